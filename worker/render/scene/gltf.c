@@ -12,6 +12,7 @@
  * becomes a property that the tables of parameters do not have: refused, or left out, there.
  */
 #include "worker/render/scene/gltf_private.h"
+#include "worker/render/scene/little.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,11 +27,6 @@ bool gltf_is(const char *name)
 {
 	size_t n = strlen(name);
 	return (n > 5 && strcmp(name + n - 5, ".gltf") == 0) || (n > 4 && strcmp(name + n - 4, ".glb") == 0);
-}
-
-static uint32_t little(const unsigned char *p)
-{
-	return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
 
 /* ---- lines */
@@ -85,17 +81,17 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	const unsigned char *p = g->bytes;
 	*text = (const char *)p;
 	*size = g->size;
-	if (g->size < GLB_HEADER || little(p) != GLB_MAGIC)
+	if (g->size < GLB_HEADER || little_u32(p) != GLB_MAGIC)
 		return 0;
-	if (little(p + 4) != 2)
-		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", little(p + 4));
-	if (little(p + 8) > g->size)
-		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, it has %zu", little(p + 8), g->size);
-	size_t end = little(p + 8), at = GLB_HEADER;
+	if (little_u32(p + 4) != 2)
+		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", little_u32(p + 4));
+	if (little_u32(p + 8) > g->size)
+		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, it has %zu", little_u32(p + 8), g->size);
+	size_t end = little_u32(p + 8), at = GLB_HEADER;
 	*size = 0;
 	for (int i = 0; at + GLB_CHUNK <= end; i++) {
-		size_t length = little(p + at);
-		uint32_t type = little(p + at + 4);
+		size_t length = little_u32(p + at);
+		uint32_t type = little_u32(p + at + 4);
 		at += GLB_CHUNK;
 		if (length > end - at)
 			return gltf_fail(g, NULL, EINVAL, "a chunk leads out of the file");

@@ -8,6 +8,7 @@
  * other than the usual ones.
  */
 #include "worker/render/scene/image_decode.h"
+#include "worker/render/scene/little.h"
 
 enum { FILE_HEADER = 14, CORE_HEADER = 12, INFO_HEADER = 40, PLAIN = 0, MASKED = 3 };
 
@@ -19,14 +20,6 @@ struct bmp {
 	const unsigned char *palette;
 	uint32_t colours, entry; /* entries, and bytes of each: blue, green, red */
 };
-
-static uint32_t little(const unsigned char *p, int bytes)
-{
-	uint32_t x = 0;
-	for (int i = bytes - 1; i >= 0; i--)
-		x = x << 8 | p[i];
-	return x;
-}
 
 static int broken(const struct bmp *b, const char *what)
 {
@@ -50,8 +43,8 @@ static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
 static bool masks_are_usual(const struct bmp *b)
 {
 	const unsigned char *p = b->in->bytes + FILE_HEADER + INFO_HEADER;
-	return b->in->size >= FILE_HEADER + INFO_HEADER + 12 && b->bits == 32 && little(p, 4) == 0xff0000 &&
-	       little(p + 4, 4) == 0xff00 && little(p + 8, 4) == 0xff;
+	return b->in->size >= FILE_HEADER + INFO_HEADER + 12 && b->bits == 32 && little_u32(p) == 0xff0000 &&
+	       little_u32(p + 4) == 0xff00 && little_u32(p + 8) == 0xff;
 }
 
 static int read_header(struct bmp *b)
@@ -59,22 +52,22 @@ static int read_header(struct bmp *b)
 	const unsigned char *p = b->in->bytes;
 	if (b->in->size < FILE_HEADER + CORE_HEADER)
 		return broken(b, "the header ends too early");
-	uint32_t header = little(p + FILE_HEADER, 4), compression = PLAIN, used = 0;
-	b->pixels_at = little(p + 10, 4);
+	uint32_t header = little_u32(p + FILE_HEADER), compression = PLAIN, used = 0;
+	b->pixels_at = little_u32(p + 10);
 	if (header != CORE_HEADER && (header < INFO_HEADER || header > b->in->size - FILE_HEADER))
 		return broken(b, "a header of an unknown size");
 	if (header == CORE_HEADER) {
-		b->width = little(p + 18, 2);
-		b->height = little(p + 20, 2);
-		b->bits = little(p + 24, 2);
+		b->width = little_u16(p + 18);
+		b->height = little_u16(p + 20);
+		b->bits = little_u16(p + 24);
 	} else {
-		int32_t height = (int32_t)little(p + 22, 4);
-		b->width = little(p + 18, 4);
+		int32_t height = (int32_t)little_u32(p + 22);
+		b->width = little_u32(p + 18);
 		b->down = height < 0;
 		b->height = (uint64_t)(height < 0 ? -(int64_t)height : height);
-		b->bits = little(p + 28, 2);
-		compression = little(p + 30, 4);
-		used = little(p + 46, 4);
+		b->bits = little_u16(p + 28);
+		compression = little_u32(p + 30);
+		used = little_u32(p + 46);
 	}
 	if (compression != PLAIN && !(compression == MASKED && masks_are_usual(b)))
 		return error_set(b->in->error, ENOTSUP, "%s: BMP: compressed, or with unusual masks", b->in->name);
