@@ -11,6 +11,10 @@
 __attribute__((format(printf, 3, 4))) struct world *world_of_text(uint32_t width, uint32_t height, const char *format,
 								  ...);
 
+/* A scene of Mitsuba 3 with a camera and `body` is refused, when it is read or built, with a sentence that holds
+ * `sentence`; else the test fails. */
+void world_refused(const char *body, const char *sentence);
+
 /* A sensor looking from o to t, box filter, film of 32 x 32: a fragment for the text above. */
 /* clang-format off */
 #define SENSOR(o, t)                                                                                                            \

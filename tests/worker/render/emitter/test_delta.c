@@ -204,38 +204,23 @@ static void test_world(void **state)
 	world_free(w);
 }
 
-static void refuses(const char *emitters, const char *text)
-{
-	static char xml[2048];
-	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "%s</scene>", emitters);
-	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
-	struct asset_source assets = memory_assets(files);
-	struct scene s;
-	struct world *w = NULL;
-	struct error e = {""};
-	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
-	if (!rc) {
-		rc = world_new(&w, &s, &assets, NULL, &e);
-		scene_fini(&s);
-	}
-	if (rc >= 0 || !strstr(e.text, text))
-		fail_msg("%s\n gave %d: %s\n not: %s", emitters, rc, e.text, text);
-}
-
 static void test_refusals(void **state)
 {
 	(void)state;
-	refuses("<emitter type='point'><point name='position' x='1' y='0' z='0'/><transform name='to_world'><translate x='1'/></transform></emitter>",
+	world_refused(
+		"<emitter type='point'><point name='position' x='1' y='0' z='0'/><transform name='to_world'><translate x='1'/></transform></emitter>",
 		"position and to_world say the same thing");
-	refuses("<emitter type='directional'><vector name='direction' x='1' y='0' z='0'/><transform name='to_world'/></emitter>",
+	world_refused(
+		"<emitter type='directional'><vector name='direction' x='1' y='0' z='0'/><transform name='to_world'/></emitter>",
 		"direction and to_world say the same thing");
-	refuses("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>",
-		"a direction of length 0");
-	refuses("<emitter type='spot'><float name='beam_width' value='30'/></emitter>", "exceeds cutoff_angle=20");
-	refuses("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
-		"a second environment");
-	refuses("<shape type='sphere'><emitter type='point'/></shape>", "cannot hang on a shape");
-	refuses("<emitter type='point'><float name='intensity' value='-1'/></emitter>", "intensity");
+	world_refused("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>",
+		      "a direction of length 0");
+	world_refused("<emitter type='spot'><float name='beam_width' value='30'/></emitter>",
+		      "exceeds cutoff_angle=20");
+	world_refused("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
+		      "a second environment");
+	world_refused("<shape type='sphere'><emitter type='point'/></shape>", "cannot hang on a shape");
+	world_refused("<emitter type='point'><float name='intensity' value='-1'/></emitter>", "intensity");
 }
 
 int main(void)

@@ -164,34 +164,19 @@ static void test_spot(void **state)
 	world_free(w);
 }
 
-static void refuses(const char *emitter, const char *text)
-{
-	static char xml[2048];
-	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "%s</scene>", emitter);
-	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
-	struct asset_source assets = memory_assets(files);
-	struct scene s;
-	struct world *w = NULL;
-	struct error e = {""};
-	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
-	if (!rc) {
-		rc = world_new(&w, &s, &assets, NULL, &e);
-		scene_fini(&s);
-	}
-	if (rc >= 0 || !strstr(e.text, text))
-		fail_msg("%s\n gave %d: %s\n not: %s", emitter, rc, e.text, text);
-}
-
 static void test_refusals(void **state)
 {
 	(void)state;
-	refuses("<emitter type='spot'><texture type='checkerboard' name='texture'/><float name='cutoff_angle' value='90'/></emitter>",
+	world_refused(
+		"<emitter type='spot'><texture type='checkerboard' name='texture'/><float name='cutoff_angle' value='90'/></emitter>",
 		"at most 89 degrees");
-	refuses("<emitter type='projector'><float name='fov' value='30'/><string name='focal_length' value='30mm'/></emitter>",
+	world_refused(
+		"<emitter type='projector'><float name='fov' value='30'/><string name='focal_length' value='30mm'/></emitter>",
 		"say the same thing");
-	refuses("<emitter type='projector'><transform name='to_world'><scale x='1' y='1' z='0'/></transform></emitter>",
+	world_refused(
+		"<emitter type='projector'><transform name='to_world'><scale x='1' y='1' z='0'/></transform></emitter>",
 		"singular");
-	refuses("<emitter type='projector'><float name='fov' value='180'/></emitter>", "fov");
+	world_refused("<emitter type='projector'><float name='fov' value='180'/></emitter>", "fov");
 }
 
 int main(void)
