@@ -19,6 +19,7 @@
 
 #include <uv.h>
 
+struct follow_up;
 struct incoming;
 struct clearing;
 struct durable_ack;
@@ -48,7 +49,8 @@ struct found {
 struct jobs {
 	struct server_config config;
 	struct peer_calls peers;
-	void (*stop)(void *user); /* the loop is to end: `fault` says why */
+	const struct follow_up *follow_up; /* coordinator/jobs/step.h */
+	void (*stop)(void *user);	   /* the loop is to end: `fault` says why */
 	void *stop_user;
 	uv_loop_t *loop;
 	uv_timer_t wake, drain; /* drain: results that waited for a canvas */

@@ -4,8 +4,7 @@
  * merges results, prepares jobs after their bootstrap, starts publishing, records changes of state.
  *
  * A result that the core wants merged is first appended to the job's journal (durable_merged), then added to its films;
- * its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished as soon as no thread
- * reads its films: record, ledger, JobEnd to all workers, memory.
+ * its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished later (finish.c).
  *
  * If a result cannot be merged for want of memory the process exits: the films may hold half of it, nobody was told
  * that it is stored, and the next start has it from the journal or computes it again. Any other failure of a merge ends
@@ -21,20 +20,13 @@
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/late.h"
 #include "coordinator/jobs/durable.h"
-#include "coordinator/jobs/extend.h"
-#include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/publish.h"
-#include "coordinator/jobs/results.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
-#include "coordinator/retention/ages.h"
-#include "coordinator/retention/clear.h"
-#include "coordinator/retention/keep.h"
 
 #include <assert.h>
 #include <fcntl.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 /* ---- jobs ---- */
@@ -274,57 +266,4 @@ void dispatch_update(struct jobs *s, const struct update *u, const struct incomi
 			break;
 		}
 	}
-}
-
-/* ---- the end of a live job ---- */
-
-static void finish(struct jobs *s, struct live_job *o)
-{
-	struct job_view v;
-	struct timespec now;
-	clock_gettime(CLOCK_REALTIME, &now);
-	jobs_view(s, o->id, &v);
-	v.record.ended_seen = ages_now(s);
-	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-	o->record = v.record;
-	if (durable_end(s, o)) { /* again, later */
-		o->unrecorded = true;
-		o->try_again = jobs_now(s) + s->config.retry_seconds;
-		return;
-	}
-	jobs_remember(s, &v.record);
-	s->peers.job_ended(s->peers.user, o->id);
-	keep_trim(s);
-	clear_soon(s);
-	live_job_release_blobs(live_job_submit(o), s->blobs);
-	struct live_job **at = &s->orders;
-	while (*at != o)
-		at = &(*at)->next;
-	*at = o->next;
-	struct waiting_batch *late = o->waiting;
-	o->waiting = NULL;
-	o->waiting_last = &o->waiting;
-	live_job_free(o);
-	while (late) { /* the core says that the job is over */
-		struct waiting_batch *next = late->next;
-		results_take(s, late->peer, &late->envelope, &late->payload);
-		waiting_batch_free(late);
-		late = next;
-	}
-}
-
-void dispatch_finish_orders(struct jobs *s)
-{
-	bool finished = false;
-	for (struct live_job *o = s->orders, *next; o; o = next) {
-		next = o->next;
-		if (o->ended && !o->busy && !o->unpublished && !o->unrecorded) {
-			finish(s, o);
-			finished = true;
-			next = s->orders; /* late batches may have ended others */
-		}
-	}
-	if (finished)
-		s->peers.jobs_let_go(s->peers.user);
-	extend_waiting(s);
 }

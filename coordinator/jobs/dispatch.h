@@ -9,9 +9,6 @@ struct incoming;
 
 /* in: what the event brought that the update answers. */
 void dispatch_update(struct jobs *s, const struct update *u, const struct incoming *in);
-/* Live jobs that the core has ended and whose canvas is free: written down, told to the workers, let go. */
-void dispatch_finish_orders(struct jobs *s);
-
 /* All of its bootstrap is merged: its films, or another try later, when the disk has no room for them. */
 void dispatch_prepare(struct jobs *s, struct live_job *o);
 

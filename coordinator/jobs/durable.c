@@ -7,7 +7,7 @@
  * the journals of all queued ones in the thread pool (group commit), and done() sends them.
  *
  * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements are
- * parked, and durable_tick tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job
+ * parked, and durable_mend tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job
  * whose end cannot be recorded stays in a list of endings until it can. Only running out of memory for these lists
  * (some 200 bytes) ends the process.
  */
@@ -19,8 +19,6 @@
 #include "common/base/version.h"
 #include "common/wire/frame.h"
 #include "coordinator/job/incoming.h"
-#include "coordinator/jobs/dispatch.h"
-#include "coordinator/jobs/publish.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/retention/keep.h"
 #include "coordinator/store/row_file.h"
@@ -431,15 +429,20 @@ static void unpark(struct jobs *s)
 	flush_next(s);
 }
 
-/* 0: nothing stands in the way of its results any more. */
-static int mend(struct live_job *o, struct error *e)
+int durable_mend(struct jobs *s, struct live_job *o)
 {
+	struct error e;
+	o->try_again = jobs_now(s) + s->config.retry_seconds;
 	if (o->unsure)
 		return -EAGAIN;
-	int rc = journal_is_bad(o->journal) ? journal_renew(o->journal, e) : 0;
+	int rc = journal_is_bad(o->journal) ? journal_renew(o->journal, &e) : 0;
 	if (rc && rc != -EAGAIN)
-		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
-	return rc ? rc : journal_reserve(o->journal, 2 * o->held_bytes, e);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	if (!rc)
+		rc = journal_reserve(o->journal, 2 * o->held_bytes, &e);
+	if (!rc)
+		hold(s, o, "");
+	return rc;
 }
 
 void durable_tick(struct jobs *s)
@@ -449,33 +452,6 @@ void durable_tick(struct jobs *s)
 	if (s->parked)
 		unpark(s);
 	end_again(s);
-	for (struct live_job *o = s->orders; o; o = o->next) {
-		struct error e;
-		if (jobs_now(s) < o->try_again || o->busy)
-			continue;
-		if (o->unpublished) {
-			o->unpublished = false;
-			publish_start(s, o, PUBLISH_RESULT, o->unpublished_rounds);
-		}
-		if (o->unrecorded) {
-			o->unrecorded = false;
-			dispatch_finish_orders(s);
-			return; /* as below */
-		}
-		if (o->unprepared && !o->ended) {
-			struct event ev = {.kind = EVENT_TICK};
-			dispatch_prepare(s, o);
-			jobs_step(s, &ev);
-			return;
-		}
-		if (!o->held || o->ended)
-			continue;
-		o->try_again = jobs_now(s) + s->config.retry_seconds;
-		if (mend(o, &e) == 0) {
-			hold(s, o, "");
-			return; /* the list may have changed; the others next time */
-		}
-	}
 }
 
 void durable_close(struct jobs *s)

@@ -34,7 +34,9 @@ void durable_look(struct jobs *s, uint64_t job);
 
 /* What the disk did not take is tried again from time to time, and the text says what that is. */
 void durable_hold(struct jobs *s, struct live_job *o, const char *what, const char *why);
-/* Now and then; writes down, too, what went wrong with a job since. */
+/* 0: nothing stands in the way of its results any more, and it goes on. */
+int durable_mend(struct jobs *s, struct live_job *o);
+/* Now and then: counters, what went wrong with a job since, and ends of jobs that could not be written. */
 void durable_tick(struct jobs *s);
 void durable_close(struct jobs *s); /* after the loop */
 

@@ -14,6 +14,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/durable.h"
+#include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/restore.h"
@@ -132,15 +133,6 @@ static int extend_live(struct jobs *s, const struct requester *by, struct live_j
 
 /* ---- a job that is done ---- */
 
-static void forget_end(struct jobs *s, uint64_t job)
-{
-	for (size_t i = 0; i < s->ended_count; i++)
-		if (s->ended[i].id == job) {
-			memmove(&s->ended[i], &s->ended[i + 1], (--s->ended_count - i) * sizeof *s->ended);
-			return;
-		}
-}
-
 /* What is kept of it beside its row. */
 static int read_job(const struct jobs *s, uint64_t job, struct row_file *f, struct error *e)
 {
@@ -174,7 +166,7 @@ static int begin_again(struct jobs *s, const struct requester *by, struct live_j
 	take_counts(&o->counts, r);
 	o->next = s->orders;
 	s->orders = o;
-	forget_end(s, o->id);
+	ended_jobs_remove(s, o->id);
 	s->refusal[0] = 0;
 	rc = restore_tell(s, o, "", by->peer, e);
 	if (!rc && !*s->refusal)
@@ -182,7 +174,7 @@ static int begin_again(struct jobs *s, const struct requester *by, struct live_j
 	if (!rc)
 		rc = error_set(e, EAGAIN, "%s", s->refusal);
 	s->orders = o->next;
-	jobs_remember(s, r);
+	ended_jobs_add(s, r);
 	struct job_record over = *r;
 	over.extended = o->record.extended;
 	durable_end_row(s, &over);

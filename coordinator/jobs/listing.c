@@ -8,22 +8,9 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/recovery.h"
-#include "coordinator/jobs/restore.h"
-#include "coordinator/retention/ages.h"
-#include "coordinator/retention/keep.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-void jobs_remember(struct jobs *s, const struct job_record *r)
-{
-	if (s->ended_count == ENDED_MAX) {
-		keep_drop(s, s->ended[0].id); /* nobody would count its films any more */
-		memmove(s->ended, s->ended + 1, --s->ended_count * sizeof *s->ended);
-	}
-	s->ended[s->ended_count++] = *r;
-}
 
 static void view_order(struct jobs *s, const struct live_job *o, struct job_view *v)
 {
@@ -95,48 +82,4 @@ size_t jobs_views(struct jobs *s, struct job_view **views)
 	n += recovery_views(s, *views + n);
 	qsort(*views, count, sizeof **views, by_id);
 	return count;
-}
-
-/* Jobs of an earlier run that have ended, and those that were never accepted: whoever submitted them has no answer. */
-int listing_open(struct jobs *s, struct error *e)
-{
-	uint64_t *ids;
-	size_t count;
-	int rc = spool_jobs(s->spool, &ids, &count, e);
-	if (rc)
-		return rc;
-	s->ended = mem_alloc(ENDED_MAX, sizeof *s->ended);
-	if (!s->ended) {
-		mem_free(ids);
-		return error_set(e, ENOMEM, "no memory for the list of jobs");
-	}
-	for (size_t i = count > ENDED_MAX ? count - ENDED_MAX : 0; i < count; i++) {
-		struct job_record *r = &s->ended[s->ended_count];
-		struct error fault;
-		if (restore_lives(s, ids[i]))
-			continue;
-		rc = spool_read_record(s->spool, ids[i], r, &fault);
-		if (rc == -ENOENT) /* the number of a job that did not get as far as a record */
-			continue;
-		if (rc) {
-			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[i],
-				  log_quote(fault.text).text);
-			continue;
-		}
-		if (!record_is_ended(r)) {
-			text_copy(r->state, sizeof r->state, "failed");
-			text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
-			text_copy(r->why, sizeof r->why, "the coordinator stopped before the job was accepted");
-			r->exit_code = 3;
-			r->ended = (double)time(NULL);
-			r->ended_seen = ages_now(s);
-			if (spool_write_record(s->spool, r, &fault))
-				log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(fault.text).text);
-		}
-		s->ended_count++;
-	}
-	mem_free(ids);
-	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(s->config.spool).text, s->ended_count,
-		  (unsigned long long)spool_next_job(s->spool));
-	return 0;
 }

@@ -5,10 +5,6 @@
 
 #include "coordinator/job/jobs.h"
 
-/* Reads the records of the last jobs that ended. One that cannot be read is logged and left out. */
-int listing_open(struct jobs *s, struct error *e);
-void jobs_remember(struct jobs *s, const struct job_record *r); /* it has ended */
-
 /* false: no such job. */
 bool jobs_view(struct jobs *s, uint64_t job, struct job_view *v);
 /* All that are listed, ascending by id; mem_alloc'd. */

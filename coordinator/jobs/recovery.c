@@ -15,8 +15,8 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/files.h"
-#include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/keep.h"
@@ -129,7 +129,7 @@ static void write_end(struct jobs *s, struct job_record *r, const char *why)
 	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) ||
 	    ledger_end(s->ledger, r->id, r->extended, r->state, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	jobs_remember(s, r);
+	ended_jobs_add(s, r);
 }
 
 /* The job has failed, if that is how it would be at every start; else an error of the machine. */

@@ -12,11 +12,13 @@
 #include "common/base/mem.h"
 #include "coordinator/jobs/checkpoint.h"
 #include "coordinator/jobs/durable.h"
+#include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/folder.h"
-#include "coordinator/jobs/listing.h"
+#include "coordinator/jobs/follow_up.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/restore.h"
+#include "coordinator/jobs/retry.h"
 #include "coordinator/jobs/trust.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
@@ -34,7 +36,7 @@ int jobs_open(struct jobs *s, struct error *e)
 	if (!rc)
 		rc = restore_open(s, e);
 	if (!rc)
-		rc = listing_open(s, e);
+		rc = ended_jobs_open(s, e);
 	if (rc)
 		return rc;
 	if (s->config.keep_partials && disk_mkdir(s->config.keep_partials, 0777) && errno != EEXIST)
@@ -57,6 +59,7 @@ int jobs_open(struct jobs *s, struct error *e)
 
 void jobs_init(struct jobs *s)
 {
+	s->follow_up = &follow_up;
 	s->deferred_last = &s->deferred;
 	s->acks_last = &s->acks;
 	uv_timer_init(s->loop, &s->wake);
@@ -70,6 +73,7 @@ void jobs_tick(struct jobs *s)
 	if (recovery_is_on(s))
 		s->changes++;
 	durable_tick(s);
+	retry_tick(s);
 	files_tick(s);
 	folder_tick(s);
 	clear_tick(s);

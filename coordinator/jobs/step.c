@@ -2,11 +2,9 @@
 /*
  * How an event runs through the core, and what follows from it.
  *
- * jobs_step gives it to the core (core/farm.h), which changes its state and answers with a list of actions;
- * dispatch.c carries these out. Events that come up meanwhile are queued and follow before jobs_step returns. Then jobs
- * that have ended are finished, results that waited for others are merged, and a checkpoint is begun where one is due.
- * The core says when it must be told the time at the latest: the timer `wake`. Results that came while a job's films
- * were read follow one at a time by the timer `drain`.
+ * jobs_step gives it to the core (core/farm.h), which changes its state and answers with a list of actions. The table
+ * `follow_up` carries these out. Events that come up meanwhile are queued and follow before jobs_step returns; then the
+ * table is told that the step is over. The core says when it must be told the time at the latest: the timer `wake`.
  *
  * A step does not fail. Without memory for a queued event (300 bytes) the process ends.
  */
@@ -15,10 +13,6 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/job/incoming.h"
-#include "coordinator/jobs/checkpoint.h"
-#include "coordinator/jobs/dispatch.h"
-#include "coordinator/jobs/late_feed.h"
-#include "coordinator/jobs/results.h"
 
 #include <assert.h>
 #include <math.h>
@@ -57,7 +51,7 @@ static void one_step(struct jobs *s, struct event *ev, const struct incoming *in
 		ev->unread = 0;
 	farm_step(s->farm, ev, &u);
 	s->changes++;
-	dispatch_update(s, &u, in);
+	s->follow_up->carry_out(s, &u, in);
 	if (isfinite(u.wake) && !s->stopping) {
 		double ms = ceil(1000 * (u.wake - jobs_now(s)));
 		uv_timer_start(&s->wake, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
@@ -88,9 +82,7 @@ void jobs_step_with(struct jobs *s, struct event *ev, const struct incoming *in)
 		mem_free(d);
 	}
 	s->stepping = false;
-	dispatch_finish_orders(s);
-	late_feed(s);
-	checkpoint_where_due(s);
+	s->follow_up->stepped(s);
 }
 
 static void on_wake(uv_timer_t *t)
@@ -99,26 +91,7 @@ static void on_wake(uv_timer_t *t)
 	jobs_step(t->data, &ev);
 }
 
-/* One at a time, so that nobody else waits for all of them. */
-static void on_drain(uv_timer_t *t)
-{
-	struct jobs *s = t->data;
-	struct live_job *o = s->orders;
-	while (o && (o->busy || !o->waiting))
-		o = o->next;
-	if (!o)
-		return;
-	struct waiting_batch *w = live_job_take_waiting(o);
-	results_take(s, w->peer, &w->envelope, &w->payload);
-	waiting_batch_free(w);
-	if (!s->stopping)
-		uv_timer_start(&s->drain, on_drain, 0, 0);
-}
-
 void jobs_films_free(struct jobs *s)
 {
-	if (!s->stopping)
-		uv_timer_start(&s->drain, on_drain, 0, 0);
-	dispatch_finish_orders(s);
-	late_feed(s);
+	s->follow_up->films_free(s);
 }

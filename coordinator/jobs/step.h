@@ -5,6 +5,14 @@
 
 #include "coordinator/job/jobs.h"
 
+/* What follows from the core's answers. A table, because what it names steps in its turn (follow_up.h). */
+struct follow_up {
+	/* The actions of an update, in their order. in: what the event brought that the update answers. */
+	void (*carry_out)(struct jobs *s, const struct update *u, const struct incoming *in);
+	void (*stepped)(struct jobs *s);    /* the event and all that were deferred meanwhile are carried out */
+	void (*films_free)(struct jobs *s); /* some live job is no longer busy */
+};
+
 /* Gives the event to the core and carries out the update and all that follows from it. */
 void jobs_step(struct jobs *s, struct event *ev);
 /* The same, of an event that brought more (incoming.h). Not while an update is carried out. */
