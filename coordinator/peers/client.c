@@ -17,6 +17,7 @@
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
+#include "coordinator/peers/client_answers.h"
 #include "coordinator/peers/control.h"
 #include "coordinator/peers/fetch.h"
 #include "coordinator/peers/upload.h"
@@ -27,15 +28,6 @@
 enum { CHUNK = 1 << 20 };
 
 /* ---- submit ---- */
-
-uint64_t client_uploading(const struct session *p)
-{
-	uint64_t bytes = 0;
-	for (const struct session *other = p->peers->sessions; other; other = other->next)
-		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)
-			bytes += live_job_asset_bytes(other->upload->submit.message->submit);
-	return bytes;
-}
 
 static void answer_submit(struct session *p, uint64_t job, const char *refusal, const struct upload *u)
 {
@@ -169,21 +161,6 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 
 /* ---- the rest ---- */
 
-/* Whoever has a certificate sees the own jobs alone, an operator all. Jobs of others are not there: that they are would
- * be an answer, too. */
-static bool may_see(const struct session *p, struct job_view *v)
-{
-	if (p->who.role == TLS_NOBODY || p->who.role == TLS_OPERATOR)
-		return true;
-	view_hide_others(v);
-	return *p->who.name && strcmp(p->who.name, v->record.owner) == 0;
-}
-
-bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v)
-{
-	return jobs_view(p->jobs, job, v) && may_see(p, v);
-}
-
 static void take_list(struct session *p)
 {
 	struct job_view *views;
@@ -194,7 +171,7 @@ static void take_list(struct session *p)
 	farm__job_list_answer__init(&answer);
 	farm__envelope__init(&m);
 	for (size_t i = 0; status && list && i < count; i++) {
-		if (!may_see(p, &views[i]))
+		if (!client_may_see(p, &views[i]))
 			continue;
 		view_to_wire(&views[i], &status[i]);
 		list[answer.n_jobs++] = &status[i];
@@ -206,21 +183,6 @@ static void take_list(struct session *p)
 	mem_free(status);
 	mem_free(list);
 	mem_free(views);
-}
-
-void client_send_done(struct session *p, const char *text)
-{
-	char said[256];
-	Farm__Done done;
-	Farm__Envelope m;
-	farm__done__init(&done);
-	farm__envelope__init(&m);
-	done.ok = !*p->rejected;
-	text_copy(said, sizeof said, *p->rejected ? p->rejected : text);
-	done.text = said;
-	m.body_case = FARM__ENVELOPE__BODY_DONE;
-	m.done = &done;
-	session_send(p, &m, NULL, 0);
 }
 
 static void take_watch(struct session *p, uint64_t job)

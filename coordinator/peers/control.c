@@ -6,7 +6,7 @@
 #include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/jobs/step.h"
-#include "coordinator/peers/client.h"
+#include "coordinator/peers/client_answers.h"
 
 /* Without a certificate anybody may call himself anything. */
 static const char *name_of(const struct session *p)

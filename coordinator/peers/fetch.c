@@ -8,7 +8,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "coordinator/jobs/publish.h"
-#include "coordinator/peers/client.h"
+#include "coordinator/peers/client_answers.h"
 
 #include <fcntl.h>
 #include <string.h>
@@ -47,7 +47,7 @@ void fetch_end(struct session *p)
 	if (!p->fetch.job)
 		return;
 	disk_close(p->fetch.fd);
-	p->fetch = (struct fetch){0};
+	p->fetch = (struct fetching){0};
 	p->peers->fetches--;
 }
 
@@ -79,7 +79,7 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 	}
 	if (st.st_size > CHUNK) /* else this is its only piece */
 		make_room(p->peers);
-	p->fetch = (struct fetch){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
+	p->fetch = (struct fetching){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
 	p->peers->fetches++;
 	return 0;
 }
@@ -100,7 +100,8 @@ static int begin(struct session *p, const Farm__Fetch *f, struct job_view *v, st
 	return open_file(p, f, file, e);
 }
 
-static int read_piece(const struct fetch *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count, struct error *e)
+static int read_piece(const struct fetching *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count,
+		      struct error *e)
 {
 	if (t->job != f->job || t->what != f->what)
 		return error_set(

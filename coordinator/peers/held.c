@@ -67,33 +67,21 @@ void held_tick(struct session *p)
 	session_send(p, &m, NULL, 0);
 }
 
-static struct held *take_first(struct session *p)
+bool held_next(struct session *p, struct envelope *env)
 {
 	struct held *h = p->held;
+	if (!h)
+		return false;
 	p->held = h->next;
 	p->held_bytes -= cost_of(&h->envelope);
 	p->peers->held_bytes -= cost_of(&h->envelope);
-	return h;
-}
-
-static void free_held(struct held *h)
-{
-	envelope_fini(&h->envelope);
+	*env = h->envelope;
 	mem_free(h);
+	return true;
 }
 
 void held_drop(struct session *p)
 {
-	while (p->held)
-		free_held(take_first(p));
-}
-
-void held_deliver(struct peers *s)
-{
-	for (struct session *p = s->sessions; p; p = p->next)
-		while (p->held) {
-			struct held *h = take_first(p);
-			session_message(p, &h->envelope, NULL, 0);
-			free_held(h);
-		}
+	for (struct envelope env; held_next(p, &env);)
+		envelope_fini(&env);
 }

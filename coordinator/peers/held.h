@@ -12,7 +12,8 @@
 /* true: it waits, and the envelope is taken; or there is too much that does, and the peer was told so. */
 bool held_take(struct session *p, struct envelope *env);
 void held_tick(struct session *p);
-void held_drop(struct session *p);  /* it goes */
-void held_deliver(struct peers *s); /* to all, now that the jobs are there */
+void held_drop(struct session *p); /* it goes */
+/* The first that waits, which is the caller's from then on; false: nothing does. */
+bool held_next(struct session *p, struct envelope *env);
 
 #endif

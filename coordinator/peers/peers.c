@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All connections: letting them in, finding them by number, and what the jobs ask of them.
+ * All connections: letting them in, and what the jobs ask of them.
  *
- * peers_accept makes a session of a connection (session.c), which enters the list and leaves it when its connection has
- * closed. When the maximum of connections is reached the oldest one without a hello gives way; when there is none, or
- * no memory, the caller is hung up on, or waits for the next tick where not even that can be done.
+ * peers_accept makes a session of a connection, which enters the list and leaves it when its connection has closed
+ * (conversation.c). When the maximum of connections is reached the oldest one without a hello gives way; when there is
+ * none, or no memory, the caller is hung up on, or waits for the next tick where not even that can be done.
  *
  * What the jobs call is at the end of the file: each function finds the session, and does nothing when it has gone.
  */
@@ -13,43 +13,11 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/peers/client.h"
+#include "coordinator/peers/client_answers.h"
+#include "coordinator/peers/conversation.h"
 #include "coordinator/peers/fetch.h"
 #include "coordinator/peers/held.h"
-#include "coordinator/peers/session.h"
-#include "coordinator/peers/worker.h"
-
-struct session *peers_find(const struct peers *s, uint64_t id)
-{
-	for (struct session *p = s->by_id[id % SESSION_BUCKETS]; p; p = p->alike)
-		if (p->id == id)
-			return p;
-	return NULL;
-}
-
-static void enlist(struct peers *s, struct session *p)
-{
-	struct session **bucket = &s->by_id[p->id % SESSION_BUCKETS];
-	p->alike = *bucket;
-	*bucket = p;
-	p->next = s->sessions;
-	p->place = &s->sessions;
-	if (p->next)
-		p->next->place = &p->next;
-	s->sessions = p;
-	s->session_count++;
-}
-
-void peers_delist(struct peers *s, struct session *p)
-{
-	struct session **at = &s->by_id[p->id % SESSION_BUCKETS];
-	while (*at != p)
-		at = &(*at)->alike;
-	*at = p->alike;
-	*p->place = p->next;
-	if (p->next)
-		p->next->place = p->place;
-	s->session_count--;
-}
+#include "coordinator/peers/worker_send.h"
 
 static void on_refused(void *user, const char *why)
 {
@@ -96,14 +64,14 @@ void peers_accept(struct peers *s)
 	p->peers = s;
 	p->jobs = s->jobs;
 	p->id = ++s->last_peer;
-	if (conn_accept(&p->conn, (uv_stream_t *)&s->listener, &config, &session_events, p, &e)) {
+	if (conn_accept(&p->conn, (uv_stream_t *)&s->listener, &config, &conversation_events, p, &e)) {
 		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
 		s->caller_waits = true;
 		mem_free(p);
 		return;
 	}
 	conn_peer_name(p->conn, p->address, sizeof p->address);
-	enlist(s, p);
+	peers_enlist(s, p);
 	log_event(LOG_PEER_ACCEPT, "peer=%llu address=%s", (unsigned long long)p->id, p->address);
 }
 
@@ -208,7 +176,7 @@ static void films_free(void *user, uint64_t job)
 
 static void jobs_read(void *user)
 {
-	held_deliver(user);
+	conversations_go_on(user);
 }
 
 static bool uses_result(void *user, uint64_t job)

@@ -1,32 +1,47 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/*
- * One connection: its handshake, the messages of a worker, and what is sent to it. Clients' messages are in client.c.
- *
- * The first message must be hello, within a time limit, and at most 4 KiB long. Version, names and the certificate's
- * role are checked; whoever is refused gets a sentence, and a worker is also told whether calling again can help. A
- * worker then asks for leases, sends results or failures, asks for files, and sends heartbeats; each message becomes an
- * event for the core, and each result is checked first (results.c).
- *
- * A message that its sender must not send is answered by Fault, and the connection ends. What a peer does not read is
- * bounded by a send limit. When the maximum of connections is reached the oldest one without a hello is closed. When a
- * connection ends, the core is told EVENT_LEFT, and uploads, fetches and requests of that peer are dropped.
- */
 #include "coordinator/peers/session.h"
 
-#include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/jobs/extend.h"
-#include "coordinator/jobs/recovery.h"
-#include "coordinator/jobs/step.h"
-#include "coordinator/peers/client.h"
-#include "coordinator/peers/fetch.h"
-#include "coordinator/peers/held.h"
-#include "coordinator/peers/worker.h"
-#include "coordinator/peers/worker_requests.h"
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <string.h>
+
+/* ---- all of them ---- */
+
+struct session *peers_find(const struct peers *s, uint64_t id)
+{
+	for (struct session *p = s->by_id[id % SESSION_BUCKETS]; p; p = p->alike)
+		if (p->id == id)
+			return p;
+	return NULL;
+}
+
+void peers_enlist(struct peers *s, struct session *p)
+{
+	struct session **bucket = &s->by_id[p->id % SESSION_BUCKETS];
+	p->alike = *bucket;
+	*bucket = p;
+	p->next = s->sessions;
+	p->place = &s->sessions;
+	if (p->next)
+		p->next->place = &p->next;
+	s->sessions = p;
+	s->session_count++;
+}
+
+void peers_delist(struct peers *s, struct session *p)
+{
+	struct session **at = &s->by_id[p->id % SESSION_BUCKETS];
+	while (*at != p)
+		at = &(*at)->alike;
+	*at = p->alike;
+	*p->place = p->next;
+	if (p->next)
+		p->next->place = p->place;
+	s->session_count--;
+}
+
+/* ---- one ---- */
 
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size)
 {
@@ -54,204 +69,3 @@ void session_fault(struct session *p, const char *format, ...)
 	p->state = SESSION_LEAVING;
 	conn_close_when_sent(p->conn, text);
 }
-
-/* ---- hello ---- */
-
-/* said: why it is refused, or what a peer that is not should know. */
-static void answer_hello(struct session *p, bool accepted, bool final, const char *said)
-{
-	char text[256];
-	Farm__HelloAck ack;
-	Farm__Envelope m;
-	farm__hello_ack__init(&ack);
-	farm__envelope__init(&m);
-	text_copy(text, sizeof text, said);
-	ack.accepted = accepted;
-	ack.final = final;
-	ack.text = text;
-	ack.version = FARM_VERSION;
-	ack.heartbeat_ms = (uint32_t)(1000 * p->jobs->config.heartbeat_seconds);
-	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
-	m.hello_ack = &ack;
-	session_send(p, &m, NULL, 0);
-	if (!accepted) {
-		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id,
-			  p->address, log_quote(p->name).text, log_quote(text).text);
-		p->state = SESSION_LEAVING;
-		conn_close_when_sent(p->conn, text);
-	}
-}
-
-static void send_hello_ack(struct session *p, bool accepted, const char *said)
-{
-	answer_hello(p, accepted, false, said);
-}
-
-/* What calling again does not mend. */
-static void refuse_for_good(struct session *p, const char *said)
-{
-	answer_hello(p, false, true, said);
-}
-
-/* What a peer that is welcome should know. */
-static const char *what_to_know(const struct session *p, char *text, size_t size)
-{
-	struct peer_status s;
-	*text = 0;
-	if (recovery_is_on(p->jobs))
-		text_print(text, size,
-			   "the coordinator is reading its jobs, %u %%: what is asked for waits until they are there",
-			   (unsigned)(100 * recovery_share(p->jobs)));
-	if (p->joined && farm_peer(p->jobs->farm, p->id, &s) && s.state == PEER_ASIDE)
-		text_print(text, size, "this worker is set aside and gets no work: %s", s.text);
-	return text;
-}
-
-static void join(struct session *p, const Farm__Hello *h)
-{
-	char text[256];
-	struct event ev = {.kind = EVENT_JOINED,
-			   .peer = p->id,
-			   .join = {.peer = p->id,
-				    .name = p->name,
-				    .fingerprint = h->fingerprint,
-				    .threads = h->threads,
-				    .certificate = p->who.name,
-				    .home = h->home,
-				    .restarts = h->restarts}};
-	p->rejected[0] = 0;
-	p->joined = true;
-	jobs_step(p->jobs, &ev);
-	if (*p->rejected) {
-		p->joined = false;
-		send_hello_ack(p, false, p->rejected);
-		return;
-	}
-	p->state = SESSION_WORKER;
-	log_event(
-		LOG_PEER_HELLO,
-		"peer=%llu address=%s role=worker name=%s certificate=%s home=%s start=%llu threads=%u fingerprint=%s",
-		(unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-",
-		*h->home ? h->home : "-", (unsigned long long)h->restarts, h->threads, log_quote(h->fingerprint).text);
-	send_hello_ack(p, true, what_to_know(p, text, sizeof text));
-}
-
-/* What the certificate does not allow; NULL: it does. */
-static const char *overreach(struct session *p, Farm__Role role, char *text, size_t size)
-{
-	const struct tls_peer *who = conn_peer(p->conn);
-	if (!who)
-		return NULL;
-	p->who = *who;
-	bool may = role == FARM__ROLE__ROLE_WORKER ? who->role == TLS_WORKER
-						   : who->role == TLS_CLIENT || who->role == TLS_OPERATOR;
-	if (may)
-		return NULL;
-	snprintf(text, size, "the certificate of %s is a %s's: it cannot %s", who->name, tls_role_name(who->role),
-		 role == FARM__ROLE__ROLE_WORKER ? "lease" : "submit or look after jobs");
-	return text;
-}
-
-/* Hexadecimal digits, as many as the core remembers. */
-static bool home_ok(const char *home)
-{
-	size_t n = strspn(home, "0123456789abcdef");
-	return !home[n] && n < JOIN_HOME;
-}
-
-static void take_hello(struct session *p, const Farm__Hello *h)
-{
-	char text[192];
-	if (h->version != FARM_VERSION) {
-		const char *who = h->role == FARM__ROLE__ROLE_WORKER ? "worker" : "client";
-		snprintf(
-			text, sizeof text,
-			"the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must be renewed",
-			who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
-		refuse_for_good(p, text);
-		return;
-	}
-	if (!envelope_text_ok(h->name, sizeof p->name - 1) || !envelope_text_ok(h->fingerprint, 255) ||
-	    !home_ok(h->home) || h->threads > 4096) {
-		refuse_for_good(p, "a name or a number in hello is out of bounds");
-		return;
-	}
-	text_copy(p->name, sizeof p->name, h->name);
-	const char *no = overreach(p, h->role, text, sizeof text);
-	if (no) {
-		refuse_for_good(p, no);
-		return;
-	}
-	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, 0});
-	conn_set_send_limit(p->conn, SESSION_SEND);
-	conn_set_quiet(p->conn, 6 * p->jobs->config.heartbeat_seconds);
-	if (h->role == FARM__ROLE__ROLE_WORKER) {
-		join(p, h);
-	} else if (h->role == FARM__ROLE__ROLE_CLIENT) {
-		p->state = SESSION_CLIENT;
-		send_hello_ack(p, true, what_to_know(p, text, sizeof text));
-	} else {
-		refuse_for_good(p, "hello must say whether it is a worker or a client");
-	}
-}
-
-/* ---- the connection ---- */
-
-void session_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
-{
-	if (p->state == SESSION_NEW && env->message->body_case == FARM__ENVELOPE__BODY_HELLO)
-		take_hello(p, env->message->hello);
-	else if (p->state == SESSION_NEW)
-		session_fault(p, "the first word must be hello");
-	else if (p->state == SESSION_WORKER)
-		worker_message(p, env);
-	else if (p->state == SESSION_CLIENT)
-		client_message(p, env, payload, size);
-}
-
-static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
-{
-	struct session *p = user;
-	bool known = p->state == SESSION_WORKER || p->state == SESSION_CLIENT;
-	if (!known || !held_take(p, env))
-		session_message(p, env, payload, size);
-}
-
-static void on_closed(void *user, const char *why)
-{
-	struct session *p = user;
-	struct peers *s = p->peers;
-	peers_delist(s, p);
-	client_upload_abort(p);
-	fetch_end(p);
-	worker_requests_drop(p);
-	held_drop(p);
-	extend_forget(p->jobs, p->id);
-	s->garbled += conn_garbled(p->conn);
-	log_event(conn_garbled(p->conn)	       ? LOG_PEER_GARBLED
-		  : conn_distrust(p->conn)     ? LOG_PEER_REFUSED
-		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
-					       : LOG_PEER_ACCEPT,
-		  "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
-		  log_quote(p->name).text, log_quote(why).text);
-	orders_drop_waiting(p->jobs->orders, p->id);
-	if (p->joined && !p->jobs->stopping) {
-		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
-		jobs_step(p->jobs, &ev);
-	}
-	mem_free(p->shown);
-	mem_free(p);
-}
-
-static void on_heard(void *user)
-{
-	worker_heard(user);
-}
-
-static void on_drained(void *user)
-{
-	worker_requests_go_on(user);
-}
-
-const struct conn_events session_events = {
-	.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};

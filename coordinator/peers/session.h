@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One peer's conversation: hello, then as a worker or as a client. Limits depend on where the conversation is. The
- * session belongs to its connection and goes with it.
+ * The sessions: what is known of each peer that is connected, and all of them by number. What is said in one is in
+ * conversation.h. A session belongs to its connection and goes with it. The loop's thread.
  */
 #ifndef COORDINATOR_PEERS_SESSION_H
 #define COORDINATOR_PEERS_SESSION_H
 
-#include "coordinator/peers/peers.h"
+#include "common/net/conn.h"
+#include "coordinator/job/jobs.h"
+
+enum { SESSION_BUCKETS = 4096 };
 
 enum { /* bytes */
        SESSION_HELLO_HEADER = 4096,
@@ -40,7 +43,7 @@ struct session {
 	double heard;	       /* s on the loop's clock: when it was last told so amid a message */
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */
-	struct fetch {	       /* a file of which it has not got all yet */
+	struct fetching {      /* a file of which it has not got all yet */
 		uint64_t job;  /* 0: none */
 		Farm__What what;
 		int fd;
@@ -55,11 +58,24 @@ struct session {
 	char rejected[256]; /* why the core refused; "" it did not */
 };
 
-extern const struct conn_events session_events; /* user: the session */
+/* All sessions, and what limits all of them together. */
+struct peers {
+	struct jobs *jobs;
+	struct tls *tls;   /* NULL: plaintext */
+	uv_tcp_t listener; /* its loop is the jobs' */
+	struct session *sessions, *by_id[SESSION_BUCKETS];
+	unsigned session_count, fetches;
+	size_t held_bytes; /* of what they ask for while jobs are read */
+	uint64_t last_peer;
+	uint64_t garbled;  /* connections on which bytes were changed */
+	bool caller_waits; /* nobody could be let in: to be tried again */
+};
+
+struct session *peers_find(const struct peers *s, uint64_t id); /* NULL: it has gone */
+void peers_enlist(struct peers *s, struct session *p);
+void peers_delist(struct peers *s, struct session *p); /* its connection has closed */
 
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size);
-/* What the peer says. May take the envelope. */
-void session_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
 /* Says why and hangs up. */
 __attribute__((format(printf, 2, 3))) void session_fault(struct session *p, const char *format, ...);
 

@@ -1,34 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A worker's side of a session: what it says, and what it is told.
+ * A worker's side of a session: what it says.
  *
  * It asks for leases, sends results or failures, asks for jobs and pieces of their files, and sends heartbeats. Each
- * message becomes an event for the core; results and failures are looked at first (results.c). What a worker may send
- * is bounded by the largest result of the jobs that it knows, and what waits for it to read by the leases that it asked
- * for.
- *
- * A message that no worker sends is answered by Fault, and the connection ends. A lease that cannot be packed ends it,
- * too: the worker calls again.
+ * message becomes an event for the core; results and failures are looked at first (results.c). A message that no
+ * worker sends is answered by Fault, and the connection ends.
  */
 #include "coordinator/peers/worker.h"
 
-#include "common/base/text.h"
 #include "coordinator/jobs/results.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/worker_requests.h"
 
 #include <string.h>
-
-/* ---- it speaks ---- */
-
-void worker_allow_results(struct session *p, const struct live_job *o)
-{
-	uint32_t need = batch_payload_max(&o->plan);
-	if (need > p->payload_limit) {
-		p->payload_limit = need;
-		conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, need});
-	}
-}
 
 /* One that makes an epoch be taken back must not come while others read the films. */
 static void take_lease_failed(struct session *p, struct envelope *env)
@@ -111,78 +95,4 @@ void worker_message(struct session *p, struct envelope *env)
 	default:
 		session_fault(p, "not a message that a worker says");
 	}
-}
-
-/* ---- it is spoken to ---- */
-
-/* As many leases as it wants, of the size of the largest, may wait for it to read them. */
-static void allow_lease(struct session *p, size_t size)
-{
-	struct peer_status s;
-	if (!farm_peer(p->jobs->farm, p->id, &s) || s.want * size <= p->leases_most)
-		return;
-	p->leases_most = s.want * size;
-	conn_set_send_limit(p->conn, SESSION_SEND + p->leases_most);
-}
-
-void worker_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k, bool anew)
-{
-	unsigned char *frame;
-	size_t size;
-	struct error e;
-	worker_allow_results(p, o);
-	if (live_job_pack_lease(o, k, anew, &frame, &size, &e)) {
-		conn_close(p->conn, e.text);
-		return;
-	}
-	allow_lease(p, size);
-	conn_send_frame(p->conn, frame, size);
-}
-
-void worker_send_revoke(struct session *p, const struct lease_key *k)
-{
-	Farm__LeaseKey key;
-	Farm__LeaseRevoke revoke;
-	Farm__Envelope m;
-	lease_key_to_wire(k, &key);
-	farm__lease_revoke__init(&revoke);
-	farm__envelope__init(&m);
-	revoke.key = &key;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_REVOKE;
-	m.lease_revoke = &revoke;
-	session_send(p, &m, NULL, 0);
-}
-
-void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text)
-{
-	static const Farm__Verdict verdicts[] = {[ACK_MERGED] = FARM__VERDICT__VERDICT_MERGED,
-						 [ACK_REPEAT] = FARM__VERDICT__VERDICT_REPEATED,
-						 [ACK_REFUSED] = FARM__VERDICT__VERDICT_REFUSED,
-						 [ACK_NOTED] = FARM__VERDICT__VERDICT_NOTED};
-	char copy[512];
-	Farm__LeaseKey key;
-	Farm__LeaseAck answer;
-	Farm__Envelope m;
-	lease_key_to_wire(k, &key);
-	farm__lease_ack__init(&answer);
-	farm__envelope__init(&m);
-	text_copy(copy, sizeof copy, text);
-	answer.key = &key;
-	answer.verdict = verdicts[ack];
-	answer.text = copy;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_ACK;
-	m.lease_ack = &answer;
-	session_send(p, &m, NULL, 0);
-}
-
-void worker_send_job_end(struct session *p, uint64_t job)
-{
-	Farm__JobEnd end;
-	Farm__Envelope m;
-	farm__job_end__init(&end);
-	farm__envelope__init(&m);
-	end.job = job;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_END;
-	m.job_end = &end;
-	session_send(p, &m, NULL, 0);
 }

@@ -5,7 +5,7 @@
 #include "common/base/mem.h"
 #include "coordinator/jobs/files.h"
 #include "coordinator/peers/session.h"
-#include "coordinator/peers/worker.h"
+#include "coordinator/peers/worker_send.h"
 
 enum {
 	BLOB_CHUNK = 1 << 20,

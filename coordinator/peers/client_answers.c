@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/peers/client_answers.h"
+
+#include "common/base/text.h"
+#include "coordinator/jobs/listing.h"
+#include "coordinator/peers/upload.h"
+
+#include <string.h>
+
+bool client_may_see(const struct session *p, struct job_view *v)
+{
+	if (p->who.role == TLS_NOBODY || p->who.role == TLS_OPERATOR)
+		return true;
+	view_hide_others(v);
+	return *p->who.name && strcmp(p->who.name, v->record.owner) == 0;
+}
+
+bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v)
+{
+	return jobs_view(p->jobs, job, v) && client_may_see(p, v);
+}
+
+void client_send_done(struct session *p, const char *text)
+{
+	char said[256];
+	Farm__Done done;
+	Farm__Envelope m;
+	farm__done__init(&done);
+	farm__envelope__init(&m);
+	done.ok = !*p->rejected;
+	text_copy(said, sizeof said, *p->rejected ? p->rejected : text);
+	done.text = said;
+	m.body_case = FARM__ENVELOPE__BODY_DONE;
+	m.done = &done;
+	session_send(p, &m, NULL, 0);
+}
+
+uint64_t client_uploading(const struct session *p)
+{
+	uint64_t bytes = 0;
+	for (const struct session *other = p->peers->sessions; other; other = other->next)
+		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)
+			bytes += live_job_asset_bytes(other->upload->submit.message->submit);
+	return bytes;
+}

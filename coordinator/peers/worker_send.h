@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a worker is told. What it may send is bounded by the largest result of the jobs that it knows, and what waits
+ * for it to read by the leases that it asked for. A lease that cannot be packed ends the connection: the worker calls
+ * again. The loop's thread.
+ */
+#ifndef COORDINATOR_PEERS_WORKER_SEND_H
+#define COORDINATOR_PEERS_WORKER_SEND_H
+
+#include "coordinator/peers/session.h"
+
+/* Results of this job may come from now on, and they may be so long. */
+void worker_allow_results(struct session *p, const struct live_job *o);
+
+/* anew: with seeds. */
+void worker_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k, bool anew);
+void worker_send_revoke(struct session *p, const struct lease_key *k);
+void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);
+void worker_send_job_end(struct session *p, uint64_t job);
+
+#endif
