@@ -8,9 +8,9 @@
 #include "worker/cli/base/options.h"
 
 #include "common/base/mem.h"
+#include "common/base/spelling.h"
 #include "common/base/text.h"
 #include "worker/render/settings/accuracy_settings.h"
-#include "worker/render/scene/spelling.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/define.h"
 
-#include "worker/render/scene/spelling.h"
+#include "common/base/spelling.h"
 
 #include <string.h>
 

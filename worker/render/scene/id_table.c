@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/id_table.h"
 
+#include "common/base/spelling.h"
 #include "worker/render/scene/plugin.h"
-#include "worker/render/scene/spelling.h"
 #include "worker/render/scene/value.h"
 
 #include <stdlib.h>

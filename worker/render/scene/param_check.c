@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/param_check.h"
 
-#include "worker/render/scene/spelling.h"
+#include "common/base/spelling.h"
 #include "worker/render/scene/value.h"
 
 #include <stdint.h>

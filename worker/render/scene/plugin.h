@@ -3,8 +3,8 @@
 #ifndef WORKER_RENDER_SCENE_PLUGIN_H
 #define WORKER_RENDER_SCENE_PLUGIN_H
 
+#include "common/base/spelling.h"
 #include "worker/render/scene/param.h"
-#include "worker/render/scene/spelling.h"
 
 #include <stdbool.h>
 

@@ -8,6 +8,7 @@
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
+#include "worker/render/scene/snake_case.h"
 #include "worker/render/scene/value.h"
 #include "worker/render/scene/xml.h"
 
@@ -111,7 +112,7 @@ static const char *property_name(struct maker *m, const struct xml_element *el, 
 		return name;
 	char *snake = allocate(m, 2 * strlen(name) + 1, 1);
 	if (snake)
-		spelling_snake(name, snake);
+		snake_case(name, snake);
 	return snake;
 }
 

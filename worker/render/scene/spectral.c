@@ -8,9 +8,9 @@
  */
 #include "worker/render/scene/spectral.h"
 
+#include "common/base/spelling.h"
 #include "worker/render/math/cie.h"
 #include "worker/render/scene/number.h"
-#include "worker/render/scene/spelling.h"
 #include "worker/render/scene/value.h"
 
 #include <math.h>

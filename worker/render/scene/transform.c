@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/transform.h"
 
+#include "common/base/spelling.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/param.h"
-#include "worker/render/scene/spelling.h"
 #include "worker/render/scene/value.h"
 
 #include <string.h>

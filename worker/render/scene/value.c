@@ -5,9 +5,9 @@
  */
 #include "worker/render/scene/value.h"
 
+#include "common/base/spelling.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/spectral.h"
-#include "worker/render/scene/spelling.h"
 #include "worker/render/scene/transform.h"
 #include "worker/render/scene/srgb.h"
 

@@ -7,8 +7,8 @@
  */
 #include "worker/render/settings/accuracy_settings.h"
 
+#include "common/base/spelling.h"
 #include "common/base/text.h"
-#include "worker/render/scene/spelling.h"
 
 #include <math.h>
 #include <stdlib.h>

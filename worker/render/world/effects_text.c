@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Names of effects, what each saves, and the text in which a plan overrides them. */
-#include "worker/render/scene/spelling.h"
+#include "common/base/spelling.h"
 #include "worker/render/world/effects.h"
 
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/math/rng.h"
 #include "worker/render/scene/number.h"
-#include "worker/render/scene/spelling.h"
+#include "worker/render/scene/snake_case.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -88,7 +88,7 @@ static void test_lists(void **state)
 static void check_snake(const char *from, const char *to)
 {
 	char out[128];
-	spelling_snake(from, out);
+	snake_case(from, out);
 	assert_string_equal(out, to);
 }
 
@@ -105,26 +105,6 @@ static void test_snake(void **state)
 	check_snake("", "");
 }
 
-static const char *nearest(const char *wanted)
-{
-	static const char *const names[] = {"roughdielectric", "dielectric", "diffuse", "conductor", "roughconductor"};
-	struct spelling s = {.wanted = wanted};
-	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		spelling_offer(&s, names[i]);
-	return s.best ? s.best : "";
-}
-
-static void test_nearest(void **state)
-{
-	(void)state;
-	assert_string_equal(nearest("difuse"), "diffuse");
-	assert_string_equal(nearest("dielectirc"), "dielectric");
-	assert_string_equal(nearest("roughConductor"), "roughconductor");
-	assert_string_equal(nearest("rough_dielectric"), "roughdielectric");
-	assert_string_equal(nearest("subsurface"), "");
-	assert_string_equal(nearest(""), "");
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -133,7 +113,6 @@ int main(void)
 		cmocka_unit_test(test_rounding_agrees_with_the_library),
 		cmocka_unit_test(test_lists),
 		cmocka_unit_test(test_snake),
-		cmocka_unit_test(test_nearest),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

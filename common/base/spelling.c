@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/scene/spelling.h"
+#include "common/base/spelling.h"
 
 #include <stdbool.h>
 #include <stdio.h>
@@ -7,26 +7,9 @@
 
 enum { COMPARED_MAX = 48 };
 
-static bool is_upper(char c)
-{
-	return c >= 'A' && c <= 'Z';
-}
-
 static char lower(char c)
 {
-	return is_upper(c) ? (char)(c - 'A' + 'a') : c;
-}
-
-void spelling_snake(const char *name, char *out)
-{
-	char before = '_';
-	for (; *name; name++) {
-		if (is_upper(*name) && before != '_' && !is_upper(before))
-			*out++ = '_';
-		*out++ = lower(*name);
-		before = *name;
-	}
-	*out = 0;
+	return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
 }
 
 /* Insertions, deletions, replacements, exchanges of neighbours (optimal string alignment). */

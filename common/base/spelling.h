@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Names: Mitsuba 0.6's camelCase in 3.x spelling, and what a mistyped one may have meant. Pure; any thread. */
-#ifndef WORKER_RENDER_SCENE_SPELLING_H
-#define WORKER_RENDER_SCENE_SPELLING_H
+/* What a mistyped name may have meant: of a scene's elements, of settings, of options. Pure; any thread. */
+#ifndef COMMON_BASE_SPELLING_H
+#define COMMON_BASE_SPELLING_H
 
 #include <stddef.h>
-
-/* toWorld -> to_world, intIOR -> int_ior. out holds 2 * strlen(name) + 1 bytes. */
-void spelling_snake(const char *name, char *out);
 
 /* Finds the nearest among the names offered; only one that is near enough to be a slip is kept. */
 struct spelling {
