@@ -1,7 +1,405 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Reads a command line by a program's tables.
+ *
+ * Happy path: defaults and environment are read by the same function as arguments (put), then argv is gone through
+ * once; an option's name is looked up among all rows (find), its argument checked by its kind and stored in the struct
+ * that its table fills. The checks that look at several options come last.
+ *
+ * Failures: each is one sentence in struct error and -EINVAL. A name that is unknown gets the nearest one.
+ */
 #include "common/base/option.h"
 
+#include "common/base/spelling.h"
+#include "common/base/text.h"
+
+#include <float.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+
+enum { NAME_MOST = 64 };
+
+static const struct option_row general_rows[] = {
+	{"help", '?', NULL, "Print this list", .kind = OPTION_IS_HELP},
+	{"usage", 0, NULL, "Print how the program is called", .kind = OPTION_IS_USAGE},
+	{"version", 'V', NULL, "Print the version", .kind = OPTION_IS_VERSION},
+	{"man", 0, NULL, "Print the manual page (for man -l)", .kind = OPTION_IS_MAN},
+	{"completion", 0, NULL, "Print a script by which bash completes these options", .kind = OPTION_IS_COMPLETION},
+	{0},
+};
+static const struct option_group general_groups[] = {{NULL, general_rows}, {0}};
+
+/* ---- the rows of a program, one after the other ---- */
+
+/* The i-th row of t; where i is beyond, it becomes the index in what follows t. */
+static const struct option_row *row_of(const struct option_group *groups, size_t *i, const struct option_group **group)
+{
+	for (const struct option_group *g = groups; g && g->rows; g++)
+		for (const struct option_row *r = g->rows; r->kind != OPTION_IS_END; r++)
+			if ((*i)-- == 0) {
+				*group = g;
+				return r;
+			}
+	return NULL;
+}
+
+const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group, size_t *offset)
+{
+	const struct option_group *g = NULL;
+	size_t shift = 0;
+	const struct option_row *r = row_of(p->own.groups, &i, &g);
+	if (!r && p->shared) {
+		r = row_of(p->shared->groups, &i, &g);
+		shift = p->shared_offset;
+	}
+	if (!r) {
+		r = row_of(general_groups, &i, &g);
+		shift = 0;
+	}
+	if (group)
+		*group = g;
+	if (offset)
+		*offset = shift;
+	return r;
+}
+
+/* ---- arguments ---- */
+
+/* "at least 0 and below 1", "from 1 to 1024" */
+static void range_text(const struct option_row *r, char *text, size_t size)
+{
+	if (r->most >= DBL_MAX)
+		text_print(text, size, "%s %.10g", r->above ? "above" : "of at least", r->least);
+	else if (r->above || r->below)
+		text_print(text, size, "%s %.10g and %s %.10g", r->above ? "above" : "of at least", r->least,
+			   r->below ? "below" : "at most", r->most);
+	else
+		text_print(text, size, "from %.10g to %.10g", r->least, r->most);
+}
+
+static bool is_within(const struct option_row *r, double x)
+{
+	return (r->above ? x > r->least : x >= r->least) && (r->below ? x < r->most : x <= r->most);
+}
+
+static void store_number(const struct option_row *r, void *field, double x)
+{
+	switch (r->store) {
+	case OPTION_DOUBLE:
+		*(double *)field = x;
+		break;
+	case OPTION_UINT64:
+		*(uint64_t *)field = (uint64_t)x;
+		break;
+	case OPTION_UINT32:
+		*(uint32_t *)field = (uint32_t)x;
+		break;
+	default:
+		*(int *)field = (int)x;
+	}
+}
+
+static int take_number(const struct option_row *r, void *field, const char *arg, struct error *e)
+{
+	char *end, range[80];
+	double x = strtod(arg, &end);
+	if (end == arg || *end || !is_within(r, x)) {
+		range_text(r, range, sizeof range);
+		return error_set(e, EINVAL, "--%s takes a number %s, not '%s'", r->name, range, arg);
+	}
+	store_number(r, field, x * r->unit);
+	return 0;
+}
+
+static int take_count(const struct option_row *r, void *field, const char *arg, struct error *e)
+{
+	char range[80];
+	uint64_t n = 0;
+	if (!text_count(arg, &n))
+		return error_set(e, EINVAL, "--%s takes a whole number such as 4000 or 1.5k, not '%s'", r->name, arg);
+	if (!is_within(r, (double)n)) {
+		range_text(r, range, sizeof range);
+		return error_set(e, EINVAL, "--%s takes a whole number %s, not '%s'", r->name, range, arg);
+	}
+	if (r->store == OPTION_UINT64)
+		*(uint64_t *)field = n;
+	else
+		*(uint32_t *)field = (uint32_t)n;
+	return 0;
+}
+
+static int take_seconds(const struct option_row *r, void *field, const char *arg, struct error *e)
+{
+	char range[80];
+	double x = 0;
+	if (!text_seconds(arg, &x))
+		return error_set(e, EINVAL, "--%s takes a time such as 90, 90s, 5m or 2h, not '%s'", r->name, arg);
+	if (!is_within(r, x)) {
+		range_text(r, range, sizeof range);
+		return error_set(e, EINVAL, "--%s takes a number of seconds %s, not '%s'", r->name, range, arg);
+	}
+	*(double *)field = x;
+	return 0;
+}
+
+/* "; did you mean `fetch`?", or all that there are */
+static int check_value(const char *noun, option_values *values, const char *arg, struct error *e)
+{
+	char hint[128], list[512] = "";
+	struct spelling s = {.wanted = arg};
+	const char *name;
+	for (size_t i = 0; (name = values(i)) != NULL; i++) {
+		if (strcmp(name, arg) == 0)
+			return 0;
+		spelling_offer(&s, name);
+		spelling_list(list, sizeof list, name);
+	}
+	spelling_hint(&s, hint, sizeof hint);
+	return error_set(e, EINVAL, "there is no %s '%s'%s%s", noun, arg, *hint ? hint : "; there are ",
+			 *hint ? "" : list);
+}
+
+/* The argument of an option, NULL where it takes none, to its place in target. */
+static int put(const struct option_row *r, void *target, char *arg, struct error *e)
+{
+	void *field = (char *)target + r->offset;
+	if (r->values && check_value(r->name, r->values, arg, e))
+		return -EINVAL;
+	if (arg && r->kind != OPTION_IS_TEXT && *r->arg == '+' && *arg == '+')
+		arg++;
+	switch (r->kind) {
+	case OPTION_IS_FLAG:
+		*(bool *)field = true;
+		return 0;
+	case OPTION_IS_TEXT:
+		*(const char **)field = arg;
+		return 0;
+	case OPTION_IS_NUMBER:
+		return take_number(r, field, arg, e);
+	case OPTION_IS_COUNT:
+		return take_count(r, field, arg, e);
+	case OPTION_IS_SECONDS:
+		return take_seconds(r, field, arg, e);
+	case OPTION_IS_SHARE:
+		if (text_share(arg, field))
+			return 0;
+		return error_set(e, EINVAL, "--%s takes a share from 0 to 1 or percent, not '%s'", r->name, arg);
+	default:
+		return r->take(target, arg, e);
+	}
+}
+
+int option_defaults(const struct option_table *t, void *target, struct error *e)
+{
+	const struct option_group *group;
+	const struct option_row *r;
+	int rc = 0;
+	for (size_t i = 0, k = 0; !rc && (k = i, r = row_of(t->groups, &k, &group)) != NULL; i++)
+		if (r->standard && (rc = put(r, target, text_borrow(r->standard), e)) != 0)
+			error_prefix(e, rc, "the default of --%s", r->name);
+	return rc;
+}
+
+/* ---- the command line ---- */
+
+struct reader {
+	const struct program *program;
+	int argc, at; /* argv[at] is looked at */
+	char **argv;
+	void *target;
+	size_t words;
+	enum option_kind asked;
+	struct error *e;
+};
+
+static void *target_of(const struct reader *x, size_t offset)
+{
+	return (char *)x->target + offset;
+}
+
+static int environment(const struct reader *x)
+{
+	const struct option_row *r;
+	size_t offset;
+	for (size_t i = 0; (r = option_at(x->program, i, NULL, &offset)) != NULL; i++) {
+		char *value = r->environment ? getenv(r->environment) : NULL;
+		int rc = value ? put(r, target_of(x, offset), value, x->e) : 0;
+		if (rc)
+			return error_prefix(x->e, rc, "$%s", r->environment);
+	}
+	return 0;
+}
+
+static int unknown(const struct reader *x, const char *dashes, const char *name)
+{
+	struct spelling s = {.wanted = name};
+	const struct option_row *r;
+	for (size_t i = 0; (r = option_at(x->program, i, NULL, NULL)) != NULL; i++)
+		if (!r->hidden)
+			spelling_offer(&s, r->name);
+	return error_set(x->e, EINVAL, "unknown option '%s%s'%s%s%s", dashes, name, s.best ? "; did you mean '--" : "",
+			 s.best ? s.best : "", s.best ? "'?" : "");
+}
+
+/* The row of a name, or of the beginning of only one; NULL: an error. */
+static const struct option_row *find(const struct reader *x, const char *name, size_t *offset)
+{
+	const struct option_row *r, *found = NULL;
+	char list[512] = "", shown[NAME_MOST + 2];
+	size_t n = strlen(name), shift, count = 0;
+	for (size_t i = 0; (r = option_at(x->program, i, NULL, &shift)) != NULL; i++) {
+		bool whole = strcmp(r->name, name) == 0;
+		if (!whole && (r->hidden || n == 0 || strncmp(r->name, name, n) != 0))
+			continue;
+		found = r;
+		*offset = shift;
+		if (whole)
+			return r;
+		count++;
+		snprintf(shown, sizeof shown, "--%s", r->name);
+		spelling_list(list, sizeof list, shown);
+	}
+	if (count > 1)
+		error_set(x->e, EINVAL, "option '--%s' is ambiguous: %s", name, list);
+	else if (!found)
+		unknown(x, "--", name);
+	return count == 1 ? found : NULL;
+}
+
+static int apply(struct reader *x, const struct option_row *r, size_t offset, char *arg)
+{
+	if (r->kind >= OPTION_IS_HELP) {
+		x->asked = r->kind;
+		return 0;
+	}
+	if (r->arg && !arg) {
+		if (x->at + 1 >= x->argc)
+			return error_set(x->e, EINVAL, "option '--%s' needs an argument: %s", r->name, r->arg);
+		arg = x->argv[++x->at];
+	}
+	return put(r, target_of(x, offset), arg, x->e);
+}
+
+static int read_long(struct reader *x, char *text)
+{
+	char name[NAME_MOST];
+	char *equals = strchr(text, '=');
+	size_t offset = 0;
+	text_copy(name, sizeof name, text);
+	if (equals && (size_t)(equals - text) < sizeof name)
+		name[equals - text] = 0;
+	const struct option_row *r = find(x, name, &offset);
+	if (!r)
+		return -EINVAL;
+	if (equals && !r->arg)
+		return error_set(x->e, EINVAL, "option '--%s' takes no argument", r->name);
+	return apply(x, r, offset, equals ? equals + 1 : NULL);
+}
+
+static const struct option_row *find_key(const struct reader *x, char key, size_t *offset)
+{
+	const struct option_row *r;
+	for (size_t i = 0; (r = option_at(x->program, i, NULL, offset)) != NULL; i++)
+		if (r->key == key)
+			return r;
+	return NULL;
+}
+
+static int read_short(struct reader *x, char *text)
+{
+	int rc = 0;
+	for (char *k = text; !rc && x->asked == OPTION_IS_END && *k; k++) {
+		size_t offset;
+		const struct option_row *r = find_key(x, *k, &offset);
+		if (!r)
+			return unknown(x, "-", text);
+		rc = apply(x, r, offset, r->arg && k[1] ? k + 1 : NULL);
+		if (r->arg)
+			break;
+	}
+	return rc;
+}
+
+static int read_word(struct reader *x, char *text)
+{
+	const struct program *p = x->program;
+	if (!p->word)
+		return error_set(x->e, EINVAL, "'%s': it takes options only", text);
+	if (p->verbs && x->words == 0 && check_value("verb", p->verbs, text, x->e))
+		return -EINVAL;
+	return p->word(x->target, x->words++, text, x->e);
+}
+
+static bool is_option(const struct reader *x, const char *text)
+{
+	size_t offset;
+	bool negative = text[0] == '-' && text[1] >= '0' && text[1] <= '9';
+	return text[0] == '-' && text[1] && !(negative && !find_key(x, text[1], &offset));
+}
+
+static int read_all(struct reader *x)
+{
+	bool options = true;
+	int rc = 0;
+	for (x->at = 1; !rc && x->asked == OPTION_IS_END && x->at < x->argc; x->at++) {
+		char *text = x->argv[x->at];
+		if (options && strcmp(text, "--") == 0)
+			options = false;
+		else if (!options || !is_option(x, text))
+			rc = read_word(x, text);
+		else
+			rc = text[1] == '-' ? read_long(x, text + 2) : read_short(x, text + 1);
+	}
+	return rc;
+}
+
+static int needed(const struct reader *x)
+{
+	const struct option_row *r;
+	size_t offset;
+	for (size_t i = 0; (r = option_at(x->program, i, NULL, &offset)) != NULL; i++)
+		if (r->needed && !*(const char **)((char *)target_of(x, offset) + r->offset))
+			return error_set(x->e, EINVAL, "--%s %s is needed%s%s%s", r->name, r->arg,
+					 r->environment ? " (or $" : "", r->environment ? r->environment : "",
+					 r->environment ? ")" : "");
+	return 0;
+}
+
+static int check(const struct reader *x)
+{
+	const struct program *p = x->program;
+	char list[512] = "";
+	const char *name;
+	int rc = 0;
+	if (p->verbs && x->words == 0) {
+		for (size_t i = 0; (name = p->verbs(i)) != NULL; i++)
+			spelling_list(list, sizeof list, name);
+		return error_set(x->e, EINVAL, "what is to be done? %s", list);
+	}
+	if (p->shared && p->shared->check)
+		rc = p->shared->check(target_of(x, p->shared_offset), x->e);
+	if (!rc && p->own.check)
+		rc = p->own.check(x->target, x->e);
+	return rc ? rc : needed(x);
+}
+
+int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *asked,
+		  struct error *e)
+{
+	struct reader x = {.program = p, .argc = argc, .argv = argv, .target = target, .e = e};
+	int rc = option_defaults(&p->own, target, e);
+	if (!rc && p->shared)
+		rc = option_defaults(p->shared, target_of(&x, p->shared_offset), e);
+	if (!rc)
+		rc = environment(&x);
+	if (!rc)
+		rc = read_all(&x);
+	if (!rc && x.asked == OPTION_IS_END)
+		rc = check(&x);
+	*asked = x.asked;
+	return rc;
+}
 
 double option_number(struct argp_state *state, const char *option, const char *arg, double least, double most)
 {

@@ -8,45 +8,14 @@
  */
 #include "common/base/mem.h"
 #include "common/base/output.h"
-#include "common/base/version.h"
+#include "common/base/program.h"
 #include "common/estimate/stated_error.h"
 #include "worker/cli/image/compare.h"
 
-#include <argp.h>
+#include <float.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-
-const char *argp_program_version = "hslt-compare " HSLT_VERSION;
-
-static const char doc[] =
-	"Says how far the picture A is from the reference B: EXR files with the channels R, G, B."
-	"\v"
-	"Examples:\n"
-	"  hslt-compare noisy.exr reference.exr\n"
-	"  hslt-compare --trim 0.001 --max-relmse 0.01 noisy.exr reference.exr\n"
-	"  hslt-compare --size 256x144 --heatmap errors.png noisy.exr reference.exr\n"
-	"  hslt-compare --exact one.exr other.exr\n"
-	"\n"
-	"relMSE is the mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its "
-	"square root; PSNR takes the 99.5th percentile of B as peak. --trim leaves the worst pixels out of relMSE, RMSE and PSNR, "
-	"not out of the means.\n"
-	"--exact looks at every channel and at the header, but for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end and "
-	"hslt:date.\n"
-	"Exit codes: 0 done, 1 failed, different, or above --max-relmse, 2 usage.";
-
-enum { OPTION_TRIM = 256, OPTION_HEATMAP, OPTION_MAX, OPTION_JSON, OPTION_SIZE, OPTION_EXACT };
-
-static const struct argp_option options[] = {
-	{"exact", OPTION_EXACT, NULL, 0, "Only ask whether all bits are the same", 0},
-	{"trim", OPTION_TRIM, "F", 0, "Leave out the worst share F of the pixels: 0.001", 0},
-	{"size", OPTION_SIZE, "WxH", 0, "Average both to this size first; it must divide theirs", 0},
-	{"heatmap", OPTION_HEATMAP, "FILE.png", 0, "Relative errors as colours: 0.1 % black to 100 % white", 0},
-	{"max-relmse", OPTION_MAX, "X", 0, "Fail when the relMSE is above X", 0},
-	{"json", OPTION_JSON, NULL, 0, "Print one JSON object", 0},
-	{0},
-};
 
 struct arguments {
 	const char *path[2], *heatmap;
@@ -55,60 +24,65 @@ struct arguments {
 	bool exact, json;
 };
 
-static double parse_below(struct argp_state *state, const char *option, const char *arg, double below)
+static int take_size(void *target, char *arg, struct error *e)
 {
-	char *end;
-	double x = strtod(arg, &end);
-	if (end == arg || *end || !(x >= 0 && x < below))
-		argp_error(state, "%s takes a number from 0 to below %g, not '%s'", option, below, arg);
-	return x;
-}
-
-static void check_usage(const struct arguments *a, struct argp_state *state)
-{
-	if (!a->path[1])
-		argp_error(state, "A.exr and B.exr are needed");
-	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->most >= 0))
-		argp_error(state, "--exact goes with --json only");
-}
-
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-	struct arguments *a = state->input;
+	struct arguments *a = target;
 	char rest;
-	switch (key) {
-	case OPTION_EXACT:
-		a->exact = true;
-		return 0;
-	case OPTION_TRIM:
-		a->trim = parse_below(state, "--trim", arg, 1);
-		return 0;
-	case OPTION_SIZE:
-		if (*arg < '0' || *arg > '9' || sscanf(arg, "%ux%u%c", &a->width, &a->height, &rest) != 2 ||
-		    !a->width || !a->height)
-			argp_error(state, "--size takes WxH, not '%s'", arg);
-		return 0;
-	case OPTION_HEATMAP:
-		a->heatmap = arg;
-		return 0;
-	case OPTION_MAX:
-		a->most = parse_below(state, "--max-relmse", arg, HUGE_VAL);
-		return 0;
-	case OPTION_JSON:
-		a->json = true;
-		return 0;
-	case ARGP_KEY_ARG:
-		if (a->path[1])
-			argp_error(state, "two pictures, not more");
-		a->path[a->path[0] ? 1 : 0] = arg;
-		return 0;
-	case ARGP_KEY_END:
-		check_usage(a, state);
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
+	if (*arg < '0' || *arg > '9' || sscanf(arg, "%ux%u%c", &a->width, &a->height, &rest) != 2 || !a->width ||
+	    !a->height)
+		return error_set(e, EINVAL, "--size takes WxH, not '%s'", arg);
+	return 0;
 }
+
+static const struct option_row rows[] = {
+	{"exact", 0, NULL, "Only ask whether all bits are the same", OPTION_FLAG(struct arguments, exact)},
+	{"trim", 0, "F", "Leave out the worst share F of the pixels: 0.001",
+	 OPTION_NUMBER(struct arguments, trim, 0, 1), .below = true},
+	{"size", 0, "WxH", "Average both to this size first; it must divide theirs", OPTION_TAKE(take_size)},
+	{"heatmap", 0, "FILE.png", "Relative errors as colours: 0.1 % black to 100 % white",
+	 OPTION_TEXT(struct arguments, heatmap)},
+	{"max-relmse", 0, "X", "Fail when the relMSE is above X", OPTION_NUMBER(struct arguments, most, 0, DBL_MAX)},
+	{"json", 0, NULL, "Print one JSON object", OPTION_FLAG(struct arguments, json)},
+	{0},
+};
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
+{
+	struct arguments *a = target;
+	if (index > 1)
+		return error_set(e, EINVAL, "two pictures, not more");
+	a->path[index] = word;
+	return 0;
+}
+
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	if (!a->path[1])
+		return error_set(e, EINVAL, "A.exr and B.exr are needed");
+	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->most >= 0))
+		return error_set(e, EINVAL, "--exact goes with --json only");
+	return 0;
+}
+
+static const struct program program = {
+	.name = "hslt-compare",
+	.words = "A.exr B.exr",
+	.summary = "Says how far the picture A is from the reference B: EXR files with the channels R, G, B.",
+	.examples = "hslt-compare noisy.exr reference.exr\n"
+		    "hslt-compare --trim 0.001 --max-relmse 0.01 noisy.exr reference.exr\n"
+		    "hslt-compare --size 256x144 --heatmap errors.png noisy.exr reference.exr\n"
+		    "hslt-compare --exact one.exr other.exr",
+	.details =
+		"relMSE is the mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its "
+		"square root; PSNR takes the 99.5th percentile of B as peak. --trim leaves the worst pixels out of relMSE, RMSE and "
+		"PSNR, not out of the means.\n"
+		"--exact looks at every channel and at the header, but for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end and "
+		"hslt:date.",
+	.exits = "0 done, 1 failed, different, or above --max-relmse, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.word = take_word,
+};
 
 static void print_json(json_t *o)
 {
@@ -215,8 +189,7 @@ int main(int argc, char **argv)
 	struct error e;
 	int code = 0;
 	output_check_at_exit();
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "A.exr B.exr", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	int rc = picture_read(&p[0], a.path[0], &e);
 	if (rc == 0)
 		rc = picture_read(&p[1], a.path[1], &e);

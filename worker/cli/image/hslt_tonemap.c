@@ -1,61 +1,51 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
 #include "common/base/output.h"
-#include "common/base/version.h"
+#include "common/base/program.h"
 #include "worker/cli/image/picture.h"
 #include "worker/cli/image/tonemap.h"
 
-#include <argp.h>
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-
-const char *argp_program_version = "hslt-tonemap " HSLT_VERSION;
-
-static const char doc[] =
-	"Makes a PNG file of 8-bit sRGB from the channels R, G, B of an EXR file."
-	"\v"
-	"Examples:\n"
-	"  hslt-tonemap room.exr room.png\n"
-	"  hslt-tonemap --exposure -1.5 room.exr darker.png\n"
-	"\n"
-	"Values are taken times 2^STOPS and clipped to [0,1]. What is not a number becomes 0, infinities 0 or 255; both are "
-	"counted on stderr.\n"
-	"Exit codes: 0 done, 1 failed, 2 usage.";
-
-static const struct argp_option options[] = {
-	{"exposure", 'e', "STOPS", 0, "Twice as bright for each (0)", 0},
-	{0},
-};
 
 struct arguments {
 	const char *in, *out;
 	double stops;
 };
 
-static error_t parse(int key, char *arg, struct argp_state *state)
+static const struct option_row rows[] = {
+	{"exposure", 'e', "STOPS", "Twice as bright for each", OPTION_NUMBER(struct arguments, stops, -100, 100),
+	 .standard = "0"},
+	{0},
+};
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
 {
-	struct arguments *a = state->input;
-	char *end;
-	switch (key) {
-	case 'e':
-		a->stops = strtod(arg, &end);
-		if (end == arg || *end || !(fabs(a->stops) <= 100))
-			argp_error(state, "--exposure takes a number of stops from -100 to 100, not '%s'", arg);
-		return 0;
-	case ARGP_KEY_ARG:
-		if (a->out)
-			argp_error(state, "two files, not more");
-		*(a->in ? &a->out : &a->in) = arg;
-		return 0;
-	case ARGP_KEY_END:
-		if (!a->out)
-			argp_error(state, "IN.exr and OUT.png are needed");
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
+	struct arguments *a = target;
+	if (index > 1)
+		return error_set(e, EINVAL, "two files, not more");
+	*(index == 0 ? &a->in : &a->out) = word;
+	return 0;
 }
+
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	return a->out ? 0 : error_set(e, EINVAL, "IN.exr and OUT.png are needed");
+}
+
+static const struct program program = {
+	.name = "hslt-tonemap",
+	.words = "IN.exr OUT.png",
+	.summary = "Makes a PNG file of 8-bit sRGB from the channels R, G, B of an EXR file.",
+	.examples = "hslt-tonemap room.exr room.png\n"
+		    "hslt-tonemap --exposure -1.5 room.exr darker.png",
+	.details =
+		"Values are taken times 2^STOPS and clipped to [0,1]. What is not a number becomes 0, infinities 0 or "
+		"255; both are counted on stderr.",
+	.exits = "0 done, 1 failed, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.word = take_word,
+};
 
 static int run(const struct arguments *a, struct error *e)
 {
@@ -84,8 +74,7 @@ int main(int argc, char **argv)
 	struct arguments a = {0};
 	struct error e;
 	output_check_at_exit();
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "IN.exr OUT.png", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	if (run(&a, &e) == 0)
 		return 0;
 	fprintf(stderr, "hslt-tonemap: %s\n", e.text);

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a program prints about itself, all of it made of its tables: --help, --usage, --version, the manual page
+ * (macros of man(7)) and a script by which bash completes its options. One thread.
+ */
+#ifndef COMMON_BASE_OPTION_PRINT_H
+#define COMMON_BASE_OPTION_PRINT_H
+
+#include "common/base/option.h"
+
+#include <stdio.h>
+
+void option_print(const struct program *p, enum option_kind what, FILE *out);
+
+#endif

@@ -1,0 +1,330 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The reader of command lines by a table of every kind of option, and what is printed of the table. */
+#include "common/base/option.h"
+#include "common/base/option_print.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct part {
+	uint64_t spp;
+	double seconds;
+};
+
+struct arguments {
+	const char *output, *tls, *word[2];
+	bool wait, quiet;
+	double stops, share, trim;
+	uint32_t threads;
+	uint64_t bytes;
+	char kind[16];
+	struct part part;
+};
+
+static const char *kinds(size_t i)
+{
+	static const char *const names[] = {"path", "bdpt", "hslt", NULL};
+	return names[i];
+}
+
+static const char *verbs(size_t i)
+{
+	static const char *const names[] = {"list", "fetch", NULL};
+	return names[i];
+}
+
+static int take_kind(void *target, char *arg, struct error *e)
+{
+	struct arguments *a = target;
+	(void)e;
+	snprintf(a->kind, sizeof a->kind, "%s", arg);
+	return 0;
+}
+
+static void more(char *text, size_t size)
+{
+	snprintf(text, size, ". There are more");
+}
+
+static const struct option_row rows[] = {
+	{"output", 'o', "FILE", "The image", OPTION_TEXT(struct arguments, output), .needed = true},
+	{"tls", 0, "DIR", "Certificates", OPTION_TEXT(struct arguments, tls), .environment = "HSLT_TEST_TLS"},
+	{"wait", 'w', NULL, "Show progress", OPTION_FLAG(struct arguments, wait)},
+	{"quiet", 'q', NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
+	{"exposure", 'e', "STOPS", "Twice as bright for each", OPTION_NUMBER(struct arguments, stops, -100, 100),
+	 .standard = "0.5"},
+	{"trim", 0, "F", "Leave out", OPTION_NUMBER(struct arguments, trim, 0, 1), .below = true},
+	{"share", 0, "P", "Share of the epochs", OPTION_SHARE(struct arguments, share)},
+	{"threads", 't', "N", "Threads", OPTION_COUNT(struct arguments, threads, 1, 1024), .standard = "3"},
+	{"blobs", 0, "GB", "Of the spool", OPTION_SCALED(struct arguments, bytes, 0.001, 1e6, 1e9), .standard = "100"},
+	{"kind", 'k', "NAME", "(chosen)", OPTION_TAKE(take_kind), .values = kinds, .more = more},
+	{"sort", 0, "NAME", "An old name", OPTION_TAKE(take_kind), .values = kinds, .hidden = true},
+	{0},
+};
+
+static const struct option_row part_rows[] = {
+	{"spp", 0, "+N", "Samples", OPTION_COUNT(struct part, spp, 1, 1e9)},
+	{"time", 0, "SECONDS", "Wall clock", OPTION_SECONDS(struct part, seconds, 0, 1e9), .above = true},
+	{0},
+};
+
+static int check_part(void *target, struct error *e)
+{
+	const struct part *p = target;
+	return p->spp == 13 ? error_set(e, EINVAL, "no 13") : 0;
+}
+
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	return a->wait && a->quiet ? error_set(e, EINVAL, "--wait is not quiet") : 0;
+}
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
+{
+	struct arguments *a = target;
+	if (index > 1)
+		return error_set(e, EINVAL, "one word too many");
+	a->word[index] = word;
+	return 0;
+}
+
+static const struct option_table part = {(const struct option_group[]){{"When to stop:", part_rows}, {0}}, check_part};
+static const struct program program = {
+	.name = "hslt-test",
+	.words = "VERB [JOB]\nA.exr",
+	.summary = "Tests options.",
+	.examples = "hslt-test list",
+	.details = ".dot begins 'this'\n\\fB is no escape",
+	.exits = "0 done, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.shared = &part,
+	.shared_offset = offsetof(struct arguments, part),
+	.verbs = verbs,
+	.word = take_word,
+};
+
+static struct arguments a;
+static struct error e;
+static enum option_kind asked;
+
+/* The words of a command line; those that follow the program's name. */
+static int parse(const char *line)
+{
+	static char text[512];
+	char *argv[32] = {text}, *at;
+	int argc = 1;
+	snprintf(text, sizeof text, "%s", line);
+	for (char *word = strtok_r(text, " ", &at); word; word = strtok_r(NULL, " ", &at))
+		argv[argc++] = word;
+	memset(&a, 0, sizeof a);
+	e.text[0] = 0;
+	return options_parse(&program, argc, argv, &a, &asked, &e);
+}
+
+static void accepted(const char *line)
+{
+	if (parse(line))
+		fail_msg("%s: %s", line, e.text);
+}
+
+static void refused(const char *line, const char *why)
+{
+	assert_int_equal(parse(line), -EINVAL);
+	assert_string_equal(e.text, why);
+}
+
+static void test_kinds(void **state)
+{
+	(void)state;
+	accepted("list -o x --trim 0.25 --share 5% --threads 1k --time 2m --spp +2k --blobs 0.5 --kind bdpt -e -2");
+	assert_string_equal(a.output, "x");
+	assert_true(a.trim == 0.25 && a.share == 0.05 && a.stops == -2 && a.part.seconds == 120);
+	assert_true(a.threads == 1000 && a.part.spp == 2000);
+	assert_int_equal(a.bytes, 500000000);
+	assert_string_equal(a.kind, "bdpt");
+}
+
+static void test_bounds(void **state)
+{
+	(void)state;
+	refused("list -o x --threads 0", "--threads takes a whole number from 1 to 1024, not '0'");
+	refused("list -o x --threads 1025", "--threads takes a whole number from 1 to 1024, not '1025'");
+	refused("list -o x --threads 1.5", "--threads takes a whole number such as 4000 or 1.5k, not '1.5'");
+	refused("list -o x --trim 1", "--trim takes a number of at least 0 and below 1, not '1'");
+	refused("list -o x --exposure nan", "--exposure takes a number from -100 to 100, not 'nan'");
+	refused("list -o x --exposure 1x", "--exposure takes a number from -100 to 100, not '1x'");
+	refused("list -o x --share 2", "--share takes a share from 0 to 1 or percent, not '2'");
+	refused("list -o x --time 0", "--time takes a number of seconds above 0 and at most 1000000000, not '0'");
+	refused("list -o x --time 5y", "--time takes a time such as 90, 90s, 5m or 2h, not '5y'");
+	refused("list -o x --threads +3", "--threads takes a whole number such as 4000 or 1.5k, not '+3'");
+}
+
+static void test_defaults_and_environment(void **state)
+{
+	(void)state;
+	assert_int_equal(unsetenv("HSLT_TEST_TLS"), 0);
+	accepted("list -o x");
+	assert_true(a.stops == 0.5 && a.threads == 3 && a.bytes == 100000000000u && !a.tls);
+	assert_int_equal(setenv("HSLT_TEST_TLS", "folder", 1), 0);
+	accepted("list -o x");
+	assert_string_equal(a.tls, "folder");
+	accepted("list -o x --tls other");
+	assert_string_equal(a.tls, "other");
+	assert_int_equal(unsetenv("HSLT_TEST_TLS"), 0);
+}
+
+static void test_order_and_forms(void **state)
+{
+	(void)state;
+	static const char *const lines[] = {"fetch j1 -o x -w -e 3 --threads 2", "-wox fetch --threads=2 -e3 j1",
+					    "-e 3 --thr 2 -w fetch --out=x j1", "--wait -t2 -o x -e3 -- fetch j1"};
+	for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
+		accepted(lines[i]);
+		assert_string_equal(a.output, "x");
+		assert_string_equal(a.word[0], "fetch");
+		assert_string_equal(a.word[1], "j1");
+		assert_true(a.wait && a.stops == 3 && a.threads == 2);
+	}
+	accepted("-o x fetch -5");
+	assert_string_equal(a.word[1], "-5");
+	accepted("-o x fetch -");
+	assert_string_equal(a.word[1], "-");
+	accepted("-o x fetch -- --wait");
+	assert_string_equal(a.word[1], "--wait");
+	accepted("list -o --wait");
+	assert_string_equal(a.output, "--wait");
+}
+
+static void test_mistyped(void **state)
+{
+	(void)state;
+	refused("list --ouptut x", "unknown option '--ouptut'; did you mean '--output'?");
+	refused("list --tiem=5", "unknown option '--tiem'; did you mean '--time'?");
+	refused("list -x", "unknown option '-x'");
+	refused("list -spp 5", "unknown option '-spp'; did you mean '--spp'?");
+	refused("list --entirely-other", "unknown option '--entirely-other'");
+	refused("list --t 5", "option '--t' is ambiguous: --tls, --trim, --threads, --time");
+	refused("list --wait=1", "option '--wait' takes no argument");
+	refused("list --output", "option '--output' needs an argument: FILE");
+	refused("list -o x --kind hslr", "there is no kind 'hslr'; did you mean `hslt`?");
+	refused("list -o x --kind zzz", "there is no kind 'zzz'; there are path, bdpt, hslt");
+	refused("fecth j1 -o x", "there is no verb 'fecth'; did you mean `fetch`?");
+	refused("-o x", "what is to be done? list, fetch");
+	refused("list a b -o x", "one word too many");
+}
+
+static void test_hidden(void **state)
+{
+	(void)state;
+	accepted("list -o x --sort path");
+	refused("list -o x --sor path", "unknown option '--sor'");
+}
+
+static void test_checks(void **state)
+{
+	(void)state;
+	refused("list", "--output FILE is needed");
+	refused("list -o x -w -q", "--wait is not quiet");
+	refused("list -o x --spp 13", "no 13");
+}
+
+/* Before whatever else is wrong. */
+static void test_asked(void **state)
+{
+	(void)state;
+	accepted("list -o x");
+	assert_int_equal(asked, OPTION_IS_END);
+	accepted("--help --no-such-option");
+	assert_int_equal(asked, OPTION_IS_HELP);
+	accepted("-wV");
+	assert_int_equal(asked, OPTION_IS_VERSION);
+	refused("--no-such-option --help", "unknown option '--no-such-option'");
+}
+
+static char *printed(enum option_kind what)
+{
+	static char text[16384];
+	FILE *f = fmemopen(text, sizeof text, "w");
+	assert_non_null(f);
+	option_print(&program, what, f);
+	assert_int_equal(fclose(f), 0);
+	return text;
+}
+
+static void has(const char *text, const char *wanted)
+{
+	if (strstr(text, wanted))
+		return;
+	fprintf(stderr, "no '%s' in:\n%s", wanted, text);
+	fail();
+}
+
+static void test_help(void **state)
+{
+	(void)state;
+	const char *text = printed(OPTION_IS_HELP);
+	has(text, "Usage: hslt-test [OPTION...] VERB [JOB]\n  or:  hslt-test [OPTION...] A.exr\nTests options.\n");
+	has(text, "\n  -o, --output=FILE          The image\n");
+	has(text, "\n      --tls=DIR              Certificates (or $HSLT_TEST_TLS)\n");
+	has(text, "\n      --blobs=GB             Of the spool (100)\n");
+	has(text, "\n  -k, --kind=NAME            path, bdpt or hslt (chosen). There are more\n");
+	has(text, "\n\n When to stop:\n      --spp=+N               Samples\n");
+	has(text, "\n      --man                  Print the manual page (for man -l)\n");
+	has(text, "\n      --completion           Print a script by which bash completes these\n"
+		  "                             options\n");
+	has(text, "\nExamples:\n  hslt-test list\n");
+	has(text, "\nExit codes: 0 done, 2 usage.\n");
+	assert_null(strstr(text, "--sort"));
+}
+
+static void test_man(void **state)
+{
+	(void)state;
+	const char *text = printed(OPTION_IS_MAN);
+	has(text, ".TH \"hslt\\-test\" 1 ");
+	has(text, "\n.SH NAME\nhslt\\-test \\- Tests options.\n.SH SYNOPSIS\n");
+	has(text, "\n.SH DESCRIPTION\n\\&.dot begins \\(aqthis\\(aq\n.PP\n\\efB is no escape\n");
+	has(text, "\n.TP\n\\fB\\-o\\fR, \\fB\\-\\-output\\fR=\\fIFILE\\fR\nThe image.\n");
+	has(text, "\n.SS \"When to stop\"\n");
+	has(text, "\n.TP\n\\fBHSLT_TEST_TLS\\fR\nStands in for \\fB\\-\\-tls\\fR.\n");
+	has(text, "\n.SH EXIT STATUS\n0 done, 2 usage.\n");
+	assert_null(strstr(text, "sort"));
+}
+
+static void test_completion(void **state)
+{
+	(void)state;
+	const char *text = printed(OPTION_IS_COMPLETION);
+	has(text, "\t-o | --output) mapfile -t COMPREPLY < <(compgen -f -- \"$word\") ;;\n");
+	has(text, "\t--tls) mapfile -t COMPREPLY < <(compgen -d -- ");
+	has(text, "\t-k | --kind) mapfile -t COMPREPLY < <(compgen -W \"path bdpt hslt\" -- ");
+	has(text, "\t--share) mapfile -t COMPREPLY < <(compgen -W \"\" -- ");
+	has(text, "-W \"--output --tls --wait --quiet --exposure ");
+	has(text, "-W \"list fetch\" -f -- ");
+	has(text, "\ncomplete -o filenames -F _hslt_test hslt-test\n");
+	assert_null(strstr(text, "sort"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_kinds),
+		cmocka_unit_test(test_bounds),
+		cmocka_unit_test(test_defaults_and_environment),
+		cmocka_unit_test(test_order_and_forms),
+		cmocka_unit_test(test_mistyped),
+		cmocka_unit_test(test_hidden),
+		cmocka_unit_test(test_checks),
+		cmocka_unit_test(test_asked),
+		cmocka_unit_test(test_help),
+		cmocka_unit_test(test_man),
+		cmocka_unit_test(test_completion),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

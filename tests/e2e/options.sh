@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+# What programs print of their options: --help, the manual page and the completion of bash name the same ones, each once; a mistyped
+# option gets the nearest name.
+. "$(dirname "$0")/lib.sh"
+PROGRAMS="assemble compare tonemap"
+need $(for p in $PROGRAMS; do echo "hslt-$p"; done)
+
+# Asks the completion for each option of a list, and for its beginnings up to three letters.
+cat >"$DIR/complete.bash" <<'END'
+. "$1" || exit 1
+complete -p "$2" >/dev/null || exit 1
+ask() {
+	COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMPREPLY=()
+	"_${1//-/_}"
+}
+while read -r option; do
+	for word in "$option" "${option:0:5}"; do
+		ask "$2" "$word"
+		[[ " ${COMPREPLY[*]} " == *" $option "* ]] || { echo "$word: ${COMPREPLY[*]}"; exit 1; }
+	done
+done <"$3"
+ask "$2" --no-such-option
+[[ ${#COMPREPLY[@]} = 0 ]] || { echo "--no-such-option: ${COMPREPLY[*]}"; exit 1; }
+END
+
+for p in $PROGRAMS; do
+	code 0 "$BIN/hslt-$p" --help
+	mv "$DIR/out" "$DIR/help"
+	grep -q "^Usage: hslt-$p \[OPTION" "$DIR/help" || fail "hslt-$p --help does not say how it is called"
+	grep -q '^Examples:' "$DIR/help" && grep -q "^  hslt-$p " "$DIR/help" || fail "hslt-$p --help has no example"
+	grep -q '^Exit codes: 0 ' "$DIR/help" || fail "hslt-$p --help has no exit codes"
+	sed -n 's/^  ..[, ] \(--[a-z-]*\).*/\1/p' "$DIR/help" >"$DIR/options"
+	for o in --help --version --man --completion; do
+		grep -qx -e $o "$DIR/options" || fail "hslt-$p --help has no $o"
+	done
+	[ -z "$(sort "$DIR/options" | uniq -d)" ] || fail "hslt-$p has twice: $(sort "$DIR/options" | uniq -d)"
+	code 0 "$BIN/hslt-$p" --usage
+	tr -d '\n' <"$DIR/out" | tr -s ' ' >"$DIR/usage"
+	for o in $(cat "$DIR/options"); do
+		grep -q -e "\[$o[]=]" "$DIR/usage" || fail "hslt-$p --usage has no $o"
+	done
+
+	code 0 "$BIN/hslt-$p" --man
+	mv "$DIR/out" "$DIR/man"
+	head -n 1 "$DIR/man" | grep -q "^\.TH \"hslt\\\\-$p\" 1 " || fail "the manual page of hslt-$p begins with $(head -n 1 "$DIR/man")"
+	for s in NAME SYNOPSIS OPTIONS "EXIT STATUS" EXAMPLES; do
+		grep -qx "\.SH $s" "$DIR/man" || fail "the manual page of hslt-$p has no $s"
+	done
+	wrong=$(grep "^[.']" "$DIR/man" | grep -vE '^\.(TH|SH|SS) .|^\.(TP|PP|br|nf|fi)$' || :)
+	[ -z "$wrong" ] || fail "requests in the manual page of hslt-$p: $wrong"
+	[ "$(grep -c '^\.nf$' "$DIR/man")" = "$(grep -c '^\.fi$' "$DIR/man")" ] || fail "the manual page of hslt-$p: .nf without .fi"
+	wrong=$(sed 's/\\[-e&]\|\\f[BIR]\|\\([a-z][a-z]//g' "$DIR/man" | grep '[\\`^~-]' || :)
+	[ -z "$wrong" ] || fail "not escaped in the manual page of hslt-$p: $wrong"
+	awk '/\\fB/ && gsub(/\\f[BI]/, "") != gsub(/\\fR/, "") { print; bad = 1 } END { exit bad }' "$DIR/man" ||
+		fail "the manual page of hslt-$p: a font that does not end"
+	sed -n '/^\.SH OPTIONS/,/^\.SH E/s/^\\fB.*\(\\-\\-[a-z\\-]*\)\\fR.*/\1/p' "$DIR/man" | tr -d '\\' >"$DIR/listed"
+	cmp "$DIR/options" "$DIR/listed" || fail "the manual page of hslt-$p has other options than --help"
+	awk '/^\.TP$/ { getline; name = $0; if ((getline) <= 0 || !/[^. ]/ || /^\./) { print name; exit 1 } }' "$DIR/man" ||
+		fail "an option without a text"
+
+	code 0 "$BIN/hslt-$p" --completion
+	mv "$DIR/out" "$DIR/completion"
+	bash --norc --noprofile "$DIR/complete.bash" "$DIR/completion" "hslt-$p" "$DIR/options" >"$DIR/asked" 2>&1 ||
+		fail "the completion of hslt-$p: $(cat "$DIR/asked")"
+
+	code 2 "$BIN/hslt-$p" --hepl
+	grep -q "unknown option '--hepl'; did you mean '--help'?" "$DIR/err.log" || fail "hslt-$p --hepl: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-$p" --ver=1
+done
+code 2 "$BIN/hslt-tonemap" --exposrue 1 a.exr b.png
+grep -q "did you mean '--exposure'?" "$DIR/err.log" || fail "--exposrue: $(cat "$DIR/err.log")"
+echo "options of $(echo $PROGRAMS | wc -w) programs: help, manual pages, completions"
