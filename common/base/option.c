@@ -143,6 +143,24 @@ static int take_seconds(const struct option_row *r, void *field, const char *arg
 	return 0;
 }
 
+/* Who writes 5 means 5 percent. */
+static int take_ratio(const struct option_row *r, void *field, const char *arg, struct error *e)
+{
+	char range[80];
+	double x = 0;
+	if (!text_ratio(arg, &x))
+		return error_set(e, EINVAL, "--%s takes something like 0.02 or 2%%, not '%s'", r->name, arg);
+	if (x > 1 && !strchr(arg, '%'))
+		return error_set(e, EINVAL, "--%s %s is %g %%; for %s percent write %s%%", r->name, arg, 100 * x, arg,
+				 arg);
+	if (!is_within(r, x)) {
+		range_text(r, range, sizeof range);
+		return error_set(e, EINVAL, "--%s takes a number %s, or percent, not '%s'", r->name, range, arg);
+	}
+	*(double *)field = x;
+	return 0;
+}
+
 /* "; did you mean `fetch`?", or all that there are */
 static int check_value(const char *noun, option_values *values, const char *arg, struct error *e)
 {
@@ -181,10 +199,8 @@ static int put(const struct option_row *r, void *target, char *arg, struct error
 		return take_count(r, field, arg, e);
 	case OPTION_IS_SECONDS:
 		return take_seconds(r, field, arg, e);
-	case OPTION_IS_SHARE:
-		if (text_share(arg, field))
-			return 0;
-		return error_set(e, EINVAL, "--%s takes a share from 0 to 1 or percent, not '%s'", r->name, arg);
+	case OPTION_IS_RATIO:
+		return take_ratio(r, field, arg, e);
 	default:
 		return r->take(target, arg, e);
 	}

@@ -25,7 +25,7 @@ enum option_kind {
 	OPTION_IS_NUMBER,  /* from least to most, stored times unit */
 	OPTION_IS_COUNT,   /* a whole number: 4000, 1.5k */
 	OPTION_IS_SECONDS, /* 90, 90s, 5m, 2h */
-	OPTION_IS_SHARE,   /* from 0 to 1: 0.05, 5% */
+	OPTION_IS_RATIO,   /* 0.05, 5%; above 1 as percent only */
 	OPTION_IS_OTHER,   /* what `take` makes of it */
 	OPTION_IS_HELP,
 	OPTION_IS_USAGE,
@@ -79,7 +79,8 @@ struct option_row {
 	.kind = OPTION_IS_COUNT, OPTION_STORE(type, field), .least = (from), .most = (to)
 #define OPTION_SECONDS(type, field, from, to) \
 	.kind = OPTION_IS_SECONDS, OPTION_STORE(type, field), .least = (from), .most = (to)
-#define OPTION_SHARE(type, field) .kind = OPTION_IS_SHARE, OPTION_STORE(type, field)
+#define OPTION_RATIO(type, field, from, to) \
+	.kind = OPTION_IS_RATIO, OPTION_STORE(type, field), .least = (from), .most = (to)
 #define OPTION_TAKE(function) .kind = OPTION_IS_OTHER, .take = (function)
 
 struct option_group {

@@ -1,42 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
 #include "common/base/output.h"
-#include "common/base/version.h"
+#include "common/base/program.h"
 #include "common/net/authority.h"
 
-#include <argp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-const char *argp_program_version = "hslt-ca " HSLT_VERSION;
-
-static const char doc[] =
-	"A farm's own certificate authority: who may be coordinator, worker, client, operator."
-	"\v"
-	"Examples:\n"
-	"  hslt-ca init                      the authority, and DIR/coordinator for hslt-coordinator --tls\n"
-	"  hslt-ca worker node1              DIR/node1, for hslt-worker --tls\n"
-	"  hslt-ca client ann                DIR/ann, for hslt-submit and hslt-job --tls\n"
-	"  hslt-ca operator root             a client who sees and cancels everybody's jobs\n"
-	"  hslt-ca coordinator spare         one more coordinator\n"
-	"  hslt-ca worker node1 --renew      a new certificate and key in place of the old\n"
-	"  hslt-ca revoke node1              by name or serial number; crl.pem to where coordinators read it\n"
-	"  hslt-ca list\n"
-	"\n"
-	"DIR is --ca, $HSLT_CA or ~/.hslt-ca. DIR/ca.key signs everything: keep it away from the farm. What belongs to a "
-	"machine is its own folder alone (copy it with its modes). Running programs notice new files by themselves.\n"
-	"Exit codes: 0 done, 1 failed, 2 usage.";
-
-enum { OPTION_CA = 256, OPTION_DAYS, OPTION_RENEW, OPTION_NAME };
-
-static const struct argp_option options[] = {
-	{"ca", OPTION_CA, "DIR", 0, "The authority's folder (or $HSLT_CA; ~/.hslt-ca)", 0},
-	{"days", OPTION_DAYS, "N", 0, "How long the certificate is valid (825; the authority: 3650)", 0},
-	{"renew", OPTION_RENEW, NULL, 0, "Replace a certificate and key that are there, of the same name and role", 0},
-	{"name", OPTION_NAME, "NAME", 0, "init: the authority's name (hslt-farm)", 0},
-	{0},
-};
 
 struct arguments {
 	const char *ca, *verb, *what, *name;
@@ -44,68 +14,67 @@ struct arguments {
 	bool renew;
 };
 
-static const char *const verbs[] = {"init", "list", "revoke", "coordinator", "worker", "client", "operator"};
-enum { VERBS = sizeof verbs / sizeof *verbs };
+static const struct option_row rows[] = {
+	{"ca", 0, "DIR", "The authority's folder, if not ~/.hslt-ca", OPTION_TEXT(struct arguments, ca),
+	 .environment = "HSLT_CA"},
+	{"days", 0, "N", "How long the certificate is valid (825; the authority: 3650)",
+	 OPTION_NUMBER(struct arguments, days, 0, 36500), .above = true},
+	{"renew", 0, NULL, "Replace a certificate and key that are there, of the same name and role",
+	 OPTION_FLAG(struct arguments, renew)},
+	{"name", 0, "NAME", "init: the authority's name", OPTION_TEXT(struct arguments, name), .standard = "hslt-farm"},
+	{0},
+};
 
-static void take_word(struct arguments *a, const char *arg, struct argp_state *state)
+static const char *verb_at(size_t i)
 {
-	if (state->arg_num == 0) {
-		for (size_t i = 0; i < VERBS; i++)
-			if (strcmp(arg, verbs[i]) == 0)
-				a->verb = verbs[i];
-		if (!a->verb)
-			argp_error(state,
-				   "'%s': the verbs are init, coordinator, worker, client, operator, revoke, list",
-				   arg);
-	} else if (state->arg_num == 1) {
-		a->what = arg;
-	} else {
-		argp_error(state, "'%s' is one word too many", arg);
-	}
+	static const char *const verbs[] = {"init",	"coordinator", "worker", "client",
+					    "operator", "revoke",      "list",	 NULL};
+	return verbs[i];
 }
 
-static void check(const struct arguments *a, struct argp_state *state)
+static int take_word(void *target, size_t index, char *word, struct error *e)
 {
-	if (!a->verb)
-		argp_error(state, "what is to be done? init, coordinator, worker, client, operator, revoke or list");
-	bool bare = a->verb && (strcmp(a->verb, "init") == 0 || strcmp(a->verb, "list") == 0);
+	struct arguments *a = target;
+	if (index > 1)
+		return error_set(e, EINVAL, "'%s' is one word too many", word);
+	*(index == 0 ? &a->verb : &a->what) = word;
+	return 0;
+}
+
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	bool bare = strcmp(a->verb, "init") == 0 || strcmp(a->verb, "list") == 0;
 	if (bare && a->what)
-		argp_error(state, "%s takes no name", a->verb);
+		return error_set(e, EINVAL, "%s takes no name", a->verb);
 	if (!bare && !a->what)
-		argp_error(state, "%s needs a name", a->verb);
-	if (a->name && !tls_name_ok(a->name))
-		argp_error(state, "--name takes up to %d letters, digits and ._@-", TLS_NAME_MAX);
+		return error_set(e, EINVAL, "%s needs a name", a->verb);
+	if (!tls_name_ok(a->name))
+		return error_set(e, EINVAL, "--name takes up to %d letters, digits and ._@-", TLS_NAME_MAX);
+	return 0;
 }
 
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-	struct arguments *a = state->input;
-	char *end;
-	switch (key) {
-	case OPTION_CA:
-		a->ca = arg;
-		return 0;
-	case OPTION_DAYS:
-		a->days = strtod(arg, &end);
-		if (*end || end == arg || !(a->days > 0 && a->days <= 36500))
-			argp_error(state, "--days takes a number above 0 and up to 36500, not '%s'", arg);
-		return 0;
-	case OPTION_RENEW:
-		a->renew = true;
-		return 0;
-	case OPTION_NAME:
-		a->name = arg;
-		return 0;
-	case ARGP_KEY_ARG:
-		take_word(a, arg, state);
-		return 0;
-	case ARGP_KEY_END:
-		check(a, state);
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
-}
+static const struct program program = {
+	.name = "hslt-ca",
+	.words = "init|coordinator|worker|client|operator|revoke|list [NAME]",
+	.summary = "A farm's own certificate authority: who may be coordinator, worker, client, operator.",
+	.examples =
+		"hslt-ca init                      the authority, and DIR/coordinator for hslt-coordinator --tls\n"
+		"hslt-ca worker node1              DIR/node1, for hslt-worker --tls\n"
+		"hslt-ca client ann                DIR/ann, for hslt-submit and hslt-job --tls\n"
+		"hslt-ca operator root             a client who sees and cancels everybody's jobs\n"
+		"hslt-ca coordinator spare         one more coordinator\n"
+		"hslt-ca worker node1 --renew      a new certificate and key in place of the old\n"
+		"hslt-ca revoke node1              by name or serial number; crl.pem to where coordinators read it\n"
+		"hslt-ca list",
+	.details =
+		"DIR is --ca, $HSLT_CA or ~/.hslt-ca. DIR/ca.key signs everything: keep it away from the farm. What belongs to a "
+		"machine is its own folder alone (copy it with its modes). Running programs notice new files by themselves.",
+	.exits = "0 done, 1 failed, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.verbs = verb_at,
+	.word = take_word,
+};
 
 static const double own_days = 3650, other_days = 825;
 
@@ -120,7 +89,7 @@ static int issue(const struct arguments *a, enum tls_role role, const char *name
 static int init(const struct arguments *a, struct error *e)
 {
 	struct arguments rest = *a;
-	int rc = authority_init(a->ca, a->name ? a->name : "hslt-farm", a->days > 0 ? a->days : own_days, e);
+	int rc = authority_init(a->ca, a->name, a->days > 0 ? a->days : own_days, e);
 	rest.days = 0;
 	return rc ? rc : issue(&rest, TLS_COORDINATOR, "coordinator", e);
 }
@@ -175,14 +144,11 @@ static int run(const struct arguments *a, struct error *e)
 
 int main(int argc, char **argv)
 {
-	struct arguments a = {.ca = getenv("HSLT_CA")};
+	struct arguments a = {0};
 	struct error e = {""};
 	char home[4000];
 	output_check_at_exit();
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "init|coordinator|worker|client|operator|revoke|list [NAME]", doc,
-				  NULL, NULL, NULL},
-		   argc, argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	if (!a.ca || !*a.ca) {
 		const char *where = getenv("HOME");
 		snprintf(home, sizeof home, "%s/.hslt-ca", where ? where : ".");

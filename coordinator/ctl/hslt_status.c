@@ -9,14 +9,13 @@
  */
 #include "common/base/progress.h"
 #include "common/base/terminal.h"
-#include "common/base/version.h"
 #include "common/base/error.h"
 #include "common/base/output.h"
+#include "common/base/program.h"
 #include "common/json/convergence_json.h"
 #include "common/estimate/strategy.h"
 #include "common/json/strategy_json.h"
 
-#include <argp.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdbool.h>
@@ -27,27 +26,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-const char *argp_program_version = "hslt-status " HSLT_VERSION;
-
-static const char doc[] =
-	"Shows what a coordinator is doing, from its status socket."
-	"\v"
-	"Examples:\n"
-	"  hslt-status --socket ~/farm/status\n"
-	"  hslt-status --watch j12\n"
-	"  hslt-status --json | jq '.jobs[] | {id, state, progress}'\n"
-	"\n"
-	"--json prints the socket's objects, one a line; with JOB only that job's. HSLT_STATUS_SOCKET stands in for --socket. "
-	"Exit codes: 0 done, 1 no such job, 2 usage, 75 coordinator not reachable.";
-
-enum { OPTION_SOCKET = 256, OPTION_JSON, OPTION_WATCH, EXIT_UNREACHABLE = 75, LINE_MOST = 1 << 26 };
-
-static const struct argp_option options[] = {
-	{"socket", OPTION_SOCKET, "PATH", 0, "The coordinator's status socket", 0},
-	{"json", OPTION_JSON, NULL, 0, "Print JSON, one object a line", 0},
-	{"watch", OPTION_WATCH, NULL, 0, "Print again on every change, until the job has ended", 0},
-	{0},
-};
+enum { EXIT_UNREACHABLE = 75, LINE_MOST = 1 << 26 };
 
 struct arguments {
 	const char *socket, *job;
@@ -55,33 +34,37 @@ struct arguments {
 	bool json, watch;
 };
 
-static error_t parse(int key, char *arg, struct argp_state *state)
+static const struct option_row rows[] = {
+	{"socket", 0, "PATH", "The coordinator's status socket", OPTION_TEXT(struct arguments, socket),
+	 .environment = "HSLT_STATUS_SOCKET", .needed = true},
+	{"json", 0, NULL, "Print JSON, one object a line", OPTION_FLAG(struct arguments, json)},
+	{"watch", 0, NULL, "Print again on every change, until the job has ended",
+	 OPTION_FLAG(struct arguments, watch)},
+	{0},
+};
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
 {
-	struct arguments *a = state->input;
-	switch (key) {
-	case OPTION_SOCKET:
-		a->socket = arg;
-		return 0;
-	case OPTION_JSON:
-		a->json = true;
-		return 0;
-	case OPTION_WATCH:
-		a->watch = true;
-		return 0;
-	case ARGP_KEY_ARG:
-		if (a->job)
-			argp_error(state, "'%s': one job at a time", arg);
-		snprintf(a->job_text, sizeof a->job_text, "%s%s", *arg == 'j' ? "" : "j", arg);
-		a->job = a->job_text;
-		return 0;
-	case ARGP_KEY_END:
-		if (!a->socket)
-			argp_error(state, "--socket PATH is needed (or $HSLT_STATUS_SOCKET)");
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
+	struct arguments *a = target;
+	if (index > 0)
+		return error_set(e, EINVAL, "'%s': one job at a time", word);
+	snprintf(a->job_text, sizeof a->job_text, "%s%s", *word == 'j' ? "" : "j", word);
+	a->job = a->job_text;
+	return 0;
 }
+
+static const struct program program = {
+	.name = "hslt-status",
+	.words = "[JOB]",
+	.summary = "Shows what a coordinator is doing, from its status socket.",
+	.examples = "hslt-status --socket ~/farm/status\n"
+		    "hslt-status --watch j12\n"
+		    "hslt-status --json | jq '.jobs[] | {id, state, progress}'",
+	.details = "--json prints the socket's objects, one a line; with JOB only that job's.",
+	.exits = "0 done, 1 no such job, 2 usage, 75 coordinator not reachable",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL},
+	.word = take_word,
+};
 
 static FILE *reach(const char *path, struct error *e)
 {
@@ -409,11 +392,10 @@ static int follow(const struct arguments *a, FILE *f)
 
 int main(int argc, char **argv)
 {
-	struct arguments a = {.socket = getenv("HSLT_STATUS_SOCKET")};
+	struct arguments a = {0};
 	struct error e;
 	output_check_at_exit();
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "[JOB]", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	FILE *f = reach(a.socket, &e);
 	if (!f) {
 		fprintf(stderr, "hslt-status: %s\n", e.text);

@@ -59,7 +59,7 @@ static const struct option_row rows[] = {
 	{"exposure", 'e', "STOPS", "Twice as bright for each", OPTION_NUMBER(struct arguments, stops, -100, 100),
 	 .standard = "0.5"},
 	{"trim", 0, "F", "Leave out", OPTION_NUMBER(struct arguments, trim, 0, 1), .below = true},
-	{"share", 0, "P", "Share of the epochs", OPTION_SHARE(struct arguments, share)},
+	{"share", 0, "P", "Share of the epochs", OPTION_RATIO(struct arguments, share, 0, 1)},
 	{"threads", 't', "N", "Threads", OPTION_COUNT(struct arguments, threads, 1, 1024), .standard = "3"},
 	{"blobs", 0, "GB", "Of the spool", OPTION_SCALED(struct arguments, bytes, 0.001, 1e6, 1e9), .standard = "100"},
 	{"kind", 'k', "NAME", "(chosen)", OPTION_TAKE(take_kind), .values = kinds, .more = more},
@@ -159,7 +159,9 @@ static void test_bounds(void **state)
 	refused("list -o x --trim 1", "--trim takes a number of at least 0 and below 1, not '1'");
 	refused("list -o x --exposure nan", "--exposure takes a number from -100 to 100, not 'nan'");
 	refused("list -o x --exposure 1x", "--exposure takes a number from -100 to 100, not '1x'");
-	refused("list -o x --share 2", "--share takes a share from 0 to 1 or percent, not '2'");
+	refused("list -o x --share 2", "--share 2 is 200 %; for 2 percent write 2%");
+	refused("list -o x --share 200%", "--share takes a number from 0 to 1, or percent, not '200%'");
+	refused("list -o x --share two", "--share takes something like 0.02 or 2%, not 'two'");
 	refused("list -o x --time 0", "--time takes a number of seconds above 0 and at most 1000000000, not '0'");
 	refused("list -o x --time 5y", "--time takes a time such as 90, 90s, 5m or 2h, not '5y'");
 	refused("list -o x --threads +3", "--threads takes a whole number such as 4000 or 1.5k, not '+3'");
