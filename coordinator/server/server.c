@@ -29,30 +29,6 @@
 
 enum { BACKLOG = 4096 };
 
-/* Of what this process may have. */
-static uint64_t quarter_of_memory(void)
-{
-	uint64_t all = uv_get_total_memory(), ours = uv_get_constrained_memory();
-	return (ours && ours < all ? ours : all) / 4;
-}
-
-void server_config_init(struct server_config *c)
-{
-	*c = (struct server_config){.listen = "127.0.0.1:7700",
-				    .heartbeat_seconds = 5,
-				    .retry_seconds = 2,
-				    .clear_seconds = 30 * 86400.0,
-				    .max_faults = 3,
-				    .max_fetches = FETCHES_MOST,
-				    .journal_bytes = 64 << 20,
-				    .keep_bytes = 2000000000,
-				    .film_bytes = quarter_of_memory(),
-				    .waiting_bytes = quarter_of_memory(),
-				    .hello_seconds = 10,
-				    .stall_seconds = 30,
-				    .tls_check_seconds = 60};
-}
-
 /* ---- start ---- */
 
 static void on_connection(uv_stream_t *listener, int status)

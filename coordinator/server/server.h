@@ -9,8 +9,6 @@
 #include "coordinator/job/jobs.h"
 #include "coordinator/peers/peers.h"
 
-void server_config_init(struct server_config *c);
-
 int server_run(const struct server_config *c, struct error *e);
 
 /* ---- for whoever turns its loop ---- */

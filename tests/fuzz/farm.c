@@ -5,6 +5,7 @@
 #include "common/base/mem.h"
 #include "common/wire/batch_wire.h"
 #include "coordinator/peers/session.h"
+#include "coordinator/server/server_options.h"
 #include "tests/fuzz/folders.h"
 #include "tests/support/black_results.h"
 #include "tests/support/checksummed_frame.h"

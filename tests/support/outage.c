@@ -5,6 +5,7 @@
 #include "common/base/mem.h"
 #include "common/exr/exr.h"
 #include "coordinator/server/server.h"
+#include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
 
 #include <setjmp.h>

@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/server/server.h"
+#include "coordinator/server/server_options.h"
 #include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>

@@ -9,6 +9,7 @@
 #include "coordinator/jobs/publish.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/server/server.h"
+#include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
 #include "tests/support/scripted.h"
 

@@ -6,6 +6,7 @@
  */
 #include "common/base/disk.h"
 #include "coordinator/server/server.h"
+#include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
 #include "tests/support/scripted.h"
 

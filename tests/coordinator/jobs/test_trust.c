@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Who was set aside is known after a restart, however long the list has become; a damaged list stops no farm. */
 #include "coordinator/server/server.h"
+#include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
 
 #include <setjmp.h>

@@ -2,6 +2,7 @@
 /* What hslt-submit sends: the bytes that it read when it checked the scene, from below the scene's folder, or nothing.
  * For which job it waits: for that one. */
 #include "coordinator/server/server.h"
+#include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
 #include "worker/cli/submit/reconnect.h"
 

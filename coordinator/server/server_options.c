@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/server/server_options.h"
+
+#include "common/base/log.h"
+#include "coordinator/server/limits.h"
+
+#include <stdlib.h>
+#include <uv.h>
+
+static int take_verbose(void *target, char *arg, struct error *e)
+{
+	(void)target, (void)arg, (void)e;
+	log_set_level(LOG_LEVEL_DEBUG);
+	return 0;
+}
+
+#define CONFIG struct server_config
+
+static const struct option_row rows[] = {
+	{"listen", 'l', "HOST:PORT", "Where workers and clients connect; port 0: any free one",
+	 OPTION_TEXT(CONFIG, listen), .standard = "127.0.0.1:7700"},
+	{"spool", 0, "DIR", "The folder of blobs, jobs and results", OPTION_TEXT(CONFIG, spool), .needed = true},
+	{"status-socket", 0, "PATH", "Unix socket for hslt-status", OPTION_TEXT(CONFIG, status_socket),
+	 .environment = "HSLT_STATUS_SOCKET"},
+	{"status-group", 0, "GROUP", "Who may connect to it besides this user (nobody)",
+	 OPTION_TEXT(CONFIG, status_group)},
+	{"keep-partials", 0, "DIR", "Write every partial EXR tile that is merged into DIR",
+	 OPTION_TEXT(CONFIG, keep_partials)},
+	{"port-file", 0, "FILE", "Write the port that was bound into FILE", OPTION_TEXT(CONFIG, port_file)},
+	{"heartbeat", 0, "SECONDS", "How often workers must be heard",
+	 OPTION_SECONDS(CONFIG, heartbeat_seconds, 0.05, 3600), .standard = "5"},
+	{"blobs", 0, "GB", "Limit of scene files kept in the spool; the oldest that no job needs go",
+	 OPTION_SCALED(CONFIG, blob_bytes, 0.001, 1e6, 1e9), .standard = "100"},
+	{"tls", 0, "DIR",
+	 "ca.pem, cert.pem, key.pem, crl.pem, made by hslt-ca: encrypt, and let in who has a certificate",
+	 OPTION_TEXT(CONFIG, tls), .environment = "HSLT_TLS"},
+	{"tls-check", 0, "SECONDS", "How often certificates of live connections are checked again",
+	 OPTION_SECONDS(CONFIG, tls_check_seconds, 0.1, 3600), .standard = "60"},
+	{"journal", 0, "MB", "Results of a running job that are kept before its films are written in their place",
+	 OPTION_SCALED(CONFIG, journal_bytes, 0.001, 1e6, 1e6), .standard = "64"},
+	{"connections", 0, "N", "At once, at most (10000, or as many as there are file descriptors)",
+	 OPTION_COUNT(CONFIG, max_connections, 1, CONNECTIONS_MOST)},
+	{"film-memory", 0, "MB",
+	 "Films of running jobs in memory; beyond, they are files of the spool (a quarter of the memory)",
+	 OPTION_SCALED(CONFIG, film_bytes, 0, 1e9, 1e6)},
+	{"keep-films", 0, "MB", "Films of jobs that are done, for hslt-job extend; the oldest go",
+	 OPTION_SCALED(CONFIG, keep_bytes, 0, 1e9, 1e6), .standard = "2000"},
+	{"keep-days", 0, "N", "Results of finished jobs; their records ten times as long; 0: for ever",
+	 OPTION_SCALED(CONFIG, clear_seconds, 0, 1e6, 86400), .standard = "30"},
+	{"keep-gb", 0, "N", "Of all finished jobs together: films go first, then results, the oldest first; 0: any",
+	 OPTION_SCALED(CONFIG, clear_bytes, 0, 1e9, 1e9), .standard = "0"},
+	{"worker-bandwidth", 0, "MB/S",
+	 "Tiles that one thread of a worker may send on average: epochs of new jobs are at least that long (any)",
+	 OPTION_SCALED(CONFIG, worker_bandwidth, 1e-6, 1e6, 1e6)},
+	{"quota-jobs", 0, "N", "Jobs of a client that have not ended", OPTION_COUNT(CONFIG, quota.jobs, 1, 1e9)},
+	{"quota-assets", 0, "MB", "Their files together, and those on their way",
+	 OPTION_SCALED(CONFIG, quota.asset_bytes, 1e-6, 1e12, 1e6)},
+	{"quota-film", 0, "MB", "Films of a job: 72 bytes a pixel of its crop and group (--groups, up to 16 by itself)",
+	 OPTION_SCALED(CONFIG, quota.film_bytes, 1e-6, 1e12, 1e6)},
+	{"quota-mutations", 0, "N", "Of a job, or samples; then each must say how many",
+	 OPTION_COUNT(CONFIG, quota.mutations, 1, 1e18)},
+	{"verify", 0, "P", "Least share of the epochs of each job, or percent, that two workers must compute alike",
+	 OPTION_RATIO(CONFIG, verify, 0, 1), .standard = "0"},
+	{"max-faults", 0, "N", "Wrong results, or invalid ones in a row, after which a worker is set aside for good",
+	 OPTION_COUNT(CONFIG, max_faults, 1, 1e6), .standard = "3"},
+	{"forgive", 0, "NAME", "A worker that was set aside in an earlier run comes back",
+	 OPTION_TEXT(CONFIG, forgive)},
+	{"accept-loss", 0, NULL, "Start although the spool has lost jobs: what is left of them is put into SPOOL/lost",
+	 OPTION_FLAG(CONFIG, accept_loss)},
+	{"insecure", 0, NULL, "Listen on other than loopback addresses without encryption",
+	 OPTION_FLAG(CONFIG, insecure)},
+	{"verbose", 'v', NULL, "Log every lease, too", OPTION_TAKE(take_verbose)},
+	{0},
+};
+
+static int check(void *target, struct error *e)
+{
+	const struct server_config *c = target;
+	if (c->status_group && !c->status_socket && !getenv("LISTEN_FDS"))
+		return error_set(e, EINVAL, "--status-group is for a --status-socket");
+	return 0;
+}
+
+const struct program server_program = {
+	.name = "hslt-coordinator",
+	.summary = "Takes render jobs, hands their work to workers, merges what they send back into one image.",
+	.examples = "hslt-coordinator --listen 127.0.0.1:7700 --spool ~/farm --status-socket ~/farm/status\n"
+		    "hslt-coordinator --listen 0.0.0.0:7700 --tls ~/.hslt-ca/coordinator --spool /var/lib/hslt",
+	.details =
+		"The spool keeps the jobs' results; one coordinator works with a spool at a time. A line of the log is written to "
+		"stderr for every event. Under systemd it says when it is ready and feeds the watchdog, and a socket unit's Unix "
+		"socket is taken as the status socket.",
+	.exits = "0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+};
+
+/* Of what this process may have. */
+static uint64_t quarter_of_memory(void)
+{
+	uint64_t all = uv_get_total_memory(), ours = uv_get_constrained_memory();
+	return (ours && ours < all ? ours : all) / 4;
+}
+
+void server_config_init(struct server_config *c)
+{
+	*c = (struct server_config){.retry_seconds = 2,
+				    .max_fetches = FETCHES_MOST,
+				    .film_bytes = quarter_of_memory(),
+				    .waiting_bytes = quarter_of_memory(),
+				    .hello_seconds = 10,
+				    .stall_seconds = 30};
+	option_defaults(&server_program.own, c, NULL);
+}

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* hslt-coordinator's options: rows that fill a struct server_config. */
+#ifndef COORDINATOR_SERVER_SERVER_OPTIONS_H
+#define COORDINATOR_SERVER_SERVER_OPTIONS_H
+
+#include "common/base/option.h"
+#include "coordinator/job/config.h"
+
+extern const struct program server_program;
+
+/* The defaults of all options, and what no option sets. */
+void server_config_init(struct server_config *c);
+
+#endif
