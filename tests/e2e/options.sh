@@ -2,7 +2,7 @@
 # What programs print of their options: --help, the manual page and the completion of bash name the same ones, each once; a mistyped
 # option gets the nearest name.
 . "$(dirname "$0")/lib.sh"
-PROGRAMS="assemble compare tonemap"
+PROGRAMS="accuracy assemble ca compare coordinator job render scene status submit tonemap"
 need $(for p in $PROGRAMS; do echo "hslt-$p"; done)
 
 # Asks the completion for each option of a list, and for its beginnings up to three letters.

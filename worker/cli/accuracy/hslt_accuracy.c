@@ -6,8 +6,8 @@
  */
 #include "common/base/mem.h"
 #include "common/base/output.h"
+#include "common/base/program.h"
 #include "common/base/progress.h"
-#include "common/base/version.h"
 #include "common/exr/image_file.h"
 #include "worker/cli/accuracy/accuracy.h"
 #include "worker/cli/base/interrupt.h"
@@ -18,53 +18,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *argp_program_version = "hslt-accuracy " HSLT_VERSION;
-
-static const char doc[] =
-	"Shows what accuracy costs in time: renders a scene with one setting changed at a time, and writes what each buys and costs."
-	"\v"
-	"Examples:\n"
-	"  hslt-accuracy room.xml -o room.html --size 160x90\n"
-	"  hslt-accuracy room.xml -o room.html --csv room.csv --size 160x90 --budget 60 --threads 8\n"
-	"  hslt-accuracy room.xml -o depth.html --parameters max-depth,tolerance --seconds 30\n"
-	"\n"
-	"The report is one HTML file: error at equal time and at equal mutations, time a mutation, failed walks and bias of every "
-	"setting, and which of them lie on the Pareto front. Small films say as much as large ones and take less memory.\n"
-	"Interrupted, it reports what there is once each setting had a round, and ends with 1.\n"
-	"Exit codes: 0 done, 1 failed, 2 usage.";
-
-enum {
-	OPTION_THREADS = 256,
-	OPTION_QUIET,
-	OPTION_CSV,
-	OPTION_BUDGET,
-	OPTION_SECONDS,
-	OPTION_ROUNDS,
-	OPTION_SETTINGS,
-	OPTION_REFERENCE
-};
-
-static const struct argp_option options[] = {
-	{"output", 'o', "FILE", 0, "The report (HTML)", 0},
-	{"csv", OPTION_CSV, "FILE", 0, "The figures as comma-separated values too", 0},
-	{"budget", OPTION_BUDGET, "MINUTES", 0,
-	 "How long it may take in all (10), shared equally; more makes the intervals narrower", 0},
-	{"seconds", OPTION_SECONDS, "S", 0, "CPU seconds of each setting, in place of a budget", 0},
-	{"rounds", OPTION_ROUNDS, "N", 0,
-	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats",
-	 0},
-	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors)", 0},
-	{"parameters", OPTION_SETTINGS, "LIST", 0,
-	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between",
-	 0},
-	{"knobs", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 0},
-	{"reference", OPTION_REFERENCE, "FILE", 0,
-	 "An image (OpenEXR) to measure the bias against, in place of a careful render", 0},
-	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
-	{0},
-};
-static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
-
 struct arguments {
 	const char *scene, *output, *csv, *accuracy, *reference;
 	unsigned threads;
@@ -74,73 +27,67 @@ struct arguments {
 	struct render_arguments render;
 };
 
-static double minutes(const struct argp_state *state, const char *arg)
+static const struct option_row rows[] = {
+	{"output", 'o', "FILE", "The report (HTML)", OPTION_TEXT(struct arguments, output)},
+	{"csv", 0, "FILE", "The figures as comma-separated values too", OPTION_TEXT(struct arguments, csv)},
+	{"budget", 0, "MINUTES", "How long it may take in all, shared equally; more makes the intervals narrower",
+	 OPTION_NUMBER(struct arguments, budget, 0, 1e6), .above = true, .below = true, .standard = "10"},
+	{"seconds", 0, "S", "CPU seconds of each setting, in place of a budget",
+	 OPTION_SECONDS(struct arguments, seconds, 0, 1e9), .above = true, .below = true},
+	{"rounds", 0, "N",
+	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats",
+	 OPTION_COUNT(struct arguments, rounds, 2, ACCURACY_COSTS)},
+	{"threads", 0, "N", "Threads (as many as processors)", OPTION_COUNT(struct arguments, threads, 1, 1024)},
+	{"parameters", 0, "LIST",
+	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between",
+	 OPTION_TEXT(struct arguments, accuracy)},
+	{"knobs", 0, "LIST", "The old name of --parameters", OPTION_TEXT(struct arguments, accuracy), .hidden = true},
+	{"reference", 0, "FILE", "An image (OpenEXR) to measure the bias against, in place of a careful render",
+	 OPTION_TEXT(struct arguments, reference)},
+	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
+	{0},
+};
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
 {
-	char *end;
-	double x = strtod(arg, &end);
-	if (end == arg || *end || !(x > 0 && x < 1e6))
-		argp_error(state, "--budget takes minutes, not '%s'", arg);
-	return x;
+	struct arguments *a = target;
+	a->scene = word;
+	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
 }
 
-static void check(const struct arguments *a, struct argp_state *state)
+static int check(void *target, struct error *e)
 {
+	const struct arguments *a = target;
 	const struct plan_request *p = &a->render.plan;
 	if (!a->scene || !a->output)
-		argp_error(state, "a scene and -o FILE are needed");
+		return error_set(e, EINVAL, "a scene and -o FILE are needed");
 	if (p->spp || p->mutations || p->seconds > 0 || p->target_error > 0)
-		argp_error(state,
-			   "--budget or --seconds say how long, not --spp, --mutations N, --time or --target-error");
+		return error_set(
+			e, EINVAL,
+			"--budget or --seconds say how long, not --spp, --mutations N, --time or --target-error");
+	return 0;
 }
 
-static error_t parse(int key, char *arg, struct argp_state *state)
-{
-	struct arguments *a = state->input;
-	switch (key) {
-	case ARGP_KEY_INIT:
-		state->child_inputs[0] = &a->render;
-		return 0;
-	case 'o':
-		a->output = arg;
-		return 0;
-	case OPTION_CSV:
-		a->csv = arg;
-		return 0;
-	case OPTION_BUDGET:
-		a->budget = minutes(state, arg);
-		return 0;
-	case OPTION_SECONDS:
-		a->seconds = option_seconds(state, "--seconds", arg);
-		return 0;
-	case OPTION_ROUNDS:
-		a->rounds = option_whole(state, "--rounds", arg);
-		if (a->rounds < 2 || a->rounds > ACCURACY_COSTS)
-			argp_error(state, "--rounds takes 2 to %d, not '%s'", ACCURACY_COSTS, arg);
-		return 0;
-	case OPTION_THREADS:
-		a->threads = option_threads(state, arg);
-		return 0;
-	case OPTION_SETTINGS:
-		a->accuracy = arg;
-		return 0;
-	case OPTION_REFERENCE:
-		a->reference = arg;
-		return 0;
-	case OPTION_QUIET:
-		a->quiet = true;
-		return 0;
-	case ARGP_KEY_ARG:
-		if (a->scene)
-			argp_error(state, "one scene at a time");
-		a->scene = arg;
-		return 0;
-	case ARGP_KEY_END:
-		check(a, state);
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
-}
+static const struct program program = {
+	.name = "hslt-accuracy",
+	.words = "SCENE.xml",
+	.summary =
+		"Shows what accuracy costs in time: renders a scene with one setting changed at a time, and writes what each buys "
+		"and costs.",
+	.examples = "hslt-accuracy room.xml -o room.html --size 160x90\n"
+		    "hslt-accuracy room.xml -o room.html --csv room.csv --size 160x90 --budget 60 --threads 8\n"
+		    "hslt-accuracy room.xml -o depth.html --parameters max-depth,tolerance --seconds 30",
+	.details =
+		"The report is one HTML file: error at equal time and at equal mutations, time a mutation, failed walks and bias of "
+		"every setting, and which of them lie on the Pareto front. Small films say as much as large ones and take less "
+		"memory.\n"
+		"Interrupted, it reports what there is once each setting had a round, and ends with 1.",
+	.exits = "0 done, 1 failed, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.shared = &render_table,
+	.shared_offset = offsetof(struct arguments, render),
+	.word = take_word,
+};
 
 struct session {
 	struct arguments *a;
@@ -293,14 +240,13 @@ static int run(struct session *s, struct error *e)
 
 int main(int argc, char **argv)
 {
-	static struct arguments a = {.budget = 10};
+	static struct arguments a;
 	static struct session s;
 	struct error e = {""};
 	mem_keep(1 << 20);
 	a.threads = option_threads_default();
 	output_check_at_exit();
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	interrupt_watch();
 	s.a = &a;
 	int rc = run(&s, &e);

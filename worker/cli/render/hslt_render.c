@@ -10,8 +10,8 @@
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/output.h"
+#include "common/base/program.h"
 #include "common/base/progress.h"
-#include "common/base/version.h"
 #include "common/exr/image_file.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
@@ -28,53 +28,6 @@
 #include <stdio.h>
 #include <string.h>
 
-const char *argp_program_version = "hslt-render " HSLT_VERSION;
-
-static const char doc[] =
-	"Renders a scene on this machine, without a farm: the same plan gives the same bits as the farm's."
-	"\v"
-	"Examples:\n"
-	"  hslt-render room.xml -o room.exr --spp 64\n"
-	"  hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
-	"  hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
-	"  hslt-render --estimate room.xml --plot room.svg\n"
-	"  hslt-render --explain room.xml\n"
-	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000\n"
-	"\n"
-	"--estimate makes no image: a pilot of a minute tells what errors of 10, 5, 2 and 1 % (and --target-error) will cost.\n"
-	"The image holds linear Rec. 709 (R G B), one standard error of each (error.R error.G error.B), and for chains the potential "
-	"scale reduction of each pixel's tile (rhat.Y).\n"
-	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
-	"note says where).";
-
-enum {
-	OPTION_THREADS = 256,
-	OPTION_STATS,
-	OPTION_QUIET,
-	OPTION_ESTIMATE,
-	OPTION_PILOT,
-	OPTION_PLOT,
-	OPTION_JSON,
-	OPTION_EXPLAIN
-};
-
-static const struct argp_option options[] = {
-	{"output", 'o', "FILE", 0, "The image (OpenEXR); -: stdout", 0},
-	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
-	{"stats", OPTION_STATS, "FILE", 0,
-	 "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes of paths",
-	 0},
-	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
-	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
-	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
-	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
-	{"explain", OPTION_EXPLAIN, NULL, 0,
-	 "Only say what the scene calls for, why, and what leaving the rest out saves", 0},
-	{"json", OPTION_JSON, NULL, 0, "Print the estimate, or what --explain says, as one JSON object", 0},
-	{0},
-};
-static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
-
 struct arguments {
 	const char *scene, *output, *stats, *plot;
 	unsigned threads;
@@ -83,59 +36,77 @@ struct arguments {
 	struct render_arguments render;
 };
 
-static error_t parse(int key, char *arg, struct argp_state *state)
+static int take_output(void *target, char *arg, struct error *e)
 {
-	struct arguments *a = state->input;
-	switch (key) {
-	case ARGP_KEY_INIT:
-		state->child_inputs[0] = &a->render;
-		return 0;
-	case 'o':
-		a->output = option_image(state, arg);
-		return 0;
-	case OPTION_THREADS:
-		a->threads = option_threads(state, arg);
-		return 0;
-	case OPTION_STATS:
-		a->stats = arg;
-		return 0;
-	case OPTION_QUIET:
-		a->quiet = true;
-		return 0;
-	case OPTION_ESTIMATE:
-		a->estimate = true;
-		return 0;
-	case OPTION_PILOT:
-		a->pilot = option_seconds(state, "--pilot", arg);
-		return 0;
-	case OPTION_PLOT:
-		a->plot = arg;
-		return 0;
-	case OPTION_JSON:
-		a->json = true;
-		return 0;
-	case OPTION_EXPLAIN:
-		a->explain = true;
-		return 0;
-	case ARGP_KEY_ARG:
-		if (a->scene)
-			argp_error(state, "one scene at a time");
-		a->scene = arg;
-		return 0;
-	case ARGP_KEY_END:
-		if (!a->scene || (!a->output && !a->estimate && !a->explain))
-			argp_error(state, "a scene and -o FILE are needed");
-		if (a->estimate && (a->output || a->stats))
-			argp_error(state, "--estimate makes no image: no -o, no --stats");
-		if (a->explain && (a->output || a->stats || a->estimate))
-			argp_error(state, "--explain renders nothing: no -o, no --stats, no --estimate");
-		if (!a->estimate && (a->pilot > 0 || a->plot || (a->json && !a->explain)))
-			argp_error(state, "--pilot, --plot and --json go with --estimate");
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
+	struct arguments *a = target;
+	return option_image(arg, &a->output, e);
 }
+
+static const struct option_row rows[] = {
+	{"output", 'o', "FILE", "The image (OpenEXR); -: stdout", OPTION_TAKE(take_output)},
+	{"threads", 0, "N", "Threads (as many as processors); does not change the bits",
+	 OPTION_COUNT(struct arguments, threads, 1, 1024)},
+	{"stats", 0, "FILE",
+	 "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes "
+	 "of paths",
+	 OPTION_TEXT(struct arguments, stats)},
+	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
+	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost",
+	 OPTION_FLAG(struct arguments, estimate)},
+	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(struct arguments, pilot, 0, 1e9),
+	 .above = true, .below = true},
+	{"plot", 0, "FILE", "Plot the estimate into an .svg or .png", OPTION_TEXT(struct arguments, plot)},
+	{"explain", 0, NULL, "Only say what the scene calls for, why, and what leaving the rest out saves",
+	 OPTION_FLAG(struct arguments, explain)},
+	{"json", 0, NULL, "Print the estimate, or what --explain says, as one JSON object",
+	 OPTION_FLAG(struct arguments, json)},
+	{0},
+};
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
+{
+	struct arguments *a = target;
+	a->scene = word;
+	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
+}
+
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	if (!a->scene || (!a->output && !a->estimate && !a->explain))
+		return error_set(e, EINVAL, "a scene and -o FILE are needed");
+	if (a->estimate && (a->output || a->stats))
+		return error_set(e, EINVAL, "--estimate makes no image: no -o, no --stats");
+	if (a->explain && (a->output || a->stats || a->estimate))
+		return error_set(e, EINVAL, "--explain renders nothing: no -o, no --stats, no --estimate");
+	if (!a->estimate && (a->pilot > 0 || a->plot || (a->json && !a->explain)))
+		return error_set(e, EINVAL, "--pilot, --plot and --json go with --estimate");
+	return 0;
+}
+
+static const struct program program = {
+	.name = "hslt-render",
+	.words = "SCENE.xml",
+	.summary = "Renders a scene on this machine, without a farm: the same plan gives the same bits as the farm's.",
+	.examples =
+		"hslt-render room.xml -o room.exr --spp 64\n"
+		"hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
+		"hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
+		"hslt-render --estimate room.xml --plot room.svg\n"
+		"hslt-render --explain room.xml\n"
+		"hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000",
+	.details =
+		"--estimate makes no image: a pilot of a minute tells what errors of 10, 5, 2 and 1 % (and --target-error) will cost.\n"
+		"The image holds linear Rec. 709 (R G B), one standard error of each (error.R error.G error.B), and for chains the "
+		"potential scale reduction of each pixel's tile (rhat.Y).",
+	.exits =
+		"0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
+		"note says where)",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.shared = &render_table,
+	.shared_offset = offsetof(struct arguments, render),
+	.word = take_word,
+};
 
 struct session {
 	struct arguments *a;
@@ -422,8 +393,7 @@ int main(int argc, char **argv)
 	a.threads = option_threads_default();
 	output_check_at_exit();
 	crash_exit("hslt-render");
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	interrupt_watch();
 	s.a = &a;
 	int rc = run(&s, &e);

@@ -3,38 +3,11 @@
 #include "worker/cli/scene/scene_report.h"
 
 #include "common/base/output.h"
-#include "common/base/version.h"
+#include "common/base/program.h"
 #include "worker/cli/base/options.h"
 
-#include <argp.h>
 #include <stdio.h>
 #include <string.h>
-
-const char *argp_program_version = "hslt-scene " HSLT_VERSION;
-
-static const char doc[] =
-	"Says what is wrong with a scene file, or what was read of it. Renders nothing."
-	"\v"
-	"check: everything that is wrong or not supported, a line each with file, line and element, and as `note:` what is ignored.\n"
-	"show: film, camera, counts, the effects that the scene calls for, and its files with the beginning of their SHA-256.\n"
-	"compatibility: what is read of Mitsuba's scenes, all plug-ins and parameters, as docs/compatibility.md has it.\n"
-	"\n"
-	"Examples:\n"
-	"  hslt-scene check room.xml\n"
-	"  hslt-scene check -D light=sun room.xml\n"
-	"  hslt-scene show --json room.xml\n"
-	"\n"
-	"Exit codes: 0 the scene can be rendered, 1 it cannot, 2 usage.";
-
-static const struct argp_option options[] = {
-	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 0},
-	{"path", 'p', "FOLDER", 0, "Where files that are not in the scene's folder are searched; may be given again",
-	 0},
-	{"lenient", 'l', NULL, 0,
-	 "As --lenient of hslt-render: what is not supported is left out or replaced, and is no problem but a note", 0},
-	{"json", 'j', NULL, 0, "show: one JSON object", 0},
-	{0},
-};
 
 struct arguments {
 	const char *verb;
@@ -42,53 +15,75 @@ struct arguments {
 	struct scene_request request;
 };
 
-/* NAME=VALUE; the name is cut out in place. */
-static void take_define(struct scene_request *r, char *arg, struct argp_state *state)
+static int take_define(void *target, char *arg, struct error *e)
 {
-	char *value = strchr(arg, '=');
-	if (!value || value == arg)
-		argp_error(state, "-D takes NAME=VALUE, not '%s'", arg);
-	if (r->define_count == sizeof r->defines / sizeof *r->defines)
-		argp_error(state, "too many -D");
-	*value = 0;
-	r->defines[r->define_count++] = (struct scene_define){arg, value + 1};
+	struct arguments *a = target;
+	return option_define(arg, a->request.defines, &a->request.define_count, e);
 }
 
-static error_t parse(int key, char *arg, struct argp_state *state)
+static int take_path(void *target, char *arg, struct error *e)
 {
-	struct arguments *a = state->input;
-	switch (key) {
-	case 'D':
-		take_define(&a->request, arg, state);
-		return 0;
-	case 'p':
-		option_path(state, arg, a->request.paths, &a->request.path_count);
-		return 0;
-	case 'l':
-		a->request.lenient = true;
-		return 0;
-	case 'j':
-		a->json = true;
-		return 0;
-	case ARGP_KEY_ARG:
-		if (a->request.path)
-			argp_error(state, "one scene, not more");
-		*(a->verb ? &a->request.path : &a->verb) = arg;
-		return 0;
-	case ARGP_KEY_END:
-		if (a->verb && strcmp(a->verb, "compatibility") == 0 && !a->request.path)
-			return 0;
-		if (!a->request.path)
-			argp_error(state, "`check SCENE.xml` or `show SCENE.xml` is needed");
-		if (strcmp(a->verb, "check") != 0 && strcmp(a->verb, "show") != 0)
-			argp_error(state, "'%s' is neither check nor show", a->verb);
-		if (a->json && strcmp(a->verb, "show") != 0)
-			argp_error(state, "--json belongs to show");
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
+	struct arguments *a = target;
+	return option_path(arg, a->request.paths, &a->request.path_count, e);
 }
+
+static const struct option_row rows[] = {
+	{"define", 'D', "NAME=VALUE", "For $NAME in the scene", OPTION_TAKE(take_define)},
+	{"path", 'p', "FOLDER", "Where files that are not in the scene's folder are searched; may be given again",
+	 OPTION_TAKE(take_path)},
+	{"lenient", 'l', NULL,
+	 "As --lenient of hslt-render: what is not supported is left out or replaced, and is no problem but a note",
+	 OPTION_FLAG(struct arguments, request.lenient)},
+	{"json", 'j', NULL, "show: one JSON object", OPTION_FLAG(struct arguments, json)},
+	{0},
+};
+
+static const char *verb_at(size_t i)
+{
+	static const char *const verbs[] = {"check", "show", "compatibility", NULL};
+	return verbs[i];
+}
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
+{
+	struct arguments *a = target;
+	if (index > 1)
+		return error_set(e, EINVAL, "one scene, not more");
+	*(index == 0 ? &a->verb : &a->request.path) = word;
+	return 0;
+}
+
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	bool reads = strcmp(a->verb, "compatibility") != 0;
+	if (reads && !a->request.path)
+		return error_set(e, EINVAL, "`%s SCENE.xml`: a scene is needed", a->verb);
+	if (!reads && a->request.path)
+		return error_set(e, EINVAL, "compatibility takes no scene");
+	if (a->json && strcmp(a->verb, "show") != 0)
+		return error_set(e, EINVAL, "--json belongs to show");
+	return 0;
+}
+
+static const struct program program = {
+	.name = "hslt-scene",
+	.words = "check|show SCENE.xml\ncompatibility",
+	.summary = "Says what is wrong with a scene file, or what was read of it. Renders nothing.",
+	.examples = "hslt-scene check room.xml\n"
+		    "hslt-scene check -D light=sun room.xml\n"
+		    "hslt-scene show --json room.xml",
+	.details =
+		"check: everything that is wrong or not supported, a line each with file, line and element, and as `note:` what is "
+		"ignored.\n"
+		"show: film, camera, counts, the effects that the scene calls for, and its files with the beginning of their "
+		"SHA-256.\n"
+		"compatibility: what is read of Mitsuba's scenes, all plug-ins and parameters, as docs/compatibility.md has it.",
+	.exits = "0 the scene can be rendered, 1 it cannot, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.verbs = verb_at,
+	.word = take_word,
+};
 
 int main(int argc, char **argv)
 {
@@ -96,9 +91,7 @@ int main(int argc, char **argv)
 	struct error e;
 	bool bad = false;
 	output_check_at_exit();
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "check|show SCENE.xml\ncompatibility", doc, NULL, NULL, NULL}, argc,
-		   argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	if (!a.request.path) {
 		compatibility_print(stdout);
 		return 0;

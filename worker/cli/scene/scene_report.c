@@ -10,7 +10,6 @@
 
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
-#include "worker/cli/base/options.h"
 #include "worker/render/scene/gltf.h"
 
 #include <jansson.h>

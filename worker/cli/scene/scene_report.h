@@ -3,13 +3,13 @@
 #ifndef WORKER_CLI_SCENE_REPORT_H
 #define WORKER_CLI_SCENE_REPORT_H
 
-#include "worker/render/render.h"
+#include "worker/cli/base/options.h"
 
 struct scene_request {
 	const char *path;
-	struct scene_define defines[256];
+	struct scene_define defines[OPTION_DEFINES_MAX];
 	size_t define_count;
-	const char *paths[ASSET_FOLDERS_MAX - 1]; /* where files that are not in the scene's folder are searched */
+	const char *paths[OPTION_PATHS_MAX]; /* where files that are not in the scene's folder are searched */
 	size_t path_count;
 	bool lenient; /* what is not supported is left out or replaced, and noted */
 };

@@ -9,8 +9,7 @@
  */
 #include "common/base/crash.h"
 #include "common/base/output.h"
-#include "common/base/text.h"
-#include "common/base/version.h"
+#include "common/base/program.h"
 #include "common/exr/image_file.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/render/choice.h"
@@ -21,68 +20,10 @@
 #include "worker/cli/render/pilot.h"
 #include "worker/cli/render/speed.h"
 
-#include <argp.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-const char *argp_program_version = "hslt-submit " HSLT_VERSION;
-
-static const char doc[] =
-	"Checks a scene, sends it to a coordinator as a job, and waits for the image if it is told to."
-	"\v"
-	"Examples:\n"
-	"  hslt-submit --coordinator 127.0.0.1:7700 room.xml -o room.exr --spp 64 --wait\n"
-	"  hslt-submit room.xml -o room.exr --target-error 2% --time 3600\n"
-	"  hslt-submit room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --spp 256\n"
-	"  hslt-submit --estimate room.xml --plot room.svg\n"
-	"  hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun\n"
-	"\n"
-	"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is what hslt-job fetch calls the image. "
-	"--estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and 1 % (and --target-error) will "
-	"cost there. For long jobs without --epoch a pilot of a second here says how many mutations a thread makes in the 20 s that a "
-	"lease should take; --epoch pins it. --wait outlasts restarts of the coordinator. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
-	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
-	"there, and its note says where), 6 refused, 75 "
-	"coordinator not reachable.";
-
-enum {
-	OPTION_PRIORITY = 256,
-	OPTION_NAME,
-	OPTION_WAIT,
-	OPTION_JSON,
-	OPTION_INSECURE,
-	OPTION_MIXED,
-	OPTION_VERIFY,
-	OPTION_ESTIMATE,
-	OPTION_PILOT,
-	OPTION_PLOT,
-	OPTION_TLS,
-	OPTION_PATIENCE
-};
-
-static const struct argp_option options[] = {
-	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
-	{"output", 'o', "FILE", 0, "The image; -: stdout, and the job's id goes to stderr", 0},
-	{"priority", OPTION_PRIORITY, "P", 0, "-100 to 100, higher first (0)", 0},
-	{"name", OPTION_NAME, "NAME", 0, "How the job is shown (the scene's file name)", 0},
-	{"wait", OPTION_WAIT, NULL, 0, "Show progress and fetch the image", 0},
-	{"patience", OPTION_PATIENCE, "SECONDS", 0, "With --wait: how long to call a coordinator that is gone (600)",
-	 0},
-	{"json", OPTION_JSON, NULL, 0, "Print one JSON object instead of the id, or of the estimate's table", 0},
-	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
-	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
-	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
-	{"mixed", OPTION_MIXED, NULL, 0, "Allow workers of any numeric fingerprint: gives up equal bits", 0},
-	{"verify", OPTION_VERIFY, "P", 0,
-	 "Share of the epochs, or percent, that two workers must compute alike before they count (0)", 0},
-	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
-	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
-	{0},
-};
-
-static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
 
 struct arguments {
 	const char *coordinator, *tls, *scene, *output, *name;
@@ -99,82 +40,97 @@ static bool to_stdout(const struct arguments *a)
 	return a->output && strcmp(a->output, "/dev/stdout") == 0;
 }
 
-static error_t parse(int key, char *arg, struct argp_state *state)
+static int take_output(void *target, char *arg, struct error *e)
 {
-	struct arguments *a = state->input;
-	char *end;
-	switch (key) {
-	case ARGP_KEY_INIT:
-		state->child_inputs[0] = &a->render;
-		return 0;
-	case 'c':
-		a->coordinator = arg;
-		return 0;
-	case 'o':
-		a->output = option_image(state, arg);
-		return 0;
-	case OPTION_PRIORITY:
-		a->request.priority = (int)strtol(arg, &end, 10);
-		if (end == arg || *end || a->request.priority < -100 || a->request.priority > 100)
-			argp_error(state, "--priority takes -100 to 100, not '%s'", arg);
-		return 0;
-	case OPTION_NAME:
-		a->name = arg;
-		return 0;
-	case OPTION_WAIT:
-		a->wait = true;
-		return 0;
-	case OPTION_JSON:
-		a->json = true;
-		return 0;
-	case OPTION_MIXED:
-		a->request.mixed = true;
-		return 0;
-	case OPTION_VERIFY:
-		if (!text_share(arg, &a->request.verify))
-			argp_error(state, "--verify takes a share from 0 to 1 or percent, not '%s'", arg);
-		return 0;
-	case OPTION_TLS:
-		a->tls = arg;
-		return 0;
-	case OPTION_INSECURE:
-		a->insecure = true;
-		return 0;
-	case OPTION_ESTIMATE:
-		a->estimate = true;
-		return 0;
-	case OPTION_PILOT:
-		a->pilot = option_seconds(state, "--pilot", arg);
-		return 0;
-	case OPTION_PATIENCE:
-		a->patience = option_seconds(state, "--patience", arg);
-		return 0;
-	case OPTION_PLOT:
-		a->plot = arg;
-		return 0;
-	case ARGP_KEY_ARG:
-		if (a->scene)
-			argp_error(state, "one scene at a time");
-		a->scene = arg;
-		return 0;
-	case ARGP_KEY_END:
-		if (!a->scene || (!a->output && !a->estimate))
-			argp_error(state, "a scene and -o FILE are needed");
-		if (a->request.verify > 0 && a->request.mixed)
-			argp_error(state, "--mixed workers cannot be held against each other: no --verify");
-		if (a->estimate && (a->output || a->wait))
-			argp_error(state, "--estimate makes no image: no -o, no --wait");
-		if (!a->estimate && (a->pilot > 0 || a->plot))
-			argp_error(state, "--pilot and --plot go with --estimate");
-		if (to_stdout(a) && (!a->wait || a->json))
-			argp_error(state, "-o - writes the image to stdout: it goes with --wait, and without --json");
-		if (!a->coordinator)
-			argp_error(state, "--coordinator HOST:PORT is needed (or $HSLT_COORDINATOR)");
-		return 0;
-	default:
-		return ARGP_ERR_UNKNOWN;
-	}
+	struct arguments *a = target;
+	return option_image(arg, &a->output, e);
 }
+
+static int take_priority(void *target, char *arg, struct error *e)
+{
+	struct arguments *a = target;
+	char *end;
+	long n = strtol(arg, &end, 10);
+	if (end == arg || *end || n < -100 || n > 100)
+		return error_set(e, EINVAL, "--priority takes -100 to 100, not '%s'", arg);
+	a->request.priority = (int)n;
+	return 0;
+}
+
+static const struct option_row rows[] = {
+	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct arguments, coordinator),
+	 .environment = "HSLT_COORDINATOR", .needed = true},
+	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_TAKE(take_output)},
+	{"priority", 0, "P", "-100 to 100, higher first", OPTION_TAKE(take_priority), .standard = "0"},
+	{"name", 0, "NAME", "How the job is shown (the scene's file name)", OPTION_TEXT(struct arguments, name)},
+	{"wait", 0, NULL, "Show progress and fetch the image", OPTION_FLAG(struct arguments, wait)},
+	{"patience", 0, "SECONDS", "With --wait: how long to call a coordinator that is gone",
+	 OPTION_SECONDS(struct arguments, patience, 0, 1e9), .above = true, .below = true, .standard = "600"},
+	{"json", 0, NULL, "Print one JSON object instead of the id, or of the estimate's table",
+	 OPTION_FLAG(struct arguments, json)},
+	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost",
+	 OPTION_FLAG(struct arguments, estimate)},
+	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(struct arguments, pilot, 0, 1e9),
+	 .above = true, .below = true},
+	{"plot", 0, "FILE", "Plot the estimate into an .svg or .png", OPTION_TEXT(struct arguments, plot)},
+	{"mixed", 0, NULL, "Allow workers of any numeric fingerprint: gives up equal bits",
+	 OPTION_FLAG(struct arguments, request.mixed)},
+	{"verify", 0, "P", "Share of the epochs, or percent, that two workers must compute alike before they count",
+	 OPTION_RATIO(struct arguments, request.verify, 0, 1), .standard = "0"},
+	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encrypt, and say who we are",
+	 OPTION_TEXT(struct arguments, tls), .environment = "HSLT_TLS"},
+	{"insecure", 0, NULL, "Connect to other than loopback addresses without encryption",
+	 OPTION_FLAG(struct arguments, insecure)},
+	{0},
+};
+
+static int take_word(void *target, size_t index, char *word, struct error *e)
+{
+	struct arguments *a = target;
+	a->scene = word;
+	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
+}
+
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	if (!a->scene || (!a->output && !a->estimate))
+		return error_set(e, EINVAL, "a scene and -o FILE are needed");
+	if (a->request.verify > 0 && a->request.mixed)
+		return error_set(e, EINVAL, "--mixed workers cannot be held against each other: no --verify");
+	if (a->estimate && (a->output || a->wait))
+		return error_set(e, EINVAL, "--estimate makes no image: no -o, no --wait");
+	if (!a->estimate && (a->pilot > 0 || a->plot))
+		return error_set(e, EINVAL, "--pilot and --plot go with --estimate");
+	if (to_stdout(a) && (!a->wait || a->json))
+		return error_set(e, EINVAL, "-o - writes the image to stdout: it goes with --wait, and without --json");
+	return 0;
+}
+
+static const struct program program = {
+	.name = "hslt-submit",
+	.words = "SCENE.xml",
+	.summary = "Checks a scene, sends it to a coordinator as a job, and waits for the image if it is told to.",
+	.examples =
+		"hslt-submit --coordinator 127.0.0.1:7700 room.xml -o room.exr --spp 64 --wait\n"
+		"hslt-submit room.xml -o room.exr --target-error 2% --time 3600\n"
+		"hslt-submit room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --spp 256\n"
+		"hslt-submit --estimate room.xml --plot room.svg\n"
+		"hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun",
+	.details =
+		"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is what hslt-job fetch "
+		"calls the image. --estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and "
+		"1 % (and --target-error) will cost there. For long jobs without --epoch a pilot of a second here says how many "
+		"mutations a thread makes in the 20 s that a lease should take; --epoch pins it. --wait outlasts restarts of the "
+		"coordinator.",
+	.exits =
+		"0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
+		"there, and its note says where), 6 refused, 75 coordinator not reachable",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.shared = &render_table,
+	.shared_offset = offsetof(struct arguments, render),
+	.word = take_word,
+};
 
 /* What a later fetch calls it. The folder is no business of the farm's. */
 static const char *last_part(const char *path)
@@ -290,14 +246,10 @@ int main(int argc, char **argv)
 	struct client *cl;
 	struct error e;
 	int code = 0;
-	a.coordinator = getenv("HSLT_COORDINATOR");
-	a.tls = getenv("HSLT_TLS");
 	a.request.args = &a.render;
-	a.patience = 600;
 	output_check_at_exit();
 	crash_exit("hslt-submit");
-	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	program_options(&program, argc, argv, &a);
 	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;
 	if (!rc)
 		rc = scene_bundle_read(&b, a.scene, &a.render, &e);
