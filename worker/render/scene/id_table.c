@@ -8,14 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { COMPARED_MAX = 1 << 20 };
+
 static int compare_ids(const void *a, const void *b)
 {
 	const struct id_entry *x = a, *y = b;
 	return strcmp(x->id, y->id);
 }
 
-int id_table_find(const struct id_table *t, const struct xml_element *el, const char *attribute,
-		  struct xml_element **out, struct error *e)
+int id_table_find(struct id_table *t, const struct xml_element *el, const char *attribute, struct xml_element **out,
+		  struct error *e)
 {
 	const char *id = xml_attribute(el, attribute);
 	if (!id)
@@ -28,7 +30,7 @@ int id_table_find(const struct id_table *t, const struct xml_element *el, const 
 	}
 	char hint[128];
 	struct spelling s = {.wanted = id};
-	for (size_t i = 0; i < t->count; i++)
+	for (size_t i = 0; i < t->count && t->compared < COMPARED_MAX; i++, t->compared++)
 		spelling_offer(&s, t->entries[i].id);
 	return xml_error(el, e, ENOENT, "there is no object with id \"%.64s\"%s", id,
 			 spelling_hint(&s, hint, sizeof hint));

@@ -46,10 +46,10 @@ int report_text(struct report *r, const char *file, const char *key, const char 
 
 int report_problem(struct report *r, int code, struct error *e)
 {
-	if (code == 0 || code == REPORT_TOLD || code == -ENOMEM)
-		return code == -ENOMEM ? code : 0;
-	if (r->problem_count == REPORT_PROBLEMS_MAX)
+	if (code == 0 || code == REPORT_TOLD)
 		return 0;
+	if (code == -ENOMEM || code == REPORT_FULL)
+		return code;
 	const char *text = arena_strdup(r->arena, e->text);
 	if (!text)
 		return error_set(e, ENOMEM, "out of memory");
@@ -58,5 +58,5 @@ int report_problem(struct report *r, int code, struct error *e)
 		r->first = *e;
 	}
 	r->problems[r->problem_count++] = text;
-	return 0;
+	return r->problem_count < REPORT_PROBLEMS_MAX ? 0 : REPORT_FULL;
 }

@@ -30,8 +30,9 @@ int report_note(struct report *r, const char *file, const char *key, struct erro
 int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e);
 
 /* Something failed with `code` and the text in e. What can be gone on after is kept, and 0 returned; no memory cannot.
- * 0 stays 0, and REPORT_TOLD becomes 0: it has been kept before. */
-enum { REPORT_TOLD = 1 };
+ * 0 stays 0, and REPORT_TOLD becomes 0: it has been kept before. REPORT_FULL: there is no room for more, and reading
+ * on would only take time; it stays what it is. */
+enum { REPORT_TOLD = 1, REPORT_FULL = 2 };
 int report_problem(struct report *r, int code, struct error *e);
 
 #endif

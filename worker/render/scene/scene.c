@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/scene.h"
 
+#include "worker/render/scene/asset_list.h"
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
+#include "worker/render/scene/nesting.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/remarks.h"
@@ -15,7 +17,6 @@
 #include <assert.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -29,8 +30,8 @@ struct maker {
 	struct xml_tree *tree;
 	struct id_table ids;
 	struct report report;
-	const char **assets;
-	size_t asset_count, asset_room;
+	struct asset_list assets;
+	uint64_t objects; /* when all references are followed */
 	int depth;
 	bool lenient;
 };
@@ -42,6 +43,7 @@ struct draft {
 	bool stands_in; /* for a plug-in that is not supported */
 	struct property *properties;
 	const struct scene_node **children;
+	struct xml_nesting nesting;
 };
 
 static int out_of_memory(struct maker *m)
@@ -92,18 +94,7 @@ static int leave_out(struct maker *m, const struct xml_element *el, const char *
 
 static int add_asset(struct maker *m, const char *name)
 {
-	if (m->asset_count == m->asset_room) {
-		size_t room = m->asset_room ? 2 * m->asset_room : 64;
-		const char **more = allocate(m, room, sizeof *more);
-		if (!more)
-			return out_of_memory(m);
-		if (m->asset_count)
-			memcpy(more, m->assets, m->asset_count * sizeof *more);
-		m->assets = more;
-		m->asset_room = room;
-	}
-	m->assets[m->asset_count++] = name;
-	return 0;
+	return asset_list_add(&m->assets, name, &m->scene->arena) ? out_of_memory(m) : 0;
 }
 
 static const char *property_name(struct maker *m, const struct xml_element *el, const char *name)
@@ -257,6 +248,11 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return leave_out(m, el, xml_attribute(owner, "type"), p->name, "an object for the parameter");
 	const struct scene_node *child;
 	int r = make_node(m, target, &child);
+	bool once = d->node->cls == PLUGIN_SHAPE && cls == PLUGIN_BSDF;
+	if (!r && once)
+		r = nesting_count(&m->objects, target, m->error);
+	if (!r)
+		r = nesting_take(&d->nesting, d->node->cls, el, target, once, m->error);
 	if (r)
 		return r;
 	if (p)
@@ -388,6 +384,7 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 		r = make_node(m, inner, out);
 		m->depth--;
 		el->busy = false;
+		el->nesting = inner->nesting;
 		return r;
 	}
 	*type = other;
@@ -428,7 +425,10 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		type = decl->type;
 	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(m, el, decl)))
 		return r;
-	struct draft d = {.node = allocate(m, 1, sizeof *d.node), .decl = decl, .stands_in = stands_in};
+	struct draft d = {.node = allocate(m, 1, sizeof *d.node),
+			  .decl = decl,
+			  .stands_in = stands_in,
+			  .nesting = {.height = 1, .objects = 1}};
 	if (!d.node)
 		return out_of_memory(m);
 	*d.node = (struct scene_node){.cls = cls,
@@ -442,6 +442,7 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	r = fill_node(m, &d, el);
 	m->depth--;
 	el->busy = false;
+	el->nesting = d.nesting;
 	el->node = *out = d.node;
 	return r;
 }
@@ -454,6 +455,15 @@ static int read_include(struct maker *m, const struct xml_element *el, const str
 	return r ? r : read_top(m, el->first, objects);
 }
 
+static int make_object(struct maker *m, struct xml_element *el, const struct scene_node **out)
+{
+	int r = make_node(m, el, out);
+	if (!r)
+		r = nesting_count(&m->objects, el, m->error);
+	m->scene->object_count += r == 0;
+	return r;
+}
+
 static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects)
 {
 	int r = value_check_element(scene, "version", true, m->error);
@@ -464,7 +474,7 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 		if (el->ignored)
 			r = note_foreign(m, el);
 		else if (plugin_class_find(el->name, &cls))
-			m->scene->object_count += (r = make_node(m, el, next)) == 0;
+			r = make_object(m, el, next);
 		else if (strcmp(el->name, "include") == 0)
 			r = read_include(m, el, objects);
 		else if (strcmp(el->name, "default") == 0)
@@ -478,12 +488,6 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 	return r;
 }
 
-static int compare_names(const void *a, const void *b)
-{
-	const char *const *x = a, *const *y = b;
-	return strcmp(*x, *y);
-}
-
 static int list_assets(struct maker *m)
 {
 	for (uint32_t i = 0; i < m->tree->include_count; i++) {
@@ -491,14 +495,9 @@ static int list_assets(struct maker *m)
 		if (r)
 			return r;
 	}
-	uint32_t n = 0;
-	if (m->asset_count)
-		qsort(m->assets, m->asset_count, sizeof *m->assets, compare_names);
-	for (size_t i = 0; i < m->asset_count; i++)
-		if ((n == 0 || strcmp(m->assets[n - 1], m->assets[i]) != 0) && strcmp(m->assets[i], m->name) != 0)
-			m->assets[n++] = m->assets[i];
-	m->scene->assets = m->assets;
-	m->scene->asset_count = n;
+	asset_list_finish(&m->assets, m->name);
+	m->scene->assets = m->assets.names;
+	m->scene->asset_count = (uint32_t)m->assets.count;
 	return 0;
 }
 
@@ -539,8 +538,8 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 		r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
 	if (r)
 		r = report_problem(&m->report, r, m->error);
-	else
-		r = make_scene(m);
+	else if ((r = make_scene(m)) == REPORT_FULL)
+		r = 0;
 	s->notes = m->report.notes;
 	s->note_count = m->report.note_count;
 	s->problems = m->report.problems;

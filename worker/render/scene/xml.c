@@ -27,6 +27,7 @@ struct reader {
 	struct error *error;
 	int failed;   /* the first error's negative errno */
 	int includes; /* files around the current one */
+	size_t bytes; /* of all files so far */
 	bool mixed;   /* files of both dialects: said */
 	/* the current file */
 	XML_Parser parser;
@@ -330,6 +331,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 		c = error_prefix(r->error, c, "%s:%d: <include>", el->file, el->line);
 	outer.failed = r->failed;
 	outer.mixed = r->mixed;
+	outer.bytes = r->bytes;
 	outer.defines = r->defines;
 	*r = outer;
 	return c;
@@ -382,6 +384,10 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 {
 	if (a->size > XML_FILE_MAX)
 		return error_set(r->error, EFBIG, "%s: a scene file of more than %d MB", r->file, XML_FILE_MAX >> 20);
+	r->bytes += a->size;
+	if (r->bytes > XML_FILES_BYTES)
+		return error_set(r->error, EFBIG, "%s: with it the files that are included have more than %d MB in all",
+				 r->file, XML_FILES_BYTES >> 20);
 	r->parser = XML_ParserCreate_MM(NULL, &expat_memory, NULL);
 	if (!r->parser)
 		return error_set(r->error, ENOMEM, "%s: out of memory", r->file);

@@ -18,13 +18,20 @@ enum {
 	XML_NOTES_MAX = 8,    /* on a file as a whole */
 	XML_ELEMENTS_MAX = 1 << 20,
 	XML_ATTRIBUTES_MAX = 24,
-	XML_VALUE_MAX = 1 << 20,  /* bytes of an attribute's value */
-	XML_FILE_MAX = 64 << 20,  /* bytes of a scene file */
-	XML_MEMORY_MAX = 1 << 30, /* bytes of the tree */
+	XML_VALUE_MAX = 1 << 20,     /* bytes of an attribute's value */
+	XML_FILE_MAX = 64 << 20,     /* bytes of a scene file */
+	XML_FILES_BYTES = 256 << 20, /* of all of them together, as often as they are included */
+	XML_MEMORY_MAX = 1 << 30,    /* bytes of the tree */
 };
 
 struct xml_attribute {
 	const char *name, *value;
+};
+
+/* What an object holds when all references are followed, itself included (nesting.h). */
+struct xml_nesting {
+	uint32_t height;
+	uint64_t objects;
 };
 
 struct xml_element {
@@ -37,7 +44,9 @@ struct xml_element {
 	struct xml_attribute *attributes;
 	struct xml_element *parent, *first, *last, *next;
 	const struct scene_node *node; /* for the interpreter: what it became */
+	struct xml_nesting nesting;    /* for the interpreter: of that node */
 	bool busy, told; /* for the interpreter: being made into a node; cannot be, and that has been said */
+	bool counted;	 /* for the interpreter: among the objects of the scene */
 };
 
 struct xml_tree {

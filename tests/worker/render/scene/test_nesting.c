@@ -1,0 +1,252 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Scenes that are short to write and enormous or endless to follow: ladders whose rungs refer twice to the one below,
+ * chains of references, files that include each other. Each is refused with file, line and element, and at once: what
+ * the limits count is found while reading, without following a reference twice.
+ */
+#include "common/base/mem.h"
+#include "tests/support/memory_assets.h"
+#include "worker/render/render.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static char xml[8 << 20];
+static size_t used;
+
+__attribute__((format(printf, 1, 2))) static void put(const char *format, ...)
+{
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(xml + used, sizeof xml - used, format, ap);
+	va_end(ap);
+	assert_true(n >= 0 && (size_t)n < sizeof xml - used);
+	used += (size_t)n;
+}
+
+static int read_files(const struct memory_file *files, struct error *e)
+{
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	int r = scene_read(&s, &assets, files[0].name, render_plugins(), NULL, 0, e);
+	if (!r)
+		scene_fini(&s);
+	return r;
+}
+
+/* What was put, read; sentence NULL: it must be accepted. */
+static void expect(const char *sentence)
+{
+	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
+	struct error e = {""};
+	int r = read_files(files, &e);
+	if (sentence ? r >= 0 || !strstr(e.text, sentence) : r != 0)
+		fail_msg("%.300s\n gave %d: %s\n not: %s", xml, r, e.text, sentence ? sentence : "a scene");
+}
+
+/* Objects m0, m1, ... m<rungs>, a line each from line 2 on: the first is `leaf`, each other holds the one before
+ * `times` times. The end of the scene is left to the caller. */
+static void ladder(const char *element, const char *type, const char *leaf, int rungs, int times, const char *more)
+{
+	used = 0;
+	put("<scene version='3.0.0'>\n<%s type='%s' id='m0'/>\n", element, leaf);
+	for (int i = 1; i <= rungs; i++) {
+		put("<%s type='%s' id='m%d'>%s", element, type, i, more);
+		for (int k = 0; k < times; k++)
+			put("<ref id='m%d'/>", i - 1);
+		put("</%s>\n", element);
+	}
+}
+
+static void test_ladders(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *element, *type, *leaf, *more;
+		int allowed; /* rungs */
+		const char *sentence;
+	} all[] = {
+		/* 2^(n+1) - 1 objects in n rungs */
+		{"bsdf", "blendbsdf", "diffuse", "", 15, "s.xml:18: <ref>: makes a bsdf of more than 65536 objects"},
+		{"bsdf", "twosided", "diffuse", "", 15, "s.xml:18: <ref>: makes a bsdf of more than 65536 objects"},
+		{"bsdf", "mixturebsdf", "diffuse", "<string name='weights' value='.5,.5'/>", 15,
+		 "s.xml:18: <ref>: makes a bsdf of more than 65536 objects"},
+		/* each rung stands in the scene, too: 2^(n+2) - n - 3 objects */
+		{"shape", "merge", "cube", "", 24,
+		 "s.xml:27: <shape type=\"merge\">: the scene has more than 67108864"},
+	};
+	for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+		ladder(all[i].element, all[i].type, all[i].leaf, all[i].allowed, 2, all[i].more);
+		put("</scene>");
+		expect(NULL);
+		for (int rungs = all[i].allowed + 1; rungs <= 200; rungs += 92) {
+			ladder(all[i].element, all[i].type, all[i].leaf, rungs, 2, all[i].more);
+			put("</scene>");
+			expect(all[i].sentence);
+		}
+	}
+}
+
+/* Instances of a group count with all that is in it. */
+static void test_instances(void **state)
+{
+	(void)state;
+	ladder("shape", "merge", "merge", 16, 2, "");
+	put("<shape type='shapegroup' id='g'><ref id='m16'/></shape>\n");
+	for (int i = 0; i < 1000; i++)
+		put("<shape type='instance'><ref id='g'/></shape>\n");
+	put("</scene>");
+	expect("<shape type=\"instance\">: the scene has more than 67108864 objects");
+}
+
+/* A material that many shapes take is made once, and counted once. */
+static void test_shared_materials(void **state)
+{
+	(void)state;
+	ladder("bsdf", "blendbsdf", "diffuse", 14, 2, "");
+	for (int i = 0; i < 5000; i++)
+		put("<shape type='cube'><ref id='m14'/></shape>\n");
+	put("</scene>");
+	expect(NULL);
+	/* but each of these is another one: 2048 * 32768 and more */
+	ladder("bsdf", "blendbsdf", "diffuse", 14, 2, "");
+	for (int i = 0; i < 2048; i++)
+		put("<shape type='cube'><bsdf type='mask'><ref id='m14'/></bsdf></shape>\n");
+	put("</scene>");
+	expect("<bsdf type=\"mask\">: the scene has more than 67108864 objects");
+}
+
+static void test_chains(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *element, *type, *leaf, *place;
+	} all[] = {
+		{"bsdf", "coating", "diffuse", "s.xml:8194: <ref>"},
+		{"texture", "scale", "checkerboard", "s.xml:8194: <ref>"},
+		{"shape", "merge", "merge", "s.xml:8194: <ref>"},
+	};
+	for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+		char sentence[128];
+		snprintf(sentence, sizeof sentence, "%s: objects hold each other more than 8192 deep", all[i].place);
+		ladder(all[i].element, all[i].type, all[i].leaf, 8191, 1, "");
+		put("</scene>");
+		expect(NULL);
+		ladder(all[i].element, all[i].type, all[i].leaf, 8192, 1, "");
+		put("</scene>");
+		expect(sentence);
+		ladder(all[i].element, all[i].type, all[i].leaf, 60000, 1, "");
+		put("</scene>");
+		expect(sentence);
+	}
+}
+
+/* The deepest that is accepted can be built and forgotten: what follows references recurses. */
+static void test_the_deepest_is_built(void **state)
+{
+	(void)state;
+	ladder("bsdf", "coating", "diffuse", 8190, 1, "");
+	put("<shape type='sphere'><ref id='m8190'/></shape><sensor type='perspective'><transform name='to_world'>"
+	    "<translate z='-9'/></transform></sensor><emitter type='constant'/></scene>");
+	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct error e = {""};
+	struct scene s;
+	struct render_summary summary;
+	int r = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
+	if (!r) {
+		r = render_check(&s, &assets, NULL, &summary, &e);
+		scene_fini(&s);
+	}
+	if (r)
+		fail_msg("%s", e.text);
+}
+
+/* Each file includes the next twice; each includes itself. */
+static void test_includes(void **state)
+{
+	(void)state;
+	static char text[10][4096];
+	struct memory_file files[11] = {{0}};
+	static const char *const names[] = {"0.xml", "1.xml", "2.xml", "3.xml", "4.xml",
+					    "5.xml", "6.xml", "7.xml", "8.xml", "9.xml"};
+	for (int i = 0; i < 10; i++) {
+		int n = snprintf(text[i], sizeof text[i], "<scene version='3.0.0'>\n");
+		for (int k = 0; k < 40 && i < 9; k++)
+			n += snprintf(text[i] + n, sizeof text[i] - (size_t)n, "<include filename='%s'/>\n",
+				      names[i < 3 ? i + 1 : 9]);
+		n += snprintf(text[i] + n, sizeof text[i] - (size_t)n, "</scene>");
+		files[i] = (struct memory_file){names[i], text[i], (size_t)n};
+	}
+	struct error e = {""};
+	assert_int_equal(read_files(files, &e), -E2BIG);
+	assert_non_null(strstr(e.text, "<include>: more than 1024 files are included"));
+	strcpy(text[9], "<scene version='3.0.0'>\n<include filename='9.xml'/></scene>");
+	files[9].size = strlen(text[9]);
+	assert_int_equal(read_files(files, &e), -ELOOP);
+	assert_non_null(strstr(e.text, "9.xml:2: <include>: files include each other more than 8 deep"));
+}
+
+/* Included as often as allowed, a file of blanks would keep its reader busy for minutes. */
+static void test_bytes_included(void **state)
+{
+	(void)state;
+	enum { BLANKS = 48 << 20 };
+	static const char open[] = "<scene version='3.0.0'>", close[] = "</scene>";
+	char *blanks = mem_alloc(BLANKS, 1);
+	assert_non_null(blanks);
+	memset(blanks, ' ', BLANKS);
+	memcpy(blanks, open, sizeof open - 1);
+	memcpy(blanks + BLANKS - (sizeof close - 1), close, sizeof close - 1);
+	used = 0;
+	put("<scene version='3.0.0'>");
+	for (int i = 0; i < 1000; i++)
+		put("<include filename='b.xml'/>");
+	put("</scene>");
+	const struct memory_file files[] = {{"s.xml", xml, used}, {"b.xml", blanks, BLANKS}, {0}};
+	struct error e = {""};
+	assert_int_equal(read_files(files, &e), -EFBIG);
+	assert_non_null(strstr(e.text, "more than 256 MB in all"));
+	mem_free(blanks);
+}
+
+/* A file that misses as many names as it has ids: to compare each with each would take hours. */
+static void test_many_missing_names(void **state)
+{
+	(void)state;
+	used = 0;
+	put("<scene version='3.0.0'>\n");
+	for (int i = 0; i < 50000; i++)
+		put("<bsdf type='diffuse' id='material number %05d'/>", i);
+	for (int i = 0; i < 50000; i++)
+		put("<shape type='cube'><ref id='materiel nombre %05d'/></shape>", i);
+	put("</scene>");
+	const struct memory_file files[] = {{"s.xml", xml, used}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct error e = {""};
+	struct scene s;
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", render_plugins(), NULL, 0, false, &e), 0);
+	assert_int_equal(s.problem_count, 1024);
+	assert_non_null(strstr(s.problems[0], "did you mean `material number 00000`?"));
+	assert_null(strstr(s.problems[1023], "did you mean"));
+	scene_fini(&s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_ladders),
+		cmocka_unit_test(test_instances),
+		cmocka_unit_test(test_shared_materials),
+		cmocka_unit_test(test_chains),
+		cmocka_unit_test(test_the_deepest_is_built),
+		cmocka_unit_test(test_includes),
+		cmocka_unit_test(test_bytes_included),
+		cmocka_unit_test(test_many_missing_names),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

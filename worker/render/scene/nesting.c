@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/nesting.h"
+
+#include "worker/render/scene/plugin.h"
+
+int nesting_take(struct xml_nesting *owner, enum plugin_class cls, const struct xml_element *el,
+		 const struct xml_element *taken, bool once, struct error *e)
+{
+	bool evaluated = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE;
+	uint64_t limit = evaluated ? NESTING_PARTS_MAX : NESTING_OBJECTS_MAX;
+	/* No overflow: what is taken is within the limit itself. */
+	uint64_t objects = owner->objects + (once ? 0 : taken->nesting.objects);
+	uint32_t height = taken->nesting.height + 1;
+	if (height > NESTING_HEIGHT_MAX)
+		return xml_error(el, e, E2BIG, "objects hold each other more than %d deep", NESTING_HEIGHT_MAX);
+	if (objects > limit)
+		return xml_error(el, e, E2BIG, "makes a %s of more than %llu objects when all references are followed",
+				 plugin_class_name(cls), (unsigned long long)limit);
+	if (height > owner->height)
+		owner->height = height;
+	owner->objects = objects;
+	return 0;
+}
+
+int nesting_count(uint64_t *objects, struct xml_element *el, struct error *e)
+{
+	if (el->counted)
+		return 0;
+	el->counted = true;
+	if (el->nesting.objects > NESTING_OBJECTS_MAX - *objects)
+		return xml_error(el, e, E2BIG,
+				 "the scene has more than %d objects with it when all references are followed",
+				 NESTING_OBJECTS_MAX);
+	*objects += el->nesting.objects;
+	return 0;
+}
