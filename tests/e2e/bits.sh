@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, other settings, a crop that ends by its error.
+# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, other settings, a crop that ends by its error,
+# a scene whose files lie outside its folder.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-render hslt-compare
 
@@ -45,5 +46,22 @@ for workers in 1 2 4; do
 	done
 done
 id=$(cat "$DIR/id")
+# A scene with names that lead out of its folder, to a folder that --path gives.
+mkdir -p "$DIR/place/sub" "$DIR/library"
+cp "${BOX%/*}"/meshes/* "$DIR/library"
+sed 's:"meshes/:"../library/none/../:' "$BOX" >"$DIR/place/box.xml"
+sed 's:"meshes/:"sub/../../library/:' "$BOX" >"$DIR/place/odd.xml"
+code 1 "$BIN/hslt-submit" "$DIR/place/box.xml" -o "$DIR/none.exr" --integrator path --spp 1
+grep -q -- "--path $DIR/library" "$DIR/err.log" || fail "names outside: $(cat "$DIR/err.log")"
+"$BIN/hslt-render" "$DIR/place/box.xml" --path "$DIR/library" -o "$DIR/place.exr" --integrator path --spp 1 2>>"$DIR/render.log" ||
+	fail "hslt-render with names outside"
+for scene in box odd; do
+	submit "$DIR/place/$scene.xml" --path "$DIR/library" -o "$DIR/place-$scene.exr" --integrator path --spp 1 --wait >"$DIR/placed" ||
+		fail "names outside: $?"
+done
+same "$DIR/place.exr" "$DIR/place-box.exr"
+code 0 "$BIN/hslt-compare" "$DIR/place.exr" "$DIR/place-odd.exr"
+grep -q "^relMSE  *0 " "$DIR/out" || fail "the same file by another name is another image: $(cat "$DIR/out")"
+
 [ "$(value "$id" reason)" = error ] || fail "$id ended by its $(value "$id" reason)"
 echo "equal bits for 1, 2 and 4 workers and hslt-render; the error was reached after $(value "$id" rounds) rounds"

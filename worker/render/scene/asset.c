@@ -2,11 +2,15 @@
 #include "worker/render/scene/asset.h"
 
 #include "common/base/mem.h"
+#include "worker/render/scene/asset_name.h"
 
 #include <fcntl.h>
+#include <limits.h>
 #include <linux/openat2.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -103,19 +107,81 @@ static int read_all(int fd, const char *name, struct asset *out, struct error *e
 	return 0;
 }
 
-static int folder_open(void *user, const char *name, struct asset *out, struct error *e)
+/* `shown` is the name for the user, who wrote another one where it leads out of the scene's folder. */
+static int open_in(const char *folder, const char *name, const char *shown, struct asset *out, struct error *e)
 {
 	*out = (struct asset){0};
 	if (!is_below(name))
 		return error_set(e, EINVAL,
-				 "%.256s: files must lie below the scene's folder (no absolute names, no ..)", name);
-	int fd = open_below(user, name);
+				 "%.256s: files must lie below the scene's folder (no absolute names, no ..)", shown);
+	int fd = open_below(folder, name);
 	if (fd < 0)
-		return error_set(e, errno, "%s: %s", name,
+		return error_set(e, errno, "%.256s: %s", shown,
 				 errno == EXDEV ? "leads out of the scene's folder" : strerror(errno));
-	int r = read_all(fd, name, out, e);
+	int r = read_all(fd, shown, out, e);
 	close(fd);
 	return r;
+}
+
+/* What follows the folder in an absolute path that lies below it; NULL: it does not. */
+static const char *below(const char *folder, const char *path)
+{
+	char real[PATH_MAX];
+	if (!realpath(*folder ? folder : ".", real))
+		return NULL;
+	size_t n = strcmp(real, "/") == 0 ? 0 : strlen(real);
+	return strncmp(path, real, n) == 0 && path[n] == '/' ? path + n + 1 : NULL;
+}
+
+/* A name that leads `up` folders out of the scene's own and then to `rest`. */
+static int open_outside(const struct asset_folders *f, size_t up, const char *rest, struct asset *out, struct error *e)
+{
+	char path[PATH_MAX + NAME_MAX_BYTES], shown[NAME_MAX_BYTES];
+	*out = (struct asset){0};
+	if (strlen(rest) + 3 * up >= sizeof shown || !realpath(*f->folder[0] ? f->folder[0] : ".", path))
+		return error_set(e, ENAMETOOLONG, "%.256s: too long a name", rest);
+	size_t used = 0, end = strlen(path);
+	for (size_t i = 0; i < up; i++) {
+		memcpy(shown + used, "../", 3);
+		used += 3;
+		while (end > 0 && path[--end] != '/')
+			;
+	}
+	strcpy(shown + used, rest);
+	snprintf(path + end, sizeof path - end, "/%s", rest);
+	int rc = 0;
+	for (size_t i = 0; i < f->count && (rc == 0 || rc == -ENOENT || rc == -ENOTDIR); i++) {
+		const char *name = below(f->folder[i], path);
+		if (name && !(rc = open_in(f->folder[i], name, shown, out, e)))
+			return 0;
+	}
+	if (rc)
+		return rc;
+	*strrchr(path, '/') = 0;
+	return error_set(
+		e, EINVAL,
+		"%.256s: leads out of the scene's folder; to read what is there, say --path %.400s or a folder "
+		"around it",
+		shown, *path ? path : "/");
+}
+
+static int search_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	const struct asset_folders *f = user;
+	const char *rest;
+	size_t up = asset_name_up(name, &rest);
+	int rc = -ENOENT;
+	if (up > 0 && is_below(rest))
+		return open_outside(f, up, rest, out, e);
+	for (size_t i = 0; i < f->count && (rc == -ENOENT || rc == -ENOTDIR); i++)
+		rc = open_in(f->folder[i], name, name, out, e);
+	return rc;
+}
+
+static int folder_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	struct asset_folders f = {.count = 1, .folder = {user}};
+	return search_open(&f, name, out, e);
 }
 
 static void folder_close(void *user, struct asset *a)
@@ -123,15 +189,6 @@ static void folder_close(void *user, struct asset *a)
 	(void)user;
 	mem_free(a->handle);
 	*a = (struct asset){0};
-}
-
-static int search_open(void *user, const char *name, struct asset *out, struct error *e)
-{
-	const struct asset_folders *f = user;
-	int rc = -ENOENT;
-	for (size_t i = 0; i < f->count && (rc == -ENOENT || rc == -ENOTDIR); i++)
-		rc = folder_open((void *)(uintptr_t)f->folder[i], name, out, e);
-	return rc;
 }
 
 struct asset_folders asset_folders_of(const char *own, const char *const *others, size_t count)

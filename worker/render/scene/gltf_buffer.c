@@ -4,6 +4,7 @@
  * for in the file so that shapes and pictures can be read from there. Failures: other schemes, views that lead out of
  * their buffer.
  */
+#include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/gltf_private.h"
 
 #include <string.h>
@@ -13,12 +14,12 @@ static int digit(char c)
 	return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
 }
 
-/* The name of a file in a URI: %20 is a blank. */
+/* The canonical name of a file in a URI: %20 is a blank. */
 static const char *file_name(struct gltf *g, const struct gltf_at *at, const char *uri)
 {
 	size_t n = strlen(uri), k = 0;
-	char *name = arena_alloc(g->arena, n + 1, 1);
-	if (!name) {
+	char *name = arena_alloc(g->arena, n + 1, 1), *out = arena_alloc(g->arena, ASSET_NAME_ROOM(n), 1);
+	if (!name || !out) {
 		gltf_fail(g, at, ENOMEM, "out of memory");
 		return NULL;
 	}
@@ -34,7 +35,8 @@ static const char *file_name(struct gltf *g, const struct gltf_at *at, const cha
 		name[k++] = c;
 	}
 	name[k] = 0;
-	return name;
+	asset_name_canonical(name, out);
+	return out;
 }
 
 static int embedded(struct gltf *g, const struct gltf_at *at, const char *uri, struct gltf_range *out)

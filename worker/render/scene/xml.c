@@ -10,6 +10,7 @@
 #include "worker/render/scene/xml.h"
 
 #include "common/base/mem.h"
+#include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/define.h"
 #include "worker/render/scene/number.h"
 
@@ -202,6 +203,18 @@ static int read_default(struct reader *r, const struct xml_element *el)
 	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
 }
 
+/* FOLDER/NAME, or NAME alone, as it is called from here on. NULL: no memory. */
+static const char *canonical(const struct reader *r, const char *folder, const char *name)
+{
+	size_t n = strlen(folder), size = n + 1 + strlen(name);
+	char *joined = arena_alloc(r->arena, size + 1, 1), *out = arena_alloc(r->arena, ASSET_NAME_ROOM(size), 1);
+	if (!joined || !out)
+		return NULL;
+	snprintf(joined, size + 1, "%s%s%s", folder, n ? "/" : "", name);
+	asset_name_canonical(joined, out);
+	return out;
+}
+
 /* A folder in which the files that are named from here on are searched, after the scene's own. */
 static int read_path(struct reader *r, const struct xml_element *el)
 {
@@ -211,7 +224,10 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	if (r->tree->path_count == XML_PATHS_MAX)
 		return xml_error(el, r->error, E2BIG, "more than %d search paths", XML_PATHS_MAX);
 	r->tree->paths[r->tree->path_count++] = value;
-	bool outside = *value == '/' || strncmp(value, "..", 2) == 0 || strstr(value, "/..");
+	const char *name = canonical(r, "", value), *rest;
+	if (!name)
+		return out_of_memory(r);
+	bool outside = *name == '/' || strcmp(name, ASSET_NAME_UP) == 0 || asset_name_up(name, &rest) > 0;
 	if (!outside || r->tree->note_count == XML_NOTES_MAX)
 		return 0;
 	enum { TEXT = 256 };
@@ -237,17 +253,17 @@ static bool is_there(const struct reader *r, const char *name)
 /* The first of the folders that has the file. A name that none has stays as it is, for whoever opens it to complain. */
 static int find_file(struct reader *r, const char **name)
 {
+	const char *written = *name;
+	if (!(*name = canonical(r, "", written)))
+		return out_of_memory(r);
 	if (r->tree->path_count == 0 || is_there(r, *name))
 		return 0;
 	for (uint32_t i = 0; i < r->tree->path_count; i++) {
-		const char *folder = r->tree->paths[i];
-		size_t size = strlen(folder) + strlen(*name) + 2, length = strlen(folder);
-		char *joined = arena_alloc(r->arena, size, 1);
-		if (!joined)
+		const char *there = canonical(r, r->tree->paths[i], written);
+		if (!there)
 			return out_of_memory(r);
-		snprintf(joined, size, "%s%s%s", folder, length && folder[length - 1] == '/' ? "" : "/", *name);
-		if (is_there(r, joined)) {
-			*name = joined;
+		if (is_there(r, there)) {
+			*name = there;
 			return 0;
 		}
 	}

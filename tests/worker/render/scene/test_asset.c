@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/asset_keeper.h"
+#include "worker/render/scene/asset_name.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -118,6 +119,41 @@ static void test_files_elsewhere(void **state)
 	refuses("fifo", "not a regular file");
 }
 
+static void test_canonical_names(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *written, *canonical;
+	} cases[] = {
+		{"a.obj", "a.obj"},
+		{"./a.obj", "a.obj"},
+		{"a/./b//c", "a/b/c"},
+		{"a/../b", "b"},
+		{"a/b/../../c/d", "c/d"},
+		{"a/../../b", "%2e%2e/b"},
+		{"../../b", "%2e%2e/%2e%2e/b"},
+		{"../a/../b", "%2e%2e/b"},
+		{"..dots/...", "..dots/..."},
+		{"a/.hidden", "a/.hidden"},
+		{"/etc/../passwd", "/etc/../passwd"},
+		{"a/..", "a/.."},
+		{"", ""},
+		{".", "."},
+		{"a/%2e%2e/b", "b"},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char out[ASSET_NAME_ROOM(64)], again[ASSET_NAME_ROOM(64)];
+		asset_name_canonical(cases[i].written, out);
+		assert_string_equal(out, cases[i].canonical);
+		asset_name_canonical(out, again);
+		assert_string_equal(again, out);
+	}
+	const char *rest;
+	assert_int_equal(asset_name_up("%2e%2e/%2e%2e/b/%2e%2e", &rest), 2);
+	assert_string_equal(rest, "b/%2e%2e");
+	assert_int_equal(asset_name_up("%2e%2e", &rest), 0);
+}
+
 /* Counts; two files whose handles tell them apart. */
 struct counts {
 	int opened, closed;
@@ -175,13 +211,26 @@ static void test_search(void **state)
 		     {"theirs", "other", 0},
 		     {"nowhere", NULL, -ENOENT},
 		     {"out", NULL, -EXDEV},
-		     {"../more/theirs", NULL, -EINVAL},
+		     {"../more/theirs", NULL, -EINVAL}, /* no canonical name */
+		     {"%2e%2e/more/theirs", "other", 0},
+		     {"%2e%2e/more/both", "other", 0},
+		     {"%2e%2e/scene/both", "own", 0},
+		     {"%2e%2e/scene/sub/b.png", "deeper", 0},
+		     {"%2e%2e/more/none", NULL, -ENOENT},
+		     {"%2e%2e/more/out", NULL, -EXDEV},
+		     {"%2e%2e/outside", NULL, -EINVAL},
+		     {"%2e%2e/secret", NULL, -EINVAL},
+		     {"%2e%2e/more2/theirs", NULL, -EINVAL},
+		     {"%2e%2e/scene/fifo", NULL, -EINVAL},
+		     {"%2e%2e/scene/up/secret", NULL, -EXDEV},
+		     {"%2e%2e/more/../outside", NULL, -EINVAL},
+		     {"%2e%2e//etc/passwd", NULL, -ENOENT},
 		     {"both/x", NULL, -ENOTDIR}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct asset a;
 		struct error e;
 		int rc = s.open(s.user, cases[i].name, &a, &e);
-		if (rc == -ELOOP && cases[i].rc == -EXDEV) /* a kernel without openat2 */
+		if ((rc == -ELOOP || rc == -ENOTDIR) && cases[i].rc == -EXDEV) /* a kernel without openat2 */
 			rc = -EXDEV;
 		assert_int_equal(rc, cases[i].rc);
 		if (!rc) {
@@ -191,6 +240,26 @@ static void test_search(void **state)
 		}
 	}
 	assert_int_equal(asset_folders_of(folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
+}
+
+/* What is outside names the folder to give, and is called as the user wrote it. */
+static void test_outside_is_said(void **state)
+{
+	(void)state;
+	char real[300], wanted[400], deep[64 * 7 + 8] = "";
+	char *base = realpath(root, NULL);
+	assert_non_null(base);
+	snprintf(real, sizeof real, "%s", base);
+	free(base);
+	snprintf(wanted, sizeof wanted,
+		 "../common/a.png: leads out of the scene's folder; to read what is there, say --path %s/common", real);
+	refuses("%2e%2e/common/a.png", wanted);
+	reads("%2e%2e/scene/a.obj", "inside");
+	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
+	for (int i = 0; i < 64; i++)
+		strcat(deep, "%2e%2e/");
+	strcat(deep, "a");
+	refuses(deep, "say --path / ");
 }
 
 /* A file that is asked for again and again is opened once, and in the end all that was opened is closed. */
@@ -226,7 +295,9 @@ static void test_keeper(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_files_below), cmocka_unit_test(test_files_elsewhere),
-					   cmocka_unit_test(test_search), cmocka_unit_test(test_keeper)};
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_files_below),	cmocka_unit_test(test_files_elsewhere),
+		cmocka_unit_test(test_canonical_names), cmocka_unit_test(test_search),
+		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_keeper)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -397,6 +397,34 @@ static void test_every_problem_is_told(void **state)
 	assert_non_null(strstr(e.text, "(and 2 more: hslt-scene check lists them)"));
 }
 
+/* However a file is named, it is one file, and its name has no "..". */
+static void test_asset_names_are_canonical(void **state)
+{
+	(void)state;
+	static const char *const names[] = {"%2e%2e/common/a.obj", "%2e%2e/common/b.ply", "inc.xml", "m/c.obj"};
+	files[1] = (struct memory_file){"inc.xml", "<scene version='3.0.0'/>", 24};
+	struct scene s = read_ok("<scene version='3.0.0'><include filename='x/../inc.xml'/>"
+				 "<shape type='obj'><string name='filename' value='../common/a.obj'/></shape>"
+				 "<shape type='obj'><string name='filename' value='m/../../common//a.obj'/></shape>"
+				 "<shape type='ply'><string name='filename' value='./../common/x/../b.ply'/></shape>"
+				 "<shape type='obj'><string name='filename' value='./m/c.obj'/></shape></scene>");
+	assert_int_equal(s.asset_count, 4);
+	for (uint32_t i = 0; i < 4; i++)
+		assert_string_equal(s.assets[i], names[i]);
+	assert_string_equal(node_string(s.objects[0], "filename", ""), names[0]);
+	assert_string_equal(node_string(s.objects[3], "filename", ""), names[3]);
+	scene_fini(&s);
+	/* a search path outside */
+	files[1] = (struct memory_file){"%2e%2e/common/a.obj", "x", 1};
+	s = read_ok("<scene version='3.0.0'><path value='m/../../common/'/>"
+		    "<shape type='obj'><string name='filename' value='a.obj'/></shape></scene>");
+	assert_int_equal(s.asset_count, 1);
+	assert_string_equal(s.assets[0], names[0]);
+	assert_int_equal(s.note_count, 1);
+	files[1] = (struct memory_file){0};
+	scene_fini(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -417,6 +445,7 @@ int main(void)
 		cmocka_unit_test(test_include),
 		cmocka_unit_test(test_ignored_is_noted_once),
 		cmocka_unit_test(test_assets_are_sorted_and_unique),
+		cmocka_unit_test(test_asset_names_are_canonical),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/asset_name.h"
+
+#include <string.h>
+
+enum { UP = sizeof ASSET_NAME_UP - 1 };
+
+static bool is_up(const char *part, size_t n)
+{
+	return (n == 2 && memcmp(part, "..", 2) == 0) || (n == UP && memcmp(part, ASSET_NAME_UP, UP) == 0);
+}
+
+/* Where the last part of out[0..n) begins. */
+static size_t last_part(const char *out, size_t n)
+{
+	while (n > 0 && out[n - 1] != '/')
+		n--;
+	return n;
+}
+
+void asset_name_canonical(const char *written, char *out)
+{
+	size_t used = 0;
+	for (const char *part = written; *written != '/' && *part; part += strspn(part, "/")) {
+		size_t n = strcspn(part, "/"), before = last_part(out, used);
+		bool up = is_up(part, n);
+		if (up && used > 0 && !is_up(out + before, used - before)) {
+			used = before > 0 ? before - 1 : 0;
+		} else if (n > 1 || *part != '.') {
+			if (used > 0)
+				out[used++] = '/';
+			memcpy(out + used, up ? ASSET_NAME_UP : part, up ? UP : n);
+			used += up ? UP : n;
+		}
+		part += n;
+	}
+	out[used] = 0;
+	if (used == 0)
+		strcpy(out, written);
+}
+
+size_t asset_name_up(const char *canonical, const char **rest)
+{
+	size_t count = 0;
+	while (strncmp(canonical, ASSET_NAME_UP "/", UP + 1) == 0) {
+		canonical += UP + 1;
+		count++;
+	}
+	*rest = canonical;
+	return count;
+}

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Canonical names of a scene's files: parts with '/' between, relative to the scene's folder, without "." and without
+ * parts that a ".." takes back. What of ".." leads out of the folder stands in front as "%2e%2e", so that no name that
+ * is sent to others has "..", and the machine that reads the scene there arrives at the same name. Whoever opens files
+ * decides what is outside and may be read (asset.h). Pure; any thread.
+ */
+#ifndef WORKER_RENDER_SCENE_ASSET_NAME_H
+#define WORKER_RENDER_SCENE_ASSET_NAME_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#define ASSET_NAME_UP "%2e%2e"
+
+/* Room for the canonical name of one of that length, with its end. */
+#define ASSET_NAME_ROOM(length) (3 * (size_t)(length) + 1)
+
+/* "a/./b//../c" becomes "a/c", "a/../../b" becomes "%2e%2e/b". Absolute names, and those of no file ("", "a/.."), stay
+ * as they are: nobody opens them. A canonical name is its own. */
+void asset_name_canonical(const char *written, char *out);
+
+/* How many folders up from the scene's; *rest is what follows. */
+size_t asset_name_up(const char *canonical, const char **rest);
+
+#endif
