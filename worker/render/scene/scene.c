@@ -205,6 +205,10 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		return leave_out(m, el, written, xml_attribute(el, "value"), "the value");
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? add_asset(m, v.as.string) : xml_error(el, m->error, EINVAL, "an empty file name");
+	mat4 inverse;
+	if (!r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE && !mat4_invert(v.as.transform, &inverse))
+		r = xml_error(owner, m->error, EINVAL, "%s flattens the shape (it has no inverse): line %d", written,
+			      el->line);
 	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
 	return r || !file ? r : add_asset(m, file);
 }

@@ -216,6 +216,30 @@ static void test_bad_transforms(void **state)
 	refuses(SHAPE("<lookat origin='1e154 0 0' target='0 0 0' up='0 1 0'/>"), "origin=1e+154 is outside");
 }
 
+/* Named where it stands: an instance of a good shape is the one that is at fault. */
+static void test_flat_shapes(void **state)
+{
+	(void)state;
+	static const char *const flat[] = {"<scale y='0'/>", "<scale value='0'/>",
+					   "<matrix value='1 0 0 0 1 0 1 1 0'/>", "<scale x='0'/><translate x='2'/>"};
+	for (size_t i = 0; i < sizeof flat / sizeof *flat; i++) {
+		static const char *const types[] = {"cube", "sphere", "instance"};
+		for (size_t k = 0; k < 3; k++) {
+			char xml[512], place[128];
+			snprintf(xml, sizeof xml,
+				 S "<shape type='shapegroup' id='g'><shape type='cube'/></shape>\n"
+				   "<shape type='%s'>%s\n<transform name='to_world'>%s</transform></shape>" END,
+				 types[k], k == 2 ? "<ref id='g'/>" : "", flat[i]);
+			snprintf(
+				place, sizeof place,
+				"s.xml:2: <shape type=\"%s\">: to_world flattens the shape (it has no inverse): line 3",
+				types[k]);
+			refuses(xml, place);
+		}
+	}
+	assert_int_equal(read_text(SHAPE("<scale y='1e-30'/>"), NULL), 0);
+}
+
 static void test_bad_references(void **state)
 {
 	(void)state;
@@ -319,12 +343,19 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_broken_xml),	     cmocka_unit_test(test_entity_bomb),
-		cmocka_unit_test(test_parameter_bomb),	     cmocka_unit_test(test_deep_nesting),
-		cmocka_unit_test(test_too_many_elements),    cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_misplaced_parameters), cmocka_unit_test(test_bad_values),
-		cmocka_unit_test(test_bad_transforms),	     cmocka_unit_test(test_bad_references),
-		cmocka_unit_test(test_bad_includes),	     cmocka_unit_test(test_bad_films),
+		cmocka_unit_test(test_broken_xml),
+		cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),
+		cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements),
+		cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_misplaced_parameters),
+		cmocka_unit_test(test_bad_values),
+		cmocka_unit_test(test_bad_transforms),
+		cmocka_unit_test(test_bad_references),
+		cmocka_unit_test(test_flat_shapes),
+		cmocka_unit_test(test_bad_includes),
+		cmocka_unit_test(test_bad_films),
 		cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

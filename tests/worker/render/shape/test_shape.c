@@ -30,8 +30,9 @@ static struct built build(const char *type, const char *content, const char *obj
 		{"s.xml", xml, strlen(xml)}, {obj ? "m.obj" : NULL, obj, obj ? strlen(obj) : 0}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct built b = {0};
-	if (scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error))
-		fail_msg("%s", b.error.text);
+	b.result = scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error);
+	if (b.result)
+		return b;
 	b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &b.dropped, &b.error);
 	return b;
 }
