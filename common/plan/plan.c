@@ -158,7 +158,17 @@ static uint64_t open_lease(const struct plan *p)
 	return clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
 }
 
-enum epoch_rule { RULE_ASKED, RULE_ROUNDS, RULE_FILM, RULE_MOST, RULE_SECONDS, RULE_BANDWIDTH };
+/* Samples or mutations that bounds on time and error leave room for, by cautious guesses, as a plan must not depend on
+ * the machine: one thread of SPEED_UNKNOWN, and samples of independent pixels with relative errors of 100 %. Infinity:
+ * no such bound. */
+static double room(const struct plan_request *r, const struct plan *p)
+{
+	double by_time = r->seconds > 0 ? SPEED_UNKNOWN * r->seconds : INFINITY,
+	       by_error = r->target_error > 0 ? (double)crop_pixels(p) / (r->target_error * r->target_error) : INFINITY;
+	return fmin(by_time, by_error);
+}
+
+enum epoch_rule { RULE_ASKED, RULE_ROUNDS, RULE_FILM, RULE_ROOM, RULE_MOST, RULE_SECONDS, RULE_BANDWIDTH };
 
 /* The power of two nearest to x by ratio, at least 1. */
 static double power_of_two_near(double x)
@@ -198,10 +208,10 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 	}
 	uint64_t want = total	 ? (uint64_t)wide_ceil_div(total, (wide)round * AIM_ROUNDS)
 			: chains ? open_lease(p) / unit
-				 : usual;
+				 : (uint64_t)fmin(room(r, p) / ((double)round * AIM_ROUNDS), (double)usual);
 	*epoch = clamp(want, 1, most);
 	if (want <= most)
-		rule = total ? RULE_ROUNDS : RULE_FILM;
+		rule = total ? RULE_ROUNDS : chains || want == usual ? RULE_FILM : RULE_ROOM;
 	double seconds = r->bandwidth > 0 ? (double)lease_bytes(p) / r->bandwidth : 0;
 	double least = ceil(seconds * (r->speed > 0 ? r->speed : SPEED_UNKNOWN) / (double)unit);
 	uint64_t all = total ? (uint64_t)wide_ceil_div(total, round) : LEASE_MOST / unit;
@@ -226,6 +236,9 @@ void plan_describe_epoch(const struct plan_request *r, const struct plan *p, cha
 		snprintf(text, size, "epochs: for %d rounds", AIM_ROUNDS);
 	else if (rule == RULE_FILM)
 		snprintf(text, size, "epochs: by the size of the film");
+	else if (rule == RULE_ROOM)
+		snprintf(text, size, "epochs: some %d rounds or more in the time, or for the error, asked for",
+			 AIM_ROUNDS);
 	else if (rule == RULE_MOST)
 		snprintf(text, size, "epochs: the most %s in a lease without a pilot", thing);
 	else if (rule == RULE_SECONDS)
@@ -300,10 +313,12 @@ static int make_samples(const struct plan_request *r, struct plan *p, uint64_t t
 static int make_bootstrap(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
 	uint64_t n = r->bootstrap;
+	double by_count = total ? (double)total : 8.0 * DEFAULT_BOOTSTRAP,
+	       by_time = r->seconds > 0 ? SPEED_UNKNOWN * r->seconds : 8.0 * DEFAULT_BOOTSTRAP;
 	if (!n && p->kind == PLAN_SAMPLES)
 		n = LEAST_BOOTSTRAP;
 	else if (!n)
-		n = total ? clamp(total / 8, LEAST_BOOTSTRAP, DEFAULT_BOOTSTRAP) : DEFAULT_BOOTSTRAP;
+		n = clamp((uint64_t)(fmin(by_count, by_time) / 8), LEAST_BOOTSTRAP, DEFAULT_BOOTSTRAP);
 	if (n > PLAN_MAX_BOOTSTRAP / 2)
 		return error_set(e, EINVAL, "%llu bootstrap samples; at most %d", (unsigned long long)n,
 				 PLAN_MAX_BOOTSTRAP / 2);

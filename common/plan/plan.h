@@ -85,10 +85,12 @@ struct plan {
 /* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 /*
- * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds, one without has 32
- * mutations a pixel in each; no lease has more than a million mutations, or, where the pilot's speed is known, takes
- * about 20 s of one thread at most (rounded to a power of two, so that the pilot's noise seldom shows). Where a
- * bandwidth is set an epoch is at least so long that the tiles of a lease do not exceed it, but no longer than the job.
+ * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds. Without one a round
+ * of chains has 32 mutations a pixel, and one of samples is an eighth of what a bound on time or error leaves room for
+ * (at 50,000 samples a second, and 1/E^2 samples a pixel for an error of E), so that it is noticed when it is met; no
+ * lease has more than a million mutations, or, where the pilot's speed is known, takes about 20 s of one thread at most
+ * (rounded to a power of two, so that the pilot's noise seldom shows). Where a bandwidth is set an epoch is at least so
+ * long that the tiles of a lease do not exceed it, but no longer than the job.
  */
 /* A pilot would tell something: a lease might take longer than that. */
 bool plan_wants_speed(const struct plan_request *r, const struct plan *p);

@@ -170,6 +170,59 @@ static uint64_t lease_work(const struct plan *p)
 	return plan_round_mutations(p) / (p->groups * p->parts);
 }
 
+/* Bounds are tested after rounds: what has no other bound is asked often enough, the more so the less it asks for. */
+static void samples_notice_time_and_error(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_SAMPLES, "");
+	r.width = 32;
+	r.height = 27;
+	r.spp = 0;
+	r.seconds = 1e6;
+	uint64_t longest = made(&r).epoch;
+	assert_true(ends_with_rule(&r, "size of the film"));
+	uint64_t before = 0;
+	for (double seconds = 0.1; seconds < 1e5; seconds *= 1.7) {
+		r.seconds = seconds;
+		uint64_t epoch = made(&r).epoch, round = epoch * 16 * 32 * 27;
+		assert_true(epoch >= before && epoch <= longest);
+		assert_true(epoch == 1 || (double)round <= 50000 * seconds / 8);
+		before = epoch;
+	}
+	assert_int_equal(before, longest);
+	r.seconds = 20;
+	assert_true(made(&r).epoch > 1 && ends_with_rule(&r, "in the time, or for the error"));
+	r.seconds = 0;
+	r.target_error = 0.5;
+	assert_int_equal(made(&r).epoch, 1);
+	r.target_error = 0.02; /* 2,500 samples a pixel in 8 rounds of 16 groups */
+	assert_int_equal(made(&r).epoch, 19);
+	r.seconds = 1; /* the nearer bound counts */
+	assert_int_equal(made(&r).epoch, 1);
+	r.spp = 1 << 20; /* a number of samples has its own rule, whatever else bounds the job */
+	assert_true(made(&r).epoch > 400);
+}
+
+/* The bootstrap of a short render is no more than a part of it. */
+static void a_bootstrap_follows_the_time(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS, "");
+	r.spp = 0;
+	r.seconds = 5;
+	assert_int_equal(made(&r).bootstrap, 31296); /* 5 x 50,000 / 8, of equal leases */
+	r.seconds = 0.1;
+	assert_int_equal(made(&r).bootstrap, 16384);
+	r.seconds = 3600;
+	assert_int_equal(made(&r).bootstrap, 1000000);
+	r.seconds = 0;
+	r.target_error = 0.02;
+	assert_int_equal(made(&r).bootstrap, 1000000);
+	r.spp = 1 << 20;
+	r.seconds = 5;
+	assert_int_equal(made(&r).bootstrap, 31296);
+}
+
 /* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, what is usual is not told.
  */
 static void parts_are_asked_for(void **state)
@@ -378,6 +431,8 @@ int main(void)
 		cmocka_unit_test(other_texts_are_none),
 		cmocka_unit_test(entries_are_counted_and_named),
 		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
+		cmocka_unit_test(samples_notice_time_and_error),
+		cmocka_unit_test(a_bootstrap_follows_the_time),
 		cmocka_unit_test(parts_are_asked_for),
 		cmocka_unit_test(leases_take_twenty_seconds),
 		cmocka_unit_test(short_jobs_ask_for_no_pilot),
