@@ -78,6 +78,17 @@ static int list(struct client *cl, const struct job_options *o, struct error *e)
 
 /* ---- the others ---- */
 
+/* What was done, where the coordinator's answer does not say it. */
+static void print_done(const struct job_options *o)
+{
+	static const char *const became[] = {
+		[JOB_CANCEL] = "cancelled", [JOB_HOLD] = "on hold", [JOB_RELEASE] = "no longer on hold"};
+	if (o->verb == JOB_PRIORITY)
+		printf("j%llu has priority %d\n", (unsigned long long)o->job, o->priority);
+	else if (o->verb < sizeof became / sizeof *became && became[o->verb])
+		printf("j%llu is %s\n", (unsigned long long)o->job, became[o->verb]);
+}
+
 static int take_done(struct client *cl, const Farm__Envelope *m, const struct job_options *o, struct error *e)
 {
 	struct client_message answer;
@@ -89,6 +100,8 @@ static int take_done(struct client *cl, const Farm__Envelope *m, const struct jo
 		rc = error_set(e, ENOENT, "j%llu: %s", (unsigned long long)o->job, done->text);
 	else if (*done->text)
 		printf("%s\n", done->text);
+	else
+		print_done(o);
 	client_message_fini(&answer);
 	return rc;
 }
@@ -133,8 +146,9 @@ static int fetch(struct client *cl, const struct job_options *o, struct error *e
 	char name[CLIENT_NAME_BYTES];
 	int rc =
 		o->output ? client_fetch(cl, o->job, what, o->output, e) : client_fetch_here(cl, o->job, what, name, e);
-	if (!rc && isatty(STDERR_FILENO))
-		fprintf(stderr, "%s\n", o->output ? o->output : name);
+	if (!rc)
+		fprintf(stderr, "j%llu: %s in %s\n", (unsigned long long)o->job,
+			o->preview ? "preview, the image so far," : "image", o->output ? o->output : name);
 	return rc;
 }
 

@@ -75,9 +75,9 @@ code() {
 	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/err.log")"
 }
 
-# until_true SECONDS COMMAND...: as long as it may take on a machine that has nothing else to do; a busy one has ten times that
+# until_true SECONDS COMMAND...: as long as it may take on a machine that has nothing else to do; a busy one has fifty times that
 until_true() {
-	tries=$(($1 * 200))
+	tries=$(($1 * 1000))
 	shift
 	while ! "$@"; do
 		tries=$((tries - 1))

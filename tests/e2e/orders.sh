@@ -80,11 +80,12 @@ refused 2 'which priority' job priority "$d"
 refused 1 'no such job' job hold j99
 refused 1 'the job is over' job hold "$b"
 refused 1 'the job is over' job cancel "$b"
-job cancel "$c"
+[ "$(job cancel "$c")" = "$c is cancelled" ] || fail "cancel does not say what it did"
 job cancel "$d"
 done_in 60 "$a"
 submit "$BOX" -o "$DIR/quiet.exr" --integrator path --spp 500 --wait >/dev/null
-job fetch "$a" -o "$DIR/a.exr"
+job fetch "$a" -o "$DIR/a.exr" 2>"$DIR/fetch.log"
+[ "$(cat "$DIR/fetch.log")" = "$a: image in $DIR/a.exr" ] || fail "fetch says: $(cat "$DIR/fetch.log")"
 same "$DIR/a.exr" "$DIR/quiet.exr"
 echo "held, released, put first and last; the bits of a quiet run"
 

@@ -5,6 +5,8 @@
 #include "common/json/forecast_json.h"
 #include "worker/render/scene/scene.h"
 
+#include <stdio.h>
+
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
 {
 	*out = (struct choice){.made = integrator_is_open(&a->plan)};
@@ -37,6 +39,13 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 		world_free(w);
 	}
 	return rc;
+}
+
+void choice_print(const struct choice *c, const char *integrator)
+{
+	if (c->made)
+		fprintf(stderr, "integrator %s, chosen by a pilot of %.1f s; hslt-render --explain says why\n",
+			integrator, c->seconds);
 }
 
 static json_t *found_to_json(const struct render_found *f)

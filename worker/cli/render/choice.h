@@ -20,6 +20,8 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 /* The same in a world that is there. */
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);
 
+/* One line on stderr for whoever renders or submits; nothing where none was made. The reasons are --explain's. */
+void choice_print(const struct choice *c, const char *integrator);
 /* null: none was made. NULL: no memory */
 json_t *choice_to_json(const struct choice *c);
 

@@ -153,8 +153,8 @@ static int load(struct session *s, struct error *e)
 static int choose(struct session *s, struct error *e)
 {
 	int rc = choice_in_world(s->world, &s->a->render, &s->choice, e);
-	if (!rc && s->choice.made && !s->a->quiet)
-		fprintf(stderr, "%s (%.2f s)\n", s->choice.text, s->choice.seconds);
+	if (!rc && !s->a->quiet)
+		choice_print(&s->choice, s->a->render.plan.integrator);
 	return rc;
 }
 

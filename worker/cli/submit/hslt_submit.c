@@ -163,12 +163,15 @@ static void say_at_the_end(const struct arguments *a, uint64_t job)
 {
 	static char text[512];
 	unsigned long long id = job;
+	char fetch[256], cancel[64];
+	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, to_stdout(a) ? "-" : a->output);
+	snprintf(cancel, sizeof cancel, "hslt-job cancel j%llu", id);
 	snprintf(text, sizeof text,
 		 "\nhslt-submit: the job goes on without this program.\n"
-		 "  hslt-job fetch j%llu -o %.200s    fetches its image when it is done, --preview the one so far\n"
-		 "  hslt-job list                 shows how far it is\n"
-		 "  hslt-job cancel j%llu         ends it\n",
-		 id, to_stdout(a) ? "-" : a->output, id);
+		 "  %s  fetches its image when it is done, --preview the one so far\n"
+		 "  %-*s  shows how far it is\n"
+		 "  %-*s  ends it\n",
+		 fetch, width, "hslt-job list", width, cancel);
 	interrupt_say(text);
 }
 
@@ -278,8 +281,7 @@ int main(int argc, char **argv)
 		scene_bundle_fini(&b);
 		return 1;
 	}
-	if (choice.made)
-		fprintf(stderr, "%s\n", choice.text);
+	choice_print(&choice, a.render.plan.integrator);
 	measure(&a, &b);
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
