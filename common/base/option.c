@@ -416,12 +416,3 @@ int options_parse(const struct program *p, int argc, char **argv, void *target, 
 	*asked = x.asked;
 	return rc;
 }
-
-double option_number(struct argp_state *state, const char *option, const char *arg, double least, double most)
-{
-	char *end;
-	double x = strtod(arg, &end);
-	if (*end || end == arg || !(x >= least && x <= most))
-		argp_error(state, "%s takes a number from %g to %g, not '%s'", option, least, most, arg);
-	return x;
-}

@@ -12,7 +12,6 @@
 
 #include "common/base/error.h"
 
-#include <argp.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -122,9 +121,5 @@ int options_parse(const struct program *p, int argc, char **argv, void *target, 
  * its table fills) may be NULL. */
 const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group,
 				   size_t *offset);
-
-/* The number from least to most that arg is; else argp_error, which ends the program. option: its name in the
- * sentence, "--threads". */
-double option_number(struct argp_state *state, const char *option, const char *arg, double least, double most);
 
 #endif

@@ -17,7 +17,8 @@ bool text_is_clean(const char *text);
 /* Makes it that, in place: what is no UTF-8 becomes '?', a control character a blank. */
 void text_clean(char *text);
 
-/* The same text, for interfaces that have no const and change nothing: generated messages, argp's filters. */
+/* The same text, for interfaces that have no const and change nothing: generated messages, arguments that are
+ * constants. */
 char *text_borrow(const char *text);
 
 /* "0.05" or "5%". false: no number. A share is from 0 to 1. */

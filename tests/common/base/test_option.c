@@ -63,6 +63,7 @@ static const struct option_row rows[] = {
 	{"threads", 't', "N", "Threads", OPTION_COUNT(struct arguments, threads, 1, 1024), .standard = "3"},
 	{"blobs", 0, "GB", "Of the spool", OPTION_SCALED(struct arguments, bytes, 0.001, 1e6, 1e9), .standard = "100"},
 	{"kind", 'k', "NAME", "(chosen)", OPTION_TAKE(take_kind), .values = kinds, .more = more},
+	{"wait-for", 0, NULL, "A longer name", OPTION_FLAG(struct arguments, quiet)},
 	{"sort", 0, "NAME", "An old name", OPTION_TAKE(take_kind), .values = kinds, .hidden = true},
 	{0},
 };
@@ -193,6 +194,8 @@ static void test_order_and_forms(void **state)
 		assert_string_equal(a.word[1], "j1");
 		assert_true(a.wait && a.stops == 3 && a.threads == 2);
 	}
+	accepted("list -o x --wait"); /* though it begins --wait-for, too */
+	assert_true(a.wait && !a.quiet);
 	accepted("-o x fetch -5");
 	assert_string_equal(a.word[1], "-5");
 	accepted("-o x fetch -");
