@@ -9,6 +9,7 @@
  */
 #include "worker/cli/accuracy/accuracy.h"
 
+#include "common/base/spelling.h"
 #include "common/base/text.h"
 #include "worker/render/settings/accuracy_settings.h"
 
@@ -356,23 +357,33 @@ static void add_reference(struct planner *p)
 	}
 }
 
-static int check_only(struct planner *p)
+/* The i-th name that --parameters may hold; NULL: the last was before. */
+static const char *parameter_at(size_t i)
 {
 	static const char *const own[] = {DEPTH, SHARE, MIXTURE, PRESET};
-	char name[32], known[300] = "";
-	struct text t = {known, sizeof known};
-	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
-		text_put(&t, "%s%s", i ? ", " : "", own[i]);
-	for (size_t i = 0; render_setting_at(i); i++)
-		text_put(&t, ", %s", render_setting_at(i)->name);
+	enum { OWN = sizeof own / sizeof *own };
+	const struct render_setting *k = i < OWN ? NULL : render_setting_at(i - OWN);
+	return i < OWN ? own[i] : k ? k->name : NULL;
+}
+
+static int check_only(struct planner *p)
+{
+	char name[32], hint[128], known[300];
+	const char *one;
 	for (const char *at = p->only; at && *at;) {
 		size_t n = strcspn(at, ",");
+		struct spelling s = {.wanted = name};
 		bool found = false;
+		*known = 0;
 		snprintf(name, sizeof name, "%.*s", (int)(n < sizeof name ? n : sizeof name - 1), at);
-		for (size_t i = 0; i < sizeof own / sizeof *own; i++)
-			found |= strcmp(name, own[i]) == 0;
-		if (!found && !setting_find(name))
-			return error_set(p->e, EINVAL, "there is no parameter '%s'; there are %s", name, known);
+		for (size_t i = 0; (one = parameter_at(i)) != NULL; i++) {
+			found |= strcmp(name, one) == 0;
+			spelling_offer(&s, one);
+			spelling_list(known, sizeof known, one);
+		}
+		if (!found)
+			return error_set(p->e, EINVAL, "there is no parameter '%s'%s; there are %s", name,
+					 spelling_hint(&s, hint, sizeof hint), known);
 		at += n + (at[n] == ',');
 	}
 	return 0;

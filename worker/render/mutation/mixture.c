@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/mutation/mixture.h"
 
+#include "common/base/spelling.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,12 +32,15 @@ static bool parse_forced(const char *text, size_t length, struct mutation_settin
 
 static int name_error(const char *text, size_t length, struct error *e)
 {
-	char known[256] = "";
-	size_t used = 0;
-	for (size_t i = 0; mutation_registry[i] && used < sizeof known; i++)
-		used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "",
-					 mutation_registry[i]->name);
-	return error_set(e, EINVAL, "no mutation is called '%.*s'; there are %s", (int)length, text, known);
+	char name[64], hint[128], known[256] = "";
+	struct spelling s = {.wanted = name};
+	snprintf(name, sizeof name, "%.*s", (int)(length < sizeof name ? length : sizeof name - 1), text);
+	for (size_t i = 0; mutation_registry[i]; i++) {
+		spelling_offer(&s, mutation_registry[i]->name);
+		spelling_list(known, sizeof known, mutation_registry[i]->name);
+	}
+	return error_set(e, EINVAL, "no mutation is called '%s'%s; there are %s", name,
+			 spelling_hint(&s, hint, sizeof hint), known);
 }
 
 static int parse_entry(const char *text, size_t length, struct mixture_entry *out, struct error *e)
