@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # What programs print of their options: --help, the manual page and the completion of bash name the same ones, each once; a mistyped
-# option gets the nearest name.
+# option gets the nearest name; the commands in the documents have no other options.
 . "$(dirname "$0")/lib.sh"
-PROGRAMS="accuracy assemble ca compare coordinator job render scene status submit tonemap"
+PROGRAMS="accuracy assemble ca compare coordinator job render scene status submit tonemap worker"
 need $(for p in $PROGRAMS; do echo "hslt-$p"; done)
 
 # Asks the completion for each option of a list, and for its beginnings up to three letters.
@@ -23,6 +23,27 @@ ask "$2" --no-such-option
 [[ ${#COMPREPLY[@]} = 0 ]] || { echo "--no-such-option: ${COMPREPLY[*]}"; exit 1; }
 END
 
+# Program and option of each command in a document: in a block of code, or between backticks.
+cat >"$DIR/commands.awk" <<'END'
+/^ *```/ { fence = !fence; next }
+{
+	text = fence || /^    / ? $0 : ""
+	if (!text) {
+		n = split($0, span, "`")
+		for (i = 2; i <= n; i += 2)
+			text = text ";" span[i]
+	}
+	n = split(text, command, /[;&|()#]/)
+	for (i = 1; i <= n; i++)
+		if (command[i] !~ /kubectl/ && match(" " command[i], /[ \t]hslt-[a-z]+ /)) {
+			m = split(substr(command[i], RSTART), word, /[ =]+/)
+			for (k = 2; k <= m; k++)
+				if (word[k] ~ /^--[a-z-]+$/)
+					print word[1], word[k]
+		}
+}
+END
+
 for p in $PROGRAMS; do
 	code 0 "$BIN/hslt-$p" --help
 	mv "$DIR/out" "$DIR/help"
@@ -33,7 +54,10 @@ for p in $PROGRAMS; do
 	for o in --help --version --man --completion; do
 		grep -qx -e $o "$DIR/options" || fail "hslt-$p --help has no $o"
 	done
+	sed -n 's/^  \(-.\), --.*/\1/p' "$DIR/help" | sort | uniq -d >"$DIR/twice"
+	[ ! -s "$DIR/twice" ] || fail "hslt-$p has twice: $(cat "$DIR/twice")"
 	[ -z "$(sort "$DIR/options" | uniq -d)" ] || fail "hslt-$p has twice: $(sort "$DIR/options" | uniq -d)"
+	sed "s/^/hslt-$p /" "$DIR/options" >>"$DIR/all"
 	code 0 "$BIN/hslt-$p" --usage
 	tr -d '\n' <"$DIR/out" | tr -s ' ' >"$DIR/usage"
 	for o in $(cat "$DIR/options"); do
@@ -67,6 +91,26 @@ for p in $PROGRAMS; do
 	grep -q "unknown option '--hepl'; did you mean '--help'?" "$DIR/err.log" || fail "hslt-$p --hepl: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" --ver=1
 done
-code 2 "$BIN/hslt-tonemap" --exposrue 1 a.exr b.png
-grep -q "did you mean '--exposure'?" "$DIR/err.log" || fail "--exposrue: $(cat "$DIR/err.log")"
+TREE=$HERE/../..
+cat "$TREE"/README.md "$TREE"/docs/*.md "$TREE"/deploy/*.md "$TREE"/worker/render/scene/README.md |
+	awk -f "$DIR/commands.awk" | sort -u >"$DIR/mentioned"
+[ "$(wc -l <"$DIR/mentioned")" -ge 20 ] || fail "the documents mention only these options: $(cat "$DIR/mentioned")"
+wrong=$(grep -vxFf "$DIR/all" "$DIR/mentioned" || :)
+[ -z "$wrong" ] || fail "the documents mention options that no program has: $wrong"
+
+# answered NAME COMMAND...: a usage error whose answer is that name
+answered() {
+	meant=$1
+	shift
+	code 2 "$@"
+	grep -q "; did you mean [\`']$meant[\`']?" "$DIR/err.log" || fail "$*: $(cat "$DIR/err.log")"
+}
+answered --exposure "$BIN/hslt-tonemap" --exposrue 1 a.exr b.png
+answered fetch "$BIN/hslt-job" fecth j1
+answered worker "$BIN/hslt-ca" wroker node1
+answered check "$BIN/hslt-scene" chekc "$BOX"
+answered bidirectional "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --mutations bidirectionl=1
+answered dispersion "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --effects -disperson
+answered tolerance "$BIN/hslt-accuracy" "$BOX" -o "$DIR/a.html" --parameters tolerence
+answered --stall "$BIN/hslt-worker" --stal1 5
 echo "options of $(echo $PROGRAMS | wc -w) programs: help, manual pages, completions"
