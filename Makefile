@@ -8,6 +8,7 @@
 # make test-states   chain states that one worker spoils, with 50 seeds
 # make fuzz-numbers   scenes with extreme numbers against a farm of sanitized workers, FUZZ_SECONDS (60) long
 # make corpus DIR=...   tries every scene file under a folder: loaded, or refused for what
+# make man completion   what the programs print with --man and --completion, into build/man and build/completion
 # make demo bench fuzz install clean
 
 CC       ?= gcc
@@ -221,9 +222,25 @@ plain:
 demo: programs
 	sh deploy/demo-run.sh $(BUILD) build/demo
 
-install: programs
-	install -d $(DESTDIR)$(PREFIX)/bin
+# Made of the programs' tables of options (common/base/option.h).
+MAN        := $(PROGRAMS:%=$(BUILD)/man/%.1)
+COMPLETION := $(PROGRAMS:%=$(BUILD)/completion/%)
+.PHONY: man completion
+man: $(MAN)
+completion: $(COMPLETION)
+$(BUILD)/man/%.1: $(BUILD)/bin/%
+	@mkdir -p $(@D)
+	$< --man >$@.new && mv $@.new $@
+$(BUILD)/completion/%: $(BUILD)/bin/%
+	@mkdir -p $(@D)
+	$< --completion >$@.new && mv $@.new $@
+
+SHARE := $(DESTDIR)$(PREFIX)/share
+install: programs man completion
+	install -d $(DESTDIR)$(PREFIX)/bin $(SHARE)/man/man1 $(SHARE)/bash-completion/completions
 	install -m 755 $(addprefix $(BUILD)/bin/,$(PROGRAMS)) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(MAN) $(SHARE)/man/man1
+	install -m 644 $(COMPLETION) $(SHARE)/bash-completion/completions
 
 clean:
 	rm -rf build
