@@ -10,19 +10,19 @@
 
 #include <stdint.h>
 
-/* X(name, its key in JSON; NULL: it is not shown) */
-#define JOB_COUNTS(X)                                                                 \
-	X(repeats, "repeats")	    /* results of leases that were merged already */  \
-	X(refused, "refused")	    /* results that could not count */                \
-	X(faults, NULL)		    /* those of them that no worker may send */       \
-	X(failures, "failures")	    /* leases that a worker tried and could not do */ \
-	X(timeouts, "timeouts")	    /* leases that were handed out again */           \
-	X(duplicates, "duplicates") /* second copies of leases that took long */      \
-	X(verified, "verified")	    /* leases on which two workers agreed */          \
-	X(mismatched, "mismatched") /* ... of which the first two did not */
+/* X(name, its key in JSON; NULL: it is not shown, AT(its member of the message JobStatus) or NOWHERE) */
+#define JOB_COUNTS(X)                                                                                 \
+	X(repeats, "repeats", NOWHERE)		    /* results of leases that were merged already */  \
+	X(refused, "refused", NOWHERE)		    /* results that could not count */                \
+	X(faults, NULL, NOWHERE)		    /* those of them that no worker may send */       \
+	X(failures, "failures", NOWHERE)	    /* leases that a worker tried and could not do */ \
+	X(timeouts, "timeouts", NOWHERE)	    /* leases that were handed out again */           \
+	X(duplicates, "duplicates", NOWHERE)	    /* second copies of leases that took long */      \
+	X(verified, "verified", AT(verified))	    /* leases on which two workers agreed */          \
+	X(mismatched, "mismatched", AT(mismatched)) /* ... of which the first two did not */
 
 struct job_counts {
-#define X(name, key) uint64_t name;
+#define X(name, key, wire) uint64_t name;
 	JOB_COUNTS(X)
 #undef X
 };

@@ -71,37 +71,29 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 {
 	const struct job_record *r = &v->record;
 	farm__job_status__init(out);
-	out->job = r->id;
-	out->name = text_borrow(r->name);
-	out->state = text_borrow(r->state);
-	out->progress = r->progress;
-	out->rate = v->rate;
-	out->eta = v->eta;
-	out->rounds = r->rounds;
-	out->submitted = r->submitted;
-	out->error = r->rel_error;
+#define SEND(x) (x)
+#define IGNORE(x)
+#define AT(to) out->to = SEND
+#define NOWHERE IGNORE
+#define X(name, key, wire) wire(r->counts.name);
+#define TEXT(member, size, key, shown, wire) wire(text_borrow(r->member));
+#define NUMBER(kind, member, key, shown, wire) wire(r->member);
+#define COUNT(member, key, shown, wire) wire(r->member);
+	RECORD_FIELDS(TEXT, NUMBER, COUNT)
+	JOB_COUNTS(X)
+#undef TEXT
+#undef NUMBER
+#define TEXT(member, size, key, shown, wire) wire(text_borrow(v->member));
+#define NUMBER(kind, member, key, shown, wire) wire(v->member);
+	VIEW_FIELDS(TEXT, NUMBER)
+#undef AT
+#undef NOWHERE
+#undef X
+#undef TEXT
+#undef NUMBER
+#undef COUNT
 	out->why = text_borrow(why_of(v));
-	out->reason = text_borrow(r->reason);
-	out->output = text_borrow(r->output);
-	out->priority = r->priority;
-	out->leases = v->leases;
-	out->owner = text_borrow(r->owner);
-	out->workers = v->workers;
-	out->share = v->share;
-	out->place = text_borrow(v->place);
-	out->fetchable = r->has_result;
 	out->ended = record_is_ended(r);
-	out->exit_code = r->exit_code;
-	out->note = text_borrow(r->note);
-	out->verify = r->verify;
-	out->verified = r->counts.verified;
-	out->mismatched = r->counts.mismatched;
-	out->eta_low = v->eta_low;
-	out->eta_high = v->eta_high;
-	out->target_error = r->target_error;
-	out->cpu_seconds = r->cpu_seconds;
-	out->bootstrap_cpu_seconds = r->bootstrap_cpu_seconds;
-	out->bootstrap_seconds = r->bootstrap_seconds;
 	out->halving_cpu_seconds = v->halving_cpu.middle;
 	out->halving_seconds = v->halving_seconds.middle;
 }
@@ -135,10 +127,6 @@ static void add_forecast(json_t *o, const struct job_view *v)
 	const struct job_record *r = &v->record;
 	struct forecast_range error, eta = {v->eta_low, v->eta, v->eta_high};
 	bool known = forecast_error(&r->looks, &error), live = !record_is_ended(r);
-	json_object_set_new(o, "targetError", number_or_null(r->target_error, r->target_error > 0));
-	json_object_set_new(o, "cpuSeconds", json_real(r->cpu_seconds));
-	json_object_set_new(o, "bootstrapCpuSeconds", json_real(r->bootstrap_cpu_seconds));
-	json_object_set_new(o, "bootstrapSeconds", json_real(r->bootstrap_seconds));
 	json_object_set_new(o, "errorNow", known ? forecast_range_to_json(&error) : json_null());
 	json_object_set_new(o, "etaRange", live && v->eta >= 0 ? forecast_range_to_json(&eta) : json_null());
 	json_object_set_new(o, "nextHalving",
@@ -150,44 +138,28 @@ static void add_forecast(json_t *o, const struct job_view *v)
 		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
-/* What its priority means. */
-static void add_share(json_t *o, const struct job_view *v)
-{
-	json_object_set_new(o, "owner", json_string(v->record.owner));
-	json_object_set_new(o, "workers", json_integer(v->workers));
-	json_object_set_new(o, "machines", json_integer(v->machines));
-	json_object_set_new(o, "share", number_or_null(v->share, v->share >= 0 && !record_is_ended(&v->record)));
-	json_object_set_new(o, "place", json_string(v->place));
-}
+#define TEXT(member, size, key, shown, wire) {FIELD_TEXT, offsetof(struct job_view, member), size, key, shown},
+#define NUMBER(kind, member, key, shown, wire) {FIELD_##kind, offsetof(struct job_view, member), 0, key, shown},
+static const struct field fields[] = {VIEW_FIELDS(TEXT, NUMBER)};
+#undef TEXT
+#undef NUMBER
 
 json_t *view_to_json(const struct job_view *v)
 {
 	const struct job_record *r = &v->record;
 	char id[32];
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)r->id);
-	json_t *o = json_pack("{s:s s:s s:s s:s s:i s:f s:f s:I s:I s:s s:s s:s s:s s:b s:i s:f s:f}",		 /* */
-			      "id", id, "name", r->name, "state", r->state, "integrator", r->integrator,	 /* */
-			      "priority", r->priority, "progress", r->progress, "rate", v->rate,		 /* */
-			      "rounds", (json_int_t)r->rounds, "mutations", (json_int_t)r->mutations,		 /* */
-			      "why", why_of(v), "waiting", v->waiting, "reason", r->reason, "output", r->output, /* */
-			      "result", (int)r->has_result, "leases", (int)v->leases, "submitted", r->submitted, /* */
-			      "ended", r->ended);
-	if (!o)
+	json_t *o = json_pack("{s:s}", "id", id);
+	if (!o || !record_show(r, o) || !fields_show(fields, sizeof fields / sizeof *fields, v, o)) {
+		json_decref(o);
 		return NULL;
-	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
-	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
-	json_object_set_new(o, "errorDoubt", json_string(r->rel_error_doubt));
+	}
+	json_object_set_new(o, "why", json_string(why_of(v)));
+	json_object_set_new(o, "share", number_or_null(v->share, v->share >= 0 && !record_is_ended(r)));
 	add_forecast(o, v);
-	add_share(o, v);
-	json_object_set_new(o, "reading", number_or_null(v->reading, v->reading >= 0));
 	json_object_set_new(o, "counts", record_counts(r));
-	json_object_set_new(o, "verify", json_real(r->verify));
-	json_object_set_new(o, "mixture", json_string(r->mixture));
 	json_object_set_new(o, "strategies", record_strategies(r));
-	json_object_set_new(o, "note", json_string(r->note));
-	json_object_set_new(o, "cleared", number_or_null(r->cleared, r->cleared > 0));
 	json_object_set_new(o, "agreement", convergence_to_json(&r->agreement));
-	json_object_set_new(o, "b", number_or_null(r->b, r->b > 0));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));
 	return o;

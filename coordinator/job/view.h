@@ -12,19 +12,31 @@
 
 #include <jansson.h>
 
-/* A record, and what only a living job has. */
+/* What only a living job has, beside its record: as in record_fields.h. A share is that of the machines that it would
+ * have by its priority; reading that of what was stored of it which has been read, while it is. */
+#define VIEW_FIELDS(TEXT, NUMBER)                                                           \
+	NUMBER(real, rate, NULL, "rate", AT(rate))                                          \
+	NUMBER(known, eta, NULL, "eta", AT(eta))                                            \
+	NUMBER(known, eta_low, NULL, NULL, AT(eta_low)) /* where eta is known */            \
+	NUMBER(known, eta_high, NULL, NULL, AT(eta_high))                                   \
+	NUMBER(u32, leases, NULL, "leases", AT(leases))	   /* out at workers */             \
+	NUMBER(u32, workers, NULL, "workers", AT(workers)) /* that hold them */             \
+	NUMBER(u32, machines, NULL, "machines", NOWHERE)   /* that might */                 \
+	NUMBER(known, share, NULL, NULL, AT(share))                                         \
+	TEXT(place, 160, NULL, "place", AT(place)) /* in words */                           \
+	NUMBER(known, reading, NULL, "reading", NOWHERE)                                    \
+	TEXT(waiting, 256, NULL, "waiting", NOWHERE) /* why nothing is being done for it */ \
+	TEXT(owners_place, 160, NULL, NULL, NOWHERE) /* the same for its owner */           \
+	TEXT(owners_waiting, 256, NULL, NULL, NOWHERE)
+
 struct job_view {
 	struct job_record record;
-	double rate, eta;				    /* eta negative: not known */
-	double eta_low, eta_high;			    /* where eta is known */
+#define TEXT(member, size, key, shown, wire) char member[size];
+#define NUMBER(kind, member, key, shown, wire) field_##kind member;
+	VIEW_FIELDS(TEXT, NUMBER)
+#undef TEXT
+#undef NUMBER
 	struct forecast_range halving_cpu, halving_seconds; /* where there are looks */
-	uint32_t leases;				    /* out at workers */
-	uint32_t workers, machines;			    /* that hold them, that might */
-	double share;	   /* machines that it would have by its priority; negative: not known */
-	char place[160];   /* in words */
-	double reading;	   /* share of what was stored of it that has been read; negative: it is not being read */
-	char waiting[256]; /* why nothing is being done for it */
-	char owners_place[160], owners_waiting[256]; /* the same for its owner */
 };
 
 void view_of_record(struct job_view *v, const struct job_record *r);

@@ -147,7 +147,7 @@ static int read_job(const struct jobs *s, uint64_t job, struct row_file *f, stru
 /* The journal has them from a while before the end: what the record of the end says is more. */
 static void take_counts(struct job_counts *c, const struct job_record *r)
 {
-#define X(name, key)                  \
+#define X(name, key, wire)            \
 	if (c->name < r->counts.name) \
 		c->name = r->counts.name;
 	JOB_COUNTS(X)

@@ -3,8 +3,9 @@
  * A job's record as JSON, with a checksum.
  *
  * record_to_json writes all that is remembered of a job, record_from_json reads it back; a key that is missing, because
- * an older version wrote the file, is zero or the text "". The counters follow from the list of
- * coordinator/core/counts.h. The checksum is over the content with sorted keys, so that layout does not matter.
+ * an older version wrote the file, is zero, not known or the text "". Plain fields follow from the list of
+ * record_fields.h, counters from that of coordinator/core/counts.h. The checksum is over the content with sorted keys,
+ * so that layout does not matter.
  *
  * A text that is not UTF-8 is -EINVAL and the record is not written. A damaged file is -EBADMSG, one of another schema
  * -EPROTO. A record without a checksum is of an earlier version and believed.
@@ -24,19 +25,24 @@
 
 enum { SCHEMA = 1 };
 
-static const struct {
-	const char *name;
-	size_t offset;
-} counts[] = {
-	{"rounds", offsetof(struct job_record, rounds)},
-	{"mutations", offsetof(struct job_record, mutations)},
-	{"merged", offsetof(struct job_record, leases_merged)},
-#define X(name, key) {key, offsetof(struct job_record, counts.name)},
-	JOB_COUNTS(X)
+#define TEXT(member, size, key, shown, wire) {FIELD_TEXT, offsetof(struct job_record, member), size, key, shown},
+#define NUMBER(kind, member, key, shown, wire) {FIELD_##kind, offsetof(struct job_record, member), 0, key, shown},
+#define COUNT(member, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, NULL, shown},
+static const struct field fields[] = {RECORD_FIELDS(TEXT, NUMBER, COUNT)};
+#undef TEXT
+#undef NUMBER
+#undef COUNT
+
+/* Those of the object "counts". */
+#define OTHER(...)
+#define COUNT(member, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, key, NULL},
+#define X(name, key, wire) {FIELD_u64, offsetof(struct job_record, counts.name), 0, key, NULL},
+static const struct field counts[] = {RECORD_FIELDS(OTHER, OTHER, COUNT) JOB_COUNTS(X)};
+#undef OTHER
+#undef COUNT
 #undef X
-		{"stuck", offsetof(struct job_record, stuck)},
-	{"longestStuck", offsetof(struct job_record, longest_stuck)},
-};
+
+enum { FIELD_COUNT = sizeof fields / sizeof *fields, COUNTS_COUNT = sizeof counts / sizeof *counts };
 
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
 			 double beyond_share)
@@ -117,45 +123,16 @@ static void take_strategies(const json_t *o, struct job_record *r)
 	memcpy(r->strategy, n.strategy, sizeof r->strategy);
 }
 
+bool record_show(const struct job_record *r, json_t *o)
+{
+	return fields_show(fields, FIELD_COUNT, r, o);
+}
+
 json_t *record_counts(const struct job_record *r)
 {
 	json_t *o = json_object();
-	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-		uint64_t n;
-		if (!counts[i].name)
-			continue;
-		memcpy(&n, (const char *)r + counts[i].offset, sizeof n);
-		json_object_set_new(o, counts[i].name, json_integer((json_int_t)n));
-	}
+	fields_store(counts, COUNTS_COUNT, r, o, NULL);
 	return o;
-}
-
-static void take_counts(const json_t *o, struct job_record *r)
-{
-	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-		if (!counts[i].name)
-			continue;
-		uint64_t n = (uint64_t)json_integer_value(json_object_get(o, counts[i].name));
-		memcpy((char *)r + counts[i].offset, &n, sizeof n);
-	}
-}
-
-static void put_looks(json_t *o, const struct job_record *r)
-{
-	json_object_set_new(o, "targetError", json_real(r->target_error));
-	json_object_set_new(o, "cpuSeconds", json_real(r->cpu_seconds));
-	json_object_set_new(o, "bootstrapCpuSeconds", json_real(r->bootstrap_cpu_seconds));
-	json_object_set_new(o, "bootstrapSeconds", json_real(r->bootstrap_seconds));
-	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
-}
-
-static void take_looks(const json_t *o, struct job_record *r)
-{
-	r->target_error = json_number_value(json_object_get(o, "targetError"));
-	r->cpu_seconds = json_number_value(json_object_get(o, "cpuSeconds"));
-	r->bootstrap_cpu_seconds = json_number_value(json_object_get(o, "bootstrapCpuSeconds"));
-	r->bootstrap_seconds = json_number_value(json_object_get(o, "bootstrapSeconds"));
-	forecast_looks_from_json(json_object_get(o, "looks"), &r->looks);
 }
 
 /* Of what it says, however it is laid out. -ENOMEM */
@@ -183,32 +160,20 @@ static int check(json_t *o, struct error *e)
 
 int record_to_json(const struct job_record *r, char **out, struct error *e)
 {
-	json_error_t fault;
-	json_t *o = json_pack_ex(
-		&fault, 0, "{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
-		"schema", SCHEMA, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator,    /* */
-		"state", r->state, "reason", r->reason, "why", r->why, "output", r->output,		    /* */
-		"priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result,	    /* */
-		"submitted", r->submitted, "ended", r->ended, "progress", r->progress,			    /* */
-		"relError", r->rel_error, "counts", record_counts(r),					    /* */
-		"mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
-	if (!o)
-		return error_set(e, json_error_code(&fault) == json_error_invalid_utf8 ? EINVAL : ENOMEM,
-				 "the record of job j%llu cannot be written: %s", (unsigned long long)r->id,
-				 fault.text);
-	json_object_set_new(o, "owner", json_string(r->owner));
-	json_object_set_new(o, "relErrorDoubt", json_string(r->rel_error_doubt));
-	json_object_set_new(o, "endedSeen", json_real(r->ended_seen));
-	json_object_set_new(o, "cleared", json_real(r->cleared));
-	json_object_set_new(o, "extended", json_integer((json_int_t)r->extended));
-	json_object_set_new(o, "verify", json_real(r->verify));
+	json_t *o = json_pack("{s:i}", "schema", SCHEMA);
+	int rc = o ? fields_store(fields, FIELD_COUNT, r, o, e) : error_set(e, ENOMEM, "no memory");
+	if (rc) {
+		json_decref(o);
+		return error_prefix(e, rc, "the record of job j%llu cannot be written", (unsigned long long)r->id);
+	}
+	json_object_set_new(o, "counts", record_counts(r));
+	json_object_set_new(o, "strategies", record_strategies(r));
 	json_object_set_new(o, "agreement", convergence_to_json(&r->agreement));
-	json_object_set_new(o, "b", json_real(r->b));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));
-	put_looks(o, r);
+	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 	json_int_t sum = 0;
-	int rc = checksum(o, &sum, e);
+	rc = checksum(o, &sum, e);
 	if (rc || json_object_set_new(o, "crc32c", json_integer(sum))) {
 		json_decref(o);
 		return error_set(e, ENOMEM, "no memory for a record");
@@ -218,12 +183,6 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 	*out = text ? mem_strdup(text) : NULL;
 	free(text);
 	return *out ? 0 : error_set(e, ENOMEM, "no memory for the record of a job");
-}
-
-static void take_text(const json_t *o, const char *key, char *out, size_t size)
-{
-	const char *text = json_string_value(json_object_get(o, key));
-	text_copy(out, size, text ? text : "");
 }
 
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e)
@@ -250,35 +209,12 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 		json_decref(o);
 		return damaged;
 	}
-	r->id = (uint64_t)json_integer_value(json_object_get(o, "id"));
-	take_text(o, "name", r->name, sizeof r->name);
-	take_text(o, "integrator", r->integrator, sizeof r->integrator);
-	take_text(o, "state", r->state, sizeof r->state);
-	take_text(o, "reason", r->reason, sizeof r->reason);
-	take_text(o, "why", r->why, sizeof r->why);
-	take_text(o, "output", r->output, sizeof r->output);
-	take_text(o, "owner", r->owner, sizeof r->owner);
-	r->extended = (uint64_t)json_integer_value(json_object_get(o, "extended"));
-	r->priority = (int)json_integer_value(json_object_get(o, "priority"));
-	r->exit_code = (uint32_t)json_integer_value(json_object_get(o, "exitCode"));
-	r->has_result = json_is_true(json_object_get(o, "result"));
-	r->cleared = json_number_value(json_object_get(o, "cleared"));
-	r->verify = json_number_value(json_object_get(o, "verify"));
-	r->submitted = json_number_value(json_object_get(o, "submitted"));
-	r->ended = json_number_value(json_object_get(o, "ended"));
-	const json_t *seen = json_object_get(o, "endedSeen");
-	r->ended_seen = json_is_number(seen) ? json_number_value(seen) : -1;
-	r->progress = json_number_value(json_object_get(o, "progress"));
-	r->rel_error = json_number_value(json_object_get(o, "relError"));
-	take_text(o, "relErrorDoubt", r->rel_error_doubt, sizeof r->rel_error_doubt);
-	take_text(o, "mixture", r->mixture, sizeof r->mixture);
-	take_text(o, "note", r->note, sizeof r->note);
-	take_counts(json_object_get(o, "counts"), r);
+	fields_read(fields, FIELD_COUNT, r, o);
+	fields_read(counts, COUNTS_COUNT, r, json_object_get(o, "counts"));
 	take_strategies(o, r);
 	convergence_from_json(json_object_get(o, "agreement"), &r->agreement);
-	r->b = json_number_value(json_object_get(o, "b"));
 	classes_from_json(json_object_get(o, "classes"), r->classes);
-	take_looks(o, r);
+	forecast_looks_from_json(json_object_get(o, "looks"), &r->looks);
 	json_t *effects = json_object_get(o, "effects");
 	record_take_effects(r, json_is_array(effects) ? json_incref(effects) : NULL);
 	json_decref(o);

@@ -12,6 +12,8 @@
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
 #include "coordinator/core/counts.h"
+#include "coordinator/store/fields.h"
+#include "coordinator/store/record_fields.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -21,39 +23,18 @@
 enum { RECORD_EFFECTS = 12288 };
 
 struct job_record {
-	uint64_t id;
-	char name[128];
-	char integrator[16];
-	char state[16];	   /* as in the status */
-	char reason[16];   /* which bound ended it */
-	char why[256];	   /* why it failed */
-	char output[1024]; /* where the client wants it */
-	char owner[72];	   /* the name in the certificate of who submitted it; "": there was none */
-	int priority;
-	uint32_t exit_code; /* of a program that waited */
-	bool has_result;
-	double cleared;		 /* its result was, s since 1970; 0: it was not */
-	uint64_t extended;	 /* how often it went on after its end, as the ledger counts */
-	double submitted, ended; /* seconds since 1970; 0: not yet */
-	double ended_seen;	 /* s that had been seen to pass then (seen.h); negative: nobody knows */
-	double progress;
-	double rel_error;			   /* negative: not known */
-	char rel_error_doubt[STATED_ERROR_TEXT];   /* why not, where an estimate was made; "" */
-	double target_error;			   /* 0: none */
-	double cpu_seconds, bootstrap_cpu_seconds; /* of all merged leases, of those of the bootstrap */
-	double bootstrap_seconds;		   /* wall clock */
-	struct forecast_history looks;
-	uint64_t rounds, mutations, leases_merged;
+#define TEXT(member, size, key, shown, wire) char member[size];
+#define NUMBER(kind, member, key, shown, wire) field_##kind member;
+#define COUNT(member, key, shown, wire) uint64_t member;
+	RECORD_FIELDS(TEXT, NUMBER, COUNT)
+#undef TEXT
+#undef NUMBER
+#undef COUNT
 	struct job_counts counts;
-	double verify; /* share of its leases that two workers compute */
-	uint64_t stuck,
-		longest_stuck; /* times that a chain accepted nothing during an epoch; most rejections in a row */
-	char mixture[PLAN_MUTATIONS_MAX];
-	char note[STRATEGY_NOTE];
+	struct forecast_history looks;
 	char effects[RECORD_EFFECTS]; /* a JSON array: what the scene calls for, and why; "": not known, or too long */
 	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
 	struct convergence agreement;				/* of the last image that was made */
-	double b;						/* of it, as the classes; 0: none was made */
 	struct path_class_energy classes[PATH_CLASSES];
 };
 
@@ -67,6 +48,7 @@ void record_begin_convergence(struct job_record *r);			      /* nothing is known
 void record_take_error(struct job_record *r, const struct canvas_image *img); /* of one that has an estimate */
 void record_take_effects(struct job_record *r, json_t *list);		      /* takes the reference; NULL: none */
 json_t *record_effects(const struct job_record *r);			      /* an array */
+bool record_show(const struct job_record *r, json_t *o);		      /* its plain fields: fields_show */
 json_t *record_counts(const struct job_record *r);			      /* an object of its counts */
 json_t *record_strategies(const struct job_record *r);			      /* an array: strategy_to_json */
 int record_to_json(const struct job_record *r, char **text,
