@@ -546,6 +546,7 @@ int canvas_error(struct making *m, struct error *e)
 		write_unvisited(m->img);
 	t->sum.groups = t->groups;
 	t->sum.tail = find_tail(&t->tail, errors);
+	t->sum.tail_errors = tail_size(errors);
 	if (mean != 0) /* a black image has no relative error */
 		canvas_interval(&t->sum, m->img);
 	free_tile(t);

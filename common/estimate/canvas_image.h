@@ -25,8 +25,8 @@ enum error_doubt {
 			  */
 	ERROR_DARK,	 /* ... from pixels whose brightness, by which errors are divided, is not known */
 	ERROR_WIDE,	 /* the interval would span more than a factor of ten of the relative error */
-	ERROR_TAIL,  /* the largest errors of pixels are so unequal that larger ones have not come yet: error_tail is
-			below 2 */
+	ERROR_TAIL,  /* the largest errors of pixels are so unequal that larger ones may not have come yet: error_tail
+			is not above error_tail_least */
 	ERROR_SHORT, /* chains are too short to be judged (common/estimate/convergence.h) */
 };
 
@@ -45,9 +45,10 @@ struct canvas_image {
 				   doubtful */
 	enum error_doubt rel_mse_doubt;
 	double doubtful_share; /* of rel_mse: what the doubt is about */
-	double error_tail;  /* tail index (common/estimate/tail.h) of the groups' relative errors of pixels; INFINITY or
-			       0:  not known */
-	uint64_t unvisited; /* pixels to which no chain came; 0 of samples */
+	double error_tail; /* tail index (common/estimate/tail.h) of the groups' relative errors of pixels; INFINITY or
+			      0:  not known */
+	double error_tail_least; /* above this the variance of errors is finite, with 95 % confidence */
+	uint64_t unvisited;	 /* pixels to which no chain came; 0 of samples */
 	/* Chains only, of complete rounds; NULL for samples, previews and before the first round is complete. Per tile
 	 * of TILE_SIZE from the crop's corner: potential scale reduction (Gelman and Rubin 1992) of the share of a
 	 * sequence's time that falls into the tile, sqrt((n - 1) / n + V / W), n mutations a sequence, V the variance

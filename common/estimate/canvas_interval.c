@@ -12,12 +12,15 @@
  * wider than the normal; by the doubt of the weights, twice, since brightness that comes in hits is skewed; by heavy
  * tails: the variance of a variance is (kurtosis - 1) / 2 times the normal's. The kurtosis of a few groups is too small
  *   where tails are heavy, hence the power of 1.5, which is of calibration (tests/image/README.md).
- * The interval begins at the lower bound of the sums and ends at the upper one. It is not known where too much of the
- * estimate comes from pixels of which too little is known (limits are of calibration, too), and where errors are so
- * unequal that those which count most have probably not come.
+ * The interval begins at the lower bound of the sums and ends at the upper one, in which the part of pixels that are
+ * divided by a block's brightness counts twice: some of them are darker than the block. It is not known where too much
+ * of the estimate comes from pixels of which too little is known (limits are of calibration, too), and where errors
+ * are so unequal that those which count most may not have come: where their tail index does not rule out an infinite
+ * variance.
  */
 #include "common/estimate/making.h"
 #include "common/estimate/quantile.h"
+#include "common/estimate/tail.h"
 
 #include <math.h>
 
@@ -71,8 +74,7 @@ static double heavier_than_normal(const struct error_sums *s)
 	return kurtosis > 3 ? pow((kurtosis - 1) / 2, tail_power) : 1;
 }
 
-/* The relMSE is the mean of squared errors: a tail index below this and it has no expectation, as far as the largest of
- * them tell. */
+/* The relMSE is the mean of squared errors: below this tail index it has no expectation. */
 static const double finite_variance = 2;
 
 /* known: upper over lower end as they would be if only the degrees of freedom were in doubt. */
@@ -87,7 +89,7 @@ static void find_doubt(const struct error_sums *s, double known, struct canvas_i
 		img->doubtful_share = dark;
 	} else if (!(img->rel_mse_95[1] <= fmax(widest, widest_of_known * known) * img->rel_mse_95[0])) {
 		img->rel_mse_doubt = ERROR_WIDE;
-	} else if (s->tail < finite_variance) {
+	} else if (!(s->tail > img->error_tail_least)) {
 		img->rel_mse_doubt = ERROR_TAIL;
 	}
 	if (img->rel_mse_doubt)
@@ -98,6 +100,7 @@ void canvas_interval(struct error_sums *s, struct canvas_image *img)
 {
 	double groups = s->groups, mean = 0;
 	img->error_tail = s->tail;
+	img->error_tail_least = tail_index_least(finite_variance, s->tail_errors);
 	for (uint32_t g = 0; g < s->groups && s->groups <= ERROR_FOLDED; g++)
 		s->distance[g] = s->gram[g][g];
 	for (uint32_t g = 0; g < s->groups; g++)
@@ -113,7 +116,7 @@ void canvas_interval(struct error_sums *s, struct canvas_image *img)
 	double known = f_quantile(0.975, own, own * (groups - 1)) / f_quantile(0.025, own, own * (groups - 1));
 	own = fmax(1, own / heavier_than_normal(s));
 	double low = s->share > 0 ? fmin(1, s->low / s->share) : 1,
-	       high = s->share > 0 ? fmax(1, s->high / s->share) : 1;
+	       high = s->share > 0 ? fmax(1, (s->high + s->dark) / s->share) : 1;
 	img->rel_mse_upper *= high * f_quantile(0.95, own, own * (groups - 1));
 	img->rel_mse_95[0] *= low * f_quantile(0.025, own, own * (groups - 1));
 	img->rel_mse_95[1] *= high * f_quantile(0.975, own, own * (groups - 1));

@@ -28,6 +28,7 @@ struct error_sums {
 				   of the variance */
 	double kurtosis;	/* of the groups' values, parts as weights */
 	double tail;		/* index of the groups' relative errors that are too bright; INFINITY: not known */
+	size_t tail_errors;	/* by so many of the largest */
 	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of groups' errors; more groups are folded onto so many */
 	double distance[PLAN_MAX_GROUPS];	 /* a group's error, squared */
 };

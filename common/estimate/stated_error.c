@@ -31,9 +31,9 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	case ERROR_TAIL:
 		text_put(
 			&t,
-			"too few pixels have met the light that decides: the tail index of their errors is %.2f, and below 2 their variance is "
-			"infinite",
-			img->error_tail);
+			"too few pixels have met the light that decides: the tail index of their errors is %.2f, and up to %.2f their variance "
+			"may be infinite",
+			img->error_tail, img->error_tail_least);
 		break;
 	case ERROR_SHORT:
 		text_put(&t, "the chains are too short to be judged");

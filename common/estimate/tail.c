@@ -58,3 +58,11 @@ double tail_index(const struct tail *t, size_t k)
 		sum += log(t->y[i] / t->y[k]);
 	return sum > 0 ? (double)k / sum : INFINITY;
 }
+
+/* The normal law's 95th percentile. */
+static const double one_sided = 1.6449;
+
+double tail_index_least(double index, size_t k)
+{
+	return index * (1 + one_sided / sqrt((double)k));
+}

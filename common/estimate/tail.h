@@ -27,5 +27,8 @@ void tail_add(struct tail *t, double y);
 void tail_settle(struct tail *t);
 /* By the k largest, k < most. 1 where no more than k were added or k is 0; INFINITY where they are all equal. */
 double tail_index(const struct tail *t, size_t k);
+/* What an estimate by the k largest must exceed to rule out a law of this index: one of them in twenty does, for many.
+ * By the estimate's standard error; as its law is skewed, one in eleven at k = 32. INFINITY where k is 0. */
+double tail_index_least(double index, size_t k);
 
 #endif
