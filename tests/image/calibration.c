@@ -5,10 +5,11 @@
  * made with other seeds. Writes the table of README.md to stdout, and ends with 1 where the intervals that were stated
  * hold the true relMSE in less than 90 % of the renders of a length, or in more than 99 % of a hundred or more. The
  * reference's own variance is subtracted from each comparison; a case whose reference has more than a tenth of the
- * renders' relMSE is left out, and said so. SIGTERM ends it after the case that is being measured, with its verdict.
+ * renders' relMSE is left out, and said so. All scenes at the shortest length come first. SIGTERM ends it after the
+ * case that is being measured, with the verdict on what there is.
  *
- *   calibration [RENDERS [LENGTHS [SCENE]]]    20 renders a case, half as many of each next length; 3 lengths; scenes
- * whose names begin with SCENE
+ *   calibration [RENDERS [LENGTHS [SEEDS [SCENE]]]]    20 renders a case, half as many of each next length; 3 lengths;
+ * SEEDS: a word, another for other seeds; scenes whose names begin with SCENE
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
@@ -24,12 +25,18 @@
 #include <cmocka.h>
 
 enum { SIZE = 16, VALUES = SIZE * SIZE * 3, PARTS = 4, INTEGRATORS = 5, LENGTHS = 3, PILOT_SPP = 64 };
+enum { KINDS = 3, SCENES_MOST = 32 };
 
 static const struct {
 	const char *name;
 	uint64_t spp; /* samples or mutations a pixel of the shortest renders */
 } integrators[INTEGRATORS] = {{"path", 128}, {"bdpt8", 128}, {"bdpt", 64}, {"pssmlt", 128}, {"hslt", 128}};
-static const uint64_t lengths[LENGTHS] = {1, 4, 16};
+/* times: its samples over those of the shortest; reference: the part of a scene's seconds that its reference takes. */
+static const struct {
+	uint64_t times;
+	double reference;
+} lengths[LENGTHS] = {{1, 0.25}, {4, 0.25}, {16, 1}};
+static const char *const kinds[KINDS] = {"tree", "public", "made"};
 
 static volatile sig_atomic_t ended;
 
@@ -40,23 +47,26 @@ static void end(int signal)
 }
 
 struct reference {
+	double part;				    /* of the scene's seconds; 0: not made */
 	double rgb[VALUES], variance, floor_square; /* variance: its relMSE */
 };
 
-/* A pilot tells how many samples the scene's seconds buy. */
-static void make_reference(const struct calibration_scene *s, const struct world *w, struct reference *r)
+/* A pilot tells how many samples the seconds buy. */
+static void make_reference(const struct calibration_scene *s, const struct world *w, double part, struct reference *r)
 {
+	if (r->part >= part)
+		return;
 	struct repeats parts;
 	char test[96];
 	snprintf(test, sizeof test, "%s pilot", s->name);
 	struct repeats_how how = {.integrator = s->reference, .test = test, .count = 2, .spp = PILOT_SPP};
 	repeats_run(w, &how, NULL, NULL, &parts);
-	how.spp = (uint64_t)(s->seconds / PARTS * 2 * PILOT_SPP / parts.cpu_seconds) + PILOT_SPP;
+	how.spp = (uint64_t)(part * s->seconds / PARTS * 2 * PILOT_SPP / parts.cpu_seconds) + PILOT_SPP;
 	repeats_free(&parts);
 	snprintf(test, sizeof test, "%s reference", s->name);
 	how.count = PARTS;
 	repeats_run(w, &how, NULL, NULL, &parts);
-	*r = (struct reference){.variance = 0};
+	*r = (struct reference){.part = part};
 	double mean = 0;
 	for (uint32_t p = 0; p < PARTS; p++) {
 		r->variance += parts.images[p].rel_mse / PARTS / PARTS;
@@ -98,16 +108,34 @@ static void look(const struct reference *r, const struct canvas_image *img, stru
 	f->values += VALUES;
 }
 
-/* One row of the table; into `all` where the reference can tell. */
-static void run_case(const struct calibration_scene *s, const struct world *w, const struct reference *r, size_t k,
-		     int length, uint32_t renders, struct figures *all)
+/* What to measure, and what was: all[kind][integrator][length], of cases whose references can tell. */
+struct calibration {
+	uint32_t renders;
+	int last;
+	const char *seeds, *scene;
+	struct reference references[SCENES_MOST];
+	struct figures all[KINDS][INTEGRATORS][LENGTHS];
+};
+
+static int kind_of(const struct calibration_scene *s)
+{
+	int kind = 0;
+	while (strcmp(s->kind, kinds[kind]) != 0)
+		kind++;
+	return kind;
+}
+
+/* One row of the table. */
+static void run_case(struct calibration *c, const struct calibration_scene *s, const struct world *w,
+		     const struct reference *r, size_t k, int length)
 {
 	char test[96];
-	snprintf(test, sizeof test, "stated errors of %s, length %d", s->name, length + 1);
+	snprintf(test, sizeof test, "stated errors of %s, length %d, seeds %s", s->name, length + 1, c->seeds);
+	uint32_t renders = (c->renders >> length) + !(c->renders >> length);
 	struct repeats_how how = {.integrator = integrators[k].name,
 				  .test = test,
 				  .count = renders,
-				  .spp = integrators[k].spp * lengths[length]};
+				  .spp = integrators[k].spp * lengths[length].times};
 	struct repeats run;
 	struct figures f = {0};
 	repeats_run(w, &how, NULL, NULL, &run);
@@ -122,19 +150,31 @@ static void run_case(const struct calibration_scene *s, const struct world *w, c
 	repeats_free(&run);
 	if (!tells)
 		return;
+	struct figures *all = &c->all[kind_of(s)][k][length];
 	all->renders += f.renders;
 	all->stated += f.stated;
 	all->held += f.held;
 }
 
-static void run_scene(const struct calibration_scene *s, const struct world *w, uint32_t renders, int last,
-		      struct figures all[INTEGRATORS][LENGTHS])
+/* All scenes at one length; returns how many were begun. */
+static int run_length(struct calibration *c, int length)
 {
-	static struct reference r;
-	make_reference(s, w, &r);
-	for (size_t k = 0; k < INTEGRATORS; k++)
-		for (int length = 0; length < last && !ended; length++)
-			run_case(s, w, &r, k, length, (renders >> length) + !(renders >> length), &all[k][length]);
+	int scenes = 0;
+	for (size_t i = 0; calibration_scenes[i].name && !ended; i++) {
+		const struct calibration_scene *s = &calibration_scenes[i];
+		if (strncmp(s->name, c->scene, strlen(c->scene)) != 0)
+			continue;
+		struct world *w = calibration_world(s, SIZE, SIZE);
+		if (!w)
+			continue;
+		assert_true(i < SCENES_MOST);
+		make_reference(s, w, lengths[length].reference, &c->references[i]);
+		for (size_t k = 0; k < INTEGRATORS && !ended; k++)
+			run_case(c, s, w, &c->references[i], k, length);
+		world_free(w);
+		scenes++;
+	}
+	return scenes;
 }
 
 static double percent(const struct figures *f)
@@ -142,46 +182,67 @@ static double percent(const struct figures *f)
 	return f->stated ? 100.0 * f->held / f->stated : 100;
 }
 
-/* A length, and its integrators one by one. */
-static bool judge(struct figures all[INTEGRATORS][LENGTHS], int length)
+static void put_figures(const struct figures *f)
+{
+	if (f->stated)
+		printf(" %d of %d (%d) |", f->held, f->stated, f->renders);
+	else
+		printf(" - (%d) |", f->renders);
+}
+
+/* A row: one integrator at one length, scenes of each kind and all. */
+static struct figures judge_integrator(const struct calibration *c, size_t k, int length)
+{
+	struct figures sum = {0};
+	printf("| %d | %s |", length + 1, integrators[k].name);
+	for (int kind = 0; kind < KINDS; kind++) {
+		const struct figures *f = &c->all[kind][k][length];
+		put_figures(f);
+		sum.renders += f->renders;
+		sum.stated += f->stated;
+		sum.held += f->held;
+	}
+	put_figures(&sum);
+	printf(" %.1f |\n", percent(&sum));
+	return sum;
+}
+
+static bool judge(const struct calibration *c, int length)
 {
 	struct figures sum = {0};
 	for (size_t k = 0; k < INTEGRATORS; k++) {
-		sum.renders += all[k][length].renders;
-		sum.stated += all[k][length].stated;
-		sum.held += all[k][length].held;
+		struct figures f = judge_integrator(c, k, length);
+		sum.renders += f.renders;
+		sum.stated += f.stated;
+		sum.held += f.held;
 	}
-	printf("\nLength %d: %d of %d renders state an interval, %d of them (%.1f %%) hold the true relMSE", length + 1,
-	       sum.stated, sum.renders, sum.held, percent(&sum));
-	for (size_t k = 0; k < INTEGRATORS; k++) {
-		const struct figures *f = &all[k][length];
-		printf("%s `%s` %d of %d of %d", k ? ";" : ":", integrators[k].name, f->held, f->stated, f->renders);
-	}
-	printf(".\n");
+	printf("| %d | all | | | |", length + 1);
+	put_figures(&sum);
+	printf(" %.1f |\n", percent(&sum));
 	return percent(&sum) >= 90 && (sum.stated < 100 || percent(&sum) <= 99);
 }
 
 int main(int argc, char **argv)
 {
-	uint32_t renders = argc > 1 && atoi(argv[1]) > 0 ? (uint32_t)atoi(argv[1]) : 20;
-	int last = argc > 2 && atoi(argv[2]) > 0 && atoi(argv[2]) < LENGTHS ? atoi(argv[2]) : LENGTHS, scenes = 0;
-	static struct figures all[INTEGRATORS][LENGTHS];
+	static struct calibration c;
+	c.renders = argc > 1 && atoi(argv[1]) > 0 ? (uint32_t)atoi(argv[1]) : 20;
+	c.last = argc > 2 && atoi(argv[2]) > 0 && atoi(argv[2]) < LENGTHS ? atoi(argv[2]) : LENGTHS;
+	c.seeds = argc > 3 ? argv[3] : "1";
+	c.scene = argc > 4 ? argv[4] : "";
+	int scenes[LENGTHS] = {0};
 	signal(SIGTERM, end);
 	printf("| kind | scene | integrator | a pixel | true %% | stated %% | intervals | held | beyond 3 errors %% | CPU s |\n"
 	       "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
-	for (const struct calibration_scene *s = calibration_scenes; s->name && !ended; s++) {
-		if (argc > 3 && strncmp(s->name, argv[3], strlen(argv[3])) != 0)
-			continue;
-		struct world *w = calibration_world(s, SIZE, SIZE);
-		if (!w)
-			continue;
-		run_scene(s, w, renders, last, all);
-		world_free(w);
-		scenes++;
-	}
-	printf("\n%d scenes%s.\n", scenes, ended ? "; ended by a signal, the last row is of the last scene begun" : "");
+	for (int length = 0; length < c.last; length++)
+		scenes[length] = run_length(&c, length);
+	printf("\nHeld of stated (of rendered), where the reference can tell:\n\n"
+	       "| length | integrator | tree | public | made | all | %% |\n| --- | --- | --- | --- | --- | --- | --- |\n");
 	bool right = true;
-	for (int length = 0; length < last; length++)
-		right &= judge(all, length);
+	for (int length = 0; length < c.last; length++)
+		right &= judge(&c, length);
+	printf("\n");
+	for (int length = 0; length < c.last; length++)
+		printf("Length %d: %d scenes. ", length + 1, scenes[length]);
+	printf("%s\n", ended ? "Ended by a signal: the last scene is not complete." : "");
 	return right ? 0 : 1;
 }
