@@ -87,7 +87,7 @@ static double splat(const struct setting *s, unsigned i)
 
 static struct bsdf_point point_of(const struct setting *s, unsigned i)
 {
-	return (struct bsdf_point){s->u[i][0], s->u[i][1], &s->wl[i], TRANSPORT_RADIANCE};
+	return (struct bsdf_point){{.u = s->u[i][0], .v = s->u[i][1]}, &s->wl[i], TRANSPORT_RADIANCE};
 }
 
 static double bsdf_eval(const struct setting *s, unsigned i)

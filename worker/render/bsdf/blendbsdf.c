@@ -29,7 +29,7 @@ static void find_shares(const struct blend *m, const struct bsdf_point *p, struc
 {
 	double sum = 0;
 	if (!m->is_fixed) {
-		s->f[1] = texture_eval(&m->weight, p->u, p->v, p->w);
+		s->f[1] = texture_eval(&m->weight, &p->where, p->w);
 		for (int i = 0; i < SPECTRUM_LANES; i++)
 			s->f[0].v[i] = 1 - s->f[1].v[i];
 		s->chance[0] = spectrum_mean(s->f[0]);

@@ -65,8 +65,8 @@ void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		 const struct bsdf_build *build, struct error *e)
 {
-	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, build->assets, build->dialect_3,
-				     build->arena, e);
+	const struct texture_build inner = bsdf_texture_build(build);
+	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, &inner, e);
 	if (code)
 		return code;
 	bsdf_add_shape(b, texture_shape(t));

@@ -27,7 +27,7 @@ enum bsdf_mode {
 enum transport { TRANSPORT_RADIANCE, TRANSPORT_IMPORTANCE };
 
 struct bsdf_point {
-	double u, v;
+	struct texture_point where;
 	const struct wavelengths *w;
 	enum transport transport;
 };
@@ -49,6 +49,11 @@ struct bsdf_build {
 	bool dialect_3;
 	double least_roughness; /* rough metal and glass below this is made smooth */
 };
+
+static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)
+{
+	return (struct texture_build){b->assets, b->arena, b->dialect_3};
+}
 
 struct bsdf_ops {
 	const char *type;

@@ -52,8 +52,8 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 	bend->scale = node_float(n, "scale", 1);
 	bend->relief = (struct relief){kind, kind == RELIEF_HEIGHT ? height_at : normal_at, bend,
 				       node_bool(n, "handedness", false)};
-	int code =
-		texture_create(&bend->texture, texture, COLOR_RELIEF, build->assets, build->dialect_3, build->arena, e);
+	const struct texture_build of_texture = bsdf_texture_build(build);
+	int code = texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
 	if (!code)
 		code = bsdf_create(b, inner, build, e);
 	if (!code && b->relief)

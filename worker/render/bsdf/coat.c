@@ -93,7 +93,7 @@ static spectrum coat_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 	double pdf;
 	if (c->rough)
 		f = spectrum_scale(boundary_reflect(&l.boundary, upright(wo), upright(wi), &pdf),
-				   texture_eval(&c->specular, p->u, p->v, p->w));
+				   texture_eval(&c->specular, &p->where, p->w));
 	if (!c->inner.has_smooth || !enter(&l, wo, &o) || !enter(&l, wi, &i))
 		return f;
 	spectrum below = spectrum_mul(c->inner.ops->eval(&c->inner, p, o.inside, i.inside),
@@ -139,7 +139,7 @@ static spectrum coat_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	*wi = (vec3){-wo.x, -wo.y, wo.z};
 	if (!c->rough) {
 		all = first;
-		f = spectrum_scale(1 - transmitted_at(&l, fabs(wo.z)), texture_eval(&c->specular, p->u, p->v, p->w));
+		f = spectrum_scale(1 - transmitted_at(&l, fabs(wo.z)), texture_eval(&c->specular, &p->where, p->w));
 	}
 	if (c->inner.has_delta && enter(&l, wo, &o)) {
 		spectrum below = bsdf_eval_delta(&c->inner, p, o.inside, BSDF_REFLECT, &unused, &one);

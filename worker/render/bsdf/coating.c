@@ -30,7 +30,7 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double escape, double transmitted_o,
 			 double transmitted_i)
 {
-	spectrum rho = texture_eval(&c->diffuse, p->u, p->v, p->w);
+	spectrum rho = texture_eval(&c->diffuse, &p->where, p->w);
 	double common = transmitted_o * transmitted_i / WARP_PI;
 	if (!(common > 0)) /* and perhaps nothing at all is let in: escape is 0 then */
 		return spectrum_of(0);

@@ -29,14 +29,14 @@ static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo,
 			return spectrum_of(0);
 		*wi = (vec3){-wo.x, -wo.y, wo.z};
 		*chance = f->reflected;
-		return spectrum_scale(f->reflected, texture_eval(&g->reflectance, p->u, p->v, p->w));
+		return spectrum_scale(f->reflected, texture_eval(&g->reflectance, &p->where, p->w));
 	}
 	if (!(f->cos_t >= DBL_MIN && f->transmitted > 0))
 		return spectrum_of(0);
 	double scale = p->transport == TRANSPORT_RADIANCE ? 1 / (eta * eta) : 1;
 	*wi = (vec3){-wo.x / eta, -wo.y / eta, -copysign(f->cos_t, wo.z)};
 	*chance = f->transmitted;
-	return spectrum_scale(f->transmitted * scale, texture_eval(&g->transmittance, p->u, p->v, p->w));
+	return spectrum_scale(f->transmitted * scale, texture_eval(&g->transmittance, &p->where, p->w));
 }
 
 static double eta_beyond(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)

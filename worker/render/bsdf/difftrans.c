@@ -13,7 +13,7 @@ static spectrum difftrans_eval(const struct bsdf *b, const struct bsdf_point *p,
 	const struct difftrans *d = b->data;
 	if (!(wo.z * wi.z < 0))
 		return spectrum_of(0);
-	return spectrum_scale(1 / WARP_PI, texture_eval(&d->transmittance, p->u, p->v, p->w));
+	return spectrum_scale(1 / WARP_PI, texture_eval(&d->transmittance, &p->where, p->w));
 }
 
 static double difftrans_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)

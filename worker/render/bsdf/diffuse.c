@@ -7,7 +7,7 @@ static spectrum diffuse_eval(const struct bsdf *b, const struct bsdf_point *p, v
 {
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
-	return spectrum_scale(1 / WARP_PI, texture_eval(b->data, p->u, p->v, p->w));
+	return spectrum_scale(1 / WARP_PI, texture_eval(b->data, &p->where, p->w));
 }
 
 static double diffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)

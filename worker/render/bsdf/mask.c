@@ -13,7 +13,7 @@ struct mask {
 
 static spectrum opacity_at(const struct mask *m, const struct bsdf_point *p)
 {
-	return texture_eval(&m->opacity, p->u, p->v, p->w);
+	return texture_eval(&m->opacity, &p->where, p->w);
 }
 
 static spectrum mask_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)

@@ -90,7 +90,7 @@ static inline spectrum fresnel_lanes(double cosine, spectrum eta, spectrum k, in
 
 spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine)
 {
-	spectrum r = texture_eval(&m->reflectance, p->u, p->v, p->w);
+	spectrum r = texture_eval(&m->reflectance, &p->where, p->w);
 	if (m->perfect)
 		return r;
 	spectrum eta = color_eval(&m->eta, p->w), k = color_eval(&m->k, p->w);

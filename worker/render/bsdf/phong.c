@@ -27,7 +27,7 @@ static spectrum phong_eval(const struct bsdf *b, const struct bsdf_point *p, vec
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
 	double lobe = (ph->exponent + 2) / (2 * WARP_PI) * lobe_of(ph, wo, wi);
-	spectrum d = texture_eval(&ph->diffuse, p->u, p->v, p->w), s = texture_eval(&ph->specular, p->u, p->v, p->w);
+	spectrum d = texture_eval(&ph->diffuse, &p->where, p->w), s = texture_eval(&ph->specular, &p->where, p->w);
 	return spectrum_scale(ph->scale, spectrum_add(spectrum_scale(1 / WARP_PI, d), spectrum_scale(lobe, s)));
 }
 

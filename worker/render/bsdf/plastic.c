@@ -44,7 +44,7 @@ static spectrum plastic_eval_delta(const struct bsdf *b, const struct bsdf_point
 	double reflected = fresnel_at(c, wo).reflected;
 	*wi = (vec3){-wo.x, -wo.y, wo.z};
 	*chance = coating_specular_chance(c, reflected);
-	return spectrum_scale(reflected, texture_eval(&c->specular, p->u, p->v, p->w));
+	return spectrum_scale(reflected, texture_eval(&c->specular, &p->where, p->w));
 }
 
 static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],

@@ -30,7 +30,7 @@ static spectrum tint_of(const struct principled *p, const struct bsdf_point *at,
 	if (WAVELENGTHS_GREY(at->w))
 		return spectrum_of(1);
 	for (int k = 0; k < 2; k++) {
-		spectrum c = texture_eval(&p->base, at->u, at->v, &seen[k]);
+		spectrum c = texture_eval(&p->base, &at->where, &seen[k]);
 		for (int l = 0; l < SPECTRUM_LANES; l++) {
 			sum += weight[k][l] * c.v[l];
 			all += weight[k][l];
@@ -50,13 +50,13 @@ struct microfacet principled_facets(double anisotropic, double roughness)
 /* Textures of roughness and of metallic are grey: their mean over the lanes. */
 static double share_at(const struct texture *t, const struct bsdf_point *at)
 {
-	return fmin(fmax(spectrum_mean(texture_eval(t, at->u, at->v, at->w)), 0), 1);
+	return fmin(fmax(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
 }
 
 struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at)
 {
 	struct stuff s = {.p = p,
-			  .base = texture_eval(&p->base, at->u, at->v, at->w),
+			  .base = texture_eval(&p->base, &at->where, at->w),
 			  .roughness = share_at(&p->roughness, at),
 			  .metallic = share_at(&p->metallic, at)};
 	for (int i = 0; i < SHARES; i++)
@@ -296,7 +296,8 @@ static double range_of(const struct texture *t, bool largest)
 	enum { SIDE = 64 };
 	double least = 1, most = 0;
 	for (int i = 0; i < SIDE * SIDE; i++) {
-		const struct bsdf_point at = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE, .w = &w};
+		const struct bsdf_point at = {.where = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE},
+					      .w = &w};
 		double x = share_at(t, &at);
 		least = fmin(least, x);
 		most = fmax(most, x);

@@ -4,7 +4,7 @@
 /* Textures of roughness are grey: the mean over the lanes. */
 static double alpha_of(const struct texture *t, const struct bsdf_point *p)
 {
-	return t->ops ? spectrum_mean(texture_eval(t, p->u, p->v, p->w)) : t->color.scale;
+	return t->ops ? spectrum_mean(texture_eval(t, &p->where, p->w)) : t->color.scale;
 }
 
 struct microfacet rough_map_look_up(const struct rough_map *r, const struct bsdf_point *p)
@@ -32,7 +32,8 @@ static void find_least(struct rough_map *r)
 	enum { SIDE = 64 };
 	struct microfacet least = {.alpha = INFINITY, .ratio = 1};
 	for (int i = 0; i < SIDE * SIDE; i++) {
-		const struct bsdf_point at = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE, .w = &w};
+		const struct bsdf_point at = {.where = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE},
+					      .w = &w};
 		struct microfacet m = rough_map_look_up(r, &at);
 		if (microfacet_least(&m) < microfacet_least(&least))
 			least = m;

@@ -67,9 +67,9 @@ static spectrum share(const struct roughdielectric *r, const struct bsdf_point *
 		      enum transport transport)
 {
 	if (reflect)
-		return spectrum_scale(f->fresnel.reflected, texture_eval(&r->glass.reflectance, p->u, p->v, p->w));
+		return spectrum_scale(f->fresnel.reflected, texture_eval(&r->glass.reflectance, &p->where, p->w));
 	double scale = transport == TRANSPORT_RADIANCE ? 1 / (f->eta * f->eta) : 1;
-	return spectrum_scale(f->fresnel.transmitted * scale, texture_eval(&r->glass.transmittance, p->u, p->v, p->w));
+	return spectrum_scale(f->fresnel.transmitted * scale, texture_eval(&r->glass.transmittance, &p->where, p->w));
 }
 
 /* G1(wi) / |wi.z| on whichever side. */

@@ -45,7 +45,7 @@ static spectrum roughdiffuse_eval(const struct bsdf *b, const struct bsdf_point 
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
 	factors(r, wo, wi, &once, &twice);
-	spectrum rho = texture_eval(&r->reflectance, p->u, p->v, p->w);
+	spectrum rho = texture_eval(&r->reflectance, &p->where, p->w);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		rho.v[i] = fmax(rho.v[i] * (once + twice * rho.v[i]), 0) / WARP_PI;
 	return rho;

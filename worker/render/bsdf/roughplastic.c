@@ -21,7 +21,7 @@ static spectrum roughplastic_eval(const struct bsdf *b, const struct bsdf_point 
 	double pdf, lobe = boundary_reflect(&at, wo, wi, &pdf);
 	return spectrum_add(coating_diffuse(&r->coating, p, boundary_escape(&at), boundary_transmitted(&at, wo.z),
 					    boundary_transmitted(&at, wi.z)),
-			    spectrum_scale(lobe, texture_eval(&r->coating.specular, p->u, p->v, p->w)));
+			    spectrum_scale(lobe, texture_eval(&r->coating.specular, &p->where, p->w)));
 }
 
 static double specular_chance(const struct roughplastic *r, const struct boundary_point *at, vec3 wo)

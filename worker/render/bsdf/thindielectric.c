@@ -46,7 +46,7 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 		return spectrum_of(0);
 	*wi = (vec3){-wo.x, -wo.y, reflect ? wo.z : -wo.z};
 	*chance = share;
-	return spectrum_scale(share, texture_eval(reflect ? &t->reflectance : &t->transmittance, p->u, p->v, p->w));
+	return spectrum_scale(share, texture_eval(reflect ? &t->reflectance : &t->transmittance, &p->where, p->w));
 }
 
 static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],

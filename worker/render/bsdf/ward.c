@@ -65,7 +65,7 @@ static spectrum ward_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
 	struct microfacet m = rough_map_at(&w->roughness, p);
-	spectrum d = texture_eval(&w->diffuse, p->u, p->v, p->w), s = texture_eval(&w->specular, p->u, p->v, p->w);
+	spectrum d = texture_eval(&w->diffuse, &p->where, p->w), s = texture_eval(&w->specular, &p->where, p->w);
 	return spectrum_scale(w->scale,
 			      spectrum_add(spectrum_scale(1 / WARP_PI, d), spectrum_scale(lobe_of(w, &m, wo, wi), s)));
 }

@@ -53,8 +53,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (!a)
 		return error_set(e, ENOMEM, "out of memory");
 	a->surface = *build->surface;
-	int rc = texture_from_node(&a->radiance, n, "radiance", 1, COLOR_ILLUMINANT, build->assets, build->dialect_3,
-				   build->arena, e);
+	int rc = emitter_texture(&a->radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (rc)
 		return rc;
 	if (a->surface.is_sphere)
@@ -76,15 +75,15 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 	const struct area *a = em->data;
 	if (!(vec3_dot(x->n, w) > 0))
 		return spectrum_of(0);
-	return texture_eval(&a->radiance, x->u, x->v, wl);
+	return texture_eval(&a->radiance, &x->where, wl);
 }
 
 static void sphere_point(const struct area *a, vec3 w, struct emitter_point *x)
 {
 	x->p = vec3_madd(a->surface.center, a->surface.radius, w);
 	x->n = vec3_scale(a->surface.normal_sign, w);
-	sphere_uv(&a->surface.sphere_axes, w, &x->u, &x->v);
-	x->prim = 0;
+	x->where = (struct texture_point){0};
+	sphere_uv(&a->surface.sphere_axes, w, &x->where.u, &x->where.v);
 }
 
 static void triangle_point(const struct area *a, uint32_t i, double b1, double b2, struct emitter_point *x)
@@ -93,14 +92,12 @@ static void triangle_point(const struct area *a, uint32_t i, double b1, double b
 	vec3 v0 = corner(s, i, 0), e1 = vec3_sub(corner(s, i, 1), v0), e2 = vec3_sub(corner(s, i, 2), v0);
 	x->p = vec3_madd(vec3_madd(v0, b1, e1), b2, e2);
 	x->n = vec3_normalize(vec3_cross(e1, e2));
-	x->prim = i;
-	x->u = b1;
-	x->v = b2;
+	x->where = (struct texture_point){b1, b2, b1, b2, i};
 	if (s->uv) {
 		const float *t0 = s->uv[s->index[i][0]], *t1 = s->uv[s->index[i][1]], *t2 = s->uv[s->index[i][2]];
 		double b0 = 1 - b1 - b2;
-		x->u = b0 * (double)t0[0] + b1 * (double)t1[0] + b2 * (double)t2[0];
-		x->v = b0 * (double)t0[1] + b1 * (double)t1[1] + b2 * (double)t2[1];
+		x->where.u = b0 * (double)t0[0] + b1 * (double)t1[0] + b2 * (double)t2[0];
+		x->where.v = b0 * (double)t0[1] + b1 * (double)t1[1] + b2 * (double)t2[1];
 	}
 }
 
@@ -143,11 +140,11 @@ static double below_1(double x)
 static void triangle_inverse(const struct area *a, const struct emitter_point *x, double u[2])
 {
 	const struct emitter_surface *s = &a->surface;
-	vec3 v0 = corner(s, x->prim, 0), e1 = vec3_sub(corner(s, x->prim, 1), v0),
-	     e2 = vec3_sub(corner(s, x->prim, 2), v0);
+	vec3 v0 = corner(s, x->where.prim, 0), e1 = vec3_sub(corner(s, x->where.prim, 1), v0),
+	     e2 = vec3_sub(corner(s, x->where.prim, 2), v0);
 	vec3 r = vec3_sub(x->p, v0), n = vec3_cross(e1, e2);
 	double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(r, e2), n) / n2, b2 = vec3_dot(vec3_cross(e1, r), n) / n2;
-	double root = fmin(fmax(1 - b1, 0), 1), low = a->cdf[x->prim], high = a->cdf[x->prim + 1];
+	double root = fmin(fmax(1 - b1, 0), 1), low = a->cdf[x->where.prim], high = a->cdf[x->where.prim + 1];
 	/* It must stay the same triangle. */
 	u[0] = fmax(fmin(low + root * root * (high - low), nextafter(high, 0)), low);
 	u[1] = root > 0 ? below_1(b2 / root) : 0;

@@ -51,8 +51,7 @@ static int constant_create(struct emitter *em, const struct scene_node *n, const
 			   struct error *e)
 {
 	struct texture radiance;
-	int code = texture_from_node(&radiance, n, "radiance", 1, COLOR_ILLUMINANT, build->assets, build->dialect_3,
-				     build->arena, e);
+	int code = emitter_texture(&radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (code)
 		return code;
 	struct color *c = arena_alloc(build->arena, 1, sizeof *c);

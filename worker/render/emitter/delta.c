@@ -5,8 +5,7 @@ int delta_create(struct emitter *em, struct delta_light *l, const struct scene_n
 		 const struct emitter_build *build, struct error *e)
 {
 	struct texture t;
-	int code =
-		texture_from_node(&t, n, name, 1, COLOR_ILLUMINANT, build->assets, build->dialect_3, build->arena, e);
+	int code = emitter_texture(&t, n, name, COLOR_ILLUMINANT, build, e);
 	if (!code)
 		code = delta_place(em, l, n, factor, e);
 	if (code)

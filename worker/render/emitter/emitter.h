@@ -16,10 +16,9 @@
 #include "worker/render/texture/texture.h"
 
 struct emitter_point {
-	vec3 p;	       /* position, or direction towards the emitter when infinite */
-	vec3 n;	       /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
-	double u, v;   /* texture coordinates */
-	uint32_t prim; /* triangle of the surface; 0 on a sphere; unused when infinite */
+	vec3 p;			    /* position, or direction towards the emitter when infinite */
+	vec3 n;			    /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
+	struct texture_point where; /* on the surface; unused when infinite */
 	bool infinite;
 };
 
@@ -86,6 +85,10 @@ struct emitter {
 bool emitter_needs_surface(const struct scene_node *n);
 
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
+
+/* Property `name` of an emitter: a colour or a texture; 1 where it is absent. */
+int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
+		    const struct emitter_build *build, struct error *e);
 
 extern const struct emitter_ops *const emitter_registry[]; /* ends with NULL */
 

@@ -42,7 +42,8 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 	double uv[2], c;
 	if (!find(p, w, uv, &c))
 		return spectrum_of(0);
-	return spectrum_scale(M_PI * p->light.factor / (c * c * c), texture_eval(&p->irradiance, uv[0], uv[1], wl));
+	const struct texture_point at = {.u = uv[0], .v = uv[1]};
+	return spectrum_scale(M_PI * p->light.factor / (c * c * c), texture_eval(&p->irradiance, &at, wl));
 }
 
 static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
@@ -80,8 +81,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (!code)
 		code = fov_read(n, &degrees, axis, e);
 	if (!code)
-		code = texture_from_node(&p->irradiance, n, "irradiance", 1, COLOR_ILLUMINANT, build->assets,
-					 build->dialect_3, build->arena, e);
+		code = emitter_texture(&p->irradiance, n, "irradiance", COLOR_ILLUMINANT, build, e);
 	if (!code)
 		code = delta_place(em, &p->light, n, scale * build->scale * build->scale, e);
 	if (code)

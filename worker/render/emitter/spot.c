@@ -36,8 +36,9 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 	if (!s->textured || !(part > 0))
 		return intensity;
 	double z = 2 * s->reach * vec3_dot(s->local[2], w);
-	return spectrum_mul(intensity, texture_eval(&s->texture, 0.5 + vec3_dot(s->local[0], w) / z,
-						    0.5 + vec3_dot(s->local[1], w) / z, wl));
+	const struct texture_point at = {.u = 0.5 + vec3_dot(s->local[0], w) / z,
+					 .v = 0.5 + vec3_dot(s->local[1], w) / z};
+	return spectrum_mul(intensity, texture_eval(&s->texture, &at, wl));
 }
 
 static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
@@ -66,8 +67,7 @@ static int read_texture(struct emitter *em, struct spot *s, const struct scene_n
 		return 0;
 	if (s->cutoff > 89 * (M_PI / 180))
 		return node_error(n, e, EINVAL, "a texture needs a cutoff_angle of at most 89 degrees");
-	int code = texture_from_node(&s->texture, n, "texture", 1, COLOR_REFLECTANCE, build->assets, build->dialect_3,
-				     build->arena, e);
+	int code = emitter_texture(&s->texture, n, "texture", COLOR_REFLECTANCE, build, e);
 	if (!code)
 		code = delta_axes(n, to_world, s->local, e);
 	if (code)

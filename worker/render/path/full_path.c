@@ -85,7 +85,7 @@ double full_path_eta(const struct full_path_path *x, unsigned j)
 spectrum full_path_specular(const struct full_path_path *x, unsigned j, vec3 *wi, double *chance)
 {
 	const struct path_vertex *v = &x->v[j];
-	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_RADIANCE);
 	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, chance);
 }
 
@@ -99,7 +99,7 @@ static spectrum scatter(const struct full_path_path *x, unsigned j, bool halfvec
 		double chance;
 		return full_path_specular(x, j, &wi, &chance);
 	}
-	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_RADIANCE);
 	vec3 wo = frame_to_local(&v->x.sh, x->edge[j].w);
 	wi = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w));
 	return halfvec ? bsdf_eval_halfvec(v->bsdf, &p, wo, wi) : v->bsdf->ops->eval(v->bsdf, &p, wo, wi);

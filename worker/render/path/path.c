@@ -63,7 +63,7 @@ static bool same_side(const struct surface_point *x, vec3 w)
 static struct bsdf_point bsdf_point_of(const struct path_context *c, const struct path_vertex *v,
 				       enum transport transport)
 {
-	return (struct bsdf_point){v->x.u, v->x.v, &c->wl, transport};
+	return world_bsdf_point(&v->x, &c->wl, transport);
 }
 
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light)
@@ -96,9 +96,11 @@ struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, c
 	uint32_t shape = w->emitter_shape[emitter];
 	v.x.p = p->p;
 	v.x.ng = v.x.sh.n = p->n;
-	v.x.u = p->u;
-	v.x.v = p->v;
-	v.x.prim = shape == UINT32_MAX ? PRIM_NONE : (struct prim_ref){shape, p->prim};
+	v.x.u = p->where.u;
+	v.x.v = p->where.v;
+	v.x.b1 = p->where.b1;
+	v.x.b2 = p->where.b2;
+	v.x.prim = shape == UINT32_MAX ? PRIM_NONE : (struct prim_ref){shape, p->where.prim};
 	return v;
 }
 

@@ -50,10 +50,9 @@ static double upper_bound(const struct bitmap *b)
 }
 
 static int bitmap_create(struct texture *t, const struct scene_node *n, enum color_role role,
-			 const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+			 const struct texture_build *build, struct error *e)
 {
-	(void)dialect_3;
-	struct bitmap *b = arena_alloc(arena, 1, sizeof *b);
+	struct bitmap *b = arena_alloc(build->arena, 1, sizeof *b);
 	if (!b)
 		return node_error(n, e, ENOMEM, "out of memory");
 	t->data = b;
@@ -61,7 +60,7 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 		return node_error(n, e, ENOTSUP, "a bitmap cannot stand for this quantity");
 	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
 					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT};
-	int code = raster_read(&b->raster, n, assets, &range, arena, e);
+	int code = raster_read(&b->raster, n, build->assets, &range, build->arena, e);
 	if (code)
 		return code;
 	const char *both = node_string(n, "wrap_mode", "repeat");
@@ -79,10 +78,10 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	return 0;
 }
 
-static spectrum bitmap_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
+static spectrum bitmap_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
 {
 	const struct bitmap *b = t->data;
-	double rgb[3];
+	double rgb[3], u = at->u, v = at->v;
 	uv_map_apply(&b->map, &u, &v);
 	raster_eval(&b->raster, u, v, rgb);
 	return b->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);

@@ -9,15 +9,15 @@ struct checkerboard {
 };
 
 static int checkerboard_create(struct texture *t, const struct scene_node *n, enum color_role role,
-			       const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+			       const struct texture_build *build, struct error *e)
 {
-	struct checkerboard *c = arena_alloc(arena, 1, sizeof *c);
+	struct checkerboard *c = arena_alloc(build->arena, 1, sizeof *c);
 	if (!c)
 		return node_error(n, e, ENOMEM, "out of memory");
 	t->data = c;
 	c->map = uv_map_read(n);
-	int code = texture_from_node(&c->color[0], n, "color0", 0.4, role, assets, dialect_3, arena, e);
-	return code ? code : texture_from_node(&c->color[1], n, "color1", 0.2, role, assets, dialect_3, arena, e);
+	int code = texture_from_node(&c->color[0], n, "color0", 0.4, role, build, e);
+	return code ? code : texture_from_node(&c->color[1], n, "color1", 0.2, role, build, e);
 }
 
 static const struct texture *square_at(const struct checkerboard *c, double u, double v)
@@ -27,9 +27,9 @@ static const struct texture *square_at(const struct checkerboard *c, double u, d
 	return &c->color[right != low];
 }
 
-static spectrum checkerboard_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
+static spectrum checkerboard_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
 {
-	return texture_eval(square_at(t->data, u, v), u, v, w);
+	return texture_eval(square_at(t->data, at->u, at->v), at, w);
 }
 
 static double checkerboard_height(const struct texture *t, double u, double v)

@@ -27,9 +27,9 @@ static int read_tint(struct scale *s, const struct scene_node *n, const struct p
 }
 
 static int scale_create(struct texture *t, const struct scene_node *n, enum color_role role,
-			const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+			const struct texture_build *build, struct error *e)
 {
-	struct scale *s = arena_alloc(arena, 1, sizeof *s);
+	struct scale *s = arena_alloc(build->arena, 1, sizeof *s);
 	if (!s)
 		return node_error(n, e, ENOMEM, "out of memory");
 	t->data = s;
@@ -45,13 +45,13 @@ static int scale_create(struct texture *t, const struct scene_node *n, enum colo
 		return node_error(n, e, EINVAL, "needs a texture inside");
 	if (s->factor < 0 && !color_role_is_number(role))
 		return node_error(n, e, ERANGE, "scale=%g makes negative colours", s->factor);
-	return texture_create(&s->inner, inner, role, assets, dialect_3, arena, e);
+	return texture_create(&s->inner, inner, role, build, e);
 }
 
-static spectrum scale_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
+static spectrum scale_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
 {
 	const struct scale *s = t->data;
-	spectrum x = spectrum_scale(s->factor, texture_eval(&s->inner, u, v, w));
+	spectrum x = spectrum_scale(s->factor, texture_eval(&s->inner, at, w));
 	if (s->tinted)
 		x = spectrum_mul(x, color_eval(&s->tint, w));
 	for (int i = 0; s->role == COLOR_REFLECTANCE && i < SPECTRUM_LANES; i++)

@@ -15,12 +15,12 @@ const struct texture_ops *const texture_registry[] = {
 };
 
 int texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
-		   const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+		   const struct texture_build *build, struct error *e)
 {
 	for (const struct texture_ops *const *ops = texture_registry; *ops; ops++)
 		if (n->cls == PLUGIN_TEXTURE && strcmp((*ops)->type, n->type) == 0) {
 			*t = (struct texture){.ops = *ops};
-			return (*ops)->create(t, n, role, assets, dialect_3, arena, e);
+			return (*ops)->create(t, n, role, build, e);
 		}
 	return node_error(n, e, ENOTSUP, "\"%s\" is no texture that is supported", n->type);
 }
@@ -38,19 +38,18 @@ static int height_from_value(struct texture *t, const struct scene_node *n, cons
 }
 
 int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		      enum color_role role, const struct asset_source *assets, bool dialect_3, struct arena *arena,
-		      struct error *e)
+		      enum color_role role, const struct texture_build *build, struct error *e)
 {
 	const struct value absent = {.type = VALUE_FLOAT, .as.number = fallback};
 	const struct property *p = node_find(n, name);
 	const struct value *v = p ? &p->value : &absent;
 	*t = (struct texture){.ops = NULL};
 	if (v->type == VALUE_NODE)
-		return texture_create(t, v->as.node, role, assets, dialect_3, arena, e);
+		return texture_create(t, v->as.node, role, build, e);
 	if (color_role_is_number(role))
 		return height_from_value(t, n, name, v, e);
 	struct error reason;
-	int code = color_from_value(v, role, arena, &t->color, &reason);
+	int code = color_from_value(v, role, build->arena, &t->color, &reason);
 	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
 }
 

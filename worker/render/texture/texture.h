@@ -11,6 +11,20 @@
 
 struct texture;
 
+/* Where on a surface a texture is looked up. */
+struct texture_point {
+	double u, v;   /* texture coordinates */
+	double b1, b2; /* barycentrics on the triangle `prim`; 0 on a sphere and where there is no surface */
+	uint32_t prim;
+};
+
+/* What making a texture needs. */
+struct texture_build {
+	const struct asset_source *assets;
+	struct arena *arena;
+	bool dialect_3;
+};
+
 /* Three numbers as a function of (u,v), with their first and second derivatives. */
 struct texture_jet {
 	double x[3], du[3], dv[3], duu[3], duv[3], dvv[3];
@@ -22,8 +36,8 @@ struct texture_ops {
 	const struct param *params;
 	unsigned nested_classes;
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
-		      const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e);
-	spectrum (*eval)(const struct texture *t, double u, double v, const struct wavelengths *w);
+		      const struct texture_build *build, struct error *e);
+	spectrum (*eval)(const struct texture *t, const struct texture_point *at, const struct wavelengths *w);
 	double (*height)(const struct texture *t, double u, double v); /* one made as COLOR_HEIGHT has nothing else */
 	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* the same of COLOR_RELIEF */
 	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
@@ -39,16 +53,16 @@ struct texture {
 
 /* Property `name` of node n: a colour or a nested texture; `fallback` where it is absent. */
 int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		      enum color_role role, const struct asset_source *assets, bool dialect_3, struct arena *arena,
-		      struct error *e);
+		      enum color_role role, const struct texture_build *build, struct error *e);
 
 /* The texture that node n itself is. */
 int texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
-		   const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e);
+		   const struct texture_build *build, struct error *e);
 
-static inline spectrum texture_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
+static inline spectrum texture_eval(const struct texture *t, const struct texture_point *at,
+				    const struct wavelengths *w)
 {
-	return t->ops ? t->ops->eval(t, u, v, w) : color_eval(&t->color, w);
+	return t->ops ? t->ops->eval(t, at, w) : color_eval(&t->color, w);
 }
 
 static inline double texture_height(const struct texture *t, double u, double v)

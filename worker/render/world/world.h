@@ -56,7 +56,14 @@ int32_t world_pick_emitter(const struct world *w, double u);
 /* A hit on a shape as a point of its emitter. */
 static inline struct emitter_point world_emitter_point(const struct surface_point *x)
 {
-	return (struct emitter_point){x->p, x->ng, x->u, x->v, x->prim.prim, false};
+	return (struct emitter_point){x->p, x->ng, {x->u, x->v, x->b1, x->b2, x->prim.prim}, false};
+}
+
+/* The same as a point of its BSDF. */
+static inline struct bsdf_point world_bsdf_point(const struct surface_point *x, const struct wavelengths *w,
+						 enum transport transport)
+{
+	return (struct bsdf_point){{x->u, x->v, x->b1, x->b2, x->prim.prim}, w, transport};
 }
 
 #endif

@@ -9,7 +9,8 @@
 #define PI 3.14159265358979323846
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
-static const struct bsdf_point point = {.u = 0.3, .v = 0.7, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+static const struct bsdf_point point = {
+	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
 static vec3 direction(double z)
 {
@@ -222,8 +223,8 @@ static void test_textured_coatings(void **state)
 			snprintf(text, sizeof text, "%s@alpha checkerboard color0=%g color1=%g", kind[k], rough[place],
 				 rough[place]);
 			bsdf_make(&a, text, &number);
-			p.u = place ? 0.75 : 0.25; /* color1 where u and v differ in their halves */
-			p.v = 0.25;
+			p.where.u = place ? 0.75 : 0.25; /* color1 where u and v differ in their halves */
+			p.where.v = 0.25;
 			assert_true(map.textured && map.alpha == 0.05);
 			double m = map.ops->eval(&map, &p, wo, wi).v[0], n = number.ops->eval(&number, &p, wo, wi).v[0];
 			if (fabs(m / n - 1) > 1e-9)

@@ -77,8 +77,7 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 		bsdf_make(&a, case_text(k), &b);
 		for (int i = 0; i < 2000; i++) {
 			vec3 wo = any_direction(&d, i);
-			struct bsdf_point p = {.u = 0.3,
-					       .v = 0.7,
+			struct bsdf_point p = {.where = {.u = 0.3, .v = 0.7},
 					       .w = &wavelengths,
 					       .transport = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
 			double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};

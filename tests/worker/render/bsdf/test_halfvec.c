@@ -13,7 +13,8 @@
 #define PI 3.14159265358979323846L
 
 static const struct wavelengths wavelengths = {.nm = {550, 500, 600, 700}};
-static const struct bsdf_point point = {.u = 0.3, .v = 0.7, .w = &wavelengths, .transport = TRANSPORT_IMPORTANCE};
+static const struct bsdf_point point = {
+	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_IMPORTANCE};
 
 typedef struct {
 	long double x, y, z;

@@ -15,7 +15,8 @@
 enum { DIRECTIONS = 16, SAMPLES = 20000, POLAR = 24, AZIMUTH = 16, CELLS = 2 * POLAR * AZIMUTH };
 
 static const struct wavelengths wavelengths = {.nm = {400, 500, 600, 700}};
-static const struct bsdf_point point = {.u = 0.3, .v = 0.7, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+static const struct bsdf_point point = {
+	.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
 
 /* From straight on to 1 degree above the plane; half of them from below where light can come from there. */
 static vec3 direction(int i, bool two_sided)

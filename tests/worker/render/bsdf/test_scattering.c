@@ -10,7 +10,7 @@ static const struct wavelengths wavelengths = {.nm = {550, 500, 600, 700}};
 
 static struct bsdf_point point_of(enum transport t)
 {
-	return (struct bsdf_point){.u = 0.3, .v = 0.7, .w = &wavelengths, .transport = t};
+	return (struct bsdf_point){.where = {.u = 0.3, .v = 0.7}, .w = &wavelengths, .transport = t};
 }
 
 static vec3 uniform_direction(double u0, double u1)
@@ -379,15 +379,15 @@ static void test_textured_roughness(void **state)
 		bsdf_make(&a, same[k][0], &number);
 		bsdf_make(&a, same[k][1], &map);
 		struct bsdf_point p = point_of(TRANSPORT_RADIANCE);
-		p.u = 0.75;
-		p.v = 0.25;
+		p.where.u = 0.75;
+		p.where.v = 0.25;
 		assert_true(map.textured && !number.textured);
 		assert_near(map.ops->eval(&map, &p, wo, wi).v[0], number.ops->eval(&number, &p, wo, wi).v[0], 1e-12,
 			    same[k][0]);
 		assert_near(map.ops->pdf_solid(&map, &p, wo, wi), number.ops->pdf_solid(&number, &p, wo, wi), 1e-12,
 			    same[k][0]);
 		if (k == 1) {
-			p.u = 0.25;
+			p.where.u = 0.25;
 			assert_true(
 				fabs(map.ops->pdf_solid(&map, &p, wo, wi) / number.ops->pdf_solid(&number, &p, wo, wi) -
 				     1) > 0.1);

@@ -292,10 +292,10 @@ static void test_mesh(void **state)
 		struct emitter_point x;
 		assert_true((i % 2 ? em->ops->sample_point(em, u, &x, &pdf)
 				   : em->ops->sample_toward(em, (vec3){0, 0, 1}, u, &x, &pdf)));
-		assert_true(x.prim < 3);
+		assert_true(x.where.prim < 3);
 		assert_true(fabs(pdf * total - 1) < 1e-12 && fabs(em->ops->pdf_point(em, &x) * total - 1) < 1e-12);
 		assert_true(em->ops->pdf_toward(em, (vec3){0, 0, 1}, &x) == pdf);
-		vec3 *c = corner[x.prim], normal = vec3_cross(vec3_sub(c[1], c[0]), vec3_sub(c[2], c[0]));
+		vec3 *c = corner[x.where.prim], normal = vec3_cross(vec3_sub(c[1], c[0]), vec3_sub(c[2], c[0]));
 		double l2 = vec3_dot(normal, normal), b[3];
 		assert_true(fabs(vec3_dot(vec3_sub(x.p, c[0]), normal)) < 1e-12 * sqrt(l2));
 		assert_true(vec3_length(vec3_sub(x.n, vec3_scale(1 / sqrt(l2), normal))) < 1e-12);
@@ -305,7 +305,7 @@ static void test_mesh(void **state)
 			       l2;
 			assert_true(b[k] > -1e-9);
 		}
-		counts[4 * x.prim + (b[0] > 0.5 ? 0 : b[1] > 0.5 ? 1 : b[2] > 0.5 ? 2 : 3)]++;
+		counts[4 * x.where.prim + (b[0] > 0.5 ? 0 : b[1] > 0.5 ? 1 : b[2] > 0.5 ? 2 : 3)]++;
 	}
 	for (int i = 0; i < 12; i++)
 		expected[i] = (double)n * area[i / 4] / (4 * total);
@@ -359,7 +359,7 @@ static void test_texture_coordinates(void **state)
 		for (int k = 0; k < 2; k++) {
 			surface_on_sphere(s, (struct prim_ref){0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)),
 					  &there);
-			assert_true(fabs(there.u - x[k].u) < 1e-9 && fabs(there.v - x[k].v) < 1e-9);
+			assert_true(fabs(there.u - x[k].where.u) < 1e-9 && fabs(there.v - x[k].where.v) < 1e-9);
 		}
 	}
 	world_free(w);

@@ -29,7 +29,7 @@ static double slope(const struct emitter *em, const double u[2], double pdf, dou
 				     draw(em, u[0], u[1] + h)};
 	/* Not across the borders of triangles or cells. */
 	for (int i = 0; i < 4; i++)
-		if (a[i].prim != a[0].prim || fabs(em->ops->pdf_point(em, &a[i]) / pdf - 1) > 1e-9)
+		if (a[i].where.prim != a[0].where.prim || fabs(em->ops->pdf_point(em, &a[i]) / pdf - 1) > 1e-9)
 			return NAN;
 	vec3 d0 = vec3_sub(a[1].p, a[0].p), d1 = vec3_sub(a[3].p, a[2].p);
 	return vec3_length(vec3_cross(d0, d1)) / (4 * h * h);
@@ -48,7 +48,7 @@ static void check(const char *name, const struct emitter *em, double share)
 		em->ops->point_inverse(em, &x, back);
 		assert_true(back[0] >= 0 && back[0] < 1 && back[1] >= 0 && back[1] < 1);
 		y = draw(em, back[0], back[1]);
-		assert_true(y.infinite == x.infinite && (x.infinite || y.prim == x.prim));
+		assert_true(y.infinite == x.infinite && (x.infinite || y.where.prim == x.where.prim));
 		worst = fmax(worst, vec3_length(vec3_sub(x.p, y.p)));
 		if (fabs(u[0] - 0.5) > 0.499 || fabs(u[1] - 0.5) > 0.499)
 			continue;

@@ -75,7 +75,7 @@ static struct bsdf_sample specular_lobe(const struct path_context *c, const stru
 					const struct path_vertex *at, const struct path_vertex *to,
 					enum transport transport)
 {
-	struct bsdf_point p = {at->x.u, at->x.v, &c->wl, transport};
+	struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, transport);
 	vec3 wo = frame_to_local(&at->x.sh, towards(at, from)), wi = frame_to_local(&at->x.sh, towards(at, to));
 	for (int i = 0; i < 2; i++) {
 		double u[3] = {0.5, 0.5, i ? 1 - 0x1p-53 : 0};
@@ -96,7 +96,7 @@ static double scattered(const struct path_context *c, const struct path_vertex *
 {
 	vec3 wo = frame_to_local(&at->x.sh, towards(at, from)), wi = frame_to_local(&at->x.sh, towards(at, to));
 	if (!delta) {
-		struct bsdf_point p = {at->x.u, at->x.v, &c->wl, transport};
+		struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, transport);
 		return at->bsdf->ops->pdf_solid(at->bsdf, &p, wo, wi) * per_area(at, to);
 	}
 	double density = specular_lobe(c, from, at, to, transport).pdf * per_area(at, to);
@@ -214,7 +214,7 @@ static double scatter(const struct path_context *c, const struct path_vertex *ca
 		struct bsdf_sample s = specular_lobe(c, camera, at, light, TRANSPORT_RADIANCE);
 		return s.f.v[0] * fabs(s.wi.z);
 	}
-	struct bsdf_point p = {at->x.u, at->x.v, &c->wl, TRANSPORT_RADIANCE};
+	struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, TRANSPORT_RADIANCE);
 	vec3 wo = towards(at, camera), wi = towards(at, light);
 	spectrum f = at->bsdf->ops->eval(at->bsdf, &p, frame_to_local(&at->x.sh, wo), frame_to_local(&at->x.sh, wi));
 	return f.v[0] * fabs(vec3_dot(at->x.sh.n, wi) / vec3_dot(at->x.ng, wi));

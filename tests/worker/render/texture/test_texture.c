@@ -19,6 +19,7 @@ struct fixture {
 	struct arena arena;
 	struct pictures pictures;
 	struct asset_source source;
+	struct texture_build build;
 };
 
 /* Picture 0 is 3 x 2, grey: 0 .25 .5 / .75 1 .125. Picture 1 is 2 x 1: red, white. Picture 2 is bright grey. */
@@ -34,6 +35,7 @@ static int setup(void **state)
 	pictures_add(&f.pictures, 2, 1, (double[]){0.5, 0.125, 0.0625, 0.5, 0.5, 0.5});
 	pictures_add(&f.pictures, 1, 1, bright);
 	f.source = pictures_source(&f.pictures);
+	f.build = (struct texture_build){&f.source, &f.arena, true};
 	*state = &f;
 	return 0;
 }
@@ -50,7 +52,7 @@ static int try(struct fixture *f, const char *text, enum color_role role, struct
 {
 	struct scene_node *owner = node_make(&f->arena, PLUGIN_BSDF, "owner");
 	node_add_ref(&f->arena, owner, "reflectance", node_make(&f->arena, PLUGIN_TEXTURE, text));
-	return texture_from_node(t, owner, "reflectance", 0.5, role, &f->source, true, &f->arena, e);
+	return texture_from_node(t, owner, "reflectance", 0.5, role, &f->build, e);
 }
 
 static struct texture make(struct fixture *f, const char *text, enum color_role role)
@@ -62,9 +64,15 @@ static struct texture make(struct fixture *f, const char *text, enum color_role 
 	return t;
 }
 
+static spectrum look_up(const struct texture *t, double u, double v, const struct wavelengths *w)
+{
+	const struct texture_point at = {.u = u, .v = v};
+	return texture_eval(t, &at, w);
+}
+
 static void assert_value(const struct texture *t, double u, double v, double expected)
 {
-	double x = texture_eval(t, u, v, &grey).v[0];
+	double x = look_up(t, u, v, &grey).v[0];
 	if (fabs(x - expected) > 1e-12)
 		fail_msg("(%g, %g): %.15g is not %g", u, v, x, expected);
 }
@@ -86,7 +94,7 @@ static void test_orientation_and_pixel_centres(void **state)
 	assert_value(&t, 0, 0.25, 0.25);
 	assert_value(&t, 0.5 / 3, 0, 0.375);
 	assert_value(&t, 7 + 1.5 / 3, -4.75, 0.25);
-	assert_value(&t, 1e300, 0.25, texture_eval(&t, 0, 0.25, &grey).v[0]);
+	assert_value(&t, 1e300, 0.25, look_up(&t, 0, 0.25, &grey).v[0]);
 }
 
 static void test_wrapping(void **state)
@@ -126,8 +134,7 @@ static void test_uv_maps(void **state)
 	struct error e;
 	node_add_transform(&f->arena, n, "to_uv", quarter);
 	node_add_ref(&f->arena, owner, "reflectance", n);
-	assert_int_equal(
-		texture_from_node(&t, owner, "reflectance", 0, COLOR_REFLECTANCE, &f->source, true, &f->arena, &e), 0);
+	assert_int_equal(texture_from_node(&t, owner, "reflectance", 0, COLOR_REFLECTANCE, &f->build, &e), 0);
 	assert_value(&t, 0, 1.5 / 3, 0.25);
 }
 
@@ -136,7 +143,7 @@ static void test_colours(void **state)
 	struct texture t = make(*state, "bitmap filename=p1", COLOR_REFLECTANCE);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
 	const double red[3] = {0.5, 0.125, 0.0625};
-	spectrum s = texture_eval(&t, 0.25, 0.5, &colour), expected = color_eval_rgb_reflectance(red, &colour);
+	spectrum s = look_up(&t, 0.25, 0.5, &colour), expected = color_eval_rgb_reflectance(red, &colour);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		assert_true(s.v[i] == expected.v[i]);
 		assert_true(s.v[i] <= texture_max(&t));
@@ -147,7 +154,7 @@ static void test_colours(void **state)
 	assert_value(&t, 0.5, 0.5, 1);
 	t = make(*state, "bitmap filename=p2", COLOR_ILLUMINANT);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_D65);
-	s = texture_eval(&t, 0.5, 0.5, &colour);
+	s = look_up(&t, 0.5, 0.5, &colour);
 	assert_true(fabs(s.v[1] - 4 * color_d65(550)) < 1e-12);
 	assert_value(&t, 0.5, 0.5, 4);
 	assert_true(texture_max(&t) >= spectrum_max(s));
@@ -175,11 +182,11 @@ static void test_plain_values_and_fallback(void **state)
 	struct scene_node *n = node_make(&f->arena, PLUGIN_BSDF, "owner reflectance=0.25");
 	struct texture t;
 	struct error e;
-	assert_int_equal(texture_from_node(&t, n, "reflectance", 0.5, COLOR_REFLECTANCE, NULL, true, &f->arena, &e), 0);
+	assert_int_equal(texture_from_node(&t, n, "reflectance", 0.5, COLOR_REFLECTANCE, &f->build, &e), 0);
 	assert_true(texture_is_constant(&t) && texture_max(&t) == 0.25);
-	assert_int_equal(texture_from_node(&t, n, "absent", 0.5, COLOR_REFLECTANCE, NULL, true, &f->arena, &e), 0);
+	assert_int_equal(texture_from_node(&t, n, "absent", 0.5, COLOR_REFLECTANCE, &f->build, &e), 0);
 	assert_value(&t, 0, 0, 0.5);
-	assert_int_equal(texture_from_node(&t, n, "absent", 2, COLOR_ILLUMINANT, NULL, true, &f->arena, &e), 0);
+	assert_int_equal(texture_from_node(&t, n, "absent", 2, COLOR_ILLUMINANT, &f->build, &e), 0);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_D65);
 }
 
@@ -254,18 +261,17 @@ static void test_scale(void **state)
 	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
 	struct texture t;
 	struct error e = {""};
-	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->source, true, &f->arena, &e), 0);
+	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->build, &e), 0);
 	assert_value(&t, 1.5 / 3, 0.25, 0.5);
 	assert_value(&t, 0.5 / 3, 0.75, 1);
 	assert_true(texture_max(&t) == 1 && texture_shape(&t) == COLOR_SHAPE_CONSTANT);
 	n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=-2");
 	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
-	assert_true(texture_create(&t, n, COLOR_ILLUMINANT, &f->source, true, &f->arena, &e) < 0 &&
-		    strstr(e.text, "negative colours"));
-	assert_int_equal(texture_create(&t, n, COLOR_HEIGHT, &f->source, true, &f->arena, &e), 0);
+	assert_true(texture_create(&t, n, COLOR_ILLUMINANT, &f->build, &e) < 0 && strstr(e.text, "negative colours"));
+	assert_int_equal(texture_create(&t, n, COLOR_HEIGHT, &f->build, &e), 0);
 	assert_true(fabs(texture_height(&t, 1.5 / 3, 0.25) + 0.5) < 1e-12);
 	struct texture_jet j;
-	assert_int_equal(texture_create(&t, n, COLOR_RELIEF, &f->source, true, &f->arena, &e), 0);
+	assert_int_equal(texture_create(&t, n, COLOR_RELIEF, &f->build, &e), 0);
 	texture_jet(&t, 1.0 / 3, 0.25, &j);
 	assert_true(fabs(j.du[0] + 1.5) < 1e-12 && fabs(j.x[0] + 0.25) < 1e-12);
 }
@@ -276,7 +282,7 @@ static struct texture tinted(struct fixture *f, const char *scale, const char *i
 	struct texture t;
 	struct error e;
 	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, inner));
-	if (texture_create(&t, n, role, &f->source, true, &f->arena, &e))
+	if (texture_create(&t, n, role, &f->build, &e))
 		fail_msg("%s", e.text);
 	return t;
 }
@@ -292,7 +298,7 @@ static void test_tint(void **state)
 		 light = color_eval_rgb_illuminant(red, &colour);
 	struct texture t = tinted(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p1", COLOR_REFLECTANCE),
 		       lamp = tinted(f, "scale scale=rgb(1,4,2)", "bitmap filename=p1", COLOR_ILLUMINANT);
-	spectrum x = texture_eval(&t, 0.25, 0.5, &colour), y = texture_eval(&lamp, 0.25, 0.5, &colour);
+	spectrum x = look_up(&t, 0.25, 0.5, &colour), y = look_up(&lamp, 0.25, 0.5, &colour);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		assert_true(fabs(x.v[i] - a.v[i] * b.v[i]) < 1e-12);
 		assert_true(fabs(y.v[i] - 4 * light.v[i] * b.v[i]) < 1e-12 * y.v[i]);
@@ -306,7 +312,7 @@ static void test_tint(void **state)
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=rgb(1,1,0)");
 	struct error e;
 	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
-	assert_true(texture_create(&t, n, COLOR_HEIGHT, &f->source, true, &f->arena, &e) < 0 &&
+	assert_true(texture_create(&t, n, COLOR_HEIGHT, &f->build, &e) < 0 &&
 		    strstr(e.text, "a number here, not a colour"));
 }
 
