@@ -133,7 +133,7 @@ void mesh_file_serialized(struct mesh_file *f, int version, int doubles, uint32_
 				put_real(&one, solid_uv[i][c], doubles, 0);
 		for (int i = 0; i < SOLID_VERTICES && (flags & 8); i++)
 			for (int c = 0; c < 3; c++)
-				put_real(&one, 0.5, doubles, 0);
+				put_real(&one, SOLID_COLOUR(3 * i + c), doubles, 0);
 		for (int i = 0; i < SOLID_TRIANGLES; i++)
 			for (int c = 0; c < 3; c++)
 				put_bits(&one, solid_index[i][c], 4, 0);

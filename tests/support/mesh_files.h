@@ -11,6 +11,9 @@ enum { SOLID_VERTICES = 6, SOLID_TRIANGLES = 8 };
 extern const double solid_position[SOLID_VERTICES][3], solid_uv[SOLID_VERTICES][2];
 extern const uint32_t solid_index[SOLID_TRIANGLES][3];
 
+/* Number k of the colours that serialized files have, three a vertex: exact in float. */
+#define SOLID_COLOUR(k) ((k) / 32.0)
+
 struct mesh_file {
 	unsigned char bytes[1 << 16];
 	size_t size;

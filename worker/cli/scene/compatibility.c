@@ -14,7 +14,7 @@ static const struct {
 } mitsuba[] = {
 	{PLUGIN_SHAPE, "bsplinecurve|deformable|ellipsoids|ellipsoidsmesh|hair|heightfield|linearcurve|sdfgrid"},
 	{PLUGIN_BSDF, "circular|hair|hk|irawan|measured|measured_polarized|polarizer|pplastic|retarder"},
-	{PLUGIN_TEXTURE, "curvature|gridtexture|mesh_attribute|vertexcolors|volume|wireframe"},
+	{PLUGIN_TEXTURE, "curvature|gridtexture|volume|wireframe"},
 	{PLUGIN_EMITTER, "collimated|directionalarea|timed_sunsky"},
 	{PLUGIN_SENSOR,
 	 "batch|distant|fluxmeter|irradiancemeter|perspective_rdist|radiancemeter|spherical|telecentric"},

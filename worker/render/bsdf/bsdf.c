@@ -4,6 +4,7 @@
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/glass.h"
 #include "worker/render/bsdf/microfacet.h"
+#include "worker/render/texture/attribute_table.h"
 
 #include <string.h>
 
@@ -72,6 +73,31 @@ int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, 
 	bsdf_add_shape(b, texture_shape(t));
 	b->textured |= !texture_is_constant(t);
 	return 0;
+}
+
+enum { PROBE_SIDE = 64 };
+
+struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build)
+{
+	const struct attribute_table *t = build->attributes;
+	struct bsdf_probes p = {PROBE_SIDE * PROBE_SIDE, t && t->asked ? 3 * (uint64_t)t->triangle_count : 0};
+	if (p.corners > p.count)
+		p.count = p.corners < BSDF_PROBES_MAX ? (uint32_t)p.corners : BSDF_PROBES_MAX;
+	return p;
+}
+
+struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i)
+{
+	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
+	uint32_t row = i / PROBE_SIDE % PROBE_SIDE, column = i % PROBE_SIDE;
+	struct bsdf_point at = {.where = {.u = (row + 0.5) / PROBE_SIDE, .v = (column + 0.5) / PROBE_SIDE}, .w = &w};
+	if (p->corners > 0) {
+		uint64_t corner = p->corners > p->count ? i * p->corners / p->count : i % p->corners;
+		at.where.prim = (uint32_t)(corner / 3);
+		at.where.b1 = corner % 3 == 1;
+		at.where.b2 = corner % 3 == 2;
+	}
+	return at;
 }
 
 double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)

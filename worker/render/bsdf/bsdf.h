@@ -47,12 +47,13 @@ struct bsdf_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	double least_roughness; /* rough metal and glass below this is made smooth */
+	double least_roughness;		    /* rough metal and glass below this is made smooth */
+	struct attribute_table *attributes; /* of the mesh that it lies on; NULL: of none */
 };
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)
 {
-	return (struct texture_build){b->assets, b->arena, b->dialect_3};
+	return (struct texture_build){b->assets, b->arena, b->dialect_3, b->attributes};
 }
 
 struct bsdf_ops {

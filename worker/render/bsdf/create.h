@@ -13,6 +13,19 @@ void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		 const struct bsdf_build *build, struct error *e);
 
+/*
+ * Places at which textures are looked up to learn their range: a grid over (u,v), and along with it the corners of the
+ * mesh's triangles, one after the other. An attribute is largest and least at a corner, so that up to
+ * BSDF_PROBES_MAX / 3 triangles its range is exact; beyond, corners are left out evenly.
+ */
+enum { BSDF_PROBES_MAX = 3 << 18 };
+struct bsdf_probes {
+	uint32_t count;
+	uint64_t corners; /* of the mesh; 0: none of its attributes was looked up */
+};
+struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build);
+struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i);
+
 /* b, whose data begins as that of `ops` does, has no lobes but exactly specular ones. */
 void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops);
 

@@ -290,14 +290,13 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	return true;
 }
 
-static double range_of(const struct texture *t, bool largest)
+static double range_of(const struct texture *t, const struct bsdf_build *build, bool largest)
 {
-	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
-	enum { SIDE = 64 };
+	const struct bsdf_probes probes = bsdf_probes_of(build);
 	double least = 1, most = 0;
-	for (int i = 0; i < SIDE * SIDE; i++) {
-		const struct bsdf_point at = {.where = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE},
-					      .w = &w};
+	uint32_t count = texture_is_constant(t) ? 1 : probes.count;
+	for (uint32_t i = 0; i < count; i++) {
+		const struct bsdf_point at = bsdf_probe(&probes, i);
 		double x = share_at(t, &at);
 		least = fmin(least, x);
 		most = fmax(most, x);
@@ -305,9 +304,9 @@ static double range_of(const struct texture *t, bool largest)
 	return largest ? most : least;
 }
 
-double principled_least(const struct texture *t)
+double principled_least(const struct texture *t, const struct bsdf_build *build)
 {
-	return range_of(t, false);
+	return range_of(t, build, false);
 }
 
 int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
@@ -326,7 +325,7 @@ int principled_shares(struct principled *p, struct bsdf *b, const struct scene_n
 		int code = bsdf_texture(b, &p->share[i], n, names[i], 0, build, e);
 		if (code)
 			return code;
-		p->most[i] = range_of(&p->share[i], true);
+		p->most[i] = range_of(&p->share[i], build, true);
 		p->varies = true;
 	}
 	return 0;
@@ -361,8 +360,8 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	if (code)
 		return code;
 	p->base_max = texture_max(&p->base);
-	struct microfacet least = principled_facets(p->most[ANISOTROPIC], principled_least(&p->roughness));
-	double metallic = principled_least(&p->metallic);
+	struct microfacet least = principled_facets(p->most[ANISOTROPIC], principled_least(&p->roughness, build));
+	double metallic = principled_least(&p->metallic, build);
 	bool glass = p->most[TRANSMISSION] > 0 && metallic < 1;
 	b->modes = BSDF_REFLECT | (glass ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;

@@ -13,7 +13,7 @@ enum { TRANSMISSION, SPEC_TINT, SHEEN, SHEEN_TINT, FLATNESS, CLEARCOAT, CLEARCOA
 struct principled {
 	struct texture base, roughness, metallic;
 	struct texture share[SHARES];
-	double most[SHARES]; /* the largest of each, of a texture on a grid */
+	double most[SHARES]; /* the largest of each, of a texture that bsdf_probe finds */
 	double eta, base_max;
 	bool varies; /* some share is a texture */
 };
@@ -43,7 +43,7 @@ int principled_shares(struct principled *p, struct bsdf *b, const struct scene_n
 		.name = name_, .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 1 \
 	}
 
-/* The least of a texture's values from 0 to 1, on a grid: step sizes go by that of roughness. */
-double principled_least(const struct texture *t);
+/* The least of a texture's values from 0 to 1 that bsdf_probe finds: step sizes go by that of roughness. */
+double principled_least(const struct texture *t, const struct bsdf_build *build);
 
 #endif

@@ -152,7 +152,7 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 	p->eta = node_float(n, "eta", 1.5);
 	p->base_max = texture_max(&p->base);
 	t->through = 0.5 * node_float(n, "diff_trans", 0);
-	double rough = principled_least(&p->roughness);
+	double rough = principled_least(&p->roughness, build);
 	struct microfacet facets = principled_facets(p->most[ANISOTROPIC], rough),
 			  passing = principled_facets(p->most[ANISOTROPIC], (0.65 * p->eta - 0.35) * rough);
 	b->modes = BSDF_REFLECT | (t->spec_trans > 0 || t->through > 0 ? BSDF_TRANSMIT : 0);

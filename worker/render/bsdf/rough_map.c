@@ -26,14 +26,12 @@ static int read_one(struct texture *t, struct bsdf *b, const struct scene_node *
 	return 0;
 }
 
-static void find_least(struct rough_map *r)
+static void find_least(struct rough_map *r, const struct bsdf_build *build)
 {
-	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
-	enum { SIDE = 64 };
+	const struct bsdf_probes probes = bsdf_probes_of(build);
 	struct microfacet least = {.alpha = INFINITY, .ratio = 1};
-	for (int i = 0; i < SIDE * SIDE; i++) {
-		const struct bsdf_point at = {.where = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE},
-					      .w = &w};
+	for (uint32_t i = 0; i < probes.count; i++) {
+		const struct bsdf_point at = bsdf_probe(&probes, i);
 		struct microfacet m = rough_map_look_up(r, &at);
 		if (microfacet_least(&m) < microfacet_least(&least))
 			least = m;
@@ -54,7 +52,7 @@ int rough_map_read(struct rough_map *r, struct bsdf *b, const struct scene_node 
 	if (code)
 		return code;
 	if (r->varies)
-		find_least(r);
+		find_least(r, build);
 	b->alpha = microfacet_least(&r->fixed);
 	b->alpha_mean = microfacet_mean(&r->fixed);
 	return 0;

@@ -7,8 +7,9 @@
 #include "worker/render/bsdf/microfacet.h"
 
 struct rough_map {
-	struct microfacet fixed; /* where it varies: of the least roughness, found on a grid; step sizes go by it */
-	double most;		 /* where it varies: the largest alpha_u found there */
+	struct microfacet
+		fixed; /* where it varies: of the least roughness that bsdf_probe finds; step sizes go by it */
+	double most;   /* where it varies: the largest alpha_u found there */
 	bool varies;
 	struct texture u, v; /* where it varies */
 };

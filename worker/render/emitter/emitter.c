@@ -44,6 +44,6 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
 		    const struct emitter_build *build, struct error *e)
 {
-	const struct texture_build inner = {build->assets, build->arena, build->dialect_3};
+	const struct texture_build inner = {build->assets, build->arena, build->dialect_3, build->attributes};
 	return texture_from_node(t, n, name, 1, role, &inner, e);
 }

@@ -39,6 +39,7 @@ struct emitter_build {
 	struct arena *arena;
 	bool dialect_3;
 	const struct emitter_surface *surface; /* NULL where it hangs on no shape */
+	struct attribute_table *attributes;    /* of the mesh that it lies on; NULL: of none */
 	vec3 center; /* a point p of the scene lies at scale (p - center) in the rescaled world */
 	double scale;
 };

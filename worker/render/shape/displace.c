@@ -142,6 +142,30 @@ static void add_to_place(struct place *c, double weight, const struct sample *s,
 	c->weight += weight;
 }
 
+/* Of the finer mesh's vertex, as its texture coordinates. */
+static void mix_attributes(const struct work *w, uint32_t triangle, double b1, double b2, uint32_t vertex)
+{
+	const uint32_t *t = w->base.index[triangle];
+	for (uint32_t i = 0; i < w->out->attribute_count; i++) {
+		const struct attribute *from = &w->base.attributes[i], *to = &w->out->attributes[i];
+		size_t n = from->channels;
+		for (size_t k = 0; k < n && !from->per_face; k++)
+			to->value[vertex * n + k] = (float)((1 - b1 - b2) * (double)from->value[t[0] * n + k] +
+							    b1 * (double)from->value[t[1] * n + k] +
+							    b2 * (double)from->value[t[2] * n + k]);
+	}
+}
+
+static void copy_face(const struct work *w, uint32_t triangle, uint32_t to)
+{
+	for (uint32_t i = 0; i < w->out->attribute_count; i++) {
+		const struct attribute *a = &w->base.attributes[i];
+		size_t n = a->channels;
+		if (a->per_face)
+			memcpy(w->out->attributes[i].value + to * n, a->value + triangle * n, n * sizeof *a->value);
+	}
+}
+
 static void put_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_t j)
 {
 	uint32_t parts = w->grid.parts;
@@ -151,6 +175,7 @@ static void put_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_t j
 	sample_at(w, triangle, b1, b2, &s);
 	vec3 normal = displaced_normal(w, triangle, b1, b2, &s);
 	w->highest = fmax(w->highest, fabs(s.h));
+	mix_attributes(w, triangle, b1, b2, at.vertex);
 	if (w->out->uv) {
 		w->out->uv[at.vertex][0] = s.u;
 		w->out->uv[at.vertex][1] = s.v;
@@ -249,12 +274,14 @@ static void put_triangles(struct work *w)
 		for (uint32_t i = 0; i < n; i++) {
 			tick();
 			for (uint32_t j = 0; j < n - i; j++) {
+				copy_face(w, t, count);
 				put_triangle(w, t, (const uint32_t[3][2]){{i, j}, {i + 1, j}, {i, j + 1}},
 					     w->out->index[count++]);
-				if (i + j + 1 < n)
-					put_triangle(w, t,
-						     (const uint32_t[3][2]){{i + 1, j}, {i + 1, j + 1}, {i, j + 1}},
-						     w->out->index[count++]);
+				if (i + j + 1 >= n)
+					continue;
+				copy_face(w, t, count);
+				put_triangle(w, t, (const uint32_t[3][2]){{i + 1, j}, {i + 1, j + 1}, {i, j + 1}},
+					     w->out->index[count++]);
 			}
 		}
 	for (uint64_t i = 0; i < w->grid.border; i++) {
@@ -265,15 +292,45 @@ static void put_triangles(struct work *w)
 	}
 }
 
+/* The attributes of `from`, all 0. */
+static bool same_attributes(struct mesh *m, const struct mesh *from, struct arena *arena)
+{
+	for (uint32_t i = 0; i < from->attribute_count; i++) {
+		const struct attribute *a = &from->attributes[i];
+		struct attribute *own =
+			mesh_add_attribute(m, a->name, a->per_face, a->channels, from->attribute_count, arena);
+		if (!own)
+			return false;
+		own->encoded = a->encoded;
+		own->damaged = a->damaged;
+	}
+	return true;
+}
+
+static void split_attributes(struct mesh *m, const struct mesh *from, uint32_t triangle)
+{
+	for (uint32_t i = 0; i < m->attribute_count; i++) {
+		const struct attribute *a = &from->attributes[i];
+		float *to = m->attributes[i].value;
+		size_t n = a->channels, size = n * sizeof *to;
+		if (a->per_face)
+			memcpy(to + triangle * n, a->value + triangle * n, size);
+		for (size_t k = 0; k < 3 && !a->per_face; k++)
+			memcpy(to + (3 * (size_t)triangle + k) * n, a->value + from->index[triangle][k] * n, size);
+	}
+}
+
 /* One vertex a corner: flat triangles have a normal each. */
 static bool split_flat(struct mesh *m, const struct mesh *from, struct arena *arena)
 {
-	if (!mesh_alloc(m, 3 * from->triangle_count, from->triangle_count, true, from->uv != NULL, arena))
+	if (!mesh_alloc(m, 3 * from->triangle_count, from->triangle_count, true, from->uv != NULL, arena) ||
+	    !same_attributes(m, from, arena))
 		return false;
 	for (uint32_t i = 0; i < from->triangle_count; i++) {
 		vec3 p[3];
 		for (uint32_t k = 0; k < 3; k++)
 			p[k] = mesh_load(from->position[from->index[i][k]]);
+		split_attributes(m, from, i);
 		for (uint32_t k = 0; k < 3; k++) {
 			uint32_t v = 3 * i + k;
 			m->index[i][k] = v;
@@ -350,6 +407,7 @@ static int run(struct work *w, struct shape_geometry *g, struct arena *arena, st
 	struct mesh out;
 	ok = ok && w->grid.vertices <= UINT32_MAX;
 	ok = ok && mesh_alloc(&out, (uint32_t)w->grid.vertices, (uint32_t)triangles, true, w->base.uv != NULL, arena);
+	ok = ok && same_attributes(&out, &w->base, arena);
 	w->places = ok ? arena_alloc(scratch, w->grid.places, sizeof *w->places) : NULL;
 	w->turns = ok ? arena_alloc(scratch, w->grid.border, sizeof *w->turns) : NULL;
 	if (!w->places || !w->turns)

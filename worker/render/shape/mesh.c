@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/shape/mesh.h"
 
+#include <stdio.h>
 #include <string.h>
 
 vec3 mesh_unit(vec3 v)
@@ -27,6 +28,38 @@ bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool norm
 	m->normal = normals ? arena_alloc(arena, vertices, sizeof *m->normal) : NULL;
 	m->uv = uv ? arena_alloc(arena, vertices, sizeof *m->uv) : NULL;
 	return m->position && m->index && (m->normal || !normals) && (m->uv || !uv);
+}
+
+struct attribute *mesh_add_attribute(struct mesh *m, const char *name, bool per_face, uint32_t channels, uint32_t room,
+				     struct arena *arena)
+{
+	size_t items = per_face ? m->triangle_count : m->vertex_count;
+	if (!m->attributes)
+		m->attributes = arena_alloc(arena, room, sizeof *m->attributes);
+	float *value = arena_alloc(arena, items * channels, sizeof *value);
+	if (!m->attributes || !value)
+		return NULL;
+	struct attribute *a = &m->attributes[m->attribute_count++];
+	*a = (struct attribute){.per_face = per_face, .channels = channels, .value = value};
+	snprintf(a->name, sizeof a->name, "%s", name);
+	return a;
+}
+
+void mesh_set_attribute(struct attribute *a, size_t item, uint32_t channel, double x)
+{
+	bool good = isfinite(x) && fabs(x) <= MESH_ATTRIBUTE_MAX;
+	a->damaged |= !good;
+	a->value[item * a->channels + channel] = good ? (float)x : 0;
+}
+
+void mesh_move_face(struct mesh *m, uint32_t from, uint32_t to)
+{
+	for (uint32_t i = 0; i < m->attribute_count && from != to; i++) {
+		const struct attribute *a = &m->attributes[i];
+		if (a->per_face)
+			memcpy(a->value + (size_t)to * a->channels, a->value + (size_t)from * a->channels,
+			       a->channels * sizeof *a->value);
+	}
 }
 
 void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v)
@@ -88,6 +121,7 @@ static uint64_t drop_flat(struct mesh *m)
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
 		if (vec3_length(area_normal(m, m->index[i])) > 0) {
 			uint32_t t[3] = {m->index[i][0], m->index[i][1], m->index[i][2]};
+			mesh_move_face(m, i, kept);
 			memcpy(m->index[kept++], t, sizeof t);
 		}
 	}

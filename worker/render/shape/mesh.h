@@ -40,6 +40,17 @@ int mesh_open(const struct scene_node *n, const struct asset_source *assets, str
 /* Allocates the arrays; false: out of memory. */
 bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena);
 
+/* Adds an attribute of zeros to a mesh that has room for `room` of them; NULL: out of memory. */
+struct attribute *mesh_add_attribute(struct mesh *m, const char *name, bool per_face, uint32_t channels, uint32_t room,
+				     struct arena *arena);
+
+/* The numbers beyond are taken as damaged, as those that are not finite are. */
+#define MESH_ATTRIBUTE_MAX 1e12
+void mesh_set_attribute(struct attribute *a, size_t item, uint32_t channel, double x);
+
+/* Triangle `from` becomes triangle `to`, in the attributes. */
+void mesh_move_face(struct mesh *m, uint32_t from, uint32_t to);
+
 /* Vertex i; n: a unit vector. */
 void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v);
 

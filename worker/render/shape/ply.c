@@ -4,13 +4,16 @@
  *
  * The header says how the bytes behind it are laid out. A first pass over the faces counts triangles, so that memory is
  * taken once; a second pass reads. Of vertices x y z, nx ny nz and u v (or s t) count, of faces vertex_indices (or
- * vertex_index); polygons become fans of triangles; everything else is stepped over.
+ * vertex_index); polygons become fans of triangles. All other numbers of vertices and faces are attributes: integers
+ * stand for 0 to 1 and are decoded from sRGB, as Mitsuba does. Lists and other elements are stepped over.
  *
  * Failures: a header that is none, a file that ends too early, indices out of range, numbers that are not finite. No
  * count of the header is believed before the file was seen to be long enough for it.
  */
 #include "common/base/liveness.h"
 #include "worker/render/scene/number.h"
+#include "worker/render/scene/srgb.h"
+#include "worker/render/shape/attribute_names.h"
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
 
@@ -18,6 +21,8 @@
 #include <string.h>
 
 enum { PROPERTIES_MAX = 64, ELEMENTS_MAX = 16, WORD_MAX = 64, TICK_INTERVAL = 4096 };
+/* A polygon's numbers count for each of its triangles: no more of them than this a byte of the file. */
+enum { ATTRIBUTE_VALUES_PER_BYTE = 8, ATTRIBUTE_VALUES_ALWAYS = 1 << 20 };
 
 enum scalar { SCALAR_NONE, INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64 };
 static const uint8_t scalar_size[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
@@ -30,6 +35,8 @@ enum role { ROLE_NONE = -1, ROLE_X, ROLE_Y, ROLE_Z, ROLE_NX, ROLE_NY, ROLE_NZ, R
 struct ply_property {
 	enum scalar type, count_type; /* of a list's length; SCALAR_NONE: it is no list */
 	enum role role;
+	bool in_attribute;
+	uint32_t group, channel; /* of the attribute */
 };
 
 enum element_kind { ELEMENT_OTHER, ELEMENT_VERTEX, ELEMENT_FACE };
@@ -40,6 +47,9 @@ struct element {
 	uint64_t count;
 	uint32_t property_count;
 	struct ply_property properties[PROPERTIES_MAX];
+	struct attribute_groups groups;
+	bool integers[ATTRIBUTE_GROUPS_MAX];		    /* by group: what it is stored as */
+	struct attribute *attributes[ATTRIBUTE_GROUPS_MAX]; /* by group; NULL: none is wanted */
 };
 
 struct ply {
@@ -55,6 +65,7 @@ struct ply {
 	uint64_t triangles;
 	struct mesh *mesh;
 	bool flip;
+	const bool *srgb; /* what the shape says of its colours; NULL: nothing */
 };
 
 static const struct param params[] = {
@@ -62,7 +73,7 @@ static const struct param params[] = {
 	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
 	{"collapse", IGNORED},
-	{"srgb", IGNORED}, /* of colours at vertices */
+	{"srgb", UNDERSTOOD(VALUE_BOOL)}, /* of colours */
 	{"max_smooth_angle", REFUSED},
 	SHAPE_PARAMS_END,
 };
@@ -152,6 +163,7 @@ static int read_element(struct ply *f)
 	el->kind = strcmp(name, "vertex") == 0 ? ELEMENT_VERTEX
 		   : strcmp(name, "face") == 0 ? ELEMENT_FACE
 					       : ELEMENT_OTHER;
+	el->groups = attribute_groups_none(el->kind == ELEMENT_FACE ? "face_" : "vertex_");
 	for (uint32_t i = 0; i + 1 < f->element_count; i++)
 		if (strcmp(f->elements[i].name, name) == 0)
 			return header_error(f, "an element is given twice");
@@ -187,6 +199,10 @@ static int read_property(struct ply *f)
 			p.role = ROLE_NONE; /* u and s may both be there */
 	if (p.role >= 0 && p.role < ROLES)
 		f->has[p.role] = true;
+	if (p.role == ROLE_NONE && !list && el->kind != ELEMENT_OTHER)
+		p.in_attribute = attribute_groups_add(&el->groups, name, &p.group, &p.channel);
+	if (p.in_attribute)
+		el->integers[p.group] = p.type < FLOAT32;
 	el->properties[el->property_count++] = p;
 	return 0;
 }
@@ -323,9 +339,37 @@ static int store_vertex(struct ply *f, const struct element *el, uint64_t i, con
 	return 0;
 }
 
+/* Whole numbers stand for 0 to 1. */
+static double attribute_number(const struct ply *f, enum scalar type, double x)
+{
+	static const double largest[] = {[INT8] = 0x7f,	    [UINT8] = 0xff,	  [INT16] = 0x7fff,
+					 [UINT16] = 0xffff, [INT32] = 0x7fffffff, [UINT32] = 0xffffffff};
+	bool whole = type < FLOAT32, encoded = f->srgb ? *f->srgb : whole;
+	x = whole ? x / largest[type] : x;
+	/* What is out of range stays so; no power of it is a finite number. */
+	return encoded && fabs(x) <= MESH_ATTRIBUTE_MAX ? srgb_to_linear(x) : x;
+}
+
+/* The numbers of item i, whose triangles, of a face, are those from `first` on. */
+static void store_attributes(const struct ply *f, const struct element *el, uint64_t i, uint64_t first,
+			     const double x[PROPERTIES_MAX])
+{
+	uint64_t begin = el->kind == ELEMENT_FACE ? first : i, end = el->kind == ELEMENT_FACE ? f->triangles : i + 1;
+	for (uint32_t k = 0; k < el->property_count; k++) {
+		const struct ply_property *p = &el->properties[k];
+		struct attribute *a = p->in_attribute ? el->attributes[p->group] : NULL;
+		if (!a || p->channel >= a->channels)
+			continue;
+		double value = attribute_number(f, p->type, x[k]);
+		for (uint64_t item = begin; item < end; item++)
+			mesh_set_attribute(a, (size_t)item, p->channel, value);
+	}
+}
+
 static int read_item(struct ply *f, const struct element *el, uint64_t i)
 {
-	double v[ROLES] = {0};
+	double v[ROLES] = {0}, others[PROPERTIES_MAX];
+	uint64_t first = f->triangles;
 	for (uint32_t k = 0; k < el->property_count; k++) {
 		const struct ply_property *p = &el->properties[k];
 		int r = 0;
@@ -336,9 +380,13 @@ static int read_item(struct ply *f, const struct element *el, uint64_t i)
 			r = item_error(f, el, i, "not a number, or the file ends here");
 		else if (p->role >= 0)
 			v[p->role] = x;
+		else
+			others[k] = x;
 		if (r)
 			return r;
 	}
+	if (el->groups.count > 0 && f->mesh->position)
+		store_attributes(f, el, i, first, others);
 	return el->kind == ELEMENT_VERTEX && f->mesh->position ? store_vertex(f, el, i, v) : 0;
 }
 
@@ -399,6 +447,29 @@ static int check_header(struct ply *f)
 	return 0;
 }
 
+/* Room for the attributes of an element, whose count may not be believed but with the file's size. */
+static int add_attributes(struct ply *f, struct element *el, uint64_t bytes, struct arena *arena)
+{
+	uint64_t items = el->kind == ELEMENT_FACE ? f->triangles : f->mesh->vertex_count, values = 0;
+	for (uint32_t k = 0; k < el->groups.count; k++)
+		values += items * attribute_group_channels(&el->groups.of[k]);
+	if (values > ATTRIBUTE_VALUES_ALWAYS && values / ATTRIBUTE_VALUES_PER_BYTE > bytes)
+		return node_error(f->node, f->error, E2BIG, "%s: its polygons make %llu numbers of attributes", f->name,
+				  (unsigned long long)values);
+	for (uint32_t k = 0; k < el->groups.count; k++) {
+		uint32_t channels = attribute_group_channels(&el->groups.of[k]);
+		if (channels == 0)
+			continue;
+		struct attribute *a = mesh_add_attribute(f->mesh, el->groups.of[k].name, el->kind == ELEMENT_FACE,
+							 channels, 2 * ATTRIBUTE_GROUPS_MAX, arena);
+		if (!a)
+			return node_error(f->node, f->error, ENOMEM, "%s: out of memory", f->name);
+		a->encoded = !f->srgb && !el->integers[k];
+		el->attributes[k] = a;
+	}
+	return 0;
+}
+
 static int read_file(struct ply *f, struct arena *arena)
 {
 	int r = read_header(f);
@@ -412,6 +483,11 @@ static int read_file(struct ply *f, struct arena *arena)
 	bool normals = f->has[ROLE_NX] && f->has[ROLE_NY] && f->has[ROLE_NZ], uv = f->has[ROLE_U] && f->has[ROLE_V];
 	if (!mesh_alloc(f->mesh, f->mesh->vertex_count, (uint32_t)f->triangles, normals, uv, arena))
 		return node_error(f->node, f->error, ENOMEM, "%s: out of memory", f->name);
+	for (uint32_t k = 0; k < f->element_count && !r; k++)
+		if (f->elements[k].kind != ELEMENT_OTHER)
+			r = add_attributes(f, &f->elements[k], (uint64_t)(f->end - body), arena);
+	if (r)
+		return r;
 	f->p = body;
 	return read_body(f);
 }
@@ -424,13 +500,15 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	if (r)
 		return r;
 	const char *bytes = (const char *)a.bytes;
+	bool srgb = node_bool(n, "srgb", true);
 	struct ply f = {.node = n,
 			.name = node_string(n, "filename", ""),
 			.error = e,
 			.p = bytes,
 			.end = bytes + a.size,
 			.mesh = &out->mesh,
-			.flip = node_bool(n, "flip_tex_coords", false)};
+			.flip = node_bool(n, "flip_tex_coords", false),
+			.srgb = node_find(n, "srgb") ? &srgb : NULL};
 	r = read_file(&f, arena);
 	assets->close(assets->user, &a);
 	return r;

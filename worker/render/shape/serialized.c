@@ -87,8 +87,8 @@ static int skip_name(struct stream *s)
 	return file_error(s, "the mesh's name does not end");
 }
 
-/* count x width numbers; out NULL: stepped over. */
-static int take_reals(struct stream *s, bool doubles, uint32_t count, int width, double *out)
+/* count x width numbers. */
+static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint32_t count, int width, double *out)
 {
 	unsigned char raw[CHUNK_ITEMS * 8];
 	int size = doubles ? 8 : 4;
@@ -98,7 +98,7 @@ static int take_reals(struct stream *s, bool doubles, uint32_t count, int width,
 		int r = take(s, raw, n * (size_t)size);
 		if (r)
 			return r;
-		for (size_t i = 0; out && i < n; i++) {
+		for (size_t i = 0; i < n; i++) {
 			uint64_t bits = little(raw + i * (size_t)size, size);
 			uint32_t low = (uint32_t)bits;
 			float f;
@@ -107,11 +107,31 @@ static int take_reals(struct stream *s, bool doubles, uint32_t count, int width,
 				memcpy(out, &bits, sizeof *out);
 			else
 				*out = (double)f;
-			if (!(fabs(*out) <= MESH_COORDINATE_MAX))
+			if (must_be_finite && !(fabs(*out) <= MESH_COORDINATE_MAX))
 				return file_error(s, "a number that is not finite, or beyond 1e60");
 			out++;
 		}
 		left -= n;
+	}
+	return 0;
+}
+
+/* Linear, and as Mitsuba 3 names them. */
+static int take_colours(struct stream *s, bool doubles, struct mesh *m, struct arena *arena)
+{
+	enum { AT_ONCE = 256 };
+	double rgb[3 * AT_ONCE];
+	struct attribute *a = mesh_add_attribute(m, "vertex_color", false, 3, 1, arena);
+	if (!a)
+		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
+	for (uint32_t done = 0; done < m->vertex_count;) {
+		uint32_t n = m->vertex_count - done < AT_ONCE ? m->vertex_count - done : AT_ONCE;
+		int r = take_reals(s, doubles, false, n, 3, rgb);
+		if (r)
+			return r;
+		for (uint32_t i = 0; i < 3 * n; i++)
+			mesh_set_attribute(a, done + i / 3, i % 3, rgb[i]);
+		done += n;
 	}
 	return 0;
 }
@@ -165,13 +185,13 @@ static int take_mesh(struct stream *s, int version, struct arena *arena, struct 
 		return file_error(s, "more vertices or triangles than there can be");
 	if (!mesh_alloc(m, (uint32_t)vertices, (uint32_t)triangles, normals, uv, arena))
 		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
-	r = take_reals(s, doubles, m->vertex_count, 3, m->position[0]);
+	r = take_reals(s, doubles, true, m->vertex_count, 3, m->position[0]);
 	if (!r && normals)
-		r = take_reals(s, doubles, m->vertex_count, 3, m->normal[0]);
+		r = take_reals(s, doubles, true, m->vertex_count, 3, m->normal[0]);
 	if (!r && uv)
-		r = take_reals(s, doubles, m->vertex_count, 2, m->uv[0]);
+		r = take_reals(s, doubles, true, m->vertex_count, 2, m->uv[0]);
 	if (!r && (flags & HAS_COLOURS))
-		r = take_reals(s, doubles, m->vertex_count, 3, NULL);
+		r = take_colours(s, doubles, m, arena);
 	if (!r)
 		r = take_triangles(s, m);
 	if (!r)

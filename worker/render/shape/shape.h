@@ -10,6 +10,7 @@
 #ifndef WORKER_RENDER_SHAPE_SHAPE_H
 #define WORKER_RENDER_SHAPE_SHAPE_H
 
+#include "worker/render/math/attribute.h"
 #include "worker/render/scene/scene.h"
 
 struct mesh {
@@ -18,6 +19,8 @@ struct mesh {
 	double (*normal)[3]; /* NULL: none, shade flat; unit length; facing the outside */
 	double (*uv)[2];     /* NULL: none */
 	uint32_t (*index)[3];
+	uint32_t attribute_count;
+	struct attribute *attributes;
 };
 
 struct sphere {

@@ -10,6 +10,7 @@
 #include "worker/render/scene/image.h"
 
 struct texture;
+struct attribute_table;
 
 /* Where on a surface a texture is looked up. */
 struct texture_point {
@@ -23,6 +24,7 @@ struct texture_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
+	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: what it is for lies on none */
 };
 
 /* Three numbers as a function of (u,v), with their first and second derivatives. */

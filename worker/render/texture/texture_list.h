@@ -3,3 +3,5 @@
 TEXTURE(bitmap)
 TEXTURE(checkerboard)
 TEXTURE(scale)
+TEXTURE(mesh_attribute)
+TEXTURE(vertexcolors)

@@ -14,6 +14,8 @@
 #include "common/base/liveness.h"
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/shape/group.h"
+#include "worker/render/shape/mesh.h"
+#include "worker/render/texture/attribute_table.h"
 #include "worker/render/texture/picture_cache.h"
 #include "worker/render/world/coincident.h"
 #include "worker/render/world/displacement.h"
@@ -35,6 +37,7 @@ struct builder {
 	struct shape_geometry *geometry;
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
+	struct attribute_pool attributes;
 	struct emitter_surface *surfaces;
 	struct box all, *boxes; /* boxes: one a shape */
 	struct error *e;
@@ -208,7 +211,7 @@ static void put_float3(float out[3], vec3 v)
 
 /* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals.
  * Those of a displaced shape are left as they are: where one overhangs, its outside is still its neighbours'. */
-static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m, bool displaced)
+static uint32_t take_triangles(struct geom_shape *g, struct mesh *m, bool displaced)
 {
 	uint32_t kept = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -223,6 +226,7 @@ static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m, bool 
 					    vec3_add(float3(g->normal[t[1]]), float3(g->normal[t[2]])));
 			turn = vec3_dot(sum, n) < 0;
 		}
+		mesh_move_face(m, i, kept);
 		g->index[kept][0] = t[0];
 		g->index[kept][1] = t[turn ? 2 : 1];
 		g->index[kept++][2] = t[turn ? 1 : 2];
@@ -230,7 +234,7 @@ static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m, bool 
 	return kept;
 }
 
-static int place_mesh(struct builder *b, struct geom_shape *g, const struct mesh *m, const struct scene_node *n)
+static int place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, const struct scene_node *n)
 {
 	struct arena *arena = &b->w->arena;
 	uint32_t vertices = m->vertex_count;
@@ -265,7 +269,7 @@ static int place_shapes(struct builder *b)
 	if (!w->shapes || !w->parts)
 		return out_of_memory(b->e);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
-		const struct shape_geometry *from = &b->geometry[i];
+		struct shape_geometry *from = &b->geometry[i];
 		struct geom_shape *g = &w->shapes[i];
 		tick();
 		g->unit = w->scale;
@@ -287,21 +291,38 @@ static int place_shapes(struct builder *b)
 	return 0;
 }
 
-/* One BSDF a node, however many shapes refer to it. A shape that names none is grey, or black where it shines. */
+static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
+{
+	const struct shape_geometry *from = &b->geometry[shape];
+	const struct geom_shape *g = &b->w->shapes[shape];
+	struct attribute_table t = {.shape = b->shape_nodes[shape], .pool = &b->attributes};
+	if (from->kind == SHAPE_MESH) {
+		t.vertex_count = g->vertex_count;
+		t.triangle_count = g->triangle_count;
+		t.index = (const uint32_t(*)[3])g->index;
+		t.count = from->mesh.attribute_count;
+		t.attributes = from->mesh.attributes;
+	}
+	return t;
+}
+
+/* One BSDF a node, however many shapes refer to it, unless it looks at the shape's attributes: then one a shape. A
+ * shape that names none is grey, or black where it shines. */
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
 	/* One more for what no path meets. */
 	w->bsdfs = arena_alloc(&w->arena, (size_t)w->shape_count + 1, sizeof *w->bsdfs);
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
-	if (!w->bsdfs || !b->bsdf_nodes)
+	bool *of_one_shape = arena_alloc(&b->scratch, w->shape_count, sizeof *of_one_shape);
+	if (!w->bsdfs || !b->bsdf_nodes || !of_one_shape)
 		return out_of_memory(b->e);
-	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->accuracy.roughness};
+	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->accuracy.roughness, NULL};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
 		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;
 		uint32_t k = 0;
-		while (k < w->bsdf_count && b->bsdf_nodes[k] != key)
+		while (k < w->bsdf_count && (b->bsdf_nodes[k] != key || of_one_shape[k]))
 			k++;
 		w->parts[i].bsdf = k;
 		if (k < w->bsdf_count) {
@@ -310,6 +331,8 @@ static int create_bsdfs(struct builder *b)
 		}
 		b->bsdf_nodes[k] = key;
 		w->bsdf_count++;
+		struct attribute_table attributes = attributes_of(b, i);
+		build.attributes = &attributes;
 		int rc = 0;
 		if (n)
 			rc = bsdf_create(&w->bsdfs[k], n, &build, b->e);
@@ -321,6 +344,7 @@ static int create_bsdfs(struct builder *b)
 			rc = bsdf_mirror_back(&w->bsdfs[k], &w->arena, b->e);
 		if (rc)
 			return rc;
+		of_one_shape[k] = attributes.asked;
 		w->shapes[i].relief = w->bsdfs[k].relief;
 	}
 	return 0;
@@ -356,14 +380,16 @@ static int create_emitters(struct builder *b)
 	b->emitter_nodes = arena_alloc(&b->scratch, limit, sizeof(void *));
 	if (!w->emitters || !w->emitter_shape || !b->emitter_nodes)
 		return out_of_memory(b->e);
-	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL, w->center, w->scale};
+	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL, NULL, w->center, w->scale};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0);
 		w->parts[i].emitter = -1;
 		if (!n)
 			continue;
 		struct emitter_surface surface = emitter_surface_of(&w->shapes[i]);
+		struct attribute_table attributes = attributes_of(b, i);
 		build.surface = &surface;
+		build.attributes = &attributes;
 		int rc = emitter_create(&w->emitters[w->emitter_count], n, &build, b->e);
 		if (rc)
 			return rc;
@@ -375,6 +401,7 @@ static int create_emitters(struct builder *b)
 	}
 	w->environment = -1;
 	build.surface = NULL;
+	build.attributes = NULL;
 	for (uint32_t i = 0; i < s->object_count; i++) {
 		const struct scene_node *n = s->objects[i];
 		/* An area emitter that stands by itself is there for shapes to refer to. */

@@ -1,0 +1,369 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Attributes of meshes as textures, against independent ways to the same: colours that are a linear function of the
+ * place against that function, on meshes that are mirrored, displaced and shine; vertex colours against a picture;
+ * a number for each triangle against a mesh for each number. And what cannot be, refused by name.
+ */
+#include "tests/support/memory_assets.h"
+#include "tests/support/pictures.h"
+#include "tests/support/render_picture.h"
+#include "tests/support/worlds.h"
+#include "worker/render/texture/attribute_table.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 8, TRIANGLES = 2 * (SIDE - 1) * (SIDE - 1), HEATS = 5, TEXT_MAX = 1 << 14 };
+
+static const struct wavelengths colour = {.nm = {450, 550, 600, 700}};
+
+#define VIEW SENSOR("0.3,0.2,4", "0,0,0")
+#define SKY "<emitter type='constant'/>"
+#define FIELD(property, attribute) \
+	"<texture type='mesh_attribute' name='" property "'><string name='name' value='" attribute "'/></texture>"
+#define PLY(file, inner) "<shape type='ply'><string name='filename' value='" file "'/>" inner "</shape>"
+#define DIFFUSE(inner) "<bsdf type='diffuse'>" inner "</bsdf>"
+
+/* Of the node in column i and row j: sums of a part by column and one by row, so that what is bilinear between four
+ * nodes is linear there. Exact in a picture's 8 bits. */
+static void node_colour(int i, int j, double rgb[3])
+{
+	rgb[0] = (i + j) / 16.0;
+	rgb[1] = (2 * (i % 3) + j) / 16.0;
+	rgb[2] = (7 - i + (j % 2 ? 4 : 1)) / 16.0;
+}
+
+static int heat_of(int triangle)
+{
+	return triangle * 3 % HEATS;
+}
+
+/* The grid over [-1,1]^2 at z = 0, its nodes at the centres of a picture's pixels; only the triangles of that heat, or
+ * all: heat -1. linear: colours are of the place. */
+static size_t write_grid(char *text, int heat, bool linear)
+{
+	char *at = text, *end = text + TEXT_MAX;
+	int count = 0;
+	for (int t = 0; t < TRIANGLES; t++)
+		count += heat < 0 || heat_of(t) == heat;
+#define PUT(...) at += snprintf(at, (size_t)(end - at), __VA_ARGS__)
+	PUT("ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
+	    "property float u\nproperty float v\nproperty float r\nproperty float g\nproperty float b\n"
+	    "property float pair_0\nproperty float pair_1\nproperty float wild\n"
+	    "element face %d\nproperty list uchar int vertex_indices\nproperty float heat\nend_header\n",
+	    SIDE * SIDE, count);
+	for (int k = 0; k < SIDE * SIDE; k++) {
+		double u = (k % SIDE + 0.5) / SIDE, v = (k / SIDE + 0.5) / SIDE, x = 2 * u - 1, y = 1 - 2 * v, rgb[3];
+		node_colour(k % SIDE, k / SIDE, rgb);
+		if (linear)
+			rgb[0] = (x + 1) / 2, rgb[1] = (y + 1) / 2, rgb[2] = (2 + x - y) / 4;
+		PUT("%.9g %.9g 0 %.9g %.9g %.9g %.9g %.9g 0 0 %s\n", x, y, u, v, rgb[0], rgb[1], rgb[2],
+		    k == 3 ? "1e300" : "0");
+	}
+	for (int t = 0; t < TRIANGLES; t++) {
+		int p = t / 2 / (SIDE - 1) * SIDE + t / 2 % (SIDE - 1), odd = t % 2;
+		if (heat < 0 || heat_of(t) == heat)
+			PUT("3 %d %d %d %.9g\n", p + odd, p + SIDE, p + 1 + odd * SIDE, heat_of(t) / (double)HEATS);
+	}
+#undef PUT
+	return (size_t)(at - text);
+}
+
+static char grid[TEXT_MAX], linear_grid[TEXT_MAX], of_heat[HEATS][TEXT_MAX];
+static struct pictures pictures;
+
+static struct world *world_of(const char *body)
+{
+	static char xml[TEXT_MAX];
+	static char names[HEATS][4];
+	struct memory_file files[HEATS + 5];
+	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW "%s</scene>", body), f = 0;
+	files[f++] = (struct memory_file){"s.xml", xml, (size_t)n};
+	files[f++] = (struct memory_file){"grid.ply", grid, write_grid(grid, -1, false)};
+	files[f++] = (struct memory_file){"linear.ply", linear_grid, write_grid(linear_grid, -1, true)};
+	if (pictures.count == 0) {
+		double rgb[3 * SIDE * SIDE];
+		for (int k = 0; k < SIDE * SIDE; k++)
+			node_colour(k % SIDE, k / SIDE, rgb + 3 * k);
+		pictures_add(&pictures, SIDE, SIDE, rgb);
+	}
+	files[f++] = (struct memory_file){"p0", pictures.file[0].bytes, pictures.file[0].size};
+	for (int h = 0; h < HEATS; h++) {
+		snprintf(names[h], sizeof names[h], "h%d", h);
+		files[f++] = (struct memory_file){names[h], of_heat[h], write_grid(of_heat[h], h, false)};
+	}
+	files[f] = (struct memory_file){NULL, NULL, 0};
+	return world_of_files(16, 16, files);
+}
+
+/* Reflectance of a diffuse surface, all lanes. */
+static spectrum albedo(const struct world *w, const struct surface_point *x)
+{
+	const struct bsdf *b = &w->bsdfs[w->parts[x->prim.shape].bsdf];
+	struct bsdf_point p = world_bsdf_point(x, &colour, TRANSPORT_RADIANCE);
+	return spectrum_scale(M_PI, b->ops->eval(b, &p, (vec3){0, 0, 1}, (vec3){0, 0, 1}));
+}
+
+static void assert_close(spectrum a, spectrum b, double tolerance)
+{
+	for (int l = 0; l < SPECTRUM_LANES; l++)
+		if (!(fabs(a.v[l] - b.v[l]) <= tolerance * fabs(b.v[l])))
+			fail_msg("lane %d: %.9g is not %.9g", l, a.v[l], b.v[l]);
+}
+
+/* What write_grid makes of the place; scene units are the world's here but for a power of two. */
+static void linear_colour(const struct world *w, vec3 p, double rgb[3])
+{
+	vec3 q = vec3_madd(w->center, 1 / w->scale, p);
+	rgb[0] = (q.x + 1) / 2;
+	rgb[1] = (q.y + 1) / 2;
+	rgb[2] = (2 + q.x - q.y) / 4;
+}
+
+static void assert_linear(const struct world *w, uint32_t shape, bool mirrored)
+{
+	const struct geom_shape *s = &w->shapes[shape];
+	for (uint32_t t = 0; t < s->triangle_count; t++) {
+		struct surface_point x;
+		double rgb[3];
+		surface_on_triangle(s, (struct prim_ref){shape, t}, 0.2, 0.1 + (t % 7) / 10.0, &x);
+		vec3 p = x.p;
+		if (mirrored)
+			p.x = -p.x;
+		linear_colour(w, p, rgb);
+		assert_close(albedo(w, &x), color_eval_rgb_reflectance(rgb, &colour), 1e-5);
+	}
+}
+
+/* Normals, winding and cutting up turn and move what attributes belong to; they go along. */
+static void test_linear(void **state)
+{
+	(void)state;
+#define LINEAR DIFFUSE(FIELD("reflectance", "vertex_color"))
+	struct world *w = world_of(
+		SKY PLY("linear.ply", LINEAR) PLY("linear.ply", LINEAR "<boolean name='flip_normals' value='true'/>")
+			PLY("linear.ply", LINEAR "<transform name='to_world'><scale x='-1'/></transform>") PLY(
+				"linear.ply", LINEAR
+				"<boolean name='face_normals' value='true'/><float name='displacement' value='0'/>"
+				"<integer name='displacement_level' value='1'/>")
+				PLY("linear.ply", LINEAR
+				    "<float name='displacement' value='0'/><integer name='displacement_level' value='2'/>"));
+	assert_int_equal(w->shape_count, 5);
+	for (uint32_t i = 0; i < 5; i++)
+		assert_linear(w, i, i == 2);
+	assert_int_equal(w->shapes[4].triangle_count, 16 * TRIANGLES);
+	/* Of one shape each. */
+	assert_true(w->parts[0].bsdf != w->parts[1].bsdf && w->bsdfs[0].textured &&
+		    w->bsdfs[0].shape == COLOR_SHAPE_OTHER);
+	world_free(w);
+}
+
+/* The picture that has the vertices' colours at its pixels. */
+static void test_picture(void **state)
+{
+	(void)state;
+	struct world *w = world_of(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "vertex_color")))
+					   PLY("grid.ply", DIFFUSE("<texture type='bitmap' name='reflectance'>"
+								   "<string name='filename' value='p0'/></texture>")));
+	for (uint32_t t = 0; t < TRIANGLES; t++)
+		for (int k = 0; k < 8; k++) {
+			struct surface_point a, b;
+			double b1 = k / 10.0, b2 = (7 - k) / 9.0 * (t % 5) / 4;
+			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, t}, b1, b2, &a);
+			surface_on_triangle(&w->shapes[1], (struct prim_ref){1, t}, b1, b2, &b);
+			assert_close(albedo(w, &a), albedo(w, &b), 1e-5);
+		}
+	world_free(w);
+}
+
+/* A mesh for each heat, of that colour, and one mesh of all heats: the same picture to the bit. */
+static void test_faces(void **state)
+{
+	(void)state;
+	char text[TEXT_MAX], *at = text + snprintf(text, sizeof text, "%s", SKY);
+	for (int h = 0; h < HEATS; h++)
+		at += snprintf(at, (size_t)(text + sizeof text - at),
+			       "<shape type='ply'><string name='filename' value='h%d'/><bsdf type='diffuse'>"
+			       "<float name='reflectance' value='%.9g'/></bsdf></shape>",
+			       h, (double)(float)(h / (double)HEATS));
+	struct world *many = world_of(text),
+		     *one = world_of(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "face_heat"))));
+	assert_true(one->bsdfs[0].shape == COLOR_SHAPE_CONSTANT && !one->effects.colour);
+	const struct render_picture_how how = {.integrator = "path", .test = "faces", .spp = 4, .max_depth = 3};
+	struct picture a, b;
+	double sum = 0;
+	render_picture_xyz(many, &how, &a);
+	render_picture_xyz(one, &how, &b);
+	for (size_t i = 0; i < (size_t)16 * 16; i++)
+		for (int k = 0; k < 3; k++) {
+			assert_true(a.rgb[k][i] == b.rgb[k][i]);
+			sum += (double)a.rgb[k][i];
+		}
+	assert_true(sum > 0);
+	picture_fini(&a);
+	picture_fini(&b);
+	/* Triangles without an area take their numbers with them: tests/worker/render/shape/test_attributes.c. */
+	world_free(many);
+	world_free(one);
+}
+
+/* Points that are drawn on a light, and points that are met. */
+static void test_light(void **state)
+{
+	(void)state;
+	struct world *w =
+		world_of(PLY("linear.ply", "<emitter type='area'>" FIELD("radiance", "vertex_color") "</emitter>"));
+	const struct emitter *em = &w->emitters[0];
+	assert_true(em->textured && em->shape == COLOR_SHAPE_OTHER && em->power > 0);
+	for (int i = 0; i < 200; i++) {
+		const double u[2] = {(i + 0.5) / 200, (i * 7 % 200 + 0.5) / 200};
+		struct emitter_point drawn;
+		struct surface_point met;
+		double pdf, rgb[3];
+		assert_true(em->ops->sample_point(em, u, &drawn, &pdf));
+		assert_true(surface_near(&w->shapes[0], (struct prim_ref){0, drawn.where.prim}, drawn.p, &met));
+		struct emitter_point as_met = world_emitter_point(&met);
+		linear_colour(w, drawn.p, rgb);
+		spectrum expected = color_eval_rgb_illuminant(rgb, &colour);
+		assert_close(em->ops->radiance(em, &drawn, drawn.n, &colour), expected, 1e-5);
+		assert_close(em->ops->radiance(em, &as_met, drawn.n, &colour), expected, 1e-5);
+		for (int l = 0; l < SPECTRUM_LANES; l++)
+			assert_true(expected.v[l] <= em->brightest);
+	}
+	world_free(w);
+}
+
+/* One material for meshes of different numbers; the least roughness is found wherever it is. */
+static void test_roughness(void **state)
+{
+	(void)state;
+#define METAL "<bsdf type='roughconductor' id='m'>" FIELD("alpha", "face_heat") "</bsdf>"
+	struct world *w =
+		world_of(SKY METAL PLY("h3", "<ref id='m'/>") PLY("h1", "<ref id='m'/>") PLY("h4", "<ref id='m'/>"));
+	const double heat[3] = {0.6, 0.2, 0.8};
+	for (uint32_t i = 0; i < 3; i++) {
+		const struct bsdf *b = &w->bsdfs[w->parts[i].bsdf];
+		if (fabs(b->alpha - heat[i]) > 1e-6)
+			fail_msg("%u: alpha %g", i, b->alpha);
+	}
+	world_free(w);
+	/* Of colours the mean over some wavelengths, least at one node. */
+	w = world_of(SKY PLY("linear.ply", "<bsdf type='roughconductor'>" FIELD("alpha", "vertex_color") "</bsdf>"));
+	const struct wavelengths probe = {.nm = {450, 500, 550, 600}};
+	double least = INFINITY;
+	for (int k = 0; k < SIDE * SIDE; k++) {
+		double x = (k % SIDE + 0.5) / SIDE, y = 1 - (k / SIDE + 0.5) / SIDE;
+		const double rgb[3] = {x, y, 0.5 + (x - y) / 2};
+		least = fmin(least, spectrum_mean(color_eval_rgb_reflectance(rgb, &probe)));
+	}
+	if (fabs(w->bsdfs[0].alpha - least) > 1e-5)
+		fail_msg("alpha %g, not %g", w->bsdfs[0].alpha, least);
+	world_free(w);
+}
+
+/* 0.6 takes floats at vertices as sRGB, unless the shape says that they are not. */
+static void test_vertexcolors(void **state)
+{
+	(void)state;
+#define COLOURS "<bsdf type='diffuse'><texture type='vertexcolors' name='reflectance'/></bsdf>"
+	struct world *w =
+		world_of(SKY PLY("grid.ply", COLOURS) PLY("grid.ply", COLOURS "<boolean name='srgb' value='false'/>"));
+	for (uint32_t i = 0; i < 2; i++) {
+		struct surface_point x;
+		double rgb[3];
+		surface_on_triangle(&w->shapes[i], (struct prim_ref){i, 0}, 0, 0, &x);
+		node_colour(0, 0, rgb);
+		for (int k = 0; k < 3 && i == 0; k++)
+			rgb[k] = pow((rgb[k] + 0.055) / 1.055, 2.4) * (rgb[k] > 0.04045);
+		assert_close(albedo(w, &x), color_eval_rgb_reflectance(rgb, &colour), 1e-5);
+	}
+	world_free(w);
+}
+
+static void test_shared(void **state)
+{
+	(void)state;
+	float a[6] = {0, 0.5, 1, 0.25, 0, 0}, b[6], c[6] = {0, 0.5, 1, 0.25, 0, 0.125};
+	memcpy(b, a, sizeof b);
+	struct attribute of[3] = {{.name = "vertex_a", .channels = 3, .value = a},
+				  {.name = "vertex_b", .channels = 3, .value = b},
+				  {.name = "vertex_c", .channels = 3, .value = c}};
+	struct arena arena = {0};
+	struct attribute_pool pool = {NULL};
+	struct attribute_table t = {.vertex_count = 2, .attributes = of, .count = 3, .pool = &pool};
+	const struct attribute_values *first = attribute_keep(&t, &of[0], false, &arena);
+	assert_true(first && t.asked && first->value != a && memcmp(first->value, a, sizeof a) == 0);
+	assert_true(first->least == 0 && first->most == 1 && !first->grey);
+	assert_ptr_equal(attribute_keep(&t, &of[1], false, &arena), first);
+	assert_ptr_not_equal(attribute_keep(&t, &of[2], false, &arena), first);
+	const struct attribute_values *decoded = attribute_keep(&t, &of[1], true, &arena);
+	assert_true(decoded != first && decoded->value[2] == 1 && decoded->value[1] < 0.25F);
+	of[1].channels = 1; /* the same bytes as two numbers a vertex less */
+	assert_ptr_not_equal(attribute_keep(&t, &of[1], false, &arena), first);
+	arena_fini(&arena);
+}
+
+static void refuses(const char *body, const char *sentence)
+{
+	static char xml[TEXT_MAX];
+	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW SKY "%s</scene>", body);
+	const struct memory_file files[] = {
+		{"s.xml", xml, (size_t)n}, {"grid.ply", grid, write_grid(grid, -1, false)}, {NULL, NULL, 0}};
+	struct asset_source assets = memory_assets(files);
+	struct render_summary m;
+	struct render_options o = {0};
+	struct scene s;
+	struct error e = {""};
+	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
+	if (!rc) {
+		rc = render_check(&s, &assets, &o, &m, &e);
+		scene_fini(&s);
+	}
+	if (rc >= 0 || !strstr(e.text, sentence))
+		fail_msg("%s\n gave: %s\n not: %s", body, e.text, sentence);
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+#define OF(attribute) DIFFUSE(FIELD("reflectance", attribute))
+	refuses(PLY("grid.ply", OF("vertex_colour")),
+		"the mesh of grid.ply (line 1) has no attribute `vertex_colour`, only vertex_color, vertex_pair, "
+		"vertex_wild, face_heat; did you mean `vertex_color`?");
+	refuses("<shape type='rectangle'>" OF("vertex_color") "</shape>",
+		"the rectangle of line 1 has no attribute `vertex_color`, nor any other");
+	refuses("<shape type='sphere'>" OF("face_heat") "</shape>",
+		"the sphere of line 1 has no attribute `face_heat`");
+	refuses("<shape type='cube'>" COLOURS "</shape>", "the cube of line 1 has no attribute `vertex_color`");
+	refuses(PLY("grid.ply", OF("color")), "needs a name that begins with `vertex_` or `face_`");
+	refuses(PLY("grid.ply", OF("vertex_pair")), "`vertex_pair` of the mesh of grid.ply (line 1) has two channels");
+	refuses(PLY("grid.ply", OF("vertex_wild")), "has a value that is not finite, or beyond 1e12");
+	refuses(PLY("grid.ply", "<bsdf type='bumpmap'><bsdf type='diffuse'/>" FIELD("", "face_heat") "</bsdf>"),
+		"an attribute of a mesh cannot be a bump or normal map");
+	refuses(PLY("grid.ply", FIELD("displacement", "face_heat") "<integer name='displacement_level' value='1'/>"),
+		"an attribute of a mesh cannot displace a surface");
+	refuses("<emitter type='projector'>" FIELD("irradiance", "face_heat") "</emitter>",
+		"only what lies on a mesh has its attributes");
+}
+
+static int teardown(void **state)
+{
+	(void)state;
+	pictures_fini(&pictures);
+	return 0;
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_linear), cmocka_unit_test(test_picture),	 cmocka_unit_test(test_faces),
+		cmocka_unit_test(test_light),  cmocka_unit_test(test_roughness), cmocka_unit_test(test_vertexcolors),
+		cmocka_unit_test(test_shared), cmocka_unit_test(test_refused),
+	};
+	return cmocka_run_group_tests(tests, NULL, teardown);
+}

@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Numbers that a mesh has at its vertices, linear between them, or one for each triangle: `mesh_attribute` of 3.x, and
+ * `vertexcolors` of 0.5/0.6, which are the attribute vertex_color. Colours are mixed as linear rgb and upsampled then;
+ * one number is grey. Reflectances are clamped to [0,1], as those of pictures are.
+ *
+ * Nothing here knows how an attribute changes with (u,v), so that it displaces nothing and bends no normals.
+ */
+#include "worker/render/texture/attribute_table.h"
+#include "worker/render/texture/texture.h"
+
+#include <string.h>
+
+struct mesh_attribute {
+	const float *value;
+	const uint32_t (*index)[3]; /* NULL: a value for each triangle */
+	size_t channels;
+	double scale, max;
+	enum color_role role;
+	enum color_shape shape;
+};
+
+static int refuse_role(const struct scene_node *n, enum color_role role, struct error *e)
+{
+	const char *what = role == COLOR_HEIGHT	  ? "displace a surface"
+			   : role == COLOR_RELIEF ? "be a bump or normal map"
+						  : "stand for this quantity";
+	return node_error(n, e, ENOTSUP, "an attribute of a mesh cannot %s", what);
+}
+
+static void find_bounds(struct mesh_attribute *m, const struct attribute_values *v)
+{
+	double ends[2] = {m->scale * (double)v->least, m->scale * (double)v->most};
+	double most = fmax(fmax(ends[0], ends[1]), 0);
+	if (m->role == COLOR_ILLUMINANT) {
+		m->shape = v->grey ? COLOR_SHAPE_D65 : COLOR_SHAPE_OTHER;
+		m->max = most * color_max_d65();
+		return;
+	}
+	/* The spectrum of a colour is not bounded by the colour's components. */
+	m->shape = v->grey ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_OTHER;
+	m->max = v->grey ? fmin(most, 1) : 1;
+}
+
+static int make(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
+		const struct texture_build *build, struct error *e)
+{
+	struct attribute_table *table = build->attributes;
+	if (role != COLOR_REFLECTANCE && role != COLOR_ILLUMINANT)
+		return refuse_role(n, role, e);
+	if (!table)
+		return node_error(n, e, EINVAL, "only what lies on a mesh has its attributes");
+	const struct attribute *a = attribute_find(table, name, n, e);
+	if (!a)
+		return -EINVAL;
+	bool decode = a->encoded && strcmp(n->type, "vertexcolors") == 0;
+	const struct attribute_values *v = attribute_keep(table, a, decode, build->arena);
+	struct mesh_attribute *m = arena_alloc(build->arena, 1, sizeof *m);
+	if (!v || !m)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*m = (struct mesh_attribute){.value = v->value,
+				     .index = a->per_face ? NULL : table->index,
+				     .channels = v->channels,
+				     .scale = node_float(n, "scale", 1),
+				     .role = role};
+	find_bounds(m, v);
+	t->data = m;
+	return 0;
+}
+
+static int attribute_create(struct texture *t, const struct scene_node *n, enum color_role role,
+			    const struct texture_build *build, struct error *e)
+{
+	const char *name = node_string(n, "name", "");
+	if (strncmp(name, "vertex_", 7) != 0 && strncmp(name, "face_", 5) != 0)
+		return node_error(n, e, EINVAL, "needs a name that begins with `vertex_` or `face_`");
+	return make(t, n, name, role, build, e);
+}
+
+static int vertexcolors_create(struct texture *t, const struct scene_node *n, enum color_role role,
+			       const struct texture_build *build, struct error *e)
+{
+	return make(t, n, "vertex_color", role, build, e);
+}
+
+static void look_up(const struct mesh_attribute *m, const struct texture_point *at, double rgb[3])
+{
+	size_t step = m->channels > 1, n = m->channels;
+	if (!m->index) {
+		const float *p = m->value + at->prim * n;
+		for (size_t k = 0; k < 3; k++)
+			rgb[k] = m->scale * (double)p[k * step];
+		return;
+	}
+	const uint32_t *i = m->index[at->prim];
+	const float *p0 = m->value + i[0] * n, *p1 = m->value + i[1] * n, *p2 = m->value + i[2] * n;
+	double b0 = 1 - at->b1 - at->b2;
+	for (size_t k = 0; k < 3; k++) {
+		size_t c = k * step;
+		rgb[k] = m->scale * (b0 * (double)p0[c] + at->b1 * (double)p1[c] + at->b2 * (double)p2[c]);
+	}
+}
+
+static spectrum mesh_attribute_eval(const struct texture *t, const struct texture_point *at,
+				    const struct wavelengths *w)
+{
+	const struct mesh_attribute *m = t->data;
+	double rgb[3], most = m->role == COLOR_REFLECTANCE ? 1 : INFINITY;
+	look_up(m, at, rgb);
+	for (int k = 0; k < 3; k++)
+		rgb[k] = fmin(fmax(rgb[k], 0), most);
+	return m->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
+}
+
+static double mesh_attribute_max(const struct texture *t)
+{
+	return ((const struct mesh_attribute *)t->data)->max;
+}
+
+static enum color_shape mesh_attribute_shape(const struct texture *t)
+{
+	return ((const struct mesh_attribute *)t->data)->shape;
+}
+
+static const struct param mesh_attribute_params[] = {
+	{.name = "name", .types = VALUE_STRING},
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
+	{.name = NULL},
+};
+
+/* They are made in roles alone that ask for neither a height nor a slope. */
+const struct texture_ops texture_ops_mesh_attribute = {
+	.type = "mesh_attribute",
+	.params = mesh_attribute_params,
+	.create = attribute_create,
+	.eval = mesh_attribute_eval,
+	.max = mesh_attribute_max,
+	.shape = mesh_attribute_shape,
+};
+
+static const struct param no_params[] = {{.name = NULL}};
+
+const struct texture_ops texture_ops_vertexcolors = {
+	.type = "vertexcolors",
+	.params = no_params,
+	.create = vertexcolors_create,
+	.eval = mesh_attribute_eval,
+	.max = mesh_attribute_max,
+	.shape = mesh_attribute_shape,
+};
