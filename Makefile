@@ -122,8 +122,15 @@ LIMIT := $(BUILD)/tests/limit/limit
 $(LIMIT): tests/limit/limit.c
 	@mkdir -p $(@D)
 	$(CC) $(CPPFLAGS) $(filter-out -fsanitize% -fno-sanitize%,$(CFLAGS)) $< -o $@
+# A worker with faults, for end-to-end tests: the daemon's objects, with functions of its own between some of them. The build id is
+# hslt-worker's, and so is the numeric fingerprint.
+FAULTY_WORKER := $(BUILD)/tests/e2e/faulty_worker
+FAULTY_WRAP   := -Wl,--wrap=render_lease,--wrap=batch_pack,--wrap=conn_send_frame
+$(FAULTY_WORKER): $(BUILD)/bin/hslt-worker $(call obj,tests/e2e/faulty_worker.c worker/daemon/main.c) $(LIB_DAEMON) $(LIB_RENDER) $(LIB_COMMON)
+	@mkdir -p $(@D); id=$$(LC_ALL=C readelf -n $< | sed -n 's/.*Build ID: //p'); \
+	$(CC) $(LDFLAGS) -Wl,--build-id=$${id:+0x}$${id:-none} $(FAULTY_WRAP) -o $@ $(filter-out $<,$^) $(LIBS_RENDER) $(LIBS_COMMON)
 # The sources of the fuzzers are compiled with every build of the tests; linked they are with clang only.
-tests: $(TEST_BIN) $(LIMIT) $(call obj,$(wildcard tests/fuzz/*.c))
+tests: $(TEST_BIN) $(LIMIT) $(FAULTY_WORKER) $(call obj,$(wildcard tests/fuzz/*.c))
 # Sanitized runs take 1/20 of the samples.
 test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
@@ -153,7 +160,7 @@ test-numerics: programs $(NUMERICS_BIN)
 
 # What happens to machines while a job runs, each fault as often as the tables of tests/e2e/README.md say, which it writes.
 .PHONY: test-faults
-test-faults: programs $(BUILD)/tests/coordinator/power_loss/test_power
+test-faults: programs $(FAULTY_WORKER) $(BUILD)/tests/coordinator/power_loss/test_power
 	sh tests/e2e/faults.sh $(BUILD) --write
 
 # Fuzzers: tests/fuzz/fuzz_*.c, one libFuzzer program each; run.sh calls `make fuzzers` with clang and its sanitizers.
@@ -170,7 +177,7 @@ fuzz:
 
 # A worker that spoils chain states among honest ones, 50 seeds: the bits of hslt-render; one of them is part of the tests.
 .PHONY: test-states
-test-states: programs
+test-states: programs $(FAULTY_WORKER)
 	SEEDS="$$(seq -s ' ' 50)" sh tests/e2e/states.sh $(BUILD)
 
 # Scenes with extreme numbers against a farm of sanitized workers.

@@ -51,7 +51,7 @@ struct option_row {
 	double least, most, unit;
 	bool above, below;	 /* the bound itself is excluded */
 	bool needed;		 /* a text: it is a usage error if it stays NULL */
-	bool hidden;		 /* for tests, or an old name: not shown, and not to be cut short */
+	bool hidden;		 /* an old name: not shown, and not to be cut short */
 	const char *standard;	 /* the default, read as an argument is; NULL: what the struct holds already */
 	const char *environment; /* the variable that stands in for the option; NULL: none */
 	option_values *values;	 /* the only arguments that there are; NULL: any */

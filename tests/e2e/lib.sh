@@ -132,6 +132,16 @@ start_worker() {
 	PIDS="$PIDS $WORKER"
 }
 
+# start_faulty_worker NAME FAULTS [OPTION...]: one that does wrong what FAULTS lists (faulty_worker.c)
+start_faulty_worker() {
+	name=$1 faults=$2
+	shift 2
+	[ -x "$BUILD/tests/e2e/faulty_worker" ] || fail "no $BUILD/tests/e2e/faulty_worker; make tests builds it"
+	HSLT_FAULTS=$faults "$BUILD/tests/e2e/faulty_worker" --threads 1 --name "$name" --cache "$DIR/cache" "$@" 2>>"$DIR/$name.log" &
+	WORKER=$!
+	PIDS="$PIDS $WORKER"
+}
+
 # renders PID: the process of that worker that renders; the worker itself only sees to it
 renders() {
 	tr -d ' ' <"/proc/$1/task/$1/children"

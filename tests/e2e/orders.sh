@@ -130,7 +130,7 @@ job fetch "$f" -o "$DIR/tighter.exr"
 same "$DIR/tighter.exr" "$DIR/target.exr"
 
 # what went wrong is counted over restarts and ends
-start_worker twice --test-repeat
+start_faulty_worker twice repeat
 until_true 10 grep -q 'event=peer_hello.*name="twice"' "$DIR/coordinator.log" || fail "the second worker does not come"
 h=$(submit "$BOX" -o "$DIR/h.exr" --integrator path --spp 500)
 repeated() {

@@ -11,7 +11,7 @@ tiles=$(ls "$DIR/partials" | wc -l)
 [ "$tiles" -gt 0 ] || fail "no partial tiles were kept"
 head -c 4 "$DIR/partials/$(ls "$DIR/partials" | head -n 1)" | od -An -tx1 | grep -q '76 2f 31 01' || fail "a tile is no EXR"
 stop $WORKER
-start_worker twice --test-repeat
+start_faulty_worker twice repeat
 id=$(submit "$BOX" -o "$DIR/twice.exr" $JOB --wait)
 same "$DIR/once.exr" "$DIR/twice.exr"
 [ "$(value "$id" repeats)" -gt 0 ] || [ "$(value "$id" refused)" -gt 0 ] || fail "nothing was repeated"

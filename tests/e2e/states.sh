@@ -4,12 +4,8 @@
 # hslt-render. SEEDS="1 2 ..." (1): two jobs each; make test-states has 50.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
-export HSLT_TEST=1
 
 JOB="--size 64x64 --bootstrap 5000 --mutations 128000 --chains 64 --epoch 250 --groups 8"
-if (unset HSLT_TEST; "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --test-spoil-states 1) 2>/dev/null; then
-	fail "a worker spoils states outside of tests"
-fi
 
 honest() {
 	for p in $honest; do
@@ -30,7 +26,7 @@ done
 again=0
 for seed in ${SEEDS:-1}; do
 	for integrator in hslt pssmlt; do
-		start_worker liar-$seed-$integrator --cache "$DIR/liar-$seed-$integrator" --test-spoil-states 1
+		start_faulty_worker liar-$seed-$integrator spoil=1 --cache "$DIR/liar-$seed-$integrator"
 		liar=$WORKER
 		id=$(submit "$BOX" -o "$DIR/all.exr" $JOB --integrator $integrator --seed $seed)
 		"$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB --integrator $integrator --seed $seed 2>"$DIR/render.log"

@@ -4,7 +4,6 @@
 # unverified is said. Before: what becomes of connections when a worker starts again.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
-export HSLT_TEST=1
 
 # says FILE WORDS
 says() {
@@ -18,10 +17,6 @@ aside() {
 
 JOB="--integrator hslt --size 96x96 --bootstrap 20000 --mutations 640000 --chains 64 --epoch 2500"
 "$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB 2>"$DIR/render.log"
-for o in lie large spoil-states; do
-	(unset HSLT_TEST; code 2 timeout 100 "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --test-$o 1)
-	grep -q -e "--test-$o is for tests alone" "$DIR/err.log" || fail "--test-$o outside of tests: $(cat "$DIR/err.log")"
-done
 
 start_coordinator --heartbeat 60
 python3 "$HERE/lives.py" "${COORDINATOR#*:}" || fail "lives of workers"
@@ -34,7 +29,7 @@ waits() {
 	[ "$(value "$id" waiting | cut -c 1-38)" = "verification waits for a second worker" ]
 }
 until_true 20 waits || fail "it waits for '$(value "$id" waiting)'"
-start_worker liar --test-lie 2
+start_faulty_worker liar lie=2
 liar=$WORKER
 until_true 10 grep -q 'event=peer_hello.*name="liar"' "$DIR/coordinator.log" || fail "the liar does not come"
 start_worker honest2
@@ -73,7 +68,7 @@ kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 start_coordinator --forgive liar
 says "$DIR/coordinator.log" "event=worker_forgiven"
-start_worker liar --test-lie 1
+start_faulty_worker liar lie=1
 id=$(submit "$BOX" -o "$DIR/some.exr" $JOB --verify 0.3)
 until_true 20 waits || fail "it waits for '$(value "$id" waiting)'"
 start_worker honest3

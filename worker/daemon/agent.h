@@ -27,12 +27,6 @@ struct agent_config {
 	double idle_seconds;  /* without a lease for so long: it leaves; 0: never */
 	double stall_seconds; /* a lease or a building that makes no progress for so long hangs; 0: nobody looks */
 	bool insecure;
-	unsigned spoil; /* tests: of so many leases one is answered with spoiled chain states; 0: none */
-	unsigned large; /* tests: one of so many results has a pixel of 1e30; 0: none */
-	unsigned lie;	/* tests: one of so many results has a wrong bit; 0: none */
-	bool repeat;	/* tests: every result is sent twice */
-	unsigned crash; /* tests: this lease, counted from 1, ends the process that renders; 0: none */
-	unsigned hang;	/* tests: this lease, counted from 1, never ends; 0: none */
 };
 
 enum { AGENT_HUNG = 75 };   /* exit code: to be started again */

@@ -27,11 +27,10 @@ struct agent {
 	struct job_cache *bundles;
 	struct fetch *fetches;
 	struct lease_task *leases;
-	uint64_t clock;	   /* of uses of bundles */
-	uint64_t rendered; /* leases begun */
-	bool backlog;	   /* so many results wait to be acknowledged that no more are made */
-	uint64_t busy_at;  /* ms of the loop: when it had a lease last */
-	bool watched;	   /* the service manager waits to hear of us */
+	uint64_t clock;	  /* of uses of bundles */
+	bool backlog;	  /* so many results wait to be acknowledged that no more are made */
+	uint64_t busy_at; /* ms of the loop: when it had a lease last */
+	bool watched;	  /* the service manager waits to hear of us */
 	bool leaving, gone;
 	bool refused; /* for good */
 	char why[256];

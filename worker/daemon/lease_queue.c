@@ -105,11 +105,6 @@ static void start_lease(struct agent *a, struct lease_task *l)
 {
 	l->owner = a;
 	l->finished = on_rendered;
-	l->spoil = a->config.spoil && a->rendered % a->config.spoil == 0 ? a->rendered + 1 : 0;
-	l->large = a->config.large && a->rendered % a->config.large == 0;
-	l->lie = a->config.lie && a->rendered % a->config.lie == 0;
-	l->hangs = ++a->rendered == a->config.hang;
-	l->crashes = a->rendered == a->config.crash;
 	lease_task_start(l, a->thread_pool);
 }
 

@@ -24,12 +24,8 @@ struct lease_task {
 	struct job_cache *bundle;
 	enum lease_task_state state;
 	atomic_bool stop;
-	bool hangs;	 /* tests: it never ends */
-	bool crashes;	 /* tests: by SIGSEGV */
-	bool unwanted;	 /* nobody waits for it: dropped when its thread lets go */
-	bool lie, large; /* tests */
-	uint64_t spoil;	 /* tests: not 0: a number for what happens to its chain states */
-	bool sent;	 /* on this connection */
+	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
+	bool sent;     /* on this connection */
 	unsigned char *frame;
 	size_t frame_size;
 	/* set by the thread */

@@ -7,7 +7,6 @@
 #include "worker/daemon/supervise.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -47,26 +46,8 @@ static const struct option_row rows[] = {
 	{"insecure", 0, NULL, "Connect to other than loopback addresses without encryption",
 	 OPTION_FLAG(CONFIG, insecure)},
 	{"verbose", 'v', NULL, "Log more", OPTION_TAKE(take_verbose)},
-	{"test-spoil-states", 0, "N", "Spoil the chain states of one of N results", OPTION_COUNT(CONFIG, spoil, 1, 1e6),
-	 .hidden = true},
-	{"test-large", 0, "N", "Make a pixel of one of N results 1e30", OPTION_COUNT(CONFIG, large, 1, 1e6),
-	 .hidden = true},
-	{"test-lie", 0, "N", "Flip a bit in one of N results", OPTION_COUNT(CONFIG, lie, 1, 1e6), .hidden = true},
-	{"test-repeat", 0, NULL, "Send every result twice", OPTION_FLAG(CONFIG, repeat), .hidden = true},
-	{"test-crash", 0, "N", "The N-th lease of each process that renders ends it by SIGSEGV",
-	 OPTION_COUNT(CONFIG, crash, 1, 1e9), .hidden = true},
-	{"test-hang", 0, "N", "The N-th lease never ends", OPTION_COUNT(CONFIG, hang, 1, 1e9), .hidden = true},
 	{0},
 };
-
-static int check(void *target, struct error *e)
-{
-	const struct agent_config *c = target;
-	const char *wrong = c->lie ? "lie" : c->large ? "large" : c->spoil ? "spoil-states" : NULL;
-	if (wrong && !getenv("HSLT_TEST"))
-		return error_set(e, EINVAL, "--test-%s is for tests alone: it makes wrong images", wrong);
-	return 0;
-}
 
 static const struct program program = {
 	.name = "hslt-worker",
@@ -82,7 +63,7 @@ static const struct program program = {
 		"failed and the process is started again. Under systemd it says when it is ready and feeds the watchdog.",
 	.exits =
 		"0 stopped, 1 failed, 2 usage, 6 refused for good (a certificate of another role, another version), 75 a thread hung",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL},
 };
 
 static int run(void *user)

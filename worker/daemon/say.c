@@ -74,14 +74,12 @@ void say_result(struct agent *a, struct lease_task *l)
 {
 	if (!a->conn || !a->welcome || l->sent)
 		return;
-	for (int i = 0; i < 1 + a->config.repeat; i++) {
-		unsigned char *copy = mem_alloc(l->frame_size, 1);
-		if (!copy) { /* offered again after the next connect */
-			conn_close(a->conn, "no memory to send a result");
-			return;
-		}
-		memcpy(copy, l->frame, l->frame_size);
-		conn_send_frame(a->conn, copy, l->frame_size);
+	unsigned char *copy = mem_alloc(l->frame_size, 1);
+	if (!copy) { /* offered again after the next connect */
+		conn_close(a->conn, "no memory to send a result");
+		return;
 	}
+	memcpy(copy, l->frame, l->frame_size);
+	conn_send_frame(a->conn, copy, l->frame_size);
 	l->sent = true;
 }

@@ -35,6 +35,10 @@ worker() {
 	start_worker "$@" -v
 }
 
+faulty_worker() {
+	start_faulty_worker "$@" -v
+}
+
 # again [OPTION...]: the coordinator, at the same place, from the same spool
 again() {
 	wait "$COORDINATOR_PID" 2>/dev/null || :

@@ -17,21 +17,18 @@ somebody_holds() {
 
 fault liar 1 1 "a worker returns wrong results, and every lease is verified"
 liar() {
-	export HSLT_TEST=1
 	farm
 	worker w0
 	worker w1
-	worker w2 --test-lie 2
+	faulty_worker w2 lie=2
 	job --verify 100%
 	finish_job
 	[ "$(value "$ID" mismatched)" -gt 0 ] || fail "$NAME: nobody has lied"
 	blameless
-	unset HSLT_TEST
 }
 
 fault spoiled_states 5 1 "a worker returns wrong results and spoils their chain states: who goes on from these finds out, nothing is verified"
 spoiled_states() {
-	export HSLT_TEST=1
 	farm
 	worker w0
 	job
@@ -40,7 +37,6 @@ spoiled_states() {
 	worker w2
 	finish_job
 	taken_back
-	unset HSLT_TEST
 }
 # after the bootstrap, and long before the last epochs: nobody goes on from those
 while_chains_go_on() {
@@ -53,7 +49,7 @@ while_chains_go_on() {
 }
 somebody_spoils() {
 	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
-	worker "liar$i" --cache "$DIR/cache$i" --test-spoil-states 1 --test-lie 1 --test-hang 3 # of no life of another
+	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # of no life of another
 	says coordinator "event=peer_hello .*name=\"liar$i\""
 	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	says "liar$i" 'event=batch_acknowledged .*kind=2'
@@ -69,7 +65,6 @@ taken_back() {
 CHECKPOINTS=
 fault spoiled_restart 5 1 "the same, and the coordinator is killed and started again right after that"
 spoiled_restart() {
-	export HSLT_TEST=1
 	# shellcheck disable=SC2086
 	farm $CHECKPOINTS
 	worker w0
@@ -79,7 +74,6 @@ spoiled_restart() {
 	worker w2
 	finish_job
 	taken_back
-	unset HSLT_TEST
 }
 spoils_before_a_restart() {
 	somebody_spoils
@@ -98,11 +92,10 @@ spoiled_checkpoint() {
 
 fault large_pixel 1 1 "a worker sends results with a pixel of 1e30: they are refused, and it is set aside"
 large_pixel() {
-	export HSLT_TEST=1
 	farm
 	worker w0
 	worker w1
-	worker w2 --test-large 1
+	faulty_worker w2 large=1
 	until_true 30 grep -q 'event=peer_hello.*name="w2"' "$DIR/coordinator.log" || fail "$NAME: w2 does not come"
 	job
 	finish_job
@@ -110,7 +103,6 @@ large_pixel() {
 	! grep 'event=batch_refused' "$DIR/coordinator.log" | grep -v 'worker="w2"\|text="the job is over"' || fail "$NAME: others are refused"
 	"$BIN/hslt-status" | grep -q '^w2 .* aside ' || fail "$NAME: $("$BIN/hslt-status")"
 	blameless
-	unset HSLT_TEST
 }
 
 fault targets 4 4 "an image is fetched into a FIFO, a device, a symbolic link, an open descriptor: these stay what they are"

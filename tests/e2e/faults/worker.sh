@@ -104,7 +104,7 @@ slow_worker() {
 fault repeat_worker 1 1 "a worker sends every result twice"
 repeat_worker() {
 	farm
-	worker w0 --test-repeat
+	faulty_worker w0 repeat
 	worker w1
 	job
 	finish_job
@@ -123,7 +123,7 @@ hang_worker() {
 # The job is held until it has come, lest the others have nothing left for it; if it has ended there is nothing to hang in.
 one_thread_hangs() {
 	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || { [ $i -gt 1 ] && return 0; } || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
-	worker "h$i" --threads 2 --stall 0.5 --test-hang 1
+	faulty_worker "h$i" hang=1 --threads 2 --stall 0.5
 	says "h$i" event=connect
 	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	CODE=0
@@ -147,7 +147,7 @@ crash_worker() {
 # The worker stays: it says what ended the process, and pauses. The other one stands still meanwhile, lest it computes that lease.
 one_process_crashes() {
 	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
-	worker "h$i" --test-crash 1
+	faulty_worker "h$i" crash=1
 	says "h$i" event=connect
 	kill -STOP "$(renders "$OTHER")"
 	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"

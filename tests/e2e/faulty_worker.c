@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A worker with faults: the objects of hslt-worker, and its build id, so that the coordinator takes it for one. The
+ * linker puts the __wrap_ functions below between the daemon and the functions of their names (--wrap, in the
+ * Makefile). HSLT_FAULTS lists what it does wrong, separated by commas:
+ *
+ *   lie=N     one of N results has one wrong bit
+ *   large=N   one of N results has a pixel of 1e30
+ *   spoil=N   one of N results has spoiled chain states
+ *   repeat    every result is sent twice
+ *   crash=N   the N-th lease of a process raises SIGSEGV
+ *   hang=N    the N-th lease of a process never ends
+ *
+ * Leases are counted as their threads begin them. Of N results the first, the (N+1)-th and so on are wrong.
+ */
+#include "common/base/mem.h"
+#include "common/net/conn.h"
+#include "common/wire/batch_wire.h"
+#include "worker/render/render.h"
+
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+int __real_render_lease(const struct world *w, const struct plan *p, const struct lease_key *k,
+			const struct lease_input *in, const atomic_bool *stop, enum lease_end *end, struct batch *out,
+			struct error *e);
+int __wrap_render_lease(const struct world *w, const struct plan *p, const struct lease_key *k,
+			const struct lease_input *in, const atomic_bool *stop, enum lease_end *end, struct batch *out,
+			struct error *e);
+int __real_batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size,
+		      struct error *e);
+int __wrap_batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size,
+		      struct error *e);
+void __real_conn_send_frame(struct conn *c, unsigned char *frame, size_t size);
+void __wrap_conn_send_frame(struct conn *c, unsigned char *frame, size_t size);
+
+enum fault { LIE, LARGE, SPOIL, REPEAT, CRASH, HANG, FAULTS };
+
+static const char *const names[FAULTS] = {"lie", "large", "spoil", "repeat", "crash", "hang"};
+static unsigned long every[FAULTS]; /* 0: not this fault */
+static atomic_ulong begun;
+static _Thread_local unsigned long lease; /* of this thread, counted from 1 */
+
+static void usage(const char *wrong)
+{
+	fprintf(stderr, "faulty_worker: HSLT_FAULTS: '%s' is none of lie=N large=N spoil=N repeat crash=N hang=N\n",
+		wrong);
+	_exit(2);
+}
+
+static void read_fault(const char *text)
+{
+	const char *equals = strchr(text, '=');
+	size_t length = equals ? (size_t)(equals - text) : strlen(text);
+	char *end = NULL;
+	for (int i = 0; i < FAULTS; i++) {
+		if (strlen(names[i]) != length || strncmp(names[i], text, length) != 0 || !equals != (i == REPEAT))
+			continue;
+		every[i] = equals ? strtoul(equals + 1, &end, 10) : 1;
+		if (every[i] && (!end || !*end))
+			return;
+	}
+	usage(text);
+}
+
+/* Before main, whose options are those of hslt-worker. */
+__attribute__((constructor)) static void read_faults(void)
+{
+	const char *list = getenv("HSLT_FAULTS");
+	char text[256];
+	if (!list || !*list || strlen(list) >= sizeof text)
+		usage(list ? list : "");
+	memcpy(text, list, strlen(list) + 1);
+	for (char *rest = text, *one; (one = strsep(&rest, ","));)
+		read_fault(one);
+}
+
+static bool is_due(enum fault f)
+{
+	return every[f] && (lease - 1) % every[f] == 0;
+}
+
+int __wrap_render_lease(const struct world *w, const struct plan *p, const struct lease_key *k,
+			const struct lease_input *in, const atomic_bool *stop, enum lease_end *end, struct batch *out,
+			struct error *e)
+{
+	lease = atomic_fetch_add(&begun, 1) + 1;
+	if (lease == every[CRASH])
+		raise(SIGSEGV);
+	while (lease == every[HANG])
+		pause();
+	return __real_render_lease(w, p, k, in, stop, end, out, e);
+}
+
+static float *first_value(const struct batch *b)
+{
+	return b->tile_count ? b->tiles[0].xyz : b->weight_count ? b->weights : NULL;
+}
+
+/* The last bit of one number: the smallest error there is. */
+static void flip_a_bit(const struct batch *b)
+{
+	float *x = first_value(b);
+	uint32_t bits;
+	if (!x)
+		return;
+	memcpy(&bits, x, sizeof bits);
+	bits ^= 1;
+	memcpy(x, &bits, sizeof bits);
+}
+
+static uint64_t splitmix(uint64_t *state)
+{
+	uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
+	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+	return z ^ z >> 31;
+}
+
+enum damage { FLIP_BITS, WRITE_NUMBERS, WRITE_NOISE, CUT_OFF, ALL_NOISE };
+
+/* Damages a state behind its id, so that it still looks like that chain's. CUT_OFF and ALL_NOISE give no state of any
+ * plan; the others may give a valid one that is not the chain's, since in primary sample space most bits of a random
+ * number make another random number. */
+static void damage_state(struct chain_state *s, enum damage how, uint64_t *random)
+{
+	enum { ID = 8, TIMES = 8 };
+	static const double numbers[] = {NAN, INFINITY, -INFINITY, 1e308, -1e308, 5e-324, 1e-310, -0.0};
+	uint64_t left = s->size - ID;
+	for (int i = 0; i < TIMES; i++) {
+		uint8_t *at = s->bytes + ID + splitmix(random) % left;
+		if (how == FLIP_BITS)
+			*at ^= (uint8_t)(1u << splitmix(random) % 8);
+		else if (how == WRITE_NUMBERS)
+			memcpy(s->bytes + ID + splitmix(random) % (left / 8) * 8, &numbers[splitmix(random) % 8],
+			       sizeof *numbers);
+		else if (how == WRITE_NOISE)
+			*at = (uint8_t)splitmix(random);
+	}
+	for (uint64_t i = 0; how == ALL_NOISE && i < left; i++)
+		s->bytes[ID + i] = (uint8_t)splitmix(random);
+	if (how == CUT_OFF)
+		s->size -= (uint32_t)(1 + splitmix(random) % (left - 1));
+}
+
+/* The first state becomes invalid for certain, so that whoever resumes it must notice. */
+static void damage_states(const struct batch *b, uint64_t random)
+{
+	for (uint32_t i = 0; i < b->state_count; i++) {
+		uint64_t r = splitmix(&random);
+		if (b->states[i].size > 2 * sizeof(double))
+			damage_state(&b->states[i], (enum damage)(i == 0 ? CUT_OFF + r % 2 : r % 5), &random);
+	}
+}
+
+int __wrap_batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e)
+{
+	if (is_due(LIE))
+		flip_a_bit(b);
+	if (is_due(LARGE) && first_value(b))
+		*first_value(b) = 1e30f;
+	if (is_due(SPOIL))
+		damage_states(b, lease);
+	return __real_batch_pack(b, p, frame, size, e);
+}
+
+/* The worker sends its results, and nothing else, as frames. */
+void __wrap_conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
+{
+	unsigned char *copy = every[REPEAT] ? mem_alloc(size, 1) : NULL;
+	if (copy)
+		__real_conn_send_frame(c, memcpy(copy, frame, size), size);
+	__real_conn_send_frame(c, frame, size);
+}
