@@ -22,7 +22,7 @@ static void add_tally(struct tally *to, const struct tally *from, uint32_t group
 	struct canvas_counts refused = {{0}, {{0}}};
 	for (int i = COUNT_NAN; i <= COUNT_NEGATIVE; i++)
 		refused.counters[i] = from->counts.counters[i];
-	canvas_add_counts(&to->counts, all ? &from->counts : &refused);
+	canvas_counts_add(&to->counts, all ? &from->counts : &refused);
 }
 
 static double ratio(double a, double b)

@@ -4,7 +4,8 @@
 #define COMMON_ESTIMATE_MAKING_H
 
 #include "common/estimate/canvas_image.h"
-#include "common/film/canvas_private.h"
+#include "common/film/canvas_films.h"
+#include "common/film/moments_sums.h"
 
 /* An image on its way. */
 struct making {

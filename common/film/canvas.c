@@ -8,10 +8,12 @@
  * Failures leave the canvas as it was: -EEXIST and -EAGAIN say that the batch is not for now, -ERANGE that a sum would
  * leave the grid, -ENOSPC that there is no room for a tile.
  */
-#include "common/film/canvas_private.h"
+#include "common/film/canvas.h"
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "common/film/canvas_films.h"
+#include "common/film/canvas_moments.h"
 
 #include <assert.h>
 #include <fcntl.h>
@@ -319,20 +321,6 @@ static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t
 	return true;
 }
 
-/* A page of a sparse file that the disk has no room for would be a signal, not an error: reserve before touching. */
-int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
-{
-	uint8_t *flags = canvas_flags(c, film, tile);
-	if (!(*flags & TILE_BACKED) && c->fd >= 0) {
-		off_t at = (off_t)((film * canvas_tiles(c) + tile) * SLOT * sizeof *c->sums);
-		int code = disk_posix_fallocate(c->fd, at, SLOT * sizeof *c->sums);
-		if (code)
-			return error_set(e, code, "no room on the disk for the films: %s", strerror(code));
-	}
-	*flags |= TILE_BACKED;
-	return 0;
-}
-
 static size_t tile_index(const struct canvas *c, const struct tile *t)
 {
 	return (size_t)((t->y - c->plan.crop_y) / TILE_SIZE) * c->tiles_across + (t->x - c->plan.crop_x) / TILE_SIZE;
@@ -391,80 +379,11 @@ static void close_tile(struct canvas *c, size_t prefix, size_t open, size_t tile
 
 /* ---- what goes with the pixels */
 
-static uint64_t add_saturated(uint64_t a, uint64_t b)
-{
-	return a > UINT64_MAX - b ? UINT64_MAX : a + b;
-}
-
-static void add_counters(uint64_t to[BATCH_COUNTERS], const uint64_t from[BATCH_COUNTERS])
-{
-	for (int i = 0; i < BATCH_COUNTERS; i++) {
-		if (i == COUNT_LONGEST_STUCK)
-			to[i] = from[i] > to[i] ? from[i] : to[i];
-		else
-			to[i] = add_saturated(to[i], from[i]);
-	}
-}
-
-static void add_strategies(struct canvas_counts *to, const uint64_t (*from)[STRATEGY_COUNTERS], uint32_t count)
-{
-	for (uint32_t i = 0; i < count; i++)
-		for (int k = 0; k < STRATEGY_COUNTERS; k++)
-			to->strategy[i][k] = add_saturated(to->strategy[i][k], from[i][k]);
-}
-
-void canvas_add_counts(struct canvas_counts *to, const struct canvas_counts *from)
-{
-	add_counters(to->counters, from->counters);
-	add_strategies(to, from->strategy, BATCH_STRATEGIES);
-}
-
 void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out)
 {
 	*out = c->prefix.counts;
 	for (uint32_t i = 0; open_rounds && i < OPEN_ROUNDS; i++)
-		canvas_add_counts(out, &c->open[i].counts);
-}
-
-static void tally_batch(struct tally *t, const struct batch *b)
-{
-	add_counters(t->counts.counters, b->counters);
-	add_strategies(&t->counts, b->strategy, b->strategy_count);
-	uint32_t g = b->key.group;
-	t->group[g].samples += b->counters[COUNT_SAMPLES];
-	t->group[g].independent += b->counters[COUNT_INDEPENDENT];
-	bool finite = exact_sum_add(&t->group[g].sum, b->independent_sum) &&
-		      exact_sum_add(&t->group[g].beyond, b->beyond_sum);
-	assert(finite); /* batch_check */
-	(void)finite;
-}
-
-/* But the longest that a chain stood still, which is a maximum: it stays. */
-static void tally_take_back(struct tally *t, const struct batch *b)
-{
-	uint32_t g = b->key.group;
-	for (int i = 0; i < BATCH_COUNTERS; i++)
-		t->counts.counters[i] -= i == COUNT_LONGEST_STUCK ? 0 : b->counters[i];
-	for (uint32_t i = 0; i < b->strategy_count; i++)
-		for (int k = 0; k < STRATEGY_COUNTERS; k++)
-			t->counts.strategy[i][k] -= b->strategy[i][k];
-	t->group[g].samples -= b->counters[COUNT_SAMPLES];
-	t->group[g].independent -= b->counters[COUNT_INDEPENDENT];
-	bool finite = exact_sum_add(&t->group[g].sum, -b->independent_sum) &&
-		      exact_sum_add(&t->group[g].beyond, -b->beyond_sum);
-	assert(finite); /* as when it was added */
-	(void)finite;
-}
-
-static void tally_merge(struct tally *to, const struct tally *from, uint32_t groups)
-{
-	canvas_add_counts(&to->counts, &from->counts);
-	for (uint32_t g = 0; g < groups; g++) {
-		to->group[g].samples += from->group[g].samples;
-		to->group[g].independent += from->group[g].independent;
-		exact_sum_merge(&to->group[g].sum, &from->group[g].sum);
-		exact_sum_merge(&to->group[g].beyond, &from->group[g].beyond);
-	}
+		canvas_counts_add(out, &c->open[i].counts);
 }
 
 static void close_round(struct canvas *c)
@@ -493,7 +412,7 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 		return error_set(e, EEXIST, "the lease is merged already");
 	uint8_t *has = &c->has[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part];
 	if (k->kind == LEASE_BOOTSTRAP) {
-		tally_batch(&c->bootstrap, b);
+		tally_add(&c->bootstrap, b);
 		moments_add(c->moments, b, false);
 		*has = 1;
 		return 0;
@@ -509,7 +428,7 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 		rc = add_tiles(c, b, e);
 	if (rc)
 		return rc;
-	tally_batch(tally_of(c, k), b);
+	tally_add(tally_of(c, k), b);
 	moments_add(c->moments, b, closed);
 	if (closed) {
 		--*missing;

@@ -12,8 +12,7 @@
 #define COMMON_FILM_CANVAS_H
 
 #include "common/film/batch.h"
-#include "common/film/exact_sum.h"
-#include "common/film/path_class.h"
+#include "common/film/tally.h"
 
 struct canvas;
 
@@ -55,12 +54,6 @@ bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged al
 uint64_t canvas_rounds(const struct canvas *c);			    /* complete rounds */
 uint64_t canvas_merged(const struct canvas *c);			    /* render leases merged, open rounds too */
 
-/* Sums over render batches, each merged once; COUNT_LONGEST_STUCK is their maximum. Cells of the strategies that the
- * plan's mixture does not have are 0. */
-struct canvas_counts {
-	uint64_t counters[BATCH_COUNTERS];
-	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
-};
 /* Of the prefix of complete rounds, with open_rounds of all that has come. */
 void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);
 

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/canvas_moments.h"
 
-#include "common/film/canvas_private.h"
-
 #include "common/base/mem.h"
+#include "common/film/moments_sums.h"
 
 #include <assert.h>
 #include <math.h>

@@ -10,7 +10,7 @@
 #define COMMON_FILM_CANVAS_MOMENTS_H
 
 #include "common/base/checked_file.h"
-#include "common/film/canvas.h"
+#include "common/film/batch.h"
 
 struct moments;
 

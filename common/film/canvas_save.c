@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/canvas_save.h"
 
-#include "common/film/canvas_private.h"
+#include "common/film/canvas_films.h"
+#include "common/film/canvas_moments.h"
 
 #include <assert.h>
 #include <string.h>

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The inside of struct canvas and of its moments, for those who add to them here and those who make images of them
- * (common/estimate).
+ * The inside of struct canvas, for those who add to it here and those who make images of it (common/estimate).
  * A film holds one slot of TILE_SIZE x TILE_SIZE x 3 integers per tile of the crop, so that a tile that nothing touched
  * is a run of pages that nothing touched. Film `group * FILMS + which`; which: the prefix, or the open round's parity.
  */
-#ifndef COMMON_FILM_CANVAS_PRIVATE_H
-#define COMMON_FILM_CANVAS_PRIVATE_H
+#ifndef COMMON_FILM_CANVAS_FILMS_H
+#define COMMON_FILM_CANVAS_FILMS_H
 
-#include "common/film/canvas.h"
-#include "common/film/canvas_moments.h"
+#include "common/film/tally.h"
+
+struct moments;
 
 enum {
 	FILM_PREFIX,
@@ -20,15 +20,6 @@ enum {
 	OPEN_ROUNDS = 2
 };
 enum tile_flag { TILE_BACKED = 1, TILE_USED = 2 };
-
-/* What a round (or the prefix, or the bootstrap) has besides pixels. */
-struct tally {
-	struct canvas_counts counts;
-	struct {
-		uint64_t samples, independent;
-		struct exact_sum sum, beyond;
-	} group[PLAN_MAX_GROUPS];
-};
 
 struct canvas {
 	struct plan plan;
@@ -48,28 +39,8 @@ struct canvas {
 	struct moments *moments;
 };
 
-enum { MOMENTS_PREFIX, MOMENTS_OPEN, MOMENTS_SETS = 3 };
-
-/* First moments are times, at most the mutations made: 2^42 of them in one lease's chains fit. */
-#define MOMENTS_GRID 0x1p20
-struct moments {
-	struct plan plan;
-	uint32_t per_lease, leases, tiles; /* sequences of a lease; leases of a round */
-	int64_t *first;			   /* [set][lease][sequence][tile] */
-	int64_t *second;		   /* [set][lease][tile] */
-	struct exact_sum *time;		   /* [set][group][class] */
-	struct exact_sum *bootstrap;	   /* [group][class] */
-};
-
-static inline size_t moments_classes(const struct moments *m)
-{
-	return (size_t)m->plan.groups * PATH_CLASSES;
-}
-
 /* Reserves its place on the disk, before it is touched. */
 int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e);
-
-void canvas_add_counts(struct canvas_counts *to, const struct canvas_counts *from);
 
 static inline size_t canvas_tiles(const struct canvas *c)
 {

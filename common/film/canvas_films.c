@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/film/canvas_films.h"
+
+#include "common/base/disk.h"
+
+#include <string.h>
+
+/* A page of a sparse file that the disk has no room for would be a signal, not an error: reserve before touching. */
+int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
+{
+	uint8_t *flags = canvas_flags(c, film, tile);
+	if (!(*flags & TILE_BACKED) && c->fd >= 0) {
+		off_t at = (off_t)((film * canvas_tiles(c) + tile) * SLOT * sizeof *c->sums);
+		int code = disk_posix_fallocate(c->fd, at, SLOT * sizeof *c->sums);
+		if (code)
+			return error_set(e, code, "no room on the disk for the films: %s", strerror(code));
+	}
+	*flags |= TILE_BACKED;
+	return 0;
+}
