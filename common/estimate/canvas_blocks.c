@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/estimate/making.h"
+#include "common/estimate/canvas_blocks.h"
+
 #include "common/base/color.h"
+#include "common/film/canvas_films.h"
 
 static double ratio(double a, double b)
 {

@@ -5,11 +5,12 @@
  * bounds. What is made of the sums is canvas_interval.c's. All loops run in a fixed order over exact inputs, so that
  * equal films give equal bits.
  */
-#include "common/estimate/making.h"
-#include "common/base/color.h"
-#include "common/estimate/tail.h"
+#include "common/estimate/canvas_error.h"
 
+#include "common/base/color.h"
 #include "common/base/mem.h"
+#include "common/estimate/canvas_interval.h"
+#include "common/estimate/tail.h"
 
 #include <assert.h>
 #include <math.h>

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits.
  */
-#include "common/estimate/convergence.h"
-#include "common/estimate/making.h"
-#include "common/base/color.h"
+#include "common/estimate/canvas_image.h"
 
+#include "common/base/color.h"
 #include "common/base/mem.h"
+#include "common/estimate/canvas_error.h"
+#include "common/estimate/convergence.h"
+#include "common/estimate/moments_image.h"
 
 #include <math.h>
 #include <string.h>

@@ -18,7 +18,8 @@
  * are so unequal that those which count most may not have come: where their tail index does not rule out an infinite
  * variance.
  */
-#include "common/estimate/making.h"
+#include "common/estimate/canvas_interval.h"
+
 #include "common/estimate/quantile.h"
 #include "common/estimate/tail.h"
 

@@ -9,7 +9,7 @@
 #ifndef COMMON_ESTIMATE_CONVERGENCE_H
 #define COMMON_ESTIMATE_CONVERGENCE_H
 
-#include "common/estimate/canvas_image.h"
+#include "common/estimate/image.h"
 
 enum convergence_verdict {
 	CHAINS_AGREE,

@@ -16,7 +16,7 @@
 #ifndef COMMON_ESTIMATE_FORECAST_H
 #define COMMON_ESTIMATE_FORECAST_H
 
-#include "common/estimate/canvas_image.h"
+#include "common/estimate/image.h"
 
 enum { FORECAST_LOOKS = 64 };
 

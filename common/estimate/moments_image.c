@@ -3,8 +3,10 @@
  * Potential scale reduction (Gelman and Rubin 1992) by tile and energies of path classes, from the moments that a
  * canvas keeps. Fails for want of memory alone.
  */
+#include "common/estimate/moments_image.h"
+
 #include "common/base/mem.h"
-#include "common/estimate/making.h"
+#include "common/film/moments_sums.h"
 
 #include <math.h>
 

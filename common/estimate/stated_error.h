@@ -5,7 +5,7 @@
 #ifndef COMMON_ESTIMATE_STATED_ERROR_H
 #define COMMON_ESTIMATE_STATED_ERROR_H
 
-#include "common/estimate/canvas_image.h"
+#include "common/estimate/image.h"
 
 /* What the numbers mean; hslt-compare's are the same, with its reference for B. */
 #define REL_MSE_DEFINITION \

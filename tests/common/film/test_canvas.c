@@ -2,6 +2,7 @@
 #include "common/estimate/canvas_image.h"
 
 #include "common/base/mem.h"
+#include "common/estimate/canvas_blocks.h"
 #include "common/estimate/merge.h"
 
 #include <math.h>

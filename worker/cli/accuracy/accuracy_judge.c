@@ -6,6 +6,7 @@
 #include "worker/cli/accuracy/accuracy.h"
 
 #include "common/base/mem.h"
+#include "common/estimate/canvas_blocks.h"
 
 #include <math.h>
 #include <stdlib.h>

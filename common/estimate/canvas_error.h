@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The error of an image from the spread between groups. Private to common/estimate. */
+#ifndef COMMON_ESTIMATE_CANVAS_ERROR_H
+#define COMMON_ESTIMATE_CANVAS_ERROR_H
+
+#include "common/base/error.h"
+#include "common/estimate/making.h"
+
+/* Fills error and the relMSE of an image whose rgb is there; two or more groups, no open rounds. -ENOMEM */
+int canvas_error(struct making *m, struct error *e);
+
+#endif
