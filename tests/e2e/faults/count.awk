@@ -4,7 +4,7 @@
 # The film of a life is what the coordinator found on the disk when it started, and what it merged from then on. LOST are
 # results that were acknowledged and that it had to merge again in a later life, or that the last film does not hold; and
 # those of which a worker was told that they count and that never were on the disk. What a life merged and lost before it was
-# acknowledged is computed again and is no loss, nor is what the coordinator took back. DOUBLED: how often a film held a result beyond the first time. RESULTS: how
+# acknowledged is computed again and is no loss, nor is what the coordinator took back, before or after it was on the disk. DOUBLED: how often a film held a result beyond the first time. RESULTS: how
 # many the last film holds. AGAIN: the most epochs of one chain that were given out again because one worker was gone that had them, or
 # one life of the coordinator; one that is given to two at once, as at the end of a round, is no loss.
 
@@ -29,6 +29,8 @@ function add(k, fresh) {
 / event=start / && /program=hslt-coordinator/ {
 	started = 1
 	life++
+	split("", unstored)
+	split("", void)
 }
 
 / event=(peer_closed|peer_accept) .*text=/ { gone[life, get("peer")] = 1 }
@@ -46,16 +48,24 @@ function add(k, fresh) {
 	event = get("event")
 	if (event == "batch_acknowledged")
 		told[key(get("kind"), get("epoch"))] = 1
-	else if (event == "batch_stored")
-		stored[key(get("kind"), get("epoch"))] = 1
-	else if (event == "batch_taken_back") {
+	else if (event == "batch_stored") {
 		k = key(get("kind"), get("epoch"))
+		unstored[k]--
+		if (void[k] > 0) # on the disk, but taken back before
+			void[k]--
+		else
+			stored[k] = 1
+	} else if (event == "batch_taken_back") {
+		k = key(get("kind"), get("epoch"))
+		void[k] = unstored[k]
 		delete film[k]
 		delete stored[k]
 	} else if (event == "batch_restored" || event == "batch_merged") {
 		if (started)
 			split("", film)
 		started = 0
+		if (event == "batch_merged" && get("late") == "")
+			unstored[key(get("kind"), get("epoch"))]++
 		if (event == "batch_merged")
 			add(key(get("kind"), get("epoch")), get("late") == "") # late: from the journal
 		for (e = 0; event == "batch_restored" && e < get("epochs"); e++)
