@@ -11,7 +11,9 @@
 #include "tests/fuzz/messages.h"
 #include "tests/fuzz/seeds.h"
 #include "tests/support/checksummed_frame.h"
-#include "worker/daemon/agent_private.h"
+#include "worker/daemon/agent.h"
+#include "worker/daemon/fetch.h"
+#include "worker/daemon/lease_queue.h"
 
 #include <arpa/inet.h>
 #include <netinet/tcp.h>

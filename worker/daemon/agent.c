@@ -7,12 +7,14 @@
  * Failures: a connection that is lost is made again for ever; a refusal for good (another version, a certificate) ends
  * the daemon with its code; a thread that hangs ends the process after its other leases are given back.
  */
-#include "worker/daemon/agent_private.h"
+#include "worker/daemon/agent.h"
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/net/notify.h"
+#include "worker/daemon/lease_queue.h"
+#include "worker/daemon/outgoing.h"
 
 #include <assert.h>
 #include <signal.h>
@@ -25,12 +27,6 @@ static const double first_back_off = 0.2, longest_back_off = 10, stall_seconds =
 
 static void connect_now(struct agent *a);
 static void go(struct agent *a);
-
-void agent_send(struct agent *a, const Farm__Envelope *m)
-{
-	if (a->conn && a->welcome)
-		conn_send(a->conn, m, NULL, 0);
-}
 
 /* ---- connection ---- */
 
@@ -92,7 +88,7 @@ static void on_heartbeat(uv_timer_t *t)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
 	m.heartbeat = &beat;
-	agent_send(t->data, &m);
+	send_message(t->data, &m);
 	refresh_tls(t->data);
 }
 
@@ -184,7 +180,7 @@ static void go(struct agent *a)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_BYE;
 	m.bye = &bye;
-	agent_send(a, &m);
+	send_message(a, &m);
 	if (a->conn)
 		conn_close_when_sent(a->conn, "leaving");
 	uv_close((uv_handle_t *)&a->retry, NULL);
@@ -325,6 +321,7 @@ int agent_open(struct agent **out, const struct agent_config *c, struct error *e
 		return error_set(e, ENOMEM, "no memory for the worker");
 	signal(SIGPIPE, SIG_IGN);
 	a->config = *c;
+	a->settle = agent_settle;
 	a->cache.lock = -1;
 	a->back_off = first_back_off;
 	fingerprint_make(a->fingerprint);

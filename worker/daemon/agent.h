@@ -13,21 +13,7 @@
 #define WORKER_DAEMON_AGENT_H
 
 #include "common/base/error.h"
-
-#include <stdbool.h>
-#include <stdint.h>
-
-struct agent_config {
-	const char *coordinator, *name;
-	const char *tls;   /* a folder (common/net/tls.h); NULL or "": plaintext */
-	const char *cache; /* NULL: the user's cache folder */
-	uint64_t cache_bytes;
-	unsigned threads;
-	double grace_seconds;
-	double idle_seconds;  /* without a lease for so long: it leaves; 0: never */
-	double stall_seconds; /* a lease or a building that makes no progress for so long hangs; 0: nobody looks */
-	bool insecure;
-};
+#include "worker/daemon/config.h"
 
 enum { AGENT_HUNG = 75 };   /* exit code: to be started again */
 enum { AGENT_REFUSED = 6 }; /* exit code of who gets -EACCES */
@@ -36,5 +22,12 @@ enum { AGENT_REFUSED = 6 }; /* exit code of who gets -EACCES */
  * -EHOSTUNREACH at once when the address is of no use; -EACCES: the coordinator refuses it, and calling again would not
  * mend that (role, version, what hello says). */
 int agent_run(const struct agent_config *c, struct error *e);
+
+/* The same in parts: opened, it works whenever its loop runs. */
+struct agent;
+int agent_open(struct agent **a, const struct agent_config *c, struct error *e);
+void agent_close(struct agent *a); /* leaves, if it has not left; waits for its threads */
+/* Leaves when it is to leave and nothing is left to do. */
+void agent_settle(struct agent *a);
 
 #endif

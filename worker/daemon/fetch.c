@@ -2,7 +2,7 @@
 #include "worker/daemon/fetch.h"
 
 #include "common/base/mem.h"
-#include "worker/daemon/agent_private.h"
+#include "worker/daemon/outgoing.h"
 
 #include <string.h>
 
@@ -22,7 +22,7 @@ static void ask(struct agent *a, struct fetch *f)
 	m.body_case = FARM__ENVELOPE__BODY_BLOB_GET;
 	m.blob_get = &get;
 	f->asked = true;
-	agent_send(a, &m);
+	send_message(a, &m);
 }
 
 int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e)

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Jobs and leases of the worker daemon. */
-#include "worker/daemon/agent_private.h"
+#include "worker/daemon/lease_queue.h"
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
-#include "worker/daemon/say.h"
+#include "worker/daemon/fetch.h"
+#include "worker/daemon/outgoing.h"
 #include "worker/daemon/work.h"
 
 #include <stdio.h>
@@ -88,7 +89,7 @@ static void fail_leases_of(struct agent *a, struct job_cache *b, const struct er
 		next = l->next;
 		if (l->bundle != b || l->state != LEASE_WAITING)
 			continue;
-		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
+		send_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
 		drop_lease(a, l);
 	}
 }
@@ -121,7 +122,7 @@ static void on_built(struct job_cache *b)
 				start_lease(a, l);
 	}
 	tidy(a);
-	agent_settle(a);
+	a->settle(a);
 }
 
 /* Asks for the next missing piece, unless another job has, or builds. */
@@ -161,7 +162,7 @@ static void pace(struct agent *a)
 	if (backlog == a->backlog)
 		return;
 	a->backlog = backlog;
-	say_request(a);
+	send_request(a);
 }
 
 static struct lease_task *find_lease(const struct agent *a, const struct lease_key *k)
@@ -191,16 +192,16 @@ static void on_rendered(struct lease_task *l)
 		drop_lease(a, l);
 	} else if (l->rc || l->end == LEASE_STOPPED) {
 		if (l->rc == -EILSEQ)
-			say_bad_states(a, &l->grant, l->error.text);
+			send_bad_states(a, &l->grant, l->error.text);
 		else
-			say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false);
+			send_failed(a, &l->grant.key, l->rc ? l->error.text : "", false);
 		drop_lease(a, l);
 	} else {
-		say_result(a, l);
+		send_result(a, l);
 	}
 	pace(a);
 	tidy(a);
-	agent_settle(a);
+	a->settle(a);
 }
 
 /* Far more than were asked for: no coordinator of ours does that. */
@@ -241,7 +242,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	}
 	if (l) { /* it is at work here already, from an earlier connection */
 		if (l->state == LEASE_RENDERED)
-			say_result(a, l);
+			send_result(a, l);
 		grant_fini(&g);
 		return;
 	}
@@ -251,7 +252,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		return;
 	}
 	if (a->leaving || is_stuffed(a)) {
-		say_failed(a, &g.key, "", false);
+		send_failed(a, &g.key, "", false);
 		grant_fini(&g);
 		return;
 	}
@@ -262,12 +263,12 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	if (!rc && fresh) {
 		b->next = a->bundles;
 		a->bundles = b;
-		say_job_get(a, b->job);
+		send_job_get(a, b->job);
 	}
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {
-		say_failed(a, &g.key, e.text, true);
+		send_failed(a, &g.key, e.text, true);
 		grant_fini(&g);
 		return;
 	}
@@ -360,7 +361,7 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	go_on(a, b);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: results from before are welcome */
 		if (l->bundle == b && l->state == LEASE_RENDERED)
-			say_result(a, l);
+			send_result(a, l);
 	tidy(a);
 }
 
@@ -418,7 +419,7 @@ void lease_queue_message(struct agent *a, struct envelope *env, const unsigned c
 	default:
 		conn_close(a->conn, "not a message that a coordinator says to a worker");
 	}
-	agent_settle(a);
+	a->settle(a);
 }
 
 /* ---- connection and leaving ---- */
@@ -429,7 +430,7 @@ static void tell_lost(struct agent *a)
 	struct lost_lease *l;
 	for (unsigned i = 0; (l = work_lost(i)); i++)
 		if (!l->told) {
-			say_failed(a, &l->key, l->text, l->own);
+			send_failed(a, &l->key, l->text, l->own);
 			l->told = true;
 		}
 }
@@ -443,19 +444,19 @@ void lease_queue_welcome(struct agent *a)
 	/* Does the job live? The answer brings unfinished fetching and unsent results on their way. */
 	for (struct job_cache *b = a->bundles; b; b = b->next)
 		if (!b->ended)
-			say_job_get(a, b->job);
-	say_request(a);
+			send_job_get(a, b->job);
+	send_request(a);
 }
 
 void lease_queue_leave(struct agent *a)
 {
-	say_request(a);
+	send_request(a);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->state == LEASE_RENDERED ||
 		    (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)))
 			continue;
-		say_failed(a, &l->grant.key, "", false);
+		send_failed(a, &l->grant.key, "", false);
 		drop_lease(a, l);
 	}
 }
@@ -484,7 +485,7 @@ static bool watch_leases(struct agent *a)
 		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
 			continue;
 		if (!l->unwanted)
-			say_failed(a, &l->grant.key, text, false);
+			send_failed(a, &l->grant.key, text, false);
 		l->unwanted = l->task.hung = found = true;
 		atomic_store(&l->stop, true);
 	}

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/daemon/say.h"
+#include "worker/daemon/outgoing.h"
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
@@ -7,7 +7,13 @@
 
 #include <string.h>
 
-void say_request(struct agent *a)
+void send_message(struct agent *a, const Farm__Envelope *m)
+{
+	if (a->conn && a->welcome)
+		conn_send(a->conn, m, NULL, 0);
+}
+
+void send_request(struct agent *a)
 {
 	Farm__LeaseRequest request;
 	Farm__Envelope m;
@@ -16,10 +22,10 @@ void say_request(struct agent *a)
 	request.want = a->leaving || a->backlog ? 0 : a->config.threads + 1;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
 	m.lease_request = &request;
-	agent_send(a, &m);
+	send_message(a, &m);
 }
 
-void say_job_get(struct agent *a, uint64_t job)
+void send_job_get(struct agent *a, uint64_t job)
 {
 	Farm__JobGet get;
 	Farm__Envelope m;
@@ -28,11 +34,12 @@ void say_job_get(struct agent *a, uint64_t job)
 	get.job = job;
 	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
 	m.job_get = &get;
-	agent_send(a, &m);
+	send_message(a, &m);
 }
 
 /* states: their digest; NULL: they are not at fault. */
-static void say(struct agent *a, const struct lease_key *k, const char *text, bool own, const struct blob_hash *states)
+static void send_failure(struct agent *a, const struct lease_key *k, const char *text, bool own,
+			 const struct blob_hash *states)
 {
 	char copy[1024];
 	struct blob_hash digest;
@@ -54,23 +61,23 @@ static void say(struct agent *a, const struct lease_key *k, const char *text, bo
 	}
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
 	m.lease_failed = &failed;
-	agent_send(a, &m);
+	send_message(a, &m);
 	if (*text)
 		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", log_u64(k->job),
 			  (int)k->kind, k->group, k->part, log_u64(k->epoch), log_quote(text).text);
 }
 
-void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
+void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
 {
-	say(a, k, text, own, NULL);
+	send_failure(a, k, text, own, NULL);
 }
 
-void say_bad_states(struct agent *a, const struct grant *g, const char *text)
+void send_bad_states(struct agent *a, const struct grant *g, const char *text)
 {
-	say(a, &g->key, text, false, &g->digest);
+	send_failure(a, &g->key, text, false, &g->digest);
 }
 
-void say_result(struct agent *a, struct lease_task *l)
+void send_result(struct agent *a, struct lease_task *l)
 {
 	if (!a->conn || !a->welcome || l->sent)
 		return;
