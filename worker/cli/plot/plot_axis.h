@@ -3,7 +3,7 @@
 #ifndef WORKER_CLI_PLOT_AXIS_H
 #define WORKER_CLI_PLOT_AXIS_H
 
-#include "worker/cli/plot/plot.h"
+#include "worker/cli/plot/plot_data.h"
 
 enum { PLOT_TICS = 32 };
 

@@ -6,7 +6,7 @@
 #ifndef WORKER_RENDER_MUTATION_TRACE_H
 #define WORKER_RENDER_MUTATION_TRACE_H
 
-#include "worker/render/mutation/breakup.h"
+#include "worker/render/mutation/mutation.h"
 
 /* Makes y's vertices k-1 .. b, edges k-1 .. b, film point, and x_k where there is an aperture that is to move. Modes of
  * the vertices k-1 .. b+1 are x's; x_b (b > 0) can scatter in many directions, x_0 (b = 0) is an emitter. Fills first

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/plot/plot.h"
 #include "worker/cli/plot/plot_axis.h"
 
 #include "common/base/mem.h"

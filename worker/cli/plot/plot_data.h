@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What a plot shows. */
+#ifndef WORKER_CLI_PLOT_DATA_H
+#define WORKER_CLI_PLOT_DATA_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum plot_style { PLOT_POINTS, PLOT_LINE, PLOT_BAND /* between low and high */ };
+
+struct plot_series {
+	const char *name; /* "": not in the legend */
+	enum plot_style style;
+	size_t count;
+	const double *x, *y, *low,
+		*high;		   /* [count]; low and high may be NULL: no bars. Not finite: the point is left out */
+	const char *const *labels; /* [count], beside the points; NULL: none */
+};
+
+struct plot {
+	const char *title, *x_label, *y_label;
+	bool log_x, log_y;
+	size_t series_count;
+	const struct plot_series *series;
+	const char *const *x_names; /* [x_name_count], at x = 1, 2, ... in place of numbers; NULL: numbers */
+	size_t x_name_count;
+};
+
+#endif
