@@ -9,14 +9,9 @@
 
 #include "common/base/arena.h"
 #include "worker/render/scene/asset.h"
+#include "worker/render/scene/image_pixels.h"
 
 #include <stdbool.h>
-#include <stdint.h>
-
-struct image {
-	uint32_t width, height, channels; /* channels: 1 or 3 (alpha is dropped) */
-	float *pixels;			  /* [height][width][channels], finite, in the arena */
-};
 
 /* A part of each pixel. */
 enum image_channel {

@@ -4,7 +4,12 @@
 #ifndef WORKER_RENDER_SCENE_IMAGE_DECODE_H
 #define WORKER_RENDER_SCENE_IMAGE_DECODE_H
 
-#include "worker/render/scene/image.h"
+#include "common/base/arena.h"
+#include "common/base/error.h"
+#include "worker/render/scene/image_pixels.h"
+
+#include <stdbool.h>
+#include <stddef.h>
 
 /* Before anything is decoded: a small file may promise a large image. Of a mask 11,585 x 11,585 pixels, of colours
  * 9,459 x 9,459. */
