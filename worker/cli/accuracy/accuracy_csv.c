@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/cli/accuracy/accuracy_columns.h"
+#include "worker/cli/accuracy/accuracy_csv.h"
+
+#include "worker/cli/base/text_file.h"
 
 #include <math.h>
 

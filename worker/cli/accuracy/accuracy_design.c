@@ -7,7 +7,7 @@
  * Fails where the user asks for a parameter or value that does not exist (-EINVAL, with the nearest name) or for more
  * settings than the table holds.
  */
-#include "worker/cli/accuracy/accuracy.h"
+#include "worker/cli/accuracy/accuracy_design.h"
 
 #include "common/base/spelling.h"
 #include "common/base/text.h"

@@ -4,9 +4,11 @@
  * each row with its interval, then plots as SVG (accuracy_plots.h). All text from scenes is escaped. Numbers that are
  * not known are printed as such, never as 0.
  */
+#include "worker/cli/accuracy/accuracy_html.h"
+
 #include "common/base/mem.h"
 #include "common/base/version.h"
-#include "worker/cli/accuracy/accuracy_columns.h"
+#include "worker/cli/accuracy/accuracy_csv.h"
 #include "worker/cli/accuracy/accuracy_plots.h"
 #include "worker/cli/image/tonemap.h"
 

@@ -3,7 +3,7 @@
  * From films to figures. Errors of all settings are weighted by one picture, the mean over the settings, so that only
  * their noise differs and not what it is measured by.
  */
-#include "worker/cli/accuracy/accuracy.h"
+#include "worker/cli/accuracy/accuracy_judge.h"
 
 #include "common/base/mem.h"
 #include "common/estimate/canvas_blocks.h"

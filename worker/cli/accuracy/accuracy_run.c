@@ -7,7 +7,7 @@
  * Failures: no memory for all films (said before anything is rendered), or whatever a lease fails with, with the
  * setting's name; on a signal what has been measured so far is reported.
  */
-#include "worker/cli/accuracy/accuracy.h"
+#include "worker/cli/accuracy/accuracy_run.h"
 
 #include "common/base/clock.h"
 #include "common/base/mem.h"

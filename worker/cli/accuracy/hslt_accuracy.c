@@ -9,7 +9,8 @@
 #include "common/base/program.h"
 #include "common/base/progress.h"
 #include "common/exr/image_file.h"
-#include "worker/cli/accuracy/accuracy.h"
+#include "worker/cli/accuracy/accuracy_csv.h"
+#include "worker/cli/accuracy/accuracy_html.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
 

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How far picture A is from reference B: the figures of docs/design.md, rules 4, and whether two images are the same
- * bits. One thread.
+ * How far picture A is from reference B: the figures of docs/design.md, rules 4. One thread.
  */
 #ifndef WORKER_CLI_IMAGE_COMPARE_H
 #define WORKER_CLI_IMAGE_COMPARE_H
@@ -28,9 +27,5 @@ int compare(const struct picture *a, const struct picture *b, double trim, struc
 /* Colours of relative errors, 0.1 % black, by way of violet, red, orange to 100 % white; not finite: cyan. Sizes as
  * above. */
 int compare_heatmap(const struct picture *a, const struct picture *b, unsigned char *rgb, struct error *e);
-
-/* Every channel of every pixel, windows, and the header but for header_excluded. false: `why` says what differs first.
- */
-bool compare_exact(const struct exr_image *a, const struct exr_image *b, char *why, size_t why_size);
 
 #endif

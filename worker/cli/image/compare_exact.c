@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/image/compare_exact.h"
+
 #include "common/exr/header.h"
-#include "worker/cli/image/compare.h"
 
 #include <stdarg.h>
 #include <stdio.h>

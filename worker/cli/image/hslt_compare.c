@@ -11,6 +11,7 @@
 #include "common/base/program.h"
 #include "common/estimate/stated_error.h"
 #include "worker/cli/image/compare.h"
+#include "worker/cli/image/compare_exact.h"
 
 #include <float.h>
 #include <jansson.h>

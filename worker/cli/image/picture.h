@@ -7,7 +7,7 @@
 #define WORKER_CLI_IMAGE_PICTURE_H
 
 #include "common/base/error.h"
-#include "common/exr/exr.h"
+#include "common/exr/exr_image.h"
 
 struct picture {
 	struct exr_image image; /* all channels, as read */

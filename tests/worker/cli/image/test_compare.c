@@ -3,6 +3,7 @@
 
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
+#include "worker/cli/image/compare_exact.h"
 
 #include <math.h>
 #include <png.h>

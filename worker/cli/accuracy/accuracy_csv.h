@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The columns of hslt-accuracy's CSV, in order, with what they mean; the report explains them. */
-#ifndef WORKER_CLI_ACCURACY_COLUMNS_H
-#define WORKER_CLI_ACCURACY_COLUMNS_H
+/* The figures as comma-separated values. */
+#ifndef WORKER_CLI_ACCURACY_ACCURACY_CSV_H
+#define WORKER_CLI_ACCURACY_ACCURACY_CSV_H
 
 #include "worker/cli/accuracy/accuracy.h"
-#include "worker/cli/base/text_file.h"
 
+/* In order; the report explains them, too. */
 struct accuracy_column {
 	const char *name, *meaning; /* meaning "": the other end of the interval */
 };
 extern const struct accuracy_column accuracy_columns[]; /* ends with a NULL name */
+
+int accuracy_csv(const struct accuracy_context *x, const char *path, struct error *e);
 
 #endif

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Rendering of all settings, in turns, so that times can be compared. One thread besides those of the leases. */
+#ifndef WORKER_CLI_ACCURACY_ACCURACY_RUN_H
+#define WORKER_CLI_ACCURACY_ACCURACY_RUN_H
+
+#include "worker/cli/accuracy/accuracy_design.h"
+#include "worker/cli/render/local.h"
+
+enum { ACCURACY_COSTS = 4096 };
+
+/* One setting's rendering. */
+struct accuracy_job {
+	struct plan plan;
+	struct world *world; /* that of several, if it can */
+	struct local_run run;
+	struct local_job *job;
+	size_t cost_count;
+	double cost[ACCURACY_COSTS]; /* CPU seconds a mutation, of each round */
+	double cpu;		     /* of the rounds */
+};
+
+struct accuracy_run {
+	/* in */
+	const struct accuracy_design *design;
+	struct plan_request request; /* what all have in common */
+	const struct scene *scene;
+	const struct asset_source *assets;
+	const struct render_options *render;
+	unsigned threads;
+	double seconds;		 /* wall clock in all */
+	double setting_seconds;	 /* CPU seconds of a setting; 0: by the clock */
+	uint64_t setting_rounds; /* rounds of a setting, so that all but times repeats; 0: by time */
+	const atomic_bool *stop;
+	void (*progress)(void *user, double fraction, const char *state);
+	void *user;
+	/* out */
+	struct accuracy_job *jobs; /* [design->count] */
+	size_t world_count;
+	struct world *worlds[ACCURACY_SETTINGS];
+	double wall_seconds;
+	bool interrupted;
+};
+
+/* 0 also where it was interrupted when each setting had a round: what there is can be judged. */
+int accuracy_render(struct accuracy_run *r, struct error *e);
+void accuracy_run_fini(struct accuracy_run *r);
+
+#endif
