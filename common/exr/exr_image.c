@@ -8,12 +8,13 @@
  * floats, halves and integers, tiles with levels, deep data; all -EBADMSG or -ENOTSUP with a sentence, and nothing is
  * kept.
  */
-#include "common/exr/exr.h"
+#include "common/exr/exr_image.h"
 
 #include "common/base/mem.h"
 #include "common/base/version.h"
-#include "common/exr/exr_private.h"
+#include "common/exr/exr_stream.h"
 
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/exr/exr_private.h"
+#include "common/exr/exr_stream.h"
 
 #include "common/base/mem.h"
 

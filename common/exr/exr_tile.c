@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/exr/exr.h"
+#include "common/exr/exr_tile.h"
 
 #include "common/base/mem.h"
-#include "common/exr/exr_private.h"
+#include "common/exr/exr_stream.h"
 
 #include <string.h>
 

@@ -9,7 +9,7 @@
 #define COMMON_EXR_HEADER_H
 
 #include "common/estimate/canvas_image.h"
-#include "common/exr/exr.h"
+#include "common/exr/exr_image.h"
 
 struct header_row {
 	const char *name;

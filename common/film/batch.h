@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A batch: the result of one lease. Its content depends on (plan, kind, group, part, epoch) only.
- * In memory here; on the wire a message header followed by one EXR per tile (common/exr/exr.h).
+ * In memory here; on the wire a message header followed by one EXR per tile (common/exr/exr_tile.h).
  */
 #ifndef COMMON_FILM_BATCH_H
 #define COMMON_FILM_BATCH_H

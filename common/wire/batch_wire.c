@@ -9,7 +9,7 @@
 #include "common/wire/batch_wire.h"
 
 #include "common/base/mem.h"
-#include "common/exr/exr.h"
+#include "common/exr/exr_tile.h"
 
 #include <string.h>
 

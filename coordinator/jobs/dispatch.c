@@ -15,7 +15,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/exr/exr.h"
+#include "common/exr/exr_image.h"
 #include "coordinator/job/back.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/late.h"

@@ -3,7 +3,7 @@
  * film. */
 #include "common/base/mem.h"
 #include "common/film/canvas.h"
-#include "common/exr/exr.h"
+#include "common/exr/exr_tile.h"
 #include "tests/bench/bench.h"
 #include "worker/render/math/rng.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/exr/exr.h"
+#include "common/exr/exr_image.h"
+#include "common/exr/exr_tile.h"
 
 #include "common/base/mem.h"
 

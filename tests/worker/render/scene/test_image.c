@@ -2,7 +2,7 @@
 #include "worker/render/scene/image.h"
 
 #include "common/base/mem.h"
-#include "common/exr/exr.h"
+#include "common/exr/exr_image.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/sample_images.h"
 

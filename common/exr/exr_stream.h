@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Files in memory for OpenEXRCore; shared by exr_image.c and exr_tile.c. One thread each. */
-#ifndef COMMON_EXR_EXR_PRIVATE_H
-#define COMMON_EXR_EXR_PRIVATE_H
+#ifndef COMMON_EXR_EXR_STREAM_H
+#define COMMON_EXR_EXR_STREAM_H
 
 #include "common/base/error.h"
 

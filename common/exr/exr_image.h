@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The one door to OpenEXR (Core, C). Images: R G B float (and error.R,G,B), ZIP, scan lines. Tiles: one-part, tiled, X
- * Y Z float, uncompressed, data window at their place. All in memory; any thread; foreign bytes are checked before
- * decoding.
+ * Images as OpenEXR files in memory: R G B float (and error.R,G,B), ZIP, scan lines. Any thread; foreign bytes are
+ * checked before decoding.
  */
-#ifndef COMMON_EXR_EXR_H
-#define COMMON_EXR_EXR_H
+#ifndef COMMON_EXR_EXR_IMAGE_H
+#define COMMON_EXR_EXR_IMAGE_H
 
 #include "common/base/error.h"
-#include "common/film/batch.h"
 
 #include <stddef.h>
+#include <stdint.h>
 
 struct exr_attribute { /* header attributes "hslt:..."; see header.h for the table of names and types */
 	const char *name;
@@ -37,12 +36,5 @@ int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img,
 int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img,
 		    struct error *e);
 void exr_image_fini(struct exr_image *img);
-
-/* Tiles of a batch. exr_tile_read: display window = the full film; refuses anything but what exr_tile_write makes. */
-size_t exr_tile_size_max(uint32_t width, uint32_t height);
-int exr_tile_write(const struct tile *t, uint32_t full_width, uint32_t full_height, unsigned char **bytes, size_t *size,
-		   struct error *e);
-int exr_tile_read(const unsigned char *bytes, size_t size, uint32_t full_width, uint32_t full_height, struct tile *t,
-		  struct error *e);
 
 #endif
