@@ -10,6 +10,7 @@
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
 #include "worker/render/chain/bytes.h"
+#include "worker/render/chain/path_bytes.h"
 #include "worker/render/chain/path_chain.h"
 #include "worker/render/chain/pss_chain.h"
 #include "worker/render/path/integrator.h"

@@ -8,6 +8,7 @@
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/render/chain/path_chain.h"
+#include "worker/render/chain/path_start.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mutation.h"
 #include "worker/render/path/integrator.h"

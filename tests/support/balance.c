@@ -3,6 +3,8 @@
 
 #include "tests/support/stats.h"
 #include "worker/render/mutation/heuristic.h"
+#include "worker/render/path/full_path_check.h"
+#include "worker/render/path/full_path_density.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

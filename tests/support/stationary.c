@@ -2,6 +2,9 @@
 #include "tests/support/stationary.h"
 
 #include "tests/support/stats.h"
+#include "worker/render/chain/path_start.h"
+#include "worker/render/path/full_path_check.h"
+#include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/render.h"
 #include "worker/render/chain/path_chain.h"
 #include "worker/render/math/fptrap.h"

@@ -4,6 +4,8 @@
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "common/estimate/tail.h"
+#include "worker/render/path/integrate_bdpt.h"
+#include "worker/render/path/integrate_path.h"
 #include "worker/render/path/integrator.h"
 #include "worker/render/brightness.h"
 

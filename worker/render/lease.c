@@ -7,6 +7,7 @@
  * Failures: -EINVAL where things do not fit, -EILSEQ for states that are none, -EDOM where an invalid operation was
  * trapped (the place in the sentence); nothing of the batch is kept.
  */
+#include "worker/render/path/integrate_path.h"
 #include "worker/render/render.h"
 
 #include "common/base/crash.h"

@@ -15,6 +15,7 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
+#include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/render.h"
 #include "worker/render/path/classes.h"
 #include "worker/render/path/ensemble.h"

@@ -4,6 +4,8 @@
  * bootstrap is that of bdpt.
  */
 #include "worker/render/chain/path_chain.h"
+#include "worker/render/path/full_path.h"
+#include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
 
 const struct integrator integrator_hslt = {

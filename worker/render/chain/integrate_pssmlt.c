@@ -4,6 +4,7 @@
  */
 #include "worker/render/chain/pss.h"
 #include "worker/render/chain/pss_chain.h"
+#include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
 
 const struct integrator integrator_pssmlt = {

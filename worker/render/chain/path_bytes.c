@@ -10,10 +10,11 @@
  * contribution than stated. Nothing is allocated and no ray is cast: whether anything lies between two vertices is not
  * asked.
  */
-#include "worker/render/chain/path_chain.h"
+#include "worker/render/chain/path_bytes.h"
 
 #include "worker/render/chain/bytes.h"
 #include "worker/render/math/fptrap.h"
+#include "worker/render/path/full_path_density.h"
 
 enum { PATH_EDGES = 8, PATH_HEAD = PATH_EDGES + 8, VERTEX_BYTES = 40 };
 

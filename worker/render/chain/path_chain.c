@@ -9,6 +9,8 @@
  */
 #include "worker/render/chain/path_chain.h"
 
+#include "worker/render/chain/path_bytes.h"
+#include "worker/render/chain/path_start.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/classes.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/chain/path_chain.h"
+#include "worker/render/chain/path_start.h"
 
 #include "worker/render/path/ensemble.h"
 

@@ -6,6 +6,7 @@
  */
 #include "worker/render/math/logsum.h"
 #include "worker/render/mutation/mutation.h"
+#include "worker/render/path/full_path_density.h"
 
 /* A path of n + 1 edges is proposed that much as often as one of n. */
 #define EDGE_RATIO 0.7

@@ -106,18 +106,7 @@ bool full_path_finish(const struct path_context *c, struct full_path_path *x);
  * everything cached. Casts the connecting ray. false: there is none, or it is black. */
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path_path *x);
 
-/* log f of the path in the measure of path.h, from the products of its geometry terms; -INFINITY: black. */
-double full_path_log_f(const struct path_context *c, struct full_path_path *x);
-
-/* Fills pdf and pdf_rev of all vertices, then log of the density with which technique s makes this path, s = 0..edges;
- * -INFINITY where it cannot. */
-void full_path_log_techniques(struct path_context *c, struct full_path_path *x, double *log_pdf);
-
 /* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
 void full_path_colour(const struct path_context *c, struct full_path_path *x, double xyz[3]);
-
-/* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for
- * states that come from outside. */
-bool path_check(struct path_context *c, const struct full_path_path *x, char *text, size_t size);
 
 #endif

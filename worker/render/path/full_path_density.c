@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The contribution of a whole path and the densities of all techniques that could have made it: the explicit products,
  * in logarithms, that proposals in half vector space never multiply out. */
+#include "worker/render/path/full_path_density.h"
+
 #include "worker/render/path/measure.h"
-#include "worker/render/path/full_path.h"
 
 double full_path_log_f(const struct path_context *c, struct full_path_path *x)
 {

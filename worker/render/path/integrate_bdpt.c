@@ -6,6 +6,8 @@
  * multi-sample model of Veach 1997, sec. 9.2.1): nearly as cheap as `path` where that finds most of the light, without
  * its fireflies.
  */
+#include "worker/render/path/integrate_bdpt.h"
+
 #include "worker/render/path/classes.h"
 #include "worker/render/path/connect.h"
 #include "worker/render/path/integrator.h"
@@ -61,7 +63,7 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 	trace(c, s, out);
 }
 
-void path_trace_rarely_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
+static void trace_rarely_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	c->light_every = RARELY;
 	trace(c, s, out);
@@ -73,7 +75,7 @@ const struct integrator integrator_bdpt8 = {
 		 .kind = PLAN_SAMPLES,
 		 .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_BDPT8,
-	.evaluate = path_trace_rarely_both_ways,
+	.evaluate = trace_rarely_both_ways,
 };
 
 const struct integrator integrator_bdpt = {

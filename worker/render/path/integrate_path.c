@@ -3,6 +3,8 @@
  * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted
  * against each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.
  */
+#include "worker/render/path/integrate_path.h"
+
 #include "worker/render/path/classes.h"
 #include "worker/render/path/connect.h"
 #include "worker/render/path/integrator.h"

@@ -20,9 +20,4 @@ struct integrator {
 extern const struct integrator *const integrator_registry[]; /* ends with NULL */
 const struct integrator *integrator_find(const char *name);  /* NULL: none */
 
-/* The evaluations that others build on. */
-void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out);
-void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
-void path_trace_rarely_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
-
 #endif

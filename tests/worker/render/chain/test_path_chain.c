@@ -10,8 +10,11 @@
 #include "tests/support/starts.h"
 #include "tests/support/worlds.h"
 #include "worker/render/chain/bytes.h"
+#include "worker/render/chain/path_bytes.h"
 #include "worker/render/chain/path_chain.h"
+#include "worker/render/chain/path_start.h"
 #include "worker/render/math/fptrap.h"
+#include "worker/render/path/full_path_check.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -9,6 +9,7 @@
 #include "tests/support/stats.h"
 #include "tests/worker/render/mutation/explicit.h"
 #include "tests/worker/render/mutation/scenes.h"
+#include "worker/render/path/full_path_density.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

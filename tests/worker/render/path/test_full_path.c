@@ -5,6 +5,8 @@
  */
 #include "tests/support/worlds.h"
 #include "worker/render/path/full_path.h"
+#include "worker/render/path/full_path_check.h"
+#include "worker/render/path/full_path_density.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Whether what a full path caches is right. */
+#ifndef WORKER_RENDER_PATH_FULL_PATH_CHECK_H
+#define WORKER_RENDER_PATH_FULL_PATH_CHECK_H
+
+#include "worker/render/path/full_path.h"
+
+/* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for
+ * states that come from outside. */
+bool path_check(struct path_context *c, const struct full_path_path *x, char *text, size_t size);
+
+#endif

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The contribution of a full path, and the densities of all techniques that could have made it. */
+#ifndef WORKER_RENDER_PATH_FULL_PATH_DENSITY_H
+#define WORKER_RENDER_PATH_FULL_PATH_DENSITY_H
+
+#include "worker/render/path/full_path.h"
+
+/* log f of the path in the measure of path.h, from the products of its geometry terms; -INFINITY: black. */
+double full_path_log_f(const struct path_context *c, struct full_path_path *x);
+
+/* Fills pdf and pdf_rev of all vertices, then log of the density with which technique s makes this path, s = 0..edges;
+ * -INFINITY where it cannot. */
+void full_path_log_techniques(struct path_context *c, struct full_path_path *x, double *log_pdf);
+
+#endif
