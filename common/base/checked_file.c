@@ -88,7 +88,7 @@ static int fill(struct checked_file *s, struct error *e)
 	return s->heard ? s->heard(s->user, s->filled, e) : 0;
 }
 
-static int take(struct checked_file *s, void *bytes, size_t size, struct error *e)
+static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct error *e)
 {
 	for (unsigned char *p = bytes; size;) {
 		int rc = s->at == s->filled ? fill(s, e) : 0;
@@ -123,7 +123,7 @@ static int check(struct checked_file *s, struct error *e)
 		s->at += n;
 		left -= n;
 	}
-	int rc = take(s, &want, sizeof want, e);
+	int rc = read_bytes(s, &want, sizeof want, e);
 	return rc ? rc : want == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
 }
 
@@ -152,7 +152,7 @@ int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct e
 	if (size > s->left)
 		return error_set(e, EBADMSG, "%s: ends too early", s->path);
 	s->left -= size;
-	return take(s, bytes, size, e);
+	return read_bytes(s, bytes, size, e);
 }
 
 void checked_file_close(struct checked_file *s)

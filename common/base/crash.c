@@ -103,7 +103,7 @@ void crash_catch(void (*last_words)(int number, const char *text))
 		sigaction(signals[i].number, &a, &before[i]);
 }
 
-static void say(const char *text)
+static void write_text(const char *text)
 {
 	ssize_t n = write(STDERR_FILENO, text, strlen(text));
 	(void)n;
@@ -112,10 +112,10 @@ static void say(const char *text)
 static void say_and_exit(int number, const char *text)
 {
 	(void)number;
-	say(program_name);
-	say(": ended by ");
-	say(text);
-	say(": a fault of this program or of a library that it uses\n");
+	write_text(program_name);
+	write_text(": ended by ");
+	write_text(text);
+	write_text(": a fault of this program or of a library that it uses\n");
 	_exit(1);
 }
 

@@ -27,7 +27,7 @@ json_t *forecast_looks_to_json(const struct forecast_history *h)
 	return list;
 }
 
-static double number(const json_t *o, const char *key)
+static double read_number(const json_t *o, const char *key)
 {
 	return json_number_value(json_object_get(o, key));
 }
@@ -39,12 +39,12 @@ void forecast_looks_from_json(const json_t *list, struct forecast_history *h)
 	h->count = 0;
 	json_array_foreach(list, i, o)
 	{
-		struct forecast_look l = {.work = number(o, "mutations"),
-					  .cpu_seconds = number(o, "cpuSeconds"),
-					  .seconds = number(o, "wallSeconds"),
-					  .rel_mse = number(o, "relMSE"),
-					  .rel_mse_upper = number(o, "relMSEUpper"),
-					  .degrees = number(o, "degrees"),
+		struct forecast_look l = {.work = read_number(o, "mutations"),
+					  .cpu_seconds = read_number(o, "cpuSeconds"),
+					  .seconds = read_number(o, "wallSeconds"),
+					  .rel_mse = read_number(o, "relMSE"),
+					  .rel_mse_upper = read_number(o, "relMSEUpper"),
+					  .degrees = read_number(o, "degrees"),
 					  .doubtful = json_is_true(json_object_get(o, "doubtful"))};
 		forecast_add_look(h, &l);
 	}

@@ -163,7 +163,7 @@ struct buf conn_take_payload(struct conn *c)
 }
 
 /* Frames, as they are without encryption. */
-static void take(struct conn *c, const unsigned char *bytes, size_t size)
+static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 {
 	size_t at = 0;
 	c->heard = clock_of(c);
@@ -297,7 +297,7 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 			pump(c);
 		}
 		if (n > 0)
-			take(c, (const unsigned char *)chunk, (size_t)n);
+			receive(c, (const unsigned char *)chunk, (size_t)n);
 		else if (n == 0)
 			return;
 	}
@@ -333,7 +333,7 @@ static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 	} else if (c->link) {
 		take_encrypted(c, b->base, (size_t)count);
 	} else if (!is_tls(c, b->base, (size_t)count)) {
-		take(c, (const unsigned char *)b->base, (size_t)count);
+		receive(c, (const unsigned char *)b->base, (size_t)count);
 	}
 }
 

@@ -33,7 +33,7 @@ bool notify_send(const char *state)
 }
 
 /* A whole number from the environment; -1: none. */
-static long long number(const char *name)
+static long long env_number(const char *name)
 {
 	char *end;
 	const char *text = getenv(name);
@@ -46,8 +46,8 @@ static long long number(const char *name)
 
 double notify_watchdog(void)
 {
-	long long us = number("WATCHDOG_USEC");
-	if (us <= 0 || (getenv("WATCHDOG_PID") && number("WATCHDOG_PID") != getpid()))
+	long long us = env_number("WATCHDOG_USEC");
+	if (us <= 0 || (getenv("WATCHDOG_PID") && env_number("WATCHDOG_PID") != getpid()))
 		return 0;
 	return 1e-6 * (double)us;
 }
@@ -61,8 +61,8 @@ static int option(int fd, int name)
 
 int notify_inherited_unix(void)
 {
-	long long count = number("LISTEN_FDS");
-	if (count <= 0 || number("LISTEN_PID") != getpid())
+	long long count = env_number("LISTEN_FDS");
+	if (count <= 0 || env_number("LISTEN_PID") != getpid())
 		return -1;
 	for (int fd = FIRST_FD; fd < FIRST_FD + (count < FDS_MAX ? (int)count : FDS_MAX); fd++) {
 		if (option(fd, SO_DOMAIN) != AF_UNIX || option(fd, SO_TYPE) != SOCK_STREAM ||

@@ -207,7 +207,7 @@ static int path_of(const struct tls *t, int file, char *path, size_t size)
 	return snprintf(path, size, "%s/%s", t->folder, file_names[file]);
 }
 
-static void look(const struct tls *t, struct stamp *stamps)
+static void stat_files(const struct tls *t, struct stamp *stamps)
 {
 	for (int i = 0; i < FILES; i++) {
 		char path[4096];
@@ -230,7 +230,7 @@ static int broken(struct error *e, int code, const char *path)
 }
 
 /* At depth 0 the chain is good already: is the certificate for what the peer does with it? */
-static int judge(int good, X509_STORE_CTX *sc)
+static int verify_certificate(int good, X509_STORE_CTX *sc)
 {
 	if (!good || X509_STORE_CTX_get_error_depth(sc) != 0)
 		return good;
@@ -329,7 +329,7 @@ static void harden(SSL_CTX *context)
 	SSL_CTX_set_num_tickets(context, 0);
 	SSL_CTX_set_mode(context, SSL_MODE_RELEASE_BUFFERS);
 	SSL_CTX_set_max_cert_list(context, CERTIFICATES_MAX);
-	SSL_CTX_set_verify(context, SSL_VERIFY_PEER | SSL_VERIFY_FAIL_IF_NO_PEER_CERT, judge);
+	SSL_CTX_set_verify(context, SSL_VERIFY_PEER | SSL_VERIFY_FAIL_IF_NO_PEER_CERT, verify_certificate);
 	SSL_CTX_set_verify_depth(context, DEPTH);
 }
 
@@ -364,7 +364,7 @@ int tls_open(struct tls **out, const char *folder, struct error *e)
 	int n = snprintf(t->folder, sizeof t->folder, "%s", folder);
 	int rc = n < 0 || (size_t)n >= sizeof t->folder ? error_set(e, EINVAL, "%s: the name is too long", folder) : 0;
 	t->recheck = 60;
-	look(t, t->stamps);
+	stat_files(t, t->stamps);
 	memcpy(t->seen, t->stamps, sizeof t->seen);
 	if (!rc)
 		rc = load(t, is_there(&t->stamps[3]), &t->context, &t->self, e);
@@ -390,7 +390,7 @@ int tls_refresh(struct tls *t, struct error *e)
 	struct stamp now[FILES];
 	struct tls_peer self;
 	SSL_CTX *fresh;
-	look(t, now);
+	stat_files(t, now);
 	bool news = memcmp(now, t->seen, sizeof now) != 0;
 	memcpy(t->seen, now, sizeof now);
 	if (memcmp(now, t->stamps, sizeof now) == 0)

@@ -23,7 +23,7 @@ struct envelope_block {
 	alignas(16) unsigned char bytes[];
 };
 
-static void *take(void *user, size_t size)
+static void *allocate_bounded(void *user, size_t size)
 {
 	struct envelope *env = user;
 	size_t need = (size + 15) & ~(size_t)15;
@@ -120,7 +120,7 @@ int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t siz
 {
 	memset(env, 0, sizeof *env);
 	env->limit = LEAST_BYTES + AMPLIFICATION * size;
-	ProtobufCAllocator allocator = {take, give_back, env};
+	ProtobufCAllocator allocator = {allocate_bounded, give_back, env};
 	Farm__Envelope *m = farm__envelope__unpack(&allocator, size, bytes);
 	const char *fault = NULL;
 	if (!m)

@@ -42,7 +42,7 @@ static bool would_complete(const struct job *j, const struct slot *s)
 	return s->next == j->rounds && j->done + 1 == j->slot_count;
 }
 
-static enum verdict judge(const struct peer *p, const struct job *j, const struct event *ev, const char **why)
+static enum verdict judge_result(const struct peer *p, const struct job *j, const struct event *ev, const char **why)
 {
 	const struct lease_key *k = &ev->lease.key;
 	*why = !p ? "unknown worker" : !j ? "no such job" : !job_is_live(j) ? "the job is over" : "";
@@ -183,7 +183,7 @@ void answer_batch(struct farm *f, const struct event *ev)
 	struct peer *p = farm_find_peer(f, ev->peer);
 	struct job *j = farm_find_job(f, ev->lease.key.job);
 	const char *why;
-	enum verdict v = judge(p, j, ev, &why);
+	enum verdict v = judge_result(p, j, ev, &why);
 	struct slot *s = j && job_is_live(j) ? slot_of(j, &ev->lease.key) : NULL;
 	bool verified = v == MERGE && proof_chosen(j, &ev->lease.key);
 	if (verified)

@@ -11,7 +11,7 @@
 
 #include <string.h>
 
-static struct peer *make(struct farm *f, const struct event_join *e, uint32_t limit)
+static struct peer *peer_new(struct farm *f, const struct event_join *e, uint32_t limit)
 {
 	if (update_reserve(f, limit) < 0)
 		return NULL;
@@ -48,7 +48,7 @@ struct peer *connection_join(struct farm *f, const struct event_join *e, const c
 	struct identity *who = worker_registry_use(f, e, refused);
 	if (!who)
 		return NULL;
-	struct peer *p = make(f, e, limit);
+	struct peer *p = peer_new(f, e, limit);
 	if (!p) {
 		worker_registry_drop(f, who);
 		*refused = "the coordinator has no memory for another worker";

@@ -43,7 +43,7 @@ static struct lease *lease_take(struct farm *f, struct peer *p)
 	return oldest;
 }
 
-static void say(struct farm *f, enum action_kind kind, const struct lease *l)
+static void add_action(struct farm *f, enum action_kind kind, const struct lease *l)
 {
 	struct action *a = update_add(f, kind);
 	a->peer = l->peer->id;
@@ -78,7 +78,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 	peer_requeue(f, p);
 	if (!j->mixed)
 		job_pin(j, p->class);
-	say(f, ACTION_SEND_LEASE, l);
+	add_action(f, ACTION_SEND_LEASE, l);
 }
 
 static void let_go(struct farm *f, struct lease *l)
@@ -127,7 +127,7 @@ void lease_drop(struct farm *f, struct lease *l)
 
 void lease_revoke(struct farm *f, struct lease *l)
 {
-	say(f, ACTION_REVOKE, l);
+	add_action(f, ACTION_REVOKE, l);
 	lease_drop(f, l);
 }
 

@@ -56,7 +56,7 @@ static uint64_t result_bytes(const struct jobs *s, uint64_t job)
 	return sum;
 }
 
-static void look(const struct jobs *s, struct clearing *c, uint64_t id)
+static void clear_if_unneeded(const struct jobs *s, struct clearing *c, uint64_t id)
 {
 	if (is_needed(s, id))
 		return;
@@ -162,7 +162,7 @@ static void choose(const struct jobs *s, struct clearing *c)
 static bool step(struct jobs *s, struct clearing *c)
 {
 	if (c->looked < c->id_count)
-		look(s, c, c->ids[c->looked++]);
+		clear_if_unneeded(s, c, c->ids[c->looked++]);
 	else if (!(c->now > 0))
 		choose(s, c);
 	else if (c->cleared < c->job_count)

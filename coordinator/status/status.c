@@ -185,7 +185,7 @@ static void on_written(uv_write_t *w, int status)
 }
 
 /* Takes the object. */
-static void say(struct reader *r, json_t *o)
+static void send_object(struct reader *r, json_t *o)
 {
 	char *text = json_dumps(o, JSON_COMPACT);
 	struct sending *s = text ? mem_alloc(1, sizeof *s) : NULL;
@@ -214,7 +214,7 @@ static void say_error(struct reader *r, const char *text)
 {
 	json_t *o = object("error");
 	json_object_set_new(o, "text", json_string(text));
-	say(r, o);
+	send_object(r, o);
 }
 
 static void take_line(struct reader *r, size_t size)
@@ -288,7 +288,7 @@ static void on_connection(uv_stream_t *listener, int status)
 		drop(r);
 		return;
 	}
-	say(r, snapshot(t->peers));
+	send_object(r, snapshot(t->peers));
 }
 
 /* ---- changes ---- */
@@ -301,12 +301,12 @@ static const struct job_view *shown_before(const struct status_socket *t, uint64
 	return NULL;
 }
 
-static void tell(struct status_socket *t, enum topic topic, json_t *o)
+static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 {
 	for (struct reader *r = t->readers, *next; r; r = next) {
 		next = r->next;
 		if (r->topics & topic)
-			say(r, json_incref(o));
+			send_object(r, json_incref(o));
 	}
 	json_decref(o);
 }
@@ -331,7 +331,7 @@ void status_tick(struct status_socket *t)
 			continue;
 		json_t *o = object("job");
 		json_object_set_new(o, "job", view_to_json(&views[i]));
-		tell(t, TOPIC_JOBS, o);
+		publish_object(t, TOPIC_JOBS, o);
 	}
 	mem_free(t->shown);
 	t->shown = views;
@@ -339,10 +339,10 @@ void status_tick(struct status_socket *t)
 	if (topics & TOPIC_WORKERS) {
 		json_t *o = object("workers");
 		add_workers(t->peers, o);
-		tell(t, TOPIC_WORKERS, o);
+		publish_object(t, TOPIC_WORKERS, o);
 	}
 	if (topics & TOPIC_SNAPSHOT)
-		tell(t, TOPIC_SNAPSHOT, snapshot(t->peers));
+		publish_object(t, TOPIC_SNAPSHOT, snapshot(t->peers));
 }
 
 /* ---- begin and end ---- */
@@ -400,7 +400,7 @@ static int find_group(const char *name, gid_t *group, struct error *e)
 
 /* A socket of our own at the path, mode 0600 from its first moment on. libuv's own would remove the file when it
  * closes, and by then it may be another's. */
-static int make(struct status_socket *t, const char *group, struct error *e)
+static int open_socket(struct status_socket *t, const char *group, struct error *e)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};
 	struct stat st = {0};
@@ -451,7 +451,7 @@ int status_open(struct status_socket **out, const struct peers *s, int inherited
 	*out = t;
 	int fault = 0, rc = 0;
 	if (t->path)
-		rc = make(t, group, e);
+		rc = open_socket(t, group, e);
 	else
 		fault = uv_pipe_open(&t->listener, inherited);
 	if (!rc && !fault)

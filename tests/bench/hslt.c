@@ -39,7 +39,7 @@ static double sum(const uint64_t *n, unsigned first, unsigned last)
 	return s;
 }
 
-static struct figures run(const struct subject *s)
+static struct figures run_subject(const struct subject *s)
 {
 	struct batch b;
 	record_walks = (struct recorded_walks){.occluded = 0};
@@ -70,7 +70,7 @@ static void measure_rate(struct world *w, const struct reference *r)
 		subject_reseed(&mixture, i);
 		subject_reseed(&alone, i);
 		double million = subject_million_rays();
-		struct figures f = run(&mixture), p = run(&alone);
+		struct figures f = run_subject(&mixture), p = run_subject(&alone);
 		series_add(&embree, 1 / million);
 		series_add(&rate, f.mutations / f.seconds * million);
 		series_add(&pure, p.mutations / p.seconds * million);
@@ -104,7 +104,7 @@ static void measure_share(struct world *w, double least_share)
 	subject_make(&s, w, "hslt", NULL);
 	subject_record(&s);
 	for (unsigned i = 0; i < BENCH_REPEATS; i++) {
-		struct figures f = run(&s);
+		struct figures f = run_subject(&s);
 		double alone = subject_replay_raw(&s) * f.rays / (double)s.count;
 		series_add(&share, alone / f.seconds);
 		series_add(&outside, 1e6 * (f.seconds - alone) / f.mutations);
@@ -127,7 +127,7 @@ static void measure_breakup(struct world *w)
 	for (unsigned i = 0; i < BENCH_REPEATS; i++) {
 		subject_reseed(&broken, i);
 		subject_reseed(&unbroken, i);
-		struct figures b = run(&broken), u = run(&unbroken);
+		struct figures b = run_subject(&broken), u = run_subject(&unbroken);
 		series_add(&rays, b.rays / b.mutations);
 		series_add(&unbroken_rays, u.rays / u.mutations);
 		series_add(&fewer, 100 * (1 - b.rays / b.mutations / (u.rays / u.mutations)));

@@ -26,7 +26,7 @@ size_t record_stop(void)
 	return count;
 }
 
-static void keep(struct recorded_ray r)
+static void keep_ray(struct recorded_ray r)
 {
 	if (count < room)
 		kept[count++] = r;
@@ -36,21 +36,22 @@ bool __wrap_accel_closest(const struct accel *a, const struct ray_end *from, vec
 			  struct ray_hit *hit)
 {
 	if (kept)
-		keep((struct recorded_ray){.kind = RAY_CLOSEST, .from = *from, .d = d, .t_min = t_min, .t_max = t_max});
+		keep_ray((struct recorded_ray){
+			.kind = RAY_CLOSEST, .from = *from, .d = d, .t_min = t_min, .t_max = t_max});
 	return __real_accel_closest(a, from, d, t_min, t_max, hit);
 }
 
 bool __wrap_accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
 {
 	if (kept)
-		keep((struct recorded_ray){.kind = RAY_SEGMENT, .from = *from, .to = *to});
+		keep_ray((struct recorded_ray){.kind = RAY_SEGMENT, .from = *from, .to = *to});
 	return __real_accel_occluded(a, from, to);
 }
 
 bool __wrap_accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d)
 {
 	if (kept)
-		keep((struct recorded_ray){.kind = RAY_INFINITE, .from = *from, .d = d});
+		keep_ray((struct recorded_ray){.kind = RAY_INFINITE, .from = *from, .d = d});
 	return __real_accel_occluded_to_infinity(a, from, d);
 }
 

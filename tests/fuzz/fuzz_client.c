@@ -32,7 +32,7 @@ static struct {
 
 /* ---- the coordinator, on a thread of its own ---- */
 
-static void say(int fd, const void *bytes, size_t size)
+static void send_bytes(int fd, const void *bytes, size_t size)
 {
 	const char *at = bytes;
 	ssize_t n = 1;
@@ -55,7 +55,7 @@ static void say_hello_ack(int fd)
 	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
 	m.hello_ack = &ack;
 	if (envelope_pack(&m, NULL, 0, &frame, &size, &e) == 0)
-		say(fd, frame, size);
+		send_bytes(fd, frame, size);
 	mem_free(frame);
 }
 
@@ -71,7 +71,7 @@ static void *speak(void *user)
 		size_t size;
 		unsigned char *sealed = checked_file_parts(s->header, s->header_size, s->payload, s->payload_size,
 							   i == 0 && !now.hello, &size);
-		say(fd, sealed, size);
+		send_bytes(fd, sealed, size);
 		free(sealed);
 	}
 	shutdown(fd, SHUT_WR);
@@ -127,7 +127,7 @@ static void submit(struct client *cl)
 	submit_send(cl, &r, &b, &job, text, sizeof text, &e);
 }
 
-static void want(struct client *cl, enum want w)
+static void make_request(struct client *cl, enum want w)
 {
 	struct error e;
 	struct submit_end end;
@@ -168,7 +168,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	if (pthread_create(&thread, NULL, speak, NULL))
 		abort();
 	if (client_open(&cl, now.address, NULL, false, "n", &e) == 0) {
-		want(cl, *bytes % WANTS);
+		make_request(cl, *bytes % WANTS);
 		client_close(cl);
 	}
 	pthread_join(thread, NULL);

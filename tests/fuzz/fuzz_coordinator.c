@@ -109,7 +109,7 @@ static void say_result(struct seed *s, uint8_t who, struct lease_key k)
 	say_some(s, who, k, 0.01f);
 }
 
-static void ask(struct seed *s, uint8_t who, uint64_t job)
+static void send_requests(struct seed *s, uint8_t who, uint64_t job)
 {
 	Farm__LeaseRequest r;
 	farm__lease_request__init(&r);
@@ -126,11 +126,11 @@ static void write_dispute(void)
 {
 	struct seed s = {0};
 	const struct lease_key k = {.job = FARM_SAMPLES, .kind = LEASE_RENDER};
-	ask(&s, WORKER_ONE, k.job);
-	ask(&s, WORKER_TWO, k.job);
+	send_requests(&s, WORKER_ONE, k.job);
+	send_requests(&s, WORKER_TWO, k.job);
 	say_some(&s, WORKER_ONE, k, 0.01f);
 	say_some(&s, WORKER_TWO, k, 7);
-	ask(&s, WORKER_THREE, k.job);
+	send_requests(&s, WORKER_THREE, k.job);
 	say_some(&s, WORKER_THREE, k, 0.01f);
 	seed_end(&s, "dispute", 0);
 }
@@ -148,16 +148,16 @@ static void write_results(void)
 	};
 	struct seed s = {0};
 	for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
-		ask(&s, WORKER_ONE, keys[i].job);
+		send_requests(&s, WORKER_ONE, keys[i].job);
 		say_result(&s, WORKER_ONE, keys[i]);
 		seed_end(&s, "result", i);
-		ask(&s, WORKER_ONE, keys[i].job);
-		ask(&s, WORKER_TWO, keys[i].job);
+		send_requests(&s, WORKER_ONE, keys[i].job);
+		send_requests(&s, WORKER_TWO, keys[i].job);
 		say_result(&s, WORKER_ONE, keys[i]);
 		say_result(&s, WORKER_TWO, keys[i]);
 		seed_end(&s, "both", i);
 	}
-	ask(&s, WORKER_ONE, last.job); /* to its end */
+	send_requests(&s, WORKER_ONE, last.job); /* to its end */
 	for (uint64_t epoch = 0; epoch < p.rounds; epoch++) {
 		struct lease_key k = last;
 		k.epoch = epoch;
@@ -165,7 +165,7 @@ static void write_results(void)
 	}
 	seed_end(&s, "end", 0);
 	p = farm_plan(FARM_BOOTSTRAP);
-	ask(&s, WORKER_ONE, FARM_BOOTSTRAP);
+	send_requests(&s, WORKER_ONE, FARM_BOOTSTRAP);
 	for (uint32_t i = 1; i < p.groups * p.parts; i++)
 		say_result(&s, WORKER_ONE,
 			   (struct lease_key){.job = FARM_BOOTSTRAP,

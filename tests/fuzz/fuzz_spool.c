@@ -180,7 +180,7 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 	}
 }
 
-static void ask(struct farm_world *w)
+static void send_requests(struct farm_world *w)
 {
 	Farm__JobList list;
 	Farm__LeaseRequest request;
@@ -215,7 +215,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	farm_spool_copy(w.spool);
 	damage(w.spool, (enum what)(*bytes % WHATS), bytes + 1, size - 1);
 	if (farm_world_open(&w, &e) == 0) {
-		ask(&w);
+		send_requests(&w);
 		farm_world_close(&w);
 	}
 	folders_remove(w.spool);

@@ -87,7 +87,7 @@ static void read_all(struct end *x)
 	}
 }
 
-static void give(struct end *x, const void *bytes, size_t size)
+static void pass_bytes(struct end *x, const void *bytes, size_t size)
 {
 	struct error e;
 	for (size_t i = 0; i < size && !x->broken; i += PIECE) {
@@ -128,7 +128,7 @@ static bool carry(struct end *from, struct end *to, struct edits *d)
 	tls_link_output_taken(from->link);
 	if (d && d->from == from)
 		change(d, copy, size);
-	give(to, copy, size);
+	pass_bytes(to, copy, size);
 	return true;
 }
 
@@ -146,7 +146,7 @@ static uint8_t said(size_t i)
 	return (uint8_t)(i * 7 + i / 251);
 }
 
-static void say(struct end *x)
+static void write_bytes(struct end *x)
 {
 	uint8_t bytes[SAID];
 	struct error e;
@@ -156,7 +156,7 @@ static void say(struct end *x)
 		x->broken = tls_link_write(x->link, bytes, SAID, &e) != 0;
 }
 
-static void judge(const struct end *x, const char *name)
+static void check_received(const struct end *x, const char *name)
 {
 	if (x->got_size > SAID)
 		abort();
@@ -174,11 +174,11 @@ static void converse(const uint8_t *bytes, size_t size, const struct end *change
 	open_end(&listener, farm, true);
 	read_all(&caller);
 	carry_all(&d);
-	say(&caller);
-	say(&listener);
+	write_bytes(&caller);
+	write_bytes(&listener);
 	carry_all(&d);
-	judge(&caller, "farm");
-	judge(&listener, "node");
+	check_received(&caller, "farm");
+	check_received(&listener, "node");
 	if (who == stranger && tls_link_is_open(listener.link))
 		abort();
 	tls_link_free(caller.link);
@@ -194,7 +194,7 @@ static void send_records(const uint8_t *bytes, size_t size)
 	carry_all(NULL);
 	if (!tls_link_is_open(listener.link) || !tls_link_is_open(caller.link))
 		abort();
-	give(&listener, bytes, size);
+	pass_bytes(&listener, bytes, size);
 	if (listener.got_size)
 		abort(); /* nobody without the keys is heard */
 	if (tls_link_recheck(listener.link, &e))
@@ -208,7 +208,7 @@ static void send_alone(const uint8_t *bytes, size_t size, bool listening)
 	struct end *x = listening ? &listener : &caller;
 	open_end(x, listening ? farm : node, listening);
 	read_all(x);
-	give(x, bytes, size);
+	pass_bytes(x, bytes, size);
 	if (tls_link_is_open(x->link))
 		abort();
 	tls_link_free(x->link);

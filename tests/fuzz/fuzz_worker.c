@@ -118,7 +118,7 @@ static void drain(void)
 		n = recv(now.fd, bytes, sizeof bytes, MSG_DONTWAIT);
 }
 
-static void say(const void *bytes, size_t size)
+static void send_bytes(const void *bytes, size_t size)
 {
 	const char *at = bytes;
 	while (now.fd >= 0 && size && now.agent->conn) {
@@ -146,7 +146,7 @@ static void say_hello_ack(void)
 	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
 	m.hello_ack = &ack;
 	if (envelope_pack(&m, NULL, 0, &frame, &size, &e) == 0) {
-		say(frame, size);
+		send_bytes(frame, size);
 		mem_free(frame);
 	}
 }
@@ -229,7 +229,7 @@ static void step(const struct step *s)
 		if (now.fd < 0)
 			answer();
 		bytes = checked_file_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
-		say(bytes, size);
+		send_bytes(bytes, size);
 		free(bytes);
 		break;
 	case CREW:

@@ -14,7 +14,7 @@ static struct {
 	uint64_t random;
 } now;
 
-static void *take(void *user, size_t size)
+static void *allocate(void *user, size_t size)
 {
 	(void)user;
 	size_t need = (size + 15) & ~(size_t)15;
@@ -31,7 +31,7 @@ static void give_back(void *user, void *p)
 	(void)p;
 }
 
-static ProtobufCAllocator allocator = {take, give_back, NULL};
+static ProtobufCAllocator allocator = {allocate, give_back, NULL};
 
 static void begin(unsigned seed)
 {
@@ -114,7 +114,7 @@ static char *some_text(const char *before)
 					    "\xff",
 					    "a\nb",
 					    "%s%n"};
-	char *p = take(NULL, STRING_ROOM);
+	char *p = allocate(NULL, STRING_ROOM);
 	if (!p)
 		return NULL;
 	if (dice(2)) {
@@ -132,7 +132,7 @@ static char *some_text(const char *before)
 
 static ProtobufCBinaryData some_bytes(ProtobufCBinaryData before)
 {
-	ProtobufCBinaryData b = {0, take(NULL, STRING_ROOM)};
+	ProtobufCBinaryData b = {0, allocate(NULL, STRING_ROOM)};
 	if (!b.data)
 		return b;
 	b.len = before.len < STRING_ROOM ? before.len : STRING_ROOM;
@@ -166,7 +166,7 @@ static void change(ProtobufCMessage *m);
 
 static ProtobufCMessage *fresh(const ProtobufCMessageDescriptor *d)
 {
-	ProtobufCMessage *m = take(NULL, d->sizeof_message);
+	ProtobufCMessage *m = allocate(NULL, d->sizeof_message);
 	if (m)
 		d->message_init(m);
 	return m;
@@ -213,7 +213,7 @@ static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *cou
 		memmove(list + gone * each, list + (gone + 1) * each, (*count - gone - 1) * each);
 		--*count;
 	} else {
-		uint8_t *more = take(NULL, (*count + 1) * each);
+		uint8_t *more = allocate(NULL, (*count + 1) * each);
 		if (!more)
 			return;
 		if (*count)
@@ -269,7 +269,7 @@ static const uint8_t *change_packed(const uint8_t *bytes, size_t *size)
 	for (uint64_t i = 0, n = 1 + dice(4); i < n && m; i++)
 		change(m);
 	size_t packed = m ? protobuf_c_message_get_packed_size(m) : 0;
-	uint8_t *out = packed ? take(NULL, packed) : NULL;
+	uint8_t *out = packed ? allocate(NULL, packed) : NULL;
 	if (out)
 		*size = protobuf_c_message_pack(m, out);
 	return out;
@@ -345,7 +345,7 @@ size_t script_add(uint8_t *bytes, size_t size, size_t room, uint8_t who, const F
 static void change_payload(struct step *s)
 {
 	size_t room = s->payload_size + 64 < PART_MOST ? s->payload_size + 64 : PART_MOST;
-	uint8_t *p = take(NULL, room);
+	uint8_t *p = allocate(NULL, room);
 	if (!p)
 		return;
 	if (s->payload_size)
@@ -410,7 +410,7 @@ size_t script_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed, un
 {
 	struct step steps[SCRIPT_STEPS];
 	begin(seed);
-	uint8_t *copy = take(NULL, size + 1); /* the input may grow over what the steps point at */
+	uint8_t *copy = allocate(NULL, size + 1); /* the input may grow over what the steps point at */
 	if (!copy || dice(32) == 0)
 		return LLVMFuzzerMutate(bytes, size, room);
 	if (size)

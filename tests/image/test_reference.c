@@ -165,7 +165,7 @@ static struct compare_result measure(const struct picture *ours, const struct pi
 	return r;
 }
 
-static void judge(const struct compare_result *r)
+static void check_result(const struct compare_result *r)
 {
 	if (test_scale() > 1)
 		return;
@@ -201,7 +201,7 @@ static void compare_in_grey(const struct subject *s)
 	struct compare_result r = measure(&ours, &reference, s, "three pictures in grey");
 	picture_fini(&ours);
 	picture_fini(&reference);
-	judge(&r);
+	check_result(&r);
 }
 
 static void compare_in_colour(const struct subject *s)
@@ -216,7 +216,7 @@ static void compare_in_colour(const struct subject *s)
 	struct compare_result r = measure(&ours, &reference, s, "spectral, luminance");
 	picture_fini(&ours);
 	picture_fini(&reference);
-	judge(&r);
+	check_result(&r);
 }
 
 static const struct subject cornell_box = {"cornell-box", 0};

@@ -195,7 +195,7 @@ static void end_all(struct table *t)
 	}
 }
 
-static void say(const struct table *t, const char *command, const char *what, double seconds)
+static void print_processes(const struct table *t, const char *command, const char *what, double seconds)
 {
 	fprintf(stderr, "limit: %s: %s for %.0f s; its processes, their states and seconds of processor time:\n",
 		command, what, seconds);
@@ -245,9 +245,9 @@ static int watch(pid_t command, const char *name, double cpu_limit, double idle_
 		over = cpu >= cpu_limit ? over + 1 : 0;
 		if (over >= 2 || idle >= idle_limit) {
 			if (over >= 2)
-				say(&t, name, "it has used the processor", cpu);
+				print_processes(&t, name, "it has used the processor", cpu);
 			else
-				say(&t, name, "it has been idle and written nothing", idle);
+				print_processes(&t, name, "it has been idle and written nothing", idle);
 			end_all(&t);
 			free(t.of);
 			return 124;

@@ -277,7 +277,7 @@ static double own_cpu(void)
 	       1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
 }
 
-static void mark(int which)
+static void note_usage(int which)
 {
 	clockwork.cpu[which] = process_cpu_seconds(&coordinator);
 	clockwork.own_cpu[which] = own_cpu();
@@ -313,12 +313,12 @@ static void on_phase(uv_timer_t *t)
 	    load.connected + load.s.bad[LOAD_DIES] + load.s.bad[LOAD_HANGS] >= load.s.workers &&
 	    load.merged >= load.s.workers) {
 		load.measuring = true;
-		mark(0);
+		note_usage(0);
 		fprintf(stderr, "load: %u workers are connected and have sent a batch; measuring\n", load.connected);
 	} else if (load.measuring && now - clockwork.begun >= 60 * load.s.minutes) {
 		double average[3];
 		clockwork.loaded = getloadavg(average, 3) > 0 ? average[0] : NAN;
-		mark(1);
+		note_usage(1);
 		load.measuring = false;
 		load_leave(&load);
 	} else if (load.leaving && (load_unanswered(&load) == 0 || now - clockwork.ended > 120)) {

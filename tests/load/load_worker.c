@@ -37,7 +37,7 @@ struct load_worker {
 
 static void work_on(struct load_worker *w);
 
-static void say(struct load_worker *w, Farm__Envelope *m, Farm__Envelope__BodyCase body)
+static void send_message(struct load_worker *w, Farm__Envelope *m, Farm__Envelope__BodyCase body)
 {
 	m->body_case = body;
 	if (w->conn)
@@ -65,7 +65,7 @@ static void request(struct load_worker *w, unsigned want)
 	farm__envelope__init(&m);
 	r.want = want;
 	m.lease_request = &r;
-	say(w, &m, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	send_message(w, &m, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 }
 
 static void give_back(struct load_worker *w, struct held *h)
@@ -80,7 +80,7 @@ static void give_back(struct load_worker *w, struct held *h)
 	f.key = &key;
 	f.text = nothing;
 	m.lease_failed = &f;
-	say(w, &m, FARM__ENVELOPE__BODY_LEASE_FAILED);
+	send_message(w, &m, FARM__ENVELOPE__BODY_LEASE_FAILED);
 	h->state = FREE;
 	w->load->given_back++;
 }
@@ -105,7 +105,7 @@ static void ask_job(struct load_worker *w, uint64_t job)
 	farm__envelope__init(&m);
 	get.job = job;
 	m.job_get = &get;
-	say(w, &m, FARM__ENVELOPE__BODY_JOB_GET);
+	send_message(w, &m, FARM__ENVELOPE__BODY_JOB_GET);
 }
 
 static void ask_file(struct load_worker *w, const Farm__File *f)
@@ -116,7 +116,7 @@ static void ask_file(struct load_worker *w, const Farm__File *f)
 	farm__envelope__init(&m);
 	get.hash = f->hash;
 	m.blob_get = &get;
-	say(w, &m, FARM__ENVELOPE__BODY_BLOB_GET);
+	send_message(w, &m, FARM__ENVELOPE__BODY_BLOB_GET);
 }
 
 /* The bundles are one small file each. */
@@ -333,7 +333,7 @@ static void on_beat(uv_timer_t *t)
 	farm__envelope__init(&m);
 	m.heartbeat = &b;
 	w->beat_at = load_now();
-	say(w, &m, FARM__ENVELOPE__BODY_HEARTBEAT);
+	send_message(w, &m, FARM__ENVELOPE__BODY_HEARTBEAT);
 }
 
 static void take_welcome(struct load_worker *w, const Farm__HelloAck *ack)
@@ -419,7 +419,7 @@ static void on_opened(void *user)
 	h.fingerprint = fingerprint;
 	h.threads = w->kind == LOAD_HOARDS ? HOARD : 1;
 	m.hello = &h;
-	say(w, &m, FARM__ENVELOPE__BODY_HELLO);
+	send_message(w, &m, FARM__ENVELOPE__BODY_HELLO);
 }
 
 static void on_drained(void *user)

@@ -67,7 +67,7 @@ static void compare(const struct agree_case *k, const char *integrator, struct w
 	row(&rows, k->topic, name, measured, bound, d.holds && d.found <= must_find(k));
 }
 
-static void run(const struct agree_case *k)
+static void run_case(const struct agree_case *k)
 {
 	static struct agree_image reference;
 	const char *only = getenv("CASE");
@@ -84,7 +84,7 @@ static void test_agree(void **state)
 {
 	(void)state;
 	for (const struct agree_case *k = agree_cases; k->topic; k++)
-		run(k);
+		run_case(k);
 	printf("integrators on hard scenes: %u comparisons, %u failed\n", rows.cases, rows.failed);
 	assert_int_equal(rows.failed, 0);
 }

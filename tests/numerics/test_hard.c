@@ -25,7 +25,7 @@ static uint64_t unsound(const uint64_t *counters)
 	return counters[COUNT_NAN] + counters[COUNT_INFINITE] + counters[COUNT_NEGATIVE];
 }
 
-static void run(const struct hard_case *h)
+static void run_case(const struct hard_case *h)
 {
 	static struct stationary_result s;
 	static struct chains_result c;
@@ -73,7 +73,7 @@ static void test_hard(void **state)
 	const char *only = getenv("CASE");
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		if (!only || strstr(h->topic, only))
-			run(h);
+			run_case(h);
 	printf("hard scenes: %u cases, %u failed; %llu mutations, caught %llu NaN, %llu infinite, %llu negative; %llu in films\n",
 	       rows.cases, rows.failed, (unsigned long long)mutations, (unsigned long long)caught[0],
 	       (unsigned long long)caught[1], (unsigned long long)caught[2], (unsigned long long)invalid);

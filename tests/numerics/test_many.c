@@ -21,7 +21,7 @@ static struct {
 	uint64_t mutations, film, counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
 } sum;
 
-static void run(struct world *w, const char *name, unsigned depth, uint64_t mutations)
+static void run_chains(struct world *w, const char *name, unsigned depth, uint64_t mutations)
 {
 	enum { CHAINS = 16, PIECE = 1 << 20 };
 	struct chains_result r;
@@ -56,9 +56,9 @@ static void test_many(void **state)
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		scenes++;
 	for (int i = 0; i < TEST_SCENES; i++)
-		run(test_world(test_scenes[i].name), test_scenes[i].name, 12, total / scenes + 1);
+		run_chains(test_world(test_scenes[i].name), test_scenes[i].name, 12, total / scenes + 1);
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
-		run(h->make(h->parameter), h->name, h->max_edges < 12 ? 12 : h->max_edges, total / scenes + 1);
+		run_chains(h->make(h->parameter), h->name, h->max_edges < 12 ? 12 : h->max_edges, total / scenes + 1);
 	struct rows rows = {0, 0};
 	char measured[600];
 	int n = snprintf(

@@ -95,7 +95,7 @@ static void note(struct errors *e, double program, const struct world *w, const 
 	e->wrong += !(fabs(exp(fmin(once, 0.0)) - accept) <= 0.01);
 }
 
-static void run(const struct precision_case *p, unsigned most, struct errors *e)
+static void run_case(const struct precision_case *p, unsigned most, struct errors *e)
 {
 	static struct path_context c;
 	static struct mutation_ctx m;
@@ -139,7 +139,7 @@ static void test_precision(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct errors e = {.of_float = of_float};
 		char measured[300], bound[64];
-		run(&cases[i], most, &e);
+		run_case(&cases[i], most, &e);
 		qsort(of_float, e.count, sizeof *of_float, by_size);
 		snprintf(
 			measured, sizeof measured,

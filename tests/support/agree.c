@@ -37,7 +37,7 @@ static uint32_t cell_of(const struct plan *p, uint32_t x, uint32_t y)
 	return (y * AGREE_BLOCKS / p->height) * AGREE_BLOCKS + x * AGREE_BLOCKS / p->width;
 }
 
-static void take(struct group_run *g, const struct batch *b)
+static void add_batch(struct group_run *g, const struct batch *b)
 {
 	for (uint32_t t = 0; t < b->tile_count; t++) {
 		const struct tile *tile = &b->tiles[t];
@@ -81,7 +81,7 @@ static bool bootstrap(struct group_run *g, uint64_t *seeds)
 		}
 		memcpy(weights + n, b.weights, b.weight_count * sizeof *weights);
 		n += b.weight_count;
-		take(g, &b);
+		add_batch(g, &b);
 		batch_fini(&b);
 	}
 	memset(g->counters, 0, sizeof g->counters);
@@ -105,7 +105,7 @@ static bool run_part(struct group_run *g, uint32_t part, const uint64_t *seeds)
 		batch_fini(&before);
 		before = (struct batch){.state_count = 0};
 		if (ok) {
-			take(g, &b);
+			add_batch(g, &b);
 			before = b;
 		}
 	}
@@ -277,7 +277,7 @@ static double p_of(const struct verdict *v)
 }
 
 /* Holm over the cells; the power is that of the strictest step. */
-static void judge(const char *test, const struct verdict *v, bool powerful)
+static void judge_cells(const char *test, const struct verdict *v, bool powerful)
 {
 	const char *scale = getenv("HSLT_TEST_SCALE");
 	bool weak_allowed = scale && atoi(scale) > 1;
@@ -330,14 +330,14 @@ void agree_check(const char *test, const struct agree_image *a, const struct agr
 {
 	struct verdict v[AGREE_CELLS + 1];
 	compare_images(a, b, v);
-	judge(test, v, true);
+	judge_cells(test, v, true);
 }
 
 double agree_within_errors(const char *test, const struct agree_image *a, const struct agree_image *b)
 {
 	struct verdict v[AGREE_CELLS + 1];
 	compare_images(a, b, v);
-	judge(test, v, false);
+	judge_cells(test, v, false);
 	return v[AGREE_CELLS].difference;
 }
 
@@ -348,5 +348,5 @@ void agree_expect(const char *test, const struct agree_image *a, double expected
 		struct cell x = cell_stats(a, c), y = {expected, 0, 0};
 		v[c] = compare(&x, &y);
 	}
-	judge(test, v, true);
+	judge_cells(test, v, true);
 }

@@ -400,7 +400,7 @@ static bool fault_of(const struct balance_trial *t, int i, double *fault, double
 	return true;
 }
 
-static void judge(struct balance_verdict *v, int i, double fault, double error)
+static void add_verdict(struct balance_verdict *v, int i, double fault, double error)
 {
 	double p = stats_student_t_p(fault / error, BALANCE_GROUPS - 1);
 	v->power = fmin(v->power, (critical_t() + 1.645) * error);
@@ -421,7 +421,7 @@ struct balance_verdict balance_judge(const struct balance_trial *t)
 	double fault, error;
 	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
 		if (fault_of(t, i, &fault, &error))
-			judge(&v, i, fault, error);
+			add_verdict(&v, i, fault, error);
 	return v;
 }
 
@@ -440,7 +440,7 @@ struct balance_verdict balance_pool_judge(const struct balance_pool *p)
 	struct balance_verdict v = nothing_known;
 	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
 		if (p->certainty[i] > 0)
-			judge(&v, i, p->weighted[i] / p->certainty[i], 1 / sqrt(p->certainty[i]));
+			add_verdict(&v, i, p->weighted[i] / p->certainty[i], 1 / sqrt(p->certainty[i]));
 	return v;
 }
 

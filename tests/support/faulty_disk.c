@@ -187,7 +187,7 @@ static void resize(unsigned char **bytes, uint64_t *size, uint64_t want)
 	*size = want;
 }
 
-static void put(unsigned char **bytes, uint64_t *size, const void *from, uint64_t n, uint64_t at)
+static void write_at(unsigned char **bytes, uint64_t *size, const void *from, uint64_t n, uint64_t at)
 {
 	if (at + n > *size)
 		resize(bytes, size, at + n);
@@ -210,7 +210,7 @@ void faulty_disk_flushed(struct faulty_disk_node *n, bool database)
 	for (struct change *c; (c = n->changes);) {
 		n->changes = c->next;
 		if (c->bytes)
-			put(&n->bytes, &n->size, c->bytes, c->size, c->at);
+			write_at(&n->bytes, &n->size, c->bytes, c->size, c->at);
 		else
 			resize(&n->bytes, &n->size, c->size);
 		free(c->bytes);
@@ -288,7 +288,7 @@ static void write_out(const struct faulty_disk_node *n, const char *path, const 
 {
 	unsigned char *bytes = NULL;
 	uint64_t size = 0;
-	put(&bytes, &size, n->bytes ? n->bytes : (const unsigned char *)"", n->size, 0);
+	write_at(&bytes, &size, n->bytes ? n->bytes : (const unsigned char *)"", n->size, 0);
 	for (const struct change *c = n->changes; c; c = c->next) {
 		if (!c->bytes) {
 			if (roll() < p->lengths)
@@ -301,7 +301,7 @@ static void write_out(const struct faulty_disk_node *n, const char *path, const 
 			end = at / SECTOR * SECTOR + SECTOR;
 			end = end < c->at + c->size ? end : c->at + c->size;
 			if (roll() < p->bytes)
-				put(&bytes, &size, c->bytes + (at - c->at), end - at, at);
+				write_at(&bytes, &size, c->bytes + (at - c->at), end - at, at);
 			else
 				++*lost;
 		}
@@ -592,7 +592,7 @@ static void load_file(struct faulty_disk_node *n, const char *path)
 	ssize_t got;
 	int fd = open(path, O_RDONLY);
 	while (fd >= 0 && (got = read(fd, part, sizeof part)) > 0)
-		put(&n->bytes, &n->size, part, (uint64_t)got, n->size);
+		write_at(&n->bytes, &n->size, part, (uint64_t)got, n->size);
 	if (fd < 0 || close(fd))
 		abort();
 }

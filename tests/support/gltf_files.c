@@ -79,7 +79,7 @@ static const char template[] =
 	"\"buffers\": [\n"
 	"{BUFFER \"byteLength\": 601}]}\n";
 
-static void put(struct gltf_files *f, const void *bytes, size_t size)
+static void append(struct gltf_files *f, const void *bytes, size_t size)
 {
 	assert(f->buffer_size + size <= sizeof f->buffer);
 	memcpy(f->buffer + f->buffer_size, bytes, size);
@@ -90,7 +90,7 @@ static void put(struct gltf_files *f, const void *bytes, size_t size)
 static void put_bits(struct gltf_files *f, uint32_t bits, int size)
 {
 	for (int i = 0; i < size; i++)
-		put(f, (const unsigned char[]){(unsigned char)(bits >> 8 * i)}, 1);
+		append(f, (const unsigned char[]){(unsigned char)(bits >> 8 * i)}, 1);
 }
 
 static void put_floats(struct gltf_files *f, const double *x, int count)

@@ -12,7 +12,7 @@ const double solid_uv[SOLID_VERTICES][2] = {{0, 0}, {0.25, 0.5}, {0.5, 1}, {0.75
 const uint32_t solid_index[SOLID_TRIANGLES][3] = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
 						  {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
 
-static void put(struct mesh_file *f, const void *bytes, size_t size)
+static void append(struct mesh_file *f, const void *bytes, size_t size)
 {
 	assert(f->size + size <= sizeof f->bytes);
 	memcpy(f->bytes + f->size, bytes, size);
@@ -26,7 +26,7 @@ __attribute__((format(printf, 2, 3))) static void say(struct mesh_file *f, const
 	va_start(ap, format);
 	int n = vsnprintf(text, sizeof text, format, ap);
 	va_end(ap);
-	put(f, text, (size_t)n);
+	append(f, text, (size_t)n);
 }
 
 static void put_bits(struct mesh_file *f, uint64_t bits, int size, int big)
@@ -34,7 +34,7 @@ static void put_bits(struct mesh_file *f, uint64_t bits, int size, int big)
 	unsigned char raw[8];
 	for (int i = 0; i < size; i++)
 		raw[big ? size - 1 - i : i] = (unsigned char)(bits >> 8 * i);
-	put(f, raw, (size_t)size);
+	append(f, raw, (size_t)size);
 }
 
 static void put_real(struct mesh_file *f, double x, int doubles, int big)
@@ -119,7 +119,7 @@ void mesh_file_serialized(struct mesh_file *f, int version, int doubles, uint32_
 		one.size = 0;
 		put_bits(&one, flags | (doubles ? 0x2000 : 0x1000), 4, 0);
 		if (version == 4)
-			put(&one, "a solid", sizeof "a solid");
+			append(&one, "a solid", sizeof "a solid");
 		put_bits(&one, SOLID_VERTICES, 8, 0);
 		put_bits(&one, SOLID_TRIANGLES, 8, 0);
 		for (int i = 0; i < SOLID_VERTICES; i++)

@@ -138,7 +138,7 @@ static size_t lease_index(const struct plan *p, const struct lease_key *k)
 	return i;
 }
 
-static const Farm__Envelope *ask(struct scripted *p, bool said)
+static const Farm__Envelope *answer_to(struct scripted *p, bool said)
 {
 	return said ? scripted_hear(p) : NULL;
 }
@@ -188,7 +188,7 @@ static void check_image(const unsigned char *bytes, size_t size, const struct pl
 /* false: it hung up. */
 static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 {
-	const Farm__Envelope *m = ask(f->client, scripted_fetch(f->client, id, FARM__WHAT__WHAT_RESULT, 0));
+	const Farm__Envelope *m = answer_to(f->client, scripted_fetch(f->client, id, FARM__WHAT__WHAT_RESULT, 0));
 	if (!m)
 		return false;
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_FETCH_CHUNK);
@@ -203,10 +203,10 @@ static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 }
 
 /* All that were acknowledged are there, none failed, and those that were said to be done are. false: it hung up. */
-static bool look(struct farm_run *f)
+static bool check_jobs(struct farm_run *f)
 {
 	bool seen[IDS_MAX] = {false}, done[IDS_MAX] = {false};
-	const Farm__Envelope *m = ask(f->client, scripted_list(f->client));
+	const Farm__Envelope *m = answer_to(f->client, scripted_list(f->client));
 	if (!m)
 		return false;
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
@@ -246,9 +246,9 @@ static bool look(struct farm_run *f)
 
 static bool submit(struct farm_run *f)
 {
-	const Farm__Envelope *m = ask(f->client, scripted_submit(f->client, &f->request, scene));
+	const Farm__Envelope *m = answer_to(f->client, scripted_submit(f->client, &f->request, scene));
 	if (m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->n_missing)
-		m = ask(f->client, scripted_send_scene(f->client, scene));
+		m = answer_to(f->client, scripted_send_scene(f->client, scene));
 	if (!m)
 		return false;
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
@@ -318,7 +318,7 @@ bool outage_work(struct farm_run *f)
 {
 	f->client = scripted_call(f->port, FARM__ROLE__ROLE_CLIENT);
 	f->worker = f->client ? scripted_call(f->port, FARM__ROLE__ROLE_WORKER) : NULL;
-	if (!f->worker || !look(f))
+	if (!f->worker || !check_jobs(f))
 		return false;
 	while (f->accepted < JOBS)
 		if (!submit(f))
@@ -331,7 +331,7 @@ bool outage_work(struct farm_run *f)
 			if (!submit(f))
 				return false;
 		if (!scripted_has(f->worker, 5)) {
-			if (!look(f))
+			if (!check_jobs(f))
 				return false;
 			continue;
 		}
@@ -342,7 +342,7 @@ bool outage_work(struct farm_run *f)
 			take_ack(f, m->lease_ack);
 		if (m->body_case == FARM__ENVELOPE__BODY_LEASE_GRANT && !answer_lease(f, m->lease_grant))
 			return false;
-		if (m->body_case == FARM__ENVELOPE__BODY_JOB_END && !look(f))
+		if (m->body_case == FARM__ENVELOPE__BODY_JOB_END && !check_jobs(f))
 			return false;
 	}
 	return true;

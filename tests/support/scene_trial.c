@@ -24,7 +24,7 @@ static bool has_place(const char *text)
 	return p && p[5] >= '1' && p[5] <= '9';
 }
 
-static int say(enum trial_end end, const char *text)
+static int end_with(enum trial_end end, const char *text)
 {
 	printf("%s", text);
 	fflush(stdout);
@@ -96,14 +96,14 @@ static int child(const struct memory_file *files)
 	if (!rc)
 		rc = render_check(&s, &assets, &o, &summary, &e);
 	if (rc)
-		return say(has_place(e.text) ? TRIAL_REFUSED : TRIAL_NO_PLACE, e.text);
+		return end_with(has_place(e.text) ? TRIAL_REFUSED : TRIAL_NO_PLACE, e.text);
 	o.width = o.height = 24; /* the film's numbers have been looked at: they cost memory, no more */
 	if (world_new(&w, &s, &assets, &o, &e))
-		return say(TRIAL_FAILED, e.text);
+		return end_with(TRIAL_FAILED, e.text);
 	world_summary(w, &summary);
 	for (size_t i = 0; render_integrator_at(i); i++)
 		if (render(w, &summary, render_integrator_at(i), &e))
-			return say(TRIAL_FAILED, e.text);
+			return end_with(TRIAL_FAILED, e.text);
 	return TRIAL_RENDERED;
 }
 

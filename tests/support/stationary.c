@@ -289,7 +289,7 @@ static double critical_t(double level)
 	return hi;
 }
 
-static void judge(const struct group *groups, struct stationary_result *out)
+static void judge_groups(const struct group *groups, struct stationary_result *out)
 {
 	double weight = 0, t = critical_t(LEVEL / STATIONARY_FUNCTIONS) + 1.645;
 	for (int g = 0; g < STATIONARY_GROUPS; g++)
@@ -371,7 +371,7 @@ void stationary_run(const struct world *w, const char *test, const struct statio
 		if (from->failure[0])
 			memcpy(out->failure, from->failure, sizeof out->failure);
 	}
-	judge(groups, out);
+	judge_groups(groups, out);
 	out->share = (double)out->accepted / (double)(out->accepted + out->starts);
 	free(groups);
 }

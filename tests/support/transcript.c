@@ -113,7 +113,7 @@ static void say_action(struct said *s, const struct action *a)
 
 /* ---- reading */
 
-static bool take(const char **at, const char *word)
+static bool skip_word(const char **at, const char *word)
 {
 	size_t n = strlen(word);
 	if (strncmp(*at, word, n) != 0)
@@ -143,7 +143,7 @@ static uint64_t take_count(const char **at)
 
 static uint64_t take_id(const char **at, const char *letter)
 {
-	if (!take(at, letter))
+	if (!skip_word(at, letter))
 		fail_msg("'%s' is missing: %s", letter, *at);
 	return take_count(at);
 }
@@ -153,7 +153,7 @@ static struct lease_key take_key(const char **at)
 	struct lease_key k = {.job = take_id(at, "j"), .kind = LEASE_RENDER};
 	k.group = (uint32_t)take_id(at, "g");
 	k.part = (uint32_t)take_id(at, "p");
-	if (take(at, "boot"))
+	if (skip_word(at, "boot"))
 		k.kind = LEASE_BOOTSTRAP;
 	else
 		k.epoch = take_id(at, "e");
@@ -167,7 +167,7 @@ static const char *take_word(const char **at, char word[WORD])
 	size_t n = strcspn(*at, " ");
 	snprintf(word, WORD, "%.*s", (int)n, *at);
 	*at += n;
-	take(at, " ");
+	skip_word(at, " ");
 	return word;
 }
 
@@ -187,27 +187,27 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 	ev->tag = 7;
 	ev->submit = (struct event_submit){.plan = p, .name = "job", .owner = ""};
 	while (**at && **at != '-') {
-		if (take(at, "priority="))
+		if (skip_word(at, "priority="))
 			ev->submit.priority = (int)take_number(at);
-		else if (take(at, "mixed"))
+		else if (skip_word(at, "mixed"))
 			ev->submit.mixed = true;
-		else if (take(at, "owner="))
+		else if (skip_word(at, "owner="))
 			ev->submit.owner = take_word(at, owner);
-		else if (take(at, "verify="))
+		else if (skip_word(at, "verify="))
 			ev->submit.verify = take_number(at);
-		else if (take(at, "groups="))
+		else if (skip_word(at, "groups="))
 			p->groups = (uint32_t)take_count(at);
-		else if (take(at, "parts="))
+		else if (skip_word(at, "parts="))
 			p->parts = (uint32_t)take_count(at);
-		else if (take(at, "rounds=inf"))
+		else if (skip_word(at, "rounds=inf"))
 			p->rounds = UINT64_MAX;
-		else if (take(at, "rounds="))
+		else if (skip_word(at, "rounds="))
 			p->rounds = take_count(at);
-		else if (take(at, "seconds="))
+		else if (skip_word(at, "seconds="))
 			p->seconds = take_number(at);
-		else if (take(at, "target="))
+		else if (skip_word(at, "target="))
 			p->target_error = take_number(at);
-		else if (take(at, "boot="))
+		else if (skip_word(at, "boot="))
 			p->bootstrap = take_count(at);
 		else
 			fail_msg("not an option of submit: %s", *at);
@@ -222,60 +222,60 @@ static void take_identity(const char **at, struct event_join *j)
 	const char **where[] = {&j->certificate, &j->name, &j->home};
 	static const char *const words[] = {"certificate=", "name=", "home="};
 	for (int i = 0; i < 3; i++)
-		for (int k = 0; take(at, words[i]); k = 0) {
+		for (int k = 0; skip_word(at, words[i]); k = 0) {
 			while (k < 3 && **at != *letters[k])
 				k++;
 			*where[i] = letters[k];
-			take(at, letters[k]);
+			skip_word(at, letters[k]);
 		}
-	if (take(at, "start="))
+	if (skip_word(at, "start="))
 		j->restarts = take_count(at);
 }
 
 static void take_worker(const char **at, struct event *ev, char *name, char *fingerprint)
 {
 	ev->peer = take_id(at, "w");
-	if (take(at, "joins")) {
+	if (skip_word(at, "joins")) {
 		ev->kind = EVENT_JOINED;
 		int n = 0;
 		if (sscanf(*at, "%31s threads=%u%n", fingerprint, &ev->join.threads, &n) != 2)
 			fail_msg("F threads=T is missing: %s", *at);
 		*at += n;
-		take(at, " ");
+		skip_word(at, " ");
 		snprintf(name, 32, "w%" PRIu64, ev->peer);
 		ev->join.peer = ev->peer;
 		ev->join.name = name;
 		ev->join.fingerprint = fingerprint;
 		take_identity(at, &ev->join);
 		ev->peer = 0;
-	} else if (take(at, "leaves")) {
+	} else if (skip_word(at, "leaves")) {
 		ev->kind = EVENT_LEFT;
-	} else if (take(at, "heard")) {
+	} else if (skip_word(at, "heard")) {
 		ev->kind = EVENT_HEARD;
-	} else if (take(at, "wants")) {
+	} else if (skip_word(at, "wants")) {
 		ev->kind = EVENT_REQUEST;
 		ev->want = (uint32_t)take_count(at);
 	} else {
-		bool lacks = take(at, "lacks"), lost = !lacks && take(at, "denies"),
-		     late = !lacks && !lost && take(at, "recalls");
-		bool refuses = lost || late || (!lacks && take(at, "refuses"));
-		ev->kind = lacks || refuses	  ? EVENT_LEASE_FAILED
-			   : take(at, "batch")	  ? EVENT_BATCH
-			   : take(at, "stored")	  ? EVENT_STORED
-			   : take(at, "delivers") ? EVENT_DELIVERED
-			   : take(at, "fails")	  ? EVENT_LEASE_FAILED
-						  : EVENT_LEASE_RETURNED;
-		if (ev->kind == EVENT_LEASE_RETURNED && !take(at, "returns"))
+		bool lacks = skip_word(at, "lacks"), lost = !lacks && skip_word(at, "denies"),
+		     late = !lacks && !lost && skip_word(at, "recalls");
+		bool refuses = lost || late || (!lacks && skip_word(at, "refuses"));
+		ev->kind = lacks || refuses	       ? EVENT_LEASE_FAILED
+			   : skip_word(at, "batch")    ? EVENT_BATCH
+			   : skip_word(at, "stored")   ? EVENT_STORED
+			   : skip_word(at, "delivers") ? EVENT_DELIVERED
+			   : skip_word(at, "fails")    ? EVENT_LEASE_FAILED
+						       : EVENT_LEASE_RETURNED;
+		if (ev->kind == EVENT_LEASE_RETURNED && !skip_word(at, "returns"))
 			fail_msg("no such event: %s", *at);
 		ev->lease.key = take_key(at);
 		ev->lease.own = lacks;
 		ev->lease.bad_states = refuses;
 		ev->lease.can_take_back = refuses && !lost;
 		ev->lease.other_states = late;
-		ev->lease.valid = !take(at, "bad");
-		if (take(at, "says "))
+		ev->lease.valid = !skip_word(at, "bad");
+		if (skip_word(at, "says "))
 			memset(&ev->lease.digest, *(*at)++, sizeof ev->lease.digest);
-		take(at, " ");
+		skip_word(at, " ");
 	}
 }
 
@@ -283,7 +283,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 static void take_restore(const char **at, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
 			 const struct forecast_history *looks, char owner[WORD])
 {
-	bool asked = take(at, "asked");
+	bool asked = skip_word(at, "asked");
 	struct event_restore r = {.job = take_id(at, "j"),
 				  .next = next,
 				  .fingerprint = fingerprint,
@@ -291,24 +291,24 @@ static void take_restore(const char **at, struct event *ev, struct plan *p, char
 				  .opened = NAN,
 				  .completed = NAN,
 				  .looks = looks};
-	r.kind = take(at, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
-	if (r.kind == LEASE_RENDER && !take(at, "render"))
+	r.kind = skip_word(at, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
+	if (r.kind == LEASE_RENDER && !skip_word(at, "render"))
 		fail_msg("boot or render is missing: %s", *at);
 	fingerprint[0] = 0;
 	do
 		*next++ = take_count(at);
-	while (take(at, ","));
-	if (take(at, "fingerprint=")) {
+	while (skip_word(at, ","));
+	if (skip_word(at, "fingerprint=")) {
 		int n = 0;
 		sscanf(*at, "%31s%n", fingerprint, &n);
 		*at += n;
-		take(at, " ");
+		skip_word(at, " ");
 	}
-	if (take(at, "elapsed="))
+	if (skip_word(at, "elapsed="))
 		r.elapsed = r.opened = take_number(at);
-	if (take(at, "completed="))
+	if (skip_word(at, "completed="))
 		r.completed = take_number(at);
-	r.black = take(at, "black");
+	r.black = skip_word(at, "black");
 	take_submit(at, ev, p, owner);
 	r.submit = ev->submit;
 	ev->kind = EVENT_RESTORE;
@@ -327,40 +327,40 @@ static void take_extend(const char **at, struct event *ev, struct plan *p, char 
 
 static void take_job(const char **at, struct event *ev)
 {
-	if (take(at, "cancel")) {
+	if (skip_word(at, "cancel")) {
 		ev->kind = EVENT_CANCEL;
 		ev->job = take_id(at, "j");
-	} else if (take(at, "prepared")) {
+	} else if (skip_word(at, "prepared")) {
 		ev->kind = EVENT_PREPARED;
 		ev->prepared.job = take_id(at, "j");
-		ev->prepared.black = take(at, "black");
-		ev->prepared.ok = !take(at, "bad");
-	} else if (take(at, "error")) {
+		ev->prepared.black = skip_word(at, "black");
+		ev->prepared.ok = !skip_word(at, "bad");
+	} else if (skip_word(at, "error")) {
 		ev->kind = EVENT_ERROR_KNOWN;
 		ev->error_known.job = take_id(at, "j");
 		ev->error_known.rounds = take_count(at);
 		ev->error_known.rel_error = take_number(at);
-	} else if (take(at, "image")) {
+	} else if (skip_word(at, "image")) {
 		ev->kind = EVENT_IMAGE_KNOWN;
 		ev->image_known.job = take_id(at, "j");
-		ev->image_known.disagrees = take(at, "disagrees");
-	} else if (take(at, "hold") || take(at, "release")) {
+		ev->image_known.disagrees = skip_word(at, "disagrees");
+	} else if (skip_word(at, "hold") || skip_word(at, "release")) {
 		ev->kind = EVENT_HOLD;
 		ev->tag = 7;
-		ev->hold = take(at, "order") ? HOLD_ORDERED : take(at, "files") ? HOLD_FILES : HOLD_STORAGE;
+		ev->hold = skip_word(at, "order") ? HOLD_ORDERED : skip_word(at, "files") ? HOLD_FILES : HOLD_STORAGE;
 		ev->job = take_id(at, "j");
-	} else if (take(at, "priority")) {
+	} else if (skip_word(at, "priority")) {
 		ev->kind = EVENT_PRIORITY;
 		ev->tag = 7;
 		ev->job = take_id(at, "j");
 		ev->priority = (int)take_number(at);
-	} else if (take(at, "aside")) { /* NAME's letter, as when it joins */
+	} else if (skip_word(at, "aside")) { /* NAME's letter, as when it joins */
 		ev->kind = EVENT_ASIDE;
 		take_identity(at, &ev->join);
-	} else if (take(at, "broken")) {
+	} else if (skip_word(at, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;
 		ev->job = take_id(at, "j");
-	} else if (!take(at, "tick")) {
+	} else if (!skip_word(at, "tick")) {
 		fail_msg("no such event: %s", *at);
 	}
 }
@@ -385,21 +385,21 @@ static bool play_line(struct farm *f, const char *line)
 	uint64_t next[64];
 	struct forecast_history looks = {.count = 0};
 	struct event ev = {.kind = EVENT_TICK};
-	if (!arrow || !take(&at, "["))
+	if (!arrow || !skip_word(&at, "["))
 		fail_msg("not a line of a transcript: %s", line);
 	ev.time = take_number(&at);
-	take(&at, "]");
-	if (take(&at, "unread="))
+	skip_word(&at, "]");
+	if (skip_word(&at, "unread="))
 		ev.unread = take_number(&at);
-	if (take(&at, "wake"))
+	if (skip_word(&at, "wake"))
 		return play_wake(line, arrow + 3);
 	if (*at == 'w')
 		take_worker(&at, &ev, name, fingerprint);
-	else if (take(&at, "submit"))
+	else if (skip_word(&at, "submit"))
 		take_submit(&at, &ev, &plan, owner);
-	else if (take(&at, "extend"))
+	else if (skip_word(&at, "extend"))
 		take_extend(&at, &ev, &plan, owner);
-	else if (take(&at, "restore"))
+	else if (skip_word(&at, "restore"))
 		take_restore(&at, &ev, &plan, fingerprint, next, &looks, owner);
 	else
 		take_job(&at, &ev);

@@ -26,7 +26,7 @@ enum { HEADER_LIMIT = 1 << 22, PAYLOAD_LIMIT = 1 << 28, SEND_LIMIT = 1 << 30 };
 static const double first_back_off = 0.2, longest_back_off = 10, stall_seconds = 30, linger_seconds = 5;
 
 static void connect_now(struct agent *a);
-static void go(struct agent *a);
+static void disconnect_for_good(struct agent *a);
 
 /* ---- connection ---- */
 
@@ -142,7 +142,7 @@ static void on_closed(void *user, const char *why)
 	a->welcome = false;
 	uv_timer_stop(&a->heartbeat);
 	if (a->refused)
-		go(a);
+		disconnect_for_good(a);
 	else if (!a->gone)
 		try_later(a);
 	agent_settle(a);
@@ -169,7 +169,7 @@ static void connect_now(struct agent *a)
 
 /* ---- leaving ---- */
 
-static void go(struct agent *a)
+static void disconnect_for_good(struct agent *a)
 {
 	Farm__Bye bye;
 	Farm__Envelope m;
@@ -194,7 +194,7 @@ static void go(struct agent *a)
 
 static void on_linger_over(uv_timer_t *t)
 {
-	go(t->data);
+	disconnect_for_good(t->data);
 }
 
 static void on_grace_over(uv_timer_t *t)
@@ -209,7 +209,7 @@ static void on_grace_over(uv_timer_t *t)
 void agent_settle(struct agent *a)
 {
 	if (a->leaving && !a->gone && lease_queue_is_idle(a))
-		go(a);
+		disconnect_for_good(a);
 }
 
 static void leave(struct agent *a)
@@ -343,7 +343,7 @@ int agent_open(struct agent **out, const struct agent_config *c, struct error *e
 
 void agent_close(struct agent *a)
 {
-	go(a);
+	disconnect_for_good(a);
 	thread_pool_close(a->thread_pool);
 	uv_run(&a->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&a->loop);

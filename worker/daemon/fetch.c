@@ -11,7 +11,7 @@ static uint64_t at(const struct fetch *f)
 	return f->writer ? blob_write_at(f->writer) : 0;
 }
 
-static void ask(struct agent *a, struct fetch *f)
+static void request_piece(struct agent *a, struct fetch *f)
 {
 	Farm__BlobGet get;
 	Farm__Envelope m;
@@ -42,7 +42,7 @@ int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e)
 		a->fetches = f;
 	}
 	if (!f->asked)
-		ask(a, f);
+		request_piece(a, f);
 	return 0;
 }
 

@@ -268,7 +268,7 @@ static int build(struct job_cache *b, struct error *e)
 	return rc;
 }
 
-static void run(struct task *t)
+static void run_build(struct task *t)
 {
 	struct job_cache *b = (struct job_cache *)t; /* its first member */
 	uint64_t begun = uv_hrtime();
@@ -299,7 +299,7 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 		blob_path(b->blobs, &h, b->paths[i], PATH_BYTES);
 	}
 	b->state = JOB_CACHE_BUILDING;
-	b->task.run = run;
+	b->task.run = run_build;
 	b->task.done = done;
 	thread_pool_add(c, &b->task);
 	return 0;

@@ -29,7 +29,7 @@ void lease_task_free(struct lease_task *l)
 }
 
 /* Packed here, so that the loop's thread never encodes a film. */
-static void run(struct task *t)
+static void render(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t; /* its first member */
 	struct batch batch = {0};
@@ -59,7 +59,7 @@ static void done(struct task *t)
 void lease_task_start(struct lease_task *l, struct thread_pool *c)
 {
 	l->state = LEASE_QUEUED;
-	l->task.run = run;
+	l->task.run = render;
 	l->task.done = done;
 	thread_pool_add(c, &l->task);
 }

@@ -22,14 +22,14 @@ struct thread_pool {
 	pthread_t threads[];
 };
 
-static void put(struct queue *q, struct task *t)
+static void queue_push(struct queue *q, struct task *t)
 {
 	t->next = NULL;
 	*q->last = t;
 	q->last = &t->next;
 }
 
-static struct task *take(struct queue *q)
+static struct task *queue_pop(struct queue *q)
 {
 	struct task *t = q->first;
 	if (t) {
@@ -46,7 +46,7 @@ static void *thread_main(void *user)
 	pthread_mutex_lock(&c->lock);
 	for (;;) {
 		struct task *t = NULL;
-		while (!c->stopping && !(t = take(&c->waiting)))
+		while (!c->stopping && !(t = queue_pop(&c->waiting)))
 			pthread_cond_wait(&c->work, &c->lock);
 		if (!t)
 			break;
@@ -56,7 +56,7 @@ static void *thread_main(void *user)
 		t->run(t);
 		tick_counter = NULL;
 		pthread_mutex_lock(&c->lock);
-		put(&c->finished, t);
+		queue_push(&c->finished, t);
 		uv_async_send(&c->back);
 	}
 	pthread_mutex_unlock(&c->lock);
@@ -68,7 +68,7 @@ static void on_back(uv_async_t *a)
 	struct thread_pool *c = a->data;
 	for (;;) {
 		pthread_mutex_lock(&c->lock);
-		struct task *t = take(&c->finished);
+		struct task *t = queue_pop(&c->finished);
 		pthread_mutex_unlock(&c->lock);
 		if (!t)
 			return;
@@ -128,7 +128,7 @@ void thread_pool_add(struct thread_pool *c, struct task *t)
 {
 	atomic_store(&t->ticks, 0);
 	pthread_mutex_lock(&c->lock);
-	put(&c->waiting, t);
+	queue_push(&c->waiting, t);
 	pthread_cond_signal(&c->work);
 	pthread_mutex_unlock(&c->lock);
 	c->pending++;

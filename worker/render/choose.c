@@ -319,7 +319,7 @@ static int film_of(const struct plan_request *r, struct plan *p, struct error *e
 	return rc;
 }
 
-static int run(struct pilot *p, const struct plan *film, struct render_choice *out, struct error *e)
+static int run_pilot(struct pilot *p, const struct plan *film, struct render_choice *out, struct error *e)
 {
 	p->context = (struct path_context){.w = p->w,
 					   .window = film_window_of(film),
@@ -367,7 +367,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 		p->seed = r->seed;
 		p->samples = pilot_samples(r, (uint64_t)film.crop_width * film.crop_height);
 		out->misses = path_misses(w);
-		rc = run(p, &film, out, e);
+		rc = run_pilot(p, &film, out, e);
 	}
 	mem_free(p);
 	if (rc)

@@ -283,7 +283,7 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 	return film_sums_init(&j->film, p, &w->settings, e);
 }
 
-static int run(struct job *j, const struct lease_input *in, enum lease_end *end)
+static int run_job(struct job *j, const struct lease_input *in, enum lease_end *end)
 {
 	if (j->key->kind == LEASE_BOOTSTRAP) {
 		*end = run_bootstrap(j);
@@ -322,7 +322,7 @@ static int run_caught(struct job *j, const struct lease_input *in, enum lease_en
 		return invalid_operation(j);
 	jmp_buf *caught = fptrap_catch(&back);
 	bool watched = fptrap_watch();
-	int rc = run(j, in, end);
+	int rc = run_job(j, in, end);
 	fptrap_unwatch(watched);
 	fptrap_catch(caught);
 	return rc;

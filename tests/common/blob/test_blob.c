@@ -19,7 +19,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static struct blob_hash put(struct blob_store *s, const char *text)
+static struct blob_hash store_text(struct blob_store *s, const char *text)
 {
 	struct blob_hash h;
 	struct blob_writer *w;
@@ -67,7 +67,7 @@ static void keeps_and_reads_back(void **state)
 	uint64_t size;
 	char text[16] = "";
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	struct blob_hash h = put(s, "hello, farm");
+	struct blob_hash h = store_text(s, "hello, farm");
 	blob_store_close(s);
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0); /* another life */
 	assert_true(blob_has(s, &h, &size));
@@ -80,7 +80,7 @@ static void keeps_and_reads_back(void **state)
 	struct blob_hash other = h;
 	other.bytes[0] ^= 1;
 	assert_int_equal(blob_open(s, &other, &size, &e), -ENOENT);
-	put(s, "hello, farm"); /* twice is as once */
+	store_text(s, "hello, farm"); /* twice is as once */
 	assert_int_equal(bytes_of_folder(), 11);
 	blob_store_close(s);
 }
@@ -115,12 +115,13 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 	struct blob_writer *w;
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
-	struct blob_hash a = put(s, "0123456789"), b = put(s, "abcdefghij"), c = put(s, "ABCDEFGHIJ");
+	struct blob_hash a = store_text(s, "0123456789"), b = store_text(s, "abcdefghij"),
+			 c = store_text(s, "ABCDEFGHIJ");
 	blob_release(s, &a);
 	blob_release(s, &b);
 	assert_true(blob_hold(s, &a)); /* a is now younger than b */
 	blob_release(s, &a);
-	struct blob_hash d = put(s, "!@#$%^&*()");
+	struct blob_hash d = store_text(s, "!@#$%^&*()");
 	assert_false(blob_has(s, &b, NULL));
 	assert_true(blob_has(s, &a, NULL) && blob_has(s, &c, NULL) && blob_has(s, &d, NULL));
 	assert_int_equal(bytes_of_folder(), 30);
@@ -142,7 +143,7 @@ static void knows_many(void **state)
 	for (int i = 0; i < MANY; i++) {
 		char text[8];
 		snprintf(text, sizeof text, "%04d", i);
-		h[i] = put(s, text);
+		h[i] = store_text(s, text);
 		blob_release(s, &h[i]);
 	}
 	for (int life = 0; life < 2; life++) {
@@ -194,7 +195,7 @@ static void held_before_it_is_trimmed(void **state)
 	struct blob_store *s;
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	struct blob_hash a = put(s, "0123456789"), b = put(s, "abcdefghij");
+	struct blob_hash a = store_text(s, "0123456789"), b = store_text(s, "abcdefghij");
 	blob_store_close(s);
 	assert_int_equal(blob_store_open(&s, folder, 5, &e), 0);
 	assert_true(blob_hold(s, &a));
@@ -224,7 +225,7 @@ static void a_disk_that_fails(void **state)
 	struct disk failing = disk_system;
 	failing.stat = failing_stat;
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
-	put(s, "hello, farm");
+	store_text(s, "hello, farm");
 	blob_store_close(s);
 	disk_use(&failing);
 	int rc = blob_store_open(&s, folder, 0, &e);
@@ -243,7 +244,7 @@ static void damaged_at_rest(void **state)
 	char path[4096], aside[300], hex[BLOB_HEX_SIZE];
 	uint64_t size;
 	assert_int_equal(blob_store_open(&s, folder, 1000, &e), 0);
-	struct blob_hash h = put(s, text), other;
+	struct blob_hash h = store_text(s, text), other;
 	assert_int_equal(blob_hash_bytes("x", 1, &other, &e), 0);
 	blob_path(s, &h, path, sizeof path);
 	blob_hex(&h, hex);
@@ -264,7 +265,7 @@ static void damaged_at_rest(void **state)
 		assert_true(access(path, F_OK) != 0 && access(aside, F_OK) == 0);
 		assert_true(!blob_has(s, &h, NULL) && !blob_hold(s, &h) && blob_open(s, &h, &size, &e) == -ENOENT);
 		assert_int_equal(blob_check(s, &h, 0, &e), -ENOENT);
-		put(s, text);
+		store_text(s, text);
 		assert_int_equal(blob_check(s, &h, 0, &e), 0);
 		assert_true(blob_has(s, &h, &size) && size == strlen(text));
 	}
@@ -274,13 +275,13 @@ static void damaged_at_rest(void **state)
 	assert_int_equal(blob_expect(s, &h, &e), 0);
 	assert_int_equal(blob_expect(s, &other, &e), 0); /* never there */
 	assert_false(blob_has(s, &other, NULL));
-	put(s, "x");
+	store_text(s, "x");
 	blob_release(s, &other);
-	put(s, text);
+	store_text(s, text);
 	for (int i = 0; i < 40; i++) { /* more than there is room for: what is held stays */
 		char more[64];
 		snprintf(more, sizeof more, "something else of fifty bytes or so, number %d", i);
-		struct blob_hash m = put(s, more);
+		struct blob_hash m = store_text(s, more);
 		blob_release(s, &m);
 	}
 	assert_true(blob_has(s, &h, NULL) && blob_has(s, &other, NULL));

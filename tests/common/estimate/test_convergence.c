@@ -24,7 +24,7 @@ struct fixture {
 };
 
 /* 64 chains in 16 groups, 20 rounds of 1,000 mutations, and nothing wrong with them. */
-static void make(struct fixture *f)
+static void make_fixture(struct fixture *f)
 {
 	memset(f, 0, sizeof *f);
 	f->plan = (struct plan){.kind = PLAN_CHAINS,
@@ -59,7 +59,7 @@ static void make(struct fixture *f)
 	f->img.classes[path_class(4, PATH_BOTH)] = (struct path_class_energy){0.5, 0.02, 0.51, 0.01, 0.5};
 }
 
-static enum convergence_verdict judge(const struct fixture *f, struct convergence *a)
+static enum convergence_verdict verdict_of(const struct fixture *f, struct convergence *a)
 {
 	convergence_judge(&f->plan, &f->img, a);
 	assert_true(strlen(a->text) < sizeof a->text);
@@ -99,8 +99,8 @@ static void all_is_well(void **state)
 	(void)state;
 	struct fixture f;
 	struct convergence a;
-	make(&f);
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	make_fixture(&f);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	assert_int_equal(a.tiles, TILES);
 	assert_int_equal(a.tiles_flagged, 0);
 	close_to(a.r_hat_median, 1.02, 1e-6);
@@ -109,12 +109,12 @@ static void all_is_well(void **state)
 	assert_int_equal(a.worst_y, 11 + 4 * TILE_SIZE);
 	/* Nothing known of tiles, or no light in them. */
 	f.img.r_hat = f.img.tile_error = f.img.tile_share = NULL;
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	assert_true(isnan(a.r_hat_median) && isnan(a.r_hat_worst));
-	make(&f);
+	make_fixture(&f);
 	for (int i = 0; i < TILES; i++)
 		f.r_hat[i] = NAN;
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	assert_true(isnan(a.r_hat_median) && isnan(a.r_hat_worst));
 }
 
@@ -123,11 +123,11 @@ static void medians(void **state)
 	(void)state;
 	struct fixture f;
 	struct convergence a;
-	make(&f);
+	make_fixture(&f);
 	static const float some[] = {3, 1, 1, 2, 1, 9, 2};
 	for (int i = 0; i < TILES; i++)
 		f.r_hat[i] = i < 7 ? some[i] : NAN;
-	judge(&f, &a);
+	verdict_of(&f, &a);
 	close_to(a.r_hat_median, 2, 0);
 	close_to(a.r_hat_worst, 9, 0);
 }
@@ -137,26 +137,26 @@ static void tiles_that_have_not_mixed(void **state)
 	(void)state;
 	struct fixture f;
 	struct convergence a;
-	make(&f);
+	make_fixture(&f);
 	f.r_hat[6] = 1.3F;
 	f.tile_error[6] = 0.2F;
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.tiles_flagged, 1);
 	close_to(a.energy_flagged, 0.05, 1e-6);
 	says(&a, "chains disagree: in 1 of 20 tiles with 5 % of the energy they have not mixed (R-hat 1.3 at 135,75)");
 	f.tile_error[6] = 0.09F;
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.tile_error[6] = 0.2F;
 	f.r_hat[6] = 1.09F;
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.r_hat[6] = 1.3F;
 	f.tile_share[6] = 0.009F; /* flagged, but too little to matter */
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	assert_int_equal(a.tiles_flagged, 1);
 	f.tile_share[6] = 0.011F;
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	f.img.rounds = 9;
-	assert_int_equal(judge(&f, &a), CHAINS_TOO_SHORT);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_TOO_SHORT);
 	says(&a, "chains are too short to be judged, 9000 mutations each: in 1 of 20 tiles");
 }
 
@@ -165,35 +165,35 @@ static void classes_that_differ(void **state)
 	(void)state;
 	struct fixture f;
 	struct convergence a;
-	make(&f);
+	make_fixture(&f);
 	struct path_class_energy *rough = &f.img.classes[path_class(4, PATH_ROUGH)],
 				 *both = &f.img.classes[path_class(4, PATH_BOTH)];
 	/* 5 % of b too little; t of 15 degrees at 5e-6, two-sided, is 6.91. */
 	*rough = (struct path_class_energy){1.5, 0.01, 1.4, 0.01, -6.8};
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	rough->difference_t = -7;
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_flagged, 1U << path_class(4, PATH_ROUGH));
 	says(&a, "to paths (rough, 3-4 edges) they give 70 % of b, the bootstrap 75 %");
 	/* As significant, but small. */
 	*rough = (struct path_class_energy){1.5, 0.001, 1.47, 0.001, -20};
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	/* Large for a small class. */
-	make(&f);
+	make_fixture(&f);
 	*both = (struct path_class_energy){0.02, 0.001, 0.015, 0.001, -7};
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	*both = (struct path_class_energy){0.009, 0.0001, 0.006, 0.0001, -7};
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	/* More than the bootstrap: only where the bootstrap knows the class. */
 	*both = (struct path_class_energy){0.5, 0.01, 0.6, 0.01, 7};
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	*both = (struct path_class_energy){0.1, 0.02, 0.6, 0.01, 30};
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	*both = (struct path_class_energy){0, 0, 0.6, 0.01, 60};
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.plan.groups = 1;
 	*both = (struct path_class_energy){0.5, NAN, 0.6, NAN, NAN};
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
 
 static void groups_that_are_apart(void **state)
@@ -201,20 +201,20 @@ static void groups_that_are_apart(void **state)
 	(void)state;
 	struct fixture f;
 	struct convergence a;
-	make(&f);
+	make_fixture(&f);
 	struct path_class_energy *both = &f.img.classes[path_class(4, PATH_BOTH)];
 	*both = (struct path_class_energy){0.1, 0.1, 0.4, 0.099, 1};
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	both->chains_error = 0.102;
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_apart, 1U << path_class(4, PATH_BOTH));
 	assert_int_equal(a.classes_flagged, 0);
 	says(&a, "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of b");
 	f.plan.groups = 7;
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.plan.groups = 16;
 	*both = (struct path_class_energy){0.1, 0.1, 0.059, 0.059, 1}; /* too little to see */
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
 
 static void chains_that_stand_still(void **state)
@@ -222,14 +222,14 @@ static void chains_that_stand_still(void **state)
 	(void)state;
 	struct fixture f;
 	struct convergence a;
-	make(&f);
+	make_fixture(&f);
 	f.img.counts.counters[COUNT_STUCK] = 12; /* of 1,280 */
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.img.counts.counters[COUNT_STUCK] = 14;
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	says(&a, "in 1.09 % of their epochs of 1000 mutations they accepted nothing");
 	f.plan.epoch = 999; /* too short an epoch to mean much */
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
 
 static void samples_agree(void **state)
@@ -237,12 +237,12 @@ static void samples_agree(void **state)
 	(void)state;
 	struct fixture f;
 	struct convergence a;
-	make(&f);
+	make_fixture(&f);
 	f.r_hat[6] = f.tile_error[6] = 9;
 	f.img.counts.counters[COUNT_STUCK] = 1000;
 	f.plan.kind = PLAN_SAMPLES;
 	f.plan.chains = 0;
-	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 }
 
 /* All at once must fit; the table has a row for each class with energy. */
@@ -253,14 +253,14 @@ static void words_fit(void **state)
 	struct convergence a;
 	char table[CONVERGENCE_TABLE];
 	const struct convergence none = {.verdict = CHAINS_AGREE};
-	make(&f);
+	make_fixture(&f);
 	for (int i = 0; i < TILES; i++)
 		f.r_hat[i] = f.tile_error[i] = 123.456F;
 	for (int k = 0; k < PATH_CLASSES; k++)
 		f.img.classes[k] =
 			(struct path_class_energy){1.23456789, 0.000123, 0.987654321e-1, 0.123456, -1234.5678};
 	f.img.counts.counters[COUNT_STUCK] = 1234;
-	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	says(&a, "in 20 of 20 tiles");
 	says(&a, "and 18 classes more; groups of them differ in paths (rough, 1-2 edges): 4.94 +- 6.2 % of b");
 	says(&a, "they accepted nothing");
@@ -269,7 +269,7 @@ static void words_fit(void **state)
 	for (const char *c = table; *c; c++)
 		lines += *c == '\n';
 	assert_int_equal(lines, PATH_CLASSES + 1);
-	make(&f);
+	make_fixture(&f);
 	convergence_table(f.img.classes, f.img.b, &none, table, sizeof table);
 	assert_non_null(strstr(table, "reflected caustic, 3-4 edges"));
 	assert_null(strstr(table, "differs"));
@@ -302,7 +302,7 @@ static void image_says_it(void **state)
 	struct error e = {""};
 	unsigned char *bytes;
 	size_t size, plane = 0;
-	make(&f);
+	make_fixture(&f);
 	f.r_hat[6] = 1.3F;
 	f.tile_error[6] = 0.2F;
 	f.r_hat[5] = NAN;

@@ -92,7 +92,7 @@ static float wide_value(void)
 	return (float)((next() & 7 ? 1 : -1) * pow(10, exponent));
 }
 
-static float one(void)
+static float always_one(void)
 {
 	return 1;
 }
@@ -171,7 +171,7 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	struct canvas *c;
 	struct canvas_image before, after;
 	assert_int_equal(canvas_new(&c, &p, -20, NULL, NULL), 0); /* 1e12 x 2^20 = 1.05e18 = 2^59.9 */
-	struct batch b = make_batch(&p, 0, 0, 0, 4, one);
+	struct batch b = make_batch(&p, 0, 0, 0, 4, always_one);
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	batch_fini(&b);
 	uint64_t rounds = 1;
@@ -180,7 +180,7 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	while (rc == 0 && rounds < 20) {
 		canvas_image_fini(&before);
 		assert_int_equal(canvas_image(c, false, &before, NULL), 0);
-		b = make_batch(&p, rounds, 0, 0, 4, one);
+		b = make_batch(&p, rounds, 0, 0, 4, always_one);
 		b.tiles[2].xyz[100] = huge();
 		rc = canvas_add(c, &b, NULL);
 		rounds += rc == 0;
@@ -193,14 +193,14 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	assert_memory_equal(before.rgb, after.rgb, 100 * 70 * 3 * sizeof(float));
 	/* The same lease with values that fit is still welcome, and so the bits are those of a run without the bad one.
 	 */
-	b = make_batch(&p, rounds, 0, 0, 4, one);
+	b = make_batch(&p, rounds, 0, 0, 4, always_one);
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	batch_fini(&b);
-	b = make_batch(&p, rounds + 1, 0, 0, 4, one);
+	b = make_batch(&p, rounds + 1, 0, 0, 4, always_one);
 	b.tiles[3].xyz[7] = 3e38f;
 	assert_int_equal(canvas_add(c, &b, NULL), -ERANGE);
 	batch_fini(&b);
-	b = make_batch(&p, rounds + 1, 0, 0, 4, one);
+	b = make_batch(&p, rounds + 1, 0, 0, 4, always_one);
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	batch_fini(&b);
 	canvas_image_fini(&after);
@@ -208,7 +208,7 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	canvas_free(c);
 	assert_int_equal(canvas_new(&c, &p, -20, NULL, NULL), 0);
 	for (uint64_t r = 0; r < rounds + 2; r++) {
-		b = make_batch(&p, r, 0, 0, 4, one);
+		b = make_batch(&p, r, 0, 0, 4, always_one);
 		if (r > 0 && r < rounds)
 			b.tiles[2].xyz[100] = huge();
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
@@ -231,7 +231,7 @@ static void only_complete_rounds_are_published(void **unused)
 	assert_int_equal(canvas_new(&c, &p, -20, NULL, NULL), 0);
 	/* All of round 1 and all but one lease of round 0. */
 	for (uint32_t i = 0; i < 7; i++) {
-		struct batch b = make_batch(&p, 1 - (i >= 4), i % 2, i / 2 % 2, 1, one);
+		struct batch b = make_batch(&p, 1 - (i >= 4), i % 2, i / 2 % 2, 1, always_one);
 		b.counters[COUNT_NAN] = 1;
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
 		assert_int_equal(canvas_add(c, &b, NULL), -EEXIST);
@@ -246,10 +246,10 @@ static void only_complete_rounds_are_published(void **unused)
 	assert_int_equal(canvas_image(c, true, &img, NULL), 0);
 	assert_false(img.black);
 	canvas_image_fini(&img);
-	struct batch b = make_batch(&p, 2, 0, 0, 1, one);
+	struct batch b = make_batch(&p, 2, 0, 0, 1, always_one);
 	assert_int_equal(canvas_add(c, &b, NULL), -EAGAIN);
 	batch_fini(&b);
-	b = make_batch(&p, 0, 1, 1, 1, one); /* the last one closes both */
+	b = make_batch(&p, 0, 1, 1, 1, always_one); /* the last one closes both */
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	assert_true(canvas_has(c, &b.key));
 	b.key.epoch = 2;
@@ -281,7 +281,7 @@ static void chains_are_scaled_by_b(void **unused)
 		boot.counters[COUNT_SAMPLES] = 8;
 		assert_int_equal(canvas_add(c, &boot, NULL), 0);
 		assert_int_equal(canvas_add(c, &boot, NULL), -EEXIST);
-		struct batch b = make_batch(&p, 0, g, 0, 1, one);
+		struct batch b = make_batch(&p, 0, g, 0, 1, always_one);
 		b.counters[COUNT_INDEPENDENT] = 8;
 		b.independent_sum = g ? 40 : 0; /* no light: its samples count all the same */
 		b.counters[COUNT_LONGEST_STUCK] = g ? 5 : 7;
@@ -289,7 +289,7 @@ static void chains_are_scaled_by_b(void **unused)
 		batch_fini(&b);
 	}
 	/* Of an open round: counts nothing. */
-	struct batch early = make_batch(&p, 1, 0, 0, 1, one);
+	struct batch early = make_batch(&p, 1, 0, 0, 1, always_one);
 	early.independent_sum = 1e9;
 	assert_int_equal(canvas_add(c, &early, NULL), 0);
 	batch_fini(&early);
@@ -391,7 +391,7 @@ static void black_canvas_has_no_error(void **unused)
 	struct canvas_image img;
 	assert_int_equal(canvas_new(&c, &p, -32, NULL, NULL), 0);
 	for (uint32_t g = 0; g < 2; g++) {
-		struct batch b = make_batch(&p, 0, g, 0, 0, one);
+		struct batch b = make_batch(&p, 0, g, 0, 0, always_one);
 		b.independent_sum = 0;
 		b.counters[COUNT_SAMPLES] = 0;
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
@@ -420,7 +420,7 @@ static void values_are_rounded_to_the_grid(void **unused)
 		struct canvas *c;
 		double block[3];
 		assert_int_equal(canvas_new(&c, &p, 0, NULL, NULL), 0);
-		struct batch b = make_batch(&p, 0, 0, 0, 1, one);
+		struct batch b = make_batch(&p, 0, 0, 0, 1, always_one);
 		b.tiles[0].xyz[0] = large ? 0x1p52f : 1;
 		b.tiles[0].xyz[3] = 0.75f;
 		b.tiles[0].xyz[4] = 1.75f;

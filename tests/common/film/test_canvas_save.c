@@ -113,7 +113,7 @@ static void add_nth(struct canvas *c, const struct plan *p, unsigned n)
 	add(c, p, LEASE_RENDER, 2 * pair + n % 2, lease / PARTS, lease % PARTS);
 }
 
-static struct canvas *make(const struct plan *p, const char *films)
+static struct canvas *make_canvas(const struct plan *p, const char *films)
 {
 	struct canvas *c;
 	assert_int_equal(canvas_new(&c, p, EXPONENT, films, NULL), 0);
@@ -136,7 +136,7 @@ static struct canvas *through_file(struct canvas *c, const struct plan *p, const
 	assert_int_equal(canvas_save(c, &s, &e), 0);
 	assert_int_equal(checked_file_finish(&s, &e), 0);
 	canvas_free(c);
-	c = make(p, films);
+	c = make_canvas(p, films);
 	assert_int_equal(checked_file_open(&s, path, &e), 0);
 	if (canvas_load(c, &s, &e))
 		fail_msg("%s", e.text);
@@ -186,7 +186,8 @@ static void goes_on_with_the_same_bits(void **unused)
 		enum { BATCHES = GROUPS * PARTS * (1 + 4) };
 		struct plan p = make_plan(kind ? PLAN_CHAINS : PLAN_SAMPLES);
 		for (unsigned stop = 0; stop <= BATCHES; stop += 7) {
-			struct canvas *plain = make(&p, NULL), *broken = make(&p, stop % 2 ? folder : NULL);
+			struct canvas *plain = make_canvas(&p, NULL),
+				      *broken = make_canvas(&p, stop % 2 ? folder : NULL);
 			for (unsigned n = 0; n < BATCHES; n++) {
 				if (n == stop)
 					broken = through_file(broken, &p, stop % 2 ? NULL : folder);
@@ -205,7 +206,7 @@ static void what_is_loaded_is_what_was_saved(void **unused)
 {
 	(void)unused;
 	struct plan p = make_plan(PLAN_CHAINS);
-	struct canvas *plain = make(&p, NULL), *again = make(&p, NULL);
+	struct canvas *plain = make_canvas(&p, NULL), *again = make_canvas(&p, NULL);
 	for (unsigned n = 0; n < 50; n++) {
 		add_nth(plain, &p, n);
 		add_nth(again, &p, n);
@@ -252,7 +253,7 @@ static void what_is_taken_back_leaves_nothing(void **unused)
 	enum { LEASES = GROUPS * PARTS };
 	for (uint64_t trial = 0; trial < 8; trial++) {
 		struct plan p = make_plan(trial % 2 ? PLAN_CHAINS : PLAN_SAMPLES);
-		struct canvas *plain = make(&p, NULL), *mended = make(&p, trial & 2 ? folder : NULL);
+		struct canvas *plain = make_canvas(&p, NULL), *mended = make_canvas(&p, trial & 2 ? folder : NULL);
 		uint64_t done[LEASES] = {0}, wrong[LEASES] = {0}, dice = 4711 + trial, closed = 0;
 		for (unsigned n = 0; n < LEASES; n++) {
 			add_nth(plain, &p, n);
@@ -307,7 +308,7 @@ static void others_are_refused(void **unused)
 	struct stat st;
 	struct plan p = make_plan(PLAN_CHAINS), q = p;
 	path_of(path);
-	struct canvas *c = make(&p, NULL);
+	struct canvas *c = make_canvas(&p, NULL);
 	for (unsigned n = 0; n < 30; n++)
 		add_nth(c, &p, n);
 	c = through_file(c, &p, NULL);

@@ -65,7 +65,7 @@ static struct canvas *canvas_of(const struct plan *p)
 	return c;
 }
 
-static void give(struct canvas *c, struct batch *b)
+static void add_batch(struct canvas *c, struct batch *b)
 {
 	assert_int_equal(canvas_add(c, b, NULL), 0);
 	batch_fini(b);
@@ -111,7 +111,7 @@ static void known_sequences(void **state)
 				for (uint32_t i = 0; i < b.state_count; i++)
 					b.states[i] = (struct chain_state){mem_alloc(1, 1), 1};
 				assert_int_equal(batch_check(&b, &p, &e), 0);
-				give(c, &b);
+				add_batch(c, &b);
 			}
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		assert_true(img.tiles_across == 3 && img.tiles_down == 2);
@@ -151,7 +151,7 @@ static void four_by_hand(void **state)
 		b.moments[5] = g ? 2 : 1;
 		b.moments[TILES + 5] = g ? 3 : 2;
 		b.moments[2 * TILES + 5] = g ? 5 : 3;
-		give(c, &b);
+		add_batch(c, &b);
 	}
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	assert_true(fabs((double)img.r_hat[5] - sqrt(3.0 / 4 + 1.0 / 7)) < 1e-6);
@@ -175,7 +175,7 @@ static void chains_that_stand_still(void **state)
 				b.moments[i * TILES + own] = half ? 500 : 1000;
 				b.moments[4 * TILES + own] += half ? 500 : 1000;
 			}
-			give(c, &b);
+			add_batch(c, &b);
 		}
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		for (int t = 0; t < 2; t++)
@@ -201,7 +201,7 @@ static void nothing_varies(void **state)
 		}
 		b.moments[4 * TILES] = 4000;
 		b.moments[4 * TILES + 1] = 4000.0f / 9;
-		give(c, &b);
+		add_batch(c, &b);
 	}
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	assert_true(img.r_hat[0] == 1 && img.r_hat[1] == 1);
@@ -247,9 +247,9 @@ static void order_changes_no_bit(void **state)
 			b[j] = swap;
 		}
 		for (uint32_t i = 0; i < LEASES; i++)
-			give(c, &boot[order % 2 ? LEASES - 1 - i : i]);
+			add_batch(c, &boot[order % 2 ? LEASES - 1 - i : i]);
 		for (uint32_t i = 0; i < ALL; i++)
-			give(c, &b[i]);
+			add_batch(c, &b[i]);
 		struct canvas_image img;
 		assert_int_equal(canvas_rounds(c), ROUNDS);
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
@@ -281,10 +281,10 @@ static void classes_by_hand(void **state)
 		b.counters[COUNT_INDEPENDENT] = 8;
 		b.classes[class] = boot[g];
 		b.classes[lost] = 4;
-		give(c, &b);
+		add_batch(c, &b);
 		b = make_batch(&p, 0, g);
 		b.classes[class] = time[g];
-		give(c, &b);
+		add_batch(c, &b);
 	}
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	/* b of each group is 82 / 9: its bootstrap's 80 of 8 and one independent proposal of 2. */
@@ -317,7 +317,7 @@ static void only_complete_rounds_of_chains(void **state)
 		struct batch b = make_batch(&p, 0, lease);
 		b.moments[0] = b.moments[4 * TILES] = 100;
 		b.classes[2] = 50;
-		give(c, &b);
+		add_batch(c, &b);
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		assert_true((img.r_hat != NULL) == (lease == 3));
 		assert_true(lease == 3 || img.classes[2].chains == 0);
@@ -329,7 +329,7 @@ static void only_complete_rounds_of_chains(void **state)
 	}
 	struct batch open = make_batch(&p, 1, 0);
 	open.moments[1] = open.moments[4 * TILES + 1] = 100;
-	give(c, &open);
+	add_batch(c, &open);
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	assert_true(isnan(img.r_hat[1]) && img.tile_share[0] == 1);
 	canvas_image_fini(&img);
@@ -339,7 +339,7 @@ static void only_complete_rounds_of_chains(void **state)
 	c = canvas_of(&p);
 	struct batch boot = {.key = {1, LEASE_BOOTSTRAP, 0, 0, 0}, .independent_sum = 80, .classes = {16}};
 	boot.counters[COUNT_INDEPENDENT] = 8;
-	give(c, &boot);
+	add_batch(c, &boot);
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	assert_null(img.r_hat);
 	assert_true(img.classes[0].bootstrap == 1 && isnan(img.classes[0].difference_t)); /* one group of two */
@@ -359,7 +359,7 @@ static void bounds(void **state)
 		struct batch b = make_batch(&p, 0, lease);
 		assert_int_equal(b.moment_count, 2 * TILES);
 		b.moments[0] = b.moments[TILES] = 1024 * (lease % 2 ? 250 : 150);
-		give(c, &b);
+		add_batch(c, &b);
 	}
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	double n = 1024000, w = 0.2 * 0.8 - 0.05 * 0.05, v = 0.05 * 0.05 * 8 / 7;
@@ -371,7 +371,7 @@ static void bounds(void **state)
 	for (uint32_t lease = 0; lease < 4; lease++) {
 		struct batch b = make_batch(&p, 0, lease);
 		b.moments[0] = b.moments[4 * TILES] = 0x1p40f;
-		give(c, &b);
+		add_batch(c, &b);
 	}
 	struct batch b = make_batch(&p, 1, 0);
 	assert_int_equal(canvas_add(c, &b, &e), -ERANGE);
@@ -384,7 +384,7 @@ static void bounds(void **state)
 		assert_true(rc == 0 || rc == -ENOMEM);
 	}
 	b = make_batch(&p, 0, 0);
-	give(c, &b);
+	add_batch(c, &b);
 	canvas_free(c);
 }
 

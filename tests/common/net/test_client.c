@@ -37,7 +37,7 @@ struct coordinator {
 	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
 };
 
-static void say(int fd, const Farm__Envelope *m, const void *payload, size_t payload_size)
+static void send_message(int fd, const Farm__Envelope *m, const void *payload, size_t payload_size)
 {
 	size_t size;
 	unsigned char *frame = checksummed_message(m, payload, payload_size, &size);
@@ -61,7 +61,7 @@ static void say_hello(int fd)
 	ack.heartbeat_ms = 5000;
 	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
 	m.hello_ack = &ack;
-	say(fd, &m, NULL, 0);
+	send_message(fd, &m, NULL, 0);
 }
 
 static void say_chunk(int fd, const char *name, uint64_t offset, uint64_t file_size)
@@ -77,7 +77,7 @@ static void say_chunk(int fd, const char *name, uint64_t offset, uint64_t file_s
 	chunk.output = output;
 	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
 	m.fetch_chunk = &chunk;
-	say(fd, &m, image, sizeof image);
+	send_message(fd, &m, image, sizeof image);
 }
 
 static void *coordinate(void *user)
@@ -95,7 +95,7 @@ static void *coordinate(void *user)
 	if (recv(fd, bytes, sizeof bytes, 0) > 0)
 		say_hello(fd);
 	for (size_t i = 0; i < c->flood; i++)
-		say(fd, &m, rubbish, c->payload);
+		send_message(fd, &m, rubbish, c->payload);
 	if (c->name && recv(fd, bytes, sizeof bytes, 0) > 0)
 		say_chunk(fd, c->name, 0, sizeof image);
 	for (int i = 0; i < 2 && c->sizes[0] && recv(fd, bytes, sizeof bytes, 0) > 0; i++)

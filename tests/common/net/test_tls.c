@@ -492,7 +492,7 @@ static void names_are_strict(void **state)
 
 /* ---- what is said ---- */
 
-static void say(struct end *x, size_t size)
+static void write_bytes(struct end *x, size_t size)
 {
 	static unsigned char bytes[1 << 16];
 	for (size_t i = 0; i < size; i++)
@@ -504,8 +504,8 @@ static void what_is_said_arrives(void **state)
 {
 	(void)state;
 	shake_by(at(ours, "node"), at(ours, "farm"), 100000);
-	say(&caller, 60000);
-	say(&listener, 1);
+	write_bytes(&caller, 60000);
+	write_bytes(&listener, 1);
 	carry(&caller, &listener, 999);
 	carry(&listener, &caller, 1);
 	assert_int_equal(listener.got_size, 60000);
@@ -521,7 +521,7 @@ static void half_a_record_says_nothing(void **state)
 	(void)state;
 	const unsigned char *bytes;
 	shake_by(at(ours, "node"), at(ours, "farm"), 100000);
-	say(&caller, 10000);
+	write_bytes(&caller, 10000);
 	size_t size = tls_link_output(caller.link, &bytes);
 	assert_int_equal(tls_link_take(listener.link, bytes, size - 1, &listener.e), 0);
 	read_all(&listener);
@@ -537,7 +537,7 @@ static void a_changed_bit_ends_it(void **state)
 	for (size_t bit = 0; bit < 8; bit++) {
 		const unsigned char *bytes;
 		shake_by(at(ours, "node"), at(ours, "farm"), 100000);
-		say(&caller, 1000);
+		write_bytes(&caller, 1000);
 		size_t size = tls_link_output(caller.link, &bytes);
 		assert_true(size > 1000 && size < sizeof copied);
 		memcpy(copied, bytes, size);
@@ -557,7 +557,7 @@ static void a_replayed_record_ends_it(void **state)
 	unsigned char copied[2048];
 	const unsigned char *bytes;
 	shake_by(at(ours, "node"), at(ours, "farm"), 100000);
-	say(&caller, 1000);
+	write_bytes(&caller, 1000);
 	size_t size = tls_link_output(caller.link, &bytes);
 	assert_true(size < sizeof copied);
 	memcpy(copied, bytes, size);

@@ -190,7 +190,7 @@ static void broken(void **state)
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
-static struct job_status ask(const struct farm *f, double now)
+static struct job_status job_status_of(const struct farm *f, double now)
 {
 	struct job_status s;
 	assert_true(farm_job(f, 1, now, &s));
@@ -213,14 +213,14 @@ static void progress_and_rate(void **state)
 				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
 				   NULL,
 			   });
-	near(ask(f, 11).progress, 1000.0 / 5000);
-	assert_true(isnan(ask(f, 11).eta));
+	near(job_status_of(f, 11).progress, 1000.0 / 5000);
+	assert_true(isnan(job_status_of(f, 11).eta));
 	transcript_play(f, (const char *const[]){
 				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
 				   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
 				   NULL,
 			   });
-	struct job_status s = ask(f, 15);
+	struct job_status s = job_status_of(f, 15);
 	near(s.progress, 1800.0 / 5000);
 	near(s.rate, 200);
 	near(s.eta, 16);
@@ -242,15 +242,15 @@ static void progress_of_errors(void **state)
 			   NULL,
 		   });
 	/* twice the error: four rounds; and when that turns out to be too few, progress stays */
-	near(ask(f, 13).progress, 1400.0 / 2600);
-	near(ask(f, 13).eta, 1200 / 200.0);
+	near(job_status_of(f, 13).progress, 1400.0 / 2600);
+	near(job_status_of(f, 13).eta, 1200 / 200.0);
 	transcript_play(
 		f, (const char *const[]){
 			   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
 			   "[15] error j1 2 0.9 -> -",
 			   NULL,
 		   });
-	near(ask(f, 15).progress, 1800.0 / 2600);
+	near(job_status_of(f, 15).progress, 1800.0 / 2600);
 	farm_free(f);
 }
 
@@ -277,7 +277,7 @@ static void doubtful_looks_end_nothing(void **state)
 					   .cpu_seconds = 5}};
 	struct update u;
 	farm_step(f, &ev, &u);
-	struct job_status s = ask(f, 13.5);
+	struct job_status s = job_status_of(f, 13.5);
 	assert_int_equal(s.state, JOB_RUNNING);
 	assert_true(isnan(s.rel_error) && s.looks->count == 1 && s.looks->looks[0].doubtful);
 	farm_free(f);
@@ -302,7 +302,7 @@ static void looks_give_a_forecast(void **state)
 			.job = 1, .rounds = 1, .rel_error = 0.2, .rel_mse = 0.038, .degrees = 2000, .cpu_seconds = 5}};
 	struct update u;
 	farm_step(f, &ev, &u);
-	struct job_status s = ask(f, 13.5);
+	struct job_status s = job_status_of(f, 13.5);
 	assert_int_equal(s.looks->count, 1);
 	near(s.looks->looks[0].work, 400);
 	near(s.looks->looks[0].cpu_seconds, 5);
@@ -324,9 +324,9 @@ static void progress_of_time(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){START("rounds=inf seconds=20"), NULL});
-	near(ask(f, 15).progress, 5.0 / 20);
-	near(ask(f, 15).eta, 15);
-	near(ask(f, 100).progress, 1);
+	near(job_status_of(f, 15).progress, 5.0 / 20);
+	near(job_status_of(f, 15).eta, 15);
+	near(job_status_of(f, 100).progress, 1);
 	farm_free(f);
 }
 

@@ -28,7 +28,7 @@ struct job {
 	struct error e;
 };
 
-static void make(struct job *j, const struct plan_request *r, uint64_t rounds, bool ended)
+static void make_job(struct job *j, const struct plan_request *r, uint64_t rounds, bool ended)
 {
 	j->asked = *r;
 	assert_int_equal(plan_make(r, &j->plan, &j->e), 0);
@@ -62,7 +62,7 @@ static void as_one_long_one(void **state)
 			struct job j;
 			struct plan one;
 			r.spp = spp;
-			make(&j, &r, 0, true);
+			make_job(&j, &r, 0, true);
 			all = r;
 			all.spp = spp + 100 + 3;
 			all.chains = j.plan.chains;
@@ -91,36 +91,36 @@ static void bounds_that_are_met(void **state)
 	r.seconds = 10;
 	r.target_error = 0.05;
 	/* the error was met: more samples lift it, but not the time */
-	make(&j, &r, 3, true);
+	make_job(&j, &r, 3, true);
 	j.from.seconds = 5;
 	j.from.error = 0.04;
 	uint64_t rounds = j.plan.rounds;
 	says(&j, (struct extension){.target_error = 0.045}, "4 % already");
-	make(&j, &r, 3, true);
+	make_job(&j, &r, 3, true);
 	j.from.seconds = 5;
 	j.from.error = 0.04;
 	assert_int_equal(extend(&j, (struct extension){.spp = 100}), 0);
 	assert_true(j.plan.target_error == 0 && j.plan.seconds == 10 && j.plan.rounds > rounds);
 	/* a lower one leaves the rest as it was */
-	make(&j, &r, 3, true);
+	make_job(&j, &r, 3, true);
 	j.from.seconds = 5;
 	j.from.error = 0.04;
 	assert_int_equal(extend(&j, (struct extension){.target_error = 0.01}), 0);
 	assert_true(j.plan.target_error == 0.01 && j.plan.seconds == 10 && j.plan.rounds == rounds);
 	/* the time was up */
-	make(&j, &r, 3, true);
+	make_job(&j, &r, 3, true);
 	assert_int_equal(extend(&j, (struct extension){.spp = 1}), 0);
 	assert_true(j.plan.seconds == 0 && j.plan.target_error == 0.05);
-	make(&j, &r, 3, true);
+	make_job(&j, &r, 3, true);
 	assert_int_equal(extend(&j, (struct extension){.seconds = 3}), 0);
 	assert_true(j.plan.seconds == 13 && j.plan.rounds == rounds);
 	/* all rounds were done: an error, a time say how long it goes on */
-	make(&j, &r, 0, true);
+	make_job(&j, &r, 0, true);
 	j.from.seconds = 5;
 	assert_int_equal(extend(&j, (struct extension){.target_error = 0.01}), 0);
 	assert_true(j.plan.rounds == UINT64_MAX && j.plan.seconds == 10);
 	/* of one that runs nothing is lifted */
-	make(&j, &r, 3, false);
+	make_job(&j, &r, 3, false);
 	j.from.error = 0.04;
 	assert_int_equal(extend(&j, (struct extension){.seconds = 3}), 0);
 	assert_true(j.plan.seconds == 13 && j.plan.rounds == rounds && j.plan.target_error == 0.05);
@@ -132,24 +132,24 @@ static void without_a_bound(void **state)
 	struct plan_request r = request(PLAN_CHAINS);
 	struct job j;
 	r.seconds = 10;
-	make(&j, &r, 7, true);
+	make_job(&j, &r, 7, true);
 	uint64_t epoch = j.plan.epoch;
 	assert_int_equal(extend(&j, (struct extension){.mutations = 1}), 0); /* beyond what is done */
 	assert_true(j.plan.rounds == 8 && j.plan.seconds == 0 && j.plan.epoch == epoch);
-	make(&j, &r, 7, false);
+	make_job(&j, &r, 7, false);
 	says(&j, (struct extension){.spp = 8}, "without a bound of samples");
-	make(&j, &r, 7, false);
+	make_job(&j, &r, 7, false);
 	says(&j, (struct extension){.job = 1}, "by what");
 	says(&j, (struct extension){.seconds = NAN, .spp = 1}, "that is none");
 	says(&j, (struct extension){.seconds = -1, .spp = 1}, "that is none");
 	says(&j, (struct extension){.target_error = INFINITY}, "that is none");
 	r.seconds = 0;
 	r.spp = 4;
-	make(&j, &r, 0, true);
+	make_job(&j, &r, 0, true);
 	says(&j, (struct extension){.spp = UINT64_MAX}, "can be counted");
-	make(&j, &r, 0, true);
+	make_job(&j, &r, 0, true);
 	says(&j, (struct extension){.mutations = UINT64_MAX}, "can be counted");
-	make(&j, &r, 0, true);
+	make_job(&j, &r, 0, true);
 	assert_int_equal(extend(&j, (struct extension){.mutations = UINT64_C(1) << 63}), -EINVAL);
 }
 

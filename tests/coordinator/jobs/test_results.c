@@ -537,7 +537,7 @@ static void a_failure_counts_whatever_its_text(void **state)
 }
 
 /* A client whose extension of job 2 has come. */
-static void ask(struct scripted *p)
+static void send_extension(struct scripted *p)
 {
 	say_extend(p, 2, 8, 1);
 	peer_say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
@@ -556,7 +556,7 @@ static void extensions_are_served_as_they_came(void **state)
 		assert_true(peer_hello(p[i] = peer_call(), FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	served_set_busy(true);
 	for (int i = 0; i < CLIENTS; i++)
-		ask(p[order[i]]);
+		send_extension(p[order[i]]);
 	scripted_hang_up(p[order[1]]);
 	served_set_busy(false);
 	for (int i = 0; i < CLIENTS; i++, last = rounds) {

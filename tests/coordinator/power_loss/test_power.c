@@ -156,7 +156,7 @@ static void run_restart(uint64_t from, uint64_t count, int with, uint64_t *refus
 	outage_stop(&f);
 }
 
-static uint64_t number(const char *name, uint64_t otherwise)
+static uint64_t env_number(const char *name, uint64_t otherwise)
 {
 	const char *text = getenv(name);
 	return text && *text ? strtoull(text, NULL, 10) : otherwise;
@@ -190,8 +190,9 @@ static void power_goes_at_any_time(void **state)
 {
 	(void)state;
 	begin_test(0);
-	uint64_t seeds = number("HSLT_POWER_SEEDS", number("FULL", 0) ? 4000 : 150), one = number("HSLT_POWER_SEED", 0);
-	seeds = seeds / number("HSLT_TEST_SCALE", 1) + 1;
+	uint64_t seeds = env_number("HSLT_POWER_SEEDS", env_number("FULL", 0) ? 4000 : 150),
+		 one = env_number("HSLT_POWER_SEED", 0);
+	seeds = seeds / env_number("HSLT_TEST_SCALE", 1) + 1;
 	uint64_t losses = 0, acks = 0;
 	outage_quiet_run();
 	outage.loud = one != 0;
@@ -225,10 +226,11 @@ static void calls_fail_at_any_time(void **state)
 			  {"ENOSPC", ENOSPC, 40, true},
 			  {"EMFILE", EMFILE, 1, false},
 			  {"EROFS", EROFS, 10, false}};
-	uint64_t one = number("HSLT_FAULT_AT", 0),
-		 step = number("FULL", 0) ? SHARES
-					  : number("HSLT_FAULT_STEP", 18 * SHARES * number("HSLT_TEST_SCALE", 1));
-	if (number("HSLT_POWER_SEED", 0))
+	uint64_t one = env_number("HSLT_FAULT_AT", 0),
+		 step = env_number("FULL", 0)
+				? SHARES
+				: env_number("HSLT_FAULT_STEP", 18 * SHARES * env_number("HSLT_TEST_SCALE", 1));
+	if (env_number("HSLT_POWER_SEED", 0))
 		skip();
 	begin_test(1);
 	outage_quiet_run();
@@ -264,10 +266,11 @@ static void starts_fail_at_any_time(void **state)
 		int with;
 		uint64_t count;
 	} kinds[] = {{"EIO", EIO, 1}, {"EMFILE", EMFILE, 3}};
-	uint64_t one = number("HSLT_FAULT_AT", 0),
-		 step = number("FULL", 0) ? SHARES
-					  : number("HSLT_FAULT_STEP", 5 * SHARES * number("HSLT_TEST_SCALE", 1));
-	if (number("HSLT_POWER_SEED", 0))
+	uint64_t one = env_number("HSLT_FAULT_AT", 0),
+		 step = env_number("FULL", 0)
+				? SHARES
+				: env_number("HSLT_FAULT_STEP", 5 * SHARES * env_number("HSLT_TEST_SCALE", 1));
+	if (env_number("HSLT_POWER_SEED", 0))
 		skip();
 	begin_test(2);
 	outage_quiet_run();
@@ -390,7 +393,7 @@ static void of_another_version(void **state)
 	static const char *const names[] = {"checkpoint", "order", "journal.*"};
 	static struct farm_run f;
 	static unsigned char before[FILE_MOST], bytes[FILE_MOST];
-	if (share || number("HSLT_POWER_SEED", 0) || number("HSLT_FAULT_AT", 0))
+	if (share || env_number("HSLT_POWER_SEED", 0) || env_number("HSLT_FAULT_AT", 0))
 		skip();
 	begin_test(3);
 	outage_quiet_run();
@@ -426,7 +429,7 @@ static void without_its_folder(void **state)
 {
 	(void)state;
 	static struct farm_run f;
-	if (share || number("HSLT_POWER_SEED", 0) || number("HSLT_FAULT_AT", 0))
+	if (share || env_number("HSLT_POWER_SEED", 0) || env_number("HSLT_FAULT_AT", 0))
 		skip();
 	begin_test(3);
 	outage_quiet_run();
@@ -467,7 +470,7 @@ int main(void)
 	if (sums == MAP_FAILED)
 		return 1;
 	outage.counts = (_Atomic uint64_t *)(sums + TESTS);
-	if (!number("HSLT_POWER_SEED", 0))
+	if (!env_number("HSLT_POWER_SEED", 0))
 		share = shares_begin();
 	outage.counts += share * FAULTY_DISK_COUNTS;
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -49,7 +49,7 @@ static bool has(uint64_t job, const char *file)
 	return access(path, F_OK) == 0;
 }
 
-static void put(uint64_t job, const char *file)
+static void write_file(uint64_t job, const char *file)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(jobs.spool, job, file, path);
@@ -73,8 +73,8 @@ static void add(uint64_t id, double ended)
 		strcpy(r->state, "running");
 	assert_int_equal(spool_take_job(jobs.spool, id, &e), 0);
 	assert_int_equal(spool_write_record(jobs.spool, r, &e), 0);
-	put(id, "result.exr");
-	put(id, "checkpoint.tmp"); /* of a life that was cut short */
+	write_file(id, "result.exr");
+	write_file(id, "checkpoint.tmp"); /* of a life that was cut short */
 	free(r);
 }
 

@@ -16,7 +16,7 @@
 static struct jobs jobs;
 static struct job_record ended[3];
 
-static void put(uint64_t job, const char *file, off_t size)
+static void write_file(uint64_t job, const char *file, off_t size)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(jobs.spool, job, file, path);
@@ -39,10 +39,10 @@ static void fill(void)
 	static const uint64_t ids[] = {3, 1, 2};
 	for (size_t i = 0; i < 3; i++) {
 		ended[i] = (struct job_record){.id = ids[i]};
-		put(ids[i], "order", 100);
-		put(ids[i], "checkpoint", 400);
-		put(ids[i], "journal.2", 500);
-		put(ids[i], "result.exr", 9000);
+		write_file(ids[i], "order", 100);
+		write_file(ids[i], "checkpoint", 400);
+		write_file(ids[i], "journal.2", 500);
+		write_file(ids[i], "result.exr", 9000);
 	}
 	jobs.ended = ended;
 	jobs.ended_count = 3;

@@ -32,7 +32,7 @@ struct job {
 
 static pthread_t loop_thread;
 
-static void run(struct task *t)
+static void run_job(struct task *t)
 {
 	struct job *j = (struct job *)t;
 	int now = atomic_fetch_add(j->running, 1) + 1, most = atomic_load(j->most);
@@ -65,7 +65,7 @@ static void the_crew_works(void **state)
 	assert_int_equal(thread_pool_new(&c, &loop, 3, &e), 0);
 	for (int i = 0; i < JOBS; i++) {
 		jobs[i] = (struct job){
-			.task = {.run = run, .done = done}, .running = &running, .most = &most, .gate = &gate};
+			.task = {.run = run_job, .done = done}, .running = &running, .most = &most, .gate = &gate};
 		thread_pool_add(c, &jobs[i].task);
 	}
 	while (atomic_load(&running) < 3)
@@ -189,7 +189,7 @@ static void set_info(struct job_cache *b, const char *texts[], size_t count)
 	mem_free(frame);
 }
 
-static void give(struct cache *c, const char *text)
+static void store_text(struct cache *c, const char *text)
 {
 	struct blob_hash h;
 	struct blob_writer *w;
@@ -222,12 +222,12 @@ static void a_bundle_holds_what_it_needs(void **state)
 	assert_int_equal(blob_hash_bytes(texts[0], 7, &first, &e), 0);
 	assert_true(job_cache_next_missing(b));
 	assert_true(blob_hash_equal(&b->wanted, &first));
-	give(&cache, texts[0]);
+	store_text(&cache, texts[0]);
 	assert_true(job_cache_next_missing(b));
 	assert_false(blob_hash_equal(&b->wanted, &first));
-	give(&cache, texts[1]);
+	store_text(&cache, texts[1]);
 	assert_true(job_cache_next_missing(b)); /* the third is the first again; the empty one is left */
-	give(&cache, texts[3]);
+	store_text(&cache, texts[3]);
 	assert_false(job_cache_next_missing(b));
 	/* The scene is none: that is found by the builder, and said. */
 	assert_int_equal(uv_loop_init(&loop), 0);

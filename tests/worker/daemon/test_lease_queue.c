@@ -63,7 +63,7 @@ static const Farm__Envelope *hear(void)
 	return scripted_hear(t.at);
 }
 
-static void say(Farm__Envelope *m, Farm__Envelope__BodyCase what, const void *payload, size_t size)
+static void send_message(Farm__Envelope *m, Farm__Envelope__BodyCase what, const void *payload, size_t size)
 {
 	m->body_case = what;
 	assert_true(scripted_say(t.at, m, payload, size));
@@ -89,7 +89,7 @@ static void welcome(void)
 	ack.version = FARM_VERSION;
 	ack.heartbeat_ms = 600000;
 	m.hello_ack = &ack;
-	say(&m, FARM__ENVELOPE__BODY_HELLO_ACK, NULL, 0);
+	send_message(&m, FARM__ENVELOPE__BODY_HELLO_ACK, NULL, 0);
 }
 
 static void hang_up(void)
@@ -147,7 +147,7 @@ static void describe(uint64_t job)
 	info.n_files = 2;
 	info.files = list;
 	m.job_info = &info;
-	say(&m, FARM__ENVELOPE__BODY_JOB_INFO, NULL, 0);
+	send_message(&m, FARM__ENVELOPE__BODY_JOB_INFO, NULL, 0);
 }
 
 static void hear_blob_get(const struct file *f, uint64_t offset)
@@ -170,7 +170,7 @@ static void send_piece(struct file *f, uint64_t offset)
 	c.offset = offset;
 	c.size = f->size;
 	m.blob_chunk = &c;
-	say(&m, FARM__ENVELOPE__BODY_BLOB_CHUNK, f->bytes + offset, left < PIECE ? left : PIECE);
+	send_message(&m, FARM__ENVELOPE__BODY_BLOB_CHUNK, f->bytes + offset, left < PIECE ? left : PIECE);
 }
 
 /* Each piece is asked for once, from the given one on; the last one is asked for. */
@@ -190,7 +190,7 @@ static void end_job(uint64_t job)
 	farm__envelope__init(&m);
 	end.job = job;
 	m.job_end = &end;
-	say(&m, FARM__ENVELOPE__BODY_JOB_END, NULL, 0);
+	send_message(&m, FARM__ENVELOPE__BODY_JOB_END, NULL, 0);
 }
 
 /* The lease of a job that could be fetched fails with its scene, which is none. */

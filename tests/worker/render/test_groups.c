@@ -129,7 +129,8 @@ static struct plan plan_of(const struct world *w, const struct render_integrator
 	return p;
 }
 
-static struct batch run(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
+static struct batch run_lease(const struct world *w, const struct plan *p, struct lease_key k,
+			      const struct lease_input *in)
 {
 	struct batch b;
 	struct error e = {""};
@@ -150,7 +151,7 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 	assert_int_equal(bootstrap_new(&s, p, NULL), 0);
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
 		noted.owner = i / PARTS;
-		struct batch b = run(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
+		struct batch b = run_lease(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
 		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
 		look(user, &b);
 		batch_fini(&b);
@@ -165,8 +166,8 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 		if (before[lease].states)
 			in = (struct lease_input){before[lease].state_count, NULL, before[lease].states};
 		noted.owner = group;
-		struct batch b = run(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)},
-				     p->kind == PLAN_CHAINS ? &in : NULL);
+		struct batch b = run_lease(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)},
+					   p->kind == PLAN_CHAINS ? &in : NULL);
 		look(user, &b);
 		batch_fini(&before[lease]);
 		before[lease] = b;
@@ -251,7 +252,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		if (render_integrator_at(i)->kind != PLAN_CHAINS)
 			continue;
 		struct plan p = plan_of(w, render_integrator_at(i));
-		struct batch boot = run(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
+		struct batch boot = run_lease(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
 		uint64_t first = plan_bootstrap_range(&p, 1, 0).begin, n = 0, looks = 0;
 		while (!(boot.weights[n] > 0))
 			n++;
@@ -264,8 +265,8 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		batch_fini(&boot);
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
 		listen(true);
-		boot = run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
-			   &(struct lease_input){CHAINS / GROUPS / PARTS, seeds, NULL});
+		boot = run_lease(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
+				 &(struct lease_input){CHAINS / GROUPS / PARTS, seeds, NULL});
 		batch_fini(&boot);
 		for (size_t k = 0; k < noted.count; k++) {
 			looks += noted.all[k].stream == RNG_BOOTSTRAP;

@@ -62,7 +62,8 @@ static struct plan plan_of(const struct world *w, const char *integrator)
 	return p;
 }
 
-static struct batch run(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
+static struct batch run_lease(const struct world *w, const struct plan *p, struct lease_key k,
+			      const struct lease_input *in)
 {
 	struct batch b;
 	struct error e = {""};
@@ -104,7 +105,7 @@ static struct lease_key key(enum lease_kind kind, uint32_t group, uint32_t part,
 /* Seeds that carry light, for one lease of chains. */
 static void find_seeds(const struct world *w, const struct plan *p, uint32_t group, uint64_t *seeds, uint32_t count)
 {
-	struct batch b = run(w, p, key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
+	struct batch b = run_lease(w, p, key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
 	uint64_t first = plan_bootstrap_range(p, group, 0).begin;
 	uint32_t n = 0;
 	for (uint64_t i = 0; i < b.weight_count && n < count; i++)
@@ -125,9 +126,9 @@ static void test_any_order(void **state)
 		enum lease_kind kind = p.kind == PLAN_CHAINS ? LEASE_BOOTSTRAP : LEASE_RENDER;
 		struct batch b[GROUPS * PARTS];
 		for (uint32_t i = 0; i < GROUPS * PARTS; i++)
-			b[i] = run(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+			b[i] = run_lease(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
 		for (uint32_t i = GROUPS * PARTS; i-- > 0;) {
-			struct batch again = run(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+			struct batch again = run_lease(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
 			assert_same(&b[i], &again);
 			batch_fini(&again);
 			batch_fini(&b[i]);
@@ -148,13 +149,13 @@ static void test_chains(void **state)
 		uint64_t seeds[2];
 		find_seeds(w, &p, 1, seeds, 2);
 		struct lease_input in = {2, seeds, NULL};
-		struct batch a = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in),
-			     b = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in);
+		struct batch a = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 0), &in),
+			     b = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 0), &in);
 		assert_same(&a, &b);
 		assert_true(a.counters[COUNT_SAMPLES] == 2 * p.epoch && a.tile_count > 0);
 		struct lease_input next = {2, NULL, a.states}, copy = {2, NULL, b.states};
-		struct batch c = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &next),
-			     d = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &copy);
+		struct batch c = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 1), &next),
+			     d = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 1), &copy);
 		assert_same(&c, &d);
 		batch_fini(&a);
 		batch_fini(&b);
@@ -185,9 +186,9 @@ static void test_extreme_light(void **state)
 			struct lease_input in = {2, seeds, NULL};
 			bool chains = p.kind == PLAN_CHAINS;
 			p.bootstrap = 4096;
-			struct batch a = run(w, &p, key(LEASE_BOOTSTRAP, 1, 0, 0), NULL);
+			struct batch a = run_lease(w, &p, key(LEASE_BOOTSTRAP, 1, 0, 0), NULL);
 			batch_fini(&a);
-			struct batch b = run(w, &p, key(LEASE_RENDER, 1, 0, 0), chains ? &in : NULL);
+			struct batch b = run_lease(w, &p, key(LEASE_RENDER, 1, 0, 0), chains ? &in : NULL);
 			batch_fini(&b);
 		}
 		world_free(w);
@@ -214,7 +215,7 @@ static void test_refused(void **state)
 	find_seeds(w, &p, 0, seeds, 3);
 	struct lease_key k0 = key(LEASE_RENDER, 0, 0, 0), k1 = key(LEASE_RENDER, 0, 0, 1);
 	struct lease_input in = {2, seeds, NULL};
-	struct batch b = run(w, &p, k0, &in);
+	struct batch b = run_lease(w, &p, k0, &in);
 	/* Counts, and nothing at all. */
 	assert_int_equal(end_of(w, &p, k0, NULL), -EINVAL);
 	for (uint32_t n = 0; n < 4; n++)
@@ -250,7 +251,7 @@ static void test_refused(void **state)
 	}
 	print_message("%zu of the noisy states are states\n", good);
 	/* Dark seeds: such a chain looks for light. */
-	struct batch boot = run(w, &p, key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
+	struct batch boot = run_lease(w, &p, key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
 	for (uint64_t i = 0; i < boot.weight_count; i++)
 		if (!(boot.weights[i] > 0)) {
 			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){2, (uint64_t[]){seeds[0], i}, NULL}),
@@ -295,7 +296,7 @@ static void test_invalid_operation(void **state)
 		struct lease_input in = {2, seeds, NULL};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
-			struct batch good = run(w, &p, k, &in), b;
+			struct batch good = run_lease(w, &p, k, &in), b;
 			struct error e = {""};
 			enum lease_end end;
 			w->camera.center_x = INFINITY;
@@ -307,7 +308,7 @@ static void test_invalid_operation(void **state)
 									    : "mutation"));
 			assert_true(!b.tiles && !b.states && !b.weights && !b.moments);
 			w->camera.center_x = center;
-			struct batch again = run(w, &p, k, &in);
+			struct batch again = run_lease(w, &p, k, &in);
 			assert_same(&good, &again);
 			batch_fini(&good);
 			batch_fini(&again);
@@ -354,7 +355,7 @@ static float *film_of(const struct world *w, const struct plan *p)
 	double *sum = calloc((size_t)p->width * p->height * 3, sizeof *sum);
 	for (uint32_t g = 0; g < p->groups; g++)
 		for (uint32_t part = 0; part < p->parts; part++) {
-			struct batch b = run(w, p, key(LEASE_RENDER, g, part, 0), NULL);
+			struct batch b = run_lease(w, p, key(LEASE_RENDER, g, part, 0), NULL);
 			for (uint32_t t = 0; t < b.tile_count; t++)
 				for (uint32_t i = 0; i < b.tiles[t].width * b.tiles[t].height * 3; i++) {
 					uint32_t x = b.tiles[t].x + i / 3 % b.tiles[t].width,

@@ -202,7 +202,8 @@ static void sample_classes(const struct world *w, const char *integrator, const 
 	}
 }
 
-static void judge(const char *test, unsigned class, double share, double difference_error, double p, double *least)
+static void check_class(const char *test, unsigned class, double share, double difference_error, double p,
+			double *least)
 {
 	/* Of what independent samples hardly find, their means are far from normal. */
 	if (share >= 0.01 && p < LEVEL)
@@ -238,7 +239,7 @@ static void samples_agree(void **state)
 				d[g] = a[k][g] - b[k][g];
 			struct stats_mean m = stats_mean_test(d, GROUPS, 0);
 			if (mean > 0)
-				judge(test, k, mean / all, m.error / mean, m.p, &least);
+				check_class(test, k, mean / all, m.error / mean, m.p, &least);
 		}
 		end_judging(test, least, 0.15);
 		world_free(w);
@@ -296,8 +297,8 @@ static void check_chains(const char *room, const char *integrator, uint64_t step
 		const struct path_class_energy *of = &img.classes[k];
 		double t = of->difference_t, p_value = isnan(t) ? 1 : stats_student_t_p(t, GROUPS - 1);
 		if (of->bootstrap > 0)
-			judge(test, k, of->bootstrap / all,
-			      hypot(of->bootstrap_error, of->chains_error) / of->bootstrap, p_value, &least);
+			check_class(test, k, of->bootstrap / all,
+				    hypot(of->bootstrap_error, of->chains_error) / of->bootstrap, p_value, &least);
 	}
 	end_judging(test, least, 0.25);
 	canvas_image_fini(&img);

@@ -50,7 +50,7 @@ static bool scaled(void)
 	return text && atoi(text) > 1;
 }
 
-static void run(const struct setting_case *c, struct stationary_result *r)
+static void run_case(const struct setting_case *c, struct stationary_result *r)
 {
 	struct stationary_how how = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_SOUND};
 	char name[96];
@@ -74,7 +74,7 @@ static void test_stationary(void **state)
 	static struct stationary_result r;
 	unsigned wrong = 0;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		run(&cases[i], &r);
+		run_case(&cases[i], &r);
 		wrong += !stationary_holds(&r) || !r.accepted || (!scaled() && r.least_block > 0.02);
 	}
 	assert_int_equal(wrong, 0);
@@ -84,7 +84,7 @@ static void test_bias_is_found(void **state)
 {
 	(void)state;
 	static struct stationary_result r;
-	run(&(struct setting_case){"tolerance=1", "rough glass", 4, "hslt@b4c0"}, &r);
+	run_case(&(struct setting_case){"tolerance=1", "rough glass", 4, "hslt@b4c0"}, &r);
 	assert_true(scaled() || !stationary_holds(&r));
 }
 

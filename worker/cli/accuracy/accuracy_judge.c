@@ -232,7 +232,7 @@ static void take_biases(struct judge *j, const struct picture *reference, struct
 			take_bias(j, i, reference ? file : from, reference ? 1 : j->groups, &points[i]);
 }
 
-static int judge(struct judge *j, const struct picture *reference, struct error *e)
+static int judge_all(struct judge *j, const struct picture *reference, struct error *e)
 {
 	static struct stats_point points[ACCURACY_SETTINGS];
 	static size_t by[ACCURACY_SETTINGS];
@@ -281,7 +281,7 @@ int accuracy_judge(const struct accuracy_run *r, const struct picture *reference
 	j.blocks = mem_alloc(n * j.groups * j.cells, sizeof *j.blocks);
 	int rc = !out->rgb || !j.mean || !j.weight || !j.worst || !j.rel_mse || !j.degrees || !j.blocks
 			 ? error_set(e, ENOMEM, "no memory for the comparison")
-			 : judge(&j, reference, e);
+			 : judge_all(&j, reference, e);
 	mem_free(j.mean);
 	mem_free(j.weight);
 	mem_free(j.worst);

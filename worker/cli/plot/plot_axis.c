@@ -38,7 +38,7 @@ static double round_step(double range)
 	return range / step > 20 ? 5 * step : range / step > 8 ? 2 * step : step;
 }
 
-static void mark(struct plot_axis *a)
+static void place_tics(struct plot_axis *a)
 {
 	static const double few[] = {1}, some[] = {1, 2, 5}, many[] = {1, 1.5, 2, 3, 4, 5, 7};
 	double decades = log10(a->high / a->low);
@@ -63,7 +63,7 @@ static void widen(struct plot_axis *a, bool amounts)
 		factor = factor > 1.02 ? factor : 1.3;
 		a->low /= factor;
 		a->high *= factor;
-		mark(a);
+		place_tics(a);
 		return;
 	}
 	double room = 0.06 * (a->high - a->low);

@@ -179,7 +179,7 @@ static int begin_rounds(struct thread_pool *c)
 	return 0;
 }
 
-static int look(struct thread_pool *c, uint64_t rounds, enum merge_end *end)
+static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *end)
 {
 	struct local_run *r = c->run;
 	struct canvas_image img;
@@ -290,7 +290,7 @@ int local_run(struct local_run *r, struct error *e)
 		rc = local_step(j, e);
 		if (rc || canvas_rounds(r->canvas) == before)
 			break;
-		rc = look(&j->thread_pool, before + 1, &r->end);
+		rc = check_target(&j->thread_pool, before + 1, &r->end);
 		if (rc)
 			fail(j, rc, e);
 	}

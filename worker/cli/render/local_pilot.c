@@ -3,7 +3,7 @@
 
 #include "worker/cli/render/pilot.h"
 
-static void look(void *user, const struct local_round *r)
+static void on_round(void *user, const struct local_round *r)
 {
 	struct local_pilot *p = user;
 	if (r->image)
@@ -25,7 +25,7 @@ static void pass_on(void *user, const struct local_progress *r)
 }
 
 /* Runs it for its looks and its times. */
-static int run(struct local_pilot *p, const struct plan_request *request, struct local_run *r, struct error *e)
+static int run_pilot(struct local_pilot *p, const struct plan_request *request, struct local_run *r, struct error *e)
 {
 	int rc = plan_make(request, &p->plan, e);
 	if (rc)
@@ -36,7 +36,7 @@ static int run(struct local_pilot *p, const struct plan_request *request, struct
 				.threads = p->threads,
 				.stop = p->stop,
 				.progress = pass_on,
-				.round = look,
+				.round = on_round,
 				.user = p};
 	rc = local_run(r, e);
 	bool none = !r->canvas, black = r->lit.black;
@@ -57,7 +57,7 @@ int local_pilot(struct local_pilot *p, struct error *e)
 	int rc = pilot_render_plan(p->request, &p->render, e);
 	if (!rc && pilot_probe(p->request, &p->render, &probe)) {
 		probed = true;
-		rc = run(p, &probe, &r, e);
+		rc = run_pilot(p, &probe, &r, e);
 		cost = (struct pilot_cost){r.bootstrap_seconds, r.seconds - r.bootstrap_seconds};
 	}
 	if (rc)
@@ -65,7 +65,7 @@ int local_pilot(struct local_pilot *p, struct error *e)
 	pilot_request(p->request, &p->render, &probe, probed ? &cost : NULL, p->seconds, &pilot);
 	pilot.seconds = 0;
 	p->timed = true;
-	rc = run(p, &pilot, &r, e);
+	rc = run_pilot(p, &pilot, &r, e);
 	p->cpu_seconds = r.cpu_seconds;
 	p->wall_seconds = r.seconds;
 	p->bootstrap_cpu = r.bootstrap_cpu_seconds;

@@ -38,7 +38,7 @@ static struct plan_request pilot_of(const struct render_arguments *a)
 }
 
 /* Longer and longer until it is long enough to be measured. */
-static int run(const struct world *w, struct plan_request *r, double *speed, struct error *e)
+static int measure_speed(const struct world *w, struct plan_request *r, double *speed, struct error *e)
 {
 	static const atomic_bool never;
 	for (r->epoch = r->kind == PLAN_CHAINS ? FIRST_EPOCH : 1;; r->epoch *= 8) {
@@ -80,7 +80,7 @@ int speed_measure(const struct render_arguments *a, const char *folder, const ch
 	scene_fini(&scene);
 	if (rc)
 		return rc;
-	rc = run(w, &r, speed, e);
+	rc = measure_speed(w, &r, speed, e);
 	world_free(w);
 	return rc;
 }

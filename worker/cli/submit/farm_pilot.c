@@ -8,7 +8,7 @@
 #include <errno.h>
 #include <stdio.h>
 
-static int run(struct farm_pilot *p, const char *what, const struct plan_request *plan, struct error *e)
+static int run_pilot(struct farm_pilot *p, const char *what, const struct plan_request *plan, struct error *e)
 {
 	char name[160], text[PLAN_TEXT];
 	struct submitted job;
@@ -43,7 +43,7 @@ int farm_pilot(struct farm_pilot *p, struct error *e)
 	bool probed = false;
 	int rc = pilot_render_plan(request, &p->render, e);
 	if (!rc && pilot_probe(request, &p->render, &probe)) {
-		rc = run(p, "probe", &probe, e);
+		rc = run_pilot(p, "probe", &probe, e);
 		const struct forecast_history *looks = &p->end.looks;
 		if (!rc && looks->count) {
 			probed = true;
@@ -53,5 +53,5 @@ int farm_pilot(struct farm_pilot *p, struct error *e)
 	if (rc)
 		return rc;
 	pilot_request(request, &p->render, &probe, probed ? &cost : NULL, p->seconds, &pilot);
-	return run(p, "pilot", &pilot, e);
+	return run_pilot(p, "pilot", &pilot, e);
 }

@@ -122,8 +122,8 @@ static int read_sun(const struct scene_node *n, const vec3 axis[3], vec3 *toward
 	return 0;
 }
 
-static int make(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct parts parts,
-		struct error *e)
+static int bake_environment(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+			    struct parts parts, struct error *e)
 {
 	struct baking b = {.image = {.width = parts.sun ? 2048 : 512, .height = parts.sun ? 1024 : 256, .channels = 3}};
 	double turbidity = node_float(n, "turbidity", 3), scale = node_float(n, "scale", 1);
@@ -162,19 +162,19 @@ static int make(struct emitter *em, const struct scene_node *n, const struct emi
 static int sky_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 		      struct error *e)
 {
-	return make(em, n, build, (struct parts){.sky = true}, e);
+	return bake_environment(em, n, build, (struct parts){.sky = true}, e);
 }
 
 static int sun_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 		      struct error *e)
 {
-	return make(em, n, build, (struct parts){.sun = true}, e);
+	return bake_environment(em, n, build, (struct parts){.sun = true}, e);
 }
 
 static int sunsky_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 			 struct error *e)
 {
-	return make(em, n, build, (struct parts){.sky = true, .sun = true}, e);
+	return bake_environment(em, n, build, (struct parts){.sky = true, .sun = true}, e);
 }
 
 #define NUMBER(name_, min_, max_)                                                         \

@@ -129,7 +129,7 @@ static double residuals(struct walk *m, bool *within)
 }
 
 /* The trial becomes the kept state: Newton's step from there, by the system of s->k. */
-static enum walk_end keep(struct walk *m, bool factored)
+static enum walk_end accept_trial(struct walk *m, bool factored)
 {
 	struct walk_scratch *s = m->s;
 	if (!factored && m->solver->factor_to_solve(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
@@ -189,7 +189,7 @@ static void refresh(struct walk *m, unsigned stale)
 
 /* Of the trial: half vectors alone are cheap, derivatives only pay where the walk goes on or the caller asks for them.
  */
-static double look(struct walk *m, bool *within)
+static double evaluate_trial(struct walk *m, bool *within)
 {
 	for (unsigned j = m->end + 1; j < m->b; j++)
 		m->s->k[j].h = halfvec_of(m->y, j);
@@ -203,21 +203,21 @@ static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, u
 	bool within;
 	refresh(m, stale);
 	double error = residuals(m, &within), step = 1;
-	enum walk_end last = isfinite(error) ? keep(m, !stale) : WALK_SINGULAR;
+	enum walk_end last = isfinite(error) ? accept_trial(m, !stale) : WALK_SINGULAR;
 	if (last != WALK_OK)
 		return last;
 	while (s->iterations < limits->iterations) {
 		s->iterations++;
 		last = trial(m, step);
 		if (last == WALK_OK) {
-			double now = look(m, &within);
+			double now = evaluate_trial(m, &within);
 			if (within ? !back : now < error)
 				constrain(m, m->b, m->end);
 			if (within)
 				return WALK_OK;
 			if (now < error) {
 				error = now;
-				last = keep(m, false);
+				last = accept_trial(m, false);
 				if (last != WALK_OK)
 					return last;
 				step = fmin(1, 2 * step);

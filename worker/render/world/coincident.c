@@ -61,8 +61,8 @@ static bool is_news(const struct world *w, const struct accel_shape *s, const st
 	       (c->same_side && w->parts[c->hidden].bsdf != w->parts[c->by].bsdf);
 }
 
-static void say(struct render_coincident *out, const struct coincide_shapes *c, const struct accel_shape *s,
-		const struct scene_node *const *nodes)
+static void describe_pair(struct render_coincident *out, const struct coincide_shapes *c, const struct accel_shape *s,
+			  const struct scene_node *const *nodes)
 {
 	char hidden[80], by[80], *text = out->text[out->count];
 	if (out->total++ >= RENDER_COINCIDENT_MAX)
@@ -94,7 +94,7 @@ int coincident_find(struct world *w, const struct scene_node *const *nodes, cons
 	const struct coincidence *c = w->coincidence;
 	for (size_t i = 0; c && i < c->shapes_count; i++)
 		if (is_news(w, shapes, &c->shapes[i]))
-			say(&w->coincident, &c->shapes[i], shapes, nodes);
+			describe_pair(&w->coincident, &c->shapes[i], shapes, nodes);
 	w->coincident.incomplete = c && c->incomplete;
 	return rc;
 }

@@ -131,7 +131,8 @@ static void add_emitter(struct census *c, const struct emitter *em, const struct
 	c->shape[em->shape]++;
 }
 
-static struct census take(const struct world *w, const struct effects_source *src, const enum visibility_bounds *shape)
+static struct census take_census(const struct world *w, const struct effects_source *src,
+				 const enum visibility_bounds *shape)
 {
 	struct census c = {.why_hidden = VISIBILITY_YES};
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
@@ -378,7 +379,7 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	struct effects *fx = &w->effects;
 	*fx = (struct effects){.line_count = 0};
 	visibility_bounds_shapes(w, src, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
-	struct census c = take(w, src, shape);
+	struct census c = take_census(w, src, shape);
 	struct report r = {fx, forced};
 	spectral(&r, &c);
 	if (w->settings.aperture_radius > 0)

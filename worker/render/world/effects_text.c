@@ -67,7 +67,7 @@ static int unknown(const char *name, size_t length, struct error *e)
 			 spelling_hint(&s, hint, sizeof hint), list);
 }
 
-static int take(const char *item, size_t length, struct effects_choice *out, struct error *e)
+static int parse_item(const char *item, size_t length, struct effects_choice *out, struct error *e)
 {
 	if (length == 3 && memcmp(item, "all", 3) == 0) {
 		for (int i = 0; i < EFFECTS; i++)
@@ -96,7 +96,7 @@ int effects_parse(const char *text, struct effects_choice *out, struct error *e)
 		return 0;
 	for (const char *at = text;; at++) {
 		size_t n = strcspn(at, ",");
-		int rc = take(at, n, out, e);
+		int rc = parse_item(at, n, out, e);
 		if (rc)
 			return rc;
 		at += n;

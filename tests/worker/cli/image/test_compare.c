@@ -16,7 +16,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-static struct picture make(uint32_t width, uint32_t height, float value)
+static struct picture make_picture(uint32_t width, uint32_t height, float value)
 {
 	struct picture p = {.image = {.width = width,
 				      .height = height,
@@ -59,7 +59,7 @@ static bool near(double a, double b)
 static void figures_are_those_made_by_hand(void **unused)
 {
 	(void)unused;
-	struct picture a = make(2, 2, 1), b = make(2, 2, 1);
+	struct picture a = make_picture(2, 2, 1), b = make_picture(2, 2, 1);
 	for (int k = 0; k < 3; k++)
 		*at(&a, k, 3) = *at(&b, k, 3) = 2 * (float)(k + 1);
 	*at(&a, 0, 0) = 0.5f;
@@ -82,7 +82,7 @@ static void figures_are_those_made_by_hand(void **unused)
 static void the_peak_is_a_percentile(void **unused)
 {
 	(void)unused;
-	struct picture b = make(20, 10, 1);
+	struct picture b = make_picture(20, 10, 1);
 	*at(&b, 1, 17) = 100; /* of 600 values, rank 597 leaves three out */
 	*at(&b, 0, 30) = 90;
 	*at(&b, 2, 31) = 80;
@@ -95,7 +95,7 @@ static void the_peak_is_a_percentile(void **unused)
 static void equal_pictures_are_infinitely_good(void **unused)
 {
 	(void)unused;
-	struct picture a = make(3, 1, 0), b = make(3, 1, 0);
+	struct picture a = make_picture(3, 1, 0), b = make_picture(3, 1, 0);
 	struct compare_result r = result(&a, &b, 0);
 	assert_true(r.rel_mse == 0 && r.rmse == 0 && isinf(r.psnr) && r.psnr > 0);
 	*at(&a, 0, 0) = 1; /* anything is infinitely far from black nothing */
@@ -107,7 +107,7 @@ static void equal_pictures_are_infinitely_good(void **unused)
 static void trimming_leaves_out_the_worst_pixels(void **unused)
 {
 	(void)unused;
-	struct picture a = make(100, 10, 2), b = make(100, 10, 2);
+	struct picture a = make_picture(100, 10, 2), b = make_picture(100, 10, 2);
 	*at(&a, 0, 500) = 1e6f;
 	*at(&a, 2, 7) = 2.5f;
 	*at(&a, 1, 8) = 2.25f;
@@ -132,13 +132,13 @@ static void trimming_leaves_out_the_worst_pixels(void **unused)
 static void what_cannot_be_compared_is_said(void **unused)
 {
 	(void)unused;
-	struct picture a = make(4, 2, 1), b = make(2, 4, 1);
+	struct picture a = make_picture(4, 2, 1), b = make_picture(2, 4, 1);
 	struct compare_result r;
 	struct error e;
 	assert_int_equal(compare(&a, &b, 0, &r, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "4x2"));
 	picture_fini(&b);
-	b = make(4, 2, 1);
+	b = make_picture(4, 2, 1);
 	*at(&b, 1, 6) = NAN;
 	assert_int_equal(compare(&a, &b, 0, &r, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "2,1"));
@@ -149,7 +149,7 @@ static void what_cannot_be_compared_is_said(void **unused)
 static void shrinking_takes_means_of_boxes(void **unused)
 {
 	(void)unused;
-	struct picture p = make(4, 6, 0);
+	struct picture p = make_picture(4, 6, 0);
 	struct error e;
 	for (size_t i = 0; i < 24; i++)
 		*at(&p, 1, i) = (float)i;
@@ -195,7 +195,7 @@ enum { ATTRIBUTES = sizeof attributes / sizeof *attributes };
 static bool same_with(const struct exr_attribute *changed, size_t count, char *why)
 {
 	struct exr_attribute copy[ATTRIBUTES];
-	struct picture a = make(5, 3, 1), b = make(5, 3, 1);
+	struct picture a = make_picture(5, 3, 1), b = make_picture(5, 3, 1);
 	memcpy(copy, attributes, sizeof copy);
 	a.image.attributes = copy;
 	a.image.attribute_count = ATTRIBUTES;
@@ -240,7 +240,7 @@ static void exact_sees_one_bit(void **unused)
 {
 	(void)unused;
 	char why[256];
-	struct picture a = make(5, 3, 1), b = make(5, 3, 1);
+	struct picture a = make_picture(5, 3, 1), b = make_picture(5, 3, 1);
 	assert_true(compare_exact(&a.image, &b.image, why, sizeof why));
 	*at(&b, 2, 8) = nextafterf(1, 2);
 	assert_false(compare_exact(&a.image, &b.image, why, sizeof why));
@@ -265,7 +265,7 @@ static void a_picture_needs_red_green_and_blue(void **unused)
 {
 	(void)unused;
 	char path[] = "/tmp/hslt-test-XXXXXX";
-	struct picture a = make(2, 2, 1), p;
+	struct picture a = make_picture(2, 2, 1), p;
 	unsigned char *bytes;
 	size_t size;
 	struct error e;
@@ -290,7 +290,7 @@ static void a_heatmap_is_a_png(void **unused)
 {
 	(void)unused;
 	char path[] = "/tmp/hslt-test-XXXXXX";
-	struct picture a = make(4, 1, 1), b = make(4, 1, 1);
+	struct picture a = make_picture(4, 1, 1), b = make_picture(4, 1, 1);
 	unsigned char rgb[12], back[12];
 	struct error e;
 	for (int k = 0; k < 3; k++) {

@@ -152,7 +152,7 @@ static double profile(double x, double y)
 	return 0.2 + pow(x, 3) + 2 * exp(-60 * ((x - 0.25) * (x - 0.25) + (y - 0.7) * (y - 0.7)));
 }
 
-static void put(struct path_sample *out, double x, double y, double value)
+static void add_splat(struct path_sample *out, double x, double y, double value)
 {
 	struct splat *s = &out->splats[out->count++];
 	*s = (struct splat){x * SIDE, y * SIDE, {value / 2, value / 3, value / 6}};
@@ -166,7 +166,7 @@ static void evaluate_plain(struct path_context *c, struct sampler *s, struct pat
 	out->intensity = 0;
 	out->classes = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
-	put(out, u[0], u[1], profile(u[0], u[1]));
+	add_splat(out, u[0], u[1], profile(u[0], u[1]));
 }
 
 static void evaluate_lengths(struct path_context *c, struct sampler *s, struct path_sample *out)
@@ -184,7 +184,7 @@ static void evaluate_lengths(struct path_context *c, struct sampler *s, struct p
 		/* On average 1. */
 		value *= 0.5 + u[3];
 	}
-	put(out, x, y, value);
+	add_splat(out, x, y, value);
 }
 
 static void evaluate_holes(struct path_context *c, struct sampler *s, struct path_sample *out)
@@ -197,9 +197,9 @@ static void evaluate_holes(struct path_context *c, struct sampler *s, struct pat
 	double x = u[0], y = u[1], w = u[5];
 	if (w < 0.4)
 		return;
-	put(out, x, y, profile(x, y) * (w < 0.7 ? 1 / 0.3 : 0));
+	add_splat(out, x, y, profile(x, y) * (w < 0.7 ? 1 / 0.3 : 0));
 	const double *l = s->block(s, SIDE_LIGHT, 0);
-	put(out, l[0], l[1], profile(l[0], l[1]) / 0.6);
+	add_splat(out, l[0], l[1], profile(l[0], l[1]) / 0.6);
 }
 
 /* Groups of chains; each its own b from its large steps, as a job's groups have. Mean of each cell's sum over the exact
@@ -291,8 +291,8 @@ static void evaluate_extremes(struct path_context *c, struct sampler *s, struct 
 	out->intensity = 0;
 	out->classes = 1;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
-	put(out, u[0], u[1], 6 * magnitudes[u[5] < 0.5]);
-	put(out, u[0], u[1], 0);
+	add_splat(out, u[0], u[1], 6 * magnitudes[u[5] < 0.5]);
+	add_splat(out, u[0], u[1], 0);
 	out->of_class[0] = out->intensity;
 }
 

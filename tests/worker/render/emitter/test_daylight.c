@@ -96,7 +96,7 @@ static void test_how_bright_it_is(void **state)
 	assert_true(rgb[0] > 3 * rgb[2]);
 }
 
-static int make(struct arena *a, const char *text, bool dialect_3, struct emitter *em, struct error *e)
+static int make_emitter(struct arena *a, const char *text, bool dialect_3, struct emitter *em, struct error *e)
 {
 	struct scene_node *n = node_make(a, PLUGIN_EMITTER, text);
 	const struct emitter_build build = {.arena = a, .dialect_3 = dialect_3, .scale = 1};
@@ -117,7 +117,7 @@ static void test_picture(void **state)
 		struct arena a = {0};
 		struct emitter em;
 		struct error e = {""};
-		assert_int_equal(make(&a, texts[i], false, &em, &e), 0);
+		assert_int_equal(make_emitter(&a, texts[i], false, &em, &e), 0);
 		double sum = 0;
 		vec3 mean = {0, 0, 0};
 		enum { N = 200 };
@@ -153,7 +153,7 @@ static void test_refused(void **state)
 		struct arena a = {0};
 		struct emitter em;
 		struct error e = {""};
-		if (make(&a, bad[i].text, true, &em, &e) >= 0 || !strstr(e.text, bad[i].word))
+		if (make_emitter(&a, bad[i].text, true, &em, &e) >= 0 || !strstr(e.text, bad[i].word))
 			fail_msg("%s: %s", bad[i].text, e.text);
 		arena_fini(&a);
 	}

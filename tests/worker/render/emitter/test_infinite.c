@@ -80,7 +80,7 @@ static int try(struct fixture *f, const char *text, const mat4 *to_world, struct
 	return emitter_create(em, n, &build, e);
 }
 
-static struct emitter make(struct fixture *f, const char *text, const mat4 *to_world)
+static struct emitter make_emitter(struct fixture *f, const char *text, const mat4 *to_world)
 {
 	struct emitter em;
 	struct error e;
@@ -155,13 +155,13 @@ static double chi_square(const struct emitter *em, double shift, uint64_t seed)
 static void test_samples_follow_the_density(void **state)
 {
 	for (int k = 0; k < CASES; k++) {
-		struct emitter em = make(*state, cases[k], NULL);
+		struct emitter em = make_emitter(*state, cases[k], NULL);
 		assert_true(em.infinite && em.power > 0 && isfinite(em.power));
 		double p = chi_square(&em, 0, stats_seed(cases[k]));
 		print_message("%s: p = %.2e\n", cases[k], p);
 		assert_true(p > LEVEL);
 	}
-	struct emitter em = make(*state, cases[2], NULL);
+	struct emitter em = make_emitter(*state, cases[2], NULL);
 	assert_true(chi_square(&em, 1, stats_seed(__func__)) < LEVEL);
 }
 
@@ -170,7 +170,7 @@ static void test_radiance_over_density(void **state)
 {
 	enum { GROUPS = 16, STEPS = 400 };
 	for (int k = 0; k < CASES; k++) {
-		struct emitter em = make(*state, cases[k], NULL);
+		struct emitter em = make_emitter(*state, cases[k], NULL);
 		double sum = 0, means[GROUPS] = {0};
 		for (int i = 0; i < STEPS * 2 * STEPS; i++) {
 			double v = (i / (2 * STEPS) + 0.5) / STEPS, u = (i % (2 * STEPS) + 0.5) / (2 * STEPS);
@@ -194,7 +194,7 @@ static void test_radiance_over_density(void **state)
 
 static void test_orientation(void **state)
 {
-	struct emitter em = make(*state, "envmap filename=p1 scale=3", NULL);
+	struct emitter em = make_emitter(*state, "envmap filename=p1 scale=3", NULL);
 	/* The pixel (2, 3) of 8 x 6. */
 	vec3 d = direction(2.5 / 8, 3.5 / 6);
 	assert_true(d.x > 0 && d.y < 0 && d.z > 0);
@@ -205,7 +205,7 @@ static void test_orientation(void **state)
 
 	/* A quarter turn about y takes +z to +x; a scale changes nothing; the density turns along. */
 	const mat4 turn = {{{0, 0, 2, 0}, {0, 2, 0, 0}, {-2, 0, 0, 0}, {0, 0, 0, 1}}};
-	struct emitter turned = make(*state, "envmap filename=p1 scale=3", &turn);
+	struct emitter turned = make_emitter(*state, "envmap filename=p1 scale=3", &turn);
 	vec3 e = {d.z, d.y, -d.x};
 	assert_true(fabs(radiance_at(&turned, e, &grey).v[0] - 6) < 1e-9);
 	assert_true(fabs(pdf_at(&turned, e) / pdf_at(&em, d) - 1) < 1e-9);
@@ -218,7 +218,7 @@ static void test_orientation(void **state)
 static void test_poles_and_ends(void **state)
 {
 	for (int k = 0; k < CASES; k++) {
-		struct emitter em = make(*state, cases[k], NULL);
+		struct emitter em = make_emitter(*state, cases[k], NULL);
 		const vec3 poles[] = {{0, 1, 0}, {0, -1, 0}, {0, 0, -1}, {-0.0, 0, -1}, {1e-300, 1, 0}};
 		for (int i = 0; i < 5; i++) {
 			assert_true(isfinite(pdf_at(&em, poles[i])));
@@ -236,7 +236,7 @@ static void test_poles_and_ends(void **state)
 
 static void test_black_and_refusals(void **state)
 {
-	struct emitter em = make(*state, "envmap filename=p4", NULL);
+	struct emitter em = make_emitter(*state, "envmap filename=p4", NULL);
 	struct emitter_point x;
 	struct error e = {{0}};
 	double pdf;

@@ -176,7 +176,7 @@ static void place_end(struct hand *h, unsigned j, enum end kind, vec3 p, vec3 di
 	}
 }
 
-static bool make(const struct corner *c, struct hand *h, struct dice *d)
+static bool make_chain(const struct corner *c, struct hand *h, struct dice *d)
 {
 	double eta = c->eta[0] == MATCHED ? MATCHED : dice_between(d, c->eta[0], fmax(c->eta[0], c->eta[1]));
 	vec3 n = dice_direction(d), i, o, p = vec3_scale(0.1, dice_direction(d));
@@ -286,7 +286,7 @@ static void test_corners(void **state)
 		struct worst w = {0};
 		static struct hand h;
 		for (size_t made = 0; made < dice_count(60);) {
-			if (!make(&corners[i], &h, &d))
+			if (!make_chain(&corners[i], &h, &d))
 				continue;
 			made++;
 			compare(&h, &d, &w);

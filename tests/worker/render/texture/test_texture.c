@@ -55,7 +55,7 @@ static int try(struct fixture *f, const char *text, enum color_role role, struct
 	return texture_from_node(t, owner, "reflectance", 0.5, role, &f->build, e);
 }
 
-static struct texture make(struct fixture *f, const char *text, enum color_role role)
+static struct texture make_texture(struct fixture *f, const char *text, enum color_role role)
 {
 	struct texture t;
 	struct error e;
@@ -79,7 +79,7 @@ static void assert_value(const struct texture *t, double u, double v, double exp
 
 static void test_orientation_and_pixel_centres(void **state)
 {
-	struct texture t = make(*state, "bitmap filename=p0", COLOR_REFLECTANCE);
+	struct texture t = make_texture(*state, "bitmap filename=p0", COLOR_REFLECTANCE);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
 	assert_false(texture_is_constant(&t));
 	assert_true(texture_max(&t) == 1);
@@ -99,22 +99,22 @@ static void test_orientation_and_pixel_centres(void **state)
 
 static void test_wrapping(void **state)
 {
-	struct texture clamp = make(*state, "bitmap filename=p0 wrap_mode=clamp", COLOR_REFLECTANCE);
+	struct texture clamp = make_texture(*state, "bitmap filename=p0 wrap_mode=clamp", COLOR_REFLECTANCE);
 	assert_value(&clamp, -3, 0.25, 0);
 	assert_value(&clamp, 9, 9, 0.125);
 	assert_value(&clamp, 0, 0, 0);
-	struct texture mirror = make(*state, "bitmap filename=p0 wrap_mode=mirror", COLOR_REFLECTANCE);
+	struct texture mirror = make_texture(*state, "bitmap filename=p0 wrap_mode=mirror", COLOR_REFLECTANCE);
 	assert_value(&mirror, -1.5 / 3, 0.25, 0.25);
 	assert_value(&mirror, 1 + 0.5 / 3, 0.25, 0.5);
 	assert_value(&mirror, 1 + 1.0 / 3, 0.25, 0.375);
 	assert_value(&mirror, 2 + 0.5 / 3, 0.25, 0);
-	struct texture mixed = make(*state, "bitmap filename=p0 wrap_mode_u=clamp", COLOR_REFLECTANCE);
+	struct texture mixed = make_texture(*state, "bitmap filename=p0 wrap_mode_u=clamp", COLOR_REFLECTANCE);
 	assert_value(&mixed, -1, 1.25, 0);
 }
 
 static void test_nearest(void **state)
 {
-	struct texture t = make(*state, "bitmap filename=p0 filter_type=nearest", COLOR_REFLECTANCE);
+	struct texture t = make_texture(*state, "bitmap filename=p0 filter_type=nearest", COLOR_REFLECTANCE);
 	assert_value(&t, 0.01, 0.01, 0);
 	assert_value(&t, 0.34, 0.49, 0.25);
 	assert_value(&t, 0.99, 0.99, 0.125);
@@ -124,9 +124,9 @@ static void test_nearest(void **state)
 static void test_uv_maps(void **state)
 {
 	struct fixture *f = *state;
-	struct texture t = make(f, "bitmap filename=p0 uvscale=2 voffset=0.5", COLOR_REFLECTANCE);
+	struct texture t = make_texture(f, "bitmap filename=p0 uvscale=2 voffset=0.5", COLOR_REFLECTANCE);
 	assert_value(&t, 0.75 / 3, 0.125, 1);
-	t = make(f, "bitmap filename=p0 uscale=3 uoffset=0.5", COLOR_REFLECTANCE);
+	t = make_texture(f, "bitmap filename=p0 uscale=3 uoffset=0.5", COLOR_REFLECTANCE);
 	assert_value(&t, 0, 0.25, 0.25);
 	struct scene_node *owner = node_make(&f->arena, PLUGIN_BSDF, "owner");
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0");
@@ -140,7 +140,7 @@ static void test_uv_maps(void **state)
 
 static void test_colours(void **state)
 {
-	struct texture t = make(*state, "bitmap filename=p1", COLOR_REFLECTANCE);
+	struct texture t = make_texture(*state, "bitmap filename=p1", COLOR_REFLECTANCE);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
 	const double red[3] = {0.5, 0.125, 0.0625};
 	spectrum s = look_up(&t, 0.25, 0.5, &colour), expected = color_eval_rgb_reflectance(red, &colour);
@@ -150,9 +150,9 @@ static void test_colours(void **state)
 	}
 	assert_true(texture_max(&t) <= 1);
 
-	t = make(*state, "bitmap filename=p2", COLOR_REFLECTANCE);
+	t = make_texture(*state, "bitmap filename=p2", COLOR_REFLECTANCE);
 	assert_value(&t, 0.5, 0.5, 1);
-	t = make(*state, "bitmap filename=p2", COLOR_ILLUMINANT);
+	t = make_texture(*state, "bitmap filename=p2", COLOR_ILLUMINANT);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_D65);
 	s = look_up(&t, 0.5, 0.5, &colour);
 	assert_true(fabs(s.v[1] - 4 * color_d65(550)) < 1e-12);
@@ -162,17 +162,17 @@ static void test_colours(void **state)
 
 static void test_checkerboard(void **state)
 {
-	struct texture t = make(*state, "checkerboard", COLOR_REFLECTANCE);
+	struct texture t = make_texture(*state, "checkerboard", COLOR_REFLECTANCE);
 	assert_value(&t, 0.25, 0.25, 0.4);
 	assert_value(&t, 0.75, 0.25, 0.2);
 	assert_value(&t, 0.25, 0.75, 0.2);
 	assert_value(&t, -0.25, -0.25, 0.4);
 	assert_true(texture_max(&t) == 0.4);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
-	t = make(*state, "checkerboard color0=1 color1=0 uscale=4", COLOR_REFLECTANCE);
+	t = make_texture(*state, "checkerboard color0=1 color1=0 uscale=4", COLOR_REFLECTANCE);
 	assert_value(&t, 0.25 / 4, 0.25, 1);
 	assert_value(&t, 0.75 / 4, 0.25, 0);
-	t = make(*state, "checkerboard color0=rgb(1,0.5,0.2)", COLOR_REFLECTANCE);
+	t = make_texture(*state, "checkerboard color0=rgb(1,0.5,0.2)", COLOR_REFLECTANCE);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
 }
 
@@ -240,12 +240,12 @@ static void test_derivatives(void **state)
 				     "bitmap filename=p1 raw=true filter_type=nearest",
 				     "checkerboard color0=1 color1=-3"};
 	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
-		struct texture t = make(f, texts[k], COLOR_RELIEF);
+		struct texture t = make_texture(f, texts[k], COLOR_RELIEF);
 		/* Nowhere near a line between pixel centres or squares. */
 		for (int i = 0; i < 60; i++)
 			assert_jet(&t, -2.03 + 0.0711 * i, 1.07 + 0.0577 * i, 1e-7);
 	}
-	struct texture t = make(f, "bitmap filename=p0 raw=true wrap_mode=mirror", COLOR_RELIEF);
+	struct texture t = make_texture(f, "bitmap filename=p0 raw=true wrap_mode=mirror", COLOR_RELIEF);
 	struct texture_jet j;
 	texture_jet(&t, 1.0 / 3, 0.25, &j);
 	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] - 0.75) < 1e-12 && fabs(j.dv[0] - 1.5) < 1e-12);
@@ -318,12 +318,12 @@ static void test_tint(void **state)
 
 static void test_channel_and_threshold(void **state)
 {
-	struct texture t = make(*state, "bitmap filename=p1 channel=g", COLOR_REFLECTANCE);
+	struct texture t = make_texture(*state, "bitmap filename=p1 channel=g", COLOR_REFLECTANCE);
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
 	assert_value(&t, 0.25, 0.5, 0.125);
-	t = make(*state, "bitmap filename=p1 channel=b", COLOR_REFLECTANCE);
+	t = make_texture(*state, "bitmap filename=p1 channel=b", COLOR_REFLECTANCE);
 	assert_value(&t, 0.25, 0.5, 0.0625);
-	t = make(*state, "bitmap filename=p0 threshold=0.5 filter_type=nearest", COLOR_REFLECTANCE);
+	t = make_texture(*state, "bitmap filename=p0 threshold=0.5 filter_type=nearest", COLOR_REFLECTANCE);
 	assert_value(&t, 1.5 / 3, 0.25, 0);
 	assert_value(&t, 2.5 / 3, 0.25, 1); /* 0.5 itself */
 	assert_value(&t, 0.5 / 3, 0.75, 1);
