@@ -44,7 +44,7 @@
 	X(BATCH_REPEATED, "batch_repeated", INFO)          \
 	X(BATCH_NOTED, "batch_noted", DEBUG)               \
 	X(WORKER_WRONG, "worker_wrong", WARN)              \
-	X(WORKER_ASIDE, "worker_aside", ERROR)             \
+	X(WORKER_QUARANTINED, "worker_quarantined", ERROR) \
 	X(WORKER_FORGIVEN, "worker_forgiven", INFO)        \
 	X(BATCH_REFUSED, "batch_refused", WARN)            \
 	X(BLOB_STORED, "blob_stored", DEBUG)               \

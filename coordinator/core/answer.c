@@ -48,8 +48,8 @@ static enum verdict judge_result(const struct peer *p, const struct job *j, cons
 	*why = !p ? "unknown worker" : !j ? "no such job" : !job_is_live(j) ? "the job is over" : "";
 	if (**why)
 		return REFUSE;
-	if (p->who->aside) {
-		*why = "the worker is set aside: its results do not count";
+	if (p->who->quarantined) {
+		*why = "the worker is quarantined: its results do not count";
 		return REFUSE;
 	}
 	const struct slot *s = slot_of(j, k);
@@ -339,6 +339,6 @@ enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const stru
 	const struct lease *l = held(f, &ev);
 	if (l && !l->delivered)
 		return DELIVERY_AWAITED;
-	bool open = p && !p->who->aside && j && job_is_live(j) && j->ending == END_NONE && job_takes(j, p->class);
+	bool open = p && !p->who->quarantined && j && job_is_live(j) && j->ending == END_NONE && job_takes(j, p->class);
 	return open && is_next(j, slot_of(j, k), k) ? DELIVERY_OPEN : DELIVERY_USELESS;
 }

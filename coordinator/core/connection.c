@@ -61,8 +61,8 @@ struct peer *connection_join(struct farm *f, const struct event_join *e, const c
 	text_copy(p->name, sizeof p->name, e->name);
 	p->threads = e->threads;
 	p->joined = p->heard = f->now;
-	p->state = who->aside ? PEER_ASIDE : PEER_ACTIVE;
-	if (who->aside)
+	p->state = who->quarantined ? PEER_QUARANTINED : PEER_ACTIVE;
+	if (who->quarantined)
 		memcpy(p->text, who->text, sizeof p->text);
 	p->class->active += p->state == PEER_ACTIVE;
 	list_init(&p->waiting);

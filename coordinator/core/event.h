@@ -34,9 +34,8 @@ enum event_kind {
 	EVENT_HOLD,	/* tag, job, hold, text: no more of its leases go out; without a text this hold is over */
 	EVENT_PRIORITY, /* tag, job, priority: from the next lease on */
 	EVENT_EXTEND,	/* tag, job, plan: its own, but for the bounds; not fewer rounds */
-	EVENT_ASIDE, /* join (but for peer, fingerprint, threads), text: a worker that was set aside in an earlier run
-		      */
-	EVENT_JOB_BROKEN, /* job, text: the caller cannot go on with it (a sum left the grid, the disk is full) */
+	EVENT_QUARANTINED, /* join (but for peer, fingerprint, threads), text: a worker quarantined in an earlier run */
+	EVENT_JOB_BROKEN,  /* job, text: the caller cannot go on with it (a sum left the grid, the disk is full) */
 };
 
 /* A job may be held for each of these at once; its leases go out when it is held for none. */

@@ -37,7 +37,7 @@ uint32_t failure_quorum_certificates(const struct farm *f)
 {
 	struct failure_quorum known = {.count = 0};
 	for (uint32_t i = 0; i < f->known_count && certificates(&known) < FAILURE_QUORUM_FATAL; i++)
-		if (!f->known[i]->aside)
+		if (!f->known[i]->quarantined)
 			add(&known, f->known[i]);
 	return certificates(&known);
 }

@@ -85,7 +85,7 @@ static void joined(struct farm *f, const struct event *ev)
 	a->text = refused;
 }
 
-static void aside(struct farm *f, const struct event *ev)
+static void add_quarantined(struct farm *f, const struct event *ev)
 {
 	const struct event_join join = complete(&ev->join);
 	worker_registry_restore_quarantined(f, &join, ev->text);
@@ -141,7 +141,7 @@ static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_HOLD] = orders_hold,
 	[EVENT_PRIORITY] = orders_priority,
 	[EVENT_EXTEND] = orders_extend,
-	[EVENT_ASIDE] = aside,
+	[EVENT_QUARANTINED] = add_quarantined,
 	[EVENT_JOB_BROKEN] = broken,
 };
 

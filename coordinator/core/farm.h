@@ -37,8 +37,8 @@
  *  - Of a job that is verified a share of the leases is computed by two workers, of two identities (worker_registry.h)
  * and one fingerprint. The first answer is noted; one that equals another worker's is merged; where two differ a third
  *    decides, and a fourth; then the job fails. Who said otherwise than two that agree has given a wrong result.
- *  - A worker is set aside for good, by identity, after three faults in a row or three wrong results. Nothing that it
- * sends counts any more, and no failure of a job is laid to its wrong results.
+ *  - A worker is quarantined permanently, by identity, after three faults in a row or three wrong results. Nothing that
+ * it sends counts any more, and no failure of a job is laid to its wrong results.
  *  - A worker that calls again, in the same run or a later one of the same home, takes the place of its old
  * connection.
  *  - A job of an earlier run goes on where its merged leases say that it was; leases that were out then count when

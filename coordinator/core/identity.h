@@ -32,7 +32,7 @@ struct identity {
 	uint32_t uses;	   /* connections, and answers that wait for a second one */
 	uint32_t faults_in_row, wrong;
 	uint32_t window; /* leases that it may hold: see peer_succeeded */
-	bool aside;
+	bool quarantined;
 	double seen;
 	struct avoid avoid[IDENTITY_AVOIDED];
 	char text[256]; /* its last fault */

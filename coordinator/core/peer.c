@@ -26,7 +26,7 @@ void peer_heard(struct farm *f, struct peer *p)
 	p->heard = f->now;
 	p->who->calls += p->state == PEER_SILENT;
 	if (p->state == PEER_SILENT)
-		peer_set_state(f, p, p->who->aside ? PEER_ASIDE : PEER_ACTIVE);
+		peer_set_state(f, p, p->who->quarantined ? PEER_QUARANTINED : PEER_ACTIVE);
 }
 
 bool peer_has_wish(const struct peer *p)

@@ -11,17 +11,17 @@
 
 void quarantine_worker(struct farm *f, struct identity *who)
 {
-	if (who->aside)
+	if (who->quarantined)
 		return;
 	worker_registry_set_aside(f, who);
-	struct action *a = update_add(f, ACTION_ASIDE);
+	struct action *a = update_add(f, ACTION_QUARANTINE);
 	a->who = who->id;
 	a->text = who->text;
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		struct peer *p = f->peers[i];
 		if (p->who != who)
 			continue;
-		peer_set_state(f, p, PEER_ASIDE);
+		peer_set_state(f, p, PEER_QUARANTINED);
 		connection_drop_leases(f, p, true);
 	}
 	verify_forget_worker(f, who);

@@ -307,7 +307,7 @@ uint64_t farm_next_quarantined(const struct farm *f, uint64_t after)
 	uint64_t next = 0;
 	for (uint32_t i = 0; i < f->known_count; i++) {
 		const struct identity *k = f->known[i];
-		if (k->aside && k->id > after && (next == 0 || k->id < next))
+		if (k->quarantined && k->id > after && (next == 0 || k->id < next))
 			next = k->id;
 	}
 	return next;
@@ -326,7 +326,7 @@ bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s)
 					    .home = k->home,
 					    .text = k->text,
 					    .wrong = k->wrong,
-					    .aside = k->aside};
+					    .quarantined = k->quarantined};
 		return true;
 	}
 	return false;

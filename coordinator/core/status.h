@@ -75,11 +75,11 @@ struct worker_status {
 	uint64_t who, restarts;
 	const char *certificate, *name, *home, *text;
 	uint32_t wrong; /* results */
-	bool aside;
+	bool quarantined;
 };
 /* Who made the chain states that go with this lease, for the log; "?": it is not the next one of its group and part. */
 const char *farm_maker(const struct farm *f, const struct lease_key *k);
-/* The smallest id above `after` (start with 0) of those that are set aside; 0: no more. */
+/* The smallest id above `after` (start with 0) of those that are quarantined; 0: no more. */
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after);
 bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s);	    /* false: unknown */
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s); /* false: unknown */

@@ -19,7 +19,7 @@ static inline bool job_state_is_end(enum job_state s)
 	return s == JOB_DONE || s == JOB_FAILED || s == JOB_CANCELLED;
 }
 
-enum peer_state { PEER_ACTIVE, PEER_SILENT, PEER_ASIDE };
+enum peer_state { PEER_ACTIVE, PEER_SILENT, PEER_QUARANTINED };
 
 /* Why a job ended. */
 enum job_end {
@@ -64,7 +64,7 @@ enum action_kind {
 	ACTION_TAKE_BACK,
 	ACTION_CHAINS_ANEW, /* job, key, text: the chains of this lease begin from their seeds (doubt.h) */
 	ACTION_WRONG,	    /* who, job, key, text: a worker's answer, noted before, is not what two others say */
-	ACTION_ASIDE,	    /* who, text: a worker is set aside for good */
+	ACTION_QUARANTINE,  /* who, text: a worker is quarantined permanently */
 	ACTION_CLOSE_PEER,  /* peer, text: hang up; the core has forgotten it already */
 };
 
@@ -78,8 +78,8 @@ struct action {
 	bool verified; /* MERGE: two workers agree */
 	bool anew;     /* SEND_LEASE: with seeds whatever its epoch */
 	uint64_t tag, peer;
-	uint64_t who; /* of MERGE, TAKE_BACK (0: not known), WRONG, ASIDE: the worker, whatever its connection (struct
-			 peer_status) */
+	uint64_t who; /* of MERGE, TAKE_BACK (0: not known), WRONG, QUARANTINE: the worker, whatever its connection
+			 (struct peer_status) */
 	uint64_t job; /* also of actions with a key */
 	uint64_t rounds;
 	struct lease_key key;

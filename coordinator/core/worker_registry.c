@@ -23,11 +23,11 @@ struct identity *worker_registry_find(const struct farm *f, const struct event_j
 	return named;
 }
 
-/* Whom to forget for one with this certificate: its own names first, whoever was set aside last. */
+/* Whom to forget for one with this certificate: its own names first, whoever was quarantined last. */
 static bool goes_before(const struct identity *a, const struct identity *b, const char *certificate)
 {
 	bool a_own = strcmp(a->certificate, certificate) == 0, b_own = strcmp(b->certificate, certificate) == 0;
-	return a->aside != b->aside ? b->aside : a_own != b_own ? a_own : a->seen < b->seen;
+	return a->quarantined != b->quarantined ? b->quarantined : a_own != b_own ? a_own : a->seen < b->seen;
 }
 
 /* NULL: all of them are needed. */
@@ -68,10 +68,10 @@ struct identity *worker_registry_use(struct farm *f, const struct event_join *e,
 		k->certificate_id = certificate_id(f, e->certificate, k->id);
 		text_copy(k->certificate, sizeof k->certificate, e->certificate);
 	}
-	/* One that is set aside stays known by what it was. */
-	if (!k->aside || strcmp(k->home, e->home) == 0)
+	/* One that is quarantined stays known by what it was. */
+	if (!k->quarantined || strcmp(k->home, e->home) == 0)
 		k->restarts = e->restarts;
-	if (!k->aside) {
+	if (!k->quarantined) {
 		text_copy(k->name, sizeof k->name, e->name);
 		text_copy(k->home, sizeof k->home, e->home);
 	}
@@ -94,7 +94,7 @@ void worker_registry_free(struct farm *f)
 	mem_free(f->known);
 }
 
-/* Names cost nothing: of one certificate so many are remembered as set aside, and the one that has been away longest
+/* Names cost nothing: of one certificate so many are remembered as quarantined, and the one that has been away longest
  * makes room. */
 void worker_registry_set_aside(struct farm *f, struct identity *who)
 {
@@ -102,15 +102,15 @@ void worker_registry_set_aside(struct farm *f, struct identity *who)
 	uint32_t count = 0;
 	for (uint32_t i = 0; i < f->known_count; i++) {
 		struct identity *k = f->known[i];
-		if (!k->aside || k == who || k->certificate_id != who->certificate_id)
+		if (!k->quarantined || k == who || k->certificate_id != who->certificate_id)
 			continue;
 		count++;
 		if (k->uses == 0 && (!oldest || k->seen < oldest->seen))
 			oldest = k;
 	}
 	if (count >= IDENTITY_QUARANTINED && oldest)
-		oldest->aside = false;
-	who->aside = true;
+		oldest->quarantined = false;
+	who->quarantined = true;
 }
 
 void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text)

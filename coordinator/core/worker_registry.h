@@ -4,7 +4,7 @@
  * again. A worker is known by the name in its certificate ("" without TLS) together with the name that it gives itself
  * or its home, the folder that counts its starts: who has one of the two in common with somebody is that somebody.
  * Bounded: those who have been away longest are forgotten first, of the newcomer's own certificate before others, and
- * those that are set aside last; of these IDENTITY_QUARANTINED a certificate, so that one that makes up names pushes
+ * those that are quarantined last; of these IDENTITY_QUARANTINED a certificate, so that one that makes up names pushes
  * out none but its own. Allocates when a worker joins.
  */
 #ifndef COORDINATOR_CORE_WORKER_REGISTRY_H

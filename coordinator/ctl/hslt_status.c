@@ -276,7 +276,7 @@ static void print_quarantined(const json_t *snapshot)
 	size_t i;
 	const json_t *worker;
 	json_array_foreach(json_object_get(snapshot, "aside"), i, worker) printf(
-		"set aside: %s%s%s: %s\n", text_of(worker, "name"), *text_of(worker, "certificate") ? " of " : "",
+		"quarantined: %s%s%s: %s\n", text_of(worker, "name"), *text_of(worker, "certificate") ? " of " : "",
 		text_of(worker, "certificate"), text_of(worker, "why"));
 }
 

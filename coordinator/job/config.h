@@ -27,9 +27,9 @@ struct server_config {
 	unsigned max_connections; /* 0: by the file descriptors that there are */
 	unsigned max_fetches;	  /* files that clients have begun to fetch, at a time */
 	double verify;		  /* least share of the leases of each job that two workers compute */
-	unsigned max_faults;	  /* of a worker, before it is set aside */
+	unsigned max_faults;	  /* of a worker, before it is quarantined */
 	bool accept_loss;	  /* go on without the jobs that the spool has lost */
-	const char *forgive;	  /* the name of a worker that was set aside and may come back; NULL: none */
+	const char *forgive;	  /* the name of a worker that was quarantined and may come back; NULL: none */
 	uint64_t film_bytes; /* of running jobs' films in memory; those of further jobs are mapped files of the spool */
 	uint64_t waiting_bytes;	 /* of results that wait for films that are being read */
 	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for new jobs' epochs;

@@ -131,7 +131,7 @@ struct live_job {
 	uint64_t last_workers[64];
 	struct live_job_credit *credits;
 	size_t credit_count;
-	char doubts[512]; /* about those of workers that are set aside by now; "": none */
+	char doubts[512]; /* about those of workers that are quarantined by now; "": none */
 	struct late_result *late;
 	size_t late_count, late_capacity;
 	struct waiting_batch *waiting, **waiting_last;

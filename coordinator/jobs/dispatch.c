@@ -258,7 +258,7 @@ void dispatch_update(struct jobs *s, const struct update *u, const struct incomi
 		case ACTION_WRONG:
 			trust_wrong(s, a);
 			break;
-		case ACTION_ASIDE:
+		case ACTION_QUARANTINE:
 			trust_quarantined(s, a);
 			break;
 		case ACTION_CLOSE_PEER:

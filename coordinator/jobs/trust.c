@@ -18,9 +18,9 @@ static int add_worker(json_t *list, const struct worker_status *w, struct error 
 	json_t *o = json_pack_ex(&fault, 0, "{s:s s:s s:s s:I s:s}", "certificate", w->certificate, "name", w->name,
 				 "home", w->home, "restarts", (json_int_t)w->restarts, "why", w->text);
 	if (!o)
-		return error_set(e, EINVAL, "%s, who is set aside, cannot be written down: %s", w->name, fault.text);
+		return error_set(e, EINVAL, "%s, who is quarantined, cannot be written down: %s", w->name, fault.text);
 	return json_array_append_new(list, o)
-		       ? error_set(e, ENOMEM, "no memory for the list of those that are set aside")
+		       ? error_set(e, ENOMEM, "no memory for the list of those that are quarantined")
 		       : 0;
 }
 
@@ -35,7 +35,7 @@ static void write_quarantined(struct jobs *s)
 	char *text = json_dumps(o, JSON_INDENT(1));
 	json_decref(o);
 	if (!rc && !text)
-		rc = error_set(&e, ENOMEM, "no memory for the list of those that are set aside");
+		rc = error_set(&e, ENOMEM, "no memory for the list of those that are quarantined");
 	if (!rc)
 		rc = spool_write_own(s->spool, file, text, strlen(text), &e);
 	if (rc)
@@ -51,7 +51,7 @@ static const char *text_of(const json_t *o, const char *key)
 
 static void tell_core(struct jobs *s, const json_t *w)
 {
-	struct event ev = {.kind = EVENT_ASIDE,
+	struct event ev = {.kind = EVENT_QUARANTINED,
 			   .text = text_of(w, "why"),
 			   .join = {.certificate = text_of(w, "certificate"),
 				    .name = text_of(w, "name"),
@@ -62,7 +62,7 @@ static void tell_core(struct jobs *s, const json_t *w)
 		log_event(LOG_WORKER_FORGIVEN, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
 		return;
 	}
-	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
+	log_event(LOG_WORKER_QUARANTINED, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
 	jobs_step(s, &ev);
 }
 
@@ -73,9 +73,10 @@ static int put_by(struct jobs *s, struct error *e)
 	spool_path(s->spool, file, from);
 	spool_path(s->spool, "aside.damaged", to);
 	spool_path(s->spool, "", folder);
-	log_event(LOG_SPOOL_FAULT,
-		  "text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is set aside\"",
-		  file, file);
+	log_event(
+		LOG_SPOOL_FAULT,
+		"text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is quarantined\"",
+		file, file);
 	return spool_rename(from, to, folder, e);
 }
 
@@ -161,7 +162,7 @@ static void note(struct live_job *o, const char *text)
 static void note_credit(struct live_job *o, const char *name, const char *why, uint64_t leases)
 {
 	char text[256];
-	text_print(text, sizeof text, "worker %s is set aside (%s); %llu of its leases were merged unverified", name,
+	text_print(text, sizeof text, "worker %s is quarantined (%s); %llu of its leases were merged unverified", name,
 		   why, (unsigned long long)leases);
 	note(o, text);
 }
@@ -177,7 +178,7 @@ void trust_quarantined(struct jobs *s, const struct action *a)
 {
 	char name[JOIN_NAME];
 	name_of(s, a->who, name);
-	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
+	log_event(LOG_WORKER_QUARANTINED, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
 	write_quarantined(s);
 	for (struct live_job *o = s->orders; o; o = o->next)
 		for (size_t i = 0; i < o->credit_count; i++)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Workers that gave wrong results: what is written down about them. Those that are set aside stand in the spool's file
- * `aside`, so that they are after a restart, too; an operator lets one back by --forgive. A job's log and note say how
- * many results of such a worker are in its image that nobody had verified: they cannot be taken out again. Who gave
+ * Workers that gave wrong results: what is written down about them. Those that are quarantined stand in the spool's
+ * file `aside`, so that they are after a restart, too; an operator lets one back by --forgive. A job's log and note say
+ * how many results of such a worker are in its image that nobody had verified: they cannot be taken out again. Who gave
  * which is known as long as the coordinator runs. The loop's thread.
  */
 #ifndef COORDINATOR_JOBS_TRUST_H
@@ -10,7 +10,7 @@
 
 #include "coordinator/job/jobs.h"
 
-/* Tells the core who is set aside, but for those that the configuration forgives. A file that
+/* Tells the core who is quarantined, but for those that the configuration forgives. A file that
  * is damaged is put by as aside.damaged, and the log says so. */
 int trust_open(struct jobs *s, struct error *e);
 

@@ -75,8 +75,8 @@ static const char *what_to_know(const struct session *p, char *text, size_t size
 		text_print(text, size,
 			   "the coordinator is reading its jobs, %u %%: what is asked for waits until they are there",
 			   (unsigned)(100 * recovery_share(p->jobs)));
-	if (p->joined && farm_peer(p->jobs->farm, p->id, &s) && s.state == PEER_ASIDE)
-		text_print(text, size, "this worker is set aside and gets no work: %s", s.text);
+	if (p->joined && farm_peer(p->jobs->farm, p->id, &s) && s.state == PEER_QUARANTINED)
+		text_print(text, size, "this worker is quarantined and gets no work: %s", s.text);
 	return text;
 }
 

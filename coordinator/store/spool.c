@@ -22,7 +22,7 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 
-/* Of a file of a job; of one in the spool's own folder: who is set aside, 64 workers a certificate, a kilobyte each. */
+/* Of a file of a job; of one in the spool's own folder: the quarantined workers, 64 a certificate, a kilobyte each. */
 enum { RECORD_MAX = 1 << 16, OWN_MAX = 1 << 28, FOLDER_MAX = SPOOL_PATH_MAX - 128 };
 
 struct spool {

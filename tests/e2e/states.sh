@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # A worker that spoils the chain states of each result (flipped bits, numbers that are none, noise, ends cut off), among honest ones
-# that go on from them: no honest worker ends or is set aside, the liar is, what it made is computed again, and each job has the bits of
+# that go on from them: no honest worker ends or is quarantined, the liar is, what it made is computed again, and each job has the bits of
 # hslt-render. SEEDS="1 2 ..." (1): two jobs each; make test-states has 50.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
@@ -13,7 +13,7 @@ honest() {
 	done
 	"$BIN/hslt-status" >"$DIR/shown"
 	for n in honest1 honest2 honest3; do
-		! grep -q "set aside: $n" "$DIR/shown" || fail "$n is set aside: $(cat "$DIR/shown")"
+		! grep -q "quarantined: $n" "$DIR/shown" || fail "$n is quarantined: $(cat "$DIR/shown")"
 	done
 }
 
@@ -42,5 +42,5 @@ done
 grep -q 'event=lease_failed .*states_of="liar-.*refused_by="honest' "$DIR/coordinator.log" || fail "the log does not say whose states were refused"
 grep -q 'is computed again: its chain states, made by liar-.*, could not be read by honest' "$DIR/coordinator.log" || fail "the log does not say who refused them"
 [ "$again" -gt 0 ] || fail "nobody noticed that states were spoiled"
-grep -q 'set aside: liar' "$DIR/shown" || fail "the liar is trusted: $(cat "$DIR/shown")"
-echo "$again epochs computed again, no honest worker ended or set aside, bits of hslt-render"
+grep -q 'quarantined: liar' "$DIR/shown" || fail "the liar is trusted: $(cat "$DIR/shown")"
+echo "$again epochs computed again, no honest worker ended or quarantined, bits of hslt-render"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A worker whose results have one wrong bit, among honest ones: with --verify 1 the image is that of hslt-render, the liar is set
-# aside for good, and nothing of it counts as the job's failures. A share finds one that lies now and then. What was merged
+# A worker whose results have one wrong bit, among honest ones: with --verify 1 the image is that of hslt-render, the liar is quarantined
+# permanently, and nothing of it counts as the job's failures. A share finds one that lies now and then. What was merged
 # unverified is said. Before: what becomes of connections when a worker starts again.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
@@ -10,9 +10,9 @@ says() {
 	grep -q -F -- "$2" "$1" || fail "$1 does not say '$2': $(tail -n 5 "$1" | cut -c 1-600)"
 }
 
-aside() {
+is_quarantined() {
 	"$BIN/hslt-status" >"$DIR/shown"
-	grep -q "set aside: $1" "$DIR/shown"
+	grep -q "quarantined: $1" "$DIR/shown"
 }
 
 JOB="--integrator hslt --size 96x96 --bootstrap 20000 --mutations 640000 --chains 64 --epoch 2500"
@@ -41,9 +41,9 @@ same "$DIR/alone.exr" "$DIR/all.exr"
 [ "$(value "$id" verified)" -ge 64 ] || fail "$(value "$id" verified) leases were verified"
 [ "$(value "$id" mismatched)" -ge 3 ] || fail "$(value "$id" mismatched) were mismatched"
 found="$(value "$id" verified) leases verified, $(value "$id" mismatched) of which differed at first"
-aside liar || fail "the liar is trusted: $(cat "$DIR/shown")"
+is_quarantined liar || fail "the liar is trusted: $(cat "$DIR/shown")"
 says "$DIR/shown" "wrong result: j1"
-says "$DIR/coordinator.log" "event=worker_aside"
+says "$DIR/coordinator.log" "event=worker_quarantined"
 "$BIN/hslt-job" log "$id" >"$DIR/log"
 says "$DIR/log" "worker=\"liar\""
 
@@ -51,13 +51,13 @@ says "$DIR/log" "worker=\"liar\""
 stop $liar
 start_worker saint
 saint=$WORKER
-until_true 10 grep -q 'is set aside and gets no work' "$DIR/saint.log" || fail "the liar's home is trusted under another name"
+until_true 10 grep -q 'is quarantined and gets no work' "$DIR/saint.log" || fail "the liar's home is trusted under another name"
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 LISTEN=$COORDINATOR
 start_coordinator --verify 0.5
-aside liar || fail "a restart made an honest worker of it"
-until_true 10 sh -c "[ \$(grep -c 'is set aside and gets no work' '$DIR/saint.log') -ge 2 ]" || fail "it is trusted after a restart"
+is_quarantined liar || fail "a restart made an honest worker of it"
+until_true 10 sh -c "[ \$(grep -c 'is quarantined and gets no work' '$DIR/saint.log') -ge 2 ]" || fail "it is trusted after a restart"
 id=$(submit "$BOX" -o "$DIR/half.exr" $JOB --wait)
 same "$DIR/alone.exr" "$DIR/half.exr"
 [ "$(value "$id" verify)" = 0.5 ] || fail "the least share is $(value "$id" verify)"
@@ -77,9 +77,9 @@ until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value 
 # The last leases of the job may be verified, and the liar found out, as it ends.
 tells() {
 	"$BIN/hslt-status" "$id" >"$DIR/shown"
-	grep -q "worker liar is set aside (wrong result: j" "$DIR/shown"
+	grep -q "worker liar is quarantined (wrong result: j" "$DIR/shown"
 }
-until_true 20 tells || fail "the status of $id does not say who is set aside: $(cat "$DIR/shown")"
+until_true 20 tells || fail "the status of $id does not say who is quarantined: $(cat "$DIR/shown")"
 says "$DIR/shown" "of its leases were merged unverified"
 "$BIN/hslt-job" log "$id" >"$DIR/log"
 says "$DIR/log" "merged unverified"

@@ -28,7 +28,7 @@ struct farm_world {
 	struct server *server;
 	char spool[128]; /* of this one; as it was in the beginning */
 	struct farm_peer peers[FARM_PEERS];
-	unsigned settled; /* times; in the names of workers, so that nobody is set aside for what another input did */
+	unsigned settled; /* times; in the names of workers, so that nobody is quarantined for what another input did */
 };
 
 struct farm_world *farm_world_new(void);    /* on a copy of that spool */

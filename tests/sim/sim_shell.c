@@ -42,7 +42,7 @@ static void send_lease(struct world *w, const struct action *a)
 	if (j->held[HOLD_STORAGE] || j->held[HOLD_ORDERED])
 		sim_wrong(w, "a lease of a job that is held");
 	if (p.state != PEER_ACTIVE)
-		sim_wrong(w, "a lease for a worker that is silent or set aside");
+		sim_wrong(w, "a lease for a worker that is silent or quarantined");
 	if (!j->mixed && *j->fingerprint && strcmp(j->fingerprint, p.fingerprint) != 0)
 		sim_wrong(w, "a lease of j%" PRIu64 " for a worker of fingerprint %s", a->job, p.fingerprint);
 	if (a->key.kind == LEASE_RENDER &&
@@ -224,8 +224,8 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 	case ACTION_WRONG:
 		w->result.lies++;
 		break;
-	case ACTION_ASIDE:
-		w->result.aside++;
+	case ACTION_QUARANTINE:
+		w->result.quarantined++;
 		break;
 	case ACTION_BOOTSTRAP_DONE:
 		prepare(w, a, j);

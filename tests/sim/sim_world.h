@@ -22,7 +22,7 @@
 struct sim_result {
 	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts,
 		extended;
-	uint64_t verified, mismatched, lies, aside; /* lies: wrong results that were found out */
+	uint64_t verified, mismatched, lies, quarantined; /* lies: wrong results that were found out */
 	uint64_t hung, hoarded; /* times that a worker stood still; leases that went to workers that never answer */
 	double time;		/* virtual seconds */
 };

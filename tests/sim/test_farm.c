@@ -30,7 +30,7 @@ static void add(struct sim_result *sum, const struct sim_result *r)
 	sum->verified += r->verified;
 	sum->mismatched += r->mismatched;
 	sum->lies += r->lies;
-	sum->aside += r->aside;
+	sum->quarantined += r->quarantined;
 	sum->hung += r->hung;
 	sum->hoarded += r->hoarded;
 }
@@ -52,16 +52,16 @@ static void simulate(void **state)
 		      " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, %" PRIu64 " of them hangs, %" PRIu64
 		      " hoarded, "
 		      "%" PRIu64 " copies, %" PRIu64 " timeouts, %" PRIu64 " restarts, %" PRIu64 " extended, %" PRIu64
-		      " verified, %" PRIu64 " mismatched, %" PRIu64 " lies, %" PRIu64 " set aside; jobs: %" PRIu64
+		      " verified, %" PRIu64 " mismatched, %" PRIu64 " lies, %" PRIu64 " quarantined; jobs: %" PRIu64
 		      " done, %" PRIu64 " failed, %" PRIu64 " cancelled\n",
 		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.hung,
 		      sum.hoarded, sum.copies, sum.timeouts, sum.restarts, sum.extended, sum.verified, sum.mismatched,
-		      sum.lies, sum.aside, sum.done, sum.failed, sum.cancelled);
+		      sum.lies, sum.quarantined, sum.done, sum.failed, sum.cancelled);
 	/* The worlds must be wild enough to mean something. */
 	if (!one) {
 		assert_true(sum.repeats > count && sum.copies > count / 4 && sum.timeouts > count / 4);
 		assert_true(sum.restarts > count / 2 && sum.extended > count / 2);
-		assert_true(sum.verified > 5 * count && sum.lies > count / 4 && sum.aside > count / 20);
+		assert_true(sum.verified > 5 * count && sum.lies > count / 4 && sum.quarantined > count / 20);
 		assert_true(sum.hung > count / 2 && sum.hoarded > count);
 		assert_true(sum.crashes > count && sum.done > count && sum.cancelled > count / 20);
 	}

@@ -102,8 +102,8 @@ static void say_action(struct said *s, const struct action *a)
 	case ACTION_WRONG:
 		say(s, "#%" PRIu64 " %s", a->who, a->text);
 		break;
-	case ACTION_ASIDE:
-		say(s, "#%" PRIu64 " aside", a->who);
+	case ACTION_QUARANTINE:
+		say(s, "#%" PRIu64 " quarantined", a->who);
 		break;
 	case ACTION_CLOSE_PEER:
 		say(s, "close w%" PRIu64, a->peer);
@@ -354,8 +354,8 @@ static void take_job(const char **at, struct event *ev)
 		ev->tag = 7;
 		ev->job = take_id(at, "j");
 		ev->priority = (int)take_number(at);
-	} else if (skip_word(at, "aside")) { /* NAME's letter, as when it joins */
-		ev->kind = EVENT_ASIDE;
+	} else if (skip_word(at, "quarantined")) { /* NAME's letter, as when it joins */
+		ev->kind = EVENT_QUARANTINED;
 		take_identity(at, &ev->join);
 	} else if (skip_word(at, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;

@@ -333,7 +333,7 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 	farm_free(f);
 }
 
-/* Whoever refuses what others can go on from is set aside after three times. */
+/* Whoever refuses what others can go on from is quarantined after three times. */
 static void a_liar_is_set_aside(void **state)
 {
 	(void)state;
@@ -367,7 +367,7 @@ static void a_liar_is_set_aside(void **state)
 	transcript_play(
 		f,
 		(const char *const[]){
-			"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 2 part 0 epoch 1, #2 aside, "
+			"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 2 part 0 epoch 1, #2 quarantined, "
 			"w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
 			NULL,
 		});

@@ -96,7 +96,7 @@ static void set_aside_after_faults(void **state)
 			START_TWO,
 			"[2] w1 batch j1 g0 p0 e0 bad tile 3 holds a NaN -> refused: tile 3 holds a NaN, w1 gets j1 g0 p0 e0",
 			"[3] w1 batch j1 g7 p0 e0 -> refused: not a lease of this job",
-			"[4] w1 batch j1 g0 p0 e0 bad torn -> refused: torn, #1 aside",
+			"[4] w1 batch j1 g0 p0 e0 bad torn -> refused: torn, #1 quarantined",
 			"[5] w1 wants 1 -> -",
 			/* its last lease is somebody else's now */
 			"[5] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g0 p0 e0",
@@ -109,7 +109,7 @@ static void set_aside_after_faults(void **state)
 		});
 	struct peer_status p;
 	assert_true(farm_peer(f, 1, &p));
-	assert_int_equal(p.state, PEER_ASIDE);
+	assert_int_equal(p.state, PEER_QUARANTINED);
 	assert_int_equal(p.faults, 3);
 	assert_string_equal(p.text, "torn");
 	struct job_status j;

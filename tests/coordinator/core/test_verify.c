@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Leases that two workers compute, and workers that are set aside, as transcripts. */
+/* Leases that two workers compute, and workers that are quarantined, as transcripts. */
 #include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"
 
@@ -215,14 +215,14 @@ static void set_aside(void **state)
 			"w3 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
 			"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* it straggles at w1 */
 			"[3] w1 batch j1 g0 p0 e1 says x -> noted: it differs from another worker's",
-			"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 1, #3 aside, j1 round 2, "
+			"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 1, #3 quarantined, j1 round 2, "
 			"w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
 			/* nothing of it counts, here or when it calls again, under whatever name */
-			"[4] w3 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
+			"[4] w3 batch j1 g0 p0 e2 says x -> refused: the worker is quarantined: its results do not count",
 			"[4] w3 leaves -> -",
 			"[4] w5 joins A threads=1 name=d home=c start=5 -> -",
 			"[4] w5 wants 1 -> -",
-			"[4] w5 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
+			"[4] w5 batch j1 g0 p0 e2 says x -> refused: the worker is quarantined: its results do not count",
 			"[5] w6 joins A threads=1 name=c home=b start=1 -> -",
 			"[5] w6 wants 1 -> -",
 			NULL,
@@ -231,7 +231,7 @@ static void set_aside(void **state)
 	struct worker_status w;
 	struct job_status j;
 	assert_true(farm_peer(f, 6, &p));
-	assert_int_equal(p.state, PEER_ASIDE);
+	assert_int_equal(p.state, PEER_QUARANTINED);
 	assert_int_equal(farm_next_quarantined(f, 0), 3);
 	assert_int_equal(farm_next_quarantined(f, 3), 0);
 	assert_true(farm_worker(f, 3, &w));
@@ -261,7 +261,7 @@ static void notes_of_a_liar(void **state)
 		"[0] w1 batch j1 g0 p0 boot says x -> noted",
 		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job",
 		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job",
-		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job, #1 aside",
+		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job, #1 quarantined",
 		"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
 		"[2] w2 batch j1 g0 p0 boot says x -> noted",
 		NULL,
@@ -272,7 +272,7 @@ static void remembered(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
-		"[0] aside certificate=a name=b home=c -> -",
+		"[0] quarantined certificate=a name=b home=c -> -",
 		"[0] submit groups=1 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 certificate=a name=b -> -",
 		"[0] w1 wants 1 -> -",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Who was set aside is known after a restart, however long the list has become; a damaged list stops no farm. */
+/* Who was quarantined is known after a restart, however long the list has become; a damaged list stops no farm. */
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
@@ -32,7 +32,7 @@ static struct server *start(void)
 	server_config_init(&c);
 	c.listen = "127.0.0.1:0";
 	c.spool = spool;
-	int shown = dup(2), nowhere = open("/dev/null", O_WRONLY); /* a line for each who is set aside */
+	int shown = dup(2), nowhere = open("/dev/null", O_WRONLY); /* a line for each who is quarantined */
 	dup2(nowhere, 2);
 	int rc = server_open(&s, &c, &e);
 	dup2(shown, 2);

@@ -90,7 +90,7 @@ spoiled_checkpoint() {
 	CHECKPOINTS=
 }
 
-fault large_pixel 1 1 "a worker sends results with a pixel of 1e30: they are refused, and it is set aside"
+fault large_pixel 1 1 "a worker sends results with a pixel of 1e30: they are refused, and it is quarantined"
 large_pixel() {
 	farm
 	worker w0
