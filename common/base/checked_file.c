@@ -85,7 +85,7 @@ static int fill(struct checked_file *s, struct error *e)
 	s->from += s->filled;
 	if (n < 0)
 		return fault(s, errno, e);
-	return s->heard ? s->heard(s->user, s->filled, e) : 0;
+	return s->progress ? s->progress(s->user, s->filled, e) : 0;
 }
 
 static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct error *e)
@@ -127,13 +127,13 @@ static int check(struct checked_file *s, struct error *e)
 	return rc ? rc : want == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
 }
 
-int checked_file_open_heard(struct checked_file *s, const char *path, checked_file_heard *heard, void *user,
-			    struct error *e)
+int checked_file_open_watched(struct checked_file *s, const char *path, checked_file_progress *progress, void *user,
+			      struct error *e)
 {
 	int rc = open_file(s, path, O_RDONLY, e);
 	if (rc)
 		return rc;
-	s->heard = heard;
+	s->progress = progress;
 	s->user = user;
 	rc = check(s, e);
 	s->at = s->filled = s->from = 0;
@@ -144,7 +144,7 @@ int checked_file_open_heard(struct checked_file *s, const char *path, checked_fi
 
 int checked_file_open(struct checked_file *s, const char *path, struct error *e)
 {
-	return checked_file_open_heard(s, path, NULL, NULL, e);
+	return checked_file_open_watched(s, path, NULL, NULL, e);
 }
 
 int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e)

@@ -19,7 +19,7 @@ static _Thread_local struct {
 	int line;
 } place;
 static _Thread_local unsigned char stack[STACK];
-static void (*told)(int number, const char *text);
+static void (*handler)(int number, const char *text);
 static struct sigaction before[SIGNALS];
 static const char *program_name;
 
@@ -72,7 +72,7 @@ static void on_signal(int number)
 		n = add(text, n, ":");
 		add_number(text, n, place.line);
 	}
-	told(number, text);
+	handler(number, text);
 	for (int i = 0; i < SIGNALS; i++)
 		if (signals[i].number == number)
 			sigaction(number, &before[i], NULL);
@@ -97,7 +97,7 @@ void crash_catch(void (*last_words)(int number, const char *text))
 {
 	struct sigaction a = {.sa_handler = on_signal, .sa_flags = SA_ONSTACK};
 	sigemptyset(&a.sa_mask);
-	told = last_words;
+	handler = last_words;
 	crash_thread();
 	for (int i = 0; i < SIGNALS; i++)
 		sigaction(signals[i].number, &a, &before[i]);

@@ -22,7 +22,7 @@ const char *crash_signal_name(int number);
  * scene.xml:12"; when it returns the program ends as it would have without. Once, before there are threads. */
 void crash_catch(void (*last_words)(int number, const char *text));
 
-/* For threads but the first: a signal for want of stack is heard, too. */
+/* For threads but the first: a signal for want of stack is handled, too. */
 void crash_thread(void);
 
 /* The same for a program: its name, the text, "it is a fault of the program or of a library" on stderr, then exit

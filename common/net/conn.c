@@ -56,9 +56,9 @@ struct conn {
 	size_t unsent;		/* bytes of frames that are not with the kernel, and what they cost beside */
 	size_t in_flight;	/* what libuv has to write, of TLS with all its own */
 	uint64_t clock, ticked; /* ms of its own clock, and of the loop's, at the last tick */
-	uint64_t begun, heard, frame_begun; /* ms of its own clock, as it was then */
-	uint64_t checked;		    /* ms of the loop's clock: the peer's certificate */
-	uint64_t linger_until;		    /* 0: not leaving */
+	uint64_t begun, last_read, frame_begun; /* ms of its own clock, as it was then */
+	uint64_t checked;			/* ms of the loop's clock: the peer's certificate */
+	uint64_t linger_until;			/* 0: not leaving */
 	int open_handles;
 	bool accepted, sniffed, closing;
 	bool waits_for_peer; /* it is told why before it is cut off */
@@ -166,7 +166,7 @@ struct buf conn_take_payload(struct conn *c)
 static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 {
 	size_t at = 0;
-	c->heard = clock_of(c);
+	c->last_read = clock_of(c);
 	while (at < size && !c->closing && !c->linger_until) {
 		struct error e;
 		size_t used;
@@ -174,7 +174,7 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 		int rc = frame_reader_take(&c->reader, bytes + at, size - at, &used, &e);
 		at += used;
 		if (!was_midway)
-			c->frame_begun = c->heard;
+			c->frame_begun = c->last_read;
 		if (rc < 0) {
 			c->garbled = rc == -EILSEQ;
 			conn_close(c, e.text);
@@ -183,8 +183,8 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 			frame_reader_drop(&c->reader); /* not only when the next one comes: that may be seconds */
 		}
 	}
-	if (c->events->heard && frame_reader_is_midway(&c->reader) && !c->closing && !c->linger_until)
-		c->events->heard(c->user);
+	if (c->events->partial && frame_reader_is_midway(&c->reader) && !c->closing && !c->linger_until)
+		c->events->partial(c->user);
 }
 
 /* Takes the mem_alloc'd bytes; what is sent is `head`, then what is behind `skip` bytes of them. */
@@ -290,7 +290,7 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 		n = tls_link_read(c->link, chunk, sizeof chunk, &e);
 		flush(c, 0);
 		if (!was_open && tls_link_is_open(c->link) && !c->closing) {
-			c->heard = clock_of(c);
+			c->last_read = clock_of(c);
 			c->checked = uv_now(c->tcp.loop);
 			if (c->events->opened && !c->accepted)
 				c->events->opened(c->user);
@@ -372,7 +372,7 @@ static void on_tick(uv_timer_t *t)
 		conn_close(c, "the TLS handshake was not finished in time");
 	else if (has_stalled(c))
 		conn_close(c, "a frame was begun and not finished in time");
-	else if (c->config.quiet_seconds > 0 && (double)(c->clock - c->heard) > 1000 * c->config.quiet_seconds)
+	else if (c->config.quiet_seconds > 0 && (double)(c->clock - c->last_read) > 1000 * c->config.quiet_seconds)
 		conn_close(c, "nothing was heard for too long");
 }
 
@@ -414,7 +414,7 @@ static int start(struct conn *c)
 {
 	uv_tcp_nodelay(&c->tcp, 1);
 	uv_tcp_keepalive(&c->tcp, 1, 60);
-	c->begun = c->heard = clock_of(c);
+	c->begun = c->last_read = clock_of(c);
 	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
 	if (!rc && c->link)
 		take_encrypted(c, NULL, 0);

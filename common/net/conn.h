@@ -22,7 +22,7 @@ struct conn_events {
 	/* The envelope may be taken (copied and zeroed); the payload is there during the call only, but for
 	 * conn_take_payload. */
 	void (*message)(void *user, struct envelope *env, const unsigned char *payload, size_t payload_size);
-	void (*heard)(void *user);   /* bytes of a message that is not whole yet; may be NULL */
+	void (*partial)(void *user); /* bytes of a message that is not whole yet; may be NULL */
 	void (*drained)(void *user); /* all that was sent is with the kernel; may be NULL */
 	void (*closed)(void *user, const char *why);
 };

@@ -270,7 +270,7 @@ static bool is_late_refusal(const struct slot *s, const struct event *ev)
 }
 
 /* Granted before the job's files were right again: what failed is likely to be what its worker was given of them, and
- * when that is heard it may be mended already. */
+ * when that arrives it may be mended already. */
 static bool is_files_fault(const struct lease *l, const struct event *ev)
 {
 	return l && !ev->lease.own && !ev->lease.bad_states && l->sent < l->job->files_changed;

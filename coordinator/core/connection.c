@@ -60,7 +60,7 @@ struct peer *connection_join(struct farm *f, const struct event_join *e, const c
 	p->restarts = e->restarts;
 	text_copy(p->name, sizeof p->name, e->name);
 	p->threads = e->threads;
-	p->joined = p->heard = f->now;
+	p->joined = p->last_seen = f->now;
 	p->state = who->quarantined ? PEER_QUARANTINED : PEER_ACTIVE;
 	if (who->quarantined)
 		memcpy(p->text, who->text, sizeof p->text);

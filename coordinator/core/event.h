@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What happened, told to the coordinator's core (farm.h). The caller owns everything in an event; the core copies what
- * it keeps. Times are seconds on a clock that never goes back (the core treats an earlier time as "no time passed").
+ * What happened, as input of the coordinator's core (farm.h). The caller owns everything in an event; the core copies
+ * what it keeps. Times are seconds on a clock that never goes back (the core treats an earlier time as "no time
+ * passed").
  */
 #ifndef COORDINATOR_CORE_EVENT_H
 #define COORDINATOR_CORE_EVENT_H
@@ -12,14 +13,14 @@
 #include "coordinator/core/counts.h"
 
 enum event_kind {
-	EVENT_TICK,    /* nothing but time: at update.wake at the latest */
-	EVENT_JOINED,  /* join */
-	EVENT_LEFT,    /* peer: its connection is gone */
-	EVENT_HEARD,   /* peer: a heartbeat (every other event of a peer counts as one) */
-	EVENT_REQUEST, /* peer, want */
-	EVENT_BATCH,   /* peer, key, valid, text: the result of a lease */
-	EVENT_STORED,  /* key, digest: the result of a lease from an earlier run, which could not count before: it does
-			  now if it can */
+	EVENT_TICK,	 /* nothing but time: at update.wake at the latest */
+	EVENT_JOINED,	 /* join */
+	EVENT_LEFT,	 /* peer: its connection is gone */
+	EVENT_HEARTBEAT, /* peer: a heartbeat (every other event of a peer counts as one) */
+	EVENT_REQUEST,	 /* peer, want */
+	EVENT_BATCH,	 /* peer, key, valid, text: the result of a lease */
+	EVENT_STORED, /* key, digest: the result of a lease from an earlier run, which could not count before: it does
+			 now if it can */
 	EVENT_DELIVERED, /* peer, key: its result is here and will be looked at later (EVENT_BATCH): it may have another
 			    lease */
 	EVENT_LEASE_FAILED,   /* peer, key, text: the worker tried and could not */
@@ -133,7 +134,7 @@ struct event {
 			uint64_t job, rounds;
 			double rel_error; /* sqrt of the upper end of the estimated relMSE; NAN: cannot be known */
 			bool doubtful;	  /* its interval is not known: no job ends by it */
-			double rel_mse, degrees; /* the estimate, and its degrees of freedom; 0: not told */
+			double rel_mse, degrees; /* the estimate, and its degrees of freedom; 0: not known */
 			double cpu_seconds;	 /* of all merged render leases */
 		} error_known;
 		struct {

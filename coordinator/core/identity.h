@@ -27,8 +27,8 @@ struct identity {
 	uint64_t id;		 /* never used twice */
 	uint64_t certificate_id; /* the same for all of one certificate */
 	char certificate[IDENTITY_CERTIFICATE], name[IDENTITY_NAME], home[IDENTITY_HOME];
-	uint64_t restarts; /* of the home, as they were last told */
-	uint64_t calls;	   /* connections so far, and how often it was heard again after a silence */
+	uint64_t restarts; /* of the home, as last reported */
+	uint64_t calls;	   /* connections so far, and how often it came back after a silence */
 	uint32_t uses;	   /* connections, and answers that wait for a second one */
 	uint32_t faults_in_row, wrong;
 	uint32_t window; /* leases that it may hold: see peer_succeeded */

@@ -23,7 +23,7 @@ void peer_set_state(struct farm *f, struct peer *p, enum peer_state s)
 
 void peer_heard(struct farm *f, struct peer *p)
 {
-	p->heard = f->now;
+	p->last_seen = f->now;
 	p->who->calls += p->state == PEER_SILENT;
 	if (p->state == PEER_SILENT)
 		peer_set_state(f, p, p->who->quarantined ? PEER_QUARANTINED : PEER_ACTIVE);

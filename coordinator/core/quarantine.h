@@ -17,7 +17,7 @@ void quarantine_wrong(struct farm *f, struct identity *who, const char *what, co
 void quarantine_worker(struct farm *f, struct identity *who);
 
 void quarantine_fault(struct farm *f, struct peer *p, const char *text); /* it sent what no worker may send */
-/* The answer with this digest is the right one: whoever gave another is told of, and nothing is noted any more. */
+/* The answer with this digest is the right one: whoever gave another is reported, and nothing is noted any more. */
 void quarantine_settle(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *right);
 
 #endif

@@ -228,19 +228,19 @@ void schedule_expire(struct farm *f, double read)
 	f->check_at = INFINITY;
 	for (uint32_t i = f->peer_count; i-- > 0;) {
 		struct peer *p = f->peers[i];
-		if (p->heard + f->config.forget_after <= read) {
+		if (p->last_seen + f->config.forget_after <= read) {
 			struct action *a = update_add(f, ACTION_CLOSE_PEER);
 			a->peer = p->id;
 			a->text = "nothing heard for too long";
 			connection_lose(f, p);
 			continue;
 		}
-		if (p->state != PEER_SILENT && p->heard + f->config.silent_after <= read) {
+		if (p->state != PEER_SILENT && p->last_seen + f->config.silent_after <= read) {
 			peer_set_state(f, p, PEER_SILENT);
 			connection_lose_leases(f, p);
 		}
 		double patience = p->state == PEER_SILENT ? f->config.forget_after : f->config.silent_after;
-		f->check_at = fmin(f->check_at, p->heard + patience);
+		f->check_at = fmin(f->check_at, p->last_seen + patience);
 		expire_leases(f, p, read);
 	}
 	/* All of this is a scan; once a second is enough for it. */

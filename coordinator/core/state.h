@@ -89,7 +89,7 @@ struct peer {
 	enum peer_state state;
 	struct link waiting;
 	uint64_t queued; /* when it began to wait, as a number */
-	double joined, heard;
+	double joined, last_seen;
 	bool returns; /* it has called again, and this connection goes */
 	uint64_t merged, repeats, refused, faults, failures, timeouts;
 	char text[256];

@@ -284,7 +284,7 @@ bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
 		.leases = p->held,
 		.state = p->state,
 		.joined = p->joined,
-		.heard = p->heard,
+		.last_seen = p->last_seen,
 		.merged = p->merged,
 		.repeats = p->repeats,
 		.refused = p->refused,

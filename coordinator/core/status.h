@@ -50,7 +50,7 @@ struct peer_status {
 	const char *name, *fingerprint;
 	uint32_t threads, want, leases;
 	enum peer_state state;
-	double joined, heard;
+	double joined, last_seen;
 	uint64_t merged, repeats, refused, faults, failures, timeouts;
 	char text[256]; /* its last fault or failure */
 };

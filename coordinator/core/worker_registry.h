@@ -14,7 +14,7 @@
 #include "coordinator/core/identity.h"
 #include "coordinator/core/state.h"
 
-/* As they were last told when there is one like that, else a new one; used by the caller. NULL with a sentence:
+/* As last reported when there is one like that, else a new one; used by the caller. NULL with a sentence:
  * refused. */
 struct identity *worker_registry_use(struct farm *f, const struct event_join *e, const char **refused);
 void worker_registry_drop(struct farm *f, struct identity *who);

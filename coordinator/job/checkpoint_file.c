@@ -145,15 +145,15 @@ static int read_all(struct live_job *o, struct checked_file *in, uint64_t *gener
 	return rc;
 }
 
-int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard,
-		    void *user, struct error *e)
+int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation,
+		    checked_file_progress *progress, void *user, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
 	struct checked_file in;
 	spool_job_path(spool, o->id, "checkpoint.tmp", name);
 	disk_unlink(name); /* of a run that ended before it was whole */
 	spool_job_path(spool, o->id, "checkpoint", name);
-	int rc = checked_file_open_heard(&in, name, heard, user, e);
+	int rc = checked_file_open_watched(&in, name, progress, user, e);
 	if (rc)
 		return rc;
 	in.bytes = in.left;

@@ -26,10 +26,10 @@ int checkpoint_write(const struct live_job *o, const struct checkpoint_head *h, 
 		     struct error *e);
 
 /* Into a new order without merged batches, by any thread. -ENOENT: there is none; -EBADMSG: it is damaged; -EPROTO: of
- * another version; the live job is of no use then. generation: of the journal that follows. heard: as in
+ * another version; the live job is of no use then. generation: of the journal that follows. progress: as in
  * checked_file.h.
  */
-int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard,
-		    void *user, struct error *e);
+int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation,
+		    checked_file_progress *progress, void *user, struct error *e);
 
 #endif

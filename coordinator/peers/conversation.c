@@ -224,7 +224,7 @@ static void on_closed(void *user, const char *why)
 	mem_free(p);
 }
 
-static void on_heard(void *user)
+static void on_partial(void *user)
 {
 	worker_heard(user);
 }
@@ -235,4 +235,4 @@ static void on_drained(void *user)
 }
 
 const struct conn_events conversation_events = {
-	.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
+	.message = on_message, .partial = on_partial, .drained = on_drained, .closed = on_closed};

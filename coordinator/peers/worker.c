@@ -46,7 +46,7 @@ static void take_lease_result(struct session *p, struct envelope *env)
  * and with them our answers, are behind that message. */
 void worker_heard(struct session *p)
 {
-	struct event ev = {.kind = EVENT_HEARD, .peer = p->id};
+	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
 	Farm__Heartbeat beat;
 	Farm__Envelope m;
 	if (!p->joined || p->state != SESSION_WORKER ||
@@ -63,7 +63,7 @@ void worker_heard(struct session *p)
 
 void worker_message(struct session *p, struct envelope *env)
 {
-	struct event ev = {.kind = EVENT_HEARD, .peer = p->id};
+	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
 	const Farm__Envelope *m = env->message;
 	switch (m->body_case) {
 	case FARM__ENVELOPE__BODY_HEARTBEAT: /* answered, so that a worker notices a connection that is dead */

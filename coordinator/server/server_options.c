@@ -27,7 +27,7 @@ static const struct option_row rows[] = {
 	{"keep-partials", 0, "DIR", "Write every partial EXR tile that is merged into DIR",
 	 OPTION_TEXT(CONFIG, keep_partials)},
 	{"port-file", 0, "FILE", "Write the port that was bound into FILE", OPTION_TEXT(CONFIG, port_file)},
-	{"heartbeat", 0, "SECONDS", "How often workers must be heard",
+	{"heartbeat", 0, "SECONDS", "How often workers must send something",
 	 OPTION_SECONDS(CONFIG, heartbeat_seconds, 0.05, 3600), .standard = "5"},
 	{"blobs", 0, "GB", "Limit of scene files kept in the spool; the oldest that no job needs go",
 	 OPTION_SCALED(CONFIG, blob_bytes, 0.001, 1e6, 1e9), .standard = "100"},

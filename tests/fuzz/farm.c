@@ -176,7 +176,7 @@ void farm_hang_up(struct farm_world *w, unsigned peer)
 		return;
 	close(p->fd);
 	frame_reader_fini(&p->reader);
-	envelope_fini(&p->heard);
+	envelope_fini(&p->received);
 	*p = (struct farm_peer){.fd = -1};
 }
 
@@ -360,9 +360,9 @@ static const Farm__Envelope *hear(struct farm_world *w, unsigned peer)
 		need(rc >= 0, e.text);
 		if (!rc)
 			continue;
-		envelope_fini(&p->heard);
-		need(envelope_unpack(&p->heard, p->reader.header.bytes, p->reader.header.size, &e) == 0, e.text);
-		return p->heard.message;
+		envelope_fini(&p->received);
+		need(envelope_unpack(&p->received, p->reader.header.bytes, p->reader.header.size, &e) == 0, e.text);
+		return p->received.message;
 	}
 	need(false, "the coordinator says nothing");
 	return NULL;

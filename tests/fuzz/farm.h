@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator to speak to, in this process: its loop turns when it is told to. It begins with the state of a spool
+ * A coordinator in this process: its loop runs when a test calls it. It begins with the state of a spool
  * that is made once: job 1 is done, 2 lacks the chains of one lease in each of its rounds, 3 is in its bootstrap, 4
  * waits for its first samples and wants each from two workers, 5 is done and can be extended. One thread. What goes
  * wrong ends the program.
@@ -19,7 +19,7 @@ enum { FARM_PEERS = 7 };
 struct farm_peer {
 	int fd; /* negative: not there */
 	struct frame_reader reader;
-	struct envelope heard;
+	struct envelope received;
 	bool has_frame;
 	bool has_spoken; /* what it says from now on is sealed */
 };
@@ -47,7 +47,7 @@ void farm_say(struct farm_world *w, unsigned peer, const void *bytes, size_t siz
 /* A frame of a header and a payload, with the checksums that belong to them: what is behind these is to be reached. */
 void farm_say_parts(struct farm_world *w, unsigned peer, const struct step *step);
 void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope *m, const void *payload, size_t size);
-void farm_drain(struct farm_world *w, unsigned peer); /* throws away what it was told */
+void farm_drain(struct farm_world *w, unsigned peer); /* discards what it received */
 void farm_hang_up(struct farm_world *w, unsigned peer);
 
 /* What an honest worker answers to a lease of one of these jobs, in even light; batch_fini frees it. */

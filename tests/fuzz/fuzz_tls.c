@@ -2,7 +2,7 @@
 /*
  * TLS in memory. The first byte says what the others are: what a stranger says to a listener or to a caller; places
  * where one direction of a handshake and what follows is changed; records to an established link; a certificate.
- * Whatever is changed, no link may open to somebody else, and what is heard is a beginning of what was said.
+ * Whatever is changed, no link may open to somebody else, and what is received is a prefix of what was sent.
  */
 #include "common/net/authority.h"
 #include "tests/fuzz/folders.h"
@@ -196,7 +196,7 @@ static void send_records(const uint8_t *bytes, size_t size)
 		abort();
 	pass_bytes(&listener, bytes, size);
 	if (listener.got_size)
-		abort(); /* nobody without the keys is heard */
+		abort(); /* nothing is received from anybody without the keys */
 	if (tls_link_recheck(listener.link, &e))
 		abort();
 	tls_link_free(caller.link);

@@ -393,7 +393,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 			fault(w, m->blob_chunk->error);
 		break;
 	case FARM__ENVELOPE__BODY_FAULT:
-		if (w->kind != LOAD_HANGS) /* which is to hear that nothing was heard */
+		if (w->kind != LOAD_HANGS) /* which is to time out */
 			fault(w, m->fault->text);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_END:

@@ -250,8 +250,8 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->peer = 0;
 	} else if (skip_word(at, "leaves")) {
 		ev->kind = EVENT_LEFT;
-	} else if (skip_word(at, "heard")) {
-		ev->kind = EVENT_HEARD;
+	} else if (skip_word(at, "heartbeat")) {
+		ev->kind = EVENT_HEARTBEAT;
 	} else if (skip_word(at, "wants")) {
 		ev->kind = EVENT_REQUEST;
 		ev->want = (uint32_t)take_count(at);

@@ -5,7 +5,7 @@
  *   [110] w2 batch j1 g3 p0 e1 -> merge, merged, w2 gets j1 g3 p0 e2
  *
  * Events:
- *   wN joins F threads=T | wN leaves | wN heard | wN wants N
+ *   wN joins F threads=T | wN leaves | wN heartbeat | wN wants N
  *   wN batch KEY [bad TEXT] | wN fails KEY TEXT | wN lacks KEY TEXT (its own machine's fault) | wN refuses KEY TEXT
  * (its states) | wN denies KEY TEXT | wN recalls KEY TEXT (the same, and what came before them is gone) | wN returns
  * KEY        KEY: j1 g0 p0 e0, or j1 g0 p0 boot submit [NAME=VALUE ...]: priority mixed groups parts rounds seconds

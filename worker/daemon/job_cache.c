@@ -123,10 +123,10 @@ bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info)
 		return true;
 	if (!info->plan)
 		return false;
-	unsigned char *known = pack_unbounded(info_of(b), &known_size), *told = pack_unbounded(info, &size);
-	bool same = known && told && size == known_size && memcmp(known, told, size) == 0;
+	unsigned char *known = pack_unbounded(info_of(b), &known_size), *received = pack_unbounded(info, &size);
+	bool same = known && received && size == known_size && memcmp(known, received, size) == 0;
 	mem_free(known);
-	mem_free(told);
+	mem_free(received);
 	return same;
 }
 

@@ -429,9 +429,9 @@ static void tell_lost(struct agent *a)
 {
 	struct lost_lease *l;
 	for (unsigned i = 0; (l = work_lost(i)); i++)
-		if (!l->told) {
+		if (!l->reported) {
 			send_failed(a, &l->key, l->text, l->own);
-			l->told = true;
+			l->reported = true;
 		}
 }
 

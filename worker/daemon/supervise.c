@@ -19,7 +19,7 @@
 static const double first_pause = 0.05, longest_pause = 10, long_life = 30;
 
 struct supervisor {
-	sigset_t heard, mask; /* signals that it waits for; the mask of before */
+	sigset_t signals, mask; /* signals that it waits for; the mask of before */
 	pid_t child;
 	int asked;    /* the last signal that was sent on; 0: none */
 	double pause; /* s before the next start */
@@ -55,7 +55,7 @@ static int start(struct supervisor *s, int (*run)(void *), void *user)
 static int wait_for_end(struct supervisor *s)
 {
 	for (;;) {
-		int status, number = sigwaitinfo(&s->heard, NULL);
+		int status, number = sigwaitinfo(&s->signals, NULL);
 		if (number == SIGCHLD) {
 			if (waitpid(s->child, &status, WNOHANG) == s->child)
 				return status;
@@ -72,7 +72,7 @@ static bool pause_before_start(struct supervisor *s)
 	double end = clock_seconds() + s->pause;
 	for (double rest; (rest = end - clock_seconds()) > 0;) {
 		struct timespec t = {(time_t)rest, (long)(1e9 * (rest - (double)(time_t)rest))};
-		int number = sigtimedwait(&s->heard, NULL, &t);
+		int number = sigtimedwait(&s->signals, NULL, &t);
 		if (number > 0 && number != SIGCHLD)
 			return false;
 	}
@@ -87,12 +87,12 @@ int supervise(unsigned threads, int (*run)(void *), void *user)
 		fprintf(stderr, "hslt-worker: %s\n", e.text);
 		return 1;
 	}
-	sigemptyset(&s.heard);
-	sigaddset(&s.heard, SIGCHLD);
-	sigaddset(&s.heard, SIGTERM);
-	sigaddset(&s.heard, SIGINT);
-	sigaddset(&s.heard, SIGHUP);
-	sigprocmask(SIG_BLOCK, &s.heard, &s.mask);
+	sigemptyset(&s.signals);
+	sigaddset(&s.signals, SIGCHLD);
+	sigaddset(&s.signals, SIGTERM);
+	sigaddset(&s.signals, SIGINT);
+	sigaddset(&s.signals, SIGHUP);
+	sigprocmask(SIG_BLOCK, &s.signals, &s.mask);
 	for (;;) {
 		double begun = clock_seconds();
 		int rc = start(&s, run, user);

@@ -89,12 +89,12 @@ static void lose(const struct work *w, const char *text, bool machine)
 		   k->group, k->part, (unsigned long long)k->epoch);
 }
 
-/* What was told is forgotten. */
+/* Drops what has been reported. */
 static void tidy(void)
 {
 	unsigned kept = 0;
 	for (unsigned i = 0; i < shared->lost_count; i++)
-		if (!shared->lost[i].told)
+		if (!shared->lost[i].reported)
 			shared->lost[kept++] = shared->lost[i];
 	shared->lost_count = kept;
 }

@@ -19,7 +19,7 @@ enum { WORK_THREADS = 1024, WORK_SCENE = 128, WORK_TEXT = 512 };
 struct lost_lease {
 	struct lease_key key;
 	char text[WORK_TEXT];
-	bool own, told;
+	bool own, reported;
 };
 
 /* Shared with processes that are forked from now on. -ENOMEM. */

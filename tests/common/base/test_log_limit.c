@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A rush of lines is cut, counted and told of; a trickle passes. */
+/* A rush of lines is cut off, counted and reported; a trickle passes. */
 #include "common/base/log_limit.h"
 
 #include <stdarg.h>
@@ -23,7 +23,7 @@ static void a_rush_is_cut(void **state)
 	assert_int_equal(said(&b, 4000, 1000, 1000), LOG_BURST);
 	assert_int_equal(log_bucket_withheld(&b, 1000), 0); /* it may go on */
 	assert_int_equal(log_bucket_withheld(&b, 1000.5), 4000 - LOG_BURST);
-	assert_int_equal(log_bucket_withheld(&b, 1100), 0); /* told once */
+	assert_int_equal(log_bucket_withheld(&b, 1100), 0); /* reported once */
 	/* 4,000 in ten seconds, from an empty bucket: what is filled again meanwhile. */
 	assert_int_equal(said(&b, LOG_BURST, 2000, 2000), LOG_BURST);
 	assert_in_range(said(&b, 4000, 2000, 2010), 10 * LOG_PER_SECOND - 1, 10 * LOG_PER_SECOND);

@@ -26,7 +26,7 @@
 static char folder[64];
 static const unsigned char image[] = "the image";
 
-/* ---- a coordinator: takes one connection, says hello, then what it is told to say ---- */
+/* ---- a coordinator: takes one connection, says hello, then what the test prescribes ---- */
 
 struct coordinator {
 	pthread_t thread;

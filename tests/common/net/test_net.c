@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Addresses are read strictly; connections carry frames both ways, tell once that they end, and never grow without
- * bound: in plaintext and through TLS. Where only one end speaks it, both are told at once.
+ * bound: in plaintext and through TLS. Where only one end speaks it, both learn so at once.
  */
 #include "common/base/mem.h"
 #include "common/net/authority.h"
@@ -50,7 +50,7 @@ static void addresses(void **state)
 
 struct end {
 	struct conn *conn;
-	int messages, closed, drained, heard;
+	int messages, closed, drained, partial;
 	size_t payload;
 	bool distrust, garbled;
 	struct tls_peer peer; /* who the other one was when a message came */
@@ -81,9 +81,9 @@ static void on_drained(void *user)
 	((struct end *)user)->drained++;
 }
 
-static void on_heard(void *user)
+static void on_partial(void *user)
 {
-	((struct end *)user)->heard++;
+	((struct end *)user)->partial++;
 }
 
 static void on_closed(void *user, const char *why)
@@ -97,7 +97,7 @@ static void on_closed(void *user, const char *why)
 }
 
 static const struct conn_events events = {
-	.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
+	.message = on_message, .partial = on_partial, .drained = on_drained, .closed = on_closed};
 
 static void on_connection(uv_stream_t *l, int status)
 {
@@ -313,7 +313,7 @@ static void a_slow_frame_is_heard(void **state)
 	send_bye(&here, 0);
 	while (!there.messages)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(there.heard, 0); /* none was under way */
+	assert_int_equal(there.partial, 0); /* none was under way */
 	conn_set_quiet(there.conn, 0.3);
 	d.timer.data = &d;
 	uv_timer_init(&loop, &d.timer);
@@ -321,7 +321,7 @@ static void a_slow_frame_is_heard(void **state)
 	while (there.messages < 2 && !there.closed)
 		uv_run(&loop, UV_RUN_ONCE);
 	assert_int_equal(there.messages, 2);
-	assert_true(there.heard >= 15);
+	assert_true(there.partial >= 15);
 	uv_close((uv_handle_t *)&d.timer, NULL);
 	close_ends();
 	free(d.bytes);

@@ -223,7 +223,7 @@ static void a_bootstrap_follows_the_time(void **state)
 	assert_int_equal(made(&r).bootstrap, 31296);
 }
 
-/* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, what is usual is not told.
+/* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, defaults are not mentioned.
  */
 static void parts_are_asked_for(void **state)
 {

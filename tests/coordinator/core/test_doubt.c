@@ -235,12 +235,12 @@ static void who_has_states_that_are_given_up_loses_them(void **state)
 			WORKER(3, "c"),
 			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 			"[4] w3 wants 1 -> -",
-			"[6] w2 heard -> w3 gets j1 g0 p0 e1",
+			"[6] w2 heartbeat -> w3 gets j1 g0 p0 e1",
 			"[6] w4 joins A threads=1 name=d -> -",
 			"[7] w2 wants 0 -> -",
 			"[7] w2 refuses j1 g0 p0 e1 no -> -",
 			"[7] w4 wants 1 -> -",
-			"[12] w3 heard -> w4 gets j1 g0 p0 e1",
+			"[12] w3 heartbeat -> w4 gets j1 g0 p0 e1",
 			"[13] w4 denies j1 g0 p0 e1 no -> w3 loses j1 g0 p0 e1, anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w4 gets j1 g0 p0 e1 anew",
 			"[13] w3 refuses j1 g0 p0 e1 no -> -", /* what it had before */
 			"[13] w4 refuses j1 g0 p0 e1 no -> -", /* the same */

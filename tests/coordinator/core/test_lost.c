@@ -40,7 +40,7 @@ static void told_by_the_next_life(void **state)
 			"[2] w1 leaves -> -",
 			"[2] w4 joins A threads=1 name=d home=a start=2 -> -",
 			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -",
-			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -", /* it is told once */
+			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -", /* reported once */
 			"[2] w4 wants 1 -> -",			   /* and pauses */
 			"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
 			/* the new life calls before the old connection is known to be cut */
@@ -95,11 +95,11 @@ static void limit_ends(void **state)
 	assert_int_equal(state_of(f, 3, 1, &s), JOB_QUEUED);
 	assert_non_null(strstr(s.waiting, "one lease at a time"));
 	transcript_play(f, (const char *const[]){
-				   "[25] w6 heard -> -",
-				   "[25] w5 heard -> -",
-				   "[50] w6 heard -> -",
-				   "[50] w5 heard -> -",
-				   "[61] w5 heard -> j3 is bootstrap, w5 gets j3 g0 p0 boot",
+				   "[25] w6 heartbeat -> -",
+				   "[25] w5 heartbeat -> -",
+				   "[50] w6 heartbeat -> -",
+				   "[50] w5 heartbeat -> -",
+				   "[61] w5 heartbeat -> j3 is bootstrap, w5 gets j3 g0 p0 boot",
 				   NULL,
 			   });
 	farm_free(f);

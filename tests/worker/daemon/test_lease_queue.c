@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A worker's lease queue with a coordinator that does as it is told: files that several jobs want come once, whatever
+ * A worker's lease queue with a scripted coordinator: files that several jobs want come once, whatever
  * happens to the job that asked first, to the connection or to the disk. Both are in this thread, so nothing happens at
  * once by chance.
  */
