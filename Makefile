@@ -112,9 +112,11 @@ TEST_SRC     := $(shell find tests -name 'test_*.c' 2>/dev/null | sort)
 TEST_SUPPORT := $(wildcard tests/support/*.c tests/sim/sim_*.c)
 TEST_BIN     := $(patsubst tests/%.c,$(BUILD)/tests/%,$(TEST_SRC))
 LIB_TEST     := $(BUILD)/lib/libhslt-test.a
+# Whatever is linked with it can run out of memory when a test says so (tests/support/failing_memory.h).
+MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap_mem_alloc
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) $(TEST_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+	$(link) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 # It notes which random numbers are asked for.
 $(BUILD)/tests/worker/render/test_groups: TEST_WRAP := -Wl,--wrap=rng_uniform4,--wrap=rng_bits4
 # What tests/run.sh ends a test by. It needs no library, and no sanitizer: it is no test.
@@ -170,7 +172,7 @@ FUZZ_SUPPORT := $(filter-out $(FUZZ_SRC),$(wildcard tests/fuzz/*.c))
 LIB_FUZZ     := $(BUILD)/lib/libhslt-fuzz.a
 $(LIB_FUZZ): $(call obj,$(FUZZ_SUPPORT))
 $(FUZZ_BIN): $(BUILD)/%: $(BUILD)/obj/tests/%.o $(LIB_FUZZ) $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) -fsanitize=fuzzer -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+	$(link) -fsanitize=fuzzer $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 fuzzers: $(FUZZ_BIN)
 fuzz:
 	MAKE="$(MAKE)" sh tests/fuzz/run.sh
@@ -194,7 +196,7 @@ corpus: programs
 # Benchmarks: one program from tests/bench/*.c; a table on stdout and $(BUILD)/bench.json. BENCH="path tiles" runs only these.
 BENCH_SRC := $(wildcard tests/bench/*.c)
 $(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) $(BENCH_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+	$(link) $(BENCH_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occluded_to_infinity,--wrap=halfvec_walk_from,--wrap=full_path_visible
 bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
@@ -207,7 +209,7 @@ row: programs
 # Stated errors against true ones: about an hour of one core. CALIBRATION="RENDERS LENGTHS SCENE" for less.
 CALIBRATION_SRC := $(filter-out tests/image/test_%.c,$(wildcard tests/image/*.c))
 $(BUILD)/calibration/calibration: $(call obj,$(CALIBRATION_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+	$(link) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 .PHONY: calibration
 calibration: $(BUILD)/calibration/calibration
 	$(BUILD)/calibration/calibration $(CALIBRATION) >$(BUILD)/calibration.md; code=$$?; cat $(BUILD)/calibration.md; exit $$code

@@ -3,31 +3,17 @@
 
 #include <limits.h>
 #include <malloc.h>
-#include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-static atomic_long countdown = -1;
-
-static int must_fail(void)
-{
-	if (atomic_load_explicit(&countdown, memory_order_relaxed) < 0)
-		return 0;
-	return atomic_fetch_sub(&countdown, 1) == 0;
-}
-
 void *mem_alloc(size_t count, size_t size)
 {
-	if (must_fail())
-		return NULL;
 	return calloc(count ? count : 1, size ? size : 1);
 }
 
 void *mem_grow(void *p, size_t old_size, size_t new_size)
 {
-	if (must_fail())
-		return NULL;
 	char *q = realloc(p, new_size ? new_size : 1);
 	if (q && new_size > old_size)
 		memset(q + old_size, 0, new_size - old_size);
@@ -46,11 +32,6 @@ char *mem_strdup(const char *s)
 void mem_free(void *p)
 {
 	free(p);
-}
-
-void mem_fail_after(long n)
-{
-	atomic_store(&countdown, n);
 }
 
 void mem_keep(size_t bytes)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The one door for memory. A test makes the n-th allocation fail and sees that nothing leaks or crashes.
+ * The one door for memory. Tests make the n-th allocation fail (tests/support/failing_memory.h) and check that nothing
+ * leaks or crashes.
  * Returned memory is zeroed. Any thread.
  */
 #ifndef COMMON_BASE_MEM_H
@@ -18,8 +19,5 @@ void mem_free(void *p);
  * kernel takes back and zeroes again; one that reads large meshes and then works for hours keeps half as much again for
  * nothing, because the C library raises the limit itself each time. */
 void mem_keep(size_t bytes);
-
-/* Tests only: the allocation after `n` successful ones fails, once; n < 0 switches this off. */
-void mem_fail_after(long n);
 
 #endif

@@ -70,7 +70,7 @@ static exr_context_initializer_t initializer(struct exr_stream *s)
 {
 	exr_context_initializer_t i = EXR_DEFAULT_CONTEXT_INITIALIZER;
 	/* The library keeps its own allocator: 3.1.5 waits for ever on its lock once an allocation of an attribute
-	 * failed, so that it cannot stand under mem_fail_after. */
+	 * failed, so that tests cannot make its memory run out. */
 	i.error_handler_fn = complain;
 	i.user_data = s;
 	i.max_image_width = i.max_image_height = EXR_MAX_SIDE;

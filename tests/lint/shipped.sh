@@ -12,7 +12,7 @@ failed=0
 
 # holds PROGRAM: what of a fault is in it
 holds() {
-	{ strings "$1" && nm "$1"; } | grep -oE 'HSLT_(TEST|FAULT)[A-Z_]*|--test-[a-z-]*|^test-[a-z-]+$|__wrap_[a-z_]+|faulty_worker' | sort -u | tr '\n' ' '
+	{ strings "$1" && nm "$1"; } | grep -oE 'HSLT_(TEST|FAULT)[A-Z_]*|--test-[a-z-]*|^test-[a-z-]+$|__wrap_[a-z_]+|faulty_worker|mem_fail_after' | sort -u | tr '\n' ' '
 }
 
 for program in "$build"/bin/*; do

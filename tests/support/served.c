@@ -6,6 +6,7 @@
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/checksummed_frame.h"
+#include "tests/support/failing_memory.h"
 
 #include <stdarg.h>
 #include <stddef.h>

@@ -6,6 +6,7 @@
 #include "common/base/mem.h"
 #include "common/base/progress.h"
 #include "common/base/text.h"
+#include "tests/support/failing_memory.h"
 
 #include <stdarg.h>
 #include <stddef.h>

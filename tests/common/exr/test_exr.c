@@ -3,6 +3,7 @@
 #include "common/exr/exr_tile.h"
 
 #include "common/base/mem.h"
+#include "tests/support/failing_memory.h"
 
 #include <math.h>
 #include <stdarg.h>

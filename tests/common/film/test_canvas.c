@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/estimate/canvas_blocks.h"
 #include "common/estimate/merge.h"
+#include "tests/support/failing_memory.h"
 
 #include <math.h>
 #include <stdarg.h>

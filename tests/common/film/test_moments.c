@@ -10,6 +10,7 @@
 
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
+#include "tests/support/failing_memory.h"
 #include "tests/support/stats.h"
 
 #include <math.h>

@@ -4,6 +4,7 @@
 #include "common/wire/batch_wire.h"
 #include "common/base/mem.h"
 #include "common/wire/frame.h"
+#include "tests/support/failing_memory.h"
 
 #include <stdarg.h>
 #include <stddef.h>

@@ -3,6 +3,7 @@
 #include "common/wire/envelope.h"
 #include "common/wire/frame.h"
 #include "common/base/mem.h"
+#include "tests/support/failing_memory.h"
 
 #include <stdarg.h>
 #include <stddef.h>

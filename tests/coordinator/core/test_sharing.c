@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Several jobs and several kinds of workers: priority, fairness, fingerprints, limits, and why a job waits. */
+#include "tests/support/failing_memory.h"
 #include "tests/support/transcript.h"
 
 #include "common/base/mem.h"

@@ -10,6 +10,7 @@
 #include "coordinator/jobs/step.h"
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
+#include "tests/support/failing_memory.h"
 #include "tests/support/folder.h"
 #include "tests/support/scripted.h"
 

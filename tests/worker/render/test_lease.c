@@ -5,6 +5,7 @@
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
+#include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"

@@ -5,6 +5,7 @@
  * against all pairs. Rays and segments: against the one rule that says which of two is there.
  */
 #include "tests/support/bodies.h"
+#include "tests/support/failing_memory.h"
 #include "worker/render/geom/coincide.h"
 
 #include "common/base/mem.h"

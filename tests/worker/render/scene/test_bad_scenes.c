@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Every bad input is answered with an error that names the place, and what would be right where that is known. */
 #include "common/base/mem.h"
+#include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "tests/support/failing_memory.h"
 #include "worker/render/scene/image.h"
 
 #include "common/base/mem.h"

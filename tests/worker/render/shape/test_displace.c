@@ -4,6 +4,7 @@
  * positions, normals and derivatives of normals that approach the analytic surface's at the expected order.
  */
 #include "common/base/mem.h"
+#include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 #include "worker/render/shape/displace.h"

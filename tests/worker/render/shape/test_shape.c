@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
+#include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Memory that runs out: all tests are linked with functions between the product and common/base/mem.h (the linker's
+ * --wrap, in the Makefile). Any thread.
+ */
+#ifndef TESTS_SUPPORT_FAILING_MEMORY_H
+#define TESTS_SUPPORT_FAILING_MEMORY_H
+
+/* The allocation after n successful ones fails, once; n < 0: none does. */
+void mem_fail_after(long n);
+
+#endif
