@@ -146,6 +146,44 @@ doors() {
 	}' "${TMPDIR:-/tmp}/includes.$$"
 }
 
+# Headers that declare what several sources define: what a folder, or one source, shows to others.
+SHARED="common/plan/plan.h worker/render/render.h worker/render/bsdf/bsdf.h worker/render/bsdf/create.h worker/render/geom/coincide.h
+worker/render/path/integrator_face.h worker/render/scene/gltf_private.h worker/render/scene/image_decode.h worker/render/scene/scene.h
+worker/render/world/build.h worker/render/world/effects.h worker/render/world/summary.h"
+
+# Declarations and definitions begin in the first column, and a body with a brace of its own there.
+declared() {
+	awk -v shared=" $(echo $SHARED) " '
+	function name_of(text) {
+		gsub(/__attribute__\(\([^)]*\([^)]*\)\)\)/, "", text)
+		return match(text, /[A-Za-z_0-9]+\(/) ? substr(text, RSTART, RLENGTH - 1) : ""
+	}
+	FNR == 1 { text = ""; comment = 0; header = FILENAME ~ /\.h$/ }
+	comment { comment = !/\*\//; next }
+	/^\/\*/ { comment = !/\*\//; next }
+	/^[A-Za-z_]/ { text = $0; line = FNR }
+	!/^[A-Za-z_{]/ && text != "" { text = text " " $0 }
+	/^\{/ && !header && text != "" && text !~ /^static|=/ { name = name_of(text); if (name) defined[name] = FILENAME }
+	/^\{/ { text = "" }
+	/;/ && text != "" {
+		if (header && text !~ /^(static|typedef|struct [a-z_0-9]+ \{|enum|union)/ && text !~ /\{/) {
+			name = name_of(text)
+			if (name) { n++; declares[n] = name; where[n] = FILENAME ":" line; file[n] = FILENAME }
+		}
+		text = ""
+	}
+	END {
+		for (k = 1; k <= n; k++) {
+			source = defined[declares[k]]
+			own = source; sub(/\.c$/, ".h", own)
+			if (source && own != file[k] && !index(shared, " " file[k] " "))
+				print where[k] ": " declares[k] " is defined in " source
+		}
+		if (n < 900)
+			print "only " n " declarations are found: this check is wrong"
+	}' $SOURCES
+}
+
 marks() {
 	words='TO''DO|FIX''ME'
 	grep -nIE "$words" $(git ls-files 2>/dev/null || find $FOLDERS tests deploy proto -type f)
@@ -166,6 +204,7 @@ check "coordinator and worker do not include each other, common includes neither
 check "no folders in a circle" circles
 check "no files in a circle, but within $CIRCULAR" returns
 check "each library is included only at its door" doors
+check "each header declares what its own source defines" declared
 check "no unfinished marks" marks
 check "no source of more than $MOST_LINES lines" overlong $MOST_LINES $SOURCES
 check "no test of more than $MOST_LINES_TEST lines" overlong $MOST_LINES_TEST $(find tests -name '*.[ch]')
