@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The counters of a job: what went wrong and cost nothing, and what was verified. This list is all that there is of
- * them: core, status, journal, checkpoint, record and the JSON of both status and record follow from it. What counts is
- * where it happens: job->counts.NAME++. The structure lies in journals and checkpoints as it is: whoever changes the
- * list counts up the versions of both (journal_file.c, checkpoint_file.c).
+ * them: core, status, journal, checkpoint, record and the JSON of both status and record follow from it, and each has a
+ * field of its name in proto/stored.proto. What counts is where it happens: job->counts.NAME++.
  */
 #ifndef COORDINATOR_CORE_COUNTS_H
 #define COORDINATOR_CORE_COUNTS_H

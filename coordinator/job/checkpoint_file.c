@@ -1,22 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The file of a checkpoint: a head, then the seeds, chain states and films of the job, under a checksum
- * (common/base/checked_file.h).
+ * The file of a checkpoint: a magic number, the size of the head and the head (stored.h), then the seeds, chain states
+ * and films of the job, under a checksum (common/base/checked_file.h). Whoever changes what follows the head counts the
+ * version up. Files of version 004, whose head lay there as a struct, are read, too.
  *
- * A file that is damaged is -EBADMSG, one of another version or of a machine with another layout -EPROTO: the sizes are
- * looked at before anything is allocated by them.
+ * A file that is damaged is -EBADMSG, one of another version -EPROTO: the sizes are looked at before anything is
+ * allocated by them.
  */
 #include "coordinator/job/checkpoint_file.h"
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
+#include "coordinator/job/stored.h"
 
 #include <stdio.h>
 #include <string.h>
 
-static const char magic[8] = "hsltC004";
-_Static_assert(sizeof(struct checkpoint_head) == 4528, "another layout is another version");
+static const char magic[8] = "hsltC005", old_magic[8] = "hsltC004";
 
 static uint32_t slots_of(const struct live_job *o)
 {
@@ -26,8 +27,7 @@ static uint32_t slots_of(const struct live_job *o)
 void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *o, const struct job_status *status)
 {
 	uint64_t generation = journal_generation(o->journal) + 1;
-	*h = (struct checkpoint_head){.bytes = sizeof *h,
-				      .worker_count = o->worker_count,
+	*h = (struct checkpoint_head){.worker_count = o->worker_count,
 				      .job = o->id,
 				      .generation = generation < o->generation_least ? o->generation_least : generation,
 				      .cpu_seconds = o->cpu_seconds,
@@ -37,7 +37,6 @@ void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *o, con
 				      .lit = o->lit,
 				      .counts = o->counts,
 				      .looks = *status->looks};
-	memcpy(h->magic, magic, sizeof magic);
 	snprintf(h->fingerprint, sizeof h->fingerprint, "%s", status->fingerprint);
 }
 
@@ -56,10 +55,20 @@ static int write_states(const struct live_job *o, struct checked_file *out, stru
 	return rc;
 }
 
+static int write_head(const struct checkpoint_head *h, struct checked_file *out, struct error *e)
+{
+	unsigned char bytes[STORED_HEAD_MOST];
+	uint32_t size = (uint32_t)stored_pack_head(h, bytes);
+	int rc = checked_file_write(out, magic, sizeof magic, e);
+	if (!rc)
+		rc = checked_file_write(out, &size, sizeof size, e);
+	return rc ? rc : checked_file_write(out, bytes, size, e);
+}
+
 int checkpoint_write(const struct live_job *o, const struct checkpoint_head *h, struct checked_file *out,
 		     struct error *e)
 {
-	int rc = checked_file_write(out, h, sizeof *h, e);
+	int rc = write_head(h, out, e);
 	if (!rc && o->seeds)
 		rc = checked_file_write(out, o->seeds, o->plan.chains * sizeof *o->seeds, e);
 	if (!rc)
@@ -110,25 +119,51 @@ static void take_head(struct live_job *o, const struct checkpoint_head *h)
 	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
 }
 
+/* Of version 004. */
+static int read_old_head(struct checkpoint_head *h, struct checked_file *in, struct error *e)
+{
+	unsigned char bytes[STORED_OLD_HEAD];
+	uint32_t sizes[2]; /* of the head; worker_count */
+	int rc = checked_file_read(in, sizes, sizeof sizes, e);
+	if (!rc && sizes[0] != sizeof magic + sizeof sizes + sizeof bytes)
+		rc = error_set(e, EPROTO, "%s: its head has %u bytes: a coordinator for another machine wrote it",
+			       in->path, sizes[0]);
+	if (!rc)
+		rc = checked_file_read(in, bytes, sizeof bytes, e);
+	if (!rc)
+		stored_old_head(bytes, sizes[1], h);
+	return rc;
+}
+
+static int read_head(struct checkpoint_head *h, struct checked_file *in, struct error *e)
+{
+	unsigned char bytes[STORED_HEAD_MOST];
+	char got[sizeof magic];
+	uint32_t size;
+	int rc = checked_file_read(in, got, sizeof got, e);
+	if (!rc && memcmp(got, old_magic, sizeof got) == 0)
+		return read_old_head(h, in, e);
+	if (!rc)
+		rc = spool_check_version(got, magic, in->path, e);
+	if (!rc)
+		rc = checked_file_read(in, &size, sizeof size, e);
+	if (!rc && size > sizeof bytes)
+		rc = error_set(e, EPROTO, "%s: its head has %u bytes", in->path, size);
+	if (!rc)
+		rc = checked_file_read(in, bytes, size, e);
+	if (!rc && (rc = stored_unpack_head(bytes, size, h, e)))
+		error_prefix(e, rc, "%s", in->path);
+	return rc;
+}
+
 static int read_all(struct live_job *o, struct checked_file *in, uint64_t *generation, struct error *e)
 {
 	struct checkpoint_head h;
-	int rc = checked_file_read(in, &h, offsetof(struct checkpoint_head, worker_count),
-				   e); /* another version's may be shorter */
-	if (!rc)
-		rc = spool_check_version(h.magic, magic, in->path, e);
-	if (!rc && h.bytes != sizeof h)
-		rc = error_set(e, EPROTO,
-			       "%s: its head has %u bytes instead of %zu: a coordinator for another machine wrote it",
-			       in->path, h.bytes, sizeof h);
-	if (!rc)
-		rc = checked_file_read(in, &h.worker_count, sizeof h - offsetof(struct checkpoint_head, worker_count),
-				       e);
+	int rc = read_head(&h, in, e);
 	if (!rc && h.job != o->id)
 		rc = error_set(e, EBADMSG, "%s: of j%llu", in->path, (unsigned long long)h.job);
 	if (rc)
 		return rc;
-	h.fingerprint[sizeof h.fingerprint - 1] = 0;
 	take_head(o, &h);
 	*generation = h.generation;
 	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, live_job_submit(o)->brightest);

@@ -5,20 +5,7 @@
 
 #include "common/base/checked_file.h"
 #include "coordinator/core/farm.h"
-#include "coordinator/job/live_job.h"
-
-/* As it lies in memory. Whoever changes it, or what follows it, counts the version up. */
-struct checkpoint_head {
-	char magic[8];
-	uint32_t bytes, worker_count;
-	uint64_t job, generation;
-	double cpu_seconds, bootstrap_cpu_seconds, look_written;
-	struct live_job_times times;
-	struct bootstrap_result lit;
-	struct forecast_history looks;
-	struct job_counts counts;
-	char fingerprint[256];
-};
+#include "coordinator/job/checkpoint_head.h"
 
 /* Of the job as it is, and of a journal that follows the one it has. */
 void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *o, const struct job_status *status);

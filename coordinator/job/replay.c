@@ -18,6 +18,7 @@
 #include "coordinator/job/back.h"
 #include "coordinator/job/checkpoint_file.h"
 #include "coordinator/job/late.h"
+#include "coordinator/job/stored.h"
 #include "coordinator/job/stored_frame.h"
 #include "coordinator/store/journal_file.h"
 
@@ -71,6 +72,14 @@ static int strange(const struct replay *r, const char *what, size_t size, struct
 		e, EPROTO,
 		"the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
 		(unsigned long long)r->order->id, what, size);
+}
+
+/* The same of a look or of counters; e says what of it. */
+static int strange_note(const struct replay *r, int rc, struct error *e)
+{
+	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another coordinator wrote it",
+					    (unsigned long long)r->order->id)
+			     : rc;
 }
 
 static int take_batch(struct replay *r, const struct journal_item *item, struct error *e)
@@ -149,17 +158,18 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		o->fingerprint[size] = 0;
 		return 0;
 	case JOURNAL_LOOK:
-		if (size != sizeof look)
-			return strange(r, "a look", size, e);
-		memcpy(&look, body, size);
+	case JOURNAL_OLD_LOOK:
+		rc = (item->kind == JOURNAL_LOOK ? stored_unpack_look : stored_old_look)(body, size, &look, e);
+		if (rc)
+			return strange_note(r, rc, e);
 		forecast_add_look(&o->record.looks, &look);
 		o->look_written = look.work;
 		return 0;
 	case JOURNAL_COUNTS:
-		if (size != sizeof o->counts)
-			return strange(r, "counts", size, e);
-		memcpy(&o->counts, body, size);
-		return 0;
+	case JOURNAL_OLD_COUNTS:
+		rc = (item->kind == JOURNAL_COUNTS ? stored_unpack_counts : stored_old_counts)(body, size, &o->counts,
+											       e);
+		return rc ? strange_note(r, rc, e) : 0;
 	default:
 		return strange(r, "a record", size, e);
 	}

@@ -19,6 +19,7 @@
 #include "common/base/version.h"
 #include "common/wire/frame.h"
 #include "coordinator/job/incoming.h"
+#include "coordinator/job/stored.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/retention/keep.h"
 #include "coordinator/store/row_file.h"
@@ -393,7 +394,9 @@ void durable_look(struct jobs *s, uint64_t job)
 		return;
 	o->look_written = l->work;
 	/* Only forecasts are made of it: the look itself is taken again. */
-	if (append_note(s, o, JOURNAL_LOOK, farm_elapsed(s->farm, job, jobs_now(s)), l, sizeof *l, &e))
+	unsigned char note[STORED_NOTE_MOST];
+	size_t size = stored_pack_look(l, note);
+	if (append_note(s, o, JOURNAL_LOOK, farm_elapsed(s->farm, job, jobs_now(s)), note, size, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
@@ -405,7 +408,8 @@ static void write_counts(struct jobs *s, struct live_job *o)
 	struct error e;
 	if (o->ended || o->busy || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
 		return;
-	if (append_note(s, o, JOURNAL_COUNTS, o->times.elapsed, &now, sizeof now, &e) == 0)
+	unsigned char note[STORED_NOTE_MOST];
+	if (append_note(s, o, JOURNAL_COUNTS, o->times.elapsed, note, stored_pack_counts(&now, note), &e) == 0)
 		o->counts = now;
 }
 

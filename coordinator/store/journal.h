@@ -24,13 +24,15 @@
 #include <stdint.h>
 
 enum journal_kind {
-	JOURNAL_BATCH = 1,  /* a frame as it came: prefix, header, payload */
-	JOURNAL_PINNED = 2, /* the fingerprint that the job belongs to */
-	JOURNAL_LOOK = 3,   /* struct forecast_look */
-	JOURNAL_COUNTS = 4, /* struct job_counts: in all, not since the last */
-	JOURNAL_AGAIN = 5, /* as JOURNAL_BATCH, in the place of the last one of that lease, which is taken back with all
-			      of its (group, part) after it */
-	JOURNAL_KEPT = 6,  /* as JOURNAL_BATCH: merged before the checkpoint, and kept because it may be taken back */
+	JOURNAL_BATCH = 1,	/* a frame as it came: prefix, header, payload */
+	JOURNAL_PINNED = 2,	/* the fingerprint that the job belongs to */
+	JOURNAL_OLD_LOOK = 3,	/* as earlier versions stored it: a struct as it lay in memory */
+	JOURNAL_OLD_COUNTS = 4, /* the same */
+	JOURNAL_AGAIN = 5,	/* as JOURNAL_BATCH, in the place of the last one of that lease, which is taken back
+				   with all of its (group, part) after it */
+	JOURNAL_KEPT = 6,   /* as JOURNAL_BATCH: merged before the checkpoint, and kept because it may be taken back */
+	JOURNAL_LOOK = 7,   /* a message Look of proto/stored.proto */
+	JOURNAL_COUNTS = 8, /* Counts: in all, not since the last */
 };
 
 struct journal;

@@ -1,0 +1,292 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/job/stored.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "proto/stored.pb-c.h"
+
+#include <assert.h>
+#include <string.h>
+
+_Static_assert(sizeof(struct job_counts) / sizeof(uint64_t) * 12 <= STORED_NOTE_MOST,
+	       "a number takes at most 12 bytes");
+
+/* ---- messages ---- */
+
+/* Memory that is out is not a message that is damaged. */
+static void *alloc(void *out, size_t size)
+{
+	void *p = mem_alloc(size, 1);
+	if (!p)
+		*(bool *)out = true;
+	return p;
+}
+
+static void release(void *out, void *p)
+{
+	(void)out;
+	mem_free(p);
+}
+
+/* NULL: e says why. */
+static ProtobufCMessage *unpack(const ProtobufCMessageDescriptor *d, const unsigned char *bytes, size_t size, int *rc,
+				struct error *e)
+{
+	bool out = false;
+	ProtobufCAllocator memory = {alloc, release, &out};
+	ProtobufCMessage *m = protobuf_c_message_unpack(d, &memory, size, bytes);
+	*rc = m	    ? 0
+	      : out ? error_set(e, ENOMEM, "no memory for %s", d->short_name)
+		    : error_set(e, EPROTO, "%zu bytes are no %s", size, d->short_name);
+	return m;
+}
+
+static void drop(ProtobufCMessage *m)
+{
+	bool out;
+	ProtobufCAllocator memory = {alloc, release, &out};
+	if (m)
+		protobuf_c_message_free_unpacked(m, &memory);
+}
+
+static int check_known(const ProtobufCMessage *m, struct error *e)
+{
+	return m->n_unknown_fields ? error_set(e, EPROTO, "%s with a field that is not known here: of another version",
+					       m->descriptor->short_name)
+				   : 0;
+}
+
+/* ---- counters ---- */
+
+static void fill_counts(const struct job_counts *c, Stored__Counts *m)
+{
+	stored__counts__init(m);
+#define X(name, key, wire) m->name = c->name;
+	JOB_COUNTS(X)
+#undef X
+}
+
+static int take_counts(const Stored__Counts *m, struct job_counts *c, struct error *e)
+{
+#define X(name, key, wire) c->name = m->name;
+	JOB_COUNTS(X)
+#undef X
+	return check_known(&m->base, e);
+}
+
+size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED_NOTE_MOST])
+{
+	Stored__Counts m;
+	fill_counts(c, &m);
+	return stored__counts__pack(&m, bytes);
+}
+
+int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e)
+{
+	int rc;
+	ProtobufCMessage *m = unpack(&stored__counts__descriptor, bytes, size, &rc, e);
+	if (m)
+		rc = take_counts((const Stored__Counts *)m, c, e);
+	drop(m);
+	return rc;
+}
+
+/* ---- looks ---- */
+
+static void fill_look(const struct forecast_look *l, Stored__Look *m)
+{
+	stored__look__init(m);
+	m->work = l->work;
+	m->cpu_seconds = l->cpu_seconds;
+	m->seconds = l->seconds;
+	m->rel_mse = l->rel_mse;
+	m->rel_mse_upper = l->rel_mse_upper;
+	m->degrees = l->degrees;
+	m->doubtful = l->doubtful;
+}
+
+static int take_look(const Stored__Look *m, struct forecast_look *l, struct error *e)
+{
+	*l = (struct forecast_look){m->work,	      m->cpu_seconds, m->seconds, m->rel_mse,
+				    m->rel_mse_upper, m->degrees,     m->doubtful};
+	return check_known(&m->base, e);
+}
+
+size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORED_NOTE_MOST])
+{
+	Stored__Look m;
+	fill_look(l, &m);
+	return stored__look__pack(&m, bytes);
+}
+
+int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e)
+{
+	int rc;
+	ProtobufCMessage *m = unpack(&stored__look__descriptor, bytes, size, &rc, e);
+	if (m)
+		rc = take_look((const Stored__Look *)m, l, e);
+	drop(m);
+	return rc;
+}
+
+/* ---- heads of checkpoints ---- */
+
+size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STORED_HEAD_MOST])
+{
+	Stored__CheckpointHead m;
+	Stored__Counts counts;
+	Stored__Look look[FORECAST_LOOKS], *looks[FORECAST_LOOKS];
+	double b[PLAN_MAX_GROUPS];
+	stored__checkpoint_head__init(&m);
+	m.job = h->job;
+	m.generation = h->generation;
+	m.worker_count = h->worker_count;
+	m.cpu_seconds = h->cpu_seconds;
+	m.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
+	m.look_written = h->look_written;
+	m.elapsed = h->times.elapsed;
+	m.opened = h->times.opened;
+	m.completed = h->times.completed;
+	memcpy(b, h->lit.b, sizeof b);
+	m.b = b;
+	m.n_b = PLAN_MAX_GROUPS;
+	m.b_pooled = h->lit.b_pooled;
+	m.beyond_share = h->lit.beyond_share;
+	m.black = h->lit.black;
+	for (; m.n_looks < h->looks.count; m.n_looks++) {
+		fill_look(&h->looks.looks[m.n_looks], &look[m.n_looks]);
+		looks[m.n_looks] = &look[m.n_looks];
+	}
+	m.looks = looks;
+	fill_counts(&h->counts, &counts);
+	m.counts = &counts;
+	m.fingerprint = text_borrow(h->fingerprint);
+	assert(stored__checkpoint_head__get_packed_size(&m) <= STORED_HEAD_MOST);
+	return stored__checkpoint_head__pack(&m, bytes);
+}
+
+static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h, struct error *e)
+{
+	int rc = check_known(&m->base, e);
+	if (!rc && (m->n_b > PLAN_MAX_GROUPS || m->n_looks > FORECAST_LOOKS || !m->counts ||
+		    strlen(m->fingerprint) >= sizeof h->fingerprint))
+		rc = error_set(e, EPROTO, "the head of a checkpoint with %zu groups and %zu looks", m->n_b, m->n_looks);
+	if (rc)
+		return rc;
+	*h = (struct checkpoint_head){
+		.job = m->job,
+		.generation = m->generation,
+		.worker_count = m->worker_count,
+		.cpu_seconds = m->cpu_seconds,
+		.bootstrap_cpu_seconds = m->bootstrap_cpu_seconds,
+		.look_written = m->look_written,
+		.times = {m->elapsed, m->opened, m->completed},
+		.lit = {.b_pooled = m->b_pooled, .beyond_share = m->beyond_share, .black = m->black != 0},
+		.looks = {.count = (uint32_t)m->n_looks}};
+	if (m->n_b)
+		memcpy(h->lit.b, m->b, m->n_b * sizeof *m->b);
+	for (size_t i = 0; i < m->n_looks && !rc; i++)
+		rc = take_look(m->looks[i], &h->looks.looks[i], e);
+	text_copy(h->fingerprint, sizeof h->fingerprint, m->fingerprint);
+	return rc ? rc : take_counts(m->counts, &h->counts, e);
+}
+
+int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoint_head *h, struct error *e)
+{
+	int rc;
+	ProtobufCMessage *m = unpack(&stored__checkpoint_head__descriptor, bytes, size, &rc, e);
+	if (m)
+		rc = take_head((const Stored__CheckpointHead *)m, h, e);
+	drop(m);
+	return rc;
+}
+
+/* ---- as earlier versions stored them: x86-64's layout, which was the only one ---- */
+
+enum { OLD_GROUPS = 64, OLD_LOOKS = 64, OLD_COUNTS = 8 };
+
+struct old_look {
+	double work, cpu_seconds, seconds, rel_mse, rel_mse_upper, degrees;
+	uint64_t doubtful;
+};
+
+struct old_counts {
+	uint64_t repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched;
+};
+
+struct old_head { /* of version 004, behind worker_count */
+	uint64_t job, generation;
+	double cpu_seconds, bootstrap_cpu_seconds, look_written, elapsed, opened, completed;
+	double b[OLD_GROUPS], b_pooled, beyond_share;
+	uint8_t black, nothing[7];
+	uint32_t look_count, nothing2;
+	struct old_look looks[OLD_LOOKS];
+	struct old_counts counts;
+	char fingerprint[256];
+};
+
+_Static_assert(sizeof(struct old_look) == 56 && sizeof(struct old_counts) == 64 &&
+		       sizeof(struct old_head) == STORED_OLD_HEAD,
+	       "what lies on disks does not change");
+_Static_assert(sizeof((struct old_head *)0)->b <= sizeof((struct bootstrap_result *)0)->b &&
+		       OLD_LOOKS <= (int)FORECAST_LOOKS,
+	       "all of an old head is taken");
+
+static struct forecast_look old_look(const struct old_look *l)
+{
+	return (struct forecast_look){l->work,		l->cpu_seconds, l->seconds, l->rel_mse,
+				      l->rel_mse_upper, l->degrees,	l->doubtful};
+}
+
+static struct job_counts old_counts(const struct old_counts *c)
+{
+	return (struct job_counts){.repeats = c->repeats,
+				   .refused = c->refused,
+				   .faults = c->faults,
+				   .failures = c->failures,
+				   .timeouts = c->timeouts,
+				   .duplicates = c->duplicates,
+				   .verified = c->verified,
+				   .mismatched = c->mismatched};
+}
+
+int stored_old_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e)
+{
+	struct old_look old;
+	if (size != sizeof old)
+		return error_set(e, EPROTO, "a look of %zu bytes", size);
+	memcpy(&old, bytes, sizeof old);
+	*l = old_look(&old);
+	return 0;
+}
+
+int stored_old_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e)
+{
+	struct old_counts old;
+	if (size != sizeof old)
+		return error_set(e, EPROTO, "counters of %zu bytes", size);
+	memcpy(&old, bytes, sizeof old);
+	*c = old_counts(&old);
+	return 0;
+}
+
+void stored_old_head(const unsigned char bytes[STORED_OLD_HEAD], uint32_t worker_count, struct checkpoint_head *h)
+{
+	struct old_head old;
+	memcpy(&old, bytes, sizeof old);
+	*h = (struct checkpoint_head){
+		.job = old.job,
+		.generation = old.generation,
+		.worker_count = worker_count,
+		.cpu_seconds = old.cpu_seconds,
+		.bootstrap_cpu_seconds = old.bootstrap_cpu_seconds,
+		.look_written = old.look_written,
+		.times = {old.elapsed, old.opened, old.completed},
+		.lit = {.b_pooled = old.b_pooled, .beyond_share = old.beyond_share, .black = old.black != 0},
+		.counts = old_counts(&old.counts)};
+	memcpy(h->lit.b, old.b, sizeof old.b);
+	for (; h->looks.count < old.look_count && h->looks.count < OLD_LOOKS; h->looks.count++)
+		h->looks.looks[h->looks.count] = old_look(&old.looks[h->looks.count]);
+	old.fingerprint[sizeof old.fingerprint - 1] = 0;
+	text_copy(h->fingerprint, sizeof h->fingerprint, old.fingerprint);
+}
