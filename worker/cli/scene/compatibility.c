@@ -12,7 +12,7 @@ static const struct {
 	enum plugin_class cls;
 	const char *types;
 } mitsuba[] = {
-	{PLUGIN_SHAPE, "bsplinecurve|deformable|ellipsoids|ellipsoidsmesh|hair|heightfield|linearcurve|sdfgrid"},
+	{PLUGIN_SHAPE, "bsplinecurve|deformable|ellipsoids|ellipsoidsmesh|hair|linearcurve|sdfgrid"},
 	{PLUGIN_BSDF, "circular|hair|hk|irawan|measured|measured_polarized|polarizer|pplastic|retarder"},
 	{PLUGIN_TEXTURE, "curvature|gridtexture|volume|wireframe"},
 	{PLUGIN_EMITTER, "collimated|directionalarea|timed_sunsky"},

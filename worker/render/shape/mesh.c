@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/shape/mesh.h"
 
+#include "worker/render/shape/smooth.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -201,6 +203,10 @@ int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena
 	if (r)
 		return r;
 	*dropped = drop_flat(m);
+	if (f->smooth_angle >= 0 && f->face_normals)
+		return node_error(n, e, EINVAL, "max_smooth_angle and face_normals contradict each other");
+	if (f->smooth_angle >= 0 && (r = mesh_smooth(m, f->smooth_angle, arena, n, e)))
+		return r;
 	if (m->normal)
 		wind_by_normals(m);
 	if (f->face_normals)

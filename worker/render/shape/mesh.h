@@ -57,6 +57,8 @@ void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, doubl
 struct mesh_finish {
 	mat4 to_world;
 	bool flip_normals, face_normals;
+	double smooth_angle; /* degrees: normals anew across edges that are less sharp (smooth.h); negative: as they are
+			      */
 };
 
 /*

@@ -18,7 +18,7 @@ static const struct param params[] = {
 	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
 	{"collapse", IGNORED},
 	{"load_materials", IGNORED}, /* .mtl files are never read */
-	{"max_smooth_angle", REFUSED},
+	MESH_SMOOTH_PARAM,
 	{"shape_index", REFUSED},
 	SHAPE_PARAMS_END,
 };

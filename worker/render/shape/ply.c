@@ -74,7 +74,7 @@ static const struct param params[] = {
 	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
 	{"collapse", IGNORED},
 	{"srgb", UNDERSTOOD(VALUE_BOOL)}, /* of colours */
-	{"max_smooth_angle", REFUSED},
+	MESH_SMOOTH_PARAM,
 	SHAPE_PARAMS_END,
 };
 

@@ -35,7 +35,7 @@ static const struct param params[] = {
 	{"shape_index", VALUE_INT, PARAM_UNDERSTOOD, 0, 1 << 24, NULL},
 	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	{"collapse", IGNORED},
-	{"max_smooth_angle", REFUSED},
+	MESH_SMOOTH_PARAM,
 	SHAPE_PARAMS_END,
 };
 

@@ -30,6 +30,7 @@ int shape_build(const struct scene_node *n, const struct asset_source *assets, s
 	if (r || out->kind != SHAPE_MESH)
 		return r;
 	struct mesh_finish f = {node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
-				out->face_normals || node_bool(n, "face_normals", false)};
+				out->face_normals || node_bool(n, "face_normals", false),
+				node_float(n, "max_smooth_angle", -1)};
 	return mesh_finish(&out->mesh, &f, arena, dropped, n, e);
 }

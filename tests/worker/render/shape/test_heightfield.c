@@ -1,0 +1,228 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A height field against the same mesh written as OBJ, its normals against those of the function that it samples. */
+#include "tests/support/memory_assets.h"
+#include "tests/support/pictures.h"
+#include "tests/support/sample_images.h"
+#include "worker/render/render.h"
+#include "worker/render/shape/shape.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 9, HEIGHT = 5 };
+
+struct built {
+	struct scene scene;
+	struct arena arena;
+	struct shape_geometry g;
+	struct error error;
+	int result;
+};
+
+static const void *picture;
+static size_t picture_size;
+static char obj[1 << 16];
+
+/* One shape of 0.6; its files are a.hdr and m.obj. */
+static struct built build(const char *type, const char *content)
+{
+	char xml[2048];
+	snprintf(xml, sizeof xml, "<scene version='0.6.0'>\n<shape type='%s'>%s</shape></scene>", type, content);
+	const struct memory_file files[] = {
+		{"s.xml", xml, strlen(xml)}, {"a.hdr", picture, picture_size}, {"m.obj", obj, strlen(obj)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct built b = {0};
+	uint64_t dropped;
+	b.result = scene_read(&b.scene, &assets, "s.xml", render_plugins(), NULL, 0, &b.error);
+	if (!b.result)
+		b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error);
+	return b;
+}
+
+static struct built build_ok(const char *type, const char *content)
+{
+	struct built b = build(type, content);
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	return b;
+}
+
+static void release(struct built *b)
+{
+	arena_fini(&b->arena);
+	scene_fini(&b->scene);
+}
+
+#define FILENAME "<string name='filename' value='a.hdr'/>"
+#define PLACE \
+	"<transform name='toWorld'><rotate x='1' angle='-90'/><scale x='3' y='2' z='0.5'/><translate x='7'/></transform>"
+
+static double height(uint32_t x, uint32_t y)
+{
+	return (double)((x * 5 + y * 3) % 8) / 8;
+}
+
+static void take_picture(struct pictures *p, uint32_t width, uint32_t height_, double (*f)(uint32_t x, uint32_t y))
+{
+	double *rgb = calloc((size_t)width * height_ * 3, sizeof *rgb);
+	assert_non_null(rgb);
+	for (uint32_t y = 0; y < height_; y++)
+		for (uint32_t x = 0; x < width; x++)
+			for (int k = 0; k < 3; k++)
+				rgb[3 * (y * width + x) + (uint32_t)k] = f(x, y);
+	pictures_add(p, width, height_, rgb);
+	free(rgb);
+	picture = p->file[p->count - 1].bytes;
+	picture_size = p->file[p->count - 1].size;
+}
+
+/* The mesh as one would write it: rows of the picture from y = -1 on, quads cut from (x, y) to (x + 1, y + 1). */
+static void write_obj(double scale)
+{
+	size_t n = 0;
+	for (int y = 0; y < HEIGHT; y++)
+		for (int x = 0; x < WIDTH; x++)
+			n += (size_t)snprintf(obj + n, sizeof obj - n, "v %.17g %.17g %.17g\nvt %.17g %.17g\n",
+					      -1 + 2.0 * x / (WIDTH - 1), -1 + 2.0 * y / (HEIGHT - 1),
+					      scale * height((uint32_t)x, (uint32_t)y), 1.0 * x / (WIDTH - 1),
+					      1.0 * y / (HEIGHT - 1));
+	for (int y = 0; y + 1 < HEIGHT; y++)
+		for (int x = 0; x + 1 < WIDTH; x++) {
+			int a = y * WIDTH + x + 1, b = a + 1, c = a + WIDTH, d = c + 1;
+			n += (size_t)snprintf(obj + n, sizeof obj - n, "f %d/%d %d/%d %d/%d\nf %d/%d %d/%d %d/%d\n", c,
+					      c, a, a, d, d, d, d, a, a, b, b);
+		}
+}
+
+static void test_as_obj(void **state)
+{
+	(void)state;
+	struct pictures p = {0};
+	take_picture(&p, WIDTH, HEIGHT, height);
+	write_obj(-1.5);
+	struct built field = build_ok("heightfield", FILENAME PLACE "<float name='scale' value='-1.5'/>"
+								    "<boolean name='shadingNormals' value='false'/>"),
+		     mesh = build_ok("obj", "<string name='filename' value='m.obj'/>" PLACE
+					    "<boolean name='faceNormals' value='true'/>"
+					    "<boolean name='flipTexCoords' value='false'/>");
+	const struct mesh *a = &field.g.mesh, *b = &mesh.g.mesh;
+	assert_int_equal(a->triangle_count, 2 * (WIDTH - 1) * (HEIGHT - 1));
+	assert_int_equal(b->triangle_count, a->triangle_count);
+	assert_true(!a->normal && !b->normal && a->uv && b->uv);
+	for (uint32_t i = 0; i < a->triangle_count; i++)
+		for (int k = 0; k < 3; k++) {
+			uint32_t v = a->index[i][k], w = b->index[i][k];
+			for (int c = 0; c < 3; c++)
+				assert_true(fabs(a->position[v][c] - b->position[w][c]) < 1e-6);
+			for (int c = 0; c < 2; c++)
+				assert_true(fabs(a->uv[v][c] - b->uv[w][c]) < 1e-12);
+		}
+	release(&field);
+	release(&mesh);
+	pictures_fini(&p);
+}
+
+static double slope(uint32_t x, uint32_t y)
+{
+	return x / 8.0 + y / 16.0;
+}
+
+static double bowl(uint32_t x, uint32_t y)
+{
+	double a = (double)x - 8, b = (double)y - 8;
+	return (a * a + b * b) / 64;
+}
+
+/* Of a plane exactly, borders too; of a bowl to the square of a pixel's width. */
+static void test_normals(void **state)
+{
+	(void)state;
+	struct pictures p = {0};
+	take_picture(&p, WIDTH, HEIGHT, slope);
+	struct built b = build_ok("heightfield", FILENAME "<float name='scale' value='2'/>");
+	assert_non_null(b.g.mesh.normal);
+	/* z = 2 (4 (x + 1) / 8 + 2 (y + 1) / 16) = x + y / 4 + ... */
+	double length = sqrt(1 + 1.0 / 16 + 1);
+	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
+		const double *n = b.g.mesh.normal[i];
+		assert_true(fabs(n[0] + 1 / length) < 1e-6 && fabs(n[1] + 0.25 / length) < 1e-6);
+	}
+	release(&b);
+	take_picture(&p, 17, 17, bowl);
+	b = build_ok("heightfield", FILENAME "<boolean name='flipNormals' value='true'/>");
+	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
+		const double *q = b.g.mesh.position[i], *n = b.g.mesh.normal[i];
+		if (fabs(q[0]) > 0.9 || fabs(q[1]) > 0.9)
+			continue;
+		/* z = x^2 + y^2 */
+		double l = sqrt(4 * q[0] * q[0] + 4 * q[1] * q[1] + 1), dx = n[0] - 2 * q[0] / l,
+		       dy = n[1] - 2 * q[1] / l;
+		if (!(fabs(dx) < 0.25 / 64 && fabs(dy) < 0.25 / 64 && n[2] < 0))
+			fail_msg("at %g %g the normal is off by %g %g", q[0], q[1], dx, dy);
+	}
+	release(&b);
+	pictures_fini(&p);
+}
+
+/* Numbers as they are stored, or decoded as colours are, as the picture's texture says. */
+static void test_decoding(void **state)
+{
+	(void)state;
+	unsigned char *png = sample_png(4, 3, SAMPLE_RGB, 8, 0, &picture_size);
+	picture = png;
+	static const char *const ways[] = {
+		FILENAME,
+		"<texture type='bitmap'>" FILENAME "</texture>",
+		"<texture type='bitmap'>" FILENAME "<float name='gamma' value='1'/></texture>",
+		"<texture type='bitmap'>" FILENAME "<string name='channel' value='g'/><float name='gamma' value='1'/>"
+		"</texture>",
+	};
+	for (int i = 0; i < 4; i++) {
+		struct built b = build_ok("heightfield", ways[i]);
+		double rgb[3];
+		for (int k = 0; k < 3; k++) {
+			double x = sample_value(2, 1, k) / 255.0;
+			rgb[k] = i >= 2 ? x : x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
+		}
+		double wanted = i == 3 ? rgb[1] : 0.212671 * rgb[0] + 0.71516 * rgb[1] + 0.072169 * rgb[2];
+		double z = b.g.mesh.position[1 * 4 + 2][2];
+		if (!(fabs(z - wanted) < 1e-6))
+			fail_msg("way %d: a height of %g, not %g", i, z, wanted);
+		release(&b);
+	}
+	free(png);
+}
+
+static void refuses(const char *content, const char *sentence)
+{
+	struct built b = build("heightfield", content);
+	if (b.result >= 0 || !strstr(b.error.text, sentence))
+		fail_msg("%s\n gave %d: %s", content, b.result, b.error.text);
+	release(&b);
+}
+
+static void test_bad_input(void **state)
+{
+	(void)state;
+	struct pictures p = {0};
+	take_picture(&p, 1, 5, height);
+	refuses("", "s.xml:2: <shape type=\"heightfield\">: needs either a filename or a bitmap inside");
+	refuses(FILENAME "<texture type='bitmap'>" FILENAME "</texture>", "needs either a filename or a bitmap");
+	refuses("<texture type='checkerboard'/>", "the heights of a heightfield come from a bitmap");
+	refuses(FILENAME, "a picture of 1 x 5 pixels; heights need 2 x 2");
+	refuses("<string name='filename' value='m.obj'/>", "m.obj");
+	refuses("<string name='filename' value='none.png'/>", "none.png: no such file");
+	pictures_fini(&p);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_as_obj), cmocka_unit_test(test_normals),
+					   cmocka_unit_test(test_decoding), cmocka_unit_test(test_bad_input)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

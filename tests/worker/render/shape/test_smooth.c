@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* max_smooth_angle against the same meshes with their normals written out. */
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_tables.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct built {
+	struct scene scene;
+	struct arena arena;
+	struct shape_geometry g;
+	struct error error;
+	int result;
+};
+
+static char text[1 << 22];
+static size_t used;
+
+__attribute__((format(printf, 1, 2))) static void put(const char *format, ...)
+{
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(text + used, sizeof text - used, format, ap);
+	va_end(ap);
+	assert_true(n >= 0 && (size_t)n < sizeof text - used);
+	used += (size_t)n;
+}
+
+/* The mesh in `text`. */
+static struct built build(const char *content)
+{
+	char xml[1024];
+	snprintf(xml, sizeof xml,
+		 "<scene version='0.6.0'>\n<shape type='obj'><string name='filename' value='m.obj'/>%s</shape></scene>",
+		 content);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m.obj", text, used}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct built b = {0};
+	uint64_t dropped;
+	b.result = scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error);
+	if (!b.result)
+		b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error);
+	return b;
+}
+
+#define ANGLE(x) "<float name='maxSmoothAngle' value='" #x "'/>"
+
+static struct built build_ok(const char *content)
+{
+	struct built b = build(content);
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	return b;
+}
+
+static void release(struct built *b)
+{
+	arena_fini(&b->arena);
+	scene_fini(&b->scene);
+}
+
+/* Triangle for triangle and corner for corner the same places and normals; vertices may be others. */
+static void expect_same(struct built *a, struct built *b)
+{
+	const struct mesh *x = &a->g.mesh, *y = &b->g.mesh;
+	assert_int_equal(x->triangle_count, y->triangle_count);
+	assert_true(x->normal && y->normal);
+	for (uint32_t i = 0; i < x->triangle_count; i++)
+		for (int k = 0; k < 3; k++)
+			for (int c = 0; c < 3; c++) {
+				assert_true(x->position[x->index[i][k]][c] == y->position[y->index[i][k]][c]);
+				double difference = x->normal[x->index[i][k]][c] - y->normal[y->index[i][k]][c];
+				if (!(fabs(difference) < 1e-12))
+					fail_msg("triangle %u, corner %d: component %d of the normal is off by %g", i,
+						 k, c, difference);
+			}
+	release(a);
+	release(b);
+}
+
+/* A prism of `sides` around z, from z = 0 to 1, with its lids. Normals: of the sides those of a cylinder if round, else
+ * of each side; 0: none in the file, and corners share positions. */
+enum normals { NONE, FLAT, ROUND };
+static void put_prism(int sides, enum normals normals)
+{
+	used = 0;
+	for (int i = 0; i < 2 * sides; i++)
+		put("v %.17g %.17g %d\n", cos(M_PI * (i / 2) * 2 / sides), sin(M_PI * (i / 2) * 2 / sides), i % 2);
+	/* the normals around: at corner i that of angle 2 i, between corners that of 2 i + 1; then down, up */
+	for (int i = 0; i < 2 * sides; i++)
+		put("vn %.17g %.17g 0\n", cos(M_PI * i / sides), sin(M_PI * i / sides));
+	put("vn 0 0 -1\nvn 0 0 1\n");
+	for (int i = 0; i < sides; i++) {
+		int next = (i + 1) % sides, v[4] = {2 * i + 1, 2 * next + 1, 2 * next + 2, 2 * i + 2};
+		int here = normals == ROUND ? 2 * i + 1 : 2 * i + 2, there = normals == ROUND ? 2 * next + 1 : here;
+		if (normals == NONE)
+			put("f %d %d %d\nf %d %d %d\n", v[0], v[1], v[2], v[0], v[2], v[3]);
+		else
+			put("f %d//%d %d//%d %d//%d\nf %d//%d %d//%d %d//%d\n", v[0], here, v[1], there, v[2], there,
+			    v[0], here, v[2], there, v[3], here);
+	}
+	for (int i = 1; i + 1 < sides; i++)
+		for (int lid = 0; lid < 2; lid++) {
+			int a = 1 + lid, b = 2 * i + 1 + lid, c = 2 * i + 3 + lid, n = 2 * sides + 1 + lid;
+			if (lid == 0) {
+				int swap = b;
+				b = c;
+				c = swap;
+			}
+			if (normals == NONE)
+				put("f %d %d %d\n", a, b, c);
+			else
+				put("f %d//%d %d//%d %d//%d\n", a, n, b, n, c, n);
+		}
+}
+
+/* Normals are weighted by angles. A quad's two triangles meet in two of its corners, so each side has 90 degrees there
+ * in all, and the normal in the middle of two sides is the mean. */
+static void test_prisms(void **state)
+{
+	(void)state;
+	for (int sides = 5; sides <= 40; sides += 7) {
+		double edge = 360.0 / sides;
+		char below[96], above[96];
+		snprintf(below, sizeof below, "<float name='maxSmoothAngle' value='%.6f'/>", 0.99 * edge);
+		snprintf(above, sizeof above, "<float name='maxSmoothAngle' value='%.6f'/>", 1.01 * edge);
+		struct built smooth, as_written;
+		put_prism(sides, NONE);
+		smooth = build_ok(below);
+		put_prism(sides, FLAT);
+		as_written = build_ok("");
+		expect_same(&smooth, &as_written);
+		put_prism(sides, NONE);
+		smooth = build_ok(above);
+		put_prism(sides, ROUND);
+		as_written = build_ok("");
+		expect_same(&smooth, &as_written);
+		/* Normals of the file are forgotten. */
+		put_prism(sides, FLAT);
+		smooth = build_ok(above);
+		put_prism(sides, ROUND);
+		as_written = build_ok("");
+		expect_same(&smooth, &as_written);
+	}
+}
+
+/* Across everything: what a file whose corners share all vertices has without normals. And across nothing. */
+static void test_ends(void **state)
+{
+	(void)state;
+	put_prism(7, NONE);
+	struct built all = build_ok(ANGLE(180)), shared = build_ok("");
+	expect_same(&all, &shared);
+	struct built none = build_ok(ANGLE(0));
+	put_prism(7, FLAT);
+	struct built flat = build_ok("");
+	expect_same(&none, &flat);
+}
+
+/* Three faces around an edge, 40 degrees each from the one before: the first takes the second, the third is left. */
+static void test_first_come(void **state)
+{
+	(void)state;
+	used = 0;
+	put("v 0 0 0\nv 0 0 1\n");
+	double third[3];
+	for (int i = 0; i < 3; i++) {
+		double a = M_PI / 180 * (90 + 40 * i);
+		put("v %.17g %.17g 0.5\n", cos(a), sin(a));
+		third[i] = a - M_PI / 2;
+	}
+	put("f 1 3 2\nf 1 4 2\nf 1 5 2\n");
+	struct built b = build_ok(ANGLE(50));
+	const struct mesh *m = &b.g.mesh;
+	for (int i = 0; i < 3; i++) {
+		double wanted = i < 2 ? 0.5 * (third[0] + third[1]) : third[2];
+		const double *n = m->normal[m->index[i][0]];
+		double cosine = fabs(n[0] * cos(wanted) + n[1] * sin(wanted));
+		if (!(fabs(cosine - 1) < 1e-12))
+			fail_msg("face %d: normal %g %g %g", i, n[0], n[1], n[2]);
+	}
+	assert_int_equal(m->vertex_count, 2 + 2 + 3); /* two of the edge for the first two, two for the third */
+	release(&b);
+}
+
+/* Where texture coordinates differ, surfaces are not smooth across, as in Mitsuba. */
+static void test_seams(void **state)
+{
+	(void)state;
+	used = 0;
+	put("v 0 0 0\nv 0 1 0\nv 1 0 0\nv -1 0 0.2\nvt 0 0\nvt 1 0\nvt 0 1\n");
+	put("f 1/1 3/2 2/3\nf 1/2 2/3 4/1\n");
+	struct built b = build_ok(ANGLE(90));
+	const struct mesh *m = &b.g.mesh;
+	assert_true(m->index[0][0] != m->index[1][0]);
+	assert_int_equal(m->index[0][2], m->index[1][1]);
+	assert_true(m->normal[m->index[0][0]][2] == 1);
+	release(&b);
+}
+
+static void expect_refused(const char *content, const char *sentence)
+{
+	struct built b = build(content);
+	if (b.result >= 0 || !strstr(b.error.text, sentence))
+		fail_msg("%s gave %d: %s", content, b.result, b.error.text);
+	release(&b);
+}
+
+static void test_bad_input(void **state)
+{
+	(void)state;
+	put_prism(5, NONE);
+	expect_refused(ANGLE(181), "max_smooth_angle=181 is outside [0, 180]");
+	expect_refused(ANGLE(30) "<boolean name='faceNormals' value='true'/>",
+		       "max_smooth_angle and face_normals contradict each other");
+	/* 40,000 triangles of different directions around a point */
+	used = 0;
+	put("v 0 0 0\n");
+	for (int i = 0; i <= 40000; i++)
+		put("v %.9g %.9g %.9g\n", cos(1e-4 * i), sin(1e-4 * i), 0.3 + 1e-9 * i * i);
+	for (int i = 0; i < 40000; i++)
+		put("f 1 %d %d\n", i + 2, i + 3);
+	expect_refused(ANGLE(0), "too many triangles of different directions meet in a place");
+	struct built b = build_ok(ANGLE(30));
+	release(&b);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_prisms), cmocka_unit_test(test_ends),	 cmocka_unit_test(test_first_come),
+		cmocka_unit_test(test_seams),  cmocka_unit_test(test_bad_input),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A picture's luminance as heights over the square from (-1,-1) to (1,1), along z and times `scale`: the height field
+ * of Mitsuba 0.6. Each pixel is a vertex, the top row lies at y = -1, and texture coordinates run over the square as
+ * x and y do. Between four pixels are two triangles, where Mitsuba has a bilinear patch.
+ *
+ * Shading normals are Mitsuba's: in units of pixels, the mean of the unit normals that the patches around have in that
+ * corner. Mitsuba resamples pictures to sides of 2^n + 1 pixels first; here they stay as they are.
+ *
+ * Failures: neither a file nor a bitmap, a picture of less than 2 x 2 pixels or of more than a mesh has room for.
+ */
+#include "worker/render/scene/image.h"
+#include "worker/render/shape/declare.h"
+#include "worker/render/shape/mesh.h"
+
+#include "common/base/liveness.h"
+
+#include <string.h>
+
+static const struct param params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL},
+	{"shading_normals", UNDERSTOOD(VALUE_BOOL)},
+	{"width", IGNORED}, /* of textures that are no pictures, which are refused */
+	{"height", IGNORED},
+	SHAPE_PARAMS_END,
+};
+
+struct field {
+	struct image picture;
+	double scale;
+};
+
+static double height_at(const struct field *f, uint32_t x, uint32_t y)
+{
+	const float *p = f->picture.pixels + ((size_t)y * f->picture.width + x) * f->picture.channels;
+	double z = (double)p[0];
+	if (f->picture.channels == 3)
+		z = 0.212671 * (double)p[0] + 0.71516 * (double)p[1] + 0.072169 * (double)p[2];
+	return f->scale * z;
+}
+
+/* The picture is decoded as one of colours is, unless its texture says that it holds numbers. */
+static int read_picture(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+			struct image *out, struct error *e)
+{
+	static const struct {
+		const char *name;
+		enum image_channel channel;
+	} channels[] = {{"r", IMAGE_RED}, {"g", IMAGE_GREEN}, {"b", IMAGE_BLUE}, {"a", IMAGE_ALPHA}};
+	const struct scene_node *texture = node_child(n, PLUGIN_TEXTURE, 0), *from = texture ? texture : n;
+	if ((texture != NULL) == (node_find(n, "filename") != NULL))
+		return node_error(n, e, EINVAL, "needs either a filename or a bitmap inside");
+	if (texture && strcmp(texture->type, "bitmap") != 0)
+		return node_error(texture, e, ENOTSUP, "the heights of a heightfield come from a bitmap");
+	const char *wanted = node_string(from, "channel", "");
+	enum image_channel channel = IMAGE_ALL;
+	for (size_t i = 0; i < sizeof channels / sizeof *channels; i++)
+		if (strcmp(channels[i].name, wanted) == 0)
+			channel = channels[i].channel;
+	struct asset a;
+	int r = mesh_open(from, assets, &a, e);
+	if (r)
+		return r;
+	struct error inner;
+	bool raw = node_bool(from, "raw", node_float(from, "gamma", -1) == 1);
+	r = image_decode(a.bytes, a.size, node_string(from, "filename", ""), raw, channel, arena, out, &inner);
+	assets->close(assets->user, &a);
+	return r ? node_error(from, e, -r, "%s", inner.text) : 0;
+}
+
+static void add(double *normal, double x, double y)
+{
+	double length = sqrt(x * x + y * y + 1);
+	normal[0] += x / length;
+	normal[1] += y / length;
+	normal[2] += 1 / length;
+}
+
+/* In units of pixels first, then of the square, which is as wide as `cells` pixels are apart over 2. */
+static void set_normals(const struct field *f, struct mesh *m, double across, double along)
+{
+	uint32_t width = f->picture.width, height = f->picture.height;
+	for (uint32_t y = 0; y + 1 < height; y++)
+		for (uint32_t x = 0; x + 1 < width; x++) {
+			double(*n)[3] = m->normal + (size_t)y * width + x;
+			double z00 = height_at(f, x, y), z10 = height_at(f, x + 1, y), z01 = height_at(f, x, y + 1),
+			       z11 = height_at(f, x + 1, y + 1);
+			add(n[0], z00 - z10, z00 - z01);
+			add(n[1], z00 - z10, z10 - z11);
+			add(n[width], z01 - z11, z00 - z01);
+			add(n[width + 1], z01 - z11, z10 - z11);
+		}
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		vec3 n = {m->normal[i][0] / across, m->normal[i][1] / along, m->normal[i][2]};
+		mesh_store(m->normal[i], mesh_unit(n));
+	}
+}
+
+static void set_triangles(const struct field *f, struct mesh *m)
+{
+	uint32_t width = f->picture.width, height = f->picture.height, k = 0;
+	for (uint32_t y = 0; y + 1 < height; y++)
+		for (uint32_t x = 0; x + 1 < width; x++) {
+			uint32_t at = y * width + x;
+			memcpy(m->index[k++], (uint32_t[3]){at + width, at, at + width + 1}, sizeof *m->index);
+			memcpy(m->index[k++], (uint32_t[3]){at + width + 1, at, at + 1}, sizeof *m->index);
+		}
+}
+
+static int make_mesh(const struct field *f, bool smooth, const struct scene_node *n, struct arena *arena,
+		     struct mesh *m, struct error *e)
+{
+	uint32_t width = f->picture.width, height = f->picture.height;
+	if (width < 2 || height < 2)
+		return node_error(n, e, EINVAL, "a picture of %u x %u pixels; heights need 2 x 2", width, height);
+	uint64_t triangles = 2 * (uint64_t)(width - 1) * (height - 1);
+	if (triangles > MESH_TRIANGLES_MAX)
+		return node_error(n, e, EFBIG, "a picture of %u x %u pixels makes more than %d triangles", width,
+				  height, MESH_TRIANGLES_MAX);
+	if (!mesh_alloc(m, width * height, (uint32_t)triangles, smooth, true, arena))
+		return node_error(n, e, ENOMEM, "out of memory");
+	double across = 2.0 / (width - 1), along = 2.0 / (height - 1);
+	for (uint32_t y = 0; y < height; y++) {
+		tick();
+		for (uint32_t x = 0; x < width; x++) {
+			uint32_t i = y * width + x;
+			mesh_store(m->position[i], (vec3){across * x - 1, along * y - 1, height_at(f, x, y)});
+			m->uv[i][0] = 0.5 * across * x;
+			m->uv[i][1] = 0.5 * along * y;
+		}
+	}
+	set_triangles(f, m);
+	if (smooth)
+		set_normals(f, m, across, along);
+	return 0;
+}
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	struct arena decoded = {0};
+	struct field f = {.scale = node_float(n, "scale", 1)};
+	bool smooth = node_bool(n, "shading_normals", true);
+	int r = read_picture(n, assets, &decoded, &f.picture, e);
+	if (!r)
+		r = make_mesh(&f, smooth, n, arena, &out->mesh, e);
+	out->face_normals = !smooth;
+	arena_fini(&decoded);
+	return r;
+}
+
+const struct shape_ops shape_ops_heightfield = {
+	.type = "heightfield",
+	.params = params,
+	.build = build,
+	.nested_classes = 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER | 1u << PLUGIN_TEXTURE,
+};

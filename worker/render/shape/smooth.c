@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/shape/smooth.h"
+
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Of pairs: so many, and as many as corners have when 64 triangles without a common direction meet in each place. */
+#define COMPARED_MAX(corners) (((uint64_t)1 << 28) + 64 * (uint64_t)(corners))
+enum { TICK_EVERY = 1 << 16 };
+
+struct corner {
+	double key[5]; /* position, texture coordinates */
+	uint32_t at;   /* 3 times the triangle, and which of its corners */
+};
+
+struct smoothing {
+	struct mesh *m;
+	struct corner *corners; /* sorted; those that have a vertex again are moved to the front of their place */
+	double (*normal)[3];	/* of each triangle */
+	double least;		/* cosine */
+	struct mesh out;
+	uint64_t compared;
+};
+
+static int compare_corners(const void *a, const void *b)
+{
+	const struct corner *x = a, *y = b;
+	for (int i = 0; i < 5; i++)
+		if (x->key[i] != y->key[i])
+			return x->key[i] < y->key[i] ? -1 : 1;
+	return x->at < y->at ? -1 : x->at > y->at;
+}
+
+static bool same_place(const struct corner *a, const struct corner *b)
+{
+	return memcmp(a->key, b->key, sizeof a->key) == 0;
+}
+
+static void gather(struct smoothing *s)
+{
+	const struct mesh *m = s->m;
+	for (uint32_t i = 0; i < m->triangle_count; i++) {
+		const uint32_t *t = m->index[i];
+		vec3 p = mesh_load(m->position[t[0]]);
+		mesh_store(s->normal[i], mesh_unit(vec3_cross(vec3_sub(mesh_load(m->position[t[1]]), p),
+							      vec3_sub(mesh_load(m->position[t[2]]), p))));
+		for (uint32_t k = 0; k < 3; k++) {
+			struct corner *c = &s->corners[3 * (size_t)i + k];
+			for (int x = 0; x < 3; x++)
+				c->key[x] = m->position[t[k]][x] + 0.0; /* -0 is 0 */
+			for (int x = 0; x < 2; x++)
+				c->key[3 + x] = m->uv ? m->uv[t[k]][x] + 0.0 : 0;
+			c->at = 3 * i + k;
+		}
+	}
+	qsort(s->corners, 3 * (size_t)m->triangle_count, sizeof *s->corners, compare_corners);
+}
+
+static uint32_t new_vertex(struct smoothing *s, const struct corner *c)
+{
+	uint32_t v = s->out.vertex_count++;
+	memcpy(s->out.position[v], c->key, sizeof s->out.position[v]);
+	if (s->out.uv)
+		memcpy(s->out.uv[v], c->key + 3, sizeof s->out.uv[v]);
+	return v;
+}
+
+static bool smooth_across(const struct smoothing *s, const struct corner *a, const struct corner *b)
+{
+	const double *x = s->normal[a->at / 3], *y = s->normal[b->at / 3];
+	return memcmp(x, y, sizeof *s->normal) == 0 || vec3_dot(mesh_load(x), mesh_load(y)) > s->least;
+}
+
+/* The corners of one place; false: too many of them. */
+static bool share_vertices(struct smoothing *s, struct corner *c, size_t count)
+{
+	while (count > 0) {
+		uint32_t v = new_vertex(s, c);
+		size_t left = 0;
+		struct corner first = *c;
+		for (size_t i = 0; i < count; i++) {
+			if (++s->compared % TICK_EVERY == 0)
+				tick();
+			if (smooth_across(s, &first, &c[i]))
+				s->out.index[c[i].at / 3][c[i].at % 3] = v;
+			else
+				c[left++] = c[i];
+		}
+		count = left;
+		if (s->compared > COMPARED_MAX(3 * (size_t)s->m->triangle_count))
+			return false;
+	}
+	return true;
+}
+
+static bool share_all(struct smoothing *s)
+{
+	size_t corners = 3 * (size_t)s->m->triangle_count, end;
+	for (size_t begin = 0; begin < corners; begin = end) {
+		for (end = begin + 1; end < corners && same_place(&s->corners[begin], &s->corners[end]); end++)
+			;
+		if (!share_vertices(s, s->corners + begin, end - begin))
+			return false;
+	}
+	return true;
+}
+
+int mesh_smooth(struct mesh *m, double degrees, struct arena *arena, const struct scene_node *n, struct error *e)
+{
+	uint32_t triangles = m->triangle_count;
+	size_t corners = 3 * (size_t)triangles;
+	struct smoothing s = {.m = m, .least = cos(degrees * (M_PI / 180))};
+	s.corners = mem_alloc(corners, sizeof *s.corners);
+	s.normal = mem_alloc(triangles, sizeof *s.normal);
+	int r = 0;
+	if (!s.corners || !s.normal || !mesh_alloc(&s.out, (uint32_t)corners, triangles, false, m->uv != NULL, arena)) {
+		r = node_error(n, e, ENOMEM, "out of memory");
+	} else {
+		gather(&s);
+		s.out.vertex_count = 0;
+		if (share_all(&s))
+			*m = s.out;
+		else
+			r = node_error(n, e, E2BIG,
+				       "max_smooth_angle: too many triangles of different directions meet in a place");
+	}
+	mem_free(s.corners);
+	mem_free(s.normal);
+	return r;
+}
