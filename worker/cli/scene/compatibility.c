@@ -7,21 +7,6 @@
 
 #include <string.h>
 
-/* Mitsuba's own plug-ins of both dialects; those that a registry has are left out of the list of what is refused. */
-static const struct {
-	enum plugin_class cls;
-	const char *types;
-} mitsuba[] = {
-	{PLUGIN_SHAPE, "bsplinecurve|deformable|ellipsoids|ellipsoidsmesh|hair|linearcurve|sdfgrid"},
-	{PLUGIN_BSDF, "circular|hair|hk|irawan|measured|measured_polarized|polarizer|pplastic|retarder"},
-	{PLUGIN_TEXTURE, "curvature|gridtexture|volume|wireframe"},
-	{PLUGIN_EMITTER, "collimated|directionalarea|timed_sunsky"},
-	{PLUGIN_SENSOR,
-	 "batch|distant|fluxmeter|irradiancemeter|perspective_rdist|radiancemeter|spherical|telecentric"},
-	{PLUGIN_FILM, "specfilm"},
-	{PLUGIN_MEDIUM, "heterogeneous|homogeneous"},
-};
-
 static const char *const headings[PLUGIN_CLASSES] = {
 	[PLUGIN_SHAPE] = "Shapes",     [PLUGIN_BSDF] = "Materials",   [PLUGIN_TEXTURE] = "Textures",
 	[PLUGIN_EMITTER] = "Emitters", [PLUGIN_SENSOR] = "Sensors",   [PLUGIN_FILM] = "Films",
@@ -86,19 +71,15 @@ static void print_stand_in(FILE *out, enum plugin_class cls, const char *type)
 
 static void print_unsupported(FILE *out)
 {
+	const char *type;
 	fprintf(out, "\n## Mitsuba's plug-ins that are not supported\n\n"
 		     "Refused, with file, line and the nearest name; with `--lenient` replaced.\n\n"
 		     "| class | type | with `--lenient` |\n|---|---|---|\n");
-	for (size_t i = 0; i < sizeof mitsuba / sizeof *mitsuba; i++) {
-		char type[64];
-		for (const char *rest = mitsuba[i].types; *rest;) {
-			size_t n = strcspn(rest, "|");
-			snprintf(type, sizeof type, "%.*s", (int)n, rest);
-			rest += n + (rest[n] == '|');
-			const struct plugin_decl *d = plugin_find(render_plugins(), mitsuba[i].cls, type);
-			if (!d || strcmp(d->type, "*") == 0)
-				print_stand_in(out, mitsuba[i].cls, type);
-		}
+	enum plugin_class cls;
+	for (size_t i = 0; (type = plugin_of_mitsuba(i, &cls)); i++) {
+		const struct plugin_decl *d = plugin_find(render_plugins(), cls, type);
+		if (!d || strcmp(d->type, "*") == 0)
+			print_stand_in(out, cls, type);
 	}
 }
 

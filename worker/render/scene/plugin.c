@@ -65,6 +65,79 @@ const struct param *plugin_param(const struct plugin_decl *d, const char *name)
 	return any;
 }
 
+const char *plugin_new_name(const struct plugin_decl *d, const char *name)
+{
+	static const struct {
+		enum plugin_class cls;
+		const char *type, *old, *now;
+	} names[] = {
+		{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
+		{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
+	};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (names[i].cls == d->cls && strcmp(names[i].type, d->type) == 0 && strcmp(names[i].old, name) == 0)
+			return names[i].now;
+	return name;
+}
+
+static const struct {
+	enum plugin_class cls;
+	const char *type;
+} mitsubas[] = {
+	{PLUGIN_SHAPE, "bsplinecurve"},
+	{PLUGIN_SHAPE, "deformable"},
+	{PLUGIN_SHAPE, "ellipsoids"},
+	{PLUGIN_SHAPE, "ellipsoidsmesh"},
+	{PLUGIN_SHAPE, "hair"},
+	{PLUGIN_SHAPE, "linearcurve"},
+	{PLUGIN_SHAPE, "sdfgrid"},
+	{PLUGIN_BSDF, "circular"},
+	{PLUGIN_BSDF, "hair"},
+	{PLUGIN_BSDF, "hk"},
+	{PLUGIN_BSDF, "irawan"},
+	{PLUGIN_BSDF, "measured"},
+	{PLUGIN_BSDF, "measured_polarized"},
+	{PLUGIN_BSDF, "polarizer"},
+	{PLUGIN_BSDF, "pplastic"},
+	{PLUGIN_BSDF, "retarder"},
+	{PLUGIN_TEXTURE, "curvature"},
+	{PLUGIN_TEXTURE, "gridtexture"},
+	{PLUGIN_TEXTURE, "mesh_attribute"},
+	{PLUGIN_TEXTURE, "vertexcolors"},
+	{PLUGIN_TEXTURE, "volume"},
+	{PLUGIN_TEXTURE, "wireframe"},
+	{PLUGIN_EMITTER, "collimated"},
+	{PLUGIN_EMITTER, "directionalarea"},
+	{PLUGIN_EMITTER, "timed_sunsky"},
+	{PLUGIN_SENSOR, "batch"},
+	{PLUGIN_SENSOR, "distant"},
+	{PLUGIN_SENSOR, "fluxmeter"},
+	{PLUGIN_SENSOR, "irradiancemeter"},
+	{PLUGIN_SENSOR, "perspective_rdist"},
+	{PLUGIN_SENSOR, "radiancemeter"},
+	{PLUGIN_SENSOR, "spherical"},
+	{PLUGIN_SENSOR, "telecentric"},
+	{PLUGIN_FILM, "specfilm"},
+	{PLUGIN_MEDIUM, "heterogeneous"},
+	{PLUGIN_MEDIUM, "homogeneous"},
+};
+
+const char *plugin_of_mitsuba(size_t index, enum plugin_class *cls)
+{
+	if (index >= sizeof mitsubas / sizeof *mitsubas)
+		return NULL;
+	*cls = mitsubas[index].cls;
+	return mitsubas[index].type;
+}
+
+bool plugin_is_mitsubas(enum plugin_class cls, const char *type)
+{
+	for (size_t i = 0; i < sizeof mitsubas / sizeof *mitsubas; i++)
+		if (mitsubas[i].cls == cls && strcasecmp(mitsubas[i].type, type) == 0)
+			return true;
+	return false;
+}
+
 void plugin_offer_types(const struct plugin_decl *decls, enum plugin_class cls, struct spelling *s)
 {
 	for (const struct plugin_decl *d = decls; d->type; d++)

@@ -166,7 +166,8 @@ static int note_foreign_parameter(struct maker *m, const struct xml_element *own
 static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
 		   const struct xml_element *el, const char *name, const struct param **p)
 {
-	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, name) : name);
+	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
+	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
@@ -317,6 +318,9 @@ static int refuse_type(struct maker *m, const struct xml_element *el, enum plugi
 	struct spelling s = {.wanted = type};
 	plugin_offer_types(m->decls, cls, &s);
 	plugin_list_types(m->decls, cls, list, sizeof list);
+	if (plugin_is_mitsubas(cls, type))
+		return xml_error(el, m->error, EINVAL, "this %s of Mitsuba's is not supported (supported: %s)",
+				 plugin_class_name(cls), list);
 	return xml_error(el, m->error, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
 			 spelling_hint(&s, hint, sizeof hint), list);
 }

@@ -127,7 +127,10 @@ static void test_unknown_names(void **state)
 	refuses(S "\n<bsdf type='difuse'/>" END,
 		"s.xml:2: <bsdf type=\"difuse\">: there is no bsdf of this type; did you mean "
 		"`diffuse`? (supported: diffuse, ");
-	refuses(S "<bsdf type='hair'/>" END, "supported: diffuse, roughconductor");
+	refuses(S "<bsdf type='hair'/>" END,
+		"this bsdf of Mitsuba's is not supported (supported: diffuse, roughconductor");
+	refuses(S "<shape type='sdfgrid'/>" END,
+		"<shape type=\"sdfgrid\">: this shape of Mitsuba's is not supported (supp");
 	refuses(S "<medium type='homogeneous'/>" END, "supported: none");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");

@@ -397,6 +397,29 @@ static void test_every_problem_is_told(void **state)
 	assert_non_null(strstr(e.text, "(and 2 more: hslt-scene check lists them)"));
 }
 
+/* 0.6 has two names for a diffuse surface's colour; 3.x has one. */
+static void test_second_name(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='0.6.0'><bsdf type='diffuse'><texture name='diffuseReflectance' "
+				 "type='checkerboard'/></bsdf><bsdf type='diffuse'>"
+				 "<rgb name='diffuseReflectance' value='0.1 0.2 0.3'/></bsdf></scene>");
+	assert_non_null(node_ref(s.objects[0], "reflectance"));
+	assert_true(node_find(s.objects[1], "reflectance")->value.as.rgb[2] == 0.3);
+	scene_fini(&s);
+	struct error e;
+	assert_true(read_with(&s,
+			      "<scene version='0.6.0'><bsdf type='diffuse'><rgb name='reflectance' value='1'/>"
+			      "<rgb name='diffuseReflectance' value='1'/></bsdf></scene>",
+			      NULL, 0, &e) < 0);
+	assert_non_null(strstr(e.text, "`reflectance` is given twice"));
+	assert_true(read_with(&s,
+			      "<scene version='3.0.0'><bsdf type='diffuse'>"
+			      "<rgb name='diffuse_reflectance' value='1'/></bsdf></scene>",
+			      NULL, 0, &e) < 0);
+	assert_non_null(strstr(e.text, "has no `diffuse_reflectance`"));
+}
+
 /* However a file is named, it is one file, and its name has no "..". */
 static void test_asset_names_are_canonical(void **state)
 {
@@ -446,6 +469,7 @@ int main(void)
 		cmocka_unit_test(test_ignored_is_noted_once),
 		cmocka_unit_test(test_assets_are_sorted_and_unique),
 		cmocka_unit_test(test_asset_names_are_canonical),
+		cmocka_unit_test(test_second_name),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
