@@ -48,7 +48,7 @@ struct microfacet principled_facets(double anisotropic, double roughness)
 }
 
 /* Textures of roughness and of metallic are grey: their mean over the lanes. */
-static double share_at(const struct texture *t, const struct bsdf_point *at)
+double principled_share_at(const struct texture *t, const struct bsdf_point *at)
 {
 	return fmin(fmax(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
 }
@@ -57,10 +57,10 @@ struct stuff principled_stuff(const struct principled *p, const struct bsdf_poin
 {
 	struct stuff s = {.p = p,
 			  .base = texture_eval(&p->base, &at->where, at->w),
-			  .roughness = share_at(&p->roughness, at),
-			  .metallic = share_at(&p->metallic, at)};
+			  .roughness = principled_share_at(&p->roughness, at),
+			  .metallic = principled_share_at(&p->metallic, at)};
 	for (int i = 0; i < SHARES; i++)
-		s.share[i] = p->varies && p->share[i].ops ? share_at(&p->share[i], at) : p->most[i];
+		s.share[i] = p->varies && p->share[i].ops ? principled_share_at(&p->share[i], at) : p->most[i];
 	s.facets = principled_facets(s.share[ANISOTROPIC], s.roughness);
 	s.tint = s.share[SPEC_TINT] > 0 || s.share[SHEEN_TINT] > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
 	return s;
@@ -297,7 +297,7 @@ static double range_of(const struct texture *t, const struct bsdf_build *build, 
 	uint32_t count = texture_is_constant(t) ? 1 : probes.count;
 	for (uint32_t i = 0; i < count; i++) {
 		const struct bsdf_point at = bsdf_probe(&probes, i);
-		double x = share_at(t, &at);
+		double x = principled_share_at(t, &at);
 		least = fmin(least, x);
 		most = fmax(most, x);
 	}

@@ -19,27 +19,29 @@ enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE, THIN_THROUGH, THIN_LOBES };
 
 struct thin {
 	struct principled p;
-	double spec_trans, through; /* through: d of the header comment */
+	struct texture diff_trans; /* a number, `through`, where it has no ops */
+	double through;		   /* d of the header comment */
 };
 
 /* A point of the surface, and a direction from it, which is taken for the upper side. */
 struct thin_point {
 	const struct thin *t;
 	struct stuff s;
-	struct microfacet passing; /* D' */
-	double chance[THIN_LOBES]; /* of sampling */
+	double spec_trans, through; /* t and d of the header comment */
+	struct microfacet passing;  /* D' */
+	double chance[THIN_LOBES];  /* of sampling */
 };
 
 static void find_chances(struct thin_point *x, double cosine)
 {
 	const struct thin *t = x->t;
-	double base = t->p.base_max, diffuse = 1 - t->spec_trans, sum = 0;
+	double base = t->p.base_max, diffuse = 1 - x->spec_trans, sum = 0;
 	double reflected = fresnel_dielectric(fmin(cosine, 1), t->p.eta).reflected;
 	/* Facets reflect other shares than the plane they lie in: neither lobe is left out. */
-	x->chance[THIN_REFLECT] = t->spec_trans * (0.25 + 0.5 * reflected);
-	x->chance[THIN_TRANSMIT] = t->spec_trans * base * (0.75 - 0.5 * reflected);
-	x->chance[THIN_DIFFUSE] = diffuse * (1 - t->through) * fmax(base, 0.2 * x->s.share[SHEEN]);
-	x->chance[THIN_THROUGH] = diffuse * t->through * base;
+	x->chance[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
+	x->chance[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
+	x->chance[THIN_DIFFUSE] = diffuse * (1 - x->through) * fmax(base, 0.2 * x->s.share[SHEEN]);
+	x->chance[THIN_THROUGH] = diffuse * x->through * base;
 	for (int i = 0; i < THIN_LOBES; i++)
 		sum += x->chance[i];
 	for (int i = 0; i < THIN_LOBES; i++)
@@ -50,6 +52,10 @@ static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *
 {
 	const struct thin *t = b->data;
 	struct thin_point x = {.t = t, .s = principled_stuff(&t->p, p)};
+	x.through = t->diff_trans.ops ? 0.5 * principled_share_at(&t->diff_trans, p) : t->through;
+	/* What passes specularly is not what principled_diffuse leaves out. */
+	x.spec_trans = x.s.share[TRANSMISSION];
+	x.s.share[TRANSMISSION] = 0;
 	x.passing = principled_facets(x.s.share[ANISOTROPIC], (0.65 * t->p.eta - 0.35) * x.s.roughness);
 	find_chances(&x, fabs(wo.z));
 	return x;
@@ -77,15 +83,15 @@ static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
 	if (!(o.z > 0 && i.z > 0) || !microfacet_half(o, 1, i, &h, &length))
 		return out;
 	double cosine = fmin(0.5 * length, 1), seen = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, o),
-	       both = t->spec_trans * seen * microfacet_g1_over_cos(m, i), diffuse = 1 - t->spec_trans;
+	       both = x->spec_trans * seen * microfacet_g1_over_cos(m, i), diffuse = 1 - x->spec_trans;
 	if (reflect) {
 		spectrum d = principled_diffuse(&x->s, o, i, cosine);
 		out.f = spectrum_add(spectrum_scale(both, principled_fresnel(&x->s, cosine)),
-				     spectrum_scale(diffuse * (1 - t->through), d));
+				     spectrum_scale(diffuse * (1 - x->through), d));
 		out.pdf = x->chance[THIN_REFLECT] * seen + x->chance[THIN_DIFFUSE] * i.z / WARP_PI;
 	} else {
 		double passes = both * fresnel_dielectric(cosine, t->p.eta).transmitted;
-		out.f = spectrum_scale(passes + diffuse * t->through / WARP_PI, x->s.base);
+		out.f = spectrum_scale(passes + diffuse * x->through / WARP_PI, x->s.base);
 		out.pdf = x->chance[THIN_TRANSMIT] * seen + x->chance[THIN_THROUGH] * i.z / WARP_PI;
 	}
 	return out;
@@ -143,40 +149,36 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
 		code = principled_shares(p, b, n, build, e);
+	t->through = 0.5 * node_float(n, "diff_trans", 0);
+	if (!code && node_ref(n, "diff_trans"))
+		code = bsdf_texture(b, &t->diff_trans, n, "diff_trans", 0, build, e);
 	if (code)
 		return code;
-	/* What passes specularly is not what principled_diffuse leaves out. */
-	t->spec_trans = p->most[TRANSMISSION];
-	p->most[TRANSMISSION] = 0;
 	p->metallic = (struct texture){.color = color_constant(0)};
 	p->eta = node_float(n, "eta", 1.5);
 	p->base_max = texture_max(&p->base);
-	t->through = 0.5 * node_float(n, "diff_trans", 0);
+	double spec_trans = p->most[TRANSMISSION];
 	double rough = principled_least(&p->roughness, build);
 	struct microfacet facets = principled_facets(p->most[ANISOTROPIC], rough),
 			  passing = principled_facets(p->most[ANISOTROPIC], (0.65 * p->eta - 0.35) * rough);
-	b->modes = BSDF_REFLECT | (t->spec_trans > 0 || t->through > 0 ? BSDF_TRANSMIT : 0);
+	b->modes = BSDF_REFLECT | (spec_trans > 0 || t->diff_trans.ops || t->through > 0 ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;
 	b->two_sided = true;
-	b->alpha = t->spec_trans > 0 ? fmin(microfacet_least(&facets), microfacet_least(&passing)) : INFINITY;
-	b->alpha_mean = 1 - t->spec_trans + t->spec_trans * microfacet_mean(&facets);
+	b->alpha = spec_trans > 0 ? fmin(microfacet_least(&facets), microfacet_least(&passing)) : INFINITY;
+	b->alpha_mean = 1 - spec_trans + spec_trans * microfacet_mean(&facets);
 	return 0;
 }
 
-#define SHARE(name_, max_)                                                             \
-	{                                                                              \
-		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = max_ \
-	}
 static const struct param thin_params[] = {
 	{.name = "base_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	{.name = "roughness", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	PRINCIPLED_SHARE("anisotropic"),
-	SHARE("spec_trans", 1),
+	PRINCIPLED_SHARE("spec_trans"),
 	PRINCIPLED_SHARE("spec_tint"),
 	PRINCIPLED_SHARE("sheen"),
 	PRINCIPLED_SHARE("sheen_tint"),
 	PRINCIPLED_SHARE("flatness"),
-	SHARE("diff_trans", 2),
+	{.name = "diff_trans", .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 2},
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = "specular_reflectance_sampling_rate", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},

@@ -16,7 +16,7 @@ static const struct {
 	enum plugin_class cls;
 	const char *type, *stand_in;
 } likes[] = {
-	{PLUGIN_BSDF, "pplastic", "roughplastic"},   {PLUGIN_BSDF, "measured", "roughplastic"},
+	{PLUGIN_BSDF, "measured", "roughplastic"},
 
 	{PLUGIN_BSDF, "polarizer", "null"},	     {PLUGIN_BSDF, "retarder", "null"},
 	{PLUGIN_BSDF, "circular", "null"},	     {PLUGIN_EMITTER, "timed_sunsky", "constant"},

@@ -98,7 +98,6 @@ static const struct {
 	{PLUGIN_BSDF, "measured"},
 	{PLUGIN_BSDF, "measured_polarized"},
 	{PLUGIN_BSDF, "polarizer"},
-	{PLUGIN_BSDF, "pplastic"},
 	{PLUGIN_BSDF, "retarder"},
 	{PLUGIN_TEXTURE, "curvature"},
 	{PLUGIN_TEXTURE, "gridtexture"},

@@ -189,6 +189,15 @@ static void test_a_thin_sheet(void **state)
 			 1) < 1e-13);
 }
 
+/* Textures that are the same everywhere are numbers. */
+static void test_a_sheet_of_textures(void **state)
+{
+	(void)state;
+	same("principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) | @spec_trans checkerboard color0=0.3 color1=0.3 | "
+	     "@diff_trans checkerboard color0=0.9 color1=0.9",
+	     "principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) spec_trans=0.3 diff_trans=0.9", 1, 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -199,6 +208,7 @@ int main(void)
 		cmocka_unit_test(test_specular_is_an_index),
 		cmocka_unit_test(test_metallic_texture),
 		cmocka_unit_test(test_a_thin_sheet),
+		cmocka_unit_test(test_a_sheet_of_textures),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,7 +22,7 @@ static void test_stand_ins(void **state)
 		const char *stand_in;
 	} expected[] = {
 		{PLUGIN_BSDF, "hair", LENIENT_INNER, "diffuse"},
-		{PLUGIN_BSDF, "pplastic", LENIENT_REPLACE, "roughplastic"},
+		{PLUGIN_BSDF, "measured", LENIENT_REPLACE, "roughplastic"},
 		{PLUGIN_BSDF, "polarizer", LENIENT_REPLACE, "null"},
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "constant"},
 		{PLUGIN_EMITTER, "directionalarea", LENIENT_REPLACE, "area"},

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Mitsuba 3's polarized plastic (Baek et al. 2018) for light that is not polarized, which is all that there is here: a
+ * rough dielectric boundary, and beside it a diffuse lobe that is let in and out by a smooth one, F and T of Fresnel:
+ *
+ *   f = specular F(wo.h) D G1 G1 / (4 cos cos) + diffuse T(wo) T(wi) / pi
+ *
+ * On the side of the normal. Light that the boundary throws back inside is lost, unlike in `roughplastic`.
+ */
+#include "worker/render/bsdf/coating.h"
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/rough_map.h"
+#include "worker/render/bsdf/warp.h"
+
+struct pplastic {
+	struct coating coating;
+	struct rough_map roughness;
+};
+
+static struct fresnel fresnel_at(const struct pplastic *s, double cosine)
+{
+	return fresnel_dielectric(fmin(cosine, 1), s->coating.eta);
+}
+
+/* The specular lobe without its reflectance, and its density. Both directions above. */
+static double facets(const struct pplastic *s, const struct microfacet *m, vec3 wo, vec3 wi, double *pdf)
+{
+	vec3 h;
+	double length;
+	*pdf = 0;
+	if (!microfacet_half(wo, 1, wi, &h, &length))
+		return 0;
+	*pdf = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, wo);
+	return *pdf * microfacet_g1_over_cos(m, wi) * fresnel_at(s, 0.5 * length).reflected;
+}
+
+static spectrum pplastic_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct pplastic *s = b->data;
+	if (!(wo.z > 0 && wi.z > 0))
+		return spectrum_of(0);
+	struct microfacet m = rough_map_at(&s->roughness, p);
+	double pdf, lobe = facets(s, &m, wo, wi, &pdf),
+		    passes = fresnel_at(s, wo.z).transmitted * fresnel_at(s, wi.z).transmitted / WARP_PI;
+	return spectrum_add(spectrum_scale(lobe, texture_eval(&s->coating.specular, &p->where, p->w)),
+			    spectrum_scale(passes, texture_eval(&s->coating.diffuse, &p->where, p->w)));
+}
+
+static double specular_chance(const struct pplastic *s, vec3 wo)
+{
+	return coating_specular_chance(&s->coating, fresnel_at(s, wo.z).reflected);
+}
+
+static double pplastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct pplastic *s = b->data;
+	if (!(wo.z > 0 && wi.z > 0))
+		return 0;
+	struct microfacet m = rough_map_at(&s->roughness, p);
+	double lobe, chance = specular_chance(s, wo);
+	facets(s, &m, wo, wi, &lobe);
+	return chance * lobe + (1 - chance) * wi.z / WARP_PI;
+}
+
+static bool pplastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			    struct bsdf_sample *out)
+{
+	const struct pplastic *s = b->data;
+	if (!(wo.z > 0))
+		return false;
+	vec3 wi;
+	if (u[2] < specular_chance(s, wo)) {
+		struct microfacet m = rough_map_at(&s->roughness, p);
+		vec3 h = microfacet_sample_visible(&m, wo, u[0], u[1]);
+		wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
+	} else {
+		wi = warp_cosine_hemisphere(u[0], u[1]);
+	}
+	double pdf = pplastic_pdf(b, p, wo, wi);
+	if (!(pdf > 0))
+		return false;
+	*out = (struct bsdf_sample){
+		.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = pplastic_eval(b, p, wo, wi), .eta = 1};
+	return true;
+}
+
+static int pplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct pplastic *s = bsdf_data(b, n, build, sizeof *s, e);
+	if (!s)
+		return -ENOMEM;
+	int code = coating_read(&s->coating, b, n, build, e);
+	if (!code)
+		code = rough_map_read(&s->roughness, b, n, build, e);
+	if (code)
+		return code;
+	double chance = s->coating.specular_weight;
+	if (!(chance > 0))
+		b->alpha = INFINITY;
+	b->alpha_mean = chance * b->alpha_mean + (1 - chance);
+	return 0;
+}
+
+static const struct param pplastic_params[] = {
+	IOR_NUMBER("int_ior"),
+	IOR_NUMBER("ext_ior"),
+	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	ROUGH_MAP_PARAMS,
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_pplastic = {
+	.type = "pplastic",
+	.params = pplastic_params,
+	.create = pplastic_create,
+	.eval = pplastic_eval,
+	.pdf_solid = pplastic_pdf,
+	.sample = pplastic_sample,
+};
