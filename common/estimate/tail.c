@@ -66,3 +66,17 @@ double tail_index_least(double index, size_t k)
 {
 	return index * (1 + one_sided / sqrt((double)k));
 }
+
+double tail_evi(const struct tail *t, size_t k)
+{
+	double first = 0, second = 0;
+	if (k == 0 || t->held <= k)
+		return 1;
+	for (size_t i = 0; i < k; i++) {
+		double x = log(t->y[i] / t->y[k]);
+		first += x / (double)k;
+		second += x * x / (double)k;
+	}
+	double spread = second - first * first;
+	return spread > 0 ? first + 1 - 0.5 * second / spread : -INFINITY;
+}
