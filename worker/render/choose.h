@@ -9,11 +9,12 @@
  * and how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator). Chains are
  * called for where either finds a good share of rare light and bdpt's largest fall off so slowly that more samples keep
  * on finding larger ones, below a tail index of about 1 not even a mean exists: caustics through water, panes, frosted
- * glass; or where both find some, and the largest of both fall off slower still. Else it is `path` or `bdpt8` where
- * path's tail is that of a finite variance (2 or more) and its second moment times rays is the smaller one: `path`
- * where the tail or its end is so short that it has no fireflies, else `bdpt8`, whose light sub-paths, one in eight
- * samples, bound them. `bdpt` in all other cases, because the fireflies that a pilot does not see decide the error of a
- * long render.
+ * glass; where both find some, and the largest of both fall off slower still; or where `path` finds nothing. Else it is
+ * `path` or `bdpt8` where path's tail is that of a finite variance (a tail index of 2 or more, or an extreme-value
+ * index below 1/2, which sees an end of a broad range of contributions) and its second moment times rays is the smaller
+ * one: `path` where the tail or its end is so short that it has no fireflies, else `bdpt8`, whose light sub-paths, one
+ * in eight samples, bound them. `bdpt` in all other cases, because the fireflies that a pilot does not see decide the
+ * error of a long render.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -27,16 +28,18 @@ struct render_found {
 	double rare;	/* share of the energy beyond RENDER_RARE times the brightness there */
 	double tail;	/* tail index of the largest, one in RENDER_TAIL samples, */
 	double extreme; /* and one in RENDER_EXTREME; 1 where fewer carry light */
+	double evi;	/* extreme-value index of the largest, one in RENDER_EVI; 1 where fewer carry light */
 };
 #define RENDER_RARE 32
-enum { RENDER_TAIL = 128, RENDER_EXTREME = 512 };
+enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 
 struct render_choice {
 	struct render_found path, bdpt;
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe */
 	bool settled;	  /* path alone left no choice: nothing is known of bdpt */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of
-			     a short render's, or 3 times 4,096; 1 in 30 of a long one's */
+			     a short render's, or 3 times 4,096; 1 in 30 of a long one's; not those of `path`, an eighth
+			     at most, that single bright ones of bdpt are held against */
 };
 
 /* Sets integrator, kind and mixture of the request, all else of which stands. Ticks. -ENOMEM, -EINVAL */

@@ -31,7 +31,7 @@ static void choose(const struct world *w, uint64_t seed, uint64_t spp, struct pl
 		fail_msg("%s", e.text);
 }
 
-enum { SPP = 40 }; /* the pilot's usual length, from 30 on at 160x90 */
+enum { SEEDS = 4, SPP = 40 }; /* the pilot's usual length, from 30 on at 160x90 */
 
 static bool chooses_chains(struct world *w, uint64_t seed)
 {
@@ -47,8 +47,6 @@ static bool chooses_chains(struct world *w, uint64_t seed)
 	print_message("seed %d: %s\n", (int)seed, text);
 	return strcmp(r.integrator, "hslt") == 0;
 }
-
-enum { SEEDS = 4 };
 
 static void an_open_room_needs_no_chains(void **state)
 {
@@ -74,6 +72,57 @@ static void a_lamp_in_view_is_not_rare_light(void **state)
 		5000, 5000, 5000);
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_false(chooses_chains(w, seed));
+	world_free(w);
+}
+
+/* Light sub-paths end in its image, a pixel of up to 100,000 times the brightness around it that none of the map's
+ * samples met: by themselves their contributions are three quarters of all light, with a tail index of 0.3. */
+static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(
+		160, 90,
+		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>" SENSOR(
+			"0,0,4",
+			"0,0,0") "<shape type='cube'><transform name='to_world'><scale value='5'/></transform>"
+				 "<bsdf type='diffuse'><rgb name='reflectance' value='0.3,0.3,0.3'/></bsdf></shape>"
+				 "<shape type='rectangle'><transform name='to_world'><scale value='1.5'/></transform>"
+				 "<bsdf type='roughconductor'><float name='alpha' value='0.02'/></bsdf></shape>"
+				 "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='4.9'/></transform>"
+				 "<emitter type='area'><rgb name='radiance' value='10,10,10'/></emitter></shape>"
+				 "<shape type='sphere'><point name='center' x='1.2' y='0.1' z='0.07'/><float name='radius' value='0.003'/>"
+				 "<emitter type='area'><rgb name='radiance' value='%d,%d,%d'/></emitter></shape>",
+		1000000, 1000000, 1000000);
+	for (uint64_t seed = 0; seed < SEEDS; seed++)
+		assert_false(chooses_chains(w, seed));
+	world_free(w);
+}
+
+/* Wide lobes and a large lamp: a broad range of contributions that has an end. */
+static void light_with_an_end_to_its_tail_is_given_to_bdpt8(void **state)
+{
+	(void)state;
+	struct world *w = world_of_own_scene("../bench/scenes", "effects-glass.xml", 160, 90);
+	int times = 0;
+	for (uint64_t seed = 0; seed < SEEDS; seed++) {
+		struct plan_request r;
+		struct render_choice c;
+		choose(w, seed, SPP, &r, &c);
+		assert_true(c.path.tail < 2);
+		times += strcmp(r.integrator, "bdpt8") == 0;
+	}
+	assert_true(times >= SEEDS / 2); /* 78 % of other seeds */
+	world_free(w);
+}
+
+/* A lamp in a ball of glass: bdpt finds what lies on the walls, and finds it clean; what is seen in a mirror it misses.
+ */
+static void a_lamp_behind_glass_that_path_never_hits_needs_chains(void **state)
+{
+	(void)state;
+	struct world *w = world_of_own_scene("bulb", "scene.xml", 160, 90);
+	for (uint64_t seed = 0; seed < 2 * SEEDS; seed++)
+		assert_true(chooses_chains(w, seed));
 	world_free(w);
 }
 
@@ -186,50 +235,77 @@ static void the_rule(void **state)
 {
 	(void)state;
 	static const struct {
-		struct render_choice c; /* cost, rare, tail, extreme of path, then of bdpt; misses */
+		struct render_choice
+			c; /* cost, rare, tail, extreme, extreme-value index of path, then of bdpt; misses */
 		const char *name;
 		bool settled;
 	} cases[] = {
-		{{{1, 0, 4, 4}, {2, 0, 3, 3}, false, false, 0}, "path", false},
-		{{{1, 0, 3, 2.4}, {2, 0, 3, 3}, false, false, 0},
+		{{{1, 0, 4, 4, 1}, {2, 0, 3, 3, 1}, false, false, 0}, "path", false},
+		{{{1, 0, 3, 2.4, 1}, {2, 0, 3, 3, 1}, false, false, 0},
 		 "bdpt8",
 		 false}, /* not sure that it has no fireflies */
-		{{{1, 0, 3, 3}, {2, 0, 3, 2.4}, false, false, 0}, "bdpt8", false},
-		{{{1, 0, 3, 2.6}, {2, 0, 3, 2.6}, false, false, 0}, "path", false},  /* the extremes of both are */
-		{{{1, 0.002, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "bdpt8", false}, /* but for some rare light */
-		{{{1, 0, 3, 3}, {2, 0.002, 3, 3}, false, false, 0}, "bdpt8", false},
-		{{{1.9, 0, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "bdpt", false},  /* not much better, and less sure */
-		{{{1, 0, 1.9, 1.5}, {0, 0, 1, 1}, false, false, 0}, "bdpt", true}, /* better but for its tail */
-		{{{1, 0, 4, 4}, {2, 0, 1.5, 1.5}, false, false, 0}, "path", false},
-		{{{1, 0.9, 0.5, 0.5}, {2, 0, 3, 3}, false, false, 0},
+		{{{1, 0, 3, 3, 1}, {2, 0, 3, 2.4, 1}, false, false, 0}, "bdpt8", false},
+		{{{1, 0, 3, 2.6, 1}, {2, 0, 3, 2.6, 1}, false, false, 0}, "path", false}, /* the extremes of both are */
+		{{{1, 0.002, 3, 3, 1}, {2, 0, 3, 3, 1}, false, false, 0}, "bdpt8", false}, /* but for some rare light */
+		{{{1, 0, 3, 3, 1}, {2, 0.002, 3, 3, 1}, false, false, 0}, "bdpt8", false},
+		{{{1.9, 0, 3, 3, 1}, {2, 0, 3, 3, 1}, false, false, 0},
+		 "bdpt",
+		 false}, /* not much better, and less sure */
+		{{{1, 0, 1.9, 1.5, 1}, {0, 0, 1, 1, 1}, false, false, 0}, "bdpt", true}, /* better but for its tail */
+		{{{1, 0, 4, 4, 1}, {2, 0, 1.5, 1.5, 1}, false, false, 0}, "path", false},
+		{{{1, 0.9, 0.5, 0.5, 1}, {2, 0, 3, 3, 1}, false, false, 0},
 		 "bdpt",
 		 false}, /* bdpt finds what path does not */
-		{{{1, 0, 4, 4}, {2, 0.9, 0.5, 0.5}, false, false, 0}, "hslt", false}, /* what bdpt finds path would */
-		{{{1, 0.2, 3.5, 1.5}, {5, 0.04, 2, 0.6}, false, false, 0}, "hslt", false}, /* by luck one of them */
-		{{{1, 0.2, 3.5, 1.5}, {5, 0.04, 2, 1.2}, false, false, 0}, "bdpt8", false},
-		{{{1, 0.5, 1.1, 1.1}, {2, 0.25, 1.4, 1.8}, false, false, 0}, "bdpt", false},   /* rare to path alone */
-		{{{1, 0.35, 1.4, 1.7}, {5, 0.3, 1.24, 1.95}, false, false, 0}, "bdpt", false}, /* but it has a mean */
-		{{{1, 0.5, 0.5, 3}, {2, 0.5, 0.5, 3}, false, false, 0}, "hslt", false},
-		{{{1, 0, 0.5, 0.6}, {2, 0.9, 0.3, 0.4}, false, false, 0}, "hslt", false},	/* path says: no mean */
-		{{{1, 0.07, 1.6, 1.7}, {600, 0.5, 1.2, 0.75}, false, false, 0}, "hslt", false}, /* path says: some */
-		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 0.7}, false, false, 0}, "hslt", false},	/* no mean exists */
-		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 1.2}, false, false, 0},
+		{{{1, 0, 4, 4, 1}, {2, 0.9, 0.5, 0.5, 1}, false, false, 0},
+		 "hslt",
+		 false}, /* what bdpt finds path would */
+		{{{1, 0.2, 3.5, 1.5, 1}, {5, 0.04, 2, 0.6, 1}, false, false, 0},
+		 "hslt",
+		 false}, /* by luck one of them */
+		{{{1, 0.2, 3.5, 1.5, 1}, {5, 0.04, 2, 1.2, 1}, false, false, 0}, "bdpt8", false},
+		{{{1, 0.5, 1.1, 1.1, 1}, {2, 0.25, 1.4, 1.8, 1}, false, false, 0},
+		 "bdpt",
+		 false}, /* rare to path alone */
+		{{{1, 0.35, 1.4, 1.7, 1}, {5, 0.3, 1.24, 1.95, 1}, false, false, 0},
+		 "bdpt",
+		 false}, /* but it has a mean */
+		{{{1, 0.5, 0.5, 3, 1}, {2, 0.5, 0.5, 3, 1}, false, false, 0}, "hslt", false},
+		{{{1, 0, 0.5, 0.6, 1}, {2, 0.9, 0.3, 0.4, 1}, false, false, 0}, "hslt", false}, /* path says: no mean */
+		{{{1, 0.07, 1.6, 1.7, 1}, {600, 0.5, 1.2, 0.75, 1}, false, false, 0},
+		 "hslt",
+		 false},									  /* path says: some */
+		{{{1, 0.1, 1.5, 0.7, 1}, {2, 0.1, 1.5, 0.7, 1}, false, false, 0}, "hslt", false}, /* no mean exists */
+		{{{1, 0.1, 1.5, 0.7, 1}, {2, 0.1, 1.5, 1.2, 1}, false, false, 0},
 		 "bdpt",
 		 false}, /* for one of them it does */
-		{{{1, 0.1, 1.5, 0.5}, {2, 0.1, 1.5, 1.0}, false, false, 0},
+		{{{1, 0.1, 1.5, 0.5, 1}, {2, 0.1, 1.5, 1.0, 1}, false, false, 0},
 		 "bdpt",
 		 false}, /* however heavy the other */
-		{{{1, 0.06, 1.5, 0.7}, {2, 0.01, 1.5, 0.7}, false, false, 0},
+		{{{1, 0.06, 1.5, 0.7, 1}, {2, 0.01, 1.5, 0.7, 1}, false, false, 0},
 		 "bdpt",
 		 false}, /* and it is nearly all there */
-		{{{0, 0, 1, 1}, {0, 0, 1, 1}, false, false, 0}, "hslt", false},
-		{{{1, 0, 3, 3}, {2, 0, 3, 3}, true, false, 0}, "bdpt", false},
-		{{{1, 0, 3, 3}, {2, 0.9, 0.5, 3}, true, false, 0},
+		{{{1, 0, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt8", false}, /* a range with an end */
+		{{{1, 0, 2, 4, 0.3}, {2, 0, 3, 3, 0.1}, false, false, 0}, "bdpt8", false},     /* never path by that */
+		{{{1, 0, 1.1, 1.9, 0.5}, {2, 0, 1.9, 2, 0.1}, false, false, 0}, "bdpt", true},
+		{{{1.6, 0, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt", false},
+		{{{1, 0.04, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt", false}, /* much of it rare */
+		{{{1, 0, 0.9, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt8", false},
+		{{{1, 0, 2.2, 1.9, 0.6}, {2, 0, 1.9, 2, 1}, false, false, 0},
+		 "bdpt8",
+		 false}, /* one of the two is enough */
+		{{{1, 0, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, true, false, 0}, "bdpt", false},
+		{{{0, 0, 1, 1, 1}, {0, 0, 1, 1, 1}, false, false, 0}, "hslt", true},
+		{{{0, 0, 1, 1, 1}, {0, 0, 1, 1, 1}, true, false, 0}, "hslt", false},
+		{{{1, 0, 3, 3, 1}, {2, 0, 3, 3, 1}, true, false, 0}, "bdpt", false},
+		{{{1, 0, 3, 3, 1}, {2, 0.9, 0.5, 3, 1}, true, false, 0},
 		 "hslt",
 		 false}, /* what path does not find says nothing */
-		{{{0, 0, 1, 1}, {1, 0, 3, 3}, false, false, 0},
+		{{{0, 0, 1, 1, 1}, {1, 0, 3, 3, 1}, false, false, 0},
+		 "hslt",
+		 true}, /* path found none: glass around all lamps */
+		{{{0, 0, 1, 1, 1}, {1, 0, 3, 3, 1}, true, false, 0},
 		 "bdpt",
-		 false}, /* no path from the camera found light */
+		 false}, /* but where it misses some that means nothing */
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		assert_string_equal(render_choice_of(&cases[i].c), cases[i].name);
@@ -242,11 +318,13 @@ static void what_is_settled_is_the_same_with_bdpt(void **state)
 {
 	(void)state;
 	static const double costs[] = {0, 1, 1000}, shares[] = {0, 0.1, 0.9}, tails[] = {0.3, 1.5, 4};
-	for (int i = 0; i < 81; i++) {
-		struct render_choice c = {.path = {1, 0.02, 1.9, 0.9},
-					  .bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27]}};
+	for (int i = 0; i < 162; i++) {
+		bool dark = i >= 81;
+		struct render_choice c = {
+			.path = {dark ? 0 : 1, dark ? 0 : 0.02, dark ? 1 : 1.9, dark ? 1 : 0.9, 1},
+			.bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27 % 3], 1}};
 		assert_true(render_choice_is_settled(&c));
-		assert_string_equal(render_choice_of(&c), "bdpt");
+		assert_string_equal(render_choice_of(&c), dark ? "hslt" : "bdpt");
 	}
 }
 
@@ -295,6 +373,9 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(an_open_room_needs_no_chains),
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),
+		cmocka_unit_test(a_small_lamp_in_a_mirror_is_not_rare_light),
+		cmocka_unit_test(light_with_an_end_to_its_tail_is_given_to_bdpt8),
+		cmocka_unit_test(a_lamp_behind_glass_that_path_never_hits_needs_chains),
 		cmocka_unit_test(path_is_not_chosen_where_it_misses_light),
 		cmocka_unit_test(light_through_water_needs_chains),
 		cmocka_unit_test(light_that_few_samples_find_needs_chains),

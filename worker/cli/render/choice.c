@@ -50,9 +50,9 @@ void choice_print(const struct choice *c, const char *integrator)
 
 static json_t *found_to_json(const struct render_found *f)
 {
-	return json_pack("{s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex", forecast_real(f->tail),
-			 "extremeTailIndex", forecast_real(f->extreme), "secondMomentTimesRays",
-			 forecast_real(f->cost));
+	return json_pack("{s:o s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex",
+			 forecast_real(f->tail), "extremeTailIndex", forecast_real(f->extreme), "extremeValueIndex",
+			 forecast_real(f->evi), "secondMomentTimesRays", forecast_real(f->cost));
 }
 
 json_t *choice_to_json(const struct choice *c)
