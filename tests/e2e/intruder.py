@@ -144,7 +144,8 @@ laughs = b"<!DOCTYPE scene [<!ENTITY a0 'ha'>" + b"".join(
 scenes = [
     unsent("a scene sent past the client: names /dev/zero", b"/dev/zero"),
     unsent("a scene sent past the client: names /proc/self/environ", b"/proc/self/environ"),
-    unsent("a scene sent past the client: names ../../../../etc/passwd", b"../../../../etc/passwd"),
+    ("a scene sent past the client: names ../../../../etc/passwd", mesh(b"../../../../etc/passwd"), (),
+     b"%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd: the file was not sent with the job"),  # as a client names it in a job
     unsent("a scene sent past the client: names a file by its whole name", at + b"/beside.obj"),
     unsent("a scene sent past the client: names a file where the worker was started", b"LICENSE"),
     unsent("a scene sent past the client: names a pipe", at + b"/pipe.obj"),
