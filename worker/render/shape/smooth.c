@@ -22,6 +22,7 @@ struct smoothing {
 	double (*normal)[3];	/* of each triangle */
 	double least;		/* cosine */
 	struct mesh out;
+	uint32_t *origin; /* of each vertex of `out`, the one in m that has its attributes */
 	uint64_t compared;
 };
 
@@ -59,19 +60,57 @@ static void gather(struct smoothing *s)
 	qsort(s->corners, 3 * (size_t)m->triangle_count, sizeof *s->corners, compare_corners);
 }
 
+static uint32_t old_vertex(const struct smoothing *s, const struct corner *c)
+{
+	return s->m->index[c->at / 3][c->at % 3];
+}
+
 static uint32_t new_vertex(struct smoothing *s, const struct corner *c)
 {
 	uint32_t v = s->out.vertex_count++;
+	s->origin[v] = old_vertex(s, c);
 	memcpy(s->out.position[v], c->key, sizeof s->out.position[v]);
 	if (s->out.uv)
 		memcpy(s->out.uv[v], c->key + 3, sizeof s->out.uv[v]);
 	return v;
 }
 
+static bool same_attributes(const struct mesh *m, uint32_t v, uint32_t w)
+{
+	for (uint32_t i = 0; i < m->attribute_count && v != w; i++) {
+		const struct attribute *a = &m->attributes[i];
+		if (!a->per_face && memcmp(a->value + (size_t)v * a->channels, a->value + (size_t)w * a->channels,
+					   a->channels * sizeof *a->value) != 0)
+			return false;
+	}
+	return true;
+}
+
+/* Those of faces stay: triangles keep their places. */
+static bool take_attributes(struct smoothing *s, struct arena *arena)
+{
+	s->out.attribute_count = s->m->attribute_count;
+	s->out.attributes = s->m->attributes;
+	for (uint32_t i = 0; i < s->out.attribute_count; i++) {
+		struct attribute *a = &s->out.attributes[i];
+		float *value = a->per_face
+				       ? a->value
+				       : arena_alloc(arena, (size_t)s->out.vertex_count * a->channels, sizeof *value);
+		if (!value)
+			return false;
+		for (uint32_t v = 0; !a->per_face && v < s->out.vertex_count; v++)
+			memcpy(value + (size_t)v * a->channels, a->value + (size_t)s->origin[v] * a->channels,
+			       a->channels * sizeof *value);
+		a->value = value;
+	}
+	return true;
+}
+
 static bool smooth_across(const struct smoothing *s, const struct corner *a, const struct corner *b)
 {
 	const double *x = s->normal[a->at / 3], *y = s->normal[b->at / 3];
-	return memcmp(x, y, sizeof *s->normal) == 0 || vec3_dot(mesh_load(x), mesh_load(y)) > s->least;
+	return (memcmp(x, y, sizeof *s->normal) == 0 || vec3_dot(mesh_load(x), mesh_load(y)) > s->least) &&
+	       same_attributes(s->m, old_vertex(s, a), old_vertex(s, b));
 }
 
 /* The corners of one place; false: too many of them. */
@@ -115,19 +154,24 @@ int mesh_smooth(struct mesh *m, double degrees, struct arena *arena, const struc
 	struct smoothing s = {.m = m, .least = cos(degrees * (M_PI / 180))};
 	s.corners = mem_alloc(corners, sizeof *s.corners);
 	s.normal = mem_alloc(triangles, sizeof *s.normal);
+	s.origin = mem_alloc(corners, sizeof *s.origin);
 	int r = 0;
-	if (!s.corners || !s.normal || !mesh_alloc(&s.out, (uint32_t)corners, triangles, false, m->uv != NULL, arena)) {
+	if (!s.corners || !s.normal || !s.origin ||
+	    !mesh_alloc(&s.out, (uint32_t)corners, triangles, false, m->uv != NULL, arena)) {
 		r = node_error(n, e, ENOMEM, "out of memory");
 	} else {
 		gather(&s);
 		s.out.vertex_count = 0;
-		if (share_all(&s))
-			*m = s.out;
-		else
+		if (!share_all(&s))
 			r = node_error(n, e, E2BIG,
 				       "max_smooth_angle: too many triangles of different directions meet in a place");
+		else if (!take_attributes(&s, arena))
+			r = node_error(n, e, ENOMEM, "out of memory");
+		else
+			*m = s.out;
 	}
 	mem_free(s.corners);
 	mem_free(s.normal);
+	mem_free(s.origin);
 	return r;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * `max_smooth_angle` of Mitsuba 0.6: normals are forgotten and computed again, across edges that are not too sharp.
- * Around each place (corners of one position and one pair of texture coordinates) triangles are taken together in
+ * Around each place (corners of one position, texture coordinates and attributes) triangles are taken together in
  * their order: the first that is left, with all others whose normals are within the angle of its own, share a vertex.
  */
 #ifndef WORKER_RENDER_SHAPE_SMOOTH_H

@@ -203,6 +203,42 @@ static void test_seams(void **state)
 	release(&b);
 }
 
+/* Nor where colours do; each corner keeps its own, and each triangle what is its. */
+static void test_attributes(void **state)
+{
+	(void)state;
+	static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+				  "property float z\nproperty float r\nproperty float g\nproperty float b\n"
+				  "element face 2\nproperty list uchar int vertex_indices\nproperty float face_heat\n"
+				  "end_header\n0 0 0 1 0 0\n0 1 0 0.5 0.5 0\n1 0 0 0 1 0\n-1 0 0.2 0 0 1\n0 0 0 0 1 1\n"
+				  "3 0 2 1 7\n3 4 1 3 9\n";
+	const char *xml = "<scene version='0.6.0'><shape type='ply'><string name='filename' value='m.ply'/>" ANGLE(
+		90) "</shape></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m.ply", ply, sizeof ply - 1}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct built b = {0};
+	uint64_t dropped;
+	assert_int_equal(scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error), 0);
+	assert_int_equal(shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error), 0);
+	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(m->vertex_count, 5);
+	assert_int_equal(m->index[0][2], m->index[1][1]); /* y = 1 has one colour */
+	assert_true(m->index[0][0] != m->index[1][0]);	  /* x = y = 0 has two */
+	assert_int_equal(m->attribute_count, 2);
+	for (uint32_t i = 0; i < m->attribute_count; i++) {
+		const struct attribute *a = &m->attributes[i];
+		if (a->per_face) {
+			assert_true(a->value[0] == 7 && a->value[1] == 9);
+			continue;
+		}
+		const float *first = a->value + (size_t)m->index[0][0] * a->channels,
+			    *second = a->value + (size_t)m->index[1][0] * a->channels,
+			    *both = a->value + (size_t)m->index[1][1] * a->channels;
+		assert_true(first[0] == 1 && first[1] == 0 && second[1] == 1 && second[2] == 1 && both[0] == 0.5f);
+	}
+	release(&b);
+}
+
 static void expect_refused(const char *content, const char *sentence)
 {
 	struct built b = build(content);
@@ -233,8 +269,8 @@ static void test_bad_input(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_prisms), cmocka_unit_test(test_ends),	 cmocka_unit_test(test_first_come),
-		cmocka_unit_test(test_seams),  cmocka_unit_test(test_bad_input),
+		cmocka_unit_test(test_prisms), cmocka_unit_test(test_ends),	  cmocka_unit_test(test_first_come),
+		cmocka_unit_test(test_seams),  cmocka_unit_test(test_attributes), cmocka_unit_test(test_bad_input),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
