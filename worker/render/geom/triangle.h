@@ -23,16 +23,17 @@ static inline double triangle_norm1(vec3 v)
 	return fabs(v.x) + fabs(v.y) + fabs(v.z);
 }
 
+/* e1, e2: v1 - v0 and v2 - v0. */
+static inline struct triangle triangle_between(vec3 v0, vec3 v1, vec3 v2, vec3 e1, vec3 e2)
+{
+	return (struct triangle){{v0, v1, v2}, vec3_cross(e1, e2), triangle_norm1(e1) * triangle_norm1(e2)};
+}
+
 static inline struct triangle triangle_from(const float (*position)[3], const uint32_t i[3])
 {
-	struct triangle t = {
-		{triangle_vertex(position, i[0]), triangle_vertex(position, i[1]), triangle_vertex(position, i[2])},
-		{0, 0, 0},
-		0};
-	vec3 e1 = vec3_sub(t.v[1], t.v[0]), e2 = vec3_sub(t.v[2], t.v[0]);
-	t.n = vec3_cross(e1, e2);
-	t.edges = triangle_norm1(e1) * triangle_norm1(e2);
-	return t;
+	vec3 v0 = triangle_vertex(position, i[0]), v1 = triangle_vertex(position, i[1]),
+	     v2 = triangle_vertex(position, i[2]);
+	return triangle_between(v0, v1, v2, vec3_sub(v1, v0), vec3_sub(v2, v0));
 }
 
 /* Of the plane over p, times |n|; 0 when p lies in the plane as far as double can tell: p and n carry the rounding of a
