@@ -71,20 +71,23 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 	for (size_t i = 0; i < count; i++)
 		m[i] = member_of(f, items[(size_t)((double)n * (double)i / (double)count)]);
 	for (int k = 0; k < 3; k++) {
-		size_t both = 0;
+		size_t below = 0, above = 0;
 		for (size_t i = 0; i < count; i++)
 			middle[i] = m[i].low[k] + (m[i].high[k] - m[i].low[k]) / 2;
 		qsort(middle, count, sizeof *middle, compare_numbers);
 		double cut = middle[count / 2];
-		for (size_t i = 0; i < count; i++)
-			both += (size_t)(m[i].low[k] <= cut) + (size_t)(m[i].high[k] >= cut);
-		if (both < least) {
-			least = both;
+		for (size_t i = 0; i < count; i++) {
+			below += m[i].low[k] <= cut;
+			above += m[i].high[k] >= cut;
+		}
+		/* A half that is the whole would be cut in the same way over and over. */
+		if (below + above < least && below < count && above < count) {
+			least = below + above;
 			*axis = k;
 			*at = cut;
 		}
 	}
-	return least * 3 <= count * 5;
+	return least < SIZE_MAX && least * 3 <= count * 5;
 }
 
 static bool shines(const struct search *f, struct prim_ref p)
