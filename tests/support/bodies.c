@@ -105,7 +105,8 @@ struct accel *body_accel(const struct geom_shape *shapes, uint32_t count)
 					    g->triangle_count,
 					    (const float(*)[3])g->position,
 					    (const uint32_t(*)[3])g->index,
-					    SURFACE_OPAQUE};
+					    SURFACE_OPAQUE,
+					    g->place};
 	}
 	struct accel *accel;
 	struct error e = {""};

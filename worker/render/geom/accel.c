@@ -12,8 +12,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
-#include "worker/render/geom/solved.h"
-#include "worker/render/geom/triangle.h"
+#include "worker/render/geom/instances.h"
 #include "worker/render/math/fptrap.h"
 
 #include <float.h>
@@ -29,6 +28,7 @@ struct accel {
 	struct accel_shape *shapes;
 	const struct coincidence *coincidence;
 	struct wide_prims *wide; /* one a shape */
+	struct instances instances;
 	atomic_size_t bytes, peak;
 	vec3 low, high;
 	double size;   /* sum of the sides */
@@ -74,8 +74,7 @@ static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 	const struct query *q = (const struct query *)(const void *)args->context;
 	/* Single rays only (N = 1): the accessors of packets exist in C++ alone. */
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
-	if ((hit->geomID == q->from.shape && hit->primID == q->from.prim) ||
-	    (hit->geomID == q->to.shape && hit->primID == q->to.prim))
+	if (query_is_end(q, (struct prim_ref){hit->geomID, hit->primID}))
 		args->valid[0] = 0;
 	else if (is_wide(q, args->geometryUserPtr, hit->primID))
 		args->valid[0] = 0;
@@ -141,7 +140,7 @@ static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, doubl
 {
 	struct wide_prims *w = &a->wide[id];
 	*w = (struct wide_prims){&a->shapes[id], id, 0, NULL};
-	if (a->shapes[id].is_sphere)
+	if (a->shapes[id].is_sphere || a->shapes[id].place)
 		return 0;
 	for (int pass = 0; pass < 2; pass++) {
 		w->count = 0;
@@ -209,6 +208,8 @@ static double extent_of(const struct accel_shape *s)
 {
 	if (s->is_sphere)
 		return 2 * s->radius;
+	if (s->place)
+		return 2 * triangle_norm_max(s->place->half);
 	float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, most = 0;
 	for (uint32_t i = 0; i < s->triangle_count; i++)
 		for (int j = 0; j < 3; j++)
@@ -221,7 +222,8 @@ static double extent_of(const struct accel_shape *s)
 	return (double)most;
 }
 
-static void find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
+/* Of all that is there: returns how far floats can be off. */
+static double find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
 {
 	double least = INFINITY, reach = 0;
 	for (uint32_t i = 0; i < count; i++) {
@@ -230,23 +232,48 @@ static void find_detail(struct accel *a, const struct accel_shape *shapes, uint3
 		least = fmin(least, extent_of(s));
 		if (s->is_sphere)
 			reach = fmax(reach, rounding_reach(vec3_sub(s->center, r), vec3_add(s->center, r)));
-		for (uint32_t k = 0; !s->is_sphere && k < s->vertex_count; k++) {
-			vec3 p = triangle_vertex(s->position, k);
-			reach = fmax(reach, rounding_reach(p, p));
-		}
+		else if (s->place)
+			reach = fmax(reach, rounding_reach(vec3_sub(s->place->center, s->place->half),
+							   vec3_add(s->place->center, s->place->half)));
+		else
+			for (uint32_t k = 0; k < s->vertex_count; k++) {
+				vec3 p = triangle_vertex(s->position, k);
+				reach = fmax(reach, rounding_reach(p, p));
+			}
 	}
 	a->detail = MIXED * least < 0x1p21 * reach ? least : 0;
+	return reach;
 }
 
 /* A sphere is hidden wholly or not at all. */
 static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 {
+	if (a->shapes[id].place)
+		return 0;
 	if (a->shapes[id].is_sphere &&
 	    coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0}, a->shapes[id].center).shape != id)
 		return 0;
 	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id)
 					 : attach_triangles(a, &a->shapes[id], id);
 	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
+}
+
+/* Of a number beyond those of the shapes and of what is solved of them. */
+static int attach_instances(struct accel *a, uint32_t count, double reach)
+{
+	struct instances *s = &a->instances;
+	int rc = instances_init(s, a->device, a->shapes, count);
+	if (rc || s->count == 0)
+		return rc;
+	/* As reach_at has it, of a scene whose size is not known yet. */
+	s->off = a->detail == 0 ? reach : 0x1p-21 * MIXED * a->detail + 0x1p-26 * reach;
+	s->off_far = a->detail == 0 ? 0 : 0x1p-21;
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
+	if (!g)
+		return -ENOMEM;
+	instances_geometry(g, s);
+	attach(a, g, 2 * count);
+	return 0;
 }
 
 static int build(struct accel *a, const struct accel_shape *shapes, uint32_t count, struct error *e)
@@ -260,7 +287,7 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 		return error_set(e, ENOMEM, "Embree's scene cannot be created");
 	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
 	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
-	find_detail(a, shapes, count);
+	double reach = find_detail(a, shapes, count);
 	for (uint32_t i = 0; i < count; i++)
 		a->shapes[i] = shapes[i];
 	for (uint32_t i = 0; i < count; i++) {
@@ -268,9 +295,12 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 		if (rc)
 			return error_set(e, -rc, "Embree's geometry cannot be created");
 	}
+	int rc = attach_instances(a, count, reach);
+	if (rc)
+		return error_set(e, -rc, "Embree's tree of a mesh cannot be created");
 	rtcSetSceneProgressMonitorFunction(a->scene, progress_monitor, tick_counter);
 	rtcCommitScene(a->scene);
-	int rc = embree_failure(a->device, e);
+	rc = embree_failure(a->device, e);
 	if (rc || count == 0)
 		return rc;
 	struct RTCBounds b;
@@ -312,6 +342,7 @@ void accel_free(struct accel *a)
 	unsigned trap = fptrap_leave();
 	if (a->scene)
 		rtcReleaseScene(a->scene);
+	instances_fini(&a->instances);
 	if (a->device)
 		rtcReleaseDevice(a->device);
 	fptrap_return(trap);
@@ -351,18 +382,13 @@ static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 	return enter;
 }
 
-static double norm_max(vec3 v)
-{
-	return fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
-}
-
 /* rounding_reach of a ray at p. Of mixed scales: by what is there, not by the scene: the triangles that Embree solves,
  * and the doubles of p itself on a triangle as large as the scene. */
 static double reach_at(const struct accel *a, vec3 p)
 {
 	if (a->detail == 0)
 		return a->reach;
-	return 0x1p-21 * (norm_max(p) + MIXED * a->detail) + 0x1p-50 * a->size;
+	return 0x1p-21 * (triangle_norm_max(p) + MIXED * a->detail) + 0x1p-50 * a->size;
 }
 
 /* A ray in float from o + t0 d on is off by parts of its distance from the origin, which is too much for what it meets
@@ -463,6 +489,7 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 		return false;
 	struct query q = query_of(a, vec3_madd(from->p, enter, d), d);
 	q.from = from->prim;
+	q.start = enter > 0 ? NULL : from;
 	struct RTCRayHit rh;
 	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
 		return false;
@@ -493,7 +520,7 @@ static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, dou
 bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
 {
 	/* Floats are the better the nearer to the origin a ray begins. */
-	if (a->detail > 0 && norm_max(to->p) < norm_max(from->p)) {
+	if (a->detail > 0 && triangle_norm_max(to->p) < triangle_norm_max(from->p)) {
 		const struct ray_end *other = from;
 		from = to;
 		to = other;
@@ -507,6 +534,8 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 	struct query q = query_of(a, vec3_madd(from->p, enter, d), vec3_scale(1 - enter, d));
 	q.from = from->prim;
 	q.to = to->prim;
+	q.start = enter > 0 ? NULL : from;
+	q.finish = to;
 	q.end = to->p;
 	q.segment = true;
 	if (!(vec3_length(q.d) > 0))
@@ -521,5 +550,6 @@ bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *fro
 		return true;
 	struct query q = query_of(a, from->p, d);
 	q.from = from->prim;
+	q.start = from;
 	return occluded(a, &q, lifted(a, from->p, from->ng, d), d, INFINITY);
 }

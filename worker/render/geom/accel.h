@@ -21,7 +21,7 @@
 #define WORKER_RENDER_GEOM_ACCEL_H
 
 #include "common/base/error.h"
-#include "worker/render/math/vec3.h"
+#include "worker/render/geom/placement.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -48,7 +48,14 @@ struct accel_shape {
 	const float (*position)[3];
 	const uint32_t (*index)[3];
 	enum surface_rank rank;
+	const struct placement *place; /* where this instance of a mesh stands; NULL: positions are the world's */
 };
+
+static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim)
+{
+	const uint32_t *i = s->index[prim];
+	return s->place ? placement_triangle(s->place, s->position, i) : triangle_from(s->position, i);
+}
 
 struct prim_ref {
 	uint32_t shape, prim;

@@ -57,7 +57,7 @@ static bool has_width(const struct polygon *a, vec3 n)
 	return fabs(area2) > 0x1p-21 * far * around;
 }
 
-bool coincide_triangles(const struct triangle *a, const struct triangle *b, bool *wholly)
+bool coincide_triangles(const struct triangle *a, const struct triangle *b, double off, bool *wholly)
 {
 	vec3 n = vec3_normalize(b->n);
 	struct polygon over = {{a->v[0], a->v[1], a->v[2]}, 3};
@@ -66,7 +66,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, bool
 		cut(&over, from, vec3_cross(n, vec3_sub(to, from)));
 	}
 	/* Twice as much as the roundings can do, for those before them in double and for the sums here. */
-	double within = 2 * (rounded_along(a, n) + rounded_along(b, n));
+	double within = 2 * (rounded_along(a, n) + rounded_along(b, n) + off);
 	for (unsigned i = 0; i < over.n; i++)
 		if (!(fabs(vec3_dot(n, vec3_sub(over.p[i], b->v[0]))) <= within))
 			return false;
@@ -78,7 +78,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, bool
 /* Seen along n. */
 static bool covers(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
 {
-	const struct triangle t = triangle_from(s->position, s->index[prim]);
+	const struct triangle t = accel_triangle(s, prim);
 	double unused;
 	return triangle_meets(&t, p, n, &unused);
 }
@@ -105,7 +105,7 @@ static bool hides(const struct coincidence *c, const struct accel_shape *shapes,
 	if (at == end || at->hidden.prim != prim.prim)
 		return false;
 	const struct accel_shape *s = &shapes[prim.shape];
-	vec3 n = s->is_sphere ? (vec3){0, 0, 0} : triangle_from(s->position, s->index[prim.prim]).n;
+	vec3 n = s->is_sphere ? (vec3){0, 0, 0} : accel_triangle(s, prim.prim).n;
 	for (; at < end && at->hidden.prim == prim.prim; at++)
 		if (at->wholly || covers(&shapes[at->by.shape], at->by.prim, p, n)) {
 			*by = at->by;

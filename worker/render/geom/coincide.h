@@ -49,7 +49,8 @@ void coincide_free(struct coincidence *c);
 struct prim_ref coincide_there(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim,
 			       vec3 p);
 
-/* Whether triangle a overlaps b in its plane: by more than the rounding of vertices makes of neighbours that touch. */
-bool coincide_triangles(const struct triangle *a, const struct triangle *b, bool *wholly);
+/* Whether triangle a overlaps b in its plane: by more than the rounding of vertices makes of neighbours that touch.
+ * off: by how much their vertices are off besides the rounding of their coordinates to float (struct placement). */
+bool coincide_triangles(const struct triangle *a, const struct triangle *b, double off, bool *wholly);
 
 #endif

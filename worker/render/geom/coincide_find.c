@@ -4,14 +4,21 @@
  * one shape that does not shine (nothing to find), a few primitives, or cannot be told apart by place; what is left is
  * compared two by two, in the order of their ranks. A triangle that is wholly hidden hides nothing itself, so a stack
  * of equal ones costs no square.
+ *
+ * An instance of a mesh goes as one item until a cut would divide it or nothing else is left to divide: then the
+ * triangles of its flat parts that meet the box around the others stand in its place. Most stand alone before that, or
+ * have none, and cost nothing.
  */
 #include "worker/render/geom/coincide.h"
 
-#include "common/base/mem.h"
 #include "common/base/liveness.h"
+#include "common/base/mem.h"
+#include "worker/render/geom/flat_parts.h"
 
 #include <stdlib.h>
 
+#define WHOLE UINT32_MAX /* in place of a primitive: all of an instance */
+enum { INSTANCED_MAX = 1 << 22 };
 enum { FEW = 12, MOST_CUTS = 64, SAMPLE = 129, OTHERS = 32, MANY = 16 * OTHERS };
 
 struct search {
@@ -20,6 +27,7 @@ struct search {
 	size_t pair_count, pair_room, pair_limit;
 	uint64_t work, limit; /* primitives put into parts, and twos compared */
 	bool incomplete;
+	struct flat_parts *flat; /* one a shape, of the first that shares a mesh; NULL: there are no instances */
 };
 
 struct member {
@@ -27,11 +35,32 @@ struct member {
 	double low[3], high[3];
 };
 
+static double along(vec3 v, int axis)
+{
+	return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
+
+static void extent_of_instance(const struct accel_shape *s, uint32_t prim, int axis, double *low, double *high)
+{
+	double margin = s->place->vertex_is_off;
+	if (prim == WHOLE) {
+		*low = along(s->place->center, axis) - along(s->place->half, axis) - margin;
+		*high = along(s->place->center, axis) + along(s->place->half, axis) + margin;
+		return;
+	}
+	const struct triangle t = accel_triangle(s, prim);
+	double u = along(t.v[0], axis), v = along(t.v[1], axis), w = along(t.v[2], axis);
+	*low = fmin(u, fmin(v, w)) - margin;
+	*high = fmax(u, fmax(v, w)) + margin;
+}
+
 /* Of its box along an axis, a little wider than it is, so that rounded coordinates meet. */
 static void extent(const struct search *f, struct prim_ref p, int axis, double *low, double *high)
 {
 	const struct accel_shape *s = &f->shapes[p.shape];
-	if (s->is_sphere) {
+	if (s->place) {
+		extent_of_instance(s, p.prim, axis, low, high);
+	} else if (s->is_sphere) {
 		double c = axis == 0 ? s->center.x : axis == 1 ? s->center.y : s->center.z;
 		*low = c - s->radius;
 		*high = c + s->radius;
@@ -122,10 +151,10 @@ static bool coincide(const struct search *f, struct coincide_pair *p)
 	p->wholly = p->same_side = true;
 	if (a->is_sphere || b->is_sphere)
 		return a->is_sphere && b->is_sphere && spheres_coincide(a, b);
-	const struct triangle t = triangle_from(a->position, a->index[p->hidden.prim]),
-			      u = triangle_from(b->position, b->index[p->by.prim]);
+	const struct triangle t = accel_triangle(a, p->hidden.prim), u = accel_triangle(b, p->by.prim);
+	double off = (a->place ? a->place->vertex_is_off : 0) + (b->place ? b->place->vertex_is_off : 0);
 	p->same_side = vec3_dot(t.n, u.n) > 0;
-	return coincide_triangles(&t, &u, &p->wholly);
+	return coincide_triangles(&t, &u, off, &p->wholly);
 }
 
 static int keep(struct search *f, const struct coincide_pair *p)
@@ -233,27 +262,102 @@ static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n
 	return kept;
 }
 
-/* items: as they rank; they are written over. */
-static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigned cuts)
-{
+static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigned cuts);
+
+/* Where to cut; `is` false: nowhere. */
+struct cut {
+	bool is;
 	int axis;
 	double at;
-	f->work += n;
-	f->incomplete |= f->work > f->limit;
-	if (f->incomplete || nothing_to_find(f, items, n))
-		return 0;
-	if (n > MANY && f->shapes[commonest(items, n)].rank != SURFACE_SHINES)
-		n = leave_out(f, items, n);
-	if (n <= FEW || cuts == 0 || !choose_cut(f, items, n, &axis, &at))
-		return compare_part(f, items, n);
+};
+
+/* An instance across the cut is divided; where there is none, every instance. */
+static bool is_divided(const struct search *f, struct prim_ref p, const struct cut *c)
+{
+	double low, high;
+	if (p.prim != WHOLE)
+		return false;
+	extent(f, p, c->axis, &low, &high);
+	return !c->is || (low <= c->at && high >= c->at);
+}
+
+static const struct flat_parts *flat_of(const struct search *f, uint32_t instance)
+{
+	return &f->flat[f->shapes[instance].place->first];
+}
+
+/* Room for all items with the triangles of those that are divided; 0: none is. */
+static size_t room_divided(const struct search *f, const struct prim_ref *items, size_t n, const struct cut *c)
+{
+	size_t room = n;
+	bool any = false;
+	for (size_t i = 0; f->flat && i < n; i++)
+		if (is_divided(f, items[i], c)) {
+			any = true;
+			room += flat_of(f, items[i].shape)->count;
+		}
+	return any ? room : 0;
+}
+
+/* The box around all items but one; of many, which are all around it, all of space. */
+static struct member box_of_others(const struct search *f, const struct prim_ref *items, size_t n, size_t without)
+{
+	double edge = n > MANY ? INFINITY : -INFINITY;
+	struct member box = {.prim = PRIM_NONE, .low = {-edge, -edge, -edge}, .high = {edge, edge, edge}};
+	if (n > MANY)
+		return box;
+	for (size_t i = 0; i < n; i++)
+		for (int k = 0; k < 3 && i != without; k++) {
+			double low, high;
+			extent(f, items[i], k, &low, &high);
+			box.low[k] = fmin(box.low[k], low);
+			box.high[k] = fmax(box.high[k], high);
+		}
+	return box;
+}
+
+/* Appends those triangles of its flat parts that meet the box. */
+static size_t divide(struct search *f, uint32_t shape, const struct member *box, struct prim_ref *out)
+{
+	size_t count = 0;
+	const struct flat_parts *flat = flat_of(f, shape);
+	f->work += flat->count;
+	for (uint32_t k = 0; k < flat->count; k++) {
+		const struct member m = member_of(f, (struct prim_ref){shape, flat->prim[k]});
+		if (may_meet(f, &m, box))
+			out[count++] = m.prim;
+		if (k % 4096 == 0)
+			tick();
+	}
+	return count;
+}
+
+static size_t divide_all(struct search *f, const struct prim_ref *items, size_t n, const struct cut *c,
+			 struct prim_ref *out)
+{
+	size_t count = 0;
+	for (size_t i = 0; i < n; i++) {
+		if (!is_divided(f, items[i], c)) {
+			out[count++] = items[i];
+			continue;
+		}
+		const struct member box = box_of_others(f, items, n, i);
+		count += divide(f, items[i].shape, &box, out + count);
+	}
+	return count;
+}
+
+static int look_into_halves(struct search *f, const struct prim_ref *items, size_t n, unsigned cuts,
+			    const struct cut *c)
+{
 	struct prim_ref *half = mem_alloc(n, sizeof *half);
 	int rc = half ? 0 : -ENOMEM;
 	for (int upper = 0; upper < 2 && !rc; upper++) {
 		size_t count = 0;
 		for (size_t i = 0; i < n; i++) {
 			double low, high;
-			extent(f, items[i], axis, &low, &high);
-			if (upper ? high >= at : low <= at)
+			extent(f, items[i], c->axis, &low, &high);
+			if (upper ? high >= c->at : low <= c->at)
 				half[count++] = items[i];
 			if (i % 4096 == 0)
 				tick();
@@ -261,6 +365,32 @@ static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigne
 		rc = look_into(f, half, count, cuts - 1);
 	}
 	mem_free(half);
+	return rc;
+}
+
+/* items: as they rank; they are written over. */
+static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigned cuts)
+{
+	struct cut c = {.is = false};
+	f->work += n;
+	f->incomplete |= f->work > f->limit;
+	if (f->incomplete || nothing_to_find(f, items, n))
+		return 0;
+	if (n > MANY && f->shapes[commonest(items, n)].rank != SURFACE_SHINES)
+		n = leave_out(f, items, n);
+	c.is = n > FEW && cuts > 0 && choose_cut(f, items, n, &c.axis, &c.at);
+	size_t room = room_divided(f, items, n, &c);
+	if (room == 0)
+		return c.is ? look_into_halves(f, items, n, cuts, &c) : compare_part(f, items, n);
+	f->incomplete |= f->work + room > f->limit;
+	if (f->incomplete)
+		return 0;
+	struct prim_ref *all = mem_alloc(room, sizeof *all);
+	if (!all)
+		return -ENOMEM;
+	size_t count = divide_all(f, items, n, &c, all);
+	int rc = c.is ? look_into_halves(f, all, count, cuts, &c) : look_into(f, all, count, cuts);
+	mem_free(all);
 	return rc;
 }
 
@@ -335,33 +465,64 @@ static int make(struct search *f, uint32_t count, struct coincidence **out)
 	return 0;
 }
 
-/* All primitives, as they rank. */
+/* All primitives, as they rank; instances as a whole. */
 static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, struct prim_ref *items)
 {
 	size_t n = 0;
 	for (unsigned rank = 0; rank < SURFACE_RANKS; rank++)
 		for (uint32_t i = 0; i < count; i++) {
-			uint32_t prims = shapes[i].is_sphere ? 1 : shapes[i].triangle_count;
+			uint32_t prims = shapes[i].is_sphere || shapes[i].place ? 1 : shapes[i].triangle_count;
 			for (uint32_t k = 0; shapes[i].rank == rank && k < prims; k++, n++)
 				if (items)
-					items[n] = (struct prim_ref){i, k};
+					items[n] = (struct prim_ref){i, shapes[i].place ? WHOLE : k};
 		}
 	return n;
+}
+
+/* The flat parts of the meshes that instances share; *moved: how many triangles these are in all instances. */
+static int find_flat_parts(struct search *f, uint32_t count, size_t *moved)
+{
+	*moved = 0;
+	for (uint32_t i = 0; i < count; i++) {
+		const struct placement *p = f->shapes[i].place;
+		if (!p)
+			continue;
+		if (!f->flat && !(f->flat = mem_alloc(count, sizeof *f->flat)))
+			return -ENOMEM;
+		int rc = p->first == i ? flat_parts_find(&f->flat[i], &f->shapes[i]) : 0;
+		if (rc)
+			return rc;
+		*moved += f->flat[p->first].count;
+	}
+	return 0;
+}
+
+static int find(struct search *f, uint32_t count, size_t n)
+{
+	size_t moved;
+	int rc = find_flat_parts(f, count, &moved);
+	struct prim_ref *items = rc ? NULL : mem_alloc(n, sizeof *items);
+	if (!items)
+		return -ENOMEM;
+	/* Enough for sorting to the last and for each primitive to meet dozens; not for all of all instances where
+	 * these are many. */
+	size_t most = moved < INSTANCED_MAX ? moved : INSTANCED_MAX;
+	f->limit = 128 * (uint64_t)n + (1u << 22) + 16 * (uint64_t)most;
+	f->pair_limit = 4 * n + (1u << 16) + most;
+	list_primitives(f->shapes, count, items);
+	rc = look_into(f, items, n, MOST_CUTS);
+	mem_free(items);
+	return rc;
 }
 
 int coincide_find(struct coincidence **out, const struct accel_shape *shapes, uint32_t count, struct error *e)
 {
 	*out = NULL;
-	size_t n = list_primitives(shapes, count, NULL);
-	/* Enough for sorting to the last and for each primitive to meet dozens. */
-	struct search f = {.shapes = shapes, .limit = 128 * (uint64_t)n + (1u << 22), .pair_limit = 4 * n + (1u << 16)};
-	struct prim_ref *items = mem_alloc(n, sizeof *items);
-	int rc = items ? 0 : -ENOMEM;
-	if (!rc) {
-		list_primitives(shapes, count, items);
-		rc = look_into(&f, items, n, MOST_CUTS);
-	}
-	mem_free(items);
+	struct search f = {.shapes = shapes};
+	int rc = find(&f, count, list_primitives(shapes, count, NULL));
+	for (uint32_t i = 0; f.flat && i < count; i++)
+		mem_free(f.flat[i].prim);
+	mem_free(f.flat);
 	if (!rc && (f.pair_count > 0 || f.incomplete))
 		rc = make(&f, count, out);
 	mem_free(f.pairs);

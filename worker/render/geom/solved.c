@@ -1,16 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/geom/solved.h"
 
-#include "worker/render/geom/triangle.h"
-
-static struct triangle triangle_of(const struct accel_shape *s, uint32_t prim)
-{
-	return triangle_from(s->position, s->index[prim]);
-}
-
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim)
 {
-	const struct triangle t = triangle_of(s, prim);
+	const struct triangle t = accel_triangle(s, prim);
 	double start = triangle_height(&t, q->o);
 	double beyond = q->segment ? -triangle_height(&t, q->end) : vec3_dot(t.n, q->d);
 	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
@@ -20,7 +13,7 @@ struct prim_ref query_there(const struct query *q, struct prim_ref prim)
 {
 	if (!query_hides(q, prim.shape))
 		return prim;
-	const struct triangle t = triangle_of(&q->shapes[prim.shape], prim.prim);
+	const struct triangle t = accel_triangle(&q->shapes[prim.shape], prim.prim);
 	double slope = vec3_dot(t.n, q->d);
 	if (slope == 0)
 		return prim;
@@ -28,15 +21,10 @@ struct prim_ref query_there(const struct query *q, struct prim_ref prim)
 			      vec3_madd(q->o, vec3_dot(t.n, vec3_sub(t.v[0], q->o)) / slope, q->d));
 }
 
-static bool is_end(const struct query *q, struct prim_ref p)
-{
-	return (p.shape == q->from.shape && p.prim == q->from.prim) || (p.shape == q->to.shape && p.prim == q->to.prim);
-}
-
 bool query_crosses_there(const struct query *q, struct prim_ref prim)
 {
 	struct prim_ref there = query_there(q, prim);
-	return !is_end(q, there) && query_crosses(q, &q->shapes[there.shape], there.prim);
+	return !query_is_end(q, there) && query_crosses(q, &q->shapes[there.shape], there.prim);
 }
 
 static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
@@ -129,9 +117,10 @@ static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
 static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct query *q, double t_max, double *t)
 {
 	const struct prim_ref ref = {w->id, prim};
-	if (is_end(q, ref) || !(query_hides(q, w->id) ? query_crosses_there(q, ref) : query_crosses(q, w->shape, prim)))
+	if (query_is_end(q, ref) ||
+	    !(query_hides(q, w->id) ? query_crosses_there(q, ref) : query_crosses(q, w->shape, prim)))
 		return false;
-	const struct triangle k = triangle_of(w->shape, prim);
+	const struct triangle k = accel_triangle(w->shape, prim);
 	return triangle_meets(&k, q->o, q->d, t) && *t > q->t_min && *t < t_max;
 }
 

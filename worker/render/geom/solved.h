@@ -21,6 +21,7 @@ struct query {
 	double back;	  /* Embree's ray begins that much before o, in units of d; below 0: after it */
 	double wide_from; /* extent from which on triangles are solved in double; INFINITY: none is */
 	struct prim_ref from, to;
+	const struct ray_end *start, *finish;  /* the surfaces on which o and end lie; NULL: free, or far from o */
 	const struct coincidence *coincidence; /* NULL: no surfaces coincide */
 	const struct accel_shape *shapes;
 };
@@ -41,6 +42,12 @@ struct wide_prims {
 /* The plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane,
  * on a coplanar neighbour, does not cross it again. */
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim);
+
+/* The ray starts or ends on it. */
+static inline bool query_is_end(const struct query *q, struct prim_ref p)
+{
+	return (p.shape == q->from.shape && p.prim == q->from.prim) || (p.shape == q->to.shape && p.prim == q->to.prim);
+}
 
 /* Which triangle is there where the ray crosses the plane of this one: it, or what hides it (coincide.h). */
 struct prim_ref query_there(const struct query *q, struct prim_ref prim);

@@ -93,17 +93,31 @@ struct corner {
 	vec3 v0, e1, e2;
 };
 
+static struct corner placed_corner(const struct geom_shape *s, const uint32_t i[3])
+{
+	vec3 p0 = at(s->position, i[0]), p1 = at(s->position, i[1]), p2 = at(s->position, i[2]);
+	return (struct corner){placement_point(s->place, p0), placement_vector(s->place, vec3_sub(p1, p0)),
+			       placement_vector(s->place, vec3_sub(p2, p0))};
+}
+
 static struct corner corner_of(const struct geom_shape *s, const uint32_t i[3])
 {
+	if (s->place)
+		return placed_corner(s, i);
 	vec3 v0 = at(s->position, i[0]);
 	return (struct corner){v0, vec3_sub(at(s->position, i[1]), v0), vec3_sub(at(s->position, i[2]), v0)};
+}
+
+static vec3 vertex_normal(const struct geom_shape *s, uint32_t i)
+{
+	return s->place ? placement_normal(s->place, at(s->normal, i)) : at(s->normal, i);
 }
 
 /* Not normalised. */
 static vec3 interpolated_normal(const struct geom_shape *s, const uint32_t i[3], double b1, double b2)
 {
-	vec3 m = vec3_scale(1 - b1 - b2, at(s->normal, i[0]));
-	return vec3_madd(vec3_madd(m, b1, at(s->normal, i[1])), b2, at(s->normal, i[2]));
+	vec3 m = vec3_scale(1 - b1 - b2, vertex_normal(s, i[0]));
+	return vec3_madd(vec3_madd(m, b1, vertex_normal(s, i[1])), b2, vertex_normal(s, i[2]));
 }
 
 /* A triangle's point before relief bends it. Where there are no texture coordinates barycentrics stand in. */
@@ -294,12 +308,12 @@ static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_
 	const uint32_t *i = s->index[x->prim.prim];
 	if (!s->normal)
 		return x->ng;
-	vec3 m = interpolated_normal(s, i, x->b1, x->b2), n0 = at(s->normal, i[0]), g1, g2;
+	vec3 m = interpolated_normal(s, i, x->b1, x->b2), n0 = vertex_normal(s, i[0]), g1, g2;
 	if (!(vec3_dot(m, x->ng) > 0))
 		return x->ng;
 	struct corner k = corner_of(s, i);
 	barycentric_gradients(&k, &g1, &g2);
-	vec3 m1 = vec3_sub(at(s->normal, i[1]), n0), m2 = vec3_sub(at(s->normal, i[2]), n0),
+	vec3 m1 = vec3_sub(vertex_normal(s, i[1]), n0), m2 = vec3_sub(vertex_normal(s, i[2]), n0),
 	     n = s->relief ? vec3_normalize(m) : x->sh.n;
 	double length = vec3_length(m);
 	for (int d = 0; d < 2; d++) {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A point on a primitive, in double: positions solved from the primitive itself (triangles in the plane of their float
- * vertices, spheres analytically), geometric normal, interpolated shading frame (bent by relief), texture coordinates.
- * The geometric normal is by winding; the world winds triangles so that it agrees with the vertex normals.
- * Pure; any thread.
+ * A point on a primitive, in double: positions solved from the primitive itself (triangles in the plane of their
+ * vertices, which are floats, or of an instance floats moved in double; spheres analytically), geometric normal,
+ * interpolated shading frame (bent by relief), texture coordinates. The geometric normal is by winding; the world winds
+ * triangles so that it agrees with the vertex normals. Pure; any thread.
  */
 #ifndef WORKER_RENDER_GEOM_SURFACE_H
 #define WORKER_RENDER_GEOM_SURFACE_H
@@ -11,7 +11,8 @@
 #include "worker/render/geom/accel.h"
 #include "worker/render/geom/relief.h"
 
-/* A shape in the rescaled world. Floats are what rays meet; everything else derives from them. */
+/* A shape in the rescaled world. Floats are what rays meet; everything else derives from them. Instances of a mesh
+ * share its arrays. */
 struct geom_shape {
 	bool is_sphere;
 	vec3 center;
@@ -20,10 +21,11 @@ struct geom_shape {
 	uint32_t vertex_count, triangle_count;
 	float (*position)[3];
 	uint32_t (*index)[3];
-	float (*normal)[3];	     /* NULL: flat */
-	float (*uv)[2];		     /* NULL: barycentrics stand in */
-	const struct relief *relief; /* bends shading normals; NULL: nothing does */
-	double unit;		     /* of the scene's length, in the world's: for relief */
+	float (*normal)[3];	       /* NULL: flat */
+	float (*uv)[2];		       /* NULL: barycentrics stand in */
+	const struct relief *relief;   /* bends shading normals; NULL: nothing does */
+	const struct placement *place; /* of an instance; NULL: positions and normals are the world's */
+	double unit;		       /* of the scene's length, in the world's: for relief */
 };
 
 struct surface_point {

@@ -18,6 +18,11 @@ static inline vec3 triangle_vertex(const float (*position)[3], uint32_t i)
 	return (vec3){(double)position[i][0], (double)position[i][1], (double)position[i][2]};
 }
 
+static inline double triangle_norm_max(vec3 v)
+{
+	return fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
+}
+
 static inline double triangle_norm1(vec3 v)
 {
 	return fabs(v.x) + fabs(v.y) + fabs(v.z);

@@ -42,6 +42,23 @@ static struct geom_shape triangle(struct dice *d, bool smooth, bool with_uv)
 				   .uv = with_uv ? uv : NULL};
 }
 
+/* An instance of it: turned, of uneven scale, and mirrored every other time. */
+static struct geom_shape placed(struct geom_shape s, struct dice *d)
+{
+	static struct placement place;
+	static uint32_t turned[1][3] = {{0, 2, 1}};
+	mat4 m = mat4_mul(mat4_rotate(dice_direction(d), dice_between(d, 0, 360)),
+			  mat4_scale((vec3){dice_between(d, 0.5, 2) * (dice_throw(d) < 0.5 ? -1 : 1),
+					    dice_between(d, 0.5, 2), dice_between(d, 0.5, 2)}));
+	for (int i = 0; i < 3; i++)
+		m.m[i][3] = dice_between(d, -1, 1);
+	assert_true(placement_make(&place, &m, (vec3){-1, -1, -1}, (vec3){1, 1, 1}));
+	s.place = &place;
+	if (place.mirrored)
+		s.index = turned;
+	return s;
+}
+
 /* Waves: a height's gradient and second derivatives, or a normal. */
 static void wave_height(const void *data, double u, double v, struct relief_value *out)
 {
@@ -151,6 +168,8 @@ static void test_differences(void **state)
 		    relief = (int)(i / 5 %
 				   (1 + RELIEFS)); /* flat, with and without uv; smooth, with and without uv; sphere */
 		struct geom_shape s = kind == 4 ? sphere(&d) : triangle(&d, kind >= 2, kind % 2);
+		if (kind < 4 && i / 20 % 2)
+			s = placed(s, &d);
 		if (relief)
 			s = bent(s, &d, relief - 1);
 		struct surface_point x;

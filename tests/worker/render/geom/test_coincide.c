@@ -96,7 +96,7 @@ static void put(struct soup *s, const struct frame *f, vec3 at, double size, con
 
 static bool meet(const struct triangle *a, const struct triangle *b)
 {
-	bool unused, one = coincide_triangles(a, b, &unused), other = coincide_triangles(b, a, &unused);
+	bool unused, one = coincide_triangles(a, b, 0, &unused), other = coincide_triangles(b, a, 0, &unused);
 	if (one != other)
 		fail_msg("one coincides with the other, which does not with the one");
 	return one;
@@ -176,7 +176,7 @@ static struct prim_ref rule(const struct accel_shape *s, uint32_t count, struct 
 				const struct triangle u = triangle_from(s[i].position, s[i].index[k]);
 				double unused;
 				bool wholly;
-				if (triangle_meets(&u, p, t.n, &unused) && coincide_triangles(&t, &u, &wholly))
+				if (triangle_meets(&u, p, t.n, &unused) && coincide_triangles(&t, &u, 0, &wholly))
 					return (struct prim_ref){i, k};
 			}
 	return at;

@@ -1,0 +1,360 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Rays among instances of one bumpy ball: plain, uneven, mirrored, turned, tiny and far away, one within another, over
+ * a floor that is no instance. Against a search in long double over all triangles, placed by the test itself: every ray
+ * from a surface or from free space meets the same triangle at the same place, every segment is blocked or not, however
+ * low it runs. At most one in two thousand, which passes an edge by less than floats can tell, meets its neighbour.
+ */
+#include "tests/support/bodies.h"
+#include "worker/render/geom/coincide.h"
+
+#include "common/base/mem.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { INSTANCES = 6, SHAPES = INSTANCES + 1, MOST = 4096 };
+
+typedef struct {
+	long double x, y, z;
+} wide;
+
+static wide widen(vec3 v)
+{
+	return (wide){(long double)v.x, (long double)v.y, (long double)v.z};
+}
+
+static wide wide_sub(wide a, wide b)
+{
+	return (wide){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+static wide wide_cross(wide a, wide b)
+{
+	return (wide){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+static long double wide_dot(wide a, wide b)
+{
+	return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+struct scene {
+	struct geom_shape ball, shape[SHAPES];
+	struct placement place[SHAPES];
+	uint32_t (*turned)[3];
+	wide corner[SHAPES][MOST][3];
+	double size[SHAPES];
+	struct accel *accel;
+};
+
+static mat4 times(mat4 a, mat4 b)
+{
+	return mat4_mul(a, b);
+}
+
+static mat4 transform(int k)
+{
+	const vec3 axis = {1, 2, -1};
+	switch (k) {
+	case 0:
+		return times(mat4_translate((vec3){-0.5, 0.1, 0}), mat4_scale((vec3){0.2, 0.2, 0.2}));
+	case 1:
+		return times(mat4_translate((vec3){0.1, 0.3, 0.4}),
+			     times(mat4_rotate(axis, 70), mat4_scale((vec3){0.3, 0.05, 0.15})));
+	case 2: /* mirrored */
+		return times(mat4_translate((vec3){0.5, 0.2, -0.2}),
+			     times(mat4_rotate(axis, -20), mat4_scale((vec3){-0.2, 0.1, 0.2})));
+	case 3: /* around the plain one */
+		return times(mat4_translate((vec3){-0.5, 0.1, 0}), mat4_scale((vec3){-0.28, -0.28, -0.28}));
+	case 4: /* of floats as rough as a thousandth of it */
+		return times(mat4_translate((vec3){0.9, -0.1, 0.3}), mat4_scale((vec3){0.0005, 0.0006, 0.0004}));
+	default:
+		return times(mat4_translate((vec3){-0.2, -0.4, -0.6}),
+			     times(mat4_rotate(axis, 160), mat4_scale((vec3){0.1, 0.1, -0.3})));
+	}
+}
+
+static wide move(const mat4 *m, const float p[3])
+{
+	long double out[3];
+	for (int i = 0; i < 3; i++) {
+		out[i] = (long double)m->m[i][3];
+		for (int k = 0; k < 3; k++)
+			out[i] += (long double)m->m[i][k] * (long double)p[k];
+	}
+	return (wide){out[0], out[1], out[2]};
+}
+
+static void turn(struct scene *s)
+{
+	const struct geom_shape *g = &s->ball;
+	s->turned = mem_alloc(g->triangle_count, sizeof *s->turned);
+	assert_non_null(s->turned);
+	for (uint32_t i = 0; i < g->triangle_count; i++)
+		memcpy(s->turned[i], (uint32_t[3]){g->index[i][0], g->index[i][2], g->index[i][1]},
+		       sizeof s->turned[i]);
+}
+
+/* `first`: which of the transforms the first shape has, so that the tree is of one winding or the other. */
+static struct scene *scene_of(int first)
+{
+	struct scene *s = mem_alloc(1, sizeof *s);
+	struct accel_shape a[SHAPES] = {{.is_sphere = false}};
+	assert_non_null(s);
+	body_ball(&s->ball, 6, 0.8, 0.1);
+	body_plane(&s->shape[INSTANCES], 2, 0.25, -0.125);
+	turn(s);
+	for (int k = 0; k < SHAPES; k++) {
+		mat4 m = k < INSTANCES ? transform((k + first) % INSTANCES) : mat4_identity();
+		struct geom_shape *g = &s->shape[k];
+		if (k < INSTANCES) {
+			*g = s->ball;
+			assert_true(placement_make(&s->place[k], &m, (vec3){-0.9, -0.9, -0.9}, (vec3){0.9, 0.9, 0.9}));
+			g->place = &s->place[k];
+			if (s->place[k].mirrored)
+				g->index = s->turned;
+			s->size[k] = triangle_norm_max(s->place[k].half);
+		} else {
+			s->size[k] = 1;
+		}
+		a[k] = (struct accel_shape){.vertex_count = g->vertex_count,
+					    .triangle_count = g->triangle_count,
+					    .position = (const float(*)[3])g->position,
+					    .index = (const uint32_t(*)[3])g->index,
+					    .rank = SURFACE_OPAQUE,
+					    .place = g->place};
+		for (uint32_t i = 0; i < g->triangle_count; i++)
+			for (int c = 0; c < 3; c++)
+				s->corner[k][i][c] = move(&m, g->position[g->index[i][c]]);
+	}
+	struct error e = {""};
+	if (accel_new(&s->accel, a, SHAPES, NULL, &e))
+		fail_msg("%s", e.text);
+	return s;
+}
+
+static void scene_free(struct scene *s)
+{
+	accel_free(s->accel);
+	mem_free(s->turned);
+	body_free(&s->ball);
+	body_free(&s->shape[INSTANCES]);
+	mem_free(s);
+}
+
+/* Nearest along o + t d, but for the triangles that are left out; margin: how near its edge it is met, in barycentrics.
+ */
+struct met {
+	struct prim_ref prim;
+	long double t, margin;
+};
+
+static struct met search(const struct scene *s, wide o, wide d, const struct prim_ref out[2], long double t_max)
+{
+	struct met best = {PRIM_NONE, t_max, 1};
+	for (uint32_t k = 0; k < SHAPES; k++)
+		for (uint32_t i = 0; i < s->shape[k].triangle_count; i++) {
+			const wide *v = s->corner[k][i];
+			wide e1 = wide_sub(v[1], v[0]), e2 = wide_sub(v[2], v[0]), h = wide_cross(d, e2);
+			long double det = wide_dot(e1, h);
+			if (det == 0 || (k == out[0].shape && i == out[0].prim) ||
+			    (k == out[1].shape && i == out[1].prim))
+				continue;
+			wide from = wide_sub(o, v[0]), q = wide_cross(from, e1);
+			long double u = wide_dot(from, h) / det, w = wide_dot(d, q) / det, t = wide_dot(e2, q) / det;
+			if (u >= 0 && w >= 0 && u + w <= 1 && t > 1e-15L && t < best.t)
+				best = (struct met){{k, i}, t, fminl(u, fminl(w, 1 - u - w))};
+		}
+	return best;
+}
+
+static struct surface_point point_of(const struct scene *s, struct dice *d)
+{
+	uint32_t k = dice_below(d, SHAPES);
+	return body_point(&s->shape[k], k, d);
+}
+
+/* Along the surface nearly as often as not. */
+static vec3 leaving(const struct surface_point *x, struct dice *d)
+{
+	vec3 w = dice_direction(d);
+	double low = dice_throw(d) < 0.3 ? exp(dice_between(d, -20, 0)) : 1;
+	return vec3_normalize(vec3_madd(w, (low - 1) * vec3_dot(w, x->ng), x->ng));
+}
+
+static struct ray_end start_of(const struct scene *s, struct dice *d, vec3 *w)
+{
+	if (dice_throw(d) < 0.3) {
+		const struct ray_end from = {.p = vec3_scale(dice_between(d, 0.1, 30), dice_direction(d)),
+					     .prim = PRIM_NONE};
+		const struct surface_point aim = point_of(s, d);
+		*w = vec3_normalize(vec3_sub(aim.p, from.p));
+		return from;
+	}
+	const struct surface_point x = point_of(s, d);
+	*w = leaving(&x, d);
+	return body_end(&x);
+}
+
+static void check_closest(struct scene *s, struct dice *d, size_t n, size_t met[SHAPES], size_t *wrong)
+{
+	for (size_t i = 0; i < n; i++) {
+		vec3 w;
+		const struct ray_end from = start_of(s, d, &w);
+		const struct prim_ref out[2] = {from.prim, PRIM_NONE};
+		struct met want = search(s, widen(from.p), widen(w), out, INFINITY);
+		struct ray_hit hit = {.prim = PRIM_NONE};
+		if (!accel_closest(s->accel, &from, w, 0, INFINITY, &hit))
+			hit.prim = PRIM_NONE;
+		if (hit.prim.shape != want.prim.shape || hit.prim.prim != want.prim.prim) {
+			*wrong += 1;
+			continue;
+		}
+		if (want.prim.shape == PRIM_NONE.shape)
+			continue;
+		met[hit.prim.shape]++;
+		struct surface_point x;
+		surface_from_hit(&s->shape[hit.prim.shape], from.p, w, &hit, &x);
+		const wide *v = s->corner[hit.prim.shape][hit.prim.prim];
+		wide ng = wide_cross(wide_sub(v[1], v[0]), wide_sub(v[2], v[0])), p = widen(x.p);
+		long double along = wide_dot(ng, widen(x.ng)) / sqrtl(wide_dot(ng, ng));
+		/* In the plane, on the ray as far as its slope allows, facing as its corners are wound. */
+		long double high = wide_dot(ng, wide_sub(p, v[0])) / sqrtl(wide_dot(ng, ng));
+		double slope = fabs(vec3_dot(x.ng, w)),
+		       off = vec3_length(vec3_sub(x.p, vec3_madd(from.p, (double)want.t, w)));
+		assert_true(fabsl(high) < 1e-15L && along > 1 - 1e-12L);
+		assert_true(off * slope < 1e-13 * (1 + (double)want.t));
+		assert_true(fabs(hit.t - (double)want.t) * slope <
+			    1e-5 * s->size[hit.prim.shape] + 1e-6 * (1 + (double)want.t));
+	}
+}
+
+static void check_segments(struct scene *s, struct dice *d, size_t n, size_t *blocked, size_t *wrong)
+{
+	for (size_t i = 0; i < n; i++) {
+		const struct surface_point a = point_of(s, d), b = point_of(s, d);
+		const struct ray_end from = body_end(&a), to = body_end(&b);
+		const struct prim_ref out[2] = {a.prim, b.prim};
+		bool plane = a.prim.shape == INSTANCES && b.prim.shape == INSTANCES; /* the segment lies in it */
+		bool want = search(s, widen(a.p), wide_sub(widen(b.p), widen(a.p)), out, 1).prim.shape != UINT32_MAX;
+		*blocked += want && !plane;
+		*wrong += !plane && accel_occluded(s->accel, &from, &to) != want;
+		*wrong += !plane && accel_occluded(s->accel, &to, &from) != want;
+		vec3 w = leaving(&a, d);
+		const struct prim_ref own[2] = {a.prim, PRIM_NONE};
+		want = search(s, widen(a.p), widen(w), own, INFINITY).prim.shape != UINT32_MAX;
+		*wrong += accel_occluded_to_infinity(s->accel, &from, w) != want;
+	}
+}
+
+static void test_rays(void **state)
+{
+	(void)state;
+	for (int first = 0; first < 4; first += 2) {
+		struct dice d = dice_of("rays among instances");
+		struct scene *s = scene_of(first);
+		size_t n = dice_count(4000), met[SHAPES] = {0}, wrong = 0, crossed = 0, blocked = 0;
+		check_closest(s, &d, n, met, &wrong);
+		check_segments(s, &d, n / 2, &blocked, &crossed);
+		print_message("%zu rays: %zu differ; met", n, wrong);
+		for (int k = 0; k < SHAPES; k++) {
+			print_message(" %zu", met[k]);
+			assert_true(met[k] > n / 100);
+		}
+		print_message("; %zu segments: %zu blocked, %zu differ\n", n / 2, blocked, crossed);
+		assert_true(blocked > n / 10);
+		assert_true(wrong <= n / 2000 + 1 && crossed <= n / 2000 + 1);
+		scene_free(s);
+	}
+}
+
+/* From inside a closed body nothing escapes. */
+static void test_closed(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("rays within instances");
+	struct scene *s = scene_of(0);
+	for (size_t i = 0; i < dice_count(20000); i++) {
+		uint32_t k = dice_below(&d, INSTANCES);
+		const struct surface_point x = body_point(&s->shape[k], k, &d);
+		const struct ray_end from = body_end(&x);
+		vec3 w = leaving(&x, &d);
+		struct ray_hit hit;
+		if (vec3_dot(w, x.ng) > 0)
+			w = vec3_neg(w);
+		assert_true(accel_closest(s->accel, &from, w, 0, INFINITY, &hit));
+		assert_true(accel_occluded_to_infinity(s->accel, &from, w));
+	}
+	scene_free(s);
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+	struct placement p;
+	const vec3 low = {-1, -1, -1}, high = {1, 1, 1};
+	mat4 flat = mat4_scale((vec3){1, 0, 1}), uneven = mat4_scale((vec3){1, 1e-6, 1}),
+	     tiny = mat4_scale((vec3){1e-30, 1e-30, 1e-30}), fine = mat4_scale((vec3){1e-3, 1, 1});
+	assert_false(placement_make(&p, &flat, low, high));
+	assert_false(placement_make(&p, &uneven, low, high));
+	assert_false(placement_make(&p, &tiny, low, high));
+	assert_true(placement_make(&p, &fine, low, high));
+}
+
+/* Instances of a table's top on a floor at 0, at which floats are exact: the tops are not, by the rounding of 0.3 in
+ * their frame. One that is lifted, and one that is tilted, coincide with nothing; of the others all triangles do. */
+static void test_coincident(void **state)
+{
+	(void)state;
+	struct geom_shape floor, top;
+	struct placement place[4];
+	struct accel_shape a[5] = {{.is_sphere = false}};
+	body_plane(&floor, 2, 0, 0);
+	body_plane(&top, 4, 0, 0);
+	for (uint32_t i = 0; i < top.vertex_count; i++)
+		top.position[i][2] = -0.3f;
+	const mat4 m[4] = {mat4_translate((vec3){0, 0, 0.3}),
+			   times(mat4_scale((vec3){-0.5, 0.7, 1}), mat4_translate((vec3){0, 0, 0.3})),
+			   mat4_translate((vec3){0, 0, 0.3 + 1e-5}),
+			   times(mat4_rotate((vec3){1, 0, 0}, 1e-3), mat4_translate((vec3){0, 0, 0.3}))};
+	for (int k = 0; k < 5; k++) {
+		const struct geom_shape *g = k < 4 ? &top : &floor;
+		a[k] = (struct accel_shape){.vertex_count = g->vertex_count,
+					    .triangle_count = g->triangle_count,
+					    .position = (const float(*)[3])g->position,
+					    .index = (const uint32_t(*)[3])g->index,
+					    .rank = k < 4 ? SURFACE_TRANSMITS : SURFACE_OPAQUE,
+					    .place = k < 4 ? &place[k] : NULL};
+		assert_true(k == 4 || placement_make(&place[k], &m[k], (vec3){-1, -1, -0.3f}, (vec3){1, 1, -0.3f}));
+	}
+	struct coincidence *c;
+	struct error e = {""};
+	assert_int_equal(coincide_find(&c, a, 5, &e), 0);
+	assert_non_null(c);
+	for (uint32_t k = 0; k < 4; k++)
+		for (uint32_t i = 0; i < top.triangle_count; i++) {
+			const struct prim_ref prim = {k, i};
+			const struct triangle t = accel_triangle(&a[k], i);
+			vec3 p = vec3_scale(1.0 / 3, vec3_add(t.v[0], vec3_add(t.v[1], t.v[2])));
+			assert_int_equal(coincide_there(c, a, prim, p).shape, k < 2 ? 4 : k);
+		}
+	coincide_free(c);
+	body_free(&floor);
+	body_free(&top);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_rays),
+		cmocka_unit_test(test_closed),
+		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_coincident),
+	};
+	return cmocka_run_group_tests_name("instances", tests, NULL, NULL);
+}

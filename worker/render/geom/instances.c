@@ -1,0 +1,269 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Building a tree for each mesh; then, for Embree's callbacks, a query of the world as a segment in the mesh's frame.
+ * The segment ends where the query does or where it leaves the mesh's box, so all its numbers are of the size of the
+ * mesh.
+ */
+#include "worker/render/geom/instances.h"
+
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+
+/* ---- building */
+
+static bool progress_monitor(void *counter, double done)
+{
+	(void)done;
+	tick_on(counter);
+	return true;
+}
+
+/* A query within one instance. */
+struct within {
+	embree_context context;
+	const struct query *q;
+	uint32_t shape;
+	vec3 from, d;	       /* where the segment begins; unit direction */
+	double length, t0, t1; /* it is the part of the query from t0 to t1 */
+	double reach;	       /* how far Embree's floats can be off */
+};
+
+/* As in accel.c: so high over the triangle's plane at both ends that no rounding can be wrong about the side. */
+static bool clearly_crosses(const struct within *w, const struct RTCHit *hit, const struct RTCRay *ray)
+{
+	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
+	double t = (double)ray->tfar - w->reach, nearer = w->q->segment ? fmin(t, w->length - t) : t;
+	return fabs(vec3_dot(n, w->d)) * nearer > 0x1p10 * w->reach * triangle_norm1(n);
+}
+
+static void filter(const struct RTCFilterFunctionNArguments *args)
+{
+	const struct within *w = (const struct within *)(const void *)args->context;
+	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
+	const struct query *q = w->q;
+	const struct prim_ref prim = {w->shape, hit->primID};
+	if (query_is_end(q, prim))
+		args->valid[0] = 0;
+	else if (query_hides(q, prim.shape)) {
+		if (!query_crosses_there(q, prim))
+			args->valid[0] = 0;
+	} else if (!clearly_crosses(w, hit, (const struct RTCRay *)(const void *)args->ray) &&
+		   !query_crosses(q, &q->shapes[prim.shape], prim.prim))
+		args->valid[0] = 0;
+}
+
+static int build_tree(struct instance_tree *t, RTCDevice device, const struct accel_shape *s)
+{
+	t->mirrored = s->place->mirrored;
+	t->scene = rtcNewScene(device);
+	RTCGeometry g = t->scene ? rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE) : NULL;
+	if (!g)
+		return -ENOMEM;
+	rtcSetSceneFlags(t->scene, RTC_SCENE_FLAG_ROBUST);
+	rtcSetSceneBuildQuality(t->scene, RTC_BUILD_QUALITY_MEDIUM);
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0,
+				   sizeof s->position[0], s->vertex_count);
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
+				   s->triangle_count);
+	rtcSetGeometryMask(g, 0xFFFFFFFFu);
+	rtcSetGeometryIntersectFilterFunction(g, filter);
+	rtcSetGeometryOccludedFilterFunction(g, filter);
+	rtcCommitGeometry(g);
+	rtcAttachGeometryByID(t->scene, g, 0);
+	rtcReleaseGeometry(g);
+	rtcSetSceneProgressMonitorFunction(t->scene, progress_monitor, tick_counter);
+	rtcCommitScene(t->scene);
+	struct RTCBounds b;
+	rtcGetSceneBounds(t->scene, &b);
+	t->low = (vec3){(double)b.lower_x, (double)b.lower_y, (double)b.lower_z};
+	t->high = (vec3){(double)b.upper_x, (double)b.upper_y, (double)b.upper_z};
+	t->reach = 0x1p-21 * fmax(triangle_norm_max(t->low), triangle_norm_max(t->high));
+	return 0;
+}
+
+int instances_init(struct instances *s, RTCDevice device, const struct accel_shape *shapes, uint32_t count)
+{
+	*s = (struct instances){.shapes = shapes};
+	uint32_t trees = 0;
+	for (uint32_t i = 0; i < count; i++) {
+		s->count += shapes[i].place != NULL;
+		trees += shapes[i].place && shapes[i].place->first == i;
+	}
+	if (s->count == 0)
+		return 0;
+	uint32_t *tree_of = mem_alloc(count, sizeof *tree_of);
+	s->trees = mem_alloc(trees, sizeof *s->trees);
+	s->list = mem_alloc(s->count, sizeof *s->list);
+	int rc = tree_of && s->trees && s->list ? 0 : -ENOMEM;
+	s->count = 0;
+	for (uint32_t i = 0; i < count && !rc; i++) {
+		if (!shapes[i].place)
+			continue;
+		uint32_t first = shapes[i].place->first;
+		if (first == i) {
+			tree_of[i] = s->tree_count++;
+			rc = build_tree(&s->trees[tree_of[i]], device, &shapes[i]);
+		}
+		s->list[s->count++] = (struct instance){i, tree_of[first]};
+	}
+	mem_free(tree_of);
+	return rc;
+}
+
+void instances_fini(struct instances *s)
+{
+	for (uint32_t i = 0; i < s->tree_count; i++)
+		if (s->trees[i].scene)
+			rtcReleaseScene(s->trees[i].scene);
+	mem_free(s->trees);
+	mem_free(s->list);
+	*s = (struct instances){.count = 0};
+}
+
+/* ---- Embree's callbacks */
+
+/* A ray of the world may run beside the true one. */
+static void bounds(const struct RTCBoundsFunctionArguments *args)
+{
+	const struct instances *s = args->geometryUserPtr;
+	const struct placement *m = s->shapes[s->list[args->primID].shape].place;
+	double r = 2 * (s->off + s->off_far * triangle_norm_max(m->center)) +
+		   0x1p-20 * (triangle_norm_max(m->half) + triangle_norm_max(m->center)) + m->vertex_is_off;
+	struct RTCBounds *b = args->bounds_o;
+	b->lower_x = (float)(m->center.x - m->half.x - r);
+	b->lower_y = (float)(m->center.y - m->half.y - r);
+	b->lower_z = (float)(m->center.z - m->half.z - r);
+	b->upper_x = (float)(m->center.x + m->half.x + r);
+	b->upper_y = (float)(m->center.y + m->half.y + r);
+	b->upper_z = (float)(m->center.z + m->half.z + r);
+}
+
+/* Leaves of [t0, t1] what lies between low and high along one axis; false: nothing. */
+static bool clip(double o, double d, double low, double high, double *t0, double *t1)
+{
+	if (d == 0)
+		return o >= low && o <= high;
+	double a = (low - o) / d, b = (high - o) / d;
+	*t0 = fmax(*t0, fmin(a, b));
+	*t1 = fmin(*t1, fmax(a, b));
+	return *t0 <= *t1;
+}
+
+/* From a surface towards the side that d leaves for, as in accel.c. */
+static vec3 lifted(const struct placement *m, vec3 p, const struct ray_end *end, vec3 d, double reach)
+{
+	vec3 n = end ? placement_normal_back(m, end->ng) : (vec3){0, 0, 0};
+	double length = vec3_length(n);
+	return length > 0 ? vec3_madd(p, copysign(reach / length, vec3_dot(n, d)), n) : p;
+}
+
+/* The part up to t_max of the query that runs within the instance's box; false: none. */
+static bool enter(struct within *w, const struct instances *s, const struct instance *it, const struct query *q,
+		  double t_max)
+{
+	const struct placement *m = s->shapes[it->shape].place;
+	const struct instance_tree *tree = &s->trees[it->tree];
+	vec3 o = placement_point_back(m, q->o), d = placement_vector_back(m, q->d);
+	w->q = q;
+	w->shape = it->shape;
+	w->reach = tree->reach + m->rounding + 0x1p-50 * triangle_norm1(o);
+	w->t0 = q->t_min;
+	w->t1 = t_max;
+	double r = 2 * w->reach;
+	if (!clip(o.x, d.x, tree->low.x - r, tree->high.x + r, &w->t0, &w->t1) ||
+	    !clip(o.y, d.y, tree->low.y - r, tree->high.y + r, &w->t0, &w->t1) ||
+	    !clip(o.z, d.z, tree->low.z - r, tree->high.z + r, &w->t0, &w->t1))
+		return false;
+	w->from = vec3_madd(o, w->t0, d);
+	vec3 to = vec3_madd(o, w->t1, d);
+	if (w->t0 == 0)
+		w->from = lifted(m, w->from, q->start, d, w->reach);
+	if (q->segment && w->t1 == 1)
+		to = lifted(m, placement_point_back(m, q->end), q->finish, vec3_neg(d), w->reach);
+	vec3 along = vec3_sub(to, w->from);
+	w->length = vec3_length(along);
+	w->d = vec3_scale(1 / w->length, along);
+	return w->length > 0 && vec3_is_finite(w->d);
+}
+
+/* The float ray begins before the segment, and ends after it, by as much as floats may be off, unless it is clipped. */
+static void fill_ray(const struct within *w, struct RTCRay *ray)
+{
+	vec3 o = vec3_madd(w->from, -w->reach, w->d);
+	bool clipped = w->q->t_min > 0 && w->t0 == w->q->t_min;
+	*ray = (struct RTCRay){.org_x = (float)o.x,
+			       .org_y = (float)o.y,
+			       .org_z = (float)o.z,
+			       .tnear = clipped ? (float)w->reach : 0,
+			       .dir_x = (float)w->d.x,
+			       .dir_y = (float)w->d.y,
+			       .dir_z = (float)w->d.z,
+			       .tfar = (float)(w->length + 2 * w->reach),
+			       .mask = 0xFFFFFFFFu};
+}
+
+/* Along the query, as a fraction of it: where Embree says, or where the triangle's plane is if that is there as far as
+ * Embree can tell. */
+static double place_of_hit(const struct within *w, const struct RTCRayHit *rh)
+{
+	double share = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->reach) * share;
+	const struct triangle k = accel_triangle(&w->q->shapes[w->shape], rh->hit.primID);
+	double there = vec3_dot(k.n, vec3_sub(k.v[0], w->q->o)) / vec3_dot(k.n, w->q->d);
+	return fmax(fabs(there - t) <= 4 * w->reach * share ? there : t, w->q->t_min);
+}
+
+static void intersect(const struct RTCIntersectFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct instances *s = args->geometryUserPtr;
+	const struct instance *it = &s->list[args->primID];
+	const struct query *q = (const struct query *)(const void *)args->context;
+	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit, inner;
+	struct within w;
+	double t_max = (double)rh->ray.tfar - q->back;
+	if (!enter(&w, s, it, q, t_max))
+		return;
+	fill_ray(&w, &inner.ray);
+	inner.hit.geomID = inner.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+	EMBREE_INIT_CONTEXT(&w.context);
+	embree_intersect(s->trees[it->tree].scene, &w.context, &inner);
+	if (inner.hit.geomID == RTC_INVALID_GEOMETRY_ID)
+		return;
+	double t = place_of_hit(&w, &inner);
+	if (!(t < t_max))
+		return;
+	bool turned = s->shapes[it->shape].place->mirrored != s->trees[it->tree].mirrored;
+	rh->ray.tfar = (float)(t + q->back);
+	rh->hit.geomID = it->shape;
+	rh->hit.primID = inner.hit.primID;
+	rh->hit.u = turned ? inner.hit.v : inner.hit.u;
+	rh->hit.v = turned ? inner.hit.u : inner.hit.v;
+}
+
+static void occluded(const struct RTCOccludedFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct instances *s = args->geometryUserPtr;
+	const struct instance *it = &s->list[args->primID];
+	const struct query *q = (const struct query *)(const void *)args->context;
+	struct within w;
+	struct RTCRay inner;
+	if (!enter(&w, s, it, q, q->segment ? 1 : INFINITY))
+		return;
+	fill_ray(&w, &inner);
+	EMBREE_INIT_CONTEXT(&w.context);
+	embree_occluded(s->trees[it->tree].scene, &w.context, &inner);
+	if (inner.tfar < 0)
+		((struct RTCRay *)(void *)args->ray)->tfar = -INFINITY;
+}
+
+void instances_geometry(RTCGeometry g, struct instances *s)
+{
+	rtcSetGeometryUserPrimitiveCount(g, s->count);
+	rtcSetGeometryUserData(g, s);
+	rtcSetGeometryBoundsFunction(g, bounds, NULL);
+	rtcSetGeometryIntersectFunction(g, intersect);
+	rtcSetGeometryOccludedFunction(g, occluded);
+}

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/geom/placement.h"
+
+#define UNEVEN 0x1p16
+#define TINY 0x1p-80
+
+static vec3 column(const mat4 *m, int k)
+{
+	return (vec3){m->m[0][k], m->m[1][k], m->m[2][k]};
+}
+
+static vec3 row(const mat4 *m, int k)
+{
+	return (vec3){m->m[k][0], m->m[k][1], m->m[k][2]};
+}
+
+/* Of the linear part; at most sqrt(3) times the largest stretch. */
+static double norm(const mat4 *m)
+{
+	double a = vec3_length(row(m, 0)), b = vec3_length(row(m, 1)), c = vec3_length(row(m, 2));
+	return vec3_length((vec3){a, b, c});
+}
+
+bool placement_is_even(const mat4 *m)
+{
+	mat4 inverse;
+	return mat4_invert(*m, &inverse) && norm(m) * norm(&inverse) <= 3 * UNEVEN;
+}
+
+static vec3 absolute(vec3 v)
+{
+	return (vec3){fabs(v.x), fabs(v.y), fabs(v.z)};
+}
+
+bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high)
+{
+	mat4 inverse;
+	if (!placement_is_even(m) || !mat4_invert(*m, &inverse) || !(norm(m) >= TINY))
+		return false;
+	*p = (struct placement){.x = column(m, 0),
+				.y = column(m, 1),
+				.z = column(m, 2),
+				.at = column(m, 3),
+				.back = {row(&inverse, 0), row(&inverse, 1), row(&inverse, 2)},
+				.mirrored = mat4_det3(*m) < 0};
+	vec3 half = vec3_scale(0.5, vec3_sub(high, low));
+	p->center = placement_point(p, vec3_add(low, half));
+	p->half = vec3_madd(vec3_madd(vec3_scale(half.x, absolute(p->x)), half.y, absolute(p->y)), half.z,
+			    absolute(p->z));
+	p->rounding = 0x1p-50 * norm(&inverse) * triangle_norm_max(vec3_add(absolute(p->center), p->half));
+	vec3 off = {0x1p-24 * triangle_norm_max((vec3){low.x, high.x, 0}),
+		    0x1p-24 * triangle_norm_max((vec3){low.y, high.y, 0}),
+		    0x1p-24 * triangle_norm_max((vec3){low.z, high.z, 0})};
+	p->vertex_is_off = vec3_length(p->x) * off.x + vec3_length(p->y) * off.y + vec3_length(p->z) * off.z;
+	return true;
+}

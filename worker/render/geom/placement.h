@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Where one instance of a mesh stands. The mesh has its vertices, in float, in a frame of its own whose unit sphere
+ * holds it; the instance's are these in double, moved into the world as they are asked for. So all that is decided by
+ * planes and solved in double is so in the world, and two triangles that share a vertex share it there, to the bit.
+ * Pure; any thread.
+ */
+#ifndef WORKER_RENDER_GEOM_PLACEMENT_H
+#define WORKER_RENDER_GEOM_PLACEMENT_H
+
+#include "worker/render/geom/triangle.h"
+#include "worker/render/math/mat4.h"
+
+struct placement {
+	vec3 x, y, z, at;     /* columns: p in the world is x p.x + y p.y + z p.z + at */
+	vec3 back[3];	      /* rows of the inverse of x, y, z */
+	vec3 center, half;    /* a box around all of it, in the world */
+	double rounding;      /* of doubles of the world, in the mesh's frame */
+	double vertex_is_off; /* by rounding to float in the mesh's frame, in the world */
+	uint32_t first;	      /* the first shape that is an instance of the same mesh */
+	bool mirrored;	      /* its triangles are wound the other way round than in the mesh's frame */
+};
+
+/* m: from the mesh's frame, in which a box with these corners holds it, to the world; affine. false: it has no inverse,
+ * is so uneven that lengths differ by more than 2^16, or so small beside the world (2^-80) that products of its lengths
+ * would be lost. */
+bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high);
+
+/* Whether lengths differ by no more than that. */
+bool placement_is_even(const mat4 *m);
+
+static inline vec3 placement_vector(const struct placement *m, vec3 v)
+{
+	return vec3_madd(vec3_madd(vec3_scale(v.x, m->x), v.y, m->y), v.z, m->z);
+}
+
+static inline vec3 placement_point(const struct placement *m, vec3 p)
+{
+	return vec3_add(placement_vector(m, p), m->at);
+}
+
+/* Unit. */
+static inline vec3 placement_normal(const struct placement *m, vec3 n)
+{
+	return vec3_normalize(vec3_madd(vec3_madd(vec3_scale(n.x, m->back[0]), n.y, m->back[1]), n.z, m->back[2]));
+}
+
+static inline vec3 placement_vector_back(const struct placement *m, vec3 v)
+{
+	return (vec3){vec3_dot(m->back[0], v), vec3_dot(m->back[1], v), vec3_dot(m->back[2], v)};
+}
+
+static inline vec3 placement_point_back(const struct placement *m, vec3 p)
+{
+	return placement_vector_back(m, vec3_sub(p, m->at));
+}
+
+/* Not normalised. */
+static inline vec3 placement_normal_back(const struct placement *m, vec3 n)
+{
+	return (vec3){vec3_dot(m->x, n), vec3_dot(m->y, n), vec3_dot(m->z, n)};
+}
+
+/* Edges are made of the mesh's own, so that they keep their digits however far away it stands. */
+static inline struct triangle placement_triangle(const struct placement *m, const float (*position)[3],
+						 const uint32_t i[3])
+{
+	vec3 p0 = triangle_vertex(position, i[0]), p1 = triangle_vertex(position, i[1]),
+	     p2 = triangle_vertex(position, i[2]);
+	return triangle_between(placement_point(m, p0), placement_point(m, p1), placement_point(m, p2),
+				placement_vector(m, vec3_sub(p1, p0)), placement_vector(m, vec3_sub(p2, p0)));
+}
+
+#endif
