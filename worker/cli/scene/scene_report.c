@@ -147,14 +147,17 @@ static json_t *describe(const struct scene *s, const struct opened *o, struct er
 	for (size_t i = 0; render_scene_note(&m, i, text, sizeof text); i++)
 		json_array_append_new(notes, json_string(text));
 	const struct scene_settings *f = &m.settings;
-	json_t *all = json_pack(
-		"{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:o s:o s:o}", "schema", 1, "scene", o->name, "dialect",
-		gltf_is(o->name) ? "glTF 2.0"
-		: s->dialect_3	 ? "3.x"
-				 : "0.6",
-		"width", (int)f->width, "height", (int)f->height, "sampleCount", (json_int_t)f->spp, "fov", f->fov,
-		"fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes, "triangles",
-		(json_int_t)m.triangles, "effects", effects_of(&m), "notes", notes, "files", files);
+	json_t *all =
+		json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:o s:o s:o}", "schema", 1,
+			  "scene", o->name, "dialect",
+			  gltf_is(o->name) ? "glTF 2.0"
+			  : s->dialect_3   ? "3.x"
+					   : "0.6",
+			  "width", (int)f->width, "height", (int)f->height, "sampleCount", (json_int_t)f->spp, "fov",
+			  f->fov, "fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes,
+			  "triangles", (json_int_t)m.triangles, "instances", (json_int_t)m.instances, "sharedMeshes",
+			  (json_int_t)m.shared_meshes, "storedTriangles", (json_int_t)m.stored_triangles, "memoryBytes",
+			  (json_int_t)m.memory, "effects", effects_of(&m), "notes", notes, "files", files);
 	if (!all)
 		error_set(e, ENOMEM, "no memory for the description");
 	return all;
@@ -165,17 +168,24 @@ static void print_text(json_t *all)
 	size_t i;
 	json_t *one;
 	const char *text;
-	long long shapes, triangles, spp;
+	long long shapes, triangles, spp, instances, meshes, stored, memory;
 	int width, height, depth;
 	double fov;
 	const char *name, *dialect, *axis;
-	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I}", "scene", &name, "dialect", &dialect, "width",
-		    &width, "height", &height, "sampleCount", &spp, "fov", &fov, "fovAxis", &axis, "maxDepth", &depth,
-		    "shapes", &shapes, "triangles", &triangles);
+	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I}", "scene", &name, "dialect",
+		    &dialect, "width", &width, "height", &height, "sampleCount", &spp, "fov", &fov, "fovAxis", &axis,
+		    "maxDepth", &depth, "shapes", &shapes, "triangles", &triangles, "instances", &instances,
+		    "sharedMeshes", &meshes, "storedTriangles", &stored, "memoryBytes", &memory);
 	bool gltf = strncmp(dialect, "glTF", 4) == 0;
 	printf("%s: %s%s, film %d x %d, field of view %.4g degrees (%s), %lld samples a pixel, paths of at most %d edges\n",
 	       name, gltf ? "" : "Mitsuba ", dialect, width, height, fov, axis, spp, depth);
-	printf("%lld shapes, %lld triangles; calls for", shapes, triangles);
+	printf("%lld shapes", shapes);
+	if (instances)
+		printf(" (%lld instances of %lld mesh%s)", instances, meshes, meshes == 1 ? "" : "es");
+	printf(", %lld triangles", triangles);
+	if (instances)
+		printf(" (%lld in memory)", stored);
+	printf(", about %.3g MB; calls for", (double)memory * 0x1p-20);
 	json_array_foreach(json_object_get(all, "effects"), i, one)
 		printf("%s %s", i ? "," : "", json_string_value(one));
 	printf("\n");

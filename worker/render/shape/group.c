@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes that hold others: `merge` is all that are in it, `shapegroup` is there for `instance` to refer to, which is a
- * copy of it somewhere else. They are resolved before anything is built (group.h).
+ * Shapes that hold others: `merge` is all that are in it, `shapegroup` is there for `instance` to refer to, which is
+ * all of it somewhere else. They are resolved before anything is built (group.h).
  */
 #include "worker/render/shape/group.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 static const struct param none[] = {{.name = NULL}};
@@ -16,7 +17,7 @@ const struct shape_ops shape_ops_instance = {"instance", instance_params, NULL, 
 
 struct listing {
 	struct arena *arena;
-	const struct scene_node **nodes;
+	struct listed_shape *shapes;
 	uint32_t count, room;
 	struct error *e;
 };
@@ -26,29 +27,119 @@ static int out_of_memory(struct listing *l)
 	return error_set(l->e, ENOMEM, "out of memory while listing shapes");
 }
 
-static int append(struct listing *l, const struct scene_node *n)
+static int append(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
 	if (l->count == SHAPES_MAX)
 		return node_error(n, l->e, E2BIG, "instances make more than %d shapes of the scene", SHAPES_MAX);
 	if (l->count == l->room) {
 		uint32_t room = l->room ? 2 * l->room : 64;
-		const struct scene_node **more = arena_alloc(l->arena, room, sizeof *more);
+		struct listed_shape *more = arena_alloc(l->arena, room, sizeof *more);
 		if (!more)
 			return out_of_memory(l);
 		if (l->count)
-			memcpy(more, l->nodes, l->count * sizeof *more);
-		l->nodes = more;
+			memcpy(more, l->shapes, l->count * sizeof *more);
+		l->shapes = more;
 		l->room = room;
 	}
-	l->nodes[l->count++] = n;
+	l->shapes[l->count] = (struct listed_shape){n, instance, l->count, 1};
+	l->count++;
 	return 0;
 }
 
-/* The shape with another to_world before its own. */
-static const struct scene_node *placed(struct listing *l, const struct scene_node *n, const mat4 *place)
+static int list(struct listing *l, const struct scene_node *n, const struct scene_node *instance);
+
+static int list_inside(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
-	struct scene_node *copy = arena_alloc(l->arena, 1, sizeof *copy);
-	struct property *properties = arena_alloc(l->arena, (size_t)n->property_count + 1, sizeof *properties);
+	int rc = 0;
+	for (uint32_t i = 0; i < n->child_count && !rc; i++)
+		rc = list(l, n->children[i], instance);
+	return rc;
+}
+
+static int list_instance(struct listing *l, const struct scene_node *n, const struct scene_node *outer)
+{
+	const struct scene_node *group = node_child(n, PLUGIN_SHAPE, 0);
+	if (!group || node_child(n, PLUGIN_SHAPE, 1) || strcmp(group->type, "shapegroup") != 0)
+		return node_error(n, l->e, EINVAL, "needs exactly one shapegroup");
+	if (outer)
+		return node_error(n, l->e, ENOTSUP, "an instance in a shapegroup is not supported");
+	mat4 inverse;
+	if (!mat4_invert(node_transform(n, "to_world"), &inverse))
+		return node_error(n, l->e, EINVAL, "to_world flattens the shapegroup (it has no inverse)");
+	return list_inside(l, group, n);
+}
+
+static int list(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
+{
+	if (strcmp(n->type, "instance") == 0)
+		return list_instance(l, n, instance);
+	if (strcmp(n->type, "merge") == 0)
+		return list_inside(l, n, instance);
+	if (strcmp(n->type, "shapegroup") == 0)
+		return node_error(n, l->e, EINVAL, "a shapegroup stands by itself or in an instance");
+	return append(l, n, instance);
+}
+
+/* A node, and where it is listed. */
+struct use {
+	uintptr_t node;
+	uint32_t at;
+};
+
+static int compare_uses(const void *x, const void *y)
+{
+	const struct use *a = x, *b = y;
+	if (a->node != b->node)
+		return a->node < b->node ? -1 : 1;
+	return a->at < b->at ? -1 : a->at > b->at;
+}
+
+/* Where nodes lie in memory decides about nothing: of equal ones the first of the list counts. */
+static int find_uses(struct listing *l)
+{
+	uint32_t n = 0;
+	struct use *uses = arena_alloc(l->arena, l->count, sizeof *uses);
+	if (!uses)
+		return out_of_memory(l);
+	for (uint32_t i = 0; i < l->count; i++)
+		if (l->shapes[i].instance)
+			uses[n++] = (struct use){(uintptr_t)l->shapes[i].node, i};
+	if (n > 0)
+		qsort(uses, n, sizeof *uses, compare_uses);
+	for (uint32_t i = 0, end; i < n; i = end) {
+		for (end = i + 1; end < n && uses[end].node == uses[i].node;)
+			end++;
+		for (uint32_t k = i; k < end; k++) {
+			l->shapes[uses[k].at].first = uses[i].at;
+			l->shapes[uses[k].at].uses = end - i;
+		}
+	}
+	return 0;
+}
+
+int shape_list(const struct scene *s, struct arena *arena, struct listed_shape **shapes, uint32_t *count,
+	       struct error *e)
+{
+	struct listing l = {.arena = arena, .e = e};
+	int rc = 0;
+	for (uint32_t i = 0; i < s->object_count && !rc; i++)
+		if (s->objects[i]->cls == PLUGIN_SHAPE && strcmp(s->objects[i]->type, "shapegroup") != 0)
+			rc = list(&l, s->objects[i], NULL);
+	if (!rc)
+		rc = find_uses(&l);
+	*shapes = l.shapes;
+	*count = l.count;
+	return rc;
+}
+
+const struct scene_node *shape_placed(const struct listed_shape *s, struct arena *arena)
+{
+	const struct scene_node *n = s->node;
+	if (!s->instance)
+		return n;
+	mat4 place = node_transform(s->instance, "to_world");
+	struct scene_node *copy = arena_alloc(arena, 1, sizeof *copy);
+	struct property *properties = arena_alloc(arena, (size_t)n->property_count + 1, sizeof *properties);
 	if (!copy || !properties)
 		return NULL;
 	*copy = *n;
@@ -60,52 +151,6 @@ static const struct scene_node *placed(struct listing *l, const struct scene_nod
 	properties[copy->property_count++] = (struct property){
 		"to_world",
 		n->line,
-		{.type = VALUE_TRANSFORM, .as.transform = mat4_mul(*place, node_transform(n, "to_world"))}};
+		{.type = VALUE_TRANSFORM, .as.transform = mat4_mul(place, node_transform(n, "to_world"))}};
 	return copy;
-}
-
-static int list(struct listing *l, const struct scene_node *n, const mat4 *place);
-
-static int list_inside(struct listing *l, const struct scene_node *n, const mat4 *place)
-{
-	int rc = 0;
-	for (uint32_t i = 0; i < n->child_count && !rc; i++)
-		rc = list(l, n->children[i], place);
-	return rc;
-}
-
-static int list_instance(struct listing *l, const struct scene_node *n, const mat4 *place)
-{
-	const struct scene_node *group = node_child(n, PLUGIN_SHAPE, 0);
-	if (!group || node_child(n, PLUGIN_SHAPE, 1) || strcmp(group->type, "shapegroup") != 0)
-		return node_error(n, l->e, EINVAL, "needs exactly one shapegroup");
-	if (place)
-		return node_error(n, l->e, ENOTSUP, "an instance in a shapegroup is not supported");
-	mat4 m = node_transform(n, "to_world");
-	return list_inside(l, group, &m);
-}
-
-static int list(struct listing *l, const struct scene_node *n, const mat4 *place)
-{
-	if (strcmp(n->type, "instance") == 0)
-		return list_instance(l, n, place);
-	if (strcmp(n->type, "merge") == 0)
-		return list_inside(l, n, place);
-	if (strcmp(n->type, "shapegroup") == 0)
-		return node_error(n, l->e, EINVAL, "a shapegroup stands by itself or in an instance");
-	const struct scene_node *it = place ? placed(l, n, place) : n;
-	return it ? append(l, it) : out_of_memory(l);
-}
-
-int shape_list(const struct scene *s, struct arena *arena, const struct scene_node ***nodes, uint32_t *count,
-	       struct error *e)
-{
-	struct listing l = {.arena = arena, .e = e};
-	int rc = 0;
-	for (uint32_t i = 0; i < s->object_count && !rc; i++)
-		if (s->objects[i]->cls == PLUGIN_SHAPE && strcmp(s->objects[i]->type, "shapegroup") != 0)
-			rc = list(&l, s->objects[i], NULL);
-	*nodes = l.nodes;
-	*count = l.count;
-	return rc;
 }

@@ -10,8 +10,8 @@
 #include "common/base/mem.h"
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/texture/picture_cache.h"
-#include "worker/render/world/build_private.h"
 #include "worker/render/world/coincident.h"
+#include "worker/render/world/geometry.h"
 #include "worker/render/world/visibility_bounds.h"
 
 static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
@@ -29,23 +29,24 @@ static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
 	return t;
 }
 
-/* One BSDF a node, however many shapes refer to it, unless it looks at the shape's attributes: then one a shape. A
- * shape that names none is grey, or black where it shines. */
+/* One BSDF a node, however many shapes refer to it, unless it looks at the shape's attributes: then one a mesh, which
+ * instances share. A shape that names none is grey, or black where it shines. */
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
 	/* One more for what no path meets. */
 	w->bsdfs = arena_alloc(&w->arena, (size_t)w->shape_count + 1, sizeof *w->bsdfs);
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
-	bool *of_one_shape = arena_alloc(&b->scratch, w->shape_count, sizeof *of_one_shape);
-	if (!w->bsdfs || !b->bsdf_nodes || !of_one_shape)
+	const void **of_mesh = arena_alloc(&b->scratch, w->shape_count, sizeof(void *)); /* by its triangles */
+	if (!w->bsdfs || !b->bsdf_nodes || !of_mesh)
 		return build_out_of_memory(b->e);
 	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->accuracy.roughness, NULL};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
 		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;
 		uint32_t k = 0;
-		while (k < w->bsdf_count && (b->bsdf_nodes[k] != key || of_one_shape[k]))
+		while (k < w->bsdf_count &&
+		       (b->bsdf_nodes[k] != key || (of_mesh[k] && of_mesh[k] != w->shapes[i].index)))
 			k++;
 		w->parts[i].bsdf = k;
 		if (k < w->bsdf_count) {
@@ -67,7 +68,7 @@ static int create_bsdfs(struct builder *b)
 			rc = bsdf_mirror_back(&w->bsdfs[k], &w->arena, b->e);
 		if (rc)
 			return rc;
-		of_one_shape[k] = attributes.asked;
+		of_mesh[k] = attributes.asked ? w->shapes[i].index : NULL;
 		w->shapes[i].relief = w->bsdfs[k].relief;
 	}
 	return 0;

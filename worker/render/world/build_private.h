@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the files that build a world share: build.c, which runs the steps in order, and geometry.c, which has those that
- * make shapes. One thread.
+ * What the files that build a world share: build.c, which runs the steps in order, geometry.c, which has those that
+ * make shapes, and shared_mesh.c. One thread.
  */
 #ifndef WORKER_RENDER_WORLD_BUILD_PRIVATE_H
 #define WORKER_RENDER_WORLD_BUILD_PRIVATE_H
@@ -17,7 +17,11 @@ struct builder {
 	const struct scene *scene;
 	const struct asset_source *assets;
 	struct arena scratch;
+	/* One a shape: its geometry in double; of an instance the mesh that it shares, and the instance, else NULL. */
 	struct shape_geometry *geometry;
+	struct shared_mesh **shared;
+	const struct scene_node **instances;
+	uint64_t triangles; /* of all meshes, shared ones once */
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct attribute_pool attributes;
@@ -30,12 +34,5 @@ static inline int build_out_of_memory(struct error *e)
 {
 	return error_set(e, ENOMEM, "out of memory while building the scene");
 }
-
-/* Shapes of the scene, their geometry in double, and the box around them. A shape with nothing to meet is none. */
-int build_read_shapes(struct builder *b);
-/* Chooses the world's centre and scale, and moves the camera there. */
-int build_rescale(struct builder *b);
-/* Shapes as floats in the rescaled world. */
-int build_place_shapes(struct builder *b);
 
 #endif

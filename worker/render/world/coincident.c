@@ -31,6 +31,7 @@ struct accel_shape *coincident_shapes(const struct world *w, struct arena *arena
 			.position = (const float(*)[3])g->position,
 			.index = (const uint32_t(*)[3])g->index,
 			.rank = rank_of(w, &w->parts[i]),
+			.place = g->place,
 		};
 	}
 	return s;

@@ -322,9 +322,14 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 					verb(&t, "is", "are"), (unsigned long long)triangles);
 	else
 		fx->displacement = line(r, EFFECT_DISPLACEMENT, false, "no shape is displaced");
-	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA, EFFECT_INSTANCING};
+	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA};
 	for (size_t i = 0; i < sizeof absent / sizeof *absent; i++)
 		line(r, absent[i], false, "%s", effect_table[absent[i]].refuse);
+	if (w->instance_count)
+		line(r, EFFECT_INSTANCING, true, "%u shapes are instances of %u meshes", w->instance_count,
+		     w->shared_mesh_count);
+	else
+		line(r, EFFECT_INSTANCING, false, "no mesh stands in several places");
 	const struct render_coincident *k = &w->coincident;
 	if (k->total > 1)
 		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide, of which one sees", k->total);

@@ -37,7 +37,7 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_COINCIDENCE] = {"coincidence", 0, "no ray asks which of two surfaces is there",
 				"surfaces coincide or they do not"},
 	[EFFECT_INSTANCING] = {"instancing", 0, "no transforms between rays and meshes",
-			       "instances are copied where the scene is read"},
+			       "instances share a mesh or they do not"},
 	[EFFECT_ENVIRONMENT] = {"environment", ON | SCENE, "rays that escape end there", NULL},
 	[EFFECT_AREA_LIGHT] = {"area-light", ON | SCENE, "nothing: only paths that end on one pay", NULL},
 	[EFFECT_DELTA_LIGHT] = {"delta-light", ON | SCENE, "nothing: only paths that end on one pay", NULL},

@@ -5,19 +5,20 @@
  * Failures have the object's place. Triangles without an area and shapes too small beside others are counted and said,
  * not errors.
  */
+#include "worker/render/world/geometry.h"
+
 #include "common/base/crash.h"
 #include "common/base/liveness.h"
-#include "worker/render/shape/group.h"
 #include "worker/render/shape/mesh.h"
-#include "worker/render/world/build_private.h"
 #include "worker/render/world/displacement.h"
+#include "worker/render/world/shared_mesh.h"
 
 #include <stdio.h>
 
 /* Of all shapes together: Embree takes about 150 bytes for each. */
 enum { TRIANGLES_MAX = 1 << 28 };
 
-static struct box box_of(const struct shape_geometry *g)
+struct box build_box_of(const struct shape_geometry *g)
 {
 	struct box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 	if (g->kind == SHAPE_SPHERE) {
@@ -29,7 +30,7 @@ static struct box box_of(const struct shape_geometry *g)
 	return b;
 }
 
-static bool is_displaced(const struct builder *b, const struct scene_node *shape)
+bool build_is_displaced(const struct builder *b, const struct scene_node *shape)
 {
 	return b->forced.of[EFFECT_DISPLACEMENT] >= 0 && displacement_of(shape);
 }
@@ -60,53 +61,106 @@ static void note_flat(struct world *w, const struct flat *f)
 			(unsigned long long)f->triangles, f->shapes, f->first->type, f->first->line, f->empty);
 }
 
-int build_read_shapes(struct builder *b)
+static int read_shape(struct builder *b, const struct scene_node *n, struct shape_geometry *g, uint64_t *dropped)
 {
-	const struct scene *s = b->scene;
-	struct world *w = b->w;
-	int rc = shape_list(s, &b->scratch, &b->shape_nodes, &w->shape_count, b->e);
+	tick();
+	crash_place("building the scene", n->file, n->line);
+	int rc = shape_build(n, b->assets, &b->scratch, g, dropped, b->e);
+	if (rc || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0) || b->forced.of[EFFECT_DISPLACEMENT] < 0)
+		return rc;
+	return displacement_apply(g, n, b->assets, b->scene->dialect_3, b->w->accuracy.tessellation, &b->scratch, b->e);
+}
+
+/* Counts what was read. */
+static int take_geometry(struct builder *b, const struct scene_node *n, const struct shape_geometry *g,
+			 uint64_t dropped, struct flat *flat)
+{
+	count_flat(flat, n, dropped, g->kind == SHAPE_MESH && g->mesh.triangle_count == 0);
+	b->triangles += g->mesh.triangle_count;
+	return b->triangles <= TRIANGLES_MAX
+		       ? 0
+		       : node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it", TRIANGLES_MAX);
+}
+
+/* The mesh that an instance shares, read when the first of them asks; NULL: it is built by itself. */
+static int find_shared(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes, struct flat *flat,
+		       struct shared_mesh **out)
+{
+	*out = NULL;
+	if (!shared_mesh_may(b, l))
+		return 0;
+	struct shared_mesh *m = meshes[l->first];
+	int rc = 0;
+	if (!m) {
+		uint64_t dropped = 0;
+		m = meshes[l->first] = arena_alloc(&b->scratch, 1, sizeof *m);
+		if (!m)
+			return build_out_of_memory(b->e);
+		rc = read_shape(b, l->node, &m->geometry, &dropped);
+		if (!rc)
+			shared_mesh_read(m);
+		if (!rc && m->shared)
+			rc = take_geometry(b, l->node, &m->geometry, dropped, flat);
+	}
+	*out = m->shared ? m : NULL;
+	return rc;
+}
+
+/* The next of the world's shapes; one with nothing to meet is none. */
+static int read_listed(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes, struct flat *flat)
+{
+	uint32_t id = b->w->shape_count;
+	struct shape_geometry *g = &b->geometry[id];
+	const struct scene_node *n = l->node;
+	int rc = find_shared(b, l, meshes, flat, &b->shared[id]);
+	if (!rc && b->shared[id]) {
+		*g = b->shared[id]->geometry;
+		rc = shared_mesh_box(b->shared[id], l->instance, &b->boxes[id], b->e);
+	} else if (!rc) {
+		uint64_t dropped = 0;
+		n = shape_placed(l, &b->scratch);
+		rc = n ? read_shape(b, n, g, &dropped) : build_out_of_memory(b->e);
+		if (!rc)
+			rc = take_geometry(b, n, g, dropped, flat);
+		if (rc || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0))
+			return rc;
+		b->boxes[id] = build_box_of(g);
+	}
 	if (rc)
 		return rc;
-	b->geometry = arena_alloc(&b->scratch, w->shape_count, sizeof *b->geometry);
-	b->boxes = arena_alloc(&b->scratch, w->shape_count, sizeof *b->boxes);
-	if (!b->geometry || !b->boxes)
+	b->shape_nodes[id] = n;
+	b->instances[id] = l->instance;
+	box_grow(&b->all, b->boxes[id].low);
+	box_grow(&b->all, b->boxes[id].high);
+	b->w->shape_count++;
+	return 0;
+}
+
+int build_read_shapes(struct builder *b)
+{
+	struct listed_shape *list;
+	uint32_t listed;
+	struct arena *a = &b->scratch;
+	int rc = shape_list(b->scene, a, &list, &listed, b->e);
+	if (rc)
+		return rc;
+	struct shared_mesh **meshes = arena_alloc(a, listed, sizeof(void *));
+	b->geometry = arena_alloc(a, listed, sizeof *b->geometry);
+	b->boxes = arena_alloc(a, listed, sizeof *b->boxes);
+	b->shape_nodes = arena_alloc(a, listed, sizeof(void *));
+	b->shared = arena_alloc(a, listed, sizeof(void *));
+	b->instances = arena_alloc(a, listed, sizeof(void *));
+	if (!meshes || !b->geometry || !b->boxes || !b->shape_nodes || !b->shared || !b->instances)
 		return build_out_of_memory(b->e);
 	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-	uint64_t triangles = 0;
-	uint32_t listed = w->shape_count;
 	struct flat flat = {0};
-	w->shape_count = 0;
-	for (uint32_t i = 0; i < listed; i++) {
-		const struct scene_node *n = b->shape_nodes[i];
-		struct shape_geometry *g = &b->geometry[w->shape_count];
-		uint64_t dropped = 0;
-		tick();
-		crash_place("building the scene", n->file, n->line);
-		rc = shape_build(n, b->assets, &b->scratch, g, &dropped, b->e);
-		if (rc)
-			return rc;
-		bool empty = g->kind == SHAPE_MESH && g->mesh.triangle_count == 0;
-		count_flat(&flat, n, dropped, empty);
-		if (empty)
-			continue;
-		if (b->forced.of[EFFECT_DISPLACEMENT] >= 0)
-			rc = displacement_apply(g, n, b->assets, s->dialect_3, w->accuracy.tessellation, &b->scratch,
-						b->e);
-		if (rc)
-			return rc;
-		triangles += g->mesh.triangle_count;
-		if (triangles > TRIANGLES_MAX)
-			return node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it",
-					  TRIANGLES_MAX);
-		b->shape_nodes[w->shape_count] = n;
-		b->boxes[w->shape_count] = box_of(g);
-		box_grow(&b->all, b->boxes[w->shape_count].low);
-		box_grow(&b->all, b->boxes[w->shape_count].high);
-		w->shape_count++;
-	}
-	note_flat(w, &flat);
+	for (uint32_t i = 0; i < listed && !rc; i++)
+		rc = read_listed(b, &list[i], meshes, &flat);
+	if (rc)
+		return rc;
+	note_flat(b->w, &flat);
 	crash_place("building the scene", NULL, 0);
-	if (w->shape_count == 0)
+	if (b->w->shape_count == 0)
 		b->all.low = b->all.high = (vec3){0, 0, 0};
 	return 0;
 }
@@ -160,11 +214,6 @@ int build_rescale(struct builder *b)
 	return rc;
 }
 
-static vec3 to_world_space(const struct world *w, const double p[3])
-{
-	return vec3_scale(w->scale, vec3_sub((vec3){p[0], p[1], p[2]}, w->center));
-}
-
 static vec3 float3(const float p[3])
 {
 	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
@@ -202,7 +251,8 @@ static uint32_t take_triangles(struct geom_shape *g, struct mesh *m, bool displa
 	return kept;
 }
 
-static int place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, const struct scene_node *n)
+int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, const struct scene_node *n, vec3 center,
+		     double scale)
 {
 	struct arena *arena = &b->w->arena;
 	uint32_t vertices = m->vertex_count;
@@ -215,7 +265,8 @@ static int place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, c
 	if (!g->position || !g->index || (m->normal && !g->normal) || (m->uv && !g->uv))
 		return build_out_of_memory(b->e);
 	for (uint32_t i = 0; i < vertices; i++) {
-		put_float3(g->position[i], to_world_space(b->w, m->position[i]));
+		const double *p = m->position[i];
+		put_float3(g->position[i], vec3_scale(scale, vec3_sub((vec3){p[0], p[1], p[2]}, center)));
 		if (g->normal)
 			put_float3(g->normal[i], (vec3){m->normal[i][0], m->normal[i][1], m->normal[i][2]});
 		if (g->uv) {
@@ -223,7 +274,7 @@ static int place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, c
 			g->uv[i][1] = (float)m->uv[i][1];
 		}
 	}
-	g->triangle_count = take_triangles(g, m, is_displaced(b, n));
+	g->triangle_count = take_triangles(g, m, build_is_displaced(b, n));
 	if (g->triangle_count == 0)
 		return node_error(n, b->e, EINVAL, "no triangle of this shape has an area at the scene's scale");
 	return 0;
@@ -240,6 +291,12 @@ int build_place_shapes(struct builder *b)
 		struct shape_geometry *from = &b->geometry[i];
 		struct geom_shape *g = &w->shapes[i];
 		tick();
+		if (b->shared[i]) {
+			int rc = shared_mesh_place(b, b->shared[i], b->instances[i], i);
+			if (rc)
+				return rc;
+			continue;
+		}
 		g->unit = w->scale;
 		if (from->kind == SHAPE_SPHERE) {
 			const struct sphere *s = &from->sphere;
@@ -252,7 +309,7 @@ int build_place_shapes(struct builder *b)
 			g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
 			continue;
 		}
-		int rc = place_mesh(b, g, &from->mesh, b->shape_nodes[i]);
+		int rc = build_place_mesh(b, g, &from->mesh, b->shape_nodes[i], w->center, w->scale);
 		if (rc)
 			return rc;
 	}

@@ -41,7 +41,9 @@ struct render_summary {
 	uint32_t useful_depth;		/* edges of the longest path that can carry light, at most what was asked for */
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
-	uint64_t shapes, triangles;
+	uint64_t shapes, triangles;			     /* instances with all that they show */
+	uint64_t instances, shared_meshes, stored_triangles; /* shapes that share meshes; how many; kept in memory */
+	uint64_t memory;  /* bytes of the world, about; Embree's part is estimated from what it takes a triangle */
 	double brightest; /* see world_brightest */
 	struct render_coincident coincident;
 	char scales[256]; /* a shape that is too small beside another, by name; "": none is */

@@ -12,7 +12,8 @@
 #define MARGIN 0x1p-16
 static vec3 vertex_of(const struct geom_shape *g, uint32_t i)
 {
-	return (vec3){(double)g->position[i][0], (double)g->position[i][1], (double)g->position[i][2]};
+	vec3 p = triangle_vertex((const float(*)[3])g->position, i);
+	return g->place ? placement_point(g->place, p) : p;
 }
 
 /* Plane of a triangle: unit normal, and its height over the origin. */
@@ -161,6 +162,12 @@ void visibility_bounds_shapes(const struct world *w, const struct effects_source
 			shape[i] = dark ? VISIBILITY_DARK : VISIBILITY_DEPTH;
 }
 
+static struct triangle triangle_at(const struct geom_shape *g, uint32_t i)
+{
+	const float(*p)[3] = (const float(*)[3])g->position;
+	return g->place ? placement_triangle(g->place, p, g->index[i]) : triangle_from(p, g->index[i]);
+}
+
 static bool lies_in(const struct triangle *plane, const struct geom_shape *g)
 {
 	for (uint32_t i = 0; i < g->triangle_count; i++)
@@ -181,7 +188,7 @@ uint32_t visibility_bounds_depth(const struct world *w, const enum visibility_bo
 		if (g->is_sphere)
 			return UINT32_MAX;
 		if (!any)
-			plane = triangle_from((const float(*)[3])g->position, g->index[0]);
+			plane = triangle_at(g, 0);
 		any = true;
 		if (!lies_in(&plane, g))
 			return UINT32_MAX;

@@ -6,6 +6,9 @@
 
 #include <string.h>
 
+/* Bytes that Embree takes for a triangle, and for a shape with what accel.c keeps of it. */
+enum { EMBREE_TRIANGLE = 150, EMBREE_SHAPE = 320 };
+
 int32_t world_pick_emitter(const struct world *w, double u)
 {
 	uint32_t n = w->emitter_count;
@@ -26,13 +29,20 @@ void world_summary(const struct world *w, struct render_summary *out)
 				       .useful_depth = w->effects.max_depth,
 				       .line_count = w->effects.line_count,
 				       .shapes = w->shape_count,
+				       .instances = w->instance_count,
+				       .shared_meshes = w->shared_mesh_count,
 				       .brightest = world_brightest(w),
 				       .coincident = w->coincident};
 	memcpy(out->scales, w->scales, sizeof out->scales);
 	memcpy(out->flat, w->flat, sizeof out->flat);
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);
-	for (uint32_t i = 0; i < w->shape_count; i++)
-		out->triangles += w->shapes[i].triangle_count;
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct geom_shape *g = &w->shapes[i];
+		out->triangles += g->triangle_count;
+		if (!g->place || g->place->first == i)
+			out->stored_triangles += g->triangle_count;
+	}
+	out->memory = w->arena.used + EMBREE_TRIANGLE * out->stored_triangles + EMBREE_SHAPE * w->shape_count;
 }
 
 int world_set_accuracy(struct world *w, const char *text, bool *fits, struct error *e)

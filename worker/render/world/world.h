@@ -27,6 +27,7 @@ struct world {
 	vec3 center;
 	double scale, radius; /* of the rescaled bounding sphere around the origin */
 	uint32_t shape_count, bsdf_count, emitter_count;
+	uint32_t instance_count, shared_mesh_count; /* shapes that share a mesh with others; of how many meshes */
 	struct geom_shape *shapes;
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;

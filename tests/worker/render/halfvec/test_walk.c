@@ -54,6 +54,24 @@ static wide wide_cross(wide a, wide b)
 	return (wide){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+/* Of an instance: in the world. */
+static wide placed(const struct geom_shape *g, wide p)
+{
+	const struct placement *m = g->place;
+	return m ? wide_add(wide_add(wide_add(widen(m->at), p.x, widen(m->x)), p.y, widen(m->y)), p.z, widen(m->z)) : p;
+}
+
+/* By cofactors: no inverse is asked. */
+static wide placed_normal(const struct geom_shape *g, wide n)
+{
+	const struct placement *m = g->place;
+	if (!m)
+		return n;
+	wide x = widen(m->x), y = widen(m->y), z = widen(m->z), a = wide_cross(y, z), zero = {0, 0, 0};
+	wide r = wide_add(wide_add(wide_add(zero, n.x, a), n.y, wide_cross(z, x)), n.z, wide_cross(x, y));
+	return wide_unit(wide_dot(a, x) < 0 ? wide_add(zero, -1, r) : r);
+}
+
 /* Position, shading normal and first tangent of a vertex from its shape; where on the shape is the vertex's word. */
 static void shape_says(const struct world *w, const struct path_vertex *v, wide *p, wide *n, wide *s)
 {
@@ -71,13 +89,15 @@ static void shape_says(const struct world *w, const struct path_vertex *v, wide 
 		*p = m;
 		for (int k = 0; k < 3; k++) {
 			const float *at = g->position[i[k]];
-			q[k] = (wide){(long double)at[0], (long double)at[1], (long double)at[2]};
+			q[k] = placed(g, (wide){(long double)at[0], (long double)at[1], (long double)at[2]});
 			*p = wide_add(*p, b[k], q[k]);
 		}
 		wide flat = wide_unit(wide_cross(wide_add(q[1], -1, q[0]), wide_add(q[2], -1, q[0])));
 		for (int k = 0; k < 3 && g->normal; k++) {
 			const float *at = g->normal[i[k]];
-			m = wide_add(m, b[k], (wide){(long double)at[0], (long double)at[1], (long double)at[2]});
+			m = wide_add(
+				m, b[k],
+				placed_normal(g, (wide){(long double)at[0], (long double)at[1], (long double)at[2]}));
 		}
 		*n = wide_dot(m, flat) > 0 ? wide_unit(m) : flat;
 	}
@@ -497,7 +517,7 @@ static void test_poles(void **state)
 }
 
 /* Bumps with interpolated normals, n x n squares, over [-2,2]^2. */
-static struct world *bumpy_world(int n, const char *bsdf)
+static struct world *bumpy_world(int n, const char *bsdf, const char *instances)
 {
 	static char obj[1 << 21], scene[4096];
 	size_t at = 0;
@@ -518,9 +538,9 @@ static struct world *bumpy_world(int n, const char *bsdf)
 	assert_true(at + 1 < sizeof obj);
 	int m = snprintf(scene, sizeof scene,
 			 "<scene version='3.0.0'>" SENSOR("0,1,2.9", "0,-1,0") SKY LAMP
-			 "<shape type='obj'><string name='filename' value='bumps.obj'/>%s</shape>" BALL(
+			 "%s<shape type='obj'><string name='filename' value='bumps.obj'/>%s</shape>%s" BALL(
 				 "0", "-.2", "0", METAL(".1")) "</scene>",
-			 bsdf);
+			 *instances ? "<shape type='shapegroup' id='g'>" : "", bsdf, instances);
 	assert_true(m > 0 && (size_t)m < sizeof scene);
 	const struct memory_file files[] = {{"bumps.xml", scene, (size_t)m}, {"bumps.obj", obj, at}, {NULL, NULL, 0}};
 	return world_of_files(32, 32, files);
@@ -529,10 +549,18 @@ static struct world *bumpy_world(int n, const char *bsdf)
 static void test_meshes(void **state)
 {
 	(void)state;
-	walk_in("coarse bumps", bumpy_world(12, METAL(".1")), 0.772, 0.951);
-	struct tally t = walk_in("fine bumps", bumpy_world(60, METAL(".1")), 0.771, 0.952);
+	walk_in("coarse bumps", bumpy_world(12, METAL(".1"), ""), 0.772, 0.951);
+	struct tally t = walk_in("fine bumps", bumpy_world(60, METAL(".1"), ""), 0.771, 0.952);
 	assert_true(t.seams > t.arrived / 10);
-	walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>"), 0.975, 0.993);
+	walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>", ""), 0.975, 0.993);
+	/* Mirrored and squeezed, over the bottom that another is. */
+	struct world *w =
+		bumpy_world(40, "<bsdf type='dielectric'/>",
+			    "</shape><shape type='instance'><ref id='g'/><transform name='to_world'>"
+			    "<scale x='-1.2' y='1' z='0.9'/></transform></shape><shape type='instance'><ref id='g'/>"
+			    "<transform name='to_world'><translate y='-0.5'/></transform></shape>");
+	assert_int_equal(w->instance_count, 2);
+	walk_in("instances of water", w, 0.99, 0.998);
 }
 
 /* Steps are shortened more often than by default, so that the search has something to do; two points more arrive. */

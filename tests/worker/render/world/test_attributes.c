@@ -163,6 +163,20 @@ static void test_linear(void **state)
 	world_free(w);
 }
 
+/* Instances share a mesh with its attributes, and a BSDF where they share triangles: mirrored ones have them turned. */
+static void test_instances(void **state)
+{
+	(void)state;
+#define INSTANCE(inner) "<shape type='instance'><ref id='g'/><transform name='to_world'>" inner "</transform></shape>"
+	struct world *w = world_of(SKY "<shape type='shapegroup' id='g'>" PLY("linear.ply", LINEAR) "</shape>" INSTANCE(
+		"<translate z='-0.1'/>") INSTANCE("<scale x='-1'/>") INSTANCE("<translate z='0.1'/>"));
+	assert_int_equal(w->instance_count, 3);
+	for (uint32_t i = 0; i < 3; i++)
+		assert_linear(w, i, i == 1);
+	assert_true(w->parts[0].bsdf == w->parts[2].bsdf && w->parts[0].bsdf != w->parts[1].bsdf);
+	world_free(w);
+}
+
 /* The picture that has the vertices' colours at its pixels. */
 static void test_picture(void **state)
 {
@@ -361,9 +375,9 @@ static int teardown(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_linear), cmocka_unit_test(test_picture),	 cmocka_unit_test(test_faces),
-		cmocka_unit_test(test_light),  cmocka_unit_test(test_roughness), cmocka_unit_test(test_vertexcolors),
-		cmocka_unit_test(test_shared), cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_linear),	     cmocka_unit_test(test_instances), cmocka_unit_test(test_picture),
+		cmocka_unit_test(test_faces),	     cmocka_unit_test(test_light),     cmocka_unit_test(test_roughness),
+		cmocka_unit_test(test_vertexcolors), cmocka_unit_test(test_shared),    cmocka_unit_test(test_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, teardown);
 }

@@ -1,0 +1,237 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Instances that share a mesh against the same meshes written out: the surface at each point, what coincides, what is
+ * not shared, and the image.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/dice.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/worlds.h"
+#include "worker/render/geom/coincide.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define VIEW SENSOR("0,2.5,5", "0,0.6,0")
+#define SKY "<emitter type='constant'/>"
+#define TO(inner) "<transform name='to_world'>" inner "</transform>"
+#define FILE_OF(inner) "<shape type='obj'><string name='filename' value='m.obj'/>" inner "</shape>"
+#define FLOOR                                                                                                          \
+	"<shape type='rectangle'>" TO("<scale value='5'/><rotate x='1' angle='-90'/>") "<bsdf type='diffuse' id='f'/>" \
+										       "</shape>"
+#define LAMP                                                                                  \
+	"<shape type='rectangle'>" TO(                                                        \
+		"<scale value='2'/><rotate x='1' angle='90'/><translate y='4'/>") "<emitter " \
+										  "type='area'><float name='radiance' value='3'/></emitter></shape>"
+
+/* What instances do: turn; stretch; mirror; and all of it. */
+static const char *const places[] = {
+	"<translate x='-1.6' y='0.47'/>",
+	"<scale x='0.7' y='1.5' z='1'/><rotate z='1' angle='20'/><translate y='0.9' z='-0.4'/>",
+	"<scale x='-0.8' y='0.8' z='0.8'/><translate x='1.6' y='0.376' z='0.3'/>",
+	"<scale x='0.5' y='0.5' z='-0.3'/><rotate x='1' y='1' angle='75'/><translate x='0.6' y='0.4' z='1.3'/>",
+};
+enum { PLACES = 4 };
+
+/* A pot with a flat foot at y = -0.47, which is no float in its frame: n around, rows upwards, smooth with texture
+ * coordinates. */
+static size_t pot(char *out, size_t size, int n, int rows)
+{
+	size_t at = 0;
+	for (int j = 0; j <= rows; j++)
+		for (int i = 0; i <= n; i++) {
+			double a = 2 * M_PI * i / n, h = (double)j / rows, r = 0.5 * (0.6 + 0.4 * sin(3 * h + 0.4)),
+			       slope = 0.6 * cos(3 * h + 0.4);
+			at += (size_t)snprintf(out + at, size - at,
+					       "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %.9g %.9g\n", r * cos(a),
+					       0.97 * h - 0.47, -r * sin(a), cos(a), -slope, -sin(a), (double)i / n, h);
+		}
+	for (int j = 0; j < rows; j++)
+		for (int i = 1; i <= n; i++) {
+			int a = j * (n + 1) + i, b = a + 1, c = a + n + 1, d = c + 1;
+			at += (size_t)snprintf(out + at, size - at,
+					       "f %d/%d/%d %d/%d/%d %d/%d/%d\nf %d/%d/%d %d/%d/%d %d/%d/%d\n", a, a, a,
+					       b, b, b, d, d, d, a, a, a, d, d, d, c, c, c);
+		}
+	int foot = (rows + 1) * (n + 1) + 1;
+	at += (size_t)snprintf(out + at, size - at, "v 0 -0.47 0\nv 0 0.5 0\nvn 0 -1 0\nvn 0 1 0\nvt 0.5 0.5\n");
+	for (int i = 1; i <= n; i++) {
+		int t = rows * (n + 1) + i;
+		at += (size_t)snprintf(out + at, size - at,
+				       "f %d/%d/%d %d/%d/%d %d/%d/%d\nf %d/%d/%d %d/%d/%d %d/%d/%d\n", foot, foot, foot,
+				       i + 1, i + 1, foot, i, i, foot, foot + 1, foot, foot + 1, t, t, foot + 1, t + 1,
+				       t + 1, foot + 1);
+	}
+	assert_true(at + 1 < size);
+	return at;
+}
+
+/* `common` comes first, `inside` is what stands in each place; shared: by one group, else by one for each, which is
+ * used once and built as if it were written out. */
+static struct world *pots(bool shared, const char *common, const char *inside, int n, int rows)
+{
+	static char obj[1 << 19], xml[1 << 14];
+	size_t size = pot(obj, sizeof obj, n, rows), at = 0;
+	at += (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s", common);
+	for (int k = 0; k < PLACES; k++) {
+		if (k == 0 || !shared)
+			at += (size_t)snprintf(xml + at, sizeof xml - at,
+					       "<shape type='shapegroup' id='g%d'>%s</shape>", k, inside);
+		at += (size_t)snprintf(xml + at, sizeof xml - at,
+				       "<shape type='instance'><ref id='g%d'/>" TO("%s") "</shape>", shared ? 0 : k,
+				       places[k]);
+	}
+	at += (size_t)snprintf(xml + at, sizeof xml - at, "</scene>");
+	assert_true(at + 1 < sizeof xml);
+	const struct memory_file files[] = {{"s.xml", xml, at}, {"m.obj", obj, size}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
+#define GLASS "<bsdf type='dielectric'/>"
+#define BUMPS                                                                                              \
+	"<bsdf type='bumpmap'><float name='scale' value='0.02'/><texture type='checkerboard' name='any'/>" \
+	"<bsdf type='diffuse'/></bsdf>"
+
+/* Vertices are rounded in the mesh's frame instead of the world's: by parts in 2^24 of either. */
+static double apart(vec3 a, vec3 b)
+{
+	return vec3_length(vec3_sub(a, b));
+}
+
+static void test_surfaces(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("surfaces of instances");
+	struct world *a = pots(true, VIEW SKY, FILE_OF(GLASS), 24, 16),
+		     *b = pots(false, VIEW SKY, FILE_OF(GLASS), 24, 16);
+	assert_int_equal(a->shape_count, PLACES);
+	assert_int_equal(b->shape_count, PLACES);
+	assert_int_equal(a->instance_count, PLACES);
+	assert_int_equal(a->shared_mesh_count, 1);
+	assert_int_equal(b->instance_count, 0);
+	for (uint32_t k = 0; k < PLACES; k++) {
+		const struct geom_shape *s = &a->shapes[k], *t = &b->shapes[k];
+		assert_ptr_equal(s->position, a->shapes[0].position);
+		assert_ptr_equal(s->normal, a->shapes[0].normal);
+		assert_int_equal(s->triangle_count, t->triangle_count);
+		for (int i = 0; i < 200; i++) {
+			struct surface_point x, y;
+			struct surface_change c, e;
+			const struct prim_ref prim = {k, dice_below(&d, s->triangle_count)};
+			double root = sqrt(dice_throw(&d)), b1 = 1 - root, b2 = root * dice_throw(&d);
+			surface_on_triangle(s, prim, b1, b2, &x);
+			surface_on_triangle(t, prim, b1, b2, &y);
+			/* The scenes' boxes differ, and with them their centres. */
+			vec3 p = vec3_madd(a->center, 1 / a->scale, x.p), q = vec3_madd(b->center, 1 / b->scale, y.p);
+			assert_true(apart(p, q) < 1e-6);
+			assert_true(apart(x.ng, y.ng) < 1e-4 && apart(x.sh.n, y.sh.n) < 1e-5);
+			assert_true(apart(x.sh.s, y.sh.s) < 1e-3 && apart(x.sh.t, y.sh.t) < 1e-3);
+			assert_true(fabs(x.u - y.u) < 1e-6 && fabs(x.v - y.v) < 1e-6);
+			surface_change_of(s, &x, &c);
+			surface_change_of(t, &y, &e);
+			for (int m = 0; m < 2; m++)
+				assert_true(apart(vec3_scale(a->scale, c.dn[m]), vec3_scale(b->scale, e.dn[m])) <
+					    2e-3 * (1 + vec3_length(c.dn[m])));
+		}
+	}
+	world_free(a);
+	world_free(b);
+}
+
+/* Pots of glass stand on the floor by their feet: what hides what is the same. */
+static void test_coincident(void **state)
+{
+	(void)state;
+	for (int lift = 0; lift < 2; lift++) {
+		const char *floor =
+			lift ? VIEW SKY "<shape type='rectangle'>" TO(
+				       "<scale value='5'/><rotate x='1' angle='-90'/><translate y='0.01'/>") "</shape>"
+			     : VIEW SKY FLOOR;
+		struct world *a = pots(true, floor, FILE_OF(GLASS), 24, 16),
+			     *b = pots(false, floor, FILE_OF(GLASS), 24, 16);
+		assert_int_equal(a->instance_count, PLACES);
+		assert_true((a->coincidence != NULL) == !lift && (b->coincidence != NULL) == !lift);
+		if (!lift) {
+			/* The plain one and a mirrored one; the others are tilted, or stand elsewhere. */
+			assert_int_equal(a->coincidence->pair_count, b->coincidence->pair_count);
+			assert_true(a->coincidence->pair_count >= 48);
+			for (size_t i = 0; i < a->coincidence->pair_count; i++)
+				assert_memory_equal(&a->coincidence->pairs[i].hidden, &b->coincidence->pairs[i].hidden,
+						    sizeof(struct prim_ref));
+		}
+		world_free(a);
+		world_free(b);
+	}
+}
+
+/* Displacement is in the scene's units: a stretched instance has a mesh of its own, which is as high as the others. */
+static void test_displaced(void **state)
+{
+	(void)state;
+#define DISPLACED                                                                               \
+	"<float name='displacement' value='1'/><float name='displacement_scale' value='0.05'/>" \
+	"<integer name='displacement_level' value='1'/>"
+	struct world *a = pots(true, VIEW SKY, FILE_OF(DISPLACED), 12, 8),
+		     *b = pots(false, VIEW SKY, FILE_OF(DISPLACED), 12, 8);
+	assert_int_equal(a->instance_count, 1); /* of the four one is merely moved */
+	for (uint32_t k = 0; k < PLACES; k++) {
+		struct surface_point x, y;
+		surface_on_triangle(&a->shapes[k], (struct prim_ref){k, 77}, 0.3, 0.3, &x);
+		surface_on_triangle(&b->shapes[k], (struct prim_ref){k, 77}, 0.3, 0.3, &y);
+		assert_true(apart(vec3_madd(a->center, 1 / a->scale, x.p), vec3_madd(b->center, 1 / b->scale, y.p)) <
+			    1e-6);
+	}
+	world_free(a);
+	world_free(b);
+}
+
+static void test_not_shared(void **state)
+{
+	(void)state;
+	static const char *const inside[] = {
+		"<shape type='sphere'/>",
+		"<shape type='cube'/>",
+		FILE_OF("<emitter type='area'><float name='radiance' value='1'/></emitter>"),
+	};
+	for (size_t i = 0; i < sizeof inside / sizeof *inside; i++) {
+		struct world *w = pots(true, VIEW SKY, inside[i], 12, 8);
+		assert_int_equal(w->instance_count, 0);
+		assert_int_equal(w->shape_count, PLACES);
+		world_free(w);
+	}
+	world_refused("<shape type='shapegroup' id='g'><shape type='cube'/></shape>\n\n"
+		      "<shape type='instance'><ref id='g'/>" TO("<scale x='1' y='0' z='1'/>") "</shape>",
+		      ":3: <shape type=\"instance\">: to_world flattens");
+}
+
+static void test_images(void **state)
+{
+	(void)state;
+	const char *room =
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" VIEW SKY FLOOR LAMP;
+	const char *inside = FILE_OF(BUMPS) "<shape type='obj'><string name='filename' value='m.obj'/>" TO(
+		"<scale value='0.5'/><translate x='0.5' z='0.7'/>") "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf></shape>";
+	struct world *a = pots(true, room, inside, 24, 16), *b = pots(false, room, inside, 24, 16);
+	assert_int_equal(a->instance_count, 2 * PLACES);
+	static struct agree_image shared, written, chains;
+	agree_render(a, __func__, "instances", &(struct agree_side){"path", 640, 32, 0, 0}, &shared);
+	agree_render(b, __func__, "copies", &(struct agree_side){"path", 640, 32, 0, 0}, &written);
+	agree_check(__func__, &shared, &written);
+	agree_render(a, __func__, "chains", &(struct agree_side){"hslt", 160, 32, 0, 0}, &chains);
+	agree_within_errors(__func__, &chains, &shared);
+	world_free(a);
+	world_free(b);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_surfaces),   cmocka_unit_test(test_coincident), cmocka_unit_test(test_displaced),
+		cmocka_unit_test(test_not_shared), cmocka_unit_test(test_images),
+	};
+	return cmocka_run_group_tests_name("instance", tests, NULL, NULL);
+}

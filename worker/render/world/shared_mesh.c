@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/shared_mesh.h"
+
+#include "worker/render/shape/mesh.h"
+#include "worker/render/world/displacement.h"
+#include "worker/render/world/geometry.h"
+
+#include <string.h>
+
+/* Written matrices have six digits. */
+#define RIGID_TOLERANCE 1e-5
+
+static vec3 column(const mat4 *m, int k)
+{
+	return (vec3){m->m[0][k], m->m[1][k], m->m[2][k]};
+}
+
+/* Moves, turns or mirrors alone. */
+static bool is_rigid(const mat4 *m)
+{
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k <= i; k++)
+			if (!(fabs(vec3_dot(column(m, i), column(m, k)) - (i == k)) <= RIGID_TOLERANCE))
+				return false;
+	return true;
+}
+
+bool shared_mesh_may(const struct builder *b, const struct listed_shape *s)
+{
+	if (!s->instance || s->uses < 2 || node_child(s->node, PLUGIN_EMITTER, 0))
+		return false;
+	mat4 m = node_transform(s->instance, "to_world");
+	return placement_is_even(&m) && (!build_is_displaced(b, s->node) || is_rigid(&m));
+}
+
+void shared_mesh_read(struct shared_mesh *m)
+{
+	m->shared = m->geometry.kind == SHAPE_MESH && m->geometry.mesh.triangle_count >= SHARED_TRIANGLES_MIN;
+	if (m->shared)
+		m->box = build_box_of(&m->geometry);
+}
+
+int shared_mesh_box(const struct shared_mesh *m, const struct scene_node *instance, struct box *box, struct error *e)
+{
+	mat4 place = node_transform(instance, "to_world");
+	vec3 half = vec3_scale(0.5, vec3_sub(m->box.high, m->box.low)),
+	     center = mat4_point(&place, vec3_add(m->box.low, half)), size;
+	double *out[3] = {&size.x, &size.y, &size.z};
+	for (int i = 0; i < 3; i++)
+		*out[i] = fabs(place.m[i][0]) * half.x + fabs(place.m[i][1]) * half.y + fabs(place.m[i][2]) * half.z;
+	*box = (struct box){vec3_sub(center, size), vec3_add(center, size)};
+	double most = fmax(triangle_norm_max(box->low), triangle_norm_max(box->high));
+	return most <= MESH_COORDINATE_MAX
+		       ? 0
+		       : node_error(instance, e, ERANGE, "a vertex lies beyond %g", MESH_COORDINATE_MAX);
+}
+
+/* As floats, in the unit sphere around the middle of its box. */
+static int place_once(struct builder *b, struct shared_mesh *m, const struct scene_node *node)
+{
+	vec3 half = vec3_scale(0.5, vec3_sub(m->box.high, m->box.low));
+	int exponent = 0;
+	frexp(vec3_length(half), &exponent);
+	m->center = vec3_add(m->box.low, half);
+	m->scale = ldexp(1, -exponent);
+	m->placed = true;
+	return build_place_mesh(b, &m->shape, &m->geometry.mesh, node, m->center, m->scale);
+}
+
+static bool turn_triangles(struct shared_mesh *m, struct arena *arena)
+{
+	if (m->turned)
+		return true;
+	m->turned = arena_alloc(arena, m->shape.triangle_count, sizeof *m->turned);
+	for (uint32_t i = 0; m->turned && i < m->shape.triangle_count; i++) {
+		const uint32_t *t = m->shape.index[i];
+		memcpy(m->turned[i], (uint32_t[3]){t[0], t[2], t[1]}, sizeof m->turned[i]);
+	}
+	return m->turned != NULL;
+}
+
+/* From the mesh's frame to the world. */
+static mat4 to_world(const struct world *w, const struct shared_mesh *m, const mat4 *place)
+{
+	mat4 r = *place;
+	vec3 at = vec3_scale(w->scale, vec3_sub(mat4_point(place, m->center), w->center));
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			r.m[i][k] *= w->scale / m->scale;
+	r.m[0][3] = at.x;
+	r.m[1][3] = at.y;
+	r.m[2][3] = at.z;
+	return r;
+}
+
+/* Of the mesh as it has been rounded. */
+static struct box float_box(const struct geom_shape *g)
+{
+	struct box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+	for (uint32_t i = 0; i < g->vertex_count; i++)
+		box_grow(&b, triangle_vertex((const float(*)[3])g->position, i));
+	return b;
+}
+
+int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct scene_node *instance, uint32_t id)
+{
+	struct world *w = b->w;
+	if (!m->placed) {
+		int rc = place_once(b, m, b->shape_nodes[id]);
+		if (rc)
+			return rc;
+		m->box = float_box(&m->shape);
+		m->first = id;
+		w->shared_mesh_count++;
+	}
+	struct placement *p = arena_alloc(&w->arena, 1, sizeof *p);
+	if (!p)
+		return build_out_of_memory(b->e);
+	mat4 place = node_transform(instance, "to_world"), all = to_world(w, m, &place);
+	if (!placement_make(p, &all, m->box.low, m->box.high))
+		return node_error(instance, b->e, EINVAL, "no triangle of the %.24s in line %d has an area there",
+				  b->shape_nodes[id]->type, b->shape_nodes[id]->line);
+	p->first = m->first;
+	w->instance_count++;
+	if (p->mirrored && !turn_triangles(m, &w->arena))
+		return build_out_of_memory(b->e);
+	struct geom_shape *g = &w->shapes[id];
+	*g = m->shape;
+	g->place = p;
+	g->unit = w->scale;
+	if (p->mirrored)
+		g->index = m->turned;
+	return 0;
+}
