@@ -135,7 +135,7 @@ os.mkfifo("pipe.obj")
 
 
 def unsent(what, name):
-    return what, mesh(name), (), name + b": the file was not sent with the job"
+    return what, mesh(name), (), name.replace(b"..", b"%2e%2e") + b": the file was not sent with the job"
 
 
 entity = b'<!DOCTYPE scene [<!ENTITY e SYSTEM "file:///proc/self/environ">]>'

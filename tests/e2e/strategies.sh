@@ -7,9 +7,21 @@ INTEGRATOR=${INTEGRATOR:-hslt}
 LIST="--mutations hslt=0.75,independent=0.25"
 COUNT="--bootstrap 16384 --mutations 40000"
 
-# counters FILE: of all strategies, in order, one a line
+# counters FILE: whole numbers of all strategies, in order, one a line
 counters() {
-	sed 's/.*"strategies"/"strategies"/' "$1" | grep -o '"[a-zA-Z]*": *[0-9][0-9]*' | tr -d ' ' | grep -v '"rel\|"stuck\|"job'
+	"${PYTHON:-python3}" - "$1" <<-'END'
+		import json, sys
+
+		def show(name, value):
+		    if isinstance(value, dict):
+		        for inner in value:
+		            show(inner, value[inner])
+		    elif type(value) is int and name != "stuck":
+		        print('"%s":%d' % (name, value))
+
+		for strategy in json.load(open(sys.argv[1]))["strategies"]:
+		    show("", strategy)
+	END
 }
 
 for p in render submit; do
@@ -39,10 +51,8 @@ start_worker w2
 id=$(submit "$BOX" -o "$DIR/farm.exr" --integrator $INTEGRATOR $COUNT $LIST --wait) || fail "hslt-submit ended with $?"
 same "$DIR/a.exr" "$DIR/farm.exr"
 "$BIN/hslt-status" --json "$id" >"$DIR/status.json"
-tr -d '\n' <"$DIR/a.json" | sed 's/"note".*//' >"$DIR/render.json"
-sed 's/"note".*//' "$DIR/status.json" >"$DIR/farm.json"
-counters "$DIR/render.json" | sort >"$DIR/by-render"
-counters "$DIR/farm.json" | sort >"$DIR/by-farm"
+counters "$DIR/a.json" >"$DIR/by-render"
+counters "$DIR/status.json" >"$DIR/by-farm"
 [ "$(wc -l <"$DIR/by-farm")" -ge 30 ] || fail "the status has few counters: $(cat "$DIR/by-farm")"
 cmp -s "$DIR/by-render" "$DIR/by-farm" || fail "other counters: $(diff "$DIR/by-render" "$DIR/by-farm")"
 "$BIN/hslt-status" "$id" | grep -q '^hslt  *[0-9]' || fail "hslt-status shows no table"
