@@ -108,6 +108,36 @@ static void put_colour(struct gltf *g, struct xml_element *el, const struct gltf
 		gltf_put_rgb(g, el, at, name, rgb);
 }
 
+static void put_attribute(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
+			  const char *attribute)
+{
+	gltf_put_text(g, gltf_plugin(g, el, at, "texture", "mesh_attribute", name), at, "name", attribute);
+}
+
+/* What is put into this, without a name, is `name` of el times an attribute of the mesh. */
+static struct xml_element *put_product(struct gltf *g, struct xml_element *el, const struct gltf_at *at,
+				       const char *name, const char *attribute)
+{
+	struct xml_element *scale = gltf_plugin(g, el, at, "texture", "scale", name);
+	put_attribute(g, scale, at, "scale", attribute);
+	return scale;
+}
+
+static void put_base_colour(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const double rgb[3],
+			    const json_t *texture, enum gltf_colours colours)
+{
+	const struct channel c = {.colour = true, .factor = {rgb[0], rgb[1], rgb[2]}, .cutoff = -1};
+	if (!colours) {
+		put_colour(g, el, at, "base_color", rgb, texture);
+	} else if (texture) {
+		put_texture(g, put_product(g, el, at, "base_color", "vertex_color"), at, NULL, texture, &c);
+	} else {
+		struct xml_element *scale = gltf_plugin(g, el, at, "texture", "scale", "base_color");
+		gltf_put_rgb(g, scale, at, "scale", rgb);
+		put_attribute(g, scale, at, NULL, "vertex_color");
+	}
+}
+
 static void put_share(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, double x,
 		      const json_t *texture, const char *channel)
 {
@@ -204,27 +234,36 @@ static void put_foreign(struct gltf *g, struct xml_element *el, const struct glt
 
 /* Around the BSDF: what lets a part of the light through. */
 static struct xml_element *put_mask(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
-				    const json_t *metal, double alpha)
+				    const json_t *metal, double alpha, bool vertex_alpha)
 {
 	const char *mode = gltf_text(g, at, at->json, "alphaMode", "OPAQUE");
 	const json_t *texture = metal ? gltf_object(g, at, metal, "baseColorTexture") : NULL;
 	bool cut = strcmp(mode, "MASK") == 0;
-	if (strcmp(mode, "OPAQUE") == 0 || (!texture && !cut && alpha == 1))
+	if (strcmp(mode, "OPAQUE") == 0 || (!texture && !cut && alpha == 1 && !vertex_alpha))
 		return parent;
 	double cutoff = gltf_number(g, at, at->json, "alphaCutoff", 0.5);
-	if (!texture && cut && alpha >= cutoff)
+	if (!texture && cut && alpha >= cutoff && !vertex_alpha)
 		return parent;
 	struct xml_element *mask = gltf_plugin(g, parent, at, "bsdf", "mask", NULL);
+	if (cut && vertex_alpha) /* no threshold of a product: not supported */
+		gltf_put_text(g, mask, at, "alpha_of_COLOR_0_with_MASK", "unsupported");
 	/* alpha times the texture's is cut off at `cutoff` */
 	const struct channel c = {.name = "a",
 				  .factor = {cut ? 1 : alpha},
 				  .cutoff = !cut	? -1
 					    : alpha > 0 ? fmin(cutoff / alpha, 2)
 							: 2};
-	if (texture)
+	if (texture && vertex_alpha) {
+		put_texture(g, put_product(g, mask, at, "opacity", "vertex_alpha"), at, NULL, texture, &c);
+	} else if (texture) {
 		put_texture(g, mask, at, "opacity", texture, &c);
-	else
+	} else if (vertex_alpha) {
+		struct xml_element *scale = gltf_plugin(g, mask, at, "texture", "scale", "opacity");
+		gltf_put_number(g, scale, at, "scale", alpha);
+		put_attribute(g, scale, at, NULL, "vertex_alpha");
+	} else {
 		gltf_put_number(g, mask, at, "opacity", cut ? 0 : alpha);
+	}
 	return mask;
 }
 
@@ -244,14 +283,17 @@ static struct xml_element *put_normal_map(struct gltf *g, struct xml_element *pa
 }
 
 /* <bsdf id="..."> and <emitter id="..."> at the top, which shapes refer to. */
-static void put_id(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *what)
+static void put_id(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *what,
+		   enum gltf_colours colours)
 {
-	gltf_attribute(g, el, "id", "%s of materials[%zu]", what, at->index);
+	static const char *const with[] = {"", " with COLOR_0", " with COLOR_0 and alpha"};
+	gltf_attribute(g, el, "id", "%s of materials[%zu]%s", what, at->index, with[colours]);
 }
 
-static void put_ref(struct gltf *g, struct xml_element *shape, const struct gltf_at *at, const char *what)
+static void put_ref(struct gltf *g, struct xml_element *shape, const struct gltf_at *at, const char *what,
+		    enum gltf_colours colours)
 {
-	put_id(g, gltf_element(g, shape, at, "ref"), at, what);
+	put_id(g, gltf_element(g, shape, at, "ref"), at, what, colours);
 }
 
 static bool shines(struct gltf *g, const struct gltf_at *at, double rgb[3])
@@ -299,11 +341,11 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const doubl
 			(const char *const[]){"attenuationDistance", NULL});
 	put_foreign(g, bsdf, at);
 	if (!g->failed)
-		put_id(g, parent == g->scene ? bsdf : parent, at, "bsdf");
+		put_id(g, parent == g->scene ? bsdf : parent, at, "bsdf", GLTF_NO_COLOURS);
 	return true;
 }
 
-static void put_principled(struct gltf *g, const struct gltf_at *at)
+static void put_principled(struct gltf *g, const struct gltf_at *at, enum gltf_colours colours)
 {
 	const json_t *metal = gltf_object(g, at, at->json, "pbrMetallicRoughness");
 	double base[4] = {1, 1, 1, 1}, metallic = 1, roughness = 1;
@@ -312,13 +354,14 @@ static void put_principled(struct gltf *g, const struct gltf_at *at)
 		metallic = gltf_number(g, at, metal, "metallicFactor", 1);
 		roughness = gltf_number(g, at, metal, "roughnessFactor", 1);
 	}
-	if (put_dispersive(g, at, base, metallic, roughness))
+	if (!colours && put_dispersive(g, at, base, metallic, roughness))
 		return;
-	struct xml_element *parent = put_normal_map(g, put_mask(g, g->scene, at, metal, base[3]), at),
+	struct xml_element *parent = put_normal_map(
+				   g, put_mask(g, g->scene, at, metal, base[3], colours == GLTF_COLOURS_AND_ALPHA), at),
 			   *bsdf = gltf_plugin(g, parent, at, "bsdf", "principled", NULL);
 	const json_t *colour = metal ? gltf_object(g, at, metal, "baseColorTexture") : NULL,
 		     *both = metal ? gltf_object(g, at, metal, "metallicRoughnessTexture") : NULL;
-	put_colour(g, bsdf, at, "base_color", base, colour);
+	put_base_colour(g, bsdf, at, base, colour, colours);
 	put_share(g, bsdf, at, "metallic", metallic, metallic > 0 ? both : NULL, "b");
 	put_share(g, bsdf, at, "roughness", roughness, roughness > 0 ? both : NULL, "g");
 	put_index(g, bsdf, at);
@@ -329,7 +372,7 @@ static void put_principled(struct gltf *g, const struct gltf_at *at)
 		return;
 	while (bsdf->parent != g->scene)
 		bsdf = bsdf->parent;
-	put_id(g, bsdf, at, "bsdf");
+	put_id(g, bsdf, at, "bsdf", colours);
 }
 
 static void put_emitter(struct gltf *g, const struct gltf_at *at)
@@ -339,29 +382,29 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 		return;
 	struct xml_element *emitter = gltf_plugin(g, g->scene, at, "emitter", "area", NULL);
 	put_colour(g, emitter, at, "radiance", rgb, gltf_object(g, at, at->json, "emissiveTexture"));
-	put_id(g, emitter, at, "emitter");
+	put_id(g, emitter, at, "emitter", GLTF_NO_COLOURS);
 	g->has_light = true;
 }
 
-void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *at)
+void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *at, enum gltf_colours colours)
 {
 	double rgb[3];
-	if (!g->material_made[at->index]) {
-		put_principled(g, at);
+	if (!(g->material_made[at->index] >> colours & 1))
+		put_principled(g, at, colours);
+	if (!g->material_made[at->index])
 		put_emitter(g, at);
-	}
-	g->material_made[at->index] = true;
-	put_ref(g, shape, at, "bsdf");
+	g->material_made[at->index] |= (unsigned char)(1u << colours);
+	put_ref(g, shape, at, "bsdf", colours);
 	if (shines(g, at, rgb))
-		put_ref(g, shape, at, "emitter");
+		put_ref(g, shape, at, "emitter", GLTF_NO_COLOURS);
 }
 
-void gltf_default_material(struct gltf *g, struct xml_element *shape)
+void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours)
 {
 	json_t *empty = json_object();
 	size_t count = json_array_size(json_object_get(g->root, "materials"));
 	if (empty)
-		gltf_material(g, shape, &(struct gltf_at){GLTF_MATERIALS, count, empty});
+		gltf_material(g, shape, &(struct gltf_at){GLTF_MATERIALS, count, empty}, colours);
 	else
 		gltf_fail(g, NULL, ENOMEM, "out of memory");
 	json_decref(empty);

@@ -34,8 +34,9 @@ struct primitive {
 	const struct gltf_at *mesh;
 	struct xml_element *shape;
 	struct gltf_range buffer; /* of all its attributes */
-	struct numbers numbers[4];
+	struct numbers numbers[6];
 	unsigned count;
+	enum gltf_colours colours;
 };
 
 static bool same_buffer(const struct gltf_range *a, const struct gltf_range *b)
@@ -71,6 +72,24 @@ static void put_accessor(struct primitive *p, const struct gltf_at *a, const cha
 	p->buffer = buffer;
 	uint64_t begin = first + offset, end = wanted > 0 ? begin + (wanted - 1) * stride + size * components : begin;
 	p->numbers[p->count++] = (struct numbers){name, component, begin, stride, wanted, end};
+}
+
+/* Of three or four components, the fourth of which is another accessor of the shape's. */
+static void put_colours(struct primitive *p, const struct gltf_at *a)
+{
+	struct gltf *g = p->g;
+	bool alpha = strcmp(gltf_text(g, a, a->json, "type", ""), "VEC4") == 0;
+	put_accessor(p, a, "color", alpha ? "VEC4" : "VEC3", alpha ? 4 : 3);
+	if (g->failed)
+		return;
+	p->colours = alpha ? GLTF_COLOURS_AND_ALPHA : GLTF_COLOURS;
+	uint64_t size;
+	if (!alpha || !type_name(gltf_whole(g, a, a->json, "componentType", 0), &size))
+		return;
+	struct numbers fourth = p->numbers[p->count - 1];
+	fourth.name = "alpha";
+	fourth.first += 3 * size;
+	p->numbers[p->count++] = fourth;
 }
 
 /* The shape reads the part of the buffer that it needs; of base64 that begins with a group of three bytes. */
@@ -125,8 +144,8 @@ static void put_attributes(struct primitive *p, const json_t *primitive, const j
 		gltf_put_bool(g, p->shape, p->mesh, "face_normals", true); /* as the format says */
 	if (gltf_follow(g, p->mesh, attributes, "TEXCOORD_0", GLTF_ACCESSORS, &a) > 0)
 		put_accessor(p, &a, "texcoord", "VEC2", 2);
-	if (json_object_get(attributes, "COLOR_0"))
-		gltf_put_text(g, p->shape, p->mesh, "vertex_colors", "COLOR_0"); /* refused by the shape */
+	if (gltf_follow(g, p->mesh, attributes, "COLOR_0", GLTF_ACCESSORS, &a) > 0)
+		put_colours(p, &a);
 	if (gltf_follow(g, p->mesh, primitive, "indices", GLTF_ACCESSORS, &a) > 0)
 		put_accessor(p, &a, "index", "SCALAR", 1);
 }
@@ -159,9 +178,9 @@ static void put_primitive(struct gltf *g, const struct gltf_at *mesh, const json
 		gltf_note(g, "its morph targets are ignored: meshes are as they were modelled");
 	struct gltf_at material;
 	if (gltf_follow(g, mesh, primitive, "material", GLTF_MATERIALS, &material) > 0)
-		gltf_material(g, p.shape, &material);
+		gltf_material(g, p.shape, &material, p.colours);
 	else
-		gltf_default_material(g, p.shape);
+		gltf_default_material(g, p.shape, p.colours);
 }
 
 void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world)

@@ -57,7 +57,7 @@ struct gltf {
 	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
 	struct gltf_range *buffers, *images; /* what is embedded, once it was found: of each */
 	unsigned embedded, primitives;
-	bool *material_made;
+	unsigned char *material_made; /* bits 1 << enum gltf_colours */
 	struct xml_element *scene;
 	bool has_camera, has_light;
 	vec3 low, high; /* of all vertices */
@@ -108,12 +108,16 @@ int gltf_buffer_view(struct gltf *g, const struct gltf_at *view, struct gltf_ran
 int gltf_image_range(struct gltf *g, const struct gltf_at *image, struct gltf_range *out);
 void gltf_put_range(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const struct gltf_range *r);
 
+/* What a primitive has at its vertices: they multiply the material's base colour, and its alpha. */
+enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
+
 /* gltf_mesh.c: the shapes of a mesh under that matrix. */
 void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world);
 
 /* gltf_material.c: what a shape of this material refers to. */
-void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material);
-void gltf_default_material(struct gltf *g, struct xml_element *shape);
+void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
+		   enum gltf_colours colours);
+void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours);
 
 /* gltf_light.c */
 void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);

@@ -24,7 +24,8 @@ static const struct param params[] = {
 	{"texcoord", UNDERSTOOD(VALUE_STRING)},
 	{"index", UNDERSTOOD(VALUE_STRING)},
 	{"mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "triangles|strip|fan"},
-	{"vertex_colors", REFUSED}, /* of COLOR_0 */
+	{"color", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_color */
+	{"alpha", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_alpha */
 	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	SHAPE_PARAMS_END,
 };
@@ -138,6 +139,25 @@ static int fill(struct mesh *m, const struct scene_node *n, const struct accesso
 	return 0;
 }
 
+/* A number or colour at the vertices; linear. */
+static int add_attribute(struct mesh *m, const struct scene_node *n, const char *name, const char *attribute,
+			 unsigned components, const struct asset_part *buffer, struct arena *arena, struct error *e)
+{
+	struct accessor from;
+	int rc = read_accessor(&from, n, name, components, 1u << F32 | 1u << U8 | 1u << U16, buffer, e);
+	if (rc)
+		return rc < 0 ? rc : 0;
+	if (from.count != m->vertex_count)
+		return node_error(n, e, EINVAL, "`%s` is not as many as positions", name);
+	struct attribute *a = mesh_add_attribute(m, attribute, false, components, 2, arena);
+	if (!a)
+		return node_error(n, e, ENOMEM, "out of memory");
+	for (uint32_t i = 0; i < m->vertex_count; i++)
+		for (unsigned k = 0; k < components; k++)
+			mesh_set_attribute(a, i, k, number(&from, i, k));
+	return 0;
+}
+
 static int make_mesh(const struct scene_node *n, const struct asset_part *buffer, struct arena *arena, struct mesh *m,
 		     struct error *e)
 {
@@ -163,7 +183,10 @@ static int make_mesh(const struct scene_node *n, const struct asset_part *buffer
 		return node_error(n, e, E2BIG, "more than %d triangles", MESH_TRIANGLES_MAX);
 	if (!mesh_alloc(m, (uint32_t)position.count, (uint32_t)triangles, !no_normal, !no_uv, arena))
 		return node_error(n, e, ENOMEM, "out of memory");
-	return fill(m, n, &position, &normal, &texcoord, no_index ? NULL : &index, mode, e);
+	rc = fill(m, n, &position, &normal, &texcoord, no_index ? NULL : &index, mode, e);
+	if (!rc)
+		rc = add_attribute(m, n, "color", "vertex_color", 3, buffer, arena, e);
+	return rc ? rc : add_attribute(m, n, "alpha", "vertex_alpha", 1, buffer, arena, e);
 }
 
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Another texture times a number or, of colours, a colour: 0.5/0.6. Reflectances end at 1. */
+/* Another texture times a number or, of colours, a colour or, which is ours, a texture: 0.5/0.6. Reflectances end at 1.
+ */
 #include "worker/render/texture/texture.h"
 
 struct scale {
@@ -7,6 +8,7 @@ struct scale {
 	double factor;
 	struct color tint; /* its largest component is 1 */
 	bool tinted;
+	struct texture by; /* times this one; constantly 1 where there is none */
 	enum color_role role;
 };
 
@@ -26,6 +28,13 @@ static int read_tint(struct scale *s, const struct scene_node *n, const struct p
 	return color_from_rgb(of, COLOR_REFLECTANCE, &s->tint);
 }
 
+static int read_by(struct scale *s, const struct scene_node *n, const struct texture_build *build, struct error *e)
+{
+	if (color_role_is_number(s->role))
+		return node_error(n, e, EINVAL, "scale is a number here, not a texture");
+	return texture_create(&s->by, node_ref(n, "scale"), COLOR_REFLECTANCE, build, e);
+}
+
 static int scale_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			const struct texture_build *build, struct error *e)
 {
@@ -36,10 +45,13 @@ static int scale_create(struct texture *t, const struct scene_node *n, enum colo
 	s->role = role;
 	const struct property *scale = node_find(n, "scale");
 	int code = scale && scale->value.type == VALUE_RGB ? read_tint(s, n, scale, e) : 0;
+	s->by = (struct texture){.color = color_constant(1)};
+	if (!code && node_ref(n, "scale"))
+		code = read_by(s, n, build, e);
 	if (code)
 		return code;
 	if (!s->tinted)
-		s->factor = node_float(n, "scale", 1);
+		s->factor = node_ref(n, "scale") ? 1 : node_float(n, "scale", 1);
 	const struct scene_node *inner = node_child(n, PLUGIN_TEXTURE, 0);
 	if (!inner)
 		return node_error(n, e, EINVAL, "needs a texture inside");
@@ -54,6 +66,8 @@ static spectrum scale_eval(const struct texture *t, const struct texture_point *
 	spectrum x = spectrum_scale(s->factor, texture_eval(&s->inner, at, w));
 	if (s->tinted)
 		x = spectrum_mul(x, color_eval(&s->tint, w));
+	if (s->by.ops)
+		x = spectrum_mul(x, texture_eval(&s->by, at, w));
 	for (int i = 0; s->role == COLOR_REFLECTANCE && i < SPECTRUM_LANES; i++)
 		x.v[i] = fmin(x.v[i], 1);
 	return x;
@@ -82,7 +96,7 @@ static void scale_jet(const struct texture *t, double u, double v, struct textur
 static double scale_max(const struct texture *t)
 {
 	const struct scale *s = t->data;
-	double m = s->factor * texture_max(&s->inner);
+	double m = s->factor * texture_max(&s->inner) * texture_max(&s->by);
 	return s->role == COLOR_REFLECTANCE ? fmin(m, 1) : m;
 }
 
@@ -95,12 +109,14 @@ static double scale_aspect(const struct texture *t)
 static enum color_shape scale_shape(const struct texture *t)
 {
 	const struct scale *s = t->data;
-	return s->tinted && s->tint.shape != COLOR_SHAPE_CONSTANT ? COLOR_SHAPE_OTHER : texture_shape(&s->inner);
+	bool coloured =
+		(s->tinted && s->tint.shape != COLOR_SHAPE_CONSTANT) || texture_shape(&s->by) != COLOR_SHAPE_CONSTANT;
+	return coloured ? COLOR_SHAPE_OTHER : texture_shape(&s->inner);
 }
 
 static const struct param scale_params[] = {
 	{.name = "scale",
-	 .types = VALUE_FLOAT | VALUE_INT | VALUE_RGB,
+	 .types = VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_NODE,
 	 .min = -PARAM_LIGHT_MAX,
 	 .max = PARAM_LIGHT_MAX},
 	{.name = NULL},

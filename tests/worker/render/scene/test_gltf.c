@@ -229,7 +229,8 @@ static const struct {
 	{"{\"source\": 0, ", "{", "textures[0]: it has no source"},
 	{"\"roughnessFactor\": 0.5", "\"roughnessFactor\": 1.5", "s.gltf:25: <float>: roughness=1.5 is outside [0, 1]"},
 	/* known, and not supported */
-	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 11, \"COLOR_0\": 9", "vertex_colors"},
+	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 11, \"COLOR_0\": 11", "of another type than color needs"},
+	{"\"TEXCOORD_0\": 2}", "\"TEXCOORD_0\": 2, \"COLOR_0\": 9}", "`color` is not as many as positions"},
 	{"{\"index\": 0},\n\"metallicFactor\"", "{\"index\": 0, \"texCoord\": 1},\n\"metallicFactor\"", "tex_coord"},
 	{"\"KHR_materials_ior\"", "\"KHR_materials_sheen\"", "KHR_materials_sheen"},
 	{"\"KHR_materials_ior\": {\"ior\": 1.75}", "\"KHR_materials_specular\": {\"specularTexture\": {}}",

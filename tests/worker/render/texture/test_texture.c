@@ -316,6 +316,30 @@ static void test_tint(void **state)
 		    strstr(e.text, "a number here, not a colour"));
 }
 
+/* A texture times a texture is the product at each place. */
+static void test_product(void **state)
+{
+	struct fixture *f = *state;
+	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale");
+	struct error e;
+	struct texture t;
+	node_add_ref(&f->arena, n, "scale", node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
+	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p1"));
+	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->build, &e), 0);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+	struct texture p0 = make_texture(f, "bitmap filename=p0", COLOR_REFLECTANCE),
+		       p1 = make_texture(f, "bitmap filename=p1", COLOR_REFLECTANCE);
+	for (int k = 0; k < 20; k++) {
+		double u = k % 5 / 5.0, v = k / 5 / 4.0;
+		spectrum x = look_up(&t, u, v, &colour), a = look_up(&p0, u, v, &colour),
+			 b = look_up(&p1, u, v, &colour);
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			assert_true(x.v[i] == a.v[i] * b.v[i] && x.v[i] <= texture_max(&t));
+	}
+	assert_true(texture_create(&t, n, COLOR_RELIEF, &f->build, &e) < 0 &&
+		    strstr(e.text, "a number here, not a texture"));
+}
+
 static void test_channel_and_threshold(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p1 channel=g", COLOR_REFLECTANCE);
@@ -339,6 +363,7 @@ int main(void)
 		cmocka_unit_test(test_derivatives),
 		cmocka_unit_test(test_scale),
 		cmocka_unit_test(test_tint),
+		cmocka_unit_test(test_product),
 		cmocka_unit_test(test_channel_and_threshold),
 		cmocka_unit_test(test_colours),
 		cmocka_unit_test(test_checkerboard),
