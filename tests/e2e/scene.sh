@@ -55,6 +55,21 @@ grep -q "^relMSE  *0 " "$DIR/out" || fail "the image is another with --path: $(c
 code 2 "$BIN/hslt-render" --path "$DIR/nowhere" "$BOX" -o "$DIR/x.exr"
 grep -q "is no folder" "$DIR/err.log" || fail "a --path that is not there: $(cat "$DIR/err.log")"
 
+# Sensors by their ids.
+mkdir "$DIR/two"
+cp -r "${BOX%/*}/meshes" "$DIR/two"
+sed 's:</scene>:<sensor type="perspective" id="aside"><float name="fov" value="30"/></sensor></scene>:' "$BOX" >"$DIR/two/two.xml"
+code 0 "$BIN/hslt-scene" check "$DIR/two/two.xml"
+grep -q 'sensor 2 ("aside"); without --sensor' "$DIR/out" || fail "of two sensors it says: $(cat "$DIR/out")"
+for sensor in 2 aside; do
+	code 0 "$BIN/hslt-render" --size 16x12 --spp 1 -i path --sensor $sensor "$DIR/two/two.xml" -o "$DIR/two-$sensor.exr"
+done
+code 0 "$BIN/hslt-compare" --exact "$DIR/two-2.exr" "$DIR/two-aside.exr"
+code 1 "$BIN/hslt-render" --size 16x12 --spp 1 -i path --sensor asied "$DIR/two/two.xml" -o "$DIR/none.exr"
+grep -q "no sensor with the id 'asied'; did you mean .aside.?" "$DIR/err.log" || fail "another id: $(cat "$DIR/err.log")"
+code 1 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 --sensor overhead "$DIR/two/two.xml" -o "$DIR/none.exr"
+grep -q "no sensor with the id 'overhead' (it has 2, numbered from 1; ids: aside)" "$DIR/err.log" || fail "another id: $(cat "$DIR/err.log")"
+
 code 0 "$BIN/hslt-scene" check "$BOX"
 grep -q "^box.xml: can be rendered: [0-9]* shapes" "$DIR/out" || fail "of a good scene it says: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" show "$BOX"

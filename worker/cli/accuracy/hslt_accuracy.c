@@ -121,7 +121,7 @@ static int load(struct session *s, struct error *e)
 		return rc;
 	s->folders = option_folders(r, s->folder);
 	s->assets = asset_search(&s->folders);
-	rc = render_scene_read(&s->scene, &s->assets, s->name, r->defines, r->define_count, &r->render, e);
+	rc = option_scene_read(&s->scene, &s->assets, s->name, r, e);
 	if (rc)
 		return rc;
 	s->scene_read = true;

@@ -6,6 +6,7 @@
 #include "worker/cli/base/options.h"
 
 #include "common/base/mem.h"
+#include "common/base/spelling.h"
 #include "common/base/text.h"
 #include "worker/render/settings/accuracy_settings.h"
 
@@ -189,13 +190,59 @@ static int take_set(void *target, char *arg, struct error *e)
 	return add_setting(target, arg, e);
 }
 
-static int take_sensor(void *target, char *arg, struct error *e)
+static int set_sensor(struct render_arguments *a, uint32_t n, struct error *e)
 {
 	char set[32];
-	uint32_t n = 0;
-	int rc = take_numbers("--sensor", arg, "", &n, 1, e);
 	snprintf(set, sizeof set, "sensor=%u", n);
-	return rc ? rc : add_setting(target, set, e);
+	a->sensor = NULL;
+	return add_setting(a, set, e);
+}
+
+/* What is no number is an id, and only the scene knows whose. */
+static int take_sensor(void *target, char *arg, struct error *e)
+{
+	struct render_arguments *a = target;
+	uint32_t n = 0;
+	if (*arg && arg[strspn(arg, "0123456789")]) {
+		a->sensor = arg;
+		return 0;
+	}
+	int rc = take_numbers("--sensor", arg, "", &n, 1, e);
+	return rc ? rc : set_sensor(a, n, e);
+}
+
+static int find_sensor(const struct scene *s, struct render_arguments *a, struct error *e)
+{
+	char hint[128], ids[256] = "";
+	struct spelling spelling = {.wanted = a->sensor};
+	uint32_t count = 0;
+	for (uint32_t i = 0; i < s->object_count; i++) {
+		const struct scene_node *n = s->objects[i];
+		if (n->cls != PLUGIN_SENSOR)
+			continue;
+		count++;
+		if (n->id && strcmp(n->id, a->sensor) == 0)
+			return set_sensor(a, count, e);
+		if (n->id) {
+			spelling_offer(&spelling, n->id);
+			spelling_list(ids, sizeof ids, n->id);
+		}
+	}
+	return error_set(e, EINVAL,
+			 "--sensor: the scene has no sensor with the id '%.64s'%s (it has %u, numbered from 1%s%s)",
+			 a->sensor, spelling_hint(&spelling, hint, sizeof hint), count, *ids ? "; ids: " : "", ids);
+}
+
+int option_scene_read(struct scene *s, const struct asset_source *assets, const char *name, struct render_arguments *a,
+		      struct error *e)
+{
+	int rc = render_scene_read(s, assets, name, a->defines, a->define_count, &a->render, e);
+	if (rc || !a->sensor)
+		return rc;
+	rc = find_sensor(s, a, e);
+	if (rc)
+		scene_fini(s);
+	return rc;
 }
 
 static int take_lenient(void *target, char *arg, struct error *e)
@@ -265,7 +312,9 @@ static const struct option_row what_rows[] = {
 	{"define", 'D', "NAME=VALUE", "For $NAME in the scene", OPTION_TAKE(take_define)},
 	{"path", 0, "FOLDER", "Where files that are not in the scene's folder are searched; may be given again",
 	 OPTION_TAKE(take_path)},
-	{"sensor", 0, "N", "Which of the scene's sensors, from 1 on (1): --set sensor=N", OPTION_TAKE(take_sensor)},
+	{"sensor", 0, "N|ID",
+	 "Which of the scene's sensors: the N-th, from 1 on (1), or that with the id: --set sensor=N",
+	 OPTION_TAKE(take_sensor)},
 	{"lenient", 0, NULL,
 	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes",
 	 OPTION_TAKE(take_lenient)},

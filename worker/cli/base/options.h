@@ -16,6 +16,7 @@ struct render_arguments {
 	const char *paths[OPTION_PATHS_MAX]; /* of --path, in their order */
 	size_t path_count;
 	const char *mixture; /* of --mutations LIST; NULL: not given */
+	const char *sensor;  /* the id that --sensor names; NULL: none, or its number is a setting by now */
 };
 
 extern const struct option_table render_table; /* fills a struct render_arguments */
@@ -39,6 +40,10 @@ int option_path(const char *arg, const char **paths, size_t *count, struct error
 
 /* NAME=VALUE of -D, cut into two in place, appended to OPTION_DEFINES_MAX defines. */
 int option_define(char *arg, struct scene_define *defines, size_t *count, struct error *e);
+
+/* render_scene_read; the sensor that --sensor names by its id is a setting from then on. */
+int option_scene_read(struct scene *s, const struct asset_source *assets, const char *name, struct render_arguments *a,
+		      struct error *e);
 
 /* The folders in which the scene's files are searched: its own, then those of --path. */
 struct asset_folders option_folders(const struct render_arguments *a, const char *folder);

@@ -29,7 +29,7 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 		return 0;
 	struct asset_folders folders = option_folders(a, folder);
 	struct asset_source assets = asset_search(&folders);
-	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
+	int rc = option_scene_read(&scene, &assets, name, a, e);
 	if (rc)
 		return rc;
 	rc = world_new(&w, &scene, &assets, &a->render, e);

@@ -74,7 +74,7 @@ static int summarise(const char *folder, const char *name, struct render_argumen
 	struct scene scene;
 	struct asset_folders folders = option_folders(a, folder);
 	struct asset_source assets = asset_search(&folders);
-	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
+	int rc = option_scene_read(&scene, &assets, name, a, e);
 	if (rc)
 		return rc;
 	rc = render_check(&scene, &assets, &a->render, m, e);

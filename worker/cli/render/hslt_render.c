@@ -135,8 +135,7 @@ static int load(struct session *s, struct error *e)
 		return rc;
 	struct asset_folders folders = option_folders(&s->a->render, s->folder);
 	struct asset_source assets = asset_search(&folders);
-	rc = render_scene_read(&scene, &assets, s->name, s->a->render.defines, s->a->render.define_count,
-			       &s->a->render.render, e);
+	rc = option_scene_read(&scene, &assets, s->name, &s->a->render, e);
 	if (rc)
 		return rc;
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)

@@ -75,7 +75,7 @@ static int copy_notes(struct scene_bundle *b, const struct scene *s, struct erro
 	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
 }
 
-int scene_bundle_read(struct scene_bundle *b, const char *path, const struct render_arguments *a, struct error *e)
+int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a, struct error *e)
 {
 	struct scene scene;
 	memset(b, 0, sizeof *b);
@@ -85,7 +85,7 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, const struct ren
 	b->folders = option_folders(a, b->folder);
 	struct opened opened = {asset_search(&b->folders), b};
 	struct asset_source assets = {.user = &opened, .open = open_remembered, .close = close_remembered};
-	rc = render_scene_read(&scene, &assets, b->scene, a->defines, a->define_count, &a->render, e);
+	rc = option_scene_read(&scene, &assets, b->scene, a, e);
 	if (!rc) {
 		rc = render_check(&scene, &assets, &a->render, &b->summary, e);
 		if (!rc)

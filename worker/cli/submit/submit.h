@@ -30,7 +30,7 @@ struct scene_bundle {
 
 /* Reads and checks the scene with everything that it calls for; files that its world was built without are not of the
  * bundle. The error names file, line and element. */
-int scene_bundle_read(struct scene_bundle *b, const char *path, const struct render_arguments *a, struct error *e);
+int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a, struct error *e);
 void scene_bundle_fini(struct scene_bundle *b);
 
 struct submit_request {

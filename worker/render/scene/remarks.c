@@ -66,8 +66,9 @@ int remarks_on(const struct scene *s, struct report *r, struct error *e)
 		else if (n->cls == PLUGIN_EMITTER)
 			rc = on_emitter(r, n, e);
 		else if (n->cls == PLUGIN_SENSOR && camera)
-			rc = remark(r, n, e, "sensor %u; without --sensor the first, in line %d, is rendered",
-				    ++sensors, camera->line);
+			rc = remark(r, n, e, "sensor %u%s%.64s%s; without --sensor the first, in line %d, is rendered",
+				    ++sensors, n->id ? " (\"" : "", n->id ? n->id : "", n->id ? "\")" : "",
+				    camera->line);
 		else if (n->cls == PLUGIN_SENSOR) {
 			camera = n;
 			sensors = 1;
