@@ -21,10 +21,11 @@ tail -n 1 "$DIR/demo.out" | grep -q 'out/demo.png' || fail "it does not say wher
 [ -z "$(ls "$TMPDIR")" ] || fail "it left $(ls "$TMPDIR")"
 nobody_left || fail "it left somebody running"
 
-sh "$DEMO" "$BUILD" "$DIR/out" --size 96x54 -D spp=1000000 >"$DIR/demo.out" 2>"$DIR/demo.log" &
+# A log of its own: the first demo's says that it is running until the shell in the background has emptied it.
+sh "$DEMO" "$BUILD" "$DIR/out" --size 96x54 -D spp=1000000 >"$DIR/long.out" 2>"$DIR/long.log" &
 demo=$!
 PIDS="$PIDS $demo"
-until_true 20 grep -q 'running' "$DIR/demo.log" || fail "the long demo does not run"
+until_true 20 grep -qs 'running' "$DIR/long.log" || fail "the long demo does not run"
 nobody_left && fail "nobody is there to be stopped"
 stop $demo
 [ $CODE -eq 130 ] || fail "interrupted, it ended with $CODE"
