@@ -158,14 +158,17 @@ static uint64_t open_lease(const struct plan *p)
 	return clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
 }
 
-/* Samples or mutations that bounds on time and error leave room for, by cautious guesses, as a plan must not depend on
- * the machine: one thread of SPEED_UNKNOWN, and samples of independent pixels with relative errors of 100 %. Infinity:
- * no such bound. */
-static double room(const struct plan_request *r, const struct plan *p)
+/* Samples or mutations that a bound on time, or on the error, leaves room for, by cautious guesses, as a plan must not
+ * depend on the machine: one thread of SPEED_UNKNOWN, and samples of independent pixels with relative errors of 100 %.
+ * Infinity: no such bound. */
+static double room_in_time(const struct plan_request *r)
 {
-	double by_time = r->seconds > 0 ? SPEED_UNKNOWN * r->seconds : INFINITY,
-	       by_error = r->target_error > 0 ? (double)crop_pixels(p) / (r->target_error * r->target_error) : INFINITY;
-	return fmin(by_time, by_error);
+	return r->seconds > 0 ? SPEED_UNKNOWN * r->seconds : INFINITY;
+}
+
+static double room_for_error(const struct plan_request *r, const struct plan *p)
+{
+	return r->target_error > 0 ? (double)crop_pixels(p) / (r->target_error * r->target_error) : INFINITY;
 }
 
 enum epoch_rule { RULE_ASKED, RULE_ROUNDS, RULE_FILM, RULE_ROOM, RULE_MOST, RULE_SECONDS, RULE_BANDWIDTH };
@@ -206,9 +209,11 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 		most = (uint64_t)power_of_two_near(LEASE_SECONDS * r->speed / (double)unit);
 		rule = RULE_SECONDS;
 	}
-	uint64_t want = total	 ? (uint64_t)wide_ceil_div(total, (wide)round * AIM_ROUNDS)
-			: chains ? open_lease(p) / unit
-				 : (uint64_t)fmin(room(r, p) / ((double)round * AIM_ROUNDS), (double)usual);
+	uint64_t want =
+		total	 ? (uint64_t)wide_ceil_div(total, (wide)round * AIM_ROUNDS)
+		: chains ? open_lease(p) / unit
+			 : (uint64_t)fmin(fmin(room_in_time(r), room_for_error(r, p)) / ((double)round * AIM_ROUNDS),
+					  (double)usual);
 	*epoch = clamp(want, 1, most);
 	if (want <= most)
 		rule = total ? RULE_ROUNDS : chains || want == usual ? RULE_FILM : RULE_ROOM;
@@ -313,12 +318,11 @@ static int make_samples(const struct plan_request *r, struct plan *p, uint64_t t
 static int make_bootstrap(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
 	uint64_t n = r->bootstrap;
-	double by_count = total ? (double)total : 8.0 * DEFAULT_BOOTSTRAP,
-	       by_time = r->seconds > 0 ? SPEED_UNKNOWN * r->seconds : 8.0 * DEFAULT_BOOTSTRAP;
+	double expected = fmin(total ? (double)total : INFINITY, room_in_time(r));
 	if (!n && p->kind == PLAN_SAMPLES)
 		n = LEAST_BOOTSTRAP;
 	else if (!n)
-		n = clamp((uint64_t)(fmin(by_count, by_time) / 8), LEAST_BOOTSTRAP, DEFAULT_BOOTSTRAP);
+		n = clamp((uint64_t)fmin(expected / 8, DEFAULT_BOOTSTRAP), LEAST_BOOTSTRAP, DEFAULT_BOOTSTRAP);
 	if (n > PLAN_MAX_BOOTSTRAP / 2)
 		return error_set(e, EINVAL, "%llu bootstrap samples; at most %d", (unsigned long long)n,
 				 PLAN_MAX_BOOTSTRAP / 2);
