@@ -55,6 +55,10 @@ static const struct trial_scene {
 	{"bulb", "tests/scenes/bulb/scene.xml", true, 160, 90},
 	{"effects-glass", "tests/bench/scenes/effects-glass.xml", true, 160, 90},
 	{"effects-box", "tests/bench/scenes/effects-box.xml", true, 160, 90},
+	{"kitchen", "tests/bench/scenes/kitchen.xml", true, 160, 90},
+	{"corridor", "tests/bench/scenes/corridor.xml", true, 160, 90},
+	{"jewel", "tests/bench/scenes/jewel.xml", true, 160, 90},
+	{"pool", "tests/bench/scenes/pool.xml", true, 160, 90},
 };
 
 static const struct method {
