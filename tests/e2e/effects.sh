@@ -25,7 +25,8 @@ python3 - "$DIR/explained.json" "$DIR/stats.json" <<-'END' || fail "$(cat "$DIR/
 	    o = json.load(open(name))
 	    c = o["choice"]
 	    assert o["integrator"] == "path" and c["considered"] == ["path", "bdpt8", "bdpt", "hslt"] and c["why"].startswith("path, by a pilot:"), c
-	    assert c["pilotSamples"] >= 8192 and not c["pathMissesLight"], c
+	    assert c["pilotSamples"] >= 8192 and not c["pathMissesLight"] and not c["surfacesFocusLight"], c
+	    assert 0 < c["path"]["largestShare"] < 0.03, c
 	    assert c["path"]["tailIndex"] > 2.1 and 0 < c["path"]["secondMomentTimesRays"] < 0.75 * c["bdpt"]["secondMomentTimesRays"], c
 END
 "$BIN/hslt-render" --explain "$SCENE" --spp 32 | grep -q '^path, by a pilot' || fail "--explain does not say why"

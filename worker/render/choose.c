@@ -15,9 +15,11 @@
 enum {
 	SAMPLES_LEAST = 1 << 12,
 	SAMPLES_USUAL = 1 << 14, /* of fewer the tail says less: README of tests/bench, "What the pilot chooses" */
-	SAMPLES_MOST = 1 << 18,
+	SAMPLES_LONG = 1 << 18,
+	SAMPLES_MOST = 1 << 20,
 	SHARE_SHORT = 32,  /* one of so many samples of the render, of each kind, up to SAMPLES_USUAL */
-	SHARE_LONG = 128,  /* and beyond */
+	SHARE_LONG = 128,  /* from there to SAMPLES_LONG: the pilot has one thread, the render may have many */
+	SHARE_HOURS = 512, /* and beyond */
 	SHORTER = 4,	   /* of bdpt at first */
 	IN_PIXEL = 16,	   /* samples of one pixel */
 	BESIDE = 128,	   /* one splat of so many samples, at most, is held against its pixel */
@@ -33,29 +35,29 @@ enum {
 
 /* Where path finds more, or its largest fall off as if there were no mean, chains may be called for. */
 static const double rare_hint = 0.03, tail_mean = 1;
-/* The larger share of the two, and the smaller of bdpt's two indices: 0.16 or more and 1.1 or less where chains win by
- * factors; else shares of 0.12 or less, but for two of veach-mis, and for veach-door: 0.33 to 0.55, and an index of 1.1
- * or more. */
-static const double rare_some = 0.12, heavy_most = 1.1;
-/* Of both, the mean share, the index of bdpt's extremes, and that of both together. 39 of 48 pilots of half-sunk say
- * so, where chains are as good as the others but for fireflies; of the scenes where bdpt is the best one of 46 of
- * veach-mis, and none of 38 of ring, 100 of displaced and four others. With 0.85 for bdpt's two of displaced did, too.
- */
+/* Share of rare light that calls for chains, of bdpt or of path. bdpt's: 0.16 or more where chains win by factors but
+ * for torus, else 0.12 or less but for veach-door, 0.05 to 0.33. */
+static const double rare_some = 0.12;
+/* Then the smaller of bdpt's two indices where the share is its own: at most 1.2 where chains win, 1.23 to 2.0 in
+ * veach-door; and that of its extremes where the share is path's: 0.6 to 1.0 in torus, 1.8 and 5.2 where a pilot of
+ * ring and demo had path find so much. */
+static const double heavy_most = 1.25, heavy_extreme = 1;
+/* Of both, the mean share, the index of bdpt's extremes, and that of both together. Pilots of half-sunk say so, where
+ * chains are as good as the others but for fireflies; of the scenes where bdpt is the best one of 46 of veach-mis, and
+ * none of 38 of ring, 100 of displaced and four others. With 0.85 for bdpt's two of displaced did, too. */
 static const double rare_both = 0.04, extreme_least = 0.75, extreme_both = 0.82;
-/* A quarter of bdpt's samples is enough where they find so much rare light, and none of a mean; or hardly any, and path
- * little, of which the extremes are no heavier than that. */
-static const double rare_clear = 0.4, rare_none = 0.01;
-/* path's tail: 2.1 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2 to 1.4 x; 0.9 to
+/* A quarter of bdpt's samples is enough where they find so much rare light, and none of a mean; */
+static const double rare_clear = 0.4;
+/* or where they find hardly any and path little, the extremes of both have about a mean, and no sample is one of the
+ * few that bring it: in jewel the rest of bdpt's samples find a third of the light where a quarter found none. */
+static const double rare_none = 0.01, extreme_clear = 0.9, most_clear = 0.05;
+/* path's tail: 2.0 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2 to 1.4 x; 0.9 to
  * 2.1 in rough-caustic, three-spheres, demo, displaced and veach-door, where bdpt is, by up to 2.1 x (6 x with
  * fireflies). */
 static const double tail_least = 2.1;
-/* From here on path's largest say that it has no fireflies: 4.0 to 4.6 in box, 2.2 to 2.8 in cornell-box and veach-mis.
- * Below, bdpt8 costs little more and bounds them: without the worst pixels 1.04 and 0.98 of path's relMSE times CPU
- * seconds in these two, of all pixels 1.03 and 0.64; in box 1.31. */
-static const double tail_path = 3.3;
-/* So say the extremes of both where neither finds rare light: the smaller of the two is 2.5 or more in 32 of 42 pilots
- * of cornell-box and in three of 42 of veach-mis; in rough-caustic, where path has fireflies, in none of 32. */
-static const double extreme_clean = 2.5, rare_clean = 0.001;
+/* And one sample's share of the light: 0.01 at most in cornell-box, box and effects-glass; 0.1 in the median pilot of
+ * pool, of which the rest looks clean. */
+static const double most_tame = 0.03;
 /* What samples of a pixel find on average where it is brighter than the map knows; below, the map is a coarse one. */
 static const double bright = 8;
 /* Or its extreme-value index says that their variance is finite, below 0.5 by three quarters of a standard error: for
@@ -103,7 +105,7 @@ static void add_pixel(struct tally *t, const struct parts *of)
 	}
 }
 
-static const struct render_found render_found_none = {0, 0, 1, 1, 1};
+static const struct render_found render_found_none = {0, 0, 1, 1, 1, 0};
 
 static struct render_found found(const struct tally *t)
 {
@@ -120,7 +122,8 @@ static struct render_found found(const struct tally *t)
 	f.tail = tail_index(tail, (size_t)t->samples / RENDER_TAIL);
 	f.extreme = tail_index(tail, (size_t)t->samples / RENDER_EXTREME);
 	f.evi = tail_evi(tail, (size_t)t->samples / RENDER_EVI);
-	/* One sample alone proves nothing: the edge of a lamp that the pixel's others missed. */
+	f.most = tail->y[0] / t->energy;
+	/* One sample alone proves no rare light: the edge of a lamp that the pixel's others missed. */
 	double most = tail->y[0], energy = t->energy - most;
 	if (energy > 0)
 		f.rare = fmax(t->rare - fmax(most - RENDER_RARE, 0), 0) / energy;
@@ -160,7 +163,9 @@ static bool wants_chains(const struct render_choice *c)
 	const struct render_found *b = &c->bdpt, *p = c->misses ? b : &c->path;
 	if (!(p->cost > 0))
 		return true; /* where there is no light at all the bootstrap of chains looks for it much longer */
-	if (fmax(p->rare, b->rare) > rare_some && fmin(b->tail, b->extreme) < heavy_most)
+	if (b->rare > rare_some && fmin(b->tail, b->extreme) < heavy_most)
+		return true;
+	if (p->rare > rare_some && b->extreme < heavy_extreme)
 		return true;
 	return 0.5 * (p->rare + b->rare) > rare_both && b->extreme < extreme_least &&
 	       2 / (1 / p->extreme + 1 / b->extreme) < extreme_both;
@@ -173,7 +178,13 @@ static bool is_clear(const struct render_choice *c)
 	if (b->rare > rare_clear && b->tail < tail_mean)
 		return true;
 	return !c->misses && p->cost > 0 && b->cost > 0 && b->rare <= rare_none && p->rare <= rare_some &&
-	       p->extreme >= extreme_least;
+	       fmax(p->most, b->most) <= most_clear && fmin(p->extreme, b->extreme) >= extreme_clear;
+}
+
+/* Nor was one seen. */
+static bool has_no_fireflies(const struct render_found *path)
+{
+	return is_tame(path) && path->most <= most_tame;
 }
 
 const char *render_choice_of(const struct render_choice *c)
@@ -184,16 +195,9 @@ const char *render_choice_of(const struct render_choice *c)
 		return "bdpt";
 	if (wants_chains(c))
 		return "hslt";
-	bool path = !c->misses && is_tame(&c->path) && c->path.cost < path_cost * c->bdpt.cost;
-	if (!path)
+	if (c->misses || !has_no_fireflies(&c->path) || !(c->path.cost < path_cost * c->bdpt.cost))
 		return "bdpt";
-	if (c->path.tail < tail_least)
-		return "bdpt8"; /* a wrong path costs ten times as much as a wrong bdpt8 */
-	if (c->path.tail >= tail_path && c->path.rare <= rare_some)
-		return "path";
-	bool clean = fmin(c->path.extreme, c->bdpt.extreme) >= extreme_clean &&
-		     fmax(c->path.rare, c->bdpt.rare) <= rare_clean;
-	return clean ? "path" : "bdpt8";
+	return c->path.tail >= tail_least && !c->focuses ? "path" : "bdpt8";
 }
 
 /* ---- the pilot */
@@ -360,7 +364,8 @@ static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 		total = r->spp * pixels;
 	if (r->mutations && r->mutations < total)
 		total = r->mutations;
-	double share = fmax(fmin((double)(total / SHARE_SHORT), SAMPLES_USUAL), (double)(total / SHARE_LONG));
+	double share = fmax(fmin((double)(total / SHARE_SHORT), SAMPLES_USUAL),
+			    fmax(fmin((double)(total / SHARE_LONG), SAMPLES_LONG), (double)(total / SHARE_HOURS)));
 	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < share)
 		n *= 2;
 	return n;
@@ -418,11 +423,22 @@ static bool path_misses(const struct world *w)
 	return emitter && lobe;
 }
 
+/* What the scene has, whatever the user forces. */
+static bool focuses_light(const struct render_summary *s)
+{
+	for (size_t i = 0; i < s->line_count; i++)
+		if (strcmp(s->lines[i].name, "half-vectors") == 0)
+			return s->lines[i].on != s->lines[i].forced;
+	return true;
+}
+
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e)
 {
 	struct render_summary summary;
 	struct plan film;
 	*out = (struct render_choice){.path = render_found_none, .bdpt = render_found_none};
+	world_summary(w, &summary);
+	out->focuses = focuses_light(&summary);
 	int rc = film_of(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
 	if (!rc && !p)
@@ -442,23 +458,29 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 	memset(r->mixture, 0, sizeof r->mixture);
 	snprintf(r->integrator, sizeof r->integrator, "%s", chosen->name);
 	r->kind = chosen->kind;
-	world_summary(w, &summary);
 	return chosen->has_mutations ? render_mutations(NULL, &summary, r->mixture, e) : 0;
+}
+
+static const char *reason(const char *integrator, const struct render_choice *c)
+{
+	if (strcmp(integrator, "hslt") == 0)
+		return is_dark(c) ? "paths from the camera find next to no light; chains search for it longest"
+				  : "much of the light arrives by few, very bright paths, such as caustics; "
+				    "chains stay with those that they find";
+	if (strcmp(integrator, "path") == 0)
+		return "paths from the camera find the light evenly, and no surface focuses it";
+	if (strcmp(integrator, "bdpt8") == 0)
+		return "paths from the camera find the light evenly; as some surfaces may focus it, one sample in eight "
+		       "starts at the lamps, too, which keeps out most fireflies";
+	if (c->misses)
+		return "paths from the camera cannot find all light, such as that of a point light through glass";
+	return has_no_fireflies(&c->path)
+		       ? "paths from the camera and from the lamps, joined, leave less noise in the same time"
+		       : "paths from the camera alone leave fireflies; joined with paths from the lamps "
+			 "they find the light more evenly";
 }
 
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size)
 {
-	const struct render_found *p = &c->path, *b = &c->bdpt;
-	int n = snprintf(
-		text, size,
-		"%s, by a pilot: path: %.3g %% of the light in samples above %d times the local brightness, tail index %.2f, "
-		"of the extreme %.2f, extreme-value index %.2f, second moment times rays %.3g",
-		integrator, 100 * p->rare, RENDER_RARE, p->tail, p->extreme, p->evi, p->cost);
-	if (n < 0 || (size_t)n >= size)
-		return;
-	if (c->settled)
-		snprintf(text + n, size - (size_t)n, "; clear without samples of bdpt");
-	else
-		snprintf(text + n, size - (size_t)n, "; bdpt: %.3g %%, %.2f, %.2f, %.2f, %.3g", 100 * b->rare, b->tail,
-			 b->extreme, b->evi, b->cost);
+	snprintf(text, size, "%s, by a pilot: %s", integrator, reason(integrator, c));
 }

@@ -6,15 +6,17 @@
  *
  * The pilot draws samples of `path`, and of `bdpt` where those leave the choice open, and looks at what each brings
  * relative to the brightness of its place: how much light comes in rare contributions of many times that brightness,
- * and how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator). Chains are
- * called for where either finds a good share of rare light and bdpt's largest fall off so slowly that more samples keep
- * on finding larger ones, below a tail index of about 1 not even a mean exists: caustics through water, panes, frosted
- * glass; where both find some, and the largest of both fall off slower still; or where `path` finds nothing. Else it is
- * `path` or `bdpt8` where path's tail is that of a finite variance (a tail index of 2 or more, or an extreme-value
- * index below 1/2, which sees an end of a broad range of contributions) and its second moment times rays is the smaller
- * one: `path` where the tail or its end is so short that it has no fireflies, else `bdpt8`, whose light sub-paths, one
- * in eight samples, bound them. `bdpt` in all other cases, because the fireflies that a pilot does not see decide the
- * error of a long render.
+ * how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator), and what share
+ * the largest alone has. Chains are called for where bdpt finds a good share of rare light and its largest fall off so
+ * slowly that more samples keep on finding larger ones, below a tail index of about 1 not even a mean exists: caustics
+ * through water, panes, frosted glass; where path finds that share and the very largest of bdpt fall off so; where both
+ * find some, and the largest of both fall off slower still; or where `path` finds nothing. Else it is `path` or `bdpt8`
+ * where path's tail is that of a finite variance (a tail index of 2 or more, or an extreme-value index below 1/2, which
+ * sees an end of a broad range of contributions), no sample has a share in the light that such a law does not allow,
+ * and its second moment times rays is the smaller one: `path` where no lobe of the scene is so narrow that it focuses
+ * light, and nothing bright can have been missed; else `bdpt8`, whose light sub-paths, one in eight samples, bound
+ * fireflies: a wrong `bdpt8` costs a third, a wrong `path` seven times as much. `bdpt` in all other cases, because the
+ * fireflies that a pilot does not see decide the error of a long render.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -29,6 +31,7 @@ struct render_found {
 	double tail;	/* tail index of the largest, one in RENDER_TAIL samples, */
 	double extreme; /* and one in RENDER_EXTREME; 1 where fewer carry light */
 	double evi;	/* extreme-value index of the largest, one in RENDER_EVI; 1 where fewer carry light */
+	double most;	/* share of the energy that one sample alone brought, the largest */
 };
 #define RENDER_RARE 32
 enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
@@ -36,10 +39,11 @@ enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 struct render_choice {
 	struct render_found path, bdpt;
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe */
+	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
 	bool settled;	  /* path alone left no choice: nothing is known of bdpt */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of
-			     a short render's, or 3 times 4,096; 1 in 30 of a long one's; not those of `path`, an eighth
-			     at most, that single bright ones of bdpt are held against */
+			     a short render's, or 3 times 4,096; 1 in 30 of a long one's, 1 in 120 of one of hours; not
+			     those of `path`, an eighth at most, that single bright ones of bdpt are held against */
 };
 
 /* Sets integrator, kind and mixture of the request, all else of which stands. Ticks. -ENOMEM, -EINVAL */
@@ -48,6 +52,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 const char *render_choice_of(const struct render_choice *c);
 /* What was found of path is enough. Pure. */
 bool render_choice_is_settled(const struct render_choice *c);
+/* One sentence for people, without figures. Pure. */
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size);
 
 #endif

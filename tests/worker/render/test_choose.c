@@ -152,6 +152,24 @@ static void path_is_not_chosen_where_it_misses_light(void **state)
 	world_free(w);
 }
 
+/* In most pilots no sample meets the sun through the water, or one: the others look clean. */
+static void path_is_not_chosen_where_glass_may_focus_light(void **state)
+{
+	(void)state;
+	struct world *w = world_of_own_scene("../bench/scenes", "pool.xml", 160, 90);
+	int clean = 0;
+	for (uint64_t seed = 0; seed < SEEDS; seed++) {
+		struct plan_request r;
+		struct render_choice c;
+		choose(w, seed, 8, &r, &c);
+		assert_true(c.focuses);
+		assert_string_not_equal(r.integrator, "path");
+		clean += c.path.tail >= 2.1;
+	}
+	assert_true(clean >= SEEDS / 2);
+	world_free(w);
+}
+
 static void light_through_water_needs_chains(void **state)
 {
 	(void)state;
@@ -189,6 +207,55 @@ static void where_no_light_is_found_the_longest_search_goes_on(void **state)
 			      5);
 	assert_true(chooses_chains(w, 0));
 	world_free(w);
+}
+
+/* Longer renders have longer pilots, up to a second or two a kind: they are made by one thread. */
+static void the_pilot_of_hours_is_bounded(void **state)
+{
+	(void)state;
+	struct world *w =
+		world_of_text(16, 16,
+			      "<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
+				      "0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>",
+			      2);
+	static const struct {
+		uint64_t spp, samples;
+	} of[] = {{1 << 17, 1 << 18}, {1 << 18, 1 << 18}, {1 << 20, 1 << 19}, {1ull << 40, 1 << 20}};
+	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+		struct plan_request r;
+		struct render_choice c;
+		choose(w, 0, of[i].spp, &r, &c);
+		assert_int_equal(c.samples, 2 * of[i].samples); /* without those of bdpt: it is dark */
+	}
+	world_free(w);
+}
+
+/* The sentence is for people; figures are in the JSON. */
+static void the_reason_is_a_sentence_without_figures(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *integrator;
+		struct render_choice c;
+		const char *says;
+	} of[] = {
+		{"path", {.path = {1, 0, 4, 4, 0, 0}}, "find the light evenly, and no surface focuses it"},
+		{"bdpt8", {.path = {1, 0, 4, 4, 0, 0}, .focuses = true}, "one sample in eight starts at the lamps"},
+		{"bdpt", {.path = {1, 0, 4, 4, 0, 0}}, "less noise in the same time"},
+		{"bdpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .settled = true}, "leave fireflies"},
+		{"bdpt", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "cannot find all light"},
+		{"hslt", {.path = {0, 0, 1, 1, 1, 0}}, "next to no light"},
+		{"hslt", {.path = {1, 0.9, 0.5, 0.5, 1, 0}}, "few, very bright paths"},
+	};
+	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+		char text[512], shortest[8];
+		render_choice_text(of[i].integrator, &of[i].c, text, sizeof text);
+		assert_non_null(strstr(text, of[i].says));
+		assert_int_equal(strncmp(text, of[i].integrator, strlen(of[i].integrator)), 0);
+		assert_null(strpbrk(text + strlen(of[i].integrator), "0123456789%"));
+		render_choice_text(of[i].integrator, &of[i].c, shortest, sizeof shortest);
+		assert_int_equal(strlen(shortest), sizeof shortest - 1);
+	}
 }
 
 static void the_same_request_gives_the_same_choice(void **state)
@@ -234,82 +301,72 @@ static void a_crop_is_rendered_as_the_whole_is(void **state)
 static void the_rule(void **state)
 {
 	(void)state;
+	enum { FLAT, FOCUSES, MISSES };
 	static const struct {
-		struct render_choice
-			c; /* cost, rare, tail, extreme, extreme-value index of path, then of bdpt; misses */
+		double path[6], bdpt[6]; /* cost, rare, tail, extreme, extreme-value index, most */
+		int scene;
 		const char *name;
 		bool settled;
 	} cases[] = {
-		{{{1, 0, 4, 4, 1}, {2, 0, 3, 3, 1}, false, false, 0}, "path", false},
-		{{{1, 0, 3, 2.4, 1}, {2, 0, 3, 3, 1}, false, false, 0},
-		 "bdpt8",
-		 false}, /* not sure that it has no fireflies */
-		{{{1, 0, 3, 3, 1}, {2, 0, 3, 2.4, 1}, false, false, 0}, "bdpt8", false},
-		{{{1, 0, 3, 2.6, 1}, {2, 0, 3, 2.6, 1}, false, false, 0}, "path", false}, /* the extremes of both are */
-		{{{1, 0.002, 3, 3, 1}, {2, 0, 3, 3, 1}, false, false, 0}, "bdpt8", false}, /* but for some rare light */
-		{{{1, 0, 3, 3, 1}, {2, 0.002, 3, 3, 1}, false, false, 0}, "bdpt8", false},
-		{{{1.9, 0, 3, 3, 1}, {2, 0, 3, 3, 1}, false, false, 0},
-		 "bdpt",
-		 false}, /* not much better, and less sure */
-		{{{1, 0, 1.9, 1.5, 1}, {0, 0, 1, 1, 1}, false, false, 0}, "bdpt", true}, /* better but for its tail */
-		{{{1, 0, 4, 4, 1}, {2, 0, 1.5, 1.5, 1}, false, false, 0}, "path", false},
-		{{{1, 0.9, 0.5, 0.5, 1}, {2, 0, 3, 3, 1}, false, false, 0},
+		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
+		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FOCUSES, "bdpt8", false}, /* what it throws may be rare */
+		{{1, 0, 2.2, 2.2, 1, 0.02}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
+		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FLAT, "bdpt", false}, /* a firefly among the few */
+		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FOCUSES, "bdpt", false},
+		{{1.9, 0, 3, 3, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "bdpt", false},  /* not much better, and less sure */
+		{{1, 0, 1.9, 1.5, 1, 0}, {0, 0, 1, 1, 1, 0}, FLAT, "bdpt", true}, /* better but for its tail */
+		{{1, 0, 1.9, 1.5, 1, 0.5}, {0, 0, 1, 1, 1, 0}, FLAT, "bdpt", true},
+		{{1, 0, 4, 4, 1, 0}, {2, 0, 1.5, 1.5, 1, 0}, FLAT, "path", false},
+		{{1, 0.9, 0.5, 0.5, 1, 0},
+		 {2, 0, 3, 3, 1, 0},
+		 FOCUSES,
 		 "bdpt",
 		 false}, /* bdpt finds what path does not */
-		{{{1, 0, 4, 4, 1}, {2, 0.9, 0.5, 0.5, 1}, false, false, 0},
-		 "hslt",
-		 false}, /* what bdpt finds path would */
-		{{{1, 0.2, 3.5, 1.5, 1}, {5, 0.04, 2, 0.6, 1}, false, false, 0},
-		 "hslt",
-		 false}, /* by luck one of them */
-		{{{1, 0.2, 3.5, 1.5, 1}, {5, 0.04, 2, 1.2, 1}, false, false, 0}, "bdpt8", false},
-		{{{1, 0.5, 1.1, 1.1, 1}, {2, 0.25, 1.4, 1.8, 1}, false, false, 0},
-		 "bdpt",
-		 false}, /* rare to path alone */
-		{{{1, 0.35, 1.4, 1.7, 1}, {5, 0.3, 1.24, 1.95, 1}, false, false, 0},
-		 "bdpt",
-		 false}, /* but it has a mean */
-		{{{1, 0.5, 0.5, 3, 1}, {2, 0.5, 0.5, 3, 1}, false, false, 0}, "hslt", false},
-		{{{1, 0, 0.5, 0.6, 1}, {2, 0.9, 0.3, 0.4, 1}, false, false, 0}, "hslt", false}, /* path says: no mean */
-		{{{1, 0.07, 1.6, 1.7, 1}, {600, 0.5, 1.2, 0.75, 1}, false, false, 0},
-		 "hslt",
-		 false},									  /* path says: some */
-		{{{1, 0.1, 1.5, 0.7, 1}, {2, 0.1, 1.5, 0.7, 1}, false, false, 0}, "hslt", false}, /* no mean exists */
-		{{{1, 0.1, 1.5, 0.7, 1}, {2, 0.1, 1.5, 1.2, 1}, false, false, 0},
-		 "bdpt",
-		 false}, /* for one of them it does */
-		{{{1, 0.1, 1.5, 0.5, 1}, {2, 0.1, 1.5, 1.0, 1}, false, false, 0},
+		{{1, 0, 4, 4, 1, 0}, {2, 0.9, 0.5, 0.5, 1, 0}, FOCUSES, "hslt", false}, /* what bdpt finds path would */
+		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 2, 0.6, 1, 0}, FOCUSES, "hslt", false},   /* by luck one of them */
+		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 1, 1.05, 1, 0}, FOCUSES, "bdpt8", false}, /* with an end to them */
+		{{1, 0.5, 1.1, 1.1, 1, 0}, {2, 0.25, 1.4, 1.8, 1, 0}, FOCUSES, "bdpt", false}, /* rare to path alone */
+		{{1, 0.35, 1.4, 1.7, 1, 0}, {5, 0.3, 1.26, 1.95, 1, 0}, FOCUSES, "bdpt", false}, /* but it has a mean */
+		{{1, 0.35, 1.4, 1.7, 1, 0}, {5, 0.3, 1.24, 1.95, 1, 0}, FOCUSES, "hslt", false}, /* not for sure */
+		{{1, 0.5, 0.5, 3, 1, 0}, {2, 0.5, 0.5, 3, 1, 0}, FOCUSES, "hslt", false},
+		{{1, 0, 0.5, 0.6, 1, 0}, {2, 0.9, 0.3, 0.4, 1, 0}, FOCUSES, "hslt", false}, /* path says: no mean */
+		{{1, 0.07, 1.6, 1.7, 1, 0}, {600, 0.5, 1.2, 0.75, 1, 0}, FOCUSES, "hslt", false}, /* path says: some */
+		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 0.7, 1, 0}, FOCUSES, "hslt", false},	  /* no mean exists */
+		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 1.2, 1, 0}, FOCUSES, "bdpt", false},	  /* for one it does */
+		{{1, 0.1, 1.5, 0.5, 1, 0},
+		 {2, 0.1, 1.5, 1.0, 1, 0},
+		 FOCUSES,
 		 "bdpt",
 		 false}, /* however heavy the other */
-		{{{1, 0.06, 1.5, 0.7, 1}, {2, 0.01, 1.5, 0.7, 1}, false, false, 0},
+		{{1, 0.06, 1.5, 0.7, 1, 0},
+		 {2, 0.01, 1.5, 0.7, 1, 0},
+		 FOCUSES,
 		 "bdpt",
-		 false}, /* and it is nearly all there */
-		{{{1, 0, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt8", false}, /* a range with an end */
-		{{{1, 0, 2, 4, 0.3}, {2, 0, 3, 3, 0.1}, false, false, 0}, "bdpt8", false},     /* never path by that */
-		{{{1, 0, 1.1, 1.9, 0.5}, {2, 0, 1.9, 2, 0.1}, false, false, 0}, "bdpt", true},
-		{{{1.6, 0, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt", false},
-		{{{1, 0.04, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt", false}, /* much of it rare */
-		{{{1, 0, 0.9, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, false, false, 0}, "bdpt8", false},
-		{{{1, 0, 2.2, 1.9, 0.6}, {2, 0, 1.9, 2, 1}, false, false, 0},
-		 "bdpt8",
-		 false}, /* one of the two is enough */
-		{{{1, 0, 1.1, 1.9, 0.3}, {2, 0, 1.9, 2, 1}, true, false, 0}, "bdpt", false},
-		{{{0, 0, 1, 1, 1}, {0, 0, 1, 1, 1}, false, false, 0}, "hslt", true},
-		{{{0, 0, 1, 1, 1}, {0, 0, 1, 1, 1}, true, false, 0}, "hslt", false},
-		{{{1, 0, 3, 3, 1}, {2, 0, 3, 3, 1}, true, false, 0}, "bdpt", false},
-		{{{1, 0, 3, 3, 1}, {2, 0.9, 0.5, 3, 1}, true, false, 0},
-		 "hslt",
-		 false}, /* what path does not find says nothing */
-		{{{0, 0, 1, 1, 1}, {1, 0, 3, 3, 1}, false, false, 0},
-		 "hslt",
-		 true}, /* path found none: glass around all lamps */
-		{{{0, 0, 1, 1, 1}, {1, 0, 3, 3, 1}, true, false, 0},
-		 "bdpt",
-		 false}, /* but where it misses some that means nothing */
+		 false},								   /* nearly all is there */
+		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FOCUSES, "bdpt8", false}, /* a range with an end */
+		{{1, 0, 2, 4, 0.3, 0}, {2, 0, 3, 3, 0.1, 0}, FLAT, "bdpt8", false},	   /* never path by that */
+		{{1, 0, 1.1, 1.9, 0.5, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "bdpt", true},
+		{{1.6, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "bdpt", false},
+		{{1, 0, 0.9, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "bdpt8", false},
+		{{1, 0, 2.2, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "path", false}, /* one of the two is enough */
+		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, MISSES, "bdpt", false},
+		{{0, 0, 1, 1, 1, 0}, {0, 0, 1, 1, 1, 0}, FLAT, "hslt", true},
+		{{0, 0, 1, 1, 1, 0}, {0, 0, 1, 1, 1, 0}, MISSES, "hslt", false},
+		{{1, 0.05, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "bdpt", false}, /* rare light is no end */
+		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "bdpt", false}, /* what is missed has no part in it */
+		{{1, 0, 1.9, 1.5, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "bdpt", false},
+		{{1, 0, 3, 3, 1, 0}, {2, 0.9, 0.5, 3, 1, 0}, MISSES, "hslt", false}, /* what path says is nothing */
+		{{0, 0, 1, 1, 1, 0}, {1, 0, 3, 3, 1, 0}, FOCUSES, "hslt", true},     /* glass around all lamps */
+		{{0, 0, 1, 1, 1, 0}, {1, 0, 3, 3, 1, 0}, MISSES, "bdpt", false},     /* but not where it misses some */
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		assert_string_equal(render_choice_of(&cases[i].c), cases[i].name);
-		assert_int_equal(render_choice_is_settled(&cases[i].c), cases[i].settled);
+		const double *p = cases[i].path, *b = cases[i].bdpt;
+		struct render_choice c = {.path = {p[0], p[1], p[2], p[3], p[4], p[5]},
+					  .bdpt = {b[0], b[1], b[2], b[3], b[4], b[5]},
+					  .misses = cases[i].scene == MISSES,
+					  .focuses = cases[i].scene != FLAT};
+		assert_string_equal(render_choice_of(&c), cases[i].name);
+		assert_int_equal(render_choice_is_settled(&c), cases[i].settled);
 	}
 }
 
@@ -321,8 +378,8 @@ static void what_is_settled_is_the_same_with_bdpt(void **state)
 	for (int i = 0; i < 162; i++) {
 		bool dark = i >= 81;
 		struct render_choice c = {
-			.path = {dark ? 0 : 1, dark ? 0 : 0.02, dark ? 1 : 1.9, dark ? 1 : 0.9, 1},
-			.bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27 % 3], 1}};
+			.path = {dark ? 0 : 1, dark ? 0 : 0.02, dark ? 1 : 1.9, dark ? 1 : 0.9, 1, 0},
+			.bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27 % 3], 1, 0}};
 		assert_true(render_choice_is_settled(&c));
 		assert_string_equal(render_choice_of(&c), dark ? "hslt" : "bdpt");
 	}
@@ -377,9 +434,12 @@ int main(void)
 		cmocka_unit_test(light_with_an_end_to_its_tail_is_given_to_bdpt8),
 		cmocka_unit_test(a_lamp_behind_glass_that_path_never_hits_needs_chains),
 		cmocka_unit_test(path_is_not_chosen_where_it_misses_light),
+		cmocka_unit_test(path_is_not_chosen_where_glass_may_focus_light),
 		cmocka_unit_test(light_through_water_needs_chains),
 		cmocka_unit_test(light_that_few_samples_find_needs_chains),
 		cmocka_unit_test(where_no_light_is_found_the_longest_search_goes_on),
+		cmocka_unit_test(the_pilot_of_hours_is_bounded),
+		cmocka_unit_test(the_reason_is_a_sentence_without_figures),
 		cmocka_unit_test(the_same_request_gives_the_same_choice),
 		cmocka_unit_test(a_crop_is_rendered_as_the_whole_is),
 		cmocka_unit_test(the_rule),

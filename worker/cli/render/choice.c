@@ -50,9 +50,10 @@ void choice_print(const struct choice *c, const char *integrator)
 
 static json_t *found_to_json(const struct render_found *f)
 {
-	return json_pack("{s:o s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex",
+	return json_pack("{s:o s:o s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex",
 			 forecast_real(f->tail), "extremeTailIndex", forecast_real(f->extreme), "extremeValueIndex",
-			 forecast_real(f->evi), "secondMomentTimesRays", forecast_real(f->cost));
+			 forecast_real(f->evi), "largestShare", forecast_real(f->most), "secondMomentTimesRays",
+			 forecast_real(f->cost));
 }
 
 json_t *choice_to_json(const struct choice *c)
@@ -60,8 +61,8 @@ json_t *choice_to_json(const struct choice *c)
 	if (!c->made)
 		return json_null();
 	const struct render_choice *f = &c->found;
-	return json_pack("{s:s s:[ssss] s:I s:f s:b s:o s:o}", "why", c->text, "considered", "path", "bdpt8", "bdpt",
-			 RENDER_INTEGRATOR_CHAINS, "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds,
-			 "pathMissesLight", (int)f->misses, "path", found_to_json(&f->path), "bdpt",
-			 f->settled ? json_null() : found_to_json(&f->bdpt));
+	return json_pack("{s:s s:[ssss] s:I s:f s:b s:b s:o s:o}", "why", c->text, "considered", "path", "bdpt8",
+			 "bdpt", RENDER_INTEGRATOR_CHAINS, "pilotSamples", (json_int_t)f->samples, "pilotSeconds",
+			 c->seconds, "pathMissesLight", (int)f->misses, "surfacesFocusLight", (int)f->focuses, "path",
+			 found_to_json(&f->path), "bdpt", f->settled ? json_null() : found_to_json(&f->bdpt));
 }
