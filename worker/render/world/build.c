@@ -12,6 +12,7 @@
 #include "worker/render/texture/picture_cache.h"
 #include "worker/render/world/coincident.h"
 #include "worker/render/world/geometry.h"
+#include "worker/render/world/node_table.h"
 #include "worker/render/world/visibility_bounds.h"
 
 static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
@@ -37,24 +38,23 @@ static int create_bsdfs(struct builder *b)
 	/* One more for what no path meets. */
 	w->bsdfs = arena_alloc(&w->arena, (size_t)w->shape_count + 1, sizeof *w->bsdfs);
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
-	const void **of_mesh = arena_alloc(&b->scratch, w->shape_count, sizeof(void *)); /* by its triangles */
-	if (!w->bsdfs || !b->bsdf_nodes || !of_mesh)
+	struct node_table made; /* a mesh is known by its triangles */
+	if (!w->bsdfs || !b->bsdf_nodes || node_table_init(&made, w->shape_count, &b->scratch))
 		return build_out_of_memory(b->e);
 	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->accuracy.roughness, NULL};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
 		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;
-		uint32_t k = 0;
-		while (k < w->bsdf_count &&
-		       (b->bsdf_nodes[k] != key || (of_mesh[k] && of_mesh[k] != w->shapes[i].index)))
-			k++;
-		w->parts[i].bsdf = k;
-		if (k < w->bsdf_count) {
+		uint32_t k;
+		if (node_table_find(&made, key, NULL, &k) ||
+		    (w->shapes[i].index && node_table_find(&made, key, w->shapes[i].index, &k))) {
+			w->parts[i].bsdf = k;
 			w->shapes[i].relief = w->bsdfs[k].relief;
 			continue;
 		}
+		k = w->bsdf_count++;
+		w->parts[i].bsdf = k;
 		b->bsdf_nodes[k] = key;
-		w->bsdf_count++;
 		struct attribute_table attributes = attributes_of(b, i);
 		build.attributes = &attributes;
 		int rc = 0;
@@ -68,7 +68,7 @@ static int create_bsdfs(struct builder *b)
 			rc = bsdf_mirror_back(&w->bsdfs[k], &w->arena, b->e);
 		if (rc)
 			return rc;
-		of_mesh[k] = attributes.asked ? w->shapes[i].index : NULL;
+		node_table_add(&made, key, attributes.asked ? w->shapes[i].index : NULL, k);
 		w->shapes[i].relief = w->bsdfs[k].relief;
 	}
 	return 0;
@@ -211,10 +211,11 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 	struct world *w = b->w;
 	enum visibility_bounds *reached = arena_alloc(&b->scratch, w->shape_count, sizeof *reached);
 	struct weighed *room = arena_alloc(&b->scratch, w->shape_count, sizeof *room);
-	if (!reached || !room)
+	struct bsdf_reach *of_bsdf = arena_alloc(&b->scratch, w->bsdf_count, sizeof *of_bsdf);
+	if (!reached || !room || !of_bsdf)
 		return build_out_of_memory(b->e);
 	const struct effects_source src = {b->scene,  b->shape_nodes, b->bsdf_nodes, b->emitter_nodes,
-					   max_depth, b->boxes,	      room};
+					   max_depth, b->boxes,	      room,	     of_bsdf};
 	effects_analyse(w, &src, &b->forced, reached);
 	return effects_apply(w, &b->forced, reached, b->e);
 }

@@ -88,16 +88,17 @@ static void add_hidden(struct census *c, const struct bsdf *b, const struct scen
 		count(&c->hidden_dispersive, n, "");
 }
 
-static enum visibility_bounds reach_of_bsdf(const struct world *w, const enum visibility_bounds *shape, uint32_t bsdf)
+/* Of each BSDF: whether one of its shapes is reached, else what keeps its last one from that; YES where it has none.
+ * One pass over the shapes, however many BSDFs there are. */
+static void find_reach(const struct world *w, const enum visibility_bounds *shape, struct bsdf_reach *of)
 {
-	enum visibility_bounds r = VISIBILITY_YES;
-	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (w->parts[i].bsdf == bsdf) {
-			if (shape[i] == VISIBILITY_YES)
-				return VISIBILITY_YES;
-			r = shape[i];
-		}
-	return r;
+	for (uint32_t k = 0; k < w->bsdf_count; k++)
+		of[k] = (struct bsdf_reach){VISIBILITY_YES, false};
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		struct bsdf_reach *r = &of[w->parts[i].bsdf];
+		if (!r->met || r->reach != VISIBILITY_YES)
+			*r = (struct bsdf_reach){shape[i], true};
+	}
 }
 
 static bool asks_for_dispersion(const struct scene_node *n)
@@ -114,9 +115,11 @@ static void add_unused(struct census *c, const struct world *w, const struct eff
 	for (uint32_t i = 0; i < src->scene->object_count; i++) {
 		const struct scene_node *n = src->scene->objects[i];
 		uint32_t k = 0;
+		if (n->cls != PLUGIN_BSDF || !asks_for_dispersion(n))
+			continue;
 		while (k < w->bsdf_count && src->bsdf[k] != n)
 			k++;
-		if (n->cls == PLUGIN_BSDF && k == w->bsdf_count && asks_for_dispersion(n))
+		if (k == w->bsdf_count)
 			count(&c->unused_dispersive, n, "");
 	}
 }
@@ -135,8 +138,9 @@ static struct census take_census(const struct world *w, const struct effects_sou
 				 const enum visibility_bounds *shape)
 {
 	struct census c = {.why_hidden = VISIBILITY_YES};
+	find_reach(w, shape, src->reach);
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
-		enum visibility_bounds r = reach_of_bsdf(w, shape, i);
+		enum visibility_bounds r = src->reach[i].reach;
 		if (r == VISIBILITY_YES)
 			add_material(&c, &w->bsdfs[i], src->bsdf[i]);
 		else

@@ -77,6 +77,7 @@ struct effects {
 struct world;
 struct box;
 struct weighed;
+struct bsdf_reach;
 
 /* The nodes that the world's parts were made of. */
 struct effects_source {
@@ -86,6 +87,7 @@ struct effects_source {
 	uint32_t max_depth;				     /* asked for; 0: the scene's */
 	const struct box *box;				     /* one a shape, in any units */
 	struct weighed *room;				     /* for one a shape */
+	struct bsdf_reach *reach;			     /* for one a BSDF */
 };
 
 /* Whether a path between camera and light can meet a shape; why not. */
@@ -94,6 +96,11 @@ enum visibility_bounds {
 	VISIBILITY_ENCLOSED, /* within a closed opaque shape that the camera is outside of */
 	VISIBILITY_DARK,     /* nothing shines in the scene, or what does is enclosed */
 	VISIBILITY_DEPTH,    /* paths are too short to scatter */
+};
+
+struct bsdf_reach {
+	enum visibility_bounds reach; /* of its shapes */
+	bool met;		      /* it has one */
 };
 
 /* Fills w->effects from shapes, BSDFs and emitters, and shape[] (one a shape, see reach.h). */
