@@ -211,7 +211,7 @@ static int read_weights(struct blend *m, const struct scene_node *n, struct erro
 		return node_error(n, e, EINVAL, "weights=\"%s\": all are 0", text);
 	for (uint32_t k = 0; k < m->count && sum > 1; k++)
 		m->fixed[k] /= sum;
-	return 0;
+	return bsdf_check_energy(n, sum, e);
 }
 
 static int mixture_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
@@ -239,7 +239,11 @@ static int mixture_create(struct bsdf *b, const struct scene_node *n, const stru
 
 static const struct param blend_params[] = {{.name = "weight", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 					    {.name = NULL}};
-static const struct param mixture_params[] = {{.name = "weights", .types = VALUE_STRING}, {.name = NULL}};
+static const struct param mixture_params[] = {
+	{.name = "weights", .types = VALUE_STRING},
+	BSDF_ENERGY_PARAM,
+	{.name = NULL},
+};
 
 const struct bsdf_ops bsdf_ops_blendbsdf = {
 	.type = "blendbsdf",

@@ -57,6 +57,16 @@ int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const 
 	return 0;
 }
 
+int bsdf_check_energy(const struct scene_node *n, double sum, struct error *e)
+{
+	if (!(sum > 1) || node_bool(n, "ensure_energy_conservation", true))
+		return 0;
+	return node_error(n, e, ERANGE,
+			  "it would give back %g times the light that it gets (ensureEnergyConservation is false), "
+			  "which is not supported",
+			  sum);
+}
+
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
 {
 	if (shape != COLOR_SHAPE_CONSTANT)

@@ -36,4 +36,12 @@ int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const 
 /* Enters that a part of b has this colour. */
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape);
 
+/* 0.6 lets whoever wants it keep reflectances that add up to more than 1 as they are. `sum` is what they add up to;
+ * -ERANGE where it exceeds 1 and the node asks for that. Of other BSDFs the parameter has no effect (scene.c). */
+#define BSDF_ENERGY_PARAM                                                 \
+	{                                                                 \
+		.name = "ensure_energy_conservation", .types = VALUE_BOOL \
+	}
+int bsdf_check_energy(const struct scene_node *n, double sum, struct error *e);
+
 #endif

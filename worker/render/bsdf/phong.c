@@ -80,18 +80,20 @@ static int phong_create(struct bsdf *b, const struct scene_node *n, const struct
 	ph->exponent = node_float(n, "exponent", 30);
 	ph->scale = d + s > 1 ? 0.99 / (d + s) : 1;
 	ph->specular_chance = d + s > 0 ? s / (d + s) : 0;
+	code = bsdf_check_energy(n, d + s, e);
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
 	double alpha = sqrt(2 / (ph->exponent + 2));
 	b->alpha = s > 0 ? alpha : INFINITY;
 	b->alpha_mean = ph->specular_chance * alpha + (1 - ph->specular_chance);
-	return 0;
+	return code;
 }
 
 static const struct param phong_params[] = {
 	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
 	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
 	{.name = "exponent", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
+	BSDF_ENERGY_PARAM,
 	{.name = NULL},
 };
 

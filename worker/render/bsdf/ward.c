@@ -131,7 +131,7 @@ static int ward_create(struct bsdf *b, const struct scene_node *n, const struct 
 	b->alpha_mean = w->specular_chance * b->alpha_mean + (1 - w->specular_chance);
 	if (s == 0)
 		b->alpha = INFINITY;
-	return 0;
+	return bsdf_check_energy(n, d + s, e);
 }
 
 static const struct param ward_params[] = {
@@ -141,6 +141,7 @@ static const struct param ward_params[] = {
 	ROUGH_MAP_NUMBER("alpha"),
 	ROUGH_MAP_NUMBER("alpha_u"),
 	ROUGH_MAP_NUMBER("alpha_v"),
+	BSDF_ENERGY_PARAM,
 	{.name = NULL},
 };
 

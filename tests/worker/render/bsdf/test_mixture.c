@@ -4,6 +4,7 @@
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
+#include <errno.h>
 #include <math.h>
 
 #define PI 3.14159265358979323846
@@ -91,6 +92,10 @@ static void test_a_mixture_is_a_sum(void **state)
 		{"mixturebsdf weights=1_2_5 | diffuse reflectance=0.9 | phong | roughconductor alpha=0.3",
 		 {0.125, 0.25, 0.625}},
 		{"mixturebsdf weights=0.4,0.6 | diffuse reflectance=0.9 | phong", {0.4, 0.6, 0}},
+		{"mixturebsdf weights=1,3 ensure_energy_conservation=true | diffuse reflectance=0.9 | phong",
+		 {0.25, 0.75, 0}},
+		{"mixturebsdf weights=0.1,0.6 ensure_energy_conservation=false | diffuse reflectance=0.9 | phong",
+		 {0.1, 0.6, 0}},
 		{"blendbsdf weight=0.6 | diffuse reflectance=0.9 | phong", {0.4, 0.6, 0}},
 	};
 	struct arena a = {0};
@@ -133,13 +138,32 @@ static void test_parts_that_let_light_through(void **state)
 	arena_fini(&a);
 }
 
+/* What 0.6 keeps where it is asked not to scale: more light than there is. */
+static void test_more_than_all_is_refused(void **state)
+{
+	(void)state;
+	static const char *const texts[] = {
+		"mixturebsdf weights=0.5,0.6 ensure_energy_conservation=false | diffuse | phong",
+		"phong diffuse_reflectance=0.8 specular_reflectance=0.4 ensure_energy_conservation=false",
+		"ward diffuse_reflectance=0.8 specular_reflectance=0.4 ensure_energy_conservation=false",
+	};
+	struct arena a = {0};
+	struct bsdf b;
+	struct error e;
+	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+		assert_int_equal(bsdf_try(&a, texts[i], false, &b, &e), -ERANGE);
+		assert_non_null(strstr(e.text, "(ensureEnergyConservation is false)"));
+	}
+	bsdf_make(&a, "phong diffuse_reflectance=0.6 specular_reflectance=0.4 ensure_energy_conservation=false", &b);
+	arena_fini(&a);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ward_is_its_formula),
-		cmocka_unit_test(test_ward_defaults_and_scale),
-		cmocka_unit_test(test_a_mixture_is_a_sum),
-		cmocka_unit_test(test_parts_that_let_light_through),
+		cmocka_unit_test(test_ward_is_its_formula),	 cmocka_unit_test(test_ward_defaults_and_scale),
+		cmocka_unit_test(test_a_mixture_is_a_sum),	 cmocka_unit_test(test_parts_that_let_light_through),
+		cmocka_unit_test(test_more_than_all_is_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
