@@ -15,6 +15,8 @@
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/warp.h"
 
+#include <string.h>
+
 enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE, THIN_THROUGH, THIN_LOBES };
 
 struct thin {
@@ -22,6 +24,11 @@ struct thin {
 	struct texture diff_trans; /* a number, `through`, where it has no ops */
 	double through;		   /* d of the header comment */
 };
+
+static double through_at(const struct thin *t, const struct bsdf_point *p)
+{
+	return 0.5 * fmin(fmax(spectrum_mean(texture_eval(&t->diff_trans, &p->where, p->w)), 0), 2);
+}
 
 /* A point of the surface, and a direction from it, which is taken for the upper side. */
 struct thin_point {
@@ -52,7 +59,7 @@ static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *
 {
 	const struct thin *t = b->data;
 	struct thin_point x = {.t = t, .s = principled_stuff(&t->p, p)};
-	x.through = t->diff_trans.ops ? 0.5 * principled_share_at(&t->diff_trans, p) : t->through;
+	x.through = t->diff_trans.ops ? through_at(t, p) : t->through;
 	/* What passes specularly is not what principled_diffuse leaves out. */
 	x.spec_trans = x.s.share[TRANSMISSION];
 	x.s.share[TRANSMISSION] = 0;
@@ -138,6 +145,26 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	return pair.pdf > 0;
 }
 
+/* A picture's numbers end at 1; the two of a checkerboard may be up to 2, as the parameter may. */
+static int read_through(struct bsdf *b, struct thin *t, const struct scene_node *n, const struct bsdf_build *build,
+			struct error *e)
+{
+	const struct scene_node *texture = node_ref(n, "diff_trans");
+	t->through = 0.5 * node_float(n, "diff_trans", 0);
+	if (!texture)
+		return 0;
+	if (strcmp(texture->type, "checkerboard") != 0)
+		return bsdf_texture(b, &t->diff_trans, n, "diff_trans", 0, build, e);
+	const struct texture_build inner = bsdf_texture_build(build);
+	int code = texture_create(&t->diff_trans, texture, COLOR_UNBOUNDED, &inner, e);
+	if (code)
+		return code;
+	b->textured = true;
+	bsdf_add_shape(b, texture_shape(&t->diff_trans));
+	double most = texture_max(&t->diff_trans);
+	return most <= 2 ? 0 : node_error(n, e, ERANGE, "diff_trans=%g is outside [0, 2]", most);
+}
+
 static int thin_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	struct thin *t = bsdf_data(b, n, build, sizeof *t, e);
@@ -149,9 +176,8 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
 		code = principled_shares(p, b, n, build, e);
-	t->through = 0.5 * node_float(n, "diff_trans", 0);
-	if (!code && node_ref(n, "diff_trans"))
-		code = bsdf_texture(b, &t->diff_trans, n, "diff_trans", 0, build, e);
+	if (!code)
+		code = read_through(b, t, n, build, e);
 	if (code)
 		return code;
 	p->metallic = (struct texture){.color = color_constant(0)};

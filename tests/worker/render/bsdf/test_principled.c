@@ -2,6 +2,7 @@
 /* The principled BSDF where it is another plug-in, and its lobes where only one is there, against their formulas. */
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
+#include <errno.h>
 #include <math.h>
 
 #define PI 3.14159265358979323846
@@ -196,6 +197,15 @@ static void test_a_sheet_of_textures(void **state)
 	same("principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) | @spec_trans checkerboard color0=0.3 color1=0.3 | "
 	     "@diff_trans checkerboard color0=0.9 color1=0.9",
 	     "principledthin roughness=0.6 base_color=rgb(0.8,0.3,0.1) spec_trans=0.3 diff_trans=0.9", 1, 1);
+	/* As the number, up to 2. */
+	same("principledthin base_color=rgb(0.8,0.3,0.1) | @diff_trans checkerboard color0=1.7 color1=1.7",
+	     "principledthin base_color=rgb(0.8,0.3,0.1) diff_trans=1.7", 1, 1);
+	struct arena a = {0};
+	struct bsdf b;
+	struct error e;
+	assert_int_equal(bsdf_try(&a, "principledthin | @diff_trans checkerboard color0=0.1 color1=2.1", true, &b, &e),
+			 -ERANGE);
+	arena_fini(&a);
 }
 
 int main(void)
