@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/lenient.h"
 
+#include "worker/render/scene/plugin.h"
+
 #include <string.h>
 
 static bool is_one_of(const char *name, const char *const *list)
@@ -57,4 +59,18 @@ const char *lenient_param(const char *stand_in, const char *name)
 	if (strcmp(stand_in, "diffuse") == 0 && is_one_of(name, colors))
 		return "reflectance";
 	return name;
+}
+
+struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el)
+{
+	struct error unused;
+	enum plugin_class cls;
+	for (struct xml_element *c = el->first; c; c = c->next) {
+		struct xml_element *target = c;
+		if (strcmp(c->name, "ref") == 0 && id_table_find(ids, c, "id", &target, &unused))
+			continue;
+		if (plugin_class_find(target->name, &cls) && cls == PLUGIN_BSDF)
+			return target;
+	}
+	return NULL;
 }

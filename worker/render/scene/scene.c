@@ -11,6 +11,7 @@
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/snake_case.h"
+#include "worker/render/scene/transform.h"
 #include "worker/render/scene/value.h"
 #include "worker/render/scene/xml.h"
 
@@ -173,6 +174,9 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
 		return 0;
 	}
+	/* 0.6 has it for all BSDFs; those whose reflectances can add up to more than 1 have it in their tables. */
+	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
+		return note_property(m, owner, el, name);
 	if (!found && is_foreign_parameter(m, d, el, name))
 		return note_foreign_parameter(m, owner, el, name);
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
@@ -185,12 +189,27 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	return 0;
 }
 
+static int stand_still(struct maker *m, const struct xml_element *owner, const struct xml_element **el)
+{
+	bool moves;
+	int r = transform_still(el, m->lenient, &moves, m->error);
+	return r || !moves ? r
+			   : leave_out(m, (*el)->parent, xml_attribute(owner, "type"), "motion",
+				       "all but the start of the");
+}
+
 static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
 			 const struct xml_element *el)
 {
 	const char *written = xml_attribute(el, "name");
 	if (!written)
 		return xml_error(el, m->error, EINVAL, "needs an attribute `name`");
+	if (strcmp(el->name, "animation") == 0) {
+		int r = stand_still(m, owner, &el);
+		if (r)
+			return r;
+		written = strcmp(written, "animation") == 0 ? "to_world" : written;
+	}
 	const char *name = property_name(m, el, written);
 	if (!name)
 		return out_of_memory(m);
@@ -353,21 +372,6 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	return 0;
 }
 
-/* The BSDF inside one that is not supported; NULL: none. */
-static struct xml_element *inner_bsdf(struct maker *m, const struct xml_element *el)
-{
-	struct error unused;
-	enum plugin_class cls;
-	for (struct xml_element *c = el->first; c; c = c->next) {
-		struct xml_element *target = c;
-		if (strcmp(c->name, "ref") == 0 && id_table_find(&m->ids, c, "id", &target, &unused))
-			continue;
-		if (plugin_class_find(target->name, &cls) && cls == PLUGIN_BSDF)
-			return target;
-	}
-	return NULL;
-}
-
 /* Of a plug-in that is not supported: refuses it, or finds the table and the type that stand in for it, or makes *out
  * of what is inside (*decl stays NULL). REPORT_TOLD: it is left out. */
 static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class cls, const char **type,
@@ -377,7 +381,7 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 	enum lenient_way way = m->lenient ? lenient_plugin(cls, *type, &other) : LENIENT_REFUSE;
 	if (way == LENIENT_REFUSE)
 		return refuse_type(m, el, cls, *type);
-	struct xml_element *inner = way == LENIENT_INNER ? inner_bsdf(m, el) : NULL;
+	struct xml_element *inner = way == LENIENT_INNER ? lenient_inner(&m->ids, el) : NULL;
 	int r = way == LENIENT_LEAVE_OUT
 			? leave_out(m, el, *type, "", "the plug-in")
 			: note(m, el, *type, "",

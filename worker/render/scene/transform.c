@@ -194,3 +194,19 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 	*out = m;
 	return 0;
 }
+
+int transform_still(const struct xml_element **el, bool lenient, bool *moves, struct error *e)
+{
+	const struct xml_element *animation = *el, *first = animation->first;
+	int r = value_check_element(animation, "name", true, e);
+	*moves = first && first->next;
+	for (const struct xml_element *c = first; c && !r; c = c->next)
+		if (strcmp(c->name, "transform") != 0)
+			return xml_error(c, e, EINVAL, "has no place in <animation>, which holds transforms");
+	if (!r && !first)
+		return xml_error(animation, e, EINVAL, "holds no transform");
+	if (!r && *moves && !lenient)
+		return xml_error(animation, e, ENOTSUP, "what moves is not supported");
+	*el = first;
+	return r;
+}

@@ -174,7 +174,7 @@ static const struct kind {
 	{"rgb", VALUE_RGB, "name|value|intent", false},
 	{"srgb", VALUE_RGB, "name|value", false},
 	{"spectrum", VALUE_SPECTRUM, "name|value|intent|filename|type|id", true},
-	{"transform", VALUE_TRANSFORM, "name", true},
+	{"transform", VALUE_TRANSFORM, "name|time", true},
 	{"blackbody", VALUE_SPECTRUM, "name|temperature|scale", false},
 	{"animation", 0, NULL, false},
 	{"color", 0, NULL, false},

@@ -193,7 +193,20 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<blackbody name='eta'/>"), "needs a temperature");
 	refuses(BSDF("<blackbody name='eta' temperature='hot'/>"), "temperature=\"hot\" is not a number");
 	refuses(BSDF("<blackbody name='eta' temperature='1'/>"), "a temperature of 1 K is outside [100, 1e+06]");
-	refuses(BSDF("<animation name='eta'/>"), "is not supported; supported: boolean");
+	refuses(BSDF("<color name='eta'/>"), "is not supported; supported: boolean");
+	refuses(S "<shape type='sphere'><animation name='toWorld'/></shape>" END, "holds no transform");
+	refuses(S "<shape type='sphere'><animation name='toWorld'><scale value='2'/></animation></shape>" END,
+		"has no place in <animation>");
+	refuses(S
+		"<shape type='sphere'><animation name='toWorld'><transform time='0'/><transform time='1'/></animation>"
+		"</shape>" END,
+		"what moves is not supported");
+	refuses(S
+		"<shape type='sphere'><animation name='animation'><transform time='0'/><transform time='1'/></animation>"
+		"</shape>" END,
+		"what moves is not supported");
+	refuses(S "<shape type='sphere'><animation name='toWorld' tiem='1'><transform/></animation></shape>" END,
+		"has no attribute `tiem`");
 	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value, a folder");
 	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END,
 		"neither true nor false");
