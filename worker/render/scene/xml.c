@@ -13,6 +13,7 @@
 #include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/define.h"
 #include "worker/render/scene/number.h"
+#include "worker/render/scene/upgrade.h"
 
 #include <expat.h>
 
@@ -26,10 +27,11 @@ struct reader {
 	struct arena *arena;
 	struct define_table defines;
 	struct error *error;
-	int failed;   /* the first error's negative errno */
-	int includes; /* files around the current one */
-	size_t bytes; /* of all files so far */
-	bool mixed;   /* files of both dialects: said */
+	int failed;    /* the first error's negative errno */
+	int includes;  /* files around the current one */
+	size_t bytes;  /* of all files so far */
+	bool mixed;    /* files of both dialects: said */
+	bool upgraded; /* a file from before 0.4: said */
 	/* the current file */
 	XML_Parser parser;
 	const char *file;
@@ -37,6 +39,7 @@ struct reader {
 	struct xml_element *current; /* innermost open element */
 	struct xml_element *hook;    /* the <include> element that the file stands for, NULL for the main file */
 	int depth;
+	int minor; /* of a version before 0.5, else -1 */
 	bool snake;
 };
 
@@ -168,6 +171,14 @@ static int begin_file(struct reader *r, struct xml_element *el)
 	const char *rest = version ? number_scan_int(version, version + strlen(version), &major) : NULL;
 	if (!rest || (*rest != 0 && *rest != '.') || major < 0)
 		return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
+	int64_t minor = 0;
+	const char *end = *rest == '.' ? number_scan_int(rest + 1, version + strlen(version), &minor) : rest;
+	r->minor = major == 0 && end && minor >= 0 && minor < 5 ? (int)minor : -1;
+	if (r->minor >= 0 && r->minor < 4 && !r->upgraded && r->tree->note_count < XML_NOTES_MAX) {
+		r->upgraded = true;
+		r->tree->notes[r->tree->note_count++] =
+			"is of a version before 0.4: taken as Mitsuba 0.5 takes such files, which turns their cameras round";
+	}
 	r->snake = major < 2;
 	bool dialect_3 = major >= 2;
 	if (el->parent && !r->mixed && r->tree->dialect_3 != dialect_3 && r->tree->note_count < XML_NOTES_MAX) {
@@ -347,6 +358,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 		c = error_prefix(r->error, c, "%s:%d: <include>", el->file, el->line);
 	outer.failed = r->failed;
 	outer.mixed = r->mixed;
+	outer.upgraded = r->upgraded;
 	outer.bytes = r->bytes;
 	outer.defines = r->defines;
 	*r = outer;
@@ -372,6 +384,8 @@ static void on_end(void *user, const char *name)
 	int c = 0;
 	if (!el->ignored && strcmp(name, "include") == 0)
 		c = el->first ? xml_error(el, r->error, EINVAL, "must be empty") : read_include(r, el);
+	if (!c && el == r->top && r->minor >= 0)
+		c = upgrade_file(el, r->minor, r->arena, r->error);
 	r->depth--;
 	r->current = el == r->top ? NULL : el->parent;
 	if (c)

@@ -1,0 +1,232 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Files of Mitsuba before 0.5 against twins that were written for 0.5 by hand, by the rules of its upgrade: the same
+ * objects with the same values. And against themselves: before 0.4 the camera's left is its right.
+ */
+#include "tests/support/memory_assets.h"
+#include "worker/render/render.h"
+#include "worker/render/scene/scene.h"
+#include "worker/render/scene/value.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct memory_file files[4];
+
+static int read_as(struct scene *s, const char *version, const char *body, const char *included, struct error *e)
+{
+	static char text[8192];
+	snprintf(text, sizeof text, "<scene version='%s'>%s</scene>", version, body);
+	files[0] = (struct memory_file){"s.xml", text, strlen(text)};
+	files[1] = (struct memory_file){"i.xml", included, strlen(included)};
+	struct asset_source assets = memory_assets(files);
+	return scene_read(s, &assets, "s.xml", render_plugins(), NULL, 0, e);
+}
+
+static struct scene read_ok(const char *version, const char *body, const char *included)
+{
+	struct scene s;
+	struct error e;
+	if (read_as(&s, version, body, included, &e))
+		fail_msg("%s: %s", version, e.text);
+	return s;
+}
+
+static void assert_same_node(const struct scene_node *a, const struct scene_node *b);
+
+static void assert_same_property(const struct scene_node *of, const struct property *p, const struct property *q)
+{
+	double x[3], y[3];
+	uint32_t n, m;
+	if (!q || p->value.type != q->value.type)
+		fail_msg("%s: %s differs", of->type, p->name);
+	const double *u = value_numbers(&p->value, x, &n), *v = value_numbers(&q->value, y, &m);
+	assert_int_equal(n, m);
+	for (uint32_t i = 0; i < n; i++)
+		assert_true(u[i] == v[i]);
+	if (p->value.type == VALUE_STRING)
+		assert_string_equal(p->value.as.string, q->value.as.string);
+	if (p->value.type == VALUE_BOOL)
+		assert_int_equal(p->value.as.boolean, q->value.as.boolean);
+	if (p->value.type == VALUE_TRANSFORM)
+		for (int i = 0; i < 16; i++)
+			assert_true(p->value.as.transform.m[i / 4][i % 4] == q->value.as.transform.m[i / 4][i % 4]);
+	if (p->value.type == VALUE_NODE)
+		assert_same_node(p->value.as.node, q->value.as.node);
+}
+
+static void assert_same_node(const struct scene_node *a, const struct scene_node *b)
+{
+	assert_int_equal(a->cls, b->cls);
+	assert_string_equal(a->type, b->type);
+	if (a->property_count != b->property_count || a->child_count != b->child_count)
+		fail_msg("%s: %u values and %u objects, not %u and %u", a->type, a->property_count, a->child_count,
+			 b->property_count, b->child_count);
+	for (uint32_t i = 0; i < a->property_count; i++)
+		assert_same_property(a, &a->properties[i], node_find(b, a->properties[i].name));
+	for (uint32_t i = 0; i < a->child_count; i++)
+		assert_same_node(a->children[i], b->children[i]);
+}
+
+static void assert_twins(const char *version, const char *body, const char *included, const char *now,
+			 const char *other)
+{
+	struct scene a = read_ok(version, body, included), b = read_ok("0.6.0", now, other);
+	assert_int_equal(a.object_count, b.object_count);
+	for (uint32_t i = 0; i < a.object_count; i++)
+		assert_same_node(a.objects[i], b.objects[i]);
+	scene_fini(&a);
+	scene_fini(&b);
+}
+
+#define LOOK "<lookAt origin='1,2,3' target='0,0,0' up='0,1,0'/>"
+#define PART "<film type='hdrfilm'><integer name='width' value='8'/><integer name='height' value='4'/></film>"
+#define TO(x) "<transform name='toWorld'>" x "</transform>"
+
+static void test_version_3(void **state)
+{
+	(void)state;
+	assert_twins(
+		"0.3.0",
+		"<camera type='thinlens'><float name='focusDepth' value='3'/><float name='apertureRadius' value='.1'/>" TO(
+			LOOK) "<film type='exrfilm'><integer name='width' value='8'/><boolean name='alpha' value='false'/>"
+			      "</film></camera>"
+			      "<luminaire type='envmap'><string name='filename' value='sky.exr'/>"
+			      "<float name='intensityScale' value='2'/></luminaire>"
+			      "<luminaire type='directional'><vector name='direction' x='0' y='0' z='1'/>"
+			      "<spectrum name='intensity' value='4'/></luminaire>"
+			      "<luminaire type='point'><spectrum name='intensity' value='5'/></luminaire>"
+			      "<shape type='sphere'><luminaire type='area'><blackbody name='intensity' "
+			      "temperature='5000' multiplier='3'/></luminaire><bsdf type='bump'>"
+			      "<texture type='bitmap'><string name='filename' value='a.png'/></texture>"
+			      "<bsdf type='diffuse'/></bsdf></shape>",
+		"",
+		"<sensor type='thinlens'><float name='focusDistance' value='3'/><float name='apertureRadius' value='.1'/>" TO(
+			"<scale x='-1'/>" LOOK) "<film type='hdrfilm'><integer name='width' value='8'/></film></sensor>"
+						"<emitter type='envmap'><string name='filename' value='sky.exr'/>"
+						"<float name='scale' value='2'/></emitter>"
+						"<emitter type='directional'><vector name='direction' x='0' y='0' z='1'/>"
+						"<spectrum name='irradiance' value='4'/></emitter>"
+						"<emitter type='point'><spectrum name='intensity' value='5'/></emitter>"
+						"<shape type='sphere'><emitter type='area'><blackbody name='radiance' "
+						"temperature='5000' scale='3'/></emitter><bsdf type='bumpmap'>"
+						"<texture type='bitmap'><string name='filename' value='a.png'/></texture>"
+						"<bsdf type='diffuse'/></bsdf></shape>",
+		"");
+}
+
+static void test_version_2(void **state)
+{
+	(void)state;
+	assert_twins("0.2.1",
+		     "<shape type='sphere'><boolean name='inverted' value='true'/><bsdf type='lambertian'>"
+		     "<texture name='reflectance' type='checkerboard'><spectrum name='brightColor' value='.8'/>"
+		     "<spectrum name='darkColor' value='.3'/></texture></bsdf></shape>"
+		     "<shape type='cylinder'><point name='p1' x='0' y='0' z='1'/><point name='p2' x='0' y='0' z='4'/>"
+		     "<bsdf type='roughglass'><float name='alphaB' value='.3'/></bsdf></shape>"
+		     "<bsdf type='composite'><string name='weights' value='.3 .4'/><bsdf type='roughmetal'>"
+		     "<float name='alphaB' value='.2'/></bsdf><bsdf type='diffuse'><texture name='reflectance' "
+		     "type='ldrtexture'><string name='filename' value='a.png'/></texture></bsdf></bsdf>",
+		     "",
+		     "<shape type='sphere'><boolean name='flipNormals' value='true'/><bsdf type='diffuse'>"
+		     "<texture name='reflectance' type='checkerboard'><spectrum name='color0' value='.8'/>"
+		     "<spectrum name='color1' value='.3'/></texture></bsdf></shape>"
+		     "<shape type='cylinder'><point name='p0' x='0' y='0' z='1'/><point name='p1' x='0' y='0' z='4'/>"
+		     "<bsdf type='roughdielectric'><float name='alpha' value='.3'/></bsdf></shape>"
+		     "<bsdf type='mixturebsdf'><string name='weights' value='.3 .4'/><bsdf type='roughconductor'>"
+		     "<float name='alpha' value='.2'/></bsdf><bsdf type='diffuse'><texture name='reflectance' "
+		     "type='bitmap'><string name='filename' value='a.png'/></texture></bsdf></bsdf>",
+		     "");
+}
+
+/* What includes a file of another version keeps its own, and the angle of view is the smaller side's. */
+static void test_each_file_for_itself(void **state)
+{
+	(void)state;
+	static const char *const axes[][2] = {{"", "smaller"},
+					      {"<boolean name='mapSmallerSide' value='true'/>", "smaller"},
+					      {"<boolean name='mapSmallerSide' value='false'/>", "larger"}};
+	for (size_t i = 0; i < 3; i++) {
+		char old[1024], now[1024];
+		snprintf(old, sizeof old,
+			 "<scene version='0.3'><camera type='perspective'>%s" TO(LOOK) PART "</camera></scene>",
+			 axes[i][0]);
+		snprintf(now, sizeof now,
+			 "<scene version='0.5.0'><sensor type='perspective'><string name='fovAxis' value='%s'/>" TO(
+				 "<scale x='-1'/>" LOOK) PART "</sensor></scene>",
+			 axes[i][1]);
+		assert_twins("0.5.0", "<include filename='i.xml'/><emitter type='constant'/>", old,
+			     "<include filename='i.xml'/><emitter type='constant'/>", now);
+	}
+}
+
+static bool says(const struct scene *s, const char *words)
+{
+	bool said = false;
+	for (uint32_t i = 0; i < s->note_count; i++)
+		said |= strstr(s->notes[i], words) != NULL;
+	return said;
+}
+
+/* The same text as of 0.3 and as of 0.4, which read it without turning anything. */
+static void test_left_is_right(void **state)
+{
+	(void)state;
+	const char *text = "<camera type='perspective'>" TO(LOOK) PART "</camera>";
+	struct scene a = read_ok("0.3.0", text, ""), b = read_ok("0.4.0", text, "");
+	const mat4 m = node_transform(a.objects[0], "to_world"), n = node_transform(b.objects[0], "to_world");
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 4; k++)
+			assert_true(m.m[i][k] == (k == 0 ? -n.m[i][k] : n.m[i][k]));
+	assert_int_equal(a.note_count, b.note_count + 1);
+	assert_true(says(&a, "turns their cameras round") && !says(&b, "turns their cameras round"));
+	scene_fini(&a);
+	scene_fini(&b);
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *version, *body, *sentence;
+	} cases[] = {
+		{"0.2.0", "<bsdf type='phong'/>", "is not supported in files before version 0.3"},
+		{"0.2.0", "<shape type='sphere'><bsdf type='mirror'/></shape>", "before version 0.3"},
+		{"0.3.0", "<bsdf type='lambertian'/>", "there is no bsdf of this type"},
+		{"0.4.0", "<luminaire type='constant'/>", "has no place in <scene>"},
+		{"0.5.0", "<bsdf type='bump'/>", "there is no bsdf of this type"},
+		{"0.3.0",
+		 "<camera type='perspective'><boolean name='mapSmallerSide' value='true'/>"
+		 "<string name='fovAxis' value='x'/></camera>",
+		 "given twice"},
+		{"0.-3", "<emitter type='constant'/>", ""},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct scene s;
+		struct error e = {""};
+		int r = read_as(&s, cases[i].version, cases[i].body, "", &e);
+		if (!*cases[i].sentence) {
+			if (!r)
+				scene_fini(&s);
+			continue;
+		}
+		if (!r || !strstr(e.text, cases[i].sentence))
+			fail_msg("%s %s: \"%s\"", cases[i].version, cases[i].body, r ? e.text : "no error");
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_version_3),
+		cmocka_unit_test(test_version_2),
+		cmocka_unit_test(test_each_file_for_itself),
+		cmocka_unit_test(test_left_is_right),
+		cmocka_unit_test(test_refused),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
