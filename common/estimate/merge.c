@@ -6,6 +6,7 @@
 #include "common/estimate/tail.h"
 
 #include <assert.h>
+#include <errno.h>
 #include <math.h>
 #include <string.h>
 
@@ -68,6 +69,11 @@ uint32_t bootstrap_missing(const struct bootstrap *s)
 	return s->missing;
 }
 
+uint32_t bootstrap_done(const struct bootstrap *s)
+{
+	return s->plan.groups * s->plan.parts - s->missing;
+}
+
 int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 {
 	const struct lease_key *k = &b->key;
@@ -87,6 +93,78 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	memcpy(kept->classes, b->classes, sizeof kept->classes);
 	s->missing--;
 	return 0;
+}
+
+/* A lease in a file: this, then its weights. */
+struct saved_lease {
+	uint32_t group, part;
+	uint64_t counters[BATCH_COUNTERS];
+	double independent_sum, independent_square, beyond_sum, classes[PATH_CLASSES];
+};
+
+static int save_lease(const struct bootstrap *s, const struct batch *b, struct checked_file *f, struct error *e)
+{
+	struct plan_range r = plan_bootstrap_range(&s->plan, b->key.group, b->key.part);
+	struct saved_lease l = {.group = b->key.group,
+				.part = b->key.part,
+				.independent_sum = b->independent_sum,
+				.independent_square = b->independent_square,
+				.beyond_sum = b->beyond_sum};
+	memcpy(l.counters, b->counters, sizeof l.counters);
+	memcpy(l.classes, b->classes, sizeof l.classes);
+	int rc = checked_file_write(f, &l, sizeof l, e);
+	return rc ? rc : checked_file_write(f, s->weights + r.begin, (r.end - r.begin) * sizeof *s->weights, e);
+}
+
+int bootstrap_save(const struct bootstrap *s, struct checked_file *f, struct error *e)
+{
+	uint32_t leases = s->plan.groups * s->plan.parts, count = bootstrap_done(s);
+	int rc = checked_file_write(f, &count, sizeof count, e);
+	for (uint32_t i = 0; i < leases && !rc; i++)
+		if (s->batches[i].key.kind == LEASE_BOOTSTRAP)
+			rc = save_lease(s, &s->batches[i], f, e);
+	return rc;
+}
+
+static int load_lease(struct bootstrap *s, struct checked_file *f, struct error *e)
+{
+	struct saved_lease l;
+	int rc = checked_file_read(f, &l, sizeof l, e);
+	if (rc)
+		return rc;
+	if (l.group >= s->plan.groups || l.part >= s->plan.parts)
+		return error_set(e, EBADMSG, "a bootstrap lease of group %u, part %u", l.group, l.part);
+	struct plan_range r = plan_bootstrap_range(&s->plan, l.group, l.part);
+	struct batch b = {.key = {.kind = LEASE_BOOTSTRAP, .group = l.group, .part = l.part},
+			  .independent_sum = l.independent_sum,
+			  .independent_square = l.independent_square,
+			  .beyond_sum = l.beyond_sum,
+			  .weight_count = r.end - r.begin,
+			  .weights = mem_alloc(r.end - r.begin, sizeof *b.weights)};
+	if (!b.weights)
+		return error_set(e, ENOMEM, "no memory for %llu bootstrap weights",
+				 (unsigned long long)(r.end - r.begin));
+	memcpy(b.counters, l.counters, sizeof b.counters);
+	memcpy(b.classes, l.classes, sizeof b.classes);
+	rc = checked_file_read(f, b.weights, b.weight_count * sizeof *b.weights, e);
+	if (!rc)
+		rc = batch_check(&b, &s->plan, e);
+	if (!rc)
+		rc = bootstrap_add(s, &b, e);
+	mem_free(b.weights);
+	return rc;
+}
+
+int bootstrap_load(struct bootstrap *s, struct checked_file *f, struct error *e)
+{
+	uint32_t count;
+	assert(s->missing == s->plan.groups * s->plan.parts);
+	int rc = checked_file_read(f, &count, sizeof count, e);
+	if (!rc && count > s->missing)
+		rc = error_set(e, EBADMSG, "%u bootstrap leases of %u", count, s->missing);
+	for (uint32_t i = 0; i < count && !rc; i++)
+		rc = load_lease(s, f, e);
+	return rc;
 }
 
 void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)

@@ -7,6 +7,7 @@
 #ifndef COMMON_ESTIMATE_MERGE_H
 #define COMMON_ESTIMATE_MERGE_H
 
+#include "common/base/checked_file.h"
 #include "common/estimate/canvas_image.h"
 
 struct bootstrap;
@@ -17,6 +18,11 @@ void bootstrap_free(struct bootstrap *s);
 int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e);
 bool bootstrap_has(const struct bootstrap *s, uint32_t group, uint32_t part);
 uint32_t bootstrap_missing(const struct bootstrap *s); /* leases */
+uint32_t bootstrap_done(const struct bootstrap *s);
+/* The leases that are here, to a file, and from one into a bootstrap of the same plan that has none yet. What a file
+ * says is believed as far as batch_check() goes; -EBADMSG. */
+int bootstrap_save(const struct bootstrap *s, struct checked_file *f, struct error *e);
+int bootstrap_load(struct bootstrap *s, struct checked_file *f, struct error *e);
 /* When complete: b by group and pooled, from the weights in index order. */
 void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r);
 /* Seeds of all chains of a group, chains / groups of them: the k-th belongs to chain group + groups * k, and a lease's

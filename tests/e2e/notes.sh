@@ -11,8 +11,9 @@ noted() {
 	grep -q "note: .*$2" "$1" || fail "it does not say '$2': $(cat "$1")"
 }
 
-# Ended in its first round: nothing is written, and nothing is said of an image that is not there.
-"$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" --integrator path --size 64x64 --epoch 512 --spp 65536 2>"$DIR/early.log" &
+# Ended in its first round: no image is written, and nothing is said of one; the bootstrap is there for the same command.
+EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536"
+"$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" $EARLY 2>"$DIR/early.log" &
 early=$!
 PIDS="$PIDS $early"
 until_true 60 grep -q '^running' "$DIR/early.log" || fail "its first lease does not end"
@@ -22,6 +23,16 @@ wait $early || got=$?
 [ $got = 1 ] && grep -q 'interrupted before the first round was complete: nothing to write' "$DIR/early.log" ||
 	fail "ended before its first round: $got, $(cat "$DIR/early.log")"
 [ ! -e "$DIR/early.exr" ] || fail "an image without a round was written"
+grep -q 'leases of the bootstrap are kept in .*early.exr.bootstrap, and the same command' "$DIR/early.log" && [ -s "$DIR/early.exr.bootstrap" ] ||
+	fail "it does not keep the bootstrap: $(cat "$DIR/early.log")"
+"$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" $EARLY 2>"$DIR/again.log" &
+early=$!
+PIDS="$PIDS $early"
+until_true 60 grep -q 'goes on with \([0-9]*\) of \1 leases of the bootstrap' "$DIR/again.log" || fail "it does not go on with it: $(cat "$DIR/again.log")"
+kill -TERM $early
+got=0
+wait $early || got=$?
+[ $got = 1 ] || fail "the second time it ended with $got"
 
 start_coordinator
 start_worker w1

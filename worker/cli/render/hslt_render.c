@@ -18,6 +18,7 @@
 #include "worker/cli/render/choice.h"
 #include "worker/cli/render/estimate.h"
 #include "worker/cli/render/explain.h"
+#include "worker/cli/render/kept_bootstrap.h"
 #include "worker/cli/render/local_pilot.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
@@ -123,6 +124,7 @@ struct session {
 	double build_seconds;
 	struct choice choice;
 	struct progress progress;
+	struct kept_bootstrap kept;
 	bool usage; /* what went wrong was asked for */
 };
 
@@ -134,7 +136,7 @@ static int load(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	struct asset_folders folders = option_folders(&s->a->render, s->folder);
-	struct asset_source assets = asset_search(&folders);
+	struct asset_source files = asset_search(&folders), assets = kept_bootstrap_source(&s->kept, &files);
 	rc = option_scene_read(&scene, &assets, s->name, &s->a->render, e);
 	if (rc)
 		return rc;
@@ -222,6 +224,24 @@ static void look(void *user, const struct local_round *r)
 		expect(s, r);
 }
 
+static int resume(void *user, struct bootstrap *b, struct error *e)
+{
+	struct session *s = user;
+	char text[512];
+	(void)e;
+	kept_bootstrap_begin(&s->kept, s->a->output, &s->plan, &s->a->render);
+	kept_bootstrap_resume(&s->kept, b, text, sizeof text);
+	if (*text && !s->a->quiet)
+		fprintf(stderr, "hslt-render: note: %s\n", text);
+	return 0;
+}
+
+static void keep(void *user, const struct bootstrap *b)
+{
+	struct session *s = user;
+	kept_bootstrap_write(&s->kept, b);
+}
+
 static int render(struct session *s, struct error *e)
 {
 	s->run = (struct local_run){.world = s->world,
@@ -230,6 +250,8 @@ static int render(struct session *s, struct error *e)
 				    .stop = &interrupted,
 				    .progress = s->a->quiet ? NULL : show,
 				    .round = look,
+				    .resume = resume,
+				    .keep = keep,
 				    .user = s};
 	if (!s->a->quiet)
 		progress_start(&s->progress);
@@ -239,7 +261,8 @@ static int render(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	if (!s->run.canvas || (canvas_rounds(s->run.canvas) == 0 && !s->run.lit.black))
-		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write");
+		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write%s",
+				 s->kept.said);
 	rc = canvas_image(s->run.canvas, false, &s->image, e);
 	if (!rc)
 		convergence_judge(&s->plan, &s->image, &s->agreement);
@@ -368,6 +391,8 @@ static int run(struct session *s, struct error *e)
 		rc = render(s, e);
 	if (!rc)
 		rc = write_image(s, e);
+	if (!rc)
+		kept_bootstrap_end(&s->kept);
 	if (!rc && s->a->stats)
 		rc = stats_write(s->a->stats,
 				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement,

@@ -129,14 +129,23 @@ static int lease(struct thread_pool *c, uint32_t index)
 	return rc;
 }
 
+/* The next lease of the phase that is not there already; all of them: none is left. Under the lock. */
+static uint32_t take_lease(struct thread_pool *c)
+{
+	uint32_t parts = c->run->plan->parts;
+	while (c->kind == LEASE_BOOTSTRAP && c->next < c->leases &&
+	       bootstrap_has(c->bootstrap, c->next / parts, c->next % parts))
+		c->next++;
+	return c->next < c->leases ? c->next++ : c->leases;
+}
+
 static void *work(void *arg)
 {
 	struct thread_pool *c = arg;
 	crash_thread();
 	for (;;) {
 		pthread_mutex_lock(&c->lock);
-		uint32_t i = c->rc || stopped(c) ? c->leases : c->next;
-		c->next += i < c->leases;
+		uint32_t i = c->rc || stopped(c) ? c->leases : take_lease(c);
 		pthread_mutex_unlock(&c->lock);
 		if (i == c->leases || lease(c, i))
 			return NULL;
@@ -208,7 +217,11 @@ static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *
 static int run_bootstrap(struct thread_pool *c)
 {
 	struct local_run *r = c->run;
-	int rc = phase(c, LEASE_BOOTSTRAP, 0);
+	int rc = r->resume ? r->resume(r->user, c->bootstrap, &c->error) : 0;
+	if (rc)
+		return rc;
+	c->finished = r->plan->groups * r->plan->parts - bootstrap_missing(c->bootstrap);
+	rc = phase(c, LEASE_BOOTSTRAP, 0);
 	if (rc || stopped(c))
 		return rc;
 	r->bootstrap_cpu_seconds = r->cpu_seconds;
@@ -295,6 +308,8 @@ int local_run(struct local_run *r, struct error *e)
 			fail(j, rc, e);
 	}
 	r->seconds = since(&j->thread_pool.begin);
+	if (!rc && r->keep && !r->lit.black && (!r->canvas || canvas_rounds(r->canvas) == 0))
+		r->keep(r->user, j->thread_pool.bootstrap);
 	local_end(j);
 	return rc;
 }

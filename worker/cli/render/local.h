@@ -33,6 +33,10 @@ struct local_run {
 	/* After each complete round, from the calling thread while no lease runs; may set *stop: the rounds end there
 	 * and `end` stays MERGE_GOES_ON. May be NULL. Its own time is in no sum but the wall clock. */
 	void (*round)(void *user, const struct local_round *r);
+	/* Before the bootstrap, to add leases of it that an earlier run kept; and after a stop before the first round
+	 * was complete, to keep those that are there. From the calling thread; may be NULL. */
+	int (*resume)(void *user, struct bootstrap *b, struct error *e);
+	void (*keep)(void *user, const struct bootstrap *b);
 	void *user;
 	/* out */
 	struct canvas *canvas; /* NULL: stopped before the bootstrap was complete. canvas_free is the caller's */

@@ -1,0 +1,248 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A render that is stopped in its bootstrap, after so many leases of it, and one that goes on with them: the same bits
+ * as one that was never stopped, with no lease done twice. Files of other plans, other scenes, other versions and
+ * damaged ones are not used. Renders are stopped from within, so that nothing depends on time.
+ */
+#include "tests/support/folder.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/worlds.h"
+#include "worker/cli/render/kept_bootstrap.h"
+#include "worker/cli/render/local.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { LEASES = 16, STOP_AFTER = 5 };
+
+struct trial {
+	struct kept_bootstrap kept;
+	struct render_arguments arguments;
+	struct plan plan;
+	atomic_bool stop;
+	uint32_t leases, stop_after; /* done in this run; 0: never stopped */
+	char image[128], text[512];
+};
+
+static void count(void *user, const struct local_progress *p)
+{
+	struct trial *t = user;
+	(void)p;
+	t->leases++;
+	if (t->leases == t->stop_after)
+		atomic_store(&t->stop, true);
+}
+
+static int resume(void *user, struct bootstrap *b, struct error *e)
+{
+	struct trial *t = user;
+	(void)e;
+	kept_bootstrap_begin(&t->kept, t->image, &t->plan, &t->arguments);
+	kept_bootstrap_resume(&t->kept, b, t->text, sizeof t->text);
+	return 0;
+}
+
+static void keep(void *user, const struct bootstrap *b)
+{
+	struct trial *t = user;
+	kept_bootstrap_write(&t->kept, b);
+}
+
+/* The scene's bytes go through the source that takes note of them. */
+static void note_scene(struct kept_bootstrap *k, const char *bytes)
+{
+	struct memory_file files[] = {{"s.xml", bytes, strlen(bytes)}, {NULL, NULL, 0}};
+	struct asset_source inner = memory_assets(files), noting = kept_bootstrap_source(k, &inner);
+	struct asset a;
+	struct error e;
+	assert_int_equal(noting.open(noting.user, "s.xml", &a, &e), 0);
+	noting.close(noting.user, &a);
+}
+
+static struct world *lit_world(void)
+{
+	return world_of_text(16, 16, SENSOR("0,0,5", "0,0,0") "<emitter type='constant'/>%s", "<shape type='sphere'/>");
+}
+
+static struct trial trial_of(const struct world *w, uint64_t seed, const char *bytes, uint32_t stop_after)
+{
+	struct plan_request r = {.integrator = "pssmlt",
+				 .kind = PLAN_CHAINS,
+				 .width = 16,
+				 .height = 16,
+				 .seed = seed,
+				 .chains = 16,
+				 .groups = 4,
+				 .parts = 4,
+				 .bootstrap = 1024,
+				 .epoch = 16,
+				 .mutations = 512,
+				 .max_depth = 8};
+	struct trial t = {.stop_after = stop_after};
+	struct error e;
+	(void)w;
+	assert_int_equal(plan_make(&r, &t.plan, &e), 0);
+	assert_int_equal(t.plan.groups * t.plan.parts, LEASES);
+	snprintf(t.image, sizeof t.image, "%s/image.exr", folder);
+	note_scene(&t.kept, bytes);
+	return t;
+}
+
+/* NULL: stopped before a round was complete. */
+static float *render(const struct world *w, struct trial *t)
+{
+	struct local_run r = {.world = w,
+			      .plan = &t->plan,
+			      .threads = 1,
+			      .stop = &t->stop,
+			      .progress = count,
+			      .resume = resume,
+			      .keep = keep,
+			      .user = t};
+	struct error e;
+	struct canvas_image i;
+	float *rgb = NULL;
+	if (local_run(&r, &e))
+		fail_msg("%s", e.text);
+	if (r.canvas && canvas_rounds(r.canvas) > 0) {
+		assert_int_equal(canvas_image(r.canvas, false, &i, &e), 0);
+		rgb = test_malloc(16 * 16 * 3 * sizeof *rgb);
+		memcpy(rgb, i.rgb, 16 * 16 * 3 * sizeof *rgb);
+		canvas_image_fini(&i);
+	}
+	canvas_free(r.canvas);
+	return rgb;
+}
+
+static bool is_there(const char *name)
+{
+	char path[160];
+	snprintf(path, sizeof path, "%s/%s", folder, name);
+	return access(path, F_OK) == 0;
+}
+
+static void test_goes_on(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	struct trial whole = trial_of(w, 1, "scene", 0);
+	float *truth = render(w, &whole);
+	uint32_t all = whole.leases;
+	assert_true(truth && all > LEASES && !*whole.text && !is_there("image.exr.bootstrap"));
+	/* Stopped in the bootstrap, once and again, and in the first round. */
+	static const uint32_t stops[] = {STOP_AFTER, 3, LEASES - STOP_AFTER - 3 + 2};
+	uint32_t done = 0;
+	for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
+		struct trial t = trial_of(w, 1, "scene", stops[i]);
+		char wanted[64];
+		assert_null(render(w, &t));
+		assert_int_equal(t.leases, stops[i]);
+		snprintf(wanted, sizeof wanted, "goes on with %u of %u leases", done, LEASES);
+		assert_true(done == 0 ? !*t.text : strstr(t.text, wanted) != NULL);
+		done += stops[i];
+		done = done < LEASES ? done : LEASES;
+		snprintf(wanted, sizeof wanted, "; %u of %u leases of the bootstrap are kept in", done, LEASES);
+		assert_non_null(strstr(t.kept.said, wanted));
+		assert_true(is_there("image.exr.bootstrap") && !is_there("image.exr.bootstrap.new"));
+	}
+	struct trial last = trial_of(w, 1, "scene", 0);
+	float *image = render(w, &last);
+	assert_non_null(image);
+	assert_int_equal(last.leases, all - LEASES);
+	assert_memory_equal(image, truth, 16 * 16 * 3 * sizeof *image);
+	kept_bootstrap_end(&last.kept);
+	assert_false(is_there("image.exr.bootstrap"));
+	test_free(image);
+	test_free(truth);
+	world_free(w);
+}
+
+static void test_of_another_command(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	struct trial t = trial_of(w, 1, "scene", STOP_AFTER);
+	assert_null(render(w, &t));
+	struct trial others[] = {trial_of(w, 2, "scene", 1), trial_of(w, 1, "scenf", 1), trial_of(w, 1, "scene", 1)};
+	others[2].arguments.define_count = 1;
+	others[2].arguments.defines[0] = (struct scene_define){"x", "1"};
+	for (size_t i = 0; i < 3; i++) {
+		others[i].kept.path[0] = 0;
+		struct bootstrap *b;
+		struct error e;
+		assert_int_equal(bootstrap_new(&b, &others[i].plan, &e), 0);
+		resume(&others[i], b, &e);
+		assert_non_null(strstr(others[i].text, "is not used: it is of another plan or scene"));
+		assert_int_equal(bootstrap_done(b), 0);
+		bootstrap_free(b);
+		kept_bootstrap_end(&others[i].kept);
+		assert_true(is_there("image.exr.bootstrap"));
+	}
+	world_free(w);
+}
+
+/* One byte after the other changed, and the file cut there: nothing of it is used. */
+static void test_damage(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	struct trial t = trial_of(w, 1, "scene", 2);
+	assert_null(render(w, &t));
+	static char bytes[1 << 16];
+	char path[160];
+	snprintf(path, sizeof path, "%s/image.exr.bootstrap", folder);
+	FILE *f = fopen(path, "rb");
+	assert_non_null(f);
+	size_t size = fread(bytes, 1, sizeof bytes, f);
+	fclose(f);
+	assert_in_range(size, 100, sizeof bytes - 1);
+	for (size_t i = 0; i < size; i += i < 64 ? 1 : 37)
+		for (int cut = 0; cut < 2; cut++) {
+			f = fopen(path, "wb");
+			bytes[i] ^= 4;
+			fwrite(bytes, 1, cut ? i : size, f);
+			bytes[i] ^= 4;
+			fclose(f);
+			struct trial damaged = trial_of(w, 1, "scene", 0);
+			struct bootstrap *b;
+			struct error e;
+			assert_int_equal(bootstrap_new(&b, &damaged.plan, &e), 0);
+			resume(&damaged, b, &e);
+			assert_non_null(strstr(damaged.text, " is not used: "));
+			assert_int_equal(bootstrap_done(b), 0);
+			bootstrap_free(b);
+		}
+	world_free(w);
+}
+
+/* Where there is no file beside the image, nothing is kept, and nothing is promised. */
+static void test_no_place(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	struct trial t = trial_of(w, 1, "scene", STOP_AFTER);
+	snprintf(t.image, sizeof t.image, "/dev/stdout");
+	assert_null(render(w, &t));
+	assert_string_equal(t.kept.said, "");
+	struct trial gone = trial_of(w, 1, "scene", STOP_AFTER);
+	snprintf(gone.image, sizeof gone.image, "%s/nowhere/image.exr", folder);
+	assert_null(render(w, &gone));
+	assert_non_null(strstr(gone.kept.said, "; the bootstrap could not be kept: "));
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(test_goes_on, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(test_of_another_command, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(test_damage, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(test_no_place, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

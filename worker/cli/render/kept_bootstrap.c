@@ -1,0 +1,170 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A file is a mark, which says what it belongs to, and what bootstrap_save() writes; it is read whole and checked
+ * before anything in it is used (checked_file.h). It gets its name when it is complete.
+ *
+ * Failures lose the bootstrap, never the render: a file that does not fit or is damaged is not used, and one that
+ * cannot be written is told.
+ */
+#include "worker/cli/render/kept_bootstrap.h"
+
+#include "common/base/crc.h"
+#include "common/base/version.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char magic[8] = "HSLTBOO1";
+
+static int marking_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	struct kept_bootstrap *k = user;
+	int rc = k->inner->open(k->inner->user, name, out, e);
+	if (rc)
+		return rc;
+	k->crc = crc32c(crc32c(k->crc, name, strlen(name) + 1), out->bytes, out->size);
+	k->bytes += out->size;
+	return 0;
+}
+
+static void marking_close(void *user, struct asset *a)
+{
+	struct kept_bootstrap *k = user;
+	k->inner->close(k->inner->user, a);
+}
+
+struct asset_source kept_bootstrap_source(struct kept_bootstrap *k, const struct asset_source *inner)
+{
+	k->inner = inner;
+	return (struct asset_source){
+		.user = k, .open = marking_open, .close = marking_close, .decoded = inner->decoded};
+}
+
+static void add_text(struct kept_bootstrap *k, const char *text, const char *end)
+{
+	size_t n = strlen(k->text);
+	if ((size_t)snprintf(k->text + n, sizeof k->text - n, "%s%s", text, end) >= sizeof k->text - n)
+		k->path[0] = 0; /* too much to tell it from others */
+}
+
+void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const struct plan *p,
+			  const struct render_arguments *a)
+{
+	char options[PLAN_TEXT], counts[128];
+	bool is_file = image && strncmp(image, "/dev/", 5) != 0;
+	int n = is_file ? snprintf(k->path, sizeof k->path, "%s.bootstrap", image) : -1;
+	if (n < 0 || (size_t)n >= sizeof k->path - sizeof ".new")
+		k->path[0] = 0;
+	plan_options(p, 1, options, sizeof options);
+	snprintf(counts, sizeof counts, "%u groups of %u parts, %llu samples", p->groups, p->parts,
+		 (unsigned long long)p->bootstrap);
+	k->text[0] = 0;
+	add_text(k, HSLT_VERSION, "\n");
+	add_text(k, options, "\n");
+	add_text(k, counts, "\n");
+	for (size_t i = 0; i < a->define_count; i++) {
+		add_text(k, a->defines[i].name, "=");
+		add_text(k, a->defines[i].value, "\n");
+	}
+}
+
+static int read_mark(const struct kept_bootstrap *k, struct checked_file *f, struct error *e)
+{
+	char start[sizeof magic], text[KEPT_TEXT];
+	uint32_t crc, length;
+	uint64_t bytes;
+	int rc = checked_file_read(f, start, sizeof start, e);
+	if (!rc)
+		rc = checked_file_read(f, &crc, sizeof crc, e);
+	if (!rc)
+		rc = checked_file_read(f, &bytes, sizeof bytes, e);
+	if (!rc)
+		rc = checked_file_read(f, &length, sizeof length, e);
+	if (!rc && (memcmp(start, magic, sizeof magic) != 0 || length > sizeof text))
+		rc = error_set(e, EBADMSG, "not a kept bootstrap");
+	if (!rc)
+		rc = checked_file_read(f, text, length, e);
+	if (!rc &&
+	    (crc != k->crc || bytes != k->bytes || length != strlen(k->text) || memcmp(text, k->text, length) != 0))
+		rc = error_set(e, ESTALE, "it is of another plan or scene");
+	return rc;
+}
+
+/* Leases that are there already after a failure in the middle are as good as any: each was checked. */
+void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size)
+{
+	struct checked_file f;
+	struct error e;
+	uint32_t all = bootstrap_missing(b);
+	text[0] = 0;
+	if (!k->path[0])
+		return;
+	int rc = checked_file_open(&f, k->path, &e);
+	if (rc == -ENOENT)
+		return;
+	if (!rc) {
+		rc = read_mark(k, &f, &e);
+		if (!rc)
+			rc = bootstrap_load(b, &f, &e);
+		checked_file_close(&f);
+	}
+	k->resumed = bootstrap_missing(b) < all;
+	if (rc)
+		snprintf(text, size, "%.300s is not used: %.128s", k->path, e.text);
+	else
+		snprintf(text, size, "goes on with %u of %u leases of the bootstrap, kept in %.300s",
+			 all - bootstrap_missing(b), all, k->path);
+}
+
+static int write_file(const struct kept_bootstrap *k, const char *path, const struct bootstrap *b, struct error *e)
+{
+	struct checked_file f;
+	uint32_t length = (uint32_t)strlen(k->text);
+	int rc = checked_file_create(&f, path, e);
+	if (rc)
+		return rc;
+	rc = checked_file_write(&f, magic, sizeof magic, e);
+	if (!rc)
+		rc = checked_file_write(&f, &k->crc, sizeof k->crc, e);
+	if (!rc)
+		rc = checked_file_write(&f, &k->bytes, sizeof k->bytes, e);
+	if (!rc)
+		rc = checked_file_write(&f, &length, sizeof length, e);
+	if (!rc)
+		rc = checked_file_write(&f, k->text, length, e);
+	if (!rc)
+		rc = bootstrap_save(b, &f, e);
+	if (!rc)
+		rc = checked_file_finish(&f, e);
+	checked_file_close(&f);
+	if (!rc && rename(path, k->path))
+		rc = error_set(e, errno, "%.300s: %s", k->path, strerror(errno));
+	if (rc)
+		unlink(path);
+	return rc;
+}
+
+void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b)
+{
+	char path[KEPT_PATH];
+	struct error e;
+	uint32_t done = bootstrap_done(b);
+	k->said[0] = 0;
+	if (!k->path[0] || done == 0)
+		return;
+	snprintf(path, sizeof path, "%.*s.new", KEPT_PATH - 8, k->path);
+	if (write_file(k, path, b, &e))
+		snprintf(k->said, sizeof k->said, "; the bootstrap could not be kept: %.300s", e.text);
+	else
+		snprintf(k->said, sizeof k->said,
+			 "; %u of %u leases of the bootstrap are kept in %s, and the same command goes on with them",
+			 done, done + bootstrap_missing(b), k->path);
+}
+
+void kept_bootstrap_end(const struct kept_bootstrap *k)
+{
+	if (k->resumed)
+		unlink(k->path);
+}
