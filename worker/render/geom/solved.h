@@ -16,10 +16,11 @@ struct query {
 	vec3 o, d, end; /* in double: what Embree proposes is judged by these; end: o + d for a segment */
 	bool segment;
 	double t_min;
-	double reach;	  /* how far Embree's floats can be off along this ray */
-	double before;	  /* the same in units of d */
-	double back;	  /* Embree's ray begins that much before o, in units of d; below 0: after it */
-	double wide_from; /* extent from which on triangles are solved in double; INFINITY: none is */
+	double reach;	    /* how far Embree's floats can be off along this ray */
+	double low, beyond; /* reach times these: along the ray to the height of it, over where it starts and ends */
+	double before;	    /* by how much Embree's ray begins early, in units of d */
+	double back;	    /* Embree's ray begins that much before o, in units of d; below 0: after it */
+	double wide_from;   /* extent from which on triangles are solved in double; INFINITY: none is */
 	struct prim_ref from, to;
 	const struct ray_end *start, *finish;  /* the surfaces on which o and end lie; NULL: free, or far from o */
 	const struct coincidence *coincidence; /* NULL: no surfaces coincide */

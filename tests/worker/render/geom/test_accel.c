@@ -352,6 +352,40 @@ static void test_building_ticks(void **state)
 	body_free(&s);
 }
 
+/* Two sheets closer together than floats can be off in their scene, so that a ray in float begins beyond the second: it
+ * is met all the same by what leaves the first, however low, and hides what lies beyond it. */
+static void test_sheets(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("sheets");
+	static const double gaps[] = {0x1p-23, 0x1p-22, 0x1p-21, 0x1p-20, 0x1p-16};
+	for (size_t k = 0; k < sizeof gaps / sizeof *gaps; k++) {
+		float position[2][5][3] = {{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}};
+		uint32_t index[2][3] = {{0, 1, 2}, {0, 2, 3}};
+		struct geom_shape s[2] = {{.vertex_count = 4, .triangle_count = 2, .index = index}};
+		s[0].position = position[0];
+		memcpy(position[1], position[0], sizeof position[0]);
+		for (int i = 0; i < 4; i++)
+			position[1][i][2] = (float)gaps[k];
+		s[1] = s[0];
+		s[1].position = position[1];
+		struct accel *a = body_accel(s, 2);
+		const vec3 up = {0, 0, 1};
+		for (size_t i = 0; i < dice_count(20000); i++) {
+			struct ray_end from = {
+				{dice_between(&d, -0.5, 0.5), dice_between(&d, -0.5, 0.5), 0}, up, {0, 0}};
+			from.prim.prim = from.p.y > from.p.x;
+			vec3 w = grazing(&d, up, exp(dice_between(&d, log(1.0 / 32), log(8))));
+			struct ray_end above = free_end(vec3_madd(from.p, 0.2, w));
+			struct ray_hit hit;
+			assert_true(accel_closest(a, &from, w, 0, INFINITY, &hit) && hit.prim.shape == 1);
+			assert_true(accel_occluded(a, &from, &above) && accel_occluded(a, &above, &from));
+			assert_true(accel_occluded_to_infinity(a, &from, w));
+		}
+		accel_free(a);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -359,6 +393,7 @@ int main(void)
 		cmocka_unit_test(test_plane),		cmocka_unit_test(test_segments),
 		cmocka_unit_test(test_far_away),	cmocka_unit_test(test_slivers),
 		cmocka_unit_test(test_silhouettes),	cmocka_unit_test(test_building_ticks),
+		cmocka_unit_test(test_sheets),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
