@@ -4,6 +4,12 @@
  * over all techniques that could have made it, and splats what remains. Densities are carried as ratios of neighbouring
  * techniques, whose products stay near 1 where densities themselves leave the range of doubles.
  *
+ * Most pairs of surfaces have little to bring, once weighted, but cost a ray and a weight like any other. Those that
+ * bring less than path_context.faint are made with a probability q in proportion to what they bring, and count 1/q
+ * times. Which of them follows by systematic sampling (Madow and Madow 1944): their q are put end to end from a random
+ * place in [0, 1) on, and those within which a whole number falls are made. So each has its probability exactly, from
+ * one random number for all, provided that no q depends on which others were made.
+ *
  * A connection that is blocked, delta at an end, or below what doubles can weigh contributes nothing; none is an error.
  */
 #include "worker/render/path/connect.h"
@@ -218,6 +224,24 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	return weighted(c, c->light, s, 1, max_s, l);
 }
 
+/* false: left to chance, and not made. The weight is not known yet; light_every / edges stands for it, as if all
+ * techniques were alike: what is made brings at most `edges` times `faint`, whatever its weight turns out to be. */
+static bool is_made(struct path_context *c, unsigned edges, spectrum *l)
+{
+	double brings = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		brings += l->v[i] / SPECTRUM_LANES;
+	brings *= (c->light_every > 1 ? c->light_every : 1) / (double)edges;
+	if (!isless(brings, c->faint))
+		return true;
+	double q = brings / c->faint, from = c->faint_place;
+	c->faint_place += q;
+	if (!(floor(c->faint_place) > floor(from)))
+		return false;
+	*l = spectrum_scale(1 / q, *l);
+	return true;
+}
+
 static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, unsigned max_s)
 {
 	const struct path_vertex *y = &c->light[s - 1], *z = &c->camera[t - 1];
@@ -228,7 +252,7 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(to_light), y->to_prev));
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
 	l = spectrum_scale(geometry_term(z->x.ng, y->x.ng, to_light, distance2), l);
-	if (spectrum_is_zero(l) || !path_visible(c, z, y))
+	if (spectrum_is_zero(l) || !is_made(c, s + t - 1, &l) || !path_visible(c, z, y))
 		return spectrum_of(0);
 	return weighted(c, c->light, s, t, max_s, l);
 }

@@ -60,6 +60,8 @@ struct path_context {
 	bool one_way;	      /* nobody asks for pdf_rev: no technique has more than one light vertex */
 	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
 				 all have */
+	double faint;	      /* what a connection of two surfaces must bring to be made for certain; 0: anything */
+	double faint_place;   /* of the next such connection in systematic sampling: see connect.c */
 	uint64_t *counters;   /* of enum batch_counter */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
 };
