@@ -91,9 +91,10 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 		int code = bsdf_create(&t->side[i], inner, build, e);
 		if (code)
 			return code;
-		if (t->side[i].two_sided)
+		/* Of one that has two sides already the front is what both sides show. */
+		if (t->side[i].modes & BSDF_TRANSMIT)
 			return node_error(inner, e, EINVAL,
-					  "\"%s\" has two sides already; twosided takes only opaque ones", inner->type);
+					  "\"%s\" lets light through; twosided takes only opaque ones", inner->type);
 	}
 	for (int i = 0; i < 2; i++) {
 		int code = bsdf_take_relief(b, &t->side[i], i == 0, n, e);

@@ -138,6 +138,43 @@ static void test_parts_that_let_light_through(void **state)
 	arena_fini(&a);
 }
 
+/* Exporters put a twosided, or a coating of one, into another: both sides show the innermost front. */
+static void test_two_sides_of_two_sides(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+	struct bsdf front, coated, nested, coat;
+	struct error e;
+	struct dice d = dice_of("two sides");
+	size_t seen = 0;
+	struct scene_node *outer = bsdf_node(&a, "twosided"), *layer = bsdf_node(&a, "coating int_ior=1.3"),
+			  *over = bsdf_node(&a, "twosided");
+	node_add_child(&a, outer, bsdf_node(&a, "twosided | roughconductor alpha=0.3 | diffuse reflectance=0.2"));
+	node_add_child(&a, layer, bsdf_node(&a, "twosided | roughconductor alpha=0.3"));
+	node_add_child(&a, over, layer);
+	bsdf_make(&a, "twosided | roughconductor alpha=0.3", &front);
+	bsdf_make(&a, "coating int_ior=1.3 | roughconductor alpha=0.3", &coated);
+	assert_int_equal(bsdf_create(&nested, outer, &build, &e), 0);
+	assert_int_equal(bsdf_create(&coat, over, &build, &e), 0);
+	for (int i = 0; i < 500; i++) {
+		vec3 wo = above(&d), wi = above(&d), back_o = {wo.x, wo.y, -wo.z}, back_i = {wi.x, wi.y, -wi.z};
+		double want = value(&front, wo, wi), layered = value(&coated, wo, wi);
+		seen += want > 0.01;
+		assert_true(value(&nested, wo, wi) == want && value(&nested, back_o, back_i) == want);
+		assert_true(value(&nested, wo, back_i) == 0 && value(&nested, back_o, wi) == 0);
+		assert_true(fabs(value(&coat, wo, wi) - layered) <= 1e-12 * layered);
+		assert_true(value(&coat, back_o, back_i) == value(&coat, wo, wi));
+		double pdf = front.ops->pdf_solid(&front, &point, wo, wi);
+		assert_true(nested.ops->pdf_solid(&nested, &point, back_o, back_i) == pdf);
+	}
+	assert_true(seen > 100);
+	assert_int_equal(bsdf_try(&a, "twosided | dielectric", true, &nested, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "lets light through; twosided takes only opaque ones"));
+	assert_int_equal(bsdf_try(&a, "twosided | difftrans", true, &nested, &e), -EINVAL);
+	arena_fini(&a);
+}
+
 /* What 0.6 keeps where it is asked not to scale: more light than there is. */
 static void test_more_than_all_is_refused(void **state)
 {
@@ -163,7 +200,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_ward_is_its_formula),	 cmocka_unit_test(test_ward_defaults_and_scale),
 		cmocka_unit_test(test_a_mixture_is_a_sum),	 cmocka_unit_test(test_parts_that_let_light_through),
-		cmocka_unit_test(test_more_than_all_is_refused),
+		cmocka_unit_test(test_more_than_all_is_refused), cmocka_unit_test(test_two_sides_of_two_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -328,7 +328,7 @@ static void test_refusals_say_why(void **state)
 		{"roughdielectric ext_ior=1 ext_cauchy_b=-0.9", "ext_cauchy_b"},
 		{"twosided", "one or two"},
 		{"twosided | diffuse | diffuse | diffuse", "one or two"},
-		{"twosided | dielectric", "two sides"},
+		{"twosided | dielectric", "lets light through"},
 		{"twosided | hair", "hair"},
 		{"mask", "exactly one"},
 		{"mask | dielectric", "lets light through"},
