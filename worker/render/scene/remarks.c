@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/remarks.h"
 
+#include "worker/render/scene/depth.h"
 #include "worker/render/scene/plugin.h"
 
 #include <stdarg.h>
@@ -20,6 +21,16 @@ __attribute__((format(printf, 4, 5))) static int remark(struct report *r, const 
 	return report_text(r, n->file, text, text, e);
 }
 
+/* Whoever asks for no limit knows that there is one; whoever asks for a number gets another. */
+static int on_depth(struct report *r, const struct scene_node *n, struct error *e)
+{
+	int64_t depth = node_int(n, "max_depth", -1);
+	if (depth <= SCENE_MAX_DEPTH)
+		return 0;
+	return remark(r, n, e, "max_depth %lld is %d here: light that takes longer paths is left out", (long long)depth,
+		      SCENE_MAX_DEPTH);
+}
+
 /* Whoever asks for a part of the light, or for something else than light, gets another picture: that is said. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
@@ -32,7 +43,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 			rc = remark(r, n, e,
 				    "is not what is rendered: the picture is of all light on surfaces, without media%s",
 				    strcmp(n->type, "direct") == 0 ? "; --max-depth 2 leaves out indirect light" : "");
-	return rc;
+	return rc ? rc : on_depth(r, n, e);
 }
 
 static bool shines(const struct scene_node *n)

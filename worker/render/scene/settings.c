@@ -10,13 +10,14 @@
 #include "worker/render/scene/fov.h"
 
 #include "common/plan/plan.h"
+#include "worker/render/scene/depth.h"
 #include "worker/render/scene/number.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-enum { MAX_DEPTH = 128, FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_HEIGHT = 576, RADIUS_MAX = 64 };
+enum { FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_HEIGHT = 576, RADIUS_MAX = 64 };
 enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
@@ -228,7 +229,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 {
 	uint32_t count;
 	const struct scene_node *integrator = find_object(s, PLUGIN_INTEGRATOR, 1, &count);
-	out->max_depth = MAX_DEPTH;
+	out->max_depth = SCENE_MAX_DEPTH;
 	out->roulette_depth = ROULETTE_DEPTH;
 	if (!integrator)
 		return 0;
@@ -245,7 +246,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	if (depth == 0)
 		return node_error(integrator, e, ERANGE,
 				  "a depth of 0 shows nothing; 1 is emitters seen directly, -1 no limit");
-	if (depth > 0 && depth < MAX_DEPTH)
+	if (depth > 0 && depth < SCENE_MAX_DEPTH)
 		out->max_depth = (uint32_t)depth;
 	out->roulette_depth = (uint32_t)roulette;
 	return 0;

@@ -388,6 +388,21 @@ static void test_ignored_is_noted_once(void **state)
 	scene_fini(&s);
 }
 
+static void test_depths_beyond_the_limit_are_noted(void **state)
+{
+	(void)state;
+	struct scene s =
+		read_ok("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='129'/>"
+			"</integrator></scene>");
+	assert_int_equal(s.note_count, 2);
+	assert_non_null(strstr(s.notes[1], "max_depth 129 is 128 here"));
+	scene_fini(&s);
+	s = read_ok("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='128'/>"
+		    "</integrator></scene>");
+	assert_int_equal(s.note_count, 1);
+	scene_fini(&s);
+}
+
 static void test_assets_are_sorted_and_unique(void **state)
 {
 	(void)state;
@@ -500,6 +515,7 @@ int main(void)
 		cmocka_unit_test(test_parameters),
 		cmocka_unit_test(test_include),
 		cmocka_unit_test(test_ignored_is_noted_once),
+		cmocka_unit_test(test_depths_beyond_the_limit_are_noted),
 		cmocka_unit_test(test_assets_are_sorted_and_unique),
 		cmocka_unit_test(test_asset_names_are_canonical),
 		cmocka_unit_test(test_second_name),
