@@ -8,6 +8,7 @@
  */
 #include "common/wire/batch_wire.h"
 
+#include "common/base/bytes.h"
 #include "common/base/mem.h"
 #include "common/exr/exr_tile.h"
 
@@ -131,15 +132,14 @@ static void write_floats(unsigned char *out, const float *v, uint64_t count)
 	for (uint64_t i = 0; i < count; i++, out += 4) {
 		uint32_t bits;
 		memcpy(&bits, &v[i], sizeof bits);
-		for (int k = 0; k < 4; k++)
-			out[k] = (unsigned char)(bits >> 8 * k);
+		put32(out, bits);
 	}
 }
 
 static void read_floats(const unsigned char *in, float *v, uint64_t count)
 {
 	for (uint64_t i = 0; i < count; i++, in += 4) {
-		uint32_t bits = in[0] | (uint32_t)in[1] << 8 | (uint32_t)in[2] << 16 | (uint32_t)in[3] << 24;
+		uint32_t bits = get32(in);
 		memcpy(&v[i], &bits, sizeof bits);
 	}
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/wire/envelope.h"
 
+#include "common/base/bytes.h"
 #include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
@@ -104,16 +105,12 @@ static bool check_holds(const unsigned char *bytes, size_t size)
 {
 	if (size < CHECK_BYTES)
 		return false;
-	const unsigned char *p = bytes + size - CHECK_BYTES;
-	uint32_t said = (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-	return crc32c(0, bytes, size - CHECK_BYTES) == said;
+	return crc32c(0, bytes, size - CHECK_BYTES) == get32(bytes + size - CHECK_BYTES);
 }
 
 static void write_check(unsigned char *bytes, size_t size)
 {
-	uint32_t sum = crc32c(0, bytes, size - CHECK_BYTES);
-	for (int i = 0; i < CHECK_BYTES; i++)
-		bytes[size - CHECK_BYTES + (size_t)i] = (unsigned char)(sum >> 8 * i);
+	put32(bytes + size - CHECK_BYTES, crc32c(0, bytes, size - CHECK_BYTES));
 }
 
 int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e)

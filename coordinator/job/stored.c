@@ -1,60 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/job/stored.h"
 
-#include "common/base/mem.h"
 #include "common/base/text.h"
-#include "proto/stored.pb-c.h"
+#include "coordinator/store/message.h"
 
 #include <assert.h>
 #include <string.h>
 
 _Static_assert(sizeof(struct job_counts) / sizeof(uint64_t) * 12 <= STORED_NOTE_MOST,
 	       "a number takes at most 12 bytes");
-
-/* ---- messages ---- */
-
-/* Memory that is out is not a message that is damaged. */
-static void *alloc(void *out, size_t size)
-{
-	void *p = mem_alloc(size, 1);
-	if (!p)
-		*(bool *)out = true;
-	return p;
-}
-
-static void release(void *out, void *p)
-{
-	(void)out;
-	mem_free(p);
-}
-
-/* NULL: e says why. */
-static ProtobufCMessage *unpack(const ProtobufCMessageDescriptor *d, const unsigned char *bytes, size_t size, int *rc,
-				struct error *e)
-{
-	bool out = false;
-	ProtobufCAllocator memory = {alloc, release, &out};
-	ProtobufCMessage *m = protobuf_c_message_unpack(d, &memory, size, bytes);
-	*rc = m	    ? 0
-	      : out ? error_set(e, ENOMEM, "no memory for %s", d->short_name)
-		    : error_set(e, EPROTO, "%zu bytes are no %s", size, d->short_name);
-	return m;
-}
-
-static void drop(ProtobufCMessage *m)
-{
-	bool out;
-	ProtobufCAllocator memory = {alloc, release, &out};
-	if (m)
-		protobuf_c_message_free_unpacked(m, &memory);
-}
-
-static int check_known(const ProtobufCMessage *m, struct error *e)
-{
-	return m->n_unknown_fields ? error_set(e, EPROTO, "%s with a field that is not known here: of another version",
-					       m->descriptor->short_name)
-				   : 0;
-}
 
 /* ---- counters ---- */
 
@@ -71,7 +25,7 @@ static int take_counts(const Stored__Counts *m, struct job_counts *c, struct err
 #define X(name, key, wire) c->name = m->name;
 	JOB_COUNTS(X)
 #undef X
-	return check_known(&m->base, e);
+	return message_check_known(&m->base, e);
 }
 
 size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED_NOTE_MOST])
@@ -84,10 +38,10 @@ size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED
 int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e)
 {
 	int rc;
-	ProtobufCMessage *m = unpack(&stored__counts__descriptor, bytes, size, &rc, e);
+	ProtobufCMessage *m = message_unpack(&stored__counts__descriptor, bytes, size, &rc, e);
 	if (m)
 		rc = take_counts((const Stored__Counts *)m, c, e);
-	drop(m);
+	message_free(m);
 	return rc;
 }
 
@@ -109,7 +63,7 @@ static int take_look(const Stored__Look *m, struct forecast_look *l, struct erro
 {
 	*l = (struct forecast_look){m->work,	      m->cpu_seconds, m->seconds, m->rel_mse,
 				    m->rel_mse_upper, m->degrees,     m->doubtful};
-	return check_known(&m->base, e);
+	return message_check_known(&m->base, e);
 }
 
 size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORED_NOTE_MOST])
@@ -122,10 +76,10 @@ size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORE
 int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e)
 {
 	int rc;
-	ProtobufCMessage *m = unpack(&stored__look__descriptor, bytes, size, &rc, e);
+	ProtobufCMessage *m = message_unpack(&stored__look__descriptor, bytes, size, &rc, e);
 	if (m)
 		rc = take_look((const Stored__Look *)m, l, e);
-	drop(m);
+	message_free(m);
 	return rc;
 }
 
@@ -167,7 +121,7 @@ size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STO
 
 static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h, struct error *e)
 {
-	int rc = check_known(&m->base, e);
+	int rc = message_check_known(&m->base, e);
 	if (!rc && (m->n_b > PLAN_MAX_GROUPS || m->n_looks > FORECAST_LOOKS || !m->counts ||
 		    strlen(m->fingerprint) >= sizeof h->fingerprint))
 		rc = error_set(e, EPROTO, "the head of a checkpoint with %zu groups and %zu looks", m->n_b, m->n_looks);
@@ -194,10 +148,10 @@ static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h,
 int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoint_head *h, struct error *e)
 {
 	int rc;
-	ProtobufCMessage *m = unpack(&stored__checkpoint_head__descriptor, bytes, size, &rc, e);
+	ProtobufCMessage *m = message_unpack(&stored__checkpoint_head__descriptor, bytes, size, &rc, e);
 	if (m)
 		rc = take_head((const Stored__CheckpointHead *)m, h, e);
-	drop(m);
+	message_free(m);
 	return rc;
 }
 

@@ -130,7 +130,7 @@ static bool has_results(const struct spool *spool, uint64_t id)
 		if (!journal && strcmp(f->d_name, "checkpoint") != 0)
 			continue;
 		spool_job_path(spool, id, f->d_name, path);
-		any = disk_stat(path, &st) == 0 && (!journal || st.st_size > (off_t)sizeof(struct journal_head));
+		any = disk_stat(path, &st) == 0 && (!journal || st.st_size > (off_t)JOURNAL_HEAD);
 	}
 	if (d)
 		closedir(d);

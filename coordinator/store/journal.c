@@ -81,6 +81,11 @@ static struct journal *make(const char *folder, uint64_t job, uint64_t generatio
 	return j;
 }
 
+static void pack_head(const struct journal *j, unsigned char bytes[JOURNAL_HEAD])
+{
+	journal_head_pack(&(struct journal_head){j->job, j->generation, j->salt}, bytes);
+}
+
 void journal_hold(struct journal *j)
 {
 	atomic_fetch_add(&j->holders, 1);
@@ -98,7 +103,7 @@ static struct unwritten *front(struct journal *j)
 
 static uint64_t size_of(const struct journal_record *r)
 {
-	return sizeof *r + r->size;
+	return JOURNAL_RECORD + r->size;
 }
 
 static void pop(struct journal *j)
@@ -145,10 +150,10 @@ static int write_parts(int fd, off_t at, struct iovec *part, int count)
 
 static int write_one(const struct journal *j, int fd, uint64_t at, struct unwritten *n)
 {
-	struct journal_record *r = &n->record;
-	r->stored = j->stored;
-	journal_record_seal(r, n->a.bytes, n->a.size, n->b.bytes, n->b.size);
-	struct iovec parts[3] = {{r, sizeof *r}, {n->a.bytes, n->a.size}, {n->b.bytes, n->b.size}};
+	unsigned char head[JOURNAL_RECORD];
+	n->record.stored = j->stored;
+	journal_record_pack(&n->record, head, &n->a, &n->b);
+	struct iovec parts[3] = {{head, sizeof head}, {n->a.bytes, n->a.size}, {n->b.bytes, n->b.size}};
 	return write_parts(fd, (off_t)at, parts, 3);
 }
 
@@ -212,14 +217,14 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 	struct journal *j = make(folder, job, generation, O_RDWR | O_CREAT | O_TRUNC, e);
 	if (!j)
 		return -ENOMEM;
-	struct journal_head h;
+	unsigned char head[JOURNAL_HEAD];
 	int rc = 0;
 	if (getentropy(&j->salt, sizeof j->salt))
 		rc = fault(j, errno, e);
-	journal_head_make(&h, job, generation, j->salt);
+	pack_head(j, head);
 	if (!rc && j->fd < 0)
 		rc = fault(j, errno, e);
-	else if (!rc && (disk_write_all(j->fd, &h, sizeof h) || disk_fsync(j->fd)))
+	else if (!rc && (disk_write_all(j->fd, head, sizeof head) || disk_fsync(j->fd)))
 		rc = fault(j, errno ? errno : ENOSPC, e);
 	if (!rc)
 		rc = disk_sync_folder(folder, e);
@@ -227,7 +232,7 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 		journal_release(j);
 		return rc;
 	}
-	j->written = j->synced = sizeof h;
+	j->written = j->synced = sizeof head;
 	*out = j;
 	return 0;
 }
@@ -241,7 +246,8 @@ static int visit_piece(struct journal *j, const struct journal_piece *p, journal
 	if (p->what != JOURNAL_UNKNOWN) {
 		item.kind = (enum journal_kind)p->record.kind;
 		item.elapsed = p->record.elapsed;
-		item.lease = journal_record_lease(&p->record, j->job);
+		item.lease = p->record.lease;
+		item.lease.job = j->job;
 		item.body = p->body;
 		item.size = p->record.size;
 	}
@@ -284,18 +290,19 @@ static int read_records(struct journal *j, uint64_t end, struct journal_gaps *ga
 /* A damaged head is made anew when the records say that it is their file. */
 static int read_file_head(struct journal *j, uint64_t end, bool *anew, struct error *e)
 {
+	unsigned char head[JOURNAL_HEAD];
 	struct journal_head h;
-	int rc = end < sizeof h ? -ENODATA : journal_read_at(j->fd, &h, sizeof h, 0);
+	int rc = end < sizeof head ? -ENODATA : journal_read_at(j->fd, head, sizeof head, 0);
 	if (rc && rc != -ENODATA)
 		return fault(j, -rc, e);
-	if (!rc && journal_head_fits(&h, j->job, j->generation)) {
+	int damaged = rc ? rc : journal_head_unpack(head, &h, j->path, e);
+	if (damaged == -EPROTO)
+		return damaged;
+	if (!damaged && h.job == j->job && h.generation == j->generation) {
 		j->salt = h.salt;
 		return 0;
 	}
-	if (!rc && journal_head_version(&h, j->path, e) == -EPROTO)
-		return -EPROTO;
-	bool another = !rc && journal_head_fits(&h, h.job, h.generation);
-	rc = another ? -EBADMSG : journal_scan_salt(j->fd, end, &j->salt);
+	rc = damaged ? journal_scan_salt(j->fd, end, &j->salt) : -EBADMSG;
 	*anew = !rc;
 	if (rc == -EBADMSG)
 		return error_set(e, EBADMSG, "%s: not the journal of j%llu", j->path, (unsigned long long)j->job);
@@ -305,7 +312,7 @@ static int read_file_head(struct journal *j, uint64_t end, bool *anew, struct er
 static int read_all(struct journal *j, journal_visit *visit, void *user, struct journal_found *found, struct error *e)
 {
 	struct stat st;
-	struct journal_head h;
+	unsigned char head[JOURNAL_HEAD];
 	struct journal_gaps gaps = {NULL, 0, 0};
 	bool anew = false;
 	if (disk_fstat(j->fd, &st))
@@ -316,8 +323,8 @@ static int read_all(struct journal *j, journal_visit *visit, void *user, struct 
 	mem_free(gaps.first);
 	if (rc)
 		return rc;
-	journal_head_make(&h, j->job, j->generation, j->salt);
-	struct iovec part = {&h, sizeof h};
+	pack_head(j, head);
+	struct iovec part = {head, sizeof head};
 	if (anew && (rc = write_parts(j->fd, 0, &part, 1)))
 		return fault(j, -rc, e);
 	if (found->cut && disk_ftruncate(j->fd, (off_t)j->written))
@@ -388,7 +395,7 @@ static int room_for(struct journal *j, uint64_t size, struct error *e)
 
 int journal_reserve(struct journal *j, size_t body, struct error *e)
 {
-	j->record = sizeof(struct journal_record) + body;
+	j->record = JOURNAL_RECORD + body;
 	return room_for(j, j->record, e);
 }
 
@@ -403,14 +410,11 @@ static void reserve_ahead(struct journal *j)
 static struct journal_record record_of(const struct journal *j, enum journal_kind kind, const struct lease_key *lease,
 				       double elapsed, size_t size)
 {
-	struct journal_record r = {.size = (uint32_t)size, .kind = kind, .elapsed = elapsed, .salt = j->salt};
-	if (lease) {
-		r.lease_kind = lease->kind;
-		r.group = lease->group;
-		r.part = lease->part;
-		r.epoch = lease->epoch;
-	}
-	return r;
+	return (struct journal_record){.size = (uint32_t)size,
+				       .kind = kind,
+				       .elapsed = elapsed,
+				       .lease = lease ? *lease : (struct lease_key){0},
+				       .salt = j->salt};
 }
 
 int journal_append(struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed,
@@ -421,7 +425,7 @@ int journal_append(struct journal *j, enum journal_kind kind, const struct lease
 		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, a_size + b_size);
 	if (kind != JOURNAL_BATCH && kind != JOURNAL_AGAIN && kind != JOURNAL_PINNED &&
 	    !j->bad) { /* it may stay away, but must not make the journal bad */
-		int rc = room_for(j, sizeof(struct journal_record) + a_size + b_size, e);
+		int rc = room_for(j, JOURNAL_RECORD + a_size + b_size, e);
 		if (rc)
 			return rc;
 	}
@@ -518,17 +522,17 @@ static int copy_records(struct journal *j, int to, struct error *e)
 int journal_renew(struct journal *j, struct error *e)
 {
 	char path[PATH_MOST + 8], folder[PATH_MOST];
-	struct journal_head h;
+	unsigned char head[JOURNAL_HEAD];
 	snprintf(path, sizeof path, "%s.new", j->path);
 	snprintf(folder, sizeof folder, "%s", j->path);
 	*strrchr(folder, '/') = 0;
 	if (j->flushes)
 		return error_set(e, EAGAIN, "%s: is being flushed", j->path);
-	journal_head_make(&h, j->job, j->generation, j->salt);
+	pack_head(j, head);
 	int fd = disk_open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	int rc = fd < 0				    ? fault(j, errno, e)
-		 : disk_write_all(fd, &h, sizeof h) ? fault(j, errno ? errno : ENOSPC, e)
-						    : copy_records(j, fd, e);
+	int rc = fd < 0					 ? fault(j, errno, e)
+		 : disk_write_all(fd, head, sizeof head) ? fault(j, errno ? errno : ENOSPC, e)
+							 : copy_records(j, fd, e);
 	if (!rc && (disk_fsync(fd) || disk_rename(path, j->path)))
 		rc = fault(j, errno, e);
 	if (!rc)

@@ -9,8 +9,7 @@
  * did not write and would say next time that all is well. What is appended from then on stays in memory until
  * journal_renew has brought all into a new file. (Who reads a journal believes what is read: the machine that failed to
  * write it has forgotten that with its process.) One thread at a time, but journal_sync may run beside the others: the
- * handle is counted, so that a flush outlives a close. Numbers are in the byte order of the machine: a spool stays
- * where it is.
+ * handle is counted, so that a flush outlives a close.
  */
 #ifndef COORDINATOR_STORE_JOURNAL_H
 #define COORDINATOR_STORE_JOURNAL_H

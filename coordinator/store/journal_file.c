@@ -11,6 +11,7 @@
  */
 #include "coordinator/store/journal_file.h"
 
+#include "common/base/bytes.h"
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -27,52 +28,62 @@ enum { WINDOW = 1 << 20 /* bytes that are searched for a mark at a time */ };
 static const char magic[8] = "hsltJ002";
 static const char mark[4] = {'\xf1', 'h', 'j', '\x0d'};
 
-_Static_assert(sizeof(struct journal_head) == 40 && sizeof(struct journal_record) == 80,
-	       "another layout is another version");
-
-static uint32_t check_head(const struct journal_head *h)
+/* Behind the magic number: job, generation, salt, checksum of all before it; four bytes are not used. */
+void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD])
 {
-	return crc32c(0, h, offsetof(struct journal_head, check));
+	memset(bytes, 0, JOURNAL_HEAD);
+	memcpy(bytes, magic, sizeof magic);
+	put64(bytes + 8, h->job);
+	put64(bytes + 16, h->generation);
+	put64(bytes + 24, h->salt);
+	put32(bytes + 32, crc32c(0, bytes, 32));
 }
 
-static uint32_t check_record(const struct journal_record *r)
+int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_head *h, const char *path,
+			struct error *e)
 {
-	return crc32c(0, r, offsetof(struct journal_record, check));
+	*h = (struct journal_head){get64(bytes + 8), get64(bytes + 16), get64(bytes + 24)};
+	int rc = spool_check_version((const char *)bytes, magic, path, e);
+	return rc || get32(bytes + 32) == crc32c(0, bytes, 32) ? rc : error_set(e, EBADMSG, "%s: damaged", path);
 }
 
-void journal_head_make(struct journal_head *h, uint64_t job, uint64_t generation, uint64_t salt)
+/* Behind the mark; bytes 52 to 55 and 72 to 75 are not used. The checksum is of all before it. */
+void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD], const struct buf *a,
+			 const struct buf *b)
 {
-	*h = (struct journal_head){.job = job, .generation = generation, .salt = salt};
-	memcpy(h->magic, magic, sizeof h->magic);
-	h->check = check_head(h);
+	r->size = (uint32_t)(a->size + b->size);
+	r->body_check = crc32c(crc32c(0, a->bytes, a->size), b->bytes, b->size);
+	memset(bytes, 0, JOURNAL_RECORD);
+	memcpy(bytes, mark, sizeof mark);
+	put32(bytes + 4, r->size);
+	put32(bytes + 8, r->body_check);
+	put32(bytes + 12, r->kind);
+	put64(bytes + 16, r->number);
+	put64(bytes + 24, r->stored);
+	put_double(bytes + 32, r->elapsed);
+	put32(bytes + 40, r->lease.kind);
+	put32(bytes + 44, r->lease.group);
+	put32(bytes + 48, r->lease.part);
+	put64(bytes + 56, r->lease.epoch);
+	put64(bytes + 64, r->salt);
+	put32(bytes + 76, crc32c(0, bytes, 76));
 }
 
-bool journal_head_fits(const struct journal_head *h, uint64_t job, uint64_t generation)
+/* Whether it is whole. */
+static bool unpack_record(const unsigned char bytes[JOURNAL_RECORD], struct journal_record *r)
 {
-	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job &&
-	       h->generation == generation;
-}
-
-int journal_head_version(const struct journal_head *h, const char *path, struct error *e)
-{
-	return spool_check_version(h->magic, magic, path, e);
-}
-
-void journal_record_seal(struct journal_record *r, const void *a, size_t a_size, const void *b, size_t b_size)
-{
-	memcpy(r->mark, mark, sizeof r->mark);
-	r->size = (uint32_t)(a_size + b_size);
-	r->body_check = crc32c(crc32c(0, a, a_size), b, b_size);
-	r->check = check_record(r);
-}
-
-struct lease_key journal_record_lease(const struct journal_record *r, uint64_t job)
-{
-	return (struct lease_key){.job = job,
-				  .kind = (enum lease_kind)r->lease_kind,
-				  .group = r->group,
-				  .part = r->part,
-				  .epoch = r->epoch};
+	*r = (struct journal_record){.size = get32(bytes + 4),
+				     .body_check = get32(bytes + 8),
+				     .kind = get32(bytes + 12),
+				     .number = get64(bytes + 16),
+				     .stored = get64(bytes + 24),
+				     .elapsed = get_double(bytes + 32),
+				     .lease = {.kind = (enum lease_kind)get32(bytes + 40),
+					       .group = get32(bytes + 44),
+					       .part = get32(bytes + 48),
+					       .epoch = get64(bytes + 56)},
+				     .salt = get64(bytes + 64)};
+	return memcmp(bytes, mark, sizeof mark) == 0 && get32(bytes + 76) == crc32c(0, bytes, 76);
 }
 
 int journal_read_at(int fd, void *bytes, size_t size, uint64_t at)
@@ -96,13 +107,14 @@ int journal_read_at(int fd, void *bytes, size_t size, uint64_t at)
 /* 1: its head is whole; 0: it is not. */
 static int read_head(const struct journal_scan *s, uint64_t at, struct journal_record *r)
 {
-	if (at > s->end || s->end - at < sizeof *r)
+	unsigned char bytes[JOURNAL_RECORD];
+	if (at > s->end || s->end - at < sizeof bytes)
 		return 0;
-	int rc = journal_read_at(s->fd, r, sizeof *r, at);
+	int rc = journal_read_at(s->fd, bytes, sizeof bytes, at);
 	if (rc)
 		return rc == -ENODATA ? 0 : rc;
-	return memcmp(r->mark, mark, sizeof mark) == 0 && r->check == check_record(r) && r->salt == s->salt &&
-	       r->number >= s->number && r->size <= s->end - at - sizeof *r;
+	return unpack_record(bytes, r) && r->salt == s->salt && r->number >= s->number &&
+	       r->size <= s->end - at - sizeof bytes;
 }
 
 /* 1: it is whole, and mem_alloc'd; 0: it is not. */
@@ -111,7 +123,7 @@ static int read_body(const struct journal_scan *s, uint64_t at, const struct jou
 	*body = mem_alloc(r->size, 1);
 	if (!*body)
 		return -ENOMEM;
-	int rc = journal_read_at(s->fd, *body, r->size, at + sizeof *r);
+	int rc = journal_read_at(s->fd, *body, r->size, at + JOURNAL_RECORD);
 	if (!rc && r->body_check == crc32c(0, *body, r->size))
 		return 1;
 	mem_free(*body);
@@ -124,7 +136,7 @@ static int find_mark(const struct journal_scan *s, uint64_t *at)
 {
 	unsigned char *window = mem_alloc(WINDOW, 1);
 	int rc = window ? 0 : -ENOMEM;
-	while (!rc && s->end - *at >= sizeof(struct journal_record)) {
+	while (!rc && s->end - *at >= JOURNAL_RECORD) {
 		size_t size = s->end - *at < WINDOW ? (size_t)(s->end - *at) : WINDOW;
 		rc = journal_read_at(s->fd, window, size, *at);
 		const unsigned char *found = rc ? NULL : memmem(window, size, mark, sizeof mark);
@@ -143,7 +155,7 @@ static int find_mark(const struct journal_scan *s, uint64_t *at)
 
 void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t salt)
 {
-	*s = (struct journal_scan){.fd = fd, .at = sizeof(struct journal_head), .end = end, .salt = salt};
+	*s = (struct journal_scan){.fd = fd, .at = JOURNAL_HEAD, .end = end, .salt = salt};
 }
 
 void journal_scan_end(struct journal_scan *s)
@@ -161,7 +173,7 @@ static int look_ahead(struct journal_scan *s)
 		*p = (struct journal_piece){.what = JOURNAL_WHOLE, .from = at, .count = 1};
 		int rc = read_head(s, at, &p->record);
 		if (rc > 0) {
-			p->to = at + sizeof p->record + p->record.size;
+			p->to = at + JOURNAL_RECORD + p->record.size;
 			rc = read_body(s, at, &p->record, &p->body);
 			if (rc > 0)
 				s->ahead = true;
@@ -187,12 +199,12 @@ static int damage(struct journal_scan *s, struct journal_piece *p)
 	int rc = s->at < to ? read_head(s, s->at, &r) : 0;
 	if (rc < 0)
 		return rc;
-	if (rc > 0 && r.number < number && r.size <= to - s->at - sizeof r) {
+	if (rc > 0 && r.number < number && r.size <= to - s->at - JOURNAL_RECORD) {
 		p->count = r.number - s->number;
 		if (p->count == 0) {
 			*p = (struct journal_piece){.what = JOURNAL_DAMAGED,
 						    .from = s->at,
-						    .to = s->at + sizeof r + r.size,
+						    .to = s->at + JOURNAL_RECORD + r.size,
 						    .count = 1,
 						    .record = r};
 			s->at = p->to;
@@ -227,11 +239,11 @@ int journal_scan_next(struct journal_scan *s, struct journal_piece *p)
 
 int journal_scan_salt(int fd, uint64_t end, uint64_t *salt)
 {
+	unsigned char bytes[JOURNAL_RECORD];
 	struct journal_record r;
-	int rc = end < sizeof(struct journal_head) + sizeof r
-			 ? -ENODATA
-			 : journal_read_at(fd, &r, sizeof r, sizeof(struct journal_head));
-	if (!rc && (memcmp(r.mark, mark, sizeof mark) != 0 || r.check != check_record(&r) || r.number != 0))
+	int rc =
+		end < JOURNAL_HEAD + JOURNAL_RECORD ? -ENODATA : journal_read_at(fd, bytes, sizeof bytes, JOURNAL_HEAD);
+	if (!rc && (!unpack_record(bytes, &r) || r.number != 0))
 		rc = -ENODATA;
 	*salt = rc ? 0 : r.salt;
 	return rc == -ENODATA ? -EBADMSG : rc;

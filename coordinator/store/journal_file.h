@@ -3,12 +3,14 @@
  * A journal as bytes of a file (journal.h): a head, then records, each with a head of its own and a body. A record's
  * head has a mark, a checksum and a number that the journal drew (salt), which no peer knows: so the next record is
  * found wherever bytes before it are damaged, and no result that a worker made up can pass for a record. Bodies have a
- * checksum of their own: a damaged one is still known by its head. Numbers are in the byte order of the machine. Any
- * thread, one at a time for a scan.
+ * checksum of their own: a damaged one is still known by its head. Heads are of a fixed size, so that room for a record
+ * is asked for before it is written, and damage is searched for the next one; numbers are little endian, doubles as
+ * their bits. Any thread, one at a time for a scan.
  */
 #ifndef COORDINATOR_STORE_JOURNAL_FILE_H
 #define COORDINATOR_STORE_JOURNAL_FILE_H
 
+#include "common/base/buf.h"
 #include "common/base/error.h"
 #include "common/film/batch.h"
 
@@ -16,32 +18,29 @@
 #include <stddef.h>
 #include <stdint.h>
 
+enum { JOURNAL_HEAD = 40, JOURNAL_RECORD = 80 }; /* bytes of each in a file */
+
 struct journal_head {
-	char magic[8];
 	uint64_t job, generation, salt;
-	uint32_t check, nothing;
 };
 
 struct journal_record { /* before its body */
-	char mark[4];
 	uint32_t size, body_check;
-	uint32_t kind;
+	uint32_t kind;	 /* of enum journal_kind (journal.h) */
 	uint64_t number; /* in its file, from 0 */
 	uint64_t stored; /* so many records of the file were durable when this one was written */
 	double elapsed;
-	uint32_t lease_kind, group, part, nothing; /* lease_kind 0: it belongs to no lease */
-	uint64_t epoch, salt;
-	uint32_t nothing2, check; /* over all before it */
+	struct lease_key lease; /* .kind 0: it belongs to no lease; .job is the file's */
+	uint64_t salt;
 };
 
-void journal_head_make(struct journal_head *h, uint64_t job, uint64_t generation, uint64_t salt);
-/* Of that job and generation. The version is not looked at. */
-bool journal_head_fits(const struct journal_head *h, uint64_t job, uint64_t generation);
-/* -EBADMSG: no journal; -EPROTO: of another version. */
-int journal_head_version(const struct journal_head *h, const char *path, struct error *e);
-/* The rest of it is set; the body is a, then b. */
-void journal_record_seal(struct journal_record *r, const void *a, size_t a_size, const void *b, size_t b_size);
-struct lease_key journal_record_lease(const struct journal_record *r, uint64_t job);
+void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD]);
+/* -EPROTO: of another version; -EBADMSG: none, or damaged. */
+int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_head *h, const char *path,
+			struct error *e);
+/* The body is a, then b; the checksums are made here. */
+void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD], const struct buf *a,
+			 const struct buf *b);
 
 /* What comes next in a file. */
 struct journal_piece {

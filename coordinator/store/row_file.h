@@ -12,7 +12,8 @@
 
 struct row_file {
 	struct ledger_job job; /* not ended; what it points at is freed by row_file_free */
-	char *memory;
+	unsigned char *memory;
+	struct ProtobufCMessage *message;
 };
 
 int row_file_write(const struct spool *s, const struct ledger_job *j, struct error *e);

@@ -9,7 +9,7 @@
 #include "tests/fuzz/seeds.h"
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
-#include "worker/render/chain/bytes.h"
+#include "common/base/bytes.h"
 #include "worker/render/chain/path_bytes.h"
 #include "worker/render/chain/path_chain.h"
 #include "worker/render/chain/pss_chain.h"

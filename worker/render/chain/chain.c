@@ -2,7 +2,7 @@
 #include "worker/render/chain/chain.h"
 
 #include "common/base/mem.h"
-#include "worker/render/chain/bytes.h"
+#include "common/base/bytes.h"
 
 #include <string.h>
 

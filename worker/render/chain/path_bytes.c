@@ -12,7 +12,7 @@
  */
 #include "worker/render/chain/path_bytes.h"
 
-#include "worker/render/chain/bytes.h"
+#include "common/base/bytes.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/path/full_path_density.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/chain/pss.h"
 
-#include "worker/render/chain/bytes.h"
+#include "common/base/bytes.h"
 
 #include <assert.h>
 #include <math.h>

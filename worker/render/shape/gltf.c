@@ -12,6 +12,7 @@
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
 
+#include "common/base/bytes.h"
 #include "common/base/liveness.h"
 
 #include <string.h>
@@ -74,10 +75,7 @@ static int read_accessor(struct accessor *a, const struct scene_node *n, const c
 static uint32_t whole(const struct accessor *a, uint64_t i, unsigned component)
 {
 	const unsigned char *p = a->at + i * a->stride + types[a->type].size * component;
-	uint32_t x = 0;
-	for (size_t k = 0; k < types[a->type].size; k++)
-		x |= (uint32_t)p[k] << 8 * k;
-	return x;
+	return (uint32_t)get_bytes(p, (int)types[a->type].size);
 }
 
 static double number(const struct accessor *a, uint64_t i, unsigned component)

@@ -9,6 +9,7 @@
  * Failures: a table that leads out of the file, a stream that is damaged or ends too early, indices out of range,
  * numbers that are not finite. Counts are believed only as far as the compressed bytes could hold them.
  */
+#include "common/base/bytes.h"
 #include "common/base/liveness.h"
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
@@ -39,14 +40,6 @@ static const struct param params[] = {
 	SHAPE_PARAMS_END,
 };
 
-static uint64_t little(const unsigned char *p, int bytes)
-{
-	uint64_t x = 0;
-	for (int i = 0; i < bytes; i++)
-		x |= (uint64_t)p[i] << 8 * i;
-	return x;
-}
-
 static int file_error(const struct stream *s, const char *what)
 {
 	return node_error(s->node, s->error, EINVAL, "%s: %s", s->name, what);
@@ -72,7 +65,7 @@ static int take_number(struct stream *s, int bytes, uint64_t *x)
 {
 	unsigned char raw[8];
 	int r = take(s, raw, (size_t)bytes);
-	*x = r ? 0 : little(raw, bytes);
+	*x = r ? 0 : get_bytes(raw, bytes);
 	return r;
 }
 
@@ -99,7 +92,7 @@ static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint3
 		if (r)
 			return r;
 		for (size_t i = 0; i < n; i++) {
-			uint64_t bits = little(raw + i * (size_t)size, size);
+			uint64_t bits = get_bytes(raw + i * (size_t)size, size);
 			uint32_t low = (uint32_t)bits;
 			float f;
 			memcpy(&f, &low, sizeof f);
@@ -145,7 +138,7 @@ static int take_triangles(struct stream *s, struct mesh *m)
 		if (r)
 			return r;
 		for (uint32_t i = 0; i < 3 * n; i++) {
-			uint32_t v = (uint32_t)little(raw + 4 * (size_t)i, 4);
+			uint32_t v = (uint32_t)get_bytes(raw + 4 * (size_t)i, 4);
 			if (v >= m->vertex_count)
 				return file_error(s, "a triangle's index is none of a vertex");
 			m->index[done + i / 3][i % 3] = v;
@@ -206,13 +199,13 @@ static int take_mesh(struct stream *s, int version, struct arena *arena, struct 
 static int find_mesh(const struct stream *s, const struct asset *a, uint64_t index, size_t *begin, size_t *end)
 {
 	enum { HEAD = 4 };
-	if (a->size < HEAD + 4 || little(a->bytes, 2) != MAGIC)
+	if (a->size < HEAD + 4 || get_bytes(a->bytes, 2) != MAGIC)
 		return file_error(s, "this is no serialized mesh");
-	uint64_t version = little(a->bytes + 2, 2);
+	uint64_t version = get_bytes(a->bytes + 2, 2);
 	if (version != VERSION_3 && version != VERSION_4)
 		return node_error(s->node, s->error, ENOTSUP, "%s: version %llu is not supported (supported: 3, 4)",
 				  s->name, (unsigned long long)version);
-	uint64_t count = little(a->bytes + a->size - 4, 4);
+	uint64_t count = get_bytes(a->bytes + a->size - 4, 4);
 	int width = version == VERSION_3 ? 4 : 8;
 	if (count == 0 || count > (a->size - 4) / (uint64_t)width)
 		return file_error(s, "the table of meshes at its end is damaged");
@@ -221,10 +214,10 @@ static int find_mesh(const struct stream *s, const struct asset *a, uint64_t ind
 				  "%s: shape_index=%llu, but it holds %llu meshes, counted from 0", s->name,
 				  (unsigned long long)index, (unsigned long long)count);
 	size_t table = a->size - 4 - (size_t)count * (size_t)width;
-	uint64_t from = little(a->bytes + table + index * (size_t)width, width);
-	uint64_t to = index + 1 < count ? little(a->bytes + table + (index + 1) * (size_t)width, width) : table;
-	if (from > table || to > table || to < from + HEAD || little(a->bytes + from, 2) != MAGIC ||
-	    little(a->bytes + from + 2, 2) != version)
+	uint64_t from = get_bytes(a->bytes + table + index * (size_t)width, width);
+	uint64_t to = index + 1 < count ? get_bytes(a->bytes + table + (index + 1) * (size_t)width, width) : table;
+	if (from > table || to > table || to < from + HEAD || get_bytes(a->bytes + from, 2) != MAGIC ||
+	    get_bytes(a->bytes + from + 2, 2) != version)
 		return file_error(s, "the table of meshes at its end is damaged");
 	*begin = (size_t)from;
 	*end = (size_t)to;
@@ -250,7 +243,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		s.z.next_in = a.bytes + begin + 4;
 		s.z.avail_in = (uInt)size;
 		s.most = (uint64_t)size * ZLIB_RATIO;
-		r = take_mesh(&s, (int)little(a.bytes + begin + 2, 2), arena, out);
+		r = take_mesh(&s, (int)get_bytes(a.bytes + begin + 2, 2), arena, out);
 		inflateEnd(&s.z);
 	}
 	assets->close(assets->user, &a);

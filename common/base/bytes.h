@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Numbers in states: little endian. */
-#ifndef WORKER_RENDER_CHAIN_BYTES_H
-#define WORKER_RENDER_CHAIN_BYTES_H
+/* Numbers as bytes, little endian, on any machine: in files, messages and states of chains. */
+#ifndef COMMON_BASE_BYTES_H
+#define COMMON_BASE_BYTES_H
 
 #include <stdint.h>
 #include <string.h>
@@ -18,6 +18,11 @@ static inline uint64_t get_bytes(const uint8_t *p, int count)
 	for (int i = 0; i < count; i++)
 		v |= (uint64_t)p[i] << (8 * i);
 	return v;
+}
+
+static inline uint32_t get16(const uint8_t *p)
+{
+	return (uint32_t)get_bytes(p, 2);
 }
 
 static inline void put32(uint8_t *p, uint32_t v)

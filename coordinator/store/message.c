@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/store/message.h"
+
+#include "common/base/mem.h"
+
+#include <stdbool.h>
+
+/* Memory that is out is not a message that is damaged. */
+static void *alloc(void *out, size_t size)
+{
+	void *p = mem_alloc(size, 1);
+	if (!p)
+		*(bool *)out = true;
+	return p;
+}
+
+static void release(void *out, void *p)
+{
+	(void)out;
+	mem_free(p);
+}
+
+ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsigned char *bytes, size_t size, int *rc,
+				 struct error *e)
+{
+	bool out = false;
+	ProtobufCAllocator memory = {alloc, release, &out};
+	ProtobufCMessage *m = protobuf_c_message_unpack(d, &memory, size, bytes);
+	*rc = m	    ? 0
+	      : out ? error_set(e, ENOMEM, "no memory for %s", d->short_name)
+		    : error_set(e, EPROTO, "%zu bytes are no %s", size, d->short_name);
+	return m;
+}
+
+void message_free(ProtobufCMessage *m)
+{
+	ProtobufCAllocator memory = {alloc, release, NULL};
+	if (m)
+		protobuf_c_message_free_unpacked(m, &memory);
+}
+
+int message_check_known(const ProtobufCMessage *m, struct error *e)
+{
+	return m->n_unknown_fields ? error_set(e, EPROTO, "%s with a field that is not known here: of another version",
+					       m->descriptor->short_name)
+				   : 0;
+}

@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A row of the ledger comes back out of its file, also out of one of version 002; what is damaged or hostile does not.
+ */
+#include "coordinator/store/row_file.h"
+
+#include "common/base/bytes.h"
+#include "common/base/checked_file.h"
+#include "tests/support/failing_memory.h"
+#include "tests/support/folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static struct spool *spool;
+static char path[SPOOL_PATH_MAX];
+static struct error e;
+
+static const struct ledger_job row = {.id = 1,
+				      .owner = "anna",
+				      .name = "glass",
+				      .version = "0.2",
+				      .held = "",
+				      .extended = 3,
+				      .revision = 0x0102030405060708,
+				      .priority = -7,
+				      .mixed = true,
+				      .submitted = 1.5,
+				      .submission = (const unsigned char *)"sub\0m",
+				      .plan = (const unsigned char *)"plan",
+				      .submission_size = 5,
+				      .plan_size = 4};
+
+/* As version 002 wrote that row. */
+static const unsigned char old_file[] = {
+	0x68, 0x73, 0x6c, 0x74, 0x4f, 0x30, 0x30, 0x32, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x03, 0x00,
+	0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x08, 0x07, 0x06, 0x05, 0x04, 0x03, 0x02, 0x01, 0x00, 0x00, 0x00, 0x00,
+	0x00, 0x00, 0xf8, 0x3f, 0xf9, 0xff, 0xff, 0xff, 0x01, 0x00, 0x00, 0x00, 0x05, 0x00, 0x00, 0x00, 0x00, 0x00,
+	0x00, 0x00, 0x06, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x04, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+	0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x05, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x04, 0x00,
+	0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x61, 0x6e, 0x6e, 0x61, 0x00, 0x67, 0x6c, 0x61, 0x73, 0x73, 0x00, 0x30,
+	0x2e, 0x32, 0x00, 0x00, 0x73, 0x75, 0x62, 0x00, 0x6d, 0x70, 0x6c, 0x61, 0x6e, 0x5c, 0x59, 0x79, 0xbd,
+};
+
+static int set_up(void **state)
+{
+	char name[128];
+	if (folder_set_up(state))
+		return -1;
+	snprintf(name, sizeof name, "%s/spool", folder);
+	if (spool_open(&spool, name, &e) || spool_take_job(spool, row.id, &e))
+		return -1;
+	spool_job_path(spool, row.id, "order", path);
+	return 0;
+}
+
+static int tear_down(void **state)
+{
+	spool_close(spool);
+	return folder_tear_down(state);
+}
+
+/* With a checksum that fits. */
+static void write_file(const void *bytes, size_t size)
+{
+	struct checked_file out;
+	unlink(path);
+	assert_int_equal(checked_file_create(&out, path, &e), 0);
+	assert_int_equal(checked_file_write(&out, bytes, size, &e), 0);
+	assert_int_equal(checked_file_finish(&out, &e), 0);
+	checked_file_close(&out);
+}
+
+static size_t read_file(unsigned char *bytes, size_t most)
+{
+	FILE *f = fopen(path, "rb");
+	assert_non_null(f);
+	size_t n = fread(bytes, 1, most, f);
+	fclose(f);
+	return n;
+}
+
+static void assert_row(void)
+{
+	struct row_file f;
+	const struct ledger_job *j = &f.job;
+	assert_int_equal(row_file_read(spool, row.id, &f, &e), 0);
+	assert_true(j->id == 1 && j->extended == 3 && j->revision == row.revision && j->priority == -7 && j->mixed);
+	assert_true(j->submitted == 1.5 && j->ended == 0 && !j->damaged);
+	assert_string_equal(j->owner, "anna");
+	assert_string_equal(j->name, "glass");
+	assert_string_equal(j->version, "0.2");
+	assert_string_equal(j->held, "");
+	assert_string_equal(j->state, "live");
+	assert_int_equal(j->submission_size, 5);
+	assert_memory_equal(j->submission, row.submission, 5);
+	assert_int_equal(j->plan_size, 4);
+	assert_memory_equal(j->plan, row.plan, 4);
+	row_file_free(&f);
+}
+
+static void assert_refused(int rc)
+{
+	struct row_file f;
+	assert_int_equal(row_file_read(spool, row.id, &f, &e), rc);
+	assert_null(f.memory);
+	assert_null(f.message);
+}
+
+static void comes_back(void **state)
+{
+	(void)state;
+	unsigned char bytes[256];
+	struct row_file f;
+	assert_refused(-ENOENT);
+	assert_int_equal(row_file_write(spool, &row, &e), 0);
+	assert_row();
+	size_t size = read_file(bytes, sizeof bytes);
+	assert_memory_equal(bytes, "hsltO003", 8);
+	for (int n = 0; n < 4; n++) {
+		mem_fail_after(n);
+		int rc = row_file_read(spool, row.id, &f, &e);
+		mem_fail_after(-1);
+		assert_true(rc == -ENOMEM || rc == 0);
+		row_file_free(&f);
+	}
+	assert_int_equal(spool_take_job(spool, 2, &e), 0); /* another job's row is not this one's */
+	spool_job_path(spool, 2, "order", path);
+	write_file(bytes, size - 4);
+	assert_int_equal(row_file_read(spool, 2, &f, &e), -EBADMSG);
+}
+
+static void old_file_is_read(void **state)
+{
+	(void)state;
+	FILE *f = fopen(path, "wb");
+	assert_int_equal(fwrite(old_file, 1, sizeof old_file, f), sizeof old_file);
+	fclose(f);
+	assert_row();
+}
+
+/* Cut anywhere, whether the checksum fits or not. */
+static void truncated(void **state)
+{
+	(void)state;
+	unsigned char bytes[256];
+	assert_int_equal(row_file_write(spool, &row, &e), 0);
+	size_t size = read_file(bytes, sizeof bytes) - 4;
+	for (int old = 0; old < 2; old++) {
+		const unsigned char *whole = old ? old_file : bytes;
+		size_t all = old ? sizeof old_file - 4 : size;
+		for (size_t n = 0; n < all; n++) {
+			struct row_file f;
+			write_file(whole, n);
+			int rc = row_file_read(spool, row.id, &f, &e);
+			assert_true(rc == -EBADMSG || rc == -EPROTO);
+			assert_int_equal(truncate(path, (off_t)n), 0);
+			assert_refused(-EBADMSG);
+		}
+		write_file(whole, all);
+		assert_row();
+	}
+}
+
+/* Sizes of version 002 that lead out of the file, or leave nothing; texts without an end. */
+static void sizes_beyond_bounds(void **state)
+{
+	(void)state;
+	static const uint64_t sizes[] = {0, 200, 1ull << 32, 1ull << 63, UINT64_MAX, UINT64_MAX - 96};
+	unsigned char bytes[sizeof old_file - 4];
+	for (int piece = 0; piece < 6; piece++)
+		for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+			memcpy(bytes, old_file, sizeof bytes);
+			put64(bytes + 48 + 8 * piece, sizes[i]);
+			write_file(bytes, sizeof bytes);
+			assert_refused(-EBADMSG);
+		}
+	memcpy(bytes, old_file, sizeof bytes);
+	bytes[96 + 4] = 'x';
+	write_file(bytes, sizeof bytes);
+	assert_refused(-EBADMSG);
+}
+
+/* Of a later version: by its digits, or by a field that is not known. */
+static void of_another_version(void **state)
+{
+	(void)state;
+	unsigned char bytes[256];
+	assert_int_equal(row_file_write(spool, &row, &e), 0);
+	size_t size = read_file(bytes, sizeof bytes) - 4;
+	memcpy(bytes + size, "\xc0\x0c\x01", 3); /* field 200 */
+	write_file(bytes, size + 3);
+	assert_refused(-EPROTO);
+	bytes[7] = '4';
+	write_file(bytes, size);
+	assert_refused(-EPROTO);
+	bytes[0] = 'x';
+	write_file(bytes, size);
+	assert_refused(-EBADMSG);
+	memcpy(bytes, "hsltO003\x5a\xff\xff\xff\xff\x0f", 14); /* a submission of 4 GiB */
+	write_file(bytes, 14);
+	assert_refused(-EPROTO);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(comes_back, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(old_file_is_read, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(truncated, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(sizes_beyond_bounds, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(of_another_version, set_up, tear_down),
+	};
+	return cmocka_run_group_tests_name("coordinator/store/test_row_file", tests, NULL, NULL);
+}
