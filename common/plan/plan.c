@@ -499,3 +499,43 @@ bool plan_resample(const struct plan *p, uint32_t group, const float *weight, ui
 	}
 	return true;
 }
+
+/* ---- texts ---- */
+
+#define TEXT_CHARACTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789@=,.:+-_"
+
+bool plan_text_ok(const char *text, size_t size)
+{
+	size_t length = strnlen(text, size);
+	if (length == size || strspn(text, TEXT_CHARACTERS) != length)
+		return false;
+	while (size > length && text[size - 1] == 0)
+		size--;
+	return size == length;
+}
+
+int plan_strategy_count(const char *mixture)
+{
+	size_t length = strnlen(mixture, PLAN_MUTATIONS_MAX);
+	if (length == PLAN_MUTATIONS_MAX || strspn(mixture, TEXT_CHARACTERS) != length)
+		return -1;
+	int count = length > 0;
+	for (size_t i = 0; i < length; i++) {
+		bool begins = i == 0 || mixture[i - 1] == ',';
+		if (begins && strspn(mixture + i, "abcdefghijklmnopqrstuvwxyz") == 0)
+			return -1;
+		count += mixture[i] == ',';
+	}
+	if ((length > 0 && mixture[length - 1] == ',') || count > PLAN_MAX_STRATEGIES)
+		return -1;
+	return count;
+}
+
+void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size)
+{
+	for (; i > 0 && *mixture; i--) {
+		mixture += strcspn(mixture, ",");
+		mixture += *mixture == ',';
+	}
+	snprintf(name, size, "%.*s", (int)strcspn(mixture, "=,"), mixture);
+}

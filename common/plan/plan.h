@@ -96,15 +96,9 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
 /* Every plan from the wire passes here before it is believed. */
 int plan_check(const struct plan *p, struct error *e);
-/* "1024 chains in 16 groups ..., 8 rounds ...": what was chosen and by which rule; for logs. */
-void plan_describe(const struct plan *p, char *text, size_t size);
-/* What plan_make changed of the values asked for ("chains 100 -> 128: ..."); empty: nothing. */
-void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size);
 /* By which rule plan_make chose the length of an epoch; empty: it was asked for. */
 void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size);
 enum { PLAN_TEXT = 1536 }; /* bytes that any of these texts needs at most */
-/* The options that make the same bits again when `rounds` rounds are done, whatever bound ended this job. */
-void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size);
 
 /* Half open ranges. */
 struct plan_range {

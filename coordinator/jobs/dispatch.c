@@ -16,6 +16,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/exr/exr_image.h"
+#include "common/plan/plan_text.h"
 #include "coordinator/job/back.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/late.h"

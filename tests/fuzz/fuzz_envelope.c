@@ -2,6 +2,7 @@
 /* One message, without its frame: the parser, and all that is made of what it says (plans, requests, keys, grants). */
 #include "common/wire/batch_wire.h"
 #include "tests/fuzz/messages.h"
+#include "common/plan/plan_text.h"
 
 #include <string.h>
 

@@ -13,6 +13,7 @@
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
+#include "worker/render/world/build.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -9,6 +9,8 @@
 #include "common/film/batch.h"
 #include "worker/render/path/integrator_face.h"
 #include "worker/render/world/build.h"
+#include "worker/render/world/camera_text.h"
+#include "worker/render/world/effects_text.h"
 #include "worker/render/world/summary.h"
 
 #include <stdatomic.h>

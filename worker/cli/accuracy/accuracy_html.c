@@ -8,6 +8,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/version.h"
+#include "common/plan/plan_text.h"
 #include "worker/cli/accuracy/accuracy_csv.h"
 #include "worker/cli/accuracy/accuracy_plots.h"
 #include "worker/cli/image/tonemap.h"

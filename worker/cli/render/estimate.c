@@ -7,6 +7,7 @@
 
 #include "common/base/progress.h"
 #include "common/json/forecast_json.h"
+#include "common/plan/plan_text.h"
 #include "worker/cli/plot/plot.h"
 #include "worker/cli/render/pilot.h"
 

@@ -15,6 +15,7 @@
 #include "common/exr/image_file.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
+#include "common/plan/plan_text.h"
 #include "worker/cli/render/choice.h"
 #include "worker/cli/render/estimate.h"
 #include "worker/cli/render/explain.h"

@@ -10,6 +10,7 @@
 
 #include "common/base/crc.h"
 #include "common/base/version.h"
+#include "common/plan/plan_text.h"
 
 #include <errno.h>
 #include <stdio.h>

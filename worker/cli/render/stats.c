@@ -7,6 +7,7 @@
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
 #include "common/json/strategy_json.h"
+#include "common/plan/plan_text.h"
 
 #include <jansson.h>
 #include <math.h>

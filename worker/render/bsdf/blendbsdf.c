@@ -7,6 +7,7 @@
  * let light through must agree about the index, and none may disperse.
  */
 #include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/twosided.h"
 #include "worker/render/scene/number.h"
 
 enum { PARTS_MAX = 16 };

@@ -42,6 +42,7 @@ struct bsdf_sample {
 };
 
 struct bsdf;
+struct ior;
 
 struct bsdf_build {
 	const struct asset_source *assets;
@@ -87,7 +88,8 @@ struct bsdf {
 			      depends on the wavelength; 1: opaque or none */
 	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength
 			    */
-	bool two_sided;	   /* scatters light that arrives from below the normal */
+	const struct ior *ior; /* of both sides (enum ior_side); NULL: eta is all that is known */
+	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
 	bool black;		     /* neither reflects nor lets through */
 	enum color_shape shape;	     /* CONSTANT: carries no colour */
@@ -114,13 +116,7 @@ spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 
 			 double *chance);
 
 int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
-void bsdf_black(struct bsdf *b);   /* absorbs everything; for emitters without a BSDF */
-void bsdf_default(struct bsdf *b); /* diffuse 0.5, what Mitsuba gives a shape without a BSDF */
-
-/* Makes an opaque BSDF scatter on its back as on its front. Mitsuba leaves backs black; public scenes of this language
- * are written for renderers that do not (the walls of `cornell-box` face outwards), and no scene gains from black
- * backs. */
-int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e);
+void bsdf_black(struct bsdf *b); /* absorbs everything; for emitters without a BSDF */
 
 extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */
 

@@ -1,16 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/glass.h"
 
-double glass_eta(const struct glass *g, double nm)
-{
-	return ior_at(&g->side[IOR_INT], nm) / ior_at(&g->side[IOR_EXT], nm);
-}
-
 /* Equal laws on both sides, or coefficients of zero, bend all wavelengths alike. */
-static bool varies(const struct glass *g, double eta)
+static bool varies(const struct ior side[2], double eta)
 {
 	for (double nm = WAVELENGTH_MIN; nm <= WAVELENGTH_MAX; nm++)
-		if (glass_eta(g, nm) != eta)
+		if (ior_eta(side, nm) != eta)
 			return true;
 	return false;
 }
@@ -39,8 +34,9 @@ static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *
 				  "or give coefficients",
 				  ior_dispersive_names(known, sizeof known));
 	}
-	b->eta = glass_eta(g, IOR_NM);
-	b->dispersive = varies(g, b->eta);
+	b->ior = g->side;
+	b->eta = ior_eta(b->ior, IOR_NM);
+	b->dispersive = varies(b->ior, b->eta);
 	if (b->dispersive)
 		bsdf_add_shape(b, COLOR_SHAPE_OTHER);
 	return 0;

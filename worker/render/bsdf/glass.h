@@ -11,8 +11,8 @@ struct glass {
 	struct ior side[2];			   /* of enum ior_side */
 };
 
-/* Parameters of the index, specular_reflectance, specular_transmittance. Sets b->eta and b->dispersive and enters the
- * colours. Where dispersive, b->data begins with the struct glass. */
+/* Parameters of the index, specular_reflectance, specular_transmittance. Sets b->eta, b->ior and b->dispersive and
+ * enters the colours; g outlives b. */
 int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define GLASS_PARAMS                                                                    \
@@ -20,8 +20,5 @@ int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, cons
 	{                                                                               \
 		.name = "specular_transmittance", .types = VALUE_TEXTURE, .max = 1      \
 	}
-
-/* Index below the surface over the one above. */
-double glass_eta(const struct glass *g, double nm);
 
 #endif

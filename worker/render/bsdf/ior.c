@@ -73,6 +73,11 @@ double ior_at(const struct ior *i, double nm)
 	return sqrt(fmax(n2, 0));
 }
 
+double ior_eta(const struct ior side[2], double nm)
+{
+	return ior_at(&side[IOR_INT], nm) / ior_at(&side[IOR_EXT], nm);
+}
+
 const char *ior_dispersive_names(char *text, size_t size)
 {
 	size_t used = 0;

@@ -43,6 +43,8 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 	}
 
 double ior_at(const struct ior *i, double nm);
+/* The index inside over the one outside; by enum ior_side. */
+double ior_eta(const struct ior side[2], double nm);
 
 /* Names whose dispersion is known, for messages. */
 const char *ior_dispersive_names(char *text, size_t size);

@@ -1,10 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/lobe_filter.h"
 
-#include "worker/render/bsdf/glass.h"
-
 struct without {
-	struct glass glass; /* first, as wherever indices vary */
 	struct bsdf inside;
 	unsigned lobes;
 };
@@ -63,8 +60,6 @@ int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struc
 	if (!x)
 		return error_set(e, ENOMEM, "out of memory");
 	*x = (struct without){.inside = *b, .lobes = lobes};
-	if (b->dispersive)
-		x->glass = *(const struct glass *)b->data;
 	b->ops = &ops;
 	b->data = x;
 	if (lobes & BSDF_WITHOUT_TRANSMISSION)

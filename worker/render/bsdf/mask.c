@@ -5,6 +5,7 @@
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/straight.h"
+#include "worker/render/bsdf/twosided.h"
 
 struct mask {
 	struct bsdf inner;

@@ -8,8 +8,7 @@
 #include "worker/render/bsdf/rough_map.h"
 
 struct roughdielectric {
-	struct glass glass; /* first: so it is asked for its index, and with equal indices the data is a smooth
-			       dielectric's */
+	struct glass glass; /* first: with equal indices the data is a smooth dielectric's */
 	struct rough_map roughness;
 };
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* One or two opaque BSDFs: the first on the side of the normal, the second (or the first again) on the other. */
+#include "worker/render/bsdf/twosided.h"
 #include "worker/render/bsdf/create.h"
 
 extern const struct bsdf_ops bsdf_ops_twosided;

@@ -21,58 +21,13 @@
 #define WORKER_RENDER_GEOM_ACCEL_H
 
 #include "common/base/error.h"
-#include "worker/render/geom/placement.h"
+#include "worker/render/geom/primitive.h"
 
 #include <stdbool.h>
 #include <stddef.h>
-#include <stdint.h>
 
 struct accel;
 struct coincidence; /* coincide.h */
-
-/* Of surfaces that coincide the one of least rank is there. */
-enum surface_rank {
-	SURFACE_SHINES,
-	SURFACE_OPAQUE,
-	SURFACE_TRANSMITS,
-	SURFACE_PASSES, /* lets light go straight on: null, mask */
-	SURFACE_RANKS
-};
-
-struct accel_shape {
-	bool is_sphere;
-	vec3 center; /* sphere */
-	double radius;
-	uint32_t vertex_count, triangle_count; /* else triangles; arrays must outlive the accel, readable 16 bytes from
-						  the start of the last vertex */
-	const float (*position)[3];
-	const uint32_t (*index)[3];
-	enum surface_rank rank;
-	const struct placement *place; /* where this instance of a mesh stands; NULL: positions are the world's */
-};
-
-static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim)
-{
-	const uint32_t *i = s->index[prim];
-	return s->place ? placement_triangle(s->place, s->position, i) : triangle_from(s->position, i);
-}
-
-struct prim_ref {
-	uint32_t shape, prim;
-};
-#define PRIM_NONE ((struct prim_ref){UINT32_MAX, UINT32_MAX})
-
-/* An end of a ray or segment: where, on which primitive, and the unit geometric normal there (0: free in space). */
-struct ray_end {
-	vec3 p, ng;
-	struct prim_ref prim;
-};
-
-struct ray_hit {
-	struct prim_ref prim;
-	double t;    /* about */
-	double u, v; /* Embree's barycentrics, for rays that lie in the triangle's plane */
-};
 
 /* c: what coincide_find found among the shapes; NULL: nothing. It outlives the accel. */
 int accel_new(struct accel **a, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c,

@@ -16,8 +16,11 @@
 #ifndef WORKER_RENDER_GEOM_COINCIDE_H
 #define WORKER_RENDER_GEOM_COINCIDE_H
 
-#include "worker/render/geom/accel.h"
+#include "worker/render/geom/primitive.h"
 #include "worker/render/geom/triangle.h"
+
+#include <stddef.h>
+#include "common/base/error.h"
 
 /* A primitive that is hidden, in part or wholly, by another of which it lies no farther than vertices are rounded. */
 struct coincide_pair {
@@ -41,8 +44,6 @@ struct coincidence {
 	bool incomplete;
 };
 
-/* *c is NULL when nothing coincides. The arrays of the shapes are looked at here and by coincide_there. -ENOMEM. */
-int coincide_find(struct coincidence **c, const struct accel_shape *shapes, uint32_t count, struct error *e);
 void coincide_free(struct coincidence *c);
 
 /* Which primitive is there at the point p of this one: itself, or what hides it. c may be NULL. */

@@ -9,6 +9,7 @@
  * triangles of its flat parts that meet the box around the others stand in its place. Most stand alone before that, or
  * have none, and cost nothing.
  */
+#include "worker/render/geom/coincide_find.h"
 #include "worker/render/geom/coincide.h"
 
 #include "common/base/liveness.h"

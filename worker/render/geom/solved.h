@@ -6,7 +6,6 @@
 #ifndef WORKER_RENDER_GEOM_SOLVED_H
 #define WORKER_RENDER_GEOM_SOLVED_H
 
-#include "worker/render/geom/accel.h"
 #include "worker/render/geom/coincide.h"
 #include "worker/render/geom/embree.h"
 

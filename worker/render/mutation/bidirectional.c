@@ -8,6 +8,7 @@
  */
 #include "worker/render/mutation/mutation.h"
 #include "worker/render/path/ensemble.h"
+#include "worker/render/world/effects_text.h"
 
 #include <math.h>
 

@@ -2,6 +2,7 @@
 /* Improved half vector space light transport: the breakup by roughness (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5).
  */
 #include "worker/render/mutation/strategy.h"
+#include "worker/render/world/effects_text.h"
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_DRAWN,	   STRATEGY_DRAWN,
 					 .halfvecs = true,     .wavelength = true, .aperture = true};

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The point on the emitter moves; half vectors up to it stay as they are. */
 #include "worker/render/mutation/strategy.h"
+#include "worker/render/world/effects_text.h"
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_DRAWN, 0, .emitter = true};
 

@@ -5,6 +5,7 @@
  * and an emitter that can be hit is also found by tracing (b = 0).
  */
 #include "worker/render/mutation/strategy.h"
+#include "worker/render/world/effects_text.h"
 
 /* Nothing but tracing, of one for each vertex that can be joined. */
 #define TRACE_WEIGHT 0.1

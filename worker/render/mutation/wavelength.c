@@ -4,6 +4,7 @@
  * all half vectors are kept and the walk finds the path that has them at the new wavelength.
  */
 #include "worker/render/mutation/strategy.h"
+#include "worker/render/world/effects_text.h"
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .wavelength = true};
 

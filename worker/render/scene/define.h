@@ -4,7 +4,14 @@
 #define WORKER_RENDER_SCENE_DEFINE_H
 
 #include "common/base/arena.h"
-#include "worker/render/scene/scene.h"
+#include "common/base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct scene_define {
+	const char *name, *value; /* -D name=value */
+};
 
 enum { DEFINE_MAX = 1024 };
 

@@ -11,8 +11,11 @@
  * are their own ancestors, extensions that a file requires and that are not known. What is known but not supported
  * becomes a property that the tables of parameters do not have: refused, or left out, there.
  */
-#include "worker/render/scene/gltf_private.h"
-#include "worker/render/scene/little.h"
+#include "worker/render/scene/gltf.h"
+#include "worker/render/scene/gltf_light.h"
+#include "worker/render/scene/gltf_mesh.h"
+#include "worker/render/scene/gltf_tree.h"
+#include "common/base/bytes.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -81,17 +84,17 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	const unsigned char *p = g->bytes;
 	*text = (const char *)p;
 	*size = g->size;
-	if (g->size < GLB_HEADER || little_u32(p) != GLB_MAGIC)
+	if (g->size < GLB_HEADER || get32(p) != GLB_MAGIC)
 		return 0;
-	if (little_u32(p + 4) != 2)
-		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", little_u32(p + 4));
-	if (little_u32(p + 8) > g->size)
-		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, it has %zu", little_u32(p + 8), g->size);
-	size_t end = little_u32(p + 8), at = GLB_HEADER;
+	if (get32(p + 4) != 2)
+		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", get32(p + 4));
+	if (get32(p + 8) > g->size)
+		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, it has %zu", get32(p + 8), g->size);
+	size_t end = get32(p + 8), at = GLB_HEADER;
 	*size = 0;
 	for (int i = 0; at + GLB_CHUNK <= end; i++) {
-		size_t length = little_u32(p + at);
-		uint32_t type = little_u32(p + at + 4);
+		size_t length = get32(p + at);
+		uint32_t type = get32(p + at + 4);
 		at += GLB_CHUNK;
 		if (length > end - at)
 			return gltf_fail(g, NULL, EINVAL, "a chunk leads out of the file");

@@ -9,13 +9,6 @@
 
 #include "worker/render/scene/xml.h"
 
-enum {
-	GLTF_JSON_MAX = 128 << 20,     /* bytes of the JSON, with all that is embedded in it */
-	GLTF_VALUES_MAX = 1 << 22,     /* values in it, each some 250 bytes of memory at most */
-	GLTF_EMBEDDED_MAX = 4096,      /* buffers and pictures embedded in the JSON */
-	GLTF_PRIMITIVES_MAX = 1 << 18, /* of all meshes, as often as nodes have them */
-};
-
 /* By the end of its name. */
 bool gltf_is(const char *name);
 

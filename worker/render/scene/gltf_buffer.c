@@ -4,8 +4,9 @@
  * for in the file so that shapes and pictures can be read from there. Failures: other schemes, views that lead out of
  * their buffer.
  */
+#include "worker/render/scene/gltf_buffer.h"
 #include "worker/render/scene/asset_name.h"
-#include "worker/render/scene/gltf_private.h"
+#include "worker/render/scene/gltf_tree.h"
 
 #include <string.h>
 

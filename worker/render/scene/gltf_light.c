@@ -4,7 +4,8 @@
  * to the left. Candela and lux are taken as they are for radiant intensity and irradiance. What the file lacks is
  * supplied: a camera that sees all of the scene, an environment of radiance 1; each with a note.
  */
-#include "worker/render/scene/gltf_private.h"
+#include "worker/render/scene/gltf_light.h"
+#include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
 #include <string.h>

@@ -8,7 +8,9 @@
  * What `principled` does not have (sheen, iridescence, attenuation, a second set of texture coordinates, ...) becomes a
  * property that its table does not know: refused with its name, or left out with --lenient.
  */
-#include "worker/render/scene/gltf_private.h"
+#include "worker/render/scene/gltf_material.h"
+#include "worker/render/scene/gltf_buffer.h"
+#include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
 #include <stdio.h>

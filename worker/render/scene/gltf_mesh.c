@@ -4,7 +4,10 @@
  * Points and lines have no area and are left out, with a note. Failures: accessors of other types than the attribute
  * has, that lead out of their views, sparse ones, attributes in different buffers.
  */
-#include "worker/render/scene/gltf_private.h"
+#include "worker/render/scene/gltf_mesh.h"
+#include "worker/render/scene/gltf_buffer.h"
+#include "worker/render/scene/gltf_material.h"
+#include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
 #include <string.h>

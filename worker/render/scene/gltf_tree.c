@@ -3,7 +3,7 @@
  * Members of JSON objects, and elements made of them, for the reader of glTF. The first failure stays: nothing is added
  * to the tree after it.
  */
-#include "worker/render/scene/gltf_private.h"
+#include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
 #include <stdarg.h>

@@ -2,8 +2,8 @@
 #include "worker/render/scene/id_table.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/scene/element.h"
 #include "worker/render/scene/plugin.h"
-#include "worker/render/scene/value.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -66,7 +66,7 @@ static int read_alias(struct id_table *t, const struct xml_element *el, struct e
 	struct xml_element *target;
 	if (!as)
 		return xml_error(el, e, EINVAL, "needs an attribute `as`");
-	int r = value_check_element(el, "id|as", false, e);
+	int r = element_check(el, "id|as", false, e);
 	if (!r)
 		r = id_table_find(t, el, "id", &target, e);
 	if (r)

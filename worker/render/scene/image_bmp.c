@@ -8,7 +8,7 @@
  * other than the usual ones.
  */
 #include "worker/render/scene/image_decode.h"
-#include "worker/render/scene/little.h"
+#include "common/base/bytes.h"
 
 enum { FILE_HEADER = 14, CORE_HEADER = 12, INFO_HEADER = 40, PLAIN = 0, MASKED = 3 };
 
@@ -43,8 +43,8 @@ static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
 static bool masks_are_usual(const struct bmp *b)
 {
 	const unsigned char *p = b->in->bytes + FILE_HEADER + INFO_HEADER;
-	return b->in->size >= FILE_HEADER + INFO_HEADER + 12 && b->bits == 32 && little_u32(p) == 0xff0000 &&
-	       little_u32(p + 4) == 0xff00 && little_u32(p + 8) == 0xff;
+	return b->in->size >= FILE_HEADER + INFO_HEADER + 12 && b->bits == 32 && get32(p) == 0xff0000 &&
+	       get32(p + 4) == 0xff00 && get32(p + 8) == 0xff;
 }
 
 static int read_header(struct bmp *b)
@@ -52,22 +52,22 @@ static int read_header(struct bmp *b)
 	const unsigned char *p = b->in->bytes;
 	if (b->in->size < FILE_HEADER + CORE_HEADER)
 		return broken(b, "the header ends too early");
-	uint32_t header = little_u32(p + FILE_HEADER), compression = PLAIN, used = 0;
-	b->pixels_at = little_u32(p + 10);
+	uint32_t header = get32(p + FILE_HEADER), compression = PLAIN, used = 0;
+	b->pixels_at = get32(p + 10);
 	if (header != CORE_HEADER && (header < INFO_HEADER || header > b->in->size - FILE_HEADER))
 		return broken(b, "a header of an unknown size");
 	if (header == CORE_HEADER) {
-		b->width = little_u16(p + 18);
-		b->height = little_u16(p + 20);
-		b->bits = little_u16(p + 24);
+		b->width = get16(p + 18);
+		b->height = get16(p + 20);
+		b->bits = get16(p + 24);
 	} else {
-		int32_t height = (int32_t)little_u32(p + 22);
-		b->width = little_u32(p + 18);
+		int32_t height = (int32_t)get32(p + 22);
+		b->width = get32(p + 18);
 		b->down = height < 0;
 		b->height = (uint64_t)(height < 0 ? -(int64_t)height : height);
-		b->bits = little_u16(p + 28);
-		compression = little_u32(p + 30);
-		used = little_u32(p + 46);
+		b->bits = get16(p + 28);
+		compression = get32(p + 30);
+		used = get32(p + 46);
 	}
 	if (compression != PLAIN && !(compression == MASKED && masks_are_usual(b)))
 		return error_set(b->in->error, ENOTSUP, "%s: BMP: compressed, or with unusual masks", b->in->name);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/scene/scene.h"
+#include "worker/render/scene/node.h"
+
 #include "worker/render/scene/plugin.h"
 
 #include <stdarg.h>

@@ -2,6 +2,7 @@
 #include "worker/render/scene/param_check.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/scene/element.h"
 #include "worker/render/scene/value.h"
 
 #include <stdint.h>
@@ -12,11 +13,11 @@ static int refuse_choice(const struct xml_element *el, const struct param *p, co
 	char one[64], names[16][64], hint[128], list[512] = "";
 	struct spelling s = {.wanted = given};
 	size_t n = 0;
-	for (const char *rest = p->choices; n < 16 && (rest = value_next_name(rest, one, sizeof one)); n++) {
+	for (const char *rest = p->choices; n < 16 && (rest = element_next_name(rest, one, sizeof one)); n++) {
 		memcpy(names[n], one, sizeof one);
 		spelling_offer(&s, names[n]);
 	}
-	for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
+	for (const char *rest = p->choices; (rest = element_next_name(rest, one, sizeof one));)
 		spelling_list(list, sizeof list, one);
 	return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not supported%s (supported: %s)", p->name, given,
 			 spelling_hint(&s, hint, sizeof hint), list);
@@ -67,7 +68,7 @@ int param_check(const struct xml_element *el, const struct param *p, struct valu
 		return r;
 	if (v->type == VALUE_STRING && p->choices) {
 		char one[64];
-		for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
+		for (const char *rest = p->choices; (rest = element_next_name(rest, one, sizeof one));)
 			if (strcmp(one, v->as.string) == 0)
 				return 0;
 		return refuse_choice(el, p, v->as.string, e);

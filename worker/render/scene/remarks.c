@@ -63,14 +63,14 @@ static int on_emitter(struct report *r, const struct scene_node *n, struct error
 	return remark(r, n, e, "daylight after Preetham (1999), a little other than Mitsuba's after Hosek and Wilkie");
 }
 
-int remarks_on(const struct scene *s, struct report *r, struct error *e)
+int remarks_on(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e)
 {
 	const struct scene_node *camera = NULL;
 	bool light = false;
 	uint32_t sensors = 0;
 	int rc = 0;
-	for (uint32_t i = 0; i < s->object_count && !rc; i++) {
-		const struct scene_node *n = s->objects[i];
+	for (uint32_t i = 0; i < count && !rc; i++) {
+		const struct scene_node *n = objects[i];
 		light |= shines(n);
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);

@@ -4,10 +4,10 @@
 #ifndef WORKER_RENDER_SCENE_REMARKS_H
 #define WORKER_RENDER_SCENE_REMARKS_H
 
+#include "worker/render/scene/node.h"
 #include "worker/render/scene/report.h"
-#include "worker/render/scene/scene.h"
 
-/* Notes it in the report. 0 or -ENOMEM. */
-int remarks_on(const struct scene *s, struct report *r, struct error *e);
+/* Of the objects at the top of a scene. Notes it in the report. 0 or -ENOMEM. */
+int remarks_on(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e);
 
 #endif

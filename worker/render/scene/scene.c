@@ -2,6 +2,7 @@
 #include "worker/render/scene/scene.h"
 
 #include "worker/render/scene/asset_list.h"
+#include "worker/render/scene/element.h"
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
@@ -325,7 +326,7 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	if (d->decl->status == PARAM_IGNORED && !d->decl->nested_classes)
 		return 0;
 	struct xml_element *target;
-	int r = value_check_element(el, "id|name", false, m->error);
+	int r = element_check(el, "id|name", false, m->error);
 	if (!r)
 		r = id_table_find(&m->ids, el, "id", &target, m->error);
 	return r ? r : read_object(m, d, owner, el, target);
@@ -421,7 +422,7 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	el->told = true; /* unless it succeeds */
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);
-	int r = value_check_element(el, "type|id|name", true, m->error);
+	int r = element_check(el, "type|id|name", true, m->error);
 	if (r)
 		return r;
 	const char *type = xml_attribute(el, "type");
@@ -463,7 +464,7 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 
 static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
 {
-	int r = value_check_element(el, "filename", true, m->error);
+	int r = element_check(el, "filename", true, m->error);
 	return r ? r : read_top(m, el->first, objects);
 }
 
@@ -478,7 +479,7 @@ static int make_object(struct maker *m, struct xml_element *el, const struct sce
 
 static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects)
 {
-	int r = value_check_element(scene, "version", true, m->error);
+	int r = element_check(scene, "version", true, m->error);
 	r = report_problem(&m->report, r, m->error);
 	for (struct xml_element *el = scene->first; el && !r; el = el->next) {
 		enum plugin_class cls;
@@ -490,9 +491,9 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 		else if (strcmp(el->name, "include") == 0)
 			r = read_include(m, el, objects);
 		else if (strcmp(el->name, "default") == 0)
-			r = value_check_element(el, "name|value", false, m->error);
+			r = element_check(el, "name|value", false, m->error);
 		else if (strcmp(el->name, "path") == 0)
-			r = value_check_element(el, "value", false, m->error);
+			r = element_check(el, "value", false, m->error);
 		else if (strcmp(el->name, "alias") != 0)
 			r = foreign_element(m, el);
 		r = report_problem(&m->report, r, m->error);
@@ -527,7 +528,7 @@ static int make_scene(struct maker *m)
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
 		r = note(m, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
 	if (!r)
-		r = remarks_on(m->scene, &m->report, m->error);
+		r = remarks_on(m->scene->objects, m->scene->object_count, &m->report, m->error);
 	return r ? r : list_assets(m);
 }
 

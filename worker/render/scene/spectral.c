@@ -10,8 +10,8 @@
 
 #include "common/base/spelling.h"
 #include "worker/render/math/cie.h"
+#include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
-#include "worker/render/scene/value.h"
 
 #include <math.h>
 #include <string.h>
@@ -343,7 +343,7 @@ enum { TYPES = sizeof types / sizeof *types };
 static bool is_listed(const char *list, const char *wanted)
 {
 	char name[64];
-	while ((list = value_next_name(list, name, sizeof name)))
+	while ((list = element_next_name(list, name, sizeof name)))
 		if (strcmp(name, wanted) == 0)
 			return true;
 	return false;

@@ -8,6 +8,7 @@
 #define WORKER_RENDER_SCENE_SPECTRAL_H
 
 #include "worker/render/scene/asset.h"
+#include "worker/render/scene/node.h"
 #include "worker/render/scene/xml.h"
 
 enum { SPECTRAL_POINTS_MAX = 65536 };

@@ -2,9 +2,9 @@
 #include "worker/render/scene/transform.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/param.h"
-#include "worker/render/scene/value.h"
 
 #include <string.h>
 
@@ -180,7 +180,7 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 					 "is no transform%s (supported: translate, rotate, scale, lookat, matrix)",
 					 spelling_hint(&s, hint, sizeof hint));
 		mat4 one;
-		int r = value_check_element(c, step->attributes, false, e);
+		int r = element_check(c, step->attributes, false, e);
 		if (!r)
 			r = step->read(c, &one, e);
 		if (r)
@@ -198,7 +198,7 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 int transform_still(const struct xml_element **el, bool lenient, bool *moves, struct error *e)
 {
 	const struct xml_element *animation = *el, *first = animation->first;
-	int r = value_check_element(animation, "name", true, e);
+	int r = element_check(animation, "name", true, e);
 	*moves = first && first->next;
 	for (const struct xml_element *c = first; c && !r; c = c->next)
 		if (strcmp(c->name, "transform") != 0)

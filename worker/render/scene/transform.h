@@ -3,6 +3,7 @@
 #ifndef WORKER_RENDER_SCENE_TRANSFORM_H
 #define WORKER_RENDER_SCENE_TRANSFORM_H
 
+#include "worker/render/scene/node.h"
 #include "worker/render/scene/xml.h"
 
 int transform_read(const struct xml_element *el, mat4 *out, struct error *e);

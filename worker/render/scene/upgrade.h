@@ -7,7 +7,8 @@
 #ifndef WORKER_RENDER_SCENE_UPGRADE_H
 #define WORKER_RENDER_SCENE_UPGRADE_H
 
-#include "worker/render/scene/xml.h"
+#include "common/base/arena.h"
+#include "worker/render/scene/element.h"
 
 /* scene: the root of the file, of version 0.MINOR, minor < 5. Included files are left to themselves. */
 int upgrade_file(struct xml_element *scene, int minor, struct arena *arena, struct error *e);

@@ -6,6 +6,7 @@
 #include "worker/render/scene/value.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/spectral.h"
 #include "worker/render/scene/transform.h"
@@ -13,58 +14,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-
-const char *value_next_name(const char *list, char *name, size_t size)
-{
-	if (!*list)
-		return NULL;
-	size_t n = strcspn(list, "|"), k = n < size - 1 ? n : size - 1;
-	memcpy(name, list, k);
-	name[k] = 0;
-	return list[n] ? list + n + 1 : list + n;
-}
-
-static bool is_listed(const char *list, const char *wanted, struct spelling *s)
-{
-	char name[64];
-	while ((list = value_next_name(list, name, sizeof name))) {
-		if (strcmp(name, wanted) == 0)
-			return true;
-		if (s)
-			spelling_offer(s, name);
-	}
-	return false;
-}
-
-/* spelling_offer keeps the pointer: the names of attributes must outlive the search, those in a list do not. */
-static int refuse_attribute(const struct xml_element *el, const char *known, const char *wanted, struct error *e)
-{
-	char name[64], best[64] = "", hint[128];
-	struct spelling s = {.wanted = wanted};
-	for (const char *list = known; (list = value_next_name(list, name, sizeof name));) {
-		const char *before = s.best;
-		size_t distance = s.distance;
-		spelling_offer(&s, name);
-		if (s.best && (s.best != before || s.distance != distance)) {
-			memcpy(best, name, sizeof best);
-			s.best = best;
-		}
-	}
-	return xml_error(el, e, EINVAL, "has no attribute `%.64s`%s (it may have: %s)", wanted,
-			 spelling_hint(&s, hint, sizeof hint), known);
-}
-
-int value_check_element(const struct xml_element *el, const char *known, bool children, struct error *e)
-{
-	for (uint32_t i = 0; i < el->attribute_count; i++)
-		if (!is_listed(known, el->attributes[i].name, NULL))
-			return refuse_attribute(el, known, el->attributes[i].name, e);
-	if (el->text)
-		return xml_error(el, e, EINVAL, "text has no meaning here; values are given by attributes");
-	if (el->first && !children)
-		return xml_error(el->first, e, EINVAL, "has no place in <%.64s>", el->name);
-	return 0;
-}
 
 static int need_value(const struct xml_element *el, const char **text, struct error *e)
 {
@@ -209,7 +158,7 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 		return xml_error(el, e, EINVAL,
 				 "is not supported; supported: boolean, integer, float, string, point, vector, "
 				 "rgb, srgb, spectrum, blackbody, transform");
-	int r = value_check_element(el, k->attributes, k->children, e);
+	int r = element_check(el, k->attributes, k->children, e);
 	if (!r)
 		r = check_intent(el, e);
 	if (r)

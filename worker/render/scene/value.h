@@ -4,6 +4,7 @@
 #ifndef WORKER_RENDER_SCENE_VALUE_H
 #define WORKER_RENDER_SCENE_VALUE_H
 
+#include "worker/render/scene/node.h"
 #include "worker/render/scene/xml.h"
 
 /* Is it the name of a value's element (float, rgb, ... also those that are refused, like animation)? */
@@ -18,11 +19,6 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 
 /* "float", "rgb" ... for messages; types: any of the bits, as a list. */
 void value_type_names(unsigned types, char *text, size_t size);
-
-/* Refuses attributes that are not in `known` (a list with '|' between), text and, unless `children`, elements inside.
- */
-int value_check_element(const struct xml_element *el, const char *known, bool children, struct error *e);
-const char *value_next_name(const char *list, char *name, size_t size); /* walks such a list; NULL at the end */
 
 /* All numbers of a value, three of a point or rgb; none of what has none (transforms check theirs: transform.h). The
  * result is in *v or in scratch. */

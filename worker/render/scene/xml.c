@@ -17,7 +17,6 @@
 
 #include <expat.h>
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -81,28 +80,6 @@ static void *expat_realloc(void *p, size_t size)
 }
 
 static const XML_Memory_Handling_Suite expat_memory = {expat_alloc, expat_realloc, expat_free};
-
-const char *xml_attribute(const struct xml_element *el, const char *name)
-{
-	for (uint32_t i = 0; i < el->attribute_count; i++)
-		if (strcmp(el->attributes[i].name, name) == 0)
-			return el->attributes[i].value;
-	return NULL;
-}
-
-int xml_error(const struct xml_element *el, struct error *e, int errno_value, const char *format, ...)
-{
-	char text[768];
-	va_list ap;
-	va_start(ap, format);
-	vsnprintf(text, sizeof text, format, ap);
-	va_end(ap);
-	const char *type = xml_attribute(el, "type");
-	if (type)
-		return error_set(e, errno_value, "%s:%d: <%.64s type=\"%.64s\">: %s", el->file, el->line, el->name,
-				 type, text);
-	return error_set(e, errno_value, "%s:%d: <%.64s>: %s", el->file, el->line, el->name, text);
-}
 
 bool xml_is_foreign(const char *element)
 {

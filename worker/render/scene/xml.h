@@ -8,7 +8,11 @@
 #define WORKER_RENDER_SCENE_XML_H
 
 #include "common/base/arena.h"
-#include "worker/render/scene/scene.h"
+#include "worker/render/scene/asset.h"
+#include "worker/render/scene/define.h"
+#include "worker/render/scene/element.h"
+
+#include <stdint.h>
 
 enum {
 	XML_DEPTH_MAX = 64,   /* elements inside elements, and objects that refer to objects */
@@ -22,31 +26,6 @@ enum {
 	XML_FILE_MAX = 64 << 20,     /* bytes of a scene file */
 	XML_FILES_BYTES = 256 << 20, /* of all of them together, as often as they are included */
 	XML_MEMORY_MAX = 1 << 30,    /* bytes of the tree */
-};
-
-struct xml_attribute {
-	const char *name, *value;
-};
-
-/* What an object holds when all references are followed, itself included (nesting.h). */
-struct xml_nesting {
-	uint32_t height;
-	uint64_t objects;
-};
-
-struct xml_element {
-	const char *name, *file;
-	int line;
-	bool snake;   /* names are to be converted from camelCase (a file of version < 2) */
-	bool ignored; /* it or one of those around it has no meaning here */
-	bool text;    /* holds text other than blanks */
-	uint32_t attribute_count;
-	struct xml_attribute *attributes;
-	struct xml_element *parent, *first, *last, *next;
-	const struct scene_node *node; /* for the interpreter: what it became */
-	struct xml_nesting nesting;    /* for the interpreter: of that node */
-	bool busy, told; /* for the interpreter: being made into a node; cannot be, and that has been said */
-	bool counted;	 /* for the interpreter: among the objects of the scene */
 };
 
 struct xml_tree {
@@ -64,11 +43,5 @@ bool xml_is_foreign(const char *element);
 
 int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,
 	     const struct scene_define *defines, size_t define_count, struct arena *arena, struct error *e);
-
-const char *xml_attribute(const struct xml_element *el, const char *name); /* NULL: none */
-
-/* error_set with "file:line: <element>: " before the text. */
-__attribute__((format(printf, 4, 5))) int xml_error(const struct xml_element *el, struct error *e, int errno_value,
-						    const char *format, ...);
 
 #endif

@@ -6,7 +6,18 @@
 #define WORKER_RENDER_SHAPE_MESH_H
 
 #include "common/base/arena.h"
-#include "worker/render/shape/shape.h"
+#include "worker/render/math/attribute.h"
+#include "worker/render/scene/scene.h"
+
+struct mesh {
+	uint32_t vertex_count, triangle_count;
+	double (*position)[3];
+	double (*normal)[3]; /* NULL: none, shade flat; unit length; facing the outside */
+	double (*uv)[2];     /* NULL: none */
+	uint32_t (*index)[3];
+	uint32_t attribute_count;
+	struct attribute *attributes;
+};
 
 enum { MESH_TRIANGLES_MAX = 1 << 27 };
 #define MESH_COORDINATE_MAX PARAM_LENGTH_MAX
@@ -53,21 +64,5 @@ void mesh_move_face(struct mesh *m, uint32_t from, uint32_t to);
 
 /* Vertex i; n: a unit vector. */
 void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v);
-
-struct mesh_finish {
-	mat4 to_world;
-	bool flip_normals, face_normals;
-	double smooth_angle; /* degrees: normals anew across edges that are less sharp (smooth.h); negative: as they are
-			      */
-};
-
-/*
- * From object to world space. Drops triangles without area. Where normals are not unit vectors they count as missing
- * and are computed from the triangles around, weighted by their angles there; face_normals: there are none after all.
- * The outside stays the outside under mirrors. Triangles are wound counter-clockwise as seen from outside, which is
- * the side of their vertices' normals.
- */
-int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped,
-		const struct scene_node *n, struct error *e);
 
 #endif

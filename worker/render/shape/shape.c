@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/shape/mesh.h"
+#include "worker/render/shape/shape.h"
+
+#include "worker/render/shape/mesh_finish.h"
 
 #include <string.h>
 

@@ -10,18 +10,8 @@
 #ifndef WORKER_RENDER_SHAPE_SHAPE_H
 #define WORKER_RENDER_SHAPE_SHAPE_H
 
-#include "worker/render/math/attribute.h"
 #include "worker/render/scene/scene.h"
-
-struct mesh {
-	uint32_t vertex_count, triangle_count;
-	double (*position)[3];
-	double (*normal)[3]; /* NULL: none, shade flat; unit length; facing the outside */
-	double (*uv)[2];     /* NULL: none */
-	uint32_t (*index)[3];
-	uint32_t attribute_count;
-	struct attribute *attributes;
-};
+#include "worker/render/shape/mesh.h"
 
 struct sphere {
 	vec3 center;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/world/summary.h"
+#include "worker/render/world/camera_text.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -2,6 +2,7 @@
 #include "worker/render/world/coincident.h"
 
 #include "common/base/text.h"
+#include "worker/render/geom/coincide_find.h"
 
 #include <stdio.h>
 #include <string.h>

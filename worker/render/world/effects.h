@@ -3,8 +3,7 @@
  * What can happen at all in a scene, read off its description before Embree is built. Each effect decides what is built
  * and run; each is reported on or off, why, and what leaving it out saves. What the user forces goes first.
  *
- * Adding one: a name and its two texts in effects_text.c, its rule in effects.c.
- * One thread; nothing here allocates but effects_apply (in the world's arena).
+ * Adding one: a name and its two texts in effects_text.c, its rule in effects_analyse.c.
  */
 #ifndef WORKER_RENDER_WORLD_EFFECTS_H
 #define WORKER_RENDER_WORLD_EFFECTS_H
@@ -57,11 +56,6 @@ struct effects_choice {
 	signed char of[EFFECTS];
 	bool any_on;
 };
-/* "", "all", "-dispersion,+aperture", "all,-glossy". -EINVAL with a sentence, which names the nearest where a name is
- * none. */
-int effects_parse(const char *text, struct effects_choice *out, struct error *e);
-/* The same choice always as the same text. */
-void effects_print(const struct effects_choice *c, char text[PLAN_EFFECTS_MAX]);
 
 struct effects {
 	bool colour; /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
@@ -74,22 +68,6 @@ struct effects {
 	size_t line_count;
 };
 
-struct world;
-struct box;
-struct weighed;
-struct bsdf_reach;
-
-/* The nodes that the world's parts were made of. */
-struct effects_source {
-	const struct scene *scene;
-	const struct scene_node *const *shape, *const *bsdf; /* one a shape; one a BSDF, NULL: the default one */
-	const struct scene_node *const *emitter;	     /* one an emitter */
-	uint32_t max_depth;				     /* asked for; 0: the scene's */
-	const struct box *box;				     /* one a shape, in any units */
-	struct weighed *room;				     /* for one a shape */
-	struct bsdf_reach *reach;			     /* for one a BSDF */
-};
-
 /* Whether a path between camera and light can meet a shape; why not. */
 enum visibility_bounds {
 	VISIBILITY_YES,
@@ -97,17 +75,5 @@ enum visibility_bounds {
 	VISIBILITY_DARK,     /* nothing shines in the scene, or what does is enclosed */
 	VISIBILITY_DEPTH,    /* paths are too short to scatter */
 };
-
-struct bsdf_reach {
-	enum visibility_bounds reach; /* of its shapes */
-	bool met;		      /* it has one */
-};
-
-/* Fills w->effects from shapes, BSDFs and emitters, and shape[] (one a shape, see reach.h). */
-void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
-		     enum visibility_bounds *shape);
-/* Leaves out of the world what no path meets and what was switched off. */
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
-		  struct error *e);
 
 #endif

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What effects change in a world: shapes that no path meets turn black, what was switched off goes. */
+#include "worker/render/world/effects_apply.h"
+
 #include "worker/render/bsdf/lobe_filter.h"
 #include "worker/render/world/visibility_bounds.h"
 

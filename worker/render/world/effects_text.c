@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Names of effects, what each saves, and the text in which a plan overrides them. */
+#include "worker/render/world/effects_text.h"
+
 #include "common/base/spelling.h"
 #include "worker/render/world/effects.h"
 

@@ -9,11 +9,6 @@
 int build_read_shapes(struct builder *b);
 /* Chooses the world's centre and scale, and moves the camera there. */
 int build_rescale(struct builder *b);
-struct box build_box_of(const struct shape_geometry *g);
-bool build_is_displaced(const struct builder *b, const struct scene_node *shape);
-/* A mesh as floats in the frame of that centre and scale. */
-int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, const struct scene_node *n, vec3 center,
-		     double scale);
 /* Shapes as floats in the rescaled world. */
 int build_place_shapes(struct builder *b);
 

@@ -2,8 +2,9 @@
 #include "worker/render/world/shared_mesh.h"
 
 #include "worker/render/shape/mesh.h"
+#include "worker/render/shape/shape.h"
 #include "worker/render/world/displacement.h"
-#include "worker/render/world/geometry.h"
+#include "worker/render/world/place_mesh.h"
 
 #include <string.h>
 

@@ -50,23 +50,8 @@ struct render_summary {
 	char flat[256];	  /* how many triangles without an area were left out; "": none */
 };
 
-/* The overrides of effects, in the spelling that a plan holds: "all", "-dispersion,+aperture". -EINVAL with a sentence:
- * no such effect, or it cannot be forced. */
-int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e);
-/* "the image is of another scene: without dispersion" where an effect that the scene calls for was switched off; else
- * "". */
-void render_effects_note(const struct render_summary *scene, char *text, size_t size);
-
-/* The i-th of the sentences about the scene as a whole: the note on effects, scales, surfaces that coincide;
- * false: there are no more. */
-bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size);
-
 /* The camera in one line of name=value pairs, as the scene language has them: fov in degrees along fov_axis, to_world
  * by rows (x left on the image, y up, z forward). For the image's header. */
 enum { RENDER_CAMERA_TEXT = 768 };
-void render_camera_text(const struct render_summary *scene, char *text, size_t size);
-
-/* false also where there is no effect of that name. */
-bool render_effect_on(const struct render_summary *scene, const char *name);
 
 #endif

@@ -9,6 +9,25 @@
 
 #include "worker/render/world/world.h"
 
+struct box;
+struct weighed;
+
+struct bsdf_reach {
+	enum visibility_bounds reach; /* of its shapes */
+	bool met;		      /* it has one */
+};
+
+/* The nodes that the world's parts were made of. */
+struct effects_source {
+	const struct scene *scene;
+	const struct scene_node *const *shape, *const *bsdf; /* one a shape; one a BSDF, NULL: the default one */
+	const struct scene_node *const *emitter;	     /* one an emitter */
+	uint32_t max_depth;				     /* asked for; 0: the scene's */
+	const struct box *box;				     /* one a shape, in any units */
+	struct weighed *room;				     /* for one a shape */
+	struct bsdf_reach *reach;			     /* for one a BSDF */
+};
+
 /* An emitter that shines and is not enclosed. */
 bool visibility_bounds_emitter(const struct world *w, const enum visibility_bounds *shape, uint32_t emitter);
 /* shape[]: one a shape of w. max_depth: edges. */

@@ -10,7 +10,6 @@
 #include "worker/render/camera/camera.h"
 #include "worker/render/geom/surface.h"
 #include "worker/render/settings/accuracy_settings.h"
-#include "worker/render/world/build.h"
 #include "worker/render/world/effects.h"
 
 struct world_shape {

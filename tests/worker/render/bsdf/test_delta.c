@@ -2,6 +2,8 @@
 /* Exactly specular lobes asked for by name, against the ones that sample() finds; and the mean roughness. */
 #include "tests/support/dice.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
+#include "worker/render/bsdf/diffuse.h"
+#include "worker/render/bsdf/twosided.h"
 
 #include <float.h>
 

@@ -3,6 +3,7 @@
 #include "tests/support/stats.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/math/rng.h"
+#include "worker/render/bsdf/diffuse.h"
 
 #define PI 3.14159265358979323846
 

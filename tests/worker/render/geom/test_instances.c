@@ -7,6 +7,7 @@
  */
 #include "tests/support/bodies.h"
 #include "worker/render/geom/coincide.h"
+#include "worker/render/geom/coincide_find.h"
 
 #include "common/base/mem.h"
 

@@ -7,6 +7,7 @@
 #include "tests/support/balance.h"
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
+#include "worker/render/world/build.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -11,6 +11,7 @@
 #include "worker/render/mutation/mutation.h"
 #include "worker/render/mutation/trace.h"
 #include "worker/render/path/ensemble.h"
+#include "worker/render/world/build.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -11,6 +11,7 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "worker/render/mutation/mutation.h"
+#include "worker/render/world/build.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

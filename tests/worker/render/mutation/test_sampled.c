@@ -13,6 +13,7 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/mutation/explicit.h"
+#include "worker/render/world/build.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -12,6 +12,7 @@
 #include "tests/support/stats.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/mutation/mutation.h"
+#include "worker/render/world/build.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -6,6 +6,7 @@
 #include "worker/render/scene/srgb.h"
 #include "worker/render/shape/attribute_names.h"
 #include "worker/render/shape/mesh.h"
+#include "worker/render/shape/shape.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

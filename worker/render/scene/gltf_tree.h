@@ -1,11 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the sources that read glTF share. Private to gltf*.c. */
-#ifndef WORKER_RENDER_SCENE_GLTF_PRIVATE_H
-#define WORKER_RENDER_SCENE_GLTF_PRIVATE_H
+/* A glTF file's tree of JSON, and the elements that are made of it. Private to gltf*.c. */
+#ifndef WORKER_RENDER_SCENE_GLTF_TREE_H
+#define WORKER_RENDER_SCENE_GLTF_TREE_H
 
-#include "worker/render/scene/gltf.h"
+#include "worker/render/math/mat4.h"
+#include "worker/render/scene/xml.h"
 
 #include <jansson.h>
+
+enum {
+	GLTF_JSON_MAX = 128 << 20,     /* bytes of the JSON, with all that is embedded in it */
+	GLTF_VALUES_MAX = 1 << 22,     /* values in it, each some 250 bytes of memory at most */
+	GLTF_EMBEDDED_MAX = 4096,      /* buffers and pictures embedded in the JSON */
+	GLTF_PRIMITIVES_MAX = 1 << 18, /* of all meshes, as often as nodes have them */
+};
 
 #define GLTF_WHOLE_MAX 9007199254740992.0 /* a double holds all up to here */
 
@@ -101,29 +109,5 @@ void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *
 void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m);
 /* To be said of the file once. */
 void gltf_note(struct gltf *g, const char *text);
-
-/* gltf_buffer.c */
-int gltf_buffer_view(struct gltf *g, const struct gltf_at *view, struct gltf_range *buffer, uint64_t *first,
-		     uint64_t *count);
-int gltf_image_range(struct gltf *g, const struct gltf_at *image, struct gltf_range *out);
-void gltf_put_range(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const struct gltf_range *r);
-
-/* What a primitive has at its vertices: they multiply the material's base colour, and its alpha. */
-enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
-
-/* gltf_mesh.c: the shapes of a mesh under that matrix. */
-void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world);
-
-/* gltf_material.c: what a shape of this material refers to. */
-void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
-		   enum gltf_colours colours);
-void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours);
-
-/* gltf_light.c */
-void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);
-void gltf_camera(struct gltf *g, const struct gltf_at *camera, const mat4 *to_world);
-/* Where the file has none: a camera that sees all of it, an environment. */
-void gltf_default_camera(struct gltf *g);
-void gltf_default_light(struct gltf *g);
 
 #endif

@@ -4,7 +4,7 @@
  * they depend on each other, what the scene calls for, what the user forces, and the sentence that says why. Nothing
  * fails: what cannot be forced was refused when the text was parsed (effects_text.c).
  */
-#include "worker/render/world/effects.h"
+#include "worker/render/world/effects_analyse.h"
 
 #include "common/base/text.h"
 #include "worker/render/world/displacement.h"

@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/bsdf/create.h"
+
+#include "worker/render/texture/attribute_table.h"
+
+void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size,
+		struct error *e)
+{
+	b->data = arena_alloc(build->arena, 1, size);
+	if (!b->data)
+		node_error(n, e, ENOMEM, "out of memory");
+	return b->data;
+}
+
+void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
+{
+	b->ops = ops;
+	b->modes |= BSDF_DELTA;
+	b->has_smooth = false;
+	b->has_delta = true;
+	b->alpha = b->alpha_mean = 0;
+}
+
+int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n, struct error *e)
+{
+	if (!first && part->relief != b->relief)
+		return node_error(
+			n, e, ENOTSUP,
+			"its two BSDFs bend the surface differently; one bump or normal map around both is supported");
+	b->relief = part->relief;
+	return 0;
+}
+
+int bsdf_check_energy(const struct scene_node *n, double sum, struct error *e)
+{
+	if (!(sum > 1) || node_bool(n, "ensure_energy_conservation", true))
+		return 0;
+	return node_error(n, e, ERANGE,
+			  "it would give back %g times the light that it gets (ensureEnergyConservation is false), "
+			  "which is not supported",
+			  sum);
+}
+
+void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
+{
+	if (shape != COLOR_SHAPE_CONSTANT)
+		b->shape = COLOR_SHAPE_OTHER;
+}
+
+int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		 const struct bsdf_build *build, struct error *e)
+{
+	const struct texture_build inner = bsdf_texture_build(build);
+	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, &inner, e);
+	if (code)
+		return code;
+	bsdf_add_shape(b, texture_shape(t));
+	b->textured |= !texture_is_constant(t);
+	return 0;
+}
+
+enum { PROBE_SIDE = 64 };
+
+struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build)
+{
+	const struct attribute_table *t = build->attributes;
+	struct bsdf_probes p = {PROBE_SIDE * PROBE_SIDE, t && t->asked ? 3 * (uint64_t)t->triangle_count : 0};
+	if (p.corners > p.count)
+		p.count = p.corners < BSDF_PROBES_MAX ? (uint32_t)p.corners : BSDF_PROBES_MAX;
+	return p;
+}
+
+struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i)
+{
+	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
+	uint32_t row = i / PROBE_SIDE % PROBE_SIDE, column = i % PROBE_SIDE;
+	struct bsdf_point at = {.where = {.u = (row + 0.5) / PROBE_SIDE, .v = (column + 0.5) / PROBE_SIDE}, .w = &w};
+	if (p->corners > 0) {
+		uint64_t corner = p->corners > p->count ? i * p->corners / p->count : i % p->corners;
+		at.where.prim = (uint32_t)(corner / 3);
+		at.where.b1 = corner % 3 == 1;
+		at.where.b2 = corner % 3 == 2;
+	}
+	return at;
+}

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/element.h"
+
+#include "common/base/spelling.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+const char *xml_attribute(const struct xml_element *el, const char *name)
+{
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (strcmp(el->attributes[i].name, name) == 0)
+			return el->attributes[i].value;
+	return NULL;
+}
+
+int xml_error(const struct xml_element *el, struct error *e, int errno_value, const char *format, ...)
+{
+	char text[768];
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(text, sizeof text, format, ap);
+	va_end(ap);
+	const char *type = xml_attribute(el, "type");
+	if (type)
+		return error_set(e, errno_value, "%s:%d: <%.64s type=\"%.64s\">: %s", el->file, el->line, el->name,
+				 type, text);
+	return error_set(e, errno_value, "%s:%d: <%.64s>: %s", el->file, el->line, el->name, text);
+}
+
+const char *element_next_name(const char *list, char *name, size_t size)
+{
+	if (!*list)
+		return NULL;
+	size_t n = strcspn(list, "|"), k = n < size - 1 ? n : size - 1;
+	memcpy(name, list, k);
+	name[k] = 0;
+	return list[n] ? list + n + 1 : list + n;
+}
+
+static bool is_listed(const char *list, const char *wanted, struct spelling *s)
+{
+	char name[64];
+	while ((list = element_next_name(list, name, sizeof name))) {
+		if (strcmp(name, wanted) == 0)
+			return true;
+		if (s)
+			spelling_offer(s, name);
+	}
+	return false;
+}
+
+/* spelling_offer keeps the pointer: the names of attributes must outlive the search, those in a list do not. */
+static int refuse_attribute(const struct xml_element *el, const char *known, const char *wanted, struct error *e)
+{
+	char name[64], best[64] = "", hint[128];
+	struct spelling s = {.wanted = wanted};
+	for (const char *list = known; (list = element_next_name(list, name, sizeof name));) {
+		const char *before = s.best;
+		size_t distance = s.distance;
+		spelling_offer(&s, name);
+		if (s.best && (s.best != before || s.distance != distance)) {
+			memcpy(best, name, sizeof best);
+			s.best = best;
+		}
+	}
+	return xml_error(el, e, EINVAL, "has no attribute `%.64s`%s (it may have: %s)", wanted,
+			 spelling_hint(&s, hint, sizeof hint), known);
+}
+
+int element_check(const struct xml_element *el, const char *known, bool children, struct error *e)
+{
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (!is_listed(known, el->attributes[i].name, NULL))
+			return refuse_attribute(el, known, el->attributes[i].name, e);
+	if (el->text)
+		return xml_error(el, e, EINVAL, "text has no meaning here; values are given by attributes");
+	if (el->first && !children)
+		return xml_error(el->first, e, EINVAL, "has no place in <%.64s>", el->name);
+	return 0;
+}

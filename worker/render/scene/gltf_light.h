@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Lights and cameras. Private to gltf*.c. */
+#ifndef WORKER_RENDER_SCENE_GLTF_LIGHT_H
+#define WORKER_RENDER_SCENE_GLTF_LIGHT_H
+
+#include "worker/render/scene/gltf_tree.h"
+
+void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);
+void gltf_camera(struct gltf *g, const struct gltf_at *camera, const mat4 *to_world);
+/* Where the file has none: a camera that sees all of it, an environment. */
+void gltf_default_camera(struct gltf *g);
+void gltf_default_light(struct gltf *g);
+
+#endif

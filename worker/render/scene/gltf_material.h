@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Materials. Private to gltf*.c. */
+#ifndef WORKER_RENDER_SCENE_GLTF_MATERIAL_H
+#define WORKER_RENDER_SCENE_GLTF_MATERIAL_H
+
+#include "worker/render/scene/gltf_tree.h"
+
+/* What a primitive has at its vertices: they multiply the material's base colour, and its alpha. */
+enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
+
+/* What a shape of this material refers to. */
+void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
+		   enum gltf_colours colours);
+void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours);
+
+#endif

@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A node of a scene's description, and its properties: typed values that have passed their tables. */
+#ifndef WORKER_RENDER_SCENE_NODE_H
+#define WORKER_RENDER_SCENE_NODE_H
+
+#include "common/base/error.h"
+#include "worker/render/math/mat4.h"
+#include "worker/render/scene/param.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct scene_node;
+
+struct value {
+	enum value_type type;
+	union {
+		bool boolean;
+		int64_t integer;
+		double number;
+		const char *string;
+		vec3 point;
+		double rgb[3]; /* linear Rec. 709 */
+		struct {
+			uint32_t count; /* 1: a constant (nm unused) */
+			const double *nm, *value;
+		} spectrum;
+		mat4 transform;
+		const struct scene_node *node;
+	} as;
+};
+
+struct property {
+	const char *name; /* 3.x spelling */
+	int line;
+	struct value value;
+};
+
+struct scene_node {
+	enum plugin_class cls;
+	const char *type; /* "roughconductor" */
+	const char *id;	  /* NULL when it has none */
+	const char *file; /* as the user named it */
+	int line;
+	const struct plugin_decl *decl;
+	uint32_t property_count, child_count;
+	const struct property *properties;
+	const struct scene_node *const *children; /* nested objects without a name */
+};
+
+/* Look-ups; defaults are the caller's. A property that is there has passed its table's type and range. */
+const struct property *node_find(const struct scene_node *n, const char *name);
+double node_float(const struct scene_node *n, const char *name, double fallback); /* ints convert */
+int64_t node_int(const struct scene_node *n, const char *name, int64_t fallback);
+bool node_bool(const struct scene_node *n, const char *name, bool fallback);
+const char *node_string(const struct scene_node *n, const char *name, const char *fallback);
+mat4 node_transform(const struct scene_node *n, const char *name); /* identity when absent */
+const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index); /* NULL: none */
+const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* VALUE_NODE or NULL */
+
+/* error_set with "file:line: <element>: " before the text. */
+__attribute__((format(printf, 4, 5))) int node_error(const struct scene_node *n, struct error *e, int errno_value,
+						     const char *format, ...);
+
+#endif

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What effects change in a world. One thread; allocates in the world's arena. */
+#ifndef WORKER_RENDER_WORLD_EFFECTS_APPLY_H
+#define WORKER_RENDER_WORLD_EFFECTS_APPLY_H
+
+#include "worker/render/world/effects.h"
+
+struct world;
+
+/* Leaves out of the world what no path meets and what was switched off. */
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
+		  struct error *e);
+
+#endif

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/place_mesh.h"
+
+#include "worker/render/shape/mesh.h"
+#include "worker/render/shape/shape.h"
+#include "worker/render/world/displacement.h"
+
+struct box build_box_of(const struct shape_geometry *g)
+{
+	struct box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+	if (g->kind == SHAPE_SPHERE) {
+		vec3 r = {g->sphere.radius, g->sphere.radius, g->sphere.radius};
+		return (struct box){vec3_sub(g->sphere.center, r), vec3_add(g->sphere.center, r)};
+	}
+	for (uint32_t i = 0; i < g->mesh.vertex_count; i++)
+		box_grow(&b, (vec3){g->mesh.position[i][0], g->mesh.position[i][1], g->mesh.position[i][2]});
+	return b;
+}
+
+bool build_is_displaced(const struct builder *b, const struct scene_node *shape)
+{
+	return b->forced.of[EFFECT_DISPLACEMENT] >= 0 && displacement_of(shape);
+}
+
+static vec3 float3(const float p[3])
+{
+	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
+}
+
+static void put_float3(float out[3], vec3 v)
+{
+	out[0] = (float)v.x;
+	out[1] = (float)v.y;
+	out[2] = (float)v.z;
+}
+
+/* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals.
+ * Those of a displaced shape are left as they are: where one overhangs, its outside is still its neighbours'. */
+static uint32_t take_triangles(struct geom_shape *g, struct mesh *m, bool displaced)
+{
+	uint32_t kept = 0;
+	for (uint32_t i = 0; i < m->triangle_count; i++) {
+		const uint32_t *t = m->index[i];
+		vec3 v0 = float3(g->position[t[0]]);
+		vec3 n = vec3_cross(vec3_sub(float3(g->position[t[1]]), v0), vec3_sub(float3(g->position[t[2]]), v0));
+		if (!(vec3_dot(n, n) > 0))
+			continue;
+		bool turn = false;
+		if (g->normal && !displaced) {
+			vec3 sum = vec3_add(float3(g->normal[t[0]]),
+					    vec3_add(float3(g->normal[t[1]]), float3(g->normal[t[2]])));
+			turn = vec3_dot(sum, n) < 0;
+		}
+		mesh_move_face(m, i, kept);
+		g->index[kept][0] = t[0];
+		g->index[kept][1] = t[turn ? 2 : 1];
+		g->index[kept++][2] = t[turn ? 1 : 2];
+	}
+	return kept;
+}
+
+int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, const struct scene_node *n, vec3 center,
+		     double scale)
+{
+	struct arena *arena = &b->w->arena;
+	uint32_t vertices = m->vertex_count;
+	g->vertex_count = vertices;
+	/* One vertex more than there are: Embree reads 16 bytes from the start of each. */
+	g->position = arena_alloc(arena, (size_t)vertices + 1, sizeof *g->position);
+	g->index = arena_alloc(arena, m->triangle_count, sizeof *g->index);
+	g->normal = m->normal ? arena_alloc(arena, vertices, sizeof *g->normal) : NULL;
+	g->uv = m->uv ? arena_alloc(arena, vertices, sizeof *g->uv) : NULL;
+	if (!g->position || !g->index || (m->normal && !g->normal) || (m->uv && !g->uv))
+		return build_out_of_memory(b->e);
+	for (uint32_t i = 0; i < vertices; i++) {
+		const double *p = m->position[i];
+		put_float3(g->position[i], vec3_scale(scale, vec3_sub((vec3){p[0], p[1], p[2]}, center)));
+		if (g->normal)
+			put_float3(g->normal[i], (vec3){m->normal[i][0], m->normal[i][1], m->normal[i][2]});
+		if (g->uv) {
+			g->uv[i][0] = (float)m->uv[i][0];
+			g->uv[i][1] = (float)m->uv[i][1];
+		}
+	}
+	g->triangle_count = take_triangles(g, m, build_is_displaced(b, n));
+	if (g->triangle_count == 0)
+		return node_error(n, b->e, EINVAL, "no triangle of this shape has an area at the scene's scale");
+	return 0;
+}
