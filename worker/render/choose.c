@@ -20,6 +20,7 @@ enum {
 	SHARE_SHORT = 32,  /* one of so many samples of the render, of each kind, up to SAMPLES_USUAL */
 	SHARE_LONG = 128,  /* from there to SAMPLES_LONG: the pilot has one thread, the render may have many */
 	SHARE_HOURS = 512, /* and beyond */
+	A_SECOND = 100000, /* samples, by and large, where a render is given in time */
 	SHORTER = 4,	   /* of bdpt at first */
 	IN_PIXEL = 16,	   /* samples of one pixel */
 	BESIDE = 128,	   /* one splat of so many samples, at most, is held against its pixel */
@@ -356,7 +357,9 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 	out->samples += p->samples - few;
 }
 
-/* The nearest power of two, so that nearly equal renders have equal pilots. */
+/* The nearest power of two, so that nearly equal renders have equal pilots. Of a render that is given in time, what
+ * that would make on a usual machine, never a measurement: the choice is the same everywhere. The usual pilot where
+ * only an error is asked for. */
 static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 {
 	uint64_t total = UINT64_MAX, n = SAMPLES_LEAST;
@@ -364,6 +367,10 @@ static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 		total = r->spp * pixels;
 	if (r->mutations && r->mutations < total)
 		total = r->mutations;
+	if (r->seconds > 0)
+		total = (uint64_t)fmin((double)total, fmin(r->seconds * A_SECOND, 0x1p62));
+	else if (!r->spp && !r->mutations)
+		total = (uint64_t)SAMPLES_USUAL * SHARE_SHORT;
 	double share = fmax(fmin((double)(total / SHARE_SHORT), SAMPLES_USUAL),
 			    fmax(fmin((double)(total / SHARE_LONG), SAMPLES_LONG), (double)(total / SHARE_HOURS)));
 	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < share)

@@ -405,6 +405,34 @@ static void the_pilot_is_a_small_part_of_the_render(void **state)
 	world_free(w);
 }
 
+/* A render of seconds has no pilot of hours, nor has one of which only the error is given. */
+static void a_render_without_a_number_of_samples_has_a_short_pilot(void **state)
+{
+	(void)state;
+	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	static const struct {
+		double seconds, target;
+		uint64_t spp, samples; /* a pixel; of the pilot, one kind */
+	} of[] = {{1, 0, 0, 1 << 12},  {8, 0, 0, 1 << 14},  {8, 0, 1 << 30, 1 << 14},
+		  {60, 0, 0, 1 << 16}, {60, 0, 1, 1 << 12}, {0, 0.02, 0, 1 << 14}};
+	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+		struct render_choice c;
+		struct error e = {""};
+		struct plan_request r = {.integrator = RENDER_INTEGRATOR_DEFAULT,
+					 .width = 60,
+					 .height = 50,
+					 .min_depth = 1,
+					 .max_depth = 8,
+					 .spp = of[i].spp,
+					 .seconds = of[i].seconds,
+					 .target_error = of[i].target};
+		if (render_choose(w, &r, &c, &e))
+			fail_msg("%s", e.text);
+		assert_in_range(c.samples, 2 * of[i].samples, 3 * of[i].samples);
+	}
+	world_free(w);
+}
+
 static void what_cannot_be_rendered_is_said(void **state)
 {
 	(void)state;
@@ -445,6 +473,7 @@ int main(void)
 		cmocka_unit_test(the_rule),
 		cmocka_unit_test(what_is_settled_is_the_same_with_bdpt),
 		cmocka_unit_test(the_pilot_is_a_small_part_of_the_render),
+		cmocka_unit_test(a_render_without_a_number_of_samples_has_a_short_pilot),
 		cmocka_unit_test(what_cannot_be_rendered_is_said),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
