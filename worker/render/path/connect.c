@@ -232,7 +232,7 @@ static bool is_made(struct path_context *c, unsigned edges, spectrum *l)
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		brings += l->v[i] / SPECTRUM_LANES;
 	brings *= (c->light_every > 1 ? c->light_every : 1) / (double)edges;
-	if (!isless(brings, c->faint))
+	if (!isgreater(brings, 0) || !isless(brings, c->faint))
 		return true;
 	double q = brings / c->faint, from = c->faint_place;
 	c->faint_place += q;

@@ -65,7 +65,8 @@ static void trace(struct path_context *c, struct sampler *s, struct path_sample 
 		for (unsigned j = 0; j <= 1; j++)
 			sum = spectrum_add(sum, join(c, j, t, &classes));
 	c->faint = faint_beside(c, sum);
-	c->faint_place = s->block(s, SIDE_CAMERA, 0)[DIM_FAINT];
+	if (c->faint > 0)
+		c->faint_place = s->block(s, SIDE_CAMERA, 0)[DIM_FAINT];
 	for (unsigned t = 2; t <= camera; t++)
 		for (unsigned j = 2; j <= light; j++)
 			sum = spectrum_add(sum, join(c, j, t, &classes));
