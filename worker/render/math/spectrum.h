@@ -82,12 +82,13 @@ static inline double spectrum_max(spectrum a)
 	return m;
 }
 
+/* Divided before they are added, so that lanes near the largest double have a mean. */
 static inline double spectrum_mean(spectrum a)
 {
 	double m = 0;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		m += a.v[i];
-	return m / SPECTRUM_LANES;
+		m += a.v[i] / SPECTRUM_LANES;
+	return m;
 }
 
 static inline bool spectrum_is_valid(spectrum a) /* finite and nowhere negative */

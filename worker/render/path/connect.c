@@ -228,10 +228,7 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
  * techniques were alike: what is made brings at most `edges` times `faint`, whatever its weight turns out to be. */
 static bool is_made(struct path_context *c, unsigned edges, spectrum *l)
 {
-	double brings = 0;
-	for (int i = 0; i < SPECTRUM_LANES; i++)
-		brings += l->v[i] / SPECTRUM_LANES;
-	brings *= (c->light_every > 1 ? c->light_every : 1) / (double)edges;
+	double brings = spectrum_mean(*l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);
 	if (!isgreater(brings, 0) || !isless(brings, c->faint))
 		return true;
 	double q = brings / c->faint, from = c->faint_place;

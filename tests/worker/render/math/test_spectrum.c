@@ -3,6 +3,7 @@
 #include "worker/render/math/cie.h"
 #include "worker/render/math/spectrum.h"
 
+#include <float.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -170,12 +171,28 @@ static void test_xyz_is_unbiased(void **state)
 	unbiased_of(1);
 }
 
+/* Of lanes whose sum is beyond the largest double, too; and to the bit what the sum's quarter is, where that is finite.
+ */
+static void test_mean(void **state)
+{
+	(void)state;
+	assert_true(spectrum_mean(spectrum_of(DBL_MAX)) == DBL_MAX);
+	for (int i = 1; i < 1000; i++) {
+		const spectrum s = {{1.0 / i, i / 7.0, sqrt(i), exp(0.1 * i)}};
+		assert_true(spectrum_mean(s) == (((s.v[0] + s.v[1]) + s.v[2]) + s.v[3]) / 4);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_published_sums),	       cmocka_unit_test(test_wavelengths_in_range_and_apart),
-		cmocka_unit_test(test_density_of_wavelengths), cmocka_unit_test(test_white_has_little_colour_noise),
-		cmocka_unit_test(test_few_wavelengths),	       cmocka_unit_test(test_xyz_is_unbiased),
+		cmocka_unit_test(test_published_sums),
+		cmocka_unit_test(test_wavelengths_in_range_and_apart),
+		cmocka_unit_test(test_density_of_wavelengths),
+		cmocka_unit_test(test_white_has_little_colour_noise),
+		cmocka_unit_test(test_few_wavelengths),
+		cmocka_unit_test(test_xyz_is_unbiased),
+		cmocka_unit_test(test_mean),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
