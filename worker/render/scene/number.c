@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* Powers of ten that a double holds exactly: with a mantissa below 2^53 one operation rounds correctly. */
 static const double power_of_ten[] = {1e0,  1e1,  1e2,	1e3,  1e4,  1e5,  1e6,	1e7,  1e8,  1e9,  1e10, 1e11,
@@ -95,6 +96,21 @@ const char *number_scan(const char *p, const char *end, double *out)
 	m = d.exponent < 0 ? m / power_of_ten[-d.exponent] : m * power_of_ten[d.exponent];
 	*out = negative ? -m : m;
 	return p;
+}
+
+const char *number_scan_printed(const char *p, const char *end, double *out)
+{
+	static const char *const none[] = {"nan", "inf", "1.#"};
+	const char *word = p < end && (*p == '+' || *p == '-') ? p + 1 : p;
+	for (size_t i = 0; i < sizeof none / sizeof *none; i++) {
+		if ((size_t)(end - word) < 3 || strncasecmp(word, none[i], 3) != 0)
+			continue;
+		while (word < end && !number_is_blank(*word))
+			word++;
+		*out = NAN;
+		return word;
+	}
+	return number_scan(p, end, out);
 }
 
 const char *number_scan_int(const char *p, const char *end, int64_t *out)

@@ -14,6 +14,10 @@
 const char *number_scan(const char *p, const char *end, double *out);
 const char *number_scan_int(const char *p, const char *end, int64_t *out);
 
+/* The same for files of numbers that programs print: what they write for no number ("nan", "-nan(ind)", "inf",
+ * "1.#IND") is NaN, which the caller refuses or replaces. */
+const char *number_scan_printed(const char *p, const char *end, double *out);
+
 /* The whole text, blanks around it allowed. */
 bool number_parse(const char *text, double *out);
 bool number_parse_int(const char *text, int64_t *out);

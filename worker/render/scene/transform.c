@@ -2,6 +2,7 @@
 #include "worker/render/scene/transform.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/math/frame.h"
 #include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/param.h"
@@ -110,16 +111,28 @@ static bool is_in_range(const mat4 *m)
 	return true;
 }
 
+/* Without `up` each Mitsuba takes the first axis that its own function puts beside the view. */
+static vec3 any_up(const struct xml_element *el, vec3 view)
+{
+	if (!el->snake)
+		return frame_around(view).s;
+	vec3 side = fabs(view.x) > fabs(view.y) ? (vec3){view.z, 0, -view.x} : (vec3){0, view.z, -view.y};
+	return vec3_cross(vec3_normalize(side), view);
+}
+
 static int read_lookat(const struct xml_element *el, mat4 *m, struct error *e)
 {
 	vec3 origin, target, up;
 	int r = read_triple(el, "origin", &origin, e);
 	if (!r)
 		r = read_triple(el, "target", &target, e);
-	if (!r)
+	bool has_up = xml_attribute(el, "up") != NULL;
+	if (!r && has_up)
 		r = read_triple(el, "up", &up, e);
 	if (r)
 		return r;
+	if (!has_up || (up.x == 0 && up.y == 0 && up.z == 0))
+		up = any_up(el, vec3_normalize(vec3_sub(target, origin)));
 	*m = mat4_look_at(origin, target, up);
 	if (!is_in_range(m))
 		return xml_error(el, e, EINVAL, "origin and target are one point, or up points along the view");

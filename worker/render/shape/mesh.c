@@ -6,6 +6,8 @@
 
 vec3 mesh_unit(vec3 v)
 {
+	if (!vec3_is_finite(v))
+		return (vec3){0, 0, 0};
 	double largest = fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
 	return largest > 0 ? vec3_normalize((vec3){v.x / largest, v.y / largest, v.z / largest}) : v;
 }

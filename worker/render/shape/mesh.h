@@ -42,7 +42,7 @@ static inline double mesh_angle(vec3 a, vec3 b)
 	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
 }
 
-/* v without its length, however long it is; 0 where it has none. */
+/* v without its length, however long it is; 0 where it has none, or is not finite. */
 vec3 mesh_unit(vec3 v);
 
 /* The file that a shape names; the caller closes it. */

@@ -97,9 +97,10 @@ static int read_numbers(struct obj *o, const char *what, struct list *l, size_t 
 		if (i >= least && at_end_of_line(o))
 			continue;
 		skip_blanks(o);
-		const char *rest = number_scan(o->p, o->end, &v[i]);
+		bool normal = l == &o->normals;
+		const char *rest = (normal ? number_scan_printed : number_scan)(o->p, o->end, &v[i]);
 		bool ends = rest && (rest == o->end || number_is_blank(*rest) || *rest == '\\' || *rest == '#');
-		if (!ends || !(fabs(v[i]) <= MESH_COORDINATE_MAX))
+		if (!ends || (!(fabs(v[i]) <= MESH_COORDINATE_MAX) && !normal))
 			return node_error(o->node, o->error, EINVAL, "%s:%d: `%s` needs %zu finite numbers", o->name,
 					  o->line, what, least);
 		o->p = rest;

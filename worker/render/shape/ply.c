@@ -278,7 +278,7 @@ static bool next_number(struct ply *f, enum scalar type, double *x)
 	}
 	while (f->p < f->end && number_is_blank(*f->p))
 		f->p++;
-	const char *rest = number_scan(f->p, f->end, x);
+	const char *rest = (type < FLOAT32 ? number_scan : number_scan_printed)(f->p, f->end, x);
 	if (!rest || (rest < f->end && !number_is_blank(*rest)))
 		return false;
 	f->p = rest;
@@ -327,7 +327,7 @@ static int store_vertex(struct ply *f, const struct element *el, uint64_t i, con
 {
 	struct mesh *m = f->mesh;
 	for (int k = 0; k < ROLES; k++)
-		if (!(fabs(v[k]) <= MESH_COORDINATE_MAX))
+		if (!(fabs(v[k]) <= MESH_COORDINATE_MAX) && k != ROLE_NX && k != ROLE_NY && k != ROLE_NZ)
 			return item_error(f, el, i, "a number that is not finite, or beyond 1e60");
 	memcpy(m->position[i], v, sizeof m->position[i]);
 	if (m->normal)

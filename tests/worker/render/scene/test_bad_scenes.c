@@ -227,7 +227,8 @@ static void test_bad_transforms(void **state)
 	refuses(SHAPE("<skale x='1'/>"), "did you mean `scale`?");
 	refuses(SHAPE("<lookat origin='0 0 0' target='0 0 0' up='0 1 0'/>"), "one point");
 	refuses(SHAPE("<lookat origin='0 0 0' target='0 1 0' up='0 1 0'/>"), "up points along the view");
-	refuses(SHAPE("<lookat origin='0 0 0' target='0 1 0'/>"), "needs an attribute `up`");
+	refuses(SHAPE("<lookat origin='0 0 0' up='0 1 0'/>"), "needs an attribute `target`");
+	refuses(SHAPE("<lookat origin='0 1 0' target='0 1 0'/>"), "origin and target are one point");
 	refuses(SHAPE("<scale value='1e50'/><scale value='1e50'/>"), "leaves the range");
 	refuses(SHAPE("<scale value='1e61'/>"), "s.xml:1: <scale>: value=1e+61 is outside [-1e+60, 1e+60]");
 	refuses(SHAPE("<lookat origin='1e154 0 0' target='0 0 0' up='0 1 0'/>"), "origin=1e+154 is outside");

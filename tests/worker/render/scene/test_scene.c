@@ -110,16 +110,22 @@ static void test_plain_values(void **state)
 	scene_fini(&s);
 }
 
-static void check_transform(const char *content, vec3 p, vec3 want)
+static void check_transform_of(const char *version, const char *content, vec3 p, vec3 want)
 {
 	char all[1024];
-	snprintf(all, sizeof all, "<transform name='toWorld'>%s</transform>", content);
-	struct scene s = read_inside("0.6.0", "<shape type='cube'>", all, "</shape>");
+	snprintf(all, sizeof all, "<transform name='%s'>%s</transform>", *version == '0' ? "toWorld" : "to_world",
+		 content);
+	struct scene s = read_inside(version, "<shape type='cube'>", all, "</shape>");
 	mat4 m = node_transform(s.objects[0], "to_world");
 	vec3 d = vec3_sub(mat4_point(&m, p), want);
 	if (!(vec3_length(d) < 1e-12))
 		fail_msg("%s is off by (%g, %g, %g)", content, d.x, d.y, d.z);
 	scene_fini(&s);
+}
+
+static void check_transform(const char *content, vec3 p, vec3 want)
+{
+	check_transform_of("0.6.0", content, p, want);
 }
 
 static void test_transforms(void **state)
@@ -143,6 +149,14 @@ static void test_transforms(void **state)
 	check_transform("<translate x='1'/><rotate z='1' angle='90'/>", p, (vec3){-2, 2, 3});
 	check_transform("<lookAt origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
 	check_transform("<lookat origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){1, 0, 0}, (vec3){-1, 0, 5});
+	/* Where +y goes without `up`: worked out by hand of what each Mitsuba says. */
+	vec3 y = {0, 1, 0};
+	check_transform("<lookat origin='0,0,5' target='0,0,9'/>", y, (vec3){1, 0, 5});
+	check_transform("<lookat origin='0,0,0' target='3,0,4'/>", y, (vec3){0, -1, 0});
+	check_transform("<lookat origin='0,0,0' target='0,3,4' up='0,0,0'/>", y, (vec3){1, 0, 0});
+	check_transform_of("3.0.0", "<lookat origin='0,0,5' target='0,0,9'/>", y, (vec3){1, 0, 5});
+	check_transform_of("3.0.0", "<lookat origin='0,0,0' target='3,0,4'/>", y, (vec3){0.8, 0, -0.6});
+	check_transform_of("3.0.0", "<lookat origin='0,0,0' target='3,0,-4'/>", y, (vec3){0.8, 0, 0.6});
 }
 
 static void test_dialects(void **state)

@@ -177,7 +177,13 @@ static void test_bad_ply(void **state)
 		 "ends here"},
 		{QUAD
 		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 nan 1 0 0 1 1 0 0 1 0 3 0 1 2",
+		 "m: vertex 0: a number that is not finite, or beyond 1e60"},
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 x 1 0 0 1 1 0 0 1 0 3 0 1 2",
 		 "m: vertex 0: not a number"},
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 nan",
+		 "m: face 0: not a number"},
 		{QUAD
 		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 1e99 1 0 0 1 1 0 0 1 0 3 0 1 2",
 		 "m: vertex 0: a number that is not finite, or beyond 1e60"},
@@ -201,6 +207,34 @@ static void test_bad_ply(void **state)
 		at++;
 	memcpy(f.bytes + at + strlen(end), "\0\0\xc0\x7f", 4);
 	refuses("ply", "", f.bytes, f.size, "m: vertex 0: a number that is not finite");
+}
+
+/* Programs write such where a vertex has no triangle with an area: as if the normal were not there. */
+static void test_normals_that_are_none(void **state)
+{
+	(void)state;
+	static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+				  "property float z\nproperty float nx\nproperty float ny\nproperty float nz\n"
+				  "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+				  "0 0 0 nan nan -nan(ind)\n2 0 0 0 0 1\n2 2 0 -1.#IND 0 INF\n0 2 0 0 0.6 0.8\n"
+				  "3 0 1 2\n3 0 2 3\n",
+			  obj[] = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nvn nan nan -nan(ind)\nvn 0 0 1\n"
+				  "vn -1.#IND 0 INF\nvn 0 0.6 0.8\nf 1//1 2//2 3//3\nf 1//1 3//3 4//4\n";
+	for (int k = 0; k < 2; k++) {
+		struct built b = build(k ? "obj" : "ply", "", k ? obj : ply, strlen(k ? obj : ply));
+		if (b.result)
+			fail_msg("%s", b.error.text);
+		const struct mesh *m = &b.g.mesh;
+		assert_int_equal(m->triangle_count, 2);
+		for (uint32_t t = 0; t < 2; t++)
+			for (int c = 0; c < 3; c++) {
+				uint32_t i = m->index[t][c];
+				bool leans = m->position[i][0] == 0 && m->position[i][1] == 2;
+				vec3 want = leans ? (vec3){0, 0.6, 0.8} : (vec3){0, 0, 1};
+				assert_true(vec3_length(vec3_sub(mesh_load(m->normal[i]), want)) < 1e-12);
+			}
+		release(&b);
+	}
 }
 
 static void test_bad_serialized(void **state)
@@ -296,6 +330,7 @@ int main(void)
 		cmocka_unit_test(test_ply_polygons),
 		cmocka_unit_test(test_serialized),
 		cmocka_unit_test(test_bad_ply),
+		cmocka_unit_test(test_normals_that_are_none),
 		cmocka_unit_test(test_bad_serialized),
 		cmocka_unit_test(test_damage),
 		cmocka_unit_test(test_memory_runs_out),

@@ -370,7 +370,8 @@ static void test_bad_objs(void **state)
 	refuses("", "v 0 0 1e99\n", "finite numbers");
 	refuses("", "v 0 0\nv 1 1 1\n", "m.obj:1: `v` needs");
 	refuses("", "v 0 0 0x\n", "m.obj:1: `v` needs");
-	refuses("", SQUARE "vn 0 0 NaN\n", "m.obj:5: `vn` needs");
+	refuses("", SQUARE "vn 0 0 x\n", "m.obj:5: `vn` needs");
+	refuses("", "v 0 0 NaN\n", "m.obj:1: `v` needs");
 	refuses("", SQUARE "vt\n", "`vt` needs 1");
 	refuses("", SQUARE "vt 0 2e12\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n", "a texture coordinate lies beyond 1e+12");
 	refuses("", SQUARE "\nf 1 2 5\n", "m.obj:6: vertex 5 is out of range; there are 4");
