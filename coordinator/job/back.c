@@ -9,14 +9,15 @@
 #include <assert.h>
 #include <string.h>
 
-static uint32_t slot_of(const struct live_job *o, const struct lease_key *k)
+static uint32_t slot_of(const struct live_job *job, const struct lease_key *k)
 {
-	return k->group * o->plan.parts + k->part;
+	return k->group * job->plan.parts + k->part;
 }
 
-static struct lease_key key_of(const struct live_job *o, const struct merged_record *r)
+static struct lease_key key_of(const struct live_job *job, const struct merged_record *r)
 {
-	return (struct lease_key){o->id, LEASE_RENDER, r->slot / o->plan.parts, r->slot % o->plan.parts, r->epoch};
+	return (struct lease_key){job->id, LEASE_RENDER, r->slot / job->plan.parts, r->slot % job->plan.parts,
+				  r->epoch};
 }
 
 static void take_maker(struct live_job_maker *to, const Farm__Maker *from)
@@ -30,47 +31,47 @@ static void take_maker(struct live_job_maker *to, const Farm__Maker *from)
 	to->restarts = from->restarts;
 }
 
-void back_note(struct live_job *o, const struct lease_key *k, uint64_t at, const Farm__Maker *maker)
+void back_note(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker)
 {
-	if (o->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER)
+	if (job->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER)
 		return;
-	if (o->merged_count == o->merged_capacity) {
-		size_t want = o->merged_capacity ? 2 * o->merged_capacity : 64;
+	if (job->merged_count == job->merged_capacity) {
+		size_t want = job->merged_capacity ? 2 * job->merged_capacity : 64;
 		struct merged_record *more =
-			mem_grow(o->merged, o->merged_capacity * sizeof *more, want * sizeof *more);
+			mem_grow(job->merged, job->merged_capacity * sizeof *more, want * sizeof *more);
 		if (!more)
 			return;
-		o->merged = more;
-		o->merged_capacity = want;
+		job->merged = more;
+		job->merged_capacity = want;
 	}
-	o->merged[o->merged_count++] = (struct merged_record){slot_of(o, k), k->epoch, at};
-	take_maker(&o->makers[slot_of(o, k)], maker);
+	job->merged[job->merged_count++] = (struct merged_record){slot_of(job, k), k->epoch, at};
+	take_maker(&job->makers[slot_of(job, k)], maker);
 }
 
 /* SIZE_MAX: it is not there. */
-static size_t find(const struct live_job *o, uint32_t slot, uint64_t epoch)
+static size_t find(const struct live_job *job, uint32_t slot, uint64_t epoch)
 {
-	for (size_t i = o->merged_count; i-- > 0;)
-		if (o->merged[i].slot == slot && o->merged[i].epoch == epoch)
+	for (size_t i = job->merged_count; i-- > 0;)
+		if (job->merged[i].slot == slot && job->merged[i].epoch == epoch)
 			return i;
 	return SIZE_MAX;
 }
 
-static int read_batch(const struct live_job *o, struct journal *j, const struct lease_key *k, struct batch *b,
+static int read_batch(const struct live_job *job, struct journal *j, const struct lease_key *k, struct batch *b,
 		      struct live_job_maker *maker, struct error *e)
 {
-	size_t i = find(o, slot_of(o, k), k->epoch), size, payload_size;
+	size_t i = find(job, slot_of(job, k), k->epoch), size, payload_size;
 	unsigned char *body;
 	const unsigned char *payload;
 	struct envelope env;
 	if (i == SIZE_MAX)
 		return error_set(e, ENOENT, "the batch of an epoch is not in the journal");
-	int rc = journal_body(j, o->merged[i].at, &body, &size, e);
+	int rc = journal_body(j, job->merged[i].at, &body, &size, e);
 	if (rc)
 		return rc;
 	rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
 	if (!rc) {
-		rc = batch_unpack(b, &o->plan, env.message->lease_result, payload, payload_size, e);
+		rc = batch_unpack(b, &job->plan, env.message->lease_result, payload, payload_size, e);
 		take_maker(maker, env.message->lease_result->maker);
 		envelope_fini(&env);
 	}
@@ -80,21 +81,21 @@ static int read_batch(const struct live_job *o, struct journal *j, const struct 
 	return rc;
 }
 
-int back_read(const struct live_job *o, struct journal *j, const struct lease_key *k, struct back *b, struct error *e)
+int back_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct back *b, struct error *e)
 {
 	struct lease_key last = *k;
 	struct batch before = {0};
 	*b = (struct back){0};
 	last.epoch--;
-	if (o->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER || k->group >= o->plan.groups ||
-	    k->part >= o->plan.parts || k->epoch == 0 || !o->canvas || canvas_has(o->canvas, k) ||
-	    !canvas_has(o->canvas, &last))
+	if (job->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER || k->group >= job->plan.groups ||
+	    k->part >= job->plan.parts || k->epoch == 0 || !job->canvas || canvas_has(job->canvas, k) ||
+	    !canvas_has(job->canvas, &last))
 		return error_set(e, ENOENT, "not the lease that is next");
-	int rc = read_batch(o, j, &last, &b->batch, &b->maker, e);
+	int rc = read_batch(job, j, &last, &b->batch, &b->maker, e);
 	b->maker = (struct live_job_maker){0};
 	if (!rc && last.epoch > 0) {
 		last.epoch--;
-		rc = read_batch(o, j, &last, &before, &b->maker, e);
+		rc = read_batch(job, j, &last, &before, &b->maker, e);
 		b->states = before.states;
 		before.states = NULL;
 		before.state_count = 0;
@@ -105,21 +106,21 @@ int back_read(const struct live_job *o, struct journal *j, const struct lease_ke
 	return rc;
 }
 
-void back_take(struct live_job *o, struct back *b)
+void back_take(struct live_job *job, struct back *b)
 {
 	const struct lease_key *k = &b->batch.key;
-	uint32_t slot = slot_of(o, k);
-	size_t i = find(o, slot, k->epoch);
+	uint32_t slot = slot_of(job, k);
+	size_t i = find(job, slot, k->epoch);
 	assert(i != SIZE_MAX);
-	memmove(&o->merged[i], &o->merged[i + 1], (--o->merged_count - i) * sizeof *o->merged);
-	canvas_take_back(o->canvas, &b->batch);
-	states_fini(o->states[slot], o->chains_per_lease);
-	o->states[slot] = b->states;
+	memmove(&job->merged[i], &job->merged[i + 1], (--job->merged_count - i) * sizeof *job->merged);
+	canvas_take_back(job->canvas, &b->batch);
+	states_fini(job->states[slot], job->chains_per_lease);
+	job->states[slot] = b->states;
 	b->states = NULL;
-	o->makers[slot] = b->maker;
-	o->again[slot] = true;
-	o->cpu_seconds -= b->batch.cpu_seconds;
-	o->record.cpu_seconds = o->cpu_seconds;
+	job->makers[slot] = b->maker;
+	job->again[slot] = true;
+	job->cpu_seconds -= b->batch.cpu_seconds;
+	job->record.cpu_seconds = job->cpu_seconds;
 }
 
 void back_fini(struct back *b)
@@ -130,67 +131,67 @@ void back_fini(struct back *b)
 	*b = (struct back){0};
 }
 
-int back_replay(struct live_job *o, struct journal *j, const struct lease_key *k, struct error *e)
+int back_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e)
 {
 	int rc = 0;
-	late_forget(o, k);
-	if (!o->canvas || k->group >= o->plan.groups || k->part >= o->plan.parts)
+	late_forget(job, k);
+	if (!job->canvas || k->group >= job->plan.groups || k->part >= job->plan.parts)
 		return 0;
-	while (!rc && canvas_has(o->canvas, k)) {
+	while (!rc && canvas_has(job->canvas, k)) {
 		struct lease_key next = *k;
 		struct back b;
 		do
 			next.epoch++;
-		while (canvas_has(o->canvas, &next));
-		rc = back_read(o, j, &next, &b, e);
+		while (canvas_has(job->canvas, &next));
+		rc = back_read(job, j, &next, &b, e);
 		if (rc) /* all is there in a journal that is whole */
 			return rc == -ENOENT ? error_set(e, EBADMSG, "a batch that was replaced is not in the journal")
 					     : rc;
-		back_take(o, &b);
+		back_take(job, &b);
 		back_fini(&b);
-		o->again[slot_of(o, k)] = false;
+		job->again[slot_of(job, k)] = false;
 	}
 	return rc;
 }
 
-static uint64_t copy_one(const struct live_job *o, struct journal *to, const struct merged_record *r, uint64_t most,
+static uint64_t copy_one(const struct live_job *job, struct journal *to, const struct merged_record *r, uint64_t most,
 			 struct merged_record *out)
 {
 	struct error e;
 	unsigned char *body;
 	size_t size;
-	struct lease_key k = key_of(o, r);
-	if (journal_body(o->journal, r->at, &body, &size, &e))
+	struct lease_key k = key_of(job, r);
+	if (journal_body(job->journal, r->at, &body, &size, &e))
 		return 0;
 	*out = (struct merged_record){r->slot, r->epoch, journal_bytes(to)};
 	bool copied = size <= most &&
-		      journal_append(to, JOURNAL_KEPT, &k, o->times.elapsed, body, size, NULL, &e) == 0 &&
+		      journal_append(to, JOURNAL_KEPT, &k, job->times.elapsed, body, size, NULL, &e) == 0 &&
 		      journal_write(to, &e) == 0;
 	mem_free(body);
 	return copied ? size : 0;
 }
 
-void back_copy(const struct live_job *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count,
-	       size_t *capacity)
+void back_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
+	       size_t *count, size_t *capacity)
 {
 	enum { LAST = 2 };
-	uint32_t slots = o->plan.groups * o->plan.parts;
+	uint32_t slots = job->plan.groups * job->plan.parts;
 	struct error e;
 	*count = 0;
-	if (journal_write(o->journal, &e)) { /* what waits cannot be read */
+	if (journal_write(job->journal, &e)) { /* what waits cannot be read */
 		*list = NULL;
 		return;
 	}
 	*capacity = (size_t)LAST * slots;
-	*list = o->merged_count ? mem_alloc(*capacity, sizeof **list) : NULL;
+	*list = job->merged_count ? mem_alloc(*capacity, sizeof **list) : NULL;
 	for (uint32_t s = 0; *list && s < slots; s++) {
 		uint64_t next = 0;
-		for (size_t i = 0; i < o->merged_count; i++)
-			if (o->merged[i].slot == s && o->merged[i].epoch >= next)
-				next = o->merged[i].epoch + 1;
+		for (size_t i = 0; i < job->merged_count; i++)
+			if (job->merged[i].slot == s && job->merged[i].epoch >= next)
+				next = job->merged[i].epoch + 1;
 		for (uint64_t epoch = next < LAST ? 0 : next - LAST; epoch < next; epoch++) {
-			size_t i = find(o, s, epoch);
-			uint64_t size = i == SIZE_MAX ? 0 : copy_one(o, to, &o->merged[i], most, &(*list)[*count]);
+			size_t i = find(job, s, epoch);
+			uint64_t size = i == SIZE_MAX ? 0 : copy_one(job, to, &job->merged[i], most, &(*list)[*count]);
 			*count += size > 0;
 			most -= size;
 		}

@@ -22,21 +22,22 @@ struct back {
 };
 
 /* The batch is merged, and its record begins there; without memory it cannot be taken back. maker NULL: not known. */
-void back_note(struct live_job *o, const struct lease_key *k, uint64_t at, const Farm__Maker *maker);
+void back_note(struct live_job *job, const struct lease_key *k, uint64_t at, const Farm__Maker *maker);
 /* Reads the last batch of that lease's (group, part). Its epoch must be the one before k's. -ENOENT: it is not known
  * where it lies. */
-int back_read(const struct live_job *o, struct journal *j, const struct lease_key *k, struct back *b, struct error *e);
+int back_read(const struct live_job *job, struct journal *j, const struct lease_key *k, struct back *b,
+	      struct error *e);
 /* Takes it out of the live job; that cannot fail. Its states go over to the live job. */
-void back_take(struct live_job *o, struct back *b);
+void back_take(struct live_job *job, struct back *b);
 void back_fini(struct back *b);
 
 /* A batch of that lease comes in the place of one that is merged, as the journal says: that one goes, and all after it.
  */
-int back_replay(struct live_job *o, struct journal *j, const struct lease_key *k, struct error *e);
+int back_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e);
 
 /* Into another journal, at most so many bytes; *list, of *count, says where they are there (mem_alloc'd). What does not
  * fit is left out. */
-void back_copy(const struct live_job *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count,
-	       size_t *capacity);
+void back_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
+	       size_t *count, size_t *capacity);
 
 #endif

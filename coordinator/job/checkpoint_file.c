@@ -19,37 +19,38 @@
 
 static const char magic[8] = "hsltC005", old_magic[8] = "hsltC004";
 
-static uint32_t slots_of(const struct live_job *o)
+static uint32_t slots_of(const struct live_job *job)
 {
-	return o->plan.groups * o->plan.parts;
+	return job->plan.groups * job->plan.parts;
 }
 
-void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *o, const struct job_status *status)
+void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *job, const struct job_status *status)
 {
-	uint64_t generation = journal_generation(o->journal) + 1;
-	*h = (struct checkpoint_head){.worker_count = o->worker_count,
-				      .job = o->id,
-				      .generation = generation < o->generation_least ? o->generation_least : generation,
-				      .cpu_seconds = o->cpu_seconds,
-				      .bootstrap_cpu_seconds = o->record.bootstrap_cpu_seconds,
-				      .look_written = o->look_written,
-				      .times = o->times,
-				      .lit = o->lit,
-				      .counts = o->counts,
+	uint64_t generation = journal_generation(job->journal) + 1;
+	*h = (struct checkpoint_head){.worker_count = job->worker_count,
+				      .job = job->id,
+				      .generation =
+					      generation < job->generation_least ? job->generation_least : generation,
+				      .cpu_seconds = job->cpu_seconds,
+				      .bootstrap_cpu_seconds = job->record.bootstrap_cpu_seconds,
+				      .look_written = job->look_written,
+				      .times = job->times,
+				      .lit = job->lit,
+				      .counts = job->counts,
 				      .looks = *status->looks};
 	snprintf(h->fingerprint, sizeof h->fingerprint, "%s", status->fingerprint);
 }
 
-static int write_states(const struct live_job *o, struct checked_file *out, struct error *e)
+static int write_states(const struct live_job *job, struct checked_file *out, struct error *e)
 {
 	int rc = 0;
-	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
-		uint32_t there = o->states[i] != NULL;
+	for (uint32_t i = 0; i < slots_of(job) && !rc; i++) {
+		uint32_t there = job->states[i] != NULL;
 		rc = checked_file_write(out, &there, sizeof there, e);
-		for (uint32_t k = 0; there && k < o->chains_per_lease && !rc; k++) {
-			rc = checked_file_write(out, &o->states[i][k].size, sizeof o->states[i][k].size, e);
+		for (uint32_t k = 0; there && k < job->chains_per_lease && !rc; k++) {
+			rc = checked_file_write(out, &job->states[i][k].size, sizeof job->states[i][k].size, e);
 			if (!rc)
-				rc = checked_file_write(out, o->states[i][k].bytes, o->states[i][k].size, e);
+				rc = checked_file_write(out, job->states[i][k].bytes, job->states[i][k].size, e);
 		}
 	}
 	return rc;
@@ -65,30 +66,30 @@ static int write_head(const struct checkpoint_head *h, struct checked_file *out,
 	return rc ? rc : checked_file_write(out, bytes, size, e);
 }
 
-int checkpoint_write(const struct live_job *o, const struct checkpoint_head *h, struct checked_file *out,
+int checkpoint_write(const struct live_job *job, const struct checkpoint_head *h, struct checked_file *out,
 		     struct error *e)
 {
 	int rc = write_head(h, out, e);
-	if (!rc && o->seeds)
-		rc = checked_file_write(out, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+	if (!rc && job->seeds)
+		rc = checked_file_write(out, job->seeds, job->plan.chains * sizeof *job->seeds, e);
 	if (!rc)
-		rc = write_states(o, out, e);
-	return rc ? rc : canvas_save(o->canvas, out, e);
+		rc = write_states(job, out, e);
+	return rc ? rc : canvas_save(job->canvas, out, e);
 }
 
-static int read_states(struct live_job *o, struct checked_file *in, struct error *e)
+static int read_states(struct live_job *job, struct checked_file *in, struct error *e)
 {
 	int rc = 0;
-	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
+	for (uint32_t i = 0; i < slots_of(job) && !rc; i++) {
 		uint32_t there;
 		rc = checked_file_read(in, &there, sizeof there, e);
 		if (rc || !there)
 			continue;
-		o->states[i] = mem_alloc(o->chains_per_lease, sizeof *o->states[i]);
-		if (!o->states[i])
+		job->states[i] = mem_alloc(job->chains_per_lease, sizeof *job->states[i]);
+		if (!job->states[i])
 			return error_set(e, ENOMEM, "no memory for chains");
-		for (uint32_t k = 0; k < o->chains_per_lease && !rc; k++) {
-			struct chain_state *c = &o->states[i][k];
+		for (uint32_t k = 0; k < job->chains_per_lease && !rc; k++) {
+			struct chain_state *c = &job->states[i][k];
 			uint32_t size;
 			rc = checked_file_read(in, &size, sizeof size, e);
 			if (!rc && (size == 0 || size > CHAIN_STATE_MAX))
@@ -104,19 +105,19 @@ static int read_states(struct live_job *o, struct checked_file *in, struct error
 	return rc;
 }
 
-static void take_head(struct live_job *o, const struct checkpoint_head *h)
+static void take_head(struct live_job *job, const struct checkpoint_head *h)
 {
-	o->worker_count = h->worker_count;
-	o->cpu_seconds = o->record.cpu_seconds = h->cpu_seconds;
-	o->record.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
-	o->look_written = h->look_written;
-	o->times = h->times;
-	o->lit = h->lit;
-	o->record.looks.count = 0;
+	job->worker_count = h->worker_count;
+	job->cpu_seconds = job->record.cpu_seconds = h->cpu_seconds;
+	job->record.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
+	job->look_written = h->look_written;
+	job->times = h->times;
+	job->lit = h->lit;
+	job->record.looks.count = 0;
 	for (uint32_t i = 0; i < h->looks.count && i < FORECAST_LOOKS; i++)
-		forecast_add_look(&o->record.looks, &h->looks.looks[i]);
-	o->counts = h->counts;
-	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
+		forecast_add_look(&job->record.looks, &h->looks.looks[i]);
+	job->counts = h->counts;
+	snprintf(job->fingerprint, sizeof job->fingerprint, "%s", h->fingerprint);
 }
 
 /* Of version 004. */
@@ -156,43 +157,43 @@ static int read_head(struct checkpoint_head *h, struct checked_file *in, struct 
 	return rc;
 }
 
-static int read_all(struct live_job *o, struct checked_file *in, uint64_t *generation, struct error *e)
+static int read_all(struct live_job *job, struct checked_file *in, uint64_t *generation, struct error *e)
 {
 	struct checkpoint_head h;
 	int rc = read_head(&h, in, e);
-	if (!rc && h.job != o->id)
+	if (!rc && h.job != job->id)
 		rc = error_set(e, EBADMSG, "%s: of j%llu", in->path, (unsigned long long)h.job);
 	if (rc)
 		return rc;
-	take_head(o, &h);
+	take_head(job, &h);
 	*generation = h.generation;
-	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, live_job_submit(o)->brightest);
-	rc = canvas_new(&o->canvas, &o->plan, exponent, o->film_folder, e);
-	if (!rc && o->seeds)
-		rc = checked_file_read(in, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+	int exponent = canvas_grid_exponent(&job->plan, job->lit.b_pooled, live_job_submit(job)->brightest);
+	rc = canvas_new(&job->canvas, &job->plan, exponent, job->film_folder, e);
+	if (!rc && job->seeds)
+		rc = checked_file_read(in, job->seeds, job->plan.chains * sizeof *job->seeds, e);
 	if (!rc)
-		rc = read_states(o, in, e);
+		rc = read_states(job, in, e);
 	if (!rc)
-		rc = canvas_load(o->canvas, in, e);
-	bootstrap_free(o->bootstrap);
-	o->bootstrap = NULL;
-	o->checkpoint_bytes = in->bytes;
+		rc = canvas_load(job->canvas, in, e);
+	bootstrap_free(job->bootstrap);
+	job->bootstrap = NULL;
+	job->checkpoint_bytes = in->bytes;
 	return rc;
 }
 
-int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation,
+int checkpoint_load(const struct spool *spool, struct live_job *job, uint64_t *generation,
 		    checked_file_progress *progress, void *user, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
 	struct checked_file in;
-	spool_job_path(spool, o->id, "checkpoint.tmp", name);
+	spool_job_path(spool, job->id, "checkpoint.tmp", name);
 	disk_unlink(name); /* of a run that ended before it was whole */
-	spool_job_path(spool, o->id, "checkpoint", name);
+	spool_job_path(spool, job->id, "checkpoint", name);
 	int rc = checked_file_open_watched(&in, name, progress, user, e);
 	if (rc)
 		return rc;
 	in.bytes = in.left;
-	rc = read_all(o, &in, generation, e);
+	rc = read_all(job, &in, generation, e);
 	checked_file_close(&in);
 	return rc;
 }

@@ -21,37 +21,37 @@ static uint64_t found_film_bytes(const struct jobs *s)
 {
 	uint64_t sum = 0;
 	for (const struct found *f = s->found; f; f = f->next)
-		if (f->order && f->order->canvas && !canvas_is_mapped(f->order->canvas))
-			sum += canvas_bytes(&f->order->plan);
+		if (f->job && f->job->canvas && !canvas_is_mapped(f->job->canvas))
+			sum += canvas_bytes(&f->job->plan);
 	return sum;
 }
 
 const char *jobs_film_folder(const struct jobs *s, const struct plan *p)
 {
 	uint64_t bytes = canvas_bytes(p) + found_film_bytes(s) + (s->reading ? canvas_bytes(&s->reading->plan) : 0);
-	for (const struct live_job *o = s->orders; o; o = o->next)
-		if (o->canvas && !canvas_is_mapped(o->canvas))
-			bytes += canvas_bytes(&o->plan);
+	for (const struct live_job *job = s->live; job; job = job->next)
+		if (job->canvas && !canvas_is_mapped(job->canvas))
+			bytes += canvas_bytes(&job->plan);
 	return bytes <= s->config.film_bytes ? NULL : spool_canvas(s->spool);
 }
 
-struct live_job *jobs_find(const struct jobs *s, uint64_t job)
+struct live_job *jobs_find(const struct jobs *s, uint64_t id)
 {
-	for (struct live_job *o = s->orders; o; o = o->next)
-		if (o->id == job)
-			return o;
+	for (struct live_job *job = s->live; job; job = job->next)
+		if (job->id == id)
+			return job;
 	return NULL;
 }
 
-int jobs_within_quota(const struct jobs *s, const char *owner, uint64_t job, uint64_t uploading,
-		      const struct plan *plan, const Farm__Submit *m, struct error *e)
+int jobs_within_quota(const struct jobs *s, const char *owner, uint64_t id, uint64_t uploading, const struct plan *plan,
+		      const Farm__Submit *m, struct error *e)
 {
 	struct quota_use has = {.asset_bytes = uploading};
-	for (const struct live_job *o = s->orders; o; o = o->next) {
-		if (o->ended || o->id == job || strcmp(o->record.owner, owner) != 0)
+	for (const struct live_job *job = s->live; job; job = job->next) {
+		if (job->ended || job->id == id || strcmp(job->record.owner, owner) != 0)
 			continue;
 		has.jobs++;
-		has.asset_bytes += live_job_asset_bytes(live_job_submit(o));
+		has.asset_bytes += live_job_asset_bytes(live_job_submit(job));
 	}
 	return quota_check(&s->config.quota, &has, plan, live_job_asset_bytes(m), e);
 }

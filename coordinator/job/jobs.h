@@ -39,7 +39,7 @@ enum { TICK_MS = 200, ENDED_MAX = 200 /* ended jobs in the lists; older ones can
 /* A job of the last run that is being read (coordinator/jobs/recovery.c). */
 struct found {
 	struct found *next;
-	struct live_job *order;	  /* all but its id is the pool's while it is read */
+	struct live_job *job;	  /* all but its id is the pool's while it is read */
 	struct job_record record; /* as it is shown meanwhile */
 	uint64_t bytes;
 	struct replay_progress progress;
@@ -59,7 +59,7 @@ struct jobs {
 	struct spool *spool;
 	struct blob_store *blobs;
 	struct ledger *ledger;
-	struct live_job *orders;
+	struct live_job *live;	  /* all that run */
 	struct job_record *ended; /* ENDED_MAX, oldest first */
 	size_t ended_count;
 	struct deferred *deferred, **deferred_last;
@@ -89,15 +89,15 @@ struct jobs {
 	uint64_t changes;		     /* grows with whatever the status shows */
 };
 
-double jobs_now(const struct jobs *s);				/* s on the loop's clock */
-struct live_job *jobs_find(const struct jobs *s, uint64_t job); /* NULL: it does not run */
+double jobs_now(const struct jobs *s);			       /* s on the loop's clock */
+struct live_job *jobs_find(const struct jobs *s, uint64_t id); /* NULL: it does not run */
 /* Where the films of a job of this plan go: NULL: into memory, which is never kept waiting by the disk. */
 const char *jobs_film_folder(const struct jobs *s, const struct plan *p);
 /* It is being read from the spool, to go on. */
-bool jobs_is_read(const struct jobs *s, uint64_t job);
-/* -EDQUOT: the owner has too much already. job: 0, or one that is there already; uploading: bytes of scenes that are on
+bool jobs_is_read(const struct jobs *s, uint64_t id);
+/* -EDQUOT: the owner has too much already. id: 0, or one that is there already; uploading: bytes of scenes that are on
  * their way. */
-int jobs_within_quota(const struct jobs *s, const char *owner, uint64_t job, uint64_t uploading,
-		      const struct plan *plan, const Farm__Submit *m, struct error *e);
+int jobs_within_quota(const struct jobs *s, const char *owner, uint64_t id, uint64_t uploading, const struct plan *plan,
+		      const Farm__Submit *m, struct error *e);
 
 #endif

@@ -9,13 +9,13 @@
 
 #include "coordinator/job/live_job.h"
 
-int late_add(struct live_job *o, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
+int late_add(struct live_job *job, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
 /* Those of that (group, part) from this epoch on do not count any more. */
-void late_forget(struct live_job *o, const struct lease_key *k);
-void late_sort(struct live_job *o); /* as they can count */
-void late_remove(struct live_job *o, size_t i);
+void late_forget(struct live_job *job, const struct lease_key *k);
+void late_sort(struct live_job *job); /* as they can count */
+void late_remove(struct live_job *job, size_t i);
 /* The core gives a lease to this worker: true: its result is here and will count soon, the worker need not be told.
  */
-bool late_withholds(struct live_job *o, const struct lease_key *k, uint64_t peer);
+bool late_withholds(struct live_job *job, const struct lease_key *k, uint64_t peer);
 
 #endif

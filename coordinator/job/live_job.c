@@ -24,9 +24,9 @@
 
 static const uint64_t log_most = 16 << 20;
 
-const Farm__Submit *live_job_submit(const struct live_job *o)
+const Farm__Submit *live_job_submit(const struct live_job *job)
 {
-	return o->submit.message->submit;
+	return job->submit.message->submit;
 }
 
 static json_t *effects_to_json(const Farm__Submit *m)
@@ -39,23 +39,23 @@ static json_t *effects_to_json(const Farm__Submit *m)
 	return list;
 }
 
-static void begin_record(struct live_job *o, const char *owner, double submitted)
+static void begin_record(struct live_job *job, const char *owner, double submitted)
 {
-	const Farm__Submit *m = live_job_submit(o);
-	struct job_record *r = &o->record;
+	const Farm__Submit *m = live_job_submit(job);
+	struct job_record *r = &job->record;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
-	r->id = o->id;
+	r->id = job->id;
 	text_copy(r->name, sizeof r->name, m->name);
-	text_copy(r->integrator, sizeof r->integrator, o->plan.integrator);
-	text_copy(r->mixture, sizeof r->mixture, o->plan.mutations);
+	text_copy(r->integrator, sizeof r->integrator, job->plan.integrator);
+	text_copy(r->mixture, sizeof r->mixture, job->plan.mutations);
 	text_copy(r->state, sizeof r->state, "queued");
 	text_copy(r->output, sizeof r->output, m->output);
 	r->priority = m->priority;
 	r->rel_error = -1;
 	record_begin_convergence(r);
 	record_take_effects(r, effects_to_json(m));
-	r->target_error = o->plan.target_error;
+	r->target_error = job->plan.target_error;
 	r->submitted = submitted > 0 ? submitted : (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	text_copy(r->owner, sizeof r->owner, owner);
 }
@@ -63,73 +63,73 @@ static void begin_record(struct live_job *o, const char *owner, double submitted
 int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, const struct plan *plan,
 		 const char *owner, double submitted, struct spool *s, struct error *e)
 {
-	struct live_job *o = mem_alloc(1, sizeof *o);
-	if (!o)
+	struct live_job *job = mem_alloc(1, sizeof *job);
+	if (!job)
 		return error_set(e, ENOMEM, "no memory for a job");
-	o->id = id;
-	o->log = -1;
-	o->plan = *plan;
-	o->submit = *submit;
+	job->id = id;
+	job->log = -1;
+	job->plan = *plan;
+	job->submit = *submit;
 	memset(submit, 0, sizeof *submit);
-	o->waiting_last = &o->waiting;
-	o->times = (struct live_job_times){NAN, NAN, NAN};
-	begin_record(o, owner, submitted);
-	o->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->states);
-	o->makers = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->makers);
-	o->again = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->again);
+	job->waiting_last = &job->waiting;
+	job->times = (struct live_job_times){NAN, NAN, NAN};
+	begin_record(job, owner, submitted);
+	job->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->states);
+	job->makers = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->makers);
+	job->again = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->again);
 	if (plan->kind == PLAN_CHAINS) {
-		o->chains_per_lease = plan->chains / (plan->groups * plan->parts);
-		o->seeds = mem_alloc(plan->chains, sizeof *o->seeds);
+		job->chains_per_lease = plan->chains / (plan->groups * plan->parts);
+		job->seeds = mem_alloc(plan->chains, sizeof *job->seeds);
 	}
 	int rc = 0;
-	if (!o->states || !o->makers || !o->again || (plan->kind == PLAN_CHAINS && !o->seeds))
+	if (!job->states || !job->makers || !job->again || (plan->kind == PLAN_CHAINS && !job->seeds))
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
-		rc = bootstrap_new(&o->bootstrap, plan, e);
+		rc = bootstrap_new(&job->bootstrap, plan, e);
 	if (!rc && !(submitted > 0)) /* else it is there; a full disk must not keep the job from being known */
-		rc = spool_write_record(s, &o->record, e);
+		rc = spool_write_record(s, &job->record, e);
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, "log", path);
-	o->log = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-	if (!rc && o->log < 0)
+	job->log = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+	if (!rc && job->log < 0)
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
 	struct stat st;
-	if (!rc && disk_fstat(o->log, &st) == 0)
-		o->log_bytes = (uint64_t)st.st_size;
+	if (!rc && disk_fstat(job->log, &st) == 0)
+		job->log_bytes = (uint64_t)st.st_size;
 	if (rc) {
-		*submit = o->submit;
-		memset(&o->submit, 0, sizeof o->submit);
-		live_job_free(o);
+		*submit = job->submit;
+		memset(&job->submit, 0, sizeof job->submit);
+		live_job_free(job);
 		return rc;
 	}
-	*out = o;
+	*out = job;
 	return 0;
 }
 
-void live_job_free(struct live_job *o)
+void live_job_free(struct live_job *job)
 {
-	assert(!o->busy);
-	for (struct waiting_batch *w; (w = live_job_take_waiting(o));)
+	assert(!job->busy);
+	for (struct waiting_batch *w; (w = live_job_take_waiting(job));)
 		waiting_batch_free(w);
-	for (uint32_t i = 0; o->states && i < o->plan.groups * o->plan.parts; i++)
-		states_fini(o->states[i], o->chains_per_lease);
-	mem_free(o->states);
-	mem_free(o->makers);
-	mem_free(o->again);
-	mem_free(o->merged);
-	mem_free(o->seeds);
-	mem_free(o->credits);
-	mem_free(o->late);
-	bootstrap_free(o->bootstrap);
-	canvas_free(o->canvas);
-	if (o->log >= 0)
-		disk_close(o->log);
-	journal_release(o->journal);
-	envelope_fini(&o->submit);
-	mem_free(o);
+	for (uint32_t i = 0; job->states && i < job->plan.groups * job->plan.parts; i++)
+		states_fini(job->states[i], job->chains_per_lease);
+	mem_free(job->states);
+	mem_free(job->makers);
+	mem_free(job->again);
+	mem_free(job->merged);
+	mem_free(job->seeds);
+	mem_free(job->credits);
+	mem_free(job->late);
+	bootstrap_free(job->bootstrap);
+	canvas_free(job->canvas);
+	if (job->log >= 0)
+		disk_close(job->log);
+	journal_release(job->journal);
+	envelope_fini(&job->submit);
+	mem_free(job);
 }
 
-void live_job_log(struct live_job *o, enum log_event event, const char *fields, ...)
+void live_job_log(struct live_job *job, enum log_event event, const char *fields, ...)
 {
 	enum { TEXT = 1800 };
 	char text[TEXT], line[TEXT + 200];
@@ -138,109 +138,110 @@ void live_job_log(struct live_job *o, enum log_event event, const char *fields, 
 	vsnprintf(text, sizeof text, fields, ap);
 	va_end(ap);
 	text_clean(text);
-	log_event(event, "job=j%llu %s", (unsigned long long)o->id, text);
+	log_event(event, "job=j%llu %s", (unsigned long long)job->id, text);
 	log_format(line, sizeof line - 1, event, text);
 	size_t size = strlen(line);
 	line[size++] = '\n';
-	if (o->log_bytes >= log_most)
+	if (job->log_bytes >= log_most)
 		return;
-	o->log_bytes += size;
-	if (o->log_bytes >= log_most)
+	job->log_bytes += size;
+	if (job->log_bytes >= log_most)
 		size = (size_t)snprintf(line, sizeof line,
 					"the log of this job is full: the coordinator's has the rest\n");
-	int rc = disk_write_all(o->log, line, size); /* the log of all jobs has the line, too */
+	int rc = disk_write_all(job->log, line, size); /* the log of all jobs has the line, too */
 	(void)rc;
 }
 
 /* ---- merging ---- */
 
-static struct chain_state **states_at(const struct live_job *o, const struct lease_key *k)
+static struct chain_state **states_at(const struct live_job *job, const struct lease_key *k)
 {
-	return &o->states[(size_t)k->group * o->plan.parts + k->part];
+	return &job->states[(size_t)k->group * job->plan.parts + k->part];
 }
 
-int live_job_merge(struct live_job *o, struct batch *b, struct error *e)
+int live_job_merge(struct live_job *job, struct batch *b, struct error *e)
 {
-	o->cpu_seconds += b->cpu_seconds;
-	o->record.cpu_seconds = o->cpu_seconds;
+	job->cpu_seconds += b->cpu_seconds;
+	job->record.cpu_seconds = job->cpu_seconds;
 	if (b->key.kind == LEASE_BOOTSTRAP)
-		o->record.bootstrap_cpu_seconds = o->cpu_seconds;
+		job->record.bootstrap_cpu_seconds = job->cpu_seconds;
 	if (b->key.kind == LEASE_BOOTSTRAP)
-		return bootstrap_add(o->bootstrap, b, e);
-	int rc = canvas_add(o->canvas, b, e);
-	if (!rc && o->plan.kind == PLAN_CHAINS) {
-		struct chain_state **at = states_at(o, &b->key);
-		states_fini(*at, o->chains_per_lease);
+		return bootstrap_add(job->bootstrap, b, e);
+	int rc = canvas_add(job->canvas, b, e);
+	if (!rc && job->plan.kind == PLAN_CHAINS) {
+		struct chain_state **at = states_at(job, &b->key);
+		states_fini(*at, job->chains_per_lease);
 		*at = b->states;
 		b->states = NULL;
 		b->state_count = 0;
-		o->again[at - o->states] = false;
+		job->again[at - job->states] = false;
 	}
 	return rc;
 }
 
-uint64_t live_job_rounds(const struct live_job *o)
+uint64_t live_job_rounds(const struct live_job *job)
 {
-	return o->canvas ? canvas_rounds(o->canvas) : 0;
+	return job->canvas ? canvas_rounds(job->canvas) : 0;
 }
 
-void live_job_note_times(struct live_job *o, double elapsed, uint64_t rounds)
+void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds)
 {
 	if (!isfinite(elapsed))
 		return;
-	o->times.elapsed = elapsed;
-	if (!o->canvas)
-		o->times.opened = elapsed; /* the last batch of the bootstrap stays */
-	if (live_job_rounds(o) > rounds)
-		o->times.completed = elapsed;
+	job->times.elapsed = elapsed;
+	if (!job->canvas)
+		job->times.opened = elapsed; /* the last batch of the bootstrap stays */
+	if (live_job_rounds(job) > rounds)
+		job->times.completed = elapsed;
 }
 
-int live_job_prepare(struct live_job *o, const char *canvas_folder, struct error *e)
+int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e)
 {
-	bootstrap_merge(o->bootstrap, &o->lit);
-	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, live_job_submit(o)->brightest);
-	int rc = canvas_new(&o->canvas, &o->plan, exponent, canvas_folder, e);
+	bootstrap_merge(job->bootstrap, &job->lit);
+	int exponent = canvas_grid_exponent(&job->plan, job->lit.b_pooled, live_job_submit(job)->brightest);
+	int rc = canvas_new(&job->canvas, &job->plan, exponent, canvas_folder, e);
 	if (rc)
 		return rc;
-	bootstrap_to_canvas(o->bootstrap, o->canvas);
-	uint32_t per_group = o->plan.kind == PLAN_CHAINS ? o->plan.chains / o->plan.groups : 0;
-	for (uint32_t g = 0; o->seeds && g < o->plan.groups; g++)
-		bootstrap_seeds(o->bootstrap, g, o->seeds + (size_t)g * per_group);
-	bootstrap_free(o->bootstrap);
-	o->bootstrap = NULL;
+	bootstrap_to_canvas(job->bootstrap, job->canvas);
+	uint32_t per_group = job->plan.kind == PLAN_CHAINS ? job->plan.chains / job->plan.groups : 0;
+	for (uint32_t g = 0; job->seeds && g < job->plan.groups; g++)
+		bootstrap_seeds(job->bootstrap, g, job->seeds + (size_t)g * per_group);
+	bootstrap_free(job->bootstrap);
+	job->bootstrap = NULL;
 	return 0;
 }
 
-int live_job_pack_lease(const struct live_job *o, const struct lease_key *k, bool anew, unsigned char **frame,
+int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool anew, unsigned char **frame,
 			size_t *size, struct error *e)
 {
-	if (k->kind == LEASE_BOOTSTRAP || o->plan.kind != PLAN_CHAINS)
+	if (k->kind == LEASE_BOOTSTRAP || job->plan.kind != PLAN_CHAINS)
 		return grant_pack(k, NULL, NULL, 0, frame, size, e);
 	if (k->epoch > 0 && !anew)
-		return grant_pack(k, NULL, *states_at(o, k), o->chains_per_lease, frame, size, e);
-	struct plan_range r = plan_chain_range(&o->plan, k->part);
-	assert(r.end - r.begin == o->chains_per_lease);
-	const uint64_t *seeds = o->seeds + (size_t)k->group * (o->plan.chains / o->plan.groups) + r.begin;
-	return grant_pack(k, seeds, NULL, o->chains_per_lease, frame, size, e);
+		return grant_pack(k, NULL, *states_at(job, k), job->chains_per_lease, frame, size, e);
+	struct plan_range r = plan_chain_range(&job->plan, k->part);
+	assert(r.end - r.begin == job->chains_per_lease);
+	const uint64_t *seeds = job->seeds + (size_t)k->group * (job->plan.chains / job->plan.groups) + r.begin;
+	return grant_pack(k, seeds, NULL, job->chains_per_lease, frame, size, e);
 }
 
-bool live_job_gives_states(const struct live_job *o, const struct lease_key *k, const struct blob_hash *digest)
+bool live_job_gives_states(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest)
 {
 	struct blob_hash own;
 	struct error e;
-	bool begins_with_states = k->kind == LEASE_RENDER && o->plan.kind == PLAN_CHAINS && k->group < o->plan.groups &&
-				  k->part < o->plan.parts && k->epoch > 0 && *states_at(o, k);
-	return begins_with_states && states_digest(*states_at(o, k), o->chains_per_lease, &own, &e) == 0 &&
+	bool begins_with_states = k->kind == LEASE_RENDER && job->plan.kind == PLAN_CHAINS &&
+				  k->group < job->plan.groups && k->part < job->plan.parts && k->epoch > 0 &&
+				  *states_at(job, k);
+	return begins_with_states && states_digest(*states_at(job, k), job->chains_per_lease, &own, &e) == 0 &&
 	       blob_hash_equal(&own, digest);
 }
 
-void live_job_count_worker(struct live_job *o, uint64_t peer)
+void live_job_count_worker(struct live_job *job, uint64_t peer)
 {
-	enum { KNOWN = sizeof o->last_workers / sizeof *o->last_workers };
+	enum { KNOWN = sizeof job->last_workers / sizeof *job->last_workers };
 	for (uint32_t i = 0; i < KNOWN; i++)
-		if (o->last_workers[i] == peer)
+		if (job->last_workers[i] == peer)
 			return;
-	o->last_workers[o->worker_count++ % KNOWN] = peer;
+	job->last_workers[job->worker_count++ % KNOWN] = peer;
 }
 
 /* ---- results that wait ---- */
@@ -250,7 +251,7 @@ static size_t waiting_size(const struct waiting_batch *w)
 	return sizeof *w + w->envelope.used + w->payload.capacity;
 }
 
-bool live_job_put_off(struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env,
+bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
 		      struct buf *payload)
 {
 	struct waiting_batch *w = mem_alloc(1, sizeof *w);
@@ -259,23 +260,23 @@ bool live_job_put_off(struct live_job *o, uint64_t peer, const struct lease_key 
 	*w = (struct waiting_batch){NULL, peer, *k, *env, *payload};
 	memset(env, 0, sizeof *env);
 	memset(payload, 0, sizeof *payload);
-	*o->waiting_last = w;
-	o->waiting_last = &w->next;
-	o->waiting_bytes += waiting_size(w);
+	*job->waiting_last = w;
+	job->waiting_last = &w->next;
+	job->waiting_bytes += waiting_size(w);
 	return true;
 }
 
-const struct waiting_batch *live_job_waits_for(const struct live_job *o, const struct lease_key *k)
+const struct waiting_batch *live_job_waits_for(const struct live_job *job, const struct lease_key *k)
 {
-	const struct waiting_batch *w = o->waiting;
+	const struct waiting_batch *w = job->waiting;
 	while (w && !lease_key_equal(&w->key, k))
 		w = w->next;
 	return w;
 }
 
-static void drop_waiting(struct live_job *o, uint64_t peer)
+static void drop_waiting(struct live_job *job, uint64_t peer)
 {
-	struct waiting_batch **at = &o->waiting;
+	struct waiting_batch **at = &job->waiting;
 	while (*at) {
 		struct waiting_batch *w = *at;
 		if (w->peer != peer) {
@@ -283,27 +284,27 @@ static void drop_waiting(struct live_job *o, uint64_t peer)
 			continue;
 		}
 		*at = w->next;
-		o->waiting_bytes -= waiting_size(w);
+		job->waiting_bytes -= waiting_size(w);
 		waiting_batch_free(w);
 	}
-	o->waiting_last = at;
+	job->waiting_last = at;
 }
 
-void orders_drop_waiting(struct live_job *first, uint64_t peer)
+void live_jobs_drop_waiting(struct live_job *first, uint64_t peer)
 {
-	for (struct live_job *o = first; o; o = o->next)
-		drop_waiting(o, peer);
+	for (struct live_job *job = first; job; job = job->next)
+		drop_waiting(job, peer);
 }
 
-struct waiting_batch *live_job_take_waiting(struct live_job *o)
+struct waiting_batch *live_job_take_waiting(struct live_job *job)
 {
-	struct waiting_batch *w = o->waiting;
+	struct waiting_batch *w = job->waiting;
 	if (!w)
 		return NULL;
-	o->waiting = w->next;
-	if (!o->waiting)
-		o->waiting_last = &o->waiting;
-	o->waiting_bytes -= waiting_size(w);
+	job->waiting = w->next;
+	if (!job->waiting)
+		job->waiting_last = &job->waiting;
+	job->waiting_bytes -= waiting_size(w);
 	return w;
 }
 

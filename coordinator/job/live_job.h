@@ -32,7 +32,7 @@ enum publish_what {
 struct publishing { /* one of a live job at a time */
 	uv_work_t work;
 	struct jobs *jobs;
-	struct live_job *order;
+	struct live_job *job;
 	enum publish_what what;
 	uint64_t rounds;
 	double wall_seconds;
@@ -140,37 +140,37 @@ struct live_job {
 
 /* Takes the submission, writes a record if it is new. The job's folder is there; owner as in the record; submitted: s
  * since 1970, of a job of an earlier run; 0: now. */
-int live_job_new(struct live_job **o, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
-		 double submitted, struct spool *s, struct error *e);
+int live_job_new(struct live_job **job, uint64_t id, struct envelope *submit, const struct plan *plan,
+		 const char *owner, double submitted, struct spool *s, struct error *e);
 /* Frees the memory; blobs and files stay. Not while busy. */
-void live_job_free(struct live_job *o);
+void live_job_free(struct live_job *job);
 
-const Farm__Submit *live_job_submit(const struct live_job *o);
-__attribute__((format(printf, 3, 4))) void live_job_log(struct live_job *o, enum log_event event, const char *fields,
+const Farm__Submit *live_job_submit(const struct live_job *job);
+__attribute__((format(printf, 3, 4))) void live_job_log(struct live_job *job, enum log_event event, const char *fields,
 							...);
 
 /* A batch that the core has accepted. Takes its states out of it. */
-int live_job_merge(struct live_job *o, struct batch *b, struct error *e);
+int live_job_merge(struct live_job *job, struct batch *b, struct error *e);
 /* So many seconds after the first lease the batch was merged, and what comes of it done. rounds: complete before. */
-void live_job_note_times(struct live_job *o, double elapsed, uint64_t rounds);
-uint64_t live_job_rounds(const struct live_job *o); /* complete */
+void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds);
+uint64_t live_job_rounds(const struct live_job *job); /* complete */
 /* All bootstrap batches are in: b, seeds, canvas. */
-int live_job_prepare(struct live_job *o, const char *canvas_folder, struct error *e);
+int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e);
 /* A lease begins with chain states, those of the epoch before, and they are those of this digest. */
-bool live_job_gives_states(const struct live_job *o, const struct lease_key *k, const struct blob_hash *digest);
+bool live_job_gives_states(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest);
 /* The lease as a frame for a worker. anew: with seeds, whatever its epoch. */
-int live_job_pack_lease(const struct live_job *o, const struct lease_key *k, bool anew, unsigned char **frame,
+int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool anew, unsigned char **frame,
 			size_t *size, struct error *e);
-void live_job_count_worker(struct live_job *o, uint64_t peer);
+void live_job_count_worker(struct live_job *job, uint64_t peer);
 
 /* Takes both. false: memory is out. */
-bool live_job_put_off(struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env,
+bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
 		      struct buf *payload);
-const struct waiting_batch *live_job_waits_for(const struct live_job *o,
+const struct waiting_batch *live_job_waits_for(const struct live_job *job,
 					       const struct lease_key *k); /* NULL: no result of that lease */
-struct waiting_batch *live_job_take_waiting(struct live_job *o);	   /* NULL: none */
+struct waiting_batch *live_job_take_waiting(struct live_job *job);	   /* NULL: none */
 /* The results of a worker that has gone, of these live jobs. */
-void orders_drop_waiting(struct live_job *first, uint64_t peer);
+void live_jobs_drop_waiting(struct live_job *first, uint64_t peer);
 void waiting_batch_free(struct waiting_batch *w);
 
 /* Lets go of the bundle's blobs. */

@@ -17,7 +17,7 @@ struct peer_calls {
 	const char *(*name)(void *user, uint64_t peer); /* as it calls itself; NULL: it has gone */
 
 	/* To a worker. send_lease: anew: with seeds, whatever the epoch. */
-	void (*send_lease)(void *user, uint64_t peer, const struct live_job *o, const struct lease_key *k, bool anew);
+	void (*send_lease)(void *user, uint64_t peer, const struct live_job *job, const struct lease_key *k, bool anew);
 	void (*revoke)(void *user, uint64_t peer, const struct lease_key *k);
 	void (*acknowledge)(void *user, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text);
 

@@ -27,7 +27,7 @@
 enum { DAMAGED_MOST = 16 /* leases that are named */ };
 
 struct replay {
-	struct live_job *order;
+	struct live_job *job;
 	struct replay_progress *progress; /* NULL: nobody looks */
 	double elapsed;
 	uint64_t batches;
@@ -37,30 +37,31 @@ struct replay {
 
 /* ---- the journal */
 
-enum replay_place replay_place(const struct live_job *o, const struct lease_key *k)
+enum replay_place replay_place(const struct live_job *job, const struct lease_key *k)
 {
 	if (k->kind == LEASE_BOOTSTRAP)
-		return o->bootstrap && !bootstrap_has(o->bootstrap, k->group, k->part) ? REPLAY_FITS : REPLAY_MERGED;
-	if (o->bootstrap)
+		return job->bootstrap && !bootstrap_has(job->bootstrap, k->group, k->part) ? REPLAY_FITS
+											   : REPLAY_MERGED;
+	if (job->bootstrap)
 		return REPLAY_LATE;
-	if (canvas_has(o->canvas, k))
+	if (canvas_has(job->canvas, k))
 		return REPLAY_MERGED;
 	struct lease_key before = *k;
 	before.epoch--;
-	bool open = k->epoch <= canvas_rounds(o->canvas) + 1;
-	return open && (k->epoch == 0 || canvas_has(o->canvas, &before)) ? REPLAY_FITS : REPLAY_LATE;
+	bool open = k->epoch <= canvas_rounds(job->canvas) + 1;
+	return open && (k->epoch == 0 || canvas_has(job->canvas, &before)) ? REPLAY_FITS : REPLAY_LATE;
 }
 
 static int merge(struct replay *r, struct batch *b, struct error *e)
 {
-	struct live_job *o = r->order;
-	uint64_t rounds = live_job_rounds(o);
-	int rc = live_job_merge(o, b, e);
+	struct live_job *job = r->job;
+	uint64_t rounds = live_job_rounds(job);
+	int rc = live_job_merge(job, b, e);
 	if (rc == -EEXIST || rc == -EAGAIN) /* of the films, not of the machine */
 		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
-	live_job_note_times(o, r->elapsed, rounds);
-	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
-		rc = live_job_prepare(o, o->film_folder, e);
+	live_job_note_times(job, r->elapsed, rounds);
+	if (!rc && job->bootstrap && bootstrap_missing(job->bootstrap) == 0)
+		rc = live_job_prepare(job, job->film_folder, e);
 	r->batches++;
 	return rc;
 }
@@ -71,14 +72,14 @@ static int strange(const struct replay *r, const char *what, size_t size, struct
 	return error_set(
 		e, EPROTO,
 		"the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
-		(unsigned long long)r->order->id, what, size);
+		(unsigned long long)r->job->id, what, size);
 }
 
 /* The same of a look or of counters; e says what of it. */
 static int strange_note(const struct replay *r, int rc, struct error *e)
 {
 	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another coordinator wrote it",
-					    (unsigned long long)r->order->id)
+					    (unsigned long long)r->job->id)
 			     : rc;
 }
 
@@ -92,25 +93,25 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 				     &payload_size, e);
 	if (rc)
 		return rc == -EBADMSG ? strange(r, "a result", item->size, e) : rc;
-	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);
+	rc = batch_unpack(&batch, &r->job->plan, env.message->lease_result, payload, payload_size, e);
 	if (rc == -EBADMSG)
 		rc = strange(r, "a result", item->size, e);
 	if (!rc && item->kind == JOURNAL_AGAIN)
-		rc = back_replay(r->order, item->journal, &batch.key, e);
+		rc = back_replay(r->job, item->journal, &batch.key, e);
 	if (!rc && item->kind == JOURNAL_KEPT) {
-		r->order->kept_bytes += item->size;
-		back_note(r->order, &batch.key, item->at, env.message->lease_result->maker);
+		r->job->kept_bytes += item->size;
+		back_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
 		batch_fini(&batch);
 		envelope_fini(&env);
 		return 0;
 	}
-	enum replay_place place = rc ? REPLAY_MERGED : replay_place(r->order, &batch.key);
+	enum replay_place place = rc ? REPLAY_MERGED : replay_place(r->job, &batch.key);
 	if (place == REPLAY_FITS)
 		rc = merge(r, &batch, e);
 	if (place == REPLAY_FITS && !rc)
-		back_note(r->order, &batch.key, item->at, env.message->lease_result->maker);
+		back_note(r->job, &batch.key, item->at, env.message->lease_result->maker);
 	else if (place == REPLAY_LATE)
-		rc = late_add(r->order, &batch.key, item->at, e);
+		rc = late_add(r->job, &batch.key, item->at, e);
 	batch_fini(&batch);
 	envelope_fini(&env);
 	return rc;
@@ -134,7 +135,7 @@ static int go_on(void *user, size_t bytes, struct error *e)
 static int take_record(void *user, const struct journal_item *item, struct error *e)
 {
 	struct replay *r = user;
-	struct live_job *o = r->order;
+	struct live_job *job = r->job;
 	struct forecast_look look;
 	const unsigned char *body = item->body;
 	size_t size = item->size;
@@ -143,7 +144,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		return rc;
 	if (item->missing) {
 		note_damage(r, item);
-		return item->kind == JOURNAL_AGAIN ? back_replay(o, item->journal, &item->lease, e) : 0;
+		return item->kind == JOURNAL_AGAIN ? back_replay(job, item->journal, &item->lease, e) : 0;
 	}
 	r->elapsed = item->elapsed;
 	switch (item->kind) {
@@ -152,22 +153,22 @@ static int take_record(void *user, const struct journal_item *item, struct error
 	case JOURNAL_KEPT:
 		return take_batch(r, item, e);
 	case JOURNAL_PINNED:
-		if (size >= sizeof o->fingerprint)
+		if (size >= sizeof job->fingerprint)
 			return strange(r, "a fingerprint", size, e);
-		memcpy(o->fingerprint, body, size);
-		o->fingerprint[size] = 0;
+		memcpy(job->fingerprint, body, size);
+		job->fingerprint[size] = 0;
 		return 0;
 	case JOURNAL_LOOK:
 	case JOURNAL_OLD_LOOK:
 		rc = (item->kind == JOURNAL_LOOK ? stored_unpack_look : stored_old_look)(body, size, &look, e);
 		if (rc)
 			return strange_note(r, rc, e);
-		forecast_add_look(&o->record.looks, &look);
-		o->look_written = look.work;
+		forecast_add_look(&job->record.looks, &look);
+		job->look_written = look.work;
 		return 0;
 	case JOURNAL_COUNTS:
 	case JOURNAL_OLD_COUNTS:
-		rc = (item->kind == JOURNAL_COUNTS ? stored_unpack_counts : stored_old_counts)(body, size, &o->counts,
+		rc = (item->kind == JOURNAL_COUNTS ? stored_unpack_counts : stored_old_counts)(body, size, &job->counts,
 											       e);
 		return rc ? strange_note(r, rc, e) : 0;
 	default:
@@ -178,46 +179,46 @@ static int take_record(void *user, const struct journal_item *item, struct error
 /* Those that waited for others behind them in the file. */
 static int take_late(struct replay *r, struct error *e)
 {
-	struct live_job *o = r->order;
+	struct live_job *job = r->job;
 	size_t kept = 0;
 	int rc = 0;
-	late_sort(o);
-	for (size_t i = 0; i < o->late_count; i++) {
-		struct late_result l = o->late[i];
+	late_sort(job);
+	for (size_t i = 0; i < job->late_count; i++) {
+		struct late_result l = job->late[i];
 		struct journal_item item = {.kind = JOURNAL_BATCH, .at = l.at};
 		unsigned char *body = NULL;
-		enum replay_place place = rc ? REPLAY_LATE : replay_place(o, &l.key);
-		if (place == REPLAY_FITS && (rc = journal_body(o->journal, l.at, &body, &item.size, e)) == 0) {
+		enum replay_place place = rc ? REPLAY_LATE : replay_place(job, &l.key);
+		if (place == REPLAY_FITS && (rc = journal_body(job->journal, l.at, &body, &item.size, e)) == 0) {
 			item.body = body;
 			rc = take_batch(r, &item, e);
 			mem_free(body);
 		}
 		if (place == REPLAY_LATE)
-			o->late[kept++] = l;
+			job->late[kept++] = l;
 	}
-	o->late_count = kept;
+	job->late_count = kept;
 	return rc;
 }
 
 /* Which of the damaged ones are computed again; those that have been since then are there. */
 static void say_damage(const struct replay *r, const struct journal_found *found)
 {
-	struct live_job *o = r->order;
+	struct live_job *job = r->job;
 	char text[400] = "";
 	struct text t = {text, sizeof text};
 	uint64_t open = 0;
 	for (size_t i = 0; i < r->damaged_count; i++) {
 		const struct lease_key *k = &r->damaged[i];
-		if (replay_place(o, k) == REPLAY_MERGED)
+		if (replay_place(job, k) == REPLAY_MERGED)
 			continue;
 		text_put(&t, "%s%s group %u part %u epoch %llu", open++ ? ", " : ": ",
 			 k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part,
 			 (unsigned long long)k->epoch);
 	}
 	live_job_log(
-		o, LOG_SPOOL_FAULT,
+		job, LOG_SPOOL_FAULT,
 		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
-		(unsigned long long)found->damaged, o->late_count, (unsigned long long)found->lost,
+		(unsigned long long)found->damaged, job->late_count, (unsigned long long)found->lost,
 		*text ? text : ": none any more");
 }
 
@@ -241,35 +242,35 @@ uint64_t replay_bytes(const struct spool *spool, uint64_t job)
 	return sum;
 }
 
-int replay_films(const struct spool *spool, struct live_job *o, struct replay_progress *p, struct error *e)
+int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e)
 {
-	struct replay r = {.order = o, .progress = p};
+	struct replay r = {.job = job, .progress = p};
 	struct journal_found found;
 	char folder[SPOOL_PATH_MAX];
 	uint64_t generation = 0;
-	spool_job_path(spool, o->id, NULL, folder);
-	int rc = checkpoint_load(spool, o, &generation, go_on, &r, e);
+	spool_job_path(spool, job->id, NULL, folder);
+	int rc = checkpoint_load(spool, job, &generation, go_on, &r, e);
 	if (rc && rc != -ENOENT)
 		return rc;
-	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &found, e);
+	rc = journal_open(&job->journal, folder, job->id, generation, take_record, &r, &found, e);
 	if (rc == -ENOENT) { /* its batches can be made again */
-		live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
+		live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
 			     folder, (unsigned long long)generation);
-		rc = journal_create(&o->journal, folder, o->id, generation, e);
+		rc = journal_create(&job->journal, folder, job->id, generation, e);
 	}
-	if (!rc && o->late_count)
+	if (!rc && job->late_count)
 		rc = take_late(&r, e);
 	if (rc)
 		return rc;
 	if (found.lost)
 		say_damage(&r, &found);
 	journal_clear(folder, generation);
-	o->pinned = *o->fingerprint != 0;
+	job->pinned = *job->fingerprint != 0;
 	live_job_log(
-		o, LOG_JOB_STATE,
+		job, LOG_JOB_STATE,
 		"state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
-		(unsigned long long)r.batches, (unsigned long long)live_job_rounds(o), o->times.elapsed,
-		(unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal),
+		(unsigned long long)r.batches, (unsigned long long)live_job_rounds(job), job->times.elapsed,
+		(unsigned long long)job->checkpoint_bytes, (unsigned long long)journal_bytes(job->journal),
 		(unsigned long long)found.cut, (unsigned long long)found.damaged);
 	return 0;
 }

@@ -22,10 +22,10 @@ uint64_t replay_bytes(const struct spool *spool, uint64_t job);
 
 /* A second and more. By any thread while nobody else has the live job. When it fails (-EBADMSG: something of it is
  * damaged or gone; -EPROTO: of another version) the live job is of no use but to be dropped. p: NULL: nobody looks. */
-int replay_films(const struct spool *spool, struct live_job *o, struct replay_progress *p, struct error *e);
+int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e);
 
 /* Whether a result can be merged now. */
 enum replay_place { REPLAY_FITS, REPLAY_MERGED /* it is */, REPLAY_LATE /* something is missing before it */ };
-enum replay_place replay_place(const struct live_job *o, const struct lease_key *k);
+enum replay_place replay_place(const struct live_job *job, const struct lease_key *k);
 
 #endif

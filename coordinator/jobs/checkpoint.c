@@ -30,7 +30,7 @@ static const double pause_seconds = 30; /* after one that could not be written *
 struct writing {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct live_job *order;
+	struct live_job *job;
 	struct journal *journal; /* the one that follows */
 	struct checkpoint_head head;
 	uint64_t bytes, kept_most;
@@ -51,11 +51,11 @@ static void run(uv_work_t *work)
 	snprintf(temporary, sizeof temporary, "%s/checkpoint.tmp", w->folder);
 	w->rc = journal_create(&w->journal, w->folder, w->head.job, w->head.generation, &w->error);
 	if (!w->rc)
-		back_copy(w->order, w->journal, w->kept_most, &w->merged, &w->merged_count, &w->merged_capacity);
+		back_copy(w->job, w->journal, w->kept_most, &w->merged, &w->merged_count, &w->merged_capacity);
 	if (!w->rc)
 		w->rc = checked_file_create(&out, temporary, &w->error);
 	if (!w->rc)
-		w->rc = checkpoint_write(w->order, &w->head, &out, &w->error);
+		w->rc = checkpoint_write(w->job, &w->head, &out, &w->error);
 	if (!w->rc)
 		w->rc = checked_file_finish(&out, &w->error);
 	checked_file_close(&out);
@@ -120,40 +120,41 @@ static void done(uv_work_t *work, int status)
 {
 	struct writing *w = work->data;
 	struct jobs *s = w->jobs;
-	struct live_job *o = w->order;
-	uint64_t id = o->id;
+	struct live_job *job = w->job;
+	uint64_t id = job->id;
 	assert(status == 0);
 	(void)status;
-	if (w->rc && (w->unsure ||
-		      o->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
-		o->unsure = true;
-		o->generation_least = w->head.generation + 1;
-		o->checkpoint_after = jobs_now(s) + s->config.retry_seconds;
+	if (w->rc &&
+	    (w->unsure ||
+	     job->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
+		job->unsure = true;
+		job->generation_least = w->head.generation + 1;
+		job->checkpoint_after = jobs_now(s) + s->config.retry_seconds;
 	} else if (w->rc) { /* the old ones go on */
-		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-		o->checkpoint_after = jobs_now(s) + pause_seconds;
-		journal_clear(w->folder, journal_generation(o->journal));
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		job->checkpoint_after = jobs_now(s) + pause_seconds;
+		journal_clear(w->folder, journal_generation(job->journal));
 	} else {
-		o->unsure = false;
-		journal_settle(o->journal);
+		job->unsure = false;
+		journal_settle(job->journal);
 		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
-			  (unsigned long long)canvas_rounds(o->canvas), (unsigned long long)w->bytes,
-			  (unsigned long long)journal_bytes(o->journal));
-		tidy(s, o->journal, w->folder, w->head.generation);
-		o->journal = w->journal;
-		o->checkpoint_bytes = w->bytes;
-		mem_free(o->merged);
-		o->merged = w->merged;
-		o->merged_count = w->merged_count;
-		o->kept_bytes = journal_bytes(o->journal);
-		o->merged_capacity = w->merged ? w->merged_capacity : 0;
+			  (unsigned long long)canvas_rounds(job->canvas), (unsigned long long)w->bytes,
+			  (unsigned long long)journal_bytes(job->journal));
+		tidy(s, job->journal, w->folder, w->head.generation);
+		job->journal = w->journal;
+		job->checkpoint_bytes = w->bytes;
+		mem_free(job->merged);
+		job->merged = w->merged;
+		job->merged_count = w->merged_count;
+		job->kept_bytes = journal_bytes(job->journal);
+		job->merged_capacity = w->merged ? w->merged_capacity : 0;
 		w->merged = NULL;
 	}
 	mem_free(w->merged);
-	o->busy = false;
+	job->busy = false;
 	s->checkpointing = s->checkpointing && !w->rc;
-	if (!s->stopping && o->unsure)
-		durable_hold(s, o, "its results cannot be stored",
+	if (!s->stopping && job->unsure)
+		durable_hold(s, job, "its results cannot be stored",
 			     w->error.text); /* which is the end of it, if it was cancelled */
 	if (!s->stopping) {
 		jobs_films_free(s);
@@ -163,27 +164,27 @@ static void done(uv_work_t *work, int status)
 }
 
 /* Of a journal. */
-static uint64_t limit_of(const struct jobs *s, const struct live_job *o)
+static uint64_t limit_of(const struct jobs *s, const struct live_job *job)
 {
-	return o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
+	return job->checkpoint_bytes > s->config.journal_bytes ? job->checkpoint_bytes : s->config.journal_bytes;
 }
 
-static void start(struct jobs *s, struct live_job *o)
+static void start(struct jobs *s, struct live_job *job)
 {
 	struct job_status status;
 	struct writing *w = mem_alloc(1, sizeof *w);
-	if (!w || !farm_job(s->farm, o->id, jobs_now(s), &status)) {
+	if (!w || !farm_job(s->farm, job->id, jobs_now(s), &status)) {
 		mem_free(w);
-		o->checkpoint_after = jobs_now(s) + pause_seconds;
+		job->checkpoint_after = jobs_now(s) + pause_seconds;
 		return;
 	}
 	w->jobs = s;
-	w->order = o;
+	w->job = job;
 	w->work.data = w;
-	w->kept_most = limit_of(s, o);
-	spool_job_path(s->spool, o->id, NULL, w->folder);
-	checkpoint_head_of(&w->head, o, &status);
-	o->busy = s->checkpointing = true;
+	w->kept_most = limit_of(s, job);
+	spool_job_path(s->spool, job->id, NULL, w->folder);
+	checkpoint_head_of(&w->head, job, &status);
+	job->busy = s->checkpointing = true;
 	int rc = uv_queue_work(s->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
@@ -194,15 +195,15 @@ void checkpoint_where_due(struct jobs *s)
 	if (s->stepping || s->stopping ||
 	    s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
-	for (struct live_job *o = s->orders; o; o = o->next) {
-		if (!o->canvas || o->busy || o->ended || o->late_count) /* what waits is in the journal alone */
+	for (struct live_job *job = s->live; job; job = job->next) {
+		if (!job->canvas || job->busy || job->ended || job->late_count) /* what waits is in the journal alone */
 			continue;
-		if (canvas_missing(o->canvas)) /* what was taken back is computed at this time */
+		if (canvas_missing(job->canvas)) /* what was taken back is computed at this time */
 			continue;
-		uint64_t limit = limit_of(s, o);
-		if ((journal_bytes(o->journal) - o->kept_bytes > limit || o->unsure) &&
-		    jobs_now(s) >= o->checkpoint_after)
-			start(s, o);
+		uint64_t limit = limit_of(s, job);
+		if ((journal_bytes(job->journal) - job->kept_bytes > limit || job->unsure) &&
+		    jobs_now(s) >= job->checkpoint_after)
+			start(s, job);
 		if (s->checkpointing)
 			return;
 	}

@@ -34,33 +34,34 @@
 
 static void submitted(struct jobs *s, const struct action *a, struct submission *from)
 {
-	struct live_job *o;
+	struct live_job *job;
 	struct error e;
 	const Farm__Submit *m = from->submit->message->submit;
 	from->job = a->job;
 	int rc = spool_take_job(s->spool, a->job, &e);
 	if (!rc)
-		rc = live_job_new(&o, a->job, from->submit, from->plan, from->owner, 0, s->spool, &e);
-	if (!rc && (rc = durable_begin(s, o, &e))) {
-		*from->submit = o->submit;
-		memset(&o->submit, 0, sizeof o->submit);
-		live_job_free(o);
+		rc = live_job_new(&job, a->job, from->submit, from->plan, from->owner, 0, s->spool, &e);
+	if (!rc && (rc = durable_begin(s, job, &e))) {
+		*from->submit = job->submit;
+		memset(&job->submit, 0, sizeof job->submit);
+		live_job_free(job);
 	}
 	if (rc) {
 		text_copy(from->refusal, sizeof from->refusal, e.text);
 		jobs_break(s, a->job, e.text);
 		return;
 	}
-	o->next = s->orders;
-	s->orders = o;
+	job->next = s->live;
+	s->live = job;
 	char plan[PLAN_TEXT];
-	plan_describe(&o->plan, plan, sizeof plan);
-	live_job_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text,
-		     from->address, *from->owner ? from->owner : "-", log_quote(plan).text, log_quote(from->rule).text);
+	plan_describe(&job->plan, plan, sizeof plan);
+	live_job_log(job, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s",
+		     log_quote(job->record.name).text, from->address, *from->owner ? from->owner : "-",
+		     log_quote(plan).text, log_quote(from->rule).text);
 	for (size_t i = 0; i < m->n_notes; i++)
-		live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
+		live_job_log(job, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
 	for (size_t i = 0; i < m->n_effects; i++)
-		live_job_log(o, LOG_JOB_NOTE, "effect=%s on=%d why=%s", log_quote(m->effects[i]->name).text,
+		live_job_log(job, LOG_JOB_NOTE, "effect=%s on=%d why=%s", log_quote(m->effects[i]->name).text,
 			     (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
 }
 
@@ -72,38 +73,38 @@ static void rejected(struct jobs *s, const struct action *a)
 
 static void job_changed(struct jobs *s, const struct action *a)
 {
-	struct live_job *o = jobs_find(s, a->job);
-	if (!o)
+	struct live_job *job = jobs_find(s, a->job);
+	if (!job)
 		return;
-	live_job_log(o,
+	live_job_log(job,
 		     a->state == JOB_FAILED ? LOG_JOB_FAILED
 		     : a->state == JOB_DONE ? LOG_JOB_DONE
 					    : LOG_JOB_STATE,
 		     "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
 		     a->end == END_NONE ? "none" : job_end_name(a->end), log_u64(a->rounds), log_quote(a->text).text);
-	o->ended = job_state_is_end(a->state);
+	job->ended = job_state_is_end(a->state);
 }
 
-void dispatch_prepare(struct jobs *s, struct live_job *o)
+void dispatch_prepare(struct jobs *s, struct live_job *job)
 {
 	struct error e = {""};
-	int rc = live_job_prepare(o, jobs_film_folder(s, &o->plan), &e);
+	int rc = live_job_prepare(job, jobs_film_folder(s, &job->plan), &e);
 	if (rc && rc != -ENOMEM) {
-		if (!o->unprepared)
-			live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
+		if (!job->unprepared)
+			live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
 				     log_quote(e.text).text);
-		o->unprepared = true;
-		o->try_again = jobs_now(s) + s->config.retry_seconds;
+		job->unprepared = true;
+		job->try_again = jobs_now(s) + s->config.retry_seconds;
 		return;
 	}
-	o->unprepared = false;
+	job->unprepared = false;
 	if (!rc)
-		live_job_log(o, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", o->lit.b_pooled,
-			     o->lit.beyond_share, (int)o->lit.black);
+		live_job_log(job, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", job->lit.b_pooled,
+			     job->lit.beyond_share, (int)job->lit.black);
 	struct event ev = {.kind = EVENT_PREPARED,
-			   .job = o->id,
+			   .job = job->id,
 			   .text = e.text,
-			   .prepared = {.job = o->id, .ok = rc == 0, .black = o->lit.black}};
+			   .prepared = {.job = job->id, .ok = rc == 0, .black = job->lit.black}};
 	jobs_defer(s, &ev);
 }
 
@@ -129,28 +130,28 @@ static void keep_partials(const struct jobs *s, const struct lease_key *k, const
 
 static void merge(struct jobs *s, const struct action *a, const struct incoming *in)
 {
-	struct live_job *o = jobs_find(s, a->job);
+	struct live_job *job = jobs_find(s, a->job);
 	struct error e;
-	assert(o && in->batch && !o->busy);
+	assert(job && in->batch && !job->busy);
 	if (s->config.keep_partials)
 		keep_partials(s, &a->key, in);
-	uint64_t rounds = live_job_rounds(o);
+	uint64_t rounds = live_job_rounds(job);
 	uint64_t at = in->stored_at;
-	int rc = in->stored ? 0 : durable_merged(s, o, in, &at, &e);
+	int rc = in->stored ? 0 : durable_merged(s, job, in, &at, &e);
 	if (!rc)
-		rc = live_job_merge(o, in->batch, &e);
+		rc = live_job_merge(job, in->batch, &e);
 	if (!rc)
-		back_note(o, &a->key, at, in->result->maker);
+		back_note(job, &a->key, at, in->result->maker);
 	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
 		log_event(LOG_STOP,
 			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
 	}
-	o->overflowed = o->overflowed || rc == -ERANGE;
+	job->overflowed = job->overflowed || rc == -ERANGE;
 	if (rc)
 		jobs_break(s, a->job, e.text);
-	trust_merged(o, a);
-	live_job_note_times(o, farm_elapsed(s->farm, a->job, jobs_now(s)), rounds);
+	trust_merged(job, a);
+	live_job_note_times(job, farm_elapsed(s->farm, a->job, jobs_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch),
 		  in->stored ? " late=1" : "");
@@ -158,20 +159,20 @@ static void merge(struct jobs *s, const struct action *a, const struct incoming 
 
 static void take_back(struct jobs *s, const struct action *a, const struct incoming *in)
 {
-	struct live_job *o = jobs_find(s, a->job);
-	assert(o && !o->busy && in->back);
-	back_take(o, in->back);
-	trust_taken_back(o, a->who);
-	live_job_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind,
+	struct live_job *job = jobs_find(s, a->job);
+	assert(job && !job->busy && in->back);
+	back_take(job, in->back);
+	trust_taken_back(job, a->who);
+	live_job_log(job, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind,
 		     a->key.group, a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
 }
 
 static void acknowledge(struct jobs *s, const struct action *a)
 {
-	const struct live_job *o = jobs_find(s, a->job);
+	const struct live_job *job = jobs_find(s, a->job);
 	const char *name = s->peers.name(s->peers.user, a->peer);
-	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && o)) /* what it repeats may not be on the disk yet */
-		durable_ack(s, o, a->peer, &a->key, a->ack);
+	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* what it repeats may not be on the disk yet */
+		durable_ack(s, job, a->peer, &a->key, a->ack);
 	else
 		s->peers.acknowledge(s->peers.user, a->peer, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
@@ -187,11 +188,11 @@ static void acknowledge(struct jobs *s, const struct action *a)
 
 static void send_lease(struct jobs *s, const struct action *a)
 {
-	struct live_job *o = jobs_find(s, a->job);
-	if (!s->peers.name(s->peers.user, a->peer) || !o || late_withholds(o, &a->key, a->peer))
+	struct live_job *job = jobs_find(s, a->job);
+	if (!s->peers.name(s->peers.user, a->peer) || !job || late_withholds(job, &a->key, a->peer))
 		return;
-	live_job_count_worker(o, a->peer);
-	s->peers.send_lease(s->peers.user, a->peer, o, &a->key, a->anew);
+	live_job_count_worker(job, a->peer);
+	s->peers.send_lease(s->peers.user, a->peer, job, &a->key, a->anew);
 	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
 }
@@ -205,7 +206,7 @@ static void revoke_lease(struct jobs *s, const struct action *a)
 
 static void close_peer(struct jobs *s, const struct action *a)
 {
-	orders_drop_waiting(s->orders, a->peer); /* it may come back, with the same */
+	live_jobs_drop_waiting(s->live, a->peer); /* it may come back, with the same */
 	s->peers.dismiss(s->peers.user, a->peer, a->text);
 }
 

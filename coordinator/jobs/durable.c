@@ -56,61 +56,61 @@ struct flush {
 
 /* ---- jobs ---- */
 
-static int pack_plan(const struct live_job *o, unsigned char **frame, size_t *size, struct error *e)
+static int pack_plan(const struct live_job *job, unsigned char **frame, size_t *size, struct error *e)
 {
 	Farm__JobInfo info;
 	Farm__Plan plan;
 	Farm__Envelope m;
 	farm__job_info__init(&info);
 	farm__envelope__init(&m);
-	plan_to_wire(&o->plan, &plan);
-	info.job = o->id;
+	plan_to_wire(&job->plan, &plan);
+	info.job = job->id;
 	info.plan = &plan;
 	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
 	m.job_info = &info;
 	return envelope_pack(&m, NULL, 0, frame, size, e);
 }
 
-int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
+int durable_pack(const struct live_job *job, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
 		 struct error *e)
 {
 	*submission = *plan = NULL;
-	int rc = envelope_pack(o->submit.message, NULL, 0, submission, &j->submission_size, e);
+	int rc = envelope_pack(job->submit.message, NULL, 0, submission, &j->submission_size, e);
 	if (!rc)
-		rc = pack_plan(o, plan, &j->plan_size, e);
+		rc = pack_plan(job, plan, &j->plan_size, e);
 	j->submission = *submission;
 	j->plan = *plan;
 	return rc;
 }
 
-int durable_begin(struct jobs *s, struct live_job *o, struct error *e)
+int durable_begin(struct jobs *s, struct live_job *job, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission, *plan;
-	struct ledger_job j = {.id = o->id,
-			       .owner = o->record.owner,
-			       .name = o->record.name,
+	struct ledger_job j = {.id = job->id,
+			       .owner = job->record.owner,
+			       .name = job->record.name,
 			       .version = HSLT_VERSION,
-			       .priority = o->record.priority,
-			       .mixed = live_job_submit(o)->mixed,
-			       .submitted = o->record.submitted};
-	spool_job_path(s->spool, o->id, NULL, folder);
-	int rc = durable_pack(o, &j, &submission, &plan, e);
+			       .priority = job->record.priority,
+			       .mixed = live_job_submit(job)->mixed,
+			       .submitted = job->record.submitted};
+	spool_job_path(s->spool, job->id, NULL, folder);
+	int rc = durable_pack(job, &j, &submission, &plan, e);
 	if (!rc)
-		rc = journal_create(&o->journal, folder, o->id, 0, e);
+		rc = journal_create(&job->journal, folder, job->id, 0, e);
 	if (!rc)
 		rc = ledger_add(s->ledger, &j, e);
 	if (!rc) { /* after the row: without one it says that the row was lost */
 		j.held = "";
 		rc = row_file_write(s->spool, &j, e);
 		if (rc)
-			ledger_end(s->ledger, o->id, 0, "failed", NULL);
+			ledger_end(s->ledger, job->id, 0, "failed", NULL);
 	}
 	if (rc) { /* should the row be there all the same: nobody waits for the job */
-		text_copy(o->record.state, sizeof o->record.state, "failed");
-		text_copy(o->record.why, sizeof o->record.why, e ? e->text : "");
-		o->record.exit_code = 3;
-		spool_write_record(s->spool, &o->record, NULL);
+		text_copy(job->record.state, sizeof job->record.state, "failed");
+		text_copy(job->record.why, sizeof job->record.why, e ? e->text : "");
+		job->record.exit_code = 3;
+		spool_write_record(s->spool, &job->record, NULL);
 	}
 	mem_free(submission);
 	mem_free(plan);
@@ -152,26 +152,26 @@ void durable_end_row(struct jobs *s, const struct job_record *r)
 	end_later(s, r, true);
 }
 
-int durable_end(struct jobs *s, struct live_job *o)
+int durable_end(struct jobs *s, struct live_job *job)
 {
 	struct error e;
-	if (journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
-		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	int rc = write_end(s, &o->record, keep_order(s, o), &e);
+	if (journal_write(job->journal, &e)) /* for whoever extends it; what is not stored is computed again */
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	int rc = write_end(s, &job->record, keep_order(s, job), &e);
 	if (rc)
-		live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
-	if (rc && o->record.has_result) {
-		text_copy(o->record.why, sizeof o->record.why, e.text);
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+	if (rc && job->record.has_result) {
+		text_copy(job->record.why, sizeof job->record.why, e.text);
 		return rc;
 	}
 	if (rc) {
-		end_later(s, &o->record, false);
+		end_later(s, &job->record, false);
 	} else {
-		durable_end_row(s, &o->record);
-		journal_settle(o->journal); /* the record says more than what still waits for a flush */
+		durable_end_row(s, &job->record);
+		journal_settle(job->journal); /* the record says more than what still waits for a flush */
 	}
-	journal_release(o->journal); /* with its last holder it gives up its room, too */
-	o->journal = NULL;
+	journal_release(job->journal); /* with its last holder it gives up its room, too */
+	job->journal = NULL;
 	return 0;
 }
 
@@ -193,25 +193,25 @@ static void end_again(struct jobs *s)
 
 /* ---- batches ---- */
 
-static void hold(struct jobs *s, struct live_job *o, const char *text)
+static void hold(struct jobs *s, struct live_job *job, const char *text)
 {
-	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .text = text};
-	if (!*text != !o->held) {
-		live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
-		o->held = *text != 0;
+	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .text = text};
+	if (!*text != !job->held) {
+		live_job_log(job, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+		job->held = *text != 0;
 	}
-	o->try_again = jobs_now(s) + s->config.retry_seconds;
+	job->try_again = jobs_now(s) + s->config.retry_seconds;
 	jobs_step(s, &ev);
 }
 
-void durable_hold(struct jobs *s, struct live_job *o, const char *what, const char *why)
+void durable_hold(struct jobs *s, struct live_job *job, const char *what, const char *why)
 {
 	char text[256];
 	text_print(text, sizeof text, "%s: %s", what, why);
-	hold(s, o, text);
+	hold(s, job, text);
 }
 
-int durable_reserve(struct jobs *s, struct live_job *o, struct incoming *in, struct error *e)
+int durable_reserve(struct jobs *s, struct live_job *job, struct incoming *in, struct error *e)
 {
 	union {
 		const Farm__LeaseResult *from;
@@ -221,46 +221,46 @@ int durable_reserve(struct jobs *s, struct live_job *o, struct incoming *in, str
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
 	m.lease_result = result.to;
-	if (o->unsure)
+	if (job->unsure)
 		return error_set(e, EIO, "the job's files cannot be written");
 	int rc = envelope_pack(&m, NULL, 0, &in->frame, &in->frame_size, e);
 	if (rc)
 		return rc;
 	size_t size = in->frame_size + in->payload->size;
 	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
-	rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
+	rc = journal_reserve(job->journal, size + PINNED_ROOM, e);
 	if (rc == -ENOSPC && keep_drop_all(s))
-		rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
-	if (!rc && o->canvas && in->batch->key.kind == LEASE_RENDER)
-		rc = canvas_reserve(o->canvas, in->batch, e);
+		rc = journal_reserve(job->journal, size + PINNED_ROOM, e);
+	if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
+		rc = canvas_reserve(job->canvas, in->batch, e);
 	if (!rc)
 		return 0;
-	o->held_bytes = size;
-	durable_hold(s, o, "its results cannot be stored", e->text);
+	job->held_bytes = size;
+	durable_hold(s, job, "its results cannot be stored", e->text);
 	return rc;
 }
 
 /* Whose it is, once, before its first batch. */
-static int write_pinned(struct jobs *s, struct live_job *o, double elapsed, struct error *e)
+static int write_pinned(struct jobs *s, struct live_job *job, double elapsed, struct error *e)
 {
 	struct job_status status;
-	if (o->pinned || !farm_job(s->farm, o->id, jobs_now(s), &status) || !*status.fingerprint)
+	if (job->pinned || !farm_job(s->farm, job->id, jobs_now(s), &status) || !*status.fingerprint)
 		return 0;
-	o->pinned = true;
-	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint),
-			      NULL, e);
+	job->pinned = true;
+	return journal_append(job->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint,
+			      strlen(status.fingerprint), NULL, e);
 }
 
-int durable_merged(struct jobs *s, struct live_job *o, const struct incoming *in, uint64_t *at, struct error *e)
+int durable_merged(struct jobs *s, struct live_job *job, const struct incoming *in, uint64_t *at, struct error *e)
 {
 	const struct lease_key *k = &in->batch->key;
-	bool again = k->kind == LEASE_RENDER && o->again[(size_t)k->group * o->plan.parts + k->part];
-	double elapsed = farm_elapsed(s->farm, o->id, jobs_now(s));
+	bool again = k->kind == LEASE_RENDER && job->again[(size_t)k->group * job->plan.parts + k->part];
+	double elapsed = farm_elapsed(s->farm, job->id, jobs_now(s));
 	assert(in->frame);
-	int rc = write_pinned(s, o, elapsed, e);
-	*at = journal_bytes(o->journal);
+	int rc = write_pinned(s, job, elapsed, e);
+	*at = journal_bytes(job->journal);
 	return rc ? rc
-		  : journal_append(o->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, in->frame,
+		  : journal_append(job->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, in->frame,
 				   in->frame_size, in->payload, e);
 }
 
@@ -295,19 +295,19 @@ static void queue(struct jobs *s, struct durable_ack *a)
 /* It waits until the journal is a good one again. */
 static void park(struct jobs *s, struct durable_ack *a)
 {
-	struct live_job *o = s->stopping ? NULL : jobs_find(s, a->key.job);
-	if (!o) {
+	struct live_job *job = s->stopping ? NULL : jobs_find(s, a->key.job);
+	if (!job) {
 		drop_ack(a);
 		return;
 	}
-	if (a->journal != o->journal) { /* which is settled by now */
+	if (a->journal != job->journal) { /* which is settled by now */
 		queue(s, a);
 		return;
 	}
 	a->next = s->parked;
 	s->parked = a;
-	if (!o->held)
-		durable_hold(s, o, "its results cannot be stored", "its journal failed to be written");
+	if (!job->held)
+		durable_hold(s, job, "its results cannot be stored", "its journal failed to be written");
 }
 
 static void answer(struct jobs *s, struct durable_ack *a)
@@ -359,12 +359,12 @@ static void flush_next(struct jobs *s)
 	(void)rc;
 }
 
-void durable_ack(struct jobs *s, const struct live_job *o, uint64_t peer, const struct lease_key *k, enum ack ack)
+void durable_ack(struct jobs *s, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
 	if (!a) /* not answered: the worker offers it again, and it is a repeat */
 		return;
-	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = o->journal};
+	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = job->journal};
 	journal_hold(a->journal);
 	queue(s, a);
 	flush_next(s);
@@ -373,44 +373,45 @@ void durable_ack(struct jobs *s, const struct live_job *o, uint64_t peer, const 
 /* ---- the rest ---- */
 
 /* What nobody waits for: it need not be safe at once, but soon. */
-static int append_note(struct jobs *s, const struct live_job *o, enum journal_kind kind, double elapsed,
+static int append_note(struct jobs *s, const struct live_job *job, enum journal_kind kind, double elapsed,
 		       const void *bytes, size_t size, struct error *e)
 {
-	int rc = journal_append(o->journal, kind, NULL, elapsed, bytes, size, NULL, e);
+	int rc = journal_append(job->journal, kind, NULL, elapsed, bytes, size, NULL, e);
 	if (!rc)
-		durable_ack(s, o, NOBODY, &(struct lease_key){.job = o->id}, ACK_REPEAT);
+		durable_ack(s, job, NOBODY, &(struct lease_key){.job = job->id}, ACK_REPEAT);
 	return rc;
 }
 
-void durable_look(struct jobs *s, uint64_t job)
+void durable_look(struct jobs *s, uint64_t id)
 {
-	struct live_job *o = jobs_find(s, job);
+	struct live_job *job = jobs_find(s, id);
 	struct job_status status;
 	struct error e;
-	if (!o || !farm_job(s->farm, job, jobs_now(s), &status) || status.looks->count == 0)
+	if (!job || !farm_job(s->farm, id, jobs_now(s), &status) || status.looks->count == 0)
 		return;
 	const struct forecast_look *l = &status.looks->looks[status.looks->count - 1];
-	if (l->work <= o->look_written)
+	if (l->work <= job->look_written)
 		return;
-	o->look_written = l->work;
+	job->look_written = l->work;
 	/* Only forecasts are made of it: the look itself is taken again. */
 	unsigned char note[STORED_NOTE_MOST];
 	size_t size = stored_pack_look(l, note);
-	if (append_note(s, o, JOURNAL_LOOK, farm_elapsed(s->farm, job, jobs_now(s)), note, size, &e))
-		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
+	if (append_note(s, job, JOURNAL_LOOK, farm_elapsed(s->farm, id, jobs_now(s)), note, size, &e))
+		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(e.text).text);
 }
 
 /* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and
  * takes the journal's place. */
-static void write_counts(struct jobs *s, struct live_job *o)
+static void write_counts(struct jobs *s, struct live_job *job)
 {
 	struct job_counts now;
 	struct error e;
-	if (o->ended || o->busy || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
+	if (job->ended || job->busy || !farm_counts(s->farm, job->id, &now) ||
+	    memcmp(&now, &job->counts, sizeof now) == 0)
 		return;
 	unsigned char note[STORED_NOTE_MOST];
-	if (append_note(s, o, JOURNAL_COUNTS, o->times.elapsed, note, stored_pack_counts(&now, note), &e) == 0)
-		o->counts = now;
+	if (append_note(s, job, JOURNAL_COUNTS, job->times.elapsed, note, stored_pack_counts(&now, note), &e) == 0)
+		job->counts = now;
 }
 
 /* The answers that waited for the journals of jobs that are no longer bad. */
@@ -419,11 +420,11 @@ static void unpark(struct jobs *s)
 	struct durable_ack *list = s->parked;
 	s->parked = NULL;
 	for (struct durable_ack *a, *next = list; (a = next);) {
-		struct live_job *o = jobs_find(s, a->key.job);
+		struct live_job *job = jobs_find(s, a->key.job);
 		next = a->next;
-		if (!o) {
+		if (!job) {
 			drop_ack(a);
-		} else if (a->journal == o->journal && journal_is_bad(a->journal)) {
+		} else if (a->journal == job->journal && journal_is_bad(a->journal)) {
 			a->next = s->parked;
 			s->parked = a;
 		} else {
@@ -433,26 +434,26 @@ static void unpark(struct jobs *s)
 	flush_next(s);
 }
 
-int durable_mend(struct jobs *s, struct live_job *o)
+int durable_mend(struct jobs *s, struct live_job *job)
 {
 	struct error e;
-	o->try_again = jobs_now(s) + s->config.retry_seconds;
-	if (o->unsure)
+	job->try_again = jobs_now(s) + s->config.retry_seconds;
+	if (job->unsure)
 		return -EAGAIN;
-	int rc = journal_is_bad(o->journal) ? journal_renew(o->journal, &e) : 0;
+	int rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
 	if (rc && rc != -EAGAIN)
-		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	if (!rc)
-		rc = journal_reserve(o->journal, 2 * o->held_bytes, &e);
+		rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
 	if (!rc)
-		hold(s, o, "");
+		hold(s, job, "");
 	return rc;
 }
 
 void durable_tick(struct jobs *s)
 {
-	for (struct live_job *o = s->orders; o; o = o->next)
-		write_counts(s, o);
+	for (struct live_job *job = s->live; job; job = job->next)
+		write_counts(s, job);
 	if (s->parked)
 		unpark(s);
 	end_again(s);

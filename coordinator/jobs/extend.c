@@ -34,99 +34,101 @@ static double error_of(const struct forecast_history *h)
 	return h->count && !h->looks[h->count - 1].doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
 }
 
-static struct extension_from where(const struct live_job *o, double seconds, bool ended)
+static struct extension_from where(const struct live_job *job, double seconds, bool ended)
 {
-	return (struct extension_from){
-		.rounds = live_job_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
+	return (struct extension_from){.rounds = live_job_rounds(job),
+				       .seconds = seconds,
+				       .error = error_of(&job->record.looks),
+				       .ended = ended};
 }
 
-static int plan_of(const struct jobs *s, const struct requester *by, const struct live_job *o,
+static int plan_of(const struct jobs *s, const struct requester *by, const struct live_job *job,
 		   const struct extension *x, const struct extension_from *from, struct plan_request *asked,
 		   struct plan *plan, struct error *e)
 {
-	int rc = plan_request_from_wire(live_job_submit(o)->plan, asked, e);
+	int rc = plan_request_from_wire(live_job_submit(job)->plan, asked, e);
 	if (!rc)
-		rc = extend_plan(&o->plan, x, from, asked, plan, e);
+		rc = extend_plan(&job->plan, x, from, asked, plan, e);
 	if (rc || by->unbounded)
 		return rc;
-	return jobs_within_quota(s, by->owner, o->id, s->peers.uploading(s->peers.user, by->peer), plan,
-				 live_job_submit(o), e);
+	return jobs_within_quota(s, by->owner, job->id, s->peers.uploading(s->peers.user, by->peer), plan,
+				 live_job_submit(job), e);
 }
 
-static void set_bounds(struct live_job *o, const struct plan_request *asked, const struct plan *plan)
+static void set_bounds(struct live_job *job, const struct plan_request *asked, const struct plan *plan)
 {
-	Farm__PlanRequest *r = o->submit.message->submit->plan;
+	Farm__PlanRequest *r = job->submit.message->submit->plan;
 	r->spp = asked->spp;
 	r->mutations = asked->mutations;
 	r->seconds = asked->seconds;
 	r->target_error = asked->target_error;
-	o->plan = *plan;
-	o->record.target_error = plan->target_error;
-	if (o->canvas)
-		canvas_set_rounds(o->canvas, plan->rounds);
+	job->plan = *plan;
+	job->record.target_error = plan->target_error;
+	if (job->canvas)
+		canvas_set_rounds(job->canvas, plan->rounds);
 }
 
-static int store(struct jobs *s, const struct live_job *o, struct error *e)
+static int store(struct jobs *s, const struct live_job *job, struct error *e)
 {
-	struct ledger_job j = {.id = o->id, .extended = o->record.extended};
+	struct ledger_job j = {.id = job->id, .extended = job->record.extended};
 	unsigned char *submission, *plan;
-	int rc = durable_pack(o, &j, &submission, &plan, e);
+	int rc = durable_pack(job, &j, &submission, &plan, e);
 	if (!rc)
 		rc = ledger_extend(s->ledger, &j, e);
 	if (!rc)
-		reconcile_row(s, o->id);
+		reconcile_row(s, job->id);
 	mem_free(submission);
 	mem_free(plan);
 	return rc;
 }
 
 /* The bounds that the job has now, for its log and for the client. */
-static void describe(const struct live_job *o, char *text, size_t size)
+static void describe(const struct live_job *job, char *text, size_t size)
 {
 	struct text t = {text, size};
 	const char *comma = "";
-	text_put(&t, "after %llu rounds it goes on until", (unsigned long long)live_job_rounds(o));
-	if (o->plan.rounds != UINT64_MAX) {
-		text_put(&t, " %llu are done", (unsigned long long)o->plan.rounds);
+	text_put(&t, "after %llu rounds it goes on until", (unsigned long long)live_job_rounds(job));
+	if (job->plan.rounds != UINT64_MAX) {
+		text_put(&t, " %llu are done", (unsigned long long)job->plan.rounds);
 		comma = " or";
 	}
-	if (o->plan.seconds > 0) {
-		text_put(&t, "%s %.3g s are over", comma, o->plan.seconds);
+	if (job->plan.seconds > 0) {
+		text_put(&t, "%s %.3g s are over", comma, job->plan.seconds);
 		comma = " or";
 	}
-	if (o->plan.target_error > 0)
-		text_put(&t, "%s its error is %.3g %%", comma, 100 * o->plan.target_error);
+	if (job->plan.target_error > 0)
+		text_put(&t, "%s its error is %.3g %%", comma, 100 * job->plan.target_error);
 }
 
-static void note(const struct requester *by, struct live_job *o, char *text, size_t size)
+static void note(const struct requester *by, struct live_job *job, char *text, size_t size)
 {
-	describe(o, text, size);
-	live_job_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *by->owner ? by->owner : "-",
+	describe(job, text, size);
+	live_job_log(job, LOG_JOB_STATE, "state=extended by=%s text=%s", *by->owner ? by->owner : "-",
 		     log_quote(text).text);
 }
 
 /* ---- a job that runs ---- */
 
-static int extend_live(struct jobs *s, const struct requester *by, struct live_job *o, const struct extension *x,
+static int extend_live(struct jobs *s, const struct requester *by, struct live_job *job, const struct extension *x,
 		       char *text, size_t size, struct error *e)
 {
 	struct plan_request asked, old_asked;
-	struct plan plan, old = o->plan;
-	double seconds = farm_elapsed(s->farm, o->id, jobs_now(s));
-	struct extension_from from = where(o, isnan(seconds) ? 0 : seconds, false);
-	int rc = plan_request_from_wire(live_job_submit(o)->plan, &old_asked, e);
+	struct plan plan, old = job->plan;
+	double seconds = farm_elapsed(s->farm, job->id, jobs_now(s));
+	struct extension_from from = where(job, isnan(seconds) ? 0 : seconds, false);
+	int rc = plan_request_from_wire(live_job_submit(job)->plan, &old_asked, e);
 	if (!rc)
-		rc = plan_of(s, by, o, x, &from, &asked, &plan, e);
+		rc = plan_of(s, by, job, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;
-	set_bounds(o, &asked, &plan);
-	rc = store(s, o, e);
+	set_bounds(job, &asked, &plan);
+	rc = store(s, job, e);
 	if (rc) {
-		set_bounds(o, &old_asked, &old);
+		set_bounds(job, &old_asked, &old);
 		return rc;
 	}
-	note(by, o, text, size);
-	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = o->id, .plan = &o->plan};
+	note(by, job, text, size);
+	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = job->id, .plan = &job->plan};
 	jobs_step(s, &ev);
 	return 0;
 }
@@ -155,46 +157,46 @@ static void take_counts(struct job_counts *c, const struct job_record *r)
 }
 
 /* r: as it was remembered. */
-static int begin_again(struct jobs *s, const struct requester *by, struct live_job *o, const struct job_record *r,
+static int begin_again(struct jobs *s, const struct requester *by, struct live_job *job, const struct job_record *r,
 		       struct error *e)
 {
-	o->record.extended++;
-	int rc = store(s, o, e);
+	job->record.extended++;
+	int rc = store(s, job, e);
 	if (rc)
 		return rc;
-	o->record.has_result = r->has_result;
-	take_counts(&o->counts, r);
-	o->next = s->orders;
-	s->orders = o;
-	ended_jobs_remove(s, o->id);
+	job->record.has_result = r->has_result;
+	take_counts(&job->counts, r);
+	job->next = s->live;
+	s->live = job;
+	ended_jobs_remove(s, job->id);
 	s->refusal[0] = 0;
-	rc = restore_tell(s, o, "", by->peer, e);
+	rc = restore_tell(s, job, "", by->peer, e);
 	if (!rc && !*s->refusal)
 		return 0;
 	if (!rc)
 		rc = error_set(e, EAGAIN, "%s", s->refusal);
-	s->orders = o->next;
+	s->live = job->next;
 	ended_jobs_add(s, r);
 	struct job_record over = *r;
-	over.extended = o->record.extended;
+	over.extended = job->record.extended;
 	durable_end_row(s, &over);
 	return rc;
 }
 
-static int extend_read(struct jobs *s, const struct requester *by, struct live_job *o, const struct extension *x,
+static int extend_read(struct jobs *s, const struct requester *by, struct live_job *job, const struct extension *x,
 		       const struct job_record *r, char *text, size_t size, struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
-	if (live_job_rounds(o) == 0)
+	if (live_job_rounds(job) == 0)
 		return error_set(e, ENOENT, "its films have been cleared: %s", again);
-	struct extension_from from = where(o, isnan(o->times.completed) ? 0 : o->times.completed, true);
-	int rc = plan_of(s, by, o, x, &from, &asked, &plan, e);
+	struct extension_from from = where(job, isnan(job->times.completed) ? 0 : job->times.completed, true);
+	int rc = plan_of(s, by, job, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;
-	set_bounds(o, &asked, &plan);
-	note(by, o, text, size);
-	return begin_again(s, by, o, r, e);
+	set_bounds(job, &asked, &plan);
+	note(by, job, text, size);
+	return begin_again(s, by, job, r, e);
 }
 
 struct extension_request {
@@ -215,7 +217,7 @@ struct reading {
 	struct requester by; /* who may have gone meanwhile */
 	struct extension what;
 	struct job_record record; /* of its end */
-	struct live_job *order;
+	struct live_job *job;
 	int rc;
 	struct error error;
 };
@@ -223,9 +225,9 @@ struct reading {
 static void run(uv_work_t *work)
 {
 	struct reading *w = work->data;
-	w->rc = replay_films(w->jobs->spool, w->order, NULL, &w->error);
+	w->rc = replay_films(w->jobs->spool, w->job, NULL, &w->error);
 	if (!w->rc) /* results from before its end may still wait for a flush of the old file */
-		w->rc = journal_renew(w->order->journal, &w->error);
+		w->rc = journal_renew(w->job->journal, &w->error);
 }
 
 static void done(uv_work_t *work, int status)
@@ -239,12 +241,12 @@ static void done(uv_work_t *work, int status)
 	s->reading = NULL;
 	s->reading_for = 0;
 	if (w->rc)
-		live_job_log(w->order, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		live_job_log(w->job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : here ? 0 : -ECANCELED;
 	if (!rc)
-		rc = extend_read(s, &w->by, w->order, &w->what, &w->record, text, sizeof text, &w->error);
+		rc = extend_read(s, &w->by, w->job, &w->what, &w->record, text, sizeof text, &w->error);
 	if (rc)
-		restore_drop(s, w->order);
+		restore_drop(s, w->job);
 	if (here)
 		answer(s, w->by.peer, rc, &w->error, text);
 	mem_free(w);
@@ -253,12 +255,12 @@ static void done(uv_work_t *work, int status)
 }
 
 /* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
-static int ask_beforehand(const struct jobs *s, const struct requester *by, const struct live_job *o,
+static int ask_beforehand(const struct jobs *s, const struct requester *by, const struct live_job *job,
 			  const struct extension *x, const struct job_record *r, struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
-	return plan_of(s, by, o, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked,
+	return plan_of(s, by, job, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked,
 		       &plan, e);
 }
 
@@ -269,15 +271,15 @@ static int start_reading(struct jobs *s, const struct extension_request *q, cons
 	if (rc)
 		return rc;
 	struct reading *w = mem_alloc(1, sizeof *w);
-	rc = w ? restore_live_job(s, &f.job, &w->order, e) : error_set(e, ENOMEM, "no memory for a job");
+	rc = w ? restore_live_job(s, &f.job, &w->job, e) : error_set(e, ENOMEM, "no memory for a job");
 	row_file_free(&f);
 	if (rc) {
 		mem_free(w);
 		return error_prefix(e, rc, "it cannot go on, %s", again);
 	}
-	rc = ask_beforehand(s, &q->by, w->order, &q->what, r, e);
+	rc = ask_beforehand(s, &q->by, w->job, &q->what, r, e);
 	if (rc) {
-		restore_drop(s, w->order);
+		restore_drop(s, w->job);
 		mem_free(w);
 		return rc;
 	}
@@ -286,7 +288,7 @@ static int start_reading(struct jobs *s, const struct extension_request *q, cons
 	w->by = q->by;
 	w->what = q->what;
 	w->record = *r;
-	s->reading = w->order;
+	s->reading = w->job;
 	s->reading_for = q->by.peer;
 	rc = uv_queue_work(s->loop, &w->work, run, done);
 	assert(rc == 0);
@@ -306,26 +308,26 @@ static int extend_ended(struct jobs *s, const struct extension_request *q, const
 /* ---- both ---- */
 
 /* Its films are in use, or those of another job are being read. */
-static bool must_wait(const struct jobs *s, uint64_t job)
+static bool must_wait(const struct jobs *s, uint64_t id)
 {
-	const struct live_job *o = jobs_find(s, job);
-	return o ? o->busy || o->ended : s->reading != NULL;
+	const struct live_job *job = jobs_find(s, id);
+	return job ? job->busy || job->ended : s->reading != NULL;
 }
 
 static void go_on(struct jobs *s, const struct extension_request *q)
 {
-	struct live_job *o = jobs_find(s, q->what.job);
+	struct live_job *job = jobs_find(s, q->what.job);
 	struct job_view v;
 	struct error e = {""};
 	char text[256] = "";
 	int rc;
-	if (o)
-		rc = extend_live(s, &q->by, o, &q->what, text, sizeof text, &e);
+	if (job)
+		rc = extend_live(s, &q->by, job, &q->what, text, sizeof text, &e);
 	else if (!jobs_view(s, q->what.job, &v))
 		rc = error_set(&e, ENOENT, "no such job");
 	else
 		rc = extend_ended(s, q, &v.record, &e);
-	if (rc || o) /* else when it is read */
+	if (rc || job) /* else when it is read */
 		answer(s, q->by.peer, rc, &e, text);
 }
 

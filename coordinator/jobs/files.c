@@ -6,18 +6,18 @@
 
 #include <string.h>
 
-static void hold(struct jobs *s, struct live_job *o, const char *text)
+static void hold(struct jobs *s, struct live_job *job, const char *text)
 {
-	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_FILES, .text = text};
-	o->lacks_file = *text != 0;
-	live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .hold = HOLD_FILES, .text = text};
+	job->lacks_file = *text != 0;
+	live_job_log(job, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
 	jobs_step(s, &ev);
 }
 
 /* The first one that is not there; NULL: all are. */
-static const Farm__File *lacking(const struct jobs *s, const struct live_job *o)
+static const Farm__File *lacking(const struct jobs *s, const struct live_job *job)
 {
-	const Farm__Submit *m = live_job_submit(o);
+	const Farm__Submit *m = live_job_submit(job);
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
 		if (!blob_has(s->blobs, &h, NULL))
@@ -26,18 +26,18 @@ static const Farm__File *lacking(const struct jobs *s, const struct live_job *o)
 	return NULL;
 }
 
-bool files_look(struct jobs *s, struct live_job *o)
+bool files_look(struct jobs *s, struct live_job *job)
 {
 	char text[256];
-	const Farm__File *f = o->ended ? NULL : lacking(s, o);
-	if (f && !o->lacks_file) {
+	const Farm__File *f = job->ended ? NULL : lacking(s, job);
+	if (f && !job->lacks_file) {
 		text_print(
 			text, sizeof text,
 			"its file %.100s is damaged or gone in the spool: submit the scene again (hslt-submit), and it goes on",
 			f->name);
-		hold(s, o, text);
-	} else if (!f && o->lacks_file) {
-		hold(s, o, "");
+		hold(s, job, text);
+	} else if (!f && job->lacks_file) {
+		hold(s, job, "");
 	}
 	return f == NULL;
 }
@@ -49,16 +49,16 @@ int files_check(struct jobs *s, const struct blob_hash *h, double seconds, struc
 		return rc;
 	if (rc == -EBADMSG)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
-	for (struct live_job *o = s->orders, *next; o; o = next) {
-		next = o->next;
-		files_look(s, o);
+	for (struct live_job *job = s->live, *next; job; job = next) {
+		next = job->next;
+		files_look(s, job);
 	}
 	return rc;
 }
 
-bool files_are_right(struct jobs *s, struct live_job *o)
+bool files_are_right(struct jobs *s, struct live_job *job)
 {
-	const Farm__Submit *m = live_job_submit(o);
+	const Farm__Submit *m = live_job_submit(job);
 	struct error e;
 	bool right = true;
 	for (size_t i = 0; i < m->n_files; i++) {
@@ -70,7 +70,7 @@ bool files_are_right(struct jobs *s, struct live_job *o)
 
 void files_tick(struct jobs *s)
 {
-	for (struct live_job *o = s->orders; o; o = o->next)
-		if (o->lacks_file && files_look(s, o))
+	for (struct live_job *job = s->live; job; job = job->next)
+		if (job->lacks_file && files_look(s, job))
 			return; /* the list may have changed; the others next time */
 }

@@ -17,33 +17,33 @@
 
 #include <time.h>
 
-static void finish(struct jobs *s, struct live_job *o)
+static void finish(struct jobs *s, struct live_job *job)
 {
 	struct job_view v;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
-	jobs_view(s, o->id, &v);
+	jobs_view(s, job->id, &v);
 	v.record.ended_seen = ages_now(s);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-	o->record = v.record;
-	if (durable_end(s, o)) { /* again, later */
-		o->unrecorded = true;
-		o->try_again = jobs_now(s) + s->config.retry_seconds;
+	job->record = v.record;
+	if (durable_end(s, job)) { /* again, later */
+		job->unrecorded = true;
+		job->try_again = jobs_now(s) + s->config.retry_seconds;
 		return;
 	}
 	ended_jobs_add(s, &v.record);
-	s->peers.job_ended(s->peers.user, o->id);
+	s->peers.job_ended(s->peers.user, job->id);
 	keep_trim(s);
 	clear_soon(s);
-	live_job_release_blobs(live_job_submit(o), s->blobs);
-	struct live_job **at = &s->orders;
-	while (*at != o)
+	live_job_release_blobs(live_job_submit(job), s->blobs);
+	struct live_job **at = &s->live;
+	while (*at != job)
 		at = &(*at)->next;
-	*at = o->next;
-	struct waiting_batch *late = o->waiting;
-	o->waiting = NULL;
-	o->waiting_last = &o->waiting;
-	live_job_free(o);
+	*at = job->next;
+	struct waiting_batch *late = job->waiting;
+	job->waiting = NULL;
+	job->waiting_last = &job->waiting;
+	live_job_free(job);
 	while (late) { /* the core says that the job is over */
 		struct waiting_batch *next = late->next;
 		results_take(s, late->peer, &late->envelope, &late->payload);
@@ -55,12 +55,12 @@ static void finish(struct jobs *s, struct live_job *o)
 void finish_ended(struct jobs *s)
 {
 	bool finished = false;
-	for (struct live_job *o = s->orders, *next; o; o = next) {
-		next = o->next;
-		if (o->ended && !o->busy && !o->unpublished && !o->unrecorded) {
-			finish(s, o);
+	for (struct live_job *job = s->live, *next; job; job = next) {
+		next = job->next;
+		if (job->ended && !job->busy && !job->unpublished && !job->unrecorded) {
+			finish(s, job);
 			finished = true;
-			next = s->orders; /* late batches may have ended others */
+			next = s->live; /* late batches may have ended others */
 		}
 	}
 	if (finished)

@@ -16,12 +16,12 @@
 static void on_drain(uv_timer_t *t)
 {
 	struct jobs *s = t->data;
-	struct live_job *o = s->orders;
-	while (o && (o->busy || !o->waiting))
-		o = o->next;
-	if (!o)
+	struct live_job *job = s->live;
+	while (job && (job->busy || !job->waiting))
+		job = job->next;
+	if (!job)
 		return;
-	struct waiting_batch *w = live_job_take_waiting(o);
+	struct waiting_batch *w = live_job_take_waiting(job);
 	results_take(s, w->peer, &w->envelope, &w->payload);
 	waiting_batch_free(w);
 	if (!s->stopping)

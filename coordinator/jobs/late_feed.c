@@ -10,25 +10,25 @@
 #include "coordinator/jobs/step.h"
 
 /* It is damaged by now, too: its lease is open. */
-static void give_up(struct jobs *s, struct live_job *o, const struct late_result *l, const char *why)
+static void give_up(struct jobs *s, struct live_job *job, const struct late_result *l, const char *why)
 {
-	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = o->id, .lease = {.key = l->key}};
-	live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
+	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = job->id, .lease = {.key = l->key}};
+	live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
 	if (l->peer)
 		jobs_step(s, &ev);
 }
 
 /* To the core, which says whether it counts. */
-static int offer(struct jobs *s, const struct live_job *o, const struct late_result *l, struct error *e)
+static int offer(struct jobs *s, const struct live_job *job, const struct late_result *l, struct error *e)
 {
-	struct event ev = {.kind = EVENT_STORED, .job = o->id, .lease = {.key = l->key, .valid = true}};
+	struct event ev = {.kind = EVENT_STORED, .job = job->id, .lease = {.key = l->key, .valid = true}};
 	struct envelope env;
 	struct batch batch = {0};
 	struct buf copy = {0};
 	unsigned char *body;
 	const unsigned char *payload;
 	size_t size, payload_size;
-	int rc = journal_body(o->journal, l->at, &body, &size, e);
+	int rc = journal_body(job->journal, l->at, &body, &size, e);
 	if (rc)
 		return rc;
 	rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
@@ -36,7 +36,7 @@ static int offer(struct jobs *s, const struct live_job *o, const struct late_res
 		mem_free(body);
 		return rc;
 	}
-	rc = batch_unpack(&batch, &o->plan, env.message->lease_result, payload, payload_size, e);
+	rc = batch_unpack(&batch, &job->plan, env.message->lease_result, payload, payload_size, e);
 	if (!rc && farm_verifies(s->farm, &l->key))
 		rc = digest_batch(&batch, &ev.lease.digest, e);
 	copy.limit = payload_size;
@@ -57,33 +57,33 @@ static int offer(struct jobs *s, const struct live_job *o, const struct late_res
 	return rc;
 }
 
-void late_drop(struct jobs *s, struct live_job *o)
+void late_drop(struct jobs *s, struct live_job *job)
 {
-	while (o->late_count) {
-		struct late_result l = o->late[--o->late_count];
-		give_up(s, o, &l, "a result that waited in the journal is computed again");
+	while (job->late_count) {
+		struct late_result l = job->late[--job->late_count];
+		give_up(s, job, &l, "a result that waited in the journal is computed again");
 	}
 }
 
 /* true: one more counts, and others may now. */
-static bool feed_one(struct jobs *s, struct live_job *o)
+static bool feed_one(struct jobs *s, struct live_job *job)
 {
-	for (size_t i = 0; i < o->late_count; i++) {
-		struct late_result l = o->late[i];
+	for (size_t i = 0; i < job->late_count; i++) {
+		struct late_result l = job->late[i];
 		struct error e;
-		enum replay_place place = replay_place(o, &l.key);
+		enum replay_place place = replay_place(job, &l.key);
 		if (place == REPLAY_LATE)
 			continue;
-		int rc = place == REPLAY_FITS ? offer(s, o, &l, &e) : 0;
+		int rc = place == REPLAY_FITS ? offer(s, job, &l, &e) : 0;
 		if (rc == -ENOMEM) /* later */
 			return false;
-		if (!rc && replay_place(o, &l.key) !=
+		if (!rc && replay_place(job, &l.key) !=
 				   REPLAY_MERGED) /* the core waits for something: an estimate of the error */
 			continue;
-		l = o->late[i];
-		late_remove(o, i);
+		l = job->late[i];
+		late_remove(job, i);
 		if (rc)
-			give_up(s, o, &l, e.text);
+			give_up(s, job, &l, e.text);
 		return true;
 	}
 	return false;
@@ -94,9 +94,9 @@ void late_feed(struct jobs *s)
 	if (s->feeding || s->stepping || s->stopping)
 		return;
 	s->feeding = true;
-	for (struct live_job *o = s->orders; o;) {
-		bool fed = o->late_count && !o->busy && !o->ended && feed_one(s, o);
-		o = fed ? s->orders : o->next; /* the list may have changed */
+	for (struct live_job *job = s->live; job;) {
+		bool fed = job->late_count && !job->busy && !job->ended && feed_one(s, job);
+		job = fed ? s->live : job->next; /* the list may have changed */
 	}
 	s->feeding = false;
 }

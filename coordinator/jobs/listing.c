@@ -12,26 +12,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void view_order(struct jobs *s, const struct live_job *o, struct job_view *v)
+static void view_live(struct jobs *s, const struct live_job *job, struct job_view *v)
 {
 	struct job_status status;
 	struct canvas_counts counted;
-	view_of_record(v, &o->record);
-	if (o->canvas) { /* in the end what the image holds, until then all that has come */
-		canvas_counts(o->canvas, !o->ended, &counted);
-		record_take_counted(&v->record, &o->plan, &counted, o->black, o->lit.beyond_share);
-		record_add_note(&v->record, o->doubts);
+	view_of_record(v, &job->record);
+	if (job->canvas) { /* in the end what the image holds, until then all that has come */
+		canvas_counts(job->canvas, !job->ended, &counted);
+		record_take_counted(&v->record, &job->plan, &counted, job->black, job->lit.beyond_share);
+		record_add_note(&v->record, job->doubts);
 	}
-	if (o->ended)
+	if (job->ended)
 		record_add_doubt(&v->record);
-	if (!farm_job(s->farm, o->id, jobs_now(s), &status))
+	if (!farm_job(s->farm, job->id, jobs_now(s), &status))
 		return;
 	view_add_status(v, &status);
-	if (o->ended && (o->busy || o->unpublished || o->unrecorded)) { /* not before its image is there */
+	if (job->ended && (job->busy || job->unpublished || job->unrecorded)) { /* not before its image is there */
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
-		if (*o->record.why)
+		if (*job->record.why)
 			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s",
-				   o->unrecorded ? "record" : "image", o->record.why);
+				   job->unrecorded ? "record" : "image", job->record.why);
 		else
 			text_copy(v->waiting, sizeof v->waiting, "its image is being written");
 		memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
@@ -40,22 +40,22 @@ static void view_order(struct jobs *s, const struct live_job *o, struct job_view
 	}
 }
 
-bool jobs_view(struct jobs *s, uint64_t job, struct job_view *v)
+bool jobs_view(struct jobs *s, uint64_t id, struct job_view *v)
 {
 	struct job_record r;
-	struct live_job *o = jobs_find(s, job);
-	if (o) {
-		view_order(s, o, v);
+	struct live_job *job = jobs_find(s, id);
+	if (job) {
+		view_live(s, job, v);
 		return true;
 	}
-	if (recovery_view(s, job, v))
+	if (recovery_view(s, id, v))
 		return true;
 	for (size_t i = 0; i < s->ended_count; i++)
-		if (s->ended[i].id == job) {
+		if (s->ended[i].id == id) {
 			view_of_record(v, &s->ended[i]);
 			return true;
 		}
-	if (spool_read_record(s->spool, job, &r, NULL))
+	if (spool_read_record(s->spool, id, &r, NULL))
 		return false;
 	view_of_record(v, &r);
 	return true;
@@ -70,15 +70,15 @@ static int by_id(const void *a, const void *b)
 size_t jobs_views(struct jobs *s, struct job_view **views)
 {
 	size_t count = s->ended_count + recovery_views(s, NULL), n = 0;
-	for (struct live_job *o = s->orders; o; o = o->next)
+	for (struct live_job *job = s->live; job; job = job->next)
 		count++;
 	*views = mem_alloc(count, sizeof **views);
 	if (!*views)
 		return 0;
 	for (size_t i = 0; i < s->ended_count; i++)
 		view_of_record(&(*views)[n++], &s->ended[i]);
-	for (struct live_job *o = s->orders; o; o = o->next)
-		view_order(s, o, &(*views)[n++]);
+	for (struct live_job *job = s->live; job; job = job->next)
+		view_live(s, job, &(*views)[n++]);
 	n += recovery_views(s, *views + n);
 	qsort(*views, count, sizeof **views, by_id);
 	return count;

@@ -25,8 +25,8 @@ static const char *end_name(enum job_end end)
 
 static int write_image(struct publishing *w)
 {
-	const struct live_job *o = w->order;
-	const Farm__Submit *m = live_job_submit(o);
+	const struct live_job *job = w->job;
+	const Farm__Submit *m = live_job_submit(job);
 	const char *slash = strrchr(m->scene, '/');
 	struct header_effect effects[HEADER_EFFECTS_MAX];
 	struct header_extra x = {.scene = slash ? slash + 1 : m->scene,
@@ -34,8 +34,8 @@ static int write_image(struct publishing *w)
 				 .effects = effects,
 				 .mixed = m->mixed,
 				 .wall_seconds = w->wall_seconds,
-				 .cpu_seconds = o->cpu_seconds,
-				 .workers = o->worker_count,
+				 .cpu_seconds = job->cpu_seconds,
+				 .workers = job->worker_count,
 				 .end = w->what == PUBLISH_RESULT ? end_name(w->end) : NULL};
 	for (; x.effect_count < m->n_effects && x.effect_count < HEADER_EFFECTS_MAX; x.effect_count++) {
 		const Farm__Effect *f = m->effects[x.effect_count];
@@ -43,9 +43,9 @@ static int write_image(struct publishing *w)
 	}
 	unsigned char *bytes = NULL;
 	size_t size = 0;
-	int rc = image_file_encode(&w->image, &o->plan, &x, &bytes, &size, &w->error);
+	int rc = image_file_encode(&w->image, &job->plan, &x, &bytes, &size, &w->error);
 	if (!rc)
-		rc = spool_write(w->jobs->spool, o->id, files[w->what], bytes, size, &w->error);
+		rc = spool_write(w->jobs->spool, job->id, files[w->what], bytes, size, &w->error);
 	mem_free(bytes);
 	return rc;
 }
@@ -53,9 +53,9 @@ static int write_image(struct publishing *w)
 static void run(uv_work_t *work)
 {
 	struct publishing *w = work->data;
-	w->rc = canvas_image(w->order->canvas, w->what == PUBLISH_PREVIEW, &w->image, &w->error);
+	w->rc = canvas_image(w->job->canvas, w->what == PUBLISH_PREVIEW, &w->image, &w->error);
 	if (!w->rc)
-		convergence_judge(&w->order->plan, &w->image, &w->agreement);
+		convergence_judge(&w->job->plan, &w->image, &w->agreement);
 	if (!w->rc && w->what != PUBLISH_ERROR_ONLY)
 		w->rc = write_image(w);
 }
@@ -64,25 +64,24 @@ static void run(uv_work_t *work)
 static void tell_error(const struct publishing *w)
 {
 	struct jobs *s = w->jobs;
-	struct event ev = {
-		.kind = EVENT_ERROR_KNOWN,
-		.job = w->order->id,
-		.error_known = {.job = w->order->id,
-				.rounds = w->rounds,
-				.rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper),
-				.rel_mse = w->rc ? NAN : w->image.rel_mse,
-				.degrees = w->rc ? NAN : w->image.rel_mse_degrees,
-				.doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
-				.cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
+	struct event ev = {.kind = EVENT_ERROR_KNOWN,
+			   .job = w->job->id,
+			   .error_known = {.job = w->job->id,
+					   .rounds = w->rounds,
+					   .rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper),
+					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
+					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
+					   .doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
+					   .cpu_seconds = w->job->cpu_seconds - w->job->record.bootstrap_cpu_seconds}};
 	jobs_step(s, &ev);
 	durable_look(s, ev.job);
 }
 
 static void tell_image(const struct publishing *w)
 {
-	uint64_t job = w->order->id;
+	uint64_t job = w->job->id;
 	if (*w->agreement.text)
-		live_job_log(w->order, LOG_JOB_NOTE, "text=%s", log_quote(w->agreement.text).text);
+		live_job_log(w->job, LOG_JOB_NOTE, "text=%s", log_quote(w->agreement.text).text);
 	struct event ev = {.kind = EVENT_IMAGE_KNOWN,
 			   .job = job,
 			   .image_known = {.job = job, .disagrees = w->agreement.verdict == CHAINS_DISAGREE}};
@@ -92,41 +91,42 @@ static void tell_image(const struct publishing *w)
 /* The core's job is done; all that it is made of stays until the disk takes the image. */
 static void cannot_write(struct publishing *w)
 {
-	struct live_job *o = w->order;
-	o->unpublished = true;
-	o->unpublished_rounds = w->rounds;
-	o->try_again = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
-	if (strcmp(o->record.why, w->error.text) != 0)
-		live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(w->error.text).text);
-	text_copy(o->record.why, sizeof o->record.why, w->error.text);
+	struct live_job *job = w->job;
+	job->unpublished = true;
+	job->unpublished_rounds = w->rounds;
+	job->try_again = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
+	if (strcmp(job->record.why, w->error.text) != 0)
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
+			     log_quote(w->error.text).text);
+	text_copy(job->record.why, sizeof job->record.why, w->error.text);
 }
 
-static void has_written(struct live_job *o)
+static void has_written(struct live_job *job)
 {
-	o->record.has_result = true;
-	o->record.cleared = 0;
-	o->record.why[0] = 0;
+	job->record.has_result = true;
+	job->record.cleared = 0;
+	job->record.why[0] = 0;
 }
 
 /* What came of it, for the live job. */
 static void take(struct publishing *w)
 {
-	struct live_job *o = w->order;
+	struct live_job *job = w->job;
 	/* Every image says how good it is, asked for or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
-		record_take_error(&o->record, &w->image);
+		record_take_error(&job->record, &w->image);
 	if (!w->rc)
-		record_take_convergence(&o->record, &w->image, &w->agreement);
+		record_take_convergence(&job->record, &w->image, &w->agreement);
 	if (w->what == PUBLISH_RESULT && !w->rc)
-		o->black = w->image.black;
+		job->black = w->image.black;
 	if (w->what == PUBLISH_RESULT && w->rc)
 		cannot_write(w);
 	else if (w->what == PUBLISH_RESULT)
-		has_written(o);
+		has_written(job);
 	else if (w->rc)
-		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 	if (w->what == PUBLISH_PREVIEW)
-		o->preview_made = jobs_now(w->jobs);
+		job->preview_made = jobs_now(w->jobs);
 	canvas_image_fini(&w->image);
 }
 
@@ -134,11 +134,11 @@ static void done(uv_work_t *work, int status)
 {
 	struct publishing *w = work->data;
 	struct jobs *s = w->jobs;
-	uint64_t id = w->order->id;
+	uint64_t id = w->job->id;
 	assert(status == 0);
 	(void)status;
 	take(w);
-	w->order->busy = false;
+	w->job->busy = false;
 	if (s->stopping)
 		return;
 	if (w->what == PUBLISH_ERROR_ONLY)
@@ -150,18 +150,18 @@ static void done(uv_work_t *work, int status)
 	s->changes++;
 }
 
-void publish_start(struct jobs *s, struct live_job *o, enum publish_what what, uint64_t rounds)
+void publish_start(struct jobs *s, struct live_job *job, enum publish_what what, uint64_t rounds)
 {
-	assert(o && o->canvas);
-	assert(!o->busy);
-	struct publishing *w = &o->publishing;
-	*w = (struct publishing){.work.data = w, .jobs = s, .order = o, .what = what, .rounds = rounds};
+	assert(job && job->canvas);
+	assert(!job->busy);
+	struct publishing *w = &job->publishing;
+	*w = (struct publishing){.work.data = w, .jobs = s, .job = job, .what = what, .rounds = rounds};
 	struct job_status status; /* from the first lease to now */
-	if (farm_job(s->farm, o->id, jobs_now(s), &status)) {
+	if (farm_job(s->farm, job->id, jobs_now(s), &status)) {
 		w->end = status.end;
 		w->wall_seconds = (isnan(status.ended) ? jobs_now(s) : status.ended) - status.started;
 	}
-	o->busy = true;
+	job->busy = true;
 	int rc = uv_queue_work(s->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;

@@ -95,15 +95,15 @@ size_t recovery_views(const struct jobs *s, struct job_view *v)
 
 /* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may
  * want to look at it. */
-static void put_aside(struct jobs *s, struct live_job *o)
+static void put_aside(struct jobs *s, struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
-	spool_job_path(s->spool, o->id, NULL, folder);
-	spool_job_path(s->spool, o->id, "checkpoint", path);
-	spool_job_path(s->spool, o->id, "checkpoint.damaged", aside);
-	live_job_log(o, LOG_SPOOL_FAULT,
+	spool_job_path(s->spool, job->id, NULL, folder);
+	spool_job_path(s->spool, job->id, "checkpoint", path);
+	spool_job_path(s->spool, job->id, "checkpoint.damaged", aside);
+	live_job_log(job, LOG_SPOOL_FAULT,
 		     "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
-	live_job_log(o, LOG_JOB_STATE, "state=anew");
+	live_job_log(job, LOG_JOB_STATE, "state=anew");
 	disk_rename(path, aside);
 	journal_put_aside(folder);
 }
@@ -168,19 +168,21 @@ static int finish(struct jobs *s, struct error *e)
 	for (struct found *f; !rc && (f = s->found);) {
 		struct ledger_job j;
 		struct job_counts known;
-		struct live_job *o = f->order;
+		struct live_job *job = f->job;
 		s->found = f->next;
-		o->next = s->orders;
-		s->orders = o;
+		job->next = s->live;
+		s->live = job;
 		mem_free(f);
-		rc = ledger_get(s->ledger, o->id, &j, e);
-		rc = rc > 0 ? restore_tell(s, o, j.held, 0, e) : rc < 0 ? rc : error_set(e, ENOENT, "its row is gone");
+		rc = ledger_get(s->ledger, job->id, &j, e);
+		rc = rc > 0   ? restore_tell(s, job, j.held, 0, e)
+		     : rc < 0 ? rc
+			      : error_set(e, ENOENT, "its row is gone");
 		if (!rc)
-			files_look(s, o);
-		if (!rc && !farm_counts(s->farm, o->id, &known))
+			files_look(s, job);
+		if (!rc && !farm_counts(s->farm, job->id, &known))
 			rc = error_set(e, ENOMEM, "no memory for a job");
 		if (rc)
-			rc = error_prefix(e, rc, "j%llu", (unsigned long long)o->id);
+			rc = error_prefix(e, rc, "j%llu", (unsigned long long)job->id);
 	}
 	if (rc)
 		return rc;
@@ -196,7 +198,7 @@ static int finish(struct jobs *s, struct error *e)
 static void run(uv_work_t *work)
 {
 	struct recovery *r = work->data;
-	r->rc = replay_films(r->jobs->spool, r->at->order, &r->at->progress, &r->error);
+	r->rc = replay_films(r->jobs->spool, r->at->job, &r->at->progress, &r->error);
 }
 
 static void done(uv_work_t *work, int status);
@@ -207,7 +209,7 @@ static int go_on(struct jobs *s, struct error *e)
 	struct recovery *r = s->recovery;
 	if (!r->at)
 		return finish(s, e);
-	r->at->order->film_folder = jobs_film_folder(s, &r->at->order->plan);
+	r->at->job->film_folder = jobs_film_folder(s, &r->at->job->plan);
 	r->under_way = true;
 	int rc = uv_queue_work(s->loop, &r->work, run, done);
 	assert(rc == 0);
@@ -229,19 +231,19 @@ static int take_failure(struct jobs *s, struct error *e)
 	struct recovery *r = s->recovery;
 	struct found *f = r->at;
 	struct ledger_job j;
-	uint64_t id = f->record.id, extended = f->order->record.extended;
+	uint64_t id = f->record.id, extended = f->job->record.extended;
 	int rc = r->rc;
 	*e = r->error;
-	live_job_log(f->order, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	live_job_log(f->job, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
 	bool anew = rc == -EBADMSG && !f->anew;
 	if (anew)
-		put_aside(s, f->order);
-	restore_drop(s, f->order);
-	f->order = NULL;
+		put_aside(s, f->job);
+	restore_drop(s, f->job);
+	f->job = NULL;
 	if (anew) {
 		f->anew = true;
 		rc = ledger_get(s->ledger, id, &j, e);
-		rc = rc > 0   ? restore_live_job(s, &j, &f->order, e)
+		rc = rc > 0   ? restore_live_job(s, &j, &f->job, e)
 		     : rc < 0 ? rc
 			      : error_set(e, ENOENT, "its row is gone");
 		if (!rc)
@@ -285,12 +287,12 @@ static int add(struct jobs *s, const struct ledger_job *j, struct error *e)
 	if (!f)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	uint64_t id = j->id, extended = j->extended;
-	int rc = restore_live_job(s, j, &f->order, e);
+	int rc = restore_live_job(s, j, &f->job, e);
 	if (rc) {
 		mem_free(f);
 		return give_up(s, id, extended, rc, e);
 	}
-	f->record = f->order->record;
+	f->record = f->job->record;
 	f->bytes = replay_bytes(s->spool, id);
 	r->bytes += f->bytes;
 	*r->last = f;
@@ -335,8 +337,8 @@ void recovery_close(struct jobs *s)
 	assert(!r->under_way);
 	while (s->found) {
 		struct found *next = s->found->next;
-		if (s->found->order)
-			live_job_free(s->found->order);
+		if (s->found->job)
+			live_job_free(s->found->job);
 		mem_free(s->found);
 		s->found = next;
 	}

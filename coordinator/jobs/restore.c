@@ -23,18 +23,21 @@
 
 /* ---- the core */
 
-static uint64_t next_epoch(const struct live_job *o, uint32_t group, uint32_t part)
+static uint64_t next_epoch(const struct live_job *job, uint32_t group, uint32_t part)
 {
-	if (o->bootstrap)
-		return bootstrap_has(o->bootstrap, group, part);
-	struct lease_key k = {
-		.job = o->id, .kind = LEASE_RENDER, .group = group, .part = part, .epoch = canvas_rounds(o->canvas)};
+	if (job->bootstrap)
+		return bootstrap_has(job->bootstrap, group, part);
+	struct lease_key k = {.job = job->id,
+			      .kind = LEASE_RENDER,
+			      .group = group,
+			      .part = part,
+			      .epoch = canvas_rounds(job->canvas)};
 	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* what was taken back is missing */
 		before.epoch = k.epoch - 1;
-		if (canvas_has(o->canvas, &before))
+		if (canvas_has(job->canvas, &before))
 			break;
 	}
-	while (k.epoch < o->plan.rounds && canvas_has(o->canvas, &k))
+	while (k.epoch < job->plan.rounds && canvas_has(job->canvas, &k))
 		k.epoch++;
 	return k.epoch;
 }
@@ -45,9 +48,9 @@ const char *restore_held_by(const char *who, char text[256])
 	return text;
 }
 
-int restore_tell(struct jobs *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e)
+int restore_tell(struct jobs *s, const struct live_job *job, const char *held, uint64_t tag, struct error *e)
 {
-	uint32_t slots = o->plan.groups * o->plan.parts;
+	uint32_t slots = job->plan.groups * job->plan.parts;
 	uint64_t *next = mem_alloc(slots, sizeof *next);
 	struct event_join *makers = mem_alloc(slots, sizeof *makers);
 	if (!next || !makers) {
@@ -56,42 +59,42 @@ int restore_tell(struct jobs *s, const struct live_job *o, const char *held, uin
 		return error_set(e, ENOMEM, "no memory for a job");
 	}
 	for (uint32_t i = 0; i < slots; i++) {
-		const struct live_job_maker *m = &o->makers[i];
-		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
+		const struct live_job_maker *m = &job->makers[i];
+		next[i] = next_epoch(job, i / job->plan.parts, i % job->plan.parts);
 		makers[i] = (struct event_join){.name = *m->name ? m->name : NULL,
 						.certificate = m->certificate,
 						.home = m->home,
 						.restarts = m->restarts};
 		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu",
-			  (unsigned long long)o->id, (int)(o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER),
-			  i / o->plan.parts, i % o->plan.parts, (unsigned long long)next[i]);
+			  (unsigned long long)job->id, (int)(job->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER),
+			  i / job->plan.parts, i % job->plan.parts, (unsigned long long)next[i]);
 	}
 	char text[256];
 	struct event ev = {.kind = EVENT_RESTORE,
 			   .tag = tag,
-			   .restore = {.job = o->id,
-				       .submit = {.plan = &o->plan,
-						  .name = o->record.name,
-						  .priority = o->record.priority,
-						  .mixed = live_job_submit(o)->mixed,
-						  .owner = o->record.owner,
-						  .verify = trust_share(s, live_job_submit(o))},
-				       .fingerprint = o->fingerprint,
-				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
+			   .restore = {.job = job->id,
+				       .submit = {.plan = &job->plan,
+						  .name = job->record.name,
+						  .priority = job->record.priority,
+						  .mixed = live_job_submit(job)->mixed,
+						  .owner = job->record.owner,
+						  .verify = trust_share(s, live_job_submit(job))},
+				       .fingerprint = job->fingerprint,
+				       .kind = job->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 				       .next = next,
 				       .makers = makers,
-				       .black = o->lit.black,
-				       .elapsed = o->times.elapsed,
-				       .opened = o->times.opened,
-				       .completed = o->times.completed,
-				       .looks = &o->record.looks,
-				       .counts = o->counts}};
+				       .black = job->lit.black,
+				       .elapsed = job->times.elapsed,
+				       .opened = job->times.opened,
+				       .completed = job->times.completed,
+				       .looks = &job->record.looks,
+				       .counts = job->counts}};
 	jobs_step(s, &ev);
 	mem_free(next);
 	mem_free(makers);
 	if (*held) {
 		ev = (struct event){
-			.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = restore_held_by(held, text)};
+			.kind = EVENT_HOLD, .job = job->id, .hold = HOLD_ORDERED, .text = restore_held_by(held, text)};
 		jobs_step(s, &ev);
 	}
 	return 0;
@@ -123,15 +126,15 @@ int restore_record(const struct jobs *s, uint64_t id, struct job_record *r, bool
 }
 
 /* What the submission does not say, but its earlier end: its image is there until the next one is. */
-static int take_record_of(const struct jobs *s, const struct ledger_job *j, struct live_job *o, struct error *e)
+static int take_record_of(const struct jobs *s, const struct ledger_job *j, struct live_job *job, struct error *e)
 {
-	o->record.priority = j->priority;
-	o->record.extended = j->extended;
+	job->record.priority = j->priority;
+	job->record.extended = j->extended;
 	struct job_record *r = mem_alloc(1, sizeof *r);
 	bool there;
 	int rc = r ? 0 : error_set(e, ENOMEM, "no memory for a job");
-	if (!rc && j->extended && (rc = restore_record(s, o->id, r, &there, e)) == 0 && there)
-		o->record.has_result = r->has_result;
+	if (!rc && j->extended && (rc = restore_record(s, job->id, r, &there, e)) == 0 && there)
+		job->record.has_result = r->has_result;
 	mem_free(r);
 	return rc;
 }
@@ -147,7 +150,7 @@ static int not_known(const struct ledger_job *j, int rc, struct error *e)
 			    HSLT_VERSION);
 }
 
-static int make_order(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e)
+static int make_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **job, struct error *e)
 {
 	struct envelope submit, info;
 	struct plan plan;
@@ -165,28 +168,28 @@ static int make_order(struct jobs *s, const struct ledger_job *j, struct live_jo
 	if (rc)
 		return not_known(j, rc, e);
 	rc = hold_blobs(s, submit.message->submit, e);
-	if (!rc && (rc = live_job_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
+	if (!rc && (rc = live_job_new(job, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
 		live_job_release_blobs(submit.message->submit, s->blobs);
 	envelope_fini(&submit);
 	return rc;
 }
 
-void restore_drop(struct jobs *s, struct live_job *o)
+void restore_drop(struct jobs *s, struct live_job *job)
 {
-	live_job_release_blobs(live_job_submit(o), s->blobs);
-	live_job_free(o);
+	live_job_release_blobs(live_job_submit(job), s->blobs);
+	live_job_free(job);
 }
 
-int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e)
+int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **job, struct error *e)
 {
-	int rc = make_order(s, j, o, e);
+	int rc = make_live_job(s, j, job, e);
 	if (rc)
 		return rc;
-	rc = take_record_of(s, j, *o, e);
+	rc = take_record_of(s, j, *job, e);
 	if (rc)
-		restore_drop(s, *o);
+		restore_drop(s, *job);
 	else
-		(*o)->film_folder = jobs_film_folder(s, &(*o)->plan);
+		(*job)->film_folder = jobs_film_folder(s, &(*job)->plan);
 	return rc;
 }
 

@@ -15,11 +15,11 @@ bool restore_lives(const struct jobs *s, uint64_t job); /* it had not ended */
 int restore_record(const struct jobs *s, uint64_t id, struct job_record *r, bool *there, struct error *e);
 
 /* One job from its row, for nobody yet. -EBADMSG: something of it is damaged or gone. */
-int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e);
-void restore_drop(struct jobs *s, struct live_job *o); /* and lets go of its files */
+int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **job, struct error *e);
+void restore_drop(struct jobs *s, struct live_job *job); /* and lets go of its files */
 /* The sentence for the status. */
 const char *restore_held_by(const char *who, char text[256]);
 /* The core is told of a live job that is in the jobs' list. held: by whom, or "". Refusals carry the tag. */
-int restore_tell(struct jobs *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e);
+int restore_tell(struct jobs *s, const struct live_job *job, const char *held, uint64_t tag, struct error *e);
 
 #endif

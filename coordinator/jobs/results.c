@@ -19,11 +19,11 @@ static void refuse(struct jobs *s, uint64_t peer, const struct lease_key *k, con
 	jobs_step(s, &ev);
 }
 
-static void fail(struct jobs *s, struct live_job *o, uint64_t peer, const struct lease_key *k, const char *why)
+static void fail(struct jobs *s, struct live_job *job, uint64_t peer, const struct lease_key *k, const char *why)
 {
 	const char *name = s->peers.name(s->peers.user, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
-	live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu",
+	live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu",
 		     log_quote(name ? name : "?").text, log_quote(why).text, (int)k->kind, k->group, k->part,
 		     (unsigned long long)k->epoch);
 	s->peers.acknowledge(s->peers.user, peer, k, ACK_REFUSED, why);
@@ -40,16 +40,16 @@ static void take_result(struct jobs *s, uint64_t peer, const Farm__LeaseResult *
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct live_job *o = jobs_find(s, ev.job);
-	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
-	if (o && !rc && batch.state_count && !m->states_digest.len)
+	struct live_job *job = jobs_find(s, ev.job);
+	int rc = job ? batch_unpack(&batch, &job->plan, m, payload->bytes, payload->size, &e) : 0;
+	if (job && !rc && batch.state_count && !m->states_digest.len)
 		rc = error_set(&e, EBADMSG, "chain states without a digest");
-	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
+	if (job && !rc && farm_verifies(s->farm, &ev.lease.key))
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
-	if (o && !rc && o->canvas && batch.key.kind == LEASE_RENDER)
-		rc = canvas_admits(o->canvas, &batch, &e);
+	if (job && !rc && job->canvas && batch.key.kind == LEASE_RENDER)
+		rc = canvas_admits(job->canvas, &batch, &e);
 	if (rc == -ERANGE) { /* perhaps any worker's would be like that: as one that could not be computed */
-		fail(s, o, peer, &ev.lease.key, e.text);
+		fail(s, job, peer, &ev.lease.key, e.text);
 		batch_fini(&batch);
 		return;
 	}
@@ -70,7 +70,7 @@ static void take_result(struct jobs *s, uint64_t peer, const Farm__LeaseResult *
 	ev.text = e.text;
 	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
 	if (rc == -ENOMEM ||
-	    (o && ev.lease.valid && durable_reserve(s, o, &in, &e))) /* no room for it, here or on the disk */
+	    (job && ev.lease.valid && durable_reserve(s, job, &in, &e))) /* no room for it, here or on the disk */
 		refuse(s, peer, &ev.lease.key, e.text);
 	else
 		jobs_step_with(s, &ev, &in);
@@ -81,24 +81,24 @@ static void take_result(struct jobs *s, uint64_t peer, const Farm__LeaseResult *
 static bool has_room(const struct jobs *s, const struct buf *payload)
 {
 	uint64_t bytes = payload->capacity;
-	for (const struct live_job *o = s->orders; o; o = o->next)
-		bytes += o->waiting_bytes;
+	for (const struct live_job *job = s->live; job; job = job->next)
+		bytes += job->waiting_bytes;
 	return bytes <= s->config.waiting_bytes;
 }
 
 /* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and
  * one of those that nobody's waits for. */
-static void put_off(struct jobs *s, struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env,
-		    struct buf *payload)
+static void put_off(struct jobs *s, struct live_job *job, uint64_t peer, const struct lease_key *k,
+		    struct envelope *env, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
 	enum farm_delivery awaited = farm_awaits(s->farm, peer, k);
-	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(o, k) : NULL;
+	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(job, k) : NULL;
 	if (w && w->peer == peer) /* the answer to that one is the answer to this one */
 		return;
 	if (awaited == DELIVERY_USELESS)
 		ev.kind = EVENT_BATCH;
-	else if (w || !has_room(s, payload) || !live_job_put_off(o, peer, k, env, payload)) {
+	else if (w || !has_room(s, payload) || !live_job_put_off(job, peer, k, env, payload)) {
 		refuse(s, peer, k, w ? "another worker's result of this lease waits" : "no room for results that wait");
 		return;
 	}
@@ -106,18 +106,18 @@ static void put_off(struct jobs *s, struct live_job *o, uint64_t peer, const str
 }
 
 /* Who does not hold the lease, or refuses states that it had before, refuses nothing that is there: nobody made it. */
-static void log_failure(const struct jobs *s, const char *from, struct live_job *o, const Farm__LeaseFailed *f,
+static void log_failure(const struct jobs *s, const char *from, struct live_job *job, const Farm__LeaseFailed *f,
 			const struct lease_key *k, const char *text, bool holds)
 {
 	struct log_value name = log_quote(from ? from : "?"), said = log_quote(text);
 	unsigned long long epoch = k->epoch;
 	if (f->bad_states)
-		live_job_log(o, LOG_LEASE_FAILED,
+		live_job_log(job, LOG_LEASE_FAILED,
 			     "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
 			     log_quote(holds ? farm_maker(s->farm, k) : "?").text, name.text, said.text, (int)k->kind,
 			     k->group, k->part, epoch);
 	else
-		live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu",
+		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu",
 			     name.text, f->own, said.text, (int)k->kind, k->group, k->part, epoch);
 }
 
@@ -136,22 +136,23 @@ void results_take_failure(struct jobs *s, uint64_t peer, const Farm__LeaseFailed
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct live_job *o = jobs_find(s, ev.job);
+	struct live_job *job = jobs_find(s, ev.job);
 	ev.lease.own = f->own;
 	ev.lease.bad_states = f->bad_states;
-	ev.lease.other_states = f->bad_states && !(o && live_job_gives_states(o, &ev.lease.key, &states));
+	ev.lease.other_states = f->bad_states && !(job && live_job_gives_states(job, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
-	if (o && *f->text && !blamed && !files_are_right(s, o)) { /* the spool's fault, not the worker's */
+	if (job && *f->text && !blamed && !files_are_right(s, job)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
 	struct back back = {0};
 	bool holds = farm_awaits(s->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
 		     !ev.lease.other_states; /* else nothing is read for it */
-	if (o && *text)
-		log_failure(s, s->peers.name(s->peers.user, peer), o, f, &ev.lease.key, text, holds);
-	if (o && *text && f->bad_states && holds && !o->busy && !s->stepping && journal_write(o->journal, &e) == 0)
-		ev.lease.can_take_back = back_read(o, o->journal, &ev.lease.key, &back, &e) == 0;
+	if (job && *text)
+		log_failure(s, s->peers.name(s->peers.user, peer), job, f, &ev.lease.key, text, holds);
+	if (job && *text && f->bad_states && holds && !job->busy && !s->stepping &&
+	    journal_write(job->journal, &e) == 0)
+		ev.lease.can_take_back = back_read(job, job->journal, &ev.lease.key, &back, &e) == 0;
 	if (ev.lease.can_take_back)
 		jobs_step_with(s, &ev, &(struct incoming){.back = &back});
 	else
@@ -163,13 +164,13 @@ void results_take_failure(struct jobs *s, uint64_t peer, const Farm__LeaseFailed
 static void take_refusal(struct jobs *s, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;
-	struct live_job *o = m->key ? jobs_find(s, m->key->job) : NULL;
+	struct live_job *job = m->key ? jobs_find(s, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
-	if (!o || !o->busy || lease_key_from_wire(m->key, &k, &e)) {
+	if (!job || !job->busy || lease_key_from_wire(m->key, &k, &e)) {
 		if (s->peers.name(s->peers.user, peer))
 			results_take_failure(s, peer, m);
-	} else if (!has_room(s, payload) || !live_job_put_off(o, peer, &k, env, payload)) {
+	} else if (!has_room(s, payload) || !live_job_put_off(job, peer, &k, env, payload)) {
 		refuse(s, peer, &k, "no room for results that wait");
 	}
 }
@@ -181,11 +182,11 @@ void results_take(struct jobs *s, uint64_t peer, struct envelope *env, struct bu
 		return;
 	}
 	const Farm__LeaseResult *m = env->message->lease_result;
-	struct live_job *o = m->key ? jobs_find(s, m->key->job) : NULL;
+	struct live_job *job = m->key ? jobs_find(s, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
-	if (o && o->busy && lease_key_from_wire(m->key, &k, &e) == 0)
-		put_off(s, o, peer, &k, env, payload);
+	if (job && job->busy && lease_key_from_wire(m->key, &k, &e) == 0)
+		put_off(s, job, peer, &k, env, payload);
 	else
 		take_result(s, peer, m, payload);
 }

@@ -9,25 +9,25 @@
 
 void retry_tick(struct jobs *s)
 {
-	for (struct live_job *o = s->orders; o; o = o->next) {
-		if (jobs_now(s) < o->try_again || o->busy)
+	for (struct live_job *job = s->live; job; job = job->next) {
+		if (jobs_now(s) < job->try_again || job->busy)
 			continue;
-		if (o->unpublished) {
-			o->unpublished = false;
-			publish_start(s, o, PUBLISH_RESULT, o->unpublished_rounds);
+		if (job->unpublished) {
+			job->unpublished = false;
+			publish_start(s, job, PUBLISH_RESULT, job->unpublished_rounds);
 		}
-		if (o->unrecorded) {
-			o->unrecorded = false;
+		if (job->unrecorded) {
+			job->unrecorded = false;
 			finish_ended(s);
 			return; /* the list may have changed; the others next time */
 		}
-		if (o->unprepared && !o->ended) {
+		if (job->unprepared && !job->ended) {
 			struct event ev = {.kind = EVENT_TICK};
-			dispatch_prepare(s, o);
+			dispatch_prepare(s, job);
 			jobs_step(s, &ev);
 			return;
 		}
-		if (o->held && !o->ended && durable_mend(s, o) == 0)
+		if (job->held && !job->ended && durable_mend(s, job) == 0)
 			return;
 	}
 }

@@ -91,10 +91,10 @@ void jobs_stop(struct jobs *s)
 void jobs_close(struct jobs *s)
 {
 	recovery_close(s);
-	while (s->orders) {
-		struct live_job *next = s->orders->next;
-		live_job_free(s->orders);
-		s->orders = next;
+	while (s->live) {
+		struct live_job *next = s->live->next;
+		live_job_free(s->live);
+		s->live = next;
 	}
 	while (s->deferred) {
 		struct deferred *next = s->deferred->next;

@@ -110,30 +110,30 @@ double trust_share(const struct jobs *s, const Farm__Submit *m)
 	return m->mixed ? 0 : m->verify > s->config.verify ? m->verify : s->config.verify;
 }
 
-void trust_merged(struct live_job *o, const struct action *a)
+void trust_merged(struct live_job *job, const struct action *a)
 {
 	if (a->verified)
 		return;
-	for (size_t i = 0; i < o->credit_count; i++)
-		if (o->credits[i].who == a->who) {
-			o->credits[i].leases++;
+	for (size_t i = 0; i < job->credit_count; i++)
+		if (job->credits[i].who == a->who) {
+			job->credits[i].leases++;
 			return;
 		}
 	struct live_job_credit *more =
-		mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
+		mem_grow(job->credits, job->credit_count * sizeof *more, (job->credit_count + 1) * sizeof *more);
 	if (!more) {
-		live_job_log(o, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
+		live_job_log(job, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
 		return;
 	}
-	o->credits = more;
-	o->credits[o->credit_count++] = (struct live_job_credit){a->who, 1};
+	job->credits = more;
+	job->credits[job->credit_count++] = (struct live_job_credit){a->who, 1};
 }
 
-void trust_taken_back(struct live_job *o, uint64_t who)
+void trust_taken_back(struct live_job *job, uint64_t who)
 {
-	for (size_t i = 0; i < o->credit_count; i++)
-		if (o->credits[i].who == who && o->credits[i].leases > 0)
-			o->credits[i].leases--;
+	for (size_t i = 0; i < job->credit_count; i++)
+		if (job->credits[i].who == who && job->credits[i].leases > 0)
+			job->credits[i].leases--;
 }
 
 static const char *name_of(const struct jobs *s, uint64_t who, char name[JOIN_NAME])
@@ -146,32 +146,32 @@ static const char *name_of(const struct jobs *s, uint64_t who, char name[JOIN_NA
 void trust_wrong(struct jobs *s, const struct action *a)
 {
 	char name[JOIN_NAME];
-	struct live_job *o = jobs_find(s, a->job);
-	if (o)
-		live_job_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text,
+	struct live_job *job = jobs_find(s, a->job);
+	if (job)
+		live_job_log(job, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text,
 			     log_quote(a->text).text);
 }
 
-static void note(struct live_job *o, const char *text)
+static void note(struct live_job *job, const char *text)
 {
-	live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
-	size_t used = strlen(o->doubts);
-	text_print(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
+	live_job_log(job, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
+	size_t used = strlen(job->doubts);
+	text_print(job->doubts + used, sizeof job->doubts - used, "%s%s", used ? "; " : "", text);
 }
 
-static void note_credit(struct live_job *o, const char *name, const char *why, uint64_t leases)
+static void note_credit(struct live_job *job, const char *name, const char *why, uint64_t leases)
 {
 	char text[256];
 	text_print(text, sizeof text, "worker %s is quarantined (%s); %llu of its leases were merged unverified", name,
 		   why, (unsigned long long)leases);
-	note(o, text);
+	note(job, text);
 }
 
 void trust_anew(struct jobs *s, const struct action *a)
 {
-	struct live_job *o = jobs_find(s, a->job);
-	if (o)
-		note(o, a->text);
+	struct live_job *job = jobs_find(s, a->job);
+	if (job)
+		note(job, a->text);
 }
 
 void trust_quarantined(struct jobs *s, const struct action *a)
@@ -180,8 +180,8 @@ void trust_quarantined(struct jobs *s, const struct action *a)
 	name_of(s, a->who, name);
 	log_event(LOG_WORKER_QUARANTINED, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
 	write_quarantined(s);
-	for (struct live_job *o = s->orders; o; o = o->next)
-		for (size_t i = 0; i < o->credit_count; i++)
-			if (o->credits[i].who == a->who && o->credits[i].leases > 0)
-				note_credit(o, name, a->text, o->credits[i].leases);
+	for (struct live_job *job = s->live; job; job = job->next)
+		for (size_t i = 0; i < job->credit_count; i++)
+			if (job->credits[i].who == a->who && job->credits[i].leases > 0)
+				note_credit(job, name, a->text, job->credits[i].leases);
 }

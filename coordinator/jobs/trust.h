@@ -18,8 +18,8 @@ int trust_open(struct jobs *s, struct error *e);
  */
 double trust_share(const struct jobs *s, const Farm__Submit *m);
 
-void trust_merged(struct live_job *o, const struct action *a);
-void trust_taken_back(struct live_job *o, uint64_t who); /* one of its results counts no more */
+void trust_merged(struct live_job *job, const struct action *a);
+void trust_taken_back(struct live_job *job, uint64_t who); /* one of its results counts no more */
 void trust_wrong(struct jobs *s, const struct action *a);
 void trust_anew(struct jobs *s, const struct action *a); /* chains that lost their states */
 void trust_quarantined(struct jobs *s, const struct action *a);

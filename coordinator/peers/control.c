@@ -28,41 +28,41 @@ static void not_for_long(struct session *p, const struct error *e)
 		   e->text);
 }
 
-static void hold(struct session *p, uint64_t job, const char *who)
+static void hold(struct session *p, uint64_t id, const char *who)
 {
 	struct jobs *s = p->jobs;
 	struct error e;
 	char text[256];
 	struct event ev = {
-		.kind = EVENT_HOLD, .job = job, .hold = HOLD_ORDERED, .text = *who ? restore_held_by(who, text) : ""};
+		.kind = EVENT_HOLD, .job = id, .hold = HOLD_ORDERED, .text = *who ? restore_held_by(who, text) : ""};
 	if (tell(p, &ev))
 		return;
-	if (ledger_hold(s->ledger, job, who, &e)) {
+	if (ledger_hold(s->ledger, id, who, &e)) {
 		not_for_long(p, &e);
 		return;
 	}
-	reconcile_row(s, job);
-	struct live_job *o = jobs_find(s, job);
-	if (o)
-		live_job_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released",
+	reconcile_row(s, id);
+	struct live_job *job = jobs_find(s, id);
+	if (job)
+		live_job_log(job, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released",
 			     log_quote(name_of(p)).text);
 }
 
-static void set_priority(struct session *p, uint64_t job, int priority)
+static void set_priority(struct session *p, uint64_t id, int priority)
 {
 	struct jobs *s = p->jobs;
 	struct error e;
-	struct event ev = {.kind = EVENT_PRIORITY, .job = job, .priority = priority};
+	struct event ev = {.kind = EVENT_PRIORITY, .job = id, .priority = priority};
 	if (tell(p, &ev))
 		return;
-	if (ledger_priority(s->ledger, job, priority, &e)) {
+	if (ledger_priority(s->ledger, id, priority, &e)) {
 		not_for_long(p, &e);
 		return;
 	}
-	reconcile_row(s, job);
-	struct live_job *o = jobs_find(s, job);
-	if (o)
-		live_job_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
+	reconcile_row(s, id);
+	struct live_job *job = jobs_find(s, id);
+	if (job)
+		live_job_log(job, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
 }
 
 /* The core need not know a job that is over any more. false: p->rejected says why. */

@@ -215,7 +215,7 @@ static void on_closed(void *user, const char *why)
 					       : LOG_PEER_ACCEPT,
 		  "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
 		  log_quote(p->name).text, log_quote(why).text);
-	orders_drop_waiting(p->jobs->orders, p->id);
+	live_jobs_drop_waiting(p->jobs->live, p->id);
 	if (p->joined && !p->jobs->stopping) {
 		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
 		jobs_step(p->jobs, &ev);

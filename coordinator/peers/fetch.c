@@ -150,24 +150,25 @@ static void answer(struct session *p, const Farm__Fetch *f)
 }
 
 /* Made when somebody asks: it holds up the job's results for as long as an image takes. */
-static bool is_preview_old(const struct jobs *s, const struct live_job *o)
+static bool is_preview_old(const struct jobs *s, const struct live_job *job)
 {
-	return o && o->canvas && !o->ended && (o->preview_made <= 0 || jobs_now(s) - o->preview_made > preview_seconds);
+	return job && job->canvas && !job->ended &&
+	       (job->preview_made <= 0 || jobs_now(s) - job->preview_made > preview_seconds);
 }
 
-void fetch_previews(struct peers *s, uint64_t job)
+void fetch_previews(struct peers *s, uint64_t id)
 {
 	for (struct session *p = s->sessions; p; p = p->next) {
-		struct live_job *o = jobs_find(s->jobs, job);
-		if (p->wants_preview != job || (o && o->busy))
+		struct live_job *job = jobs_find(s->jobs, id);
+		if (p->wants_preview != id || (job && job->busy))
 			continue;
-		if (is_preview_old(s->jobs, o)) {
-			publish_start(s->jobs, o, PUBLISH_PREVIEW, 0);
+		if (is_preview_old(s->jobs, job)) {
+			publish_start(s->jobs, job, PUBLISH_PREVIEW, 0);
 			continue;
 		}
 		Farm__Fetch f;
 		farm__fetch__init(&f);
-		f.job = job;
+		f.job = id;
 		f.what = FARM__WHAT__WHAT_PREVIEW;
 		p->wants_preview = 0;
 		answer(p, &f);

@@ -100,11 +100,11 @@ static const char *name(void *user, uint64_t peer)
 	return p ? p->name : NULL;
 }
 
-static void send_lease(void *user, uint64_t peer, const struct live_job *o, const struct lease_key *k, bool anew)
+static void send_lease(void *user, uint64_t peer, const struct live_job *job, const struct lease_key *k, bool anew)
 {
 	struct session *p = peers_find(user, peer);
 	if (p)
-		worker_send_lease(p, o, k, anew);
+		worker_send_lease(p, job, k, anew);
 }
 
 static void revoke_lease(void *user, uint64_t peer, const struct lease_key *k)

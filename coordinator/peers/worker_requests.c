@@ -13,22 +13,22 @@ enum {
 	ASKS_MOST = 512, /* twice what a worker that has leases of as many jobs as it may hold has to ask */
 };
 
-static void send_job_info(struct session *p, uint64_t job)
+static void send_job_info(struct session *p, uint64_t id)
 {
-	const struct live_job *o = jobs_find(p->jobs, job);
-	if (!o) {
-		worker_send_job_end(p, job);
+	const struct live_job *job = jobs_find(p->jobs, id);
+	if (!job) {
+		worker_send_job_end(p, id);
 		return;
 	}
-	worker_allow_results(p, o);
-	const Farm__Submit *from = live_job_submit(o);
+	worker_allow_results(p, job);
+	const Farm__Submit *from = live_job_submit(job);
 	Farm__JobInfo info;
 	Farm__Plan plan;
 	Farm__Envelope m;
 	farm__job_info__init(&info);
 	farm__envelope__init(&m);
-	plan_to_wire(&o->plan, &plan);
-	info.job = job;
+	plan_to_wire(&job->plan, &plan);
+	info.job = id;
 	info.name = from->name;
 	info.scene = from->scene;
 	info.n_defines = from->n_defines;

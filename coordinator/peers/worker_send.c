@@ -3,9 +3,9 @@
 
 #include "common/base/text.h"
 
-void worker_allow_results(struct session *p, const struct live_job *o)
+void worker_allow_results(struct session *p, const struct live_job *job)
 {
-	uint32_t need = batch_payload_max(&o->plan);
+	uint32_t need = batch_payload_max(&job->plan);
 	if (need > p->payload_limit) {
 		p->payload_limit = need;
 		conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, need});
@@ -22,13 +22,13 @@ static void allow_lease(struct session *p, size_t size)
 	conn_set_send_limit(p->conn, SESSION_SEND + p->leases_most);
 }
 
-void worker_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k, bool anew)
+void worker_send_lease(struct session *p, const struct live_job *job, const struct lease_key *k, bool anew)
 {
 	unsigned char *frame;
 	size_t size;
 	struct error e;
-	worker_allow_results(p, o);
-	if (live_job_pack_lease(o, k, anew, &frame, &size, &e)) {
+	worker_allow_results(p, job);
+	if (live_job_pack_lease(job, k, anew, &frame, &size, &e)) {
 		conn_close(p->conn, e.text);
 		return;
 	}

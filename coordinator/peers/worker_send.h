@@ -10,10 +10,10 @@
 #include "coordinator/peers/session.h"
 
 /* Results of this job may come from now on, and they may be so long. */
-void worker_allow_results(struct session *p, const struct live_job *o);
+void worker_allow_results(struct session *p, const struct live_job *job);
 
 /* anew: with seeds. */
-void worker_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k, bool anew);
+void worker_send_lease(struct session *p, const struct live_job *job, const struct lease_key *k, bool anew);
 void worker_send_revoke(struct session *p, const struct lease_key *k);
 void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);
 void worker_send_job_end(struct session *p, uint64_t job);

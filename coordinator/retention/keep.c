@@ -6,14 +6,14 @@
 
 #include <string.h>
 
-bool keep_order(struct jobs *s, const struct live_job *o)
+bool keep_order(struct jobs *s, const struct live_job *job)
 {
 	char path[SPOOL_PATH_MAX];
 	struct stat st;
-	if (!s->config.keep_bytes || !o->canvas || o->lit.black || canvas_rounds(o->canvas) == 0 ||
-	    (strcmp(o->record.state, job_state_name(JOB_DONE)) != 0 && !o->overflowed))
+	if (!s->config.keep_bytes || !job->canvas || job->lit.black || canvas_rounds(job->canvas) == 0 ||
+	    (strcmp(job->record.state, job_state_name(JOB_DONE)) != 0 && !job->overflowed))
 		return false;
-	spool_job_path(s->spool, o->id, "order", path);
+	spool_job_path(s->spool, job->id, "order", path);
 	return disk_stat(path, &st) == 0;
 }
 

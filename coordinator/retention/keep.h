@@ -10,7 +10,7 @@
 #include "coordinator/job/jobs.h"
 
 /* Of a job that has just ended. false: it cannot go on, and nothing is to be kept. */
-bool keep_order(struct jobs *s, const struct live_job *o);
+bool keep_order(struct jobs *s, const struct live_job *job);
 void keep_drop(const struct jobs *s, uint64_t job);
 uint64_t keep_bytes(const struct jobs *s, uint64_t job); /* on the disk */
 bool keep_drop_all(const struct jobs *s);		 /* of listed jobs; true: there was something */

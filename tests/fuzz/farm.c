@@ -38,8 +38,8 @@ void farm_turn(struct farm_world *w)
 
 static bool is_at_work(const struct server *s)
 {
-	for (const struct live_job *o = s->jobs.orders; o; o = o->next)
-		if (o->busy)
+	for (const struct live_job *job = s->jobs.live; job; job = job->next)
+		if (job->busy)
 			return true;
 	return s->jobs.flushing || s->peers.session_count;
 }

@@ -26,8 +26,8 @@ static struct {
 static uint64_t stored(const struct server *s)
 {
 	uint64_t sum = s->jobs.ended_count;
-	for (const struct live_job *o = s->jobs.orders; o; o = o->next)
-		sum += 1000003 + (o->journal ? journal_bytes(o->journal) : 0);
+	for (const struct live_job *job = s->jobs.live; job; job = job->next)
+		sum += 1000003 + (job->journal ? journal_bytes(job->journal) : 0);
 	return sum;
 }
 

@@ -44,8 +44,8 @@ static void on_look(uv_timer_t *t)
 		return;
 	held = wanted;
 	snprintf(path, sizeof path, "%s/held", folder);
-	for (struct live_job *o = s->jobs.orders; o; o = o->next)
-		o->busy = wanted;
+	for (struct live_job *job = s->jobs.live; job; job = job->next)
+		job->busy = wanted;
 	if (!wanted)
 		jobs_films_free(&s->jobs);
 	if (wanted && fclose(fopen(path, "w")))

@@ -576,7 +576,7 @@ static void a_row_ends_later(void **state)
 	struct server *s = open_here();
 	assert_non_null(s);
 	jobs_step(&s->jobs, &(struct event){.kind = EVENT_CANCEL, .job = job});
-	assert_true(s->jobs.endings && !s->jobs.orders);
+	assert_true(s->jobs.endings && !s->jobs.live);
 	assert_int_equal(ledger_add(s->jobs.ledger, &j, &e), 0);
 	while (s->jobs.endings)
 		uv_run(&s->loop, UV_RUN_ONCE);
@@ -604,20 +604,20 @@ static uint64_t begin_a_job(void)
 static void no_memory_for_an_image(void **state)
 {
 	(void)state;
-	uint64_t job = begin_a_job();
+	uint64_t id = begin_a_job();
 	struct server *s = open_here();
 	assert_non_null(s);
-	struct live_job *o = jobs_find(&s->jobs, job);
-	assert_true(o && o->canvas);
+	struct live_job *job = jobs_find(&s->jobs, id);
+	assert_true(job && job->canvas);
 	for (enum publish_what what = PUBLISH_ERROR_ONLY; what <= PUBLISH_RESULT; what++) {
 		mem_fail_after(0);
-		publish_start(&s->jobs, o, what, live_job_rounds(o));
+		publish_start(&s->jobs, job, what, live_job_rounds(job));
 		mem_fail_after(-1);
-		assert_true(o->busy && !s->jobs.deferred);
-		while (o->busy || (what == PUBLISH_RESULT && !o->record.has_result))
+		assert_true(job->busy && !s->jobs.deferred);
+		while (job->busy || (what == PUBLISH_RESULT && !job->record.has_result))
 			uv_run(&s->loop, UV_RUN_ONCE);
 		struct job_status status;
-		assert_true(farm_job(s->jobs.farm, job, jobs_now(&s->jobs), &status) && status.state == JOB_RUNNING);
+		assert_true(farm_job(s->jobs.farm, id, jobs_now(&s->jobs), &status) && status.state == JOB_RUNNING);
 	}
 	server_close(s);
 }
@@ -641,8 +641,8 @@ static bool opens_without(long allocation)
 	bool failed = has_failed();
 	assert_true(s || failed);
 	if (s) {
-		assert_true(s->jobs.orders && s->jobs.orders->canvas &&
-			    farm_counts(s->jobs.farm, s->jobs.orders->id, &counts));
+		assert_true(s->jobs.live && s->jobs.live->canvas &&
+			    farm_counts(s->jobs.farm, s->jobs.live->id, &counts));
 		server_close(s);
 	}
 	return failed;
