@@ -3,55 +3,56 @@
 
 #include <string.h>
 
-double jobs_now(const struct jobs *s)
+double jobs_now(const struct jobs *jobs)
 {
-	(void)s;
+	(void)jobs;
 	return (double)uv_hrtime() * 1e-9;
 }
 
-bool jobs_is_read(const struct jobs *s, uint64_t job)
+bool jobs_is_read(const struct jobs *jobs, uint64_t job)
 {
-	for (const struct found *f = s->found; f; f = f->next)
+	for (const struct found *f = jobs->found; f; f = f->next)
 		if (f->record.id == job)
 			return true;
-	return s->reading && s->reading->id == job;
+	return jobs->reading && jobs->reading->id == job;
 }
 
-static uint64_t found_film_bytes(const struct jobs *s)
+static uint64_t found_film_bytes(const struct jobs *jobs)
 {
 	uint64_t sum = 0;
-	for (const struct found *f = s->found; f; f = f->next)
+	for (const struct found *f = jobs->found; f; f = f->next)
 		if (f->job && f->job->canvas && !canvas_is_mapped(f->job->canvas))
 			sum += canvas_bytes(&f->job->plan);
 	return sum;
 }
 
-const char *jobs_film_folder(const struct jobs *s, const struct plan *p)
+const char *jobs_film_folder(const struct jobs *jobs, const struct plan *p)
 {
-	uint64_t bytes = canvas_bytes(p) + found_film_bytes(s) + (s->reading ? canvas_bytes(&s->reading->plan) : 0);
-	for (const struct live_job *job = s->live; job; job = job->next)
+	uint64_t bytes =
+		canvas_bytes(p) + found_film_bytes(jobs) + (jobs->reading ? canvas_bytes(&jobs->reading->plan) : 0);
+	for (const struct live_job *job = jobs->live; job; job = job->next)
 		if (job->canvas && !canvas_is_mapped(job->canvas))
 			bytes += canvas_bytes(&job->plan);
-	return bytes <= s->config.film_bytes ? NULL : spool_canvas(s->spool);
+	return bytes <= jobs->config.film_bytes ? NULL : spool_canvas(jobs->spool);
 }
 
-struct live_job *jobs_find(const struct jobs *s, uint64_t id)
+struct live_job *jobs_find(const struct jobs *jobs, uint64_t id)
 {
-	for (struct live_job *job = s->live; job; job = job->next)
+	for (struct live_job *job = jobs->live; job; job = job->next)
 		if (job->id == id)
 			return job;
 	return NULL;
 }
 
-int jobs_within_quota(const struct jobs *s, const char *owner, uint64_t id, uint64_t uploading, const struct plan *plan,
-		      const Farm__Submit *m, struct error *e)
+int jobs_within_quota(const struct jobs *jobs, const char *owner, uint64_t id, uint64_t uploading,
+		      const struct plan *plan, const Farm__Submit *m, struct error *e)
 {
 	struct quota_use has = {.asset_bytes = uploading};
-	for (const struct live_job *job = s->live; job; job = job->next) {
+	for (const struct live_job *job = jobs->live; job; job = job->next) {
 		if (job->ended || job->id == id || strcmp(job->record.owner, owner) != 0)
 			continue;
 		has.jobs++;
 		has.asset_bytes += live_job_asset_bytes(live_job_submit(job));
 	}
-	return quota_check(&s->config.quota, &has, plan, live_job_asset_bytes(m), e);
+	return quota_check(&jobs->config.quota, &has, plan, live_job_asset_bytes(m), e);
 }

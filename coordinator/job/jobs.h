@@ -89,15 +89,15 @@ struct jobs {
 	uint64_t changes;		     /* grows with whatever the status shows */
 };
 
-double jobs_now(const struct jobs *s);			       /* s on the loop's clock */
-struct live_job *jobs_find(const struct jobs *s, uint64_t id); /* NULL: it does not run */
+double jobs_now(const struct jobs *jobs);			  /* s on the loop's clock */
+struct live_job *jobs_find(const struct jobs *jobs, uint64_t id); /* NULL: it does not run */
 /* Where the films of a job of this plan go: NULL: into memory, which is never kept waiting by the disk. */
-const char *jobs_film_folder(const struct jobs *s, const struct plan *p);
+const char *jobs_film_folder(const struct jobs *jobs, const struct plan *p);
 /* It is being read from the spool, to go on. */
-bool jobs_is_read(const struct jobs *s, uint64_t id);
+bool jobs_is_read(const struct jobs *jobs, uint64_t id);
 /* -EDQUOT: the owner has too much already. id: 0, or one that is there already; uploading: bytes of scenes that are on
  * their way. */
-int jobs_within_quota(const struct jobs *s, const char *owner, uint64_t id, uint64_t uploading, const struct plan *plan,
-		      const Farm__Submit *m, struct error *e);
+int jobs_within_quota(const struct jobs *jobs, const char *owner, uint64_t id, uint64_t uploading,
+		      const struct plan *plan, const Farm__Submit *m, struct error *e);
 
 #endif

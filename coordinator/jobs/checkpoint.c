@@ -99,19 +99,19 @@ static void tidied(uv_work_t *work, int status)
 }
 
 /* The journals before `keep` go. */
-static void tidy(struct jobs *s, struct journal *old, const char *folder, uint64_t keep)
+static void tidy(struct jobs *jobs, struct journal *old, const char *folder, uint64_t keep)
 {
 	struct tidying *t = mem_alloc(1, sizeof *t);
 	if (!t) {
 		journal_release(old);
 		journal_clear(folder, keep);
-		s->checkpointing = false;
+		jobs->checkpointing = false;
 		return;
 	}
-	*t = (struct tidying){.jobs = s, .old = old, .keep = keep};
+	*t = (struct tidying){.jobs = jobs, .old = old, .keep = keep};
 	snprintf(t->folder, sizeof t->folder, "%s", folder);
 	t->work.data = t;
-	int rc = uv_queue_work(s->loop, &t->work, run_tidy, tidied);
+	int rc = uv_queue_work(jobs->loop, &t->work, run_tidy, tidied);
 	assert(rc == 0);
 	(void)rc;
 }
@@ -119,7 +119,7 @@ static void tidy(struct jobs *s, struct journal *old, const char *folder, uint64
 static void done(uv_work_t *work, int status)
 {
 	struct writing *w = work->data;
-	struct jobs *s = w->jobs;
+	struct jobs *jobs = w->jobs;
 	struct live_job *job = w->job;
 	uint64_t id = job->id;
 	assert(status == 0);
@@ -129,10 +129,10 @@ static void done(uv_work_t *work, int status)
 	     job->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
 		job->unsure = true;
 		job->generation_least = w->head.generation + 1;
-		job->checkpoint_after = jobs_now(s) + s->config.retry_seconds;
+		job->checkpoint_after = jobs_now(jobs) + jobs->config.retry_seconds;
 	} else if (w->rc) { /* the old ones go on */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-		job->checkpoint_after = jobs_now(s) + pause_seconds;
+		job->checkpoint_after = jobs_now(jobs) + pause_seconds;
 		journal_clear(w->folder, journal_generation(job->journal));
 	} else {
 		job->unsure = false;
@@ -140,7 +140,7 @@ static void done(uv_work_t *work, int status)
 		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
 			  (unsigned long long)canvas_rounds(job->canvas), (unsigned long long)w->bytes,
 			  (unsigned long long)journal_bytes(job->journal));
-		tidy(s, job->journal, w->folder, w->head.generation);
+		tidy(jobs, job->journal, w->folder, w->head.generation);
 		job->journal = w->journal;
 		job->checkpoint_bytes = w->bytes;
 		mem_free(job->merged);
@@ -152,59 +152,59 @@ static void done(uv_work_t *work, int status)
 	}
 	mem_free(w->merged);
 	job->busy = false;
-	s->checkpointing = s->checkpointing && !w->rc;
-	if (!s->stopping && job->unsure)
-		durable_hold(s, job, "its results cannot be stored",
+	jobs->checkpointing = jobs->checkpointing && !w->rc;
+	if (!jobs->stopping && job->unsure)
+		durable_hold(jobs, job, "its results cannot be stored",
 			     w->error.text); /* which is the end of it, if it was cancelled */
-	if (!s->stopping) {
-		jobs_films_free(s);
-		s->peers.films_free(s->peers.user, id);
+	if (!jobs->stopping) {
+		jobs_films_free(jobs);
+		jobs->peers.films_free(jobs->peers.user, id);
 	}
 	mem_free(w);
 }
 
 /* Of a journal. */
-static uint64_t limit_of(const struct jobs *s, const struct live_job *job)
+static uint64_t limit_of(const struct jobs *jobs, const struct live_job *job)
 {
-	return job->checkpoint_bytes > s->config.journal_bytes ? job->checkpoint_bytes : s->config.journal_bytes;
+	return job->checkpoint_bytes > jobs->config.journal_bytes ? job->checkpoint_bytes : jobs->config.journal_bytes;
 }
 
-static void start(struct jobs *s, struct live_job *job)
+static void start(struct jobs *jobs, struct live_job *job)
 {
 	struct job_status status;
 	struct writing *w = mem_alloc(1, sizeof *w);
-	if (!w || !farm_job(s->farm, job->id, jobs_now(s), &status)) {
+	if (!w || !farm_job(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		mem_free(w);
-		job->checkpoint_after = jobs_now(s) + pause_seconds;
+		job->checkpoint_after = jobs_now(jobs) + pause_seconds;
 		return;
 	}
-	w->jobs = s;
+	w->jobs = jobs;
 	w->job = job;
 	w->work.data = w;
-	w->kept_most = limit_of(s, job);
-	spool_job_path(s->spool, job->id, NULL, w->folder);
+	w->kept_most = limit_of(jobs, job);
+	spool_job_path(jobs->spool, job->id, NULL, w->folder);
 	checkpoint_head_of(&w->head, job, &status);
-	job->busy = s->checkpointing = true;
-	int rc = uv_queue_work(s->loop, &w->work, run, done);
+	job->busy = jobs->checkpointing = true;
+	int rc = uv_queue_work(jobs->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
 }
 
-void checkpoint_where_due(struct jobs *s)
+void checkpoint_where_due(struct jobs *jobs)
 {
-	if (s->stepping || s->stopping ||
-	    s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
+	if (jobs->stepping || jobs->stopping ||
+	    jobs->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
-	for (struct live_job *job = s->live; job; job = job->next) {
+	for (struct live_job *job = jobs->live; job; job = job->next) {
 		if (!job->canvas || job->busy || job->ended || job->late_count) /* what waits is in the journal alone */
 			continue;
 		if (canvas_missing(job->canvas)) /* what was taken back is computed at this time */
 			continue;
-		uint64_t limit = limit_of(s, job);
+		uint64_t limit = limit_of(jobs, job);
 		if ((journal_bytes(job->journal) - job->kept_bytes > limit || job->unsure) &&
-		    jobs_now(s) >= job->checkpoint_after)
-			start(s, job);
-		if (s->checkpointing)
+		    jobs_now(jobs) >= job->checkpoint_after)
+			start(jobs, job);
+		if (jobs->checkpointing)
 			return;
 	}
 }

@@ -13,6 +13,6 @@
 #include "coordinator/job/jobs.h"
 
 /* Starts one for each order whose journal is long enough. Not while an update is carried out. */
-void checkpoint_where_due(struct jobs *s);
+void checkpoint_where_due(struct jobs *jobs);
 
 #endif

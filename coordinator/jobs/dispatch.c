@@ -32,27 +32,27 @@
 
 /* ---- jobs ---- */
 
-static void submitted(struct jobs *s, const struct action *a, struct submission *from)
+static void submitted(struct jobs *jobs, const struct action *a, struct submission *from)
 {
 	struct live_job *job;
 	struct error e;
 	const Farm__Submit *m = from->submit->message->submit;
 	from->job = a->job;
-	int rc = spool_take_job(s->spool, a->job, &e);
+	int rc = spool_take_job(jobs->spool, a->job, &e);
 	if (!rc)
-		rc = live_job_new(&job, a->job, from->submit, from->plan, from->owner, 0, s->spool, &e);
-	if (!rc && (rc = durable_begin(s, job, &e))) {
+		rc = live_job_new(&job, a->job, from->submit, from->plan, from->owner, 0, jobs->spool, &e);
+	if (!rc && (rc = durable_begin(jobs, job, &e))) {
 		*from->submit = job->submit;
 		memset(&job->submit, 0, sizeof job->submit);
 		live_job_free(job);
 	}
 	if (rc) {
 		text_copy(from->refusal, sizeof from->refusal, e.text);
-		jobs_break(s, a->job, e.text);
+		jobs_break(jobs, a->job, e.text);
 		return;
 	}
-	job->next = s->live;
-	s->live = job;
+	job->next = jobs->live;
+	jobs->live = job;
 	char plan[PLAN_TEXT];
 	plan_describe(&job->plan, plan, sizeof plan);
 	live_job_log(job, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s",
@@ -65,15 +65,15 @@ static void submitted(struct jobs *s, const struct action *a, struct submission 
 			     (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
 }
 
-static void rejected(struct jobs *s, const struct action *a)
+static void rejected(struct jobs *jobs, const struct action *a)
 {
-	text_copy(s->refusal, sizeof s->refusal, *a->text ? a->text : "refused");
-	s->peers.refused(s->peers.user, a->tag ? a->tag : a->peer, s->refusal);
+	text_copy(jobs->refusal, sizeof jobs->refusal, *a->text ? a->text : "refused");
+	jobs->peers.refused(jobs->peers.user, a->tag ? a->tag : a->peer, jobs->refusal);
 }
 
-static void job_changed(struct jobs *s, const struct action *a)
+static void job_changed(struct jobs *jobs, const struct action *a)
 {
-	struct live_job *job = jobs_find(s, a->job);
+	struct live_job *job = jobs_find(jobs, a->job);
 	if (!job)
 		return;
 	live_job_log(job,
@@ -85,16 +85,16 @@ static void job_changed(struct jobs *s, const struct action *a)
 	job->ended = job_state_is_end(a->state);
 }
 
-void dispatch_prepare(struct jobs *s, struct live_job *job)
+void dispatch_prepare(struct jobs *jobs, struct live_job *job)
 {
 	struct error e = {""};
-	int rc = live_job_prepare(job, jobs_film_folder(s, &job->plan), &e);
+	int rc = live_job_prepare(job, jobs_film_folder(jobs, &job->plan), &e);
 	if (rc && rc != -ENOMEM) {
 		if (!job->unprepared)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
 				     log_quote(e.text).text);
 		job->unprepared = true;
-		job->try_again = jobs_now(s) + s->config.retry_seconds;
+		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
 	}
 	job->unprepared = false;
@@ -105,18 +105,18 @@ void dispatch_prepare(struct jobs *s, struct live_job *job)
 			   .job = job->id,
 			   .text = e.text,
 			   .prepared = {.job = job->id, .ok = rc == 0, .black = job->lit.black}};
-	jobs_defer(s, &ev);
+	jobs_defer(jobs, &ev);
 }
 
 /* ---- batches ---- */
 
-static void keep_partials(const struct jobs *s, const struct lease_key *k, const struct incoming *in)
+static void keep_partials(const struct jobs *jobs, const struct lease_key *k, const struct incoming *in)
 {
 	for (size_t i = 0; i < in->result->n_tile_sizes; i++) {
 		char path[SPOOL_PATH_MAX];
 		size_t size;
 		const unsigned char *bytes = batch_tile_bytes(in->result, in->payload->bytes, i, &size);
-		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials,
+		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", jobs->config.keep_partials,
 			 log_u64(k->job), log_u64(k->epoch), k->group, k->part, in->batch->tiles[i].x,
 			 in->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -128,16 +128,16 @@ static void keep_partials(const struct jobs *s, const struct lease_key *k, const
 	}
 }
 
-static void merge(struct jobs *s, const struct action *a, const struct incoming *in)
+static void merge(struct jobs *jobs, const struct action *a, const struct incoming *in)
 {
-	struct live_job *job = jobs_find(s, a->job);
+	struct live_job *job = jobs_find(jobs, a->job);
 	struct error e;
 	assert(job && in->batch && !job->busy);
-	if (s->config.keep_partials)
-		keep_partials(s, &a->key, in);
+	if (jobs->config.keep_partials)
+		keep_partials(jobs, &a->key, in);
 	uint64_t rounds = live_job_rounds(job);
 	uint64_t at = in->stored_at;
-	int rc = in->stored ? 0 : durable_merged(s, job, in, &at, &e);
+	int rc = in->stored ? 0 : durable_merged(jobs, job, in, &at, &e);
 	if (!rc)
 		rc = live_job_merge(job, in->batch, &e);
 	if (!rc)
@@ -149,17 +149,17 @@ static void merge(struct jobs *s, const struct action *a, const struct incoming 
 	}
 	job->overflowed = job->overflowed || rc == -ERANGE;
 	if (rc)
-		jobs_break(s, a->job, e.text);
+		jobs_break(jobs, a->job, e.text);
 	trust_merged(job, a);
-	live_job_note_times(job, farm_elapsed(s->farm, a->job, jobs_now(s)), rounds);
+	live_job_note_times(job, farm_elapsed(jobs->farm, a->job, jobs_now(jobs)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch),
 		  in->stored ? " late=1" : "");
 }
 
-static void take_back(struct jobs *s, const struct action *a, const struct incoming *in)
+static void take_back(struct jobs *jobs, const struct action *a, const struct incoming *in)
 {
-	struct live_job *job = jobs_find(s, a->job);
+	struct live_job *job = jobs_find(jobs, a->job);
 	assert(job && !job->busy && in->back);
 	back_take(job, in->back);
 	trust_taken_back(job, a->who);
@@ -167,14 +167,14 @@ static void take_back(struct jobs *s, const struct action *a, const struct incom
 		     a->key.group, a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
 }
 
-static void acknowledge(struct jobs *s, const struct action *a)
+static void acknowledge(struct jobs *jobs, const struct action *a)
 {
-	const struct live_job *job = jobs_find(s, a->job);
-	const char *name = s->peers.name(s->peers.user, a->peer);
+	const struct live_job *job = jobs_find(jobs, a->job);
+	const char *name = jobs->peers.name(jobs->peers.user, a->peer);
 	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* what it repeats may not be on the disk yet */
-		durable_ack(s, job, a->peer, &a->key, a->ack);
+		durable_ack(jobs, job, a->peer, &a->key, a->ack);
 	else
-		s->peers.acknowledge(s->peers.user, a->peer, &a->key, a->ack, a->text);
+		jobs->peers.acknowledge(jobs->peers.user, a->peer, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
 		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
@@ -186,85 +186,85 @@ static void acknowledge(struct jobs *s, const struct action *a)
 
 /* ---- leases and peers ---- */
 
-static void send_lease(struct jobs *s, const struct action *a)
+static void send_lease(struct jobs *jobs, const struct action *a)
 {
-	struct live_job *job = jobs_find(s, a->job);
-	if (!s->peers.name(s->peers.user, a->peer) || !job || late_withholds(job, &a->key, a->peer))
+	struct live_job *job = jobs_find(jobs, a->job);
+	if (!jobs->peers.name(jobs->peers.user, a->peer) || !job || late_withholds(job, &a->key, a->peer))
 		return;
 	live_job_count_worker(job, a->peer);
-	s->peers.send_lease(s->peers.user, a->peer, job, &a->key, a->anew);
+	jobs->peers.send_lease(jobs->peers.user, a->peer, job, &a->key, a->anew);
 	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
 }
 
-static void revoke_lease(struct jobs *s, const struct action *a)
+static void revoke_lease(struct jobs *jobs, const struct action *a)
 {
-	s->peers.revoke(s->peers.user, a->peer, &a->key);
+	jobs->peers.revoke(jobs->peers.user, a->peer, &a->key);
 	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
 }
 
-static void close_peer(struct jobs *s, const struct action *a)
+static void close_peer(struct jobs *jobs, const struct action *a)
 {
-	live_jobs_drop_waiting(s->live, a->peer); /* it may come back, with the same */
-	s->peers.dismiss(s->peers.user, a->peer, a->text);
+	live_jobs_drop_waiting(jobs->live, a->peer); /* it may come back, with the same */
+	jobs->peers.dismiss(jobs->peers.user, a->peer, a->text);
 }
 
-void dispatch_update(struct jobs *s, const struct update *u, const struct incoming *in)
+void dispatch_update(struct jobs *jobs, const struct update *u, const struct incoming *in)
 {
 	for (size_t i = 0; i < u->count; i++) {
 		const struct action *a = &u->actions[i];
 		switch (a->kind) {
 		case ACTION_SUBMITTED:
-			submitted(s, a, in->submission);
+			submitted(jobs, a, in->submission);
 			break;
 		case ACTION_CANCELLED:
 			break;
 		case ACTION_REJECTED:
-			rejected(s, a);
+			rejected(jobs, a);
 			break;
 		case ACTION_SEND_LEASE:
-			send_lease(s, a);
+			send_lease(jobs, a);
 			break;
 		case ACTION_REVOKE:
-			revoke_lease(s, a);
+			revoke_lease(jobs, a);
 			break;
 		case ACTION_MERGE:
-			merge(s, a, in);
+			merge(jobs, a, in);
 			break;
 		case ACTION_ACK:
-			acknowledge(s, a);
+			acknowledge(jobs, a);
 			break;
 		case ACTION_BOOTSTRAP_DONE:
-			dispatch_prepare(s, jobs_find(s, a->job));
+			dispatch_prepare(jobs, jobs_find(jobs, a->job));
 			break;
 		case ACTION_ROUND_DONE:
 			break;
 		case ACTION_EVALUATE_ERROR:
-			publish_start(s, jobs_find(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
+			publish_start(jobs, jobs_find(jobs, a->job), PUBLISH_ERROR_ONLY, a->rounds);
 			break;
 		case ACTION_PUBLISH:
-			publish_start(s, jobs_find(s, a->job), PUBLISH_RESULT, a->rounds);
+			publish_start(jobs, jobs_find(jobs, a->job), PUBLISH_RESULT, a->rounds);
 			break;
 		case ACTION_JOB_CHANGED:
-			job_changed(s, a);
+			job_changed(jobs, a);
 			break;
 		case ACTION_JOB_FORGOTTEN:
 			break;
 		case ACTION_TAKE_BACK:
-			take_back(s, a, in);
+			take_back(jobs, a, in);
 			break;
 		case ACTION_CHAINS_ANEW:
-			trust_anew(s, a);
+			trust_anew(jobs, a);
 			break;
 		case ACTION_WRONG:
-			trust_wrong(s, a);
+			trust_wrong(jobs, a);
 			break;
 		case ACTION_QUARANTINE:
-			trust_quarantined(s, a);
+			trust_quarantined(jobs, a);
 			break;
 		case ACTION_CLOSE_PEER:
-			close_peer(s, a);
+			close_peer(jobs, a);
 			break;
 		}
 	}

@@ -8,8 +8,8 @@
 struct incoming;
 
 /* in: what the event brought that the update answers. */
-void dispatch_update(struct jobs *s, const struct update *u, const struct incoming *in);
+void dispatch_update(struct jobs *jobs, const struct update *u, const struct incoming *in);
 /* All of its bootstrap is merged: its films, or another try later, when the disk has no room for them. */
-void dispatch_prepare(struct jobs *s, struct live_job *job);
+void dispatch_prepare(struct jobs *jobs, struct live_job *job);
 
 #endif

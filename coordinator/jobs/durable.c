@@ -83,7 +83,7 @@ int durable_pack(const struct live_job *job, struct ledger_job *j, unsigned char
 	return rc;
 }
 
-int durable_begin(struct jobs *s, struct live_job *job, struct error *e)
+int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission, *plan;
@@ -94,23 +94,23 @@ int durable_begin(struct jobs *s, struct live_job *job, struct error *e)
 			       .priority = job->record.priority,
 			       .mixed = live_job_submit(job)->mixed,
 			       .submitted = job->record.submitted};
-	spool_job_path(s->spool, job->id, NULL, folder);
+	spool_job_path(jobs->spool, job->id, NULL, folder);
 	int rc = durable_pack(job, &j, &submission, &plan, e);
 	if (!rc)
 		rc = journal_create(&job->journal, folder, job->id, 0, e);
 	if (!rc)
-		rc = ledger_add(s->ledger, &j, e);
+		rc = ledger_add(jobs->ledger, &j, e);
 	if (!rc) { /* after the row: without one it says that the row was lost */
 		j.held = "";
-		rc = row_file_write(s->spool, &j, e);
+		rc = row_file_write(jobs->spool, &j, e);
 		if (rc)
-			ledger_end(s->ledger, job->id, 0, "failed", NULL);
+			ledger_end(jobs->ledger, job->id, 0, "failed", NULL);
 	}
 	if (rc) { /* should the row be there all the same: nobody waits for the job */
 		text_copy(job->record.state, sizeof job->record.state, "failed");
 		text_copy(job->record.why, sizeof job->record.why, e ? e->text : "");
 		job->record.exit_code = 3;
-		spool_write_record(s->spool, &job->record, NULL);
+		spool_write_record(jobs->spool, &job->record, NULL);
 	}
 	mem_free(submission);
 	mem_free(plan);
@@ -118,46 +118,46 @@ int durable_begin(struct jobs *s, struct live_job *job, struct error *e)
 }
 
 /* Its journal goes only when the record says for good that it has ended. kept: the films stay (keep.h). */
-static int write_end(struct jobs *s, const struct job_record *r, bool kept, struct error *e)
+static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
-	int rc = spool_write_record(s->spool, r, e);
+	int rc = spool_write_record(jobs->spool, r, e);
 	if (rc && !r->has_result) /* what it has merged is for nobody, and may be what fills the disk */
-		keep_drop(s, r->id);
+		keep_drop(jobs, r->id);
 	if (rc == -ENOSPC)
-		keep_drop_all(s);
+		keep_drop_all(jobs);
 	if (rc)
-		rc = spool_write_record(s->spool, r, e);
+		rc = spool_write_record(jobs->spool, r, e);
 	if (!rc && !kept)
-		keep_drop(s, r->id);
+		keep_drop(jobs, r->id);
 	return rc;
 }
 
-static void end_later(struct jobs *s, const struct job_record *r, bool written)
+static void end_later(struct jobs *jobs, const struct job_record *r, bool written)
 {
 	struct ending *n = mem_alloc(1, sizeof *n);
 	if (!n)
 		return;
-	*n = (struct ending){s->endings, *r, written};
-	s->endings = n;
-	s->endings_again = jobs_now(s) + s->config.retry_seconds;
+	*n = (struct ending){jobs->endings, *r, written};
+	jobs->endings = n;
+	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
 }
 
-void durable_end_row(struct jobs *s, const struct job_record *r)
+void durable_end_row(struct jobs *jobs, const struct job_record *r)
 {
 	struct error e;
-	if (ledger_end(s->ledger, r->id, r->extended, r->state, &e) == 0)
+	if (ledger_end(jobs->ledger, r->id, r->extended, r->state, &e) == 0)
 		return;
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id,
 		  log_quote(e.text).text);
-	end_later(s, r, true);
+	end_later(jobs, r, true);
 }
 
-int durable_end(struct jobs *s, struct live_job *job)
+int durable_end(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
 	if (journal_write(job->journal, &e)) /* for whoever extends it; what is not stored is computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	int rc = write_end(s, &job->record, keep_order(s, job), &e);
+	int rc = write_end(jobs, &job->record, keep_order(jobs, job), &e);
 	if (rc)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 	if (rc && job->record.has_result) {
@@ -165,9 +165,9 @@ int durable_end(struct jobs *s, struct live_job *job)
 		return rc;
 	}
 	if (rc) {
-		end_later(s, &job->record, false);
+		end_later(jobs, &job->record, false);
 	} else {
-		durable_end_row(s, &job->record);
+		durable_end_row(jobs, &job->record);
 		journal_settle(job->journal); /* the record says more than what still waits for a flush */
 	}
 	journal_release(job->journal); /* with its last holder it gives up its room, too */
@@ -175,43 +175,43 @@ int durable_end(struct jobs *s, struct live_job *job)
 	return 0;
 }
 
-static void end_again(struct jobs *s)
+static void end_again(struct jobs *jobs)
 {
 	struct error e;
-	if (!s->endings || jobs_now(s) < s->endings_again)
+	if (!jobs->endings || jobs_now(jobs) < jobs->endings_again)
 		return;
-	s->endings_again = jobs_now(s) + s->config.retry_seconds;
-	for (struct ending *n; (n = s->endings);) {
+	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
+	for (struct ending *n; (n = jobs->endings);) {
 		const struct job_record *r = &n->record;
-		n->written = n->written || write_end(s, r, false, &e) == 0;
-		if (!n->written || ledger_end(s->ledger, r->id, r->extended, r->state, &e))
+		n->written = n->written || write_end(jobs, r, false, &e) == 0;
+		if (!n->written || ledger_end(jobs->ledger, r->id, r->extended, r->state, &e))
 			return;
-		s->endings = n->next;
+		jobs->endings = n->next;
 		mem_free(n);
 	}
 }
 
 /* ---- batches ---- */
 
-static void hold(struct jobs *s, struct live_job *job, const char *text)
+static void hold(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .text = text};
 	if (!*text != !job->held) {
 		live_job_log(job, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
 		job->held = *text != 0;
 	}
-	job->try_again = jobs_now(s) + s->config.retry_seconds;
-	jobs_step(s, &ev);
+	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
+	jobs_step(jobs, &ev);
 }
 
-void durable_hold(struct jobs *s, struct live_job *job, const char *what, const char *why)
+void durable_hold(struct jobs *jobs, struct live_job *job, const char *what, const char *why)
 {
 	char text[256];
 	text_print(text, sizeof text, "%s: %s", what, why);
-	hold(s, job, text);
+	hold(jobs, job, text);
 }
 
-int durable_reserve(struct jobs *s, struct live_job *job, struct incoming *in, struct error *e)
+int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in, struct error *e)
 {
 	union {
 		const Farm__LeaseResult *from;
@@ -229,35 +229,35 @@ int durable_reserve(struct jobs *s, struct live_job *job, struct incoming *in, s
 	size_t size = in->frame_size + in->payload->size;
 	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
 	rc = journal_reserve(job->journal, size + PINNED_ROOM, e);
-	if (rc == -ENOSPC && keep_drop_all(s))
+	if (rc == -ENOSPC && keep_drop_all(jobs))
 		rc = journal_reserve(job->journal, size + PINNED_ROOM, e);
 	if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
 		rc = canvas_reserve(job->canvas, in->batch, e);
 	if (!rc)
 		return 0;
 	job->held_bytes = size;
-	durable_hold(s, job, "its results cannot be stored", e->text);
+	durable_hold(jobs, job, "its results cannot be stored", e->text);
 	return rc;
 }
 
 /* Whose it is, once, before its first batch. */
-static int write_pinned(struct jobs *s, struct live_job *job, double elapsed, struct error *e)
+static int write_pinned(struct jobs *jobs, struct live_job *job, double elapsed, struct error *e)
 {
 	struct job_status status;
-	if (job->pinned || !farm_job(s->farm, job->id, jobs_now(s), &status) || !*status.fingerprint)
+	if (job->pinned || !farm_job(jobs->farm, job->id, jobs_now(jobs), &status) || !*status.fingerprint)
 		return 0;
 	job->pinned = true;
 	return journal_append(job->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint,
 			      strlen(status.fingerprint), NULL, e);
 }
 
-int durable_merged(struct jobs *s, struct live_job *job, const struct incoming *in, uint64_t *at, struct error *e)
+int durable_merged(struct jobs *jobs, struct live_job *job, const struct incoming *in, uint64_t *at, struct error *e)
 {
 	const struct lease_key *k = &in->batch->key;
 	bool again = k->kind == LEASE_RENDER && job->again[(size_t)k->group * job->plan.parts + k->part];
-	double elapsed = farm_elapsed(s->farm, job->id, jobs_now(s));
+	double elapsed = farm_elapsed(jobs->farm, job->id, jobs_now(jobs));
 	assert(in->frame);
-	int rc = write_pinned(s, job, elapsed, e);
+	int rc = write_pinned(jobs, job, elapsed, e);
 	*at = journal_bytes(job->journal);
 	return rc ? rc
 		  : journal_append(job->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, in->frame,
@@ -266,7 +266,7 @@ int durable_merged(struct jobs *s, struct live_job *job, const struct incoming *
 
 /* ---- group commit ---- */
 
-static void flush_next(struct jobs *s);
+static void flush_next(struct jobs *jobs);
 
 static void run(uv_work_t *work)
 {
@@ -285,109 +285,109 @@ static void drop_ack(struct durable_ack *a)
 	mem_free(a);
 }
 
-static void queue(struct jobs *s, struct durable_ack *a)
+static void queue(struct jobs *jobs, struct durable_ack *a)
 {
 	a->next = NULL;
-	*s->acks_last = a;
-	s->acks_last = &a->next;
+	*jobs->acks_last = a;
+	jobs->acks_last = &a->next;
 }
 
 /* It waits until the journal is a good one again. */
-static void park(struct jobs *s, struct durable_ack *a)
+static void park(struct jobs *jobs, struct durable_ack *a)
 {
-	struct live_job *job = s->stopping ? NULL : jobs_find(s, a->key.job);
+	struct live_job *job = jobs->stopping ? NULL : jobs_find(jobs, a->key.job);
 	if (!job) {
 		drop_ack(a);
 		return;
 	}
 	if (a->journal != job->journal) { /* which is settled by now */
-		queue(s, a);
+		queue(jobs, a);
 		return;
 	}
-	a->next = s->parked;
-	s->parked = a;
+	a->next = jobs->parked;
+	jobs->parked = a;
 	if (!job->held)
-		durable_hold(s, job, "its results cannot be stored", "its journal failed to be written");
+		durable_hold(jobs, job, "its results cannot be stored", "its journal failed to be written");
 }
 
-static void answer(struct jobs *s, struct durable_ack *a)
+static void answer(struct jobs *jobs, struct durable_ack *a)
 {
 	if (a->failed) {
-		park(s, a);
+		park(jobs, a);
 		return;
 	}
 	if (a->ack == ACK_MERGED)
 		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu",
 			  (unsigned long long)a->key.job, (unsigned long long)a->peer, (int)a->key.kind, a->key.group,
 			  a->key.part, (unsigned long long)a->key.epoch);
-	if (!s->stopping && a->peer != NOBODY)
-		s->peers.acknowledge(s->peers.user, a->peer, &a->key, a->ack, "");
+	if (!jobs->stopping && a->peer != NOBODY)
+		jobs->peers.acknowledge(jobs->peers.user, a->peer, &a->key, a->ack, "");
 	drop_ack(a);
 }
 
 static void done(uv_work_t *work, int status)
 {
 	struct flush *w = work->data;
-	struct jobs *s = w->jobs;
+	struct jobs *jobs = w->jobs;
 	assert(status == 0);
 	(void)status;
-	s->flushing = false;
+	jobs->flushing = false;
 	while (w->acks) {
 		struct durable_ack *a = w->acks;
 		w->acks = a->next;
-		answer(s, a);
+		answer(jobs, a);
 	}
 	mem_free(w);
-	flush_next(s);
+	flush_next(jobs);
 }
 
-static void flush_next(struct jobs *s)
+static void flush_next(struct jobs *jobs)
 {
-	if (s->flushing || !s->acks)
+	if (jobs->flushing || !jobs->acks)
 		return;
 	struct flush *w = mem_alloc(1, sizeof *w);
 	if (!w) /* as for an event: without 200 bytes nothing goes on */
 		abort();
-	w->jobs = s;
-	w->acks = s->acks;
+	w->jobs = jobs;
+	w->acks = jobs->acks;
 	w->work.data = w;
-	s->acks = NULL;
-	s->acks_last = &s->acks;
-	s->flushing = true;
-	int rc = uv_queue_work(s->loop, &w->work, run, done);
+	jobs->acks = NULL;
+	jobs->acks_last = &jobs->acks;
+	jobs->flushing = true;
+	int rc = uv_queue_work(jobs->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
 }
 
-void durable_ack(struct jobs *s, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack)
+void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
 	if (!a) /* not answered: the worker offers it again, and it is a repeat */
 		return;
 	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = job->journal};
 	journal_hold(a->journal);
-	queue(s, a);
-	flush_next(s);
+	queue(jobs, a);
+	flush_next(jobs);
 }
 
 /* ---- the rest ---- */
 
 /* What nobody waits for: it need not be safe at once, but soon. */
-static int append_note(struct jobs *s, const struct live_job *job, enum journal_kind kind, double elapsed,
+static int append_note(struct jobs *jobs, const struct live_job *job, enum journal_kind kind, double elapsed,
 		       const void *bytes, size_t size, struct error *e)
 {
 	int rc = journal_append(job->journal, kind, NULL, elapsed, bytes, size, NULL, e);
 	if (!rc)
-		durable_ack(s, job, NOBODY, &(struct lease_key){.job = job->id}, ACK_REPEAT);
+		durable_ack(jobs, job, NOBODY, &(struct lease_key){.job = job->id}, ACK_REPEAT);
 	return rc;
 }
 
-void durable_look(struct jobs *s, uint64_t id)
+void durable_look(struct jobs *jobs, uint64_t id)
 {
-	struct live_job *job = jobs_find(s, id);
+	struct live_job *job = jobs_find(jobs, id);
 	struct job_status status;
 	struct error e;
-	if (!job || !farm_job(s->farm, id, jobs_now(s), &status) || status.looks->count == 0)
+	if (!job || !farm_job(jobs->farm, id, jobs_now(jobs), &status) || status.looks->count == 0)
 		return;
 	const struct forecast_look *l = &status.looks->looks[status.looks->count - 1];
 	if (l->work <= job->look_written)
@@ -396,48 +396,48 @@ void durable_look(struct jobs *s, uint64_t id)
 	/* Only forecasts are made of it: the look itself is taken again. */
 	unsigned char note[STORED_NOTE_MOST];
 	size_t size = stored_pack_look(l, note);
-	if (append_note(s, job, JOURNAL_LOOK, farm_elapsed(s->farm, id, jobs_now(s)), note, size, &e))
+	if (append_note(jobs, job, JOURNAL_LOOK, farm_elapsed(jobs->farm, id, jobs_now(jobs)), note, size, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(e.text).text);
 }
 
 /* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and
  * takes the journal's place. */
-static void write_counts(struct jobs *s, struct live_job *job)
+static void write_counts(struct jobs *jobs, struct live_job *job)
 {
 	struct job_counts now;
 	struct error e;
-	if (job->ended || job->busy || !farm_counts(s->farm, job->id, &now) ||
+	if (job->ended || job->busy || !farm_counts(jobs->farm, job->id, &now) ||
 	    memcmp(&now, &job->counts, sizeof now) == 0)
 		return;
 	unsigned char note[STORED_NOTE_MOST];
-	if (append_note(s, job, JOURNAL_COUNTS, job->times.elapsed, note, stored_pack_counts(&now, note), &e) == 0)
+	if (append_note(jobs, job, JOURNAL_COUNTS, job->times.elapsed, note, stored_pack_counts(&now, note), &e) == 0)
 		job->counts = now;
 }
 
 /* The answers that waited for the journals of jobs that are no longer bad. */
-static void unpark(struct jobs *s)
+static void unpark(struct jobs *jobs)
 {
-	struct durable_ack *list = s->parked;
-	s->parked = NULL;
+	struct durable_ack *list = jobs->parked;
+	jobs->parked = NULL;
 	for (struct durable_ack *a, *next = list; (a = next);) {
-		struct live_job *job = jobs_find(s, a->key.job);
+		struct live_job *job = jobs_find(jobs, a->key.job);
 		next = a->next;
 		if (!job) {
 			drop_ack(a);
 		} else if (a->journal == job->journal && journal_is_bad(a->journal)) {
-			a->next = s->parked;
-			s->parked = a;
+			a->next = jobs->parked;
+			jobs->parked = a;
 		} else {
-			queue(s, a);
+			queue(jobs, a);
 		}
 	}
-	flush_next(s);
+	flush_next(jobs);
 }
 
-int durable_mend(struct jobs *s, struct live_job *job)
+int durable_mend(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
-	job->try_again = jobs_now(s) + s->config.retry_seconds;
+	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
 	if (job->unsure)
 		return -EAGAIN;
 	int rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
@@ -446,29 +446,29 @@ int durable_mend(struct jobs *s, struct live_job *job)
 	if (!rc)
 		rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
 	if (!rc)
-		hold(s, job, "");
+		hold(jobs, job, "");
 	return rc;
 }
 
-void durable_tick(struct jobs *s)
+void durable_tick(struct jobs *jobs)
 {
-	for (struct live_job *job = s->live; job; job = job->next)
-		write_counts(s, job);
-	if (s->parked)
-		unpark(s);
-	end_again(s);
+	for (struct live_job *job = jobs->live; job; job = job->next)
+		write_counts(jobs, job);
+	if (jobs->parked)
+		unpark(jobs);
+	end_again(jobs);
 }
 
-void durable_close(struct jobs *s)
+void durable_close(struct jobs *jobs)
 {
-	assert(!s->flushing && !s->acks);
-	for (struct durable_ack *a; (a = s->parked);) {
-		s->parked = a->next;
+	assert(!jobs->flushing && !jobs->acks);
+	for (struct durable_ack *a; (a = jobs->parked);) {
+		jobs->parked = a->next;
 		drop_ack(a);
 	}
-	for (struct ending *n; (n = s->endings);) {
-		s->endings = n->next;
+	for (struct ending *n; (n = jobs->endings);) {
+		jobs->endings = n->next;
 		mem_free(n);
 	}
-	ledger_close(s->ledger);
+	ledger_close(jobs->ledger);
 }

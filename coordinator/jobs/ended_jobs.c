@@ -10,43 +10,43 @@
 #include <string.h>
 #include <time.h>
 
-void ended_jobs_add(struct jobs *s, const struct job_record *r)
+void ended_jobs_add(struct jobs *jobs, const struct job_record *r)
 {
-	if (s->ended_count == ENDED_MAX) {
-		keep_drop(s, s->ended[0].id); /* nobody would count its films any more */
-		memmove(s->ended, s->ended + 1, --s->ended_count * sizeof *s->ended);
+	if (jobs->ended_count == ENDED_MAX) {
+		keep_drop(jobs, jobs->ended[0].id); /* nobody would count its films any more */
+		memmove(jobs->ended, jobs->ended + 1, --jobs->ended_count * sizeof *jobs->ended);
 	}
-	s->ended[s->ended_count++] = *r;
+	jobs->ended[jobs->ended_count++] = *r;
 }
 
-void ended_jobs_remove(struct jobs *s, uint64_t job)
+void ended_jobs_remove(struct jobs *jobs, uint64_t job)
 {
-	for (size_t i = 0; i < s->ended_count; i++)
-		if (s->ended[i].id == job) {
-			memmove(&s->ended[i], &s->ended[i + 1], (--s->ended_count - i) * sizeof *s->ended);
+	for (size_t i = 0; i < jobs->ended_count; i++)
+		if (jobs->ended[i].id == job) {
+			memmove(&jobs->ended[i], &jobs->ended[i + 1], (--jobs->ended_count - i) * sizeof *jobs->ended);
 			return;
 		}
 }
 
 /* Jobs of an earlier run that have ended, and those that were never accepted: whoever submitted them has no answer. */
-int ended_jobs_open(struct jobs *s, struct error *e)
+int ended_jobs_open(struct jobs *jobs, struct error *e)
 {
 	uint64_t *ids;
 	size_t count;
-	int rc = spool_jobs(s->spool, &ids, &count, e);
+	int rc = spool_jobs(jobs->spool, &ids, &count, e);
 	if (rc)
 		return rc;
-	s->ended = mem_alloc(ENDED_MAX, sizeof *s->ended);
-	if (!s->ended) {
+	jobs->ended = mem_alloc(ENDED_MAX, sizeof *jobs->ended);
+	if (!jobs->ended) {
 		mem_free(ids);
 		return error_set(e, ENOMEM, "no memory for the list of jobs");
 	}
 	for (size_t i = count > ENDED_MAX ? count - ENDED_MAX : 0; i < count; i++) {
-		struct job_record *r = &s->ended[s->ended_count];
+		struct job_record *r = &jobs->ended[jobs->ended_count];
 		struct error fault;
-		if (restore_lives(s, ids[i]))
+		if (restore_lives(jobs, ids[i]))
 			continue;
-		rc = spool_read_record(s->spool, ids[i], r, &fault);
+		rc = spool_read_record(jobs->spool, ids[i], r, &fault);
 		if (rc == -ENOENT) /* the number of a job that did not get as far as a record */
 			continue;
 		if (rc) {
@@ -60,14 +60,14 @@ int ended_jobs_open(struct jobs *s, struct error *e)
 			text_copy(r->why, sizeof r->why, "the coordinator stopped before the job was accepted");
 			r->exit_code = 3;
 			r->ended = (double)time(NULL);
-			r->ended_seen = ages_now(s);
-			if (spool_write_record(s->spool, r, &fault))
+			r->ended_seen = ages_now(jobs);
+			if (spool_write_record(jobs->spool, r, &fault))
 				log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(fault.text).text);
 		}
-		s->ended_count++;
+		jobs->ended_count++;
 	}
 	mem_free(ids);
-	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(s->config.spool).text, s->ended_count,
-		  (unsigned long long)spool_next_job(s->spool));
+	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(jobs->config.spool).text, jobs->ended_count,
+		  (unsigned long long)spool_next_job(jobs->spool));
 	return 0;
 }

@@ -6,8 +6,8 @@
 #include "coordinator/job/jobs.h"
 
 /* Reads those of earlier runs. One that cannot be read is logged and left out. */
-int ended_jobs_open(struct jobs *s, struct error *e);
-void ended_jobs_add(struct jobs *s, const struct job_record *r); /* it has ended */
-void ended_jobs_remove(struct jobs *s, uint64_t job);		 /* it goes on */
+int ended_jobs_open(struct jobs *jobs, struct error *e);
+void ended_jobs_add(struct jobs *jobs, const struct job_record *r); /* it has ended */
+void ended_jobs_remove(struct jobs *jobs, uint64_t job);	    /* it goes on */
 
 #endif

@@ -42,7 +42,7 @@ static struct extension_from where(const struct live_job *job, double seconds, b
 				       .ended = ended};
 }
 
-static int plan_of(const struct jobs *s, const struct requester *by, const struct live_job *job,
+static int plan_of(const struct jobs *jobs, const struct requester *by, const struct live_job *job,
 		   const struct extension *x, const struct extension_from *from, struct plan_request *asked,
 		   struct plan *plan, struct error *e)
 {
@@ -51,7 +51,7 @@ static int plan_of(const struct jobs *s, const struct requester *by, const struc
 		rc = extend_plan(&job->plan, x, from, asked, plan, e);
 	if (rc || by->unbounded)
 		return rc;
-	return jobs_within_quota(s, by->owner, job->id, s->peers.uploading(s->peers.user, by->peer), plan,
+	return jobs_within_quota(jobs, by->owner, job->id, jobs->peers.uploading(jobs->peers.user, by->peer), plan,
 				 live_job_submit(job), e);
 }
 
@@ -68,15 +68,15 @@ static void set_bounds(struct live_job *job, const struct plan_request *asked, c
 		canvas_set_rounds(job->canvas, plan->rounds);
 }
 
-static int store(struct jobs *s, const struct live_job *job, struct error *e)
+static int store(struct jobs *jobs, const struct live_job *job, struct error *e)
 {
 	struct ledger_job j = {.id = job->id, .extended = job->record.extended};
 	unsigned char *submission, *plan;
 	int rc = durable_pack(job, &j, &submission, &plan, e);
 	if (!rc)
-		rc = ledger_extend(s->ledger, &j, e);
+		rc = ledger_extend(jobs->ledger, &j, e);
 	if (!rc)
-		reconcile_row(s, job->id);
+		reconcile_row(jobs, job->id);
 	mem_free(submission);
 	mem_free(plan);
 	return rc;
@@ -109,38 +109,38 @@ static void note(const struct requester *by, struct live_job *job, char *text, s
 
 /* ---- a job that runs ---- */
 
-static int extend_live(struct jobs *s, const struct requester *by, struct live_job *job, const struct extension *x,
+static int extend_live(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct extension *x,
 		       char *text, size_t size, struct error *e)
 {
 	struct plan_request asked, old_asked;
 	struct plan plan, old = job->plan;
-	double seconds = farm_elapsed(s->farm, job->id, jobs_now(s));
+	double seconds = farm_elapsed(jobs->farm, job->id, jobs_now(jobs));
 	struct extension_from from = where(job, isnan(seconds) ? 0 : seconds, false);
 	int rc = plan_request_from_wire(live_job_submit(job)->plan, &old_asked, e);
 	if (!rc)
-		rc = plan_of(s, by, job, x, &from, &asked, &plan, e);
+		rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;
 	set_bounds(job, &asked, &plan);
-	rc = store(s, job, e);
+	rc = store(jobs, job, e);
 	if (rc) {
 		set_bounds(job, &old_asked, &old);
 		return rc;
 	}
 	note(by, job, text, size);
 	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = job->id, .plan = &job->plan};
-	jobs_step(s, &ev);
+	jobs_step(jobs, &ev);
 	return 0;
 }
 
 /* ---- a job that is done ---- */
 
 /* What is kept of it beside its row. */
-static int read_job(const struct jobs *s, uint64_t job, struct row_file *f, struct error *e)
+static int read_job(const struct jobs *jobs, uint64_t job, struct row_file *f, struct error *e)
 {
 	struct ledger_job j;
-	int rc = ledger_get(s->ledger, job, &j, e);
-	rc = rc == 0 ? -ENOENT : rc < 0 ? rc : row_file_read(s->spool, job, f, e);
+	int rc = ledger_get(jobs->ledger, job, &j, e);
+	rc = rc == 0 ? -ENOENT : rc < 0 ? rc : row_file_read(jobs->spool, job, f, e);
 	if (rc == -ENOENT)
 		return error_set(e, ENOENT, "its films have been cleared: %s", again);
 	return rc ? error_prefix(e, rc, "what was kept of it") : 0;
@@ -157,33 +157,33 @@ static void take_counts(struct job_counts *c, const struct job_record *r)
 }
 
 /* r: as it was remembered. */
-static int begin_again(struct jobs *s, const struct requester *by, struct live_job *job, const struct job_record *r,
+static int begin_again(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct job_record *r,
 		       struct error *e)
 {
 	job->record.extended++;
-	int rc = store(s, job, e);
+	int rc = store(jobs, job, e);
 	if (rc)
 		return rc;
 	job->record.has_result = r->has_result;
 	take_counts(&job->counts, r);
-	job->next = s->live;
-	s->live = job;
-	ended_jobs_remove(s, job->id);
-	s->refusal[0] = 0;
-	rc = restore_tell(s, job, "", by->peer, e);
-	if (!rc && !*s->refusal)
+	job->next = jobs->live;
+	jobs->live = job;
+	ended_jobs_remove(jobs, job->id);
+	jobs->refusal[0] = 0;
+	rc = restore_tell(jobs, job, "", by->peer, e);
+	if (!rc && !*jobs->refusal)
 		return 0;
 	if (!rc)
-		rc = error_set(e, EAGAIN, "%s", s->refusal);
-	s->live = job->next;
-	ended_jobs_add(s, r);
+		rc = error_set(e, EAGAIN, "%s", jobs->refusal);
+	jobs->live = job->next;
+	ended_jobs_add(jobs, r);
 	struct job_record over = *r;
 	over.extended = job->record.extended;
-	durable_end_row(s, &over);
+	durable_end_row(jobs, &over);
 	return rc;
 }
 
-static int extend_read(struct jobs *s, const struct requester *by, struct live_job *job, const struct extension *x,
+static int extend_read(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct extension *x,
 		       const struct job_record *r, char *text, size_t size, struct error *e)
 {
 	struct plan_request asked;
@@ -191,12 +191,12 @@ static int extend_read(struct jobs *s, const struct requester *by, struct live_j
 	if (live_job_rounds(job) == 0)
 		return error_set(e, ENOENT, "its films have been cleared: %s", again);
 	struct extension_from from = where(job, isnan(job->times.completed) ? 0 : job->times.completed, true);
-	int rc = plan_of(s, by, job, x, &from, &asked, &plan, e);
+	int rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;
 	set_bounds(job, &asked, &plan);
 	note(by, job, text, size);
-	return begin_again(s, by, job, r, e);
+	return begin_again(jobs, by, job, r, e);
 }
 
 struct extension_request {
@@ -205,9 +205,9 @@ struct extension_request {
 	struct extension what;
 };
 
-static void answer(struct jobs *s, uint64_t peer, int rc, const struct error *e, const char *text)
+static void answer(struct jobs *jobs, uint64_t peer, int rc, const struct error *e, const char *text)
 {
-	s->peers.extended(s->peers.user, peer, rc ? e->text : NULL, text);
+	jobs->peers.extended(jobs->peers.user, peer, rc ? e->text : NULL, text);
 }
 
 /* Films of hundreds of megabytes, which the pool reads, those of one job at a time. */
@@ -233,150 +233,152 @@ static void run(uv_work_t *work)
 static void done(uv_work_t *work, int status)
 {
 	struct reading *w = work->data;
-	struct jobs *s = w->jobs;
-	bool here = !s->stopping && s->peers.name(s->peers.user, w->by.peer);
+	struct jobs *jobs = w->jobs;
+	bool here = !jobs->stopping && jobs->peers.name(jobs->peers.user, w->by.peer);
 	char text[256] = "";
 	assert(status == 0);
 	(void)status;
-	s->reading = NULL;
-	s->reading_for = 0;
+	jobs->reading = NULL;
+	jobs->reading_for = 0;
 	if (w->rc)
 		live_job_log(w->job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : here ? 0 : -ECANCELED;
 	if (!rc)
-		rc = extend_read(s, &w->by, w->job, &w->what, &w->record, text, sizeof text, &w->error);
+		rc = extend_read(jobs, &w->by, w->job, &w->what, &w->record, text, sizeof text, &w->error);
 	if (rc)
-		restore_drop(s, w->job);
+		restore_drop(jobs, w->job);
 	if (here)
-		answer(s, w->by.peer, rc, &w->error, text);
+		answer(jobs, w->by.peer, rc, &w->error, text);
 	mem_free(w);
-	if (!s->stopping)
-		extend_waiting(s);
+	if (!jobs->stopping)
+		extend_waiting(jobs);
 }
 
 /* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
-static int ask_beforehand(const struct jobs *s, const struct requester *by, const struct live_job *job,
+static int ask_beforehand(const struct jobs *jobs, const struct requester *by, const struct live_job *job,
 			  const struct extension *x, const struct job_record *r, struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
-	return plan_of(s, by, job, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked,
+	return plan_of(jobs, by, job, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked,
 		       &plan, e);
 }
 
-static int start_reading(struct jobs *s, const struct extension_request *q, const struct job_record *r, struct error *e)
+static int start_reading(struct jobs *jobs, const struct extension_request *q, const struct job_record *r,
+			 struct error *e)
 {
 	struct row_file f;
-	int rc = read_job(s, r->id, &f, e);
+	int rc = read_job(jobs, r->id, &f, e);
 	if (rc)
 		return rc;
 	struct reading *w = mem_alloc(1, sizeof *w);
-	rc = w ? restore_live_job(s, &f.job, &w->job, e) : error_set(e, ENOMEM, "no memory for a job");
+	rc = w ? restore_live_job(jobs, &f.job, &w->job, e) : error_set(e, ENOMEM, "no memory for a job");
 	row_file_free(&f);
 	if (rc) {
 		mem_free(w);
 		return error_prefix(e, rc, "it cannot go on, %s", again);
 	}
-	rc = ask_beforehand(s, &q->by, w->job, &q->what, r, e);
+	rc = ask_beforehand(jobs, &q->by, w->job, &q->what, r, e);
 	if (rc) {
-		restore_drop(s, w->job);
+		restore_drop(jobs, w->job);
 		mem_free(w);
 		return rc;
 	}
 	w->work.data = w;
-	w->jobs = s;
+	w->jobs = jobs;
 	w->by = q->by;
 	w->what = q->what;
 	w->record = *r;
-	s->reading = w->job;
-	s->reading_for = q->by.peer;
-	rc = uv_queue_work(s->loop, &w->work, run, done);
+	jobs->reading = w->job;
+	jobs->reading_for = q->by.peer;
+	rc = uv_queue_work(jobs->loop, &w->work, run, done);
 	assert(rc == 0);
 	return rc;
 }
 
-static int extend_ended(struct jobs *s, const struct extension_request *q, const struct job_record *r, struct error *e)
+static int extend_ended(struct jobs *jobs, const struct extension_request *q, const struct job_record *r,
+			struct error *e)
 {
 	if (strcmp(r->state, job_state_name(JOB_DONE)) != 0)
 		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s",
 				 strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled", again);
 	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
 		return error_set(e, EINVAL, "it is black: chains have nowhere to begin");
-	return start_reading(s, q, r, e);
+	return start_reading(jobs, q, r, e);
 }
 
 /* ---- both ---- */
 
 /* Its films are in use, or those of another job are being read. */
-static bool must_wait(const struct jobs *s, uint64_t id)
+static bool must_wait(const struct jobs *jobs, uint64_t id)
 {
-	const struct live_job *job = jobs_find(s, id);
-	return job ? job->busy || job->ended : s->reading != NULL;
+	const struct live_job *job = jobs_find(jobs, id);
+	return job ? job->busy || job->ended : jobs->reading != NULL;
 }
 
-static void go_on(struct jobs *s, const struct extension_request *q)
+static void go_on(struct jobs *jobs, const struct extension_request *q)
 {
-	struct live_job *job = jobs_find(s, q->what.job);
+	struct live_job *job = jobs_find(jobs, q->what.job);
 	struct job_view v;
 	struct error e = {""};
 	char text[256] = "";
 	int rc;
 	if (job)
-		rc = extend_live(s, &q->by, job, &q->what, text, sizeof text, &e);
-	else if (!jobs_view(s, q->what.job, &v))
+		rc = extend_live(jobs, &q->by, job, &q->what, text, sizeof text, &e);
+	else if (!jobs_view(jobs, q->what.job, &v))
 		rc = error_set(&e, ENOENT, "no such job");
 	else
-		rc = extend_ended(s, q, &v.record, &e);
+		rc = extend_ended(jobs, q, &v.record, &e);
 	if (rc || job) /* else when it is read */
-		answer(s, q->by.peer, rc, &e, text);
+		answer(jobs, q->by.peer, rc, &e, text);
 }
 
 /* One that is not answered yet. */
-static bool has_asked(const struct jobs *s, uint64_t peer)
+static bool has_asked(const struct jobs *jobs, uint64_t peer)
 {
-	const struct extension_request *q = s->extending;
+	const struct extension_request *q = jobs->extending;
 	while (q && q->by.peer != peer)
 		q = q->next;
-	return q || s->reading_for == peer;
+	return q || jobs->reading_for == peer;
 }
 
-void extend_job(struct jobs *s, const struct requester *by, const struct extension *x)
+void extend_job(struct jobs *jobs, const struct requester *by, const struct extension *x)
 {
-	struct extension_request *q = NULL, **at = &s->extending;
+	struct extension_request *q = NULL, **at = &jobs->extending;
 	struct error e;
-	int rc = has_asked(s, by->peer)
+	int rc = has_asked(jobs, by->peer)
 			 ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet")
 			 : extend_check(x, &e);
 	if (!rc && !(q = mem_alloc(1, sizeof *q)))
 		rc = error_set(&e, ENOMEM, "no memory for an extension");
 	if (rc) {
-		answer(s, by->peer, rc, &e, "");
+		answer(jobs, by->peer, rc, &e, "");
 		return;
 	}
 	*q = (struct extension_request){.by = *by, .what = *x};
 	while (*at)
 		at = &(*at)->next;
 	*at = q;
-	extend_waiting(s);
+	extend_waiting(jobs);
 }
 
-void extend_waiting(struct jobs *s)
+void extend_waiting(struct jobs *jobs)
 {
-	for (struct extension_request **at = &s->extending, *q; (q = *at);) {
-		if (must_wait(s, q->what.job)) {
+	for (struct extension_request **at = &jobs->extending, *q; (q = *at);) {
+		if (must_wait(jobs, q->what.job)) {
 			at = &q->next;
 			continue;
 		}
 		*at = q->next;
-		go_on(s, q);
+		go_on(jobs, q);
 		mem_free(q);
-		at = &s->extending; /* others may have been served meanwhile */
+		at = &jobs->extending; /* others may have been served meanwhile */
 	}
 }
 
-void extend_forget(struct jobs *s, uint64_t peer)
+void extend_forget(struct jobs *jobs, uint64_t peer)
 {
-	for (struct extension_request **at = &s->extending, *q; (q = *at);) {
+	for (struct extension_request **at = &jobs->extending, *q; (q = *at);) {
 		if (q->by.peer != peer) {
 			at = &q->next;
 			continue;

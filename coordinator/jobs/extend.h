@@ -16,9 +16,9 @@ struct requester {
 
 /* Does it, or puts it off until the job's films are free or read; the peer gets its answer (peer_calls.h). One at a
  * time of a peer: another one meanwhile is refused. */
-void extend_job(struct jobs *s, const struct requester *by, const struct extension *x);
+void extend_job(struct jobs *jobs, const struct requester *by, const struct extension *x);
 /* Films are free or read, or a job has ended: those that were put off, in the order in which they came. */
-void extend_waiting(struct jobs *s);
-void extend_forget(struct jobs *s, uint64_t peer); /* it has gone */
+void extend_waiting(struct jobs *jobs);
+void extend_forget(struct jobs *jobs, uint64_t peer); /* it has gone */
 
 #endif

@@ -6,71 +6,71 @@
 
 #include <string.h>
 
-static void hold(struct jobs *s, struct live_job *job, const char *text)
+static void hold(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .hold = HOLD_FILES, .text = text};
 	job->lacks_file = *text != 0;
 	live_job_log(job, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
-	jobs_step(s, &ev);
+	jobs_step(jobs, &ev);
 }
 
 /* The first one that is not there; NULL: all are. */
-static const Farm__File *lacking(const struct jobs *s, const struct live_job *job)
+static const Farm__File *lacking(const struct jobs *jobs, const struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
-		if (!blob_has(s->blobs, &h, NULL))
+		if (!blob_has(jobs->blobs, &h, NULL))
 			return m->files[i];
 	}
 	return NULL;
 }
 
-bool files_look(struct jobs *s, struct live_job *job)
+bool files_look(struct jobs *jobs, struct live_job *job)
 {
 	char text[256];
-	const Farm__File *f = job->ended ? NULL : lacking(s, job);
+	const Farm__File *f = job->ended ? NULL : lacking(jobs, job);
 	if (f && !job->lacks_file) {
 		text_print(
 			text, sizeof text,
 			"its file %.100s is damaged or gone in the spool: submit the scene again (hslt-submit), and it goes on",
 			f->name);
-		hold(s, job, text);
+		hold(jobs, job, text);
 	} else if (!f && job->lacks_file) {
-		hold(s, job, "");
+		hold(jobs, job, "");
 	}
 	return f == NULL;
 }
 
-int files_check(struct jobs *s, const struct blob_hash *h, double seconds, struct error *e)
+int files_check(struct jobs *jobs, const struct blob_hash *h, double seconds, struct error *e)
 {
-	int rc = blob_check(s->blobs, h, seconds, e);
+	int rc = blob_check(jobs->blobs, h, seconds, e);
 	if (rc != -EBADMSG && rc != -ENOENT)
 		return rc;
 	if (rc == -EBADMSG)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
-	for (struct live_job *job = s->live, *next; job; job = next) {
+	for (struct live_job *job = jobs->live, *next; job; job = next) {
 		next = job->next;
-		files_look(s, job);
+		files_look(jobs, job);
 	}
 	return rc;
 }
 
-bool files_are_right(struct jobs *s, struct live_job *job)
+bool files_are_right(struct jobs *jobs, struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
 	struct error e;
 	bool right = true;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
-		right = files_check(s, &h, BLOB_SINCE_GIVEN, &e) == 0 && right;
+		right = files_check(jobs, &h, BLOB_SINCE_GIVEN, &e) == 0 && right;
 	}
 	return right;
 }
 
-void files_tick(struct jobs *s)
+void files_tick(struct jobs *jobs)
 {
-	for (struct live_job *job = s->live; job; job = job->next)
-		if (job->lacks_file && files_look(s, job))
+	for (struct live_job *job = jobs->live; job; job = job->next)
+		if (job->lacks_file && files_look(jobs, job))
 			return; /* the list may have changed; the others next time */
 }

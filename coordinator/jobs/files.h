@@ -12,12 +12,12 @@
 enum { FILES_CHECKED = 60 /* s: what was right so lately is not read again before it is given to anybody */ };
 
 /* Of one that is asked for. Not 0: it cannot be given; jobs that need it wait. */
-int files_check(struct jobs *s, const struct blob_hash *h, double seconds, struct error *e);
+int files_check(struct jobs *jobs, const struct blob_hash *h, double seconds, struct error *e);
 /* Whether a job has all its files, by what the store knows; it waits or goes on. */
-bool files_look(struct jobs *s, struct live_job *job);
+bool files_look(struct jobs *jobs, struct live_job *job);
 /* All of a job's, when a worker complains: read again unless that was done after a piece was given out last. false: it
  * waits for one. */
-bool files_are_right(struct jobs *s, struct live_job *job);
-void files_tick(struct jobs *s); /* those that wait for files that are here now go on */
+bool files_are_right(struct jobs *jobs, struct live_job *job);
+void files_tick(struct jobs *jobs); /* those that wait for files that are here now go on */
 
 #endif

@@ -17,26 +17,26 @@
 
 #include <time.h>
 
-static void finish(struct jobs *s, struct live_job *job)
+static void finish(struct jobs *jobs, struct live_job *job)
 {
 	struct job_view v;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
-	jobs_view(s, job->id, &v);
-	v.record.ended_seen = ages_now(s);
+	jobs_view(jobs, job->id, &v);
+	v.record.ended_seen = ages_now(jobs);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	job->record = v.record;
-	if (durable_end(s, job)) { /* again, later */
+	if (durable_end(jobs, job)) { /* again, later */
 		job->unrecorded = true;
-		job->try_again = jobs_now(s) + s->config.retry_seconds;
+		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
 	}
-	ended_jobs_add(s, &v.record);
-	s->peers.job_ended(s->peers.user, job->id);
-	keep_trim(s);
-	clear_soon(s);
-	live_job_release_blobs(live_job_submit(job), s->blobs);
-	struct live_job **at = &s->live;
+	ended_jobs_add(jobs, &v.record);
+	jobs->peers.job_ended(jobs->peers.user, job->id);
+	keep_trim(jobs);
+	clear_soon(jobs);
+	live_job_release_blobs(live_job_submit(job), jobs->blobs);
+	struct live_job **at = &jobs->live;
 	while (*at != job)
 		at = &(*at)->next;
 	*at = job->next;
@@ -46,24 +46,24 @@ static void finish(struct jobs *s, struct live_job *job)
 	live_job_free(job);
 	while (late) { /* the core says that the job is over */
 		struct waiting_batch *next = late->next;
-		results_take(s, late->peer, &late->envelope, &late->payload);
+		results_take(jobs, late->peer, &late->envelope, &late->payload);
 		waiting_batch_free(late);
 		late = next;
 	}
 }
 
-void finish_ended(struct jobs *s)
+void finish_ended(struct jobs *jobs)
 {
 	bool finished = false;
-	for (struct live_job *job = s->live, *next; job; job = next) {
+	for (struct live_job *job = jobs->live, *next; job; job = next) {
 		next = job->next;
 		if (job->ended && !job->busy && !job->unpublished && !job->unrecorded) {
-			finish(s, job);
+			finish(jobs, job);
 			finished = true;
-			next = s->live; /* late batches may have ended others */
+			next = jobs->live; /* late batches may have ended others */
 		}
 	}
 	if (finished)
-		s->peers.jobs_let_go(s->peers.user);
-	extend_waiting(s);
+		jobs->peers.jobs_let_go(jobs->peers.user);
+	extend_waiting(jobs);
 }

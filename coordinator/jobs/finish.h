@@ -7,6 +7,6 @@
 
 /* Those that the core has ended and whose films are free: written down, told to the workers, let go. Then extensions
  * that waited for one of them go on. */
-void finish_ended(struct jobs *s);
+void finish_ended(struct jobs *jobs);
 
 #endif

@@ -11,75 +11,75 @@
 
 static const double every_seconds = 1;
 
-static int make_anew(struct jobs *s, struct live_job *job, struct error *e)
+static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
-	spool_path(s->spool, "jobs", path);
+	spool_path(jobs->spool, "jobs", path);
 	int rc = disk_make_folder(path, e);
 	if (!rc)
-		rc = spool_take_job(s->spool, job->id, e);
+		rc = spool_take_job(jobs->spool, job->id, e);
 	if (!rc)
-		rc = spool_write_record(s->spool, &job->record, e);
+		rc = spool_write_record(jobs->spool, &job->record, e);
 	if (rc)
 		return rc;
-	spool_job_path(s->spool, job->id, "log", path);
+	spool_job_path(jobs->spool, job->id, "log", path);
 	int fd = disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
 	if (fd < 0)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	disk_close(job->log);
 	job->log = fd;
-	reconcile_row(s, job->id);
+	reconcile_row(jobs, job->id);
 	return 0;
 }
 
 /* What was merged is in memory or in the old journal, whose file is open: the one goes into a checkpoint, the other
  * into a new file. */
-static void go_on(struct jobs *s, struct live_job *job)
+static void go_on(struct jobs *jobs, struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct error e;
-	spool_job_path(s->spool, job->id, NULL, folder);
-	int rc = make_anew(s, job, &e);
+	spool_job_path(jobs->spool, job->id, NULL, folder);
+	int rc = make_anew(jobs, job, &e);
 	live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder,
 		     rc ? e.text : "made anew, and the job goes on");
 	if (rc) {
 		if (!job->ended)
-			durable_hold(s, job, "its folder is gone and cannot be made anew", e.text);
+			durable_hold(jobs, job, "its folder is gone and cannot be made anew", e.text);
 		return;
 	}
 	if (job->ended)
 		return;
 	journal_distrust(job->journal);
 	if (job->checkpoint_bytes) {
-		late_drop(s, job); /* no checkpoint has them */
+		late_drop(jobs, job); /* no checkpoint has them */
 		job->unsure = true;
 		if (job->generation_least <= journal_generation(job->journal))
 			job->generation_least = journal_generation(job->journal) + 1;
 		job->checkpoint_after = 0;
 	}
-	durable_hold(s, job, "its results cannot be stored", "its folder was removed, and is made anew");
+	durable_hold(jobs, job, "its results cannot be stored", "its folder was removed, and is made anew");
 }
 
 /* A journal that is bad already has no file to look for, and who has ended needs none: then the folder itself, which
  * may go while it is being made anew. */
-static bool is_gone(const struct jobs *s, const struct live_job *job)
+static bool is_gone(const struct jobs *jobs, const struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct stat st;
 	if (!journal_is_bad(job->journal) && !job->ended)
 		return journal_is_gone(job->journal);
-	spool_job_path(s->spool, job->id, NULL, folder);
+	spool_job_path(jobs->spool, job->id, NULL, folder);
 	return disk_stat(folder, &st) && (errno == ENOENT || errno == ENOTDIR);
 }
 
-void folder_tick(struct jobs *s)
+void folder_tick(struct jobs *jobs)
 {
-	if (jobs_now(s) < s->folders_next)
+	if (jobs_now(jobs) < jobs->folders_next)
 		return;
-	s->folders_next = jobs_now(s) + every_seconds;
-	for (struct live_job *job = s->live; job; job = job->next)
-		if (!job->busy && job->journal && is_gone(s, job)) {
-			go_on(s, job);
+	jobs->folders_next = jobs_now(jobs) + every_seconds;
+	for (struct live_job *job = jobs->live; job; job = job->next)
+		if (!job->busy && job->journal && is_gone(jobs, job)) {
+			go_on(jobs, job);
 			return; /* the list may have changed; the others next time */
 		}
 }

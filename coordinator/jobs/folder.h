@@ -8,6 +8,6 @@
 
 #include "coordinator/job/jobs.h"
 
-void folder_tick(struct jobs *s); /* looks every second */
+void folder_tick(struct jobs *jobs); /* looks every second */
 
 #endif

@@ -15,32 +15,32 @@
 /* One at a time, so that nobody else waits for all of them. */
 static void on_drain(uv_timer_t *t)
 {
-	struct jobs *s = t->data;
-	struct live_job *job = s->live;
+	struct jobs *jobs = t->data;
+	struct live_job *job = jobs->live;
 	while (job && (job->busy || !job->waiting))
 		job = job->next;
 	if (!job)
 		return;
 	struct waiting_batch *w = live_job_take_waiting(job);
-	results_take(s, w->peer, &w->envelope, &w->payload);
+	results_take(jobs, w->peer, &w->envelope, &w->payload);
 	waiting_batch_free(w);
-	if (!s->stopping)
-		uv_timer_start(&s->drain, on_drain, 0, 0);
+	if (!jobs->stopping)
+		uv_timer_start(&jobs->drain, on_drain, 0, 0);
 }
 
-static void stepped(struct jobs *s)
+static void stepped(struct jobs *jobs)
 {
-	finish_ended(s);
-	late_feed(s);
-	checkpoint_where_due(s);
+	finish_ended(jobs);
+	late_feed(jobs);
+	checkpoint_where_due(jobs);
 }
 
-static void films_free(struct jobs *s)
+static void films_free(struct jobs *jobs)
 {
-	if (!s->stopping)
-		uv_timer_start(&s->drain, on_drain, 0, 0);
-	finish_ended(s);
-	late_feed(s);
+	if (!jobs->stopping)
+		uv_timer_start(&jobs->drain, on_drain, 0, 0);
+	finish_ended(jobs);
+	late_feed(jobs);
 }
 
 const struct follow_up follow_up = {.carry_out = dispatch_update, .stepped = stepped, .films_free = films_free};

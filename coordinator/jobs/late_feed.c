@@ -10,16 +10,16 @@
 #include "coordinator/jobs/step.h"
 
 /* It is damaged by now, too: its lease is open. */
-static void give_up(struct jobs *s, struct live_job *job, const struct late_result *l, const char *why)
+static void give_up(struct jobs *jobs, struct live_job *job, const struct late_result *l, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = job->id, .lease = {.key = l->key}};
 	live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
 	if (l->peer)
-		jobs_step(s, &ev);
+		jobs_step(jobs, &ev);
 }
 
 /* To the core, which says whether it counts. */
-static int offer(struct jobs *s, const struct live_job *job, const struct late_result *l, struct error *e)
+static int offer(struct jobs *jobs, const struct live_job *job, const struct late_result *l, struct error *e)
 {
 	struct event ev = {.kind = EVENT_STORED, .job = job->id, .lease = {.key = l->key, .valid = true}};
 	struct envelope env;
@@ -37,7 +37,7 @@ static int offer(struct jobs *s, const struct live_job *job, const struct late_r
 		return rc;
 	}
 	rc = batch_unpack(&batch, &job->plan, env.message->lease_result, payload, payload_size, e);
-	if (!rc && farm_verifies(s->farm, &l->key))
+	if (!rc && farm_verifies(jobs->farm, &l->key))
 		rc = digest_batch(&batch, &ev.lease.digest, e);
 	copy.limit = payload_size;
 	if (!rc && !buf_append(&copy, payload, payload_size))
@@ -48,7 +48,7 @@ static int offer(struct jobs *s, const struct live_job *job, const struct late_r
 					    .payload = &copy,
 					    .stored = true,
 					    .stored_at = l->at};
-		jobs_step_with(s, &ev, &in);
+		jobs_step_with(jobs, &ev, &in);
 	}
 	buf_fini(&copy);
 	batch_fini(&batch);
@@ -57,16 +57,16 @@ static int offer(struct jobs *s, const struct live_job *job, const struct late_r
 	return rc;
 }
 
-void late_drop(struct jobs *s, struct live_job *job)
+void late_drop(struct jobs *jobs, struct live_job *job)
 {
 	while (job->late_count) {
 		struct late_result l = job->late[--job->late_count];
-		give_up(s, job, &l, "a result that waited in the journal is computed again");
+		give_up(jobs, job, &l, "a result that waited in the journal is computed again");
 	}
 }
 
 /* true: one more counts, and others may now. */
-static bool feed_one(struct jobs *s, struct live_job *job)
+static bool feed_one(struct jobs *jobs, struct live_job *job)
 {
 	for (size_t i = 0; i < job->late_count; i++) {
 		struct late_result l = job->late[i];
@@ -74,7 +74,7 @@ static bool feed_one(struct jobs *s, struct live_job *job)
 		enum replay_place place = replay_place(job, &l.key);
 		if (place == REPLAY_LATE)
 			continue;
-		int rc = place == REPLAY_FITS ? offer(s, job, &l, &e) : 0;
+		int rc = place == REPLAY_FITS ? offer(jobs, job, &l, &e) : 0;
 		if (rc == -ENOMEM) /* later */
 			return false;
 		if (!rc && replay_place(job, &l.key) !=
@@ -83,20 +83,20 @@ static bool feed_one(struct jobs *s, struct live_job *job)
 		l = job->late[i];
 		late_remove(job, i);
 		if (rc)
-			give_up(s, job, &l, e.text);
+			give_up(jobs, job, &l, e.text);
 		return true;
 	}
 	return false;
 }
 
-void late_feed(struct jobs *s)
+void late_feed(struct jobs *jobs)
 {
-	if (s->feeding || s->stepping || s->stopping)
+	if (jobs->feeding || jobs->stepping || jobs->stopping)
 		return;
-	s->feeding = true;
-	for (struct live_job *job = s->live; job;) {
-		bool fed = job->late_count && !job->busy && !job->ended && feed_one(s, job);
-		job = fed ? s->live : job->next; /* the list may have changed */
+	jobs->feeding = true;
+	for (struct live_job *job = jobs->live; job;) {
+		bool fed = job->late_count && !job->busy && !job->ended && feed_one(jobs, job);
+		job = fed ? jobs->live : job->next; /* the list may have changed */
 	}
-	s->feeding = false;
+	jobs->feeding = false;
 }

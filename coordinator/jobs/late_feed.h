@@ -6,8 +6,8 @@
 #include "coordinator/job/jobs.h"
 
 /* They are computed again, after all. */
-void late_drop(struct jobs *s, struct live_job *job);
+void late_drop(struct jobs *jobs, struct live_job *job);
 /* All that can count now do. After every step of the core, and when films are free again. */
-void late_feed(struct jobs *s);
+void late_feed(struct jobs *jobs);
 
 #endif

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void view_live(struct jobs *s, const struct live_job *job, struct job_view *v)
+static void view_live(struct jobs *jobs, const struct live_job *job, struct job_view *v)
 {
 	struct job_status status;
 	struct canvas_counts counted;
@@ -24,7 +24,7 @@ static void view_live(struct jobs *s, const struct live_job *job, struct job_vie
 	}
 	if (job->ended)
 		record_add_doubt(&v->record);
-	if (!farm_job(s->farm, job->id, jobs_now(s), &status))
+	if (!farm_job(jobs->farm, job->id, jobs_now(jobs), &status))
 		return;
 	view_add_status(v, &status);
 	if (job->ended && (job->busy || job->unpublished || job->unrecorded)) { /* not before its image is there */
@@ -40,22 +40,22 @@ static void view_live(struct jobs *s, const struct live_job *job, struct job_vie
 	}
 }
 
-bool jobs_view(struct jobs *s, uint64_t id, struct job_view *v)
+bool jobs_view(struct jobs *jobs, uint64_t id, struct job_view *v)
 {
 	struct job_record r;
-	struct live_job *job = jobs_find(s, id);
+	struct live_job *job = jobs_find(jobs, id);
 	if (job) {
-		view_live(s, job, v);
+		view_live(jobs, job, v);
 		return true;
 	}
-	if (recovery_view(s, id, v))
+	if (recovery_view(jobs, id, v))
 		return true;
-	for (size_t i = 0; i < s->ended_count; i++)
-		if (s->ended[i].id == id) {
-			view_of_record(v, &s->ended[i]);
+	for (size_t i = 0; i < jobs->ended_count; i++)
+		if (jobs->ended[i].id == id) {
+			view_of_record(v, &jobs->ended[i]);
 			return true;
 		}
-	if (spool_read_record(s->spool, id, &r, NULL))
+	if (spool_read_record(jobs->spool, id, &r, NULL))
 		return false;
 	view_of_record(v, &r);
 	return true;
@@ -67,19 +67,19 @@ static int by_id(const void *a, const void *b)
 	return (x->record.id > y->record.id) - (x->record.id < y->record.id);
 }
 
-size_t jobs_views(struct jobs *s, struct job_view **views)
+size_t jobs_views(struct jobs *jobs, struct job_view **views)
 {
-	size_t count = s->ended_count + recovery_views(s, NULL), n = 0;
-	for (struct live_job *job = s->live; job; job = job->next)
+	size_t count = jobs->ended_count + recovery_views(jobs, NULL), n = 0;
+	for (struct live_job *job = jobs->live; job; job = job->next)
 		count++;
 	*views = mem_alloc(count, sizeof **views);
 	if (!*views)
 		return 0;
-	for (size_t i = 0; i < s->ended_count; i++)
-		view_of_record(&(*views)[n++], &s->ended[i]);
-	for (struct live_job *job = s->live; job; job = job->next)
-		view_live(s, job, &(*views)[n++]);
-	n += recovery_views(s, *views + n);
+	for (size_t i = 0; i < jobs->ended_count; i++)
+		view_of_record(&(*views)[n++], &jobs->ended[i]);
+	for (struct live_job *job = jobs->live; job; job = job->next)
+		view_live(jobs, job, &(*views)[n++]);
+	n += recovery_views(jobs, *views + n);
 	qsort(*views, count, sizeof **views, by_id);
 	return count;
 }

@@ -6,8 +6,8 @@
 #include "coordinator/job/jobs.h"
 
 /* false: no such job. */
-bool jobs_view(struct jobs *s, uint64_t job, struct job_view *v);
+bool jobs_view(struct jobs *jobs, uint64_t job, struct job_view *v);
 /* All that are listed, ascending by id; mem_alloc'd. */
-size_t jobs_views(struct jobs *s, struct job_view **views);
+size_t jobs_views(struct jobs *jobs, struct job_view **views);
 
 #endif

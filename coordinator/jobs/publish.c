@@ -63,7 +63,7 @@ static void run(uv_work_t *work)
 /* The two that tell the core: it may want the next image at once, or end the job, and w is not ours any more. */
 static void tell_error(const struct publishing *w)
 {
-	struct jobs *s = w->jobs;
+	struct jobs *jobs = w->jobs;
 	struct event ev = {.kind = EVENT_ERROR_KNOWN,
 			   .job = w->job->id,
 			   .error_known = {.job = w->job->id,
@@ -73,8 +73,8 @@ static void tell_error(const struct publishing *w)
 					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
 					   .doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
 					   .cpu_seconds = w->job->cpu_seconds - w->job->record.bootstrap_cpu_seconds}};
-	jobs_step(s, &ev);
-	durable_look(s, ev.job);
+	jobs_step(jobs, &ev);
+	durable_look(jobs, ev.job);
 }
 
 static void tell_image(const struct publishing *w)
@@ -133,36 +133,36 @@ static void take(struct publishing *w)
 static void done(uv_work_t *work, int status)
 {
 	struct publishing *w = work->data;
-	struct jobs *s = w->jobs;
+	struct jobs *jobs = w->jobs;
 	uint64_t id = w->job->id;
 	assert(status == 0);
 	(void)status;
 	take(w);
 	w->job->busy = false;
-	if (s->stopping)
+	if (jobs->stopping)
 		return;
 	if (w->what == PUBLISH_ERROR_ONLY)
 		tell_error(w);
 	else if (w->what == PUBLISH_RESULT && !w->rc)
 		tell_image(w);
-	jobs_films_free(s);
-	s->peers.films_free(s->peers.user, id);
-	s->changes++;
+	jobs_films_free(jobs);
+	jobs->peers.films_free(jobs->peers.user, id);
+	jobs->changes++;
 }
 
-void publish_start(struct jobs *s, struct live_job *job, enum publish_what what, uint64_t rounds)
+void publish_start(struct jobs *jobs, struct live_job *job, enum publish_what what, uint64_t rounds)
 {
 	assert(job && job->canvas);
 	assert(!job->busy);
 	struct publishing *w = &job->publishing;
-	*w = (struct publishing){.work.data = w, .jobs = s, .job = job, .what = what, .rounds = rounds};
+	*w = (struct publishing){.work.data = w, .jobs = jobs, .job = job, .what = what, .rounds = rounds};
 	struct job_status status; /* from the first lease to now */
-	if (farm_job(s->farm, job->id, jobs_now(s), &status)) {
+	if (farm_job(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		w->end = status.end;
-		w->wall_seconds = (isnan(status.ended) ? jobs_now(s) : status.ended) - status.started;
+		w->wall_seconds = (isnan(status.ended) ? jobs_now(jobs) : status.ended) - status.started;
 	}
 	job->busy = true;
-	int rc = uv_queue_work(s->loop, &w->work, run, done);
+	int rc = uv_queue_work(jobs->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
 }

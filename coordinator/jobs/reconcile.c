@@ -193,19 +193,19 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 {
 	struct ledger_job j;
 	struct row_file f;
-	struct jobs *s = l->jobs;
-	int rc = spool_read_record(s->spool, id, l->record, e);
+	struct jobs *jobs = l->jobs;
+	int rc = spool_read_record(jobs->spool, id, l->record, e);
 	bool ended = rc == 0 && record_is_ended(l->record), bad_record = rc == -EBADMSG;
 	if (rc && rc != -ENOENT && rc != -EBADMSG)
 		return rc;
-	int file = row_file_read(s->spool, id, &f, e);
+	int file = row_file_read(jobs->spool, id, &f, e);
 	if (file && file != -ENOENT && file != -EBADMSG)
 		return file;
-	rc = ledger_get(s->ledger, id, &j, e);
+	rc = ledger_get(jobs->ledger, id, &j, e);
 	if (rc >= 0)
 		rc = rc > 0 && !j.damaged ? with_row(l, &j, &f, file, ended, e)
 					  : without_row(l, id, rc > 0, &f, file, ended, e);
-	if (rc == 0 && bad_record && (rc = ledger_get(s->ledger, id, &j, e)) > 0)
+	if (rc == 0 && bad_record && (rc = ledger_get(jobs->ledger, id, &j, e)) > 0)
 		rc = !j.damaged && j.ended > 0 ? make_record(l, &j, e) : 0;
 	row_file_free(&f);
 	return rc;
@@ -242,42 +242,42 @@ static int look_at_rows(struct looking *l, struct error *e)
 
 /* ---- the database ---- */
 
-static int put_database_aside(struct jobs *s, struct error *e)
+static int put_database_aside(struct jobs *jobs, struct error *e)
 {
 	static const char *const ends[] = {"", "-wal", "-shm"};
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
-	spool_path(s->spool, "", folder);
+	spool_path(jobs->spool, "", folder);
 	for (int i = 0; i < 3; i++) {
 		char name[64];
 		snprintf(name, sizeof name, "jobs.db%s", ends[i]);
-		spool_path(s->spool, name, from);
+		spool_path(jobs->spool, name, from);
 		snprintf(name, sizeof name, "jobs.db.damaged%s", ends[i]);
-		spool_path(s->spool, name, to);
+		spool_path(jobs->spool, name, to);
 		if (disk_rename(from, to) && errno != ENOENT)
 			return error_set(e, errno, "%s: %s", to, strerror(errno));
 	}
 	return disk_sync_folder(folder, e);
 }
 
-static int open_database(struct jobs *s, struct error *e)
+static int open_database(struct jobs *jobs, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
-	spool_path(s->spool, "jobs.db", path);
-	int rc = ledger_open(&s->ledger, path, e);
+	spool_path(jobs->spool, "jobs.db", path);
+	int rc = ledger_open(&jobs->ledger, path, e);
 	if (rc != -EBADMSG)
 		return rc;
 	log_event(LOG_SPOOL_FAULT,
 		  "text=%s action=\"it is kept as jobs.db.damaged, and made anew from the jobs' folders\"",
 		  log_quote(e->text).text);
-	rc = put_database_aside(s, e);
-	return rc ? rc : ledger_open(&s->ledger, path, e);
+	rc = put_database_aside(jobs, e);
+	return rc ? rc : ledger_open(&jobs->ledger, path, e);
 }
 
-int reconcile(struct jobs *s, struct error *e)
+int reconcile(struct jobs *jobs, struct error *e)
 {
-	struct looking l = {.jobs = s};
+	struct looking l = {.jobs = jobs};
 	l.names = (struct text){l.text, sizeof l.text};
-	int rc = open_database(s, e);
+	int rc = open_database(jobs, e);
 	if (!rc && !(l.record = mem_alloc(1, sizeof *l.record)))
 		rc = error_set(e, ENOMEM, "no memory for the jobs");
 	if (!rc)
@@ -286,24 +286,24 @@ int reconcile(struct jobs *s, struct error *e)
 		rc = look_at_rows(&l, e);
 	mem_free(l.record);
 	if (!rc)
-		spool_skip_jobs(s->spool, l.last);
-	if (rc || !l.lost || s->config.accept_loss)
+		spool_skip_jobs(jobs->spool, l.last);
+	if (rc || !l.lost || jobs->config.accept_loss)
 		return rc;
 	return error_set(
 		e, EBADMSG,
 		"%s has lost %llu job%s: %s%s. Nothing has been deleted. Put back what is missing, or start with --accept-loss: what is"
 		" left of them is then put into lost/ of the spool, and the other jobs go on",
-		s->config.spool, (unsigned long long)l.lost, l.lost == 1 ? "" : "s", l.text,
+		jobs->config.spool, (unsigned long long)l.lost, l.lost == 1 ? "" : "s", l.text,
 		l.lost > NAMED_MOST ? ", ..." : "");
 }
 
-void reconcile_row(struct jobs *s, uint64_t job)
+void reconcile_row(struct jobs *jobs, uint64_t job)
 {
 	struct ledger_job j;
 	struct error e;
-	int rc = ledger_get(s->ledger, job, &j, &e);
+	int rc = ledger_get(jobs->ledger, job, &j, &e);
 	if (rc > 0)
-		rc = row_file_write(s->spool, &j, &e);
+		rc = row_file_write(jobs->spool, &j, &e);
 	if (rc < 0)
 		say(job, e.text);
 }

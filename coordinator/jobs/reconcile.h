@@ -12,8 +12,8 @@
 #include "coordinator/job/jobs.h"
 
 /* Opens the ledger. -EBADMSG: something is lost. */
-int reconcile(struct jobs *s, struct error *e);
+int reconcile(struct jobs *jobs, struct error *e);
 /* The row has been written: so is its copy. What the disk does not take is said, and written at the next start. */
-void reconcile_row(struct jobs *s, uint64_t job);
+void reconcile_row(struct jobs *jobs, uint64_t job);
 
 #endif

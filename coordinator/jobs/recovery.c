@@ -38,14 +38,14 @@ struct recovery {
 
 /* ---- how far it is */
 
-bool recovery_is_on(const struct jobs *s)
+bool recovery_is_on(const struct jobs *jobs)
 {
-	return s->recovery != NULL;
+	return jobs->recovery != NULL;
 }
 
-double recovery_share(const struct jobs *s)
+double recovery_share(const struct jobs *jobs)
 {
-	const struct recovery *r = s->recovery;
+	const struct recovery *r = jobs->recovery;
 	uint64_t read = r->read + (r->at ? atomic_load(&r->at->progress.read) : 0);
 	return r->bytes > 0 && read < r->bytes ? (double)read / (double)r->bytes : 1;
 }
@@ -66,26 +66,26 @@ static void view(const struct found *f, struct job_view *v)
 	memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
 }
 
-static const struct found *find(const struct jobs *s, uint64_t job)
+static const struct found *find(const struct jobs *jobs, uint64_t job)
 {
-	const struct found *f = s->found;
+	const struct found *f = jobs->found;
 	while (f && f->record.id != job)
 		f = f->next;
 	return f;
 }
 
-bool recovery_view(const struct jobs *s, uint64_t job, struct job_view *v)
+bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
 {
-	const struct found *f = find(s, job);
+	const struct found *f = find(jobs, job);
 	if (f)
 		view(f, v);
 	return f != NULL;
 }
 
-size_t recovery_views(const struct jobs *s, struct job_view *v)
+size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 {
 	size_t n = 0;
-	for (const struct found *f = s->found; f; f = f->next, n++)
+	for (const struct found *f = jobs->found; f; f = f->next, n++)
 		if (v)
 			view(f, &v[n]);
 	return n;
@@ -95,12 +95,12 @@ size_t recovery_views(const struct jobs *s, struct job_view *v)
 
 /* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may
  * want to look at it. */
-static void put_aside(struct jobs *s, struct live_job *job)
+static void put_aside(struct jobs *jobs, struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
-	spool_job_path(s->spool, job->id, NULL, folder);
-	spool_job_path(s->spool, job->id, "checkpoint", path);
-	spool_job_path(s->spool, job->id, "checkpoint.damaged", aside);
+	spool_job_path(jobs->spool, job->id, NULL, folder);
+	spool_job_path(jobs->spool, job->id, "checkpoint", path);
+	spool_job_path(jobs->spool, job->id, "checkpoint.damaged", aside);
 	live_job_log(job, LOG_SPOOL_FAULT,
 		     "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
 	live_job_log(job, LOG_JOB_STATE, "state=anew");
@@ -114,7 +114,7 @@ static bool is_lasting(int rc)
 	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
 }
 
-static void write_end(struct jobs *s, struct job_record *r, const char *why)
+static void write_end(struct jobs *jobs, struct job_record *r, const char *why)
 {
 	struct timespec now;
 	struct error e;
@@ -124,28 +124,28 @@ static void write_end(struct jobs *s, struct job_record *r, const char *why)
 	text_copy(r->why, sizeof r->why, why);
 	r->exit_code = 3;
 	r->ended = (double)now.tv_sec;
-	r->ended_seen = ages_now(s);
+	r->ended_seen = ages_now(jobs);
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
-	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) ||
-	    ledger_end(s->ledger, r->id, r->extended, r->state, &e))
+	if (spool_take_job(jobs->spool, r->id, &e) || spool_write_record(jobs->spool, r, &e) ||
+	    ledger_end(jobs->ledger, r->id, r->extended, r->state, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	ended_jobs_add(s, r);
+	ended_jobs_add(jobs, r);
 }
 
 /* The job has failed, if that is how it would be at every start; else an error of the machine. */
-static int give_up(struct jobs *s, uint64_t id, uint64_t extended, int rc, struct error *e)
+static int give_up(struct jobs *jobs, uint64_t id, uint64_t extended, int rc, struct error *e)
 {
 	struct error why = *e;
 	bool there;
 	if (!is_lasting(rc))
 		return error_prefix(e, rc, "j%llu", (unsigned long long)id);
 	struct job_record *r = mem_alloc(1, sizeof *r);
-	rc = r ? restore_record(s, id, r, &there, e) : error_set(e, ENOMEM, "no memory for the jobs");
+	rc = r ? restore_record(jobs, id, r, &there, e) : error_set(e, ENOMEM, "no memory for the jobs");
 	if (!rc && !there)
 		*r = (struct job_record){.id = id, .rel_error = -1};
 	if (!rc) {
 		r->extended = extended;
-		write_end(s, r, why.text);
+		write_end(jobs, r, why.text);
 	}
 	mem_free(r);
 	return rc;
@@ -153,33 +153,33 @@ static int give_up(struct jobs *s, uint64_t id, uint64_t extended, int rc, struc
 
 /* ---- one job after the other */
 
-static void fail(struct jobs *s, int rc, const struct error *e)
+static void fail(struct jobs *jobs, int rc, const struct error *e)
 {
-	s->fault = rc;
-	s->fault_error = *e;
-	s->stop(s->stop_user);
+	jobs->fault = rc;
+	jobs->fault_error = *e;
+	jobs->stop(jobs->stop_user);
 }
 
 /* All have been read, and the core is told of them. */
-static int finish(struct jobs *s, struct error *e)
+static int finish(struct jobs *jobs, struct error *e)
 {
-	struct recovery *r = s->recovery;
+	struct recovery *r = jobs->recovery;
 	int rc = 0;
-	for (struct found *f; !rc && (f = s->found);) {
+	for (struct found *f; !rc && (f = jobs->found);) {
 		struct ledger_job j;
 		struct job_counts known;
 		struct live_job *job = f->job;
-		s->found = f->next;
-		job->next = s->live;
-		s->live = job;
+		jobs->found = f->next;
+		job->next = jobs->live;
+		jobs->live = job;
 		mem_free(f);
-		rc = ledger_get(s->ledger, job->id, &j, e);
-		rc = rc > 0   ? restore_tell(s, job, j.held, 0, e)
+		rc = ledger_get(jobs->ledger, job->id, &j, e);
+		rc = rc > 0   ? restore_tell(jobs, job, j.held, 0, e)
 		     : rc < 0 ? rc
 			      : error_set(e, ENOENT, "its row is gone");
 		if (!rc)
-			files_look(s, job);
-		if (!rc && !farm_counts(s->farm, job->id, &known))
+			files_look(jobs, job);
+		if (!rc && !farm_counts(jobs->farm, job->id, &known))
 			rc = error_set(e, ENOMEM, "no memory for a job");
 		if (rc)
 			rc = error_prefix(e, rc, "j%llu", (unsigned long long)job->id);
@@ -187,11 +187,11 @@ static int finish(struct jobs *s, struct error *e)
 	if (rc)
 		return rc;
 	mem_free(r);
-	s->recovery = NULL;
-	s->changes++;
-	blob_store_trim(s->blobs); /* the files of living jobs are held by now */
-	keep_trim(s);
-	s->peers.jobs_read(s->peers.user);
+	jobs->recovery = NULL;
+	jobs->changes++;
+	blob_store_trim(jobs->blobs); /* the files of living jobs are held by now */
+	keep_trim(jobs);
+	jobs->peers.jobs_read(jobs->peers.user);
 	return 0;
 }
 
@@ -204,14 +204,14 @@ static void run(uv_work_t *work)
 static void done(uv_work_t *work, int status);
 
 /* The one at hand, or the end. */
-static int go_on(struct jobs *s, struct error *e)
+static int go_on(struct jobs *jobs, struct error *e)
 {
-	struct recovery *r = s->recovery;
+	struct recovery *r = jobs->recovery;
 	if (!r->at)
-		return finish(s, e);
-	r->at->job->film_folder = jobs_film_folder(s, &r->at->job->plan);
+		return finish(jobs, e);
+	r->at->job->film_folder = jobs_film_folder(jobs, &r->at->job->plan);
 	r->under_way = true;
-	int rc = uv_queue_work(s->loop, &r->work, run, done);
+	int rc = uv_queue_work(jobs->loop, &r->work, run, done);
 	assert(rc == 0);
 	return rc;
 }
@@ -226,9 +226,9 @@ static void remove_found(struct recovery *r, struct found *f)
 }
 
 /* It cannot be read. 0: it is read again, or has failed for good. */
-static int take_failure(struct jobs *s, struct error *e)
+static int take_failure(struct jobs *jobs, struct error *e)
 {
-	struct recovery *r = s->recovery;
+	struct recovery *r = jobs->recovery;
 	struct found *f = r->at;
 	struct ledger_job j;
 	uint64_t id = f->record.id, extended = f->job->record.extended;
@@ -237,13 +237,13 @@ static int take_failure(struct jobs *s, struct error *e)
 	live_job_log(f->job, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
 	bool anew = rc == -EBADMSG && !f->anew;
 	if (anew)
-		put_aside(s, f->job);
-	restore_drop(s, f->job);
+		put_aside(jobs, f->job);
+	restore_drop(jobs, f->job);
 	f->job = NULL;
 	if (anew) {
 		f->anew = true;
-		rc = ledger_get(s->ledger, id, &j, e);
-		rc = rc > 0   ? restore_live_job(s, &j, &f->job, e)
+		rc = ledger_get(jobs->ledger, id, &j, e);
+		rc = rc > 0   ? restore_live_job(jobs, &j, &f->job, e)
 		     : rc < 0 ? rc
 			      : error_set(e, ENOENT, "its row is gone");
 		if (!rc)
@@ -252,96 +252,96 @@ static int take_failure(struct jobs *s, struct error *e)
 	r->at = f->next;
 	r->read += f->bytes;
 	remove_found(r, f);
-	return give_up(s, id, extended, rc, e);
+	return give_up(jobs, id, extended, rc, e);
 }
 
 static void done(uv_work_t *work, int status)
 {
 	struct recovery *r = work->data;
-	struct jobs *s = r->jobs;
+	struct jobs *jobs = r->jobs;
 	struct error e;
 	int rc = 0;
 	assert(status == 0);
 	(void)status;
 	r->under_way = false;
-	if (s->stopping)
+	if (jobs->stopping)
 		return;
 	if (r->rc) {
-		rc = take_failure(s, &e);
+		rc = take_failure(jobs, &e);
 	} else {
 		r->read += r->at->bytes;
 		r->at = r->at->next;
 	}
 	if (!rc)
-		rc = go_on(s, &e);
+		rc = go_on(jobs, &e);
 	if (rc)
-		fail(s, rc, &e);
+		fail(jobs, rc, &e);
 }
 
 /* ---- begin and end */
 
-static int add(struct jobs *s, const struct ledger_job *j, struct error *e)
+static int add(struct jobs *jobs, const struct ledger_job *j, struct error *e)
 {
-	struct recovery *r = s->recovery;
+	struct recovery *r = jobs->recovery;
 	struct found *f = mem_alloc(1, sizeof *f);
 	if (!f)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	uint64_t id = j->id, extended = j->extended;
-	int rc = restore_live_job(s, j, &f->job, e);
+	int rc = restore_live_job(jobs, j, &f->job, e);
 	if (rc) {
 		mem_free(f);
-		return give_up(s, id, extended, rc, e);
+		return give_up(jobs, id, extended, rc, e);
 	}
 	f->record = f->job->record;
-	f->bytes = replay_bytes(s->spool, id);
+	f->bytes = replay_bytes(jobs->spool, id);
 	r->bytes += f->bytes;
 	*r->last = f;
 	r->last = &f->next;
 	return 0;
 }
 
-int recovery_begin(struct jobs *s, struct error *e)
+int recovery_begin(struct jobs *jobs, struct error *e)
 {
 	struct ledger_job j;
 	uint64_t id = 0;
 	int rc;
-	struct recovery *r = s->recovery = mem_alloc(1, sizeof *r);
+	struct recovery *r = jobs->recovery = mem_alloc(1, sizeof *r);
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for the jobs");
-	r->jobs = s;
+	r->jobs = jobs;
 	r->work.data = r;
-	r->last = &s->found;
-	while ((rc = ledger_next(s->ledger, id, &j, e)) > 0) {
+	r->last = &jobs->found;
+	while ((rc = ledger_next(jobs->ledger, id, &j, e)) > 0) {
 		id = j.id;
-		rc = add(s, &j, e);
+		rc = add(jobs, &j, e);
 		if (rc)
 			return rc;
 	}
 	if (rc)
 		return rc;
-	r->at = s->found;
-	return go_on(s, e);
+	r->at = jobs->found;
+	return go_on(jobs, e);
 }
 
-void recovery_stop(struct jobs *s)
+void recovery_stop(struct jobs *jobs)
 {
-	for (struct found *f = s->found; f; f = f->next)
+	for (struct found *f = jobs->found; f; f = f->next)
 		atomic_store(&f->progress.stop, true);
 }
 
-void recovery_close(struct jobs *s)
+void recovery_close(struct jobs *jobs)
 {
-	struct recovery *r = s->recovery;
+	struct recovery *r = jobs->recovery;
 	if (!r)
 		return;
 	assert(!r->under_way);
-	while (s->found) {
-		struct found *next = s->found->next;
-		if (s->found->job)
-			live_job_free(s->found->job);
-		mem_free(s->found);
-		s->found = next;
+	while (jobs->found) {
+		struct found *next = jobs->found->next;
+		if (jobs->found->job)
+			live_job_free(jobs->found->job);
+		mem_free(jobs->found);
+		jobs->found = next;
 	}
 	mem_free(r);
-	s->recovery = NULL;
+	jobs->recovery = NULL;
 }

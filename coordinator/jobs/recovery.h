@@ -15,14 +15,14 @@
 
 #include "coordinator/job/jobs.h"
 
-int recovery_begin(struct jobs *s, struct error *e); /* where there are no such jobs it is over at once */
-bool recovery_is_on(const struct jobs *s);
-double recovery_share(const struct jobs *s); /* of all bytes: 0 to 1 */
-void recovery_stop(struct jobs *s);	     /* soon, with the loop */
-void recovery_close(struct jobs *s);	     /* the loop has ended */
+int recovery_begin(struct jobs *jobs, struct error *e); /* where there are no such jobs it is over at once */
+bool recovery_is_on(const struct jobs *jobs);
+double recovery_share(const struct jobs *jobs); /* of all bytes: 0 to 1 */
+void recovery_stop(struct jobs *jobs);		/* soon, with the loop */
+void recovery_close(struct jobs *jobs);		/* the loop has ended */
 
 /* While it is on. */
-bool recovery_view(const struct jobs *s, uint64_t job, struct job_view *v); /* false: not one of them */
-size_t recovery_views(const struct jobs *s, struct job_view *v); /* ascending by id. v: NULL: how many they are */
+bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v); /* false: not one of them */
+size_t recovery_views(const struct jobs *jobs, struct job_view *v); /* ascending by id. v: NULL: how many they are */
 
 #endif

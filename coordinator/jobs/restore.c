@@ -48,7 +48,7 @@ const char *restore_held_by(const char *who, char text[256])
 	return text;
 }
 
-int restore_tell(struct jobs *s, const struct live_job *job, const char *held, uint64_t tag, struct error *e)
+int restore_tell(struct jobs *jobs, const struct live_job *job, const char *held, uint64_t tag, struct error *e)
 {
 	uint32_t slots = job->plan.groups * job->plan.parts;
 	uint64_t *next = mem_alloc(slots, sizeof *next);
@@ -78,7 +78,7 @@ int restore_tell(struct jobs *s, const struct live_job *job, const char *held, u
 						  .priority = job->record.priority,
 						  .mixed = live_job_submit(job)->mixed,
 						  .owner = job->record.owner,
-						  .verify = trust_share(s, live_job_submit(job))},
+						  .verify = trust_share(jobs, live_job_submit(job))},
 				       .fingerprint = job->fingerprint,
 				       .kind = job->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 				       .next = next,
@@ -89,51 +89,51 @@ int restore_tell(struct jobs *s, const struct live_job *job, const char *held, u
 				       .completed = job->times.completed,
 				       .looks = &job->record.looks,
 				       .counts = job->counts}};
-	jobs_step(s, &ev);
+	jobs_step(jobs, &ev);
 	mem_free(next);
 	mem_free(makers);
 	if (*held) {
 		ev = (struct event){
 			.kind = EVENT_HOLD, .job = job->id, .hold = HOLD_ORDERED, .text = restore_held_by(held, text)};
-		jobs_step(s, &ev);
+		jobs_step(jobs, &ev);
 	}
 	return 0;
 }
 
 /* ---- one job */
 
-static int hold_blobs(struct jobs *s, const Farm__Submit *m, struct error *e)
+static int hold_blobs(struct jobs *jobs, const Farm__Submit *m, struct error *e)
 {
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
-		int rc = blob_expect(s->blobs, &h, e);
+		int rc = blob_expect(jobs->blobs, &h, e);
 		if (!rc)
 			continue;
 		while (i-- > 0) {
 			h = live_job_file_hash(m->files[i]);
-			blob_release(s->blobs, &h);
+			blob_release(jobs->blobs, &h);
 		}
 		return rc;
 	}
 	return 0;
 }
 
-int restore_record(const struct jobs *s, uint64_t id, struct job_record *r, bool *there, struct error *e)
+int restore_record(const struct jobs *jobs, uint64_t id, struct job_record *r, bool *there, struct error *e)
 {
-	int rc = spool_read_record(s->spool, id, r, e);
+	int rc = spool_read_record(jobs->spool, id, r, e);
 	*there = rc == 0;
 	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
 }
 
 /* What the submission does not say, but its earlier end: its image is there until the next one is. */
-static int take_record_of(const struct jobs *s, const struct ledger_job *j, struct live_job *job, struct error *e)
+static int take_record_of(const struct jobs *jobs, const struct ledger_job *j, struct live_job *job, struct error *e)
 {
 	job->record.priority = j->priority;
 	job->record.extended = j->extended;
 	struct job_record *r = mem_alloc(1, sizeof *r);
 	bool there;
 	int rc = r ? 0 : error_set(e, ENOMEM, "no memory for a job");
-	if (!rc && j->extended && (rc = restore_record(s, job->id, r, &there, e)) == 0 && there)
+	if (!rc && j->extended && (rc = restore_record(jobs, job->id, r, &there, e)) == 0 && there)
 		job->record.has_result = r->has_result;
 	mem_free(r);
 	return rc;
@@ -150,7 +150,7 @@ static int not_known(const struct ledger_job *j, int rc, struct error *e)
 			    HSLT_VERSION);
 }
 
-static int make_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **job, struct error *e)
+static int make_live_job(struct jobs *jobs, const struct ledger_job *j, struct live_job **job, struct error *e)
 {
 	struct envelope submit, info;
 	struct plan plan;
@@ -167,64 +167,64 @@ static int make_live_job(struct jobs *s, const struct ledger_job *j, struct live
 					 &payload, &size, e);
 	if (rc)
 		return not_known(j, rc, e);
-	rc = hold_blobs(s, submit.message->submit, e);
-	if (!rc && (rc = live_job_new(job, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
-		live_job_release_blobs(submit.message->submit, s->blobs);
+	rc = hold_blobs(jobs, submit.message->submit, e);
+	if (!rc && (rc = live_job_new(job, j->id, &submit, &plan, j->owner, j->submitted, jobs->spool, e)))
+		live_job_release_blobs(submit.message->submit, jobs->blobs);
 	envelope_fini(&submit);
 	return rc;
 }
 
-void restore_drop(struct jobs *s, struct live_job *job)
+void restore_drop(struct jobs *jobs, struct live_job *job)
 {
-	live_job_release_blobs(live_job_submit(job), s->blobs);
+	live_job_release_blobs(live_job_submit(job), jobs->blobs);
 	live_job_free(job);
 }
 
-int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **job, struct error *e)
+int restore_live_job(struct jobs *jobs, const struct ledger_job *j, struct live_job **job, struct error *e)
 {
-	int rc = make_live_job(s, j, job, e);
+	int rc = make_live_job(jobs, j, job, e);
 	if (rc)
 		return rc;
-	rc = take_record_of(s, j, *job, e);
+	rc = take_record_of(jobs, j, *job, e);
 	if (rc)
-		restore_drop(s, *job);
+		restore_drop(jobs, *job);
 	else
-		(*job)->film_folder = jobs_film_folder(s, &(*job)->plan);
+		(*job)->film_folder = jobs_film_folder(jobs, &(*job)->plan);
 	return rc;
 }
 
-int restore_open(struct jobs *s, struct error *e)
+int restore_open(struct jobs *jobs, struct error *e)
 {
 	struct ledger_job j;
 	struct job_record *r = mem_alloc(1, sizeof *r);
-	int rc = r ? reconcile(s, e) : error_set(e, ENOMEM, "no memory for the jobs");
+	int rc = r ? reconcile(jobs, e) : error_set(e, ENOMEM, "no memory for the jobs");
 	uint64_t id = 0;
-	while (!rc && (rc = ledger_next(s->ledger, id, &j, e)) > 0) {
+	while (!rc && (rc = ledger_next(jobs->ledger, id, &j, e)) > 0) {
 		id = j.id;
 		bool there;
-		rc = restore_record(s, id, r, &there, e);
+		rc = restore_record(jobs, id, r, &there, e);
 		if (rc)
 			break;
 		/* Its record was written before its end came into the ledger. */
 		if (there && record_is_ended(r) && r->extended == j.extended) {
-			rc = ledger_end(s->ledger, id, r->extended, r->state, e);
+			rc = ledger_end(jobs->ledger, id, r->extended, r->state, e);
 			continue;
 		}
-		uint64_t *more =
-			mem_grow(s->restored, s->restored_count * sizeof *more, (s->restored_count + 1) * sizeof *more);
+		uint64_t *more = mem_grow(jobs->restored, jobs->restored_count * sizeof *more,
+					  (jobs->restored_count + 1) * sizeof *more);
 		if (!more)
 			rc = error_set(e, ENOMEM, "no memory for the jobs");
 		else
-			(s->restored = more)[s->restored_count++] = id;
+			(jobs->restored = more)[jobs->restored_count++] = id;
 	}
 	mem_free(r);
 	return rc;
 }
 
-bool restore_lives(const struct jobs *s, uint64_t job)
+bool restore_lives(const struct jobs *jobs, uint64_t job)
 {
-	for (size_t i = 0; i < s->restored_count; i++)
-		if (s->restored[i] == job)
+	for (size_t i = 0; i < jobs->restored_count; i++)
+		if (jobs->restored[i] == job)
 			return true;
 	return false;
 }

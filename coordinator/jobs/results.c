@@ -12,44 +12,44 @@
 #include "coordinator/jobs/step.h"
 
 /* It can be made again. */
-static void refuse(struct jobs *s, uint64_t peer, const struct lease_key *k, const char *why)
+static void refuse(struct jobs *jobs, uint64_t peer, const struct lease_key *k, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = peer, .job = k->job, .lease = {.key = *k}};
-	s->peers.acknowledge(s->peers.user, peer, k, ACK_REFUSED, why);
-	jobs_step(s, &ev);
+	jobs->peers.acknowledge(jobs->peers.user, peer, k, ACK_REFUSED, why);
+	jobs_step(jobs, &ev);
 }
 
-static void fail(struct jobs *s, struct live_job *job, uint64_t peer, const struct lease_key *k, const char *why)
+static void fail(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k, const char *why)
 {
-	const char *name = s->peers.name(s->peers.user, peer);
+	const char *name = jobs->peers.name(jobs->peers.user, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
 	live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu",
 		     log_quote(name ? name : "?").text, log_quote(why).text, (int)k->kind, k->group, k->part,
 		     (unsigned long long)k->epoch);
-	s->peers.acknowledge(s->peers.user, peer, k, ACK_REFUSED, why);
-	jobs_step(s, &ev);
+	jobs->peers.acknowledge(jobs->peers.user, peer, k, ACK_REFUSED, why);
+	jobs_step(jobs, &ev);
 }
 
-static void take_result(struct jobs *s, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
+static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
 	struct error e = {""};
 	struct batch batch = {0};
 	if (lease_key_from_wire(m->key, &ev.lease.key, &e)) {
-		s->peers.fault(s->peers.user, peer, e.text);
+		jobs->peers.fault(jobs->peers.user, peer, e.text);
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct live_job *job = jobs_find(s, ev.job);
+	struct live_job *job = jobs_find(jobs, ev.job);
 	int rc = job ? batch_unpack(&batch, &job->plan, m, payload->bytes, payload->size, &e) : 0;
 	if (job && !rc && batch.state_count && !m->states_digest.len)
 		rc = error_set(&e, EBADMSG, "chain states without a digest");
-	if (job && !rc && farm_verifies(s->farm, &ev.lease.key))
+	if (job && !rc && farm_verifies(jobs->farm, &ev.lease.key))
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
 	if (job && !rc && job->canvas && batch.key.kind == LEASE_RENDER)
 		rc = canvas_admits(job->canvas, &batch, &e);
 	if (rc == -ERANGE) { /* perhaps any worker's would be like that: as one that could not be computed */
-		fail(s, job, peer, &ev.lease.key, e.text);
+		fail(jobs, job, peer, &ev.lease.key, e.text);
 		batch_fini(&batch);
 		return;
 	}
@@ -58,7 +58,7 @@ static void take_result(struct jobs *s, uint64_t peer, const Farm__LeaseResult *
 	Farm__LeaseResult stored = *m;
 	Farm__Maker maker;
 	farm__maker__init(&maker);
-	bool known = farm_peer(s->farm, peer, &from) && farm_worker(s->farm, from.who, &who);
+	bool known = farm_peer(jobs->farm, peer, &from) && farm_worker(jobs->farm, from.who, &who);
 	if (known) {
 		maker.name = text_borrow(who.name);
 		maker.certificate = text_borrow(who.certificate);
@@ -70,43 +70,44 @@ static void take_result(struct jobs *s, uint64_t peer, const Farm__LeaseResult *
 	ev.text = e.text;
 	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
 	if (rc == -ENOMEM ||
-	    (job && ev.lease.valid && durable_reserve(s, job, &in, &e))) /* no room for it, here or on the disk */
-		refuse(s, peer, &ev.lease.key, e.text);
+	    (job && ev.lease.valid && durable_reserve(jobs, job, &in, &e))) /* no room for it, here or on the disk */
+		refuse(jobs, peer, &ev.lease.key, e.text);
 	else
-		jobs_step_with(s, &ev, &in);
+		jobs_step_with(jobs, &ev, &in);
 	batch_fini(&batch);
 	mem_free(in.frame);
 }
 
-static bool has_room(const struct jobs *s, const struct buf *payload)
+static bool has_room(const struct jobs *jobs, const struct buf *payload)
 {
 	uint64_t bytes = payload->capacity;
-	for (const struct live_job *job = s->live; job; job = job->next)
+	for (const struct live_job *job = jobs->live; job; job = job->next)
 		bytes += job->waiting_bytes;
-	return bytes <= s->config.waiting_bytes;
+	return bytes <= jobs->config.waiting_bytes;
 }
 
 /* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and
  * one of those that nobody's waits for. */
-static void put_off(struct jobs *s, struct live_job *job, uint64_t peer, const struct lease_key *k,
+static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k,
 		    struct envelope *env, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
-	enum farm_delivery awaited = farm_awaits(s->farm, peer, k);
+	enum farm_delivery awaited = farm_awaits(jobs->farm, peer, k);
 	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(job, k) : NULL;
 	if (w && w->peer == peer) /* the answer to that one is the answer to this one */
 		return;
 	if (awaited == DELIVERY_USELESS)
 		ev.kind = EVENT_BATCH;
-	else if (w || !has_room(s, payload) || !live_job_put_off(job, peer, k, env, payload)) {
-		refuse(s, peer, k, w ? "another worker's result of this lease waits" : "no room for results that wait");
+	else if (w || !has_room(jobs, payload) || !live_job_put_off(job, peer, k, env, payload)) {
+		refuse(jobs, peer, k,
+		       w ? "another worker's result of this lease waits" : "no room for results that wait");
 		return;
 	}
-	jobs_step(s, &ev);
+	jobs_step(jobs, &ev);
 }
 
 /* Who does not hold the lease, or refuses states that it had before, refuses nothing that is there: nobody made it. */
-static void log_failure(const struct jobs *s, const char *from, struct live_job *job, const Farm__LeaseFailed *f,
+static void log_failure(const struct jobs *jobs, const char *from, struct live_job *job, const Farm__LeaseFailed *f,
 			const struct lease_key *k, const char *text, bool holds)
 {
 	struct log_value name = log_quote(from ? from : "?"), said = log_quote(text);
@@ -114,14 +115,14 @@ static void log_failure(const struct jobs *s, const char *from, struct live_job 
 	if (f->bad_states)
 		live_job_log(job, LOG_LEASE_FAILED,
 			     "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
-			     log_quote(holds ? farm_maker(s->farm, k) : "?").text, name.text, said.text, (int)k->kind,
-			     k->group, k->part, epoch);
+			     log_quote(holds ? farm_maker(jobs->farm, k) : "?").text, name.text, said.text,
+			     (int)k->kind, k->group, k->part, epoch);
 	else
 		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu",
 			     name.text, f->own, said.text, (int)k->kind, k->group, k->part, epoch);
 }
 
-void results_take_failure(struct jobs *s, uint64_t peer, const Farm__LeaseFailed *f)
+void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f)
 {
 	struct error e;
 	char text[1024];
@@ -132,61 +133,61 @@ void results_take_failure(struct jobs *s, uint64_t peer, const Farm__LeaseFailed
 	text_clean(text);
 	if (lease_key_from_wire(f->key, &ev.lease.key, &e) ||
 	    (f->bad_states && states_digest_from_wire(&f->states_digest, &states, &e))) {
-		s->peers.fault(s->peers.user, peer, "a lease cannot fail like this");
+		jobs->peers.fault(jobs->peers.user, peer, "a lease cannot fail like this");
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct live_job *job = jobs_find(s, ev.job);
+	struct live_job *job = jobs_find(jobs, ev.job);
 	ev.lease.own = f->own;
 	ev.lease.bad_states = f->bad_states;
 	ev.lease.other_states = f->bad_states && !(job && live_job_gives_states(job, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
-	if (job && *f->text && !blamed && !files_are_right(s, job)) { /* the spool's fault, not the worker's */
+	if (job && *f->text && !blamed && !files_are_right(jobs, job)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
 	struct back back = {0};
-	bool holds = farm_awaits(s->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
+	bool holds = farm_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
 		     !ev.lease.other_states; /* else nothing is read for it */
 	if (job && *text)
-		log_failure(s, s->peers.name(s->peers.user, peer), job, f, &ev.lease.key, text, holds);
-	if (job && *text && f->bad_states && holds && !job->busy && !s->stepping &&
+		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);
+	if (job && *text && f->bad_states && holds && !job->busy && !jobs->stepping &&
 	    journal_write(job->journal, &e) == 0)
 		ev.lease.can_take_back = back_read(job, job->journal, &ev.lease.key, &back, &e) == 0;
 	if (ev.lease.can_take_back)
-		jobs_step_with(s, &ev, &(struct incoming){.back = &back});
+		jobs_step_with(jobs, &ev, &(struct incoming){.back = &back});
 	else
-		jobs_step(s, &ev);
+		jobs_step(jobs, &ev);
 	back_fini(&back);
 }
 
 /* Its states are refused: looked at when nobody reads the film. */
-static void take_refusal(struct jobs *s, uint64_t peer, struct envelope *env, struct buf *payload)
+static void take_refusal(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;
-	struct live_job *job = m->key ? jobs_find(s, m->key->job) : NULL;
+	struct live_job *job = m->key ? jobs_find(jobs, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	if (!job || !job->busy || lease_key_from_wire(m->key, &k, &e)) {
-		if (s->peers.name(s->peers.user, peer))
-			results_take_failure(s, peer, m);
-	} else if (!has_room(s, payload) || !live_job_put_off(job, peer, &k, env, payload)) {
-		refuse(s, peer, &k, "no room for results that wait");
+		if (jobs->peers.name(jobs->peers.user, peer))
+			results_take_failure(jobs, peer, m);
+	} else if (!has_room(jobs, payload) || !live_job_put_off(job, peer, &k, env, payload)) {
+		refuse(jobs, peer, &k, "no room for results that wait");
 	}
 }
 
-void results_take(struct jobs *s, uint64_t peer, struct envelope *env, struct buf *payload)
+void results_take(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	if (env->message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED) {
-		take_refusal(s, peer, env, payload);
+		take_refusal(jobs, peer, env, payload);
 		return;
 	}
 	const Farm__LeaseResult *m = env->message->lease_result;
-	struct live_job *job = m->key ? jobs_find(s, m->key->job) : NULL;
+	struct live_job *job = m->key ? jobs_find(jobs, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	if (job && job->busy && lease_key_from_wire(m->key, &k, &e) == 0)
-		put_off(s, job, peer, &k, env, payload);
+		put_off(jobs, job, peer, &k, env, payload);
 	else
-		take_result(s, peer, m, payload);
+		take_result(jobs, peer, m, payload);
 }

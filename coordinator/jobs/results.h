@@ -7,8 +7,8 @@
 
 /* A LeaseResult, or a LeaseFailed that says that chain states are bad: now, or when the films are free. May take
  * either. */
-void results_take(struct jobs *s, uint64_t peer, struct envelope *env, struct buf *payload);
+void results_take(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload);
 /* Any other LeaseFailed. */
-void results_take_failure(struct jobs *s, uint64_t peer, const Farm__LeaseFailed *f);
+void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f);
 
 #endif

@@ -7,27 +7,27 @@
 #include "coordinator/jobs/publish.h"
 #include "coordinator/jobs/step.h"
 
-void retry_tick(struct jobs *s)
+void retry_tick(struct jobs *jobs)
 {
-	for (struct live_job *job = s->live; job; job = job->next) {
-		if (jobs_now(s) < job->try_again || job->busy)
+	for (struct live_job *job = jobs->live; job; job = job->next) {
+		if (jobs_now(jobs) < job->try_again || job->busy)
 			continue;
 		if (job->unpublished) {
 			job->unpublished = false;
-			publish_start(s, job, PUBLISH_RESULT, job->unpublished_rounds);
+			publish_start(jobs, job, PUBLISH_RESULT, job->unpublished_rounds);
 		}
 		if (job->unrecorded) {
 			job->unrecorded = false;
-			finish_ended(s);
+			finish_ended(jobs);
 			return; /* the list may have changed; the others next time */
 		}
 		if (job->unprepared && !job->ended) {
 			struct event ev = {.kind = EVENT_TICK};
-			dispatch_prepare(s, job);
-			jobs_step(s, &ev);
+			dispatch_prepare(jobs, job);
+			jobs_step(jobs, &ev);
 			return;
 		}
-		if (job->held && !job->ended && durable_mend(s, job) == 0)
+		if (job->held && !job->ended && durable_mend(jobs, job) == 0)
 			return;
 	}
 }

@@ -6,6 +6,6 @@
 #include "coordinator/job/jobs.h"
 
 /* Of each live job whose time has come: its image, its record, its films, the journal for its results. */
-void retry_tick(struct jobs *s);
+void retry_tick(struct jobs *jobs);
 
 #endif

@@ -25,90 +25,90 @@
 
 #include <string.h>
 
-int jobs_open(struct jobs *s, struct error *e)
+int jobs_open(struct jobs *jobs, struct error *e)
 {
 	struct farm_config config;
-	int rc = spool_open(&s->spool, s->config.spool, e);
+	int rc = spool_open(&jobs->spool, jobs->config.spool, e);
 	if (!rc)
-		rc = blob_store_open(&s->blobs, spool_blobs(s->spool), s->config.blob_bytes, e);
+		rc = blob_store_open(&jobs->blobs, spool_blobs(jobs->spool), jobs->config.blob_bytes, e);
 	if (!rc)
-		ages_open(s);
+		ages_open(jobs);
 	if (!rc)
-		rc = restore_open(s, e);
+		rc = restore_open(jobs, e);
 	if (!rc)
-		rc = ended_jobs_open(s, e);
+		rc = ended_jobs_open(jobs, e);
 	if (rc)
 		return rc;
-	if (s->config.keep_partials && disk_mkdir(s->config.keep_partials, 0777) && errno != EEXIST)
-		return error_set(e, errno, "%s: %s", s->config.keep_partials, strerror(errno));
+	if (jobs->config.keep_partials && disk_mkdir(jobs->config.keep_partials, 0777) && errno != EEXIST)
+		return error_set(e, errno, "%s: %s", jobs->config.keep_partials, strerror(errno));
 	farm_config_init(&config);
-	config.max_peers = s->config.max_connections;
-	config.first_job = spool_next_job(s->spool);
-	config.silent_after = 3 * s->config.heartbeat_seconds;
-	config.max_faults = s->config.max_faults;
-	config.first_pause = 2 * s->config.heartbeat_seconds;
+	config.max_peers = jobs->config.max_connections;
+	config.first_job = spool_next_job(jobs->spool);
+	config.silent_after = 3 * jobs->config.heartbeat_seconds;
+	config.max_faults = jobs->config.max_faults;
+	config.first_pause = 2 * jobs->config.heartbeat_seconds;
 	uv_random(NULL, NULL, &config.verify_seed, sizeof config.verify_seed, 0, NULL);
-	config.forget_after = 6 * s->config.heartbeat_seconds;
-	rc = farm_new(&s->farm, &config, e);
+	config.forget_after = 6 * jobs->config.heartbeat_seconds;
+	rc = farm_new(&jobs->farm, &config, e);
 	if (!rc)
-		rc = trust_open(s, e);
+		rc = trust_open(jobs, e);
 	if (!rc)
-		rc = recovery_begin(s, e);
+		rc = recovery_begin(jobs, e);
 	return rc;
 }
 
-void jobs_init(struct jobs *s)
+void jobs_init(struct jobs *jobs)
 {
-	s->follow_up = &follow_up;
-	s->deferred_last = &s->deferred;
-	s->acks_last = &s->acks;
-	uv_timer_init(s->loop, &s->wake);
-	uv_timer_init(s->loop, &s->drain);
-	s->wake.data = s->drain.data = s;
-	s->read = jobs_now(s);
+	jobs->follow_up = &follow_up;
+	jobs->deferred_last = &jobs->deferred;
+	jobs->acks_last = &jobs->acks;
+	uv_timer_init(jobs->loop, &jobs->wake);
+	uv_timer_init(jobs->loop, &jobs->drain);
+	jobs->wake.data = jobs->drain.data = jobs;
+	jobs->read = jobs_now(jobs);
 }
 
-void jobs_tick(struct jobs *s)
+void jobs_tick(struct jobs *jobs)
 {
-	if (recovery_is_on(s))
-		s->changes++;
-	durable_tick(s);
-	retry_tick(s);
-	files_tick(s);
-	folder_tick(s);
-	clear_tick(s);
-	checkpoint_where_due(s);
+	if (recovery_is_on(jobs))
+		jobs->changes++;
+	durable_tick(jobs);
+	retry_tick(jobs);
+	files_tick(jobs);
+	folder_tick(jobs);
+	clear_tick(jobs);
+	checkpoint_where_due(jobs);
 }
 
-void jobs_stop(struct jobs *s)
+void jobs_stop(struct jobs *jobs)
 {
-	s->stopping = true;
-	uv_close((uv_handle_t *)&s->wake, NULL);
-	uv_close((uv_handle_t *)&s->drain, NULL);
-	recovery_stop(s);
+	jobs->stopping = true;
+	uv_close((uv_handle_t *)&jobs->wake, NULL);
+	uv_close((uv_handle_t *)&jobs->drain, NULL);
+	recovery_stop(jobs);
 }
 
-void jobs_close(struct jobs *s)
+void jobs_close(struct jobs *jobs)
 {
-	recovery_close(s);
-	while (s->live) {
-		struct live_job *next = s->live->next;
-		live_job_free(s->live);
-		s->live = next;
+	recovery_close(jobs);
+	while (jobs->live) {
+		struct live_job *next = jobs->live->next;
+		live_job_free(jobs->live);
+		jobs->live = next;
 	}
-	while (s->deferred) {
-		struct deferred *next = s->deferred->next;
-		mem_free(s->deferred);
-		s->deferred = next;
+	while (jobs->deferred) {
+		struct deferred *next = jobs->deferred->next;
+		mem_free(jobs->deferred);
+		jobs->deferred = next;
 	}
-	durable_close(s);
-	clear_close(s);
-	if (s->seen.up > 0)
-		ages_keep(s);
-	if (s->farm)
-		farm_free(s->farm);
-	blob_store_close(s->blobs);
-	spool_close(s->spool);
-	mem_free(s->ended);
-	mem_free(s->restored);
+	durable_close(jobs);
+	clear_close(jobs);
+	if (jobs->seen.up > 0)
+		ages_keep(jobs);
+	if (jobs->farm)
+		farm_free(jobs->farm);
+	blob_store_close(jobs->blobs);
+	spool_close(jobs->spool);
+	mem_free(jobs->ended);
+	mem_free(jobs->restored);
 }

@@ -20,7 +20,7 @@
 
 /* ---- the core ---- */
 
-void jobs_defer(struct jobs *s, const struct event *ev)
+void jobs_defer(struct jobs *jobs, const struct event *ev)
 {
 	struct deferred *d = mem_alloc(1, sizeof *d);
 	if (!d) /* 300 bytes: without them nothing can go on */
@@ -28,61 +28,61 @@ void jobs_defer(struct jobs *s, const struct event *ev)
 	d->event = *ev;
 	text_copy(d->text, sizeof d->text, ev->text ? ev->text : "");
 	d->event.text = d->text;
-	*s->deferred_last = d;
-	s->deferred_last = &d->next;
+	*jobs->deferred_last = d;
+	jobs->deferred_last = &d->next;
 }
 
-void jobs_break(struct jobs *s, uint64_t job, const char *text)
+void jobs_break(struct jobs *jobs, uint64_t job, const char *text)
 {
 	struct event ev = {.kind = EVENT_JOB_BROKEN, .job = job, .text = text};
-	jobs_defer(s, &ev);
+	jobs_defer(jobs, &ev);
 }
 
 static void on_wake(uv_timer_t *t);
 
 static const struct incoming nothing;
 
-static void one_step(struct jobs *s, struct event *ev, const struct incoming *in)
+static void one_step(struct jobs *jobs, struct event *ev, const struct incoming *in)
 {
 	struct update u;
-	ev->time = jobs_now(s);
-	ev->unread = ev->time - s->read;
-	if (ev->unread < s->config.heartbeat_seconds + 1e-3 * TICK_MS) /* nobody is missed for so little */
+	ev->time = jobs_now(jobs);
+	ev->unread = ev->time - jobs->read;
+	if (ev->unread < jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* nobody is missed for so little */
 		ev->unread = 0;
-	farm_step(s->farm, ev, &u);
-	s->changes++;
-	s->follow_up->carry_out(s, &u, in);
-	if (isfinite(u.wake) && !s->stopping) {
-		double ms = ceil(1000 * (u.wake - jobs_now(s)));
-		uv_timer_start(&s->wake, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
+	farm_step(jobs->farm, ev, &u);
+	jobs->changes++;
+	jobs->follow_up->carry_out(jobs, &u, in);
+	if (isfinite(u.wake) && !jobs->stopping) {
+		double ms = ceil(1000 * (u.wake - jobs_now(jobs)));
+		uv_timer_start(&jobs->wake, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
 	} else {
-		uv_timer_stop(&s->wake);
+		uv_timer_stop(&jobs->wake);
 	}
 }
 
-void jobs_step(struct jobs *s, struct event *ev)
+void jobs_step(struct jobs *jobs, struct event *ev)
 {
-	if (s->stepping) /* what sessions say while an update is carried out */
-		jobs_defer(s, ev);
+	if (jobs->stepping) /* what sessions say while an update is carried out */
+		jobs_defer(jobs, ev);
 	else
-		jobs_step_with(s, ev, &nothing);
+		jobs_step_with(jobs, ev, &nothing);
 }
 
-void jobs_step_with(struct jobs *s, struct event *ev, const struct incoming *in)
+void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *in)
 {
-	assert(!s->stepping);
-	s->stepping = true;
-	one_step(s, ev, in);
-	while (s->deferred) {
-		struct deferred *d = s->deferred;
-		s->deferred = d->next;
-		if (!s->deferred)
-			s->deferred_last = &s->deferred;
-		one_step(s, &d->event, &nothing);
+	assert(!jobs->stepping);
+	jobs->stepping = true;
+	one_step(jobs, ev, in);
+	while (jobs->deferred) {
+		struct deferred *d = jobs->deferred;
+		jobs->deferred = d->next;
+		if (!jobs->deferred)
+			jobs->deferred_last = &jobs->deferred;
+		one_step(jobs, &d->event, &nothing);
 		mem_free(d);
 	}
-	s->stepping = false;
-	s->follow_up->stepped(s);
+	jobs->stepping = false;
+	jobs->follow_up->stepped(jobs);
 }
 
 static void on_wake(uv_timer_t *t)
@@ -91,7 +91,7 @@ static void on_wake(uv_timer_t *t)
 	jobs_step(t->data, &ev);
 }
 
-void jobs_films_free(struct jobs *s)
+void jobs_films_free(struct jobs *jobs)
 {
-	s->follow_up->films_free(s);
+	jobs->follow_up->films_free(jobs);
 }

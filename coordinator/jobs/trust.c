@@ -24,20 +24,21 @@ static int add_worker(json_t *list, const struct worker_status *w, struct error 
 		       : 0;
 }
 
-static void write_quarantined(struct jobs *s)
+static void write_quarantined(struct jobs *jobs)
 {
 	struct worker_status w;
 	struct error e;
 	int rc = 0;
 	json_t *list = json_array(), *o = json_pack("{s:i s:o}", "schema", 1, "workers", list);
-	for (uint64_t who = 0; !rc && (who = farm_next_quarantined(s->farm, who)) && farm_worker(s->farm, who, &w);)
+	for (uint64_t who = 0;
+	     !rc && (who = farm_next_quarantined(jobs->farm, who)) && farm_worker(jobs->farm, who, &w);)
 		rc = add_worker(list, &w, &e);
 	char *text = json_dumps(o, JSON_INDENT(1));
 	json_decref(o);
 	if (!rc && !text)
 		rc = error_set(&e, ENOMEM, "no memory for the list of those that are quarantined");
 	if (!rc)
-		rc = spool_write_own(s->spool, file, text, strlen(text), &e);
+		rc = spool_write_own(jobs->spool, file, text, strlen(text), &e);
 	if (rc)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	free(text);
@@ -49,7 +50,7 @@ static const char *text_of(const json_t *o, const char *key)
 	return text ? text : "";
 }
 
-static void tell_core(struct jobs *s, const json_t *w)
+static void tell_core(struct jobs *jobs, const json_t *w)
 {
 	struct event ev = {.kind = EVENT_QUARANTINED,
 			   .text = text_of(w, "why"),
@@ -57,22 +58,22 @@ static void tell_core(struct jobs *s, const json_t *w)
 				    .name = text_of(w, "name"),
 				    .home = text_of(w, "home"),
 				    .restarts = (uint64_t)json_integer_value(json_object_get(w, "restarts"))}};
-	const char *forgiven = s->config.forgive;
+	const char *forgiven = jobs->config.forgive;
 	if (forgiven && strcmp(forgiven, ev.join.name) == 0) {
 		log_event(LOG_WORKER_FORGIVEN, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
 		return;
 	}
 	log_event(LOG_WORKER_QUARANTINED, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
-	jobs_step(s, &ev);
+	jobs_step(jobs, &ev);
 }
 
 /* The farm does not stand still for it: whoever gives wrong results will do so again, and is found again. */
-static int put_by(struct jobs *s, struct error *e)
+static int put_by(struct jobs *jobs, struct error *e)
 {
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
-	spool_path(s->spool, file, from);
-	spool_path(s->spool, "aside.damaged", to);
-	spool_path(s->spool, "", folder);
+	spool_path(jobs->spool, file, from);
+	spool_path(jobs->spool, "aside.damaged", to);
+	spool_path(jobs->spool, "", folder);
 	log_event(
 		LOG_SPOOL_FAULT,
 		"text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is quarantined\"",
@@ -80,34 +81,34 @@ static int put_by(struct jobs *s, struct error *e)
 	return spool_rename(from, to, folder, e);
 }
 
-int trust_open(struct jobs *s, struct error *e)
+int trust_open(struct jobs *jobs, struct error *e)
 {
 	char *text;
 	size_t size;
 	json_error_t fault;
-	int rc = spool_read_own(s->spool, file, &text, &size, e);
+	int rc = spool_read_own(jobs->spool, file, &text, &size, e);
 	if (rc == -EFBIG)
-		return put_by(s, e);
+		return put_by(jobs, e);
 	if (rc)
 		return rc == -ENOENT ? 0 : rc;
 	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
 	const json_t *list = json_object_get(o, "workers");
 	if (!json_is_array(list))
-		rc = put_by(s, e);
+		rc = put_by(jobs, e);
 	for (size_t i = 0; i < json_array_size(list); i++)
-		tell_core(s, json_array_get(list, i));
+		tell_core(jobs, json_array_get(list, i));
 	json_decref(o);
 	mem_free(text);
-	if (!rc && s->config.forgive)
-		write_quarantined(s);
+	if (!rc && jobs->config.forgive)
+		write_quarantined(jobs);
 	return rc;
 }
 
 /* ---- what they did */
 
-double trust_share(const struct jobs *s, const Farm__Submit *m)
+double trust_share(const struct jobs *jobs, const Farm__Submit *m)
 {
-	return m->mixed ? 0 : m->verify > s->config.verify ? m->verify : s->config.verify;
+	return m->mixed ? 0 : m->verify > jobs->config.verify ? m->verify : jobs->config.verify;
 }
 
 void trust_merged(struct live_job *job, const struct action *a)
@@ -136,19 +137,19 @@ void trust_taken_back(struct live_job *job, uint64_t who)
 			job->credits[i].leases--;
 }
 
-static const char *name_of(const struct jobs *s, uint64_t who, char name[JOIN_NAME])
+static const char *name_of(const struct jobs *jobs, uint64_t who, char name[JOIN_NAME])
 {
 	struct worker_status w;
-	text_copy(name, JOIN_NAME, farm_worker(s->farm, who, &w) ? w.name : "?");
+	text_copy(name, JOIN_NAME, farm_worker(jobs->farm, who, &w) ? w.name : "?");
 	return name;
 }
 
-void trust_wrong(struct jobs *s, const struct action *a)
+void trust_wrong(struct jobs *jobs, const struct action *a)
 {
 	char name[JOIN_NAME];
-	struct live_job *job = jobs_find(s, a->job);
+	struct live_job *job = jobs_find(jobs, a->job);
 	if (job)
-		live_job_log(job, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text,
+		live_job_log(job, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(jobs, a->who, name)).text,
 			     log_quote(a->text).text);
 }
 
@@ -167,20 +168,20 @@ static void note_credit(struct live_job *job, const char *name, const char *why,
 	note(job, text);
 }
 
-void trust_anew(struct jobs *s, const struct action *a)
+void trust_anew(struct jobs *jobs, const struct action *a)
 {
-	struct live_job *job = jobs_find(s, a->job);
+	struct live_job *job = jobs_find(jobs, a->job);
 	if (job)
 		note(job, a->text);
 }
 
-void trust_quarantined(struct jobs *s, const struct action *a)
+void trust_quarantined(struct jobs *jobs, const struct action *a)
 {
 	char name[JOIN_NAME];
-	name_of(s, a->who, name);
+	name_of(jobs, a->who, name);
 	log_event(LOG_WORKER_QUARANTINED, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
-	write_quarantined(s);
-	for (struct live_job *job = s->live; job; job = job->next)
+	write_quarantined(jobs);
+	for (struct live_job *job = jobs->live; job; job = job->next)
 		for (size_t i = 0; i < job->credit_count; i++)
 			if (job->credits[i].who == a->who && job->credits[i].leases > 0)
 				note_credit(job, name, a->text, job->credits[i].leases);

@@ -12,16 +12,16 @@
 
 /* Tells the core who is quarantined, but for those that the configuration forgives. A file that
  * is damaged is put by as aside.damaged, and the log says so. */
-int trust_open(struct jobs *s, struct error *e);
+int trust_open(struct jobs *jobs, struct error *e);
 
 /* Of the job's leases that two workers compute: as it asks for, and no less than is asked of all; none of a mixed one.
  */
-double trust_share(const struct jobs *s, const Farm__Submit *m);
+double trust_share(const struct jobs *jobs, const Farm__Submit *m);
 
 void trust_merged(struct live_job *job, const struct action *a);
 void trust_taken_back(struct live_job *job, uint64_t who); /* one of its results counts no more */
-void trust_wrong(struct jobs *s, const struct action *a);
-void trust_anew(struct jobs *s, const struct action *a); /* chains that lost their states */
-void trust_quarantined(struct jobs *s, const struct action *a);
+void trust_wrong(struct jobs *jobs, const struct action *a);
+void trust_anew(struct jobs *jobs, const struct action *a); /* chains that lost their states */
+void trust_quarantined(struct jobs *jobs, const struct action *a);
 
 #endif

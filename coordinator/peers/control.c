@@ -30,19 +30,19 @@ static void not_for_long(struct session *p, const struct error *e)
 
 static void hold(struct session *p, uint64_t id, const char *who)
 {
-	struct jobs *s = p->jobs;
+	struct jobs *jobs = p->jobs;
 	struct error e;
 	char text[256];
 	struct event ev = {
 		.kind = EVENT_HOLD, .job = id, .hold = HOLD_ORDERED, .text = *who ? restore_held_by(who, text) : ""};
 	if (tell(p, &ev))
 		return;
-	if (ledger_hold(s->ledger, id, who, &e)) {
+	if (ledger_hold(jobs->ledger, id, who, &e)) {
 		not_for_long(p, &e);
 		return;
 	}
-	reconcile_row(s, id);
-	struct live_job *job = jobs_find(s, id);
+	reconcile_row(jobs, id);
+	struct live_job *job = jobs_find(jobs, id);
 	if (job)
 		live_job_log(job, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released",
 			     log_quote(name_of(p)).text);
@@ -50,17 +50,17 @@ static void hold(struct session *p, uint64_t id, const char *who)
 
 static void set_priority(struct session *p, uint64_t id, int priority)
 {
-	struct jobs *s = p->jobs;
+	struct jobs *jobs = p->jobs;
 	struct error e;
 	struct event ev = {.kind = EVENT_PRIORITY, .job = id, .priority = priority};
 	if (tell(p, &ev))
 		return;
-	if (ledger_priority(s->ledger, id, priority, &e)) {
+	if (ledger_priority(jobs->ledger, id, priority, &e)) {
 		not_for_long(p, &e);
 		return;
 	}
-	reconcile_row(s, id);
-	struct live_job *job = jobs_find(s, id);
+	reconcile_row(jobs, id);
+	struct live_job *job = jobs_find(jobs, id);
 	if (job)
 		live_job_log(job, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
 }

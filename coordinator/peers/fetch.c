@@ -150,10 +150,10 @@ static void answer(struct session *p, const Farm__Fetch *f)
 }
 
 /* Made when somebody asks: it holds up the job's results for as long as an image takes. */
-static bool is_preview_old(const struct jobs *s, const struct live_job *job)
+static bool is_preview_old(const struct jobs *jobs, const struct live_job *job)
 {
 	return job && job->canvas && !job->ended &&
-	       (job->preview_made <= 0 || jobs_now(s) - job->preview_made > preview_seconds);
+	       (job->preview_made <= 0 || jobs_now(jobs) - job->preview_made > preview_seconds);
 }
 
 void fetch_previews(struct peers *s, uint64_t id)

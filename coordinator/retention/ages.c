@@ -29,13 +29,13 @@ static struct seen clocks(void)
 	return now;
 }
 
-void ages_open(struct jobs *s)
+void ages_open(struct jobs *jobs)
 {
 	struct seen last;
 	struct error e = {""};
 	char *text;
 	size_t size;
-	int rc = spool_read_own(s->spool, file, &text, &size, &e);
+	int rc = spool_read_own(jobs->spool, file, &text, &size, &e);
 	if (!rc) {
 		if ((rc = seen_from_text(text, size, &last)))
 			error_set(
@@ -46,23 +46,23 @@ void ages_open(struct jobs *s)
 	}
 	if (rc && rc != -ENOENT)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	s->seen = clocks();
-	seen_go_on(&s->seen, rc ? NULL : &last);
-	ages_keep(s);
+	jobs->seen = clocks();
+	seen_go_on(&jobs->seen, rc ? NULL : &last);
+	ages_keep(jobs);
 }
 
-double ages_now(const struct jobs *s)
+double ages_now(const struct jobs *jobs)
 {
-	double since = seconds_of(CLOCK_BOOTTIME) - s->seen.up;
-	return s->seen.seconds + (since > 0 ? since : 0);
+	double since = seconds_of(CLOCK_BOOTTIME) - jobs->seen.up;
+	return jobs->seen.seconds + (since > 0 ? since : 0);
 }
 
-void ages_keep(const struct jobs *s)
+void ages_keep(const struct jobs *jobs)
 {
 	char text[SEEN_TEXT];
 	struct error e;
 	struct seen now = clocks();
-	now.seconds = ages_now(s);
-	if (spool_write_own(s->spool, file, text, seen_to_text(&now, text), &e))
+	now.seconds = ages_now(jobs);
+	if (spool_write_own(jobs->spool, file, text, seen_to_text(&now, text), &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 }

@@ -9,8 +9,8 @@
 #include "coordinator/job/jobs.h"
 
 /* A file that is gone or damaged begins anew: what has ended is then as young as it can be. Never fails. */
-void ages_open(struct jobs *s);
-double ages_now(const struct jobs *s); /* s */
-void ages_keep(const struct jobs *s);  /* writes it down; a disk that does not take it is tried again next time */
+void ages_open(struct jobs *jobs);
+double ages_now(const struct jobs *jobs); /* s */
+void ages_keep(const struct jobs *jobs);  /* writes it down; a disk that does not take it is tried again next time */
 
 #endif

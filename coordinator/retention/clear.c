@@ -39,65 +39,65 @@ struct clearing {
 };
 
 /* Or is about to run again: its films are being read, so that it goes on. */
-static bool is_needed(const struct jobs *s, uint64_t job)
+static bool is_needed(const struct jobs *jobs, uint64_t job)
 {
-	return jobs_find(s, job) || jobs_is_read(s, job);
+	return jobs_find(jobs, job) || jobs_is_read(jobs, job);
 }
 
-static uint64_t result_bytes(const struct jobs *s, uint64_t job)
+static uint64_t result_bytes(const struct jobs *jobs, uint64_t job)
 {
 	uint64_t sum = 0;
 	for (int i = 0; i < RESULTS; i++) {
 		char path[SPOOL_PATH_MAX];
 		struct stat st;
-		spool_job_path(s->spool, job, results[i], path);
+		spool_job_path(jobs->spool, job, results[i], path);
 		sum += disk_stat(path, &st) == 0 ? (uint64_t)st.st_size : 0;
 	}
 	return sum;
 }
 
-static void clear_if_unneeded(const struct jobs *s, struct clearing *c, uint64_t id)
+static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint64_t id)
 {
-	if (is_needed(s, id))
+	if (is_needed(jobs, id))
 		return;
-	int rc = spool_read_record(s->spool, id, &c->record, NULL);
+	int rc = spool_read_record(jobs->spool, id, &c->record, NULL);
 	if (rc == -ENOENT) { /* if nothing is in it */
 		char path[SPOOL_PATH_MAX];
-		spool_job_path(s->spool, id, NULL, path);
+		spool_job_path(jobs->spool, id, NULL, path);
 		disk_rmdir(path);
 	}
 	if (rc || !record_is_ended(&c->record))
 		return;
-	double now = ages_now(s);
+	double now = ages_now(jobs);
 	if (c->record.ended_seen < 0 ||
 	    c->record.ended_seen > now) { /* nobody knows how old it is: it counts from here on */
 		c->record.ended_seen = now;
-		if (spool_write_record(s->spool, &c->record, NULL))
+		if (spool_write_record(jobs->spool, &c->record, NULL))
 			return;
 	}
 	c->jobs[c->job_count++] = (struct age_job){.id = id,
 						   .ended = c->record.ended_seen,
-						   .films = keep_bytes(s, id),
-						   .result = result_bytes(s, id),
-						   .busy = s->peers.uses_result(s->peers.user, id)};
+						   .films = keep_bytes(jobs, id),
+						   .result = result_bytes(jobs, id),
+						   .busy = jobs->peers.uses_result(jobs->peers.user, id)};
 }
 
-static struct job_record *listed(struct jobs *s, uint64_t job)
+static struct job_record *listed(struct jobs *jobs, uint64_t job)
 {
-	for (size_t i = 0; i < s->ended_count; i++)
-		if (s->ended[i].id == job)
-			return &s->ended[i];
+	for (size_t i = 0; i < jobs->ended_count; i++)
+		if (jobs->ended[i].id == job)
+			return &jobs->ended[i];
 	return NULL;
 }
 
-static void drop_result(struct jobs *s, const struct age_job *j, struct job_record *r, double now)
+static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_record *r, double now)
 {
 	struct error e;
-	struct job_record *known = listed(s, j->id);
+	struct job_record *known = listed(jobs, j->id);
 	if (r->has_result) {
 		r->has_result = false;
 		r->cleared = now;
-		if (spool_write_record(s->spool, r,
+		if (spool_write_record(jobs->spool, r,
 				       &e)) { /* the result stays until its record can say that it is gone */
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)j->id,
 				  log_quote(e.text).text);
@@ -108,122 +108,122 @@ static void drop_result(struct jobs *s, const struct age_job *j, struct job_reco
 	}
 	for (int i = 0; i < RESULTS; i++) {
 		char path[SPOOL_PATH_MAX];
-		spool_job_path(s->spool, j->id, results[i], path);
+		spool_job_path(jobs->spool, j->id, results[i], path);
 		disk_unlink(path);
 	}
 	log_event(LOG_JOB_CLEARED, "job=j%llu what=result bytes=%llu ended=%.0f", (unsigned long long)j->id,
 		  (unsigned long long)j->result, r->ended);
 }
 
-static void drop_record(struct jobs *s, const struct age_job *j)
+static void drop_record(struct jobs *jobs, const struct age_job *j)
 {
-	struct job_record *known = listed(s, j->id);
-	spool_drop_job(s->spool, j->id);
+	struct job_record *known = listed(jobs, j->id);
+	spool_drop_job(jobs->spool, j->id);
 	if (known) {
-		size_t behind = s->ended_count - (size_t)(known - s->ended) - 1;
+		size_t behind = jobs->ended_count - (size_t)(known - jobs->ended) - 1;
 		memmove(known, known + 1, behind * sizeof *known);
-		s->ended_count--;
+		jobs->ended_count--;
 	}
 	log_event(LOG_JOB_CLEARED, "job=j%llu what=record", (unsigned long long)j->id);
 }
 
 /* What was chosen, unless something has come of the job since. */
-static void clear_job(struct jobs *s, struct clearing *c, const struct age_job *j)
+static void clear_job(struct jobs *jobs, struct clearing *c, const struct age_job *j)
 {
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
 		return;
-	if (is_needed(s, j->id) || s->peers.uses_result(s->peers.user, j->id) ||
-	    spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
+	if (is_needed(jobs, j->id) || jobs->peers.uses_result(jobs->peers.user, j->id) ||
+	    spool_read_record(jobs->spool, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
 		return;
 	if (j->no_films && j->films) {
-		keep_drop(s, j->id);
+		keep_drop(jobs, j->id);
 		log_event(LOG_JOB_CLEARED, "job=j%llu what=films bytes=%llu", (unsigned long long)j->id,
 			  (unsigned long long)j->films);
 	}
 	if (j->no_result && j->result)
-		drop_result(s, j, &c->record, c->now);
+		drop_result(jobs, j, &c->record, c->now);
 	if (j->no_record) {
-		drop_record(s, j);
+		drop_record(jobs, j);
 		c->ids[c->records++] = j->id;
 	}
-	s->changes++;
+	jobs->changes++;
 }
 
-static void choose(const struct jobs *s, struct clearing *c)
+static void choose(const struct jobs *jobs, struct clearing *c)
 {
-	struct age_limits limits = {s->config.clear_seconds, s->config.clear_bytes};
+	struct age_limits limits = {jobs->config.clear_seconds, jobs->config.clear_bytes};
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
 	c->now = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-	age_choose(c->jobs, c->job_count, &limits, ages_now(s));
+	age_choose(c->jobs, c->job_count, &limits, ages_now(jobs));
 }
 
 /* false: that was all. */
-static bool step(struct jobs *s, struct clearing *c)
+static bool step(struct jobs *jobs, struct clearing *c)
 {
 	if (c->looked < c->id_count)
-		clear_if_unneeded(s, c, c->ids[c->looked++]);
+		clear_if_unneeded(jobs, c, c->ids[c->looked++]);
 	else if (!(c->now > 0))
-		choose(s, c);
+		choose(jobs, c);
 	else if (c->cleared < c->job_count)
-		clear_job(s, c, &c->jobs[c->cleared++]);
+		clear_job(jobs, c, &c->jobs[c->cleared++]);
 	else
 		return false;
 	return true;
 }
 
 /* At once, for each change of the database is flushed. */
-static void drop_rows(struct jobs *s, const struct clearing *c)
+static void drop_rows(struct jobs *jobs, const struct clearing *c)
 {
 	struct error e;
-	if (c->records && ledger_drop(s->ledger, c->ids, c->records, &e))
+	if (c->records && ledger_drop(jobs->ledger, c->ids, c->records, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 
-void clear_close(struct jobs *s)
+void clear_close(struct jobs *jobs)
 {
-	struct clearing *c = s->clearing;
+	struct clearing *c = jobs->clearing;
 	if (!c)
 		return;
 	mem_free(c->ids);
 	mem_free(c->jobs);
 	mem_free(c);
-	s->clearing = NULL;
+	jobs->clearing = NULL;
 }
 
-static bool begin(struct jobs *s)
+static bool begin(struct jobs *jobs)
 {
 	struct error e;
-	struct clearing *c = s->clearing = mem_alloc(1, sizeof *c);
+	struct clearing *c = jobs->clearing = mem_alloc(1, sizeof *c);
 	if (!c)
 		return false;
-	if (spool_jobs(s->spool, &c->ids, &c->id_count, &e))
+	if (spool_jobs(jobs->spool, &c->ids, &c->id_count, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	c->jobs = c->id_count ? mem_alloc(c->id_count, sizeof *c->jobs) : NULL;
 	if (!c->jobs)
-		clear_close(s);
-	return s->clearing != NULL;
+		clear_close(jobs);
+	return jobs->clearing != NULL;
 }
 
-void clear_soon(struct jobs *s)
+void clear_soon(struct jobs *jobs)
 {
-	s->clear_next = fmin(s->clear_next, jobs_now(s) + soon_seconds);
+	jobs->clear_next = fmin(jobs->clear_next, jobs_now(jobs) + soon_seconds);
 }
 
-void clear_tick(struct jobs *s)
+void clear_tick(struct jobs *jobs)
 {
-	double now = jobs_now(s);
-	if (!s->clearing) {
-		if (now < s->clear_next)
+	double now = jobs_now(jobs);
+	if (!jobs->clearing) {
+		if (now < jobs->clear_next)
 			return;
-		s->clear_next = now + every_seconds;
-		ages_keep(s);
-		if ((!(s->config.clear_seconds > 0) && !s->config.clear_bytes) || !begin(s))
+		jobs->clear_next = now + every_seconds;
+		ages_keep(jobs);
+		if ((!(jobs->config.clear_seconds > 0) && !jobs->config.clear_bytes) || !begin(jobs))
 			return;
 	}
-	while (step(s, s->clearing))
-		if (jobs_now(s) - now > tick_seconds)
+	while (step(jobs, jobs->clearing))
+		if (jobs_now(jobs) - now > tick_seconds)
 			return;
-	drop_rows(s, s->clearing);
-	clear_close(s);
+	drop_rows(jobs, jobs->clearing);
+	clear_close(jobs);
 }

@@ -11,8 +11,8 @@
 
 #include "coordinator/job/jobs.h"
 
-void clear_tick(struct jobs *s);
-void clear_soon(struct jobs *s);  /* a job has ended */
-void clear_close(struct jobs *s); /* after the loop */
+void clear_tick(struct jobs *jobs);
+void clear_soon(struct jobs *jobs);  /* a job has ended */
+void clear_close(struct jobs *jobs); /* after the loop */
 
 #endif

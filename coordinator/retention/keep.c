@@ -6,42 +6,42 @@
 
 #include <string.h>
 
-bool keep_order(struct jobs *s, const struct live_job *job)
+bool keep_order(struct jobs *jobs, const struct live_job *job)
 {
 	char path[SPOOL_PATH_MAX];
 	struct stat st;
-	if (!s->config.keep_bytes || !job->canvas || job->lit.black || canvas_rounds(job->canvas) == 0 ||
+	if (!jobs->config.keep_bytes || !job->canvas || job->lit.black || canvas_rounds(job->canvas) == 0 ||
 	    (strcmp(job->record.state, job_state_name(JOB_DONE)) != 0 && !job->overflowed))
 		return false;
-	spool_job_path(s->spool, job->id, "order", path);
+	spool_job_path(jobs->spool, job->id, "order", path);
 	return disk_stat(path, &st) == 0;
 }
 
-void keep_drop(const struct jobs *s, uint64_t job)
+void keep_drop(const struct jobs *jobs, uint64_t job)
 {
 	char path[SPOOL_PATH_MAX];
-	if (jobs_is_read(s, job))
+	if (jobs_is_read(jobs, job))
 		return;
-	spool_job_path(s->spool, job, NULL, path);
+	spool_job_path(jobs->spool, job, NULL, path);
 	journal_clear(path, UINT64_MAX);
-	spool_job_path(s->spool, job, "checkpoint", path);
+	spool_job_path(jobs->spool, job, "checkpoint", path);
 	disk_unlink(path);
-	spool_job_path(s->spool, job, "order", path);
+	spool_job_path(jobs->spool, job, "order", path);
 	disk_unlink(path);
 }
 
-uint64_t keep_bytes(const struct jobs *s, uint64_t job)
+uint64_t keep_bytes(const struct jobs *jobs, uint64_t job)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
 	uint64_t sum = 0;
 	struct stat st;
-	spool_job_path(s->spool, job, NULL, folder);
+	spool_job_path(jobs->spool, job, NULL, folder);
 	DIR *d = disk_opendir(folder);
 	for (struct dirent *f; d && (f = readdir(d));) {
 		if (strcmp(f->d_name, "order") != 0 && strcmp(f->d_name, "checkpoint") != 0 &&
 		    strncmp(f->d_name, "journal.", 8) != 0)
 			continue;
-		spool_job_path(s->spool, job, f->d_name, path);
+		spool_job_path(jobs->spool, job, f->d_name, path);
 		sum += disk_stat(path, &st) == 0 ? (uint64_t)st.st_size : 0;
 	}
 	if (d)
@@ -49,24 +49,24 @@ uint64_t keep_bytes(const struct jobs *s, uint64_t job)
 	return sum;
 }
 
-bool keep_drop_all(const struct jobs *s)
+bool keep_drop_all(const struct jobs *jobs)
 {
 	bool any = false;
-	for (size_t i = 0; i < s->ended_count; i++)
-		if (keep_bytes(s, s->ended[i].id)) {
-			keep_drop(s, s->ended[i].id);
+	for (size_t i = 0; i < jobs->ended_count; i++)
+		if (keep_bytes(jobs, jobs->ended[i].id)) {
+			keep_drop(jobs, jobs->ended[i].id);
 			any = true;
 		}
 	return any;
 }
 
-void keep_trim(const struct jobs *s)
+void keep_trim(const struct jobs *jobs)
 {
-	uint64_t left = s->config.keep_bytes;
-	for (size_t i = s->ended_count; i-- > 0;) { /* the latest ones first */
-		uint64_t bytes = keep_bytes(s, s->ended[i].id);
+	uint64_t left = jobs->config.keep_bytes;
+	for (size_t i = jobs->ended_count; i-- > 0;) { /* the latest ones first */
+		uint64_t bytes = keep_bytes(jobs, jobs->ended[i].id);
 		if (bytes > left)
-			keep_drop(s, s->ended[i].id);
+			keep_drop(jobs, jobs->ended[i].id);
 		else
 			left -= bytes;
 	}

@@ -10,10 +10,10 @@
 #include "coordinator/job/jobs.h"
 
 /* Of a job that has just ended. false: it cannot go on, and nothing is to be kept. */
-bool keep_order(struct jobs *s, const struct live_job *job);
-void keep_drop(const struct jobs *s, uint64_t job);
-uint64_t keep_bytes(const struct jobs *s, uint64_t job); /* on the disk */
-bool keep_drop_all(const struct jobs *s);		 /* of listed jobs; true: there was something */
-void keep_trim(const struct jobs *s);			 /* after jobs have ended, and at the start */
+bool keep_order(struct jobs *jobs, const struct live_job *job);
+void keep_drop(const struct jobs *jobs, uint64_t job);
+uint64_t keep_bytes(const struct jobs *jobs, uint64_t job); /* on the disk */
+bool keep_drop_all(const struct jobs *jobs);		    /* of listed jobs; true: there was something */
+void keep_trim(const struct jobs *jobs);		    /* after jobs have ended, and at the start */
 
 #endif
