@@ -34,6 +34,14 @@ static struct world *on_a_floor(const struct agree_case *k)
 			     SMALL_VALUES(k->a), k->b);
 }
 
+/* The floor is turned about an axis that it does not lie along, and its middle is elsewhere: each of its vertices is rounded in another way. */
+static struct world *on_a_tilted_floor(const struct agree_case *k)
+{
+	return world_of_text(32, 32, SMALL_THINGS
+			     "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/><translate x='0.3' z='-0.41'/>" SCALED) GREY("0.7") "</shape>",
+			     SMALL_VALUES(k->a), k->b);
+}
+
 /* The floor is not under its own centre, a second one hangs far above, and the sun is a ball as far away as that. */
 static struct world *beside_a_floor(const struct agree_case *k)
 {
@@ -211,6 +219,7 @@ const struct agree_case agree_cases[] = {
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},
+	{"mixed scales", "1 on a tilted floor of 1e8", on_a_tilted_floor, 1, 1e8, 5, 1024, 512, {"bdpt", "hslt"}, 0.02},
 	{"mixed scales", "1 on a floor of 1e12", on_a_floor, 1, 1e12, 5, 1024, 512, ALL, 0.02},
 	{"mixed scales", "1e18 on a floor of 1e19", on_a_floor, 1e18, 1e19, 5, 1024, 512, ALL, 0.02},
 	{NULL, NULL, NULL, 0, 0, 0, 0, 0, {NULL}, 0},

@@ -106,7 +106,8 @@ struct accel *body_accel(const struct geom_shape *shapes, uint32_t count)
 					    (const float(*)[3])g->position,
 					    (const uint32_t(*)[3])g->index,
 					    SURFACE_OPAQUE,
-					    g->place};
+					    g->place,
+					    (const double(*)[3])g->unrounded};
 	}
 	struct accel *accel;
 	struct error e = {""};

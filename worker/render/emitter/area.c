@@ -24,7 +24,10 @@ static const struct param params[] = {
 
 static vec3 corner(const struct emitter_surface *s, uint32_t triangle, int k)
 {
-	const float *p = s->position[s->index[triangle][k]];
+	uint32_t i = s->index[triangle][k];
+	if (s->unrounded)
+		return (vec3){s->unrounded[i][0], s->unrounded[i][1], s->unrounded[i][2]};
+	const float *p = s->position[i];
 	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
 }
 

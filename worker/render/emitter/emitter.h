@@ -30,6 +30,7 @@ struct emitter_surface {
 	struct frame sphere_axes;   /* of the (u,v) parametrisation */
 	uint32_t triangle_count;
 	const float (*position)[3];
+	const double (*unrounded)[3]; /* NULL: position; see worker/render/geom/primitive.h */
 	const uint32_t (*index)[3];
 	const float (*uv)[2]; /* NULL: none */
 };

@@ -2,8 +2,8 @@
 /*
  * Asking which of coinciding primitives is there, and whether two coincide. The latter is decided on the polygon in
  * which the one projects onto the other: its corners lie no farther from the other's plane than the vertices of both
- * are rounded, 2^-24 of each coordinate, and it is wider than a few such roundings. The corners decide for all of it:
- * both are planes.
+ * are rounded, floats by 2^-24 of each coordinate, and it is wider than a few such roundings. The corners decide for
+ * all of it: both are planes.
  */
 #include "worker/render/geom/coincide.h"
 
@@ -39,9 +39,9 @@ static double largest(double a, double b, double c)
 /* What rounding of its vertices can move a triangle by, along n. */
 static double rounded_along(const struct triangle *t, vec3 n)
 {
-	return 0x1p-24 * (fabs(n.x) * largest(t->v[0].x, t->v[1].x, t->v[2].x) +
-			  fabs(n.y) * largest(t->v[0].y, t->v[1].y, t->v[2].y) +
-			  fabs(n.z) * largest(t->v[0].z, t->v[1].z, t->v[2].z));
+	return t->rounding * (fabs(n.x) * largest(t->v[0].x, t->v[1].x, t->v[2].x) +
+			      fabs(n.y) * largest(t->v[0].y, t->v[1].y, t->v[2].y) +
+			      fabs(n.z) * largest(t->v[0].z, t->v[1].z, t->v[2].z));
 }
 
 /* Wider than about eight roundings of its coordinates. */

@@ -27,11 +27,15 @@ struct accel_shape {
 	const uint32_t (*index)[3];
 	enum surface_rank rank;
 	const struct placement *place; /* where this instance of a mesh stands; NULL: positions are the world's */
+	const double (*unrounded)[3];  /* the vertices in double, of a shape that is too large for floats beside what is
+					  small; NULL: position */
 };
 
 static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim)
 {
 	const uint32_t *i = s->index[prim];
+	if (s->unrounded)
+		return triangle_unrounded(s->unrounded, i);
 	return s->place ? placement_triangle(s->place, s->position, i) : triangle_from(s->position, i);
 }
 

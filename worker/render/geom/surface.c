@@ -100,10 +100,18 @@ static struct corner placed_corner(const struct geom_shape *s, const uint32_t i[
 			       placement_vector(s->place, vec3_sub(p2, p0))};
 }
 
+static struct corner unrounded_corner(const struct geom_shape *s, const uint32_t i[3])
+{
+	const struct triangle t = triangle_unrounded((const double(*)[3])s->unrounded, i);
+	return (struct corner){t.v[0], vec3_sub(t.v[1], t.v[0]), vec3_sub(t.v[2], t.v[0])};
+}
+
 static struct corner corner_of(const struct geom_shape *s, const uint32_t i[3])
 {
 	if (s->place)
 		return placed_corner(s, i);
+	if (s->unrounded)
+		return unrounded_corner(s, i);
 	vec3 v0 = at(s->position, i[0]);
 	return (struct corner){v0, vec3_sub(at(s->position, i[1]), v0), vec3_sub(at(s->position, i[2]), v0)};
 }

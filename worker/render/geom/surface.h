@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A point on a primitive, in double: positions solved from the primitive itself (triangles in the plane of their
- * vertices, which are floats, or of an instance floats moved in double; spheres analytically), geometric normal,
+ * vertices, which are floats, of an instance floats moved in double, of what is large in a scene of mixed scales
+ * doubles; spheres analytically), geometric normal,
  * interpolated shading frame (bent by relief), texture coordinates. The geometric normal is by winding; the world winds
  * triangles so that it agrees with the vertex normals. Pure; any thread.
  */
@@ -11,8 +12,8 @@
 #include "worker/render/geom/accel.h"
 #include "worker/render/geom/relief.h"
 
-/* A shape in the rescaled world. Floats are what rays meet; everything else derives from them. Instances of a mesh
- * share its arrays. */
+/* A shape in the rescaled world. Floats are what rays meet, unless there are doubles; everything else derives from
+ * them. Instances of a mesh share its arrays. */
 struct geom_shape {
 	bool is_sphere;
 	vec3 center;
@@ -20,6 +21,7 @@ struct geom_shape {
 	struct frame sphere_axes; /* of the (u,v) parametrisation: n is the pole */
 	uint32_t vertex_count, triangle_count;
 	float (*position)[3];
+	double (*unrounded)[3]; /* as struct accel_shape has it */
 	uint32_t (*index)[3];
 	float (*normal)[3];	       /* NULL: flat */
 	float (*uv)[2];		       /* NULL: barycentrics stand in */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One triangle with float vertices, in double: its plane, and where a line meets it. Pure; any thread. */
+/* One triangle, in double, with vertices that mostly are floats: its plane, and where a line meets it. Pure; any
+ * thread. */
 #ifndef WORKER_RENDER_GEOM_TRIANGLE_H
 #define WORKER_RENDER_GEOM_TRIANGLE_H
 
@@ -9,8 +10,9 @@
 #include <stdint.h>
 
 struct triangle {
-	vec3 v[3], n; /* n: not normalised */
-	double edges; /* bounds the terms of n */
+	vec3 v[3], n;	 /* n: not normalised */
+	double edges;	 /* bounds the terms of n */
+	double rounding; /* of its vertices, as a share of their coordinates */
 };
 
 static inline vec3 triangle_vertex(const float (*position)[3], uint32_t i)
@@ -31,7 +33,7 @@ static inline double triangle_norm1(vec3 v)
 /* e1, e2: v1 - v0 and v2 - v0. */
 static inline struct triangle triangle_between(vec3 v0, vec3 v1, vec3 v2, vec3 e1, vec3 e2)
 {
-	return (struct triangle){{v0, v1, v2}, vec3_cross(e1, e2), triangle_norm1(e1) * triangle_norm1(e2)};
+	return (struct triangle){{v0, v1, v2}, vec3_cross(e1, e2), triangle_norm1(e1) * triangle_norm1(e2), 0x1p-24};
 }
 
 static inline struct triangle triangle_from(const float (*position)[3], const uint32_t i[3])
@@ -39,6 +41,21 @@ static inline struct triangle triangle_from(const float (*position)[3], const ui
 	vec3 v0 = triangle_vertex(position, i[0]), v1 = triangle_vertex(position, i[1]),
 	     v2 = triangle_vertex(position, i[2]);
 	return triangle_between(v0, v1, v2, vec3_sub(v1, v0), vec3_sub(v2, v0));
+}
+
+static inline vec3 triangle_vertex_unrounded(const double (*position)[3], uint32_t i)
+{
+	return (vec3){position[i][0], position[i][1], position[i][2]};
+}
+
+/* Of vertices in double, each off by a few roundings of what it was made of. */
+static inline struct triangle triangle_unrounded(const double (*position)[3], const uint32_t i[3])
+{
+	vec3 v0 = triangle_vertex_unrounded(position, i[0]), v1 = triangle_vertex_unrounded(position, i[1]),
+	     v2 = triangle_vertex_unrounded(position, i[2]);
+	struct triangle t = triangle_between(v0, v1, v2, vec3_sub(v1, v0), vec3_sub(v2, v0));
+	t.rounding = 0x1p-50;
+	return t;
 }
 
 /* Of the plane over p, times |n|; 0 when p lies in the plane as far as double can tell: p and n carry the rounding of a

@@ -96,6 +96,7 @@ static struct emitter_surface emitter_surface_of(const struct geom_shape *g)
 		.sphere_axes = g->sphere_axes,
 		.triangle_count = g->triangle_count,
 		.position = (const float(*)[3])g->position,
+		.unrounded = (const double(*)[3])g->unrounded,
 		.index = (const uint32_t(*)[3])g->index,
 		.uv = (const float(*)[2])g->uv,
 	};

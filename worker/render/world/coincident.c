@@ -33,6 +33,7 @@ struct accel_shape *coincident_shapes(const struct world *w, struct arena *arena
 			.index = (const uint32_t(*)[3])g->index,
 			.rank = rank_of(w, &w->parts[i]),
 			.place = g->place,
+			.unrounded = (const double(*)[3])g->unrounded,
 		};
 	}
 	return s;

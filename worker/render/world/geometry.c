@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes of a world: read in double, moved into the unit sphere with the camera, then rounded to float.
+ * Shapes of a world: read in double, moved into the unit sphere with the camera, then rounded to float; what is too
+ * large for that beside what is small stays in double as well.
  *
  * Failures have the object's place. Triangles without an area and shapes too small beside others are counted and said,
  * not errors.
@@ -206,6 +207,7 @@ int build_place_shapes(struct builder *b)
 	w->parts = arena_alloc(&w->arena, w->shape_count, sizeof *w->parts);
 	if (!w->shapes || !w->parts)
 		return build_out_of_memory(b->e);
+	double wide_from = w->scale * origin_wide_from(&b->all, b->boxes, w->shape_count);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		struct shape_geometry *from = &b->geometry[i];
 		struct geom_shape *g = &w->shapes[i];
@@ -229,6 +231,8 @@ int build_place_shapes(struct builder *b)
 			continue;
 		}
 		int rc = build_place_mesh(b, g, &from->mesh, b->shape_nodes[i], w->center, w->scale);
+		if (!rc)
+			rc = build_keep_unrounded(b, g, &from->mesh, wide_from);
 		if (rc)
 			return rc;
 	}

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/origin.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 
 #define MIXED 0x1p-12
+#define WIDE 0x1p11
 
 void box_grow(struct box *b, vec3 p)
 {
@@ -46,15 +48,32 @@ static double median(struct weighed *w, uint32_t count)
 	return w[count - 1].at;
 }
 
-vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighed *room)
+/* Of the smallest shape. */
+static double least_extent(const struct box *shapes, uint32_t count)
 {
 	double least = INFINITY;
 	for (uint32_t i = 0; i < count; i++)
 		least = fmin(least, box_extent(&shapes[i]));
-	double at[3];
+	return least;
+}
+
+static bool is_mixed(double least, const struct box *all)
+{
+	return least > 0 && least < MIXED * box_extent(all);
+}
+
+double origin_wide_from(const struct box *all, const struct box *shapes, uint32_t count)
+{
+	double least = least_extent(shapes, count);
+	return is_mixed(least, all) ? WIDE * least : INFINITY;
+}
+
+vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighed *room)
+{
+	double at[3], least = least_extent(shapes, count);
 	for (int axis = 0; axis < 3; axis++) {
 		at[axis] = middle(all, axis);
-		if (!(least > 0 && least < MIXED * box_extent(all)))
+		if (!is_mixed(least, all))
 			continue;
 		for (uint32_t i = 0; i < count; i++)
 			room[i] = (struct weighed){middle(&shapes[i], axis), least / box_extent(&shapes[i])};

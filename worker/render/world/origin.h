@@ -25,4 +25,8 @@ double box_extent(const struct box *b); /* its largest side */
  * median along each axis of the shapes' centres, weighted by 1 / extent: amid what is small. `room` is for `count`. */
 vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighed *room);
 
+/* Extent from which on triangles of such a scene are too large for floats, in its own lengths, as in
+ * worker/render/geom/accel.c; INFINITY: the scene is not one of mixed scales. */
+double origin_wide_from(const struct box *all, const struct box *shapes, uint32_t count);
+
 #endif

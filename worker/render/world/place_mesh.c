@@ -59,6 +59,11 @@ static uint32_t take_triangles(struct geom_shape *g, struct mesh *m, bool displa
 	return kept;
 }
 
+static vec3 rescaled(const struct mesh *m, uint32_t i, vec3 center, double scale)
+{
+	return vec3_scale(scale, vec3_sub(mesh_load(m->position[i]), center));
+}
+
 int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, const struct scene_node *n, vec3 center,
 		     double scale)
 {
@@ -73,8 +78,7 @@ int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, co
 	if (!g->position || !g->index || (m->normal && !g->normal) || (m->uv && !g->uv))
 		return build_out_of_memory(b->e);
 	for (uint32_t i = 0; i < vertices; i++) {
-		const double *p = m->position[i];
-		put_float3(g->position[i], vec3_scale(scale, vec3_sub((vec3){p[0], p[1], p[2]}, center)));
+		put_float3(g->position[i], rescaled(m, i, center, scale));
 		if (g->normal)
 			put_float3(g->normal[i], (vec3){m->normal[i][0], m->normal[i][1], m->normal[i][2]});
 		if (g->uv) {
@@ -85,5 +89,20 @@ int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, co
 	g->triangle_count = take_triangles(g, m, build_is_displaced(b, n));
 	if (g->triangle_count == 0)
 		return node_error(n, b->e, EINVAL, "no triangle of this shape has an area at the scene's scale");
+	return 0;
+}
+
+int build_keep_unrounded(struct builder *b, struct geom_shape *g, const struct mesh *m, double least)
+{
+	float most = 0;
+	for (uint32_t i = 0; i < g->triangle_count; i++)
+		most = fmaxf(most, triangle_extent((const float(*)[3])g->position, g->index[i]));
+	if (!((double)most >= least))
+		return 0;
+	g->unrounded = arena_alloc(&b->w->arena, g->vertex_count, sizeof *g->unrounded);
+	if (!g->unrounded)
+		return build_out_of_memory(b->e);
+	for (uint32_t i = 0; i < g->vertex_count; i++)
+		mesh_store(g->unrounded[i], rescaled(m, i, b->w->center, b->w->scale));
 	return 0;
 }
