@@ -4,11 +4,11 @@
 #
 #   sh deploy/test.sh          all that the build packages allow; says what it skipped
 #   sh deploy/test.sh --full   also what needs big packages: a build with clang, fuzzers, longer statistical runs
-#   sh deploy/test.sh --ci     all kinds at short lengths
+#   sh deploy/test.sh --ci     all kinds at short lengths; ends after the first kind in which a test failed
 #
 # HSLT_SCENES names a folder of public scenes; without it the tests that need them are skipped. The run ends with one line
-# `N passed, N failed, N skipped` and exit code 0 when nothing failed; before it stands what was skipped, and why. With --full and --ci
-# nothing is skipped for want of a package: that is a failure.
+# `N passed, N failed, N skipped` and exit code 0 when nothing failed; before it stands what was skipped, and why, and what failed. With
+# --full and --ci nothing is skipped for want of a package: that is a failure.
 set -eu
 cd "$(dirname "$0")/.."
 mode=plain
@@ -26,10 +26,12 @@ case "${1:-}" in
 	;;
 esac
 
+begin=$(date +%s)
 jobs=$(nproc 2>/dev/null || echo 2)
 results=$(mktemp)
 skips=$(mktemp)
-trap 'rm -f "$results" "$results.code" "$skips"' EXIT
+fails=$(mktemp)
+trap 'rm -f "$results" "$results.code" "$skips" "$fails"' EXIT
 passed=0 failed=0 skipped=0
 
 # Runs one kind, shows its output, and takes its closing line into the sum instead of printing it.
@@ -38,7 +40,8 @@ kind() {
 	shift
 	echo "== $title"
 	code=0
-	{ "$@" 2>&1 || echo "exit $?" >"$results.code"; } | tee "$results" | grep --line-buffered -v '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$\|^skipped: ' || true
+	{ "$@" 2>&1 || echo "exit $?" >"$results.code"; } | tee "$results" | grep --line-buffered -v '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$\|^skipped: \|^failed: ' || true
+	sed -n "s|^failed: |failed: $title: |p" "$results" >>"$fails"
 	grep '^skipped: ' "$results" | sort -u | sed "s|^skipped: |skipped: $title: |" >>"$skips" || true
 	[ ! -f "$results.code" ] || { code=1 && rm -f "$results.code"; }
 	line=$(grep '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' "$results" | tail -n 1)
@@ -49,6 +52,20 @@ kind() {
 	[ $code -eq 0 ] || [ "$bad" -gt 0 ] || bad=1
 	failed=$((failed + bad))
 	[ $code -eq 0 ] || echo "== FAILED: $title"
+	ended
+}
+
+# With --ci the first kind that fails is the last: the others would take as long again and bury what it said.
+ended() {
+	echo "== $(($(date +%s) - begin)) s since the beginning"
+	[ $mode != ci ] || [ $failed -eq 0 ] || sum_up
+}
+
+# The closing lines, and the end.
+sum_up() {
+	cat "$skips" "$fails"
+	echo "$passed passed, $failed failed, $skipped skipped"
+	exit $((failed > 0))
 }
 
 # A step that passes or fails as a whole.
@@ -64,7 +81,9 @@ step() {
 		failed=$((failed + 1))
 		cat "$results"
 		echo "== FAILED: $title"
+		echo "failed: $title" >>"$fails"
 	fi
+	ended
 }
 
 skip() {
@@ -101,6 +120,4 @@ else
 		step "fuzzers, 5 s each" make -s fuzz FUZZ_SECONDS=5
 	fi
 fi
-cat "$skips"
-echo "$passed passed, $failed failed, $skipped skipped"
-[ $failed -eq 0 ]
+sum_up

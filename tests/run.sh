@@ -4,8 +4,9 @@
 #
 # Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and
 # tests/e2e/*.sh (one test each; exit 77: skipped; a line `skipped in part: WHY`: one skipped beside the one that passed). The output
-# of what fails is shown. The last lines name what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`; the
-# exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
+# of what fails is shown; that of what passes, its figures, is left in BUILD/tests/said (and shown with HSLT_TEST_VERBOSE=1). The last
+# lines name what failed, as `failed: NAME`, what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`;
+# the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 #
 # As many tests run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts run one after the
 # other; programs have the other processors, and all of them when the scripts have ended.
@@ -53,10 +54,15 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its 
 			cat "$log"
 		else
 			echo "ok $name: ${ok:-0} passed, $took s"
-			# What tests print about themselves (figures, reasons for skipping) is part of the result.
-			[ "$kind" != unit ] || grep -v '^\[' "$log" | grep -v '^$' | sed 's/^/   /'
 		fi
 	} >"$log.shown"
+	# What a test says of itself (figures, reasons for skipping) is kept, and shown when asked for.
+	if [ -s "$log" ]; then
+		mkdir -p "$said/$(dirname "$name")"
+		grep -v '^\[\|^$' "$log" >"$said/$name.txt"
+		[ "${HSLT_TEST_VERBOSE:-0}" = 0 ] || [ $code -ne 0 ] || sed 's/^/   /' "$said/$name.txt" >>"$log.shown"
+	fi
+	[ "${bad:-0}" = 0 ] || echo "$name" >"$log.bad"
 	echo "${ok:-0} ${bad:-0} ${out:-0}" >"$log.counts"
 	# In one piece, however many end at the same time.
 	flock "$run/settings" cat "$log.shown"
@@ -80,7 +86,7 @@ limit=$build/tests/limit/limit
 run=$(mktemp -d)
 trap 'rm -rf "$run"' EXIT
 cat >"$run/settings" <<END
-cpu=${HSLT_TEST_CPU:-$cpu} idle=${HSLT_TEST_IDLE:-$idle} limit='$limit'
+cpu=${HSLT_TEST_CPU:-$cpu} idle=${HSLT_TEST_IDLE:-$idle} limit='$limit' said='$build/tests/said'
 END
 took=$build/tests/took # seconds and file of the last run
 touch "$took"
@@ -124,6 +130,7 @@ if [ $beside = 1 ]; then
 fi
 wait $units
 cat "$run"/*.took "$took" 2>/dev/null | awk '!seen[$2]++' >"$took.new" && mv "$took.new" "$took"
+cat "$run"/*.bad 2>/dev/null | sort | sed 's/^/failed: /'
 cat "$run"/*.skips 2>/dev/null | sort
 # One that left no counts was ended from outside: a failure.
 lost=$(($(cat "$run"/*.list | wc -l) - $(ls "$run" | grep -c '\.counts$')))

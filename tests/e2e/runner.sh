@@ -50,13 +50,17 @@ skipped: one/test_one: wet: no rain
 2 passed, 0 failed, 4 skipped
 TEXT
 [ $CODE -eq 0 ] || fail "nothing failed, and it ended with $CODE"
-export HSLT_TEST_ALL=1
-run 4 <<'TEXT'
+grep -q dry "$DIR/said" && fail "what passed was shown: $(cat "$DIR/said")"
+grep -qx 'it is dry' "$DIR/build/tests/said/one/test_one.txt" || fail "what passed was not kept"
+export HSLT_TEST_ALL=1 HSLT_TEST_VERBOSE=1
+run 5 <<'TEXT'
+failed: e2e/bare.sh
 skipped: e2e/part.sh: the roof: it rains
 skipped: e2e/whole.sh: it rains
 skipped: one/test_one: wet: no rain
 2 passed, 1 failed, 3 skipped
 TEXT
+grep -qx '   it is dry' "$DIR/said" || fail "what passed was not shown: $(cat "$DIR/said")"
 [ $CODE -eq 1 ] || fail "a test that lacks something where all is installed: $CODE"
 
 # limited CPU IDLE CODE SAID SCRIPT [ARGUMENT...]: how it ends, and that nothing of it is left: its processes hold the other end of a pipe

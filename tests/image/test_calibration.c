@@ -13,9 +13,11 @@
  * 0.87 and 0.975: Student's t with 15 degrees would be 93.1 %, skewed pixels have less. b          chains: b_error
  * holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders: 95 % fails with less than
  * 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %. planted    intervals and
- * errors made too small by 1.3 (the relMSE by 1.69) are refused. FULL=1: larger pictures with more samples.
+ * errors made too small by 1.3 (the relMSE by 1.69) are refused. FULL=1: larger pictures with more
+ * samples, and the cases after the third.
  * HSLT_TEST_SCALE=N: N times fewer renders, which are made and not judged.
  */
+#include "tests/support/length.h"
 #include "tests/support/repeats.h"
 #include "tests/support/worlds.h"
 
@@ -61,24 +63,12 @@ struct reference {
 
 static struct reference references[SCENES];
 
-static bool full(void)
-{
-	const char *s = getenv("FULL");
-	return s && strcmp(s, "1") == 0;
-}
-
-static uint32_t test_scale(void)
-{
-	const char *s = getenv("HSLT_TEST_SCALE");
-	return s && atoi(s) > 1 ? (uint32_t)atoi(s) : 1;
-}
-
 static struct reference *reference_of(int scene)
 {
 	struct reference *r = &references[scene];
 	if (r->world)
 		return r;
-	r->world = build(scene, full() ? 32 : 8, full() ? 24 : 6);
+	r->world = build(scene, test_full() ? 32 : 8, test_full() ? 24 : 6);
 	r->values = r->world->settings.width * r->world->settings.height * 3;
 	r->rgb = calloc(r->values, sizeof *r->rgb);
 	enum { PARTS = 4 };
@@ -170,13 +160,13 @@ static void check(const struct kase *c)
 	struct repeats_how how = {.integrator = c->integrator,
 				  .test = c->name,
 				  .count = RENDERS / test_scale() + 1,
-				  .spp = c->spp * (full() ? 2 : 1),
+				  .spp = c->spp * (test_full() ? 2 : 1),
 				  .epoch = c->epoch,
 				  .bootstrap = c->bootstrap,
 				  .chains = c->chains,
 				  .groups = 16};
 	struct repeats s;
-	if (test_scale() > 1) {
+	if (test_scaled()) {
 		struct world *w = build(c->scene, 8, 6);
 		repeats_run(w, &how, NULL, NULL, &s);
 		repeats_free(&s);
@@ -231,9 +221,11 @@ static int forget(void **unused)
 
 int main(void)
 {
+	enum { SHORT = 3 };
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(room_path),  cmocka_unit_test(room_pssmlt),  cmocka_unit_test(room_hslt),
-		cmocka_unit_test(glass_path), cmocka_unit_test(glass_pssmlt), cmocka_unit_test(glass_hslt),
+		cmocka_unit_test(room_path),   cmocka_unit_test(glass_path), cmocka_unit_test(glass_hslt),
+		cmocka_unit_test(room_pssmlt), cmocka_unit_test(room_hslt),  cmocka_unit_test(glass_pssmlt),
 	};
-	return cmocka_run_group_tests(tests, NULL, forget);
+	return _cmocka_run_group_tests("calibration", tests, test_full() ? sizeof tests / sizeof *tests : SHORT, NULL,
+				       forget);
 }

@@ -2,10 +2,11 @@
 /*
  * The default integrator against bdpt on whole scenes: those that are shipped, and the public ones where HSLT_SCENES
  * names their folder. Within the errors of both, at the level of all comparisons; how small a bias would have been
- * found is printed.
+ * found is printed. FULL=1: all of them, with more samples.
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
+#include "tests/support/length.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -25,7 +26,7 @@ static void compare(const char *name, struct world *w, uint64_t bdpt_spp, uint64
 		skip();
 	}
 	static struct agree_image reference, image;
-	uint64_t times = getenv("FULL") ? 16 : 1;
+	uint64_t times = test_full() ? 16 : 1;
 	uint32_t depth = w->settings.max_depth < DEPTH ? w->settings.max_depth : DEPTH;
 	const struct agree_side bdpt = {"bdpt", times * bdpt_spp, GROUPS, 1, depth};
 	const struct agree_side chains = {RENDER_INTEGRATOR_CHAINS, times * chain_spp, GROUPS, 1, depth};
@@ -41,7 +42,8 @@ static void test_own(void **state)
 {
 	(void)state;
 	compare("demo", world_of_own_scene("demo", "scene.xml", WIDTH, HEIGHT), 256, 1024);
-	compare("box", world_of_own_scene("box", "box.xml", WIDTH, HEIGHT), 256, 1024);
+	if (test_full())
+		compare("box", world_of_own_scene("box", "box.xml", WIDTH, HEIGHT), 256, 1024);
 	compare("displaced", world_of_own_scene("displaced", "scene.xml", WIDTH, HEIGHT), 256, 512);
 }
 
@@ -66,16 +68,19 @@ static void test_veach_door(void **state)
 static void test_rates(void **state)
 {
 	(void)state;
-	compare("three-spheres", world_of_public_scene(".", "three-spheres.xml", WIDTH, HEIGHT), 256, 1024);
-	compare("half-sunk", world_of_public_scene(".", "half-sunk.xml", WIDTH, HEIGHT), 256, 1024);
+	if (test_full()) {
+		compare("three-spheres", world_of_public_scene(".", "three-spheres.xml", WIDTH, HEIGHT), 256, 1024);
+		compare("half-sunk", world_of_public_scene(".", "half-sunk.xml", WIDTH, HEIGHT), 256, 1024);
+	}
 	compare("half-sunk-rough", world_of_public_scene(".", "half-sunk-rough.xml", WIDTH, HEIGHT), 256, 1024);
 }
 
 int main(void)
 {
+	enum { SHORT = 3 };
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_own),	   cmocka_unit_test(test_cornell_box), cmocka_unit_test(test_veach_mis),
-		cmocka_unit_test(test_veach_door), cmocka_unit_test(test_rates),
+		cmocka_unit_test(test_own),	    cmocka_unit_test(test_veach_door), cmocka_unit_test(test_rates),
+		cmocka_unit_test(test_cornell_box), cmocka_unit_test(test_veach_mis),
 	};
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	return _cmocka_run_group_tests("scenes", tests, test_full() ? sizeof tests / sizeof *tests : SHORT, NULL, NULL);
 }

@@ -6,6 +6,8 @@
 #ifndef TESTS_NUMERICS_ROWS_H
 #define TESTS_NUMERICS_ROWS_H
 
+#include "tests/support/length.h"
+
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,21 +24,6 @@ static inline void row(struct rows *r, const char *topic, const char *name, cons
 	if (getenv("HSLT_TEST_ROWS") || !ok)
 		printf("%s\t%s\t%s\t%s\t%s\n", topic, name, measured, bound, ok ? "ok" : "FAILED");
 	fflush(stdout);
-}
-
-/* FULL=1 */
-static inline bool rows_full(void)
-{
-	const char *text = getenv("FULL");
-	return text && atoi(text) > 0;
-}
-
-/* HSLT_TEST_SCALE: so many times fewer samples. */
-static inline unsigned rows_scale(void)
-{
-	const char *text = getenv("HSLT_TEST_SCALE");
-	int n = text ? atoi(text) : 1;
-	return n > 0 ? (unsigned)n : 1;
 }
 
 #endif

@@ -24,13 +24,13 @@ static struct rows rows;
 /* Samples in units of what a case names, and the least bias that has to be found. */
 static uint64_t samples(uint64_t spp)
 {
-	uint64_t n = rows_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 8;
+	uint64_t n = test_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 8;
 	return n < 32 ? 32 : n;
 }
 
 static bool is_table(void)
 {
-	return getenv("HSLT_TEST_ROWS") || rows_full();
+	return getenv("HSLT_TEST_ROWS") || test_full();
 }
 
 /* Tables have as many groups as there may be: t needs less with more degrees of freedom. And enough independent paths
@@ -41,14 +41,14 @@ static void render(const struct agree_case *k, const char *name, const char *int
 	struct agree_side side = {integrator, samples(spp), is_table() ? AGREE_MAX_GROUPS : 16, 1, k->max_depth};
 	uint64_t paths = 32 * k->spp > 1 << 14 ? 32 * k->spp : 1 << 14;
 	if (is_table())
-		agree_render_bootstrap(w, name, integrator, &side, rows_full() ? 16 * paths : paths, out);
+		agree_render_chains(w, name, integrator, &side, test_full() ? 16 * paths : paths, NULL, out);
 	else
 		agree_render(w, name, integrator, &side, out);
 }
 
 static double must_find(const struct agree_case *k)
 {
-	return rows_scale() > 1 ? INFINITY : k->find * (rows_full() ? 0.3 : getenv("HSLT_TEST_ROWS") ? 1 : 50);
+	return test_scaled() ? INFINITY : k->find * (test_full() ? 0.3 : getenv("HSLT_TEST_ROWS") ? 1 : 50);
 }
 
 static void compare(const struct agree_case *k, const char *integrator, struct world *w,

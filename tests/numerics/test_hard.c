@@ -32,7 +32,7 @@ static void run_case(const struct hard_case *h)
 	char test[128], measured[800];
 	struct world *w = h->make(h->parameter);
 	snprintf(test, sizeof test, "%s %s", h->topic, h->name);
-	unsigned more = rows_full() ? 10 : 1;
+	unsigned more = test_full() ? 10 : 1;
 	struct stationary_how alone = {h->mutation, h->min_edges, h->max_edges,
 				       24 * more,   400 * more,	  STATIONARY_SOUND};
 	stationary_run(w, test, &alone, &s);
@@ -40,7 +40,7 @@ static void run_case(const struct hard_case *h)
 				 .max_depth = h->max_edges < 8 ? 8 : h->max_edges,
 				 .chains = 16,
 				 .bootstrap = 2048,
-				 .steps = 1000 * more / rows_scale(),
+				 .steps = 1000 * more / test_scale(),
 				 .seed = stats_seed(test)};
 	chains_run(w, &all, &c);
 	double proposals = (double)s.proposals,

@@ -52,7 +52,7 @@ static void test_many(void **state)
 					      "singular", "diverged", "iterations", "reverse",
 					      "specular", "emitter",  "dark",	    "inapplicable"};
 	uint64_t scenes = TEST_SCENES,
-		 total = rows_full() ? getenv("HSLT_TEST_ROWS") ? 100000000 : 10000000 : 300000 / rows_scale();
+		 total = test_full() ? getenv("HSLT_TEST_ROWS") ? 100000000 : 10000000 : 300000 / test_scale();
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		scenes++;
 	for (int i = 0; i < TEST_SCENES; i++)

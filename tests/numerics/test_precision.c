@@ -134,7 +134,7 @@ static void test_precision(void **state)
 {
 	(void)state;
 	struct rows rows = {0, 0};
-	unsigned most = (rows_full() ? 20000 : 1000) / rows_scale();
+	unsigned most = (test_full() ? 20000 : 1000) / test_scale();
 	double *of_float = calloc(most, sizeof *of_float);
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct errors e = {.of_float = of_float};

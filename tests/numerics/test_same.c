@@ -47,7 +47,7 @@ static void render(struct world *w, uint64_t seed, struct chains_result *out)
 				 .max_depth = 6,
 				 .chains = 64,
 				 .bootstrap = 4096,
-				 .steps = 2000 / rows_scale(),
+				 .steps = 2000 / test_scale(),
 				 .seed = seed};
 	chains_run(w, &how, out);
 	world_free(w);

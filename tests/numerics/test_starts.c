@@ -105,7 +105,7 @@ static void found_later(void)
 					 .max_depth = 1,
 					 .chains = 4,
 					 .bootstrap = 4,
-					 .steps = 20000 / rows_scale(),
+					 .steps = 20000 / test_scale(),
 					 .seed = seed};
 		chains_run(w, &how, &r);
 		was_black = r.black;
@@ -134,7 +134,7 @@ static void dominated(void)
 						 .max_depth = 8,
 						 .chains = CHAINS,
 						 .bootstrap = 2048,
-						 .steps = 2000 / rows_scale(),
+						 .steps = 2000 / test_scale(),
 						 .seed = stats_seed("one sample dominates") + (uint64_t)(2 * f + side)};
 			struct chains_result r;
 			uint64_t same[CHAINS];

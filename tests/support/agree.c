@@ -3,6 +3,7 @@
 #include "tests/support/agree.h"
 
 #include "common/estimate/merge.h"
+#include "tests/support/length.h"
 #include "tests/support/stats.h"
 
 #include <pthread.h>
@@ -147,8 +148,7 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 {
 	const struct render_integrator *i = render_integrator_find(how->integrator);
 	assert_non_null(i);
-	const char *scale = getenv("HSLT_TEST_SCALE");
-	uint64_t spp = how->spp / (scale && atoi(scale) > 0 ? (uint64_t)atoi(scale) : 1);
+	uint64_t spp = how->spp / test_scale();
 	char name[128];
 	snprintf(name, sizeof name, "%s %s", test, side);
 	uint64_t pixels = (uint64_t)w->settings.width * w->settings.height;
@@ -173,15 +173,15 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 	if (i->has_mutations && render_mutations(mutations, &summary, p->mutations, &e))
 		fail_msg("%s", e.text);
 	p->chains = i->kind == PLAN_CHAINS ? groups * 8 : 0;
-	p->bootstrap = groups * bootstrap;
+	p->bootstrap = groups * (test_scaled() ? bootstrap / 4 : bootstrap);
 	uint64_t per = i->kind == PLAN_CHAINS ? spp * pixels / p->chains : spp / groups;
 	p->epoch = per / 2 ? per / 2 : 1;
 	if (plan_check(p, &e))
 		fail_msg("%s", e.text);
 }
 
-static void render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-		   const char *mutations, uint64_t bootstrap, struct agree_image *out)
+void agree_render_chains(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+			 uint64_t bootstrap, const char *mutations, struct agree_image *out)
 {
 	static struct group_run runs[AGREE_MAX_GROUPS];
 	struct plan p;
@@ -211,19 +211,7 @@ static void render(const struct world *w, const char *test, const char *side, co
 void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
 		  struct agree_image *out)
 {
-	render(w, test, side, how, NULL, AGREE_BOOTSTRAP, out);
-}
-
-void agree_render_mixture(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-			  const char *mutations, struct agree_image *out)
-{
-	render(w, test, side, how, mutations, AGREE_BOOTSTRAP, out);
-}
-
-void agree_render_bootstrap(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-			    uint64_t bootstrap, struct agree_image *out)
-{
-	render(w, test, side, how, NULL, bootstrap, out);
+	agree_render_chains(w, test, side, how, AGREE_BOOTSTRAP, NULL, out);
 }
 
 struct cell {
@@ -279,8 +267,6 @@ static double p_of(const struct verdict *v)
 /* Holm over the cells; the power is that of the strictest step. */
 static void judge_cells(const char *test, const struct verdict *v, bool powerful)
 {
-	const char *scale = getenv("HSLT_TEST_SCALE");
-	bool weak_allowed = scale && atoi(scale) > 1;
 	int cells = AGREE_CELLS + 1;
 	double worst_block = 0, mean_power = 0;
 	for (int c = 0; c < cells; c++) {
@@ -301,7 +287,7 @@ static void judge_cells(const char *test, const struct verdict *v, bool powerful
 	print_message(
 		"%s: mean differs by %+.3f %% +- %.3f %%; finds with 95 %%: %.2f %% on a block, %.2f %% on the mean\n",
 		test, 100 * v[AGREE_CELLS].difference, 100 * v[AGREE_CELLS].error, 100 * worst_block, 100 * mean_power);
-	if (powerful && !weak_allowed && (worst_block > 0.02 || mean_power > 0.005))
+	if (powerful && !test_scaled() && (worst_block > 0.02 || mean_power > 0.005))
 		fail_msg("%s: too weak", test);
 }
 

@@ -33,13 +33,10 @@ struct agree_image {
 void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
 		  struct agree_image *out);
 
-/* The same with a mixture of strategies of our own. */
-void agree_render_mixture(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-			  const char *mutations, struct agree_image *out);
-
-/* The same with `bootstrap` independent paths in each group of chains instead of AGREE_BOOTSTRAP. */
-void agree_render_bootstrap(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-			    uint64_t bootstrap, struct agree_image *out);
+/* The same with `bootstrap` independent paths in each group of chains instead of AGREE_BOOTSTRAP, and a mixture of
+ * strategies (NULL: the default one). */
+void agree_render_chains(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+			 uint64_t bootstrap, const char *mutations, struct agree_image *out);
 
 /* Fails the test when the images differ, or when the comparison is too weak to tell. */
 void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b);

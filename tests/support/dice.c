@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/dice.h"
 
+#include "tests/support/length.h"
 #include "tests/support/stats.h"
 #include "worker/render/math/rng.h"
 
@@ -38,10 +39,6 @@ vec3 dice_direction(struct dice *d)
 
 size_t dice_count(size_t samples)
 {
-	const char *scale = getenv("HSLT_TEST_SCALE"), *full = getenv("FULL");
-	if (full && full[0] == '1')
-		samples *= 8;
-	if (scale && atoi(scale) > 1)
-		samples /= (size_t)atoi(scale);
+	samples = samples * (test_full() ? 8 : 1) / test_scale();
 	return samples ? samples : 1;
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "tests/support/length.h"
 #include "tests/support/stationary.h"
 
 #include "tests/support/stats.h"
@@ -334,8 +335,7 @@ void stationary_run(const struct world *w, const char *test, const struct statio
 		    struct stationary_result *out)
 {
 	struct group *groups = calloc(STATIONARY_GROUPS, sizeof *groups);
-	const char *text = getenv("HSLT_TEST_SCALE");
-	uint32_t scale = text && atoi(text) > 0 ? (uint32_t)atoi(text) : 1;
+	uint32_t scale = test_scale();
 	struct mixture_entry entry;
 	char name[160];
 	snprintf(name, sizeof name, "%s %s %u..%u", test, how->mutation, how->min_edges, how->max_edges);

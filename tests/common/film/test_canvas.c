@@ -5,6 +5,7 @@
 #include "common/estimate/canvas_blocks.h"
 #include "common/estimate/merge.h"
 #include "tests/support/failing_memory.h"
+#include "tests/support/length.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -109,9 +110,7 @@ static void shuffle(uint32_t *order, uint32_t n)
 
 static int scaled(int n)
 {
-	const char *s = getenv("HSLT_TEST_SCALE");
-	int scale = s ? atoi(s) : 1;
-	return scale > 1 ? n / scale : n;
+	return n / (int)test_scale();
 }
 
 static void bits_do_not_depend_on_the_order(void **unused)

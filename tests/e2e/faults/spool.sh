@@ -30,7 +30,8 @@ journal_bit() {
 	job
 	each_time journal_is_damaged
 	finish_damaged "$TIMES"
-	[ "$(grep -c 'level=error event=spool_fault .*the journal is damaged: .* computed again: [br]' "$DIR/coordinator.log")" -ge $(((TIMES + 1) / 2)) ] ||
+	# One bit alone may fall where no lease is lost by name; of several, half say which.
+	[ "$TIMES" -lt 3 ] || [ "$(grep -c 'level=error event=spool_fault .*the journal is damaged: .* computed again: [br]' "$DIR/coordinator.log")" -ge $(((TIMES + 1) / 2)) ] ||
 		fail "$NAME: it does not say what is lost"
 	# Whether a result behind the damaged one waits for it depends on where the journal was cut: of several, one does.
 	[ "$TIMES" -lt 3 ] || grep -q 'batch_merged .*late=1' "$DIR/coordinator.log" || fail "$NAME: nothing waited for what was damaged"

@@ -8,6 +8,7 @@
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
+#include "tests/support/length.h"
 #include "tests/support/stationary.h"
 #include "tests/worker/render/mutation/scenes.h"
 
@@ -44,12 +45,6 @@ static const struct setting_case cases[] = {
 	{"wavelengths=1", "dispersion", 4, "wavelength"},
 };
 
-static bool scaled(void)
-{
-	const char *text = getenv("HSLT_TEST_SCALE");
-	return text && atoi(text) > 1;
-}
-
 static void run_case(const struct setting_case *c, struct stationary_result *r)
 {
 	struct stationary_how how = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_SOUND};
@@ -75,7 +70,7 @@ static void test_stationary(void **state)
 	unsigned wrong = 0;
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		run_case(&cases[i], &r);
-		wrong += !stationary_holds(&r) || !r.accepted || (!scaled() && r.least_block > 0.02);
+		wrong += !stationary_holds(&r) || !r.accepted || (!test_scaled() && r.least_block > 0.02);
 	}
 	assert_int_equal(wrong, 0);
 }
@@ -85,7 +80,7 @@ static void test_bias_is_found(void **state)
 	(void)state;
 	static struct stationary_result r;
 	run_case(&(struct setting_case){"tolerance=1", "rough glass", 4, "hslt@b4c0"}, &r);
-	assert_true(scaled() || !stationary_holds(&r));
+	assert_true(test_scaled() || !stationary_holds(&r));
 }
 
 /* Little noise but that of drawing wavelengths. */

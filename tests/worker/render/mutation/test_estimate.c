@@ -7,6 +7,7 @@
  * default no more than 2 % over all rooms, with FULL=1 in each room.
  */
 #include "tests/support/dice.h"
+#include "tests/support/length.h"
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
@@ -51,8 +52,7 @@ static size_t rooms_pooled;
 /* What a room needs to find 2 % by itself, in units of what all rooms together do. */
 static size_t more_paths(void)
 {
-	const char *text = getenv("FULL");
-	return text && atoi(text) > 0 ? 8 : 1;
+	return test_full() ? 8 : 1;
 }
 
 /* Of each number of edges, and of all together. */

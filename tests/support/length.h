@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * How long a test is. By default short enough for all of them together to take half an hour on two cores, each
+ * comparison with the power that docs/design.md asks for; FULL=1 adds the comparisons left out for want of time;
+ * HSLT_TEST_SCALE=N takes N times fewer samples and asks for no power (sanitized runs: 20).
+ */
+#ifndef TESTS_SUPPORT_LENGTH_H
+#define TESTS_SUPPORT_LENGTH_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+static inline bool test_full(void)
+{
+	const char *text = getenv("FULL");
+	return text && atoi(text) > 0;
+}
+
+static inline uint32_t test_scale(void)
+{
+	const char *text = getenv("HSLT_TEST_SCALE");
+	return text && atoi(text) > 1 ? (uint32_t)atoi(text) : 1;
+}
+
+static inline bool test_scaled(void)
+{
+	return test_scale() > 1;
+}
+
+#endif
