@@ -9,6 +9,7 @@
 #include "worker/render/scene/nesting.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
+#include "worker/render/scene/refuse.h"
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/snake_case.h"
@@ -290,21 +291,6 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	return 0;
 }
 
-static int refuse_element(const struct xml_element *el, struct error *e)
-{
-	char hint[128];
-	struct spelling s = {.wanted = el->name};
-	plugin_offer_classes(&s);
-	value_offer_elements(&s);
-	spelling_offer(&s, "ref");
-	spelling_offer(&s, "include");
-	spelling_offer(&s, "default");
-	spelling_offer(&s, "alias");
-	spelling_offer(&s, "path");
-	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s",
-			 el->parent ? el->parent->name : "", spelling_hint(&s, hint, sizeof hint));
-}
-
 static int foreign_element(struct maker *m, const struct xml_element *el)
 {
 	return m->lenient ? leave_out(m, el, el->name, "", "the element") : refuse_element(el, m->error);
@@ -330,19 +316,6 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	if (!r)
 		r = id_table_find(&m->ids, el, "id", &target, m->error);
 	return r ? r : read_object(m, d, owner, el, target);
-}
-
-static int refuse_type(struct maker *m, const struct xml_element *el, enum plugin_class cls, const char *type)
-{
-	char hint[128], list[512];
-	struct spelling s = {.wanted = type};
-	plugin_offer_types(m->decls, cls, &s);
-	plugin_list_types(m->decls, cls, list, sizeof list);
-	if (plugin_is_mitsubas(cls, type))
-		return xml_error(el, m->error, EINVAL, "this %s of Mitsuba's is not supported (supported: %s)",
-				 plugin_class_name(cls), list);
-	return xml_error(el, m->error, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
-			 spelling_hint(&s, hint, sizeof hint), list);
 }
 
 static int note_ignored_plugin(struct maker *m, const struct xml_element *el, const struct plugin_decl *decl)
@@ -381,7 +354,7 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 	const char *other;
 	enum lenient_way way = m->lenient ? lenient_plugin(cls, *type, &other) : LENIENT_REFUSE;
 	if (way == LENIENT_REFUSE)
-		return refuse_type(m, el, cls, *type);
+		return refuse_type(m->decls, el, cls, *type, m->error);
 	struct xml_element *inner = way == LENIENT_INNER ? lenient_inner(&m->ids, el) : NULL;
 	int r = way == LENIENT_LEAVE_OUT
 			? leave_out(m, el, *type, "", "the plug-in")
@@ -402,7 +375,7 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 	}
 	*type = other;
 	*decl = plugin_find(m->decls, cls, other);
-	return *decl ? 0 : refuse_type(m, el, cls, *type);
+	return *decl ? 0 : refuse_type(m->decls, el, cls, *type, m->error);
 }
 
 /* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/refuse.h"
+
+#include "common/base/spelling.h"
+#include "worker/render/scene/plugin.h"
+#include "worker/render/scene/value.h"
+
+int refuse_element(const struct xml_element *el, struct error *e)
+{
+	char hint[128];
+	struct spelling s = {.wanted = el->name};
+	plugin_offer_classes(&s);
+	value_offer_elements(&s);
+	spelling_offer(&s, "ref");
+	spelling_offer(&s, "include");
+	spelling_offer(&s, "default");
+	spelling_offer(&s, "alias");
+	spelling_offer(&s, "path");
+	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s",
+			 el->parent ? el->parent->name : "", spelling_hint(&s, hint, sizeof hint));
+}
+
+int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
+		struct error *e)
+{
+	char hint[128], list[512];
+	struct spelling s = {.wanted = type};
+	plugin_offer_types(decls, cls, &s);
+	plugin_list_types(decls, cls, list, sizeof list);
+	if (plugin_is_mitsubas(cls, type))
+		return xml_error(el, e, EINVAL, "this %s of Mitsuba's is not supported (supported: %s)",
+				 plugin_class_name(cls), list);
+	return xml_error(el, e, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
+			 spelling_hint(&s, hint, sizeof hint), list);
+}

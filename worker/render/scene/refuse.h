@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The sentences for what no table has, with the nearest name. Each returns -EINVAL. Pure. */
+#ifndef WORKER_RENDER_SCENE_REFUSE_H
+#define WORKER_RENDER_SCENE_REFUSE_H
+
+#include "worker/render/scene/element.h"
+#include "worker/render/scene/param.h"
+
+/* An element that has no place in the one around it. */
+int refuse_element(const struct xml_element *el, struct error *e);
+
+/* An object of a type that is none of its class, or one of Mitsuba's that is not supported. */
+int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
+		struct error *e);
+
+#endif
