@@ -70,6 +70,31 @@ grep -q "no sensor with the id 'asied'; did you mean .aside.?" "$DIR/err.log" ||
 code 1 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 --sensor overhead "$DIR/two/two.xml" -o "$DIR/none.exr"
 grep -q "no sensor with the id 'overhead' (it has 2, numbered from 1; ids: aside)" "$DIR/err.log" || fail "another id: $(cat "$DIR/err.log")"
 
+# A batch is its sensors, each with its share of the film.
+camera() { # camera NAME X
+	echo "<sensor type='perspective' id='$1'><transform name='to_world'><lookat origin='$2,0,5' target='0,0,0' up='0,1,0'/></transform>${3-}</sensor>"
+}
+film() {
+	echo "<film type='hdrfilm'><integer name='width' value='$1'/><integer name='height' value='12'/><rfilter type='box'/></film>"
+}
+rest='<shape type="cube"/><emitter type="point"><point name="position" value="1,2,4"/></emitter></scene>'
+echo "<scene version='3.0.0'><sensor type='batch'>$(camera left -3 "$(film 100)")$(camera right 3)$(film 32)</sensor>$rest" >"$DIR/batch.xml"
+echo "<scene version='3.0.0'>$(camera left -3 "$(film 16)")$(camera right 3 "$(film 16)")$rest" >"$DIR/apart.xml"
+code 0 "$BIN/hslt-scene" check "$DIR/batch.xml"
+grep -q 'sensor 2 ("right"); without --sensor' "$DIR/out" || fail "of a batch it says: $(cat "$DIR/out")"
+for sensor in 1 right; do
+	for file in batch apart; do
+		code 0 "$BIN/hslt-render" --spp 1 -i path --sensor $sensor "$DIR/$file.xml" -o "$DIR/$file-$sensor.exr"
+	done
+	code 0 "$BIN/hslt-compare" "$DIR/batch-$sensor.exr" "$DIR/apart-$sensor.exr"
+	grep -q "^relMSE  *0 " "$DIR/out" || fail "a batch's sensor $sensor renders another image: $(cat "$DIR/out")"
+done
+for bad in "$(camera a 1)$(camera b 2)$(camera c 3)$(film 32)" "$(film 32)" "<sensor type='batch'>$(camera a 1)$(film 2)</sensor>$(film 32)"; do
+	echo "<scene version='3.0.0'><sensor type='batch'>$bad</sensor>$rest" >"$DIR/bad.xml"
+	code 1 "$BIN/hslt-scene" check "$DIR/bad.xml"
+	grep -q 'bad.xml:1: .*batch' "$DIR/out" || fail "of a bad batch it says: $(cat "$DIR/out")"
+done
+
 code 0 "$BIN/hslt-scene" check "$BOX"
 grep -q "^box.xml: can be rendered: [0-9]* shapes" "$DIR/out" || fail "of a good scene it says: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" show "$BOX"
@@ -109,6 +134,19 @@ grep -aq "lenient=yes" "$DIR/strange.exr" || fail "the image does not say that i
 code 0 "$BIN/hslt-render" -i path --spp 4 "$DIR/plain.xml" -o "$DIR/plain.exr"
 code 0 "$BIN/hslt-compare" "$DIR/strange.exr" "$DIR/plain.exr"
 grep -q "^relMSE  *0 " "$DIR/out" || fail "the lenient image is not that of the scene it stands for: $(cat "$DIR/out")"
+# What covers opaque materials only, over one that lets light through.
+hole='<bsdf type="mask"><float name="opacity" value="0.5"/><bsdf type="diffuse"/></bsdf>'
+scene covered.xml box '' "<bsdf type='coating' id='stuff'><bsdf type='twosided'>$hole</bsdf></bsdf>" '' ''
+echo "$hole" | sed 's/type="mask"/type="mask" id="stuff"/' >"$DIR/hole"
+scene plain.xml box '' "$(cat "$DIR/hole")" '' ''
+code 1 "$BIN/hslt-scene" check "$DIR/covered.xml"
+code 0 "$BIN/hslt-scene" check --lenient "$DIR/covered.xml"
+grep -q '<bsdf type="coating"> over "mask".*(lenient)' "$DIR/out" || fail "nothing is noted of the coating: $(cat "$DIR/out")"
+for file in covered plain; do
+	code 0 "$BIN/hslt-render" -i path --spp 2 --lenient "$DIR/$file.xml" -o "$DIR/$file.exr"
+done
+code 0 "$BIN/hslt-compare" "$DIR/covered.exr" "$DIR/plain.exr"
+grep -q "^relMSE  *0 " "$DIR/out" || fail "an uncovered mask is another: $(cat "$DIR/out")"
 # Leniency is not for what is supported and wrong, nor for what has no stand-in.
 sed 's/value="24"/value="wide"/' "$DIR/strange.xml" >"$DIR/wrong.xml"
 code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"

@@ -61,6 +61,34 @@ const char *lenient_param(const char *stand_in, const char *name)
 	return name;
 }
 
+static bool lets_through(const struct scene_node *n)
+{
+	static const char *const always[] = {"null",	       "mask",	    "dielectric", "roughdielectric",
+					     "thindielectric", "difftrans", NULL},
+				 *const perhaps[] = {"spec_trans", "diff_trans", NULL};
+	if (is_one_of(n->type, always))
+		return true;
+	for (uint32_t i = 0; i < n->property_count; i++) {
+		const struct value *v = &n->properties[i].value;
+		bool zero = v->type == VALUE_FLOAT && v->as.number == 0;
+		if (is_one_of(n->properties[i].name, perhaps) && !zero)
+			return true;
+	}
+	for (uint32_t i = 0; i < n->child_count; i++)
+		if (n->children[i]->cls == PLUGIN_BSDF && lets_through(n->children[i]))
+			return true;
+	return false;
+}
+
+const struct scene_node *lenient_uncovered(const struct scene_node *n)
+{
+	static const char *const covers[] = {"coating", "roughcoating", "twosided", "mask", NULL};
+	if (n->cls != PLUGIN_BSDF || !is_one_of(n->type, covers))
+		return NULL;
+	const struct scene_node *inner = node_child(n, PLUGIN_BSDF, 0);
+	return inner && lets_through(inner) ? inner : NULL;
+}
+
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el)
 {
 	struct error unused;

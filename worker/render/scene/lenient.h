@@ -7,6 +7,7 @@
 #define WORKER_RENDER_SCENE_LENIENT_H
 
 #include "worker/render/scene/id_table.h"
+#include "worker/render/scene/node.h"
 #include "worker/render/scene/param.h"
 
 #include <stdbool.h>
@@ -23,6 +24,9 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 
 /* The stand-in's parameter that says what `name` said of the plug-in replaced; `name` itself where none does. */
 const char *lenient_param(const char *stand_in, const char *name);
+
+/* The BSDF in `n` where `n` is one that holds opaque ones only and that one lets light through; NULL: all is well. */
+const struct scene_node *lenient_uncovered(const struct scene_node *n);
 
 /* The BSDF inside one that is not supported; NULL: none. */
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el);

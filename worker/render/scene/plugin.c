@@ -108,7 +108,6 @@ static const struct {
 	{PLUGIN_EMITTER, "collimated"},
 	{PLUGIN_EMITTER, "directionalarea"},
 	{PLUGIN_EMITTER, "timed_sunsky"},
-	{PLUGIN_SENSOR, "batch"},
 	{PLUGIN_SENSOR, "distant"},
 	{PLUGIN_SENSOR, "fluxmeter"},
 	{PLUGIN_SENSOR, "irradiancemeter"},

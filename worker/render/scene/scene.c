@@ -2,6 +2,7 @@
 #include "worker/render/scene/scene.h"
 
 #include "worker/render/scene/asset_list.h"
+#include "worker/render/scene/batch.h"
 #include "worker/render/scene/element.h"
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/id_table.h"
@@ -283,7 +284,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return r;
 	if (p)
 		return add_property(d, el, p, (struct value){.type = VALUE_NODE, .as.node = child}, m->error);
-	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE);
+	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR);
 	if (!many && node_child(d->node, cls, 0))
 		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">", plugin_class_name(cls),
 				 owner->name, d->node->type);
@@ -378,6 +379,20 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 	return *decl ? 0 : refuse_type(m->decls, el, cls, *type, m->error);
 }
 
+/* What covers a BSDF that it cannot cover goes. */
+static int uncover(struct maker *m, const struct xml_element *el, const struct scene_node **node)
+{
+	const char *type = (*node)->type;
+	const struct scene_node *inner = lenient_uncovered(*node);
+	if (!inner)
+		return 0;
+	*node = inner;
+	return note(m, el, type, inner->type,
+		    "%s:%d: <bsdf type=\"%.64s\"> over \"%.64s\", which lets light through, is not supported; the BSDF "
+		    "inside stands in for it (lenient)",
+		    el->file, el->line, type, inner->type);
+}
+
 /* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no
  * object of any kind does not, and is complained of once. */
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
@@ -429,7 +444,10 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	m->depth--;
 	el->busy = false;
 	el->nesting = d.nesting;
-	el->node = *out = d.node;
+	*out = d.node;
+	if (!r && m->lenient)
+		r = uncover(m, el, out);
+	el->node = *out;
 	return r;
 }
 
@@ -446,7 +464,10 @@ static int make_object(struct maker *m, struct xml_element *el, const struct sce
 	int r = make_node(m, el, out);
 	if (!r)
 		r = nesting_count(&m->objects, el, m->error);
-	m->scene->object_count += r == 0;
+	uint32_t count = 1;
+	if (!r && batch_is(*out))
+		r = batch_spread(*out, &m->scene->arena, out, &count, m->error);
+	m->scene->object_count += r ? 0 : count;
 	return r;
 }
 

@@ -11,13 +11,14 @@
 
 #include "common/plan/plan.h"
 #include "worker/render/scene/depth.h"
+#include "worker/render/scene/film.h"
 #include "worker/render/scene/number.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-enum { FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_HEIGHT = 576, RADIUS_MAX = 64 };
+enum { FILM_PIXELS_MAX = 1 << 28, RADIUS_MAX = 64 };
 enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
@@ -60,6 +61,9 @@ static const struct param orthographic_params[] = {
 	{"srf", REFUSED},
 	{NULL, 0, 0, 0, 0, NULL},
 };
+
+static const struct param batch_params[] = {
+	{"shutter_open", IGNORED}, {"shutter_close", IGNORED}, {"srf", REFUSED}, {NULL, 0, 0, 0, 0, NULL}};
 
 static const struct param film_params[] = {
 	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
@@ -123,6 +127,8 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_SENSOR, "thinlens", thinlens_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "orthographic", orthographic_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
 	 PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "batch", batch_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER) | HOLDS(PLUGIN_SENSOR),
+	 PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "mfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "tiledhdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
@@ -174,8 +180,8 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 		     struct error *e)
 {
 	const struct scene_node *film = node_child(sensor, PLUGIN_FILM, 0);
-	out->width = film ? (uint32_t)node_int(film, "width", DEFAULT_WIDTH) : DEFAULT_WIDTH;
-	out->height = film ? (uint32_t)node_int(film, "height", DEFAULT_HEIGHT) : DEFAULT_HEIGHT;
+	out->width = film ? (uint32_t)node_int(film, "width", SCENE_FILM_WIDTH) : SCENE_FILM_WIDTH;
+	out->height = film ? (uint32_t)node_int(film, "height", SCENE_FILM_HEIGHT) : SCENE_FILM_HEIGHT;
 	if (width && !height) /* the film keeps its shape */
 		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1),
 					     PLAN_MAX_SIZE + 1.0);

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/batch.h"
+
+#include "worker/render/scene/film.h"
+
+#include <string.h>
+
+bool batch_is(const struct scene_node *n)
+{
+	return n->cls == PLUGIN_SENSOR && strcmp(n->type, "batch") == 0;
+}
+
+static uint32_t count_sensors(const struct scene_node *batch)
+{
+	uint32_t n = 0;
+	while (node_child(batch, PLUGIN_SENSOR, n))
+		n++;
+	return n;
+}
+
+static int check(const struct scene_node *batch, const struct scene_node *film, uint32_t sensors, struct error *e)
+{
+	static const char *const crop[] = {"crop_offset_x", "crop_offset_y", "crop_width", "crop_height"};
+	if (sensors == 0)
+		return node_error(batch, e, EINVAL, "needs at least one sensor inside");
+	for (uint32_t i = 0; i < sensors; i++)
+		if (batch_is(node_child(batch, PLUGIN_SENSOR, i)))
+			return node_error(batch, e, EINVAL, "a batch in a batch");
+	for (size_t i = 0; i < sizeof crop / sizeof *crop; i++)
+		if (node_find(film, crop[i]))
+			return node_error(film, e, ENOTSUP, "a crop window of a batch is not supported");
+	int64_t width = node_int(film, "width", SCENE_FILM_WIDTH);
+	if (width % sensors != 0)
+		return node_error(film, e, EINVAL, "a width of %lld is no multiple of the batch's %u sensors",
+				  (long long)width, sensors);
+	return 0;
+}
+
+/* The batch's film, as wide as one sensor's share. */
+static const struct scene_node *share_of(const struct scene_node *film, uint32_t sensors, struct arena *arena)
+{
+	struct scene_node *share = arena_alloc(arena, 1, sizeof *share);
+	struct property *p = arena_alloc(arena, (size_t)film->property_count + 1, sizeof *p);
+	if (!share || !p)
+		return NULL;
+	*share = *film;
+	share->properties = p;
+	share->property_count = 0;
+	for (uint32_t i = 0; i < film->property_count; i++)
+		if (strcmp(film->properties[i].name, "width") != 0)
+			p[share->property_count++] = film->properties[i];
+	int64_t width = node_int(film, "width", SCENE_FILM_WIDTH) / sensors;
+	p[share->property_count++] = (struct property){"width", film->line, {.type = VALUE_INT, .as.integer = width}};
+	return share;
+}
+
+int batch_spread(const struct scene_node *batch, struct arena *arena, const struct scene_node **out, uint32_t *count,
+		 struct error *e)
+{
+	const struct scene_node none = {
+		.cls = PLUGIN_FILM, .type = "hdrfilm", .file = batch->file, .line = batch->line};
+	const struct scene_node *film = node_child(batch, PLUGIN_FILM, 0),
+				*sampler = node_child(batch, PLUGIN_SAMPLER, 0);
+	uint32_t n = count_sensors(batch);
+	film = film ? film : &none;
+	int r = check(batch, film, n, e);
+	if (r)
+		return r;
+	const struct scene_node **children = arena_alloc(arena, 2, sizeof *children);
+	struct scene_node *sensors = arena_alloc(arena, n, sizeof *sensors);
+	if (!children || !sensors || !(children[0] = share_of(film, n, arena)))
+		return node_error(batch, e, ENOMEM, "out of memory");
+	children[1] = sampler;
+	for (uint32_t i = 0; i < n; i++) {
+		sensors[i] = *node_child(batch, PLUGIN_SENSOR, i);
+		sensors[i].children = children;
+		sensors[i].child_count = sampler ? 2 : 1;
+		out[i] = &sensors[i];
+	}
+	*count = n;
+	return 0;
+}
