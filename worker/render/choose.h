@@ -4,13 +4,16 @@
  * is made, from a pilot that counts rays instead of seconds and draws random numbers of its own: the same on every
  * machine for the same request, and the plan names what was chosen.
  *
- * The pilot draws samples of `path`, and of `bdpt` where those leave the choice open, and looks at what each brings
+ * The pilot draws samples of `path`, merges light with the camera's sub-paths where a lobe is narrow (rare_light.h),
+ * and draws samples of `bdpt` where these leave the choice open. Chains are called for where a share of the light is
+ * rare to bdpt: caustics seen through water, panes, frosted glass; be it by merging, which knows without having met
+ * that light, or, where photons hardly reach what the camera sees, by samples. Of these it looks at what each brings
  * relative to the brightness of its place: how much light comes in rare contributions of many times that brightness,
  * how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator), and what share
  * the largest alone has. Chains are called for where bdpt finds a good share of rare light and its largest fall off so
- * slowly that more samples keep on finding larger ones, below a tail index of about 1 not even a mean exists: caustics
- * through water, panes, frosted glass; where path finds that share and the very largest of bdpt fall off so; where both
- * find some, and the largest of both fall off slower still; or where `path` finds nothing. Else it is `path` or `bdpt8`
+ * slowly that more samples keep on finding larger ones, below a tail index of about 1 not even a mean exists; where
+ * path finds that share and the very largest of bdpt fall off so; where both find some, and the largest of both fall
+ * off slower still; or where `path` finds nothing. Else it is `path` or `bdpt8`
  * where path's tail is that of a finite variance (a tail index of 2 or more, or an extreme-value index below 1/2, which
  * sees an end of a broad range of contributions), no sample has a share in the light that such a law does not allow,
  * and its second moment times rays is the smaller one: `path` where no lobe of the scene is so narrow that it focuses
@@ -21,6 +24,7 @@
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
 
+#include "worker/render/rare_light.h"
 #include "worker/render/render.h"
 
 /* What was found of one of them. */
@@ -33,14 +37,14 @@ struct render_found {
 	double evi;	/* extreme-value index of the largest, one in RENDER_EVI; 1 where fewer carry light */
 	double most;	/* share of the energy that one sample alone brought, the largest */
 };
-#define RENDER_RARE 32
 enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 
 struct render_choice {
 	struct render_found path, bdpt;
+	double merged;	  /* share of the light that is rare to bdpt, by merging; 0 where no lobe is narrow */
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe */
 	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
-	bool settled;	  /* path alone left no choice: nothing is known of bdpt */
+	bool settled;	  /* no choice was left before bdpt was looked at: nothing is known of it */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of
 			     a short render's, or 3 times 4,096; 1 in 30 of a long one's, 1 in 120 of one of hours; not
 			     those of `path`, an eighth at most, that single bright ones of bdpt are held against */
@@ -50,7 +54,7 @@ struct render_choice {
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e);
 /* By what was found. Pure. */
 const char *render_choice_of(const struct render_choice *c);
-/* What was found of path is enough. Pure. */
+/* What was found of path and by merging is enough. Pure. */
 bool render_choice_is_settled(const struct render_choice *c);
 /* One sentence for people, without figures. Pure. */
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size);

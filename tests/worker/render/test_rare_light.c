@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Light that is rare to bdpt, and light that only looks so: the sun on the floor of a pool; a caustic that is bright on
+ * few pixels, which light sub-paths find; a room where path alone finds next to nothing of what lies behind a mirror.
+ */
+#include "tests/support/worlds.h"
+#include "worker/render/path/integrate_path.h"
+#include "worker/render/rare_light.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+enum { SAMPLES = 1 << 14, MERGED = 1 << 12, WIDTH = 160, HEIGHT = 90 };
+
+static double share_of(struct world *w, uint64_t seed)
+{
+	static struct path_context c;
+	static struct path_sample sample;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	struct brightness map;
+	struct error e;
+	double share;
+	c = (struct path_context){.w = w,
+				  .window = {0, 0, WIDTH, HEIGHT},
+				  .min_depth = 1,
+				  .max_depth = 8,
+				  .roulette = true,
+				  .unclassed = true,
+				  .counters = counters};
+	assert_int_equal(brightness_init(&map, &c.window, SAMPLES, &e), 0);
+	for (uint64_t i = 0; i < SAMPLES; i++) {
+		struct sampler_random s;
+		sampler_random_init(&s, seed, RNG_TEST, i, 0);
+		path_trace(&c, &s.base, &sample);
+		for (uint32_t k = 0; k < sample.count; k++)
+			brightness_add(&map, &sample.splats[k]);
+	}
+	brightness_settle(&map, SAMPLES);
+	assert_int_equal(rare_light(&c, &map, seed, 0, MERGED, &share), 0);
+	brightness_fini(&map);
+	return share;
+}
+
+/* Each seed lies within; those of the scene's own table (README of tests/bench) do by half as much again or more. */
+static void expect_share(const char *folder, const char *file, double least, double most)
+{
+	struct world *w = world_of_own_scene(folder, file, WIDTH, HEIGHT);
+	for (uint64_t seed = 0; seed < 3; seed++) {
+		double share = share_of(w, seed);
+		printf("%s: %.4f\n", file, share);
+		if (!(share >= least && share <= most))
+			fail_msg("%s: %g, not within %g and %g", file, share, least, most);
+	}
+	world_free(w);
+}
+
+static void test_light_that_is_rare(void **state)
+{
+	(void)state;
+	expect_share("../bench/scenes", "pool.xml", 0.03, 0.2);
+	expect_share("../bench/scenes", "torus.xml", 0.03, 0.2);
+	expect_share("displaced", "water.xml", 0.15, 0.6);
+}
+
+static void test_light_that_is_not(void **state)
+{
+	(void)state;
+	expect_share("../bench/scenes", "ring.xml", 0, 0.02);
+	expect_share("../bench/scenes", "rough-caustic.xml", 0, 0.01);
+	expect_share("demo", "scene.xml", 0, 0.02);
+	expect_share("box", "box.xml", 0, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_light_that_is_rare),
+					   cmocka_unit_test(test_light_that_is_not)};
+	return cmocka_run_group_tests_name("worker/render/rare_light", tests, NULL, NULL);
+}

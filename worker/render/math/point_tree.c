@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/math/point_tree.h"
+
+typedef struct point_tree_node node;
+
+/* The axis changes from level to level; the middle of a range is the node that parts it. */
+static double along(vec3 p, unsigned axis)
+{
+	return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
+}
+
+static void exchange(node *a, node *b)
+{
+	node t = *a;
+	*a = *b;
+	*b = t;
+}
+
+/* nodes[middle] as if all were sorted, none before it above, none behind it below (Hoare 1961, Algorithm 65). */
+static void part(node *nodes, size_t count, size_t middle, unsigned axis)
+{
+	size_t low = 0, high = count - 1;
+	while (low < high) {
+		double pivot = along(nodes[low + (high - low) / 2].p, axis);
+		size_t i = low, j = high;
+		for (;;) {
+			while (along(nodes[i].p, axis) < pivot)
+				i++;
+			while (along(nodes[j].p, axis) > pivot)
+				j--;
+			if (i >= j)
+				break;
+			exchange(&nodes[i++], &nodes[j--]);
+		}
+		if (middle <= j)
+			high = j;
+		else
+			low = j + 1;
+	}
+}
+
+static void build(node *nodes, size_t count, unsigned axis)
+{
+	while (count > 1) {
+		size_t middle = count / 2;
+		part(nodes, count, middle, axis);
+		axis = (axis + 1) % 3;
+		build(nodes, middle, axis);
+		nodes += middle + 1;
+		count -= middle + 1;
+	}
+}
+
+void point_tree_build(struct point_tree *t)
+{
+	build(t->nodes, t->count, 0);
+}
+
+struct search {
+	vec3 at;
+	double radius;
+	void (*found)(void *user, uint32_t id);
+	void *user;
+};
+
+static void search(const struct search *s, const node *nodes, size_t count, unsigned axis)
+{
+	while (count > 0) {
+		size_t middle = count / 2;
+		const node *m = &nodes[middle];
+		vec3 d = vec3_sub(m->p, s->at);
+		double across = along(d, axis);
+		if (vec3_dot(d, d) <= s->radius * s->radius)
+			s->found(s->user, m->id);
+		axis = (axis + 1) % 3;
+		if (across >= -s->radius)
+			search(s, nodes, middle, axis);
+		if (across > s->radius)
+			return;
+		nodes += middle + 1;
+		count -= middle + 1;
+	}
+}
+
+void point_tree_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
+		       void *user)
+{
+	const struct search s = {at, radius, found, user};
+	search(&s, t->nodes, t->count, 0);
+}

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Points in space, and which of them lie within a distance (Bentley 1975, k-d trees). The order in which they are found
+ * depends on the points alone, so that sums over them have the same bits on every machine.
+ */
+#ifndef WORKER_RENDER_MATH_POINT_TREE_H
+#define WORKER_RENDER_MATH_POINT_TREE_H
+
+#include "worker/render/math/vec3.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct point_tree {
+	struct point_tree_node {
+		vec3 p;
+		uint32_t id;
+	} * nodes;
+	size_t count;
+};
+
+/* Orders nodes[0..count), whose memory stays the caller's; at most 2^32 of them, finite. */
+void point_tree_build(struct point_tree *t);
+/* Calls found for each node at most `radius` from `at`. */
+void point_tree_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
+		       void *user);
+
+#endif

@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A path of merging is y_0 .. y_{s-1}, z, x_{s+1} .. x_k: a light sub-path that landed at y_s, within a radius r of z,
+ * where the camera's sub-path met its first rough surface; z stands for y_s. It brings
+ *
+ *     f / (p_light(y_0 .. y_s) p_camera(z .. x_k)) / (pi r^2 photons)
+ *
+ * to the mean of the camera's samples, p_light(y_0 .. y_s) p_camera(z .. x_k) being the product of the densities of
+ * both sub-paths, in which z counts twice. Technique j of bdpt (path.h) has density p_j over that product of
+ *
+ *     q_{s+1} = 1 / p_camera(z),  q_s = 1 / p_light(y_s),  q_{j+1} / q_j = p_light(x_j) / p_camera(x_j),
+ *
+ * 0 where one of the vertices that it joins is specular. So a sample of bdpt that finds that path brings the product of
+ * both sub-paths' throughputs over the sum of all q, one of `path` over q_0 + q_1. Terms of the light's sub-path alone
+ * are summed up when the photon is stored.
+ *
+ * Photons behind an edge or on another surface are told by their normals and their distance from z's plane. A surface
+ * that bends within r blurs, and so does a shadow's edge: of a sum over all samples little is lost.
+ */
+#include "worker/render/path/merging.h"
+
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+#include "common/film/path_class.h"
+#include "worker/render/path/connect.h"
+#include "worker/render/path/measure.h"
+
+#include <errno.h>
+
+enum { PHOTONS = 4 /* places for so many a path */, TICKS = 16 };
+
+/* Photons of a disk as wide as so many samples of the camera. */
+static const double samples_wide = 16;
+static const double same_normal = 0.9, same_plane = 0.25;
+
+/* Random numbers but for the wavelength. */
+struct one_wavelength {
+	struct sampler_random random;
+	double wavelength;
+};
+
+static const double *block(struct sampler *base, enum sampler_side side, unsigned vertex)
+{
+	struct one_wavelength *s = (struct one_wavelength *)(void *)base;
+	double *u = s->random.value[side];
+	sampler_fill(s->random.seed, s->random.stream, s->random.index, s->random.step, side, vertex, u);
+	if (side == SIDE_CAMERA && vertex == 0)
+		u[DIM_WAVELENGTH] = s->wavelength;
+	return u;
+}
+
+static void sampler_init(struct one_wavelength *s, const struct merging *m, uint64_t seed, uint64_t step,
+			 uint64_t index)
+{
+	sampler_random_init(&s->random, seed, RNG_CHOICE, index, step);
+	s->random.base.block = block;
+	s->wavelength = m->wavelength;
+}
+
+static bool is_rough(const struct path_vertex *v)
+{
+	return v->kind == VERTEX_SURFACE && v->bsdf->has_smooth && !(v->bsdf->alpha_mean < PATH_CLASS_ALPHA);
+}
+
+static double intensity_of(struct path_context *c, spectrum l)
+{
+	struct path_sample one; /* its many splats are not read: nothing sets them */
+	one.count = 0;
+	one.intensity = 0;
+	path_splat(c, &one, 0, 0, l);
+	return one.intensity;
+}
+
+/* ---- photons */
+
+/* Densities of techniques with fewer than s light vertices over that of s - 1, be there such a technique or not. */
+static void sum_fewer(const struct path_context *c, unsigned s, struct photon *out)
+{
+	const struct path_vertex *y = c->light;
+	double ratio = 1, toward = path_pdf_toward(c, &y[0], y[1].x.p) / y[0].pdf;
+	for (unsigned j = s - 1; j > 0; j--) {
+		double q = j == 1 ? ratio * toward : ratio;
+		if (!y[j].delta && !(j > 1 && y[j - 1].delta)) {
+			out->fewer += q;
+			out->path += j == 1 ? q : 0;
+		}
+		ratio *= y[j - 1].pdf_rev / y[j - 1].pdf;
+	}
+	if (path_can_be_hit(c, &y[0])) {
+		out->fewer += ratio;
+		out->path += ratio;
+	}
+}
+
+struct photon photon_of(const struct path_context *c, unsigned s)
+{
+	const struct path_vertex *at = &c->light[s], *prev = at - 1;
+	struct photon p = {.p = at->x.p, .ng = at->x.ng, .beta = at->beta, .pdf = at->pdf, .s = s};
+	p.prev.kind = prev->kind;
+	p.prev.emitter = prev->emitter;
+	p.prev.p = prev->x.p;
+	p.prev.ng = prev->x.ng;
+	p.prev.pdf = prev->pdf;
+	p.prev.delta = prev->delta;
+	sum_fewer(c, s, &p);
+	return p;
+}
+
+static void store(struct merging *m, const struct path_context *c, unsigned s)
+{
+	m->photons[m->count] = photon_of(c, s);
+	m->tree.nodes[m->count] = (struct point_tree_node){c->light[s].x.p, (uint32_t)m->count};
+	m->count++;
+}
+
+int merging_photons(struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t paths)
+{
+	double u[4];
+	*m = (struct merging){.room = PHOTONS * paths + c->max_depth};
+	m->photons = mem_alloc(m->room, sizeof *m->photons);
+	m->tree.nodes = mem_alloc(m->room, sizeof *m->tree.nodes);
+	if (!m->photons || !m->tree.nodes)
+		return -ENOMEM;
+	rng_uniform4(seed, RNG_CHOICE, paths, step, 0, u);
+	m->wavelength = u[0];
+	c->one_way = false;
+	for (; m->paths < paths && m->count + c->max_depth <= m->room; m->paths++) {
+		struct one_wavelength s;
+		double film[2];
+		if (m->paths % TICKS == 0)
+			tick();
+		sampler_init(&s, m, seed, step, m->paths);
+		path_walk_camera(c, &s.random.base, 1, film); /* sets the wavelengths */
+		unsigned n = path_walk_light(c, &s.random.base, c->max_depth);
+		for (unsigned i = 2; i < n; i++)
+			if (is_rough(&c->light[i]))
+				store(m, c, i);
+	}
+	m->tree.count = m->count;
+	point_tree_build(&m->tree);
+	return 0;
+}
+
+void merging_fini(struct merging *m)
+{
+	mem_free(m->photons);
+	mem_free(m->tree.nodes);
+	*m = (struct merging){0};
+}
+
+/* ---- merging */
+
+bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t index,
+		  struct merging_place *out)
+{
+	struct one_wavelength s;
+	double distance = 0, unused;
+	if (index % TICKS == 0)
+		tick();
+	c->one_way = false;
+	sampler_init(&s, m, seed, step, index);
+	unsigned n = path_walk_camera(c, &s.random.base, c->max_depth + 1, out->film);
+	for (out->t = 1;; out->t++) {
+		const struct path_vertex *v = &c->camera[out->t];
+		if (out->t >= n || v->kind != VERTEX_SURFACE)
+			return false;
+		distance += vec3_length(vec3_sub(v->x.p, v[-1].x.p));
+		if (is_rough(v))
+			break;
+	}
+	vec3 d = path_direction(&c->camera[0], &c->camera[1], &unused);
+	double solid = samples_wide * c->window.width * c->window.height /
+		       (camera_jac_film_from_solid(&c->w->camera, d) * (double)m->paths);
+	out->radius = distance * sqrt(solid / M_PI);
+	return true;
+}
+
+/* Of the techniques with more than s light vertices the sum of q; y: the photon's vertex before z. */
+static double sum_more(const struct path_context *c, const struct path_vertex *y, unsigned t)
+{
+	const struct path_vertex *v = c->camera, *z = &v[t];
+	double q = 1 / z->pdf, sum = 0;
+	for (unsigned i = t; i > 0; i--) { /* joins v[i], of the light, to v[i - 1], of the camera */
+		const struct path_vertex *next = &v[i - 1];
+		if (!(i < t && v[i].delta) && !(i > 1 && next->delta))
+			sum += q;
+		q *= (i == t ? path_pdf(c, y, z, next, TRANSPORT_IMPORTANCE) : next->pdf_rev) / next->pdf;
+	}
+	return sum;
+}
+
+bool merged_of(struct path_context *c, const struct photon *p, unsigned t, struct merged *out)
+{
+	const struct path_vertex *z = &c->camera[t];
+	struct path_vertex y = {.kind = p->prev.kind, .emitter = p->prev.emitter};
+	double distance2;
+	y.x.p = p->prev.p;
+	y.x.ng = p->prev.ng;
+	vec3 to_light = path_direction(z, &y, &distance2);
+	if (!(distance2 > 0) || t + p->s > c->max_depth)
+		return false;
+	spectrum l = spectrum_mul(spectrum_mul(z->beta, p->beta), path_scatter(c, z, z->to_prev, to_light));
+	out->brings = intensity_of(c, l);
+	/* q_{s-1}, be there such a technique or not */
+	double q = path_pdf(c, z - 1, z, &y, TRANSPORT_RADIANCE) / (p->pdf * p->prev.pdf),
+	       joined = p->prev.delta ? 0 : 1 / p->pdf;
+	out->bdpt = out->brings / (q * p->fewer + joined + sum_more(c, &y, t));
+	out->path = out->brings / (q * p->path);
+	return out->brings > 0;
+}
+
+struct gathering {
+	const struct merging *m;
+	struct path_context *c;
+	const struct merging_place *place;
+	void (*take)(void *user, const struct merged *found);
+	void *user;
+};
+
+static void merge(void *user, uint32_t id)
+{
+	const struct gathering *g = user;
+	const struct photon *p = &g->m->photons[id];
+	const struct surface_point *z = &g->c->camera[g->place->t].x;
+	double r = g->place->radius;
+	struct merged found;
+	if (vec3_dot(p->ng, z->ng) < same_normal || fabs(vec3_dot(vec3_sub(p->p, z->p), z->ng)) > same_plane * r ||
+	    !merged_of(g->c, p, g->place->t, &found))
+		return;
+	found.brings /= M_PI * r * r * (double)g->m->paths;
+	g->take(g->user, &found);
+}
+
+void merging_each(const struct merging *m, struct path_context *c, const struct merging_place *place,
+		  void (*take)(void *user, const struct merged *found), void *user)
+{
+	struct gathering g = {m, c, place, take, user};
+	point_tree_within(&m->tree, c->camera[place->t].x.p, place->radius, merge, &g);
+}

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * rare_light follows light sub-paths, then samples of the camera, each of which meets the photons around it. What a
+ * path brings beyond RENDER_RARE times the brightness of its place counts.
+ *
+ * The map of brightness is made of few samples: where light falls that they did not find it says too little, and a
+ * bright spot in a dark corner would be called rare however easily it is found. So each place is as bright as its
+ * photons say, where that is more. Light that no photon brings to a rough surface that the camera
+ * sees is not seen here: behind a keyhole, or in a mirror's mirror.
+ */
+#include "worker/render/rare_light.h"
+
+#include "worker/render/path/merging.h"
+
+struct sums {
+	double scale;	     /* of the place */
+	double here, beyond; /* of its photons */
+};
+
+static void add_here(void *user, const struct merged *m)
+{
+	((struct sums *)user)->here += m->brings;
+}
+
+static void add_beyond(void *user, const struct merged *m)
+{
+	struct sums *s = user;
+	s->beyond += s->scale * m->brings * fmax(1 - RENDER_RARE / (s->scale * m->bdpt), 0);
+}
+
+int rare_light(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step, uint64_t samples,
+	       double *share)
+{
+	struct merging m;
+	double sum = 0;
+	int rc = merging_photons(&m, c, seed, step, samples);
+	for (uint64_t i = 0; i < m.paths && m.count && !rc; i++) {
+		struct merging_place place;
+		struct sums s = {0};
+		if (!merging_walk(&m, c, seed, step + 1, i, &place))
+			continue;
+		merging_each(&m, c, &place, add_here, &s);
+		double scale = brightness_scale(map, place.film[0], place.film[1]);
+		s.scale = scale / fmax(1, scale * s.here);
+		if (!(s.scale > 0))
+			continue;
+		merging_each(&m, c, &place, add_beyond, &s);
+		sum += s.beyond;
+	}
+	*share = rc || m.paths == 0 ? 0 : sum / (double)m.paths;
+	merging_fini(&m);
+	return rc;
+}

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * How much of the light `bdpt` brings in rare contributions of many times the brightness of their place, be one of them
+ * met or not: by merging (worker/render/path/merging.h), which finds that light at once. One thread.
+ */
+#ifndef WORKER_RENDER_RARE_LIGHT_H
+#define WORKER_RENDER_RARE_LIGHT_H
+
+#include "worker/render/brightness.h"
+
+/* Contributions beyond so many times the brightness of their place. */
+#define RENDER_RARE 32
+
+/* The share of the film's light, in 0 .. 1 but for noise. Sub-paths from both ends, as many as `samples`, with numbers
+ * of RNG_CHOICE, two steps from `step` on. Ticks. -ENOMEM */
+int rare_light(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step, uint64_t samples,
+	       double *share);
+
+#endif
