@@ -133,6 +133,22 @@ static void a_lamp_behind_glass_that_path_never_hits_needs_chains(void **state)
 	world_free(w);
 }
 
+/* Short pilots of kitchen of which path finds nothing, seeds where that is so: bdpt finds what there is. */
+static void light_that_path_never_finds_may_be_easy_for_bdpt(void **state)
+{
+	(void)state;
+	struct world *w = world_of_own_scene("../bench/scenes", "kitchen.xml", 160, 90);
+	static const uint64_t seeds[] = {2001, 2005, 2007};
+	for (size_t i = 0; i < sizeof seeds / sizeof *seeds; i++) {
+		struct plan_request r;
+		struct render_choice c;
+		choose(w, seeds[i], 8, &r, &c);
+		assert_true(c.misses && !(c.path.cost > 0));
+		assert_string_equal(r.integrator, "bdpt");
+	}
+	world_free(w);
+}
+
 /* The sun on the floor of a pool: a pilot's samples meet it once or never, and what one says cannot be told from a
  * lamp's edge. Merging knows it: 0.05 to 0.07 of the light is rare, where 0.03 are enough. */
 static void light_that_no_sample_meets_is_known_by_merging(void **state)
@@ -492,6 +508,7 @@ int main(void)
 		cmocka_unit_test(a_small_lamp_in_a_mirror_is_not_rare_light),
 		cmocka_unit_test(light_with_an_end_to_its_tail_is_given_to_bdpt8),
 		cmocka_unit_test(a_lamp_behind_glass_that_path_never_hits_needs_chains),
+		cmocka_unit_test(light_that_path_never_finds_may_be_easy_for_bdpt),
 		cmocka_unit_test(light_that_no_sample_meets_is_known_by_merging),
 		cmocka_unit_test(path_is_not_chosen_where_it_misses_light),
 		cmocka_unit_test(path_is_not_chosen_where_glass_may_focus_light),
