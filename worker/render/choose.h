@@ -40,9 +40,10 @@ enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 
 struct render_choice {
 	struct render_found path, bdpt;
-	double merged;	  /* share of the light that is rare to bdpt, by merging; 0 where no lobe is narrow */
+	struct rare_light merged; /* to bdpt, by merging; 0 where no lobe is narrow */
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe, or
 			     none at all */
+	bool dark;	  /* path finds next to nothing */
 	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
 	bool settled;	  /* no choice was left before bdpt was looked at: nothing is known of it */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of

@@ -29,10 +29,10 @@ static void add_beyond(void *user, const struct merged *m)
 }
 
 int rare_light(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step, uint64_t samples,
-	       double *share)
+	       struct rare_light *out)
 {
 	struct merging m;
-	double sum = 0;
+	*out = (struct rare_light){0, 0};
 	int rc = merging_photons(&m, c, seed, step, samples);
 	for (uint64_t i = 0; i < m.paths && m.count && !rc; i++) {
 		struct merging_place place;
@@ -45,9 +45,9 @@ int rare_light(struct path_context *c, const struct brightness *map, uint64_t se
 		if (!(s.scale > 0))
 			continue;
 		merging_each(&m, c, &place, add_beyond, &s);
-		sum += s.beyond;
+		out->share += s.beyond / (double)m.paths;
+		out->seen += s.scale * s.here / (double)m.paths;
 	}
-	*share = rc || m.paths == 0 ? 0 : sum / (double)m.paths;
 	merging_fini(&m);
 	return rc;
 }

@@ -11,9 +11,14 @@
 /* Contributions beyond so many times the brightness of their place. */
 #define RENDER_RARE 32
 
-/* The share of the film's light, in 0 .. 1 but for noise. Sub-paths from both ends, as many as `samples`, with numbers
- * of RNG_CHOICE, two steps from `step` on. Ticks. -ENOMEM */
+struct rare_light {
+	double share; /* of the film's light, in 0 .. 1 but for noise */
+	double seen;  /* share of all light that photons bring to what the camera sees */
+};
+
+/* Sub-paths from both ends, as many as `samples`, with numbers of RNG_CHOICE, two steps from `step` on. Ticks. -ENOMEM
+ */
 int rare_light(struct path_context *c, const struct brightness *map, uint64_t seed, uint64_t step, uint64_t samples,
-	       double *share);
+	       struct rare_light *out);
 
 #endif

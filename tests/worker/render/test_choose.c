@@ -408,13 +408,37 @@ static void light_that_is_rare_by_merging_needs_chains(void **state)
 	(void)state;
 	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true};
 	for (int i = 0; i < 2; i++) {
-		c.merged = 0.008;
+		c.merged.share = 0.008;
 		assert_string_equal(render_choice_of(&c), i ? "bdpt" : "bdpt8");
 		assert_int_equal(render_choice_is_settled(&c), i);
-		c.merged = 0.05;
+		c.merged.share = 0.05;
 		assert_string_equal(render_choice_of(&c), "hslt");
 		assert_true(render_choice_is_settled(&c));
 		c.path.tail = 1.5;
+	}
+}
+
+/* What looks rare to path is not to bdpt where photons see most of the light and merging finds hardly any that is. */
+static void light_that_photons_see_is_not_rare(void **state)
+{
+	(void)state;
+	static const struct {
+		double share, seen, bdpt_rare;
+		const char *name;
+	} cases[] = {{0.005, 0.6, 0.05, "bdpt"},
+		     {0.005, 0.1, 0.05, "hslt"}, /* hardly a photon arrives */
+		     {0.02, 0.6, 0.05, "hslt"},
+		     {0.005, 0.6, 0.5, "hslt"}}; /* bdpt's own samples say so */
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct render_choice c = {.path = {1, 0.9, 0.5, 0.5, 1, 0},
+					  .bdpt = {2, cases[i].bdpt_rare, 0.9, 0.8, 1, 0},
+					  .merged = {cases[i].share, cases[i].seen},
+					  .focuses = true};
+		assert_string_equal(render_choice_of(&c), cases[i].name);
+		c.bdpt = (struct render_found){2, 0, 3, 3, 1, 0};
+		c.misses = c.dark = true;
+		assert_string_equal(render_choice_of(&c),
+				    cases[i].share < 0.01 && cases[i].seen > 0.5 ? "bdpt" : "hslt");
 	}
 }
 
@@ -521,6 +545,7 @@ int main(void)
 		cmocka_unit_test(a_crop_is_rendered_as_the_whole_is),
 		cmocka_unit_test(the_rule),
 		cmocka_unit_test(light_that_is_rare_by_merging_needs_chains),
+		cmocka_unit_test(light_that_photons_see_is_not_rare),
 		cmocka_unit_test(what_is_settled_is_the_same_with_bdpt),
 		cmocka_unit_test(the_pilot_is_a_small_part_of_the_render),
 		cmocka_unit_test(a_render_without_a_number_of_samples_has_a_short_pilot),

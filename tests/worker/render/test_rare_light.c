@@ -21,7 +21,7 @@ static double share_of(struct world *w, uint64_t seed)
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	struct brightness map;
 	struct error e;
-	double share;
+	struct rare_light found;
 	c = (struct path_context){.w = w,
 				  .window = {0, 0, WIDTH, HEIGHT},
 				  .min_depth = 1,
@@ -38,9 +38,9 @@ static double share_of(struct world *w, uint64_t seed)
 			brightness_add(&map, &sample.splats[k]);
 	}
 	brightness_settle(&map, SAMPLES);
-	assert_int_equal(rare_light(&c, &map, seed, 0, MERGED, &share), 0);
+	assert_int_equal(rare_light(&c, &map, seed, 0, MERGED, &found), 0);
 	brightness_fini(&map);
-	return share;
+	return found.share;
 }
 
 /* Each seed lies within; those of the scene's own table (README of tests/bench) do by half as much again or more. */
