@@ -31,6 +31,8 @@ static void print_supported(FILE *out, const struct plugin_decl *d)
 	fprintf(out, " | ");
 	print_params(out, d, PARAM_IGNORED);
 	fprintf(out, " | ");
+	print_params(out, d, PARAM_UNHEEDED);
+	fprintf(out, " | ");
 	print_params(out, d, PARAM_REFUSED);
 	fprintf(out, " |\n");
 }
@@ -42,7 +44,8 @@ static void print_class(FILE *out, enum plugin_class cls)
 		if (d->cls != cls)
 			continue;
 		if (!any)
-			fprintf(out, "\n## %s\n\n| type | understood | ignored | refused |\n|---|---|---|---|\n",
+			fprintf(out,
+				"\n## %s\n\n| type | understood | ignored | unheeded | refused |\n|---|---|---|---|---|\n",
 				headings[cls]);
 		any = true;
 		print_supported(out, d);
@@ -72,9 +75,13 @@ static void print_stand_in(FILE *out, enum plugin_class cls, const char *type)
 static void print_unsupported(FILE *out)
 {
 	const char *type;
-	fprintf(out, "\n## Mitsuba's plug-ins that are not supported\n\n"
-		     "Refused, with file, line and the nearest name; with `--lenient` replaced.\n\n"
-		     "| class | type | with `--lenient` |\n|---|---|---|\n");
+	fprintf(out,
+		"\n## Mitsuba's plug-ins that are not supported\n\n"
+		"Refused, with file, line and the nearest name; with `--lenient` replaced. Light is unpolarised here: "
+		"`polarizer`, `retarder`, `circular` and\n`measured_polarized` have nothing to act on. `hk` is a "
+		"layer of a medium, and media are refused. Bump and normal "
+		"maps\nare those of Mitsuba up to 3.6: `flip_invalid_normals` and `use_shadowing_function`, which 3.7 has on, are off here.\n\n"
+		"| class | type | with `--lenient` |\n|---|---|---|\n");
 	enum plugin_class cls;
 	for (size_t i = 0; (type = plugin_of_mitsuba(i, &cls)); i++) {
 		const struct plugin_decl *d = plugin_find(render_plugins(), cls, type);
@@ -89,7 +96,8 @@ void compatibility_print(FILE *out)
 		"# What is read of Mitsuba's scenes\n\n"
 		"Made by `hslt-scene compatibility` of the tables that the reader works by. Names are those of 3.x; in 0.5/0.6 the same "
 		"in camelCase.\n"
-		"*Ignored*: has no effect on light, and is said once. *Refused*: would change the image. "
+		"*Ignored*: has no effect on light, and is said once. *Unheeded*: the image differs a little "
+		"from Mitsuba's, and a warning says so.\n*Refused*: would change the image. "
 		"[worker/render/scene/README.md](../worker/render/scene/README.md)\nsays what the plug-ins do, and where they differ,\n"
 		"[tests/corpus/README.md](../tests/corpus/README.md) how many public scenes load.\n");
 	for (int cls = 0; cls < PLUGIN_CLASSES; cls++)

@@ -73,14 +73,23 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 	return create(b, n, build, RELIEF_NORMAL, e);
 }
 
+/* What Mitsuba 3.7 does where the bent normal and the surface disagree. */
+#define OF_MITSUBA_3_7                                                                          \
+	{.name = "flip_invalid_normals", .types = VALUE_BOOL, .status = PARAM_UNHEEDED},        \
+	{                                                                                       \
+		.name = "use_shadowing_function", .types = VALUE_BOOL, .status = PARAM_UNHEEDED \
+	}
+
 static const struct param bumpmap_params[] = {
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
+	OF_MITSUBA_3_7,
 	{.name = NULL},
 };
 /* scale and handedness: as glTF has them. */
 static const struct param normalmap_params[] = {
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
 	{.name = "handedness", .types = VALUE_BOOL},
+	OF_MITSUBA_3_7,
 	{.name = NULL},
 };
 

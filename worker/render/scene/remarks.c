@@ -34,15 +34,35 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 /* Whoever asks for a part of the light, or for something else than light, gets another picture: that is said. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
-	static const char *const others[] = {
-		"direct", "volpath", "volpathmis", "prbvolpath", "volpath_simple", "aov",  "stokes", "moment",
-		"depth",  "field",   "ao",	   "vpl",	 "irrcache",	   "sppm", "ppm",    "photonmapper"};
+	static const char *const others[] = {"direct",
+					     "direct_projective",
+					     "direct_reparam",
+					     "emission_reparam",
+					     "volpath",
+					     "volpathmis",
+					     "prbvolpath",
+					     "volpath_simple",
+					     "volprim_rf_basic",
+					     "aov",
+					     "multichannel",
+					     "stokes",
+					     "moment",
+					     "depth",
+					     "field",
+					     "ao",
+					     "vpl",
+					     "irrcache",
+					     "sppm",
+					     "ppm",
+					     "photonmapper"};
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
 			rc = remark(r, n, e,
 				    "is not what is rendered: the picture is of all light on surfaces, without media%s",
-				    strcmp(n->type, "direct") == 0 ? "; --max-depth 2 leaves out indirect light" : "");
+				    strncmp(n->type, "direct", strlen("direct")) == 0
+					    ? "; --max-depth 2 leaves out indirect light"
+					    : "");
 	return rc ? rc : on_depth(r, n, e);
 }
 

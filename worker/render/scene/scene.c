@@ -83,6 +83,18 @@ static int note_property(struct maker *m, const struct xml_element *owner, const
 		    owner->name, type, name);
 }
 
+static int note_unheeded(struct maker *m, const struct xml_element *owner, const struct xml_element *el,
+			 const char *name)
+{
+	const char *type = xml_attribute(owner, "type"), *value = xml_attribute(el, "value");
+	if (value && strcasecmp(value, "false") == 0)
+		return 0;
+	return note(
+		m, owner, type, name,
+		"%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not supported: the image differs a little from Mitsuba's",
+		el->file, el->line, owner->name, type, name);
+}
+
 static int note_foreign(struct maker *m, const struct xml_element *el)
 {
 	return note(m, el, "", "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
@@ -188,6 +200,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		return refuse_property(d, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
 		return note_property(m, owner, el, name);
+	if (found->status == PARAM_UNHEEDED)
+		return note_unheeded(m, owner, el, name);
 	*p = found;
 	return 0;
 }

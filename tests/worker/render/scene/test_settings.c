@@ -177,6 +177,9 @@ static void test_notes_on_the_whole(void **state)
 		 "s.xml:1: <integrator type=\"direct\">: is not what is rendered: the picture is of all light on "
 		 "surfaces, without media; --max-depth 2 leaves out indirect light"},
 		{"<integrator type='volpath'/>", "without media"},
+		{"<integrator type='direct_projective'/>", "without media; --max-depth 2 leaves out indirect light"},
+		{"<integrator type='multichannel'/>", "is not what is rendered"},
+		{"<integrator type='volprim_rf_basic'/>", "is not what is rendered"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[512];

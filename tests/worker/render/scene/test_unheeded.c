@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Parameters that change light a little and are not supported: a note by name, none where the file says that it is off.
+ */
+#include "tests/support/memory_assets.h"
+#include "worker/render/render.h"
+#include "worker/render/scene/scene.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define BENT(type, name, value)                                                                                   \
+	"<bsdf type='" type "'><texture name='t' type='checkerboard'/><bsdf type='diffuse'/><boolean name='" name \
+	"' value='" value "'/></bsdf>"
+
+/* note: NULL: there is none with `not supported` */
+static void check(const char *inside, const char *note)
+{
+	char xml[1024];
+	struct scene s;
+	struct error e;
+	bool found = false;
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", inside);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s: %s", inside, e.text);
+	for (uint32_t i = 0; i < s.note_count; i++)
+		found |= strstr(s.notes[i], note ? note : "not supported") != NULL;
+	if (found != (note != NULL))
+		fail_msg("%s: %s", inside, note ? note : "a note too many");
+	scene_fini(&s);
+}
+
+static void test_notes(void **state)
+{
+	(void)state;
+	check("<emitter type='sky'><float name='albedo' value='0.5'/></emitter>",
+	      "s.xml:1: <emitter type=\"sky\">: `albedo` is not supported: the image differs a little from Mitsuba's");
+	check("<emitter type='sunsky'><rgb name='albedo' value='1 0 0'/></emitter>", "`albedo` is not supported");
+	check("<emitter type='sky'/>", NULL);
+	check(BENT("bumpmap", "flip_invalid_normals", "true"), "`flip_invalid_normals` is not supported");
+	check(BENT("normalmap", "use_shadowing_function", "true"), "`use_shadowing_function` is not supported");
+	check(BENT("bumpmap", "use_shadowing_function", "False"), NULL);
+	check(BENT("normalmap", "flip_invalid_normals", "false"), NULL);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
