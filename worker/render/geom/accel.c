@@ -405,24 +405,10 @@ static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double 
 	return fmin(t0 + to_nearest - sqrt(left2 / d2), t_max);
 }
 
-/* Lower rays lose what is nearer to the surface that they leave than floats can be off. */
-#define LOWEST 64.0
-
 /* To the side that d leaves for. */
 static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 {
 	return vec3_madd(p, copysign(reach_at(a, p), vec3_dot(ng, d)), ng);
-}
-
-/* How far along d, for a step away from the surface: a ray that is lifted comes back to the surface that much earlier.
- * Begun there, it loses nothing that is nearer to the surface than it is lifted; begun behind the surface, it would
- * meet neighbours whose planes the true ray crosses elsewhere. */
-static double lowness(vec3 ng, vec3 d)
-{
-	double along = vec3_length(d), up = fabs(vec3_dot(ng, d));
-	if (!(vec3_dot(ng, ng) > 0))
-		return 1;
-	return fmax(up * LOWEST > along ? along / up : LOWEST, 1);
 }
 
 /* Embree ends the program on rays beyond about 1.8e18 (FLT_LARGE). A number that is none fails, too. */
@@ -507,7 +493,7 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	struct query q = query_of(a, vec3_madd(from->p, enter, d), d);
 	q.from = from->prim;
 	q.start = enter > 0 ? NULL : from;
-	q.low = enter > 0 ? 1 : lowness(from->ng, d);
+	q.low = enter > 0 ? 1 : query_lowness(from->ng, d);
 	struct RTCRayHit rh;
 	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
 		return false;
@@ -556,8 +542,8 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 	q.finish = to;
 	q.end = to->p;
 	q.segment = true;
-	q.low = enter > 0 ? 1 : lowness(from->ng, d);
-	q.beyond = lowness(to->ng, d);
+	q.low = enter > 0 ? 1 : query_lowness(from->ng, d);
+	q.beyond = query_lowness(to->ng, d);
 	if (!(vec3_length(q.d) > 0))
 		return false;
 	vec3 o = lifted(a, q.o, from->ng, d), end = lifted(a, to->p, to->ng, vec3_neg(d));
@@ -571,6 +557,6 @@ bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *fro
 	struct query q = query_of(a, from->p, d);
 	q.from = from->prim;
 	q.start = from;
-	q.low = lowness(from->ng, d);
+	q.low = query_lowness(from->ng, d);
 	return occluded(a, &q, lifted(a, from->p, from->ng, d), d, INFINITY);
 }

@@ -26,13 +26,14 @@ struct within {
 	vec3 from, d;	       /* where the segment begins; unit direction */
 	double length, t0, t1; /* it is the part of the query from t0 to t1 */
 	double reach;	       /* how far Embree's floats can be off */
+	double before, beyond; /* so much longer is Embree's ray at its ends, see query_lowness */
 };
 
 /* As in accel.c: so high over the triangle's plane at both ends that no rounding can be wrong about the side. */
 static bool clearly_crosses(const struct within *w, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
-	double t = (double)ray->tfar - w->reach, nearer = w->q->segment ? fmin(t, w->length - t) : t;
+	double t = (double)ray->tfar - w->before, nearer = w->q->segment ? fmin(t, w->length - t) : t;
 	return fabs(vec3_dot(n, w->d)) * nearer > 0x1p10 * w->reach * triangle_norm1(n);
 }
 
@@ -149,12 +150,19 @@ static bool clip(double o, double d, double low, double high, double *t0, double
 	return *t0 <= *t1;
 }
 
-/* From a surface towards the side that d leaves for, as in accel.c. */
-static vec3 lifted(const struct placement *m, vec3 p, const struct ray_end *end, vec3 d, double reach)
+/* Unit, in the mesh's frame, of the surface that an end lies on; 0: on none. */
+static vec3 normal_at(const struct placement *m, const struct ray_end *end)
 {
 	vec3 n = end ? placement_normal_back(m, end->ng) : (vec3){0, 0, 0};
 	double length = vec3_length(n);
-	return length > 0 ? vec3_madd(p, copysign(reach / length, vec3_dot(n, d)), n) : p;
+	return length > 0 ? vec3_scale(1 / length, n) : n;
+}
+
+/* From a surface of normal n towards the side that d leaves for; the ray is as much longer as query_lowness says. */
+static vec3 lifted(vec3 p, vec3 n, vec3 d, double reach, double *longer)
+{
+	*longer = reach * query_lowness(n, d);
+	return vec3_madd(p, copysign(reach, vec3_dot(n, d)), n);
 }
 
 /* The part up to t_max of the query that runs within the instance's box; false: none. */
@@ -175,11 +183,13 @@ static bool enter(struct within *w, const struct instances *s, const struct inst
 	    !clip(o.z, d.z, tree->low.z - r, tree->high.z + r, &w->t0, &w->t1))
 		return false;
 	w->from = vec3_madd(o, w->t0, d);
+	w->before = w->beyond = w->reach;
 	vec3 to = vec3_madd(o, w->t1, d);
 	if (w->t0 == 0)
-		w->from = lifted(m, w->from, q->start, d, w->reach);
+		w->from = lifted(w->from, normal_at(m, q->start), d, w->reach, &w->before);
 	if (q->segment && w->t1 == 1)
-		to = lifted(m, placement_point_back(m, q->end), q->finish, vec3_neg(d), w->reach);
+		to = lifted(placement_point_back(m, q->end), normal_at(m, q->finish), vec3_neg(d), w->reach,
+			    &w->beyond);
 	vec3 along = vec3_sub(to, w->from);
 	w->length = vec3_length(along);
 	w->d = vec3_scale(1 / w->length, along);
@@ -189,16 +199,16 @@ static bool enter(struct within *w, const struct instances *s, const struct inst
 /* The float ray begins before the segment, and ends after it, by as much as floats may be off, unless it is clipped. */
 static void fill_ray(const struct within *w, struct RTCRay *ray)
 {
-	vec3 o = vec3_madd(w->from, -w->reach, w->d);
+	vec3 o = vec3_madd(w->from, -w->before, w->d);
 	bool clipped = w->q->t_min > 0 && w->t0 == w->q->t_min;
 	*ray = (struct RTCRay){.org_x = (float)o.x,
 			       .org_y = (float)o.y,
 			       .org_z = (float)o.z,
-			       .tnear = clipped ? (float)w->reach : 0,
+			       .tnear = clipped ? (float)w->before : 0,
 			       .dir_x = (float)w->d.x,
 			       .dir_y = (float)w->d.y,
 			       .dir_z = (float)w->d.z,
-			       .tfar = (float)(w->length + 2 * w->reach),
+			       .tfar = (float)(w->length + w->before + w->beyond),
 			       .mask = 0xFFFFFFFFu};
 }
 
@@ -206,10 +216,10 @@ static void fill_ray(const struct within *w, struct RTCRay *ray)
  * Embree can tell. */
 static double place_of_hit(const struct within *w, const struct RTCRayHit *rh)
 {
-	double share = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->reach) * share;
+	double share = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->before) * share;
 	const struct triangle k = accel_triangle(&w->q->shapes[w->shape], rh->hit.primID);
 	double there = vec3_dot(k.n, vec3_sub(k.v[0], w->q->o)) / vec3_dot(k.n, w->q->d);
-	return fmax(fabs(there - t) <= 4 * w->reach * share ? there : t, w->q->t_min);
+	return fmax(fabs(there - t) <= 4 * w->before * share ? there : t, w->q->t_min);
 }
 
 static void intersect(const struct RTCIntersectFunctionNArguments *args)

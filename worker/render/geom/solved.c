@@ -9,6 +9,17 @@ bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t 
 	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
 }
 
+/* Lower rays lose what is nearer to the surface that they leave than floats can be off. */
+#define LOWEST 64.0
+
+double query_lowness(vec3 n, vec3 d)
+{
+	double along = vec3_length(d), up = fabs(vec3_dot(n, d));
+	if (!(vec3_dot(n, n) > 0))
+		return 1;
+	return fmax(up * LOWEST > along ? along / up : LOWEST, 1);
+}
+
 struct prim_ref query_there(const struct query *q, struct prim_ref prim)
 {
 	if (!query_hides(q, prim.shape))

@@ -43,6 +43,11 @@ struct wide_prims {
  * on a coplanar neighbour, does not cross it again. */
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim);
 
+/* How far along d, for a step away from the surface of normal n: a ray that is lifted comes back to the surface that
+ * much earlier. Begun there, it loses nothing that is nearer to the surface than it is lifted; begun behind the
+ * surface, it would meet neighbours whose planes the true ray crosses elsewhere. 1 where n is 0. */
+double query_lowness(vec3 n, vec3 d);
+
 /* The ray starts or ends on it. */
 static inline bool query_is_end(const struct query *q, struct prim_ref p)
 {
