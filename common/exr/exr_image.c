@@ -42,16 +42,6 @@ void exr_image_fini(struct exr_image *img)
 
 /* ---- writing */
 
-static exr_attr_box2i_t box(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
-{
-	exr_attr_box2i_t b;
-	b.min.x = (int32_t)x;
-	b.min.y = (int32_t)y;
-	b.max.x = (int32_t)(x + width) - 1;
-	b.max.y = (int32_t)(y + height) - 1;
-	return b;
-}
-
 static exr_result_t write_attributes(exr_context_t x, const struct exr_image *img)
 {
 	exr_result_t rc = EXR_ERR_SUCCESS;
@@ -87,8 +77,8 @@ static exr_result_t write_origin(exr_context_t x, const struct exr_image *img)
 
 static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 {
-	exr_attr_box2i_t data = box(img->x, img->y, img->width, img->height);
-	exr_attr_box2i_t display = box(0, 0, img->full_width, img->full_height);
+	exr_attr_box2i_t data = exr_box(img->x, img->y, img->width, img->height);
+	exr_attr_box2i_t display = exr_box(0, 0, img->full_width, img->full_height);
 	const exr_attr_v2f_t center = {{{0, 0}}};
 	int part;
 	exr_result_t rc = exr_add_part(x, NULL, EXR_STORAGE_SCANLINE, &part);

@@ -129,3 +129,13 @@ int exr_close_write(exr_context_t *x, struct exr_stream *s, exr_result_t rc, uns
 	*size = s->size;
 	return 0;
 }
+
+exr_attr_box2i_t exr_box(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
+{
+	exr_attr_box2i_t b;
+	b.min.x = (int32_t)x;
+	b.min.y = (int32_t)y;
+	b.max.x = (int32_t)(x + width) - 1;
+	b.max.y = (int32_t)(y + height) - 1;
+	return b;
+}

@@ -8,6 +8,7 @@
 #include <OpenEXR/openexr.h>
 
 #include <stddef.h>
+#include <stdint.h>
 
 enum { EXR_MAX_SIDE = 1 << 20 };
 
@@ -25,5 +26,7 @@ int exr_close_write(exr_context_t *x, struct exr_stream *s, exr_result_t rc, uns
 		    struct error *e);
 /* -EBADMSG, or -ENOMEM when that is why, with the library's sentence. */
 int exr_failed(const struct exr_stream *s, exr_result_t rc, struct error *e);
+/* Sides of at most EXR_MAX_SIDE. */
+exr_attr_box2i_t exr_box(uint32_t x, uint32_t y, uint32_t width, uint32_t height);
 
 #endif

@@ -15,19 +15,10 @@ size_t exr_tile_size_max(uint32_t width, uint32_t height)
 	return (size_t)width * height * TILE_CHANNELS * sizeof(float) + HEADER_ROOM;
 }
 
-static exr_attr_box2i_t box(uint32_t x, uint32_t y, uint32_t width, uint32_t height)
-{
-	exr_attr_box2i_t b;
-	b.min.x = (int32_t)x;
-	b.min.y = (int32_t)y;
-	b.max.x = (int32_t)(x + width) - 1;
-	b.max.y = (int32_t)(y + height) - 1;
-	return b;
-}
-
 static exr_result_t write_header(exr_context_t x, const struct tile *t, uint32_t full_width, uint32_t full_height)
 {
-	exr_attr_box2i_t data = box(t->x, t->y, t->width, t->height), display = box(0, 0, full_width, full_height);
+	exr_attr_box2i_t data = exr_box(t->x, t->y, t->width, t->height),
+			 display = exr_box(0, 0, full_width, full_height);
 	const exr_attr_v2f_t center = {{{0, 0}}};
 	int part;
 	exr_result_t rc = exr_add_part(x, "tile", EXR_STORAGE_TILED, &part);
