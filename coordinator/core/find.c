@@ -1,36 +1,39 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/find.h"
 
-/* The first job whose id is not below `id`. */
-static uint32_t job_place_of(const struct farm *f, uint64_t id)
+/* The first of `count` whose id is not below `id`; ids ascend. */
+static uint32_t place_of(const struct farm *f, uint32_t count, uint64_t (*id_at)(const struct farm *f, uint32_t i),
+			 uint64_t id)
 {
-	uint32_t low = 0, high = f->job_count;
+	uint32_t low = 0, high = count;
 	while (low < high) {
 		uint32_t mid = low + (high - low) / 2;
-		if (f->jobs[mid]->id < id)
+		if (id_at(f, mid) < id)
 			low = mid + 1;
 		else
 			high = mid;
 	}
 	return low;
+}
+
+static uint64_t job_id(const struct farm *f, uint32_t i)
+{
+	return f->jobs[i]->id;
+}
+
+static uint64_t peer_id(const struct farm *f, uint32_t i)
+{
+	return f->peers[i]->id;
 }
 
 uint32_t farm_peer_place(const struct farm *f, uint64_t id)
 {
-	uint32_t low = 0, high = f->peer_count;
-	while (low < high) {
-		uint32_t mid = low + (high - low) / 2;
-		if (f->peers[mid]->id < id)
-			low = mid + 1;
-		else
-			high = mid;
-	}
-	return low;
+	return place_of(f, f->peer_count, peer_id, id);
 }
 
 struct job *farm_find_job(const struct farm *f, uint64_t id)
 {
-	uint32_t i = job_place_of(f, id);
+	uint32_t i = place_of(f, f->job_count, job_id, id);
 	return i < f->job_count && f->jobs[i]->id == id ? f->jobs[i] : NULL;
 }
 
