@@ -5,6 +5,7 @@
  * the limits count is found while reading, without following a reference twice.
  */
 #include "common/base/mem.h"
+#include "tests/support/append.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 
@@ -18,15 +19,7 @@
 static char xml[8 << 20];
 static size_t used;
 
-__attribute__((format(printf, 1, 2))) static void put(const char *format, ...)
-{
-	va_list ap;
-	va_start(ap, format);
-	int n = vsnprintf(xml + used, sizeof xml - used, format, ap);
-	va_end(ap);
-	assert_true(n >= 0 && (size_t)n < sizeof xml - used);
-	used += (size_t)n;
-}
+#define put(...) append(xml, sizeof xml, &used, __VA_ARGS__)
 
 static int read_files(const struct memory_file *files, struct error *e)
 {

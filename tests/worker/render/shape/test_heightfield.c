@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A height field against the same mesh written as OBJ, its normals against those of the function that it samples. */
-#include "tests/support/memory_assets.h"
+#include "tests/support/built_shape.h"
 #include "tests/support/pictures.h"
 #include "tests/support/sample_images.h"
 #include "worker/render/render.h"
@@ -16,46 +16,26 @@
 
 enum { WIDTH = 9, HEIGHT = 5 };
 
-struct built {
-	struct scene scene;
-	struct arena arena;
-	struct shape_geometry g;
-	struct error error;
-	int result;
-};
-
 static const void *picture;
 static size_t picture_size;
 static char obj[1 << 16];
 
 /* One shape of 0.6; its files are a.hdr and m.obj. */
-static struct built build(const char *type, const char *content)
+static struct built_shape build(const char *type, const char *content)
 {
 	char xml[2048];
 	snprintf(xml, sizeof xml, "<scene version='0.6.0'>\n<shape type='%s'>%s</shape></scene>", type, content);
 	const struct memory_file files[] = {
 		{"s.xml", xml, strlen(xml)}, {"a.hdr", picture, picture_size}, {"m.obj", obj, strlen(obj)}, {0}};
-	struct asset_source assets = memory_assets(files);
-	struct built b = {0};
-	uint64_t dropped;
-	b.result = scene_read(&b.scene, &assets, "s.xml", render_plugins(), NULL, 0, &b.error);
-	if (!b.result)
-		b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error);
-	return b;
+	return built_shape(files, render_plugins());
 }
 
-static struct built build_ok(const char *type, const char *content)
+static struct built_shape build_ok(const char *type, const char *content)
 {
-	struct built b = build(type, content);
+	struct built_shape b = build(type, content);
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	return b;
-}
-
-static void release(struct built *b)
-{
-	arena_fini(&b->arena);
-	scene_fini(&b->scene);
 }
 
 #define FILENAME "<string name='filename' value='a.hdr'/>"
@@ -105,11 +85,12 @@ static void test_as_obj(void **state)
 	struct pictures p = {0};
 	take_picture(&p, WIDTH, HEIGHT, height);
 	write_obj(-1.5);
-	struct built field = build_ok("heightfield", FILENAME PLACE "<float name='scale' value='-1.5'/>"
-								    "<boolean name='shadingNormals' value='false'/>"),
-		     mesh = build_ok("obj", "<string name='filename' value='m.obj'/>" PLACE
-					    "<boolean name='faceNormals' value='true'/>"
-					    "<boolean name='flipTexCoords' value='false'/>");
+	struct built_shape field = build_ok("heightfield",
+					    FILENAME PLACE "<float name='scale' value='-1.5'/>"
+							   "<boolean name='shadingNormals' value='false'/>"),
+			   mesh = build_ok("obj", "<string name='filename' value='m.obj'/>" PLACE
+						  "<boolean name='faceNormals' value='true'/>"
+						  "<boolean name='flipTexCoords' value='false'/>");
 	const struct mesh *a = &field.g.mesh, *b = &mesh.g.mesh;
 	assert_int_equal(a->triangle_count, 2 * (WIDTH - 1) * (HEIGHT - 1));
 	assert_int_equal(b->triangle_count, a->triangle_count);
@@ -122,8 +103,8 @@ static void test_as_obj(void **state)
 			for (int c = 0; c < 2; c++)
 				assert_true(fabs(a->uv[v][c] - b->uv[w][c]) < 1e-12);
 		}
-	release(&field);
-	release(&mesh);
+	built_shape_release(&field);
+	built_shape_release(&mesh);
 	pictures_fini(&p);
 }
 
@@ -144,7 +125,7 @@ static void test_normals(void **state)
 	(void)state;
 	struct pictures p = {0};
 	take_picture(&p, WIDTH, HEIGHT, slope);
-	struct built b = build_ok("heightfield", FILENAME "<float name='scale' value='2'/>");
+	struct built_shape b = build_ok("heightfield", FILENAME "<float name='scale' value='2'/>");
 	assert_non_null(b.g.mesh.normal);
 	/* z = 2 (4 (x + 1) / 8 + 2 (y + 1) / 16) = x + y / 4 + ... */
 	double length = sqrt(1 + 1.0 / 16 + 1);
@@ -152,7 +133,7 @@ static void test_normals(void **state)
 		const double *n = b.g.mesh.normal[i];
 		assert_true(fabs(n[0] + 1 / length) < 1e-6 && fabs(n[1] + 0.25 / length) < 1e-6);
 	}
-	release(&b);
+	built_shape_release(&b);
 	take_picture(&p, 17, 17, bowl);
 	b = build_ok("heightfield", FILENAME "<boolean name='flipNormals' value='true'/>");
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
@@ -165,7 +146,7 @@ static void test_normals(void **state)
 		if (!(fabs(dx) < 0.25 / 64 && fabs(dy) < 0.25 / 64 && n[2] < 0))
 			fail_msg("at %g %g the normal is off by %g %g", q[0], q[1], dx, dy);
 	}
-	release(&b);
+	built_shape_release(&b);
 	pictures_fini(&p);
 }
 
@@ -183,7 +164,7 @@ static void test_decoding(void **state)
 		"</texture>",
 	};
 	for (int i = 0; i < 4; i++) {
-		struct built b = build_ok("heightfield", ways[i]);
+		struct built_shape b = build_ok("heightfield", ways[i]);
 		double rgb[3];
 		for (int k = 0; k < 3; k++) {
 			double x = sample_value(2, 1, k) / 255.0;
@@ -193,17 +174,17 @@ static void test_decoding(void **state)
 		double z = b.g.mesh.position[1 * 4 + 2][2];
 		if (!(fabs(z - wanted) < 1e-6))
 			fail_msg("way %d: a height of %g, not %g", i, z, wanted);
-		release(&b);
+		built_shape_release(&b);
 	}
 	free(png);
 }
 
 static void refuses(const char *content, const char *sentence)
 {
-	struct built b = build("heightfield", content);
+	struct built_shape b = build("heightfield", content);
 	if (b.result >= 0 || !strstr(b.error.text, sentence))
 		fail_msg("%s\n gave %d: %s", content, b.result, b.error.text);
-	release(&b);
+	built_shape_release(&b);
 }
 
 static void test_bad_input(void **state)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* max_smooth_angle against the same meshes with their normals written out. */
-#include "tests/support/memory_assets.h"
+#include "tests/support/append.h"
+#include "tests/support/built_shape.h"
 #include "tests/support/scene_tables.h"
 
 #include <setjmp.h>
@@ -10,62 +11,34 @@
 
 #include <cmocka.h>
 
-struct built {
-	struct scene scene;
-	struct arena arena;
-	struct shape_geometry g;
-	struct error error;
-	int result;
-};
-
 static char text[1 << 22];
 static size_t used;
 
-__attribute__((format(printf, 1, 2))) static void put(const char *format, ...)
-{
-	va_list ap;
-	va_start(ap, format);
-	int n = vsnprintf(text + used, sizeof text - used, format, ap);
-	va_end(ap);
-	assert_true(n >= 0 && (size_t)n < sizeof text - used);
-	used += (size_t)n;
-}
+#define put(...) append(text, sizeof text, &used, __VA_ARGS__)
 
 /* The mesh in `text`. */
-static struct built build(const char *content)
+static struct built_shape build(const char *content)
 {
 	char xml[1024];
 	snprintf(xml, sizeof xml,
 		 "<scene version='0.6.0'>\n<shape type='obj'><string name='filename' value='m.obj'/>%s</shape></scene>",
 		 content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m.obj", text, used}, {0}};
-	struct asset_source assets = memory_assets(files);
-	struct built b = {0};
-	uint64_t dropped;
-	b.result = scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error);
-	if (!b.result)
-		b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error);
-	return b;
+	return built_shape(files, scene_tables());
 }
 
 #define ANGLE(x) "<float name='maxSmoothAngle' value='" #x "'/>"
 
-static struct built build_ok(const char *content)
+static struct built_shape build_ok(const char *content)
 {
-	struct built b = build(content);
+	struct built_shape b = build(content);
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	return b;
 }
 
-static void release(struct built *b)
-{
-	arena_fini(&b->arena);
-	scene_fini(&b->scene);
-}
-
 /* Triangle for triangle and corner for corner the same places and normals; vertices may be others. */
-static void expect_same(struct built *a, struct built *b)
+static void expect_same(struct built_shape *a, struct built_shape *b)
 {
 	const struct mesh *x = &a->g.mesh, *y = &b->g.mesh;
 	assert_int_equal(x->triangle_count, y->triangle_count);
@@ -79,8 +52,8 @@ static void expect_same(struct built *a, struct built *b)
 					fail_msg("triangle %u, corner %d: component %d of the normal is off by %g", i,
 						 k, c, difference);
 			}
-	release(a);
-	release(b);
+	built_shape_release(a);
+	built_shape_release(b);
 }
 
 /* A prism of `sides` around z, from z = 0 to 1, with its lids. Normals: of the sides those of a cylinder if round, else
@@ -129,7 +102,7 @@ static void test_prisms(void **state)
 		char below[96], above[96];
 		snprintf(below, sizeof below, "<float name='maxSmoothAngle' value='%.6f'/>", 0.99 * edge);
 		snprintf(above, sizeof above, "<float name='maxSmoothAngle' value='%.6f'/>", 1.01 * edge);
-		struct built smooth, as_written;
+		struct built_shape smooth, as_written;
 		put_prism(sides, NONE);
 		smooth = build_ok(below);
 		put_prism(sides, FLAT);
@@ -154,11 +127,11 @@ static void test_ends(void **state)
 {
 	(void)state;
 	put_prism(7, NONE);
-	struct built all = build_ok(ANGLE(180)), shared = build_ok("");
+	struct built_shape all = build_ok(ANGLE(180)), shared = build_ok("");
 	expect_same(&all, &shared);
-	struct built none = build_ok(ANGLE(0));
+	struct built_shape none = build_ok(ANGLE(0));
 	put_prism(7, FLAT);
-	struct built flat = build_ok("");
+	struct built_shape flat = build_ok("");
 	expect_same(&none, &flat);
 }
 
@@ -175,7 +148,7 @@ static void test_first_come(void **state)
 		third[i] = a - M_PI / 2;
 	}
 	put("f 1 3 2\nf 1 4 2\nf 1 5 2\n");
-	struct built b = build_ok(ANGLE(50));
+	struct built_shape b = build_ok(ANGLE(50));
 	const struct mesh *m = &b.g.mesh;
 	for (int i = 0; i < 3; i++) {
 		double wanted = i < 2 ? 0.5 * (third[0] + third[1]) : third[2];
@@ -185,7 +158,7 @@ static void test_first_come(void **state)
 			fail_msg("face %d: normal %g %g %g", i, n[0], n[1], n[2]);
 	}
 	assert_int_equal(m->vertex_count, 2 + 2 + 3); /* two of the edge for the first two, two for the third */
-	release(&b);
+	built_shape_release(&b);
 }
 
 /* Where texture coordinates differ, surfaces are not smooth across, as in Mitsuba. */
@@ -195,12 +168,12 @@ static void test_seams(void **state)
 	used = 0;
 	put("v 0 0 0\nv 0 1 0\nv 1 0 0\nv -1 0 0.2\nvt 0 0\nvt 1 0\nvt 0 1\n");
 	put("f 1/1 3/2 2/3\nf 1/2 2/3 4/1\n");
-	struct built b = build_ok(ANGLE(90));
+	struct built_shape b = build_ok(ANGLE(90));
 	const struct mesh *m = &b.g.mesh;
 	assert_true(m->index[0][0] != m->index[1][0]);
 	assert_int_equal(m->index[0][2], m->index[1][1]);
 	assert_true(m->normal[m->index[0][0]][2] == 1);
-	release(&b);
+	built_shape_release(&b);
 }
 
 /* Nor where colours do; each corner keeps its own, and each triangle what is its. */
@@ -216,7 +189,7 @@ static void test_attributes(void **state)
 		90) "</shape></scene>";
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m.ply", ply, sizeof ply - 1}, {0}};
 	struct asset_source assets = memory_assets(files);
-	struct built b = {0};
+	struct built_shape b = {0};
 	uint64_t dropped;
 	assert_int_equal(scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error), 0);
 	assert_int_equal(shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error), 0);
@@ -236,15 +209,15 @@ static void test_attributes(void **state)
 			    *both = a->value + (size_t)m->index[1][1] * a->channels;
 		assert_true(first[0] == 1 && first[1] == 0 && second[1] == 1 && second[2] == 1 && both[0] == 0.5f);
 	}
-	release(&b);
+	built_shape_release(&b);
 }
 
 static void expect_refused(const char *content, const char *sentence)
 {
-	struct built b = build(content);
+	struct built_shape b = build(content);
 	if (b.result >= 0 || !strstr(b.error.text, sentence))
 		fail_msg("%s gave %d: %s", content, b.result, b.error.text);
-	release(&b);
+	built_shape_release(&b);
 }
 
 static void test_bad_input(void **state)
@@ -262,8 +235,8 @@ static void test_bad_input(void **state)
 	for (int i = 0; i < 40000; i++)
 		put("f 1 %d %d\n", i + 2, i + 3);
 	expect_refused(ANGLE(0), "too many triangles of different directions meet in a place");
-	struct built b = build_ok(ANGLE(30));
-	release(&b);
+	struct built_shape b = build_ok(ANGLE(30));
+	built_shape_release(&b);
 }
 
 int main(void)
