@@ -9,7 +9,7 @@
 # make fuzz-numbers   scenes with extreme numbers against a farm of sanitized workers, FUZZ_SECONDS (60) long
 # make corpus DIR=...   tries every scene file under a folder: loaded, or refused for what
 # make man completion   what the programs print with --man and --completion, into build/man and build/completion
-# make demo bench fuzz install clean
+# make demo bench fuzz install uninstall clean
 
 CC       ?= gcc
 ifeq ($(origin CC),default)
@@ -60,7 +60,7 @@ CTL_CLI    := $(patsubst coordinator/ctl/hslt_%.c,hslt-%,$(wildcard coordinator/
 PROGRAMS   := $(if $(wildcard coordinator/main.c),hslt-coordinator) $(if $(wildcard worker/daemon/main.c),hslt-worker) \
               $(WORKER_CLI) $(CTL_CLI)
 
-.PHONY: all programs tests test demo bench fuzz fuzzers install clean
+.PHONY: all programs tests test demo bench fuzz fuzzers install uninstall clean
 all: programs
 programs: $(addprefix $(BUILD)/bin/,$(PROGRAMS))
 
@@ -250,6 +250,9 @@ install: programs man completion
 	install -m 755 $(addprefix $(BUILD)/bin/,$(PROGRAMS)) $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(MAN) $(SHARE)/man/man1
 	install -m 644 $(COMPLETION) $(SHARE)/bash-completion/completions
+uninstall:
+	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(PROGRAMS:%=$(SHARE)/man/man1/%.1) \
+		$(PROGRAMS:%=$(SHARE)/bash-completion/completions/%)
 
 clean:
 	rm -rf build
