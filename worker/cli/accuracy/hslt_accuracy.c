@@ -51,9 +51,7 @@ static const struct option_row rows[] = {
 
 static int take_word(void *target, size_t index, char *word, struct error *e)
 {
-	struct arguments *a = target;
-	a->scene = word;
-	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
+	return option_scene(index, word, &((struct arguments *)target)->scene, e);
 }
 
 static int check(void *target, struct error *e)

@@ -24,6 +24,12 @@ unsigned option_threads_default(void)
 	return processors > 0 ? (unsigned)processors : 1;
 }
 
+int option_scene(size_t index, const char *word, const char **scene, struct error *e)
+{
+	*scene = word;
+	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
+}
+
 int option_image(const char *arg, const char **image, struct error *e)
 {
 	static const char *const others[] = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp", ".ppm", ".pfm"};

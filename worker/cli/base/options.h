@@ -35,6 +35,9 @@ unsigned option_threads_default(void); /* as many as processors */
  * its name says that it is something else. "-" is /dev/stdout. */
 int option_image(const char *arg, const char **image, struct error *e);
 
+/* For a program of one scene: the index-th word that is no option. */
+int option_scene(size_t index, const char *word, const char **scene, struct error *e);
+
 /* A folder of --path, which must be there, appended to OPTION_PATHS_MAX paths. */
 int option_path(const char *arg, const char **paths, size_t *count, struct error *e);
 

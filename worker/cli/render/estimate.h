@@ -6,7 +6,17 @@
 #ifndef WORKER_CLI_RENDER_ESTIMATE_H
 #define WORKER_CLI_RENDER_ESTIMATE_H
 
+#include "common/base/option.h"
 #include "common/estimate/forecast.h"
+
+/* The options of a program that estimates: rows for a struct with these fields. */
+/* clang-format off */
+#define ESTIMATE_ROWS(type) \
+	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost", OPTION_FLAG(type, estimate)}, \
+	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(type, pilot, 0, 1e9), .above = true, \
+	 .below = true}, \
+	{"plot", 0, "FILE", "Plot the estimate into an .svg or .png", OPTION_TEXT(type, plot)}
+/* clang-format on */
 
 struct estimate {
 	const char *scene, *where; /* "this machine, 2 threads" */

@@ -53,11 +53,7 @@ static const struct option_row rows[] = {
 	 "of paths",
 	 OPTION_TEXT(struct arguments, stats)},
 	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
-	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost",
-	 OPTION_FLAG(struct arguments, estimate)},
-	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(struct arguments, pilot, 0, 1e9),
-	 .above = true, .below = true},
-	{"plot", 0, "FILE", "Plot the estimate into an .svg or .png", OPTION_TEXT(struct arguments, plot)},
+	ESTIMATE_ROWS(struct arguments),
 	{"explain", 0, NULL, "Only say what the scene calls for, why, and what leaving the rest out saves",
 	 OPTION_FLAG(struct arguments, explain)},
 	{"json", 0, NULL, "Print the estimate, or what --explain says, as one JSON object",
@@ -67,9 +63,7 @@ static const struct option_row rows[] = {
 
 static int take_word(void *target, size_t index, char *word, struct error *e)
 {
-	struct arguments *a = target;
-	a->scene = word;
-	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
+	return option_scene(index, word, &((struct arguments *)target)->scene, e);
 }
 
 static int check(void *target, struct error *e)

@@ -68,11 +68,7 @@ static const struct option_row rows[] = {
 	 OPTION_SECONDS(struct arguments, patience, 0, 1e9), .above = true, .below = true, .standard = "600"},
 	{"json", 0, NULL, "Print one JSON object instead of the id, or of the estimate's table",
 	 OPTION_FLAG(struct arguments, json)},
-	{"estimate", 0, NULL, "Render a pilot only and print what smaller errors will cost",
-	 OPTION_FLAG(struct arguments, estimate)},
-	{"pilot", 0, "SECONDS", "Length of the pilot (60)", OPTION_SECONDS(struct arguments, pilot, 0, 1e9),
-	 .above = true, .below = true},
-	{"plot", 0, "FILE", "Plot the estimate into an .svg or .png", OPTION_TEXT(struct arguments, plot)},
+	ESTIMATE_ROWS(struct arguments),
 	{"mixed", 0, NULL, "Allow workers of any numeric fingerprint: gives up equal bits",
 	 OPTION_FLAG(struct arguments, request.mixed)},
 	{"verify", 0, "P", "Share of the epochs, or percent, that two workers must compute alike before they count",
@@ -86,9 +82,7 @@ static const struct option_row rows[] = {
 
 static int take_word(void *target, size_t index, char *word, struct error *e)
 {
-	struct arguments *a = target;
-	a->scene = word;
-	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
+	return option_scene(index, word, &((struct arguments *)target)->scene, e);
 }
 
 static int check(void *target, struct error *e)
