@@ -6,8 +6,8 @@
 
 #include "common/net/conn.h"
 #include "worker/daemon/config.h"
-#include "worker/daemon/fingerprint.h"
 #include "worker/daemon/lease_task.h"
+#include "worker/render/fingerprint.h"
 
 enum { WORLDS_KEPT = 2 /* of jobs that have no lease here now */ };
 

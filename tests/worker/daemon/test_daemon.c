@@ -4,7 +4,7 @@
 #include "worker/daemon/job_cache.h"
 #include "worker/daemon/cache.h"
 #include "worker/daemon/thread_pool.h"
-#include "worker/daemon/fingerprint.h"
+#include "worker/render/fingerprint.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>

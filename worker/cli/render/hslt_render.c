@@ -25,6 +25,7 @@
 #include "worker/cli/base/options.h"
 #include "worker/cli/render/pilot.h"
 #include "worker/cli/render/stats.h"
+#include "worker/render/fingerprint.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -222,9 +223,10 @@ static void look(void *user, const struct local_round *r)
 static int resume(void *user, struct bootstrap *b, struct error *e)
 {
 	struct session *s = user;
-	char text[512];
+	char text[512], fingerprint[FINGERPRINT_MAX];
 	(void)e;
-	kept_bootstrap_begin(&s->kept, s->a->output, &s->plan, &s->a->render);
+	fingerprint_make(fingerprint);
+	kept_bootstrap_begin(&s->kept, s->a->output, fingerprint, &s->plan, &s->a->render);
 	kept_bootstrap_resume(&s->kept, b, text, sizeof text);
 	if (*text && !s->a->quiet)
 		fprintf(stderr, "hslt-render: note: %s\n", text);

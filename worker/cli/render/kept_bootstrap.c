@@ -9,7 +9,6 @@
 #include "worker/cli/render/kept_bootstrap.h"
 
 #include "common/base/crc.h"
-#include "common/base/version.h"
 #include "common/plan/plan_text.h"
 
 #include <errno.h>
@@ -50,7 +49,7 @@ static void add_text(struct kept_bootstrap *k, const char *text, const char *end
 		k->path[0] = 0; /* too much to tell it from others */
 }
 
-void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const struct plan *p,
+void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
 			  const struct render_arguments *a)
 {
 	char options[PLAN_TEXT], counts[128];
@@ -62,7 +61,7 @@ void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const str
 	snprintf(counts, sizeof counts, "%u groups of %u parts, %llu samples", p->groups, p->parts,
 		 (unsigned long long)p->bootstrap);
 	k->text[0] = 0;
-	add_text(k, HSLT_VERSION, "\n");
+	add_text(k, fingerprint, "\n");
 	add_text(k, options, "\n");
 	add_text(k, counts, "\n");
 	for (size_t i = 0; i < a->define_count; i++) {
@@ -89,7 +88,7 @@ static int read_mark(const struct kept_bootstrap *k, struct checked_file *f, str
 		rc = checked_file_read(f, text, length, e);
 	if (!rc &&
 	    (crc != k->crc || bytes != k->bytes || length != strlen(k->text) || memcmp(text, k->text, length) != 0))
-		rc = error_set(e, ESTALE, "it is of another plan or scene");
+		rc = error_set(e, ESTALE, "it is of another plan, scene, program or machine");
 	return rc;
 }
 

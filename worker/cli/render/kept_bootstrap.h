@@ -2,8 +2,9 @@
 /*
  * What a render that is interrupted before its first round is complete leaves: the leases of the bootstrap that are
  * done, in a file beside the image, IMAGE.bootstrap. The same command goes on with them, to the same bits, and removes
- * the file when its image is written. Another plan, another version, other defines or files that differ make it another
- * command: then the file is left alone, and replaced by the next interruption. One thread.
+ * the file when its image is written. Another plan, other defines, files that differ, or another numeric fingerprint (a
+ * new build, or a machine that rounds otherwise) make it another command: then the file is left alone, and replaced by
+ * the next interruption. One thread.
  */
 #ifndef WORKER_CLI_RENDER_KEPT_BOOTSTRAP_H
 #define WORKER_CLI_RENDER_KEPT_BOOTSTRAP_H
@@ -20,7 +21,7 @@ struct kept_bootstrap {
 	uint32_t crc;
 	uint64_t bytes;
 	char path[KEPT_PATH]; /* "": there is no place for one */
-	char text[KEPT_TEXT]; /* version, plan and defines */
+	char text[KEPT_TEXT]; /* fingerprint, plan and defines */
 	bool resumed;
 	char said[KEPT_PATH + 256]; /* after a write, what to tell: a half sentence, or "" */
 };
@@ -28,8 +29,8 @@ struct kept_bootstrap {
 /* A source that passes on what `inner` has, and takes note of it. Both must outlive it. */
 struct asset_source kept_bootstrap_source(struct kept_bootstrap *k, const struct asset_source *inner);
 
-/* When the plan is known. */
-void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const struct plan *p,
+/* When the plan is known; fingerprint: of this program here (worker/render/fingerprint.h). */
+void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
 			  const struct render_arguments *a);
 /* Adds what the file has; text: what to tell of it, or "". */
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size);

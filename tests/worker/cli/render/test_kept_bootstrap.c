@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A render that is stopped in its bootstrap, after so many leases of it, and one that goes on with them: the same bits
- * as one that was never stopped, with no lease done twice. Files of other plans, other scenes, other versions and
- * damaged ones are not used. Renders are stopped from within, so that nothing depends on time.
+ * as one that was never stopped, with no lease done twice. Files of other plans, other scenes, other fingerprints
+ * and damaged ones are not used. Renders are stopped from within, so that nothing depends on time.
  */
 #include "tests/support/folder.h"
 #include "tests/support/memory_assets.h"
@@ -26,6 +26,7 @@ struct trial {
 	struct plan plan;
 	atomic_bool stop;
 	uint32_t leases, stop_after; /* done in this run; 0: never stopped */
+	const char *fingerprint;
 	char image[128], text[512];
 };
 
@@ -42,7 +43,7 @@ static int resume(void *user, struct bootstrap *b, struct error *e)
 {
 	struct trial *t = user;
 	(void)e;
-	kept_bootstrap_begin(&t->kept, t->image, &t->plan, &t->arguments);
+	kept_bootstrap_begin(&t->kept, t->image, t->fingerprint, &t->plan, &t->arguments);
 	kept_bootstrap_resume(&t->kept, b, t->text, sizeof t->text);
 	return 0;
 }
@@ -83,7 +84,7 @@ static struct trial trial_of(const struct world *w, uint64_t seed, const char *b
 				 .epoch = 16,
 				 .mutations = 512,
 				 .max_depth = 8};
-	struct trial t = {.stop_after = stop_after};
+	struct trial t = {.stop_after = stop_after, .fingerprint = "build=1 libc=2"};
 	struct error e;
 	(void)w;
 	assert_int_equal(plan_make(&r, &t.plan, &e), 0);
@@ -168,16 +169,19 @@ static void test_of_another_command(void **state)
 	struct world *w = lit_world();
 	struct trial t = trial_of(w, 1, "scene", STOP_AFTER);
 	assert_null(render(w, &t));
-	struct trial others[] = {trial_of(w, 2, "scene", 1), trial_of(w, 1, "scenf", 1), trial_of(w, 1, "scene", 1)};
+	struct trial others[] = {trial_of(w, 2, "scene", 1), trial_of(w, 1, "scenf", 1), trial_of(w, 1, "scene", 1),
+				 trial_of(w, 1, "scene", 1)};
 	others[2].arguments.define_count = 1;
 	others[2].arguments.defines[0] = (struct scene_define){"x", "1"};
-	for (size_t i = 0; i < 3; i++) {
+	others[3].fingerprint = "build=1 libc=3";
+	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
 		others[i].kept.path[0] = 0;
 		struct bootstrap *b;
 		struct error e;
 		assert_int_equal(bootstrap_new(&b, &others[i].plan, &e), 0);
 		resume(&others[i], b, &e);
-		assert_non_null(strstr(others[i].text, "is not used: it is of another plan or scene"));
+		assert_non_null(
+			strstr(others[i].text, "is not used: it is of another plan, scene, program or machine"));
 		assert_int_equal(bootstrap_done(b), 0);
 		bootstrap_free(b);
 		kept_bootstrap_end(&others[i].kept);

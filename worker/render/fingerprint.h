@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The numeric fingerprint (docs/design.md, rules 1): what decides the bits of a result beside plan and scene. Workers
+ * The numeric fingerprint (docs/design.md, rules 1): what decides the bits of a result beside plan and scene. Programs
  * with equal texts give equal bits. Any thread.
  */
-#ifndef WORKER_DAEMON_FINGERPRINT_H
-#define WORKER_DAEMON_FINGERPRINT_H
+#ifndef WORKER_RENDER_FINGERPRINT_H
+#define WORKER_RENDER_FINGERPRINT_H
 
 #include <stddef.h>
 #include <stdint.h>

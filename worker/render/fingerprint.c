@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/daemon/fingerprint.h"
+#include "worker/render/fingerprint.h"
 
 #include "common/base/version.h"
 #include "worker/render/render.h"
