@@ -171,6 +171,6 @@ void strategy_add_beyond(double share, char *note, size_t size)
 	if (share > 0.001)
 		text_print(
 			note + used, size - used,
-			"%s%.2g %% of the light is missing: it comes by paths longer than the chains of this integrator hold (path has all of it)",
+			"%s%.2g %% of the light is missing: it comes by paths of more edges than are simulated (128; pssmlt: 32)",
 			used ? "; " : "", 100 * share);
 }

@@ -34,6 +34,18 @@ got=0
 wait $early || got=$?
 [ $got = 1 ] || fail "the second time it ended with $got"
 
+# A sphere whose wall shines and reflects 99 %: 0.99^128 of its light takes more edges than are simulated.
+cat >"$DIR/bright.xml" <<-'XML'
+	<scene version="3.0.0"><integrator type="path"/>
+	<sensor type="perspective"><transform name="to_world"><lookat origin="0,0,0" target="0,0,1" up="0,1,0"/></transform></sensor>
+	<shape type="sphere"><boolean name="flip_normals" value="true"/>
+	<bsdf type="diffuse"><spectrum name="reflectance" value="0.99"/></bsdf>
+	<emitter type="area"><spectrum name="radiance" value="1"/></emitter></shape></scene>
+XML
+"$BIN/hslt-render" "$DIR/bright.xml" -o "$DIR/bright.exr" --integrator path --size 16x16 --spp 16 2>"$DIR/bright.log" ||
+	fail "the bright sphere: ended with $?"
+noted "$DIR/bright.log" '2[789] % of the light is missing: it comes by paths of more edges than are simulated'
+
 start_coordinator
 start_worker w1
 for kind in black stuck; do

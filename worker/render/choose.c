@@ -441,7 +441,7 @@ static int run_pilot(struct pilot *p, const struct plan *film, struct render_cho
 					   .window = film_window_of(film),
 					   .min_depth = film->min_depth,
 					   .max_depth = film->max_depth,
-					   .roulette = true,
+					   .roulette = PATH_ROULETTE,
 					   .unclassed = true,
 					   .counters = p->counters};
 	int rc = tail_init(&p->tail, p->samples / RENDER_TAIL + 1);

@@ -7,7 +7,7 @@
  * Failures: -EINVAL where things do not fit, -EILSEQ for states that are none, -EDOM where an invalid operation was
  * trapped (the place in the sentence); nothing of the batch is kept.
  */
-#include "worker/render/path/integrate_path.h"
+#include "worker/render/path/longer.h"
 #include "worker/render/render.h"
 
 #include "common/base/crash.h"
@@ -39,7 +39,7 @@ struct job {
 };
 
 enum { STOP_INTERVAL = 256 };  /* samples between looks at the stop flag */
-enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths too long for a chain's state */
+enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths that are too long to simulate */
 
 const char *render_numeric_version(void)
 {
@@ -121,28 +121,11 @@ static enum lease_end run_samples(struct job *j)
 	return LEASE_DONE;
 }
 
-/* Energy in paths longer than a chain's state: path tracing from random numbers of its own, with roulette. */
-static double beyond(struct job *j, uint64_t index)
-{
-	struct path_context *c = &j->context;
-	uint32_t min = c->min_depth, max = c->max_depth;
-	struct sampler_random s;
-	sampler_random_init(&s, j->plan->seed, RNG_BEYOND, index, 0);
-	c->min_depth = c->max_depth + 1 > min ? c->max_depth + 1 : min;
-	c->max_depth = j->plan->max_depth;
-	c->roulette = true;
-	path_trace(c, &s.base, &j->sample);
-	c->min_depth = min;
-	c->max_depth = max;
-	c->roulette = false;
-	return j->sample.intensity * BEYOND_INTERVAL;
-}
-
 static enum lease_end run_bootstrap(struct job *j)
 {
 	struct plan_range r = plan_bootstrap_range(j->plan, j->key->group, j->key->part);
 	struct batch *out = j->out;
-	bool longer = j->plan->kind == PLAN_CHAINS && j->plan->max_depth > j->context.max_depth;
+	uint32_t longest = j->plan->max_depth < PATH_MAX_EDGES ? j->plan->max_depth : LONGER_EDGES;
 	for (uint64_t i = r.begin; i < r.end; i++) {
 		if (i % STOP_INTERVAL == 0 && stopped(j))
 			return LEASE_STOPPED;
@@ -160,8 +143,9 @@ static enum lease_end run_bootstrap(struct job *j)
 		out->independent_square += intensity * intensity;
 		out->counters[COUNT_SAMPLES]++;
 		out->counters[COUNT_INDEPENDENT]++;
-		if (longer && i % BEYOND_INTERVAL == 0)
-			out->beyond_sum += beyond(j, i);
+		if (longest > j->context.max_depth && i % BEYOND_INTERVAL == 0)
+			out->beyond_sum +=
+				BEYOND_INTERVAL * longer_paths(&j->context, j->plan->seed, i, longest, &j->sample);
 	}
 	return LEASE_DONE;
 }
@@ -258,7 +242,7 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 	j->context.window = film_window_of(p);
 	j->context.min_depth = p->min_depth;
 	j->context.max_depth = depth;
-	j->context.roulette = p->kind == PLAN_SAMPLES;
+	j->context.roulette = p->kind == PLAN_SAMPLES ? PATH_ROULETTE : 0;
 	j->context.unclassed = p->kind == PLAN_SAMPLES && j->key->kind == LEASE_RENDER;
 	j->context.counters = j->out->counters;
 	j->out->strategy_count = j->key->kind == LEASE_RENDER ? (uint32_t)plan_strategy_count(p->mutations) : 0;

@@ -218,8 +218,9 @@ static void tables_are_readable(void **state)
 	assert_null(strstr(text, "missing"));
 	strategy_add_beyond(0.25, text, sizeof text);
 	assert_non_null(strstr(
-		text, "911 rejections; 25 % of the light is missing: it comes by paths longer than the chains of this "
-		      "integrator hold (path has all of it)"));
+		text,
+		"911 rejections; 25 % of the light is missing: it comes by paths of more edges than are simulated "
+		"(128; pssmlt: 32)"));
 	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
 	assert_int_equal(strlen(small), sizeof small - 1);
 	strategy_lines(p.mutations, &n, text, sizeof text);

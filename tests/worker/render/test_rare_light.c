@@ -26,7 +26,7 @@ static double share_of(struct world *w, uint64_t seed)
 				  .window = {0, 0, WIDTH, HEIGHT},
 				  .min_depth = 1,
 				  .max_depth = 8,
-				  .roulette = true,
+				  .roulette = PATH_ROULETTE,
 				  .unclassed = true,
 				  .counters = counters};
 	assert_int_equal(brightness_init(&map, &c.window, SAMPLES, &e), 0);

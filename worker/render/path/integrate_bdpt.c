@@ -42,7 +42,7 @@ static spectrum join(struct path_context *c, unsigned j, unsigned t, struct clas
  * them are made. Where it finds none, all are. */
 static double faint_beside(const struct path_context *c, spectrum found)
 {
-	return c->roulette ? faint_share * spectrum_mean(found) : 0;
+	return c->roulette > 0 ? faint_share * spectrum_mean(found) : 0;
 }
 
 static void trace(struct path_context *c, struct sampler *s, struct path_sample *out)

@@ -211,9 +211,9 @@ void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera
 
 static bool survives(const struct path_context *c, unsigned scatterings, double start, double u, spectrum *beta)
 {
-	if (!c->roulette || scatterings < c->w->settings.roulette_depth)
+	if (!(c->roulette > 0) || scatterings < c->w->settings.roulette_depth)
 		return true;
-	double q = fmin(spectrum_max(*beta) / start, 0.95);
+	double q = fmin(spectrum_max(*beta) / start, c->roulette);
 	if (!(u < q))
 		return false;
 	*beta = spectrum_scale(1 / q, *beta);

@@ -20,6 +20,9 @@
 #include "worker/render/path/sampler.h"
 #include "worker/render/world/world.h"
 
+/* The usual value of path_context.roulette: mirrors do not keep a path for ever. */
+#define PATH_ROULETTE 0.95
+
 enum { PATH_MAX_EDGES = 128, PATH_MAX_SPLATS = PATH_MAX_EDGES + 2 };
 
 enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE };
@@ -55,9 +58,9 @@ struct path_context {
 	struct film_window window;
 	struct wavelengths wl;
 	uint32_t min_depth, max_depth; /* edges */
-	bool roulette;
-	bool unclassed;	      /* nobody asks for path_sample.classes */
-	bool one_way;	      /* nobody asks for pdf_rev: no technique has more than one light vertex */
+	double roulette;	       /* the most that a sub-path goes on with; 0: no roulette */
+	bool unclassed;		       /* nobody asks for path_sample.classes */
+	bool one_way;		       /* nobody asks for pdf_rev: no technique has more than one light vertex */
 	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
 				 all have */
 	double faint;	      /* what a connection of two surfaces must bring to be made for certain; 0: anything */

@@ -284,7 +284,7 @@ static void test_roulette(void **state)
 					  .window = {0, 0, 8, 8},
 					  .min_depth = 1,
 					  .max_depth = EDGES,
-					  .roulette = true,
+					  .roulette = PATH_ROULETTE,
 					  .counters = counters};
 		for (uint64_t i = 0; i < PATHS; i++) {
 			struct sampler_random random;

@@ -99,7 +99,7 @@ static void test_mean(void **state)
 	static uint64_t counters[BATCH_COUNTERS];
 	struct world *w = room();
 	struct path_context c = context_of(w, counters);
-	c.roulette = true;
+	c.roulette = PATH_ROULETTE;
 	double all = 0, mean = 0;
 	uint64_t rays_all = 0, rays = 0, differ = 0;
 	for (uint64_t i = 0; i < SAMPLES; i++) {

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The energy of paths that are too long to simulate, in a closed sphere whose wall shines and reflects the share r:
+ * paths of e edges bring r^(e - 1) of what the wall emits. Each estimate against this sum, at 4 standard errors (level
+ * 6e-5); a hundredth too much or too little is found where the share is large.
+ */
+#include "tests/support/worlds.h"
+#include "worker/render/path/integrate_path.h"
+#include "worker/render/path/longer.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+enum { SAMPLES = 1 << 13, SIZE = 32 };
+
+static struct path_context context_of(struct world *w, uint64_t *counters, uint32_t max_depth)
+{
+	return (struct path_context){.w = w,
+				     .window = {0, 0, SIZE, SIZE},
+				     .min_depth = 1,
+				     .max_depth = max_depth,
+				     .unclassed = true,
+				     .counters = counters};
+}
+
+static struct world *room(const char *bsdf)
+{
+	return world_of_text(
+		SIZE, SIZE,
+		SENSOR("0,0,0", "0,0,1") "<shape type='sphere'><boolean name='flip_normals' value='true'/>%s"
+					 "<emitter type='area'><spectrum name='radiance' value='1'/>"
+					 "</emitter></shape>",
+		bsdf);
+}
+
+/* The mean of what is found of paths of more than `after` edges. */
+static double found(struct world *w, uint32_t after, uint32_t longest, double *error)
+{
+	static struct path_context c;
+	static struct path_sample sample;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	double sum = 0, square = 0;
+	c = context_of(w, counters, after);
+	for (uint64_t i = 0; i < SAMPLES; i++) {
+		double x = longer_paths(&c, 3, i, longest, &sample);
+		assert_true(c.max_depth == after && c.roulette == 0);
+		sum += x / SAMPLES;
+		square += x * x / SAMPLES;
+	}
+	*error = sqrt((square - sum * sum) / SAMPLES);
+	return sum;
+}
+
+/* The mean where radiance 1 is all that the camera sees. */
+static double one(void)
+{
+	static struct path_context c;
+	static struct path_sample sample;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	double sum = 0;
+	struct world *w = room("<bsdf type='diffuse'/>");
+	c = context_of(w, counters, 1);
+	for (uint64_t i = 0; i < SAMPLES; i++) {
+		struct sampler_random s;
+		sampler_random_init(&s, 3, RNG_TEST, i, 0);
+		path_trace(&c, &s.base, &sample);
+		sum += sample.intensity / SAMPLES;
+	}
+	world_free(w);
+	return sum;
+}
+
+static void expect(struct world *w, uint32_t after, uint32_t longest, double wanted, double most_error)
+{
+	double error, unit = one(), mean = found(w, after, longest, &error) / unit;
+	error /= unit;
+	printf("%u to %u edges: %.5g +- %.2g, wanted %.5g\n", after + 1, longest, mean, error, wanted);
+	if (!(fabs(mean - wanted) <= 4 * error) || error > most_error * wanted)
+		fail_msg("off by %.2f standard errors", (mean - wanted) / error);
+}
+
+/* r^after + ... + r^(longest - 1) */
+static double series(double r, uint32_t after, uint32_t longest)
+{
+	return (pow(r, after) - (longest == LONGER_EDGES ? 0 : pow(r, longest))) / (1 - r);
+}
+
+static void test_a_shining_sphere(void **state)
+{
+	(void)state;
+	struct world *w = room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.99'/></bsdf>");
+	expect(w, 32, 64, series(0.99, 32, 64), 0.02);
+	expect(w, 126, 131, series(0.99, 126, 131), 0.03); /* where one stretch ends and the next begins */
+	expect(w, 128, LONGER_EDGES, series(0.99, 128, LONGER_EDGES), 0.05);
+	world_free(w);
+	w = room("<bsdf type='diffuse'><spectrum name='reflectance' value='0.5'/></bsdf>");
+	expect(w, 4, LONGER_EDGES, series(0.5, 4, LONGER_EDGES), 0.05);
+	world_free(w);
+}
+
+/* The same by a lobe that scatters in one direction only. */
+static void test_a_mirror(void **state)
+{
+	(void)state;
+	struct world *w = room("<bsdf type='conductor'><string name='material' value='none'/>"
+			       "<spectrum name='specular_reflectance' value='0.99'/></bsdf>");
+	expect(w, 126, 131, series(0.99, 126, 131), 0.03);
+	world_free(w);
+}
+
+/* Between two mirrors, each meeting a step further on, to a lamp behind 300 of them: a stretch goes on from where the
+ * one before it ended, with its throughput. */
+static void test_a_corridor(void **state)
+{
+	(void)state;
+	static const char mirror[] = "<bsdf type='conductor'><string name='material' value='none'/>"
+				     "<spectrum name='specular_reflectance' value='0.995'/></bsdf>";
+	struct world *w = world_of_text(
+		SIZE, SIZE,
+		"<sensor type='perspective'><float name='fov' value='0.001'/><transform name='to_world'>"
+		"<lookat origin='0,0.5,0' target='1,1.5,0' up='0,0,1'/></transform><film type='hdrfilm'>"
+		"<rfilter type='box'/></film></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/><scale value='400'/>"
+		"</transform><bsdf type='twosided'>%s</bsdf></shape>"
+		"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/><scale value='400'/>"
+		"<translate y='1'/></transform><bsdf type='twosided'>%s</bsdf></shape>"
+		"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='-90'/><translate x='300'/>"
+		"</transform><emitter type='area'><spectrum name='radiance' value='1'/></emitter></shape>",
+		mirror, mirror);
+	expect(w, 128, 300, 0, 0);
+	expect(w, 128, 301, pow(0.995, 300), 0.05);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_a_shining_sphere), cmocka_unit_test(test_a_mirror),
+					   cmocka_unit_test(test_a_corridor)};
+	return cmocka_run_group_tests_name("worker/render/path/longer", tests, NULL, NULL);
+}

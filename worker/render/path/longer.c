@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Path tracing of long paths only, in stretches of as many vertices as a sub-path holds: the last vertices of one
+ * stretch are the first of the next, with random numbers of its own. A technique with at most one vertex of the light's
+ * looks at the camera's last three, so little else has to be carried over: whether a vertex that is gone dispersed the
+ * light, and vertex 1, since roulette compares with its throughput. Roulette lets a path live as long as it loses
+ * nothing, so that the share of a bright mirror room is estimated by many paths of like weight.
+ */
+#include "worker/render/path/longer.h"
+
+#include "worker/render/path/connect.h"
+
+#include <string.h>
+
+enum { FULL = PATH_MAX_EDGES + 1, CARRIED = 3, CARRIED_END = 2 + CARRIED };
+
+/* Of paths that end at the camera sub-path's vertices first - 1 ... n - 1, `before` of whose edges are not in it. */
+static spectrum gather(struct path_context *c, unsigned first, unsigned n, unsigned before, uint32_t least,
+		       uint32_t most, double film[2])
+{
+	spectrum sum = spectrum_of(0);
+	for (unsigned t = first; t <= n; t++)
+		for (unsigned j = 0; j <= 1; j++) {
+			unsigned edges = before + t + j - 1;
+			if (edges < least || edges > most)
+				continue;
+			spectrum l = path_connect(c, j, t, 1, film);
+			if (path_accept(c, l))
+				sum = spectrum_add(sum, l);
+		}
+	return sum;
+}
+
+double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint32_t longest,
+		    struct path_sample *scratch)
+{
+	const double roulette = c->roulette;
+	const bool one_way = c->one_way;
+	uint32_t least = c->max_depth + 1 > c->min_depth ? c->max_depth + 1 : c->min_depth;
+	unsigned first = 2, before = 0, most = longest + 1 < FULL ? longest + 1 : FULL;
+	double film[2];
+	bool dispersed = false; /* by a vertex that is not carried any more */
+	struct sampler_random s;
+	c->roulette = 1;
+	c->one_way = true;
+	sampler_random_init(&s, seed, RNG_BEYOND, index, 0);
+	unsigned n = path_walk_camera(c, &s.base, most, film);
+	spectrum sum = gather(c, first, n, before, least, longest, film);
+	for (uint64_t stretch = 1; n == FULL && c->camera[n - 1].kind == VERTEX_SURFACE && before + n - 1 < longest;
+	     stretch++) {
+		for (unsigned i = 1; i + CARRIED < n; i++)
+			dispersed = dispersed || c->camera[i].bsdf->dispersive;
+		memmove(&c->camera[CARRIED_END - CARRIED], &c->camera[n - CARRIED], CARRIED * sizeof *c->camera);
+		before += n - CARRIED_END;
+		sampler_random_init(&s, seed, RNG_BEYOND, index, stretch);
+		n = path_walk_on(c, &s.base, SIDE_CAMERA, CARRIED_END, FULL);
+		spectrum l = gather(c, CARRIED_END + 1, n, before, least, longest, film);
+		sum = spectrum_add(sum, path_collapse(l, dispersed));
+	}
+	c->roulette = roulette;
+	c->one_way = one_way;
+	scratch->count = 0;
+	scratch->classes = 0;
+	scratch->intensity = 0;
+	path_splat(c, scratch, film[0], film[1], sum);
+	return scratch->intensity;
+}
