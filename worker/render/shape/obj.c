@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Wavefront OBJ: v, vt, vn, f; everything else (groups, materials, lines) has no meaning here. Every index is checked
- * where it stands, so that an error has a line.
+ * Wavefront OBJ: v, vt, vn, f; everything else (groups, lines) has no meaning here, and of materials only that there
+ * are some. Every index is checked where it stands, so that an error has a line.
  */
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
@@ -17,7 +17,7 @@ static const struct param params[] = {
 	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
 	{"collapse", IGNORED},
-	{"load_materials", IGNORED}, /* .mtl files are never read */
+	{"load_materials", UNDERSTOOD(VALUE_BOOL)}, /* .mtl files are never read: false says that none is wanted */
 	MESH_SMOOTH_PARAM,
 	{"shape_index", REFUSED},
 	SHAPE_PARAMS_END,
@@ -42,6 +42,7 @@ struct obj {
 	struct list positions, uvs, normals; /* double[3], double[2], double[3] */
 	struct list corners;		     /* struct corner, one for each corner of each polygon */
 	struct list triangles;		     /* uint32_t[3] into corners */
+	bool materials;			     /* faces are given some */
 };
 
 static void *push(struct list *l)
@@ -207,6 +208,7 @@ static int read_line(struct obj *o)
 		return read_numbers(o, "vt", &o->uvs, 1, 2);
 	if (n == 2 && memcmp(word, "vn", 2) == 0)
 		return read_normal(o);
+	o->materials |= n == 6 && memcmp(word, "usemtl", 6) == 0;
 	return n == 1 && *word == 'f' ? read_face(o) : 0;
 }
 
@@ -300,6 +302,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	o.triangles.size = 3 * sizeof(uint32_t);
 	r = a.size > UINT32_MAX ? node_error(n, e, EFBIG, "%s: larger than 4 GB", name) : read_lines(&o);
 	assets->close(assets->user, &a);
+	out->materials = o.materials && node_bool(n, "load_materials", true);
 	if (!r)
 		r = make_mesh(&o, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
 	mem_free(o.positions.items);

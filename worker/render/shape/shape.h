@@ -26,6 +26,7 @@ struct shape_geometry {
 	enum shape_kind kind;
 	struct mesh mesh;  /* arrays owned by the arena given */
 	bool face_normals; /* its file wants each triangle flat */
+	bool materials;	   /* its file says which of its materials each face has; they are not read */
 	struct sphere sphere;
 };
 

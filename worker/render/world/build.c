@@ -325,9 +325,8 @@ void world_summary(const struct world *w, struct render_summary *out)
 				       .instances = w->instance_count,
 				       .shared_meshes = w->shared_mesh_count,
 				       .brightest = world_brightest(w),
-				       .coincident = w->coincident};
-	memcpy(out->scales, w->scales, sizeof out->scales);
-	memcpy(out->flat, w->flat, sizeof out->flat);
+				       .coincident = w->coincident,
+				       .notes = w->notes};
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];

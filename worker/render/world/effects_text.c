@@ -151,14 +151,12 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 	render_effects_note(scene, text, size);
 	if (*text && i-- == 0)
 		return true;
-	if (*scene->scales && i-- == 0) {
-		snprintf(text, size, "%s", scene->scales);
-		return true;
-	}
-	if (*scene->flat && i-- == 0) {
-		snprintf(text, size, "%s", scene->flat);
-		return true;
-	}
+	const char *const met[] = {scene->notes.scales, scene->notes.flat, scene->notes.materials};
+	for (size_t k = 0; k < sizeof met / sizeof *met; k++)
+		if (*met[k] && i-- == 0) {
+			snprintf(text, size, "%s", met[k]);
+			return true;
+		}
 	if (i < c->count) {
 		snprintf(text, size, "%s", c->text[i]);
 		return true;

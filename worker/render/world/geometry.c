@@ -3,8 +3,8 @@
  * Shapes of a world: read in double, moved into the unit sphere with the camera, then rounded to float; what is too
  * large for that beside what is small stays in double as well.
  *
- * Failures have the object's place. Triangles without an area and shapes too small beside others are counted and said,
- * not errors.
+ * Failures have the object's place. Triangles without an area, shapes too small beside others and materials that are
+ * not read are counted and said, not errors.
  */
 #include "worker/render/world/geometry.h"
 
@@ -21,14 +21,17 @@
 /* Of all shapes together: Embree takes about 150 bytes for each. */
 enum { TRIANGLES_MAX = 1 << 28 };
 
-/* Triangles without an area: nothing meets them, and they are left out. */
-struct flat {
+/* What is counted and said: triangles without an area, which nothing meets and which are left out, and files whose
+ * materials Mitsuba 0.6 would read, where the scene gives the shape no BSDF. */
+struct counted {
 	uint64_t triangles;
 	uint32_t shapes, empty; /* that have some; that have nothing else */
 	const struct scene_node *first;
+	uint32_t materials;
+	const struct scene_node *first_material;
 };
 
-static void count_flat(struct flat *f, const struct scene_node *n, uint64_t triangles, bool empty)
+static void count_flat(struct counted *f, const struct scene_node *n, uint64_t triangles, bool empty)
 {
 	if (triangles && !f->first)
 		f->first = n;
@@ -37,14 +40,33 @@ static void count_flat(struct flat *f, const struct scene_node *n, uint64_t tria
 	f->empty += empty;
 }
 
-static void note_flat(struct world *w, const struct flat *f)
+static void note_flat(struct world *w, const struct counted *f)
 {
 	if (f->first)
 		snprintf(
-			w->flat, sizeof w->flat,
+			w->notes.flat, sizeof w->notes.flat,
 			"%llu triangles without an area are left out, in %u shapes (first: the %.24s in line %d); %u of these "
 			"shapes have no others",
 			(unsigned long long)f->triangles, f->shapes, f->first->type, f->first->line, f->empty);
+}
+
+static void count_materials(struct counted *c, const struct builder *b, const struct scene_node *n,
+			    const struct shape_geometry *g)
+{
+	if (!g->materials || b->scene->dialect_3 || node_child(n, PLUGIN_BSDF, 0))
+		return;
+	if (c->materials++ == 0)
+		c->first_material = n;
+}
+
+static void note_materials(struct world *w, const struct counted *c)
+{
+	if (c->materials)
+		snprintf(
+			w->notes.materials, sizeof w->notes.materials,
+			"the materials of %u mesh%s without a bsdf (first: the %.24s in line %d) are not read from their .mtl "
+			"files: they are diffuse and grey",
+			c->materials, c->materials == 1 ? "" : "es", c->first_material->type, c->first_material->line);
 }
 
 static int read_shape(struct builder *b, const struct scene_node *n, struct shape_geometry *g, uint64_t *dropped)
@@ -59,9 +81,10 @@ static int read_shape(struct builder *b, const struct scene_node *n, struct shap
 
 /* Counts what was read. */
 static int take_geometry(struct builder *b, const struct scene_node *n, const struct shape_geometry *g,
-			 uint64_t dropped, struct flat *flat)
+			 uint64_t dropped, struct counted *counted)
 {
-	count_flat(flat, n, dropped, g->kind == SHAPE_MESH && g->mesh.triangle_count == 0);
+	count_flat(counted, n, dropped, g->kind == SHAPE_MESH && g->mesh.triangle_count == 0);
+	count_materials(counted, b, n, g);
 	b->triangles += g->mesh.triangle_count;
 	return b->triangles <= TRIANGLES_MAX
 		       ? 0
@@ -69,8 +92,8 @@ static int take_geometry(struct builder *b, const struct scene_node *n, const st
 }
 
 /* The mesh that an instance shares, read when the first of them asks; NULL: it is built by itself. */
-static int find_shared(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes, struct flat *flat,
-		       struct shared_mesh **out)
+static int find_shared(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes,
+		       struct counted *counted, struct shared_mesh **out)
 {
 	*out = NULL;
 	if (!shared_mesh_may(b, l))
@@ -86,19 +109,20 @@ static int find_shared(struct builder *b, const struct listed_shape *l, struct s
 		if (!rc)
 			shared_mesh_read(m);
 		if (!rc && m->shared)
-			rc = take_geometry(b, l->node, &m->geometry, dropped, flat);
+			rc = take_geometry(b, l->node, &m->geometry, dropped, counted);
 	}
 	*out = m->shared ? m : NULL;
 	return rc;
 }
 
 /* The next of the world's shapes; one with nothing to meet is none. */
-static int read_listed(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes, struct flat *flat)
+static int read_listed(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes,
+		       struct counted *counted)
 {
 	uint32_t id = b->w->shape_count;
 	struct shape_geometry *g = &b->geometry[id];
 	const struct scene_node *n = l->node;
-	int rc = find_shared(b, l, meshes, flat, &b->shared[id]);
+	int rc = find_shared(b, l, meshes, counted, &b->shared[id]);
 	if (!rc && b->shared[id]) {
 		*g = b->shared[id]->geometry;
 		rc = shared_mesh_box(b->shared[id], l->instance, &b->boxes[id], b->e);
@@ -107,7 +131,7 @@ static int read_listed(struct builder *b, const struct listed_shape *l, struct s
 		n = shape_placed(l, &b->scratch);
 		rc = n ? read_shape(b, n, g, &dropped) : build_out_of_memory(b->e);
 		if (!rc)
-			rc = take_geometry(b, n, g, dropped, flat);
+			rc = take_geometry(b, n, g, dropped, counted);
 		if (rc || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0))
 			return rc;
 		b->boxes[id] = build_box_of(g);
@@ -139,12 +163,13 @@ int build_read_shapes(struct builder *b)
 	if (!meshes || !b->geometry || !b->boxes || !b->shape_nodes || !b->shared || !b->instances)
 		return build_out_of_memory(b->e);
 	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-	struct flat flat = {0};
+	struct counted counted = {0};
 	for (uint32_t i = 0; i < listed && !rc; i++)
-		rc = read_listed(b, &list[i], meshes, &flat);
+		rc = read_listed(b, &list[i], meshes, &counted);
 	if (rc)
 		return rc;
-	note_flat(b->w, &flat);
+	note_flat(b->w, &counted);
+	note_materials(b->w, &counted);
 	crash_place("building the scene", NULL, 0);
 	if (b->w->shape_count == 0)
 		b->all.low = b->all.high = (vec3){0, 0, 0};
@@ -166,7 +191,7 @@ static void note_scales(struct builder *b)
 	}
 	if (b->w->shape_count > 0 && box_extent(&b->boxes[small]) < LEAST_SCALE * box_extent(&b->all))
 		snprintf(
-			b->w->scales, sizeof b->w->scales,
+			b->w->notes.scales, sizeof b->w->notes.scales,
 			"the %.24s in line %d is so much smaller than the scene, with the %.24s in line %d, that numbers are too short for both: what is "
 			"seen of it can be wrong",
 			b->shape_nodes[small]->type, b->shape_nodes[small]->line, b->shape_nodes[large]->type,

@@ -36,6 +36,13 @@ struct render_coincident {
 	bool incomplete;     /* there are more than were looked for */
 };
 
+/* What was met while the shapes were read; "" where nothing was. */
+struct world_notes {
+	char scales[256];    /* a shape that is too small beside another, by name */
+	char flat[256];	     /* how many triangles without an area were left out */
+	char materials[256]; /* how many files of shapes have materials that are not read */
+};
+
 struct render_summary {
 	struct scene_settings settings; /* with the overrides of the options */
 	uint32_t useful_depth;		/* edges of the longest path that can carry light, at most what was asked for */
@@ -46,8 +53,7 @@ struct render_summary {
 	uint64_t memory;  /* bytes of the world, about; Embree's part is estimated from what it takes a triangle */
 	double brightest; /* see world_brightest */
 	struct render_coincident coincident;
-	char scales[256]; /* a shape that is too small beside another, by name; "": none is */
-	char flat[256];	  /* how many triangles without an area were left out; "": none */
+	struct world_notes notes;
 };
 
 /* The camera in one line of name=value pairs, as the scene language has them: fov in degrees along fov_axis, to_world

@@ -37,8 +37,7 @@ struct world {
 	double grey_xyz[3];		     /* CIE XYZ of grey value 1 */
 	struct coincidence *coincidence;     /* of surfaces; NULL: none */
 	struct render_coincident coincident; /* what there is to say of it */
-	char scales[256];		     /* of shapes that are too small beside others; "": nothing */
-	char flat[256];			     /* of triangles without an area; "": nothing */
+	struct world_notes notes;
 	struct accel *accel;
 };
 

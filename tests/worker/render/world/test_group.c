@@ -123,10 +123,39 @@ static void test_flat(void **state)
 	assert_true(w->shapes[2].is_sphere && w->parts[2].emitter >= 0 && w->parts[1].emitter < 0);
 	assert_true(w->parts[0].bsdf != w->parts[1].bsdf);
 	assert_int_equal(w->emitter_count, 2); /* the sphere and the sky */
-	assert_non_null(
-		strstr(w->flat, "3 triangles without an area are left out, in 2 shapes (first: the obj in line 1)"));
-	assert_non_null(strstr(w->flat, "1 of these shapes have no others"));
+	assert_non_null(strstr(w->notes.flat,
+			       "3 triangles without an area are left out, in 2 shapes (first: the obj in line 1)"));
+	assert_non_null(strstr(w->notes.flat, "1 of these shapes have no others"));
 	world_free(w);
+}
+
+/* Mitsuba 0.6 reads the materials of a mesh whose shape has no BSDF; whoever has such a file is told. */
+static void test_materials_of_files(void **state)
+{
+	(void)state;
+	static const char mesh[] = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl red\nf 1 2 3\n";
+	static const struct {
+		const char *version, *inside;
+		bool said;
+	} cases[] = {{"0.6.0", "", true},
+		     {"0.6.0", "<bsdf type='diffuse'/>", false},
+		     {"0.6.0", "<boolean name='loadMaterials' value='false'/>", false},
+		     {"3.0.0", "", false}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char scene[512];
+		snprintf(
+			scene, sizeof scene,
+			"<scene version='%s'><sensor type='perspective'/><emitter type='constant'/>\n"
+			"<shape type='obj'><string name='filename' value='a.obj'/>%s</shape>"
+			"<shape type='obj'><string name='filename' value='a.obj'/><bsdf type='diffuse'/></shape></scene>",
+			cases[i].version, cases[i].inside);
+		const struct memory_file files[] = {
+			{"scene.xml", scene, strlen(scene)}, {"a.obj", mesh, strlen(mesh)}, {NULL, NULL, 0}};
+		struct world *w = world_of_files(8, 8, files);
+		const char *said = strstr(w->notes.materials, "of 1 mesh without a bsdf (first: the obj in line 2)");
+		assert_true(cases[i].said ? said != NULL : !*w->notes.materials);
+		world_free(w);
+	}
 }
 
 static void test_refused(void **state)
@@ -203,8 +232,12 @@ static void test_orthographic(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_copies),	cmocka_unit_test(test_flat),	     cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_sensors), cmocka_unit_test(test_orthographic),
+		cmocka_unit_test(test_copies),
+		cmocka_unit_test(test_flat),
+		cmocka_unit_test(test_materials_of_files),
+		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_sensors),
+		cmocka_unit_test(test_orthographic),
 	};
 	return cmocka_run_group_tests_name("group", tests, NULL, NULL);
 }
