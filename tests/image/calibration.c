@@ -8,8 +8,8 @@
  * renders' relMSE is left out, and said so. All scenes at the shortest length come first. SIGTERM ends it after the
  * case that is being measured, with the verdict on what there is.
  *
- *   calibration [RENDERS [LENGTHS [SEEDS [SCENE]]]]    20 renders a case, half as many of each next length; 3 lengths;
- * SEEDS: a word, another for other seeds; scenes whose names begin with SCENE
+ *   calibration [RENDERS [LENGTHS [SEEDS [SCENE [TIMES]]]]]    20 renders a case, half as many of each next length; 3
+ * lengths; SEEDS: a word, another for other seeds; scenes whose names begin with SCENE; references TIMES as long
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
@@ -53,7 +53,8 @@ struct reference {
 };
 
 /* A pilot tells how many samples the seconds buy. */
-static void make_reference(const struct calibration_scene *s, const struct world *w, double part, struct reference *r)
+static void make_reference(const struct calibration_scene *s, const struct world *w, double part, double times,
+			   struct reference *r)
 {
 	if (r->part >= part)
 		return;
@@ -62,7 +63,7 @@ static void make_reference(const struct calibration_scene *s, const struct world
 	snprintf(test, sizeof test, "%s pilot", s->name);
 	struct repeats_how how = {.integrator = s->reference, .test = test, .count = 2, .spp = PILOT_SPP};
 	repeats_run(w, &how, NULL, NULL, &parts);
-	how.spp = (uint64_t)(part * s->seconds / PARTS * 2 * PILOT_SPP / parts.cpu_seconds) + PILOT_SPP;
+	how.spp = (uint64_t)(part * times * s->seconds / PARTS * 2 * PILOT_SPP / parts.cpu_seconds) + PILOT_SPP;
 	repeats_free(&parts);
 	snprintf(test, sizeof test, "%s reference", s->name);
 	how.count = PARTS;
@@ -114,6 +115,7 @@ struct calibration {
 	uint32_t renders;
 	int last;
 	const char *seeds, *scene;
+	double times; /* as long are the references as their scenes say */
 	struct reference references[SCENES_MOST];
 	struct figures all[KINDS][INTEGRATORS][LENGTHS];
 };
@@ -169,7 +171,7 @@ static int run_length(struct calibration *c, int length)
 		if (!w)
 			continue;
 		assert_true(i < SCENES_MOST);
-		make_reference(s, w, lengths[length].reference, &c->references[i]);
+		make_reference(s, w, lengths[length].reference, c->times, &c->references[i]);
 		for (size_t k = 0; k < INTEGRATORS && !ended; k++)
 			run_case(c, s, w, &c->references[i], k, length);
 		world_free(w);
@@ -230,6 +232,7 @@ int main(int argc, char **argv)
 	c.last = argc > 2 && atoi(argv[2]) > 0 && atoi(argv[2]) < LENGTHS ? atoi(argv[2]) : LENGTHS;
 	c.seeds = argc > 3 ? argv[3] : "1";
 	c.scene = argc > 4 ? argv[4] : "";
+	c.times = argc > 5 && atof(argv[5]) > 0 ? atof(argv[5]) : 1;
 	int scenes[LENGTHS] = {0};
 	signal(SIGTERM, end);
 	printf("| kind | scene | integrator | a pixel | true %% | stated %% | intervals | held | beyond 3 errors %% | CPU s |\n"
