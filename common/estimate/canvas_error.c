@@ -10,6 +10,7 @@
 #include "common/base/color.h"
 #include "common/base/mem.h"
 #include "common/estimate/canvas_interval.h"
+#include "common/estimate/inverse_square.h"
 #include "common/estimate/tail.h"
 
 #include <assert.h>
@@ -24,6 +25,9 @@ static const double believed = 0.08;
 /* A kurtosis above this share of the groups: one of them has most of the pixel's variance. One alone would have
  * nearly 1. */
 static const double one_group = 0.6;
+
+/* A channel that is darker than this share of its pixel's brightest one may be what is left where colours cancel. */
+static const double cancelled = 0.125;
 
 /* The tail index of errors is taken from one in 128 of them and from one in 512, as that of samples where an integrator
  * is chosen (worker/render/choose.h), and from 32 and 8 at least. Of fewer than ERRORS_LEAST it would be that of the
@@ -43,7 +47,7 @@ struct tile_error {
 	double base[TILE_SIZE * TILE_SIZE][3],
 		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
 	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
-	bool settled[TILE_SIZE * TILE_SIZE][3];
+	bool settled[TILE_SIZE * TILE_SIZE][3], cancels[TILE_SIZE * TILE_SIZE][3];
 	struct error_sums sum;
 	struct tail tail; /* of the groups' errors that are too bright */
 };
@@ -196,11 +200,28 @@ static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool beli
 	add_share(t, square / divisor, brightness, square, divisor);
 }
 
+/* Each brightness that the pixel may have, by the normal law, weighs its error. */
+static void settle_cancelling(struct tile_error *t, size_t pixel, size_t k)
+{
+	double square = t->square[pixel][k];
+	struct inverse_square weight =
+		inverse_square_expect(t->brightness[pixel][k], sqrt(square), sqrt(t->floor_square));
+	double part = square * weight.mean;
+	float *apart = apart_at(t, pixel) + k * t->groups, root = (float)sqrt(weight.mean);
+	add_bounds(t, pixel, k, part, part);
+	for (uint32_t g = 0; g < t->groups; g++)
+		apart[g] *= root;
+	t->sum.share += part;
+	t->sum.doubt += square * square * weight.variance;
+}
+
 static void settle_pixels(struct tile_error *t, size_t first, size_t count)
 {
 	for (size_t pixel = first; pixel < first + count; pixel++)
 		for (size_t k = 0; k < 3; k++)
-			if (t->settled[pixel][k])
+			if (t->cancels[pixel][k])
+				settle_cancelling(t, pixel, k);
+			else if (t->settled[pixel][k])
 				settle_pixel(t, pixel, k, true);
 }
 
@@ -217,6 +238,28 @@ static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, s
 	return sum / n;
 }
 
+/*
+ * A channel that is next to nothing because colours cancel in it, the blue of gold: the pixel's light is well known,
+ * and this channel of it comes out positive in some groups and negative in others. It is no darker or brighter than its
+ * neighbours for want of samples, and their mean, in which signs differ, is not its brightness.
+ */
+static bool cancels(const struct tile_error *t, size_t pixel, size_t k)
+{
+	const double *b = t->brightness[pixel];
+	size_t most = fabs(b[1]) > fabs(b[0]) ? 1 : 0;
+	most = fabs(b[2]) > fabs(b[most]) ? 2 : most;
+	if (t->groups < BASE_GROUPS || !(fabs(b[k]) < cancelled * fabs(b[most])) ||
+	    !believe(b[most], t->square[pixel][most], t->floor_square))
+		return false;
+	const float *apart = apart_at(t, pixel) + k * t->groups;
+	uint32_t above = 0, below = 0;
+	for (uint32_t g = 0; g < t->groups; g++) {
+		above += b[k] + (double)apart[g] > 0;
+		below += b[k] + (double)apart[g] < 0;
+	}
+	return above >= t->groups / 8 && below >= t->groups / 8;
+}
+
 /* A pixel keeps its own brightness where its neighbourhood is believed: by itself alone, those that came out bright
  * would keep it and those that came out dark would not. Or where it is out of doubt, whatever is beside it. */
 static uint32_t find_settled(struct tile_error *t)
@@ -228,6 +271,8 @@ static uint32_t find_settled(struct tile_error *t)
 				size_t p = (size_t)y * t->width + x;
 				t->settled[p][k] = believe(t->brightness[p][k], 8 * t->square[p][k], t->floor_square) ||
 						   noise_around(t, x, y, k) <= believed;
+				t->cancels[p][k] = !t->settled[p][k] && cancels(t, p, k);
+				t->settled[p][k] |= t->cancels[p][k];
 				waiting += !t->settled[p][k];
 			}
 	return waiting;

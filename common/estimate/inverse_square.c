@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * With B = f sinh u, dB / (B^2 + f^2) = du / (f cosh u): what is integrated is smooth however small the floor f is, and
+ * the trapezoidal rule converges exponentially.
+ */
+#include "common/estimate/inverse_square.h"
+
+#include <math.h>
+
+struct inverse_square inverse_square_expect(double brightness, double error, double floor)
+{
+	static const double reach = 6; /* standard errors */
+	double f = floor / error, b = brightness / error;
+	double first = asinh((b - reach) / f), last = asinh((b + reach) / f);
+	/* Half a standard deviation where the law is narrower than the weight. */
+	double most = fmin(0.25, 0.5 / sqrt(b * b + f * f)), steps = ceil((last - first) / most);
+	double h = (last - first) / steps, up = exp(first), ratio = exp(h), one = 0, two = 0;
+	for (double i = 0; i <= steps; i++, up *= ratio) {
+		double down = 1 / up, apart = f * (up - down) / 2 - b, secant = 2 / (up + down);
+		double law = exp(-apart * apart / 2) * secant;
+		one += law;
+		two += law * secant * secant;
+	}
+	double scale = h / sqrt(2 * M_PI) / (error * error);
+	double mean = scale * one / f, square = scale * two / (f * f * f) / (error * error);
+	return (struct inverse_square){mean, fmax(0, square - mean * mean)};
+}
