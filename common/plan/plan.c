@@ -18,10 +18,13 @@ typedef unsigned __int128 wide;
 
 enum {
 	DEFAULT_GROUPS = 16,
+	LEAST_GROUPS = 4,
 	DEFAULT_PARTS = 4,
 	DEFAULT_CHAINS = 1024,
 	DEFAULT_BOOTSTRAP = 1000000,
 	LEAST_BOOTSTRAP = 16384,
+	LEAST_BOOTSTRAP_SLOW = 256, /* what takes thousands of rays joins as many vertices: it finds light if any is */
+	LEAST_CHAINS = 16,
 	MUTATIONS_PER_CHAIN = 2048, /* fewer chains before chains become shorter than this */
 	AIM_ROUNDS = 8,
 	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
@@ -30,6 +33,8 @@ enum {
 	LEASE_SECONDS = 20,	      /* of one thread */
 	LEASE_SAMPLES_SLOW = 1 << 15, /* fewer take no longer than that in any scene that was seen */
 	SPEED_UNKNOWN = 50000,	      /* mutations or samples a second, where no pilot said it */
+	RAYS_A_SECOND = 2000000,      /* of one thread: 1.5 to 3.5 million in the scenes of tests/bench */
+	RAYS_USUAL = 8,		      /* of a mutation or a sample, at most */
 	PIXEL_BYTES = 12,	      /* of a tile on the wire */
 	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
 	STREAM_RESAMPLING = 5,	      /* RNG_RESAMPLING of the renderer's random numbers */
@@ -148,14 +153,39 @@ static uint32_t power_of_two_below(uint64_t x)
 	return p;
 }
 
+bool plan_wants_rays(const struct plan_request *r)
+{
+	bool asked = r->bootstrap && r->epoch && (r->chains || r->kind == PLAN_SAMPLES);
+	bool counted = r->spp || r->mutations;
+	return !asked && (!counted || r->seconds > 0 || r->target_error > 0);
+}
+
+/* Of one thread in so many seconds; 2^62: no rays were counted. */
+static uint64_t bootstrap_room(const struct plan_request *r, double seconds)
+{
+	return r->rays.bootstrap > 0 ? (uint64_t)fmin(seconds * RAYS_A_SECOND / r->rays.bootstrap, 0x1p62) : 1ull << 62;
+}
+
+uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds)
+{
+	return clamp(bootstrap_room(r, seconds), LEAST_BOOTSTRAP_SLOW, PLAN_MAX_BOOTSTRAP / 2);
+}
+
+/* How many times as long a mutation or a sample takes as a usual one. */
+static double slowness(const struct plan_request *r)
+{
+	return fmax(1, r->rays.step / RAYS_USUAL);
+}
+
 /* Mutations in a lease of a plan that time or an error ends: 32 a pixel and round, as far as 64 leases go. A lease's
  * tiles cost about 20 ns a pixel of the crop to sum, send and add, which is 2 % of half a mutation a pixel; fewer than
- * 2^13 would not be worth sending. */
-static uint64_t open_lease(const struct plan *p)
+ * 2^13 would not be worth sending, fewer of slow ones in proportion. */
+static uint64_t open_lease(const struct plan_request *r, const struct plan *p)
 {
 	uint64_t leases = (uint64_t)p->groups * p->parts, per_pixel = crop_pixels(p) * 32 / leases,
 		 least = crop_pixels(p) / 2;
-	return clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
+	uint64_t lease = clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
+	return (uint64_t)((double)lease / slowness(r));
 }
 
 /* Samples or mutations that a bound on time, or on the error, leaves room for, by cautious guesses, as a plan must not
@@ -163,7 +193,7 @@ static uint64_t open_lease(const struct plan *p)
  * Infinity: no such bound. */
 static double room_in_time(const struct plan_request *r)
 {
-	return r->seconds > 0 ? SPEED_UNKNOWN * r->seconds : INFINITY;
+	return r->seconds > 0 ? SPEED_UNKNOWN / slowness(r) * r->seconds : INFINITY;
 }
 
 static double room_for_error(const struct plan_request *r, const struct plan *p)
@@ -209,14 +239,15 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 		most = (uint64_t)power_of_two_near(LEASE_SECONDS * r->speed / (double)unit);
 		rule = RULE_SECONDS;
 	}
-	uint64_t want =
-		total	 ? (uint64_t)wide_ceil_div(total, (wide)round * AIM_ROUNDS)
-		: chains ? open_lease(p) / unit
-			 : (uint64_t)fmin(fmin(room_in_time(r), room_for_error(r, p)) / ((double)round * AIM_ROUNDS),
-					  (double)usual);
-	*epoch = clamp(want, 1, most);
-	if (want <= most)
-		rule = total ? RULE_ROUNDS : chains || want == usual ? RULE_FILM : RULE_ROOM;
+	double aim = (double)round * AIM_ROUNDS, in_time = room_in_time(r) / aim;
+	double film = (double)(chains ? open_lease(r, p) / unit : usual);
+	double want = chains ? film : fmin(fmin(in_time, room_for_error(r, p) / aim), film);
+	double asked = (double)wide_ceil_div(total, (wide)round * AIM_ROUNDS);
+	if (total)
+		want = fmin(asked, chains ? fmax(in_time, film) : in_time);
+	*epoch = clamp((uint64_t)fmin(want, 0x1p62), 1, most);
+	if (want <= (double)most)
+		rule = total && want == asked ? RULE_ROUNDS : want == film ? RULE_FILM : RULE_ROOM;
 	double seconds = r->bandwidth > 0 ? (double)lease_bytes(p) / r->bandwidth : 0;
 	double least = ceil(seconds * (r->speed > 0 ? r->speed : SPEED_UNKNOWN) / (double)unit);
 	uint64_t all = total ? (uint64_t)wide_ceil_div(total, round) : LEASE_MOST / unit;
@@ -228,13 +259,25 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 	return rule;
 }
 
+/* A round cannot be shorter than a sample a pixel and group. Where not even two threads would be through with it in
+ * time there are fewer groups, but four at least, so that there is an error. */
+static uint32_t usual_groups(const struct plan_request *r, const struct plan *p)
+{
+	if (r->groups)
+		return r->groups;
+	if (p->kind == PLAN_CHAINS || !(r->seconds > 0) || !(r->rays.step > 0))
+		return DEFAULT_GROUPS;
+	double samples = fmin(2.0 * RAYS_A_SECOND * r->seconds / r->rays.step, 0x1p62);
+	return (uint32_t)clamp((uint64_t)samples / plan_extended_pixels(p), LEAST_GROUPS, DEFAULT_GROUPS);
+}
+
 void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size)
 {
 	struct plan q = *p;
 	struct error e;
 	uint64_t total, epoch;
 	if (p->kind == PLAN_SAMPLES)
-		q.groups = r->groups ? r->groups : DEFAULT_GROUPS;
+		q.groups = usual_groups(r, p);
 	enum epoch_rule rule = asked_total(r, p, &total, &e) ? RULE_ASKED : choose_epoch(r, &q, total, &epoch);
 	const char *thing = p->kind == PLAN_CHAINS ? "mutations" : "samples";
 	if (rule == RULE_ROUNDS)
@@ -268,8 +311,13 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 	p->groups = r->groups ? r->groups : DEFAULT_GROUPS;
 	uint64_t chains = r->chains;
 	if (!chains)
-		chains = total ? power_of_two_below(clamp(total / MUTATIONS_PER_CHAIN, 16, DEFAULT_CHAINS))
+		chains = total ? power_of_two_below(clamp(total / MUTATIONS_PER_CHAIN, LEAST_CHAINS, DEFAULT_CHAINS))
 			       : DEFAULT_CHAINS;
+	if (!r->chains && r->seconds > 0) {
+		uint64_t starts = bootstrap_room(r, r->seconds / 8);
+		if (starts < chains)
+			chains = power_of_two_below(clamp(starts, LEAST_CHAINS, DEFAULT_CHAINS));
+	}
 	uint64_t per_group = ceil_div(chains, p->groups);
 	p->parts = r->parts ? r->parts : (uint32_t)clamp(per_group, 1, DEFAULT_PARTS);
 	if (r->parts && r->chains && (chains % p->groups || per_group % p->parts))
@@ -290,11 +338,12 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 static int make_samples(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
 	uint64_t rows = (uint64_t)p->crop_height + 2 * (uint64_t)p->border;
-	uint64_t groups = r->groups ? r->groups : DEFAULT_GROUPS;
+	uint64_t groups = usual_groups(r, p),
+		 parts = r->groups ? DEFAULT_PARTS : DEFAULT_PARTS * DEFAULT_GROUPS / groups;
 	if (r->parts > rows)
 		return error_set(e, EINVAL, "%llu rows cannot be cut into %u parts", (unsigned long long)rows,
 				 r->parts);
-	p->parts = r->parts ? r->parts : (uint32_t)clamp(rows, 1, DEFAULT_PARTS);
+	p->parts = r->parts ? r->parts : (uint32_t)clamp(rows, 1, parts);
 	uint64_t spp = ceil_div(total, crop_pixels(p)); /* 0: no bound */
 	p->groups = (uint32_t)groups;
 	choose_epoch(r, p, total, &p->epoch);
@@ -317,16 +366,20 @@ static int make_samples(const struct plan_request *r, struct plan *p, uint64_t t
 
 static int make_bootstrap(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
-	uint64_t n = r->bootstrap;
+	uint64_t n = r->bootstrap, leases = (uint64_t)p->groups * p->parts;
 	double expected = fmin(total ? (double)total : INFINITY, room_in_time(r));
 	if (!n && p->kind == PLAN_SAMPLES)
 		n = LEAST_BOOTSTRAP;
 	else if (!n)
 		n = clamp((uint64_t)fmin(expected / 8, DEFAULT_BOOTSTRAP), LEAST_BOOTSTRAP, DEFAULT_BOOTSTRAP);
+	if (!r->bootstrap && (r->seconds > 0 || r->target_error > 0)) {
+		uint64_t room =
+			plan_bootstrap_room(r, r->seconds > 0 ? r->seconds / 4 : LEASE_SECONDS * (double)leases);
+		n = n < room ? n : room;
+	}
 	if (n > PLAN_MAX_BOOTSTRAP / 2)
 		return error_set(e, EINVAL, "%llu bootstrap samples; at most %d", (unsigned long long)n,
 				 PLAN_MAX_BOOTSTRAP / 2);
-	uint64_t leases = (uint64_t)p->groups * p->parts;
 	p->bootstrap = ceil_div(n, leases) * leases;
 	return 0;
 }

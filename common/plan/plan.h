@@ -39,6 +39,11 @@ enum {
 	PLAN_EFFECTS_MAX = 256,
 };
 
+/* Rays that a pilot counted (worker/render/rays.h), the same on every machine; 0: none were. */
+struct plan_rays {
+	double bootstrap, step; /* a bootstrap sample; a mutation, or a sample */
+};
+
 struct plan_request {
 	char integrator[16];
 	enum plan_kind kind;
@@ -55,6 +60,7 @@ struct plan_request {
 	uint32_t parts;		       /* leases of a group in a round; 0: by the rule */
 	uint64_t bootstrap, epoch;     /* 0: by the rule; epoch: mutations per chain or samples per pixel and group */
 	double speed; /* mutations or samples a second of one thread, by a pilot: bounds a lease's time; 0: not known */
+	struct plan_rays rays; /* where time or an error ends the job: what these leave room for */
 	double bandwidth; /* bytes of tiles a second that one thread may send, a setting of the coordinator; 0: any */
 	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
@@ -85,7 +91,8 @@ struct plan {
 /* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 /*
- * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds. Without one a round
+ * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds,
+ * or more where a time leaves room for less than these in an eighth of it. Without such a bound a round
  * of chains has 32 mutations a pixel, and one of samples is an eighth of what a bound on time or error leaves room for
  * (at 50,000 samples a second, and 1/E^2 samples a pixel for an error of E), so that it is noticed when it is met; no
  * lease has more than a million mutations, or, where the pilot's speed is known, takes about 20 s of one thread at most
@@ -94,6 +101,16 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
  */
 /* A pilot would tell something: a lease might take longer than that. */
 bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
+/*
+ * What a time leaves room for, by counted rays of which a thread traces two million a second. Nobody having asked for
+ * it, the bootstrap takes at most a quarter of the time of one thread, and the starts of chains, each as much work as a
+ * bootstrap sample, an eighth; where a mutation or a sample takes more than 8 rays, the rounds of a plan without a
+ * bound on these are shorter in proportion. Without a time no lease of the bootstrap takes more than about 20 s.
+ */
+bool plan_wants_rays(const struct plan_request *r);
+/* Bootstrap samples in so many seconds of one thread, at least 256; the most there may be where no rays were counted.
+ */
+uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds);
 /* Every plan from the wire passes here before it is believed. */
 int plan_check(const struct plan *p, struct error *e);
 /* By which rule plan_make chose the length of an epoch; empty: it was asked for. */

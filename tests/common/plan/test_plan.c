@@ -166,6 +166,11 @@ static bool ends_with_rule(const struct plan_request *r, const char *words)
 	return *words ? strstr(text, words) != NULL : !*text;
 }
 
+static uint64_t round_of(struct plan p)
+{
+	return plan_round_mutations(&p);
+}
+
 static uint64_t lease_work(const struct plan *p)
 {
 	return plan_round_mutations(p) / (p->groups * p->parts);
@@ -200,8 +205,31 @@ static void samples_notice_time_and_error(void **state)
 	assert_int_equal(made(&r).epoch, 19);
 	r.seconds = 1; /* the nearer bound counts */
 	assert_int_equal(made(&r).epoch, 1);
-	r.spp = 1 << 20; /* a number of samples has its own rule, whatever else bounds the job */
-	assert_true(made(&r).epoch > 400);
+	r.spp = 1 << 20; /* a number of samples that does not fit into the time changes nothing */
+	assert_int_equal(made(&r).epoch, 1);
+	r.seconds = 1e6; /* one that does has its own rule, whatever error is asked for */
+	assert_true(made(&r).epoch > 400 && ends_with_rule(&r, "in a lease"));
+}
+
+/* The same with chains: as much as without the number, or as an eighth of the time has room for. */
+static void a_time_also_ends_what_is_counted(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS, "");
+	r.spp = 0;
+	r.seconds = 2;
+	uint64_t open = round_of(made(&r));
+	r.spp = 1 << 20;
+	assert_int_equal(round_of(made(&r)), open);
+	assert_true(ends_with_rule(&r, "size of the film"));
+	r.seconds = 2000;
+	uint64_t longer = round_of(made(&r));
+	assert_true(longer > open && (double)longer <= 50000.0 * r.seconds / 8);
+	assert_true(ends_with_rule(&r, "in the time"));
+	r.seconds = 1e6;
+	assert_true(ends_with_rule(&r, "in a lease"));
+	r.spp = 16;
+	assert_true(ends_with_rule(&r, "for 8 rounds"));
 }
 
 /* The bootstrap of a short render is no more than a part of it. */
@@ -222,6 +250,115 @@ static void a_bootstrap_follows_the_time(void **state)
 	r.spp = 1 << 20;
 	r.seconds = 5;
 	assert_int_equal(made(&r).bootstrap, 31296);
+}
+
+/* Of a scene whose samples take many rays. */
+static struct plan slow(enum plan_kind kind, double seconds, double bootstrap_rays, double step_rays)
+{
+	struct plan_request r = request(kind, "");
+	r.width = 64;
+	r.height = 64;
+	r.spp = 0;
+	r.seconds = seconds;
+	r.target_error = seconds > 0 ? 0 : 0.02;
+	r.rays = (struct plan_rays){bootstrap_rays, step_rays};
+	return made(&r);
+}
+
+/* At two million rays a second: a quarter of the time for the bootstrap and an eighth for the starts of chains, but for
+ * the least of both. Usual scenes are not touched. */
+static void a_slow_bootstrap_is_short(void **state)
+{
+	(void)state;
+	for (double rays = 1; rays < 1e6; rays *= 1.9)
+		for (double seconds = 0.25; seconds < 1e5; seconds *= 2.3) {
+			struct plan p = slow(PLAN_CHAINS, seconds, rays, 1), usual = slow(PLAN_CHAINS, seconds, 0, 0);
+			double room = 2e6 * seconds / rays;
+			assert_true((double)p.bootstrap <= fmax(256, room / 4 + p.groups * p.parts));
+			assert_true((double)p.chains <= fmax(16, room / 8));
+			assert_true(p.bootstrap >= 256 && p.chains >= 16);
+			assert_true(p.bootstrap <= usual.bootstrap && p.chains <= usual.chains);
+			assert_true(room / 4 < (double)usual.bootstrap || p.bootstrap == usual.bootstrap);
+			assert_true(room / 8 < (double)usual.chains || p.chains == usual.chains);
+			struct plan samples = slow(PLAN_SAMPLES, seconds, rays, 1);
+			assert_true((double)samples.bootstrap <= fmax(256, room / 4 + 64) && samples.bootstrap >= 256);
+		}
+	assert_int_equal(slow(PLAN_CHAINS, 0, 1e4, 1).bootstrap, 64 * 4000); /* 20 s a lease */
+	assert_int_equal(slow(PLAN_CHAINS, 0, 1, 1).bootstrap, 1000000);
+	struct plan_request r = request(PLAN_CHAINS, "");
+	r.seconds = 2;
+	r.rays = (struct plan_rays){1e5, 1};
+	r.bootstrap = 64000; /* what is asked for stays */
+	r.chains = 512;
+	assert_int_equal(made(&r).bootstrap, 64000);
+	assert_int_equal(made(&r).chains, 512);
+	assert_int_equal(plan_bootstrap_room(&r, 100), 2000);
+	assert_int_equal(plan_bootstrap_room(&r, 1), 256);
+}
+
+/* In proportion to the rays of a mutation, eight of which are usual; of samples by the room that the time has. */
+static void slow_rounds_are_short(void **state)
+{
+	(void)state;
+	uint64_t usual = round_of(slow(PLAN_CHAINS, 2, 1, 8));
+	assert_int_equal(usual, round_of(slow(PLAN_CHAINS, 2, 0, 0)));
+	for (double rays = 8; rays < 2000; rays *= 1.7) {
+		struct plan p = slow(PLAN_CHAINS, 2, 1, rays);
+		double round = (double)plan_round_mutations(&p);
+		assert_true(round * rays <= 8 * (double)usual && (round + p.chains) * rays > 8 * (double)usual);
+	}
+	uint64_t many = slow(PLAN_SAMPLES, 1000, 1, 8).epoch;
+	assert_true(many >= 80);
+	assert_int_equal(slow(PLAN_SAMPLES, 1000, 1, 80).epoch, many / 10);
+}
+
+/* A round of sixteen samples a pixel that two threads need longer for than there is time has fewer groups, and as many
+ * leases. */
+static void a_round_fits_into_the_time(void **state)
+{
+	(void)state;
+	struct plan usual = slow(PLAN_SAMPLES, 2, 1, 10), p = slow(PLAN_SAMPLES, 2, 1, 200);
+	assert_int_equal(usual.groups, 16);
+	assert_int_equal(usual.parts, 4);
+	assert_int_equal(p.groups, 9); /* 40,000 samples, 4,096 pixels */
+	assert_int_equal(p.parts, 7);
+	assert_int_equal(slow(PLAN_SAMPLES, 2, 1, 1e5).groups, 4);
+	assert_int_equal(slow(PLAN_SAMPLES, 2, 1, 1e5).parts, 16);
+	assert_int_equal(slow(PLAN_SAMPLES, 0, 1, 1e5).groups, 16);
+	assert_int_equal(slow(PLAN_CHAINS, 2, 1, 1e5).groups, 16);
+	struct plan_request r = request(PLAN_SAMPLES, "");
+	char text[PLAN_TEXT];
+	r.spp = 0;
+	r.seconds = 2;
+	r.rays = (struct plan_rays){1, 1e5};
+	p = made(&r);
+	plan_options(&p, 1, text, sizeof text);
+	assert_non_null(strstr(text, " --groups 4 --parts 16 "));
+	r.groups = 12;
+	assert_int_equal(made(&r).groups, 12);
+	assert_int_equal(made(&r).parts, 4);
+}
+
+/* Where a time or an error ends a job that leaves something to be found out. */
+static void rays_are_counted_where_time_counts(void **state)
+{
+	(void)state;
+	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
+		struct plan_request r = request((enum plan_kind)kind, "");
+		assert_false(plan_wants_rays(&r));
+		r.seconds = 1;
+		assert_true(plan_wants_rays(&r));
+		r.seconds = 0;
+		r.target_error = 0.1;
+		assert_true(plan_wants_rays(&r));
+		r.bootstrap = r.epoch = 64;
+		assert_int_equal(plan_wants_rays(&r), kind == PLAN_CHAINS);
+		r.chains = 64;
+		assert_false(plan_wants_rays(&r));
+		r.target_error = 0;
+		r.spp = r.bootstrap = 0;
+		assert_true(plan_wants_rays(&r)); /* an estimate's */
+	}
 }
 
 /* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, defaults are not mentioned.
@@ -433,7 +570,12 @@ int main(void)
 		cmocka_unit_test(entries_are_counted_and_named),
 		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
 		cmocka_unit_test(samples_notice_time_and_error),
+		cmocka_unit_test(a_time_also_ends_what_is_counted),
 		cmocka_unit_test(a_bootstrap_follows_the_time),
+		cmocka_unit_test(a_slow_bootstrap_is_short),
+		cmocka_unit_test(slow_rounds_are_short),
+		cmocka_unit_test(a_round_fits_into_the_time),
+		cmocka_unit_test(rays_are_counted_where_time_counts),
 		cmocka_unit_test(parts_are_asked_for),
 		cmocka_unit_test(leases_take_twenty_seconds),
 		cmocka_unit_test(short_jobs_ask_for_no_pilot),
