@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 9 };
+enum { FARM_VERSION = 10 };
 
 struct envelope_block;
 

@@ -122,6 +122,8 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	out->groups = r->groups;
 	out->parts = r->parts;
 	out->speed = r->speed;
+	out->bootstrap_rays = r->rays.bootstrap;
+	out->step_rays = r->rays.step;
 	out->bootstrap = r->bootstrap;
 	out->epoch = r->epoch;
 	out->mixture = text_borrow(r->mixture);
@@ -143,6 +145,8 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 		rc = text_from_wire(m->effects, r->effects, sizeof r->effects, e);
 	if (!rc && !(m->speed >= 0 && m->speed < 1e15))
 		rc = error_set(e, EBADMSG, "a pilot of %g a second", m->speed);
+	if (!rc && !(m->bootstrap_rays >= 0 && m->bootstrap_rays < 1e15 && m->step_rays >= 0 && m->step_rays < 1e15))
+		rc = error_set(e, EBADMSG, "a pilot of %g and %g rays", m->bootstrap_rays, m->step_rays);
 	if (rc)
 		return rc;
 	r->width = m->width;
@@ -163,6 +167,7 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 	r->groups = m->groups;
 	r->parts = m->parts;
 	r->speed = m->speed;
+	r->rays = (struct plan_rays){m->bootstrap_rays, m->step_rays};
 	r->bootstrap = m->bootstrap;
 	r->epoch = m->epoch;
 	return 0;

@@ -383,7 +383,8 @@ static void plans_travel(void **state)
 				       .accuracy = "tolerance=1e-05",
 				       .effects = "all",
 				       .parts = 64,
-				       .speed = 31000.5},
+				       .speed = 31000.5,
+				       .rays = {8123.25, 88.5}},
 			    again;
 	Farm__PlanRequest rm;
 	plan_request_to_wire(&request, &rm);
@@ -392,6 +393,14 @@ static void plans_travel(void **state)
 	rm.speed = -1;
 	assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
 	rm.speed = 0;
+	for (int i = 0; i < 2; i++) {
+		const double bad[] = {-1, INFINITY, NAN};
+		for (int k = 0; k < 3; k++) {
+			*(i ? &rm.step_rays : &rm.bootstrap_rays) = bad[k];
+			assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
+		}
+		*(i ? &rm.step_rays : &rm.bootstrap_rays) = 0;
+	}
 	char long_text[PLAN_ACCURACY_MAX + 1] = "";
 	memset(long_text, 'a', PLAN_ACCURACY_MAX);
 	plan_to_wire(&p, &m);

@@ -3,15 +3,13 @@
 
 #include "common/base/clock.h"
 #include "common/json/forecast_json.h"
+#include "worker/render/rays.h"
 #include "worker/render/scene/scene.h"
 
 #include <stdio.h>
 
-int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
+static int choose(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
 {
-	*out = (struct choice){.made = integrator_is_open(&a->plan)};
-	if (!out->made)
-		return 0;
 	double begin = clock_seconds();
 	int rc = render_choose(w, &a->plan, &out->found, e);
 	out->seconds = clock_seconds() - begin;
@@ -20,12 +18,19 @@ int choice_in_world(const struct world *w, struct render_arguments *a, struct ch
 	return rc;
 }
 
+int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
+{
+	*out = (struct choice){.made = integrator_is_open(&a->plan)};
+	int rc = out->made ? choose(w, a, out, e) : 0;
+	return !rc && plan_wants_rays(&a->plan) ? render_count_rays(w, &a->plan, &a->plan.rays, e) : rc;
+}
+
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e)
 {
 	struct scene scene;
 	struct world *w;
 	*out = (struct choice){.made = false};
-	if (!integrator_is_open(&a->plan))
+	if (!integrator_is_open(&a->plan) && !plan_wants_rays(&a->plan))
 		return 0;
 	struct asset_folders folders = option_folders(a, folder);
 	struct asset_source assets = asset_search(&folders);

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The choice of the integrator (worker/render/choose.h) where it is left to the scene. */
+/*
+ * What is found out about a scene before a plan is made of it: the integrator (worker/render/choose.h) where that is
+ * left to the scene, and how many rays its samples take (worker/render/rays.h) where a time or an error ends the
+ * render.
+ */
 #ifndef WORKER_CLI_RENDER_CHOICE_H
 #define WORKER_CLI_RENDER_CHOICE_H
 
@@ -15,7 +19,7 @@ struct choice {
 	char text[512]; /* one line, for people */
 };
 
-/* a: complete but for what is chosen. Where nothing is to be chosen no world is built for it. */
+/* a: complete but for what is chosen and counted. Where that is nothing no world is built for it. */
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e);
 /* The same in a world that is there. */
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);

@@ -13,6 +13,7 @@ enum {
 };
 static const double out_of_reach = 1e-9;
 static const double bootstrap_share = 0.25; /* of a pilot, at most */
+static const double probe_seconds = 1;	    /* of a thread, for its bootstrap, where samples take many rays */
 
 int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
 {
@@ -49,7 +50,10 @@ int pilot_render_plan(const struct plan_request *request, struct plan *render, s
 bool pilot_probe(const struct plan_request *request, const struct plan *render, struct plan_request *probe)
 {
 	*probe = open_ended(request, render);
-	probe->bootstrap = render->bootstrap < PROBE_BOOTSTRAP ? render->bootstrap : PROBE_BOOTSTRAP;
+	uint64_t room = plan_bootstrap_room(request, probe_seconds);
+	probe->bootstrap = room < PROBE_BOOTSTRAP ? room : PROBE_BOOTSTRAP;
+	if (render->bootstrap < probe->bootstrap)
+		probe->bootstrap = render->bootstrap;
 	probe->epoch = 1;
 	if (render->kind == PLAN_CHAINS) {
 		probe->epoch = PROBE_EPOCH;
@@ -71,7 +75,7 @@ void pilot_request(const struct plan_request *request, const struct plan *render
 		return;
 	double sample = cost->bootstrap / (double)probe->bootstrap, most = bootstrap_share * seconds / sample;
 	if (most < (double)pilot->bootstrap)
-		pilot->bootstrap = (uint64_t)fmax(PROBE_BOOTSTRAP, most);
+		pilot->bootstrap = (uint64_t)fmax((double)probe->bootstrap, most);
 	double left = fmax(seconds - sample * (double)pilot->bootstrap, seconds / 4);
 	double epochs = left / PILOT_ROUNDS / cost->rounds;
 	double longest = (double)render->epoch / (double)probe->epoch; /* not longer than the render's own */

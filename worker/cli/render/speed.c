@@ -2,6 +2,7 @@
 #include "worker/cli/render/speed.h"
 
 #include "worker/cli/render/local.h"
+#include "worker/render/rays.h"
 #include "worker/render/scene/scene.h"
 
 #include <math.h>
@@ -32,7 +33,6 @@ static struct plan_request pilot_of(const struct render_arguments *a)
 	r.spp = r.mutations = 0;
 	r.seconds = r.target_error = r.bandwidth = 0;
 	r.groups = r.parts = 1;
-	r.bootstrap = BOOTSTRAP;
 	r.chains = r.kind == PLAN_CHAINS ? CHAINS : 0;
 	return r;
 }
@@ -41,6 +41,11 @@ static struct plan_request pilot_of(const struct render_arguments *a)
 static int measure_speed(const struct world *w, struct plan_request *r, double *speed, struct error *e)
 {
 	static const atomic_bool never;
+	int counted = r->rays.bootstrap > 0 ? 0 : render_count_rays(w, r, &r->rays, e);
+	if (counted)
+		return counted;
+	uint64_t room = plan_bootstrap_room(r, enough_seconds);
+	r->bootstrap = room < BOOTSTRAP ? room : BOOTSTRAP;
 	for (r->epoch = r->kind == PLAN_CHAINS ? FIRST_EPOCH : 1;; r->epoch *= 8) {
 		struct plan p;
 		r->mutations = r->kind == PLAN_CHAINS ? CHAINS * r->epoch : r->epoch * r->width * r->height;

@@ -43,6 +43,24 @@ static void pilots_of_chains(void **state)
 	}
 }
 
+/* 8,000 rays a bootstrap sample, 4 ms: neither a probe nor a pilot of a minute begins with minutes of them. */
+static void slow_bootstraps_are_short(void **state)
+{
+	(void)state;
+	struct plan_request request = request_of(PLAN_CHAINS, 100), probe, pilot;
+	struct plan render, plan;
+	struct error e;
+	request.rays = (struct plan_rays){8000, 90};
+	assert_int_equal(pilot_render_plan(&request, &render, &e), 0);
+	assert_true(pilot_probe(&request, &render, &probe));
+	assert_int_equal(plan_make(&probe, &plan, &e), 0);
+	assert_int_equal(plan.bootstrap, 256);
+	struct pilot_cost cost = {0.004 * 256, 1};
+	pilot_request(&request, &render, &probe, &cost, 60, &pilot);
+	assert_int_equal(plan_make(&pilot, &plan, &e), 0);
+	assert_true(0.004 * (double)plan.bootstrap <= 60 * 0.26 && plan.bootstrap >= 3000);
+}
+
 static void pilots_of_samples(void **state)
 {
 	(void)state;
@@ -64,6 +82,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(pilots_of_chains),
+		cmocka_unit_test(slow_bootstraps_are_short),
 		cmocka_unit_test(pilots_of_samples),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

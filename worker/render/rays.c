@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A group at a time: a short lease of the bootstrap, then one of a single chain that begins at one of its samples.
+ * The start of a chain is as much work as a bootstrap sample, so what counts is its second epoch. Samples are as much
+ * work as those of their bootstrap.
+ *
+ * Failures: of a lease; what was counted is lost.
+ */
+#include "worker/render/rays.h"
+
+#include <string.h>
+
+enum {
+	GROUPS = PLAN_MAX_GROUPS,
+	SAMPLES = 16, /* of a group's bootstrap: one of them also looks for paths that are too long */
+	MUTATIONS = 32,
+	ENOUGH = 1 << 18, /* rays, of bootstrap samples as of mutations */
+	LEAST_GROUPS = 2,
+};
+
+struct counted {
+	double rays, steps;
+};
+
+struct counter {
+	const struct world *w;
+	struct plan plan;
+	struct counted bootstrap, chain;
+	struct error *e;
+};
+
+/* Random numbers that the render does not draw: what is counted must not decide how often the same is drawn again. */
+static int make_plan(const struct plan_request *r, struct plan *p, struct error *e)
+{
+	struct plan_request q = *r;
+	q.seed = ~r->seed;
+	q.spp = 0;
+	q.mutations = 1;
+	q.seconds = q.target_error = q.speed = q.bandwidth = 0;
+	q.groups = GROUPS;
+	q.parts = 1;
+	q.chains = r->kind == PLAN_CHAINS ? GROUPS : 0;
+	q.bootstrap = (uint64_t)GROUPS * SAMPLES;
+	q.epoch = r->kind == PLAN_CHAINS ? MUTATIONS : 1;
+	return plan_make(&q, p, e);
+}
+
+static void add(struct counted *c, const struct batch *b)
+{
+	c->rays += (double)(b->counters[COUNT_RAYS_CLOSEST] + b->counters[COUNT_RAYS_SHADOW]);
+	c->steps += (double)b->counters[COUNT_SAMPLES];
+}
+
+static int run(struct counter *c, enum lease_kind kind, uint32_t group, uint64_t epoch, const struct lease_input *in,
+	       struct batch *b)
+{
+	const struct lease_key k = {.kind = kind, .group = group, .epoch = epoch};
+	enum lease_end end;
+	return render_lease(c->w, &c->plan, &k, in, NULL, &end, b, c->e);
+}
+
+static int count_chain(struct counter *c, uint32_t group, uint64_t seed)
+{
+	struct lease_input in = {.chain_count = 1, .seeds = &seed};
+	struct batch first, second;
+	int rc = run(c, LEASE_RENDER, group, 0, &in, &first);
+	if (rc)
+		return rc;
+	in = (struct lease_input){.chain_count = 1, .states = first.states};
+	rc = run(c, LEASE_RENDER, group, 1, &in, &second);
+	batch_fini(&first);
+	if (rc)
+		return rc;
+	add(&c->chain, &second);
+	batch_fini(&second);
+	return 0;
+}
+
+static int count_group(struct counter *c, uint32_t group)
+{
+	struct batch b;
+	uint64_t seed;
+	int rc = run(c, LEASE_BOOTSTRAP, group, 0, NULL, &b);
+	if (rc)
+		return rc;
+	add(&c->bootstrap, &b);
+	bool lit =
+		plan_resample(&c->plan, group, b.weights, b.weight_count, plan_resample_u(&c->plan, group), 1, &seed);
+	batch_fini(&b);
+	if (c->plan.kind != PLAN_CHAINS || !lit || c->chain.rays >= ENOUGH)
+		return 0;
+	return count_chain(c, group, seed);
+}
+
+int render_count_rays(const struct world *w, const struct plan_request *r, struct plan_rays *out, struct error *e)
+{
+	struct counter c = {.w = w, .e = e};
+	int rc = make_plan(r, &c.plan, e);
+	*out = (struct plan_rays){0, 0};
+	for (uint32_t g = 0; !rc && g < GROUPS && (g < LEAST_GROUPS || c.bootstrap.rays < ENOUGH); g++)
+		rc = count_group(&c, g);
+	if (rc)
+		return rc;
+	out->bootstrap = c.bootstrap.rays / c.bootstrap.steps;
+	out->step = c.chain.steps > 0 ? c.chain.rays / c.chain.steps : out->bootstrap;
+	return 0;
+}
