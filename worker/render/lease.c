@@ -38,7 +38,7 @@ struct job {
 	uint64_t sequence, index; /* where it is: row and column, or chain and mutation; of a bootstrap the sample */
 };
 
-enum { STOP_INTERVAL = 256 };  /* samples between looks at the stop flag */
+enum { STOP_INTERVAL = 16 };   /* samples between looks at the stop flag; one may take 10 ms */
 enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths that are too long to simulate */
 
 const char *render_numeric_version(void)
@@ -84,7 +84,7 @@ static uint64_t pixel_index(const struct film_window *w, uint64_t column, uint64
 	return y << 32 | x;
 }
 
-static void sample_pixel(struct job *j, uint64_t column, uint64_t row)
+static enum lease_end sample_pixel(struct job *j, uint64_t column, uint64_t row)
 {
 	const struct plan *p = j->plan;
 	const struct film_window *w = &j->context.window;
@@ -94,6 +94,8 @@ static void sample_pixel(struct job *j, uint64_t column, uint64_t row)
 				  .width = 1 / w->width,
 				  .height = 1 / w->height};
 	for (uint64_t i = 0; i < p->epoch; i++) {
+		if (j->out->counters[COUNT_SAMPLES] % STOP_INTERVAL == 0 && stopped(j))
+			return LEASE_STOPPED;
 		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel_index(w, column, row), j->key->group,
 				   j->key->epoch * p->epoch + i);
 		s.sobol.base.block = pixel_block;
@@ -102,9 +104,10 @@ static void sample_pixel(struct job *j, uint64_t column, uint64_t row)
 			film_sums_splat(&j->film, &j->sample.splats[k], 1 / area);
 		j->out->independent_sum += j->sample.intensity;
 		j->out->independent_square += j->sample.intensity * j->sample.intensity;
+		j->out->counters[COUNT_SAMPLES]++;
 	}
-	j->out->counters[COUNT_SAMPLES] += p->epoch;
 	j->out->counters[COUNT_INDEPENDENT] += p->epoch;
+	return LEASE_DONE;
 }
 
 static enum lease_end run_samples(struct job *j)
@@ -112,11 +115,10 @@ static enum lease_end run_samples(struct job *j)
 	struct plan_range rows = plan_row_range(j->plan, j->key->part);
 	for (uint64_t row = rows.begin; row < rows.end; row++)
 		for (uint64_t column = 0; column < (uint64_t)j->context.window.width; column++) {
-			if (column % STOP_INTERVAL == 0 && stopped(j))
-				return LEASE_STOPPED;
 			j->sequence = row;
 			j->index = column;
-			sample_pixel(j, column, row);
+			if (sample_pixel(j, column, row) == LEASE_STOPPED)
+				return LEASE_STOPPED;
 		}
 	return LEASE_DONE;
 }
@@ -127,7 +129,7 @@ static enum lease_end run_bootstrap(struct job *j)
 	struct batch *out = j->out;
 	uint32_t longest = j->plan->max_depth < PATH_MAX_EDGES ? j->plan->max_depth : LONGER_EDGES;
 	for (uint64_t i = r.begin; i < r.end; i++) {
-		if (i % STOP_INTERVAL == 0 && stopped(j))
+		if ((i - r.begin) % STOP_INTERVAL == 0 && stopped(j))
 			return LEASE_STOPPED;
 		j->index = i;
 		struct sampler_random s;

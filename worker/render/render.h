@@ -53,7 +53,7 @@ enum lease_end { LEASE_DONE, LEASE_STOPPED };
 
 /* Runs one lease and fills the batch (batch_fini frees it). `stop` may become true at any time: the lease is given up.
  * -ENOMEM, -EILSEQ (states that cannot be gone on from), -EINVAL (plan and world do not fit), -EDOM (an invalid
- * floating-point operation; the sentence says where). Ticks (common/base/liveness.h) at least every 256 samples or
+ * floating-point operation; the sentence says where). Ticks (common/base/liveness.h) at least every 16 samples or
  * mutations. */
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
 		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e);

@@ -3,6 +3,7 @@
  * Leases: results that depend on plan and key alone, in any order; stopping; what comes from outside refused; a crop's
  * pixels; memory that runs out; and the film of one lease.
  */
+#include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
 #include "tests/support/failing_memory.h"
@@ -350,6 +351,35 @@ static void test_stop(void **state)
 	world_free(w);
 }
 
+/* However few pixels there are: a worker whose lease does not tick for long has hung, and one that does not look ends
+ * late. */
+static void test_ticks(void **state)
+{
+	(void)state;
+	enum { TICK = 16 };
+	static atomic_ullong ticks;
+	struct world *w = small_world("box");
+	const char *names[] = {"path", "bdpt", "pssmlt", "hslt"};
+	for (int n = 0; n < 4; n++) {
+		struct plan p = plan_of(w, names[n]);
+		uint64_t seeds[2];
+		find_seeds(w, &p, 1, seeds, 2);
+		p.epoch = p.kind == PLAN_CHAINS ? 256 : 50;
+		struct lease_input in = {2, seeds, NULL};
+		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
+			struct lease_key k = key((enum lease_kind)kind, 1, 0, 0);
+			atomic_store(&ticks, 0);
+			tick_counter = &ticks;
+			struct batch b = run_lease(w, &p, k, p.kind == PLAN_CHAINS ? &in : NULL);
+			tick_counter = NULL;
+			assert_true(b.counters[COUNT_SAMPLES] >= TICK);
+			assert_true(atomic_load(&ticks) >= b.counters[COUNT_SAMPLES] / TICK);
+			batch_fini(&b);
+		}
+	}
+	world_free(w);
+}
+
 static float *film_of(const struct world *w, const struct plan *p)
 {
 	float *film = calloc((size_t)p->width * p->height * 3, sizeof *film);
@@ -567,6 +597,7 @@ int main(void)
 		cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_invalid_operation),
 		cmocka_unit_test(test_stop),
+		cmocka_unit_test(test_ticks),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_borders),
 		cmocka_unit_test(test_kernels),
