@@ -380,7 +380,11 @@ static int follow(const struct arguments *a, FILE *f)
 			code = EXIT_UNREACHABLE;
 			break;
 		}
-		if (strcmp(text_of(o, "type"), "snapshot") == 0) {
+		if (first && strcmp(text_of(o, "type"), "error") == 0) {
+			fprintf(stderr, "hslt-status: %s\n", text_of(o, "text"));
+			code = EXIT_UNREACHABLE;
+			more = false;
+		} else if (strcmp(text_of(o, "type"), "snapshot") == 0) {
 			more = show(a, o, first, &code);
 			first = false;
 		}

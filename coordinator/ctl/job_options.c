@@ -60,8 +60,9 @@ static int take_verb(struct job_options *o, const char *word)
 static int take_job(struct job_options *o, const char *word, struct error *e)
 {
 	char *end;
+	errno = 0;
 	o->job = strtoull(word + (*word == 'j'), &end, 10);
-	if (*end || !o->job || word[*word == 'j'] < '0' || word[*word == 'j'] > '9')
+	if (errno || *end || !o->job || word[*word == 'j'] < '0' || word[*word == 'j'] > '9')
 		return error_set(e, EINVAL, "'%s' is no job: expected something like j12", word);
 	return 0;
 }

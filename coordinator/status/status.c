@@ -283,8 +283,16 @@ static void on_connection(uv_stream_t *listener, int status)
 	r->next = t->readers;
 	t->readers = r;
 	t->reader_count++;
-	if (uv_accept(listener, (uv_stream_t *)&r->pipe) || t->reader_count > READERS_MAX ||
-	    uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read)) {
+	if (uv_accept(listener, (uv_stream_t *)&r->pipe)) {
+		drop(r);
+		return;
+	}
+	if (t->reader_count > READERS_MAX) { /* the kernel takes the line at once */
+		say_error(r, "too many read the status: 64 others are connected to its socket");
+		drop(r);
+		return;
+	}
+	if (uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read)) {
 		drop(r);
 		return;
 	}

@@ -57,6 +57,7 @@ for p in render submit; do
 done
 code 1 "$BIN/hslt-job" fetch j1
 code 1 "$BIN/hslt-job" cancel j1
+code 2 "$BIN/hslt-job" cancel j18446744073709551616 # more than there can be
 
 id=$(submit "$BOX" -o "$DIR/cancelled.exr" --integrator path --spp 1000000)
 [ "$id" = j1 ] || fail "the first job is $id"

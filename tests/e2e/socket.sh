@@ -67,6 +67,24 @@ rm "$AT"
 mv "$DIR/moved" "$AT"
 answers || fail "it was disturbed"
 if "${PYTHON:-python3}" -c '' 2>/dev/null; then
+	# As many as may read it do: who comes then is told so, and gets in when one has gone.
+	"${PYTHON:-python3}" -c '
+import socket, sys, time
+readers = [socket.socket(socket.AF_UNIX) for _ in range(64)]
+for r in readers:
+    r.connect(sys.argv[1])
+for r in readers:
+    r.recv(1)
+open(sys.argv[1] + ".full", "w")
+time.sleep(600)' "$AT" &
+	crowd=$!
+	PIDS="$PIDS $crowd"
+	until_true 10 test -e "$AT.full" || fail "64 cannot read"
+	code 75 "$BIN/hslt-status" --socket "$AT"
+	grep -q "64 others are connected" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
+	kill $crowd
+	wait $crowd 2>/dev/null || :
+	until_true 10 answers 2>"$DIR/err.log" || fail "no answer when they have gone"
 	AT=$DIR/busy
 	"${PYTHON:-python3}" -c '
 import os, socket, sys, time
