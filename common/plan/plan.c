@@ -105,6 +105,14 @@ uint32_t plan_parts_usual(const struct plan *p)
 	return (uint32_t)clamp((uint64_t)p->crop_height + 2 * (uint64_t)p->border, 1, DEFAULT_PARTS);
 }
 
+uint64_t plan_lease_mutations(const struct plan *p)
+{
+	if (p->kind == PLAN_CHAINS)
+		return p->chains / (p->groups * p->parts) * p->epoch;
+	uint64_t rows = ceil_div((uint64_t)p->crop_height + 2 * (uint64_t)p->border, p->parts);
+	return rows * ((uint64_t)p->crop_width + 2 * (uint64_t)p->border) * p->epoch;
+}
+
 /* ---- making a plan */
 
 static int check_film(const struct plan *p, struct error *e)

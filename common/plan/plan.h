@@ -128,6 +128,7 @@ struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
 struct plan_range plan_row_range(const struct plan *p, uint32_t part);
 uint32_t plan_parts_usual(const struct plan *p);     /* by the rule, for its chains and groups or its film */
 uint64_t plan_round_mutations(const struct plan *p); /* samples or mutations in one round, all groups */
+uint64_t plan_lease_mutations(const struct plan *p); /* samples or mutations in the longest lease of a round */
 uint64_t plan_extended_pixels(const struct plan *p); /* (crop + 2 border) in each direction */
 
 /* Entries of a mixture's text; 0: it is empty, -1: it is none (an empty entry, too many, a character that none has, or

@@ -19,6 +19,9 @@
 #include <string.h>
 
 enum { FILES_MAX = 10000, DEFINES_MAX = 256, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
+/* Mutations or samples of a lease whose length was asked for: some minutes of a thread in usual scenes, an hour where
+ * each is 30 us. Without that a mistyped --epoch takes a farm from all others for days. */
+enum { LEASE_MOST = 1 << 27 };
 static const uint64_t job_cache_max = 1ull << 34; /* 16 GiB */
 
 /* A relative path without "..": what a scene may ask for, and what a worker may look up. */
@@ -116,6 +119,12 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 		return rc;
 	request.bandwidth = bandwidth;
 	rc = plan_make(&request, plan, e);
+	if (!rc && request.epoch && plan_lease_mutations(plan) > LEASE_MOST)
+		rc = error_set(
+			e, EINVAL,
+			"an epoch of %llu makes leases of %llu mutations or samples, each of which keeps a thread from "
+			"all other jobs; at most %d: a shorter --epoch, or more --parts",
+			(unsigned long long)request.epoch, (unsigned long long)plan_lease_mutations(plan), LEASE_MOST);
 	if (!rc)
 		plan_describe_epoch(&request, plan, rule, rule_size);
 	return rc;

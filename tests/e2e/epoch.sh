@@ -36,6 +36,12 @@ told parts --spp 16 --parts 64
 rule "$DIR/parts" "1024 leases"
 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --parts 3 --chains 1024 --epoch 9 2>"$DIR/odd" && fail "3 parts of 64 chains"
 rule "$DIR/odd" "cannot be cut into 3 parts"
+# 16 chains of 8,388,608 mutations are a lease that is let in, of one more each are not.
+told longest --spp 100000 --epoch 8388608
+[ "$(epoch "$DIR/longest")" = 8388608 ] || fail "an epoch of $(epoch "$DIR/longest")"
+code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --spp 100000 --epoch 8388609
+grep -q "keeps a thread from all other jobs.*--epoch" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
+code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator path --spp 100000000 --epoch 1000000
 start_worker one
 FINE="--integrator pssmlt --size 64x36 --spp 16 --groups 4 --chains 64 --parts 16"
 submit "$BOX" -o "$DIR/farm.exr" $FINE --wait >/dev/null || fail "a job of 16 parts"

@@ -402,6 +402,11 @@ static void parts_are_asked_for(void **state)
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
 	r.parts = 32;
 	assert_int_equal(made(&r).parts, 32);
+	r.parts = 5; /* of 34 rows one has 7 */
+	r.border = 1;
+	r.epoch = 3;
+	p = made(&r);
+	assert_int_equal(plan_lease_mutations(&p), 7 * 66 * 3);
 }
 
 /* A pilot's speed bounds a lease to about 20 s of a thread, and noise of a tenth does not show. */
@@ -419,7 +424,8 @@ static void leases_take_twenty_seconds(void **state)
 			r.speed = speed;
 			p = made(&r);
 			double seconds = (double)lease_work(&p) / speed;
-			bool least = p.epoch == 1; /* a strip cannot be cut further */
+			assert_int_equal(plan_lease_mutations(&p), lease_work(&p)); /* 720 rows in 4 parts */
+			bool least = p.epoch == 1;				    /* a strip cannot be cut further */
 			assert_true(seconds < 20 * 1.4143 || least);
 			assert_true(seconds > 20 / 1.4143 - 1e-9);
 			assert_true((p.epoch & (p.epoch - 1)) == 0);
