@@ -37,6 +37,7 @@ enum {
 	PLAN_MAX_STRATEGIES = 8,  /* entries of the mixture */
 	PLAN_ACCURACY_MAX = 256,  /* bytes of the text, the last a 0 */
 	PLAN_EFFECTS_MAX = 256,
+	PLAN_SPEED_MOST = 20000000, /* mutations or samples a second of one thread: none is faster */
 };
 
 /* Rays that a pilot counted (worker/render/rays.h), the same on every machine; 0: none were. */

@@ -143,7 +143,7 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 		rc = text_from_wire(m->accuracy, r->accuracy, sizeof r->accuracy, e);
 	if (!rc)
 		rc = text_from_wire(m->effects, r->effects, sizeof r->effects, e);
-	if (!rc && !(m->speed >= 0 && m->speed < 1e15))
+	if (!rc && !(m->speed >= 0 && m->speed <= PLAN_SPEED_MOST))
 		rc = error_set(e, EBADMSG, "a pilot of %g a second", m->speed);
 	if (!rc && !(m->bootstrap_rays >= 0 && m->bootstrap_rays < 1e15 && m->step_rays >= 0 && m->step_rays < 1e15))
 		rc = error_set(e, EBADMSG, "a pilot of %g and %g rays", m->bootstrap_rays, m->step_rays);

@@ -390,8 +390,11 @@ static void plans_travel(void **state)
 	plan_request_to_wire(&request, &rm);
 	assert_int_equal(plan_request_from_wire(&rm, &again, &e), 0);
 	assert_memory_equal(&request, &again, sizeof request);
-	rm.speed = -1;
-	assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
+	const double speeds[] = {-1, 2.1e7, NAN};
+	for (int i = 0; i < 3; i++) {
+		rm.speed = speeds[i];
+		assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
+	}
 	rm.speed = 0;
 	for (int i = 0; i < 2; i++) {
 		const double bad[] = {-1, INFINITY, NAN};

@@ -60,7 +60,7 @@ static int measure_speed(const struct world *w, struct plan_request *r, double *
 		if (l.lit.black && r->kind == PLAN_CHAINS)
 			return 0;
 		if (seconds >= enough_seconds || r->epoch >= LONGEST_EPOCH) {
-			*speed = (double)plan_round_mutations(&p) / fmax(seconds, 1e-6);
+			*speed = fmin((double)plan_round_mutations(&p) / fmax(seconds, 1e-6), PLAN_SPEED_MOST);
 			return 0;
 		}
 	}
