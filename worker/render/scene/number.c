@@ -137,10 +137,17 @@ static const char *skip_blanks(const char *p)
 	return p;
 }
 
+/* A number of a scene file: "0.5f", as programs print it, is 0.5. */
+static const char *scan_value(const char *p, const char *end, double *out)
+{
+	const char *rest = number_scan(p, end, out);
+	return rest && rest < end && (*rest == 'f' || *rest == 'F') ? rest + 1 : rest;
+}
+
 bool number_parse(const char *text, double *out)
 {
 	text = skip_blanks(text);
-	const char *rest = number_scan(text, text + strlen(text), out);
+	const char *rest = scan_value(text, text + strlen(text), out);
 	return rest && *skip_blanks(rest) == 0;
 }
 
@@ -158,7 +165,7 @@ int number_list(const char *text, double *out, size_t max)
 	while (p < end) {
 		if (n == max)
 			return -1;
-		const char *rest = number_scan(p, end, &out[n]);
+		const char *rest = scan_value(p, end, &out[n]);
 		if (!rest)
 			return -1;
 		n++;

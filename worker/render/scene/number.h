@@ -18,11 +18,12 @@ const char *number_scan_int(const char *p, const char *end, int64_t *out);
  * "1.#IND") is NaN, which the caller refuses or replaces. */
 const char *number_scan_printed(const char *p, const char *end, double *out);
 
-/* The whole text, blanks around it allowed. */
+/* The whole text, blanks around it and an `f` after it allowed. */
 bool number_parse(const char *text, double *out);
 bool number_parse_int(const char *text, int64_t *out);
 
-/* A list separated by blanks, commas or both. The count, or -1 when something else is in it or there are more than max.
+/* A list of the same, separated by blanks, commas or both. The count, or -1 when something else is in it or there are
+ * more than max.
  */
 int number_list(const char *text, double *out, size_t max);
 

@@ -96,6 +96,10 @@ static int read_rotate(const struct xml_element *el, mat4 *m, struct error *e)
 	if (r)
 		return r;
 	double length = vec3_length(axis);
+	if (degrees == 0) { /* about any axis, or none */
+		*m = mat4_identity();
+		return 0;
+	}
 	if (!(length > 0) || !isfinite(length))
 		return xml_error(el, e, EINVAL, "has no axis: x, y, z are (%g, %g, %g)", axis.x, axis.y, axis.z);
 	*m = mat4_rotate(axis, degrees);

@@ -20,6 +20,8 @@ static void test_accepted(void **state)
 	} good[] = {{"1", 1},
 		    {" -2.5 ", -2.5},
 		    {".73", .73},
+		    {"0.5f", .5},
+		    {" 100F ", 100},
 		    {"5.", 5},
 		    {"+1e3", 1000},
 		    {"-4.37114e-008", -4.37114e-8},
@@ -40,8 +42,8 @@ static void test_accepted(void **state)
 static void test_refused(void **state)
 {
 	(void)state;
-	static const char *const bad[] = {"",	   " ",	  "nan", "inf", "-inf", "0x10", "1,5", "1e",
-					  "1e400", "--1", "1 2", ".",	"-",	"e5",	"1f"};
+	static const char *const bad[] = {"",	 " ",	"nan", "inf", "-inf", "0x10", "1,5", "1e",  "1e400",
+					  "--1", "1 2", ".",   "-",   "e5",   "1ff",  "f",   "1 f", "1d"};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		double x;
 		if (number_parse(bad[i], &x))
@@ -77,6 +79,9 @@ static void test_lists(void **state)
 	assert_true(v[0] == 1 && v[1] == 2 && v[2] == 3);
 	assert_int_equal(number_list(".8,.8,.8", v, 3), 3);
 	assert_int_equal(number_list(" 1420 1552\n1642 ", v, 3), 3);
+	assert_int_equal(number_list("1f, 2.f 3e0F", v, 3), 3);
+	assert_true(v[0] == 1 && v[1] == 2 && v[2] == 3);
+	assert_int_equal(number_list("1f2", v, 3), -1);
 	assert_int_equal(number_list("", v, 3), 0);
 	assert_int_equal(number_list("1 2 3 4", v, 3), -1);
 	assert_int_equal(number_list("1,,2", v, 3), -1);

@@ -141,6 +141,7 @@ static void test_transforms(void **state)
 	check_transform("<scale value='1, 2, 3'/>", p, (vec3){1, 4, 9});
 	check_transform("<rotate z='1' angle='90'/>", p, (vec3){-2, 1, 3});
 	check_transform("<rotate value='0, 0, 1' angle='90'/>", p, (vec3){-2, 1, 3});
+	check_transform("<rotate x='0' y='0' z='0' angle='0'/>", p, p);
 	check_transform("<matrix value='1 0 0 10 0 0 1 20 0 -1 0 30 0 0 0 1'/>", p, (vec3){11, 23, 28});
 	check_transform("<matrix value='0 1 0, 0 0 1, 1 0 0'/>", p, (vec3){2, 3, 1});
 	/* In the order in which they stand. */
