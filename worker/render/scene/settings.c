@@ -313,16 +313,41 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	return 0;
 }
 
+#define STAND_IN_FOV 45.0
+
+/* What a scene without a sensor is seen by, but for its place. */
+static const struct property stand_in_properties[] = {{"fov", 0, {.type = VALUE_FLOAT, .as.number = STAND_IN_FOV}}};
+static const struct scene_node stand_in = {.cls = PLUGIN_SENSOR,
+					   .type = "perspective",
+					   .file = "no sensor in the file",
+					   .decl = setting_decls,
+					   .property_count = 1,
+					   .properties = stand_in_properties};
+
+int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct error *e)
+{
+	double size = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z)),
+	       distance = size / (2 * tan(STAND_IN_FOV / 2 / 57.295779513082320877));
+	if (!(size > 0))
+		return error_set(e, EINVAL, "the scene has no <sensor>, and no shape that one could be placed before");
+	s->near_clip = distance / 100;
+	s->far_clip = 5 * size + distance;
+	s->to_world =
+		mat4_translate((vec3){low.x + (high.x - low.x) / 2, low.y + (high.y - low.y) / 2, low.z - distance});
+	return 0;
+}
+
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t which,
 			struct scene_settings *out, struct error *e)
 {
 	*out = (struct scene_settings){0};
 	uint32_t sensors;
 	const struct scene_node *sensor = find_object(s, PLUGIN_SENSOR, which, &sensors);
-	if (!sensor && sensors)
+	if (!sensor && (sensors || which > 1))
 		return error_set(e, EINVAL, "there is no sensor %u: the scene has %u", which, sensors);
+	out->unplaced = !sensor;
 	if (!sensor)
-		return error_set(e, EINVAL, "the scene has no <sensor>");
+		sensor = &stand_in;
 	const struct scene_node *sampler = node_child(sensor, PLUGIN_SAMPLER, 0);
 	out->spp = sampler ? (uint64_t)node_int(sampler, "sample_count", 0) : 0;
 	int r = read_film(sensor, width, height, out, e);

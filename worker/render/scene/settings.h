@@ -33,11 +33,15 @@ struct scene_settings {
 		principal_y; /* offset of the principal point from the middle, of the film's size, as in Mitsuba 3 */
 	double near_clip, far_clip;
 	double aperture_radius, focus_distance; /* thinlens; radius 0: a pinhole, whatever the distance */
+	bool unplaced; /* the scene has no sensor: scene_settings_place says where the camera is */
 };
 
 /* width, height: override the film's (0: keep) and its crop window. sensor: which of several, from 1 on. */
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
 			struct scene_settings *out, struct error *e);
+
+/* Of a scene without a sensor, whose shapes lie between low and high: the camera that both Mitsubas put before it. */
+int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct error *e);
 
 /* Declarations of perspective, thinlens, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL
  * type ends. */

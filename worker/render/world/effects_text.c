@@ -151,6 +151,12 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 	render_effects_note(scene, text, size);
 	if (*text && i-- == 0)
 		return true;
+	if (scene->settings.unplaced && i-- == 0) {
+		snprintf(text, size,
+			 "the scene has no <sensor>: as in Mitsuba, a camera before it that looks along +z stands in%s",
+			 scene->brightest > 0 ? "" : "; it has no emitter either: the picture is black");
+		return true;
+	}
 	const char *const met[] = {scene->notes.scales, scene->notes.flat, scene->notes.materials};
 	for (size_t k = 0; k < sizeof met / sizeof *met; k++)
 		if (*met[k] && i-- == 0) {

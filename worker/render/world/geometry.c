@@ -207,6 +207,9 @@ int build_rescale(struct builder *b)
 	if (!isfinite(vec3_length(vec3_sub(b->all.high, b->all.low))))
 		return error_set(b->e, EINVAL, "the scene's extent is not finite");
 	note_scales(b);
+	int rc = w->settings.unplaced ? scene_settings_place(&w->settings, b->all.low, b->all.high, b->e) : 0;
+	if (rc)
+		return rc;
 	w->center = origin_choose(&b->all, b->boxes, w->shape_count, room);
 	vec3 over = vec3_sub(b->all.high, w->center), under = vec3_sub(w->center, b->all.low);
 	double r = vec3_length((vec3){fmax(over.x, under.x), fmax(over.y, under.y), fmax(over.z, under.z)});
@@ -216,7 +219,7 @@ int build_rescale(struct builder *b)
 	w->scale = ldexp(1, -exponent);
 	/* Rounding to float moves vertices by parts in 2^24: the sphere is to hold them all the same. */
 	w->radius = (r > 0 ? r * w->scale : 1) * (1 + 0x1p-20);
-	int rc = camera_init(&w->camera, &w->settings, w->center, w->scale, b->e);
+	rc = camera_init(&w->camera, &w->settings, w->center, w->scale, b->e);
 	for (uint32_t i = 0; rc && i < b->scene->object_count; i++) {
 		const struct scene_node *n = b->scene->objects[i];
 		if (n->cls == PLUGIN_SENSOR)

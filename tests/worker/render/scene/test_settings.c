@@ -234,11 +234,30 @@ static void test_size_is_overridden(void **state)
 	assert_int_equal(read_scene(xml, 70000, 8, &s, &e), -ERANGE);
 }
 
+/* The camera that Mitsuba 3 makes where a scene has none. */
+static void test_no_sensor(void **state)
+{
+	(void)state;
+	struct scene_settings s;
+	struct error e = {""};
+	assert_int_equal(read_scene("<scene version='3.0.0'/>", 0, 0, &s, &e), 0);
+	assert_true(s.unplaced && s.fov == 45 && s.width == 768 && s.height == 576);
+	assert_string_equal(s.fov_axis, "x");
+	assert_int_equal(scene_settings_place(&s, (vec3){0, -1, 3}, (vec3){4, 1, 5}, &e), 0);
+	double distance = 2 / tan(M_PI / 8); /* the 4 units of the nearest side fill the image */
+	assert_true(fabs(s.to_world.m[2][3] - (3 - distance)) < 1e-12);
+	assert_true(s.to_world.m[0][3] == 2 && s.to_world.m[1][3] == 0);
+	assert_true(s.to_world.m[0][0] == 1 && s.to_world.m[1][1] == 1 && s.to_world.m[2][2] == 1);
+	assert_true(s.near_clip < distance && s.far_clip > distance + 2);
+	assert_int_equal(scene_settings_place(&s, (vec3){1, 1, 1}, (vec3){1, 1, 1}, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "no shape that one could be placed before"));
+	assert_false(read_ok("", "").unplaced);
+}
+
 static void test_refused(void **state)
 {
 	(void)state;
 #define SENSOR(x) "<sensor type='perspective'>" x "</sensor>"
-	refuses("", "the scene has no <sensor>");
 	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='10'/><integer name='crop_width' value='11'/></film>"),
 		"s.xml:1: <film type=\"hdrfilm\">: the crop window of 11 x 576 pixels at 0, 0 leaves the film of 10 x 576");
 	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='10'/><integer name='crop_offset_x' value='1'/></film>"),
@@ -294,6 +313,7 @@ int main(void)
 		cmocka_unit_test(test_notes_on_the_whole),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_size_is_overridden),
+		cmocka_unit_test(test_no_sensor),
 		cmocka_unit_test(test_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

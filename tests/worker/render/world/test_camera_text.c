@@ -57,6 +57,9 @@ static void test_text(void **state)
 		  "<float name='focus_distance' value='4'/>" LOOK FILM "</sensor>",
 		  text, &m);
 	assert_true(strncmp(text, "thinlens fov=30 fov_axis=x aperture_radius=0.25 focus_distance=4 ", 65) == 0);
+	camera_of("", text, &m); /* a ball of radius 1 at the origin, seen whole */
+	assert_true(strncmp(text, "perspective fov=45 fov_axis=x ", 30) == 0);
+	assert_true(fabs(m.m[2][3] + 1 + 1 / tan(M_PI / 8)) < 1e-9);
 	camera_of("<sensor type='orthographic'>" LOOK FILM "</sensor>", text, &m);
 	has(text, "orthographic half_width=1 near_clip=");
 	camera_of("<sensor type='perspective'><float name='fov' value='40'/><float name='principal_point_offset_x' "
@@ -65,8 +68,27 @@ static void test_text(void **state)
 	has(text, " principal_point_offset_x=0.25 principal_point_offset_y=0 ");
 }
 
+static void check_note(const char *scene, bool dark)
+{
+	struct world *w = world_of_text(16, 8, "%s", scene);
+	struct render_summary s;
+	char text[512];
+	world_summary(w, &s);
+	assert_true(render_scene_note(&s, 0, text, sizeof text));
+	has(text, "the scene has no <sensor>");
+	assert_int_equal(strstr(text, "the picture is black") != NULL, dark);
+	world_free(w);
+}
+
+static void test_stand_in_is_noted(void **state)
+{
+	(void)state;
+	check_note(BALL, false);
+	check_note("<shape type='sphere'/>", true);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_text)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_text), cmocka_unit_test(test_stand_in_is_noted)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
