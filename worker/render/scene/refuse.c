@@ -33,3 +33,19 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 	return xml_error(el, e, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
 			 spelling_hint(&s, hint, sizeof hint), list);
 }
+
+int refuse_property(const struct plugin_decl *owner, const char *type, const struct xml_element *el, const char *name,
+		    const struct param *p, struct error *e)
+{
+	char list[512], hint[128] = "";
+	plugin_list_params(owner, list, sizeof list);
+	if (p)
+		return xml_error(el, e, EINVAL,
+				 "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
+				 "supported: %s",
+				 name, plugin_class_name(owner->cls), type, list);
+	struct spelling s = {.wanted = name};
+	plugin_offer_params(owner, &s);
+	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",
+			 plugin_class_name(owner->cls), type, name, spelling_hint(&s, hint, sizeof hint), list);
+}

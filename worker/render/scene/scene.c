@@ -123,23 +123,6 @@ static const char *property_name(struct maker *m, const struct xml_element *el, 
 	return snake;
 }
 
-static int refuse_property(const struct draft *d, const struct xml_element *el, const char *name, const struct param *p,
-			   struct error *e)
-{
-	char list[512], hint[128] = "";
-	plugin_list_params(d->decl, list, sizeof list);
-	if (p)
-		return xml_error(el, e, EINVAL,
-				 "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
-				 "supported: %s",
-				 name, plugin_class_name(d->node->cls), d->node->type, list);
-	struct spelling s = {.wanted = name};
-	plugin_offer_params(d->decl, &s);
-	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",
-			 plugin_class_name(d->node->cls), d->node->type, name, spelling_hint(&s, hint, sizeof hint),
-			 list);
-}
-
 static int add_property(struct draft *d, const struct xml_element *el, const struct param *p, struct value v,
 			struct error *e)
 {
@@ -197,7 +180,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
 		return leave_out(m, el, xml_attribute(owner, "type"), name, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
-		return refuse_property(d, el, name, found, m->error);
+		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
 		return note_property(m, owner, el, name);
 	if (found->status == PARAM_UNHEEDED)
