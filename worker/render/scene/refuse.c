@@ -2,12 +2,44 @@
 #include "worker/render/scene/refuse.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/scene/lenient.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/value.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* "; --lenient ..." or "": what is done where the user asks for leniency. */
+static const char *lenient_hint(enum plugin_class cls, const char *type, char *text, size_t size)
+{
+	const char *other;
+	switch (lenient_plugin(cls, type, &other)) {
+	case LENIENT_LEAVE_OUT:
+		snprintf(text, size, "; --lenient leaves it out");
+		break;
+	case LENIENT_REPLACE:
+		snprintf(text, size, "; --lenient takes `%s` instead", other);
+		break;
+	case LENIENT_INNER:
+		snprintf(text, size, "; --lenient takes the %s inside it, or `%s`, instead", plugin_class_name(cls),
+			 other);
+		break;
+	default:
+		*text = 0;
+	}
+	return text;
+}
+
+int refuse_medium(const struct xml_element *el, struct error *e)
+{
+	return xml_error(el, e, EINVAL, "participating media are not supported; --lenient leaves them out");
+}
 
 int refuse_element(const struct xml_element *el, struct error *e)
 {
 	char hint[128];
+	if (strcmp(el->name, "subsurface") == 0)
+		return xml_error(el, e, EINVAL, "subsurface scattering is not supported; --lenient leaves it out");
 	struct spelling s = {.wanted = el->name};
 	plugin_offer_classes(&s);
 	value_offer_elements(&s);
@@ -25,13 +57,16 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 {
 	char hint[128], list[512];
 	struct spelling s = {.wanted = type};
+	if (cls == PLUGIN_MEDIUM)
+		return refuse_medium(el, e);
 	plugin_offer_types(decls, cls, &s);
 	plugin_list_types(decls, cls, list, sizeof list);
 	if (plugin_is_mitsubas(cls, type))
-		return xml_error(el, e, EINVAL, "this %s of Mitsuba's is not supported (supported: %s)",
-				 plugin_class_name(cls), list);
+		return xml_error(el, e, EINVAL, "this %s of Mitsuba's is not supported%s (supported: %s)",
+				 plugin_class_name(cls), lenient_hint(cls, type, hint, sizeof hint), list);
 	return xml_error(el, e, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
-			 spelling_hint(&s, hint, sizeof hint), list);
+			 s.best ? spelling_hint(&s, hint, sizeof hint) : lenient_hint(cls, type, hint, sizeof hint),
+			 list);
 }
 
 int refuse_property(const struct plugin_decl *owner, const char *type, const struct xml_element *el, const char *name,

@@ -242,6 +242,12 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	enum plugin_class cls;
 	bool is_class = plugin_class_find(target->name, &cls);
 	assert(is_class);
+	if (cls == PLUGIN_MEDIUM && d->decl->status != PARAM_IGNORED) {
+		if (el != target) /* it is told where it is made */
+			return REPORT_TOLD;
+		const char *type = xml_attribute(el, "type");
+		return m->lenient ? leave_out(m, el, type ? type : "", "", "the medium") : refuse_medium(el, m->error);
+	}
 	const char *written = xml_attribute(el, "name");
 	const struct param *p = NULL;
 	bool nested = d->decl->nested_classes >> cls & 1;

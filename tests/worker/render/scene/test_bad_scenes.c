@@ -128,10 +128,17 @@ static void test_unknown_names(void **state)
 		"s.xml:2: <bsdf type=\"difuse\">: there is no bsdf of this type; did you mean "
 		"`diffuse`? (supported: diffuse, ");
 	refuses(S "<bsdf type='hair'/>" END,
-		"this bsdf of Mitsuba's is not supported (supported: diffuse, roughconductor");
+		"this bsdf of Mitsuba's is not supported; --lenient takes the bsdf inside it, or `diffuse`, instead "
+		"(supported: diffuse, roughconductor");
+	refuses(S "<bsdf type='roughgrating'/>" END, "there is no bsdf of this type; --lenient takes the bsdf inside");
+	refuses(S "<rfilter type='blackman'/>" END, "; --lenient takes `gaussian` instead");
 	refuses(S "<shape type='sdfgrid'/>" END,
-		"<shape type=\"sdfgrid\">: this shape of Mitsuba's is not supported (supp");
-	refuses(S "<medium type='homogeneous'/>" END, "supported: none");
+		"<shape type=\"sdfgrid\">: this shape of Mitsuba's is not supported; --lenient leaves it out (supp");
+	refuses(S "<medium type='homogeneous'/>" END,
+		"s.xml:1: <medium type=\"homogeneous\">: participating media are not supported; --lenient leaves");
+	refuses(S "<shape type='cube'>\n<medium type='homogeneous' name='interior'/></shape>" END,
+		"s.xml:2: <medium type=\"homogeneous\">: participating media");
+	refuses(S "<shape type='cube'>\n<subsurface type='dipole'/></shape>" END, "subsurface scattering is not");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");
 	refuses(S "<float name='a' value='1'/>" END, "has no place in <scene>");
@@ -280,6 +287,25 @@ static void test_bad_references(void **state)
 	refuses(S "<bsdf type='diffuse'><bsdf type='diffuse' name='nested'/></bsdf>" END, "has no `nested`");
 }
 
+/* A medium is complained of where it is made, not wherever it is used. */
+static void test_media_are_told_once(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		S "<medium type='homogeneous' id='fog'/><shape type='cube'><ref id='fog' name='interior'/>"
+		  "</shape><shape type='sphere'><ref id='fog' name='exterior'/></shape>" END;
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", scene_tables(), NULL, 0, false, &e), 0);
+	assert_int_equal(s.problem_count, 1);
+	scene_fini(&s);
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", scene_tables(), NULL, 0, true, &e), 0);
+	assert_true(s.problem_count == 0 && s.note_count == 1);
+	scene_fini(&s);
+}
+
 /* What a fork's parameter is taken for is in test_scene.c. */
 static void test_misplaced_parameters(void **state)
 {
@@ -361,19 +387,13 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_broken_xml),
-		cmocka_unit_test(test_entity_bomb),
-		cmocka_unit_test(test_parameter_bomb),
-		cmocka_unit_test(test_deep_nesting),
-		cmocka_unit_test(test_too_many_elements),
-		cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_misplaced_parameters),
-		cmocka_unit_test(test_bad_values),
-		cmocka_unit_test(test_bad_transforms),
-		cmocka_unit_test(test_bad_references),
-		cmocka_unit_test(test_flat_shapes),
-		cmocka_unit_test(test_bad_includes),
-		cmocka_unit_test(test_bad_films),
+		cmocka_unit_test(test_broken_xml),	    cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),	    cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements),   cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_media_are_told_once), cmocka_unit_test(test_misplaced_parameters),
+		cmocka_unit_test(test_bad_values),	    cmocka_unit_test(test_bad_transforms),
+		cmocka_unit_test(test_bad_references),	    cmocka_unit_test(test_flat_shapes),
+		cmocka_unit_test(test_bad_includes),	    cmocka_unit_test(test_bad_films),
 		cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
