@@ -4,6 +4,7 @@
  * to the tree after it.
  */
 #include "worker/render/scene/gltf_tree.h"
+#include "worker/render/scene/element_make.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -154,32 +155,19 @@ __attribute__((format(printf, 2, 0))) static char *print(struct gltf *g, const c
 
 struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *name)
 {
-	enum { ATTRIBUTES = 4 };
 	if (g->failed || (!parent && g->scene))
 		return NULL;
 	if (g->tree->element_count >= XML_ELEMENTS_MAX) {
 		gltf_fail(g, at, E2BIG, "more than %d elements are made of this file", XML_ELEMENTS_MAX);
 		return NULL;
 	}
-	struct xml_element *el = arena_alloc(g->arena, 1, sizeof *el);
-	struct xml_attribute *attributes = arena_alloc(g->arena, ATTRIBUTES, sizeof *attributes);
-	if (!el || !attributes) {
+	struct xml_element *el =
+		element_make(parent, name, g->file, at ? gltf_line(g, at->array, at->index) : 1, g->arena);
+	if (!el) {
 		no_memory(g);
 		return NULL;
 	}
 	g->tree->element_count++;
-	*el = (struct xml_element){.name = name,
-				   .file = g->file,
-				   .line = at ? gltf_line(g, at->array, at->index) : 1,
-				   .attributes = attributes,
-				   .parent = parent};
-	if (!parent)
-		return el;
-	if (parent->last)
-		parent->last->next = el;
-	else
-		parent->first = el;
-	parent->last = el;
 	return el;
 }
 
@@ -192,7 +180,7 @@ void gltf_attribute(struct gltf *g, struct xml_element *el, const char *name, co
 	char *value = print(g, format, ap);
 	va_end(ap);
 	if (value)
-		el->attributes[el->attribute_count++] = (struct xml_attribute){name, value};
+		element_put(el, name, value);
 }
 
 struct xml_element *gltf_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *cls,

@@ -12,6 +12,7 @@
 #include "common/base/mem.h"
 #include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/define.h"
+#include "worker/render/scene/element_make.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/upgrade.h"
 
@@ -167,21 +168,6 @@ static int begin_file(struct reader *r, struct xml_element *el)
 	return 0;
 }
 
-static int append_element(struct reader *r, struct xml_element *el)
-{
-	struct xml_element *parent = el->parent;
-	if (!parent) {
-		r->tree->root = el;
-		return 0;
-	}
-	if (parent->last)
-		parent->last->next = el;
-	else
-		parent->first = el;
-	parent->last = el;
-	return 0;
-}
-
 static int read_default(struct reader *r, const struct xml_element *el)
 {
 	const char *name = xml_attribute(el, "name"), *value = xml_attribute(el, "value");
@@ -297,8 +283,10 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 		c = begin_file(r, el);
 	}
 	el->snake = r->snake;
-	if (!c)
-		c = append_element(r, el);
+	if (!c && el->parent)
+		element_link(el->parent, el);
+	else if (!c)
+		r->tree->root = el;
 	if (!c && !el->ignored)
 		c = find_files(r, el);
 	if (!c && !el->ignored && strcmp(name, "default") == 0)
