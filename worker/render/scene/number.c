@@ -130,6 +130,17 @@ const char *number_scan_int(const char *p, const char *end, int64_t *out)
 	return p;
 }
 
+const char *number_line_rest(const char *p, const char *end, size_t *length)
+{
+	const char *newline = memchr(p, '\n', (size_t)(end - p)), *last = newline ? newline : end;
+	while (p < last && number_is_blank(*p))
+		p++;
+	while (last > p && number_is_blank(last[-1]))
+		last--;
+	*length = (size_t)(last - p);
+	return p;
+}
+
 static const char *skip_blanks(const char *p)
 {
 	while (number_is_blank(*p))

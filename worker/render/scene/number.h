@@ -27,6 +27,9 @@ bool number_parse_int(const char *text, int64_t *out);
  */
 int number_list(const char *text, double *out, size_t max);
 
+/* What is left of a line from p on, without the blanks around it. */
+const char *number_line_rest(const char *p, const char *end, size_t *length);
+
 static inline bool number_is_blank(char c)
 {
 	return c == ' ' || c == '\t' || c == '\r' || c == '\n';

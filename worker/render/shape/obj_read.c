@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/shape/obj_read.h"
+
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+#include "worker/render/scene/number.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct reader {
+	struct obj_file *file;
+	const struct scene_node *node;
+	const char *name;
+	struct error *error;
+	const char *p, *end;
+	int line;
+};
+
+static void *push(struct obj_list *l)
+{
+	if (l->count == l->room) {
+		size_t room = l->room ? 2 * l->room : 256;
+		void *more = mem_grow(l->items, l->room * l->size, room * l->size);
+		if (!more)
+			return NULL;
+		l->items = more;
+		l->room = room;
+	}
+	return (char *)l->items + l->size * l->count++;
+}
+
+static int out_of_memory(const struct reader *o)
+{
+	return node_error(o->node, o->error, ENOMEM, "%s:%d: out of memory", o->name, o->line);
+}
+
+/* Blanks, and the backslash that joins two lines. */
+static void skip_blanks(struct reader *o)
+{
+	while (o->p < o->end) {
+		if (*o->p == ' ' || *o->p == '\t' || *o->p == '\r') {
+			o->p++;
+		} else if (*o->p == '\\') {
+			const char *q = o->p + 1;
+			q += q < o->end && *q == '\r';
+			if (q >= o->end || *q != '\n')
+				return;
+			o->p = q + 1;
+			o->line++;
+		} else {
+			return;
+		}
+	}
+}
+
+static bool at_end_of_line(struct reader *o)
+{
+	skip_blanks(o);
+	return o->p >= o->end || *o->p == '\n' || *o->p == '#';
+}
+
+static int read_numbers(struct reader *o, const char *what, struct obj_list *l, size_t least, size_t count)
+{
+	double *v = push(l);
+	if (!v)
+		return out_of_memory(o);
+	for (size_t i = 0; i < count; i++) {
+		v[i] = 0;
+		if (i >= least && at_end_of_line(o))
+			continue;
+		skip_blanks(o);
+		bool normal = l == &o->file->normals;
+		const char *rest = (normal ? number_scan_printed : number_scan)(o->p, o->end, &v[i]);
+		bool ends = rest && (rest == o->end || number_is_blank(*rest) || *rest == '\\' || *rest == '#');
+		if (!ends || (!(fabs(v[i]) <= MESH_COORDINATE_MAX) && !normal))
+			return node_error(o->node, o->error, EINVAL, "%s:%d: `%s` needs %zu finite numbers", o->name,
+					  o->line, what, least);
+		o->p = rest;
+	}
+	return 0;
+}
+
+static int read_normal(struct reader *o)
+{
+	int r = read_numbers(o, "vn", &o->file->normals, 3, 3);
+	if (r)
+		return r;
+	double *n = (double *)o->file->normals.items + 3 * (o->file->normals.count - 1);
+	mesh_store(n, mesh_unit(mesh_load(n)));
+	return 0;
+}
+
+/* Indices count from 1, or backwards from the last with -1. */
+static int read_index(struct reader *o, const char *what, size_t count, uint32_t *out)
+{
+	int64_t i;
+	const char *rest = number_scan_int(o->p, o->end, &i);
+	if (!rest)
+		return node_error(o->node, o->error, EINVAL, "%s:%d: a face's corners are v, v/vt, v//vn or v/vt/vn",
+				  o->name, o->line);
+	int64_t k = i < 0 ? (int64_t)count + 1 + i : i;
+	if (k < 1 || k > (int64_t)count)
+		return node_error(o->node, o->error, EINVAL,
+				  "%s:%d: %s %lld is out of range; there are %zu before this line", o->name, o->line,
+				  what, (long long)i, count);
+	*out = (uint32_t)k;
+	o->p = rest;
+	return 0;
+}
+
+static bool take(struct reader *o, char c)
+{
+	if (o->p < o->end && *o->p == c) {
+		o->p++;
+		return true;
+	}
+	return false;
+}
+
+static int read_corner(struct reader *o)
+{
+	struct obj_corner c = {.at = (uint32_t)o->file->corners.count};
+	int r = read_index(o, "vertex", o->file->positions.count, &c.v);
+	if (!r && take(o, '/')) {
+		bool slash = take(o, '/');
+		if (!slash) {
+			r = read_index(o, "texture coordinate", o->file->uvs.count, &c.vt);
+			slash = !r && take(o, '/');
+		}
+		if (!r && slash)
+			r = read_index(o, "normal", o->file->normals.count, &c.vn);
+	}
+	if (r)
+		return r;
+	if (o->p < o->end && !number_is_blank(*o->p) && *o->p != '\\' && *o->p != '#')
+		return node_error(o->node, o->error, EINVAL, "%s:%d: a face's corners are v, v/vt, v//vn or v/vt/vn",
+				  o->name, o->line);
+	struct obj_corner *new = push(&o->file->corners);
+	if (!new)
+		return out_of_memory(o);
+	*new = c;
+	return 0;
+}
+
+static int read_face(struct reader *o)
+{
+	uint32_t first = (uint32_t)o->file->corners.count, n = 0;
+	for (; !at_end_of_line(o); n++) {
+		int r = read_corner(o);
+		if (r)
+			return r;
+		if (n < 2)
+			continue;
+		if (o->file->triangles.count >= MESH_TRIANGLES_MAX)
+			return node_error(o->node, o->error, E2BIG, "%s:%d: more than %d triangles", o->name, o->line,
+					  MESH_TRIANGLES_MAX);
+		uint32_t *t = push(&o->file->triangles);
+		if (!t)
+			return out_of_memory(o);
+		t[0] = first;
+		t[1] = first + n - 1;
+		t[2] = first + n;
+	}
+	if (n < 3)
+		return node_error(o->node, o->error, EINVAL, "%s:%d: a face of %u corners", o->name, o->line, n);
+	return 0;
+}
+
+/* A run of no faces is none. */
+static int begin_run(struct reader *o, const char *name, size_t length)
+{
+	struct obj_file *f = o->file;
+	struct obj_run *last = f->runs.count ? (struct obj_run *)f->runs.items + (f->runs.count - 1) : NULL;
+	if (!last || last->triangle < f->triangles.count)
+		last = push(&f->runs);
+	if (!last)
+		return out_of_memory(o);
+	*last = (struct obj_run){f->names.count, length, f->corners.count, f->triangles.count};
+	for (size_t i = 0; i < length; i++) {
+		char *c = push(&f->names);
+		if (!c)
+			return out_of_memory(o);
+		*c = name[i];
+	}
+	return 0;
+}
+
+/* The name is the rest of the line, blanks inside included. */
+static int read_material(struct reader *o)
+{
+	size_t length;
+	const char *name = number_line_rest(o->p, o->end, &length);
+	return begin_run(o, name, length);
+}
+
+static int read_line(struct reader *o)
+{
+	skip_blanks(o);
+	const char *word = o->p;
+	while (o->p < o->end && !number_is_blank(*o->p))
+		o->p++;
+	size_t n = (size_t)(o->p - word);
+	if (n == 1 && *word == 'v')
+		return read_numbers(o, "v", &o->file->positions, 3, 3);
+	if (n == 2 && memcmp(word, "vt", 2) == 0)
+		return read_numbers(o, "vt", &o->file->uvs, 1, 2);
+	if (n == 2 && memcmp(word, "vn", 2) == 0)
+		return read_normal(o);
+	if (n == 6 && memcmp(word, "usemtl", 6) == 0)
+		return read_material(o);
+	return n == 1 && *word == 'f' ? read_face(o) : 0;
+}
+
+static int read_lines(struct reader *o)
+{
+	while (o->p < o->end) {
+		o->line++;
+		tick();
+		int r = read_line(o);
+		if (r)
+			return r;
+		const char *newline = memchr(o->p, '\n', (size_t)(o->end - o->p));
+		o->p = newline ? newline + 1 : o->end;
+	}
+	if (o->file->triangles.count == 0)
+		return node_error(o->node, o->error, EINVAL, "%s: has no faces", o->name);
+	return 0;
+}
+
+int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e)
+{
+	*o = (struct obj_file){0};
+	struct asset a;
+	int r = mesh_open(n, assets, &a, e);
+	if (r)
+		return r;
+	const char *bytes = (const char *)a.bytes;
+	struct reader reader = {.file = o,
+				.node = n,
+				.name = node_string(n, "filename", ""),
+				.error = e,
+				.p = bytes,
+				.end = bytes + a.size};
+	o->positions.size = o->normals.size = 3 * sizeof(double);
+	o->uvs.size = 2 * sizeof(double);
+	o->corners.size = sizeof(struct obj_corner);
+	o->triangles.size = 3 * sizeof(uint32_t);
+	o->runs.size = sizeof(struct obj_run);
+	o->names.size = 1;
+	if (a.size > UINT32_MAX)
+		r = node_error(n, e, EFBIG, "%s: larger than 4 GB", reader.name);
+	else if (!(r = begin_run(&reader, "", 0)))
+		r = read_lines(&reader);
+	assets->close(assets->user, &a);
+	if (r)
+		obj_free(o);
+	return r;
+}
+
+void obj_free(struct obj_file *o)
+{
+	struct obj_list *all[] = {&o->positions, &o->uvs, &o->normals, &o->corners, &o->triangles, &o->runs, &o->names};
+	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+		mem_free(all[i]->items);
+	*o = (struct obj_file){0};
+}

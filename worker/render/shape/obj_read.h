@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a Wavefront OBJ file holds, as it stands there: v, vt, vn, f and usemtl. Everything else (groups, lines) has no
+ * meaning here. Every index is checked where it stands, so that an error has a line. One thread.
+ */
+#ifndef WORKER_RENDER_SHAPE_OBJ_READ_H
+#define WORKER_RENDER_SHAPE_OBJ_READ_H
+
+#include "worker/render/shape/mesh.h"
+
+struct obj_list {
+	void *items;
+	size_t count, room, size; /* size of one item */
+};
+
+struct obj_corner {
+	uint32_t v, vt, vn; /* from 1; 0: none */
+	uint32_t at;	    /* place in the list of corners */
+};
+
+/* The faces from here to the next run have one material. */
+struct obj_run {
+	size_t name, name_length; /* in `names` */
+	size_t corner, triangle;
+};
+
+struct obj_file {
+	struct obj_list positions, uvs, normals; /* double[3], double[2], double[3] */
+	struct obj_list corners;		 /* struct obj_corner, one for each corner of each polygon */
+	struct obj_list triangles;		 /* uint32_t[3] into corners */
+	struct obj_list runs;			 /* struct obj_run; the first, without a name, is always there */
+	struct obj_list names;			 /* char */
+};
+
+/* The file that the node names. After 0 alone obj_free. */
+int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e);
+void obj_free(struct obj_file *o);
+
+#endif
