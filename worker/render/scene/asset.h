@@ -17,6 +17,7 @@ struct asset {
 };
 
 struct picture_cache; /* worker/render/texture/picture_cache.h */
+struct obj_cache;     /* worker/render/shape/obj_read.h */
 
 struct asset_source {
 	void *user;
@@ -24,6 +25,7 @@ struct asset_source {
 	int (*open)(void *user, const char *name, struct asset *out, struct error *e);
 	void (*close)(void *user, struct asset *a);
 	struct picture_cache *decoded; /* NULL: each texture decodes its picture for itself */
+	struct obj_cache *parsed;      /* NULL: each shape reads its file for itself */
 };
 
 /* A folder: names must stay below it (no absolute paths, no "..", no symbolic links that

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Wavefront OBJ. Of materials only that there are some. */
+/* Wavefront OBJ: all faces, or those of one material. */
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "worker/render/shape/declare.h"
@@ -10,6 +10,7 @@
 
 static const struct param params[] = {
 	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"material", UNDERSTOOD(VALUE_STRING)}, /* the faces after `usemtl` of that name alone; "": those before any */
 	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
 	{"collapse", IGNORED},
@@ -49,12 +50,19 @@ static void set_vertex(const struct obj_file *o, struct mesh *m, uint32_t i, con
 	}
 }
 
+/* Faces of a file, in arrays of their own or in its: sorting changes the corners. */
+struct faces {
+	struct obj_corner *corners;
+	uint32_t (*triangles)[3];
+	size_t corner_count, triangle_count;
+};
+
 /* Corners that agree in all three indices share a vertex. Sorting takes a bounded time whatever the file says. False:
  * out of memory. */
-static bool make_mesh(struct obj_file *o, struct arena *arena, struct mesh *m, bool flip)
+static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *arena, struct mesh *m, bool flip)
 {
-	struct obj_corner *c = o->corners.items;
-	size_t n = o->corners.count;
+	struct obj_corner *c = f->corners;
+	size_t n = f->corner_count;
 	uint32_t *vertex_of = mem_alloc(n, sizeof *vertex_of);
 	if (!vertex_of)
 		return false;
@@ -67,30 +75,98 @@ static bool make_mesh(struct obj_file *o, struct arena *arena, struct mesh *m, b
 		normals |= c[i].vn != 0;
 		uv |= c[i].vt != 0;
 	}
-	bool ok = mesh_alloc(m, vertices, (uint32_t)o->triangles.count, normals, uv, arena);
+	bool ok = mesh_alloc(m, vertices, (uint32_t)f->triangle_count, normals, uv, arena);
 	for (size_t i = 0; ok && i < n; i++)
 		if (i == 0 || !same_vertex(&c[i - 1], &c[i]))
 			set_vertex(o, m, vertex_of[c[i].at], &c[i], flip);
-	const uint32_t(*t)[3] = o->triangles.items;
-	for (size_t i = 0; ok && i < o->triangles.count; i++)
+	for (size_t i = 0; ok && i < f->triangle_count; i++)
 		for (int k = 0; k < 3; k++)
-			m->index[i][k] = vertex_of[t[i][k]];
+			m->index[i][k] = vertex_of[f->triangles[i][k]];
 	mem_free(vertex_of);
 	return ok;
+}
+
+/* How far a run goes. */
+static struct obj_run end_of(const struct obj_file *o, size_t run)
+{
+	const struct obj_run *runs = o->runs.items;
+	return run + 1 < o->runs.count ? runs[run + 1]
+				       : (struct obj_run){.corner = o->corners.count, .triangle = o->triangles.count};
+}
+
+static bool is_of(const struct obj_file *o, size_t run, const char *material)
+{
+	const struct obj_run *r = (const struct obj_run *)o->runs.items + run;
+	size_t n = strlen(material);
+	return r->name_length == n && (n == 0 || memcmp((const char *)o->names.items + r->name, material, n) == 0);
+}
+
+static void take_run(const struct obj_file *o, size_t run, struct faces *f)
+{
+	const struct obj_run from = ((const struct obj_run *)o->runs.items)[run], to = end_of(o, run);
+	const struct obj_corner *corners = o->corners.items;
+	const uint32_t(*triangles)[3] = o->triangles.items;
+	uint32_t shift = (uint32_t)(f->corner_count - from.corner);
+	for (size_t i = from.triangle; i < to.triangle; i++, f->triangle_count++)
+		for (int k = 0; k < 3; k++)
+			f->triangles[f->triangle_count][k] = triangles[i][k] + shift;
+	for (size_t i = from.corner; i < to.corner; i++, f->corner_count++) {
+		f->corners[f->corner_count] = corners[i];
+		f->corners[f->corner_count].at = (uint32_t)f->corner_count;
+	}
+}
+
+static int out_of_memory(const struct scene_node *n, struct error *e)
+{
+	return node_error(n, e, ENOMEM, "%s: out of memory", node_string(n, "filename", ""));
+}
+
+/* The faces of one material, copied: the file is kept for the others. */
+static int build_material(const struct scene_node *n, const struct obj_file *o, const char *material,
+			  struct arena *arena, struct shape_geometry *out, struct error *e)
+{
+	size_t corners = 0, triangles = 0;
+	for (size_t i = 0; i < o->runs.count; i++) {
+		if (!is_of(o, i, material))
+			continue;
+		corners += end_of(o, i).corner - ((const struct obj_run *)o->runs.items)[i].corner;
+		triangles += end_of(o, i).triangle - ((const struct obj_run *)o->runs.items)[i].triangle;
+	}
+	if (triangles == 0)
+		return node_error(n, e, EINVAL, "%s: has no faces of the material `%.64s`",
+				  node_string(n, "filename", ""), material);
+	struct faces f = {.corners = mem_alloc(corners, sizeof *f.corners),
+			  .triangles = mem_alloc(triangles, sizeof *f.triangles)};
+	bool ok = f.corners && f.triangles;
+	for (size_t i = 0; ok && i < o->runs.count; i++)
+		if (is_of(o, i, material))
+			take_run(o, i, &f);
+	ok = ok && make_mesh(o, &f, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
+	mem_free(f.corners);
+	mem_free(f.triangles);
+	return ok ? 0 : out_of_memory(n, e);
+}
+
+static int build_all(const struct scene_node *n, struct obj_file *o, struct arena *arena, struct shape_geometry *out,
+		     struct error *e)
+{
+	const struct obj_run *first = o->runs.items;
+	out->materials = (o->runs.count > 1 || first->name_length > 0) && node_bool(n, "load_materials", true);
+	struct faces f = {o->corners.items, o->triangles.items, o->corners.count, o->triangles.count};
+	bool ok = make_mesh(o, &f, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
+	return ok ? 0 : out_of_memory(n, e);
 }
 
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
-	struct obj_file o;
-	int r = obj_read(&o, n, assets, e);
-	if (r)
-		return r;
-	const struct obj_run *first = o.runs.items;
-	out->materials = (o.runs.count > 1 || first->name_length > 0) && node_bool(n, "load_materials", true);
-	if (!make_mesh(&o, arena, &out->mesh, node_bool(n, "flip_tex_coords", true)))
-		r = node_error(n, e, ENOMEM, "%s: out of memory", node_string(n, "filename", ""));
-	obj_free(&o);
+	const char *material = node_string(n, "material", NULL);
+	struct obj_cache own = {.name = NULL}, *cache = material && assets->parsed ? assets->parsed : &own;
+	int r = obj_cache_read(cache, n, assets, e);
+	if (!r)
+		r = material ? build_material(n, &cache->file, material, arena, out, e)
+			     : build_all(n, &cache->file, arena, out, e);
+	obj_cache_fini(&own);
 	return r;
 }
 

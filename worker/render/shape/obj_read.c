@@ -265,3 +265,27 @@ void obj_free(struct obj_file *o)
 		mem_free(all[i]->items);
 	*o = (struct obj_file){0};
 }
+
+int obj_cache_read(struct obj_cache *c, const struct scene_node *n, const struct asset_source *assets, struct error *e)
+{
+	const char *name = node_string(n, "filename", "");
+	if (c->name && strcmp(c->name, name) == 0)
+		return 0;
+	obj_cache_fini(c);
+	int r = obj_read(&c->file, n, assets, e);
+	if (r)
+		return r;
+	c->name = mem_strdup(name);
+	if (c->name)
+		return 0;
+	obj_free(&c->file);
+	return node_error(n, e, ENOMEM, "%s: out of memory", name);
+}
+
+void obj_cache_fini(struct obj_cache *c)
+{
+	if (c->name)
+		obj_free(&c->file);
+	mem_free(c->name);
+	c->name = NULL;
+}

@@ -36,4 +36,13 @@ struct obj_file {
 int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e);
 void obj_free(struct obj_file *o);
 
+/* The last file of which a shape took one material: the next shape takes another. */
+struct obj_cache {
+	char *name; /* NULL: nothing is kept */
+	struct obj_file file;
+};
+/* The file that the node names, kept in c until another one is asked for. */
+int obj_cache_read(struct obj_cache *c, const struct scene_node *n, const struct asset_source *assets, struct error *e);
+void obj_cache_fini(struct obj_cache *c);
+
 #endif

@@ -13,6 +13,7 @@
 #include "worker/render/bsdf/diffuse.h"
 #include "worker/render/bsdf/twosided.h"
 #include "worker/render/scene/asset_keeper.h"
+#include "worker/render/shape/obj_read.h"
 #include "worker/render/texture/picture_cache.h"
 #include "worker/render/world/coincident.h"
 #include "worker/render/world/effects_analyse.h"
@@ -273,9 +274,12 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	if (!b.w)
 		return build_out_of_memory(e);
 	struct picture_cache decoded = {.arena = &b.w->arena};
+	struct obj_cache parsed = {.name = NULL};
 	kept.decoded = &decoded;
+	kept.parsed = &parsed;
 	crash_place("building the scene", NULL, 0);
 	int rc = prepare(&b, o);
+	obj_cache_fini(&parsed);
 	asset_keeper_fini(&keeper);
 	crash_place("building Embree's tree", NULL, 0);
 	if (!rc && with_accel)

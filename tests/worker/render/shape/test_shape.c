@@ -3,6 +3,7 @@
 #include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
+#include "worker/render/shape/obj_read.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -272,6 +273,80 @@ static void test_obj_polygons(void **state)
 	release(&b);
 }
 
+static void refuses(const char *content, const char *obj, const char *text)
+{
+	struct built b = build("obj", content, obj);
+	if (b.result >= 0 || !strstr(b.error.text, text))
+		fail_msg("%s\n gave %d: %s\n not: %s", obj, b.result, b.error.text, text);
+	release(&b);
+}
+
+#define PARTS                                                                                                       \
+	SQUARE "vt 0 0.25\nf 1 2 3\nusemtl red paint \nusemtl blue\nf 1/1 2/1 3/1\nusemtl red paint\r\nf 3 4 1 2\n" \
+	       "usemtl blue\nv 9 8 0\nf 1/1 3/1 5/1\nusemtl none\n"
+
+static void test_obj_material(void **state)
+{
+	(void)state;
+	struct built b = build_ok("obj", "<string name='material' value='blue'/>", PARTS);
+	static const double blue[][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}, {1, 1, 0}, {9, 8, 0}};
+	assert_int_equal(b.g.mesh.triangle_count, 2);
+	for (int i = 0; i < 6; i++) {
+		uint32_t v = b.g.mesh.index[i / 3][i % 3];
+		assert_memory_equal(b.g.mesh.position[v], blue[i], sizeof blue[i]);
+		assert_true(b.g.mesh.uv[v][1] == 0.75);
+	}
+	assert_int_equal(b.g.mesh.vertex_count, 4); /* what the two faces share they share here */
+	assert_false(b.g.materials);
+	release(&b);
+	b = build_ok("obj", "<string name='material' value='red paint'/>", PARTS);
+	assert_true(b.g.mesh.triangle_count == 2 && b.g.mesh.vertex_count == 4 && !b.g.mesh.uv);
+	release(&b);
+	b = build_ok("obj", "<string name='material' value=''/>", PARTS);
+	assert_true(b.g.mesh.triangle_count == 1 && b.g.mesh.vertex_count == 3);
+	release(&b);
+	b = build_ok("obj", "", PARTS);
+	assert_true(b.g.mesh.triangle_count == 5 && b.g.materials);
+	release(&b);
+	refuses("<string name='material' value='none'/>", PARTS, "m.obj: has no faces of the material `none`");
+	refuses("<string name='material' value='red'/>", PARTS, "has no faces of the material `red`");
+}
+
+/* The file is read once for all its materials, and once more when another has been asked for in between. */
+static void test_obj_is_kept(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='3.0.0'><shape type='obj'><string name='filename' value='m.obj'/><string name='material' value='blue'/></shape>"
+		"<shape type='obj'><string name='filename' value='m.obj'/><string name='material' value=''/></shape>"
+		"<shape type='obj'><string name='filename' value='n.obj'/><string name='material' value=''/></shape></scene>";
+	struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1},
+				      {"m.obj", PARTS, sizeof PARTS - 1},
+				      {"n.obj", SQUARE "f 1 2 3 4\n", sizeof SQUARE "f 1 2 3 4\n" - 1},
+				      {0}};
+	struct asset_source assets = memory_assets(files);
+	struct obj_cache kept = {.name = NULL};
+	struct scene s;
+	struct arena arena = {0};
+	struct shape_geometry g;
+	struct error e;
+	uint64_t dropped;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
+	assets.parsed = &kept;
+	static const uint32_t triangles[] = {2, 1, 2, 2};
+	for (int i = 0; i < 4; i++) {
+		if (i == 1)
+			files[1].name = "gone.obj";
+		if (i == 3)
+			files[1].name = "m.obj";
+		assert_int_equal(shape_build(s.objects[i % 3], &assets, &arena, &g, &dropped, &e), 0);
+		assert_int_equal(g.mesh.triangle_count, triangles[i]);
+	}
+	obj_cache_fini(&kept);
+	arena_fini(&arena);
+	scene_fini(&s);
+}
+
 static void test_obj_attributes(void **state)
 {
 	(void)state;
@@ -352,14 +427,6 @@ static void test_flat_triangles_are_dropped(void **state)
 	release(&b);
 }
 
-static void refuses(const char *content, const char *obj, const char *text)
-{
-	struct built b = build("obj", content, obj);
-	if (b.result >= 0 || !strstr(b.error.text, text))
-		fail_msg("%s\n gave %d: %s\n not: %s", obj, b.result, b.error.text, text);
-	release(&b);
-}
-
 static void test_bad_objs(void **state)
 {
 	(void)state;
@@ -427,6 +494,8 @@ int main(void)
 		cmocka_unit_test(test_disk),
 		cmocka_unit_test(test_cylinder),
 		cmocka_unit_test(test_obj_polygons),
+		cmocka_unit_test(test_obj_material),
+		cmocka_unit_test(test_obj_is_kept),
 		cmocka_unit_test(test_obj_attributes),
 		cmocka_unit_test(test_smooth_normals),
 		cmocka_unit_test(test_normals_are_weighted_by_angle),
