@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A scene of Mitsuba 0.6 and the same scene written for 3.x are one image, bit for bit: names, values, texture coordinates, defaults.
+# A scene of Mitsuba 0.6 and the same scene written for 3.x are one image, bit for bit: names, values, texture coordinates, defaults, the
+# materials of an OBJ file.
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-compare
 
@@ -35,6 +36,7 @@ cat >"$DIR/old/twin.xml" <<'END'
 		<transform name="toWorld"><rotate x="1" angle="90"/><translate y="2"/></transform>
 		<emitter type="area"><spectrum name="radiance" value="4, 5, 6"/></emitter>
 	</shape>
+	<shape type="obj"><string name="filename" value="roof.obj"/><bsdf type="diffuse" name="left"><rgb name="reflectance" value="0.9, 0.1, 0.1"/></bsdf></shape>
 </scene>
 END
 cat >"$DIR/new/twin.xml" <<'END'
@@ -68,8 +70,26 @@ cat >"$DIR/new/twin.xml" <<'END'
 		<transform name="to_world"><rotate x="1" angle="90"/><translate y="2"/></transform>
 		<emitter type="area"><rgb name="radiance" value="4, 5, 6"/></emitter>
 	</shape>
+	<shape type="obj"><string name="filename" value="left.obj"/><bsdf type="diffuse"><rgb name="reflectance" value="0.9, 0.1, 0.1"/></bsdf></shape>
+	<shape type="obj"><string name="filename" value="right.obj"/><bsdf type="diffuse"><srgb name="reflectance" value="0.2, 0.3, 0.9"/></bsdf></shape>
 </scene>
 END
+cat >"$DIR/old/roof.obj" <<'END'
+mtllib roof.mtl
+v -2 -1 -2
+v 0 1 -2
+v 2 -1 -2
+v -2 1.5 -2
+v 2 1.5 -2
+usemtl left
+f 1 2 4
+usemtl right
+f 3 5 2
+END
+printf 'newmtl left\nKd 0 0 0\nnewmtl right\nKd 0.2 0.3 0.9\nNs 10\n' >"$DIR/old/roof.mtl"
+sed -e '/usemtl right/,$d' "$DIR/old/roof.obj" >"$DIR/new/left.obj"
+sed -e '/usemtl left/,/usemtl right/d' "$DIR/old/roof.obj" >"$DIR/new/right.obj"
+cp "$DIR/new/left.obj" "$DIR/new/right.obj" "$DIR"
 sed 's/value="1.5046"/value="1.5047"/' "$DIR/new/twin.xml" >"$DIR/twin.xml"
 for i in old/ new/ ""; do
 	"$BIN/hslt-render" "$DIR/${i}twin.xml" -o "$DIR/${i}a.exr" --integrator path --quiet 2>"$DIR/err.log" || fail "$i: $(cat "$DIR/err.log")"

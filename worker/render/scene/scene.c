@@ -8,6 +8,7 @@
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
+#include "worker/render/scene/obj_materials.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/refuse.h"
@@ -520,6 +521,9 @@ static int make_scene(struct maker *m)
 	s->dialect_3 = m->tree->dialect_3;
 	s->objects = objects;
 	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
+	if (!r)
+		r = obj_materials_spread(m->tree, &m->ids, m->assets_from, &m->assets, &m->scene->arena, &m->report,
+					 m->error);
 	if (!r)
 		r = read_top(m, m->tree->root, objects);
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)

@@ -64,8 +64,8 @@ static void note_materials(struct world *w, const struct counted *c)
 	if (c->materials)
 		snprintf(
 			w->notes.materials, sizeof w->notes.materials,
-			"the materials of %u mesh%s without a bsdf (first: the %.24s in line %d) are not read from their .mtl "
-			"files: they are diffuse and grey",
+			"the files of %u mesh%s without a bsdf (first: the %.24s in line %d) name materials, but no .mtl file that "
+			"has them: diffuse and grey",
 			c->materials, c->materials == 1 ? "" : "es", c->first_material->type, c->first_material->line);
 }
 

@@ -1,0 +1,288 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* OBJ shapes of 0.6 whose file names materials: which BSDF the faces of each get, from the scene or from the .mtl. */
+#include "tests/support/failing_memory.h"
+#include "tests/support/memory_assets.h"
+#include "worker/render/render.h"
+#include "worker/render/scene/mtl.h"
+#include "worker/render/scene/obj_materials.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define FACES "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+#define FACE "f 1 2 3\n"
+static const char model[] = "mtllib m\\lib.mtl \n" FACES "usemtl gold leaf\n" FACE "usemtl nothing\nusemtl glass\n" FACE
+			    "usemtl gold leaf\r\n" FACE;
+
+static const char *library = "newmtl gold leaf\nKd 1 0.5 0\n";
+
+static int read_scene(struct scene *s, const char *version, const char *xml, struct error *e)
+{
+	char text[4096];
+	snprintf(text, sizeof text, "<scene version='%s'>%s</scene>", version, xml);
+	const struct memory_file files[] = {{"s.xml", text, strlen(text)},
+					    {"d/m.obj", model, sizeof model - 1},
+					    {"d/m/lib.mtl", library, strlen(library)},
+					    {"d/m/wood.png", "", 0},
+					    {0}};
+	struct asset_source assets = memory_assets(files);
+	return scene_read_all(s, &assets, "s.xml", render_plugins(), NULL, 0, false, e);
+}
+
+static struct scene read_ok(const char *xml)
+{
+	struct scene s;
+	struct error e;
+	if (read_scene(&s, "0.6.0", xml, &e))
+		fail_msg("%s", e.text);
+	if (s.problem_count)
+		fail_msg("%s", s.problems[0]);
+	return s;
+}
+
+#define OBJ(x) "<shape type='obj'><string name='filename' value='d/m.obj'/>" x "</shape>"
+#define BSDF(name, value) "<bsdf type='diffuse' " name "><float name='reflectance' value='" value "'/></bsdf>"
+
+/* The scene's only shape is a merge of the two materials that have faces. */
+static const struct scene_node *part_of(const struct scene *s, uint32_t index)
+{
+	static const char *const names[] = {"gold leaf", "glass"};
+	const struct scene_node *merge = s->objects[s->object_count - 1];
+	assert_string_equal(merge->type, "merge");
+	assert_int_equal(merge->child_count, 2);
+	const struct scene_node *part = merge->children[index];
+	assert_string_equal(part->type, "obj");
+	assert_string_equal(node_string(part, "filename", ""), "d/m.obj");
+	assert_string_equal(node_string(part, "material", ""), names[index]);
+	return part;
+}
+
+/* -1: it has no BSDF. */
+static double reflectance(const struct scene *s, uint32_t index)
+{
+	const struct scene_node *bsdf = node_child(part_of(s, index), PLUGIN_BSDF, 0);
+	return bsdf ? node_float(bsdf, "reflectance", -2) : -1;
+}
+
+static void check(const char *content, double gold, double glass, const char *note)
+{
+	struct scene s = read_ok(content);
+	double found[] = {reflectance(&s, 0), reflectance(&s, 1)};
+	if (found[0] != gold || found[1] != glass)
+		fail_msg("%s\n gave %g and %g", content, found[0], found[1]);
+	assert_int_equal(s.note_count, note != NULL);
+	if (note && !strstr(s.notes[0], note))
+		fail_msg("%s\n not: %s", s.notes[0], note);
+	scene_fini(&s);
+}
+
+static void test_named_bsdfs(void **state)
+{
+	(void)state;
+	library = "";
+	check(OBJ(BSDF("name='gold leaf'", "0.25") BSDF("name='glass'", "0.5")), 0.25, 0.5, NULL);
+	check(BSDF("id='a'", "0.125") OBJ("<ref id='a' name='glass'/>" BSDF("name='gold leaf'", "0.25")), 0.25, 0.125,
+	      NULL);
+	/* the last that is for it counts */
+	check(OBJ(BSDF("", "0.25") BSDF("name='glass'", "0.5")), 0.25, 0.5, NULL);
+	check(OBJ(BSDF("name='glass'", "0.5") BSDF("", "0.25")), 0.25, 0.25, NULL);
+	check(OBJ(BSDF("name='glass'", "0.5")), -1, 0.5,
+	      "s.xml:1: <shape type=\"obj\">: 1 of the materials of d/m.obj (first: `gold leaf`) has neither a bsdf nor");
+	check(OBJ(BSDF("name='glass'", "0.5") BSDF("", "0.25") BSDF("name='nothing'", "0.125")), 0.25, 0.25,
+	      "no face of d/m.obj has the material `nothing`: this bsdf is not used");
+}
+
+/* All else in the shape is in each of its parts, and whoever refers to the shape has both. */
+static void test_parts_are_whole(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<shape type='shapegroup' id='g'>" OBJ(
+		"<transform name='toWorld'><scale value='2'/></transform><boolean name='faceNormals' value='true'/>" BSDF(
+			"name='glass'", "0.5")) "</shape><shape type='instance'><ref id='g'/></shape>");
+	const struct scene_node *merge = node_child(s.objects[0], PLUGIN_SHAPE, 0);
+	assert_string_equal(merge->type, "merge");
+	for (uint32_t i = 0; i < 2; i++) {
+		const struct scene_node *part = node_child(merge, PLUGIN_SHAPE, i);
+		assert_true(node_transform(part, "to_world").m[0][0] == 2 && node_bool(part, "face_normals", false));
+	}
+	assert_int_equal(s.asset_count, 2);
+	assert_string_equal(s.assets[1], "d/m/lib.mtl");
+	scene_fini(&s);
+}
+
+static void left_alone(const char *version, const char *content)
+{
+	struct scene s;
+	struct error e;
+	assert_int_equal(read_scene(&s, version, content, &e), 0);
+	if (s.problem_count)
+		fail_msg("%s", s.problems[0]);
+	assert_string_equal(s.objects[s.object_count - 1]->type, "obj");
+	scene_fini(&s);
+}
+
+static void test_left_alone(void **state)
+{
+	(void)state;
+	library = "newmtl glass\nKd 1 1 1\n";
+	left_alone("0.6.0", OBJ(BSDF("", "0.25")));
+	left_alone("0.6.0", OBJ(BSDF("name='bsdf'", "0.25"))); /* no material's name: of all faces */
+	left_alone("0.6.0", OBJ("<boolean name='loadMaterials' value='false'/>"));
+	left_alone("0.6.0", OBJ("<boolean name='collapse' value='true'/>"));
+	left_alone("0.6.0", OBJ("<string name='material' value='glass'/>" BSDF("", "0.25")));
+	left_alone("3.0.0", OBJ(""));
+	left_alone("3.0.0", OBJ(BSDF("name='glass'", "0.25")));
+	library = "newmtl something else\n";
+	left_alone("0.6.0", OBJ(""));
+}
+
+/* Of the .mtl file: the BSDF of glass. */
+static const struct scene_node *made_of(struct scene *s, const char *text)
+{
+	library = text;
+	*s = read_ok(OBJ(BSDF("name='gold leaf'", "0.25")));
+	const struct scene_node *bsdf = node_child(part_of(s, 1), PLUGIN_BSDF, 0);
+	assert_non_null(bsdf);
+	assert_string_equal(bsdf->file, "d/m/lib.mtl");
+	return bsdf;
+}
+
+static bool is_rgb(const struct scene_node *n, const char *name, double r, double g, double b)
+{
+	const struct property *p = node_find(n, name);
+	const double want[] = {r, g, b};
+	for (int i = 0; p && i < 3; i++)
+		if (!(fabs(p->value.as.rgb[i] - want[i]) < 1e-4))
+			return false;
+	return p != NULL;
+}
+
+static void test_libraries(void **state)
+{
+	(void)state;
+	struct scene s;
+	library = "newmtl glass\nKd 1 1 1\n";
+	s = read_ok(OBJ("<emitter type='area'/>")); /* all parts shine */
+	assert_true(node_child(part_of(&s, 0), PLUGIN_EMITTER, 0) && node_child(part_of(&s, 1), PLUGIN_EMITTER, 0));
+	scene_fini(&s);
+	const struct scene_node *b =
+		made_of(&s, "newmtl gold leaf\nKd 1 1 1\n\tnewmtl glass \r\n Kd 0.5 1 0 # sRGB\r\nKs 1 1 1\nNs 5\n");
+	assert_string_equal(b->type, "diffuse"); /* without a model nothing shines */
+	assert_int_equal(b->line, 3);
+	assert_true(is_rgb(b, "reflectance", 0.21404, 1, 0));
+	scene_fini(&s);
+	b = made_of(&s, "newmtl glass\nillum 2\nKs 1 0 0\nNs 200.0\n");
+	assert_string_equal(b->type, "phong");
+	assert_true(is_rgb(b, "diffuse_reflectance", 0, 0, 0) && is_rgb(b, "specular_reflectance", 1, 0, 0));
+	assert_true(node_float(b, "exponent", 0) == 200);
+	scene_fini(&s);
+	b = made_of(&s, "newmtl glass\nillum 2\nKs 0 0 0\nNs 200\nKd 0\n");
+	assert_string_equal(b->type, "diffuse");
+	scene_fini(&s);
+	b = made_of(&s, "newmtl glass\nKd 1 1 1\nnewmtl glass\nillum 7\n"); /* the last of a name */
+	assert_string_equal(b->type, "dielectric");
+	scene_fini(&s);
+	b = made_of(&s, "newmtl glass\nillum 5\n");
+	assert_string_equal(b->type, "conductor");
+	assert_string_equal(node_string(b, "material", ""), "Al");
+	scene_fini(&s);
+	b = made_of(&s, "newmtl glass\nd 0.25\nbump C:\\x\\wood.png\nmap_Kd wood.png\nKd 1 1 1\n");
+	assert_true(strcmp(b->type, "mask") == 0 && node_float(b, "opacity", 1) == 0.25);
+	b = node_child(b, PLUGIN_BSDF, 0);
+	assert_string_equal(b->type, "bumpmap");
+	const struct scene_node *bump = node_child(b, PLUGIN_TEXTURE, 0);
+	assert_string_equal(node_string(bump, "filename", ""), "d/m/wood.png"); /* beside the file that names it */
+	assert_true(node_float(bump, "gamma", 0) == 1);
+	assert_true(is_rgb(node_child(b, PLUGIN_BSDF, 0), "reflectance", 1, 1, 1)); /* after the picture */
+	assert_string_equal(s.assets[2], "d/m/wood.png");
+	scene_fini(&s);
+	b = made_of(&s, "newmtl glass\nd 1\nmap_d wood.png\nKd 1 1 1\nmap_Kd wood.png\nmap_Bump wood.png\n");
+	assert_string_equal(b->type, "mask");
+	assert_string_equal(node_ref(b, "opacity")->type, "bitmap");
+	assert_string_equal(node_ref(node_child(b, PLUGIN_BSDF, 0), "reflectance")->type, "bitmap");
+	assert_non_null(strstr(s.notes[0], "d/m/lib.mtl:6: `map_Bump` is not read"));
+	scene_fini(&s);
+}
+
+static void refuses(const char *content, const char *text)
+{
+	struct scene s;
+	struct error e;
+	assert_int_equal(read_scene(&s, "0.6.0", content, &e), 0);
+	if (s.problem_count != 1 || !strstr(s.problems[0], text))
+		fail_msg("%u: %s\n not: %s", s.problem_count, s.problem_count ? s.problems[0] : "", text);
+	scene_fini(&s);
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+	library = "newmtl glass\n\nKd 2 0 0\n";
+	refuses(OBJ(""), "d/m/lib.mtl:3: <srgb>: reflectance=");
+	library = "newmtl glass\nKd spectral x.rfl\n";
+	refuses(OBJ(""), "d/m/lib.mtl:2: <srgb>: `spectral x.rfl` is neither");
+	refuses("<shape type='obj'><string name='filename' value='n.obj'/>" BSDF("name='a'", "0.5")
+			BSDF("name='b'", "0.5") "</shape>",
+		"s.xml:1: <shape type=\"obj\">: n.obj: no such file");
+	refuses("<shape type='ply'><string name='filename' value='n'/>" BSDF("name='a'", "0.5")
+			BSDF("name='b'", "0.5") "</shape>",
+		"a second bsdf");
+	static char many[(MTL_MATERIALS_MAX + 1) * 16];
+	size_t n = 0;
+	for (int i = 0; i <= MTL_MATERIALS_MAX; i++)
+		n += (size_t)snprintf(many + n, sizeof many - n, "newmtl %d\n", i);
+	library = many;
+	refuses(OBJ(""), "d/m/lib.mtl:4097: more than 4096 materials");
+}
+
+static void test_too_many(void **state)
+{
+	(void)state;
+	static char xml[] = "<scene version='0.6.0'>" OBJ(BSDF("name='7'", "0.5")) "</scene>",
+		    obj[(OBJ_MATERIALS_MAX + 1) * 16 + sizeof FACES];
+	size_t n = (size_t)snprintf(obj, sizeof obj, FACES);
+	for (int i = 0; i < OBJ_MATERIALS_MAX; i++)
+		n += (size_t)snprintf(obj + n, sizeof obj - n, "usemtl %d\n", i);
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {"d/m.obj", obj, n}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), -E2BIG);
+	assert_non_null(strstr(e.text, "d/m.obj:4099: more than 4096 materials")); /* "" is one */
+}
+
+/* Every allocation fails once. */
+static void test_memory_runs_out(void **state)
+{
+	(void)state;
+	library = "newmtl glass\nKd 1 1 1\nmap_Kd a\\b.png\nillum 2\nd 0.5\nbump c.png\n";
+	struct scene s;
+	struct error e;
+	long n = 0;
+	int r;
+	do {
+		mem_fail_after(n++);
+		r = read_scene(&s, "0.6.0", OBJ(BSDF("name='gold leaf'", "0.5")), &e);
+		assert_true(r == 0 || r == -ENOMEM);
+	} while (r && n < 10000);
+	mem_fail_after(-1);
+	assert_true(n > 5 && s.problem_count == 0);
+	assert_int_equal(part_of(&s, 1)->child_count, 1);
+	scene_fini(&s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_named_bsdfs),	cmocka_unit_test(test_parts_are_whole),
+		cmocka_unit_test(test_left_alone),	cmocka_unit_test(test_libraries),
+		cmocka_unit_test(test_refused),		cmocka_unit_test(test_too_many),
+		cmocka_unit_test(test_memory_runs_out),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,402 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/obj_materials.h"
+
+#include "common/base/liveness.h"
+#include "worker/render/scene/element_make.h"
+#include "worker/render/scene/mtl.h"
+#include "worker/render/scene/text_lines.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+struct spread {
+	struct xml_tree *tree;
+	struct id_table *ids;
+	const struct asset_source *assets;
+	struct asset_list *files;
+	struct arena *arena;
+	struct report *report;
+	struct error *error;
+	struct material *materials; /* room for those of the shape at work; NULL: there has been none */
+	uint32_t *places;
+};
+
+/* What stands in a shape. */
+struct child {
+	const struct xml_element *el;
+	bool bsdf;
+	const char *name; /* of a BSDF; NULL: none */
+};
+
+struct material {
+	const char *name;
+	size_t length;
+	bool has_faces;
+	const struct xml_element *bsdf; /* in the shape; NULL: none */
+	const struct mtl_material *mtl; /* where there is no bsdf; NULL: none */
+};
+
+/* A shape at work. */
+struct obj_shape {
+	struct xml_element *el;
+	const char *file; /* NULL: it says none */
+	struct asset bytes;
+	struct child *children;
+	size_t child_count, plain, named; /* BSDFs without a name, and with one */
+	bool load, fixed;		  /* it asks for the .mtl file; shines, or says itself which faces it wants */
+	struct material *materials;	  /* OBJ_MATERIALS_MAX */
+	uint32_t *places;		  /* PLACES: 1 + index, by the hash of the name; 0: free */
+	size_t count;
+	const char *library; /* of the last mtllib; NULL: none */
+	size_t library_length;
+	struct mtl mtl;
+};
+
+enum { PLACES = 2 * OBJ_MATERIALS_MAX };
+
+static int out_of_memory(const struct spread *s)
+{
+	return error_set(s->error, ENOMEM, "out of memory while reading the materials of an OBJ file");
+}
+
+/* ---- what a shape says */
+
+static bool is_property(const struct xml_element *el, const char *element, const char *name, const char *snake)
+{
+	const char *written = xml_attribute(el, "name");
+	return strcmp(el->name, element) == 0 && written && (strcmp(written, name) == 0 || strcmp(written, snake) == 0);
+}
+
+/* What an element in a shape is, references followed: "bsdf", "emitter" and so on. */
+static const char *kind_of(const struct spread *s, const struct xml_element *el)
+{
+	struct error unused;
+	struct xml_element *target;
+	if (strcmp(el->name, "ref") == 0 && id_table_find(s->ids, el, "id", &target, &unused) == 0)
+		return target->name;
+	return el->name;
+}
+
+static int read_children(const struct spread *s, struct obj_shape *o)
+{
+	size_t n = 0;
+	for (const struct xml_element *c = o->el->first; c; c = c->next)
+		n++;
+	o->children = arena_alloc(s->arena, n, sizeof *o->children);
+	if (!o->children)
+		return out_of_memory(s);
+	for (const struct xml_element *c = o->el->first; c; c = c->next) {
+		const char *kind = kind_of(s, c), *value = xml_attribute(c, "value");
+		bool bsdf = strcmp(kind, "bsdf") == 0 && !c->ignored;
+		const char *name = bsdf ? xml_attribute(c, "name") : NULL;
+		o->children[o->child_count++] = (struct child){c, bsdf, name};
+		o->plain += bsdf && !name;
+		o->named += bsdf && name;
+		if (is_property(c, "string", "filename", "filename"))
+			o->file = value;
+		if (is_property(c, "boolean", "loadMaterials", "load_materials") && value)
+			o->load = strcasecmp(value, "false") != 0;
+		o->fixed |= is_property(c, "string", "material", "material") ||
+			    is_property(c, "boolean", "collapse", "collapse");
+	}
+	return 0;
+}
+
+/* ---- what the file says */
+
+static uint32_t hash_of(const char *name, size_t length)
+{
+	uint32_t h = 2166136261u;
+	for (size_t i = 0; i < length; i++)
+		h = (h ^ (unsigned char)name[i]) * 16777619u;
+	return h;
+}
+
+/* NULL: there are too many. */
+static struct material *material_of(struct obj_shape *o, const char *name, size_t length)
+{
+	uint32_t at = hash_of(name, length) % PLACES;
+	for (; o->places[at]; at = (at + 1) % PLACES) {
+		struct material *m = &o->materials[o->places[at] - 1];
+		if (m->length == length && memcmp(m->name, name, length) == 0)
+			return m;
+	}
+	if (o->count == OBJ_MATERIALS_MAX)
+		return NULL;
+	struct material *m = &o->materials[o->count];
+	*m = (struct material){.name = name, .length = length};
+	o->places[at] = (uint32_t)++o->count;
+	return m;
+}
+
+static int scan(const struct spread *s, struct obj_shape *o)
+{
+	const char *bytes = (const char *)o->bytes.bytes;
+	struct text_lines lines = {.p = bytes, .end = bytes + o->bytes.size};
+	struct material *now = material_of(o, "", 0);
+	for (struct text_line l; text_lines_next(&lines, &l);) {
+		tick();
+		if (text_line_is(&l, "f")) {
+			now->has_faces = true;
+		} else if (text_line_is(&l, "usemtl")) {
+			now = material_of(o, l.rest, l.rest_length);
+			if (!now)
+				return xml_error(o->el, s->error, E2BIG, "%s:%d: more than %d materials", o->file,
+						 l.number, OBJ_MATERIALS_MAX);
+		} else if (text_line_is(&l, "mtllib")) {
+			o->library = l.rest;
+			o->library_length = l.rest_length;
+		}
+	}
+	return 0;
+}
+
+static int read_library(const struct spread *s, struct obj_shape *o)
+{
+	if (!o->library)
+		return 0;
+	const char *file = mtl_file(s->assets, o->file, o->library, o->library_length, s->arena);
+	if (!file)
+		return out_of_memory(s);
+	int r = mtl_read(&o->mtl, s->assets, file, s->arena, s->error);
+	if (!r && o->mtl.there && asset_list_add(s->files, file, s->arena))
+		r = out_of_memory(s);
+	return r;
+}
+
+/* ---- which material each has */
+
+/* The last BSDF in the shape that is for it counts. *found: how many have a BSDF or an entry in the .mtl file. */
+static int choose(const struct spread *s, struct obj_shape *o, size_t *found)
+{
+	*found = 0;
+	for (size_t i = 0; i < o->count; i++) {
+		struct material *m = &o->materials[i];
+		char *name = arena_alloc(s->arena, m->length + 1, 1);
+		if (!name)
+			return out_of_memory(s);
+		memcpy(name, m->name, m->length);
+		name[m->length] = 0;
+		m->name = name;
+		for (size_t k = 0; k < o->child_count; k++) {
+			const struct child *c = &o->children[k];
+			if (c->bsdf && (!c->name || strcmp(c->name, name) == 0))
+				m->bsdf = c->el;
+		}
+		if (!m->bsdf && o->load)
+			m->mtl = mtl_find(&o->mtl, name);
+		*found += m->has_faces && (m->bsdf || m->mtl);
+	}
+	return 0;
+}
+
+/* One BSDF whose name is no material of the file is that of the whole shape. */
+static bool is_for_all(struct obj_shape *o)
+{
+	for (size_t k = 0; k < o->child_count && o->named == 1 && o->plain == 0; k++) {
+		const char *name = o->children[k].name;
+		const struct material *m = name ? material_of(o, name, strlen(name)) : NULL;
+		if (m && !m->has_faces)
+			return true;
+	}
+	return false;
+}
+
+/* ---- the shapes that it becomes */
+
+static int count_elements(const struct spread *s, const struct xml_element *at, int made)
+{
+	if (made < 0)
+		return out_of_memory(s);
+	if (s->tree->element_count > XML_ELEMENTS_MAX - (uint32_t)made)
+		return xml_error(at, s->error, E2BIG, "materials make more than %d elements of the scene",
+				 XML_ELEMENTS_MAX);
+	s->tree->element_count += (uint32_t)made;
+	return 0;
+}
+
+/* The same element once more, inside another; `unnamed`: as what has no name. */
+static struct xml_element *copy_into(const struct spread *s, struct xml_element *in, const struct xml_element *el,
+				     bool unnamed)
+{
+	struct xml_element *copy = arena_alloc(s->arena, 1, sizeof *copy);
+	struct xml_attribute *attributes = arena_alloc(s->arena, el->attribute_count, sizeof *attributes);
+	if (!copy || !attributes)
+		return NULL;
+	*copy = *el;
+	copy->next = NULL;
+	copy->attributes = attributes;
+	copy->attribute_count = 0;
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (!unnamed || strcmp(el->attributes[i].name, "name") != 0)
+			attributes[copy->attribute_count++] = el->attributes[i];
+	element_link(in, copy);
+	return copy;
+}
+
+static int put_part(const struct spread *s, const struct obj_shape *o, struct xml_element *merge,
+		    const struct material *m)
+{
+	int made = 2;
+	struct xml_element *part = element_make(merge, "shape", o->el->file, o->el->line, s->arena), *name;
+	if (!part)
+		return out_of_memory(s);
+	part->snake = true;
+	element_put(part, "type", "obj");
+	for (size_t k = 0; k < o->child_count; k++, made++) {
+		const struct child *c = &o->children[k];
+		if ((!c->bsdf || c->el == m->bsdf) && !copy_into(s, part, c->el, c->bsdf))
+			return out_of_memory(s);
+	}
+	name = element_make(part, "string", o->el->file, o->el->line, s->arena);
+	if (!name)
+		return out_of_memory(s);
+	element_put(name, "name", "material");
+	element_put(name, "value", m->name);
+	int r = count_elements(s, o->el, made);
+	return r || !m->mtl ? r : count_elements(s, o->el, mtl_put(&o->mtl, m->mtl, part, s->arena));
+}
+
+/* Of the element itself becomes the merge, so that whoever refers to it finds all. */
+static int replace(const struct spread *s, const struct obj_shape *o)
+{
+	struct xml_element *merge = element_make(NULL, o->el->name, o->el->file, o->el->line, s->arena);
+	if (!merge)
+		return out_of_memory(s);
+	const char *id = xml_attribute(o->el, "id");
+	element_put(merge, "type", "merge");
+	if (id)
+		element_put(merge, "id", id);
+	int r = 0;
+	for (size_t i = 0; i < o->count && !r; i++)
+		if (o->materials[i].has_faces)
+			r = put_part(s, o, merge, &o->materials[i]);
+	if (r)
+		return r;
+	merge->parent = o->el->parent;
+	merge->next = o->el->next;
+	merge->snake = true;
+	for (struct xml_element *part = merge->first; part; part = part->next)
+		part->parent = o->el;
+	*o->el = *merge;
+	return 0;
+}
+
+/* ---- what is said of it */
+
+__attribute__((format(printf, 3, 4))) static int note(const struct spread *s, const struct obj_shape *o,
+						      const char *format, ...)
+{
+	char text[REPORT_TEXT_MAX];
+	va_list ap;
+	int used = snprintf(text, sizeof text, "%s:%d: <shape type=\"obj\">: ", o->el->file, o->el->line);
+	va_start(ap, format);
+	vsnprintf(text + used, sizeof text - (size_t)used, format, ap);
+	va_end(ap);
+	return report_text(s->report, o->el->file, text, text, s->error);
+}
+
+static int note_all(const struct spread *s, struct obj_shape *o)
+{
+	int r = 0;
+	unsigned grey = 0;
+	const char *first = NULL;
+	for (size_t k = 0; k < o->child_count && !r; k++) {
+		const char *name = o->children[k].name;
+		const struct material *m = name ? material_of(o, name, strlen(name)) : NULL;
+		if (m && !m->has_faces)
+			r = note(s, o, "no face of %.128s has the material `%.64s`: this bsdf is not used", o->file,
+				 name);
+	}
+	for (size_t i = 0; i < o->count; i++)
+		if (o->materials[i].has_faces && !o->materials[i].bsdf && !o->materials[i].mtl) {
+			first = first ? first : o->materials[i].name;
+			grey++;
+		}
+	if (!r && grey)
+		r = note(
+			s, o,
+			"%u of the materials of %.128s (first: `%.64s`) %s neither a bsdf nor an entry in a .mtl file: "
+			"diffuse and grey",
+			grey, o->file, first, grey == 1 ? "has" : "have");
+	if (!r && o->mtl.unread.line)
+		r = note(s, o, "%.128s:%d: `%s` is not read, as Mitsuba does not read it", o->mtl.file,
+			 o->mtl.unread.line, o->mtl.unread.text);
+	return r;
+}
+
+/* ---- the walk */
+
+static int spread_open(const struct spread *s, struct obj_shape *o)
+{
+	size_t found = 0;
+	int r = scan(s, o);
+	if (r || is_for_all(o))
+		return r;
+	if (o->load)
+		r = read_library(s, o);
+	if (!r)
+		r = choose(s, o, &found);
+	if (r || (found == 0 && o->named < 2))
+		return r; /* the builder of the world counts those whose materials are not read */
+	r = note_all(s, o);
+	return r ? r : replace(s, o);
+}
+
+static bool make_room(struct spread *s)
+{
+	s->materials = s->materials ? s->materials : arena_alloc(s->arena, OBJ_MATERIALS_MAX, sizeof *s->materials);
+	s->places = s->places ? s->places : arena_alloc(s->arena, PLACES, sizeof *s->places);
+	return s->materials && s->places;
+}
+
+static int spread_shape(struct spread *s, struct xml_element *el)
+{
+	struct obj_shape o = {.el = el, .load = true};
+	struct error missing;
+	int r = read_children(s, &o);
+	bool asks = o.named > 0 || (o.plain == 0 && o.load && !o.fixed);
+	if (r || !o.file || !asks)
+		return r;
+	if (s->assets->open(s->assets->user, o.file, &o.bytes, &missing)) {
+		if (o.named + o.plain < 2)
+			return 0; /* whoever builds the shape complains */
+		el->told = true;
+		return xml_error(el, s->error, ENOENT, "%.400s", missing.text);
+	}
+	if (make_room(s)) {
+		o.materials = s->materials;
+		o.places = s->places;
+		memset(o.places, 0, PLACES * sizeof *o.places);
+		r = spread_open(s, &o);
+	} else {
+		r = out_of_memory(s);
+	}
+	s->assets->close(s->assets->user, &o.bytes);
+	return r;
+}
+
+static int walk(struct spread *s, struct xml_element *el)
+{
+	int r = 0;
+	for (struct xml_element *c = el->first; c && !r; c = c->next) {
+		const char *type = xml_attribute(c, "type");
+		if (c->ignored)
+			continue;
+		if (c->snake && strcmp(c->name, "shape") == 0 && type && strcasecmp(type, "obj") == 0)
+			r = report_problem(s->report, spread_shape(s, c), s->error);
+		else
+			r = walk(s, c);
+	}
+	return r;
+}
+
+int obj_materials_spread(struct xml_tree *t, struct id_table *ids, const struct asset_source *assets,
+			 struct asset_list *files, struct arena *arena, struct report *report, struct error *e)
+{
+	struct spread s = {
+		.tree = t, .ids = ids, .assets = assets, .files = files, .arena = arena, .report = report, .error = e};
+	return t->dialect_3 ? 0 : walk(&s, t->root);
+}
