@@ -71,3 +71,15 @@ int node_error(const struct scene_node *n, struct error *e, int errno_value, con
 	return error_set(e, errno_value, "%s:%d: <%s type=\"%.64s\">: %s", n->file, n->line, plugin_class_name(n->cls),
 			 n->type, text);
 }
+
+const char *node_title(const struct scene_node *n, char text[NODE_TITLE_MAX])
+{
+	const char *material = node_string(n, "material", NULL);
+	if (n->id)
+		snprintf(text, NODE_TITLE_MAX, "`%.40s` (line %d)", n->id, n->line);
+	else if (material && n->cls == PLUGIN_SHAPE)
+		snprintf(text, NODE_TITLE_MAX, "the %.24s in line %d (`%.32s`)", n->type, n->line, material);
+	else
+		snprintf(text, NODE_TITLE_MAX, "the %.24s in line %d", n->type, n->line);
+	return text;
+}

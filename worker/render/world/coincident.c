@@ -39,15 +39,6 @@ struct accel_shape *coincident_shapes(const struct world *w, struct arena *arena
 	return s;
 }
 
-static const char *name_of(const struct scene_node *n, char text[80])
-{
-	if (n->id)
-		snprintf(text, 80, "`%.40s` (line %d)", n->id, n->line);
-	else
-		snprintf(text, 80, "the %.24s in line %d", n->type, n->line);
-	return text;
-}
-
 static const char *reason(enum surface_rank hidden, enum surface_rank by)
 {
 	if (hidden == by)
@@ -67,19 +58,19 @@ static bool is_news(const struct world *w, const struct accel_shape *s, const st
 static void describe_pair(struct render_coincident *out, const struct coincide_shapes *c, const struct accel_shape *s,
 			  const struct scene_node *const *nodes)
 {
-	char hidden[80], by[80], *text = out->text[out->count];
+	char hidden[NODE_TITLE_MAX], by[NODE_TITLE_MAX], *text = out->text[out->count];
 	if (out->total++ >= RENDER_COINCIDENT_MAX)
 		return;
 	out->count++;
 	if (c->hidden == c->by) {
 		snprintf(text, sizeof out->text[0], "triangles of %s coincide: only the first of them is there",
-			 name_of(nodes[c->hidden], hidden));
+			 node_title(nodes[c->hidden], hidden));
 	} else {
 		bool shine = s[c->hidden].rank == SURFACE_SHINES && s[c->by].rank == SURFACE_SHINES;
 		bool refract = s[c->hidden].rank == SURFACE_TRANSMITS && s[c->by].rank == SURFACE_TRANSMITS;
 		snprintf(text, sizeof out->text[0],
 			 "%s and %s coincide: where they overlap only the latter is there, because it %s%s",
-			 name_of(nodes[c->hidden], hidden), name_of(nodes[c->by], by),
+			 node_title(nodes[c->hidden], hidden), node_title(nodes[c->by], by),
 			 reason(s[c->hidden].rank, s[c->by].rank),
 			 shine && !c->same_side
 				 ? "; light to the other side is lost: a lamp with two sides is two, a little apart"

@@ -42,12 +42,16 @@ static void count_flat(struct counted *f, const struct scene_node *n, uint64_t t
 
 static void note_flat(struct world *w, const struct counted *f)
 {
-	if (f->first)
-		snprintf(
-			w->notes.flat, sizeof w->notes.flat,
-			"%llu triangles without an area are left out, in %u shapes (first: the %.24s in line %d); %u of these "
-			"shapes have no others",
-			(unsigned long long)f->triangles, f->shapes, f->first->type, f->first->line, f->empty);
+	char first[NODE_TITLE_MAX], empty[64] = "";
+	if (!f->first)
+		return;
+	if (f->empty)
+		snprintf(empty, sizeof empty, "; %u of these shapes ha%s no others", f->empty,
+			 f->empty == 1 ? "s" : "ve");
+	snprintf(w->notes.flat, sizeof w->notes.flat,
+		 "%llu triangles without an area are left out, in %u shape%s (first: %s)%s",
+		 (unsigned long long)f->triangles, f->shapes, f->shapes == 1 ? "" : "s", node_title(f->first, first),
+		 empty);
 }
 
 static void count_materials(struct counted *c, const struct builder *b, const struct scene_node *n,
@@ -61,12 +65,12 @@ static void count_materials(struct counted *c, const struct builder *b, const st
 
 static void note_materials(struct world *w, const struct counted *c)
 {
+	char first[NODE_TITLE_MAX];
 	if (c->materials)
-		snprintf(
-			w->notes.materials, sizeof w->notes.materials,
-			"the files of %u mesh%s without a bsdf (first: the %.24s in line %d) name materials, but no .mtl file that "
-			"has them: diffuse and grey",
-			c->materials, c->materials == 1 ? "" : "es", c->first_material->type, c->first_material->line);
+		snprintf(w->notes.materials, sizeof w->notes.materials,
+			 "the files of %u mesh%s without a bsdf (first: %s) name materials, but no .mtl file that "
+			 "has them: diffuse and grey",
+			 c->materials, c->materials == 1 ? "" : "es", node_title(c->first_material, first));
 }
 
 static int read_shape(struct builder *b, const struct scene_node *n, struct shape_geometry *g, uint64_t *dropped)
@@ -183,6 +187,7 @@ int build_read_shapes(struct builder *b)
 static void note_scales(struct builder *b)
 {
 	uint32_t small = 0, large = 0;
+	char little[NODE_TITLE_MAX], big[NODE_TITLE_MAX];
 	for (uint32_t i = 1; i < b->w->shape_count; i++) {
 		if (box_extent(&b->boxes[i]) < box_extent(&b->boxes[small]))
 			small = i;
@@ -190,12 +195,10 @@ static void note_scales(struct builder *b)
 			large = i;
 	}
 	if (b->w->shape_count > 0 && box_extent(&b->boxes[small]) < LEAST_SCALE * box_extent(&b->all))
-		snprintf(
-			b->w->notes.scales, sizeof b->w->notes.scales,
-			"the %.24s in line %d is so much smaller than the scene, with the %.24s in line %d, that numbers are too short for both: what is "
-			"seen of it can be wrong",
-			b->shape_nodes[small]->type, b->shape_nodes[small]->line, b->shape_nodes[large]->type,
-			b->shape_nodes[large]->line);
+		snprintf(b->w->notes.scales, sizeof b->w->notes.scales,
+			 "%s is so much smaller than the scene, with %s, that numbers are too short for both: what is "
+			 "seen of it can be wrong",
+			 node_title(b->shape_nodes[small], little), node_title(b->shape_nodes[large], big));
 }
 
 int build_rescale(struct builder *b)

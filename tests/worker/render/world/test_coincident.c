@@ -93,7 +93,7 @@ static void test_scales(void **state)
 		if (far)
 			assert_string_equal(
 				note,
-				"the cube in line 2 is so much smaller than the scene, with the rectangle in line 3, that numbers are "
+				"`block` (line 2) is so much smaller than the scene, with the rectangle in line 3, that numbers are "
 				"too short for both: what is seen of it can be wrong");
 		world_free(w);
 	}

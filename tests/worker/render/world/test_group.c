@@ -125,7 +125,7 @@ static void test_flat(void **state)
 	assert_int_equal(w->emitter_count, 2); /* the sphere and the sky */
 	assert_non_null(strstr(w->notes.flat,
 			       "3 triangles without an area are left out, in 2 shapes (first: the obj in line 1)"));
-	assert_non_null(strstr(w->notes.flat, "1 of these shapes have no others"));
+	assert_non_null(strstr(w->notes.flat, "1 of these shapes has no others"));
 	world_free(w);
 }
 
