@@ -36,6 +36,9 @@ struct xml_element {
 	bool counted;	 /* for the interpreter: among the objects of the scene */
 };
 
+/* The value of a property that stands for a member of a glTF file which has no counterpart here. */
+#define ELEMENT_UNSUPPORTED "unsupported"
+
 const char *xml_attribute(const struct xml_element *el, const char *name); /* NULL: none */
 
 /* error_set with "file:line: <element>: " before the text. */

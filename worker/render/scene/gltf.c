@@ -151,6 +151,11 @@ static void note_unknown(struct gltf *g)
 static void check_file(struct gltf *g)
 {
 	const json_t *asset = gltf_object(g, NULL, g->root, "asset");
+	const json_t *number = asset ? json_object_get(asset, "version") : NULL; /* as files of 1.0 may have it */
+	if (json_is_number(number) && json_number_value(number) < 2) {
+		gltf_fail(g, NULL, EINVAL, "glTF of version %.3g; 2.0 is supported", json_number_value(number));
+		return;
+	}
 	const char *version = asset ? gltf_text(g, NULL, asset, "version", "") : "";
 	if (strncmp(version, "2.", 2) != 0)
 		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);

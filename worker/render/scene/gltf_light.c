@@ -108,10 +108,12 @@ void gltf_default_camera(struct gltf *g)
 	static const double fov = 40 / (180 / M_PI);
 	vec3 middle = vec3_scale(0.5, vec3_add(g->low, g->high));
 	double radius = 0.5 * vec3_length(vec3_sub(g->high, g->low));
-	if (!vec3_is_finite(middle) || !(radius > 0)) {
+	if (!(g->low.x <= g->high.x)) {
 		gltf_fail(g, NULL, EINVAL, "there is no mesh of triangles in its scene");
 		return;
 	}
+	if (!vec3_is_finite(middle) || !(radius > 0))
+		return; /* the accessors do not say how large it is: the scene has no sensor (scene_settings_place) */
 	vec3 from = vec3_normalize((vec3){0.5, 0.4, 1});
 	mat4 look = mat4_look_at(vec3_madd(middle, radius / sin(fov / 2), from), middle, (vec3){0, 1, 0});
 	mat4 back = mat4_scale((vec3){-1, 1, -1}), m = mat4_mul(look, back);

@@ -5,13 +5,14 @@
  * not told apart from solids. The clear coat's strength is the format's, four times the parameter of `principled`,
  * which ends at a quarter of it.
  *
- * What `principled` does not have (sheen, iridescence, attenuation, a second set of texture coordinates, ...) becomes a
+ * What `principled` does not have (sheen, iridescence, attenuation, two sets of texture coordinates, ...) becomes a
  * property that its table does not know: refused with its name, or left out with --lenient.
  */
 #include "worker/render/scene/gltf_material.h"
 #include "worker/render/scene/gltf_buffer.h"
 #include "worker/render/scene/gltf_tree.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -62,6 +63,33 @@ static void put_transform(struct gltf *g, struct xml_element *el, const struct g
 	gltf_put_matrix(g, el, at, "to_uv", &m);
 }
 
+static uint64_t set_of(struct gltf *g, const struct gltf_at *at, const json_t *info)
+{
+	const json_t *t = gltf_extension(g, at, info, "KHR_texture_transform");
+	uint64_t own = gltf_whole(g, at, info, "texCoord", 0);
+	return t ? gltf_whole(g, at, t, "texCoord", own) : own;
+}
+
+unsigned gltf_material_set(struct gltf *g, const struct gltf_at *at)
+{
+	const json_t *metal = json_object_get(at->json, "pbrMetallicRoughness");
+	const json_t *infos[] = {
+		json_object_get(metal, "baseColorTexture"), json_object_get(metal, "metallicRoughnessTexture"),
+		json_object_get(at->json, "normalTexture"), json_object_get(at->json, "emissiveTexture")};
+	uint64_t set = 0;
+	bool any = false;
+	for (size_t i = 0; i < sizeof infos / sizeof *infos; i++) {
+		if (!infos[i])
+			continue;
+		uint64_t own = set_of(g, at, infos[i]);
+		if (any && own != set)
+			return 0;
+		set = own;
+		any = true;
+	}
+	return set < UINT_MAX ? (unsigned)set : 0;
+}
+
 /* The texture that `info` names as the property `name` of el. */
 static void put_texture(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
 			const json_t *info, const struct channel *c)
@@ -95,9 +123,8 @@ static void put_texture(struct gltf *g, struct xml_element *el, const struct glt
 		gltf_put_number(g, bitmap, &texture, "threshold", c->cutoff);
 	put_sampler(g, bitmap, &texture);
 	put_transform(g, bitmap, at, info);
-	uint64_t set = gltf_whole(g, at, info, "texCoord", 0);
-	if (set > 0)
-		gltf_put_whole(g, bitmap, at, "tex_coord", set); /* no parameter: not supported */
+	if (set_of(g, at, info) != gltf_material_set(g, at))
+		gltf_put_text(g, bitmap, at, "texCoord", ELEMENT_UNSUPPORTED);
 }
 
 static void put_colour(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
@@ -158,7 +185,7 @@ static void put_unsupported(struct gltf *g, struct xml_element *el, const struct
 {
 	for (; *members; members++)
 		if (json_object_get(extension, *members))
-			gltf_put_text(g, el, at, *members, "unsupported");
+			gltf_put_text(g, el, at, *members, ELEMENT_UNSUPPORTED);
 }
 
 static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
@@ -175,7 +202,7 @@ static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_
 	if (specular)
 		gltf_numbers(g, at, specular, "specularColorFactor", tint, 3);
 	if (tint[0] != 1 || tint[1] != 1 || tint[2] != 1)
-		gltf_put_rgb(g, el, at, "specularColorFactor", tint); /* no parameter: not supported */
+		gltf_put_text(g, el, at, "specularColorFactor", ELEMENT_UNSUPPORTED);
 	put_unsupported(g, el, at, specular, others);
 }
 
@@ -228,7 +255,7 @@ static void put_foreign(struct gltf *g, struct xml_element *el, const struct glt
 		while (known[k] && strcmp(known[k], name) != 0)
 			k++;
 		if (!known[k])
-			gltf_put_text(g, el, at, name, "unsupported");
+			gltf_put_text(g, el, at, name, ELEMENT_UNSUPPORTED);
 	}
 }
 
@@ -248,7 +275,7 @@ static struct xml_element *put_mask(struct gltf *g, struct xml_element *parent, 
 		return parent;
 	struct xml_element *mask = gltf_plugin(g, parent, at, "bsdf", "mask", NULL);
 	if (cut && vertex_alpha) /* no threshold of a product: not supported */
-		gltf_put_text(g, mask, at, "alpha_of_COLOR_0_with_MASK", "unsupported");
+		gltf_put_text(g, mask, at, "alpha_of_COLOR_0_with_MASK", ELEMENT_UNSUPPORTED);
 	/* alpha times the texture's is cut off at `cutoff` */
 	const struct channel c = {.name = "a",
 				  .factor = {cut ? 1 : alpha},

@@ -11,6 +11,8 @@ enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
 /* What a shape of this material refers to. */
 void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
 		   enum gltf_colours colours);
+/* Which set of texture coordinates its textures take, where all take the same; else 0. */
+unsigned gltf_material_set(struct gltf *g, const struct gltf_at *material);
 void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours);
 
 #endif

@@ -10,6 +10,7 @@
 #include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { UNSIGNED_BYTE = 5121, UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126 };
@@ -145,7 +146,11 @@ static void put_attributes(struct primitive *p, const json_t *primitive, const j
 		put_accessor(p, &a, "normal", "VEC3", 3);
 	else
 		gltf_put_bool(g, p->shape, p->mesh, "face_normals", true); /* as the format says */
-	if (gltf_follow(g, p->mesh, attributes, "TEXCOORD_0", GLTF_ACCESSORS, &a) > 0)
+	struct gltf_at material;
+	char texcoord[32];
+	bool has = gltf_follow(g, p->mesh, primitive, "material", GLTF_MATERIALS, &material) > 0;
+	snprintf(texcoord, sizeof texcoord, "TEXCOORD_%u", has ? gltf_material_set(g, &material) : 0);
+	if (gltf_follow(g, p->mesh, attributes, texcoord, GLTF_ACCESSORS, &a) > 0)
 		put_accessor(p, &a, "texcoord", "VEC2", 2);
 	if (gltf_follow(g, p->mesh, attributes, "COLOR_0", GLTF_ACCESSORS, &a) > 0)
 		put_colours(p, &a);
@@ -170,6 +175,8 @@ static void put_primitive(struct gltf *g, const struct gltf_at *mesh, const json
 		return;
 	}
 	struct primitive p = {.g = g, .mesh = mesh, .shape = gltf_plugin(g, g->scene, mesh, "shape", "gltf", NULL)};
+	/* All of a .glb stands in one line: messages name shapes by this. */
+	gltf_attribute(g, p.shape, "id", "shape %u, of meshes[%zu]", g->primitives, mesh->index);
 	put_attributes(&p, primitive, attributes, to_world);
 	if (g->failed)
 		return;

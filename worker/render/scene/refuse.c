@@ -2,6 +2,7 @@
 #include "worker/render/scene/refuse.h"
 
 #include "common/base/spelling.h"
+#include "worker/render/scene/gltf.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/value.h"
@@ -79,6 +80,9 @@ int refuse_property(const struct plugin_decl *owner, const char *type, const str
 				 "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
 				 "supported: %s",
 				 name, plugin_class_name(owner->cls), type, list);
+	const char *value = xml_attribute(el, "value");
+	if (gltf_is(el->file) && value && strcmp(value, ELEMENT_UNSUPPORTED) == 0)
+		return xml_error(el->parent, e, ENOTSUP, "`%.64s` is not supported; --lenient leaves it out", name);
 	struct spelling s = {.wanted = name};
 	plugin_offer_params(owner, &s);
 	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",

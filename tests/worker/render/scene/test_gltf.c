@@ -231,8 +231,10 @@ static const struct {
 	/* known, and not supported */
 	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 11, \"COLOR_0\": 11", "of another type than color needs"},
 	{"\"TEXCOORD_0\": 2}", "\"TEXCOORD_0\": 2, \"COLOR_0\": 9}", "`color` is not as many as positions"},
-	{"{\"index\": 0},\n\"metallicFactor\"", "{\"index\": 0, \"texCoord\": 1},\n\"metallicFactor\"", "tex_coord"},
-	{"\"KHR_materials_ior\"", "\"KHR_materials_sheen\"", "KHR_materials_sheen"},
+	{"{\"index\": 0},\n\"metallicFactor\"", "{\"index\": 0, \"texCoord\": 1},\n\"metallicFactor\"",
+	 "<texture type=\"bitmap\">: `texCoord` is not supported; --lenient leaves it out"},
+	{"\"KHR_materials_ior\"", "\"KHR_materials_sheen\"",
+	 "<bsdf type=\"principled\">: `KHR_materials_sheen` is not supported; --lenient leaves it out"},
 	{"\"KHR_materials_ior\": {\"ior\": 1.75}", "\"KHR_materials_specular\": {\"specularTexture\": {}}",
 	 "specularTexture"},
 	{"\"mode\": 5,", "\"mode\": 5, \"extensions\": {\"KHR_draco_mesh_compression\": {}},", "without compression"},

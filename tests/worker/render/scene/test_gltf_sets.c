@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* glTF files with several sets of texture coordinates, without extents, of version 1; how their shapes are called. */
+#include "tests/support/memory_assets.h"
+#include "worker/render/render.h"
+#include "worker/render/scene/scene.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* Set 0 begins at byte 36, set 1 at byte 60. */
+#define FILE_OF(version, material, more, bounds)                                                                    \
+	"{\"asset\": {\"version\": " version                                                                        \
+	"}, \"scene\": 0, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"mesh\": 0}],"                              \
+	"\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0, \"TEXCOORD_0\": 1, \"TEXCOORD_1\": 2},"  \
+	"\"material\": 0}]}], \"materials\": [{\"pbrMetallicRoughness\": {" material "}" more "}],"                 \
+	"\"textures\": [{\"source\": 0}], \"images\": [{\"uri\": \"p.png\"}],"                                      \
+	"\"accessors\": [{\"bufferView\": 0, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC3\"" bounds "}," \
+	"{\"bufferView\": 0, \"byteOffset\": 36, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC2\"},"       \
+	"{\"bufferView\": 0, \"byteOffset\": 60, \"componentType\": 5126, \"count\": 3, \"type\": \"VEC2\"}],"      \
+	"\"bufferViews\": [{\"buffer\": 0, \"byteLength\": 84}], \"buffers\": [{\"uri\": \"b.bin\", \"byteLength\": 84}]}"
+#define BOUNDS ", \"min\": [0, 0, 0], \"max\": [1, 1, 0]"
+#define FIRST "\"baseColorTexture\": {\"index\": 0}"
+#define SECOND "\"baseColorTexture\": {\"index\": 0, \"texCoord\": 1}"
+#define BOTH(set) "\"metallicRoughnessTexture\": {\"index\": 0, \"texCoord\": " set "}"
+
+static struct scene read_text(const char *json)
+{
+	const struct memory_file files[] = {{"s.gltf", json, strlen(json)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	if (scene_read_all(&s, &assets, "s.gltf", render_plugins(), NULL, 0, false, &e))
+		fail_msg("%s", e.text);
+	return s;
+}
+
+static const struct scene_node *shape_of(const struct scene *s)
+{
+	if (s->problem_count)
+		fail_msg("%s", s->problems[0]);
+	for (uint32_t i = 0; i < s->object_count; i++)
+		if (s->objects[i]->cls == PLUGIN_SHAPE)
+			return s->objects[i];
+	fail_msg("there is no shape");
+	return NULL;
+}
+
+static void takes(const char *json, const char *first_byte)
+{
+	struct scene s = read_text(json);
+	const char *texcoord = node_string(shape_of(&s), "texcoord", "");
+	if (!strstr(texcoord, first_byte))
+		fail_msg("%s\n takes %s", json, texcoord);
+	scene_fini(&s);
+}
+
+static void refuses(const char *json, const char *sentence)
+{
+	struct scene s = read_text(json);
+	if (!s.problem_count || !strstr(s.problems[0], sentence))
+		fail_msg("%u: %s\n not: %s", s.problem_count, s.problem_count ? s.problems[0] : "", sentence);
+	scene_fini(&s);
+}
+
+static void test_sets(void **state)
+{
+	(void)state;
+	takes(FILE_OF("\"2.0\"", FIRST, "", BOUNDS), "36");
+	takes(FILE_OF("\"2.0\"", SECOND, "", BOUNDS), "60");
+	takes(FILE_OF("\"2.0\"", SECOND "," BOTH("1"), ", \"normalTexture\": {\"index\": 0, \"texCoord\": 1}", BOUNDS),
+	      "60");
+	takes(FILE_OF("\"2.0\"",
+		      "\"baseColorTexture\": {\"index\": 0, \"extensions\": {\"KHR_texture_transform\": {\"texCoord\": 1}}}",
+		      "", BOUNDS),
+	      "60");
+	refuses(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), "", BOUNDS),
+		"`texCoord` is not supported; --lenient leaves it out");
+	refuses(FILE_OF("\"2.0\"", SECOND, ", \"normalTexture\": {\"index\": 0}", BOUNDS),
+		"`texCoord` is not supported");
+}
+
+static void test_versions(void **state)
+{
+	(void)state;
+	refuses(FILE_OF("1.0", FIRST, "", BOUNDS), "glTF of version 1; 2.0 is supported");
+	refuses(FILE_OF("\"1.0\"", FIRST, "", BOUNDS), "glTF of version \"1.0\"; 2.0 is supported");
+}
+
+/* Without bounds a camera cannot be placed before the meshes are read: there is none in the scene. */
+static void test_camera(void **state)
+{
+	(void)state;
+	for (int bounds = 0; bounds < 2; bounds++) {
+		struct scene s =
+			read_text(bounds ? FILE_OF("\"2.0\"", FIRST, "", BOUNDS) : FILE_OF("\"2.0\"", FIRST, "", ""));
+		int sensors = 0;
+		assert_string_equal(shape_of(&s)->id, "shape 1, of meshes[0]");
+		for (uint32_t i = 0; i < s.object_count; i++)
+			sensors += s.objects[i]->cls == PLUGIN_SENSOR;
+		assert_int_equal(sensors, bounds);
+		scene_fini(&s);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_sets),
+		cmocka_unit_test(test_versions),
+		cmocka_unit_test(test_camera),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
