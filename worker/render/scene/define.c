@@ -69,17 +69,27 @@ int define_default(struct define_table *t, const char *name, const char *value, 
 	return 0;
 }
 
-static int refuse_unknown(const struct define_table *t, const char *name, size_t length, struct error *e)
+static int refuse_unknown(struct define_table *t, const char *name, size_t length, struct error *e)
 {
 	char wanted[65], hint[128];
 	size_t n = length < sizeof wanted - 1 ? length : sizeof wanted - 1;
 	memcpy(wanted, name, n);
 	wanted[n] = 0;
+	for (size_t i = 0; i < t->missing_count; i++)
+		if (strcmp(t->missing[i], wanted) == 0)
+			return -EEXIST;
+	if (t->missing_count == DEFINE_MISSING_MAX)
+		return -EEXIST;
+	const char *kept = arena_strdup(t->arena, wanted);
+	if (!kept)
+		return error_set(e, ENOMEM, "out of memory");
+	t->missing[t->missing_count++] = kept;
 	struct spelling s = {.wanted = wanted};
 	for (size_t i = 0; i < t->count; i++)
 		spelling_offer(&s, t->entries[i].name);
-	return error_set(e, EINVAL, "$%s is not defined: neither by <default> before this line nor by -D%s", wanted,
-			 spelling_hint(&s, hint, sizeof hint));
+	return error_set(e, ENOENT,
+			 "$%s is not defined by a <default> before this line; -D %s=VALUE gives it a value%s", wanted,
+			 wanted, spelling_hint(&s, hint, sizeof hint));
 }
 
 /* One pass; with out NULL only the length is found. */

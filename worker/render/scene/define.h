@@ -13,7 +13,7 @@ struct scene_define {
 	const char *name, *value; /* -D name=value */
 };
 
-enum { DEFINE_MAX = 1024 };
+enum { DEFINE_MAX = 1024, DEFINE_MISSING_MAX = 64 };
 
 struct define_entry {
 	const char *name, *value;
@@ -23,7 +23,8 @@ struct define_entry {
 struct define_table {
 	struct arena *arena;
 	struct define_entry *entries; /* DEFINE_MAX */
-	size_t count;
+	size_t count, missing_count;
+	const char *missing[DEFINE_MISSING_MAX]; /* names that were asked for and are not there, each once */
 };
 
 int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena,
@@ -31,7 +32,8 @@ int define_init(struct define_table *t, const struct scene_define *given, size_t
 int define_default(struct define_table *t, const char *name, const char *value, struct error *e);
 
 /* Replaces every $name in text, once: what is put in is not looked at again. The text itself where it has none.
- * The longest run of letters, digits and '_' after '$' must be a name. */
+ * The longest run of letters, digits and '_' after '$' must be a name. -ENOENT: there is none of that name, and it is
+ * asked for the first time; -EEXIST: that has been said. */
 int define_substitute(struct define_table *t, const char *text, size_t size_max, const char **out, struct error *e);
 
 /* A name of the command line that no file had a use for is a mistake. */

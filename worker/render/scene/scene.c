@@ -550,9 +550,11 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 				 : gltf_read(m->tree, assets, name, &s->arena, m->error);
 	else
 		r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
+	for (uint32_t i = 0; i < m->tree->missing_count && !r; i++)
+		r = report_problem(&m->report, error_set(m->error, EINVAL, "%s", m->tree->missing[i]), m->error);
 	if (r)
 		r = report_problem(&m->report, r, m->error);
-	else if ((r = make_scene(m)) == REPORT_FULL)
+	else if (m->tree->missing_count == 0 && (r = make_scene(m)) == REPORT_FULL)
 		r = 0;
 	s->notes = m->report.notes;
 	s->note_count = m->report.note_count;

@@ -106,6 +106,17 @@ static int out_of_memory(struct reader *r)
 			 r->file, line_now(r), XML_MEMORY_MAX >> 20);
 }
 
+/* All names without a value are said, not the first alone. */
+static int note_missing(struct reader *r, const struct xml_element *el, const char *attribute)
+{
+	error_prefix(r->error, -ENOENT, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line, el->name, attribute);
+	const char *text = arena_strdup(r->arena, r->error->text);
+	if (!text)
+		return out_of_memory(r);
+	r->tree->missing[r->tree->missing_count++] = text;
+	return 0;
+}
+
 static int copy_attributes(struct reader *r, struct xml_element *el, const char **given)
 {
 	size_t n = 0;
@@ -128,9 +139,15 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 			a[i].value = arena_strdup(r->arena, value);
 		else
 			c = define_substitute(&r->defines, value, XML_VALUE_MAX, &a[i].value, r->error);
+		if (c == -ENOENT || c == -EEXIST) {
+			c = c == -ENOENT ? note_missing(r, el, a[i].name) : 0;
+			a[i].value = arena_strdup(r->arena, value);
+		} else if (c) {
+			error_prefix(r->error, c, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line, el->name,
+				     a[i].name);
+		}
 		if (c)
-			return error_prefix(r->error, c, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line,
-					    el->name, a[i].name);
+			return c;
 		if (!a[i].value)
 			return out_of_memory(r);
 		el->attributes = a;
@@ -429,5 +446,5 @@ int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *
 	if (!file)
 		return error_set(e, ENOMEM, "out of memory");
 	c = read_file(&r, file);
-	return c ? c : define_check_used(&r.defines, e);
+	return c || t->missing_count ? c : define_check_used(&r.defines, e);
 }

@@ -20,6 +20,7 @@ enum {
 	XML_FILES_MAX = 1024, /* files included in all */
 	XML_PATHS_MAX = 16,   /* folders that are searched for files */
 	XML_NOTES_MAX = 8,    /* on a file as a whole */
+	XML_MISSING_MAX = DEFINE_MISSING_MAX,
 	XML_ELEMENTS_MAX = 1 << 20,
 	XML_ATTRIBUTES_MAX = 24,
 	XML_VALUE_MAX = 1 << 20,     /* bytes of an attribute's value */
@@ -31,9 +32,11 @@ enum {
 struct xml_tree {
 	struct xml_element *root; /* <scene>; includes stand as <scene> elements in the place of <include> */
 	bool dialect_3;
-	uint32_t element_count, include_count, path_count, note_count;
+	uint32_t element_count, include_count, path_count, note_count, missing_count;
 	const char *includes[XML_FILES_MAX]; /* names of included files; repeated where included more than once */
 	const char *notes[XML_NOTES_MAX];    /* what whoever reads the file should know */
+	const char
+		*missing[XML_MISSING_MAX]; /* a sentence each on $names without a value: what they stand in is wrong */
 	const char *
 		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
 };

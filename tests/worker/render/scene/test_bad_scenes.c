@@ -287,6 +287,29 @@ static void test_bad_references(void **state)
 	refuses(S "<bsdf type='diffuse'><bsdf type='diffuse' name='nested'/></bsdf>" END, "has no `nested`");
 }
 
+/* Every name without a value is said, where it is met first. */
+static void test_names_without_values(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		S "\n<default name='there' value='1'/><shape type='$kind'><float name='radius' value='$r'/>\n"
+		  "<float name='x' value='$there'/><float name='y' value='$there$hte'/></shape><bsdf type='$r'/>" END;
+	static const char *const said[] = {
+		"s.xml:2: <shape>: attribute `type`: $kind is not defined",
+		"s.xml:2: <float>: attribute `value`: $r is not defined by a <default> before this line; -D r=VALUE",
+		"s.xml:3: <float>: attribute `value`: $hte is not defined"};
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", scene_tables(), NULL, 0, false, &e), 0);
+	assert_int_equal(s.problem_count, 3);
+	for (size_t i = 0; i < 3; i++)
+		if (strncmp(s.problems[i], said[i], strlen(said[i])) != 0)
+			fail_msg("%s\n not: %s", s.problems[i], said[i]);
+	scene_fini(&s);
+}
+
 /* A medium is complained of where it is made, not wherever it is used. */
 static void test_media_are_told_once(void **state)
 {
@@ -387,13 +410,21 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_broken_xml),	    cmocka_unit_test(test_entity_bomb),
-		cmocka_unit_test(test_parameter_bomb),	    cmocka_unit_test(test_deep_nesting),
-		cmocka_unit_test(test_too_many_elements),   cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_media_are_told_once), cmocka_unit_test(test_misplaced_parameters),
-		cmocka_unit_test(test_bad_values),	    cmocka_unit_test(test_bad_transforms),
-		cmocka_unit_test(test_bad_references),	    cmocka_unit_test(test_flat_shapes),
-		cmocka_unit_test(test_bad_includes),	    cmocka_unit_test(test_bad_films),
+		cmocka_unit_test(test_broken_xml),
+		cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),
+		cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements),
+		cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_names_without_values),
+		cmocka_unit_test(test_media_are_told_once),
+		cmocka_unit_test(test_misplaced_parameters),
+		cmocka_unit_test(test_bad_values),
+		cmocka_unit_test(test_bad_transforms),
+		cmocka_unit_test(test_bad_references),
+		cmocka_unit_test(test_flat_shapes),
+		cmocka_unit_test(test_bad_includes),
+		cmocka_unit_test(test_bad_films),
 		cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
