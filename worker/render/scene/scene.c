@@ -131,6 +131,11 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 	if (r)
 		return r;
 	const struct property *before = node_find(d->node, p->name);
+	if (before && el->snake && (before->value.type == VALUE_NODE) != (v.type == VALUE_NODE)) {
+		if (v.type == VALUE_NODE) /* in 0.6 a texture has the place of a value, in whichever order */
+			d->properties[before - d->node->properties].value = v;
+		return 0;
+	}
 	if (before)
 		return xml_error(el, e, EINVAL, "`%s` is given twice (first in line %d)", p->name, before->line);
 	d->properties[d->node->property_count++] = (struct property){p->name, el->line, v};

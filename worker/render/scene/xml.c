@@ -241,13 +241,13 @@ static bool is_there(const struct reader *r, const char *name)
 	return true;
 }
 
-/* The first of the folders that has the file. A name that none has stays as it is, for whoever opens it to complain. */
-static int find_file(struct reader *r, const char **name)
+/* The first of the folders that has the file; *found: one has. */
+static int search(struct reader *r, const char *written, const char **name, bool *found)
 {
-	const char *written = *name;
+	*found = false;
 	if (!(*name = canonical(r, "", written)))
 		return out_of_memory(r);
-	if (r->tree->path_count == 0 || is_there(r, *name))
+	if ((*found = is_there(r, *name)))
 		return 0;
 	for (uint32_t i = 0; i < r->tree->path_count; i++) {
 		const char *there = canonical(r, r->tree->paths[i], written);
@@ -255,10 +255,34 @@ static int find_file(struct reader *r, const char **name)
 			return out_of_memory(r);
 		if (is_there(r, there)) {
 			*name = there;
+			*found = true;
 			return 0;
 		}
 	}
 	return 0;
+}
+
+/* A name that no folder has stays as it is, for whoever opens it to complain; one that was written on Windows is tried
+ * with '/' for '\\'. */
+static int find_file(struct reader *r, const char **name)
+{
+	bool found = false, windows = strchr(*name, '\\') != NULL;
+	const char *written = *name;
+	if (r->tree->path_count == 0 && !windows)
+		return (*name = canonical(r, "", written)) ? 0 : out_of_memory(r);
+	int c = search(r, written, name, &found);
+	if (c || found || !windows)
+		return c;
+	char *turned = arena_strdup(r->arena, written);
+	if (!turned)
+		return out_of_memory(r);
+	for (char *p = turned; *p; p++)
+		*p = *p == '\\' ? '/' : *p;
+	const char *other;
+	c = search(r, turned, &other, &found);
+	if (!c && found)
+		*name = other;
+	return c;
 }
 
 /* <include filename>, <spectrum filename> and <string name="filename" value>. */

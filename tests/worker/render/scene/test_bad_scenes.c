@@ -138,6 +138,7 @@ static void test_unknown_names(void **state)
 		"s.xml:1: <medium type=\"homogeneous\">: participating media are not supported; --lenient leaves");
 	refuses(S "<shape type='cube'>\n<medium type='homogeneous' name='interior'/></shape>" END,
 		"s.xml:2: <medium type=\"homogeneous\">: participating media");
+	refuses(S "\n<phase type='hg' id='p'/>" END, "s.xml:2: <phase type=\"hg\">: participating media are not");
 	refuses(S "<shape type='cube'>\n<subsurface type='dipole'/></shape>" END, "subsurface scattering is not");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");

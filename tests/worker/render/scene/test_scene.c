@@ -469,7 +469,19 @@ static void test_second_name(void **state)
 	assert_non_null(node_ref(s.objects[0], "reflectance"));
 	assert_true(node_find(s.objects[1], "reflectance")->value.as.rgb[2] == 0.3);
 	scene_fini(&s);
+	/* A value and a texture: the texture counts there, in both orders. */
+	s = read_ok(
+		"<scene version='0.6.0'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/>"
+		"<spectrum name='reflectance' value='0.5'/></bsdf><bsdf type='diffuse'>"
+		"<spectrum name='reflectance' value='0.5'/><texture name='reflectance' type='checkerboard'/></bsdf></scene>");
+	for (int i = 0; i < 2; i++)
+		assert_true(node_ref(s.objects[i], "reflectance") && s.objects[i]->property_count == 1);
+	scene_fini(&s);
 	struct error e;
+	assert_true(read_with(&s,
+			      "<scene version='3.0.0'><bsdf type='diffuse'><rgb name='reflectance' value='1'/>"
+			      "<texture name='reflectance' type='checkerboard'/></bsdf></scene>",
+			      NULL, 0, &e) < 0);
 	assert_true(read_with(&s,
 			      "<scene version='0.6.0'><bsdf type='diffuse'><rgb name='reflectance' value='1'/>"
 			      "<rgb name='diffuseReflectance' value='1'/></bsdf></scene>",
@@ -506,6 +518,20 @@ static void test_asset_names_are_canonical(void **state)
 	assert_int_equal(s.asset_count, 1);
 	assert_string_equal(s.assets[0], names[0]);
 	assert_int_equal(s.note_count, 1);
+	scene_fini(&s);
+	/* a name from Windows; one that is there as it is written; one that is not there at all */
+	s = read_ok("<scene version='3.0.0'><path value='m/../../common/'/>"
+		    "<shape type='obj'><string name='filename' value='..\\common\\a.obj'/></shape>"
+		    "<shape type='obj'><string name='filename' value='x\\..\\a.obj'/></shape>"
+		    "<shape type='obj'><string name='filename' value='b\\c.obj'/></shape></scene>");
+	assert_string_equal(node_string(s.objects[0], "filename", ""), names[0]);
+	assert_string_equal(node_string(s.objects[1], "filename", ""), names[0]);
+	assert_string_equal(node_string(s.objects[2], "filename", ""), "b\\c.obj");
+	scene_fini(&s);
+	files[1].name = "b\\c.obj";
+	s = read_ok(
+		"<scene version='3.0.0'><shape type='obj'><string name='filename' value='b\\c.obj'/></shape></scene>");
+	assert_string_equal(node_string(s.objects[0], "filename", ""), "b\\c.obj");
 	files[1] = (struct memory_file){0};
 	scene_fini(&s);
 }
