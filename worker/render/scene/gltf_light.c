@@ -125,5 +125,5 @@ void gltf_default_light(struct gltf *g)
 {
 	struct xml_element *el = gltf_plugin(g, g->scene, NULL, "emitter", "constant", NULL);
 	gltf_put_number(g, el, NULL, "radiance", 1);
-	gltf_note(g, "it has no light: a constant environment of radiance 1 stands in");
+	gltf_note(g, "it has no light, or none brighter than 1: a constant environment of radiance 1 stands in");
 }

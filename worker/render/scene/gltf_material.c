@@ -412,7 +412,8 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 	struct xml_element *emitter = gltf_plugin(g, g->scene, at, "emitter", "area", NULL);
 	put_colour(g, emitter, at, "radiance", rgb, gltf_object(g, at, at->json, "emissiveTexture"));
 	put_id(g, emitter, at, "emitter", GLTF_NO_COLOURS);
-	g->has_light = true;
+	/* What glows like a screen lights no room: viewers show it among surroundings that do. */
+	g->has_light |= rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
 }
 
 void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *at, enum gltf_colours colours)

@@ -106,12 +106,31 @@ static void test_camera(void **state)
 	}
 }
 
+/* A material that glows as far as a screen does is shown by other light; a lamp is light enough. */
+static void test_light(void **state)
+{
+	(void)state;
+#define GLOWS(more) FILE_OF("\"2.0\"", FIRST, ", \"emissiveFactor\": [1, 0.5, 0]" more, BOUNDS)
+	for (int strong = 0; strong < 2; strong++) {
+		struct scene s = read_text(
+			strong ? GLOWS(", \"extensions\": {\"KHR_materials_emissive_strength\": {\"emissiveStrength\": 1.5}}")
+			       : GLOWS(""));
+		int skies = 0;
+		assert_non_null(node_child(shape_of(&s), PLUGIN_EMITTER, 0)); /* it shines in any case */
+		for (uint32_t i = 0; i < s.object_count; i++)
+			skies += s.objects[i]->cls == PLUGIN_EMITTER && strcmp(s.objects[i]->type, "constant") == 0;
+		assert_int_equal(skies, !strong);
+		scene_fini(&s);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_sets),
 		cmocka_unit_test(test_versions),
 		cmocka_unit_test(test_camera),
+		cmocka_unit_test(test_light),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
