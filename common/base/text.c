@@ -25,9 +25,10 @@ static size_t utf8_length(const unsigned char *p)
 	return n;
 }
 
-static bool is_control(unsigned char c)
+/* Those of ASCII, and U+0080 to U+009F: a terminal takes U+009B for the beginning of a command as it does escape. */
+static bool is_control(const unsigned char *p)
 {
-	return c < 32 || c == 127;
+	return p[0] < 32 || p[0] == 127 || (p[0] == 0xC2 && p[1] < 0xA0);
 }
 
 bool text_is_clean(const char *text)
@@ -35,7 +36,7 @@ bool text_is_clean(const char *text)
 	size_t n;
 	for (const unsigned char *p = (const unsigned char *)text; *p; p += n) {
 		n = utf8_length(p);
-		if (n == 0 || is_control(*p))
+		if (n == 0 || is_control(p))
 			return false;
 	}
 	return true;
@@ -48,8 +49,8 @@ void text_clean(char *text)
 		n = utf8_length(p);
 		if (n == 0)
 			*p = '?';
-		else if (is_control(*p))
-			*p = ' ';
+		else if (is_control(p))
+			memset(p, ' ', n);
 	}
 }
 

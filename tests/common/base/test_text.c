@@ -77,6 +77,12 @@ static void texts_are_made_clean(void **state)
 	text_clean(text);
 	assert_string_equal(text, "a\xc3\xa4??\"  ???\xf0\x9f\x98\x80?");
 	assert_true(text_is_clean(text));
+	char command[] = "\xc2\x9b"
+			 "2J\xc2\x80\xc2\xa0\xc2\x9f";
+	assert_false(text_is_clean(command));
+	text_clean(command);
+	assert_string_equal(command, "  2J  \xc2\xa0  ");
+	assert_true(text_is_clean(command));
 	/* a sentence is clean whatever it quotes */
 	struct error e;
 	error_set(&e, EINVAL, "<%.4s>: %s", "abc\xc3\xa4", "caf\xe9");

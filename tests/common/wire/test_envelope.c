@@ -137,6 +137,9 @@ static void text_is_checked(void **state)
 	assert_true(envelope_text_ok("gr\xc3\xbcn \xf0\x9f\x98\x80", 20));
 	assert_false(envelope_text_ok("abc", 2));
 	assert_false(envelope_text_ok("a\nb", 9));
+	assert_false(envelope_text_ok("a\xc2\x9b"
+				      "b",
+				      9));		   /* a control character of terminals */
 	assert_false(envelope_text_ok("\xc0\xaf", 9));	   /* overlong */
 	assert_false(envelope_text_ok("\xed\xa0\x80", 9)); /* a surrogate */
 	assert_false(envelope_text_ok("\xe2\x82", 9));	   /* cut */
