@@ -10,6 +10,7 @@
 #include "common/estimate/forecast.h"
 
 #include "common/estimate/merge.h"
+#include "common/estimate/stated_error.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -50,13 +51,15 @@ void forecast_add_look(struct forecast_history *h, const struct forecast_look *l
 void forecast_add(struct forecast_history *h, const struct plan *p, const struct canvas_image *img, double cpu_seconds,
 		  double seconds)
 {
+	bool doubtful;
+	double upper = stated_error_upper(img, &doubtful);
 	struct forecast_look l = {.work = (double)img->rounds * (double)plan_round_mutations(p),
 				  .cpu_seconds = cpu_seconds,
 				  .seconds = seconds,
 				  .rel_mse = img->rel_mse,
-				  .rel_mse_upper = img->rel_mse_upper,
+				  .rel_mse_upper = upper * upper,
 				  .degrees = img->rel_mse_degrees > 0 ? img->rel_mse_degrees : p->groups - 1.0,
-				  .doubtful = img->rel_mse_doubt != ERROR_KNOWN};
+				  .doubtful = doubtful};
 	forecast_add_look(h, &l);
 }
 

@@ -25,7 +25,13 @@ void stated_b_doubt(const struct canvas_image *img, char *text, size_t size);
  * chains did not come everywhere also how many pixels they left out. Empty: there is no estimate. */
 void stated_error(const struct canvas_image *img, char *text, size_t size);
 
-/* An error that is known, below or at the target: what ends a render. */
+/*
+ * What a target error is compared with, relative: the upper end of the 90 % interval. Where the doubt of an image made
+ * of samples is about rare light it may last for ever, since their variance is infinite: then it is five times the
+ * estimate, once that is 10 % or less (tests/image/README.md, "Where the render stops"). doubtful: of no use for that.
+ */
+double stated_error_upper(const struct canvas_image *img, bool *doubtful);
+/* That is below or at the target: what ends a render. */
 bool stated_error_meets(const struct canvas_image *img, double target);
 
 #endif

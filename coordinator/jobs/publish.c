@@ -3,6 +3,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/estimate/stated_error.h"
 #include "common/exr/image_file.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/step.h"
@@ -64,14 +65,16 @@ static void run(uv_work_t *work)
 static void tell_error(const struct publishing *w)
 {
 	struct jobs *jobs = w->jobs;
+	bool doubtful;
+	double upper = stated_error_upper(&w->image, &doubtful);
 	struct event ev = {.kind = EVENT_ERROR_KNOWN,
 			   .job = w->job->id,
 			   .error_known = {.job = w->job->id,
 					   .rounds = w->rounds,
-					   .rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper),
+					   .rel_error = w->rc ? NAN : upper,
 					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
 					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
-					   .doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
+					   .doubtful = !w->rc && doubtful,
 					   .cpu_seconds = w->job->cpu_seconds - w->job->record.bootstrap_cpu_seconds}};
 	jobs_step(jobs, &ev);
 	durable_look(jobs, ev.job);

@@ -402,6 +402,28 @@ static void words(void **state)
 		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose brightness is "
 		"not known well enough to divide by; no chain came to 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
+	img.unvisited = 0;
+	/* Rare light may leave the interval unknown for ever: five times the estimate count, once that is small. */
+	static const enum error_doubt rare[] = {ERROR_ONE_GROUP, ERROR_TAIL};
+	static const enum error_doubt others[] = {ERROR_DARK, ERROR_WIDE, ERROR_SHORT};
+	float chains = 1;
+	for (int i = 0; i < 2; i++) {
+		img.rel_mse_doubt = rare[i];
+		assert_true(stated_error_meets(&img, 0.501) && !stated_error_meets(&img, 0.499));
+		img.r_hat = &chains;
+		assert_false(stated_error_meets(&img, 0.501));
+		img.r_hat = NULL;
+		img.rel_mse = 0.0101;
+		assert_false(stated_error_meets(&img, 10));
+		img.rel_mse = 0.01;
+		img.rel_mse_upper = 0.49; /* more than that */
+		assert_true(stated_error_meets(&img, 0.701) && !stated_error_meets(&img, 0.699));
+		img.rel_mse_upper = 0.0121;
+	}
+	for (int i = 0; i < 3; i++) {
+		img.rel_mse_doubt = others[i];
+		assert_false(stated_error_meets(&img, 10));
+	}
 	img.rel_mse = NAN;
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(text, "");
