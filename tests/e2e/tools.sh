@@ -46,6 +46,7 @@ code 0 "$BIN/hslt-compare" a.exr large.exr --size 16x16 --heatmap heat.png --tri
 grep -q '^left out  *2 of 256' out || fail "--trim says: $(cat out)"
 code 0 "$BIN/hslt-tonemap" a.exr a.png --exposure -1
 code 2 "$BIN/hslt-tonemap" a.exr a.png --exposure bright
+code 2 "$BIN/hslt-tonemap" a.exr a.JPG && [ ! -e a.JPG ] || fail "a PNG has the name of another format"
 # What is no regular file is written to and stays; of a link the file that it leads to is replaced.
 code 0 "$BIN/hslt-tonemap" a.exr b.png --exposure -1
 "$BIN/hslt-tonemap" a.exr /dev/stdout --exposure -1 2>err.log | cmp - b.png || fail "/dev/stdout: $(cat err.log)"

@@ -6,6 +6,7 @@
 #include "worker/cli/base/options.h"
 
 #include "common/base/mem.h"
+#include "common/base/picture_name.h"
 #include "common/base/spelling.h"
 #include "common/base/text.h"
 #include "worker/render/settings/accuracy_settings.h"
@@ -14,7 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -32,18 +32,13 @@ int option_scene(size_t index, const char *word, const char **scene, struct erro
 
 int option_image(const char *arg, const char **image, struct error *e)
 {
-	static const char *const others[] = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp", ".ppm", ".pfm"};
-	size_t n = strlen(arg);
+	const char *format = picture_name_format(arg);
 	*image = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
-	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
-		size_t k = strlen(others[i]);
-		if (n > k && strcasecmp(arg + n - k, others[i]) == 0)
-			return error_set(
-				e, EINVAL,
-				"images are OpenEXR, and '%s' would not be what its name says; hslt-tonemap makes a PNG of one",
-				arg);
-	}
-	return 0;
+	if (!format || strcmp(format, ".exr") == 0)
+		return 0;
+	return error_set(
+		e, EINVAL,
+		"images are OpenEXR, and '%s' would not be what its name says; hslt-tonemap makes a PNG of one", arg);
 }
 
 int option_path(const char *arg, const char **paths, size_t *count, struct error *e)

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
 #include "common/base/output.h"
+#include "common/base/picture_name.h"
 #include "common/base/program.h"
 #include "worker/cli/image/picture.h"
 #include "worker/cli/image/tonemap.h"
 
 #include <stdio.h>
+#include <string.h>
 
 struct arguments {
 	const char *in, *out;
@@ -30,7 +32,12 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	return a->out ? 0 : error_set(e, EINVAL, "IN.exr and OUT.png are needed");
+	const char *format = a->out ? picture_name_format(a->out) : NULL;
+	if (!a->out)
+		return error_set(e, EINVAL, "IN.exr and OUT.png are needed");
+	if (!format || strcmp(format, ".png") == 0)
+		return 0;
+	return error_set(e, EINVAL, "it makes PNG files, and '%s' would not be what its name says", a->out);
 }
 
 static const struct program program = {
