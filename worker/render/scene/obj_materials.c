@@ -286,8 +286,8 @@ static int replace(const struct spread *s, const struct obj_shape *o)
 
 /* ---- what is said of it */
 
-__attribute__((format(printf, 3, 4))) static int note(const struct spread *s, const struct obj_shape *o,
-						      const char *format, ...)
+__attribute__((format(printf, 3, 4))) static int say(const struct spread *s, const struct obj_shape *o,
+						     const char *format, ...)
 {
 	char text[REPORT_TEXT_MAX];
 	va_list ap;
@@ -307,8 +307,8 @@ static int note_all(const struct spread *s, struct obj_shape *o)
 		const char *name = o->children[k].name;
 		const struct material *m = name ? material_of(o, name, strlen(name)) : NULL;
 		if (m && !m->has_faces)
-			r = note(s, o, "no face of %.128s has the material `%.64s`: this bsdf is not used", o->file,
-				 name);
+			r = say(s, o, "no face of %.128s has the material `%.64s`: this bsdf is not used", o->file,
+				name);
 	}
 	for (size_t i = 0; i < o->count; i++)
 		if (o->materials[i].has_faces && !o->materials[i].bsdf && !o->materials[i].mtl) {
@@ -316,14 +316,13 @@ static int note_all(const struct spread *s, struct obj_shape *o)
 			grey++;
 		}
 	if (!r && grey)
-		r = note(
-			s, o,
+		r = say(s, o,
 			"%u of the materials of %.128s (first: `%.64s`) %s neither a bsdf nor an entry in a .mtl file: "
 			"diffuse and grey",
 			grey, o->file, first, grey == 1 ? "has" : "have");
 	if (!r && o->mtl.unread.line)
-		r = note(s, o, "%.128s:%d: `%s` is not read, as Mitsuba does not read it", o->mtl.file,
-			 o->mtl.unread.line, o->mtl.unread.text);
+		r = say(s, o, "%.128s:%d: `%s` is not read, as Mitsuba does not read it", o->mtl.file,
+			o->mtl.unread.line, o->mtl.unread.text);
 	return r;
 }
 

@@ -8,6 +8,7 @@
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
+#include "worker/render/scene/notes.h"
 #include "worker/render/scene/obj_materials.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
@@ -20,7 +21,6 @@
 #include "worker/render/scene/xml.h"
 
 #include <assert.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -35,6 +35,7 @@ struct maker {
 	struct xml_tree *tree;
 	struct id_table ids;
 	struct report report;
+	struct notes notes;
 	struct asset_list assets;
 	uint64_t objects; /* when all references are followed */
 	int depth;
@@ -60,53 +61,6 @@ static int out_of_memory(struct maker *m)
 static void *allocate(struct maker *m, size_t count, size_t size)
 {
 	return arena_alloc(&m->scene->arena, count, size);
-}
-
-/* One note for each kind of thing, where it is met first. */
-__attribute__((format(printf, 5, 6))) static int note(struct maker *m, const struct xml_element *el, const char *type,
-						      const char *property, const char *format, ...)
-{
-	char key[REPORT_TEXT_MAX];
-	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", el->name, type, property);
-	va_list ap;
-	va_start(ap, format);
-	int r = report_note(&m->report, el->file, key, m->error, format, ap);
-	va_end(ap);
-	return r;
-}
-
-static int note_property(struct maker *m, const struct xml_element *owner, const struct xml_element *el,
-			 const char *name)
-{
-	const char *type = xml_attribute(owner, "type");
-	return note(m, owner, type, name,
-		    "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file, el->line,
-		    owner->name, type, name);
-}
-
-static int note_unheeded(struct maker *m, const struct xml_element *owner, const struct xml_element *el,
-			 const char *name)
-{
-	const char *type = xml_attribute(owner, "type"), *value = xml_attribute(el, "value");
-	if (value && strcasecmp(value, "false") == 0)
-		return 0;
-	return note(
-		m, owner, type, name,
-		"%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not supported: the image differs a little from Mitsuba's",
-		el->file, el->line, owner->name, type, name);
-}
-
-static int note_foreign(struct maker *m, const struct xml_element *el)
-{
-	return note(m, el, "", "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
-}
-
-/* What is not supported goes, and that is said. */
-static int leave_out(struct maker *m, const struct xml_element *el, const char *type, const char *property,
-		     const char *what)
-{
-	return note(m, el, type, property, "%s:%d: <%.64s>: %s `%.64s` is not supported and left out (lenient)",
-		    el->file, el->line, el->name, what, *property ? property : type);
 }
 
 static int add_asset(struct maker *m, const char *name)
@@ -159,14 +113,6 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 	return !s.best;
 }
 
-static int note_foreign_parameter(struct maker *m, const struct xml_element *owner, const struct xml_element *el,
-				  const char *name)
-{
-	const char *type = xml_attribute(owner, "type");
-	return note(m, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not known and is ignored",
-		    el->file, el->line, owner->name, type, name);
-}
-
 /* What the table says of a name: *p understood, or NULL with the matter settled (ignored, or an error). */
 static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
 		   const struct xml_element *el, const char *name, const struct param **p)
@@ -180,17 +126,17 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	}
 	/* 0.6 has it for all BSDFs; those whose reflectances can add up to more than 1 have it in their tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
-		return note_property(m, owner, el, name);
+		return note_property(&m->notes, owner, el, name);
 	if (!found && is_foreign_parameter(m, d, el, name))
-		return note_foreign_parameter(m, owner, el, name);
+		return note_foreign_parameter(&m->notes, owner, el, name);
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
-		return leave_out(m, el, xml_attribute(owner, "type"), name, "the parameter");
+		return leave_out(&m->notes, el, xml_attribute(owner, "type"), name, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
-		return note_property(m, owner, el, name);
+		return note_property(&m->notes, owner, el, name);
 	if (found->status == PARAM_UNHEEDED)
-		return note_unheeded(m, owner, el, name);
+		return note_unheeded(&m->notes, owner, el, name);
 	*p = found;
 	return 0;
 }
@@ -200,7 +146,7 @@ static int stand_still(struct maker *m, const struct xml_element *owner, const s
 	bool moves;
 	int r = transform_still(el, m->lenient, &moves, m->error);
 	return r || !moves ? r
-			   : leave_out(m, (*el)->parent, xml_attribute(owner, "type"), "motion",
+			   : leave_out(&m->notes, (*el)->parent, xml_attribute(owner, "type"), "motion",
 				       "all but the start of the");
 }
 
@@ -228,7 +174,7 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	if (!r)
 		r = add_property(d, el, p, v, m->error);
 	if (r == -EINVAL && m->lenient && p->choices)
-		return leave_out(m, el, written, xml_attribute(el, "value"), "the value");
+		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? add_asset(m, v.as.string) : xml_error(el, m->error, EINVAL, "an empty file name");
 	mat4 inverse;
@@ -252,7 +198,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		if (el != target) /* it is told where it is made */
 			return REPORT_TOLD;
 		const char *type = xml_attribute(el, "type");
-		return m->lenient ? leave_out(m, el, type ? type : "", "", "the medium") : refuse_medium(el, m->error);
+		return m->lenient ? leave_out(&m->notes, el, type ? type : "", "", "the medium")
+				  : refuse_medium(el, m->error);
 	}
 	const char *written = xml_attribute(el, "name");
 	const struct param *p = NULL;
@@ -273,7 +220,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		if (d->decl->status == PARAM_IGNORED)
 			return 0;
 		if (m->lenient)
-			return leave_out(m, el, plugin_class_name(cls), d->node->type, "its use in");
+			return leave_out(&m->notes, el, plugin_class_name(cls), d->node->type, "its use in");
 		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",
 				 plugin_class_name(cls), written ? "" : " without a name", owner->name, d->node->type);
 	}
@@ -281,7 +228,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return xml_error(el, m->error, EINVAL, "`%s` may be a texture, but not a %s", p->name,
 				 plugin_class_name(cls));
 	if (p && m->lenient && !(p->types & VALUE_NODE))
-		return leave_out(m, el, xml_attribute(owner, "type"), p->name, "an object for the parameter");
+		return leave_out(&m->notes, el, xml_attribute(owner, "type"), p->name, "an object for the parameter");
 	const struct scene_node *child;
 	int r = make_node(m, target, &child);
 	bool once = d->node->cls == PLUGIN_SHAPE && cls == PLUGIN_BSDF;
@@ -303,14 +250,14 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 
 static int foreign_element(struct maker *m, const struct xml_element *el)
 {
-	return m->lenient ? leave_out(m, el, el->name, "", "the element") : refuse_element(el, m->error);
+	return m->lenient ? leave_out(&m->notes, el, el->name, "", "the element") : refuse_element(el, m->error);
 }
 
 static int read_content(struct maker *m, struct draft *d, const struct xml_element *owner, struct xml_element *el)
 {
 	enum plugin_class cls;
 	if (el->ignored)
-		return note_foreign(m, el);
+		return note_foreign(&m->notes, el);
 	if (value_is_element(el->name))
 		return read_property(m, d, owner, el);
 	if (plugin_class_find(el->name, &cls))
@@ -326,15 +273,6 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	if (!r)
 		r = id_table_find(&m->ids, el, "id", &target, m->error);
 	return r ? r : read_object(m, d, owner, el, target);
-}
-
-static int note_ignored_plugin(struct maker *m, const struct xml_element *el, const struct plugin_decl *decl)
-{
-	char list[256];
-	const char *type = xml_attribute(el, "type");
-	plugin_list_params(decl, list, sizeof list);
-	return note(m, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored except for: %s", el->file, el->line,
-		    el->name, type, list);
 }
 
 static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
@@ -367,8 +305,8 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 		return refuse_type(m->decls, el, cls, *type, m->error);
 	struct xml_element *inner = way == LENIENT_INNER ? lenient_inner(&m->ids, el) : NULL;
 	int r = way == LENIENT_LEAVE_OUT
-			? leave_out(m, el, *type, "", "the plug-in")
-			: note(m, el, *type, "",
+			? leave_out(&m->notes, el, *type, "", "the plug-in")
+			: note(&m->notes, el, *type, "",
 			       "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)",
 			       el->file, el->line, el->name, *type, inner ? "the BSDF inside" : "a standard ",
 			       inner ? "" : other);
@@ -396,7 +334,7 @@ static int uncover(struct maker *m, const struct xml_element *el, const struct s
 	if (!inner)
 		return 0;
 	*node = inner;
-	return note(m, el, type, inner->type,
+	return note(&m->notes, el, type, inner->type,
 		    "%s:%d: <bsdf type=\"%.64s\"> over \"%.64s\", which lets light through, is not supported; the BSDF "
 		    "inside stands in for it (lenient)",
 		    el->file, el->line, type, inner->type);
@@ -433,7 +371,7 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		return el->node = *out, 0;
 	if (strcasecmp(type, decl->type) == 0)
 		type = decl->type;
-	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(m, el, decl)))
+	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(&m->notes, el, decl)))
 		return r;
 	struct draft d = {.node = allocate(m, 1, sizeof *d.node),
 			  .decl = decl,
@@ -488,7 +426,7 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 		enum plugin_class cls;
 		const struct scene_node **next = &objects[m->scene->object_count];
 		if (el->ignored)
-			r = note_foreign(m, el);
+			r = note_foreign(&m->notes, el);
 		else if (plugin_class_find(el->name, &cls))
 			r = make_object(m, el, next);
 		else if (strcmp(el->name, "include") == 0)
@@ -532,7 +470,7 @@ static int make_scene(struct maker *m)
 	if (!r)
 		r = read_top(m, m->tree->root, objects);
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
-		r = note(m, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
+		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
 	if (!r)
 		r = remarks_on(m->scene->objects, m->scene->object_count, &m->report, m->error);
 	return r ? r : list_assets(m);
@@ -545,6 +483,7 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 {
 	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
 	*m = (struct maker){.scene = s, .assets_from = assets, .decls = decls, .error = m->error, .lenient = lenient};
+	m->notes = (struct notes){&m->report, m->error};
 	m->tree = allocate(m, 1, sizeof *m->tree);
 	int r = m->tree ? report_init(&m->report, &s->arena, m->error) : out_of_memory(m);
 	if (r)

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/notes.h"
+
+#include "worker/render/scene/plugin.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <strings.h>
+
+/* One note for each kind of thing, where it is met first. */
+int note(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
+	 const char *format, ...)
+{
+	char key[REPORT_TEXT_MAX];
+	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", el->name, type, property);
+	va_list ap;
+	va_start(ap, format);
+	int r = report_note(t->report, el->file, key, t->error, format, ap);
+	va_end(ap);
+	return r;
+}
+
+int note_property(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		  const char *name)
+{
+	const char *type = xml_attribute(owner, "type");
+	return note(t, owner, type, name,
+		    "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file, el->line,
+		    owner->name, type, name);
+}
+
+int note_unheeded(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		  const char *name)
+{
+	const char *type = xml_attribute(owner, "type"), *value = xml_attribute(el, "value");
+	if (value && strcasecmp(value, "false") == 0)
+		return 0;
+	return note(
+		t, owner, type, name,
+		"%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not supported: the image differs a little from Mitsuba's",
+		el->file, el->line, owner->name, type, name);
+}
+
+int note_foreign(const struct notes *t, const struct xml_element *el)
+{
+	return note(t, el, "", "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
+}
+
+/* What is not supported goes, and that is said. */
+int leave_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
+	      const char *what)
+{
+	return note(t, el, type, property, "%s:%d: <%.64s>: %s `%.64s` is not supported and left out (lenient)",
+		    el->file, el->line, el->name, what, *property ? property : type);
+}
+
+int note_foreign_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+			   const char *name)
+{
+	const char *type = xml_attribute(owner, "type");
+	return note(t, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not known and is ignored",
+		    el->file, el->line, owner->name, type, name);
+}
+
+int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl)
+{
+	char list[256];
+	const char *type = xml_attribute(el, "type");
+	plugin_list_params(decl, list, sizeof list);
+	return note(t, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored except for: %s", el->file, el->line,
+		    el->name, type, list);
+}

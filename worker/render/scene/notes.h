@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The sentences for what is left out of a scene, ignored or replaced: each kind of thing once, where it is met first.
+ * Each returns 0 or -ENOMEM. One thread.
+ */
+#ifndef WORKER_RENDER_SCENE_NOTES_H
+#define WORKER_RENDER_SCENE_NOTES_H
+
+#include "worker/render/scene/element.h"
+#include "worker/render/scene/param.h"
+#include "worker/render/scene/report.h"
+
+struct notes {
+	struct report *report;
+	struct error *error;
+};
+
+/* type, property: with the element's name the kind of thing. */
+__attribute__((format(printf, 5, 6))) int note(const struct notes *t, const struct xml_element *el, const char *type,
+					       const char *property, const char *format, ...);
+/* A parameter without effect on light; one that would change it a little; one that only a fork of Mitsuba has. */
+int note_property(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		  const char *name);
+int note_unheeded(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		  const char *name);
+int note_foreign_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+			   const char *name);
+/* An element that is ignored with all inside; an object of which its table keeps something. */
+int note_foreign(const struct notes *t, const struct xml_element *el);
+int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl);
+/* What is not supported goes, and that is said. */
+int leave_out(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
+	      const char *what);
+
+#endif
