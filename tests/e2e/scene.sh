@@ -39,13 +39,22 @@ if grep -q gone.obj "$DIR/gone.xml"; then
 	code 1 "$BIN/hslt-scene" check "$DIR/gone.xml"
 	grep -qi "gone.xml:[0-9]*: .*gone.obj: no such file" "$DIR/out" || fail "a missing mesh: $(cat "$DIR/out")"
 fi
+cat >"$DIR/gone2.xml" <<'XML'
+<scene version="3.0.0"><sensor type="perspective"/><emitter type="envmap"><string name="filename" value="sky.hdr"/></emitter>
+<shape type="obj"><string name="filename" value="a.obj"/></shape>
+<shape type="ply"><string name="filename" value="b.ply"/></shape><shape type="ply"><string name="filename" value="b.ply"/></shape>
+</scene>
+XML
+code 1 "$BIN/hslt-scene" check "$DIR/gone2.xml"
+grep -q "^gone2.xml: 3 problems" "$DIR/out" && grep -q 'gone2.xml:2: <shape type="obj">: a.obj: no such file' "$DIR/out" ||
+	fail "not all missing files are said: $(cat "$DIR/out")"
 
 # Files in another folder: found where --path says, with the same picture.
 mkdir "$DIR/apart" "$DIR/library"
 sed 's:<sensor:<path value="../library"/><sensor:' "$BOX" >"$DIR/apart/box.xml"
 cp -r "${BOX%/*}/meshes" "$DIR/library"
 code 1 "$BIN/hslt-scene" check "$DIR/apart/box.xml"
-grep -q 'wedge.obj: No such file' "$DIR/out" || fail "of a mesh elsewhere it says: $(cat "$DIR/out")"
+grep -q 'wedge.obj: no such file' "$DIR/out" || fail "of a mesh elsewhere it says: $(cat "$DIR/out")"
 grep -q 'note: .*"../library".*--path' "$DIR/out" || fail "it does not say how to find files outside: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" check --path "$DIR/library" "$DIR/apart/box.xml"
 code 0 "$BIN/hslt-render" --size 16 --spp 1 -i path --path "$DIR/library" "$DIR/apart/box.xml" -o "$DIR/apart.exr"

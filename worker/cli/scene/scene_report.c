@@ -39,9 +39,27 @@ static void close_scene(struct opened *o)
 	mem_free(o->name);
 }
 
-static const char *plural(uint32_t n)
+static const char *plural(uint64_t n)
 {
 	return n == 1 ? "" : "s";
+}
+
+/* Files that cannot be opened, all of them. Others are as their users find them. */
+static uint32_t print_missing(const struct scene *s, const struct asset_source *assets)
+{
+	uint32_t missing = 0;
+	for (uint32_t i = 0; i < s->asset_count; i++) {
+		struct asset a;
+		struct error e;
+		const char *place = s->asset_places[i];
+		if (assets->open(assets->user, s->assets[i], &a, &e)) {
+			printf("%s%s%s\n", place, *place ? ": " : "", e.text);
+			missing++;
+		} else {
+			assets->close(assets->user, &a);
+		}
+	}
+	return missing;
 }
 
 /* What the reader cannot see, meshes, pictures and values that do not go together, is looked at when all else is right;
@@ -53,6 +71,7 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	uint32_t problems = s->problem_count, notes = s->note_count;
 	for (uint32_t i = 0; i < s->problem_count; i++)
 		printf("%s\n", s->problems[i]);
+	problems += print_missing(s, assets);
 	const struct render_options as_it_is = {0};
 	if (!problems && render_check(s, assets, &as_it_is, &m, &deeper)) {
 		printf("%s\n", deeper.text);
@@ -67,9 +86,9 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	if (*bad)
 		printf("%s: %u problem%s, %u note%s\n", name, problems, plural(problems), notes, plural(notes));
 	else
-		printf("%s: can be rendered: %llu shapes, %llu triangles, %u files, %u note%s\n", name,
-		       (unsigned long long)m.shapes, (unsigned long long)m.triangles, s->asset_count + 1, notes,
-		       plural(notes));
+		printf("%s: can be rendered: %llu shape%s, %llu triangle%s, %u file%s, %u note%s\n", name,
+		       (unsigned long long)m.shapes, plural(m.shapes), (unsigned long long)m.triangles,
+		       plural(m.triangles), s->asset_count + 1, plural(s->asset_count + 1), notes, plural(notes));
 	return 0;
 }
 

@@ -113,7 +113,9 @@ static int open_in(const char *folder, const char *name, const char *shown, stru
 	*out = (struct asset){0};
 	if (!is_below(name))
 		return error_set(e, EINVAL,
-				 "%.256s: files must lie below the scene's folder (no absolute names, no ..)", shown);
+				 "%.256s: files must lie below the scene's folder, or one given with --path, and be "
+				 "named relative to it",
+				 shown);
 	int fd = open_below(folder, name);
 	if (fd < 0)
 		return error_set(e, errno, "%.256s: %s", shown,
@@ -165,9 +167,8 @@ static int open_outside(const struct asset_folders *f, size_t up, const char *re
 		shown, *path ? path : "/");
 }
 
-static int search_open(void *user, const char *name, struct asset *out, struct error *e)
+static int open_any(const struct asset_folders *f, const char *name, struct asset *out, struct error *e)
 {
-	const struct asset_folders *f = user;
 	const char *rest;
 	size_t up = asset_name_up(name, &rest);
 	int rc = -ENOENT;
@@ -178,10 +179,22 @@ static int search_open(void *user, const char *name, struct asset *out, struct e
 	return rc;
 }
 
+/* For whoever may say --path. */
+static int search_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	const struct asset_folders *f = user;
+	const char *rest;
+	int rc = open_any(f, name, out, e);
+	if (rc != -ENOENT || asset_name_up(name, &rest) > 0)
+		return rc;
+	return error_set(e, ENOENT, "%.256s: no such file in the scene's folder%s", name,
+			 f->count > 1 ? " or those of --path" : "; --path FOLDER searches there, too");
+}
+
 static int folder_open(void *user, const char *name, struct asset *out, struct error *e)
 {
 	struct asset_folders f = {.count = 1, .folder = {user}};
-	return search_open(&f, name, out, e);
+	return open_any(&f, name, out, e);
 }
 
 static void folder_close(void *user, struct asset *a)

@@ -4,15 +4,24 @@
 #define WORKER_RENDER_SCENE_ASSET_LIST_H
 
 #include "common/base/arena.h"
+#include "worker/render/scene/element.h"
 
-struct asset_list {
-	const char **names;
-	size_t count, room;
+struct asset_use {
+	const char *name;
+	const struct xml_element *by; /* NULL: no object */
+	size_t at;		      /* in the order in which they are met */
 };
 
-int asset_list_add(struct asset_list *l, const char *name, struct arena *arena); /* 0 or -ENOMEM */
+struct asset_list {
+	struct asset_use *uses;
+	size_t count, room;
+	const char **names, **places; /* once finished; a place is "scene.xml:12: <shape type=\"obj\">", or "" */
+};
 
-/* Sorts them, and leaves each once and `but` not at all. */
-void asset_list_finish(struct asset_list *l, const char *but);
+/* 0 or -ENOMEM. */
+int asset_list_add(struct asset_list *l, const char *name, const struct xml_element *by, struct arena *arena);
+
+/* Sorts them, and leaves each once, with the first place that names it, and `but` not at all. 0 or -ENOMEM. */
+int asset_list_finish(struct asset_list *l, const char *but, struct arena *arena);
 
 #endif

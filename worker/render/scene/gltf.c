@@ -363,7 +363,7 @@ int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char 
 		return error_set(e, ENOMEM, "out of memory");
 	int rc = assets->open(assets->user, name, &file, e);
 	if (rc)
-		return rc;
+		return rc == -ENOENT ? error_set(e, ENOENT, "%s: %s", name, strerror(ENOENT)) : rc;
 	g.bytes = file.bytes;
 	g.size = file.size;
 	rc = read_file(&g);

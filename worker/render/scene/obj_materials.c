@@ -161,7 +161,7 @@ static int read_library(const struct spread *s, struct obj_shape *o)
 	if (!file)
 		return out_of_memory(s);
 	int r = mtl_read(&o->mtl, s->assets, file, s->arena, s->error);
-	if (!r && o->mtl.there && asset_list_add(s->files, file, s->arena))
+	if (!r && o->mtl.there && asset_list_add(s->files, file, o->el, s->arena))
 		r = out_of_memory(s);
 	return r;
 }

@@ -63,9 +63,9 @@ static void *allocate(struct maker *m, size_t count, size_t size)
 	return arena_alloc(&m->scene->arena, count, size);
 }
 
-static int add_asset(struct maker *m, const char *name)
+static int add_asset(struct maker *m, const char *name, const struct xml_element *by)
 {
-	return asset_list_add(&m->assets, name, &m->scene->arena) ? out_of_memory(m) : 0;
+	return asset_list_add(&m->assets, name, by, &m->scene->arena) ? out_of_memory(m) : 0;
 }
 
 static const char *property_name(struct maker *m, const struct xml_element *el, const char *name)
@@ -176,13 +176,14 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	if (r == -EINVAL && m->lenient && p->choices)
 		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
-		r = *v.as.string ? add_asset(m, v.as.string) : xml_error(el, m->error, EINVAL, "an empty file name");
+		r = *v.as.string ? add_asset(m, v.as.string, owner)
+				 : xml_error(el, m->error, EINVAL, "an empty file name");
 	mat4 inverse;
 	if (!r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE && !mat4_invert(v.as.transform, &inverse))
 		r = xml_error(owner, m->error, EINVAL, "%s flattens the shape (it has no inverse): line %d", written,
 			      el->line);
 	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
-	return r || !file ? r : add_asset(m, file);
+	return r || !file ? r : add_asset(m, file, el);
 }
 
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
@@ -445,11 +446,13 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 static int list_assets(struct maker *m)
 {
 	for (uint32_t i = 0; i < m->tree->include_count; i++) {
-		int r = add_asset(m, m->tree->includes[i]);
+		int r = add_asset(m, m->tree->includes[i], NULL);
 		if (r)
 			return r;
 	}
-	asset_list_finish(&m->assets, m->name);
+	if (asset_list_finish(&m->assets, m->name, &m->scene->arena))
+		return out_of_memory(m);
+	m->scene->asset_places = m->assets.places;
 	m->scene->assets = m->assets.names;
 	m->scene->asset_count = (uint32_t)m->assets.count;
 	return 0;

@@ -24,7 +24,8 @@ struct scene {
 	uint32_t asset_count;
 	const char *const
 		*assets; /* names of all files that the description refers to, without the scene file, each once */
-	uint32_t problem_count; /* 0 but after scene_read_all */
+	const char *const *asset_places; /* "scene.xml:12: <shape type=\"obj\">" which names it first; or "" */
+	uint32_t problem_count;		 /* 0 but after scene_read_all */
 	const char *const
 		*problems; /* "scene.xml:12: <bsdf>: ..." all that is wrong or not supported, in the file's order */
 	uint32_t note_count;

@@ -470,5 +470,7 @@ int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *
 	if (!file)
 		return error_set(e, ENOMEM, "out of memory");
 	c = read_file(&r, file);
+	if (c == -ENOENT && !r.file)
+		return error_set(e, ENOENT, "%s: %s", file, strerror(ENOENT));
 	return c || t->missing_count ? c : define_check_used(&r.defines, e);
 }

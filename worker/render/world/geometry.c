@@ -49,9 +49,9 @@ static void note_flat(struct world *w, const struct counted *f)
 		snprintf(empty, sizeof empty, "; %u of these shapes ha%s no others", f->empty,
 			 f->empty == 1 ? "s" : "ve");
 	snprintf(w->notes.flat, sizeof w->notes.flat,
-		 "%llu triangles without an area are left out, in %u shape%s (first: %s)%s",
-		 (unsigned long long)f->triangles, f->shapes, f->shapes == 1 ? "" : "s", node_title(f->first, first),
-		 empty);
+		 "%llu triangle%s without an area %s left out, in %u shape%s (first: %s)%s",
+		 (unsigned long long)f->triangles, f->triangles == 1 ? "" : "s", f->triangles == 1 ? "is" : "are",
+		 f->shapes, f->shapes == 1 ? "" : "s", node_title(f->first, first), empty);
 }
 
 static void count_materials(struct counted *c, const struct builder *b, const struct scene_node *n,

@@ -256,6 +256,18 @@ static void test_outside_is_said(void **state)
 	refuses("%2e%2e/common/a.png", wanted);
 	reads("%2e%2e/scene/a.obj", "inside");
 	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
+	/* what is nowhere, to someone who may say where else to search */
+	struct asset_folders f = asset_folders_of(folder, NULL, 0);
+	struct asset_source own = asset_search(&f), more;
+	struct asset a;
+	struct error e;
+	assert_int_equal(own.open(own.user, "none.obj", &a, &e), -ENOENT);
+	assert_string_equal(e.text, "none.obj: no such file in the scene's folder; --path FOLDER searches there, too");
+	const char *const others[] = {root};
+	f = asset_folders_of(folder, others, 1);
+	more = asset_search(&f);
+	assert_int_equal(more.open(more.user, "none.obj", &a, &e), -ENOENT);
+	assert_string_equal(e.text, "none.obj: no such file in the scene's folder or those of --path");
 	for (int i = 0; i < 64; i++)
 		strcat(deep, "%2e%2e/");
 	strcat(deep, "a");
