@@ -51,7 +51,8 @@ static int build_cdf(struct area *a, struct arena *arena)
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	if (!build->surface)
-		return node_error(n, e, EINVAL, "an area emitter belongs into a shape");
+		return node_error(n, e, EINVAL,
+				  "an area emitter must stand in a shape, or have an id by which shapes refer to it");
 	struct area *a = arena_alloc(build->arena, 1, sizeof *a);
 	if (!a)
 		return error_set(e, ENOMEM, "out of memory");

@@ -32,9 +32,9 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 {
 	const struct emitter_ops *ops = find_ops(n);
 	if (!ops)
-		return node_error(n, e, ENOTSUP, "\"%s\" is no emitter that is supported", n->type);
+		return node_error(n, e, ENOTSUP, "\"%s\" is not an emitter that is supported", n->type);
 	if (ops->needs_surface && !build->surface)
-		return node_error(n, e, EINVAL, "\"%s\" belongs into a shape", n->type);
+		return node_error(n, e, EINVAL, "\"%s\" must stand in a shape", n->type);
 	if (!ops->needs_surface && build->surface)
 		return node_error(n, e, EINVAL, "\"%s\" cannot hang on a shape", n->type);
 	*em = (struct emitter){.ops = ops};

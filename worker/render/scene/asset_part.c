@@ -44,7 +44,7 @@ static int decode_part(struct asset_part *p, const struct scene_node *n, const c
 	int64_t size = decode(p->bytes, p->size, p->decoded);
 	if (size < 0) {
 		mem_free(p->decoded);
-		return node_error(n, e, EINVAL, "%s: what is embedded there is no base64", name);
+		return node_error(n, e, EINVAL, "%s: what is embedded there is not base64", name);
 	}
 	p->bytes = p->decoded;
 	p->size = (size_t)size;

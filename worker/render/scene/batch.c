@@ -25,13 +25,13 @@ static int check(const struct scene_node *batch, const struct scene_node *film, 
 		return node_error(batch, e, EINVAL, "needs at least one sensor inside");
 	for (uint32_t i = 0; i < sensors; i++)
 		if (batch_is(node_child(batch, PLUGIN_SENSOR, i)))
-			return node_error(batch, e, EINVAL, "a batch in a batch");
+			return node_error(batch, e, EINVAL, "a batch may not hold another batch");
 	for (size_t i = 0; i < sizeof crop / sizeof *crop; i++)
 		if (node_find(film, crop[i]))
 			return node_error(film, e, ENOTSUP, "a crop window of a batch is not supported");
 	int64_t width = node_int(film, "width", SCENE_FILM_WIDTH);
 	if (width % sensors != 0)
-		return node_error(film, e, EINVAL, "a width of %lld is no multiple of the batch's %u sensors",
+		return node_error(film, e, EINVAL, "a width of %lld is not a multiple of the batch's %u sensors",
 				  (long long)width, sensors);
 	return 0;
 }

@@ -13,7 +13,7 @@
 bool batch_is(const struct scene_node *n);
 
 /* The sensors of a batch, at most as many as it has children. Fails when it has none, when the film's width is no
- * multiple of their number, for a crop window, and for a batch in a batch. */
+ * multiple of their number, for a crop window, and for a batch may not hold another batch. */
 int batch_spread(const struct scene_node *batch, struct arena *arena, const struct scene_node **out, uint32_t *count,
 		 struct error *e);
 

@@ -22,7 +22,7 @@ static int check_name(const char *name, struct error *e)
 {
 	for (const char *p = name; *p; p++)
 		if (!is_name_character(*p))
-			return error_set(e, EINVAL, "`%.64s` is no name for a parameter: letters, digits and _ only",
+			return error_set(e, EINVAL, "`%.64s` is not a name for a parameter: letters, digits and _ only",
 					 name);
 	if (!*name)
 		return error_set(e, EINVAL, "a parameter without a name");

@@ -196,7 +196,7 @@ static mat4 matrix_of(struct gltf *g, const struct gltf_at *node)
 		return out;
 	double norm = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
 	if (!(norm > 0) || !isfinite(norm)) {
-		gltf_fail(g, node, EINVAL, "its rotation is no quaternion");
+		gltf_fail(g, node, EINVAL, "its rotation is not a quaternion");
 		return mat4_identity();
 	}
 	double x = r[0], y = r[1], z = r[2], w = r[3], k = 2 / norm;
@@ -248,7 +248,7 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth)
 	for (size_t i = 0; i < json_array_size(children) && !g->failed; i++) {
 		const json_t *child = json_array_get(children, i);
 		if (!json_is_integer(child) || json_integer_value(child) < 0)
-			gltf_fail(g, &node, EINVAL, "its children are no indices");
+			gltf_fail(g, &node, EINVAL, "its children are not indices");
 		else
 			visit(w, (uint64_t)json_integer_value(child), &to_world, depth + 1);
 	}
@@ -272,7 +272,7 @@ static void read_scene(struct gltf *g)
 	for (size_t i = 0; i < json_array_size(roots) && !g->failed; i++) {
 		const json_t *root = json_array_get(roots, i);
 		if (!json_is_integer(root) || json_integer_value(root) < 0)
-			gltf_fail(g, &scene, EINVAL, "its nodes are no indices");
+			gltf_fail(g, &scene, EINVAL, "its nodes are not indices");
 		else
 			visit(&w, (uint64_t)json_integer_value(root), &world, 0);
 	}
@@ -313,7 +313,7 @@ static int read_json(struct gltf *g)
 		return g->failed;
 	}
 	if (!json_is_object(g->root))
-		return gltf_fail(g, NULL, EINVAL, "it is no JSON object");
+		return gltf_fail(g, NULL, EINVAL, "it is not a JSON object");
 	find_lines(g, text, size);
 	const json_t *lights = gltf_extension(g, NULL, g->root, "KHR_lights_punctual");
 	g->lights = json_object_get(lights, "lights");

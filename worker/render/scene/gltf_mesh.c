@@ -203,6 +203,6 @@ void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world)
 		else if (json_is_object(primitive))
 			put_primitive(g, mesh, primitive, to_world);
 		else
-			gltf_fail(g, mesh, EINVAL, "its primitives are no objects");
+			gltf_fail(g, mesh, EINVAL, "its primitives are not objects");
 	}
 }

@@ -81,7 +81,7 @@ double gltf_number(struct gltf *g, const struct gltf_at *at, const json_t *o, co
 		return fallback;
 	if (json_is_number(x))
 		return json_number_value(x);
-	gltf_fail(g, at, EINVAL, "\"%s\" is no number", key);
+	gltf_fail(g, at, EINVAL, "\"%s\" is not a number", key);
 	return fallback;
 }
 
@@ -93,7 +93,7 @@ uint64_t gltf_whole(struct gltf *g, const struct gltf_at *at, const json_t *o, c
 		return fallback;
 	if (json_is_number(x) && value >= 0 && value <= GLTF_WHOLE_MAX && value == floor(value))
 		return (uint64_t)value;
-	gltf_fail(g, at, EINVAL, "\"%s\" is no whole number from 0 to %.0f", key, GLTF_WHOLE_MAX);
+	gltf_fail(g, at, EINVAL, "\"%s\" is not a whole number from 0 to %.0f", key, GLTF_WHOLE_MAX);
 	return fallback;
 }
 
@@ -104,7 +104,7 @@ const char *gltf_text(struct gltf *g, const struct gltf_at *at, const json_t *o,
 		return fallback;
 	if (json_is_string(x))
 		return json_string_value(x);
-	gltf_fail(g, at, EINVAL, "\"%s\" is no text", key);
+	gltf_fail(g, at, EINVAL, "\"%s\" is not a string", key);
 	return fallback;
 }
 
@@ -120,14 +120,14 @@ void gltf_numbers(struct gltf *g, const struct gltf_at *at, const json_t *o, con
 		x[i] = json_number_value(one);
 	}
 	if (!good)
-		gltf_fail(g, at, EINVAL, "\"%s\" is no array of %zu numbers", key, count);
+		gltf_fail(g, at, EINVAL, "\"%s\" is not an array of %zu numbers", key, count);
 }
 
 const json_t *gltf_object(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key)
 {
 	const json_t *x = json_object_get(o, key);
 	if (x && !json_is_object(x))
-		gltf_fail(g, at, EINVAL, "\"%s\" is no object", key);
+		gltf_fail(g, at, EINVAL, "\"%s\" is not an object", key);
 	return json_is_object(x) ? x : NULL;
 }
 

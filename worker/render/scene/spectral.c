@@ -65,7 +65,7 @@ static int check_table(const struct xml_element *el, const struct value *v, stru
 	const double *nm = v->as.spectrum.nm;
 	if (v->as.spectrum.count < 2)
 		return xml_error(el, e, EINVAL,
-				 "one pair nm:value is no spectrum; give a single number for a constant");
+				 "one pair nm:value is not a spectrum; give a single number for a constant");
 	for (uint32_t i = 0; i < v->as.spectrum.count; i++)
 		if (!(nm[i] > 0) || (i && !(nm[i] > nm[i - 1])))
 			return xml_error(el, e, EINVAL, "wavelengths must be positive and ascend: %g nm does not",
@@ -111,12 +111,13 @@ static int read_pairs(const struct xml_element *el, const char *text, const char
 {
 	uint32_t n = scan_pairs(text, end, between, NULL, NULL);
 	if (n == 0)
-		return between == ':' ? xml_error(el, e, EINVAL,
-						  "`%.64s` is neither a number nor a list nm:value, nm:value, ... of "
-						  "at most %d",
-						  text, SPECTRAL_POINTS_MAX)
-				      : xml_error(el, e, EINVAL, "the file is no list of lines `nm value`, at most %d",
-						  SPECTRAL_POINTS_MAX);
+		return between == ':'
+			       ? xml_error(el, e, EINVAL,
+					   "`%.64s` is neither a number nor a list nm:value, nm:value, ... of "
+					   "at most %d",
+					   text, SPECTRAL_POINTS_MAX)
+			       : xml_error(el, e, EINVAL, "the file is not a list of lines `nm value`, at most %d",
+					   SPECTRAL_POINTS_MAX);
 	double *nm, *value;
 	if (!table(el, n, arena, out, &nm, &value, e))
 		return -ENOMEM;
@@ -154,7 +155,7 @@ static int read_value(const struct xml_element *el, const char *text, struct are
 	}
 	return xml_error(el, e, EINVAL,
 			 "`%.64s` is neither a number nor a list nm:value, nm:value, ...; three numbers "
-			 "belong into <rgb>",
+			 "are for <rgb>",
 			 text);
 }
 

@@ -194,7 +194,7 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 		char hint[128];
 		if (!step)
 			return xml_error(c, e, EINVAL,
-					 "is no transform%s (supported: translate, rotate, scale, lookat, matrix)",
+					 "is not a transform%s (supported: translate, rotate, scale, lookat, matrix)",
 					 spelling_hint(&s, hint, sizeof hint));
 		mat4 one;
 		int r = element_check(c, step->attributes, false, e);
@@ -223,7 +223,7 @@ int transform_still(const struct xml_element **el, bool lenient, bool *moves, st
 	if (!r && !first)
 		return xml_error(animation, e, EINVAL, "holds no transform");
 	if (!r && *moves && !lenient)
-		return xml_error(animation, e, ENOTSUP, "what moves is not supported");
+		return xml_error(animation, e, ENOTSUP, "motion is not supported; --lenient keeps the first transform");
 	*el = first;
 	return r;
 }

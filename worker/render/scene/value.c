@@ -88,7 +88,7 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
 		else if (n != 3)
 			return xml_error(el, e, EINVAL, "`%.64s` is neither three numbers nor one%s", text,
 					 srgb		  ? " nor #rrggbb"
-					 : text[0] == '#' ? "; #rrggbb belongs into <srgb>"
+					 : text[0] == '#' ? "; #rrggbb is for <srgb>"
 							  : "");
 	}
 	for (int i = 0; i < 3 && srgb; i++)

@@ -146,7 +146,7 @@ static int add_attribute(struct mesh *m, const struct scene_node *n, const char 
 	if (rc)
 		return rc < 0 ? rc : 0;
 	if (from.count != m->vertex_count)
-		return node_error(n, e, EINVAL, "`%s` is not as many as positions", name);
+		return node_error(n, e, EINVAL, "`%s` has another number of entries than `position`", name);
 	struct attribute *a = mesh_add_attribute(m, attribute, false, components, 2, arena);
 	if (!a)
 		return node_error(n, e, ENOMEM, "out of memory");

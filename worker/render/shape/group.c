@@ -76,7 +76,7 @@ static int list(struct listing *l, const struct scene_node *n, const struct scen
 	if (strcmp(n->type, "merge") == 0)
 		return list_inside(l, n, instance);
 	if (strcmp(n->type, "shapegroup") == 0)
-		return node_error(n, l->e, EINVAL, "a shapegroup stands by itself or in an instance");
+		return node_error(n, l->e, EINVAL, "a shapegroup may stand directly in <scene> or in an instance only");
 	return append(l, n, instance);
 }
 

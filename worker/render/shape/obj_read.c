@@ -163,7 +163,8 @@ static int read_face(struct reader *o)
 		t[2] = first + n;
 	}
 	if (n < 3)
-		return node_error(o->node, o->error, EINVAL, "%s:%d: a face of %u corners", o->name, o->line, n);
+		return node_error(o->node, o->error, EINVAL, "%s:%d: a face of %u corners; it needs 3", o->name,
+				  o->line, n);
 	return 0;
 }
 

@@ -213,7 +213,7 @@ static int read_header(struct ply *f)
 	bool formatted = false;
 	f->line = 1;
 	if (!next_word(f, word) || strcmp(word, "ply") != 0)
-		return header_error(f, "this is no PLY file");
+		return header_error(f, "this is not a PLY file");
 	for (;;) {
 		end_line(f);
 		if (f->p >= f->end)

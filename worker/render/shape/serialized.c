@@ -200,7 +200,7 @@ static int find_mesh(const struct stream *s, const struct asset *a, uint64_t ind
 {
 	enum { HEAD = 4 };
 	if (a->size < HEAD + 4 || get_bytes(a->bytes, 2) != MAGIC)
-		return file_error(s, "this is no serialized mesh");
+		return file_error(s, "this is not a serialized mesh");
 	uint64_t version = get_bytes(a->bytes + 2, 2);
 	if (version != VERSION_3 && version != VERSION_4)
 		return node_error(s->node, s->error, ENOTSUP, "%s: version %llu is not supported (supported: 3, 4)",

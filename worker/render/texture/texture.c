@@ -22,7 +22,7 @@ int texture_create(struct texture *t, const struct scene_node *n, enum color_rol
 			*t = (struct texture){.ops = *ops};
 			return (*ops)->create(t, n, role, build, e);
 		}
-	return node_error(n, e, ENOTSUP, "\"%s\" is no texture that is supported", n->type);
+	return node_error(n, e, ENOTSUP, "\"%s\" is not a stringure that is supported", n->type);
 }
 
 static int height_from_value(struct texture *t, const struct scene_node *n, const char *name, const struct value *v,

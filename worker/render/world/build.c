@@ -151,7 +151,8 @@ static int create_emitters(struct builder *b)
 			return rc;
 		bool environment = em->infinite && !em->delta;
 		if (environment && w->environment >= 0)
-			return node_error(n, b->e, EINVAL, "a second environment: one is supported");
+			return node_error(n, b->e, EINVAL,
+					  "a scene may have one environment only; remove this one or the one before");
 		if (em->infinite)
 			em->power *= M_PI * w->radius * w->radius;
 		if (!isfinite(em->power))

@@ -218,7 +218,7 @@ static void test_refusals(void **state)
 	world_refused("<emitter type='spot'><float name='beam_width' value='30'/></emitter>",
 		      "exceeds cutoff_angle=20");
 	world_refused("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
-		      "a second environment");
+		      "may have one environment only");
 	world_refused("<shape type='sphere'><emitter type='point'/></shape>", "cannot hang on a shape");
 	world_refused("<emitter type='point'><float name='intensity' value='-1'/></emitter>", "intensity");
 }

@@ -175,12 +175,12 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<float name='alpha' value='.1'><x/></float>"), "has no place in <float>");
 	refuses(BSDF("<rgb name='eta' value='1, 2'/>"), "neither three numbers nor one");
 	refuses(BSDF("<rgb name='eta' value='1, inf, 2'/>"), "neither three numbers nor one");
-	refuses(BSDF("<rgb name='eta' value='#ff0000'/>"), "#rrggbb belongs into <srgb>");
+	refuses(BSDF("<rgb name='eta' value='#ff0000'/>"), "#rrggbb is for <srgb>");
 	refuses(BSDF("<srgb name='eta' value='#ff00gg'/>"), "nor #rrggbb");
 	refuses(BSDF("<spectrum name='eta' value='400:1'/>"), "one pair");
 	refuses(BSDF("<spectrum name='eta' value='500:1, 400:1'/>"), "must be positive and ascend");
 	refuses(BSDF("<spectrum name='eta' value='400:1, 500'/>"), "neither a number nor a list");
-	refuses(BSDF("<spectrum name='eta' value='1, 2, 3'/>"), "three numbers belong into <rgb>");
+	refuses(BSDF("<spectrum name='eta' value='1, 2, 3'/>"), "three numbers are for <rgb>");
 	refuses(BSDF("<spectrum name='eta' filename='x.spd'/>"), "s.xml:1: <spectrum>: x.spd: no such file");
 	refuses(BSDF("<spectrum name='eta'/>"), "needs either value or filename or type");
 	refuses(BSDF("<spectrum name='eta' value='1' type='d65'/>"), "needs either value or filename or type");
@@ -208,11 +208,11 @@ static void test_bad_values(void **state)
 	refuses(S
 		"<shape type='sphere'><animation name='toWorld'><transform time='0'/><transform time='1'/></animation>"
 		"</shape>" END,
-		"what moves is not supported");
+		"motion is not supported; --lenient keeps the first transform");
 	refuses(S
 		"<shape type='sphere'><animation name='animation'><transform time='0'/><transform time='1'/></animation>"
 		"</shape>" END,
-		"what moves is not supported");
+		"motion is not supported; --lenient keeps the first transform");
 	refuses(S "<shape type='sphere'><animation name='toWorld' tiem='1'><transform/></animation></shape>" END,
 		"has no attribute `tiem`");
 	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value, a folder");

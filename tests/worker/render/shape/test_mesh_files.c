@@ -141,8 +141,8 @@ static void test_bad_ply(void **state)
 	static const struct {
 		const char *text, *error;
 	} cases[] = {
-		{"", "m:1: this is no PLY file"},
-		{"plyx\n", "this is no PLY file"},
+		{"", "m:1: this is not a PLY file"},
+		{"plyx\n", "this is not a PLY file"},
 		{"ply\n", "the header does not end"},
 		{"ply\nformat binary 1.0\n", "m:2: the format is neither"},
 		{"ply\nelement vertex -1\nend_header\n", "m:2: an element needs a name and a count"},
@@ -242,8 +242,8 @@ static void test_bad_serialized(void **state)
 	(void)state;
 	static struct mesh_file f, g;
 	mesh_file_serialized(&f, 4, 0, 3, 2);
-	refuses("serialized", "", "", 0, "m: this is no serialized mesh");
-	refuses("serialized", "", "plyplyply", 9, "this is no serialized mesh");
+	refuses("serialized", "", "", 0, "m: this is not a serialized mesh");
+	refuses("serialized", "", "plyplyply", 9, "this is not a serialized mesh");
 	refuses("serialized", "<integer name='shape_index' value='2'/>", f.bytes, f.size,
 		"m: shape_index=2, but it holds 2 meshes, counted from 0");
 	g = f;

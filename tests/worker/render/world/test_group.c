@@ -167,7 +167,8 @@ static void test_refused(void **state)
 	refuses(VIEW "<shape type='instance'><shape type='cube'/></shape>", "", "needs exactly one shapegroup");
 	refuses(VIEW GROUP("a", "<shape type='cube'/>") GROUP("b", INSTANCE("a")) INSTANCE("b"), "",
 		"an instance in a shapegroup is not supported");
-	refuses(VIEW "<shape type='merge'>" GROUP("a", "") "</shape>", "", "a shapegroup stands by itself");
+	refuses(VIEW "<shape type='merge'>" GROUP("a", "") "</shape>", "",
+		"a shapegroup may stand directly in <scene>");
 	refuses(VIEW "<shape type='merge' id='m'><ref id='m'/></shape>", "", "refers to itself");
 	/* Sixteen of sixteen of ... are counted before anything is built. */
 	char deep[8192], *at = deep, *end = deep + sizeof deep;
