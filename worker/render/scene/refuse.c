@@ -36,6 +36,24 @@ int refuse_medium(const struct xml_element *el, struct error *e)
 	return xml_error(el, e, EINVAL, "participating media are not supported; --lenient leaves them out");
 }
 
+/* What other programs' files and people call an element; NULL: none that is known. */
+static const char *usual_name(const char *name)
+{
+	static const struct {
+		const char *other, *ours;
+	} names[] = {
+		{"bool", "boolean"},	  {"int", "integer"},	 {"double", "float"},  {"number", "float"},
+		{"str", "string"},	  {"text", "string"},	 {"color", "rgb"},     {"colour", "rgb"},
+		{"material", "bsdf"},	  {"brdf", "bsdf"},	 {"light", "emitter"}, {"lamp", "emitter"},
+		{"luminaire", "emitter"}, {"camera", "sensor"},	 {"mesh", "shape"},    {"object", "shape"},
+		{"image", "texture"},	  {"define", "default"},
+	};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (strcmp(names[i].other, name) == 0)
+			return names[i].ours;
+	return NULL;
+}
+
 int refuse_element(const struct xml_element *el, struct error *e)
 {
 	char hint[128];
@@ -51,8 +69,13 @@ int refuse_element(const struct xml_element *el, struct error *e)
 	spelling_offer(&s, "default");
 	spelling_offer(&s, "alias");
 	spelling_offer(&s, "path");
-	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s",
-			 el->parent ? el->parent->name : "", spelling_hint(&s, hint, sizeof hint));
+	const char *usual = usual_name(el->name), *around = el->parent ? el->parent->name : "";
+	if (usual)
+		s.best = usual;
+	else if (s.best && strcmp(s.best, el->name) == 0) /* the right name in the wrong place */
+		return xml_error(el, e, EINVAL, "has no place in <%.64s>", around);
+	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s", around,
+			 spelling_hint(&s, hint, sizeof hint));
 }
 
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,

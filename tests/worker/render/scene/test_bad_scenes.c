@@ -142,7 +142,9 @@ static void test_unknown_names(void **state)
 	refuses(S "<shape type='cube'>\n<subsurface type='dipole'/></shape>" END, "subsurface scattering is not");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");
-	refuses(S "<float name='a' value='1'/>" END, "has no place in <scene>");
+	refuses(S "<float name='a' value='1'/>" END, "<float>: has no place in <scene>");
+	refuses(S "<light type='point'/>" END, "or is not supported; did you mean `emitter`?");
+	refuses(BSDF("<int name='a' value='1'/>"), "or is not supported; did you mean `integer`?");
 	refuses(S "<bsdf/>" END, "needs an attribute `type`");
 	refuses(S "<sensor type='spherical'/>" END, "supported: perspective, thinlens, orthographic");
 	refuses(S "<sensor type='perspective'><film type='hdrfilm'><rfilter type='wiener'/></film></sensor>" END,
