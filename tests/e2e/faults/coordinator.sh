@@ -31,7 +31,7 @@ coordinator_dies_early() {
 	again --journal 0.05
 }
 
-fault leave_coordinator 10 1 "SIGTERM of the coordinator, and it is started again"
+fault leave_coordinator 10 1 "the coordinator gets SIGTERM and is started again"
 leave_coordinator() {
 	farm
 	worker w0
@@ -78,7 +78,7 @@ patient_client() {
 	grep -q 'no coordinator\|not there\|refused' "$DIR/status.log" || fail "$NAME: hslt-status says: $(cat "$DIR/status.log")"
 }
 
-fault long_journal 3 1 "a journal takes long to read when the coordinator starts again: it listens, says how far it is, and peers wait"
+fault long_journal 3 1 "a journal takes long to read at a restart of the coordinator: it listens and reports its progress, peers wait"
 long_journal() {
 	${CC:-cc} -shared -fPIC -O1 -o "$DIR/slow.so" "$HERE/faults/slow.c" 2>"$DIR/cc.log" || fail "$NAME: no compiler: $(cat "$DIR/cc.log")"
 	export HSLT_SLOW=20000

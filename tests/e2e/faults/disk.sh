@@ -2,17 +2,17 @@
 # Faults of the disk: those of tests/coordinator/power, where the coordinator's calls go through a disk that loses what was not
 # synchronised. The test counts for itself: what was acknowledged and is not there, what a film holds too often, images of other bits.
 
-fault power 101 0 "the power goes at any call of the coordinator's disk"
+fault power 101 0 "power is lost at any of the coordinator's disk operations"
 power() {
 	disk_test power $((TIMES - 1)) 100000
 }
 
-fault failing_calls 1 0 "a call of the coordinator's disk fails: EIO, ENOSPC, EMFILE, EROFS"
+fault failing_calls 1 0 "one of the coordinator's disk operations fails: EIO, ENOSPC, EMFILE, EROFS"
 failing_calls() {
 	disk_test "failing calls" 1 72
 }
 
-fault failing_starts 1 0 "a call of the disk fails while the coordinator starts with jobs half done"
+fault failing_starts 1 0 "a disk operation fails while the coordinator starts with unfinished jobs"
 failing_starts() {
 	disk_test "failing starts" 1 20
 }

@@ -48,7 +48,7 @@ cut_grant() {
 	through_proxy is_cut cut 21
 }
 
-fault stall_result 3 1 "half a result comes, and then nothing"
+fault stall_result 3 1 "half a result arrives, and then nothing"
 stall_result() {
 	through_proxy is_stalled
 }
@@ -59,7 +59,7 @@ is_stalled() {
 	kill -CONT "$(renders "$OTHER")"
 }
 
-fault slow_result 3 1 "results take longer than a worker may be silent"
+fault slow_result 3 1 "results take longer to arrive than a worker may be silent"
 slow_result() {
 	through_proxy is_slow
 }
@@ -78,7 +78,7 @@ is_slow() {
 	fail "$NAME: the worker is cut off"
 }
 
-fault late_result 3 1 "results come when their worker has been missed"
+fault late_result 3 1 "results arrive after their worker was given up"
 late_result() {
 	through_proxy is_late
 }
@@ -98,7 +98,7 @@ is_missed() {
 	grep -q 'name="w1" text="nothing.* heard' "$DIR/coordinator.log"
 }
 
-fault twice_result 10 1 "results are sent twice by the network"
+fault twice_result 10 1 "the network delivers results twice"
 twice_result() {
 	through_proxy happens twice 22
 	grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "$NAME: nothing was repeated"
@@ -126,7 +126,7 @@ is_told() {
 	[ "$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled)" -ge "$1" ]
 }
 
-fault deaf_client 3 1 "clients, workers and readers of the status ask for all there is and do not read"
+fault deaf_client 3 1 "clients, workers and status readers request everything and read nothing"
 deaf_client() {
 	farm
 	worker w0
@@ -142,7 +142,7 @@ nobody_reads() {
 	[ $((after - before)) -lt 65536 ] || fail "$NAME: the coordinator grew from $before to $after KB"
 }
 
-fault crowd 2 1 "2,000 connections say nothing, and 2,000 more a hello that is refused, or rubbish: few lines of the log, and the job goes on"
+fault crowd 2 1 "2,000 connections send nothing, 2,000 more send garbage or a hello that is refused: the log stays short, the job goes on"
 crowd() {
 	start_coordinator --heartbeat 0.2
 	worker w0

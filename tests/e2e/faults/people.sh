@@ -27,7 +27,7 @@ liar() {
 	blameless
 }
 
-fault spoiled_states 5 1 "a worker returns wrong results and spoils their chain states: who goes on from these finds out, nothing is verified"
+fault spoiled_states 5 1 "a worker returns wrong results with corrupt chain states, without verification: whoever resumes from them notices"
 spoiled_states() {
 	farm
 	worker w0
@@ -82,7 +82,7 @@ spoils_before_a_restart() {
 	again $CHECKPOINTS
 }
 
-fault spoiled_checkpoint 5 1 "the same, with checkpoints that take the last results along"
+fault spoiled_checkpoint 5 1 "the same, with checkpoints that already contain the last results"
 spoiled_checkpoint() {
 	CHECKPOINTS="--journal 5"
 	spoiled_restart
@@ -105,7 +105,7 @@ large_pixel() {
 	blameless
 }
 
-fault targets 4 4 "an image is fetched into a FIFO, a device, a symbolic link, an open descriptor: these stay what they are"
+fault targets 4 4 "an image is fetched into a FIFO, a device, a symbolic link, an open descriptor: none of them is replaced"
 targets() {
 	[ -n "${HSLT_OWN_MOUNTS:-}" ] || { cannot "no name spaces for mounts here" && return 0; }
 	farm
@@ -155,7 +155,7 @@ fetches_into() {
 	[ "$(od -An -tx1 -N4 "$DIR/real.exr" | tr -d ' ')" = 762f3101 ] || fail "$NAME: no image comes out of kind $i"
 }
 
-fault other_role 3 1 "a worker calls with a client's certificate: it is told why, and ends"
+fault other_role 3 1 "a worker connects with a client's certificate: it is told why, and exits"
 other_role() {
 	export HSLT_CA="$DIR/ca"
 	for who in init "worker node" "client ann"; do
@@ -177,7 +177,7 @@ a_client_leases() {
 	grep -q 'cannot lease' "$DIR/err.log" || fail "$NAME: it says $(cat "$DIR/err.log")"
 }
 
-fault large_picture 3 1 "a scene with a PNG of 140 KB that would be 16,000 x 16,000 pixels is submitted, and sent past hslt-submit"
+fault large_picture 3 1 "a scene with a PNG of 140 KB and 16,000 x 16,000 pixels is submitted, also without hslt-submit's checks"
 large_picture() {
 	cp -r "$HERE/../scenes/box" "$DIR/large"
 	sed '/id="white"/s|<rgb.*/>|<texture name="reflectance" type="bitmap"><string name="filename" value="large.png"/></texture>|' "$BOX" >"$DIR/large/box.xml"

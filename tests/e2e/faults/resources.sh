@@ -8,7 +8,7 @@ small_spool() {
 	mount -t tmpfs -o size=64m none "$DIR/spool"
 }
 
-fault full_disk 3 1 "the coordinator's disk is full, and has room again"
+fault full_disk 3 1 "the coordinator's disk is full for a while"
 full_disk() {
 	small_spool || return 0
 	farm
@@ -27,7 +27,7 @@ disk_is_full() {
 	rm "$DIR/spool/filler"
 }
 
-fault readonly_spool 2 1 "the spool cannot be written when the coordinator starts again"
+fault readonly_spool 2 1 "the spool is not writable at a restart of the coordinator"
 readonly_spool() {
 	small_spool || return 0
 	farm
@@ -49,7 +49,7 @@ spool_is_readonly() {
 	again
 }
 
-fault no_descriptors 3 1 "file descriptors of the coordinator are used up by connections"
+fault no_descriptors 3 1 "connections use up the coordinator's file descriptors"
 no_descriptors() {
 	farm
 	worker w0
@@ -73,7 +73,7 @@ TEXT
 	kill -0 "$COORDINATOR_PID" || fail "$NAME: the coordinator is gone"
 }
 
-fault no_descriptors_worker 2 1 "file descriptors of a worker are used up while it is connected anew"
+fault no_descriptors_worker 2 1 "a worker runs out of file descriptors while it reconnects"
 no_descriptors_worker() {
 	farm
 	worker w0
@@ -92,7 +92,7 @@ worker_without_descriptors() {
 	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: w1 does not come back"
 }
 
-fault no_memory 5 1 "the coordinator gets no more memory for a while"
+fault no_memory 5 1 "the coordinator gets no memory for a while"
 no_memory() {
 	farm
 	worker w0
@@ -149,7 +149,7 @@ small_worker() {
 	QUIET=$quiet
 }
 
-fault clock_jumps 6 2 "the wall clock jumps by a year, back and forth, everywhere"
+fault clock_jumps 6 2 "all wall clocks jump by a year, back and forth"
 clock_jumps() {
 	${CC:-cc} -shared -fPIC -O1 -o "$DIR/clock.so" "$HERE/faults/clock.c" 2>"$DIR/cc.log" || fail "$NAME: no compiler: $(cat "$DIR/cc.log")"
 	export HSLT_CLOCK="$DIR/clock" LD_PRELOAD="$DIR/clock.so"

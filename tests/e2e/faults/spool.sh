@@ -68,7 +68,7 @@ journal_is_damaged() {
 	again
 }
 
-fault clock_ahead 3 1 "the wall clock is 40 days ahead for a while, and the coordinator is started again meanwhile: results stay"
+fault clock_ahead 3 1 "the wall clock is 40 days ahead for a while, with a restart of the coordinator: results are kept"
 clock_ahead() {
 	${CC:-cc} -shared -fPIC -O1 -o "$DIR/clock.so" "$HERE/faults/clock.c" 2>"$DIR/cc.log" || fail "$NAME: no compiler: $(cat "$DIR/cc.log")"
 	export HSLT_CLOCK="$DIR/clock" LD_PRELOAD="$DIR/clock.so"
@@ -98,7 +98,7 @@ clock_goes_ahead() {
 	echo 0 >"$DIR/clock"
 }
 
-fault jobs_database 8 2 "jobs.db or its WAL is gone, cut off, or has a wrong bit when the coordinator starts"
+fault jobs_database 8 2 "jobs.db or its WAL is missing, truncated, or has a wrong bit when the coordinator starts"
 jobs_database() {
 	farm
 	worker w0
@@ -123,7 +123,7 @@ database_is_damaged() {
 	[ -d "$DIR/spool/jobs/$ID" ] || fail "$NAME: the job's folder is gone"
 }
 
-fault plan_changed 2 1 "a number in the plan of a job's row is another one when the coordinator starts"
+fault plan_changed 2 1 "a number in the plan in a job's row has changed when the coordinator starts"
 plan_changed() {
 	farm
 	worker w0
@@ -146,7 +146,7 @@ TEXT
 	again
 }
 
-fault row_lost 1 1 "a row of jobs.db and its copy in the job's folder are gone: the start is refused, --accept-loss goes on"
+fault row_lost 1 1 "a row of jobs.db and its copy in the job's folder are missing: the coordinator starts only with --accept-loss"
 row_lost() {
 	farm
 	worker w0
@@ -169,7 +169,7 @@ row_is_lost() {
 	again --accept-loss
 }
 
-fault folder_gone 6 2 "a job's folder is removed, moved away, or removed twice, while the job runs"
+fault folder_gone 6 2 "a job's folder is removed, moved away, or removed twice while the job runs"
 folder_gone() {
 	farm # from the first life's journal a new one is made, in the second one there are checkpoints
 	worker w0
@@ -213,7 +213,7 @@ is_mended() {
 	grep 'made anew\|state=released text=""' "$DIR/coordinator.log" | tail -n 1 | grep -q state=released
 }
 
-fault file_damaged 4 1 "a file of the scene is damaged in the spool, and in a worker's cache: the job waits, says so, and the scene is sent again"
+fault file_damaged 4 1 "a file of the scene is damaged in the spool and in a worker's cache: the job waits and says so until the scene is sent again"
 file_damaged() {
 	farm
 	start_worker w0 -v --cache "$DIR/own"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Programs that do not fit together.
 
-fault skew 3 1 "workers and clients of an older and of a newer protocol call"
+fault skew 3 1 "workers and clients of an older and a newer protocol connect"
 skew() {
 	farm
 	worker w0
@@ -14,7 +14,7 @@ strangers_call() {
 	"$PYTHON" "$HERE/faults/skew.py" "${COORDINATOR#*:}" >"$DIR/skew.log" 2>&1 || fail "$NAME: $(cat "$DIR/skew.log")"
 }
 
-fault other_build 2 1 "for a while only a worker of another build is left"
+fault other_build 2 1 "for a while only a worker of another build is connected"
 other_build() {
 	other="$DIR/other-worker"
 	"$PYTHON" - "$BIN/hslt-worker" "$other" <<'TEXT' || { cannot "no build id to change" && return; }

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Faults of workers.
 
-fault kill_worker 20 2 "a worker is killed (kill -9), another comes"
+fault kill_worker 20 2 "a worker is killed (kill -9), another joins"
 kill_worker() {
 	farm
 	worker w0
@@ -22,7 +22,7 @@ blameless() {
 		fail "$NAME: counted as $(value "$ID" failures) failures: $(grep event=lease_failed "$DIR/coordinator.log" | head -n 3)"
 }
 
-fault hoard_leases 1 1 "a worker claims 4,096 threads, takes leases, says its heartbeats and answers nothing"
+fault hoard_leases 1 1 "a worker claims 4,096 threads, takes leases, sends heartbeats and returns nothing"
 hoard_leases() {
 	farm
 	worker w0
@@ -37,7 +37,7 @@ hoard_leases() {
 	blameless
 }
 
-fault leave_worker 20 2 "SIGTERM of a worker: it finishes its epoch"
+fault leave_worker 20 2 "a worker gets SIGTERM: it finishes its epoch"
 leave_worker() {
 	farm
 	worker w0
@@ -54,14 +54,14 @@ one_worker_leaves() {
 	worker "w$((i + 1))" $GRACE
 }
 
-fault hurry_worker 20 1 "SIGTERM of a worker without grace: it gives its epoch up"
+fault hurry_worker 20 1 "a worker gets SIGTERM, with no grace period: it gives up its epoch"
 hurry_worker() {
 	GRACE="--grace 0"
 	leave_worker
 	GRACE=
 }
 
-fault stop_worker 3 1 "a worker stands still (SIGSTOP) until it is missed, then goes on"
+fault stop_worker 3 1 "a worker is stopped (SIGSTOP) until it is given up, then continues"
 stop_worker() {
 	farm
 	worker w0
@@ -111,7 +111,7 @@ repeat_worker() {
 	grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "$NAME: nothing was repeated"
 }
 
-fault hang_worker 2 1 "a thread of a worker hangs in a lease, and heartbeats go on"
+fault hang_worker 2 1 "a thread of a worker hangs in a lease while heartbeats continue"
 hang_worker() {
 	farm
 	worker w0
@@ -134,7 +134,7 @@ one_thread_hangs() {
 		grep -q "event=lease_taken_back job=$ID" "$DIR/coordinator.log" || fail "$NAME: h$i keeps its lease"
 }
 
-fault crash_worker 5 1 "a signal ends the process that renders, in the middle of a lease"
+fault crash_worker 5 1 "a signal kills the rendering process in the middle of a lease"
 crash_worker() {
 	farm
 	worker w0
@@ -159,7 +159,7 @@ one_process_crashes() {
 	[ "$CODE" -le 1 ] || fail "$NAME: h$i ended with $CODE"
 }
 
-fault kill_renderer 5 1 "the machine runs out of memory: SIGKILL of the process that renders"
+fault kill_renderer 5 1 "the machine runs out of memory: the rendering process gets SIGKILL"
 kill_renderer() {
 	farm
 	worker w0
@@ -175,7 +175,7 @@ one_renderer_killed() {
 	kill -0 "$WORKER" || fail "$NAME: the worker is gone"
 }
 
-fault extreme_numbers 9 3 "a scene with numbers that no scene can have is submitted"
+fault extreme_numbers 9 3 "a scene with impossible numbers is submitted"
 extreme_numbers() {
 	farm
 	worker w0
