@@ -31,7 +31,7 @@ static void print_supported(FILE *out, const struct plugin_decl *d)
 	fprintf(out, " | ");
 	print_params(out, d, PARAM_IGNORED);
 	fprintf(out, " | ");
-	print_params(out, d, PARAM_UNHEEDED);
+	print_params(out, d, PARAM_DIFFERS);
 	fprintf(out, " | ");
 	print_params(out, d, PARAM_REFUSED);
 	fprintf(out, " |\n");
@@ -45,7 +45,7 @@ static void print_class(FILE *out, enum plugin_class cls)
 			continue;
 		if (!any)
 			fprintf(out,
-				"\n## %s\n\n| type | understood | ignored | unheeded | refused |\n|---|---|---|---|---|\n",
+				"\n## %s\n\n| type | understood | ignored | differs | refused |\n|---|---|---|---|---|\n",
 				headings[cls]);
 		any = true;
 		print_supported(out, d);
@@ -93,13 +93,15 @@ static void print_unsupported(FILE *out)
 void compatibility_print(FILE *out)
 {
 	fprintf(out,
-		"# What is read of Mitsuba's scenes\n\n"
-		"Made by `hslt-scene compatibility` of the tables that the reader works by. Names are those of 3.x; in 0.5/0.6 the same "
-		"in camelCase.\n"
-		"*Ignored*: has no effect on light, and is said once. *Unheeded*: the image differs a little "
-		"from Mitsuba's, and a warning says so.\n*Refused*: would change the image. "
-		"[worker/render/scene/README.md](../worker/render/scene/README.md)\nsays what the plug-ins do, and where they differ,\n"
-		"[tests/corpus/README.md](../tests/corpus/README.md) how many public scenes load.\n");
+		"# What is supported of Mitsuba's scenes\n\n"
+		"Written by `hslt-scene compatibility`, from the tables that the reader works by. Names are those of 3.x; 0.5/0.6 has "
+		"them in camelCase.\n\n"
+		"- *Understood*: has the same effect as in Mitsuba.\n"
+		"- *Ignored*: has no effect on light; a note says so.\n"
+		"- *Differs*: not supported; the image differs a little from Mitsuba's, and a warning says so.\n"
+		"- *Refused*: would change the image.\n\n"
+		"[worker/render/scene/README.md](../worker/render/scene/README.md) says how the plug-ins behave and where they "
+		"differ,\n[tests/corpus/README.md](../tests/corpus/README.md) how many public scenes load.\n");
 	for (int cls = 0; cls < PLUGIN_CLASSES; cls++)
 		print_class(out, (enum plugin_class)cls);
 	print_unsupported(out);

@@ -74,10 +74,10 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 }
 
 /* What Mitsuba 3.7 does where the bent normal and the surface disagree. */
-#define OF_MITSUBA_3_7                                                                          \
-	{.name = "flip_invalid_normals", .types = VALUE_BOOL, .status = PARAM_UNHEEDED},        \
-	{                                                                                       \
-		.name = "use_shadowing_function", .types = VALUE_BOOL, .status = PARAM_UNHEEDED \
+#define OF_MITSUBA_3_7                                                                         \
+	{.name = "flip_invalid_normals", .types = VALUE_BOOL, .status = PARAM_DIFFERS},        \
+	{                                                                                      \
+		.name = "use_shadowing_function", .types = VALUE_BOOL, .status = PARAM_DIFFERS \
 	}
 
 static const struct param bumpmap_params[] = {

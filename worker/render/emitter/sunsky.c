@@ -204,7 +204,7 @@ static const struct param params[] = {
 	NUMBER("minute", 0, 60),
 	NUMBER("second", 0, 60),
 	{.name = "to_world", .types = VALUE_TRANSFORM},
-	{.name = "albedo", .types = VALUE_TEXTURE, .status = PARAM_UNHEEDED}, /* Preetham's ground is of one kind */
+	{.name = "albedo", .types = VALUE_TEXTURE, .status = PARAM_DIFFERS}, /* Preetham's ground is of one kind */
 	{.name = "resolution", .types = VALUE_INT, .status = PARAM_IGNORED},
 	{.name = "complex_sun", .types = VALUE_BOOL, .status = PARAM_IGNORED},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},

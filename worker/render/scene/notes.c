@@ -29,8 +29,8 @@ int note_property(const struct notes *t, const struct xml_element *owner, const 
 		    owner->name, type, name);
 }
 
-int note_unheeded(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		  const char *name)
+int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		    const char *name)
 {
 	const char *type = xml_attribute(owner, "type"), *value = xml_attribute(el, "value");
 	if (value && strcasecmp(value, "false") == 0)

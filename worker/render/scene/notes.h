@@ -21,8 +21,8 @@ __attribute__((format(printf, 5, 6))) int note(const struct notes *t, const stru
 /* A parameter without effect on light; one that would change it a little; one that only a fork of Mitsuba has. */
 int note_property(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);
-int note_unheeded(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		  const char *name);
+int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		    const char *name);
 int note_foreign_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 			   const char *name);
 /* An element that is ignored with all inside; an object of which its table keeps something. */

@@ -35,9 +35,9 @@ enum value_type {
 
 enum param_class {
 	PARAM_UNDERSTOOD,
-	PARAM_IGNORED,	/* has no effect on light: reported once, with file and line */
-	PARAM_UNHEEDED, /* changes light a little: reported once, as a difference; a `false` says that it is off */
-	PARAM_REFUSED,	/* would change light: the scene is refused, with what is supported */
+	PARAM_IGNORED, /* has no effect on light: reported once, with file and line */
+	PARAM_DIFFERS, /* changes light a little and is not modelled: a warning, unless the scene says `false` */
+	PARAM_REFUSED, /* would change light: the scene is refused, with what is supported */
 };
 
 struct param {

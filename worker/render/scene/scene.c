@@ -135,8 +135,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
 		return note_property(&m->notes, owner, el, name);
-	if (found->status == PARAM_UNHEEDED)
-		return note_unheeded(&m->notes, owner, el, name);
+	if (found->status == PARAM_DIFFERS)
+		return note_difference(&m->notes, owner, el, name);
 	*p = found;
 	return 0;
 }
