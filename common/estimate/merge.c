@@ -1,4 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The bootstrap of a job, and the bounds that end it.
+ *
+ * Happy path: batches of the bootstrap are added in any order (bootstrap_add). When none is missing, bootstrap_merge
+ * computes b by group and pooled, bootstrap_seeds draws each group's seeds by systematic resampling, and
+ * bootstrap_to_canvas starts the film's sums. After complete rounds merge_end_of says which bound ends the job;
+ * merge_error_due says at which rounds the error is estimated at all.
+ *
+ * Failures: a lease that was added before is -EEXIST, a damaged file of saved leases -EBADMSG, and -ENOMEM. A
+ * bootstrap without light is no failure: it is `black`, and its seeds are UINT64_MAX. Exact sums make the result
+ * independent of the order of batches.
+ */
 #include "common/estimate/merge.h"
 
 #include "common/base/mem.h"

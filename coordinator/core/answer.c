@@ -1,5 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What workers send back: merged, repeated, refused, failed. */
+/*
+ * What the core makes of a worker's answer to a lease.
+ *
+ * Happy path: answer_batch judges a result (judge_result). One that is next for its slot is merged: the action tells
+ * the shell to add it, the worker is acknowledged, other copies of the lease are revoked, and job_merge completes the
+ * round if it was the last. If the lease is verified, the result counts only when a second worker has sent the same
+ * (verify). answer_stored does the same for results read from a journal.
+ *
+ * Failures: REPEAT, a result that was merged before; REFUSE, one that does not count now, through no fault of the
+ * worker; FAULT, content that cannot be right, which counts towards quarantine. A lease that failed (answer_failed)
+ * makes its worker pause; several workers failing alike end the job (failure_quorum.h), and refused chain states are
+ * settled in doubt.c.
+ */
 #include "coordinator/core/answer.h"
 
 #include "common/base/text.h"

@@ -1,5 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a job goes through: submitted, bootstrap, rounds, the bounds, its end. */
+/*
+ * The life of a job: submitted, bootstrap, rounds, a bound, the end.
+ *
+ * Happy path: rounds_submit puts the job on the list of live jobs, ordered by priority. The first lease starts it
+ * (rounds_started). When the bootstrap is merged, the shell prepares seeds and b (ACTION_BOOTSTRAP_DONE) and
+ * rounds_prepared opens the first round. After each complete round rounds_settle checks the bounds; if the error has
+ * to be estimated, the shell does that (ACTION_EVALUATE_ERROR) and rounds_error_known decides. rounds_end revokes what
+ * is out and publishes the image.
+ *
+ * Failures: a submission is rejected with a sentence (priority, too many jobs, job_new's reasons). A job fails when
+ * its bootstrap cannot be prepared or when another file of the core ends it. A black bootstrap ends the job as done.
+ * Answers that come late, for a job that has ended meanwhile, are ignored.
+ */
 #include "coordinator/core/rounds.h"
 
 #include "common/base/mem.h"

@@ -1,5 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Who gets what, and what has been out for too long. */
+/*
+ * Decides which worker gets which lease, and which leases have been out for too long.
+ *
+ * Happy path: schedule runs after every event. While workers wait, hand_out_ready gives the next lease of the job
+ * whose turn it is: the highest priority first, then the owner and the job with the fewest leases out. Once nothing is
+ * ready, hand_out_copy gives second copies of overdue leases. schedule_expire looks about once a second for leases
+ * past their deadline and for silent workers.
+ *
+ * Failures: a silent worker first loses its leases, then its connection. Workers that avoid a job, are quarantined for
+ * it, or hold the same lease already are passed over. Where the usual duration is not known, give_up_copies expires
+ * the older of two copies after a longer time. call_again keeps the earliest time at which any of this may change.
+ */
 #include "coordinator/core/schedule.h"
 
 #include "coordinator/core/actions.h"

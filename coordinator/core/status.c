@@ -1,5 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Answers to questions about the farm. */
+/*
+ * Answers questions about the farm without changing it: jobs, workers, leases, and why a job is waiting.
+ *
+ * farm_job fills all figures of a job. why_waiting finds the first reason why nothing is being done for it, in this
+ * order: held, being evaluated, no worker, no worker of its fingerprint, verification, doubted states, a limited
+ * owner, workers that failed, and last other jobs. Sentences for a job's owner do not name other owners' jobs.
+ *
+ * An unknown id makes a function return false, 0 or NAN. Pointers in the results are valid until the farm's next step.
+ */
 #include "coordinator/core/status.h"
 
 #include "common/base/text.h"

@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Packs what is stored of a job into messages of proto/stored.proto and unpacks it again: counters, error estimates
+ * ("looks") and the head of a checkpoint. The counters come from the list JOB_COUNTS, so a new one appears here by
+ * itself.
+ *
+ * Failures: bytes that are not such a message, a field that this version does not know, or more groups or looks than
+ * fit are -EPROTO with a sentence; -ENOMEM. Packing cannot fail: the sizes are bounded by STORED_NOTE_MOST and
+ * STORED_HEAD_MOST, which assertions check.
+ *
+ * The last part reads the structs that version 004 wrote as they lay in memory (x86-64). Their layout is asserted.
+ */
 #include "coordinator/job/stored.h"
 
 #include "common/base/text.h"

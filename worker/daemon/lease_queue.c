@@ -1,5 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Jobs and leases of the worker daemon. */
+/*
+ * Jobs and leases of the worker daemon. One thread, the event loop's; renders and builds run in the thread pool and
+ * come back through it.
+ *
+ * Happy path: take_grant queues a lease and finds or creates its job's cache. The cache asks for the job
+ * (take_job_info), fetches missing files (take_blob) and builds the scene (on_built); then its leases start. A
+ * rendered lease is sent (on_rendered) and kept until the coordinator acknowledges it (take_ack), also across
+ * connections.
+ *
+ * Failures: a job whose files cannot be fetched or whose scene cannot be built fails all its waiting leases with a
+ * sentence. A lease that is revoked, or whose job has ended, is dropped; what a thread is working on is dropped when
+ * the thread returns. A message that makes no sense closes the connection. lease_queue_watch finds threads that no
+ * longer make progress and fails their leases. When too many results wait to be sent, no more leases are asked for
+ * (pace).
+ */
 #include "worker/daemon/lease_queue.h"
 
 #include "common/base/log.h"

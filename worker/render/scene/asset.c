@@ -1,4 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Opens the files of a scene on behalf of one that is not trusted: every name must stay below the scene's folder or
+ * one that the user added.
+ *
+ * Happy path: search_open tries the folders in order. open_below opens the folder and lets the kernel resolve the name
+ * beneath it (openat2, RESOLVE_BENEATH); read_all then reads the file into memory. A name that leads out of the
+ * scene's folder (asset_name_up) is resolved by its text alone, and opened if it ends below one of the other folders.
+ *
+ * Failures are one sentence in struct error: an absolute name or one that leads out (-EINVAL, with the --path that
+ * would allow it), anything but a regular file, a file above 4 GB or one that shrinks while it is read. Kernels
+ * without openat2 do not follow symbolic links at all.
+ */
 #include "worker/render/scene/asset.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Turns the tree of XML elements (or glTF read as such) into a tree of typed nodes, by the tables of the plug-ins.
+ *
+ * Happy path: read_all parses the file, make_scene lists all ids and walks the top level, and make_node makes one node
+ * for each object: its plug-in is found, then fill_node reads the contents, parameters by read_property and objects,
+ * nested or referred to, by read_object. An element is made once; later references share its node. List_assets
+ * collects the names of all files.
+ *
+ * Failures: a problem is reported with file and line and reading goes on, so that one run lists all problems
+ * (report.h); an object with problems inside still becomes a node. scene_read fails with the first problem,
+ * scene_read_all returns the list. With `lenient`, what is not supported is left out or replaced, with a note.
+ * References in a circle are an error, and depth and number of objects are bounded (nesting.h). -ENOMEM ends the
+ * reading.
+ */
 #include "worker/render/scene/scene.h"
 
 #include "worker/render/scene/asset_list.h"

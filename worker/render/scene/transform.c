@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Reads <transform>, <animation> and vectors given as attributes.
+ *
+ * Happy path: transform_read goes through the elements in order, finds each in the table `steps`, and multiplies its
+ * matrix from the left, so that it applies to the result of those before. transform_still replaces an <animation> by
+ * its first transform.
+ *
+ * Failures are errors with file and line: an unknown element (with the nearest name), a missing or malformed
+ * attribute, a matrix that is not affine, a lookat without a direction, a number outside PARAM_LENGTH_MAX, a moving
+ * <animation> unless the reader is lenient.
+ */
 #include "worker/render/scene/transform.h"
 
 #include "common/base/spelling.h"
