@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bytes that grow up to a hard limit. One thread at a time. Zeroed memory with `limit` set is an empty buffer.
+ * A byte buffer that grows up to a hard limit. Not thread-safe. Zeroed memory with `limit` set is an empty buffer.
  */
 #ifndef COMMON_BASE_BUF_H
 #define COMMON_BASE_BUF_H
@@ -11,12 +11,12 @@
 struct buf {
 	unsigned char *bytes;
 	size_t size, capacity;
-	size_t limit; /* never more than this many bytes */
+	size_t limit; /* the buffer never holds more */
 };
 
-/* Room for `count` bytes more. false: the limit or memory is out; the buffer is unchanged. */
+/* Makes room for `count` more bytes. false: the limit is reached or memory is out; the buffer is unchanged. */
 bool buf_reserve(struct buf *b, size_t count);
 bool buf_append(struct buf *b, const void *bytes, size_t count);
-void buf_fini(struct buf *b); /* the limit stays */
+void buf_fini(struct buf *b); /* keeps the limit */
 
 #endif

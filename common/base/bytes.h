@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Numbers as bytes, little endian, on any machine: in files, messages and states of chains. */
+/* Little-endian numbers in files, messages and chain states, on any machine. */
 #ifndef COMMON_BASE_BYTES_H
 #define COMMON_BASE_BYTES_H
 

@@ -73,7 +73,7 @@ int checked_file_finish(struct checked_file *s, struct error *e)
 	return rc;
 }
 
-/* Fills the buffer anew; at the end of the file it stays empty. */
+/* Refills the buffer; at the end of the file it stays empty. */
 static int fill(struct checked_file *s, struct error *e)
 {
 	ssize_t n;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Seconds of the clock that never jumps, from an unknown beginning: for differences. Any thread. */
+/* Seconds of the monotonic clock, whose origin is unspecified: for differences. Any thread. */
 #ifndef COMMON_BASE_CLOCK_H
 #define COMMON_BASE_CLOCK_H
 

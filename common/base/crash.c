@@ -77,20 +77,20 @@ static void on_signal(int number)
 		if (signals[i].number == number)
 			sigaction(number, &before[i], NULL);
 	errno = kept;
-	raise(number); /* blocked until here is left; a faulting instruction comes again by itself */
+	raise(number); /* blocked until this function returns; a faulting instruction raises it again */
 }
 
 void crash_thread(void)
 {
 	sigset_t all;
 	stack_t now;
-	/* A sanitizer gives threads a stack of its own, which it takes back at their end: that will do. */
+	/* Sanitizers install a stack of their own in each thread and remove it at the end; that one is used. */
 	if (sigaltstack(NULL, &now) || (now.ss_flags & SS_DISABLE))
 		sigaltstack(&(stack_t){.ss_sp = stack, .ss_size = sizeof stack}, NULL);
 	sigemptyset(&all);
 	for (int i = 0; i < SIGNALS; i++)
 		sigaddset(&all, signals[i].number);
-	pthread_sigmask(SIG_UNBLOCK, &all, NULL); /* blocked, they end a program without a word */
+	pthread_sigmask(SIG_UNBLOCK, &all, NULL); /* while blocked, they end a program without a message */
 }
 
 void crash_catch(void (*last_words)(int number, const char *text))

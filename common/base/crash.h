@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The last words of a program that a signal ends (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT: a fault of ours or of a
- * library, an assertion): which signal, and what its thread was doing. What is said meanwhile uses no memory but its
- * own and no lock.
+ * The last message of a program that a signal ends (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT: our fault or a library's,
+ * or an assertion): which signal it was and what the thread was doing. The handler neither allocates nor locks.
  */
 #ifndef COMMON_BASE_CRASH_H
 #define COMMON_BASE_CRASH_H
@@ -11,22 +10,22 @@
 
 enum { CRASH_TEXT = 256 };
 
-/* What the calling thread does from now on, at which line of which file (NULL: of none). The texts are not copied: they
- * stay until another place is said. doing NULL: nothing. */
+/* Sets what the calling thread is doing, and for which line of which file (NULL: none). The texts are not copied and
+ * must stay valid until the next call. doing NULL: nothing. */
 void crash_place(const char *doing, const char *file, int line);
 
-/* "SIGSEGV"; "signal 9" of those that are not listed above is "SIGKILL", of others "a signal". */
+/* "SIGSEGV"; of signals that are not listed above SIGKILL is "SIGKILL", others are "a signal". */
 const char *crash_signal_name(int number);
 
-/* last_words is called on the thread that the signal hit with a text like "SIGABRT while building the scene:
- * scene.xml:12"; when it returns the program ends as it would have without. Once, before there are threads. */
+/* last_words is called on the thread that received the signal, with a text such as "SIGABRT while building the
+ * scene: scene.xml:12". When it returns, the signal takes its default action. Call once, before threads are started. */
 void crash_catch(void (*last_words)(int number, const char *text));
 
-/* For threads but the first: a signal for want of stack is handled, too. */
+/* For each further thread: also handles a signal caused by a stack overflow. */
 void crash_thread(void);
 
-/* The same for a program: its name, the text, "it is a fault of the program or of a library" on stderr, then exit
- * code 1. */
+/* The same for a command-line program: prints its name, the text, and "it is a fault of the program or of a library"
+ * on stderr, then exits with 1. */
 void crash_exit(const char *program);
 
 #endif

@@ -23,7 +23,7 @@ static void fill(void)
 }
 
 #ifdef __x86_64__
-/* The processor's own, three times as fast and more. */
+/* The processor's instruction: at least three times as fast. */
 __attribute__((target("sse4.2"))) static uint32_t by_instruction(uint32_t crc, const uint8_t *p, size_t size)
 {
 	uint64_t c = crc;
@@ -39,7 +39,7 @@ __attribute__((target("sse4.2"))) static uint32_t by_instruction(uint32_t crc, c
 }
 #endif
 
-/* Eight bytes a step, each through a table of its own (slicing by 8); byte order does not matter to what comes out. */
+/* Eight bytes per step, each through a table of its own (slicing by 8); the result does not depend on byte order. */
 uint32_t crc32c(uint32_t crc, const void *bytes, size_t size)
 {
 	const uint8_t *p = bytes;

@@ -87,7 +87,8 @@ int disk_sync_folder(const char *path, struct error *e)
 int disk_make_folder(const char *path, struct error *e)
 {
 	char parent[4096];
-	bool there = disk_mkdir(path, 0700) != 0; /* perhaps by a start that was cut short: its name is flushed again */
+	bool there =
+		disk_mkdir(path, 0700) != 0; /* perhaps by a start that was interrupted: its name is flushed again */
 	if (there && errno != EEXIST)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	int n = snprintf(parent, sizeof parent, "%s", path);
@@ -101,5 +102,5 @@ int disk_make_folder(const char *path, struct error *e)
 	else if (slash)
 		*slash = 0;
 	int rc = disk_sync_folder(slash ? parent : ".", e);
-	return there && rc == -EACCES ? 0 : rc; /* somebody else made it, where we may not look */
+	return there && rc == -EACCES ? 0 : rc; /* exists, but we may not look inside */
 }

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The one door for file I/O of whatever must survive: the coordinator's spool, stores of blobs, files of films, sealed
- * files. The calls are the system's, with its conventions (-1 and errno), through a table that tests replace: by a disk
- * that is full, fails, or forgets at a loss of power what was not flushed. tests/lint/disk.sh holds the tree to it;
- * SQLite has a door of its own (its VFS). Any thread; disk_use before there is more than one. Allocates nothing.
+ * All file I/O of data that must survive: the coordinator's spool, blob stores, film files, checked files. The
+ * functions are the system's, with its conventions (-1 and errno), called through a table that tests replace by a disk
+ * that is full, fails, or loses what was not flushed. tests/lint/disk.sh checks that nothing goes around it; SQLite has
+ * its own layer (its VFS). Any thread; call disk_use before there is more than one. Allocates nothing.
  *
- * What a flush promises: the bytes and the length of this file. That its name is there is promised by a flush of its
- * folder. A flush that failed is never repeated: what it did not write may be forgotten, and the next one says that all
- * is well.
+ * Flushing a file makes its bytes and its length durable. Its name becomes durable by flushing its folder. A flush that
+ * failed is never repeated: the data may be lost, and the next flush would report success.
  */
 #ifndef COMMON_BASE_DISK_H
 #define COMMON_BASE_DISK_H
@@ -30,14 +29,14 @@ struct disk {
 	ssize_t (*pwritev)(int fd, const struct iovec *parts, int count, off_t at);
 	int (*ftruncate)(int fd, off_t size);
 	int (*fallocate)(int fd, int mode, off_t at, off_t size);
-	int (*posix_fallocate)(int fd, off_t at, off_t size); /* the error is what it returns */
+	int (*posix_fallocate)(int fd, off_t at, off_t size); /* returns the error code */
 	int (*fsync)(int fd);
 	int (*fdatasync)(int fd);
 	int (*rename)(const char *from, const char *to);
 	int (*unlink)(const char *path);
 	int (*mkdir)(const char *path, mode_t mode);
 	int (*rmdir)(const char *path);
-	int (*stat)(const char *path, struct stat *st); /* of a link: the link's */
+	int (*stat)(const char *path, struct stat *st); /* of the link itself */
 	int (*fstat)(int fd, struct stat *st);
 	int (*touch)(const char *path);
 	int (*flock)(int fd, int what);
@@ -45,7 +44,7 @@ struct disk {
 };
 
 extern const struct disk *disk_calls;
-void disk_use(const struct disk *calls); /* NULL: the system's */
+void disk_use(const struct disk *calls); /* NULL: the system's functions */
 extern const struct disk disk_system;
 
 static inline int disk_open(const char *path, int flags, mode_t mode)
@@ -103,13 +102,13 @@ static inline int disk_fdatasync(int fd)
 	return disk_calls->fdatasync(fd);
 }
 
-/* What is on the disk need not stay in memory: it is read again after a crash only. */
+/* The data need not stay in the page cache: it is read again only after a crash. */
 static inline void disk_forget(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
 }
 
-/* All of it will be read, from its beginning to its end, and soon. */
+/* The file will be read sequentially and completely, soon. */
 static inline void disk_read_through(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_SEQUENTIAL);
@@ -161,11 +160,11 @@ static inline DIR *disk_opendir(const char *path)
 	return disk_calls->opendir(path);
 }
 
-/* All of it; 0 or -errno. */
+/* Writes all of it; 0 or -errno. */
 int disk_write_all(int fd, const void *bytes, size_t size);
-/* The names in a folder are there for good. */
+/* Makes the names in a folder durable. */
 int disk_sync_folder(const char *path, struct error *e);
-/* The folder is there, for good; it may have been before. */
+/* Makes a folder, durably; it may exist already. */
 int disk_make_folder(const char *path, struct error *e);
 
 #endif

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What went wrong outside, said once where the knowledge is.
+ * One error of the outside world (a file, a peer, memory), worded where it is known best.
  *
- * Functions that can fail because of the outside (a file, a peer, memory) return 0 or a negative errno and
- * write one sentence here. Any thread; allocates nothing.
+ * Functions that can fail return 0 or a negative errno and write one sentence here. Any thread; allocates nothing.
  */
 #ifndef COMMON_BASE_ERROR_H
 #define COMMON_BASE_ERROR_H
@@ -14,11 +13,10 @@ struct error {
 	char text[1024];
 };
 
-/* Writes the sentence, clean as in text.h whatever is cut or quoted in it, and returns -errno_value. e may be NULL (the
- * code alone is wanted). */
+/* Writes the sentence, sanitised as in text.h, and returns -errno_value. e may be NULL if only the code is wanted. */
 __attribute__((format(printf, 3, 4))) int error_set(struct error *e, int errno_value, const char *format, ...);
 
-/* Puts "prefix: " before the sentence that is there already. Returns code unchanged. */
+/* Puts "prefix: " in front of the sentence. Returns code. */
 __attribute__((format(printf, 3, 4))) int error_prefix(struct error *e, int code, const char *format, ...);
 
 #endif

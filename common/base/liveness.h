@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Work that says that it gets on: a thread's ticks count up a counter of its own, and whoever watches that sees it
- * stand still when the thread hangs. Code that may run for long ticks more often than once a second. Threads that
- * nobody watches lose a look at a variable by it.
+ * Lets a watchdog see that a thread makes progress: tick() increments the thread's counter, and a counter that stands
+ * still means that the thread hangs. Code that may run for long calls tick() more than once a second. In threads
+ * without a watchdog it costs one load.
  */
 #ifndef COMMON_BASE_LIVENESS_H
 #define COMMON_BASE_LIVENESS_H
@@ -10,9 +10,9 @@
 #include <stdatomic.h>
 #include <stddef.h>
 
-extern _Thread_local atomic_ullong *tick_counter; /* NULL: nobody watches this thread */
+extern _Thread_local atomic_ullong *tick_counter; /* NULL: this thread is not watched */
 
-/* One thread counts, others look. */
+/* One thread counts, others read. */
 static inline void tick_on(atomic_ullong *counter)
 {
 	if (counter)

@@ -22,7 +22,7 @@ static const struct {
 #undef LOG_ROW
 };
 
-/* What anybody who reaches the port can cause. */
+/* Events that anyone who reaches the port can cause. */
 static const enum log_event limited[] = {LOG_PEER_ACCEPT, LOG_PEER_HELLO, LOG_PEER_REFUSED,
 					 LOG_PEER_CLOSED, LOG_PEER_FAULT, LOG_PEER_GARBLED};
 enum { LIMITED = sizeof limited / sizeof *limited };
@@ -112,7 +112,7 @@ void log_event(enum log_event event, const char *fields, ...)
 	text_clean(text);
 	size_t n = log_format(line, sizeof line - 1, event, text);
 	line[n++] = '\n';
-	/* A log that cannot be written must not stop the farm. */
+	/* Errors are ignored: a log that cannot be written must not stop the farm. */
 	if (write(STDERR_FILENO, line, n) < 0)
 		return;
 }

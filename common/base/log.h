@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Log lines of the daemons: one logfmt line an event on stderr, "time=... level=... event=... key=value ...".
- * The vocabulary is the table below: what is not in it is not logged, so that a line can be searched for by name.
- * Any thread (one write a line). Libraries do not log.
+ * Log lines of the daemons: one logfmt line per event on stderr, "time=... level=... event=... key=value ...". All
+ * events are in the table below, so every line can be searched for by name. Any thread (one write per line). Libraries
+ * do not log.
  */
 #ifndef COMMON_BASE_LOG_H
 #define COMMON_BASE_LOG_H
@@ -64,29 +64,28 @@ enum log_event {
 
 enum log_level { LOG_LEVEL_DEBUG, LOG_LEVEL_INFO, LOG_LEVEL_WARN, LOG_LEVEL_ERROR };
 
-void log_set_level(enum log_level least); /* INFO at first */
+void log_set_level(enum log_level least); /* default: INFO */
 
-/* fields: "job=j%llu name=%s"; texts from outside go through log_quote. A line is at most 2,047 bytes. */
+/* fields: "job=j%llu name=%s"; text from outside must go through log_quote. A line has at most 2,047 bytes. */
 __attribute__((format(printf, 2, 3))) void log_event(enum log_event event, const char *fields, ...);
 
 enum { LOG_VALUE_MAX = 512 };
 struct log_value {
 	char text[LOG_VALUE_MAX];
 };
-/* "text" with quotes, and without control characters, cut to fit. */
+/* "text" in quotes, without control characters, cut to fit. */
 struct log_value log_quote(const char *text);
-/* For %llu, whatever uint64_t is here. */
+/* For %llu, whatever type uint64_t is. */
 static inline unsigned long long log_u64(uint64_t n)
 {
 	return n;
 }
 
-/* Lines about connections come in rushes: of each such kind 100 at once and 5 a second are said, the others counted
- * (log_limit.h; not with LOG_LEVEL_DEBUG, where all are said). Called now and then it says how many of which kind that
- * were. */
+/* Lines about connections are rate-limited by kind: 100 at once and 5 a second, the others are counted (log_limit.h;
+ * with LOG_LEVEL_DEBUG all are written). Call this now and then: it logs how many of which kind were left out. */
 void log_tick(void);
 
-/* The line as log_event writes it, without the newline; for logs of jobs. Returns its length. */
+/* The line as log_event writes it, without the newline, for the logs of jobs. Returns its length. */
 size_t log_format(char *line, size_t size, enum log_event event, const char *fields);
 
 #endif

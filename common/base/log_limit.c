@@ -25,7 +25,7 @@ uint64_t log_bucket_withheld(struct log_bucket *b, double now)
 	fill(b, now);
 	if (!n || b->used + 1 > LOG_BURST)
 		return 0;
-	b->used++; /* the line that says so */
+	b->used++; /* the line that reports this */
 	b->withheld = 0;
 	return n;
 }

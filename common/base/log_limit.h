@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How many log lines of one kind are said: a bucket of tokens, one a line, filled again as time goes by. Pure: the
- * caller has the clock, and one bucket a kind.
+ * A rate limit for log lines of one kind: a token bucket, one token per line. Pure: the caller provides the clock and
+ * one bucket per kind.
  */
 #ifndef COMMON_BASE_LOG_LIMIT_H
 #define COMMON_BASE_LOG_LIMIT_H
@@ -12,13 +12,13 @@
 enum { LOG_BURST = 100, LOG_PER_SECOND = 5 };
 
 struct log_bucket {
-	double used, at;   /* tokens that are not there, and when that was; zeroed: full */
-	uint64_t withheld; /* lines since this was asked for last */
+	double used, at;   /* tokens used, and as of when; zeroed: a full bucket */
+	uint64_t withheld; /* lines left out since the last log_bucket_withheld */
 };
 
-/* A line is to be said at `now` (s, never falls); false: it is withheld, and counted. */
+/* true: write the line. `now` in s, never decreasing. false: leave it out; it is counted. */
 bool log_bucket_take(struct log_bucket *b, double now);
-/* How many were withheld, once a line could be said again; 0: none, or the rush goes on. Then counted anew. */
+/* How many lines were left out, once lines are allowed again, and resets the count; otherwise 0. */
 uint64_t log_bucket_withheld(struct log_bucket *b, double now);
 
 #endif

@@ -36,7 +36,7 @@ void mem_free(void *p)
 
 void mem_keep(size_t bytes)
 {
-	enum { MAPPED_MOST = 32 << 20 }; /* glibc takes no more */
+	enum { MAPPED_MOST = 32 << 20 }; /* glibc's maximum */
 	int limit = bytes < INT_MAX ? (int)bytes : INT_MAX;
 	mallopt(M_TRIM_THRESHOLD, limit);
 	mallopt(M_MMAP_THRESHOLD, limit < MAPPED_MOST ? limit : MAPPED_MOST);

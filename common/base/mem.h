@@ -1,23 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The one door for memory. Tests make the n-th allocation fail (tests/support/failing_memory.h) and check that nothing
- * leaks or crashes.
- * Returned memory is zeroed. Any thread.
+ * All heap memory. Tests make the n-th allocation fail (tests/support/failing_memory.h) and check that nothing leaks or
+ * crashes. Memory is zeroed. Any thread.
  */
 #ifndef COMMON_BASE_MEM_H
 #define COMMON_BASE_MEM_H
 
 #include <stddef.h>
 
-void *mem_alloc(size_t count, size_t size);		   /* NULL when count * size overflows or memory is out */
-void *mem_grow(void *p, size_t old_size, size_t new_size); /* as realloc; the new part is zeroed; p lives on failure */
+void *mem_alloc(size_t count, size_t size); /* NULL if count * size overflows or memory is out */
+void *mem_grow(void *p, size_t old_size,
+	       size_t new_size); /* as realloc; the new part is zeroed; p stays valid on failure */
 char *mem_strdup(const char *s);
 void mem_free(void *p);
 
-/* At the start of a program: up to so many freed bytes wait for the next allocations, and what is larger goes back to
- * the kernel at once. A daemon that takes and frees buffers of megabytes spends a fifth of its time on pages that the
- * kernel takes back and zeroes again; one that reads large meshes and then works for hours keeps half as much again for
- * nothing, because the C library raises the limit itself each time. */
+/* Call at the start of a program: up to so many freed bytes are kept for the next allocations, and larger blocks are
+ * returned to the kernel at once. Without it, a daemon that allocates and frees buffers of megabytes spends a fifth
+ * of its time on page faults, and one that reads large meshes keeps half as much memory again unused, because the C
+ * library raises its threshold by itself. */
 void mem_keep(size_t bytes);
 
 #endif

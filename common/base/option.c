@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads a command line by a program's tables.
+ * Parses a command line by a program's tables.
  *
- * Happy path: defaults and environment are read by the same function as arguments (put), then argv is gone through
- * once; an option's name is looked up among all rows (find), its argument checked by its kind and stored in the struct
- * that its table fills. The checks that look at several options come last.
+ * Happy path: defaults and environment variables are stored by the same function as arguments (put). Then argv is
+ * scanned once: each option is looked up among all rows (find), its argument is checked by its kind and stored in the
+ * struct that its table fills. Checks that involve several options come last.
  *
- * Failures: each is one sentence in struct error and -EINVAL. A name that is unknown gets the nearest one.
+ * Failures: one sentence in struct error and -EINVAL. An unknown name is answered with the nearest one.
  */
 #include "common/base/option.h"
 
@@ -32,7 +32,7 @@ static const struct option_group general_groups[] = {{NULL, general_rows}, {0}};
 
 /* ---- the rows of a program, one after the other ---- */
 
-/* The i-th row of t; where i is beyond, it becomes the index in what follows t. */
+/* The i-th row of t. If i is beyond its end, it becomes the index into what follows t. */
 static const struct option_row *row_of(const struct option_group *groups, size_t *i, const struct option_group **group)
 {
 	for (const struct option_group *g = groups; g && g->rows; g++)
@@ -143,7 +143,7 @@ static int take_seconds(const struct option_row *r, void *field, const char *arg
 	return 0;
 }
 
-/* Who writes 5 means 5 percent. */
+/* A plain number above 1, such as 5, means percent. */
 static int take_ratio(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
 	char range[80];
@@ -161,7 +161,7 @@ static int take_ratio(const struct option_row *r, void *field, const char *arg, 
 	return 0;
 }
 
-/* "; did you mean `fetch`?", or all that there are */
+/* "; did you mean `fetch`?", or a list of all */
 static int check_value(const char *noun, option_values *values, const char *arg, struct error *e)
 {
 	char hint[128], list[512] = "";
@@ -178,7 +178,7 @@ static int check_value(const char *noun, option_values *values, const char *arg,
 			 *hint ? "" : list);
 }
 
-/* The argument of an option, NULL where it takes none, to its place in target. */
+/* Stores an option's argument (NULL if it takes none) at its place in target. */
 static int put(const struct option_row *r, void *target, char *arg, struct error *e)
 {
 	void *field = (char *)target + r->offset;
@@ -221,7 +221,7 @@ int option_defaults(const struct option_table *t, void *target, struct error *e)
 
 struct reader {
 	const struct program *program;
-	int argc, at; /* argv[at] is looked at */
+	int argc, at; /* argv[at] is the next to read */
 	char **argv;
 	void *target;
 	size_t words;
@@ -258,7 +258,7 @@ static int unknown(const struct reader *x, const char *dashes, const char *name)
 			 s.best ? s.best : "", s.best ? "'?" : "");
 }
 
-/* The row of a name, or of the beginning of only one; NULL: an error. */
+/* The row of a name or of an unambiguous prefix; NULL: an error. */
 static const struct option_row *find(const struct reader *x, const char *name, size_t *offset)
 {
 	const struct option_row *r, *found = NULL;

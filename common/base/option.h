@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A program as its user meets it: its options are rows of a table, from which the command line is read (options_parse)
- * and --help, the manual page and the completion of a shell are printed (option_print.h). One thread.
+ * The options of a program as rows of a table. The command line is parsed by it (options_parse), and --help, the manual
+ * page and shell completion are printed from it (option_print.h). One thread.
  *
- * As with getopt_long: options and other words may come in any order, names may be cut short as long as they are
- * unambiguous, an argument follows as `--name=ARG`, `--name ARG`, `-n ARG` or `-nARG`, flags of one letter may be
- * joined, and after `--` nothing is an option. A word such as -5 is no option.
+ * As with getopt_long, options and other words may be mixed, names may be abbreviated as long as they are unambiguous,
+ * arguments are written `--name=ARG`, `--name ARG`, `-n ARG` or `-nARG`, one-letter flags may be joined, and nothing
+ * after `--` is an option. A word such as -5 is not an option.
  */
 #ifndef COMMON_BASE_OPTION_H
 #define COMMON_BASE_OPTION_H
@@ -16,16 +16,16 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What the argument of an option is; the last ones are those of every program. */
+/* The kind of an option's argument; the last ones are the options that every program has. */
 enum option_kind {
 	OPTION_IS_END,	   /* no row: the table ends */
-	OPTION_IS_FLAG,	   /* none */
+	OPTION_IS_FLAG,	   /* takes none */
 	OPTION_IS_TEXT,	   /* borrowed from argv */
 	OPTION_IS_NUMBER,  /* from least to most, stored times unit */
 	OPTION_IS_COUNT,   /* a whole number: 4000, 1.5k */
 	OPTION_IS_SECONDS, /* 90, 90s, 5m, 2h */
 	OPTION_IS_RATIO,   /* 0.05, 5%; above 1 as percent only */
-	OPTION_IS_OTHER,   /* what `take` makes of it */
+	OPTION_IS_OTHER,   /* converted by `take` */
 	OPTION_IS_HELP,
 	OPTION_IS_USAGE,
 	OPTION_IS_VERSION,
@@ -35,28 +35,28 @@ enum option_kind {
 
 enum option_store { OPTION_BOOL, OPTION_STRING, OPTION_DOUBLE, OPTION_UINT64, OPTION_UINT32, OPTION_INT };
 
-/* The i-th name that is known, NULL after the last. */
+/* The i-th accepted name, NULL after the last. */
 typedef const char *option_values(size_t i);
 
-/* A `most` of DBL_MAX is no bound. What the name of the argument says: FILE and PATH are completed by files, DIR and
- * FOLDER by folders; the argument of +N may begin with a plus sign. */
+/* A `most` of DBL_MAX means no upper bound. The argument's name has a meaning: FILE and PATH are completed by files,
+ * DIR and FOLDER by folders; the argument of +N may begin with a plus sign. */
 struct option_row {
 	const char *name; /* without its dashes */
-	char key;	  /* of one letter; 0: none */
+	char key;	  /* one letter; 0: none */
 	const char *arg;  /* its argument's name; NULL: it takes none */
-	const char *help; /* without a full stop, and without the default */
+	const char *help; /* without full stop and default */
 	enum option_kind kind;
 	enum option_store store;
-	size_t offset; /* of where it is stored in the struct that the table fills */
+	size_t offset; /* offset in the struct that the table fills */
 	double least, most, unit;
-	bool above, below;	 /* the bound itself is excluded */
-	bool needed;		 /* a text: it is a usage error if it stays NULL */
-	bool hidden;		 /* an old name: not shown, and not to be cut short */
-	const char *standard;	 /* the default, read as an argument is; NULL: what the struct holds already */
-	const char *environment; /* the variable that stands in for the option; NULL: none */
-	option_values *values;	 /* the only arguments that there are; NULL: any */
-	int (*take)(void *target, char *arg, struct error *e); /* arg: of argv, may be changed; NULL without `arg` */
-	void (*more)(char *text, size_t size);		       /* what help says behind the default; NULL: nothing */
+	bool above, below;	 /* the bound itself is not allowed */
+	bool needed;		 /* a text: leaving it NULL is a usage error */
+	bool hidden;		 /* an old name: not shown, cannot be abbreviated */
+	const char *standard;	 /* the default, parsed like an argument; NULL: keep what the struct holds */
+	const char *environment; /* environment variable used if the option is not given; NULL: none */
+	option_values *values;	 /* the only accepted arguments; NULL: any */
+	int (*take)(void *target, char *arg, struct error *e); /* arg: from argv, may be changed; NULL without `arg` */
+	void (*more)(char *text, size_t size); /* what the help text adds as the default; NULL: nothing */
 };
 
 #define OPTION_STORE(type, field) \
@@ -67,7 +67,7 @@ struct option_row {
 							   : OPTION_UINT64, uint32_t                                   \
 							   : OPTION_UINT32, int                                        \
 							   : OPTION_INT)
-/* The last part of a row: its kind, and the field of the struct that holds it. */
+/* The last part of a row: its kind, and the field that it fills. */
 #define OPTION_FLAG(type, field) .kind = OPTION_IS_FLAG, OPTION_STORE(type, field)
 #define OPTION_TEXT(type, field) .kind = OPTION_IS_TEXT, OPTION_STORE(type, field)
 #define OPTION_NUMBER(type, field, from, to) \
@@ -89,36 +89,38 @@ struct option_group {
 
 /* Options that fill one struct. */
 struct option_table {
-	const struct option_group *groups;	     /* until one without rows */
-	int (*check)(void *target, struct error *e); /* that they go together, after the last word; NULL: they do */
+	const struct option_group *groups; /* ends with an empty row */
+	int (*check)(void *target,
+		     struct error *e); /* checks their combination, after the last word; NULL: nothing to check */
 };
 
-/* Texts without line breaks are filled; those of more lines have each line filled, examples none. */
+/* Paragraphs are filled; in texts of several lines, each line is filled, except in examples. */
 struct program {
 	const char *name;
-	const char *words;    /* what follows the options, a line each way to call it; NULL: nothing does */
+	const char *words;    /* what follows the options, one line per form of the command; NULL: nothing */
 	const char *summary;  /* one sentence */
-	const char *examples; /* a line each */
-	const char *details;  /* what else there is to know */
+	const char *examples; /* one per line */
+	const char *details;  /* further text */
 	const char *exits;    /* "0 done, 1 failed, 2 usage" */
 	struct option_table own;
-	const struct option_table *shared; /* by several programs; NULL: none */
-	size_t shared_offset;		   /* of its struct in the one that `own` fills */
-	option_values *verbs;		   /* what the first word must be; NULL: anything */
-	/* The index-th word that is no option; NULL: there must be none. */
+	const struct option_table *shared; /* shared by several programs; NULL: none */
+	size_t shared_offset;		   /* offset of its struct in the one that `own` fills */
+	option_values *verbs;		   /* accepted first words; NULL: any */
+	/* Takes the index-th word that is not an option; NULL: there must be none. */
 	int (*word)(void *target, size_t index, char *word, struct error *e);
 };
 
-/* The defaults of a table into what it fills; the environment is not looked at. */
+/* Stores the defaults of a table; does not read the environment. */
 int option_defaults(const struct option_table *t, void *target, struct error *e);
 
-/* Defaults, environment, command line, then the checks. -EINVAL with a sentence for the user: a usage error. *asked is
- * one of the last kinds if it was asked for, and then the rest was not looked at; else OPTION_IS_END. */
+/* Defaults, environment, command line, then the checks. -EINVAL, with a sentence for the user: a usage error. *asked
+ * is one of the last kinds if such an option was given, and then nothing after it was parsed; otherwise
+ * OPTION_IS_END. */
 int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *asked,
 		  struct error *e);
 
-/* All rows of a program, with those that every program has at the end; NULL after the last. group and offset (of what
- * its table fills) may be NULL. */
+/* All rows of a program, those that every program has at the end; NULL after the last. group and offset (into what
+ * the table fills) may be NULL. */
 const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group,
 				   size_t *offset);
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Help and manual page say the same sentences in two layouts: describe() makes the text of a row from its help, values,
- * default and environment variable. The completion knows the names, and what may follow each from its values or its
- * argument's name.
+ * Help and manual page have the same sentences in two layouts: describe() builds the text of a row from its help,
+ * values, default and environment variable. The completion knows the names, and the possible arguments by their values
+ * or the argument's name.
  */
 #include "common/base/option_print.h"
 
@@ -40,7 +40,7 @@ static void describe(const struct option_row *r, char *text, size_t size)
 
 /* ---- help ---- */
 
-/* The words of a line of n bytes, from a column on, later lines from `indent` on. */
+/* The words of a line of n bytes, starting at a column; continuation lines start at `indent`. */
 static void fill(FILE *out, const char *line, size_t n, size_t column, size_t indent)
 {
 	const char *end = line + n;
@@ -75,7 +75,7 @@ static void fill_lines(FILE *out, const char *text)
 	}
 }
 
-/* Each line of `text` behind `before`. */
+/* Each line of `text`, prefixed by `before`. */
 static void print_lines(FILE *out, const char *before, const char *text)
 {
 	while (*text) {
@@ -157,7 +157,7 @@ static void print_usage(FILE *out, const struct program *p)
 
 /* ---- manual page ---- */
 
-/* Text as roff: no request, no escape, and no character that a typesetter would make another of. */
+/* Text for roff: requests and escapes are disabled, and no character is typeset as another one. */
 static void roff(FILE *out, const char *text, size_t n)
 {
 	static const char special[] = "\\-'`^~";
@@ -301,7 +301,7 @@ static void print_case(FILE *out, const struct option_row *r)
 	fputs(" -- \"$word\") ;;\n", out);
 }
 
-/* bash splits words at '=', too: `--size=3` are three of them. */
+/* bash splits words at '=': `--size=3` arrives as three words. */
 static void print_completion(FILE *out, const struct program *p)
 {
 	char function[64];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a program prints about itself, all of it made of its tables: --help, --usage, --version, the manual page
- * (macros of man(7)) and a script by which bash completes its options. One thread.
+ * What a program prints about itself, generated from its tables: --help, --usage, --version, the manual page (macros of
+ * man(7)) and a bash completion script. One thread.
  */
 #ifndef COMMON_BASE_OPTION_PRINT_H
 #define COMMON_BASE_OPTION_PRINT_H

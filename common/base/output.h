@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a program says on stdout has been said, or its exit code is not 0. */
+/* Makes a program fail if its output on stdout was lost. */
 #ifndef COMMON_BASE_OUTPUT_H
 #define COMMON_BASE_OUTPUT_H
 
-/* First in main: when the program ends, by whatever way but _exit, with 0, and stdout did not take all that was written
- * (a full disk), it says so on stderr and ends with 1. */
+/* Call first in main. If the program exits with 0 (other than by _exit) and stdout could not take everything (a full
+ * disk), it prints an error and the exit code becomes 1. */
 void output_check_at_exit(void);
 
 #endif

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The beginning of main. One thread. */
+/* The start of main. One thread. */
 #ifndef COMMON_BASE_PROGRAM_H
 #define COMMON_BASE_PROGRAM_H
 
 #include "common/base/option.h"
 
-/* options_parse for main: an error ends the program with 2, help and the like with 0. */
+/* options_parse for main: an error exits with 2, --help and the like with 0. */
 void program_options(const struct program *p, int argc, char **argv, void *target);
 
 #endif

@@ -12,7 +12,7 @@ static char lower(char c)
 	return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
 }
 
-/* Insertions, deletions, replacements, exchanges of neighbours (optimal string alignment). */
+/* Insertions, deletions, replacements and transpositions (optimal string alignment). */
 static size_t edit_distance(const char *a, size_t n, const char *b, size_t m)
 {
 	size_t row[3][COMPARED_MAX + 1];

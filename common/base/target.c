@@ -11,8 +11,8 @@
 
 enum { LINKS_MOST = 40 };
 
-/* As /dev/fd/3 and /dev/stdout lead to: opened anew such a file would be written from its beginning. Negative: it is
- * none. */
+/* The descriptor behind /dev/fd/3, /dev/stdout and the like; reopening such a file would write from its beginning.
+ * Negative: none. */
 static int own_descriptor(const char *path)
 {
 	char folder[TARGET_PATH], real[PATH_MAX], own[64];
@@ -25,7 +25,7 @@ static int own_descriptor(const char *path)
 	return realpath(folder, real) && strcmp(real, own) == 0 ? atoi(name) : -1;
 }
 
-/* One link further; `path` is the link. */
+/* Follows one link; `path` is the link. */
 static int follow(char path[TARGET_PATH], struct error *e)
 {
 	char to[TARGET_PATH], next[TARGET_PATH];
@@ -56,7 +56,7 @@ int target_find(struct target *t, const char *path, struct error *e)
 			return 0;
 		}
 		if (lstat(t->path, &st))
-			return 0; /* whoever writes there says why it cannot be */
+			return 0; /* left to whoever writes there to report */
 		if (S_ISDIR(st.st_mode))
 			return error_set(e, EISDIR, "%s: is a folder", path);
 		t->through = !S_ISREG(st.st_mode);

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Length of the UTF-8 sequence at p (1..4), 0 when it is none: RFC 3629, no surrogates, shortest form. */
+/* Length of the UTF-8 sequence at p (1..4), 0 if it is invalid: RFC 3629, no surrogates, shortest form. */
 static size_t utf8_length(const unsigned char *p)
 {
 	if (p[0] < 0x80)
@@ -54,7 +54,7 @@ void text_clean(char *text)
 	}
 }
 
-/* The length of a text of n bytes without the beginning of a sequence at its end. */
+/* The length of a text of n bytes without an incomplete sequence at its end. */
 static size_t whole(const char *text, size_t n)
 {
 	size_t start = n;
@@ -78,7 +78,7 @@ void text_copy(char *out, size_t size, const char *from)
 	out[n] = 0;
 }
 
-/* The length of what is there; cut: not all of it. */
+/* The length of the valid part; cut: that is not all of it. */
 __attribute__((format(printf, 4, 0))) static size_t print(char *out, size_t size, bool *cut, const char *format,
 							  va_list ap)
 {
@@ -137,7 +137,7 @@ bool text_share(const char *text, double *share)
 	return true;
 }
 
-/* A number that is not negative, and behind it at most one letter of `units`, worth the factor of its place. */
+/* A non-negative number, followed by at most one letter of `units`, which selects the factor at the same index. */
 static bool with_unit(const char *text, const char *units, const double *factors, double *value)
 {
 	char *end;
@@ -154,7 +154,7 @@ static bool with_unit(const char *text, const char *units, const double *factors
 bool text_count(const char *text, uint64_t *count)
 {
 	static const double thousands[] = {1e3, 1e3, 1e6, 1e9};
-	if (text[strspn(text, "0123456789")] == 0) { /* exact beyond 2^53, too */
+	if (text[strspn(text, "0123456789")] == 0) { /* exact also beyond 2^53 */
 		errno = 0;
 		unsigned long long n = strtoull(text, NULL, 10);
 		*count = n;

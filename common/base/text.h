@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Short texts in fixed arrays. Any thread. */
+/* Short texts in fixed-size arrays. Any thread. */
 #ifndef COMMON_BASE_TEXT_H
 #define COMMON_BASE_TEXT_H
 
@@ -7,30 +7,30 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Copies, cutting what does not fit, never in the middle of a UTF-8 sequence. */
+/* Copies, truncating what does not fit, but never inside a UTF-8 sequence. */
 void text_copy(char *out, size_t size, const char *from);
-/* The same of something formatted. */
+/* The same with a format. */
 __attribute__((format(printf, 3, 4))) void text_print(char *out, size_t size, const char *format, ...);
 
-/* UTF-8 without control characters: what may be shown, sent, and written as JSON. */
+/* UTF-8 without control characters: safe to display, send and write as JSON. */
 bool text_is_clean(const char *text);
-/* Makes it that, in place: what is no UTF-8 becomes '?', a control character a blank. */
+/* Makes a text safe in place: invalid UTF-8 becomes '?', a control character a blank. */
 void text_clean(char *text);
 
-/* The same text, for interfaces that have no const and change nothing: generated messages, arguments that are
- * constants. */
+/* Casts const away for interfaces that lack it but change nothing: generated messages, constant arguments. */
 char *text_borrow(const char *text);
 
-/* "0.05" or "5%". false: no number. A share is from 0 to 1. */
+/* "0.05" or "5%". false: not a number. A share is from 0 to 1. */
 bool text_ratio(const char *text, double *ratio);
 bool text_share(const char *text, double *share);
 
-/* "1000", "1.5k", "2M", "1G": a whole number, by powers of 1000. "90", "90s", "5m", "2h", "1d": seconds. false: none of
- * these, or the number is not finite, negative, or not whole. */
+/* A whole number with decimal units: "1000", "1.5k", "2M", "1G"; a time: "90", "90s", "5m", "2h", "1d". false:
+ * malformed, not finite, negative, or not a whole number. */
 bool text_count(const char *text, uint64_t *count);
 bool text_seconds(const char *text, double *seconds);
 
-/* Appends to a fixed array: what does not fit is cut as above, and nothing comes after it. Begin with {array, size}. */
+/* Appends to a fixed-size array. What does not fit is truncated as above, and later text is dropped. Start with
+ * {array, size}. */
 struct text {
 	char *at;
 	size_t left;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A store is a sorted array of entries (hash, size, holds, last use) beside the folder that it describes: opening reads
- * the folder, looking up is a binary search, and the disk is touched for bytes alone.
+ * A store is a sorted array of entries (hash, size, holds, last use) that mirrors a folder: opening reads the folder,
+ * looking up is a binary search, and only contents are read from the disk.
  *
  * Writing: blob_write_begin makes room and a temporary file, blob_write_add appends and hashes, blob_write_commit
- * compares the hash, flushes, renames and enters the blob. Until then nobody finds it.
+ * compares the hash, flushes, renames and adds the entry. Until then the blob does not exist.
  *
- * Failures: bytes of another hash or more than were announced are -EBADMSG, and the temporary file goes; a full disk is
- * -ENOSPC, after everything that nobody holds has been forgotten; a blob whose file has gone or changed is found by
- * blob_check and forgotten.
+ * Failures: a wrong hash or more bytes than announced are -EBADMSG, and the temporary file is removed. A full disk is
+ * -ENOSPC, after every blob that is not held has been evicted. A blob whose file has disappeared or changed is found by
+ * blob_check and dropped.
  */
 #include "common/base/clock.h"
 #include "common/blob/blob.h"
@@ -28,20 +28,19 @@ enum { PATH_MOST = 4096 };
 
 struct entry {
 	struct blob_hash hash;
-	uint64_t size, used; /* used: a counter that grows with every use */
+	uint64_t size, used; /* used: a counter that increases with every use */
 	unsigned holds;
-	double checked; /* when its bytes were last found to be right, s on a clock that never goes back; 0: not in this
-			   life */
+	double checked; /* when its contents were last verified, in s of a monotonic clock; 0: not since the start */
 	bool given;	/* opened since then */
-	bool gone;	/* or damaged: it is as if it were not there, but for its holds */
+	bool gone;	/* or damaged: treated as missing, except for its holds */
 };
 
 struct blob_store {
 	char *folder;
 	uint64_t limit, bytes, clock;
-	uint64_t promised;     /* to writers that are open */
+	uint64_t promised;     /* reserved for open writers */
 	uint64_t temporary;    /* number of the last temporary file */
-	struct entry *entries; /* by hash */
+	struct entry *entries; /* sorted by hash */
 	size_t count, capacity;
 };
 
@@ -100,7 +99,7 @@ static void path_of(const struct blob_store *s, const char *name, char path[PATH
 	snprintf(path, PATH_MOST, "%s/%s", s->folder, name);
 }
 
-/* The place of the first entry that is not below it. */
+/* The index of the first entry that is not below it. */
 static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
 {
 	size_t low = 0, high = s->count;
@@ -120,7 +119,7 @@ static struct entry *find(struct blob_store *s, const struct blob_hash *h)
 	return i < s->count && blob_hash_equal(&s->entries[i].hash, h) ? &s->entries[i] : NULL;
 }
 
-/* NULL, too, when it is gone. */
+/* NULL also if it is missing. */
 static struct entry *find_there(struct blob_store *s, const struct blob_hash *h)
 {
 	struct entry *n = find(s, h);
@@ -178,7 +177,7 @@ static int by_age(const void *a, const void *b)
 	return (x->used.tv_nsec > y->used.tv_nsec) - (x->used.tv_nsec < y->used.tv_nsec);
 }
 
-/* The folder's files, oldest use first, so that the order of use outlives a restart. */
+/* Reads the folder, oldest use first, so that the order of use survives a restart. */
 static int read_folder(struct blob_store *s, struct error *e)
 {
 	struct found *all = NULL;
@@ -196,7 +195,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 			disk_unlink(path);
 		if (!from_hex(f->d_name, &h))
 			continue;
-		if (disk_stat(path, &st)) { /* what cannot be looked at is not lost */
+		if (disk_stat(path, &st)) { /* if it cannot be read it is kept */
 			rc = error_set(e, errno, "%s: %s", path, strerror(errno));
 			break;
 		}
@@ -229,7 +228,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 	return rc;
 }
 
-/* Forgets blobs that nobody holds until `need` bytes more fit. */
+/* Evicts blobs that are not held until `need` more bytes fit. */
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
 	while (s->limit && (need > s->limit || s->bytes + s->promised > s->limit - need)) {
@@ -470,7 +469,7 @@ static int finish(struct blob_writer *w, struct error *e)
 	blob_hex(&w->hash, hex);
 	if (!blob_hash_equal(&got, &w->hash))
 		return error_set(e, EBADMSG, "the bytes are not those of the blob %s", hex);
-	if (blob_hold(s, &w->hash)) { /* somebody else brought it in the meantime */
+	if (blob_hold(s, &w->hash)) { /* another writer stored it meanwhile */
 		disk_unlink(w->path);
 		return 0;
 	}
@@ -478,7 +477,7 @@ static int finish(struct blob_writer *w, struct error *e)
 	if (disk_fsync(w->fd) || disk_rename(w->path, path))
 		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
 	int rc = disk_sync_folder(s->folder, e);
-	struct entry *n = find(s, &w->hash); /* somebody waits for it */
+	struct entry *n = find(s, &w->hash); /* it was held before it was there */
 	if (!rc && n) {
 		n->gone = false;
 		n->size = w->size;

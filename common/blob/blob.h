@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bytes named by their SHA-256: a folder of files, put there whole or not at all (temporary file, check, fsync,
- * rename, fsync of the folder).
- * A store with a limit forgets what was used least recently, but nothing that is held. One thread at a time for a
- * store; hashing functions from any thread. SHA-256 through OpenSSL's EVP.
+ * Blobs named by their SHA-256: files in a folder, stored atomically (temporary file, check, fsync, rename, fsync of
+ * the folder). A store with a limit evicts the least recently used blobs, but none that is held. One thread at a time
+ * per store; the hashing functions from any thread. SHA-256 comes from OpenSSL's EVP.
  */
 #ifndef COMMON_BLOB_BLOB_H
 #define COMMON_BLOB_BLOB_H
@@ -26,40 +25,40 @@ bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b);
 
 struct blob_store;
 
-/* Makes the folder if need be and clears temporary files of earlier lives. limit: bytes; 0: none. What is there stays
- * for now. */
+/* Creates the folder if necessary and removes temporary files of earlier runs. limit: bytes; 0: none. Existing blobs
+ * are kept for now. */
 int blob_store_open(struct blob_store **s, const char *folder, uint64_t limit, struct error *e);
 void blob_store_close(struct blob_store *s);
-/* When what is needed is held: what is beyond the limit goes. */
+/* Evicts what exceeds the limit. Call once everything needed is held. */
 void blob_store_trim(struct blob_store *s);
 
 bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size); /* size may be NULL */
-/* Held blobs are not evicted; holds are counted. false: it is not there. */
+/* Held blobs are not evicted; holds are counted. false: not in the store. */
 bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
 
-/* Whether the file's bytes are still those of its name, read anew unless that was done in the last so many seconds, or
- * (BLOB_SINCE_GIVEN) since it was opened last: a second a gigabyte. -EBADMSG: they are not, or the file is gone: it is
- * kept as damaged.NAME, and the store has the blob no more until it is written again; holds stay. -ENOENT: the store
- * has it not. Else the file cannot be read just now. */
+/* Verifies the file's contents, unless that was done within the last so many seconds or (BLOB_SINCE_GIVEN) since it
+ * was last opened: about a second per gigabyte. -EBADMSG: the contents are wrong or the file is missing; it is kept
+ * as damaged.NAME, and the blob counts as missing until it is written again, while holds remain. -ENOENT: not in the
+ * store. Any other error: it cannot be read at the moment. */
 enum { BLOB_SINCE_GIVEN = -1 };
 int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e);
-/* Holds a blob that is there or is not: when it is written again it is held. -ENOMEM */
+/* Holds a blob, present or not: one that is written later is held from the start. -ENOMEM */
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e);
 
 /* A file descriptor to read from, or -ENOENT. The caller closes it. */
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e);
 
-/* The file of a blob that is held, for those who map it. */
+/* The path of a held blob, for callers that map it. */
 void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size);
 
-/* Writing: begin, add in order, commit. What is announced has its room from the beginning on. -EFBIG: more than was
- * announced or than the limit; -EBADMSG: the bytes are not those of that name. A writer ends with commit or abort. What
- * is committed is held once. */
+/* Writing: begin, add in order, commit. Room for the announced size is reserved at once. -EFBIG: more than
+ * announced, or more than the limit; -EBADMSG: the hash does not match the name. End a writer with commit or abort.
+ * A committed blob is held once. */
 struct blob_writer;
 int blob_write_begin(struct blob_writer **w, struct blob_store *s, const struct blob_hash *h, uint64_t size,
 		     struct error *e);
-uint64_t blob_write_at(const struct blob_writer *w); /* bytes so far */
+uint64_t blob_write_at(const struct blob_writer *w); /* bytes written so far */
 int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e);
 int blob_write_commit(struct blob_writer *w, struct error *e); /* frees the writer in any case */
 void blob_write_abort(struct blob_writer *w);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The error of an image and what its relMSE is summed from, by the spread between groups: standard errors of pixels;
- * weights, 1 / (B^2 + (0.01 m)^2), with brightnesses B that are no noisier than need be; sums of weighted errors, with
- * bounds. What is made of the sums is canvas_interval.c's. All loops run in a fixed order over exact inputs, so that
+ * The errors of an image from the spread between groups: standard errors of pixels; weights 1 / (B^2 + (0.01 m)^2),
+ * with estimates of the brightness B that are as little noisy as possible; sums of weighted errors, with bounds.
+ * canvas_interval.c turns the sums into relMSE and its interval. All loops run in a fixed order over exact inputs, so
  * equal films give equal bits.
  */
 #include "common/estimate/canvas_error.h"
@@ -19,29 +19,29 @@
 
 enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS, BASE_GROUPS = 8 };
 
-/* Squared relative standard error below which a brightness is believed. */
+/* Squared relative standard error below which a pixel's own brightness is used. */
 static const double believed = 0.08;
 
-/* A kurtosis above this share of the groups: one of them has most of the pixel's variance. One alone would have
- * nearly 1. */
+/* A kurtosis above this share of the number of groups: one of them has most of the pixel's variance. A single
+ * outlier would have nearly 1. */
 static const double one_group = 0.6;
 
-/* A channel that is darker than this share of its pixel's brightest one may be what is left where colours cancel. */
+/* A channel darker than this share of its pixel's brightest one may be the remainder of colours that cancel. */
 static const double cancelled = 0.125;
 
-/* The tail index of errors is taken from one in 128 of them and from one in 512, as that of samples where an integrator
- * is chosen (worker/render/choose.h), and from 32 and 8 at least. Of fewer than ERRORS_LEAST it would be that of the
- * bulk. */
+/* The tail index of errors is estimated from the largest in 128 and in 512, as that of samples when an integrator is
+ * chosen (worker/render/choose.h), but from at least 32 and 8. From fewer than ERRORS_LEAST it would be the index of
+ * the bulk. */
 enum { TAIL = 128, TAIL_LEAST = 32, TAIL_MOST = 1 << 16, EXTREME = 4, ERRORS_LEAST = 2048 };
 
-/* A tile at work. Rows of `apart` hold three channels of `groups` values. */
+/* A tile being worked on. Rows of `apart` hold three channels of `groups` values. */
 struct tile_error {
 	const struct canvas *c;
 	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
 	double floor_square;
-	bool lit;	       /* chains, and some came to the tile */
+	bool lit;	       /* rendered by chains, and some visited the tile */
 	double mean_square[3]; /* over the tile's pixels */
-	float *apart;	       /* [height][width][3][groups]: a group's image less the groups' mean */
+	float *apart;	       /* [height][width][3][groups]: a group's image minus the mean of the groups */
 	double brightness[TILE_SIZE * TILE_SIZE][3],
 		square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
 	double base[TILE_SIZE * TILE_SIZE][3],
@@ -49,7 +49,7 @@ struct tile_error {
 	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
 	bool settled[TILE_SIZE * TILE_SIZE][3], cancels[TILE_SIZE * TILE_SIZE][3];
 	struct error_sums sum;
-	struct tail tail; /* of the groups' errors that are too bright */
+	struct tail tail; /* of the groups' errors on the bright side */
 };
 
 /* ---- standard errors */
@@ -59,7 +59,7 @@ static float *apart_at(const struct tile_error *t, size_t pixel)
 	return t->apart + pixel * 3 * t->groups;
 }
 
-/* Loops over groups inside, none of which depends on another's: the compiler makes vectors of them. */
+/* The inner loops run over groups and are independent, so the compiler vectorises them. */
 static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
 {
 	uint32_t groups = t->groups;
@@ -125,19 +125,19 @@ static void tile_errors(struct making *m, struct tile_error *t)
 		}
 }
 
-/* ---- weights: 1 / (B^2 + floor) with a B that is no noisier than need be */
+/* ---- weights: 1 / (B^2 + floor), with an estimate of B that is as little noisy as possible */
 
-/* A square of pixels: sums over all of them, and over those that wait for a weight. */
+/* A square of pixels: sums over all of them, and over those that have no brightness of their own yet. */
 struct block {
 	uint32_t pixels, waiting[3];
 	double all[3], open[3];			      /* of the mean */
-	double rare[3], open_rare[3];		      /* of the mean less the base */
+	double rare[3], open_rare[3];		      /* of the mean minus the base */
 	double all_apart[VALUES], open_apart[VALUES]; /* [3][groups] */
 };
 
-/* What the errors are divided by, squared. B's own noise makes 1 / B^2 too large by three of its variances, less two
- * because errors are largest where B came out too bright, if brightness comes in hits: `variances` are 1, or 3 where
- * they are apart. */
+/* The squared denominator of errors. Noise in B makes 1 / B^2 too large by three of its variances; two are
+ * subtracted from that where brightness comes in rare hits, because errors are then largest where B is too bright:
+ * `variances` is 1, or 3 where they are independent. */
 static double divisor_square(const struct tile_error *t, double brightness, double square, double variances)
 {
 	return brightness * brightness + t->floor_square + variances * square;
@@ -148,7 +148,7 @@ static bool believe(double brightness, double square, double floor_square)
 	return square <= believed * (brightness * brightness + floor_square);
 }
 
-/* A part of the relMSE whose pixels share one brightness, and how sure that is. */
+/* A part of the relMSE whose pixels share one brightness, and the uncertainty of that. */
 static void add_share(struct tile_error *t, double part, double brightness, double square, double divisor)
 {
 	double slope = 2 * brightness * part / divisor;
@@ -156,9 +156,9 @@ static void add_share(struct tile_error *t, double part, double brightness, doub
 	t->sum.doubt += slope * slope * square;
 }
 
-/* The pixel's part of the relMSE with each group's deviation over the brightness that the other groups found: no sample
- * is divided by the brightness that it makes itself. As large as the part can reasonably be, since light that came to
- * one group only is missing in all its divisors. */
+/* The pixel's part of the relMSE with each group's deviation divided by the brightness found by the other groups, so
+ * that no sample is divided by the brightness it makes itself. This is an upper bound, since light that only one
+ * group met is missing in that group's divisor. */
 static double by_others(const struct tile_error *t, size_t pixel, size_t k)
 {
 	const float *apart = apart_at(t, pixel) + k * t->groups;
@@ -171,8 +171,8 @@ static double by_others(const struct tile_error *t, size_t pixel, size_t k)
 	return sum / n / (n - 1);
 }
 
-/* Bounds of a part of the relMSE, and what makes it doubtful. The lower bound: over the brightness that the pixel has,
- * all fireflies in it. */
+/* Bounds of a part of the relMSE, and what makes it doubtful. The lower bound divides by the pixel's own brightness,
+ * with all its fireflies. */
 static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part, double high)
 {
 	double square = t->square[pixel][k];
@@ -183,8 +183,9 @@ static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part
 		t->sum.one_group += part;
 }
 
-/* By the pixel's own brightness. Where it is believed, a group's errors are divided by the brightness that the other
- * groups found, to second order: what errors and brightness have in common is taken out, however clumped they come. */
+/* Divides by the pixel's own brightness. Where it is reliable, each group's errors are divided by the brightness
+ * that the other groups found, to second order: this removes the correlation of errors and brightness, however rare
+ * the light is. */
 static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool believed_in)
 {
 	double brightness = t->brightness[pixel][k], square = t->square[pixel][k];
@@ -200,7 +201,7 @@ static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool beli
 	add_share(t, square / divisor, brightness, square, divisor);
 }
 
-/* Each brightness that the pixel may have, by the normal law, weighs its error. */
+/* The error is weighted over all brightnesses the pixel may have, by the normal distribution. */
 static void settle_cancelling(struct tile_error *t, size_t pixel, size_t k)
 {
 	double square = t->square[pixel][k];
@@ -225,7 +226,7 @@ static void settle_pixels(struct tile_error *t, size_t first, size_t count)
 				settle_pixel(t, pixel, k, true);
 }
 
-/* Squared relative standard error of the mean pixel of the 2 x 2 that this one lies in, each no more than 1. */
+/* Squared relative standard error of the mean of the 2 x 2 pixels around this one, each limited to 1. */
 static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
 {
 	double sum = 0, n = 0;
@@ -239,9 +240,9 @@ static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, s
 }
 
 /*
- * A channel that is next to nothing because colours cancel in it, the blue of gold: the pixel's light is well known,
- * and this channel of it comes out positive in some groups and negative in others. It is no darker or brighter than its
- * neighbours for want of samples, and their mean, in which signs differ, is not its brightness.
+ * Whether a channel is nearly zero because colours cancel in it, such as the blue of gold: the pixel's light is well
+ * known, but this channel is positive in some groups and negative in others. Its value is not a lack of samples, and
+ * the mean of its neighbours, whose signs differ, is not its brightness.
  */
 static bool cancels(const struct tile_error *t, size_t pixel, size_t k)
 {
@@ -260,8 +261,9 @@ static bool cancels(const struct tile_error *t, size_t pixel, size_t k)
 	return above >= t->groups / 8 && below >= t->groups / 8;
 }
 
-/* A pixel keeps its own brightness where its neighbourhood is believed: by itself alone, those that came out bright
- * would keep it and those that came out dark would not. Or where it is out of doubt, whatever is beside it. */
+/* A pixel keeps its own brightness if its neighbourhood is reliable. Judging each pixel alone would keep those that
+ * came out too bright and average those that came out too dark. A pixel that is certain by itself keeps its
+ * brightness whatever its neighbours are. */
 static uint32_t find_settled(struct tile_error *t)
 {
 	uint32_t waiting = 0;
@@ -278,7 +280,7 @@ static uint32_t find_settled(struct tile_error *t)
 	return waiting;
 }
 
-/* Mean variance of the 3 x 3 pixels around one, as far as they lie in the tile. */
+/* Mean variance of the 3 x 3 pixels around one, within the tile. */
 static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
 {
 	double sum = 0, n = 0;
@@ -289,10 +291,10 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 }
 
 /*
- * Standard errors of the tile's pixels. Where the brightness is not believed a variance from few groups is mostly too
- * small, since what comes in bursts has not come yet: it is averaged with its neighbours'. A pixel that chains never
- * visited has a variance of 0, which would be a claim; it gets that of its neighbours, of its tile, or
- * (write_unvisited) of the image.
+ * Standard errors of the tile's pixels. Where the brightness is not reliable, the variance of few groups is usually too
+ * small, because rare light has not arrived yet: it is averaged with its neighbours'. A pixel that no chain visited
+ * would have a variance of 0, a false claim; it gets the variance of its neighbours, of its tile, or (write_unvisited)
+ * of the image.
  */
 static void write_errors(struct making *m, const struct tile_error *t)
 {
@@ -318,8 +320,8 @@ static double spread_square(const double *apart, uint32_t groups, double pixels)
 	return square / (pixels * pixels) / groups / (groups - 1);
 }
 
-/* Where the groups agree about a pixel but for a few, its brightness is theirs, and what the few found is spread over
- * the block: `rare` a pixel, with the variance `square`. A wall beside a lamp keeps its darkness so. */
+/* If all groups but a few agree about a pixel, their brightness is used and the excess of the few is spread over the
+ * block: `rare` per pixel, with the variance `square`. So a wall beside a lamp stays dark. */
 static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double rare, double square)
 {
 	double base = t->base[pixel][k] + rare, doubt = t->base_square[pixel][k] + square;
@@ -335,11 +337,10 @@ static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double 
 }
 
 /*
- * The block's weight for what waits in it. Its brightness is the mean of all its pixels: those without a firefly count
- * as those with one. But pixels that were believed and are more than twice as bright as what waits, a lamp beside a
- * wall, are something else and are left out. And a pixel that is brighter than the block by 1.5 of its standard errors
- * has met its light in three groups or more: that is no firefly (which is one standard error high) but a glint, and
- * keeps its own brightness.
+ * The block's weight for its waiting pixels. Its brightness is the mean over all its pixels, with and without
+ * fireflies. Excluded are pixels that are reliable and more than twice as bright as the waiting ones, such as a lamp
+ * beside a wall. A pixel brighter than the block by 1.5 of its standard errors received its light in three groups or
+ * more: that is a highlight, not a firefly (which is one standard error high), and it keeps its own brightness.
  */
 static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32_t x, uint32_t y, uint32_t size)
 {
@@ -380,7 +381,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 	memset(b->open_apart + k * t->groups, 0, t->groups * sizeof *b->open_apart);
 }
 
-/* Mean and its variance without the eighth of the groups that lie farthest from the others: the brightness without
+/* Mean and its variance without the eighth of the groups that are farthest from the others: the brightness without
  * fireflies. */
 static void find_base(struct tile_error *t, size_t pixel, size_t k)
 {
@@ -442,7 +443,7 @@ static void add_block(struct block *b, const struct block *part, uint32_t groups
 			b->open_apart[i] += part->open_apart[i];
 }
 
-/* The square of `size` pixels at (x, y) of the tile, from its quarters; at most six levels deep. */
+/* The square of `size` pixels at (x, y) of the tile, built from its quarters; recursion is at most six levels deep. */
 static void settle_square(struct tile_error *t, uint32_t x, uint32_t y, uint32_t size, struct block *b)
 {
 	*b = (struct block){0};
@@ -466,7 +467,7 @@ static void settle_square(struct tile_error *t, uint32_t x, uint32_t y, uint32_t
 
 /* ---- sums over the image */
 
-/* FOLDED groups from `first` on, or as many as there are. */
+/* FOLDED groups from `first` on, or as many as remain. */
 static void fold(struct tile_error *t, uint32_t first, const float *apart, float *folded)
 {
 	uint32_t count = t->groups - first < FOLDED ? t->groups - first : FOLDED;
@@ -491,7 +492,7 @@ static size_t tail_size(size_t errors)
 	return size < TAIL_LEAST ? TAIL_LEAST : size > TAIL_MOST ? TAIL_MOST : size;
 }
 
-/* INFINITY: too few to tell. */
+/* INFINITY: too few errors. */
 static double find_tail(struct tail *t, size_t errors)
 {
 	size_t size = tail_size(errors);
@@ -501,8 +502,8 @@ static double find_tail(struct tail *t, size_t errors)
 	return fmin(tail_index(t, size), tail_index(t, size / EXTREME));
 }
 
-/* Products of the groups' weighted errors. More than FOLDED groups are folded onto so many: errors that add up are
- * alike. A lane is a pair of groups, so that the order within a sum is the pixels'. */
+/* Products of the groups' weighted errors. More than FOLDED groups are folded onto FOLDED, which is valid because
+ * errors that add up are alike. A lane is a pair of groups, so each sum is in the order of pixels. */
 static void add_row(struct tile_error *t, size_t first)
 {
 	float gram[FOLDED][FOLDED] = {{0}};
@@ -543,7 +544,7 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 		add_row(t, (size_t)row * t->width);
 }
 
-/* Tiles to which no chain came have no variance of their own: they get the image's mean one. */
+/* Tiles that no chain visited have no variance of their own and get the mean of the image. */
 static void write_unvisited(struct canvas_image *img)
 {
 	size_t values = (size_t)img->width * img->height * 3;

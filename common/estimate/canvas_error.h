@@ -6,7 +6,7 @@
 #include "common/base/error.h"
 #include "common/estimate/making.h"
 
-/* Fills error and the relMSE of an image whose rgb is there; two or more groups, no open rounds. -ENOMEM */
+/* Fills in error and relMSE of an image whose rgb is complete; needs two or more groups and no open rounds. -ENOMEM */
 int canvas_error(struct making *m, struct error *e);
 
 #endif

@@ -32,7 +32,7 @@ static double ratio(double a, double b)
 	return b > 0 ? a / b : 0;
 }
 
-/* b of each group and of all, and from the spread of the groups its standard error. */
+/* b of each group and of all, and its standard error from the spread of the groups. */
 static void find_b(struct making *m)
 {
 	uint32_t groups = m->c->plan.groups;
@@ -73,8 +73,8 @@ static void find_factors(struct making *m)
 	m->pooled_factor = (p->kind == PLAN_CHAINS ? m->img->b : 1) * ratio(m->c->quantum, n);
 }
 
-/* A preview of samples: parts of the picture have come more often than others. Leases merged of the strip that holds a
- * row of the crop, by group; the rows that the filter shares between strips are slightly off. */
+/* For a preview of samples, where parts of the image have more samples than others: the leases merged, by group, for
+ * the strip that contains a row of the crop. Rows that the filter shares between strips are slightly off. */
 static double preview_leases(const struct canvas *c, uint32_t row)
 {
 	uint32_t part = 0;
@@ -87,7 +87,7 @@ static double preview_leases(const struct canvas *c, uint32_t row)
 	return (double)n;
 }
 
-/* The used slots of a tile, of all groups: the prefix's, and of a preview the open rounds'. */
+/* The used slots of a tile, of all groups: the prefix's, and for a preview the open rounds'. */
 static uint32_t tile_slots(const struct making *m, size_t tile, const int64_t *slots[PLAN_MAX_GROUPS * FILMS])
 {
 	uint32_t n = 0;
@@ -98,7 +98,7 @@ static uint32_t tile_slots(const struct making *m, size_t tile, const int64_t *s
 	return n;
 }
 
-/* Integers, so that their order is free; added as doubles, since together they may be more than 64 bits hold. */
+/* Sums of integers, so their order does not matter; added as doubles, because the total may exceed 64 bits. */
 static void pool_row(const int64_t *const *slots, uint32_t count, size_t at, size_t values, double *sums)
 {
 	memset(sums, 0, values * sizeof *sums);
@@ -138,7 +138,7 @@ static int find_moments(const struct making *m, struct error *e)
 	return moments_image(m->c->moments, groups, m->c->rounds, m->open_rounds, m->img, e);
 }
 
-/* Chains that are flagged and too short to be blamed for it: how far their errors reach is not known. */
+/* Chains are flagged but too short to be judged: the extent of their errors is not known. */
 static void doubt_short_chains(struct making *m)
 {
 	struct convergence a;

@@ -6,7 +6,7 @@
 #include "common/estimate/image.h"
 #include "common/film/canvas.h"
 
-/* Allocates img's arrays; canvas_image_fini frees them. open_rounds: a preview with all that has come. */
+/* Allocates img's arrays; canvas_image_fini frees them. open_rounds: a preview of everything received. */
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e);
 void canvas_image_fini(struct canvas_image *img);
 

@@ -26,16 +26,16 @@
 #include <math.h>
 
 static const double tail_power = 1.5, dark_most = 0.5, one_group_most = 0.4;
-/* Upper over lower end, and that over what it would be without heavy tails and unsure brightness: an error that all
- * pixels have in common may happen to be next to nothing, so that the lower end says little however much is known. */
+/* The maximum ratio of upper to lower end, and the maximum of that over the ratio without heavy tails and uncertain
+ * brightness. An error that all pixels share may happen to be nearly zero, so the lower end alone says little. */
 static const double widest = 100, widest_of_known = 4;
 
 /*
- * How many errors move apart in one error image: (sum l)^2 / sum l^2 over the eigenvalues l of the covariance of a
- * group's error; 1 when all pixels err together, as by an error of b. Both sums without bias from differences of
- * disjoint pairs of groups: |e1 - e2|^2 |e3 - e4|^2 / 4 and ((e1 - e2) . (e3 - e4))^2 / 4, averaged over all four
- * groups. No fourth power of a group's own error enters, so that a firefly does not pass for an error of everything;
- * the second is never above the first.
+ * How many errors vary independently in one error image: (sum l)^2 / sum l^2 over the eigenvalues l of the covariance
+ * of a group's error; 1 if all pixels err together, as by an error of b. Both sums are estimated without bias from
+ * differences of disjoint pairs of groups: |e1 - e2|^2 |e3 - e4|^2 / 4 and ((e1 - e2) . (e3 - e4))^2 / 4, averaged over
+ * all sets of four groups. No fourth power of a group's own error occurs, so a firefly does not look like an error of
+ * everything. The second sum never exceeds the first.
  */
 static double own_degrees(const struct error_sums *s)
 {
@@ -58,8 +58,8 @@ static double own_degrees(const struct error_sums *s)
 	return !(total > square) ? 1 : total < most * square ? total / square : most;
 }
 
-/* Spread of the distances among the groups, relative, squared: 2 over the degrees of one group. The factor undoes the
- * bias of dividing by the mean distance, which is there when all pixels err together. */
+/* Relative variance of the groups' distances: 2 over the degrees of freedom of one group. The factor removes the
+ * bias of dividing by the mean distance, which exists if all pixels err together. */
 static double distance_spread(const struct error_sums *s, double mean)
 {
 	double groups = s->groups, square = 0;
@@ -75,10 +75,10 @@ static double heavier_than_normal(const struct error_sums *s)
 	return kurtosis > 3 ? pow((kurtosis - 1) / 2, tail_power) : 1;
 }
 
-/* The relMSE is the mean of squared errors: below this tail index it has no expectation. */
+/* The relMSE is a mean of squared errors: below this tail index it has no expectation. */
 static const double finite_variance = 2;
 
-/* known: upper over lower end as they would be if only the degrees of freedom were in doubt. */
+/* known: ratio of upper to lower end if only the degrees of freedom were uncertain. */
 static void find_doubt(const struct error_sums *s, double known, struct canvas_image *img)
 {
 	double dark = s->share > 0 ? s->dark / s->share : 0, one_group = s->share > 0 ? s->one_group / s->share : 0;

@@ -7,21 +7,22 @@
 
 enum { ERROR_FOLDED = 16 };
 
-/* Of the groups' weighted errors, over an image. Parts of the relMSE are sums over pixels and channels, not means. */
+/* Sums of the groups' weighted errors over an image. Parts of the relMSE are sums over pixels and channels, not
+ * means. */
 struct error_sums {
 	uint32_t groups;
 	double share, doubt; /* parts; their squares times the variances of their weights */
-	double low, high;    /* bounds of the same: over brightness with all fireflies, over what other groups found */
-	double dark, one_group; /* parts where brightness is a block's mean, not the pixel's; where one group has most
-				   of the variance */
+	double low, high;    /* bounds: divided by the brightness with all fireflies, and by what other groups found */
+	double dark, one_group; /* parts whose brightness is a block's mean; parts in which one group has most of the
+				   variance */
 	double kurtosis;	/* of the groups' values, parts as weights */
-	double tail;		/* index of the groups' relative errors that are too bright; INFINITY: not known */
-	size_t tail_errors;	/* by so many of the largest */
+	double tail;		/* tail index of the groups' relative errors on the bright side; INFINITY: not known */
+	size_t tail_errors;	/* number of largest errors used */
 	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of groups' errors; more groups are folded onto so many */
 	double distance[PLAN_MAX_GROUPS];	 /* a group's error, squared */
 };
 
-/* Fills the relMSE, its intervals, and what is doubtful of it. */
+/* Fills in the relMSE, its intervals and the reasons for doubt. */
 void canvas_interval(struct error_sums *s, struct canvas_image *img);
 
 #endif

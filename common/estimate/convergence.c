@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Tiles first (potential scale reduction), then classes of paths (chains against bootstrap, groups against each other),
- * then chains that stood still; whatever is flagged goes into one sentence. Every criterion asks for significance and
- * for size: a deviation that cannot be seen in the image is no disagreement, and one that may be chance is none either.
+ * Checks tiles (potential scale reduction), then classes of paths (chains against bootstrap, groups against each
+ * other), then chains that stood still. Everything flagged goes into one sentence. Each criterion requires both
+ * significance and size: a deviation that is invisible in the image is not a disagreement, nor is one that may be
+ * chance.
  *
- * Nothing fails: numbers that are not known (too few groups, nothing visited) are NAN and never flagged.
+ * Nothing fails: values that are not known (too few groups, nothing visited) are NAN and are never flagged.
  */
 #include "common/estimate/convergence.h"
 
@@ -14,25 +15,27 @@
 #include <math.h>
 #include <string.h>
 
-/* Tiles. Below 1.1 chains count as mixed (Gelman and Rubin 1992); the mean's own error must be large too, or a scene of
- * many small lights, which chains visit in turns, would be blamed for what 1,000 chains average out. */
+/* Tiles. Below 1.1 chains count as mixed (Gelman and Rubin 1992). The error of the mean must be large, too, or a
+ * scene of many small lights that chains visit in turn would be flagged for differences that 1,000 chains average
+ * out. */
 #define R_HAT_MIXED 1.1
 #define TILE_ERROR_MOST 0.1
 #define TILE_SHARE_LEAST 1e-3
 #define FLAGGED_SHARE_MOST 0.01
 
-/* Classes: significant, over all of them, and large enough to be seen. */
+/* Classes: significant over all of them, and large enough to be visible. */
 #define CLASS_LEVEL 1e-4
 #define CLASS_OF_B 0.02
 #define CLASS_OF_ITSELF 0.2
 #define CLASS_LEAST 0.005
-/* Standard error from the groups of a class's energy in the chains: when half of the groups have found it and share it
- * evenly it is a quarter of it (sqrt((16 / 8 - 1) / 15) of 16 groups); of fewer groups it is itself too uncertain. */
+/* Standard error of a class's energy in the chains, from the groups: a quarter of the energy if half of the groups
+ * found the class and share it evenly (sqrt((16 / 8 - 1) / 15) for 16 groups). If fewer found it, the standard error
+ * itself is too uncertain. */
 #define APART_OF_ITSELF 0.25
 #define APART_OF_B 0.03
 enum { APART_GROUPS = 8 };
-/* Standard error of a class's energy in the bootstrap above which the bootstrap is no witness against more of it: see
- * excess. */
+/* Standard error of a class's energy in the bootstrap above which the bootstrap is no evidence of an excess: see
+ * excess(). */
 #define CLASS_KNOWN 0.1
 
 /* Chain epochs. */
@@ -75,7 +78,7 @@ static bool tile_flagged(const struct canvas_image *img, size_t i)
 	       img->tile_share[i] >= (float)TILE_SHARE_LEAST;
 }
 
-/* The k-th smallest R-hat by bisection over its values: quadratic, but without memory, and tiles are few. */
+/* The k-th smallest R-hat, by bisection over its values: quadratic, but without memory, and there are few tiles. */
 static double median(const struct canvas_image *img, uint32_t known)
 {
 	size_t tiles = (size_t)img->tiles_across * img->tiles_down;
@@ -126,11 +129,11 @@ static void judge_tiles(const struct plan *p, const struct canvas_image *img, st
 /* ---- classes */
 
 /*
- * Whether more of a class in the chains than in the bootstrap says anything. Energies of independent samples have heavy
- * tails: while the rare bright ones have not come, the mean is too small and so is its spread, and t is far too large.
- * So an excess counts only where the bootstrap knows the class well. Nothing is lost by that: chains share out b, and b
- * comes from independent samples, so a class that these miss is missing in all others of the chains; and with too
- * little in the chains the tails err to the safe side, since samples that raise the mean raise its spread too.
+ * Whether an excess of a class in the chains over the bootstrap is evidence. Energies of independent samples have heavy
+ * tails: before the rare bright samples occur, both mean and spread are too small and t is far too large. So an excess
+ * counts only if the bootstrap knows the class well. Little is lost: chains distribute b, which comes from independent
+ * samples, so a class that they miss is missing in all other classes of the chains. For a deficit the tails err on the
+ * safe side, because samples that raise the mean also raise its spread.
  */
 static bool excess_counts(const struct path_class_energy *c)
 {
@@ -235,7 +238,7 @@ void convergence_judge(const struct plan *p, const struct canvas_image *img, str
 	     stuck = p->epoch >= STUCK_EPOCH && a->stuck_share > STUCK_MOST;
 	if (!tiles && !a->classes_flagged && !a->classes_apart && !stuck)
 		return;
-	/* The product of two counts of a plan that was checked fits 64 bits: COUNT_SAMPLES holds it. */
+	/* The product of two counts of a checked plan fits 64 bits: COUNT_SAMPLES does. */
 	a->verdict = img->rounds * p->epoch < CONVERGENCE_MUTATIONS ? CHAINS_TOO_SHORT : CHAINS_DISAGREE;
 	put_words(p, img, a, tiles, stuck);
 }

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * fit() turns the looks into a level, a trend and their uncertainty by generalized least squares; play_of() and
- * play_target() draw renders from that and let each run along the ladder of looks until it stops; costs() sorts what
- * they cost. The dice are seeded by constants, so that the same looks give the same forecast everywhere.
+ * fit() fits a level, a trend and their uncertainty to the estimates of the error so far (looks) by generalized least
+ * squares. play_of() and play_target() draw possible renders from that fit and simulate each until it would stop;
+ * costs() sorts their costs. The random numbers have constant seeds, so equal looks give equal forecasts everywhere.
  *
- * Without looks, or without one whose interval is known, there is no forecast (false); costs that no play can pay are
- * INFINITY.
+ * Without looks, or without one whose interval is known, there is no forecast (false). Costs that no simulated render
+ * can pay are INFINITY.
  */
 #include "common/estimate/forecast.h"
 
@@ -18,18 +18,17 @@
 
 enum {
 	PLAYS = 1024,
-	PRIOR_WEIGHT = 6, /* of the degrees of freedom that looks report, against their scatter, in looks */
-	STEPS_MOST = 256, /* of the ladder; more than 2^60 rounds have */
+	PRIOR_WEIGHT = 6, /* weight of the degrees of freedom that looks report, against their scatter, in looks */
+	STEPS_MOST = 256, /* more than 2^60 rounds have */
 };
-static const double used_share =
-	1.0 / 16;		       /* looks at less than this share of the work say little about what is to come */
-static const double burst = 0.15;      /* spread of a look beyond chi-square: light that comes in rare bursts */
-static const double trend_prior = 0.2; /* standard deviation of the trend: light that comes in rare bursts, chains that
-					* have not forgotten their seeds yet */
+static const double used_share = 1.0 / 16; /* looks at less than this share of the work say little about the future */
+static const double burst = 0.15;	   /* spread of a look beyond chi-square: rare bursts of light */
+static const double trend_prior =
+	0.2; /* standard deviation of the trend: rare bursts of light, and chains that still remember their seeds */
 static const double memory = 2,
-		    memory_sd = 0.8;	/* e-folds of work over which a trend dies down; its logarithm's spread */
-static const double drift = 0.08;	/* what else may change in an e-fold of work that nobody has seen */
-static const double price_floor = 0.03; /* relative spread of a sample's price from one stretch of time to another */
+		    memory_sd = 0.8;	/* e-folds of work over which a trend decays; the spread of its logarithm */
+static const double drift = 0.08;	/* unforeseen change per e-fold of work */
+static const double price_floor = 0.03; /* relative spread of the time per sample between stretches of time */
 static const double log_four = 1.3862943611198906;
 
 /* ---- looks */
@@ -96,11 +95,11 @@ bool forecast_error(const struct forecast_history *h, struct forecast_range *err
 /* ---- the fit */
 
 struct fit {
-	double work;	     /* of the last look; times are logarithms of work over it */
+	double work;	     /* of the last look; times are logarithms of work relative to it */
 	double level, trend; /* log(relMSE x work) now, and its growth per e-fold of work */
 	double level_sd, trend_sd, correlation;
-	double spread, shift;		   /* of one look's logarithm around them: standard deviation, mean */
-	double seen;			   /* e-folds of work that the looks cover: as far as the trend is drawn */
+	double spread, shift;		   /* of one look's logarithm around the fit: standard deviation, mean */
+	double seen;			   /* e-folds of work covered by the looks: the trend is extrapolated as far */
 	double now;			   /* the last look's deviation in spreads */
 	double margin, margin_sd;	   /* log of upper end over estimate */
 	double cpu, cpu_sd, wall, wall_sd; /* seconds a sample; relative spread */
@@ -119,7 +118,7 @@ static void observe(struct normal_equations *q, double weight, double al, double
 	q->t += weight * at * value;
 }
 
-struct innovation { /* what a look adds to the one before it: value = al level + at trend + noise of variance share x
+struct innovation { /* what a look adds to the one before: value = al level + at trend + noise of variance share x
 		       spread^2 */
 	double al, at, value, share;
 };
@@ -145,7 +144,7 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 		struct innovation v = innovation_of(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
 		observe(&q, 1 / v.share, v.al, v.at, v.value);
 	}
-	double det = q.ll * q.tt - q.lt * q.lt; /* > 0: the prior and the first look see to it */
+	double det = q.ll * q.tt - q.lt * q.lt; /* > 0, by the prior and the first look */
 	f->level = (q.l * q.tt - q.t * q.lt) / det;
 	f->trend = (q.ll * q.t - q.lt * q.l) / det;
 	double square = 0;
@@ -154,7 +153,7 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 		double d = v.value - v.al * f->level - v.at * f->trend;
 		square += d * d / v.share;
 	}
-	/* The scatter of the looks tells more than chi-square where light comes in rare bursts. */
+	/* With rare bursts of light the scatter of the looks says more than chi-square. */
 	variance = (PRIOR_WEIGHT * variance + square) / (PRIOR_WEIGHT + (double)(h->count - first) - 1);
 	f->spread = sqrt(variance);
 	f->level_sd = sqrt(variance * q.tt / det);
@@ -180,7 +179,7 @@ static double spent(const struct forecast_look *l, bool wall)
 	return wall ? l->seconds : l->cpu_seconds;
 }
 
-/* Seconds a sample, and how much that differs from stretch to stretch: machines are shared. */
+/* Seconds per sample, and how much they vary from stretch to stretch: machines are shared. */
 static void fit_price(const struct forecast_history *h, bool wall, double *price, double *sd)
 {
 	const struct forecast_look *end = last(h);
@@ -203,7 +202,7 @@ static struct fit fit(const struct forecast_history *h)
 	while (h->looks[first].work < used_share * end->work)
 		first++;
 	double d = fmax(end->degrees, 1);
-	/* Mean and variance of the logarithm of chi-square over its degrees, and what bursts add. */
+	/* Mean and variance of the logarithm of chi-square over its degrees, plus those of bursts. */
 	struct fit f = {.work = end->work,
 			.spread = sqrt(2 / d + 2 / (d * d) + burst * burst),
 			.shift = -1 / d - 1 / (3 * d * d)};
@@ -216,7 +215,7 @@ static struct fit fit(const struct forecast_history *h)
 	return f;
 }
 
-/* ---- playing renders */
+/* ---- simulated renders */
 
 struct dice {
 	uint64_t state;
@@ -236,7 +235,7 @@ static double normal(struct dice *d)
 	return r * cos(6.283185307179586 * uniform(d));
 }
 
-struct play { /* one way in which things may be */
+struct play { /* one possible state of affairs */
 	double level, trend, memory, drift, margin, now, cpu, wall;
 };
 
@@ -252,7 +251,7 @@ static struct play play_of(const struct fit *f, struct dice *d)
 			     margin, now,   f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
 }
 
-/* How log(relMSE x work) will have changed after t e-folds of work. */
+/* How much log(relMSE x work) changes over t e-folds of work. */
 static double change(const struct fit *f, const struct play *y, double t)
 {
 	if (t < 0)
@@ -260,13 +259,13 @@ static double change(const struct fit *f, const struct play *y, double t)
 	return y->trend * y->memory * (1 - exp(-t / y->memory)) + y->drift * t;
 }
 
-/* log(relMSE) expected at a work. */
+/* The expected log(relMSE) at some work. */
 static double expected(const struct fit *f, const struct play *y, double work)
 {
 	return y->level + change(f, y, log(work / f->work)) - log(work);
 }
 
-/* Rounds at which it stops. */
+/* The number of rounds at which it stops. */
 static double play_target(const struct fit *f, const struct play *y, const struct plan *p, double target,
 			  enum forecast_run run, struct dice *d)
 {

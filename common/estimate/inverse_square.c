@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * With B = f sinh u, dB / (B^2 + f^2) = du / (f cosh u): what is integrated is smooth however small the floor f is, and
- * the trapezoidal rule converges exponentially.
+ * With B = f sinh u, dB / (B^2 + f^2) = du / (f cosh u): the integrand is smooth however small the floor f is, and the
+ * trapezoidal rule converges exponentially.
  */
 #include "common/estimate/inverse_square.h"
 
@@ -12,7 +12,7 @@ struct inverse_square inverse_square_expect(double brightness, double error, dou
 	static const double reach = 6; /* standard errors */
 	double f = floor / error, b = brightness / error;
 	double first = asinh((b - reach) / f), last = asinh((b + reach) / f);
-	/* Half a standard deviation where the law is narrower than the weight. */
+	/* Half a standard deviation where the distribution is narrower than the weight. */
 	double most = fmin(0.25, 0.5 / sqrt(b * b + f * f)), steps = ceil((last - first) / most);
 	double h = (last - first) / steps, up = exp(first), ratio = exp(h), one = 0, two = 0;
 	for (double i = 0; i <= steps; i++, up *= ratio) {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the making of an image shares. Private to common/estimate. */
+/* The state shared by the steps that make an image. Private to common/estimate. */
 #ifndef COMMON_ESTIMATE_MAKING_H
 #define COMMON_ESTIMATE_MAKING_H
 
 #include "common/estimate/image.h"
 #include "common/film/canvas_films.h"
 
-/* An image on its way. */
+/* An image being made. */
 struct making {
 	const struct canvas *c;
 	struct canvas_image *img;

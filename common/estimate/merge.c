@@ -30,8 +30,8 @@ struct bootstrap {
 	struct tail tail; /* of all weights */
 };
 
-/* Of so many samples the largest that their tail is judged by: one in 512, but no less than give it a standard error of
- * a quarter. */
+/* How many of the largest samples the tail is judged by: one in 512, but at least enough for a standard error of a
+ * quarter. */
 static size_t tail_count(const struct plan *p)
 {
 	uint64_t n = p->bootstrap / 512;
@@ -107,7 +107,7 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	return 0;
 }
 
-/* A lease in a file: this, then its weights. */
+/* A saved lease in a file: this, then its weights. */
 struct saved_lease {
 	uint32_t group, part;
 	uint64_t counters[BATCH_COUNTERS];
@@ -227,8 +227,9 @@ void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c)
 	}
 }
 
-/* Rounds between two looks at least. A look costs 15 to 17 ns a pixel and group, a mutation or a sample 2 us or more:
- * of the work since the last one a look is less than 1 % after 0.9 of them a pixel for each group. */
+/* The least number of rounds between two estimates of the error. One costs 15 to 17 ns per pixel and group, a
+ * mutation or sample at least 2 us: after 0.9 of them per pixel and group it is less than 1 % of the work since the
+ * last one. */
 static uint64_t look_rounds(const struct plan *p)
 {
 	uint64_t work = (uint64_t)p->crop_width * p->crop_height * p->groups / 10 * 9, round = plan_round_mutations(p);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Potential scale reduction (Gelman and Rubin 1992) by tile and energies of path classes, from the moments that a
- * canvas keeps. Fails for want of memory alone.
+ * Potential scale reduction (Gelman and Rubin 1992) by tile, and energies of path classes, from the moments that a
+ * canvas keeps. Can only fail for lack of memory.
  */
 #include "common/estimate/moments_image.h"
 
@@ -10,11 +10,11 @@
 
 #include <math.h>
 
-/* Moments are rounded to float once an epoch and then to the grid. What is smaller than this next to the mean is not
- * told from no spread at all: a film of one tile has every chain in it all the time. */
+/* Moments are rounded to float once per epoch and then to the grid. A spread this small relative to the mean cannot
+ * be told from none: in a film of one tile, every chain is in it all the time. */
 #define ROUNDING 0x1p-20
 
-/* Over sequences of one tile: mean and variance of their means, and the mean variance of a mutation within one. */
+/* For the sequences of one tile: mean and variance of their means, and the mean variance of a mutation within one. */
 struct spread {
 	double mean, between, within;
 };
@@ -73,7 +73,7 @@ static int make_tiles(const struct moments *m, double n, struct canvas_image *im
 
 /* ---- classes */
 
-/* Mean of the groups' values and its standard error. */
+/* Mean of the groups' values, and its standard error. */
 static double mean_of(const double *x, uint32_t groups, double *error)
 {
 	double mean = 0, square = 0;

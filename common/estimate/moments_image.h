@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the moments of a canvas say of an image. Private to common/estimate. */
+/* Statistics of an image from the moments of its canvas. Private to common/estimate. */
 #ifndef COMMON_ESTIMATE_MOMENTS_IMAGE_H
 #define COMMON_ESTIMATE_MOMENTS_IMAGE_H
 
@@ -8,12 +8,12 @@
 
 struct moments;
 
-/* What moments_image needs of a group: independent samples of its bootstrap, mutations that are merged, b. */
+/* Input per group: independent samples of its bootstrap, merged mutations, b. */
 struct moments_group {
 	uint64_t bootstrap, mutations;
 	double b;
 };
-/* Fills img->classes and, where there are complete rounds of chains and this is no preview, the arrays by tile. */
+/* Fills in img->classes and, for complete rounds of chains (not for previews), the arrays by tile. */
 int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
 		  struct canvas_image *img, struct error *e);
 

@@ -4,7 +4,7 @@
 #include <float.h>
 #include <math.h>
 
-/* Stirling's series from 12 up: below 1e-15 of error. (lgamma of the C library writes to a global variable.) */
+/* Stirling's series from 12 up: error below 1e-15. (The C library's lgamma writes to a global variable.) */
 static double log_gamma(double x)
 {
 	double shift = 1;
@@ -15,7 +15,7 @@ static double log_gamma(double x)
 	return (x - 0.5) * log(x) - x + 0.91893853320467274178 + series - log(shift);
 }
 
-/* Steps until the fraction stands; about the square root of the larger parameter. */
+/* Steps until the fraction converges; about the square root of the larger parameter. */
 static double beta_fraction(double x, double a, double b)
 {
 	double c = 1, d = 1 - (a + b) * x / (a + 1);
@@ -41,7 +41,7 @@ static double beta_fraction(double x, double a, double b)
 	return f;
 }
 
-/* I_x(a, b), y = 1 - x given apart. */
+/* I_x(a, b), with y = 1 - x passed separately. */
 static double incomplete_beta(double x, double y, double a, double b)
 {
 	if (!(x > 0))

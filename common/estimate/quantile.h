@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Quantiles of the distributions that errors of images follow. Pure; any thread; allocates nothing.
+ * Quantiles of the distributions of image errors. Pure; any thread; allocates nothing.
  */
 #ifndef COMMON_ESTIMATE_QUANTILE_H
 #define COMMON_ESTIMATE_QUANTILE_H
@@ -10,11 +10,11 @@
 double f_below(double x, double a, double b);
 
 /* x with f_below(x, a, b) = p, 0 < p < 1, for degrees from 1 to 1e9, to a relative 2^-24: rounded to float, so that
- * libraries whose logarithm differs in the last bits give the same. */
+ * libraries whose logarithms differ in the last bits agree. */
 double f_quantile(double p, double a, double b);
 
-/* 5 % quantile of chi-square: the lower end of a two-sided 90 % interval (Wilson and Hilferty 1931; below 3 degrees it
- * is too low, which makes intervals wider). Square roots and products only: the same bits on any machine. */
+/* 5 % quantile of chi-square: the lower end of a two-sided 90 % interval (Wilson and Hilferty 1931; too low below 3
+ * degrees, which widens intervals). Uses square roots and products only: the same bits on any machine. */
 double chi_square_5(double degrees);
 
 #endif

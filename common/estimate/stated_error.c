@@ -45,9 +45,9 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	}
 }
 
-/* The variance is finite above 2. Of 95 % intervals from 16 groups of 1,000 samples of a Pareto law 95 % hold at an
- * index of 3, 93 % at 2.2, 91 % at 1.8, 80 % at 1.5, 28 % at 1.1 (3,000 trials each). The groups' own means do not
- * tell: those that look regular are wrong more often. */
+/* The variance is finite above 2. Of 95 % intervals from 16 groups of 1,000 samples of a Pareto distribution, 95 %
+ * hold at an index of 3, 93 % at 2.2, 91 % at 1.8, 80 % at 1.5, 28 % at 1.1 (3,000 trials each). The groups' means
+ * give no hint: those that look regular are wrong more often. */
 static const double finite_variance = 2;
 
 void stated_b_doubt(const struct canvas_image *img, char *text, size_t size)

@@ -1,28 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What an image says of its own error, in words, the same wherever it is said. Pure; any thread; allocates nothing.
+ * The sentences about an image's error, the same in every program. Pure; any thread; allocates nothing.
  */
 #ifndef COMMON_ESTIMATE_STATED_ERROR_H
 #define COMMON_ESTIMATE_STATED_ERROR_H
 
 #include "common/estimate/image.h"
 
-/* What the numbers mean; hslt-compare's are the same, with its reference for B. */
+/* What the numbers mean; hslt-compare uses the same definition, with its reference as B. */
 #define REL_MSE_DEFINITION \
 	"mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its square root"
 
 enum { STATED_ERROR_TEXT = 384 };
 
-/* Why the interval is not known: "78 % of it comes from pixels ...". Empty: it is known, or there is no estimate at
- * all. */
+/* Why the interval is not known: "78 % of it comes from pixels ...". Empty: it is known, or there is no estimate. */
 void stated_error_doubt(const struct canvas_image *img, char *text, size_t size);
 
-/* Why b's standard error is not known (chains): the spread between few groups of means whose variance is infinite says
- * too little, as long as the rarest light has not come. Empty: it is known. */
+/* Why b's standard error is not known (chains): between few groups of means with infinite variance, the spread says
+ * too little until the rarest light has come. Empty: it is known. */
 void stated_b_doubt(const struct canvas_image *img, char *text, size_t size);
 
-/* "relative error 8.60 % (95 %: 8.41 to 8.90 %)", or "relative error about 38 %, its interval is not known: ..."; where
- * chains did not come everywhere also how many pixels they left out. Empty: there is no estimate. */
+/* "relative error 8.60 % (95 %: 8.41 to 8.90 %)", or "relative error about 38 %, its interval is not known: ...";
+ * also how many pixels no chain visited. Empty: there is no estimate. */
 void stated_error(const struct canvas_image *img, char *text, size_t size);
 
 /*

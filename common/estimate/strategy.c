@@ -50,7 +50,7 @@ static const char *thousands(uint64_t n, char out[NUMBER])
 	return out;
 }
 
-/* A cell of the given width: a / b with a suffix, or '-' where there is no b. */
+/* A cell of the given width: a / b with a suffix, or '-' if b is 0. */
 static void put_ratio(struct text *t, int width, int decimals, double factor, uint64_t a, uint64_t b)
 {
 	if (b)
@@ -67,7 +67,7 @@ static uint64_t failures(const uint64_t c[STRATEGY_COUNTERS])
 	return n;
 }
 
-/* Reasons that nobody met are left out, or the lines would be too long to read. */
+/* Reasons that never occurred are left out, to keep lines readable. */
 static void put_failures(struct text *t, const uint64_t c[STRATEGY_COUNTERS])
 {
 	text_put(t, " ");
@@ -122,7 +122,7 @@ void strategy_lines(const char *mixture, const struct canvas_counts *n, char *te
 	}
 }
 
-/* Epochs that chains went through: a chain without a state makes no mutations. */
+/* Epochs of chains: a chain without a state makes no mutations. */
 static uint64_t chain_epochs(const struct plan *p, const struct canvas_counts *n)
 {
 	return n->counters[COUNT_SAMPLES] / p->epoch;

@@ -59,7 +59,7 @@ double tail_index(const struct tail *t, size_t k)
 	return sum > 0 ? (double)k / sum : INFINITY;
 }
 
-/* The normal law's 95th percentile. */
+/* 95th percentile of the normal distribution. */
 static const double one_sided = 1.6449;
 
 double tail_index_least(double index, size_t k)

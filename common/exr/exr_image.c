@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Writing builds the header by OpenEXRCore and compresses chunk after chunk, storing raw what compression would make
- * larger. Reading checks the header against the file's size before it allocates, then decodes chunks straight into the
- * planes of the channels.
+ * Writing builds the header with OpenEXRCore and compresses chunk by chunk, storing chunks raw if compression would
+ * enlarge them. Reading checks the header against the file's size before it allocates, then decodes chunks directly
+ * into the planes of the channels.
  *
- * Failures: whatever OpenEXR refuses, headers that promise more pixels than the bytes can hold, other channels than
- * floats, halves and integers, tiles with levels, deep data; all -EBADMSG or -ENOTSUP with a sentence, and nothing is
- * kept.
+ * Failures: anything that OpenEXR refuses, headers that promise more pixels than the bytes can hold, channels other
+ * than floats, halves and integers, tiles with levels, deep data. All are -EBADMSG or -ENOTSUP with a sentence, and
+ * nothing is kept.
  */
 #include "common/exr/exr_image.h"
 
@@ -21,7 +21,8 @@
 enum { CHANNELS_MOST = 16, ATTRIBUTES_MOST = 256 };
 #define PIXELS_MOST (INT64_C(1) << 28)
 #define VALUES_MOST (INT64_C(1) << 30)
-/* Bytes of pixels that a byte of the file can stand for: deflate's 1032, by 4/3 where PXR24 leaves every fourth out. */
+/* Bytes of pixels that one byte of the file can represent: deflate's 1032, times 4/3 because PXR24 drops every
+ * fourth byte. */
 #define INFLATION_MOST INT64_C(1376)
 #define ATTRIBUTE_PREFIX "hslt:"
 
@@ -65,8 +66,8 @@ static const float *plane_of(const struct exr_image *img, const char *name)
 	return NULL;
 }
 
-/* What any viewer may know: who wrote it, and that the colours are those of ITU-R BT.709, linear, white D65 (color.h).
- */
+/* Attributes for any viewer: who wrote the file, and that the colours are those of ITU-R BT.709, linear, white D65
+ * (color.h). */
 static exr_result_t write_origin(exr_context_t x, const struct exr_image *img)
 {
 	static const exr_attr_chromaticities_t bt709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
@@ -95,12 +96,12 @@ static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 }
 
 struct compressor {
-	exr_result_t (*run)(exr_encode_pipeline_t *encode); /* the library's own */
+	exr_result_t (*run)(exr_encode_pipeline_t *encode); /* the library's own attributes */
 };
 
 /*
- * A chunk whose size in the file is that of its pixels is read as stored. OpenEXRCore 3.1.5 stores only what deflate
- * makes larger, so that deflated bytes of exactly that size would be taken for pixels.
+ * A chunk whose stored size equals the size of its pixels is read as raw. OpenEXRCore 3.1.5 stores raw only what
+ * deflate enlarges, so deflated data of exactly that size would be taken for pixels.
  */
 static exr_result_t compress_or_store(exr_encode_pipeline_t *encode)
 {
@@ -219,8 +220,8 @@ static int check_header(exr_context_t x, const struct exr_stream *s, int64_t byt
 				 (long long)height);
 	img->width = (uint32_t)width;
 	img->height = (uint32_t)height;
-	/* Windows that begin left of or above the display's corner have no place in unsigned numbers: only the size is
-	 * told. */
+	/* Windows that begin left of or above the display window cannot be expressed by unsigned numbers; only the
+	 * size is reported. */
 	int64_t dx = (int64_t)data.min.x - display.min.x, dy = (int64_t)data.min.y - display.min.y;
 	img->x = dx > 0 ? (uint32_t)dx : 0;
 	img->y = dy > 0 ? (uint32_t)dy : 0;
@@ -235,7 +236,7 @@ static int32_t smaller(int32_t a, int32_t b)
 	return a < b ? a : b;
 }
 
-/* Decodes one chunk to its place in the planes. Integer channels are converted afterwards: see read_planes. */
+/* Decodes one chunk into the planes. Integer channels are converted afterwards, in read_planes. */
 static exr_result_t read_chunk(exr_context_t x, struct exr_image *img, const exr_chunk_info_t *chunk, uint32_t px,
 			       uint32_t py)
 {

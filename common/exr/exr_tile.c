@@ -32,7 +32,7 @@ static exr_result_t write_header(exr_context_t x, const struct tile *t, uint32_t
 	return rc == EXR_ERR_SUCCESS ? exr_write_header(x) : rc;
 }
 
-/* The file holds a row of X, a row of Y, a row of Z, then the next rows; little endian. */
+/* The file holds a row of X, a row of Y, a row of Z, then the next row; little endian. */
 static void pack(const struct tile *t, float *to)
 {
 	for (size_t y = 0; y < t->height; y++, to += (size_t)t->width * TILE_CHANNELS) {
@@ -78,7 +78,7 @@ int exr_tile_write(const struct tile *t, uint32_t full_width, uint32_t full_heig
 	return exr_close_write(&x, &s, written, bytes, size, e);
 }
 
-/* Refuses all that exr_tile_write does not make, before anything is decoded. */
+/* Refuses anything that exr_tile_write does not produce, before decoding. */
 static const char *check_header(exr_context_t x, uint32_t full_width, uint32_t full_height, struct tile *t)
 {
 	int parts;

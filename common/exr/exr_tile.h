@@ -11,7 +11,7 @@
 
 #include <stddef.h>
 
-/* exr_tile_read: display window = the full film; refuses anything but what exr_tile_write makes. */
+/* exr_tile_read: the display window must be the full film; refuses anything but what exr_tile_write produces. */
 size_t exr_tile_size_max(uint32_t width, uint32_t height);
 int exr_tile_write(const struct tile *t, uint32_t full_width, uint32_t full_height, unsigned char **bytes, size_t *size,
 		   struct error *e);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One table has each attribute's name, type and whether equal renders may differ in it; header_fill walks through plan,
- * result and extras in the table's order. Text goes into one buffer of fixed size; what does not fit is cut at its end,
- * never an error.
+ * One table has each attribute's name and type, and whether equal renders may differ in it. header_fill goes through
+ * plan, result and extras in the table's order. Text goes into one buffer of fixed size; what does not fit is cut at
+ * its end, which is not an error.
  */
 #include "common/exr/header.h"
 
@@ -143,7 +143,8 @@ const struct header_row header_rows[] = {
 	[H_CPU] = {"hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads"},
 	[H_WORKERS] = {"hslt:workers", INT, true, "workers that took part (hslt-render: threads)"},
 	[H_DATE] = {"hslt:date", STRING, true, "when the image was written, UTC"},
-	/* Not compared: --mutations of as many rounds makes the same bits as the error or the time that ended them. */
+	/* Not compared: --mutations with the same number of rounds gives the same bits as the error or the time that
+	 * ended them. */
 	[H_END] = {"hslt:end", STRING, true,
 		   "which bound ended the render: mutations, time, target-error, black, interrupted"},
 	[H_CROPS] = {"hslt:crops", INT, false, "number of crops that hslt-assemble made the image of"},
@@ -181,7 +182,7 @@ static void add_double(struct header *h, enum header_name name, double value)
 	a->number = value;
 }
 
-/* Appends to the text that is being written. */
+/* Appends to the text being written. */
 __attribute__((format(printf, 2, 3))) static void append(struct header *h, const char *format, ...)
 {
 	va_list ap;

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The image's header attributes "hslt:...", in one table: what each is called, its type, what it means. EXR has no
- * 64-bit integer, so counts are strings of decimal digits. The coordinator and hslt-render fill them in by the same
- * function, so that equal bits of the image come with an equal header; the attributes marked `excluded` say how it was
- * made and differ.
+ * The header attributes "hslt:..." of an image, in one table: name, type, meaning. EXR has no 64-bit integer, so counts
+ * are strings of decimal digits. The coordinator and hslt-render fill them in with the same function, so equal images
+ * have equal headers, except for the attributes marked `excluded`, which say how the image was made.
  */
 #ifndef COMMON_EXR_HEADER_H
 #define COMMON_EXR_HEADER_H
@@ -19,7 +18,7 @@ struct header_row {
 };
 extern const struct header_row header_rows[]; /* ends with a NULL name */
 
-bool header_excluded(const char *name); /* one of those that hslt-compare --exact leaves out */
+bool header_excluded(const char *name); /* hslt-compare --exact ignores it */
 
 struct header_effect { /* see render_effects */
 	const char *name;
@@ -42,11 +41,11 @@ struct header_extra {
 enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 32768 };
 struct header {
 	size_t count;
-	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* strings in `text` */
+	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* storage of the strings */
 	char text[HEADER_TEXT];
 	size_t used;
 };
-/* Never fails: a text that does not fit is cut. Allocates nothing; h must not move afterwards. */
+/* Never fails: text that does not fit is cut. Allocates nothing; h must not be moved afterwards. */
 void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An image becomes bytes (colours, errors, R-hat as planes), these go into a temporary file beside the target, are
- * flushed and renamed, so that the target is the old file or the new one. Targets that are no regular files (pipes,
- * devices, descriptors) are written through.
+ * Encodes an image (colours, errors and R-hat as planes), writes it to a temporary file beside the target, flushes and
+ * renames, so that the target is either the old file or the new one. Targets that are not regular files (pipes,
+ * devices, descriptors) are written directly.
  *
- * Failures carry the path: a folder that is not there, no room, no permission; the temporary file is removed.
+ * Failures name the path: a missing folder, no space, no permission. The temporary file is removed.
  */
 #include "common/exr/image_file.h"
 
@@ -75,7 +75,7 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 		out.attribute_count = h->count;
 		rc = exr_write(&out, bytes, size, e);
 	}
-	out.attributes = NULL; /* not mem_alloc'd one by one */
+	out.attributes = NULL; /* not mem_alloc'd individually */
 	exr_image_fini(&out);
 	mem_free(h);
 	return rc;
@@ -99,7 +99,7 @@ static int write_all(int fd, const unsigned char *bytes, size_t size)
 	return 0;
 }
 
-/* So that the new name survives a crash too; a folder that cannot be opened for it is not worth failing for. */
+/* Makes the new name survive a crash. Failing to open the folder is not worth an error. */
 static void sync_folder(const char *path)
 {
 	char folder[PATH_ROOM];
@@ -113,7 +113,7 @@ static void sync_folder(const char *path)
 	close(fd);
 }
 
-/* A temporary file beside `path`; its descriptor or a negative errno. */
+/* Creates a temporary file beside `path`; its descriptor or a negative errno. */
 static int open_beside(const char *path, char temporary[PATH_ROOM], struct error *e)
 {
 	int n = snprintf(temporary, PATH_ROOM, "%s.XXXXXX", path);

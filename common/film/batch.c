@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * batch_check is what stands between the network and the canvas: counts, tiles within the crop and in order, finite
- * values, weights, chain states of the plan's size, sums that belong together. What passes can be merged without
- * further questions.
+ * batch_check protects the canvas from the network: it checks counts, tiles within the crop and in order, finite
+ * values, weights, chain states of the plan's size, and sums that must be consistent. A batch that passes can be merged
+ * without further checks.
  *
- * Failures are -EBADMSG with a sentence for the log of whoever sent the batch; -ENOMEM where a batch is copied.
+ * Failures are -EBADMSG with a sentence for the log of the sender; -ENOMEM when a batch is copied.
  */
 #include "common/film/batch.h"
 
@@ -66,7 +66,7 @@ static int check_key(const struct lease_key *k, const struct plan *p, struct err
 
 static bool all_finite(const float *v, size_t n)
 {
-	/* An exponent of all ones is an infinity or NaN; one test for all values, so that the loop has no branch. */
+	/* An exponent of all ones is an infinity or NaN. All values are tested together, so the loop has no branch. */
 	uint32_t bad = 0;
 	for (size_t i = 0; i < n; i++) {
 		uint32_t bits;
@@ -134,11 +134,10 @@ static int check_weights(const struct batch *b, const struct plan *p, struct err
 	return 0;
 }
 
-/* Sums of the same terms in another order, rounded to float here and there. */
+/* Tolerance for sums of the same terms in another order, partly rounded to float. */
 #define ROUNDING (1 + 1e-6)
 
-/* Far more of anything than a sample can count: rays of a path of 128 edges joined with each other, refused
- * contributions. */
+/* More of anything than a sample can count: rays of a path of 128 edges with all connections, refused contributions. */
 #define PER_SAMPLE 0x1p20
 
 static int check_absurd(const struct batch *b, const struct plan *p, uint64_t samples, struct error *e)
@@ -156,8 +155,8 @@ static int check_absurd(const struct batch *b, const struct plan *p, uint64_t sa
 	return 0;
 }
 
-/* n terms, none of them negative: their sum and the sum of their squares, Cauchy and Schwarz's inequality, and float's
- * range, which no sample exceeds. Squares may have been lost below double's range. */
+/* For n non-negative terms: their sum and sum of squares must satisfy the Cauchy-Schwarz inequality and float's
+ * range, which no sample exceeds. Squares may have underflowed. */
 static int check_sums(const struct batch *b, struct error *e)
 {
 	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum, b->cpu_seconds};

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Adding: find the film of the batch's group and round, reserve the tiles on the disk, add the values as integers on
- * the grid, note that the batch is there; when the last batch of a round has come its film is added to the prefix and
- * cleared. Since integers add exactly, the order of batches does not matter, and a batch can be taken back by
- * subtracting it.
+ * Adding a batch: find the film of its group and round, reserve its tiles on the disk, add the values as integers on
+ * the grid, and record that the batch is merged. With the last batch of a round, its film is added to the prefix and
+ * cleared. Integers add exactly, so the order of batches does not matter and a batch can be subtracted again.
  *
- * Failures leave the canvas as it was: -EEXIST and -EAGAIN say that the batch is not for now, -ERANGE that a sum would
- * leave the grid, -ENOSPC that there is no room for a tile.
+ * Failures leave the canvas unchanged: -EEXIST and -EAGAIN if the batch is not expected now, -ERANGE if a sum would
+ * leave the grid, -ENOSPC if there is no room for a tile.
  */
 #include "common/film/canvas.h"
 
@@ -25,12 +24,12 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-/* The prefix and both open rounds together stay below 2^62 in every pixel, so that closing a round cannot fail. */
+/* The prefix and both open rounds together stay below 2^62 in every pixel, so closing a round cannot fail. */
 #define SUM_MOST (UINT64_C(1) << 62)
 #define VALUE_MOST 0x1p61
 
 enum {
-	CHAIN_EXPONENT = -32, /* a chain adds about 1 a mutation: 2^30 of them fit into one pixel */
+	CHAIN_EXPONENT = -32, /* a chain adds about 1 per mutation: 2^30 of them fit into one pixel */
 	SAMPLE_BITS = 28,     /* below a group's mean pixel sum in one round */
 	BLACK_BITS = 40,      /* below the brightest sample */
 	EXPONENT_MOST = 900,
@@ -174,7 +173,7 @@ static uint32_t *missing_of(const struct canvas *c, const struct lease_key *k)
 	return &c->missing[(size_t)k->group * c->plan.parts + k->part];
 }
 
-/* Of a render lease: its round is closed, so that its sums are or were in the prefix. */
+/* For a render lease: whether its round is closed, so that its sums are or were in the prefix. */
 static bool is_closed(const struct canvas *c, const struct lease_key *k)
 {
 	return k->epoch < c->rounds;
@@ -230,7 +229,7 @@ uint64_t canvas_merged(const struct canvas *c)
 
 /* ---- pixels */
 
-/* To the nearest integer, ties to even. Above 2^51 a float is an integer many times over already. */
+/* Rounds to the nearest integer, ties to even. Above 2^51 every float is an integer. */
 static int64_t round_to_grid(double x)
 {
 	if (fabs(x) < 0x1p51) {
@@ -247,7 +246,7 @@ static size_t tile_values(const struct tile *t)
 	return (size_t)t->width * t->height * TILE_CHANNELS;
 }
 
-/* The largest magnitude: finite floats without their sign are ordered as their bits are. */
+/* The largest magnitude: the bits of finite floats without their sign are ordered like the floats. */
 static float largest(const struct tile *t)
 {
 	uint32_t most = 0;
@@ -263,7 +262,7 @@ static float largest(const struct tile *t)
 	return value;
 }
 
-/* The largest value of a filter's kernel, by far: settings bound its radius from below. */
+/* A generous bound on a filter kernel's largest value: settings bound its radius from below. */
 #define KERNEL_MOST 0x1p14
 
 int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e)
@@ -283,7 +282,7 @@ int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e
 	return 0;
 }
 
-/* Adds a row, with the scale's sign. Loops without exits, each doing one thing: the compiler makes vectors of them. */
+/* Adds a row, with the scale's sign. Each loop does one thing and has no exit, so the compiler vectorises it. */
 static void add_row(int64_t *s, const float *v, size_t count, double scale, bool small)
 {
 	if (small) {
@@ -299,8 +298,9 @@ static void add_row(int64_t *s, const float *v, size_t count, double scale, bool
 	}
 }
 
-/* Adds (sign 1) or takes back (sign -1) a tile. False: a value is off the grid, nothing was done. Each |sum| was at
- * most SUM_MOST and a value is less than VALUE_MOST: their sum is a number, if one too large, and *bound tells. */
+/* Adds (sign 1) or subtracts (sign -1) a tile. false: a value is off the grid, and nothing was done. Each |sum| was
+ * at most SUM_MOST and a value is less than VALUE_MOST, so the sum does not overflow, and *bound shows if it is too
+ * large. */
 static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t, double sign, uint64_t *bound)
 {
 	double most = (double)largest(t) * c->scale;
@@ -377,7 +377,7 @@ static void close_tile(struct canvas *c, size_t prefix, size_t open, size_t tile
 	*canvas_flags(c, open, tile) &= (uint8_t)~TILE_USED;
 }
 
-/* ---- what goes with the pixels */
+/* ---- other data of a batch */
 
 void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out)
 {
@@ -449,7 +449,7 @@ void canvas_take_back(struct canvas *c, const struct batch *b)
 	assert(k->kind == LEASE_RENDER && canvas_has(c, k));
 	for (uint32_t i = 0; i < b->tile_count; i++) {
 		bool on_grid = add_tile(c, canvas_slot(c, film, tile_index(c, &b->tiles[i])), &b->tiles[i], -1, &bound);
-		assert(on_grid); /* as when it was added */
+		assert(on_grid); /* the same as when it was added */
 		(void)on_grid;
 	}
 	c->bound[film] = bound > c->bound[film] ? bound : c->bound[film];

@@ -103,7 +103,7 @@ void moments_take_back(struct moments *m, const struct batch *b, bool closed)
 	add_render(m, b, closed, -1);
 }
 
-/* What is 0 is left alone, so that its page stays untouched. */
+/* Zeros are not added, so their pages stay untouched. */
 static void move_grid(int64_t *to, int64_t *from, size_t count)
 {
 	for (size_t i = 0; i < count; i++)
@@ -127,7 +127,7 @@ void moments_close_round(struct moments *m, uint64_t round)
 
 /* ---- files */
 
-/* Runs of a film's tiles, or of a group's classes; one of zeros is a byte. */
+/* Runs of a film's tiles, or of a group's classes; a run of zeros takes one byte. */
 static int save_runs(struct checked_file *out, const void *bytes, size_t run, size_t count, struct error *e)
 {
 	const unsigned char *p = bytes;

@@ -9,7 +9,7 @@
 
 enum { VERSION = 2, END = UINT32_MAX };
 
-/* What must be equal for a file to fit. */
+/* What must be equal for a file to be loaded. */
 struct head {
 	uint32_t version, tally_bytes, groups, parts, tiles_across, tiles_down, kind, slot;
 	double quantum;
@@ -45,7 +45,7 @@ static size_t has_bytes(const struct canvas *c)
 	return (size_t)(1 + OPEN_ROUNDS) * c->plan.groups * c->plan.parts;
 }
 
-/* All but the pixels, one after the other: written and read by the same list. */
+/* Everything but the pixels, in order: writing and reading use the same list. */
 struct piece {
 	void *bytes;
 	size_t size;
@@ -102,7 +102,7 @@ static int load_tiles(struct canvas *c, struct checked_file *in, struct error *e
 		if (at.film >= films_of(c) || at.tile >= canvas_tiles(c))
 			return error_set(e, EBADMSG, "a tile that the films do not have");
 		rc = canvas_back_tile(c, at.film, at.tile, e);
-		/* Closing a round moves it into the prefix, which must not meet a full disk. */
+		/* Closing a round moves it into the prefix, so room for that is reserved now. */
 		if (!rc)
 			rc = canvas_back_tile(c, canvas_film(at.film / FILMS, FILM_PREFIX), at.tile, e);
 		if (!rc)

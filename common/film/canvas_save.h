@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A canvas in a file and back, open rounds too: whoever adds the same batches to both gets the same bits. What no batch
- * touched takes no room. The form is that of this build (versioned; numbers as they lie in memory). One thread at a
- * time.
+ * Saves a canvas to a file and loads it, open rounds included: adding the same batches to both gives the same bits.
+ * Untouched tiles take no space. The format is that of this build (versioned, numbers in memory layout). One thread at
+ * a time.
  */
 #ifndef COMMON_FILM_CANVAS_SAVE_H
 #define COMMON_FILM_CANVAS_SAVE_H
@@ -11,8 +11,8 @@
 #include "common/film/canvas.h"
 
 int canvas_save(const struct canvas *c, struct checked_file *out, struct error *e);
-/* Into a new canvas of the same plan and grid. -EBADMSG: of another one; -EPROTO: of another version; the canvas is of
- * no use then. */
+/* Loads into a new canvas of the same plan and grid. -EBADMSG: it is of another one; -EPROTO: of another version.
+ * The canvas is unusable after an error. */
 int canvas_load(struct canvas *c, struct checked_file *in, struct error *e);
 
 #endif

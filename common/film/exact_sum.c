@@ -6,7 +6,7 @@
 
 enum { MANTISSA_BITS = 52, EXPONENT_MASK = 0x7ff, UNIT_EXPONENT = -1074 };
 
-/* word[i...] += value, carries upward. */
+/* word[i...] += value, with carry. */
 static void add_at(struct exact_sum *s, int i, uint64_t value)
 {
 	while (value && i < EXACT_SUM_WORDS) {

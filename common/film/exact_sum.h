@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A sum of doubles without rounding: the same for any order (a Kulisch accumulator; 64-bit words over the whole range
- * of double). Adding canonical zeros, infinities and NaN: refused, counted by the caller. No allocation.
+ * A sum of doubles without rounding: the same in any order (a Kulisch accumulator: 64-bit words over the whole range of
+ * double). Infinities and NaN are refused; the caller counts them. No allocation.
  */
 #ifndef COMMON_FILM_EXACT_SUM_H
 #define COMMON_FILM_EXACT_SUM_H

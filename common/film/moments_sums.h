@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The inside of struct moments, for canvas_moments.c, which adds to it, and for common/estimate, which reads it. */
+/* The contents of struct moments, for canvas_moments.c, which adds to it, and common/estimate, which reads it. */
 #ifndef COMMON_FILM_MOMENTS_SUMS_H
 #define COMMON_FILM_MOMENTS_SUMS_H
 
@@ -9,7 +9,7 @@
 
 enum { MOMENTS_PREFIX, MOMENTS_OPEN, MOMENTS_SETS = 3 };
 
-/* First moments are times, at most the mutations made: 2^42 of them in one lease's chains fit. */
+/* First moments are times, at most the number of mutations: the chains of one lease make at most 2^42. */
 #define MOMENTS_GRID 0x1p20
 struct moments {
 	struct plan plan;

@@ -8,10 +8,10 @@
 
 #include <jansson.h>
 
-/* [{"name":"hslt","proposed":900,...,"failures":{"outside":90,...}},...], one object an entry of the mixture; NULL when
- * memory is out. Numbers above 2^63-1 become that. */
+/* [{"name":"hslt","proposed":900,...,"failures":{"outside":90,...}},...], one object per entry of the mixture; NULL:
+ * out of memory. Numbers above 2^63-1 become that. */
 json_t *strategy_to_json(const char *mixture, const struct canvas_counts *n);
-/* What strategy_to_json wrote. Whatever is missing, negative or of another kind is 0. */
+/* Reads what strategy_to_json wrote. Values that are missing, negative or of another type become 0. */
 void strategy_from_json(const json_t *list, struct canvas_counts *n);
 
 #endif

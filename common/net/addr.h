@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * "HOST:PORT", "[::1]:PORT": where a daemon listens and whom a peer calls. Whatever is not loopback needs TLS or must
- * be asked for (--insecure).
+ * "HOST:PORT", "[::1]:PORT": where a daemon listens or a peer connects to. Anything but loopback requires TLS or
+ * --insecure.
  */
 #ifndef COMMON_NET_ADDR_H
 #define COMMON_NET_ADDR_H
@@ -16,10 +16,10 @@ struct net_addr {
 	struct sockaddr_storage storage;
 };
 
-/* Looks the name up (may block on DNS). -EINVAL: not HOST:PORT; -EHOSTUNREACH: unknown name. Port 0 is allowed. */
+/* Resolves the name (may block on DNS). -EINVAL: not HOST:PORT; -EHOSTUNREACH: unknown name. Port 0 is allowed. */
 int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e);
 bool net_addr_is_loopback(const struct net_addr *a);
-/* -EPERM with what to do, unless the address is loopback or `safe`: there is TLS, or none is wanted. */
+/* -EPERM, with what to do about it, unless the address is loopback or `safe` (TLS, or --insecure). */
 int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, struct error *e);
 unsigned net_addr_port(const struct net_addr *a);
 void net_addr_format(const struct net_addr *a, char *text, size_t size); /* numeric HOST:PORT */

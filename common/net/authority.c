@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Each command locks the folder, reads what it needs, makes certificate or list in memory, and replaces files one by
- * one in an order in which a crash leaves a usable folder: keys before certificates, the record in issued/ before what
+ * Each command locks the folder, reads what it needs, makes the certificate or list in memory, and replaces files in an
+ * order in which a crash leaves a usable folder: keys before certificates, the record in issued/ before the certificate
  * is handed out.
  *
- * Failures: a folder that is none of ours or is locked, names that are taken by another role, what OpenSSL refuses
- * (with its reason); nothing is half issued.
+ * Failures: a folder that is not an authority's or is locked, a name that belongs to another role, errors of OpenSSL
+ * (with its reason). Nothing is half issued.
  */
 #include "common/net/authority.h"
 
@@ -51,7 +51,7 @@ static int crypto_error(struct error *e, const char *what)
 	return -EBADMSG;
 }
 
-/* The bytes of b, as a whole or not at all. Frees b. */
+/* Writes the bytes of b, atomically. Frees b. */
 static int write_pem(const char *path, BIO *b, mode_t mode, struct error *e)
 {
 	char temporary[PATH_SIZE + 8];
@@ -184,7 +184,7 @@ static bool set_serial(X509 *cert)
 	unsigned char bytes[SERIAL_BYTES];
 	if (RAND_bytes(bytes, sizeof bytes) != 1)
 		return false;
-	bytes[0] = (unsigned char)((bytes[0] & 0x7f) | 0x40); /* positive, and always as long */
+	bytes[0] = (unsigned char)((bytes[0] & 0x7f) | 0x40); /* positive, and of constant length */
 	BIGNUM *n = BN_bin2bn(bytes, sizeof bytes, NULL);
 	bool ok = n && BN_to_ASN1_INTEGER(n, X509_get_serialNumber(cert));
 	BN_free(n);
@@ -213,7 +213,7 @@ static bool set_times(X509 *cert, double days, const X509 *issuer)
 	       ASN1_TIME_set(X509_getm_notAfter(cert), until);
 }
 
-/* A certificate without extensions and without a signature. */
+/* A certificate without extensions and signature. */
 static X509 *begin_cert(const char *name, EVP_PKEY *key, const X509 *issuer, double days)
 {
 	X509 *cert = X509_new();
@@ -246,9 +246,9 @@ static bool sign_other(const struct authority *a, X509 *cert, enum tls_role role
 	       X509_sign(cert, a->key, EVP_sha256());
 }
 
-/* ---- the list of the revoked ---- */
+/* ---- the revocation list ---- */
 
-/* Dates and signs it. It holds as long as the authority: a list that has run out would lock everybody out. */
+/* Dates and signs it. It is valid as long as the authority: an expired list would lock everybody out. */
 static int sign_list(struct authority *a, struct error *e)
 {
 	ASN1_TIME *now = ASN1_TIME_set(NULL, time(NULL));
@@ -310,7 +310,7 @@ static int write_authority(struct authority *a, struct error *e)
 		rc = write_pem(path, pem_key(a->key), 0600, e);
 	if (!rc)
 		rc = write_list(a, "", e);
-	if (!rc) /* last: it says that there is an authority */
+	if (!rc) /* written last: it marks a complete authority */
 		rc = path_in(path, e, a->folder, "", "ca.pem");
 	return rc ? rc : write_pem(path, pem_cert(a->cert), 0644, e);
 }
@@ -329,7 +329,8 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	if (!rc) {
 		char unique[TLS_NAME_MAX + 16];
 		unsigned char random[4] = {0};
-		/* Two authorities of one name could not be told apart while one replaces the other. */
+		/* A unique name: two authorities with the same name could not be told apart while one replaces the
+		 * other. */
 		RAND_bytes(random, sizeof random);
 		snprintf(unique, sizeof unique, "%.*s-%02x%02x%02x%02x", TLS_NAME_MAX - 9, name, random[0], random[1],
 			 random[2], random[3]);
@@ -344,7 +345,7 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	return rc;
 }
 
-/* The key first: a program that reads in between finds that the two do not fit, and stays with what it has. */
+/* Key first: a program that reads in between finds that key and certificate do not match, and keeps its old pair. */
 static int write_issued(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
 {
 	char path[PATH_SIZE], file[80];
@@ -354,7 +355,7 @@ static int write_issued(const struct authority *a, const char *name, X509 *cert,
 		snprintf(file, sizeof file, "%s.pem", who.serial);
 		rc = path_in(path, e, a->folder, "issued", file);
 	}
-	if (!rc) /* before anybody can use it: what is not in the folder cannot be revoked by its name */
+	if (!rc) /* before anybody can use it: a certificate that is not recorded cannot be revoked by name */
 		rc = write_pem(path, pem_cert(cert), 0644, e);
 	if (!rc)
 		rc = path_in(path, e, a->folder, name, "key.pem");
@@ -369,7 +370,7 @@ static int write_issued(const struct authority *a, const char *name, X509 *cert,
 	return rc ? rc : write_pem(path, pem_cert(cert), 0644, e);
 }
 
-/* A folder goes on with another certificate for the same name and role, or it is somebody else's. */
+/* A folder may only be renewed with a certificate of the same name and role. */
 static int may_renew(const struct authority *a, const char *name, enum tls_role role, struct error *e)
 {
 	char path[PATH_SIZE];
@@ -421,7 +422,7 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	return rc;
 }
 
-/* Calls `each` for every certificate in issued/ until it fails. */
+/* Calls `each` for every certificate in issued/, until it fails. */
 static int walk(const char *folder, int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e),
 		void *user, struct error *e)
 {

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * client_open connects and says hello; client_call sends a message and runs the loop until the answer with its number
- * has come, a deadline is over or the connection is gone. Fetching reads chunk after chunk into a temporary file that
- * takes the final name when it is whole.
+ * client_open connects and says hello. client_call sends a message and runs the loop until the answer with its number
+ * arrives, a deadline passes, or the connection is lost. Fetching reads chunk by chunk into a temporary file that is
+ * renamed when complete.
  *
- * Failures: -ECONNREFUSED, -ECONNRESET and -ETIMEDOUT may be tried again (client_exit_code has the code for each), a
- * refusal of the coordinator carries its sentence.
+ * Failures: -ECONNREFUSED, -ECONNRESET and -ETIMEDOUT may be retried (client_exit_code has the exit code of each); a
+ * refusal carries the coordinator's sentence.
  */
 #include "common/net/client.h"
 
@@ -25,7 +25,7 @@
 enum {
 	HEADER_LIMIT = 1 << 22,
 	PAYLOAD_LIMIT = 1 << 21,
-	WAITING_MAX = 4096,	 /* messages not yet asked for */
+	WAITING_MAX = 4096,	 /* messages received but not asked for yet */
 	WAITING_BYTES = 1 << 26, /* of them */
 	ANSWER_SECONDS = 60,
 	HELLO_SECONDS = 10,
@@ -41,7 +41,7 @@ struct client {
 	uv_timer_t timeout, heartbeat;
 	struct conn *conn; /* NULL: closed */
 	struct waiting *first, **last;
-	uint64_t patience_ms; /* of who waits */
+	uint64_t patience_ms; /* from whoever waits */
 	unsigned waiting_count;
 	size_t waiting_bytes;
 	struct tls *tls; /* NULL: plaintext */
@@ -384,7 +384,7 @@ int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd
 	return rc;
 }
 
-/* replace: what is there already under that name. */
+/* replace: whether an existing file of that name is replaced. */
 static int give_name(const char *temporary, const char *path, bool replace, struct error *e)
 {
 	if ((replace ? rename(temporary, path) : link(temporary, path)) != 0)
@@ -404,7 +404,7 @@ static int copy(int from, int to, struct error *e)
 	return n < 0 ? error_set(e, EIO, "a temporary file: %s", strerror(errno)) : rc;
 }
 
-/* All of it is here before a byte is written: what a pipe has taken cannot be taken back when the connection breaks. */
+/* Received completely before a byte is written: what a pipe has taken cannot be taken back if the connection breaks. */
 static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
 			 const struct target *t, struct error *e)
 {
@@ -465,7 +465,7 @@ int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *p
 	return rc;
 }
 
-/* What somebody else called it, as the name of a file here: nothing hidden, nothing that looks like an option. */
+/* Turns a name that somebody else chose into a safe file name: not hidden, and not like an option. */
 static int take_name(const char *output, char name[CLIENT_NAME_BYTES], struct error *e)
 {
 	struct stat st;

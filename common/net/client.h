@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The client's side of the conversation (hslt-submit, hslt-job): says hello, then sends and waits, one step at a time,
- * with a loop of its own. One thread.
+ * The client's side of the protocol (hslt-submit, hslt-job): hello, then requests and answers, one at a time, with an
+ * event loop of its own. One thread.
  */
 #ifndef COMMON_NET_CLIENT_H
 #define COMMON_NET_CLIENT_H
@@ -18,40 +18,38 @@ struct client_message { /* fini with client_message_fini */
 	struct buf payload;
 };
 
-/* Connects and exchanges hello; tls: a folder (tls.h), NULL or "" for plaintext. -ECONNREFUSED when nobody is there
- * (also what is not one of ours: nothing else answers in time), -EPROTO when hello is refused, -EACCES when one side
- * does not accept the other's certificate or only one speaks TLS, -EPERM, -EIO when our own folder is no good. */
+/* Connects and exchanges hello. tls: a folder (tls.h); NULL or "" means plaintext. -ECONNREFUSED: nobody answers (or
+ * not a coordinator), -EPROTO: hello is refused, -EACCES: one side does not accept the other's certificate, or only
+ * one uses TLS, -EPERM or -EIO: our own folder is unusable. */
 int client_open(struct client **cl, const char *host_port, const char *tls, bool insecure, const char *name,
 		struct error *e);
 void client_close(struct client *cl);
-/* Tells the user on stderr that certificates expire soon, and what the coordinator says of itself, if there is anything
- * to tell. */
+/* Prints on stderr which certificates expire soon, and what the coordinator says about its own. */
 void client_print_notes(const struct client *cl, const char *program);
 
-/* Sends and waits until it is with the kernel. */
+/* Sends, and waits until the kernel has it. */
 int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e);
-/* The next message. -ETIMEDOUT after `seconds` without a word, heartbeats included (< 0: waits for ever), -ECONNRESET
- * when the connection is gone, -EPROTO when the coordinator found fault with us. */
+/* The next message. -ETIMEDOUT after `seconds` without any message, heartbeats included (< 0: waits forever),
+ * -ECONNRESET if the connection is lost, -EPROTO if the coordinator reports a fault. */
 int client_wait(struct client *cl, double seconds, struct client_message *m, struct error *e);
 /* Sends, and waits for a message of this kind; any other is -EPROTO. */
 int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want,
 		struct client_message *answer, struct error *e);
 void client_message_fini(struct client_message *m);
 
-/* Fetches a job's result or log piece by piece into the file: temporary file beside it, then rename. -EIO: of the file
- * here. */
+/* Fetches a job's result or log chunk by chunk into a temporary file, then renames it. -EIO: an error of the local
+ * file. */
 int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, struct error *e);
-/* The same into the current folder, under the last part of the name that hslt-submit was given. That came over the
- * wire: -EEXIST when something has that name already, or when it is none that a file of somebody else's choice may have
- * (hidden, like an option). */
+/* The same into the current folder, under the last part of the name that hslt-submit was given. Because that name
+ * came over the wire, -EEXIST if a file of that name exists, or if the name is unsafe (hidden, or like an option). */
 int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e);
 /* The same, to a stream. */
 int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e);
 
-/* The exit code for a failure of the functions above: 75 unreachable, 6 refused, else 1. */
+/* The exit code for an error of the functions above: 75 unreachable, 6 refused, otherwise 1. */
 int client_exit_code(int rc);
-/* What went wrong with files here is neither the farm's doing nor its absence, whatever its number: -EIO instead of it.
- * 0 stays. */
+/* Turns an error of local files into -EIO, so that it is not taken for one of the farm, whatever its number. 0 stays
+ * 0. */
 int client_local(int rc);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bytes that libuv reads go through TLS, where there is TLS, into the frame reader, which calls `message` for each
- * whole frame; what is sent is queued, encrypted where needed, and handed to libuv. A timer of its own notices peers
- * that are silent or do not take what they are sent, and certificates that run out or are revoked meanwhile.
+ * Bytes that libuv reads go through TLS, if used, into the frame reader, which calls `message` for each complete frame.
+ * Outgoing frames are queued, encrypted if needed, and handed to libuv. A timer notices peers that are silent or do not
+ * read, and certificates that expire or are revoked meanwhile.
  *
- * Failures end the connection, once, with a reason in words: frames beyond the limits, plain bytes where TLS is wanted
+ * Failures end the connection, once, with a reason in words: frames beyond the limits, plaintext where TLS is required
  * (and the reverse), a peer that stalls, no memory.
  */
 #include "common/net/conn.h"
@@ -19,28 +19,28 @@
 enum {
 	READ_BYTES = 1 << 16,
 	TICK_MS = 250,
-	TICK_MS_MOST = 1000, /* where nothing can come sooner */
+	TICK_MS_MOST = 1000, /* if nothing is due earlier */
 	LINGER_MS = 5000,
-	REFUSED_MS = 1000,    /* for a peer to read why */
-	HANDSHAKE_MS = 10000, /* of TLS */
+	REFUSED_MS = 1000,    /* time for a peer to read the reason */
+	HANDSHAKE_MS = 10000, /* of TLS records */
 	BYTES_PER_SECOND = 1 << 16,
-	PIECE = 1 << 16,  /* encrypted at a time */
-	WINDOW = 1 << 20, /* encrypted and not yet with the kernel */
-	FRAME_COST = 256, /* memory of a frame that waits, beside its bytes */
+	PIECE = 1 << 16,  /* bytes encrypted at a time */
+	WINDOW = 1 << 20, /* encrypted bytes that the kernel has not taken yet */
+	FRAME_COST = 256, /* overhead of a queued frame besides its bytes */
 };
 
-/* What goes out instead of a frame's own prefix. */
+/* Replaces the prefix of a frame. */
 struct head {
 	unsigned char bytes[FRAME_SEALED_PREFIX];
 	size_t size;
 };
 
-/* A frame that waits to be encrypted. */
+/* A frame waiting to be encrypted. */
 struct queued {
 	struct queued *next;
-	struct head head; /* empty: it is on its way */
+	struct head head; /* empty: it is being sent */
 	unsigned char *bytes;
-	size_t size, at, plain; /* plain: what it still counts in unsent */
+	size_t size, at, plain; /* plaintext: what it counts for in `unsent` */
 };
 
 struct conn {
@@ -53,29 +53,29 @@ struct conn {
 	struct frame_reader reader;
 	struct tls_link *link; /* NULL: plaintext */
 	struct queued *queue, **queue_last;
-	size_t unsent;		/* bytes of frames that are not with the kernel, and what they cost beside */
-	size_t in_flight;	/* what libuv has to write, of TLS with all its own */
-	uint64_t clock, ticked; /* ms of its own clock, and of the loop's, at the last tick */
-	uint64_t begun, last_read, frame_begun; /* ms of its own clock, as it was then */
-	uint64_t checked;			/* ms of the loop's clock: the peer's certificate */
-	uint64_t linger_until;			/* 0: not leaving */
+	size_t unsent;		/* bytes of frames that the kernel has not taken, and their overhead */
+	size_t in_flight;	/* what libuv has to write; with TLS including its overhead */
+	uint64_t clock, ticked; /* ms of the connection's clock and of the loop's clock at the last tick */
+	uint64_t begun, last_read, frame_begun; /* ms of the connection's clock at that time */
+	uint64_t checked;			/* ms of the loop's clock: the next check of the peer's certificate */
+	uint64_t linger_until;			/* 0: not closing */
 	int open_handles;
 	bool accepted, sniffed, closing;
-	bool waits_for_peer; /* it is told why before it is cut off */
+	bool waits_for_peer; /* tell the peer why before closing */
 	bool distrust, garbled;
-	bool sent; /* the first frame is on its way */
+	bool sent; /* the first frame has been sent */
 	char why[256];
 };
 
-/* What was just read, or decrypted: libuv calls back with it before it reads anything else, and nobody reads from
- * inside a callback. */
+/* Holds what was just read or decrypted: libuv calls back with it before it reads more, and nothing is read inside a
+ * callback. */
 static _Thread_local char chunk[READ_BYTES];
 
 struct sending {
 	uv_write_t request;
 	struct head head;
 	unsigned char *bytes;
-	size_t size, plain; /* what it counts in in_flight, in unsent */
+	size_t size, plain; /* what it counts for in in_flight and in unsent */
 };
 
 static void on_sent(uv_write_t *r, int status);
@@ -113,9 +113,10 @@ void conn_close(struct conn *c, const char *why)
 	uv_close((uv_handle_t *)&c->tcp, on_handle_closed);
 }
 
-/* ---- its own clock ---- */
+/* ---- the connection's clock ---- */
 
-/* Stands still while the loop does: what came meanwhile is not read yet, and nobody is to be blamed for it. */
+/* Stands still while the loop does: whatever arrived meanwhile has not been read yet, and no peer is to blame for
+ * that. */
 static uint64_t clock_of(const struct conn *c)
 {
 	uint64_t since = uv_now(c->tcp.loop) - c->ticked, most = uv_timer_get_repeat(&c->timer);
@@ -162,7 +163,7 @@ struct buf conn_take_payload(struct conn *c)
 	return payload;
 }
 
-/* Frames, as they are without encryption. */
+/* Frames in plaintext, after decryption. */
 static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 {
 	size_t at = 0;
@@ -180,14 +181,15 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 			conn_close(c, e.text);
 		} else if (rc) {
 			deliver(c);
-			frame_reader_drop(&c->reader); /* not only when the next one comes: that may be seconds */
+			frame_reader_drop(
+				&c->reader); /* now, rather than with the next frame, which may be seconds away */
 		}
 	}
 	if (c->events->partial && frame_reader_is_midway(&c->reader) && !c->closing && !c->linger_until)
 		c->events->partial(c->user);
 }
 
-/* Takes the mem_alloc'd bytes; what is sent is `head`, then what is behind `skip` bytes of them. */
+/* Takes the mem_alloc'd bytes; sends `head`, then the bytes after the first `skip`. */
 static void to_kernel(struct conn *c, struct head head, unsigned char *bytes, size_t size, size_t skip, size_t plain)
 {
 	struct sending *s = mem_alloc(1, sizeof *s);
@@ -219,22 +221,22 @@ static void copy_to_kernel(struct conn *c, const void *bytes, size_t size, size_
 		conn_close(c, "no memory to send");
 }
 
-/* What TLS has to say, in which `plain` bytes of frames are. */
+/* Sends what TLS has produced, which contains `plain` bytes of frames. */
 static void flush(struct conn *c, size_t plain)
 {
 	const unsigned char *bytes;
 	size_t size = tls_link_output(c->link, &bytes);
 	if (!size || c->closing)
 		return;
-	if (c->in_flight > 2 * WINDOW) /* answers to what it asks for: it asks and does not read */
+	if (c->in_flight > 2 * WINDOW) /* a peer that sends requests and does not read the answers */
 		conn_close(c, "the peer does not take what is sent to it");
 	else
 		copy_to_kernel(c, bytes, size, plain);
 	tls_link_output_taken(c->link);
 }
 
-/* The peer is told, if there is something to tell, and is given a moment to read it: data that comes after the socket
- * is closed would make the kernel throw that away. */
+/* Tells the peer the reason, if there is one, and gives it time to read: the kernel would discard it if data arrived
+ * after the socket was closed. */
 static void refuse(struct conn *c, int rc, const char *why)
 {
 	c->distrust = rc == -EACCES;
@@ -255,7 +257,7 @@ static void pump(struct conn *c)
 		struct error e;
 		size_t most = PIECE - q->head.size, size = q->size - q->at < most ? q->size - q->at : most;
 		const unsigned char *bytes = q->bytes + q->at;
-		if (q->head.size) { /* in the same record as what follows */
+		if (q->head.size) { /* in the same record as the next one */
 			memcpy(first, q->head.bytes, q->head.size);
 			memcpy(first + q->head.size, bytes, size);
 			bytes = first;
@@ -267,7 +269,7 @@ static void pump(struct conn *c)
 		q->head.size = 0;
 		q->at += size;
 		if (q->at == q->size)
-			size = q->plain; /* what is left of it */
+			size = q->plain; /* what is left */
 		q->plain -= size;
 		flush(c, size);
 		if (q->at < q->size)
@@ -280,7 +282,7 @@ static void pump(struct conn *c)
 	}
 }
 
-/* Encrypted bytes, or none: then the handshake begins. */
+/* Encrypted bytes; with none, starts the handshake. */
 static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 {
 	struct error e;
@@ -307,7 +309,7 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 	}
 }
 
-/* No frame begins like TLS. */
+/* No frame begins like a TLS record. */
 static bool is_tls(struct conn *c, const char *bytes, size_t size)
 {
 	bool first = !c->sniffed && size;
@@ -345,7 +347,7 @@ static bool has_stalled(const struct conn *c)
 	return frame_reader_is_midway(&c->reader) && (double)(c->clock - c->frame_begun) > 1000 * allowed;
 }
 
-/* Is the peer's certificate still good? By the clock it can expire, by the list it can be revoked. */
+/* Checks the peer's certificate again: it may have expired, or been revoked. */
 static void check_again(struct conn *c, uint64_t now)
 {
 	struct error e;
@@ -376,7 +378,7 @@ static void on_tick(uv_timer_t *t)
 		conn_close(c, "nothing was heard for too long");
 }
 
-/* ---- life ---- */
+/* ---- opening and closing ---- */
 
 static int conn_new(struct conn **out, uv_loop_t *loop, bool accepted, const struct conn_config *config,
 		    const struct conn_events *events, void *user, struct error *e)
@@ -532,7 +534,7 @@ static void on_sent(uv_write_t *r, int status)
 		c->events->drained(c->user);
 }
 
-/* Takes the bytes, also when it fails. */
+/* Takes the bytes, also on failure. */
 static void enqueue(struct conn *c, struct head head, unsigned char *bytes, size_t size, size_t skip)
 {
 	struct queued *q = mem_alloc(1, sizeof *q);

@@ -20,7 +20,7 @@ bool notify_send(const char *state)
 	if (length < 2 || length >= sizeof a.sun_path || (*path != '/' && *path != '@'))
 		return false;
 	memcpy(a.sun_path, path, length);
-	if (*path == '@') /* Linux' abstract names begin with a zero and are as long as the address says */
+	if (*path == '@') /* Abstract names on Linux begin with a zero byte, and their length is that of the address */
 		a.sun_path[0] = 0;
 	int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 	if (fd < 0)
@@ -32,7 +32,7 @@ bool notify_send(const char *state)
 	return sent == (ssize_t)size;
 }
 
-/* A whole number from the environment; -1: none. */
+/* A whole number from an environment variable; -1: none. */
 static long long env_number(const char *name)
 {
 	char *end;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A context is made of the folder's files and made again when one of them changes; a link is one connection's state,
- * between two memory buffers of OpenSSL: bytes from the socket go into one, bytes for the socket come out of the other.
- * Whom a link talks to is judged in the verification's callback (role, revocation, expiry).
+ * A context is made from the folder's files, and made again when one changes. A link is the TLS state of one
+ * connection, between two memory buffers of OpenSSL: received bytes go into one, bytes to send come out of the other.
+ * The verification callback checks the peer's role, revocation and expiry.
  *
- * A folder that cannot be read while it changes keeps the old context; a certificate that the other side does not
- * accept is explained in words in explain().
+ * A folder that cannot be read while it changes keeps the old context. explain() puts into words why the other side
+ * does not accept a certificate.
  */
 #include "common/net/tls.h"
 
@@ -20,10 +20,10 @@
 #include <sys/stat.h>
 
 enum {
-	BEFORE_OPEN_MAX = 1 << 16, /* bytes from a peer whose certificate was not seen yet */
+	BEFORE_OPEN_MAX = 1 << 16, /* bytes accepted from a peer before its certificate was checked */
 	CERTIFICATES_MAX = 1 << 14,
 	DEPTH = 1,
-	ALERT_REASON = 1000, /* OpenSSL's number of the reason for an alert that came */
+	ALERT_REASON = 1000, /* OpenSSL's number for the reason of a received alert */
 	ALERT_RECORD = 21,
 	HANDSHAKE_RECORD = 22,
 	PROTOCOL_VERSION = 70,
@@ -34,7 +34,7 @@ const unsigned char tls_none_here[7] = {ALERT_RECORD, 3, 3, 0, 2, 2, PROTOCOL_VE
 enum { FILES = 4 };
 static const char *const file_names[FILES] = {"ca.pem", "cert.pem", "key.pem", "crl.pem"};
 
-struct stamp { /* of a file; zeroes: not there */
+struct stamp { /* of a file; zeros: it does not exist */
 	ino_t inode;
 	off_t size;
 	struct timespec changed;
@@ -43,8 +43,8 @@ struct stamp { /* of a file; zeroes: not there */
 struct tls {
 	char folder[3072];
 	SSL_CTX *context;
-	struct stamp stamps[FILES]; /* of what holds */
-	struct stamp seen[FILES];   /* ... and what was there last, of use or not */
+	struct stamp stamps[FILES]; /* of the files in use */
+	struct stamp seen[FILES];   /* ... and of those read last, usable or not */
 	struct tls_peer self;
 	time_t authority_until;
 	time_t warned; /* 0: not since the files were read */
@@ -54,11 +54,11 @@ struct tls {
 struct tls_link {
 	struct tls *tls;
 	SSL *ssl;
-	BIO *in, *out; /* the SSL's */
+	BIO *in, *out; /* owned by the SSL */
 	struct tls_peer peer;
-	size_t taken; /* before the handshake was done */
+	size_t taken; /* before the handshake was complete */
 	bool listening, begun, open;
-	char distrust[128]; /* why the peer's certificate is not for us, though the authority made it */
+	char distrust[128]; /* why the peer's certificate is refused although it is valid */
 };
 
 bool tls_is_first_byte(unsigned char c)
@@ -66,7 +66,7 @@ bool tls_is_first_byte(unsigned char c)
 	return c == HANDSHAKE_RECORD || c == ALERT_RECORD;
 }
 
-/* ---- who somebody is ---- */
+/* ---- names and roles ---- */
 
 static const char role_prefix[] = "hslt:role:";
 static const char *const roles[TLS_ROLES] = {"nobody", "coordinator", "worker", "client", "operator"};
@@ -104,7 +104,7 @@ static enum tls_role role_of(const ASN1_IA5STRING *uri)
 	return TLS_NOBODY;
 }
 
-/* Exactly one role: of a certificate with two it would not be clear what it may do. */
+/* Exactly one role: what a certificate with two may do would be unclear. */
 static enum tls_role read_role(X509 *cert)
 {
 	enum tls_role found = TLS_NOBODY;
@@ -152,7 +152,7 @@ int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 	return 0;
 }
 
-/* ---- what is about to expire ---- */
+/* ---- certificates that expire soon ---- */
 
 static bool expiry(const char *what, time_t until, time_t now, char *text, size_t size)
 {
@@ -229,7 +229,7 @@ static int broken(struct error *e, int code, const char *path)
 	return error_set(e, code, "%s: %s", path, text ? text : "cannot be used");
 }
 
-/* At depth 0 the chain is good already: is the certificate for what the peer does with it? */
+/* At depth 0 the chain is valid already: checks whether the certificate allows what the peer does. */
 static int verify_certificate(int good, X509_STORE_CTX *sc)
 {
 	if (!good || X509_STORE_CTX_get_error_depth(sc) != 0)
@@ -249,7 +249,8 @@ static int verify_certificate(int good, X509_STORE_CTX *sc)
 	return 0;
 }
 
-/* The revoked must not come back because a file is lost. How many lists there were; -1: no memory. */
+/* Keeps the old lists when the file is lost, so that revoked certificates stay revoked. The number of lists; -1: no
+ * memory. */
 static int keep_lists(SSL_CTX *from, X509_STORE *to)
 {
 	int count = 0;
@@ -272,7 +273,7 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 		X509_STORE_free(store);
 		return broken(e, EBADMSG, path);
 	}
-	SSL_CTX_set_cert_store(context, store); /* which owns it now */
+	SSL_CTX_set_cert_store(context, store); /* which now owns it */
 	int kept = revocations || !t->context ? 0 : keep_lists(t->context, store);
 	if (kept < 0)
 		return error_set(e, ENOMEM, "no memory for TLS");
@@ -304,7 +305,7 @@ static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
 
-/* While one authority replaces another there are several. */
+/* There are several while one authority replaces another. */
 static time_t find_authority(SSL_CTX *context)
 {
 	time_t last = 0;
@@ -426,7 +427,7 @@ double tls_recheck_seconds(const struct tls *t)
 	return t->recheck;
 }
 
-/* ---- a link ---- */
+/* ---- links ---- */
 
 int tls_link_new(struct tls_link **out, struct tls *t, bool listening, struct error *e)
 {
@@ -474,7 +475,7 @@ int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct err
 	return 0;
 }
 
-/* What OpenSSL stumbled over, in words for whoever must do something about it. */
+/* OpenSSL's error, worded for the person who has to fix it. */
 static int explain(struct tls_link *l, struct error *e)
 {
 	unsigned long code = ERR_peek_error();
@@ -507,8 +508,8 @@ ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *
 		return (ssize_t)got;
 	int rc;
 	switch (SSL_get_error(l->ssl, ok)) {
-	case SSL_ERROR_WANT_READ: /* all that was taken is used up: what came behind the handshake does not count for it
-				   */
+	case SSL_ERROR_WANT_READ: /* all input has been consumed: bytes after the handshake do not count towards its
+				     limit */
 		if (!l->open && l->taken > BEFORE_OPEN_MAX)
 			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
 		return 0;

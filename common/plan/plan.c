@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * plan_make cuts a request into groups, parts, chains, epochs and rounds, by sizes that depend on the request alone;
- * plan_check asks of a plan from the network everything that plan_make promises, so that whoever computes with it needs
- * no further checks. plan_resample draws the chains' seeds from the weights of the bootstrap by systematic resampling.
+ * plan_make divides a request into groups, parts, chains, epochs and rounds, by sizes that depend on the request alone.
+ * plan_check checks that a plan from the network has every property that plan_make guarantees, so that its users need
+ * no further checks. plan_resample draws the chains' seeds from the bootstrap's weights by systematic resampling.
  *
  * Failures: -EINVAL with a sentence that names the number and its range.
  */
@@ -28,7 +28,7 @@ enum {
 	MUTATIONS_PER_CHAIN = 2048, /* fewer chains before chains become shorter than this */
 	AIM_ROUNDS = 8,
 	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
-	LEASE_SAMPLES_OPEN = 1 << 18, /* chains without a bound on mutations: most in one lease */
+	LEASE_SAMPLES_OPEN = 1 << 18, /* for chains without a bound on mutations: the most in one lease */
 	LEASE_SAMPLES_LEAST = 1 << 13,
 	LEASE_SECONDS = 20,	      /* of one thread */
 	LEASE_SAMPLES_SLOW = 1 << 15, /* fewer take no longer than that in any scene that was seen */
@@ -134,7 +134,7 @@ static int check_film(const struct plan *p, struct error *e)
 	return 0;
 }
 
-/* 0: no bound. Else the samples or mutations asked for, the least of the bounds given. */
+/* 0: no bound. Otherwise the samples or mutations requested, the least of the given bounds. */
 static int asked_total(const struct plan_request *r, const struct plan *p, uint64_t *total, struct error *e)
 {
 	*total = 0;
@@ -196,9 +196,9 @@ static uint64_t open_lease(const struct plan_request *r, const struct plan *p)
 	return (uint64_t)((double)lease / slowness(r));
 }
 
-/* Samples or mutations that a bound on time, or on the error, leaves room for, by cautious guesses, as a plan must not
- * depend on the machine: one thread of SPEED_UNKNOWN, and samples of independent pixels with relative errors of 100 %.
- * Infinity: no such bound. */
+/* Samples or mutations that fit into a bound on time or error, by conservative constants, because a plan must not
+ * depend on the machine: one thread at SPEED_UNKNOWN, and independent pixels with relative errors of 100 % per
+ * sample. Infinity: no such bound. */
 static double room_in_time(const struct plan_request *r)
 {
 	return r->seconds > 0 ? SPEED_UNKNOWN / slowness(r) * r->seconds : INFINITY;
@@ -217,7 +217,7 @@ static double power_of_two_near(double x)
 	return x > 1 ? exp2(fmin(round(log2(x)), 40)) : 1;
 }
 
-/* Mutations, or samples, of a lease whose epoch is 1. */
+/* Mutations or samples of a lease whose epoch is 1. */
 static uint64_t lease_unit(const struct plan *p)
 {
 	if (p->kind == PLAN_CHAINS)
@@ -230,7 +230,7 @@ static uint64_t lease_bytes(const struct plan *p)
 	return crop_pixels(p) * PIXEL_BYTES / (p->kind == PLAN_CHAINS ? 1 : p->parts);
 }
 
-/* By the rule above plan_wants_speed. parts, groups and chains stand already. */
+/* The rule is stated above plan_wants_speed. parts, groups and chains are set already. */
 static enum epoch_rule choose_epoch(const struct plan_request *r, const struct plan *p, uint64_t total, uint64_t *epoch)
 {
 	bool chains = p->kind == PLAN_CHAINS;
@@ -553,7 +553,7 @@ bool plan_resample(const struct plan *p, uint32_t group, const float *weight, ui
 	uint64_t i = 0;
 	for (uint32_t k = 0; k < count; k++) {
 		double at = ((double)k + u) / count * total;
-		/* `last` stands for the rounding of `at` up to the total; an index of weight 0 is never chosen. */
+		/* `last` guards against the rounding of `at` up to the total; an index of weight 0 is never chosen. */
 		while (i < last && sum <= at)
 			sum += (double)weight[++i];
 		index[k] = first + i;

@@ -25,17 +25,17 @@ enum lease_kind { LEASE_BOOTSTRAP = 1, LEASE_RENDER = 2 };
 enum {
 	PLAN_MAX_GROUPS = 64,
 	PLAN_MAX_PIXELS = 1 << 24, /* of the crop: bounds a batch */
-	PLAN_MAX_SIZE = 65536,	   /* width, height of the full film */
+	PLAN_MAX_SIZE = 65536,	   /* width and height of the full film */
 	PLAN_MAX_BORDER = 256,
 	PLAN_MAX_PARTS = 64,
 	PLAN_MAX_CHAINS = 1 << 20,
 	PLAN_MAX_LEASE_CHAINS =
-		1 << 14, /* their seeds, and the sizes of their states, fit into a header; the states into a payload */
+		1 << 14, /* bounded so that seeds and state sizes fit into a header, and the states into a payload */
 	PLAN_MAX_BOOTSTRAP = 1 << 26,
 	PLAN_MAX_DEPTH = 128,	  /* edges */
-	PLAN_MUTATIONS_MAX = 160, /* bytes of the mixture's text, the last a 0 */
+	PLAN_MUTATIONS_MAX = 160, /* bytes of the mixture's text, with the final 0 */
 	PLAN_MAX_STRATEGIES = 8,  /* entries of the mixture */
-	PLAN_ACCURACY_MAX = 256,  /* bytes of the text, the last a 0 */
+	PLAN_ACCURACY_MAX = 256,  /* bytes of the text, with the final 0 */
 	PLAN_EFFECTS_MAX = 256,
 	PLAN_SPEED_MOST = 20000000, /* mutations or samples a second of one thread: none is faster */
 };
@@ -50,7 +50,7 @@ struct plan_request {
 	enum plan_kind kind;
 	uint32_t width, height;				  /* full film */
 	uint32_t crop_x, crop_y, crop_width, crop_height; /* width 0: the full film */
-	uint32_t border;				  /* pixels by which samples extend beyond the crop (filter) */
+	uint32_t border; /* pixels by which samples extend beyond the crop: the filter's radius */
 	uint64_t seed;
 	uint64_t spp;		       /* 0: none */
 	uint64_t mutations;	       /* 0: none; as spp x pixels */
@@ -79,17 +79,16 @@ struct plan {
 	uint64_t rounds;	/* after which the job ends; UINT64_MAX: only time or error end it */
 	double seconds, target_error;
 	uint32_t min_depth, max_depth;
-	/* The mixture of strategies that chains draw their proposals from, as the renderer spells it: one entry each,
-	 * with commas between, "independent=0.1,hslt=0.9". Empty: the integrator has none. Bytes behind the text are 0.
-	 */
+	/* The mixture of strategies that proposals are drawn from, as the renderer spells it, entries separated by
+	 * commas: "independent=0.1,hslt=0.9". Empty: the integrator has none. Bytes after the text are 0. */
 	char mutations[PLAN_MUTATIONS_MAX];
-	/* As the renderer spells them, bytes behind the text are 0: settings that differ from the default,
-	 * "tolerance=1e-05"; effects that the scene does not call for and that are simulated all the same, or the other
-	 * way round: "all", "-dispersion,+aperture". Empty: nothing differs. */
+	/* As the renderer spells them; bytes after the text are 0. Settings that differ from the default:
+	 * "tolerance=1e-05". Effects whose choice was overridden: "all", "-dispersion,+aperture". Empty: nothing
+	 * differs. */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
-/* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
+/* Checks the request (sizes, crop, counts) and chooses what it leaves open. -EINVAL with a sentence. */
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 /*
  * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds,
@@ -100,7 +99,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
  * (rounded to a power of two, so that the pilot's noise seldom shows). Where a bandwidth is set an epoch is at least so
  * long that the tiles of a lease do not exceed it, but no longer than the job.
  */
-/* A pilot would tell something: a lease might take longer than that. */
+/* Whether a pilot would help: without one a lease might take longer than that. */
 bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
 /*
  * What a time leaves room for, by counted rays of which a thread traces two million a second. Nobody having asked for
@@ -114,39 +113,39 @@ bool plan_wants_rays(const struct plan_request *r);
 uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds);
 /* Every plan from the wire passes here before it is believed. */
 int plan_check(const struct plan *p, struct error *e);
-/* By which rule plan_make chose the length of an epoch; empty: it was asked for. */
+/* The rule by which plan_make chose the length of an epoch; empty: it was requested. */
 void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size);
-enum { PLAN_TEXT = 1536 }; /* bytes that any of these texts needs at most */
+enum { PLAN_TEXT = 1536 }; /* enough for any of these texts */
 
-/* Half open ranges. */
+/* Half-open ranges. */
 struct plan_range {
 	uint64_t begin, end;
 };
 struct plan_range plan_bootstrap_range(const struct plan *p, uint32_t group, uint32_t part);
-/* k-th chain of part `part`: group + groups * k for k in the range. */
+/* The k-th chain of part `part`: group + groups * k for k in the range. */
 struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
-/* Rows of the crop extended by the border, counted from the top of the extended crop: a part's strip. */
+/* A part's strip: rows of the crop extended by the border, counted from the top of the extended crop. */
 struct plan_range plan_row_range(const struct plan *p, uint32_t part);
 uint32_t plan_parts_usual(const struct plan *p);     /* by the rule, for its chains and groups or its film */
 uint64_t plan_round_mutations(const struct plan *p); /* samples or mutations in one round, all groups */
 uint64_t plan_lease_mutations(const struct plan *p); /* samples or mutations in the longest lease of a round */
 uint64_t plan_extended_pixels(const struct plan *p); /* (crop + 2 border) in each direction */
 
-/* Entries of a mixture's text; 0: it is empty, -1: it is none (an empty entry, too many, a character that none has, or
- * no end within PLAN_MUTATIONS_MAX bytes). */
+/* Number of entries of a mixture's text; 0: it is empty, -1: it is invalid (an empty entry, too many, a character
+ * that no entry has, or no end within PLAN_MUTATIONS_MAX bytes). */
 int plan_strategy_count(const char *mixture);
 /* The i-th entry without its weight ("hslt", "hslt@b2c0"), cut to the size. */
 void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size);
 
-/* A text of a plan: ends within `size` bytes, nothing behind its end, and nothing in it that a shell would take for its
- * own. */
+/* Checks a text of a plan: it ends within `size` bytes, nothing follows its end, and it has no character that is
+ * special to a shell. */
 bool plan_text_ok(const char *text, size_t size);
 
 /* Systematic resampling of a group's seeds over its bootstrap weights, in index order (docs/design.md, rules 2).
  * weight[i] >= 0 and finite, i in the group's range; writes `count` bootstrap indices. false: all weights are 0. */
 bool plan_resample(const struct plan *p, uint32_t group, const float *weight, uint64_t weight_count, double u,
 		   uint32_t count, uint64_t *index);
-/* The u above: a pure function of seed and group. */
+/* The u above: a function of seed and group. */
 double plan_resample_u(const struct plan *p, uint32_t group);
 
 #endif

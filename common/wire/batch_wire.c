@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Packing measures first, then writes message and payload into one frame; unpacking cuts the payload by the sizes that
- * the message says, each checked against what is left, and decodes tiles and states into a batch that owns its memory.
+ * Packing measures first, then writes message and payload into one frame. Unpacking splits the payload by the sizes in
+ * the message, each checked against what is left, and decodes tiles and states into a batch that owns its memory.
  *
- * Failures: -EBADMSG for sizes that contradict each other or the plan and for states of another digest, -ENOMEM; the
- * batch is empty then.
+ * Failures: -EBADMSG for sizes that contradict each other or the plan and for states with another digest, -ENOMEM. The
+ * batch is then empty.
  */
 #include "common/wire/batch_wire.h"
 
@@ -126,7 +126,7 @@ static int packing_init(struct packing *k, const struct batch *b, const struct p
 	return 0;
 }
 
-/* IEEE floats little endian, whatever the machine. */
+/* IEEE floats, little endian on any machine. */
 static void write_floats(unsigned char *out, const float *v, uint64_t count)
 {
 	for (uint64_t i = 0; i < count; i++, out += 4) {
@@ -207,13 +207,13 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 
 /* ---- unpacking ---- */
 
-/* Cuts `size` bytes off the front of a payload. */
+/* Cuts `size` bytes off the front of the payload. */
 struct cutter {
 	const unsigned char *at;
 	size_t left;
 };
 
-/* No bytes at all are a place, too: that of states without bytes. */
+/* An empty range needs a valid pointer, too: that of states without bytes. */
 static struct cutter cutter_of(const unsigned char *payload, size_t size)
 {
 	static const unsigned char nothing[1];
@@ -297,7 +297,7 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		rc = error_set(e, EBADMSG, "a batch with %zu counters of strategies", m->n_strategies);
 	if (!rc && m->n_classes != PATH_CLASSES)
 		rc = error_set(e, EBADMSG, "a batch with %zu path classes", m->n_classes);
-	/* As many as the plan allows, before memory is asked for. */
+	/* Checks the count against the plan before memory is allocated. */
 	if (!rc && m->n_state_sizes > chains_per_lease(p))
 		rc = error_set(e, EBADMSG, "a batch with %zu chain states", m->n_state_sizes);
 	if (!rc) {

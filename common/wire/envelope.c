@@ -13,9 +13,10 @@
 
 enum {
 	BLOCK_BYTES = 1 << 14,
-	AMPLIFICATION = 16, /* memory per byte of a message; honest ones need at most 8 (packed varints of one byte) */
+	AMPLIFICATION =
+		16, /* memory allowed per byte of a message; valid ones need at most 8 (packed varints of one byte) */
 	LEAST_BYTES = 1 << 16,
-	CHECK_BYTES = 4, /* a fixed32, at the end of hello and its answer: its field has the highest number there */
+	CHECK_BYTES = 4, /* a fixed32 at the end of hello and its answer: its field number is the highest */
 };
 
 struct envelope_block {
@@ -75,13 +76,13 @@ static bool field_is_known(const ProtobufCMessage *m, const ProtobufCFieldDescri
 	return !one || is_known(one);
 }
 
-/* Whoever speaks another version says so in hello, with fields that are new there, and must be told. */
+/* A peer of another version says so in hello, which may have fields that are new there; it must be answered. */
 static bool may_be_newer(const ProtobufCMessage *m)
 {
 	return m->descriptor == &farm__hello__descriptor || m->descriptor == &farm__hello_ack__descriptor;
 }
 
-/* The schema is not recursive, so this is at most as deep as the schema. */
+/* The schema is not recursive, so the depth is bounded by the schema. */
 static bool is_known(const ProtobufCMessage *m)
 {
 	if (m->n_unknown_fields && !may_be_newer(m))
@@ -94,7 +95,7 @@ static bool is_known(const ProtobufCMessage *m)
 	return true;
 }
 
-/* The frame that they travel in has no checksum that other versions could read. */
+/* Their frame has no checksum, which other versions could not read. */
 static bool has_check(const Farm__Envelope *m)
 {
 	return (m->body_case == FARM__ENVELOPE__BODY_HELLO && m->hello->version == FARM_VERSION) ||
@@ -180,7 +181,7 @@ int envelope_pack(const Farm__Envelope *message, const void *payload, size_t pay
 	Farm__HelloAck ack;
 	if (has_check(message) && message->body_case == FARM__ENVELOPE__BODY_HELLO) {
 		hello = *message->hello;
-		hello.check = 1; /* room for it: what is 0 is not packed */
+		hello.check = 1; /* room for it: a value of 0 is not packed */
 		copy.hello = &hello;
 	} else if (has_check(message)) {
 		ack = *message->hello_ack;

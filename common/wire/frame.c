@@ -66,7 +66,7 @@ bool frame_reader_is_midway(const struct frame_reader *r)
 	return r->prefix_size && !is_whole(r);
 }
 
-/* Big buffers are given back: a connection at rest holds little. */
+/* Large buffers are freed, so that an idle connection holds little memory. */
 void frame_reader_drop(struct frame_reader *r)
 {
 	enum { KEEP = 1 << 16 };

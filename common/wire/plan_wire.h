@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Plans, plan requests and lease keys between memory and messages. What comes from a message is checked by plan_check
- * or plan_make before it is believed; here only what does not fit into the structures is refused. Any thread.
+ * Converts plans, plan requests and lease keys to messages and back. Only what does not fit into the structures is
+ * refused here; callers check the rest with plan_check or plan_make. Any thread.
  */
 #ifndef COMMON_WIRE_PLAN_WIRE_H
 #define COMMON_WIRE_PLAN_WIRE_H
