@@ -5,8 +5,8 @@
 
 #include <assert.h>
 
-/* In one step each lease is revoked at most once and replaced at most once, a worker that is full of overdue leases
- * loses some more, each worker is hung up once, and a job says a handful of things. */
+/* Bounds per step: each lease is revoked at most once and replaced at most once, a worker whose table is full of
+ * overdue leases loses some more, each worker is disconnected once, and a job causes a handful of actions. */
 int update_reserve(struct farm *f, size_t more_leases)
 {
 	size_t leases = f->lease_limit + more_leases;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* How actions come into the update (update.h). Room for them is made when workers join and jobs come, so that saying
- * something cannot fail. */
+/* Adds actions to the update (update.h). Room for them is reserved when workers join and jobs are submitted, so
+ * adding one cannot fail. */
 #ifndef COORDINATOR_CORE_ACTIONS_H
 #define COORDINATOR_CORE_ACTIONS_H
 

@@ -48,7 +48,7 @@ static bool is_next(const struct job *j, const struct slot *s, const struct leas
 	return s && k->kind == j->kind && k->epoch == s->next;
 }
 
-/* The prefix that is being evaluated must stay what it is. */
+/* The prefix that is being evaluated must not change. */
 static bool would_complete(const struct job *j, const struct slot *s)
 {
 	return s->next == j->rounds && j->done + 1 == j->slot_count;
@@ -148,11 +148,11 @@ static void count(struct peer *p, struct job *j, enum verdict v)
 	}
 }
 
-/* Two workers must say the same before it counts. */
+/* The result counts only if two workers agree. */
 static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev,
 			   const char **why)
 {
-	/* A late answer of a class that the job has left is not to be held against those of another. */
+	/* A late answer from a class that the job no longer belongs to must not be compared with those of another. */
 	if (!j->class && !verify_may_begin(f, j, p->class)) {
 		*why = "the job belongs to nobody, and not to a lone worker";
 		return REFUSE;
@@ -177,8 +177,8 @@ static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct
 	return FAULT;
 }
 
-/* The job's workers cannot compute it, or one of them is wrong each time in the same way: no third opinion will help.
- */
+/* Either the job's workers cannot compute this lease reproducibly, or one of them is wrong in the same way each
+ * time: another opinion will not help. */
 static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s, const struct lease_key *k)
 {
 	char names[160], text[256];
@@ -228,7 +228,7 @@ void answer_stored(struct farm *f, const struct event *ev)
 	struct action *a = update_add(f, ACTION_MERGE);
 	a->key = *k;
 	a->job = j->id;
-	a->verified = true; /* whatever it had to be, it was when it came */
+	a->verified = true; /* it met all requirements when it arrived */
 	lease_revoke_slot(f, s);
 	if (proof_chosen(j, k))
 		quarantine_settle(f, j, s, &ev->lease.digest);
@@ -252,14 +252,14 @@ bool answer_all_failed(const struct farm *f, const struct job *j)
 	return here > 0;
 }
 
-/* Nothing of the job was ever made, and nobody is left who might: there is nothing to lose or to wait for. Who
- * cannot for want of something on its own machine is not here, as far as that goes. */
+/* Nothing of the job was ever computed, and no worker is left that might: there is nothing to lose or wait for.
+ * Workers whose own machine is at fault do not count. */
 static bool never_works(const struct farm *f, const struct job *j)
 {
 	return j->tries >= TRIES_FATAL && answer_all_failed(f, j);
 }
 
-/* The slot whose next lease it is; NULL: not of a worker and a job that are here. */
+/* The slot whose next lease this is; NULL: unknown worker or job, or not the next lease. */
 static struct slot *next_slot(const struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->lease.key.job);
@@ -275,14 +275,14 @@ static struct lease *held(const struct farm *f, const struct event *ev)
 	return s ? lease_of(s, farm_find_peer(f, ev->peer)) : NULL;
 }
 
-/* Of an earlier grant of this lease. Its worker has, or will have, the one of the states that are there now. */
+/* The refusal concerns an earlier grant of this lease. Its worker has, or will get, the grant with the current
+ * states. */
 static bool is_late_refusal(const struct slot *s, const struct event *ev)
 {
 	return ev->lease.bad_states && (ev->lease.other_states || s->doubt.anew);
 }
 
-/* Granted before the job's files were right again: what failed is likely to be what its worker was given of them, and
- * when that arrives it may be mended already. */
+/* The lease was granted before the job's files were repaired: the failure is probably due to the damaged files. */
 static bool is_files_fault(const struct lease *l, const struct event *ev)
 {
 	return l && !ev->lease.own && !ev->lease.bad_states && l->sent < l->job->files_changed;
@@ -295,7 +295,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 		return;
 	struct peer *p = farm_find_peer(f, ev->peer);
 	struct lease *l = s ? lease_of(s, p) : NULL;
-	/* It may tell of a lease that an earlier run of it had, and that ended that run. */
+	/* It may report a lease of an earlier process, which that lease ended. */
 	bool was_lost = s && lost_take(&s->lost, p->who);
 	if (!l && !was_lost)
 		return;
@@ -311,7 +311,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 		doubt_refused(f, j, s, p, ev->lease.can_take_back, ev->text ? ev->text : "");
 		return;
 	}
-	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once: one reason */
+	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once count as one */
 	peer_failed(f, p, j->id, ev->lease.own);
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
 	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What workers send back. */
+/* Handles what workers send back. */
 #ifndef COORDINATOR_CORE_ANSWER_H
 #define COORDINATOR_CORE_ANSWER_H
 
@@ -14,7 +14,8 @@ void answer_stored(struct farm *f, const struct event *ev);
 void answer_failed(struct farm *f, const struct event *ev);
 void answer_delivered(struct farm *f, const struct event *ev);
 void answer_returned(struct farm *f, const struct event *ev);
-bool answer_all_failed(const struct farm *f, const struct job *j); /* each worker here, since it last gave something */
+bool answer_all_failed(const struct farm *f,
+		       const struct job *j); /* every worker present, since it last returned a result */
 
 enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A worker comes and goes. */
+/* Workers join and leave. */
 #include "coordinator/core/connection.h"
 
 #include "common/base/mem.h"
@@ -41,7 +41,7 @@ struct peer *connection_join(struct farm *f, const struct event_join *e, const c
 		*refused = e->threads ? "the fingerprint is too long" : "a worker without threads";
 		return NULL;
 	}
-	/* Room for a lease and a half per thread and some that are overdue. */
+	/* Room for 1.5 leases per thread, and some overdue ones. */
 	uint32_t limit = f->config.max_peer_leases;
 	if (e->threads < limit / 2)
 		limit = 2 * e->threads < 4 ? (limit < 4 ? limit : 4) : 2 * e->threads;

@@ -31,7 +31,7 @@ const char *doubt_maker(const struct farm *f, const struct lease_key *k)
 		j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
 	const struct slot *s = known_slot ? job_slot(j, k->group, k->part) : NULL;
 	return s && s->next == k->epoch && k->epoch > 0 ? name_of(f, s->doubt.maker)
-							: "?"; /* who made others is not remembered */
+							: "?"; /* the makers of other states are not known */
 }
 
 static bool is_party(const struct slot *s, uint64_t who)
@@ -40,7 +40,7 @@ static bool is_party(const struct slot *s, uint64_t who)
 	return who == d->barred || (doubt_waits(s) && (who == d->maker || who == d->refuser));
 }
 
-/* A worker that might be asked and is none of them. */
+/* A worker that could be asked and is neither of them. */
 static bool third_is_here(const struct farm *f, const struct job *j, const struct slot *s)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++) {
@@ -56,8 +56,8 @@ bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s,
 	return is_party(s, p->who->id) && third_is_here(f, j, s);
 }
 
-/* The batch of the slot's last epoch is none: that epoch is next again. The rounds that it was in are open again, and
- * nobody works on what lies more than one round behind them. */
+/* Undoes the slot's last epoch, which becomes the next again. Its rounds are open again, and leases more than one
+ * round ahead of them are revoked. */
 static void open_again(struct farm *f, struct job *j, struct slot *s)
 {
 	assert(j->kind == LEASE_RENDER && s->next > 0);
@@ -70,7 +70,7 @@ static void open_again(struct farm *f, struct job *j, struct slot *s)
 	j->leases_merged--;
 	if (s->next < j->rounds) {
 		j->rounds = s->next;
-		j->evaluating = false; /* the answer is about more */
+		j->evaluating = false; /* the update has other actions, too */
 	}
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		if (j->slots[i].next - j->rounds > 1)
@@ -78,7 +78,7 @@ static void open_again(struct farm *f, struct job *j, struct slot *s)
 	job_place_all(j);
 }
 
-/* The states may be wrong without that epoch's sums being so: it is not asked. */
+/* The states may be wrong even if that epoch's sums are not, so it is not verified. */
 static void take_back(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	struct doubt *d = &s->doubt;
@@ -99,7 +99,7 @@ static void take_back(struct farm *f, struct job *j, struct slot *s, const char 
 static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	const struct lease_key k = slot_key(j, s);
-	lease_revoke_slot(f, s); /* who has the states still */
+	lease_revoke_slot(f, s); /* workers that still have the states */
 	s->doubt.anew = true;
 	j->anew++;
 	text_print(

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chain states that a worker could not go on from. Who refuses them is not to blame, nor is who made them until a
- * second worker says the same: the lease goes to another worker, neither to the one nor to the other while there is a
- * third.
- *  - The third goes on: the refusal was wrong, and is counted as a wrong result.
- *  - The third refuses, too: the states are wrong, which is counted against who made them. The epoch that they are the
- * end of is taken back, sums and all, and computed again from the states before it, not by who made them while there is
- * another: the job has the bits that it would have had.
- *  - There is no third: the same, and nobody is to blame.
- * Where the caller no longer has what came before, or an epoch was computed again AGAIN_MOST times and its states are
- * refused still, the chains begin anew from their seeds: an epoch that depends on the plan alone, and what came before
- * it stays in the films. A job does not fail by it. Memory of a slot; but for who made its states nothing survives a
+ * Chain states that a worker refuses to continue from. Neither the worker nor the maker of the states is blamed until a
+ * second worker has judged them: the lease goes to a third worker if there is one.
+ * - If the third continues, the refusal was wrong and counts as a wrong result.
+ * - If it refuses, too, the states are wrong, which counts against their maker. The epoch that ends with them is taken
+ *   back, including its sums, and computed again from the states before it, by another worker if possible: the job gets
+ *   the bits it would have had.
+ * - Without a third worker the same happens, and nobody is blamed.
+ *
+ * If the caller no longer has the earlier states, or an epoch was computed again AGAIN_MOST times and its states are
+ * still refused, the chains start again from their seeds: that epoch depends on the plan alone, and earlier epochs stay
+ * in the films. The job does not fail. All memory is in the slot; except for the maker of its states nothing survives a
  * restart of the coordinator, which asks again.
  */
 #ifndef COORDINATOR_CORE_DOUBT_H
@@ -29,15 +29,16 @@ struct slot;
 
 enum { AGAIN_MOST = 4 };
 
-/* The lease of this worker is dropped already. can: the caller has what it takes to compute the epoch before again. */
+/* The worker's lease has been dropped already. can: the caller has what is needed to compute the previous epoch
+ * again. */
 void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text);
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
-/* A result of the slot's next epoch is merged: its sender went on from the states. Before job_merge. */
+/* Call when a result of the slot's next epoch is merged, before job_merge: its sender accepted the states. */
 void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who,
 		  const struct lease_key *k);
-/* Who made the chain states that go with this lease; "?": it is not the next one of its group and part. */
+/* Who made the chain states that this lease begins with; "?": it is not the next lease of its group and part. */
 const char *doubt_maker(const struct farm *f, const struct lease_key *k);
-/* Why the job waits for another worker; false: it does not. */
+/* Why the job waits for another worker; false: it does not wait. */
 bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Workers that failed with the same thing. Three of them say that it is the thing's fault, each counted once however
- * often it failed and called again; of as many certificates, up to three, as the farm knows workers of, for whoever has
- * one can give himself any number of names. Pure but for the list.
+ * The workers that failed at the same thing. If three did, the thing is at fault. Each worker counts once, however
+ * often it failed or reconnected, and they must have as many different certificates (up to three) as the farm knows,
+ * because one certificate can be used under any number of names. Pure.
  */
 #ifndef COORDINATOR_CORE_FAILURE_QUORUM_H
 #define COORDINATOR_CORE_FAILURE_QUORUM_H
@@ -15,10 +15,10 @@
 struct farm;
 struct identity;
 
-/* So many certificates must be among those who fail. */
+/* This many certificates must be among those that failed. */
 uint32_t failure_quorum_certificates(const struct farm *f);
 
-/* true: it is the thing's fault. */
+/* true: the thing is at fault. */
 bool failure_quorum_add(struct failure_quorum *l, const struct farm *f, const struct identity *who);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/find.h"
 
-/* The first of `count` whose id is not below `id`; ids ascend. */
+/* The index of the first of `count` whose id is not below `id`; ids ascend. */
 static uint32_t place_of(const struct farm *f, uint32_t count, uint64_t (*id_at)(const struct farm *f, uint32_t i),
 			 uint64_t id)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* How far a job is and how long it will take: the bound that looks nearest decides. */
+/* Progress and remaining time of a job, by whichever bound seems to come first. */
 #include "coordinator/core/forecast.h"
 
 #include <math.h>
@@ -26,15 +26,15 @@ static double work_of_rounds(const struct job *j, double rounds)
 	return bootstrap_total(j) + rounds * (double)plan_round_mutations(&j->plan);
 }
 
-/* Where the error alone is known, without what it is made of: it falls as 1/sqrt(rounds). */
+/* If only the error is known, without its history, it is assumed to fall as 1/sqrt(rounds). */
 static double rounds_by_rule(const struct job *j)
 {
 	double factor = j->rel_error / j->plan.target_error;
 	return (double)j->rel_error_rounds * factor * factor;
 }
 
-/* All samples and mutations that the job will need: by the plan, or by the error so far; more than the two open rounds
- * hold. */
+/* All samples and mutations that the job will need: by the plan, or by the error so far; more than the two open
+ * rounds hold. */
 static struct forecast_range work_total(const struct job *j)
 {
 	struct forecast_range total = {INFINITY, INFINITY, INFINITY};
@@ -83,7 +83,7 @@ struct forecast_range job_eta(const struct job *j, double now)
 
 void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds)
 {
-	/* What workers have merged ahead of the prefix is paid for, but not in the picture yet. */
+	/* Work merged ahead of the prefix has been paid for but is not in the image yet. */
 	double in_prefix = (double)j->rounds * j->slot_count / (double)(j->leases_merged ? j->leases_merged : 1);
 	struct forecast_look l = {.work = (double)j->rounds * (double)plan_round_mutations(&j->plan),
 				  .cpu_seconds = cpu_seconds * in_prefix,

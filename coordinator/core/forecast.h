@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* How far a job is and how long it will take. */
+/* Progress and remaining time of a job. */
 #ifndef COORDINATOR_CORE_FORECAST_H
 #define COORDINATOR_CORE_FORECAST_H
 
@@ -8,10 +8,10 @@
 double job_progress(const struct job *j, double now);
 /* s; middle NAN: unknown. */
 struct forecast_range job_eta(const struct job *j, double now);
-/* The error of the prefix is known. */
+/* Call when the error of the prefix is known. */
 void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds);
-void job_forecast(struct job *j); /* anew, from its looks */
-/* Seconds until the error is half of what it is, at the present rate. */
+void job_forecast(struct job *j); /* recomputes it from its history */
+/* Seconds until the error is halved, at the present rate. */
 struct forecast_range job_halving_seconds(const struct job *j, double now);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A worker, whatever its connection (worker_registry.h). */
+/* A worker, whatever its connections (worker_registry.h). */
 #ifndef COORDINATOR_CORE_IDENTITY_H
 #define COORDINATOR_CORE_IDENTITY_H
 
@@ -13,23 +13,23 @@ enum {
 	IDENTITY_HOME = JOIN_HOME
 };
 
-enum { PEER_WINDOW = 8 /* leases that a worker may hold before it has given anything */ };
+enum { PEER_WINDOW = 8 /* leases that a new worker may hold */ };
 
-/* After a failed lease the worker stays away from that job for a while. */
+/* After a failed lease the worker pauses with that job for a while. */
 struct avoid {
 	uint64_t job; /* 0: free */
 	uint32_t failures;
 	double until;
-	bool own; /* each of its failures since the last pause was its own machine's */
+	bool own; /* each failure since the last pause was its own machine's fault */
 };
 
 struct identity {
 	uint64_t id;		 /* never used twice */
-	uint64_t certificate_id; /* the same for all of one certificate */
+	uint64_t certificate_id; /* equal for all with the same certificate */
 	char certificate[IDENTITY_CERTIFICATE], name[IDENTITY_NAME], home[IDENTITY_HOME];
-	uint64_t restarts; /* of the home, as last reported */
-	uint64_t calls;	   /* connections so far, and how often it came back after a silence */
-	uint32_t uses;	   /* connections, and answers that wait for a second one */
+	uint64_t restarts; /* restarts of the home, as last reported */
+	uint64_t calls;	   /* connections so far, and how often it came back after silence */
+	uint32_t uses;	   /* references: connections, and answers that wait for a second one */
 	uint32_t faults_in_row, wrong;
 	uint32_t window; /* leases that it may hold: see peer_succeeded */
 	bool quarantined;

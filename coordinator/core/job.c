@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job of the core: its slots, in which list each is, and how far the rounds are.
+ * A job of the core: its slots, the lists they are in, and the progress of rounds.
  *
- * A slot lies in one list by its next epoch (the first incomplete round, the one after it, or blocked behind both) and
- * by its holders: ready, out with one, or waiting for a second answer; with two holders it lies in none. job_place puts
- * it there after each change. When all slots have merged a round, the lists of the next one take its place at once;
- * only after an epoch was taken back each slot is placed anew.
+ * A slot is in one list, depending on its next epoch (the first incomplete round, the one after it, or blocked behind
+ * both) and its holders: ready, out with one, or waiting for a second answer; with two holders it is in none. job_place
+ * moves it after each change. When all slots have merged a round, the lists of the next round take over at once; only
+ * after an epoch was taken back is each slot placed individually.
  *
- * Memory is taken when a job is made, which may be refused with a sentence. Nothing after that can fail.
+ * Memory is allocated when a job is made, which may be refused with a sentence. Nothing after that can fail.
  */
 #include "coordinator/core/job.h"
 
@@ -189,7 +189,7 @@ static void add_duration(struct job *j, double duration)
 	j->median = sorted[n / 2];
 }
 
-/* Counts and lists, from how far each slot is. */
+/* Recomputes counts and lists from the progress of each slot. */
 void job_place_all(struct job *j)
 {
 	j->done = j->ahead = 0;

@@ -27,7 +27,7 @@ struct lease *lease_of(const struct slot *s, const struct peer *p)
 	return NULL;
 }
 
-/* A free place in the worker's table; the lease that has been overdue longest makes room. */
+/* A free place in the worker's table, if necessary by dropping the lease that has been overdue longest. */
 static struct lease *lease_take(struct farm *f, struct peer *p)
 {
 	struct lease *oldest = NULL;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One worker's hold on one open lease. Lives in its worker's table; linked to its slot. */
+/* One worker's hold on one open lease. Stored in its worker's table and linked to its slot. */
 #ifndef COORDINATOR_CORE_LEASE_H
 #define COORDINATOR_CORE_LEASE_H
 
@@ -16,14 +16,14 @@ struct slot;
 struct lease_key lease_key(const struct lease *l);
 struct lease *lease_of(const struct slot *s, const struct peer *p); /* NULL: holds none */
 
-/* Hands the slot's open lease to a worker that has a wish, and says so. */
+/* Gives the slot's open lease to a worker that wants one. */
 void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s);
-/* Takes it out of all lists; the slot goes back to where it belongs. */
+/* Removes it from all lists; the slot moves to the right list. */
 void lease_drop(struct farm *f, struct lease *l);
 void lease_revoke(struct farm *f, struct lease *l); /* the same, and tells the worker */
-/* The worker has done its part. */
+/* The worker has delivered its result. */
 void lease_deliver(struct farm *f, struct lease *l);
-/* Its time is over: the slot is free for others, an answer still counts. */
+/* It timed out: the slot is free for others, but an answer still counts. */
 void lease_expire(struct farm *f, struct lease *l);
 void lease_revoke_slot(struct farm *f, struct slot *s); /* all holders */
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Doubly linked lists inside the things they link. A head is a link that points to itself; a lone link too. */
+/* Intrusive doubly linked lists. A head is a link that points to itself when empty; so does a link in no list. */
 #ifndef COORDINATOR_CORE_LIST_H
 #define COORDINATOR_CORE_LIST_H
 

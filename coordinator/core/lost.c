@@ -30,7 +30,7 @@ static uint32_t gone(const struct lost *l, uint32_t *certificates)
 	return n;
 }
 
-/* Where it stands, a free place, one that came back, or one of several with its certificate. */
+/* Its own entry, a free one, one that came back, or one of several with its certificate. */
 static void add(struct lost *l, const struct identity *who)
 {
 	uint32_t place = l->count;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Workers that went while they held the same lease, in a row. A worker that renders in a process of its own says
- * itself, when it calls again, which lease ended that process, and that counts as a failure (failure_quorum.h); the
- * list knows that it had the lease. Who calls again, or was silent and is heard, has not been lost by the lease
- * whatever else it says: machines are switched off, workers are killed, racks lose their power. Those that are never
- * heard of again count against the lease only when there are LOST_FATAL of them with nothing merged in between: where
- * each holder of a lease vanishes with a chance of 1/4 that happens once in 65,536 leases, and a whole farm that is
- * switched off counts once for each. Of as many certificates as failers want. Pure but for the list.
+ * Workers that disappeared one after the other while they held the same lease. A worker's supervisor reports, when it
+ * reconnects, which lease ended its render process, and that counts as a failure (failure_quorum.h); this list proves
+ * that it held the lease. A worker that reconnects or is heard again was not lost by the lease: machines are switched
+ * off, workers are killed, racks lose power. Workers that never return count against the lease only if LOST_FATAL of
+ * them did so with nothing merged in between. If each holder of a lease disappears with probability 1/4, that happens
+ * once in 65,536 leases; a farm that is switched off counts once per worker. As many certificates are required as in
+ * failure_quorum.h. Pure.
  */
 #ifndef COORDINATOR_CORE_LOST_H
 #define COORDINATOR_CORE_LOST_H
@@ -21,9 +21,10 @@ struct identity;
 struct lease;
 struct peer;
 
-/* The worker of this lease has gone, or is silent: the lease is dropped, and the job ends where it was one too many. */
+/* Adds the worker of this lease, which has disappeared or is silent: the lease is dropped, and the job ends if it
+ * was one too many. */
 void lost_lease(struct farm *f, struct lease *l);
-/* It was among them, and is no longer. */
+/* Removes a worker; true if it was in the list. */
 bool lost_take(struct lost *l, const struct identity *who);
 
 #endif

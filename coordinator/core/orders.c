@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What people want of jobs that are there: that they wait, go on, come earlier or later, last longer. */
+/* What users do to existing jobs: hold, release, prioritise, extend. */
 #include "coordinator/core/orders.h"
 
 #include "common/base/text.h"
@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 
-/* The live job that somebody means; NULL: the answer is given. */
+/* The live job that the event names; NULL: the event has been answered. */
 static struct job *meant(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->job);
@@ -32,8 +32,8 @@ static void hold(struct job *j, enum job_hold which, const char *why, double now
 		j->held_since = now;
 	if (!was || job_is_held(j))
 		return;
-	j->progress_floor = job_progress(j, now); /* moving its clock rounds */
-	double pause = now - j->held_since;	  /* its times are as if that had not been; NAN stays */
+	j->progress_floor = job_progress(j, now); /* a clock that moves completes rounds */
+	double pause = now - j->held_since;	  /* shifts its times by the time it was held; NAN stays NAN */
 	j->started += pause;
 	j->opened += pause;
 	j->looked_at += pause;
@@ -76,7 +76,7 @@ void orders_extend(struct farm *f, const struct event *ev)
 		job_forecast(j);
 	if (j->kind == LEASE_RENDER)
 		job_raise_limit(j);
-	/* While its error was estimated once more for a bound that is none any longer, it goes on. */
+	/* The error was being estimated for a bound that no longer applies: continue. */
 	if (j->ending != END_NONE)
 		j->ending = rounds_bound(j, job_elapsed(j, f->now));
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What people want of jobs that are there. */
+/* What users do to existing jobs: hold, release, prioritise, extend. */
 #ifndef COORDINATOR_CORE_ORDERS_H
 #define COORDINATOR_CORE_ORDERS_H
 

@@ -56,7 +56,7 @@ static struct avoid *avoid_of(const struct peer *p, uint64_t job)
 	return NULL;
 }
 
-/* Where there is room, where a job is over, or instead of the one that ends first. */
+/* A free entry, one of a job that is over, or the one that ends first. */
 static struct avoid *room_to_avoid(const struct farm *f, struct identity *who)
 {
 	struct avoid *first = &who->avoid[0];
@@ -89,11 +89,10 @@ void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
 }
 
-/* What it may hold grows with what it gives: who takes what he can get and gives nothing holds up little. */
+/* What a worker may hold grows with what it returns: one that takes everything and returns nothing blocks little. */
 static void set_window(struct farm *f, struct peer *p, uint32_t window)
 {
-	struct peer **all =
-		p->who->uses > 1 ? f->peers : &p; /* an old connection of the same worker may still be here */
+	struct peer **all = p->who->uses > 1 ? f->peers : &p; /* an old connection of the same worker may still exist */
 	uint32_t count = p->who->uses > 1 ? f->peer_count : 1;
 	p->who->window = window;
 	for (uint32_t i = 0; i < count; i++)

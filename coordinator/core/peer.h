@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a worker that is here may have: its place in the queue, its window, the jobs that it stays away from. */
+/* What a connected worker may get: its place in the queue, its limit of leases, the jobs that it pauses with. */
 #ifndef COORDINATOR_CORE_PEER_H
 #define COORDINATOR_CORE_PEER_H
 
@@ -7,14 +7,14 @@
 
 void peer_set_state(struct farm *f, struct peer *p, enum peer_state s);
 void peer_heard(struct farm *f, struct peer *p);
-/* Queues it or takes it out of the queue after its wish, leases or state changed; at the end of the queue if queued. */
+/* Adds it to the end of the queue or removes it, after its wish, leases or state changed. */
 void peer_requeue(struct farm *f, struct peer *p);
 bool peer_has_wish(const struct peer *p);
 
 void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own);
 void peer_succeeded(struct farm *f, struct peer *p, uint64_t job);
 void peer_was_late(struct farm *f, struct peer *p);	      /* with a lease that others get now, or have answered */
-double peer_avoids_until(const struct peer *p, uint64_t job); /* -INFINITY: does not */
-bool peer_lacks(const struct peer *p, uint64_t job);	      /* its last failure with the job was its own machine's */
+double peer_avoids_until(const struct peer *p, uint64_t job); /* -INFINITY: it does not */
+bool peer_lacks(const struct peer *p, uint64_t job); /* its last failure with the job was its own machine's fault */
 
 #endif

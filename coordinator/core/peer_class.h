@@ -11,13 +11,13 @@ enum { FINGERPRINT_SIZE = 128 };
 
 struct peer_class {
 	struct link link;    /* of all classes */
-	struct link waiting; /* peers that have a wish */
-	uint32_t uses;	     /* workers and live jobs */
+	struct link waiting; /* workers that want a lease */
+	uint32_t uses;	     /* references: workers and live jobs */
 	uint32_t active;     /* workers that may get leases */
 	char fingerprint[FINGERPRINT_SIZE];
 };
 
-struct peer_class *peer_class_use(struct link *classes, const char *fingerprint); /* NULL: no memory */
+struct peer_class *peer_class_use(struct link *classes, const char *fingerprint); /* NULL: out of memory */
 void peer_class_drop(struct peer_class *c);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a worker did wrong, and what follows from it for its connections and its answers. */
+/* Faults of workers, and their consequences for connections and answers. */
 #ifndef COORDINATOR_CORE_QUARANTINE_H
 #define COORDINATOR_CORE_QUARANTINE_H
 
@@ -11,13 +11,14 @@ struct job;
 struct peer;
 struct slot;
 
-/* Counted as a wrong result; what it was in a few words. */
+/* Counts a wrong result; the text describes it in a few words. */
 void quarantine_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k);
-/* For good: no leases, nothing that it sends counts. */
+/* Permanently: no leases, and nothing that it sends counts. */
 void quarantine_worker(struct farm *f, struct identity *who);
 
-void quarantine_fault(struct farm *f, struct peer *p, const char *text); /* it sent what no worker may send */
-/* The answer with this digest is the right one: whoever gave another is reported, and nothing is noted any more. */
+void quarantine_fault(struct farm *f, struct peer *p,
+		      const char *text); /* it sent something that no correct worker sends */
+/* The answer with this digest is right: workers that gave another one are reported, and the notes are cleared. */
 void quarantine_settle(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *right);
 
 #endif

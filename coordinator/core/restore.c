@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Jobs of an earlier run, and ended ones that go on: put where their merged leases say that they were. */
+/* Restores jobs of an earlier run, and ended ones that are extended, from which of their leases are merged. */
 #include "coordinator/core/restore.h"
 
 #include "common/base/mem.h"
@@ -12,7 +12,7 @@
 #include <assert.h>
 #include <math.h>
 
-/* As it was pinned by its first merged batch. Without memory for that the first worker that asks pins it again. */
+/* Pins the job as its first merged batch did. If memory is out, the first worker that asks pins it again. */
 static void pin(struct farm *f, struct job *j, const char *fingerprint)
 {
 	struct peer_class *c = *fingerprint ? peer_class_use(&f->classes, fingerprint) : NULL;
@@ -22,7 +22,7 @@ static void pin(struct farm *f, struct job *j, const char *fingerprint)
 	peer_class_drop(c);
 }
 
-/* A worker that nobody knows any more has made them as well as one that is here. */
+/* The maker may be a worker that is no longer known. */
 static void take_makers(struct farm *f, struct job *j, const struct event_join *makers)
 {
 	for (uint32_t i = 0; makers && i < j->slot_count; i++) {
@@ -56,7 +56,7 @@ static void take_looks(struct job *j, const struct forecast_history *looks)
 	job_forecast(j);
 }
 
-/* Jobs of an earlier run are never too many: nobody would be told that they are refused. */
+/* max_jobs does not apply to restored jobs: nobody could be told that they are refused. */
 static bool make_room(struct farm *f, bool asked)
 {
 	uint32_t room = asked ? f->config.max_jobs : f->live_limit;
@@ -108,8 +108,8 @@ void restore_job(struct farm *f, const struct event *ev)
 	if (j->kind != LEASE_RENDER)
 		return;
 	rounds_opened(f, j, r->black);
-	/* A bound that the last complete round met is met still; a look that is due is taken again, with the same
-	 * answer. */
+	/* A bound that the last complete round met still applies; an estimate that is due is made again, with the
+	 * same result. */
 	if (job_is_live(j) && j->rounds > 0)
 		rounds_settle(f, j, isnan(r->completed) ? r->elapsed : r->completed);
 }

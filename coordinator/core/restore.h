@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A job of an earlier run goes on. */
+/* Restores a job of an earlier run. */
 #ifndef COORDINATOR_CORE_RESTORE_H
 #define COORDINATOR_CORE_RESTORE_H
 

@@ -127,7 +127,7 @@ void rounds_started(struct farm *f, struct job *j)
 	}
 }
 
-/* `latest` has just ended: the update still points to what it says. */
+/* Keeps `latest`, which has just ended: the update still refers to it. */
 static void forget_oldest(struct farm *f, const struct job *latest)
 {
 	if (f->job_count - f->live_count <= f->config.max_ended)
@@ -268,7 +268,7 @@ void rounds_error_known(struct farm *f, const struct event *ev)
 	j->rel_error_rounds = j->rounds;
 	job_note_look(j, ev->error_known.rel_error, ev->error_known.rel_mse, ev->error_known.degrees,
 		      ev->error_known.doubtful, ev->error_known.cpu_seconds);
-	/* A look that was taken because another bound was met does not count when that bound was lifted meanwhile. */
+	/* An estimate made because another bound was met does not count if that bound was lifted meanwhile. */
 	bool counts = j->ending != END_NONE || merge_error_due(&j->plan, j->rounds);
 	if (counts && j->rel_error <= j->plan.target_error)
 		rounds_end(f, j, END_ERROR, "");

@@ -31,8 +31,8 @@ static void call_again(struct farm *f, double at)
 		f->schedule_at = at;
 }
 
-/* The worker that has waited longest and does not hold the slot; one that holds it overdue if `again` and no other
- * does. */
+/* The worker that has waited longest and does not hold the slot. If there is none and `again`, one that holds it
+ * overdue. */
 static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const struct job *j, const struct slot *s,
 			       bool again)
 {
@@ -69,7 +69,7 @@ static struct peer *waiting_for(struct farm *f, const struct job *j, const struc
 	return first;
 }
 
-/* What waits for a second worker goes first: its chain and its round stand still. */
+/* Leases that wait for a second worker go first: their chains and their round are blocked. */
 static struct peer *taker(struct farm *f, const struct job *j, struct slot **slot)
 {
 	for (int i = 0; i < 2; i++) {
@@ -95,7 +95,7 @@ static void hand_out(struct farm *f, struct peer *p, struct job *j, struct slot 
 	lease_send(f, p, j, s);
 }
 
-/* Of two jobs of the same priority, a the older one. */
+/* Whether a, the older of two jobs of the same priority, goes first. */
 static bool comes_first(const struct job *a, const struct job *b)
 {
 	if (a->owner != b->owner && a->owner->leases_out != b->owner->leases_out)
@@ -103,7 +103,8 @@ static bool comes_first(const struct job *a, const struct job *b)
 	return a->owner == b->owner ? a->leases_out <= b->leases_out : true;
 }
 
-/* Of an owner whose job ended workers: one lease at a time of all his jobs of which nothing has been made yet. */
+/* If a job of its owner ended workers, all jobs of the owner of which nothing was computed yet share one lease at a
+ * time. */
 static bool must_wait(struct farm *f, const struct job *j)
 {
 	bool waits = share_is_limited(f, j) && share_unproven(f, j->owner) > 0;
@@ -112,7 +113,7 @@ static bool must_wait(struct farm *f, const struct job *j)
 	return waits;
 }
 
-/* Among jobs of the highest priority that can use a waiting worker the one whose turn it is. */
+/* Of the jobs of the highest priority that can use a waiting worker, the one whose turn it is. */
 static bool hand_out_ready(struct farm *f)
 {
 	struct job *best = NULL;
@@ -137,7 +138,7 @@ static bool hand_out_ready(struct farm *f)
 	return best;
 }
 
-/* A second copy of what holds up a round. */
+/* Gives out a second copy of a lease that holds up a round. */
 static bool hand_out_copy(struct farm *f)
 {
 	for (uint32_t i = 0; i < f->live_count; i++) {
@@ -161,7 +162,7 @@ static bool hand_out_copy(struct farm *f)
 	return false;
 }
 
-/* NULL: fewer than two hold it, or an answer of one is here and will be looked at. */
+/* NULL: fewer than two workers hold it, or one has delivered an answer that is not judged yet. */
 static struct lease *older_copy(const struct slot *s)
 {
 	struct lease *older = NULL;
@@ -174,8 +175,8 @@ static struct lease *older_copy(const struct slot *s)
 	return s->holders > 1 ? older : NULL;
 }
 
-/* Nobody knows how long leases of this job take, two workers hold one for long, and another has nothing to do. true:
- * there are such. */
+/* If the job has no median yet, two workers hold a lease for long and another is idle, the older copy is given up.
+ * true: there are such leases. */
 static bool give_up_copies(struct farm *f, struct job *j)
 {
 	bool any = false;
@@ -194,7 +195,7 @@ static bool give_up_copies(struct farm *f, struct job *j)
 	return any;
 }
 
-/* A scan of all leases, a few times a minute. */
+/* Scans all leases, a few times a minute. */
 static void look_at_copies(struct farm *f)
 {
 	enum { PERIOD = 10 };
@@ -254,6 +255,6 @@ void schedule_expire(struct farm *f, double read)
 		f->check_at = fmin(f->check_at, p->last_seen + patience);
 		expire_leases(f, p, read);
 	}
-	/* All of this is a scan; once a second is enough for it. */
+	/* This is a scan of everything, at most once a second. */
 	f->check_at = fmax(f->check_at, f->now + 1);
 }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Who gets what, and what has been out for too long. */
+/* Which worker gets which lease, and timeouts. */
 #ifndef COORDINATOR_CORE_SCHEDULE_H
 #define COORDINATOR_CORE_SCHEDULE_H
 
 struct farm;
 
 void schedule(struct farm *f);
-void schedule_expire(struct farm *f, double read); /* silence and overdue leases, by what had come then */
+void schedule_expire(struct farm *f,
+		     double read); /* silent workers and overdue leases, by what had been received then */
 
 #endif

@@ -12,7 +12,7 @@ bool share_competes(const struct job *a, const struct job *b)
 	return !a->class || !b->class || a->mixed || b->mixed || a->class == b->class;
 }
 
-/* Machines that would be busy with all of its leases, when one takes so many. */
+/* Machines that would be busy with all of the job's leases, at the number that one takes. */
 static double wants(const struct job *j, double leases_each)
 {
 	if (job_is_held(j))
@@ -53,15 +53,15 @@ static uint32_t workers_of(const struct job *j)
 	return n;
 }
 
-/* One that takes part: the i-th live job where it competes at this priority and for this owner (NULL: anybody's). */
+/* Jobs that take part: the i-th live job, if it competes at this priority and for this owner (NULL: any). */
 static const struct job *rival(const struct farm *f, uint32_t i, const struct job *j, const struct owner *o)
 {
 	const struct job *r = f->live[i];
 	return r->priority == j->priority && share_competes(r, j) && (!o || r->owner == o) ? r : NULL;
 }
 
-/* The level up to which all are filled from what there is, given how much those below a level take and how many are
- * above. */
+/* The level to which everybody can be filled from the available machines, given how much those below the level take
+ * and how many are above. */
 struct level {
 	double there, taken, level;
 	uint32_t above;
@@ -75,7 +75,7 @@ static void pour(struct level *v, double want)
 		v->taken += want;
 }
 
-/* true: the level is found. It only rises. */
+/* Raises the level; true: it is found. */
 static bool is_level(struct level *v)
 {
 	if (v->above == 0)
@@ -112,8 +112,8 @@ static double due(const struct farm *f, const struct job *j, uint32_t machines, 
 	return fmin(wants(j, leases_each), v.above ? v.level : INFINITY);
 }
 
-/* "; j4, j7 and 2 more come first"; only: whose jobs may be named, NULL: anybody's. "; 2 jobs of other owners come
- * first" */
+/* "; j4, j7 and 2 more come first"; only: the owner whose jobs may be named, NULL: any. "; 2 jobs of other owners
+ * come first" */
 static void put_others(struct text *t, const struct farm *f, const struct job *j, const struct owner *only, bool higher,
 		       double leases_each)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A slot is one (group, part) of a job: the chain of leases of which exactly one is next; and the leases on it. */
+/* A slot is one (group, part) of a job: a chain of leases of which exactly one is next, and the holders of that
+ * lease. */
 #ifndef COORDINATOR_CORE_SLOT_H
 #define COORDINATOR_CORE_SLOT_H
 
@@ -11,14 +12,14 @@ struct job;
 struct peer;
 struct slot;
 
-/* One worker's hold on one open lease. Lives in its worker's table; linked to its slot. */
+/* One worker's hold on one open lease. Stored in its worker's table and linked to its slot. */
 struct lease {
 	bool used;
-	bool overdue;	/* counts no longer as held: handed out again */
-	bool delivered; /* its result waits to be looked at: counts no longer among what its worker has to do */
+	bool overdue;	/* timed out: no longer counts as held */
+	bool delivered; /* its result is received but not judged yet: no longer counts as work to do */
 	struct peer *peer;
 	struct job *job;
-	struct slot *slot; /* the key is that of the slot's next epoch: a merge ends all leases of the slot */
+	struct slot *slot; /* its key is that of the slot's next epoch: merging ends all leases of the slot */
 	double sent, deadline;
 	struct lease *next; /* of the same slot */
 };
@@ -35,13 +36,13 @@ struct failure_quorum {
 
 /* See doubt.h. */
 struct doubt {
-	uint64_t maker;	  /* the worker whose states the next epoch begins with; 0: not known */
-	uint64_t before;  /* the one whose states that worker began with; 0: not known */
-	uint64_t refuser; /* the first that could not read them; 0: nobody */
-	uint64_t barred;  /* whose epoch is computed again; 0: nobody's */
-	uint64_t reach;	  /* epochs were taken back from here */
-	uint32_t again;	  /* so many since then */
-	bool anew;	  /* its chains begin the next epoch from their seeds */
+	uint64_t maker;	  /* the worker that made the states of the next epoch; 0: not known */
+	uint64_t before;  /* the maker of the states that that worker started from; 0: not known */
+	uint64_t refuser; /* the first that refused them; 0: nobody */
+	uint64_t barred;  /* the maker whose epoch is computed again; 0: none */
+	uint64_t reach;	  /* number of epochs taken back here */
+	uint32_t again;	  /* epochs merged since */
+	bool anew;	  /* its chains start the next epoch from their seeds */
 };
 
 /* See lost.h. */
@@ -50,23 +51,23 @@ enum { LOST_FATAL = 8 };
 struct lost {
 	uint32_t count;
 	struct lost_worker {
-		const struct identity *who;	 /* as long as its id is this one */
-		uint64_t id, certificate, calls; /* calls: how often it had called then */
+		const struct identity *who;	 /* valid as long as its id is this one */
+		uint64_t id, certificate, calls; /* calls: its number of connections at that time */
 	} of[LOST_FATAL];
 };
 
 struct slot {
-	struct link link;		      /* one of the job's lists, or alone: two holders, or nothing left to do */
-	struct lease *leases;		      /* overdue ones too */
-	uint64_t next;			      /* the first epoch that is not merged */
-	double since;			      /* when the lease that is out was sent */
-	struct failure_quorum failure_quorum; /* with the next epoch */
+	struct link link;     /* in one of the job's lists, or in none: two holders, or nothing left to do */
+	struct lease *leases; /* including overdue ones */
+	uint64_t next;	      /* the first epoch that is not merged */
+	double since;	      /* when the current lease was sent */
+	struct failure_quorum failure_quorum; /* at the next epoch */
 	struct lost lost;		      /* while they held it */
-	struct doubt doubt;		      /* about the states with which it begins */
+	struct doubt doubt;		      /* about the states that it starts from */
 	uint32_t holders, timeouts;
 };
 
-/* Somebody else is asked about the states. */
+/* Another worker has been asked about the states. */
 static inline bool doubt_waits(const struct slot *s)
 {
 	return s->doubt.refuser && !s->doubt.anew;

@@ -52,7 +52,8 @@ int job_exit_code(const struct job_status *s)
 	return missed ? 4 : 0;
 }
 
-/* The job that keeps workers of this class busy: the first of higher priority, else the one with the most leases. */
+/* The job that keeps workers of this class busy: the first of higher priority, otherwise the one with the most
+ * leases. */
 static const struct job *busy_with(const struct farm *f, const struct job *j)
 {
 	const struct job *most = NULL;
@@ -84,7 +85,7 @@ static bool someone_avoids(const struct farm *f, const struct job *j)
 	return false;
 }
 
-/* Those whose own machines are at fault are named: somebody has to mend them. */
+/* Names the workers whose own machines are at fault, because somebody has to repair them. */
 static void put_failing(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	char names[100] = "";
@@ -101,7 +102,7 @@ static void put_failing(const struct farm *f, const struct job *j, char *text, s
 		text_print(text, size, "no worker can compute it: %s", j->text);
 }
 
-/* all: other owners' jobs are named. */
+/* all: other owners' jobs may be named. */
 static void put_busy(char *text, size_t size, const struct job *j, const struct job *other, bool all)
 {
 	bool higher = other->priority > j->priority;
@@ -126,8 +127,8 @@ static void why_held(const struct job *j, char *text, size_t size)
 		}
 }
 
-/* All leases that are out are late, and nobody has brought a result: who holds the oldest one. false: somebody works on
- * it. */
+/* If all leases that are out are late and none has been answered, says who holds the oldest one. false: somebody
+ * works on it. */
 static bool put_late(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	const struct lease *oldest = NULL;
@@ -150,7 +151,7 @@ static bool put_late(const struct farm *f, const struct job *j, char *text, size
 	return oldest != NULL;
 }
 
-/* The job that it waits for; NULL: it does not, or for something else. */
+/* The job that it waits for; NULL: it does not wait, or for something else. */
 static const struct job *why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;

@@ -48,7 +48,7 @@ void verify_forget_worker(struct farm *f, const struct identity *who)
 			forget_answers(f, f->live[i], who);
 }
 
-/* Another class has more than so many. */
+/* Whether another class has more than so many. */
 static bool more_elsewhere(const struct farm *f, const struct peer_class *than, uint32_t workers)
 {
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {
@@ -79,7 +79,7 @@ bool verify_may_begin(const struct farm *f, const struct job *j, const struct pe
 	return !j->proofs || c->active > 1 || !more_elsewhere(f, c, 1);
 }
 
-/* The first lease that no worker here may have. */
+/* The first lease that no connected worker may have. */
 static const struct slot *stranded(const struct farm *f, const struct job *j)
 {
 	for (int i = 0; i < 2; i++) {

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* By its home, else by its name. */
+/* By its home, otherwise by its name. */
 struct identity *worker_registry_find(const struct farm *f, const struct event_join *e)
 {
 	struct identity *named = NULL;
@@ -23,7 +23,8 @@ struct identity *worker_registry_find(const struct farm *f, const struct event_j
 	return named;
 }
 
-/* Whom to forget for one with this certificate: its own names first, whoever was quarantined last. */
+/* Whom to forget for a newcomer with this certificate: entries with the same certificate first, quarantined ones
+ * last. */
 static bool goes_before(const struct identity *a, const struct identity *b, const char *certificate)
 {
 	bool a_own = strcmp(a->certificate, certificate) == 0, b_own = strcmp(b->certificate, certificate) == 0;
@@ -46,7 +47,7 @@ static struct identity *room_for_one(struct farm *f, const char *certificate)
 	return oldest;
 }
 
-/* That of those who have the same, else a new one. */
+/* The certificate's number, if another entry has it, or a new one. */
 static uint64_t certificate_id(const struct farm *f, const char *certificate, uint64_t otherwise)
 {
 	for (uint32_t i = 0; i < f->known_count; i++)
@@ -68,7 +69,7 @@ struct identity *worker_registry_use(struct farm *f, const struct event_join *e,
 		k->certificate_id = certificate_id(f, e->certificate, k->id);
 		text_copy(k->certificate, sizeof k->certificate, e->certificate);
 	}
-	/* One that is quarantined stays known by what it was. */
+	/* A quarantined worker stays known by the names it had. */
 	if (!k->quarantined || strcmp(k->home, e->home) == 0)
 		k->restarts = e->restarts;
 	if (!k->quarantined) {
@@ -94,8 +95,8 @@ void worker_registry_free(struct farm *f)
 	mem_free(f->known);
 }
 
-/* Names cost nothing: of one certificate so many are remembered as quarantined, and the one that has been away longest
- * makes room. */
+/* Names cost nothing: at most this many quarantined entries are kept per certificate, and the one that has been away
+ * longest makes room. */
 void worker_registry_set_aside(struct farm *f, struct identity *who)
 {
 	struct identity *oldest = NULL;

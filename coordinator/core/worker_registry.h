@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Who workers are, for longer than their connections last: what a worker did wrong is not forgotten when it calls
- * again. A worker is known by the name in its certificate ("" without TLS) together with the name that it gives itself
- * or its home, the folder that counts its starts: who has one of the two in common with somebody is that somebody.
- * Bounded: those who have been away longest are forgotten first, of the newcomer's own certificate before others, and
- * those that are quarantined last; of these IDENTITY_QUARANTINED a certificate, so that one that makes up names pushes
- * out none but its own. Allocates when a worker joins.
+ * Identities of workers, which outlive their connections, so that a worker's faults are not forgotten when it
+ * reconnects. A worker is known by the name in its certificate ("" without TLS) together with its own name or its home,
+ * the folder that counts its starts: whoever shares one of the two is the same worker. Bounded: those away longest are
+ * forgotten first, of the newcomer's own certificate before others, and quarantined ones last; of these
+ * IDENTITY_QUARANTINED are kept per certificate, so that inventing names displaces only one's own. Allocates when a
+ * worker joins.
  */
 #ifndef COORDINATOR_CORE_WORKER_REGISTRY_H
 #define COORDINATOR_CORE_WORKER_REGISTRY_H
@@ -14,17 +14,16 @@
 #include "coordinator/core/identity.h"
 #include "coordinator/core/state.h"
 
-/* As last reported when there is one like that, else a new one; used by the caller. NULL with a sentence:
- * refused. */
+/* The existing entry, updated as reported, or a new one; referenced by the caller. NULL, with a sentence: refused. */
 struct identity *worker_registry_use(struct farm *f, const struct event_join *e, const char **refused);
 void worker_registry_drop(struct farm *f, struct identity *who);
 void worker_registry_free(struct farm *f);
 
-/* NULL: nobody by this home, or else this name. */
+/* NULL: no worker with this home or, failing that, this name. */
 struct identity *worker_registry_find(const struct farm *f, const struct event_join *e);
-/* Marks it; the rest is quarantine.h's. */
+/* Marks it; quarantine.h does the rest. */
 void worker_registry_set_aside(struct farm *f, struct identity *who);
-/* As it was in an earlier run of the coordinator. */
+/* Restores one from an earlier run of the coordinator. */
 void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text);
 
 #endif
