@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * hslt-coordinator: its options, and then the server until a signal stops it.
+ * hslt-coordinator: parses its options, then runs the server until a signal stops it.
  *
- * Exit codes: 0 after SIGTERM or SIGINT, 2 for options and settings that cannot be, 1 for anything else; the reason
- * goes to stderr.
+ * Exit codes: 0 after SIGTERM or SIGINT, 2 for invalid options and settings, 1 for anything else; the reason goes to
+ * stderr.
  */
 #include "common/base/log.h"
 #include "common/base/mem.h"

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * hslt-status: what the coordinator's status socket says, for people.
+ * hslt-status: prints what the coordinator's status socket says.
  *
- * It connects, reads the snapshot and prints jobs and workers, or one job with its leases; with --watch it subscribes
- * and prints again when something changes, until the job has ended; with --json it prints the objects as they are.
+ * It connects, reads the snapshot and prints jobs and workers, or one job with its leases. With --watch it subscribes
+ * and prints again whenever something changes, until the job has ended. With --json it prints the objects unchanged.
  *
- * Where nobody answers, or what answers is no coordinator, it says so and exits with 75; 1: there is no such job.
+ * If nobody answers, or not a coordinator, it says so and exits with 75; 1: there is no such job.
  */
 #include "common/base/progress.h"
 #include "common/base/terminal.h"
@@ -118,7 +118,7 @@ static const char *color_of(const char *state, bool colors)
 										  : "\033[33m";
 }
 
-/* Which bound ended it, where there were several. */
+/* Which of several bounds ended it. */
 static const char *bound_of(const json_t *job)
 {
 	const char *reason = text_of(job, "reason");
@@ -130,7 +130,7 @@ static const char *bound_of(const json_t *job)
 						  : "";
 }
 
-/* null and negative: it has no end */
+/* null or negative: open-ended */
 static double span(const json_t *range, const char *key)
 {
 	const json_t *x = json_object_get(range, key);
@@ -164,7 +164,7 @@ static void print_job(const json_t *job, bool colors)
 
 static void print_doubt(const json_t *job)
 {
-	if (*text_of(job, "errorDoubt") && !is_ended(job)) /* then it is in the note */
+	if (*text_of(job, "errorDoubt") && !is_ended(job)) /* then the note says it */
 		printf("       the error's interval is not known: %s\n", text_of(job, "errorDoubt"));
 }
 
@@ -342,7 +342,7 @@ static const json_t *find_job(const json_t *snapshot, const char *id)
 	return NULL;
 }
 
-/* One snapshot in the form that was asked for. false: nothing more is to come. */
+/* Prints one snapshot in the requested form. false: stop watching. */
 static bool show(const struct arguments *a, const json_t *snapshot, bool first, int *code)
 {
 	const json_t *job = a->job ? find_job(snapshot, a->job) : NULL;

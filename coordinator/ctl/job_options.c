@@ -3,10 +3,10 @@
  * hslt-job's command line: a verb, a job, and options.
  *
  * Happy path: the first word is looked up among the verbs, the second is a job (j12 or 12), a third is the new
- * priority; options fill in the rest of struct job_options, and check() sees that they fit the verb.
+ * priority; options fill in the rest of struct job_options, and check() checks that they fit the verb.
  *
- * Failures: a command that makes no sense (unknown verb, no job, a bound for a verb other than extend, no coordinator)
- * ends the program with exit code 2 and a sentence on stderr. Nothing is sent before the whole command is checked.
+ * Failures: an invalid command (unknown verb, no job, a bound for a verb other than extend, no coordinator) exits with
+ * 2 and a sentence on stderr. Nothing is sent before the whole command is checked.
  */
 #include "coordinator/ctl/job_options.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* hslt-job's command line. Texts are borrowed from argv; a command that makes no sense ends the program with 2. */
+/* hslt-job's command line. Texts are borrowed from argv; an invalid command exits with 2. */
 #ifndef COORDINATOR_CTL_JOB_OPTIONS_H
 #define COORDINATOR_CTL_JOB_OPTIONS_H
 
@@ -13,7 +13,7 @@ struct job_options {
 	enum job_verb verb; /* JOB_VERBS: none */
 	uint64_t job;
 	int priority;
-	uint64_t more_spp, more_mutations; /* extend: these four */
+	uint64_t more_spp, more_mutations; /* for extend only */
 	double more_seconds, target_error;
 	bool has_priority, insecure, json, preview;
 };

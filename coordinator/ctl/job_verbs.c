@@ -76,9 +76,9 @@ static int list(struct client *cl, const struct job_options *o, struct error *e)
 	return 0;
 }
 
-/* ---- the others ---- */
+/* ---- the other verbs ---- */
 
-/* What was done, where the coordinator's answer does not say it. */
+/* What was done, if the coordinator's answer does not say it. */
 static void print_done(const struct job_options *o)
 {
 	static const char *const became[] = {

@@ -48,7 +48,7 @@ void back_note(struct live_job *job, const struct lease_key *k, uint64_t at, con
 	take_maker(&job->makers[slot_of(job, k)], maker);
 }
 
-/* SIZE_MAX: it is not there. */
+/* SIZE_MAX: not found. */
 static size_t find(const struct live_job *job, uint32_t slot, uint64_t epoch)
 {
 	for (size_t i = job->merged_count; i-- > 0;)
@@ -144,7 +144,7 @@ int back_replay(struct live_job *job, struct journal *j, const struct lease_key 
 			next.epoch++;
 		while (canvas_has(job->canvas, &next));
 		rc = back_read(job, j, &next, &b, e);
-		if (rc) /* all is there in a journal that is whole */
+		if (rc) /* an undamaged journal has all of them */
 			return rc == -ENOENT ? error_set(e, EBADMSG, "a batch that was replaced is not in the journal")
 					     : rc;
 		back_take(job, &b);
@@ -178,7 +178,7 @@ void back_copy(const struct live_job *job, struct journal *to, uint64_t most, st
 	uint32_t slots = job->plan.groups * job->plan.parts;
 	struct error e;
 	*count = 0;
-	if (journal_write(job->journal, &e)) { /* what waits cannot be read */
+	if (journal_write(job->journal, &e)) { /* the waiting records cannot be read */
 		*list = NULL;
 		return;
 	}

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The file of a checkpoint: a magic number, the size of the head and the head (stored.h), then the seeds, chain states
- * and films of the job, under a checksum (common/base/checked_file.h). Whoever changes what follows the head counts the
- * version up. Files of version 004, whose head lay there as a struct, are read, too.
+ * The file of a checkpoint: a magic number, the size of the head, the head (stored.h), then the seeds, chain states and
+ * films of the job, with a checksum (common/base/checked_file.h). A change of what follows the head needs a new version
+ * number. Files of version 004, whose head is a struct, are read, too.
  *
- * A file that is damaged is -EBADMSG, one of another version -EPROTO: the sizes are looked at before anything is
- * allocated by them.
+ * A damaged file is -EBADMSG, one of another version -EPROTO. Sizes are checked before anything is allocated.
  */
 #include "coordinator/job/checkpoint_file.h"
 
@@ -187,7 +186,7 @@ int checkpoint_load(const struct spool *spool, struct live_job *job, uint64_t *g
 	char name[SPOOL_PATH_MAX];
 	struct checked_file in;
 	spool_job_path(spool, job->id, "checkpoint.tmp", name);
-	disk_unlink(name); /* of a run that ended before it was whole */
+	disk_unlink(name); /* left by a run that ended while writing it */
 	spool_job_path(spool, job->id, "checkpoint", name);
 	int rc = checked_file_open_watched(&in, name, progress, user, e);
 	if (rc)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a checkpoint holds of a job beside seeds, chain states and films. Stored as a message (stored.h). */
+/* What a checkpoint contains besides seeds, chain states and films. Stored as a message (stored.h). */
 #ifndef COORDINATOR_JOB_CHECKPOINT_HEAD_H
 #define COORDINATOR_JOB_CHECKPOINT_HEAD_H
 

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-/* A digest of digests: one for the numbers, one each for tiles, states, weights, moments. */
+/* A digest of digests: one for the numbers, and one each for tiles, states, weights, moments. */
 struct parts {
 	struct blob_hash *hashes;
 	size_t count;
@@ -17,7 +17,7 @@ static int add(struct parts *p, const void *bytes, size_t size, struct error *e)
 	return blob_hash_bytes(size ? bytes : "", size, &p->hashes[p->count++], e);
 }
 
-/* Field by field: what lies between them is nobody's. */
+/* Field by field, because padding is undefined. */
 static int add_numbers(struct parts *p, const struct batch *b, struct error *e)
 {
 	const uint64_t counts[] = {b->key.job,	    (uint64_t)b->key.kind, b->key.group,   b->key.part,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What of a worker's answer decides bits, as one SHA-256: the numbers themselves, not the bytes of the message, which
- * another compressor may pack otherwise. Left out: the time that it took. Any thread; allocates nothing but one list.
+ * SHA-256 of everything in a worker's result that affects bits: of the values, not the message's bytes, which another
+ * compressor may pack differently. The time it took is not included. Any thread; allocates one list only.
  */
 #ifndef COORDINATOR_JOB_DIGEST_H
 #define COORDINATOR_JOB_DIGEST_H

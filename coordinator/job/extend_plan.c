@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Samples or mutations that were asked for, as plan_make counts them; if nothing was, those that are done. */
+/* Samples or mutations requested, as plan_make counts them; if there was no such bound, those that are done. */
 static uint64_t total_of(const struct plan *p, const struct plan_request *asked, uint64_t rounds)
 {
 	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0;
@@ -29,7 +29,7 @@ static int more_rounds(const struct plan *p, const struct extension *x, const st
 	return 0;
 }
 
-/* The counts that a plan was cut by are not chosen anew. */
+/* Counts chosen when the plan was made are kept. */
 static void keep_cut(const struct plan *p, struct plan_request *asked)
 {
 	asked->chains = p->chains;
@@ -82,7 +82,7 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 	if (rc)
 		return rc;
 	if (!samples && from->ended && bounded && from->rounds >= p->rounds)
-		asked->mutations = 0; /* met */
+		asked->mutations = 0; /* already met */
 	asked->seconds = p->seconds;
 	if (time)
 		asked->seconds = (p->seconds > 0 ? p->seconds : from->seconds) + x->seconds;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What an event brought besides what the core needs to know of it: an argument of jobs_step_with, from there on of
- * whatever carries out the core's answer. Of an event each field is set that its kind names, and all else is NULL. The
- * caller keeps all of it until jobs_step_with returns.
+ * What an event brings beyond what the core needs: an argument of jobs_step_with that is passed on to whatever carries
+ * out the core's answer. Fields that do not belong to the event's kind are NULL. The caller keeps everything until
+ * jobs_step_with returns.
  */
 #ifndef COORDINATOR_JOB_INCOMING_H
 #define COORDINATOR_JOB_INCOMING_H
@@ -14,27 +14,27 @@
 
 struct back;
 
-/* A job that is submitted, and what became of it. */
+/* A submitted job, and the outcome. */
 struct submission {
-	struct envelope *submit; /* accepted: it goes over to the job */
+	struct envelope *submit; /* taken over by the job if accepted */
 	const struct plan *plan;
-	const char *rule;	     /* by which its epochs are so long; "": they were asked for */
-	const char *owner, *address; /* of whoever submits it; owner "": no certificate */
-	uint64_t job;		     /* its number, or 0: the core refused it */
-	char refusal[256];	     /* it has a number, but cannot be stored; "": it is */
+	const char *rule;	     /* what its epochs' length was derived from; "": it was requested */
+	const char *owner, *address; /* of the submitter; owner "": no certificate */
+	uint64_t job;		     /* the job's number; 0: refused by the core */
+	char refusal[256];	     /* why a job with a number cannot be stored; "": it is stored */
 };
 
 struct incoming {
 	struct submission *submission; /* EVENT_SUBMIT */
-	struct back *back;	       /* EVENT_LEASE_FAILED: what may be taken back; NULL: nothing */
+	struct back *back;	       /* EVENT_LEASE_FAILED: what can be taken back; NULL: nothing */
 	/* EVENT_BATCH, EVENT_STORED */
-	struct batch *batch; /* merged: its states go over to the job */
+	struct batch *batch; /* if merged, its states are taken over by the job */
 	const Farm__LeaseResult *result;
 	struct buf *payload;
-	/* EVENT_BATCH: the result as the journal takes it, but for the payload; made by durable_reserve, mem_alloc'd */
+	/* EVENT_BATCH: the result for the journal, without the payload; made by durable_reserve, mem_alloc'd */
 	unsigned char *frame;
 	size_t frame_size;
-	/* EVENT_STORED: the journal has it already, there */
+	/* EVENT_STORED: its place in the journal */
 	bool stored;
 	uint64_t stored_at;
 };

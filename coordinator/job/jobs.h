@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All jobs: those that run, those that are being read, the last that ended; where they are stored; and what the
- * rooms that work on them share. Connections are reached by a table of functions alone (peer_calls.h). The loop's
- * thread, but for what a job's own header gives to the pool.
+ * All jobs: running ones, those being read after a restart, and the last that ended; where they are stored; and what
+ * the folders that work on them share. Connections are reached only through a table of functions (peer_calls.h). The
+ * loop's thread, except for what a job's own header gives to the thread pool.
  */
 #ifndef COORDINATOR_JOB_JOBS_H
 #define COORDINATOR_JOB_JOBS_H
@@ -27,7 +27,7 @@ struct ending;
 struct extension_request;
 struct recovery;
 
-/* An event for the core that came up while its last update was carried out. */
+/* An event for the core that arose while an update was being carried out. */
 struct deferred {
 	struct deferred *next;
 	struct event event;
@@ -39,64 +39,63 @@ enum { TICK_MS = 200, ENDED_MAX = 200 /* ended jobs in the lists; older ones can
 /* A job of the last run that is being read (coordinator/jobs/recovery.c). */
 struct found {
 	struct found *next;
-	struct live_job *job;	  /* all but its id is the pool's while it is read */
-	struct job_record record; /* as it is shown meanwhile */
+	struct live_job *job;	  /* while it is read, everything but its id belongs to the pool */
+	struct job_record record; /* how it is displayed meanwhile */
 	uint64_t bytes;
 	struct replay_progress progress;
-	bool anew; /* what was merged of it is damaged, and it begins anew */
+	bool anew; /* its merged results are damaged, and it starts over */
 };
 
 struct jobs {
 	struct server_config config;
 	struct peer_calls peers;
 	const struct follow_up *follow_up; /* coordinator/jobs/step.h */
-	void (*stop)(void *user);	   /* the loop is to end: `fault` says why */
+	void (*stop)(void *user);	   /* the loop is to end, for the reason `fault` */
 	void *stop_user;
 	uv_loop_t *loop;
-	uv_timer_t wake, drain; /* drain: results that waited for a canvas */
-	double read;		/* s: what came before this has been read from all sockets */
+	uv_timer_t wake, drain; /* drain: for results that waited for a canvas */
+	double read;		/* s: all messages that arrived before have been read from all sockets */
 	struct farm *farm;
 	struct spool *spool;
 	struct blob_store *blobs;
 	struct ledger *ledger;
-	struct live_job *live;	  /* all that run */
-	struct job_record *ended; /* ENDED_MAX, oldest first */
+	struct live_job *live;	  /* running jobs */
+	struct job_record *ended; /* at most ENDED_MAX, oldest first */
 	size_t ended_count;
 	struct deferred *deferred, **deferred_last;
-	char refusal[256];	   /* of the last event that the core refused */
-	struct found *found;	   /* ascending by id */
-	struct recovery *recovery; /* the jobs of an earlier run are being read; NULL: no more */
+	char refusal[256];	   /* why the core refused the last event */
+	struct found *found;	   /* sorted by id */
+	struct recovery *recovery; /* jobs of an earlier run that are being read; NULL: none left */
 	int fault;		   /* why it stops by itself; 0: it does not */
 	struct error fault_error;
-	uint64_t *restored; /* ids of the jobs that went on when this run began */
+	uint64_t *restored; /* ids of the jobs that continued when this run started */
 	size_t restored_count;
-	struct durable_ack *acks, **acks_last; /* that wait for a flush */
-	struct durable_ack *parked;	       /* ... for a journal that failed to be a good one again */
+	struct durable_ack *acks, **acks_last; /* waiting for a flush */
+	struct durable_ack *parked;	       /* ... for a new journal to replace one that failed */
 	struct ending *endings;		       /* jobs that ended and whose records could not be written yet */
 	double endings_again;
-	struct seen seen;	   /* when this run began */
-	double folders_next;	   /* when jobs' folders are looked for */
-	double clear_next;	   /* when finished jobs are looked at again */
-	struct clearing *clearing; /* they are being looked at */
+	struct seen seen;	   /* when this run started */
+	double folders_next;	   /* next check of jobs' folders */
+	double clear_next;	   /* next check of finished jobs */
+	struct clearing *clearing; /* that check is running */
 	bool flushing;
 	bool stepping, stopping;
-	bool feeding;			     /* late results */
-	bool checkpointing;		     /* of some job, by the pool */
-	struct extension_request *extending; /* that wait, in the order in which they came */
-	const struct live_job *reading;	     /* of an ended job: the pool reads its films, and all else of it but id and
-						plan is the pool's */
-	uint64_t reading_for;		     /* the peer that asked for that; 0: none is read */
-	uint64_t changes;		     /* grows with whatever the status shows */
+	bool feeding;			     /* results stored ahead of their predecessors */
+	bool checkpointing;		     /* some job is being written by the pool */
+	struct extension_request *extending; /* waiting requests, in order of arrival */
+	const struct live_job
+		*reading;     /* of an ended job: the pool reads its films, and owns all of it but id and plan */
+	uint64_t reading_for; /* the peer that requested it; 0: none is being read */
+	uint64_t changes;     /* incremented whenever the status changes */
 };
 
-double jobs_now(const struct jobs *jobs);			  /* s on the loop's clock */
-struct live_job *jobs_find(const struct jobs *jobs, uint64_t id); /* NULL: it does not run */
-/* Where the films of a job of this plan go: NULL: into memory, which is never kept waiting by the disk. */
+double jobs_now(const struct jobs *jobs);			  /* s of the loop's clock */
+struct live_job *jobs_find(const struct jobs *jobs, uint64_t id); /* NULL: it is not running */
+/* Where the films of a job with this plan go. NULL: into memory, which never waits for the disk. */
 const char *jobs_film_folder(const struct jobs *jobs, const struct plan *p);
-/* It is being read from the spool, to go on. */
+/* Whether it is being read from the spool. */
 bool jobs_is_read(const struct jobs *jobs, uint64_t id);
-/* -EDQUOT: the owner has too much already. id: 0, or one that is there already; uploading: bytes of scenes that are on
- * their way. */
+/* -EDQUOT: the owner's quota is used up. id: 0, or that of an existing job; uploading: bytes of scenes in transit. */
 int jobs_within_quota(const struct jobs *jobs, const char *owner, uint64_t id, uint64_t uploading,
 		      const struct plan *plan, const Farm__Submit *m, struct error *e);
 

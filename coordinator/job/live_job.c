@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One job that runs: its films, seeds, chain states and log.
+ * One running job: its films, seeds, chain states and log.
  *
- * live_job_new takes the submission and begins the record. Bootstrap results are collected until live_job_prepare makes
- * b, seeds and canvas of them; from then on live_job_merge adds each result to the films and keeps its chain states for
- * the next lease of its group and part. Results that come while a thread reads the films wait in a list.
+ * live_job_new takes the submission and starts the record. Bootstrap results are collected until live_job_prepare makes
+ * b, seeds and canvas from them. Then live_job_merge adds each result to the films and keeps its chain states for the
+ * next lease of its group and part. Results that arrive while a thread reads the films wait in a list.
  *
- * live_job_merge fails with -ENOMEM half way, after which the films are not to be used, or with -ERANGE when a sum
- * leaves the grid of the films. A log that cannot be written is passed over: no job fails by it.
+ * live_job_merge fails with -ENOMEM half way, after which the films must not be used, or with -ERANGE if a sum leaves
+ * the grid. Errors of the log are ignored: no job fails because of it.
  */
 #include "coordinator/job/live_job.h"
 
@@ -86,7 +86,7 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
 		rc = bootstrap_new(&job->bootstrap, plan, e);
-	if (!rc && !(submitted > 0)) /* else it is there; a full disk must not keep the job from being known */
+	if (!rc && !(submitted > 0)) /* otherwise it exists; a full disk must not keep the job from being registered */
 		rc = spool_write_record(s, &job->record, e);
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, "log", path);
@@ -148,7 +148,7 @@ void live_job_log(struct live_job *job, enum log_event event, const char *fields
 	if (job->log_bytes >= log_most)
 		size = (size_t)snprintf(line, sizeof line,
 					"the log of this job is full: the coordinator's has the rest\n");
-	int rc = disk_write_all(job->log, line, size); /* the log of all jobs has the line, too */
+	int rc = disk_write_all(job->log, line, size); /* the common log has the line, too */
 	(void)rc;
 }
 
@@ -190,7 +190,7 @@ void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds)
 		return;
 	job->times.elapsed = elapsed;
 	if (!job->canvas)
-		job->times.opened = elapsed; /* the last batch of the bootstrap stays */
+		job->times.opened = elapsed; /* the last batch of the bootstrap is kept */
 	if (live_job_rounds(job) > rounds)
 		job->times.completed = elapsed;
 }
@@ -244,7 +244,7 @@ void live_job_count_worker(struct live_job *job, uint64_t peer)
 	job->last_workers[job->worker_count++ % KNOWN] = peer;
 }
 
-/* ---- results that wait ---- */
+/* ---- waiting results ---- */
 
 static size_t waiting_size(const struct waiting_batch *w)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A live job with all its weight, beside the few numbers that the core (coordinator/core) keeps of it. Scene
- * bundle as submitted, bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log.
- * The loop's thread, but while `busy` a thread of the pool reads the canvas and nobody adds to it.
+ * A running job with its data, beside the few numbers that the core (coordinator/core) keeps of it: scene bundle,
+ * bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log. The loop's thread;
+ * while `busy`, a thread of the pool reads the canvas and nobody adds to it.
  */
 #ifndef COORDINATOR_JOB_LIVE_JOB_H
 #define COORDINATOR_JOB_LIVE_JOB_H
@@ -22,14 +22,14 @@
 struct jobs;
 struct live_job;
 
-/* Work on a whole film (coordinator/jobs/publish.h). */
+/* Work on whole films (coordinator/jobs/publish.h). */
 enum publish_what {
 	PUBLISH_ERROR_ONLY, /* answered by EVENT_ERROR_KNOWN */
 	PUBLISH_PREVIEW,    /* preview.exr */
 	PUBLISH_RESULT,	    /* result.exr */
 };
 
-struct publishing { /* one of a live job at a time */
+struct publishing { /* at most one at a time per live job */
 	uv_work_t work;
 	struct jobs *jobs;
 	struct live_job *job;
@@ -43,7 +43,7 @@ struct publishing { /* one of a live job at a time */
 	struct error error;
 };
 
-/* A result that came while the canvas was busy. */
+/* A result that arrived while the canvas was busy. */
 struct waiting_batch {
 	struct waiting_batch *next;
 	uint64_t peer;
@@ -52,32 +52,32 @@ struct waiting_batch {
 	struct buf payload;
 };
 
-/* Seconds after the job's first lease, in this run and those before: at the last merged batch, when the first round
- * opened, when the last round was complete. NAN: not yet. */
+/* Seconds after the job's first lease, including earlier runs: at the last merged batch, at the start of the first
+ * round, at the end of the last complete round. NAN: not yet. */
 struct live_job_times {
 	double elapsed, opened, completed;
 };
 
-/* Results of a worker that count though nobody else made them, too. */
+/* Results of a worker that count without having been verified. */
 struct live_job_credit {
-	uint64_t who; /* as the core knows it */
+	uint64_t who; /* the core's number of the worker */
 	uint64_t leases;
 };
 
-/* Where a result lies in the journal that cannot count yet (late.h). */
+/* A stored result that cannot count yet (late.h). */
 struct late_result {
 	struct lease_key key;
 	uint64_t at;
-	uint64_t peer; /* to whom the core has given its lease meanwhile; 0: nobody */
+	uint64_t peer; /* the worker that the core has given the lease to; 0: none */
 };
 
-/* Where a batch that is merged lies in the journal (back.h). */
+/* Where a merged batch is in the journal (back.h). */
 struct merged_record {
 	uint32_t slot;
 	uint64_t epoch, at;
 };
 
-/* Who gave the last batch; name "": nobody knows. */
+/* Who made the last batch; name "": not known. */
 struct live_job_maker {
 	char name[128], certificate[72], home[40];
 	uint64_t restarts;
@@ -89,94 +89,95 @@ struct live_job {
 	struct envelope submit; /* owned */
 	struct plan plan;
 	struct job_record record;
-	struct bootstrap *bootstrap; /* until the canvas is there */
+	struct bootstrap *bootstrap; /* until the canvas exists */
 	struct canvas *canvas;	     /* from then on */
-	const char *film_folder;     /* where it goes when it is read from the spool; NULL: into memory */
+	const char *film_folder;     /* folder for the films when it is read from the spool; NULL: memory */
 	struct bootstrap_result lit;
 	uint64_t *seeds;	       /* [groups][chains / groups]; NULL for samples */
 	struct chain_state **states;   /* [groups x parts]; NULL entries: no epoch merged yet */
-	struct live_job_maker *makers; /* as many: of those */
-	bool *again;		       /* as many: the next batch comes in the place of one that was taken back */
-	struct merged_record *merged;  /* as they were merged */
+	struct live_job_maker *makers; /* [groups x parts]: of those */
+	bool *again;		       /* [groups x parts]: the next batch replaces one that was taken back */
+	struct merged_record *merged;  /* in order of merging */
 	size_t merged_count, merged_capacity;
-	uint64_t kept_bytes; /* of the journal: what is merged in its checkpoint */
+	uint64_t kept_bytes; /* of the journal; earlier batches are in its checkpoint */
 	uint32_t chains_per_lease;
-	int log; /* a file descriptor */
+	int log; /* file descriptor of the log */
 	uint64_t log_bytes;
 	struct journal *journal;
-	bool pinned;		  /* the journal knows whose it is */
-	struct job_counts counts; /* as they were written down last */
+	bool pinned;		  /* the journal has the record of its fingerprint */
+	struct job_counts counts; /* as last written */
 	struct live_job_times times;
-	char fingerprint[256];	   /* of an earlier run */
-	uint64_t checkpoint_bytes; /* of the last one */
-	double checkpoint_after;   /* s on the loop's clock: not before */
-	double look_written;	   /* work of the last look in the journal */
-	bool lacks_file;	   /* of its scene: it is held for that */
+	char fingerprint[256];	   /* an image of an earlier run */
+	uint64_t checkpoint_bytes; /* of the last attempt */
+	double checkpoint_after;   /* s of the loop's clock: next attempt */
+	double look_written;	   /* work of the last estimate stored in the journal */
+	bool lacks_file;	   /* files of its scene, for which it is held */
 	bool held;		   /* the disk has no room for a result of so many bytes: */
 	size_t held_bytes;
 	double try_again;
-	bool unsure;		   /* whether the last checkpoint has its name: nothing is stored before the next has */
+	bool unsure; /* whether the last checkpoint was renamed is unknown: nothing is stored before the next one */
 	uint64_t generation_least; /* of that one */
 	bool unprepared;	   /* the disk has no room for its films yet */
 	bool unpublished;	   /* it has ended, but its image could not be written yet */
 	uint64_t unpublished_rounds;
-	bool unrecorded; /* ... but its record could not */
-	bool overflowed; /* a sum of its batches left the films' range: they are kept as they are */
+	bool unrecorded; /* ... but its record could not be written */
+	bool overflowed; /* a sum of its batches left the films' range: the films are kept as they are */
 	bool busy, ended;
-	struct publishing publishing; /* while busy */
-	bool black;		      /* as the image that was published, or the bootstrap */
-	double preview_made;	      /* s on the loop's clock; 0: never */
+	struct publishing publishing; /* valid while busy */
+	bool black;		      /* as the published image, or the bootstrap */
+	double preview_made;	      /* s of the loop's clock; 0: never */
 	double cpu_seconds;	      /* of all merged leases */
-	uint32_t worker_count;	      /* who had leases of it */
+	uint32_t worker_count;	      /* workers that had leases of it */
 	uint64_t last_workers[64];
 	struct live_job_credit *credits;
 	size_t credit_count;
-	char doubts[512]; /* about those of workers that are quarantined by now; "": none */
+	char doubts[512]; /* about results of workers that are quarantined now; "": none */
 	struct late_result *late;
 	size_t late_count, late_capacity;
 	struct waiting_batch *waiting, **waiting_last;
 	size_t waiting_bytes;
 };
 
-/* Takes the submission, writes a record if it is new. The job's folder is there; owner as in the record; submitted: s
- * since 1970, of a job of an earlier run; 0: now. */
+/* Takes the submission; writes a record if it is new. The job's folder exists; owner as in the record; submitted: s
+ * since 1970 for a job of an earlier run; 0: now. */
 int live_job_new(struct live_job **job, uint64_t id, struct envelope *submit, const struct plan *plan,
 		 const char *owner, double submitted, struct spool *s, struct error *e);
-/* Frees the memory; blobs and files stay. Not while busy. */
+/* Frees memory; blobs and files stay. Not while busy. */
 void live_job_free(struct live_job *job);
 
 const Farm__Submit *live_job_submit(const struct live_job *job);
 __attribute__((format(printf, 3, 4))) void live_job_log(struct live_job *job, enum log_event event, const char *fields,
 							...);
 
-/* A batch that the core has accepted. Takes its states out of it. */
+/* Merges a batch that the core accepted. Takes its states. */
 int live_job_merge(struct live_job *job, struct batch *b, struct error *e);
-/* So many seconds after the first lease the batch was merged, and what comes of it done. rounds: complete before. */
+/* Call after a batch was merged, this many seconds after the first lease. rounds: complete before. */
 void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds);
 uint64_t live_job_rounds(const struct live_job *job); /* complete */
-/* All bootstrap batches are in: b, seeds, canvas. */
+/* The bootstrap is complete: makes b, seeds and canvas. */
 int live_job_prepare(struct live_job *job, const char *canvas_folder, struct error *e);
-/* A lease begins with chain states, those of the epoch before, and they are those of this digest. */
+/* Whether a lease starts from chain states, those of the epoch before, with this digest. */
 bool live_job_gives_states(const struct live_job *job, const struct lease_key *k, const struct blob_hash *digest);
-/* The lease as a frame for a worker. anew: with seeds, whatever its epoch. */
+/* A lease as a frame for a worker. anew: with seeds, whatever its epoch. */
 int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, bool anew, unsigned char **frame,
 			size_t *size, struct error *e);
 void live_job_count_worker(struct live_job *job, uint64_t peer);
 
-/* Takes both. false: memory is out. */
+/* Takes both. false: out of memory. */
 bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
 		      struct buf *payload);
-const struct waiting_batch *live_job_waits_for(const struct live_job *job,
-					       const struct lease_key *k); /* NULL: no result of that lease */
-struct waiting_batch *live_job_take_waiting(struct live_job *job);	   /* NULL: none */
-/* The results of a worker that has gone, of these live jobs. */
+const struct waiting_batch *
+live_job_waits_for(const struct live_job *job,
+		   const struct lease_key *k);			   /* NULL: no result of that lease is waiting */
+struct waiting_batch *live_job_take_waiting(struct live_job *job); /* NULL: none */
+/* Drops the waiting results of a worker that is gone. */
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer);
 void waiting_batch_free(struct waiting_batch *w);
 
-/* Lets go of the bundle's blobs. */
+/* Releases the bundle's blobs. */
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s);
-uint64_t live_job_asset_bytes(const Farm__Submit *m); /* of its files, as it says */
-/* A file's hash in a message of which the length was checked. */
+uint64_t live_job_asset_bytes(const Farm__Submit *m); /* total size of its files, as submitted */
+/* A file's hash from a message whose lengths were checked. */
 struct blob_hash live_job_file_hash(const Farm__File *f);
 
 #endif

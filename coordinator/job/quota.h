@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How much of the farm one owner may take: the name in a client's certificate, or without TLS all clients together.
- * Operators are free. Looked at when a job is submitted, before its files are sent; pure.
+ * Limits on what one owner may use. The owner is the name in a client's certificate or, without TLS, all clients
+ * together; operators are exempt. Checked when a job is submitted, before its files are sent; pure.
  */
 #ifndef COORDINATOR_JOB_QUOTA_H
 #define COORDINATOR_JOB_QUOTA_H
@@ -12,13 +12,13 @@
 #include <stdint.h>
 
 struct quota {		      /* 0: no limit */
-	uint64_t jobs;	      /* that have not ended, of one owner */
-	uint64_t asset_bytes; /* of their files, each job's counted, and of those that are on their way */
-	uint64_t film_bytes;  /* of a job's films, as canvas_bytes */
-	uint64_t mutations;   /* or samples, of a job; then every job must have such a bound */
+	uint64_t jobs;	      /* live jobs of one owner */
+	uint64_t asset_bytes; /* of their files, counted once per job, and of those in transit */
+	uint64_t film_bytes;  /* of one job's films, as canvas_bytes */
+	uint64_t mutations;   /* or samples of one job; if set, every job must have such a bound */
 };
 
-/* What the owner has already. */
+/* What the owner uses already. */
 struct quota_use {
 	uint64_t jobs, asset_bytes;
 };

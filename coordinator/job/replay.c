@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What was merged of a job, from the disk into its films.
+ * Reads what was merged of a job from the disk into its films.
  *
  * replay_films reads the checkpoint, if there is one, and then the journal that follows it. Each result goes through
- * the code that live ones go through; one whose predecessor is missing is noted (late.h) and tried again at the end.
- * The other records bring back fingerprint, times, looks and counters.
+ * the same code as live ones. One whose predecessor is missing is noted (late.h) and tried again at the end. Other
+ * records restore fingerprint, times, estimates of the error and counters.
  *
- * A damaged record is left out, counted, and said in the job's log: its lease is computed again. A damaged checkpoint
- * is -EBADMSG; a record that is whole and means nothing here was written by another version: -EPROTO. The job is then
- * only to be dropped. A stop that another thread asks for is -ECANCELED.
+ * A damaged record is skipped, counted and logged in the job's log: its lease is computed again. A damaged checkpoint
+ * is -EBADMSG; an undamaged record that makes no sense was written by another version: -EPROTO. The job must then be
+ * dropped. A stop requested by another thread is -ECANCELED.
  */
 #include "coordinator/job/replay.h"
 
@@ -24,14 +24,14 @@
 
 #include <string.h>
 
-enum { DAMAGED_MOST = 16 /* leases that are named */ };
+enum { DAMAGED_MOST = 16 /* leases named in the log */ };
 
 struct replay {
 	struct live_job *job;
-	struct replay_progress *progress; /* NULL: nobody looks */
+	struct replay_progress *progress; /* NULL: nobody watches */
 	double elapsed;
 	uint64_t batches;
-	struct lease_key damaged[DAMAGED_MOST]; /* whose records are */
+	struct lease_key damaged[DAMAGED_MOST]; /* the fingerprint of the records */
 	size_t damaged_count;
 };
 
@@ -57,7 +57,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 	struct live_job *job = r->job;
 	uint64_t rounds = live_job_rounds(job);
 	int rc = live_job_merge(job, b, e);
-	if (rc == -EEXIST || rc == -EAGAIN) /* of the films, not of the machine */
+	if (rc == -EEXIST || rc == -EAGAIN) /* an error of the films, not of the machine */
 		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
 	live_job_note_times(job, r->elapsed, rounds);
 	if (!rc && job->bootstrap && bootstrap_missing(job->bootstrap) == 0)
@@ -66,7 +66,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 	return rc;
 }
 
-/* It was written whole: by a coordinator with other records. They are not thrown away. */
+/* An undamaged record that another version wrote: it must not be thrown away. */
 static int strange(const struct replay *r, const char *what, size_t size, struct error *e)
 {
 	return error_set(
@@ -75,7 +75,7 @@ static int strange(const struct replay *r, const char *what, size_t size, struct
 		(unsigned long long)r->job->id, what, size);
 }
 
-/* The same of a look or of counters; e says what of it. */
+/* The same for estimates and counters; e says what is wrong. */
 static int strange_note(const struct replay *r, int rc, struct error *e)
 {
 	return rc == -EPROTO ? error_prefix(e, rc, "the journal of j%llu: another coordinator wrote it",
@@ -176,7 +176,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 	}
 }
 
-/* Those that waited for others behind them in the file. */
+/* Those that waited for later records in the file. */
 static int take_late(struct replay *r, struct error *e)
 {
 	struct live_job *job = r->job;
@@ -200,7 +200,7 @@ static int take_late(struct replay *r, struct error *e)
 	return rc;
 }
 
-/* Which of the damaged ones are computed again; those that have been since then are there. */
+/* Which of the damaged results are to be computed again; those computed since are merged. */
 static void say_damage(const struct replay *r, const struct journal_found *found)
 {
 	struct live_job *job = r->job;
@@ -253,7 +253,7 @@ int replay_films(const struct spool *spool, struct live_job *job, struct replay_
 	if (rc && rc != -ENOENT)
 		return rc;
 	rc = journal_open(&job->journal, folder, job->id, generation, take_record, &r, &found, e);
-	if (rc == -ENOENT) { /* its batches can be made again */
+	if (rc == -ENOENT) { /* its batches can be computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
 			     folder, (unsigned long long)generation);
 		rc = journal_create(&job->journal, folder, job->id, generation, e);

@@ -166,7 +166,7 @@ int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoin
 	return rc;
 }
 
-/* ---- as earlier versions stored them: x86-64's layout, which was the only one ---- */
+/* ---- structs stored by earlier versions, in the layout of x86-64, the only platform then ---- */
 
 enum { OLD_GROUPS = 64, OLD_LOOKS = 64, OLD_COUNTS = 8 };
 
@@ -179,7 +179,7 @@ struct old_counts {
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched;
 };
 
-struct old_head { /* of version 004, behind worker_count */
+struct old_head { /* of version 004, after worker_count */
 	uint64_t job, generation;
 	double cpu_seconds, bootstrap_cpu_seconds, look_written, elapsed, opened, completed;
 	double b[OLD_GROUPS], b_pooled, beyond_share;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is stored of a job beside its results, as messages of proto/stored.proto, and as earlier versions stored it: the
- * structs as they lay in memory. Any thread.
+ * Stored data of a job other than results, as messages of proto/stored.proto, and as structs in memory layout, which
+ * earlier versions stored. Any thread.
  */
 #ifndef COORDINATOR_JOB_STORED_H
 #define COORDINATOR_JOB_STORED_H
@@ -12,10 +12,10 @@
 #include "coordinator/job/checkpoint_head.h"
 
 enum {
-	STORED_NOTE_MOST = 1024,    /* bytes of a look, of counters */
+	STORED_NOTE_MOST = 1024,    /* bytes of an estimate of the error ("look"), of counters */
 	STORED_HEAD_MOST = 1 << 16, /* bytes of a checkpoint's head */
 	STORED_OLD_HEAD =
-		4528 - 16, /* bytes of one of version 004 but for magic, size and worker_count, the first 16 */
+		4528 - 16, /* bytes of one of version 004 without magic, size and worker_count, its first 16 */
 };
 
 /* Returns the size. */
@@ -23,12 +23,12 @@ size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORE
 size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED_NOTE_MOST]);
 size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STORED_HEAD_MOST]);
 
-/* -EPROTO: not such a message, or one of another version; -ENOMEM. */
+/* -EPROTO: not such a message, or another version; -ENOMEM. */
 int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e);
 int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e);
 int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoint_head *h, struct error *e);
 
-/* The same of earlier versions. -EPROTO: the size is another. */
+/* The same for earlier versions. -EPROTO: the wrong size. */
 int stored_old_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e);
 int stored_old_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e);
 void stored_old_head(const unsigned char bytes[STORED_OLD_HEAD], uint32_t worker_count, struct checkpoint_head *h);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job as it is shown: a record and what only a job that runs has, made into a message or JSON.
+ * A job as it is displayed: a record, plus what only a running job has, as a message or JSON.
  *
- * view_of_record begins it, view_add_status adds what the core knows. Whoever may see only his own jobs gets the texts
- * in which others have no numbers (view_hide_others). A number that is not known is null in JSON and negative in
- * messages. Messages borrow the view's texts and must be sent while it is there. JSON is NULL without memory.
+ * view_of_record starts it, view_add_status adds what the core knows. Users who may only see their own jobs get texts
+ * without the numbers of others' (view_hide_others). Unknown numbers are null in JSON and negative in messages.
+ * Messages borrow the view's texts and must be sent while it exists. JSON is NULL if memory is out.
  */
 #include "coordinator/job/view.h"
 
@@ -121,7 +121,7 @@ static json_t *number_or_null(double x, bool known)
 	return known ? forecast_real(x) : json_null();
 }
 
-/* What is known of the error, and what less of it will cost. */
+/* What is known of the error, and the cost of reducing it. */
 static void add_forecast(json_t *o, const struct job_view *v)
 {
 	const struct job_record *r = &v->record;
@@ -134,7 +134,7 @@ static void add_forecast(json_t *o, const struct job_view *v)
 				    ? json_null()
 				    : json_pack("{s:o s:o}", "cpuSeconds", forecast_range_to_json(&v->halving_cpu),
 						"wallSeconds", forecast_range_to_json(&v->halving_seconds)));
-	if (live) /* there may be many that have ended */
+	if (live) /* there may be many ended jobs */
 		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 

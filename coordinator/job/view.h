@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job as it is shown: on the wire (JobStatus), on the status socket (JSON), in the spool (its record). Pure but for
- * memory; the loop's thread.
+ * A job as it is displayed: on the wire (JobStatus), on the status socket (JSON), in the spool (its record). Pure
+ * except for memory; the loop's thread.
  */
 #ifndef COORDINATOR_JOB_VIEW_H
 #define COORDINATOR_JOB_VIEW_H
@@ -12,21 +12,21 @@
 
 #include <jansson.h>
 
-/* What only a living job has, beside its record: as in record_fields.h. A share is that of the machines that it would
- * have by its priority; reading that of what was stored of it which has been read, while it is. */
+/* What only a live job has, beside its record (record_fields.h). A share counts machines by priority; `reading` is
+ * the share of its stored data that has been read after a restart. */
 #define VIEW_FIELDS(TEXT, NUMBER)                                                           \
 	NUMBER(real, rate, NULL, "rate", AT(rate))                                          \
 	NUMBER(known, eta, NULL, "eta", AT(eta))                                            \
-	NUMBER(known, eta_low, NULL, NULL, AT(eta_low)) /* where eta is known */            \
+	NUMBER(known, eta_low, NULL, NULL, AT(eta_low)) /* valid if eta is known */         \
 	NUMBER(known, eta_high, NULL, NULL, AT(eta_high))                                   \
-	NUMBER(u32, leases, NULL, "leases", AT(leases))	   /* out at workers */             \
+	NUMBER(u32, leases, NULL, "leases", AT(leases))	   /* leases at workers */          \
 	NUMBER(u32, workers, NULL, "workers", AT(workers)) /* that hold them */             \
-	NUMBER(u32, machines, NULL, "machines", NOWHERE)   /* that might */                 \
+	NUMBER(u32, machines, NULL, "machines", NOWHERE)   /* that could */                 \
 	NUMBER(known, share, NULL, NULL, AT(share))                                         \
 	TEXT(place, 160, NULL, "place", AT(place)) /* in words */                           \
 	NUMBER(known, reading, NULL, "reading", NOWHERE)                                    \
 	TEXT(waiting, 256, NULL, "waiting", NOWHERE) /* why nothing is being done for it */ \
-	TEXT(owners_place, 160, NULL, NULL, NOWHERE) /* the same for its owner */           \
+	TEXT(owners_place, 160, NULL, NULL, NOWHERE) /* the same text for its owner */      \
 	TEXT(owners_waiting, 256, NULL, NULL, NOWHERE)
 
 struct job_view {
@@ -36,14 +36,14 @@ struct job_view {
 	VIEW_FIELDS(TEXT, NUMBER)
 #undef TEXT
 #undef NUMBER
-	struct forecast_range halving_cpu, halving_seconds; /* where there are looks */
+	struct forecast_range halving_cpu, halving_seconds; /* valid if there are estimates */
 };
 
 void view_of_record(struct job_view *v, const struct job_record *r);
-/* Puts the core's view of a living job into v, whose record has the job's names and times already. */
+/* Adds the core's view of a live job to v, whose record has the job's names and times already. */
 void view_add_status(struct job_view *v, const struct job_status *s);
 
-/* For its owner, who is to know nothing of other owners' jobs. */
+/* For its owner, who must not learn about other owners' jobs. */
 void view_hide_others(struct job_view *v);
 
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */

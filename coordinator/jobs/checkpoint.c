@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Checkpoints: the films, seeds, chain states and counters of a job in one file, so that its journal can begin anew.
+ * Checkpoints: films, seeds, chain states and counters of a job in one file, so that its journal can start over.
  *
  * checkpoint_where_due starts one when a job's journal has grown beyond the last checkpoint or a minimum, one job at a
  * time. The thread pool writes the next journal (with the last results of each group and part, which may still be taken
  * back), then checkpoint.tmp, syncs it, renames it to checkpoint and syncs the folder. Results that arrive meanwhile
- * wait in memory. Then the new journal takes over and older ones are deleted.
+ * wait in memory. Then the new journal is used and older ones are deleted.
  *
- * If writing fails, the old checkpoint and journal go on, and another attempt follows after a pause. If only the sync
- * of the folder fails it is unknown which of the two pairs a crash would leave; both hold everything acknowledged, and
- * the job is held until a checkpoint succeeds. A checkpoint that is damaged when it is read makes its job begin anew.
+ * If writing fails, the old checkpoint and journal stay in use, and another attempt follows after a pause. If only the
+ * sync of the folder fails, it is unknown which of the two pairs a crash would leave; both contain everything
+ * acknowledged, and the job is held until a checkpoint succeeds. A checkpoint that is damaged when it is read makes its
+ * job start over.
  */
 #include "coordinator/jobs/checkpoint.h"
 
@@ -25,20 +26,20 @@
 #include <stdio.h>
 #include <string.h>
 
-static const double pause_seconds = 30; /* after one that could not be written */
+static const double pause_seconds = 30; /* after a failed attempt */
 
 struct writing {
 	uv_work_t work;
 	struct jobs *jobs;
 	struct live_job *job;
-	struct journal *journal; /* the one that follows */
+	struct journal *journal; /* the next journal */
 	struct checkpoint_head head;
 	uint64_t bytes, kept_most;
-	struct merged_record *merged; /* in that one */
+	struct merged_record *merged; /* in the next journal */
 	size_t merged_count, merged_capacity;
 	char folder[SPOOL_PATH_MAX];
 	int rc;
-	bool unsure; /* it has its name, but perhaps not for good */
+	bool unsure; /* it was renamed, but perhaps not durably */
 	struct error error;
 };
 
@@ -74,7 +75,7 @@ static void run(uv_work_t *work)
 	}
 }
 
-/* Closing and unlinking a journal of hundreds of megabytes takes as many milliseconds: the pool does it, too. */
+/* Closing and unlinking a journal of hundreds of megabytes takes as many milliseconds, so the pool does it. */
 struct tidying {
 	uv_work_t work;
 	struct jobs *jobs;
@@ -86,7 +87,7 @@ struct tidying {
 static void run_tidy(uv_work_t *work)
 {
 	struct tidying *t = work->data;
-	journal_release(t->old); /* what waits for its flush holds it, too */
+	journal_release(t->old); /* also referenced by answers that wait for its flush */
 	journal_clear(t->folder, t->keep);
 }
 
@@ -94,11 +95,11 @@ static void tidied(uv_work_t *work, int status)
 {
 	struct tidying *t = work->data;
 	(void)status;
-	t->jobs->checkpointing = false; /* until now, so that no younger journal is in the way */
+	t->jobs->checkpointing = false; /* late, so that no younger journal is in the way */
 	mem_free(t);
 }
 
-/* The journals before `keep` go. */
+/* Deletes the journals before `keep`. */
 static void tidy(struct jobs *jobs, struct journal *old, const char *folder, uint64_t keep)
 {
 	struct tidying *t = mem_alloc(1, sizeof *t);
@@ -124,13 +125,12 @@ static void done(uv_work_t *work, int status)
 	uint64_t id = job->id;
 	assert(status == 0);
 	(void)status;
-	if (w->rc &&
-	    (w->unsure ||
-	     job->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
+	if (w->rc && (w->unsure || job->unsure)) { /* this checkpoint with its journal, or the old pair: both contain
+						      everything acknowledged */
 		job->unsure = true;
 		job->generation_least = w->head.generation + 1;
 		job->checkpoint_after = jobs_now(jobs) + jobs->config.retry_seconds;
-	} else if (w->rc) { /* the old ones go on */
+	} else if (w->rc) { /* the old pair stays in use */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 		job->checkpoint_after = jobs_now(jobs) + pause_seconds;
 		journal_clear(w->folder, journal_generation(job->journal));
@@ -155,7 +155,7 @@ static void done(uv_work_t *work, int status)
 	jobs->checkpointing = jobs->checkpointing && !w->rc;
 	if (!jobs->stopping && job->unsure)
 		durable_hold(jobs, job, "its results cannot be stored",
-			     w->error.text); /* which is the end of it, if it was cancelled */
+			     w->error.text); /* which ends it, if it was cancelled */
 	if (!jobs->stopping) {
 		jobs_films_free(jobs);
 		jobs->peers.films_free(jobs->peers.user, id);
@@ -196,9 +196,10 @@ void checkpoint_where_due(struct jobs *jobs)
 	    jobs->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
 	for (struct live_job *job = jobs->live; job; job = job->next) {
-		if (!job->canvas || job->busy || job->ended || job->late_count) /* what waits is in the journal alone */
+		if (!job->canvas || job->busy || job->ended ||
+		    job->late_count) /* stored results that wait are only in the journal */
 			continue;
-		if (canvas_missing(job->canvas)) /* what was taken back is computed at this time */
+		if (canvas_missing(job->canvas)) /* a taken-back batch is being computed again */
 			continue;
 		uint64_t limit = limit_of(jobs, job);
 		if ((journal_bytes(job->journal) - job->kept_bytes > limit || job->unsure) &&

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job's checkpoint (jobs/jN/checkpoint): films, seeds, chain states and the rest of a live job, so that its journal
- * can begin anew. Written when the journal is longer than the limit and than the last checkpoint, so that disk and
- * bytes written stay within a small multiple of the films. Order of steps: an empty journal G + 1; the checkpoint under
- * a temporary name, which says that G + 1 follows it; its rename; only then does journal G go. Wherever the machine
- * stops, one checkpoint and its journal are whole. Writing runs in the pool while the live job is busy; the rest on the
+ * can start over. Written when the journal is longer than the limit and than the last checkpoint, so the disk space and
+ * bytes written stay within a small multiple of the films. The steps: an empty journal G + 1; the checkpoint under a
+ * temporary name, which refers to G + 1; its rename; only then the deletion of journal G. Wherever the machine stops,
+ * one checkpoint and its journal are complete. The pool writes while the live job is busy; everything else runs on the
  * loop's thread.
  */
 #ifndef COORDINATOR_JOBS_CHECKPOINT_H
@@ -12,7 +12,7 @@
 
 #include "coordinator/job/jobs.h"
 
-/* Starts one for each order whose journal is long enough. Not while an update is carried out. */
+/* Starts one for each job whose journal is long enough. Not while an update is being carried out. */
 void checkpoint_where_due(struct jobs *jobs);
 
 #endif

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Carries out what the core answers to an event, action by action: sends leases, revocations and acknowledgements,
- * merges results, prepares jobs after their bootstrap, starts publishing, records changes of state.
+ * Carries out the core's answer to an event, action by action: sends leases, revocations and acknowledgements, merges
+ * results, prepares jobs after their bootstrap, starts publishing, records changes of state.
  *
  * A result that the core wants merged is first appended to the job's journal (durable_merged), then added to its films;
  * its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished later (finish.c).
  *
- * If a result cannot be merged for want of memory the process exits: the films may hold half of it, nobody was told
- * that it is stored, and the next start has it from the journal or computes it again. Any other failure of a merge ends
- * the job. A job that cannot be prepared, because the disk is full, is tried again.
+ * If memory runs out while a result is merged, the process exits: the films may contain half of it, nobody was told
+ * that it is stored, and the next start takes it from the journal or computes it again. Any other failure of a merge
+ * ends the job. A job that cannot be prepared because the disk is full is tried again.
  */
 #include "coordinator/jobs/dispatch.h"
 
@@ -142,7 +142,7 @@ static void merge(struct jobs *jobs, const struct action *a, const struct incomi
 		rc = live_job_merge(job, in->batch, &e);
 	if (!rc)
 		back_note(job, &a->key, at, in->result->maker);
-	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
+	if (rc == -ENOMEM) { /* half merged, and not acknowledged */
 		log_event(LOG_STOP,
 			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
@@ -171,7 +171,7 @@ static void acknowledge(struct jobs *jobs, const struct action *a)
 {
 	const struct live_job *job = jobs_find(jobs, a->job);
 	const char *name = jobs->peers.name(jobs->peers.user, a->peer);
-	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* what it repeats may not be on the disk yet */
+	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && job)) /* the original may not be on disk yet */
 		durable_ack(jobs, job, a->peer, &a->key, a->ack);
 	else
 		jobs->peers.acknowledge(jobs->peers.user, a->peer, &a->key, a->ack, a->text);
@@ -206,7 +206,7 @@ static void revoke_lease(struct jobs *jobs, const struct action *a)
 
 static void close_peer(struct jobs *jobs, const struct action *a)
 {
-	live_jobs_drop_waiting(jobs->live, a->peer); /* it may come back, with the same */
+	live_jobs_drop_waiting(jobs->live, a->peer); /* it may return with the same number */
 	jobs->peers.dismiss(jobs->peers.user, a->peer, a->text);
 }
 

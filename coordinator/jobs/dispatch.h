@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the core's update asks for, carried out action by action. The loop's thread. */
+/* Carries out the core's update, action by action. The loop's thread. */
 #ifndef COORDINATOR_JOBS_DISPATCH_H
 #define COORDINATOR_JOBS_DISPATCH_H
 
@@ -7,9 +7,9 @@
 
 struct incoming;
 
-/* in: what the event brought that the update answers. */
+/* in: what came with the event that the update answers. */
 void dispatch_update(struct jobs *jobs, const struct update *u, const struct incoming *in);
-/* All of its bootstrap is merged: its films, or another try later, when the disk has no room for them. */
+/* The job's bootstrap is merged: makes its films, or tries again later if the disk has no room. */
 void dispatch_prepare(struct jobs *jobs, struct live_job *job);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What must be on disk before it is acknowledged: submissions, results, the ends of jobs.
+ * Everything that must be on disk before it is acknowledged: submissions, results, the ends of jobs.
  *
- * Results: durable_reserve makes room in the journal and the films before the core sees a result, so that merging it
- * cannot fail for want of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next syncs
- * the journals of all queued ones in the thread pool (group commit), and done() sends them.
+ * Results: durable_reserve makes room in the journal and the films before the core sees a result, so merging it cannot
+ * fail for lack of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next syncs the
+ * journals of all queued ones in the thread pool (group commit), and done() sends them.
  *
  * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements are
  * parked, and durable_mend tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job
@@ -28,26 +28,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PINNED_ROOM = 512 /* for the record of the fingerprint before the first batch */ };
-enum { NOBODY = 0 /* peers are counted from 1 */ };
+enum { PINNED_ROOM = 512 /* for the record of the fingerprint, before the first batch */ };
+enum { NOBODY = 0 /* peers are numbered from 1 */ };
 
-/* A job that has ended, of which the disk does not know it yet. */
+/* A job that has ended, which the disk does not know yet. */
 struct ending {
 	struct ending *next;
 	struct job_record record;
-	bool written; /* the record, but the row of the ledger is not */
+	bool written; /* the record is written, but not the row of the ledger */
 };
 
 struct durable_ack {
 	struct durable_ack *next;
-	uint64_t peer; /* NOBODY: no answer is waited for */
+	uint64_t peer; /* NOBODY: nobody waits for the answer */
 	struct lease_key key;
 	enum ack ack;
 	bool failed;
 	struct journal *journal; /* held */
 };
 
-/* One flush for all that has come so far. */
+/* One flush for everything queued so far. */
 struct flush {
 	uv_work_t work;
 	struct jobs *jobs;
@@ -100,13 +100,13 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 		rc = journal_create(&job->journal, folder, job->id, 0, e);
 	if (!rc)
 		rc = ledger_add(jobs->ledger, &j, e);
-	if (!rc) { /* after the row: without one it says that the row was lost */
+	if (!rc) { /* after the row: without one, it would mean that the row was lost */
 		j.held = "";
 		rc = row_file_write(jobs->spool, &j, e);
 		if (rc)
 			ledger_end(jobs->ledger, job->id, 0, "failed", NULL);
 	}
-	if (rc) { /* should the row be there all the same: nobody waits for the job */
+	if (rc) { /* in case the row was written after all: nobody waits for the job */
 		text_copy(job->record.state, sizeof job->record.state, "failed");
 		text_copy(job->record.why, sizeof job->record.why, e ? e->text : "");
 		job->record.exit_code = 3;
@@ -117,11 +117,11 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 	return rc;
 }
 
-/* Its journal goes only when the record says for good that it has ended. kept: the films stay (keep.h). */
+/* Deletes its journal only once the record durably says that it has ended. kept: the films stay (keep.h). */
 static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
 	int rc = spool_write_record(jobs->spool, r, e);
-	if (rc && !r->has_result) /* what it has merged is for nobody, and may be what fills the disk */
+	if (rc && !r->has_result) /* its merged data is useless now, and may be what fills the disk */
 		keep_drop(jobs, r->id);
 	if (rc == -ENOSPC)
 		keep_drop_all(jobs);
@@ -155,7 +155,7 @@ void durable_end_row(struct jobs *jobs, const struct job_record *r)
 int durable_end(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
-	if (journal_write(job->journal, &e)) /* for whoever extends it; what is not stored is computed again */
+	if (journal_write(job->journal, &e)) /* for an extension; what is not stored is computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	int rc = write_end(jobs, &job->record, keep_order(jobs, job), &e);
 	if (rc)
@@ -168,9 +168,9 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 		end_later(jobs, &job->record, false);
 	} else {
 		durable_end_row(jobs, &job->record);
-		journal_settle(job->journal); /* the record says more than what still waits for a flush */
+		journal_settle(job->journal); /* the record contains more than what still waits for a flush */
 	}
-	journal_release(job->journal); /* with its last holder it gives up its room, too */
+	journal_release(job->journal); /* with its last reference it frees its room, too */
 	job->journal = NULL;
 	return 0;
 }
@@ -216,7 +216,7 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 	union {
 		const Farm__LeaseResult *from;
 		Farm__LeaseResult *to;
-	} result = {in->result}; /* generated structures have no const */
+	} result = {in->result}; /* generated structures are not const */
 	Farm__Envelope m;
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
@@ -240,7 +240,7 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 	return rc;
 }
 
-/* Whose it is, once, before its first batch. */
+/* Records the job's fingerprint, once, before its first batch. */
 static int write_pinned(struct jobs *jobs, struct live_job *job, double elapsed, struct error *e)
 {
 	struct job_status status;
@@ -292,7 +292,7 @@ static void queue(struct jobs *jobs, struct durable_ack *a)
 	jobs->acks_last = &a->next;
 }
 
-/* It waits until the journal is a good one again. */
+/* Waits until the journal is replaced. */
 static void park(struct jobs *jobs, struct durable_ack *a)
 {
 	struct live_job *job = jobs->stopping ? NULL : jobs_find(jobs, a->key.job);
@@ -300,7 +300,7 @@ static void park(struct jobs *jobs, struct durable_ack *a)
 		drop_ack(a);
 		return;
 	}
-	if (a->journal != job->journal) { /* which is settled by now */
+	if (a->journal != job->journal) { /* which is resolved by now */
 		queue(jobs, a);
 		return;
 	}
@@ -346,7 +346,7 @@ static void flush_next(struct jobs *jobs)
 	if (jobs->flushing || !jobs->acks)
 		return;
 	struct flush *w = mem_alloc(1, sizeof *w);
-	if (!w) /* as for an event: without 200 bytes nothing goes on */
+	if (!w) /* as for an event: without 200 bytes nothing can continue */
 		abort();
 	w->jobs = jobs;
 	w->acks = jobs->acks;
@@ -362,7 +362,7 @@ static void flush_next(struct jobs *jobs)
 void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
-	if (!a) /* not answered: the worker offers it again, and it is a repeat */
+	if (!a) /* not answered: the worker sends it again, and it is a repeat */
 		return;
 	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = job->journal};
 	journal_hold(a->journal);
@@ -372,7 +372,7 @@ void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, c
 
 /* ---- the rest ---- */
 
-/* What nobody waits for: it need not be safe at once, but soon. */
+/* Data that nobody waits for: it is flushed soon, but not at once. */
 static int append_note(struct jobs *jobs, const struct live_job *job, enum journal_kind kind, double elapsed,
 		       const void *bytes, size_t size, struct error *e)
 {
@@ -393,15 +393,15 @@ void durable_look(struct jobs *jobs, uint64_t id)
 	if (l->work <= job->look_written)
 		return;
 	job->look_written = l->work;
-	/* Only forecasts are made of it: the look itself is taken again. */
+	/* Used by forecasts only: the estimate itself is made again. */
 	unsigned char note[STORED_NOTE_MOST];
 	size_t size = stored_pack_look(l, note);
 	if (append_note(jobs, job, JOURNAL_LOOK, farm_elapsed(jobs->farm, id, jobs_now(jobs)), note, size, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(e.text).text);
 }
 
-/* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and
- * takes the journal's place. */
+/* Counters are only for the record, so not before each answer; and not while a checkpoint is written, which has the
+ * latest and replaces the journal. */
 static void write_counts(struct jobs *jobs, struct live_job *job)
 {
 	struct job_counts now;
@@ -414,7 +414,7 @@ static void write_counts(struct jobs *jobs, struct live_job *job)
 		job->counts = now;
 }
 
-/* The answers that waited for the journals of jobs that are no longer bad. */
+/* Answers that waited for journals which have been replaced. */
 static void unpark(struct jobs *jobs)
 {
 	struct durable_ack *list = jobs->parked;

@@ -28,7 +28,7 @@ void ended_jobs_remove(struct jobs *jobs, uint64_t job)
 		}
 }
 
-/* Jobs of an earlier run that have ended, and those that were never accepted: whoever submitted them has no answer. */
+/* Jobs of an earlier run that have ended, and those that were never accepted, whose client got no answer. */
 int ended_jobs_open(struct jobs *jobs, struct error *e)
 {
 	uint64_t *ids;
@@ -47,7 +47,7 @@ int ended_jobs_open(struct jobs *jobs, struct error *e)
 		if (restore_lives(jobs, ids[i]))
 			continue;
 		rc = spool_read_record(jobs->spool, ids[i], r, &fault);
-		if (rc == -ENOENT) /* the number of a job that did not get as far as a record */
+		if (rc == -ENOENT) /* the number of a job that has no record yet */
 			continue;
 		if (rc) {
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[i],

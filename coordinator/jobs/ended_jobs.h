@@ -5,9 +5,9 @@
 
 #include "coordinator/job/jobs.h"
 
-/* Reads those of earlier runs. One that cannot be read is logged and left out. */
+/* Reads those of earlier runs. One that cannot be read is logged and skipped. */
 int ended_jobs_open(struct jobs *jobs, struct error *e);
-void ended_jobs_add(struct jobs *jobs, const struct job_record *r); /* it has ended */
-void ended_jobs_remove(struct jobs *jobs, uint64_t job);	    /* it goes on */
+void ended_jobs_add(struct jobs *jobs, const struct job_record *r); /* adds a job that has ended */
+void ended_jobs_remove(struct jobs *jobs, uint64_t job);	    /* removes a job that continues */
 
 #endif

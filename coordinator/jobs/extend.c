@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Extensions of jobs: what is asked for, until it is answered.
+ * Extensions of jobs: a list of requests until they are answered.
  *
- * extend_job puts a request at the end of a list; extend_waiting takes those out whose jobs nobody is at work on. A job
- * that runs gets its new plan in the ledger and then in the core. One that is done is read from what was kept of it
- * (keep.h) by a thread of the pool, one at a time, and goes on as after a restart.
+ * extend_job appends a request; extend_waiting handles those whose jobs are not in use. A running job gets its new plan
+ * in the ledger and then in the core. A finished job is read from what was kept of it (keep.h) by a thread of the pool,
+ * one at a time, and continues as after a restart.
  *
- * Each request is answered once, unless its peer has gone: then a job that was read for it is dropped again. What
- * cannot be done is answered with a sentence, and the job stays as it was.
+ * Each request is answered once, unless its peer is gone; a job that was read for it is then dropped. A request that
+ * cannot be fulfilled is answered with a sentence, and the job stays as it was.
  */
 #include "coordinator/jobs/extend.h"
 
@@ -82,7 +82,7 @@ static int store(struct jobs *jobs, const struct live_job *job, struct error *e)
 	return rc;
 }
 
-/* The bounds that the job has now, for its log and for the client. */
+/* The job's current bounds, for its log and for the client. */
 static void describe(const struct live_job *job, char *text, size_t size)
 {
 	struct text t = {text, size};
@@ -107,7 +107,7 @@ static void note(const struct requester *by, struct live_job *job, char *text, s
 		     log_quote(text).text);
 }
 
-/* ---- a job that runs ---- */
+/* ---- running jobs ---- */
 
 static int extend_live(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct extension *x,
 		       char *text, size_t size, struct error *e)
@@ -133,9 +133,9 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 	return 0;
 }
 
-/* ---- a job that is done ---- */
+/* ---- finished jobs ---- */
 
-/* What is kept of it beside its row. */
+/* What is kept beside its row. */
 static int read_job(const struct jobs *jobs, uint64_t job, struct row_file *f, struct error *e)
 {
 	struct ledger_job j;
@@ -146,7 +146,7 @@ static int read_job(const struct jobs *jobs, uint64_t job, struct row_file *f, s
 	return rc ? error_prefix(e, rc, "what was kept of it") : 0;
 }
 
-/* The journal has them from a while before the end: what the record of the end says is more. */
+/* The journal's numbers are from shortly before the end: the record of the end is more accurate. */
 static void take_counts(struct job_counts *c, const struct job_record *r)
 {
 #define X(name, key, wire)            \
@@ -156,7 +156,7 @@ static void take_counts(struct job_counts *c, const struct job_record *r)
 #undef X
 }
 
-/* r: as it was remembered. */
+/* r: its record. */
 static int begin_again(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct job_record *r,
 		       struct error *e)
 {
@@ -210,11 +210,11 @@ static void answer(struct jobs *jobs, uint64_t peer, int rc, const struct error 
 	jobs->peers.extended(jobs->peers.user, peer, rc ? e->text : NULL, text);
 }
 
-/* Films of hundreds of megabytes, which the pool reads, those of one job at a time. */
+/* Films may have hundreds of megabytes, so the pool reads them, those of one job at a time. */
 struct reading {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct requester by; /* who may have gone meanwhile */
+	struct requester by; /* its peer may be gone */
 	struct extension what;
 	struct job_record record; /* of its end */
 	struct live_job *job;
@@ -254,7 +254,8 @@ static void done(uv_work_t *work, int status)
 		extend_waiting(jobs);
 }
 
-/* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
+/* Everything that can be checked without its films, assuming that less was done, so that nothing is refused which
+ * the films would allow. */
 static int ask_beforehand(const struct jobs *jobs, const struct requester *by, const struct live_job *job,
 			  const struct extension *x, const struct job_record *r, struct error *e)
 {
@@ -329,11 +330,11 @@ static void go_on(struct jobs *jobs, const struct extension_request *q)
 		rc = error_set(&e, ENOENT, "no such job");
 	else
 		rc = extend_ended(jobs, q, &v.record, &e);
-	if (rc || job) /* else when it is read */
+	if (rc || job) /* otherwise when it has been read */
 		answer(jobs, q->by.peer, rc, &e, text);
 }
 
-/* One that is not answered yet. */
+/* A request that is not answered yet. */
 static bool has_asked(const struct jobs *jobs, uint64_t peer)
 {
 	const struct extension_request *q = jobs->extending;
@@ -372,7 +373,7 @@ void extend_waiting(struct jobs *jobs)
 		*at = q->next;
 		go_on(jobs, q);
 		mem_free(q);
-		at = &jobs->extending; /* others may have been served meanwhile */
+		at = &jobs->extending; /* the list may have changed */
 	}
 }
 

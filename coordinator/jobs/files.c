@@ -14,7 +14,7 @@ static void hold(struct jobs *jobs, struct live_job *job, const char *text)
 	jobs_step(jobs, &ev);
 }
 
-/* The first one that is not there; NULL: all are. */
+/* The first missing one; NULL: all exist. */
 static const Farm__File *lacking(const struct jobs *jobs, const struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
@@ -72,5 +72,5 @@ void files_tick(struct jobs *jobs)
 {
 	for (struct live_job *job = jobs->live; job; job = job->next)
 		if (job->lacks_file && files_look(jobs, job))
-			return; /* the list may have changed; the others next time */
+			return; /* the list may have changed; continue next time */
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The end of a live job. One that the core has ended is finished as soon as no thread reads its films: its record is
- * written and its row ended (durable.h), workers are told, its memory is freed. A record that the disk does not take is
- * tried again (retry.c), and until then the job counts as running.
+ * The end of a live job. A job that the core has ended is finished as soon as no thread reads its films: its record is
+ * written and its row ended (durable.h), workers are told, its memory is freed. A record that the disk refuses is tried
+ * again (retry.c), and until then the job counts as running.
  */
 #include "coordinator/jobs/finish.h"
 
@@ -26,7 +26,7 @@ static void finish(struct jobs *jobs, struct live_job *job)
 	v.record.ended_seen = ages_now(jobs);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	job->record = v.record;
-	if (durable_end(jobs, job)) { /* again, later */
+	if (durable_end(jobs, job)) { /* try again later */
 		job->unrecorded = true;
 		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
@@ -44,7 +44,7 @@ static void finish(struct jobs *jobs, struct live_job *job)
 	job->waiting = NULL;
 	job->waiting_last = &job->waiting;
 	live_job_free(job);
-	while (late) { /* the core says that the job is over */
+	while (late) { /* the core knows that the job is over */
 		struct waiting_batch *next = late->next;
 		results_take(jobs, late->peer, &late->envelope, &late->payload);
 		waiting_batch_free(late);
@@ -60,7 +60,7 @@ void finish_ended(struct jobs *jobs)
 		if (job->ended && !job->busy && !job->unpublished && !job->unrecorded) {
 			finish(jobs, job);
 			finished = true;
-			next = jobs->live; /* late batches may have ended others */
+			next = jobs->live; /* stored batches may have ended others */
 		}
 	}
 	if (finished)

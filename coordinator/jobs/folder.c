@@ -32,7 +32,7 @@ static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
 	return 0;
 }
 
-/* What was merged is in memory or in the old journal, whose file is open: the one goes into a checkpoint, the other
+/* Merged data is in memory or in the old journal, whose file is open: the former goes into a checkpoint, the latter
  * into a new file. */
 static void go_on(struct jobs *jobs, struct live_job *job)
 {
@@ -60,8 +60,8 @@ static void go_on(struct jobs *jobs, struct live_job *job)
 	durable_hold(jobs, job, "its results cannot be stored", "its folder was removed, and is made anew");
 }
 
-/* A journal that is bad already has no file to look for, and who has ended needs none: then the folder itself, which
- * may go while it is being made anew. */
+/* A journal that failed already has no file to look for, and an ended job needs none: then the folder itself is
+ * checked, which may disappear while it is being restored. */
 static bool is_gone(const struct jobs *jobs, const struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX];
@@ -80,6 +80,6 @@ void folder_tick(struct jobs *jobs)
 	for (struct live_job *job = jobs->live; job; job = job->next)
 		if (!job->busy && job->journal && is_gone(jobs, job)) {
 			go_on(jobs, job);
-			return; /* the list may have changed; the others next time */
+			return; /* the list may have changed; continue next time */
 		}
 }

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's folder that somebody removes, or moves away, while the job runs: it is made anew, and all that the job needs
- * to go on is written into it, from memory and from the files that are still open. The loop's thread.
+ * Restores a job's folder that is removed or moved away while the job runs: creates it again and writes everything that
+ * the job needs into it, from memory and from files that are still open. The loop's thread.
  */
 #ifndef COORDINATOR_JOBS_FOLDER_H
 #define COORDINATOR_JOBS_FOLDER_H
 
 #include "coordinator/job/jobs.h"
 
-void folder_tick(struct jobs *jobs); /* looks every second */
+void folder_tick(struct jobs *jobs); /* checks every second */
 
 #endif

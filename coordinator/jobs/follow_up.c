@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * After each step: jobs that have ended are finished, results that waited for others are merged, and a checkpoint is
- * begun where one is due. When films are free again: the same without checkpoints, and results that came while a job's
- * films were read follow, one at a time, by the timer `drain`.
+ * After each step: finishes jobs that have ended, merges results that waited for others, and starts a checkpoint if one
+ * is due. When films are free again: the same without checkpoints; then results that arrived while the films were read
+ * follow, one at a time, by the timer `drain`.
  */
 #include "coordinator/jobs/follow_up.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What follows from the core's answers: the table by which a step reaches all that steps in its turn (step.h). */
+/* The table of what follows a step of the core, through which a step reaches code that itself makes steps (step.h). */
 #ifndef COORDINATOR_JOBS_FOLLOW_UP_H
 #define COORDINATOR_JOBS_FOLLOW_UP_H
 

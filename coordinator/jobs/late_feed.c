@@ -9,7 +9,7 @@
 #include "coordinator/job/stored_frame.h"
 #include "coordinator/jobs/step.h"
 
-/* It is damaged by now, too: its lease is open. */
+/* It has been damaged meanwhile: its lease is open. */
 static void give_up(struct jobs *jobs, struct live_job *job, const struct late_result *l, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = job->id, .lease = {.key = l->key}};
@@ -18,7 +18,7 @@ static void give_up(struct jobs *jobs, struct live_job *job, const struct late_r
 		jobs_step(jobs, &ev);
 }
 
-/* To the core, which says whether it counts. */
+/* Gives it to the core, which says whether it counts. */
 static int offer(struct jobs *jobs, const struct live_job *job, const struct late_result *l, struct error *e)
 {
 	struct event ev = {.kind = EVENT_STORED, .job = job->id, .lease = {.key = l->key, .valid = true}};
@@ -65,7 +65,7 @@ void late_drop(struct jobs *jobs, struct live_job *job)
 	}
 }
 
-/* true: one more counts, and others may now. */
+/* true: one more counts, and others may follow. */
 static bool feed_one(struct jobs *jobs, struct live_job *job)
 {
 	for (size_t i = 0; i < job->late_count; i++) {
@@ -77,8 +77,7 @@ static bool feed_one(struct jobs *jobs, struct live_job *job)
 		int rc = place == REPLAY_FITS ? offer(jobs, job, &l, &e) : 0;
 		if (rc == -ENOMEM) /* later */
 			return false;
-		if (!rc && replay_place(job, &l.key) !=
-				   REPLAY_MERGED) /* the core waits for something: an estimate of the error */
+		if (!rc && replay_place(job, &l.key) != REPLAY_MERGED) /* the core waits for an estimate of the error */
 			continue;
 		l = job->late[i];
 		late_remove(job, i);

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Results that wait in a job's journal (coordinator/job/late.h), from there to the core. The loop's thread. */
+/* Gives results that wait in a job's journal (coordinator/job/late.h) to the core. The loop's thread. */
 #ifndef COORDINATOR_JOBS_LATE_FEED_H
 #define COORDINATOR_JOBS_LATE_FEED_H
 
 #include "coordinator/job/jobs.h"
 
-/* They are computed again, after all. */
+/* They are computed again instead. */
 void late_drop(struct jobs *jobs, struct live_job *job);
-/* All that can count now do. After every step of the core, and when films are free again. */
+/* Gives the core all results that can count now. Call after every step, and when films are free again. */
 void late_feed(struct jobs *jobs);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Jobs as they are listed and shown, wherever they are: among those that run, those that are being read, the last
- * ENDED_MAX that ended, and then on the disk.
+ * Finds jobs for display, wherever they are: running, being read after a restart, among the last ENDED_MAX that ended,
+ * or only on the disk.
  */
 #include "coordinator/jobs/listing.h"
 
@@ -17,7 +17,7 @@ static void view_live(struct jobs *jobs, const struct live_job *job, struct job_
 	struct job_status status;
 	struct canvas_counts counted;
 	view_of_record(v, &job->record);
-	if (job->canvas) { /* in the end what the image holds, until then all that has come */
+	if (job->canvas) { /* at the end what the image contains, until then everything received */
 		canvas_counts(job->canvas, !job->ended, &counted);
 		record_take_counted(&v->record, &job->plan, &counted, job->black, job->lit.beyond_share);
 		record_add_note(&v->record, job->doubts);
@@ -27,7 +27,7 @@ static void view_live(struct jobs *jobs, const struct live_job *job, struct job_
 	if (!farm_job(jobs->farm, job->id, jobs_now(jobs), &status))
 		return;
 	view_add_status(v, &status);
-	if (job->ended && (job->busy || job->unpublished || job->unrecorded)) { /* not before its image is there */
+	if (job->ended && (job->busy || job->unpublished || job->unrecorded)) { /* not before its image exists */
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*job->record.why)
 			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s",

@@ -7,7 +7,7 @@
 
 /* false: no such job. */
 bool jobs_view(struct jobs *jobs, uint64_t job, struct job_view *v);
-/* All that are listed, ascending by id; mem_alloc'd. */
+/* All jobs in the lists, sorted by id; mem_alloc'd. */
 size_t jobs_views(struct jobs *jobs, struct job_view **views);
 
 #endif

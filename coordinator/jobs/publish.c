@@ -61,7 +61,7 @@ static void run(uv_work_t *work)
 		w->rc = write_image(w);
 }
 
-/* The two that tell the core: it may want the next image at once, or end the job, and w is not ours any more. */
+/* The last two tell the core, which may request the next image at once or end the job: w is not ours any more. */
 static void tell_error(const struct publishing *w)
 {
 	struct jobs *jobs = w->jobs;
@@ -91,7 +91,7 @@ static void tell_image(const struct publishing *w)
 	jobs_step(w->jobs, &ev);
 }
 
-/* The core's job is done; all that it is made of stays until the disk takes the image. */
+/* The core's job is done, but its data stays until the disk takes the image. */
 static void cannot_write(struct publishing *w)
 {
 	struct live_job *job = w->job;
@@ -111,11 +111,11 @@ static void has_written(struct live_job *job)
 	job->record.why[0] = 0;
 }
 
-/* What came of it, for the live job. */
+/* Stores the outcome in the live job. */
 static void take(struct publishing *w)
 {
 	struct live_job *job = w->job;
-	/* Every image says how good it is, asked for or not. */
+	/* Every image states its error, requested or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
 		record_take_error(&job->record, &w->image);
 	if (!w->rc)
@@ -159,7 +159,7 @@ void publish_start(struct jobs *jobs, struct live_job *job, enum publish_what wh
 	assert(!job->busy);
 	struct publishing *w = &job->publishing;
 	*w = (struct publishing){.work.data = w, .jobs = jobs, .job = job, .what = what, .rounds = rounds};
-	struct job_status status; /* from the first lease to now */
+	struct job_status status; /* from the first lease until now */
 	if (farm_job(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		w->end = status.end;
 		w->wall_seconds = (isnan(status.ended) ? jobs_now(jobs) : status.ended) - status.started;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Work on a whole film: its error, its image as EXR in the spool. Runs in the pool; the live job is busy meanwhile and
- * its results wait. Started and finished on the loop's thread. Starting allocates nothing and cannot fail; an image of
- * the result for which there is no memory or no disk is made again later.
+ * Work on a whole film: estimating its error, writing its image into the spool. Runs in the pool; meanwhile the live
+ * job is busy and its results wait. Started and finished on the loop's thread. Starting allocates nothing and cannot
+ * fail; a final image for which there is no memory or disk space is made again later.
  */
 #ifndef COORDINATOR_JOBS_PUBLISH_H
 #define COORDINATOR_JOBS_PUBLISH_H

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The database of jobs against the jobs' folders, before any job is read.
+ * Compares the database of jobs with the jobs' folders, before any job is read.
  *
- * Each folder and each row is looked at once (look_at): its row, its copy of the row (row_file.h) and its record. What
- * one of them lacks is made from the others: a row from its copy, a copy from the row, the damaged record of an ended
- * job from the row. A database that cannot be read is put aside and made anew from the copies.
+ * For each folder and each row, look_at considers the row, its copy (row_file.h) and the record. What is missing is
+ * made from the others: a row from its copy, a copy from the row, the damaged record of an ended job from the row. An
+ * unreadable database is put aside and rebuilt from the copies.
  *
- * A job of which neither row nor copy is left, but results are, is lost: without --accept-loss the start ends with
- * -EBADMSG and the list of what is missing, with it the folder is moved to spool/lost with a sentence. An error of the
- * machine ends the start and changes nothing more.
+ * A job with results but neither row nor copy is lost: without --accept-loss the start ends with -EBADMSG and a list of
+ * what is missing; with it the folder is moved to spool/lost with an explanation. An error of the machine ends the
+ * start without further changes.
  */
 #include "coordinator/jobs/reconcile.h"
 
@@ -22,12 +22,12 @@
 #include <string.h>
 #include <time.h>
 
-enum { NAMED_MOST = 8 /* of what is lost, in the sentence of the refusal */ };
+enum { NAMED_MOST = 8 /* of the lost jobs, in the error */ };
 
 struct looking {
 	struct jobs *jobs;
-	struct job_record *record; /* of the job at hand */
-	uint64_t lost, last;	   /* jobs; the highest id of a row */
+	struct job_record *record; /* about the current job */
+	uint64_t lost, last;	   /* number of jobs; the highest id of a row */
 	char text[600];		   /* which */
 	struct text names;
 };
@@ -37,9 +37,9 @@ static void say(uint64_t id, const char *what)
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(what).text);
 }
 
-/* ---- what is lost ---- */
+/* ---- lost jobs ---- */
 
-/* Its folder stays, for whoever knows more than we do. */
+/* Its folder is kept, for somebody who knows more. */
 static int put_aside(struct looking *l, uint64_t id, const char *why, struct error *e)
 {
 	const struct spool *spool = l->jobs->spool;
@@ -82,9 +82,9 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 	return rc;
 }
 
-/* ---- the record of an ended job ---- */
+/* ---- damaged records of ended jobs ---- */
 
-/* What its row still knows: it is listed, and its image can be fetched. What the image's header says is not read. */
+/* What its row still knows: the job is listed, and its image can be fetched. The image's header is not read. */
 static int make_record(struct looking *l, const struct ledger_job *j, struct error *e)
 {
 	const struct spool *spool = l->jobs->spool;
@@ -117,7 +117,7 @@ static int make_record(struct looking *l, const struct ledger_job *j, struct err
 
 /* ---- one job ---- */
 
-/* Something was merged or begun of it, which nobody would do for a job that was not accepted. */
+/* Something of it was merged or started, so the job had been accepted. */
 static bool has_results(const struct spool *spool, uint64_t id)
 {
 	char path[SPOOL_PATH_MAX];
@@ -137,7 +137,7 @@ static bool has_results(const struct spool *spool, uint64_t id)
 	return any;
 }
 
-/* From its copy, as its record says: it lives or has ended. */
+/* From its copy; whether it is live or has ended is in its record. */
 static int make_row(struct looking *l, struct row_file *f, bool ended, const char *why, struct error *e)
 {
 	if (ended) {
@@ -150,7 +150,7 @@ static int make_row(struct looking *l, struct row_file *f, bool ended, const cha
 	return ledger_put(l->jobs->ledger, &f->job, e);
 }
 
-/* There is a row, and it is whole. */
+/* The row exists and is undamaged. */
 static int with_row(struct looking *l, const struct ledger_job *j, struct row_file *f, int file, bool ended,
 		    struct error *e)
 {
@@ -162,7 +162,7 @@ static int with_row(struct looking *l, const struct ledger_job *j, struct row_fi
 	if (file == -EBADMSG)
 		say(j->id, "the copy of its row in its folder (order) is damaged: made anew from jobs.db");
 	if (row_file_write(l->jobs->spool, j, e))
-		say(j->id, e->text); /* a full disk keeps no job from going on */
+		say(j->id, e->text); /* a full disk must not stop the job */
 	return 0;
 }
 
@@ -175,7 +175,7 @@ static int without_row(struct looking *l, uint64_t id, bool damaged, struct row_
 					: "jobs.db had lost its row: made anew from its folder",
 				e);
 	if (ended)
-		return damaged ? ledger_forget(l->jobs->ledger, id, e) : 0; /* its record says all */
+		return damaged ? ledger_forget(l->jobs->ledger, id, e) : 0; /* its record contains everything */
 	if (damaged)
 		return is_lost(l, id,
 			       "its row in jobs.db is damaged, and so is the copy in its folder (order), or it is gone",
@@ -222,7 +222,7 @@ static int look_at_folders(struct looking *l, struct error *e)
 	return rc;
 }
 
-/* Rows without a folder: living ones fail with a sentence (restore.h), ended ones are nobody's. */
+/* Rows without a folder: live jobs fail with a sentence (restore.h), ended ones are dropped. */
 static int look_at_rows(struct looking *l, struct error *e)
 {
 	struct ledger_job j;

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * At the start, before any job is read: the rows of the ledger against the jobs' own folders. What one of the two has
- * lost or damaged is made anew from the other (at level error: it should not have happened); so is the damaged record
- * of a job that has ended, as far as its row knows it. What neither knows is not
- * deleted: the start is refused, and says what is missing; with --accept-loss such folders are put into spool/lost,
- * each with a sentence, and the rest goes on.
+ * Compares the rows of the ledger with the jobs' folders at the start, before any job is read. What one of the two has
+ * lost or damaged is restored from the other and logged at level error; so is the damaged record of an ended job, as
+ * far as its row contains it. What is lost in both is not deleted: the start is refused, and says what is missing. With
+ * --accept-loss such folders are moved to spool/lost, each with an explanation, and the rest continues.
  */
 #ifndef COORDINATOR_JOBS_RECONCILE_H
 #define COORDINATOR_JOBS_RECONCILE_H
@@ -13,7 +12,7 @@
 
 /* Opens the ledger. -EBADMSG: something is lost. */
 int reconcile(struct jobs *jobs, struct error *e);
-/* The row has been written: so is its copy. What the disk does not take is said, and written at the next start. */
+/* Call after the row was written: writes its copy. What the disk refuses is logged, and written at the next start. */
 void reconcile_row(struct jobs *jobs, uint64_t job);
 
 #endif

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The jobs of the last run, from the spool into the list of jobs.
+ * Reads the jobs of the last run from the spool.
  *
- * recovery_begin makes a job of each row of the ledger (restore.c) and lists them; the pool then reads their films, one
- * job after the other (replay.h). When the last one is there the core is told of all of them in the order of their
- * numbers, each takes its place among the jobs that run, and peers are served what they asked for meanwhile.
+ * recovery_begin makes a job from each row of the ledger (restore.c) and lists them. The pool then reads their films,
+ * one job after the other (replay.h). After the last one, the core is told of all of them in the order of their
+ * numbers, they join the running jobs, and requests that arrived meanwhile are served.
  *
- * A job whose checkpoint or journal is damaged is read again without them, which begins it anew; they stay as
- * *.damaged. One that has no folder, plan or scene fails, with the reason in its record. An error of the machine, or a
- * file of another version, stops the coordinator and leaves everything as it was: the next start may go better.
+ * A job whose checkpoint or journal is damaged is read again without them, so it starts over; the files are kept as
+ * *.damaged. A job without folder, plan or scene fails, with the reason in its record. An error of the machine, or a
+ * file of another version, stops the coordinator and leaves everything unchanged: the next start may succeed.
  */
 #include "coordinator/jobs/recovery.h"
 
@@ -29,14 +29,14 @@
 struct recovery {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct found **last, *at; /* of jobs.found. at: the one that is read; NULL: none is */
-	uint64_t bytes, read;	  /* of all; of those that are done with */
+	struct found **last, *at; /* of jobs.found. at: the one being read; NULL: none */
+	uint64_t bytes, read;	  /* of all jobs; of finished ones */
 	bool under_way;
-	int rc; /* of the one that was read */
+	int rc; /* of the job just read */
 	struct error error;
 };
 
-/* ---- how far it is */
+/* ---- progress ---- */
 
 bool recovery_is_on(const struct jobs *jobs)
 {
@@ -91,10 +91,10 @@ size_t recovery_views(const struct jobs *jobs, struct job_view *v)
 	return n;
 }
 
-/* ---- what cannot be read */
+/* ---- jobs that cannot be read ---- */
 
-/* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may
- * want to look at it. */
+/* The stored data is damaged: the job's batches can be computed again, with the same bits. Nothing is deleted, since
+ * somebody may want to look at it. */
 static void put_aside(struct jobs *jobs, struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
@@ -108,7 +108,7 @@ static void put_aside(struct jobs *jobs, struct live_job *job)
 	journal_put_aside(folder);
 }
 
-/* Not of the machine, but of what is stored: the same at every start. ENOENT: its folder is gone. */
+/* An error of the stored data rather than of the machine: it recurs at every start. ENOENT: its folder is missing. */
 static bool is_lasting(int rc)
 {
 	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
@@ -132,7 +132,7 @@ static void write_end(struct jobs *jobs, struct job_record *r, const char *why)
 	ended_jobs_add(jobs, r);
 }
 
-/* The job has failed, if that is how it would be at every start; else an error of the machine. */
+/* The job fails if the error would recur at every start; otherwise it is an error of the machine. */
 static int give_up(struct jobs *jobs, uint64_t id, uint64_t extended, int rc, struct error *e)
 {
 	struct error why = *e;
@@ -160,7 +160,7 @@ static void fail(struct jobs *jobs, int rc, const struct error *e)
 	jobs->stop(jobs->stop_user);
 }
 
-/* All have been read, and the core is told of them. */
+/* All have been read: tells the core. */
 static int finish(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
@@ -189,7 +189,7 @@ static int finish(struct jobs *jobs, struct error *e)
 	mem_free(r);
 	jobs->recovery = NULL;
 	jobs->changes++;
-	blob_store_trim(jobs->blobs); /* the files of living jobs are held by now */
+	blob_store_trim(jobs->blobs); /* live jobs hold their files by now */
 	keep_trim(jobs);
 	jobs->peers.jobs_read(jobs->peers.user);
 	return 0;
@@ -203,7 +203,7 @@ static void run(uv_work_t *work)
 
 static void done(uv_work_t *work, int status);
 
-/* The one at hand, or the end. */
+/* Reads the next job, or ends. */
 static int go_on(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
@@ -225,7 +225,7 @@ static void remove_found(struct recovery *r, struct found *f)
 	mem_free(f);
 }
 
-/* It cannot be read. 0: it is read again, or has failed for good. */
+/* A job cannot be read. 0: it is read again, or has failed for good. */
 static int take_failure(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
@@ -278,7 +278,7 @@ static void done(uv_work_t *work, int status)
 		fail(jobs, rc, &e);
 }
 
-/* ---- begin and end */
+/* ---- start and end ---- */
 
 static int add(struct jobs *jobs, const struct ledger_job *j, struct error *e)
 {

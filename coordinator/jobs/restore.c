@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job from its row in the ledger: submission, plan and record, then the core.
+ * Makes a job from its row in the ledger: submission, plan and record, then the core.
  *
  * restore_open lists the jobs that had not ended. restore_live_job unpacks one, holds the files of its scene and takes
- * from its record what the submission does not say. When its films are there too, restore_tell says to the core which
- * epoch of each group and part comes next, and who made the states that it begins with.
+ * from its record what the submission does not contain. Once its films are read, restore_tell tells the core which
+ * epoch of each group and part comes next, and who made the states it starts from.
  *
- * A submission or plan that cannot be unpacked is -EPROTO if another version took the job, else -EBADMSG; the caller
- * decides what becomes of the job. Nothing is left behind: files that were held are let go.
+ * A submission or plan that cannot be unpacked is -EPROTO if another version accepted the job, otherwise -EBADMSG; the
+ * caller decides what happens to the job. Nothing is left behind: held files are released.
  */
 #include "coordinator/jobs/restore.h"
 
@@ -32,7 +32,7 @@ static uint64_t next_epoch(const struct live_job *job, uint32_t group, uint32_t 
 			      .group = group,
 			      .part = part,
 			      .epoch = canvas_rounds(job->canvas)};
-	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* what was taken back is missing */
+	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* a taken-back batch is missing */
 		before.epoch = k.epoch - 1;
 		if (canvas_has(job->canvas, &before))
 			break;
@@ -125,7 +125,7 @@ int restore_record(const struct jobs *jobs, uint64_t id, struct job_record *r, b
 	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
 }
 
-/* What the submission does not say, but its earlier end: its image is there until the next one is. */
+/* What the submission does not contain, except for its earlier end: its image exists until the next one does. */
 static int take_record_of(const struct jobs *jobs, const struct ledger_job *j, struct live_job *job, struct error *e)
 {
 	job->record.priority = j->priority;
@@ -139,7 +139,7 @@ static int take_record_of(const struct jobs *jobs, const struct ledger_job *j, s
 	return rc;
 }
 
-/* Plan or submission cannot be read: they are of another version, or damaged. */
+/* Plan or submission cannot be read: another version, or damaged. */
 static int not_known(const struct ledger_job *j, int rc, struct error *e)
 {
 	if (rc != -EBADMSG && rc != -EINVAL)
@@ -205,7 +205,7 @@ int restore_open(struct jobs *jobs, struct error *e)
 		rc = restore_record(jobs, id, r, &there, e);
 		if (rc)
 			break;
-		/* Its record was written before its end came into the ledger. */
+		/* Its record was written before its end was in the ledger. */
 		if (there && record_is_ended(r) && r->extended == j.extended) {
 			rc = ledger_end(jobs->ledger, id, r->extended, r->state, e);
 			continue;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Results of leases on their way to the core: now, or when nobody reads their film any more. */
+/* Passes results of leases to the core, at once or when nobody reads their film any more. */
 #include "coordinator/jobs/results.h"
 
 #include "common/base/mem.h"
@@ -11,7 +11,7 @@
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/step.h"
 
-/* It can be made again. */
+/* It can be computed again. */
 static void refuse(struct jobs *jobs, uint64_t peer, const struct lease_key *k, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = peer, .job = k->job, .lease = {.key = *k}};
@@ -48,7 +48,7 @@ static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResul
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
 	if (job && !rc && job->canvas && batch.key.kind == LEASE_RENDER)
 		rc = canvas_admits(job->canvas, &batch, &e);
-	if (rc == -ERANGE) { /* perhaps any worker's would be like that: as one that could not be computed */
+	if (rc == -ERANGE) { /* perhaps any worker's result would be like that: treated as a failed lease */
 		fail(jobs, job, peer, &ev.lease.key, e.text);
 		batch_fini(&batch);
 		return;
@@ -69,8 +69,8 @@ static void take_result(struct jobs *jobs, uint64_t peer, const Farm__LeaseResul
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
 	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
-	if (rc == -ENOMEM ||
-	    (job && ev.lease.valid && durable_reserve(jobs, job, &in, &e))) /* no room for it, here or on the disk */
+	if (rc == -ENOMEM || (job && ev.lease.valid &&
+			      durable_reserve(jobs, job, &in, &e))) /* no room for it, in memory or on the disk */
 		refuse(jobs, peer, &ev.lease.key, e.text);
 	else
 		jobs_step_with(jobs, &ev, &in);
@@ -86,15 +86,15 @@ static bool has_room(const struct jobs *jobs, const struct buf *payload)
 	return bytes <= jobs->config.waiting_bytes;
 }
 
-/* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and
- * one of those that nobody's waits for. */
+/* The film is in use. Results that the core would merge wait: one for each lease that its worker holds, and one for
+ * a lease without holder. */
 static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, const struct lease_key *k,
 		    struct envelope *env, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
 	enum farm_delivery awaited = farm_awaits(jobs->farm, peer, k);
 	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(job, k) : NULL;
-	if (w && w->peer == peer) /* the answer to that one is the answer to this one */
+	if (w && w->peer == peer) /* the answer to that one answers this one */
 		return;
 	if (awaited == DELIVERY_USELESS)
 		ev.kind = EVENT_BATCH;
@@ -106,7 +106,8 @@ static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, cons
 	jobs_step(jobs, &ev);
 }
 
-/* Who does not hold the lease, or refuses states that it had before, refuses nothing that is there: nobody made it. */
+/* A worker that does not hold the lease, or refuses states of an earlier grant, refuses nothing current: there is no
+ * maker. */
 static void log_failure(const struct jobs *jobs, const char *from, struct live_job *job, const Farm__LeaseFailed *f,
 			const struct lease_key *k, const char *text, bool holds)
 {
@@ -128,7 +129,7 @@ void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFai
 	char text[1024];
 	struct blob_hash states = {{0}};
 	struct event ev = {.kind = *f->text ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED, .peer = peer, .text = text};
-	/* Whatever it says, it failed: many texts of a scene's author are in it. */
+	/* Sanitised: it may contain texts of a scene's author. */
 	text_copy(text, sizeof text, f->text);
 	text_clean(text);
 	if (lease_key_from_wire(f->key, &ev.lease.key, &e) ||
@@ -148,7 +149,7 @@ void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFai
 	}
 	struct back back = {0};
 	bool holds = farm_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
-		     !ev.lease.other_states; /* else nothing is read for it */
+		     !ev.lease.other_states; /* otherwise nothing is read for it */
 	if (job && *text)
 		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);
 	if (job && *text && f->bad_states && holds && !job->busy && !jobs->stepping &&
@@ -161,7 +162,7 @@ void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFai
 	back_fini(&back);
 }
 
-/* Its states are refused: looked at when nobody reads the film. */
+/* Its states are refused: handled when nobody reads the film. */
 static void take_refusal(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;

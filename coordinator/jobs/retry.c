@@ -19,7 +19,7 @@ void retry_tick(struct jobs *jobs)
 		if (job->unrecorded) {
 			job->unrecorded = false;
 			finish_ended(jobs);
-			return; /* the list may have changed; the others next time */
+			return; /* the list may have changed; continue next time */
 		}
 		if (job->unprepared && !job->ended) {
 			struct event ev = {.kind = EVENT_TICK};

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How the jobs are opened and closed.
+ * Opens and closes the jobs.
  *
- * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and begins to read those
- * that had not (recovery.c). An error of the spool ends the start with a sentence; jobs_close then gives back what was
+ * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and starts to read those
+ * that had not (recovery.c). An error of the spool ends the start with a sentence; jobs_close then closes what was
  * opened.
  */
 #include "coordinator/jobs/start.h"

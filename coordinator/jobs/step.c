@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How an event runs through the core, and what follows from it.
+ * Passes an event through the core and carries out what follows.
  *
  * jobs_step gives it to the core (core/farm.h), which changes its state and answers with a list of actions. The table
- * `follow_up` carries these out. Events that come up meanwhile are queued and follow before jobs_step returns; then the
- * table is told that the step is over. The core says when it must be told the time at the latest: the timer `wake`.
+ * `follow_up` carries these out. Events that arise meanwhile are queued and handled before jobs_step returns; then the
+ * table is told that the step is over. The core says by when it must be told the time: the timer `wake`.
  *
- * A step does not fail. Without memory for a queued event (300 bytes) the process ends.
+ * A step does not fail. If there is no memory for a queued event (300 bytes), the process ends.
  */
 #include "coordinator/jobs/step.h"
 
@@ -23,7 +23,7 @@
 void jobs_defer(struct jobs *jobs, const struct event *ev)
 {
 	struct deferred *d = mem_alloc(1, sizeof *d);
-	if (!d) /* 300 bytes: without them nothing can go on */
+	if (!d) /* 300 bytes, without which nothing can continue */
 		abort();
 	d->event = *ev;
 	text_copy(d->text, sizeof d->text, ev->text ? ev->text : "");
@@ -47,7 +47,7 @@ static void one_step(struct jobs *jobs, struct event *ev, const struct incoming 
 	struct update u;
 	ev->time = jobs_now(jobs);
 	ev->unread = ev->time - jobs->read;
-	if (ev->unread < jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* nobody is missed for so little */
+	if (ev->unread < jobs->config.heartbeat_seconds + 1e-3 * TICK_MS) /* nobody is blamed for so short a silence */
 		ev->unread = 0;
 	farm_step(jobs->farm, ev, &u);
 	jobs->changes++;
@@ -62,7 +62,7 @@ static void one_step(struct jobs *jobs, struct event *ev, const struct incoming 
 
 void jobs_step(struct jobs *jobs, struct event *ev)
 {
-	if (jobs->stepping) /* what sessions say while an update is carried out */
+	if (jobs->stepping) /* messages of sessions while an update is being carried out */
 		jobs_defer(jobs, ev);
 	else
 		jobs_step_with(jobs, ev, &nothing);

@@ -10,7 +10,7 @@
 
 static const char file[] = "aside";
 
-/* ---- the file */
+/* ---- the file of quarantined workers */
 
 static int add_worker(json_t *list, const struct worker_status *w, struct error *e)
 {
@@ -67,7 +67,7 @@ static void tell_core(struct jobs *jobs, const json_t *w)
 	jobs_step(jobs, &ev);
 }
 
-/* The farm does not stand still for it: whoever gives wrong results will do so again, and is found again. */
+/* The farm does not stop for it: a worker that gives wrong results will do so again, and be found again. */
 static int put_by(struct jobs *jobs, struct error *e)
 {
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
@@ -104,7 +104,7 @@ int trust_open(struct jobs *jobs, struct error *e)
 	return rc;
 }
 
-/* ---- what they did */
+/* ---- wrong results */
 
 double trust_share(const struct jobs *jobs, const Farm__Submit *m)
 {

@@ -2,12 +2,13 @@
 /*
  * A client's side of a session: submit, list, watch; fetch.c and control.c have the rest.
  *
- * A submission waits in the session until its files are there (upload.h), and then goes to the core, whose answer is
- * the client's. A client sees its own jobs alone, by the name in its certificate; an operator sees all, and so does
- * everybody without TLS. Whoever watches a job gets its status when that has changed and the one before has been read.
+ * A submission waits in the session until its files have arrived (upload.h), and then goes to the core, whose answer is
+ * the client's. A client sees only its own jobs, by the name in its certificate; an operator sees all, and so does
+ * everybody without TLS. A client that watches a job gets its status whenever it has changed and the previous one has
+ * been read.
  *
- * A submission that is refused, or beyond its owner's quota, is answered with a sentence, and the client may submit
- * another. A message that no client sends is answered by Fault, and the connection ends.
+ * A submission that is refused, or exceeds its owner's quota, is answered with a sentence, and the client may submit
+ * another. An invalid message is answered by Fault, and the connection ends.
  */
 #include "coordinator/peers/client.h"
 
@@ -83,13 +84,13 @@ static int within_quota(const struct session *p, struct error *e)
 				 p->upload->submit.message->submit, e);
 }
 
-/* Every blob is there: the core decides. */
+/* All blobs have arrived: the core decides. */
 static void submit(struct session *p)
 {
 	const Farm__Submit *m = p->upload->submit.message->submit;
 	char name[128];
 	struct error e;
-	if (within_quota(p, &e)) { /* again: other jobs may have come while its files did */
+	if (within_quota(p, &e)) { /* checked again: other jobs may have been submitted while its files arrived */
 		answer_submit(p, 0, e.text, NULL);
 		client_upload_abort(p);
 		return;
@@ -160,7 +161,7 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 	}
 }
 
-/* ---- the rest ---- */
+/* ---- other requests ---- */
 
 static void take_list(struct session *p)
 {

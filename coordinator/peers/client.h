@@ -5,9 +5,9 @@
 
 #include "coordinator/peers/session.h"
 
-/* What it says. May take the envelope. */
+/* Handles a message. May take the envelope. */
 void client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
-void client_tick(struct session *p); /* what has changed of the job that it watches */
+void client_tick(struct session *p); /* sends what has changed in the job that it watches */
 void client_upload_abort(struct session *p);
 
 #endif

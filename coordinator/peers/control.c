@@ -8,7 +8,7 @@
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/client_answers.h"
 
-/* Without a certificate anybody may call himself anything. */
+/* Without certificates anybody can use any name. */
 static const char *name_of(const struct session *p)
 {
 	return *p->who.name ? p->who.name : "a client";
@@ -21,7 +21,7 @@ static int tell(struct session *p, struct event *ev)
 	return *p->rejected ? -1 : 0;
 }
 
-/* The core knows whether it can be, and is told first. */
+/* The core knows whether it can be cancelled, so it is asked first. */
 static void not_for_long(struct session *p, const struct error *e)
 {
 	text_print(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %s",
@@ -65,7 +65,7 @@ static void set_priority(struct session *p, uint64_t id, int priority)
 		live_job_log(job, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
 }
 
-/* The core need not know a job that is over any more. false: p->rejected says why. */
+/* The core may have forgotten a job that is over. false: p->rejected is the reason. */
 static bool finds(struct session *p, uint64_t job, bool over_too)
 {
 	struct job_view v;
@@ -108,8 +108,8 @@ void control_job(struct session *p, const Farm__Control *c)
 						       .mutations = c->more_mutations,
 						       .seconds = c->more_seconds,
 						       .target_error = c->target_error});
-			return; /* with an answer, or there will be one */
-		default:	/* a number from outside */
+			return; /* answered now or later */
+		default:	/* an untrusted number */
 			text_copy(p->rejected, sizeof p->rejected, "nothing that can be done with a job");
 		}
 	}

@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The conversation of one connection: its handshake, then what it says as a worker (worker.c) or as a client
- * (client.c).
+ * The protocol of one connection: its handshake, then messages as a worker (worker.c) or as a client (client.c).
  *
  * The first message must be hello, within a time limit, and at most 4 KiB long. Version, names and the certificate's
- * role are checked; whoever is refused gets a sentence, and a worker is also told whether calling again can help. A
- * worker then asks for leases, sends results or failures, asks for files, and sends heartbeats; each message becomes an
- * event for the core, and each result is checked first (results.c).
+ * role are checked; a peer that is refused gets a sentence, and a worker is also told whether reconnecting can help.
+ * Then a worker asks for leases, sends results or failures, asks for files, and sends heartbeats; each message becomes
+ * an event for the core, and each result is checked first (results.c).
  *
- * A message that its sender must not send is answered by Fault, and the connection ends. What a peer does not read is
- * bounded by a send limit. When the maximum of connections is reached the oldest one without a hello is closed. When a
- * connection ends, the core is told EVENT_LEFT, and uploads, fetches and requests of that peer are dropped.
+ * An invalid message is answered by Fault, and the connection ends. Data that a peer does not read is bounded by a send
+ * limit. When the maximum of connections is reached, the oldest one without a hello is closed. When a connection ends,
+ * the core gets EVENT_LEFT, and the peer's uploads, fetches and requests are dropped.
  */
 #include "coordinator/peers/conversation.h"
 
@@ -30,7 +29,7 @@
 
 /* ---- hello ---- */
 
-/* said: why it is refused, or what a peer that is not should know. */
+/* text: why it is refused, or a note for a peer that is accepted. */
 static void answer_hello(struct session *p, bool accepted, bool final, const char *said)
 {
 	char text[256];
@@ -60,13 +59,13 @@ static void send_hello_ack(struct session *p, bool accepted, const char *said)
 	answer_hello(p, accepted, false, said);
 }
 
-/* What calling again does not mend. */
+/* Reasons that reconnecting does not change. */
 static void refuse_for_good(struct session *p, const char *said)
 {
 	answer_hello(p, false, true, said);
 }
 
-/* What a peer that is welcome should know. */
+/* Notes for a peer that is accepted. */
 static const char *what_to_know(const struct session *p, char *text, size_t size)
 {
 	struct peer_status s;
@@ -109,7 +108,7 @@ static void join(struct session *p, const Farm__Hello *h)
 	send_hello_ack(p, true, what_to_know(p, text, sizeof text));
 }
 
-/* What the certificate does not allow; NULL: it does. */
+/* What the certificate does not allow; NULL: it allows everything. */
 static const char *overreach(struct session *p, Farm__Role role, char *text, size_t size)
 {
 	const struct tls_peer *who = conn_peer(p->conn);
@@ -125,7 +124,7 @@ static const char *overreach(struct session *p, Farm__Role role, char *text, siz
 	return text;
 }
 
-/* Hexadecimal digits, as many as the core remembers. */
+/* Hexadecimal digits, as many as the core stores. */
 static bool home_ok(const char *home)
 {
 	size_t n = strspn(home, "0123456789abcdef");
@@ -168,9 +167,9 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 	}
 }
 
-/* ---- the connection ---- */
+/* ---- connections ---- */
 
-/* What the peer says. May take the envelope. */
+/* Handles a message. May take the envelope. */
 static void take_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	if (p->state == SESSION_NEW && env->message->body_case == FARM__ENVELOPE__BODY_HELLO)

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One peer's conversation: hello, then as a worker or as a client. Limits depend on where the conversation is. The
- * loop's thread.
+ * The protocol of one peer: hello, then as a worker or as a client. Limits depend on the state. The loop's thread.
  */
 #ifndef COORDINATOR_PEERS_CONVERSATION_H
 #define COORDINATOR_PEERS_CONVERSATION_H
@@ -10,7 +9,7 @@
 
 extern const struct conn_events conversation_events; /* user: the session */
 
-/* The jobs are there: what waited for them (held.h) is taken now. */
+/* The jobs have been read: handles the requests that waited for that (held.h). */
 void conversations_go_on(struct peers *s);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a client fetches, piece by piece, is one file from its first piece to its last: it is opened once, however often
- * another one gets its name meanwhile.
+ * Files of jobs for clients, chunk by chunk. A file is opened once per fetch, so all chunks are of the same file even
+ * if another one takes its name meanwhile.
  */
 #include "coordinator/peers/fetch.h"
 
@@ -15,7 +15,7 @@
 #include <time.h>
 
 enum { CHUNK = 1 << 20 };
-static const double preview_seconds = 5; /* a younger one is good enough */
+static const double preview_seconds = 5; /* an image younger than this is reused */
 
 static const char *file_of(Farm__What what)
 {
@@ -27,7 +27,7 @@ static const char *file_of(Farm__What what)
 	case FARM__WHAT__WHAT_PREVIEW:
 		return "preview.exr";
 	default:
-		return NULL; /* a number from outside */
+		return NULL; /* an untrusted number */
 	}
 }
 
@@ -51,7 +51,7 @@ void fetch_end(struct session *p)
 	p->peers->fetches--;
 }
 
-/* Who has asked for nothing for longest gives way: clients that begin and stop must not keep out those who go on. */
+/* The fetch that has been idle longest is dropped: clients that start and stop must not block those that continue. */
 static void make_room(struct peers *s)
 {
 	struct session *silent = NULL;
@@ -77,7 +77,7 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 			disk_close(fd);
 		return rc;
 	}
-	if (st.st_size > CHUNK) /* else this is its only piece */
+	if (st.st_size > CHUNK) /* otherwise this is its only chunk */
 		make_room(p->peers);
 	p->fetch = (struct fetching){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
 	p->peers->fetches++;
@@ -149,7 +149,7 @@ static void answer(struct session *p, const Farm__Fetch *f)
 	mem_free(bytes);
 }
 
-/* Made when somebody asks: it holds up the job's results for as long as an image takes. */
+/* Made on demand: it delays the job's results for as long as making the image takes. */
 static bool is_preview_old(const struct jobs *jobs, const struct live_job *job)
 {
 	return job && job->canvas && !job->ended &&

@@ -5,12 +5,13 @@
 
 #include "coordinator/peers/session.h"
 
-/* A piece is asked for; it is sent now, or when the preview is made. */
+/* Handles a request for a chunk, now or when the preview is ready. */
 void fetch_begin(struct session *p, const Farm__Fetch *f);
 void fetch_end(struct session *p);
-/* The live job's canvas is free, or the job has ended: who waits for its preview gets it, or it is made now. */
+/* The live job's canvas is free, or the job has ended: sends the preview to those that wait for it, or starts making
+ * it. */
 void fetch_previews(struct peers *s, uint64_t job);
-/* Somebody fetches the job's result, or waits for it. */
+/* Whether somebody fetches the job's result, or waits for it. */
 bool fetch_uses(const struct peers *s, uint64_t job);
 
 #endif

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-/* Memory of all, and of one peer: a worker asks once for each job that it knows, and says which leases ended it. */
+/* Limits of memory, in total and per peer: a worker asks once for each job that it knows, and reports lost leases. */
 enum { HELD_MOST = 1 << 28, PEER_MOST = 1 << 23, MESSAGE_COST = 256 };
 
 struct held {
@@ -19,7 +19,7 @@ static size_t cost_of(const struct envelope *env)
 	return env->used + MESSAGE_COST;
 }
 
-/* first: nothing of this peer waits. */
+/* first: nothing of this peer is waiting yet. */
 static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 {
 	return what == FARM__ENVELOPE__BODY_HEARTBEAT || what == FARM__ENVELOPE__BODY_BYE ||

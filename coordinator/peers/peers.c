@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * All connections: letting them in, and what the jobs ask of them.
+ * All connections: accepting them, and what the jobs ask of them.
  *
- * peers_accept makes a session of a connection, which enters the list and leaves it when its connection has closed
- * (conversation.c). When the maximum of connections is reached the oldest one without a hello gives way; when there is
- * none, or no memory, the caller is hung up on, or waits for the next tick where not even that can be done.
+ * peers_accept makes a session for a connection, which is in the list until its connection has closed (conversation.c).
+ * When the maximum of connections is reached, the oldest one without a hello is closed; if there is none, or no memory,
+ * the new one is closed, or waits for the next tick if not even that can be done.
  *
- * What the jobs call is at the end of the file: each function finds the session, and does nothing when it has gone.
+ * The functions that the jobs call are at the end of the file: each finds the session, and does nothing if it is gone.
  */
 #include "coordinator/peers/peers.h"
 
@@ -26,8 +26,8 @@ static void on_refused(void *user, const char *why)
 }
 static const struct conn_events refused_events = {.closed = on_refused};
 
-/* Whoever has not said who they are gives way, the one who has had longest first: strangers who hold connections and
- * say nothing must not keep out those who can. */
+/* Peers that have not said hello are closed first, the oldest first: strangers that hold connections and say nothing
+ * must not block others. */
 static bool make_room(struct peers *s)
 {
 	struct session *oldest = NULL;
@@ -92,7 +92,7 @@ void peers_stop(struct peers *s)
 		conn_close(p->conn, "the coordinator stops");
 }
 
-/* ---- what the jobs ask (peer_calls.h) ---- */
+/* ---- calls of the jobs (peer_calls.h) ---- */
 
 static const char *name(void *user, uint64_t peer)
 {

@@ -6,7 +6,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-/* ---- all of them ---- */
+/* ---- all sessions ---- */
 
 struct session *peers_find(const struct peers *s, uint64_t id)
 {
@@ -41,7 +41,7 @@ void peers_delist(struct peers *s, struct session *p)
 	s->session_count--;
 }
 
-/* ---- one ---- */
+/* ---- one session ---- */
 
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size)
 {

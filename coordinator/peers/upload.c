@@ -3,11 +3,11 @@
  * A submission on its way from its message to the core.
  *
  * upload_new checks it: names and texts, that paths stay inside the bundle, sizes against the limits, and the plan.
- * Files that the spool has are held at once; the client is told the hashes of the others and sends these, each in
- * order, and upload_add writes them under their hashes. When none is missing any more the job can be submitted.
+ * Files that the spool has are held at once. The client is told the hashes of the others and sends these, each in
+ * order, and upload_add stores them under their hashes. When none is missing any more, the job can be submitted.
  *
- * What is wrong is -EINVAL with a sentence for the client; bytes that do not have the hash they were sent for, or come
- * out of order, too. upload_free lets go of all that is held, whatever was done.
+ * Errors are -EINVAL with a sentence for the client, including bytes with a wrong hash or out of order. upload_free
+ * releases everything that is held.
  */
 #include "coordinator/peers/upload.h"
 
@@ -24,7 +24,7 @@ enum { FILES_MAX = 10000, DEFINES_MAX = 256, EFFECTS_MAX = 64, NOTES_MAX = 1000,
 enum { LEASE_MOST = 1 << 27 };
 static const uint64_t job_cache_max = 1ull << 34; /* 16 GiB */
 
-/* A relative path without "..": what a scene may ask for, and what a worker may look up. */
+/* A relative path without "..": what a scene may refer to, and a worker may look up. */
 static bool name_ok(const char *name)
 {
 	if (!envelope_text_ok(name, NAME_MAX_BYTES) || !*name || *name == '/')
@@ -63,7 +63,7 @@ static int compare_names(const void *x, const void *y)
 	return strcmp((*a)->name, (*b)->name);
 }
 
-/* Of two files of a name nobody could say which one the scene means. */
+/* Two files with the same name would be ambiguous. */
 static int check_names(const Farm__Submit *m, struct error *e)
 {
 	Farm__File **sorted = mem_alloc(m->n_files, sizeof *sorted);
@@ -136,7 +136,7 @@ static int compare_hashes(const void *x, const void *y, void *files)
 	return memcmp(f[*(const uint32_t *)x]->hash.data, f[*(const uint32_t *)y]->hash.data, BLOB_HASH_SIZE);
 }
 
-/* Some thousand files, of which each is looked for when it comes: they are put in order once. */
+/* There may be thousands of files, each looked up when it arrives, so they are sorted once. */
 static int sort_hashes(struct upload *u, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -152,7 +152,7 @@ static int sort_hashes(struct upload *u, struct error *e)
 	return 0;
 }
 
-/* The first place in by_hash that is not before h. */
+/* The index of the first in by_hash that is not before h. */
 static size_t place_of(const struct upload *u, const struct blob_hash *h)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -167,7 +167,7 @@ static size_t place_of(const struct upload *u, const struct blob_hash *h)
 	return low;
 }
 
-/* A blob has come: all files that have its content hold it. */
+/* A blob has arrived: every file with that content holds it. */
 static void hold_blob(struct upload *u, const struct blob_hash *h)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -191,7 +191,7 @@ static void look_for_blobs(struct upload *u)
 	}
 }
 
-/* A size that is not the blob's would mislead workers. */
+/* A size that differs from the blob's would mislead workers. */
 static int check_sizes(const struct upload *u, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
@@ -290,7 +290,7 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 	if (rc)
 		return rc;
 	hold_blob(u, &h);
-	blob_release(u->blobs, &h); /* the writer's hold; each file has its own now */
+	blob_release(u->blobs, &h); /* releases the writer's hold; each file has its own now */
 	return 1;
 }
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A worker's side of a session: what it says.
+ * A worker's side of a session: its messages.
  *
- * It asks for leases, sends results or failures, asks for jobs and pieces of their files, and sends heartbeats. Each
- * message becomes an event for the core; results and failures are looked at first (results.c). A message that no
- * worker sends is answered by Fault, and the connection ends.
+ * It asks for leases, sends results or failures, asks for jobs and chunks of their files, and sends heartbeats. Each
+ * message becomes an event for the core; results and failures are checked first (results.c). An invalid message is
+ * answered by Fault, and the connection ends.
  */
 #include "coordinator/peers/worker.h"
 
@@ -14,7 +14,7 @@
 
 #include <string.h>
 
-/* One that makes an epoch be taken back must not come while others read the films. */
+/* A failure that takes an epoch back must not be handled while others read the films. */
 static void take_lease_failed(struct session *p, struct envelope *env)
 {
 	struct buf nothing = {0};
@@ -42,8 +42,8 @@ static void take_lease_result(struct session *p, struct envelope *env)
 	buf_fini(&payload);
 }
 
-/* Also a message that takes long is a word from its worker, who must know for as long that we are here: its heartbeats,
- * and with them our answers, are behind that message. */
+/* A long message counts as a sign of life, and its worker needs one from us meanwhile: its heartbeats, and with them
+ * our answers, are queued behind that message. */
 void worker_heard(struct session *p)
 {
 	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
@@ -66,7 +66,7 @@ void worker_message(struct session *p, struct envelope *env)
 	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
 	const Farm__Envelope *m = env->message;
 	switch (m->body_case) {
-	case FARM__ENVELOPE__BODY_HEARTBEAT: /* answered, so that a worker notices a connection that is dead */
+	case FARM__ENVELOPE__BODY_HEARTBEAT: /* answered, so that a worker notices a dead connection */
 		session_send(p, m, NULL, 0);
 		jobs_step(p->jobs, &ev);
 		break;

@@ -5,8 +5,8 @@
 
 #include "coordinator/peers/session.h"
 
-/* What it says. May take the envelope. */
+/* Handles a message. May take the envelope. */
 void worker_message(struct session *p, struct envelope *env);
-void worker_heard(struct session *p); /* a part of a message that is still coming */
+void worker_heard(struct session *p); /* a part of an incomplete message has arrived */
 
 #endif

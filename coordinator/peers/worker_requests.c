@@ -10,7 +10,7 @@
 enum {
 	BLOB_CHUNK = 1 << 20,
 	AHEAD = 1 << 22, /* bytes that may be unsent when the next answer is made */
-	ASKS_MOST = 512, /* twice what a worker that has leases of as many jobs as it may hold has to ask */
+	ASKS_MOST = 512, /* twice what a worker can need that has leases of as many jobs as it may hold */
 };
 
 static void send_job_info(struct session *p, uint64_t id)

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a worker is told. What it may send is bounded by the largest result of the jobs that it knows, and what waits
- * for it to read by the leases that it asked for. A lease that cannot be packed ends the connection: the worker calls
- * again. The loop's thread.
+ * Messages to workers. What a worker may send is limited by the largest result of the jobs that it knows, and what may
+ * wait for it to read by the leases that it asked for. A lease that cannot be packed ends the connection, and the
+ * worker reconnects. The loop's thread.
  */
 #ifndef COORDINATOR_PEERS_WORKER_SEND_H
 #define COORDINATOR_PEERS_WORKER_SEND_H
 
 #include "coordinator/peers/session.h"
 
-/* Results of this job may come from now on, and they may be so long. */
+/* From now on it may send results of this job, of at most this size. */
 void worker_allow_results(struct session *p, const struct live_job *job);
 
-/* anew: with seeds. */
+/* anew: send seeds. */
 void worker_send_lease(struct session *p, const struct live_job *job, const struct lease_key *k, bool anew);
 void worker_send_revoke(struct session *p, const struct lease_key *k);
 void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);

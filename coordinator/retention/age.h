@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which finished jobs give up what: by age their films and results, then their records; by space the films of the job
- * that ended first before any result, results in the same order. Pure; any thread.
+ * Chooses which finished jobs are cleared of what. By age: films and results, then records. By space: the films of the
+ * job that ended first, before any result; then results in the same order. Pure; any thread.
  */
 #ifndef COORDINATOR_RETENTION_AGE_H
 #define COORDINATOR_RETENTION_AGE_H
@@ -12,19 +12,19 @@
 
 struct age_job {
 	uint64_t id;
-	double ended;			     /* s that had been seen to pass then (seen.h) */
-	uint64_t films, result;		     /* bytes: what only serves to go on; result, preview and log */
-	bool busy;			     /* somebody fetches its result: it stays this time */
-	bool no_films, no_result, no_record; /* the answer */
+	double ended;			     /* s of observed time at that moment (seen.h) */
+	uint64_t films, result;		     /* bytes: of what only serves extensions; of result, preview and log */
+	bool busy;			     /* somebody fetches its result: it is kept this time */
+	bool no_films, no_result, no_record; /* the output */
 };
 
 struct age_limits {
-	double seconds; /* after a job's end; 0: for ever. Its record stays AGE_RECORD times as long. */
-	uint64_t bytes; /* of all finished jobs together; 0: any */
+	double seconds; /* time after a job's end; 0: forever. Its record is kept AGE_RECORD times as long. */
+	uint64_t bytes; /* limit for all finished jobs; 0: none */
 };
 enum { AGE_RECORD = 10 };
 
-/* Sorts the jobs, the one that ended first to the front. now: s that have been seen to pass. */
+/* Sorts the jobs by end, the oldest first. now: observed time in s. */
 void age_choose(struct age_job *jobs, size_t count, const struct age_limits *l, double now);
 
 #endif

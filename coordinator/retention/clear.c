@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Clearing of finished jobs, by age and by space.
+ * Clears finished jobs, by age and by space.
  *
- * A round begins every hour, and soon after a job has ended: it lists the jobs of the spool, reads the record of each,
- * lets age.h choose, and clears those one by one. The work is cut into steps of one job; clear_tick does as many as fit
- * into 5 ms. A job is cleared in the order record, files, row, so that whoever asks for its result meanwhile is told
- * when it went.
+ * A round starts every hour, and soon after a job has ended: it lists the jobs of the spool, reads the record of each,
+ * lets age.h choose, and clears those one by one. The work is divided into steps of one job; clear_tick does as many as
+ * fit into 5 ms. A job is cleared in the order record, files, row, so that a client that asks for its result meanwhile
+ * is told when it was deleted.
  *
- * A job that runs again, or whose result a client fetches, is passed over. A record that cannot be written leaves its
- * job for the next round; without memory, or where the folder of jobs cannot be read, the round ends and the next one
- * tries again.
+ * A job that runs again, or whose result a client fetches, is skipped. If a record cannot be written, the job waits for
+ * the next round; if memory runs out or the folder of jobs cannot be read, the round ends and the next one tries again.
  */
 #include "coordinator/retention/clear.h"
 
@@ -27,18 +26,18 @@ static const double every_seconds = 3600, soon_seconds = 2, tick_seconds = 0.005
 static const char *const results[] = {"result.exr", "preview.exr", "log"};
 enum { RESULTS = sizeof results / sizeof *results };
 
-/* First all are looked at, then it is chosen among them, then what is chosen goes. */
+/* The phases: look at all, choose among them, clear the chosen ones. */
 struct clearing {
 	uint64_t *ids;
 	size_t id_count, looked;
 	struct age_job *jobs; /* those that have ended */
 	size_t job_count, cleared, records;
 	double now; /* s since 1970, when it was chosen; 0: not yet */
-	/* The ids of those whose records went take the places of those that were looked at. */
-	struct job_record record; /* the one at hand */
+	/* The ids of jobs without record overwrite those already looked at. */
+	struct job_record record; /* index of the current one */
 };
 
-/* Or is about to run again: its films are being read, so that it goes on. */
+/* Runs, or is about to run again: its films are being read for an extension. */
 static bool is_needed(const struct jobs *jobs, uint64_t job)
 {
 	return jobs_find(jobs, job) || jobs_is_read(jobs, job);
@@ -61,7 +60,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	if (is_needed(jobs, id))
 		return;
 	int rc = spool_read_record(jobs->spool, id, &c->record, NULL);
-	if (rc == -ENOENT) { /* if nothing is in it */
+	if (rc == -ENOENT) { /* only if it is empty */
 		char path[SPOOL_PATH_MAX];
 		spool_job_path(jobs->spool, id, NULL, path);
 		disk_rmdir(path);
@@ -69,8 +68,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	if (rc || !record_is_ended(&c->record))
 		return;
 	double now = ages_now(jobs);
-	if (c->record.ended_seen < 0 ||
-	    c->record.ended_seen > now) { /* nobody knows how old it is: it counts from here on */
+	if (c->record.ended_seen < 0 || c->record.ended_seen > now) { /* its age is unknown: it counts from now */
 		c->record.ended_seen = now;
 		if (spool_write_record(jobs->spool, &c->record, NULL))
 			return;
@@ -98,7 +96,7 @@ static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_r
 		r->has_result = false;
 		r->cleared = now;
 		if (spool_write_record(jobs->spool, r,
-				       &e)) { /* the result stays until its record can say that it is gone */
+				       &e)) { /* the result is kept until its record can say that it is deleted */
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)j->id,
 				  log_quote(e.text).text);
 			return;
@@ -127,7 +125,7 @@ static void drop_record(struct jobs *jobs, const struct age_job *j)
 	log_event(LOG_JOB_CLEARED, "job=j%llu what=record", (unsigned long long)j->id);
 }
 
-/* What was chosen, unless something has come of the job since. */
+/* Clears a chosen job, unless it has changed since. */
 static void clear_job(struct jobs *jobs, struct clearing *c, const struct age_job *j)
 {
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
@@ -158,7 +156,7 @@ static void choose(const struct jobs *jobs, struct clearing *c)
 	age_choose(c->jobs, c->job_count, &limits, ages_now(jobs));
 }
 
-/* false: that was all. */
+/* false: there are no more. */
 static bool step(struct jobs *jobs, struct clearing *c)
 {
 	if (c->looked < c->id_count)
@@ -172,7 +170,7 @@ static bool step(struct jobs *jobs, struct clearing *c)
 	return true;
 }
 
-/* At once, for each change of the database is flushed. */
+/* All at once, because each change of the database is flushed. */
 static void drop_rows(struct jobs *jobs, const struct clearing *c)
 {
 	struct error e;

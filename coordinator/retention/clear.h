@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Finished jobs go by age and by space (age.h): at the start, every hour, and soon after a job has ended. Never a
- * living job's files nor those of one that is being read to go on, never a result that a client is fetching or waits
- * for. The record says first that the result is gone, and when; then the files go. With its record a job's row goes,
- * too, and all that is left in its folder. All finished jobs are looked at, a few milliseconds in each tick: nobody
+ * Clears finished jobs by age and by space (age.h): at the start, every hour, and soon after a job has ended. It never
+ * touches files of live jobs or of jobs being read for an extension, nor a result that a client is fetching or waits
+ * for. First the record says that the result is deleted, and when; then the files are deleted. With its record, a job's
+ * row and the rest of its folder go, too. All finished jobs are examined, for a few milliseconds per tick, so nobody
  * waits for it. The loop's thread.
  */
 #ifndef COORDINATOR_RETENTION_CLEAR_H

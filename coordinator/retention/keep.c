@@ -63,7 +63,7 @@ bool keep_drop_all(const struct jobs *jobs)
 void keep_trim(const struct jobs *jobs)
 {
 	uint64_t left = jobs->config.keep_bytes;
-	for (size_t i = jobs->ended_count; i-- > 0;) { /* the latest ones first */
+	for (size_t i = jobs->ended_count; i-- > 0;) { /* starting with the most recent */
 		uint64_t bytes = keep_bytes(jobs, jobs->ended[i].id);
 		if (bytes > left)
 			keep_drop(jobs, jobs->ended[i].id);

@@ -8,10 +8,10 @@
 #include <sys/resource.h>
 
 enum {
-	OF_JOB = 3,  /* descriptors: its log, its journal, the next one while a checkpoint is written */
-	SPARE = 128, /* the spool's and the database's, files on their way in, whoever looks at the status */
+	OF_JOB = 3,  /* descriptors per job: log, journal, the next journal during a checkpoint */
+	SPARE = 128, /* spool and database, incoming files, readers of the status */
 	OTHERS = FARM_JOBS * OF_JOB + FETCHES_MOST + SPARE,
-	FEWEST = 16, /* connections without which a coordinator is none */
+	FEWEST = 16, /* a coordinator needs at least so many connections */
 };
 
 int limits_connections(unsigned asked, unsigned *connections, struct error *e)

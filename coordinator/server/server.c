@@ -2,14 +2,14 @@
 /*
  * The coordinator's event loop.
  *
- * server_open opens the jobs, which begins to read those of the last run (recovery.h), and listens. From then on
- * sockets, timers and the thread pool drive everything: what peers say becomes an event for the core (step.h). Five
- * times a second a timer drives what has to happen by itself: status, retries, checkpoints, retention, the service
- * manager's watchdog.
+ * server_open opens the jobs, which starts to read those of the last run (recovery.h), and listens. From then on
+ * sockets, timers and the thread pool drive everything: messages of peers become events for the core (step.h). Five
+ * times a second a timer drives everything else: status, retries, checkpoints, retention, the service manager's
+ * watchdog.
  *
- * SIGTERM and SIGINT stop the loop when the work in the thread pool has ended; nothing needs to be written then, for
- * everything acknowledged is on disk. Errors of one job hold or end that job. A fault that makes the spool unreadable
- * stops the coordinator with a message (server_run returns it).
+ * SIGTERM and SIGINT stop the loop when the work in the thread pool has ended; nothing needs to be written then,
+ * because everything acknowledged is on disk. Errors of one job hold or end that job. A fault that makes the spool
+ * unreadable stops the coordinator with a message (server_run returns it).
  */
 #include "coordinator/server/server.h"
 
@@ -89,7 +89,7 @@ static int open_tls(struct server *s, struct error *e)
 			 s->jobs.config.tls, self->name, tls_role_name(self->role));
 }
 
-/* A list of the revoked or a new certificate is taken up within a second. */
+/* A new revocation list or certificate is used within a second. */
 static void refresh_tls(struct server *s)
 {
 	struct error e;
@@ -106,7 +106,7 @@ static void refresh_tls(struct server *s)
 		log_event(LOG_TLS_EXPIRY, "text=%s", log_quote(text).text);
 }
 
-/* What came before the loop looked at its sockets has been read when it has. */
+/* Everything that arrived before the loop polled its sockets has been read after this. */
 static void on_look(uv_prepare_t *h)
 {
 	struct server *s = h->data;

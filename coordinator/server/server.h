@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator: jobs, connections and status on one loop and one thread; heavy work on films goes to the pool.
+ * The coordinator: jobs, connections and status on one loop and one thread; heavy work on films runs in the pool.
  * server_run returns when a signal has stopped it.
  */
 #ifndef COORDINATOR_SERVER_SERVER_H
@@ -11,7 +11,7 @@
 
 int server_run(const struct server_config *c, struct error *e);
 
-/* ---- for whoever turns its loop ---- */
+/* ---- for callers that run its loop themselves ---- */
 
 struct status_socket;
 
@@ -20,20 +20,20 @@ struct server {
 	uv_timer_t tick;
 	uv_prepare_t look;
 	uv_check_t check;
-	double looked; /* s: when the loop looked at its sockets last */
+	double looked; /* s: when the loop last polled its sockets */
 	uv_signal_t on_term, on_int;
 	struct jobs jobs;
 	struct peers peers;
 	struct status_socket *status;
-	double tls_next;		/* when its files are looked at again */
-	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it is told again
-					   that we run */
+	double tls_next; /* next check of its files */
+	double watchdog,
+		watchdog_next; /* the service manager's watchdog interval (0: none), and when to notify it next */
 };
 
-/* It listens; the jobs of an earlier run are read by its loop (recovery.h). */
+/* Starts to listen; the loop reads the jobs of an earlier run (recovery.h). */
 int server_open(struct server **s, const struct server_config *c, struct error *e);
-int server_await_jobs(struct server *s, struct error *e); /* turns the loop until they are */
-void server_stop(struct server *s);  /* no more is begun; the loop ends when what is under way has ended */
-void server_close(struct server *s); /* stops it, if no signal has */
+int server_await_jobs(struct server *s, struct error *e); /* runs the loop until they have been read */
+void server_stop(struct server *s);  /* nothing new is started; the loop ends when running work has ended */
+void server_close(struct server *s); /* stops it, unless a signal has */
 
 #endif

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The status socket: lines of JSON to whoever connects.
+ * The status socket: lines of JSON for every reader.
  *
  * A reader gets a snapshot at once, and then what it subscribes to: jobs, workers, or the snapshot. status_tick
- * compares each job with what was said of it last and tells only what has changed; nothing is made when nobody is
- * subscribed. The file of the socket is removed at the end if it is still the one that was made.
+ * compares each job with what was last sent about it and sends only changes; nothing is done while nobody is
+ * subscribed. At the end the socket's file is removed if it is still the same.
  *
- * A line that is no subscription is answered by an error. A reader whose line is too long is dropped, and so is one
- * that does not read: each has a bound of bytes that wait for it. A path where somebody answers is -EADDRINUSE; a file
- * that is no socket is never removed.
+ * A line that is no subscription is answered by an error. A reader is dropped if its line is too long or if it does not
+ * read: the bytes that wait for it are bounded. A path where somebody answers is -EADDRINUSE; a file that is not a
+ * socket is never removed.
  */
 #include "coordinator/status/status.h"
 
@@ -50,11 +50,11 @@ struct status_socket {
 	struct reader *readers;
 	unsigned reader_count;
 	bool caller_waits;
-	struct job_view *shown; /* as the subscribers saw the jobs last */
+	struct job_view *shown; /* the jobs as last sent to subscribers */
 	size_t shown_count;
-	uint64_t shown_changes; /* of the jobs, at the last tick */
+	uint64_t shown_changes; /* state of the jobs at the last tick */
 	char *path;		/* NULL: inherited */
-	dev_t device;		/* the file that was made there; inode 0: none */
+	dev_t device;		/* the socket's file; inode 0: none */
 	ino_t inode;
 };
 
@@ -76,7 +76,7 @@ static json_t *jobs_json(const struct job_view *views, size_t count)
 	return list;
 }
 
-/* What a worker's certificate is, and whether it must be renewed. */
+/* The state of a worker's certificate, and whether it must be renewed. */
 static void add_certificate(const struct peers *s, uint64_t peer, json_t *worker)
 {
 	char text[192];
@@ -102,7 +102,7 @@ static void add_tls(const struct peers *s, json_t *o)
 	json_object_set_new(o, "tls", tls);
 }
 
-/* Here or not. */
+/* Connected or not. */
 static json_t *quarantined_json(const struct peers *s)
 {
 	json_t *list = json_array();
@@ -152,7 +152,7 @@ static json_t *snapshot(const struct peers *s)
 
 struct sending {
 	uv_write_t request;
-	char *text; /* jansson's */
+	char *text; /* allocated by jansson */
 };
 
 static void on_reader_closed(uv_handle_t *h)
@@ -274,7 +274,7 @@ static void on_connection(uv_stream_t *listener, int status)
 {
 	struct status_socket *t = listener->data;
 	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
-	t->caller_waits = !r && !status; /* and with it all others, until it is let in */
+	t->caller_waits = !r && !status; /* and blocks all other readers until it is accepted */
 	if (!r)
 		return;
 	uv_pipe_init(listener->loop, &r->pipe, 0);
@@ -353,9 +353,9 @@ void status_tick(struct status_socket *t)
 		publish_object(t, TOPIC_SNAPSHOT, snapshot(t->peers));
 }
 
-/* ---- begin and end ---- */
+/* ---- start and end ---- */
 
-/* A socket that nobody listens to is left from an earlier run; whatever else is there is somebody's. */
+/* A socket on which nobody listens is left from an earlier run; anything else belongs to somebody. */
 static int remove_stale(const char *path, const struct sockaddr_un *a, struct error *e)
 {
 	struct stat st;
@@ -372,12 +372,12 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 		return 0;
 	if (fault == EACCES || fault == EPROTOTYPE)
 		return error_set(e, fault, "%s: somebody else's socket: %s", path, strerror(fault));
-	if (fault != ECONNREFUSED) /* EAGAIN: so many wait there that nobody more can */
+	if (fault != ECONNREFUSED) /* EAGAIN: its backlog is full */
 		return error_set(e, EADDRINUSE, "%s: somebody else answers there", path);
 	return unlink(path) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
 }
 
-/* Through a descriptor of the file that we made: the name may mean another by now. */
+/* Through a descriptor of the file that we created: the name may refer to another one by now. */
 static int share(const char *path, gid_t group, struct error *e)
 {
 	char itself[64];
@@ -406,8 +406,8 @@ static int find_group(const char *name, gid_t *group, struct error *e)
 	return 0;
 }
 
-/* A socket of our own at the path, mode 0600 from its first moment on. libuv's own would remove the file when it
- * closes, and by then it may be another's. */
+/* Creates a socket at the path, with mode 0600 from the start. libuv would remove the file when it closes, and by
+ * then it may be another's. */
 static int open_socket(struct status_socket *t, const char *group, struct error *e)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};

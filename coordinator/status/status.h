@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The status socket: a Unix stream socket (mode 0600, or 0660 for a group). On connect one snapshot line at once
- * (JSON); a line
- * {"subscribe":["jobs"]} (jobs, workers, snapshot) then gets lines when something changes. Every object has schema,
- * type, time; fields are only ever added. Who does not read is dropped. The loop's thread.
+ * The status socket: a Unix stream socket (mode 0600, or 0660 for a group). A new reader gets one snapshot line (JSON)
+ * at once; after a line {"subscribe":["jobs"]} (jobs, workers, snapshot) it gets lines when something changes. Every
+ * object has schema, type and time; fields are only ever added. Readers that do not read are dropped. The loop's
+ * thread.
  */
 #ifndef COORDINATOR_STATUS_STATUS_H
 #define COORDINATOR_STATUS_STATUS_H
@@ -13,13 +13,13 @@
 struct status_socket;
 
 /*
- * inherited: a listening socket that the service manager made, whose file stays when we go; -1: one is made at path.
- * group: who may connect besides us; NULL: nobody. -EADDRINUSE when somebody answers there already, -EEXIST when
- * something else is there (a link, too, wherever it leads), -EINVAL when there is no such group.
+ * inherited: a listening socket from the service manager, whose file is kept; -1: create one at path. group: who may
+ * connect besides our own user; NULL: nobody. -EADDRINUSE: somebody answers there already, -EEXIST: something else is
+ * there (including a link, wherever it leads), -EINVAL: no such group.
  */
 int status_open(struct status_socket **out, const struct peers *s, int inherited, const char *path, const char *group,
 		struct error *e);
-void status_close(struct status_socket *t); /* NULL: nothing; asynchronous */
-void status_tick(struct status_socket *t);  /* NULL: nothing */
+void status_close(struct status_socket *t); /* s may be NULL; asynchronous */
+void status_tick(struct status_socket *t);  /* s may be NULL */
 
 #endif

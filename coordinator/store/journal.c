@@ -2,12 +2,12 @@
 /*
  * A job's journal: appending, flushing, and a new file when the old one has failed.
  *
- * journal_append puts a record into a queue in memory; journal_sync writes what waits and flushes it, and may run in
- * the pool while others append. Room is reserved ahead, so that a full disk is noticed before a result is merged.
- * journal_open reads a file from its head, gives each record to a visitor and cuts off what was not whole at the end.
+ * journal_append puts a record into a queue in memory; journal_sync writes and flushes the queue, and may run in the
+ * pool while others append. Room is reserved ahead, so that a full disk is noticed before a result is merged.
+ * journal_open reads a file from its head, gives each record to a visitor and cuts off an incomplete one at the end.
  *
- * After a failed write or flush the file is bad and not touched again; journal_renew copies what is durable and what
- * waits into a new file. Records damaged in the middle are counted and left out. A full disk is -ENOSPC.
+ * After a failed write or flush the file is bad and not touched again; journal_renew copies what is durable and what is
+ * queued into a new file. Records damaged in the middle are counted and skipped. A full disk is -ENOSPC.
  */
 #include "coordinator/store/journal.h"
 
@@ -25,10 +25,9 @@
 #include <unistd.h>
 
 enum { PATH_MOST = 4200 };
-/* Room is taken for several records at once: a file system that is writing back makes whoever asks for it wait. */
+/* Room is reserved for several records at once, because a file system that is writing back delays each reservation. */
 enum { AHEAD = 8, AHEAD_MOST = 1 << 28 };
-/* More than that does not wait in memory, of all journals together: whoever appends writes, too, as fast as the disk
- * takes it. */
+/* The limit of queued bytes, of all journals together: beyond it appending writes, too, at the disk's speed. */
 enum { UNWRITTEN_MOST = 1 << 28 };
 static _Atomic uint64_t unwritten_bytes;
 
@@ -42,19 +41,19 @@ struct journal {
 	int fd;
 	uint64_t job, generation, salt;
 	atomic_uint holders;
-	pthread_mutex_t writer; /* held while the file is written or cut; taken before `list` */
-	pthread_mutex_t list;	/* held for a moment only: of the next four */
+	pthread_mutex_t writer; /* held while the file is written or truncated; taken before `list` */
+	pthread_mutex_t list;	/* held briefly: protects the next four */
 	struct unwritten *first, **last;
-	uint64_t waiting;		  /* their bytes; what the file will have is written + waiting */
+	uint64_t waiting;		  /* their bytes; the file will have written + waiting */
 	uint64_t number;		  /* of the next record */
-	uint64_t damaged;		  /* records in the file that were not whole when it was read */
-	_Atomic uint64_t in_file, stored; /* records that are written, that are durable */
+	uint64_t damaged;		  /* records in the file that were damaged when it was read */
+	_Atomic uint64_t in_file, stored; /* records written; records durable */
 	_Atomic uint64_t written, synced; /* in the file */
-	_Atomic uint64_t room;		  /* the disk has it, up to this byte of the file */
-	_Atomic uint64_t record;	  /* the size of one, as room was asked for last */
-	atomic_bool bad;		  /* a call on the file failed: it is not written any more, nor believed */
-	atomic_bool settled;		  /* all of it is stored elsewhere */
-	atomic_uint flushes;		  /* under way */
+	_Atomic uint64_t room;		  /* reserved up to this offset */
+	_Atomic uint64_t record;	  /* size of the last reservation */
+	atomic_bool bad;     /* an operation on the file failed: it is neither written nor trusted any more */
+	atomic_bool settled; /* everything in it is stored elsewhere */
+	atomic_uint flushes; /* being renewed */
 	char path[PATH_MOST];
 };
 
@@ -91,7 +90,7 @@ void journal_hold(struct journal *j)
 	atomic_fetch_add(&j->holders, 1);
 }
 
-/* ---- what waits to be written ---- */
+/* ---- the queue ---- */
 
 static struct unwritten *front(struct journal *j)
 {
@@ -157,7 +156,7 @@ static int write_one(const struct journal *j, int fd, uint64_t at, struct unwrit
 	return write_parts(fd, (off_t)at, parts, 3);
 }
 
-/* Gives back what nothing was written to; the writer's lock is held. */
+/* Frees reserved space that was not used; the writer's lock is held. */
 static int cut_off(struct journal *j)
 {
 	j->room = 0;
@@ -172,8 +171,8 @@ uint64_t journal_bytes(struct journal *j)
 	return bytes;
 }
 
-/* All that waited when this began, and no more: on a slow disk more would come for ever, and nobody be told that the
- * first is stored. */
+/* Writes everything that was queued at the start, and no more: on a slow disk the queue would never become empty,
+ * and the first record would never be acknowledged. */
 static int write_waiting(struct journal *j)
 {
 	int rc = 0;
@@ -186,7 +185,8 @@ static int write_waiting(struct journal *j)
 			pop(j);
 			continue;
 		}
-		int cut = cut_off(j); /* a torn record that could not be cut off would be cut off by whoever reads it */
+		int cut = cut_off(j); /* a torn record that could not be cut off would be cut off by the next reader,
+					 together with what follows */
 		(void)cut;
 		j->bad = true;
 	}
@@ -201,7 +201,7 @@ void journal_release(struct journal *j)
 	if (j->fd >= 0 && !j->bad) {
 		int rc = j->settled ? 0 : write_waiting(j); /* nobody was told that it is stored */
 		if (!rc && j->room > j->written)
-			rc = cut_off(j); /* else it goes with the file */
+			rc = cut_off(j); /* otherwise it goes with the file */
 		(void)rc;
 	}
 	drop_all(j);
@@ -251,7 +251,7 @@ static int visit_piece(struct journal *j, const struct journal_piece *p, journal
 		item.body = p->body;
 		item.size = p->record.size;
 	}
-	j->written = p->to; /* so far it can be read */
+	j->written = p->to; /* readable up to here */
 	return visit(user, &item, e);
 }
 
@@ -287,7 +287,7 @@ static int read_records(struct journal *j, uint64_t end, struct journal_gaps *ga
 	return rc;
 }
 
-/* A damaged head is made anew when the records say that it is their file. */
+/* A damaged head is restored if the records identify the file. */
 static int read_file_head(struct journal *j, uint64_t end, bool *anew, struct error *e)
 {
 	unsigned char head[JOURNAL_HEAD];
@@ -385,8 +385,8 @@ static int room_for(struct journal *j, uint64_t size, struct error *e)
 	int code = errno;
 	pthread_mutex_lock(&j->writer);
 	int cut = cut_off(j);
-	bool kept =
-		j->written == end || reserve(j, j->written, end - j->written); /* what waits was promised its room */
+	bool kept = j->written == end ||
+		    reserve(j, j->written, end - j->written); /* queued records have reserved their room */
 	pthread_mutex_unlock(&j->writer);
 	(void)cut;
 	(void)kept;
@@ -399,7 +399,7 @@ int journal_reserve(struct journal *j, size_t body, struct error *e)
 	return room_for(j, j->record, e);
 }
 
-/* Before it runs out, by whoever flushes. */
+/* Called before the reserved space runs out, by whoever flushes. */
 static void reserve_ahead(struct journal *j)
 {
 	uint64_t size = j->record, end = journal_bytes(j);
@@ -424,7 +424,7 @@ int journal_append(struct journal *j, enum journal_kind kind, const struct lease
 	if (a_size > UINT32_MAX || b_size > UINT32_MAX - a_size)
 		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, a_size + b_size);
 	if (kind != JOURNAL_BATCH && kind != JOURNAL_AGAIN && kind != JOURNAL_PINNED &&
-	    !j->bad) { /* it may stay away, but must not make the journal bad */
+	    !j->bad) { /* it is optional, and must not make the journal bad */
 		int rc = room_for(j, JOURNAL_RECORD + a_size + b_size, e);
 		if (rc)
 			return rc;
@@ -449,7 +449,7 @@ int journal_append(struct journal *j, enum journal_kind kind, const struct lease
 	j->waiting += size;
 	pthread_mutex_unlock(&j->list);
 	if (bytes > UNWRITTEN_MOST && !j->bad)
-		write_waiting(j); /* a journal that has become bad says so */
+		write_waiting(j); /* reports a journal that has become bad */
 	return 0;
 }
 
@@ -493,8 +493,8 @@ static int copy_bytes(struct journal *j, int to, uint64_t from, uint64_t end, st
 	return 0;
 }
 
-/* All records of the file, each checked again, at their places, and those that wait, into another file. What was
- * damaged stays so: it is known to be missing. */
+/* Copies all records of the file, each checked again, to their offsets in another file, and those that are queued.
+ * Damaged ones stay damaged: it is known what is missing. */
 static int copy_records(struct journal *j, int to, struct error *e)
 {
 	struct journal_scan s;
@@ -537,7 +537,7 @@ int journal_renew(struct journal *j, struct error *e)
 		rc = fault(j, errno, e);
 	if (!rc)
 		rc = disk_sync_folder(folder, e);
-	if (rc) { /* with its name or without it: it holds all that was acknowledged */
+	if (rc) { /* with or without its name it contains everything acknowledged */
 		if (fd >= 0)
 			disk_close(fd);
 		disk_unlink(path);
@@ -568,8 +568,7 @@ int journal_sync(struct journal *j, struct error *e)
 {
 	if (j->settled)
 		return 0;
-	atomic_fetch_add(&j->flushes,
-			 1); /* before it is asked whether it is bad: a bad one may be renewed at any time */
+	atomic_fetch_add(&j->flushes, 1); /* set before the check for bad: a bad journal may be renewed at any time */
 	int rc = j->bad ? -EIO : write_waiting(j);
 	uint64_t written = j->written, in_file = j->in_file;
 	if (!rc && j->bad) {

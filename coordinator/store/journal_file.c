@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The bytes of a journal: its head, its records, and how they are found again where bytes are damaged.
+ * The bytes of a journal: its head, its records, and how they are found again among damaged bytes.
  *
- * journal_scan_next returns one piece after the other: a whole record, a record of which the head alone is whole, or a
- * stretch of which neither is. A record is known by its mark, the salt of its file and a checksum; after a stretch that
- * fits nothing the file is searched for the next mark. The number in each head says how many records a gap held.
+ * journal_scan_next returns one piece after the other: a whole record, a record of which only the head is valid, or a
+ * stretch without either. A record is recognised by its mark, the salt of its file and a checksum; after a stretch of
+ * invalid bytes the file is searched for the next mark. The number in each head says how many records a gap contained.
  *
- * Damage is a piece and not an error. An error of the disk is -errno and says nothing about the file; without memory
- * for a body it is -ENOMEM.
+ * Damage is a piece, not an error. An error of the disk is -errno and says nothing about the file; -ENOMEM if there is
+ * no memory for a body.
  */
 #include "coordinator/store/journal_file.h"
 
@@ -21,14 +21,14 @@
 #include <string.h>
 
 enum { PATH_MOST = 4200 };
-enum { WINDOW = 1 << 20 /* bytes that are searched for a mark at a time */ };
+enum { WINDOW = 1 << 20 /* bytes searched for a mark at a time */ };
 
-/* Its digits grow with every change of what a record is, the bodies included (journal_kind's, and batches as
- * common/wire packs them). */
+/* The digits change with every change of a record's format, including bodies (those of journal_kind, and batches as
+ * packed by common/wire). */
 static const char magic[8] = "hsltJ002";
 static const char mark[4] = {'\xf1', 'h', 'j', '\x0d'};
 
-/* Behind the magic number: job, generation, salt, checksum of all before it; four bytes are not used. */
+/* After the magic number: job, generation, salt, checksum of all before it; four bytes are unused. */
 void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD])
 {
 	memset(bytes, 0, JOURNAL_HEAD);
@@ -47,7 +47,7 @@ int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_
 	return rc || get32(bytes + 32) == crc32c(0, bytes, 32) ? rc : error_set(e, EBADMSG, "%s: damaged", path);
 }
 
-/* Behind the mark; bytes 52 to 55 and 72 to 75 are not used. The checksum is of all before it. */
+/* After the mark; bytes 52 to 55 and 72 to 75 are unused. The checksum covers everything before it. */
 void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD], const struct buf *a,
 			 const struct buf *b)
 {
@@ -69,7 +69,7 @@ void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_R
 	put32(bytes + 76, crc32c(0, bytes, 76));
 }
 
-/* Whether it is whole. */
+/* Whether the head is valid. */
 static bool unpack_record(const unsigned char bytes[JOURNAL_RECORD], struct journal_record *r)
 {
 	*r = (struct journal_record){.size = get32(bytes + 4),
@@ -104,7 +104,7 @@ int journal_read_at(int fd, void *bytes, size_t size, uint64_t at)
 
 /* ---- one record ---- */
 
-/* 1: its head is whole; 0: it is not. */
+/* 1: its head is valid; 0: it is not. */
 static int read_head(const struct journal_scan *s, uint64_t at, struct journal_record *r)
 {
 	unsigned char bytes[JOURNAL_RECORD];
@@ -117,7 +117,7 @@ static int read_head(const struct journal_scan *s, uint64_t at, struct journal_r
 	       r->size <= s->end - at - sizeof bytes;
 }
 
-/* 1: it is whole, and mem_alloc'd; 0: it is not. */
+/* 1: it is valid, and mem_alloc'd; 0: it is not. */
 static int read_body(const struct journal_scan *s, uint64_t at, const struct journal_record *r, unsigned char **body)
 {
 	*body = mem_alloc(r->size, 1);
@@ -131,7 +131,7 @@ static int read_body(const struct journal_scan *s, uint64_t at, const struct jou
 	return rc == -ENODATA ? 0 : rc;
 }
 
-/* The first place from *at on that has a mark; 0: none has. */
+/* The first offset from *at on that has a mark; 0: none has. */
 static int find_mark(const struct journal_scan *s, uint64_t *at)
 {
 	unsigned char *window = mem_alloc(WINDOW, 1);
@@ -144,7 +144,7 @@ static int find_mark(const struct journal_scan *s, uint64_t *at)
 			*at += (uint64_t)(found - window);
 			rc = 1;
 		} else if (!rc) {
-			*at += size < WINDOW ? size : size - (sizeof mark - 1); /* one may lie across the edge */
+			*at += size < WINDOW ? size : size - (sizeof mark - 1); /* a mark may lie across the edge */
 		}
 	}
 	mem_free(window);
@@ -164,7 +164,7 @@ void journal_scan_end(struct journal_scan *s)
 	*s = (struct journal_scan){.fd = -1};
 }
 
-/* 1: the first whole record from s->at on is known. */
+/* 1: the first valid record from s->at on is known. */
 static int look_ahead(struct journal_scan *s)
 {
 	struct journal_piece *p = &s->found;
@@ -190,7 +190,7 @@ static int look_ahead(struct journal_scan *s)
 	}
 }
 
-/* What lies before the record that was found: a damaged one whose head says so, or bytes that say nothing. */
+/* What lies before that record: a damaged one whose head is valid, or bytes that say nothing. */
 static int damage(struct journal_scan *s, struct journal_piece *p)
 {
 	uint64_t to = s->found.from, number = s->found.record.number;
@@ -286,7 +286,7 @@ void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t 
 
 /* ---- names ---- */
 
-/* The generation; a file that was becoming a journal counts, too. */
+/* The generation; also of a file that was going to be a journal. */
 static bool is_journal(const char *name, uint64_t *generation)
 {
 	unsigned long long n;

@@ -2,12 +2,12 @@
 /*
  * The jobs in an SQLite database: one row each, with a checksum over its columns.
  *
- * ledger_open brings an older scheme up to date and looks through all rows. A change reads its row first, so that a
- * damaged one is noticed and not sealed again under a new checksum, and commits before it returns (WAL, synchronous
- * FULL). ledger_next goes through the jobs that have not ended, ledger_after through all.
+ * ledger_open upgrades an older scheme and checks all rows. A change reads its row first, so that a damaged one is
+ * noticed instead of getting a new checksum, and commits before it returns (WAL, synchronous FULL). ledger_next
+ * iterates over the jobs that have not ended, ledger_after over all.
  *
- * A damaged row is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that is no
- * database -EBADMSG, any other fault of SQLite -EIO or -ENOMEM. A newer scheme is -EPROTO.
+ * A damaged row is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that is no database -EBADMSG,
+ * any other fault of SQLite -EIO or -ENOMEM. A newer scheme is -EPROTO.
  */
 #include "coordinator/store/ledger.h"
 
@@ -24,7 +24,7 @@ struct ledger {
 	sqlite3_stmt *add, *change, *drop, *remove, *next, *get, *all;
 };
 
-/* The n-th brings a database of version n to n + 1; never changed, only added to. */
+/* The n-th upgrades a database of version n to n + 1; never changed, only added to. */
 static const char *const migrations[] = {
 	"CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
 	" priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL, ended REAL,"
@@ -101,7 +101,7 @@ static uint32_t check_text(uint32_t crc, const char *text)
 	return crc32c(crc, text, strlen(text) + 1);
 }
 
-/* Of all that a row says. */
+/* The checksum of everything in a row. */
 static uint32_t check(const struct ledger_job *j)
 {
 	const struct {
@@ -128,7 +128,7 @@ static const char *text_at(sqlite3_stmt *s, int column)
 
 static int row(struct ledger *l, sqlite3_stmt *s, uint64_t id, struct ledger_job *j, struct error *e)
 {
-	sqlite3_reset(s); /* here, so that the last answer was valid until now */
+	sqlite3_reset(s); /* here, so that the previous answer was valid until now */
 	sqlite3_bind_int64(s, 1, (sqlite3_int64)id);
 	int rc = sqlite3_step(s);
 	if (rc != SQLITE_ROW) {
@@ -156,7 +156,7 @@ static int row(struct ledger *l, sqlite3_stmt *s, uint64_t id, struct ledger_job
 	return 1;
 }
 
-/* Runs a statement that gives no rows. */
+/* Runs a statement that returns no rows. */
 static int finish(struct ledger *l, sqlite3_stmt *s, struct error *e)
 {
 	int rc = sqlite3_step(s) == SQLITE_DONE ? 0 : fault(l, e);
@@ -165,7 +165,7 @@ static int finish(struct ledger *l, sqlite3_stmt *s, struct error *e)
 	return rc;
 }
 
-/* All that a row says, copied: it may be one that was read. */
+/* Copies everything in a row, which may be one that was read. */
 static void bind(sqlite3_stmt *s, const struct ledger_job *j)
 {
 	sqlite3_bind_int64(s, 1, (sqlite3_int64)j->id);
@@ -219,7 +219,7 @@ static int look_through(struct ledger *l, struct error *e)
 	return rc;
 }
 
-/* Rows of versions that had no checksums are believed, once. */
+/* Rows of versions without checksums are trusted, once. */
 static int make_checksums(struct ledger *l, struct error *e)
 {
 	sqlite3_stmt *s = NULL;
@@ -244,7 +244,7 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 	if (sqlite3_open_v2(path, &l->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL) !=
 	    SQLITE_OK)
 		rc = l->db ? fault(l, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
-	/* The spool's lock makes us the only ones: without shared memory it works on any file system. */
+	/* The spool's lock excludes others; without shared memory it works on any file system. */
 	if (!rc)
 		rc = run(l,
 			 "PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
@@ -400,7 +400,7 @@ int ledger_extend(struct ledger *l, const struct ledger_job *more, struct error 
 int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e)
 {
 	int rc = row(l, l->next, after, j, e);
-	if (rc > 0 && j->id <= after) /* or whoever asks for the next one after it would ask for ever */
+	if (rc > 0 && j->id <= after) /* otherwise a caller that asks for the next one would never stop */
 		return error_set(e, EBADMSG, "jobs.db is damaged: its jobs are not in order");
 	return rc;
 }

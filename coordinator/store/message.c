@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-/* Memory that is out is not a message that is damaged. */
+/* Distinguishes lack of memory from a damaged message. */
 static void *alloc(void *out, size_t size)
 {
 	void *p = mem_alloc(size, 1);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Messages of proto/stored.proto, out of bytes that a disk gave back. Any thread. */
+/* Reads messages of proto/stored.proto from stored bytes. Any thread. */
 #ifndef COORDINATOR_STORE_MESSAGE_H
 #define COORDINATOR_STORE_MESSAGE_H
 
@@ -7,11 +7,11 @@
 
 #include "proto/stored.pb-c.h"
 
-/* For message_free. NULL, and rc is -ENOMEM, or -EPROTO: the bytes are no such message. */
+/* For message_free. NULL, and rc is -ENOMEM, or -EPROTO: the bytes are not such a message. */
 ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsigned char *bytes, size_t size, int *rc,
 				 struct error *e);
-void message_free(ProtobufCMessage *m); /* NULL: nothing */
-/* -EPROTO: it has a field that is not known here. Of its own fields, not of those of messages in it. */
+void message_free(ProtobufCMessage *m); /* m may be NULL */
+/* -EPROTO: it has an unknown field. Checks its own fields, not those of nested messages. */
 int message_check_known(const ProtobufCMessage *m, struct error *e);
 
 #endif

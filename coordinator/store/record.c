@@ -2,13 +2,13 @@
 /*
  * A job's record as JSON, with a checksum.
  *
- * record_to_json writes all that is remembered of a job, record_from_json reads it back; a key that is missing, because
- * an older version wrote the file, is zero, not known or the text "". Plain fields follow from the list of
- * record_fields.h, counters from that of coordinator/core/counts.h. The checksum is over the content with sorted keys,
- * so that layout does not matter.
+ * record_to_json writes everything that is kept of a job, record_from_json reads it back; a missing key, because an
+ * older version wrote the file, is zero, unknown or "". Plain fields are generated from the list in record_fields.h,
+ * counters from that in coordinator/core/counts.h. The checksum is over the content with sorted keys, so that
+ * formatting does not matter.
  *
- * A text that is not UTF-8 is -EINVAL and the record is not written. A damaged file is -EBADMSG, one of another schema
- * -EPROTO. A record without a checksum is of an earlier version and believed.
+ * A text that is not UTF-8 is -EINVAL, and the record is not written. A damaged file is -EBADMSG, one of another schema
+ * -EPROTO. A record without a checksum is of an earlier version and trusted.
  */
 #include "coordinator/store/record.h"
 
@@ -33,7 +33,7 @@ static const struct field fields[] = {RECORD_FIELDS(TEXT, NUMBER, COUNT)};
 #undef NUMBER
 #undef COUNT
 
-/* Those of the object "counts". */
+/* Members of the object "counts". */
 #define OTHER(...)
 #define COUNT(member, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, key, NULL},
 #define X(name, key, wire) {FIELD_u64, offsetof(struct job_record, counts.name), 0, key, NULL},
@@ -113,7 +113,7 @@ json_t *record_strategies(const struct job_record *r)
 	return strategy_to_json(r->mixture, &n);
 }
 
-/* A record from elsewhere must not name more strategies than there are counters for. */
+/* A record must not name more strategies than there are counters for. */
 static void take_strategies(const json_t *o, struct job_record *r)
 {
 	struct canvas_counts n;
@@ -135,7 +135,7 @@ json_t *record_counts(const struct job_record *r)
 	return o;
 }
 
-/* Of what it says, however it is laid out. -ENOMEM */
+/* Checksum of the content, whatever its formatting. -ENOMEM */
 static int checksum(const json_t *o, json_int_t *sum, struct error *e)
 {
 	char *text = json_dumps(o, JSON_COMPACT | JSON_SORT_KEYS);
@@ -146,7 +146,7 @@ static int checksum(const json_t *o, json_int_t *sum, struct error *e)
 	return 0;
 }
 
-/* A record without one is of an earlier version. */
+/* A record without a checksum is of an earlier version. */
 static int check(json_t *o, struct error *e)
 {
 	const json_t *said = json_object_get(o, "crc32c");
@@ -189,7 +189,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 {
 	json_error_t fault;
 	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
-	const json_t *schema = json_object_get(o, "schema"); /* NULL of whatever is no object */
+	const json_t *schema = json_object_get(o, "schema"); /* NULL unless it is an object */
 	memset(r, 0, sizeof *r);
 	if (json_integer_value(schema) != SCHEMA) {
 		int rc =

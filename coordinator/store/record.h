@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is remembered of a job in its spool folder (jobs/jN/job.json): enough to list it and to fetch its result after a
- * restart. Pure but for memory.
+ * What is kept of a job in its spool folder (jobs/jN/job.json): enough to list it and to fetch its result after a
+ * restart. Pure except for memory.
  */
 #ifndef COORDINATOR_STORE_RECORD_H
 #define COORDINATOR_STORE_RECORD_H
@@ -32,28 +32,29 @@ struct job_record {
 #undef COUNT
 	struct job_counts counts;
 	struct forecast_history looks;
-	char effects[RECORD_EFFECTS]; /* a JSON array: what the scene calls for, and why; "": not known, or too long */
+	char effects[RECORD_EFFECTS]; /* a JSON array: the effects that the scene needs, and why; "": not known, or too
+					 long */
 	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
-	struct convergence agreement;				/* of the last image that was made */
+	struct convergence agreement;				/* statistics of the last image */
 	struct path_class_energy classes[PATH_CLASSES];
 };
 
-/* What the merged batches counted, and what is to be said about it. */
+/* What the merged batches counted, and notes about it. */
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
 			 double beyond_share);
-void record_add_note(struct job_record *r, const char *text); /* "": nothing to say */
-void record_add_doubt(struct job_record *r); /* once: why the interval of the error is not known, if so */
+void record_add_note(struct job_record *r, const char *text); /* "": nothing to note */
+void record_add_doubt(struct job_record *r);		      /* why the interval of the error is not known, if so */
 void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
-void record_begin_convergence(struct job_record *r);			      /* nothing is known */
-void record_take_error(struct job_record *r, const struct canvas_image *img); /* of one that has an estimate */
+void record_begin_convergence(struct job_record *r);			      /* initialises: nothing is known */
+void record_take_error(struct job_record *r, const struct canvas_image *img); /* of an image with an estimate */
 void record_take_effects(struct job_record *r, json_t *list);		      /* takes the reference; NULL: none */
 json_t *record_effects(const struct job_record *r);			      /* an array */
 bool record_show(const struct job_record *r, json_t *o);		      /* its plain fields: fields_show */
 json_t *record_counts(const struct job_record *r);			      /* an object of its counts */
 json_t *record_strategies(const struct job_record *r);			      /* an array: strategy_to_json */
 int record_to_json(const struct job_record *r, char **text,
-		   struct error *e); /* mem_alloc'd; -ENOMEM, -EINVAL: a text of it is not UTF-8 */
-/* -EBADMSG when it is not a record, -EPROTO when it is one of another version. */
+		   struct error *e); /* mem_alloc'd; -ENOMEM, -EINVAL: a text is not UTF-8 */
+/* -EBADMSG: not a record; -EPROTO: another version. */
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e);
 bool record_is_ended(const struct job_record *r);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The file is a magic number and a message Row, under a checksum (common/base/checked_file.h). Files of version 002 are
- * read, too: numbers, the sizes of texts and frames, then these, texts with their ends.
+ * The file is a magic number and a message Row, with a checksum (common/base/checked_file.h). Files of version 002 are
+ * read, too: numbers, the sizes of texts and frames, then these, texts with their final 0.
  */
 #include "coordinator/store/row_file.h"
 
@@ -14,7 +14,7 @@
 
 #include <string.h>
 
-enum { PIECES = 6, OLD_HEAD = 8 * (5 + PIECES) /* behind the magic number */ };
+enum { PIECES = 6, OLD_HEAD = 8 * (5 + PIECES) /* after the magic number */ };
 static const uint64_t piece_most = 1 << 26;
 static const char magic[8] = "hsltO003", old_magic[8] = "hsltO002";
 
@@ -72,7 +72,7 @@ int row_file_write(const struct spool *s, const struct ledger_job *j, struct err
 	return rc;
 }
 
-/* All that is left of the file goes into f->memory. */
+/* Reads the rest of the file into f->memory. */
 static int read_rest(struct checked_file *in, struct row_file *f, size_t *size, struct error *e)
 {
 	if (in->left > PIECES * piece_most)

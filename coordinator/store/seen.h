@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Time that was seen to pass, in seconds: what the ages of finished jobs are made of. It grows by the clock of the
- * machine since it was started, which nobody sets, while it runs and from one run of the coordinator to the next.
- * Where the machine has been started anew in between, only the wall clock knows how long that took, and may be wrong:
- * SEEN_CREDIT at most is believed. Pure.
+ * Observed time, in seconds, from which ages of finished jobs are computed. It advances with the machine's boot-time
+ * clock, which nobody sets, during a run of the coordinator and between runs. Across a reboot only the wall clock knows
+ * how much time has passed, and it may be wrong: at most SEEN_CREDIT is added. Pure.
  */
 #ifndef COORDINATOR_STORE_SEEN_H
 #define COORDINATOR_STORE_SEEN_H
@@ -13,13 +12,13 @@
 enum { SEEN_CREDIT = 86400, SEEN_BOOT = 40, SEEN_TEXT = 256 };
 
 struct seen {
-	double seconds;	      /* seen so far, at this moment of the other two: */
-	double up;	      /* s since the machine was started, those that it slept included */
+	double seconds;	      /* observed so far, when the other two were: */
+	double up;	      /* s since the machine was booted, including sleep */
 	double wall;	      /* s since 1970 */
-	char boot[SEEN_BOOT]; /* the name that the kernel gave to this start */
+	char boot[SEEN_BOOT]; /* the kernel's identifier of this boot */
 };
 
-/* now has all but the seconds, which it gets. last: NULL: there is none, they begin at 0. */
+/* now has everything but the seconds, which are filled in. last: NULL: there is none, and they start at 0. */
 void seen_go_on(struct seen *now, const struct seen *last);
 
 /* One line, with a checksum. Returns its length. */

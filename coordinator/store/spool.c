@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator's folder: its lock, the numbers of jobs, and files that appear whole.
+ * The coordinator's folder: its lock, the numbers of jobs, and files that are written atomically.
  *
- * spool_open takes the lock and makes the folders that are missing. A number is written to next-job before a job gets
- * it, so that none is given twice, and folders that are there count too. Files are written under a temporary name,
- * flushed, renamed, and the folder flushed.
+ * spool_open takes the lock and creates missing folders. A number is written to next-job before a job gets it, so that
+ * none is used twice; existing folders count, too. Files are written under a temporary name, flushed, renamed, and the
+ * folder flushed.
  *
- * A second coordinator on the same folder is -EBUSY. A counter without a number in it is -EBADMSG, a missing one is
- * made from the folders. A write that fails leaves the old file as it was; a record that cannot be parsed is -EBADMSG,
- * one that is not there -ENOENT.
+ * A second coordinator on the same folder is -EBUSY. A counter file without a number is -EBADMSG, a missing one is
+ * derived from the folders. A failed write leaves the old file unchanged; a record that cannot be parsed is -EBADMSG, a
+ * missing one -ENOENT.
  */
 #include "coordinator/store/spool.h"
 
@@ -22,7 +22,8 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 
-/* Of a file of a job; of one in the spool's own folder: the quarantined workers, 64 a certificate, a kilobyte each. */
+/* Size limit of a job's file; of a file in the spool's own folder: the quarantined workers, 64 per certificate, a
+ * kilobyte each. */
 enum { RECORD_MAX = 1 << 16, OWN_MAX = 1 << 28, FOLDER_MAX = SPOOL_PATH_MAX - 128 };
 
 struct spool {
@@ -57,7 +58,7 @@ static int take_lock(struct spool *s, struct error *e)
 	return rc;
 }
 
-/* folder/name appears with these bytes, or not at all. */
+/* folder/name gets these bytes, atomically. */
 static int write_file(const char *folder, const char *name, const void *bytes, size_t size, struct error *e)
 {
 	char path[SPOOL_PATH_MAX], temporary[SPOOL_PATH_MAX + 8];
@@ -130,7 +131,7 @@ static int by_id(const void *a, const void *b)
 
 static bool add_id(uint64_t **ids, size_t count, uint64_t id)
 {
-	if ((count & (count - 1)) == 0) { /* it grows at powers of two */
+	if ((count & (count - 1)) == 0) { /* grows at powers of two */
 		uint64_t *more = mem_grow(*ids, count * sizeof *more, (count ? 2 * count : 1) * sizeof *more);
 		if (!more)
 			return false;
@@ -195,7 +196,7 @@ static int read_counter(struct spool *s, struct error *e)
 	return 0;
 }
 
-/* ---- begin and end ---- */
+/* ---- start and end ---- */
 
 int spool_open(struct spool **out, const char *folder, struct error *e)
 {

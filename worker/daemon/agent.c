@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * connect_now, hello, then a circle: the lease queue says how many leases to ask for, grants start work (work.c),
+ * connect_now and hello, then a cycle: the lease queue says how many leases to ask for, grants start work (work.c),
  * finished leases are sent and kept until they are acknowledged. Timers: heartbeat, reconnection with growing pauses,
- * the pulse by which threads that get nowhere are noticed.
+ * and a check for threads that make no progress.
  *
- * Failures: a connection that is lost is made again for ever; a refusal for good (another version, a certificate) ends
- * the daemon with its code; a thread that hangs ends the process after its other leases are given back.
+ * Failures: a lost connection is made again, forever; a permanent refusal (another version, a certificate) ends the
+ * daemon with its code; a hanging thread ends the process after its other leases are returned.
  */
 #include "worker/daemon/agent.h"
 
@@ -35,7 +35,7 @@ static void on_retry(uv_timer_t *t)
 	connect_now(t->data);
 }
 
-/* Twice as long each time, and never at the same moment as a hundred others. */
+/* Twice as long each time, with jitter, so that a hundred workers do not reconnect at once. */
 static void try_later(struct agent *a)
 {
 	unsigned char random = 128;
@@ -66,7 +66,7 @@ static void on_opened(void *user)
 	conn_send(a->conn, &m, NULL, 0);
 }
 
-/* New certificates and lists are taken up while the worker runs. */
+/* New certificates and revocation lists are used while the worker runs. */
 static void refresh_tls(struct agent *a)
 {
 	struct error e;
@@ -155,7 +155,7 @@ static void connect_now(struct agent *a)
 	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10, a->tls};
 	struct error e;
 	refresh_tls(a);
-	/* The name may mean another machine by now. */
+	/* The name may have another address by now. */
 	int rc = net_addr_resolve(&a->address, a->config.coordinator, &e);
 	if (!rc)
 		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure || a->tls, &e);
@@ -235,7 +235,7 @@ static void on_watch(uv_timer_t *t)
 static void on_signal(uv_signal_t *h, int number)
 {
 	struct agent *a = h->data;
-	if (a->leaving) { /* the second time: at once */
+	if (a->leaving) { /* a second signal: at once */
 		log_event(LOG_STOP, "signal=%d text=\"at once\"", number);
 		_exit(0);
 	}
@@ -243,7 +243,7 @@ static void on_signal(uv_signal_t *h, int number)
 	leave(a);
 }
 
-/* ---- life ---- */
+/* ---- start and end ---- */
 
 static void on_pulse(uv_timer_t *t)
 {
@@ -259,7 +259,7 @@ static void on_pulse(uv_timer_t *t)
 	leave(a);
 }
 
-/* Often enough for whoever waits; not at all when nobody does. */
+/* Often enough for whoever watches; not at all if nobody does. */
 static void start_pulse(struct agent *a)
 {
 	double watchdog = notify_watchdog(), idle = a->config.idle_seconds, wait = 1;
@@ -364,8 +364,7 @@ int agent_run(const struct agent_config *c, struct error *e)
 	notify_send("READY=1"); /* it may wait for its coordinator for long */
 	while (!a->gone || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);
-	if (a->hung || thread_pool_pending(
-			       a->thread_pool)) /* nobody can wait for its threads; what was to be said has been sent */
+	if (a->hung || thread_pool_pending(a->thread_pool)) /* its threads cannot be joined; everything has been sent */
 		_exit(a->hung ? AGENT_HUNG : a->refused ? AGENT_REFUSED : 0);
 	int refused = a->refused ? error_set(e, EACCES, "%s refuses: %s", a->config.coordinator, a->why) : 0;
 	agent_close(a);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The daemon's state: agent.c has the connection and the end, lease_queue.c jobs and leases, fetch.c files, outgoing.c
- * what is sent. */
+/* The daemon's state: agent.c has connection and shutdown, lease_queue.c jobs and leases, fetch.c files, outgoing.c
+ * messages. */
 #ifndef WORKER_DAEMON_AGENT_STATE_H
 #define WORKER_DAEMON_AGENT_STATE_H
 
@@ -9,7 +9,7 @@
 #include "worker/daemon/lease_task.h"
 #include "worker/render/fingerprint.h"
 
-enum { WORLDS_KEPT = 2 /* of jobs that have no lease here now */ };
+enum { WORLDS_KEPT = 2 /* worlds kept of jobs without leases here */ };
 
 struct fetch;
 
@@ -29,15 +29,15 @@ struct agent {
 	struct job_cache *bundles;
 	struct fetch *fetches;
 	struct lease_task *leases;
-	uint64_t clock;	  /* of uses of bundles */
-	bool backlog;	  /* so many results wait to be acknowledged that no more are made */
-	uint64_t busy_at; /* ms of the loop: when it had a lease last */
-	bool watched;	  /* the service manager waits to hear of us */
+	uint64_t clock;	  /* counter of uses of bundles */
+	bool backlog;	  /* too many results wait to be acknowledged: no new leases */
+	uint64_t busy_at; /* ms of the loop: when it last had a lease */
+	bool watched;	  /* the service manager expects notifications */
 	bool leaving, gone;
-	bool refused; /* for good */
+	bool refused; /* permanently */
 	char why[256];
-	bool hung;			/* a thread of the thread pool is */
-	void (*settle)(struct agent *); /* after each change of the leases: it may be time to leave */
+	bool hung;			/* a thread of the pool hangs */
+	void (*settle)(struct agent *); /* called after each change of the leases: it may be time to leave */
 };
 
 #endif

@@ -28,8 +28,8 @@ static int make_folders(char *path, struct error *e)
 	}
 }
 
-/* In a folder that somebody else made, or can write to, somebody else chooses what we render: names are all that is
- * looked at when a worker starts. Root may have made the one around ours. */
+/* In a folder that somebody else made or can write to, somebody else would choose what we render, because only names
+ * are checked when a worker starts. The parent folder may be root's. */
 static int check_owner(const char *path, bool or_root, struct error *e)
 {
 	struct stat st;
@@ -70,7 +70,7 @@ static int base_folder(const char *folder, char path[PATH_BYTES], struct error *
 	return rc ? rc : check_owner(path, true, e);
 }
 
-/* A worker that nobody can count is a worker all the same. */
+/* A worker without a counted identity can still work. */
 static void begin_life(struct cache *c, const char *base, int slot)
 {
 	char name[32];

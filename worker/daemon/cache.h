@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where a worker keeps blobs between jobs and lives: a folder with a slot for each worker of this machine that runs at
- * the same time, each a blob store with its own lock. The loop's thread.
+ * Where a worker keeps blobs between jobs and runs: a folder with a slot for each worker that runs on this machine at
+ * the same time. Each slot is a blob store with its own lock. The loop's thread.
  */
 #ifndef WORKER_DAEMON_CACHE_H
 #define WORKER_DAEMON_CACHE_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a worker is started with: the options of hslt-worker. */
+/* The options of hslt-worker. */
 #ifndef WORKER_DAEMON_CONFIG_H
 #define WORKER_DAEMON_CONFIG_H
 
@@ -13,8 +13,8 @@ struct agent_config {
 	uint64_t cache_bytes;
 	unsigned threads;
 	double grace_seconds;
-	double idle_seconds;  /* without a lease for so long: it leaves; 0: never */
-	double stall_seconds; /* a lease or a building that makes no progress for so long hangs; 0: nobody looks */
+	double idle_seconds;  /* exits after so long without a lease; 0: never */
+	double stall_seconds; /* a lease or a build without progress for so long counts as hung; 0: not checked */
 	bool insecure;
 };
 

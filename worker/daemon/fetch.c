@@ -61,7 +61,7 @@ struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c)
 	return NULL;
 }
 
-/* What does not fit below the limit is too large for the worker as it was set up; wrong bytes are the coordinator's. */
+/* What exceeds the limit is too large for this worker's settings; wrong bytes are the coordinator's fault. */
 static enum fetch_end failed(int rc)
 {
 	return rc == -EFBIG || rc == -EBADMSG ? FETCH_FAILED : FETCH_UNSTORED;

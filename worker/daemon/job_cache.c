@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job arrives as JobInfo; its files are asked for until the cache has them all, then a thread reads the scene through
- * the cache and builds the world. What this worker reads of film,
- * integrator, settings and mixture is compared with the plan before a lease runs.
+ * A job arrives as JobInfo. Its files are requested until the cache has them all, then a thread reads the scene through
+ * the cache and builds the world. What this worker reads of film, integrator, settings and mixture is compared with the
+ * plan before a lease runs.
  *
- * Failures: a scene that does not build, or builds into another one than was planned, fails the job's leases with the
- * reason; a file that is gone from the cache is fetched again.
+ * Failures: a scene that does not build, or that differs from the plan, fails the job's leases with the reason; a file
+ * that has disappeared from the cache is fetched again.
  */
 #include "worker/daemon/job_cache.h"
 
@@ -24,7 +24,7 @@
 enum {
 	PATH_BYTES = 4200,
 	DEFINES_MAX = 256,
-	CHECKED_SECONDS = 60 /* a file that was right so lately is not read again */
+	CHECKED_SECONDS = 60 /* a file verified so recently is not read again */
 };
 
 static const Farm__JobInfo *info_of(const struct job_cache *b)
@@ -92,8 +92,8 @@ int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error 
 		mem_free(paths);
 		return error_set(e, ENOMEM, "no memory for a job");
 	}
-	b->plan.rounds = UINT64_MAX; /* the bound may be moved while the job runs, and what a lease computes does not
-					depend on it */
+	b->plan.rounds =
+		UINT64_MAX; /* the bound may be changed while the job runs, and does not affect what a lease computes */
 	b->held = held;
 	b->paths = paths;
 	b->info = *info;
@@ -134,7 +134,7 @@ bool job_cache_next_missing(struct job_cache *b)
 {
 	for (size_t i = 0; i < info_of(b)->n_files; i++) {
 		b->wanted = hash_of(info_of(b)->files[i]);
-		/* What lies in the cache may have been damaged since it came: then it is fetched again. */
+		/* Files in the cache may have been damaged since they arrived: those are fetched again. */
 		if (!b->held[i] && blob_check(b->blobs, &b->wanted, CHECKED_SECONDS, NULL) == 0)
 			b->held[i] = blob_hold(b->blobs, &b->wanted);
 		if (!b->held[i])
@@ -196,7 +196,7 @@ static void close_asset(void *user, struct asset *a)
 
 /* ---- the world ---- */
 
-/* What this worker reads must be what the client read, or the image would not be the one that was planned. */
+/* What this worker reads must equal what the client read, or the image would not be the planned one. */
 static int check_plan(const struct job_cache *b, const struct scene *s, const struct render_options *o, struct error *e)
 {
 	struct scene_settings set;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job at a worker: what it is (JobInfo), its files in the cache, its world. The world is built on a thread of the
- * thread pool and shared by all leases; everything else is the loop's thread.
+ * A job at a worker: its description (JobInfo), its files in the cache, its world. The world is built on a thread of
+ * the pool and shared by all leases; everything else is the loop's thread.
  */
 #ifndef WORKER_DAEMON_JOB_CACHE_H
 #define WORKER_DAEMON_JOB_CACHE_H
@@ -16,7 +16,7 @@ enum job_cache_state {
 	JOB_CACHE_FETCHING, /* files are missing */
 	JOB_CACHE_BUILDING, /* its world is being built */
 	JOB_CACHE_READY,
-	JOB_CACHE_FAILED, /* error says why */
+	JOB_CACHE_FAILED, /* error is the reason */
 };
 
 struct job_cache {
@@ -27,33 +27,33 @@ struct job_cache {
 	struct envelope info; /* JobInfo, owned */
 	struct plan plan;
 	struct blob_store *blobs;
-	bool *held;		 /* by file: in the cache, held */
+	bool *held;		 /* by file: in the cache, and held */
 	char **paths;		 /* by file, for the builder's thread */
-	struct blob_hash wanted; /* while FETCHING: the blob that it waits for */
+	struct blob_hash wanted; /* while FETCHING: the blob being waited for */
 	struct world *world;
 	struct lease_key waits; /* one of the leases that wait for the world; job 0: none */
-	unsigned users;		/* leases that need it */
-	uint64_t last_used;	/* counter */
-	bool ended;		/* the coordinator needs it no more */
+	unsigned users;		/* number of leases that need it */
+	uint64_t last_used;	/* value of the counter of uses */
+	bool ended;		/* the coordinator does not need it any more */
 	double build_seconds;
 	void *owner;
-	void (*built)(struct job_cache *); /* on the loop's thread: READY or FAILED */
+	void (*built)(struct job_cache *); /* called on the loop's thread: READY or FAILED */
 	struct error error;
-	bool own; /* FAILED: this machine is at fault, not the job */
+	bool own; /* FAILED: because of this machine, not the job */
 };
 
 int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, struct error *e);
 /* Not while BUILDING. */
 void job_cache_free(struct job_cache *b);
 
-/* Takes the answer to JobGet; then job_cache_next_missing. -EBADMSG. */
+/* Takes the answer to JobGet; then call job_cache_next_missing. -EBADMSG. */
 int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e);
-/* Whether it is the same job: number and all, but for the bounds, which may have been moved. Where it cannot be known:
- * not. */
+/* Whether it is the same job: number and everything but the bounds, which may have been changed. If that cannot be
+ * known: false. */
 bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info);
-/* Holds what is there; the next hash to fetch into b->wanted. false: all files are there. */
+/* Holds the files in the cache, and puts the next hash to fetch into b->wanted. false: all files are there. */
 bool job_cache_next_missing(struct job_cache *b);
-/* All files are there: builds the world on the thread pool. */
+/* All files are there: builds the world in the thread pool. */
 int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e);
 
 #endif

@@ -51,7 +51,7 @@ static struct job_cache *who_wants(const struct agent *a, const struct blob_hash
 	return NULL;
 }
 
-/* What is asked for stays until it is answered, so that an answer is never taken for another one's. */
+/* A requested file is kept until it is answered, so that the answer is not taken for another's. */
 static void tidy_fetches(struct agent *a)
 {
 	for (struct fetch *f = a->fetches, *next; f; f = next) {
@@ -61,7 +61,7 @@ static void tidy_fetches(struct agent *a)
 	}
 }
 
-/* Idle bundles go when their job has ended, and the least recently used ones beyond WORLDS_KEPT. */
+/* Drops unused bundles of jobs that have ended, and the least recently used ones beyond WORLDS_KEPT. */
 static void tidy(struct agent *a)
 {
 	for (;;) {
@@ -108,7 +108,7 @@ static void fail_leases_of(struct agent *a, struct job_cache *b, const struct er
 	}
 }
 
-/* It goes with the next tidy(). */
+/* The next tidy() drops it. */
 static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
 {
 	b->state = JOB_CACHE_FAILED;
@@ -139,7 +139,7 @@ static void on_built(struct job_cache *b)
 	a->settle(a);
 }
 
-/* Asks for the next missing piece, unless another job has, or builds. */
+/* Requests the next missing chunk, unless another job has done so, or builds. */
 static void go_on(struct agent *a, struct job_cache *b)
 {
 	struct error e;
@@ -164,8 +164,8 @@ static void go_on(struct agent *a, struct job_cache *b)
 
 /* ---- leases ---- */
 
-/* Where leases are short and the coordinator's disk is slow results pile up: it asks for no more until they have gone.
- */
+/* If leases are short and the coordinator's disk is slow, results pile up: no more leases are requested until they
+ * have been acknowledged. */
 static void pace(struct agent *a)
 {
 	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
@@ -187,7 +187,7 @@ static struct lease_task *find_lease(const struct agent *a, const struct lease_k
 	return NULL;
 }
 
-/* Nobody wants it any more. What a thread has is dropped when the thread lets go. */
+/* Nobody wants it any more. If a thread has it, it is dropped when the thread returns. */
 static void forget_lease(struct agent *a, struct lease_task *l)
 {
 	if (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)) {
@@ -218,7 +218,7 @@ static void on_rendered(struct lease_task *l)
 	a->settle(a);
 }
 
-/* Far more than were asked for: no coordinator of ours does that. */
+/* Far more than requested: no correct coordinator does that. */
 static bool is_flood(const struct agent *a)
 {
 	unsigned open = 0;
@@ -227,8 +227,8 @@ static bool is_flood(const struct agent *a)
 	return open >= 4 * (a->config.threads + 1) + 16;
 }
 
-/* Results that are not acknowledged are many where leases are short and the coordinator's disk is slow. Whoever hung up
- * then would send them all again, and have no fewer. */
+/* Many unacknowledged results are normal if leases are short and the coordinator's disk is slow. Disconnecting would
+ * only send them all again. */
 static bool is_stuffed(const struct agent *a)
 {
 	enum { ANSWERS_MOST = 1024 };
@@ -250,11 +250,11 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	struct job_cache *b = find_job_cache(a, g.key.job);
 	l = find_lease(a, &g.key);
 	if (l && !blob_hash_equal(&l->grant.digest,
-				  &g.digest)) { /* the epoch before was computed again: this one is another now */
+				  &g.digest)) { /* the previous epoch was computed again: this is another lease */
 		forget_lease(a, l);
 		l = NULL;
 	}
-	if (l) { /* it is at work here already, from an earlier connection */
+	if (l) { /* it is being rendered already, from an earlier connection */
 		if (l->state == LEASE_RENDERED)
 			send_result(a, l);
 		grant_fini(&g);
@@ -287,7 +287,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		return;
 	}
 	b->last_used = ++a->clock;
-	struct lease_task **end = &a->leases; /* the oldest first: rounds complete in order */
+	struct lease_task **end = &a->leases; /* the oldest first, so that rounds complete in order */
 	while (*end)
 		end = &(*end)->next;
 	*end = l;
@@ -344,8 +344,8 @@ static void take_job_end(struct agent *a, uint64_t job)
 	tidy(a);
 }
 
-/* The coordinator has begun anew, and the job's number is another job's now: what was made of the old one is nobody's.
- */
+/* The coordinator has started over, and the job's number is now another job's: the results of the old one are
+ * useless. */
 static void disown(struct agent *a, struct job_cache *b)
 {
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job of this number\"", log_u64(b->job));
@@ -373,14 +373,14 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	if (b->state == JOB_CACHE_ASKED && job_cache_set_info(b, env, &e))
 		fail_job_cache(a, b, &e);
 	go_on(a, b);
-	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: results from before are welcome */
+	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: earlier results are welcome */
 		if (l->bundle == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
 	tidy(a);
 }
 
-/* Where it cannot be fetched for one job the others that want it try for themselves: what the first one held makes
- * room. */
+/* If it cannot be fetched for one job, the others that want it try for themselves: what the first one held is
+ * released. */
 static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
@@ -438,7 +438,7 @@ void lease_queue_message(struct agent *a, struct envelope *env, const unsigned c
 
 /* ---- connection and leaving ---- */
 
-/* What the processes before this one had when a signal ended them, before any lease is asked for. */
+/* Reports the leases of earlier processes that a signal ended, before any lease is requested. */
 static void tell_lost(struct agent *a)
 {
 	struct lost_lease *l;
@@ -455,7 +455,7 @@ void lease_queue_welcome(struct agent *a)
 		l->sent = false;
 	tell_lost(a);
 	fetch_reconnected(a);
-	/* Does the job live? The answer brings unfinished fetching and unsent results on their way. */
+	/* Asks whether the jobs still live. The answers resume unfinished fetches and send unsent results. */
 	for (struct job_cache *b = a->bundles; b; b = b->next)
 		if (!b->ended)
 			send_job_get(a, b->job);
@@ -481,7 +481,7 @@ void lease_queue_stop_all(struct agent *a)
 		atomic_store(&l->stop, true);
 }
 
-/* Looks are counted, not seconds: a worker that was stopped as a whole has not hung. */
+/* Counts checks, not seconds: a worker that was stopped as a whole has not hung. */
 static bool has_hung(struct task *t)
 {
 	unsigned long long now = atomic_load(&t->ticks);
@@ -527,7 +527,7 @@ bool lease_queue_watch(struct agent *a)
 	return watch_builds(a) || lease;
 }
 
-/* But for threads that hang, and scenes that are being built for nobody. */
+/* Except for hanging threads, and scenes being built for nobody. */
 bool lease_queue_is_idle(const struct agent *a)
 {
 	unsigned left = 0;

@@ -28,7 +28,7 @@ void lease_task_free(struct lease_task *l)
 	mem_free(l);
 }
 
-/* Packed here, so that the loop's thread never encodes a film. */
+/* Packed in the render thread, so that the loop's thread never encodes a film. */
 static void render(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t; /* its first member */
@@ -39,7 +39,7 @@ static void render(struct task *t)
 	work_begin(&l->grant.key, l->bundle->info.message->job_info->scene);
 	if (!atomic_load(&l->stop))
 		l->rc = render_lease(l->bundle->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
-	if (!l->rc && l->end == LEASE_DONE) /* what the coordinator would refuse is the scene's fault, and is said
+	if (!l->rc && l->end == LEASE_DONE) /* what the coordinator would refuse is the scene's fault, so it is reported
 					       before it is sent */
 		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)

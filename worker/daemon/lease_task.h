@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A lease in a worker's hands: from the grant through a thread of the thread pool to the frame that carries its result,
- * which is kept until the coordinator has acknowledged it. Loop's thread, but for the run itself.
+ * A lease at a worker: from the grant, through a render thread, to the frame with its result, which is kept until the
+ * coordinator has acknowledged it. Loop's thread, except for the rendering itself.
  */
 #ifndef WORKER_DAEMON_LEASE_TASK_H
 #define WORKER_DAEMON_LEASE_TASK_H
@@ -24,7 +24,7 @@ struct lease_task {
 	struct job_cache *bundle;
 	enum lease_task_state state;
 	atomic_bool stop;
-	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
+	bool unwanted; /* nobody wants it: dropped when its thread returns */
 	bool sent;     /* on this connection */
 	unsigned char *frame;
 	size_t frame_size;

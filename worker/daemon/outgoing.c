@@ -82,7 +82,7 @@ void send_result(struct agent *a, struct lease_task *l)
 	if (!a->conn || !a->welcome || l->sent)
 		return;
 	unsigned char *copy = mem_alloc(l->frame_size, 1);
-	if (!copy) { /* offered again after the next connect */
+	if (!copy) { /* sent again after the next connect */
 		conn_close(a->conn, "no memory to send a result");
 		return;
 	}

@@ -19,13 +19,13 @@
 static const double first_pause = 0.05, longest_pause = 10, long_life = 30;
 
 struct supervisor {
-	sigset_t signals, mask; /* signals that it waits for; the mask of before */
+	sigset_t signals, mask; /* the signals that it waits for; the previous mask */
 	pid_t child;
-	int asked;    /* the last signal that was sent on; 0: none */
+	int asked;    /* the last signal passed on; 0: none */
 	double pause; /* s before the next start */
 };
 
-/* The service manager's watchdog is fed by the process that renders. */
+/* The rendering process feeds the service manager's watchdog. */
 static void take_over_watchdog(pid_t parent)
 {
 	const char *of = getenv("WATCHDOG_PID");
@@ -51,7 +51,7 @@ static int start(struct supervisor *s, int (*run)(void *), void *user)
 	exit(run(user));
 }
 
-/* Until the process has ended; its status. */
+/* Waits until the process has ended; its status. */
 static int wait_for_end(struct supervisor *s)
 {
 	for (;;) {

@@ -18,7 +18,7 @@ struct shared {
 	unsigned threads;
 	atomic_uint taken; /* entries that a thread has */
 	atomic_int number; /* of the signal that ended the process; 0: none */
-	atomic_int hit;	   /* the entry of the thread that it hit; -1: none of these */
+	atomic_int hit;	   /* the entry of the thread that received it; -1: none of these */
 	char text[CRASH_TEXT];
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
@@ -43,7 +43,7 @@ static void last_words(int number, const char *text)
 {
 	int none = 0;
 	if (!atomic_compare_exchange_strong(&shared->number, &none, number))
-		return; /* another thread was first */
+		return; /* another thread came first */
 	atomic_store(&shared->hit, own && atomic_load(&own->busy) ? (int)(own - shared->of) : -1);
 	memcpy(shared->text, text, sizeof shared->text);
 }

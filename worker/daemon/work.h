@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the render threads are at work on, in memory that outlives their process: when a signal ends that the next one
- * knows which leases it had, and which of them the signal hit. Made by the supervisor (supervise.h) before it starts
- * the process that renders; a worker without a supervisor keeps none. Threads write their own entry; the loop's thread
- * reads what the process before left.
+ * What the render threads are working on, in memory that outlives their process: after a signal the next process knows
+ * which leases the old one had, and which of them the signal hit. Allocated by the supervisor (supervise.h) before it
+ * starts the rendering process; a worker without supervisor has none. Each thread writes its own entry; the loop's
+ * thread reads those of the previous process.
  */
 #ifndef WORKER_DAEMON_WORK_H
 #define WORKER_DAEMON_WORK_H
@@ -14,28 +14,28 @@
 
 enum { WORK_THREADS = 1024, WORK_SCENE = 128, WORK_TEXT = 512 };
 
-/* Of a process that has ended. own: nothing says that it was this lease (SIGKILL: the machine's memory, or somebody).
- */
+/* A lease of a process that has ended. own: nothing says that this lease was the cause (SIGKILL: lack of memory, or
+ * a person). */
 struct lost_lease {
 	struct lease_key key;
 	char text[WORK_TEXT];
 	bool own, reported;
 };
 
-/* Shared with processes that are forked from now on. -ENOMEM. */
+/* Shared with processes forked from now on. -ENOMEM. */
 int work_share(unsigned threads, struct error *e);
-/* In the process that renders: a signal that ends it leaves its name. */
+/* In the rendering process: a signal that ends it is recorded. */
 void work_catch(void);
 
 /* This thread renders the lease, or builds the scene that the lease waits for, until work_end. */
 void work_begin(const struct lease_key *k, const char *scene);
 void work_end(void);
 
-/* The supervisor: the process that rendered has ended, by this signal as far as the kernel says (0: none). What it had
- * is lost from now on. Returns how many leases that is; 0, too, where it ended without a signal. */
+/* In the supervisor: the rendering process has ended, by this signal according to the kernel (0: none). Its leases
+ * are lost from now on. Returns their number; also 0 if it ended without a signal. */
 unsigned work_lose(int number);
 
-/* Of the processes before: the index-th lost lease; NULL: no more. */
+/* Of earlier processes: the index-th lost lease; NULL: no more. */
 struct lost_lease *work_lost(unsigned index);
 
 #endif
