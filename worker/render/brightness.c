@@ -5,11 +5,11 @@
 
 enum {
 	SAMPLES_A_CELL = 8,
-	CELLS_MOST = 256, /* along a side */
+	CELLS_MOST = 256, /* cells along a side */
 };
-/* Squared relative standard error up to which a quarter's brightness is believed. */
+/* Squared relative standard error up to which a quarter's brightness is used. */
 static const double believed = 0.2;
-/* Of the mean, what is added in squares. */
+/* Share of the mean that is added in squares. */
 static const double least = 0.01;
 
 int brightness_init(struct brightness *b, const struct film_window *window, uint64_t samples, struct error *e)
@@ -81,7 +81,7 @@ static struct sums sums_of(const struct brightness *b, struct square q)
 	return s;
 }
 
-/* The square of a sum, with the least that a square of that size has. */
+/* The square of a sum, with the minimum for a square of that size. */
 static double lifted(const struct brightness *b, double all, struct sums s, struct square q)
 {
 	double floor = least * all * q.size * q.size / ((double)b->across * b->across);

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A map of how bright an image is, from few samples: what fireflies made is spread over the place that they may have
- * come from.
+ * A map of an image's brightness from few samples. Fireflies are spread over the region that they may have come from.
  *
- * Contributions fall into a grid of cells, a few samples for each. From the whole film downwards a square is quartered
- * as long as each of its quarters knows its brightness well enough; where one does not, all four have that of the
- * square. So what a cell says never depends on whether a firefly happened to come. A hundredth of the mean is added in
- * squares, as in the relative error. One thread.
+ * Contributions fall into a grid of cells, a few samples in each. Starting with the whole film, a square is divided as
+ * long as the brightness of each of its quarters is known well enough; otherwise all four get the brightness of the
+ * square. So the value of a cell does not depend on whether a firefly happened to land in it. A hundredth of the mean
+ * is added in squares, as in the relative error. One thread.
  */
 #ifndef WORKER_RENDER_BRIGHTNESS_H
 #define WORKER_RENDER_BRIGHTNESS_H
@@ -19,14 +18,14 @@ struct brightness {
 	double *sum, *square, *scale;
 };
 
-/* Of so many samples; brightness_fini frees it. -ENOMEM */
+/* For so many samples; brightness_fini frees it. -ENOMEM */
 int brightness_init(struct brightness *b, const struct film_window *window, uint64_t samples, struct error *e);
 void brightness_fini(struct brightness *b);
 void brightness_add(struct brightness *b, const struct splat *s);
-/* All samples are there. */
+/* Call when all samples have been added. */
 void brightness_settle(struct brightness *b, uint64_t samples);
-/* 1 / (pixels of the window x a pixel's X+Y+Z there): a contribution times this is relative to its place. 0: all is
- * black. */
+/* 1 / (pixels of the window x a pixel's X+Y+Z there): multiplies a contribution to make it relative to the
+ * brightness of its place. 0: everything is black. */
 double brightness_scale(const struct brightness *b, double x, double y);
 
 #endif

@@ -24,11 +24,11 @@ static void mix(uint64_t *hash, double x)
 uint64_t fingerprint_self_test(void)
 {
 	uint64_t hash = 0xcbf29ce484222325u;
-	/* volatile: computed by the library that is there, not by the compiler that was */
+	/* volatile: computed at run time by the installed library, not by the compiler */
 	volatile double seed = 0.123456789;
 	double x = seed;
 	for (int i = 0; i < INPUTS; i++) {
-		x = x * 3.9 * (1 - x); /* chaotic in (0,1): any bit of difference grows */
+		x = x * 3.9 * (1 - x); /* chaotic in (0,1): any difference in a bit grows */
 		mix(&hash, sin(100 * x));
 		mix(&hash, cos(100 * x));
 		mix(&hash, tan(x));
@@ -96,7 +96,7 @@ static int has_fma(void)
 void fingerprint_make(char text[FINGERPRINT_MAX])
 {
 	struct build_id id = {.size = 0};
-	char build[2 * ID_BYTES + 1] = HSLT_VERSION; /* linked without an id: better than nothing */
+	char build[2 * ID_BYTES + 1] = HSLT_VERSION; /* linked without a build id: better than nothing */
 	dl_iterate_phdr(look_at_program, &id);
 	for (size_t i = 0; i < id.size; i++)
 		snprintf(build + 2 * i, 3, "%02x", id.bytes[i]);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The numeric fingerprint (docs/design.md, rules 1): what decides the bits of a result beside plan and scene. Programs
- * with equal texts give equal bits. Any thread.
+ * The numeric fingerprint (docs/design.md, rules 1): everything that affects the bits of a result besides plan and
+ * scene. Programs with equal fingerprints give equal bits. Any thread.
  */
 #ifndef WORKER_RENDER_FINGERPRINT_H
 #define WORKER_RENDER_FINGERPRINT_H
@@ -15,7 +15,7 @@ enum { FINGERPRINT_MAX = 256 };
  * version, and a hash of what it computes here. */
 void fingerprint_make(char text[FINGERPRINT_MAX]);
 
-/* FNV-1a over the results of libm's functions on fixed inputs, about a millisecond. */
+/* FNV-1a over the results of libm's functions on fixed inputs; takes about a millisecond. */
 uint64_t fingerprint_self_test(void);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Every plug-in that a scene may name, gathered from the registries: the one list for the scene reader. */
+/* All plug-ins that a scene may name, collected from the registries for the scene reader. */
 #include "worker/render/render.h"
 
 #include "worker/render/bsdf/bsdf.h"

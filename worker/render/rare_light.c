@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * rare_light follows light sub-paths, then samples of the camera, each of which meets the photons around it. What a
- * path brings beyond RENDER_RARE times the brightness of its place counts.
+ * rare_light traces light sub-paths, then samples of the camera, each of which is merged with the photons around it.
+ * Contributions beyond RENDER_RARE times the brightness of their place count.
  *
- * The map of brightness is made of few samples: where light falls that they did not find it says too little, and a
- * bright spot in a dark corner would be called rare however easily it is found. So each place is as bright as its
- * photons say, where that is more. Light that no photon brings to a rough surface that the camera
- * sees is not seen here: behind a keyhole, or in a mirror's mirror.
+ * The map of brightness is made of few samples: where they did not find light it is too dark, and a bright spot in a
+ * dark corner would be called rare however easily it is found. So each place is as bright as its photons say, if that
+ * is more. Light that no photon brings to a rough surface visible to the camera is not detected: light through a
+ * keyhole, or seen in a mirror by a mirror.
  */
 #include "worker/render/rare_light.h"
 

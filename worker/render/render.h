@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The renderer: a library without network. This is its one public header for the daemon and the command line.
- * A world is immutable and shared by all threads; a lease is run by one thread.
+ * The renderer: a library without network code. This is its only public header for the daemon and the command line. A
+ * world is immutable and shared by all threads; a lease is run by one thread.
  */
 #ifndef WORKER_RENDER_RENDER_H
 #define WORKER_RENDER_RENDER_H
@@ -18,34 +18,33 @@
 /* All plug-in declarations, for scene_read. */
 const struct plugin_decl *render_plugins(void);
 
-/* Not one of them: that which the scene calls for, found by worker/render/choose.h before the plan is made. */
+/* Stands for the integrator that worker/render/choose.h selects for the scene, before the plan is made. */
 #define RENDER_INTEGRATOR_DEFAULT "auto"
 #define RENDER_INTEGRATOR_CHAINS "hslt"
 
-/* Of the libraries that decide bits, for the numeric fingerprint: "embree 3.13.5 avx2". */
+/* Versions of libraries that affect bits, for the numeric fingerprint: "embree 3.13.5 avx2". */
 const char *render_numeric_version(void);
 
-/* Reads a scene by the tables of all plug-ins: scene_read, or scene_read_lenient where the options have RENDER_LENIENT.
- */
+/* Reads a scene with all plug-ins: scene_read, or scene_read_lenient if the options have RENDER_LENIENT. */
 int render_scene_read(struct scene *s, const struct asset_source *assets, const char *name,
 		      const struct scene_define *defines, size_t define_count, const struct render_options *o,
 		      struct error *e);
 #define RENDER_LENIENT "lenient=yes"
 
-/* The strategies that there are: a name and what it moves; NULL at the end. */
+/* All strategies: a name and what it moves; ends with NULL. */
 const char *render_mutation_at(size_t index, const char **summary);
 
-/* The mixture of strategies of an integrator that has_mutations, in the spelling that a plan holds:
- * "independent=0.1,hslt=0.9". text: NAME or NAME=WEIGHT with commas between; NULL or "": what suits the scene. A
- * canonical text comes back as it is. -EINVAL with a sentence. */
+/* The mixture of strategies of an integrator that has_mutations, as stored in a plan: "independent=0.1,hslt=0.9".
+ * text: NAME or NAME=WEIGHT, separated by commas; NULL or "": the default for the scene. A canonical text does not
+ * change. -EINVAL with a sentence. */
 int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX],
 		     struct error *e);
 
-/* Seeds of a lease at epoch 0 (bootstrap indices, one a chain) or the states after the epoch before; seeds in their
- * place where these are lost: the chains begin anew. */
+/* Seeds of a lease at epoch 0 (bootstrap indices, one per chain), or the states after the previous epoch; seeds in
+ * their place if the states are lost, and the chains start again. */
 struct lease_input {
 	uint32_t chain_count;
-	const uint64_t *seeds;		  /* NULL where there are states */
+	const uint64_t *seeds;		  /* NULL if there are states */
 	const struct chain_state *states; /* NULL at epoch 0 */
 };
 

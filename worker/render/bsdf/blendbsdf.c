@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Several BSDFs, each with a share of the light: `blendbsdf` two by a weight (0 is the first, 1 the second),
- * `mixturebsdf` any number by fixed ones, which absorb what they leave of 1 and are scaled where they exceed it.
+ * `mixturebsdf` any number by fixed weights; what these leave of 1 is absorbed, and they are scaled if they exceed it.
  *
- * A surface has one index of refraction, and specular lobes of the same kind must leave in one direction: parts that
- * let light through must agree about the index, and none may disperse.
+ * A surface has one index of refraction, and specular lobes of the same kind must have the same direction: transmitting
+ * parts must have the same index, and none may be dispersive.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/twosided.h"
@@ -20,7 +20,7 @@ struct blend {
 	bool is_fixed;
 };
 
-/* Of each part: the share of the light, and the probability of choosing it. */
+/* For each part: its share of the light, and the probability of choosing it. */
 struct shares {
 	spectrum f[PARTS_MAX];
 	double chance[PARTS_MAX];
@@ -83,7 +83,7 @@ static double blend_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	return sum;
 }
 
-/* Specular lobes of all parts look the same way. */
+/* Specular lobes of all parts have the same direction. */
 static spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 				 double *chance)
 {
@@ -129,7 +129,7 @@ static bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return out->pdf > 0;
 }
 
-/* Whether this part goes with those before it; it enters what it is into b. */
+/* Whether this part is compatible with those before it; merges its properties into b. */
 static int join(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n,
 		const struct scene_node *inner, struct error *e)
 {
@@ -196,7 +196,7 @@ static int blend_create(struct bsdf *b, const struct scene_node *n, const struct
 	return bsdf_texture(b, &m->weight, n, "weight", 0.5, build, e);
 }
 
-/* As many as there are parts. */
+/* As many weights as parts. */
 static int read_weights(struct blend *m, const struct scene_node *n, struct error *e)
 {
 	const char *text = node_string(n, "weights", "");

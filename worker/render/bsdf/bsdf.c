@@ -32,7 +32,7 @@ double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)
 	return b->dispersive && b->ior ? ior_eta(b->ior, w->nm[0]) : b->eta;
 }
 
-/* What a plug-in that cancels nothing by hand is worth. */
+/* The product without cancellation, for plug-ins that do not provide their own. */
 static spectrum halfvec_product(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	struct bsdf_point radiance = *p;

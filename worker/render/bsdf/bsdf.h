@@ -19,11 +19,11 @@
 enum bsdf_mode {
 	BSDF_REFLECT = 1,
 	BSDF_TRANSMIT = 2,
-	BSDF_DELTA = 4, /* with one of the two above */
+	BSDF_DELTA = 4, /* combined with one of the two above */
 };
 
-/* Which quantity the path carries while it is being followed: a camera sub-path carries importance backwards and so
- * gathers radiance; bsdf values for it are those of TRANSPORT_RADIANCE. */
+/* Which quantity a sub-path carries while it is traced: a camera sub-path traces importance backwards and thus
+ * gathers radiance; its BSDF values are those of TRANSPORT_RADIANCE. */
 enum transport { TRANSPORT_RADIANCE, TRANSPORT_IMPORTANCE };
 
 struct bsdf_point {
@@ -48,8 +48,8 @@ struct bsdf_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	double least_roughness;		    /* rough metal and glass below this is made smooth */
-	struct attribute_table *attributes; /* of the mesh that it lies on; NULL: of none */
+	double least_roughness;		    /* rough metal and glass below this roughness is made smooth */
+	struct attribute_table *attributes; /* of the mesh; NULL: none */
 };
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)
@@ -64,10 +64,10 @@ struct bsdf_ops {
 	int (*create)(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 	spectrum (*eval)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 	double (*pdf_solid)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
-	/* f |wi.z| |d wi / d h_par| with the factors that explode and vanish together cancelled by hand; see
-	 * bsdf_eval_halfvec. NULL: nothing cancels, the product of its factors will do. */
+	/* f |wi.z| |d wi / d h_par| with factors that diverge and vanish together cancelled analytically; see
+	 * bsdf_eval_halfvec. NULL: nothing cancels, and the plain product is used. */
 	spectrum (*eval_halfvec)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
-	/* See bsdf_eval_delta. NULL: has no exactly specular lobe. */
+	/* See bsdf_eval_delta. NULL: it has no specular lobe. */
 	spectrum (*eval_delta)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			       double *chance);
 	/* u[0], u[1]: direction; u[2]: lobe. false: absorbed. */
@@ -77,23 +77,22 @@ struct bsdf_ops {
 
 struct bsdf {
 	const struct bsdf_ops *ops;
-	unsigned modes;	 /* union of all modes it can have (REFLECT|DELTA and REFLECT may both be there: then both bits)
-			  */
-	bool has_smooth; /* some lobe is not delta: eval is not identically 0 */
+	unsigned modes;	 /* union of all modes it can have (with both REFLECT|DELTA and REFLECT, both bits are set) */
+	bool has_smooth; /* some lobe is not specular: eval is not identically 0 */
 	bool has_delta;
-	double alpha;	   /* least roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
+	double alpha;	   /* smallest roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
 	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta
 			      only */
 	double eta;	   /* index below the surface (against the normal) over the one above, at 587.6 nm where it
 			      depends on the wavelength; 1: opaque or none */
 	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength
 			    */
-	const struct ior *ior; /* of both sides (enum ior_side); NULL: eta is all that is known */
+	const struct ior *ior; /* for both sides (enum ior_side); NULL: only eta is known */
 	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
-	bool black;		     /* neither reflects nor lets through */
+	bool black;		     /* neither reflects nor transmits */
 	enum color_shape shape;	     /* CONSTANT: carries no colour */
-	const struct relief *relief; /* bends the shading normals of the surface that it lies on; NULL: nothing does */
+	const struct relief *relief; /* bends the shading normals of the surface; NULL: none */
 	void *data;
 };
 
@@ -116,7 +115,7 @@ spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 
 			 double *chance);
 
 int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
-void bsdf_black(struct bsdf *b); /* absorbs everything; for emitters without a BSDF */
+void bsdf_black(struct bsdf *b); /* absorbs everything: for emitters without a BSDF */
 
 extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line a BSDF: its const struct bsdf_ops is bsdf_ops_NAME. */
+/* One line per BSDF: BSDF(NAME) stands for its const struct bsdf_ops bsdf_ops_NAME. */
 BSDF(diffuse)
 BSDF(conductor)
 BSDF(roughconductor)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Another BSDF on a surface whose shading normals are bent by a height (`bumpmap`) or given by a picture (`normalmap`).
- * The BSDF itself is the inner one: geometry does the bending (worker/render/geom/relief.h), so that half vectors and
- * their derivatives know of it.
+ * Another BSDF on a surface whose shading normals are bent by a height (`bumpmap`) or given by an image (`normalmap`).
+ * The BSDF itself is the inner one: the normals are bent by the geometry (worker/render/geom/relief.h), so that half
+ * vectors and their derivatives take it into account.
  */
 #include "worker/render/bsdf/create.h"
 
@@ -28,7 +28,7 @@ static void height_at(const void *data, double u, double v, struct relief_value 
 	out->dv = (vec3){mixed, b->scale * height_of(j.dvv, j.grey), 0};
 }
 
-/* Components from 0 to 1 stand for -1 to 1. */
+/* Components from 0 to 1 represent -1 to 1. */
 static void normal_at(const void *data, double u, double v, struct relief_value *out)
 {
 	const struct bend *b = data;
@@ -73,7 +73,7 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 	return create(b, n, build, RELIEF_NORMAL, e);
 }
 
-/* What Mitsuba 3.7 does where the bent normal and the surface disagree. */
+/* What Mitsuba 3.7 does if the bent normal and the surface disagree. */
 #define OF_MITSUBA_3_7                                                                         \
 	{.name = "flip_invalid_normals", .types = VALUE_BOOL, .status = PARAM_DIFFERS},        \
 	{                                                                                      \
@@ -85,7 +85,7 @@ static const struct param bumpmap_params[] = {
 	OF_MITSUBA_3_7,
 	{.name = NULL},
 };
-/* scale and handedness: as glTF has them. */
+/* scale and handedness: as in glTF. */
 static const struct param normalmap_params[] = {
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
 	{.name = "handedness", .types = VALUE_BOOL},

@@ -54,7 +54,7 @@ static double transmitted_at(const struct layer *l, double cosine)
 			   : fresnel_dielectric(fmin(cosine, 1), l->c->eta).transmitted;
 }
 
-/* false: nothing gets in from there. */
+/* false: no light gets in from there. */
 static bool enter(const struct layer *l, vec3 w, struct passage *out)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(w.z), 1), l->c->eta);
@@ -153,7 +153,7 @@ static spectrum coat_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	return f;
 }
 
-/* Out through the boundary: false where it reflects totally. */
+/* Out through the boundary; false: total reflection. */
 static bool leave(const struct coat *c, vec3 inside, vec3 *out)
 {
 	double x = c->eta * inside.x, y = c->eta * inside.y, cos2 = 1 - x * x - y * y;
@@ -163,7 +163,7 @@ static bool leave(const struct coat *c, vec3 inside, vec3 *out)
 	return out->z != 0;
 }
 
-/* The direction of a lobe that is not specular, or false with *delta set, or false: absorbed. */
+/* The direction of a lobe that is not specular. false: specular if *delta is set, absorbed otherwise. */
 static bool follow(const struct bsdf *b, const struct layer *l, const struct bsdf_point *p, vec3 wo, const double u[3],
 		   bool *delta, vec3 *wi)
 {

@@ -32,7 +32,7 @@ spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, do
 {
 	spectrum rho = texture_eval(&c->diffuse, &p->where, p->w);
 	double common = transmitted_o * transmitted_i / WARP_PI;
-	if (!(common > 0)) /* and perhaps nothing at all is let in: escape is 0 then */
+	if (!(common > 0)) /* and possibly no light gets in at all: escape is 0 then */
 		return spectrum_of(0);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double again = c->nonlinear ? rho.v[i] : 1;

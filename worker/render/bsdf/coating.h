@@ -17,16 +17,16 @@
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/ior.h"
 
-#define COATING_IOR_DEFAULT 1.49 /* polypropylene, what both Mitsuba dialects take */
+#define COATING_IOR_DEFAULT 1.49 /* polypropylene, the default of both Mitsuba dialects */
 
 struct coating {
 	struct texture diffuse, specular;
 	double eta;		/* index of the coating over the one outside */
-	double specular_weight; /* share of the specular reflectance, for the choice of a lobe */
+	double specular_weight; /* share of the specular reflectance, used to choose a lobe */
 	bool nonlinear;
 };
 
-/* Reads the parameters and enters them into b. */
+/* Reads the parameters into b. */
 int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		 struct error *e);
 #define COATING_PARAMS                                                                        \
@@ -41,7 +41,8 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double escape, double transmitted_o,
 			 double transmitted_i);
 
-/* The probability of sampling the specular lobe where the boundary reflects the share `reflected` of wo's light. */
+/* The probability of sampling the specular lobe, given the share `reflected` of wo's light that the boundary
+ * reflects. */
 double coating_specular_chance(const struct coating *c, double reflected);
 
 #endif

@@ -18,8 +18,7 @@ static double dielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, v
 	return 0;
 }
 
-/* f |wi.z| of one lobe for light that f is the Fresnel share of; eta: index beyond over index on wo's side. Chance 0:
- * none. */
+/* f |wi.z| of one lobe with the Fresnel share f; eta: index beyond over index on wo's side. Chance 0: no such lobe. */
 static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
 		     const struct fresnel *f, vec3 *wi, double *chance)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A sheet that scatters light through to its other side, the same in all directions, and reflects none: paper, leaves
+/* A sheet that scatters light through to its other side, equally in all directions, and reflects none: paper, leaves
  * (in a blend with `diffuse`). */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/warp.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What Mitsuba gives a shape without a BSDF. */
+/* The BSDF that Mitsuba gives a shape without one. */
 #ifndef WORKER_RENDER_BSDF_DIFFUSE_H
 #define WORKER_RENDER_BSDF_DIFFUSE_H
 

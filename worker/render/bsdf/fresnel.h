@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Reflection at a smooth boundary, unpolarised. Cosines on the side that the light is on, in [0,1]. */
+/* Reflection at a smooth boundary, unpolarised. Cosines are on the incident side, in [0,1]. */
 #ifndef WORKER_RENDER_BSDF_FRESNEL_H
 #define WORKER_RENDER_BSDF_FRESNEL_H
 
 #include <math.h>
 
-/* Shares of light; both keep their digits where they are small. */
+/* Shares of light; both keep their precision where they are small. */
 struct fresnel {
 	double reflected, transmitted;
-	double cos_t; /* cosine beyond, 0 at total reflection */
+	double cos_t; /* cosine of the refracted ray, 0 at total reflection */
 };
 
-/* Cosines on both sides, of directions that Snell's law joins; eta: index beyond over index here. The differences of
- * the amplitudes are written as what is left of them, so that no digit goes where eta is next to 1. */
+/* Cosines on both sides, of directions related by Snell's law; eta: index beyond over index here. The differences of
+ * amplitudes are written out, so that no digits cancel when eta is close to 1. */
 static inline struct fresnel fresnel_between(double c, double t, double eta)
 {
 	double s = 1 / (c + eta * t), p = 1 / (eta * c + t), e = (eta - 1) * (eta + 1);
@@ -23,14 +23,14 @@ static inline struct fresnel fresnel_between(double c, double t, double eta)
 
 static inline struct fresnel fresnel_dielectric(double c, double eta)
 {
-	/* (eta cos_t)^2; each form keeps its digits where it is used, next to eta = 1 and to the normal. */
+	/* (eta cos_t)^2; each form keeps its precision where it is used, close to eta = 1 and to the normal. */
 	double t2 = c * c < 0.5 ? (eta - 1) * (eta + 1) + c * c : eta * eta - (1 - c) * (1 + c);
 	if (!(t2 > 0))
 		return (struct fresnel){1, 0, 0};
 	return fresnel_between(c, sqrt(t2) / eta, eta);
 }
 
-/* Index eta - i k beyond, over the index here. eta = 0, k = 1 is a perfect mirror. */
+/* Index eta - i k beyond, relative to the index here. eta = 0, k = 1 is a perfect mirror. */
 static inline double fresnel_conductor(double c, double eta, double k)
 {
 	double c2 = c * c, s2 = (1 - c) * (1 + c);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What dielectric and roughdielectric share: the index and the factors of the two modes. */
+/* Shared by dielectric and roughdielectric: the index and the factors of the two modes. */
 #ifndef WORKER_RENDER_BSDF_GLASS_H
 #define WORKER_RENDER_BSDF_GLASS_H
 
@@ -11,8 +11,8 @@ struct glass {
 	struct ior side[2];			   /* of enum ior_side */
 };
 
-/* Parameters of the index, specular_reflectance, specular_transmittance. Sets b->eta, b->ior and b->dispersive and
- * enters the colours; g outlives b. */
+/* Reads the parameters of the index, specular_reflectance, specular_transmittance. Sets b->eta, b->ior,
+ * b->dispersive and the colour flags; g must outlive b. */
 int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define GLASS_PARAMS                                                                    \

@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <strings.h>
 
-/* Glasses and crystals: value at 587.6 nm of the Sellmeier equations that their makers and Malitson, Peter, Daimon
- * published; liquids and gases: handbook values at room temperature. */
+/* Glasses and crystals: values at 587.6 nm of the Sellmeier equations published by their makers and by Malitson,
+ * Peter and Daimon; liquids and gases: handbook values at room temperature. */
 static const struct {
 	const char *name;
 	double n;
@@ -42,7 +42,7 @@ static const struct {
 	{"sapphire (o)", 3, {1.4313493, 0.65054713, 5.3414021}, {0.005279926102, 0.01423826471, 325.0178341}},
 };
 
-/* Gases bend light so little that one number will do even where dispersion is asked for. */
+/* Gases refract so little that a constant suffices even with dispersion. */
 #define NEARLY_VACUUM 1.001
 
 int ior_read(const struct scene_node *n, const char *name, double fallback, double *out, struct error *e)
@@ -94,8 +94,8 @@ static const struct names side_names[] = {
 	[IOR_EXT] = {"ext_ior", "ext_cauchy_b", "ext_sellmeier"},
 };
 
-/* "B1,..,Bm,C1,..,Cm". With no negative numbers among them and no C among the squares of wavelengths, n falls from the
- * shortest to the longest wavelength: its two ends say whether it is an index everywhere. */
+/* "B1,..,Bm,C1,..,Cm". Without negative numbers, and with no C among the squares of wavelengths, n decreases from
+ * the shortest to the longest wavelength, so checking both ends is enough. */
 static int parse_sellmeier(struct ior *out, const struct scene_node *n, const char *name, const char *text,
 			   struct error *e)
 {

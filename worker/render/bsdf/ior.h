@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Indices of refraction: one number, by value or by name, as in Mitsuba; or, where the scene asks for it, a function of
- * the wavelength by Cauchy's or Sellmeier's law (Sellmeier 1871). Wavelengths in nm outside, in micrometres in
- * coefficients. Immutable after reading; any thread; nothing allocates.
+ * Indices of refraction: a constant, by value or by name, as in Mitsuba; or, if the scene requests it, a function of
+ * the wavelength by Cauchy's or Sellmeier's law (Sellmeier 1871). Wavelengths are in nm in the interface and in
+ * micrometres in coefficients. Immutable after reading; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_BSDF_IOR_H
 #define WORKER_RENDER_BSDF_IOR_H
 
 #include "worker/render/scene/scene.h"
 
-#define IOR_NM 587.6 /* helium's yellow line, near sodium's: where indices that are one number are taken */
+#define IOR_NM 587.6 /* helium's yellow line, near sodium's: the wavelength of constant indices */
 
 enum { IOR_TERMS = 4 };
 
@@ -22,11 +22,11 @@ struct ior {
 
 enum ior_side { IOR_INT, IOR_EXT };
 
-/* The property `name` of n, a number of that range or a name, as one number; `fallback` when absent. */
+/* Reads the property `name` of n, a number in that range or a material's name, as a constant; `fallback` if absent. */
 int ior_read(const struct scene_node *n, const char *name, double fallback, double *out, struct error *e);
 
-/* int_ior, int_cauchy_b, int_sellmeier or the three for ext; names have their own law where `dispersion` is on.
- * Defaults are Mitsuba's. What is returned is within [PARAM_IOR_MIN, PARAM_IOR_MAX] over all wavelengths. */
+/* int_ior, int_cauchy_b, int_sellmeier, or the three for ext; with `dispersion`, names stand for the material's own
+ * law. Defaults are Mitsuba's. The result is within [PARAM_IOR_MIN, PARAM_IOR_MAX] at all wavelengths. */
 int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out, struct error *e);
 #define IOR_NUMBER(name_)                                                                             \
 	{                                                                                             \
@@ -43,13 +43,13 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 	}
 
 double ior_at(const struct ior *i, double nm);
-/* The index inside over the one outside; by enum ior_side. */
+/* The index inside over the index outside; by enum ior_side. */
 double ior_eta(const struct ior side[2], double nm);
 
-/* Names whose dispersion is known, for messages. */
+/* Names with known dispersion, for messages. */
 const char *ior_dispersive_names(char *text, size_t size);
 
-#define IOR_BK7_DEFAULT 1.5046	 /* what both Mitsuba dialects take for the inside when nothing is said */
+#define IOR_BK7_DEFAULT 1.5046	 /* the default inside, in both Mitsuba dialects */
 #define IOR_AIR_DEFAULT 1.000277 /* ... and for the outside */
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A BSDF without some of its lobes, which then absorb. */
+/* A BSDF without some of its lobes, whose light is then absorbed. */
 #ifndef WORKER_RENDER_BSDF_LOBE_FILTER_H
 #define WORKER_RENDER_BSDF_LOBE_FILTER_H
 
@@ -7,7 +7,7 @@
 
 enum { BSDF_WITHOUT_TRANSMISSION = 1, BSDF_WITHOUT_DELTA = 2, BSDF_WITHOUT_SMOOTH = 4 };
 
-/* Takes the lobes out of b; allocates in the arena. */
+/* Removes the lobes from b; allocates in the arena. */
 int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struct error *e);
 
 #endif

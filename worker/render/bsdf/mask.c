@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An opaque BSDF with holes: the share `opacity` of the light meets it, the rest goes straight on. The way through is a
- * specular lobe, so a path counts an edge more for it, and next event estimation does not look through.
+ * An opaque BSDF with holes: it scatters the share `opacity` of the light, the rest passes straight through. The latter
+ * is a specular lobe, so a path counts one more edge for it, and next event estimation does not look through.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/straight.h"

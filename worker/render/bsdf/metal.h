@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The complex index of a conductor, relative to what is outside: shared by conductor and roughconductor. */
+/* The complex index of a conductor, relative to the outside: shared by conductor and roughconductor. */
 #ifndef WORKER_RENDER_BSDF_METAL_H
 #define WORKER_RENDER_BSDF_METAL_H
 
@@ -8,12 +8,12 @@
 
 struct metal {
 	struct color eta, k;
-	struct texture reflectance; /* multiplies */
-	bool perfect;		    /* reflects everything: Fresnel's factor is 1 */
+	struct texture reflectance; /* factor */
+	bool perfect;		    /* reflects everything: the Fresnel factor is 1 */
 };
 
-/* Parameters material, eta, k, ext_eta, specular_reflectance. Without any of the first three the material is Cu in the
- * 0.5/0.6 dialect and none (a perfect mirror) in 3.x. Enters colour and texture into b. */
+/* Reads material, eta, k, ext_eta, specular_reflectance. Without any of the first three, the material is Cu in the
+ * 0.5/0.6 dialect and none (a perfect mirror) in 3.x. Sets b's colour and texture flags. */
 int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define METAL_PARAMS                                                                                                \
@@ -23,7 +23,7 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 		.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1                                    \
 	}
 
-/* Reflectance for the cosine against the (micro)surface. */
+/* Reflectance for the cosine to the (micro)surface normal. */
 spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine);
 
 #endif

@@ -6,7 +6,7 @@
 #include <float.h>
 #include <string.h>
 
-/* The length of v's part in the plane, stretched along v by the ratio: times alpha it is the sine that masking sees. */
+/* The length of v's tangential part, stretched along v by the ratio: times alpha it is the sine that enters masking. */
 static double stretched_sine(const struct microfacet *m, vec3 v)
 {
 	return sqrt(v.x * v.x + m->ratio * m->ratio * (v.y * v.y));
@@ -22,7 +22,7 @@ double microfacet_d(const struct microfacet *m, vec3 h)
 		double d = a2 * c2 + s2;
 		return a2 / (WARP_PI * d * d);
 	}
-	if (s2 > 700 * a2 * c2) /* below the least double */
+	if (s2 > 700 * a2 * c2) /* below the smallest double */
 		return 0;
 	return exp(-s2 / (a2 * c2)) / (WARP_PI * a2 * c2 * c2);
 }
@@ -112,7 +112,8 @@ static vec3 ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1
 	double z = (1 - u1) * (1 + stretched.z) - stretched.z, r = sqrt(fmax(0, (1 - z) * (1 + z)));
 	double phi = 2 * WARP_PI * u0;
 	vec3 h = {m->alpha * (r * cos(phi) + stretched.x), along_v * (r * sin(phi) + stretched.y), z + stretched.z};
-	/* The rim of the cap rounds to z = 0 and r = 0 at once only for v in the plane: any normal on it will do. */
+	/* The rim of the cap rounds to z = 0 and r = 0 at once only for v in the plane: then any normal on it is
+	 * valid. */
 	return h.z > 0 ? vec3_normalize(h) : (vec3){0, 0, 1};
 }
 

@@ -2,8 +2,8 @@
 /*
  * Microfacet distributions, Beckmann and GGX (Walter et al. 2007, Microfacet Models for Refraction), with Smith's
  * masking; the roughness along u and v may differ (Heitz 2014, section 5.3: the isotropic one, stretched). Shadowing
- * and masking are taken as independent, G2 = G1 G1, as Mitsuba does. Everything stays finite at grazing angles because
- * G1 is only ever wanted over the cosine. Roughness from MICROFACET_ALPHA_MIN up.
+ * and masking are independent, G2 = G1 G1, as in Mitsuba. G1 is always divided by the cosine, so everything stays
+ * finite at grazing angles. Roughness is at least MICROFACET_ALPHA_MIN.
  */
 #ifndef WORKER_RENDER_BSDF_MICROFACET_H
 #define WORKER_RENDER_BSDF_MICROFACET_H
@@ -32,11 +32,11 @@ double microfacet_d(const struct microfacet *m, vec3 h);
 /* Smith's G1(v) / v.z for v.z > 0, unit. */
 double microfacet_g1_over_cos(const struct microfacet *m, vec3 v);
 
-/* A normal with density G1(v) max(0, v.h) D(h) / v.z: those seen from v (v.z > 0). GGX: Dupuy and Benyoub 2023;
- * Beckmann: Heitz and d'Eon 2014, inverted to double precision. */
+/* A normal with density G1(v) max(0, v.h) D(h) / v.z: the normals visible from v (v.z > 0). GGX: Dupuy and Benyoub
+ * 2023; Beckmann: Heitz and d'Eon 2014, inverted to double precision. */
 vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, double u1);
 
-/* The half vector wo + eta wi: direction and length. false: too short to have one. */
+/* The half vector wo + eta wi: direction and length. false: too short to have a direction. */
 static inline bool microfacet_half(vec3 wo, double eta, vec3 wi, vec3 *h, double *length)
 {
 	vec3 sum = vec3_madd(wo, eta, wi);
@@ -61,7 +61,7 @@ int microfacet_read(struct microfacet *m, const struct scene_node *n, struct err
 		.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED      \
 	}
 
-/* Of smooth materials: what editors leave there when a rough one was made smooth. */
+/* Parameters of smooth materials that have no effect: editors leave them when a rough material is made smooth. */
 #define MICROFACET_PARAMS_IGNORED                                                                                \
 	{.name = "alpha", .status = PARAM_IGNORED}, {.name = "alpha_u", .status = PARAM_IGNORED},                \
 		{.name = "alpha_v", .status = PARAM_IGNORED}, {.name = "distribution", .status = PARAM_IGNORED}, \

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Nothing: light goes straight on. A path counts an edge more for it, and next event estimation does not look through.
- */
+/* Light passes straight through. A path counts one more edge for it, and next event estimation does not look
+ * through. */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/straight.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Phong's lobe, modified to be reciprocal and normalised (Lafortune and Willems 1994), over a diffuse base. As in
- * Mitsuba 0.6, where the two reflectances can add up to more than 1 both are scaled by 0.99 over their sum.
+ * Phong's lobe, made reciprocal and normalised (Lafortune and Willems 1994), over a diffuse base. As in Mitsuba 0.6, if
+ * the two reflectances can add up to more than 1, both are scaled by 0.99 over their sum.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/warp.h"
@@ -14,7 +14,7 @@ struct phong {
 	double specular_chance; /* of sampling the specular lobe */
 };
 
-/* The lobe without its norm: nothing comes from behind the plane across the mirror direction. */
+/* The lobe without its normalisation: zero behind the plane across the mirror direction. */
 static double lobe_of(const struct phong *ph, vec3 wo, vec3 wi)
 {
 	double c = wo.z * wi.z - wo.x * wi.x - wo.y * wi.y;

@@ -66,8 +66,8 @@ static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 	return out->pdf > 0;
 }
 
-/* What the boundary lets in of diffuse light: the integral of T over the sine's square, up to total reflection, by the
- * midpoint rule. */
+/* The share of diffuse light that the boundary lets in: the integral of T over the squared sine, up to total
+ * reflection, by the midpoint rule. */
 static double let_in(double eta)
 {
 	enum { STEPS = 4096 };

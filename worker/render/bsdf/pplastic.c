@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Mitsuba 3's polarized plastic (Baek et al. 2018) for light that is not polarized, which is all that there is here: a
- * rough dielectric boundary, and beside it a diffuse lobe that is let in and out by a smooth one, F and T of Fresnel:
+ * Mitsuba 3's polarized plastic (Baek et al. 2018) for unpolarised light, the only kind here: a rough dielectric
+ * boundary, and a diffuse lobe that enters and leaves through a smooth one, with Fresnel's F and T:
  *
  *   f = specular F(wo.h) D G1 G1 / (4 cos cos) + diffuse T(wo) T(wi) / pi
  *
- * On the side of the normal. Light that the boundary throws back inside is lost, unlike in `roughplastic`.
+ * On the side of the normal. Light that the boundary reflects back inside is lost, unlike in `roughplastic`.
  */
 #include "worker/render/bsdf/coating.h"
 #include "worker/render/bsdf/fresnel.h"
@@ -22,7 +22,7 @@ static struct fresnel fresnel_at(const struct pplastic *s, double cosine)
 	return fresnel_dielectric(fmin(cosine, 1), s->coating.eta);
 }
 
-/* The specular lobe without its reflectance, and its density. Both directions above. */
+/* The specular lobe without its reflectance, and its density. Both directions are above. */
 static double facets(const struct pplastic *s, const struct microfacet *m, vec3 wo, vec3 wi, double *pdf)
 {
 	vec3 h;

@@ -21,7 +21,7 @@
 
 enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_TRANSMIT, LOBES };
 
-/* base_color over its luminance, by eight wavelengths weighted with the eye's sensitivity. */
+/* base_color over its luminance, from eight wavelengths weighted by the eye's sensitivity. */
 static spectrum tint_of(const struct principled *p, const struct bsdf_point *at, spectrum base)
 {
 	static const struct wavelengths seen[2] = {{.nm = {440, 520, 560, 620}}, {.nm = {480, 540, 580, 660}}};
@@ -47,7 +47,7 @@ struct microfacet principled_facets(double anisotropic, double roughness)
 	return m;
 }
 
-/* Textures of roughness and of metallic are grey: their mean over the lanes. */
+/* Textures of roughness and metallic are grey: the mean over the lanes. */
 double principled_share_at(const struct texture *t, const struct bsdf_point *at)
 {
 	return fmin(fmax(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
@@ -87,8 +87,8 @@ spectrum principled_fresnel(const struct stuff *s, double cosine)
 	return f;
 }
 
-/* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. wi is
- * refused below the surface by the caller. */
+/* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. The
+ * caller excludes wi below the surface. */
 spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_d)
 {
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
@@ -132,7 +132,7 @@ static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
 	bool below = wo.z < 0;
 	double clear = 1 - s->metallic, glass = clear * s->share[TRANSMISSION];
 	double reflected = fresnel_dielectric(fmin(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
-	/* Where the surface reflects totally, some facets do not. */
+	/* At total reflection some facets do not reflect. */
 	chance[LOBE_TRANSMIT] = glass * fmax(1 - reflected, 0.05);
 	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * fmax(p->base_max, 0.04);
 	chance[LOBE_DIFFUSE] =
@@ -149,7 +149,7 @@ static vec3 mirror(vec3 v, bool below)
 	return below ? (vec3){v.x, v.y, -v.z} : v;
 }
 
-/* The value and the density of one pair, side by side: they share most of their terms. wo.z is not 0. */
+/* The value and the density of one pair, together because they share most terms. wo.z is not 0. */
 struct pair {
 	spectrum f;
 	double pdf;
@@ -241,7 +241,7 @@ static vec3 clearcoat_normal(const struct stuff *s, double u0, double u1)
 	return (vec3){sine * cos(phi), sine * sin(phi), sqrt(cos2)};
 }
 
-/* From above. false: this facet sends nothing on. */
+/* From above. false: this facet transmits nothing. */
 static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const double u[3], vec3 *wi)
 {
 	if (lobe == LOBE_DIFFUSE) {
@@ -338,7 +338,8 @@ static int read_index(struct principled *p, const struct scene_node *n, struct e
 		return node_error(n, e, EINVAL, "eta and specular say the same thing; give one");
 	/* Burley 2012, section 5.5: 0.08 times `specular` is reflected at normal incidence. */
 	p->eta = node_find(n, "eta") ? node_float(n, "eta", 1.5) : 2 / (1 - sqrt(0.08 * specular)) - 1;
-	p->eta = fmax(p->eta, 1 + 1e-3); /* Mitsuba's least, too: a boundary that is none refracts nothing */
+	p->eta = fmax(p->eta,
+		      1 + 1e-3); /* Mitsuba's minimum, too: without a difference of indices nothing is refracted */
 	return 0;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What `principled` and `principledthin` share: the parameters, read, and the lobes of a surface. Private to
+/* Shared by `principled` and `principledthin`: the parameters and the lobes of a surface. Private to
  * worker/render/bsdf. */
 #ifndef WORKER_RENDER_BSDF_PRINCIPLED_H
 #define WORKER_RENDER_BSDF_PRINCIPLED_H
@@ -13,12 +13,12 @@ enum { TRANSMISSION, SPEC_TINT, SHEEN, SHEEN_TINT, FLATNESS, CLEARCOAT, CLEARCOA
 struct principled {
 	struct texture base, roughness, metallic;
 	struct texture share[SHARES];
-	double most[SHARES]; /* the largest of each, of a texture that bsdf_probe finds */
+	double most[SHARES]; /* the largest value of each, for textures as found by bsdf_probe */
 	double eta, base_max;
-	bool varies; /* some share is a texture */
+	bool varies; /* some parameter is a texture */
 };
 
-/* What a point of the surface is made of. */
+/* The parameters at a point of the surface. */
 struct stuff {
 	const struct principled *p;
 	spectrum base, tint;
@@ -31,14 +31,14 @@ struct microfacet principled_facets(double anisotropic, double roughness);
 
 /* Fresnel's factor of boundary and metal, for light from above. */
 spectrum principled_fresnel(const struct stuff *s, double cosine);
-/* The diffuse lobe with sheen; cos_d: of either direction against the half vector. Both directions above. */
+/* The diffuse lobe with sheen; cos_d: cosine of either direction to the half vector. Both directions are above. */
 spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_d);
 
-/* Reads those of the shares that are among the plug-in's parameters; the others are 0. */
+/* Reads those of the parameters that the plug-in has; the others are 0. */
 int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		      struct error *e);
 
-/* The value of a number or a texture at a point: textures of shares are grey, the mean over the lanes. */
+/* The value of a number or texture at a point: textures of shares are grey, the mean over the lanes. */
 double principled_share_at(const struct texture *t, const struct bsdf_point *at);
 
 #define PRINCIPLED_SHARE(name_)                                                                  \
@@ -46,7 +46,7 @@ double principled_share_at(const struct texture *t, const struct bsdf_point *at)
 		.name = name_, .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 1 \
 	}
 
-/* The least of a texture's values from 0 to 1 that bsdf_probe finds: step sizes go by that of roughness. */
+/* The smallest value of a texture, from 0 to 1, that bsdf_probe finds: step sizes depend on that of roughness. */
 double principled_least(const struct texture *t, const struct bsdf_build *build);
 
 #endif

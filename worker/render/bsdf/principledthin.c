@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The thin form of `principled`: a sheet of no thickness, the same from both sides (Burley 2015, section 5.3;
- * parameters and defaults are those of Mitsuba 3's plug-in). With t = spec_trans, d = diff_trans / 2 and c =
- * base_color,
+ * The thin form of `principled`: a sheet without thickness, equal from both sides (Burley 2015, section 5.3; parameters
+ * and defaults are those of Mitsuba 3's plug-in). With t = spec_trans, d = diff_trans / 2 and c = base_color,
  *
  *   reflected     t D G1 G1 F / 4 + (1 - t) (1 - d) (diffuse + sheen)
  *   transmitted   t c D' G1' G1' (1 - F) / 4 + (1 - t) d c / pi
  *
- * where light that passes is light that is reflected, turned to the other side, by facets D' of the roughness times
- * 0.65 eta - 0.35. Nothing bends: both sides have one index.
+ * where transmitted light is reflected light mirrored to the other side, by facets D' with the roughness times 0.65 eta
+ * - 0.35. Nothing is refracted: both sides have the same index.
  */
 #include "worker/render/bsdf/principled.h"
 
@@ -21,7 +20,7 @@ enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE, THIN_THROUGH, THIN_LOBES };
 
 struct thin {
 	struct principled p;
-	struct texture diff_trans; /* a number, `through`, where it has no ops */
+	struct texture diff_trans; /* a number, `through`, if it has no ops */
 	double through;		   /* d of the header comment */
 };
 
@@ -30,7 +29,7 @@ static double through_at(const struct thin *t, const struct bsdf_point *p)
 	return 0.5 * fmin(fmax(spectrum_mean(texture_eval(&t->diff_trans, &p->where, p->w)), 0), 2);
 }
 
-/* A point of the surface, and a direction from it, which is taken for the upper side. */
+/* A point of the surface, and a direction from it, whose side counts as the upper one. */
 struct thin_point {
 	const struct thin *t;
 	struct stuff s;
@@ -44,7 +43,7 @@ static void find_chances(struct thin_point *x, double cosine)
 	const struct thin *t = x->t;
 	double base = t->p.base_max, diffuse = 1 - x->spec_trans, sum = 0;
 	double reflected = fresnel_dielectric(fmin(cosine, 1), t->p.eta).reflected;
-	/* Facets reflect other shares than the plane they lie in: neither lobe is left out. */
+	/* Facets reflect other shares than the plane they lie in, so neither lobe is ever left out. */
 	x->chance[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
 	x->chance[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
 	x->chance[THIN_DIFFUSE] = diffuse * (1 - x->through) * fmax(base, 0.2 * x->s.share[SHEEN]);
@@ -60,7 +59,7 @@ static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *
 	const struct thin *t = b->data;
 	struct thin_point x = {.t = t, .s = principled_stuff(&t->p, p)};
 	x.through = t->diff_trans.ops ? through_at(t, p) : t->through;
-	/* What passes specularly is not what principled_diffuse leaves out. */
+	/* Specular transmission is not what principled_diffuse leaves. */
 	x.spec_trans = x.s.share[TRANSMISSION];
 	x.s.share[TRANSMISSION] = 0;
 	x.passing = principled_facets(x.s.share[ANISOTROPIC], (0.65 * t->p.eta - 0.35) * x.s.roughness);
@@ -145,7 +144,7 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	return pair.pdf > 0;
 }
 
-/* A picture's numbers end at 1; the two of a checkerboard may be up to 2, as the parameter may. */
+/* A texture's numbers end at 1; those of a checkerboard may be up to 2, as the parameter may. */
 static int read_through(struct bsdf *b, struct thin *t, const struct scene_node *n, const struct bsdf_build *build,
 			struct error *e)
 {

@@ -5,7 +5,7 @@
 
 enum { SIDE = 16, STEPS = 1024 };
 
-/* What the boundary reflects of light from v, to the same side: visible normals by the midpoint rule. */
+/* The share of light from v that the boundary reflects to the same side: visible normals, by the midpoint rule. */
 static double reflected_by(const struct microfacet *m, double eta, double cosine)
 {
 	double sum = 0;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The rough boundary of a clear coating seen from outside, what `roughplastic` and `roughcoating` share: that of
- * roughdielectric (Walter et al. 2007, eq. 20). What it transmits, one minus what it reflects to the same side, is
- * tabulated over the cosine, and over the roughness where that comes from a texture, when the material is made.
- * Roughness is the same in all directions. Private to worker/render/bsdf.
+ * The rough boundary of a clear coating seen from outside, shared by `roughplastic` and `roughcoating`: that of
+ * roughdielectric (Walter et al. 2007, eq. 20). Its transmittance, one minus what it reflects to the same side, is
+ * tabulated over the cosine, and over the roughness if that comes from a texture, when the material is made. The
+ * roughness is isotropic. Private to worker/render/bsdf.
  */
 #ifndef WORKER_RENDER_BSDF_ROUGH_BOUNDARY_H
 #define WORKER_RENDER_BSDF_ROUGH_BOUNDARY_H
@@ -15,7 +15,7 @@ enum { BOUNDARY_NODES = 48, BOUNDARY_ROWS = 12 };
 struct rough_boundary {
 	struct rough_map roughness;
 	double eta;	    /* index below over index above */
-	double least, step; /* row i is of the roughness least exp(i step) */
+	double least, step; /* row i is for the smallest roughness times exp(i step) */
 	int rows;
 	double transmitted[BOUNDARY_ROWS][BOUNDARY_NODES]; /* from outside, at cosines (i / (BOUNDARY_NODES - 1))^2 */
 	double escape[BOUNDARY_ROWS]; /* twice the integral of that and the cosine over the cosine */
@@ -26,10 +26,10 @@ struct boundary_point {
 	const struct rough_boundary *of;
 	struct microfacet facets;
 	int row;
-	double rest; /* towards the next row */
+	double rest; /* fraction towards the next row */
 };
 
-/* Parameters alpha, alpha_u, alpha_v, distribution; enters texture and roughness into b. */
+/* Reads alpha, alpha_u, alpha_v, distribution; sets b's texture flags and roughness. */
 int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, const struct scene_node *n,
 			const struct bsdf_build *build, struct error *e);
 #define ROUGH_BOUNDARY_PARAMS                                                                                  \
@@ -42,7 +42,7 @@ int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, co
 
 struct boundary_point rough_boundary_at(const struct rough_boundary *r, const struct bsdf_point *p);
 double boundary_transmitted(const struct boundary_point *at, double cosine);
-/* What leaves of diffuse light from inside, times eta^2. */
+/* The share of diffuse light from inside that leaves, times eta^2. */
 double boundary_escape(const struct boundary_point *at);
 
 /* wo and wi above: the reflected lobe, and its density of wi (D G1(wo) / 4 wo.z). */

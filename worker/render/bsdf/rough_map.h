@@ -8,13 +8,13 @@
 
 struct rough_map {
 	struct microfacet
-		fixed; /* where it varies: of the least roughness that bsdf_probe finds; step sizes go by it */
-	double most;   /* where it varies: the largest alpha_u found there */
+		fixed; /* if it varies, for the smallest roughness that bsdf_probe finds; step sizes depend on it */
+	double most;   /* if it varies: the largest alpha_u found */
 	bool varies;
-	struct texture u, v; /* where it varies */
+	struct texture u, v; /* if it varies */
 };
 
-/* Parameters alpha, alpha_u, alpha_v, distribution. Enters texture and roughness into b. */
+/* Reads alpha, alpha_u, alpha_v, distribution. Sets b's texture flags and roughness. */
 int rough_map_read(struct rough_map *r, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		   struct error *e);
 #define ROUGH_MAP_NUMBER(name_)                                                                   \

@@ -4,14 +4,14 @@
 #include "worker/render/bsdf/rough_map.h"
 
 struct roughconductor {
-	struct metal metal; /* first: taken for smooth, the data is a conductor's */
+	struct metal metal; /* first: if treated as smooth, the data is a conductor's */
 	struct rough_map roughness;
 };
 
 /* The facet between two directions. */
 struct facet {
 	vec3 h;
-	double cosine; /* against both */
+	double cosine; /* cosine of both to it */
 	double pdf;    /* D G1(wo) / 4 wo.z, the density of wi */
 };
 

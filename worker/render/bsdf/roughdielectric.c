@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A rough boundary between two transparent media: Walter et al. 2007, eqs. 19-21, visible normals sampled, the mode
- * chosen by Fresnel's factor at the microfacet. Everything is mirrored so that wo is on the side of the normal.
+ * A rough boundary between two transparent media: Walter et al. 2007, eqs. 19-21, with visible normals sampled, and the
+ * mode chosen by the Fresnel factor at the microfacet. Everything is mirrored such that wo is on the side of the
+ * normal.
  */
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/glass.h"
@@ -12,17 +13,17 @@ struct roughdielectric {
 	struct rough_map roughness;
 };
 
-/* A pair of directions as the facets see it. */
+/* A pair of directions relative to the microfacet. */
 struct facet {
 	vec3 h;	    /* on wo's side */
 	double d;   /* distribution x G1(wo) / |wo.z| */
 	double eta; /* index beyond over index on wo's side */
 	struct fresnel fresnel;
-	double cos_o, cos_i; /* against h; cos_i < 0 when refracted */
+	double cos_o, cos_i; /* cosines to h; cos_i < 0 if refracted */
 	double length;	     /* of wo + wi or wo + eta wi */
 };
 
-/* wo.z > 0. false: no facet connects the two. Fresnel's factors come from both cosines: next to the critical angle one
+/* wo.z > 0. false: no facet connects the two. The Fresnel factors use both cosines: near the critical angle, one
  * alone says little about the other. */
 static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, struct facet *f)
 {
@@ -38,7 +39,7 @@ static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, s
 	} else {
 		f->cos_o = vec3_dot(wo, f->h);
 		f->cos_i = vec3_dot(wi, f->h);
-		/* Facets are seen from the side that the surface is seen from. */
+		/* Facets must be seen from the same side as the surface. */
 		if (!(f->cos_o > 0 && f->cos_i < 0))
 			return false;
 		f->fresnel = fresnel_between(fmin(f->cos_o, 1), fmin(-f->cos_i, 1), eta);
@@ -47,7 +48,7 @@ static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, s
 	return f->d > 0;
 }
 
-/* Cosine against h times the solid angle of h over that of wi. */
+/* Cosine to h times the solid angle of h over that of wi. */
 static double facet_spread(const struct facet *f, bool reflect)
 {
 	if (reflect)
@@ -61,7 +62,7 @@ static vec3 mirror(vec3 v, bool below)
 	return below ? (vec3){v.x, v.y, -v.z} : v;
 }
 
-/* What Fresnel and the transport leave of light. */
+/* The factor from Fresnel and from the transport mode. */
 static spectrum share(const struct roughdielectric *r, const struct bsdf_point *p, const struct facet *f, bool reflect,
 		      enum transport transport)
 {
@@ -71,7 +72,7 @@ static spectrum share(const struct roughdielectric *r, const struct bsdf_point *
 	return spectrum_scale(f->fresnel.transmitted * scale, texture_eval(&r->glass.transmittance, &p->where, p->w));
 }
 
-/* G1(wi) / |wi.z| on whichever side. */
+/* G1(wi) / |wi.z| on either side. */
 static double g1_over_cos(const struct microfacet *m, vec3 wi)
 {
 	return microfacet_g1_over_cos(m, (vec3){wi.x, wi.y, fabs(wi.z)});
@@ -89,7 +90,7 @@ static double facet_pdf(const struct facet *f, vec3 wi)
 	return f->d * facet_spread(f, wi.z > 0) * (wi.z > 0 ? f->fresnel.reflected : f->fresnel.transmitted);
 }
 
-/* Seen with wo on the side of the normal. */
+/* Mirrored such that wo is on the side of the normal. */
 static bool facet_between(const struct bsdf *b, const struct microfacet *m, const struct bsdf_point *p, vec3 wo,
 			  vec3 *wi, struct facet *f)
 {
@@ -107,7 +108,7 @@ static spectrum roughdielectric_eval(const struct bsdf *b, const struct bsdf_poi
 	return facet_between(b, &m, p, wo, &wi, &f) ? facet_f(r, &m, p, &f, wi) : spectrum_of(0);
 }
 
-/* Neither the solid angle of h over that of wi nor its inverse: both go to extremes as eta goes to 1. */
+/* Without the solid angle of h over that of wi or its inverse, which diverge or vanish as eta approaches 1. */
 static spectrum roughdielectric_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct roughdielectric *r = b->data;
@@ -175,7 +176,7 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 		return code;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
-	/* With equal indices no facet bends light: all of it goes straight on. */
+	/* With equal indices no facet refracts: all light passes straight through. */
 	if ((b->eta == 1 && !b->dispersive) || (!r->roughness.varies && b->alpha < build->least_roughness)) {
 		extern const struct bsdf_ops bsdf_ops_dielectric;
 		bsdf_make_smooth(b, &bsdf_ops_dielectric);

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A matt surface of grooves, on the side of the normal: Oren and Nayar 1994, eq. 30 and 31, or with use_fast_approx the
- * first two terms (their sec. 4.4). sigma, the slopes' deviation, is alpha over the root of two, so that alpha means
- * what it does for Beckmann's facets.
+ * A matte surface of grooves, on the side of the normal: Oren and Nayar 1994, eq. 30 and 31, or with use_fast_approx
+ * the first two terms (their sec. 4.4). sigma, the standard deviation of slopes, is alpha over the root of two, so that
+ * alpha means the same as for Beckmann facets.
  */
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/warp.h"
 
 struct roughdiffuse {
 	struct texture reflectance;
-	double a, b, c, d; /* C1, C2, C3 and the factor of the light that bounces twice */
+	double a, b, c, d; /* C1, C2, C3 and the factor of light that bounces twice */
 };
 
 static double cube(double x)

@@ -64,8 +64,7 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 	if (!r)
 		return -ENOMEM;
 	int code = coating_read(&r->coating, b, n, build, e);
-	/* A diffuse base has nothing to gain from an exact mirror above it: the coating stays rough, as smooth as it
-	 * may be. */
+	/* A diffuse base gains nothing from an exact mirror above it: the coating stays rough, however smooth it is. */
 	if (!code)
 		code = rough_boundary_read(&r->boundary, r->coating.eta, b, n, build, e);
 	if (code)

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What lets a share of the light pass as if nothing were there, for `null` and `mask`: a specular lobe that does not
- * bend. */
+/* A specular lobe that transmits a share of the light unchanged, for `null` and `mask`. */
 #ifndef WORKER_RENDER_BSDF_STRAIGHT_H
 #define WORKER_RENDER_BSDF_STRAIGHT_H
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A sheet of glass without thickness: light that is let in goes straight on, reflections between its two sides included
- * (R' = 2 R / (1 + R) where R is Fresnel's share at one side, as in Mitsuba). The way through is not bent: eta is 1.
+ * A sheet of glass without thickness: light that enters passes straight through, with all reflections between its two
+ * sides (R' = 2 R / (1 + R) where R is the Fresnel share at one side, as in Mitsuba). Transmission is not refracted:
+ * eta is 1.
  */
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/ior.h"
@@ -12,7 +13,7 @@
 
 struct thin {
 	struct texture reflectance, transmittance;
-	double eta; /* of the glass over what is around it */
+	double eta; /* of the glass over that of its surroundings */
 };
 
 static spectrum thin_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -27,7 +28,7 @@ static double thin_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	return 0;
 }
 
-/* 2 R / (1 + R) and (1 - R) / (1 + R); neither loses digits where it is small. */
+/* 2 R / (1 + R) and (1 - R) / (1 + R); neither loses precision where it is small. */
 static struct fresnel sheet(const struct thin *t, vec3 wo)
 {
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), t->eta);

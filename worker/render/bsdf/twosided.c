@@ -92,7 +92,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 		int code = bsdf_create(&t->side[i], inner, build, e);
 		if (code)
 			return code;
-		/* Of one that has two sides already the front is what both sides show. */
+		/* For a BSDF that has two sides already, both sides show its front. */
 		if (t->side[i].modes & BSDF_TRANSMIT)
 			return node_error(inner, e, EINVAL,
 					  "\"%s\" lets light through; twosided takes only opaque ones", inner->type);
@@ -115,7 +115,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 	}
 	if (!b->has_smooth)
 		b->alpha = 0;
-	/* Nothing says from which side light comes: both count the same. */
+	/* Nothing is known about the side that light comes from: both count the same. */
 	int smooth = t->side[0].has_smooth + t->side[1].has_smooth;
 	b->alpha_mean = smooth ? (t->side[0].alpha_mean + t->side[1].alpha_mean) / smooth : 0;
 	return 0;

@@ -30,7 +30,7 @@ struct ward {
 /* The half vector of two directions above. */
 struct ward_half {
 	vec3 h;
-	double cosine; /* against both */
+	double cosine; /* cosine of both to it */
 	double d;      /* p22 / cos_h^4 */
 };
 

@@ -7,7 +7,7 @@
 
 #define WARP_PI 3.14159265358979323846
 
-/* Cosine-distributed, by the concentric map of Shirley and Chiu 1997, which keeps neighbours together. z may be 0. */
+/* Cosine-distributed, by the concentric map of Shirley and Chiu 1997, which preserves neighbourhoods. z may be 0. */
 static inline vec3 warp_cosine_hemisphere(double u0, double u1)
 {
 	double a = 2 * u0 - 1, b = 2 * u1 - 1, r, phi;

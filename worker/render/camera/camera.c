@@ -2,14 +2,14 @@
 #include "worker/render/camera/camera.h"
 #include "worker/render/scene/fov.h"
 
-/* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle spans.
- */
+/* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle
+ * spans. */
 static double pixels_per_slope(const struct scene_settings *s)
 {
 	return fov_side(s->fov_axis, s->width, s->height) / (2 * tan(s->fov * (M_PI / 360)));
 }
 
-/* An orthographic camera is a pinhole so far behind that what is twice as far away looks smaller by a part in 2^20
+/* An orthographic camera is a pinhole so far behind the scene that objects twice as far away look smaller by 2^-20
  * only: a thousandth of a pixel in a film of 1,000. */
 static void step_back(struct camera *c, double half_width)
 {
@@ -32,7 +32,7 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	double volume = fabs(vec3_dot(left, vec3_cross(up, forward)));
 	if (!(volume > 0) || !isfinite(volume))
 		return error_set(e, EINVAL, "the sensor's to_world transform is singular");
-	/* A mirrored transform gives a mirrored image, as in Mitsuba: the axes are taken as they come. */
+	/* A mirrored transform gives a mirrored image, as in Mitsuba: the axes are used unchanged. */
 	c->axes.n = vec3_normalize(forward);
 	c->axes.s = vec3_neg(vec3_normalize(left));
 	c->axes.t = vec3_neg(vec3_normalize(up));
@@ -75,7 +75,7 @@ void camera_force_aperture(struct camera *c, bool on)
 	if (!on)
 		c->aperture = 0;
 	else if (!(c->focus > 0))
-		c->focus = 1; /* any: nothing lies off the centre */
+		c->focus = 1; /* any value: no point is off the centre */
 }
 
 /* The unit square onto the unit disk: concentric squares become circles, areas keep their ratios. */
@@ -100,7 +100,7 @@ static void square_from_disk(double x, double y, double u[2])
 		u[i] = fmin(fmax(0.5 * (a[i] + 1), 0), 1 - 0x1p-53);
 }
 
-/* On the aperture: x_k less the centre, along the image's axes. */
+/* On the aperture: x_k minus the centre, along the image's axes. */
 static void aperture_offset(const struct camera *c, vec3 x_k, double *x, double *y)
 {
 	vec3 offset = vec3_sub(x_k, c->position);

@@ -27,25 +27,25 @@ struct camera {
 	double center_x,
 		center_y; /* the film point on the axis: the film's middle but for the principal point's offset */
 	double near_clip, far_clip; /* along the axis, in the rescaled world */
-	bool lens;		    /* x_k is drawn and moved: the radius is above 0, or that was forced */
+	bool lens;		    /* x_k is drawn and mutated: the radius is above 0, or this was forced */
 	double aperture, focus;	    /* radius; distance of the plane of focus along the axis */
 };
 
-/* -EINVAL with a sentence when the field of view is not within (0,180) degrees, the transform is singular, or a lens is
- * focused on nothing in front of it. */
+/* -EINVAL with a sentence if the field of view is not within (0,180) degrees, the transform is singular, or a lens
+ * is focused behind it. */
 int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
 		struct error *e);
 
 bool camera_has_aperture(const struct camera *c);
-/* x_k is drawn and moved even where the radius is 0; or any camera becomes a pinhole. */
+/* Forces drawing and mutating x_k even if the radius is 0; or makes any camera a pinhole. */
 void camera_force_aperture(struct camera *c, bool on);
-/* x_k from two numbers in [0,1), uniform on the aperture (Shirley and Chiu 1997); the pinhole's position without one.
- */
+/* x_k from two numbers in [0,1), uniform on the aperture (Shirley and Chiu 1997); without one, the pinhole's
+ * position. */
 vec3 camera_point(const struct camera *c, const double u[2]);
 /* The numbers in [0,1) that give p, a point of the aperture; 1/2, 1/2 without one. */
 void camera_point_inverse(const struct camera *c, vec3 p, double u[2]);
 
-/* The unit direction in which light of a film point leaves x_k. */
+/* The unit direction in which light from a film point leaves x_k. */
 vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double film_y);
 /* The film point that sees, through x_k, along the unit direction d. false: behind the camera or outside near and far.
  * distance: from x_k to the point seen. */

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Light from a surface, the same in all directions of the side that its normal points to.
- * Meshes: uniform per area. Spheres: uniform per area for light paths; seen from outside, uniform over the cone that
- * the sphere subtends (Shirley, Wang, Zimmerman 1996, sec. 4.1.1), with its angle from the sine so that far spheres
- * keep digits.
+ * Light from a surface, equal in all directions on the side of its normal. Meshes: uniform per area. Spheres: uniform
+ * per area for light sub-paths; seen from outside, uniform over the cone that the sphere subtends (Shirley, Wang,
+ * Zimmerman 1996, sec. 4.1.1), with its angle computed from the sine so that distant spheres keep their precision.
  */
 #include "worker/render/emitter/emitter.h"
 #include "worker/render/emitter/uniform.h"
@@ -149,7 +148,7 @@ static void triangle_inverse(const struct area *a, const struct emitter_point *x
 	vec3 r = vec3_sub(x->p, v0), n = vec3_cross(e1, e2);
 	double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(r, e2), n) / n2, b2 = vec3_dot(vec3_cross(e1, r), n) / n2;
 	double root = fmin(fmax(1 - b1, 0), 1), low = a->cdf[x->where.prim], high = a->cdf[x->where.prim + 1];
-	/* It must stay the same triangle. */
+	/* Rounding must not change the triangle. */
 	u[0] = fmax(fmin(low + root * root * (high - low), nextafter(high, 0)), low);
 	u[1] = root > 0 ? below_1(b2 / root) : 0;
 }
@@ -186,7 +185,7 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 	return fmax(vec3_dot(x->n, w), 0) / M_PI;
 }
 
-/* The sphere as seen from outside: distance and squared sine of its half angle. false: from inside, or it shines
+/* The sphere as seen from outside: distance and squared sine of its half angle. false: seen from inside, or it emits
  * inwards. */
 static bool sphere_cone(const struct area *a, vec3 ref, vec3 *axis, double *distance, double *sin2)
 {
@@ -231,7 +230,7 @@ static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2],
 	vec3 p = vec3_madd(ref, t, w);
 	x->infinite = false;
 	vec3 out = vec3_sub(p, a->surface.center);
-	/* So far away that rounding leaves a point of it: the one that is nearest. */
+	/* So distant that it rounds to a point: the nearest one is used. */
 	sphere_point(a, vec3_length(out) > 0 ? vec3_normalize(out) : vec3_neg(axis), x);
 	*pdf = sphere_pdf_area(ref, sin2, x);
 	return *pdf > 0;

@@ -59,7 +59,7 @@ static void rgb_from_xyz(const double xyz[3], double rgb[3])
 void daylight_sky(const struct daylight *d, double angle, double gamma, double rgb[3])
 {
 	double v[3];
-	/* The horizon itself is the limit of what is above it. */
+	/* The horizon itself gets the limit from above. */
 	double low = fmin(angle, 0.5 * PI - 1e-3);
 	for (int k = 0; k < 3; k++)
 		v[k] = d->zenith[k] * perez(d->perez[k], low, gamma) / perez(d->perez[k], 0, d->sun);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Daylight after Preetham, Shirley and Smits 1999, "A Practical Analytic Model for Daylight". Angles in radians, from
- * the zenith; colours are linear Rec. 709 in W / (m^2 sr nm), as Mitsuba's spectra: CIE Y = 1 is 1 W / (m^2 sr nm) at
+ * the zenith; colours are linear Rec. 709 in W / (m^2 sr nm), like Mitsuba's spectra: CIE Y = 1 is 1 W / (m^2 sr nm) at
  * all wavelengths. Pure; any thread.
  */
 #ifndef WORKER_RENDER_EMITTER_DAYLIGHT_H
@@ -9,7 +9,7 @@
 
 #include "worker/render/math/vec3.h"
 
-#define DAYLIGHT_SUN_RADIUS 0.0046526 /* angle of the sun's disk seen from the earth */
+#define DAYLIGHT_SUN_RADIUS 0.0046526 /* angular radius of the sun's disk seen from the earth */
 
 struct daylight {
 	double sun;		       /* the sun's angle */

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Emitters. One file per plug-in and one line in emitter_list.h; the generic tests pick it up.
- * A point on an emitter is a position with a normal, or for emitters at infinity the unit direction from the scene
- * towards it. Measures: `pdf_point` and `pdf_toward` are per area (world units of the rescaled scene), per solid angle
- * at infinity. Immutable after creation; any thread; nothing allocates after create.
+ * Emitters. One file per plug-in and one line in emitter_list.h; the generic tests include it. A point on an emitter is
+ * a position with a normal, or, for emitters at infinity, the unit direction from the scene towards it. Measures:
+ * `pdf_point` and `pdf_toward` are per area (world units of the rescaled scene), or per solid angle at infinity.
+ * Immutable after creation; any thread; allocates nothing after create.
  *
- * Delta emitters are one point (or one direction): nothing hits them by chance, the measure of x_0 counts and both
- * densities are 1. What `radiance` gives is intensity per solid angle at a point (no cosine there, n is 0), irradiance
+ * Delta emitters are a single point (or direction): no path hits them by chance, x_0 has the counting measure, and both
+ * densities are 1. `radiance` gives intensity per solid angle at a point (without a cosine; n is 0), or irradiance
  * across the direction at infinity.
  */
 #ifndef WORKER_RENDER_EMITTER_EMITTER_H
@@ -22,7 +22,7 @@ struct emitter_point {
 	bool infinite;
 };
 
-/* The surface of an area emitter in the rescaled world. Triangles are those that rays meet. */
+/* The surface of an area emitter in the rescaled world. Its triangles are those that rays hit. */
 struct emitter_surface {
 	bool is_sphere;
 	vec3 center;
@@ -39,9 +39,9 @@ struct emitter_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	const struct emitter_surface *surface; /* NULL where it hangs on no shape */
-	struct attribute_table *attributes;    /* of the mesh that it lies on; NULL: of none */
-	vec3 center; /* a point p of the scene lies at scale (p - center) in the rescaled world */
+	const struct emitter_surface *surface; /* NULL if it has no shape */
+	struct attribute_table *attributes;    /* of the mesh; NULL: none */
+	vec3 center;			       /* a scene point p is at scale (p - center) in the rescaled world */
 	double scale;
 };
 
@@ -51,22 +51,22 @@ struct emitter_ops {
 	const char *type;
 	const struct param *params;
 	unsigned nested_classes;
-	bool needs_surface; /* area: belongs into a shape */
+	bool needs_surface; /* area: belongs to a shape */
 	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 		      struct error *e);
 	/* Radiance leaving x in direction w (unit, away from the emitter, into the scene). */
 	spectrum (*radiance)(const struct emitter *em, const struct emitter_point *x, vec3 w,
 			     const struct wavelengths *wl);
-	/* Where light sub-paths begin. */
+	/* Samples where a light sub-path starts. */
 	bool (*sample_point)(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
 	double (*pdf_point)(const struct emitter *em, const struct emitter_point *x);
-	/* The numbers in [0,1) for which sample_point gives x; NULL for delta emitters. */
+	/* The numbers in [0,1) from which sample_point makes x; NULL for delta emitters. */
 	void (*point_inverse)(const struct emitter *em, const struct emitter_point *x, double u[2]);
-	/* In which direction they leave; not called for infinite ones. */
+	/* Samples the direction in which it leaves; not called for infinite emitters. */
 	bool (*sample_direction)(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
 				 double *pdf_solid);
 	double (*pdf_direction)(const struct emitter *em, const struct emitter_point *x, vec3 w);
-	/* Next event estimation as seen from ref. */
+	/* Samples a point for next event estimation from ref. */
 	bool (*sample_toward)(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 			      double *pdf_toward);
 	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
@@ -75,20 +75,20 @@ struct emitter_ops {
 struct emitter {
 	const struct emitter_ops *ops;
 	bool infinite, textured, delta;
-	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere but for a factor */
-	double power;	  /* for choosing among emitters: area x pi x mean radiance; infinite: mean radiance x 4 pi,
-			     or irradiance, multiplied by the scene's cross section pi R^2 by the caller */
-	double brightest; /* upper bound of the radiance, over places, directions and wavelengths; of delta emitters
-			     what pixels may be expected to stay below, see delta.h */
+	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
+	double power; /* for choosing among emitters: area x pi x mean radiance; infinite ones: mean radiance x 4 pi, or
+			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */
+	double brightest; /* upper bound of the radiance over places, directions and wavelengths; for delta emitters a
+			     bound that pixels are expected to stay below, see delta.h */
 	void *data;
 };
 
-/* Is it one that lies on a shape? */
+/* Whether it belongs to a shape. */
 bool emitter_needs_surface(const struct scene_node *n);
 
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
 
-/* Property `name` of an emitter: a colour or a texture; 1 where it is absent. */
+/* Reads property `name` of an emitter: a colour or a texture; 1 if absent. */
 int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
 		    const struct emitter_build *build, struct error *e);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line an emitter: its const struct emitter_ops is emitter_ops_NAME. */
+/* One line per emitter: EMITTER(NAME) stands for its const struct emitter_ops emitter_ops_NAME. */
 EMITTER(area)
 EMITTER(constant)
 EMITTER(envmap)

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An equirectangular picture of the surroundings. Local +y is up (the top row), the middle column looks along +z
- * and the one a quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel
- * centres lie at half-integers, also vertically, where Mitsuba 3 puts the first and last rows onto the poles: a shift
- * of up to half a pixel.
+ * An equirectangular environment map. Local +y is up (the top row), the middle column looks along +z and the one a
+ * quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel centres are at
+ * half-integers, also vertically, where Mitsuba 3 puts the first and last rows onto the poles: a shift of up to half a
+ * pixel.
  *
- * Sampling: the radiance is bilinear between pixel centres, so the cells of the density lie between pixel centres too
- * (and from the outer rows to the poles). Within a cell the density is constant in solid angle and in proportion to the
- * mean luminance of its four corners: it is positive wherever there is light. A row's cells have probabilities in
- * multiples of 2^-31, at least one where there is light, kept as running sums: sampling and density use the same
+ * Sampling: the radiance is bilinear between pixel centres, so the cells of the density also lie between pixel centres
+ * (and between the outer rows and the poles). Within a cell the density is constant in solid angle and proportional to
+ * the mean luminance of its four corners: it is positive wherever there is light. The probabilities of a row's cells
+ * are multiples of 2^-31, at least one where there is light, stored as running sums: sampling and density use the same
  * numbers.
  */
 #include "worker/render/emitter/envmap.h"
@@ -66,12 +66,12 @@ static const uint32_t *row_cells(const struct envmap *m, uint32_t row)
 	return m->cell_cdf + (size_t)row * (m->columns + 1);
 }
 
-/* Where the density's cells are; across: how far into its cell the column is. */
+/* The position relative to the density's cells; across: fraction within its cell. */
 static void find_place(const struct envmap *m, vec3 d, uint32_t *row, uint32_t *column, double *across)
 {
 	double u, v;
 	coordinates(m, d, &u, &v);
-	/* Cell 0 of a row begins at the centre of pixel 0; the half pixel before belongs to the last one. */
+	/* Cell 0 of a row begins at the centre of pixel 0; the half pixel before belongs to the last cell. */
 	double c = u * m->columns - 0.5, r = v * (m->rows - 1) + 0.5;
 	*column = c < 0 || c >= m->columns ? m->columns - 1 : (uint32_t)c;
 	*row = r >= m->rows ? m->rows - 1 : (uint32_t)r;
@@ -100,7 +100,7 @@ void envmap_point_inverse(const struct emitter *em, const struct emitter_point *
 	find_place(m, x->p, &row, &column, &across);
 	const uint32_t *cells = row_cells(m, row);
 	vec3 d = to_local(m, x->p);
-	/* Heights in the cosine, as differences of angles. */
+	/* Heights in the cosine, computed from differences of angles. */
 	double angle = atan2(hypot(d.x, d.z), d.y), edge = row_edge(m, row);
 	double down = 2 * sin(0.5 * (angle + edge)) * sin(0.5 * (angle - edge)) / row_height(m, row);
 	u[0] = cells[m->columns] ? (cells[column] + across * (cells[column + 1] - cells[column])) / cells[m->columns]
@@ -211,7 +211,7 @@ static double build_density(struct envmap *m)
 	return total;
 }
 
-/* The local axes, without their scale; only rotations, reflections and one scale keep angles. */
+/* The local axes without their scale; only rotations, reflections and a uniform scale keep angles. */
 int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e)
 {
 	mat4 t = node_transform(n, "to_world");
@@ -225,7 +225,7 @@ int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e)
 			if (fabs(vec3_dot(axis[k], axis[c])) > 1e-4)
 				return node_error(n, e, ENOTSUP, "to_world of an environment can only rotate");
 	}
-	/* Files give few digits: made orthonormal. */
+	/* Files give few digits: orthonormalised. */
 	double sign = vec3_dot(vec3_cross(axis[0], axis[1]), axis[2]) < 0 ? -1 : 1;
 	axis[1] = vec3_normalize(vec3_madd(axis[1], -vec3_dot(axis[0], axis[1]), axis[0]));
 	axis[2] = vec3_scale(sign, vec3_cross(axis[0], axis[1]));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What emitters share that are an equirectangular picture of the surroundings. Private to worker/render/emitter. */
+/* Shared by emitters that are environment maps. Private to worker/render/emitter. */
 #ifndef WORKER_RENDER_EMITTER_ENVMAP_H
 #define WORKER_RENDER_EMITTER_ENVMAP_H
 
@@ -8,7 +8,7 @@
 
 /* The local axes x, y (up) and z in the world. -ENOTSUP: to_world does more than rotate. */
 int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e);
-/* Makes em of the picture, times scale. The picture is kept. */
+/* Makes em from the image, times scale. The image is kept. */
 int envmap_make(struct emitter *em, const struct raster *picture, double scale, const vec3 axis[3],
 		const struct scene_node *n, const struct emitter_build *build, struct error *e);
 

@@ -15,11 +15,11 @@
 struct projector {
 	struct delta_light light; /* its colour is unused */
 	struct texture irradiance;
-	vec3 axes[3];	 /* unit; the picture's u goes along -x, v along -y, as a camera's */
-	double reach[2]; /* half the picture's width and height at distance 1 */
+	vec3 axes[3];	 /* unit; the image's u goes along -x, v along -y, as a camera's */
+	double reach[2]; /* half the image's width and height at distance 1 */
 };
 
-/* Where w meets the picture, and the cosine of its angle with the axis. */
+/* Where w meets the image plane, and the cosine of its angle with the axis. */
 static bool find(const struct projector *p, vec3 w, double uv[2], double *cosine)
 {
 	*cosine = vec3_dot(p->axes[2], w);

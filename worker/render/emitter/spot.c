@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A point that shines into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from
- * there linear in the angle to 0 at `cutoff_angle` (degrees; 20, and 3/4 of the cut-off, where nothing is said). Light
- * paths leave it uniformly over the cone. A `texture` multiplies the intensity: its unit square, upright, is what the
- * cone circumscribes on a plane across the axis.
+ * A point that emits into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from
+ * there linear in the angle to 0 at `cutoff_angle` (degrees; by default 20, and 3/4 of the cut-off). Light sub-paths
+ * leave it uniformly over the cone. A `texture` multiplies the intensity: the cone circumscribes its upright unit
+ * square on a plane across the axis.
  */
 #include "worker/render/emitter/delta.h"
 #include "worker/render/math/frame.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Daylight (daylight.h) as a picture of the surroundings: `sky`, `sun`, `sunsky`. The sky takes 512 x 256 pixels, one
- * with a sun 2048 x 1024: its disk is three pixels wide, and what the whole of it sends is kept. Below the horizon it
- * is black. Up is +y in 0.5/0.6 and +z in 3.x; where time and place say where the sun is, north is -z and +y.
+ * Daylight (daylight.h) as an environment map: `sky`, `sun`, `sunsky`. A sky has 512 x 256 pixels, one with a sun 2048
+ * x 1024: its disk is three pixels wide, and its total power is preserved. Below the horizon it is black. Up is +y in
+ * 0.5/0.6 and +z in 3.x; if time and place determine the sun, north is -z and +y.
  */
 #include "worker/render/emitter/daylight.h"
 #include "worker/render/emitter/envmap.h"
@@ -65,7 +65,7 @@ static double covered(const struct baking *b, uint32_t x, uint32_t y)
 	return (double)inside / (PARTS * PARTS);
 }
 
-/* rgb: of the disk as large as it is; a larger one is dimmer. */
+/* rgb: of the disk at its true size; a larger one is dimmed. */
 static void bake_sun(const struct baking *b, const double rgb[3])
 {
 	const struct image *m = &b->image;
@@ -107,7 +107,7 @@ static int read_sun(const struct scene_node *n, const vec3 axis[3], vec3 *toward
 		*towards = vec3_scale(1 / length, p->value.as.point);
 		return 0;
 	}
-	/* Mitsuba's default: a summer's afternoon in Tokyo. */
+	/* Mitsuba's default: a summer afternoon in Tokyo. */
 	struct daylight_time t = {.latitude = node_float(n, "latitude", 35.6894),
 				  .longitude = node_float(n, "longitude", 139.6917),
 				  .zone = node_float(n, "timezone", 9),
@@ -204,7 +204,7 @@ static const struct param params[] = {
 	NUMBER("minute", 0, 60),
 	NUMBER("second", 0, 60),
 	{.name = "to_world", .types = VALUE_TRANSFORM},
-	{.name = "albedo", .types = VALUE_TEXTURE, .status = PARAM_DIFFERS}, /* Preetham's ground is of one kind */
+	{.name = "albedo", .types = VALUE_TEXTURE, .status = PARAM_DIFFERS}, /* Preetham's model has one ground */
 	{.name = "resolution", .types = VALUE_INT, .status = PARAM_IGNORED},
 	{.name = "complex_sun", .types = VALUE_BOOL, .status = PARAM_IGNORED},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},

@@ -3,7 +3,7 @@
 
 #include "common/base/mem.h"
 
-/* Mitchell and Netravali 1988, eq. 8: integral 1 whatever B and C are. */
+/* Mitchell and Netravali 1988, eq. 8: the integral is 1 for all B and C. */
 static double cubic(double b, double c, double d)
 {
 	if (d >= 2)
@@ -23,7 +23,7 @@ static double windowed_sinc(double radius, double d)
 	return d < radius ? sinc(d) * sinc(d / radius) : 0;
 }
 
-/* By Simpson's rule: smooth but for the ends, where it is 0. */
+/* By Simpson's rule: smooth except for the ends, where it is 0. */
 static double windowed_sinc_integral(double radius)
 {
 	enum { STEPS = 4096 };
@@ -44,7 +44,7 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 	f->tiles_x = (f->width + TILE_SIZE - 1) / TILE_SIZE;
 	f->tiles_y = (f->height + TILE_SIZE - 1) / TILE_SIZE;
 	if (s->filter == FILTER_GAUSSIAN) {
-		/* Mitsuba's gaussian is lowered so that it ends at zero; its integral in closed form. */
+		/* Mitsuba's Gaussian is shifted down so that it ends at zero; the integral is in closed form. */
 		double sd = s->filter_stddev, r = s->filter_radius;
 		f->inverse = 1 / (2 * sd * sd);
 		f->floor = exp(-f->inverse * r * r);
@@ -105,7 +105,7 @@ static void add(struct film_sums *f, uint32_t i, uint32_t j, const double xyz[3]
 	f->touched[(size_t)(j / TILE_SIZE) * f->tiles_x + i / TILE_SIZE] = 1;
 }
 
-/* First and last pixel (relative to the crop) whose centre lies within the radius; false: none inside the crop. */
+/* First and last pixel (relative to the crop) whose centre is within the radius; false: none inside the crop. */
 static bool reach(double position, double radius, uint32_t size, uint32_t *first, uint32_t *last)
 {
 	double lo = fmax(ceil(position - radius - 0.5), 0), hi = fmin(floor(position + radius - 0.5), (double)size - 1);

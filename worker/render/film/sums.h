@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The film of one lease: per pixel of the crop a sum in double, rounded once when the tiles are taken. Every integrator
- * splats with the continuous filter kernel, normalised to integral 1 over the plane (docs/design.md, rules 3).
- * One thread. Memory: 24 bytes a pixel, of which only pages that are touched cost anything; splatting allocates
- * nothing.
+ * splats with the continuous filter kernel, normalised to integral 1 over the plane (docs/design.md, rules 3). One
+ * thread. Memory: 24 bytes per pixel, of which only touched pages cost anything; splatting allocates nothing.
  */
 #ifndef WORKER_RENDER_FILM_SUMS_H
 #define WORKER_RENDER_FILM_SUMS_H
@@ -18,7 +17,7 @@ struct film_sums {
 	enum filter_kind filter;
 	double radius;
 	double inverse, floor, scale; /* gaussian: scale (exp(-inverse d^2) - floor) */
-	double b, c;		      /* cubic; scale: of lanczos, too */
+	double b, c;		      /* cubic; scale: also of lanczos */
 	double *xyz;
 	uint8_t *touched; /* one a tile */
 	struct chain_moments moments;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Building: triangles and spheres become Embree geometries, with filters where a hit must be asked again in double;
- * large triangles of a scene of mixed scales are a user geometry that is solved in double altogether. Tracing: the ray
- * enters the scene's box in double, Embree proposes in float, the filter decides, the caller solves the hit again
+ * Building: triangles and spheres become Embree geometries, with filters where a hit must be checked in double; large
+ * triangles of a scene of mixed scales are a user geometry that is intersected in double. Tracing: the ray enters the
+ * scene's box in double, Embree proposes hits in float, the filter decides, and the caller computes the hit again
  * (surface.h).
  *
- * Failures are at building alone: no memory, and what Embree reports, by way of an error; rays never fail, and a ray
- * that is not finite meets nothing.
+ * Only building can fail: out of memory, and errors that Embree reports. Rays never fail; a ray that is not finite hits
+ * nothing.
  */
 #include "worker/render/geom/accel.h"
 
@@ -27,13 +27,13 @@ struct accel {
 	struct sphere_prim *spheres;
 	struct accel_shape *shapes;
 	const struct coincidence *coincidence;
-	struct wide_prims *wide; /* one a shape */
+	struct wide_prims *wide; /* one per shape */
 	struct instances instances;
 	atomic_size_t bytes, peak;
 	vec3 low, high;
 	double size;   /* sum of the sides */
-	double reach;  /* how far Embree's floats can be off, see below */
-	double detail; /* of a scene of mixed scales: the extent of its smallest shape; else 0 */
+	double reach;  /* the error bound of Embree's floats, see below */
+	double detail; /* in a scene of mixed scales: the extent of its smallest shape; otherwise 0 */
 };
 
 static bool memory_monitor(void *user, ssize_t bytes, bool post)
@@ -46,7 +46,7 @@ static bool memory_monitor(void *user, ssize_t bytes, bool post)
 	return true;
 }
 
-/* Once in about a thousand primitives, on whatever thread Embree likes. */
+/* Called once per thousand primitives or so, on a thread of Embree's choice. */
 static bool progress_monitor(void *counter, double done)
 {
 	(void)done;
@@ -54,8 +54,8 @@ static bool progress_monitor(void *counter, double done)
 	return true;
 }
 
-/* So high over the triangle's plane at both ends that not even the normal that Embree makes of tiny triangles far away
- * can be wrong about the side: spares most hits the way to their vertices. */
+/* Both ends are so high over the triangle's plane that not even Embree's float normal of a tiny distant triangle can
+ * be wrong about the side: for most hits this avoids loading the vertices. */
 static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
@@ -63,7 +63,7 @@ static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, con
 	return fabs(vec3_dot(n, q->d)) * nearer > 0x1p10 * q->reach * triangle_norm1(n);
 }
 
-/* Solved in double, as a primitive of its own (wide_root). */
+/* Intersected in double, by a user geometry (wide_root). */
 static bool is_wide(const struct query *q, const struct accel_shape *s, uint32_t prim)
 {
 	return isfinite(q->wide_from) && (double)triangle_extent(s->position, s->index[prim]) >= q->wide_from;
@@ -72,7 +72,7 @@ static bool is_wide(const struct query *q, const struct accel_shape *s, uint32_t
 static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 {
 	const struct query *q = (const struct query *)(const void *)args->context;
-	/* Single rays only (N = 1): the accessors of packets exist in C++ alone. */
+	/* Single rays only (N = 1): accessors of packets exist only in C++. */
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
 	if (query_is_end(q, (struct prim_ref){hit->geomID, hit->primID}))
 		args->valid[0] = 0;
@@ -86,8 +86,7 @@ static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 		args->valid[0] = 0;
 }
 
-/* The final hit is among those that pass here: its vertices, far apart in memory, come while Embree goes on searching.
- */
+/* The final hit is one of those that pass here: prefetch its vertices while Embree continues. */
 static void filter_closest(const struct RTCFilterFunctionNArguments *args)
 {
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
@@ -134,8 +133,8 @@ static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t 
 	return 0;
 }
 
-/* The triangles of a shape that are `least` large, as a geometry of their own, of a number beyond those of the shapes.
- */
+/* The shape's triangles with an extent of at least `least`, as a user geometry with a number after those of the
+ * shapes. */
 static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double least)
 {
 	struct wide_prims *w = &a->wide[id];
@@ -164,7 +163,7 @@ static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, doubl
 	return 0;
 }
 
-/* One instruction set for all machines that have it, so that farms of mixed processors agree on bits. */
+/* The same instruction set on all machines that have it, so that mixed farms agree on bits. */
 static bool has_avx2(void)
 {
 #if defined(__x86_64__)
@@ -191,17 +190,16 @@ static int embree_failure(RTCDevice device, struct error *e)
 			 (int)code);
 }
 
-/* How far a point in float, and what Embree's robust test makes of it with vertices anywhere in the scene, can be off:
- * half a unit in the last place of each coordinate for the point, as much again for the differences, times four. */
+/* The error bound of a float point and of Embree's robust test, for vertices anywhere in the scene: half a unit in
+ * the last place of each coordinate for the point, as much again for the differences, times four. */
 static double rounding_reach(vec3 low, vec3 high)
 {
 	vec3 m = {fmax(fabs(low.x), fabs(high.x)), fmax(fabs(low.y), fabs(high.y)), fmax(fabs(low.z), fabs(high.z))};
 	return 0x1p-21 * fmax(m.x, fmax(m.y, m.z));
 }
 
-/* A scene has mixed scales where its smallest shape is so much smaller than the scene: what floats are off in all of it
- * is then more than a thousandth of that shape. Triangles that are so much larger than that shape are solved in double.
- */
+/* A scene has mixed scales if its smallest shape is so much smaller than the scene that float errors exceed a
+ * thousandth of that shape. Triangles that are so much larger than the smallest shape are intersected in double. */
 #define MIXED 0x1p11
 
 static double extent_of(const struct accel_shape *s)
@@ -222,7 +220,7 @@ static double extent_of(const struct accel_shape *s)
 	return (double)most;
 }
 
-/* Of all that is there: returns how far floats can be off. */
+/* Adds everything; returns the error bound of floats. */
 static double find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
 {
 	double least = INFINITY, reach = 0;
@@ -245,7 +243,7 @@ static double find_detail(struct accel *a, const struct accel_shape *shapes, uin
 	return reach;
 }
 
-/* A sphere is hidden wholly or not at all. */
+/* A sphere is hidden entirely or not at all. */
 static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 {
 	if (a->shapes[id].place)
@@ -258,14 +256,14 @@ static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
 }
 
-/* Of a number beyond those of the shapes and of what is solved of them. */
+/* Its number follows those of the shapes and of their user geometries. */
 static int attach_instances(struct accel *a, uint32_t count, double reach)
 {
 	struct instances *s = &a->instances;
 	int rc = instances_init(s, a->device, a->shapes, count);
 	if (rc || s->count == 0)
 		return rc;
-	/* As reach_at has it, of a scene whose size is not known yet. */
+	/* The same as reach_at, before the size of the scene is known. */
 	s->off = a->detail == 0 ? reach : 0x1p-21 * MIXED * a->detail + 0x1p-26 * reach;
 	s->off_far = a->detail == 0 ? 0 : 0x1p-21;
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
@@ -364,7 +362,8 @@ size_t accel_peak_bytes(const struct accel *a)
 	return atomic_load(&a->peak);
 }
 
-/* Rays from far outside enter the scene's box in double: Embree's floats never see the distance. In units of |d|. */
+/* Rays from far outside enter the scene's box in double, so Embree's floats never have to represent the distance. In
+ * units of |d|. */
 static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 {
 	double size = a->size;
@@ -382,8 +381,8 @@ static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 	return enter;
 }
 
-/* rounding_reach of a ray at p. Of mixed scales: by what is there, not by the scene: the triangles that Embree solves,
- * and the doubles of p itself on a triangle as large as the scene. */
+/* rounding_reach of a ray at p. With mixed scales it depends on p, not on the scene: on the triangles that Embree
+ * intersects, and on the rounding of p itself on a triangle as large as the scene. */
 static double reach_at(const struct accel *a, vec3 p)
 {
 	if (a->detail == 0)
@@ -391,8 +390,8 @@ static double reach_at(const struct accel *a, vec3 p)
 	return 0x1p-21 * (triangle_norm_max(p) + MIXED * a->detail) + 0x1p-50 * a->size;
 }
 
-/* A ray in float from o + t0 d on is off by parts of its distance from the origin, which is too much for what it meets
- * far nearer to it: there another begins. In units of d. */
+/* The float ray from o + t0 d deviates in proportion to its distance from the origin, which is too much for objects
+ * much closer to the origin: there a new ray starts. In units of d. */
 static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double t_max)
 {
 	if (a->detail == 0)
@@ -405,13 +404,13 @@ static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double 
 	return fmin(t0 + to_nearest - sqrt(left2 / d2), t_max);
 }
 
-/* To the side that d leaves for. */
+/* Lifted to the side that d leaves for. */
 static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 {
 	return vec3_madd(p, copysign(reach_at(a, p), vec3_dot(ng, d)), ng);
 }
 
-/* Embree ends the program on rays beyond about 1.8e18 (FLT_LARGE). A number that is none fails, too. */
+/* Embree aborts on rays beyond about 1.8e18 (FLT_LARGE). NaN fails this test, too. */
 static void check_ray(const struct RTCRay *r)
 {
 	float sum = fabsf(r->org_x) + fabsf(r->org_y) + fabsf(r->org_z) + fabsf(r->dir_x) + fabsf(r->dir_y) +
@@ -433,7 +432,7 @@ static struct query query_of(const struct accel *a, vec3 o, vec3 d)
 			      .shapes = a->shapes};
 }
 
-/* It lies on a surface where another is. */
+/* The point is on a surface where another one is present. */
 static bool is_hidden(const struct accel *a, const struct ray_end *end)
 {
 	if (!a->coincidence || end->prim.shape == PRIM_NONE.shape)
@@ -442,15 +441,15 @@ static bool is_hidden(const struct accel *a, const struct ray_end *end)
 	return there.shape != end->prim.shape || there.prim != end->prim.prim;
 }
 
-/* Embree's ray for the part from t0 to t1 runs from o along d, beside the true one, and begins before it, by as much as
- * floats may be off: beside, so that a low ray does not slip out along the edge of the triangle that it leaves and that
- * is filtered; before, and beyond the end, so that nothing near them is lost. What it does not meet in double between
- * the ends is turned down by the callbacks. */
+/* Embree's ray for the part from t0 to t1 runs beside the true one, and starts earlier and ends later by the error
+ * bound of floats: beside, so that a grazing ray does not slip past the edge of the triangle that it leaves and that
+ * is filtered; earlier and later, so that nothing near the ends is lost. The callbacks reject what the true ray does
+ * not hit in double between the ends. */
 static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q, double t_min, vec3 o, vec3 d,
 		     double t0, double t1)
 {
 	q->reach = reach_at(a, vec3_madd(q->o, t0, q->d));
-	/* A segment that is shorter leaves Embree's floats no ray. */
+	/* A shorter segment has no float representation as a ray. */
 	double unit = q->segment ? fmax(vec3_length(q->d), q->reach * 0x1p-20) : 1;
 	q->before = q->reach * q->low / unit;
 	q->back = q->before - t0;
@@ -523,7 +522,7 @@ static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, dou
 
 bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
 {
-	/* Floats are the better the nearer to the origin a ray begins. */
+	/* Floats are more precise the nearer to the origin a ray starts. */
 	if (a->detail > 0 && triangle_norm_max(to->p) < triangle_norm_max(from->p)) {
 		const struct ray_end *other = from;
 		from = to;

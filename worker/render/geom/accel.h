@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The one door to Embree (3.13 or 4). Rays in double go in, primitives come out; where on the primitive the ray met it
- * is solved again in double by surface.h.
+ * The only interface to Embree (3.13 or 4). Rays are in double; the result is a primitive, on which surface.h computes
+ * the hit again in double.
  *
  * Self-intersection: a ray names the primitive it starts on (and, for a segment, the one it ends on). A plane triangle
- * cannot be met again from itself, so it is filtered; on a sphere the root that is the start (or the end) is divided
- * out of the quadratic. Every other triangle that Embree proposes is asked in double whether its plane is crossed
- * between the ends: a coplanar neighbour is not, however low the ray. So the ray that Embree gets in float may run off
- * the true one by what rounding can do in a scene of that extent, never by an absolute length.
+ * cannot be hit again from itself, so it is filtered; on a sphere, the root of the start (or end) is divided out of the
+ * quadratic. For every other triangle that Embree proposes, it is checked in double whether the ray crosses its plane
+ * between the ends: that of a coplanar neighbour is not, however grazing the ray. So the float ray given to Embree may
+ * deviate from the true one by the rounding errors of a scene of that extent, never by an absolute length.
  *
- * In a scene whose smallest shape is less than 2^-11 of it that would be too much. There a ray runs off by what
- * rounding does where it is: floats are the finer the nearer to the origin (worker/render/world/origin.h puts what is
- * small there), a ray that comes from far is cut into parts that each begin nearer, and triangles that are large beside
- * the smallest shape are solved in double.
+ * In a scene whose smallest shape is less than 2^-11 of it, that would be too much. There a ray deviates by the
+ * rounding errors at its position: floats are more precise near the origin (worker/render/world/origin.h puts small
+ * things there), a ray from far away is divided into parts that each start nearer, and triangles that are large
+ * relative to the smallest shape are intersected in double.
  *
- * Embree runs in robust mode with one build thread. It raises INVALID on ordinary rays: what it raises is wiped away.
- * Immutable after creation: any thread. Lengths: the rescaled world, whose radius is about 1.
+ * Embree runs in robust mode with one build thread. It raises INVALID on ordinary rays, which is cleared. Immutable
+ * after creation: any thread. Lengths are those of the rescaled world, whose radius is about 1.
  */
 #ifndef WORKER_RENDER_GEOM_ACCEL_H
 #define WORKER_RENDER_GEOM_ACCEL_H
@@ -29,18 +29,18 @@
 struct accel;
 struct coincidence; /* coincide.h */
 
-/* c: what coincide_find found among the shapes; NULL: nothing. It outlives the accel. */
+/* c: the result of coincide_find for the shapes; NULL: nothing coincides. It must outlive the accel. */
 int accel_new(struct accel **a, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c,
 	      struct error *e);
 void accel_free(struct accel *a);
-size_t accel_bytes(const struct accel *a);	/* what Embree allocated, without our vertices and indices */
-size_t accel_peak_bytes(const struct accel *a); /* the most of it, while it built */
+size_t accel_bytes(const struct accel *a);	/* allocated by Embree, without our vertices and indices */
+size_t accel_peak_bytes(const struct accel *a); /* the peak, while building */
 
 /* Closest hit along the unit direction d, in (t_min, t_max). */
 bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max,
 		   struct ray_hit *hit);
-/* Something lies between the two ends, or one of them lies on a surface that is hidden there (coincide.h), from which
- * no ray leaves either: the others say that they meet nothing, or something. */
+/* Whether something lies between the two ends, or one of them is on a surface that is hidden there (coincide.h),
+ * from which no ray leaves. (For the other functions such a ray hits nothing, or something.) */
 bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to);
 /* Something lies along the unit direction d, to infinity. */
 bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d);

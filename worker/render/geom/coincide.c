@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Asking which of coinciding primitives is there, and whether two coincide. The latter is decided on the polygon in
- * which the one projects onto the other: its corners lie no farther from the other's plane than the vertices of both
- * are rounded, floats by 2^-24 of each coordinate, and it is wider than a few such roundings. The corners decide for
- * all of it: both are planes.
+ * Decides which of coinciding primitives is present, and whether two coincide. For the latter, one triangle is
+ * projected onto the other: they coincide if the corners of the resulting polygon are no farther from the other's plane
+ * than the rounding of both triangles' vertices, floats by 2^-24 of each coordinate, and if the polygon is wider than a
+ * few such roundings. The corners decide for all of it, because both are planes.
  */
 #include "worker/render/geom/coincide.h"
 
 #include "common/base/mem.h"
 
-enum { CORNERS = 9 }; /* three, and one more a cut */
+enum { CORNERS = 9 }; /* three corners, and one more per cut */
 
 struct polygon {
 	vec3 p[CORNERS];
 	unsigned n;
 };
 
-/* What is left where side.(p - at) >= 0. */
+/* The part with side.(p - at) >= 0. */
 static void cut(struct polygon *a, vec3 at, vec3 side)
 {
 	struct polygon out = {.n = 0};
@@ -36,7 +36,7 @@ static double largest(double a, double b, double c)
 	return fmax(fabs(a), fmax(fabs(b), fabs(c)));
 }
 
-/* What rounding of its vertices can move a triangle by, along n. */
+/* How far the rounding of its vertices can move a triangle along n. */
 static double rounded_along(const struct triangle *t, vec3 n)
 {
 	return t->rounding * (fabs(n.x) * largest(t->v[0].x, t->v[1].x, t->v[2].x) +
@@ -65,7 +65,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 		vec3 from = b->v[i], to = b->v[(i + 1) % 3];
 		cut(&over, from, vec3_cross(n, vec3_sub(to, from)));
 	}
-	/* Twice as much as the roundings can do, for those before them in double and for the sums here. */
+	/* Twice the rounding error, for the earlier roundings in double and for the sums here. */
 	double within = 2 * (rounded_along(a, n) + rounded_along(b, n) + off);
 	for (unsigned i = 0; i < over.n; i++)
 		if (!(fabs(vec3_dot(n, vec3_sub(over.p[i], b->v[0]))) <= within))
@@ -75,7 +75,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 	return over.n >= 3 && has_width(&over, n);
 }
 
-/* Seen along n. */
+/* As seen along n. */
 static bool covers(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
 {
 	const struct triangle t = accel_triangle(s, prim);
@@ -97,7 +97,7 @@ static const struct coincide_pair *find_first(const struct coincidence *c, struc
 	return low;
 }
 
-/* One that hides it there; false: none does. */
+/* One that hides it there; false: none. */
 static bool hides(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p,
 		  struct prim_ref *by)
 {
@@ -117,7 +117,7 @@ static bool hides(const struct coincidence *c, const struct accel_shape *shapes,
 struct prim_ref coincide_there(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim,
 			       vec3 p)
 {
-	/* What hides it may be hidden itself; ranks end this. */
+	/* What hides it may be hidden itself; ranks end the recursion. */
 	while (c && prim.shape != PRIM_NONE.shape && c->first[prim.shape] < c->first[prim.shape + 1] &&
 	       hides(c, shapes, prim, p, &prim))
 		;

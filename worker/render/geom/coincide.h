@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Surfaces that coincide: triangles that overlap in one plane as far as float vertices can tell, and spheres that are
- * one. Which of them a ray meets would be chance, and what samples points on one of them would not ask. So one rule
- * holds for whatever asks about surfaces: where some coincide only one is there, that of the least rank; of equals the
- * first. The others are hidden there.
+ * Surfaces that coincide: triangles that overlap in one plane as far as float vertices can tell, and equal spheres. It
+ * would be chance which of them a ray hits, and sampling a point on one of them would not ask. So one rule applies to
+ * everything: where several coincide, only the one of the lowest rank is present; of equals, the first. The others are
+ * hidden there.
  *
- * Found once, before Embree's tree is built: triangles are sorted into ever smaller boxes, only where those hold more
- * than one shape or one that shines (whose points are sampled by area, so that a triangle that is there twice would
- * count twice). Triangles of one shape that does not shine are left as they are: it does not matter which of them is
- * met. Work and memory are bounded in proportion to the number of triangles; where that does not do, what was found
- * holds and `incomplete` says so.
+ * Found once, before Embree's tree is built: triangles are sorted into smaller and smaller boxes, as long as a box
+ * holds more than one shape or an emitter (points on emitters are sampled by area, so a duplicate triangle would count
+ * twice). Triangles of one shape that does not emit are left alone: it does not matter which of them is hit. Work and
+ * memory are bounded in proportion to the number of triangles; if that is not enough, what was found applies and
+ * `incomplete` is set.
  *
- * What was found is immutable: any thread. Finding allocates and ticks (common/base/liveness.h); asking does not.
+ * The result is immutable: any thread. Finding allocates and ticks (common/base/liveness.h); queries do not.
  */
 #ifndef WORKER_RENDER_GEOM_COINCIDE_H
 #define WORKER_RENDER_GEOM_COINCIDE_H
@@ -22,36 +22,36 @@
 #include <stddef.h>
 #include "common/base/error.h"
 
-/* A primitive that is hidden, in part or wholly, by another of which it lies no farther than vertices are rounded. */
+/* A primitive that is hidden, in part or entirely, by another one within the rounding of vertices. */
 struct coincide_pair {
 	struct prim_ref hidden, by;
 	enum surface_rank rank; /* of `by` */
 	bool wholly;
-	bool same_side; /* their normals agree */
+	bool same_side; /* their normals have the same direction */
 };
 
-/* Two shapes of which primitives coincide. */
+/* Two shapes with coinciding primitives. */
 struct coincide_shapes {
 	uint32_t hidden, by;
-	bool same_side; /* some of them with agreeing normals */
+	bool same_side; /* some of them with normals in the same direction */
 };
 
 struct coincidence {
 	size_t pair_count, shapes_count;
-	struct coincide_pair *pairs;	/* by hidden shape, hidden primitive, then as `by` ranks */
-	struct coincide_shapes *shapes; /* each two once, in the same order */
-	size_t *first;			/* one a shape and one more: where its pairs begin */
+	struct coincide_pair *pairs;	/* sorted by hidden shape, hidden primitive, then by the rank of `by` */
+	struct coincide_shapes *shapes; /* each pair once, in the same order */
+	size_t *first;			/* one per shape, plus one: where its pairs begin */
 	bool incomplete;
 };
 
 void coincide_free(struct coincidence *c);
 
-/* Which primitive is there at the point p of this one: itself, or what hides it. c may be NULL. */
+/* Which primitive is present at the point p of this one: itself, or what hides it. c may be NULL. */
 struct prim_ref coincide_there(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim,
 			       vec3 p);
 
-/* Whether triangle a overlaps b in its plane: by more than the rounding of vertices makes of neighbours that touch.
- * off: by how much their vertices are off besides the rounding of their coordinates to float (struct placement). */
+/* Whether triangle a overlaps b in its plane by more than rounding makes touching neighbours overlap. off: the error
+ * of their vertices besides the rounding of coordinates to float (struct placement). */
 bool coincide_triangles(const struct triangle *a, const struct triangle *b, double off, bool *wholly);
 
 #endif

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The search of coincide.h. Primitives go into halves of a box, those across the middle into both, until a part holds
- * one shape that does not shine (nothing to find), a few primitives, or cannot be told apart by place; what is left is
- * compared two by two, in the order of their ranks. A triangle that is wholly hidden hides nothing itself, so a stack
- * of equal ones costs no square.
+ * The search of coincide.h. Boxes are divided in halves, with primitives across the middle in both, until a part holds
+ * one shape that does not emit (nothing to find) or few primitives, or cannot be divided further; what is left is
+ * compared pairwise, in the order of ranks. A triangle that is entirely hidden hides nothing itself, so a stack of
+ * equal ones does not cost quadratic time.
  *
- * An instance of a mesh goes as one item until a cut would divide it or nothing else is left to divide: then the
- * triangles of its flat parts that meet the box around the others stand in its place. Most stand alone before that, or
- * have none, and cost nothing.
+ * An instance of a mesh is one item until a cut would divide it or nothing else is left to divide; then it is replaced
+ * by those triangles of its flat parts that meet the box around the others. Most instances are alone by then, or have
+ * none, and cost nothing.
  */
 #include "worker/render/geom/coincide_find.h"
 #include "worker/render/geom/coincide.h"
@@ -18,7 +18,7 @@
 
 #include <stdlib.h>
 
-#define WHOLE UINT32_MAX /* in place of a primitive: all of an instance */
+#define WHOLE UINT32_MAX /* as the primitive: an entire instance */
 enum { INSTANCED_MAX = 1 << 22 };
 enum { FEW = 12, MOST_CUTS = 64, SAMPLE = 129, OTHERS = 32, MANY = 16 * OTHERS };
 
@@ -26,9 +26,10 @@ struct search {
 	const struct accel_shape *shapes;
 	struct coincide_pair *pairs;
 	size_t pair_count, pair_room, pair_limit;
-	uint64_t work, limit; /* primitives put into parts, and twos compared */
+	uint64_t work, limit; /* primitives put into parts, and pairs compared */
 	bool incomplete;
-	struct flat_parts *flat; /* one a shape, of the first that shares a mesh; NULL: there are no instances */
+	struct flat_parts
+		*flat; /* one per shape, that of the first shape sharing the mesh; NULL: there are no instances */
 };
 
 struct member {
@@ -55,7 +56,7 @@ static void extent_of_instance(const struct accel_shape *s, uint32_t prim, int a
 	*high = fmax(u, fmax(v, w)) + margin;
 }
 
-/* Of its box along an axis, a little wider than it is, so that rounded coordinates meet. */
+/* The box's extent along an axis, slightly enlarged so that rounded coordinates meet. */
 static void extent(const struct search *f, struct prim_ref p, int axis, double *low, double *high)
 {
 	const struct accel_shape *s = &f->shapes[p.shape];
@@ -91,8 +92,8 @@ static int compare_numbers(const void *a, const void *b)
 	return x < y ? -1 : x > y;
 }
 
-/* Where to cut so that the halves are smallest, judged by some of them; false: halves would be hardly smaller than the
- * whole. */
+/* Where to cut such that the halves are smallest, judged by a sample; false: the halves would be hardly smaller than
+ * the whole. */
 static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, int *axis, double *at)
 {
 	struct member m[SAMPLE];
@@ -110,7 +111,7 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 			below += m[i].low[k] <= cut;
 			above += m[i].high[k] >= cut;
 		}
-		/* A half that is the whole would be cut in the same way over and over. */
+		/* A half equal to the whole would be cut in the same way forever. */
 		if (below + above < least && below < count && above < count) {
 			least = below + above;
 			*axis = k;
@@ -125,7 +126,7 @@ static bool shines(const struct search *f, struct prim_ref p)
 	return f->shapes[p.shape].rank == SURFACE_SHINES;
 }
 
-/* All of one shape that does not shine. */
+/* Whether all are of one shape that does not emit. */
 static bool nothing_to_find(const struct search *f, const struct prim_ref *items, size_t n)
 {
 	for (size_t i = 1; i < n; i++)
@@ -186,7 +187,7 @@ static bool may_meet(const struct search *f, const struct member *a, const struc
 	return true;
 }
 
-/* Each with those before it, which rank before it, that are not wholly hidden. */
+/* Compares each with those before it, which have lower ranks, that are not entirely hidden. */
 static int compare_all(struct search *f, struct member *m, size_t n)
 {
 	size_t kept = 0;
@@ -224,7 +225,7 @@ static int compare_part(struct search *f, const struct prim_ref *items, size_t n
 	return rc;
 }
 
-/* The shape that most of them are of, if more than half are: by votes for and against. */
+/* The shape that most of them belong to, if more than half do: by majority vote. */
 static uint32_t commonest(const struct prim_ref *items, size_t n)
 {
 	uint32_t shape = items[0].shape;
@@ -237,8 +238,8 @@ static uint32_t commonest(const struct prim_ref *items, size_t n)
 	return shape;
 }
 
-/* Of a large mesh and few others only what meets the box of one of those: most of a statue does not touch the room that
- * it stands in. Returns how many are left, at the beginning. */
+/* Of a large mesh among few others, keeps only what meets the box of one of those: most of a statue does not touch
+ * its room. Returns how many are left, at the front. */
 static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n)
 {
 	struct member others[OTHERS];
@@ -272,7 +273,7 @@ struct cut {
 	double at;
 };
 
-/* An instance across the cut is divided; where there is none, every instance. */
+/* Instances across the cut are expanded; if there are none, every instance is. */
 static bool is_divided(const struct search *f, struct prim_ref p, const struct cut *c)
 {
 	double low, high;
@@ -287,7 +288,7 @@ static const struct flat_parts *flat_of(const struct search *f, uint32_t instanc
 	return &f->flat[f->shapes[instance].place->first];
 }
 
-/* Room for all items with the triangles of those that are divided; 0: none is. */
+/* Room for all items with the triangles of the expanded instances; 0: none is expanded. */
 static size_t room_divided(const struct search *f, const struct prim_ref *items, size_t n, const struct cut *c)
 {
 	size_t room = n;
@@ -300,7 +301,7 @@ static size_t room_divided(const struct search *f, const struct prim_ref *items,
 	return any ? room : 0;
 }
 
-/* The box around all items but one; of many, which are all around it, all of space. */
+/* The box around all items but one; if there are many items, all of space. */
 static struct member box_of_others(const struct search *f, const struct prim_ref *items, size_t n, size_t without)
 {
 	double edge = n > MANY ? INFINITY : -INFINITY;
@@ -317,7 +318,7 @@ static struct member box_of_others(const struct search *f, const struct prim_ref
 	return box;
 }
 
-/* Appends those triangles of its flat parts that meet the box. */
+/* Appends the triangles of its flat parts that meet the box. */
 static size_t divide(struct search *f, uint32_t shape, const struct member *box, struct prim_ref *out)
 {
 	size_t count = 0;
@@ -369,7 +370,7 @@ static int look_into_halves(struct search *f, const struct prim_ref *items, size
 	return rc;
 }
 
-/* items: as they rank; they are written over. */
+/* items: sorted by rank; overwritten. */
 static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigned cuts)
 {
 	struct cut c = {.is = false};
@@ -414,11 +415,11 @@ static int compare_shapes(const void *x, const void *y)
 	return a->by < b->by ? -1 : a->by > b->by;
 }
 
-/* What lies across a cut was found more than once. */
+/* Pairs across a cut were found more than once. */
 static size_t unique_pairs(struct coincide_pair *p, size_t n)
 {
 	size_t kept = 0;
-	if (n == 0) /* p may be NULL then, which qsort may not be given */
+	if (n == 0) /* p may be NULL then, which qsort does not allow */
 		return 0;
 	qsort(p, n, sizeof *p, compare_pairs);
 	for (size_t i = 0; i < n; i++)
@@ -466,7 +467,7 @@ static int make(struct search *f, uint32_t count, struct coincidence **out)
 	return 0;
 }
 
-/* All primitives, as they rank; instances as a whole. */
+/* All primitives by rank; instances as single items. */
 static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, struct prim_ref *items)
 {
 	size_t n = 0;
@@ -480,7 +481,7 @@ static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, 
 	return n;
 }
 
-/* The flat parts of the meshes that instances share; *moved: how many triangles these are in all instances. */
+/* The flat parts of shared meshes; *moved: the total number of these triangles over all instances. */
 static int find_flat_parts(struct search *f, uint32_t count, size_t *moved)
 {
 	*moved = 0;
@@ -505,8 +506,8 @@ static int find(struct search *f, uint32_t count, size_t n)
 	struct prim_ref *items = rc ? NULL : mem_alloc(n, sizeof *items);
 	if (!items)
 		return -ENOMEM;
-	/* Enough for sorting to the last and for each primitive to meet dozens; not for all of all instances where
-	 * these are many. */
+	/* Enough for complete sorting and for each primitive to meet dozens of others; not for all triangles of very
+	 * many instances. */
 	size_t most = moved < INSTANCED_MAX ? moved : INSTANCED_MAX;
 	f->limit = 128 * (uint64_t)n + (1u << 22) + 16 * (uint64_t)most;
 	f->pair_limit = 4 * n + (1u << 16) + most;

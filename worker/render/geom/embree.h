@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Embree 3 and 4 under one spelling. Only accel.c and solved.c see this. */
+/* Embree 3 and 4 under common names. Only accel.c, solved.c and instances.c include this. */
 #ifndef WORKER_RENDER_GEOM_EMBREE_H
 #define WORKER_RENDER_GEOM_EMBREE_H
 
-/* Embree's own headers are not ours to warn about. */
+/* Suppresses warnings in Embree's own headers. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wstrict-prototypes"
 #pragma GCC diagnostic ignored "-Wundef"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Triangles are sorted by their planes, rounded to a grid of which axes and the plane through the origin are in the
- * middle of a cell; what a cell of the grid divides counts as two planes. */
+/* Triangles are sorted by their planes, rounded to a grid in which axes and the plane through the origin are in the
+ * middle of a cell; a plane divided by the grid counts as two. */
 #include "worker/render/geom/flat_parts.h"
 
 #include "common/base/liveness.h"
@@ -43,7 +43,7 @@ static int32_t on_grid(double x)
 	return (int32_t)lrint(fmin(fmax(x, -4), 4) * GRID);
 }
 
-/* The mesh's unit sphere holds its vertices. */
+/* The mesh fits into the unit sphere. */
 static struct face face_of(const struct accel_shape *s, uint32_t prim)
 {
 	const struct triangle t = triangle_from(s->position, s->index[prim]);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The triangles of a mesh by which its instances may coincide with something: those in planes that hold a hundredth of
- * its surface, such as the foot of a glass or the sides of a brick. That a triangle of a curved surface lies in the
- * plane of another is not looked for among instances, of which there may be millions. One thread.
+ * The triangles of a mesh whose instances may coincide with something: those in planes that contain a hundredth of its
+ * surface, such as the foot of a glass or the sides of a brick. Coincidences of single triangles of curved surfaces are
+ * not searched for among instances, of which there may be millions. One thread.
  */
 #ifndef WORKER_RENDER_GEOM_FLAT_PARTS_H
 #define WORKER_RENDER_GEOM_FLAT_PARTS_H
@@ -11,7 +11,7 @@
 
 struct flat_parts {
 	uint32_t count;
-	uint32_t *prim; /* in rising order; freed by mem_free */
+	uint32_t *prim; /* ascending; freed with mem_free */
 };
 
 /* Of the mesh in its own frame. -ENOMEM. */

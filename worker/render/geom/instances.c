@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Building a tree for each mesh; then, for Embree's callbacks, a query of the world as a segment in the mesh's frame.
- * The segment ends where the query does or where it leaves the mesh's box, so all its numbers are of the size of the
- * mesh.
+ * Builds a tree for each mesh. Embree's callbacks transform a query of the world into a segment in the mesh's frame.
+ * The segment ends where the query does, or where it leaves the mesh's box, so all its numbers are of the order of the
+ * mesh's size.
  */
 #include "worker/render/geom/instances.h"
 
@@ -23,13 +23,13 @@ struct within {
 	embree_context context;
 	const struct query *q;
 	uint32_t shape;
-	vec3 from, d;	       /* where the segment begins; unit direction */
-	double length, t0, t1; /* it is the part of the query from t0 to t1 */
-	double reach;	       /* how far Embree's floats can be off */
-	double before, beyond; /* so much longer is Embree's ray at its ends, see query_lowness */
+	vec3 from, d;	       /* start of the segment; unit direction */
+	double length, t0, t1; /* the part of the query from t0 to t1 */
+	double reach;	       /* the error bound of Embree's floats */
+	double before, beyond; /* Embree's ray is longer by this at its ends, see query_lowness */
 };
 
-/* As in accel.c: so high over the triangle's plane at both ends that no rounding can be wrong about the side. */
+/* As in accel.c: both ends are so high over the triangle's plane that rounding cannot change the side. */
 static bool clearly_crosses(const struct within *w, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
@@ -123,7 +123,7 @@ void instances_fini(struct instances *s)
 
 /* ---- Embree's callbacks */
 
-/* A ray of the world may run beside the true one. */
+/* A ray of the world may deviate from the true one. */
 static void bounds(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct instances *s = args->geometryUserPtr;
@@ -139,7 +139,7 @@ static void bounds(const struct RTCBoundsFunctionArguments *args)
 	b->upper_z = (float)(m->center.z + m->half.z + r);
 }
 
-/* Leaves of [t0, t1] what lies between low and high along one axis; false: nothing. */
+/* Clips [t0, t1] to what lies between low and high along one axis; false: nothing is left. */
 static bool clip(double o, double d, double low, double high, double *t0, double *t1)
 {
 	if (d == 0)
@@ -150,7 +150,7 @@ static bool clip(double o, double d, double low, double high, double *t0, double
 	return *t0 <= *t1;
 }
 
-/* Unit, in the mesh's frame, of the surface that an end lies on; 0: on none. */
+/* The unit normal, in the mesh's frame, of the surface that an end is on; 0: on none. */
 static vec3 normal_at(const struct placement *m, const struct ray_end *end)
 {
 	vec3 n = end ? placement_normal_back(m, end->ng) : (vec3){0, 0, 0};
@@ -158,14 +158,14 @@ static vec3 normal_at(const struct placement *m, const struct ray_end *end)
 	return length > 0 ? vec3_scale(1 / length, n) : n;
 }
 
-/* From a surface of normal n towards the side that d leaves for; the ray is as much longer as query_lowness says. */
+/* Lifts from a surface with normal n to the side that d leaves for; the ray is longer by query_lowness. */
 static vec3 lifted(vec3 p, vec3 n, vec3 d, double reach, double *longer)
 {
 	*longer = reach * query_lowness(n, d);
 	return vec3_madd(p, copysign(reach, vec3_dot(n, d)), n);
 }
 
-/* The part up to t_max of the query that runs within the instance's box; false: none. */
+/* The part of the query up to t_max that is inside the instance's box; false: none. */
 static bool enter(struct within *w, const struct instances *s, const struct instance *it, const struct query *q,
 		  double t_max)
 {
@@ -196,7 +196,7 @@ static bool enter(struct within *w, const struct instances *s, const struct inst
 	return w->length > 0 && vec3_is_finite(w->d);
 }
 
-/* The float ray begins before the segment, and ends after it, by as much as floats may be off, unless it is clipped. */
+/* The float ray starts before the segment, and ends after it, by the error bound of floats, unless it is clipped. */
 static void fill_ray(const struct within *w, struct RTCRay *ray)
 {
 	vec3 o = vec3_madd(w->from, -w->before, w->d);
@@ -212,8 +212,7 @@ static void fill_ray(const struct within *w, struct RTCRay *ray)
 			       .mask = 0xFFFFFFFFu};
 }
 
-/* Along the query, as a fraction of it: where Embree says, or where the triangle's plane is if that is there as far as
- * Embree can tell. */
+/* The hit as a fraction of the query: Embree's, or that of the triangle's plane if Embree's precision allows it. */
 static double place_of_hit(const struct within *w, const struct RTCRayHit *rh)
 {
 	double share = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->before) * share;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Instances of meshes: one tree of Embree's for each mesh, in the mesh's own frame, and one geometry that holds all
- * instances as primitives. A ray that enters the box of one is moved into the mesh's frame in double, begins there
- * where it enters that box, and only then becomes float: Embree's own instances would round transform and ray in the
- * world, so that what is proposed would be off by parts of the scene instead of parts of the mesh. What Embree proposes
- * is judged in the world, as everywhere (accel.h).
+ * Instances of meshes: one Embree tree for each mesh, in the mesh's own frame, and one user geometry with all instances
+ * as primitives. A ray that enters the box of one is transformed into the mesh's frame in double, starts where it
+ * enters that box, and only then becomes float. Embree's own instances would round transform and ray in the world, so
+ * their errors would be proportional to the scene instead of the mesh. What Embree proposes is checked in the world, as
+ * everywhere (accel.h).
  *
  * Runs inside Embree's traversal: any thread; allocates nothing there.
  */
@@ -16,8 +16,8 @@
 struct instance_tree {
 	RTCScene scene;
 	vec3 low, high; /* of the mesh, in its frame */
-	double reach;	/* how far Embree's floats can be off in it */
-	bool mirrored;	/* the winding of its triangles is that of mirrored instances */
+	double reach;	/* the error bound of Embree's floats in it */
+	bool mirrored;	/* its triangles are wound as for mirrored instances */
 };
 
 struct instance {
@@ -27,16 +27,16 @@ struct instance {
 struct instances {
 	const struct accel_shape *shapes;
 	uint32_t tree_count, count;
-	struct instance_tree *trees; /* one a mesh */
+	struct instance_tree *trees; /* one per mesh */
 	struct instance *list;
-	double off, off_far; /* how far a ray of the world can be off at p: off + off_far |p| */
+	double off, off_far; /* the error bound of a ray of the world at p: off + off_far |p| */
 };
 
-/* Of all shapes that have a place. The device reports what goes wrong in Embree. -ENOMEM. */
+/* For all shapes with a placement. The device reports Embree's errors. -ENOMEM. */
 int instances_init(struct instances *s, RTCDevice device, const struct accel_shape *shapes, uint32_t count);
 void instances_fini(struct instances *s);
 
-/* What the user geometry is made of; s outlives it, and knows off and off_far when it is committed. */
+/* The data of the user geometry; s must outlive it, with off and off_far set when it is committed. */
 void instances_geometry(RTCGeometry g, struct instances *s);
 
 #endif

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where one instance of a mesh stands. The mesh has its vertices, in float, in a frame of its own whose unit sphere
- * holds it; the instance's are these in double, moved into the world as they are asked for. So all that is decided by
- * planes and solved in double is so in the world, and two triangles that share a vertex share it there, to the bit.
- * Pure; any thread.
+ * Where one instance of a mesh is. The mesh has float vertices in a frame of its own, in which it fits into the unit
+ * sphere; the instance's vertices are these in double, transformed into the world whenever they are read. So everything
+ * decided by planes and computed in double happens in the world, and two triangles that share a vertex share it there,
+ * to the bit. Pure; any thread.
  */
 #ifndef WORKER_RENDER_GEOM_PLACEMENT_H
 #define WORKER_RENDER_GEOM_PLACEMENT_H
@@ -14,16 +14,16 @@
 struct placement {
 	vec3 x, y, z, at;     /* columns: p in the world is x p.x + y p.y + z p.z + at */
 	vec3 back[3];	      /* rows of the inverse of x, y, z */
-	vec3 center, half;    /* a box around all of it, in the world */
-	double rounding;      /* of doubles of the world, in the mesh's frame */
-	double vertex_is_off; /* by rounding to float in the mesh's frame, in the world */
+	vec3 center, half;    /* the bounding box, in the world */
+	double rounding;      /* rounding error of world coordinates, in the mesh's frame */
+	double vertex_is_off; /* error of rounding to float in the mesh's frame, in the world */
 	uint32_t first;	      /* the first shape that is an instance of the same mesh */
-	bool mirrored;	      /* its triangles are wound the other way round than in the mesh's frame */
+	bool mirrored;	      /* its triangles are wound opposite to the mesh's frame */
 };
 
-/* m: from the mesh's frame, in which a box with these corners holds it, to the world; affine. false: it has no inverse,
- * is so uneven that lengths differ by more than 2^16, or so small beside the world (2^-80) that products of its lengths
- * would be lost. */
+/* m: affine, from the mesh's frame, in which this is its bounding box, to the world. false: it has no inverse, or is
+ * so uneven that lengths differ by more than 2^16, or so small relative to the world (2^-80) that products of its
+ * lengths would underflow. */
 bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high);
 
 /* Whether lengths differ by no more than that. */
@@ -61,7 +61,7 @@ static inline vec3 placement_normal_back(const struct placement *m, vec3 n)
 	return (vec3){vec3_dot(m->x, n), vec3_dot(m->y, n), vec3_dot(m->z, n)};
 }
 
-/* Edges are made of the mesh's own, so that they keep their digits however far away it stands. */
+/* Edges are computed from the mesh's own, so that they keep their precision however far away it is. */
 static inline struct triangle placement_triangle(const struct placement *m, const float (*position)[3],
 						 const uint32_t i[3])
 {

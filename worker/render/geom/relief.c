@@ -4,12 +4,12 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* The bent normal before it is normalised, and how it changes. */
+/* The bent normal before normalisation, and its derivative. */
 struct bent {
 	vec3 m, dm;
 };
 
-/* The tangent t made orthogonal to n, lifted by the slope; and its change. */
+/* The tangent t made orthogonal to n and lifted by the slope; and its derivative. */
 static void lift(const struct relief_site *s, const struct relief_step *d, vec3 t, vec3 dt, double slope, double dslope,
 		 struct bent *out)
 {
@@ -36,13 +36,13 @@ static void bend_height(const struct relief_site *s, const struct relief_step *d
 		out->dm = vec3_scale(hand, vec3_add(vec3_cross(a.dm, b.m), vec3_cross(a.m, b.dm)));
 }
 
-/* Texture coordinates that run as in a mirror, seen from outside with v downwards. */
+/* Whether texture coordinates are mirrored, seen from outside with v pointing down. */
 static bool mirrored(const struct relief_site *s)
 {
 	return vec3_dot(vec3_cross(s->tu, s->tv), s->n) > 0;
 }
 
-/* The frame turns with n, and about it with the axis: as in worker/render/halfvec/constraint.c. */
+/* The frame turns with n, and around it with the axis: as in worker/render/halfvec/constraint.c. */
 static void bend_normal(const struct relief_site *s, const struct relief_step *d, struct relief_value *l, bool turned,
 			struct bent *out)
 {

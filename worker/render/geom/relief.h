@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shading normals bent by a bump map or a normal map (worker/render/math/relief.h). A height h(u,v) gives the normal
- * that the surface p + h n would have if n did not turn and all heights were small: across dp/du + n (dh/du - n.dp/du)
- * and the same of v (Blinn 1978, with the tangents made orthogonal to n first). A bent normal that looks to the back of
- * the triangle is not taken. Pure; any thread; allocates nothing.
+ * Shading normals bent by a bump map or a normal map (worker/render/math/relief.h). A height h(u,v) gives the normal of
+ * the surface p + h n as if n were constant and all heights small: perpendicular to dp/du + n (dh/du - n.dp/du) and the
+ * same for v (Blinn 1978, with the tangents made orthogonal to n first). A bent normal that points to the back of the
+ * triangle is ignored. Pure; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_GEOM_RELIEF_H
 #define WORKER_RENDER_GEOM_RELIEF_H
@@ -11,16 +11,16 @@
 #include "worker/render/math/frame.h"
 #include "worker/render/math/relief.h"
 
-/* A point of a surface before it is bent. */
+/* A surface point before its normal is bent. */
 struct relief_site {
 	vec3 ng, n;  /* unit: geometric and shading normal */
-	vec3 axis;   /* what the shading frame is laid along */
-	vec3 tu, tv; /* dp/du, dp/dv; 0: the surface has no use for relief here */
+	vec3 axis;   /* the direction along which the shading frame is laid */
+	vec3 tu, tv; /* dp/du, dp/dv; 0: relief does not apply here */
 	double u, v;
-	double unit; /* of the scene's length, in that of tu and tv */
+	double unit; /* the scene's unit of length, in that of tu and tv */
 };
 
-/* How these change as the point moves, per length. */
+/* The derivatives of these as the point moves, per length. */
 struct relief_step {
 	vec3 dn, daxis, dtu, dtv;
 	double du, dv;

@@ -9,7 +9,7 @@ bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t 
 	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
 }
 
-/* Lower rays lose what is nearer to the surface that they leave than floats can be off. */
+/* More grazing rays lose what is closer to the surface that they leave than the error of floats. */
 #define LOWEST 64.0
 
 double query_lowness(vec3 n, vec3 d)
@@ -41,7 +41,7 @@ bool query_crosses_there(const struct query *q, struct prim_ref prim)
 static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct sphere_prim *s = args->geometryUserPtr;
-	/* One part in 2^20 outwards: more than float rounding of the box and of Embree's slab test can take away. */
+	/* Enlarged by one part in 2^20: more than the float rounding of the box and of Embree's slab test. */
 	double r = s->radius * (1 + 0x1p-20) + 0x1p-20 * (fabs(s->center.x) + fabs(s->center.y) + fabs(s->center.z));
 	struct RTCBounds *b = args->bounds_o;
 	b->lower_x = (float)(s->center.x - r);
@@ -52,9 +52,9 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 	b->upper_z = (float)(s->center.z + r);
 }
 
-/* The nearest admissible root of |o + t d - c|^2 = r^2 in (t_min, t_max). Where the ray starts on the sphere one root
- * is 0, where a segment ends on it one root is 1: the other follows from Vieta without cancellation. Else the
- * discriminant comes from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
+/* The nearest valid root of |o + t d - c|^2 = r^2 in (t_min, t_max). If the ray starts on the sphere one root is 0,
+ * if a segment ends on it one root is 1: the other follows from Vieta's formulas without cancellation. Otherwise the
+ * discriminant is computed from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
 static bool sphere_root(const struct sphere_prim *s, const struct query *q, double t_max, double *t)
 {
 	vec3 oc = vec3_sub(q->o, s->center);
@@ -124,7 +124,7 @@ static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
 					     .upper_z = high[2]};
 }
 
-/* As the filter has it for triangles that Embree solves; those are never PRIM_NONE. */
+/* The same as the filter for triangles intersected by Embree; these are never PRIM_NONE. */
 static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct query *q, double t_max, double *t)
 {
 	const struct prim_ref ref = {w->id, prim};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Primitives that Embree asks us about, solved in double: spheres, and triangles too large for floats beside what is
- * small in a scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.
+ * Primitives that are intersected in double by our own callbacks: spheres, and triangles too large for floats relative
+ * to small things in a scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_GEOM_SOLVED_H
 #define WORKER_RENDER_GEOM_SOLVED_H
@@ -9,19 +9,20 @@
 #include "worker/render/geom/coincide.h"
 #include "worker/render/geom/embree.h"
 
-/* What a query carries into Embree's callbacks. */
+/* What a query passes to Embree's callbacks. */
 struct query {
 	embree_context context;
-	vec3 o, d, end; /* in double: what Embree proposes is judged by these; end: o + d for a segment */
+	vec3 o, d, end; /* in double, decides about Embree's proposals; end: o + d for a segment */
 	bool segment;
 	double t_min;
-	double reach;	    /* how far Embree's floats can be off along this ray */
-	double low, beyond; /* reach times these: along the ray to the height of it, over where it starts and ends */
-	double before;	    /* by how much Embree's ray begins early, in units of d */
-	double back;	    /* Embree's ray begins that much before o, in units of d; below 0: after it */
-	double wide_from;   /* extent from which on triangles are solved in double; INFINITY: none is */
+	double reach;	    /* the error bound of Embree's floats along this ray */
+	double low, beyond; /* reach times these: the part of the ray up to that height over the surfaces of its start
+			       and end */
+	double before;	    /* how much earlier Embree's ray starts, in units of d */
+	double back;	    /* Embree's ray starts this much before o, in units of d; negative: after it */
+	double wide_from;   /* extent from which triangles are intersected in double; INFINITY: none */
 	struct prim_ref from, to;
-	const struct ray_end *start, *finish;  /* the surfaces on which o and end lie; NULL: free, or far from o */
+	const struct ray_end *start, *finish;  /* the surfaces that o and end are on; NULL: none, or far from o */
 	const struct coincidence *coincidence; /* NULL: no surfaces coincide */
 	const struct accel_shape *shapes;
 };
@@ -32,39 +33,39 @@ struct sphere_prim {
 	uint32_t shape;
 };
 
-/* The triangles of a shape that are solved in double, in scenes of mixed scales. */
+/* Those triangles of a shape that are intersected in double, in scenes of mixed scales. */
 struct wide_prims {
 	const struct accel_shape *shape;
 	uint32_t id, count;
 	uint32_t *prim;
 };
 
-/* The plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane,
- * on a coplanar neighbour, does not cross it again. */
+/* Whether the plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in
+ * the plane, on a coplanar neighbour, does not cross it again. */
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim);
 
-/* How far along d, for a step away from the surface of normal n: a ray that is lifted comes back to the surface that
- * much earlier. Begun there, it loses nothing that is nearer to the surface than it is lifted; begun behind the
- * surface, it would meet neighbours whose planes the true ray crosses elsewhere. 1 where n is 0. */
+/* The length along d per distance from a surface with normal n: a lifted ray returns to the surface that much
+ * earlier. Starting there, it misses nothing closer to the surface than its lift; starting behind the surface, it
+ * would hit neighbours whose planes the true ray crosses elsewhere. 1 if n is 0. */
 double query_lowness(vec3 n, vec3 d);
 
-/* The ray starts or ends on it. */
+/* Whether the ray starts or ends on it. */
 static inline bool query_is_end(const struct query *q, struct prim_ref p)
 {
 	return (p.shape == q->from.shape && p.prim == q->from.prim) || (p.shape == q->to.shape && p.prim == q->to.prim);
 }
 
-/* Which triangle is there where the ray crosses the plane of this one: it, or what hides it (coincide.h). */
+/* Which triangle is present where the ray crosses the plane of this one: it, or what hides it (coincide.h). */
 struct prim_ref query_there(const struct query *q, struct prim_ref prim);
-/* Some of this shape is hidden. */
+/* Whether some of this shape is hidden. */
 static inline bool query_hides(const struct query *q, uint32_t shape)
 {
 	return q->coincidence && q->coincidence->first[shape] < q->coincidence->first[shape + 1];
 }
-/* The same as query_crosses, of what is there; no end of the ray lies on that. */
+/* As query_crosses, for the primitive that is present; no end of the ray is on it. */
 bool query_crosses_there(const struct query *q, struct prim_ref prim);
 
-/* What a user geometry is made of; both outlive it. */
+/* The data of a user geometry; both must outlive it. */
 void solved_sphere(RTCGeometry g, struct sphere_prim *s);
 void solved_triangles(RTCGeometry g, struct wide_prims *w);
 

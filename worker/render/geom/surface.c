@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A hit becomes a site on its primitive (barycentrics, or the direction from a sphere's centre), the site a point with
- * frame and texture coordinates, and, where half vectors ask for it, the change of all of these along two tangents;
- * relief bends normal and change in the same way.
+ * frame and texture coordinates, and, for half vectors, the derivatives of these along two tangents; relief bends
+ * normal and derivatives in the same way.
  *
- * Nothing fails: where texture coordinates are degenerate another tangent stands in that turns as little as it can, and
- * a normal of no length is the geometric one.
+ * Nothing fails: if texture coordinates are degenerate, another tangent is used that turns as little as possible, and a
+ * normal of zero length is replaced by the geometric one.
  */
 #include "worker/render/geom/surface.h"
 
@@ -16,8 +16,8 @@ static vec3 at(const float (*a)[3], uint32_t i)
 	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
 }
 
-/* Moves a point of the triangle's plane that lies outside to the nearest one inside. Barycentrics clamped one by one
- * would travel along a sliver by as many of its widths as they are off. */
+/* Moves a point of the triangle's plane that is outside to the nearest one inside. Clamping each barycentric
+ * separately would move along a sliver by as many of its widths as they are off. */
 static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
 {
 	const double start[3][2] = {{0, 0}, {0, 0}, {1, 0}}, step[3][2] = {{1, 0}, {0, 1}, {-1, 1}};
@@ -36,8 +36,8 @@ static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
 	}
 }
 
-/* Barycentrics of the ray's crossing with the triangle's plane, kept inside the triangle: Embree said that it was met.
- * false: the ray lies in the plane. */
+/* Barycentrics of the ray's crossing with the triangle's plane, clamped to the triangle, since Embree reported a
+ * hit. false: the ray is in the plane. */
 static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1, double *b2)
 {
 	vec3 h = vec3_cross(d, e2), s = vec3_sub(o, v0), q = vec3_cross(s, e1);
@@ -54,9 +54,9 @@ static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1
 	return true;
 }
 
-/* A tangent that turns as little as it can from one triangle to the next: what the shortest rotation from r to n makes
- * of a. Half vectors are numbers in frames, and frames along edges would turn at random. No such field is without a
- * flaw; this one's is at n = -r, where few surfaces face. */
+/* A tangent that turns as little as possible from one triangle to the next: the shortest rotation from r to n
+ * applied to a. Half vectors are coordinates in frames, and frames along edges would turn at random. Every such
+ * field has a singularity; this one's is at n = -r, which few surfaces face. */
 static vec3 carried_axis(vec3 n)
 {
 	const vec3 r = {2.0 / 7, 3.0 / 7, 6.0 / 7}, a = {3.0 / 7, -6.0 / 7, 2.0 / 7};
@@ -67,7 +67,7 @@ static vec3 carried_axis(vec3 n)
 /* dp/du and dp/dv from the texture coordinates. */
 struct tangents {
 	vec3 u, v;
-	bool any; /* false: there are none, or they are degenerate */
+	bool any; /* false: missing or degenerate */
 };
 
 static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2)
@@ -88,7 +88,7 @@ static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[
 	return t;
 }
 
-/* A triangle's first vertex and the edges from there. */
+/* A triangle's first vertex and its edges from there. */
 struct corner {
 	vec3 v0, e1, e2;
 };
@@ -128,7 +128,7 @@ static vec3 interpolated_normal(const struct geom_shape *s, const uint32_t i[3],
 	return vec3_madd(vec3_madd(m, b1, vertex_normal(s, i[1])), b2, vertex_normal(s, i[2]));
 }
 
-/* A triangle's point before relief bends it. Where there are no texture coordinates barycentrics stand in. */
+/* A triangle's point before relief. Without texture coordinates, barycentrics are used. */
 static struct relief_site site_on_triangle(const struct geom_shape *s, const struct corner *c, const struct tangents *t,
 					   vec3 n, const struct surface_point *x)
 {
@@ -155,8 +155,7 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 	vec3 n = x->ng;
 	if (s->normal) {
 		vec3 m = interpolated_normal(s, i, b1, b2);
-		/* Normals that turn to the back somewhere inside the triangle say nothing about this side: shade flat.
-		 */
+		/* Normals that point to the back somewhere inside the triangle are unusable: shade flat. */
 		if (vec3_dot(m, x->ng) > 0)
 			n = vec3_normalize(m);
 	}
@@ -188,7 +187,7 @@ void surface_uv(const struct geom_shape *s, struct surface_point *x)
 		sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
 }
 
-/* A sphere's point before relief bends it. At the poles dp/du is 0. */
+/* A sphere's point before relief. At the poles dp/du is 0. */
 static struct relief_site site_on_sphere(const struct geom_shape *s, const struct surface_point *x)
 {
 	struct relief_site r = {.ng = x->ng, .n = x->ng, .axis = x->dpdu, .u = x->u, .v = x->v, .unit = s->unit};
@@ -201,14 +200,14 @@ static struct relief_site site_on_sphere(const struct geom_shape *s, const struc
 	return r;
 }
 
-/* All but u and v, unless there is relief. */
+/* Everything except u and v, unless there is relief. */
 static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	x->prim = prim;
 	x->p = vec3_madd(s->center, s->radius, w);
 	x->b1 = x->b2 = 0;
 	x->ng = vec3_scale(s->normal_sign, w);
-	/* du of the longitude: axis x normal; undefined at the poles, where frame_along picks a frame of its own. */
+	/* du along the longitude: axis x normal; undefined at the poles, where frame_along chooses a frame. */
 	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
 	vec3 n = x->ng;
 	if (s->relief) {
@@ -225,7 +224,7 @@ void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w,
 	surface_uv(s, x);
 }
 
-/* The hit in double: the root nearest to the one that Embree's search settled on. */
+/* The hit in double: the root nearest to Embree's. */
 static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double t)
 {
 	vec3 oc = vec3_sub(o, s->center);
@@ -254,7 +253,7 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
 {
-	/* Where both normals are one the shading frame is this one already. */
+	/* If both normals are equal, the shading frame is this one. */
 	if (x->sh.n.x == x->ng.x && x->sh.n.y == x->ng.y && x->sh.n.z == x->ng.z) {
 		*du = x->sh.s;
 		*dv = x->sh.t;
@@ -270,8 +269,8 @@ static void change_on_sphere(const struct geom_shape *s, const struct surface_po
 	double bend = 1 / s->radius;
 	c->dn[0] = vec3_scale(s->normal_sign * bend, c->du);
 	c->dn[1] = vec3_scale(s->normal_sign * bend, c->dv);
-	/* du is axis x w over its length. Along the circle of latitude it turns by bend about the outward direction w's
-	 * own circle and by bend cot(theta) towards the pole; along the meridian it is carried in parallel. */
+	/* du is axis x w, normalised. Along the circle of latitude it turns by bend around the outward direction w's
+	 * own circle and by bend cot(theta) towards the pole; along the meridian it is transported in parallel. */
 	vec3 w = vec3_scale(s->normal_sign, x->ng);
 	double cosine = vec3_dot(s->sphere_axes.n, w), sine = vec3_length(vec3_cross(s->sphere_axes.n, w));
 	vec3 turn = vec3_scale(-bend, w);
@@ -310,7 +309,7 @@ static void barycentric_gradients(const struct corner *k, vec3 *g1, vec3 *g2)
 	*g2 = vec3_scale(inverse, vec3_cross(area, k->e1));
 }
 
-/* The normal without relief, and in c->dn how it changes. */
+/* The normal without relief, and its derivatives in c->dn. */
 static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
 {
 	const uint32_t *i = s->index[x->prim.prim];
@@ -341,7 +340,7 @@ static void bend_on_triangle(const struct geom_shape *s, const struct surface_po
 	struct corner k = corner_of(s, i);
 	struct tangents t = tangents_of(s, i, k.e1, k.e2);
 	struct relief_site site = site_on_triangle(s, &k, &t, n, x);
-	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* how (u,v) changes with the barycentrics */
+	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* derivatives of (u,v) by the barycentrics */
 	for (int a = 0; s->uv && a < 2; a++) {
 		t1[a] = (double)s->uv[i[1]][a] - (double)s->uv[i[0]][a];
 		t2[a] = (double)s->uv[i[2]][a] - (double)s->uv[i[0]][a];

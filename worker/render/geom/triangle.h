@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One triangle, in double, with vertices that mostly are floats: its plane, and where a line meets it. Pure; any
+/* One triangle in double, with vertices that are mostly floats: its plane, and where a line crosses it. Pure; any
  * thread. */
 #ifndef WORKER_RENDER_GEOM_TRIANGLE_H
 #define WORKER_RENDER_GEOM_TRIANGLE_H
@@ -12,7 +12,7 @@
 struct triangle {
 	vec3 v[3], n;	 /* n: not normalised */
 	double edges;	 /* bounds the terms of n */
-	double rounding; /* of its vertices, as a share of their coordinates */
+	double rounding; /* error of its vertices, relative to their coordinates */
 };
 
 static inline vec3 triangle_vertex(const float (*position)[3], uint32_t i)
@@ -48,7 +48,7 @@ static inline vec3 triangle_vertex_unrounded(const double (*position)[3], uint32
 	return (vec3){position[i][0], position[i][1], position[i][2]};
 }
 
-/* Of vertices in double, each off by a few roundings of what it was made of. */
+/* With vertices in double, each off by a few roundings of its inputs. */
 static inline struct triangle triangle_unrounded(const double (*position)[3], const uint32_t i[3])
 {
 	vec3 v0 = triangle_vertex_unrounded(position, i[0]), v1 = triangle_vertex_unrounded(position, i[1]),
@@ -58,8 +58,8 @@ static inline struct triangle triangle_unrounded(const double (*position)[3], co
 	return t;
 }
 
-/* Of the plane over p, times |n|; 0 when p lies in the plane as far as double can tell: p and n carry the rounding of a
- * few operations, of which `edges` bounds the terms. */
+/* Height over the plane, times |n|; 0 if p is in the plane as far as double can tell: p and n carry the rounding of
+ * a few operations, whose terms `edges` bounds. */
 static inline double triangle_height(const struct triangle *t, vec3 p)
 {
 	vec3 to = vec3_sub(t->v[0], p);
@@ -67,11 +67,11 @@ static inline double triangle_height(const struct triangle *t, vec3 p)
 	return fabs(h) <= 0x1p-49 * t->edges * (triangle_norm1(p) + triangle_norm1(to)) ? 0 : h;
 }
 
-/* Largest side of its box. */
+/* Largest side of its bounding box. */
 float triangle_extent(const float (*position)[3], const uint32_t i[3]);
 
-/* Where o + t d meets the plane, if that is within the triangle. Two triangles that share an edge leave no gap there:
- * both ask about it by the same operations. */
+/* Where o + t d crosses the plane, if that is within the triangle. Two triangles that share an edge leave no gap,
+ * because both test it with the same operations. */
 bool triangle_meets(const struct triangle *k, vec3 o, vec3 d, double *t);
 
 #endif

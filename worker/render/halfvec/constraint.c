@@ -3,18 +3,18 @@
 
 #include <assert.h>
 
-/* What a constraint knows of the vertex before or after it. */
+/* What a constraint knows of an adjacent vertex. */
 struct neighbour {
 	vec3 w;	     /* unit direction to it */
-	double rate; /* by how much w turns as it moves across w */
+	double rate; /* how fast w turns as it moves perpendicular to w */
 	double own;  /* and as the constraint's own vertex does */
 	vec3 du, dv; /* how it moves */
 };
 
-/* A half vector that is not normalised, and its slopes. */
+/* A half vector before normalisation, and its slopes. */
 struct half {
 	vec3 sum;     /* i + eta o */
-	double along; /* sum.n; 1 where matched: then no slope divides */
+	double along; /* 1 if index-matched: then no slope is divided */
 	vec2 h;
 	bool matched, finite;
 };
@@ -32,7 +32,7 @@ static struct half half_of(const struct full_path_path *x, unsigned j, double et
 	r.matched = eta == 1 && (v->mode & BSDF_TRANSMIT);
 	if (!r.matched) {
 		r.along = l.z;
-		/* Beyond this the derivatives, which divide by the square, could overflow. */
+		/* Beyond this the derivatives, which divide by its square, could overflow. */
 		r.finite = fabs(l.z) > 0x1p-300 * vec3_length(r.sum);
 	}
 	r.h = r.finite ? (vec2){l.x / r.along, l.y / r.along} : (vec2){INFINITY, INFINITY};
@@ -50,7 +50,7 @@ static inline vec3 turn(vec3 w, vec3 d, double rate)
 	return vec3_scale(rate, vec3_madd(d, -vec3_dot(w, d), w));
 }
 
-/* Change of the slopes as the half vector changes by d, in a frame that stands still. */
+/* Derivative of the slopes as the half vector changes by d, in a fixed frame. */
 static inline vec2 slope_change(const struct frame *f, const struct half *r, vec3 d)
 {
 	vec3 l = frame_to_local(f, d);
@@ -66,8 +66,8 @@ static inline mat2 by_neighbour(const struct frame *f, const struct half *r, con
 }
 
 /* The vertex itself moves along d: both directions turn, and the frame with the shading normal (by dn) and with the
- * field of du (by ddu). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is how s = N(du - n (n.du)) turns about
- * n. */
+ * field of du (by ddu). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is the rate at which s = N(du - n
+ * (n.du)) turns around n. */
 static inline vec2 by_itself(const struct frame *f, const struct half *r, const struct neighbour *i,
 			     const struct neighbour *o, double eta, vec3 d, vec3 du, vec3 dn, vec3 ddu)
 {
@@ -76,7 +76,7 @@ static inline vec2 by_itself(const struct frame *f, const struct half *r, const 
 	double dns = vec3_dot(f->s, dn), dnt = vec3_dot(f->t, dn);
 	double bent = vec3_dot(f->s, du); /* |du - n (n.du)| */
 	double twist = bent > 0 ? (vec3_dot(f->t, ddu) - dnt * vec3_dot(f->n, du)) / bent : 0;
-	double normal = 1, stretch = 0; /* of the half vector that the slopes are read from */
+	double normal = 1, stretch = 0; /* of the half vector that the slopes are computed from */
 	if (r->matched)
 		normal = vec3_dot(r->sum, f->n);
 	else
@@ -86,7 +86,7 @@ static inline vec2 by_itself(const struct frame *f, const struct half *r, const 
 	return c;
 }
 
-/* How an end of the sub-path moves, seen from the vertex next to it in direction w. */
+/* How an end of the sub-path moves, seen from the adjacent vertex in direction w. */
 static void end_tangents(const struct world *w, const struct path_vertex *v, vec3 direction, struct neighbour *n)
 {
 	struct frame f;

@@ -30,7 +30,7 @@ struct constraint {
 /* Constraints of the inner vertices c+1..b-1 of x, k[j] for vertex j. Needs edges c..b-1 joined and the inner modes. */
 void constraints_of(const struct world *w, const struct full_path_path *x, unsigned b, unsigned c,
 		    struct constraint *k);
-/* h alone. */
+/* Computes h only. */
 vec2 halfvec_of(const struct full_path_path *x, unsigned j);
 
 /*
@@ -42,7 +42,7 @@ vec2 halfvec_of(const struct full_path_path *x, unsigned j);
 enum constraint_end { CONSTRAINT_OK, CONSTRAINT_SINGULAR };
 
 struct constraint_factors {
-	mat2 inverse[FULL_PATH_MAX_VERTICES]; /* of L_j, by vertex */
+	mat2 inverse[FULL_PATH_MAX_VERTICES]; /* by vertex, of L_j */
 	double det[FULL_PATH_MAX_VERTICES];   /* of L_j */
 	/* banded factors, when pivoted: the layout is constraint_system.inc's */
 	double band[2 * FULL_PATH_MAX_VERTICES][10];
@@ -55,7 +55,7 @@ struct constraint_factors_single {
 	mat2_single inverse[FULL_PATH_MAX_VERTICES];
 	float det[FULL_PATH_MAX_VERTICES];
 	float band[2 * FULL_PATH_MAX_VERTICES][10];
-	struct constraint_single k[FULL_PATH_MAX_VERTICES]; /* what was factored */
+	struct constraint_single k[FULL_PATH_MAX_VERTICES]; /* vertices of the factored system */
 };
 
 struct constraint_system {
@@ -75,14 +75,14 @@ struct constraint_system {
 struct constraint_solver {
 	enum constraint_end (*factor)(const struct constraint *k, unsigned b, unsigned c,
 				      struct constraint_system *out);
-	/* The same but for the two logarithms, which only `factor` fills in. */
+	/* The same without the two logarithms, which only `factor` computes. */
 	enum constraint_end (*factor_to_solve)(const struct constraint *k, unsigned b, unsigned c,
 					       struct constraint_system *out);
-	/* dx for given dh, both by vertex index c+1..b-1. Finite or infinite, in float also where the solution is out
-	 * of reach. */
+	/* dx for given dh, both by vertex index c+1..b-1. Finite or infinite; in float also where the solution is
+	 * out of range. */
 	void (*solve)(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx);
-	/* Ray differentials (sec. 3.1): D_j = d x_{b-1} / d h_j, for j = c+1..b-1. CONSTRAINT_SINGULAR: not to be had.
-	 */
+	/* Ray differentials (sec. 3.1): D_j = d x_{b-1} / d h_j, for j = c+1..b-1. CONSTRAINT_SINGULAR: not
+	 * available. */
 	enum constraint_end (*differentials)(const struct constraint *k, unsigned b, unsigned c, mat2 *d);
 };
 extern const struct constraint_solver constraint_double, constraint_single;

@@ -5,9 +5,9 @@
 
 /* Standard deviation on the film, of its smaller side. */
 #define FILM_STEP 0.02
-/* Least sigma over the limit: a pixel that sees less than this of a lobe leaves no room for a walk in double. */
+/* Minimum of sigma over the limit: a pixel that sees less than this of a lobe leaves no room for a walk in double. */
 #define SIGMA_LEAST 1e-6
-/* Cosines and determinants below this are none: what is divided by them would overflow. */
+/* Smaller cosines and determinants count as zero: dividing by them would overflow. */
 #define RATIO_LEAST 0x1p-500
 
 double halfvec_film_step(const struct camera *camera)
@@ -26,7 +26,7 @@ static double bsdf_limit(const struct path_context *c, const struct path_vertex 
 	return c->w->accuracy.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
 }
 
-/* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric
+/* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale per pixel, meet the plane of the geometric
  * normal. */
 static bool pixel_footprint(const struct camera *camera, const struct full_path_path *x, mat2 *j)
 {
@@ -45,7 +45,7 @@ static bool pixel_footprint(const struct camera *camera, const struct full_path_
 	return true;
 }
 
-/* d^-1 j, both brought to entries of at most 1 first. */
+/* d^-1 j, with both scaled to entries of at most 1 first. */
 static bool solve(mat2 d, mat2 j, mat2 *e)
 {
 	double size_d = mat2_largest(d), size_j = mat2_largest(j);
@@ -75,7 +75,7 @@ struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit)
 	if (!isfinite(size) || !(size > 0) || !isfinite(size * scale))
 		return s;
 	e = (mat2){e.xx / size, e.xy / size, e.yx / size, e.yy / size};
-	/* e e^T = U diag(s^2) U^T; the smaller one from the determinant, which keeps its digits. */
+	/* e e^T = U diag(s^2) U^T; the smaller one from the determinant, which keeps its precision. */
 	double s00 = e.xx * e.xx + e.xy * e.xy, s11 = e.yx * e.yx + e.yy * e.yy, s01 = e.xx * e.yx + e.xy * e.yy;
 	double difference = s00 - s11, root = sqrt(difference * difference + 4 * s01 * s01);
 	double larger = sqrt(0.5 * (s00 + s11 + root)), smaller = fabs(mat2_det(e)) / larger;

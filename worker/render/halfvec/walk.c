@@ -20,8 +20,7 @@ struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 				    k->reverse_tolerance,    constraint_solver_of(k)};
 }
 
-/* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo.
- */
+/* The state of a walk. Predictions start from the kept state only, so a rejected trial leaves nothing to undo. */
 struct walk {
 	struct path_context *c;
 	struct full_path_path *y; /* the trial */
@@ -30,9 +29,9 @@ struct walk {
 	const struct constraint_solver *solver;
 	double scale;
 	struct walk_scratch *s;
-	uint64_t above;			   /* by vertex: where light leaves on the side of the geometric normal */
-	uint64_t seen;			   /* by edge: a ray of this trial has met the next vertex along it */
-	vec3 move[FULL_PATH_MAX_VERTICES]; /* a full step of Newton from the kept state */
+	uint64_t above;			   /* by vertex: light leaves on the side of the geometric normal */
+	uint64_t seen;			   /* by edge: a ray of this trial has hit the next vertex along it */
+	vec3 move[FULL_PATH_MAX_VERTICES]; /* a full Newton step from the kept state */
 };
 
 static uint64_t bit(unsigned i)
@@ -74,7 +73,7 @@ static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 	return WALK_OK;
 }
 
-/* Vertex j of the trial: along the ray from the one before it towards the prediction. */
+/* Vertex j of the trial: along the ray from the previous one towards the prediction. */
 static enum walk_end put_back(struct walk *m, unsigned j, double step)
 {
 	const struct path_vertex *from = &m->y->v[j + 1], *kept = &m->s->kept[j];
@@ -110,8 +109,8 @@ static enum walk_end trial(struct walk *m, double step)
 	}
 }
 
-/* How far the half vectors s->k[].h are from the targets, a measure for step control alone. within: all as near as
- * asked. */
+/* The distance of the half vectors s->k[].h from the targets, used for step control only. within: all are within
+ * tolerance. */
 static double residuals(struct walk *m, bool *within)
 {
 	double error = 0;
@@ -187,8 +186,8 @@ static void refresh(struct walk *m, unsigned stale)
 		constrain(m, m->end + 2, m->end);
 }
 
-/* Of the trial: half vectors alone are cheap, derivatives only pay where the walk goes on or the caller asks for them.
- */
+/* Evaluates the trial: half vectors alone are cheap, derivatives are only computed if the walk continues or the
+ * caller needs them. */
 static double evaluate_trial(struct walk *m, bool *within)
 {
 	for (unsigned j = m->end + 1; j < m->b; j++)
@@ -196,7 +195,7 @@ static double evaluate_trial(struct walk *m, bool *within)
 	return residuals(m, within);
 }
 
-/* Until the residuals are as small as asked, or a reason why they cannot be. */
+/* Iterates until the residuals are small enough, or returns the reason for failing. */
 static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, unsigned stale, bool back)
 {
 	struct walk_scratch *s = m->s;

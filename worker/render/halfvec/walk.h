@@ -1,42 +1,43 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The predictor-corrector walk (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3 and 6; Jakob 2013): moves the inner
- * vertices of a sub-path between two fixed ends until their half vectors are the ones asked for.
+ * vertices of a sub-path between two fixed ends until their half vectors have given values.
  *
- * A step of Newton moves every vertex in its tangent plane; from the camera's end each is put back onto the surface
- * along the ray from the one before it: on the primitive where it was when it is still met, else by casting a ray. Only
- * the path that the walk ends with must be visible: its edges are asked at the end, unless the caller knows (a walk
- * back to a path that exists). One thread; nothing allocates.
+ * A Newton step moves every vertex in its tangent plane. Starting at the camera's end, each is put back onto the
+ * surface along the ray from the previous one: on its old primitive if that is still hit, otherwise by casting a ray.
+ * Only the final path must be visible: its edges are tested at the end, unless the caller knows that they are (a
+ * reverse walk to an existing path). One thread; nothing allocates.
  */
 #ifndef WORKER_RENDER_HALFVEC_WALK_H
 #define WORKER_RENDER_HALFVEC_WALK_H
 
 #include "worker/render/halfvec/constraint.h"
 
-/* Why a walk failed: the reason for which its last trial was refused. */
+/* Why a walk failed: the reason for which its last trial was rejected. */
 enum walk_end {
 	WALK_OK,
-	WALK_MISSED,	 /* a ray met nothing */
+	WALK_MISSED,	 /* a ray hit nothing */
 	WALK_BLOCKED,	 /* another material, or an edge is occluded */
 	WALK_MODE,	 /* a vertex would scatter in another mode, or the normals disagree about a side */
-	WALK_SINGULAR,	 /* of the matrix; or two vertices coincide */
+	WALK_SINGULAR,	 /* the matrix is singular, or two vertices coincide */
 	WALK_DIVERGED,	 /* the residuals grew, however short the step */
-	WALK_ITERATIONS, /* ran out of them, although the residuals still shrank */
+	WALK_ITERATIONS, /* too many iterations, although the residuals still shrank */
 };
 
 struct walk_limits {
 	unsigned iterations;
 	double least_step; /* of a Newton step */
-	double scale;	   /* of all tolerances: 1, 0.5 to show that they change no image */
-	double tolerance; /* of a vertex at the end of a walk: how near its target the half vector comes, of the smaller
-			     of lobe and step */
-	double back; /* how near to where the walk began the way back ends, of the largest step that a vertex made */
+	double scale;	   /* of all tolerances: 1, or 0.5 to show that they do not change the image */
+	double tolerance;  /* of a vertex at the end of a walk: distance of the half vector from its target, relative to
+			      the smaller of lobe and step */
+	double back; /* how near to its start the reverse walk must end, relative to the largest step that a vertex made
+		      */
 	const struct constraint_solver *solver;
 };
 struct walk_limits walk_limits_of(const struct accuracy_settings *k);
 
 struct walk_target {
-	vec2 h;		  /* of the vertex where the walk ends, in its frame; (0,0) where specular */
+	vec2 h;		  /* of the vertex at the end of the walk, in its frame; (0,0) if specular */
 	double tolerance; /* of |h - target| */
 };
 
@@ -46,20 +47,20 @@ struct walk_scratch {
 	struct constraint_system system;
 	vec2 residual[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
 	struct path_vertex kept[FULL_PATH_MAX_VERTICES];
-	unsigned iterations; /* out: of the last walk */
+	unsigned iterations; /* output: of the last walk */
 };
 
 /* y: vertices b and c stay; b-1..c+1 are where the walk starts, and on WALK_OK where it ended, with edges c..b-1
- * joined. Wavelengths (indices of refraction) are y's. On WALK_OK s->k holds the constraints there, but for a walk
- * back. visible: a walk back, do not ask for occlusion, the caller knows. On failure y's vertices c+1..b-1 are not to
- * be read. What y knew of f there is forgotten. A walk back tells for certain whether it finds the path again when its
- * tolerances are tighter than those of the way there (scale 0.1: 0.2 iterations more, no rays). */
+ * joined. Wavelengths (indices of refraction) are y's. On WALK_OK s->k has the constraints there, except after a
+ * reverse walk. visible: a reverse walk, whose edges the caller knows to be unoccluded. On failure y's vertices
+ * c+1..b-1 are undefined. Cached values of f there are dropped. A reverse walk decides reliably whether it finds the
+ * path again if its tolerances are tighter than those of the forward walk (scale 0.1: 0.2 more iterations, no rays). */
 enum walk_end halfvec_walk(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   struct walk_scratch *s);
 
-/* What no longer holds of s->k and s->system, which are of the path where the walk starts: nothing; the constraint next
- * to an end that has moved since, and the system; all. */
+/* What is stale of s->k and s->system, which belong to the path where the walk starts: nothing; the constraint next
+ * to an end that has moved since, and the system; everything. */
 enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
 enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
 				const struct walk_target *target, bool visible, const struct walk_limits *limits,

@@ -12,12 +12,13 @@ enum { CIE_FIRST_NM = 360, CIE_LAST_NM = 830, CIE_COUNT = CIE_LAST_NM - CIE_FIRS
 extern const double cie_observer[CIE_COUNT][3];
 extern const double cie_d65[CIE_COUNT];
 
-/* The 1 nm from CIE_FIRST_NM + i on: what share of all wavelengths is drawn below it, and in it (so per nm, too). */
+/* For the nanometre from CIE_FIRST_NM + i on: the share of all wavelengths drawn below it, and in it (which is also
+ * the density per nm). */
 struct wavelength_cell {
 	double below, share;
 };
 extern const struct wavelength_cell wavelength_cells[CIE_COUNT - 1];
-/* The cell in which the share k / WAVELENGTH_GUIDE lies. */
+/* The cell that contains the share k / WAVELENGTH_GUIDE. */
 enum { WAVELENGTH_GUIDE = 512 };
 extern const unsigned short wavelength_guide[WAVELENGTH_GUIDE];
 

@@ -27,8 +27,8 @@ static inline struct frame frame_around(vec3 n)
 	return (struct frame){{1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};
 }
 
-/* The shading frame of hslt constraints: s is du made orthogonal to n (falls back where du is parallel to n, and where
- * its square has no digits: within 1e-150 of a sphere's pole). */
+/* The shading frame of constraints: s is du made orthogonal to n (with a fallback where du is parallel to n, or its
+ * square underflows: within 1e-150 of a sphere's pole). */
 static inline struct frame frame_along(vec3 n, vec3 du)
 {
 	vec3 s = vec3_madd(du, -vec3_dot(n, du), n);

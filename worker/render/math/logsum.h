@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Sums of numbers that are given by their logarithms. */
+/* Sums of numbers given by their logarithms. */
 #ifndef WORKER_RENDER_MATH_LOGSUM_H
 #define WORKER_RENDER_MATH_LOGSUM_H
 
 #include <math.h>
 
-/* log of the sum of exp(v[i]); -INFINITY for none or only zeros. */
+/* log of the sum of exp(v[i]); -INFINITY if there are none, or only zeros. */
 static inline double log_sum_exp(const double *v, unsigned n)
 {
 	double most = -INFINITY, sum = 0;

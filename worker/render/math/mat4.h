@@ -12,7 +12,7 @@ typedef struct {
 } mat4;
 
 mat4 mat4_identity(void);
-mat4 mat4_mul(mat4 a, mat4 b);		 /* first b, then a */
+mat4 mat4_mul(mat4 a, mat4 b);		 /* b is applied first */
 bool mat4_invert(mat4 a, mat4 *inverse); /* false when singular or not finite */
 mat4 mat4_translate(vec3 t);
 mat4 mat4_scale(vec3 s);

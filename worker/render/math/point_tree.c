@@ -3,7 +3,7 @@
 
 typedef struct point_tree_node node;
 
-/* The axis changes from level to level; the middle of a range is the node that parts it. */
+/* The axis changes from level to level; the middle of a range is the node that divides it. */
 static double along(vec3 p, unsigned axis)
 {
 	return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
@@ -16,7 +16,8 @@ static void exchange(node *a, node *b)
 	*b = t;
 }
 
-/* nodes[middle] as if all were sorted, none before it above, none behind it below (Hoare 1961, Algorithm 65). */
+/* Makes nodes[middle] what it would be if all were sorted, with none before it above and none after it below (Hoare
+ * 1961, Algorithm 65). */
 static void part(node *nodes, size_t count, size_t middle, unsigned axis)
 {
 	size_t low = 0, high = count - 1;

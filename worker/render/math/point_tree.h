@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points in space, and which of them lie within a distance (Bentley 1975, k-d trees). The order in which they are found
- * depends on the points alone, so that sums over them have the same bits on every machine.
+ * Points in space, and which of them are within a distance (Bentley 1975, k-d trees). The order in which they are found
+ * depends on the points only, so that sums over them have the same bits on every machine.
  */
 #ifndef WORKER_RENDER_MATH_POINT_TREE_H
 #define WORKER_RENDER_MATH_POINT_TREE_H
@@ -19,9 +19,9 @@ struct point_tree {
 	size_t count;
 };
 
-/* Orders nodes[0..count), whose memory stays the caller's; at most 2^32 of them, finite. */
+/* Reorders nodes[0..count), whose memory remains the caller's; at most 2^32 of them, finite. */
 void point_tree_build(struct point_tree *t);
-/* Calls found for each node at most `radius` from `at`. */
+/* Calls found for each node at most `radius` away from `at`. */
 void point_tree_within(const struct point_tree *t, vec3 at, double radius, void (*found)(void *user, uint32_t id),
 		       void *user);
 

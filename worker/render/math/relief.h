@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a bump map or a normal map says of a surface at (u,v): made by a material, applied by
- * worker/render/geom/relief.h. Immutable; any thread; allocates nothing.
+ * The value of a bump map or a normal map at (u,v): made by a material, applied by worker/render/geom/relief.h.
+ * Immutable; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_MATH_RELIEF_H
 #define WORKER_RENDER_MATH_RELIEF_H
@@ -24,7 +24,7 @@ struct relief {
 	enum relief_kind kind;
 	void (*at)(const void *data, double u, double v, struct relief_value *out);
 	const void *data;
-	bool handed; /* of RELIEF_NORMAL: y runs against dp/dv, not along n x dp/du, where the two differ */
+	bool handed; /* for RELIEF_NORMAL: y runs against dp/dv, not along n x dp/du, where the two differ */
 };
 
 #endif

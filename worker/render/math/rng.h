@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Counter-based random numbers: (seed, stream, index, step, dimension) -> value, by Threefry-4x64-20 (Salmon et al.
- * 2011, through Random123). One stream constant a use, so that no two uses share numbers. Values are multiples of
- * 2^-53 in [0,1). Any thread; no state.
+ * 2011, through Random123). Each use has a stream constant of its own, so no two uses share numbers. Values are
+ * multiples of 2^-53 in [0,1). Any thread; no state.
  */
 #ifndef WORKER_RENDER_MATH_RNG_H
 #define WORKER_RENDER_MATH_RNG_H
 
 #include <stdint.h>
 
-/* Numbers are never used again for something else, or jobs that go on would not: add new ones at the end. */
+/* Numbers are never reused for something else, because jobs that continue depend on them: add new ones at the end. */
 enum rng_stream {
 	RNG_PATH = 1,
 	RNG_BDPT = 2,
@@ -26,7 +26,7 @@ enum rng_stream {
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */
 void rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
-/* The 256 random bits that they are made of. */
+/* The 256 random bits that these are made from. */
 void rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
 
 #endif

@@ -9,7 +9,7 @@ static int cell_of(double nm)
 	return cell < 0 ? 0 : cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
 }
 
-/* The wavelength below which the share u of all lies. */
+/* The wavelength below which the share u of all wavelengths lies. */
 static double wavelength_at(double u)
 {
 	int part = (int)(u * WAVELENGTH_GUIDE); /* u may be 1 by rounding */
@@ -40,7 +40,7 @@ struct wavelengths wavelengths_sample_few(double u, unsigned count)
 	return w;
 }
 
-/* Lane i's part of the three integrals where it carries 1. */
+/* Lane i's contribution to the three integrals for a value of 1. */
 static void lane_weights(const struct wavelengths *w, int i, double xyz[3])
 {
 	int cell = cell_of(w->nm[i]);

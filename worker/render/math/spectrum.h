@@ -28,9 +28,9 @@ typedef struct {
 
 struct wavelengths {
 	double nm[SPECTRUM_LANES];
-	bool grey;    /* the scene carries no colour: nm is not to be read */
-	double u;     /* what nm was made of; 0 where grey */
-	unsigned few; /* 0: all differ; 1 or 2: nm repeats after so many, for the same mean from fewer wavelengths */
+	bool grey;    /* the scene has no colour: nm is undefined */
+	double u;     /* the number that nm was made from; 0 if grey */
+	unsigned few; /* 0: all differ; 1 or 2: nm repeats after this many, for the same mean from fewer wavelengths */
 };
 
 /* See EFFECT_IS_ON in worker/render/world/world.h. */
@@ -82,7 +82,7 @@ static inline double spectrum_max(spectrum a)
 	return m;
 }
 
-/* Divided before they are added, so that lanes near the largest double have a mean. */
+/* Divided before they are added, so that the mean of lanes near the largest double is finite. */
 static inline double spectrum_mean(spectrum a)
 {
 	double m = 0;
@@ -91,7 +91,7 @@ static inline double spectrum_mean(spectrum a)
 	return m;
 }
 
-static inline bool spectrum_is_valid(spectrum a) /* finite and nowhere negative */
+static inline bool spectrum_is_valid(spectrum a) /* finite and non-negative */
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		if (!(a.v[i] >= 0) || !isfinite(a.v[i]))
@@ -101,12 +101,12 @@ static inline bool spectrum_is_valid(spectrum a) /* finite and nowhere negative 
 
 /* Of one lane's wavelength, per nm; positive from WAVELENGTH_MIN to WAVELENGTH_MAX. */
 double wavelength_pdf(double nm);
-/* u in [0,1) -> the four wavelengths of the head comment. */
+/* u in [0,1) -> the four wavelengths described above. */
 struct wavelengths wavelengths_sample(double u);
-/* Of 1, 2 or 4 wavelengths, evenly rotated in the cumulative distribution. */
+/* 1, 2 or 4 wavelengths, evenly rotated in the cumulative distribution. */
 struct wavelengths wavelengths_sample_few(double u, unsigned count);
 
-/* The first `lanes` again and again. */
+/* Repeats the first `lanes`. */
 static inline spectrum spectrum_repeat(spectrum s, int lanes)
 {
 	for (int i = lanes; i < SPECTRUM_LANES; i++)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The (u, v) of a sphere: longitude around the axes' n from s, and the angle from n, each over its range. */
+/* The (u, v) of a sphere: longitude from s around the axes' n, and the angle from n, each divided by its range. */
 #ifndef WORKER_RENDER_MATH_SPHERE_H
 #define WORKER_RENDER_MATH_SPHERE_H
 

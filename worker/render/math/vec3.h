@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Three doubles by copy: points, directions, normals. World lengths are those of the rescaled scene. */
+/* Three doubles, passed by value: points, directions, normals. World lengths are those of the rescaled scene. */
 #ifndef WORKER_RENDER_MATH_VEC3_H
 #define WORKER_RENDER_MATH_VEC3_H
 

@@ -20,17 +20,17 @@
 
 #include <string.h>
 
-/* At the end of a walk, of a half vector that is to be 0. */
+/* Tolerance at the end of a walk for a half vector whose target is 0. */
 #define SPECULAR_TOLERANCE 1e-9
-/* The way back aims that much closer than the way there: at the same tolerance 2 to 11 % of the returns fail by it
- * alone. */
+/* The reverse walk has a tighter tolerance by this factor: with the same one, 2 to 11 % of the reverse walks fail
+ * only because of it. */
 #define BACK_SCALE 0.1
-/* Positions are rounded in that many parts of the edges they hang on. */
+/* Positions are rounded to this fraction of the adjacent edges. */
 #define ROUNDING 0x1p-40
 /* Steps of x_0, in the numbers that make it. */
 #define EMITTER_STEP 0.1
-/* By how much the number that makes the wavelengths moves at most where something disperses (sec. 6: 50 nm of 470);
- * else all are as good. */
+/* Largest change of the number that determines the wavelengths in dispersive scenes (sec. 6: 50 nm of 470);
+ * otherwise all are equally good. */
 #define WAVELENGTH_STEP (50.0 / 470)
 
 bool breakup_allows(const struct full_path_path *x, unsigned b, unsigned c)
@@ -41,7 +41,7 @@ bool breakup_allows(const struct full_path_path *x, unsigned b, unsigned c)
 	return b == 0 || (c < b && !(c > 0 && x->v[c].delta));
 }
 
-/* A symmetric step, mirrored at the ends of the range. */
+/* A symmetric step, reflected at the ends of the range. */
 static double move_wavelength(const struct path_context *c, double u, double r)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion))
@@ -51,7 +51,7 @@ static double move_wavelength(const struct path_context *c, double u, double r)
 	return v < 1 ? v : u;
 }
 
-/* Some vertex that stays where it is would have to move for another wavelength. */
+/* Whether a vertex that stays would have to move for another wavelength. */
 static bool holds_wavelength(const struct path_context *c, const struct full_path_path *x, unsigned b, unsigned c_end)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
@@ -111,7 +111,7 @@ static double tolerance_of(const struct mutation_ctx *m, const struct path_verte
 	return m->limits.tolerance * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
 }
 
-/* Steps of the half vectors, and what they aim at. */
+/* Steps of the half vectors, and their targets. */
 static void aim(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x)
 {
 	struct mutation_scratch *s = &m->scratch;
@@ -142,7 +142,7 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 	}
 }
 
-/* What of the constraints of one path does not hold when the walk to the other starts from it. */
+/* What is stale of one path's constraints when the walk to the other starts from it. */
 static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
 			 const struct full_path_path *y)
 {
@@ -153,7 +153,8 @@ static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how
 	return (b_moved ? WALK_STALE_B : 0) | (c_moved ? WALK_STALE_C : 0);
 }
 
-/* The walk from y leads back to x: else the proposal has no way back, and detailed balance wants it refused. */
+/* The walk from y must lead back to x: otherwise the proposal cannot be reversed, and detailed balance requires
+ * rejecting it. */
 static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
 		       const struct full_path_path *y)
 {

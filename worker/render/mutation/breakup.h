@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The breakup of a path (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4 and 5), in the paper's indices: x_k .. x_b is
- * traced from the camera by perturbed half vectors (multi chain perturbation), x_b .. x_c moves by half vectors between
- * its two ends (predictor-corrector walk), x_c .. x_0 stays. b = k: nothing is traced; b = 0: all is; c = b - 1: x_b is
- * joined to x_c. Strategies differ in which b and c they allow and in what else moves.
+ * traced from the camera by perturbed half vectors (multi-chain perturbation), x_b .. x_c moves by half vectors between
+ * its two ends (predictor-corrector walk), x_c .. x_0 stays. b = k: nothing is traced; b = 0: everything is; c = b - 1:
+ * x_b is joined to x_c. Strategies differ in the b and c that they allow and in what else moves.
  */
 #ifndef WORKER_RENDER_MUTATION_BREAKUP_H
 #define WORKER_RENDER_MUTATION_BREAKUP_H
@@ -12,13 +12,13 @@
 #include "worker/render/mutation/mutation.h"
 
 struct breakup {
-	unsigned b, c;	   /* c is not read when b = 0; b = c = k: nothing moves */
+	unsigned b, c;	   /* c is ignored if b = 0; b = c = k: nothing moves */
 	double log_choice; /* log P(b) P(c) given x */
-	bool halfvecs;	   /* the half vectors between x_b and x_c take steps; else they stay while the ends move */
-	bool wavelength, aperture, emitter; /* move too, where the scene and the path have them */
+	bool halfvecs; /* the half vectors between x_b and x_c take steps; otherwise they stay while the ends move */
+	bool wavelength, aperture, emitter; /* these move, too, if the scene and the path have them */
 };
 
-/* See mutation.h. On success all but move->log_density[Y_TO_X]'s share of the choice of b and c is filled in. */
+/* See mutation.h. On success everything is set but the share of move->log_density[Y_TO_X] for the choice of b and c. */
 enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
 				      struct full_path_path *y, struct move *move);
 double breakup_log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,

@@ -14,7 +14,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 static double useful(const struct render_summary *scene)
 {
 	(void)scene;
-	return 0; /* the breakup does this where it pays */
+	return 0; /* the breakup does this where it helps */
 }
 
 const struct mutation_ops mutation_halfvec = {

@@ -9,8 +9,8 @@ static double roughness(const struct path_vertex *v)
 	return v->delta ? 0 : fmin(v->bsdf->alpha_mean, 1);
 }
 
-/* P(b = i) ~ a_i, 0.1 for both ends. Where all inner vertices are specular, or there is only the emitter beside x_k,
- * half vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
+/* P(b = i) ~ a_i, 0.1 for both ends. If all inner vertices are specular, or x_k has only the emitter beside it, half
+ * vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
 static void weigh_b(const struct path_context *c, const struct full_path_path *x, double *weight)
 {
 	unsigned k = x->edges;
@@ -23,10 +23,10 @@ static void weigh_b(const struct path_context *c, const struct full_path_path *x
 	weight[k] = any ? END_WEIGHT : 0;
 }
 
-/* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2; a of the emitter is 1, the scene's diameter stands for infinity. */
+/* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2; a of the emitter is 1, the scene's diameter is used for infinity. */
 static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
 {
-	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity on a
+	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity for a
 	 * pinhole. */
 	bool moves = b < x->edges;
 	for (unsigned i = b; i-- > 0;) {

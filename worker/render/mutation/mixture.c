@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Added to a list that names no independent proposals, without which chains never change the length of their paths. */
+/* Added to a list without independent proposals, without which chains never change the length of their paths. */
 #define INDEPENDENT_SHARE 0.05
 
 /* "b3c1", "b3" or "c1". */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which strategies a chain uses, and how often: "independent=0.1,hslt=0.9", as a plan has it. Forced choices for tests:
+ * Which strategies a chain uses, and how often: "independent=0.1,hslt=0.9", as in a plan. Forced choices for tests:
  * "hslt@b3c1". Pure.
  */
 #ifndef WORKER_RENDER_MUTATION_MIXTURE_H
@@ -15,19 +15,19 @@ struct mixture_entry {
 };
 
 struct mixture {
-	unsigned count, independent; /* which entry makes independent proposals */
+	unsigned count, independent; /* index of the entry that makes independent proposals */
 	double total;
 	struct mixture_entry entry[BATCH_STRATEGIES];
 };
 
-/* Independent proposals are added where the list names none. -EINVAL with a sentence: no such strategy, a weight that
- * is not above 0, too many. */
+/* Adds independent proposals if the list has none. -EINVAL with a sentence: an unknown strategy, a weight that is
+ * not above 0, too many entries. */
 int mixture_parse(const char *text, struct mixture *out, struct error *e);
-/* As text; parsed and printed again it stays the same. */
+/* As text; parsing and printing it again does not change it. */
 void mixture_print(const struct mixture *m, char text[PLAN_MUTATIONS_MAX]);
-/* What is useful in this scene. */
+/* The default for this scene. */
 void mixture_default(const struct render_summary *scene, struct mixture *out);
-/* The entry that u in [0,1) chooses. */
+/* The entry that u in [0,1) selects. */
 unsigned mixture_choose(const struct mixture *m, double u);
 
 #endif

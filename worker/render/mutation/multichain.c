@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The whole path is traced anew by perturbed half vectors (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4). */
+/* The whole path is traced by perturbed half vectors (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4). */
 #include "worker/render/mutation/strategy.h"
 
 static const struct strategy strategy = {&heuristic_roughness, 0, 0, .wavelength = true, .aperture = true};
@@ -13,7 +13,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 static double useful(const struct render_summary *scene)
 {
 	(void)scene;
-	return 0; /* the breakup does this where it pays */
+	return 0; /* the breakup does this where it helps */
 }
 
 const struct mutation_ops mutation_multichain = {

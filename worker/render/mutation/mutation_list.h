@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line a strategy: MUTATION(name) stands for `const struct mutation_ops mutation_<name>`. */
+/* One line per strategy: MUTATION(name) stands for `const struct mutation_ops mutation_<name>`. */
 MUTATION(bidirectional)
 MUTATION(independent)
 MUTATION(hslt)

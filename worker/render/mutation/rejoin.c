@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The path is traced from the camera to x_b by slightly perturbed half vectors and joined to x_{b-1}; where that is x_0
- * it moves on its emitter, too. No walk, no derivative: where all lobes are wide, b is uniform over the inner vertices,
- * and an emitter that can be hit is also found by tracing (b = 0).
+ * The path is traced from the camera to x_b by slightly perturbed half vectors and joined to x_{b-1}; if that is x_0,
+ * it moves on its emitter, too. There is no walk and no derivative: suitable where all lobes are wide. b is uniform
+ * over the inner vertices, and an emitter that can be hit is also found by tracing (b = 0).
  */
 #include "worker/render/mutation/strategy.h"
 #include "worker/render/world/effects_text.h"
 
-/* Nothing but tracing, of one for each vertex that can be joined. */
+/* Probability of tracing only, relative to that of one vertex that can be joined. */
 #define TRACE_WEIGHT 0.1
 
 static void weigh_b(const struct path_context *c, const struct full_path_path *x, double *weight)
@@ -38,8 +38,8 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 
 static double useful(const struct render_summary *scene)
 {
-	/* cornell-box: relMSE x time 30 % below hslt's. Beside hslt a fifth of it: error at equal time 27 % lower in
-	 * veach-door, 5 % and 4 % in displaced and demo, as good in water. */
+	/* cornell-box: relMSE x time 30 % below hslt's. Beside hslt, a fifth of it: error at equal time 27 % lower
+	 * in veach-door, 5 % and 4 % in displaced and demo, equal in water. */
 	return render_effect_on(scene, "half-vectors") ? 0.2 : 0.8;
 }
 

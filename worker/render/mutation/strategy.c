@@ -11,7 +11,7 @@ static unsigned fixed_b(int b, unsigned k)
 	return b == STRATEGY_CAMERA ? k : (unsigned)b;
 }
 
-/* Which b: weights of the heuristic, without what the strategy cannot use. */
+/* Probabilities of b: weights of the heuristic, without what the strategy cannot use. */
 static void weigh_b(const struct strategy *s, const struct choice *forced, const struct mutation_ctx *m,
 		    const struct full_path_path *x, double *weight)
 {
@@ -21,7 +21,7 @@ static void weigh_b(const struct strategy *s, const struct choice *forced, const
 			weight[i] = 0;
 }
 
-/* log P(b) P(c | b) of x by the heuristic; what is forced has probability 1. -INFINITY: never chosen. */
+/* log P(b) P(c | b) of x by the heuristic; forced choices have probability 1. -INFINITY: never chosen. */
 static double log_choice(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
 			 const struct full_path_path *x, unsigned b, unsigned c)
 {

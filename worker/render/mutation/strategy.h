@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Strategies that are breakups: which b and c they allow, and what moves. */
+/* Strategies that are breakups: the b and c that they allow, and what moves. */
 #ifndef WORKER_RENDER_MUTATION_STRATEGY_H
 #define WORKER_RENDER_MUTATION_STRATEGY_H
 
@@ -13,7 +13,7 @@ struct strategy {
 	bool halfvecs, wavelength, aperture, emitter; /* see struct breakup */
 };
 
-/* A breakup by this strategy; what `how` forces goes first. */
+/* A breakup by this strategy; `how` takes precedence. */
 enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m,
 				       const struct mutation_setting *how, struct full_path_path *x,
 				       struct full_path_path *y, struct move *move);

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/mutation/trace.h"
 
-/* Half vectors take steps of so many lobe widths. */
+/* Half vectors take steps of this many lobe widths. */
 #define HALFVEC_STEP 0.01
 /* Steps of x_k, in the numbers that make it. */
 #define APERTURE_STEP 0.1
-/* The line between the two vertices must show that much of itself in both tangent planes to turn frames by. */
+/* Minimum sine of the angle between the line and both normals, to be able to align frames by it. */
 #define LEAST_PROJECTION 1e-3
 
 bool trace_move_aperture(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y)
@@ -32,8 +32,8 @@ static bool move_film(struct mutation_ctx *m, const struct full_path_path *x, st
 	return film_window_holds(&m->path->window, y->film);
 }
 
-/* Rotation that takes half vectors of x_j's frame into y_j's, by the line between the two as both frames see it (sec.
- * 4). It is its own way back: from y to x both angles gain pi. */
+/* The rotation that maps half vectors from x_j's frame into y_j's, by the line between the two as seen in both
+ * frames (sec. 4). It is its own inverse: from y to x both angles gain pi. */
 static void turn(const struct path_vertex *from, const struct path_vertex *to, vec2 *h)
 {
 	vec3 d = vec3_sub(to->x.p, from->x.p);
@@ -45,7 +45,7 @@ static void turn(const struct path_vertex *from, const struct path_vertex *to, v
 	*h = (vec2){c * h->x - s * h->y, s * h->x + c * h->y};
 }
 
-/* Where light from o goes by the half vector h; eta = n_o / n_i. false: total reflection. */
+/* The direction to the light for light leaving along o with half vector h; eta = n_o / n_i. false: total reflection. */
 static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 {
 	if (transmit && eta == 1) { /* matched: h is (i + o)_xy */
@@ -70,7 +70,7 @@ static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 	return o.z * i->z < 0;
 }
 
-/* The direction in which the path goes on from y_j. */
+/* The direction in which the path continues from y_j. */
 static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path_path *x, struct full_path_path *y,
 		       struct move *move, vec3 *d)
 {
@@ -100,7 +100,7 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_pat
 	return true;
 }
 
-/* y_b as the end of what is traced. */
+/* y_b as the end of the traced part. */
 static enum strategy_counter arrive(struct path_context *c, unsigned b, struct path_vertex *v)
 {
 	v->delta = false;
