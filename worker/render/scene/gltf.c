@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The container (GLB header and chunks, or plain JSON), and the scene's nodes: each mesh of a node becomes shapes under
- * the product of the matrices above it, each light an emitter, each camera a sensor. JSON is read by jansson; where
- * entries begin is looked for once more, so that messages have lines.
+ * the product of the matrices above it, each light an emitter, each camera a sensor. JSON is parsed by jansson; the
+ * starts of entries are searched for separately, so that messages have line numbers.
  *
- * What a file cannot say in glTF stays a default: the film's size follows the first camera's aspect, a file without
- * cameras gets one that sees all of it, one without lights a constant environment; both are said.
+ * What glTF cannot express keeps its default: the film's size follows the first camera's aspect, a file without cameras
+ * gets one that sees everything, one without lights a constant environment, both with a note.
  *
- * Failures: a container that contradicts itself, JSON that is none, indices of entries that are not there, nodes that
- * are their own ancestors, extensions that a file requires and that are not known. What is known but not supported
- * becomes a property that the tables of parameters do not have: refused, or left out, there.
+ * Failures: a container that contradicts itself, invalid JSON, indices of missing entries, nodes that are their own
+ * ancestors, unknown required extensions. What is known but not supported becomes a property that no table of
+ * parameters has: there it is refused, or left out.
  */
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/gltf_light.h"
@@ -34,7 +34,7 @@ bool gltf_is(const char *name)
 
 /* ---- lines */
 
-/* The array of that name, with room for the lines of its entries; GLTF_ARRAYS: none. */
+/* The array with that name, and room for the lines of its entries; GLTF_ARRAYS: none. */
 static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
 {
 	for (int i = 0; i < GLTF_ARRAYS; i++) {
@@ -50,8 +50,8 @@ static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
 	return GLTF_ARRAYS;
 }
 
-/* Where the entries of the arrays at the top begin, in JSON that is known to be well formed and to have no key twice.
- */
+/* Finds where the entries of the top-level arrays begin, in JSON that is known to be well formed and to have no
+ * duplicate keys. */
 static void find_lines(struct gltf *g, const char *text, size_t size)
 {
 	int depth = 0, line = 1;
@@ -78,7 +78,7 @@ static void find_lines(struct gltf *g, const char *text, size_t size)
 
 /* ---- the container */
 
-/* The JSON and the binary chunk of a .glb; of a .gltf all is JSON. */
+/* The JSON and the binary chunk of a .glb; a .gltf is all JSON. */
 static int find_json(struct gltf *g, const char **text, size_t *size)
 {
 	const unsigned char *p = g->bytes;
@@ -110,7 +110,7 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
 }
 
-/* What the reader knows; what comes of it is another matter. */
+/* Extensions that are known, whatever becomes of them. */
 static bool is_known(const char *extension)
 {
 	static const char *const known[] = {"KHR_lights_punctual",	  "KHR_materials_clearcoat",
@@ -124,8 +124,7 @@ static bool is_known(const char *extension)
 	return false;
 }
 
-/* Those that the file says it uses and the reader does not know, in one note: what they would have changed is missing.
- */
+/* A note with the extensions that the file uses and the reader does not know: their effect is missing. */
 static void note_unknown(struct gltf *g)
 {
 	enum { ROOM = 512 };
@@ -177,7 +176,7 @@ static void check_file(struct gltf *g)
 
 struct walk {
 	struct gltf *g;
-	bool *above; /* by node: it is an ancestor of the one at hand */
+	bool *above; /* by node: it is an ancestor of the current one */
 	size_t nodes, visited;
 };
 
@@ -278,7 +277,7 @@ static void read_scene(struct gltf *g)
 	}
 }
 
-/* At most so many values: each begins, or comes after, one of these. */
+/* An upper bound of the number of values: each begins with, or comes after, one of these. */
 static bool is_moderate(const char *text, size_t size)
 {
 	size_t values = 0;

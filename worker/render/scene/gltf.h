@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * glTF 2.0 scenes (.gltf, .glb) as the tree of elements that an XML file of version 3 would be: all that follows
- * (tables of parameters, what is refused or left out, the list of files) is one for both. Geometry stays in its
- * buffers, which shapes of type "gltf" read. One thread; the tree lives in the arena given.
+ * glTF 2.0 scenes (.gltf, .glb) as the tree of elements of an equivalent XML file of version 3, so that everything
+ * after it (tables of parameters, refusals and replacements, the list of files) is shared. Geometry stays in its
+ * buffers, which shapes of type "gltf" read. One thread; the tree is allocated in the given arena.
  */
 #ifndef WORKER_RENDER_SCENE_GLTF_H
 #define WORKER_RENDER_SCENE_GLTF_H

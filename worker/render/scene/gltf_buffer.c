@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where bytes lie: files beside the scene, the binary chunk of a .glb, or base64 in the JSON itself, which is looked
- * for in the file so that shapes and pictures can be read from there. Failures: other schemes, views that lead out of
- * their buffer.
+ * Finds the bytes of buffers: files beside the scene, the binary chunk of a .glb, or base64 in the JSON, whose place in
+ * the file is searched for so that shapes and images can be read from there. Failures: other URI schemes, views that
+ * exceed their buffer.
  */
 #include "worker/render/scene/gltf_buffer.h"
 #include "worker/render/scene/asset_name.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Cameras, and lights of KHR_lights_punctual. Both look along -z with y up; here sensors and spots look along z, with x
- * to the left. Candela and lux are taken as they are for radiant intensity and irradiance. What the file lacks is
- * supplied: a camera that sees all of the scene, an environment of radiance 1; each with a note.
+ * Cameras, and lights of KHR_lights_punctual. Both look along -z with y up; sensors and spots of this scene language
+ * look along z, with x to the left. Candela and lux are used as radiant intensity and irradiance. What the file lacks
+ * is supplied with a note: a camera that sees the whole scene, an environment of radiance 1.
  */
 #include "worker/render/scene/gltf_light.h"
 #include "worker/render/scene/gltf_tree.h"
@@ -13,7 +13,7 @@
 enum { FILM_WIDTH = 768 };
 static const double degrees = 180 / M_PI;
 
-/* Turned round to look along z, without the lengths of its axes where these mean nothing. */
+/* Turned to look along z, without the lengths of its axes where these have no meaning. */
 static mat4 looking(const mat4 *to_world)
 {
 	mat4 m = *to_world;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A metallic-roughness material as a `principled` BSDF, in a `normalmap` and a `mask` where it has these, and an area
- * emitter where it shines. Transmission refracts, as the format's importers in modelling tools have it: thin walls are
- * not told apart from solids. The clear coat's strength is the format's, four times the parameter of `principled`,
- * which ends at a quarter of it.
+ * A metallic-roughness material as a `principled` BSDF, inside a `normalmap` and a `mask` if it has these, and an area
+ * emitter if it emits. Transmission refracts, as in importers of modelling tools: thin walls are not distinguished from
+ * solids. The clear coat's strength is four times the parameter of `principled`, which ends at a quarter of the
+ * format's.
  *
  * What `principled` does not have (sheen, iridescence, attenuation, two sets of texture coordinates, ...) becomes a
  * property that its table does not know: refused with its name, or left out with --lenient.
@@ -19,12 +19,12 @@
 
 enum { NEAREST = 9728, CLAMP = 33071, MIRROR = 33648, REPEAT = 10497 };
 
-/* How a picture is read: which numbers of a pixel, and whether they are colours. */
+/* How an image is read: which numbers of a pixel, and whether they are colours. */
 struct channel {
 	const char *name; /* "r", "g", "b", "a"; NULL: all three */
 	bool colour;
-	double factor[3]; /* of colours; else the first */
-	double cutoff;	  /* of alpha; negative: none */
+	double factor[3]; /* factor of colours; otherwise the first is used */
+	double cutoff;	  /* factor of alpha; negative: none */
 };
 
 static const char *wrap_name(uint64_t mode)
@@ -143,7 +143,7 @@ static void put_attribute(struct gltf *g, struct xml_element *el, const struct g
 	gltf_put_text(g, gltf_plugin(g, el, at, "texture", "mesh_attribute", name), at, "name", attribute);
 }
 
-/* What is put into this, without a name, is `name` of el times an attribute of the mesh. */
+/* An element whose unnamed child will be, as `name` of el, multiplied by an attribute of the mesh. */
 static struct xml_element *put_product(struct gltf *g, struct xml_element *el, const struct gltf_at *at,
 				       const char *name, const char *attribute)
 {
@@ -179,7 +179,7 @@ static void put_share(struct gltf *g, struct xml_element *el, const struct gltf_
 
 /* ---- extensions */
 
-/* Members of an extension that have no counterpart, as properties that no table knows. */
+/* Members of an extension without counterpart, as properties that no table has. */
 static void put_unsupported(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const json_t *extension,
 			    const char *const *members)
 {
@@ -195,7 +195,7 @@ static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_
 		     *specular = gltf_extension(g, at, at->json, "KHR_materials_specular");
 	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5,
 	       factor = specular ? gltf_number(g, at, specular, "specularFactor", 1) : 1;
-	/* What is reflected at normal incidence, scaled; 0 of the index stands for total reflection in the format. */
+	/* The reflectance at normal incidence, scaled; an index of 0 means total reflection in the format. */
 	double root = eta > 0 ? (eta - 1) / (eta + 1) : 1, scaled = fabs(root) * sqrt(fmin(fmax(factor, 0), 1));
 	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
 	double tint[3] = {1, 1, 1};
@@ -236,7 +236,7 @@ static void put_transmission(struct gltf *g, struct xml_element *el, const struc
 	}
 }
 
-/* Extensions that would make another picture and are not known at all. */
+/* Unknown extensions that would change the image. */
 static void put_foreign(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	static const char *const known[] = {"KHR_materials_clearcoat",
@@ -261,7 +261,7 @@ static void put_foreign(struct gltf *g, struct xml_element *el, const struct glt
 
 /* ---- the material */
 
-/* Around the BSDF: what lets a part of the light through. */
+/* Wraps the BSDF in what transmits a part of the light. */
 static struct xml_element *put_mask(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
 				    const json_t *metal, double alpha, bool vertex_alpha)
 {
@@ -311,7 +311,7 @@ static struct xml_element *put_normal_map(struct gltf *g, struct xml_element *pa
 	return map;
 }
 
-/* <bsdf id="..."> and <emitter id="..."> at the top, which shapes refer to. */
+/* <bsdf id="..."> and <emitter id="..."> at the top level, for shapes to refer to. */
 static void put_id(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *what,
 		   enum gltf_colours colours)
 {
@@ -336,7 +336,7 @@ static bool shines(struct gltf *g, const struct gltf_at *at, double rgb[3])
 	return rgb[0] > 0 || rgb[1] > 0 || rgb[2] > 0;
 }
 
-/* Clear glass whose index varies: a dielectric, with Cauchy's law for the Abbe number 20 / dispersion. False: it is
+/* Clear glass with a varying index: a dielectric, with Cauchy's law for the Abbe number 20 / dispersion. false:
  * another material. */
 static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const double base[4], double metallic,
 			   double roughness)

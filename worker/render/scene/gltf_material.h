@@ -5,10 +5,10 @@
 
 #include "worker/render/scene/gltf_tree.h"
 
-/* What a primitive has at its vertices: they multiply the material's base colour, and its alpha. */
+/* Attributes of a primitive's vertices: they multiply the material's base colour, and its alpha. */
 enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
 
-/* What a shape of this material refers to. */
+/* The references of a shape with this material. */
 void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
 		   enum gltf_colours colours);
 /* Which set of texture coordinates its textures take, where all take the same; else 0. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Each primitive of triangles becomes a shape of type "gltf" that names its buffer and where in it its numbers are.
- * Points and lines have no area and are left out, with a note. Failures: accessors of other types than the attribute
- * has, that lead out of their views, sparse ones, attributes in different buffers.
+ * Each primitive of triangles becomes a shape of type "gltf" that names its buffer and the position of its numbers
+ * there. Points and lines have no area and are left out, with a note. Failures: accessors of a type that the attribute
+ * cannot have, accessors that exceed their views, sparse ones, attributes in different buffers.
  */
 #include "worker/render/scene/gltf_mesh.h"
 #include "worker/render/scene/gltf_buffer.h"
@@ -32,7 +32,7 @@ struct numbers {
 	uint64_t first, stride, count, end;
 };
 
-/* What is known of a primitive's shape while it is made. */
+/* The shape of a primitive while it is made. */
 struct primitive {
 	struct gltf *g;
 	const struct gltf_at *mesh;
@@ -78,7 +78,7 @@ static void put_accessor(struct primitive *p, const struct gltf_at *a, const cha
 	p->numbers[p->count++] = (struct numbers){name, component, begin, stride, wanted, end};
 }
 
-/* Of three or four components, the fourth of which is another accessor of the shape's. */
+/* Of three or four components; the fourth is another accessor of the shape. */
 static void put_colours(struct primitive *p, const struct gltf_at *a)
 {
 	struct gltf *g = p->g;
@@ -96,7 +96,7 @@ static void put_colours(struct primitive *p, const struct gltf_at *a)
 	p->numbers[p->count++] = fourth;
 }
 
-/* The shape reads the part of the buffer that it needs; of base64 that begins with a group of three bytes. */
+/* The shape reads the part of the buffer that it needs; for base64 that starts at a group of three bytes. */
 static void put_numbers(struct primitive *p)
 {
 	struct gltf_range part = p->buffer;
@@ -119,7 +119,7 @@ static void put_numbers(struct primitive *p)
 	}
 }
 
-/* Of the accessor's bounds, which positions have, for a camera that sees all. */
+/* The accessor's bounds, which positions must have, for a camera that sees everything. */
 static void grow_box(struct gltf *g, const struct gltf_at *a, const mat4 *to_world)
 {
 	double bound[2][3] = {{0, 0, 0}, {0, 0, 0}};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Members of JSON objects, and elements made of them, for the reader of glTF. The first failure stays: nothing is added
- * to the tree after it.
+ * Members of JSON objects, and elements made from them, for the reader of glTF. The first failure is kept: nothing is
+ * added to the tree after it.
  */
 #include "worker/render/scene/gltf_tree.h"
 #include "worker/render/scene/element_make.h"

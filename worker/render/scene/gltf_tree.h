@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A glTF file's tree of JSON, and the elements that are made of it. Private to gltf*.c. */
+/* A glTF file's JSON tree, and the elements made from it. Private to gltf*.c. */
 #ifndef WORKER_RENDER_SCENE_GLTF_TREE_H
 #define WORKER_RENDER_SCENE_GLTF_TREE_H
 
@@ -9,15 +9,15 @@
 #include <jansson.h>
 
 enum {
-	GLTF_JSON_MAX = 128 << 20,     /* bytes of the JSON, with all that is embedded in it */
-	GLTF_VALUES_MAX = 1 << 22,     /* values in it, each some 250 bytes of memory at most */
-	GLTF_EMBEDDED_MAX = 4096,      /* buffers and pictures embedded in the JSON */
-	GLTF_PRIMITIVES_MAX = 1 << 18, /* of all meshes, as often as nodes have them */
+	GLTF_JSON_MAX = 128 << 20,     /* bytes of the JSON, including embedded data */
+	GLTF_VALUES_MAX = 1 << 22,     /* values in it, at most 250 bytes of memory each */
+	GLTF_EMBEDDED_MAX = 4096,      /* buffers and images embedded in the JSON */
+	GLTF_PRIMITIVES_MAX = 1 << 18, /* of all meshes, counted once per node that has them */
 };
 
-#define GLTF_WHOLE_MAX 9007199254740992.0 /* a double holds all up to here */
+#define GLTF_WHOLE_MAX 9007199254740992.0 /* a double represents all integers up to here */
 
-/* Arrays at the top of the file whose entries are named in messages. */
+/* Top-level arrays whose entries are named in messages. */
 enum gltf_array {
 	GLTF_ACCESSORS,
 	GLTF_BUFFERS,
@@ -41,11 +41,11 @@ struct gltf_at {
 	const json_t *json; /* an object */
 };
 
-/* Where the bytes of a buffer, a view or an image lie. */
+/* Where the bytes of a buffer, a view or an image are. */
 struct gltf_range {
 	const char *file;
 	uint64_t first, count;
-	bool base64;   /* first and count are of the text; a view's offset is of what it stands for */
+	bool base64;   /* first and count refer to the text; a view's offset to the decoded bytes */
 	uint64_t size; /* decoded */
 };
 
@@ -54,7 +54,7 @@ struct gltf {
 	const struct asset_source *assets;
 	struct arena *arena;
 	struct error *error;
-	int failed; /* the first error's negative errno: nothing is added to the tree any more */
+	int failed; /* the first error's negative errno: nothing more is added to the tree */
 	const char *file;
 	const unsigned char *bytes; /* of the file */
 	size_t size;
@@ -63,35 +63,35 @@ struct gltf {
 	const json_t *lights;	 /* NULL: none */
 	int *lines[GLTF_ARRAYS]; /* of each entry */
 	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
-	struct gltf_range *buffers, *images; /* what is embedded, once it was found: of each */
+	struct gltf_range *buffers, *images; /* embedded data that has been located, by entry */
 	unsigned embedded, primitives;
 	unsigned char *material_made; /* bits 1 << enum gltf_colours */
 	struct xml_element *scene;
 	bool has_camera, has_light;
-	vec3 low, high; /* of all vertices */
+	vec3 low, high; /* over all vertices */
 };
 
 const char *gltf_array_name(enum gltf_array array);
-/* The entry with that index; false: there is none, and that is an error. */
+/* The entry with that index; false: missing, which is an error. */
 bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gltf_at *out);
-/* The entry whose index stands under `key`. 1: it is there, 0: no such key, negative: an error. */
+/* The entry whose index is the value of `key`. 1: found, 0: no such key, negative: an error. */
 int gltf_follow(struct gltf *g, const struct gltf_at *from, const json_t *object, const char *key,
 		enum gltf_array array, struct gltf_at *out);
 int gltf_line(const struct gltf *g, enum gltf_array array, size_t index);
-/* Sets g->failed with "file:line: array[index]: ". */
+/* Sets g->failed, with "file:line: array[index]: ". */
 __attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value,
 						    const char *format, ...);
 
-/* Members of an object, with what stands for them where they are not there; another type is an error. */
+/* Members of an object, with defaults for missing ones; another type is an error. */
 double gltf_number(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double fallback);
 uint64_t gltf_whole(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, uint64_t fallback);
 const char *gltf_text(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, const char *fallback);
-/* `count` numbers into x, which keeps its values where there are none. */
+/* `count` numbers into x, which keeps its values if there are none. */
 void gltf_numbers(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double *x, size_t count);
 const json_t *gltf_object(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key); /* or NULL */
 const json_t *gltf_extension(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *name);
 
-/* Elements: of the line of an entry. NULL as a parent: nothing is made, NULL comes back. */
+/* Elements, with the line of an entry. With NULL as parent nothing is made, and NULL is returned. */
 struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
 				 const char *name);
 __attribute__((format(printf, 4, 5))) void gltf_attribute(struct gltf *g, struct xml_element *el, const char *name,
@@ -107,7 +107,7 @@ void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at 
 void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
 		  const double rgb[3]);
 void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m);
-/* To be said of the file once. */
+/* A note that the file gets once. */
 void gltf_note(struct gltf *g, const char *text);
 
 #endif

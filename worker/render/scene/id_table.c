@@ -59,7 +59,7 @@ static int check_unique(const struct id_table *t, struct error *e)
 	return 0;
 }
 
-/* An alias may name an alias that stands before it. */
+/* An alias may name an alias before it. */
 static int read_alias(struct id_table *t, const struct xml_element *el, struct error *e)
 {
 	const char *as = xml_attribute(el, "as");

@@ -16,7 +16,7 @@ static const struct format {
 	{"#?RGBE", 6, image_decode_hdr, false},		  {"BM", 2, image_decode_bmp, false},
 };
 
-/* One of three, in their place. */
+/* A grey value as three equal ones, in place. */
 static void keep_channel(struct image *img, enum image_channel channel)
 {
 	size_t count = (size_t)img->width * img->height;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR, BMP by content. PNG (8
- * and 16 bits), JPEG and BMP are sRGB, whatever gamma they claim. Damaged files are an error, never half an image. Any
- * thread, each with its own arena.
+ * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR and BMP are recognised
+ * by content. PNG (8 and 16 bits), JPEG and BMP are sRGB, whatever gamma they claim. Damaged files are an error, never
+ * half an image. Any thread, each with its own arena.
  */
 #ifndef WORKER_RENDER_SCENE_IMAGE_H
 #define WORKER_RENDER_SCENE_IMAGE_H
@@ -19,14 +19,14 @@ enum image_channel {
 	IMAGE_RED,
 	IMAGE_GREEN,
 	IMAGE_BLUE,
-	IMAGE_ALPHA, /* of PNG; 1 where a picture has none, -ENOTSUP of formats whose alpha is not read */
+	IMAGE_ALPHA, /* of PNG; 1 if an image has none, -ENOTSUP for formats whose alpha is not read */
 };
 
-/* raw: no sRGB decoding of integer data. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the
- * arena holds: -EFBIG names the file and its size before it is decoded. */
+/* raw: integers are not decoded from sRGB. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the
+ * arena holds: -EFBIG, with the file and its size, before it is decoded. */
 int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
 	       struct error *e);
-/* The same of bytes in memory; name: for messages. */
+/* The same for bytes in memory; name: for messages. */
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
 		 struct arena *arena, struct image *out, struct error *e);
 

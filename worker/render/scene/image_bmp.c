@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Windows bitmaps without compression: palettes of 1, 4 and 8 bits, and 24 and 32 bits a pixel, from bottom to top or,
- * with a negative height, from top to bottom. A palette of greys gives one channel. Alpha is not read: most writers
+ * Uncompressed Windows bitmaps: palettes of 1, 4 and 8 bits, and 24 and 32 bits per pixel, from bottom to top or, with
+ * a negative height, from top to bottom. A grey palette gives one channel. Alpha is not read, because most writers
  * leave 0 there.
  *
- * Failures: -EBADMSG for a file that contradicts itself or ends too early, -ENOTSUP for compression, 16 bits and masks
- * other than the usual ones.
+ * Failures: -EBADMSG for a file that contradicts itself or ends too early, -ENOTSUP for compression, 16 bits and
+ * unusual masks.
  */
 #include "worker/render/scene/image_decode.h"
 #include "common/base/bytes.h"
@@ -39,7 +39,7 @@ static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
 	return 0;
 }
 
-/* Of 32 bits with masks: those that say what is so without them. */
+/* For 32 bits with masks: only the default masks are accepted. */
 static bool masks_are_usual(const struct bmp *b)
 {
 	const unsigned char *p = b->in->bytes + FILE_HEADER + INFO_HEADER;
@@ -76,7 +76,7 @@ static int read_header(struct bmp *b)
 	return read_palette(b, header, used);
 }
 
-/* The three bytes of pixel x of a row; NULL: an entry that the palette does not have. */
+/* The three bytes of pixel x of a row; NULL: not in the palette. */
 static const unsigned char *pixel_at(const struct bmp *b, const unsigned char *row, uint64_t x)
 {
 	if (!b->palette)

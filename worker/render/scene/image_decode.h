@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The formats behind image_read: each decodes bytes in memory; whatever they hold, it answers with an image or an
- * error. */
+/* The formats behind image_read: each decodes bytes in memory, whatever they contain, into an image or an error. */
 #ifndef WORKER_RENDER_SCENE_IMAGE_DECODE_H
 #define WORKER_RENDER_SCENE_IMAGE_DECODE_H
 
@@ -11,16 +10,16 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Before anything is decoded: a small file may promise a large image. Of a mask 11,585 x 11,585 pixels, of colours
- * 9,459 x 9,459. */
+/* Limits checked before decoding, because a small file may promise a large image. A mask may have 11,585 x 11,585
+ * pixels, a colour image 9,459 x 9,459. */
 enum { IMAGE_PIXELS_MAX = 1 << 27, IMAGE_BYTES_MAX = 1 << 30 };
-#define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* of all that an arena holds */
+#define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* of everything in an arena */
 
 struct image_input {
 	const char *name;
 	const unsigned char *bytes;
 	size_t size;
-	bool raw, alpha; /* alpha: nothing but it, as it is stored */
+	bool raw, alpha; /* alpha: only the alpha channel, as stored */
 	struct arena *arena;
 	struct error *error;
 };
@@ -31,12 +30,12 @@ int image_decode_bmp(const struct image_input *in, struct image *out);
 int image_decode_hdr(const struct image_input *in, struct image *out);
 int image_decode_exr(const struct image_input *in, struct image *out);
 
-/* Checks the size, also against the least number of bytes that such an image takes (bytes_least of any format's best
+/* Checks the size, also against the fewest bytes that such an image can take (bytes_least, for the format's best
  * compression), before anything is allocated; then allocates the pixels. */
 int image_allocate(const struct image_input *in, struct image *out, uint64_t width, uint64_t height, uint32_t channels,
 		   uint64_t bytes_least);
 
-/* Values of integer samples: value[i] for i of 0..max. */
+/* Values of integer samples: value[i] for i in 0..max. */
 void image_table(float *value, uint32_t max, bool raw);
 
 #endif

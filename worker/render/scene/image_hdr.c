@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Radiance pictures: mantissas of red, green, blue and a common exponent (Ward 1991, Real Pixels), flat or with
- * run lengths by component. EXPOSURE is not applied, as in Mitsuba.
+ * Radiance images: mantissas of red, green, blue and a common exponent (Ward 1991, Real Pixels), flat or run-length
+ * encoded by component. EXPOSURE is not applied, as in Mitsuba.
  */
 #include "worker/render/scene/image_decode.h"
 
@@ -127,7 +127,7 @@ int image_decode_hdr(const struct image_input *in, struct image *out)
 	struct cursor c = {in, in->bytes, in->bytes + in->size};
 	int64_t width, height;
 	int r = read_header(&c, &width, &height);
-	/* The best case: two bytes for 127 values of a component. */
+	/* The best compression: two bytes for 127 values of a component. */
 	uint64_t w = r ? 0 : (uint64_t)width, h = r ? 0 : (uint64_t)height;
 	if (!r)
 		r = image_allocate(in, out, w, h, 3,

@@ -12,7 +12,7 @@
 
 enum { SCANS_MAX = 200 }; /* of a progressive file: each costs a pass over all pixels */
 
-/* What survives the longjmp; the library's own structures must come first in theirs. */
+/* State that survives the longjmp; the library's structures require theirs to come first. */
 struct state {
 	struct jpeg_error_mgr errors;
 	struct jpeg_progress_mgr progress;
@@ -39,8 +39,8 @@ static void on_error(j_common_ptr jpeg)
 	longjmp(s->back, 1);
 }
 
-/* The library fills what is missing with grey and only warns; that is an error here. Surplus bytes and odd versions do
- * no harm. */
+/* The library replaces missing data with grey and only warns; here that is an error. Surplus bytes and odd versions
+ * are harmless. */
 static void on_message(j_common_ptr jpeg, int level)
 {
 	int code = jpeg->err->msg_code;

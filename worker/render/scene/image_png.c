@@ -8,7 +8,7 @@
 #include <setjmp.h>
 #include <string.h>
 
-/* What survives libpng's longjmp. */
+/* State that survives libpng's longjmp. */
 struct state {
 	const struct image_input *in;
 	struct image *out;
@@ -54,7 +54,7 @@ static void on_read(png_structp png, png_bytep out, size_t n)
 	s->at += n;
 }
 
-/* Grey or RGB with 8 or 16 bits, and alpha where that is asked for: palettes and fewer bits are expanded. */
+/* Grey or RGB with 8 or 16 bits, with alpha if requested: palettes and lower depths are expanded. */
 static int read_header(struct state *s)
 {
 	png_set_read_fn(s->png, s, on_read);
@@ -65,7 +65,7 @@ static int read_header(struct state *s)
 	uint32_t width = png_get_image_width(s->png, s->info), height = png_get_image_height(s->png, s->info);
 	png_set_expand(s->png);
 	if (s->in->alpha)
-		png_set_add_alpha(s->png, 0xffff, PNG_FILLER_AFTER); /* where there is none */
+		png_set_add_alpha(s->png, 0xffff, PNG_FILLER_AFTER); /* if there is none */
 	else
 		png_set_strip_alpha(s->png);
 	png_set_interlace_handling(s->png);
@@ -76,7 +76,7 @@ static int read_header(struct state *s)
 	    (s->depth != 8 && s->depth != 16))
 		return error_set(s->in->error, EINVAL, "%s: PNG with %u channels of %u bits", s->in->name, s->channels,
 				 s->depth);
-	/* deflate makes at most 1032 bytes of one; a pixel takes at least a bit. */
+	/* deflate produces at most 1032 bytes per byte; a pixel takes at least a bit. */
 	return image_allocate(s->in, s->out, width, height, s->in->alpha ? 1 : s->channels,
 			      (uint64_t)width * height / (8 * 1032));
 }

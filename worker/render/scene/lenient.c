@@ -13,7 +13,7 @@ static bool is_one_of(const char *name, const char *const *list)
 	return false;
 }
 
-/* What is like it, by class. */
+/* Replacements by class. */
 static const struct {
 	enum plugin_class cls;
 	const char *type, *stand_in;
@@ -41,7 +41,7 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 		*stand_in = "gaussian"; /* filters with negative lobes are sharper */
 		return LENIENT_REPLACE;
 	case PLUGIN_FILM:
-		*stand_in = "hdrfilm"; /* of the same size, filter and crop window; what else it keeps is left out */
+		*stand_in = "hdrfilm"; /* with the same size, filter and crop window; other parameters are left out */
 		return LENIENT_REPLACE;
 	case PLUGIN_SHAPE:
 	case PLUGIN_EMITTER:

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A node of a scene's description, and its properties: typed values that have passed their tables. */
+/* A node of a scene's description and its properties: typed values that match their tables. */
 #ifndef WORKER_RENDER_SCENE_NODE_H
 #define WORKER_RENDER_SCENE_NODE_H
 
@@ -39,7 +39,7 @@ struct property {
 struct scene_node {
 	enum plugin_class cls;
 	const char *type; /* "roughconductor" */
-	const char *id;	  /* NULL when it has none */
+	const char *id;	  /* NULL: none */
 	const char *file; /* as the user named it */
 	int line;
 	const struct plugin_decl *decl;
@@ -48,13 +48,13 @@ struct scene_node {
 	const struct scene_node *const *children; /* nested objects without a name */
 };
 
-/* Look-ups; defaults are the caller's. A property that is there has passed its table's type and range. */
+/* Look-ups, with defaults by the caller. An existing property has the type and range of its table. */
 const struct property *node_find(const struct scene_node *n, const char *name);
 double node_float(const struct scene_node *n, const char *name, double fallback); /* ints convert */
 int64_t node_int(const struct scene_node *n, const char *name, int64_t fallback);
 bool node_bool(const struct scene_node *n, const char *name, bool fallback);
 const char *node_string(const struct scene_node *n, const char *name, const char *fallback);
-mat4 node_transform(const struct scene_node *n, const char *name); /* identity when absent */
+mat4 node_transform(const struct scene_node *n, const char *name); /* identity if absent */
 const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index); /* NULL: none */
 const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* VALUE_NODE or NULL */
 

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* Powers of ten that a double holds exactly: with a mantissa below 2^53 one operation rounds correctly. */
+/* Powers of ten that a double represents exactly: with a mantissa below 2^53, one operation rounds correctly. */
 static const double power_of_ten[] = {1e0,  1e1,  1e2,	1e3,  1e4,  1e5,  1e6,	1e7,  1e8,  1e9,  1e10, 1e11,
 				      1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
@@ -25,7 +25,7 @@ static bool is_digit(char c)
 	return c >= '0' && c <= '9';
 }
 
-/* [first, last) is digits, a point, an exponent and nothing else by now. */
+/* [first, last) consists of digits, a point and an exponent. */
 static bool convert_slowly(const char *first, const char *last, double *out)
 {
 	static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -43,7 +43,7 @@ static bool convert_slowly(const char *first, const char *last, double *out)
 struct digits {
 	uint64_t mantissa;
 	int exponent; /* of ten */
-	bool exact;   /* the mantissa holds all digits */
+	bool exact;   /* the mantissa has all digits */
 	bool any;
 };
 

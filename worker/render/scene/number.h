@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Numbers as text, always with a point, whatever the process's locale. NaN, infinity, hexadecimal and values that
- * overflow are no numbers. Any thread; allocates nothing (but the locale, once).
+ * overflow are not numbers. Any thread; allocates nothing (except the locale, once).
  */
 #ifndef WORKER_RENDER_SCENE_NUMBER_H
 #define WORKER_RENDER_SCENE_NUMBER_H
@@ -10,12 +10,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Reads a number at the start of [p, end) and returns what follows it; NULL when there is none. Correctly rounded. */
+/* Reads a number at the start of [p, end) and returns what follows it; NULL: there is none. Correctly rounded. */
 const char *number_scan(const char *p, const char *end, double *out);
 const char *number_scan_int(const char *p, const char *end, int64_t *out);
 
-/* The same for files of numbers that programs print: what they write for no number ("nan", "-nan(ind)", "inf",
- * "1.#IND") is NaN, which the caller refuses or replaces. */
+/* The same for files written by programs: their spellings of non-numbers ("nan", "-nan(ind)", "inf", "1.#IND") give
+ * NaN, which the caller refuses or replaces. */
 const char *number_scan_printed(const char *p, const char *end, double *out);
 
 /* The whole text, blanks around it and an `f` after it allowed. */

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Parameter tables: what a plug-in understands, declared where it is implemented, read by the scene reader.
- * Names are those of Mitsuba 3 (to_world, int_ior, max_depth); 0.5/0.6 names are the same in camelCase and are
- * converted on reading (toWorld, intIOR, maxDepth).
- * The name or type "*" stands for all that the table does not list.
+ * Parameter tables: what a plug-in understands, declared where it is implemented and used by the scene reader. Names
+ * are those of Mitsuba 3 (to_world, int_ior, max_depth); 0.5/0.6 has them in camelCase, which is converted on reading
+ * (toWorld, intIOR, maxDepth). The name or type "*" stands for everything that the table does not list.
  */
 #ifndef WORKER_RENDER_SCENE_PARAM_H
 #define WORKER_RENDER_SCENE_PARAM_H
@@ -19,16 +18,16 @@ enum value_type {
 	VALUE_TRANSFORM = 1 << 7,
 	VALUE_NODE = 1 << 8, /* a nested or referenced object, by name: a texture, a BSDF */
 };
-/* What a colour may be given as: a number, rgb, a spectrum, a texture. */
+/* The forms of a colour: a number, rgb, a spectrum, a texture. */
 #define VALUE_COLOR (VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_SPECTRUM)
 #define VALUE_TEXTURE (VALUE_COLOR | VALUE_NODE)
 
-/* Ranges that many parameters have. Lengths and matrices: what squares of areas can hold; how far apart things may be,
- * measured by the scene's size, is checked when that is known (PARAM_REACH_MAX). */
+/* Common ranges. Lengths and matrices: what squares of areas can represent. How far apart things may be, relative to
+ * the scene's size, is checked when that is known (PARAM_REACH_MAX). */
 #define PARAM_LENGTH_MAX 1e60
-#define PARAM_LIGHT_MAX 1e30 /* radiance, irradiance, intensity: a film of float has room for sums of it */
-#define PARAM_REACH_MAX 1e12 /* of cameras and lights from the middle of the scene, in its radii */
-#define PARAM_UV_MAX 1e6 /* factors and offsets of texture coordinates: what is left of their digits picks a pixel */
+#define PARAM_LIGHT_MAX 1e30 /* radiance, irradiance, intensity: sums of it fit a film of float */
+#define PARAM_REACH_MAX 1e12 /* distance of cameras and lights from the middle of the scene, in scene radii */
+#define PARAM_UV_MAX 1e6     /* factors and offsets of texture coordinates: enough digits remain to select a pixel */
 #define PARAM_IOR_MIN 1e-3
 #define PARAM_IOR_MAX 1e3
 #define PARAM_METAL_MAX 1e9 /* eta and k of conductors */
@@ -44,9 +43,9 @@ struct param {
 	const char *name;
 	unsigned types; /* of enum value_type */
 	enum param_class status;
-	double min,
-		max; /* of every number in it, those of points, colours and spectra too: outside is an error. min < max
-			wherever the types have numbers (a test walks over all tables); a texture says its own ranges */
+	double min, max; /* for every number in the value, also in points, colours and spectra; outside is an error. min
+			    < max for all types with numbers (checked by a test of all tables); textures have their own
+			    ranges */
 	const char *choices; /* for VALUE_STRING: "beckmann|ggx", NULL: any */
 };
 
@@ -64,14 +63,14 @@ enum plugin_class {
 	PLUGIN_CLASSES,
 };
 
-/* Children that are not named (a BSDF in a shape, a film in a sensor) go by class; nested_classes lists which. */
+/* Unnamed children (a BSDF in a shape, a film in a sensor) are accepted by class: nested_classes. */
 struct plugin_decl {
 	enum plugin_class cls;
 	const char *type;	    /* as written in type="..." */
 	const struct param *params; /* ends with a NULL name */
 	unsigned nested_classes;    /* bits 1 << enum plugin_class */
-	enum param_class status; /* IGNORED: has no effect but for its understood parameters (samplers), all else in it
-				    is skipped; REFUSED never listed: unknown is refused */
+	enum param_class status; /* IGNORED: has no effect except for its understood parameters (samplers), everything
+				    else in it is skipped; REFUSED is never listed: unknown plug-ins are refused */
 };
 
 #endif

@@ -34,7 +34,7 @@ static int check_range(const struct xml_element *el, const struct param *p, cons
 	return 0;
 }
 
-/* A colour that is the same everywhere is a number where numbers are asked for: exporters write roughness as one. */
+/* A colour that is constant is accepted as a number: exporters write roughness as a colour. */
 static void number_of_color(const struct param *p, struct value *v)
 {
 	if (!(p->types & VALUE_FLOAT) || (p->types & v->type))

@@ -45,7 +45,7 @@ const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plug
 		if (d->cls != cls)
 			continue;
 		if (strcasecmp(d->type, type) ==
-		    0) /* Mitsuba looks for a file of this name: "Sphere" on Windows, too */
+		    0) /* Mitsuba looks for a file of this name, so "Sphere" works on Windows */
 			return d;
 		if (is_any(d->type))
 			any = d;

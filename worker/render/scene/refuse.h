@@ -9,7 +9,7 @@
 /* An element that has no place in the one around it. */
 int refuse_element(const struct xml_element *el, struct error *e);
 
-/* An object of a type that is none of its class, or one of Mitsuba's that is not supported. */
+/* An object of an unknown type, or of one of Mitsuba's that is not supported. */
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
 		struct error *e);
 

@@ -21,7 +21,7 @@ __attribute__((format(printf, 4, 5))) static int remark(struct report *r, const 
 	return report_text(r, n->file, text, text, e);
 }
 
-/* Whoever asks for no limit knows that there is one; whoever asks for a number gets another. */
+/* A scene without a limit expects some limit; one with a number gets another number, which is noted. */
 static int on_depth(struct report *r, const struct scene_node *n, struct error *e)
 {
 	int64_t depth = node_int(n, "max_depth", -1);
@@ -31,7 +31,7 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 		      SCENE_MAX_DEPTH);
 }
 
-/* Whoever asks for a part of the light, or for something else than light, gets another picture: that is said. */
+/* A scene that asks for a part of the light, or for something other than light, gets another image, which is noted. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
 	static const char *const others[] = {"direct",

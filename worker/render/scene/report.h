@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What there is to say of a scene while it is read: what is ignored, each kind of thing once, and what is wrong, all of
- * it. One thread; texts live in the arena given.
+ * The notes and problems found while a scene is read: ignored things, each kind once, and all errors. One thread; texts
+ * are allocated in the given arena.
  */
 #ifndef WORKER_RENDER_SCENE_REPORT_H
 #define WORKER_RENDER_SCENE_REPORT_H
@@ -24,14 +24,14 @@ struct report {
 
 int report_init(struct report *r, struct arena *arena, struct error *e);
 
-/* key: what kind of thing it is about; said before, it is not said again. 0 or -ENOMEM. */
+/* key: identifies the kind of thing; a second note with the same key is dropped. 0 or -ENOMEM. */
 int report_note(struct report *r, const char *file, const char *key, struct error *e, const char *format, va_list ap);
 
 int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e);
 
-/* Something failed with `code` and the text in e. What can be gone on after is kept, and 0 returned; no memory cannot.
- * 0 stays 0, and REPORT_TOLD becomes 0: it has been kept before. REPORT_FULL: there is no room for more, and reading
- * on would only take time; it stays what it is. */
+/* A failure with `code` and the text in e. Recoverable ones are stored, and the result is 0; lack of memory is not
+ * recoverable. 0 stays 0, and REPORT_TOLD becomes 0, because it has been stored before. REPORT_FULL: there is no
+ * room for more, and reading on would only take time; it is returned unchanged. */
 enum { REPORT_TOLD = 1, REPORT_FULL = 2 };
 int report_problem(struct report *r, int code, struct error *e);
 

@@ -51,16 +51,16 @@ struct maker {
 	struct report report;
 	struct notes notes;
 	struct asset_list assets;
-	uint64_t objects; /* when all references are followed */
+	uint64_t objects; /* with all references followed */
 	int depth;
 	bool lenient;
 };
 
-/* A node while it grows. */
+/* A node being made. */
 struct draft {
 	struct scene_node *node;
 	const struct plugin_decl *decl;
-	bool stands_in; /* for a plug-in that is not supported */
+	bool stands_in; /* replaces a plug-in that is not supported */
 	struct property *properties;
 	const struct scene_node **children;
 	struct xml_nesting nesting;
@@ -110,8 +110,9 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 	return 0;
 }
 
-/* Forks add parameters of their own. A name that is like none of the table, and that no other plug-in of the class has,
- * is one of them; others are mistakes. Materials and textures have no place for either: what they set is to be seen. */
+/* Forks of Mitsuba add parameters. A name that resembles none in the table, and that no other plug-in of the class
+ * has, is taken for one of these; other unknown names are mistakes. Materials and textures do not allow it, because
+ * their parameters are visible in the image. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
@@ -138,7 +139,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
 		return 0;
 	}
-	/* 0.6 has it for all BSDFs; those whose reflectances can add up to more than 1 have it in their tables. */
+	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
 		return note_property(&m->notes, owner, el, name);
 	if (!found && is_foreign_parameter(m, d, el, name))
@@ -202,7 +203,7 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
 
-/* An object inside another or referred to there: by its name where the table has it, by its class else. */
+/* An object nested in another, or referred to there: by its name if the table has it, otherwise by its class. */
 static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
 		       struct xml_element *target)
 {
@@ -309,8 +310,8 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	return 0;
 }
 
-/* Of a plug-in that is not supported: refuses it, or finds the table and the type that stand in for it, or makes *out
- * of what is inside (*decl stays NULL). REPORT_TOLD: it is left out. */
+/* For a plug-in that is not supported: refuses it, or finds the table and type that replace it, or puts the node
+ * inside it into *out (*decl stays NULL). REPORT_TOLD: it is left out. */
 static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class cls, const char **type,
 		    const struct plugin_decl **decl, const struct scene_node **out)
 {
@@ -341,7 +342,7 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 	return *decl ? 0 : refuse_type(m->decls, el, cls, *type, m->error);
 }
 
-/* What covers a BSDF that it cannot cover goes. */
+/* Removes a covering that its inner BSDF does not allow. */
 static int uncover(struct maker *m, const struct xml_element *el, const struct scene_node **node)
 {
 	const char *type = (*node)->type;
@@ -355,8 +356,8 @@ static int uncover(struct maker *m, const struct xml_element *el, const struct s
 		    el->file, el->line, type, inner->type);
 }
 
-/* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no
- * object of any kind does not, and is complained of once. */
+/* An object with errors inside still becomes a node, so that all errors are found. One that is not an object of any
+ * kind does not, and is reported once. */
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
 {
 	if (el->node) {
@@ -369,7 +370,7 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		return REPORT_TOLD;
 	if (m->depth >= XML_DEPTH_MAX)
 		return xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep", XML_DEPTH_MAX);
-	el->told = true; /* unless it succeeds */
+	el->told = true; /* reset on success */
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);
 	int r = element_check(el, "type|id|name", true, m->error);
@@ -382,7 +383,7 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	bool stands_in = !decl;
 	if (!decl && (r = stand_in(m, el, cls, &type, &decl, out)))
 		return r;
-	if (!decl) /* *out does */
+	if (!decl) /* *out is the replacement */
 		return el->node = *out, 0;
 	if (strcasecmp(type, decl->type) == 0)
 		type = decl->type;
@@ -493,7 +494,7 @@ static int make_scene(struct maker *m)
 	return r ? r : list_assets(m);
 }
 
-/* All that can be said of the file; what is wrong with it ends in s->problems. */
+/* Reads as much as possible; problems are collected in s->problems. */
 static int read_all(struct scene *s, const struct asset_source *assets, const char *name,
 		    const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		    bool lenient, struct maker *m)

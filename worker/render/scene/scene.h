@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The scene description: Mitsuba's XML (0.5/0.6 and 3.x dialects) or glTF 2.0 as a tree of typed, checked nodes. Knows
- * no physics. docs/design.md, rules 5. The whole description lives in one arena.
+ * The scene description: Mitsuba's XML (0.5/0.6 and 3.x dialects) or glTF 2.0 as a tree of typed, checked nodes,
+ * without any physics (docs/design.md, rules 5). The whole description is in one arena.
  */
 #ifndef WORKER_RENDER_SCENE_SCENE_H
 #define WORKER_RENDER_SCENE_SCENE_H
@@ -22,14 +22,14 @@ struct scene {
 	uint32_t object_count;
 	const struct scene_node *const *objects; /* top level, in file order */
 	uint32_t asset_count;
-	const char *const
-		*assets; /* names of all files that the description refers to, without the scene file, each once */
-	const char *const *asset_places; /* "scene.xml:12: <shape type=\"obj\">" which names it first; or "" */
-	uint32_t problem_count;		 /* 0 but after scene_read_all */
+	const char *const *assets; /* names of all files that the description refers to, each once, without the scene
+				      file itself */
+	const char *const *asset_places; /* "scene.xml:12: <shape type=\"obj\">" the place that names it first; or "" */
+	uint32_t problem_count;		 /* 0 except after scene_read_all */
 	const char *const
 		*problems; /* "scene.xml:12: <bsdf>: ..." all that is wrong or not supported, in the file's order */
 	uint32_t note_count;
-	const char *const *notes; /* "scene.xml:12: ignored ..." once each, for the log */
+	const char *const *notes; /* "scene.xml:12: ignored ...": each once, for the log */
 };
 
 /* Reads `name` through `assets`. decls ends with a NULL type. On failure the error names file, line and element and
@@ -38,13 +38,13 @@ int scene_read(struct scene *s, const struct asset_source *assets, const char *n
 	       const struct scene_define *defines, size_t define_count, struct error *e);
 void scene_fini(struct scene *s);
 
-/* The same, but what is not supported is left out or replaced by what is nearest (lenient.h), with a note each. */
+/* The same, but what is not supported is left out or replaced (lenient.h), with a note each. */
 int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name,
 		       const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		       struct error *e);
 
-/* The same, but a scene with something wrong in it is no failure: it is as far as it could be read, and s->problems
- * says all that is wrong. Not for rendering where there is any. -ENOMEM. */
+/* The same, but errors in the scene are not a failure: it is read as far as possible, and s->problems has all of
+ * them. If there are any, it must not be rendered. -ENOMEM. */
 int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name,
 		   const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
 		   bool lenient, struct error *e);

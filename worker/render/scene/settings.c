@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Finds sensor (the one that was asked for), film, filter and integrator among the objects and translates each into
- * numbers of struct scene_settings, with Mitsuba's defaults where a scene is silent.
+ * Finds sensor (the selected one), film, filter and integrator among the objects, and translates each into numbers of
+ * struct scene_settings, with Mitsuba's defaults.
  *
- * Failures have the object's place: a second film, a crop window outside of the film, a camera whose to_world flattens
- * it, angles that are none.
+ * Failures have the object's place: a second film, a crop window outside the film, a camera that to_world flattens,
+ * invalid angles.
  */
 #include "worker/render/scene/settings.h"
 #include "worker/render/scene/fov.h"
@@ -26,7 +26,7 @@ enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 #define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 #define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
 
-/* Of both cameras. Shutters: nothing moves. */
+/* For both cameras. Shutters have no effect, because nothing moves. */
 #define CAMERA_PARAMS                                                                                             \
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                      \
 		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},                \
@@ -40,7 +40,7 @@ enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 static const struct param perspective_params[] = {
 	CAMERA_PARAMS,
-	{"focus_distance", IGNORED},  /* a pinhole has none; exporters write it all the same */
+	{"focus_distance", IGNORED},  /* a pinhole has none, but exporters write it */
 	{"aperture_radius", REFUSED}, /* thinlens has one */
 	{NULL, 0, 0, 0, 0, NULL},
 };
@@ -140,12 +140,12 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_RFILTER, "catmullrom", no_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "lanczos", lanczos_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_SAMPLER, "*", sampler_params, 0, PARAM_IGNORED},
-	/* irrcache, adaptive, aov and others hold the integrator that says the depth. */
+	/* irrcache, adaptive, aov and others contain the integrator with the depth. */
 	{PLUGIN_INTEGRATOR, "*", integrator_params, HOLDS(PLUGIN_INTEGRATOR), PARAM_IGNORED},
 	{0, NULL, NULL, 0, 0},
 };
 
-/* The n-th of its class, from 1 on; count: of all. */
+/* The n-th of its class, from 1 on; count: the total. */
 static const struct scene_node *find_object(const struct scene *s, enum plugin_class cls, uint32_t n, uint32_t *count)
 {
 	const struct scene_node *found = NULL;
@@ -156,7 +156,7 @@ static const struct scene_node *find_object(const struct scene *s, enum plugin_c
 	return found;
 }
 
-/* A window of the whole film is none. */
+/* A window that covers the film is none. */
 static int read_crop(const struct scene_node *film, struct scene_settings *out, struct error *e)
 {
 	uint64_t x = (uint64_t)node_int(film, "crop_offset_x", 0), y = (uint64_t)node_int(film, "crop_offset_y", 0);
@@ -182,7 +182,7 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 	const struct scene_node *film = node_child(sensor, PLUGIN_FILM, 0);
 	out->width = film ? (uint32_t)node_int(film, "width", SCENE_FILM_WIDTH) : SCENE_FILM_WIDTH;
 	out->height = film ? (uint32_t)node_int(film, "height", SCENE_FILM_HEIGHT) : SCENE_FILM_HEIGHT;
-	if (width && !height) /* the film keeps its shape */
+	if (width && !height) /* the film keeps its aspect */
 		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1),
 					     PLAN_MAX_SIZE + 1.0);
 	if (width)
@@ -230,7 +230,7 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 	return 0;
 }
 
-/* The innermost one says it, as in Mitsuba. */
+/* The innermost one has it, as in Mitsuba. */
 static int read_depth(const struct scene *s, struct scene_settings *out, struct error *e)
 {
 	uint32_t count;
@@ -258,7 +258,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	return 0;
 }
 
-/* What the film shows is as wide as to_world makes the line from -1 to 1. */
+/* The film is as wide as to_world makes the line from -1 to 1. */
 static int read_scale(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	mat4 m = node_transform(sensor, "to_world");
@@ -280,7 +280,7 @@ static int read_fov(const struct scene_node *sensor, struct scene_settings *out,
 	return fov_read(sensor, &out->fov, out->fov_axis, e);
 }
 
-/* Columns made orthonormal around the view, mirrored ones stay mirrored. */
+/* Orthonormalises the columns around the view; mirrored ones stay mirrored. */
 static int read_camera(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	mat4 m = node_transform(sensor, "to_world");

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What sensor, film, filter, sampler and integrator of a scene say, as plain numbers: for hslt-submit, hslt-render and
- * the world. Needs no Embree and opens no asset.
+ * Sensor, film, filter, sampler and integrator of a scene as plain numbers: for hslt-submit, hslt-render and the world.
+ * Needs no Embree and opens no files.
  */
 #ifndef WORKER_RENDER_SCENE_SETTINGS_H
 #define WORKER_RENDER_SCENE_SETTINGS_H
@@ -16,27 +16,26 @@ struct scene_settings {
 	double filter_radius,
 		filter_stddev;	   /* pixels; Mitsuba's defaults: box 0.5, tent 1, gaussian 0.5 and 4 x that */
 	double filter_b, filter_c; /* of FILTER_CUBIC: Mitchell and Netravali's B and C */
-	uint32_t border;	   /* whole pixels by which the kernel reaches beyond a pixel: ceil(radius - 0.5) */
-	uint32_t crop_x, crop_y, crop_width, crop_height; /* what the scene's film wants rendered; width 0: all of it */
+	uint32_t border;	   /* whole pixels by which the kernel extends beyond a pixel: ceil(radius - 0.5) */
+	uint32_t crop_x, crop_y, crop_width, crop_height; /* the crop window of the scene's film; width 0: all of it */
 	uint64_t spp;					  /* sampleCount; 0: none given */
-	uint32_t max_depth;	 /* edges, 1..128 (-1 and more become 128); 128 when none is given */
-	uint32_t roulette_depth; /* scattering events before Russian roulette begins, rr_depth; from 1 on, 5 when none
-				    is given */
-	bool hide_emitters;	 /* paths of one edge, emitters seen directly, are not wanted */
-	char integrator[32];	 /* the scene's own ("" none): ignored but for its depths */
+	uint32_t max_depth;				  /* edges, 1..128 (-1 and more become 128); default 128 */
+	uint32_t roulette_depth; /* scattering events before Russian roulette begins, rr_depth; from 1 on, default 5 */
+	bool hide_emitters;	 /* hides paths of one edge, emitters seen directly */
+	char integrator[32];	 /* the scene's own ("": none): ignored except for its depths */
 	/* perspective, thinlens */
-	mat4 to_world;	   /* camera: +z forward, +x LEFT on the image, +y up; any scale is removed */
-	double half_width; /* above 0: orthographic, half of what the film's width shows, in units of the scene */
+	mat4 to_world;	   /* camera: +z forward, +x LEFT on the image, +y up; without scale */
+	double half_width; /* above 0: orthographic, half of the film's width in scene units */
 	double fov;	   /* degrees, along fov_axis */
-	char fov_axis[16]; /* x, y, diagonal, smaller, larger: resolved against the film size by the camera */
-	double principal_x,
-		principal_y; /* offset of the principal point from the middle, of the film's size, as in Mitsuba 3 */
+	char fov_axis[16]; /* x, y, diagonal, smaller, larger: the camera resolves it by the film's size */
+	double principal_x, principal_y; /* offset of the principal point from the middle, relative to the film's size,
+					    as in Mitsuba 3 */
 	double near_clip, far_clip;
 	double aperture_radius, focus_distance; /* thinlens; radius 0: a pinhole, whatever the distance */
 	bool unplaced; /* the scene has no sensor: scene_settings_place says where the camera is */
 };
 
-/* width, height: override the film's (0: keep) and its crop window. sensor: which of several, from 1 on. */
+/* width, height: override the film's size (0: keep) and its crop window. sensor: which of several, from 1 on. */
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
 			struct scene_settings *out, struct error *e);
 

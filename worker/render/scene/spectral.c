@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Each way of writing a spectrum has a function that fills a table of wavelengths and values or a constant; tables are
- * checked for order, range and finite values in one place, check_table.
+ * Each form of a spectrum has a function that fills a table of wavelengths and values, or a constant; check_table
+ * checks all tables for order, range and finite values.
  *
- * Failures: lists of different lengths, wavelengths that do not increase, files that are not lines of two numbers,
+ * Failures: lists of different lengths, wavelengths that do not increase, files other than lines of two numbers,
  * negative temperatures.
  */
 #include "worker/render/scene/spectral.h"
@@ -16,12 +16,12 @@
 #include <math.h>
 #include <string.h>
 
-#define TEMPERATURE_MAX 1e6 /* kelvin; below 100 no visible light is left in a double's range that matters */
+#define TEMPERATURE_MAX 1e6 /* kelvin; below 100 there is practically no visible light */
 #define TEMPERATURE_MIN 100
 #define VALUE_LARGEST 1e30
 
-/* Luminance of the CIE's D65 table over that of a constant 1: dividing by it makes rgb 1 and this spectrum the same
- * white. */
+/* Luminance of the CIE's D65 table over that of a constant 1: divided by it, this spectrum has the same white as rgb
+ * 1. */
 static double d65_normalization(void)
 {
 	double sum = 0, y = 0;
@@ -44,7 +44,7 @@ static int constant(const struct xml_element *el, double x, struct arena *arena,
 	return 0;
 }
 
-/* A table with room for n points; NULL, with the error set: no memory. */
+/* A table with room for n points; NULL, with the error set: out of memory. */
 static bool table(const struct xml_element *el, uint32_t n, struct arena *arena, struct value *out, double **nm,
 		  double **value, struct error *e)
 {
@@ -73,7 +73,7 @@ static int check_table(const struct xml_element *el, const struct value *v, stru
 	return 0;
 }
 
-/* "400:0.1, 500:0.2", or lines "400 0.1" of a file: how many, 0 when it is none of that. */
+/* "400:0.1, 500:0.2", or lines "400 0.1" of a file: the number of points, 0 if it is neither. */
 static uint32_t scan_pairs(const char *p, const char *end, char between, double *nm, double *value)
 {
 	uint32_t n = 0;
@@ -147,7 +147,7 @@ static int read_value(const struct xml_element *el, const char *text, struct are
 		return read_pairs(el, text, text + strlen(text), ':', arena, out, e);
 	if (number_parse(text, x))
 		return constant(el, x[0], arena, out, e);
-	/* 0.6 built with three lanes takes r, g, b here; with more it would take as many numbers. */
+	/* 0.6 built with three lanes accepts r, g, b here; with more it accepts as many numbers. */
 	if (el->snake && number_list(text, x, 3) == 3) {
 		*out = (struct value){.type = VALUE_RGB};
 		memcpy(out->as.rgb, x, sizeof x);
@@ -159,7 +159,7 @@ static int read_value(const struct xml_element *el, const char *text, struct are
 			 text);
 }
 
-/* Planck's law; h, c and k by the SI's definition. */
+/* Planck's law; h, c and k as defined by the SI. */
 static double planck(double nm, double kelvin)
 {
 	const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
@@ -208,7 +208,7 @@ int spectral_read_blackbody(const struct xml_element *el, struct arena *arena, s
 	return r ? r : blackbody(el, kelvin, factor, arena, out, e);
 }
 
-/* What is written inside a <spectrum type="...">: the value of <float name="NAME" .../> or of any other element; NULL:
+/* The contents of a <spectrum type="...">: the value of <float name="NAME" .../> or of any other element; NULL:
  * none. */
 static const char *inner_value(const struct xml_element *el, const char *name)
 {
@@ -232,7 +232,7 @@ static int inner_number(const struct xml_element *el, const char *name, const ch
 	return text ? number_of(el, name, text, 0, x, e) : 0;
 }
 
-/* The numbers of `name`, 2 at least: their count, or negative with the error set. */
+/* The numbers of `name`, at least 2: their count, or negative with the error set. */
 static int inner_list(const struct xml_element *el, const char *name, struct arena *arena, double **out,
 		      struct error *e)
 {
@@ -328,7 +328,7 @@ static int read_srgb(const struct xml_element *el, struct arena *arena, struct v
 }
 
 static const struct {
-	const char *type, *names; /* of what may stand inside */
+	const char *type, *names; /* elements that may be inside */
 	int (*read)(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e);
 } types[] = {
 	{"uniform", "value|wavelength_min|wavelength_max|lambda_min|lambda_max", read_uniform},

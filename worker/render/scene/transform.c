@@ -20,7 +20,7 @@
 
 #include <string.h>
 
-/* Any number of a transform: what squares of areas can hold. */
+/* Range of any number in a transform: what squares of areas can represent. */
 static int check_number(const struct xml_element *el, const char *attribute, double x, struct error *e)
 {
 	if (fabs(x) <= PARAM_LENGTH_MAX)
@@ -126,7 +126,7 @@ static bool is_in_range(const mat4 *m)
 	return true;
 }
 
-/* Without `up` each Mitsuba takes the first axis that its own function puts beside the view. */
+/* Without `up`, each Mitsuba uses the first axis that its own function makes perpendicular to the view. */
 static vec3 any_up(const struct xml_element *el, vec3 view)
 {
 	if (!el->snake)

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * upgrade() walks over the file's elements, the inner ones last, so that rules see what is around an element under its
- * new name. Rules are rows of tables, as Mitsuba's own are; what needs more than a new name is a function.
+ * upgrade() walks over the file's elements, inner ones last, so that rules see the enclosing elements under their new
+ * names. Rules are rows of tables, like Mitsuba's own; those that need more than a new name are functions.
  *
- * Before 0.3 some materials had other parameters and defaults: they are refused by name.
+ * Some materials had other parameters and defaults before 0.3: they are refused by name.
  */
 #include "worker/render/scene/upgrade.h"
 
 #include <errno.h>
 #include <string.h>
 
-/* Up to which version it holds: 0.3 is `before` 4. NULL is any. */
+/* Minor version before which it applies: 0.3 is `before` 4. NULL: any. */
 struct new_name {
 	int before;
 	const char *element, *type, *old, *now;
@@ -28,7 +28,7 @@ static const struct new_name types[] = {
 	{3, "texture", NULL, "ldrtexture", "bitmap"},
 };
 
-/* Of what stands in an element of that name and type. */
+/* For elements inside one of that name and type. */
 static const struct new_name parameters[] = {
 	{4, "emitter", "area", "intensity", "radiance"},
 	{4, "emitter", "constant", "intensity", "radiance"},
@@ -74,7 +74,7 @@ static void rename_value(const struct new_name *rules, size_t count, int minor, 
 		}
 }
 
-/* An element with one attribute or two, as the first inside another. */
+/* Adds an element with one or two attributes as the first inside another. */
 static struct xml_element *put_first(struct xml_element *in, const char *name, const char *key, const char *value,
 				     const char *key_2, const char *value_2, struct arena *arena)
 {
@@ -97,7 +97,7 @@ static struct xml_element *put_first(struct xml_element *in, const char *name, c
 	return el;
 }
 
-/* Cameras before 0.4: the picture's left was its right, and the angle of view was of the smaller side. */
+/* Cameras before 0.4 were mirrored horizontally, and their angle of view was that of the smaller side. */
 static bool turn_camera(struct xml_element *camera, struct arena *arena)
 {
 	const char *axis = "smaller";
@@ -140,7 +140,7 @@ static int upgrade(struct xml_element *el, int minor, struct arena *arena, struc
 		if (!turn_camera(el, arena))
 			return xml_error(el, e, ENOMEM, "out of memory");
 	}
-	/* What the film did with it is said by pixelFormat since, and here by none. */
+	/* pixelFormat has replaced it, and has no effect here. */
 	const char *name = xml_attribute(el, "name");
 	if (minor < 4 && el->parent && is_named(el->parent, "film") && name && strcmp(name, "alpha") == 0)
 		el->ignored = true;

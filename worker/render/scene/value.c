@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A table has each element's name, its attributes and its reader. Attributes that it does not list are refused with the
- * nearest name, so that a typing error is never a default.
+ * A table has each element's name, its attributes and its reader. Other attributes are refused with the nearest name,
+ * so a typing error never silently becomes a default.
  */
 #include "worker/render/scene/value.h"
 
@@ -80,7 +80,7 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
 		return r;
 	double *rgb = out->as.rgb;
 	bool srgb = strcmp(el->name, "srgb") == 0;
-	/* 0.6 reads #rrggbb in <rgb> too, and there as linear; 3.x does not know it. */
+	/* 0.6 reads #rrggbb in <rgb>, too, as linear; 3.x does not accept it. */
 	if (!(text[0] == '#' && (srgb || el->snake) && parse_hex(text, rgb))) {
 		int n = number_list(text, rgb, 3);
 		if (n == 1)
@@ -96,8 +96,8 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
 	return 0;
 }
 
-/* Mitsuba 0.6 lets a value say whether it is a light's colour or a surface's; what differs from the place is refused.
- */
+/* In Mitsuba 0.6 a value may say whether it is a light's colour or a surface's; a contradiction to its place is
+ * refused. */
 static int check_intent(const struct xml_element *el, struct error *e)
 {
 	const char *intent = xml_attribute(el, "intent");

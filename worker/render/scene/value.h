@@ -7,9 +7,9 @@
 #include "worker/render/scene/node.h"
 #include "worker/render/scene/xml.h"
 
-/* Is it the name of a value's element (float, rgb, ... also those that are refused, like animation)? */
+/* Whether it is the name of a value's element (float, rgb, ... including refused ones such as animation). */
 bool value_is_element(const char *name);
-/* Hands all these names to a suggestion. */
+/* Offers all these names for a suggestion. */
 struct spelling;
 void value_offer_elements(struct spelling *s);
 
@@ -17,11 +17,11 @@ void value_offer_elements(struct spelling *s);
 int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
 	       struct error *e);
 
-/* "float", "rgb" ... for messages; types: any of the bits, as a list. */
+/* "float", "rgb" ... for messages; types: any combination of bits, as a list. */
 void value_type_names(unsigned types, char *text, size_t size);
 
-/* All numbers of a value, three of a point or rgb; none of what has none (transforms check theirs: transform.h). The
- * result is in *v or in scratch. */
+/* All numbers of a value, three for a point or rgb; none for types without numbers (transforms are checked in
+ * transform.h). The result is in *v or in scratch. */
 const double *value_numbers(const struct value *v, double scratch[3], uint32_t *count);
 
 #endif

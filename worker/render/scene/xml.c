@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * expat calls open_element and on_end; each element goes into the arena with its attributes, $names replaced and files
- * looked for along the search paths. <include> reads the named file into the place where it stands. Nothing is
- * interpreted here.
+ * expat calls open_element and on_end. Each element is put into the arena with its attributes, with $names replaced and
+ * files searched along the paths. <include> reads the named file in its place. Nothing is interpreted here.
  *
- * Failures stop the parser at once, with file and line: what expat refuses, a document type, depth, counts and sizes
- * beyond the limits of xml.h.
+ * Failures stop the parser at once, with file and line: errors of expat, a document type, and depth, counts and sizes
+ * beyond the limits in xml.h.
  */
 #include "worker/render/scene/xml.h"
 
@@ -29,21 +28,21 @@ struct reader {
 	struct error *error;
 	int failed;    /* the first error's negative errno */
 	int includes;  /* files around the current one */
-	size_t bytes;  /* of all files so far */
-	bool mixed;    /* files of both dialects: said */
-	bool upgraded; /* a file from before 0.4: said */
+	size_t bytes;  /* total bytes of files so far */
+	bool mixed;    /* noted that files have both dialects */
+	bool upgraded; /* noted that a file is from before 0.4 */
 	/* the current file */
 	XML_Parser parser;
 	const char *file;
 	struct xml_element *top;     /* the file's <scene> */
 	struct xml_element *current; /* innermost open element */
-	struct xml_element *hook;    /* the <include> element that the file stands for, NULL for the main file */
+	struct xml_element *hook;    /* the <include> element that the file replaces, NULL for the main file */
 	int depth;
-	int minor; /* of a version before 0.5, else -1 */
+	int minor; /* if the version is below 0.5, otherwise -1 */
 	bool snake;
 };
 
-/* expat wants realloc without the old size; it is kept in front of each piece. */
+/* expat needs realloc without the old size, which is stored in front of each block. */
 union header {
 	size_t size;
 	max_align_t align;
@@ -84,7 +83,7 @@ static const XML_Memory_Handling_Suite expat_memory = {expat_alloc, expat_reallo
 
 bool xml_is_foreign(const char *element)
 {
-	/* Final or preview mode, objects hidden by an editor, the settings of another renderer. */
+	/* Final or preview mode, objects hidden by an editor, settings of another renderer. */
 	return !strcmp(element, "mode") || !strcmp(element, "hide") || !strcmp(element, "dpt");
 }
 
@@ -156,7 +155,7 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 	return 0;
 }
 
-/* The version decides which dialect's names and rules hold. */
+/* The version determines which dialect's names and rules apply. */
 static int begin_file(struct reader *r, struct xml_element *el)
 {
 	if (strcmp(el->name, "scene") != 0)
@@ -194,7 +193,7 @@ static int read_default(struct reader *r, const struct xml_element *el)
 	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
 }
 
-/* FOLDER/NAME, or NAME alone, as it is called from here on. NULL: no memory. */
+/* FOLDER/NAME, or NAME alone, as the file is called from here on. NULL: out of memory. */
 static const char *canonical(const struct reader *r, const char *folder, const char *name)
 {
 	size_t n = strlen(folder), size = n + 1 + strlen(name);
@@ -206,7 +205,7 @@ static const char *canonical(const struct reader *r, const char *folder, const c
 	return out;
 }
 
-/* A folder in which the files that are named from here on are searched, after the scene's own. */
+/* Adds a folder in which files named after it are searched, after the scene's own. */
 static int read_path(struct reader *r, const struct xml_element *el)
 {
 	const char *value = xml_attribute(el, "value");
@@ -427,7 +426,7 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 	r->parser = XML_ParserCreate_MM(NULL, &expat_memory, NULL);
 	if (!r->parser)
 		return error_set(r->error, ENOMEM, "%s: out of memory", r->file);
-	/* A fixed salt: runs repeat exactly; the element and attribute limits bound what collisions can cost. */
+	/* A fixed salt makes runs reproducible; the limits on elements and attributes bound the cost of collisions. */
 	XML_SetHashSalt(r->parser, 0x9e3779b9u);
 	XML_SetUserData(r->parser, r);
 	XML_SetElementHandler(r->parser, on_start, on_end);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A scene file as a tree of elements, through expat: includes opened, defaults substituted, nothing interpreted.
- * Any DOCTYPE is refused, and with it every entity; depth, sizes and counts are bounded. One thread; the tree lives in
- * the arena given.
+ * DOCTYPE is refused, and with it every entity; depth, sizes and counts are bounded. One thread; the tree is allocated
+ * in the given arena.
  */
 #ifndef WORKER_RENDER_SCENE_XML_H
 #define WORKER_RENDER_SCENE_XML_H
@@ -15,9 +15,9 @@
 #include <stdint.h>
 
 enum {
-	XML_DEPTH_MAX = 64,   /* elements inside elements, and objects that refer to objects */
+	XML_DEPTH_MAX = 64,   /* nesting of elements, and of objects that refer to objects */
 	XML_INCLUDE_MAX = 8,  /* files that include files */
-	XML_FILES_MAX = 1024, /* files included in all */
+	XML_FILES_MAX = 1024, /* files included in total */
 	XML_PATHS_MAX = 16,   /* folders that are searched for files */
 	XML_NOTES_MAX = 8,    /* on a file as a whole */
 	XML_MISSING_MAX = DEFINE_MISSING_MAX,
@@ -25,12 +25,12 @@ enum {
 	XML_ATTRIBUTES_MAX = 24,
 	XML_VALUE_MAX = 1 << 20,     /* bytes of an attribute's value */
 	XML_FILE_MAX = 64 << 20,     /* bytes of a scene file */
-	XML_FILES_BYTES = 256 << 20, /* of all of them together, as often as they are included */
+	XML_FILES_BYTES = 256 << 20, /* total, counted once per inclusion */
 	XML_MEMORY_MAX = 1 << 30,    /* bytes of the tree */
 };
 
 struct xml_tree {
-	struct xml_element *root; /* <scene>; includes stand as <scene> elements in the place of <include> */
+	struct xml_element *root; /* <scene>; each include is replaced by a <scene> element */
 	bool dialect_3;
 	uint32_t element_count, include_count, path_count, note_count, missing_count;
 	const char *includes[XML_FILES_MAX]; /* names of included files; repeated where included more than once */
@@ -41,7 +41,7 @@ struct xml_tree {
 		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
 };
 
-/* Elements for which this holds, and all inside them, are marked ignored. */
+/* Elements for which this is true are marked ignored, with everything inside. */
 bool xml_is_foreign(const char *element);
 
 int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,

@@ -5,8 +5,8 @@
 
 static const struct param params[] = {{"face_normals", IGNORED}, SHAPE_PARAMS_END};
 
-/* Each face with its normal and the directions in which u and v grow, as on Mitsuba's cube. Some are left-handed:
- * mesh_finish winds the triangles by their normals. */
+/* Each face with its normal and the directions of u and v, as on Mitsuba's cube. Some are left-handed: mesh_finish
+ * winds the triangles by their normals. */
 static const struct face {
 	vec3 n, u, v;
 } faces[6] = {

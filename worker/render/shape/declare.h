@@ -9,12 +9,12 @@
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
 #define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 #define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
-/* Of meshes from files (smooth.h). */
+/* For meshes from files (smooth.h). */
 #define MESH_SMOOTH_PARAM                                                                   \
 	{                                                                                   \
 		"max_smooth_angle", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 180, NULL \
 	}
-/* What every shape knows, and the end of its table. */
+/* The parameters of every shape, and the end of its table. */
 #define SHAPE_PARAMS_END                                                                     \
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)}, \
 		{"silhouette_sampling_weight", IGNORED}, DISPLACE_PARAMS,                    \

@@ -5,7 +5,7 @@
 
 static const struct param params[] = {SHAPE_PARAMS_END};
 
-/* The centre once for each triangle: every one has a v of its own there. */
+/* The centre once per triangle, because each has another v there. */
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * run() cuts every triangle by way of the grid (displace_grid.h): each point is sampled with position, normal and
- * height, moved, and given the displaced surface's normal by differences; points of edges and corners are added up at
- * their place first and settled afterwards, so that neighbours agree to the bit.
+ * run() divides every triangle by the grid (displace_grid.h): each point is sampled with position, normal and height,
+ * moved, and given the displaced surface's normal by differences. Points on edges and corners are accumulated at their
+ * place first and finalised afterwards, so that neighbours agree to the bit.
  *
- * Failures: more triangles than a mesh may have (before any memory is taken), heights that are not finite, no memory.
+ * Failures: more triangles than a mesh may have (before memory is allocated), heights that are not finite, no memory.
  */
 #include "worker/render/shape/displace.h"
 
@@ -14,19 +14,19 @@
 
 #include <string.h>
 
-/* Normals that differ by less than a thousandth of a radian (those that files round) and heights by less than this
- * share of the largest are no crease. */
+/* Normals that differ by less than a thousandth of a radian (rounding in files), and heights that differ by less
+ * than this share of the largest, are not a crease. */
 #define CREASE_COSINE (1 - 1e-6)
 #define SEAM_HEIGHT 1e-9
 
-/* What the triangles around a place say about it. */
+/* What the triangles around a place contribute to it. */
 struct place {
-	vec3 p, direction, normal; /* sums but for p */
+	vec3 p, direction, normal; /* sums, except for p */
 	double weight, height, least, most;
 	bool seen, bent;
 };
 
-/* How the triangles around a border vertex turned. */
+/* The rotation of the triangles around a border vertex. */
 struct turn {
 	vec3 sum;
 	double weight;
@@ -34,7 +34,7 @@ struct turn {
 
 struct work {
 	const struct displacement *d;
-	const struct sphere *sphere; /* NULL: the base mesh is the surface */
+	const struct sphere *sphere; /* NULL: the surface is the base mesh */
 	struct mesh base, *out;
 	struct displace_grid grid;
 	struct place *places;
@@ -42,7 +42,7 @@ struct work {
 	double highest;
 };
 
-/* The undisplaced surface at a point, and the height there. */
+/* The surface at a point before displacement, and the height there. */
 struct sample {
 	vec3 p, n;
 	double u, v, h;
@@ -59,7 +59,7 @@ static vec3 axis(const struct sphere *s, int k)
 	return (vec3){s->to_world.m[0][k], s->to_world.m[1][k], s->to_world.m[2][k]};
 }
 
-/* u runs on beyond the octant's own quarter, and at the poles is its middle. */
+/* u continues beyond the octant's own quarter, and at the poles is its middle. */
 static void sphere_sample(const struct sphere *ball, uint32_t octant, vec3 out, struct sample *s)
 {
 	vec3 w = vec3_normalize(out);
@@ -104,7 +104,7 @@ static vec3 normal_or(vec3 v, vec3 otherwise)
 	return length > 0 && isfinite(length) ? vec3_scale(1 / length, v) : otherwise;
 }
 
-/* Differences over two steps, which may lead out of the triangle: there its plane, normals and (u,v) go on. */
+/* Differences over two steps, which may leave the triangle: its plane, normals and (u,v) are continued there. */
 static vec3 displaced_normal(const struct work *w, uint32_t triangle, double b1, double b2, const struct sample *at)
 {
 	double step = 1.0 / w->grid.parts;
@@ -142,7 +142,7 @@ static void add_to_place(struct place *c, double weight, const struct sample *s,
 	c->weight += weight;
 }
 
-/* Of the finer mesh's vertex, as its texture coordinates. */
+/* Of the finer mesh's vertex, for its texture coordinates. */
 static void mix_attributes(const struct work *w, uint32_t triangle, double b1, double b2, uint32_t vertex)
 {
 	const uint32_t *t = w->base.index[triangle];
@@ -192,7 +192,7 @@ static void put_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_t j
 	add_to_place(&w->places[at.place], weight, &s, normal);
 }
 
-/* Opposite sheets that meet have no direction in common: their places stay. */
+/* Opposite sheets that touch have no common direction: their places do not move. */
 static void settle_place(const struct work *w, struct place *c)
 {
 	double length = vec3_length(c->direction), height = c->height / c->weight;
@@ -343,8 +343,8 @@ static bool split_flat(struct mesh *m, const struct mesh *from, struct arena *ar
 	return true;
 }
 
-/* Normals hold the directions from the centre. Octants are numbered by quarter of longitude, the lower half from 4 on.
- */
+/* Normals are the directions from the centre. Octants are numbered by quarter of longitude, the lower half from 4
+ * on. */
 static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena *arena)
 {
 	if (!mesh_alloc(m, 24, 8, true, true, arena))

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A primitive of a glTF 2.0 mesh, as numbers in a buffer: `position`, `normal`, `texcoord` and `index` are each "first
- * stride count type", bytes from the buffer's beginning, type one of f32 u8 u16 u32 (of texture coordinates u8 and u16
- * stand for 0 to 1). The reader of glTF scenes (worker/render/scene/gltf.h) writes them; nothing is believed of them
- * here.
+ * stride count type", with bytes from the buffer's beginning and type one of f32 u8 u16 u32 (texture coordinates in u8
+ * and u16 represent 0 to 1). The reader of glTF scenes (worker/render/scene/gltf.h) writes them; everything is checked
+ * again here.
  *
- * Failures: numbers that lead out of the buffer, indices out of range, more vertices or triangles than a mesh may have.
+ * Failures: numbers that exceed the buffer, indices out of range, more vertices or triangles than a mesh may have.
  */
 #include "worker/render/scene/asset_part.h"
 #include "worker/render/scene/number.h"
@@ -44,7 +44,7 @@ struct accessor {
 	enum number_type type;
 };
 
-/* 1: there is none. */
+/* 1: the property is absent. */
 static int read_accessor(struct accessor *a, const struct scene_node *n, const char *name, unsigned components,
 			 unsigned allowed, const struct asset_part *buffer, struct error *e)
 {
@@ -95,7 +95,7 @@ static uint64_t triangles_of(enum mode mode, uint64_t corners)
 	return mode == TRIANGLES ? corners / 3 : corners > 2 ? corners - 2 : 0;
 }
 
-/* Corner k of triangle t among the indices: of a strip every second triangle is turned round. */
+/* Corner k of triangle t among the indices; in strips every second triangle is reversed. */
 static uint64_t corner_of(enum mode mode, uint64_t t, unsigned k)
 {
 	if (mode == TRIANGLES)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes that hold others: `merge` is all that are in it, `shapegroup` is there for `instance` to refer to, which is
- * all of it somewhere else. They are resolved before anything is built (group.h).
+ * Shapes that hold others: `merge` stands for everything in it; a `shapegroup` exists for `instance` to refer to, which
+ * places all of it somewhere else. They are resolved before anything is built (group.h).
  */
 #include "worker/render/shape/group.h"
 
@@ -80,7 +80,7 @@ static int list(struct listing *l, const struct scene_node *n, const struct scen
 	return append(l, n, instance);
 }
 
-/* A node, and where it is listed. */
+/* A node, and its position in the list. */
 struct use {
 	uintptr_t node;
 	uint32_t at;
@@ -94,7 +94,7 @@ static int compare_uses(const void *x, const void *y)
 	return a->at < b->at ? -1 : a->at > b->at;
 }
 
-/* Where nodes lie in memory decides about nothing: of equal ones the first of the list counts. */
+/* Addresses must not affect the result: of equal nodes the first in the list counts. */
 static int find_uses(struct listing *l)
 {
 	uint32_t n = 0;

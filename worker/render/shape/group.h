@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The shapes of a scene one by one: what is in a `merge`, and for each `instance` all that is in its `shapegroup`, to
- * be placed by the instance's to_world after its own. Whether an instance shares its mesh with others or is built as if
- * it were written out is up to the builder of the world.
+ * The shapes of a scene as a flat list: the contents of each `merge`, and for each `instance` the contents of its
+ * `shapegroup`, placed by the instance's to_world after their own. Whether an instance shares its mesh or is copied is
+ * decided by the builder of the world.
  */
 #ifndef WORKER_RENDER_SHAPE_GROUP_H
 #define WORKER_RENDER_SHAPE_GROUP_H
@@ -12,9 +12,9 @@
 enum { SHAPES_MAX = 1 << 20 };
 
 struct listed_shape {
-	const struct scene_node *node;	   /* as it is in the file */
-	const struct scene_node *instance; /* whose to_world comes after the node's; NULL: none */
-	uint32_t first, uses; /* the first in the list of those that are the same node in instances; how many */
+	const struct scene_node *node;	   /* as in the file */
+	const struct scene_node *instance; /* whose to_world is applied after the node's; NULL: none */
+	uint32_t first, uses;		   /* the first in the list of those that instantiate the same node; how many */
 };
 
 /* In the file's order, in the arena. -EINVAL, -ENOTSUP, -E2BIG with a sentence, -ENOMEM. */

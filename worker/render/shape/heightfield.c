@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A picture's luminance as heights over the square from (-1,-1) to (1,1), along z and times `scale`: the height field
- * of Mitsuba 0.6. Each pixel is a vertex, the top row lies at y = -1, and texture coordinates run over the square as
- * x and y do. Between four pixels are two triangles, where Mitsuba has a bilinear patch.
+ * An image's luminance as heights over the square from (-1,-1) to (1,1), along z and times `scale`: the height field of
+ * Mitsuba 0.6. Each pixel is a vertex, the top row is at y = -1, and texture coordinates run over the square with x and
+ * y. Between four pixels are two triangles, where Mitsuba has a bilinear patch.
  *
- * Shading normals are Mitsuba's: in units of pixels, the mean of the unit normals that the patches around have in that
- * corner. Mitsuba resamples pictures to sides of 2^n + 1 pixels first; here they stay as they are.
+ * Shading normals are Mitsuba's: in units of pixels, the mean of the unit normals that the adjacent patches have in
+ * that corner. Mitsuba resamples images to sides of 2^n + 1 pixels first; here they are used unchanged.
  *
- * Failures: neither a file nor a bitmap, a picture of less than 2 x 2 pixels or of more than a mesh has room for.
+ * Failures: neither a file nor a bitmap, an image of less than 2 x 2 pixels or of more than a mesh may have.
  */
 #include "worker/render/scene/image.h"
 #include "worker/render/shape/declare.h"
@@ -21,7 +21,7 @@ static const struct param params[] = {
 	{"filename", UNDERSTOOD(VALUE_STRING)},
 	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL},
 	{"shading_normals", UNDERSTOOD(VALUE_BOOL)},
-	{"width", IGNORED}, /* of textures that are no pictures, which are refused */
+	{"width", IGNORED}, /* of textures that are not images, which are refused */
 	{"height", IGNORED},
 	SHAPE_PARAMS_END,
 };
@@ -40,7 +40,7 @@ static double height_at(const struct field *f, uint32_t x, uint32_t y)
 	return f->scale * z;
 }
 
-/* The picture is decoded as one of colours is, unless its texture says that it holds numbers. */
+/* The image is decoded like colours, unless its texture says that it contains numbers. */
 static int read_picture(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 			struct image *out, struct error *e)
 {
@@ -77,7 +77,7 @@ static void add(double *normal, double x, double y)
 	normal[2] += 1 / length;
 }
 
-/* In units of pixels first, then of the square, which is as wide as `cells` pixels are apart over 2. */
+/* In units of pixels first, then of the square, whose half width is `cells` / 2 pixel distances. */
 static void set_normals(const struct field *f, struct mesh *m, double across, double along)
 {
 	uint32_t width = f->picture.width, height = f->picture.height;

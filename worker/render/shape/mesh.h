@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Meshes while they are built: object space, normals perhaps missing. One thread; arrays in the arena given.
+ * Meshes while they are built: in object space, possibly without normals. One thread; arrays in the given arena.
  */
 #ifndef WORKER_RENDER_SHAPE_MESH_H
 #define WORKER_RENDER_SHAPE_MESH_H
@@ -21,9 +21,8 @@ struct mesh {
 
 enum { MESH_TRIANGLES_MAX = 1 << 27 };
 #define MESH_COORDINATE_MAX PARAM_LENGTH_MAX
-#define MESH_UV_MAX                                                                                                    \
-	1e12 /* a double has a ten-thousandth of a texture's width there, and tangents are no shorter than 1e-12 of an \
-		edge */
+/* A double then resolves a ten-thousandth of a texture's width, and tangents are at least 1e-12 of an edge. */
+#define MESH_UV_MAX 1e12
 
 static inline vec3 mesh_load(const double v[3])
 {
@@ -42,7 +41,7 @@ static inline double mesh_angle(vec3 a, vec3 b)
 	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
 }
 
-/* v without its length, however long it is; 0 where it has none, or is not finite. */
+/* v normalised, however long it is; 0 if it has no length, or is not finite. */
 vec3 mesh_unit(vec3 v);
 
 /* The file that a shape names; the caller closes it. */
@@ -51,15 +50,15 @@ int mesh_open(const struct scene_node *n, const struct asset_source *assets, str
 /* Allocates the arrays; false: out of memory. */
 bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena);
 
-/* Adds an attribute of zeros to a mesh that has room for `room` of them; NULL: out of memory. */
+/* Adds an attribute of zeros to a mesh with room for `room` of them; NULL: out of memory. */
 struct attribute *mesh_add_attribute(struct mesh *m, const char *name, bool per_face, uint32_t channels, uint32_t room,
 				     struct arena *arena);
 
-/* The numbers beyond are taken as damaged, as those that are not finite are. */
+/* Numbers beyond this count as damaged, like those that are not finite. */
 #define MESH_ATTRIBUTE_MAX 1e12
 void mesh_set_attribute(struct attribute *a, size_t item, uint32_t channel, double x);
 
-/* Triangle `from` becomes triangle `to`, in the attributes. */
+/* Triangle `from` becomes triangle `to` in the attributes. */
 void mesh_move_face(struct mesh *m, uint32_t from, uint32_t to);
 
 /* Vertex i; n: a unit vector. */

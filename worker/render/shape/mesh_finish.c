@@ -37,7 +37,7 @@ static int place_vertices(struct mesh *m, const struct mesh_finish *f, const str
 			return node_error(n, e, ERANGE, "a texture coordinate lies beyond %g", MESH_UV_MAX);
 		if (!m->normal)
 			continue;
-		/* Normals come as unit vectors or as nothing; scaling first keeps tiny and huge transforms in range. */
+		/* Normals become unit vectors or missing; scaling first keeps tiny and huge transforms in range. */
 		vec3 normal = mat4_normal(&inverse, mesh_load(m->normal[i]));
 		double largest = fmax(fabs(normal.x), fmax(fabs(normal.y), fabs(normal.z)));
 		normal = largest > 0 && isfinite(largest) ? vec3_normalize(vec3_scale(1 / largest, normal))
@@ -65,8 +65,8 @@ static uint64_t drop_flat(struct mesh *m)
 	return dropped;
 }
 
-/* Where a file's normals and winding contradict each other, the normals are believed, as Mitsuba's emitters and
- * materials do. */
+/* If a file's normals and winding contradict each other, the normals are used, as by Mitsuba's emitters and
+ * materials. */
 static void wind_by_normals(struct mesh *m)
 {
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -93,7 +93,7 @@ static void add_corner_normals(struct mesh *m, const uint32_t t[3], const double
 	}
 }
 
-/* Opposite triangles may cancel; any of them is better than no normal. */
+/* Opposite triangles may cancel; then any of their normals is used. */
 static void fill_cancelled(struct mesh *m)
 {
 	for (uint32_t i = 0; i < m->triangle_count; i++)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is the same for all meshes once they have been read. One thread; arrays in the arena given. */
+/* The steps that all meshes share after they have been read. One thread; arrays in the given arena. */
 #ifndef WORKER_RENDER_SHAPE_MESH_FINISH_H
 #define WORKER_RENDER_SHAPE_MESH_FINISH_H
 
@@ -8,15 +8,15 @@
 struct mesh_finish {
 	mat4 to_world;
 	bool flip_normals, face_normals;
-	double smooth_angle; /* degrees: normals anew across edges that are less sharp (smooth.h); negative: as they are
+	double smooth_angle; /* degrees: new normals across edges that are less sharp (smooth.h); negative: keep normals
 			      */
 };
 
 /*
- * From object to world space. Drops triangles without area. Where normals are not unit vectors they count as missing
- * and are computed from the triangles around, weighted by their angles there; face_normals: there are none after all.
- * The outside stays the outside under mirrors. Triangles are wound counter-clockwise as seen from outside, which is
- * the side of their vertices' normals.
+ * Transforms from object to world space. Drops triangles without area. Normals that are not unit vectors count as
+ * missing and are computed from the adjacent triangles, weighted by angle; face_normals removes all. Mirrors do not
+ * swap inside and outside. Triangles are wound counter-clockwise as seen from outside, which is the side of their
+ * vertices' normals.
  */
 int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped,
 		const struct scene_node *n, struct error *e);

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Stanford PLY: ascii and both byte orders, any order of elements and properties.
+ * Stanford PLY: ascii and both byte orders, with any order of elements and properties.
  *
- * The header says how the bytes behind it are laid out. A first pass over the faces counts triangles, so that memory is
- * taken once; a second pass reads. Of vertices x y z, nx ny nz and u v (or s t) count, of faces vertex_indices (or
- * vertex_index); polygons become fans of triangles. All other numbers of vertices and faces are attributes: integers
- * stand for 0 to 1 and are decoded from sRGB, as Mitsuba does. Lists and other elements are stepped over.
+ * The header describes the data. A first pass over the faces counts triangles, so that memory is allocated once; a
+ * second pass reads. Vertices have x y z, nx ny nz and u v (or s t), faces vertex_indices (or vertex_index); polygons
+ * become fans of triangles. All other numbers of vertices and faces are attributes: integers represent 0 to 1 and are
+ * decoded from sRGB, as in Mitsuba. Lists and other elements are skipped.
  *
- * Failures: a header that is none, a file that ends too early, indices out of range, numbers that are not finite. No
- * count of the header is believed before the file was seen to be long enough for it.
+ * Failures: an invalid header, a file that ends too early, indices out of range, numbers that are not finite. Counts in
+ * the header are checked against the file's size before anything is allocated.
  */
 #include "common/base/liveness.h"
 #include "worker/render/scene/number.h"
@@ -21,7 +21,7 @@
 #include <string.h>
 
 enum { PROPERTIES_MAX = 64, ELEMENTS_MAX = 16, WORD_MAX = 64, TICK_INTERVAL = 4096 };
-/* A polygon's numbers count for each of its triangles: no more of them than this a byte of the file. */
+/* A polygon's numbers apply to each of its triangles: at most this many per byte of the file. */
 enum { ATTRIBUTE_VALUES_PER_BYTE = 8, ATTRIBUTE_VALUES_ALWAYS = 1 << 20 };
 
 enum scalar { SCALAR_NONE, INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64 };
@@ -33,7 +33,7 @@ enum format { FORMAT_ASCII, FORMAT_LITTLE, FORMAT_BIG };
 enum role { ROLE_NONE = -1, ROLE_X, ROLE_Y, ROLE_Z, ROLE_NX, ROLE_NY, ROLE_NZ, ROLE_U, ROLE_V, ROLES, ROLE_INDICES };
 
 struct ply_property {
-	enum scalar type, count_type; /* of a list's length; SCALAR_NONE: it is no list */
+	enum scalar type, count_type; /* type of a list's length; SCALAR_NONE: not a list */
 	enum role role;
 	bool in_attribute;
 	uint32_t group, channel; /* of the attribute */
@@ -48,8 +48,8 @@ struct element {
 	uint32_t property_count;
 	struct ply_property properties[PROPERTIES_MAX];
 	struct attribute_groups groups;
-	bool integers[ATTRIBUTE_GROUPS_MAX];		    /* by group: what it is stored as */
-	struct attribute *attributes[ATTRIBUTE_GROUPS_MAX]; /* by group; NULL: none is wanted */
+	bool integers[ATTRIBUTE_GROUPS_MAX];		    /* by group: the attribute it is stored in */
+	struct attribute *attributes[ATTRIBUTE_GROUPS_MAX]; /* by group; NULL: none is stored */
 };
 
 struct ply {
@@ -65,7 +65,7 @@ struct ply {
 	uint64_t triangles;
 	struct mesh *mesh;
 	bool flip;
-	const bool *srgb; /* what the shape says of its colours; NULL: nothing */
+	const bool *srgb; /* the shape's `srgb`; NULL: not given */
 };
 
 static const struct param params[] = {
@@ -78,7 +78,7 @@ static const struct param params[] = {
 	SHAPE_PARAMS_END,
 };
 
-/* A word of the header's line; false: the line ends. */
+/* A word of the header's line; false: end of the line. */
 static bool next_word(struct ply *f, char word[WORD_MAX])
 {
 	while (f->p < f->end && (*f->p == ' ' || *f->p == '\t' || *f->p == '\r'))
@@ -196,7 +196,7 @@ static int read_property(struct ply *f)
 		return header_error(f, "indices must be whole numbers");
 	for (uint32_t i = 0; i < el->property_count && p.role != ROLE_NONE; i++)
 		if (el->properties[i].role == p.role)
-			p.role = ROLE_NONE; /* u and s may both be there */
+			p.role = ROLE_NONE; /* u and s may both be present */
 	if (p.role >= 0 && p.role < ROLES)
 		f->has[p.role] = true;
 	if (p.role == ROLE_NONE && !list && el->kind != ELEMENT_OTHER)
@@ -339,18 +339,18 @@ static int store_vertex(struct ply *f, const struct element *el, uint64_t i, con
 	return 0;
 }
 
-/* Whole numbers stand for 0 to 1. */
+/* Integers represent 0 to 1. */
 static double attribute_number(const struct ply *f, enum scalar type, double x)
 {
 	static const double largest[] = {[INT8] = 0x7f,	    [UINT8] = 0xff,	  [INT16] = 0x7fff,
 					 [UINT16] = 0xffff, [INT32] = 0x7fffffff, [UINT32] = 0xffffffff};
 	bool whole = type < FLOAT32, encoded = f->srgb ? *f->srgb : whole;
 	x = whole ? x / largest[type] : x;
-	/* What is out of range stays so; no power of it is a finite number. */
+	/* Out of range stays out of range: no power of it is finite. */
 	return encoded && fabs(x) <= MESH_ATTRIBUTE_MAX ? srgb_to_linear(x) : x;
 }
 
-/* The numbers of item i, whose triangles, of a face, are those from `first` on. */
+/* The numbers of item i; a face's triangles are those from `first` on. */
 static void store_attributes(const struct ply *f, const struct element *el, uint64_t i, uint64_t first,
 			     const double x[PROPERTIES_MAX])
 {
@@ -390,7 +390,7 @@ static int read_item(struct ply *f, const struct element *el, uint64_t i)
 	return el->kind == ELEMENT_VERTEX && f->mesh->position ? store_vertex(f, el, i, v) : 0;
 }
 
-/* The least that one item takes: a digit and a blank each in ascii. */
+/* The minimum size of an item: in ascii a digit and a blank per number. */
 static uint64_t least_bytes(const struct ply *f, const struct element *el)
 {
 	uint64_t n = 0;
@@ -402,7 +402,7 @@ static uint64_t least_bytes(const struct ply *f, const struct element *el)
 	return n;
 }
 
-/* All behind the header: once without arrays, to count and to check, once with. */
+/* Everything after the header: once without arrays, to count and to check, and once with them. */
 static int read_body(struct ply *f)
 {
 	f->triangles = 0;
@@ -447,7 +447,7 @@ static int check_header(struct ply *f)
 	return 0;
 }
 
-/* Room for the attributes of an element, whose count may not be believed but with the file's size. */
+/* Room for the attributes of an element, whose count is checked against the file's size. */
 static int add_attributes(struct ply *f, struct element *el, uint64_t bytes, struct arena *arena)
 {
 	uint64_t items = el->kind == ELEMENT_FACE ? f->triangles : f->mesh->vertex_count, values = 0;

@@ -5,10 +5,10 @@
 
 #include "worker/render/shape/mesh.h"
 
-/* Corners in a circle: (u, v) of each. */
+/* Corners in order around it: (u, v) of each. */
 extern const double quad_corner[4][2];
 
-/* Two triangles, `triangle` and the one behind it, of the vertices first .. first+3 in a circle. */
+/* Two triangles, `triangle` and the next, with the vertices first .. first+3 in order around it. */
 void quad_set(struct mesh *m, uint32_t triangle, uint32_t first);
 
 #endif

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Mitsuba's own binary meshes (.serialized, versions 3 and 4): any number of meshes in one file, each compressed by
- * itself, found through a table of offsets at the file's end; `shape_index` says which.
+ * itself, found through a table of offsets at the file's end; `shape_index` selects one.
  *
- * A mesh is a number of fixed meaning, a version, and behind these a zlib stream: flags, a name (version 4), counts,
- * positions, normals, texture coordinates and colours as the flags say, triangles. All is little endian.
+ * A mesh is a magic number, a version, and a zlib stream: flags, a name (version 4), counts, positions, then normals,
+ * texture coordinates and colours by the flags, and triangles. Everything is little endian.
  *
- * Failures: a table that leads out of the file, a stream that is damaged or ends too early, indices out of range,
- * numbers that are not finite. Counts are believed only as far as the compressed bytes could hold them.
+ * Failures: a table that exceeds the file, a stream that is damaged or ends too early, indices out of range, numbers
+ * that are not finite. Counts are checked against what the compressed bytes could hold.
  */
 #include "common/base/bytes.h"
 #include "common/base/liveness.h"
@@ -20,7 +20,7 @@
 #include <zlib.h>
 
 enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, NAME_MAX_BYTES = 1 << 16, CHUNK_ITEMS = 1024 };
-enum { ZLIB_RATIO = 1032 /* a byte of deflate stands for at most so many */ };
+enum { ZLIB_RATIO = 1032 /* a byte of deflate represents at most this many */ };
 enum { HAS_NORMALS = 1, HAS_UV = 2, HAS_COLOURS = 8, HAS_FACE_NORMALS = 16, DOUBLES = 0x2000 };
 
 struct stream {
@@ -28,7 +28,7 @@ struct stream {
 	const char *name;
 	struct error *error;
 	z_stream z;
-	uint64_t most; /* bytes that it can hold */
+	uint64_t most; /* bytes that it can represent */
 };
 
 static const struct param params[] = {
@@ -109,7 +109,7 @@ static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint3
 	return 0;
 }
 
-/* Linear, and as Mitsuba 3 names them. */
+/* Linear, with Mitsuba 3's name. */
 static int take_colours(struct stream *s, bool doubles, struct mesh *m, struct arena *arena)
 {
 	enum { AT_ONCE = 256 };
@@ -148,7 +148,7 @@ static int take_triangles(struct stream *s, struct mesh *m)
 	return 0;
 }
 
-/* The stream's checksum stands at its end. What follows the triangles without being damaged is nobody's. */
+/* The stream's checksum is at its end. Undamaged data after the triangles is ignored. */
 static int check_end(struct stream *s)
 {
 	unsigned char beyond;
@@ -195,7 +195,7 @@ static int take_mesh(struct stream *s, int version, struct arena *arena, struct 
 	return r;
 }
 
-/* Where mesh `index` begins and ends. The last four bytes count the meshes; before them stand their offsets. */
+/* Where mesh `index` begins and ends. The last four bytes are the number of meshes; their offsets precede it. */
 static int find_mesh(const struct stream *s, const struct asset *a, uint64_t index, size_t *begin, size_t *end)
 {
 	enum { HEAD = 4 };

@@ -7,22 +7,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of pairs: so many, and as many as corners have when 64 triangles without a common direction meet in each place. */
+/* Limits of pairs: this many, and as many as there are if 64 triangles without a common direction meet in each
+ * place. */
 #define COMPARED_MAX(corners) (((uint64_t)1 << 28) + 64 * (uint64_t)(corners))
 enum { TICK_EVERY = 1 << 16 };
 
 struct corner {
 	double key[5]; /* position, texture coordinates */
-	uint32_t at;   /* 3 times the triangle, and which of its corners */
+	uint32_t at;   /* 3 times the triangle, plus the corner */
 };
 
 struct smoothing {
 	struct mesh *m;
-	struct corner *corners; /* sorted; those that have a vertex again are moved to the front of their place */
+	struct corner *corners; /* sorted; those that already have a vertex are moved to the front of their place */
 	double (*normal)[3];	/* of each triangle */
 	double least;		/* cosine */
 	struct mesh out;
-	uint32_t *origin; /* of each vertex of `out`, the one in m that has its attributes */
+	uint32_t *origin; /* by vertex of `out`: the one in m with its attributes */
 	uint64_t compared;
 };
 
@@ -86,7 +87,7 @@ static bool same_attributes(const struct mesh *m, uint32_t v, uint32_t w)
 	return true;
 }
 
-/* Those of faces stay: triangles keep their places. */
+/* Attributes of faces are kept: triangles keep their numbers. */
 static bool take_attributes(struct smoothing *s, struct arena *arena)
 {
 	s->out.attribute_count = s->m->attribute_count;
@@ -113,7 +114,7 @@ static bool smooth_across(const struct smoothing *s, const struct corner *a, con
 	       same_attributes(s->m, old_vertex(s, a), old_vertex(s, b));
 }
 
-/* The corners of one place; false: too many of them. */
+/* The corners of one place; false: too many. */
 static bool share_vertices(struct smoothing *s, struct corner *c, size_t count)
 {
 	while (count > 0) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A true sphere. What to_world scales unevenly is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with the
- * ellipsoid's own normals.
+ * An exact sphere. Scaled unevenly by to_world it is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with exact
+ * normals.
  */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
@@ -14,7 +14,7 @@ static const struct param params[] = {
 	SHAPE_PARAMS_END,
 };
 
-/* Written matrices have six digits: that much unevenness passes for a similarity. */
+/* Matrices in files have six digits: this much unevenness counts as a similarity. */
 #define SIMILARITY_TOLERANCE 1e-4
 
 enum { ELLIPSOID_LEVEL = 6 };

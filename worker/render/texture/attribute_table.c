@@ -59,7 +59,7 @@ const struct attribute *attribute_find(const struct attribute_table *t, const ch
 	return a;
 }
 
-/* FNV-1a over words; what it finds is compared. */
+/* FNV-1a over words; matches are compared. */
 static uint64_t hash_of(const float *value, size_t count)
 {
 	uint64_t h = 0xcbf29ce484222325;
@@ -91,7 +91,7 @@ const struct attribute_values *attribute_keep(struct attribute_table *t, const s
 {
 	size_t count = (size_t)(a->per_face ? t->triangle_count : t->vertex_count) * a->channels;
 	t->asked = true;
-	/* Before it is compared: what the pool holds is decoded. */
+	/* Decoded before it is compared, because the pool holds decoded numbers. */
 	float *own = NULL;
 	if (decode) {
 		own = arena_alloc(arena, count, sizeof *own);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An image file. (u,v) = (0,0) is the upper left corner of the picture in both dialects: Mitsuba's loaders of OBJ files
- * turn v over (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Interpolation is of linear
- * rgb; trilinear and ewa, which 0.5/0.6 offer, become bilinear: there are no footprints here, samples do the filtering.
+ * An image file. (u,v) = (0,0) is the upper left corner of the image in both dialects: Mitsuba's OBJ loaders invert v
+ * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Linear rgb is interpolated; trilinear
+ * and ewa of 0.5/0.6 become bilinear, since there are no footprints: sampling does the filtering.
  */
 #include "worker/render/texture/raster.h"
 #include "worker/render/texture/texture.h"
@@ -11,7 +11,7 @@
 #include <float.h>
 #include <string.h>
 
-enum { BOUND_PIXELS_MAX = 1 << 22 }; /* beyond that many the upper bound is not sought pixel by pixel */
+enum { BOUND_PIXELS_MAX = 1 << 22 }; /* with more pixels, the upper bound is not searched pixel by pixel */
 
 struct bitmap {
 	struct raster raster;
@@ -87,7 +87,7 @@ static spectrum bitmap_eval(const struct texture *t, const struct texture_point 
 	return b->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
 }
 
-/* Of a coloured picture the luminance. */
+/* The luminance of coloured images. */
 static double bitmap_height(const struct texture *t, double u, double v)
 {
 	const struct bitmap *b = t->data;

@@ -37,7 +37,7 @@ static double checkerboard_height(const struct texture *t, double u, double v)
 	return texture_height(square_at(t->data, u, v), u, v);
 }
 
-/* Squares have no slope between them. */
+/* The derivative is 0 between the edges. */
 static void checkerboard_jet(const struct texture *t, double u, double v, struct texture_jet *j)
 {
 	texture_jet(square_at(t->data, u, v), u, v, j);

@@ -36,7 +36,7 @@ double color_d65(double nm)
 #define STEP(x) ((x) * (x) * (3 - 2 * (x)))
 #define VALUE(k) STEP(STEP((double)(k) / (UPSAMPLE_TABLE_SIZE - 1)))
 #define VALUES(k) VALUE(k), VALUE((k) + 1), VALUE((k) + 2), VALUE((k) + 3)
-/* upsample_table_value, computed once: it is asked for at every textured vertex. */
+/* upsample_table_value, computed once: it is used at every textured vertex. */
 static const double values[UPSAMPLE_TABLE_SIZE] = {VALUES(0),  VALUES(4),  VALUES(8),  VALUES(12),
 						   VALUES(16), VALUES(20), VALUES(24), VALUES(28)};
 
@@ -107,7 +107,7 @@ struct color color_constant(double x)
 	return (struct color){.shape = COLOR_SHAPE_CONSTANT, .scale = x};
 }
 
-/* The same number at all wavelengths, or the white of the role. */
+/* The same value at all wavelengths, or the role's white. */
 static struct color color_white(double x, enum color_role role)
 {
 	struct color c = color_constant(x);
@@ -127,7 +127,7 @@ static void coefficients_in_nm(const double t[3], double nm[3])
 	nm[2] = t[0] * r * r * center * center - t[1] * r * center + t[2];
 }
 
-/* The largest number that a colour of the role may have: of textures, which cannot know it from their tables. */
+/* The largest number that a colour of the role may have: for textures, whose tables do not limit it. */
 static double role_max(enum color_role role)
 {
 	return role == COLOR_REFLECTANCE ? 1 : role == COLOR_ILLUMINANT ? PARAM_LIGHT_MAX : PARAM_METAL_MAX;
@@ -215,7 +215,7 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 	return 0;
 }
 
-/* The cell of nm in the table. Most tables are even: the first guess is then right. */
+/* The cell of nm in the table. Most tables are equidistant, so the first guess is right. */
 static uint32_t piece_of(const struct color *c, double nm)
 {
 	uint32_t last = c->count - 2, low = 0, high = c->count - 1;
@@ -274,7 +274,7 @@ spectrum color_eval(const struct color *c, const struct wavelengths *w)
 	return eval_lanes(c, w, SPECTRUM_LANES);
 }
 
-/* The polynomial's greatest value: at an end of the range, or at its vertex. */
+/* The polynomial's maximum: at an end of the range, or at its vertex. */
 static double sigmoid_max(const double c[3])
 {
 	double nm[3] = {WAVELENGTH_MIN, WAVELENGTH_MAX, WAVELENGTH_MIN};

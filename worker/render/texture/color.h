@@ -11,8 +11,8 @@
 #include "worker/render/math/spectrum.h"
 #include "worker/render/scene/scene.h"
 
-/* The last two are of textures only, plain numbers of either sign and no spectrum: a height that displaces, whose
- * pictures are taken as they are stored, and what bends normals, whose pictures are decoded as those of colours are. */
+/* The last two are for textures only, plain numbers of either sign rather than spectra: displacement heights, whose
+ * images are used as stored, and relief, whose images are decoded like colours. */
 enum color_role { COLOR_REFLECTANCE, COLOR_ILLUMINANT, COLOR_UNBOUNDED, COLOR_HEIGHT, COLOR_RELIEF };
 
 static inline bool color_role_is_number(enum color_role r)
@@ -29,8 +29,8 @@ struct color {
 	bool d65;     /* times D65 / its normalisation */
 	bool sigmoid; /* times S(c0 x^2 + c1 x + c2), x = nm */
 	double coefficient[3];
-	uint32_t count;		  /* > 0: piecewise linear table instead; constant extension outside is 0 for emitters
-				     and the end value for others */
+	uint32_t count; /* > 0: piecewise linear table instead; extended by 0 for emitters and by the end values
+			   otherwise */
 	const double *nm, *value; /* in the arena */
 	bool zero_outside;
 };
@@ -42,16 +42,16 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 struct color color_constant(double x);
 spectrum color_eval(const struct color *c, const struct wavelengths *w);
 double color_max(const struct color *c);  /* upper bound over wavelengths */
-double color_mean(const struct color *c); /* over wavelengths as they are drawn, to choose among emitters */
+double color_mean(const struct color *c); /* averaged over wavelengths as they are drawn, to choose among emitters */
 
-/* Fast reflectance of many rgb values (textures): from a table of coefficients made at build time. rgb in [0,1]. */
+/* Fast reflectance for many rgb values (textures): from a table of coefficients made at build time. rgb in [0,1]. */
 spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w);
 double color_max_rgb_reflectance(const double rgb[3]); /* of that spectrum */
 /* The same for emitters: largest component x reflectance x D65. rgb >= 0. */
 spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w);
 double color_max_d65(void);
 
-/* D65 normalised so that an emitter of this spectrum has Rec. 709 (1,1,1); by linear interpolation. */
+/* D65 normalised so that an emitter with this spectrum has Rec. 709 (1,1,1); by linear interpolation. */
 double color_d65(double nm);
 
 #endif

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Numbers that a mesh has at its vertices, linear between them, or one for each triangle: `mesh_attribute` of 3.x, and
- * `vertexcolors` of 0.5/0.6, which are the attribute vertex_color. Colours are mixed as linear rgb and upsampled then;
- * one number is grey. Reflectances are clamped to [0,1], as those of pictures are.
+ * Numbers at the vertices of a mesh, interpolated linearly, or one per triangle: `mesh_attribute` of 3.x, and
+ * `vertexcolors` of 0.5/0.6, which is the attribute vertex_color. Colours are interpolated as linear rgb and then
+ * upsampled; one number is grey. Reflectances are clamped to [0,1], like those of images.
  *
- * Nothing here knows how an attribute changes with (u,v), so that it displaces nothing and bends no normals.
+ * Derivatives of an attribute by (u,v) are not known, so it cannot displace or bend normals.
  */
 #include "worker/render/texture/attribute_table.h"
 #include "worker/render/texture/texture.h"
@@ -128,7 +128,7 @@ static const struct param mesh_attribute_params[] = {
 	{.name = NULL},
 };
 
-/* They are made in roles alone that ask for neither a height nor a slope. */
+/* They are only made in roles that need neither a height nor a derivative. */
 const struct texture_ops texture_ops_mesh_attribute = {
 	.type = "mesh_attribute",
 	.params = mesh_attribute_params,

@@ -6,7 +6,7 @@
 struct picture_entry {
 	struct picture_key key;
 	struct picture picture;
-	double least, largest; /* what it was cut to; where nothing was cut: the pixels' own */
+	double least, largest; /* the range it was clamped to; if nothing was clamped: the pixels' own */
 	bool cut;
 	struct picture_entry *next;
 };

@@ -23,7 +23,7 @@ static int decode(struct raster *r, const struct scene_node *n, const struct ass
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
 
-/* Whether a pixel lay outside the range. */
+/* Whether a pixel was outside the range. */
 static bool cut_to(struct image *i, double threshold, const struct raster_range *range)
 {
 	size_t count = (size_t)i->width * i->height * i->channels;
@@ -95,7 +95,7 @@ static double wrap(double x, enum raster_wrap mode)
 	return y > 1 ? 2 - y : y;
 }
 
-/* A pixel's neighbour beyond the border: on the other side when repeated, itself when mirrored or clamped. */
+/* A pixel's neighbour beyond the border: on the other side if repeated, itself if mirrored or clamped. */
 static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
 {
 	if (i < 0)
@@ -105,7 +105,7 @@ static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
 	return (uint32_t)i;
 }
 
-/* The four pixels around a place, and how far it is from the first towards the others. */
+/* The four pixels around a position, and the fractions between them. */
 struct corners {
 	double c[4][3], fx, fy;
 };
@@ -148,7 +148,7 @@ void raster_eval(const struct raster *r, double u, double v, double rgb[3])
 		rgb[k] = between(&q, k);
 }
 
-/* Pixels a unit of u; below 0 where the picture runs backwards. */
+/* Pixels per unit of u; negative if the image is mirrored. */
 static double pixels_per_unit(double x, uint32_t pixels, enum raster_wrap mode)
 {
 	bool backwards = mode == RASTER_MIRROR && isfinite(x) && x - 2 * floor(0.5 * x) > 1;

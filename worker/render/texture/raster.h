@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An image as a function on the plane: u to the right, v DOWN, the unit square is the image once. Pixel centres lie at
+ * An image as a function on the plane: u to the right, v DOWN; the unit square is the image once. Pixel centres are at
  * ((i + 1/2) / width, (j + 1/2) / height). Immutable; any thread.
  */
 #ifndef WORKER_RENDER_TEXTURE_RASTER_H
@@ -17,16 +17,16 @@ struct raster {
 	struct image image;
 	enum raster_wrap wrap_u, wrap_v;
 	bool nearest;		/* else bilinear */
-	struct picture *shared; /* NULL: the pixels are nobody else's */
+	struct picture *shared; /* NULL: the pixels are not shared */
 };
 
 struct raster_range {
-	double least, largest; /* pixels beyond are clamped */
-	bool raw;	       /* integers are no sRGB, where the parameters raw and gamma do not say */
+	double least, largest; /* pixels outside are clamped */
+	bool raw;	       /* default of raw, unless the parameters raw or gamma are given */
 };
 
-/* Reads the picture that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: that one alone, as
- * three that are equal) and threshold (pixels become 1 from there on, and 0 below). */
+/* Reads the image that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: only that one, as
+ * three equal values) and threshold (pixels become 1 from there on, and 0 below). */
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		const struct raster_range *range, struct arena *arena, struct error *e);
 #define RASTER_PARAMS                                                                        \
@@ -40,7 +40,8 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	}
 
 void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
-/* The same with its derivatives by u and v, and the mixed one: the two others are 0 between pixel centres. */
+/* The same with its derivatives by u and v, and the mixed one: the other second derivatives are 0 between pixel
+ * centres. */
 struct raster_patch {
 	double x[3], du[3], dv[3], duv[3];
 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Another texture times a number or, of colours, a colour or, which is ours, a texture: 0.5/0.6. Reflectances end at 1.
- */
+/* Another texture times a number or, for colours, a colour or (ours) a texture: 0.5/0.6. Reflectances are limited to
+ * 1. */
 #include "worker/render/texture/texture.h"
 
 struct scale {
@@ -8,7 +8,7 @@ struct scale {
 	double factor;
 	struct color tint; /* its largest component is 1 */
 	bool tinted;
-	struct texture by; /* times this one; constantly 1 where there is none */
+	struct texture by; /* times this one; constantly 1 if there is none */
 	enum color_role role;
 };
 
@@ -105,7 +105,7 @@ static double scale_aspect(const struct texture *t)
 	return texture_aspect(&((const struct scale *)t->data)->inner);
 }
 
-/* What is cut off at 1 has another shape, unless it had none. */
+/* Clamping at 1 changes the shape of a spectrum, unless it is constant. */
 static enum color_shape scale_shape(const struct texture *t)
 {
 	const struct scale *s = t->data;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Textures: a colour, or a height, that may depend on (u,v). One file per plug-in and one line in texture_list.h.
+ * Textures: a colour or a height that may depend on (u,v). One file per plug-in and one line in texture_list.h.
  * Immutable after creation; any thread.
  */
 #ifndef WORKER_RENDER_TEXTURE_TEXTURE_H
@@ -12,10 +12,10 @@
 struct texture;
 struct attribute_table;
 
-/* Where on a surface a texture is looked up. */
+/* Where on a surface a texture is evaluated. */
 struct texture_point {
 	double u, v;   /* texture coordinates */
-	double b1, b2; /* barycentrics on the triangle `prim`; 0 on a sphere and where there is no surface */
+	double b1, b2; /* barycentrics on the triangle `prim`; 0 on a sphere and without a surface */
 	uint32_t prim;
 };
 
@@ -24,7 +24,7 @@ struct texture_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: what it is for lies on none */
+	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: there is no mesh */
 };
 
 /* Three numbers as a function of (u,v), with their first and second derivatives. */
@@ -40,11 +40,11 @@ struct texture_ops {
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
 		      const struct texture_build *build, struct error *e);
 	spectrum (*eval)(const struct texture *t, const struct texture_point *at, const struct wavelengths *w);
-	double (*height)(const struct texture *t, double u, double v); /* one made as COLOR_HEIGHT has nothing else */
-	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* the same of COLOR_RELIEF */
+	double (*height)(const struct texture *t, double u, double v); /* for COLOR_HEIGHT, which has nothing else */
+	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* the same for COLOR_RELIEF */
 	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
 	enum color_shape (*shape)(const struct texture *t);
-	double (*aspect)(const struct texture *t); /* width over height of the picture; NULL: 1 */
+	double (*aspect)(const struct texture *t); /* width over height of the image; NULL: 1 */
 };
 
 struct texture {
@@ -53,7 +53,7 @@ struct texture {
 	void *data;
 };
 
-/* Property `name` of node n: a colour or a nested texture; `fallback` where it is absent. */
+/* Property `name` of node n: a colour or a nested texture; `fallback` if absent. */
 int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		      enum color_role role, const struct texture_build *build, struct error *e);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line a texture: its const struct texture_ops is texture_ops_NAME. */
+/* One line per texture: TEXTURE(NAME) stands for its const struct texture_ops texture_ops_NAME. */
 TEXTURE(bitmap)
 TEXTURE(checkerboard)
 TEXTURE(scale)

@@ -153,7 +153,7 @@ double upsample_fit(const struct upsample *s, const double rgb[3], double tolera
 
 	double r[3], j[3][3], error = residual_of(s, target, c, r, j), damping = 1e-6;
 	for (int i = 0; i < ITERATIONS && error > tolerance; i++) {
-		/* Levenberg and Marquardt: damped in proportion to the diagonal, so that units do not matter. */
+		/* Levenberg-Marquardt: damped in proportion to the diagonal, so that units do not matter. */
 		double a[3][3], b[3], step[3], next[3], next_r[3], next_j[3][3];
 		for (int p = 0; p < 3; p++) {
 			b[p] = -(j[0][p] * r[0] + j[1][p] * r[1] + j[2][p] * r[2]);

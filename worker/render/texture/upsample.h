@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reflectance spectra from linear Rec. 709 colours: a sigmoid of a quadratic in wavelength (Jakob and Hanika 2019,
- * A Low-Dimensional Function Space for Efficient Spectral Upsampling), fitted in CIELAB under D65. Shared by the
- * program that makes the table and by the renderer. White is the white of the tabulated D65, so that a constant
- * spectrum is exactly grey. Any thread; nothing allocates.
+ * Reflectance spectra from linear Rec. 709 colours: a sigmoid of a quadratic in wavelength (Jakob and Hanika 2019, A
+ * Low-Dimensional Function Space for Efficient Spectral Upsampling), fitted in CIELAB under D65. Shared by the program
+ * that makes the table and the renderer. White is that of the tabulated D65, so that a constant spectrum is exactly
+ * grey. Any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_TEXTURE_UPSAMPLE_H
 #define WORKER_RENDER_TEXTURE_UPSAMPLE_H
@@ -16,7 +16,7 @@
 enum { UPSAMPLE_TABLE_SIZE = 32, UPSAMPLE_STEPS_MAX = 471 };
 
 struct upsample {
-	int count; /* quadrature points; the spectrum is taken as linear between them */
+	int count; /* quadrature points; the spectrum is linear between them */
 	double t[UPSAMPLE_STEPS_MAX];
 	double weight[UPSAMPLE_STEPS_MAX][3]; /* to XYZ; those of white sum to 1 in Y */
 	double white[3];
@@ -33,11 +33,11 @@ void upsample_init(struct upsample *s, int step_nm); /* a divisor of 470 */
 /* The colour under D65 of the reflectance with these coefficients. */
 void upsample_rgb(const struct upsample *s, const double c[3], double rgb[3]);
 
-/* Improves c (the start: any finite values) by damped Gauss-Newton steps until the colour difference is below
- * `tolerance` or nothing helps. Returns the difference that is left, in CIELAB units. rgb in [0,1]. */
+/* Improves c (start: any finite values) by damped Gauss-Newton steps until the colour difference is below
+ * `tolerance` or nothing helps. Returns the remaining difference, in CIELAB units. rgb in [0,1]. */
 double upsample_fit(const struct upsample *s, const double rgb[3], double tolerance, double c[3]);
 
-/* The table's k-th value of the largest component: dense at both ends, where the coefficients move fastest. */
+/* The table's k-th value of the largest component: dense at both ends, where the coefficients change fastest. */
 static inline double upsample_smoothstep(double x)
 {
 	return x * x * (3 - 2 * x);

@@ -31,7 +31,7 @@ static inline void uv_map_apply(const struct uv_map *map, double *u, double *v)
 	*v = map->m[1][0] * x + map->m[1][1] * y + map->m[1][2];
 }
 
-/* Offsets and factors that are larger leave no digit of (u,v). */
+/* Larger offsets and factors would leave no digits of (u,v). */
 #define UV_NUMBER(name_)                                                                                   \
 	{                                                                                                  \
 		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX \

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Geometry in double, the scene moved into the unit sphere, floats (geometry.c); then BSDFs, emitters, effects and what
- * they leave out, and last Embree's structure. render_check stops before Embree.
+ * Builds a world: geometry in double, the scene moved into the unit sphere, floats (geometry.c); then BSDFs, emitters,
+ * effects and what they omit, and last Embree's structure. render_check stops before Embree.
  *
- * Failures have the object's place and leave nothing behind: the world is one arena. Surfaces that coincide are said,
+ * Failures have the object's place and leave nothing behind: the world is one arena. Surfaces that coincide are notes,
  * not errors.
  */
 #include "worker/render/world/build.h"
@@ -25,7 +25,7 @@
 
 #include <string.h>
 
-/* Bytes that Embree takes for a triangle, and for a shape with what accel.c keeps of it. */
+/* Bytes that Embree needs per triangle, and per shape with the data of accel.c. */
 enum { EMBREE_TRIANGLE = 150, EMBREE_SHAPE = 320 };
 
 static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
@@ -43,15 +43,15 @@ static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
 	return t;
 }
 
-/* One BSDF a node, however many shapes refer to it, unless it looks at the shape's attributes: then one a mesh, which
- * instances share. A shape that names none is grey, or black where it shines. */
+/* One BSDF per node, however many shapes refer to it, unless it uses the shape's attributes: then one per mesh,
+ * which instances share. The default is grey, or black for emitters. */
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
-	/* One more for what no path meets. */
+	/* one more, for shapes that no path meets */
 	w->bsdfs = arena_alloc(&w->arena, (size_t)w->shape_count + 1, sizeof *w->bsdfs);
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
-	struct node_table made; /* a mesh is known by its triangles */
+	struct node_table made; /* a mesh is identified by its triangles */
 	if (!w->bsdfs || !b->bsdf_nodes || node_table_init(&made, w->shape_count, &b->scratch))
 		return build_out_of_memory(b->e);
 	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->accuracy.roughness, NULL};
@@ -142,7 +142,7 @@ static int create_emitters(struct builder *b)
 	build.attributes = NULL;
 	for (uint32_t i = 0; i < s->object_count; i++) {
 		const struct scene_node *n = s->objects[i];
-		/* An area emitter that stands by itself is there for shapes to refer to. */
+		/* A separate area emitter exists for shapes to refer to. */
 		if (n->cls != PLUGIN_EMITTER || (n->id && emitter_needs_surface(n)))
 			continue;
 		struct emitter *em = &w->emitters[w->emitter_count];
@@ -184,8 +184,8 @@ static int choose_emitters(struct builder *b)
 	return 0;
 }
 
-/* The colour that the grey value 1 stands for: the common illuminant's, as an emitter of rgb 1 or of a constant 1 has
- * it. By the midpoint rule; the density with which wavelengths are drawn cancels. */
+/* The colour of the grey value 1: the common illuminant's, as of an emitter of rgb 1 or constant 1. By the midpoint
+ * rule; the density with which wavelengths are drawn cancels. */
 static void set_grey(struct world *w)
 {
 	for (int i = 0; i < 3; i++)
@@ -207,7 +207,7 @@ static void set_grey(struct world *w)
 static int build_accel(struct builder *b)
 {
 	struct world *w = b->w;
-	/* The meshes as they were read are half as large as what Embree is about to need. */
+	/* The meshes as read take half of the memory that Embree is about to need, so they are freed first. */
 	arena_fini(&b->scratch);
 	struct accel_shape *s = coincident_shapes(w, &b->scratch);
 	if (!s)
@@ -235,7 +235,7 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 	return effects_apply(w, &b->forced, reached, b->e);
 }
 
-/* All but Embree: every effect is known before that is built. */
+/* Everything but Embree: all effects are known before that is built. */
 static int prepare(struct builder *b, const struct render_options *o)
 {
 	int rc = effects_parse(o ? o->effects : "", &b->forced, b->e);
@@ -311,7 +311,7 @@ int render_check(const struct scene *s, const struct asset_source *assets, const
 	return rc;
 }
 
-/* ---- the world that there is ---- */
+/* ---- finished worlds ---- */
 
 double world_brightest(const struct world *w)
 {

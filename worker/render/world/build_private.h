@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the files that build a world share: build.c, which runs the steps in order, geometry.c, which has those that
- * make shapes, and shared_mesh.c. One thread.
+ * Shared by the files that build a world: build.c, which runs the steps in order, geometry.c, which makes shapes, and
+ * shared_mesh.c. One thread.
  */
 #ifndef WORKER_RENDER_WORLD_BUILD_PRIVATE_H
 #define WORKER_RENDER_WORLD_BUILD_PRIVATE_H
@@ -11,17 +11,18 @@
 #include "worker/render/world/origin.h"
 #include "worker/render/world/world.h"
 
-/* What building needs and the world does not. */
+/* Data needed for building, but not in the world. */
 struct builder {
 	struct world *w;
 	const struct scene *scene;
 	const struct asset_source *assets;
 	struct arena scratch;
-	/* One a shape: its geometry in double; of an instance the mesh that it shares, and the instance, else NULL. */
+	/* One per shape: its geometry in double; for an instance the mesh that it shares, and the instance,
+	 * otherwise NULL. */
 	struct shape_geometry *geometry;
 	struct shared_mesh **shared;
 	const struct scene_node **instances;
-	uint64_t triangles; /* of all meshes, shared ones once */
+	uint64_t triangles; /* over all meshes, shared ones once */
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct attribute_pool attributes;

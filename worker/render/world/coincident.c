@@ -46,7 +46,7 @@ static const char *reason(enum surface_rank hidden, enum surface_rank by)
 	return by == SURFACE_SHINES ? "shines" : by == SURFACE_OPAQUE ? "is opaque" : "refracts or scatters";
 }
 
-/* Else nobody can see which of them is there. */
+/* Otherwise it is not visible which of them is present. */
 static bool is_news(const struct world *w, const struct accel_shape *s, const struct coincide_shapes *c)
 {
 	if (c->hidden == c->by)

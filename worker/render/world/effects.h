@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What can happen at all in a scene, read off its description before Embree is built. Each effect decides what is built
- * and run; each is reported on or off, why, and what leaving it out saves. What the user forces goes first.
+ * What can happen at all in a scene, determined from its description before Embree is built. Each effect decides what
+ * is built and run; each is reported as on or off, with the reason and what omitting it saves. The user's choice takes
+ * precedence.
  *
  * Adding one: a name and its two texts in effects_text.c, its rule in effects_analyse.c.
  */
@@ -36,43 +37,43 @@ enum effect {
 	EFFECTS
 };
 
-/* What may be forced of an effect. */
+/* How an effect may be overridden. */
 enum {
 	EFFECT_MAY_FORCE_ON = 1,
 	EFFECT_MAY_FORCE_OFF = 2,
-	EFFECT_OF_THE_SCENE = 4 /* forced off, the image is another one */
+	EFFECT_OF_THE_SCENE = 4 /* forced off, the image is that of another scene */
 };
 
 struct effect_decl {
 	const char *name;
 	unsigned may;
-	const char *saves;  /* what leaving it out saves */
-	const char *refuse; /* why it cannot be forced, where it cannot */
+	const char *saves;  /* what omitting it saves */
+	const char *refuse; /* why it cannot be forced, if so */
 };
 extern const struct effect_decl effect_table[EFFECTS];
 
-/* 1: forced on, -1: off, 0: as the scene says. */
+/* 1: forced on, -1: forced off, 0: determined by the scene. */
 struct effects_choice {
 	signed char of[EFFECTS];
 	bool any_on;
 };
 
 struct effects {
-	bool colour; /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
+	bool colour; /* if off, no wavelengths are drawn, and a grey value stands for the common illuminant's shape */
 	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light,
 		delta_light;
 	bool displacement, half_vectors, emitter_move;
-	enum color_shape illuminant; /* of all emitters, when colour is off */
+	enum color_shape illuminant; /* of all emitters, if colour is off */
 	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 };
 
-/* Whether a path between camera and light can meet a shape; why not. */
+/* Whether a path between camera and light can meet a shape, or why not. */
 enum visibility_bounds {
 	VISIBILITY_YES,
-	VISIBILITY_ENCLOSED, /* within a closed opaque shape that the camera is outside of */
-	VISIBILITY_DARK,     /* nothing shines in the scene, or what does is enclosed */
+	VISIBILITY_ENCLOSED, /* inside a closed opaque shape that the camera is outside of */
+	VISIBILITY_DARK,     /* nothing emits in the scene, or all emitters are enclosed */
 	VISIBILITY_DEPTH,    /* paths are too short to scatter */
 };
 

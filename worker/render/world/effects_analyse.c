@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads materials, emitters and shapes once, counts who has what, then decides effect by effect, in the order in which
- * they depend on each other, what the scene calls for, what the user forces, and the sentence that says why. Nothing
- * fails: what cannot be forced was refused when the text was parsed (effects_text.c).
+ * Reads materials, emitters and shapes once and counts who has what. Then it decides effect by effect, in the order of
+ * their dependencies, what the scene needs, what the user forces, and the sentence with the reason. Nothing fails:
+ * choices that are not possible were refused when the text was parsed (effects_text.c).
  */
 #include "worker/render/world/effects_analyse.h"
 
@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What is counted: how many, and the first by name. */
+/* A count, and the first by name. */
 struct tally {
 	size_t count;
 	char first[64];
@@ -51,7 +51,7 @@ static const char *verb(const struct tally *t, const char *one, const char *many
 struct census {
 	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
 	struct tally hidden_specular, hidden_dispersive,
-		unused_dispersive; /* of those that no path meets; that no shape uses */
+		unused_dispersive; /* materials that no path meets; that no shape uses */
 	struct tally environment, area, delta, textured_light, coloured_light;
 	enum visibility_bounds why_hidden;
 	size_t shape[3];
@@ -88,8 +88,8 @@ static void add_hidden(struct census *c, const struct bsdf *b, const struct scen
 		count(&c->hidden_dispersive, n, "");
 }
 
-/* Of each BSDF: whether one of its shapes is reached, else what keeps its last one from that; YES where it has none.
- * One pass over the shapes, however many BSDFs there are. */
+/* For each BSDF: whether one of its shapes is reached, otherwise the reason for its last one; YES if it has no
+ * shape. One pass over the shapes, however many BSDFs there are. */
 static void find_reach(const struct world *w, const enum visibility_bounds *shape, struct bsdf_reach *of)
 {
 	for (uint32_t k = 0; k < w->bsdf_count; k++)
@@ -160,7 +160,7 @@ struct report {
 	const struct effects_choice *forced;
 };
 
-/* The line of an effect that the scene calls for or not; returns whether it is on after all. */
+/* The line of an effect that the scene needs or not; returns whether it is on. */
 __attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum effect which, bool called,
 						       const char *why, ...)
 {
@@ -262,7 +262,7 @@ static void spectral(struct report *r, const struct census *c)
 		force_colour(r, "dispersion");
 }
 
-/* The line of materials that have something, or "no material ...". */
+/* A line that names the materials that have something, or "no material ...". */
 static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
 		      const char *none)
 {
@@ -275,7 +275,7 @@ static bool materials(struct report *r, enum effect which, const struct tally *t
 static void lobes(struct report *r, const struct census *c)
 {
 	struct effects *fx = r->fx;
-	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: known after the two */
+	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: known after the other two */
 	if (!c->specular.count && c->hidden_specular.count) {
 		char text[96];
 		fx->specular = line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", who(&c->hidden_specular, text),

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which effects a scene calls for. One thread; allocates nothing. */
+/* Determines which effects a scene needs. One thread; allocates nothing. */
 #ifndef WORKER_RENDER_WORLD_EFFECTS_ANALYSE_H
 #define WORKER_RENDER_WORLD_EFFECTS_ANALYSE_H
 
@@ -8,7 +8,7 @@
 struct effects_source;
 struct world;
 
-/* Fills w->effects from shapes, BSDFs and emitters, and shape[] (one a shape, see reach.h). */
+/* Sets w->effects from shapes, BSDFs and emitters, and shape[] (one per shape, see visibility_bounds.h). */
 void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
 		     enum visibility_bounds *shape);
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What effects change in a world: shapes that no path meets turn black, what was switched off goes. */
+/* Changes a world according to its effects: shapes that no path meets become black, and what was switched off is
+ * removed. */
 #include "worker/render/world/effects_apply.h"
 
 #include "worker/render/bsdf/lobe_filter.h"
@@ -20,11 +21,10 @@ static bool is_switched_off(const struct emitter *em, const struct effects_choic
 	return forced->of[which] < 0;
 }
 
-/* What no path meets, in the way of none: nothing of it is asked for. Not where something is forced on: that may be of
- * it. */
+/* Shapes that no path meets become black and need nothing; not if something is forced on that may belong to them. */
 static void leave_out(struct world *w, const enum visibility_bounds *shape)
 {
-	uint32_t black = w->bsdf_count++; /* there is room for one more than shapes */
+	uint32_t black = w->bsdf_count++; /* there is room for one more than there are shapes */
 	bsdf_black(&w->bsdfs[black]);
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
@@ -53,7 +53,7 @@ int effects_apply(struct world *w, const struct effects_choice *forced, const en
 		leave_out(w, shape);
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
 		struct bsdf *b = &w->bsdfs[i];
-		/* Forced on: as if the index varied, though by nothing. */
+		/* Forced on: as if the index varied, but by nothing. */
 		if (!w->effects.dispersion)
 			b->dispersive = false;
 		else if (forced->of[EFFECT_DISPERSION] > 0 && b->eta != 1)

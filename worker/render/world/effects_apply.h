@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What effects change in a world. One thread; allocates in the world's arena. */
+/* Changes a world according to its effects. One thread; allocates in the world's arena. */
 #ifndef WORKER_RENDER_WORLD_EFFECTS_APPLY_H
 #define WORKER_RENDER_WORLD_EFFECTS_APPLY_H
 
@@ -7,7 +7,7 @@
 
 struct world;
 
-/* Leaves out of the world what no path meets and what was switched off. */
+/* Removes what no path meets and what was switched off. */
 int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
 		  struct error *e);
 

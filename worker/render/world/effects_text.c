@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Names of effects, what each saves, and the text in which a plan overrides them. */
+/* Names of effects, what omitting each saves, and the text with which a plan overrides them. */
 #include "worker/render/world/effects_text.h"
 
 #include "common/base/spelling.h"
@@ -46,7 +46,7 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_DEPTH] = {"depth", ON, "longer paths are not tried", "--max-depth shortens paths"},
 };
 
-/* EFFECTS: none of that name. */
+/* EFFECTS: unknown name. */
 static enum effect find(const char *name, size_t length)
 {
 	int i = 0;

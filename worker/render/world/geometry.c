@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes of a world: read in double, moved into the unit sphere with the camera, then rounded to float; what is too
- * large for that beside what is small stays in double as well.
+ * Shapes of a world: read in double, moved into the unit sphere with the camera, then rounded to float; shapes that are
+ * too large for that relative to small ones also stay in double.
  *
- * Failures have the object's place. Triangles without an area, shapes too small beside others and materials that are
- * not read are counted and said, not errors.
+ * Failures have the object's place. Triangles without area, shapes that are too small relative to others and materials
+ * that are not read are counted and noted, not errors.
  */
 #include "worker/render/world/geometry.h"
 
@@ -18,14 +18,14 @@
 
 #include <stdio.h>
 
-/* Of all shapes together: Embree takes about 150 bytes for each. */
+/* Over all shapes: Embree takes about 150 bytes for each. */
 enum { TRIANGLES_MAX = 1 << 28 };
 
-/* What is counted and said: triangles without an area, which nothing meets and which are left out, and files whose
- * materials Mitsuba 0.6 would read, where the scene gives the shape no BSDF. */
+/* Counted and noted: triangles without area, which nothing hits and which are left out, and files with materials
+ * that Mitsuba 0.6 would read because the shape has no BSDF in the scene. */
 struct counted {
 	uint64_t triangles;
-	uint32_t shapes, empty; /* that have some; that have nothing else */
+	uint32_t shapes, empty; /* shapes that have some; that have nothing else */
 	const struct scene_node *first;
 	uint32_t materials;
 	const struct scene_node *first_material;
@@ -95,7 +95,7 @@ static int take_geometry(struct builder *b, const struct scene_node *n, const st
 		       : node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it", TRIANGLES_MAX);
 }
 
-/* The mesh that an instance shares, read when the first of them asks; NULL: it is built by itself. */
+/* The mesh that an instance shares, read when the first of them needs it; NULL: the instance is built by itself. */
 static int find_shared(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes,
 		       struct counted *counted, struct shared_mesh **out)
 {
@@ -119,7 +119,7 @@ static int find_shared(struct builder *b, const struct listed_shape *l, struct s
 	return rc;
 }
 
-/* The next of the world's shapes; one with nothing to meet is none. */
+/* Adds the next shape of the world, unless it has nothing to hit. */
 static int read_listed(struct builder *b, const struct listed_shape *l, struct shared_mesh **meshes,
 		       struct counted *counted)
 {
@@ -180,8 +180,8 @@ int build_read_shapes(struct builder *b)
 	return 0;
 }
 
-/* Points of a shape as large as the scene are off by a few 2^-53 of that. Where the smallest shape is a few thousand
- * times as large as these roundings integrators agree; at 2^-44 of the scene path and bdpt differed by 2 %. */
+/* Points of a shape as large as the scene have errors of a few 2^-53 of that. If the smallest shape is a few
+ * thousand times as large as these errors, integrators agree; at 2^-44 of the scene, path and bdpt differed by 2 %. */
 #define LEAST_SCALE 0x1p-42
 
 static void note_scales(struct builder *b)
@@ -220,7 +220,7 @@ int build_rescale(struct builder *b)
 	if (r > 0)
 		frexp(r, &exponent);
 	w->scale = ldexp(1, -exponent);
-	/* Rounding to float moves vertices by parts in 2^24: the sphere is to hold them all the same. */
+	/* Rounding to float moves vertices by parts in 2^24: the sphere must contain them all the same. */
 	w->radius = (r > 0 ? r * w->scale : 1) * (1 + 0x1p-20);
 	rc = camera_init(&w->camera, &w->settings, w->center, w->scale, b->e);
 	for (uint32_t i = 0; rc && i < b->scene->object_count; i++) {

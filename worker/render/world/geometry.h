@@ -5,9 +5,9 @@
 
 #include "worker/render/world/build_private.h"
 
-/* Shapes of the scene, their geometry in double, and the box around them. A shape with nothing to meet is none. */
+/* Reads the scene's shapes in double, with their bounding box. A shape with nothing to hit is left out. */
 int build_read_shapes(struct builder *b);
-/* Chooses the world's centre and scale, and moves the camera there. */
+/* Chooses the world's centre and scale, and moves the camera accordingly. */
 int build_rescale(struct builder *b);
 /* Shapes as floats in the rescaled world. */
 int build_place_shapes(struct builder *b);

@@ -21,7 +21,7 @@ static uint64_t mix(uint64_t x)
 	return x ^ x >> 31;
 }
 
-/* The entry, or the free one where it would stand. */
+/* The entry, or the free one where it belongs. */
 static struct node_entry *place_of(struct node_table *t, const void *node, const void *mesh)
 {
 	size_t i = (size_t)mix((uintptr_t)node + mix((uintptr_t)mesh + 1));

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which BSDF was made of a node, for all meshes or for one of them: a hash table with linear probing that never fills
- * by more than a half. Nothing is removed. One thread; lives in the arena given.
+ * Maps a node to its BSDF, for all meshes or for one of them: a hash table with linear probing, at most half full.
+ * Nothing is removed. One thread; allocated in the given arena.
  */
 #ifndef WORKER_RENDER_WORLD_NODE_TABLE_H
 #define WORKER_RENDER_WORLD_NODE_TABLE_H
@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 struct node_entry {
-	const void *node, *mesh; /* of what, NULL included; mesh NULL: of all meshes */
+	const void *node, *mesh; /* the key; NULL is a valid node; mesh NULL: for all meshes */
 	uint32_t bsdf;
 	bool used;
 };
@@ -20,16 +20,16 @@ struct node_entry {
 struct node_table {
 	struct node_entry *entries;
 	size_t mask, count, most;
-	uint64_t compared; /* entries that were looked at so far */
+	uint64_t compared; /* entries probed so far */
 };
 
-/* Of at most so many entries. 0 or -ENOMEM. */
+/* For at most so many entries. 0 or -ENOMEM. */
 int node_table_init(struct node_table *t, uint32_t most, struct arena *arena);
 
-/* False: there is none. */
+/* false: not found. */
 bool node_table_find(struct node_table *t, const void *node, const void *mesh, uint32_t *bsdf);
 
-/* One that is not there. */
+/* Adds one that is not in the table. */
 void node_table_add(struct node_table *t, const void *node, const void *mesh, uint32_t bsdf);
 
 #endif

@@ -34,8 +34,8 @@ static void put_float3(float out[3], vec3 v)
 	out[2] = (float)v.z;
 }
 
-/* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals.
- * Those of a displaced shape are left as they are: where one overhangs, its outside is still its neighbours'. */
+/* Keeps the triangles that still have an area in float, wound such that their normal agrees with the vertex normals.
+ * Those of a displaced shape are unchanged: where one overhangs, its outside is still that of its neighbours. */
 static uint32_t take_triangles(struct geom_shape *g, struct mesh *m, bool displaced)
 {
 	uint32_t kept = 0;
@@ -70,7 +70,7 @@ int build_place_mesh(struct builder *b, struct geom_shape *g, struct mesh *m, co
 	struct arena *arena = &b->w->arena;
 	uint32_t vertices = m->vertex_count;
 	g->vertex_count = vertices;
-	/* One vertex more than there are: Embree reads 16 bytes from the start of each. */
+	/* One more vertex than there are: Embree reads 16 bytes from the start of each. */
 	g->position = arena_alloc(arena, (size_t)vertices + 1, sizeof *g->position);
 	g->index = arena_alloc(arena, m->triangle_count, sizeof *g->index);
 	g->normal = m->normal ? arena_alloc(arena, vertices, sizeof *g->normal) : NULL;

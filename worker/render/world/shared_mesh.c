@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-/* Written matrices have six digits. */
+/* Matrices in files have six digits. */
 #define RIGID_TOLERANCE 1e-5
 
 static vec3 column(const mat4 *m, int k)
@@ -16,7 +16,7 @@ static vec3 column(const mat4 *m, int k)
 	return (vec3){m->m[0][k], m->m[1][k], m->m[2][k]};
 }
 
-/* Moves, turns or mirrors alone. */
+/* Only translation, rotation or reflection. */
 static bool is_rigid(const mat4 *m)
 {
 	for (int i = 0; i < 3; i++)
@@ -94,7 +94,7 @@ static mat4 to_world(const struct world *w, const struct shared_mesh *m, const m
 	return r;
 }
 
-/* Of the mesh as it has been rounded. */
+/* Of the mesh after rounding. */
 static struct box float_box(const struct geom_shape *g)
 {
 	struct box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};

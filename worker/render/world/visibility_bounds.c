@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Shapes count as apart when this far from each other, in radii of the scene: floats are 2^-24. */
+/* Shapes count as apart at this distance, in scene radii: floats have 2^-24. */
 #define MARGIN 0x1p-16
 static vec3 vertex_of(const struct geom_shape *g, uint32_t i)
 {
@@ -26,7 +26,7 @@ static vec3 plane_of(const struct geom_shape *g, uint32_t triangle, double *heig
 	return n;
 }
 
-/* Least and largest of n.p over a shape. */
+/* Smallest and largest n.p over a shape. */
 static void extent(const struct geom_shape *g, vec3 n, double *low, double *high)
 {
 	if (g->is_sphere) {
@@ -57,15 +57,14 @@ static double farthest(const struct geom_shape *g, vec3 from)
 	return sqrt(far2);
 }
 
-/* Convex, closed, and light does not get through. An ellipsoid is, too, but its mesh is looked at triangle by triangle.
- */
+/* Convex, closed and opaque. An ellipsoid is, too, but as a mesh it is checked triangle by triangle. */
 static bool is_container(const struct world *w, const struct scene_node *node, uint32_t shape)
 {
 	bool convex = strcmp(node->type, "cube") == 0 || w->shapes[shape].is_sphere;
 	return convex && !displacement_of(node) && !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
 }
 
-/* No path from the camera begins within: all of it lies deeper than the near plane, or behind the camera and its
+/* Whether no path from the camera starts inside: all of it is beyond the near plane, or behind the camera and its
  * aperture. */
 static bool camera_is_outside(const struct world *w, const struct geom_shape *g)
 {
@@ -83,7 +82,7 @@ static bool contains(const struct geom_shape *outer, const struct geom_shape *in
 		double height, unused, low, high, least, most;
 		vec3 n = plane_of(outer, i, &height);
 		extent(outer, n, &low, &high);
-		/* All of a convex shape lies on one side of each of its triangles. */
+		/* All of a convex shape is on one side of each of its triangles. */
 		if (high > height + MARGIN)
 			n = vec3_neg(n), height = -height;
 		extent(inner, n, &least, &most);
@@ -106,7 +105,7 @@ static int compare_places(const void *a, const void *b)
 	return (x->at > y->at) - (x->at < y->at);
 }
 
-/* The first of n, sorted, that is not below x. */
+/* The first of n sorted numbers that is not below x. */
 static uint32_t first_from(const struct weighed *sorted, uint32_t n, double x)
 {
 	uint32_t low = 0, high = n;
@@ -120,7 +119,7 @@ static uint32_t first_from(const struct weighed *sorted, uint32_t n, double x)
 	return low;
 }
 
-/* Only what begins between a container's ends along x, and whose box lies in its box, is looked at closely. */
+/* Only shapes that start between a container's ends along x, and whose box is inside its box, are checked closely. */
 static void find_enclosed(const struct world *w, const struct effects_source *src, enum visibility_bounds *shape)
 {
 	struct weighed *by_x = src->room;

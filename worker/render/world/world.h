@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The world that all threads share: built once from a description, immutable then. Lengths are rescaled in double by a
- * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred, or what is small in a
- * scene of mixed scales (origin.h): floats begin after that.
+ * The world that all threads share: built once from a description, then immutable. Lengths are rescaled in double by a
+ * power of two so that the scene's radius is in (1/2, 1], and moved so that its box is centred, or small things in a
+ * scene of mixed scales (origin.h): floats are used only after that.
  */
 #ifndef WORKER_RENDER_WORLD_WORLD_H
 #define WORKER_RENDER_WORLD_WORLD_H
@@ -14,7 +14,7 @@
 
 struct world_shape {
 	uint32_t bsdf;
-	int32_t emitter; /* -1: does not shine */
+	int32_t emitter; /* -1: not an emitter */
 };
 
 struct world {
@@ -26,30 +26,30 @@ struct world {
 	vec3 center;
 	double scale, radius; /* of the rescaled bounding sphere around the origin */
 	uint32_t shape_count, bsdf_count, emitter_count;
-	uint32_t instance_count, shared_mesh_count; /* shapes that share a mesh with others; of how many meshes */
+	uint32_t instance_count, shared_mesh_count; /* shapes that share a mesh with others; number of these meshes */
 	struct geom_shape *shapes;
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
-	uint32_t *emitter_shape;	     /* on which it lies; UINT32_MAX: on none */
+	uint32_t *emitter_shape;	     /* that it belongs to; UINT32_MAX: none */
 	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */
 	int32_t environment;		     /* index of the emitter that escaping rays meet; -1: none */
 	double grey_xyz[3];		     /* CIE XYZ of grey value 1 */
-	struct coincidence *coincidence;     /* of surfaces; NULL: none */
-	struct render_coincident coincident; /* what there is to say of it */
+	struct coincidence *coincidence;     /* coinciding surfaces; NULL: none */
+	struct render_coincident coincident; /* notes about them */
 	struct world_notes notes;
 	struct accel *accel;
 };
 
-/* Asked while rendering. -DHSLT_PLAIN makes a renderer that knows nothing of colour, dispersion and apertures: what
- * asking costs where they are off is measured against it (tests/bench/effects.c). */
+/* Checked while rendering. -DHSLT_PLAIN makes a renderer without colour, dispersion and apertures, to measure what
+ * these checks cost (tests/bench/effects.c). */
 #ifdef HSLT_PLAIN
 #define EFFECT_IS_ON(w, effect) ((void)(w), false)
 #else
 #define EFFECT_IS_ON(w, effect) ((w)->effects.effect)
 #endif
 
-/* Which emitter a number in [0,1) chooses; -1 when there is none. */
+/* The emitter selected by a number in [0,1); -1 if there is none. */
 int32_t world_pick_emitter(const struct world *w, double u);
 
 /* A hit on a shape as a point of its emitter. */
