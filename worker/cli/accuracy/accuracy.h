@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What accuracy costs in time: settings around a default, one of them changed at a time, rendered in turns and
- * compared. The parts: design (which settings), run (rendering), judge (figures), csv and html (reports).
+ * What accuracy costs in time: settings around a default, each with one change, rendered alternately and compared. The
+ * parts: design (which settings), run (rendering), judge (figures), csv and html (reports).
  */
 #ifndef WORKER_CLI_ACCURACY_ACCURACY_H
 #define WORKER_CLI_ACCURACY_ACCURACY_H
 
 #include "worker/cli/accuracy/accuracy_judge.h"
 
-/* What a report says besides. */
+/* Further contents of a report. */
 struct accuracy_context {
 	const char *scene, *reference; /* names; reference: NULL: none */
 	const struct render_summary *summary;

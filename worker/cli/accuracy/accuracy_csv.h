@@ -5,7 +5,7 @@
 
 #include "worker/cli/accuracy/accuracy.h"
 
-/* In order; the report explains them, too. */
+/* In order; the report explains them as well. */
 struct accuracy_column {
 	const char *name, *meaning; /* meaning "": the other end of the interval */
 };

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The list of settings to compare: the default, the reference, each accuracy setting over its sweep, mixtures of
- * strategies with one left out or taken in, presets. A value that does nothing in this scene (accuracy_settings'
- * `place`, effects that are off) is left out with the reason, so that no time goes into it.
+ * strategies with one removed or added, presets. A value without effect in this scene (accuracy_settings' `place`,
+ * effects that are off) is left out with the reason, so that no time is spent on it.
  *
- * Fails where the user asks for a parameter or value that does not exist (-EINVAL, with the nearest name) or for more
- * settings than the table holds.
+ * Fails if the user names a parameter or value that does not exist (-EINVAL, with the nearest name), or more settings
+ * than the table holds.
  */
 #include "worker/cli/accuracy/accuracy_design.h"
 
@@ -18,8 +18,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The reference: values at which what a parameter may bias is far below what can be measured. Those of the roughness
- * and the tessellation are the finest that are worth a sweep. */
+/* The reference: values for which the bias of a parameter is far below what can be measured. Those of roughness and
+ * tessellation are the finest ones worth a sweep. */
 static const struct {
 	const char *parameter, *value;
 } careful[] = {{"tolerance", "1e-06"},
@@ -28,12 +28,12 @@ static const struct {
 	       {"roughness", "0"},
 	       {"tessellation", "2"}};
 
-/* What one would try who is in a hurry. */
+/* Presets for a user in a hurry. */
 static const struct {
 	const char *name, *accuracy;
 } presets[] = {{"fast", "tolerance=0.01,iterations=6,reverse-tolerance=0.01"}};
 
-/* Parameters that are not of the list of worker/render/settings/accuracy_settings.h. */
+/* Parameters that are not in the list of worker/render/settings/accuracy_settings.h. */
 #define DEPTH "max-depth"
 #define SHARE "independent"
 #define MIXTURE "mixture"
@@ -85,7 +85,7 @@ static struct accuracy_sweep *new_sweep(struct planner *p, const char *parameter
 	return s;
 }
 
-/* Another setting that is the default but for what the caller changes; NULL: the table is full. */
+/* Adds a setting that equals the default except for what the caller changes; NULL: the table is full. */
 static struct accuracy_setting *new_setting(struct planner *p, const char *parameter, const char *value)
 {
 	struct accuracy_design *d = p->d;
@@ -100,7 +100,7 @@ static struct accuracy_setting *new_setting(struct planner *p, const char *param
 	return s;
 }
 
-/* The sweep's next value; setting 0 where it is the default's. */
+/* The sweep's next value; setting 0 if it is the default's. */
 static bool add_value(struct accuracy_sweep *s, const char *value, size_t setting)
 {
 	if (s->count == ACCURACY_VALUES)
@@ -120,7 +120,7 @@ static struct accuracy_setting *swept(struct planner *p, struct accuracy_sweep *
 	return setting;
 }
 
-/* The base's settings with one more; false: it is the base's value already, or no value. */
+/* Adds one setting to the base's; false: it is the base's value already, or invalid. */
 static bool with_setting(const char *base, const char *name, const char *value, char out[PLAN_ACCURACY_MAX])
 {
 	char text[2 * PLAN_ACCURACY_MAX];
@@ -129,7 +129,7 @@ static bool with_setting(const char *base, const char *name, const char *value, 
 	return render_settings_canonical(text, out, &e) == 0 && strcmp(out, base) != 0;
 }
 
-/* Why a parameter of the renderer does nothing here; NULL: it does. */
+/* Why a parameter of the renderer has no effect here; NULL: it has one. */
 static const char *idle(const struct planner *p, const struct render_setting *k)
 {
 	if (!k->sweep[0])
@@ -198,7 +198,7 @@ struct entry {
 	bool independent;
 };
 
-/* A canonical mixture: NAME=WEIGHT each. */
+/* A canonical mixture: NAME=WEIGHT for each strategy. */
 static int entries_of(const char *mixture, struct entry entry[PLAN_MAX_STRATEGIES])
 {
 	int n = plan_strategy_count(mixture);
@@ -285,7 +285,7 @@ static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struc
 		memcpy(setting->mixture, mixture, sizeof mixture);
 }
 
-/* Each strategy left out, and each that is not there taken in. */
+/* Mixtures with each present strategy removed, and each absent one added. */
 static void sweep_mixture(struct planner *p)
 {
 	struct entry base[PLAN_MAX_STRATEGIES], changed[PLAN_MAX_STRATEGIES + 1];
@@ -357,7 +357,7 @@ static void add_reference(struct planner *p)
 	}
 }
 
-/* The i-th name that --parameters may hold; NULL: the last was before. */
+/* The i-th name that --parameters accepts; NULL: no more. */
 static const char *parameter_at(size_t i)
 {
 	static const char *const own[] = {DEPTH, SHARE, MIXTURE, PRESET};

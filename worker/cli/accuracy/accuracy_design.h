@@ -13,14 +13,14 @@ enum { ACCURACY_SETTINGS = 96, ACCURACY_SWEEPS = 24, ACCURACY_VALUES = 12 };
 #define ACCURACY_REFERENCE_SHARE 4.0
 
 struct accuracy_setting {
-	char parameter[32], value[48]; /* "default" and "reference" are settings without value */
-	double share;		       /* of the time, in units of the others' */
-	bool other_image;	       /* it is known to make another image, however small the difference */
+	char parameter[32], value[48]; /* "default" and "reference" are settings without a value */
+	double share;		       /* share of the time, relative to the others' */
+	bool other_image;	       /* known to make another image, however small the difference */
 	uint32_t max_depth;
 	char accuracy[PLAN_ACCURACY_MAX], mixture[PLAN_MUTATIONS_MAX];
 };
 
-struct accuracy_sweep { /* of one parameter; the default's value among the others, in order */
+struct accuracy_sweep { /* of one parameter, in order, with the default's value among them */
 	char parameter[32];
 	const char *summary;
 	size_t count, setting[ACCURACY_VALUES];
@@ -40,8 +40,8 @@ struct accuracy_design {
 };
 enum { ACCURACY_DEFAULT, ACCURACY_REFERENCE };
 
-/* Around the request's settings, what the scene calls for. only: NAME,NAME: sweeps to make; NULL: all. -EINVAL: there
- * is no such parameter, with a sentence. */
+/* Around the request's settings, as suits the scene. only: NAME,NAME: the sweeps to make; NULL: all. -EINVAL with a
+ * sentence: unknown parameter. */
 int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
 		    const char *only, struct error *e);
 

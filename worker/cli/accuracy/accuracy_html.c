@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The report as one HTML page without scripts: a summary in a paragraph, then facts of machine and scene, then tables,
- * each row with its interval, then plots as SVG (accuracy_plots.h). All text from scenes is escaped. Numbers that are
- * not known are printed as such, never as 0.
+ * The report as one HTML page without scripts: a summary paragraph, facts about machine and scene, tables with an
+ * interval in each row, plots as SVG (accuracy_plots.h). All text from scenes is escaped. Unknown numbers are printed
+ * as such, never as 0.
  */
 #include "worker/cli/accuracy/accuracy_html.h"
 
@@ -61,7 +61,7 @@ static void row_begin(struct text_file *p, const struct accuracy_context *x, siz
 	text_file_put(p, "<tr class=\"%s%s\">", front ? "front " : "", i == ACCURACY_DEFAULT ? "default" : "");
 }
 
-/* The default against the others, in one paragraph: what most readers came for. */
+/* The default against the others, in one paragraph, for readers in a hurry. */
 static void put_answer(struct text_file *p, const struct accuracy_context *x)
 {
 	const struct accuracy_figures *f = x->judgement->figures, *d = &f[ACCURACY_DEFAULT];

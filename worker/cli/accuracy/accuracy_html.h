@@ -5,7 +5,7 @@
 
 #include "worker/cli/accuracy/accuracy.h"
 
-/* One XHTML file. Where gnuplot is missing it says so and goes without plots. */
+/* One XHTML file. Without gnuplot it says so and has no plots. */
 int accuracy_html(const struct accuracy_context *x, const char *path, struct error *e);
 
 #endif

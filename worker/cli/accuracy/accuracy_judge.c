@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * From films to figures. Errors of all settings are weighted by one picture, the mean over the settings, so that only
- * their noise differs and not what it is measured by.
+ * Computes figures from films. The errors of all settings are weighted by one image, the mean over the settings, so
+ * that only their noise differs, not the weights.
  */
 #include "worker/cli/accuracy/accuracy_judge.h"
 
@@ -18,7 +18,7 @@ struct judge {
 	const struct accuracy_run *r;
 	struct accuracy_judgement *out;
 	double *mean;		   /* [pixels * 3], over the settings */
-	double *weight, *worst;	   /* [pixels * 3]; [2][pixels], the second sorted: of one setting at a time */
+	double *weight, *worst;	   /* [pixels * 3]; [2][pixels], the second sorted: for one setting at a time */
 	double *rel_mse, *degrees; /* [settings] */
 	double *blocks;		   /* [settings][groups][cells] */
 	size_t cells, groups;
@@ -29,7 +29,7 @@ static const struct accuracy_job *job(const struct judge *j, size_t i)
 	return &j->r->jobs[i];
 }
 
-/* The interval of x known to a relative standard deviation, on a logarithmic scale. */
+/* The interval of x with a known relative standard deviation, on a logarithmic scale. */
 static struct interval around(double x, double log_sd)
 {
 	double factor = exp(stats_t(LEVEL, 1e9) * log_sd);
@@ -45,7 +45,7 @@ static int take_mean(struct judge *j, struct error *e)
 			return -ENOMEM;
 		for (size_t k = 0; k < values; k++)
 			j->mean[k] += (double)img.rgb[k] / (double)n;
-		/* The picture of the report is the one with the least noise. */
+		/* The image of the report is the one with the least noise. */
 		for (size_t k = 0; i == ACCURACY_REFERENCE && k < values; k++)
 			j->out->rgb[(k % 3) * (values / 3) + k / 3] = img.rgb[k];
 		canvas_image_fini(&img);
@@ -75,7 +75,7 @@ static int order(const void *pa, const void *pb)
 	return (*a > *b) - (*a < *b);
 }
 
-/* 1 over B^2 + (0.01 m)^2, B the settings' common picture; 0 for the pixels with the greatest errors. */
+/* 1 over B^2 + (0.01 m)^2, B the settings' mean image; 0 for the pixels with the largest errors. */
 static void weigh(struct judge *j, const float *error)
 {
 	size_t pixels = (size_t)j->out->width * j->out->height, left = (size_t)ceil(ACCURACY_TRIM * (double)pixels);
@@ -98,7 +98,7 @@ static void weigh(struct judge *j, const float *error)
 		j->weight[k] = j->worst[k / 3] > most ? 0 : j->weight[k] / (double)(3 * pixels);
 }
 
-/* Degrees of freedom of the chi-square with the spread that the groups' distances show (Satterthwaite 1946). */
+/* Degrees of freedom of the chi-square with the spread of the groups' distances (Satterthwaite 1946). */
 static double degrees_of(const double *distance, size_t groups, double mean)
 {
 	double n = (double)groups, square = 0;
@@ -136,7 +136,8 @@ static void take_cost(struct judge *j, size_t i)
 	j->out->figures[i].cost = (struct interval){1e6 * c.value, 1e6 * c.low, 1e6 * c.high};
 }
 
-/* Errors fall as one over the root of mutations, which brings all settings to one number and to one time. */
+/* Errors fall as one over the root of mutations: this converts all settings to the same number, and to the same
+ * time. */
 static void scale_errors(struct judge *j, struct stats_point *points)
 {
 	struct accuracy_judgement *o = j->out;
@@ -156,7 +157,7 @@ static void scale_errors(struct judge *j, struct stats_point *points)
 	}
 }
 
-/* The same block of an image from a file, which is taken as exact. */
+/* The same block of an image from a file, which counts as exact. */
 static double block_of(const struct picture *p, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	/* X+Y+Z of Rec. 709's red, green and blue */
@@ -190,8 +191,7 @@ static void take_bias(struct judge *j, size_t i, const double *reference, size_t
 	struct accuracy_figures *f = &j->out->figures[i];
 	double a[PLAN_MAX_GROUPS], b[PLAN_MAX_GROUPS], worst = -1;
 	size_t last = (size_t)j->out->across * j->out->down;
-	/* Whether a bias is seen at all is asked of the mean and of every block of every setting, half the level for
-	 * the means. */
+	/* A bias is tested in the mean and in every block of every setting, with half the level for the means. */
 	double settings = (double)j->r->design->count, blocks = last > 0 ? (double)last : 1;
 	for (size_t c = 0; c < j->cells; c++) {
 		double t;
@@ -250,7 +250,8 @@ static int judge_all(struct judge *j, const struct picture *reference, struct er
 		j->out->thin |= j->out->figures[i].rounds < 4;
 	j->out->thin |= j->out->figures[ACCURACY_DEFAULT].equal_time.value > 0.5;
 	take_biases(j, reference, points);
-	/* The reference is no setting that one would choose, and longer: it moves to the end and takes no part. */
+	/* The reference is not a setting to choose from, and is rendered longer: it moves to the end and takes no
+	 * part. */
 	points[ACCURACY_REFERENCE] = points[n - 1];
 	stats_front(points, n - 1, LEVEL, by);
 	for (size_t i = 0; i + 1 < n; i++)

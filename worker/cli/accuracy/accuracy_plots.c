@@ -18,7 +18,7 @@ static void put_plot(struct text_file *p, const struct plot *plot)
 		text_file_put(p, "</p>\n");
 		return;
 	}
-	/* Inside a page it has no declaration of its own. */
+	/* Inside a page it must not have an XML declaration. */
 	const char *begin = strstr(svg, "<svg");
 	if (begin)
 		text_file_bytes(p, begin, size - (size_t)(begin - svg));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The report's plots, as SVG inside the page. Where one cannot be drawn, the reason stands in its place. */
+/* The report's plots, as SVG inside the page. If one cannot be drawn, the reason replaces it. */
 #ifndef WORKER_CLI_ACCURACY_PLOTS_H
 #define WORKER_CLI_ACCURACY_PLOTS_H
 

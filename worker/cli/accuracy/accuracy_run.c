@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The settings take turns in short rounds, the one with the least of its share next, so that a machine that changes its
- * speed changes it for all alike. Worlds are shared by settings that differ in nothing that was built. One thread
+ * The settings are rendered alternately in short rounds, the one with the smallest part of its share next, so that
+ * changes of the machine's speed affect all alike. Settings share a world if nothing that is built differs. One thread
  * measures; leases run as in hslt-render (local.h).
  *
- * Failures: no memory for all films (said before anything is rendered), or whatever a lease fails with, with the
- * setting's name; on a signal what has been measured so far is reported.
+ * Failures: no memory for all films (reported before anything is rendered), or the failure of a lease, with the
+ * setting's name. After a signal, what has been measured is reported.
  */
 #include "worker/cli/accuracy/accuracy_run.h"
 
@@ -19,9 +19,9 @@
 
 enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
 
-struct pilot {				   /* of the default, for the sizes of rounds and nothing else */
+struct pilot {				   /* of the default, used only for the sizes of rounds */
 	double bootstrap_sample, mutation; /* CPU seconds */
-	double rate;			   /* CPU seconds a second: what other programs leave of the processors */
+	double rate;			   /* CPU seconds per second: what other programs leave of the processors */
 };
 
 static double shares(const struct accuracy_design *d)
@@ -32,13 +32,13 @@ static double shares(const struct accuracy_design *d)
 	return sum;
 }
 
-/* CPU seconds that a setting of share 1 will have, before it is known how much the bootstrap and the worlds take. */
+/* CPU seconds for a setting of share 1, before the cost of bootstrap and worlds is known. */
 static double expected_seconds(const struct accuracy_run *r, const struct pilot *pilot)
 {
 	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / shares(r->design);
 }
 
-/* All films stay in memory until the end, because the settings take turns. */
+/* All films stay in memory until the end, because the settings alternate. */
 static int check_memory(const struct accuracy_run *r, const struct plan *p, struct error *e)
 {
 	double tiles = ceil(p->crop_width / (double)TILE_SIZE) * ceil(p->crop_height / (double)TILE_SIZE);
@@ -54,7 +54,7 @@ static int check_memory(const struct accuracy_run *r, const struct plan *p, stru
 		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
 }
 
-/* Rounds are short, so that the settings change often; the bootstrap takes a tenth of the time or so. */
+/* Rounds are short, so that the settings alternate often; the bootstrap takes about a tenth of the time. */
 static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot, struct error *e)
 {
 	enum { ROUNDS = 25 };
@@ -65,15 +65,14 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	q.max_depth = s->max_depth;
 	memcpy(q.accuracy, s->accuracy, sizeof q.accuracy);
 	memcpy(q.mixture, s->mixture, sizeof q.mixture);
-	q.seed += i; /* what is compared shares no random numbers */
+	q.seed += i; /* compared settings share no random numbers */
 	q.seconds = 1e8;
 	q.spp = q.mutations = 0;
 	q.target_error = 0;
 	bool chains = q.kind == PLAN_CHAINS;
 	if (chains && !q.bootstrap)
 		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
-	/* As many chains as a render of that length has: where they are short, many of them err in ways that groups do
-	 * not show. */
+	/* As many chains as a render of that length has: many short chains err in ways that groups do not show. */
 	q.mutations = chains && !q.chains ? (uint64_t)fmin(fmax(each / pilot->mutation, 1), 1e15) : 0;
 	int rc = plan_make(&q, p, e);
 	q.chains = p->chains;
@@ -91,7 +90,7 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	return rc;
 }
 
-/* A world that is there already and needs no building for these settings, or a new one. */
+/* An existing world that suits these settings, or a new one. */
 static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct error *e)
 {
 	struct render_options options = *r->render;
@@ -130,7 +129,7 @@ static int start(struct accuracy_run *r, size_t i, struct error *e)
 	return rc;
 }
 
-/* A round of job i. Its cost is what its leases took of the processors. */
+/* A round of job i. Its cost is the CPU time of its leases. */
 static int step(struct accuracy_run *r, size_t i, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[i];
@@ -149,14 +148,14 @@ static int step(struct accuracy_run *r, size_t i, struct error *e)
 	return 0;
 }
 
-/* What setting i had of its share: CPU seconds or rounds. */
+/* What setting i has used of its share: CPU seconds or rounds. */
 static double had(const struct accuracy_run *r, size_t i)
 {
 	const struct accuracy_job *j = &r->jobs[i];
 	return (r->setting_rounds ? (double)canvas_rounds(j->run.canvas) : j->cpu) / r->design->settings[i].share;
 }
 
-/* Who had least. */
+/* The one that has used least. */
 static size_t next(const struct accuracy_run *r)
 {
 	size_t best = 0;
@@ -179,7 +178,7 @@ static int rounds(struct accuracy_run *r, double begin, struct error *e)
 		size_t i = next(r);
 		double wall = clock_seconds();
 		bool enough = wanted > 0 ? had(r, i) >= wanted : wall >= begin + r->seconds;
-		/* Two rounds at least, however short the time. */
+		/* At least two rounds, however short the time. */
 		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || stopped(r))
 			return 0;
 		show(r, fmin(wanted > 0 ? had(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1), 1),
@@ -198,11 +197,11 @@ static void end(struct accuracy_job *j)
 	*j = (struct accuracy_job){.cost_count = 0};
 }
 
-/* The default for a moment, thrown away again. */
+/* Renders the default briefly, to measure its speed. */
 static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[ACCURACY_DEFAULT];
-	*pilot = (struct pilot){1, 1, 1}; /* so slow that all sizes are the least */
+	*pilot = (struct pilot){1, 1, 1}; /* so slow that all sizes are the minimum */
 	int rc = make_plan(r, ACCURACY_DEFAULT, pilot, e);
 	if (!rc)
 		rc = check_memory(r, &j->plan, e);

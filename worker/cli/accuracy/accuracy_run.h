@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Rendering of all settings, in turns, so that times can be compared. One thread besides those of the leases. */
+/* Renders all settings alternately, so that times can be compared. One thread, besides those of the leases. */
 #ifndef WORKER_CLI_ACCURACY_ACCURACY_RUN_H
 #define WORKER_CLI_ACCURACY_ACCURACY_RUN_H
 
@@ -11,11 +11,11 @@ enum { ACCURACY_COSTS = 4096 };
 /* One setting's rendering. */
 struct accuracy_job {
 	struct plan plan;
-	struct world *world; /* that of several, if it can */
+	struct world *world; /* shared with others, if possible */
 	struct local_run run;
 	struct local_job *job;
 	size_t cost_count;
-	double cost[ACCURACY_COSTS]; /* CPU seconds a mutation, of each round */
+	double cost[ACCURACY_COSTS]; /* CPU seconds per mutation, of each round */
 	double cpu;		     /* of the rounds */
 };
 
@@ -27,9 +27,9 @@ struct accuracy_run {
 	const struct asset_source *assets;
 	const struct render_options *render;
 	unsigned threads;
-	double seconds;		 /* wall clock in all */
-	double setting_seconds;	 /* CPU seconds of a setting; 0: by the clock */
-	uint64_t setting_rounds; /* rounds of a setting, so that all but times repeats; 0: by time */
+	double seconds;		 /* total wall-clock time */
+	double setting_seconds;	 /* CPU seconds per setting; 0: by wall-clock time */
+	uint64_t setting_rounds; /* rounds per setting, so that everything but times is reproducible; 0: by time */
 	const atomic_bool *stop;
 	void (*progress)(void *user, double fraction, const char *state);
 	void *user;
@@ -41,7 +41,7 @@ struct accuracy_run {
 	bool interrupted;
 };
 
-/* 0 also where it was interrupted when each setting had a round: what there is can be judged. */
+/* Returns 0 also if it was interrupted after each setting had a round: what was rendered can be judged. */
 int accuracy_render(struct accuracy_run *r, struct error *e);
 void accuracy_run_fini(struct accuracy_run *r);
 

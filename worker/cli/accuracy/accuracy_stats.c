@@ -34,7 +34,7 @@ struct interval stats_difference(const double *a, size_t a_count, const double *
 		*t = 0;
 	if (a_count < 2 || b_count < 1 || !(mb > 0))
 		return (struct interval){NAN, NAN, NAN};
-	/* The means' ratio is meant, so that b's own error counts in the measure of a. */
+	/* The ratio of means, so that b's own error enters a's. */
 	double ratio = ma / mb;
 	vb *= ratio * ratio;
 	double variance = (va + vb) / (mb * mb);
@@ -58,7 +58,7 @@ struct interval stats_median(double *x, size_t count)
 		return (struct interval){NAN, NAN, NAN};
 	qsort(x, count, sizeof *x, order);
 	double middle = 0.5 * (x[(count - 1) / 2] + x[count / 2]), n = (double)count;
-	/* Binomial with chance 1/2: the rank that 2.5 % lie below, by its normal approximation. */
+	/* Binomial with probability 1/2: the rank below which 2.5 % lie, by the normal approximation. */
 	double rank = floor(0.5 * n - 0.5 - 0.98 * sqrt(n));
 	size_t k = rank > 0 ? (size_t)rank : 0;
 	return (struct interval){middle, x[k], x[count - 1 - k]};

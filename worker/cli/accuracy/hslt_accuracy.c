@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: the list of settings to compare (accuracy_design.c), their renders in turns (accuracy_run.c), the
- * judgement (accuracy_judge.c), and the report as text, CSV, JSON and HTML. Before hours are spent it says how long it
- * will take and what it will compare; a signal ends the measuring, and what is known is reported.
+ * The program: the list of settings to compare (accuracy_design.c), their alternating renders (accuracy_run.c), the
+ * figures (accuracy_judge.c), and the report as text, CSV, JSON and HTML. First it prints how long it will take and
+ * what it will compare. A signal ends the rendering, and what is known is reported.
  */
 #include "common/base/mem.h"
 #include "common/base/output.h"
@@ -92,7 +92,7 @@ struct session {
 	struct arguments *a;
 	char *folder, *name;
 	struct scene scene;
-	bool scene_read, usage; /* usage: what went wrong was asked for */
+	bool scene_read, usage; /* usage: the command line is wrong */
 	struct asset_folders folders;
 	struct asset_source assets;
 	struct render_summary summary;
@@ -128,7 +128,7 @@ static int load(struct session *s, struct error *e)
 	return render_check(&s->scene, &s->assets, &r->render, &s->summary, e);
 }
 
-/* Before hours are spent. */
+/* Printed before hours are spent. */
 static int check_reference(const struct session *s, struct error *e)
 {
 	const struct plan_request *p = &s->a->render.plan;
@@ -142,7 +142,7 @@ static int check_reference(const struct session *s, struct error *e)
 static int design(struct session *s, struct error *e)
 {
 	struct render_arguments *r = &s->a->render;
-	if (integrator_is_open(&r->plan)) /* most settings are those of chains */
+	if (integrator_is_open(&r->plan)) /* most settings concern chains */
 		snprintf(r->plan.integrator, sizeof r->plan.integrator, RENDER_INTEGRATOR_CHAINS);
 	int rc = render_plan_from_scene(r, &s->summary, e);
 	if (!rc)

@@ -32,7 +32,7 @@ static const char *_Atomic last_words;
 static void say_and_end(int signal_number)
 {
 	const char *text = atomic_load(&last_words);
-	/* The handler is gone already (SA_RESETHAND); the signal comes when this one returns. */
+	/* The handler has been reset (SA_RESETHAND); the signal is delivered when this one returns. */
 	if (write(STDERR_FILENO, text, strlen(text)) < 0)
 		_exit(128 + signal_number);
 	raise(signal_number);

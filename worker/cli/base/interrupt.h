@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * SIGINT and SIGTERM as a flag that renders look at: the first asks for an end that leaves what is complete, the second
- * one kills. One a process.
+ * SIGINT and SIGTERM as a flag that renders check: the first signal asks for an end that keeps complete rounds, the
+ * second kills. One per process.
  */
 #ifndef WORKER_CLI_BASE_INTERRUPT_H
 #define WORKER_CLI_BASE_INTERRUPT_H
@@ -11,8 +11,7 @@
 extern atomic_bool interrupted;
 void interrupt_watch(void);
 
-/* From now on such a signal writes the text (kept by the caller) to stderr and ends the process as it would have
- * without it. */
+/* From now on such a signal writes the text (owned by the caller) to stderr and then takes its default action. */
 void interrupt_say(const char *text);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One table: each option checks its argument at once and says what would be right. What only the scene can tell (the
- * film's shape, the usual mixture) is filled in by render_plan_from_scene, which ends in plan_make.
+ * One table: each option checks its argument at once and says what is expected. What depends on the scene (the film's
+ * aspect, the default mixture) is filled in by render_plan_from_scene, which ends with plan_make.
  */
 #include "worker/cli/base/options.h"
 
@@ -113,7 +113,7 @@ static int take_numbers(const char *option, const char *arg, const char *separat
 	return 0;
 }
 
-/* "640x360", or "640": the height that keeps the scene's shape. */
+/* "640x360", or "640": the height follows from the scene's aspect. */
 static int take_size(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
@@ -161,7 +161,7 @@ static int take_mutations(void *target, char *arg, struct error *e)
 	return 0;
 }
 
-/* Every setting, its default, its range and what it does. */
+/* Every setting, with default, range and meaning. */
 static void list_settings(void)
 {
 	const struct render_setting *k;
@@ -199,7 +199,7 @@ static int set_sensor(struct render_arguments *a, uint32_t n, struct error *e)
 	return add_setting(a, set, e);
 }
 
-/* What is no number is an id, and only the scene knows whose. */
+/* Anything but a number is an id, which is looked up in the scene. */
 static int take_sensor(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
@@ -258,7 +258,7 @@ static int take_effects(void *target, char *arg, struct error *e)
 	return render_effects(arg, a->render.effects, e) ? error_prefix(e, -EINVAL, "--effects") : 0;
 }
 
-/* ---- what there is to choose from ---- */
+/* ---- lists of choices ---- */
 
 static const char *integrator_name(size_t i)
 {
@@ -375,7 +375,7 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 {
 	struct plan_request *p = &a->plan;
 	const struct scene_settings *s = &summary->settings;
-	bool open = integrator_is_open(p), chains = a->mixture || p->chains; /* who says how, wants them */
+	bool open = integrator_is_open(p), chains = a->mixture || p->chains; /* options of mutations imply them */
 	if (open)
 		text_copy(p->integrator, sizeof p->integrator,
 			  chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
@@ -397,7 +397,7 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 		p->min_depth = s->hide_emitters ? 2 : 1;
 	if (!p->max_depth)
 		p->max_depth = s->max_depth;
-	/* Longer paths carry no light; but what was asked for at least must be asked of something. */
+	/* Longer paths carry no light; but the requested minimum must be measured against something. */
 	if (p->max_depth > summary->useful_depth && summary->useful_depth >= p->min_depth)
 		p->max_depth = summary->useful_depth;
 	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))

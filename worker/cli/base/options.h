@@ -13,45 +13,46 @@ struct render_arguments {
 	struct render_options render;
 	struct scene_define defines[OPTION_DEFINES_MAX];
 	size_t define_count;
-	const char *paths[OPTION_PATHS_MAX]; /* of --path, in their order */
+	const char *paths[OPTION_PATHS_MAX]; /* of --path, in order */
 	size_t path_count;
 	const char *mixture; /* of --mutations LIST; NULL: not given */
-	const char *sensor;  /* the id that --sensor names; NULL: none, or its number is a setting by now */
+	const char
+		*sensor; /* the id given to --sensor; NULL: none, or it has been resolved to a number in the settings */
 };
 
 extern const struct option_table render_table; /* fills a struct render_arguments */
 
-/* Which integrator is left to the scene: choice_make (worker/cli/render/choice.h) finds it after
+/* Whether the choice of the integrator is left to the scene: choice_make (worker/cli/render/choice.h) makes it after
  * render_plan_from_scene. */
 bool integrator_is_open(const struct plan_request *r);
 
-/* Fills in what the options left to the scene: film, depth, samples, mixture of mutations. -EINVAL: the mixture
- * that was asked for is none, a usage error. */
+/* Fills in what the options left to the scene: film, depth, samples, mixture of mutations. -EINVAL: the given
+ * mixture is invalid, a usage error. */
 int render_plan_from_scene(struct render_arguments *a, const struct render_summary *s, struct error *e);
 
-unsigned option_threads_default(void); /* as many as processors */
+unsigned option_threads_default(void); /* number of processors */
 
-/* For rows of tables; -EINVAL with a sentence is a usage error. The file of an image, which is OpenEXR: an error where
- * its name says that it is something else. "-" is /dev/stdout. */
+/* For rows of tables; -EINVAL with a sentence is a usage error. The file of an image, which is OpenEXR: an error if
+ * its name has another ending. "-" is /dev/stdout. */
 int option_image(const char *arg, const char **image, struct error *e);
 
-/* For a program of one scene: the index-th word that is no option. */
+/* For a program with one scene: the index-th word that is not an option. */
 int option_scene(size_t index, const char *word, const char **scene, struct error *e);
 
-/* A folder of --path, which must be there, appended to OPTION_PATHS_MAX paths. */
+/* A folder of --path, which must exist, appended to OPTION_PATHS_MAX paths. */
 int option_path(const char *arg, const char **paths, size_t *count, struct error *e);
 
-/* NAME=VALUE of -D, cut into two in place, appended to OPTION_DEFINES_MAX defines. */
+/* NAME=VALUE of -D, split in place, appended to OPTION_DEFINES_MAX defines. */
 int option_define(char *arg, struct scene_define *defines, size_t *count, struct error *e);
 
-/* render_scene_read; the sensor that --sensor names by its id is a setting from then on. */
+/* render_scene_read; a sensor given by id becomes a number in the settings. */
 int option_scene_read(struct scene *s, const struct asset_source *assets, const char *name, struct render_arguments *a,
 		      struct error *e);
 
 /* The folders in which the scene's files are searched: its own, then those of --path. */
 struct asset_folders option_folders(const struct render_arguments *a, const char *folder);
 
-/* "a/b/room.xml" -> "a/b" and "room.xml"; both to be mem_free'd. */
+/* "a/b/room.xml" -> "a/b" and "room.xml"; free both with mem_free. */
 int scene_path_split(const char *path, char **folder, char **name, struct error *e);
 
 #endif

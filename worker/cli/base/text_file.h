@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A text file that is made in memory and put in place as a whole. Pieces that do not fit are noticed once, at the end.
- * One thread; zeroed memory is an empty page.
+ * A text file that is built in memory and written atomically. Lack of memory is reported once, at the end. One thread;
+ * zeroed memory is an empty file.
  */
 #ifndef WORKER_CLI_BASE_TEXT_FILE_H
 #define WORKER_CLI_BASE_TEXT_FILE_H
@@ -16,15 +16,15 @@ struct text_file {
 
 __attribute__((format(printf, 2, 3))) void text_file_put(struct text_file *p, const char *format, ...);
 void text_file_bytes(struct text_file *p, const void *bytes, size_t count);
-/* For XML and HTML: what has a meaning there is spelled out; what is no UTF-8 or no character of XML becomes '?'. */
+/* For XML and HTML: special characters are escaped; invalid UTF-8 and characters that XML does not allow become '?'. */
 void text_file_escaped(struct text_file *p, const char *text);
-/* A field of comma-separated values, in quotes where it needs them. */
+/* A field of comma-separated values, in quotes if necessary. */
 void text_file_field(struct text_file *p, const char *text);
 void text_file_base64(struct text_file *p, const unsigned char *bytes, size_t count);
 int text_file_write(const struct text_file *p, const char *path, struct error *e);
 void text_file_fini(struct text_file *p);
 
-/* Bytes of the character that `at` begins with, where it is UTF-8 that XML may hold; else 0. */
+/* Bytes of the character at `at`, if it is UTF-8 that XML allows; otherwise 0. */
 size_t text_file_character(const char *at);
 
 #endif

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Crops are added one by one: the first decides what all must share (plan, seed, film), each pastes its pixels and adds
- * its sums, the last closes the header. Pixels that no crop has are cut off if they are a border, else an error.
+ * Crops are added one by one: the first determines what all must share (plan, seed, film), each copies its pixels and
+ * adds its sums, and the last completes the header. Pixels without a crop are cut off at the border; elsewhere they are
+ * an error.
  *
  * Failures name the file and the attribute in which it differs.
  */
@@ -17,8 +18,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What must be alike, what is added up, what has a meaning of its own; the rest of the header is kept where all crops
- * say the same. */
+/* Attributes that must be equal, that are added, or that have a rule of their own; others are kept if all crops
+ * agree. */
 static const char *const alike[] = {"hslt:version",  "hslt:scene",    "hslt:integrator",
 				    "hslt:minDepth", "hslt:maxDepth", "hslt:effects"};
 static const char *const added[] = {"hslt:mutations",	"hslt:accepted",   "hslt:independent",
@@ -33,9 +34,8 @@ enum { TEXT = 8192 };
 
 struct sums {
 	uint64_t added[ADDED];
-	bool in_all[ADDED]; /* every crop has it */
-	double mse, below, above,
-		pixels; /* relMSE times pixels; squares of its distances from the ends of its interval */
+	bool in_all[ADDED];		  /* present in every crop */
+	double mse, below, above, pixels; /* relMSE times pixels; squared distances from the ends of its interval */
 	bool has_mse;
 	double cpu, wall;
 	int mixed;
@@ -47,7 +47,7 @@ struct assembly {
 	struct exr_image film;
 	unsigned char *covered;
 	bool *kept;		/* of the attributes of the first crop */
-	struct exr_image first; /* its header alone */
+	struct exr_image first; /* only its header */
 	struct sums sums;
 };
 
@@ -80,7 +80,7 @@ static double number_of(const struct exr_image *img, const char *name)
 	return a && a->type == EXR_ATTRIBUTE_DOUBLE ? a->number : NAN;
 }
 
-/* "--set A=1 ..." of hslt:options: what stands behind the option, up to a space. */
+/* The argument of an option in hslt:options ("--set A=1 ..."), up to a space. */
 static bool same_option(const char *a, const char *b, const char *option)
 {
 	const char *x = strstr(a, option), *y = strstr(b, option);
@@ -223,7 +223,7 @@ static int add_crop(struct assembly *a, const char *path, struct error *e)
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
 
-/* The rectangle that is covered becomes the image; moves rows to the front. */
+/* The covered rectangle becomes the image; moves its rows to the front. */
 static int close_up(struct assembly *a, struct error *e)
 {
 	struct exr_image *f = &a->film;
@@ -278,7 +278,7 @@ static void put_string(struct exr_image *f, const char *name, const char *text)
 		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_STRING, .string = text};
 }
 
-/* Names and texts are borrowed: of the table, of the first crop, of the sums. */
+/* Names and texts are borrowed from the table, the first crop and the sums. */
 static int write(struct assembly *a, size_t count, unsigned char **bytes, size_t *size, struct error *e)
 {
 	struct exr_image *f = &a->film;

@@ -39,7 +39,7 @@ static double mean(const float *plane, size_t n)
 	return sum / (double)n;
 }
 
-/* What keeps relative errors of black pixels finite: (0.01 m)^2. */
+/* Keeps relative errors of black pixels finite: (0.01 m)^2. */
 static double floor_of(const struct picture *b)
 {
 	double sum = 0;
@@ -55,8 +55,7 @@ static struct pixel_error error_at(const struct picture *a, const struct picture
 		double reference = (double)b->rgb[k][i], d = (double)a->rgb[k][i] - reference;
 		r.squared += d * d / 3;
 		r.relative +=
-			d == 0 ? 0
-			       : d * d / (reference * reference + least) / 3; /* least is 0 under a black reference */
+			d == 0 ? 0 : d * d / (reference * reference + least) / 3; /* least is 0 for a black reference */
 	}
 	if (!isfinite(r.squared))
 		r = (struct pixel_error){INFINITY, INFINITY};
@@ -77,7 +76,7 @@ static int ascending(const void *p, const void *q)
 	return a < b ? -1 : a > b;
 }
 
-/* Of all values of the three channels, by nearest rank. */
+/* Over all values of the three channels, by nearest rank. */
 static int percentile(const struct picture *b, double share, double *value, struct error *e)
 {
 	size_t n = pixels_of(b);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: two images and what differs between them (compare.h), as text or JSON, with a heat map where one is
- * asked for; --exact compares bits and headers and says the first difference.
+ * The program: two images and their differences (compare.h), as text or JSON, optionally with a heat map; --exact
+ * compares bits and headers and prints the first difference.
  *
- * Exit code 1: a failure (images of different sizes, or with other channels), a difference with --exact, or more than
- * --max-relmse.
+ * Exit code 1: a failure (images of different sizes, or with different channels), a difference with --exact, or more
+ * than --max-relmse.
  */
 #include "common/base/mem.h"
 #include "common/base/output.h"
@@ -20,7 +20,7 @@
 
 struct arguments {
 	const char *path[2], *heatmap;
-	double trim, most; /* most: negative for none */
+	double trim, most; /* most: negative: none */
 	uint32_t width, height;
 	bool exact, json;
 };

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Pictures for the programs that look at them: R, G, B of an EXR file, averaged down where asked, and PNG files out.
- * Planes of floats, linear. One thread.
+ * Images for the programs that process them: reading R, G, B of an EXR file, optionally averaged down, and writing PNG
+ * files. Planes of floats, linear. One thread.
  */
 #ifndef WORKER_CLI_IMAGE_PICTURE_H
 #define WORKER_CLI_IMAGE_PICTURE_H
@@ -11,17 +11,17 @@
 
 struct picture {
 	struct exr_image image; /* all channels, as read */
-	const float *rgb[3];	/* planes of it */
+	const float *rgb[3];	/* its planes */
 };
 
-/* The error names the file. -EINVAL: it has no R, G or B. */
+/* The error names the file. -EINVAL: it lacks R, G or B. */
 int picture_read(struct picture *p, const char *path, struct error *e);
 void picture_fini(struct picture *p);
 
-/* Means of equal boxes, of R, G and B alone. -EINVAL: width and height do not divide the picture's. */
+/* Means of equal boxes, of R, G and B only. -EINVAL: width and height do not divide the image's. */
 int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct error *e);
 
-/* rgb: 3 bytes a pixel, sRGB. bytes are mem_alloc'd. */
+/* rgb: 3 bytes per pixel, sRGB. bytes are mem_alloc'd. */
 int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size,
 		       struct error *e);
 /* Temporary file and rename. */

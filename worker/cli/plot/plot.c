@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The data becomes a script for gnuplot on its standard input, its SVG or PNG comes back from a temporary file; both
- * are whole before the other side reads, so that neither waits for the other. Every name and number is quoted or
- * printed by us.
+ * The data becomes a script for gnuplot on its standard input; its SVG or PNG comes back in a temporary file. Both are
+ * complete before the other side reads, so that neither waits for the other. Every name and number is quoted or printed
+ * by us.
  *
- * Failures: no gnuplot (-ENOENT), one that ends with an error (its own first line is in the sentence), no room for its
- * output.
+ * Failures: no gnuplot (-ENOENT), a gnuplot that exits with an error (its first line is in the sentence), no room for
+ * its output.
  */
 #include "worker/cli/plot/plot.h"
 
@@ -30,8 +30,8 @@ enum { OUTPUT_MAX = 1 << 26 };
 
 extern char **environ;
 
-/* In single quotes gnuplot takes nothing for its own but the quote itself; a line cannot go on there, so controls are
- * blanks. */
+/* In single quotes gnuplot interprets only the quote itself; a line cannot continue there, so control characters
+ * become blanks. */
 static void put_quoted(struct text_file *s, const char *text)
 {
 	enum { LONGEST = 400 };
@@ -50,8 +50,8 @@ static void put_quoted(struct text_file *s, const char *text)
 	text_file_bytes(s, "'", 1);
 }
 
-/* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008): apart for every kind of eyes, on white and in
- * print. */
+/* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008): distinguishable with all kinds of colour vision,
+ * on white and in print. */
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#aa4499", "#e69f00", "#56b4e9"};
 static const int shapes[] = {7, 5, 9, 13, 11, 4};
 
@@ -112,7 +112,7 @@ static void put_data(struct text_file *s, const struct plot *p, const struct plo
 		bool bars = r->low && r->high && isfinite(r->low[i]) && isfinite(r->high[i]) &&
 			    (!p->log_y || r->high[i] > 0);
 		double low = bars ? r->low[i] : y, high = bars ? r->high[i] : y;
-		/* On a logarithmic axis a bar that reaches 0 goes to the edge. */
+		/* On a logarithmic axis, a bar that reaches 0 extends to the edge. */
 		text_file_put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y,
 			      p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
 	}
@@ -184,8 +184,8 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 		put_series(&body, p, k);
 	}
 	text_file_put(&body, "\n");
-	/* Plots in one page have names of their own for their parts: from what they show, so that they stay the same.
-	 */
+	/* Plots in one page need distinct ids for their parts: derived from their contents, so that they are
+	 * reproducible. */
 	put_style(s, png, hash(&body.text));
 	text_file_bytes(s, body.text.bytes, body.text.size);
 	s->full = s->full || body.full;
@@ -193,7 +193,7 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 	return s->full ? error_set(e, ENOMEM, "the plot '%.80s' has too many points", p->title) : 0;
 }
 
-/* The script is complete before gnuplot reads, and its output before we do: neither waits for the other. */
+/* The script is complete before gnuplot reads, and its output before we do, so neither waits for the other. */
 static int spawn(const int fd[3], struct error *e)
 {
 	char name[] = "gnuplot", settings[] = "--default-settings", input[] = "-";
@@ -209,7 +209,7 @@ static int spawn(const int fd[3], struct error *e)
 	posix_spawnattr_init(&attributes);
 	for (int i = 0; i < 3; i++)
 		posix_spawn_file_actions_adddup2(&actions, fd[i], i);
-	/* A group of its own: an interrupt from the terminal is for us, who finish the report then. */
+	/* A process group of its own: an interrupt from the terminal is for us, and we then finish the report. */
 	posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
 	posix_spawnattr_setpgroup(&attributes, 0);
 	posix_spawnattr_setsigmask(&attributes, &none);
@@ -228,7 +228,7 @@ static int spawn(const int fd[3], struct error *e)
 	return WIFEXITED(status) && WEXITSTATUS(status) == 0 ? 0 : -EIO;
 }
 
-/* All of the file and a 0 behind it. */
+/* The whole file, followed by a 0. */
 static int read_whole(int fd, char **bytes, size_t *size, struct error *e)
 {
 	struct stat st;
@@ -304,7 +304,7 @@ static int draw(const struct plot *p, bool png, char **bytes, size_t *size, stru
 	return rc;
 }
 
-/* gnuplot gives each part a title that tells readers nothing and that browsers show below the pointer. */
+/* gnuplot gives each part a meaningless title, which browsers show at the pointer. */
 static void drop_titles(char *svg, size_t *size)
 {
 	char *to = svg;

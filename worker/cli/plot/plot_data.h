@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a plot shows. */
+/* The contents of a plot. */
 #ifndef WORKER_CLI_PLOT_DATA_H
 #define WORKER_CLI_PLOT_DATA_H
 
@@ -13,7 +13,7 @@ struct plot_series {
 	enum plot_style style;
 	size_t count;
 	const double *x, *y, *low,
-		*high;		   /* [count]; low and high may be NULL: no bars. Not finite: the point is left out */
+		*high; /* [count]; low and high may be NULL: no bars. Points that are not finite are left out */
 	const char *const *labels; /* [count], beside the points; NULL: none */
 };
 

@@ -13,20 +13,20 @@
 #include <jansson.h>
 
 struct choice {
-	bool made; /* false: one was asked for, and the rest is empty */
+	bool made; /* false: one was given, and the rest is empty */
 	struct render_choice found;
 	double seconds; /* wall clock */
-	char text[512]; /* one line, for people */
+	char text[512]; /* one line for people */
 };
 
 /* a: complete but for what is chosen and counted. Where that is nothing no world is built for it. */
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e);
-/* The same in a world that is there. */
+/* The same in an existing world. */
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);
 
-/* One line on stderr for whoever renders or submits; nothing where none was made. The reasons are --explain's. */
+/* Prints one line on stderr; nothing if no choice was made. --explain prints the reasons. */
 void choice_print(const struct choice *c, const char *integrator);
-/* null: none was made. NULL: no memory */
+/* null: no choice was made. NULL: out of memory */
 json_t *choice_to_json(const struct choice *c);
 
 #endif

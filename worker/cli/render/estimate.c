@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A pilot's history of looks (common/estimate/forecast.h) as a table of errors and what each costs, as JSON and as a
- * plot. Rows that lie beyond what the pilot can tell say so instead of giving a number.
+ * The errors estimated by a pilot (common/estimate/forecast.h) as a table of errors and their costs, as JSON and as a
+ * plot. Rows beyond what the pilot can predict say so instead of giving a number.
  */
 #include "worker/cli/render/estimate.h"
 
@@ -21,8 +21,8 @@ static const double usual[] = {0.1, 0.05, 0.02, 0.01};
 
 struct row {
 	double target;
-	const struct forecast_look *reached; /* by the pilot; NULL: not */
-	struct forecast_cost cost;	     /* of the render, with its bootstrap */
+	const struct forecast_look *reached; /* by the pilot; NULL: not reached */
+	struct forecast_cost cost;	     /* of the render, including its bootstrap */
 };
 
 static double bootstrap_ratio(const struct estimate *s)
@@ -177,7 +177,7 @@ static void draw_looks(const struct estimate *s, struct drawing *d)
 	}
 }
 
-/* From the pilot's last look to where the last target that can be paid for is met. */
+/* From the pilot's last estimate to the last target that can be reached. */
 static void draw_band(const struct estimate *s, struct drawing *d, double most)
 {
 	const struct forecast_look *l = &s->looks->looks[s->looks->count - 1];

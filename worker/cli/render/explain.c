@@ -15,7 +15,7 @@ static const char *state_of(const struct effect_line *l)
 	return l->on ? "on" : "off";
 }
 
-/* Edges of the longest path that the image has. */
+/* Edges of the longest path in the image. */
 static uint32_t held_depth(const struct plan_request *p)
 {
 	const struct render_integrator *integrator = render_integrator_find(p->integrator);

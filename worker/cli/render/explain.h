@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* hslt-render --explain: what a scene calls for, why, and what leaving the rest out saves; which integrators were
- * considered, and why one was chosen. Renders nothing but the pilot of that choice. */
+/* hslt-render --explain: which effects a scene needs and why, what omitting the others saves, which integrators were
+ * considered and why one was chosen. Renders nothing but the pilot of that choice. */
 #ifndef WORKER_CLI_RENDER_EXPLAIN_H
 #define WORKER_CLI_RENDER_EXPLAIN_H
 
 #include "worker/cli/base/options.h"
 
-/* Reads the scene at `path` and prints the list on stdout, as one JSON object where asked. *usage: what went wrong was
- * asked for. */
+/* Reads the scene at `path` and prints the list on stdout, optionally as one JSON object. *usage: the command line
+ * is wrong. */
 int explain(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e);
 
 #endif

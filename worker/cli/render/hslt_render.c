@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: options, scene, integrator (choice.h), plan, render (local.h), image. Between phases it looks whether a
- * signal has come: the image of the complete rounds is written then, and the exit code says that it was ended.
+ * The program: options, scene, integrator (choice.h), plan, render (local.h), image. Between phases it checks for
+ * signals: it then writes the image of the complete rounds, and the exit code says that it was interrupted.
  *
- * Every failure ends in one line on stderr and the exit code of its kind (docs/design.md); the image is replaced as a
- * whole or not at all.
+ * Every failure ends with one line on stderr and the exit code of its kind (docs/design.md); the image is replaced
+ * atomically or not at all.
  */
 #include "common/base/clock.h"
 #include "common/base/crash.h"
@@ -121,7 +121,7 @@ struct session {
 	struct choice choice;
 	struct progress progress;
 	struct kept_bootstrap kept;
-	bool usage; /* what went wrong was asked for */
+	bool usage; /* the command line is wrong */
 };
 
 static int load(struct session *s, struct error *e)
@@ -195,7 +195,8 @@ static void show(void *user, const struct local_progress *p)
 	progress_show(&s->progress, fraction, p->state, detail);
 }
 
-/* After a look: when it will stop by its target, and what the next halving would cost, for the progress line. */
+/* After an estimate of the error: when the target will be reached, and the cost of halving the error, for the
+ * progress line. */
 static void expect(struct session *s, const struct local_round *r)
 {
 	struct forecast_cost stop, half;
@@ -317,7 +318,7 @@ static void say(const struct session *s)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
 
-/* The last line, and what even --quiet says: how wrong the image is, nobody knows. */
+/* The last line, printed even with --quiet: the error of the image is not known. */
 static void warn(const struct session *s)
 {
 	char text[STATED_ERROR_TEXT];

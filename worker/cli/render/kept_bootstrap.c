@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A file is a mark, which says what it belongs to, and what bootstrap_save() writes; it is read whole and checked
- * before anything in it is used (checked_file.h). It gets its name when it is complete.
+ * The file is a mark, which identifies the command that it belongs to, and the data of bootstrap_save(). It is read
+ * completely and checked before anything in it is used (checked_file.h). It gets its name when it is complete.
  *
- * Failures lose the bootstrap, never the render: a file that does not fit or is damaged is not used, and one that
- * cannot be written is told.
+ * Failures lose the bootstrap, never the render: a file that does not match or is damaged is not used, and a failure to
+ * write is reported.
  */
 #include "worker/cli/render/kept_bootstrap.h"
 
@@ -46,7 +46,7 @@ static void add_text(struct kept_bootstrap *k, const char *text, const char *end
 {
 	size_t n = strlen(k->text);
 	if ((size_t)snprintf(k->text + n, sizeof k->text - n, "%s%s", text, end) >= sizeof k->text - n)
-		k->path[0] = 0; /* too much to tell it from others */
+		k->path[0] = 0; /* too much to compare with others */
 }
 
 void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const char *fingerprint, const struct plan *p,
@@ -92,7 +92,7 @@ static int read_mark(const struct kept_bootstrap *k, struct checked_file *f, str
 	return rc;
 }
 
-/* Leases that are there already after a failure in the middle are as good as any: each was checked. */
+/* Leases that were added before a failure are kept: each was checked. */
 void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *text, size_t size)
 {
 	struct checked_file f;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * phase() hands leases to threads under one lock and merges their results in the order in which they end, which the
- * sums do not notice; run_bootstrap(), then rounds, each followed by the question whether the job is done
- * (common/estimate/merge.h), until it is.
+ * phase() gives leases to threads under one lock and merges their results in the order in which they finish, which does
+ * not affect the sums. run_bootstrap() is followed by rounds; after each, common/estimate/merge.h decides whether the
+ * job is done.
  *
- * Failures: of a lease (with its key), of the disk under the canvas, no memory; the canvas is freed, since it may hold
- * a part of a round.
+ * Failures: of a lease (with its key), of the disk under the canvas, no memory. The canvas is freed then, since it may
+ * contain part of a round.
  */
 #include "worker/cli/render/local.h"
 
@@ -75,7 +75,7 @@ static void show(struct thread_pool *c)
 	r->progress(r->user, &p);
 }
 
-/* Under the lock: the batch's content goes where the farm's goes. */
+/* Under the lock: merges the batch as the farm does. */
 static int merge(struct thread_pool *c, struct batch *b)
 {
 	const struct plan *p = c->run->plan;
@@ -129,7 +129,7 @@ static int lease(struct thread_pool *c, uint32_t index)
 	return rc;
 }
 
-/* The next lease of the phase that is not there already; all of them: none is left. Under the lock. */
+/* The next lease of the phase that is not merged yet; the total number: none is left. Under the lock. */
 static uint32_t take_lease(struct thread_pool *c)
 {
 	uint32_t parts = c->run->plan->parts;
@@ -162,7 +162,7 @@ static int phase(struct thread_pool *c, enum lease_kind kind, uint64_t epoch)
 	c->epoch = epoch;
 	c->next = 0;
 	c->leases = c->run->plan->groups * c->run->plan->parts;
-	/* This thread is one of the thread pool, so that the phase ends even where no other can be made. */
+	/* This thread works, too, so that the phase ends even if no other thread can be created. */
 	while (started + 1 < wanted && pthread_create(&threads[started], NULL, work, c) == 0)
 		started++;
 	work(c);
@@ -193,7 +193,7 @@ static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *
 	struct local_run *r = c->run;
 	struct canvas_image img;
 	double seconds = since(&c->begin);
-	/* Where another bound ends it, the target may be met all the same. */
+	/* The target may be reached even if another bound ends the render. */
 	bool ends = merge_end_of(r->plan, rounds, seconds, NULL) != MERGE_GOES_ON && r->plan->target_error > 0;
 	bool due = ends || merge_error_due(r->plan, rounds);
 	if (due && canvas_image(r->canvas, false, &img, &c->error))
@@ -213,7 +213,7 @@ static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *
 	return 0;
 }
 
-/* The bootstrap, and what the rounds begin with. */
+/* The bootstrap, and the start of the rounds. */
 static int run_bootstrap(struct thread_pool *c)
 {
 	struct local_run *r = c->run;
@@ -232,7 +232,7 @@ static int run_bootstrap(struct thread_pool *c)
 	return rc;
 }
 
-/* On errors the canvas goes: what it holds cannot be trusted. */
+/* After an error the canvas cannot be trusted and is freed. */
 static int fail(struct local_job *j, int rc, struct error *e)
 {
 	*e = j->thread_pool.error;

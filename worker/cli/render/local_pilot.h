@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A pilot on this machine (pilot.h): a probe, then a short render whose looks are kept. Threads as local.h. */
+/* A pilot on this machine (pilot.h): a probe, then a short render whose error estimates are kept. Threads as in
+ * local.h. */
 #ifndef WORKER_CLI_RENDER_LOCAL_PILOT_H
 #define WORKER_CLI_RENDER_LOCAL_PILOT_H
 
@@ -16,13 +17,13 @@ struct local_pilot {
 	void (*progress)(void *user, const struct local_progress *p); /* may be NULL */
 	void *user;
 	/* out */
-	struct plan render, plan; /* the one spoken of, the pilot's */
+	struct plan render, plan; /* of the render being predicted; of the pilot */
 	struct forecast_history looks;
-	bool timed, over; /* of the callbacks: the pilot proper has begun, has seen enough */
+	bool timed, over; /* set by the callbacks: the pilot itself has started; it has seen enough */
 	double cpu_seconds, wall_seconds, bootstrap_cpu, bootstrap_seconds;
 };
 
-/* -EINTR: stopped before there was a look. */
+/* -EINTR: stopped before there was an estimate. */
 int local_pilot(struct local_pilot *p, struct error *e);
 
 #endif

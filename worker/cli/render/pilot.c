@@ -8,8 +8,8 @@
 
 enum {
 	PROBE_BOOTSTRAP = 16384,
-	PROBE_EPOCH = 16,	      /* mutations a chain; a chain's start costs about one */
-	PROBE_SAMPLES_MOST = 1 << 21, /* samples of the shortest round that is worth a probe */
+	PROBE_EPOCH = 16,	      /* mutations per chain; starting a chain costs about one */
+	PROBE_SAMPLES_MOST = 1 << 21, /* samples of the shortest round that needs a probe */
 };
 static const double out_of_reach = 1e-9;
 static const double bootstrap_share = 0.25; /* of a pilot, at most */
@@ -18,7 +18,7 @@ static const double probe_seconds = 1;	    /* of a thread, for its bootstrap, wh
 int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
 {
 	double target = a->plan.target_error;
-	a->plan.target_error = target > 0 ? target : 1; /* a wish, so that the scene's is not taken for one */
+	a->plan.target_error = target > 0 ? target : 1; /* set, so that the scene's is not used */
 	int rc = render_plan_from_scene(a, summary, e);
 	a->plan.target_error = target;
 	return rc;
@@ -40,7 +40,7 @@ int pilot_render_plan(const struct plan_request *request, struct plan *render, s
 {
 	struct plan_request r = *request;
 	if (!(r.target_error > 0))
-		r.target_error = 0.01; /* the least of those that are spoken of */
+		r.target_error = 0.01; /* the smallest error that predictions name */
 	int rc = plan_make(&r, render, e);
 	if (!rc && render->groups < 2)
 		rc = error_set(e, EINVAL, "one group has no error: give --groups 2 or more");

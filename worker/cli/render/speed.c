@@ -12,11 +12,11 @@ enum {
 	BOOTSTRAP = 4096,
 	FIRST_EPOCH = 32, /* then eight times as long, and so on */
 	LONGEST_EPOCH = 1 << 20,
-	SMALL_FILM = 1 << 13, /* pixels: a round of samples cannot be shorter than its film */
+	SMALL_FILM = 1 << 13, /* pixels: a round of samples is at least one per pixel */
 };
 static const double enough_seconds = 0.25;
 
-/* Samples are taken of a smaller film of the same view. */
+/* Samples are measured on a smaller film of the same view. */
 static void shrink(struct render_options *o, struct plan_request *r)
 {
 	double scale = sqrt(SMALL_FILM / ((double)r->width * r->height));
@@ -37,7 +37,7 @@ static struct plan_request pilot_of(const struct render_arguments *a)
 	return r;
 }
 
-/* Longer and longer until it is long enough to be measured. */
+/* Lengthens the render until it can be measured. */
 static int measure_speed(const struct world *w, struct plan_request *r, double *speed, struct error *e)
 {
 	static const atomic_bool never;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What --stats FILE holds, as JSON: plan, why its integrator was chosen, times, counters, strategies, effects, which
- * bound ended the render. One thread.
+ * The contents of --stats FILE, as JSON: plan, reasons for its integrator, times, counters, strategies, effects, the
+ * bound that ended the render. One thread.
  */
 #ifndef WORKER_CLI_RENDER_STATS_H
 #define WORKER_CLI_RENDER_STATS_H

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* docs/compatibility.md, made of the registries: what is read of Mitsuba's scenes, what stands in for the rest. */
+/* Prints docs/compatibility.md, generated from the registries: what is supported of Mitsuba's scenes, and what
+ * replaces the rest. */
 #ifndef WORKER_CLI_SCENE_COMPATIBILITY_H
 #define WORKER_CLI_SCENE_COMPATIBILITY_H
 

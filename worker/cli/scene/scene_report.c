@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The scene is read so that everything wrong is found (scene_read_all); where nothing is, meshes, pictures and values
- * that do not go together are looked at as a worker would. `show` gathers all that is known as JSON, of which the text
- * is made.
+ * The scene is read such that every problem is found (scene_read_all); if there is none, meshes, images and
+ * combinations of values are checked as a worker would. `show` collects everything as JSON, from which the text is
+ * made.
  *
- * A scene that cannot be rendered is exit code 1, with a line a problem; files that cannot be read at all say so alone.
+ * For a scene that cannot be rendered the exit code is 1, with one line per problem; a file that cannot be read at all
+ * gets only that line.
  */
 #include "worker/cli/scene/scene_report.h"
 
@@ -16,7 +17,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A scene file opened: its folder, its name there, and what the folder has. */
+/* An open scene file: its folder, its name there, and the folder's files. */
 struct opened {
 	char *folder, *name;
 	struct asset_folders folders;
@@ -150,7 +151,7 @@ static json_t *effects_of(const struct render_summary *m)
 	return on;
 }
 
-/* All that `show` knows, as JSON; the text is made of it. */
+/* Everything that `show` knows, as JSON; the text is made from it. */
 static json_t *describe(const struct scene *s, const struct opened *o, struct error *e)
 {
 	static struct render_summary m; /* large */

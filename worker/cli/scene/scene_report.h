@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* hslt-scene: what is wrong with a scene file, and what was read of it. Renders nothing. */
+/* hslt-scene: lists the problems of a scene file, or what was read from it. Renders nothing. */
 #ifndef WORKER_CLI_SCENE_REPORT_H
 #define WORKER_CLI_SCENE_REPORT_H
 
@@ -11,14 +11,14 @@ struct scene_request {
 	size_t define_count;
 	const char *paths[OPTION_PATHS_MAX]; /* where files that are not in the scene's folder are searched */
 	size_t path_count;
-	bool lenient; /* what is not supported is left out or replaced, and noted */
+	bool lenient; /* leave out or replace what is not supported, with a note */
 };
 
-/* Prints a line for everything that is wrong, not supported, or ignored, and one that sums up. *bad: the scene cannot
- * be rendered. */
+/* Prints a line for everything that is wrong, not supported or ignored, and a summary. *bad: the scene cannot be
+ * rendered. */
 int scene_report_check(const struct scene_request *r, bool *bad, struct error *e);
 
-/* Prints what was read: film, camera, counts, files with sizes and SHA-256; as one JSON object where asked. */
+/* Prints what was read: film, camera, counts, files with sizes and SHA-256; optionally as one JSON object. */
 int scene_report_show(const struct scene_request *r, bool json, struct error *e);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A pilot on a farm (pilot.h): a probe and a short render as jobs of their own, whose looks come with their status. One
- * thread; shows progress on stderr.
+ * A pilot on a farm (pilot.h): a probe and a short render as separate jobs, whose error estimates come with their
+ * status. One thread; shows progress on stderr.
  */
 #ifndef WORKER_CLI_SUBMIT_FARM_PILOT_H
 #define WORKER_CLI_SUBMIT_FARM_PILOT_H
@@ -15,7 +15,7 @@ struct farm_pilot {
 	const struct scene_bundle *bundle;
 	double seconds;
 	/* out */
-	struct plan render, plan; /* the one spoken of, the pilot's */
+	struct plan render, plan; /* of the render being predicted; of the pilot */
 	struct submit_end end;	  /* of the pilot */
 };
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: options, the scene's files and their hashes, integrator and plan as hslt-render makes them, submission;
- * with --wait it shows progress, fetches the image and verifies its hash. A connection that breaks is made again
- * (reconnect.h); the job goes on meanwhile.
+ * The program: options, the scene's files and their hashes, integrator and plan as in hslt-render, submission. With
+ * --wait it shows progress, fetches the image and verifies its hash. A lost connection is re-established (reconnect.h);
+ * the job continues meanwhile.
  *
- * Exit codes are those of the job where it ended (docs/design.md), 1 for a local failure, and a signal says how to go
- * on with the job.
+ * Exit codes are those of the job if it ended (docs/design.md), 1 for a local failure; after a signal it prints how to
+ * continue with the job.
  */
 #include "common/base/crash.h"
 #include "common/base/output.h"
@@ -126,7 +126,7 @@ static const struct program program = {
 	.word = take_word,
 };
 
-/* What a later fetch calls it. The folder is no business of the farm's. */
+/* The default name for a later fetch. The farm does not need the folder. */
 static const char *last_part(const char *path)
 {
 	const char *slash = strrchr(path, '/');
@@ -148,11 +148,11 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	} else {
 		puts(id);
 	}
-	if (fflush(stdout) || ferror(stdout)) /* it is a job all the same */
+	if (fflush(stdout) || ferror(stdout)) /* the job exists all the same */
 		fprintf(stderr, "hslt-submit: the job's id is %s\n", id);
 }
 
-/* Whoever stops waiting for a job has not stopped the job. */
+/* Ending the wait does not end the job. */
 static void say_at_the_end(const struct arguments *a, uint64_t job)
 {
 	static char text[512];
@@ -219,7 +219,7 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 	return client_local(estimate_report(&m, a->json, a->plot, e));
 }
 
-/* How long leases take is asked only where it matters; who gives --epoch knows it. */
+/* The duration of leases is measured only if it matters; with --epoch it is known. */
 static void measure(struct arguments *a, const struct scene_bundle *b)
 {
 	struct plan plan;

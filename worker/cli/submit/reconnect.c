@@ -27,7 +27,7 @@ static int try_once(struct client *cl, const struct submitted *job, const char *
 	return rc;
 }
 
-/* Calls until somebody answers. */
+/* Connects again and again until somebody answers. */
 static int call_again(struct client **cl, const struct reconnect *o, struct error *e)
 {
 	double gone = clock_seconds(), pause = first_pause;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The bundle is read through a folder that notes each file's hash while the scene is read and checked as a worker will;
- * then the job is sent, the coordinator answers which files it lacks, and those are sent in chunks, each compared with
- * the hash that was noted.
+ * The bundle is read through a folder that hashes each file while the scene is read and checked as a worker will. Then
+ * the job is sent; the coordinator answers which files it lacks, and those are sent in chunks, each compared with the
+ * hash.
  *
- * Failures: a scene that cannot be rendered (its place), a file that changes while it is sent, a refusal with the
+ * Failures: a scene that cannot be rendered (with the place), a file that changes while it is sent, a refusal with the
  * coordinator's sentence, a lost connection (-ECONNRESET, may be tried again).
  */
 #include "worker/cli/submit/submit.h"
@@ -23,8 +23,8 @@ enum { CHUNK = 1 << 20 };
 
 /* ---- the bundle ---- */
 
-/* A folder that remembers what was opened, and the hash of what was read: the world is built here as workers will build
- * it, so they need just that. One thread. */
+/* A folder that records which files were opened, with their hashes: the world is built here as by workers, so they
+ * need exactly these. One thread. */
 struct opened {
 	struct asset_source folder;
 	struct scene_bundle *bundle;
@@ -112,7 +112,7 @@ void scene_bundle_fini(struct scene_bundle *b)
 
 /* ---- sending ---- */
 
-/* The message's lists; their texts are borrowed. */
+/* The lists of a message; their texts are borrowed. */
 struct lists {
 	Farm__File *files, **file_at;
 	Farm__Define *defines, **define_at;
@@ -241,8 +241,8 @@ static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint
 	return client_send(cl, &m, bytes, size, e);
 }
 
-/* Opened as it was before, below the scene's folder or one of --path, and no other bytes than those that were read then
- * leave this machine. */
+/* Opened as before, below the scene's folder or one of --path; only the bytes that were read then leave this
+ * machine. */
 static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f,
 		     struct error *e)
 {
@@ -280,7 +280,7 @@ static int send_missing(struct client *cl, const struct scene_bundle *b, const F
 int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle,
 		struct submitted *job, char *plan_text, size_t plan_size, struct error *e)
 {
-	struct scene_bundle b = *bundle; /* messages borrow texts that are not const */
+	struct scene_bundle b = *bundle; /* texts in messages are not const */
 	struct client_message answer = {0};
 	int rc = send_submit(cl, r, &b, e);
 	if (!rc)

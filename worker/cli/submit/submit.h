@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What hslt-submit does: collects a scene's files by their hashes, sends the job and what the coordinator misses of it,
+ * What hslt-submit does: collects a scene's files by hash, sends the job and the files that the coordinator lacks,
  * waits for it and fetches its result. One thread.
  */
 #ifndef WORKER_CLI_SUBMIT_H
@@ -14,7 +14,7 @@
 
 /* A scene and its files, as read here. */
 struct scene_bundle {
-	char *folder; /* of the scene file; names of files are relative to it, or to one of the folders of --path */
+	char *folder; /* of the scene file; names of files are relative to it, or to a folder of --path */
 	struct asset_folders folders;
 	char *scene; /* the scene file's name in it */
 	size_t count;
@@ -28,8 +28,8 @@ struct scene_bundle {
 	char **notes;
 };
 
-/* Reads and checks the scene with everything that it calls for; files that its world was built without are not of the
- * bundle. The error names file, line and element. */
+/* Reads and checks the scene with everything that it needs; files that building its world did not need are not part
+ * of the bundle. The error names file, line and element. */
 int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a, struct error *e);
 void scene_bundle_fini(struct scene_bundle *b);
 
@@ -37,17 +37,17 @@ struct submit_request {
 	const char *name, *output; /* output: a file's name for a later fetch, or "" */
 	int priority;
 	bool mixed;
-	double verify; /* share of the epochs that two workers compute */
+	double verify; /* share of the epochs computed by two workers */
 	const struct render_arguments *args;
 };
 
-/* A job of a coordinator. Another spool counts from 1 again: the number alone could be another job's. */
+/* A job of a coordinator. A new spool counts from 1 again, so the number alone could mean another job. */
 struct submitted {
 	uint64_t job;
-	double at; /* s since 1970, as the coordinator has it */
+	double at; /* s since 1970, by the coordinator */
 };
 
-/* -EACCES: the coordinator refuses; the sentence is its own. plan_text: what was chosen and by which rule. */
+/* -EACCES: refused, with the coordinator's sentence. plan_text: what was chosen, and by which rule. */
 int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *b, struct submitted *job,
 		char *plan_text, size_t plan_size, struct error *e);
 
@@ -55,9 +55,9 @@ struct submit_end {
 	uint32_t exit_code; /* of a program that waited */
 	bool has_result;
 	char state[16];		       /* done, failed, cancelled */
-	struct forecast_history looks; /* at the error; seconds from the first round on */
+	struct forecast_history looks; /* estimates of the error; seconds from the first round on */
 	double cpu_seconds, bootstrap_cpu_seconds, bootstrap_seconds;
-	char why[256], note[1024]; /* why there is no result; what whoever looks at it should know */
+	char why[256], note[1024]; /* why there is no result; notes on the image */
 };
 
 /* Shows progress on stderr until the job has ended. -ESTALE: another job has its number. */
