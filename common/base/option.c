@@ -22,10 +22,10 @@ enum { NAME_MOST = 64 };
 
 static const struct option_row general_rows[] = {
 	{"help", '?', NULL, "Print this list", .kind = OPTION_IS_HELP},
-	{"usage", 0, NULL, "Print how the program is called", .kind = OPTION_IS_USAGE},
+	{"usage", 0, NULL, "Print a usage summary", .kind = OPTION_IS_USAGE},
 	{"version", 'V', NULL, "Print the version", .kind = OPTION_IS_VERSION},
 	{"man", 0, NULL, "Print the manual page (for man -l)", .kind = OPTION_IS_MAN},
-	{"completion", 0, NULL, "Print a script by which bash completes these options", .kind = OPTION_IS_COMPLETION},
+	{"completion", 0, NULL, "Print a bash completion script", .kind = OPTION_IS_COMPLETION},
 	{0},
 };
 static const struct option_group general_groups[] = {{NULL, general_rows}, {0}};
@@ -341,7 +341,7 @@ static int read_word(struct reader *x, char *text)
 {
 	const struct program *p = x->program;
 	if (!p->word)
-		return error_set(x->e, EINVAL, "'%s': it takes options only", text);
+		return error_set(x->e, EINVAL, "'%s': only options are accepted", text);
 	if (p->verbs && x->words == 0 && check_value("verb", p->verbs, text, x->e))
 		return -EINVAL;
 	return p->word(x->target, x->words++, text, x->e);
@@ -391,7 +391,7 @@ static int check(const struct reader *x)
 	if (p->verbs && x->words == 0) {
 		for (size_t i = 0; (name = p->verbs(i)) != NULL; i++)
 			spelling_list(list, sizeof list, name);
-		return error_set(x->e, EINVAL, "what is to be done? %s", list);
+		return error_set(x->e, EINVAL, "a verb is missing: %s", list);
 	}
 	if (p->shared && p->shared->check)
 		rc = p->shared->check(target_of(x, p->shared_offset), x->e);

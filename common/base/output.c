@@ -15,7 +15,7 @@ static void check(int code, void *user)
 	if (fflush(stdout) == 0 && !ferror(stdout))
 		return;
 	fprintf(stderr, "%s: stdout: %s\n", program_invocation_short_name,
-		errno ? strerror(errno) : "it did not take all");
+		errno ? strerror(errno) : "it could not take everything");
 	_exit(code ? code : 1);
 }
 

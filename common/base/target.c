@@ -67,7 +67,7 @@ int target_find(struct target *t, const char *path, struct error *e)
 			return rc;
 		t->through = false;
 	}
-	return error_set(e, ELOOP, "%s: links that lead nowhere", path);
+	return error_set(e, ELOOP, "%s: a loop of links", path);
 }
 
 int target_open(const struct target *t, struct error *e)

@@ -237,8 +237,7 @@ static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 			if (!s->entries[i].holds && (!oldest || s->entries[i].used < oldest->used))
 				oldest = &s->entries[i];
 		if (!oldest)
-			return error_set(e, EFBIG,
-					 "%s: %llu bytes more do not fit below its limit of %llu beside what is in use",
+			return error_set(e, EFBIG, "%s: %llu more bytes exceed its limit of %llu, given what is in use",
 					 s->folder, (unsigned long long)need, (unsigned long long)s->limit);
 		char path[PATH_MOST];
 		blob_path(s, &oldest->hash, path, sizeof path);
@@ -389,7 +388,7 @@ int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, 
 	n->gone = true;
 	s->bytes -= n->size;
 	n->size = 0;
-	return error_set(e, EBADMSG, rc ? "%s is gone" : "%s is damaged: its bytes are not those of its name", path);
+	return error_set(e, EBADMSG, rc ? "%s is gone" : "%s is damaged: its contents do not match its name", path);
 }
 
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e)
@@ -468,7 +467,7 @@ static int finish(struct blob_writer *w, struct error *e)
 		return error_set(e, EIO, "SHA-256 failed");
 	blob_hex(&w->hash, hex);
 	if (!blob_hash_equal(&got, &w->hash))
-		return error_set(e, EBADMSG, "the bytes are not those of the blob %s", hex);
+		return error_set(e, EBADMSG, "the bytes do not match the blob %s", hex);
 	if (blob_hold(s, &w->hash)) { /* another writer stored it meanwhile */
 		disk_unlink(w->path);
 		return 0;

@@ -167,7 +167,7 @@ static void judge_classes(const struct plan *p, const struct canvas_image *img, 
 
 static void put_tiles(struct text *t, const struct convergence *a)
 {
-	text_put(t, "in %u of %u tiles with %.3g %% of the energy they have not mixed (R-hat %.3g at %u,%u)",
+	text_put(t, "they have not mixed in %u of %u tiles, with %.3g %% of the energy (R-hat %.3g at %u,%u)",
 		 a->tiles_flagged, a->tiles, 100 * a->energy_flagged, a->r_hat_worst, a->worst_x, a->worst_y);
 }
 

@@ -92,7 +92,7 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	struct plan_range r = plan_bootstrap_range(&s->plan, k->group, k->part);
 	assert(k->kind == LEASE_BOOTSTRAP && b->weight_count == r.end - r.begin);
 	if (bootstrap_has(s, k->group, k->part))
-		return error_set(e, EEXIST, "the bootstrap lease is merged already");
+		return error_set(e, EEXIST, "the bootstrap lease has been merged before");
 	memcpy(s->weights + r.begin, b->weights, b->weight_count * sizeof *b->weights);
 	for (size_t i = 0; i < b->weight_count; i++)
 		tail_add(&s->tail, (double)b->weights[i]);

@@ -24,10 +24,8 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 			 share);
 		break;
 	case ERROR_DARK:
-		text_put(
-			&t,
-			"%.0f %% of the estimate comes from pixels whose brightness is not known well enough to divide by",
-			share);
+		text_put(&t, "%.0f %% of the estimate comes from pixels whose brightness is not known well enough",
+			 share);
 		break;
 	case ERROR_WIDE:
 		text_put(&t, "it would span more than a factor of ten");
@@ -35,8 +33,8 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	case ERROR_TAIL:
 		text_put(
 			&t,
-			"too few pixels have met the light that decides: the tail index of their errors is %.2f, and up to %.2f their variance "
-			"may be infinite",
+			"too few pixels have met the rare light: the tail index of their errors is %.2f, and up to %.2f "
+			"their variance may be infinite",
 			img->error_tail, img->error_tail_least);
 		break;
 	case ERROR_SHORT:

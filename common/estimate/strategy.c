@@ -151,10 +151,10 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 	}
 	uint64_t lost = n->counters[COUNT_STATES_LOST];
 	if (lost) {
-		text_put(
-			&t,
-			"%s%s of %s times a chain's state could not be read back, and the chain returned to where it began the epoch",
-			then, thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
+		text_put(&t,
+			 "%s%s of %s times a chain's state could not be read back, and the chain returned to the start "
+			 "of the epoch",
+			 then, thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
 		then = "; ";
 	}
 	if (stuck)

@@ -348,7 +348,7 @@ static int read_attributes(exr_context_t x, struct exr_image *img, struct error 
 	for (int32_t i = 0; i < count && rc == 0; i++) {
 		const exr_attribute_t *a;
 		if (exr_get_attribute_by_index(x, 0, EXR_ATTR_LIST_SORTED_ORDER, i, &a) != EXR_ERR_SUCCESS)
-			return error_set(e, EBADMSG, "the EXR file's header is broken");
+			return error_set(e, EBADMSG, "the EXR file's header is invalid");
 		bool known = a->type == EXR_ATTR_DOUBLE || a->type == EXR_ATTR_INT || a->type == EXR_ATTR_STRING;
 		if (known && strncmp(a->name, ATTRIBUTE_PREFIX, strlen(ATTRIBUTE_PREFIX)) == 0)
 			rc = read_attribute(a, &img->attributes[img->attribute_count++], e);

@@ -95,7 +95,7 @@ static int check_tiles(const struct batch *b, const struct plan *p, struct error
 					 t->height, t->x, t->y);
 		int64_t index = (int64_t)(y / TILE_SIZE) * across + x / TILE_SIZE;
 		if (index <= last)
-			return error_set(e, EBADMSG, "the tile at %u,%u comes twice or out of order", t->x, t->y);
+			return error_set(e, EBADMSG, "the tile at %u,%u is repeated or out of order", t->x, t->y);
 		last = index;
 		if (!all_finite(t->xyz, (size_t)w * h * TILE_CHANNELS))
 			return error_set(e, EBADMSG, "the tile at %u,%u holds a value that is not finite", t->x, t->y);
@@ -197,7 +197,7 @@ static int check_counts(const struct batch *b, const struct plan *p, uint64_t li
 			(unsigned long long)samples);
 	if (c[COUNT_SAMPLES] > samples || c[COUNT_INDEPENDENT] > samples || c[COUNT_ACCEPTED] > samples ||
 	    c[COUNT_STUCK] > b->state_count || c[COUNT_STATES_LOST] > b->state_count)
-		return error_set(e, EBADMSG, "more accepted, independent, stuck or lost than there are");
+		return error_set(e, EBADMSG, "more accepted, independent, stuck or lost chains than there are");
 	int rc = check_absurd(b, p, samples, e);
 	return rc ? rc : check_sums(b, e);
 }

@@ -276,7 +276,7 @@ int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e
 		double most = (double)largest(t);
 		if (!(most <= limit))
 			return error_set(e, chains ? EBADMSG : ERANGE,
-					 "a pixel of %g in the tile at %u,%u, and at most %g fit into one lease", most,
+					 "a pixel of %g in the tile at %u,%u; at most %g fits into one lease", most,
 					 t->x, t->y, limit);
 	}
 	return 0;
@@ -409,7 +409,7 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 	const struct lease_key *k = &b->key;
 	assert(k->group < c->plan.groups && k->part < c->plan.parts);
 	if (canvas_has(c, k))
-		return error_set(e, EEXIST, "the lease is merged already");
+		return error_set(e, EEXIST, "the lease has been merged before");
 	uint8_t *has = &c->has[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part];
 	if (k->kind == LEASE_BOOTSTRAP) {
 		tally_add(&c->bootstrap, b);

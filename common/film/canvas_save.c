@@ -123,7 +123,7 @@ int canvas_load(struct canvas *c, struct checked_file *in, struct error *e)
 	if (h.version != want.version || h.tally_bytes != want.tally_bytes || h.slot != want.slot)
 		return error_set(
 			e, EPROTO,
-			"%s: films of version %u, and version %u is known here: another coordinator wrote them",
+			"%s: films of version %u, and this coordinator knows version %u: another one wrote them",
 			in->path, h.version, want.version);
 	if (memcmp(&h, &want, sizeof h) != 0)
 		return error_set(e, EBADMSG, "%s: the films of another plan", in->path);

@@ -69,9 +69,8 @@ int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, s
 		return 0;
 	return error_set(
 		e, EPERM,
-		"'%s' is not a loopback address, and without certificates what goes over the network is neither "
-		"encrypted nor authenticated: give --tls DIR (hslt-ca makes one), or say --insecure if every machine "
-		"that can reach it is trusted",
+		"'%s' is not a loopback address, and without certificates nothing is encrypted or authenticated: "
+		"give --tls DIR (hslt-ca makes one), or --insecure if every machine that can reach it is trusted",
 		host_port);
 }
 

@@ -123,7 +123,7 @@ static int lock_folder(struct authority *a, const char *folder, struct error *e)
 	*a = (struct authority){.folder = folder};
 	a->lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 	if (a->lock < 0 && errno == ENOENT)
-		return error_set(e, ENOENT, "%s: there is no authority here (hslt-ca init makes one)", folder);
+		return error_set(e, ENOENT, "%s: there is no authority here (hslt-ca init creates one)", folder);
 	if (a->lock < 0 || flock(a->lock, LOCK_EX))
 		return error_set(e, errno, "%s: %s", folder, strerror(errno));
 	return 0;
@@ -146,7 +146,7 @@ static int authority_open(struct authority *a, const char *folder, bool with_key
 	if (!rc)
 		rc = path_in(path, e, folder, "", "ca.pem");
 	if (!rc && access(path, R_OK))
-		rc = error_set(e, errno, "%s: there is no authority here (hslt-ca init makes one): %s", path,
+		rc = error_set(e, errno, "%s: there is no authority here (hslt-ca init creates one): %s", path,
 			       strerror(errno));
 	if (!rc)
 		rc = read_cert(path, &a->cert, e);
@@ -258,7 +258,7 @@ static int sign_list(struct authority *a, struct error *e)
 		  X509_CRL_set1_nextUpdate(a->list, X509_get0_notAfter(a->cert)) && X509_CRL_sort(a->list) &&
 		  X509_CRL_sign(a->list, a->key, EVP_sha256());
 	ASN1_TIME_free(now);
-	return ok ? 0 : crypto_error(e, "the list of the revoked");
+	return ok ? 0 : crypto_error(e, "the revocation list");
 }
 
 static bool is_revoked(const struct authority *a, X509 *cert)
@@ -299,7 +299,7 @@ static int write_authority(struct authority *a, struct error *e)
 {
 	char path[PATH_SIZE];
 	a->list = X509_CRL_new();
-	int rc = a->list ? sign_list(a, e) : crypto_error(e, "the list of the revoked");
+	int rc = a->list ? sign_list(a, e) : crypto_error(e, "the revocation list");
 	if (!rc)
 		rc = path_in(path, e, a->folder, "", "issued");
 	if (!rc)
@@ -325,7 +325,7 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	if (!rc)
 		rc = path_in(path, e, folder, "", "ca.pem");
 	if (!rc && access(path, F_OK) == 0)
-		rc = error_set(e, EEXIST, "%s is there: a farm has one authority", path);
+		rc = error_set(e, EEXIST, "%s exists: a farm has one authority", path);
 	if (!rc) {
 		char unique[TLS_NAME_MAX + 16];
 		unsigned char random[4] = {0};
@@ -385,7 +385,7 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 	rc = tls_read_peer(cert, &who, e);
 	X509_free(cert);
 	if (!rc && (who.role != role || strcmp(who.name, name) != 0))
-		rc = error_set(e, EEXIST, "%s is of the %s %s: --renew makes no %s of it", path,
+		rc = error_set(e, EEXIST, "%s belongs to the %s %s: --renew cannot change the role to %s", path,
 			       tls_role_name(who.role), who.name, tls_role_name(role));
 	return rc;
 }
@@ -396,14 +396,14 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	struct authority a;
 	if (!tls_name_ok(name) || strcmp(name, "issued") == 0)
 		return error_set(e, EINVAL,
-				 "'%s' is no name: up to %d letters, digits and ._@-, the first a letter or digit",
+				 "'%s' is not a name: up to %d letters, digits and ._@-, the first a letter or digit",
 				 name, TLS_NAME_MAX);
 	int rc = authority_open(&a, folder, true, e);
 	if (rc)
 		return rc;
 	rc = path_in(path, e, folder, "", name);
 	if (!rc && !renew && access(path, F_OK) == 0)
-		rc = error_set(e, EEXIST, "%s is there: --renew replaces its certificate and key", path);
+		rc = error_set(e, EEXIST, "%s exists: --renew replaces its certificate and key", path);
 	if (!rc && renew)
 		rc = may_renew(&a, name, role, e);
 	if (!rc)
@@ -465,7 +465,7 @@ static int revoke_one(void *user, X509 *cert, const struct tls_peer *who, struct
 	    X509_cmp_current_time(X509_get0_notAfter(cert)) < 0)
 		return 0;
 	r->count++;
-	return add_revoked(r->a, cert) ? 0 : crypto_error(e, "the list of the revoked");
+	return add_revoked(r->a, cert) ? 0 : crypto_error(e, "the revocation list");
 }
 
 static int tell_coordinator(void *user, X509 *cert, const struct tls_peer *who, struct error *e)

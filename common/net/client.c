@@ -77,7 +77,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES ||
 	    !buf_append(&w->message.payload, payload, size)) {
 		mem_free(w);
-		conn_close(cl->conn, "the coordinator sends more than it is asked for");
+		conn_close(cl->conn, "the coordinator sends more than was requested");
 		return;
 	}
 	w->message.envelope = *env;
@@ -127,8 +127,8 @@ int client_send(struct client *cl, const Farm__Envelope *m, const void *payload,
 	while (cl->conn && conn_unsent(cl->conn) && !cl->timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	if (!cl->conn && !cl->first)
-		return error_set(e, ECONNRESET, "the connection to the coordinator is gone: %s", cl->why);
-	return cl->timed_out ? error_set(e, ETIMEDOUT, "the coordinator does not take what is sent to it") : 0;
+		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->why);
+	return cl->timed_out ? error_set(e, ETIMEDOUT, "the coordinator does not read what is sent to it") : 0;
 }
 
 int client_wait(struct client *cl, double seconds, struct client_message *m, struct error *e)
@@ -139,7 +139,7 @@ int client_wait(struct client *cl, double seconds, struct client_message *m, str
 		uv_run(&cl->loop, UV_RUN_ONCE);
 	struct waiting *w = cl->first;
 	if (!w && !cl->conn)
-		return error_set(e, ECONNRESET, "the connection to the coordinator is gone: %s", cl->why);
+		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->why);
 	if (!w)
 		return error_set(e, ETIMEDOUT, "the coordinator did not answer in time");
 	*m = w->message;
@@ -165,7 +165,7 @@ int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__Body
 		rc = client_wait(cl, ANSWER_SECONDS, answer, e);
 	if (!rc && answer->envelope.message->body_case != want) {
 		client_message_fini(answer);
-		rc = error_set(e, EPROTO, "the coordinator's answer is not to the question");
+		rc = error_set(e, EPROTO, "the coordinator's answer does not match the request");
 	}
 	return rc;
 }
@@ -204,7 +204,7 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 		return rc == -EPROTO ? rc : error_set(e, ECONNREFUSED, "no coordinator answers at %s", host_port);
 	const Farm__Envelope *a = answer.envelope.message;
 	if (a->body_case != FARM__ENVELOPE__BODY_HELLO_ACK)
-		rc = error_set(e, ECONNREFUSED, "what answers at %s is no coordinator", host_port);
+		rc = error_set(e, ECONNREFUSED, "what answers at %s is not a coordinator", host_port);
 	else if (!a->hello_ack->accepted)
 		rc = error_set(e, EPROTO, "the coordinator at %s refuses: %s", host_port, a->hello_ack->text);
 	else if (a->hello_ack->heartbeat_ms >= 10)
@@ -333,7 +333,7 @@ static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_
 		rc = error_set(e, ENOENT, "%s", c->error);
 	else if (c->offset != offset || (answer->payload.size == 0 && offset < c->size) ||
 		 answer->payload.size > c->size - offset)
-		rc = error_set(e, EPROTO, "the coordinator sends other bytes than those asked for");
+		rc = error_set(e, EPROTO, "the coordinator sends other bytes than requested");
 	if (rc)
 		client_message_fini(answer);
 	return rc;
@@ -471,11 +471,9 @@ static int take_name(const char *output, char name[CLIENT_NAME_BYTES], struct er
 	struct stat st;
 	const char *slash = strrchr(output, '/'), *last = slash ? slash + 1 : output;
 	if (!envelope_text_ok(last, CLIENT_NAME_BYTES - 1) || !*last || *last == '.' || *last == '-')
-		return error_set(e, EEXIST,
-				 "the job has no name for its image that would do here: give one with -o FILE");
+		return error_set(e, EEXIST, "the name of the job's image cannot be used here: give one with -o FILE");
 	text_copy(name, CLIENT_NAME_BYTES, last);
-	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s is there already: -o FILE replaces what is there", name)
-				     : 0;
+	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s exists: -o FILE replaces it", name) : 0;
 }
 
 int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e)

@@ -229,7 +229,7 @@ static void flush(struct conn *c, size_t plain)
 	if (!size || c->closing)
 		return;
 	if (c->in_flight > 2 * WINDOW) /* a peer that sends requests and does not read the answers */
-		conn_close(c, "the peer does not take what is sent to it");
+		conn_close(c, "the peer does not read what is sent to it");
 	else
 		copy_to_kernel(c, bytes, size, plain);
 	tls_link_output_taken(c->link);
@@ -318,7 +318,7 @@ static bool is_tls(struct conn *c, const char *bytes, size_t size)
 		return false;
 	if (c->accepted)
 		copy_to_kernel(c, tls_none_here, sizeof tls_none_here, 0);
-	refuse(c, -EACCES, "the peer speaks TLS, and here nothing is encrypted: both need --tls DIR, or neither");
+	refuse(c, -EACCES, "the peer speaks TLS, and this side does not: both need --tls DIR, or neither");
 	return true;
 }
 
@@ -373,9 +373,9 @@ static void on_tick(uv_timer_t *t)
 	else if (c->link && !tls_link_is_open(c->link) && c->clock - c->begun > HANDSHAKE_MS)
 		conn_close(c, "the TLS handshake was not finished in time");
 	else if (has_stalled(c))
-		conn_close(c, "a frame was begun and not finished in time");
+		conn_close(c, "a frame was not completed in time");
 	else if (c->config.quiet_seconds > 0 && (double)(c->clock - c->last_read) > 1000 * c->config.quiet_seconds)
-		conn_close(c, "nothing was heard for too long");
+		conn_close(c, "silent for too long");
 }
 
 /* ---- opening and closing ---- */
@@ -557,7 +557,7 @@ static void send_all(struct conn *c, struct head head, unsigned char *bytes, siz
 		mem_free(bytes);
 	} else if (c->unsent && size > room) {
 		mem_free(bytes);
-		conn_close(c, "the peer does not take what is sent to it");
+		conn_close(c, "the peer does not read what is sent to it");
 	} else if (c->link) {
 		enqueue(c, head, bytes, size, skip);
 	} else {

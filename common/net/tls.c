@@ -140,7 +140,7 @@ int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 	    strnlen((const char *)ASN1_STRING_get0_data(name), length) == length)
 		memcpy(p->name, ASN1_STRING_get0_data(name), length);
 	if (!tls_name_ok(p->name))
-		return error_set(e, EACCES, "the certificate has no name that can be one of this farm");
+		return error_set(e, EACCES, "the certificate has no name that is valid in this farm");
 	BIGNUM *serial = ASN1_INTEGER_to_BN(X509_get0_serialNumber(cert), NULL);
 	char *hex = serial ? BN_bn2hex(serial) : NULL;
 	text_copy(p->serial, sizeof p->serial, hex ? hex : "");
@@ -401,15 +401,16 @@ int tls_refresh(struct tls *t, struct error *e)
 	if (rc && !news)
 		return 0;
 	if (rc)
-		return error_prefix(e, rc, "TLS, the files before still hold%s",
-				    lost ? ", crl.pem too, which is gone" : "");
+		return error_prefix(e, rc, "TLS; the previous files stay in use%s",
+				    lost ? ", including crl.pem, which is missing" : "");
 	memcpy(t->stamps, now, sizeof now);
 	SSL_CTX_free(t->context);
 	t->context = fresh;
 	t->self = self;
 	t->authority_until = find_authority(fresh);
 	t->warned = 0;
-	return lost ? error_set(e, ENOENT, "TLS: %s/crl.pem is gone; what it said still holds", t->folder) : 1;
+	return lost ? error_set(e, ENOENT, "TLS: %s/crl.pem is missing; the previous list stays in force", t->folder)
+		    : 1;
 }
 
 const struct tls_peer *tls_self(const struct tls *t)
@@ -466,7 +467,7 @@ int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct err
 		return 0;
 	if (!l->begun && !tls_is_first_byte(*(const unsigned char *)bytes)) {
 		BIO_write(l->out, tls_none_here, sizeof tls_none_here);
-		return error_set(e, EACCES, "the peer speaks without TLS, and here it is needed");
+		return error_set(e, EACCES, "the peer does not use TLS, which is required here");
 	}
 	l->begun = true;
 	l->taken += l->open ? 0 : size;
@@ -487,14 +488,14 @@ static int explain(struct tls_link *l, struct error *e)
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && reason == SSL_R_PEER_DID_NOT_RETURN_A_CERTIFICATE)
 		return error_set(e, EACCES, "the peer has no certificate");
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert == PROTOCOL_VERSION)
-		return error_set(e, EACCES, "the peer speaks no TLS 1.3: is it started without --tls?");
+		return error_set(e, EACCES, "the peer does not speak TLS 1.3: was it started without --tls?");
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert >= 40 && alert < 256)
 		return error_set(e, EACCES, "the peer does not accept this certificate: %s",
 				 SSL_alert_desc_string_long(alert));
 	if (verdict != X509_V_OK)
 		return error_set(e, EACCES, "the peer's certificate is not accepted: %s",
 				 X509_verify_cert_error_string(verdict));
-	return error_set(e, EPROTO, "TLS: %s", text ? text : "nonsense on the wire");
+	return error_set(e, EPROTO, "TLS: %s", text ? text : "invalid data on the wire");
 }
 
 ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *e)
@@ -567,7 +568,7 @@ int tls_link_recheck(struct tls_link *l, struct error *e)
 	    X509_STORE_CTX_set_default(sc, l->listening ? "ssl_client" : "ssl_server") != 1)
 		rc = error_set(e, ENOMEM, "the peer's certificate cannot be checked again");
 	else if (X509_verify_cert(sc) != 1)
-		rc = error_set(e, EACCES, "the peer's certificate is not accepted any more: %s",
+		rc = error_set(e, EACCES, "the peer's certificate is no longer accepted: %s",
 			       X509_verify_cert_error_string(X509_STORE_CTX_get_error(sc)));
 	X509_STORE_CTX_free(sc);
 	ERR_clear_error();

@@ -129,7 +129,7 @@ static int check_film(const struct plan *p, struct error *e)
 		return error_set(e, EINVAL, "the image has %llu pixels; at most %d are supported (crop it)",
 				 (unsigned long long)crop_pixels(p), PLAN_MAX_PIXELS);
 	if (p->border > PLAN_MAX_BORDER)
-		return error_set(e, EINVAL, "the filter reaches %u pixels beyond the image; at most %d", p->border,
+		return error_set(e, EINVAL, "the filter extends %u pixels beyond the image; at most %d", p->border,
 				 PLAN_MAX_BORDER);
 	return 0;
 }
@@ -293,16 +293,15 @@ void plan_describe_epoch(const struct plan_request *r, const struct plan *p, cha
 	else if (rule == RULE_FILM)
 		snprintf(text, size, "epochs: by the size of the film");
 	else if (rule == RULE_ROOM)
-		snprintf(text, size, "epochs: some %d rounds or more in the time, or for the error, asked for",
-			 AIM_ROUNDS);
+		snprintf(text, size, "epochs: at least about %d rounds for the requested time or error", AIM_ROUNDS);
 	else if (rule == RULE_MOST)
-		snprintf(text, size, "epochs: the most %s in a lease without a pilot", thing);
+		snprintf(text, size, "epochs: the maximum of %s in a lease without a pilot", thing);
 	else if (rule == RULE_SECONDS)
-		snprintf(text, size, "epochs: leases of about %d s of a thread that makes %.3g %s a second",
+		snprintf(text, size, "epochs: leases of about %d s for a thread that makes %.3g %s a second",
 			 LEASE_SECONDS, r->speed, thing);
 	else if (rule == RULE_BANDWIDTH)
 		snprintf(text, size,
-			 "epochs: %.3g MB of tiles a lease at %.3g MB/s a thread that makes %.3g %s a second",
+			 "epochs: %.3g MB of tiles per lease at %.3g MB/s for a thread that makes %.3g %s a second",
 			 1e-6 * (double)lease_bytes(p), 1e-6 * r->bandwidth, r->speed > 0 ? r->speed : SPEED_UNKNOWN,
 			 thing);
 	else if (size)
@@ -329,7 +328,7 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 	uint64_t per_group = ceil_div(chains, p->groups);
 	p->parts = r->parts ? r->parts : (uint32_t)clamp(per_group, 1, DEFAULT_PARTS);
 	if (r->parts && r->chains && (chains % p->groups || per_group % p->parts))
-		return error_set(e, EINVAL, "%llu chains in %u groups cannot be cut into %u parts of equal size",
+		return error_set(e, EINVAL, "%llu chains in %u groups cannot be divided into %u equal parts",
 				 (unsigned long long)chains, p->groups, p->parts);
 	chains = ceil_div(chains, (uint64_t)p->groups * p->parts) * p->groups * p->parts;
 	if (chains > PLAN_MAX_CHAINS)
@@ -349,7 +348,7 @@ static int make_samples(const struct plan_request *r, struct plan *p, uint64_t t
 	uint64_t groups = usual_groups(r, p),
 		 parts = r->groups ? DEFAULT_PARTS : DEFAULT_PARTS * DEFAULT_GROUPS / groups;
 	if (r->parts > rows)
-		return error_set(e, EINVAL, "%llu rows cannot be cut into %u parts", (unsigned long long)rows,
+		return error_set(e, EINVAL, "%llu rows cannot be divided into %u parts", (unsigned long long)rows,
 				 r->parts);
 	p->parts = r->parts ? r->parts : (uint32_t)clamp(rows, 1, parts);
 	uint64_t spp = ceil_div(total, crop_pixels(p)); /* 0: no bound */
@@ -426,8 +425,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	if (rc == 0)
 		rc = asked_total(r, p, &total, e);
 	if (rc == 0 && !total && !(r->seconds > 0) && !(r->target_error > 0))
-		rc = error_set(e, EINVAL,
-			       "nothing says when to end: give samples per pixel, mutations, seconds or an error");
+		rc = error_set(e, EINVAL, "no bound is given: samples per pixel, mutations, seconds or an error");
 	if (rc == 0)
 		rc = r->kind == PLAN_CHAINS ? make_chains(r, p, total, e) : make_samples(r, p, total, e);
 	if (rc == 0)
@@ -443,7 +441,7 @@ static int check_integrator(const struct plan *p, struct error *e)
 	if (n == 0 || n == sizeof p->integrator)
 		return error_set(e, EINVAL, "the integrator's name is empty or too long");
 	if (strspn(p->integrator, "abcdefghijklmnopqrstuvwxyz0123456789_-") != n)
-		return error_set(e, EINVAL, "the integrator's name has characters that no integrator's name has");
+		return error_set(e, EINVAL, "the integrator's name has invalid characters");
 	return 0;
 }
 
@@ -456,7 +454,7 @@ static int check_mutations(const struct plan *p, struct error *e)
 			"the mixture of mutations is not a list of up to %d names with weights in %d characters",
 			PLAN_MAX_STRATEGIES, PLAN_MUTATIONS_MAX - 1);
 	if (!plan_text_ok(p->mutations, sizeof p->mutations))
-		return error_set(e, EINVAL, "the mixture of mutations does not end with its text");
+		return error_set(e, EINVAL, "the mixture of mutations has bytes after its text");
 	if (!plan_text_ok(p->accuracy, sizeof p->accuracy) || !plan_text_ok(p->effects, sizeof p->effects))
 		return error_set(e, EINVAL,
 				 "the settings or the effects are not a text of letters, digits and @=,.:+-_");
@@ -505,7 +503,7 @@ static int check_end(const struct plan *p, struct error *e)
 		return error_set(e, EINVAL, "the time and the target error must be finite and not negative");
 	if (p->rounds == UINT64_MAX) {
 		if (!(p->seconds > 0) && !(p->target_error > 0))
-			return error_set(e, EINVAL, "nothing says when the plan ends");
+			return error_set(e, EINVAL, "the plan has no bound");
 	} else if (p->rounds < 1 || (wide)p->rounds * plan_round_mutations(p) > TOTAL_MOST * 2) {
 		return error_set(e, EINVAL, "%llu rounds are not possible", (unsigned long long)p->rounds);
 	}

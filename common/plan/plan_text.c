@@ -13,10 +13,10 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	if (p->kind == PLAN_CHAINS)
 		text_put(
 			&t,
-			"%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations a chain in %u leases",
+			"%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations per chain in %u leases",
 			p->integrator, p->chains, p->groups, bootstrap, epoch, p->groups * p->parts);
 	else
-		text_put(&t, "%s: %u groups, rounds of %llu samples a pixel in %u leases, scaled by %llu samples",
+		text_put(&t, "%s: %u groups, rounds of %llu samples per pixel in %u leases, scaled by %llu samples",
 			 p->integrator, p->groups, p->groups * epoch, p->groups * p->parts, bootstrap);
 	if (*p->mutations)
 		text_put(&t, ", mutations %s", p->mutations);
@@ -32,7 +32,7 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 			text_put(&t, "%llu round%s (%llu mutations)", rounds, rounds == 1 ? "" : "s",
 				 rounds * plan_round_mutations(p));
 		else
-			text_put(&t, "%llu round%s (%llu samples a pixel)", rounds, rounds == 1 ? "" : "s",
+			text_put(&t, "%llu round%s (%llu samples per pixel)", rounds, rounds == 1 ? "" : "s",
 				 rounds * p->groups * p->epoch);
 		or = " or ";
 	}

@@ -80,9 +80,8 @@ static int check_digest(const struct chain_state *states, uint32_t count, const 
 	int rc = states_digest_from_wire(m, &said, e);
 	if (!rc)
 		rc = states_digest(states, count, out, e);
-	return rc || blob_hash_equal(&said, out)
-		       ? rc
-		       : error_set(e, EBADMSG, "the chain states are not those of their digest");
+	return rc || blob_hash_equal(&said, out) ? rc
+						 : error_set(e, EBADMSG, "the chain states do not match their digest");
 }
 
 /* ---- packing ---- */
@@ -323,7 +322,7 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 	if (!rc)
 		rc = cut_floats(&c, "moments", m->moment_count, &b->moments, &b->moment_count, e);
 	if (!rc && c.left)
-		rc = error_set(e, EBADMSG, "%zu bytes too many behind a batch", c.left);
+		rc = error_set(e, EBADMSG, "%zu extra bytes after a batch", c.left);
 	if (!rc)
 		rc = batch_check(b, p, e);
 	if (rc)
@@ -406,7 +405,7 @@ int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char
 			rc = check_digest(g->states, g->chain_count, &m->states_digest, &g->digest, e);
 	}
 	if (!rc && c.left)
-		rc = error_set(e, EBADMSG, "%zu bytes too many behind a lease", c.left);
+		rc = error_set(e, EBADMSG, "%zu extra bytes after a lease", c.left);
 	if (rc)
 		grant_fini(g);
 	return rc;

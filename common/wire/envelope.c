@@ -135,7 +135,7 @@ int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t siz
 	}
 	if (has_check(m) && !check_holds(bytes, size)) {
 		envelope_fini(env);
-		return error_set(e, EILSEQ, "bytes of a hello were changed on their way");
+		return error_set(e, EILSEQ, "a hello was changed in transit");
 	}
 	env->message = m;
 	return 0;

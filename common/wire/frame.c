@@ -82,8 +82,7 @@ void frame_reader_drop(struct frame_reader *r)
 
 static int changed(struct error *e)
 {
-	return error_set(e, EILSEQ,
-			 "bytes were changed on their way: the checksum of a message is not that of its bytes");
+	return error_set(e, EILSEQ, "data was changed in transit: the checksum of a message does not match");
 }
 
 static int take_prefix(struct frame_reader *r, struct error *e)

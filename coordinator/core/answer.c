@@ -154,7 +154,7 @@ static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct
 {
 	/* A late answer from a class that the job no longer belongs to must not be compared with those of another. */
 	if (!j->class && !verify_may_begin(f, j, p->class)) {
-		*why = "the job belongs to nobody, and not to a lone worker";
+		*why = "the job is not pinned, and cannot be to a lone worker";
 		return REFUSE;
 	}
 	job_pin(j, p->class);

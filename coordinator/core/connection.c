@@ -30,7 +30,7 @@ static struct peer *peer_new(struct farm *f, const struct event_join *e, uint32_
 struct peer *connection_join(struct farm *f, const struct event_join *e, const char **refused)
 {
 	if (f->peer_count == f->config.max_peers) {
-		*refused = "the farm has as many workers as it takes";
+		*refused = "the farm accepts no more workers";
 		return NULL;
 	}
 	if (!*e->name || strlen(e->name) >= PEER_NAME) {
@@ -137,8 +137,7 @@ bool connection_replace(struct farm *f, const struct event_join *e, const char *
 		if (is_at(f->peers[i], e) && f->peers[i]->restarts > last)
 			last = f->peers[i]->restarts;
 	if (last > e->restarts) {
-		text_print(f->text, sizeof f->text,
-			   "this is start %llu of %s, and start %llu of it has been here before",
+		text_print(f->text, sizeof f->text, "this is start %llu of %s, and its start %llu has connected before",
 			   (unsigned long long)e->restarts, e->name, (unsigned long long)last);
 		*refused = f->text;
 		return false;
@@ -149,7 +148,7 @@ bool connection_replace(struct farm *f, const struct event_join *e, const char *
 			continue;
 		struct action *a = update_add(f, ACTION_CLOSE_PEER);
 		a->peer = p->id;
-		a->text = "the same worker has called again";
+		a->text = "the same worker has reconnected";
 		p->returns = true;
 		connection_lose(f, p);
 	}

@@ -89,10 +89,9 @@ static void take_back(struct farm *f, struct job *j, struct slot *s, const char 
 	a->who = maker;
 	a->job = j->id;
 	a->key = slot_key(j, s);
-	text_print(
-		f->text, sizeof f->text,
-		"group %u part %u epoch %llu is computed again: its chain states, made by %s, could not be read by %s",
-		a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker), refusers);
+	text_print(f->text, sizeof f->text,
+		   "group %u part %u epoch %llu is computed again: its chain states, made by %s, were refused by %s",
+		   a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker), refusers);
 	a->text = f->text;
 }
 
@@ -102,10 +101,10 @@ static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char
 	lease_revoke_slot(f, s); /* workers that still have the states */
 	s->doubt.anew = true;
 	j->anew++;
-	text_print(
-		f->text, sizeof f->text,
-		"the chains of group %u part %u begin epoch %llu anew from their seeds: their states, made by %s, could not be read by %s",
-		k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker), refusers);
+	text_print(f->text, sizeof f->text,
+		   "the chains of group %u part %u start epoch %llu from their seeds: their states, made by %s, were "
+		   "refused by %s",
+		   k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker), refusers);
 	struct action *a = update_add(f, ACTION_CHAINS_ANEW);
 	a->job = j->id;
 	a->key = k;
@@ -165,7 +164,8 @@ bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t siz
 		const struct lease_key k = slot_key(j, s);
 		text_print(
 			text, size,
-			"a third worker is to say whether the chain states of group %u part %u epoch %llu are wrong: %s made them, %s could not read them",
+			"a third worker will decide whether the chain states of group %u part %u epoch %llu are wrong: "
+			"%s made them, %s refused them",
 			k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker),
 			name_of(f, s->doubt.refuser));
 		return true;

@@ -83,7 +83,7 @@ void restore_job(struct farm *f, const struct event *ev)
 	const struct event_restore *r = &ev->restore;
 	struct job *ended = farm_find_job(f, r->job);
 	assert(!ended || !job_is_live(ended));
-	const char *refused = "the coordinator has as many jobs as it takes";
+	const char *refused = "the coordinator accepts no more jobs";
 	struct job *j = make_room(f, ev->tag) ? job_new(f, &r->submit, &refused) : NULL;
 	if (!j) {
 		struct action *a = update_add(f, ACTION_REJECTED);

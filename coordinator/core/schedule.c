@@ -243,7 +243,7 @@ void schedule_expire(struct farm *f, double read)
 		if (p->last_seen + f->config.forget_after <= read) {
 			struct action *a = update_add(f, ACTION_CLOSE_PEER);
 			a->peer = p->id;
-			a->text = "nothing heard for too long";
+			a->text = "silent for too long";
 			connection_lose(f, p);
 			continue;
 		}

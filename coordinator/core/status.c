@@ -96,7 +96,7 @@ static void put_failing(const struct farm *f, const struct job *j, char *text, s
 			text_put(&t, "%s%s", *names ? ", " : "", f->peers[i]->name);
 	if (*names)
 		text_print(text, size,
-			   "no worker can compute it, for want of something on the machines of %s; the last one: %s",
+			   "no worker can compute it, because of a problem on the machines of %s; the last one: %s",
 			   names, j->text);
 	else
 		text_print(text, size, "no worker can compute it: %s", j->text);
@@ -168,7 +168,7 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 	else if (f->peer_count == 0)
 		snprintf(text, size, "no worker");
 	else if (active == 0)
-		snprintf(text, size, "no worker that answers and is trusted (%u are known)", f->peer_count);
+		snprintf(text, size, "no worker that responds and is not quarantined (%u are known)", f->peer_count);
 	else if (j->class && !j->mixed && j->class->active == 0)
 		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
 	else if (verify_why(f, j, text, size) || doubt_why(f, j, text, size))
@@ -176,7 +176,7 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 	else if (share_is_limited(f, j) && share_unproven(f, j->owner))
 		snprintf(
 			text, size,
-			"a job of its owner ended workers: one lease at a time until something of a job is made (for %.0f s)",
+			"a job of its owner ended workers: one lease at a time until something is computed (for %.0f s)",
 			j->owner->limited_until - f->now);
 	else if (answer_all_failed(f, j))
 		put_failing(f, j, text, size);

@@ -62,7 +62,7 @@ struct identity *worker_registry_use(struct farm *f, const struct event_join *e,
 	if (!k) {
 		k = room_for_one(f, e->certificate);
 		if (!k) {
-			*refused = "the coordinator has no room to remember another worker";
+			*refused = "the coordinator has no room for another worker";
 			return NULL;
 		}
 		*k = (struct identity){.id = ++f->identities, .window = PEER_WINDOW};

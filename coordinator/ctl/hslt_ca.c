@@ -19,7 +19,7 @@ static const struct option_row rows[] = {
 	 .environment = "HSLT_CA"},
 	{"days", 0, "N", "How long the certificate is valid (825; the authority: 3650)",
 	 OPTION_NUMBER(struct arguments, days, 0, 36500), .above = true},
-	{"renew", 0, NULL, "Replace a certificate and key that are there, of the same name and role",
+	{"renew", 0, NULL, "Replace an existing certificate and key of the same name and role",
 	 OPTION_FLAG(struct arguments, renew)},
 	{"name", 0, "NAME", "init: the authority's name", OPTION_TEXT(struct arguments, name), .standard = "hslt-farm"},
 	{0},
@@ -36,7 +36,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
-		return error_set(e, EINVAL, "'%s' is one word too many", word);
+		return error_set(e, EINVAL, "unexpected argument '%s'", word);
 	*(index == 0 ? &a->verb : &a->what) = word;
 	return 0;
 }
@@ -57,7 +57,7 @@ static int check(void *target, struct error *e)
 static const struct program program = {
 	.name = "hslt-ca",
 	.words = "init|coordinator|worker|client|operator|revoke|list [NAME]",
-	.summary = "A farm's own certificate authority: who may be coordinator, worker, client, operator.",
+	.summary = "A farm's own certificate authority: certificates for coordinators, workers, clients and operators.",
 	.examples =
 		"hslt-ca init                      the authority, and DIR/coordinator for hslt-coordinator --tls\n"
 		"hslt-ca worker node1              DIR/node1, for hslt-worker --tls\n"

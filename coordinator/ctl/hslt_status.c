@@ -76,7 +76,7 @@ static FILE *reach(const char *path, struct error *e)
 	memcpy(a.sun_path, path, strlen(path));
 	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
 	if (fd < 0 || connect(fd, (struct sockaddr *)&a, sizeof a)) {
-		error_set(e, ECONNREFUSED, "%s: no coordinator answers there: %s", path, strerror(errno));
+		error_set(e, ECONNREFUSED, "%s: no coordinator answers: %s", path, strerror(errno));
 		if (fd >= 0)
 			close(fd);
 		return NULL;
@@ -125,8 +125,8 @@ static const char *bound_of(const json_t *job)
 	if (!(number_of(job, "targetError") > 0) || strcmp(text_of(job, "state"), "done") != 0)
 		return "";
 	return strcmp(reason, "error") == 0	  ? "target error reached"
-	       : strcmp(reason, "time") == 0	  ? "time was up before the target error"
-	       : strcmp(reason, "mutations") == 0 ? "all mutations were made before the target error"
+	       : strcmp(reason, "time") == 0	  ? "the time was up before the target error was reached"
+	       : strcmp(reason, "mutations") == 0 ? "all mutations were made before the target error was reached"
 						  : "";
 }
 

@@ -21,21 +21,23 @@ static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct job_options, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
 	{"output", 'o', "FILE",
-	 "fetch: where to, over what is there (without it: into the current folder, under the last part of the name that "
-	 "hslt-submit was given, never over anything)",
+	 "fetch: the output file, which is replaced (without it: into the current folder, under the last "
+	 "part of the name given to hslt-submit, never replacing a file)",
 	 OPTION_TEXT(struct job_options, output)},
-	{"preview", 0, NULL, "fetch: what there is while the job runs", OPTION_FLAG(struct job_options, preview)},
+	{"preview", 0, NULL, "fetch: the image so far, while the job runs", OPTION_FLAG(struct job_options, preview)},
 	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
-	{"spp", 0, "+N", "extend: so many more samples a pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
-	{"mutations", 0, "+N", "extend: so many more", OPTION_COUNT(struct job_options, more_mutations, 1, 1e18)},
-	{"time", 0, "+SECONDS", "extend: so much longer (90, 5m, 2h)",
+	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
+	{"mutations", 0, "+N", "extend: additional mutations or samples",
+	 OPTION_COUNT(struct job_options, more_mutations, 1, 1e18)},
+	{"time", 0, "+SECONDS", "extend: additional time (90, 5m, 2h)",
 	 OPTION_SECONDS(struct job_options, more_seconds, 0, 1e9), .above = true},
 	{"target-error", 0, "E",
-	 "extend: until the estimated relative error is 0.02 or 2%; bounds that are met and not named end it no more",
+	 "extend: until the estimated relative error is 0.02 or 2%; bounds that are met and not named no "
+	 "longer apply",
 	 OPTION_RATIO(struct job_options, target_error, 0, 1e3), .above = true, .below = true},
-	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encrypt, and say who we are",
+	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(struct job_options, tls), .environment = "HSLT_TLS"},
-	{"insecure", 0, NULL, "Connect to other than loopback addresses without encryption",
+	{"insecure", 0, NULL, "Connect to addresses other than loopback without encryption",
 	 OPTION_FLAG(struct job_options, insecure)},
 	{0},
 };
@@ -63,7 +65,7 @@ static int take_job(struct job_options *o, const char *word, struct error *e)
 	errno = 0;
 	o->job = strtoull(word + (*word == 'j'), &end, 10);
 	if (errno || *end || !o->job || word[*word == 'j'] < '0' || word[*word == 'j'] > '9')
-		return error_set(e, EINVAL, "'%s' is no job: expected something like j12", word);
+		return error_set(e, EINVAL, "'%s' is not a job: expected something like j12", word);
 	return 0;
 }
 
@@ -87,7 +89,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 		return take_job(o, word, e);
 	if (index == 2 && o->verb == JOB_PRIORITY)
 		return take_priority(o, word, e);
-	return error_set(e, EINVAL, "'%s' is one word too many", word);
+	return error_set(e, EINVAL, "unexpected argument '%s'", word);
 }
 
 static int check(void *target, struct error *e)
@@ -96,19 +98,19 @@ static int check(void *target, struct error *e)
 	if (o->verb != JOB_LIST && !o->job)
 		return error_set(e, EINVAL, "%s needs a job", verbs[o->verb]);
 	if (o->verb == JOB_PRIORITY && !o->has_priority)
-		return error_set(e, EINVAL, "which priority? From -100 to 100");
+		return error_set(e, EINVAL, "a priority is missing: -100 to 100");
 	bool more = o->more_spp || o->more_mutations || o->more_seconds > 0 || o->target_error > 0;
 	if (o->verb == JOB_EXTEND && !more)
-		return error_set(e, EINVAL, "by what? --spp, --mutations, --time or --target-error");
+		return error_set(e, EINVAL, "a bound is missing: --spp, --mutations, --time or --target-error");
 	if (o->verb != JOB_EXTEND && more)
-		return error_set(e, EINVAL, "bounds are for extend");
+		return error_set(e, EINVAL, "bounds are only for extend");
 	return 0;
 }
 
 static const struct program program = {
 	.name = "hslt-job",
 	.words = "VERB [JOB] [PRIORITY]",
-	.summary = "Looks after jobs at a coordinator.",
+	.summary = "Manages the jobs of a coordinator.",
 	.examples =
 		"hslt-job --coordinator 127.0.0.1:7700 list\n"
 		"hslt-job fetch j12 -o room.exr\n"

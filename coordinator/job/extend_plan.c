@@ -21,7 +21,7 @@ static int more_rounds(const struct plan *p, const struct extension *x, const st
 {
 	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, more, total;
 	if (p->rounds == UINT64_MAX && !from->ended)
-		return error_set(e, EINVAL, "it runs without a bound of samples: name a time or an error");
+		return error_set(e, EINVAL, "it has no bound on samples: give a time or an error");
 	if (__builtin_mul_overflow(x->spp, pixels, &more) || __builtin_add_overflow(more, x->mutations, &more) ||
 	    __builtin_add_overflow(more, total_of(p, asked, from->rounds), &total))
 		return error_set(e, EINVAL, "more samples than can be counted");
@@ -59,9 +59,9 @@ static bool same_bits(const struct plan *a, const struct plan *b)
 int extend_check(const struct extension *x, struct error *e)
 {
 	if (!isfinite(x->seconds) || !isfinite(x->target_error) || x->seconds < 0 || x->target_error < 0)
-		return error_set(e, EINVAL, "a time or an error that is none");
+		return error_set(e, EINVAL, "an invalid time or error");
 	if (!x->spp && !x->mutations && !(x->seconds > 0) && !(x->target_error > 0))
-		return error_set(e, EINVAL, "by what? --spp, --mutations, --time or --target-error");
+		return error_set(e, EINVAL, "a bound is missing: --spp, --mutations, --time or --target-error");
 	return 0;
 }
 
@@ -73,7 +73,7 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 	if (rc)
 		return rc;
 	if (error && from->ended && from->error <= x->target_error)
-		return error_set(e, EINVAL, "its error is %.3g %% already", 100 * from->error);
+		return error_set(e, EINVAL, "its error is already %.3g %%", 100 * from->error);
 	uint64_t total = total_of(p, asked, from->rounds);
 	bool bounded = p->rounds != UINT64_MAX;
 	asked->spp = 0;
@@ -96,12 +96,12 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 	keep_cut(p, asked);
 	rc = plan_make(asked, out, e);
 	if (!rc && !same_bits(p, out))
-		rc = error_set(e, EINVAL, "its plan was made by a version with other rules: submit it again");
+		rc = error_set(e, EINVAL, "its plan was made by a version with different rules: submit it again");
 	if (!rc && out->rounds < p->rounds && !from->ended)
 		rc = error_set(e, EINVAL, "it would end earlier than it does");
 	if (!rc && out->rounds <= from->rounds)
-		rc = error_set(e, EINVAL, "it has as many samples already");
+		rc = error_set(e, EINVAL, "it already has as many samples");
 	if (!rc && out->seconds > 0 && from->ended && from->seconds >= out->seconds)
-		rc = error_set(e, EINVAL, "it took %.3g s already", from->seconds);
+		rc = error_set(e, EINVAL, "it has already taken %.3g s", from->seconds);
 	return rc;
 }

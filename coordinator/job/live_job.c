@@ -147,7 +147,7 @@ void live_job_log(struct live_job *job, enum log_event event, const char *fields
 	job->log_bytes += size;
 	if (job->log_bytes >= log_most)
 		size = (size_t)snprintf(line, sizeof line,
-					"the log of this job is full: the coordinator's has the rest\n");
+					"the log of this job is full: the rest is in the coordinator's log\n");
 	int rc = disk_write_all(job->log, line, size); /* the common log has the line, too */
 	(void)rc;
 }

@@ -58,7 +58,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 	uint64_t rounds = live_job_rounds(job);
 	int rc = live_job_merge(job, b, e);
 	if (rc == -EEXIST || rc == -EAGAIN) /* an error of the films, not of the machine */
-		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
+		rc = error_prefix(e, -EBADMSG, "a batch out of order");
 	live_job_note_times(job, r->elapsed, rounds);
 	if (!rc && job->bootstrap && bootstrap_missing(job->bootstrap) == 0)
 		rc = live_job_prepare(job, job->film_folder, e);

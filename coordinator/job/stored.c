@@ -135,7 +135,8 @@ static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h,
 	int rc = message_check_known(&m->base, e);
 	if (!rc && (m->n_b > PLAN_MAX_GROUPS || m->n_looks > FORECAST_LOOKS || !m->counts ||
 		    strlen(m->fingerprint) >= sizeof h->fingerprint))
-		rc = error_set(e, EPROTO, "the head of a checkpoint with %zu groups and %zu looks", m->n_b, m->n_looks);
+		rc = error_set(e, EPROTO, "the head of a checkpoint with %zu groups and %zu error estimates", m->n_b,
+			       m->n_looks);
 	if (rc)
 		return rc;
 	*h = (struct checkpoint_head){

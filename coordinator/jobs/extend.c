@@ -25,7 +25,7 @@
 #include <math.h>
 #include <string.h>
 
-static const char *const again = "submit it again (hslt-submit)";
+static const char *const again = "submit it again with hslt-submit";
 
 /* ---- the new plan ---- */
 
@@ -142,7 +142,7 @@ static int read_job(const struct jobs *jobs, uint64_t job, struct row_file *f, s
 	int rc = ledger_get(jobs->ledger, job, &j, e);
 	rc = rc == 0 ? -ENOENT : rc < 0 ? rc : row_file_read(jobs->spool, job, f, e);
 	if (rc == -ENOENT)
-		return error_set(e, ENOENT, "its films have been cleared: %s", again);
+		return error_set(e, ENOENT, "its films have been deleted: %s", again);
 	return rc ? error_prefix(e, rc, "what was kept of it") : 0;
 }
 
@@ -189,7 +189,7 @@ static int extend_read(struct jobs *jobs, const struct requester *by, struct liv
 	struct plan_request asked;
 	struct plan plan;
 	if (live_job_rounds(job) == 0)
-		return error_set(e, ENOENT, "its films have been cleared: %s", again);
+		return error_set(e, ENOENT, "its films have been deleted: %s", again);
 	struct extension_from from = where(job, isnan(job->times.completed) ? 0 : job->times.completed, true);
 	int rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
 	if (rc)
@@ -242,7 +242,7 @@ static void done(uv_work_t *work, int status)
 	jobs->reading_for = 0;
 	if (w->rc)
 		live_job_log(w->job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : here ? 0 : -ECANCELED;
+	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot continue: %s", again) : here ? 0 : -ECANCELED;
 	if (!rc)
 		rc = extend_read(jobs, &w->by, w->job, &w->what, &w->record, text, sizeof text, &w->error);
 	if (rc)
@@ -277,7 +277,7 @@ static int start_reading(struct jobs *jobs, const struct extension_request *q, c
 	row_file_free(&f);
 	if (rc) {
 		mem_free(w);
-		return error_prefix(e, rc, "it cannot go on, %s", again);
+		return error_prefix(e, rc, "it cannot continue: %s", again);
 	}
 	rc = ask_beforehand(jobs, &q->by, w->job, &q->what, r, e);
 	if (rc) {
@@ -304,7 +304,7 @@ static int extend_ended(struct jobs *jobs, const struct extension_request *q, co
 		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s",
 				 strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled", again);
 	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
-		return error_set(e, EINVAL, "it is black: chains have nowhere to begin");
+		return error_set(e, EINVAL, "it is black: chains have nowhere to start");
 	return start_reading(jobs, q, r, e);
 }
 
@@ -348,7 +348,7 @@ void extend_job(struct jobs *jobs, const struct requester *by, const struct exte
 	struct extension_request *q = NULL, **at = &jobs->extending;
 	struct error e;
 	int rc = has_asked(jobs, by->peer)
-			 ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet")
+			 ? error_set(&e, EBUSY, "one extension at a time: the previous one is not answered yet")
 			 : extend_check(x, &e);
 	if (!rc && !(q = mem_alloc(1, sizeof *q)))
 		rc = error_set(&e, ENOMEM, "no memory for an extension");

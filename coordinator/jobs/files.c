@@ -33,7 +33,7 @@ bool files_look(struct jobs *jobs, struct live_job *job)
 	if (f && !job->lacks_file) {
 		text_print(
 			text, sizeof text,
-			"its file %.100s is damaged or gone in the spool: submit the scene again (hslt-submit), and it goes on",
+			"its file %.100s is damaged or missing in the spool: submit the scene again (hslt-submit) to continue",
 			f->name);
 		hold(jobs, job, text);
 	} else if (!f && job->lacks_file) {

@@ -41,10 +41,10 @@ static void go_on(struct jobs *jobs, struct live_job *job)
 	spool_job_path(jobs->spool, job->id, NULL, folder);
 	int rc = make_anew(jobs, job, &e);
 	live_job_log(job, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder,
-		     rc ? e.text : "made anew, and the job goes on");
+		     rc ? e.text : "restored, and the job continues");
 	if (rc) {
 		if (!job->ended)
-			durable_hold(jobs, job, "its folder is gone and cannot be made anew", e.text);
+			durable_hold(jobs, job, "its folder is missing and cannot be restored", e.text);
 		return;
 	}
 	if (job->ended)
@@ -57,7 +57,7 @@ static void go_on(struct jobs *jobs, struct live_job *job)
 			job->generation_least = journal_generation(job->journal) + 1;
 		job->checkpoint_after = 0;
 	}
-	durable_hold(jobs, job, "its results cannot be stored", "its folder was removed, and is made anew");
+	durable_hold(jobs, job, "its results cannot be stored", "its folder was removed, and is being restored");
 }
 
 /* A journal that failed already has no file to look for, and an ended job needs none: then the folder itself is

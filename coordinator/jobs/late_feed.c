@@ -61,7 +61,7 @@ void late_drop(struct jobs *jobs, struct live_job *job)
 {
 	while (job->late_count) {
 		struct late_result l = job->late[--job->late_count];
-		give_up(jobs, job, &l, "a result that waited in the journal is computed again");
+		give_up(jobs, job, &l, "a waiting result in the journal is computed again");
 	}
 }
 

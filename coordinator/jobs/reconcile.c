@@ -77,7 +77,7 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 		return 0;
 	}
 	int rc = put_aside(l, id, why, e);
-	text_print(text, sizeof text, "%s: given up; what is left of it is in spool/lost", why);
+	text_print(text, sizeof text, "%s: given up; the rest of it is in spool/lost", why);
 	say(id, text);
 	return rc;
 }
@@ -111,7 +111,7 @@ static int make_record(struct looking *l, const struct ledger_job *j, struct err
 	spool_job_path(spool, j->id, "job.json.damaged", kept);
 	if (disk_rename(path, kept) && errno != ENOENT)
 		return error_set(e, errno, "%s: %s", kept, strerror(errno));
-	say(j->id, "its record (job.json) was damaged: made anew from jobs.db, and kept as job.json.damaged");
+	say(j->id, "its record (job.json) was damaged: restored from jobs.db, and kept as job.json.damaged");
 	return spool_write_record(spool, r, e);
 }
 
@@ -156,11 +156,11 @@ static int with_row(struct looking *l, const struct ledger_job *j, struct row_fi
 {
 	if (!file && f->job.revision > j->revision)
 		return make_row(l, f, ended && l->record->extended == f->job.extended,
-				"its row in jobs.db was older than the copy in its folder: made anew from it", e);
+				"its row in jobs.db was older than the copy in its folder: restored from it", e);
 	if (j->ended > 0 || (!file && f->job.revision == j->revision))
 		return 0;
 	if (file == -EBADMSG)
-		say(j->id, "the copy of its row in its folder (order) is damaged: made anew from jobs.db");
+		say(j->id, "the copy of its row in its folder (order) is damaged: restored from jobs.db");
 	if (row_file_write(l->jobs->spool, j, e))
 		say(j->id, e->text); /* a full disk must not stop the job */
 	return 0;
@@ -171,20 +171,20 @@ static int without_row(struct looking *l, uint64_t id, bool damaged, struct row_
 {
 	if (!file)
 		return make_row(l, f, ended && l->record->extended == f->job.extended,
-				damaged ? "its row in jobs.db was damaged: made anew from its folder"
-					: "jobs.db had lost its row: made anew from its folder",
+				damaged ? "its row in jobs.db was damaged: restored from its folder"
+					: "jobs.db had lost its row: restored from its folder",
 				e);
 	if (ended)
 		return damaged ? ledger_forget(l->jobs->ledger, id, e) : 0; /* its record contains everything */
 	if (damaged)
-		return is_lost(l, id,
-			       "its row in jobs.db is damaged, and so is the copy in its folder (order), or it is gone",
-			       e);
+		return is_lost(
+			l, id,
+			"its row in jobs.db is damaged, and the copy in its folder (order) is damaged or missing", e);
 	if (file == -EBADMSG)
-		return is_lost(l, id, "jobs.db has no row of it, and the copy in its folder (order) is damaged", e);
+		return is_lost(l, id, "jobs.db has no row for it, and the copy in its folder (order) is damaged", e);
 	return has_results(l->jobs->spool, id)
 		       ? is_lost(l, id,
-				 "jobs.db has no row of it, and its folder has results, but no copy of the row (order)",
+				 "jobs.db has no row for it, and its folder has results but no copy of the row (order)",
 				 e)
 		       : 0; /* it was never accepted */
 }
@@ -234,7 +234,7 @@ static int look_at_rows(struct looking *l, struct error *e)
 		l->last = id = j.id;
 		spool_job_path(l->jobs->spool, id, NULL, path);
 		if (j.damaged && disk_stat(path, &st) &&
-		    (rc = is_lost(l, id, "its row in jobs.db is damaged, and it has no folder", e)))
+		    (rc = is_lost(l, id, "its row in jobs.db is damaged, and its folder is missing", e)))
 			return rc;
 	}
 	return rc;
@@ -291,8 +291,8 @@ int reconcile(struct jobs *jobs, struct error *e)
 		return rc;
 	return error_set(
 		e, EBADMSG,
-		"%s has lost %llu job%s: %s%s. Nothing has been deleted. Put back what is missing, or start with --accept-loss: what is"
-		" left of them is then put into lost/ of the spool, and the other jobs go on",
+		"%s has lost %llu job%s: %s%s. Nothing has been deleted. Put back what is missing, or start with "
+		"--accept-loss: what is left of them is then moved to lost/ in the spool, and the other jobs continue",
 		jobs->config.spool, (unsigned long long)l.lost, l.lost == 1 ? "" : "s", l.text,
 		l.lost > NAMED_MOST ? ", ..." : "");
 }

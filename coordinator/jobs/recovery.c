@@ -176,7 +176,7 @@ static int finish(struct jobs *jobs, struct error *e)
 		rc = ledger_get(jobs->ledger, job->id, &j, e);
 		rc = rc > 0   ? restore_tell(jobs, job, j.held, 0, e)
 		     : rc < 0 ? rc
-			      : error_set(e, ENOENT, "its row is gone");
+			      : error_set(e, ENOENT, "its row is missing");
 		if (!rc)
 			files_look(jobs, job);
 		if (!rc && !farm_counts(jobs->farm, job->id, &known))
@@ -245,7 +245,7 @@ static int take_failure(struct jobs *jobs, struct error *e)
 		rc = ledger_get(jobs->ledger, id, &j, e);
 		rc = rc > 0   ? restore_live_job(jobs, &j, &f->job, e)
 		     : rc < 0 ? rc
-			      : error_set(e, ENOENT, "its row is gone");
+			      : error_set(e, ENOENT, "its row is missing");
 		if (!rc)
 			return 0;
 	}

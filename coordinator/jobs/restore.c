@@ -146,8 +146,8 @@ static int not_known(const struct ledger_job *j, int rc, struct error *e)
 		return rc;
 	if (strcmp(j->version, HSLT_VERSION) == 0)
 		return error_prefix(e, -EBADMSG, "what it was submitted with");
-	return error_prefix(e, -EPROTO, "version %.40s of the coordinator took it, and this is %s", j->version,
-			    HSLT_VERSION);
+	return error_prefix(e, -EPROTO, "it was submitted to version %.40s of the coordinator, and this is %s",
+			    j->version, HSLT_VERSION);
 }
 
 static int make_live_job(struct jobs *jobs, const struct ledger_job *j, struct live_job **job, struct error *e)

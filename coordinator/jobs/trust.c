@@ -18,10 +18,9 @@ static int add_worker(json_t *list, const struct worker_status *w, struct error 
 	json_t *o = json_pack_ex(&fault, 0, "{s:s s:s s:s s:I s:s}", "certificate", w->certificate, "name", w->name,
 				 "home", w->home, "restarts", (json_int_t)w->restarts, "why", w->text);
 	if (!o)
-		return error_set(e, EINVAL, "%s, who is quarantined, cannot be written down: %s", w->name, fault.text);
-	return json_array_append_new(list, o)
-		       ? error_set(e, ENOMEM, "no memory for the list of those that are quarantined")
-		       : 0;
+		return error_set(e, EINVAL, "the quarantined worker %s cannot be recorded: %s", w->name, fault.text);
+	return json_array_append_new(list, o) ? error_set(e, ENOMEM, "no memory for the list of quarantined workers")
+					      : 0;
 }
 
 static void write_quarantined(struct jobs *jobs)
@@ -36,7 +35,7 @@ static void write_quarantined(struct jobs *jobs)
 	char *text = json_dumps(o, JSON_INDENT(1));
 	json_decref(o);
 	if (!rc && !text)
-		rc = error_set(&e, ENOMEM, "no memory for the list of those that are quarantined");
+		rc = error_set(&e, ENOMEM, "no memory for the list of quarantined workers");
 	if (!rc)
 		rc = spool_write_own(jobs->spool, file, text, strlen(text), &e);
 	if (rc)

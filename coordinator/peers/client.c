@@ -255,9 +255,9 @@ void client_message(struct session *p, struct envelope *env, const unsigned char
 		fetch_begin(p, m->fetch);
 		break;
 	case FARM__ENVELOPE__BODY_BYE:
-		conn_close(p->conn, "the client said goodbye");
+		conn_close(p->conn, "the client ended the connection");
 		break;
 	default:
-		session_fault(p, "not a message that a client says");
+		session_fault(p, "not a message for a client to send");
 	}
 }

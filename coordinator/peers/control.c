@@ -24,7 +24,7 @@ static int tell(struct session *p, struct event *ev)
 /* The core knows whether it can be cancelled, so it is asked first. */
 static void not_for_long(struct session *p, const struct error *e)
 {
-	text_print(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %s",
+	text_print(p->rejected, sizeof p->rejected, "it applies until the coordinator stops, but cannot be stored: %s",
 		   e->text);
 }
 
@@ -110,7 +110,7 @@ void control_job(struct session *p, const Farm__Control *c)
 						       .target_error = c->target_error});
 			return; /* answered now or later */
 		default:	/* an untrusted number */
-			text_copy(p->rejected, sizeof p->rejected, "nothing that can be done with a job");
+			text_copy(p->rejected, sizeof p->rejected, "unknown request for a job");
 		}
 	}
 	client_send_done(p, "");

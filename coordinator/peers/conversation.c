@@ -72,7 +72,7 @@ static const char *what_to_know(const struct session *p, char *text, size_t size
 	*text = 0;
 	if (recovery_is_on(p->jobs))
 		text_print(text, size,
-			   "the coordinator is reading its jobs, %u %%: what is asked for waits until they are there",
+			   "the coordinator is reading its jobs, %u %%: requests wait until it has finished",
 			   (unsigned)(100 * recovery_share(p->jobs)));
 	if (p->joined && farm_peer(p->jobs->farm, p->id, &s) && s.state == PEER_QUARANTINED)
 		text_print(text, size, "this worker is quarantined and gets no work: %s", s.text);
@@ -120,7 +120,7 @@ static const char *overreach(struct session *p, Farm__Role role, char *text, siz
 	if (may)
 		return NULL;
 	snprintf(text, size, "the certificate of %s is a %s's: it cannot %s", who->name, tls_role_name(who->role),
-		 role == FARM__ROLE__ROLE_WORKER ? "lease" : "submit or look after jobs");
+		 role == FARM__ROLE__ROLE_WORKER ? "lease" : "submit or manage jobs");
 	return text;
 }
 
@@ -138,7 +138,8 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		const char *who = h->role == FARM__ROLE__ROLE_WORKER ? "worker" : "client";
 		snprintf(
 			text, sizeof text,
-			"the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must be renewed",
+			"the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must "
+			"be updated",
 			who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
 		refuse_for_good(p, text);
 		return;
@@ -175,7 +176,7 @@ static void take_message(struct session *p, struct envelope *env, const unsigned
 	if (p->state == SESSION_NEW && env->message->body_case == FARM__ENVELOPE__BODY_HELLO)
 		take_hello(p, env->message->hello);
 	else if (p->state == SESSION_NEW)
-		session_fault(p, "the first word must be hello");
+		session_fault(p, "the first message must be hello");
 	else if (p->state == SESSION_WORKER)
 		worker_message(p, env);
 	else if (p->state == SESSION_CLIENT)

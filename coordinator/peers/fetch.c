@@ -91,7 +91,7 @@ static int begin(struct session *p, const Farm__Fetch *f, struct job_view *v, st
 	if (!client_finds_job(p, f->job, v))
 		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
 	if (!file)
-		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
+		return error_set(e, EINVAL, "unknown kind of file to fetch");
 	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)
 		return cleared(&v->record, e);
 	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
@@ -106,10 +106,10 @@ static int read_piece(const struct fetching *t, const Farm__Fetch *f, unsigned c
 	if (t->job != f->job || t->what != f->what)
 		return error_set(
 			e, ESTALE,
-			"j%llu: this was not fetched from its beginning, or had to give way to others: fetch it again",
+			"j%llu: the fetch did not start at the beginning, or was dropped in favour of others: fetch it again",
 			(unsigned long long)f->job);
 	if (f->offset > t->size)
-		return error_set(e, EINVAL, "the file is shorter than that");
+		return error_set(e, EINVAL, "the file ends before that");
 	uint64_t left = t->size - f->offset;
 	ssize_t n = disk_pread(t->fd, bytes, left < CHUNK ? left : CHUNK, (off_t)f->offset);
 	if (n < 0 || (n == 0 && left))

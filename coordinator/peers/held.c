@@ -37,7 +37,7 @@ bool held_take(struct session *p, struct envelope *env)
 	if (!h) {
 		session_fault(
 			p,
-			"the coordinator is still reading its jobs, and no more can wait for that: call again later");
+			"the coordinator is still reading its jobs, and too many requests wait for that: try again later");
 		return true;
 	}
 	if (!p->held) {

@@ -37,7 +37,7 @@ static bool make_room(struct peers *s)
 	if (!oldest)
 		return false;
 	oldest->state = SESSION_LEAVING;
-	conn_close(oldest->conn, "as many connections as are allowed, and this one has not said hello");
+	conn_close(oldest->conn, "too many connections, and this one has not said hello");
 	return true;
 }
 
@@ -54,9 +54,9 @@ void peers_accept(struct peers *s)
 	struct conn *c;
 	s->caller_waits = false;
 	if (!p) {
-		log_event(LOG_PEER_REFUSED, "text=\"as many connections as are allowed\"");
+		log_event(LOG_PEER_REFUSED, "text=\"too many connections\"");
 		if (conn_accept(&c, (uv_stream_t *)&s->listener, &config, &refused_events, NULL, &e) == 0)
-			conn_close(c, "as many connections as are allowed");
+			conn_close(c, "too many connections");
 		else
 			s->caller_waits = true;
 		return;

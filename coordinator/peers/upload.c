@@ -47,7 +47,7 @@ static int check_files(const Farm__Submit *m, struct error *e)
 	for (size_t i = 0; i < m->n_files; i++) {
 		const Farm__File *f = m->files[i];
 		if (!name_ok(f->name) || f->hash.len != BLOB_HASH_SIZE)
-			return error_set(e, EINVAL, "file %zu of the bundle has no proper name or hash", i);
+			return error_set(e, EINVAL, "file %zu of the bundle has no valid name or hash", i);
 		if (f->size > job_cache_max - total)
 			return error_set(e, EINVAL, "the bundle is larger than %llu bytes",
 					 (unsigned long long)job_cache_max);
@@ -110,9 +110,8 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 	if (!rc && !(m->verify >= 0 && m->verify <= 1))
 		rc = error_set(e, EINVAL, "a share of %g of the epochs to be verified", m->verify);
 	if (!rc && m->verify > 0 && m->mixed)
-		rc = error_set(
-			e, EINVAL,
-			"workers of several fingerprints cannot be held against each other: verify or mixed, not both");
+		rc = error_set(e, EINVAL,
+			       "results of different fingerprints cannot be compared: verify or mixed, not both");
 	if (!rc)
 		rc = plan_request_from_wire(m->plan, &request, e);
 	if (rc)
@@ -146,7 +145,7 @@ static int sort_hashes(struct upload *u, struct error *e)
 	for (size_t i = 1; i < m->n_files; i++) {
 		const Farm__File *a = m->files[u->by_hash[i - 1]], *b = m->files[u->by_hash[i]];
 		if (memcmp(a->hash.data, b->hash.data, BLOB_HASH_SIZE) == 0 && a->size != b->size)
-			return error_set(e, EINVAL, "%.256s: the same content as %.256s, and another size", a->name,
+			return error_set(e, EINVAL, "%.256s: the same content as %.256s, but another size", a->name,
 					 b->name);
 	}
 	return 0;
@@ -199,7 +198,7 @@ static int check_sizes(const struct upload *u, struct error *e)
 		struct blob_hash h = live_job_file_hash(m->files[i]);
 		uint64_t size;
 		if (u->held[i] && (!blob_has(u->blobs, &h, &size) || size != m->files[i]->size))
-			return error_set(e, EINVAL, "%s: another size than its content has", m->files[i]->name);
+			return error_set(e, EINVAL, "%s: its size does not match its content", m->files[i]->name);
 	}
 	return 0;
 }
@@ -275,7 +274,7 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 	if (!u->writer) {
 		const Farm__File *f = missing_file(u, &h);
 		if (!f || f->size != c->size)
-			return error_set(e, EINVAL, "a blob that nobody asked for");
+			return error_set(e, EINVAL, "a blob that was not requested");
 		rc = blob_write_begin(&u->writer, u->blobs, &h, c->size, e);
 		u->writing = h;
 	}

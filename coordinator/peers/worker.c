@@ -90,9 +90,9 @@ void worker_message(struct session *p, struct envelope *env)
 		take_blob_get(p, m->blob_get);
 		break;
 	case FARM__ENVELOPE__BODY_BYE:
-		conn_close(p->conn, "the worker said goodbye");
+		conn_close(p->conn, "the worker ended the connection");
 		break;
 	default:
-		session_fault(p, "not a message that a worker says");
+		session_fault(p, "not a message for a worker to send");
 	}
 }

@@ -89,7 +89,8 @@ void worker_requests_take(struct session *p, const struct worker_request *a)
 	}
 	struct worker_request *last = p->ask_count < ASKS_MOST ? mem_alloc(1, sizeof *last) : NULL;
 	if (!last) {
-		session_fault(p, "%u pieces and jobs asked for and not taken: no worker needs so many", p->ask_count);
+		session_fault(p, "%u chunks and jobs were requested and not read: no worker needs so many",
+			      p->ask_count);
 		return;
 	}
 	*last = *a;

@@ -38,10 +38,9 @@ void ages_open(struct jobs *jobs)
 	int rc = spool_read_own(jobs->spool, file, &text, &size, &e);
 	if (!rc) {
 		if ((rc = seen_from_text(text, size, &last)))
-			error_set(
-				&e, EBADMSG,
-				"the file %s of the spool is damaged: all finished jobs are as if they had just ended",
-				file);
+			error_set(&e, EBADMSG,
+				  "the file %s of the spool is damaged: finished jobs count as if they had just ended",
+				  file);
 		mem_free(text);
 	}
 	if (rc && rc != -ENOENT)

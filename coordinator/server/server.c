@@ -85,7 +85,8 @@ static int open_tls(struct server *s, struct error *e)
 	const struct tls_peer *self = tls_self(s->peers.tls);
 	if (self->role == TLS_COORDINATOR)
 		return 0;
-	return error_set(e, EINVAL, "%s: the certificate of %s is a %s's, and nobody would take it for a coordinator's",
+	return error_set(e, EINVAL,
+			 "%s: the certificate of %s is a %s's, and no peer would accept it as a coordinator's",
 			 s->jobs.config.tls, self->name, tls_role_name(self->role));
 }
 

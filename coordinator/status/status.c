@@ -362,7 +362,7 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 	if (lstat(path, &st))
 		return 0;
 	if (!S_ISSOCK(st.st_mode))
-		return error_set(e, EEXIST, "%s: is there already and is no socket", path);
+		return error_set(e, EEXIST, "%s: exists and is not a socket", path);
 	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 	if (fd < 0)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
@@ -371,9 +371,9 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 	if (fault == ENOENT)
 		return 0;
 	if (fault == EACCES || fault == EPROTOTYPE)
-		return error_set(e, fault, "%s: somebody else's socket: %s", path, strerror(fault));
+		return error_set(e, fault, "%s: the socket of another user: %s", path, strerror(fault));
 	if (fault != ECONNREFUSED) /* EAGAIN: its backlog is full */
-		return error_set(e, EADDRINUSE, "%s: somebody else answers there", path);
+		return error_set(e, EADDRINUSE, "%s: another program answers there", path);
 	return unlink(path) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
 }
 
@@ -387,9 +387,9 @@ static int share(const char *path, gid_t group, struct error *e)
 	bool ours = fd >= 0 && fstat(fd, &st) == 0 && S_ISSOCK(st.st_mode) && st.st_uid == geteuid();
 	int rc = 0;
 	if (!ours)
-		rc = error_set(e, fd < 0 ? errno : EEXIST, "%s: is not the socket that was made there", path);
+		rc = error_set(e, fd < 0 ? errno : EEXIST, "%s: is not the socket that was created there", path);
 	else if (fchownat(fd, "", (uid_t)-1, group, AT_EMPTY_PATH) || chmod(itself, 0660))
-		rc = error_set(e, errno, "%s: cannot be given to the group: %s", path, strerror(errno));
+		rc = error_set(e, errno, "%s: the group cannot be set: %s", path, strerror(errno));
 	if (fd >= 0)
 		close(fd);
 	return rc;
@@ -445,8 +445,9 @@ int status_open(struct status_socket **out, const struct peers *s, int inherited
 		struct error *e)
 {
 	if (inherited >= 0 && group)
-		return error_set(e, EINVAL,
-				 "--status-group: the socket is the service manager's: SocketGroup= in its unit");
+		return error_set(
+			e, EINVAL,
+			"--status-group: the socket belongs to the service manager: set SocketGroup= in its unit");
 	struct status_socket *t = mem_alloc(1, sizeof *t);
 	if (!t || (inherited < 0 && !(t->path = mem_strdup(path)))) {
 		mem_free(t);

@@ -361,7 +361,7 @@ int journal_body(struct journal *j, uint64_t at, unsigned char **body, size_t *s
 	*size = r.size;
 	if (rc < 0)
 		return fault(j, -rc, e);
-	return rc ? 0 : error_set(e, EBADMSG, "%s: a record that was whole is damaged", j->path);
+	return rc ? 0 : error_set(e, EBADMSG, "%s: a record has been damaged", j->path);
 }
 
 /* ---- appending ---- */

@@ -77,7 +77,7 @@ static int migrate(struct ledger *l, struct error *e)
 	if (!rc && version > VERSION)
 		return error_set(
 			e, EPROTO,
-			"the database of jobs is of version %d, and version %d is known here: a later coordinator wrote it",
+			"the database of jobs has version %d, and this coordinator knows version %d: a later one wrote it",
 			version, (int)VERSION);
 	if (!rc && version < 0)
 		return error_set(e, EBADMSG, "the database of jobs is damaged: no coordinator writes a version %d",

@@ -28,7 +28,7 @@ ProtobufCMessage *message_unpack(const ProtobufCMessageDescriptor *d, const unsi
 	ProtobufCMessage *m = protobuf_c_message_unpack(d, &memory, size, bytes);
 	*rc = m	    ? 0
 	      : out ? error_set(e, ENOMEM, "no memory for %s", d->short_name)
-		    : error_set(e, EPROTO, "%zu bytes are no %s", size, d->short_name);
+		    : error_set(e, EPROTO, "%zu bytes are not a %s", size, d->short_name);
 	return m;
 }
 
@@ -41,7 +41,7 @@ void message_free(ProtobufCMessage *m)
 
 int message_check_known(const ProtobufCMessage *m, struct error *e)
 {
-	return m->n_unknown_fields ? error_set(e, EPROTO, "%s with a field that is not known here: of another version",
-					       m->descriptor->short_name)
-				   : 0;
+	return m->n_unknown_fields
+		       ? error_set(e, EPROTO, "%s with an unknown field, of another version", m->descriptor->short_name)
+		       : 0;
 }

@@ -155,7 +155,7 @@ static int check(json_t *o, struct error *e)
 		return 0;
 	json_object_del(o, "crc32c");
 	int rc = checksum(o, &got, e);
-	return rc ? rc : got == want ? 0 : error_set(e, EBADMSG, "damaged: its checksum does not fit");
+	return rc ? rc : got == want ? 0 : error_set(e, EBADMSG, "damaged: its checksum does not match");
 }
 
 int record_to_json(const struct job_record *r, char **out, struct error *e)
@@ -196,7 +196,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 			json_is_integer(schema)
 				? error_set(
 					  e, EPROTO,
-					  "a record of version %lld, and version %d is known here: another coordinator wrote it",
+					  "a record of version %lld, and this coordinator knows version %d: another one wrote it",
 					  (long long)json_integer_value(schema), SCHEMA)
 			: !o && json_error_code(&fault) == json_error_out_of_memory
 				? error_set(e, ENOMEM, "no memory for a record")

@@ -51,9 +51,8 @@ static int take_lock(struct spool *s, struct error *e)
 	if (s->lock < 0)
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
 	else if (disk_flock(s->lock, LOCK_EX | LOCK_NB))
-		rc = errno == EWOULDBLOCK
-			     ? error_set(e, EBUSY, "%s: another coordinator works with this spool", s->folder)
-			     : error_set(e, errno, "%s: %s", path, strerror(errno));
+		rc = errno == EWOULDBLOCK ? error_set(e, EBUSY, "%s: another coordinator uses this spool", s->folder)
+					  : error_set(e, errno, "%s: %s", path, strerror(errno));
 	mem_free(path);
 	return rc;
 }
@@ -321,7 +320,7 @@ int spool_check_version(const char got[8], const char known[8], const char *path
 	if (memcmp(got + NAME, known + NAME, DIGITS) == 0)
 		return 0;
 	return error_set(e, EPROTO,
-			 "%s is of version %.3s, and version %.3s is known here: another coordinator wrote it", path,
+			 "%s has version %.3s, and this coordinator knows version %.3s: another one wrote it", path,
 			 got + NAME, known + NAME);
 }
 

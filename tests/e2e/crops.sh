@@ -78,7 +78,7 @@ done
 code 0 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/hslt.exr" -o "$DIR/both.exr"
 code 0 "$BIN/hslt-compare" "$DIR/both.exr" "$DIR/chains.exr" --max-relmse 0
 code 1 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/right.exr" -o "$DIR/x.exr"
-says "another crop has its pixel 40,0"
+says "another crop also has its pixel 40,0"
 "$BIN/hslt-render" "$BOX" -o "$DIR/low.exr" -i hslt --size 80x40 --crop 0,1,40,39 --mutations 40000 --threads 1 --quiet
 code 1 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/low.exr" -o "$DIR/x.exr"
 says "no crop has pixel 0,0"

@@ -30,7 +30,7 @@ python3 - "$DIR/explained.json" "$DIR/stats.json" <<-'END' || fail "$(cat "$DIR/
 	    assert c["path"]["tailIndex"] > 2.1 and 0 < c["path"]["secondMomentTimesRays"] < 0.75 * c["bdpt"]["secondMomentTimesRays"], c
 END
 "$BIN/hslt-render" --explain "$SCENE" --spp 32 | grep -q '^path, by a pilot' || fail "--explain does not say why"
-"$BIN/hslt-render" --explain "$SCENE" -i bdpt | grep -q '^asked for; else a pilot' || fail "--explain -i bdpt"
+"$BIN/hslt-render" --explain "$SCENE" -i bdpt | grep -q '^as requested; otherwise a pilot' || fail "--explain -i bdpt"
 "$BIN/hslt-render" --explain --json "$SCENE" -i bdpt | grep -q '"choice":null' || fail "--explain --json -i bdpt"
 
 for p in render submit; do

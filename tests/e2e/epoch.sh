@@ -24,7 +24,7 @@ told() {
 start_coordinator
 told long --spp 100000
 rule "$DIR/long" "pilot: "
-rule "$DIR/long" "leases of about 20 s of a thread"
+rule "$DIR/long" "leases of about 20 s for a thread"
 long=$(epoch "$DIR/long")
 told short --spp 16
 grep -q pilot "$DIR/short" && fail "a pilot for a short job"
@@ -35,7 +35,7 @@ grep -q "pilot\|epochs:" "$DIR/pinned" && fail "a pilot for an epoch that was as
 told parts --spp 16 --parts 64
 rule "$DIR/parts" "1024 leases"
 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --parts 3 --chains 1024 --epoch 9 2>"$DIR/odd" && fail "3 parts of 64 chains"
-rule "$DIR/odd" "cannot be cut into 3 parts"
+rule "$DIR/odd" "cannot be divided into 3 parts"
 # 16 chains of 8,388,608 mutations are a lease that is let in, of one more each are not.
 told longest --spp 100000 --epoch 8388608
 [ "$(epoch "$DIR/longest")" = 8388608 ] || fail "an epoch of $(epoch "$DIR/longest")"
@@ -52,7 +52,7 @@ stop "$WORKER" "$COORDINATOR_PID"
 
 start_coordinator --worker-bandwidth 0.01
 told slow --spp 100000
-rule "$DIR/slow" "2.76 MB of tiles a lease at 0.01 MB/s"
+rule "$DIR/slow" "2.76 MB of tiles per lease at 0.01 MB/s"
 slow=$(epoch "$DIR/slow")
 [ "$slow" -gt "$long" ] || fail "epochs of $slow at a slow bandwidth, $long without"
 echo "epochs of $long mutations, $slow with 0.01 MB/s a thread"

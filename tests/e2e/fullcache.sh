@@ -26,7 +26,7 @@ is_waiting() {
 id=$(submit "$BOX" -o "$DIR/box.exr" --integrator path --spp 4)
 until_true 20 is_waiting "$id" || fail "$id is $(value "$id" state), $(value "$id" waiting)"
 is_state "$id" failed && fail "$id failed: $(value "$id" why)"
-"$BIN/hslt-status" --json "$id" | grep -q '"waiting":"no worker can compute it, for want of something on the machines of bad1, bad2, bad3; the last one: bad[123]: .*No space left' ||
+"$BIN/hslt-status" --json "$id" | grep -q '"waiting":"no worker can compute it, because of a problem on the machines of bad1, bad2, bad3; the last one: bad[123]: .*No space left' ||
 	fail "it waits for: $("$BIN/hslt-status" --json "$id" | grep -o '"waiting":"[^"]*')"
 "$BIN/hslt-job" log "$id" | grep -q 'event=lease_failed worker="bad[123]" own=1 .*No space left' || fail "the log does not say why"
 start_worker good

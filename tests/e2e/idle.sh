@@ -24,7 +24,7 @@ for tenths in 8 80 600; do
 	! grep -q 'event=connect ' "$DIR/nothing.log" || break
 done
 grep -q "event=stop text=\"no lease for $(awk -v t=$tenths 'BEGIN { print t / 10 }') s\"" "$DIR/nothing.log" || fail "it does not say why"
-until_true 5 grep -q 'name="nothing".*said goodbye' "$DIR/coordinator.log" || fail "it did not say goodbye"
+until_true 5 grep -q 'name="nothing".*ended the connection' "$DIR/coordinator.log" || fail "it did not say goodbye"
 
 # A job keeps it; it leaves afterwards. One without the option, or with 0, stays.
 submit "$BOX" -o "$DIR/farm.exr" $JOB >"$DIR/id"

@@ -32,11 +32,11 @@ def is_open(s):
 
 first, heard = hello(b"w", b"ab12", 5)
 later, heard = hello(b"other", b"ab12", 6)
-expect("the earlier life", first.recv(4096), b"the same worker has called again")
+expect("the earlier life", first.recv(4096), b"the same worker has reconnected")
 stale, heard = hello(b"w", b"ab12", 5)
-expect("a start before", heard, b"start 6 of it has been here before")
+expect("a start before", heard, b"its start 6 has connected before")
 again, heard = hello(b"other", b"ab12", 6)
-expect("the same life on its old connection", later.recv(4096), b"the same worker has called again")
+expect("the same life on its old connection", later.recv(4096), b"the same worker has reconnected")
 elsewhere, heard = hello(b"other", b"cd34", 1)
 nowhere, heard = hello(b"other", b"", 0)
 for what, s in (("the same life", again), ("one name, another home", elsewhere), ("one name, no home", nowhere)):

@@ -20,7 +20,7 @@ until_true 60 grep -q '^running' "$DIR/early.log" || fail "its first lease does 
 kill -TERM $early
 got=0
 wait $early || got=$?
-[ $got = 1 ] && grep -q 'interrupted before the first round was complete: nothing to write' "$DIR/early.log" ||
+[ $got = 1 ] && grep -q 'interrupted before the first round was complete: there is no image' "$DIR/early.log" ||
 	fail "ended before its first round: $got, $(cat "$DIR/early.log")"
 [ ! -e "$DIR/early.exr" ] || fail "an image without a round was written"
 grep -q 'leases of the bootstrap are kept in .*early.exr.bootstrap, and the same command' "$DIR/early.log" && [ -s "$DIR/early.exr.bootstrap" ] ||

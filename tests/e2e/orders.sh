@@ -156,7 +156,7 @@ job cancel "$g"
 refused 1 'has been cancelled, and nothing of it was kept: submit it again' job extend "$g" --spp +8
 refused 1 'no such job' job extend j99 --spp +8
 rm "$DIR/spool/jobs/$f/checkpoint" "$DIR/spool/jobs/$f"/journal.* 2>/dev/null || :
-refused 1 'its films have been cleared: submit it again' job extend "$f" --time +1
+refused 1 'its films have been deleted: submit it again' job extend "$f" --time +1
 is_state "$f" done || fail "$f is $(value "$f" state)"
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :

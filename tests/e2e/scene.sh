@@ -62,7 +62,7 @@ code 0 "$BIN/hslt-render" --size 16 --spp 1 -i path "$BOX" -o "$DIR/whole.exr"
 code 0 "$BIN/hslt-compare" "$DIR/apart.exr" "$DIR/whole.exr"
 grep -q "^relMSE  *0 " "$DIR/out" || fail "the image is another with --path: $(cat "$DIR/out")"
 code 2 "$BIN/hslt-render" --path "$DIR/nowhere" "$BOX" -o "$DIR/x.exr"
-grep -q "is no folder" "$DIR/err.log" || fail "a --path that is not there: $(cat "$DIR/err.log")"
+grep -q "is not a folder" "$DIR/err.log" || fail "a --path that is not there: $(cat "$DIR/err.log")"
 
 # Sensors by their ids.
 mkdir "$DIR/two"

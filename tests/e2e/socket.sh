@@ -59,7 +59,7 @@ timeout 100 env -u HSLT_STATUS_SOCKET "$BIN/hslt-coordinator" --spool "$DIR/othe
 begin
 [ "$(stat -c %a "$AT")" = 600 ] || fail "the mode is $(stat -c %a "$AT")"
 answers || fail "no answer"
-refused "somebody else answers"
+refused "another program answers"
 mv "$AT" "$DIR/moved"
 ln -s "$DIR/moved" "$AT"
 refused "no socket"
@@ -103,9 +103,9 @@ d.bind(kind + "/kind")
 time.sleep(600)' "$DIR" &
 	PIDS="$PIDS $!"
 	until_true 10 test -S "$DIR/kind" || fail "no sockets"
-	refused "somebody else answers"
+	refused "another program answers"
 	AT=$DIR/kind
-	refused "somebody else's socket"
+	refused "the socket of another user"
 	AT=$DIR/at
 fi
 

@@ -37,7 +37,7 @@ kill -TERM $WAITS
 code=0
 wait $WAITS || code=$?
 [ $code -eq 143 ] || fail "it ends with $code: $(cat "$DIR/wait.log")"
-for words in "the job goes on" "hslt-job fetch j1 -o later.exr" "hslt-job cancel j1"; do
+for words in "the job continues" "hslt-job fetch j1 -o later.exr" "hslt-job cancel j1"; do
 	grep -q "$words" "$DIR/wait.log" || fail "it does not say '$words': $(cat "$DIR/wait.log")"
 done
 "$BIN/hslt-job" list | grep -q '^j1 ' || fail "the job is gone"

@@ -160,8 +160,8 @@ calls_it() {
 	until_true 20 is_listed_done "$id" || fail "$id does not end"
 	refused "path tricks: an image that is called $2" 1 "$3" env -C "$DIR/home" "$programs/hslt-job" fetch "$id" --tls "$CA/chief"
 }
-calls_it "$DIR/home/.profile" "/home/ann/.profile" "no name for its image"
-calls_it ../home/room.exr "like one that is there" "is there already"
+calls_it "$DIR/home/.profile" "/home/ann/.profile" "the name of the job's image cannot be used"
+calls_it ../home/room.exr "like one that is there" "exists: -o FILE"
 [ "$(ls -A "$DIR/home")" = room.exr ] && [ "$(cat "$DIR/home/room.exr")" = precious ] || fail "it was written over: $(ls -lA "$DIR/home")"
 
 # Live connections: revoked, expired.
@@ -256,7 +256,7 @@ for k in 1 2; do
 done
 refused "jobs beyond the quota" 6 "quota: 2 jobs" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1
 
-refused "a worker's certificate as coordinator" 2 "nobody would take it" "$BIN/hslt-coordinator" --listen 127.0.0.1:0 \
+refused "a worker's certificate as coordinator" 2 "no peer would accept it" "$BIN/hslt-coordinator" --listen 127.0.0.1:0 \
 	--spool "$DIR/spool3" --tls "$CA/node"
 refused "an open port without TLS" 2 "--insecure" "$BIN/hslt-coordinator" --listen 0.0.0.0:0 --spool "$DIR/spool3" \
 	--status-socket "$DIR/status3" --tls ""

@@ -126,7 +126,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	} else if (m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK) {
 		take_hello_ack(a, m->hello_ack);
 	} else {
-		conn_close(a->conn, "the first answer must be to hello");
+		conn_close(a->conn, "the first answer must be that to hello");
 	}
 }
 
@@ -226,7 +226,7 @@ static void on_watch(uv_timer_t *t)
 	struct agent *a = t->data;
 	if (!lease_queue_watch(a))
 		return;
-	log_event(LOG_STOP, "text=\"a thread hangs: the others finish, and the worker ends to be started again\"");
+	log_event(LOG_STOP, "text=\"a thread hangs: the others finish, then the worker exits to be restarted\"");
 	a->hung = true;
 	if (!a->leaving)
 		leave(a);

@@ -37,11 +37,12 @@ static int check_owner(const char *path, bool or_root, struct error *e)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	bool ours = st.st_uid == geteuid();
 	if (!ours && !(or_root && st.st_uid == 0))
-		return error_set(e, EPERM, "%s: belongs to another user: what it holds cannot be trusted (--cache DIR)",
-				 path);
+		return error_set(e, EPERM,
+				 "%s belongs to another user: its contents cannot be trusted (use --cache DIR)", path);
 	if (ours && (st.st_mode & S_IWOTH) && !(or_root && (st.st_mode & S_ISVTX)))
 		return error_set(e, EPERM,
-				 "%s: everybody can write there: what it holds cannot be trusted (--cache DIR)", path);
+				 "%s is writable for everybody: its contents cannot be trusted (use --cache DIR)",
+				 path);
 	return 0;
 }
 
@@ -63,7 +64,7 @@ static int base_folder(const char *folder, char path[PATH_BYTES], struct error *
 	else if (home && *home == '/')
 		n = snprintf(path, PATH_BYTES, "%s/.cache/hslt", home);
 	else
-		return error_set(e, EINVAL, "no folder for the cache: there is no $HOME; say --cache DIR");
+		return error_set(e, EINVAL, "no folder for the cache: $HOME is not set; use --cache DIR");
 	if (n <= 0 || n >= PATH_BYTES - 32)
 		return error_set(e, EINVAL, "the name of the cache's folder is empty or too long");
 	int rc = make_folders(path, e);

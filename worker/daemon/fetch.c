@@ -33,7 +33,7 @@ int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e)
 		count++;
 	if (!f) {
 		if (count == FETCHES_MOST)
-			return error_set(e, ENOBUFS, "%u pieces of files were asked for, and none came", count);
+			return error_set(e, ENOBUFS, "%u chunks of files were requested, and none was received", count);
 		f = mem_alloc(1, sizeof *f);
 		if (!f)
 			return error_set(e, ENOMEM, "no memory to fetch a file");
@@ -72,7 +72,7 @@ enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__Blob
 {
 	int rc = 0;
 	if (*c->error || (size == 0 && c->offset < c->size)) {
-		error_set(e, EBADMSG, "the coordinator has a file of the scene no more: %s",
+		error_set(e, EBADMSG, "the coordinator no longer has a file of the scene: %s",
 			  *c->error ? c->error : "it ended too early");
 		return FETCH_FAILED;
 	}

@@ -74,7 +74,7 @@ static int check_info(const Farm__JobInfo *m, struct error *e)
 	bool ok = envelope_text_ok(m->name, 1024) && envelope_text_ok(m->scene, 1024) && m->n_defines <= DEFINES_MAX;
 	for (size_t i = 0; ok && i < m->n_files; i++)
 		ok = envelope_text_ok(m->files[i]->name, 1024) && m->files[i]->hash.len == BLOB_HASH_SIZE;
-	return ok ? 0 : error_set(e, EBADMSG, "the coordinator's description of the job is not in order");
+	return ok ? 0 : error_set(e, EBADMSG, "the coordinator's description of the job is invalid");
 }
 
 int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e)
@@ -210,8 +210,8 @@ static int check_plan(const struct job_cache *b, const struct scene *s, const st
 	if (set.width != p->width || set.height != p->height || set.border != p->border)
 		return error_set(
 			e, EINVAL,
-			"this worker reads a film of %ux%u with a border of %u from the scene, the plan says %ux%u "
-			"and %u: other versions?",
+			"this worker reads a film of %ux%u with a border of %u from the scene, the plan has %ux%u and "
+			"%u: different versions?",
 			set.width, set.height, set.border, p->width, p->height, p->border);
 	const struct render_integrator *i = render_integrator_find(p->integrator);
 	if (!i || i->kind != p->kind)
@@ -219,7 +219,7 @@ static int check_plan(const struct job_cache *b, const struct scene *s, const st
 	char own[PLAN_ACCURACY_MAX];
 	rc = render_settings_canonical(p->accuracy, own, e);
 	if (!rc && strcmp(own, p->accuracy) != 0)
-		rc = error_set(e, EINVAL, "this worker spells the settings '%s', the plan '%s': other versions?", own,
+		rc = error_set(e, EINVAL, "this worker has the settings '%s', the plan '%s': different versions?", own,
 			       p->accuracy);
 	return rc;
 }
@@ -234,7 +234,7 @@ static int check_mutations(const struct job_cache *b, struct error *e)
 								      : 0;
 	if (!rc && strcmp(own, p->mutations) != 0)
 		rc = error_set(e, EINVAL,
-			       "this worker spells the mixture of mutations '%s', the plan '%s': other versions?", own,
+			       "this worker has the mixture of mutations '%s', the plan '%s': different versions?", own,
 			       p->mutations);
 	return rc;
 }

@@ -262,7 +262,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	}
 	if (is_flood(a)) {
 		grant_fini(&g);
-		conn_close(a->conn, "the coordinator grants more leases than it is asked for");
+		conn_close(a->conn, "the coordinator grants more leases than were requested");
 		return;
 	}
 	if (a->leaving || is_stuffed(a)) {
@@ -348,7 +348,7 @@ static void take_job_end(struct agent *a, uint64_t job)
  * useless. */
 static void disown(struct agent *a, struct job_cache *b)
 {
-	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job of this number\"", log_u64(b->job));
+	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"", log_u64(b->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->bundle == b && !l->unwanted)
@@ -386,7 +386,7 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 	struct error e;
 	struct fetch *f = fetch_answered(a, c);
 	if (!f) {
-		conn_close(a->conn, "the coordinator sends a piece of a file that it was not asked for");
+		conn_close(a->conn, "the coordinator sends a chunk of a file that was not requested");
 		return;
 	}
 	const struct blob_hash hash = f->hash;
@@ -431,7 +431,7 @@ void lease_queue_message(struct agent *a, struct envelope *env, const unsigned c
 		take_blob(a, m->blob_chunk, payload, size);
 		break;
 	default:
-		conn_close(a->conn, "not a message that a coordinator says to a worker");
+		conn_close(a->conn, "not a message from a coordinator to a worker");
 	}
 	a->settle(a);
 }

@@ -32,18 +32,18 @@ static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(CONFIG, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
 	{"threads", 't', "N", "Render threads (all cores)", OPTION_COUNT(CONFIG, threads, 1, 1024)},
-	{"name", 0, "NAME", "How the worker is shown (host and process)", OPTION_TAKE(take_name)},
-	{"cache", 0, "DIR", "Where files of scenes are kept (~/.cache/hslt)", OPTION_TEXT(CONFIG, cache)},
-	{"cache-size", 0, "GB", "The cache's limit", OPTION_SCALED(CONFIG, cache_bytes, 0.001, 1e6, 1e9),
+	{"name", 0, "NAME", "Displayed name of the worker (host and process)", OPTION_TAKE(take_name)},
+	{"cache", 0, "DIR", "Folder of cached scene files (~/.cache/hslt)", OPTION_TEXT(CONFIG, cache)},
+	{"cache-size", 0, "GB", "Limit of the cache", OPTION_SCALED(CONFIG, cache_bytes, 0.001, 1e6, 1e9),
 	 .standard = "20"},
 	{"grace", 0, "SECONDS", "After SIGTERM", OPTION_SECONDS(CONFIG, grace_seconds, 0, 86400), .standard = "20"},
-	{"idle-exit", 0, "SECONDS", "Leave when there was no lease for so long; 0: never",
+	{"idle-exit", 0, "SECONDS", "Exit after so long without a lease; 0: never",
 	 OPTION_SECONDS(CONFIG, idle_seconds, 0, 1e7), .standard = "0"},
-	{"stall", 0, "SECONDS", "How long a lease or the building of a scene may make no progress; 0: for ever",
+	{"stall", 0, "SECONDS", "How long a lease or the building of a scene may make no progress; 0: forever",
 	 OPTION_SECONDS(CONFIG, stall_seconds, 0, 86400), .standard = "120"},
-	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encrypt, and say who we are",
+	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(CONFIG, tls), .environment = "HSLT_TLS"},
-	{"insecure", 0, NULL, "Connect to other than loopback addresses without encryption",
+	{"insecure", 0, NULL, "Connect to addresses other than loopback without encryption",
 	 OPTION_FLAG(CONFIG, insecure)},
 	{"verbose", 'v', NULL, "Log more", OPTION_TAKE(take_verbose)},
 	{0},
@@ -54,15 +54,16 @@ static const struct program program = {
 	.summary = "Renders leases for a coordinator until it is told to stop.",
 	.examples = "hslt-worker --coordinator 127.0.0.1:7700\n"
 		    "hslt-worker --coordinator farm.lan:7700 --tls ~/node1 --threads 8 --name $(hostname)",
-	.details =
-		"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
-		"second one ends it at once. It reconnects for ever unless it is refused for good; with --idle-exit it leaves when "
-		"nobody has work for it. A lease that makes no progress for --stall is given back as failed, as are those that "
-		"wait for a scene whose building makes none, and the worker leaves, to be started again. It renders in a process of "
-		"its own: when a signal ends that (a fault in a scene's wake, the machine's memory) the lease is given back as "
-		"failed and the process is started again. Under systemd it says when it is ready and feeds the watchdog.",
+	.details = "On SIGTERM it finishes the running epochs within the grace period or gives them up, sends finished "
+		   "results and exits; a second SIGTERM ends it at once. It reconnects forever, unless it is refused "
+		   "permanently; with --idle-exit it exits when there is no work. A lease without progress for --stall "
+		   "is returned as failed, as are leases that wait for a scene whose building makes no progress, "
+		   "and the worker exits, to be restarted. It renders in a process of its own: if a signal ends that "
+		   "(a fault caused by a scene, lack of memory), the lease is returned as failed and the process "
+		   "is restarted. Under systemd it reports when it is ready and feeds the watchdog.",
 	.exits =
-		"0 stopped, 1 failed, 2 usage, 6 refused for good (a certificate of another role, another version), 75 a thread hung",
+		"0 stopped, 1 failed, 2 usage, 6 refused permanently (a certificate of another role, another version), "
+		"75 a thread hung",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL},
 };
 

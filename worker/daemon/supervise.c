@@ -106,7 +106,7 @@ int supervise(unsigned threads, int (*run)(void *), void *user)
 			return WEXITSTATUS(status);
 		if (s.asked)
 			return number == s.asked ? 0 : 1;
-		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the process that renders was ended by %s\" leases=%u",
+		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the rendering process was ended by %s\" leases=%u",
 			  number, crash_signal_name(number), lost);
 		s.pause = clock_seconds() - begun > long_life ? first_pause
 			  : s.pause * 2 < longest_pause	      ? s.pause * 2

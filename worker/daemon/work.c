@@ -32,7 +32,7 @@ int work_share(unsigned threads, struct error *e)
 {
 	void *at = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	if (at == MAP_FAILED)
-		return error_set(e, ENOMEM, "no memory to share with the process that renders");
+		return error_set(e, ENOMEM, "no memory to share with the rendering process");
 	shared = at;
 	shared->threads = threads < WORK_THREADS ? threads : WORK_THREADS;
 	atomic_store(&shared->hit, -1);
@@ -84,9 +84,9 @@ static void lose(const struct work *w, const char *text, bool machine)
 	struct lost_lease *l = &shared->lost[shared->lost_count++];
 	*l = (struct lost_lease){.key = *k, .own = machine};
 	text_print(l->text, sizeof l->text,
-		   "%s: the process that rendered it was ended by %s (j%llu, %s, group %u, part %u, epoch %llu)",
-		   w->scene, text, (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render",
-		   k->group, k->part, (unsigned long long)k->epoch);
+		   "%s: the rendering process was ended by %s (j%llu, %s, group %u, part %u, epoch %llu)", w->scene,
+		   text, (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group,
+		   k->part, (unsigned long long)k->epoch);
 }
 
 /* Drops what has been reported. */

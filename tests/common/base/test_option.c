@@ -220,7 +220,7 @@ static void test_mistyped(void **state)
 	refused("list -o x --kind hslr", "there is no kind 'hslr'; did you mean `hslt`?");
 	refused("list -o x --kind zzz", "there is no kind 'zzz'; there are path, bdpt, hslt");
 	refused("fecth j1 -o x", "there is no verb 'fecth'; did you mean `fetch`?");
-	refused("-o x", "what is to be done? list, fetch");
+	refused("-o x", "a verb is missing: list, fetch");
 	refused("list a b -o x", "one word too many");
 }
 
@@ -281,8 +281,7 @@ static void test_help(void **state)
 	has(text, "\n  -k, --kind=NAME            path, bdpt or hslt (chosen). There are more\n");
 	has(text, "\n\n When to stop:\n      --spp=+N               Samples\n");
 	has(text, "\n      --man                  Print the manual page (for man -l)\n");
-	has(text, "\n      --completion           Print a script by which bash completes these\n"
-		  "                             options\n");
+	has(text, "\n      --completion           Print a bash completion script\n");
 	has(text, "\nExamples:\n  hslt-test list\n");
 	has(text, "\nExit codes: 0 done, 2 usage.\n");
 	assert_null(strstr(text, "--sort"));

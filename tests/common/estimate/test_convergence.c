@@ -143,7 +143,7 @@ static void tiles_that_have_not_mixed(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.tiles_flagged, 1);
 	close_to(a.energy_flagged, 0.05, 1e-6);
-	says(&a, "chains disagree: in 1 of 20 tiles with 5 % of the energy they have not mixed (R-hat 1.3 at 135,75)");
+	says(&a, "chains disagree: they have not mixed in 1 of 20 tiles, with 5 % of the energy (R-hat 1.3 at 135,75)");
 	f.tile_error[6] = 0.09F;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.tile_error[6] = 0.2F;
@@ -157,7 +157,7 @@ static void tiles_that_have_not_mixed(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	f.img.rounds = 9;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_TOO_SHORT);
-	says(&a, "chains are too short to be judged, 9000 mutations each: in 1 of 20 tiles");
+	says(&a, "chains are too short to be judged, 9000 mutations each: they have not mixed in 1 of 20 tiles");
 }
 
 static void classes_that_differ(void **state)

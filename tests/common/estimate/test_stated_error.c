@@ -345,8 +345,8 @@ static int doubtful_of(const char *name, value_of *of, enum error_doubt doubt, d
 		mean += img.error_tail / TIMES;
 		stated_error(&img, text, sizeof text);
 		if (img.rel_mse_doubt == ERROR_TAIL)
-			assert_non_null(strstr(
-				text, "its interval is not known: too few pixels have met the light that decides"));
+			assert_non_null(
+				strstr(text, "its interval is not known: too few pixels have met the rare light"));
 		canvas_image_fini(&img);
 	}
 	print_message("%s: %d of %d doubtful by this, %d stated, mean tail index %.2f of %.1f\n", name, count, TIMES,
@@ -399,8 +399,7 @@ static void words(void **state)
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(
 		text,
-		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose brightness is "
-		"not known well enough to divide by; no chain came to 7 of 100 pixels");
+		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose brightness is not known well enough; no chain came to 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
 	img.unvisited = 0;
 	/* Rare light may leave the interval unknown for ever: five times the estimate count, once that is small. */

@@ -266,7 +266,7 @@ static size_t take_all(struct client *cl)
 		client_message_fini(&m);
 	}
 	assert_int_equal(rc, -ECONNRESET);
-	if (!strstr(e.text, "sends more than it is asked for"))
+	if (!strstr(e.text, "sends more than was requested"))
 		fail_msg("%s", e.text);
 	return sum ? sum : count;
 }

@@ -145,7 +145,8 @@ static void renewed_is_what_it_was(void **state)
 	snprintf(ca, sizeof ca, "%s/kept", root);
 	for (enum tls_role r = TLS_COORDINATOR; r < TLS_ROLES; r++)
 		assert_int_equal(authority_issue(ca, "node", r, 5, true, &e), r == TLS_WORKER ? 0 : -EEXIST);
-	assert_non_null(strstr(e.text, "/node/cert.pem is of the worker node: --renew makes no operator of it"));
+	assert_non_null(strstr(
+		e.text, "/node/cert.pem belongs to the worker node: --renew cannot change the role to operator"));
 	snprintf(from, sizeof from, "%s/node", ca);
 	snprintf(to, sizeof to, "%s/moved", ca);
 	assert_int_equal(rename(from, to), 0);

@@ -616,7 +616,7 @@ static void plaintext_is_known(void **state)
 	const unsigned char *bytes;
 	open_end(&listener, at(ours, "farm"), true);
 	assert_int_equal(tls_link_take(listener.link, "\0\0\0\x10", 4, &listener.e), -EACCES);
-	assert_non_null(strstr(listener.e.text, "without TLS"));
+	assert_non_null(strstr(listener.e.text, "does not use TLS"));
 	assert_int_equal(tls_link_output(listener.link, &bytes), sizeof tls_none_here);
 	assert_true(tls_is_first_byte(*bytes) && !tls_is_first_byte(0));
 	close_end(&listener);
@@ -626,7 +626,7 @@ static void plaintext_is_known(void **state)
 	assert_int_equal(tls_link_take(caller.link, tls_none_here, sizeof tls_none_here, &caller.e), 0);
 	read_all(&caller);
 	assert_int_equal(caller.rc, -EACCES);
-	assert_non_null(strstr(caller.e.text, "no TLS"));
+	assert_non_null(strstr(caller.e.text, "does not speak TLS"));
 	close_end(&caller);
 }
 

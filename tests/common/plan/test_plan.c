@@ -197,7 +197,7 @@ static void samples_notice_time_and_error(void **state)
 	}
 	assert_int_equal(before, longest);
 	r.seconds = 20;
-	assert_true(made(&r).epoch > 1 && ends_with_rule(&r, "in the time, or for the error"));
+	assert_true(made(&r).epoch > 1 && ends_with_rule(&r, "for the requested time or error"));
 	r.seconds = 0;
 	r.target_error = 0.5;
 	assert_int_equal(made(&r).epoch, 1);
@@ -409,7 +409,7 @@ static void parts_are_asked_for(void **state)
 	assert_int_equal(plan_lease_mutations(&p), 7 * 66 * 3);
 }
 
-/* A pilot's speed bounds a lease to about 20 s of a thread, and noise of a tenth does not show. */
+/* A pilot's speed bounds a lease to about 20 s for a thread, and noise of a tenth does not show. */
 static void leases_take_twenty_seconds(void **state)
 {
 	(void)state;
@@ -429,7 +429,7 @@ static void leases_take_twenty_seconds(void **state)
 			assert_true(seconds < 20 * 1.4143 || least);
 			assert_true(seconds > 20 / 1.4143 - 1e-9);
 			assert_true((p.epoch & (p.epoch - 1)) == 0);
-			assert_true(ends_with_rule(&r, "20 s of a thread"));
+			assert_true(ends_with_rule(&r, "20 s for a thread"));
 			assert_false(plan_wants_speed(&r, &p));
 		}
 	struct plan_request r = request(PLAN_CHAINS, "");
@@ -474,7 +474,7 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	assert_true(ends_with_rule(&r, ""));
 }
 
-/* 11 MB of tiles a lease: at 0.1 MB/s of a thread an epoch lasts 110 s or more, at 10 MB/s the 20 s stand. */
+/* 11 MB of tiles per lease: at 0.1 MB/s of a thread an epoch lasts 110 s or more, at 10 MB/s the 20 s stand. */
 static void a_bandwidth_makes_epochs_longer(void **state)
 {
 	(void)state;
@@ -491,7 +491,7 @@ static void a_bandwidth_makes_epochs_longer(void **state)
 		struct plan p = made(&r);
 		double seconds = (double)lease_work(&p) / r.speed;
 		assert_true(seconds >= 12 * 1280 * 720 / 1e5 && seconds < 2.2 * 12 * 1280 * 720 / 1e5);
-		assert_true(ends_with_rule(&r, "MB of tiles a lease"));
+		assert_true(ends_with_rule(&r, "MB of tiles per lease"));
 		r.spp = 32; /* not longer than the job */
 		assert_true(made(&r).rounds == 1);
 		r.speed = 0; /* nobody knows: something is assumed */

@@ -48,7 +48,7 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 	assert_true(farm_job(f, 1, 4, &j));
 	assert_non_null(strstr(
 		j.waiting,
-		"a third worker is to say whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b could"));
+		"a third worker will decide whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b refused"));
 	transcript_play(
 		f,
 		(const char *const[]){

@@ -441,7 +441,7 @@ static void three_full_disks(void **state)
 	assert_int_equal(s.counts.failures, 6);
 	assert_string_equal(
 		s.waiting,
-		"no worker can compute it, for want of something on the machines of w1, w2, w3; the last one: w3: disk full");
+		"no worker can compute it, because of a problem on the machines of w1, w2, w3; the last one: w3: disk full");
 	transcript_play(f, (const char *const[]){
 				   "[13] w4 joins A threads=1 -> -",
 				   "[13] w4 wants 1 -> w4 gets j1 g1 p0 boot",

@@ -253,7 +253,7 @@ static void nobody_is_trusted(void **state)
 				   "[30] tick -> -",
 				   NULL,
 			   });
-	assert_string_equal(waiting(f, 1), "no worker that answers and is trusted (1 are known)");
+	assert_string_equal(waiting(f, 1), "no worker that responds and is not quarantined (1 are known)");
 	transcript_play(f, (const char *const[]){
 				   "[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 				   "[31] w1 fails j1 g0 p0 boot no such file -> -",
@@ -279,11 +279,11 @@ static void limits(void **state)
 		f,
 		(const char *const[]){
 			"[0] w1 joins A threads=1 -> -",
-			"[0] w2 joins A threads=1 -> rejected: the farm has as many workers as it takes",
+			"[0] w2 joins A threads=1 -> rejected: the farm accepts no more workers",
 			"[0] submit groups=5 -> rejected: the plan has more leases in a round than the coordinator takes",
 			"[0] submit -> j7 submitted, j7 is queued",
 			"[0] submit -> j8 submitted, j8 is queued",
-			"[0] submit -> rejected: the coordinator has as many jobs as it takes",
+			"[0] submit -> rejected: the coordinator accepts no more jobs",
 			"[0] cancel j7 -> j7 cancelled, j7 is cancelled (cancelled: cancelled)",
 			"[1] submit -> j9 submitted, j9 is queued",
 			"[1] cancel j9 -> j9 cancelled, j9 is cancelled (cancelled: cancelled), j7 forgotten",

@@ -292,12 +292,12 @@ static void lives(void **state)
 		/* the later life: what the earlier one held is free at once */
 		"[1] w2 joins A threads=1 name=b home=a start=8 -> close w1",
 		"[1] w2 wants 1 -> w2 gets j1 g0 p0 boot",
-		"[2] w3 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and start 8 of it has been here before",
+		"[2] w3 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and its start 8 has connected before",
 		/* the same life on a new connection */
 		"[3] w4 joins A threads=1 name=b home=a start=8 -> close w2",
 		"[3] w4 wants 1 -> w4 gets j1 g0 p0 boot",
 		"[4] w4 leaves -> -",
-		"[4] w5 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and start 8 of it has been here before",
+		"[4] w5 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and its start 8 has connected before",
 		/* one name on two machines, one home of two certificates: nobody is replaced */
 		"[5] w6 joins A threads=1 name=a home=b start=1 -> -",
 		"[5] w7 joins A threads=1 name=a home=c start=1 -> -",

@@ -52,7 +52,7 @@ static const struct {
 	  "[1] w1 fails j1 g0 p0 boot sorry -> -"},
 	 "no worker can compute it: w1: sorry"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -", "[30] tick -> -"},
-	 "no worker that answers and is trusted (1 are known)"},
+	 "no worker that responds and is not quarantined (1 are known)"},
 	{{"[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 name=a -> -",
 	  "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot",
@@ -74,7 +74,7 @@ static const struct {
 	 "its workers failed and pause before they try again; the last one: w1: sorry"},
 	{{"[0] submit groups=1 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -",
 	  "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", "[1] w1 lacks j1 g0 p0 boot no room -> -"},
-	 "no worker can compute it, for want of something on the machines of w1; the last one: w1: no room"},
+	 "no worker can compute it, because of a problem on the machines of w1; the last one: w1: no room"},
 	{{"[0] submit groups=1 rounds=1 target=0.5 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -",
 	  "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare",
@@ -88,8 +88,7 @@ static const struct {
 	  "[2] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1", "[3] w2 joins A threads=1 name=b -> -",
 	  "[3] w3 joins A threads=1 name=c -> -", "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 	  "[4] w2 denies j1 g0 p0 e1 no -> -"},
-	 "a third worker is to say whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b could not read "
-	 "them"},
+	 "a third worker will decide whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b refused them"},
 };
 
 static void every_state(void **state)

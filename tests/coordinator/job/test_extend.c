@@ -95,7 +95,7 @@ static void bounds_that_are_met(void **state)
 	j.from.seconds = 5;
 	j.from.error = 0.04;
 	uint64_t rounds = j.plan.rounds;
-	says(&j, (struct extension){.target_error = 0.045}, "4 % already");
+	says(&j, (struct extension){.target_error = 0.045}, "already 4 %");
 	make_job(&j, &r, 3, true);
 	j.from.seconds = 5;
 	j.from.error = 0.04;
@@ -137,12 +137,12 @@ static void without_a_bound(void **state)
 	assert_int_equal(extend(&j, (struct extension){.mutations = 1}), 0); /* beyond what is done */
 	assert_true(j.plan.rounds == 8 && j.plan.seconds == 0 && j.plan.epoch == epoch);
 	make_job(&j, &r, 7, false);
-	says(&j, (struct extension){.spp = 8}, "without a bound of samples");
+	says(&j, (struct extension){.spp = 8}, "no bound on samples");
 	make_job(&j, &r, 7, false);
-	says(&j, (struct extension){.job = 1}, "by what");
-	says(&j, (struct extension){.seconds = NAN, .spp = 1}, "that is none");
-	says(&j, (struct extension){.seconds = -1, .spp = 1}, "that is none");
-	says(&j, (struct extension){.target_error = INFINITY}, "that is none");
+	says(&j, (struct extension){.job = 1}, "a bound is missing");
+	says(&j, (struct extension){.seconds = NAN, .spp = 1}, "an invalid time or error");
+	says(&j, (struct extension){.seconds = -1, .spp = 1}, "an invalid time or error");
+	says(&j, (struct extension){.target_error = INFINITY}, "an invalid time or error");
 	r.seconds = 0;
 	r.spp = 4;
 	make_job(&j, &r, 0, true);

@@ -474,7 +474,7 @@ static void extensions_wait_for_films(void **state)
 	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	assert_true(peer_hello(b, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	say_extend(a, 2, 0, 1); /* not for that */
-	hear_done(a, false, "by what");
+	hear_done(a, false, "a bound is missing");
 	say_extend(a, 2, 8, 3);
 	say_extend(b, 2, 8, 1);
 	hear_done(a, false, "one extension at a time");

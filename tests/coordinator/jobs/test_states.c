@@ -201,7 +201,7 @@ static void states_that_are_not_those_of_their_digest_are_refused(void **state)
 	const struct lease_key k = t.grant.key;
 	send_damaged(false);
 	assert_int_equal(verdict(), FARM__VERDICT__VERDICT_REFUSED);
-	assert_string_equal(t.text, "the chain states are not those of their digest");
+	assert_string_equal(t.text, "the chain states do not match their digest");
 	come_to(&k);
 	send_damaged(true);
 	assert_int_equal(verdict(), FARM__VERDICT__VERDICT_REFUSED);

@@ -89,7 +89,7 @@ long_journal() {
 	each_time journal_is_read_slowly
 	finish_job
 	unset HSLT_SLOW
-	[ "$(grep -c 'is reading its jobs, [0-9]* %: what is asked for waits' "$DIR"/w[01].log | awk -F: '{ n += $2 } END { print n }')" -ge "$TIMES" ] ||
+	[ "$(grep -c 'is reading its jobs, [0-9]* %: requests wait' "$DIR"/w[01].log | awk -F: '{ n += $2 } END { print n }')" -ge "$TIMES" ] ||
 		fail "$NAME: no worker called meanwhile"
 	blameless
 }

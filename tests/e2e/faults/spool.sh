@@ -131,7 +131,7 @@ plan_changed() {
 	job
 	each_time plan_is_changed
 	finish_job
-	[ "$(grep -c 'its row in jobs.db was damaged: made anew from its folder' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
+	[ "$(grep -c 'its row in jobs.db was damaged: restored from its folder' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
 }
 plan_is_changed() {
 	kill -9 "$COORDINATOR_PID"
@@ -203,14 +203,14 @@ remove_folder() {
 	rm -r "$DIR/spool/jobs/$ID" 2>/dev/null || rm -rf "$DIR/spool/jobs/$ID" 2>/dev/null || :
 }
 times_noticed() {
-	grep -c 'was removed or moved away while the job runs: made anew' "$DIR/coordinator.log" || :
+	grep -c 'was removed or moved away while the job runs: restored' "$DIR/coordinator.log" || :
 }
 is_noticed() {
 	[ "$(times_noticed)" -gt "$seen" ]
 }
-# its results can be stored again since it was made anew
+# its results can be stored again since it was restored
 is_mended() {
-	grep 'made anew\|state=released text=""' "$DIR/coordinator.log" | tail -n 1 | grep -q state=released
+	grep 'restored, and\|state=released text=""' "$DIR/coordinator.log" | tail -n 1 | grep -q state=released
 }
 
 fault file_damaged 4 1 "a file of the scene is damaged in the spool and in a worker's cache: the job waits and says so until the scene is sent again"
@@ -246,5 +246,5 @@ file_is_damaged() {
 	"$BIN/hslt-job" cancel "$again_id" 2>>"$DIR/cancel.log"
 }
 waits_for_file() {
-	value "$ID" waiting | grep -q 'is damaged or gone in the spool: submit the scene again'
+	value "$ID" waiting | grep -q 'is damaged or missing in the spool: submit the scene again'
 }

@@ -127,7 +127,7 @@ static void a_cache_of_others_is_not_used(void **state)
 	assert_int_equal(mkdir(slot, 0700), 0);
 	assert_int_equal(chmod(base, 0777), 0);
 	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
-	assert_non_null(strstr(e.text, "everybody can write"));
+	assert_non_null(strstr(e.text, "is writable for everybody"));
 	assert_int_equal(chmod(base, 01777), 0);
 	assert_int_equal(chmod(slot, 0777), 0);
 	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);

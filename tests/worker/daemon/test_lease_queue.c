@@ -379,7 +379,7 @@ static void lies_are_noticed(void **state)
 	t.mesh_bytes[MESH - 1] ^= 1;
 	send_piece(&t.mesh, (PIECES - 1) * PIECE);
 	t.mesh_bytes[MESH - 1] ^= 1;
-	const uint64_t first = hear_failed("not those of the blob");
+	const uint64_t first = hear_failed("do not match the blob");
 	serve_mesh(0, PIECES); /* the other one tries for itself */
 	assert_int_equal(hear_failed("scene"), 3 - first);
 	finish();
@@ -391,10 +391,10 @@ static void a_store_without_room_fails_each_once(void **state)
 	start(MESH - 1);
 	begin_jobs(2);
 	serve_mesh(0, 1);
-	const uint64_t first = hear_failed("do not fit below its limit");
+	const uint64_t first = hear_failed("more bytes exceed its limit");
 	assert_false(t.own); /* it was set up so: no worker may have room for such a file */
 	serve_mesh(0, 1);
-	assert_int_equal(hear_failed("do not fit below its limit"), 3 - first);
+	assert_int_equal(hear_failed("more bytes exceed its limit"), 3 - first);
 	hear_silence();
 	finish();
 }

@@ -133,7 +133,7 @@ static bool with_setting(const char *base, const char *name, const char *value, 
 static const char *idle(const struct planner *p, const struct render_setting *k)
 {
 	if (!k->sweep[0])
-		return "it decides what is rendered, not how accurately";
+		return "it determines what is rendered, not how accurately";
 	if (k->place == SETTING_CHAINS && !p->integrator->has_mutations)
 		return "the integrator has no strategies that walk";
 	if (strcmp(k->name, "tessellation") == 0 && !render_effect_on(p->scene, "displacement"))
@@ -177,8 +177,7 @@ static void sweep_depth(struct planner *p)
 {
 	static const uint32_t depths[] = {2, 3, 5, 8, 12, 20, 32};
 	char value[32];
-	struct accuracy_sweep *s =
-		new_sweep(p, DEPTH, "Longest paths, in edges; what is longer is missing in the image");
+	struct accuracy_sweep *s = new_sweep(p, DEPTH, "Longest paths, in edges; longer ones are missing in the image");
 	for (size_t i = 0; s && i < sizeof depths / sizeof *depths && depths[i] < p->base->max_depth; i++) {
 		snprintf(value, sizeof value, "%u", depths[i]);
 		struct accuracy_setting *setting = swept(p, s, value);
@@ -247,9 +246,7 @@ static void sweep_share(struct planner *p)
 		return;
 	}
 	struct accuracy_sweep *s =
-		new_sweep(p, SHARE,
-			  "Share of independent proposals, which find new light and estimate the brightness, "
-			  "among all");
+		new_sweep(p, SHARE, "Share of independent proposals, which find new light and estimate the brightness");
 	bool placed = false;
 	for (size_t k = 0; s && k < sizeof shares / sizeof *shares; k++) {
 		struct entry changed[PLAN_MAX_STRATEGIES];
@@ -292,10 +289,9 @@ static void sweep_mixture(struct planner *p)
 	int n = entries_of(p->base->mixture, base);
 	const char *name, *summary;
 	char value[48];
-	struct accuracy_sweep *s =
-		new_sweep(p, MIXTURE,
-			  "Strategies that propose mutations: one left out, or one taken in (a fifth of the "
-			  "others' weight)");
+	struct accuracy_sweep *s = new_sweep(
+		p, MIXTURE,
+		"Strategies that propose mutations: one removed, or one added (a fifth of the others' weight)");
 	if (!s)
 		return;
 	add_value(s, "default", ACCURACY_DEFAULT);

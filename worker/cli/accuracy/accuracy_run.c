@@ -49,8 +49,8 @@ static int check_memory(const struct accuracy_run *r, const struct plan *p, stru
 		return 0;
 	return error_set(
 		e, ENOMEM,
-		"%zu settings of %ux%u pixels take %.1f GB of memory, of which %.1f are there: choose a smaller --size, "
-		"or fewer --parameters",
+		"%zu settings of %ux%u pixels take %.1f GB of memory, and %.1f are available: choose a smaller "
+		"--size, or fewer --parameters",
 		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
 }
 
@@ -85,8 +85,7 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 		rc = plan_make(&q, p, e);
 	}
 	if (!rc && p->groups < 4)
-		rc = error_set(e, EINVAL, "%u groups are too few to tell errors from: at least 4 are needed",
-			       p->groups);
+		rc = error_set(e, EINVAL, "%u groups are too few to estimate errors: at least 4 are needed", p->groups);
 	return rc;
 }
 
@@ -125,7 +124,7 @@ static int start(struct accuracy_run *r, size_t i, struct error *e)
 	j->run = (struct local_run){.world = j->world, .plan = &j->plan, .threads = r->threads, .stop = r->stop};
 	rc = local_start(&j->run, &j->job, e);
 	if (!rc && j->run.lit.black && j->run.canvas)
-		rc = error_set(e, EINVAL, "no light arrives in the bootstrap: there is nothing to compare");
+		rc = error_set(e, EINVAL, "the bootstrap found no light: there is nothing to compare");
 	return rc;
 }
 

@@ -30,20 +30,22 @@ struct arguments {
 
 static const struct option_row rows[] = {
 	{"output", 'o', "FILE", "The report (HTML)", OPTION_TEXT(struct arguments, output)},
-	{"csv", 0, "FILE", "The figures as comma-separated values too", OPTION_TEXT(struct arguments, csv)},
-	{"budget", 0, "MINUTES", "How long it may take in all, shared equally; more makes the intervals narrower",
+	{"csv", 0, "FILE", "Also write the figures as comma-separated values", OPTION_TEXT(struct arguments, csv)},
+	{"budget", 0, "MINUTES", "Total time, divided equally; more makes the intervals narrower",
 	 OPTION_NUMBER(struct arguments, budget, 0, 1e6), .above = true, .below = true, .standard = "10"},
-	{"seconds", 0, "S", "CPU seconds of each setting, in place of a budget",
+	{"seconds", 0, "S", "CPU seconds for each setting, instead of a budget",
 	 OPTION_SECONDS(struct arguments, seconds, 0, 1e9), .above = true, .below = true},
 	{"rounds", 0, "N",
-	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats",
+	 "Rounds of each setting, instead of a budget: with --epoch, --chains and --bootstrap, everything "
+	 "but times is reproducible",
 	 OPTION_COUNT(struct arguments, rounds, 2, ACCURACY_COSTS)},
-	{"threads", 0, "N", "Threads (as many as processors)", OPTION_COUNT(struct arguments, threads, 1, 1024)},
+	{"threads", 0, "N", "Threads (one per processor)", OPTION_COUNT(struct arguments, threads, 1, 1024)},
 	{"parameters", 0, "LIST",
-	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between",
+	 "Only these, separated by commas: settings of --set (see --set help), max-depth, independent, "
+	 "mixture, preset",
 	 OPTION_TEXT(struct arguments, accuracy)},
 	{"knobs", 0, "LIST", "The old name of --parameters", OPTION_TEXT(struct arguments, accuracy), .hidden = true},
-	{"reference", 0, "FILE", "An image (OpenEXR) to measure the bias against, in place of a careful render",
+	{"reference", 0, "FILE", "An image (OpenEXR) to measure the bias against, instead of a careful render",
 	 OPTION_TEXT(struct arguments, reference)},
 	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
 	{0},
@@ -61,18 +63,16 @@ static int check(void *target, struct error *e)
 	if (!a->scene || !a->output)
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
 	if (p->spp || p->mutations || p->seconds > 0 || p->target_error > 0)
-		return error_set(
-			e, EINVAL,
-			"--budget or --seconds say how long, not --spp, --mutations N, --time or --target-error");
+		return error_set(e, EINVAL,
+				 "use --budget or --seconds instead of --spp, --mutations N, --time or --target-error");
 	return 0;
 }
 
 static const struct program program = {
 	.name = "hslt-accuracy",
 	.words = "SCENE.xml",
-	.summary =
-		"Shows what accuracy costs in time: renders a scene with one setting changed at a time, and writes what each buys "
-		"and costs.",
+	.summary = "Shows what accuracy costs in time: renders a scene with one setting changed at a time, and reports "
+		   "the error and time of each.",
 	.examples = "hslt-accuracy room.xml -o room.html --size 160x90\n"
 		    "hslt-accuracy room.xml -o room.html --csv room.csv --size 160x90 --budget 60 --threads 8\n"
 		    "hslt-accuracy room.xml -o depth.html --parameters max-depth,tolerance --seconds 30",
@@ -80,7 +80,7 @@ static const struct program program = {
 		"The report is one HTML file: error at equal time and at equal mutations, time a mutation, failed walks and bias of "
 		"every setting, and which of them lie on the Pareto front. Small films say as much as large ones and take less "
 		"memory.\n"
-		"Interrupted, it reports what there is once each setting had a round, and ends with 1.",
+		"If interrupted after each setting had a round, it reports what was rendered and exits with 1.",
 	.exits = "0 done, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
@@ -135,7 +135,7 @@ static int check_reference(const struct session *s, struct error *e)
 	uint32_t width = p->crop_width ? p->crop_width : p->width, height = p->crop_width ? p->crop_height : p->height;
 	if (!s->a->reference || (s->reference.image.width == width && s->reference.image.height == height))
 		return 0;
-	return error_set(e, EINVAL, "%s: %ux%u pixels, and the settings are rendered with %ux%u", s->a->reference,
+	return error_set(e, EINVAL, "%s has %ux%u pixels, but the settings are rendered with %ux%u", s->a->reference,
 			 s->reference.image.width, s->reference.image.height, width, height);
 }
 

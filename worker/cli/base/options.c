@@ -45,7 +45,7 @@ int option_path(const char *arg, const char **paths, size_t *count, struct error
 {
 	struct stat st;
 	if (stat(arg, &st) || !S_ISDIR(st.st_mode))
-		return error_set(e, EINVAL, "--path: '%s' is no folder", arg);
+		return error_set(e, EINVAL, "--path: '%s' is not a folder", arg);
 	if (*count == OPTION_PATHS_MAX)
 		return error_set(e, EINVAL, "at most %d times --path", OPTION_PATHS_MAX);
 	paths[(*count)++] = arg;
@@ -106,7 +106,7 @@ static int take_numbers(const char *option, const char *arg, const char *separat
 		unsigned long n = strtoul(at, &end, 10);
 		char wanted = i + 1 < count ? separators[i] : 0;
 		if (*at < '0' || *at > '9' || errno || n > UINT32_MAX || *end != wanted)
-			return error_set(e, EINVAL, "%s does not understand '%s' (try --help)", option, arg);
+			return error_set(e, EINVAL, "%s: invalid argument '%s' (try --help)", option, arg);
 		out[i] = (uint32_t)n;
 		at = end + 1;
 	}
@@ -293,43 +293,44 @@ static void more_settings(char *text, size_t size)
 
 static const struct option_row what_rows[] = {
 	{"integrator", 'i', "NAME",
-	 "(" RENDER_INTEGRATOR_DEFAULT ": path, bdpt8, bdpt or hslt, by a short pilot); the scene's own is ignored",
+	 "(" RENDER_INTEGRATOR_DEFAULT
+	 ": path, bdpt8, bdpt or hslt, chosen by a short pilot); the scene's own is ignored",
 	 OPTION_TAKE(take_integrator), .values = integrator_name},
-	{"size", 0, "W[xH]", "Size of the film; keeps the angle of view. Without H the film keeps its shape",
+	{"size", 0, "W[xH]", "Size of the film; keeps the angle of view. Without H it keeps the aspect",
 	 OPTION_TAKE(take_size)},
-	{"crop", 0, "X,Y,W,H", "Part of the film, in its pixels", OPTION_TAKE(take_crop)},
-	{"seed", 0, "S", "Of all random numbers", OPTION_COUNT(RENDER, plan.seed, 0, DBL_MAX), .standard = "0"},
+	{"crop", 0, "X,Y,W,H", "Render only this part of the film, in pixels", OPTION_TAKE(take_crop)},
+	{"seed", 0, "S", "Seed of all random numbers", OPTION_COUNT(RENDER, plan.seed, 0, DBL_MAX), .standard = "0"},
 	{"min-depth", 0, "K", "Shortest paths, in edges (1: emitters seen directly)",
 	 OPTION_COUNT(RENDER, plan.min_depth, 0, UINT32_MAX)},
 	{"max-depth", 0, "K", "Longest paths, in edges (the scene's)",
 	 OPTION_COUNT(RENDER, plan.max_depth, 0, UINT32_MAX)},
 	{"set", 0, "NAME=VALUE",
-	 "Settings that trade accuracy for time, with commas between; may be given again. help: what each does",
+	 "Settings that trade accuracy for time, separated by commas; may be repeated. help: lists them",
 	 OPTION_TAKE(take_set), .more = more_settings},
 	{"effects", 0, "LIST",
-	 "What is simulated although the scene does not call for it, or not although it does: all, or such as "
-	 "-dispersion,+aperture (hslt-render --explain lists them)",
+	 "Effects to simulate or omit, whether or not the scene needs them: all, or a list such as -dispersion,+aperture "
+	 "(hslt-render --explain shows them)",
 	 OPTION_TAKE(take_effects)},
 	{"define", 'D', "NAME=VALUE", "For $NAME in the scene", OPTION_TAKE(take_define)},
-	{"path", 0, "FOLDER", "Where files that are not in the scene's folder are searched; may be given again",
+	{"path", 0, "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
 	 OPTION_TAKE(take_path)},
 	{"sensor", 0, "N|ID",
-	 "Which of the scene's sensors: the N-th, from 1 on (1), or that with the id: --set sensor=N",
+	 "Which of the scene's sensors: its number, from 1 on (1), or its id; the same as --set sensor=N",
 	 OPTION_TAKE(take_sensor)},
 	{"lenient", 0, NULL,
-	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes",
+	 "Leave out or replace what is not supported, with a note each; the same as --set lenient=yes",
 	 OPTION_TAKE(take_lenient)},
 	{0},
 };
 
 static const struct option_row when_rows[] = {
-	{"spp", 0, "N", "Samples a pixel (64, 1.5k), rounded up to whole rounds",
+	{"spp", 0, "N", "Samples per pixel (64, 1.5k), rounded up to whole rounds",
 	 OPTION_COUNT(RENDER, plan.spp, 1, DBL_MAX)},
 	{"mutations", 0, "N|LIST",
-	 "N: mutations or samples in all. LIST: the strategies that propose mutations, with weights (1), such as "
-	 "hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once for each",
+	 "N: total number of mutations or samples. LIST: the strategies that propose mutations, with weights "
+	 "(1), such as hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once for each",
 	 OPTION_TAKE(take_mutations), .more = more_strategies},
-	{"time", 0, "SECONDS", "Wall clock (90, 5m, 2h), looked at after complete rounds",
+	{"time", 0, "SECONDS", "Wall-clock time (90, 5m, 2h), checked after complete rounds",
 	 OPTION_SECONDS(RENDER, plan.seconds, 0, 1e9), .above = true, .below = true},
 	{"target-error", 0, "E", "Estimated relative error: 0.02 or 2%",
 	 OPTION_RATIO(RENDER, plan.target_error, 0, 1e3), .above = true, .below = true},
@@ -337,16 +338,16 @@ static const struct option_row when_rows[] = {
 };
 
 static const struct option_row plan_rows[] = {
-	{"chains", 0, "N", "Markov chains (1024, fewer for tiny jobs)",
+	{"chains", 0, "N", "Markov chains (1024, fewer for short jobs)",
 	 OPTION_COUNT(RENDER, plan.chains, 0, UINT32_MAX)},
-	{"groups", 0, "N", "Independent replicates, for the error (16)",
+	{"groups", 0, "N", "Independent replicates, whose spread is the error (16)",
 	 OPTION_COUNT(RENDER, plan.groups, 0, UINT32_MAX)},
-	{"parts", 0, "N", "Leases of a group in a round: groups times parts threads at most work on the job (4)",
+	{"parts", 0, "N", "Leases of a group in a round: at most groups times parts threads work on the job (4)",
 	 OPTION_COUNT(RENDER, plan.parts, 0, UINT32_MAX)},
-	{"bootstrap", 0, "N", "Bootstrap samples (1000000, fewer for tiny jobs)",
+	{"bootstrap", 0, "N", "Bootstrap samples (1000000, fewer for short jobs)",
 	 OPTION_COUNT(RENDER, plan.bootstrap, 0, DBL_MAX)},
 	{"epoch", 0, "N",
-	 "Mutations of a chain, or samples a pixel and group, in a round (leases of 20 s at most, where a farm is asked)",
+	 "Mutations per chain, or samples per pixel and group, in a round (on a farm: leases of at most 20 s)",
 	 OPTION_COUNT(RENDER, plan.epoch, 0, DBL_MAX)},
 	{0},
 };
@@ -354,7 +355,7 @@ static const struct option_row plan_rows[] = {
 static const struct option_group groups[] = {
 	{"What to render:", what_rows},
 	{"When to stop (the first bound met; without any, the scene's sampleCount):", when_rows},
-	{"The plan (part of what decides the bits):", plan_rows},
+	{"The plan (affects the bits):", plan_rows},
 	{0},
 };
 
@@ -414,7 +415,7 @@ int scene_path_split(const char *path, char **folder, char **name, struct error 
 	if (!rc && slash)
 		(*folder)[slash == path ? 1 : slash - path] = 0;
 	if (!rc && !**name)
-		rc = error_set(e, EINVAL, "%s: is a folder, not a scene file", path);
+		rc = error_set(e, EINVAL, "%s is a folder, not a scene file", path);
 	if (rc) {
 		mem_free(*folder);
 		mem_free(*name);

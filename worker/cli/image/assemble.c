@@ -93,10 +93,10 @@ static bool same_option(const char *a, const char *b, const char *option)
 static int check_render(const struct exr_image *first, const struct exr_image *img, struct error *e)
 {
 	if (img->full_width != first->full_width || img->full_height != first->full_height)
-		return error_set(e, EINVAL, "a crop of a film of %ux%u, the first one's has %ux%u", img->full_width,
-				 img->full_height, first->full_width, first->full_height);
+		return error_set(e, EINVAL, "a crop of a film of %ux%u; the first one's film has %ux%u",
+				 img->full_width, img->full_height, first->full_width, first->full_height);
 	if ((uint64_t)img->x + img->width > img->full_width || (uint64_t)img->y + img->height > img->full_height)
-		return error_set(e, EINVAL, "its pixels lie outside its film of %ux%u", img->full_width,
+		return error_set(e, EINVAL, "its pixels are outside its film of %ux%u", img->full_width,
 				 img->full_height);
 	bool layers = img->channel_count == first->channel_count;
 	for (uint32_t c = 0; layers && c < img->channel_count; c++)
@@ -146,7 +146,7 @@ static int paste(struct assembly *a, const struct exr_image *img, struct error *
 		size_t to = (size_t)(img->y + y) * f->width + img->x;
 		for (uint32_t x = 0; x < img->width; x++)
 			if (a->covered[to + x])
-				return error_set(e, EINVAL, "another crop has its pixel %u,%u, too", img->x + x,
+				return error_set(e, EINVAL, "another crop also has its pixel %u,%u", img->x + x,
 						 img->y + y);
 		memset(a->covered + to, 1, img->width);
 		for (uint32_t c = 0; c < f->channel_count; c++)

@@ -21,7 +21,7 @@ static int check(const struct picture *a, const struct picture *b, struct error 
 	const struct exr_image *i = &a->image, *j = &b->image;
 	if (i->width != j->width || i->height != j->height)
 		return error_set(e, EINVAL,
-				 "the pictures have %ux%u and %ux%u pixels; --size WxH averages both to one size",
+				 "the images have %ux%u and %ux%u pixels; --size WxH averages both to one size",
 				 i->width, i->height, j->width, j->height);
 	for (int k = 0; k < 3; k++)
 		for (size_t p = 0; p < pixels_of(b); p++)

@@ -37,14 +37,13 @@ static int check(void *target, struct error *e)
 static const struct program program = {
 	.name = "hslt-assemble",
 	.words = "CROP.exr...",
-	.summary = "Puts crops of one render (hslt-render --crop, hslt-submit --crop) together to one image.",
+	.summary = "Assembles crops of one render (hslt-render --crop, hslt-submit --crop) into one image.",
 	.examples = "hslt-render room.xml -o left.exr --size 640x360 --crop 0,0,320,360\n"
 		    "hslt-render room.xml -o right.exr --size 640x360 --crop 320,0,320,360\n"
 		    "hslt-assemble left.exr right.exr -o room.exr",
-	.details =
-		"The crops must not overlap, and must fill a rectangle. Errors of pixels stay what they are; hslt:relMSE is the mean "
-		"over pixels. What crops say in common stays in the header, counts are added up.\n"
-		"deploy/crops.sh submits a grid of crops to one coordinator or several, and calls this.",
+	.details = "The crops must not overlap, and must fill a rectangle. Errors of pixels are kept; hslt:relMSE "
+		   "is the mean over pixels. Header attributes on which all crops agree are kept, counts are added.\n"
+		   "deploy/crops.sh submits a grid of crops to one coordinator or several, and calls this.",
 	.exits = "0 done, 1 failed, 2 usage, 5 done, but chains of some crop disagree",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,

@@ -36,11 +36,11 @@ static int take_size(void *target, char *arg, struct error *e)
 }
 
 static const struct option_row rows[] = {
-	{"exact", 0, NULL, "Only ask whether all bits are the same", OPTION_FLAG(struct arguments, exact)},
-	{"trim", 0, "F", "Leave out the worst share F of the pixels: 0.001",
-	 OPTION_NUMBER(struct arguments, trim, 0, 1), .below = true},
-	{"size", 0, "WxH", "Average both to this size first; it must divide theirs", OPTION_TAKE(take_size)},
-	{"heatmap", 0, "FILE.png", "Relative errors as colours: 0.1 % black to 100 % white",
+	{"exact", 0, NULL, "Only check whether all bits are equal", OPTION_FLAG(struct arguments, exact)},
+	{"trim", 0, "F", "Omit the worst share F of the pixels: 0.001", OPTION_NUMBER(struct arguments, trim, 0, 1),
+	 .below = true},
+	{"size", 0, "WxH", "First average both to this size, which must divide theirs", OPTION_TAKE(take_size)},
+	{"heatmap", 0, "FILE.png", "Write relative errors as colours, from black (0.1 %) to white (100 %)",
 	 OPTION_TEXT(struct arguments, heatmap)},
 	{"max-relmse", 0, "X", "Fail when the relMSE is above X", OPTION_NUMBER(struct arguments, most, 0, DBL_MAX)},
 	{"json", 0, NULL, "Print one JSON object", OPTION_FLAG(struct arguments, json)},
@@ -51,7 +51,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
-		return error_set(e, EINVAL, "two pictures, not more");
+		return error_set(e, EINVAL, "only two images can be compared");
 	a->path[index] = word;
 	return 0;
 }
@@ -62,23 +62,22 @@ static int check(void *target, struct error *e)
 	if (!a->path[1])
 		return error_set(e, EINVAL, "A.exr and B.exr are needed");
 	if (a->exact && (a->trim > 0 || a->width || a->heatmap || a->most >= 0))
-		return error_set(e, EINVAL, "--exact goes with --json only");
+		return error_set(e, EINVAL, "--exact can only be combined with --json");
 	return 0;
 }
 
 static const struct program program = {
 	.name = "hslt-compare",
 	.words = "A.exr B.exr",
-	.summary = "Says how far the picture A is from the reference B: EXR files with the channels R, G, B.",
+	.summary = "Measures the difference of image A from reference B: EXR files with the channels R, G, B.",
 	.examples = "hslt-compare noisy.exr reference.exr\n"
 		    "hslt-compare --trim 0.001 --max-relmse 0.01 noisy.exr reference.exr\n"
 		    "hslt-compare --size 256x144 --heatmap errors.png noisy.exr reference.exr\n"
 		    "hslt-compare --exact one.exr other.exr",
 	.details =
 		"relMSE is the mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its "
-		"square root; PSNR takes the 99.5th percentile of B as peak. --trim leaves the worst pixels out of relMSE, RMSE and "
-		"PSNR, not out of the means.\n"
-		"--exact looks at every channel and at the header, but for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end and "
+		"square root; PSNR takes the 99.5th percentile of B as peak. --trim omits the worst pixels from relMSE, RMSE and PSNR, not from the means.\n--exact compares "
+		"every channel and the header, except for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end and "
 		"hslt:date.",
 	.exits = "0 done, 1 failed, different, or above --max-relmse, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},

@@ -15,8 +15,8 @@ struct arguments {
 };
 
 static const struct option_row rows[] = {
-	{"exposure", 'e', "STOPS", "Twice as bright for each", OPTION_NUMBER(struct arguments, stops, -100, 100),
-	 .standard = "0"},
+	{"exposure", 'e', "STOPS", "Exposure in stops: each doubles the brightness",
+	 OPTION_NUMBER(struct arguments, stops, -100, 100), .standard = "0"},
 	{0},
 };
 
@@ -24,7 +24,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
-		return error_set(e, EINVAL, "two files, not more");
+		return error_set(e, EINVAL, "only two files are accepted");
 	*(index == 0 ? &a->in : &a->out) = word;
 	return 0;
 }
@@ -43,12 +43,11 @@ static int check(void *target, struct error *e)
 static const struct program program = {
 	.name = "hslt-tonemap",
 	.words = "IN.exr OUT.png",
-	.summary = "Makes a PNG file of 8-bit sRGB from the channels R, G, B of an EXR file.",
+	.summary = "Converts the channels R, G, B of an EXR file to a PNG file of 8-bit sRGB.",
 	.examples = "hslt-tonemap room.exr room.png\n"
 		    "hslt-tonemap --exposure -1.5 room.exr darker.png",
-	.details =
-		"Values are taken times 2^STOPS and clipped to [0,1]. What is not a number becomes 0, infinities 0 or "
-		"255; both are counted on stderr.",
+	.details = "Values are multiplied by 2^STOPS and clipped to [0,1]. NaN becomes 0, infinities become 0 or "
+		   "255; both are counted on stderr.",
 	.exits = "0 done, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,

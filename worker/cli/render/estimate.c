@@ -65,7 +65,7 @@ static int check(const struct estimate *s, struct error *e)
 		return 0;
 	return error_set(
 		e, EAGAIN,
-		"the pilot has seen its error %u times only, %d are needed: give it more time (--pilot SECONDS)",
+		"the pilot has only %u estimates of the error, and %d are needed: give it more time (--pilot SECONDS)",
 		s->looks->count, PILOT_LOOKS_LEAST);
 }
 
@@ -92,7 +92,7 @@ static void print_table(const struct estimate *s, FILE *f)
 	progress_duration(s->cpu_seconds, cpu, sizeof cpu);
 	fprintf(f, "%s: a pilot of %s (%s of CPU time) reached an error of %.3g %% (%.3g - %.3g %%)\n", s->scene, text,
 		cpu, 100 * now.middle, 100 * now.low, 100 * now.high);
-	fprintf(f, "each with its 90 %% interval; wall clock on %s\n", s->where);
+	fprintf(f, "each with its 90 %% interval; wall-clock time on %s\n", s->where);
 	fprintf(f, "%-8s  %-31s  %-31s\n", "error", "CPU time", "wall clock");
 	for (size_t i = 0; i < count; i++) {
 		snprintf(text, sizeof text, "%.3g %%", 100 * row[i].target);

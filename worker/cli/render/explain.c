@@ -35,13 +35,13 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 	}
 	printf("\n%s, paths of at most %u edges", p->integrator, p->max_depth);
 	if (held_depth(p) < p->max_depth)
-		printf(" asked for, of at most %u held (what is longer is missing in the image: its note says how much)",
+		printf(" requested, at most %u simulated (longer ones are missing in the image; its note says how much)",
 		       held_depth(p));
 	if (*p->mixture)
 		printf(", mutations %s", p->mixture);
 	printf("\n%s\n",
 	       c->made ? c->text
-		       : "asked for; else a pilot would choose among path, bdpt8, bdpt and " RENDER_INTEGRATOR_CHAINS);
+		       : "as requested; otherwise a pilot would choose among path, bdpt8, bdpt and " RENDER_INTEGRATOR_CHAINS);
 	for (size_t i = 0; render_scene_note(m, i, note, sizeof note); i++)
 		printf("note: %s\n", note);
 }

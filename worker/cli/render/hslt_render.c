@@ -47,17 +47,17 @@ static int take_output(void *target, char *arg, struct error *e)
 
 static const struct option_row rows[] = {
 	{"output", 'o', "FILE", "The image (OpenEXR); -: stdout", OPTION_TAKE(take_output)},
-	{"threads", 0, "N", "Threads (as many as processors); does not change the bits",
+	{"threads", 0, "N", "Threads (one per processor); does not change the bits",
 	 OPTION_COUNT(struct arguments, threads, 1, 1024)},
 	{"stats", 0, "FILE",
-	 "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes "
-	 "of paths",
+	 "Write plan, times, counters, strategies and effects as JSON, and print tables of strategies and "
+	 "path classes",
 	 OPTION_TEXT(struct arguments, stats)},
 	{"quiet", 0, NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
 	ESTIMATE_ROWS(struct arguments),
-	{"explain", 0, NULL, "Only say what the scene calls for, why, and what leaving the rest out saves",
+	{"explain", 0, NULL, "Only print which effects the scene needs and why, and what omitting the others saves",
 	 OPTION_FLAG(struct arguments, explain)},
-	{"json", 0, NULL, "Print the estimate, or what --explain says, as one JSON object",
+	{"json", 0, NULL, "Print the output of --estimate or --explain as one JSON object",
 	 OPTION_FLAG(struct arguments, json)},
 	{0},
 };
@@ -73,11 +73,12 @@ static int check(void *target, struct error *e)
 	if (!a->scene || (!a->output && !a->estimate && !a->explain))
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
 	if (a->estimate && (a->output || a->stats))
-		return error_set(e, EINVAL, "--estimate makes no image: no -o, no --stats");
+		return error_set(e, EINVAL, "--estimate makes no image and cannot be combined with -o or --stats");
 	if (a->explain && (a->output || a->stats || a->estimate))
-		return error_set(e, EINVAL, "--explain renders nothing: no -o, no --stats, no --estimate");
+		return error_set(e, EINVAL,
+				 "--explain renders nothing and cannot be combined with -o, --stats or --estimate");
 	if (!a->estimate && (a->pilot > 0 || a->plot || (a->json && !a->explain)))
-		return error_set(e, EINVAL, "--pilot, --plot and --json go with --estimate");
+		return error_set(e, EINVAL, "--pilot, --plot and --json require --estimate");
 	return 0;
 }
 
@@ -93,8 +94,8 @@ static const struct program program = {
 		"hslt-render --explain room.xml\n"
 		"hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000",
 	.details =
-		"--estimate makes no image: a pilot of a minute tells what errors of 10, 5, 2 and 1 % (and --target-error) will cost.\n"
-		"The image holds linear Rec. 709 (R G B), one standard error of each (error.R error.G error.B), and for chains the "
+		"--estimate makes no image: a pilot of a minute predicts what errors of 10, 5, 2 and 1 % (and "
+		"--target-error) will cost.\nThe image contains linear Rec. 709 (R G B), one standard error of each (error.R error.G error.B), and for chains the "
 		"potential scale reduction of each pixel's tile (rhat.Y).",
 	.exits =
 		"0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
@@ -259,7 +260,7 @@ static int render(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	if (!s->run.canvas || (canvas_rounds(s->run.canvas) == 0 && !s->run.lit.black))
-		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write%s",
+		return error_set(e, EINTR, "interrupted before the first round was complete: there is no image%s",
 				 s->kept.said);
 	rc = canvas_image(s->run.canvas, false, &s->image, e);
 	if (!rc)
@@ -401,7 +402,7 @@ static int run(struct session *s, struct error *e)
 	if (!rc && s->image.rel_mse_doubt)
 		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
-		rc = error_set(e, EINTR, "interrupted: %s holds the %llu complete rounds", s->a->output,
+		rc = error_set(e, EINTR, "interrupted: %s contains the %llu complete rounds", s->a->output,
 			       (unsigned long long)s->image.rounds);
 	return rc;
 }

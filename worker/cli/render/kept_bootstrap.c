@@ -114,7 +114,7 @@ void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *
 	if (rc)
 		snprintf(text, size, "%.300s is not used: %.128s", k->path, e.text);
 	else
-		snprintf(text, size, "goes on with %u of %u leases of the bootstrap, kept in %.300s",
+		snprintf(text, size, "continues from %u of %u leases of the bootstrap, kept in %.300s",
 			 all - bootstrap_missing(b), all, k->path);
 }
 
@@ -159,7 +159,7 @@ void kept_bootstrap_write(struct kept_bootstrap *k, const struct bootstrap *b)
 		snprintf(k->said, sizeof k->said, "; the bootstrap could not be kept: %.300s", e.text);
 	else
 		snprintf(k->said, sizeof k->said,
-			 "; %u of %u leases of the bootstrap are kept in %s, and the same command goes on with them",
+			 "; %u of %u leases of the bootstrap are kept in %s, and the same command continues from them",
 			 done, done + bootstrap_missing(b), k->path);
 }
 

@@ -43,7 +43,7 @@ int pilot_render_plan(const struct plan_request *request, struct plan *render, s
 		r.target_error = 0.01; /* the smallest error that predictions name */
 	int rc = plan_make(&r, render, e);
 	if (!rc && render->groups < 2)
-		rc = error_set(e, EINVAL, "one group has no error: give --groups 2 or more");
+		rc = error_set(e, EINVAL, "a single group has no error: give --groups 2 or more");
 	return rc;
 }
 

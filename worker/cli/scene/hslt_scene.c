@@ -29,10 +29,11 @@ static int take_path(void *target, char *arg, struct error *e)
 
 static const struct option_row rows[] = {
 	{"define", 'D', "NAME=VALUE", "For $NAME in the scene", OPTION_TAKE(take_define)},
-	{"path", 'p', "FOLDER", "Where files that are not in the scene's folder are searched; may be given again",
+	{"path", 'p', "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
 	 OPTION_TAKE(take_path)},
 	{"lenient", 'l', NULL,
-	 "As --lenient of hslt-render: what is not supported is left out or replaced, and is no problem but a note",
+	 "As --lenient of hslt-render: what is not supported is left out or replaced, with a note instead "
+	 "of a problem",
 	 OPTION_FLAG(struct arguments, request.lenient)},
 	{"json", 'j', NULL, "show: one JSON object", OPTION_FLAG(struct arguments, json)},
 	{0},
@@ -48,7 +49,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
 	if (index > 1)
-		return error_set(e, EINVAL, "one scene, not more");
+		return error_set(e, EINVAL, "only one scene is accepted");
 	*(index == 0 ? &a->verb : &a->request.path) = word;
 	return 0;
 }
@@ -60,25 +61,23 @@ static int check(void *target, struct error *e)
 	if (reads && !a->request.path)
 		return error_set(e, EINVAL, "`%s SCENE.xml`: a scene is needed", a->verb);
 	if (!reads && a->request.path)
-		return error_set(e, EINVAL, "compatibility takes no scene");
+		return error_set(e, EINVAL, "compatibility does not take a scene");
 	if (a->json && strcmp(a->verb, "show") != 0)
-		return error_set(e, EINVAL, "--json belongs to show");
+		return error_set(e, EINVAL, "--json is only for show");
 	return 0;
 }
 
 static const struct program program = {
 	.name = "hslt-scene",
 	.words = "check|show SCENE.xml\ncompatibility",
-	.summary = "Says what is wrong with a scene file, or what was read of it. Renders nothing.",
+	.summary = "Lists the problems of a scene file, or what was read from it. Renders nothing.",
 	.examples = "hslt-scene check room.xml\n"
 		    "hslt-scene check -D light=sun room.xml\n"
 		    "hslt-scene show --json room.xml",
-	.details =
-		"check: everything that is wrong or not supported, a line each with file, line and element, and as `note:` what is "
-		"ignored.\n"
-		"show: film, camera, counts, the effects that the scene calls for, and its files with the beginning of their "
-		"SHA-256.\n"
-		"compatibility: what is read of Mitsuba's scenes, all plug-ins and parameters, as docs/compatibility.md has it.",
+	.details = "check: everything that is wrong or not supported, one line each with file, line and element, "
+		   "and as `note:` what is ignored.\nshow: film, camera, counts, the effects that the scene needs, "
+		   "and its files with the beginning of their SHA-256.\ncompatibility: what is supported of Mitsuba's "
+		   "scenes, all plug-ins and parameters, as in docs/compatibility.md.",
 	.exits = "0 the scene can be rendered, 1 it cannot, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.verbs = verb_at,

@@ -197,7 +197,7 @@ static void print_text(json_t *all)
 		    "maxDepth", &depth, "shapes", &shapes, "triangles", &triangles, "instances", &instances,
 		    "sharedMeshes", &meshes, "storedTriangles", &stored, "memoryBytes", &memory);
 	bool gltf = strncmp(dialect, "glTF", 4) == 0;
-	printf("%s: %s%s, film %d x %d, field of view %.4g degrees (%s), %lld samples a pixel, paths of at most %d edges\n",
+	printf("%s: %s%s, film %d x %d, field of view %.4g degrees (%s), %lld samples per pixel, paths of at most %d edges\n",
 	       name, gltf ? "" : "Mitsuba ", dialect, width, height, fov, axis, spp, depth);
 	printf("%lld shapes", shapes);
 	if (instances)
@@ -232,7 +232,7 @@ int scene_report_show(const struct scene_request *r, bool json, struct error *e)
 		json_t *all = describe(&s, &o, e);
 		if (all && json)
 			rc = json_dumpf(all, stdout, JSON_COMPACT) || putchar('\n') == EOF
-				     ? error_set(e, EIO, "stdout took not all")
+				     ? error_set(e, EIO, "stdout could not take everything")
 				     : 0;
 		else if (all)
 			print_text(all);

@@ -62,20 +62,20 @@ static const struct option_row rows[] = {
 	 .environment = "HSLT_COORDINATOR", .needed = true},
 	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_TAKE(take_output)},
 	{"priority", 0, "P", "-100 to 100, higher first", OPTION_TAKE(take_priority), .standard = "0"},
-	{"name", 0, "NAME", "How the job is shown (the scene's file name)", OPTION_TEXT(struct arguments, name)},
+	{"name", 0, "NAME", "Displayed name of the job (the scene's file name)", OPTION_TEXT(struct arguments, name)},
 	{"wait", 0, NULL, "Show progress and fetch the image", OPTION_FLAG(struct arguments, wait)},
-	{"patience", 0, "SECONDS", "With --wait: how long to call a coordinator that is gone",
+	{"patience", 0, "SECONDS", "With --wait: how long to try to reconnect to the coordinator",
 	 OPTION_SECONDS(struct arguments, patience, 0, 1e9), .above = true, .below = true, .standard = "600"},
 	{"json", 0, NULL, "Print one JSON object instead of the id, or of the estimate's table",
 	 OPTION_FLAG(struct arguments, json)},
 	ESTIMATE_ROWS(struct arguments),
-	{"mixed", 0, NULL, "Allow workers of any numeric fingerprint: gives up equal bits",
+	{"mixed", 0, NULL, "Accept workers of any numeric fingerprint, without equal bits",
 	 OPTION_FLAG(struct arguments, request.mixed)},
-	{"verify", 0, "P", "Share of the epochs, or percent, that two workers must compute alike before they count",
+	{"verify", 0, "P", "Share or percentage of the epochs on which two workers must agree before they count",
 	 OPTION_RATIO(struct arguments, request.verify, 0, 1), .standard = "0"},
-	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encrypt, and say who we are",
+	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(struct arguments, tls), .environment = "HSLT_TLS"},
-	{"insecure", 0, NULL, "Connect to other than loopback addresses without encryption",
+	{"insecure", 0, NULL, "Connect to addresses other than loopback without encryption",
 	 OPTION_FLAG(struct arguments, insecure)},
 	{0},
 };
@@ -91,20 +91,20 @@ static int check(void *target, struct error *e)
 	if (!a->scene || (!a->output && !a->estimate))
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
 	if (a->request.verify > 0 && a->request.mixed)
-		return error_set(e, EINVAL, "--mixed workers cannot be held against each other: no --verify");
+		return error_set(e, EINVAL, "results of --mixed workers cannot be compared: no --verify");
 	if (a->estimate && (a->output || a->wait))
-		return error_set(e, EINVAL, "--estimate makes no image: no -o, no --wait");
+		return error_set(e, EINVAL, "--estimate makes no image and cannot be combined with -o or --wait");
 	if (!a->estimate && (a->pilot > 0 || a->plot))
-		return error_set(e, EINVAL, "--pilot and --plot go with --estimate");
+		return error_set(e, EINVAL, "--pilot and --plot require --estimate");
 	if (to_stdout(a) && (!a->wait || a->json))
-		return error_set(e, EINVAL, "-o - writes the image to stdout: it goes with --wait, and without --json");
+		return error_set(e, EINVAL, "-o - writes the image to stdout: it requires --wait and excludes --json");
 	return 0;
 }
 
 static const struct program program = {
 	.name = "hslt-submit",
 	.words = "SCENE.xml",
-	.summary = "Checks a scene, sends it to a coordinator as a job, and waits for the image if it is told to.",
+	.summary = "Checks a scene, sends it to a coordinator as a job, and optionally waits for the image.",
 	.examples =
 		"hslt-submit --coordinator 127.0.0.1:7700 room.xml -o room.exr --spp 64 --wait\n"
 		"hslt-submit room.xml -o room.exr --target-error 2% --time 3600\n"
@@ -112,11 +112,11 @@ static const struct program program = {
 		"hslt-submit --estimate room.xml --plot room.svg\n"
 		"hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun",
 	.details =
-		"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is what hslt-job fetch "
-		"calls the image. --estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and "
-		"1 % (and --target-error) will cost there. For long jobs without --epoch a pilot of a second here says how many "
-		"mutations a thread makes in the 20 s that a lease should take; --epoch pins it. --wait outlasts restarts of the "
-		"coordinator.",
+		"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is the default name for hslt-job fetch. --estimate makes "
+		"no image: a pilot of a minute on the farm predicts what errors of 10, 5, 2 and 1 % (and --target-error) "
+		"will cost there. For long jobs without --epoch, a pilot of a second on this machine measures "
+		"how many mutations a thread makes in the 20 s that a lease should take. --wait reconnects when "
+		"the coordinator restarts.",
 	.exits =
 		"0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
 		"there, and its note says where), 6 refused, 75 coordinator not reachable",
@@ -160,12 +160,11 @@ static void say_at_the_end(const struct arguments *a, uint64_t job)
 	char fetch[256], cancel[64];
 	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, to_stdout(a) ? "-" : a->output);
 	snprintf(cancel, sizeof cancel, "hslt-job cancel j%llu", id);
-	snprintf(text, sizeof text,
-		 "\nhslt-submit: the job goes on without this program.\n"
-		 "  %s  fetches its image when it is done, --preview the one so far\n"
-		 "  %-*s  shows how far it is\n"
-		 "  %-*s  ends it\n",
-		 fetch, width, "hslt-job list", width, cancel);
+	snprintf(
+		text, sizeof text,
+		"\nhslt-submit: the job continues without this program.\n  %s  fetches its image when it is done, with --preview "
+		"the image so far\n  %-*s  shows its progress\n  %-*s  ends it\n",
+		fetch, width, "hslt-job list", width, cancel);
 	interrupt_say(text);
 }
 
@@ -206,7 +205,7 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 		return rc;
 	const struct forecast_history *looks = &p.end.looks;
 	struct estimate m = {.scene = a->request.name,
-			     .where = "the farm as it is",
+			     .where = "the farm in its current state",
 			     .plan = &p.render,
 			     .pilot = &p.plan,
 			     .looks = looks,

@@ -53,8 +53,8 @@ int reconnect_job(struct client **cl, const struct reconnect *o, const struct su
 		if (is_gone(rc))
 			return error_set(
 				e, ECONNREFUSED,
-				"no coordinator at %s for %g s. The job is in its spool and goes on when it is back: "
-				"hslt-job fetch j%llu -o %s",
+				"no coordinator at %s for %g s. The job is in its spool and continues when it is back: hslt-job "
+				"fetch j%llu -o %s",
 				o->coordinator, o->patience, (unsigned long long)job->job, output);
 		if (rc)
 			break;

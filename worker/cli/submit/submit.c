@@ -254,7 +254,7 @@ static int send_file(struct client *cl, const struct scene_bundle *b, const stru
 		return client_local(rc);
 	rc = blob_hash_bytes(a.bytes, a.size, &hash, e);
 	if (!rc && !blob_hash_equal(&hash, &f->hash))
-		rc = error_set(e, EIO, "%s: it has changed meanwhile", f->name);
+		rc = error_set(e, EIO, "%s has changed meanwhile", f->name);
 	size_t at = 0;
 	do {
 		size_t n = a.size - at < CHUNK ? a.size - at : CHUNK;
@@ -354,8 +354,7 @@ static int take_status(struct progress *p, const Farm__JobStatus *s, const struc
 		       struct submit_end *end, bool *ended, struct error *e)
 {
 	if (s->submitted != job->at)
-		return error_set(e, ESTALE,
-				 "j%llu is another job now, '%s': the coordinator goes on with another spool",
+		return error_set(e, ESTALE, "j%llu is another job now, '%s': the coordinator uses another spool",
 				 (unsigned long long)job->job, s->name);
 	show(p, s);
 	*ended = s->ended;

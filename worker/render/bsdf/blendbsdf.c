@@ -137,8 +137,9 @@ static int join(struct bsdf *b, const struct bsdf *part, bool first, const struc
 		bool other = (b->modes & BSDF_TRANSMIT) && b->eta != part->eta;
 		if (part->dispersive || other)
 			return node_error(n, e, ENOTSUP, "its part \"%s\" %s", inner->type,
-					  part->dispersive ? "disperses, which parts of a blend may not"
-							   : "has another index of refraction than one before it");
+					  part->dispersive
+						  ? "is dispersive, which parts of a blend may not be"
+						  : "has a different index of refraction than an earlier part");
 		b->eta = part->eta;
 	}
 	int code = bsdf_take_relief(b, part, first, n, e);

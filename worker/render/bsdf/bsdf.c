@@ -24,7 +24,7 @@ int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 			*b = (struct bsdf){.ops = *ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
 			return (*ops)->create(b, n, build, e);
 		}
-	return node_error(n, e, ENOTSUP, "\"%s\" is no BSDF that is supported", n->type);
+	return node_error(n, e, ENOTSUP, "\"%s\" is not a supported BSDF", n->type);
 }
 
 double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)

@@ -220,7 +220,7 @@ static int read_inner(struct coat *c, struct bsdf *b, const struct scene_node *n
 		return node_error(n, e, EINVAL, "needs exactly one BSDF inside");
 	int code = bsdf_create(&c->inner, inner, build, e);
 	if (!code && (c->inner.modes & BSDF_TRANSMIT))
-		code = node_error(n, e, ENOTSUP, "a coating over \"%s\", which lets light through, is not supported",
+		code = node_error(n, e, ENOTSUP, "a coating over \"%s\", which transmits light, is not supported",
 				  inner->type);
 	if (code)
 		return code;

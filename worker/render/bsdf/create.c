@@ -26,7 +26,7 @@ int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const 
 	if (!first && part->relief != b->relief)
 		return node_error(
 			n, e, ENOTSUP,
-			"its two BSDFs bend the surface differently; one bump or normal map around both is supported");
+			"its two BSDFs bend normals differently; one bump or normal map around both is supported");
 	b->relief = part->relief;
 	return 0;
 }
@@ -35,10 +35,11 @@ int bsdf_check_energy(const struct scene_node *n, double sum, struct error *e)
 {
 	if (!(sum > 1) || node_bool(n, "ensure_energy_conservation", true))
 		return 0;
-	return node_error(n, e, ERANGE,
-			  "it would give back %g times the light that it gets (ensureEnergyConservation is false), "
-			  "which is not supported",
-			  sum);
+	return node_error(
+		n, e, ERANGE,
+		"it would reflect %g times the light that it receives (ensureEnergyConservation is false), which "
+		"is not supported",
+		sum);
 }
 
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape)

@@ -29,10 +29,10 @@ static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *
 	if (node_bool(n, "dispersion", false) && !has_coefficients(n) && !g->side[IOR_INT].terms &&
 	    !g->side[IOR_EXT].terms) {
 		char known[128];
-		return node_error(n, e, EINVAL,
-				  "dispersion: a number does not say how it depends on the wavelength; name one of %s "
-				  "or give coefficients",
-				  ior_dispersive_names(known, sizeof known));
+		return node_error(
+			n, e, EINVAL,
+			"dispersion: a number does not depend on the wavelength; name one of %s or give coefficients",
+			ior_dispersive_names(known, sizeof known));
 	}
 	b->ior = g->side;
 	b->eta = ior_eta(b->ior, IOR_NM);

@@ -54,7 +54,7 @@ int ior_read(const struct scene_node *n, const char *name, double fallback, doub
 				*out = named[i].n;
 				return 0;
 			}
-		return node_error(n, e, ENOTSUP, "%s: no material \"%s\" is known; a number will do", name,
+		return node_error(n, e, ENOTSUP, "%s: unknown material \"%s\"; a number is accepted, too", name,
 				  p->value.as.string);
 	}
 	*out = node_float(n, name, fallback);
@@ -136,7 +136,8 @@ static int look_up_law(struct ior *out, const struct scene_node *n, const char *
 	char known[128];
 	if (out->n < NEARLY_VACUUM)
 		return 0;
-	return node_error(n, e, ENOTSUP, "%s: the dispersion of \"%s\" is not known, only of %s; coefficients will do",
+	return node_error(n, e, ENOTSUP,
+			  "%s: the dispersion of \"%s\" is not known, only that of %s; coefficients are accepted, too",
 			  property, material, ior_dispersive_names(known, sizeof known));
 }
 
@@ -147,7 +148,7 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 	const char *sellmeier = node_string(n, name->sellmeier, NULL);
 	*out = (struct ior){.cauchy = node_float(n, name->cauchy, 0)};
 	if (sellmeier && (ior || cauchy))
-		return node_error(n, e, EINVAL, "%s stands beside %s: one of them will do", name->sellmeier,
+		return node_error(n, e, EINVAL, "%s and %s are both given: only one is allowed", name->sellmeier,
 				  (ior ? ior : cauchy)->name);
 	int code = ior_read(n, name->ior, side == IOR_INT ? IOR_BK7_DEFAULT : IOR_AIR_DEFAULT, &out->n, e);
 	if (!code && sellmeier)

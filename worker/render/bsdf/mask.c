@@ -87,8 +87,7 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 		return node_error(n, e, EINVAL, "needs exactly one BSDF inside");
 	int code = bsdf_create(&m->inner, inner, build, e);
 	if (!code && (m->inner.modes & BSDF_TRANSMIT))
-		code = node_error(n, e, ENOTSUP,
-				  "a mask over \"%s\", which lets light through by itself, is not supported",
+		code = node_error(n, e, ENOTSUP, "a mask over \"%s\", which transmits light itself, is not supported",
 				  inner->type);
 	if (!code)
 		code = bsdf_mirror_back(&m->inner, build->arena, e);

@@ -41,7 +41,7 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 		m->k.value = room + 2 * METAL_ROWS;
 		return 0;
 	}
-	return node_error(n, e, ENOTSUP, "no conductor \"%s\" is known; eta and k will do", name);
+	return node_error(n, e, ENOTSUP, "unknown conductor \"%s\"; eta and k are accepted, too", name);
 }
 
 static int given(struct color *c, const struct scene_node *n, const char *name, struct arena *arena, struct error *e)

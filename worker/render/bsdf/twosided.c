@@ -95,7 +95,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 		/* For a BSDF that has two sides already, both sides show its front. */
 		if (t->side[i].modes & BSDF_TRANSMIT)
 			return node_error(inner, e, EINVAL,
-					  "\"%s\" lets light through; twosided takes only opaque ones", inner->type);
+					  "\"%s\" transmits light; twosided only accepts opaque BSDFs", inner->type);
 	}
 	for (int i = 0; i < 2; i++) {
 		int code = bsdf_take_relief(b, &t->side[i], i == 0, n, e);

@@ -51,8 +51,8 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 		step_back(c, s->half_width * world_scale);
 	double away = vec3_length(c->position) + c->aperture;
 	if (!(away <= PARAM_REACH_MAX))
-		return error_set(e, ERANGE, "the camera stands %g times the scene's radius away from it, beyond %g",
-				 away, PARAM_REACH_MAX);
+		return error_set(e, ERANGE, "the camera is %g scene radii away from the scene, more than %g", away,
+				 PARAM_REACH_MAX);
 	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
 		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius,
 				 s->focus_distance);

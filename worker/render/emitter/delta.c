@@ -20,10 +20,10 @@ int delta_place(struct emitter *em, struct delta_light *l, const struct scene_no
 {
 	double away = vec3_length(l->x.p);
 	if (!(away <= PARAM_REACH_MAX))
-		return node_error(n, e, ERANGE, "stands %g times the scene's radius away from it, beyond %g", away,
+		return node_error(n, e, ERANGE, "is %g scene radii away from the scene, more than %g", away,
 				  PARAM_REACH_MAX);
 	if (!(factor > 0) || !isfinite(factor))
-		return node_error(n, e, EINVAL, "the scene's size leaves no number for this light's strength");
+		return node_error(n, e, EINVAL, "this light's strength is out of range at the scene's size");
 	l->factor = factor;
 	em->data = l;
 	em->delta = true;
@@ -54,7 +54,7 @@ double delta_strength(const struct delta_light *l)
 int delta_either(const struct scene_node *n, const char *name, const char *other, struct error *e)
 {
 	if (node_find(n, name) && node_find(n, other))
-		return node_error(n, e, EINVAL, "%s and %s say the same thing; give one", name, other);
+		return node_error(n, e, EINVAL, "%s and %s are both given: only one is allowed", name, other);
 	return 0;
 }
 

@@ -36,7 +36,7 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 	if (ops->needs_surface && !build->surface)
 		return node_error(n, e, EINVAL, "\"%s\" must stand in a shape", n->type);
 	if (!ops->needs_surface && build->surface)
-		return node_error(n, e, EINVAL, "\"%s\" cannot hang on a shape", n->type);
+		return node_error(n, e, EINVAL, "\"%s\" cannot be inside a shape", n->type);
 	*em = (struct emitter){.ops = ops};
 	return ops->create(em, n, build, e);
 }

@@ -89,7 +89,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	mat4 to_world = node_transform(n, "to_world");
 	vec3 axis = vec3_normalize(mat4_vector(&to_world, (vec3){0, 0, 1}));
 	if (!vec3_is_finite(axis))
-		return node_error(n, e, EINVAL, "to_world leaves the spot no direction");
+		return node_error(n, e, EINVAL, "to_world gives the spot no direction");
 	double cutoff = node_float(n, "cutoff_angle", 20), beam = node_float(n, "beam_width", 0.75 * cutoff);
 	if (beam > cutoff)
 		return node_error(n, e, EINVAL, "beam_width=%g exceeds cutoff_angle=%g", beam, cutoff);

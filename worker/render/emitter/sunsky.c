@@ -100,8 +100,8 @@ static int read_sun(const struct scene_node *n, const vec3 axis[3], vec3 *toward
 		double length = vec3_length(p->value.as.point);
 		for (size_t i = 0; i < sizeof clock / sizeof *clock; i++)
 			if (node_find(n, clock[i]))
-				return node_error(n, e, EINVAL, "sun_direction and %s say the same thing; give one",
-						  clock[i]);
+				return node_error(n, e, EINVAL,
+						  "sun_direction and %s are both given: only one is allowed", clock[i]);
 		if (!(length > 0) || !isfinite(length))
 			return node_error(n, e, EINVAL, "a sun_direction of length %g", length);
 		*towards = vec3_scale(1 / length, p->value.as.point);

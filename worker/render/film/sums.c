@@ -50,9 +50,8 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 		f->floor = exp(-f->inverse * r * r);
 		f->scale = 1 / (sd * sqrt(2 * M_PI) * erf(r / (sd * M_SQRT2)) - 2 * r * f->floor);
 		if (!(f->scale > 0) || !isfinite(f->scale))
-			return error_set(e, EINVAL,
-					 "nothing is left of a gaussian filter of deviation %g, radius %g pixels", sd,
-					 r);
+			return error_set(e, EINVAL, "a gaussian filter of deviation %g and radius %g pixels vanishes",
+					 sd, r);
 	}
 	f->b = s->filter_b;
 	f->c = s->filter_c;

@@ -63,7 +63,7 @@ static double useful(const struct render_summary *scene)
 
 const struct mutation_ops mutation_bidirectional = {
 	.name = "bidirectional",
-	.summary = "a fresh path, drawn from all that a pair of sub-paths makes",
+	.summary = "a new path, one of those formed by a pair of sub-paths",
 	.independent = true,
 	.useful = useful,
 	.propose = propose,

@@ -68,7 +68,7 @@ static double useful(const struct render_summary *scene)
 
 const struct mutation_ops mutation_independent = {
 	.name = "independent",
-	.summary = "a fresh path by a bidirectional technique",
+	.summary = "a new path by one bidirectional technique",
 	.independent = true,
 	.useful = useful,
 	.propose = propose,

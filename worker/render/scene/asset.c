@@ -153,7 +153,7 @@ static int open_outside(const struct asset_folders *f, size_t up, const char *re
 	char path[PATH_MAX + NAME_MAX_BYTES], shown[NAME_MAX_BYTES];
 	*out = (struct asset){0};
 	if (strlen(rest) + 3 * up >= sizeof shown || !realpath(*f->folder[0] ? f->folder[0] : ".", path))
-		return error_set(e, ENAMETOOLONG, "%.256s: too long a name", rest);
+		return error_set(e, ENAMETOOLONG, "%.256s: the name is too long", rest);
 	size_t used = 0, end = strlen(path);
 	for (size_t i = 0; i < up; i++) {
 		memcpy(shown + used, "../", 3);
@@ -174,8 +174,8 @@ static int open_outside(const struct asset_folders *f, size_t up, const char *re
 	*strrchr(path, '/') = 0;
 	return error_set(
 		e, EINVAL,
-		"%.256s: leads out of the scene's folder; to read what is there, say --path %.400s or a folder "
-		"around it",
+		"%.256s: leads out of the scene's folder; to allow it, give --path %.400s or a folder that contains "
+		"it",
 		shown, *path ? path : "/");
 }
 

@@ -67,7 +67,7 @@ int asset_part_open(struct asset_part *p, const struct scene_node *n, const stru
 	p->size = (size_t)count;
 	p->decoded = NULL;
 	if (first > size || count > size - first)
-		rc = node_error(n, e, EINVAL, "%s has %llu bytes, and no %llu from byte %llu on", name,
+		rc = node_error(n, e, EINVAL, "%s has %llu bytes, and not %llu from byte %llu on", name,
 				(unsigned long long)size, (unsigned long long)count, (unsigned long long)first);
 	else if (node_bool(n, "base64", false))
 		rc = decode_part(p, n, name, e);

@@ -75,7 +75,7 @@ int element_check(const struct xml_element *el, const char *known, bool children
 		if (!is_listed(known, el->attributes[i].name, NULL))
 			return refuse_attribute(el, known, el->attributes[i].name, e);
 	if (el->text)
-		return xml_error(el, e, EINVAL, "text has no meaning here; values are given by attributes");
+		return xml_error(el, e, EINVAL, "text is not allowed here; values are given by attributes");
 	if (el->first && !children)
 		return xml_error(el->first, e, EINVAL, "has no place in <%.64s>", el->name);
 	return 0;

@@ -13,7 +13,7 @@ int fov_read(const struct scene_node *n, double *degrees, char axis[FOV_AXIS_MAX
 	const struct property *fov = node_find(n, "fov");
 	const char *focal_length = node_string(n, "focal_length", NULL);
 	if (fov && focal_length)
-		return node_error(n, e, EINVAL, "fov and focal_length say the same thing; give one");
+		return node_error(n, e, EINVAL, "fov and focal_length are both given: only one is allowed");
 	if (fov) {
 		*degrees = node_float(n, "fov", 0);
 		snprintf(axis, FOV_AXIS_MAX, "%s", node_string(n, "fov_axis", "x"));

@@ -97,7 +97,7 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 		uint32_t type = get32(p + at + 4);
 		at += GLB_CHUNK;
 		if (length > end - at)
-			return gltf_fail(g, NULL, EINVAL, "a chunk leads out of the file");
+			return gltf_fail(g, NULL, EINVAL, "a chunk exceeds the file");
 		if (i == 0 && type == GLB_JSON) {
 			*text = (const char *)p + at;
 			*size = length;
@@ -140,7 +140,7 @@ static void note_unknown(struct gltf *g)
 			return;
 		}
 		int n = snprintf(text + length, ROOM - length, "%s%.64s",
-				 length ? ", " : "what these extensions add is not read: ", name);
+				 length ? ", " : "these extensions are not supported and ignored: ", name);
 		length = n < 0 || length + (size_t)n >= ROOM ? ROOM - 1 : length + (size_t)n;
 	}
 	if (text)
@@ -167,9 +167,9 @@ static void check_file(struct gltf *g)
 	}
 	note_unknown(g);
 	if (json_array_size(json_object_get(g->root, "animations")))
-		gltf_note(g, "its animations are ignored: the image is of the nodes as they stand");
+		gltf_note(g, "its animations are ignored");
 	if (json_array_size(json_object_get(g->root, "skins")))
-		gltf_note(g, "its skins are ignored: meshes are as they were modelled");
+		gltf_note(g, "its skins are ignored");
 }
 
 /* ---- nodes */

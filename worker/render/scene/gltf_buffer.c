@@ -48,14 +48,14 @@ static int embedded(struct gltf *g, const struct gltf_at *at, const char *uri, s
 		return 0;
 	}
 	if (++g->embedded > GLTF_EMBEDDED_MAX)
-		return gltf_fail(g, at, E2BIG, "more than %d buffers and pictures are embedded", GLTF_EMBEDDED_MAX);
+		return gltf_fail(g, at, E2BIG, "more than %d buffers and images are embedded", GLTF_EMBEDDED_MAX);
 	const char *comma = strchr(uri, ',');
 	if (!comma || comma - uri < 7 || memcmp(comma - 7, ";base64", 7) != 0)
-		return gltf_fail(g, at, ENOTSUP, "what is embedded in it is not written in base64");
+		return gltf_fail(g, at, ENOTSUP, "its embedded data is not base64");
 	size_t n = strlen(comma + 1), padding = 0;
 	const unsigned char *there = n ? memmem(g->bytes, g->size, comma + 1, n) : g->bytes;
 	if (!there)
-		return gltf_fail(g, at, ENOTSUP, "what is embedded in it is written with escapes; .glb has none");
+		return gltf_fail(g, at, ENOTSUP, "its embedded data is written with escapes; use .glb");
 	while (padding < n && comma[n - padding] == '=')
 		padding++;
 	*out = (struct gltf_range){g->file, (uint64_t)(there - g->bytes), n, true, (n - padding) * 3 / 4};
@@ -85,7 +85,7 @@ static int buffer_range(struct gltf *g, const struct gltf_at *buffer, struct glt
 	else if (range_of_uri(g, buffer, uri, out))
 		return g->failed;
 	if (length > out->size)
-		return gltf_fail(g, buffer, EINVAL, "it says %llu bytes and has %llu", (unsigned long long)length,
+		return gltf_fail(g, buffer, EINVAL, "it states %llu bytes and has %llu", (unsigned long long)length,
 				 (unsigned long long)out->size);
 	out->size = length;
 	if (!out->base64)
@@ -107,7 +107,7 @@ int gltf_buffer_view(struct gltf *g, const struct gltf_at *view, struct gltf_ran
 	if (buffer_range(g, &at, buffer))
 		return g->failed;
 	if (*first > buffer->size || *count > buffer->size - *first)
-		return gltf_fail(g, view, EINVAL, "it leads out of buffers[%zu] of %llu bytes", at.index,
+		return gltf_fail(g, view, EINVAL, "it exceeds buffers[%zu] of %llu bytes", at.index,
 				 (unsigned long long)buffer->size);
 	return g->failed;
 }
@@ -126,7 +126,7 @@ int gltf_image_range(struct gltf *g, const struct gltf_at *image, struct gltf_ra
 	if (gltf_buffer_view(g, &view, &buffer, &first, &count))
 		return g->failed;
 	if (buffer.base64)
-		return gltf_fail(g, image, ENOTSUP, "a picture within an embedded buffer; .glb may have these");
+		return gltf_fail(g, image, ENOTSUP, "an image in an embedded buffer; use .glb");
 	*out = (struct gltf_range){buffer.file, buffer.first + first, count, false, count};
 	return 0;
 }

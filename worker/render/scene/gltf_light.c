@@ -79,9 +79,7 @@ void gltf_light(struct gltf *g, const struct gltf_at *at, const mat4 *to_world)
 	mat4 m = looking(to_world);
 	g->has_light = true;
 	if (json_object_get(at->json, "range"))
-		gltf_note(
-			g,
-			"ranges of lights are ignored: they fall off with the square of the distance, without an end");
+		gltf_note(g, "ranges of lights are ignored: intensity falls off with the square of the distance");
 	if (strcmp(type, "directional") == 0) {
 		struct xml_element *el = gltf_plugin(g, g->scene, at, "emitter", "directional", NULL);
 		gltf_put_rgb(g, el, at, "irradiance", rgb);
@@ -117,7 +115,7 @@ void gltf_default_camera(struct gltf *g)
 	vec3 from = vec3_normalize((vec3){0.5, 0.4, 1});
 	mat4 look = mat4_look_at(vec3_madd(middle, radius / sin(fov / 2), from), middle, (vec3){0, 1, 0});
 	mat4 back = mat4_scale((vec3){-1, 1, -1}), m = mat4_mul(look, back);
-	gltf_note(g, "it has no camera: one that sees all of it stands in");
+	gltf_note(g, "it has no camera: one that sees everything is used");
 	put_perspective(g, NULL, &m, fov, 4.0 / 3);
 }
 
@@ -125,5 +123,5 @@ void gltf_default_light(struct gltf *g)
 {
 	struct xml_element *el = gltf_plugin(g, g->scene, NULL, "emitter", "constant", NULL);
 	gltf_put_number(g, el, NULL, "radiance", 1);
-	gltf_note(g, "it has no light, or none brighter than 1: a constant environment of radiance 1 stands in");
+	gltf_note(g, "it has no light, or none brighter than 1: a constant environment of radiance 1 is used");
 }

@@ -215,7 +215,7 @@ static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_a
 	if (!(factor > 0))
 		return;
 	double roughness = gltf_number(g, at, coat, "clearcoatRoughnessFactor", 0);
-	gltf_note(g, "clear coats reflect a quarter of what the format says: that is the most that `principled` has");
+	gltf_note(g, "clear coats reflect a quarter of what the format says, the maximum of `principled`");
 	gltf_put_number(g, el, at, "clearcoat", factor);
 	gltf_put_number(g, el, at, "clearcoat_gloss", fmin(fmax((0.1 - roughness * roughness) / 0.099, 0), 1));
 	put_unsupported(g, el, at, coat, others);

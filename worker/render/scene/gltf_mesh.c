@@ -58,7 +58,7 @@ static void put_accessor(struct primitive *p, const struct gltf_at *a, const cha
 	uint64_t first, count, size;
 	const char *component = type_name(gltf_whole(g, a, a->json, "componentType", 0), &size);
 	if (!component || strcmp(gltf_text(g, a, a->json, "type", ""), type) != 0)
-		gltf_fail(g, a, EINVAL, "of another type than %s needs", name);
+		gltf_fail(g, a, EINVAL, "of a type that %s cannot have", name);
 	if (json_object_get(a->json, "sparse"))
 		gltf_fail(g, a, ENOTSUP, "sparse accessors are not supported");
 	if (gltf_follow(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) == 0)
@@ -70,7 +70,7 @@ static void put_accessor(struct primitive *p, const struct gltf_at *a, const cha
 	if (offset > count || stride < size * components || stride > count ||
 	    (wanted > 0 &&
 	     (count - offset < size * components || (wanted - 1) > (count - offset - size * components) / stride)))
-		gltf_fail(g, a, EINVAL, "it leads out of bufferViews[%zu]", view.index);
+		gltf_fail(g, a, EINVAL, "it exceeds bufferViews[%zu]", view.index);
 	if (p->buffer.file && !same_buffer(&p->buffer, &buffer))
 		gltf_fail(g, p->mesh, ENOTSUP, "attributes of a primitive in different buffers are not supported");
 	p->buffer = buffer;
@@ -185,7 +185,7 @@ static void put_primitive(struct gltf *g, const struct gltf_at *mesh, const json
 		gltf_put_text(g, p.shape, mesh, "mode", mode == MODE_STRIP ? "strip" : "fan");
 	gltf_put_matrix(g, p.shape, mesh, "to_world", to_world);
 	if (json_array_size(json_object_get(primitive, "targets")))
-		gltf_note(g, "its morph targets are ignored: meshes are as they were modelled");
+		gltf_note(g, "its morph targets are ignored");
 	struct gltf_at material;
 	if (gltf_follow(g, mesh, primitive, "material", GLTF_MATERIALS, &material) > 0)
 		gltf_material(g, p.shape, &material, p.colours);

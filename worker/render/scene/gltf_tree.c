@@ -158,7 +158,7 @@ struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, con
 	if (g->failed || (!parent && g->scene))
 		return NULL;
 	if (g->tree->element_count >= XML_ELEMENTS_MAX) {
-		gltf_fail(g, at, E2BIG, "more than %d elements are made of this file", XML_ELEMENTS_MAX);
+		gltf_fail(g, at, E2BIG, "this file becomes more than %d elements", XML_ELEMENTS_MAX);
 		return NULL;
 	}
 	struct xml_element *el =

@@ -33,12 +33,11 @@ static int decode(const struct image_input *in, struct image *out)
 		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
 			continue;
 		if (in->alpha && !formats[i].alpha)
-			return error_set(in->error, ENOTSUP, "%s: alpha is read of PNG only", in->name);
+			return error_set(in->error, ENOTSUP, "%s: alpha is only read from PNG", in->name);
 		return formats[i].decode(in, out);
 	}
 	return error_set(in->error, EINVAL,
-			 "%s: no image that is understood (supported: PNG, JPEG, OpenEXR, Radiance HDR, BMP)",
-			 in->name);
+			 "%s: unknown image format (supported: PNG, JPEG, OpenEXR, Radiance HDR, BMP)", in->name);
 }
 
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,

@@ -34,7 +34,7 @@ static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
 	b->colours = used ? used : 1u << b->bits;
 	uint64_t end = FILE_HEADER + (uint64_t)header + (uint64_t)b->colours * b->entry;
 	if (b->colours > 1u << b->bits || end > b->pixels_at || end > b->in->size)
-		return broken(b, "a palette that has no room before the pixels");
+		return broken(b, "a palette that overlaps the pixels");
 	b->palette = b->in->bytes + FILE_HEADER + header;
 	return 0;
 }
@@ -72,7 +72,7 @@ static int read_header(struct bmp *b)
 	if (compression != PLAIN && !(compression == MASKED && masks_are_usual(b)))
 		return error_set(b->in->error, ENOTSUP, "%s: BMP: compressed, or with unusual masks", b->in->name);
 	if (b->bits != 1 && b->bits != 4 && b->bits != 8 && b->bits != 24 && b->bits != 32)
-		return error_set(b->in->error, ENOTSUP, "%s: BMP: %u bits a pixel", b->in->name, b->bits);
+		return error_set(b->in->error, ENOTSUP, "%s: BMP: %u bits per pixel", b->in->name, b->bits);
 	return read_palette(b, header, used);
 }
 

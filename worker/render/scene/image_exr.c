@@ -21,7 +21,7 @@ static int copy_planes(const struct image_input *in, const struct exr_image *x, 
 	const float *planes[3] = {channels == 1 ? find_plane(x, "Y") : NULL};
 	for (uint32_t k = 0; channels == 3 && k < 3; k++)
 		if (!(planes[k] = find_plane(x, rgb[k])))
-			return error_set(in->error, EINVAL, "%s: OpenEXR without channel %s; needed are R, G, B or Y",
+			return error_set(in->error, EINVAL, "%s: OpenEXR without channel %s; R, G, B or Y are required",
 					 in->name, rgb[k]);
 	int r = image_allocate(in, out, x->width, x->height, channels, 0);
 	for (size_t i = 0; !r && i < (size_t)x->width * x->height; i++)

@@ -50,7 +50,7 @@ static int read_header(struct cursor *c, int64_t *width, int64_t *height)
 	char line[LINE_MAX_BYTES];
 	do {
 		if (!read_line(c, line))
-			return broken(c, "the header has no end");
+			return broken(c, "the header does not end");
 		if (strncmp(line, "FORMAT=", 7) == 0 && strcmp(line + 7, "32-bit_rle_rgbe") != 0)
 			return broken(c, "only FORMAT=32-bit_rle_rgbe is supported");
 	} while (line[0]);

@@ -12,7 +12,7 @@ int nesting_take(struct xml_nesting *owner, enum plugin_class cls, const struct 
 	uint64_t objects = owner->objects + (once ? 0 : taken->nesting.objects);
 	uint32_t height = taken->nesting.height + 1;
 	if (height > NESTING_HEIGHT_MAX)
-		return xml_error(el, e, E2BIG, "objects hold each other more than %d deep", NESTING_HEIGHT_MAX);
+		return xml_error(el, e, E2BIG, "objects are nested more than %d deep", NESTING_HEIGHT_MAX);
 	if (objects > limit)
 		return xml_error(el, e, E2BIG, "makes a %s of more than %llu objects when all references are followed",
 				 plugin_class_name(cls), (unsigned long long)limit);

@@ -62,7 +62,7 @@ int param_check(const struct xml_element *el, const struct param *p, struct valu
 	if (!(v->type & p->types)) {
 		char list[256];
 		value_type_names(p->types, list, sizeof list);
-		return xml_error(el, e, EINVAL, "`%s` cannot be given like this (supported: %s)", p->name, list);
+		return xml_error(el, e, EINVAL, "`%s` cannot have this type (supported: %s)", p->name, list);
 	}
 	if (p->min < p->max && (r = check_range(el, p, v, e)))
 		return r;

@@ -27,7 +27,7 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 	int64_t depth = node_int(n, "max_depth", -1);
 	if (depth <= SCENE_MAX_DEPTH)
 		return 0;
-	return remark(r, n, e, "max_depth %lld is %d here: light that takes longer paths is left out", (long long)depth,
+	return remark(r, n, e, "max_depth %lld becomes %d: light of longer paths is missing", (long long)depth,
 		      SCENE_MAX_DEPTH);
 }
 
@@ -58,10 +58,9 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e,
-				    "is not what is rendered: the picture is of all light on surfaces, without media%s",
+			rc = remark(r, n, e, "is ignored: the image shows all light on surfaces, without media%s",
 				    strncmp(n->type, "direct", strlen("direct")) == 0
-					    ? "; --max-depth 2 leaves out indirect light"
+					    ? "; --max-depth 2 omits indirect light"
 					    : "");
 	return rc ? rc : on_depth(r, n, e);
 }
@@ -80,7 +79,8 @@ static int on_emitter(struct report *r, const struct scene_node *n, struct error
 {
 	if (strcmp(n->type, "sky") != 0 && strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0)
 		return 0;
-	return remark(r, n, e, "daylight after Preetham (1999), a little other than Mitsuba's after Hosek and Wilkie");
+	return remark(r, n, e,
+		      "daylight after Preetham (1999), which differs a little from Mitsuba's after Hosek and Wilkie");
 }
 
 int remarks_on(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e)
@@ -106,6 +106,6 @@ int remarks_on(const struct scene_node *const *objects, uint32_t count, struct r
 		}
 	}
 	if (!rc && !light && camera && r->problem_count == 0)
-		rc = remark(r, camera, e, "the scene has no emitter: the picture is black");
+		rc = remark(r, camera, e, "the scene has no emitter: the image is black");
 	return rc;
 }

@@ -164,7 +164,7 @@ static int read_crop(const struct scene_node *film, struct scene_settings *out, 
 		 h = (uint64_t)node_int(film, "crop_height", out->height);
 	if (x + w > out->width || y + h > out->height)
 		return node_error(film, e, ERANGE,
-				  "the crop window of %llu x %llu pixels at %llu, %llu leaves the film of %u x %u",
+				  "the crop window of %llu x %llu pixels at %llu, %llu exceeds the film of %u x %u",
 				  (unsigned long long)w, (unsigned long long)h, (unsigned long long)x,
 				  (unsigned long long)y, out->width, out->height);
 	if (w == out->width && h == out->height)
@@ -251,7 +251,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 		out->hide_emitters |= node_bool(n, "hide_emitters", false);
 	if (depth == 0)
 		return node_error(integrator, e, ERANGE,
-				  "a depth of 0 shows nothing; 1 is emitters seen directly, -1 no limit");
+				  "a depth of 0 shows nothing; 1 shows emitters seen directly, -1 is no limit");
 	if (depth > 0 && depth < SCENE_MAX_DEPTH)
 		out->max_depth = (uint32_t)depth;
 	out->roulette_depth = (uint32_t)roulette;
@@ -291,7 +291,7 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	z = vec3_normalize(z);
 	double skew = fmax(fabs(vec3_dot(x, y)), fmax(fabs(vec3_dot(y, z)), fabs(vec3_dot(z, x))));
 	if (!vec3_is_finite(x) || !vec3_is_finite(y) || !vec3_is_finite(z) || !(skew < 1e-3))
-		return node_error(sensor, e, EINVAL, "to_world must only turn, move, mirror and scale a camera");
+		return node_error(sensor, e, EINVAL, "to_world may only rotate, translate, mirror and scale a camera");
 	double hand = vec3_dot(vec3_cross(x, y), z) < 0 ? -1 : 1;
 	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));
 	y = vec3_scale(hand, vec3_cross(z, x));

@@ -150,7 +150,7 @@ static int read_lookat(const struct xml_element *el, mat4 *m, struct error *e)
 		up = any_up(el, vec3_normalize(vec3_sub(target, origin)));
 	*m = mat4_look_at(origin, target, up);
 	if (!is_in_range(m))
-		return xml_error(el, e, EINVAL, "origin and target are one point, or up points along the view");
+		return xml_error(el, e, EINVAL, "origin and target are equal, or up is parallel to the view");
 	return 0;
 }
 
@@ -215,8 +215,7 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 			return r;
 		m = mat4_mul(one, m);
 		if (!is_in_range(&m))
-			return xml_error(c, e, ERANGE,
-					 "the transform leaves the range of numbers: an element is outside [%g, %g]",
+			return xml_error(c, e, ERANGE, "the transform is out of range: an element is outside [%g, %g]",
 					 -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
 	}
 	*out = m;

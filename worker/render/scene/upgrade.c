@@ -122,9 +122,8 @@ static int check_material(const struct xml_element *el, struct error *e)
 	static const char *const others[] = {"microfacet", "phong", "ward", "mirror"};
 	for (size_t i = 0; is_named(el, "bsdf") && i < sizeof others / sizeof *others; i++)
 		if (is_of_type(el, others[i]) && xml_attribute(el, "type"))
-			return xml_error(
-				el, e, ENOTSUP,
-				"is not supported in files before version 0.3; Mitsuba 0.6 can save them anew");
+			return xml_error(el, e, ENOTSUP,
+					 "is not supported in files before version 0.3; Mitsuba 0.6 can convert them");
 	return 0;
 }
 

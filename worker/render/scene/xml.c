@@ -159,7 +159,7 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 static int begin_file(struct reader *r, struct xml_element *el)
 {
 	if (strcmp(el->name, "scene") != 0)
-		return xml_error(el, r->error, EINVAL, "a scene file begins with <scene version=\"...\">");
+		return xml_error(el, r->error, EINVAL, "a scene file must begin with <scene version=\"...\">");
 	const char *version = xml_attribute(el, "version");
 	int64_t major;
 	const char *rest = version ? number_scan_int(version, version + strlen(version), &major) : NULL;
@@ -171,14 +171,15 @@ static int begin_file(struct reader *r, struct xml_element *el)
 	if (r->minor >= 0 && r->minor < 4 && !r->upgraded && r->tree->note_count < XML_NOTES_MAX) {
 		r->upgraded = true;
 		r->tree->notes[r->tree->note_count++] =
-			"is of a version before 0.4: taken as Mitsuba 0.5 takes such files, which turns their cameras round";
+			"is of a version before 0.4: read as by Mitsuba 0.5, which mirrors the cameras of such files";
 	}
 	r->snake = major < 2;
 	bool dialect_3 = major >= 2;
 	if (el->parent && !r->mixed && r->tree->dialect_3 != dialect_3 && r->tree->note_count < XML_NOTES_MAX) {
 		r->mixed = true;
 		r->tree->notes[r->tree->note_count++] =
-			"includes a file of another dialect; all is taken as Mitsuba 3 takes it, with the old names in the old files";
+			"includes a file of another dialect; everything is read as by Mitsuba 3, with the old names in "
+			"the old files";
 	}
 	r->tree->dialect_3 |= dialect_3; /* 3.x reads older files, 0.6 no newer ones */
 	return 0;
@@ -421,8 +422,8 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 		return error_set(r->error, EFBIG, "%s: a scene file of more than %d MB", r->file, XML_FILE_MAX >> 20);
 	r->bytes += a->size;
 	if (r->bytes > XML_FILES_BYTES)
-		return error_set(r->error, EFBIG, "%s: with it the files that are included have more than %d MB in all",
-				 r->file, XML_FILES_BYTES >> 20);
+		return error_set(r->error, EFBIG, "%s: the included files have more than %d MB in total", r->file,
+				 XML_FILES_BYTES >> 20);
 	r->parser = XML_ParserCreate_MM(NULL, &expat_memory, NULL);
 	if (!r->parser)
 		return error_set(r->error, ENOMEM, "%s: out of memory", r->file);

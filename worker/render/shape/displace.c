@@ -395,7 +395,7 @@ static int run(struct work *w, struct shape_geometry *g, struct arena *arena, st
 	uint32_t parts = parts_of(w->d);
 	uint64_t triangles = (g->kind == SHAPE_SPHERE ? 8 : (uint64_t)g->mesh.triangle_count) * parts * parts;
 	if (triangles > MESH_TRIANGLES_MAX)
-		return node_error(n, e, E2BIG, "displacement_level %u makes %llu triangles; at most %d are possible",
+		return node_error(n, e, E2BIG, "displacement_level %u makes %llu triangles; at most %d are supported",
 				  w->d->level, (unsigned long long)triangles, MESH_TRIANGLES_MAX);
 	bool ok = true;
 	w->base = g->mesh;

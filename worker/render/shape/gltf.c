@@ -67,7 +67,7 @@ static int read_accessor(struct accessor *a, const struct scene_node *n, const c
 		 count = (uint64_t)x[2];
 	if (count > UINT32_MAX || (stride < size && count > 1) || stride > buffer->size || first > buffer->size ||
 	    (count > 0 && (buffer->size - first < size || (count - 1) * stride > buffer->size - first - size)))
-		return node_error(n, e, EINVAL, "`%s` leads out of its buffer of %zu bytes", name, buffer->size);
+		return node_error(n, e, EINVAL, "`%s` exceeds its buffer of %zu bytes", name, buffer->size);
 	*a = (struct accessor){buffer->bytes + first, stride, count, (enum number_type)t};
 	return 0;
 }
@@ -171,12 +171,13 @@ static int make_mesh(const struct scene_node *n, const struct asset_part *buffer
 	if (no_index < 0)
 		return no_index;
 	if ((!no_normal && normal.count != position.count) || (!no_uv && texcoord.count != position.count))
-		return node_error(n, e, EINVAL, "positions, normals and texture coordinates are not equally many");
+		return node_error(n, e, EINVAL, "the numbers of positions, normals and texture coordinates differ");
 	const char *said = node_string(n, "mode", "triangles");
 	enum mode mode = strcmp(said, "strip") == 0 ? STRIP : strcmp(said, "fan") == 0 ? FAN : TRIANGLES;
 	uint64_t corners = no_index ? position.count : index.count, triangles = triangles_of(mode, corners);
 	if (mode == TRIANGLES && corners % 3)
-		return node_error(n, e, EINVAL, "%llu corners make no whole triangles", (unsigned long long)corners);
+		return node_error(n, e, EINVAL, "%llu corners are not a whole number of triangles",
+				  (unsigned long long)corners);
 	if (triangles > MESH_TRIANGLES_MAX || position.count > 3ull * MESH_TRIANGLES_MAX)
 		return node_error(n, e, E2BIG, "more than %d triangles", MESH_TRIANGLES_MAX);
 	if (!mesh_alloc(m, (uint32_t)position.count, (uint32_t)triangles, !no_normal, !no_uv, arena))

@@ -30,7 +30,7 @@ static int out_of_memory(struct listing *l)
 static int append(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
 	if (l->count == SHAPES_MAX)
-		return node_error(n, l->e, E2BIG, "instances make more than %d shapes of the scene", SHAPES_MAX);
+		return node_error(n, l->e, E2BIG, "with its instances the scene has more than %d shapes", SHAPES_MAX);
 	if (l->count == l->room) {
 		uint32_t room = l->room ? 2 * l->room : 64;
 		struct listed_shape *more = arena_alloc(l->arena, room, sizeof *more);

@@ -188,7 +188,7 @@ static int read_property(struct ply *f)
 	}
 	p.type = find_scalar(word);
 	if (p.type == SCALAR_NONE || (list && (p.count_type == SCALAR_NONE || p.count_type >= FLOAT32)))
-		return header_error(f, "a property of no known type");
+		return header_error(f, "a property of an unknown type");
 	if (!next_word(f, name))
 		return header_error(f, "a property without a name");
 	p.role = find_role(el->kind, name, list);
@@ -303,7 +303,7 @@ static int read_list(struct ply *f, const struct element *el, uint64_t item, con
 		if (p->role != ROLE_INDICES)
 			continue;
 		if (!(x >= 0 && x < (double)f->mesh->vertex_count) || x != floor(x))
-			return item_error(f, el, item, "an index that is none of a vertex");
+			return item_error(f, el, item, "an index out of range");
 		corner[k < 2 ? (int)k : 2] = x;
 		if (k < 2)
 			continue;

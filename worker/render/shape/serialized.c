@@ -140,7 +140,7 @@ static int take_triangles(struct stream *s, struct mesh *m)
 		for (uint32_t i = 0; i < 3 * n; i++) {
 			uint32_t v = (uint32_t)get_bytes(raw + 4 * (size_t)i, 4);
 			if (v >= m->vertex_count)
-				return file_error(s, "a triangle's index is none of a vertex");
+				return file_error(s, "a triangle's index is out of range");
 			m->index[done + i / 3][i % 3] = v;
 		}
 		done += n;

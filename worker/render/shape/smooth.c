@@ -164,8 +164,9 @@ int mesh_smooth(struct mesh *m, double degrees, struct arena *arena, const struc
 		gather(&s);
 		s.out.vertex_count = 0;
 		if (!share_all(&s))
-			r = node_error(n, e, E2BIG,
-				       "max_smooth_angle: too many triangles of different directions meet in a place");
+			r = node_error(
+				n, e, E2BIG,
+				"max_smooth_angle: too many triangles with different directions meet in one place");
 		else if (!take_attributes(&s, arena))
 			r = node_error(n, e, ENOMEM, "out of memory");
 		else

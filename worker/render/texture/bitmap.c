@@ -57,7 +57,7 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 		return node_error(n, e, ENOMEM, "out of memory");
 	t->data = b;
 	if (role == COLOR_UNBOUNDED)
-		return node_error(n, e, ENOTSUP, "a bitmap cannot stand for this quantity");
+		return node_error(n, e, ENOTSUP, "a bitmap cannot be used for this quantity");
 	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
 					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT};
 	int code = raster_read(&b->raster, n, build->assets, &range, build->arena, e);

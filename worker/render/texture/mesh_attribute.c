@@ -24,7 +24,7 @@ static int refuse_role(const struct scene_node *n, enum color_role role, struct 
 {
 	const char *what = role == COLOR_HEIGHT	  ? "displace a surface"
 			   : role == COLOR_RELIEF ? "be a bump or normal map"
-						  : "stand for this quantity";
+						  : "be used for this quantity";
 	return node_error(n, e, ENOTSUP, "an attribute of a mesh cannot %s", what);
 }
 
@@ -49,7 +49,7 @@ static int make(struct texture *t, const struct scene_node *n, const char *name,
 	if (role != COLOR_REFLECTANCE && role != COLOR_ILLUMINANT)
 		return refuse_role(n, role, e);
 	if (!table)
-		return node_error(n, e, EINVAL, "only what lies on a mesh has its attributes");
+		return node_error(n, e, EINVAL, "attributes are only available on a mesh");
 	const struct attribute *a = attribute_find(table, name, n, e);
 	if (!a)
 		return -EINVAL;

@@ -63,20 +63,20 @@ static void describe_pair(struct render_coincident *out, const struct coincide_s
 		return;
 	out->count++;
 	if (c->hidden == c->by) {
-		snprintf(text, sizeof out->text[0], "triangles of %s coincide: only the first of them is there",
+		snprintf(text, sizeof out->text[0], "triangles of %s coincide: only the first of them is present",
 			 node_title(nodes[c->hidden], hidden));
 	} else {
 		bool shine = s[c->hidden].rank == SURFACE_SHINES && s[c->by].rank == SURFACE_SHINES;
 		bool refract = s[c->hidden].rank == SURFACE_TRANSMITS && s[c->by].rank == SURFACE_TRANSMITS;
-		snprintf(text, sizeof out->text[0],
-			 "%s and %s coincide: where they overlap only the latter is there, because it %s%s",
-			 node_title(nodes[c->hidden], hidden), node_title(nodes[c->by], by),
-			 reason(s[c->hidden].rank, s[c->by].rank),
-			 shine && !c->same_side
-				 ? "; light to the other side is lost: a lamp with two sides is two, a little apart"
-			 : refract
-				 ? "; where two media touch, one surface with the int_ior and ext_ior of both is meant"
-				 : "");
+		snprintf(
+			text, sizeof out->text[0],
+			"%s and %s coincide: where they overlap, only the latter is present, because it %s%s",
+			node_title(nodes[c->hidden], hidden), node_title(nodes[c->by], by),
+			reason(s[c->hidden].rank, s[c->by].rank),
+			shine && !c->same_side
+				? "; light to the other side is lost: for a lamp with two sides use two, slightly apart"
+			: refract ? "; where two media touch, use one surface with the int_ior and ext_ior of both"
+				  : "");
 	}
 	text_clean(text);
 }

@@ -182,7 +182,7 @@ static const char *hidden_because(enum visibility_bounds r)
 {
 	switch (r) {
 	case VISIBILITY_ENCLOSED:
-		return "a closed opaque shape is around it";
+		return "it is inside a closed opaque shape";
 	case VISIBILITY_DARK:
 		return "nothing shines";
 	case VISIBILITY_DEPTH:
@@ -294,7 +294,7 @@ static void lobes(struct report *r, const struct census *c)
 		     fx->specular && fx->glossy ? "specular and glossy"
 		     : fx->specular		? "specular"
 		     : fx->glossy		? "glossy"
-						: "a path that is traced and joined is as likely to carry light");
+						: "paths that are traced and joined are as likely to carry light");
 	fx->line_count = end;
 	fx->diffuse = materials(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only",
 				"is diffuse only");
@@ -336,11 +336,11 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		line(r, EFFECT_INSTANCING, false, "no mesh stands in several places");
 	const struct render_coincident *k = &w->coincident;
 	if (k->total > 1)
-		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide, of which one sees", k->total);
+		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide visibly", k->total);
 	else if (k->total == 1)
 		line(r, EFFECT_COINCIDENCE, true, "%s", k->text[0]);
 	else if (w->coincidence)
-		line(r, EFFECT_COINCIDENCE, true, "opaque bodies touch");
+		line(r, EFFECT_COINCIDENCE, true, "only opaque bodies touch");
 	else
 		line(r, EFFECT_COINCIDENCE, false, "no surfaces lie in one place");
 }
@@ -375,8 +375,8 @@ static void depth(struct report *r, const struct world *w, const struct effects_
 	uint32_t useful = bound < asked ? bound : asked;
 	bool on;
 	if (useful < asked)
-		on = line(r, EFFECT_DEPTH, false, "of %u edges that paths may have %u can carry light: %s", asked,
-			  useful, useful == 1 ? "nothing scatters" : "all that scatters lies in one plane");
+		on = line(r, EFFECT_DEPTH, false, "paths may have %u edges, but only up to %u can carry light: %s",
+			  asked, useful, useful == 1 ? "nothing scatters" : "everything that scatters is in one plane");
 	else
 		on = line(r, EFFECT_DEPTH, true, "paths of up to %u edges can carry light", asked);
 	r->fx->max_depth = on ? asked : useful;
@@ -399,7 +399,7 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	emitter_moves(&r, &c);
 	lobes(&r, &c);
 	surfaces(&r, &c, w, src);
-	fx->environment = lights(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on all that escapes", "",
+	fx->environment = lights(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
 				 "rays that escape meet nothing");
 	fx->area_light = lights(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
 				"no surface shines");

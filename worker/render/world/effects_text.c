@@ -12,8 +12,8 @@ enum { ON = EFFECT_MAY_FORCE_ON, OFF = EFFECT_MAY_FORCE_OFF, SCENE = EFFECT_MAY_
 
 const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_COLOUR] = {"colour", ON, "no wavelengths are drawn, carried or stored; colours are plain numbers",
-			   "a coloured scene has no grey values that would stand for its colours"},
-	[EFFECT_WAVELENGTH] = {"wavelength", ON | OFF, "no proposal is spent on the wavelength", NULL},
+			   "a coloured scene has no grey values to replace its colours"},
+	[EFFECT_WAVELENGTH] = {"wavelength", ON | OFF, "no proposals for the wavelength", NULL},
 	[EFFECT_DISPERSION] =
 		{"dispersion", ON | SCENE,
 		 "four wavelengths travel together: 4x fewer paths for a colour; no walk and no derivatives when one changes",
@@ -26,23 +26,22 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_SPECULAR] = {"specular", ON | SCENE,
 			     "no exactly specular chains; without glossy lobes no half vectors either", NULL},
 	[EFFECT_GLOSSY] = {"glossy", ON | SCENE, "no microfacets; without specular lobes no half vectors either", NULL},
-	[EFFECT_DIFFUSE] = {"diffuse", ON | SCENE, "nothing: only paths that meet such a surface pay", NULL},
-	[EFFECT_TRANSMISSION] = {"transmission", ON | SCENE, "nothing: only paths that meet such a surface pay", NULL},
+	[EFFECT_DIFFUSE] = {"diffuse", ON | SCENE, "nothing: it costs only paths that meet such a surface", NULL},
+	[EFFECT_TRANSMISSION] = {"transmission", ON | SCENE, "nothing: it costs only paths that meet such a surface",
+				 NULL},
 	[EFFECT_TEXTURES] = {"textures", ON, "colours are constants: no look-ups by (u,v)",
 			     "without its textures a scene has no colours"},
 	[EFFECT_DISPLACEMENT] = {"displacement", ON | SCENE, "no finer meshes are made: time and memory of building",
 				 NULL},
-	[EFFECT_BUMP] = {"bump", 0, "normals are the mesh's",
-			 "normals are bent where points are made, which costs nothing where none is"},
-	[EFFECT_ALPHA] = {"alpha", 0, "no ray asks for opacity: one filter less in Embree",
-			  "masks are specular lobes that do not bend"},
-	[EFFECT_COINCIDENCE] = {"coincidence", 0, "no ray asks which of two surfaces is there",
+	[EFFECT_BUMP] = {"bump", 0, "normals are the mesh's", "bending normals costs nothing where there is no relief"},
+	[EFFECT_ALPHA] = {"alpha", 0, "no opacity test per ray: one filter less in Embree", "masks are specular lobes"},
+	[EFFECT_COINCIDENCE] = {"coincidence", 0, "no test per ray which of two surfaces is present",
 				"surfaces coincide or they do not"},
 	[EFFECT_INSTANCING] = {"instancing", 0, "no transforms between rays and meshes",
 			       "instances share a mesh or they do not"},
 	[EFFECT_ENVIRONMENT] = {"environment", ON | SCENE, "rays that escape end there", NULL},
-	[EFFECT_AREA_LIGHT] = {"area-light", ON | SCENE, "nothing: only paths that end on one pay", NULL},
-	[EFFECT_DELTA_LIGHT] = {"delta-light", ON | SCENE, "nothing: only paths that end on one pay", NULL},
+	[EFFECT_AREA_LIGHT] = {"area-light", ON | SCENE, "nothing: it costs only paths that end on one", NULL},
+	[EFFECT_DELTA_LIGHT] = {"delta-light", ON | SCENE, "nothing: it costs only paths that end on one", NULL},
 	[EFFECT_DEPTH] = {"depth", ON, "longer paths are not tried", "--max-depth shortens paths"},
 };
 
@@ -78,7 +77,7 @@ static int parse_item(const char *item, size_t length, struct effects_choice *ou
 		return 0;
 	}
 	if (length < 2 || (*item != '+' && *item != '-'))
-		return error_set(e, EINVAL, "'%.*s': effects are forced by all, +NAME or -NAME, with commas between",
+		return error_set(e, EINVAL, "'%.*s': effects are forced by all, +NAME or -NAME, separated by commas",
 				 (int)length, item);
 	enum effect which = find(item + 1, length - 1);
 	if (which == EFFECTS)
@@ -172,7 +171,8 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 		snprintf(text, size, "%zu more pairs of shapes coincide", c->total - c->count);
 		return true;
 	}
-	snprintf(text, size, "more surfaces coincide than are looked for: of the others chance decides which is met");
+	snprintf(text, size,
+		 "more surfaces coincide than were searched for: of the others, it is undefined which one a ray hits");
 	return c->incomplete && i == 0;
 }
 

@@ -196,8 +196,8 @@ static void note_scales(struct builder *b)
 	}
 	if (b->w->shape_count > 0 && box_extent(&b->boxes[small]) < LEAST_SCALE * box_extent(&b->all))
 		snprintf(b->w->notes.scales, sizeof b->w->notes.scales,
-			 "%s is so much smaller than the scene, with %s, that numbers are too short for both: what is "
-			 "seen of it can be wrong",
+			 "%s is too small for the scene, with %s: double precision does not suffice for both, and its "
+			 "image may be wrong",
 			 node_title(b->shape_nodes[small], little), node_title(b->shape_nodes[large], big));
 }
 

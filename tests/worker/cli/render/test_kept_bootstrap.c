@@ -143,7 +143,7 @@ static void test_goes_on(void **state)
 		char wanted[64];
 		assert_null(render(w, &t));
 		assert_int_equal(t.leases, stops[i]);
-		snprintf(wanted, sizeof wanted, "goes on with %u of %u leases", done, LEASES);
+		snprintf(wanted, sizeof wanted, "continues from %u of %u leases", done, LEASES);
 		assert_true(done == 0 ? !*t.text : strstr(t.text, wanted) != NULL);
 		done += stops[i];
 		done = done < LEASES ? done : LEASES;

@@ -142,7 +142,7 @@ static void what_was_checked_is_sent(void **state)
 	says(&b, "meshes/wedge.obj: leads out of the scene's folder");
 	assert_int_equal(unlink(mesh), 0);
 	assert_int_equal(rename(secret, mesh), 0);
-	says(&b, "meshes/wedge.obj: it has changed meanwhile");
+	says(&b, "meshes/wedge.obj has changed meanwhile");
 	assert_int_equal(rename(kept, mesh), 0);
 	assert_string_equal(sent(&b), "");
 	scene_bundle_fini(&b);

@@ -170,7 +170,7 @@ static void test_two_sides_of_two_sides(void **state)
 	}
 	assert_true(seen > 100);
 	assert_int_equal(bsdf_try(&a, "twosided | dielectric", true, &nested, &e), -EINVAL);
-	assert_non_null(strstr(e.text, "lets light through; twosided takes only opaque ones"));
+	assert_non_null(strstr(e.text, "transmits light; twosided only accepts opaque BSDFs"));
 	assert_int_equal(bsdf_try(&a, "twosided | difftrans", true, &nested, &e), -EINVAL);
 	arena_fini(&a);
 }

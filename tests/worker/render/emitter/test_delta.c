@@ -209,10 +209,10 @@ static void test_refusals(void **state)
 	(void)state;
 	world_refused(
 		"<emitter type='point'><point name='position' x='1' y='0' z='0'/><transform name='to_world'><translate x='1'/></transform></emitter>",
-		"position and to_world say the same thing");
+		"position and to_world are both given");
 	world_refused(
 		"<emitter type='directional'><vector name='direction' x='1' y='0' z='0'/><transform name='to_world'/></emitter>",
-		"direction and to_world say the same thing");
+		"direction and to_world are both given");
 	world_refused("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>",
 		      "a direction of length 0");
 	world_refused("<emitter type='spot'><float name='beam_width' value='30'/></emitter>",

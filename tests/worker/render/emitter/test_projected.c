@@ -172,7 +172,7 @@ static void test_refusals(void **state)
 		"at most 89 degrees");
 	world_refused(
 		"<emitter type='projector'><float name='fov' value='30'/><string name='focal_length' value='30mm'/></emitter>",
-		"say the same thing");
+		"are both given");
 	world_refused(
 		"<emitter type='projector'><transform name='to_world'><scale x='1' y='1' z='0'/></transform></emitter>",
 		"singular");

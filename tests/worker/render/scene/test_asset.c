@@ -252,7 +252,7 @@ static void test_outside_is_said(void **state)
 	snprintf(real, sizeof real, "%s", base);
 	free(base);
 	snprintf(wanted, sizeof wanted,
-		 "../common/a.png: leads out of the scene's folder; to read what is there, say --path %s/common", real);
+		 "../common/a.png: leads out of the scene's folder; to allow it, give --path %s/common", real);
 	refuses("%2e%2e/common/a.png", wanted);
 	reads("%2e%2e/scene/a.obj", "inside");
 	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
@@ -271,7 +271,7 @@ static void test_outside_is_said(void **state)
 	for (int i = 0; i < 64; i++)
 		strcat(deep, "%2e%2e/");
 	strcat(deep, "a");
-	refuses(deep, "say --path / ");
+	refuses(deep, "give --path / ");
 }
 
 /* A file that is asked for again and again is opened once, and in the end all that was opened is closed. */

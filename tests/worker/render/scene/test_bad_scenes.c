@@ -56,8 +56,8 @@ static void test_broken_xml(void **state)
 	refuses(S "<shape type='cube'/>" END "<x/>", "junk after document element");
 	refuses(S "\xff\xfe" END, "not well-formed");
 	refuses(S "&unknown;" END, "undefined entity");
-	refuses(S "words" END, "text has no meaning here");
-	refuses("<scenes version='3.0.0'/>", "a scene file begins with <scene");
+	refuses(S "words" END, "text is not allowed here");
+	refuses("<scenes version='3.0.0'/>", "a scene file must begin with <scene");
 	refuses("<scene/>", "needs version=");
 	refuses("<scene version='three'/>", "needs version=");
 	refuses("<scene version='3.0.0' verzion='1'/>", "has no attribute `verzion`; did you mean `version`?");
@@ -173,7 +173,7 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<float name='alpha' valeu='1'/>"), "has no attribute `valeu`; did you mean `value`?");
 	refuses(BSDF("<float name='alpha' value='$x'/>"), "$x is not defined");
 	refuses(BSDF("<float name='alpha' value='0.1'/><float name='alpha' value='0.2'/>"), "given twice");
-	refuses(BSDF("<string name='alpha' value='0.1'/>"), "`alpha` cannot be given like this (supported: float)");
+	refuses(BSDF("<string name='alpha' value='0.1'/>"), "`alpha` cannot have this type (supported: float)");
 	refuses(BSDF("<float name='alpha' value='.1'><x/></float>"), "has no place in <float>");
 	refuses(BSDF("<rgb name='eta' value='1, 2'/>"), "neither three numbers nor one");
 	refuses(BSDF("<rgb name='eta' value='1, inf, 2'/>"), "neither three numbers nor one");
@@ -235,11 +235,11 @@ static void test_bad_transforms(void **state)
 	refuses(SHAPE("<translate/>"), "needs either x, y, z or value");
 	refuses(SHAPE("<translate x='1' value='1 2 3'/>"), "needs either x, y, z or value");
 	refuses(SHAPE("<skale x='1'/>"), "did you mean `scale`?");
-	refuses(SHAPE("<lookat origin='0 0 0' target='0 0 0' up='0 1 0'/>"), "one point");
-	refuses(SHAPE("<lookat origin='0 0 0' target='0 1 0' up='0 1 0'/>"), "up points along the view");
+	refuses(SHAPE("<lookat origin='0 0 0' target='0 0 0' up='0 1 0'/>"), "origin and target are equal");
+	refuses(SHAPE("<lookat origin='0 0 0' target='0 1 0' up='0 1 0'/>"), "up is parallel to the view");
 	refuses(SHAPE("<lookat origin='0 0 0' up='0 1 0'/>"), "needs an attribute `target`");
-	refuses(SHAPE("<lookat origin='0 1 0' target='0 1 0'/>"), "origin and target are one point");
-	refuses(SHAPE("<scale value='1e50'/><scale value='1e50'/>"), "leaves the range");
+	refuses(SHAPE("<lookat origin='0 1 0' target='0 1 0'/>"), "origin and target are equal");
+	refuses(SHAPE("<scale value='1e50'/><scale value='1e50'/>"), "the transform is out of range");
 	refuses(SHAPE("<scale value='1e61'/>"), "s.xml:1: <scale>: value=1e+61 is outside [-1e+60, 1e+60]");
 	refuses(SHAPE("<lookat origin='1e154 0 0' target='0 0 0' up='0 1 0'/>"), "origin=1e+154 is outside");
 }
@@ -341,8 +341,8 @@ static void test_misplaced_parameters(void **state)
 	refuses(BSDF("<float name='num_parameters' value='1'/>"), "has no `num_parameters`");
 	refuses(S "<shape type='cube'><texture name='num_parameters' type='checkerboard'/></shape>" END,
 		"has no `num_parameters`");
-	refuses(BSDF("<rgb name='alpha' value='.1 .1 .2'/>"), "`alpha` cannot be given like this");
-	refuses(BSDF("<spectrum name='alpha' value='400:.1, 700:.2'/>"), "`alpha` cannot be given like this");
+	refuses(BSDF("<rgb name='alpha' value='.1 .1 .2'/>"), "`alpha` cannot have this type");
+	refuses(BSDF("<spectrum name='alpha' value='400:.1, 700:.2'/>"), "`alpha` cannot have this type");
 	refuses(BSDF("<rgb name='alpha' value='2'/>"), "alpha=2 is outside");
 }
 

@@ -204,27 +204,27 @@ static const struct {
 	{"\"light\": 0", "\"light\": 7", "there is no lights[7]"},
 	{"\"mode\": 5", "\"mode\": 8", "meshes[0]: a primitive without attributes, or of mode 8"},
 	{"\"POSITION\": 9", "\"POSITION\": 99", "there is no accessors[99]"},
-	{"\"POSITION\": 9", "\"POSITION\": 3", "accessors[3]: of another type than position needs"},
+	{"\"POSITION\": 9", "\"POSITION\": 3", "accessors[3]: of a type that position cannot have"},
 	{"\"POSITION\": 9,", "", "meshes[0]: a primitive has no POSITION"},
-	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 2", "not equally many"},
-	{"\"indices\": 3", "\"indices\": 8", "accessors[8]: of another type than index needs"},
+	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 2", "texture coordinates differ"},
+	{"\"indices\": 3", "\"indices\": 8", "accessors[8]: of a type that index cannot have"},
 	{"{\"bufferView\": 2, ", "{\"bufferView\": 2, \"sparse\": {}, ", "sparse accessors are not supported"},
 	{"{\"bufferView\": 2, ", "{", "accessors[3]: without a bufferView"},
 	{"5123, \"count\": 24", "5123, \"count\": 25", "accessors[3]: it leads out of bufferViews[2]"},
 	{"5123, \"count\": 24", "5123, \"count\": 23", "no whole triangles"},
 	{"5123, \"count\": 24", "5123, \"count\": 1e300", "\"count\" is not a whole number"},
 	{"5123, \"count\": 24", "5125, \"count\": 12", "out of range; there are 6 vertices"},
-	{"\"byteOffset\": 24, \"componentType\"", "\"byteOffset\": 9007199254740992, \"componentType\"", "leads out"},
-	{"\"byteStride\": 32", "\"byteStride\": 4", "it leads out of bufferViews[5]"},
-	{"\"byteOffset\": 593", "\"byteOffset\": 594", "bufferViews[9]: it leads out of buffers[0] of 601 bytes"},
+	{"\"byteOffset\": 24, \"componentType\"", "\"byteOffset\": 9007199254740992, \"componentType\"", "exceeds"},
+	{"\"byteStride\": 32", "\"byteStride\": 4", "it exceeds bufferViews[5]"},
+	{"\"byteOffset\": 593", "\"byteOffset\": 594", "bufferViews[9]: it exceeds buffers[0] of 601 bytes"},
 	{"593, \"byteLength\": 8}],\n\"buffers\": [\n{BUFFER \"byteLength\": 601",
 	 "690, \"byteLength\": 8}],\n\"buffers\": [\n{BUFFER \"byteLength\": 700", "the mesh.bin has 601 bytes"},
 	{"BUFFER", "\"uri\": \"http://x/y.bin\",", "not from a network"},
 	{"BUFFER", "\"uri\": \"../y.bin\",", "%2e%2e/y.bin"},
 	{"BUFFER", "\"uri\": \"x%20y/%2E%2e/.%2e/y%25.bin\",", "%2e%2e/y%.bin"},
 	{"BUFFER", "\"uri\": \"a%00b\",", "its uri names no file"},
-	{"BUFFER", "\"uri\": \"data:text/plain,abc\",", "buffers[0]: what is embedded in it is not written in base64"},
-	{"BUFFER", "\"uri\": \"data:;base64,AAAA\",", "buffers[0]: it says 601 bytes and has 3"},
+	{"BUFFER", "\"uri\": \"data:text/plain,abc\",", "buffers[0]: its embedded data is not base64"},
+	{"BUFFER", "\"uri\": \"data:;base64,AAAA\",", "buffers[0]: it states 601 bytes and has 3"},
 	{"\"index\": 0},", "\"index\": 3},", "there is no textures[3]"},
 	{"{\"source\": 0, ", "{", "textures[0]: it has no source"},
 	{"\"roughnessFactor\": 0.5", "\"roughnessFactor\": 1.5", "s.gltf:25: <float>: roughness=1.5 is outside [0, 1]"},
@@ -267,7 +267,7 @@ static void test_malformed_containers(void **state)
 	} damage[] = {
 		{4, 1, "a GLB file of version 1"},
 		{10, 9, "its header says"},
-		{14, 9, "a chunk leads out of the file"},
+		{14, 9, "a chunk exceeds the file"},
 		{16, 'X', "a GLB file begins with JSON"},
 		{20, 'x', "s.glb:1: "},
 		{0, 'x', "s.glb:1: "},
@@ -481,7 +481,7 @@ static void test_notes(void **state)
 	struct error e;
 	if (read_files(changed.list, false, &s, &e))
 		fail_msg("%s", e.text);
-	assert_true(has_note(&s, "what these extensions add is not read: ACME_fog, ACME_wind"));
+	assert_true(has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
 	assert_true(has_note(&s, "ranges of lights are ignored"));
 	scene_fini(&s);
 }

@@ -124,7 +124,7 @@ static void test_channels(void **state)
 	struct image img;
 	struct error e;
 	assert_int_equal(image_decode(jpeg, size, "i", false, IMAGE_ALPHA, &arena, &img, &e), -ENOTSUP);
-	assert_string_equal(e.text, "i: alpha is read of PNG only");
+	assert_string_equal(e.text, "i: alpha is only read from PNG");
 	arena_fini(&arena);
 	free(jpeg);
 }
@@ -135,7 +135,7 @@ static void test_bad_png(void **state)
 	size_t size;
 	unsigned char *png = sample_png(13, 9, SAMPLE_RGB, 8, 0, &size);
 	for (size_t n = 0; n < size; n++)
-		refuses(png, n, n < 8 ? "no image that is understood" : "i: PNG: ");
+		refuses(png, n, n < 8 ? "unknown image format" : "i: PNG: ");
 	unsigned char *copy = malloc(size);
 	for (size_t at = 8; at < size; at++) { /* every chunk has a checksum */
 		memcpy(copy, png, size);

@@ -144,14 +144,14 @@ static void test_lies(void **state)
 	lie(24, 22, 0x80000000, 4, "pixels; at most");
 	lie(24, 18, 4000, 4, "too short for");
 	lie(24, 10, 0xffffffff, 4, "ends too early");
-	lie(24, 28, 16, 2, "16 bits a pixel");
+	lie(24, 28, 16, 2, "16 bits per pixel");
 	lie(8, 30, 1, 4, "compressed");
 	lie(32, 30, 3, 4, "unusual masks");
-	lie(8, 46, 257, 4, "no room");
-	lie(8, 10, 14 + 40 + 255 * 4, 4, "no room");
+	lie(8, 46, 257, 4, "overlaps the pixels");
+	lie(8, 10, 14 + 40 + 255 * 4, 4, "overlaps the pixels");
 	lie(8, 46, 2, 4, "beyond the palette");
 	struct bitmap b = bitmap_of(8, false, false, false, false);
-	refuses(b.bytes, 14 + 40 + 4 * 256 - 1, "no room");
+	refuses(b.bytes, 14 + 40 + 4 * 256 - 1, "overlaps the pixels");
 }
 
 int main(void)

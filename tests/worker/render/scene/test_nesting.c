@@ -125,7 +125,7 @@ static void test_chains(void **state)
 	};
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
 		char sentence[128];
-		snprintf(sentence, sizeof sentence, "%s: objects hold each other more than 8192 deep", all[i].place);
+		snprintf(sentence, sizeof sentence, "%s: objects are nested more than 8192 deep", all[i].place);
 		ladder(all[i].element, all[i].type, all[i].leaf, 8191, 1, "");
 		put("</scene>");
 		expect(NULL);
@@ -203,7 +203,7 @@ static void test_bytes_included(void **state)
 	const struct memory_file files[] = {{"s.xml", xml, used}, {"b.xml", blanks, BLANKS}, {0}};
 	struct error e = {""};
 	assert_int_equal(read_files(files, &e), -EFBIG);
-	assert_non_null(strstr(e.text, "more than 256 MB in all"));
+	assert_non_null(strstr(e.text, "more than 256 MB in total"));
 	mem_free(blanks);
 }
 

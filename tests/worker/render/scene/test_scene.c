@@ -392,7 +392,7 @@ static void test_ignored_is_noted_once(void **state)
 			"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
 			"<dpt/></scene>");
 	assert_int_equal(s.note_count, 4);
-	assert_string_equal(s.notes[0], "s.xml:2: <mode> and all inside it is ignored");
+	assert_string_equal(s.notes[0], "s.xml:2: <mode> is ignored with its contents");
 	assert_string_equal(
 		s.notes[1],
 		"s.xml:3: <integrator type=\"unheard\"> is ignored except for: max_depth, rr_depth, hide_emitters");
@@ -410,7 +410,7 @@ static void test_depths_beyond_the_limit_are_noted(void **state)
 		read_ok("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='129'/>"
 			"</integrator></scene>");
 	assert_int_equal(s.note_count, 2);
-	assert_non_null(strstr(s.notes[1], "max_depth 129 is 128 here"));
+	assert_non_null(strstr(s.notes[1], "max_depth 129 becomes 128"));
 	scene_fini(&s);
 	s = read_ok("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='128'/>"
 		    "</integrator></scene>");

@@ -172,14 +172,13 @@ static void test_notes_on_the_whole(void **state)
 		const char *xml, *note;
 	} cases[] = {
 		{"<sensor type='perspective'/>",
-		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the picture is black"},
+		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
 		{"<integrator type='direct'/>",
-		 "s.xml:1: <integrator type=\"direct\">: is not what is rendered: the picture is of all light on "
-		 "surfaces, without media; --max-depth 2 leaves out indirect light"},
+		 "s.xml:1: <integrator type=\"direct\">: is ignored: the image shows all light on surfaces, without media; --max-depth 2 omits indirect light"},
 		{"<integrator type='volpath'/>", "without media"},
-		{"<integrator type='direct_projective'/>", "without media; --max-depth 2 leaves out indirect light"},
-		{"<integrator type='multichannel'/>", "is not what is rendered"},
-		{"<integrator type='volprim_rf_basic'/>", "is not what is rendered"},
+		{"<integrator type='direct_projective'/>", "without media; --max-depth 2 omits indirect light"},
+		{"<integrator type='multichannel'/>", "is ignored"},
+		{"<integrator type='volprim_rf_basic'/>", "is ignored"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[512];
@@ -259,22 +258,23 @@ static void test_refused(void **state)
 	(void)state;
 #define SENSOR(x) "<sensor type='perspective'>" x "</sensor>"
 	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='10'/><integer name='crop_width' value='11'/></film>"),
-		"s.xml:1: <film type=\"hdrfilm\">: the crop window of 11 x 576 pixels at 0, 0 leaves the film of 10 x 576");
+		"s.xml:1: <film type=\"hdrfilm\">: the crop window of 11 x 576 pixels at 0, 0 exceeds the film of 10 x 576");
 	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='10'/><integer name='crop_offset_x' value='1'/></film>"),
-		"the crop window of 10 x 576 pixels at 1, 0 leaves");
+		"the crop window of 10 x 576 pixels at 1, 0 exceeds");
 	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='32000'/><integer name='height' value='32000'/></film>"),
 		"a film of 32000 x 32000 pixels");
 	refuses(SENSOR("") "<integrator type='path'><integer name='max_depth' value='0'/></integrator>",
 		"a depth of 0");
 	refuses(SENSOR("") "<integrator type='path'/><integrator type='path'/>", "a second integrator");
-	refuses(SENSOR("<float name='fov' value='40'/><string name='focal_length' value='50mm'/>"), "give one");
+	refuses(SENSOR("<float name='fov' value='40'/><string name='focal_length' value='50mm'/>"),
+		"only one is allowed");
 	refuses(SENSOR("<string name='focal_length' value='50'/>"), "is not a length");
 	refuses(SENSOR("<string name='focal_length' value='-1mm'/>"), "is not a length");
 	refuses(SENSOR("<float name='near_clip' value='5'/><float name='far_clip' value='5'/>"),
 		"is not below far_clip");
 	refuses(SENSOR("<transform name='to_world'><matrix value='1 0.5 0 0 1 0 0 0 1'/></transform>"),
-		"must only turn");
-	refuses(SENSOR("<transform name='to_world'><scale z='0'/></transform>"), "must only turn");
+		"may only rotate");
+	refuses(SENSOR("<transform name='to_world'><scale z='0'/></transform>"), "may only rotate");
 }
 
 /* Both dialects; everything else as a pinhole has it. */

@@ -183,7 +183,7 @@ static void test_left_is_right(void **state)
 		for (int k = 0; k < 4; k++)
 			assert_true(m.m[i][k] == (k == 0 ? -n.m[i][k] : n.m[i][k]));
 	assert_int_equal(a.note_count, b.note_count + 1);
-	assert_true(says(&a, "turns their cameras round") && !says(&b, "turns their cameras round"));
+	assert_true(says(&a, "mirrors the cameras") && !says(&b, "mirrors the cameras"));
 	scene_fini(&a);
 	scene_fini(&b);
 }

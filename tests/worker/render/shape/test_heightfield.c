@@ -195,7 +195,7 @@ static void test_bad_input(void **state)
 	refuses("", "s.xml:2: <shape type=\"heightfield\">: needs either a filename or a bitmap inside");
 	refuses(FILENAME "<texture type='bitmap'>" FILENAME "</texture>", "needs either a filename or a bitmap");
 	refuses("<texture type='checkerboard'/>", "the heights of a heightfield come from a bitmap");
-	refuses(FILENAME, "a picture of 1 x 5 pixels; heights need 2 x 2");
+	refuses(FILENAME, "an image of 1 x 5 pixels; heights need 2 x 2");
 	refuses("<string name='filename' value='m.obj'/>", "m.obj");
 	refuses("<string name='filename' value='none.png'/>", "none.png: no such file");
 	pictures_fini(&p);

@@ -147,8 +147,8 @@ static void test_bad_ply(void **state)
 		{"ply\nformat binary 1.0\n", "m:2: the format is neither"},
 		{"ply\nelement vertex -1\nend_header\n", "m:2: an element needs a name and a count"},
 		{"ply\nproperty float x\nend_header\n", "m:2: a property before any element"},
-		{HEAD "element vertex 1\nproperty half x\nend_header\n", "m:4: a property of no known type"},
-		{HEAD "element vertex 1\nproperty list float int x\nend_header\n", "a property of no known type"},
+		{HEAD "element vertex 1\nproperty half x\nend_header\n", "m:4: a property of an unknown type"},
+		{HEAD "element vertex 1\nproperty list float int x\nend_header\n", "a property of an unknown type"},
 		{HEAD "element vertex 1\nproperty float\nend_header\n", "a property without a name"},
 		{HEAD "element vertex 1\nelement vertex 1\nend_header\n", "an element is given twice"},
 		{HEAD "what\nend_header\n", "m:3: neither comment"},
@@ -159,7 +159,7 @@ static void test_bad_ply(void **state)
 		 "indices must be whole numbers"},
 		{QUAD
 		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 4",
-		 "m: face 0: an index that is none of a vertex"},
+		 "m: face 0: an index out of range"},
 		{QUAD
 		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 -1",
 		 "an index"},

@@ -198,7 +198,7 @@ static void test_refusals_say_why(void **state)
 		   {"bitmap", "filename"},
 		   {"bitmap filename=nowhere", "nowhere"},
 		   {"bitmap filename=p0 gamma=2.2", "gamma"},
-		   {"bitmap filename=p0 channel=a", "alpha is read of PNG only"},
+		   {"bitmap filename=p0 channel=a", "alpha is only read from PNG"},
 		   {"checkerboard color0=3", "color0"}};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		struct texture t;

@@ -362,7 +362,7 @@ static void test_refused(void **state)
 	refuses(PLY("grid.ply", FIELD("displacement", "face_heat") "<integer name='displacement_level' value='1'/>"),
 		"an attribute of a mesh cannot displace a surface");
 	refuses("<emitter type='projector'>" FIELD("irradiance", "face_heat") "</emitter>",
-		"only what lies on a mesh has its attributes");
+		"attributes are only available on a mesh");
 }
 
 static int teardown(void **state)

@@ -145,7 +145,7 @@ static void test_refused(void **state)
 	refuses(BITMAP("") LEVEL("1"), "h.png: no such file");
 	refuses("<bsdf name='displacement' type='diffuse'/>" LEVEL("1"),
 		"`displacement` may be a texture, but not a bsdf");
-	refuses("<rgb name='displacement' value='1,0.5,1'/>" LEVEL("1"), "`displacement` cannot be given like this");
+	refuses("<rgb name='displacement' value='1,0.5,1'/>" LEVEL("1"), "`displacement` cannot have this type");
 	refuses("<texture name='displacement' type='checkerboard'><rgb name='color0' value='1,0,0'/></texture>" LEVEL(
 			"1"),
 		"color0: a height is a number, not a colour");

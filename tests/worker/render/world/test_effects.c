@@ -63,9 +63,9 @@ static void test_dispersion_that_no_path_meets(void **state)
 	expect(VIEW LAMP SF11("a") SF11("b") BALL("1", ""), "dispersion", false,
 	       "`a` and 1 more disperse, but no shape uses them");
 	expect(VIEW LAMP SF11("sf") BALL("1", USES("sf")) BOX("1.5", ""), "dispersion", false,
-	       "`sf` disperses, but a closed opaque shape is around it");
+	       "`sf` disperses, but it is inside a closed opaque shape");
 	expect(VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("1.5", ""), "dispersion", false,
-	       "`sf` disperses, but a closed opaque shape is around it");
+	       "`sf` disperses, but it is inside a closed opaque shape");
 	expect(VIEW SF11("sf") BALL("1", USES("sf")), "dispersion", false, "`sf` disperses, but nothing shines");
 	expect("<integrator type='path'><integer name='max_depth' value='1'/></integrator>" VIEW LAMP SF11("sf")
 		       BALL("1", USES("sf")),
@@ -129,9 +129,9 @@ static void test_lights_and_depth(void **state)
 	expect(VIEW LAMP BALL("1", ""), "delta-light", false, "no emitter is a point or parallel light");
 	expect(VIEW LAMP BALL("1", ""), "environment", false, "rays that escape meet nothing");
 	expect(VIEW LAMP FLOOR, "depth", false,
-	       "of 128 edges that paths may have 2 can carry light: all that scatters lies in one plane");
+	       "paths may have 128 edges, but only up to 2 can carry light: everything that scatters is in one plane");
 	expect(VIEW LAMP BALL("1", "<bsdf type='diffuse'><float name='reflectance' value='0'/></bsdf>"), "depth", false,
-	       "of 128 edges that paths may have 1 can carry light: nothing scatters");
+	       "paths may have 128 edges, but only up to 1 can carry light: nothing scatters");
 	expect(VIEW LAMP FLOOR BALL("1", ""), "depth", true, "paths of up to 128 edges can carry light");
 }
 
@@ -139,22 +139,21 @@ static void test_surfaces(void **state)
 {
 	(void)state;
 	expect(VIEW LAMP BALL("1", ""), "half-vectors", false,
-	       "no lobe is narrow: a path that is traced and joined is as likely to carry light");
+	       "no lobe is narrow: paths that are traced and joined are as likely to carry light");
 	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "half-vectors", true,
 	       "lobes are narrow: specular");
 	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "specular", true,
 	       "`g` has exactly specular lobes");
 	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>") BOX("1.5", ""), "specular", false,
-	       "`g` is specular, but a closed opaque shape is around it");
+	       "`g` is specular, but it is inside a closed opaque shape");
 	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "transmission", true, "`g` lets light through");
 	expect(VIEW LAMP BALL("1", "<bsdf type='roughconductor' id='m'/>"), "glossy", true,
 	       "`m` has rough lobes of finite width");
 	expect(VIEW LAMP BALL("1", ""), "aperture", false, "the sensor is a pinhole");
 	expect(VIEW LAMP BALL("1", ""), "textures", false, "no material and no emitter has a texture");
 	expect(VIEW LAMP BALL("1", ""), "displacement", false, "no shape is displaced");
-	expect(VIEW LAMP BALL("1", ""), "bump", false,
-	       "normals are bent where points are made, which costs nothing where none is");
-	expect(VIEW LAMP BALL("1", ""), "alpha", false, "masks are specular lobes that do not bend");
+	expect(VIEW LAMP BALL("1", ""), "bump", false, "bending normals costs nothing where there is no relief");
+	expect(VIEW LAMP BALL("1", ""), "alpha", false, "masks are specular lobes");
 	expect(VIEW LAMP BALL("1", ""), "instancing", false, "no mesh stands in several places");
 }
 

@@ -123,8 +123,8 @@ static void test_flat(void **state)
 	assert_true(w->shapes[2].is_sphere && w->parts[2].emitter >= 0 && w->parts[1].emitter < 0);
 	assert_true(w->parts[0].bsdf != w->parts[1].bsdf);
 	assert_int_equal(w->emitter_count, 2); /* the sphere and the sky */
-	assert_non_null(strstr(w->notes.flat,
-			       "3 triangles without an area are left out, in 2 shapes (first: the obj in line 1)"));
+	assert_non_null(
+		strstr(w->notes.flat, "3 triangles without area are left out, in 2 shapes (first: the obj in line 1)"));
 	assert_non_null(strstr(w->notes.flat, "1 of these shapes has no others"));
 	world_free(w);
 }
