@@ -74,7 +74,7 @@ int checked_file_finish(struct checked_file *s, struct error *e)
 }
 
 /* Refills the buffer; at the end of the file it stays empty. */
-static int fill(struct checked_file *s, struct error *e)
+static int refill_buffer(struct checked_file *s, struct error *e)
 {
 	ssize_t n;
 	do
@@ -91,7 +91,7 @@ static int fill(struct checked_file *s, struct error *e)
 static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct error *e)
 {
 	for (unsigned char *p = bytes; size;) {
-		int rc = s->at == s->filled ? fill(s, e) : 0;
+		int rc = s->at == s->filled ? refill_buffer(s, e) : 0;
 		if (rc)
 			return rc;
 		size_t n = s->filled - s->at < size ? s->filled - s->at : size;
@@ -115,7 +115,7 @@ static int check(struct checked_file *s, struct error *e)
 		return error_set(e, EBADMSG, "%s: too short", s->path);
 	s->left = (uint64_t)st.st_size - sizeof want;
 	for (uint64_t left = s->left; left;) {
-		int rc = s->at == s->filled ? fill(s, e) : 0;
+		int rc = s->at == s->filled ? refill_buffer(s, e) : 0;
 		size_t n = s->filled - s->at < left ? s->filled - s->at : (size_t)left;
 		if (rc || n == 0)
 			return rc ? rc : error_set(e, EBADMSG, "%s: ends too early", s->path);

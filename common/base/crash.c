@@ -38,7 +38,7 @@ const char *crash_signal_name(int number)
 	return number == SIGKILL ? "SIGKILL" : "a signal";
 }
 
-static size_t add(char *text, size_t used, const char *more)
+static size_t append_text(char *text, size_t used, const char *more)
 {
 	while (*more && used + 1 < CRASH_TEXT)
 		text[used++] = *more++;
@@ -54,22 +54,22 @@ static size_t add_number(char *text, size_t used, int n)
 	do
 		digits[--i] = (char)('0' + n % 10);
 	while ((n /= 10) > 0);
-	return add(text, used, digits + i);
+	return append_text(text, used, digits + i);
 }
 
 static void on_signal(int number)
 {
 	char text[CRASH_TEXT];
 	int kept = errno;
-	size_t n = add(text, 0, crash_signal_name(number));
+	size_t n = append_text(text, 0, crash_signal_name(number));
 	if (place.doing) {
-		n = add(text, n, " while ");
-		n = add(text, n, place.doing);
+		n = append_text(text, n, " while ");
+		n = append_text(text, n, place.doing);
 	}
 	if (place.doing && place.file) {
-		n = add(text, n, ": ");
-		n = add(text, n, place.file);
-		n = add(text, n, ":");
+		n = append_text(text, n, ": ");
+		n = append_text(text, n, place.file);
+		n = append_text(text, n, ":");
 		add_number(text, n, place.line);
 	}
 	handler(number, text);

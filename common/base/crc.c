@@ -9,7 +9,7 @@ enum { SLICES = 8 };
 static uint32_t table[SLICES][256];
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
-static void fill(void)
+static void fill_tables(void)
 {
 	for (uint32_t i = 0; i < 256; i++) {
 		uint32_t c = i;
@@ -48,7 +48,7 @@ uint32_t crc32c(uint32_t crc, const void *bytes, size_t size)
 	if (__builtin_cpu_supports("sse4.2"))
 		return ~by_instruction(crc, p, size);
 #endif
-	pthread_once(&once, fill);
+	pthread_once(&once, fill_tables);
 	for (; size >= SLICES; size -= SLICES, p += SLICES) {
 		uint32_t low =
 			crc ^ ((uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24);

@@ -179,7 +179,7 @@ static int check_value(const char *noun, option_values *values, const char *arg,
 }
 
 /* Stores an option's argument (NULL if it takes none) at its place in target. */
-static int put(const struct option_row *r, void *target, char *arg, struct error *e)
+static int store_argument(const struct option_row *r, void *target, char *arg, struct error *e)
 {
 	void *field = (char *)target + r->offset;
 	if (r->values && check_value(r->name, r->values, arg, e))
@@ -212,7 +212,7 @@ int option_defaults(const struct option_table *t, void *target, struct error *e)
 	const struct option_row *r;
 	int rc = 0;
 	for (size_t i = 0, k = 0; !rc && (k = i, r = row_of(t->groups, &k, &group)) != NULL; i++)
-		if (r->standard && (rc = put(r, target, text_borrow(r->standard), e)) != 0)
+		if (r->standard && (rc = store_argument(r, target, text_borrow(r->standard), e)) != 0)
 			error_prefix(e, rc, "the default of --%s", r->name);
 	return rc;
 }
@@ -240,7 +240,7 @@ static int environment(const struct reader *x)
 	size_t offset;
 	for (size_t i = 0; (r = option_at(x->program, i, NULL, &offset)) != NULL; i++) {
 		char *value = r->environment ? getenv(r->environment) : NULL;
-		int rc = value ? put(r, target_of(x, offset), value, x->e) : 0;
+		int rc = value ? store_argument(r, target_of(x, offset), value, x->e) : 0;
 		if (rc)
 			return error_prefix(x->e, rc, "$%s", r->environment);
 	}
@@ -294,7 +294,7 @@ static int apply(struct reader *x, const struct option_row *r, size_t offset, ch
 			return error_set(x->e, EINVAL, "option '--%s' needs an argument: %s", r->name, r->arg);
 		arg = x->argv[++x->at];
 	}
-	return put(r, target_of(x, offset), arg, x->e);
+	return store_argument(r, target_of(x, offset), arg, x->e);
 }
 
 static int read_long(struct reader *x, char *text)

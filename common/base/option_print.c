@@ -41,7 +41,7 @@ static void describe(const struct option_row *r, char *text, size_t size)
 /* ---- help ---- */
 
 /* The words of a line of n bytes, starting at a column; continuation lines start at `indent`. */
-static void fill(FILE *out, const char *line, size_t n, size_t column, size_t indent)
+static void print_filled(FILE *out, const char *line, size_t n, size_t column, size_t indent)
 {
 	const char *end = line + n;
 	bool first = true;
@@ -70,7 +70,7 @@ static void fill_lines(FILE *out, const char *text)
 {
 	while (*text) {
 		size_t n = strcspn(text, "\n");
-		fill(out, text, n, 0, 0);
+		print_filled(out, text, n, 0, 0);
 		text += n + (text[n] == '\n');
 	}
 }
@@ -98,7 +98,7 @@ static void print_row(FILE *out, const struct option_row *r)
 		n = 0;
 	}
 	fprintf(out, "%*s", (int)(HELP_COLUMN - n), "");
-	fill(out, text, strlen(text), HELP_COLUMN, HELP_COLUMN);
+	print_filled(out, text, strlen(text), HELP_COLUMN, HELP_COLUMN);
 }
 
 static void print_forms(FILE *out, const struct program *p)
@@ -151,7 +151,7 @@ static void print_usage(FILE *out, const struct program *p)
 			text_put(&t, " [--%s%s%s]", r->name, r->arg ? "=" : "", r->arg ? r->arg : "");
 	if (p->words)
 		text_put(&t, " %.*s", (int)strcspn(p->words, "\n"), p->words);
-	fill(out, line, strlen(line), 0, 12);
+	print_filled(out, line, strlen(line), 0, 12);
 	free(line);
 }
 

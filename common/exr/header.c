@@ -159,7 +159,7 @@ bool header_excluded(const char *name)
 	return false;
 }
 
-static struct exr_attribute *add(struct header *h, enum header_name name, int type)
+static struct exr_attribute *add_attribute(struct header *h, enum header_name name, int type)
 {
 	assert(h->count < HEADER_ATTRIBUTES && header_rows[name].type == type);
 	(void)type;
@@ -170,14 +170,14 @@ static struct exr_attribute *add(struct header *h, enum header_name name, int ty
 
 static void add_int(struct header *h, enum header_name name, uint32_t value)
 {
-	struct exr_attribute *a = add(h, name, INT);
+	struct exr_attribute *a = add_attribute(h, name, INT);
 	a->type = EXR_ATTRIBUTE_INT;
 	a->integer = (int)value;
 }
 
 static void add_double(struct header *h, enum header_name name, double value)
 {
-	struct exr_attribute *a = add(h, name, DOUBLE);
+	struct exr_attribute *a = add_attribute(h, name, DOUBLE);
 	a->type = EXR_ATTRIBUTE_DOUBLE;
 	a->number = value;
 }
@@ -195,7 +195,7 @@ __attribute__((format(printf, 2, 3))) static void append(struct header *h, const
 
 static void begin_string(struct header *h, enum header_name name)
 {
-	struct exr_attribute *a = add(h, name, STRING);
+	struct exr_attribute *a = add_attribute(h, name, STRING);
 	a->type = EXR_ATTRIBUTE_STRING;
 	a->string = h->text + h->used;
 	h->text[h->used] = 0;

@@ -423,8 +423,9 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 }
 
 /* Calls `each` for every certificate in issued/, until it fails. */
-static int walk(const char *folder, int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e),
-		void *user, struct error *e)
+static int for_each_issued(const char *folder,
+			   int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e), void *user,
+			   struct error *e)
 {
 	char path[PATH_SIZE];
 	int rc = path_in(path, e, folder, "", "issued");
@@ -484,7 +485,7 @@ int authority_revoke(const char *folder, const char *what, unsigned *count, stru
 	if (rc)
 		return rc;
 	struct revocation r = {.a = &a, .what = what};
-	rc = walk(folder, revoke_one, &r, e);
+	rc = for_each_issued(folder, revoke_one, &r, e);
 	if (!rc && !r.count)
 		rc = error_set(e, ENOENT, "no valid certificate has the name or serial number '%s'", what);
 	if (!rc)
@@ -492,7 +493,7 @@ int authority_revoke(const char *folder, const char *what, unsigned *count, stru
 	if (!rc)
 		rc = write_list(&a, "", e);
 	if (!rc)
-		rc = walk(folder, tell_coordinator, &a, e);
+		rc = for_each_issued(folder, tell_coordinator, &a, e);
 	*count = r.count;
 	authority_close(&a);
 	return rc;
@@ -545,7 +546,7 @@ int authority_list(const char *folder, struct authority_entry **entries, size_t 
 	int rc = authority_open(&a, folder, false, e);
 	if (rc)
 		return rc;
-	rc = walk(folder, list_one, &l, e);
+	rc = for_each_issued(folder, list_one, &l, e);
 	authority_close(&a);
 	if (rc) {
 		mem_free(l.entries);

@@ -269,7 +269,7 @@ static struct slot *next_slot(const struct farm *f, const struct event *ev)
 	return is_next(j, s, &ev->lease.key) ? s : NULL;
 }
 
-static struct lease *held(const struct farm *f, const struct event *ev)
+static struct lease *lease_held_by_sender(const struct farm *f, const struct event *ev)
 {
 	struct slot *s = next_slot(f, ev);
 	return s ? lease_of(s, farm_find_peer(f, ev->peer)) : NULL;
@@ -331,14 +331,14 @@ void answer_failed(struct farm *f, const struct event *ev)
 
 void answer_delivered(struct farm *f, const struct event *ev)
 {
-	struct lease *l = held(f, ev);
+	struct lease *l = lease_held_by_sender(f, ev);
 	if (l)
 		lease_deliver(f, l);
 }
 
 void answer_returned(struct farm *f, const struct event *ev)
 {
-	struct lease *l = held(f, ev);
+	struct lease *l = lease_held_by_sender(f, ev);
 	if (l)
 		lease_drop(f, l);
 }
@@ -348,7 +348,7 @@ enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const stru
 	const struct event ev = {.peer = peer, .lease = {.key = *k}};
 	const struct peer *p = farm_find_peer(f, peer);
 	const struct job *j = farm_find_job(f, k->job);
-	const struct lease *l = held(f, &ev);
+	const struct lease *l = lease_held_by_sender(f, &ev);
 	if (l && !l->delivered)
 		return DELIVERY_AWAITED;
 	bool open = p && !p->who->quarantined && j && job_is_live(j) && j->ending == END_NONE && job_takes(j, p->class);

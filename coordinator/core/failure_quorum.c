@@ -15,7 +15,7 @@ static uint32_t certificates(const struct failure_quorum *l)
 	return n;
 }
 
-static void add(struct failure_quorum *l, const struct identity *who)
+static void add_worker(struct failure_quorum *l, const struct identity *who)
 {
 	uint32_t place = l->count;
 	for (uint32_t i = 0; i < l->count; i++) {
@@ -38,12 +38,12 @@ uint32_t failure_quorum_certificates(const struct farm *f)
 	struct failure_quorum known = {.count = 0};
 	for (uint32_t i = 0; i < f->known_count && certificates(&known) < FAILURE_QUORUM_FATAL; i++)
 		if (!f->known[i]->quarantined)
-			add(&known, f->known[i]);
+			add_worker(&known, f->known[i]);
 	return certificates(&known);
 }
 
 bool failure_quorum_add(struct failure_quorum *l, const struct farm *f, const struct identity *who)
 {
-	add(l, who);
+	add_worker(l, who);
 	return l->count == FAILURE_QUORUM_FATAL && certificates(l) >= failure_quorum_certificates(f);
 }

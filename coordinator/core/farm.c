@@ -91,7 +91,7 @@ static void add_quarantined(struct farm *f, const struct event *ev)
 	worker_registry_restore_quarantined(f, &join, ev->text);
 }
 
-static void left(struct farm *f, const struct event *ev)
+static void peer_left(struct farm *f, const struct event *ev)
 {
 	struct peer *p = farm_find_peer(f, ev->peer);
 	if (p)
@@ -124,7 +124,7 @@ static void ticked(struct farm *f, const struct event *ev)
 static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_TICK] = ticked,
 	[EVENT_JOINED] = joined,
-	[EVENT_LEFT] = left,
+	[EVENT_LEFT] = peer_left,
 	[EVENT_HEARTBEAT] = ticked,
 	[EVENT_REQUEST] = requested,
 	[EVENT_BATCH] = answer_batch,

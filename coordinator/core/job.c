@@ -23,7 +23,7 @@
 enum { TIMEOUT_MEDIANS = 10, TIMEOUT_DOUBLINGS = 16 };
 static const double straggler_medians = 1.5;
 
-static void begin(struct job *j, enum lease_kind kind, uint64_t limit, double now)
+static void begin_kind(struct job *j, enum lease_kind kind, uint64_t limit, double now)
 {
 	j->kind = kind;
 	j->limit = limit;
@@ -59,7 +59,7 @@ static void init(struct job *j, const struct event_submit *e, double now)
 	list_init(&j->blocked);
 	for (uint32_t i = 0; i < j->slot_count; i++)
 		list_init(&j->slots[i].link);
-	begin(j, LEASE_BOOTSTRAP, 1, now);
+	begin_kind(j, LEASE_BOOTSTRAP, 1, now);
 }
 
 struct job *job_new(struct farm *f, const struct event_submit *e, const char **refused)
@@ -251,7 +251,7 @@ void job_raise_limit(struct job *j)
 void job_open_rounds(struct job *j, double now)
 {
 	j->opened = now;
-	begin(j, LEASE_RENDER, j->plan.rounds, now);
+	begin_kind(j, LEASE_RENDER, j->plan.rounds, now);
 }
 
 void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now)

@@ -31,7 +31,7 @@ static uint32_t gone(const struct lost *l, uint32_t *certificates)
 }
 
 /* Its own entry, a free one, one that came back, or one of several with its certificate. */
-static void add(struct lost *l, const struct identity *who)
+static void add_worker(struct lost *l, const struct identity *who)
 {
 	uint32_t place = l->count;
 	for (uint32_t i = l->count; i-- > 0;)
@@ -67,7 +67,7 @@ void lost_lease(struct farm *f, struct lease *l)
 	lease_drop(f, l);
 	if (!counts)
 		return;
-	add(&s->lost, p->who);
+	add_worker(&s->lost, p->who);
 	p->who->calls += p->returns;
 	n = gone(&s->lost, &certificates);
 	if (n < LOST_TOLD)

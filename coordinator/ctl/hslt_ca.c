@@ -128,7 +128,7 @@ static int list(const struct arguments *a, struct error *e)
 	return 0;
 }
 
-static int run(const struct arguments *a, struct error *e)
+static int run_command(const struct arguments *a, struct error *e)
 {
 	if (strcmp(a->verb, "init") == 0)
 		return init(a, e);
@@ -154,7 +154,7 @@ int main(int argc, char **argv)
 		snprintf(home, sizeof home, "%s/.hslt-ca", where ? where : ".");
 		a.ca = home;
 	}
-	int rc = run(&a, &e);
+	int rc = run_command(&a, &e);
 	if (rc)
 		fprintf(stderr, "hslt-ca: %s\n", e.text);
 	return rc == 0 ? 0 : rc == -EINVAL ? 2 : 1;

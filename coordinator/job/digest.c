@@ -12,7 +12,7 @@ struct parts {
 	size_t count;
 };
 
-static int add(struct parts *p, const void *bytes, size_t size, struct error *e)
+static int add_part(struct parts *p, const void *bytes, size_t size, struct error *e)
 {
 	return blob_hash_bytes(size ? bytes : "", size, &p->hashes[p->count++], e);
 }
@@ -24,21 +24,21 @@ static int add_numbers(struct parts *p, const struct batch *b, struct error *e)
 				   b->key.epoch,    b->tile_count,	   b->state_count, b->strategy_count,
 				   b->weight_count, b->moment_count};
 	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum};
-	int rc = add(p, counts, sizeof counts, e);
+	int rc = add_part(p, counts, sizeof counts, e);
 	if (!rc)
-		rc = add(p, b->counters, sizeof b->counters, e);
+		rc = add_part(p, b->counters, sizeof b->counters, e);
 	if (!rc)
-		rc = add(p, b->strategy, b->strategy_count * sizeof *b->strategy, e);
+		rc = add_part(p, b->strategy, b->strategy_count * sizeof *b->strategy, e);
 	if (!rc)
-		rc = add(p, sums, sizeof sums, e);
-	return rc ? rc : add(p, b->classes, sizeof b->classes, e);
+		rc = add_part(p, sums, sizeof sums, e);
+	return rc ? rc : add_part(p, b->classes, sizeof b->classes, e);
 }
 
 static int add_tile(struct parts *p, const struct tile *t, struct error *e)
 {
 	const uint32_t where[] = {t->x, t->y, t->width, t->height};
-	int rc = add(p, where, sizeof where, e);
-	return rc ? rc : add(p, t->xyz, (size_t)t->width * t->height * TILE_CHANNELS * sizeof *t->xyz, e);
+	int rc = add_part(p, where, sizeof where, e);
+	return rc ? rc : add_part(p, t->xyz, (size_t)t->width * t->height * TILE_CHANNELS * sizeof *t->xyz, e);
 }
 
 int digest_batch(const struct batch *b, struct batch_digest *out, struct error *e)
@@ -53,11 +53,11 @@ int digest_batch(const struct batch *b, struct batch_digest *out, struct error *
 	for (uint32_t i = 0; !rc && i < b->tile_count; i++)
 		rc = add_tile(&p, &b->tiles[i], e);
 	for (uint32_t i = 0; !rc && i < b->state_count; i++)
-		rc = add(&p, b->states[i].bytes, b->states[i].size, e);
+		rc = add_part(&p, b->states[i].bytes, b->states[i].size, e);
 	if (!rc)
-		rc = add(&p, b->weights, b->weight_count * sizeof *b->weights, e);
+		rc = add_part(&p, b->weights, b->weight_count * sizeof *b->weights, e);
 	if (!rc)
-		rc = add(&p, b->moments, b->moment_count * sizeof *b->moments, e);
+		rc = add_part(&p, b->moments, b->moment_count * sizeof *b->moments, e);
 	if (!rc)
 		rc = blob_hash_bytes(p.hashes, p.count * sizeof *p.hashes, &all, e);
 	mem_free(p.hashes);

@@ -123,7 +123,7 @@ static void note_damage(struct replay *r, const struct journal_item *item)
 		r->damaged[r->damaged_count++] = item->lease;
 }
 
-static int go_on(void *user, size_t bytes, struct error *e)
+static int report_progress(void *user, size_t bytes, struct error *e)
 {
 	struct replay_progress *p = ((struct replay *)user)->progress;
 	if (!p)
@@ -139,7 +139,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 	struct forecast_look look;
 	const unsigned char *body = item->body;
 	size_t size = item->size;
-	int rc = go_on(r, size, e);
+	int rc = report_progress(r, size, e);
 	if (rc)
 		return rc;
 	if (item->missing) {
@@ -249,7 +249,7 @@ int replay_films(const struct spool *spool, struct live_job *job, struct replay_
 	char folder[SPOOL_PATH_MAX];
 	uint64_t generation = 0;
 	spool_job_path(spool, job->id, NULL, folder);
-	int rc = checkpoint_load(spool, job, &generation, go_on, &r, e);
+	int rc = checkpoint_load(spool, job, &generation, report_progress, &r, e);
 	if (rc && rc != -ENOENT)
 		return rc;
 	rc = journal_open(&job->journal, folder, job->id, generation, take_record, &r, &found, e);

@@ -43,7 +43,7 @@ struct writing {
 	struct error error;
 };
 
-static void run(uv_work_t *work)
+static void write_checkpoint(uv_work_t *work)
 {
 	struct writing *w = work->data;
 	struct checked_file out = {0};
@@ -100,7 +100,7 @@ static void tidied(uv_work_t *work, int status)
 }
 
 /* Deletes the journals before `keep`. */
-static void tidy(struct jobs *jobs, struct journal *old, const char *folder, uint64_t keep)
+static void delete_old_journals(struct jobs *jobs, struct journal *old, const char *folder, uint64_t keep)
 {
 	struct tidying *t = mem_alloc(1, sizeof *t);
 	if (!t) {
@@ -117,7 +117,7 @@ static void tidy(struct jobs *jobs, struct journal *old, const char *folder, uin
 	(void)rc;
 }
 
-static void done(uv_work_t *work, int status)
+static void checkpoint_written(uv_work_t *work, int status)
 {
 	struct writing *w = work->data;
 	struct jobs *jobs = w->jobs;
@@ -140,7 +140,7 @@ static void done(uv_work_t *work, int status)
 		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
 			  (unsigned long long)canvas_rounds(job->canvas), (unsigned long long)w->bytes,
 			  (unsigned long long)journal_bytes(job->journal));
-		tidy(jobs, job->journal, w->folder, w->head.generation);
+		delete_old_journals(jobs, job->journal, w->folder, w->head.generation);
 		job->journal = w->journal;
 		job->checkpoint_bytes = w->bytes;
 		mem_free(job->merged);
@@ -185,7 +185,7 @@ static void start(struct jobs *jobs, struct live_job *job)
 	spool_job_path(jobs->spool, job->id, NULL, w->folder);
 	checkpoint_head_of(&w->head, job, &status);
 	job->busy = jobs->checkpointing = true;
-	int rc = uv_queue_work(jobs->loop, &w->work, run, done);
+	int rc = uv_queue_work(jobs->loop, &w->work, write_checkpoint, checkpoint_written);
 	assert(rc == 0);
 	(void)rc;
 }

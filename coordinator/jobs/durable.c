@@ -268,7 +268,7 @@ int durable_merged(struct jobs *jobs, struct live_job *job, const struct incomin
 
 static void flush_next(struct jobs *jobs);
 
-static void run(uv_work_t *work)
+static void flush_journals(uv_work_t *work)
 {
 	struct flush *w = work->data;
 	for (struct durable_ack *a = w->acks; a; a = a->next) {
@@ -325,7 +325,7 @@ static void answer(struct jobs *jobs, struct durable_ack *a)
 	drop_ack(a);
 }
 
-static void done(uv_work_t *work, int status)
+static void journals_flushed(uv_work_t *work, int status)
 {
 	struct flush *w = work->data;
 	struct jobs *jobs = w->jobs;
@@ -354,7 +354,7 @@ static void flush_next(struct jobs *jobs)
 	jobs->acks = NULL;
 	jobs->acks_last = &jobs->acks;
 	jobs->flushing = true;
-	int rc = uv_queue_work(jobs->loop, &w->work, run, done);
+	int rc = uv_queue_work(jobs->loop, &w->work, flush_journals, journals_flushed);
 	assert(rc == 0);
 	(void)rc;
 }

@@ -100,7 +100,7 @@ static void describe(const struct live_job *job, char *text, size_t size)
 		text_put(&t, "%s its error is %.3g %%", comma, 100 * job->plan.target_error);
 }
 
-static void note(const struct requester *by, struct live_job *job, char *text, size_t size)
+static void log_extension(const struct requester *by, struct live_job *job, char *text, size_t size)
 {
 	describe(job, text, size);
 	live_job_log(job, LOG_JOB_STATE, "state=extended by=%s text=%s", *by->owner ? by->owner : "-",
@@ -127,7 +127,7 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 		set_bounds(job, &old_asked, &old);
 		return rc;
 	}
-	note(by, job, text, size);
+	log_extension(by, job, text, size);
 	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = job->id, .plan = &job->plan};
 	jobs_step(jobs, &ev);
 	return 0;
@@ -195,7 +195,7 @@ static int extend_read(struct jobs *jobs, const struct requester *by, struct liv
 	if (rc)
 		return rc;
 	set_bounds(job, &asked, &plan);
-	note(by, job, text, size);
+	log_extension(by, job, text, size);
 	return begin_again(jobs, by, job, r, e);
 }
 
@@ -222,7 +222,7 @@ struct reading {
 	struct error error;
 };
 
-static void run(uv_work_t *work)
+static void read_ended_job(uv_work_t *work)
 {
 	struct reading *w = work->data;
 	w->rc = replay_films(w->jobs->spool, w->job, NULL, &w->error);
@@ -230,7 +230,7 @@ static void run(uv_work_t *work)
 		w->rc = journal_renew(w->job->journal, &w->error);
 }
 
-static void done(uv_work_t *work, int status)
+static void ended_job_read(uv_work_t *work, int status)
 {
 	struct reading *w = work->data;
 	struct jobs *jobs = w->jobs;
@@ -292,7 +292,7 @@ static int start_reading(struct jobs *jobs, const struct extension_request *q, c
 	w->record = *r;
 	jobs->reading = w->job;
 	jobs->reading_for = q->by.peer;
-	rc = uv_queue_work(jobs->loop, &w->work, run, done);
+	rc = uv_queue_work(jobs->loop, &w->work, read_ended_job, ended_job_read);
 	assert(rc == 0);
 	return rc;
 }
@@ -317,7 +317,7 @@ static bool must_wait(const struct jobs *jobs, uint64_t id)
 	return job ? job->busy || job->ended : jobs->reading != NULL;
 }
 
-static void go_on(struct jobs *jobs, const struct extension_request *q)
+static void handle_request(struct jobs *jobs, const struct extension_request *q)
 {
 	struct live_job *job = jobs_find(jobs, q->what.job);
 	struct job_view v;
@@ -371,7 +371,7 @@ void extend_waiting(struct jobs *jobs)
 			continue;
 		}
 		*at = q->next;
-		go_on(jobs, q);
+		handle_request(jobs, q);
 		mem_free(q);
 		at = &jobs->extending; /* the list may have changed */
 	}

@@ -34,7 +34,7 @@ static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
 
 /* Merged data is in memory or in the old journal, whose file is open: the former goes into a checkpoint, the latter
  * into a new file. */
-static void go_on(struct jobs *jobs, struct live_job *job)
+static void restore_folder(struct jobs *jobs, struct live_job *job)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct error e;
@@ -79,7 +79,7 @@ void folder_tick(struct jobs *jobs)
 	jobs->folders_next = jobs_now(jobs) + every_seconds;
 	for (struct live_job *job = jobs->live; job; job = job->next)
 		if (!job->busy && job->journal && is_gone(jobs, job)) {
-			go_on(jobs, job);
+			restore_folder(jobs, job);
 			return; /* the list may have changed; continue next time */
 		}
 }

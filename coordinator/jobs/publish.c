@@ -51,7 +51,7 @@ static int write_image(struct publishing *w)
 	return rc;
 }
 
-static void run(uv_work_t *work)
+static void work_on_film(uv_work_t *work)
 {
 	struct publishing *w = work->data;
 	w->rc = canvas_image(w->job->canvas, w->what == PUBLISH_PREVIEW, &w->image, &w->error);
@@ -112,7 +112,7 @@ static void has_written(struct live_job *job)
 }
 
 /* Stores the outcome in the live job. */
-static void take(struct publishing *w)
+static void take_outcome(struct publishing *w)
 {
 	struct live_job *job = w->job;
 	/* Every image states its error, requested or not. */
@@ -133,14 +133,14 @@ static void take(struct publishing *w)
 	canvas_image_fini(&w->image);
 }
 
-static void done(uv_work_t *work, int status)
+static void film_work_done(uv_work_t *work, int status)
 {
 	struct publishing *w = work->data;
 	struct jobs *jobs = w->jobs;
 	uint64_t id = w->job->id;
 	assert(status == 0);
 	(void)status;
-	take(w);
+	take_outcome(w);
 	w->job->busy = false;
 	if (jobs->stopping)
 		return;
@@ -165,7 +165,7 @@ void publish_start(struct jobs *jobs, struct live_job *job, enum publish_what wh
 		w->wall_seconds = (isnan(status.ended) ? jobs_now(jobs) : status.ended) - status.started;
 	}
 	job->busy = true;
-	int rc = uv_queue_work(jobs->loop, &w->work, run, done);
+	int rc = uv_queue_work(jobs->loop, &w->work, work_on_film, film_work_done);
 	assert(rc == 0);
 	(void)rc;
 }

@@ -32,7 +32,7 @@ struct looking {
 	struct text names;
 };
 
-static void say(uint64_t id, const char *what)
+static void log_fault(uint64_t id, const char *what)
 {
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)id, log_quote(what).text);
 }
@@ -73,12 +73,12 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 	if (l->lost++ < NAMED_MOST)
 		text_put(&l->names, "%s%s", l->lost > 1 ? ", " : "", text);
 	if (!l->jobs->config.accept_loss) {
-		say(id, why);
+		log_fault(id, why);
 		return 0;
 	}
 	int rc = put_aside(l, id, why, e);
 	text_print(text, sizeof text, "%s: given up; the rest of it is in spool/lost", why);
-	say(id, text);
+	log_fault(id, text);
 	return rc;
 }
 
@@ -111,7 +111,7 @@ static int make_record(struct looking *l, const struct ledger_job *j, struct err
 	spool_job_path(spool, j->id, "job.json.damaged", kept);
 	if (disk_rename(path, kept) && errno != ENOENT)
 		return error_set(e, errno, "%s: %s", kept, strerror(errno));
-	say(j->id, "its record (job.json) was damaged: restored from jobs.db, and kept as job.json.damaged");
+	log_fault(j->id, "its record (job.json) was damaged: restored from jobs.db, and kept as job.json.damaged");
 	return spool_write_record(spool, r, e);
 }
 
@@ -146,7 +146,7 @@ static int make_row(struct looking *l, struct row_file *f, bool ended, const cha
 		f->job.submission = f->job.plan = NULL;
 		f->job.submission_size = f->job.plan_size = 0;
 	}
-	say(f->job.id, why);
+	log_fault(f->job.id, why);
 	return ledger_put(l->jobs->ledger, &f->job, e);
 }
 
@@ -160,9 +160,9 @@ static int with_row(struct looking *l, const struct ledger_job *j, struct row_fi
 	if (j->ended > 0 || (!file && f->job.revision == j->revision))
 		return 0;
 	if (file == -EBADMSG)
-		say(j->id, "the copy of its row in its folder (order) is damaged: restored from jobs.db");
+		log_fault(j->id, "the copy of its row in its folder (order) is damaged: restored from jobs.db");
 	if (row_file_write(l->jobs->spool, j, e))
-		say(j->id, e->text); /* a full disk must not stop the job */
+		log_fault(j->id, e->text); /* a full disk must not stop the job */
 	return 0;
 }
 
@@ -305,5 +305,5 @@ void reconcile_row(struct jobs *jobs, uint64_t job)
 	if (rc > 0)
 		rc = row_file_write(jobs->spool, &j, &e);
 	if (rc < 0)
-		say(job, e.text);
+		log_fault(job, e.text);
 }

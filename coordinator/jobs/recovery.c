@@ -195,23 +195,23 @@ static int finish(struct jobs *jobs, struct error *e)
 	return 0;
 }
 
-static void run(uv_work_t *work)
+static void read_films(uv_work_t *work)
 {
 	struct recovery *r = work->data;
 	r->rc = replay_films(r->jobs->spool, r->at->job, &r->at->progress, &r->error);
 }
 
-static void done(uv_work_t *work, int status);
+static void films_read(uv_work_t *work, int status);
 
 /* Reads the next job, or ends. */
-static int go_on(struct jobs *jobs, struct error *e)
+static int read_next(struct jobs *jobs, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
 	if (!r->at)
 		return finish(jobs, e);
 	r->at->job->film_folder = jobs_film_folder(jobs, &r->at->job->plan);
 	r->under_way = true;
-	int rc = uv_queue_work(jobs->loop, &r->work, run, done);
+	int rc = uv_queue_work(jobs->loop, &r->work, read_films, films_read);
 	assert(rc == 0);
 	return rc;
 }
@@ -255,7 +255,7 @@ static int take_failure(struct jobs *jobs, struct error *e)
 	return give_up(jobs, id, extended, rc, e);
 }
 
-static void done(uv_work_t *work, int status)
+static void films_read(uv_work_t *work, int status)
 {
 	struct recovery *r = work->data;
 	struct jobs *jobs = r->jobs;
@@ -273,14 +273,14 @@ static void done(uv_work_t *work, int status)
 		r->at = r->at->next;
 	}
 	if (!rc)
-		rc = go_on(jobs, &e);
+		rc = read_next(jobs, &e);
 	if (rc)
 		fail(jobs, rc, &e);
 }
 
 /* ---- start and end ---- */
 
-static int add(struct jobs *jobs, const struct ledger_job *j, struct error *e)
+static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error *e)
 {
 	struct recovery *r = jobs->recovery;
 	struct found *f = mem_alloc(1, sizeof *f);
@@ -313,14 +313,14 @@ int recovery_begin(struct jobs *jobs, struct error *e)
 	r->last = &jobs->found;
 	while ((rc = ledger_next(jobs->ledger, id, &j, e)) > 0) {
 		id = j.id;
-		rc = add(jobs, &j, e);
+		rc = add_found(jobs, &j, e);
 		if (rc)
 			return rc;
 	}
 	if (rc)
 		return rc;
 	r->at = jobs->found;
-	return go_on(jobs, e);
+	return read_next(jobs, e);
 }
 
 void recovery_stop(struct jobs *jobs)

@@ -152,7 +152,7 @@ void trust_wrong(struct jobs *jobs, const struct action *a)
 			     log_quote(a->text).text);
 }
 
-static void note(struct live_job *job, const char *text)
+static void append_note(struct live_job *job, const char *text)
 {
 	live_job_log(job, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
 	size_t used = strlen(job->doubts);
@@ -164,14 +164,14 @@ static void note_credit(struct live_job *job, const char *name, const char *why,
 	char text[256];
 	text_print(text, sizeof text, "worker %s is quarantined (%s); %llu of its leases were merged unverified", name,
 		   why, (unsigned long long)leases);
-	note(job, text);
+	append_note(job, text);
 }
 
 void trust_anew(struct jobs *jobs, const struct action *a)
 {
 	struct live_job *job = jobs_find(jobs, a->job);
 	if (job)
-		note(job, a->text);
+		append_note(job, a->text);
 }
 
 void trust_quarantined(struct jobs *jobs, const struct action *a)

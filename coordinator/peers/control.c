@@ -14,7 +14,7 @@ static const char *name_of(const struct session *p)
 	return *p->who.name ? p->who.name : "a client";
 }
 
-static int tell(struct session *p, struct event *ev)
+static int ask_core(struct session *p, struct event *ev)
 {
 	ev->tag = p->id;
 	jobs_step(p->jobs, ev);
@@ -35,7 +35,7 @@ static void hold(struct session *p, uint64_t id, const char *who)
 	char text[256];
 	struct event ev = {
 		.kind = EVENT_HOLD, .job = id, .hold = HOLD_ORDERED, .text = *who ? restore_held_by(who, text) : ""};
-	if (tell(p, &ev))
+	if (ask_core(p, &ev))
 		return;
 	if (ledger_hold(jobs->ledger, id, who, &e)) {
 		not_for_long(p, &e);
@@ -53,7 +53,7 @@ static void set_priority(struct session *p, uint64_t id, int priority)
 	struct jobs *jobs = p->jobs;
 	struct error e;
 	struct event ev = {.kind = EVENT_PRIORITY, .job = id, .priority = priority};
-	if (tell(p, &ev))
+	if (ask_core(p, &ev))
 		return;
 	if (ledger_priority(jobs->ledger, id, priority, &e)) {
 		not_for_long(p, &e);
@@ -81,7 +81,7 @@ void control_cancel(struct session *p, uint64_t job)
 {
 	struct event ev = {.kind = EVENT_CANCEL, .job = job};
 	if (finds(p, job, false))
-		tell(p, &ev);
+		ask_core(p, &ev);
 	client_send_done(p, "");
 }
 

@@ -84,7 +84,7 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 	return 0;
 }
 
-static int begin(struct session *p, const Farm__Fetch *f, struct job_view *v, struct error *e)
+static int begin_fetch(struct session *p, const Farm__Fetch *f, struct job_view *v, struct error *e)
 {
 	const char *file = file_of(f->what);
 	fetch_end(p);
@@ -133,7 +133,7 @@ static void answer(struct session *p, const Farm__Fetch *f)
 	chunk.what = f->what;
 	chunk.offset = f->offset;
 	chunk.error = e.text;
-	int rc = !bytes ? error_set(&e, ENOMEM, "no memory") : f->offset ? 0 : begin(p, f, &v, &e);
+	int rc = !bytes ? error_set(&e, ENOMEM, "no memory") : f->offset ? 0 : begin_fetch(p, f, &v, &e);
 	if (!rc && !f->offset)
 		chunk.output = v.record.output;
 	if (!rc)

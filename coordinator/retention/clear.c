@@ -189,7 +189,7 @@ void clear_close(struct jobs *jobs)
 	jobs->clearing = NULL;
 }
 
-static bool begin(struct jobs *jobs)
+static bool begin_round(struct jobs *jobs)
 {
 	struct error e;
 	struct clearing *c = jobs->clearing = mem_alloc(1, sizeof *c);
@@ -216,7 +216,7 @@ void clear_tick(struct jobs *jobs)
 			return;
 		jobs->clear_next = now + every_seconds;
 		ages_keep(jobs);
-		if ((!(jobs->config.clear_seconds > 0) && !jobs->config.clear_bytes) || !begin(jobs))
+		if ((!(jobs->config.clear_seconds > 0) && !jobs->config.clear_bytes) || !begin_round(jobs))
 			return;
 	}
 	while (step(jobs, jobs->clearing))

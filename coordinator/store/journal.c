@@ -62,7 +62,7 @@ static int fault(const struct journal *j, int code, struct error *e)
 	return error_set(e, code, "%s: %s", j->path, strerror(code));
 }
 
-static struct journal *make(const char *folder, uint64_t job, uint64_t generation, int flags, struct error *e)
+static struct journal *make_journal(const char *folder, uint64_t job, uint64_t generation, int flags, struct error *e)
 {
 	struct journal *j = mem_alloc(1, sizeof *j);
 	if (!j) {
@@ -214,7 +214,7 @@ void journal_release(struct journal *j)
 
 int journal_create(struct journal **out, const char *folder, uint64_t job, uint64_t generation, struct error *e)
 {
-	struct journal *j = make(folder, job, generation, O_RDWR | O_CREAT | O_TRUNC, e);
+	struct journal *j = make_journal(folder, job, generation, O_RDWR | O_CREAT | O_TRUNC, e);
 	if (!j)
 		return -ENOMEM;
 	unsigned char head[JOURNAL_HEAD];
@@ -336,7 +336,7 @@ int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_
 		 void *user, struct journal_found *found, struct error *e)
 {
 	*found = (struct journal_found){0};
-	struct journal *j = make(folder, job, generation, O_RDWR, e);
+	struct journal *j = make_journal(folder, job, generation, O_RDWR, e);
 	if (!j)
 		return -ENOMEM;
 	int rc = j->fd < 0 ? fault(j, errno, e) : 0;

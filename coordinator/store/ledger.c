@@ -49,7 +49,7 @@ static int fault(const struct ledger *l, struct error *e)
 	return error_set(e, as, "the database of jobs: %s", sqlite3_errmsg(l->db));
 }
 
-static int run(struct ledger *l, const char *sql, struct error *e)
+static int run_statements(struct ledger *l, const char *sql, struct error *e)
 {
 	return sqlite3_exec(l->db, sql, NULL, NULL, NULL) == SQLITE_OK ? 0 : fault(l, e);
 }
@@ -85,11 +85,11 @@ static int migrate(struct ledger *l, struct error *e)
 	for (; !rc && version < VERSION; version++) {
 		char done[64];
 		snprintf(done, sizeof done, "PRAGMA user_version = %d; COMMIT", version + 1);
-		rc = run(l, "BEGIN IMMEDIATE", e);
+		rc = run_statements(l, "BEGIN IMMEDIATE", e);
 		if (!rc)
-			rc = run(l, migrations[version], e);
+			rc = run_statements(l, migrations[version], e);
 		if (!rc)
-			rc = run(l, done, e);
+			rc = run_statements(l, done, e);
 	}
 	return rc;
 }
@@ -246,10 +246,11 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 		rc = l->db ? fault(l, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
 	/* The spool's lock excludes others; without shared memory it works on any file system. */
 	if (!rc)
-		rc = run(l,
-			 "PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
-			 "PRAGMA journal_size_limit = 1048576; PRAGMA trusted_schema = OFF",
-			 e);
+		rc = run_statements(
+			l,
+			"PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
+			"PRAGMA journal_size_limit = 1048576; PRAGMA trusted_schema = OFF",
+			e);
 	if (!rc)
 		rc = migrate(l, e);
 	if (!rc)
@@ -311,7 +312,7 @@ int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)
 
 int ledger_put(struct ledger *l, const struct ledger_job *j, struct error *e)
 {
-	int rc = run(l, "BEGIN IMMEDIATE", e);
+	int rc = run_statements(l, "BEGIN IMMEDIATE", e);
 	if (rc)
 		return rc;
 	sqlite3_bind_int64(l->remove, 1, (sqlite3_int64)j->id);
@@ -320,9 +321,9 @@ int ledger_put(struct ledger *l, const struct ledger_job *j, struct error *e)
 	if (!rc)
 		rc = finish(l, l->add, e);
 	if (!rc)
-		rc = run(l, "COMMIT", e);
+		rc = run_statements(l, "COMMIT", e);
 	if (rc)
-		run(l, "ROLLBACK", NULL);
+		run_statements(l, "ROLLBACK", NULL);
 	return rc;
 }
 
@@ -350,7 +351,7 @@ int ledger_end(struct ledger *l, uint64_t id, uint64_t extended, const char *sta
 
 int ledger_drop(struct ledger *l, const uint64_t *ids, size_t count, struct error *e)
 {
-	int rc = run(l, "BEGIN IMMEDIATE", e);
+	int rc = run_statements(l, "BEGIN IMMEDIATE", e);
 	if (rc)
 		return rc;
 	for (size_t i = 0; !rc && i < count; i++) {
@@ -358,9 +359,9 @@ int ledger_drop(struct ledger *l, const uint64_t *ids, size_t count, struct erro
 		rc = finish(l, l->drop, e);
 	}
 	if (!rc)
-		rc = run(l, "COMMIT", e);
+		rc = run_statements(l, "COMMIT", e);
 	if (rc)
-		run(l, "ROLLBACK", NULL);
+		run_statements(l, "ROLLBACK", NULL);
 	return rc;
 }
 

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-static uint64_t at(const struct fetch *f)
+static uint64_t fetch_offset(const struct fetch *f)
 {
 	return f->writer ? blob_write_at(f->writer) : 0;
 }
@@ -18,7 +18,7 @@ static void request_piece(struct agent *a, struct fetch *f)
 	farm__blob_get__init(&get);
 	farm__envelope__init(&m);
 	get.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, f->hash.bytes};
-	get.offset = at(f);
+	get.offset = fetch_offset(f);
 	m.body_case = FARM__ENVELOPE__BODY_BLOB_GET;
 	m.blob_get = &get;
 	f->asked = true;
@@ -53,7 +53,7 @@ struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c)
 	for (struct fetch *f = a->fetches; f; f = f->next) {
 		if (memcmp(c->hash.data, f->hash.bytes, BLOB_HASH_SIZE) != 0)
 			continue;
-		if (!f->asked || c->offset != at(f))
+		if (!f->asked || c->offset != fetch_offset(f))
 			return NULL;
 		f->asked = false;
 		return f;
@@ -82,7 +82,7 @@ enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__Blob
 		rc = blob_write_add(f->writer, payload, size, e);
 	if (rc)
 		return failed(rc);
-	if (at(f) < c->size)
+	if (fetch_offset(f) < c->size)
 		return FETCH_MORE;
 	rc = blob_write_commit(f->writer, e);
 	f->writer = NULL;

@@ -280,7 +280,7 @@ static void run_build(struct task *t)
 	b->build_seconds = (double)(uv_hrtime() - begun) * 1e-9;
 }
 
-static void done(struct task *t)
+static void on_world_built(struct task *t)
 {
 	struct job_cache *b = (struct job_cache *)t;
 	b->state = b->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
@@ -300,7 +300,7 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 	}
 	b->state = JOB_CACHE_BUILDING;
 	b->task.run = run_build;
-	b->task.done = done;
+	b->task.done = on_world_built;
 	thread_pool_add(c, &b->task);
 	return 0;
 }

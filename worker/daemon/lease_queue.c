@@ -62,7 +62,7 @@ static void tidy_fetches(struct agent *a)
 }
 
 /* Drops unused bundles of jobs that have ended, and the least recently used ones beyond WORLDS_KEPT. */
-static void tidy(struct agent *a)
+static void drop_unused_bundles(struct agent *a)
 {
 	for (;;) {
 		struct job_cache *oldest = NULL, *ended = NULL;
@@ -135,12 +135,12 @@ static void on_built(struct job_cache *b)
 			if (l->bundle == b && l->state == LEASE_WAITING)
 				start_lease(a, l);
 	}
-	tidy(a);
+	drop_unused_bundles(a);
 	a->settle(a);
 }
 
 /* Requests the next missing chunk, unless another job has done so, or builds. */
-static void go_on(struct agent *a, struct job_cache *b)
+static void fetch_or_build(struct agent *a, struct job_cache *b)
 {
 	struct error e;
 	int rc;
@@ -166,7 +166,7 @@ static void go_on(struct agent *a, struct job_cache *b)
 
 /* If leases are short and the coordinator's disk is slow, results pile up: no more leases are requested until they
  * have been acknowledged. */
-static void pace(struct agent *a)
+static void limit_backlog(struct agent *a)
 {
 	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
 	unsigned results = 0;
@@ -213,8 +213,8 @@ static void on_rendered(struct lease_task *l)
 	} else {
 		send_result(a, l);
 	}
-	pace(a);
-	tidy(a);
+	limit_backlog(a);
+	drop_unused_bundles(a);
 	a->settle(a);
 }
 
@@ -293,7 +293,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	*end = l;
 	if (b->state == JOB_CACHE_READY)
 		start_lease(a, l);
-	tidy(a);
+	drop_unused_bundles(a);
 }
 
 static void take_ack(struct agent *a, const Farm__LeaseAck *m)
@@ -314,8 +314,8 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 			  m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		drop_lease(a, l);
-		pace(a);
-		tidy(a);
+		limit_backlog(a);
+		drop_unused_bundles(a);
 	}
 }
 
@@ -326,7 +326,7 @@ static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : find_lease(a, &k);
 	if (l && l->state != LEASE_RENDERED) /* a result that was sent is acknowledged all the same */
 		forget_lease(a, l);
-	tidy(a);
+	drop_unused_bundles(a);
 }
 
 static void take_job_end(struct agent *a, uint64_t job)
@@ -340,8 +340,8 @@ static void take_job_end(struct agent *a, uint64_t job)
 			forget_lease(a, l);
 	}
 	b->ended = true;
-	pace(a);
-	tidy(a);
+	limit_backlog(a);
+	drop_unused_bundles(a);
 }
 
 /* The coordinator has started over, and the job's number is now another job's: the results of the old one are
@@ -354,10 +354,10 @@ static void disown(struct agent *a, struct job_cache *b)
 		if (l->bundle == b && !l->unwanted)
 			forget_lease(a, l);
 	}
-	pace(a);
+	limit_backlog(a);
 	b->ended = true;
 	b->job = 0;
-	tidy(a);
+	drop_unused_bundles(a);
 }
 
 static void take_job_info(struct agent *a, struct envelope *env)
@@ -372,11 +372,11 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	}
 	if (b->state == JOB_CACHE_ASKED && job_cache_set_info(b, env, &e))
 		fail_job_cache(a, b, &e);
-	go_on(a, b);
+	fetch_or_build(a, b);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: earlier results are welcome */
 		if (l->bundle == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
-	tidy(a);
+	drop_unused_bundles(a);
 }
 
 /* If it cannot be fetched for one job, the others that want it try for themselves: what the first one held is
@@ -397,13 +397,13 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 	if (end == FETCH_FAILED || end == FETCH_UNSTORED) {
 		first->own = end == FETCH_UNSTORED;
 		fail_job_cache(a, first, &e);
-		tidy(a);
+		drop_unused_bundles(a);
 	}
 	for (struct job_cache *b = a->bundles; b; b = b->next)
-		go_on(a, b);
+		fetch_or_build(a, b);
 	if (end == FETCH_WHOLE)
 		blob_release(a->cache.blobs, &hash);
-	tidy(a);
+	drop_unused_bundles(a);
 }
 
 void lease_queue_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)

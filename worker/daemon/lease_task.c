@@ -50,7 +50,7 @@ static void render(struct task *t)
 	work_end();
 }
 
-static void done(struct task *t)
+static void on_task_done(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t;
 	l->finished(l);
@@ -60,6 +60,6 @@ void lease_task_start(struct lease_task *l, struct thread_pool *c)
 {
 	l->state = LEASE_QUEUED;
 	l->task.run = render;
-	l->task.done = done;
+	l->task.done = on_task_done;
 	thread_pool_add(c, &l->task);
 }

@@ -67,7 +67,7 @@ static const struct program program = {
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL},
 };
 
-static int run(void *user)
+static int run_worker(void *user)
 {
 	struct error e;
 	int rc = agent_run(user, &e);
@@ -88,5 +88,5 @@ int main(int argc, char **argv)
 	program_options(&program, argc, argv, &c);
 	if (geteuid() == 0)
 		log_event(LOG_ROOT, "text=\"a worker needs no privileges: scenes from others are read as root\"");
-	return supervise(c.threads, run, &c);
+	return supervise(c.threads, run_worker, &c);
 }

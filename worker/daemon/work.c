@@ -90,7 +90,7 @@ static void lose(const struct work *w, const char *text, bool machine)
 }
 
 /* Drops what has been reported. */
-static void tidy(void)
+static void drop_reported(void)
 {
 	unsigned kept = 0;
 	for (unsigned i = 0; i < shared->lost_count; i++)
@@ -103,7 +103,7 @@ unsigned work_lose(int number)
 {
 	int said = atomic_load(&shared->number), hit = atomic_load(&shared->hit);
 	unsigned before;
-	tidy();
+	drop_reported();
 	before = shared->lost_count;
 	if (said || number)
 		for (unsigned i = 0; i < WORK_THREADS; i++) {

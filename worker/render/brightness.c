@@ -100,13 +100,13 @@ static bool knows(const struct brightness *b, double all, struct square q)
 }
 
 /* At most eight levels deep. */
-static void settle(struct brightness *b, double all, double samples, struct square q)
+static void settle_square(struct brightness *b, double all, double samples, struct square q)
 {
 	bool quartered = q.size > 1;
 	for (uint32_t k = 0; k < 4 && quartered; k++)
 		quartered = knows(b, all, quarter(q, k));
 	for (uint32_t k = 0; k < 4 && quartered; k++)
-		settle(b, all, samples, quarter(q, k));
+		settle_square(b, all, samples, quarter(q, k));
 	if (quartered)
 		return;
 	double sum = sqrt(lifted(b, all, sums_of(b, q), q)), cells = (double)b->across * b->across;
@@ -120,5 +120,5 @@ void brightness_settle(struct brightness *b, uint64_t samples)
 	struct square whole = {0, 0, b->across};
 	double all = sums_of(b, whole).sum;
 	if (all > 0)
-		settle(b, all, (double)samples, whole);
+		settle_square(b, all, (double)samples, whole);
 }

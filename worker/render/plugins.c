@@ -15,7 +15,7 @@ enum { PLUGINS_MAX = 128 };
 static struct plugin_decl decls[PLUGINS_MAX];
 static size_t count;
 
-static void add(struct plugin_decl d)
+static void add_plugin(struct plugin_decl d)
 {
 	assert(count + 1 < PLUGINS_MAX);
 	decls[count++] = d;
@@ -24,21 +24,21 @@ static void add(struct plugin_decl d)
 static void gather(void)
 {
 	for (size_t i = 0; shape_registry[i]; i++)
-		add((struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
-					 shape_registry[i]->nested_classes ? shape_registry[i]->nested_classes
-									   : shape_nested_classes,
-					 PARAM_UNDERSTOOD});
+		add_plugin((struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
+						shape_registry[i]->nested_classes ? shape_registry[i]->nested_classes
+										  : shape_nested_classes,
+						PARAM_UNDERSTOOD});
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
-		add(*d);
+		add_plugin(*d);
 	for (size_t i = 0; bsdf_registry[i]; i++)
-		add((struct plugin_decl){PLUGIN_BSDF, bsdf_registry[i]->type, bsdf_registry[i]->params,
-					 bsdf_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+		add_plugin((struct plugin_decl){PLUGIN_BSDF, bsdf_registry[i]->type, bsdf_registry[i]->params,
+						bsdf_registry[i]->nested_classes, PARAM_UNDERSTOOD});
 	for (size_t i = 0; texture_registry[i]; i++)
-		add((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params,
-					 texture_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+		add_plugin((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params,
+						texture_registry[i]->nested_classes, PARAM_UNDERSTOOD});
 	for (size_t i = 0; emitter_registry[i]; i++)
-		add((struct plugin_decl){PLUGIN_EMITTER, emitter_registry[i]->type, emitter_registry[i]->params,
-					 emitter_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+		add_plugin((struct plugin_decl){PLUGIN_EMITTER, emitter_registry[i]->type, emitter_registry[i]->params,
+						emitter_registry[i]->nested_classes, PARAM_UNDERSTOOD});
 }
 
 const struct plugin_decl *render_plugins(void)

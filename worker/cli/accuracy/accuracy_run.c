@@ -155,7 +155,7 @@ static double had(const struct accuracy_run *r, size_t i)
 }
 
 /* The one that has used least. */
-static size_t next(const struct accuracy_run *r)
+static size_t next_setting(const struct accuracy_run *r)
 {
 	size_t best = 0;
 	for (size_t i = 1; i < r->design->count; i++)
@@ -174,7 +174,7 @@ static int rounds(struct accuracy_run *r, double begin, struct error *e)
 {
 	double first = clock_seconds(), wanted = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
 	for (;;) {
-		size_t i = next(r);
+		size_t i = next_setting(r);
 		double wall = clock_seconds();
 		bool enough = wanted > 0 ? had(r, i) >= wanted : wall >= begin + r->seconds;
 		/* At least two rounds, however short the time. */
@@ -188,7 +188,7 @@ static int rounds(struct accuracy_run *r, double begin, struct error *e)
 	}
 }
 
-static void end(struct accuracy_job *j)
+static void end_job(struct accuracy_job *j)
 {
 	if (j->job)
 		local_end(j->job);
@@ -216,7 +216,7 @@ static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 		pilot->mutation = fmax(j->cost[0], 1e-9);
 		pilot->rate = fmax(j->run.cpu_seconds / fmax(clock_seconds() - begin, 1e-9), 0.05);
 	}
-	end(j);
+	end_job(j);
 	return rc;
 }
 
@@ -255,7 +255,7 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 void accuracy_run_fini(struct accuracy_run *r)
 {
 	for (size_t i = 0; r->jobs && i < r->design->count; i++)
-		end(&r->jobs[i]);
+		end_job(&r->jobs[i]);
 	mem_free(r->jobs);
 	for (size_t k = 0; k < r->world_count; k++)
 		world_free(r->worlds[k]);

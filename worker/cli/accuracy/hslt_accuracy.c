@@ -198,7 +198,7 @@ static int report(struct session *s, struct error *e)
 	return rc;
 }
 
-static void say(const struct session *s)
+static void print_summary(const struct session *s)
 {
 	const struct accuracy_figures *f = s->judgement.figures, *d = &f[ACCURACY_DEFAULT];
 	char name[96];
@@ -215,7 +215,7 @@ static void say(const struct session *s)
 	fprintf(stderr, "; beaten by %s: %.2f %%\n", name, 100 * f[d->beaten_by].equal_time.value);
 }
 
-static int run(struct session *s, struct error *e)
+static int run_session(struct session *s, struct error *e)
 {
 	int rc = image_file_probe(s->a->output, e);
 	if (!rc && s->a->csv)
@@ -231,7 +231,7 @@ static int run(struct session *s, struct error *e)
 	if (!rc)
 		rc = report(s, e);
 	if (!rc && !s->a->quiet)
-		say(s);
+		print_summary(s);
 	if (!rc && s->run.interrupted)
 		rc = error_set(e, EINTR, "interrupted: %s holds what there was by then", s->a->output);
 	return rc;
@@ -248,7 +248,7 @@ int main(int argc, char **argv)
 	program_options(&program, argc, argv, &a);
 	interrupt_watch();
 	s.a = &a;
-	int rc = run(&s, &e);
+	int rc = run_session(&s, &e);
 	accuracy_run_fini(&s.run);
 	accuracy_judgement_fini(&s.judgement);
 	picture_fini(&s.reference);

@@ -114,7 +114,7 @@ static int check_render(const struct exr_image *first, const struct exr_image *i
 	return 0;
 }
 
-static int begin(struct assembly *a, const struct exr_image *img, struct error *e)
+static int begin_assembly(struct assembly *a, const struct exr_image *img, struct error *e)
 {
 	struct exr_image *f = &a->film;
 	size_t pixels = (size_t)img->full_width * img->full_height;
@@ -206,7 +206,7 @@ static int add_crop(struct assembly *a, const char *path, struct error *e)
 	if (!rc)
 		rc = check_render(first ? &img : &a->first, &img, e);
 	if (!rc && first)
-		rc = begin(a, &img, e);
+		rc = begin_assembly(a, &img, e);
 	if (!rc)
 		rc = paste(a, &img, e);
 	if (first) {

@@ -53,7 +53,7 @@ static const struct program program = {
 	.word = take_word,
 };
 
-static int run(const struct arguments *a, struct error *e)
+static int tonemap_file(const struct arguments *a, struct error *e)
 {
 	struct picture p;
 	int rc = picture_read(&p, a->in, e);
@@ -81,7 +81,7 @@ int main(int argc, char **argv)
 	struct error e;
 	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
-	if (run(&a, &e) == 0)
+	if (tonemap_file(&a, &e) == 0)
 		return 0;
 	fprintf(stderr, "hslt-tonemap: %s\n", e.text);
 	return 1;

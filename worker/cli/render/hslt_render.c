@@ -215,7 +215,7 @@ static void expect(struct session *s, const struct local_round *r)
 		 high, 100 * error.middle, more);
 }
 
-static void look(void *user, const struct local_round *r)
+static void on_round(void *user, const struct local_round *r)
 {
 	struct session *s = user;
 	if (r->image)
@@ -248,7 +248,7 @@ static int render(struct session *s, struct error *e)
 				    .threads = s->a->threads,
 				    .stop = &interrupted,
 				    .progress = s->a->quiet ? NULL : show,
-				    .round = look,
+				    .round = on_round,
 				    .resume = resume,
 				    .keep = keep,
 				    .user = s};
@@ -295,7 +295,7 @@ static int write_image(const struct session *s, struct error *e)
 	return rc;
 }
 
-static void say(const struct session *s)
+static void print_summary(const struct session *s)
 {
 	const struct canvas_image *i = &s->image;
 	const struct plan *p = &s->plan;
@@ -373,7 +373,7 @@ static int estimate(struct session *s, struct error *e)
 	return rc ? rc : report(s, &p, e);
 }
 
-static int run(struct session *s, struct error *e)
+static int run_session(struct session *s, struct error *e)
 {
 	if (s->a->estimate)
 		return estimate(s, e);
@@ -398,7 +398,7 @@ static int run(struct session *s, struct error *e)
 						 s->build_seconds, &s->looks, &s->choice},
 				 e);
 	if (!rc && !s->a->quiet)
-		say(s);
+		print_summary(s);
 	if (!rc && s->image.rel_mse_doubt)
 		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
@@ -419,7 +419,7 @@ int main(int argc, char **argv)
 	program_options(&program, argc, argv, &a);
 	interrupt_watch();
 	s.a = &a;
-	int rc = run(&s, &e);
+	int rc = run_session(&s, &e);
 	canvas_image_fini(&s.image);
 	canvas_free(s.run.canvas);
 	world_free(s.world);

@@ -139,7 +139,7 @@ static uint32_t take_lease(struct thread_pool *c)
 	return c->next < c->leases ? c->next++ : c->leases;
 }
 
-static void *work(void *arg)
+static void *run_leases(void *arg)
 {
 	struct thread_pool *c = arg;
 	crash_thread();
@@ -163,9 +163,9 @@ static int phase(struct thread_pool *c, enum lease_kind kind, uint64_t epoch)
 	c->next = 0;
 	c->leases = c->run->plan->groups * c->run->plan->parts;
 	/* This thread works, too, so that the phase ends even if no other thread can be created. */
-	while (started + 1 < wanted && pthread_create(&threads[started], NULL, work, c) == 0)
+	while (started + 1 < wanted && pthread_create(&threads[started], NULL, run_leases, c) == 0)
 		started++;
-	work(c);
+	run_leases(c);
 	for (unsigned i = 0; i < started; i++)
 		pthread_join(threads[i], NULL);
 	return c->rc;

@@ -168,7 +168,8 @@ static void say_at_the_end(const struct arguments *a, uint64_t job)
 	interrupt_say(text);
 }
 
-static int run(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code, struct error *e)
+static int submit_scene(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code,
+			struct error *e)
 {
 	struct submitted job;
 	struct submit_end end = {0};
@@ -279,7 +280,7 @@ int main(int argc, char **argv)
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
 		client_print_notes(cl, "hslt-submit");
-		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, &cl, &b, &code, &e);
+		rc = a.estimate ? estimate(&a, cl, &b, &e) : submit_scene(&a, &cl, &b, &code, &e);
 		client_close(cl);
 	}
 	scene_bundle_fini(&b);

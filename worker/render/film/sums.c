@@ -96,7 +96,7 @@ double film_kernel(const struct film_sums *f, double distance)
 	return 0;
 }
 
-static void add(struct film_sums *f, uint32_t i, uint32_t j, const double xyz[3], double weight)
+static void add_pixel(struct film_sums *f, uint32_t i, uint32_t j, const double xyz[3], double weight)
 {
 	double *p = f->xyz + ((size_t)j * f->width + i) * 3;
 	for (int k = 0; k < 3; k++)
@@ -123,7 +123,7 @@ void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
 	if (f->filter == FILTER_BOX && f->radius == 0.5) {
 		/* A point on the border of two pixels belongs to one. */
 		if (x >= 0 && y >= 0 && x < f->width && y < f->height)
-			add(f, (uint32_t)x, (uint32_t)y, s->xyz, weight);
+			add_pixel(f, (uint32_t)x, (uint32_t)y, s->xyz, weight);
 		return;
 	}
 	uint32_t i0, i1, j0, j1;
@@ -137,7 +137,7 @@ void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
 		double ky = film_kernel(f, y - (j + 0.5)) * weight;
 		for (uint32_t i = i0; i <= i1; i++)
 			if (kx[i - i0] * ky != 0)
-				add(f, i, j, s->xyz, kx[i - i0] * ky);
+				add_pixel(f, i, j, s->xyz, kx[i - i0] * ky);
 	}
 }
 

@@ -443,7 +443,7 @@ static void list_shapes(struct coincidence *c)
 	}
 }
 
-static int make(struct search *f, uint32_t count, struct coincidence **out)
+static int make_result(struct search *f, uint32_t count, struct coincidence **out)
 {
 	struct coincidence *c = mem_alloc(1, sizeof *c);
 	if (!c)
@@ -526,7 +526,7 @@ int coincide_find(struct coincidence **out, const struct accel_shape *shapes, ui
 		mem_free(f.flat[i].prim);
 	mem_free(f.flat);
 	if (!rc && (f.pair_count > 0 || f.incomplete))
-		rc = make(&f, count, out);
+		rc = make_result(&f, count, out);
 	mem_free(f.pairs);
 	return rc ? error_set(e, ENOMEM, "out of memory") : 0;
 }

@@ -11,7 +11,7 @@
 
 #include "worker/render/math/sphere.h"
 
-static vec3 at(const float (*a)[3], uint32_t i)
+static vec3 vertex_at(const float (*a)[3], uint32_t i)
 {
 	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
 }
@@ -95,7 +95,7 @@ struct corner {
 
 static struct corner placed_corner(const struct geom_shape *s, const uint32_t i[3])
 {
-	vec3 p0 = at(s->position, i[0]), p1 = at(s->position, i[1]), p2 = at(s->position, i[2]);
+	vec3 p0 = vertex_at(s->position, i[0]), p1 = vertex_at(s->position, i[1]), p2 = vertex_at(s->position, i[2]);
 	return (struct corner){placement_point(s->place, p0), placement_vector(s->place, vec3_sub(p1, p0)),
 			       placement_vector(s->place, vec3_sub(p2, p0))};
 }
@@ -112,13 +112,14 @@ static struct corner corner_of(const struct geom_shape *s, const uint32_t i[3])
 		return placed_corner(s, i);
 	if (s->unrounded)
 		return unrounded_corner(s, i);
-	vec3 v0 = at(s->position, i[0]);
-	return (struct corner){v0, vec3_sub(at(s->position, i[1]), v0), vec3_sub(at(s->position, i[2]), v0)};
+	vec3 v0 = vertex_at(s->position, i[0]);
+	return (struct corner){v0, vec3_sub(vertex_at(s->position, i[1]), v0),
+			       vec3_sub(vertex_at(s->position, i[2]), v0)};
 }
 
 static vec3 vertex_normal(const struct geom_shape *s, uint32_t i)
 {
-	return s->place ? placement_normal(s->place, at(s->normal, i)) : at(s->normal, i);
+	return s->place ? placement_normal(s->place, vertex_at(s->normal, i)) : vertex_at(s->normal, i);
 }
 
 /* Not normalised. */
@@ -142,8 +143,8 @@ static struct relief_site site_on_triangle(const struct geom_shape *s, const str
 	return r;
 }
 
-static void fill(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
-		 struct surface_point *x)
+static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
+			  struct surface_point *x)
 {
 	double b0 = 1 - b1 - b2;
 	x->b1 = b1;
@@ -178,7 +179,7 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 	const uint32_t *i = s->index[prim.prim];
 	struct corner c = corner_of(s, i);
 	x->prim = prim;
-	fill(s, i, &c, b1, b2, x);
+	fill_triangle(s, i, &c, b1, b2, x);
 }
 
 void surface_uv(const struct geom_shape *s, struct surface_point *x)
@@ -248,7 +249,7 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 	double b1 = fmin(fmax(hit->u, 0), 1), b2 = fmin(fmax(hit->v, 0), 1 - b1);
 	solve_triangle(o, d, c.v0, c.e1, c.e2, &b1, &b2);
 	x->prim = hit->prim;
-	fill(s, i, &c, b1, b2, x);
+	fill_triangle(s, i, &c, b1, b2, x);
 }
 
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
@@ -382,7 +383,7 @@ static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim,
 	if (!(b1 >= 0) || !(b2 >= 0) || !(b1 + b2 <= most) || !(side * vec3_dot(c.e2, q) > 0) || !(most > 0))
 		return false;
 	x->prim = prim;
-	fill(s, i, &c, b1 / most, b2 / most, x);
+	fill_triangle(s, i, &c, b1 / most, b2 / most, x);
 	return true;
 }
 
@@ -440,6 +441,6 @@ bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, stru
 	if (b1 < 0 || b2 < 0 || b1 + b2 > 1)
 		move_inside(c.e1, c.e2, &b1, &b2);
 	x->prim = prim;
-	fill(s, i, &c, b1, b2, x);
+	fill_triangle(s, i, &c, b1, b2, x);
 	return true;
 }

@@ -115,8 +115,9 @@ static struct neighbour neighbour_of(const struct full_path_path *x, unsigned ed
 	return n;
 }
 
-static void fill(const struct path_vertex *v, double eta, const struct half *r, const struct surface_change *change,
-		 const struct neighbour *i, const struct neighbour *o, struct constraint *k)
+static void fill_constraint(const struct path_vertex *v, double eta, const struct half *r,
+			    const struct surface_change *change, const struct neighbour *i, const struct neighbour *o,
+			    struct constraint *k)
 {
 	const struct frame *f = &v->x.sh;
 	k->h = r->h;
@@ -155,6 +156,6 @@ void constraints_of(const struct world *w, const struct full_path_path *x, unsig
 		}
 		double eta = full_path_eta(x, j);
 		struct half r = half_of(x, j, eta);
-		fill(v, eta, &r, here, &i, &o, &k[j]);
+		fill_constraint(v, eta, &r, here, &i, &o, &k[j]);
 	}
 }

@@ -29,7 +29,7 @@ static int check_name(const char *name, struct error *e)
 	return 0;
 }
 
-static int add(struct define_table *t, const char *name, const char *value, bool given, struct error *e)
+static int add_define(struct define_table *t, const char *name, const char *value, bool given, struct error *e)
 {
 	int r = check_name(name, e);
 	if (r)
@@ -53,7 +53,7 @@ int define_init(struct define_table *t, const struct scene_define *given, size_t
 		struct define_entry *before = find(t, given[i].name, strlen(given[i].name));
 		if (before)
 			return error_set(e, EINVAL, "-D %s is given twice", before->name);
-		int r = add(t, given[i].name, given[i].value, true, e);
+		int r = add_define(t, given[i].name, given[i].value, true, e);
 		if (r)
 			return error_prefix(e, r, "-D");
 	}
@@ -64,7 +64,7 @@ int define_default(struct define_table *t, const char *name, const char *value, 
 {
 	struct define_entry *entry = find(t, name, strlen(name));
 	if (!entry)
-		return add(t, name, value, false, e);
+		return add_define(t, name, value, false, e);
 	entry->used = true;
 	return 0;
 }

@@ -193,8 +193,8 @@ struct xml_element *gltf_plugin(struct gltf *g, struct xml_element *parent, cons
 	return el;
 }
 
-static struct xml_element *put(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *element,
-			       const char *name)
+static struct xml_element *put_element(struct gltf *g, struct xml_element *el, const struct gltf_at *at,
+				       const char *element, const char *name)
 {
 	struct xml_element *p = el ? gltf_element(g, el, at, element) : NULL;
 	gltf_attribute(g, p, "name", "%s", name);
@@ -203,28 +203,28 @@ static struct xml_element *put(struct gltf *g, struct xml_element *el, const str
 
 void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, double x)
 {
-	gltf_attribute(g, put(g, el, at, "float", name), "value", "%.17g", x);
+	gltf_attribute(g, put_element(g, el, at, "float", name), "value", "%.17g", x);
 }
 
 void gltf_put_whole(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, uint64_t x)
 {
-	gltf_attribute(g, put(g, el, at, "integer", name), "value", "%llu", (unsigned long long)x);
+	gltf_attribute(g, put_element(g, el, at, "integer", name), "value", "%llu", (unsigned long long)x);
 }
 
 void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, bool x)
 {
-	gltf_attribute(g, put(g, el, at, "boolean", name), "value", "%s", x ? "true" : "false");
+	gltf_attribute(g, put_element(g, el, at, "boolean", name), "value", "%s", x ? "true" : "false");
 }
 
 void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const char *text)
 {
-	gltf_attribute(g, put(g, el, at, "string", name), "value", "%s", text);
+	gltf_attribute(g, put_element(g, el, at, "string", name), "value", "%s", text);
 }
 
 void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
 		  const double rgb[3])
 {
-	gltf_attribute(g, put(g, el, at, "rgb", name), "value", "%.17g %.17g %.17g", rgb[0], rgb[1], rgb[2]);
+	gltf_attribute(g, put_element(g, el, at, "rgb", name), "value", "%.17g %.17g %.17g", rgb[0], rgb[1], rgb[2]);
 }
 
 void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m)
@@ -233,7 +233,7 @@ void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_a
 	size_t used = 0;
 	for (int i = 0; i < 16; i++)
 		used += (size_t)snprintf(text + used, sizeof text - used, "%s%.17g", i ? " " : "", m->m[i / 4][i % 4]);
-	struct xml_element *transform = put(g, el, at, "transform", name),
+	struct xml_element *transform = put_element(g, el, at, "transform", name),
 			   *matrix = transform ? gltf_element(g, transform, at, "matrix") : NULL;
 	gltf_attribute(g, matrix, "value", "%s", text);
 }

@@ -364,7 +364,7 @@ static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena
 }
 
 /* Vertices that no triangle uses stay where they are. */
-static int settle(struct work *w, const struct scene_node *n, struct error *e)
+static int settle_places(struct work *w, const struct scene_node *n, struct error *e)
 {
 	for (uint32_t i = 0; i < w->base.vertex_count; i++) {
 		memcpy(w->out->position[i], w->base.position[i], sizeof w->out->position[i]);
@@ -389,8 +389,8 @@ static uint32_t parts_of(const struct displacement *d)
 	return (uint32_t)fmin(fmax(round(ldexp(d->tessellation, (int)d->level)), 1), 1 << DISPLACE_LEVEL_MAX);
 }
 
-static int run(struct work *w, struct shape_geometry *g, struct arena *arena, struct arena *scratch,
-	       const struct scene_node *n, struct error *e)
+static int displace_triangles(struct work *w, struct shape_geometry *g, struct arena *arena, struct arena *scratch,
+			      const struct scene_node *n, struct error *e)
 {
 	uint32_t parts = parts_of(w->d);
 	uint64_t triangles = (g->kind == SHAPE_SPHERE ? 8 : (uint64_t)g->mesh.triangle_count) * parts * parts;
@@ -413,7 +413,7 @@ static int run(struct work *w, struct shape_geometry *g, struct arena *arena, st
 	if (!w->places || !w->turns)
 		return node_error(n, e, ENOMEM, "out of memory for %llu triangles", (unsigned long long)triangles);
 	w->out = &out;
-	int rc = settle(w, n, e);
+	int rc = settle_places(w, n, e);
 	if (!rc)
 		*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = out};
 	return rc;
@@ -427,7 +427,7 @@ int displace(struct shape_geometry *g, const struct displacement *d, struct aren
 				  "displacement by a texture needs texture coordinates, and the mesh has none");
 	struct work w = {.d = d};
 	struct arena scratch = {0};
-	int rc = run(&w, g, arena, &scratch, n, e);
+	int rc = displace_triangles(&w, g, arena, &scratch, n, e);
 	arena_fini(&scratch);
 	return rc;
 }

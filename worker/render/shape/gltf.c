@@ -78,7 +78,7 @@ static uint32_t whole(const struct accessor *a, uint64_t i, unsigned component)
 	return (uint32_t)get_bytes(p, (int)types[a->type].size);
 }
 
-static double number(const struct accessor *a, uint64_t i, unsigned component)
+static double read_number(const struct accessor *a, uint64_t i, unsigned component)
 {
 	uint32_t bits = whole(a, i, component);
 	float x;
@@ -105,21 +105,22 @@ static uint64_t corner_of(enum mode mode, uint64_t t, unsigned k)
 	return t + (k > 0 && t % 2 ? 3 - k : k);
 }
 
-static int fill(struct mesh *m, const struct scene_node *n, const struct accessor *position,
-		const struct accessor *normal, const struct accessor *texcoord, const struct accessor *index,
-		enum mode mode, struct error *e)
+static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct accessor *position,
+		     const struct accessor *normal, const struct accessor *texcoord, const struct accessor *index,
+		     enum mode mode, struct error *e)
 {
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
 		for (unsigned k = 0; k < 3; k++)
-			m->position[i][k] = number(position, i, k);
+			m->position[i][k] = read_number(position, i, k);
 		if (!vec3_is_finite(mesh_load(m->position[i])))
 			return node_error(n, e, EINVAL, "vertex %u is not finite", i);
 		if (m->normal) {
-			vec3 v = mesh_unit((vec3){number(normal, i, 0), number(normal, i, 1), number(normal, i, 2)});
+			vec3 v = mesh_unit((vec3){read_number(normal, i, 0), read_number(normal, i, 1),
+						  read_number(normal, i, 2)});
 			mesh_store(m->normal[i], vec3_is_finite(v) ? v : (vec3){0, 0, 0});
 		}
 		for (unsigned k = 0; m->uv && k < 2; k++)
-			m->uv[i][k] = number(texcoord, i, k);
+			m->uv[i][k] = read_number(texcoord, i, k);
 		if (m->uv && !(isfinite(m->uv[i][0]) && isfinite(m->uv[i][1])))
 			return node_error(n, e, EINVAL, "the texture coordinates of vertex %u are not finite", i);
 		if (i % 65536 == 0)
@@ -152,7 +153,7 @@ static int add_attribute(struct mesh *m, const struct scene_node *n, const char 
 		return node_error(n, e, ENOMEM, "out of memory");
 	for (uint32_t i = 0; i < m->vertex_count; i++)
 		for (unsigned k = 0; k < components; k++)
-			mesh_set_attribute(a, i, k, number(&from, i, k));
+			mesh_set_attribute(a, i, k, read_number(&from, i, k));
 	return 0;
 }
 
@@ -182,7 +183,7 @@ static int make_mesh(const struct scene_node *n, const struct asset_part *buffer
 		return node_error(n, e, E2BIG, "more than %d triangles", MESH_TRIANGLES_MAX);
 	if (!mesh_alloc(m, (uint32_t)position.count, (uint32_t)triangles, !no_normal, !no_uv, arena))
 		return node_error(n, e, ENOMEM, "out of memory");
-	rc = fill(m, n, &position, &normal, &texcoord, no_index ? NULL : &index, mode, e);
+	rc = fill_mesh(m, n, &position, &normal, &texcoord, no_index ? NULL : &index, mode, e);
 	if (!rc)
 		rc = add_attribute(m, n, "color", "vertex_color", 3, buffer, arena, e);
 	return rc ? rc : add_attribute(m, n, "alpha", "vertex_alpha", 1, buffer, arena, e);

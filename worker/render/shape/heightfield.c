@@ -69,7 +69,7 @@ static int read_picture(const struct scene_node *n, const struct asset_source *a
 	return r ? node_error(from, e, -r, "%s", inner.text) : 0;
 }
 
-static void add(double *normal, double x, double y)
+static void add_normal(double *normal, double x, double y)
 {
 	double length = sqrt(x * x + y * y + 1);
 	normal[0] += x / length;
@@ -86,10 +86,10 @@ static void set_normals(const struct field *f, struct mesh *m, double across, do
 			double(*n)[3] = m->normal + (size_t)y * width + x;
 			double z00 = height_at(f, x, y), z10 = height_at(f, x + 1, y), z01 = height_at(f, x, y + 1),
 			       z11 = height_at(f, x + 1, y + 1);
-			add(n[0], z00 - z10, z00 - z01);
-			add(n[1], z00 - z10, z10 - z11);
-			add(n[width], z01 - z11, z00 - z01);
-			add(n[width + 1], z01 - z11, z10 - z11);
+			add_normal(n[0], z00 - z10, z00 - z01);
+			add_normal(n[1], z00 - z10, z10 - z11);
+			add_normal(n[width], z01 - z11, z00 - z01);
+			add_normal(n[width + 1], z01 - z11, z10 - z11);
 		}
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
 		vec3 n = {m->normal[i][0] / across, m->normal[i][1] / along, m->normal[i][2]};

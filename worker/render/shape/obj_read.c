@@ -109,7 +109,7 @@ static int read_index(struct reader *o, const char *what, size_t count, uint32_t
 	return 0;
 }
 
-static bool take(struct reader *o, char c)
+static bool skip_char(struct reader *o, char c)
 {
 	if (o->p < o->end && *o->p == c) {
 		o->p++;
@@ -122,11 +122,11 @@ static int read_corner(struct reader *o)
 {
 	struct obj_corner c = {.at = (uint32_t)o->file->corners.count};
 	int r = read_index(o, "vertex", o->file->positions.count, &c.v);
-	if (!r && take(o, '/')) {
-		bool slash = take(o, '/');
+	if (!r && skip_char(o, '/')) {
+		bool slash = skip_char(o, '/');
 		if (!slash) {
 			r = read_index(o, "texture coordinate", o->file->uvs.count, &c.vt);
-			slash = !r && take(o, '/');
+			slash = !r && skip_char(o, '/');
 		}
 		if (!r && slash)
 			r = read_index(o, "normal", o->file->normals.count, &c.vn);

@@ -45,7 +45,7 @@ static int file_error(const struct stream *s, const char *what)
 	return node_error(s->node, s->error, EINVAL, "%s: %s", s->name, what);
 }
 
-static int take(struct stream *s, void *out, size_t size)
+static int read_stream(struct stream *s, void *out, size_t size)
 {
 	s->z.next_out = out;
 	while (size > 0) {
@@ -64,7 +64,7 @@ static int take(struct stream *s, void *out, size_t size)
 static int take_number(struct stream *s, int bytes, uint64_t *x)
 {
 	unsigned char raw[8];
-	int r = take(s, raw, (size_t)bytes);
+	int r = read_stream(s, raw, (size_t)bytes);
 	*x = r ? 0 : get_bytes(raw, bytes);
 	return r;
 }
@@ -73,7 +73,7 @@ static int skip_name(struct stream *s)
 {
 	char c;
 	for (int i = 0; i < NAME_MAX_BYTES; i++) {
-		int r = take(s, &c, 1);
+		int r = read_stream(s, &c, 1);
 		if (r || c == 0)
 			return r;
 	}
@@ -88,7 +88,7 @@ static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint3
 	uint64_t left = (uint64_t)count * (uint64_t)width;
 	while (left > 0) {
 		size_t n = left < CHUNK_ITEMS ? (size_t)left : CHUNK_ITEMS;
-		int r = take(s, raw, n * (size_t)size);
+		int r = read_stream(s, raw, n * (size_t)size);
 		if (r)
 			return r;
 		for (size_t i = 0; i < n; i++) {
@@ -134,7 +134,7 @@ static int take_triangles(struct stream *s, struct mesh *m)
 	unsigned char raw[CHUNK_ITEMS * 12];
 	for (uint32_t done = 0; done < m->triangle_count;) {
 		uint32_t n = m->triangle_count - done < CHUNK_ITEMS ? m->triangle_count - done : CHUNK_ITEMS;
-		int r = take(s, raw, (size_t)n * 12);
+		int r = read_stream(s, raw, (size_t)n * 12);
 		if (r)
 			return r;
 		for (uint32_t i = 0; i < 3 * n; i++) {

@@ -42,8 +42,8 @@ static void find_bounds(struct mesh_attribute *m, const struct attribute_values 
 	m->max = v->grey ? fmin(most, 1) : 1;
 }
 
-static int make(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
-		const struct texture_build *build, struct error *e)
+static int make_attribute(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
+			  const struct texture_build *build, struct error *e)
 {
 	struct attribute_table *table = build->attributes;
 	if (role != COLOR_REFLECTANCE && role != COLOR_ILLUMINANT)
@@ -74,13 +74,13 @@ static int attribute_create(struct texture *t, const struct scene_node *n, enum 
 	const char *name = node_string(n, "name", "");
 	if (strncmp(name, "vertex_", 7) != 0 && strncmp(name, "face_", 5) != 0)
 		return node_error(n, e, EINVAL, "needs a name that begins with `vertex_` or `face_`");
-	return make(t, n, name, role, build, e);
+	return make_attribute(t, n, name, role, build, e);
 }
 
 static int vertexcolors_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			       const struct texture_build *build, struct error *e)
 {
-	return make(t, n, "vertex_color", role, build, e);
+	return make_attribute(t, n, "vertex_color", role, build, e);
 }
 
 static void look_up(const struct mesh_attribute *m, const struct texture_point *at, double rgb[3])

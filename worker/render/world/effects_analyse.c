@@ -34,7 +34,7 @@ static void count(struct tally *t, const struct scene_node *n, const char *namel
 }
 
 /* "`glass1`", "`glass1` and 2 more" */
-static const char *who(const struct tally *t, char text[96])
+static const char *names_of(const struct tally *t, char text[96])
 {
 	if (t->count > 1)
 		snprintf(text, 96, "%s and %zu more", t->first, t->count - 1);
@@ -202,11 +202,11 @@ static void colour(struct report *r, const struct census *c)
 	bool called = c->coloured.count > 0 || !one_shape;
 	fx->illuminant = c->shape[COLOR_SHAPE_CONSTANT] ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_D65;
 	if (c->coloured.count)
-		fx->colour = line(r, EFFECT_COLOUR, called, "%s var%s with wavelength", who(&c->coloured, text),
+		fx->colour = line(r, EFFECT_COLOUR, called, "%s var%s with wavelength", names_of(&c->coloured, text),
 				  verb(&c->coloured, "ies", "y"));
 	else if (c->coloured_light.count)
-		fx->colour =
-			line(r, EFFECT_COLOUR, called, "the light of %s is coloured", who(&c->coloured_light, text));
+		fx->colour = line(r, EFFECT_COLOUR, called, "the light of %s is coloured",
+				  names_of(&c->coloured_light, text));
 	else if (!one_shape)
 		fx->colour = line(r, EFFECT_COLOUR, called, "the emitters differ in spectrum");
 	else
@@ -232,7 +232,7 @@ static void dispersion(struct report *r, const struct census *c)
 				: c->hidden_dispersive.count ? &c->hidden_dispersive
 				: c->unused_dispersive.count ? &c->unused_dispersive
 							     : &c->constant_eta;
-	const char *name = t->count ? who(t, text) : "";
+	const char *name = t->count ? names_of(t, text) : "";
 	if (called)
 		on = line(r, EFFECT_DISPERSION, true,
 			  "the index of %s varies with wavelength: paths that meet %s carry one", name,
@@ -268,7 +268,7 @@ static bool materials(struct report *r, enum effect which, const struct tally *t
 {
 	char text[96];
 	if (t->count)
-		return line(r, which, true, "%s %s", who(t, text), verb(t, one, many));
+		return line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many));
 	return line(r, which, false, "no material that light meets %s", none);
 }
 
@@ -278,8 +278,9 @@ static void lobes(struct report *r, const struct census *c)
 	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: known after the other two */
 	if (!c->specular.count && c->hidden_specular.count) {
 		char text[96];
-		fx->specular = line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", who(&c->hidden_specular, text),
-				    verb(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
+		fx->specular =
+			line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", names_of(&c->hidden_specular, text),
+			     verb(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
 	} else {
 		fx->specular = materials(r, EFFECT_SPECULAR, &c->specular, "has exactly specular lobes",
 					 "have exactly specular lobes", "has exactly specular lobes");
@@ -308,10 +309,10 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	struct effects *fx = r->fx;
 	if (c->textured.count && c->textured_light.count)
 		fx->textures = line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured",
-				    who(&c->textured, text), who(&c->textured_light, more));
+				    names_of(&c->textured, text), names_of(&c->textured_light, more));
 	else if (c->textured.count + c->textured_light.count)
 		fx->textures = line(r, EFFECT_TEXTURES, true, "textured: %s",
-				    who(c->textured.count ? &c->textured : &c->textured_light, text));
+				    names_of(c->textured.count ? &c->textured : &c->textured_light, text));
 	else
 		fx->textures = line(r, EFFECT_TEXTURES, false, "no material and no emitter has a texture");
 	struct tally t = {0};
@@ -322,8 +323,8 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 			triangles += w->shapes[i].triangle_count;
 		}
 	if (t.count)
-		fx->displacement = line(r, EFFECT_DISPLACEMENT, true, "%s %s displaced: %llu triangles", who(&t, text),
-					verb(&t, "is", "are"), (unsigned long long)triangles);
+		fx->displacement = line(r, EFFECT_DISPLACEMENT, true, "%s %s displaced: %llu triangles",
+					names_of(&t, text), verb(&t, "is", "are"), (unsigned long long)triangles);
 	else
 		fx->displacement = line(r, EFFECT_DISPLACEMENT, false, "no shape is displaced");
 	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA};
@@ -349,7 +350,7 @@ static bool lights(struct report *r, enum effect which, const struct tally *t, c
 		   const char *none)
 {
 	char text[96];
-	return t->count ? line(r, which, true, "%s %s", who(t, text), verb(t, one, many))
+	return t->count ? line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many))
 			: line(r, which, false, "%s", none);
 }
 
@@ -359,7 +360,7 @@ static void emitter_moves(struct report *r, const struct census *c)
 	bool called = c->area.count + c->environment.count > 0;
 	if (called)
 		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",
-					   who(c->area.count ? &c->area : &c->environment, text),
+					   names_of(c->area.count ? &c->area : &c->environment, text),
 					   verb(c->area.count ? &c->area : &c->environment, "has", "have"));
 	else
 		r->fx->emitter_move =
