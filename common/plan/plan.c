@@ -23,19 +23,20 @@ enum {
 	DEFAULT_CHAINS = 1024,
 	DEFAULT_BOOTSTRAP = 1000000,
 	LEAST_BOOTSTRAP = 16384,
-	LEAST_BOOTSTRAP_SLOW = 256, /* what takes thousands of rays joins as many vertices: it finds light if any is */
+	LEAST_BOOTSTRAP_SLOW = 256, /* a bootstrap sample of thousands of rays joins as many vertices: 256 find light if
+				       there is any */
 	LEAST_CHAINS = 16,
-	MUTATIONS_PER_CHAIN = 2048, /* fewer chains before chains become shorter than this */
+	MUTATIONS_PER_CHAIN = 2048, /* with fewer mutations, the number of chains is reduced rather than their length */
 	AIM_ROUNDS = 8,
 	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
 	LEASE_SAMPLES_OPEN = 1 << 18, /* for chains without a bound on mutations: the most in one lease */
 	LEASE_SAMPLES_LEAST = 1 << 13,
 	LEASE_SECONDS = 20,	      /* of one thread */
-	LEASE_SAMPLES_SLOW = 1 << 15, /* fewer take no longer than that in any scene that was seen */
-	SPEED_UNKNOWN = 50000,	      /* mutations or samples a second, where no pilot said it */
-	RAYS_A_SECOND = 2000000,      /* of one thread: 1.5 to 3.5 million in the scenes of tests/bench */
-	RAYS_USUAL = 8,		      /* of a mutation or a sample, at most */
-	PIXEL_BYTES = 12,	      /* of a tile on the wire */
+	LEASE_SAMPLES_SLOW = 1 << 15, /* fewer never take longer than that in any scene tried */
+	SPEED_UNKNOWN = 50000,	      /* mutations or samples a second, if no pilot measured it */
+	RAYS_A_SECOND = 2000000,      /* of one thread; 1.5 to 3.5 million in the scenes of tests/bench */
+	RAYS_USUAL = 8,		      /* the most that a mutation or a sample usually takes */
+	PIXEL_BYTES = 12,	      /* bytes of a tile on the wire */
 	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
 	STREAM_RESAMPLING = 5,	      /* RNG_RESAMPLING of the renderer's random numbers */
 };
@@ -168,7 +169,7 @@ bool plan_wants_rays(const struct plan_request *r)
 	return !asked && (!counted || r->seconds > 0 || r->target_error > 0);
 }
 
-/* Of one thread in so many seconds; 2^62: no rays were counted. */
+/* Bootstrap samples of one thread in so many seconds; 2^62: no rays were counted. */
 static uint64_t bootstrap_room(const struct plan_request *r, double seconds)
 {
 	return r->rays.bootstrap > 0 ? (uint64_t)fmin(seconds * RAYS_A_SECOND / r->rays.bootstrap, 0x1p62) : 1ull << 62;
@@ -179,15 +180,15 @@ uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds)
 	return clamp(bootstrap_room(r, seconds), LEAST_BOOTSTRAP_SLOW, PLAN_MAX_BOOTSTRAP / 2);
 }
 
-/* How many times as long a mutation or a sample takes as a usual one. */
+/* How many times as long a mutation or a sample takes as a usual one; at least 1. */
 static double slowness(const struct plan_request *r)
 {
 	return fmax(1, r->rays.step / RAYS_USUAL);
 }
 
-/* Mutations in a lease of a plan that time or an error ends: 32 a pixel and round, as far as 64 leases go. A lease's
- * tiles cost about 20 ns a pixel of the crop to sum, send and add, which is 2 % of half a mutation a pixel; fewer than
- * 2^13 would not be worth sending, fewer of slow ones in proportion. */
+/* Mutations in a lease of a plan that ends by time or error: 32 per pixel and round, divided among up to 64 leases.
+ * A lease's tiles cost about 20 ns per pixel of the crop to sum, send and add, which is 2 % of half a mutation per
+ * pixel. Fewer than 2^13 are not worth sending; slow mutations have shorter leases in proportion. */
 static uint64_t open_lease(const struct plan_request *r, const struct plan *p)
 {
 	uint64_t leases = (uint64_t)p->groups * p->parts, per_pixel = crop_pixels(p) * 32 / leases,
@@ -267,8 +268,8 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 	return rule;
 }
 
-/* A round cannot be shorter than a sample a pixel and group. Where not even two threads would be through with it in
- * time there are fewer groups, but four at least, so that there is an error. */
+/* A round has at least one sample per pixel and group. If two threads would not finish it in time, there are fewer
+ * groups, but at least four, so that there is an error. */
 static uint32_t usual_groups(const struct plan_request *r, const struct plan *p)
 {
 	if (r->groups)

@@ -37,12 +37,12 @@ enum {
 	PLAN_MAX_STRATEGIES = 8,  /* entries of the mixture */
 	PLAN_ACCURACY_MAX = 256,  /* bytes of the text, with the final 0 */
 	PLAN_EFFECTS_MAX = 256,
-	PLAN_SPEED_MOST = 20000000, /* mutations or samples a second of one thread: none is faster */
+	PLAN_SPEED_MOST = 20000000, /* mutations or samples a second of one thread: nothing is faster */
 };
 
-/* Rays that a pilot counted (worker/render/rays.h), the same on every machine; 0: none were. */
+/* Rays that a pilot counted (worker/render/rays.h), the same on every machine; 0: not counted. */
 struct plan_rays {
-	double bootstrap, step; /* a bootstrap sample; a mutation, or a sample */
+	double bootstrap, step; /* per bootstrap sample; per mutation or sample */
 };
 
 struct plan_request {
@@ -57,12 +57,14 @@ struct plan_request {
 	double seconds;		       /* 0: none */
 	double target_error;	       /* 0: none */
 	uint32_t min_depth, max_depth; /* edges */
-	uint32_t chains, groups;       /* 0: by the rule */
-	uint32_t parts;		       /* leases of a group in a round; 0: by the rule */
-	uint64_t bootstrap, epoch;     /* 0: by the rule; epoch: mutations per chain or samples per pixel and group */
-	double speed; /* mutations or samples a second of one thread, by a pilot: bounds a lease's time; 0: not known */
-	struct plan_rays rays; /* where time or an error ends the job: what these leave room for */
-	double bandwidth; /* bytes of tiles a second that one thread may send, a setting of the coordinator; 0: any */
+	uint32_t chains, groups;       /* 0: chosen by plan_make */
+	uint32_t parts;		       /* leases of a group in a round; 0: chosen by plan_make */
+	uint64_t bootstrap,
+		epoch; /* 0: chosen by plan_make; epoch: mutations per chain, or samples per pixel and group */
+	double speed; /* mutations or samples a second of one thread, measured by a pilot: bounds a lease's time; 0: not
+			 known */
+	struct plan_rays rays; /* set if a time or an error ends the job: decides how much fits into it */
+	double bandwidth; /* bytes of tiles a second that one thread may send, set by the coordinator; 0: unlimited */
 	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 };
@@ -91,27 +93,26 @@ struct plan {
 /* Checks the request (sizes, crop, counts) and chooses what it leaves open. -EINVAL with a sentence. */
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 /*
- * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds,
- * or more where a time leaves room for less than these in an eighth of it. Without such a bound a round
- * of chains has 32 mutations a pixel, and one of samples is an eighth of what a bound on time or error leaves room for
- * (at 50,000 samples a second, and 1/E^2 samples a pixel for an error of E), so that it is noticed when it is met; no
- * lease has more than a million mutations, or, where the pilot's speed is known, takes about 20 s of one thread at most
- * (rounded to a power of two, so that the pilot's noise seldom shows). Where a bandwidth is set an epoch is at least so
- * long that the tiles of a lease do not exceed it, but no longer than the job.
+ * The length of an epoch if none is requested. A job with a bound on its mutations has 8 rounds, or more if fewer
+ * mutations than these fit into an eighth of its time. Without such a bound, a round of chains has 32 mutations per
+ * pixel, and a round of samples is an eighth of what a bound on time or error leaves room for (at 50,000 samples a
+ * second, and 1/E^2 samples per pixel for an error of E), so that the bound is noticed soon after it is reached. A
+ * lease has at most a million mutations or, if the pilot's speed is known, takes at most about 20 s of one thread
+ * (rounded to a power of two, so that the pilot's noise seldom shows). If a bandwidth is set, an epoch is long enough
+ * that a lease's tiles do not exceed it, but not longer than the job.
  */
 /* Whether a pilot would help: without one a lease might take longer than that. */
 bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
 /*
- * What a time leaves room for, by counted rays of which a thread traces two million a second. Nobody having asked for
- * it, the bootstrap takes at most a quarter of the time of one thread, and the starts of chains, each as much work as a
- * bootstrap sample, an eighth; where a mutation or a sample takes more than 8 rays, the rounds of a plan without a
- * bound on these are shorter in proportion. Without a time no lease of the bootstrap takes more than about 20 s.
+ * How much fits into a time, by counted rays, of which a thread traces two million a second. Unless they are requested,
+ * the bootstrap takes at most a quarter of the time of one thread, and the starts of chains, each as much work as a
+ * bootstrap sample, an eighth. If a mutation or a sample takes more than 8 rays, the rounds of a plan without a bound
+ * on these are shorter in proportion. Without a time, no lease of the bootstrap takes more than about 20 s.
  */
 bool plan_wants_rays(const struct plan_request *r);
-/* Bootstrap samples in so many seconds of one thread, at least 256; the most there may be where no rays were counted.
- */
+/* Bootstrap samples in so many seconds of one thread, at least 256; the maximum if no rays were counted. */
 uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds);
-/* Every plan from the wire passes here before it is believed. */
+/* Every plan from the wire must pass this check. */
 int plan_check(const struct plan *p, struct error *e);
 /* The rule by which plan_make chose the length of an epoch; empty: it was requested. */
 void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A group at a time: a short lease of the bootstrap, then one of a single chain that begins at one of its samples.
- * The start of a chain is as much work as a bootstrap sample, so what counts is its second epoch. Samples are as much
- * work as those of their bootstrap.
+ * One group after the other: a short lease of the bootstrap, then a lease of a single chain that starts from one of its
+ * samples. The start of a chain is as much work as a bootstrap sample, so only its second epoch is counted. Samples are
+ * as much work as those of their bootstrap.
  *
- * Failures: of a lease; what was counted is lost.
+ * Failures: those of a lease; what was counted is lost.
  */
 #include "worker/render/rays.h"
 
@@ -12,9 +12,9 @@
 
 enum {
 	GROUPS = PLAN_MAX_GROUPS,
-	SAMPLES = 16, /* of a group's bootstrap: one of them also looks for paths that are too long */
+	SAMPLES = 16, /* of a group's bootstrap; one of them also looks for paths that are too long */
 	MUTATIONS = 32,
-	ENOUGH = 1 << 18, /* rays, of bootstrap samples as of mutations */
+	ENOUGH = 1 << 18, /* rays, of bootstrap samples and of mutations each */
 	LEAST_GROUPS = 2,
 };
 
@@ -29,7 +29,7 @@ struct counter {
 	struct error *e;
 };
 
-/* Random numbers that the render does not draw: what is counted must not decide how often the same is drawn again. */
+/* Random numbers that the render does not draw, so that a render is independent of its pilot. */
 static int make_plan(const struct plan_request *r, struct plan *p, struct error *e)
 {
 	struct plan_request q = *r;

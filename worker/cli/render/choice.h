@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is found out about a scene before a plan is made of it: the integrator (worker/render/choose.h) where that is
- * left to the scene, and how many rays its samples take (worker/render/rays.h) where a time or an error ends the
- * render.
+ * What is found out about a scene before a plan is made for it: the integrator (worker/render/choose.h) if none was
+ * given, and how many rays its samples take (worker/render/rays.h) if a time or an error ends the render.
  */
 #ifndef WORKER_CLI_RENDER_CHOICE_H
 #define WORKER_CLI_RENDER_CHOICE_H
@@ -13,13 +12,13 @@
 #include <jansson.h>
 
 struct choice {
-	bool made; /* false: one was given, and the rest is empty */
+	bool made; /* false: an integrator was given, and the rest is empty */
 	struct render_choice found;
 	double seconds; /* wall clock */
-	char text[512]; /* one line for people */
+	char text[512]; /* one line for the user */
 };
 
-/* a: complete but for what is chosen and counted. Where that is nothing no world is built for it. */
+/* a: complete except for what is chosen and counted. If nothing is, no world is built. */
 int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e);
 /* The same in an existing world. */
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);

@@ -13,7 +13,7 @@ enum {
 };
 static const double out_of_reach = 1e-9;
 static const double bootstrap_share = 0.25; /* of a pilot, at most */
-static const double probe_seconds = 1;	    /* of a thread, for its bootstrap, where samples take many rays */
+static const double probe_seconds = 1;	    /* of one thread, for its bootstrap, if samples take many rays */
 
 int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Elements that no XML file holds: made of what stands in other files. One thread; they live in the arena given. */
+/* Elements that are not in an XML file but made from the contents of other files. One thread; they are allocated in
+ * the given arena. */
 #ifndef WORKER_RENDER_SCENE_ELEMENT_MAKE_H
 #define WORKER_RENDER_SCENE_ELEMENT_MAKE_H
 
@@ -8,14 +9,14 @@
 
 enum { ELEMENT_MAKE_ATTRIBUTES = 4 };
 
-/* The last inside `parent` from now on. */
+/* Appends it to the children of `parent`. */
 void element_link(struct xml_element *parent, struct xml_element *el);
 
-/* A new one of that place, the last inside `parent` (NULL: it stands alone). NULL: no memory. */
+/* A new element of that place in a file, appended to `parent` (NULL: to none). NULL: out of memory. */
 struct xml_element *element_make(struct xml_element *parent, const char *name, const char *file, int line,
 				 struct arena *arena);
 
-/* Adds an attribute to one of element_make, ELEMENT_MAKE_ATTRIBUTES at most. */
+/* Adds an attribute to an element of element_make, at most ELEMENT_MAKE_ATTRIBUTES. */
 void element_put(struct xml_element *el, const char *name, const char *value);
 
 #endif

@@ -412,7 +412,8 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 	struct xml_element *emitter = gltf_plugin(g, g->scene, at, "emitter", "area", NULL);
 	put_colour(g, emitter, at, "radiance", rgb, gltf_object(g, at, at->json, "emissiveTexture"));
 	put_id(g, emitter, at, "emitter", GLTF_NO_COLOURS);
-	/* What glows like a screen lights no room: viewers show it among surroundings that do. */
+	/* Emission of at most 1 is that of a screen, which does not light a room: viewers show such files in
+	 * surroundings that do. */
 	g->has_light |= rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
 }
 

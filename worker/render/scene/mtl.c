@@ -49,7 +49,7 @@ const char *mtl_file(const struct asset_source *assets, const char *other, const
 	if (!written)
 		return NULL;
 	for (char *p = written; *p; p++)
-		*p = *p == '\\' ? '/' : *p; /* as files that were written on Windows have it */
+		*p = *p == '\\' ? '/' : *p; /* files written on Windows have it */
 	const char *last = strrchr(written, '/'), *out = beside(other, written, arena);
 	return !out || !last || opens(assets, out) ? out : beside(other, last + 1, arena);
 }
@@ -58,7 +58,7 @@ const char *mtl_file(const struct asset_source *assets, const char *other, const
 
 static const struct keyword {
 	const char *word;
-	size_t at; /* of the mtl_value */
+	size_t at; /* index into mtl_value */
 	bool file;
 } keywords[] = {
 	{"Kd", offsetof(struct mtl_material, diffuse), false},
@@ -72,7 +72,7 @@ static const struct keyword {
 	{"bump", offsetof(struct mtl_material, bump), true},
 };
 
-/* Mitsuba does not read them either. */
+/* Mitsuba does not read these either. */
 static const char *const unread[] = {"Ke",	 "map_Ke", "Tr",       "Tf",	 "map_Ns", "map_bump",
 				     "map_Bump", "norm",   "disp",     "Pr",	 "Pm",	   "map_Pr",
 				     "map_Pm",	 "refl",   "map_refl", "map_Tr", "decal",  NULL};
@@ -156,7 +156,7 @@ const struct mtl_material *mtl_find(const struct mtl *m, const char *name)
 struct making {
 	const struct mtl *m;
 	struct arena *arena;
-	int count; /* of elements; negative: no memory */
+	int count; /* of elements; negative: out of memory */
 };
 
 static struct xml_element *make(struct making *k, struct xml_element *in, const char *element, int line)
@@ -195,7 +195,7 @@ static void picture(struct making *k, struct xml_element *in, const char *name, 
 		property(k, texture, "float", "gamma", &(struct mtl_value){v->line, "1"});
 }
 
-/* A colour, in sRGB as Mitsuba takes it, or the picture given last. */
+/* A colour, in sRGB as in Mitsuba, or the image given last. */
 static void colour(struct making *k, struct xml_element *in, const char *name, int line, const struct mtl_value *v,
 		   const struct mtl_value *map)
 {

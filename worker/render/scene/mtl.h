@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The materials of Wavefront .mtl files, as the elements of a scene that Mitsuba 0.6 makes of them: by `illum` a
- * diffuse, phong, dielectric or conductor BSDF, in a bumpmap and a mask where there are some. One thread; all lives in
- * the arena given.
+ * The materials of Wavefront .mtl files, as the scene elements that Mitsuba 0.6 makes from them: by `illum` a diffuse,
+ * phong, dielectric or conductor BSDF, inside a bumpmap and a mask if given. One thread; everything is allocated in the
+ * given arena.
  */
 #ifndef WORKER_RENDER_SCENE_MTL_H
 #define WORKER_RENDER_SCENE_MTL_H
@@ -13,7 +13,7 @@
 
 struct mtl_value {
 	int line;	  /* 0: not given */
-	const char *text; /* as it is written; of a file, its name from the scene's folder */
+	const char *text; /* as written; for a file, its name relative to the scene's folder */
 };
 
 struct mtl_material {
@@ -26,24 +26,24 @@ struct mtl_material {
 
 struct mtl {
 	const char *file;
-	bool there; /* it can be opened */
+	bool there; /* can be opened */
 	const struct mtl_material *last;
-	struct mtl_value unread; /* the first keyword that would change the image and is not read */
+	struct mtl_value unread; /* the first keyword that would change the image and is not supported */
 };
 
 enum { MTL_MATERIALS_MAX = 4096 };
 
-/* `file` is a canonical name (asset_name.h). One that cannot be opened has no materials. -E2BIG, -ENOMEM. */
+/* `file` is a canonical name (asset_name.h). A file that cannot be opened has no materials. -E2BIG, -ENOMEM. */
 int mtl_read(struct mtl *m, const struct asset_source *assets, const char *file, struct arena *arena, struct error *e);
 
-/* Of several of that name the last; NULL: none. */
+/* The last one of that name; NULL: none. */
 const struct mtl_material *mtl_find(const struct mtl *m, const char *name);
 
-/* Adds its <bsdf> to `shape`. The elements made, or -ENOMEM. */
+/* Adds its <bsdf> to `shape`. Returns the number of elements made, or -ENOMEM. */
 int mtl_put(const struct mtl *m, const struct mtl_material *of, struct xml_element *shape, struct arena *arena);
 
-/* FOLDER of `beside`, and `name` in it, canonical; where no file is there, the file of that name without its folders.
- * NULL: no memory. */
+/* `name` in the folder of `beside`, canonical; if there is no such file, the file of that name without its folders.
+ * NULL: out of memory. */
 const char *mtl_file(const struct asset_source *assets, const char *beside, const char *name, size_t length,
 		     struct arena *arena);
 

@@ -148,7 +148,7 @@ static const char *skip_blanks(const char *p)
 	return p;
 }
 
-/* A number of a scene file: "0.5f", as programs print it, is 0.5. */
+/* A number of a scene file; "0.5f", as some programs write it, is 0.5. */
 static const char *scan_value(const char *p, const char *end, double *out)
 {
 	const char *rest = number_scan(p, end, out);

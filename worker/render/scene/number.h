@@ -18,16 +18,15 @@ const char *number_scan_int(const char *p, const char *end, int64_t *out);
  * NaN, which the caller refuses or replaces. */
 const char *number_scan_printed(const char *p, const char *end, double *out);
 
-/* The whole text, blanks around it and an `f` after it allowed. */
+/* The whole text is one number; blanks around it and an `f` after it are allowed. */
 bool number_parse(const char *text, double *out);
 bool number_parse_int(const char *text, int64_t *out);
 
-/* A list of the same, separated by blanks, commas or both. The count, or -1 when something else is in it or there are
- * more than max.
- */
+/* A list of such numbers, separated by blanks, commas or both. The count, or -1 if it contains anything else or more
+ * than max. */
 int number_list(const char *text, double *out, size_t max);
 
-/* What is left of a line from p on, without the blanks around it. */
+/* The rest of a line from p on, without the blanks around it. */
 const char *number_line_rest(const char *p, const char *end, size_t *length);
 
 static inline bool number_is_blank(char c)

@@ -19,11 +19,11 @@ struct spread {
 	struct arena *arena;
 	struct report *report;
 	struct error *error;
-	struct material *materials; /* room for those of the shape at work; NULL: there has been none */
+	struct material *materials; /* scratch space for the current shape's materials; NULL: not allocated yet */
 	uint32_t *places;
 };
 
-/* What stands in a shape. */
+/* An element in a shape. */
 struct child {
 	const struct xml_element *el;
 	bool bsdf;
@@ -38,16 +38,16 @@ struct material {
 	const struct mtl_material *mtl; /* where there is no bsdf; NULL: none */
 };
 
-/* A shape at work. */
+/* The current shape. */
 struct obj_shape {
 	struct xml_element *el;
-	const char *file; /* NULL: it says none */
+	const char *file; /* NULL: none given */
 	struct asset bytes;
 	struct child *children;
 	size_t child_count, plain, named; /* BSDFs without a name, and with one */
-	bool load, fixed;		  /* it asks for the .mtl file; shines, or says itself which faces it wants */
-	struct material *materials;	  /* OBJ_MATERIALS_MAX */
-	uint32_t *places;		  /* PLACES: 1 + index, by the hash of the name; 0: free */
+	bool load, fixed; /* load: it asks for the .mtl file; fixed: it emits, or states itself which faces it wants */
+	struct material *materials; /* OBJ_MATERIALS_MAX */
+	uint32_t *places;	    /* PLACES: 1 + index, by the hash of the name; 0: free */
 	size_t count;
 	const char *library; /* of the last mtllib; NULL: none */
 	size_t library_length;
@@ -69,7 +69,7 @@ static bool is_property(const struct xml_element *el, const char *element, const
 	return strcmp(el->name, element) == 0 && written && (strcmp(written, name) == 0 || strcmp(written, snake) == 0);
 }
 
-/* What an element in a shape is, references followed: "bsdf", "emitter" and so on. */
+/* What an element in a shape is, with references followed: "bsdf", "emitter" and so on. */
 static const char *kind_of(const struct spread *s, const struct xml_element *el)
 {
 	struct error unused;
@@ -114,7 +114,7 @@ static uint32_t hash_of(const char *name, size_t length)
 	return h;
 }
 
-/* NULL: there are too many. */
+/* NULL: too many. */
 static struct material *material_of(struct obj_shape *o, const char *name, size_t length)
 {
 	uint32_t at = hash_of(name, length) % PLACES;
@@ -168,7 +168,7 @@ static int read_library(const struct spread *s, struct obj_shape *o)
 
 /* ---- which material each has */
 
-/* The last BSDF in the shape that is for it counts. *found: how many have a BSDF or an entry in the .mtl file. */
+/* The last BSDF in the shape that applies to it is used. *found: how many have a BSDF or an entry in the .mtl file. */
 static int choose(const struct spread *s, struct obj_shape *o, size_t *found)
 {
 	*found = 0;
@@ -192,7 +192,7 @@ static int choose(const struct spread *s, struct obj_shape *o, size_t *found)
 	return 0;
 }
 
-/* One BSDF whose name is no material of the file is that of the whole shape. */
+/* A single BSDF whose name is not a material of the file applies to the whole shape. */
 static bool is_for_all(struct obj_shape *o)
 {
 	for (size_t k = 0; k < o->child_count && o->named == 1 && o->plain == 0; k++) {
@@ -217,7 +217,7 @@ static int count_elements(const struct spread *s, const struct xml_element *at, 
 	return 0;
 }
 
-/* The same element once more, inside another; `unnamed`: as what has no name. */
+/* A copy of the element, inside another; `unnamed`: without its name. */
 static struct xml_element *copy_into(const struct spread *s, struct xml_element *in, const struct xml_element *el,
 				     bool unnamed)
 {
@@ -259,7 +259,7 @@ static int put_part(const struct spread *s, const struct obj_shape *o, struct xm
 	return r || !m->mtl ? r : count_elements(s, o->el, mtl_put(&o->mtl, m->mtl, part, s->arena));
 }
 
-/* Of the element itself becomes the merge, so that whoever refers to it finds all. */
+/* The element itself becomes the merge, so that references to it find all of its shapes. */
 static int replace(const struct spread *s, const struct obj_shape *o)
 {
 	struct xml_element *merge = element_make(NULL, o->el->name, o->el->file, o->el->line, s->arena);
@@ -339,7 +339,7 @@ static int spread_open(const struct spread *s, struct obj_shape *o)
 	if (!r)
 		r = choose(s, o, &found);
 	if (r || (found == 0 && o->named < 2))
-		return r; /* the builder of the world counts those whose materials are not read */
+		return r; /* the world's builder counts those whose materials are not read */
 	r = note_all(s, o);
 	return r ? r : replace(s, o);
 }
@@ -361,7 +361,7 @@ static int spread_shape(struct spread *s, struct xml_element *el)
 		return r;
 	if (s->assets->open(s->assets->user, o.file, &o.bytes, &missing)) {
 		if (o.named + o.plain < 2)
-			return 0; /* whoever builds the shape complains */
+			return 0; /* reported when the shape is built */
 		el->told = true;
 		return xml_error(el, s->error, ENOENT, "%.400s", missing.text);
 	}

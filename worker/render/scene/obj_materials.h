@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * OBJ shapes of Mitsuba 0.6 whose file names materials: a BSDF with a name is that of the faces after `usemtl` of this
- * name, one without a name that of all, and where there is neither the .mtl file counts. Such a shape becomes a `merge`
- * of shapes with one material each. Works on the tree of elements; one thread.
+ * OBJ shapes of Mitsuba 0.6 whose file names materials. A BSDF with a name applies to the faces after `usemtl` of that
+ * name, one without a name to all faces; faces without either have the material of the .mtl file. Such a shape becomes
+ * a `merge` of shapes with one material each. Works on the tree of elements; one thread.
  */
 #ifndef WORKER_RENDER_SCENE_OBJ_MATERIALS_H
 #define WORKER_RENDER_SCENE_OBJ_MATERIALS_H
@@ -14,7 +14,7 @@
 
 enum { OBJ_MATERIALS_MAX = 4096 }; /* of a file */
 
-/* Lists the .mtl files in `files`. What is wrong ends in the report. 0, -ENOMEM or REPORT_FULL. */
+/* Lists the .mtl files in `files`. Problems are added to the report. 0, -ENOMEM or REPORT_FULL. */
 int obj_materials_spread(struct xml_tree *t, struct id_table *ids, const struct asset_source *assets,
 			 struct asset_list *files, struct arena *arena, struct report *report, struct error *e);
 

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* "; --lenient ..." or "": what is done where the user asks for leniency. */
+/* "; --lenient ..." or "": what --lenient does instead. */
 static const char *lenient_hint(enum plugin_class cls, const char *type, char *text, size_t size)
 {
 	const char *other;

@@ -1,22 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The sentences for what no table has, with the nearest name. Each returns -EINVAL. Pure. */
+/* The sentences for unknown and unsupported elements, types and parameters, with the nearest name. Each returns
+ * -EINVAL. Pure. */
 #ifndef WORKER_RENDER_SCENE_REFUSE_H
 #define WORKER_RENDER_SCENE_REFUSE_H
 
 #include "worker/render/scene/element.h"
 #include "worker/render/scene/param.h"
 
-/* An element that has no place in the one around it. */
+/* An element that is not allowed where it stands. */
 int refuse_element(const struct xml_element *el, struct error *e);
 
-/* An object of an unknown type, or of one of Mitsuba's that is not supported. */
+/* An object of an unknown type, or of one of Mitsuba's types that is not supported. */
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
 		struct error *e);
 
-/* A medium, wherever it stands. */
+/* A medium, anywhere. */
 int refuse_medium(const struct xml_element *el, struct error *e);
 
-/* A parameter of `owner`, which the file calls `type`: one that it does not have (p NULL), or that is not supported. */
+/* A parameter of `owner`, whose type in the file is `type`: unknown (p NULL), or not supported. */
 int refuse_property(const struct plugin_decl *owner, const char *type, const struct xml_element *el, const char *name,
 		    const struct param *p, struct error *e);
 

@@ -39,7 +39,7 @@ struct scene_settings {
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
 			struct scene_settings *out, struct error *e);
 
-/* Of a scene without a sensor, whose shapes lie between low and high: the camera that both Mitsubas put before it. */
+/* For a scene without a sensor, whose shapes lie between low and high: places the camera that both Mitsubas supply. */
 int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct error *e);
 
 /* Declarations of perspective, thinlens, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A file of lines that begin with a word, as Wavefront's are. Blanks around words do not count. Pure. */
+/* A file of lines that begin with a word, like Wavefront's. Blanks around words are skipped. Pure. */
 #ifndef WORKER_RENDER_SCENE_TEXT_LINES_H
 #define WORKER_RENDER_SCENE_TEXT_LINES_H
 
@@ -8,7 +8,7 @@
 
 struct text_line {
 	int number;
-	const char *word, *rest; /* the rest: without the blanks around it */
+	const char *word, *rest; /* rest: without the blanks around it */
 	size_t word_length, rest_length;
 };
 
@@ -17,7 +17,7 @@ struct text_lines {
 	int number; /* of the last line */
 };
 
-/* The next line; false: there is none. An empty one has an empty word. */
+/* The next line; false: none is left. An empty line has an empty word. */
 bool text_lines_next(struct text_lines *t, struct text_line *out);
 bool text_line_is(const struct text_line *l, const char *word);
 

@@ -105,7 +105,7 @@ static int out_of_memory(struct reader *r)
 			 r->file, line_now(r), XML_MEMORY_MAX >> 20);
 }
 
-/* All names without a value are said, not the first alone. */
+/* All names without a value are reported, not only the first. */
 static int note_missing(struct reader *r, const struct xml_element *el, const char *attribute)
 {
 	error_prefix(r->error, -ENOENT, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line, el->name, attribute);
@@ -241,7 +241,7 @@ static bool is_there(const struct reader *r, const char *name)
 	return true;
 }
 
-/* The first of the folders that has the file; *found: one has. */
+/* The first of the folders that has the file; *found: whether one has. */
 static int search(struct reader *r, const char *written, const char **name, bool *found)
 {
 	*found = false;
@@ -262,8 +262,8 @@ static int search(struct reader *r, const char *written, const char **name, bool
 	return 0;
 }
 
-/* A name that no folder has stays as it is, for whoever opens it to complain; one that was written on Windows is tried
- * with '/' for '\\'. */
+/* A name that no folder has is kept, and reported by whoever opens it. One written on Windows is tried with '/' for
+ * '\\'. */
 static int find_file(struct reader *r, const char **name)
 {
 	bool found = false, windows = strchr(*name, '\\') != NULL;

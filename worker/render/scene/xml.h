@@ -33,10 +33,9 @@ struct xml_tree {
 	struct xml_element *root; /* <scene>; each include is replaced by a <scene> element */
 	bool dialect_3;
 	uint32_t element_count, include_count, path_count, note_count, missing_count;
-	const char *includes[XML_FILES_MAX]; /* names of included files; repeated where included more than once */
-	const char *notes[XML_NOTES_MAX];    /* what whoever reads the file should know */
-	const char
-		*missing[XML_MISSING_MAX]; /* a sentence each on $names without a value: what they stand in is wrong */
+	const char *includes[XML_FILES_MAX];  /* names of included files; repeated where included more than once */
+	const char *notes[XML_NOTES_MAX];     /* what whoever reads the file should know */
+	const char *missing[XML_MISSING_MAX]; /* a sentence for each $name without a value */
 	const char *
 		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
 };

@@ -10,7 +10,7 @@
 
 static const struct param params[] = {
 	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{"material", UNDERSTOOD(VALUE_STRING)}, /* the faces after `usemtl` of that name alone; "": those before any */
+	{"material", UNDERSTOOD(VALUE_STRING)}, /* only the faces after `usemtl` of that name; "": those before any */
 	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
 	{"collapse", IGNORED},
@@ -50,15 +50,15 @@ static void set_vertex(const struct obj_file *o, struct mesh *m, uint32_t i, con
 	}
 }
 
-/* Faces of a file, in arrays of their own or in its: sorting changes the corners. */
+/* Faces of a file, in arrays of their own or in the file's: sorting changes the corners. */
 struct faces {
 	struct obj_corner *corners;
 	uint32_t (*triangles)[3];
 	size_t corner_count, triangle_count;
 };
 
-/* Corners that agree in all three indices share a vertex. Sorting takes a bounded time whatever the file says. False:
- * out of memory. */
+/* Corners that agree in all three indices share a vertex. Sorting takes a bounded time for any file. False: out of
+ * memory. */
 static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *arena, struct mesh *m, bool flip)
 {
 	struct obj_corner *c = f->corners;
@@ -86,7 +86,7 @@ static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *a
 	return ok;
 }
 
-/* How far a run goes. */
+/* Where a run ends. */
 static struct obj_run end_of(const struct obj_file *o, size_t run)
 {
 	const struct obj_run *runs = o->runs.items;
@@ -121,7 +121,7 @@ static int out_of_memory(const struct scene_node *n, struct error *e)
 	return node_error(n, e, ENOMEM, "%s: out of memory", node_string(n, "filename", ""));
 }
 
-/* The faces of one material, copied: the file is kept for the others. */
+/* The faces of one material, copied: the file is kept for the other materials. */
 static int build_material(const struct scene_node *n, const struct obj_file *o, const char *material,
 			  struct arena *arena, struct shape_geometry *out, struct error *e)
 {

@@ -168,7 +168,7 @@ static int read_face(struct reader *o)
 	return 0;
 }
 
-/* A run of no faces is none. */
+/* A run without faces is dropped. */
 static int begin_run(struct reader *o, const char *name, size_t length)
 {
 	struct obj_file *f = o->file;
@@ -187,7 +187,7 @@ static int begin_run(struct reader *o, const char *name, size_t length)
 	return 0;
 }
 
-/* The name is the rest of the line, blanks inside included. */
+/* The name is the rest of the line, with blanks inside. */
 static int read_material(struct reader *o)
 {
 	size_t length;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a Wavefront OBJ file holds, as it stands there: v, vt, vn, f and usemtl. Everything else (groups, lines) has no
- * meaning here. Every index is checked where it stands, so that an error has a line. One thread.
+ * The contents of a Wavefront OBJ file: v, vt, vn, f and usemtl. Everything else (groups, lines) is skipped. Each index
+ * is checked where it is read, so that an error has a line. One thread.
  */
 #ifndef WORKER_RENDER_SHAPE_OBJ_READ_H
 #define WORKER_RENDER_SHAPE_OBJ_READ_H
@@ -15,10 +15,10 @@ struct obj_list {
 
 struct obj_corner {
 	uint32_t v, vt, vn; /* from 1; 0: none */
-	uint32_t at;	    /* place in the list of corners */
+	uint32_t at;	    /* index into the list of corners */
 };
 
-/* The faces from here to the next run have one material. */
+/* The faces from this one to the next run have one material. */
 struct obj_run {
 	size_t name, name_length; /* in `names` */
 	size_t corner, triangle;
@@ -32,16 +32,16 @@ struct obj_file {
 	struct obj_list names;			 /* char */
 };
 
-/* The file that the node names. After 0 alone obj_free. */
+/* Reads the file that the node names. After 0, release it with obj_free. */
 int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e);
 void obj_free(struct obj_file *o);
 
-/* The last file of which a shape took one material: the next shape takes another. */
+/* The file read last, kept if a shape took one material of it, because the next shape usually takes another. */
 struct obj_cache {
 	char *name; /* NULL: nothing is kept */
 	struct obj_file file;
 };
-/* The file that the node names, kept in c until another one is asked for. */
+/* The file that the node names, kept in c until another one is requested. */
 int obj_cache_read(struct obj_cache *c, const struct scene_node *n, const struct asset_source *assets, struct error *e);
 void obj_cache_fini(struct obj_cache *c);
 
