@@ -122,7 +122,7 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 		rc = error_set(
 			e, EINVAL,
 			"an epoch of %llu makes leases of %llu mutations or samples, each of which keeps a thread from "
-			"all other jobs; at most %d: a shorter --epoch, or more --parts",
+			"all other jobs; at most %d are allowed: use a shorter --epoch, or more --parts",
 			(unsigned long long)request.epoch, (unsigned long long)plan_lease_mutations(plan), LEASE_MOST);
 	if (!rc)
 		plan_describe_epoch(&request, plan, rule, rule_size);

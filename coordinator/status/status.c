@@ -288,7 +288,7 @@ static void on_connection(uv_stream_t *listener, int status)
 		return;
 	}
 	if (t->reader_count > READERS_MAX) { /* the kernel takes the line at once */
-		say_error(r, "too many read the status: 64 others are connected to its socket");
+		say_error(r, "the status has too many readers: 64 others are connected to its socket");
 		drop(r);
 		return;
 	}

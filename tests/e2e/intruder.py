@@ -163,7 +163,7 @@ for what, words, sentence in attempts:
         sys.exit(f"{what}: it says {heard!r}")
     print(f"{what}|{sentence.decode() or 'hung up'}")
 # What one owner has on its way counts on all connections, what others have does not.
-what, goes_on = "files beyond the quota, on two connections", b"samples a pixel"
+what, goes_on = "files beyond the quota, on two connections", b"samples per pixel"
 with call(60) as first, call(60) as second, call(60, another) as other:
     for s, sentence in (first, goes_on), (second, b"quota: its files"), (other, goes_on):
         heard = say(s, hello + announce(60000), sentence)

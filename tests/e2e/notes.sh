@@ -28,7 +28,7 @@ grep -q 'leases of the bootstrap are kept in .*early.exr.bootstrap, and the same
 "$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" $EARLY 2>"$DIR/again.log" &
 early=$!
 PIDS="$PIDS $early"
-until_true 60 grep -q 'goes on with \([0-9]*\) of \1 leases of the bootstrap' "$DIR/again.log" || fail "it does not go on with it: $(cat "$DIR/again.log")"
+until_true 60 grep -q 'continues from \([0-9]*\) of \1 leases of the bootstrap' "$DIR/again.log" || fail "it does not go on with it: $(cat "$DIR/again.log")"
 kill -TERM $early
 got=0
 wait $early || got=$?

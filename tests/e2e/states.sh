@@ -40,7 +40,7 @@ for seed in ${SEEDS:-1}; do
 	done
 done
 grep -q 'event=lease_failed .*states_of="liar-.*refused_by="honest' "$DIR/coordinator.log" || fail "the log does not say whose states were refused"
-grep -q 'is computed again: its chain states, made by liar-.*, could not be read by honest' "$DIR/coordinator.log" || fail "the log does not say who refused them"
+grep -q 'is computed again: its chain states, made by liar-.*, were refused by honest' "$DIR/coordinator.log" || fail "the log does not say who refused them"
 [ "$again" -gt 0 ] || fail "nobody noticed that states were spoiled"
 grep -q 'quarantined: liar' "$DIR/shown" || fail "the liar is trusted: $(cat "$DIR/shown")"
 echo "$again epochs computed again, no honest worker ended or quarantined, bits of hslt-render"

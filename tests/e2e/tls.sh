@@ -241,7 +241,7 @@ ROWS=$((ROWS - 1))
 	2>>"$DIR/plain-coordinator.log" &
 PIDS="$PIDS $!"
 until_true 10 test -s "$DIR/port2" || fail "the plain coordinator does not listen"
-refused "TLS to a port without" 6 "no TLS" $list --coordinator "127.0.0.1:$(cat "$DIR/port2")"
+refused "TLS to a port without" 6 "does not speak TLS" $list --coordinator "127.0.0.1:$(cat "$DIR/port2")"
 # Its quotas; the box has 1,920 pixels, which are one tile of 4.7 MB in 16 groups, and 2 KB. There is no worker, so that jobs stay.
 plain="$BIN/hslt-submit --coordinator 127.0.0.1:$(cat "$DIR/port2") --tls"
 refused "a film beyond the quota" 6 "quota: films" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 16 --size 100x80

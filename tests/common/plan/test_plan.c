@@ -225,7 +225,7 @@ static void a_time_also_ends_what_is_counted(void **state)
 	r.seconds = 2000;
 	uint64_t longer = round_of(made(&r));
 	assert_true(longer > open && (double)longer <= 50000.0 * r.seconds / 8);
-	assert_true(ends_with_rule(&r, "in the time"));
+	assert_true(ends_with_rule(&r, "requested time"));
 	r.seconds = 1e6;
 	assert_true(ends_with_rule(&r, "in a lease"));
 	r.spp = 16;

@@ -329,7 +329,7 @@ int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct e
 	double size = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z)),
 	       distance = size / (2 * tan(STAND_IN_FOV / 2 / 57.295779513082320877));
 	if (!(size > 0))
-		return error_set(e, EINVAL, "the scene has no <sensor>, and no shape that one could be placed before");
+		return error_set(e, EINVAL, "the scene has no <sensor>, and no shape to place one in front of");
 	s->near_clip = distance / 100;
 	s->far_clip = 5 * size + distance;
 	s->to_world =

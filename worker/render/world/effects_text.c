@@ -152,8 +152,8 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 		return true;
 	if (scene->settings.unplaced && i-- == 0) {
 		snprintf(text, size,
-			 "the scene has no <sensor>: as in Mitsuba, a camera before it that looks along +z stands in%s",
-			 scene->brightest > 0 ? "" : "; it has no emitter either: the picture is black");
+			 "the scene has no <sensor>: as in Mitsuba, a camera in front of it looks along +z%s",
+			 scene->brightest > 0 ? "" : "; it has no emitter either: the image is black");
 		return true;
 	}
 	const char *const met[] = {scene->notes.scales, scene->notes.flat, scene->notes.materials};

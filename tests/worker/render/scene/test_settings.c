@@ -249,7 +249,7 @@ static void test_no_sensor(void **state)
 	assert_true(s.to_world.m[0][0] == 1 && s.to_world.m[1][1] == 1 && s.to_world.m[2][2] == 1);
 	assert_true(s.near_clip < distance && s.far_clip > distance + 2);
 	assert_int_equal(scene_settings_place(&s, (vec3){1, 1, 1}, (vec3){1, 1, 1}, &e), -EINVAL);
-	assert_non_null(strstr(e.text, "no shape that one could be placed before"));
+	assert_non_null(strstr(e.text, "no shape to place one in front of"));
 	assert_false(read_ok("", "").unplaced);
 }
 

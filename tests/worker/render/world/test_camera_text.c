@@ -76,7 +76,7 @@ static void check_note(const char *scene, bool dark)
 	world_summary(w, &s);
 	assert_true(render_scene_note(&s, 0, text, sizeof text));
 	has(text, "the scene has no <sensor>");
-	assert_int_equal(strstr(text, "the picture is black") != NULL, dark);
+	assert_int_equal(strstr(text, "the image is black") != NULL, dark);
 	world_free(w);
 }
 
