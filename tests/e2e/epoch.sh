@@ -35,7 +35,7 @@ grep -q "pilot\|epochs:" "$DIR/pinned" && fail "a pilot for an epoch that was as
 told parts --spp 16 --parts 64
 rule "$DIR/parts" "1024 leases"
 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --parts 3 --chains 1024 --epoch 9 2>"$DIR/odd" && fail "3 parts of 64 chains"
-rule "$DIR/odd" "cannot be divided into 3 parts"
+rule "$DIR/odd" "cannot be divided into 3 equal parts"
 # 16 chains of 8,388,608 mutations are a lease that is let in, of one more each are not.
 told longest --spp 100000 --epoch 8388608
 [ "$(epoch "$DIR/longest")" = 8388608 ] || fail "an epoch of $(epoch "$DIR/longest")"

@@ -76,7 +76,7 @@ job log "$d" | grep -q 'event=job_note .*priority=50 by=' || fail "the log of $d
 job log "$a" | grep -q 'state=held by=' || fail "the log of $a does not know that it was held"
 job log "$a" | grep -q 'state=released by=' || fail "the log of $a does not know that it was released"
 refused 2 'from -100 to 100' job priority "$d" 101
-refused 2 'which priority' job priority "$d"
+refused 2 'a priority is missing' job priority "$d"
 refused 1 'no such job' job hold j99
 refused 1 'the job is over' job hold "$b"
 refused 1 'the job is over' job cancel "$b"
@@ -96,7 +96,7 @@ e=$(submit "$BOX" -o "$DIR/extended.exr" $CHAINS --spp 100)
 done_in 60 "$e"
 job fetch "$e" -o "$DIR/short.exr"
 "$BIN/hslt-compare" --exact "$DIR/short.exr" "$DIR/long.exr" >/dev/null 2>&1 && fail "100 and 600 samples a pixel are the same"
-refused 2 'by what' job extend "$e"
+refused 2 'a bound is missing' job extend "$e"
 job extend "$e" --spp +100
 job fetch "$e" -o "$DIR/between.exr" || fail "the image of before is gone while it goes on"
 again # in the midst of it

@@ -43,7 +43,7 @@ int note_difference(const struct notes *t, const struct xml_element *owner, cons
 
 int note_foreign(const struct notes *t, const struct xml_element *el)
 {
-	return note(t, el, "", "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
+	return note(t, el, "", "", "%s:%d: <%.64s> is ignored with its contents", el->file, el->line, el->name);
 }
 
 /* What is not supported goes, and that is said. */

@@ -49,7 +49,7 @@ static void note_flat(struct world *w, const struct counted *f)
 		snprintf(empty, sizeof empty, "; %u of these shapes ha%s no others", f->empty,
 			 f->empty == 1 ? "s" : "ve");
 	snprintf(w->notes.flat, sizeof w->notes.flat,
-		 "%llu triangle%s without an area %s left out, in %u shape%s (first: %s)%s",
+		 "%llu triangle%s without area %s left out, in %u shape%s (first: %s)%s",
 		 (unsigned long long)f->triangles, f->triangles == 1 ? "" : "s", f->triangles == 1 ? "is" : "are",
 		 f->shapes, f->shapes == 1 ? "" : "s", node_title(f->first, first), empty);
 }

@@ -219,7 +219,7 @@ static void test_refusals(void **state)
 		      "exceeds cutoff_angle=20");
 	world_refused("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
 		      "may have one environment only");
-	world_refused("<shape type='sphere'><emitter type='point'/></shape>", "cannot hang on a shape");
+	world_refused("<shape type='sphere'><emitter type='point'/></shape>", "cannot be inside a shape");
 	world_refused("<emitter type='point'><float name='intensity' value='-1'/></emitter>", "intensity");
 }
 
