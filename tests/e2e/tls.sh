@@ -254,7 +254,7 @@ refused "files beyond the quota" 6 "quota: its files" $plain "" "$DIR/large/box.
 for k in 1 2; do
 	$plain "" "$BOX" -o "$DIR/yes.exr" --integrator path --spp 16 >>"$DIR/id" 2>>"$DIR/submit.log" || fail "job $k of 2 is refused"
 done
-refused "jobs beyond the quota" 6 "quota: 2 jobs" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1
+refused "jobs beyond the quota" 6 "quota: at most 2 live jobs" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1
 
 refused "a worker's certificate as coordinator" 2 "no peer would accept it" "$BIN/hslt-coordinator" --listen 127.0.0.1:0 \
 	--spool "$DIR/spool3" --tls "$CA/node"
