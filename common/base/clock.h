@@ -1,15 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Seconds of the monotonic clock, whose origin is unspecified: for differences. Any thread. */
+/* Seconds from an unspecified origin, for differences. Any thread. */
 #ifndef COMMON_BASE_CLOCK_H
 #define COMMON_BASE_CLOCK_H
 
 #include <time.h>
 
-static inline double clock_seconds(void)
+static inline double clock_seconds_of(clockid_t clock)
 {
 	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
+	clock_gettime(clock, &t);
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Of the monotonic clock. */
+static inline double clock_seconds(void)
+{
+	return clock_seconds_of(CLOCK_MONOTONIC);
+}
+
+/* Of processor time of the calling thread. */
+static inline double clock_thread_seconds(void)
+{
+	return clock_seconds_of(CLOCK_THREAD_CPUTIME_ID);
 }
 
 #endif

@@ -137,8 +137,9 @@ static int check_weights(const struct batch *b, const struct plan *p, struct err
 /* Tolerance for sums of the same terms in another order, partly rounded to float. */
 #define ROUNDING (1 + 1e-6)
 
-/* More of anything than a sample can count: rays of a path of 128 edges with all connections, refused contributions. */
-#define PER_SAMPLE 0x1p20
+/* More of anything than a sample can count: rays of a path of 128 edges with all connections and of the chains that it
+ * starts, refused contributions. */
+#define PER_SAMPLE 0x1p24
 
 static int check_absurd(const struct batch *b, const struct plan *p, uint64_t samples, struct error *e)
 {

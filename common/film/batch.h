@@ -44,10 +44,12 @@ enum batch_counter {
 	COUNT_NEGATIVE,	   /* ... negative */
 	COUNT_RAYS_CLOSEST,
 	COUNT_RAYS_SHADOW,
-	COUNT_STUCK,	     /* chains that accepted nothing during the epoch */
-	COUNT_LONGEST_STUCK, /* most rejections in a row (merged by maximum) */
-	COUNT_STATES_LOST,   /* chains whose last state could not be read back: they start the next epoch where they
-				started this one */
+	COUNT_STUCK,		/* chains that accepted nothing during the epoch */
+	COUNT_LONGEST_STUCK,	/* most rejections in a row (merged by maximum) */
+	COUNT_STATES_LOST,	/* chains whose last state could not be read back: they start the next epoch where they
+				   started this one */
+	COUNT_SPREAD,		/* contributions too bright for a sample, which chains spread */
+	COUNT_SPREAD_MUTATIONS, /* mutations of these chains */
 };
 
 /* Counters of the chains of a lease for each strategy of the plan's mixture; names in common/estimate/strategy.h.

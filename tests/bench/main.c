@@ -42,9 +42,7 @@ double series_median(const struct series *s)
 
 double bench_cpu_seconds(void)
 {
-	struct timespec t;
-	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+	return clock_thread_seconds();
 }
 
 void bench_group(const char *name, const char *says)

@@ -57,6 +57,6 @@ code=0
 wait $outer || code=$?
 [ $code -eq 0 ] || fail "the worker ended with $code"
 [ $(($(date +%s) - begin)) -lt 25 ] || fail "the hook took longer than the grace"
-grep -q 'name="pod".*said goodbye' "$DIR/coordinator.log" || fail "the worker did not hand over"
+grep -q 'name="pod".*ended the connection' "$DIR/coordinator.log" || fail "the worker did not hand over"
 [ "$(value "$(cat "$DIR/id")" failures)" = 0 ] || fail "leaving was counted as a failure"
 echo "the hook: the worker finished its epochs and left"

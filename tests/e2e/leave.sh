@@ -43,7 +43,7 @@ begun=$(date +%s)
 stop $WORKER
 [ $CODE -eq 0 ] || fail "leaving while a scene is built ended with $CODE"
 [ $(($(date +%s) - begun)) -lt 90 ] || fail "it took $(($(date +%s) - begun)) s, the grace is 100 s"
-until_true 5 grep -q 'event=peer_closed .*name="never" .*said goodbye' "$DIR/coordinator.log" || fail "it said nothing"
+until_true 5 grep -q 'event=peer_closed .*name="never" .*ended the connection' "$DIR/coordinator.log" || fail "it said nothing"
 [ "$(value "$id" failures)" = 0 ] || fail "leaving while a scene is built was counted as a failure"
 
 start_builder 600 stands --stall 0.8

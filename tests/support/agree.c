@@ -100,7 +100,9 @@ static bool run_part(struct group_run *g, uint32_t part, const uint64_t *seeds)
 	bool ok = true;
 	for (uint64_t epoch = 0; epoch < g->p->rounds && ok; epoch++) {
 		struct lease_key k = {1, LEASE_RENDER, g->group, part, epoch};
-		struct lease_input in = {(uint32_t)(r.end - r.begin), epoch ? NULL : seeds + r.begin, before.states};
+		struct lease_input in = {.chain_count = (uint32_t)(r.end - r.begin),
+					 .seeds = epoch ? NULL : seeds + r.begin,
+					 .states = before.states};
 		struct batch b;
 		ok = lease(g, &k, g->p->kind == PLAN_CHAINS ? &in : NULL, &b);
 		batch_fini(&before);

@@ -97,7 +97,7 @@ void chains_run(const struct world *w, const struct chains_how *how, struct chai
 	uint64_t unsound = out->counters[COUNT_NAN] + out->counters[COUNT_INFINITE] + out->counters[COUNT_NEGATIVE];
 	assert_int_equal(unsound, 0);
 	memset(out->counters, 0, sizeof out->counters);
-	struct lease_input in = {how->chains, seeds, NULL};
+	struct lease_input in = {.chain_count = how->chains, .seeds = seeds};
 	struct batch b;
 	lease(w, &p, LEASE_RENDER, &in, &b);
 	count(&b, out);

@@ -78,7 +78,7 @@ static int render(const struct world *w, const struct render_summary *s, const s
 	for (uint64_t k = 0; k < b.weight_count && n < 2; k++)
 		if (b.weights[k] > 0)
 			seeds[n++] = k;
-	const struct lease_input in = {2, seeds, NULL};
+	const struct lease_input in = {.chain_count = 2, .seeds = seeds};
 	return n < 2 ? 0 : lease(w, &p, LEASE_RENDER, &in, &b, e);
 }
 

@@ -63,6 +63,7 @@ void job_cache_free(struct job_cache *b)
 	}
 	mem_free(b->held);
 	mem_free(b->paths);
+	render_map_free(b->map);
 	if (b->world)
 		world_free(b->world);
 	envelope_fini(&b->info);
@@ -261,6 +262,8 @@ static int build(struct job_cache *b, struct error *e)
 	if (rc)
 		return rc;
 	rc = check_mutations(b, e);
+	if (!rc)
+		rc = render_map_new(b->world, &b->plan, &b->map, e);
 	if (rc) {
 		world_free(b->world);
 		b->world = NULL;

@@ -31,6 +31,7 @@ struct job_cache {
 	char **paths;		 /* by file, for the builder's thread */
 	struct blob_hash wanted; /* while FETCHING: the blob being waited for */
 	struct world *world;
+	struct brightness *map; /* see render_map_new */
 	struct lease_key waits; /* one of the leases that wait for the world; job 0: none */
 	unsigned users;		/* number of leases that need it */
 	uint64_t last_used;	/* value of the counter of uses */

@@ -33,7 +33,10 @@ static void render(struct task *t)
 {
 	struct lease_task *l = (struct lease_task *)t; /* its first member */
 	struct batch batch = {0};
-	struct lease_input in = {l->grant.chain_count, l->grant.seeds, l->grant.states};
+	struct lease_input in = {.chain_count = l->grant.chain_count,
+				 .seeds = l->grant.seeds,
+				 .states = l->grant.states,
+				 .map = l->bundle->map};
 	const struct plan *p = &l->bundle->plan;
 	l->end = LEASE_STOPPED;
 	work_begin(&l->grant.key, l->bundle->info.message->job_info->scene);

@@ -4,10 +4,10 @@
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "common/estimate/tail.h"
+#include "worker/render/path/brightness.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrate_path.h"
 #include "worker/render/path/integrator.h"
-#include "worker/render/brightness.h"
 #include "worker/render/rare_light.h"
 
 #include <stdio.h>
@@ -44,14 +44,13 @@ static const double rare_hint = 0.03, tail_mean = 1;
 /* Share of rare light that calls for chains, of bdpt or of path. bdpt's: 0.16 or more where chains win by factors but
  * for torus, else 0.12 or less but for veach-door, 0.05 to 0.33. */
 static const double rare_some = 0.12;
-/* Then the smaller of bdpt's two indices where the share is its own: at most 1.2 where chains win, 1.23 to 2.0 in
- * veach-door; and that of its extremes where the share is path's: 0.6 to 1.0 in torus, 1.8 and 5.2 where a pilot of
- * ring and demo had path find so much. */
-static const double heavy_most = 1.25, heavy_extreme = 1;
-/* Of both, the mean share, the index of bdpt's extremes, and that of both together. Pilots of half-sunk say so, where
- * chains are as good as the others but for fireflies; of the scenes where bdpt is the best one of 46 of veach-mis, and
- * none of 38 of ring, 100 of displaced and four others. With 0.85 for bdpt's two of displaced did, too. */
-static const double rare_both = 0.04, extreme_least = 0.75, extreme_both = 0.82;
+/* Then the smaller of bdpt's two indices: at most 1.2 where chains win, 1.23 to 2.0 in veach-door. */
+static const double heavy_most = 1.25;
+/* And that of path's extremes, however much light is rare: 0.3 to 0.6 in window, pane and frosted, where what the
+ * camera's sub-paths meet at all they meet by luck, so that too few samples of bdpt begin a chain; 1.5 to 2.6 in water,
+ * pool and torus, where light sub-paths find what they miss, and chains that begin there need 0.01 to 0.9 of the time
+ * of those that wander all over the image. */
+static const double lucky_extreme = 1;
 /* Share of the light that is rare to bdpt, by merging: 0.05 to 0.35 in water, frosted, pane, torus and pool, 0.02 to
  * 0.03 in half-sunk, at most 0.008 where chains lose. */
 static const double merged_rare = 0.03;
@@ -168,22 +167,19 @@ static bool is_seen(const struct render_choice *c)
 	return c->merged.seen > merged_seen && c->merged.share < merged_none;
 }
 
-/* What path misses it says nothing of. */
+/* Chains that wander all over the image, not those that samples begin. What path misses it says nothing of. */
 static bool wants_chains(const struct render_choice *c)
 {
 	const struct render_found *b = &c->bdpt, *p = c->misses ? b : &c->path;
 	if (c->dark && !is_seen(c))
 		return true; /* a mistake costs 1,300 times the error in bulb, 2.5 times in kitchen */
+	if (c->merged.share > merged_rare)
+		return c->misses || p->extreme < lucky_extreme;
+	if (render_choice_is_settled(c))
+		return false;
 	if (!(p->cost > 0))
 		return true; /* where there is no light at all the bootstrap of chains looks for it much longer */
-	if (b->rare > rare_some && fmin(b->tail, b->extreme) < heavy_most)
-		return true;
-	if (is_seen(c))
-		return false;
-	if (p->rare > rare_some && b->extreme < heavy_extreme)
-		return true;
-	return 0.5 * (p->rare + b->rare) > rare_both && b->extreme < extreme_least &&
-	       2 / (1 / p->extreme + 1 / b->extreme) < extreme_both;
+	return p->extreme < lucky_extreme && b->rare > rare_some && fmin(b->tail, b->extreme) < heavy_most;
 }
 
 /* More of bdpt's samples would hardly say anything else. */
@@ -202,16 +198,19 @@ static bool has_no_fireflies(const struct render_found *path)
 	return is_tame(path) && path->most <= most_tame;
 }
 
+/* So much is rare that neither path nor every eighth light sub-path would do. */
+static bool has_rare_light(const struct render_choice *c)
+{
+	return c->bdpt.rare > rare_some || (c->path.rare > rare_some && c->bdpt.extreme < lucky_extreme);
+}
+
 const char *render_choice_of(const struct render_choice *c)
 {
-	if (c->merged.share > merged_rare)
-		return "hslt";
-	if (render_choice_is_settled(c))
-		return "bdpt";
 	if (wants_chains(c))
-		return "hslt";
-	if (c->misses || !has_no_fireflies(&c->path) || !(c->path.cost < path_cost * c->bdpt.cost))
-		return "bdpt";
+		return RENDER_INTEGRATOR_CHAINS;
+	if (render_choice_is_settled(c) || c->misses || has_rare_light(c) || !has_no_fireflies(&c->path) ||
+	    !(c->path.cost < path_cost * c->bdpt.cost))
+		return "erpt";
 	return c->path.tail >= tail_least && !c->focuses ? "path" : "bdpt8";
 }
 
@@ -251,25 +250,12 @@ static const double *pixel_block(struct sampler *base, enum sampler_side side, u
 /* By `path`, which is the cheaper one, where it finds all. */
 static int make_map(struct pilot *p, bool misses, struct error *e)
 {
-	int rc = brightness_init(&p->map, &p->context.window, p->samples, e);
-	for (uint64_t i = 0; i < p->samples && !rc; i++) {
-		struct sampler_random s;
-		if (i % IN_PIXEL == 0)
-			tick();
-		sampler_random_init(&s, p->seed, RNG_CHOICE, i, STREAM_MAP);
-		(misses ? path_trace_both_ways : path_trace)(&p->context, &s.base, &p->sample);
-		for (uint32_t k = 0; k < p->sample.count; k++)
-			brightness_add(&p->map, &p->sample.splats[k]);
-	}
-	if (!rc)
-		brightness_settle(&p->map, p->samples);
-	return rc;
+	return brightness_of_samples(&p->map, &p->context, misses ? path_trace_both_ways : path_trace, p->seed,
+				     RNG_CHOICE, STREAM_MAP, p->samples, e);
 }
 
-typedef void tracer(struct path_context *, struct sampler *, struct path_sample *);
-
 /* One sample of the pixel in that column and row of the window. */
-static void trace_pixel(struct pilot *p, const double at[2], uint64_t index, uint64_t stream, tracer *trace,
+static void trace_pixel(struct pilot *p, const double at[2], uint64_t index, uint64_t stream, path_tracer *trace,
 			struct path_sample *out)
 {
 	const struct film_window *w = &p->context.window;
@@ -323,7 +309,7 @@ static void take_parts(struct pilot *p, const struct film_window *pixel, struct 
 }
 
 /* From sample first to sample end of the stream, on top of what the tally has. */
-static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t first, uint64_t end, tracer *trace,
+static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t first, uint64_t end, path_tracer *trace,
 				   struct tally *t)
 {
 	const struct film_window *w = &p->context.window;
@@ -525,9 +511,10 @@ static const char *reason(const char *integrator, const struct render_choice *c)
 	if (c->misses)
 		return "paths from the camera cannot find all light, such as that of a point light through glass";
 	return has_no_fireflies(&c->path)
-		       ? "paths from the camera and from the lamps, joined, leave less noise in the same time"
-		       : "paths from the camera alone leave fireflies; joined with paths from the lamps "
-			 "they find the light more evenly";
+		       ? "paths from the camera and from the lamps, joined, leave less noise in the same time; what is "
+			 "too bright for a sample is spread by short chains"
+		       : "paths from the camera alone leave fireflies; joined with paths from the lamps they find the "
+			 "light more evenly, and what is still too bright for a sample is spread by short chains";
 }
 
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size)

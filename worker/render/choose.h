@@ -1,24 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which integrator a scene calls for: `path`, `bdpt`, `bdpt8`, or the chains of `hslt`. Decided once, before the plan
+ * Which integrator a scene calls for: `path`, `bdpt8`, `erpt`, or the chains of `hslt`. Decided once, before the plan
  * is made, from a pilot that counts rays instead of seconds and draws random numbers of its own: the same on every
  * machine for the same request, and the plan names what was chosen.
  *
  * The pilot draws samples of `path`, merges light with the camera's sub-paths where a lobe is narrow (rare_light.h),
- * and draws samples of `bdpt` where these leave the choice open. Chains are called for where much of the light is rare
- * to bdpt: caustics seen through water, panes, frosted glass. Merging says so without having met that light. Where
- * photons hardly reach what the camera sees, samples say it: by what each brings relative to the brightness of its
- * place, how much light comes in rare contributions of many times that brightness, how fast the frequency of the
- * largest falls with their size (their tail index, by Hill's estimator), and what share the largest alone has. Chains
- * are called for where bdpt finds a good share of rare light and its largest fall off so slowly that more samples keep
- * on finding larger ones, below a tail index of about 1 not even a mean exists; where path finds that share and the
- * very largest of bdpt fall off so; where both find some, and the largest of both fall off slower still; or where
- * neither finds any light. Else it is `path` or `bdpt8` where path's tail is that of a finite variance (a tail index of
- * 2 or more, or an extreme-value index below 1/2, which sees an end of a broad range of contributions), no sample has a
- * share in the light that such a law does not allow, and its second moment times rays is the smaller one: `path` where
- * no lobe of the scene is so narrow that it focuses light, and nothing bright can have been missed; else `bdpt8`, whose
- * light sub-paths, one in eight samples, bound fireflies: a wrong `bdpt8` costs a third, a wrong `path` seven times as
- * much. `bdpt` in all other cases, because the fireflies that a pilot does not see decide the error of a long render.
+ * and draws samples of `bdpt` where these leave the choice open. Of each kind it asks what a contribution brings
+ * relative to the brightness of its place: how much light comes in rare contributions of many times that brightness,
+ * how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator), and what share
+ * the largest alone has.
+ *
+ * `erpt` is the usual answer: samples of bdpt, of which short chains spread what is too bright. `hslt` is called for
+ * where such samples are too rare to begin a chain wherever one is wanted: merging or bdpt finds much rare light, and
+ * even what the camera's sub-paths find has extremes without a mean; or nothing finds any light. `path` or `bdpt8` do
+ * where path's tail is that of a finite variance (a tail index of 2 or more, or an extreme-value index below 1/2, which
+ * sees an end of a broad range of contributions), no sample has a share in the light that such a law does not allow,
+ * and its second moment times rays is the smaller one: `path` where no lobe of the scene is so narrow that it focuses
+ * light, and nothing bright can have been missed; else `bdpt8`, whose light sub-paths, one in eight samples, bound
+ * fireflies: a wrong `bdpt8` costs a third, a wrong `path` seven times as much.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H

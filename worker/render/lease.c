@@ -10,10 +10,12 @@
 #include "worker/render/path/longer.h"
 #include "worker/render/render.h"
 
+#include "common/base/clock.h"
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "worker/render/chain/chain.h"
+#include "worker/render/chain/redistribution.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/sobol.h"
@@ -21,7 +23,6 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 /* Everything one lease works with. */
 struct job {
@@ -33,6 +34,8 @@ struct job {
 	struct path_sample sample;
 	struct film_sums film;
 	struct chain *chain;
+	struct redistribution *redistribution; /* NULL: the integrator has none */
+	struct brightness *own_map;
 	struct batch *out;
 	struct error *e;
 	uint64_t sequence, index; /* where it is: row and column, or chain and mutation; of a bootstrap the sample */
@@ -50,13 +53,6 @@ static bool stopped(const struct job *j)
 {
 	tick();
 	return j->stop && atomic_load_explicit(j->stop, memory_order_relaxed);
-}
-
-static double thread_seconds(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 /* Stratified over pixels: block 0 of the camera with the film point moved into one pixel. */
@@ -84,11 +80,29 @@ static uint64_t pixel_index(const struct film_window *w, uint64_t column, uint64
 	return y << 32 | x;
 }
 
+/* Sample i of the group in that pixel. */
+static void take_sample(struct job *j, struct sampler *s, uint64_t pixel, uint64_t i)
+{
+	const struct film_window *w = &j->context.window;
+	double area = w->width * w->height;
+	if (j->redistribution)
+		j->context.split = redistribution_begin(j->redistribution, pixel, i * j->plan->groups + j->key->group);
+	j->integrator->evaluate(&j->context, s, &j->sample);
+	for (uint32_t k = 0; k < j->sample.count; k++)
+		film_sums_splat(&j->film, &j->sample.splats[k], 1 / area);
+	double intensity = j->sample.intensity;
+	if (j->redistribution)
+		intensity += redistribution_taken(j->redistribution);
+	j->out->independent_sum += intensity;
+	j->out->independent_square += intensity * intensity;
+	j->out->counters[COUNT_SAMPLES]++;
+}
+
 static enum lease_end sample_pixel(struct job *j, uint64_t column, uint64_t row)
 {
 	const struct plan *p = j->plan;
 	const struct film_window *w = &j->context.window;
-	double area = w->width * w->height;
+	const uint64_t pixel = pixel_index(w, column, row);
 	struct pixel_sampler s = {.x = (double)column / w->width,
 				  .y = (double)row / w->height,
 				  .width = 1 / w->width,
@@ -96,15 +110,10 @@ static enum lease_end sample_pixel(struct job *j, uint64_t column, uint64_t row)
 	for (uint64_t i = 0; i < p->epoch; i++) {
 		if (j->out->counters[COUNT_SAMPLES] % STOP_INTERVAL == 0 && stopped(j))
 			return LEASE_STOPPED;
-		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel_index(w, column, row), j->key->group,
-				   j->key->epoch * p->epoch + i);
+		uint64_t sample = j->key->epoch * p->epoch + i;
+		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel, j->key->group, sample);
 		s.sobol.base.block = pixel_block;
-		j->integrator->evaluate(&j->context, &s.sobol.base, &j->sample);
-		for (uint32_t k = 0; k < j->sample.count; k++)
-			film_sums_splat(&j->film, &j->sample.splats[k], 1 / area);
-		j->out->independent_sum += j->sample.intensity;
-		j->out->independent_square += j->sample.intensity * j->sample.intensity;
-		j->out->counters[COUNT_SAMPLES]++;
+		take_sample(j, &s.sobol.base, pixel, sample);
 	}
 	j->out->counters[COUNT_INDEPENDENT] += p->epoch;
 	return LEASE_DONE;
@@ -236,7 +245,16 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 	return 0;
 }
 
-static int prepare(struct job *j, const struct world *w, struct error *e)
+static int prepare_redistribution(struct job *j, const struct brightness *map, struct error *e)
+{
+	int rc = map ? 0 : render_map_new(j->context.w, j->plan, &j->own_map, e);
+	if (rc)
+		return rc;
+	return redistribution_new(&j->redistribution, &redistribution_usual, &j->context, map ? map : j->own_map,
+				  j->plan->seed, &j->film, e);
+}
+
+static int prepare(struct job *j, const struct world *w, const struct lease_input *in, struct error *e)
 {
 	const struct plan *p = j->plan;
 	uint32_t depth = p->max_depth < j->integrator->face.max_depth ? p->max_depth : j->integrator->face.max_depth;
@@ -266,7 +284,8 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 		if (!j->out->states || !j->chain || !j->out->moments)
 			return error_set(e, ENOMEM, "out of memory for chain states");
 	}
-	return film_sums_init(&j->film, p, &w->settings, e);
+	int rc = j->integrator->redistributes ? prepare_redistribution(j, in ? in->map : NULL, e) : 0;
+	return rc ? rc : film_sums_init(&j->film, p, &w->settings, e);
 }
 
 static int run_job(struct job *j, const struct lease_input *in, enum lease_end *end)
@@ -332,16 +351,18 @@ int render_lease(const struct world *w, const struct plan *p, const struct lease
 	j->stop = stop;
 	j->out = out;
 	j->e = e;
-	double start = thread_seconds();
+	double start = clock_thread_seconds();
 	crash_place(k->kind == LEASE_BOOTSTRAP ? "rendering bootstrap samples" : "rendering", NULL, 0);
-	rc = prepare(j, w, e);
+	rc = prepare(j, w, in, e);
 	if (!rc)
 		rc = run_caught(j, in, end);
 	film_sums_fini(&j->film);
+	redistribution_free(j->redistribution);
+	render_map_free(j->own_map);
 	mem_free(j->chain);
 	mem_free(j);
 	crash_place(NULL, NULL, 0);
-	out->cpu_seconds = thread_seconds() - start;
+	out->cpu_seconds = clock_thread_seconds() - start;
 	if (rc || *end == LEASE_STOPPED)
 		batch_fini(out);
 	return rc;

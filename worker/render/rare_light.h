@@ -6,7 +6,7 @@
 #ifndef WORKER_RENDER_RARE_LIGHT_H
 #define WORKER_RENDER_RARE_LIGHT_H
 
-#include "worker/render/brightness.h"
+#include "worker/render/path/brightness.h"
 
 /* Contributions beyond this many times the brightness of their place. */
 #define RENDER_RARE 32

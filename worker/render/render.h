@@ -40,12 +40,20 @@ const char *render_mutation_at(size_t index, const char **summary);
 int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX],
 		     struct error *e);
 
+/* What all leases of a plan share beside the world: the map of brightness, where the integrator redistributes, and else
+ * NULL. It is made of the plan's seed, film and depths: every machine has the same. render_map_free takes NULL. Ticks.
+ * -ENOMEM, -EINVAL, -EDOM */
+struct brightness;
+int render_map_new(const struct world *w, const struct plan *p, struct brightness **out, struct error *e);
+void render_map_free(struct brightness *map);
+
 /* Seeds of a lease at epoch 0 (bootstrap indices, one per chain), or the states after the previous epoch; seeds in
  * their place if the states are lost, and the chains start again. */
 struct lease_input {
 	uint32_t chain_count;
 	const uint64_t *seeds;		  /* NULL if there are states */
 	const struct chain_state *states; /* NULL at epoch 0 */
+	const struct brightness *map;	  /* NULL: a lease that needs one makes its own, the same */
 };
 
 enum lease_end { LEASE_DONE, LEASE_STOPPED };

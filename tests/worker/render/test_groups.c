@@ -160,11 +160,12 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 		bootstrap_seeds(s, g, seeds[g]);
 	for (uint32_t i = 0; i < ROUNDS * GROUPS * PARTS; i++) {
 		uint32_t lease = i % (GROUPS * PARTS), group = lease / PARTS, part = lease % PARTS;
-		struct lease_input in = {CHAINS / GROUPS / PARTS,
-					 seeds[group] + plan_chain_range(p, part).begin * (p->kind == PLAN_CHAINS),
-					 NULL};
+		struct lease_input in = {.chain_count = CHAINS / GROUPS / PARTS,
+					 .seeds = seeds[group] +
+						  plan_chain_range(p, part).begin * (p->kind == PLAN_CHAINS)};
 		if (before[lease].states)
-			in = (struct lease_input){before[lease].state_count, NULL, before[lease].states};
+			in = (struct lease_input){.chain_count = before[lease].state_count,
+						  .states = before[lease].states};
 		noted.owner = group;
 		struct batch b = run_lease(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)},
 					   p->kind == PLAN_CHAINS ? &in : NULL);
@@ -266,7 +267,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
 		listen(true);
 		boot = run_lease(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
-				 &(struct lease_input){CHAINS / GROUPS / PARTS, seeds, NULL});
+				 &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
 		batch_fini(&boot);
 		for (size_t k = 0; k < noted.count; k++) {
 			looks += noted.all[k].stream == RNG_BOOTSTRAP;

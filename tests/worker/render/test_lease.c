@@ -122,8 +122,8 @@ static void test_any_order(void **state)
 {
 	(void)state;
 	struct world *w = small_world("gaussian");
-	const char *names[] = {"path", "bdpt", "bdpt8", "pssmlt"};
-	for (int n = 0; n < 4; n++) {
+	const char *names[] = {"path", "bdpt", "bdpt8", "erpt", "pssmlt"};
+	for (int n = 0; n < 5; n++) {
 		struct plan p = plan_of(w, names[n]);
 		enum lease_kind kind = p.kind == PLAN_CHAINS ? LEASE_BOOTSTRAP : LEASE_RENDER;
 		struct batch b[GROUPS * PARTS];
@@ -150,12 +150,13 @@ static void test_chains(void **state)
 		struct plan p = plan_of(w, render_integrator_at(n)->name);
 		uint64_t seeds[2];
 		find_seeds(w, &p, 1, seeds, 2);
-		struct lease_input in = {2, seeds, NULL};
+		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		struct batch a = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 0), &in),
 			     b = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 0), &in);
 		assert_same(&a, &b);
 		assert_true(a.counters[COUNT_SAMPLES] == 2 * p.epoch && a.tile_count > 0);
-		struct lease_input next = {2, NULL, a.states}, copy = {2, NULL, b.states};
+		struct lease_input next = {.chain_count = 2, .states = a.states},
+				   copy = {.chain_count = 2, .states = b.states};
 		struct batch c = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 1), &next),
 			     d = run_lease(w, &p, key(LEASE_RENDER, 1, 1, 1), &copy);
 		assert_same(&c, &d);
@@ -185,7 +186,7 @@ static void test_extreme_light(void **state)
 		for (size_t i = 0; render_integrator_at(i); i++) {
 			struct plan p = plan_of(w, render_integrator_at(i)->name);
 			uint64_t seeds[2] = {UINT64_MAX, UINT64_MAX};
-			struct lease_input in = {2, seeds, NULL};
+			struct lease_input in = {.chain_count = 2, .seeds = seeds};
 			bool chains = p.kind == PLAN_CHAINS;
 			p.bootstrap = 4096;
 			struct batch a = run_lease(w, &p, key(LEASE_BOOTSTRAP, 1, 0, 0), NULL);
@@ -216,17 +217,18 @@ static void test_refused(void **state)
 	uint64_t seeds[3];
 	find_seeds(w, &p, 0, seeds, 3);
 	struct lease_key k0 = key(LEASE_RENDER, 0, 0, 0), k1 = key(LEASE_RENDER, 0, 0, 1);
-	struct lease_input in = {2, seeds, NULL};
+	struct lease_input in = {.chain_count = 2, .seeds = seeds};
 	struct batch b = run_lease(w, &p, k0, &in);
 	/* Counts, and nothing at all. */
 	assert_int_equal(end_of(w, &p, k0, NULL), -EINVAL);
 	for (uint32_t n = 0; n < 4; n++)
 		if (n != 2)
-			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){n, seeds, NULL}), -EINVAL);
-	assert_int_equal(end_of(w, &p, k0, &(struct lease_input){2, NULL, NULL}), -EINVAL);
+			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){.chain_count = n, .seeds = seeds}),
+					 -EINVAL);
+	assert_int_equal(end_of(w, &p, k0, &(struct lease_input){.chain_count = 2}), -EINVAL);
 	/* States: another chain's, cut, lengthened, noise. */
 	struct chain_state s[2] = {b.states[1], b.states[0]};
-	assert_int_equal(end_of(w, &p, k1, &(struct lease_input){2, NULL, s}), -EILSEQ);
+	assert_int_equal(end_of(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = s}), -EILSEQ);
 	struct dice d = dice_of("hostile states");
 	size_t good = 0;
 	for (size_t i = 0; i < dice_count(300); i++) {
@@ -244,7 +246,7 @@ static void test_refused(void **state)
 		uint8_t *exact = malloc(size ? size : 1);
 		memcpy(exact, bytes, size);
 		struct chain_state hostile[2] = {{exact, size}, b.states[1]};
-		int rc = end_of(w, &p, k1, &(struct lease_input){2, NULL, hostile});
+		int rc = end_of(w, &p, k1, &(struct lease_input){.chain_count = 2, .states = hostile});
 		/* Other numbers in [0,1) may make another path that carries light: a state like any. */
 		assert_true(rc == -EILSEQ || (rc == 0 && i % 3 == 2));
 		good += rc == 0;
@@ -256,8 +258,10 @@ static void test_refused(void **state)
 	struct batch boot = run_lease(w, &p, key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
 	for (uint64_t i = 0; i < boot.weight_count; i++)
 		if (!(boot.weights[i] > 0)) {
-			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){2, (uint64_t[]){seeds[0], i}, NULL}),
-					 0);
+			assert_int_equal(
+				end_of(w, &p, k0,
+				       &(struct lease_input){.chain_count = 2, .seeds = (uint64_t[]){seeds[0], i}}),
+				0);
 			break;
 		}
 	batch_fini(&boot);
@@ -295,7 +299,7 @@ static void test_invalid_operation(void **state)
 		struct plan p = plan_of(w, render_integrator_at(n)->name);
 		uint64_t seeds[2];
 		find_seeds(w, &p, 0, seeds, 2);
-		struct lease_input in = {2, seeds, NULL};
+		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
 			struct batch good = run_lease(w, &p, k, &in), b;
@@ -305,9 +309,10 @@ static void test_invalid_operation(void **state)
 			assert_int_equal(render_lease(w, &p, &k, &in, NULL, &end, &b, &e), -EDOM);
 			assert_true(strstr(e.text, "invalid floating-point operation (SIGFPE)") &&
 				    strstr(e.text, p.integrator));
-			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP  ? "bootstrap sample"
-						   : p.kind == PLAN_SAMPLES ? "row 0, column 0"
-									    : "mutation"));
+			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP	       ? "bootstrap sample"
+						   : strcmp(p.integrator, "erpt") == 0 ? "map of brightness"
+						   : p.kind == PLAN_SAMPLES	       ? "row 0, column 0"
+										       : "mutation"));
 			assert_true(!b.tiles && !b.states && !b.weights && !b.moments);
 			w->camera.center_x = center;
 			struct batch again = run_lease(w, &p, k, &in);
@@ -329,7 +334,7 @@ static void test_stop(void **state)
 		struct plan p = plan_of(w, names[n]);
 		uint64_t seeds[2];
 		find_seeds(w, &p, 0, seeds, 2);
-		struct lease_input in = {2, seeds, NULL};
+		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			atomic_bool stop = true;
 			enum lease_end end = LEASE_DONE;
@@ -359,13 +364,13 @@ static void test_ticks(void **state)
 	enum { TICK = 16 };
 	static atomic_ullong ticks;
 	struct world *w = small_world("box");
-	const char *names[] = {"path", "bdpt", "pssmlt", "hslt"};
-	for (int n = 0; n < 4; n++) {
+	const char *names[] = {"path", "bdpt", "erpt", "pssmlt", "hslt"};
+	for (int n = 0; n < 5; n++) {
 		struct plan p = plan_of(w, names[n]);
 		uint64_t seeds[2];
 		find_seeds(w, &p, 1, seeds, 2);
 		p.epoch = p.kind == PLAN_CHAINS ? 256 : 50;
-		struct lease_input in = {2, seeds, NULL};
+		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			struct lease_key k = key((enum lease_kind)kind, 1, 0, 0);
 			atomic_store(&ticks, 0);
@@ -531,7 +536,7 @@ static void test_no_memory(void **state)
 		p.epoch = 1;
 		uint64_t seeds[2];
 		find_seeds(w, &p, 0, seeds, 2);
-		struct lease_input in = {2, seeds, NULL};
+		struct lease_input in = {.chain_count = 2, .seeds = seeds};
 		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
 			int failed = 0;
 			for (long i = 0;; i++) {

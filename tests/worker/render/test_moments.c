@@ -266,7 +266,7 @@ static struct canvas *run_chains(const struct world *w, const struct plan *p,
 	}
 	bootstrap_to_canvas(s, c);
 	for (uint32_t g = 0; g < p->groups; g++) {
-		struct lease_input in = {chains, seeds, NULL};
+		struct lease_input in = {.chain_count = chains, .seeds = seeds};
 		struct batch b;
 		bootstrap_seeds(s, g, seeds);
 		lease(w, p, &(struct lease_key){1, LEASE_RENDER, g, 0, 0}, &in, &b);

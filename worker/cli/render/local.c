@@ -9,6 +9,7 @@
  */
 #include "worker/cli/render/local.h"
 
+#include "common/base/clock.h"
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 
@@ -20,6 +21,7 @@ struct thread_pool {
 	struct local_run *run;
 	struct bootstrap *bootstrap;
 	uint64_t *seeds;	     /* [groups][chains / groups] */
+	struct brightness *map;	     /* see render_map_new */
 	struct chain_state **states; /* [groups x parts][chains of a lease] after the epoch before */
 	enum lease_kind kind;
 	uint64_t epoch;
@@ -97,7 +99,7 @@ static int lease(struct thread_pool *c, uint32_t index)
 {
 	const struct plan *p = c->run->plan;
 	struct lease_key k = {.kind = c->kind, .group = index / p->parts, .part = index % p->parts, .epoch = c->epoch};
-	struct lease_input in = {.chain_count = chains_of(p, k.part)};
+	struct lease_input in = {.chain_count = chains_of(p, k.part), .map = c->map};
 	if (p->kind == PLAN_CHAINS && c->kind == LEASE_RENDER) {
 		if (c->epoch == 0)
 			in.seeds = c->seeds + (size_t)k.group * (p->chains / p->groups) +
@@ -213,11 +215,22 @@ static int check_target(struct thread_pool *c, uint64_t rounds, enum merge_end *
 	return 0;
 }
 
+/* Its time is the bootstrap's. */
+static int make_map(struct thread_pool *c)
+{
+	double begin = clock_thread_seconds();
+	int rc = render_map_new(c->run->world, c->run->plan, &c->map, &c->error);
+	c->run->cpu_seconds += clock_thread_seconds() - begin;
+	return rc;
+}
+
 /* The bootstrap, and the start of the rounds. */
 static int run_bootstrap(struct thread_pool *c)
 {
 	struct local_run *r = c->run;
 	int rc = r->resume ? r->resume(r->user, c->bootstrap, &c->error) : 0;
+	if (!rc)
+		rc = make_map(c);
 	if (rc)
 		return rc;
 	c->finished = r->plan->groups * r->plan->parts - bootstrap_missing(c->bootstrap);
@@ -287,6 +300,7 @@ void local_end(struct local_job *j)
 		free_states(c->states[i], chains_of(p, i % p->parts));
 	mem_free(c->states);
 	mem_free(c->seeds);
+	render_map_free(c->map);
 	bootstrap_free(c->bootstrap);
 	pthread_mutex_destroy(&c->lock);
 	mem_free(j);

@@ -26,6 +26,8 @@ static const char *const counter_names[BATCH_COUNTERS] = {
 	[COUNT_STUCK] = "stuck",
 	[COUNT_LONGEST_STUCK] = "longestStuck",
 	[COUNT_STATES_LOST] = "statesLost",
+	[COUNT_SPREAD] = "spread",
+	[COUNT_SPREAD_MUTATIONS] = "spreadMutations",
 };
 
 static json_t *plan_json(const struct stats *s)

@@ -10,20 +10,12 @@
 #include "worker/render/chain/path_chain.h"
 
 #include "worker/render/chain/path_bytes.h"
+#include "worker/render/chain/path_place.h"
 #include "worker/render/chain/path_start.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/classes.h"
 
-#include <float.h>
 #include <string.h>
-
-#define LOG_FLT_MAX (FLT_MAX_EXP * M_LN2)
-
-/* A state with what it has gathered and not splatted yet. */
-struct path_place {
-	struct full_path_path path; /* 0 edges: black, looking for light */
-	double weight;
-};
 
 struct path_chain {
 	struct chain base;
@@ -54,19 +46,12 @@ static void set_up(struct path_chain *c)
 	c->mutation.limits = walk_limits_of(&c->base.context->w->accuracy);
 }
 
-static void copy_whole(struct full_path_path *to, const struct full_path_path *from)
-{
-	if (from->edges)
-		full_path_copy(to, from, 0, from->edges);
-	to->edges = from->edges;
-}
-
 /* The epoch begins with this path, which has been read or is black. */
 static void begin(struct path_chain *c, const uint8_t *bytes, size_t size)
 {
 	memcpy(c->began, bytes, size);
 	c->began_size = size;
-	copy_whole(&c->proposal->path, &c->current->path);
+	path_place_copy(&c->proposal->path, &c->current->path);
 }
 
 static bool start(struct chain *base, uint64_t bootstrap_index)
@@ -109,7 +94,7 @@ static int save(struct chain *base, struct chain_state *out)
 		size = c->began_size;
 		memcpy(bytes + CHAIN_STATE_HEAD, c->began, size);
 	}
-	copy_whole(&c->proposal->path, &c->current->path);
+	path_place_copy(&c->proposal->path, &c->current->path);
 	chain_put_head(base, bytes);
 	return chain_give(bytes, CHAIN_STATE_HEAD + size, out);
 }
@@ -136,19 +121,6 @@ static uint64_t rays(const uint64_t *counters)
 	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
 }
 
-/* What the film may not have: counted, and no proposal. What an independent proposal adds to b is within a float, as
- * all that path_splat takes. */
-static bool is_sound(struct path_chain *c, double log_weight, bool independent)
-{
-	if (isnan(log_weight))
-		c->base.context->counters[COUNT_NAN]++;
-	else if (log_weight == INFINITY || (independent && log_weight > LOG_FLT_MAX))
-		c->base.context->counters[COUNT_INFINITE]++;
-	else
-		return true;
-	return false;
-}
-
 /* The probability of acceptance; 0 where there is no proposal, for a reason that is counted. */
 static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move,
 		      struct chain_sums *sums)
@@ -157,7 +129,7 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 	struct full_path_path *x = &c->current->path, *y = &c->proposal->path;
 	enum strategy_counter end = entry->ops->propose(m, &entry->how, x, y, move);
 	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
-	if (!end && !(to_y > -INFINITY && is_sound(c, to_y, entry->ops->independent)))
+	if (!end && !(to_y > -INFINITY && path_place_is_sound(m->path, to_y, entry->ops->independent)))
 		end = STRATEGY_FAIL_DARK;
 	if (end) {
 		m->count[end]++;
@@ -171,7 +143,7 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 	if (x->edges == 0)
 		return 1;
 	double to_x = entry->ops->log_weight(m, x, move, Y_TO_X);
-	return is_sound(c, to_x, false) ? exp(fmin(to_y - to_x, 0)) : 0;
+	return path_place_is_sound(m->path, to_x, false) ? exp(fmin(to_y - to_x, 0)) : 0;
 }
 
 static void step(struct chain *base, struct chain_sums *sums)
@@ -207,10 +179,7 @@ static void step(struct chain *base, struct chain_sums *sums)
 	} else {
 		splat(c, c->proposal);
 	}
-	if (c->proposal->path.edges != c->current->path.edges || entry->ops->independent)
-		copy_whole(&c->proposal->path, &c->current->path);
-	else
-		full_path_copy(&c->proposal->path, &c->current->path, move.first, move.last);
+	path_place_follow(&c->proposal->path, &c->current->path, &move, entry->ops->independent);
 }
 
 const struct chain_ops chain_path = {

@@ -22,6 +22,9 @@ enum rng_stream {
 	RNG_TEST = 9,
 	RNG_CHOICE = 10,
 	RNG_BDPT8 = 11,
+	RNG_ERPT = 12,
+	RNG_REDISTRIBUTION = 13,
+	RNG_BRIGHTNESS = 14,
 };
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */

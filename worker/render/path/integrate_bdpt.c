@@ -24,6 +24,12 @@ static bool has_light(const struct path_context *c, struct sampler *s)
 	return c->light_every <= 1 || s->block(s, SIDE_CAMERA, 0)[DIM_HAS_LIGHT] * c->light_every < 1;
 }
 
+/* What the film gets of l. */
+static spectrum kept(struct path_context *c, unsigned j, unsigned t, const double film[2], spectrum l)
+{
+	return c->split && !spectrum_is_zero(l) ? c->split->keep(c->split, c, j, t, film, l) : l;
+}
+
 /* Technique j of paths whose camera sub-path has t vertices. */
 static spectrum join(struct path_context *c, unsigned j, unsigned t, struct classes *classes)
 {
@@ -55,18 +61,21 @@ static void trace(struct path_context *c, struct sampler *s, struct path_sample 
 	c->one_way = false;
 	unsigned camera = path_walk_camera(c, s, c->max_depth + 1, film);
 	unsigned light = has_light(c, s) ? path_walk_light(c, s, c->max_depth) : 0;
-	spectrum sum = spectrum_of(0);
+	spectrum sum = spectrum_of(0), found = spectrum_of(0);
 	if (!c->unclassed)
 		classes_begin(&classes, c, camera, light, out);
 	for (unsigned t = 2; t <= camera; t++)
-		for (unsigned j = 0; j <= 1; j++)
-			sum = spectrum_add(sum, join(c, j, t, &classes));
-	c->faint = faint_beside(c, sum);
+		for (unsigned j = 0; j <= 1; j++) {
+			spectrum l = join(c, j, t, &classes);
+			found = spectrum_add(found, l);
+			sum = spectrum_add(sum, kept(c, j, t, film, l));
+		}
+	c->faint = faint_beside(c, found);
 	if (c->faint > 0)
 		c->faint_place = s->block(s, SIDE_CAMERA, 0)[DIM_FAINT];
 	for (unsigned t = 2; t <= camera; t++)
 		for (unsigned j = 2; j <= light; j++)
-			sum = spectrum_add(sum, join(c, j, t, &classes));
+			sum = spectrum_add(sum, kept(c, j, t, film, join(c, j, t, &classes)));
 	c->faint = 0;
 	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
 		classes_clear(out);
@@ -75,6 +84,8 @@ static void trace(struct path_context *c, struct sampler *s, struct path_sample 
 		if (j < c->min_depth)
 			continue;
 		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
+		if (path_accept(c, l))
+			l = kept(c, j, 1, at, l);
 		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l) && !c->unclassed)
 			classes_add(&classes, j, 1, l);
 	}

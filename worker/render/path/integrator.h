@@ -13,7 +13,8 @@
 struct integrator {
 	struct render_integrator face; /* name, summary, kind, depth that its state holds */
 	enum rng_stream stream;	       /* of its own samples */
-	void (*evaluate)(struct path_context *c, struct sampler *s, struct path_sample *out);
+	path_tracer *evaluate;
+	bool redistributes;	       /* what is too bright for a sample goes to chains: chain/redistribution.h */
 	const struct chain_ops *chain; /* worker/render/chain/chain.h; NULL: averages independent points */
 };
 

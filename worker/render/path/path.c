@@ -395,6 +395,23 @@ bool path_accept(const struct path_context *c, spectrum l)
 	return !zero;
 }
 
+static void to_xyz(const struct path_context *c, spectrum l, double xyz[3])
+{
+	if (EFFECT_IS_ON(c->w, colour)) {
+		spectrum_to_xyz(l, &c->wl, xyz);
+		return;
+	}
+	for (int i = 0; i < 3; i++)
+		xyz[i] = l.v[0] * c->w->grey_xyz[i];
+}
+
+double path_intensity(const struct path_context *c, spectrum l)
+{
+	double xyz[3];
+	to_xyz(c, l, xyz);
+	return xyz[0] + xyz[1] + xyz[2];
+}
+
 bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l)
 {
 	if (!path_accept(c, l) || out->count == PATH_MAX_SPLATS)
@@ -402,11 +419,7 @@ bool path_splat(struct path_context *c, struct path_sample *out, double x, doubl
 	struct splat *s = &out->splats[out->count];
 	s->x = x;
 	s->y = y;
-	if (!EFFECT_IS_ON(c->w, colour))
-		for (int i = 0; i < 3; i++)
-			s->xyz[i] = l.v[0] * c->w->grey_xyz[i];
-	else
-		spectrum_to_xyz(l, &c->wl, s->xyz);
+	to_xyz(c, l, s->xyz);
 	double sum = s->xyz[0] + s->xyz[1] + s->xyz[2];
 	if (out->intensity + sum > (double)FLT_MAX) {
 		c->counters[COUNT_INFINITE]++;

@@ -52,6 +52,16 @@ static inline bool film_window_holds(const struct film_window *w, const double f
 	return film[0] >= w->x && film[0] < w->x + w->width && film[1] >= w->y && film[1] < w->y + w->height;
 }
 
+struct path_context;
+
+/* Divides each contribution between the film and somebody else. `keep` is told the weighted contribution l of joining s
+ * vertices of the light with t of the camera's at a film point, returns the part of it that the film gets, and sees to
+ * the rest. It must leave the context as it finds it. */
+struct path_split {
+	spectrum (*keep)(struct path_split *p, struct path_context *c, unsigned s, unsigned t, const double film[2],
+			 spectrum l);
+};
+
 /* One evaluation's surroundings; one a thread. */
 struct path_context {
 	const struct world *w;
@@ -66,6 +76,7 @@ struct path_context {
 	double faint;	      /* what a connection of two surfaces must bring to be made for certain; 0: anything */
 	double faint_place;   /* of the next such connection in systematic sampling: see connect.c */
 	uint64_t *counters;   /* of enum batch_counter */
+	struct path_split *split; /* NULL: the film gets all */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
 };
 
@@ -80,6 +91,9 @@ struct path_sample {
 	double of_class[PATH_CLASSES]; /* its part of the intensity */
 	struct splat splats[PATH_MAX_SPLATS];
 };
+
+/* What an integrator does with one point of the space of random numbers: struct integrator.evaluate. */
+typedef void path_tracer(struct path_context *c, struct sampler *s, struct path_sample *out);
 
 struct film_window film_window_of(const struct plan *p);
 
@@ -130,6 +144,9 @@ bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d,
 
 /* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
 vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
+
+/* I = X + Y + Z of what the film gets of l. */
+double path_intensity(const struct path_context *c, spectrum l);
 
 /* Adds L (f / p) at a film point; NaN, infinite (beyond a float in sum) and negative ones are counted and left
  * out, as black ones are: false. */

@@ -334,7 +334,7 @@ static void black(const char *text)
 		for (int boot = 0; boot < 2; boot++) {
 			const uint64_t seeds[] = {UINT64_MAX, UINT64_MAX};
 			struct lease_key k = {1, boot ? LEASE_BOOTSTRAP : LEASE_RENDER, 1, 0, 0};
-			struct lease_input in = {2, seeds, NULL};
+			struct lease_input in = {.chain_count = 2, .seeds = seeds};
 			enum lease_end end;
 			struct batch b;
 			if (render_lease(w, &p, &k, boot || r->kind == PLAN_SAMPLES ? NULL : &in, NULL, &end, &b, &e))

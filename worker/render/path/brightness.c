@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/brightness.h"
+#include "worker/render/path/brightness.h"
 
+#include "common/base/liveness.h"
 #include "common/base/mem.h"
 
 enum {
+	TICK_INTERVAL = 16, /* samples */
 	SAMPLES_A_CELL = 8,
 	CELLS_MOST = 256, /* cells along a side */
 };
@@ -110,9 +112,12 @@ static void settle_square(struct brightness *b, double all, double samples, stru
 	if (quartered)
 		return;
 	double sum = sqrt(lifted(b, all, sums_of(b, q), q)), cells = (double)b->across * b->across;
+	double scale = samples * q.size * q.size / (cells * sum);
+	if (!isfinite(scale)) /* fainter than squares of doubles can tell */
+		scale = 0;
 	for (uint32_t j = q.y; j < q.y + q.size; j++)
 		for (uint32_t i = q.x; i < q.x + q.size; i++)
-			b->scale[(size_t)j * b->across + i] = samples * q.size * q.size / (cells * sum);
+			b->scale[(size_t)j * b->across + i] = scale;
 }
 
 void brightness_settle(struct brightness *b, uint64_t samples)
@@ -121,4 +126,24 @@ void brightness_settle(struct brightness *b, uint64_t samples)
 	double all = sums_of(b, whole).sum;
 	if (all > 0)
 		settle_square(b, all, (double)samples, whole);
+}
+
+int brightness_of_samples(struct brightness *b, struct path_context *c, path_tracer *trace, uint64_t seed,
+			  enum rng_stream stream, uint64_t step, uint64_t samples, struct error *e)
+{
+	struct path_sample sample;
+	int rc = brightness_init(b, &c->window, samples, e);
+	if (rc)
+		return rc;
+	for (uint64_t i = 0; i < samples; i++) {
+		struct sampler_random s;
+		if (i % TICK_INTERVAL == 0)
+			tick();
+		sampler_random_init(&s, seed, stream, i, step);
+		trace(c, &s.base, &sample);
+		for (uint32_t k = 0; k < sample.count; k++)
+			brightness_add(b, &sample.splats[k]);
+	}
+	brightness_settle(b, samples);
+	return 0;
 }

@@ -7,8 +7,8 @@
  * square. So the value of a cell does not depend on whether a firefly happened to land in it. A hundredth of the mean
  * is added in squares, as in the relative error. One thread.
  */
-#ifndef WORKER_RENDER_BRIGHTNESS_H
-#define WORKER_RENDER_BRIGHTNESS_H
+#ifndef WORKER_RENDER_PATH_BRIGHTNESS_H
+#define WORKER_RENDER_PATH_BRIGHTNESS_H
 
 #include "worker/render/path/path.h"
 
@@ -18,7 +18,12 @@ struct brightness {
 	double *sum, *square, *scale;
 };
 
-/* For so many samples; brightness_fini frees it. -ENOMEM */
+/* The map of so many samples of the whole window by `trace`, with the numbers of a stream and step; brightness_fini
+ * frees it. Ticks. -ENOMEM */
+int brightness_of_samples(struct brightness *b, struct path_context *c, path_tracer *trace, uint64_t seed,
+			  enum rng_stream stream, uint64_t step, uint64_t samples, struct error *e);
+
+/* The same in steps. Of so many samples; brightness_fini frees it. -ENOMEM */
 int brightness_init(struct brightness *b, const struct film_window *window, uint64_t samples, struct error *e);
 void brightness_fini(struct brightness *b);
 void brightness_add(struct brightness *b, const struct splat *s);

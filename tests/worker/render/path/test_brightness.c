@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The map of brightness: what is known shows, what a firefly made is spread. */
-#include "worker/render/brightness.h"
+#include "worker/render/path/brightness.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

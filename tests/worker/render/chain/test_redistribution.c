@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Energy redistribution. The image stays that of bdpt, whatever the share that chains spread: all of it, or what is
+ * above a threshold. Both images are made of the same samples, so that only the noise of the chains is left between
+ * them; that bdpt is right, and erpt with it, test_integrators shows against path.
+ */
+#include "worker/render/chain/redistribution.h"
+
+#include "tests/support/agree.h"
+#include "tests/support/worlds.h"
+#include "worker/render/path/integrate_bdpt.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 32, GROUPS = 32, MAP_SAMPLES = 1 << 12 };
+
+#define DEPTH "<integrator type='path'><integer name='max_depth' value='6'/></integrator>"
+#define AT(inner) "<transform name='to_world'>" inner "</transform>"
+/* clang-format off */
+#define ROOM                                                                                                                    \
+	SENSOR("0,0.2,1.9", "0,-0.3,-1")                                                                                        \
+	"<shape type='cube'>" AT("<scale value='2'/>")                                                                          \
+	"<bsdf type='diffuse'><rgb name='reflectance' value='0.5,0.45,0.35'/></bsdf></shape>"
+#define LAMP(size)                                                                                                              \
+	"<shape type='rectangle'>" AT("<scale value='" size "'/><rotate x='1' angle='90'/><translate y='1.9'/>")              \
+	"<emitter type='area'><rgb name='radiance' value='3,2.5,2'/></emitter></shape>"
+#define BALL(center, radius, bsdf)                                                                                              \
+	"<shape type='sphere'><point name='center' value='" center "'/><float name='radius' value='" radius "'/>" bsdf "</shape>"
+/* clang-format on */
+#define GLASS "<bsdf type='dielectric'/>"
+#define METAL(alpha) "<bsdf type='roughconductor'><float name='alpha' value='" alpha "'/></bsdf>"
+
+static struct world *room_of_balls(void)
+{
+	return world_of_text(SIDE, SIDE,
+			     DEPTH ROOM LAMP("1.6") BALL("-0.7,-1.2,-0.6", "0.7", GLASS)
+				     BALL("0.8,-1.3,0", "0.6", METAL("0.2")));
+}
+
+/* Dark places beside bright ones: light that flew only one way between them would show at once. */
+static struct world *lamp_over_ground(void)
+{
+	return world_of_text(
+		SIDE, SIDE,
+		DEPTH SENSOR("0,1.5,5", "0,0,0") "<shape type='rectangle'>" AT(
+			"<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.5'/>") "<bsdf type='diffuse'/></shape>" LAMP("1.6")
+			BALL("0.8,0.3,0", "0.6", "<bsdf type='diffuse'/>"));
+}
+
+/* A render of samples anywhere on the film. */
+struct trial {
+	const struct world *w;
+	struct plan plan;
+	struct path_context context;
+	struct path_sample sample;
+	struct brightness map;
+	struct film_sums film, unspread;
+	struct redistribution *r;
+	uint64_t counters[BATCH_COUNTERS];
+	double intensity; /* of all samples, with what was taken */
+};
+
+static void trial_begin(struct trial *t, const struct world *w, const struct redistribution_rule *rule, uint64_t seed)
+{
+	struct error e;
+	memset(t, 0, sizeof *t);
+	t->w = w;
+	t->plan = (struct plan){.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	t->context = (struct path_context){.w = w,
+					   .window = film_window_of(&t->plan),
+					   .min_depth = 1,
+					   .max_depth = w->settings.max_depth,
+					   .roulette = PATH_ROULETTE,
+					   .unclassed = true,
+					   .counters = t->counters};
+	assert_int_equal(brightness_of_samples(&t->map, &t->context, path_trace_both_ways, seed, RNG_BRIGHTNESS, 0,
+					       MAP_SAMPLES, &e),
+			 0);
+	assert_int_equal(film_sums_init(&t->film, &t->plan, &w->settings, &e), 0);
+	assert_int_equal(film_sums_init(&t->unspread, &t->plan, &w->settings, &e), 0);
+	memset(t->counters, 0, sizeof t->counters);
+	assert_int_equal(redistribution_new(&t->r, rule, &t->context, &t->map, seed, &t->film, &e), 0);
+}
+
+static void trial_end(struct trial *t)
+{
+	redistribution_free(t->r);
+	film_sums_fini(&t->film);
+	film_sums_fini(&t->unspread);
+	brightness_fini(&t->map);
+}
+
+static void evaluate(struct trial *t, uint64_t seed, uint64_t index, struct path_split *split, struct film_sums *film)
+{
+	struct sampler_random s;
+	sampler_random_init(&s, seed, RNG_ERPT, index, 0);
+	t->context.split = split;
+	path_trace_both_ways(&t->context, &s.base, &t->sample);
+	for (uint32_t k = 0; k < t->sample.count; k++)
+		film_sums_splat(film, &t->sample.splats[k], 1.0 / (SIDE * SIDE));
+}
+
+static void trial_sample(struct trial *t, uint64_t seed, uint64_t index)
+{
+	evaluate(t, seed, index, redistribution_begin(t->r, index, 0), &t->film);
+	t->intensity += t->sample.intensity + redistribution_taken(t->r);
+}
+
+/* The same sample as bdpt has it. Its intensity. */
+static double unspread_sample(struct trial *t, uint64_t seed, uint64_t index)
+{
+	evaluate(t, seed, index, NULL, &t->unspread);
+	return t->sample.intensity;
+}
+
+static uint64_t seed_of(const char *test)
+{
+	uint64_t h = 14695981039346656037u;
+	for (; *test; test++)
+		h = (h ^ (uint8_t)*test) * 1099511628211u;
+	return h;
+}
+
+/* Blocks of the film and the whole, each as its mean. */
+static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGREE_CELLS + 1])
+{
+	double sum[AGREE_CELLS + 1] = {0};
+	for (unsigned y = 0; y < SIDE; y++)
+		for (unsigned x = 0; x < SIDE; x++) {
+			const double *p = &f->xyz[((size_t)y * SIDE + x) * 3];
+			unsigned cell = y * AGREE_BLOCKS / SIDE * AGREE_BLOCKS + x * AGREE_BLOCKS / SIDE;
+			sum[cell] += p[0] + p[1] + p[2];
+			sum[AGREE_CELLS] += p[0] + p[1] + p[2];
+		}
+	for (int c = 0; c <= AGREE_CELLS; c++)
+		mean[c] = sum[c] / (double)spp / (SIDE * SIDE) * (c < AGREE_CELLS ? AGREE_CELLS : 1);
+}
+
+/* By group and cell 1 + the difference of the two images over bdpt's mean there. Returns mutations a sample. */
+static double compare(const char *test, const struct world *w, const struct redistribution_rule *rule, uint64_t spp,
+		      struct agree_image *out)
+{
+	static struct trial t;
+	double mutations = 0, unspread[GROUPS][AGREE_CELLS + 1], all[AGREE_CELLS + 1] = {0};
+	memset(out, 0, sizeof *out);
+	out->groups = GROUPS;
+	for (uint32_t g = 0; g < GROUPS; g++) {
+		uint64_t seed = seed_of(test) + g;
+		trial_begin(&t, w, rule, seed);
+		for (uint64_t i = 0; i < spp * SIDE * SIDE; i++) {
+			trial_sample(&t, seed, i);
+			unspread_sample(&t, seed, i);
+		}
+		take_means(&t.film, spp, out->mean[g]);
+		take_means(&t.unspread, spp, unspread[g]);
+		for (int c = 0; c <= AGREE_CELLS; c++)
+			all[c] += unspread[g][c] / GROUPS;
+		mutations += (double)t.counters[COUNT_SPREAD_MUTATIONS] / (double)(spp * SIDE * SIDE * GROUPS);
+		trial_end(&t);
+	}
+	for (uint32_t g = 0; g < GROUPS; g++)
+		for (int c = 0; c <= AGREE_CELLS; c++)
+			out->mean[g][c] = 1 + (out->mean[g][c] - unspread[g][c]) / all[c];
+	return mutations;
+}
+
+static struct agree_image image;
+
+static void all_light_by_chains_is_the_same_image(void **state)
+{
+	(void)state;
+	const struct redistribution_rule all = {.threshold = 1e-6, .mutations = 8, .length = 2};
+	struct world *w = lamp_over_ground();
+	assert_true(compare(__func__, w, &all, 16, &image) > 1);
+	agree_expect(__func__, &image, 1);
+	world_free(w);
+}
+
+/* Most paths near the threshold, where a changes. */
+static void some_light_by_chains_is_the_same_image(void **state)
+{
+	(void)state;
+	const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
+	struct world *w = room_of_balls();
+	assert_true(compare(__func__, w, &some, 8, &image) > 1);
+	agree_expect(__func__, &image, 1);
+	world_free(w);
+}
+
+/* Chains are as long at a bright path as at any other; only their number grows, up to a bound. */
+static void the_brightest_begin_no_more_than_so_many_chains(void **state)
+{
+	(void)state;
+	const struct redistribution_rule endless = {.threshold = 0.5, .mutations = 1e12, .length = 3};
+	static struct trial t;
+	struct world *w = room_of_balls();
+	trial_begin(&t, w, &endless, seed_of(__func__));
+	for (uint64_t i = 0; i < 256; i++)
+		trial_sample(&t, seed_of(__func__), i);
+	assert_true(t.counters[COUNT_SPREAD] > 16);
+	assert_int_equal(t.counters[COUNT_SPREAD_MUTATIONS], t.counters[COUNT_SPREAD] * 3 * REDISTRIBUTION_CHAINS);
+	trial_end(&t);
+	world_free(w);
+}
+
+/* The sum that b is estimated from is that of bdpt with the same random numbers. */
+static void nothing_is_lost_of_the_sum(void **state)
+{
+	(void)state;
+	const struct redistribution_rule half = {.threshold = 0.1, .mutations = 0.1, .length = 2};
+	static struct trial t;
+	struct world *w = room_of_balls();
+	trial_begin(&t, w, &half, seed_of(__func__));
+	double whole = 0;
+	for (uint64_t i = 0; i < 512; i++) {
+		trial_sample(&t, seed_of(__func__), i);
+		whole += unspread_sample(&t, seed_of(__func__), i);
+	}
+	assert_true(t.counters[COUNT_SPREAD] > 100);
+	assert_true(fabs(t.intensity - whole) < 1e-9 * whole);
+	trial_end(&t);
+	world_free(w);
+}
+
+/* All samples of a lamp in view are alike, and of one that mirrors and glass show. */
+static void what_is_seen_directly_is_not_spread(void **state)
+{
+	(void)state;
+	const struct redistribution_rule all = {.threshold = 1e-6, .mutations = 1, .length = 1};
+	static struct trial t;
+	struct world *w = world_of_text(
+		SIDE, SIDE,
+		DEPTH SENSOR(
+			"0,0,5",
+			"0,0,0") "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>" BALL("0,0,0",
+													    "1",
+													    GLASS));
+	trial_begin(&t, w, &all, seed_of(__func__));
+	for (uint64_t i = 0; i < 4096; i++)
+		trial_sample(&t, seed_of(__func__), i);
+	assert_true(t.intensity > 0);
+	assert_int_equal(t.counters[COUNT_SPREAD], 0);
+	trial_end(&t);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(all_light_by_chains_is_the_same_image),
+		cmocka_unit_test(some_light_by_chains_is_the_same_image),
+		cmocka_unit_test(the_brightest_begin_no_more_than_so_many_chains),
+		cmocka_unit_test(nothing_is_lost_of_the_sum),
+		cmocka_unit_test(what_is_seen_directly_is_not_spread),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

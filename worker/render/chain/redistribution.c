@@ -1,0 +1,227 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * keep() is asked for each contribution of a sample. Nearly all are below the threshold and stay as they are. Of the
+ * others the whole path is made, for C(x) is a function of the path, not of the roulette that a sample has survived
+ * (both factors of which stay in the weight). Then spread() runs the chain: propose by a local mutation, accept with
+ * min(1, h(y) T(y -> x) / (h(x) T(x -> y))), splat both states with their expected weights.
+ *
+ * A path that cannot be made again, once in millions, keeps its contribution. Proposals that are not numbers are
+ * counted and rejected.
+ */
+#include "worker/render/chain/redistribution.h"
+
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+#include "worker/render/chain/path_place.h"
+#include "worker/render/math/logsum.h"
+#include "worker/render/mutation/mixture.h"
+#include "worker/render/path/full_path_density.h"
+#include "worker/render/world/build.h"
+
+/* Relative MSE times CPU time for other values: README of tests/bench, "Energy redistribution". */
+const struct redistribution_rule redistribution_usual = {.threshold = 4, .mutations = 2, .length = 64};
+
+enum { TICK_INTERVAL = 256 };
+
+struct spread_place {
+	struct path_place place;
+	double scale; /* w */
+	double share; /* 1 - a; 0: the film gets all */
+};
+
+struct redistribution {
+	struct path_split split; /* first: keep() gets its address */
+	struct redistribution_rule rule;
+	struct path_context context;
+	const struct brightness *map;
+	struct film_sums *film;
+	struct mixture mixture; /* local strategies alone */
+	struct mutation_ctx mutation;
+	uint64_t unread[STRATEGY_COUNTERS];
+	uint64_t pixel, sample;
+	double taken;
+	struct spread_place start, places[2];
+};
+
+/* Some vertex between its ends scatters into more than one direction. */
+static bool is_scattered(const struct full_path_path *x)
+{
+	for (unsigned j = 1; j < x->edges; j++)
+		if (!x->v[j].delta)
+			return true;
+	return false;
+}
+
+static void weigh(struct redistribution *r, struct spread_place *at)
+{
+	double log_pdf[FULL_PATH_MAX_VERTICES];
+	struct full_path_path *x = &at->place.path;
+	at->scale = brightness_scale(r->map, x->film[0], x->film[1]);
+	at->share = 0;
+	if (!is_scattered(x))
+		return;
+	full_path_log_techniques(&r->context, x, log_pdf);
+	double u = at->scale * exp(full_path_log_f(&r->context, x) - log_sum_exp(log_pdf, x->edges + 1));
+	if (isgreater(u, r->rule.threshold))
+		at->share = 1 - r->rule.threshold / u;
+}
+
+static void splat(struct redistribution *r, struct spread_place *at, double unit)
+{
+	if (at->place.weight == 0)
+		return;
+	struct splat s = {.x = at->place.path.film[0], .y = at->place.path.film[1]};
+	full_path_colour(&r->context, &at->place.path, s.xyz);
+	film_sums_splat(r->film, &s, at->place.weight * unit / at->scale);
+	at->place.weight = 0;
+}
+
+/* The probability of acceptance. */
+static double propose(struct redistribution *r, const struct mixture_entry *entry, struct move *move,
+		      struct spread_place *x, struct spread_place *y)
+{
+	struct mutation_ctx *m = &r->mutation;
+	if (entry->ops->propose(m, &entry->how, &x->place.path, &y->place.path, move))
+		return 0;
+	double to_y = entry->ops->log_weight(m, &y->place.path, move, X_TO_Y);
+	if (!(to_y > -INFINITY && path_place_is_sound(m->path, to_y, false)))
+		return 0;
+	weigh(r, y);
+	if (!(y->share > 0))
+		return 0;
+	double to_x = entry->ops->log_weight(m, &x->place.path, move, Y_TO_X);
+	if (!path_place_is_sound(m->path, to_x, false))
+		return 0;
+	return exp(fmin(to_y - to_x + log(y->scale * y->share / (x->scale * x->share)), 0));
+}
+
+/* One chain from the path `from`; each mutation splats `unit` times the brightness of its place. */
+static void spread(struct redistribution *r, const struct spread_place *from, double unit)
+{
+	struct spread_place *x = &r->places[0], *y = &r->places[1];
+	struct mutation_ctx *m = &r->mutation;
+	path_place_copy(&x->place.path, &from->place.path);
+	path_place_copy(&y->place.path, &from->place.path);
+	x->scale = from->scale;
+	x->share = from->share;
+	x->place.weight = y->place.weight = 0;
+	for (uint32_t i = 0; i < r->rule.length; i++) {
+		double u[4];
+		struct move move = {0};
+		if (i % TICK_INTERVAL == 0)
+			tick();
+		m->step = i;
+		mutation_random(m, BLOCK_STRATEGY, u);
+		double a = propose(r, &r->mixture.entry[mixture_choose(&r->mixture, u[0])], &move, x, y);
+		x->place.weight += 1 - a;
+		y->place.weight = a;
+		if (u[1] < a) {
+			struct spread_place *swap = x;
+			splat(r, x, unit);
+			x = y;
+			y = swap;
+		} else {
+			splat(r, y, unit);
+		}
+		path_place_follow(&y->place.path, &x->place.path, &move, false);
+	}
+	splat(r, x, unit);
+}
+
+/* Chains for what there is to spread, in units of what a chain carries: none where chance says so, with its
+ * probability. */
+static unsigned chains_for(double units, double u, double *each)
+{
+	if (units < 1) {
+		*each = 1;
+		return u < units;
+	}
+	double n = fmin(floor(units), REDISTRIBUTION_CHAINS);
+	*each = units / n;
+	return (unsigned)n;
+}
+
+static spectrum keep(struct path_split *split, struct path_context *c, unsigned s, unsigned t, const double film[2],
+		     spectrum l)
+{
+	struct redistribution *r = (struct redistribution *)(void *)split;
+	struct spread_place *x = &r->start;
+	double intensity = path_intensity(c, l), relative = intensity * brightness_scale(r->map, film[0], film[1]);
+	if (!isgreater(relative, r->rule.threshold) || !isfinite(relative) ||
+	    !full_path_from_subpaths(c, s, s + t - 1, &x->place.path))
+		return l;
+	weigh(r, x);
+	if (!(x->share > 0))
+		return l;
+	const double share = x->share, carries = r->rule.length / r->rule.mutations;
+	double u[4], each;
+	uint64_t id[4];
+	const uint64_t technique = s * (PATH_MAX_EDGES + 2) + t;
+	rng_uniform4(r->mutation.seed, RNG_REDISTRIBUTION, r->pixel, r->sample, technique * 2, u);
+	unsigned n = chains_for(share * relative / carries, u[0], &each);
+	r->taken += share * intensity;
+	c->counters[COUNT_SPREAD]++;
+	c->counters[COUNT_SPREAD_MUTATIONS] += (uint64_t)n * r->rule.length;
+	rng_bits4(r->mutation.seed, RNG_REDISTRIBUTION, r->pixel, r->sample, technique * 2 + 1, id);
+	for (unsigned k = 0; k < n; k++) {
+		r->mutation.chain = id[0] + k;
+		spread(r, x, each / r->rule.mutations / (c->window.width * c->window.height));
+	}
+	return spectrum_scale(1 - share, l);
+}
+
+/* What does not look at its state changes it altogether: that is not what is spread. */
+static void leave_out_independent(struct mixture *m)
+{
+	unsigned n = 0;
+	m->total = 0;
+	for (unsigned i = 0; i < m->count; i++) {
+		if (m->entry[i].ops->independent)
+			continue;
+		m->total += m->entry[i].weight;
+		m->entry[n++] = m->entry[i];
+	}
+	m->count = n;
+}
+
+int redistribution_new(struct redistribution **out, const struct redistribution_rule *rule,
+		       const struct path_context *c, const struct brightness *map, uint64_t seed,
+		       struct film_sums *film, struct error *e)
+{
+	struct render_summary summary;
+	struct redistribution *r = *out = mem_alloc(1, sizeof *r);
+	if (!r)
+		return error_set(e, ENOMEM, "no memory for chains");
+	r->split.keep = keep;
+	r->rule = *rule;
+	r->context = *c;
+	r->context.roulette = 0;
+	r->map = map;
+	r->film = film;
+	world_summary(c->w, &summary);
+	mixture_default(&summary, &r->mixture);
+	leave_out_independent(&r->mixture);
+	r->mutation.path = &r->context;
+	r->mutation.seed = seed;
+	r->mutation.count = r->unread;
+	r->mutation.limits = walk_limits_of(&c->w->accuracy);
+	return 0;
+}
+
+void redistribution_free(struct redistribution *r)
+{
+	mem_free(r);
+}
+
+struct path_split *redistribution_begin(struct redistribution *r, uint64_t pixel, uint64_t sample)
+{
+	r->pixel = pixel;
+	r->sample = sample;
+	r->taken = 0;
+	return &r->split;
+}
+
+double redistribution_taken(const struct redistribution *r)
+{
+	return r->taken;
+}

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The map of brightness that leases share. By bdpt, which misses nothing that the render finds; about a sample a pixel,
+ * so that it costs little beside any render, and a large film has a fine one.
+ *
+ * Failures: memory, and an invalid floating-point operation, after which nothing is left.
+ */
+#include "worker/render/path/brightness.h"
+#include "worker/render/path/integrate_bdpt.h"
+#include "worker/render/path/integrator.h"
+#include "worker/render/render.h"
+
+#include "common/base/mem.h"
+#include "worker/render/math/fptrap.h"
+
+enum { SAMPLES_LEAST = 1 << 12, SAMPLES_MOST = 1 << 17 };
+
+static uint64_t samples_of(const struct film_window *w)
+{
+	uint64_t n = SAMPLES_LEAST;
+	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < w->width * w->height)
+		n *= 2;
+	return n;
+}
+
+static int sample_map(struct brightness *map, struct path_context *c, const struct plan *p, struct error *e)
+{
+	jmp_buf back;
+	if (setjmp(back))
+		return error_set(e, EDOM,
+				 "an invalid floating-point operation (SIGFPE) in the map of brightness for '%s'",
+				 p->integrator);
+	jmp_buf *caught = fptrap_catch(&back);
+	int rc = brightness_of_samples(map, c, path_trace_both_ways, p->seed, RNG_BRIGHTNESS, 0, samples_of(&c->window),
+				       e);
+	fptrap_catch(caught);
+	return rc;
+}
+
+int render_map_new(const struct world *w, const struct plan *p, struct brightness **out, struct error *e)
+{
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	const struct integrator *i = integrator_find(p->integrator);
+	*out = NULL;
+	if (!i)
+		return error_set(e, EINVAL, "no integrator is called '%s'", p->integrator);
+	if (!i->redistributes)
+		return 0;
+	struct brightness *map = mem_alloc(1, sizeof *map);
+	struct path_context *c = mem_alloc(1, sizeof *c);
+	int rc = map && c ? 0 : error_set(e, ENOMEM, "no memory for a map of brightness");
+	if (!rc) {
+		c->w = w;
+		c->window = film_window_of(p);
+		c->min_depth = p->min_depth;
+		c->max_depth = p->max_depth;
+		c->roulette = PATH_ROULETTE;
+		c->unclassed = true;
+		c->counters = counters;
+		rc = sample_map(map, c, p, e);
+	}
+	mem_free(c);
+	if (rc)
+		render_map_free(map);
+	else
+		*out = map;
+	return rc;
+}
+
+void render_map_free(struct brightness *map)
+{
+	if (map)
+		brightness_fini(map);
+	mem_free(map);
+}
