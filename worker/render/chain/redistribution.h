@@ -18,7 +18,7 @@
  * its place, or, beside the brightest, more. No chain runs where no sample is too bright. Emitters in view, and those
  * seen by exactly specular surfaces alone, are not spread: all samples of such a place are alike.
  *
- * One thread. Memory: some 350 kB; nothing allocates after redistribution_new.
+ * One thread. Memory: some 400 kB; nothing allocates after redistribution_new.
  */
 #ifndef WORKER_RENDER_CHAIN_REDISTRIBUTION_H
 #define WORKER_RENDER_CHAIN_REDISTRIBUTION_H
