@@ -161,7 +161,7 @@ is_state "$f" done || fail "$f is $(value "$f" state)"
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 LISTEN=$COORDINATOR start_coordinator -v --keep-films 0.001
-refused 1 'its films have been cleared' job extend "$e" --spp +8
+refused 1 'its films have been deleted' job extend "$e" --spp +8
 [ "$(find "$DIR/spool/jobs" -name 'journal.*' -o -name checkpoint -o -name order | wc -l)" -eq 0 ] || fail "films beyond the limit are kept"
 job fetch "$e" -o "$DIR/still.exr"
 same "$DIR/still.exr" "$DIR/long.exr"

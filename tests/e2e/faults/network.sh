@@ -95,7 +95,7 @@ is_late() {
 	kill -CONT "$(renders "$OTHER")"
 }
 is_missed() {
-	grep -q 'name="w1" text="nothing.* heard' "$DIR/coordinator.log"
+	grep -q 'name="w1" text="silent' "$DIR/coordinator.log"
 }
 
 fault twice_result 10 1 "the network delivers results twice"
