@@ -210,7 +210,7 @@ is_noticed() {
 }
 # its results can be stored again since it was restored
 is_mended() {
-	grep 'restored, and\|state=released text=""' "$DIR/coordinator.log" | tail -n 1 | grep -q state=released
+	grep 'being restored\|state=released text=""' "$DIR/coordinator.log" | tail -n 1 | grep -q state=released
 }
 
 fault file_damaged 4 1 "a file of the scene is damaged in the spool and in a worker's cache: the job waits and says so until the scene is sent again"
