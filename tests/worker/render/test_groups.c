@@ -38,7 +38,8 @@ static struct {
 
 static void note(enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block)
 {
-	if (!noted.on)
+	/* The map of brightness is the plan's: all groups share it, and none of their samples. */
+	if (!noted.on || stream == RNG_BRIGHTNESS)
 		return;
 	if (noted.count == noted.room) {
 		noted.room = noted.room ? 2 * noted.room : 1 << 16;
