@@ -7,7 +7,7 @@
  * is a long render by what the default chooses, kept in build/bench-references (the error that it has itself is taken
  * off, pixel by pixel); a third figure leaves out the pixels in which that is largest. HSLT_BENCH_SECONDS: other than
  * 10 for each picture; references take ten times that. HSLT_BENCH_SEEDS: other than 5. HSLT_BENCH_METHODS: only the
- * first so many; with 6, bdpt8 too, which is not among those that the default is held against.
+ * first so many; with 6 and 7, bdpt8 and erpt too, which are not among those that the default is held against.
  */
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
@@ -70,10 +70,11 @@ static const struct method {
 	{"bdpt", "bdpt", NULL},
 	{"path", "path", NULL},
 	{"bdpt8", "bdpt8", NULL},
+	{"erpt", "erpt", NULL},
 	{"breakup", "hslt", "hslt=0.95,bidirectional=0.05"},
 	{"unbroken", "hslt", "halfvec=0.475,multichain=0.475,bidirectional=0.05"},
 };
-enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, PEERS_END = 5, BREAKUP = 6, UNBROKEN = 7 };
+enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, PEERS_END = 5, BREAKUP = 7, UNBROKEN = 8 };
 
 struct shot {
 	struct canvas_image image;
