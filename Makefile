@@ -131,8 +131,8 @@ FAULTY_WRAP   := -Wl,--wrap=render_lease,--wrap=batch_pack,--wrap=conn_send_fram
 $(FAULTY_WORKER): $(BUILD)/bin/hslt-worker $(call obj,tests/e2e/faulty_worker.c worker/daemon/main.c) $(LIB_DAEMON) $(LIB_RENDER) $(LIB_COMMON)
 	@mkdir -p $(@D); id=$$(LC_ALL=C readelf -n $< | sed -n 's/.*Build ID: //p'); \
 	$(CC) $(LDFLAGS) -Wl,--build-id=$${id:+0x}$${id:-none} $(FAULTY_WRAP) -o $@ $(filter-out $<,$^) $(LIBS_RENDER) $(LIBS_COMMON)
-# The sources of the fuzzers are compiled with every build of the tests; linked they are with clang only.
-tests: $(TEST_BIN) $(LIMIT) $(FAULTY_WORKER) $(call obj,$(wildcard tests/fuzz/*.c))
+# Every build of the tests also compiles the fuzzers (linked with clang only), the benchmarks and the calibration, so that they keep building.
+tests: $(TEST_BIN) $(LIMIT) $(FAULTY_WORKER) $(call obj,$(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c))
 # Sanitized runs take 1/20 of the samples.
 test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)

@@ -2,12 +2,13 @@
 /* make bench: runs all benchmarks, or those named. */
 #include "tests/bench/bench.h"
 
+#include "common/base/clock.h"
+
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 volatile double bench_sink;
 
