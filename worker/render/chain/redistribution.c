@@ -19,7 +19,7 @@
 #include "worker/render/world/build.h"
 
 /* Relative MSE times CPU time for other values: README of tests/bench, "Energy redistribution". */
-const struct redistribution_rule redistribution_usual = {.threshold = 4, .mutations = 2, .length = 64};
+const struct redistribution_rule redistribution_usual = {.threshold = 4, .mutations = 2, .length = 256};
 
 enum { TICK_INTERVAL = 256 };
 
