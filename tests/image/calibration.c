@@ -8,8 +8,9 @@
  * renders' relMSE is left out, and said so. All scenes at the shortest length come first. SIGTERM ends it after the
  * case that is being measured, with the verdict on what there is.
  *
- *   calibration [RENDERS [LENGTHS [SEEDS [SCENE [TIMES]]]]]    20 renders a case, half as many of each next length; 3
- * lengths; SEEDS: a word, another for other seeds; scenes whose names begin with SCENE; references TIMES as long
+ *   calibration [RENDERS [LENGTHS [SEEDS [SCENE [TIMES [INTEGRATOR]]]]]]    20 renders a case, half as many of each next
+ * length; 3 lengths; SEEDS: a word, another for other seeds; scenes whose names begin with SCENE; references TIMES as
+ * long; INTEGRATOR: only that one
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
@@ -115,7 +116,7 @@ static void look(const struct reference *r, const struct canvas_image *img, stru
 struct calibration {
 	uint32_t renders;
 	int last;
-	const char *seeds, *scene;
+	const char *seeds, *scene, *integrator;
 	double times; /* as long are the references as their scenes say */
 	struct reference references[SCENES_MOST];
 	struct figures all[KINDS][INTEGRATORS][LENGTHS];
@@ -174,7 +175,8 @@ static int run_length(struct calibration *c, int length)
 		assert_true(i < SCENES_MOST);
 		make_reference(s, w, lengths[length].reference, c->times, &c->references[i]);
 		for (size_t k = 0; k < INTEGRATORS && !ended; k++)
-			run_case(c, s, w, &c->references[i], k, length);
+			if (!*c->integrator || strcmp(c->integrator, integrators[k].name) == 0)
+				run_case(c, s, w, &c->references[i], k, length);
 		world_free(w);
 		scenes++;
 	}
@@ -234,6 +236,7 @@ int main(int argc, char **argv)
 	c.seeds = argc > 3 ? argv[3] : "1";
 	c.scene = argc > 4 ? argv[4] : "";
 	c.times = argc > 5 && atof(argv[5]) > 0 ? atof(argv[5]) : 1;
+	c.integrator = argc > 6 ? argv[6] : "";
 	int scenes[LENGTHS] = {0};
 	signal(SIGTERM, end);
 	printf("| kind | scene | integrator | a pixel | true %% | stated %% | intervals | held | beyond 3 errors %% | CPU s |\n"
