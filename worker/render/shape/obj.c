@@ -38,6 +38,12 @@ static bool same_vertex(const struct obj_corner *a, const struct obj_corner *b)
 	return a->v == b->v && a->vt == b->vt && a->vn == b->vn;
 }
 
+/* Colours that only some of the vertices have are not used. */
+static bool has_colours(const struct obj_file *o)
+{
+	return o->colours.count > 0 && o->colours.count == o->positions.count;
+}
+
 static void set_vertex(const struct obj_file *o, struct mesh *m, uint32_t i, const struct obj_corner *c, bool flip)
 {
 	memcpy(m->position[i], (const double *)o->positions.items + 3 * (c->v - 1), sizeof m->position[i]);
@@ -48,6 +54,8 @@ static void set_vertex(const struct obj_file *o, struct mesh *m, uint32_t i, con
 		m->uv[i][0] = uv[0];
 		m->uv[i][1] = flip ? 1 - uv[1] : uv[1];
 	}
+	for (uint32_t k = 0; m->attribute_count && k < 3; k++)
+		mesh_set_attribute(m->attributes, i, k, ((const double *)o->colours.items)[3 * (c->v - 1) + k]);
 }
 
 /* Faces of a file, in arrays of their own or in the file's: sorting changes the corners. */
@@ -75,7 +83,8 @@ static bool make_mesh(const struct obj_file *o, struct faces *f, struct arena *a
 		normals |= c[i].vn != 0;
 		uv |= c[i].vt != 0;
 	}
-	bool ok = mesh_alloc(m, vertices, (uint32_t)f->triangle_count, normals, uv, arena);
+	bool ok = mesh_alloc(m, vertices, (uint32_t)f->triangle_count, normals, uv, arena) &&
+		  (!has_colours(o) || mesh_add_attribute(m, "vertex_color", false, 3, 1, arena));
 	for (size_t i = 0; ok && i < n; i++)
 		if (i == 0 || !same_vertex(&c[i - 1], &c[i]))
 			set_vertex(o, m, vertex_of[c[i].at], &c[i], flip);

@@ -4,6 +4,7 @@
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "worker/render/scene/number.h"
+#include "worker/render/scene/srgb.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -79,6 +80,32 @@ static int read_numbers(struct reader *o, const char *what, struct obj_list *l, 
 		o->p = rest;
 	}
 	return 0;
+}
+
+/* Three numbers after a position, to the end of the line, are an sRGB colour; anything else there is skipped. */
+static int read_colour(struct reader *o)
+{
+	double rgb[3];
+	for (int k = 0; k < 3; k++) {
+		const char *rest = at_end_of_line(o) ? NULL : number_scan(o->p, o->end, &rgb[k]);
+		if (!rest)
+			return 0;
+		o->p = rest;
+	}
+	if (!at_end_of_line(o))
+		return 0;
+	double *colour = push(&o->file->colours);
+	if (!colour)
+		return out_of_memory(o);
+	for (int k = 0; k < 3; k++)
+		colour[k] = fabs(rgb[k]) <= MESH_ATTRIBUTE_MAX ? srgb_to_linear(rgb[k]) : rgb[k];
+	return 0;
+}
+
+static int read_position(struct reader *o)
+{
+	int r = read_numbers(o, "v", &o->file->positions, 3, 3);
+	return r ? r : read_colour(o);
 }
 
 static int read_normal(struct reader *o)
@@ -203,7 +230,7 @@ static int read_line(struct reader *o)
 		o->p++;
 	size_t n = (size_t)(o->p - word);
 	if (n == 1 && *word == 'v')
-		return read_numbers(o, "v", &o->file->positions, 3, 3);
+		return read_position(o);
 	if (n == 2 && memcmp(word, "vt", 2) == 0)
 		return read_numbers(o, "vt", &o->file->uvs, 1, 2);
 	if (n == 2 && memcmp(word, "vn", 2) == 0)
@@ -243,7 +270,7 @@ int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_
 				.error = e,
 				.p = bytes,
 				.end = bytes + a.size};
-	o->positions.size = o->normals.size = 3 * sizeof(double);
+	o->positions.size = o->normals.size = o->colours.size = 3 * sizeof(double);
 	o->uvs.size = 2 * sizeof(double);
 	o->corners.size = sizeof(struct obj_corner);
 	o->triangles.size = 3 * sizeof(uint32_t);
@@ -261,7 +288,8 @@ int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_
 
 void obj_free(struct obj_file *o)
 {
-	struct obj_list *all[] = {&o->positions, &o->uvs, &o->normals, &o->corners, &o->triangles, &o->runs, &o->names};
+	struct obj_list *all[] = {&o->positions, &o->uvs,	&o->normals, &o->colours,
+				  &o->corners,	 &o->triangles, &o->runs,    &o->names};
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
 		mem_free(all[i]->items);
 	*o = (struct obj_file){0};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The contents of a Wavefront OBJ file: v, vt, vn, f and usemtl. Everything else (groups, lines) is skipped. Each index
- * is checked where it is read, so that an error has a line. One thread.
+ * The contents of a Wavefront OBJ file: v (with colours), vt, vn, f and usemtl. Everything else (groups, lines) is
+ * skipped. Each index is checked where it is read, so that an error has a line. One thread.
  */
 #ifndef WORKER_RENDER_SHAPE_OBJ_READ_H
 #define WORKER_RENDER_SHAPE_OBJ_READ_H
@@ -26,6 +26,7 @@ struct obj_run {
 
 struct obj_file {
 	struct obj_list positions, uvs, normals; /* double[3], double[2], double[3] */
+	struct obj_list colours;		 /* double[3], linear: of the positions, or of a part of them */
 	struct obj_list corners;		 /* struct obj_corner, one for each corner of each polygon */
 	struct obj_list triangles;		 /* uint32_t[3] into corners */
 	struct obj_list runs;			 /* struct obj_run; the first, without a name, is always there */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Attributes of meshes as the readers of PLY and serialized files find them. */
+/* Attributes of meshes as the readers of PLY, serialized and OBJ files find them. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/scene_tables.h"
@@ -203,13 +203,54 @@ static void test_serialized(void **state)
 	}
 }
 
+/* Three numbers after a position are an sRGB colour, also of the faces of one material; a weight is none, and colours
+ * count only if each vertex of the file has one. */
+static void test_obj(void **state)
+{
+	(void)state;
+#define FACES "vt 0 0\nf 1 2 4\nusemtl a\nf 2/1 3/1 4/1\n"
+	static const char text[] =
+		"v 0 0 0 1 0 0 # red\nv 1 0 0 0.2 0.4 0.02\nv 1 1 0 2 \\\n-0.5 1\nv 0 1 0 0 0 1 \n" FACES;
+	struct built b = build("obj", "", text, sizeof text - 1);
+	const struct attribute *c = find(&b, "vertex_color");
+	assert_true(c->channels == 3 && !c->per_face && !c->encoded && !c->damaged);
+	assert_int_equal(b.g.mesh.vertex_count, 6);
+	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
+		static const double at[4][3] = {{1, 0, 0}, {0.2, 0.4, 0.02}, {0, 0, 1}, {2, -0.5, 1}};
+		const double *p = b.g.mesh.position[i];
+		for (int k = 0; k < 3; k++)
+			assert_true(
+				near(c->value[3 * i + (uint32_t)k], srgb_to_linear(at[(int)p[0] + 2 * (int)p[1]][k])));
+	}
+	release(&b);
+	b = build("obj", "<string name='material' value='a'/>", text, sizeof text - 1);
+	assert_int_equal(b.g.mesh.vertex_count, 3);
+	assert_true(near(find(&b, "vertex_color")->value[0], srgb_to_linear(0.2)));
+	release(&b);
+
+	static const char damaged[] = "v 0 0 0 1 0 0\nv 1 0 0 1e300 0 0\nv 1 1 0 0 0 0\nf 1 2 3\n";
+	b = build("obj", "", damaged, sizeof damaged - 1);
+	assert_true(find(&b, "vertex_color")->damaged);
+	release(&b);
+	static const char *const without[] = {
+		"v 0 0 0 1\nv 1 0 0 1\nv 1 1 0 1\nv 0 1 0 1\n" FACES,
+		"v 0 0 0 1 1 1\nv 1 0 0 1 1 1\nv 1 1 0 1 1 1\nv 0 1 0\n" FACES,
+		"v 0 0 0 1 1\nv 1 0 0 1 1\nv 1 1 0 1 1\nv 0 1 0 1 1\n" FACES,
+		"v 0 0 0 1 1 1 1\nv 1 0 0 1 1 1 1\nv 1 1 0 1 1 1 1\nv 0 1 0 1 1 1 1\n" FACES,
+		"v 0 0 0 r g b\nv 1 0 0 1 1 1x\nv 1 1 0 1 1 1\nv 0 1 0 1 1 1\n" FACES,
+	};
+	for (size_t i = 0; i < sizeof without / sizeof *without; i++) {
+		b = build("obj", "", without[i], strlen(without[i]));
+		assert_true(b.result == 0 && b.g.mesh.attribute_count == 0);
+		release(&b);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_names),
-		cmocka_unit_test(test_ply_values),
-		cmocka_unit_test(test_ply_bound),
-		cmocka_unit_test(test_serialized),
+		cmocka_unit_test(test_names),	   cmocka_unit_test(test_ply_values), cmocka_unit_test(test_ply_bound),
+		cmocka_unit_test(test_serialized), cmocka_unit_test(test_obj),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
