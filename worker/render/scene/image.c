@@ -3,6 +3,8 @@
 
 #include "worker/render/scene/image_decode.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 static const struct format {
@@ -64,4 +66,17 @@ int image_read(const struct asset_source *assets, const char *name, bool raw, st
 	r = image_decode(a.bytes, a.size, name, raw, IMAGE_ALL, arena, out, e);
 	assets->close(assets->user, &a);
 	return r;
+}
+
+int image_power(struct image *i, double power, struct error *e)
+{
+	size_t count = (size_t)i->width * i->height * i->channels;
+	for (size_t k = 0; k < count; k++) {
+		double x = (double)i->pixels[k], size = fabs(x);
+		if (size > 1 && power * log2(size) >= FLT_MAX_EXP - 1)
+			return error_set(e, ERANGE, "gamma = %g makes a number that is too large: %g to that power",
+					 power, size);
+		i->pixels[k] = (float)copysign(pow(size, power), x);
+	}
+	return 0;
 }

@@ -29,5 +29,7 @@ int image_read(const struct asset_source *assets, const char *name, bool raw, st
 /* The same for bytes in memory; name: for messages. */
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
 		 struct arena *arena, struct image *out, struct error *e);
+/* Raises each number to a positive power, negative ones by their size. -ERANGE: one gets too large for a float. */
+int image_power(struct image *i, double power, struct error *e);
 
 #endif

@@ -63,9 +63,12 @@ static int read_picture(const struct scene_node *n, const struct asset_source *a
 	if (r)
 		return r;
 	struct error inner;
-	bool raw = node_bool(from, "raw", node_float(from, "gamma", -1) == 1);
+	double gamma = node_float(from, "gamma", -1);
+	bool raw = node_bool(from, "raw", gamma > 0);
 	r = image_decode(a.bytes, a.size, node_string(from, "filename", ""), raw, channel, arena, out, &inner);
 	assets->close(assets->user, &a);
+	if (!r && raw && gamma > 0 && gamma != 1)
+		r = image_power(out, gamma, &inner);
 	return r ? node_error(from, e, -r, "%s", inner.text) : 0;
 }
 

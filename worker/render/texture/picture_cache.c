@@ -15,7 +15,7 @@ static bool same_key(const struct picture_key *a, const struct picture_key *b)
 {
 	return a->first_byte == b->first_byte && a->byte_count == b->byte_count && a->base64 == b->base64 &&
 	       a->linear == b->linear && a->channel == b->channel && a->threshold == b->threshold &&
-	       strcmp(a->name, b->name) == 0;
+	       a->power == b->power && strcmp(a->name, b->name) == 0;
 }
 
 struct picture *picture_find(const struct picture_cache *c, const struct picture_key *k, double least, double largest)

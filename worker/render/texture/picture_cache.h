@@ -21,7 +21,7 @@ struct picture_key {
 	int64_t first_byte, byte_count;
 	bool base64, linear;
 	enum image_channel channel;
-	double threshold;
+	double threshold, power; /* power: what the stored numbers are raised to; 1 unless linear */
 };
 
 struct picture {

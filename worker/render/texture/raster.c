@@ -20,6 +20,8 @@ static int decode(struct raster *r, const struct scene_node *n, const struct ass
 		return code;
 	code = image_decode(part.bytes, part.size, k->name, k->linear, k->channel, arena, &r->image, &reason);
 	asset_part_close(&part, assets);
+	if (!code && k->power != 1)
+		code = image_power(&r->image, k->power, &reason);
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
 
@@ -48,17 +50,18 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	double gamma = node_float(n, "gamma", 0);
 	if (!name)
 		return node_error(n, e, EINVAL, "\"%s\" needs a filename", n->type);
-	if (gamma != 0 && gamma != 1 && gamma != -1)
-		return node_error(n, e, ENOTSUP, "gamma = %g is not supported; it can be 1 (linear) or -1 (sRGB)",
+	if (gamma < 0 && gamma != -1)
+		return node_error(n, e, EINVAL, "gamma = %g; it is -1 (sRGB), 1 (linear) or another positive number",
 				  gamma);
 	const struct picture_key key = {
 		.name = name,
 		.first_byte = node_int(n, "first_byte", 0),
 		.byte_count = node_int(n, "byte_count", 0),
 		.base64 = node_bool(n, "base64", false),
-		.linear = gamma == 1 || node_bool(n, "raw", range->raw && gamma != -1),
+		.linear = gamma > 0 || node_bool(n, "raw", range->raw && gamma != -1),
 		.channel = channel_of(channel),
 		.threshold = node_float(n, "threshold", -1),
+		.power = gamma > 0 ? gamma : 1,
 	};
 	struct picture_cache *decoded = assets->decoded && assets->decoded->arena == arena ? assets->decoded : NULL;
 	r->shared = decoded ? picture_find(decoded, &key, range->least, range->largest) : NULL;

@@ -162,13 +162,14 @@ static void test_decoding(void **state)
 		"<texture type='bitmap'>" FILENAME "<float name='gamma' value='1'/></texture>",
 		"<texture type='bitmap'>" FILENAME "<string name='channel' value='g'/><float name='gamma' value='1'/>"
 		"</texture>",
+		"<texture type='bitmap'>" FILENAME "<float name='gamma' value='2'/></texture>",
 	};
-	for (int i = 0; i < 4; i++) {
+	for (int i = 0; i < 5; i++) {
 		struct built_shape b = build_ok("heightfield", ways[i]);
 		double rgb[3];
 		for (int k = 0; k < 3; k++) {
 			double x = sample_value(2, 1, k) / 255.0;
-			rgb[k] = i >= 2 ? x : x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
+			rgb[k] = i == 4 ? x * x : i >= 2 ? x : x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4);
 		}
 		double wanted = i == 3 ? rgb[1] : 0.212671 * rgb[0] + 0.71516 * rgb[1] + 0.072169 * rgb[2];
 		double z = b.g.mesh.position[1 * 4 + 2][2];

@@ -61,12 +61,14 @@ static void test_shared(void **state)
 	assert_ptr_not_equal(pixels(&s, "filename=p0 channel=r", &reflectance, &a), first);
 	assert_ptr_not_equal(pixels(&s, "filename=p0 threshold=0.5", &reflectance, &a), first);
 	assert_ptr_not_equal(pixels(&s, "filename=p0", &height, &a), first); /* not decoded as sRGB */
-	assert_int_equal(c.opened, 4);
+	assert_ptr_not_equal(pixels(&s, "filename=p0 gamma=1", &reflectance, &a),
+			     pixels(&s, "filename=p0 gamma=2", &reflectance, &a));
+	assert_int_equal(c.opened, 5); /* gamma=1 reads the same numbers as a height */
 	const float *bright = pixels(&s, "filename=p1", &light, &a), *cut = pixels(&s, "filename=p1", &reflectance, &a);
 	assert_true(bright[2] == 4 && cut[2] == 1);
 	assert_ptr_equal(pixels(&s, "filename=p1", &reflectance, &a), cut);
 	assert_ptr_equal(pixels(&s, "filename=p1", &light, &a), bright);
-	assert_int_equal(c.opened, 6);
+	assert_int_equal(c.opened, 7);
 	/* Memory that ends sooner or later is not shared. */
 	assert_ptr_not_equal(pixels(&s, "filename=p0", &reflectance, &other), first);
 	assert_ptr_equal(pixels(&s, "filename=p0", &reflectance, &a), first);

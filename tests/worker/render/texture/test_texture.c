@@ -197,7 +197,8 @@ static void test_refusals_say_why(void **state)
 	} bad[] = {{"wood", "wood"},
 		   {"bitmap", "filename"},
 		   {"bitmap filename=nowhere", "nowhere"},
-		   {"bitmap filename=p0 gamma=2.2", "gamma"},
+		   {"bitmap filename=p0 gamma=-2", "gamma = -2; it is -1 (sRGB), 1 (linear) or"},
+		   {"bitmap filename=p2 gamma=70", "gamma = 70 makes a number that is too large: 4 to that power"},
 		   {"bitmap filename=p0 channel=a", "alpha is only read from PNG"},
 		   {"checkerboard color0=3", "color0"}};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -353,6 +354,19 @@ static void test_channel_and_threshold(void **state)
 	assert_value(&t, 0.5 / 3, 0.75, 1);
 }
 
+/* The stored numbers to that power, before the threshold; images of another gamma are not shared. */
+static void test_gamma(void **state)
+{
+	struct texture t = make_texture(*state, "bitmap filename=p0 gamma=2.2", COLOR_REFLECTANCE);
+	assert_value(&t, 1.5 / 3, 0.25, (double)(float)pow(0.25, 2.2));
+	assert_value(&t, 0.5 / 3, 0.75, (double)(float)pow(0.75, 2.2));
+	t = make_texture(*state, "bitmap filename=p0 gamma=1", COLOR_REFLECTANCE);
+	assert_value(&t, 1.5 / 3, 0.25, 0.25);
+	t = make_texture(*state, "bitmap filename=p0 gamma=0.5 threshold=0.5 filter_type=nearest", COLOR_REFLECTANCE);
+	assert_value(&t, 1.5 / 3, 0.25, 1); /* the root of 0.25 */
+	assert_value(&t, 2.5 / 3, 0.75, 0);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -365,6 +379,7 @@ int main(void)
 		cmocka_unit_test(test_tint),
 		cmocka_unit_test(test_product),
 		cmocka_unit_test(test_channel_and_threshold),
+		cmocka_unit_test(test_gamma),
 		cmocka_unit_test(test_colours),
 		cmocka_unit_test(test_checkerboard),
 		cmocka_unit_test(test_plain_values_and_fallback),
