@@ -43,6 +43,7 @@ void bench_hslt(const char *bin);
 void bench_equal_time(const char *bin); /* most of an hour: only when named */
 void bench_tiles(const char *bin);
 void bench_parts(const char *bin);
+void bench_loading(const char *bin);
 void bench_farm(const char *bin);
 void bench_memory(const char *bin);
 void bench_effects(const char *bin); /* minutes of valgrind: only when named */

@@ -102,7 +102,7 @@ static const struct {
 } benches[] = {
 	{"rays", bench_rays, false},	 {"hslt", bench_hslt, false},	   {"equal-time", bench_equal_time, true},
 	{"tiles", bench_tiles, false},	 {"parts", bench_parts, false},	   {"farm", bench_farm, false},
-	{"memory", bench_memory, false}, {"effects", bench_effects, true},
+	{"memory", bench_memory, false}, {"effects", bench_effects, true}, {"loading", bench_loading, false},
 };
 
 static bool chosen(const char *name, bool when_named, char **names, int count)

@@ -156,18 +156,29 @@ static void add_triangles(RTCDevice device, RTCScene scene, const struct geom_sh
 	attach(scene, g);
 }
 
-static void make_raw_scene(const struct subject *s, struct subject_scene *raw)
+static void make_raw_scene(const struct world *w, struct subject_scene *raw)
 {
 	raw->device = new_device();
 	raw->scene = new_scene(raw->device);
-	for (uint32_t i = 0; i < s->w->shape_count; i++) {
-		const struct geom_shape *g = &s->w->shapes[i];
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct geom_shape *g = &w->shapes[i];
 		if (g->is_sphere)
 			add_sphere(raw->device, raw->scene, g->center, g->radius);
 		else
 			add_triangles(raw->device, raw->scene, g);
 	}
 	rtcCommitScene(raw->scene);
+}
+
+double subject_build_raw(const struct world *w)
+{
+	struct subject_scene raw;
+	double begin = bench_cpu_seconds();
+	make_raw_scene(w, &raw);
+	double seconds = bench_cpu_seconds() - begin;
+	rtcReleaseScene(raw.scene);
+	rtcReleaseDevice(raw.device);
+	return seconds;
 }
 
 static struct RTCRayHit raw_ray(vec3 o, vec3 d, double t_min, double t_max)
@@ -199,7 +210,7 @@ void subject_record(struct subject *s)
 	subject_render(s);
 	s->count = record_stop();
 	s->raw = room(1, sizeof *s->raw + s->count * sizeof s->raw->ray[0]);
-	make_raw_scene(s, s->raw);
+	make_raw_scene(s->w, s->raw);
 	for (size_t i = 0; i < s->count; i++)
 		s->raw->ray[i] = raw_from_recorded(&s->rays[i]);
 }

@@ -39,6 +39,9 @@ void subject_record(struct subject *s);
 double subject_replay_raw(const struct subject *s); /* CPU seconds */
 double subject_replay_door(const struct subject *s);
 
+/* CPU seconds in which Embree alone builds its scene of a world's triangles and spheres. */
+double subject_build_raw(const struct world *w);
+
 /* CPU seconds in which Embree alone finds the closest hits of a million incoherent rays among 2 triangles and 3
  * spheres. */
 double subject_million_rays(void);
