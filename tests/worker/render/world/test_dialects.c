@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * One scene in the words of 0.6 and in those of 3.x: the same picture to the bit. What one dialect leaves to its
+ * defaults, the other states.
+ */
+#include "tests/support/memory_assets.h"
+#include "tests/support/pictures.h"
+#include "tests/support/render_picture.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 16 };
+
+static const char old[] =
+	"<scene version='0.6.0'><integrator type='path'><integer name='maxDepth' value='5'/></integrator>"
+	"<sensor type='thinlens'><float name='fov' value='45'/><string name='fovAxis' value='y'/>"
+	"<float name='apertureRadius' value='0.05'/><float name='focusDistance' value='5'/>"
+	"<transform name='toWorld'><lookAt origin='0,1,6' target='0,0,0' up='0,1,0'/></transform>"
+	"<sampler type='ldsampler'><integer name='sampleCount' value='4'/></sampler>"
+	"<film type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/>"
+	"<rfilter type='box'/></film></sensor>"
+	"<emitter type='spot'><spectrum name='intensity' value='40'/><float name='cutoffAngle' value='30'/>"
+	"<float name='beamWidth' value='20'/>"
+	"<transform name='toWorld'><lookAt origin='1,4,3' target='0,0,0' up='0,1,0'/></transform></emitter>"
+	"<shape type='rectangle'><transform name='toWorld'><scale value='6'/><rotate x='1' angle='-90'/>"
+	"<translate y='-1'/></transform><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'>"
+	"<spectrum name='color0' value='0.2,0.4,0.6'/><spectrum name='color1' value='0.7'/>"
+	"<float name='uscale' value='8'/><float name='vscale' value='4'/></texture></bsdf></shape>"
+	"<shape type='sphere'><point name='center' x='-1.5' y='0' z='0'/><bsdf type='roughconductor'>"
+	"<float name='alpha' value='0.2'/></bsdf></shape>"
+	"<shape type='cube'><transform name='toWorld'><scale value='0.6'/><translate x='0.5'/></transform>"
+	"<boolean name='flipNormals' value='false'/><bsdf type='roughplastic'><string name='intIOR' value='diamond'/>"
+	"<spectrum name='diffuseReflectance' value='0.6,0.3,0.1'/></bsdf></shape>"
+	"<shape type='shapegroup' id='g'><shape type='cylinder'><point name='p0' x='0' y='-1' z='0'/>"
+	"<point name='p1' x='0' y='0.5' z='0'/><float name='radius' value='0.3'/>"
+	"<bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='p0'/>"
+	"<string name='filterType' value='nearest'/><string name='wrapMode' value='mirror'/>"
+	"<float name='uoffset' value='0.25'/></texture></bsdf></shape></shape>"
+	"<shape type='instance'><ref id='g'/><transform name='toWorld'><translate x='1.7'/></transform></shape>"
+	"<shape type='instance'><ref id='g'/><transform name='toWorld'><translate x='2.5'/></transform></shape>"
+	"<shape type='disk'><transform name='toWorld'><rotate x='1' angle='90'/><translate y='3'/></transform>"
+	"<emitter type='area'><spectrum name='radiance' value='5,4,3'/></emitter></shape></scene>";
+
+static const char new[] =
+	"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='5'/></integrator>"
+	"<sensor type='thinlens'><float name='fov' value='45'/><string name='fov_axis' value='y'/>"
+	"<float name='aperture_radius' value='0.05'/><float name='focus_distance' value='5'/>"
+	"<transform name='to_world'><lookat origin='0,1,6' target='0,0,0' up='0,1,0'/></transform>"
+	"<sampler type='independent'><integer name='sample_count' value='4'/></sampler>"
+	"<film type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/>"
+	"<rfilter type='box'/></film></sensor>"
+	"<emitter type='spot'><rgb name='intensity' value='40'/><float name='cutoff_angle' value='30'/>"
+	"<float name='beam_width' value='20'/>"
+	"<transform name='to_world'><lookat origin='1,4,3' target='0,0,0' up='0,1,0'/></transform></emitter>"
+	"<shape type='rectangle'><transform name='to_world'><scale value='6'/><rotate x='1' angle='-90'/>"
+	"<translate y='-1'/></transform><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'>"
+	"<rgb name='color0' value='0.2,0.4,0.6'/><float name='color1' value='0.7'/>"
+	"<transform name='to_uv'><scale x='8' y='4'/></transform></texture></bsdf></shape>"
+	"<shape type='sphere'><point name='center' x='-1.5' y='0' z='0'/><bsdf type='roughconductor'>"
+	"<string name='material' value='Cu'/><string name='distribution' value='beckmann'/>"
+	"<string name='ext_eta' value='air'/>"
+	"<float name='alpha' value='0.2'/></bsdf></shape>"
+	"<shape type='cube'><transform name='to_world'><scale value='0.6'/><translate x='0.5'/></transform>"
+	"<bsdf type='roughplastic'><string name='int_ior' value='diamond'/><float name='alpha' value='0.1'/>"
+	"<rgb name='diffuse_reflectance' value='0.6,0.3,0.1'/></bsdf></shape>"
+	"<shape type='shapegroup' id='g'><shape type='cylinder'><point name='p0' x='0' y='-1' z='0'/>"
+	"<point name='p1' x='0' y='0.5' z='0'/><float name='radius' value='0.3'/>"
+	"<bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='p0'/>"
+	"<string name='filter_type' value='nearest'/><string name='wrap_mode' value='mirror'/>"
+	"<transform name='to_uv'><translate x='0.25'/></transform></texture></bsdf></shape></shape>"
+	"<shape type='instance'><ref id='g'/><transform name='to_world'><translate x='1.7'/></transform></shape>"
+	"<shape type='instance'><ref id='g'/><transform name='to_world'><translate x='2.5'/></transform></shape>"
+	"<shape type='disk'><transform name='to_world'><rotate x='1' angle='90'/><translate y='3'/></transform>"
+	"<emitter type='area'><rgb name='radiance' value='5,4,3'/></emitter></shape></scene>";
+
+static void render(const char *xml, struct pictures *p, struct picture *out)
+{
+	const struct memory_file files[] = {
+		{"s.xml", xml, strlen(xml)}, {"p0", p->file[0].bytes, p->file[0].size}, {NULL, NULL, 0}};
+	struct world *w = world_of_files(SIDE, SIDE, files);
+	const struct render_picture_how how = {.integrator = "path", .test = "dialects", .spp = 16};
+	render_picture_xyz(w, &how, out);
+	world_free(w);
+}
+
+static void test_twins(void **state)
+{
+	(void)state;
+	struct pictures p = {.count = 0};
+	struct picture a, b;
+	pictures_add(&p, 2, 1, (const double[]){0.75, 0.25, 0.125, 0.125, 0.25, 0.75});
+	render(old, &p, &a);
+	render(new, &p, &b);
+	double sum = 0;
+	for (size_t i = 0; i < (size_t)SIDE * SIDE; i++)
+		for (int k = 0; k < 3; k++) {
+			sum += (double)a.rgb[k][i];
+			if (a.rgb[k][i] != b.rgb[k][i])
+				fail_msg("pixel %zu, channel %d: %.9g in 0.6, %.9g in 3.x", i, k, (double)a.rgb[k][i],
+					 (double)b.rgb[k][i]);
+		}
+	assert_true(sum > 0);
+	picture_fini(&a);
+	picture_fini(&b);
+	pictures_fini(&p);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_twins)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
