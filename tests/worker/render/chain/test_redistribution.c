@@ -7,6 +7,7 @@
 #include "worker/render/chain/redistribution.h"
 
 #include "tests/support/agree.h"
+#include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/render/path/integrate_bdpt.h"
 
@@ -118,14 +119,6 @@ static double unspread_sample(struct trial *t, uint64_t seed, uint64_t index)
 	return t->sample.intensity;
 }
 
-static uint64_t seed_of(const char *test)
-{
-	uint64_t h = 14695981039346656037u;
-	for (; *test; test++)
-		h = (h ^ (uint8_t)*test) * 1099511628211u;
-	return h;
-}
-
 /* Blocks of the film and the whole, each as its mean. */
 static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGREE_CELLS + 1])
 {
@@ -150,7 +143,7 @@ static double compare(const char *test, const struct world *w, const struct redi
 	memset(out, 0, sizeof *out);
 	out->groups = GROUPS;
 	for (uint32_t g = 0; g < GROUPS; g++) {
-		uint64_t seed = seed_of(test) + g;
+		uint64_t seed = stats_seed(test) + g;
 		trial_begin(&t, w, rule, seed);
 		for (uint64_t i = 0; i < spp * SIDE * SIDE; i++) {
 			trial_sample(&t, seed, i);
@@ -199,9 +192,9 @@ static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 	const struct redistribution_rule endless = {.threshold = 0.5, .mutations = 1e12, .length = 3};
 	static struct trial t;
 	struct world *w = room_of_balls();
-	trial_begin(&t, w, &endless, seed_of(__func__));
+	trial_begin(&t, w, &endless, stats_seed(__func__));
 	for (uint64_t i = 0; i < 256; i++)
-		trial_sample(&t, seed_of(__func__), i);
+		trial_sample(&t, stats_seed(__func__), i);
 	assert_true(t.counters[COUNT_SPREAD] > 16);
 	assert_int_equal(t.counters[COUNT_SPREAD_MUTATIONS], t.counters[COUNT_SPREAD] * 3 * REDISTRIBUTION_CHAINS);
 	trial_end(&t);
@@ -215,11 +208,11 @@ static void nothing_is_lost_of_the_sum(void **state)
 	const struct redistribution_rule half = {.threshold = 0.1, .mutations = 0.1, .length = 2};
 	static struct trial t;
 	struct world *w = room_of_balls();
-	trial_begin(&t, w, &half, seed_of(__func__));
+	trial_begin(&t, w, &half, stats_seed(__func__));
 	double whole = 0;
 	for (uint64_t i = 0; i < 512; i++) {
-		trial_sample(&t, seed_of(__func__), i);
-		whole += unspread_sample(&t, seed_of(__func__), i);
+		trial_sample(&t, stats_seed(__func__), i);
+		whole += unspread_sample(&t, stats_seed(__func__), i);
 	}
 	assert_true(t.counters[COUNT_SPREAD] > 100);
 	assert_true(fabs(t.intensity - whole) < 1e-9 * whole);
@@ -240,9 +233,9 @@ static void what_is_seen_directly_is_not_spread(void **state)
 			"0,0,0") "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>" BALL("0,0,0",
 													    "1",
 													    GLASS));
-	trial_begin(&t, w, &all, seed_of(__func__));
+	trial_begin(&t, w, &all, stats_seed(__func__));
 	for (uint64_t i = 0; i < 4096; i++)
-		trial_sample(&t, seed_of(__func__), i);
+		trial_sample(&t, stats_seed(__func__), i);
 	assert_true(t.intensity > 0);
 	assert_int_equal(t.counters[COUNT_SPREAD], 0);
 	trial_end(&t);
