@@ -423,13 +423,7 @@ static int see_what_path_misses(struct pilot *p, struct render_choice *out, stru
 
 static int run_pilot(struct pilot *p, const struct plan *film, struct render_choice *out, struct error *e)
 {
-	p->context = (struct path_context){.w = p->w,
-					   .window = film_window_of(film),
-					   .min_depth = film->min_depth,
-					   .max_depth = film->max_depth,
-					   .roulette = PATH_ROULETTE,
-					   .unclassed = true,
-					   .counters = p->counters};
+	path_context_for_samples(&p->context, p->w, film, p->counters);
 	int rc = tail_init(&p->tail, p->samples / RENDER_TAIL + 1);
 	rc = rc ? error_set(e, ENOMEM, "no memory for a pilot") : make_map(p, out->misses, e);
 	if (!rc) {

@@ -50,13 +50,7 @@ int render_map_new(const struct world *w, const struct plan *p, struct brightnes
 	struct path_context *c = mem_alloc(1, sizeof *c);
 	int rc = map && c ? 0 : error_set(e, ENOMEM, "no memory for a map of brightness");
 	if (!rc) {
-		c->w = w;
-		c->window = film_window_of(p);
-		c->min_depth = p->min_depth;
-		c->max_depth = p->max_depth;
-		c->roulette = PATH_ROULETTE;
-		c->unclassed = true;
-		c->counters = counters;
+		path_context_for_samples(c, w, p, counters);
 		rc = sample_map(map, c, p, e);
 	}
 	mem_free(c);

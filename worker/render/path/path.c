@@ -26,6 +26,17 @@ struct film_window film_window_of(const struct plan *p)
 				    (double)p->crop_width + 2.0 * p->border, (double)p->crop_height + 2.0 * p->border};
 }
 
+void path_context_for_samples(struct path_context *c, const struct world *w, const struct plan *p, uint64_t *counters)
+{
+	*c = (struct path_context){.w = w,
+				   .window = film_window_of(p),
+				   .min_depth = p->min_depth,
+				   .max_depth = p->max_depth,
+				   .roulette = PATH_ROULETTE,
+				   .unclassed = true,
+				   .counters = counters};
+}
+
 vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2)
 {
 	*distance2 = 1;

@@ -97,6 +97,9 @@ typedef void path_tracer(struct path_context *c, struct sampler *s, struct path_
 
 struct film_window film_window_of(const struct plan *p);
 
+/* For independent samples of the plan's film, with roulette and without path classes. Counts into counters. */
+void path_context_for_samples(struct path_context *c, const struct world *w, const struct plan *p, uint64_t *counters);
+
 /* Camera sub-path: vertex 0 is the pinhole or a point of the aperture, whose density is 1 in every technique. Returns
  * the number of vertices; an escaped path may end in VERTEX_INFINITE. film: the film point that was drawn. */
 unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2]);
