@@ -21,8 +21,6 @@
 /* Relative MSE times CPU time for other values: README of tests/bench, "Energy redistribution". */
 const struct redistribution_rule redistribution_usual = {.threshold = 4, .mutations = 2, .length = 256};
 
-enum { TICK_INTERVAL = 256 };
-
 struct spread_place {
 	struct path_place place;
 	double scale; /* w */
@@ -105,11 +103,10 @@ static void spread(struct redistribution *r, const struct spread_place *from, do
 	x->scale = from->scale;
 	x->share = from->share;
 	x->place.weight = y->place.weight = 0;
+	tick();
 	for (uint32_t i = 0; i < r->rule.length; i++) {
 		double u[4];
 		struct move move = {0};
-		if (i % TICK_INTERVAL == 0)
-			tick();
 		m->step = i;
 		mutation_random(m, BLOCK_STRATEGY, u);
 		double a = propose(r, &r->mixture.entry[mixture_choose(&r->mixture, u[0])], &move, x, y);
