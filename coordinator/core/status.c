@@ -206,7 +206,7 @@ static void fill_counts(const struct job *j, struct job_status *s)
 	s->leases_merged = j->leases_merged;
 	double slots = (double)j->plan.groups * j->plan.parts;
 	s->mutations = (uint64_t)((double)j->leases_merged * ((double)plan_round_mutations(&j->plan) / slots));
-	s->leases_out = j->leases_out;
+	s->leases = j->leases_out;
 	s->counts = j->counts;
 }
 

@@ -33,10 +33,10 @@ struct job_status {
 	struct forecast_range halving_cpu, halving_seconds;  /* the remaining cost of halving the error */
 	uint64_t rounds;				     /* complete rounds */
 	uint64_t bootstrap_merged, leases_merged, mutations; /* leases_merged: render leases, including open rounds */
-	uint32_t leases_out;
-	uint32_t workers, machines; /* machines that hold its leases; machines that could */
-	double share;		    /* machines it would get by its priority: coordinator/core/share.h */
-	char place[160];	    /* both, and which jobs come first */
+	uint32_t leases;				     /* at workers */
+	uint32_t workers, machines;			     /* machines that hold its leases; machines that could */
+	double share;	 /* machines it would get by its priority: coordinator/core/share.h */
+	char place[160]; /* both, and which jobs come first */
 	struct job_counts counts;
 	char text[256];				     /* why it failed, or the last failure of a lease */
 	char waiting[256];			     /* why nothing is being done for it; "" if something is */

@@ -39,7 +39,7 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	v->eta = isfinite(s->eta) ? s->eta : -1;
 	v->eta_low = isfinite(s->eta_low) ? s->eta_low : -1;
 	v->eta_high = isfinite(s->eta_high) ? s->eta_high : -1;
-	v->leases = s->leases_out;
+	v->leases = s->leases;
 	v->workers = s->workers;
 	v->machines = s->machines;
 	v->share = s->share;

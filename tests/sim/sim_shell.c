@@ -271,10 +271,10 @@ static void check_progress(struct world *w)
 		if (s.priority != j->priority || (s.state == JOB_HELD) != (!j->over && is_held(j)))
 			sim_wrong(w, "j%" PRIu64 " has priority %d, or is %s", j->id, s.priority,
 				  job_state_name(s.state));
-		if (s.workers > s.leases_out || !(s.share >= 0 && s.share <= s.machines))
-			sim_wrong(w, "%u leases at %u workers, %g machines of %u due", s.leases_out, s.workers, s.share,
+		if (s.workers > s.leases || !(s.share >= 0 && s.share <= s.machines))
+			sim_wrong(w, "%u leases at %u workers, %g machines of %u due", s.leases, s.workers, s.share,
 				  s.machines);
-		if (!job_state_is_end(s.state) && !s.leases_out && (!*s.waiting || !*s.owners_waiting))
+		if (!job_state_is_end(s.state) && !s.leases && (!*s.waiting || !*s.owners_waiting))
 			sim_wrong(w, "j%" PRIu64 " waits, and nobody says why", j->id);
 		if (!(s.progress >= j->progress && s.progress <= 1))
 			sim_wrong(w, "progress of j%" PRIu64 " goes from %g to %g", j->id, j->progress, s.progress);

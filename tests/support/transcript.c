@@ -440,7 +440,7 @@ static bool says_why(const struct farm *f, const char *line)
 	bool all = true;
 	for (uint64_t id = 1; id <= JOBS; id++) {
 		struct job_status s;
-		if (!farm_job(f, id, 0, &s) || job_state_is_end(s.state) || (s.leases_out && s.state != JOB_HELD) ||
+		if (!farm_job(f, id, 0, &s) || job_state_is_end(s.state) || (s.leases && s.state != JOB_HELD) ||
 		    (*s.waiting && *s.owners_waiting))
 			continue;
 		print_error("\"%s\": j%llu waits and does not say for what\n", line, (unsigned long long)id);

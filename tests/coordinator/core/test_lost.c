@@ -60,7 +60,7 @@ static void told_by_the_next_life(void **state)
 		});
 	struct job_status s;
 	assert_int_equal(state_of(f, 2, 4, &s), JOB_BOOTSTRAP);
-	assert_int_equal(s.leases_out, 1);
+	assert_int_equal(s.leases, 1);
 	/* something is made of it: it is as good as any */
 	play(f, "[5] w4 batch j2 g0 p0 boot -> merge, merged, w5 gets j2 g0 p1 boot, w4 gets j2 g1 p0 boot");
 	farm_free(f);
