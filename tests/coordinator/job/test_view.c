@@ -163,6 +163,45 @@ static void shows_the_share(void **state)
 	json_decref(o);
 }
 
+/* While a job lives, the core's numbers replace those of its record; the rest of the record stays. */
+static void shows_what_the_core_says(void **state)
+{
+	(void)state;
+	struct job_record r = {.id = 1, .state = "queued", .name = "a", .priority = 1, .b = 7, .cpu_seconds = 9};
+	struct job_status s = {.priority = -3,
+			       .progress = 0.25,
+			       .rounds = 4,
+			       .mutations = 5,
+			       .leases_merged = 6,
+			       .verify = 0.5,
+			       .bootstrap_seconds = 8,
+			       .rate = 10,
+			       .eta = 11,
+			       .eta_low = 12,
+			       .eta_high = 13,
+			       .leases = 14,
+			       .counts = {.repeats = 15},
+			       .text = "a lease failed",
+			       .looks = &r.looks,
+			       .state = JOB_RUNNING};
+	struct job_view v;
+	view_of_record(&v, &r);
+	view_add_status(&v, &s);
+	assert_string_equal(v.record.state, "running");
+	assert_string_equal(v.record.why, "a lease failed");
+	assert_string_equal(v.record.name, "a");
+	assert_true(v.record.priority == -3 && v.record.progress == 0.25 && v.record.rounds == 4 &&
+		    v.record.mutations == 5 && v.record.leases_merged == 6 && v.record.verify == 0.5 &&
+		    v.record.bootstrap_seconds == 8 && v.record.counts.repeats == 15);
+	assert_true(v.rate == 10 && v.eta == 11 && v.eta_low == 12 && v.eta_high == 13 && v.leases == 14);
+	assert_true(v.record.b == 7 && v.record.cpu_seconds == 9 && v.reading == -1);
+	s.rate = s.bootstrap_seconds = s.eta = s.eta_low = NAN;
+	s.eta_high = INFINITY;
+	view_add_status(&v, &s);
+	assert_true(v.rate == 0 && v.record.bootstrap_seconds == 0);
+	assert_true(v.eta == -1 && v.eta_low == -1 && v.eta_high == -1);
+}
+
 /* As hslt-submit --estimate gets them. */
 static void looks_travel(void **state)
 {
@@ -192,6 +231,7 @@ int main(void)
 		cmocka_unit_test(json_says_why_no_error_is_stated),
 		cmocka_unit_test(json_shows_the_forecast),
 		cmocka_unit_test(shows_the_share),
+		cmocka_unit_test(shows_what_the_core_says),
 		cmocka_unit_test(looks_travel),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
