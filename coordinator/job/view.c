@@ -24,36 +24,54 @@ void view_of_record(struct job_view *v, const struct job_record *r)
 	v->share = v->reading = -1;
 }
 
+/* A number of the core as the record states it: one that is not known is 0, or negative where 0 has a meaning. */
+static double from_core_real(double x)
+{
+	return isfinite(x) ? x : 0;
+}
+
+static double from_core_known(double x)
+{
+	return isfinite(x) ? x : -1;
+}
+
+static int from_core_int(int n)
+{
+	return n;
+}
+
+static uint32_t from_core_u32(uint32_t n)
+{
+	return n;
+}
+
 void view_add_status(struct job_view *v, const struct job_status *s)
 {
 	struct job_record *r = &v->record;
 	text_copy(r->state, sizeof r->state, job_state_name(s->state));
 	text_copy(r->reason, sizeof r->reason, s->end == END_NONE ? "" : job_end_name(s->end));
 	text_copy(r->why, sizeof r->why, s->text);
-	r->priority = s->priority;
-	r->progress = s->progress;
-	r->rounds = s->rounds;
-	r->mutations = s->mutations;
 	r->exit_code = job_state_is_end(s->state) ? (uint32_t)job_exit_code(s) : 0;
-	v->rate = isfinite(s->rate) ? s->rate : 0;
-	v->eta = isfinite(s->eta) ? s->eta : -1;
-	v->eta_low = isfinite(s->eta_low) ? s->eta_low : -1;
-	v->eta_high = isfinite(s->eta_high) ? s->eta_high : -1;
-	v->leases = s->leases;
-	v->workers = s->workers;
-	v->machines = s->machines;
-	v->share = s->share;
-	text_copy(v->place, sizeof v->place, s->place);
-	r->bootstrap_seconds = isfinite(s->bootstrap_seconds) ? s->bootstrap_seconds : 0;
 	r->looks = *s->looks;
+	r->counts = s->counts;
 	v->halving_cpu = s->halving_cpu;
 	v->halving_seconds = s->halving_seconds;
-	r->leases_merged = s->leases_merged;
-	r->verify = s->verify;
-	r->counts = s->counts;
-	text_copy(v->waiting, sizeof v->waiting, s->waiting);
-	text_copy(v->owners_place, sizeof v->owners_place, s->owners_place);
-	text_copy(v->owners_waiting, sizeof v->owners_waiting, s->owners_waiting);
+#define LIVE(statement) statement
+#define KEPT(statement)
+#define TEXT(member, size, key, shown, wire, core) core(text_copy(r->member, sizeof r->member, s->member);)
+#define NUMBER(kind, member, key, shown, wire, core) core(r->member = from_core_##kind(s->member);)
+#define COUNT(member, key, shown, wire, core) core(r->member = s->member;)
+	RECORD_FIELDS(TEXT, NUMBER, COUNT)
+#undef TEXT
+#undef NUMBER
+#undef COUNT
+#define TEXT(member, size, key, shown, wire, core) core(text_copy(v->member, sizeof v->member, s->member);)
+#define NUMBER(kind, member, key, shown, wire, core) core(v->member = from_core_##kind(s->member);)
+	VIEW_FIELDS(TEXT, NUMBER)
+#undef TEXT
+#undef NUMBER
+#undef LIVE
+#undef KEPT
 }
 
 void view_hide_others(struct job_view *v)
@@ -76,15 +94,15 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 #define AT(to) out->to = SEND
 #define NOWHERE IGNORE
 #define X(name, key, wire) wire(r->counts.name);
-#define TEXT(member, size, key, shown, wire) wire(text_borrow(r->member));
-#define NUMBER(kind, member, key, shown, wire) wire(r->member);
-#define COUNT(member, key, shown, wire) wire(r->member);
+#define TEXT(member, size, key, shown, wire, core) wire(text_borrow(r->member));
+#define NUMBER(kind, member, key, shown, wire, core) wire(r->member);
+#define COUNT(member, key, shown, wire, core) wire(r->member);
 	RECORD_FIELDS(TEXT, NUMBER, COUNT)
 	JOB_COUNTS(X)
 #undef TEXT
 #undef NUMBER
-#define TEXT(member, size, key, shown, wire) wire(text_borrow(v->member));
-#define NUMBER(kind, member, key, shown, wire) wire(v->member);
+#define TEXT(member, size, key, shown, wire, core) wire(text_borrow(v->member));
+#define NUMBER(kind, member, key, shown, wire, core) wire(v->member);
 	VIEW_FIELDS(TEXT, NUMBER)
 #undef AT
 #undef NOWHERE
@@ -138,8 +156,8 @@ static void add_forecast(json_t *o, const struct job_view *v)
 		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
-#define TEXT(member, size, key, shown, wire) {FIELD_TEXT, offsetof(struct job_view, member), size, key, shown},
-#define NUMBER(kind, member, key, shown, wire) {FIELD_##kind, offsetof(struct job_view, member), 0, key, shown},
+#define TEXT(member, size, key, shown, wire, core) {FIELD_TEXT, offsetof(struct job_view, member), size, key, shown},
+#define NUMBER(kind, member, key, shown, wire, core) {FIELD_##kind, offsetof(struct job_view, member), 0, key, shown},
 static const struct field fields[] = {VIEW_FIELDS(TEXT, NUMBER)};
 #undef TEXT
 #undef NUMBER

@@ -25,9 +25,9 @@
 
 enum { SCHEMA = 1 };
 
-#define TEXT(member, size, key, shown, wire) {FIELD_TEXT, offsetof(struct job_record, member), size, key, shown},
-#define NUMBER(kind, member, key, shown, wire) {FIELD_##kind, offsetof(struct job_record, member), 0, key, shown},
-#define COUNT(member, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, NULL, shown},
+#define TEXT(member, size, key, shown, wire, core) {FIELD_TEXT, offsetof(struct job_record, member), size, key, shown},
+#define NUMBER(kind, member, key, shown, wire, core) {FIELD_##kind, offsetof(struct job_record, member), 0, key, shown},
+#define COUNT(member, key, shown, wire, core) {FIELD_u64, offsetof(struct job_record, member), 0, NULL, shown},
 static const struct field fields[] = {RECORD_FIELDS(TEXT, NUMBER, COUNT)};
 #undef TEXT
 #undef NUMBER
@@ -35,7 +35,7 @@ static const struct field fields[] = {RECORD_FIELDS(TEXT, NUMBER, COUNT)};
 
 /* Members of the object "counts". */
 #define OTHER(...)
-#define COUNT(member, key, shown, wire) {FIELD_u64, offsetof(struct job_record, member), 0, key, NULL},
+#define COUNT(member, key, shown, wire, core) {FIELD_u64, offsetof(struct job_record, member), 0, key, NULL},
 #define X(name, key, wire) {FIELD_u64, offsetof(struct job_record, counts.name), 0, key, NULL},
 static const struct field counts[] = {RECORD_FIELDS(OTHER, OTHER, COUNT) JOB_COUNTS(X)};
 #undef OTHER

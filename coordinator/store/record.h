@@ -23,9 +23,9 @@
 enum { RECORD_EFFECTS = 12288 };
 
 struct job_record {
-#define TEXT(member, size, key, shown, wire) char member[size];
-#define NUMBER(kind, member, key, shown, wire) field_##kind member;
-#define COUNT(member, key, shown, wire) uint64_t member;
+#define TEXT(member, size, key, shown, wire, core) char member[size];
+#define NUMBER(kind, member, key, shown, wire, core) field_##kind member;
+#define COUNT(member, key, shown, wire, core) uint64_t member;
 	RECORD_FIELDS(TEXT, NUMBER, COUNT)
 #undef TEXT
 #undef NUMBER
