@@ -1,5 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits.
+/*
+ * From integer sums to an image.
+ *
+ * canvas_image adds up the counts of bootstrap and rounds, computes b of each group and of all, and from it the factor
+ * of each group's film. Then it pools the films tile by tile into RGB, and estimates the error and the statistics
+ * within chains. A preview (open_rounds) includes rounds that are not complete and has no error.
+ *
+ * All loops run in a fixed order over exact inputs, so that equal films give equal bits. What is not known, such as b
+ * without samples, is NAN or 0; the only failure is -ENOMEM, after which the image has no arrays.
  */
 #include "common/estimate/canvas_image.h"
 

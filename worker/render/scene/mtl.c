@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Reads .mtl files and makes scene elements of their materials.
+ *
+ * mtl_read reads a file line by line. `newmtl` begins a material, a keyword of the table sets one of its values, and
+ * the last value given counts. mtl_put writes a material as elements: a mask if it is not opaque, in it a bumpmap if
+ * there is one, in it the BSDF that `illum` selects. The elements are then read like those of the scene file, so
+ * values that are not numbers are reported there, with the line in the .mtl file.
+ *
+ * A file that cannot be opened has no materials. A keyword that is not supported but would change the image is kept in
+ * mtl.unread, for the caller to report. -E2BIG: too many materials; -ENOMEM.
+ */
 #include "worker/render/scene/mtl.h"
 
 #include "worker/render/scene/asset_name.h"

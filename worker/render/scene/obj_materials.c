@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Splits OBJ shapes with several materials into shapes with one material each.
+ *
+ * The walk visits each OBJ shape of the tree. For one that may have several materials, it reads the names of materials
+ * in the file, then the .mtl file, and chooses for each name the BSDF of the shape or the entry of the .mtl file. If
+ * any was found, the element becomes a `merge` with a copy of the shape for each material. Otherwise it stays as it
+ * is. Scenes of the 3.x format do not have this feature and are not changed.
+ *
+ * A file that is missing is an error here only if the shape has several BSDFs; otherwise it is reported when the shape
+ * is built. Problems go to the report, and the walk continues with the next shape. -ENOMEM ends it.
+ */
 #include "worker/render/scene/obj_materials.h"
 
 #include "common/base/liveness.h"

@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Reads OBJ files.
+ *
+ * obj_read opens the file and reads it line by line in one pass. Numbers, corners and triangles go to lists that grow
+ * by doubling; polygons are cut into triangles; `usemtl` begins a run of faces with one material. The cache keeps the
+ * file that was read last.
+ *
+ * An error names the file and the line: a number that cannot be read, an index of something that the file has not
+ * defined yet. A file without faces or above 4 GB is refused. After an error nothing is left allocated.
+ */
 #include "worker/render/shape/obj_read.h"
 
 #include "common/base/liveness.h"
