@@ -1,4 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Chooses the integrator from a pilot; choose.h explains the method.
+ *
+ * render_choose makes a map of brightness from samples of `path`, then a second set of samples of `path` relative to
+ * this map. If a lobe of the scene is narrow, it merges light with sub-paths of the camera. If that leaves the choice
+ * open, it takes samples of `bdpt`: a quarter of them first, the rest unless the quarter is clear. render_choice_of
+ * then compares the figures with the thresholds below. They were set from pilots of 16,384 samples, 40 in each scene
+ * of tests/bench/README.md.
+ *
+ * If `path` finds no light, the map is made again by `bdpt`. -ENOMEM: no memory for the pilot. -EINVAL: the request
+ * has no valid film.
+ */
 #include "worker/render/choose.h"
 
 #include "common/base/mem.h"
@@ -15,71 +27,75 @@
 
 enum {
 	SAMPLES_LEAST = 1 << 12,
-	SAMPLES_USUAL = 1 << 14, /* of fewer the tail says less: README of tests/bench, "What the pilot chooses" */
+	SAMPLES_USUAL = 1 << 14, /* fewer estimate the tail worse: README of tests/bench, "What the pilot chooses" */
 	SAMPLES_LONG = 1 << 18,
 	SAMPLES_MOST = 1 << 20,
-	SHARE_SHORT = 32,  /* one of so many samples of the render, of each kind, up to SAMPLES_USUAL */
-	SHARE_LONG = 128,  /* from there to SAMPLES_LONG: the pilot has one thread, the render may have many */
-	SHARE_HOURS = 512, /* and beyond */
-	A_SECOND = 100000, /* samples, by and large, where a render is given in time */
-	SHORTER = 4,	   /* of bdpt at first */
-	IN_PIXEL = 16,	   /* samples of one pixel */
-	MERGED = 4,	   /* of what is merged */
+	SHARE_SHORT = 32,  /* a pilot has 1/32 of the samples of the render, of each kind, up to SAMPLES_USUAL */
+	SHARE_LONG = 128,  /* 1/128 from there to SAMPLES_LONG: the pilot has one thread, the render may have many */
+	SHARE_HOURS = 512, /* 1/512 beyond */
+	A_SECOND = 100000, /* assumed samples a second, for a render bounded by time */
+	SHORTER = 4,	   /* bdpt takes 1/4 of its samples first */
+	IN_PIXEL = 16,	   /* consecutive samples in one pixel */
+	MERGED = 4,	   /* merging has 1/4 of the samples, within the two bounds below */
 	MERGED_LEAST = 1 << 12,
 	MERGED_MOST = 1 << 16, /* photons take memory */
-	BESIDE = 128,	       /* one splat of so many samples, at most, is held against its pixel */
-	DROPPED = 1 << 12,     /* one of so many terms, the largest: of all of path's as of a quarter of bdpt's */
+	BESIDE = 128,	       /* at most 1/128 as many splats as samples are compared with their pixels */
+	DROPPED = 1 << 12,     /* the second moment leaves out the largest terms, one for 4,096 samples */
 	STREAM_MAP = 0,
 	STREAM_PATH,
 	STREAM_BDPT,
 	STREAM_PIXEL,
 	STREAM_BESIDE,
-	STREAM_MERGED, /* and the one after it; steps of RNG_CHOICE */
+	STREAM_MERGED, /* uses the next number, too; these are steps of RNG_CHOICE */
 };
 
-/* The figures below are of pilots of 16,384 samples, 40 in each scene of tests/bench/README.md. */
-
-/* Where path finds more, or its largest fall off as if there were no mean, chains may be called for. */
+/* If path finds a larger share of rare light, or a smaller tail index (no finite mean), chains may be needed. */
 static const double rare_hint = 0.03, tail_mean = 1;
-/* Share of rare light that calls for chains, of bdpt or of path. bdpt's: 0.16 or more where chains win by factors but
- * for torus, else 0.12 or less but for veach-door, 0.05 to 0.33. */
+/* Share of rare light, of bdpt or of path, from which chains are needed. For bdpt it is 0.16 or more in the scenes
+ * where chains win by factors, except torus; in the others 0.12 or less, except veach-door with 0.05 to 0.33. */
 static const double rare_some = 0.12;
-/* Then the smaller of bdpt's two indices: at most 1.2 where chains win, 1.23 to 2.0 in veach-door. */
+/* Then the smaller of bdpt's two tail indices must be below this. It is at most 1.2 where chains win, and 1.23 to 2.0
+ * in veach-door. */
 static const double heavy_most = 1.25;
-/* And that of path's extremes, however much light is rare: 0.3 to 0.6 in window, pane and frosted, where what the
- * camera's sub-paths meet at all they meet by luck, so that too few samples of bdpt begin a chain; 1.5 to 2.6 in water,
- * pool and torus, where light sub-paths find what they miss, and chains that begin there need 0.01 to 0.9 of the time
- * of those that wander all over the image. */
+/* And the tail index of path's extremes must be below this, whatever the share of rare light. It is 0.3 to 0.6 in
+ * window, pane and frosted: there camera sub-paths rarely meet the light, so too few samples of bdpt begin a chain. It
+ * is 1.5 to 2.6 in water, pool and torus: there light sub-paths find the rest, and the chains of erpt need 0.01 to 0.9
+ * of the time of those of hslt. */
 static const double lucky_extreme = 1;
-/* Share of the light that is rare to bdpt, by merging: 0.05 to 0.35 in water, frosted, pane, torus and pool, 0.02 to
- * 0.03 in half-sunk, at most 0.008 where chains lose. */
+/* Share of the light that merging finds and that is rare for bdpt: 0.05 to 0.35 in water, frosted, pane, torus and
+ * pool, 0.02 to 0.03 in half-sunk, at most 0.008 where chains lose. */
 static const double merged_rare = 0.03;
-/* At most so much of it, where photons bring so much of all light: then what is rare to path, or to samples of bdpt
- * that are none of its largest, is not to bdpt. 0.62 to 0.84 and 0.003 to 0.006 in kitchen, where short pilots of path
- * find hardly anything. */
+/* If merging finds more than merged_seen of all light, and less than merged_none of it is rare for bdpt, chains are not
+ * needed, even if light is rare for path. In kitchen, where short pilots of path find almost nothing, these are 0.62 to
+ * 0.84 and 0.003 to 0.006. */
 static const double merged_none = 0.01, merged_seen = 0.4;
-/* A quarter of bdpt's samples is enough where they find so much rare light, and none of a mean; */
+/* A quarter of bdpt's samples is enough if it finds more rare light than this, and a tail without a mean; */
 static const double rare_clear = 0.4;
-/* or where they find hardly any and path little, the extremes of both have about a mean, and no sample is one of the
- * few that bring it: in jewel the rest of bdpt's samples find a third of the light where a quarter found none. */
+/* or if it finds less rare light than rare_none and path little, the extremes of both have a tail index near 1 or
+ * above, and no single sample has more than most_clear of the light. In jewel, a quarter found no rare light and the
+ * rest of the samples found that a third of the light is rare. */
 static const double rare_none = 0.01, extreme_clear = 0.9, most_clear = 0.05;
-/* path's tail: 2.0 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2 to 1.4 x; 0.9 to
- * 2.1 in rough-caustic, three-spheres, demo, displaced and veach-door, where bdpt is, by up to 2.1 x (6 x with
- * fireflies). */
+/* path's tail index must reach this. It is 2.0 to 2.8 in cornell-box and veach-mis and more in box, where path wins by
+ * 1.2 to 1.4 x. It is 0.9 to 2.1 in rough-caustic, three-spheres, demo, displaced and veach-door, where bdpt wins by up
+ * to 2.1 x (6 x with fireflies). */
 static const double tail_least = 2.1;
-/* And one sample's share of the light: 0.01 at most in cornell-box, box and effects-glass; 0.1 in the median pilot of
- * pool, of which the rest looks clean. */
+/* And no sample of path may have more than this share of the light. It is at most 0.01 in cornell-box, box and
+ * effects-glass, and 0.1 in the median pilot of pool, where the other samples show no sign of rare light. */
 static const double most_tame = 0.03;
-/* What samples of a pixel find on average where it is brighter than the map knows; below, the map is a coarse one. */
+/* Mean of the samples of a pixel, relative to the map, above which the pixel is brighter than the map says. Smaller
+ * values only mean that the map is coarse. */
 static const double bright = 8;
-/* Or its extreme-value index says that their variance is finite, below 0.5 by three quarters of a standard error: for
- * 50 of 64 pilots of effects-glass, where the tail index of 1.0 to 1.2 is that of a broad range of contributions with
- * an end, and bdpt8 is the best; 6 of 64 of rough-caustic, 3 of demo and 2 of three-spheres. */
+/* Instead of the tail index, the extreme-value index may show a finite variance: it is then below 0.5 by three quarters
+ * of a standard error. So it is for 50 of 64 pilots of effects-glass, where bdpt8 wins and the tail index is 1.0 to 1.2
+ * because the contributions have a broad but bounded range; for 6 of 64 of rough-caustic, 3 of demo, 2 of
+ * three-spheres.
+ */
 static const double evi_most = 0.4;
-/* bdpt errs less than the pilot says: it has the shorter tails. */
+/* bdpt has the shorter tails, so its error is less than the pilot's second moment says. path must cost less by this
+ * factor. */
 static const double path_cost = 0.75;
 
-/* ---- what samples bring */
+/* ---- contributions of samples */
 
 /* Sums over samples of one kind, relative to the brightness of their places. */
 struct tally {
@@ -88,7 +104,7 @@ struct tally {
 	struct tail *tail;
 };
 
-/* One sample of a pixel: what it brings there, and to other places. */
+/* One sample of a pixel: its contribution to this pixel, and those to other places. */
 struct parts {
 	double here;
 	uint32_t count;
@@ -103,8 +119,8 @@ static void add_term(struct tally *t, double y)
 	tail_add(t->tail, y);
 }
 
-/* A pixel that is brighter than the map knows, a lamp's, is so in all its samples: each is held against what the others
- * found, where that is more. */
+/* A pixel may be brighter than the map says, such as one of a small lamp. Then all of its samples are: each is divided
+ * by the mean of the others if that exceeds 1. */
 static void add_pixel(struct tally *t, const struct parts *of)
 {
 	double all = 0;
@@ -144,13 +160,13 @@ static struct render_found found(const struct tally *t)
 
 /* ---- the choice */
 
-/* By what path says, as far as it says anything: some light may be for chains alone. */
+/* Light that only chains find cannot be ruled out from the samples of path. */
 static bool is_doubtful(const struct render_choice *c)
 {
 	return c->misses || c->path.rare > rare_hint || c->path.tail < tail_mean;
 }
 
-/* path's largest are those of a finite variance. */
+/* The largest samples of path agree with a finite variance. */
 static bool is_tame(const struct render_found *path)
 {
 	return path->tail >= tail_least || (path->evi < evi_most && path->rare <= rare_hint);
@@ -161,13 +177,13 @@ bool render_choice_is_settled(const struct render_choice *c)
 	return c->merged.share > merged_rare || (!is_doubtful(c) && !is_tame(&c->path));
 }
 
-/* Photons bring most of the light, and hardly any of it is rare to bdpt. */
+/* Merging finds most of the light, and hardly any of that is rare for bdpt. */
 static bool is_seen(const struct render_choice *c)
 {
 	return c->merged.seen > merged_seen && c->merged.share < merged_none;
 }
 
-/* Chains that wander all over the image, not those that samples begin. What path misses it says nothing of. */
+/* The chains of hslt, not those of erpt. If path cannot find all light, bdpt's samples are judged instead. */
 static bool wants_chains(const struct render_choice *c)
 {
 	const struct render_found *b = &c->bdpt, *p = c->misses ? b : &c->path;
@@ -182,7 +198,7 @@ static bool wants_chains(const struct render_choice *c)
 	return p->extreme < lucky_extreme && b->rare > rare_some && fmin(b->tail, b->extreme) < heavy_most;
 }
 
-/* More of bdpt's samples would hardly say anything else. */
+/* More samples of bdpt would hardly change the choice. */
 static bool is_clear(const struct render_choice *c)
 {
 	const struct render_found *b = &c->bdpt, *p = &c->path;
@@ -192,13 +208,13 @@ static bool is_clear(const struct render_choice *c)
 	       fmax(p->most, b->most) <= most_clear && fmin(p->extreme, b->extreme) >= extreme_clear;
 }
 
-/* Nor was one seen. */
+/* A finite variance, and no single bright sample. */
 static bool has_no_fireflies(const struct render_found *path)
 {
 	return is_tame(path) && path->most <= most_tame;
 }
 
-/* So much is rare that neither path nor every eighth light sub-path would do. */
+/* Too much light is rare for path, and for bdpt8. */
 static bool has_rare_light(const struct render_choice *c)
 {
 	return c->bdpt.rare > rare_some || (c->path.rare > rare_some && c->bdpt.extreme < lucky_extreme);
@@ -224,7 +240,7 @@ struct pilot {
 	struct brightness map;
 	struct parts parts[IN_PIXEL];
 	struct path_sample beside;
-	uint64_t besides; /* splats that were looked at, of one kind */
+	uint64_t besides; /* splats of this kind that were compared with their pixels */
 	struct tail tail;
 	uint64_t counters[BATCH_COUNTERS], uncounted[BATCH_COUNTERS];
 };
@@ -247,7 +263,7 @@ static const double *pixel_block(struct sampler *base, enum sampler_side side, u
 	return u;
 }
 
-/* By `path`, which is the cheaper one, where it finds all. */
+/* By `path`, which is cheaper, unless it misses some light. */
 static int make_map(struct pilot *p, bool misses, struct error *e)
 {
 	return brightness_of_samples(&p->map, &p->context, misses ? path_trace_both_ways : path_trace, p->seed,
@@ -271,8 +287,8 @@ static double relative(const struct pilot *p, const struct splat *s)
 	return (s->xyz[0] + s->xyz[1] + s->xyz[2]) * brightness_scale(&p->map, s->x, s->y);
 }
 
-/* Light sub-paths find lamps, and lamps in mirrors, of a pixel or less, which the map does not know. They look like
- * the caustics that chains are called for; but samples of `path` find them in their pixel, too. */
+/* Light sub-paths hit lamps, and mirror images of lamps, that are too small for the map. These look like caustics that
+ * need chains, but samples of `path` in the same pixel find them, too. */
 static double held_against_its_pixel(struct pilot *p, const struct splat *s, double y)
 {
 	const struct film_window *w = &p->context.window;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The map of brightness that leases share. By bdpt, which misses nothing that the render finds; about a sample a pixel,
- * so that it costs little beside any render, and a large film has a fine one.
+ * Makes the map of brightness that all leases of a job share. It is sampled by bdpt, which finds all light that the
+ * render finds, with about one sample a pixel: that costs little compared with any render.
  *
- * Failures: memory, and an invalid floating-point operation, after which nothing is left.
+ * -ENOMEM; -EDOM after an invalid floating-point operation. Nothing is left allocated then.
  */
 #include "worker/render/path/brightness.h"
 #include "worker/render/path/integrate_bdpt.h"

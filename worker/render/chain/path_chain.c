@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A step: copy the state, let the mixture propose, check the proposal, accept with min(1, ratio); the state that loses
- * is splatted with the weight that it has gathered. Saving and resuming write a state as bytes (path_bytes.c) at the
- * end of an epoch.
+ * A step copies the state, draws a strategy of the mixture, lets it propose, and accepts with probability
+ * min(1, ratio of the weights). The state that is left is splatted with its accumulated weight. At the end of an epoch
+ * the state is saved as bytes (path_bytes.c), from which the next epoch resumes.
  *
- * A proposal that is not sound (no density, not finite, out of range) is counted by its reason and rejected; a state
- * that cannot be resumed is -EILSEQ, and the lease fails, not the program.
+ * A proposal without density, or with one that is not finite or out of range, is counted by its reason and rejected. A
+ * state that cannot be resumed fails the lease (-EILSEQ).
  */
 #include "worker/render/chain/path_chain.h"
 
@@ -46,7 +46,7 @@ static void set_up(struct path_chain *c)
 	c->mutation.limits = walk_limits_of(&c->base.context->w->accuracy);
 }
 
-/* The epoch begins with this path, which has been read or is black. */
+/* Begins an epoch with the current path, and keeps its bytes for save(). */
 static void begin(struct path_chain *c, const uint8_t *bytes, size_t size)
 {
 	memcpy(c->began, bytes, size);
@@ -121,7 +121,7 @@ static uint64_t rays(const uint64_t *counters)
 	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
 }
 
-/* The probability of acceptance; 0 where there is no proposal, for a reason that is counted. */
+/* The probability of acceptance; 0 if there is no valid proposal, the reason for which is counted. */
 static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move,
 		      struct chain_sums *sums)
 {

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What chains of full paths have in common, whatever their target: a path with the weight that it has gathered, and the
- * copy of it that the next proposal changes. One thread; nothing allocates.
+ * What chains of full paths share, for any target function: a path with its accumulated weight, and the copy of the
+ * path that the next proposal changes. One thread; nothing allocates.
  */
 #ifndef WORKER_RENDER_CHAIN_PATH_PLACE_H
 #define WORKER_RENDER_CHAIN_PATH_PLACE_H
 
 #include "worker/render/mutation/mutation.h"
 
-/* A state with what it has gathered and not splatted yet. */
+/* A state with the weight that it has accumulated since it was splatted. */
 struct path_place {
 	struct full_path_path path; /* 0 edges: black, looking for light */
 	double weight;
@@ -18,8 +18,8 @@ void path_place_copy(struct full_path_path *to, const struct full_path_path *fro
 /* After a step: the proposal's path equals the current one again. all: any vertex may differ. */
 void path_place_follow(struct full_path_path *proposal, const struct full_path_path *current, const struct move *move,
 		       bool all);
-/* The logarithm of a weight that the film may have; what is not is counted, and is no proposal. What is bounded has to
- * be within a float. */
+/* Whether a weight with this logarithm may go to the film: not NaN, not infinite, and if bounded within the range of a
+ * float. Other weights are counted. */
 bool path_place_is_sound(const struct path_context *c, double log_weight, bool bounded);
 
 #endif

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * keep() is asked for each contribution of a sample. Nearly all are below the threshold and stay as they are. Of the
- * others the whole path is made, for C(x) is a function of the path, not of the roulette that a sample has survived
- * (both factors of which stay in the weight). Then spread() runs the chain: propose by a local mutation, accept with
- * min(1, h(y) T(y -> x) / (h(x) T(x -> y))), splat both states with their expected weights.
+ * bdpt calls keep() for each contribution of a sample. Nearly all are below the threshold and are left as they are. For
+ * the others, keep() builds the full path x, because its share depends on the path alone, not on the roulette of the
+ * sub-paths, which stays a factor of the weight. Then spread() runs the chains: it proposes y by a local mutation,
+ * accepts it with probability min(1, h(y) T(y -> x) / (h(x) T(x -> y))), and splats both states with their expected
+ * weights.
  *
- * A path that cannot be made again, once in millions, keeps its contribution. Proposals that are not numbers are
- * counted and rejected.
+ * One path in millions cannot be built again; it keeps its contribution. Proposals with a density that is not
+ * finite are counted and rejected.
  */
 #include "worker/render/chain/redistribution.h"
 
@@ -41,7 +42,7 @@ struct redistribution {
 	struct spread_place start, places[2];
 };
 
-/* Some vertex between its ends scatters into more than one direction. */
+/* Some inner vertex is not specular. */
 static bool is_scattered(const struct full_path_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
@@ -50,6 +51,7 @@ static bool is_scattered(const struct full_path_path *x)
 	return false;
 }
 
+/* Computes w and the share of chains in the contribution of this path. */
 static void weigh(struct redistribution *r, struct spread_place *at)
 {
 	double log_pdf[FULL_PATH_MAX_VERTICES];
@@ -125,8 +127,8 @@ static void spread(struct redistribution *r, const struct spread_place *from, do
 	splat(r, x, unit);
 }
 
-/* Chains for what there is to spread, in units of what a chain carries: none where chance says so, with its
- * probability. */
+/* The number of chains for `units` times the energy that one chain carries, and the factor `each` of their energy. Less
+ * than one unit: one chain with that probability, otherwise none. */
 static unsigned chains_for(double units, double u, double *each)
 {
 	if (units < 1) {
@@ -167,7 +169,7 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 	return spectrum_scale(1 - share, l);
 }
 
-/* What does not look at its state changes it altogether: that is not what is spread. */
+/* Independent strategies ignore the current path: they would not keep the energy near it. */
 static void leave_out_independent(struct mixture *m)
 {
 	unsigned n = 0;
