@@ -8,9 +8,9 @@
  * renders' relMSE is left out, and said so. All scenes at the shortest length come first. SIGTERM ends it after the
  * case that is being measured, with the verdict on what there is.
  *
- *   calibration [RENDERS [LENGTHS [SEEDS [SCENE [TIMES [INTEGRATOR]]]]]]    20 renders a case, half as many of each next
- * length; 3 lengths; SEEDS: a word, another for other seeds; scenes whose names begin with SCENE; references TIMES as
- * long; INTEGRATOR: only that one
+ *   calibration [RENDERS [LENGTHS [SEEDS [SCENE [TIMES [INTEGRATOR]]]]]]    20 renders a case, half as many of each
+ * next length; 3 lengths; SEEDS: a word, another for other seeds; scenes whose names begin with SCENE; references TIMES
+ * as long; INTEGRATOR: only that one
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
