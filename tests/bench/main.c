@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* make bench: runs all benchmarks, or those named. */
-#include "common/base/clock.h"
 #include "tests/bench/bench.h"
 
 #include "common/base/clock.h"
