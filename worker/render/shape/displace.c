@@ -35,7 +35,7 @@ struct turn {
 struct work {
 	const struct displacement *d;
 	const struct sphere *sphere; /* NULL: the surface is the base mesh */
-	struct mesh base, *out;
+	struct mesh base, out;
 	struct displace_grid grid;
 	struct place *places;
 	struct turn *turns;
@@ -146,8 +146,8 @@ static void add_to_place(struct place *c, double weight, const struct sample *s,
 static void mix_attributes(const struct work *w, uint32_t triangle, double b1, double b2, uint32_t vertex)
 {
 	const uint32_t *t = w->base.index[triangle];
-	for (uint32_t i = 0; i < w->out->attribute_count; i++) {
-		const struct attribute *from = &w->base.attributes[i], *to = &w->out->attributes[i];
+	for (uint32_t i = 0; i < w->out.attribute_count; i++) {
+		const struct attribute *from = &w->base.attributes[i], *to = &w->out.attributes[i];
 		size_t n = from->channels;
 		for (size_t k = 0; k < n && !from->per_face; k++)
 			to->value[vertex * n + k] = (float)((1 - b1 - b2) * (double)from->value[t[0] * n + k] +
@@ -158,11 +158,11 @@ static void mix_attributes(const struct work *w, uint32_t triangle, double b1, d
 
 static void copy_face(const struct work *w, uint32_t triangle, uint32_t to)
 {
-	for (uint32_t i = 0; i < w->out->attribute_count; i++) {
+	for (uint32_t i = 0; i < w->out.attribute_count; i++) {
 		const struct attribute *a = &w->base.attributes[i];
 		size_t n = a->channels;
 		if (a->per_face)
-			memcpy(w->out->attributes[i].value + to * n, a->value + triangle * n, n * sizeof *a->value);
+			memcpy(w->out.attributes[i].value + to * n, a->value + triangle * n, n * sizeof *a->value);
 	}
 }
 
@@ -176,19 +176,19 @@ static void put_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_t j
 	vec3 normal = displaced_normal(w, triangle, b1, b2, &s);
 	w->highest = fmax(w->highest, fabs(s.h));
 	mix_attributes(w, triangle, b1, b2, at.vertex);
-	if (w->out->uv) {
-		w->out->uv[at.vertex][0] = s.u;
-		w->out->uv[at.vertex][1] = s.v;
+	if (w->out.uv) {
+		w->out.uv[at.vertex][0] = s.u;
+		w->out.uv[at.vertex][1] = s.v;
 	}
 	if (at.inside) {
-		mesh_store(w->out->position[at.vertex], vec3_madd(s.p, s.h, s.n));
-		mesh_store(w->out->normal[at.vertex], normal);
+		mesh_store(w->out.position[at.vertex], vec3_madd(s.p, s.h, s.n));
+		mesh_store(w->out.normal[at.vertex], normal);
 		return;
 	}
 	uint32_t corner = i == parts ? 1 : j == parts ? 2 : 0;
 	bool is_corner = corner || i + j == 0;
 	double weight = is_corner ? corner_angle(&w->base, w->base.index[triangle], corner) : M_PI;
-	mesh_store(w->out->normal[at.vertex], s.n);
+	mesh_store(w->out.normal[at.vertex], s.n);
 	add_to_place(&w->places[at.place], weight, &s, normal);
 }
 
@@ -208,9 +208,9 @@ static void settle_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_
 	if (at.inside)
 		return;
 	const struct place *c = &w->places[at.place];
-	mesh_store(w->out->position[at.vertex], c->p);
+	mesh_store(w->out.position[at.vertex], c->p);
 	if (!c->bent)
-		mesh_store(w->out->normal[at.vertex], normal_or(c->normal, mesh_load(w->out->normal[at.vertex])));
+		mesh_store(w->out.normal[at.vertex], normal_or(c->normal, mesh_load(w->out.normal[at.vertex])));
 }
 
 /* Calls `what` for every point of the border of every triangle, or for all points. */
@@ -240,7 +240,7 @@ static void add_turns(struct work *w, uint32_t triangle, const uint32_t ij[3][2]
 		struct sample s;
 		sample_at(w, triangle, (double)ij[k][0] / w->grid.parts, (double)ij[k][1] / w->grid.parts, &s);
 		before[k] = s.p;
-		after[k] = mesh_load(w->out->position[at[k].vertex]);
+		after[k] = mesh_load(w->out.position[at[k].vertex]);
 	}
 	vec3 turned = vec3_sub(unit_area(after), unit_area(before));
 	for (int k = 0; k < 3; k++) {
@@ -276,18 +276,18 @@ static void put_triangles(struct work *w)
 			for (uint32_t j = 0; j < n - i; j++) {
 				copy_face(w, t, count);
 				put_triangle(w, t, (const uint32_t[3][2]){{i, j}, {i + 1, j}, {i, j + 1}},
-					     w->out->index[count++]);
+					     w->out.index[count++]);
 				if (i + j + 1 >= n)
 					continue;
 				copy_face(w, t, count);
 				put_triangle(w, t, (const uint32_t[3][2]){{i + 1, j}, {i + 1, j + 1}, {i, j + 1}},
-					     w->out->index[count++]);
+					     w->out.index[count++]);
 			}
 		}
 	for (uint64_t i = 0; i < w->grid.border; i++) {
-		vec3 n0 = mesh_load(w->out->normal[i]);
+		vec3 n0 = mesh_load(w->out.normal[i]);
 		if (w->turns[i].weight > 0)
-			mesh_store(w->out->normal[i],
+			mesh_store(w->out.normal[i],
 				   normal_or(vec3_madd(n0, 1 / w->turns[i].weight, w->turns[i].sum), n0));
 	}
 }
@@ -367,17 +367,17 @@ static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena
 static int settle_places(struct work *w, const struct scene_node *n, struct error *e)
 {
 	for (uint32_t i = 0; i < w->base.vertex_count; i++) {
-		memcpy(w->out->position[i], w->base.position[i], sizeof w->out->position[i]);
-		memcpy(w->out->normal[i], w->base.normal[i], sizeof w->out->normal[i]);
+		memcpy(w->out.position[i], w->base.position[i], sizeof w->out.position[i]);
+		memcpy(w->out.normal[i], w->base.normal[i], sizeof w->out.normal[i]);
 	}
 	each_point(w, true, put_vertex);
 	for (uint64_t i = 0; i < w->grid.places; i++)
 		if (w->places[i].seen)
 			settle_place(w, &w->places[i]);
 	each_point(w, false, settle_vertex);
-	for (uint32_t i = 0; i < w->out->vertex_count; i++)
+	for (uint32_t i = 0; i < w->out.vertex_count; i++)
 		for (int k = 0; k < 3; k++)
-			if (!(fabs(w->out->position[i][k]) <= MESH_COORDINATE_MAX))
+			if (!(fabs(w->out.position[i][k]) <= MESH_COORDINATE_MAX))
 				return node_error(n, e, ERANGE, "displacement moves a vertex beyond %g",
 						  MESH_COORDINATE_MAX);
 	put_triangles(w);
@@ -404,18 +404,17 @@ static int displace_triangles(struct work *w, struct shape_geometry *g, struct a
 	else if (!g->mesh.normal)
 		ok = split_flat(&w->base, &g->mesh, scratch);
 	ok = ok && displace_grid_init(&w->grid, &w->base, parts, scratch);
-	struct mesh out;
 	ok = ok && w->grid.vertices <= UINT32_MAX;
-	ok = ok && mesh_alloc(&out, (uint32_t)w->grid.vertices, (uint32_t)triangles, true, w->base.uv != NULL, arena);
-	ok = ok && same_attributes(&out, &w->base, arena);
+	ok = ok &&
+	     mesh_alloc(&w->out, (uint32_t)w->grid.vertices, (uint32_t)triangles, true, w->base.uv != NULL, arena);
+	ok = ok && same_attributes(&w->out, &w->base, arena);
 	w->places = ok ? arena_alloc(scratch, w->grid.places, sizeof *w->places) : NULL;
 	w->turns = ok ? arena_alloc(scratch, w->grid.border, sizeof *w->turns) : NULL;
 	if (!w->places || !w->turns)
 		return node_error(n, e, ENOMEM, "out of memory for %llu triangles", (unsigned long long)triangles);
-	w->out = &out;
 	int rc = settle_places(w, n, e);
 	if (!rc)
-		*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = out};
+		*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = w->out};
 	return rc;
 }
 
