@@ -138,7 +138,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		const char *who = h->role == FARM__ROLE__ROLE_WORKER ? "worker" : "client";
 		snprintf(
 			text, sizeof text,
-			"the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must "
+			"the %s speaks version %u of the protocol, the coordinator version %d: the %s is older and must "
 			"be updated",
 			who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
 		refuse_for_good(p, text);
