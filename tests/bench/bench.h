@@ -33,6 +33,8 @@ void bench_row(const char *name, const struct series *s, const char *unit, enum 
 void bench_single(const char *name, double value, const char *unit, enum bench_target kind, double target);
 void bench_skip(const char *why);
 __attribute__((noreturn)) void bench_die(const struct error *e);
+/* mem_alloc, or bench_die. */
+void *bench_alloc(size_t count, size_t size);
 
 /* Keeps the compiler from dropping what it computes. */
 extern volatile double bench_sink;

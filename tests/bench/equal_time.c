@@ -199,13 +199,7 @@ static int descending(const void *a, const void *b)
 
 static double *doubles(size_t n)
 {
-	double *p = mem_alloc(n, sizeof *p);
-	if (!p) {
-		struct error e;
-		error_set(&e, ENOMEM, "out of memory");
-		bench_die(&e);
-	}
-	return p;
+	return bench_alloc(n, sizeof(double));
 }
 
 /* What squared errors are measured by, as in worker/cli/image/compare.h, but for the mean of the reference around each

@@ -6,6 +6,7 @@
 #include "common/base/bytes.h"
 #include "common/base/mem.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/scenes.h"
 #include "tests/bench/subject.h"
 #include "tests/support/memory_assets.h"
 
@@ -23,13 +24,7 @@ struct file {
 
 static struct file room(size_t bytes)
 {
-	struct file f = {mem_alloc(bytes, 1), 0};
-	struct error e;
-	if (!f.bytes) {
-		error_set(&e, ENOMEM, "out of memory");
-		bench_die(&e);
-	}
-	return f;
+	return (struct file){bench_alloc(bytes, 1), 0};
 }
 
 static void put_float(struct file *f, double x)
@@ -95,20 +90,9 @@ static struct file make_small(unsigned count)
 static double load_seconds(const struct memory_file *files, struct world **out)
 {
 	struct asset_source assets = memory_assets(files);
-	struct scene s;
-	struct error e;
-	struct world *w = NULL;
 	double begin = bench_cpu_seconds();
-	int rc = scene_read(&s, &assets, files[0].name, render_plugins(), NULL, 0, &e);
-	if (!rc) {
-		rc = world_new(&w, &s, &assets, NULL, &e);
-		scene_fini(&s);
-	}
-	if (rc)
-		bench_die(&e);
-	double seconds = bench_cpu_seconds() - begin;
-	*out = w;
-	return seconds;
+	*out = bench_world_of(&assets, files[0].name, NULL);
+	return bench_cpu_seconds() - begin;
 }
 
 /* From a file that the system has in memory. */

@@ -3,6 +3,7 @@
 #include "tests/bench/bench.h"
 
 #include "common/base/clock.h"
+#include "common/base/mem.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -92,6 +93,17 @@ void bench_die(const struct error *e)
 {
 	fprintf(stderr, "bench: %s\n", e->text);
 	exit(1);
+}
+
+void *bench_alloc(size_t count, size_t size)
+{
+	struct error e;
+	void *p = mem_alloc(count, size);
+	if (!p) {
+		error_set(&e, ENOMEM, "out of memory");
+		bench_die(&e);
+	}
+	return p;
 }
 
 static const struct {

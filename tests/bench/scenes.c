@@ -22,12 +22,7 @@ struct text {
 
 static void text_new(struct text *t, size_t lines)
 {
-	*t = (struct text){.bytes = mem_alloc(lines, LINE), .room = lines * LINE};
-	if (!t->bytes) {
-		struct error e;
-		error_set(&e, ENOMEM, "out of memory");
-		bench_die(&e);
-	}
+	*t = (struct text){.bytes = bench_alloc(lines, LINE), .room = lines * LINE};
 }
 
 __attribute__((format(printf, 2, 3))) static void text_line(struct text *t, const char *format, ...)
@@ -107,7 +102,7 @@ static struct world *build_with(const struct asset_source *assets, const char *f
 	return w;
 }
 
-static struct world *build(const struct asset_source *assets, const char *file, const struct render_options *o)
+struct world *bench_world_of(const struct asset_source *assets, const char *file, const struct render_options *o)
 {
 	return build_with(assets, file, o, NULL, 0);
 }
@@ -122,7 +117,7 @@ struct world *bench_world_million(void)
 					    {"ball.obj", round.bytes, round.size},
 					    {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
-	struct world *w = build(&assets, "million.xml", NULL);
+	struct world *w = bench_world_of(&assets, "million.xml", NULL);
 	mem_free(floor.bytes);
 	mem_free(round.bytes);
 	return w;
@@ -173,7 +168,7 @@ struct world *bench_world_box(const char **name)
 					      : "the box of tests/scenes (HSLT_SCENES names no cornell-box)";
 	struct asset_source assets = asset_folder(folder);
 	struct render_options small = {.width = 160, .height = 160};
-	return build(&assets, slash + 1, &small);
+	return bench_world_of(&assets, slash + 1, &small);
 }
 
 struct world *bench_world(const char *path, bool shipped, const struct render_options *o)
@@ -188,7 +183,7 @@ struct world *bench_world(const char *path, bool shipped, const struct render_op
 	char *slash = strrchr(folder, '/');
 	*slash = 0;
 	struct asset_source assets = asset_folder(folder);
-	return build(&assets, slash + 1, o);
+	return bench_world_of(&assets, slash + 1, o);
 }
 
 struct world *bench_world_displaced(void)

@@ -19,5 +19,7 @@ const char *bench_box_file(void);
 struct world *bench_world(const char *path, bool shipped, const struct render_options *o);
 /* tests/scenes/displaced with a million triangles. */
 struct world *bench_world_displaced(void);
+/* That file of the assets. o may be NULL. */
+struct world *bench_world_of(const struct asset_source *assets, const char *file, const struct render_options *o);
 
 #endif

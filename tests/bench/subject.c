@@ -21,17 +21,6 @@ struct subject_scene {
 	struct RTCRayHit ray[];
 };
 
-static void *room(size_t count, size_t size)
-{
-	struct error e;
-	void *p = mem_alloc(count, size);
-	if (!p) {
-		error_set(&e, ENOMEM, "out of memory");
-		bench_die(&e);
-	}
-	return p;
-}
-
 static void run_lease(const struct subject *s, const struct lease_key *k, struct batch *b)
 {
 	struct error e;
@@ -107,7 +96,7 @@ void subject_make(struct subject *s, struct world *w, const char *integrator, co
 	if (i->kind == PLAN_CHAINS) {
 		s->plan.chains = CHAINS;
 		s->plan.epoch = 64;
-		s->seeds = room(CHAINS, sizeof *s->seeds);
+		s->seeds = bench_alloc(CHAINS, sizeof *s->seeds);
 		s->in = (struct lease_input){.chain_count = CHAINS, .seeds = s->seeds};
 		make_seeds(s);
 	}
@@ -205,11 +194,11 @@ static struct RTCRayHit raw_from_recorded(const struct recorded_ray *r)
 
 void subject_record(struct subject *s)
 {
-	s->rays = room(RAYS_MAX, sizeof *s->rays);
+	s->rays = bench_alloc(RAYS_MAX, sizeof *s->rays);
 	record_start(s->rays, RAYS_MAX);
 	subject_render(s);
 	s->count = record_stop();
-	s->raw = room(1, sizeof *s->raw + s->count * sizeof s->raw->ray[0]);
+	s->raw = bench_alloc(1, sizeof *s->raw + s->count * sizeof s->raw->ray[0]);
 	make_raw_scene(s->w, s->raw);
 	for (size_t i = 0; i < s->count; i++)
 		s->raw->ray[i] = raw_from_recorded(&s->rays[i]);
@@ -278,7 +267,7 @@ struct small {
 
 static struct small *make_small(void)
 {
-	struct small *s = room(1, sizeof *s);
+	struct small *s = bench_alloc(1, sizeof *s);
 	s->device = new_device();
 	s->scene = new_scene(s->device);
 	static float corner[5][3] = {{-10, -10, 0}, {10, -10, 0}, {10, 10, 0}, {-10, 10, 0}};
