@@ -68,9 +68,18 @@ int image_read(const struct asset_source *assets, const char *name, bool raw, st
 	return r;
 }
 
+enum image_channel image_channel_named(const char *name)
+{
+	static const char letters[] = "rgba";
+	const char *at = name[0] && !name[1] ? strchr(letters, *name) : NULL;
+	return at ? (enum image_channel)(IMAGE_RED + (at - letters)) : IMAGE_ALL;
+}
+
 int image_power(struct image *i, double power, struct error *e)
 {
 	size_t count = (size_t)i->width * i->height * i->channels;
+	if (power == 1)
+		return 0;
 	for (size_t k = 0; k < count; k++) {
 		double x = (double)i->pixels[k], size = fabs(x);
 		if (size > 1 && power * log2(size) >= FLT_MAX_EXP - 1)

@@ -22,6 +22,8 @@ enum image_channel {
 	IMAGE_ALPHA, /* of PNG; 1 if an image has none, -ENOTSUP for formats whose alpha is not read */
 };
 
+/* "r", "g", "b" or "a"; all of each pixel for any other name. */
+enum image_channel image_channel_named(const char *name);
 /* raw: integers are not decoded from sRGB. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the
  * arena holds: -EFBIG, with the file and its size, before it is decoded. */
 int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
@@ -29,7 +31,8 @@ int image_read(const struct asset_source *assets, const char *name, bool raw, st
 /* The same for bytes in memory; name: for messages. */
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
 		 struct arena *arena, struct image *out, struct error *e);
-/* Raises each number to a positive power, negative ones by their size. -ERANGE: one gets too large for a float. */
+/* Raises each number to a positive power (1: nothing changes), negative ones by their size. -ERANGE: one gets too large
+ * for a float. */
 int image_power(struct image *i, double power, struct error *e);
 
 #endif

@@ -44,20 +44,12 @@ static double height_at(const struct field *f, uint32_t x, uint32_t y)
 static int read_picture(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 			struct image *out, struct error *e)
 {
-	static const struct {
-		const char *name;
-		enum image_channel channel;
-	} channels[] = {{"r", IMAGE_RED}, {"g", IMAGE_GREEN}, {"b", IMAGE_BLUE}, {"a", IMAGE_ALPHA}};
 	const struct scene_node *texture = node_child(n, PLUGIN_TEXTURE, 0), *from = texture ? texture : n;
 	if ((texture != NULL) == (node_find(n, "filename") != NULL))
 		return node_error(n, e, EINVAL, "needs either a filename or a bitmap inside");
 	if (texture && strcmp(texture->type, "bitmap") != 0)
 		return node_error(texture, e, ENOTSUP, "the heights of a heightfield come from a bitmap");
-	const char *wanted = node_string(from, "channel", "");
-	enum image_channel channel = IMAGE_ALL;
-	for (size_t i = 0; i < sizeof channels / sizeof *channels; i++)
-		if (strcmp(channels[i].name, wanted) == 0)
-			channel = channels[i].channel;
+	enum image_channel channel = image_channel_named(node_string(from, "channel", "all"));
 	struct asset a;
 	int r = mesh_open(from, assets, &a, e);
 	if (r)
@@ -67,8 +59,8 @@ static int read_picture(const struct scene_node *n, const struct asset_source *a
 	bool raw = node_bool(from, "raw", gamma > 0);
 	r = image_decode(a.bytes, a.size, node_string(from, "filename", ""), raw, channel, arena, out, &inner);
 	assets->close(assets->user, &a);
-	if (!r && raw && gamma > 0 && gamma != 1)
-		r = image_power(out, gamma, &inner);
+	if (!r)
+		r = image_power(out, raw && gamma > 0 ? gamma : 1, &inner);
 	return r ? node_error(from, e, -r, "%s", inner.text) : 0;
 }
 

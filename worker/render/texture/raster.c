@@ -1,15 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/texture/raster.h"
 
-#include <string.h>
-
-static enum image_channel channel_of(const char *name)
-{
-	static const char letters[] = "?rgba";
-	const char *at = name[1] ? NULL : strchr(letters, *name);
-	return at && at > letters ? (enum image_channel)(at - letters) : IMAGE_ALL;
-}
-
 static int decode(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		  const struct picture_key *k, struct arena *arena, struct error *e)
 {
@@ -20,7 +11,7 @@ static int decode(struct raster *r, const struct scene_node *n, const struct ass
 		return code;
 	code = image_decode(part.bytes, part.size, k->name, k->linear, k->channel, arena, &r->image, &reason);
 	asset_part_close(&part, assets);
-	if (!code && k->power != 1)
+	if (!code)
 		code = image_power(&r->image, k->power, &reason);
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
@@ -59,7 +50,7 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 		.byte_count = node_int(n, "byte_count", 0),
 		.base64 = node_bool(n, "base64", false),
 		.linear = gamma > 0 || node_bool(n, "raw", range->raw && gamma != -1),
-		.channel = channel_of(channel),
+		.channel = image_channel_named(channel),
 		.threshold = node_float(n, "threshold", -1),
 		.power = gamma > 0 ? gamma : 1,
 	};
