@@ -140,7 +140,9 @@ bool path_visible(struct path_context *c, const struct path_vertex *a, const str
 
 spectrum path_collapse(spectrum l, bool dispersive)
 {
-	return dispersive ? (spectrum){{SPECTRUM_LANES * l.v[0]}} : l;
+	if (!dispersive)
+		return l;
+	return (spectrum){{SPECTRUM_LANES * l.v[0]}};
 }
 
 static bool disperses(const struct path_context *c, const struct joined_path *p)
