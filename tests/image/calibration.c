@@ -161,6 +161,11 @@ static void run_case(struct calibration *c, const struct calibration_scene *s, c
 	all->held += f.held;
 }
 
+static bool is_asked(const struct calibration *c, size_t k)
+{
+	return !*c->integrator || strcmp(c->integrator, integrators[k].name) == 0;
+}
+
 /* All scenes at one length; returns how many were begun. */
 static int run_length(struct calibration *c, int length)
 {
@@ -175,7 +180,7 @@ static int run_length(struct calibration *c, int length)
 		assert_true(i < SCENES_MOST);
 		make_reference(s, w, lengths[length].reference, c->times, &c->references[i]);
 		for (size_t k = 0; k < INTEGRATORS && !ended; k++)
-			if (!*c->integrator || strcmp(c->integrator, integrators[k].name) == 0)
+			if (is_asked(c, k))
 				run_case(c, s, w, &c->references[i], k, length);
 		world_free(w);
 		scenes++;
@@ -217,6 +222,8 @@ static bool judge(const struct calibration *c, int length)
 {
 	struct figures sum = {0};
 	for (size_t k = 0; k < INTEGRATORS; k++) {
+		if (!is_asked(c, k))
+			continue;
 		struct figures f = judge_integrator(c, k, length);
 		sum.renders += f.renders;
 		sum.stated += f.stated;
@@ -237,6 +244,13 @@ int main(int argc, char **argv)
 	c.scene = argc > 4 ? argv[4] : "";
 	c.times = argc > 5 && atof(argv[5]) > 0 ? atof(argv[5]) : 1;
 	c.integrator = argc > 6 ? argv[6] : "";
+	size_t asked = 0;
+	for (size_t k = 0; k < INTEGRATORS; k++)
+		asked += is_asked(&c, k);
+	if (asked == 0) {
+		fprintf(stderr, "calibration: no integrator is called '%s'\n", c.integrator);
+		return 2;
+	}
 	int scenes[LENGTHS] = {0};
 	signal(SIGTERM, end);
 	printf("| kind | scene | integrator | a pixel | true %% | stated %% | intervals | held | beyond 3 errors %% | CPU s |\n"
