@@ -72,8 +72,8 @@ static const double merged_none = 0.01, merged_seen = 0.4;
 /* A quarter of bdpt's samples is enough if it finds more rare light than this, and a tail without a mean; */
 static const double rare_clear = 0.4;
 /* or if it finds less rare light than rare_none and path little, the extremes of both have a tail index near 1 or
- * above, and no single sample has more than most_clear of the light. In jewel, the rest of bdpt's
- * samples found a third of the light, of which the first quarter had found nothing. */
+ * above, and no single sample has more than most_clear of the light. In jewel, the rest of bdpt's samples found a third
+ * of the light, of which the first quarter had found nothing. */
 static const double rare_none = 0.01, extreme_clear = 0.9, most_clear = 0.05;
 /* path's tail index must reach this. It is 2.0 to 2.8 in cornell-box and veach-mis and more in box, where path wins by
  * 1.2 to 1.4 x. It is 0.9 to 2.1 in rough-caustic, three-spheres, demo, displaced and veach-door, where bdpt wins by up
@@ -88,8 +88,7 @@ static const double bright = 8;
 /* Instead of the tail index, the extreme-value index may show a finite variance: it is then below 0.5 by three quarters
  * of a standard error. So it is for 50 of 64 pilots of effects-glass, where bdpt8 wins and the tail index is 1.0 to 1.2
  * because the contributions have a broad but bounded range; for 6 of 64 of rough-caustic, 3 of demo, 2 of
- * three-spheres.
- */
+ * three-spheres. */
 static const double evi_most = 0.4;
 /* bdpt has the shorter tails, so its error is less than the pilot's second moment says. path must cost less by this
  * factor. */
