@@ -24,7 +24,7 @@ EMBREE   := $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
 WARN     := -Wall -Wextra -Wconversion -Wshadow -Wmissing-prototypes -Wstrict-prototypes -Wvla -Wpointer-arith \
             -Wcast-qual -Wwrite-strings -Wundef -Wformat=2 -Wold-style-definition -Werror
 OPT      ?= $(if $(SAN),-O2,-O3)
-CFLAGS   := -std=c17 $(OPT) -g -ffp-contract=off -fno-fast-math -fno-strict-aliasing -fno-common $(WARN) \
+CFLAGS   := -std=c17 $(OPT) -g -ffp-contract=off -fno-fast-math -fno-math-errno -fno-strict-aliasing -fno-common $(WARN) \
             $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer) $(EXTRA_CFLAGS)
 CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen -MMD -MP
 LDFLAGS  := $(if $(SAN),-fsanitize=$(SAN)) $(EXTRA_LDFLAGS)

@@ -30,16 +30,18 @@ static inline struct fresnel fresnel_dielectric(double c, double eta)
 	return fresnel_between(c, sqrt(t2) / eta, eta);
 }
 
-/* Index eta - i k beyond, relative to the index here. eta = 0, k = 1 is a perfect mirror. */
+/* Index eta - i k beyond, relative to the index here. eta = 0, k = 1 is a perfect mirror. No branches, so that a loop
+ * over wavelengths is vectorised. Nothing overflows: eta and k are at most 1e9. */
 static inline double fresnel_conductor(double c, double eta, double k)
 {
-	double c2 = c * c, s2 = (1 - c) * (1 + c);
-	double t0 = (eta - k) * (eta + k) - s2, n2 = hypot(t0, 2 * eta * k);
-	double t1 = n2 + c2, t2 = 2 * c * sqrt(fmax(0, 0.5 * (n2 + t0)));
-	double t3 = c2 * n2 + s2 * s2, t4 = t2 * s2;
-	double rs = t1 + t2 > 0 ? (t1 - t2) / (t1 + t2) : 1;
-	double rp = t3 + t4 > 0 ? rs * (t3 - t4) / (t3 + t4) : rs;
-	return 0.5 * (rs + rp);
+	double c2 = c * c, s2 = (1 - c) * (1 + c), ek = 2 * eta * k;
+	double t0 = (eta - k) * (eta + k) - s2, n2 = sqrt(t0 * t0 + ek * ek), half = 0.5 * (n2 + t0);
+	double t1 = n2 + c2, t2 = 2 * c * sqrt(half > 0 ? half : 0);
+	double t3 = c2 * n2 + s2 * s2, t4 = t2 * s2, s = t1 + t2, p = t3 + t4;
+	double rs = (s > 0 ? t1 - t2 : 1) / (s > 0 ? s : 1);
+	double rp = rs * ((p > 0 ? t3 - t4 : 1) / (p > 0 ? p : 1));
+	double r = 0.5 * (rs + rp);
+	return r > 0 ? r : 0; /* rounding, where both sides are alike */
 }
 
 #endif

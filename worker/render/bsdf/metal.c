@@ -35,6 +35,7 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 		m->eta = (struct color){.shape = COLOR_SHAPE_OTHER,
 					.scale = 1,
 					.count = METAL_ROWS,
+					.per_nm = (METAL_ROWS - 1) / (room[METAL_ROWS - 1] - room[0]),
 					.nm = room,
 					.value = room + METAL_ROWS};
 		m->k = m->eta;
@@ -80,22 +81,14 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 	return 0;
 }
 
-static inline spectrum fresnel_lanes(double cosine, spectrum eta, spectrum k, int lanes)
-{
-	spectrum f = spectrum_of(0);
-	for (int i = 0; i < lanes; i++)
-		f.v[i] = fresnel_conductor(cosine, eta.v[i], k.v[i]);
-	return f;
-}
-
 spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine)
 {
-	spectrum r = texture_eval(&m->reflectance, &p->where, p->w);
+	spectrum r = texture_eval(&m->reflectance, &p->where, p->w), index[2], f;
 	if (m->perfect)
 		return r;
-	spectrum eta = color_eval(&m->eta, p->w), k = color_eval(&m->k, p->w);
-	double c = fmin(fmax(cosine, 0), 1);
-	if (p->w->few)
-		return spectrum_mul(r, spectrum_repeat(fresnel_lanes(c, eta, k, (int)p->w->few), (int)p->w->few));
-	return spectrum_mul(r, fresnel_lanes(c, eta, k, SPECTRUM_LANES));
+	color_eval_both(&m->eta, &m->k, p->w, index);
+	double c = !(cosine > 0) ? 0 : cosine < 1 ? cosine : 1;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		f.v[i] = fresnel_conductor(c, index[0].v[i], index[1].v[i]);
+	return spectrum_mul(r, f);
 }

@@ -249,6 +249,8 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 	if (!(distance2 > 0))
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(to_light), y->to_prev));
+	if (spectrum_is_zero(l)) /* the other side of an opaque surface, most often */
+		return l;
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
 	l = spectrum_scale(geometry_term(z->x.ng, y->x.ng, to_light, distance2), l);
 	if (spectrum_is_zero(l) || !is_made(c, s + t - 1, &l) || !path_visible(c, z, y))

@@ -177,6 +177,7 @@ static int color_from_table(const struct value *v, enum color_role role, struct 
 	*out = (struct color){.shape = COLOR_SHAPE_OTHER,
 			      .scale = 1,
 			      .count = n,
+			      .per_nm = (n - 1) / (copy[n - 1] - copy[0]),
 			      .nm = copy,
 			      .value = copy + n,
 			      .zero_outside = role == COLOR_ILLUMINANT};
@@ -215,34 +216,46 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 	return 0;
 }
 
-/* The cell of nm in the table. Most tables are equidistant, so the first guess is right. */
-static uint32_t piece_of(const struct color *c, double nm)
+/* The table is linear from sample i to i + 1; nm is at `part` of the way. */
+struct piece {
+	uint32_t i;
+	double part;
+};
+
+/* Beyond the ends, the end. Most tables are equidistant, so the first guess is right. */
+static struct piece piece_of(const struct color *c, double nm)
 {
+	const double *at = c->nm;
 	uint32_t last = c->count - 2, low = 0, high = c->count - 1;
-	double guess = (nm - c->nm[0]) / (c->nm[high] - c->nm[0]) * (double)high;
+	if (!(nm > at[0]))
+		return (struct piece){0, 0};
+	if (!(nm < at[high]))
+		return (struct piece){last, 1};
+	double guess = (nm - at[0]) * c->per_nm;
 	uint32_t g = guess >= (double)last ? last : (uint32_t)guess;
-	if (c->nm[g] <= nm && nm <= c->nm[g + 1])
-		return g;
-	while (high - low > 1) {
-		uint32_t middle = low + (high - low) / 2;
-		if (nm < c->nm[middle])
-			high = middle;
-		else
-			low = middle;
+	if (!(at[g] <= nm && nm <= at[g + 1])) {
+		while (high - low > 1) {
+			uint32_t middle = low + (high - low) / 2;
+			if (nm < at[middle])
+				high = middle;
+			else
+				low = middle;
+		}
+		g = low;
 	}
-	return low;
+	return (struct piece){g, (nm - at[g]) / (at[g + 1] - at[g])};
+}
+
+static double piece_value(const struct color *c, struct piece p)
+{
+	return (1 - p.part) * c->value[p.i] + p.part * c->value[p.i + 1];
 }
 
 static double table_value(const struct color *c, double nm)
 {
-	uint32_t last = c->count - 1;
-	if (nm < c->nm[0])
-		return c->zero_outside ? 0 : c->value[0];
-	if (nm > c->nm[last])
-		return c->zero_outside ? 0 : c->value[last];
-	uint32_t i = piece_of(c, nm);
-	double b = (nm - c->nm[i]) / (c->nm[i + 1] - c->nm[i]);
-	return (1 - b) * c->value[i] + b * c->value[i + 1];
+	if (c->zero_outside && (nm < c->nm[0] || nm > c->nm[c->count - 1]))
+		return 0;
+	return piece_value(c, piece_of(c, nm));
 }
 
 static inline spectrum eval_lanes(const struct color *c, const struct wavelengths *w, int lanes)
@@ -272,6 +285,26 @@ spectrum color_eval(const struct color *c, const struct wavelengths *w)
 	if (w->few)
 		return spectrum_repeat(eval_lanes(c, w, (int)w->few), (int)w->few);
 	return eval_lanes(c, w, SPECTRUM_LANES);
+}
+
+void color_eval_both(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2])
+{
+	if (!a->count || a->nm != b->nm || a->zero_outside || WAVELENGTHS_GREY(w)) {
+		out[0] = color_eval(a, w);
+		out[1] = color_eval(b, w);
+		return;
+	}
+	for (unsigned i = 0; i < SPECTRUM_LANES; i++) {
+		unsigned same = w->few ? i % w->few : i;
+		if (same < i) {
+			out[0].v[i] = out[0].v[same];
+			out[1].v[i] = out[1].v[same];
+			continue;
+		}
+		struct piece p = piece_of(a, w->nm[i]);
+		out[0].v[i] = a->scale * piece_value(a, p);
+		out[1].v[i] = b->scale * piece_value(b, p);
+	}
 }
 
 /* The polynomial's maximum: at an end of the range, or at its vertex. */

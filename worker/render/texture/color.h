@@ -31,6 +31,7 @@ struct color {
 	double coefficient[3];
 	uint32_t count; /* > 0: piecewise linear table instead; extended by 0 for emitters and by the end values
 			   otherwise */
+	double per_nm;	/* pieces, on average */
 	const double *nm, *value; /* in the arena */
 	bool zero_outside;
 };
@@ -41,6 +42,8 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 int color_from_rgb(const double rgb[3], enum color_role role, struct color *out);
 struct color color_constant(double x);
 spectrum color_eval(const struct color *c, const struct wavelengths *w);
+/* color_eval of both; one search where their tables have the same wavelengths, such as those of a metal's n and k. */
+void color_eval_both(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2]);
 double color_max(const struct color *c);  /* upper bound over wavelengths */
 double color_mean(const struct color *c); /* averaged over wavelengths as they are drawn, to choose among emitters */
 

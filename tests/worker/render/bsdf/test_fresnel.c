@@ -40,10 +40,27 @@ static void test_dielectrics_are_conductors_that_absorb_nothing(void **state)
 			    1e-12);
 }
 
+/* A mirror, nothing at all, and the largest numbers that scenes may give. */
+static void test_conductors_at_the_ends(void **state)
+{
+	(void)state;
+	const double ends[][3] = {{0, 1, 1},   {1, 0, 0},   {0, 0, 1},		 {1e9, 1e9, 1},
+				  {0, 1e9, 1}, {1e9, 0, 1}, {1e-200, 1e-200, 1}, {1e-9, 1e9, 1}};
+	for (size_t i = 0; i < sizeof ends / sizeof *ends; i++)
+		for (int j = 0; j <= 100; j++) {
+			double c = j / 100.0, r = fresnel_conductor(c, ends[i][0], ends[i][1]);
+			assert_true(r >= 0 && r <= 1);
+			if (j > 0 && j < 100)
+				assert_true(fabs(r - ends[i][2]) < 1e-6);
+		}
+	assert_true(fresnel_conductor(0, 0.36, 2.5) == 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_conductors),
+		cmocka_unit_test(test_conductors_at_the_ends),
 		cmocka_unit_test(test_dielectrics_are_conductors_that_absorb_nothing),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

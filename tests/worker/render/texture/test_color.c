@@ -302,6 +302,48 @@ static void test_tables(void **state)
 	arena_fini(&arena);
 }
 
+/* A search through the table that leaves nothing out. */
+static double by_search(const double *nm, const double *x, uint32_t n, double at)
+{
+	if (at <= nm[0])
+		return x[0];
+	for (uint32_t i = 1; i < n; i++)
+		if (at <= nm[i])
+			return x[i - 1] + (x[i] - x[i - 1]) * ((at - nm[i - 1]) / (nm[i] - nm[i - 1]));
+	return x[n - 1];
+}
+
+/* Equidistant tables, one with gaps of all sizes, and one whose samples nearly coincide. */
+static void test_two_tables_at_once(void **state)
+{
+	(void)state;
+	const double even[] = {350, 450, 550, 650, 750, 850}, uneven[] = {390, 391, 500, 500.5, 612, 820},
+		     close[] = {500, 500 + 1e-13, 501, 502, 503, 504};
+	const double *nm[] = {even, uneven, close}, x[] = {0.1, 0.3, 0.2, 0.8, 0, 1}, y[] = {3, 0, 7, 2, 2, 5};
+	struct arena arena = {0};
+	struct error e;
+	for (int k = 0; k < 3; k++)
+		for (unsigned few = 0; few <= 2; few++)
+			for (double u = 0; u < 1; u += 1.0 / 512) {
+				struct value va = table_of(nm[k], x, 6), vb = table_of(nm[k], y, 6);
+				struct color a, b;
+				assert_int_equal(color_from_value(&va, COLOR_UNBOUNDED, &arena, &a, &e), 0);
+				assert_int_equal(color_from_value(&vb, COLOR_UNBOUNDED, &arena, &b, &e), 0);
+				a.scale = 0.5;
+				b.nm = u < 0.5 ? a.nm : b.nm; /* as metals have them */
+				struct wavelengths w = wavelengths_sample_few(u, few ? few : SPECTRUM_LANES);
+				spectrum out[2], sa = color_eval(&a, &w), sb = color_eval(&b, &w);
+				color_eval_both(&a, &b, &w, out);
+				for (int i = 0; i < SPECTRUM_LANES; i++) {
+					assert_true(fabs(sa.v[i] - 0.5 * by_search(nm[k], x, 6, w.nm[i])) < 1e-12);
+					assert_true(fabs(sb.v[i] - by_search(nm[k], y, 6, w.nm[i])) < 1e-11);
+				}
+				assert_memory_equal(&out[0], &sa, sizeof sa);
+				assert_memory_equal(&out[1], &sb, sizeof sb);
+			}
+	arena_fini(&arena);
+}
+
 static void test_bad_values_are_refused(void **state)
 {
 	(void)state;
@@ -340,6 +382,7 @@ int main(void)
 		cmocka_unit_test(test_bounds_hold),
 		cmocka_unit_test(test_few_wavelengths),
 		cmocka_unit_test(test_tables),
+		cmocka_unit_test(test_two_tables_at_once),
 		cmocka_unit_test(test_bad_values_are_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
