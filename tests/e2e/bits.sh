@@ -10,6 +10,7 @@ options_of() {
 	bdpt) echo "--integrator bdpt --spp 4" ;;
 	bdpt8) echo "--integrator bdpt8 --spp 16" ;;
 	erpt) echo "--integrator erpt --spp 8" ;;
+	erpt4) echo "--integrator erpt4 --spp 8" ;;
 	pssmlt) echo "--integrator pssmlt --bootstrap 20000 --mutations 60000" ;;
 	hslt) echo "--integrator hslt --mutations hslt=0.9,independent=0.1 --bootstrap 20000 --mutations 60000" ;;
 	settings) echo "--integrator hslt --bootstrap 5000 --mutations 20000 --set roughness=0.1,wavelengths=2 --set precision=single,tolerance=0.0001" ;;
@@ -18,7 +19,7 @@ options_of() {
 	esac
 }
 
-KINDS="path bdpt bdpt8 erpt pssmlt auto"
+KINDS="path bdpt bdpt8 erpt erpt4 pssmlt auto"
 if "$BIN/hslt-render" --help | grep -q 'integrator=NAME.* hslt'; then
 	KINDS="$KINDS hslt settings"
 fi

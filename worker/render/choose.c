@@ -75,24 +75,24 @@ static const double rare_clear = 0.4;
  * above, and no single sample has more than most_clear of the light. In jewel, the rest of bdpt's samples found a third
  * of the light, of which the first quarter had found nothing. */
 static const double rare_none = 0.01, extreme_clear = 0.9, most_clear = 0.05;
-/* path's tail index must reach this. It is 2.0 to 2.8 in cornell-box and veach-mis and more in box, where path wins by
- * 1.2 to 1.4 x. It is 0.9 to 2.1 in rough-caustic, three-spheres, demo, displaced and veach-door, where bdpt wins by up
- * to 2.1 x (6 x with fireflies). */
+/* The tail index of path from which its variance is taken to be finite. It is 2.0 to 2.8 in cornell-box and veach-mis
+ * and more in box, where path wins by 1.1 to 2.4 x. It is 0.9 to 2.1 in rough-caustic, three-spheres, demo, displaced
+ * and veach-door, where path loses. */
 static const double tail_least = 2.1;
-/* And no sample of path may have more than this share of the light. It is at most 0.01 in cornell-box, box and
+/* For path itself, no sample may have more than this share of the light. It is at most 0.01 in cornell-box, box and
  * effects-glass, and 0.1 in the median pilot of pool, where the other samples show no sign of rare light. */
 static const double most_tame = 0.03;
 /* Mean of the samples of a pixel, relative to the map, above which the pixel is brighter than the map says. Smaller
  * values only mean that the map is coarse. */
 static const double bright = 8;
-/* Instead of the tail index, the extreme-value index may show a finite variance: it is then below 0.5 by three quarters
- * of a standard error. So it is for 50 of 64 pilots of effects-glass, where bdpt8 wins and the tail index is 1.0 to 1.2
- * because the contributions have a broad but bounded range; for 6 of 64 of rough-caustic, 3 of demo, 2 of
- * three-spheres. */
-static const double evi_most = 0.4;
-/* bdpt has the shorter tails, so its error is less than the pilot's second moment says. path must cost less by this
- * factor. */
-static const double path_cost = 0.75;
+/* Instead of the tail index, the extreme-value index may show a finite variance: it is then below 0.5. It is 0.2 to 0.6
+ * in effects-glass, where the tail index is 1.0 to 1.3 because the contributions have a broad but bounded range, and
+ * where erpt4 needs 0.7 of the time of erpt. */
+static const double evi_most = 0.5;
+/* The second moment of path times its rays, over that of bdpt, must be less than this. It is 0.68 to 0.95 in
+ * cornell-box and 0.5 to 0.9 in veach-mis, where path and erpt4 win, 2.1 or more in glossy-room, where erpt4 needs 1.8
+ * times the time of erpt. */
+static const double path_cost = 0.9;
 
 /* ---- contributions of samples */
 
@@ -213,7 +213,7 @@ static bool has_no_fireflies(const struct render_found *path)
 	return is_tame(path) && path->most <= most_tame;
 }
 
-/* Too much light is rare for path, and for bdpt8. */
+/* Too much light is rare for path, and for erpt4. */
 static bool has_rare_light(const struct render_choice *c)
 {
 	return c->bdpt.rare > rare_some || (c->path.rare > rare_some && c->bdpt.extreme < lucky_extreme);
@@ -223,10 +223,10 @@ const char *render_choice_of(const struct render_choice *c)
 {
 	if (wants_chains(c))
 		return RENDER_INTEGRATOR_CHAINS;
-	if (render_choice_is_settled(c) || c->misses || has_rare_light(c) || !has_no_fireflies(&c->path) ||
+	if (render_choice_is_settled(c) || c->misses || has_rare_light(c) || !is_tame(&c->path) ||
 	    !(c->path.cost < path_cost * c->bdpt.cost))
 		return "erpt";
-	return c->path.tail >= tail_least && !c->focuses ? "path" : "bdpt8";
+	return has_no_fireflies(&c->path) && c->path.tail >= tail_least && !c->focuses ? "path" : "erpt4";
 }
 
 /* ---- the pilot */
@@ -514,9 +514,9 @@ static const char *reason(const char *integrator, const struct render_choice *c)
 					     "chains stay with those that they find";
 	if (strcmp(integrator, "path") == 0)
 		return "paths from the camera find the light evenly, and no surface focuses it";
-	if (strcmp(integrator, "bdpt8") == 0)
-		return "paths from the camera find the light evenly; as some surfaces may focus it, one sample in eight "
-		       "starts at the lamps, too, which keeps out most fireflies";
+	if (strcmp(integrator, "erpt4") == 0)
+		return "paths from the camera find the light evenly; as some may be bright nevertheless, one sample in "
+		       "four starts at the lamps, too, and what is too bright for a sample is spread by short chains";
 	if (c->misses)
 		return "paths from the camera cannot find all light, such as that of a point light through glass";
 	return has_no_fireflies(&c->path)

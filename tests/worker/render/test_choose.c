@@ -115,7 +115,7 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 }
 
 /* Wide lobes and a large lamp: a broad range of contributions that has an end. */
-static void light_with_an_end_to_its_tail_is_given_to_bdpt8(void **state)
+static void light_with_an_end_to_its_tail_is_given_to_erpt4(void **state)
 {
 	(void)state;
 	struct world *w = world_of_own_scene("../bench/scenes", "effects-glass.xml", 160, 90);
@@ -125,7 +125,7 @@ static void light_with_an_end_to_its_tail_is_given_to_bdpt8(void **state)
 		struct render_choice c;
 		choose(w, seed, SPP, &r, &c);
 		assert_true(c.path.tail < 2);
-		times += strcmp(r.integrator, "bdpt8") == 0;
+		times += strcmp(r.integrator, "erpt4") == 0;
 	}
 	assert_true(times >= SEEDS / 2); /* 78 % of other seeds */
 	world_free(w);
@@ -285,7 +285,7 @@ static void the_reason_is_a_sentence_without_figures(void **state)
 		const char *says;
 	} of[] = {
 		{"path", {.path = {1, 0, 4, 4, 0, 0}}, "find the light evenly, and no surface focuses it"},
-		{"bdpt8", {.path = {1, 0, 4, 4, 0, 0}, .focuses = true}, "one sample in eight starts at the lamps"},
+		{"erpt4", {.path = {1, 0, 4, 4, 0, 0}, .focuses = true}, "one sample in four starts at the lamps"},
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}}, "less noise in the same time"},
 		{"erpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .settled = true}, "leave fireflies"},
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "cannot find all light"},
@@ -354,10 +354,10 @@ static void the_rule(void **state)
 		bool settled;
 	} cases[] = {
 		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
-		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FOCUSES, "bdpt8", false}, /* what it throws may be rare */
+		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FOCUSES, "erpt4", false}, /* what it throws may be rare */
 		{{1, 0, 2.2, 2.2, 1, 0.02}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
-		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt", false}, /* a firefly among the few */
-		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FOCUSES, "erpt", false},
+		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt4", false}, /* a firefly among the few */
+		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FOCUSES, "erpt4", false},
 		{{1.9, 0, 3, 3, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt", false},  /* not much better, and less sure */
 		{{1, 0, 1.9, 1.5, 1, 0}, {0, 0, 1, 1, 1, 0}, FLAT, "erpt", true}, /* better but for its tail */
 		{{1, 0, 1.9, 1.5, 1, 0.5}, {0, 0, 1, 1, 1, 0}, FLAT, "erpt", true},
@@ -369,7 +369,7 @@ static void the_rule(void **state)
 		 false}, /* bdpt finds what path does not */
 		{{1, 0, 4, 4, 1, 0}, {2, 0.9, 0.5, 0.5, 1, 0}, FOCUSES, "erpt", false},	     /* path does not meet it */
 		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 2, 0.6, 1, 0}, FOCUSES, "erpt", false}, /* by luck one of them */
-		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 1, 1.05, 1, 0}, FOCUSES, "bdpt8", false}, /* with an end to them */
+		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 1, 1.05, 1, 0}, FOCUSES, "erpt4", false}, /* with an end to them */
 		{{1, 0.5, 1.1, 1.1, 1, 0}, {2, 0.25, 1.4, 1.8, 1, 0}, FOCUSES, "erpt", false}, /* rare to path alone */
 		{{1, 0.35, 1.4, 1.7, 1, 0}, {5, 0.3, 1.26, 1.95, 1, 0}, FOCUSES, "erpt", false}, /* but it has a mean */
 		{{1, 0.35, 1.4, 0.7, 1, 0}, {5, 0.3, 1.24, 1.95, 1, 0}, FOCUSES, "hslt", false}, /* not for sure */
@@ -395,11 +395,11 @@ static void the_rule(void **state)
 		 FOCUSES,
 		 "erpt",
 		 false},								   /* nearly all is there */
-		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FOCUSES, "bdpt8", false}, /* a range with an end */
-		{{1, 0, 2, 4, 0.3, 0}, {2, 0, 3, 3, 0.1, 0}, FLAT, "bdpt8", false},	   /* never path by that */
-		{{1, 0, 1.1, 1.9, 0.5, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", true},
-		{{1.6, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt", false},
-		{{1, 0, 0.9, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "bdpt8", false},
+		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FOCUSES, "erpt4", false}, /* a range with an end */
+		{{1, 0, 2, 4, 0.3, 0}, {2, 0, 3, 3, 0.1, 0}, FLAT, "erpt4", false},	   /* never path by that */
+		{{1, 0, 1.1, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", true},
+		{{1.85, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt", false},
+		{{1, 0, 0.9, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt4", false},
 		{{1, 0, 2.2, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "path", false}, /* one of the two is enough */
 		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, MISSES, "erpt", false},
 		{{0, 0, 1, 1, 1, 0}, {0, 0, 1, 1, 1, 0}, MISSES, "hslt", false},
@@ -428,7 +428,7 @@ static void light_that_is_rare_by_merging_needs_chains(void **state)
 	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true};
 	for (int i = 0; i < 2; i++) {
 		c.merged.share = 0.008;
-		assert_string_equal(render_choice_of(&c), i ? "erpt" : "bdpt8");
+		assert_string_equal(render_choice_of(&c), i ? "erpt" : "erpt4");
 		assert_int_equal(render_choice_is_settled(&c), i);
 		c.merged.share = 0.05;
 		assert_string_equal(render_choice_of(&c), "erpt");
@@ -555,7 +555,7 @@ int main(void)
 		cmocka_unit_test(an_open_room_needs_no_chains),
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),
 		cmocka_unit_test(a_small_lamp_in_a_mirror_is_not_rare_light),
-		cmocka_unit_test(light_with_an_end_to_its_tail_is_given_to_bdpt8),
+		cmocka_unit_test(light_with_an_end_to_its_tail_is_given_to_erpt4),
 		cmocka_unit_test(a_lamp_behind_glass_that_path_never_hits_needs_chains),
 		cmocka_unit_test(light_that_path_never_finds_may_be_easy_for_bdpt),
 		cmocka_unit_test(light_that_no_sample_meets_is_known_by_merging),

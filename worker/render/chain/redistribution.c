@@ -61,6 +61,8 @@ static void weigh(struct redistribution *r, struct spread_place *at)
 	if (!is_scattered(x))
 		return;
 	full_path_log_techniques(&r->context, x, log_pdf);
+	for (unsigned j = 2; j <= x->edges && r->context.light_every > 1; j++)
+		log_pdf[j] -= log(r->context.light_every);
 	double u = at->scale * exp(full_path_log_f(&r->context, x) - log_sum_exp(log_pdf, x->edges + 1));
 	if (isgreater(u, r->rule.threshold))
 		at->share = 1 - r->rule.threshold / u;
@@ -145,6 +147,7 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 {
 	struct redistribution *r = (struct redistribution *)(void *)split;
 	struct spread_place *x = &r->start;
+	r->context.light_every = c->light_every;
 	double intensity = path_intensity(c, l), relative = intensity * brightness_scale(r->map, film[0], film[1]);
 	if (!isgreater(relative, r->rule.threshold) || !isfinite(relative) ||
 	    !full_path_from_subpaths(c, s, s + t - 1, &x->place.path))

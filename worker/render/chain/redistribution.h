@@ -4,7 +4,8 @@
  * (Cline, Talbot and Egbert 2005, Energy Redistribution Path Tracing; which paths it pays for, by what all techniques
  * together make of them: Bitterli and Jarosz 2019, Selectively Metropolised Monte Carlo Light Transport Simulation).
  *
- * Every path x has C(x) = I(x) / sum of the densities of all techniques of bdpt, I = X+Y+Z of its contribution, and
+ * Every path x has C(x) = I(x) / sum of the densities of all techniques of bdpt (of those that need a light sub-path
+ * over light_every, if only one sample in so many has one), I = X+Y+Z of its contribution, and
  * u(x) = w C(x), with 1/w the brightness of its place on the film (path/brightness.h). Of its contribution the film
  * gets the share a(x) = min(1, T / u(x)), a function of the path alone. The rest is the weight of a chain that begins
  * at x, has the target h = w (1 - a) I and only local mutations, which leave h invariant. As x comes with density

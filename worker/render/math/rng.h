@@ -25,6 +25,7 @@ enum rng_stream {
 	RNG_ERPT = 12,
 	RNG_REDISTRIBUTION = 13,
 	RNG_BRIGHTNESS = 14,
+	RNG_ERPT4 = 15,
 };
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */

@@ -12,7 +12,7 @@
 #include "worker/render/path/connect.h"
 #include "worker/render/path/integrator.h"
 
-enum { RARELY = 8 };
+enum { SELDOM = 4, RARELY = 8 };
 
 /* Of the light that the camera sub-path finds alone. In closed rooms 0.1 saves a quarter of the time and adds 1 % to
  * the relMSE, 0.3 hardly saves more and adds 5 %; elsewhere neither changes anything (README of tests/bench). */
@@ -94,6 +94,12 @@ static void trace(struct path_context *c, struct sampler *s, struct path_sample 
 void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	c->light_every = 1;
+	trace(c, s, out);
+}
+
+void path_trace_one_in_four_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	c->light_every = SELDOM;
 	trace(c, s, out);
 }
 

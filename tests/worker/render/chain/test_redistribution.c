@@ -56,6 +56,7 @@ static struct world *lamp_over_ground(void)
 /* A render of samples anywhere on the film. */
 struct trial {
 	const struct world *w;
+	path_tracer *trace;
 	struct plan plan;
 	struct path_context context;
 	struct path_sample sample;
@@ -71,6 +72,7 @@ static void trial_begin(struct trial *t, const struct world *w, const struct red
 	struct error e;
 	memset(t, 0, sizeof *t);
 	t->w = w;
+	t->trace = path_trace_both_ways;
 	t->plan = (struct plan){.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	t->context = (struct path_context){.w = w,
 					   .window = film_window_of(&t->plan),
@@ -101,7 +103,7 @@ static void evaluate(struct trial *t, uint64_t seed, uint64_t index, struct path
 	struct sampler_random s;
 	sampler_random_init(&s, seed, RNG_ERPT, index, 0);
 	t->context.split = split;
-	path_trace_both_ways(&t->context, &s.base, &t->sample);
+	t->trace(&t->context, &s.base, &t->sample);
 	for (uint32_t k = 0; k < t->sample.count; k++)
 		film_sums_splat(film, &t->sample.splats[k], 1.0 / (SIDE * SIDE));
 }
@@ -135,8 +137,8 @@ static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGRE
 }
 
 /* By group and cell 1 + the difference of the two images over bdpt's mean there. Returns mutations a sample. */
-static double compare(const char *test, const struct world *w, const struct redistribution_rule *rule, uint64_t spp,
-		      struct agree_image *out)
+static double compare(const char *test, const struct world *w, path_tracer *trace,
+		      const struct redistribution_rule *rule, uint64_t spp, struct agree_image *out)
 {
 	static struct trial t;
 	double mutations = 0, unspread[GROUPS][AGREE_CELLS + 1], all[AGREE_CELLS + 1] = {0};
@@ -145,6 +147,7 @@ static double compare(const char *test, const struct world *w, const struct redi
 	for (uint32_t g = 0; g < GROUPS; g++) {
 		uint64_t seed = stats_seed(test) + g;
 		trial_begin(&t, w, rule, seed);
+		t.trace = trace;
 		for (uint64_t i = 0; i < spp * SIDE * SIDE; i++) {
 			trial_sample(&t, seed, i);
 			unspread_sample(&t, seed, i);
@@ -169,7 +172,7 @@ static void all_light_by_chains_is_the_same_image(void **state)
 	(void)state;
 	const struct redistribution_rule all = {.threshold = 1e-6, .mutations = 8, .length = 2};
 	struct world *w = lamp_over_ground();
-	assert_true(compare(__func__, w, &all, 16, &image) > 1);
+	assert_true(compare(__func__, w, path_trace_both_ways, &all, 16, &image) > 1);
 	agree_expect(__func__, &image, 1);
 	world_free(w);
 }
@@ -180,8 +183,47 @@ static void some_light_by_chains_is_the_same_image(void **state)
 	(void)state;
 	const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
 	struct world *w = room_of_balls();
-	assert_true(compare(__func__, w, &some, 8, &image) > 1);
+	assert_true(compare(__func__, w, path_trace_both_ways, &some, 8, &image) > 1);
 	agree_expect(__func__, &image, 1);
+	world_free(w);
+}
+
+/* What needs a light sub-path counts four times: more of it is above the threshold. */
+static void a_light_sub_path_in_one_of_four_samples_is_the_same_image(void **state)
+{
+	(void)state;
+	const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
+	struct world *w = room_of_balls();
+	assert_true(compare(__func__, w, path_trace_one_in_four_both_ways, &some, 12, &image) > 1);
+	agree_expect(__func__, &image, 1);
+	world_free(w);
+}
+
+/* Without roulette, what a light sub-path brings to the film is at most T times as bright as its place, to rounding,
+ * however seldom there is one. */
+static void no_splat_is_brighter_than_the_threshold(void **state)
+{
+	(void)state;
+	const struct redistribution_rule rule = {.threshold = 0.5, .mutations = 1, .length = 1};
+	static struct trial t;
+	struct world *w = room_of_balls();
+	for (int seldom = 0; seldom < 2; seldom++) {
+		double most = 0;
+		trial_begin(&t, w, &rule, stats_seed(__func__));
+		t.trace = seldom ? path_trace_one_in_four_both_ways : path_trace_both_ways;
+		t.context.roulette = 0;
+		for (uint64_t i = 0; i < 4096; i++) {
+			trial_sample(&t, stats_seed(__func__), i);
+			for (uint32_t k = 1; k < t.sample.count; k++) {
+				const struct splat *s = &t.sample.splats[k];
+				most = fmax(most,
+					    (s->xyz[0] + s->xyz[1] + s->xyz[2]) * brightness_scale(&t.map, s->x, s->y));
+			}
+		}
+		print_message("%s: %.9f\n", seldom ? "one in four" : "each", most);
+		assert_true(fabs(most - 0.5) < 1e-6);
+		trial_end(&t);
+	}
 	world_free(w);
 }
 
@@ -247,6 +289,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(all_light_by_chains_is_the_same_image),
 		cmocka_unit_test(some_light_by_chains_is_the_same_image),
+		cmocka_unit_test(a_light_sub_path_in_one_of_four_samples_is_the_same_image),
+		cmocka_unit_test(no_splat_is_brighter_than_the_threshold),
 		cmocka_unit_test(the_brightest_begin_no_more_than_so_many_chains),
 		cmocka_unit_test(nothing_is_lost_of_the_sum),
 		cmocka_unit_test(what_is_seen_directly_is_not_spread),

@@ -30,7 +30,7 @@ static void check_all(const char *name, struct world *w, uint64_t path_spp, uint
 		uint64_t spp = r->kind == PLAN_SAMPLES ? bdpt_spp : r->has_mutations ? single_spp : chain_spp;
 		if (strcmp(r->name, "bdpt8") == 0)
 			spp = rare_spp;
-		if (strcmp(r->name, "erpt") == 0)
+		if (strncmp(r->name, "erpt", 4) == 0)
 			spp = spp * 9 / 4; /* a chain brings its light in one piece */
 		if (strcmp(r->name, "path") == 0 || spp == 0)
 			continue;
