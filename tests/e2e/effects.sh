@@ -24,7 +24,7 @@ python3 - "$DIR/explained.json" "$DIR/stats.json" <<-'END' || fail "$(cat "$DIR/
 	for name in sys.argv[1:]:
 	    o = json.load(open(name))
 	    c = o["choice"]
-	    assert o["integrator"] == "path" and c["considered"] == ["path", "erpt4", "erpt", "hslt"] and c["why"].startswith("path, by a pilot:"), c
+	    assert o["integrator"] == "path" and c["considered"] == ["path", "bdpt8", "erpt4", "erpt", "hslt"] and c["why"].startswith("path, by a pilot:"), c
 	    assert c["pilotSamples"] >= 8192 and not c["pathMissesLight"] and not c["surfacesFocusLight"], c
 	    assert 0 < c["path"]["largestShare"] < 0.03, c
 	    assert c["path"]["tailIndex"] > 2.1 and 0 < c["path"]["secondMomentTimesRays"] < 0.75 * c["bdpt"]["secondMomentTimesRays"], c

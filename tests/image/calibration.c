@@ -26,14 +26,14 @@
 
 #include <cmocka.h>
 
-enum { SIZE = 16, VALUES = SIZE * SIZE * 3, PARTS = 4, INTEGRATORS = 6, LENGTHS = 3, PILOT_SPP = 64 };
+enum { SIZE = 16, VALUES = SIZE * SIZE * 3, PARTS = 4, INTEGRATORS = 7, LENGTHS = 3, PILOT_SPP = 64 };
 enum { KINDS = 3, SCENES_MOST = 32 };
 
 static const struct {
 	const char *name;
 	uint64_t spp; /* samples or mutations a pixel of the shortest renders */
-} integrators[INTEGRATORS] = {{"path", 128}, {"bdpt8", 128},  {"bdpt", 64},
-			      {"erpt", 64},  {"pssmlt", 128}, {"hslt", 128}};
+} integrators[INTEGRATORS] = {{"path", 128}, {"bdpt8", 128},  {"bdpt", 64}, {"erpt", 64},
+			      {"erpt4", 96}, {"pssmlt", 128}, {"hslt", 128}};
 /* times: its samples over those of the shortest; reference: the part of a scene's seconds that its reference takes. */
 static const struct {
 	uint64_t times;

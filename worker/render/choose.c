@@ -79,7 +79,7 @@ static const double rare_none = 0.01, extreme_clear = 0.9, most_clear = 0.05;
  * and more in box, where path wins by 1.1 to 2.4 x. It is 0.9 to 2.1 in rough-caustic, three-spheres, demo, displaced
  * and veach-door, where path loses. */
 static const double tail_least = 2.1;
-/* For path itself, no sample may have more than this share of the light. It is at most 0.01 in cornell-box, box and
+/* For path and bdpt8, no sample may have more than this share of the light. It is at most 0.01 in cornell-box, box and
  * effects-glass, and 0.1 in the median pilot of pool, where the other samples show no sign of rare light. */
 static const double most_tame = 0.03;
 /* Mean of the samples of a pixel, relative to the map, above which the pixel is brighter than the map says. Smaller
@@ -90,7 +90,7 @@ static const double bright = 8;
  * where erpt4 needs 0.7 of the time of erpt. */
 static const double evi_most = 0.5;
 /* The second moment of path times its rays, over that of bdpt, must be less than this. It is 0.68 to 0.95 in
- * cornell-box and 0.5 to 0.9 in veach-mis, where path and erpt4 win, 2.1 or more in glossy-room, where erpt4 needs 1.8
+ * cornell-box and 0.5 to 0.9 in veach-mis, where path and bdpt8 win, 2.1 or more in glossy-room, where erpt4 needs 1.8
  * times the time of erpt. */
 static const double path_cost = 0.9;
 
@@ -226,7 +226,9 @@ const char *render_choice_of(const struct render_choice *c)
 	if (render_choice_is_settled(c) || c->misses || has_rare_light(c) || !is_tame(&c->path) ||
 	    !(c->path.cost < path_cost * c->bdpt.cost))
 		return "erpt";
-	return has_no_fireflies(&c->path) && c->path.tail >= tail_least && !c->focuses ? "path" : "erpt4";
+	if (!has_no_fireflies(&c->path) || !(c->path.tail >= tail_least))
+		return "erpt4";
+	return c->focuses ? "bdpt8" : "path";
 }
 
 /* ---- the pilot */
@@ -514,6 +516,9 @@ static const char *reason(const char *integrator, const struct render_choice *c)
 					     "chains stay with those that they find";
 	if (strcmp(integrator, "path") == 0)
 		return "paths from the camera find the light evenly, and no surface focuses it";
+	if (strcmp(integrator, "bdpt8") == 0)
+		return "paths from the camera find the light evenly; as some surfaces may focus it, one sample in eight "
+		       "starts at the lamps, too, which keeps out most fireflies";
 	if (strcmp(integrator, "erpt4") == 0)
 		return "paths from the camera find the light evenly; as some may be bright nevertheless, one sample in "
 		       "four starts at the lamps, too, and what is too bright for a sample is spread by short chains";

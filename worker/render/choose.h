@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which integrator a scene calls for: `path`, `erpt4`, `erpt`, or the chains of `hslt`. Decided once, before the plan
- * is made, from a pilot that counts rays instead of seconds and draws random numbers of its own: the same on every
- * machine for the same request, and the plan names what was chosen.
+ * Which integrator a scene calls for: `path`, `bdpt8`, `erpt4`, `erpt`, or the chains of `hslt`. Decided once, before
+ * the plan is made, from a pilot that counts rays instead of seconds and draws random numbers of its own: the same on
+ * every machine for the same request, and the plan names what was chosen.
  *
  * The pilot draws samples of `path`, merges light with the camera's sub-paths where a lobe is narrow (rare_light.h),
  * and draws samples of `bdpt` where these leave the choice open. Of each kind it asks what a contribution brings
@@ -12,11 +12,12 @@
  *
  * `erpt` is the usual answer: samples of bdpt, of which short chains spread what is too bright. `hslt` is called for
  * where such samples are too rare to begin a chain wherever one is wanted: merging or bdpt finds much rare light, and
- * even what the camera's sub-paths find has extremes without a mean; or nothing finds any light. `path` or `erpt4` do
- * where path's tail is that of a finite variance (a tail index of 2 or more, or an extreme-value index below 1/2, which
- * sees an end of a broad range of contributions) and its second moment times rays is the smaller one: `path` where no
- * lobe of the scene is so narrow that it focuses light, and no sample has a share in the light that such a law does not
- * allow; else `erpt4`, which has a light sub-path in one of four samples.
+ * even what the camera's sub-paths find has extremes without a mean; or nothing finds any light. The others
+ * do where path's tail is that of a finite variance and its second moment times rays is the smaller one. If a tail
+ * index of 2 or more says so, and no sample has a share in the light that such a law does not allow, this is `path`
+ * where no lobe of the scene is so narrow that it focuses light, else `bdpt8`, whose light sub-paths, one in eight
+ * samples, bound fireflies. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of
+ * contributions, it is `erpt4`, whose chains bound them, with a light sub-path in one of four samples.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H

@@ -294,7 +294,7 @@ static void more_settings(char *text, size_t size)
 static const struct option_row what_rows[] = {
 	{"integrator", 'i', "NAME",
 	 "(" RENDER_INTEGRATOR_DEFAULT
-	 ": path, erpt4, erpt or hslt, chosen by a short pilot); the scene's own is ignored",
+	 ": path, bdpt8, erpt4, erpt or hslt, chosen by a short pilot); the scene's own is ignored",
 	 OPTION_TAKE(take_integrator), .values = integrator_name},
 	{"size", 0, "W[xH]", "Size of the film; keeps the angle of view. Without H it keeps the aspect",
 	 OPTION_TAKE(take_size)},
