@@ -11,6 +11,17 @@ noted() {
 	grep -q "note: .*$2" "$1" || fail "it does not say '$2': $(cat "$1")"
 }
 
+# Ended in the pilot, which takes seconds for a render of an hour: at once, by the signal, and it says so.
+"$BIN/hslt-render" "$HERE/../scenes/demo/scene.xml" -o "$DIR/pilot.exr" --time 1h 2>"$DIR/pilot.log" &
+pilot=$!
+PIDS="$PIDS $pilot"
+until_true 60 grep -q 'is ignored' "$DIR/pilot.log" || fail "it reads no scene"
+kill -TERM $pilot
+got=0
+wait $pilot || got=$?
+[ $got = 143 ] && grep -q 'interrupted before rendering began' "$DIR/pilot.log" && ! grep -q 'chosen by a pilot' "$DIR/pilot.log" ||
+	fail "ended in its pilot: $got, $(cat "$DIR/pilot.log")"
+
 # Ended in its first round: no image is written, and nothing is said of one; the bootstrap is there for the same command.
 EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536"
 "$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" $EARLY 2>"$DIR/early.log" &

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The program: options, scene, integrator (choice.h), plan, render (local.h), image. Between phases it checks for
- * signals: it then writes the image of the complete rounds, and the exit code says that it was interrupted.
+ * The program: options, scene, integrator (choice.h), plan, render (local.h), image. A signal ends it at once until the
+ * integrator is chosen; later it writes the image of the complete rounds, and the exit code says that it was
+ * interrupted.
  *
  * Every failure ends with one line on stderr and the exit code of its kind (docs/design.md); the image is replaced
  * atomically or not at all.
@@ -148,9 +149,11 @@ static int load(struct session *s, struct error *e)
 	return 0;
 }
 
+/* Until here there is nothing to keep; from here on signals end the render in order. */
 static int choose(struct session *s, struct error *e)
 {
 	int rc = choice_in_world(s->world, &s->a->render, &s->choice, e);
+	interrupt_watch();
 	if (!rc && !s->a->quiet)
 		choice_print(&s->choice, s->a->render.plan.integrator);
 	return rc;
@@ -417,7 +420,7 @@ int main(int argc, char **argv)
 	output_check_at_exit();
 	crash_exit("hslt-render");
 	program_options(&program, argc, argv, &a);
-	interrupt_watch();
+	interrupt_say("hslt-render: interrupted before rendering began: nothing is kept\n");
 	s.a = &a;
 	int rc = run_session(&s, &e);
 	canvas_image_fini(&s.image);
