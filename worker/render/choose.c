@@ -228,7 +228,9 @@ const char *render_choice_of(const struct render_choice *c)
 		return "erpt";
 	if (!has_no_fireflies(&c->path) || !(c->path.tail >= tail_least))
 		return "erpt4";
-	return c->focuses ? "bdpt8" : "path";
+	if (!c->focuses)
+		return "path";
+	return c->brief ? "erpt4" : "bdpt8";
 }
 
 /* ---- the pilot */
@@ -494,6 +496,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 		p->w = w;
 		p->seed = r->seed;
 		p->samples = pilot_samples(r, (uint64_t)film.crop_width * film.crop_height);
+		out->brief = p->samples < SAMPLES_USUAL;
 		out->misses = path_misses(w);
 		rc = run_pilot(p, &film, out, e);
 	}

@@ -17,7 +17,8 @@
  * index of 2 or more says so, and no sample has a share in the light that such a law does not allow, this is `path`
  * where no lobe of the scene is so narrow that it focuses light, else `bdpt8`, whose light sub-paths, one in eight
  * samples, bound fireflies. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of
- * contributions, it is `erpt4`, whose chains bound them, with a light sub-path in one of four samples.
+ * contributions, or if the pilot is brief, it is `erpt4`, whose chains bound them, with a light sub-path in one of four
+ * samples.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -44,6 +45,7 @@ struct render_choice {
 			     none at all */
 	bool dark;	  /* path finds next to nothing */
 	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
+	bool brief;	  /* too few samples to trust a tail index where lobes are narrow */
 	bool settled;	  /* no choice was left before bdpt was looked at: nothing is known of it */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of
 			     a short render's, or 3 times 4,096; 1 in 30 of a long one's, 1 in 120 of one of hours; not

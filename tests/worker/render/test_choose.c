@@ -422,6 +422,25 @@ static void the_rule(void **state)
 	}
 }
 
+/* A brief pilot of demo finds no fireflies in half of the cases: chains are kept in reserve. */
+static void a_brief_pilot_does_not_trust_the_tail(void **state)
+{
+	(void)state;
+	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true};
+	assert_string_equal(render_choice_of(&c), "bdpt8");
+	c.brief = true;
+	assert_string_equal(render_choice_of(&c), "erpt4");
+	c.focuses = false;
+	assert_string_equal(render_choice_of(&c), "path");
+	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct plan_request r;
+	choose(w, 1, 2, &r, &c);
+	assert_true(c.brief);
+	choose(w, 1, 400, &r, &c);
+	assert_false(c.brief);
+	world_free(w);
+}
+
 /* Whatever the others say; not a share as in scenes where bdpt is the best. */
 static void light_that_is_rare_by_merging_needs_chains(void **state)
 {
@@ -571,6 +590,7 @@ int main(void)
 		cmocka_unit_test(the_same_request_gives_the_same_choice),
 		cmocka_unit_test(a_crop_is_rendered_as_the_whole_is),
 		cmocka_unit_test(the_rule),
+		cmocka_unit_test(a_brief_pilot_does_not_trust_the_tail),
 		cmocka_unit_test(light_that_is_rare_by_merging_needs_chains),
 		cmocka_unit_test(light_that_photons_see_is_not_rare),
 		cmocka_unit_test(what_is_settled_is_the_same_with_bdpt),
