@@ -206,7 +206,7 @@ bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 row: programs
 	python3 tests/bench/row.py $(BUILD) $(BUILD)/equal-time.png 6 8
 
-# Stated errors against true ones: about an hour of one core. CALIBRATION="RENDERS LENGTHS SEEDS SCENE TIMES INTEGRATOR" for less.
+# Stated errors against true ones: about an hour of one core. CALIBRATION="--renders 8 --lengths 2" for less.
 CALIBRATION_SRC := $(filter-out tests/image/test_%.c,$(wildcard tests/image/*.c))
 $(BUILD)/calibration/calibration: $(call obj,$(CALIBRATION_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)

@@ -8,14 +8,16 @@
  * renders' relMSE is left out, and said so. All scenes at the shortest length come first. SIGTERM ends it after the
  * case that is being measured, with the verdict on what there is.
  *
- *   calibration [RENDERS [LENGTHS [SEEDS [SCENE [TIMES [INTEGRATOR]]]]]]    20 renders a case, half as many of each
- * next length; 3 lengths; SEEDS: a word, another for other seeds; scenes whose names begin with SCENE; references TIMES
- * as long; INTEGRATOR: only that one
+ *   calibration --renders 8 --lengths 2 --seeds second --scene room --reference 4 --integrator erpt
+ *
+ * Eight renders a case (20 if not given), half as many of each next length; the two shorter lengths (3); seeds made of
+ * that word; scenes whose names begin with that; references four times as long; one integrator.
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
 #include "worker/render/world/build.h"
 
+#include <getopt.h>
 #include <math.h>
 #include <setjmp.h>
 #include <signal.h>
@@ -235,15 +237,55 @@ static bool judge(const struct calibration *c, int length)
 	return percent(&sum) >= 90 && (sum.stated < 100 || percent(&sum) <= 99);
 }
 
+/* false: not an option, or not a value that it has. */
+static bool take_options(int argc, char **argv, struct calibration *c)
+{
+	static const struct option options[] = {{"renders", required_argument, NULL, 'r'},
+						{"lengths", required_argument, NULL, 'l'},
+						{"seeds", required_argument, NULL, 's'},
+						{"scene", required_argument, NULL, 'n'},
+						{"reference", required_argument, NULL, 't'},
+						{"integrator", required_argument, NULL, 'i'},
+						{0}};
+	*c = (struct calibration){
+		.renders = 20, .last = LENGTHS, .seeds = "1", .scene = "", .times = 1, .integrator = ""};
+	bool right = true;
+	for (int o; (o = getopt_long(argc, argv, "", options, NULL)) != -1;)
+		switch (o) {
+		case 'r':
+			c->renders = (uint32_t)atoi(optarg);
+			right = right && atoi(optarg) > 0;
+			break;
+		case 'l':
+			c->last = atoi(optarg);
+			right = right && c->last > 0 && c->last <= LENGTHS;
+			break;
+		case 's':
+			c->seeds = optarg;
+			break;
+		case 'n':
+			c->scene = optarg;
+			break;
+		case 't':
+			c->times = atof(optarg);
+			right = right && c->times > 0;
+			break;
+		case 'i':
+			c->integrator = optarg;
+			break;
+		default:
+			return false;
+		}
+	return right && optind == argc;
+}
+
 int main(int argc, char **argv)
 {
 	static struct calibration c;
-	c.renders = argc > 1 && atoi(argv[1]) > 0 ? (uint32_t)atoi(argv[1]) : 20;
-	c.last = argc > 2 && atoi(argv[2]) > 0 && atoi(argv[2]) < LENGTHS ? atoi(argv[2]) : LENGTHS;
-	c.seeds = argc > 3 ? argv[3] : "1";
-	c.scene = argc > 4 ? argv[4] : "";
-	c.times = argc > 5 && atof(argv[5]) > 0 ? atof(argv[5]) : 1;
-	c.integrator = argc > 6 ? argv[6] : "";
+	if (!take_options(argc, argv, &c)) {
+		fprintf(stderr, "calibration: see the beginning of tests/image/calibration.c for its options\n");
+		return 2;
+	}
 	size_t asked = 0;
 	for (size_t k = 0; k < INTEGRATORS; k++)
 		asked += is_asked(&c, k);
