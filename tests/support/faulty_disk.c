@@ -12,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { SECTOR = 512, FDS = 4096, PATH_MOST = 4400 };
+enum { SECTOR = 512, PATH_MOST = 4400 };
 
 /* Done to a file since its last flush. */
 struct change {
@@ -46,7 +46,6 @@ struct faulty_disk_node {
 
 static struct faulty_disk setup;
 static struct faulty_disk_node *root;
-static struct faulty_disk_node *open_files[FDS];
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static uint64_t calls, changing_calls, since_failure, dice;
 static atomic_bool failed;
@@ -175,6 +174,27 @@ static struct faulty_disk_node *node_at(const char *path, bool create, bool fold
 struct faulty_disk_node *faulty_disk_node_of(const char *path, bool create)
 {
 	return node_at(path, create, false);
+}
+
+void faulty_disk_made_folder(const char *path)
+{
+	node_at(path, true, true);
+}
+
+void faulty_disk_renamed(const char *from, const char *to)
+{
+	const char *gone, *made;
+	struct faulty_disk_node *a = parent_of(from, &gone), *b = parent_of(to, &made);
+	if (!a)
+		return;
+	struct name *n = *find(&a->live, gone);
+	assert(n && b);
+	if (a != b) { /* each folder for itself: one of them may keep what the other does not */
+		rename_in(b, NULL, made, n->node);
+		rename_in(a, gone, NULL, NULL);
+	} else {
+		rename_in(a, gone, made, n->node);
+	}
 }
 
 /* ---- what a flush makes safe ---- */
@@ -383,207 +403,6 @@ void faulty_disk_leave(void)
 	pthread_mutex_unlock(&mutex);
 }
 
-/* ---- the door ---- */
-
-static bool is_refused(enum faulty_disk_call what)
-{
-	int code = faulty_disk_enter(what);
-	if (!code)
-		return false;
-	faulty_disk_leave();
-	errno = code;
-	return true;
-}
-
-/* Keeps errno. */
-static long out(long result)
-{
-	faulty_disk_leave();
-	return result;
-}
-
-static int do_open(const char *path, int flags, mode_t mode)
-{
-	bool hidden = (flags & O_TMPFILE) == O_TMPFILE, changes = !hidden && (flags & (O_CREAT | O_TRUNC));
-	if (is_refused(changes ? FAULTY_DISK_OPENS : FAULTY_DISK_READS))
-		return -1;
-	int fd = open(path, flags, mode);
-	if (fd >= 0 && fd < FDS)
-		open_files[fd] = hidden ? NULL : node_at(path, (flags & O_CREAT) != 0, false);
-	if (fd >= 0 && fd < FDS && open_files[fd] && (flags & O_TRUNC))
-		faulty_disk_cut(open_files[fd], 0);
-	return (int)out(fd);
-}
-
-static int do_close(int fd)
-{
-	faulty_disk_enter(FAULTY_DISK_READS); /* a close that fails has closed all the same */
-	if (fd >= 0 && fd < FDS)
-		open_files[fd] = NULL;
-	return (int)out(close(fd));
-}
-
-static struct faulty_disk_node *file_of(int fd)
-{
-	return fd >= 0 && fd < FDS ? open_files[fd] : NULL;
-}
-
-static ssize_t do_read(int fd, void *bytes, size_t size)
-{
-	return is_refused(FAULTY_DISK_READS) ? -1 : out(read(fd, bytes, size));
-}
-
-static ssize_t do_pread(int fd, void *bytes, size_t size, off_t at)
-{
-	return is_refused(FAULTY_DISK_READS) ? -1 : out(pread(fd, bytes, size, at));
-}
-
-static ssize_t do_write(int fd, const void *bytes, size_t size)
-{
-	if (is_refused(FAULTY_DISK_WRITES))
-		return -1;
-	bool at_end = fcntl(fd, F_GETFL) & O_APPEND;
-	off_t at = lseek(fd, 0, at_end ? SEEK_END : SEEK_CUR);
-	ssize_t n = write(fd, bytes, size);
-	if (n > 0)
-		faulty_disk_wrote(file_of(fd), bytes, (size_t)n, (uint64_t)at);
-	return out(n);
-}
-
-static ssize_t do_pwritev(int fd, const struct iovec *parts, int count, off_t at)
-{
-	if (is_refused(FAULTY_DISK_WRITES))
-		return -1;
-	ssize_t n = pwritev(fd, parts, count, at);
-	for (size_t left = n > 0 ? (size_t)n : 0; left; parts++) {
-		size_t size = parts->iov_len < left ? parts->iov_len : left;
-		faulty_disk_wrote(file_of(fd), parts->iov_base, size, (uint64_t)at);
-		at += (off_t)size;
-		left -= size;
-	}
-	return out(n);
-}
-
-static int do_ftruncate(int fd, off_t size)
-{
-	if (is_refused(FAULTY_DISK_REMOVES))
-		return -1;
-	int rc = ftruncate(fd, size);
-	if (!rc)
-		faulty_disk_cut(file_of(fd), (uint64_t)size);
-	return (int)out(rc);
-}
-
-static int do_fallocate(int fd, int mode, off_t at, off_t size)
-{
-	assert(mode == FALLOC_FL_KEEP_SIZE);
-	return is_refused(FAULTY_DISK_WRITES) ? -1 : (int)out(fallocate(fd, mode, at, size));
-}
-
-static int do_posix_fallocate(int fd, off_t at, off_t size)
-{
-	int code = faulty_disk_enter(FAULTY_DISK_WRITES);
-	return (int)out(code ? code : posix_fallocate(fd, at, size));
-}
-
-static int do_fsync(int fd)
-{
-	int code = faulty_disk_enter(FAULTY_DISK_FLUSHES);
-	if (code)
-		faulty_disk_failed(file_of(fd));
-	else
-		faulty_disk_flushed(file_of(fd), false);
-	faulty_disk_leave();
-	errno = code;
-	return code ? -1 : 0;
-}
-
-static int do_rename(const char *from, const char *to)
-{
-	const char *gone, *made;
-	if (is_refused(FAULTY_DISK_OPENS))
-		return -1;
-	int rc = rename(from, to);
-	struct faulty_disk_node *a = parent_of(from, &gone), *b = parent_of(to, &made);
-	if (!rc && a) {
-		struct name *n = *find(&a->live, gone);
-		assert(n && b);
-		if (a != b) { /* each folder for itself: one of them may keep what the other does not */
-			rename_in(b, NULL, made, n->node);
-			rename_in(a, gone, NULL, NULL);
-		} else {
-			rename_in(a, gone, made, n->node);
-		}
-	}
-	return (int)out(rc);
-}
-
-static int do_unlink(const char *path)
-{
-	if (is_refused(FAULTY_DISK_REMOVES))
-		return -1;
-	int rc = unlink(path);
-	if (!rc)
-		faulty_disk_removed(path);
-	return (int)out(rc);
-}
-
-static int do_mkdir(const char *path, mode_t mode)
-{
-	if (is_refused(FAULTY_DISK_OPENS))
-		return -1;
-	int rc = mkdir(path, mode);
-	if (!rc)
-		node_at(path, true, true);
-	return (int)out(rc);
-}
-
-static int do_rmdir(const char *path)
-{
-	if (is_refused(FAULTY_DISK_REMOVES))
-		return -1;
-	int rc = rmdir(path);
-	if (!rc)
-		faulty_disk_removed(path);
-	return (int)out(rc);
-}
-
-static int do_stat(const char *path, struct stat *st)
-{
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(lstat(path, st));
-}
-
-static int do_fstat(int fd, struct stat *st)
-{
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(fstat(fd, st));
-}
-
-static int do_touch(const char *path)
-{
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(disk_system.touch(path));
-}
-
-static int do_flock(int fd, int what)
-{
-	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(disk_system.flock(fd, what));
-}
-
-static DIR *do_opendir(const char *path)
-{
-	if (is_refused(FAULTY_DISK_READS))
-		return NULL;
-	DIR *d = opendir(path);
-	faulty_disk_leave();
-	return d;
-}
-
-static const struct disk door = {
-	do_open,    do_close,	  do_read,	do_pread,	    do_write,
-	do_pwritev, do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
-	do_fsync,   do_rename,	  do_unlink,	do_mkdir,	    do_rmdir,
-	do_stat,    do_fstat,	  do_touch,	do_flock,	    do_opendir,
-};
-
 /* ---- the start: all that is there is safe ---- */
 
 static void load_file(struct faulty_disk_node *n, const char *path)
@@ -627,6 +446,6 @@ void faulty_disk_begin(const struct faulty_disk *l)
 	dice = setup.seed;
 	root = node_new(true, "");
 	load_folder(root, setup.root);
-	disk_use(&door);
+	disk_use(&faulty_disk_calls);
 	faulty_disk_vfs_begin();
 }

@@ -13,6 +13,8 @@
 #ifndef TESTS_SUPPORT_FAULTY_DISK_H
 #define TESTS_SUPPORT_FAULTY_DISK_H
 
+#include "common/base/disk.h"
+
 #include <sqlite3.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -50,7 +52,7 @@ struct faulty_disk {
 void faulty_disk_begin(const struct faulty_disk *l);
 void faulty_disk_power_off(void); /* now */
 
-/* ---- for faulty_disk_vfs.c */
+/* ---- for faulty_disk_vfs.c and faulty_disk_calls.c */
 
 struct faulty_disk_node;
 struct faulty_disk_node *faulty_disk_node_of(const char *path, bool create); /* NULL: not below the root */
@@ -70,6 +72,9 @@ void faulty_disk_flushed(struct faulty_disk_node *n, bool database);
 void faulty_disk_failed(struct faulty_disk_node *n);
 void faulty_disk_flushed_folder_of(const char *path);
 void faulty_disk_removed(const char *path);
+void faulty_disk_renamed(const char *from, const char *to);
+void faulty_disk_made_folder(const char *path);
 void faulty_disk_vfs_begin(void);
+extern const struct disk faulty_disk_calls;
 
 #endif
