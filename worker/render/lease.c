@@ -262,6 +262,7 @@ static int prepare(struct job *j, const struct world *w, const struct lease_inpu
 	j->context.window = film_window_of(p);
 	j->context.min_depth = p->min_depth;
 	j->context.max_depth = depth;
+	j->context.light_every = j->integrator->light_every;
 	j->context.roulette = p->kind == PLAN_SAMPLES ? PATH_ROULETTE : 0;
 	j->context.unclassed = p->kind == PLAN_SAMPLES && j->key->kind == LEASE_RENDER;
 	j->context.counters = j->out->counters;

@@ -11,6 +11,7 @@
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"
 #include "worker/render/film/sums.h"
+#include "worker/render/path/integrator.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -309,10 +310,10 @@ static void test_invalid_operation(void **state)
 			assert_int_equal(render_lease(w, &p, &k, &in, NULL, &end, &b, &e), -EDOM);
 			assert_true(strstr(e.text, "invalid floating-point operation (SIGFPE)") &&
 				    strstr(e.text, p.integrator));
-			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP		   ? "bootstrap sample"
-						   : strncmp(p.integrator, "erpt", 4) == 0 ? "map of brightness"
-						   : p.kind == PLAN_SAMPLES		   ? "row 0, column 0"
-											   : "mutation"));
+			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP			  ? "bootstrap sample"
+						   : integrator_find(p.integrator)->redistributes ? "map of brightness"
+						   : p.kind == PLAN_SAMPLES			  ? "row 0, column 0"
+												  : "mutation"));
 			assert_true(!b.tiles && !b.states && !b.weights && !b.moments);
 			w->camera.center_x = center;
 			struct batch again = run_lease(w, &p, k, &in);

@@ -23,6 +23,7 @@ const struct integrator integrator_erpt4 = {
 		 .kind = PLAN_SAMPLES,
 		 .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_ERPT4,
-	.evaluate = path_trace_one_in_four_both_ways,
+	.evaluate = path_trace_both_ways,
+	.light_every = 4,
 	.redistributes = true,
 };

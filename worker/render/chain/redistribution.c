@@ -31,7 +31,8 @@ struct spread_place {
 struct redistribution {
 	struct path_split split; /* first: keep() gets its address */
 	struct redistribution_rule rule;
-	struct path_context context;
+	struct path_context context; /* of the chains */
+	uint32_t light_every;	     /* of the samples */
 	const struct brightness *map;
 	struct film_sums *film;
 	struct mixture mixture; /* local strategies alone */
@@ -61,8 +62,8 @@ static void weigh(struct redistribution *r, struct spread_place *at)
 	if (!is_scattered(x))
 		return;
 	full_path_log_techniques(&r->context, x, log_pdf);
-	for (unsigned j = 2; j <= x->edges && r->context.light_every > 1; j++)
-		log_pdf[j] -= log(r->context.light_every);
+	for (unsigned j = 2; j <= x->edges && r->light_every > 1; j++)
+		log_pdf[j] -= log(r->light_every);
 	double u = at->scale * exp(full_path_log_f(&r->context, x) - log_sum_exp(log_pdf, x->edges + 1));
 	if (isgreater(u, r->rule.threshold))
 		at->share = 1 - r->rule.threshold / u;
@@ -147,7 +148,6 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 {
 	struct redistribution *r = (struct redistribution *)(void *)split;
 	struct spread_place *x = &r->start;
-	r->context.light_every = c->light_every;
 	double intensity = path_intensity(c, l), relative = intensity * brightness_scale(r->map, film[0], film[1]);
 	if (!isgreater(relative, r->rule.threshold) || !isfinite(relative) ||
 	    !full_path_from_subpaths(c, s, s + t - 1, &x->place.path))
@@ -198,6 +198,8 @@ int redistribution_new(struct redistribution **out, const struct redistribution_
 	r->rule = *rule;
 	r->context = *c;
 	r->context.roulette = 0;
+	r->context.light_every = 0;
+	r->light_every = c->light_every;
 	r->map = map;
 	r->film = film;
 	world_summary(c->w, &summary);

@@ -40,7 +40,7 @@ extern const struct redistribution_rule redistribution_usual;
 
 enum { REDISTRIBUTION_CHAINS = 64 }; /* for one contribution */
 
-/* c: that of the samples; world, window, depths and counters are taken from it. -ENOMEM */
+/* c: that of the samples; world, window, depths, light_every and counters are taken from it. -ENOMEM */
 int redistribution_new(struct redistribution **r, const struct redistribution_rule *rule, const struct path_context *c,
 		       const struct brightness *map, uint64_t seed, struct film_sums *film, struct error *e);
 void redistribution_free(struct redistribution *r);

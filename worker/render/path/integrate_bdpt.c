@@ -12,8 +12,6 @@
 #include "worker/render/path/connect.h"
 #include "worker/render/path/integrator.h"
 
-enum { SELDOM = 4, RARELY = 8 };
-
 /* Of the light that the camera sub-path finds alone. In closed rooms 0.1 saves a quarter of the time and adds 1 % to
  * the relMSE, 0.3 hardly saves more and adds 5 %; elsewhere neither changes anything (README of tests/bench). */
 static const double faint_share = 0.1;
@@ -51,7 +49,7 @@ static double faint_beside(const struct path_context *c, spectrum found)
 	return c->roulette > 0 ? faint_share * spectrum_mean(found) : 0;
 }
 
-static void trace(struct path_context *c, struct sampler *s, struct path_sample *out)
+void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
 	struct classes classes;
@@ -91,31 +89,14 @@ static void trace(struct path_context *c, struct sampler *s, struct path_sample 
 	}
 }
 
-void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
-{
-	c->light_every = 1;
-	trace(c, s, out);
-}
-
-void path_trace_one_in_four_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
-{
-	c->light_every = SELDOM;
-	trace(c, s, out);
-}
-
-static void trace_rarely_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
-{
-	c->light_every = RARELY;
-	trace(c, s, out);
-}
-
 const struct integrator integrator_bdpt8 = {
 	.face = {.name = "bdpt8",
 		 .summary = "bdpt with a light sub-path in one of eight samples",
 		 .kind = PLAN_SAMPLES,
 		 .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_BDPT8,
-	.evaluate = trace_rarely_both_ways,
+	.evaluate = path_trace_both_ways,
+	.light_every = 8,
 };
 
 const struct integrator integrator_bdpt = {

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The evaluation of bdpt, for integrators that build on it: with a light sub-path in every sample, or in one of four.
- */
+/* The evaluation of bdpt, for integrators that build on it; path_context.light_every says how many samples have a light
+ * sub-path. */
 #ifndef WORKER_RENDER_PATH_INTEGRATE_BDPT_H
 #define WORKER_RENDER_PATH_INTEGRATE_BDPT_H
 
 #include "worker/render/path/path.h"
 
 void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
-void path_trace_one_in_four_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
 
 #endif

@@ -14,6 +14,7 @@ struct integrator {
 	struct render_integrator face; /* name, summary, kind, depth that its state holds */
 	enum rng_stream stream;	       /* of its own samples */
 	path_tracer *evaluate;
+	uint32_t light_every;	       /* of path_context, for its samples */
 	bool redistributes;	       /* what is too bright for a sample goes to chains: chain/redistribution.h */
 	const struct chain_ops *chain; /* worker/render/chain/chain.h; NULL: averages independent points */
 };

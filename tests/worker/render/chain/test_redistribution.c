@@ -56,7 +56,6 @@ static struct world *lamp_over_ground(void)
 /* A render of samples anywhere on the film. */
 struct trial {
 	const struct world *w;
-	path_tracer *trace;
 	struct plan plan;
 	struct path_context context;
 	struct path_sample sample;
@@ -67,12 +66,12 @@ struct trial {
 	double intensity; /* of all samples, with what was taken */
 };
 
-static void trial_begin(struct trial *t, const struct world *w, const struct redistribution_rule *rule, uint64_t seed)
+static void trial_begin(struct trial *t, const struct world *w, const struct redistribution_rule *rule,
+			uint32_t light_every, uint64_t seed)
 {
 	struct error e;
 	memset(t, 0, sizeof *t);
 	t->w = w;
-	t->trace = path_trace_both_ways;
 	t->plan = (struct plan){.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	t->context = (struct path_context){.w = w,
 					   .window = film_window_of(&t->plan),
@@ -87,6 +86,7 @@ static void trial_begin(struct trial *t, const struct world *w, const struct red
 	assert_int_equal(film_sums_init(&t->film, &t->plan, &w->settings, &e), 0);
 	assert_int_equal(film_sums_init(&t->unspread, &t->plan, &w->settings, &e), 0);
 	memset(t->counters, 0, sizeof t->counters);
+	t->context.light_every = light_every;
 	assert_int_equal(redistribution_new(&t->r, rule, &t->context, &t->map, seed, &t->film, &e), 0);
 }
 
@@ -103,7 +103,7 @@ static void evaluate(struct trial *t, uint64_t seed, uint64_t index, struct path
 	struct sampler_random s;
 	sampler_random_init(&s, seed, RNG_ERPT, index, 0);
 	t->context.split = split;
-	t->trace(&t->context, &s.base, &t->sample);
+	path_trace_both_ways(&t->context, &s.base, &t->sample);
 	for (uint32_t k = 0; k < t->sample.count; k++)
 		film_sums_splat(film, &t->sample.splats[k], 1.0 / (SIDE * SIDE));
 }
@@ -137,8 +137,8 @@ static void take_means(const struct film_sums *f, uint64_t spp, double mean[AGRE
 }
 
 /* By group and cell 1 + the difference of the two images over bdpt's mean there. Returns mutations a sample. */
-static double compare(const char *test, const struct world *w, path_tracer *trace,
-		      const struct redistribution_rule *rule, uint64_t spp, struct agree_image *out)
+static double compare(const char *test, const struct world *w, const struct redistribution_rule *rule,
+		      uint32_t light_every, uint64_t spp, struct agree_image *out)
 {
 	static struct trial t;
 	double mutations = 0, unspread[GROUPS][AGREE_CELLS + 1], all[AGREE_CELLS + 1] = {0};
@@ -146,8 +146,7 @@ static double compare(const char *test, const struct world *w, path_tracer *trac
 	out->groups = GROUPS;
 	for (uint32_t g = 0; g < GROUPS; g++) {
 		uint64_t seed = stats_seed(test) + g;
-		trial_begin(&t, w, rule, seed);
-		t.trace = trace;
+		trial_begin(&t, w, rule, light_every, seed);
 		for (uint64_t i = 0; i < spp * SIDE * SIDE; i++) {
 			trial_sample(&t, seed, i);
 			unspread_sample(&t, seed, i);
@@ -165,38 +164,36 @@ static double compare(const char *test, const struct world *w, path_tracer *trac
 	return mutations;
 }
 
-static struct agree_image image;
+static void expect_the_same(const char *test, struct world *w, const struct redistribution_rule *rule,
+			    uint32_t light_every, uint64_t spp)
+{
+	static struct agree_image image;
+	assert_true(compare(test, w, rule, light_every, spp, &image) > 1);
+	agree_expect(test, &image, 1);
+	world_free(w);
+}
 
 static void all_light_by_chains_is_the_same_image(void **state)
 {
 	(void)state;
 	const struct redistribution_rule all = {.threshold = 1e-6, .mutations = 8, .length = 2};
-	struct world *w = lamp_over_ground();
-	assert_true(compare(__func__, w, path_trace_both_ways, &all, 16, &image) > 1);
-	agree_expect(__func__, &image, 1);
-	world_free(w);
+	expect_the_same(__func__, lamp_over_ground(), &all, 1, 16);
 }
+
+static const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
 
 /* Most paths near the threshold, where a changes. */
 static void some_light_by_chains_is_the_same_image(void **state)
 {
 	(void)state;
-	const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
-	struct world *w = room_of_balls();
-	assert_true(compare(__func__, w, path_trace_both_ways, &some, 8, &image) > 1);
-	agree_expect(__func__, &image, 1);
-	world_free(w);
+	expect_the_same(__func__, room_of_balls(), &some, 1, 8);
 }
 
 /* What needs a light sub-path counts four times: more of it is above the threshold. */
 static void a_light_sub_path_in_one_of_four_samples_is_the_same_image(void **state)
 {
 	(void)state;
-	const struct redistribution_rule some = {.threshold = 0.5, .mutations = 8, .length = 2};
-	struct world *w = room_of_balls();
-	assert_true(compare(__func__, w, path_trace_one_in_four_both_ways, &some, 12, &image) > 1);
-	agree_expect(__func__, &image, 1);
-	world_free(w);
+	expect_the_same(__func__, room_of_balls(), &some, 4, 12);
 }
 
 /* Without roulette, what a light sub-path brings to the film is at most T times as bright as its place, to rounding,
@@ -207,10 +204,9 @@ static void no_splat_is_brighter_than_the_threshold(void **state)
 	const struct redistribution_rule rule = {.threshold = 0.5, .mutations = 1, .length = 1};
 	static struct trial t;
 	struct world *w = room_of_balls();
-	for (int seldom = 0; seldom < 2; seldom++) {
+	for (uint32_t light_every = 1; light_every <= 4; light_every *= 4) {
 		double most = 0;
-		trial_begin(&t, w, &rule, stats_seed(__func__));
-		t.trace = seldom ? path_trace_one_in_four_both_ways : path_trace_both_ways;
+		trial_begin(&t, w, &rule, light_every, stats_seed(__func__));
 		t.context.roulette = 0;
 		for (uint64_t i = 0; i < 4096; i++) {
 			trial_sample(&t, stats_seed(__func__), i);
@@ -220,7 +216,7 @@ static void no_splat_is_brighter_than_the_threshold(void **state)
 					    (s->xyz[0] + s->xyz[1] + s->xyz[2]) * brightness_scale(&t.map, s->x, s->y));
 			}
 		}
-		print_message("%s: %.9f\n", seldom ? "one in four" : "each", most);
+		print_message("a light sub-path in one of %u: %.9f\n", light_every, most);
 		assert_true(fabs(most - 0.5) < 1e-6);
 		trial_end(&t);
 	}
@@ -234,7 +230,7 @@ static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 	const struct redistribution_rule endless = {.threshold = 0.5, .mutations = 1e12, .length = 3};
 	static struct trial t;
 	struct world *w = room_of_balls();
-	trial_begin(&t, w, &endless, stats_seed(__func__));
+	trial_begin(&t, w, &endless, 1, stats_seed(__func__));
 	for (uint64_t i = 0; i < 256; i++)
 		trial_sample(&t, stats_seed(__func__), i);
 	assert_true(t.counters[COUNT_SPREAD] > 16);
@@ -250,7 +246,7 @@ static void nothing_is_lost_of_the_sum(void **state)
 	const struct redistribution_rule half = {.threshold = 0.1, .mutations = 0.1, .length = 2};
 	static struct trial t;
 	struct world *w = room_of_balls();
-	trial_begin(&t, w, &half, stats_seed(__func__));
+	trial_begin(&t, w, &half, 1, stats_seed(__func__));
 	double whole = 0;
 	for (uint64_t i = 0; i < 512; i++) {
 		trial_sample(&t, stats_seed(__func__), i);
@@ -275,7 +271,7 @@ static void what_is_seen_directly_is_not_spread(void **state)
 			"0,0,0") "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>" BALL("0,0,0",
 													    "1",
 													    GLASS));
-	trial_begin(&t, w, &all, stats_seed(__func__));
+	trial_begin(&t, w, &all, 1, stats_seed(__func__));
 	for (uint64_t i = 0; i < 4096; i++)
 		trial_sample(&t, stats_seed(__func__), i);
 	assert_true(t.intensity > 0);

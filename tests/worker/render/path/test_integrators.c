@@ -4,6 +4,7 @@
  * diffuse light and textures, glossy metal, smooth glass, rough glass, shading normals, light from infinity.
  * Chains take minutes where light comes through glass: FULL=1.
  */
+#include "worker/render/path/integrator.h"
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
 #include "tests/support/length.h"
@@ -30,7 +31,7 @@ static void check_all(const char *name, struct world *w, uint64_t path_spp, uint
 		uint64_t spp = r->kind == PLAN_SAMPLES ? bdpt_spp : r->has_mutations ? single_spp : chain_spp;
 		if (strcmp(r->name, "bdpt8") == 0)
 			spp = rare_spp;
-		if (strncmp(r->name, "erpt", 4) == 0)
+		if (integrator_find(r->name)->redistributes)
 			spp = spp * 9 / 4; /* a chain brings its light in one piece */
 		if (strcmp(r->name, "path") == 0 || spp == 0)
 			continue;
