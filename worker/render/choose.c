@@ -226,11 +226,10 @@ const char *render_choice_of(const struct render_choice *c)
 	if (render_choice_is_settled(c) || c->misses || has_rare_light(c) || !is_tame(&c->path) ||
 	    !(c->path.cost < path_cost * c->bdpt.cost))
 		return "erpt";
-	if (!has_no_fireflies(&c->path) || !(c->path.tail >= tail_least))
-		return "erpt4";
-	if (!c->focuses)
+	bool is_short = has_no_fireflies(&c->path) && c->path.tail >= tail_least;
+	if (is_short && !c->focuses)
 		return "path";
-	return c->brief ? "erpt4" : "bdpt8";
+	return is_short && !c->brief ? "bdpt8" : "erpt4";
 }
 
 /* ---- the pilot */

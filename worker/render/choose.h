@@ -12,19 +12,24 @@
  *
  * `erpt` is the usual answer: samples of bdpt, of which short chains spread what is too bright. `hslt` is called for
  * where such samples are too rare to begin a chain wherever one is wanted: merging or bdpt finds much rare light, and
- * even what the camera's sub-paths find has extremes without a mean; or nothing finds any light. The others
- * do where path's tail is that of a finite variance and its second moment times rays is the smaller one. If a tail
- * index of 2 or more says so, and no sample has a share in the light that such a law does not allow, this is `path`
- * where no lobe of the scene is so narrow that it focuses light, else `bdpt8`, whose light sub-paths, one in eight
- * samples, bound fireflies. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of
- * contributions, or if the pilot is brief, it is `erpt4`, whose chains bound them, with a light sub-path in one of four
- * samples.
+ * even what the camera's sub-paths find has extremes without a mean; or nothing finds any light. The others do where
+ * path's tail is that of a finite variance and its second moment times rays is the smaller one. If a tail index of 2 or
+ * more says so, and no sample has a share in the light that such a law does not allow, this is `path` where no lobe of
+ * the scene is so narrow that it focuses light, else `bdpt8`, whose light sub-paths, one in eight samples, bound
+ * fireflies. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of contributions, or
+ * if the pilot is brief, it is `erpt4`, whose chains bound them, with a light sub-path in one of four samples.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
 
 #include "worker/render/rare_light.h"
 #include "worker/render/render.h"
+
+/* What a pilot chooses among, besides RENDER_INTEGRATOR_CHAINS: the first name and the others. */
+#define RENDER_CHOICES(first, other) first("path") other("bdpt8") other("erpt4") other("erpt")
+#define RENDER_CHOICES_FIRST(name) name
+#define RENDER_CHOICES_OTHER(name) ", " name
+#define RENDER_CHOICES_TEXT RENDER_CHOICES(RENDER_CHOICES_FIRST, RENDER_CHOICES_OTHER)
 
 /* What was found of one of them. */
 struct render_found {

@@ -9,6 +9,7 @@
 #include "common/base/picture_name.h"
 #include "common/base/spelling.h"
 #include "common/base/text.h"
+#include "worker/render/choose.h"
 #include "worker/render/settings/accuracy_settings.h"
 
 #include <float.h>
@@ -293,8 +294,8 @@ static void more_settings(char *text, size_t size)
 
 static const struct option_row what_rows[] = {
 	{"integrator", 'i', "NAME",
-	 "(" RENDER_INTEGRATOR_DEFAULT
-	 ": path, bdpt8, erpt4, erpt or hslt, chosen by a short pilot); the scene's own is ignored",
+	 "(" RENDER_INTEGRATOR_DEFAULT ": " RENDER_CHOICES_TEXT " or " RENDER_INTEGRATOR_CHAINS
+	 ", chosen by a short pilot); the scene's own is ignored",
 	 OPTION_TAKE(take_integrator), .values = integrator_name},
 	{"size", 0, "W[xH]", "Size of the film; keeps the angle of view. Without H it keeps the aspect",
 	 OPTION_TAKE(take_size)},

@@ -61,14 +61,24 @@ static json_t *found_to_json(const struct render_found *f)
 			 forecast_real(f->cost));
 }
 
+static json_t *considered_to_json(void)
+{
+#define AFTER_A_COMMA(name) , name
+	static const char *const names[] = {RENDER_CHOICES(RENDER_CHOICES_FIRST, AFTER_A_COMMA),
+					    RENDER_INTEGRATOR_CHAINS};
+	json_t *list = json_array();
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		json_array_append_new(list, json_string(names[i]));
+	return list;
+}
+
 json_t *choice_to_json(const struct choice *c)
 {
 	if (!c->made)
 		return json_null();
 	const struct render_choice *f = &c->found;
-	return json_pack("{s:s s:[sssss] s:I s:f s:b s:b s:f s:o s:o}", "why", c->text, "considered", "path", "bdpt8",
-			 "erpt4", "erpt", RENDER_INTEGRATOR_CHAINS, "pilotSamples", (json_int_t)f->samples,
-			 "pilotSeconds", c->seconds, "pathMissesLight", (int)f->misses, "surfacesFocusLight",
-			 (int)f->focuses, "mergedRareShare", f->merged.share, "path", found_to_json(&f->path), "bdpt",
-			 f->settled ? json_null() : found_to_json(&f->bdpt));
+	return json_pack("{s:s s:o s:I s:f s:b s:b s:f s:o s:o}", "why", c->text, "considered", considered_to_json(),
+			 "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds, "pathMissesLight",
+			 (int)f->misses, "surfacesFocusLight", (int)f->focuses, "mergedRareShare", f->merged.share,
+			 "path", found_to_json(&f->path), "bdpt", f->settled ? json_null() : found_to_json(&f->bdpt));
 }

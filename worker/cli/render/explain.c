@@ -39,9 +39,9 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 		       held_depth(p));
 	if (*p->mixture)
 		printf(", mutations %s", p->mixture);
-	printf("\n%s\n",
-	       c->made ? c->text
-		       : "as requested; otherwise a pilot would choose among path, bdpt8, erpt4, erpt and " RENDER_INTEGRATOR_CHAINS);
+	printf("\n%s\n", c->made ? c->text
+				 : "as requested; otherwise a pilot would choose among " RENDER_CHOICES_TEXT
+				   " and " RENDER_INTEGRATOR_CHAINS);
 	for (size_t i = 0; render_scene_note(m, i, note, sizeof note); i++)
 		printf("note: %s\n", note);
 }
