@@ -46,22 +46,26 @@ struct plan canvas_plan(enum plan_kind kind, uint32_t width, uint32_t height, ui
 	return p;
 }
 
+struct tile canvas_tile(const struct plan *p, uint32_t i, float (*value)(void))
+{
+	uint32_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
+	uint32_t x = i % across * TILE_SIZE, y = i / across * TILE_SIZE;
+	uint32_t w = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
+	uint32_t h = p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE;
+	struct tile t = {p->crop_x + x, p->crop_y + y, w, h, mem_alloc((size_t)w * h * 3, sizeof(float))};
+	for (size_t k = 0; k < (size_t)w * h * 3; k++)
+		t.xyz[k] = value();
+	return t;
+}
+
 struct batch canvas_batch(const struct plan *p, uint64_t epoch, uint32_t group, uint32_t part, uint32_t tiles,
 			  float (*value)(void))
 {
 	struct batch b = {.key = {1, LEASE_RENDER, group, part, epoch}, .tile_count = tiles};
-	uint32_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
 	struct plan_range rows = plan_row_range(p, part);
 	b.tiles = mem_alloc(tiles, sizeof *b.tiles);
-	for (uint32_t i = 0; i < tiles; i++) {
-		uint32_t x = i % across * TILE_SIZE, y = i / across * TILE_SIZE;
-		uint32_t w = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
-		uint32_t h = p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE;
-		b.tiles[i] =
-			(struct tile){p->crop_x + x, p->crop_y + y, w, h, mem_alloc((size_t)w * h * 3, sizeof(float))};
-		for (size_t k = 0; k < (size_t)w * h * 3; k++)
-			b.tiles[i].xyz[k] = value();
-	}
+	for (uint32_t i = 0; i < tiles; i++)
+		b.tiles[i] = canvas_tile(p, i, value);
 	b.counters[COUNT_SAMPLES] = (rows.end - rows.begin) * p->crop_width * p->epoch;
 	if (p->kind == PLAN_CHAINS) {
 		b.state_count = 2;

@@ -13,6 +13,8 @@ double canvas_normal(void);
 
 /* A plan whose crop has that size, with an offset. */
 struct plan canvas_plan(enum plan_kind kind, uint32_t width, uint32_t height, uint32_t groups, uint32_t parts);
+/* The i-th tile of the film, filled by `value`. */
+struct tile canvas_tile(const struct plan *p, uint32_t i, float (*value)(void));
 /* A render lease's batch with the first so many tiles of the film, filled by `value`; batch_fini frees it. */
 struct batch canvas_batch(const struct plan *p, uint64_t epoch, uint32_t group, uint32_t part, uint32_t tiles,
 			  float (*value)(void));

@@ -2,6 +2,7 @@
 #include "tests/support/tls_pair.h"
 
 #include "common/net/authority.h"
+#include "tests/support/folder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,33 +10,31 @@
 #include <cmocka.h>
 
 #include <stdio.h>
-#include <stdlib.h>
 
-char pair_root[64], pair_ours[128], pair_theirs[128];
+const char *const pair_root = folder;
+char pair_ours[128], pair_theirs[128];
 
-const char *pair_at(const char *folder, const char *name)
+const char *pair_at(const char *of, const char *name)
 {
 	static char paths[4][512];
 	static unsigned next;
 	char *path = paths[next++ % 4];
-	snprintf(path, sizeof paths[0], "%s/%s", folder, name);
+	snprintf(path, sizeof paths[0], "%s/%s", of, name);
 	return path;
 }
 
-void pair_issue(const char *folder, const char *name, enum tls_role role, double days)
+void pair_issue(const char *of, const char *name, enum tls_role role, double days)
 {
 	struct error e = {""};
-	int rc = authority_issue(folder, name, role, days, false, &e);
+	int rc = authority_issue(of, name, role, days, false, &e);
 	if (rc)
 		fail_msg("%s: %s", name, e.text);
 }
 
 int pair_make_folders(void **state)
 {
-	(void)state;
 	struct error e;
-	snprintf(pair_root, sizeof pair_root, "/tmp/hslt-tls.XXXXXX");
-	if (!mkdtemp(pair_root))
+	if (folder_set_up(state))
 		return -1;
 	snprintf(pair_ours, sizeof pair_ours, "%s/ours", pair_root);
 	snprintf(pair_theirs, sizeof pair_theirs, "%s/theirs", pair_root);
@@ -52,18 +51,15 @@ int pair_make_folders(void **state)
 
 int pair_remove_folders(void **state)
 {
-	(void)state;
-	char command[128];
-	snprintf(command, sizeof command, "rm -rf '%s'", pair_root);
-	return system(command);
+	return folder_tear_down(state);
 }
 
-void pair_open(struct pair_end *x, const char *folder, bool listening)
+void pair_open(struct pair_end *x, const char *of, bool listening)
 {
 	x->rc = 0;
 	x->got_size = 0;
 	x->e.text[0] = 0;
-	int rc = tls_open(&x->tls, folder, &x->e);
+	int rc = tls_open(&x->tls, of, &x->e);
 	if (rc)
 		fail_msg("%s", x->e.text);
 	assert_int_equal(tls_link_new(&x->link, x->tls, listening, &x->e), 0);

@@ -13,7 +13,8 @@
 
 /* Folders: one temporary folder with an authority each. Ours has issued the folders farm (a coordinator), node (a
  * worker), ann (a client) and root (an operator); theirs farm and node. */
-extern char pair_root[64], pair_ours[128], pair_theirs[128];
+extern const char *const pair_root;
+extern char pair_ours[128], pair_theirs[128];
 int pair_make_folders(void **state); /* cmocka's set-up and tear-down of a group */
 int pair_remove_folders(void **state);
 void pair_issue(const char *folder, const char *name, enum tls_role role, double days);

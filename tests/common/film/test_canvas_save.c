@@ -6,6 +6,7 @@
 #include "common/estimate/canvas_image.h"
 
 #include "common/base/mem.h"
+#include "tests/support/canvas_batches.h"
 #include "tests/support/folder.h"
 
 #include <math.h>
@@ -23,38 +24,14 @@
 
 enum { WIDTH = 150, HEIGHT = 70, GROUPS = 4, PARTS = 3, ROUNDS = 5, EXPONENT = -20 };
 
-static uint64_t state;
-
-static uint64_t next(void)
-{
-	state ^= state << 13;
-	state ^= state >> 7;
-	return state ^= state << 17;
-}
-
-static double uniform(void)
-{
-	return (double)(next() >> 11) * 0x1p-53;
-}
-
 static struct plan make_plan(enum plan_kind kind)
 {
-	struct plan p = {.integrator = "path",
-			 .kind = kind,
-			 .width = WIDTH,
-			 .height = HEIGHT,
-			 .crop_width = WIDTH,
-			 .crop_height = HEIGHT,
-			 .groups = GROUPS,
-			 .parts = PARTS,
-			 .epoch = 4,
-			 .rounds = UINT64_MAX,
-			 .seconds = 1,
-			 .max_depth = 8};
-	p.bootstrap = GROUPS * PARTS * 8;
-	if (kind == PLAN_CHAINS)
-		p.chains = GROUPS * PARTS * 2;
-	return p;
+	return canvas_plan(kind, WIDTH, HEIGHT, GROUPS, PARTS);
+}
+
+static float small(void)
+{
+	return (float)(canvas_uniform() * pow(10, -6 * canvas_uniform()));
 }
 
 /* Every field that a canvas looks at; some tiles, and no more than the film has. */
@@ -63,30 +40,24 @@ static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint6
 {
 	struct batch b = {.key = {1, kind, group, part, epoch}};
 	uint32_t across = (WIDTH + TILE_SIZE - 1) / TILE_SIZE, down = (HEIGHT + TILE_SIZE - 1) / TILE_SIZE;
-	state = 1000003u * (uint64_t)(1 + part + PARTS * (group + GROUPS * (epoch + 100 * (uint64_t)kind)));
+	canvas_state = 1000003u * (uint64_t)(1 + part + PARTS * (group + GROUPS * (epoch + 100 * (uint64_t)kind)));
 	b.tiles = mem_alloc((size_t)across * down, sizeof *b.tiles);
 	for (uint32_t i = 0; kind == LEASE_RENDER && i < across * down; i++) {
-		uint32_t x = i % across * TILE_SIZE, y = i / across * TILE_SIZE;
-		uint32_t w = WIDTH - x < TILE_SIZE ? WIDTH - x : TILE_SIZE,
-			 h = HEIGHT - y < TILE_SIZE ? HEIGHT - y : TILE_SIZE;
-		if (next() % 3 == 0 || i == 4) /* the fifth tile is never touched */
+		if (canvas_next() % 3 == 0 || i == 4) /* the fifth tile is never touched */
 			continue;
-		struct tile *t = &b.tiles[b.tile_count++];
-		*t = (struct tile){x, y, w, h, mem_alloc((size_t)w * h * 3, sizeof(float))};
-		for (size_t k = 0; k < (size_t)w * h * 3; k++)
-			t->xyz[k] = (float)(uniform() * pow(10, -6 * uniform()));
+		b.tiles[b.tile_count++] = canvas_tile(p, i, small);
 	}
 	b.counters[COUNT_SAMPLES] = 2 * p->epoch;
-	b.counters[COUNT_INDEPENDENT] = p->epoch + next() % 4;
-	b.counters[COUNT_LONGEST_STUCK] = next() % 100;
-	b.independent_sum = uniform() * (double)p->epoch;
-	b.beyond_sum = uniform();
+	b.counters[COUNT_INDEPENDENT] = p->epoch + canvas_next() % 4;
+	b.counters[COUNT_LONGEST_STUCK] = canvas_next() % 100;
+	b.independent_sum = canvas_uniform() * (double)p->epoch;
+	b.beyond_sum = canvas_uniform();
 	for (int k = 0; k < PATH_CLASSES; k++)
-		b.classes[k] = uniform();
+		b.classes[k] = canvas_uniform();
 	b.moment_count = batch_moment_count(p, kind);
 	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
 	for (uint64_t k = 0; k < b.moment_count; k++)
-		b.moments[k] = (float)uniform();
+		b.moments[k] = (float)canvas_uniform();
 	return b;
 }
 
@@ -260,10 +231,10 @@ static void what_is_taken_back_leaves_nothing(void **unused)
 			add_nth(mended, &p, n);
 		}
 		while (!all_right(mended, done, wrong)) {
-			state = dice = dice * 6364136223846793005u + 1442695040888963407u;
-			unsigned i = (unsigned)(next() >> 20) % LEASES;
+			canvas_state = dice = dice * 6364136223846793005u + 1442695040888963407u;
+			unsigned i = (unsigned)(canvas_next() >> 20) % LEASES;
 			struct lease_key k = {1, LEASE_RENDER, i / PARTS, i % PARTS, done[i]};
-			bool lie = next() % 3 && wrong[i] < 2, notice = next() % 4 == 0;
+			bool lie = canvas_next() % 3 && wrong[i] < 2, notice = canvas_next() % 4 == 0;
 			if (wrong[i] && (notice || done[i] >= canvas_rounds(mended) + 2 || done[i] >= ROUNDS)) {
 				k.epoch--;
 				closed += k.epoch < canvas_rounds(mended);
