@@ -16,11 +16,9 @@ noted() {
 pilot=$!
 PIDS="$PIDS $pilot"
 until_true 60 grep -q 'is ignored' "$DIR/pilot.log" || fail "it reads no scene"
-kill -TERM $pilot
-got=0
-wait $pilot || got=$?
-[ $got = 143 ] && grep -q 'interrupted before rendering began' "$DIR/pilot.log" && ! grep -q 'chosen by a pilot' "$DIR/pilot.log" ||
-	fail "ended in its pilot: $got, $(cat "$DIR/pilot.log")"
+stop $pilot
+[ $CODE = 143 ] && grep -q 'interrupted before rendering began' "$DIR/pilot.log" && ! grep -q 'chosen by a pilot' "$DIR/pilot.log" ||
+	fail "ended in its pilot: $CODE, $(cat "$DIR/pilot.log")"
 
 # Ended in its first round: no image is written, and nothing is said of one; the bootstrap is there for the same command.
 EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536"
@@ -28,11 +26,9 @@ EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536"
 early=$!
 PIDS="$PIDS $early"
 until_true 60 grep -q '^running' "$DIR/early.log" || fail "its first lease does not end"
-kill -TERM $early
-got=0
-wait $early || got=$?
-[ $got = 1 ] && grep -q 'interrupted before the first round was complete: there is no image' "$DIR/early.log" ||
-	fail "ended before its first round: $got, $(cat "$DIR/early.log")"
+stop $early
+[ $CODE = 1 ] && grep -q 'interrupted before the first round was complete: there is no image' "$DIR/early.log" ||
+	fail "ended before its first round: $CODE, $(cat "$DIR/early.log")"
 [ ! -e "$DIR/early.exr" ] || fail "an image without a round was written"
 grep -q 'leases of the bootstrap are kept in .*early.exr.bootstrap, and the same command' "$DIR/early.log" && [ -s "$DIR/early.exr.bootstrap" ] ||
 	fail "it does not keep the bootstrap: $(cat "$DIR/early.log")"
@@ -40,10 +36,8 @@ grep -q 'leases of the bootstrap are kept in .*early.exr.bootstrap, and the same
 early=$!
 PIDS="$PIDS $early"
 until_true 60 grep -q 'continues from \([0-9]*\) of \1 leases of the bootstrap' "$DIR/again.log" || fail "it does not go on with it: $(cat "$DIR/again.log")"
-kill -TERM $early
-got=0
-wait $early || got=$?
-[ $got = 1 ] || fail "the second time it ended with $got"
+stop $early
+[ $CODE = 1 ] || fail "the second time it ended with $CODE"
 
 # A sphere whose wall shines and reflects 99 %: 0.99^128 of its light takes more edges than are simulated.
 cat >"$DIR/bright.xml" <<-'XML'

@@ -7,17 +7,12 @@
  * reference's own variance is subtracted from each comparison; a case whose reference has more than a tenth of the
  * renders' relMSE is left out, and said so. All scenes at the shortest length come first. SIGTERM ends it after the
  * case that is being measured, with the verdict on what there is.
- *
- *   calibration --renders 8 --lengths 2 --seeds second --scene room --reference 4 --integrator erpt
- *
- * Eight renders a case (20 if not given), half as many of each next length; the two shorter lengths (3); seeds made of
- * that word; scenes whose names begin with that; references four times as long; one integrator.
  */
 #include "tests/image/calibration_scenes.h"
+#include "common/base/program.h"
 #include "tests/support/repeats.h"
 #include "worker/render/world/build.h"
 
-#include <getopt.h>
 #include <math.h>
 #include <setjmp.h>
 #include <signal.h>
@@ -165,7 +160,7 @@ static void run_case(struct calibration *c, const struct calibration_scene *s, c
 
 static bool is_asked(const struct calibration *c, size_t k)
 {
-	return !*c->integrator || strcmp(c->integrator, integrators[k].name) == 0;
+	return !c->integrator || strcmp(c->integrator, integrators[k].name) == 0;
 }
 
 /* All scenes at one length; returns how many were begun. */
@@ -237,62 +232,36 @@ static bool judge(const struct calibration *c, int length)
 	return percent(&sum) >= 90 && (sum.stated < 100 || percent(&sum) <= 99);
 }
 
-/* false: not an option, or not a value that it has. */
-static bool take_options(int argc, char **argv, struct calibration *c)
+#define OF struct calibration
+static const char *integrator_name(size_t i)
 {
-	static const struct option options[] = {{"renders", required_argument, NULL, 'r'},
-						{"lengths", required_argument, NULL, 'l'},
-						{"seeds", required_argument, NULL, 's'},
-						{"scene", required_argument, NULL, 'n'},
-						{"reference", required_argument, NULL, 't'},
-						{"integrator", required_argument, NULL, 'i'},
-						{0}};
-	*c = (struct calibration){
-		.renders = 20, .last = LENGTHS, .seeds = "1", .scene = "", .times = 1, .integrator = ""};
-	bool right = true;
-	for (int o; (o = getopt_long(argc, argv, "", options, NULL)) != -1;)
-		switch (o) {
-		case 'r':
-			c->renders = (uint32_t)atoi(optarg);
-			right = right && atoi(optarg) > 0;
-			break;
-		case 'l':
-			c->last = atoi(optarg);
-			right = right && c->last > 0 && c->last <= LENGTHS;
-			break;
-		case 's':
-			c->seeds = optarg;
-			break;
-		case 'n':
-			c->scene = optarg;
-			break;
-		case 't':
-			c->times = atof(optarg);
-			right = right && c->times > 0;
-			break;
-		case 'i':
-			c->integrator = optarg;
-			break;
-		default:
-			return false;
-		}
-	return right && optind == argc;
+	return i < INTEGRATORS ? integrators[i].name : NULL;
 }
+
+static const struct option_row rows[] = {
+	{"renders", 'r', "N", "Renders of each case, half as many of each next length",
+	 OPTION_COUNT(OF, renders, 1, 1 << 20), .standard = "20"},
+	{"lengths", 'l', "N", "Only the shortest N lengths", OPTION_COUNT(OF, last, 1, LENGTHS), .standard = "3"},
+	{"seeds", 's', "WORD", "Makes the seeds; another word makes others", OPTION_TEXT(OF, seeds), .standard = "1"},
+	{"scene", 0, "NAME", "Only scenes whose names begin with it", OPTION_TEXT(OF, scene), .standard = ""},
+	{"reference", 0, "TIMES", "References so many times as long", OPTION_NUMBER(OF, times, 0, 1e6), .above = true,
+	 .standard = "1"},
+	{"integrator", 'i', "NAME", "Only this one", OPTION_TEXT(OF, integrator), .values = integrator_name},
+	{0}};
+#undef OF
+
+static const struct program program = {
+	.name = "calibration",
+	.summary = "Are the errors that images state their errors? Writes a table.",
+	.examples = "calibration --renders 8 --lengths 2 --seeds second --integrator erpt",
+	.exits = "0 they are, 1 too few or too many intervals hold, 2 usage",
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL},
+};
 
 int main(int argc, char **argv)
 {
 	static struct calibration c;
-	if (!take_options(argc, argv, &c)) {
-		fprintf(stderr, "calibration: see the beginning of tests/image/calibration.c for its options\n");
-		return 2;
-	}
-	size_t asked = 0;
-	for (size_t k = 0; k < INTEGRATORS; k++)
-		asked += is_asked(&c, k);
-	if (asked == 0) {
-		fprintf(stderr, "calibration: no integrator is called '%s'\n", c.integrator);
-		return 2;
-	}
+	program_options(&program, argc, argv, &c);
 	int scenes[LENGTHS] = {0};
 	signal(SIGTERM, end);
 	printf("| kind | scene | integrator | a pixel | true %% | stated %% | intervals | held | beyond 3 errors %% | CPU s |\n"
