@@ -1,17 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The errors of an image from the spread between groups: standard errors of pixels; weights 1 / (B^2 + (0.01 m)^2),
- * with estimates of the brightness B that are as little noisy as possible; sums of weighted errors, with bounds.
- * canvas_interval.c turns the sums into relMSE and its interval. All loops run in a fixed order over exact inputs, so
- * equal films give equal bits.
+ * The relative error of an image from the spread between groups: weights 1 / (B^2 + (0.01 m)^2), with estimates of
+ * the brightness B that are as little noisy as possible; sums of weighted errors, with bounds. tile_error.c makes the
+ * standard errors of pixels, canvas_interval.c turns the sums into relMSE and its interval. All loops run in a fixed
+ * order over exact inputs, so equal films give equal bits.
  */
 #include "common/estimate/canvas_error.h"
 
-#include "common/base/color.h"
 #include "common/base/mem.h"
-#include "common/estimate/canvas_interval.h"
 #include "common/estimate/inverse_square.h"
-#include "common/estimate/tail.h"
+#include "common/estimate/tile_error.h"
 
 #include <assert.h>
 #include <math.h>
@@ -33,97 +31,6 @@ static const double cancelled = 0.125;
  * chosen (worker/render/choose.h), but from at least 32 and 8. From fewer than ERRORS_LEAST it would be the index of
  * the bulk. */
 enum { TAIL = 128, TAIL_LEAST = 32, TAIL_MOST = 1 << 16, EXTREME = 4, ERRORS_LEAST = 2048 };
-
-/* A tile being worked on. Rows of `apart` hold three channels of `groups` values. */
-struct tile_error {
-	const struct canvas *c;
-	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
-	double floor_square;
-	bool lit;	       /* rendered by chains, and some visited the tile */
-	double mean_square[3]; /* over the tile's pixels */
-	float *apart;	       /* [height][width][3][groups]: a group's image minus the mean of the groups */
-	double brightness[TILE_SIZE * TILE_SIZE][3],
-		square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
-	double base[TILE_SIZE * TILE_SIZE][3],
-		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
-	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
-	bool settled[TILE_SIZE * TILE_SIZE][3], cancels[TILE_SIZE * TILE_SIZE][3];
-	struct error_sums sum;
-	struct tail tail; /* of the groups' errors on the bright side */
-};
-
-/* ---- standard errors */
-
-static float *apart_at(const struct tile_error *t, size_t pixel)
-{
-	return t->apart + pixel * 3 * t->groups;
-}
-
-/* The inner loops run over groups and are independent, so the compiler vectorises them. */
-static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
-{
-	uint32_t groups = t->groups;
-	double rgb[3][PLAN_MAX_GROUPS];
-	for (uint32_t g = 0; g < groups; g++) {
-		const int64_t *s = slot[g] + at;
-		double xyz[3] = {(double)s[0] * m->factor[g], (double)s[1] * m->factor[g], (double)s[2] * m->factor[g]},
-		       out[3];
-		rec709_from_xyz(xyz, out);
-		for (int k = 0; k < 3; k++)
-			rgb[k][g] = out[k];
-	}
-	float *apart = apart_at(t, pixel);
-	for (size_t k = 0; k < 3; k++) {
-		double mean = 0, square = 0;
-		for (uint32_t g = 0; g < groups; g++)
-			mean += rgb[k][g];
-		mean /= groups;
-		for (uint32_t g = 0; g < groups; g++) {
-			rgb[k][g] -= mean;
-			apart[k * groups + g] = (float)rgb[k][g];
-		}
-		double fourth = 0;
-		for (uint32_t g = 0; g < groups; g++) {
-			double q = rgb[k][g] * rgb[k][g];
-			square += q;
-			fourth += q * q;
-		}
-		t->square[pixel][k] = square / groups / (groups - 1);
-		t->kurtosis[pixel][k] = square > 0 ? fourth / (square * square) * groups : 0;
-	}
-}
-
-static bool is_dark(const struct tile_error *t, size_t pixel)
-{
-	return t->square[pixel][0] + t->square[pixel][1] + t->square[pixel][2] == 0;
-}
-
-static void tile_errors(struct making *m, struct tile_error *t)
-{
-	bool chains = m->c->plan.kind == PLAN_CHAINS;
-	t->lit = false;
-	memset(t->mean_square, 0, sizeof t->mean_square);
-	static const int64_t nothing[SLOT];
-	const int64_t *slot[PLAN_MAX_GROUPS];
-	size_t tile = (size_t)(t->y / TILE_SIZE) * m->c->tiles_across + t->x / TILE_SIZE;
-	for (uint32_t g = 0; g < t->groups; g++) {
-		size_t film = canvas_film(g, FILM_PREFIX);
-		slot[g] = *canvas_flags(m->c, film, tile) & TILE_USED ? canvas_slot(m->c, film, tile) : nothing;
-	}
-	for (uint32_t y = 0; y < t->height; y++)
-		for (uint32_t x = 0; x < t->width; x++) {
-			size_t pixel = (size_t)y * t->width + x,
-			       out = ((size_t)(t->y + y) * m->img->width + t->x + x) * 3;
-			pixel_error(m, t, slot, (size_t)y * SLOT_ROW + (size_t)x * TILE_CHANNELS, pixel);
-			for (size_t k = 0; k < 3; k++) {
-				t->brightness[pixel][k] = (double)m->img->rgb[out + k];
-				t->mean_square[k] += t->square[pixel][k] / t->width / t->height;
-			}
-			bool dark = is_dark(t, pixel);
-			m->img->unvisited += chains && dark;
-			t->lit |= chains && !dark;
-		}
-}
 
 /* ---- weights: 1 / (B^2 + floor), with an estimate of B that is as little noisy as possible */
 
@@ -161,7 +68,7 @@ static void add_share(struct tile_error *t, double part, double brightness, doub
  * group met is missing in that group's divisor. */
 static double by_others(const struct tile_error *t, size_t pixel, size_t k)
 {
-	const float *apart = apart_at(t, pixel) + k * t->groups;
+	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
 	double n = t->groups, sum = 0, all = t->square[pixel][k] * n * (n - 1);
 	for (uint32_t g = 0; g < t->groups; g++) {
 		double d = (double)apart[g], others = t->brightness[pixel][k] - d / (n - 1);
@@ -192,7 +99,7 @@ static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool beli
 	double divisor = divisor_square(t, brightness, square, believed_in ? 3 : 1);
 	float root = (float)(1 / sqrt(divisor)),
 	      slope = believed_in ? (float)(brightness / divisor / (t->groups - 1)) : 0;
-	float *apart = apart_at(t, pixel) + k * t->groups;
+	float *apart = tile_error_apart(t, pixel) + k * t->groups;
 	add_bounds(t, pixel, k, square / divisor, believed_in ? by_others(t, pixel, k) : square / divisor);
 	for (uint32_t g = 0; g < t->groups; g++) {
 		float x = slope * apart[g];
@@ -208,7 +115,7 @@ static void settle_cancelling(struct tile_error *t, size_t pixel, size_t k)
 	struct inverse_square weight =
 		inverse_square_expect(t->brightness[pixel][k], sqrt(square), sqrt(t->floor_square));
 	double part = square * weight.mean;
-	float *apart = apart_at(t, pixel) + k * t->groups, root = (float)sqrt(weight.mean);
+	float *apart = tile_error_apart(t, pixel) + k * t->groups, root = (float)sqrt(weight.mean);
 	add_bounds(t, pixel, k, part, part);
 	for (uint32_t g = 0; g < t->groups; g++)
 		apart[g] *= root;
@@ -252,7 +159,7 @@ static bool cancels(const struct tile_error *t, size_t pixel, size_t k)
 	if (t->groups < BASE_GROUPS || !(fabs(b[k]) < cancelled * fabs(b[most])) ||
 	    !believe(b[most], t->square[pixel][most], t->floor_square))
 		return false;
-	const float *apart = apart_at(t, pixel) + k * t->groups;
+	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
 	uint32_t above = 0, below = 0;
 	for (uint32_t g = 0; g < t->groups; g++) {
 		above += b[k] + (double)apart[g] > 0;
@@ -280,38 +187,6 @@ static uint32_t find_settled(struct tile_error *t)
 	return waiting;
 }
 
-/* Mean variance of the 3 x 3 pixels around one, within the tile. */
-static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
-{
-	double sum = 0, n = 0;
-	for (uint32_t j = y > 0 ? y - 1 : 0; j < t->height && j <= y + 1; j++)
-		for (uint32_t i = x > 0 ? x - 1 : 0; i < t->width && i <= x + 1; i++, n++)
-			sum += t->square[(size_t)j * t->width + i][k];
-	return sum / n;
-}
-
-/*
- * Standard errors of the tile's pixels. Where the brightness is not reliable, the variance of few groups is usually too
- * small, because rare light has not arrived yet: it is averaged with its neighbours'. A pixel that no chain visited
- * would have a variance of 0, a false claim; it gets the variance of its neighbours, of its tile, or (write_unvisited)
- * of the image.
- */
-static void write_errors(struct making *m, const struct tile_error *t)
-{
-	for (uint32_t y = 0; y < t->height; y++)
-		for (uint32_t x = 0; x < t->width; x++)
-			for (size_t k = 0; k < 3; k++) {
-				size_t pixel = (size_t)y * t->width + x;
-				double own = t->square[pixel][k], around = own;
-				if (!t->settled[pixel][k] || own == 0)
-					around = (own + square_around(t, x, y, k)) / 2;
-				if (around == 0 && t->lit)
-					around = t->mean_square[k];
-				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] =
-					(float)sqrt(around);
-			}
-}
-
 static double spread_square(const double *apart, uint32_t groups, double pixels)
 {
 	double square = 0;
@@ -328,7 +203,7 @@ static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double 
 	if (t->groups < BASE_GROUPS || !believe(base, doubt, t->floor_square))
 		return false;
 	double divisor = divisor_square(t, base, doubt, 1), part = t->square[pixel][k] / divisor;
-	float *apart = apart_at(t, pixel) + k * t->groups, root = (float)(1 / sqrt(divisor));
+	float *apart = tile_error_apart(t, pixel) + k * t->groups, root = (float)(1 / sqrt(divisor));
 	add_bounds(t, pixel, k, part, by_others(t, pixel, k));
 	for (uint32_t g = 0; g < t->groups; g++)
 		apart[g] *= root;
@@ -365,7 +240,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 				settle_pixel(t, pixel, k, false);
 				continue;
 			}
-			float *own = apart_at(t, pixel) + k * t->groups;
+			float *own = tile_error_apart(t, pixel) + k * t->groups;
 			if (settle_by_base(t, pixel, k, rare, square))
 				continue;
 			double own_part = t->square[pixel][k] / divisor;
@@ -386,7 +261,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 static void find_base(struct tile_error *t, size_t pixel, size_t k)
 {
 	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
-	const float *apart = apart_at(t, pixel) + k * t->groups;
+	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
 	uint32_t n = t->groups, drop = t->groups / 8;
 	for (uint32_t g = 0; g < n; g++)
 		d[g] = (double)apart[g];
@@ -405,7 +280,7 @@ static void find_base(struct tile_error *t, size_t pixel, size_t k)
 
 static void add_pixel(struct tile_error *t, struct block *b, size_t pixel)
 {
-	const float *apart = apart_at(t, pixel);
+	const float *apart = tile_error_apart(t, pixel);
 	size_t groups = t->groups;
 	b->pixels++;
 	for (size_t i = 0; i < 3 * groups; i++)
@@ -508,7 +383,7 @@ static void add_row(struct tile_error *t, size_t first)
 {
 	float gram[FOLDED][FOLDED] = {{0}};
 	for (size_t pixel = first; pixel < first + t->width; pixel++) {
-		const float *apart = apart_at(t, pixel);
+		const float *apart = tile_error_apart(t, pixel);
 		float folded[3][FOLDED] = {{0}};
 		add_to_tail(t, apart);
 		for (size_t k = 0; k < 3; k++) {
@@ -531,9 +406,9 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	t->y = y;
 	t->width = m->img->width - x < TILE_SIZE ? m->img->width - x : TILE_SIZE;
 	t->height = m->img->height - y < TILE_SIZE ? m->img->height - y : TILE_SIZE;
-	tile_errors(m, t);
+	tile_error_load(m, t);
 	bool all_settled = find_settled(t) == 0;
-	write_errors(m, t);
+	tile_error_write(m, t);
 	if (!all_settled) {
 		struct block whole;
 		settle_square(t, 0, 0, TILE_SIZE, &whole);
@@ -542,21 +417,6 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	}
 	for (uint32_t row = 0; row < t->height; row++)
 		add_row(t, (size_t)row * t->width);
-}
-
-/* Tiles that no chain visited have no variance of their own and get the mean of the image. */
-static void write_unvisited(struct canvas_image *img)
-{
-	size_t values = (size_t)img->width * img->height * 3;
-	double mean[3] = {0};
-	for (size_t i = 0; i < values; i++)
-		mean[i % 3] += (double)img->error[i] * (double)img->error[i] * 3 / (double)values;
-	for (size_t i = 0; i < values; i += 3) {
-		if (img->error[i] + img->error[i + 1] + img->error[i + 2] > 0)
-			continue;
-		for (size_t k = 0; k < 3; k++)
-			img->error[i + k] = (float)sqrt(mean[k]);
-	}
 }
 
 static void free_tile(struct tile_error *t)
@@ -590,7 +450,7 @@ int canvas_error(struct making *m, struct error *e)
 		for (uint32_t x = 0; x < m->img->width; x += TILE_SIZE)
 			error_tile(m, t, x, y);
 	if (m->img->unvisited)
-		write_unvisited(m->img);
+		tile_error_fill_unvisited(m->img);
 	t->sum.groups = t->groups;
 	t->sum.tail = find_tail(&t->tail, errors);
 	t->sum.tail_errors = tail_size(errors);

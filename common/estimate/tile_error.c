@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Standard errors of pixels: the spread between groups, and where it is too small because little light has arrived,
+ * that of the neighbourhood. All loops run in a fixed order over exact inputs, so equal films give equal bits.
+ */
+#include "common/estimate/tile_error.h"
+
+#include "common/base/color.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The inner loops run over groups and are independent, so the compiler vectorises them. */
+static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
+{
+	uint32_t groups = t->groups;
+	double rgb[3][PLAN_MAX_GROUPS];
+	for (uint32_t g = 0; g < groups; g++) {
+		const int64_t *s = slot[g] + at;
+		double xyz[3] = {(double)s[0] * m->factor[g], (double)s[1] * m->factor[g], (double)s[2] * m->factor[g]},
+		       out[3];
+		rec709_from_xyz(xyz, out);
+		for (int k = 0; k < 3; k++)
+			rgb[k][g] = out[k];
+	}
+	float *apart = tile_error_apart(t, pixel);
+	for (size_t k = 0; k < 3; k++) {
+		double mean = 0, square = 0;
+		for (uint32_t g = 0; g < groups; g++)
+			mean += rgb[k][g];
+		mean /= groups;
+		for (uint32_t g = 0; g < groups; g++) {
+			rgb[k][g] -= mean;
+			apart[k * groups + g] = (float)rgb[k][g];
+		}
+		double fourth = 0;
+		for (uint32_t g = 0; g < groups; g++) {
+			double q = rgb[k][g] * rgb[k][g];
+			square += q;
+			fourth += q * q;
+		}
+		t->square[pixel][k] = square / groups / (groups - 1);
+		t->kurtosis[pixel][k] = square > 0 ? fourth / (square * square) * groups : 0;
+	}
+}
+
+static bool is_dark(const struct tile_error *t, size_t pixel)
+{
+	return t->square[pixel][0] + t->square[pixel][1] + t->square[pixel][2] == 0;
+}
+
+void tile_error_load(struct making *m, struct tile_error *t)
+{
+	bool chains = m->c->plan.kind == PLAN_CHAINS;
+	t->lit = false;
+	memset(t->mean_square, 0, sizeof t->mean_square);
+	static const int64_t nothing[SLOT];
+	const int64_t *slot[PLAN_MAX_GROUPS];
+	size_t tile = (size_t)(t->y / TILE_SIZE) * m->c->tiles_across + t->x / TILE_SIZE;
+	for (uint32_t g = 0; g < t->groups; g++) {
+		size_t film = canvas_film(g, FILM_PREFIX);
+		slot[g] = *canvas_flags(m->c, film, tile) & TILE_USED ? canvas_slot(m->c, film, tile) : nothing;
+	}
+	for (uint32_t y = 0; y < t->height; y++)
+		for (uint32_t x = 0; x < t->width; x++) {
+			size_t pixel = (size_t)y * t->width + x,
+			       out = ((size_t)(t->y + y) * m->img->width + t->x + x) * 3;
+			pixel_error(m, t, slot, (size_t)y * SLOT_ROW + (size_t)x * TILE_CHANNELS, pixel);
+			for (size_t k = 0; k < 3; k++) {
+				t->brightness[pixel][k] = (double)m->img->rgb[out + k];
+				t->mean_square[k] += t->square[pixel][k] / t->width / t->height;
+			}
+			bool dark = is_dark(t, pixel);
+			m->img->unvisited += chains && dark;
+			t->lit |= chains && !dark;
+		}
+}
+
+/* Mean variance of the 3 x 3 pixels around one, within the tile. */
+static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
+{
+	double sum = 0, n = 0;
+	for (uint32_t j = y > 0 ? y - 1 : 0; j < t->height && j <= y + 1; j++)
+		for (uint32_t i = x > 0 ? x - 1 : 0; i < t->width && i <= x + 1; i++, n++)
+			sum += t->square[(size_t)j * t->width + i][k];
+	return sum / n;
+}
+
+/*
+ * Standard errors of the tile's pixels. Where the brightness is not reliable, the variance of few groups is usually too
+ * small, because rare light has not arrived yet: it is averaged with its neighbours'. A pixel that no chain visited
+ * would have a variance of 0, a false claim; it gets the variance of its neighbours, of its tile, or
+ * (tile_error_fill_unvisited) of the image.
+ */
+void tile_error_write(struct making *m, const struct tile_error *t)
+{
+	for (uint32_t y = 0; y < t->height; y++)
+		for (uint32_t x = 0; x < t->width; x++)
+			for (size_t k = 0; k < 3; k++) {
+				size_t pixel = (size_t)y * t->width + x;
+				double own = t->square[pixel][k], around = own;
+				if (!t->settled[pixel][k] || own == 0)
+					around = (own + square_around(t, x, y, k)) / 2;
+				if (around == 0 && t->lit)
+					around = t->mean_square[k];
+				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] =
+					(float)sqrt(around);
+			}
+}
+
+void tile_error_fill_unvisited(struct canvas_image *img)
+{
+	size_t values = (size_t)img->width * img->height * 3;
+	double mean[3] = {0};
+	for (size_t i = 0; i < values; i++)
+		mean[i % 3] += (double)img->error[i] * (double)img->error[i] * 3 / (double)values;
+	for (size_t i = 0; i < values; i += 3) {
+		if (img->error[i] + img->error[i + 1] + img->error[i + 2] > 0)
+			continue;
+		for (size_t k = 0; k < 3; k++)
+			img->error[i + k] = (float)sqrt(mean[k]);
+	}
+}

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The spread between groups in one tile of an image, and the error layer that is made from it. Private to
+ * common/estimate. Pure; nothing allocates.
+ */
+#ifndef COMMON_ESTIMATE_TILE_ERROR_H
+#define COMMON_ESTIMATE_TILE_ERROR_H
+
+#include "common/estimate/canvas_interval.h"
+#include "common/estimate/making.h"
+#include "common/estimate/tail.h"
+
+/* A tile being worked on. Rows of `apart` hold three channels of `groups` values. */
+struct tile_error {
+	const struct canvas *c;
+	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
+	double floor_square;
+	bool lit;	       /* rendered by chains, and some visited the tile */
+	double mean_square[3]; /* over the tile's pixels */
+	float *apart;	       /* [height][width][3][groups]: a group's image minus the mean of the groups */
+	double brightness[TILE_SIZE * TILE_SIZE][3],
+		square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
+	double base[TILE_SIZE * TILE_SIZE][3],
+		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
+	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
+	bool settled[TILE_SIZE * TILE_SIZE][3], cancels[TILE_SIZE * TILE_SIZE][3];
+	struct error_sums sum;
+	struct tail tail; /* of the groups' errors on the bright side */
+};
+
+/* A pixel's deviations: [3][groups]. */
+static inline float *tile_error_apart(const struct tile_error *t, size_t pixel)
+{
+	return t->apart + pixel * 3 * t->groups;
+}
+
+/* Fills in what follows from the film of the tile at (x, y): apart, brightness, square, kurtosis, mean_square, lit.
+ * Counts the image's unvisited pixels. */
+void tile_error_load(struct making *m, struct tile_error *t);
+
+/* Writes the standard errors of the tile's pixels into the image; `settled` must be known. */
+void tile_error_write(struct making *m, const struct tile_error *t);
+
+/* Gives the mean variance of the image to tiles that no chain visited, which have none of their own. */
+void tile_error_fill_unvisited(struct canvas_image *img);
+
+#endif
