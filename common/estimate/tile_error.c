@@ -10,6 +10,11 @@
 #include <math.h>
 #include <string.h>
 
+/* Squares of up to RARE pixels a side share their variance where more than this share of it is that of pixels in which
+ * one group outweighs all others. */
+enum { RARE = 16 };
+static const double rare_share = 1. / 3;
+
 /* The inner loops run over groups and are independent, so the compiler vectorises them. */
 static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
 {
@@ -87,13 +92,49 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 }
 
 /*
+ * Raises `rare` in a square of pixels to their mean variance if much of that belongs to pixels where one group
+ * outweighs all others. Such light is too rare for the groups to show how often it comes: pixels that it did not reach
+ * have groups that agree, on too small a value. The bright pixels keep what they have, so the square's sum grows.
+ */
+static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
+{
+	uint32_t right = x + size < t->width ? x + size : t->width, low = y + size < t->height ? y + size : t->height;
+	double all = 0, single = 0, n = (double)(right - x) * (low - y);
+	for (uint32_t j = y; j < low; j++)
+		for (uint32_t i = x; i < right; i++) {
+			size_t pixel = (size_t)j * t->width + i;
+			all += t->square[pixel][k];
+			single += tile_error_is_single(t, pixel, k) ? t->square[pixel][k] : 0;
+		}
+	if (single <= rare_share * all)
+		return;
+	for (uint32_t j = y; j < low; j++)
+		for (uint32_t i = x; i < right; i++) {
+			size_t pixel = (size_t)j * t->width + i;
+			rare[pixel] = fmax(rare[pixel], all / n);
+		}
+}
+
+static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
+{
+	memset(rare, 0, 3 * sizeof *rare);
+	for (size_t k = 0; k < 3; k++)
+		for (uint32_t size = 2; size <= RARE; size *= 2)
+			for (uint32_t y = 0; y < t->height; y += size)
+				for (uint32_t x = 0; x < t->width; x += size)
+					raise_square(t, k, x, y, size, rare[k]);
+}
+
+/*
  * Standard errors of the tile's pixels. Where the brightness is not reliable, the variance of few groups is usually too
- * small, because rare light has not arrived yet: it is averaged with its neighbours'. A pixel that no chain visited
- * would have a variance of 0, a false claim; it gets the variance of its neighbours, of its tile, or
- * (tile_error_fill_unvisited) of the image.
+ * small, because rare light has not arrived yet: it is averaged with its neighbours', and is at least that of rare
+ * light around it. A pixel that no chain visited would have a variance of 0, a false claim; it gets the variance of its
+ * neighbours, of its tile, or (tile_error_fill_unvisited) of the image.
  */
 void tile_error_write(struct making *m, const struct tile_error *t)
 {
+	double rare[3][TILE_SIZE * TILE_SIZE];
+	find_rare(t, rare);
 	for (uint32_t y = 0; y < t->height; y++)
 		for (uint32_t x = 0; x < t->width; x++)
 			for (size_t k = 0; k < 3; k++) {
@@ -103,6 +144,7 @@ void tile_error_write(struct making *m, const struct tile_error *t)
 					around = (own + square_around(t, x, y, k)) / 2;
 				if (around == 0 && t->lit)
 					around = t->mean_square[k];
+				around = fmax(around, rare[k][pixel]);
 				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] =
 					(float)sqrt(around);
 			}
