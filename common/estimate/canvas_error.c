@@ -20,6 +20,10 @@ enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS, BASE_GROUPS = 8 };
 /* Squared relative standard error below which a pixel's own brightness is used. */
 static const double believed = 0.08;
 
+/* A kurtosis above this share of the number of groups: one of them has most of the pixel's variance. A single
+ * outlier would have nearly 1. */
+static const double one_group = 0.6;
+
 /* A channel darker than this share of its pixel's brightest one may be the remainder of colours that cancel. */
 static const double cancelled = 0.125;
 
@@ -82,7 +86,7 @@ static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part
 	t->sum.low += square / divisor_square(t, t->brightness[pixel][k], square, 1);
 	t->sum.high += high;
 	t->sum.kurtosis += part * t->kurtosis[pixel][k];
-	if (tile_error_is_single(t, pixel, k))
+	if (t->kurtosis[pixel][k] > one_group * t->groups)
 		t->sum.one_group += part;
 }
 

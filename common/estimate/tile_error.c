@@ -10,10 +10,10 @@
 #include <math.h>
 #include <string.h>
 
-/* Squares of up to RARE pixels a side share their variance where more than this share of it is that of pixels in which
- * one group outweighs all others. */
+/* Squares of up to RARE pixels a side share their variance where more than rare_share of it is that of pixels in which
+ * one or two groups outweigh all others: their kurtosis is above rare_kurtosis times the number of groups. */
 enum { RARE = 16 };
-static const double rare_share = 1. / 3;
+static const double rare_share = 1. / 3, rare_kurtosis = 0.45;
 
 /* The inner loops run over groups and are independent, so the compiler vectorises them. */
 static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
@@ -92,21 +92,21 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 }
 
 /*
- * Raises `rare` in a square of pixels to their mean variance if much of that belongs to pixels where one group
- * outweighs all others. Such light is too rare for the groups to show how often it comes: pixels that it did not reach
- * have groups that agree, on too small a value. The bright pixels keep what they have, so the square's sum grows.
+ * Raises `rare` in a square of pixels to their mean variance if much of that belongs to pixels where one or two
+ * groups outweigh all others. Such light is too rare for the groups to show how often it comes: pixels that it did not
+ * reach have groups that agree, on too small a value. The bright pixels keep what they have, so the square's sum grows.
  */
 static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
 {
 	uint32_t right = x + size < t->width ? x + size : t->width, low = y + size < t->height ? y + size : t->height;
-	double all = 0, single = 0, n = (double)(right - x) * (low - y);
+	double all = 0, few = 0, n = (double)(right - x) * (low - y);
 	for (uint32_t j = y; j < low; j++)
 		for (uint32_t i = x; i < right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
 			all += t->square[pixel][k];
-			single += tile_error_is_single(t, pixel, k) ? t->square[pixel][k] : 0;
+			few += t->kurtosis[pixel][k] > rare_kurtosis * t->groups ? t->square[pixel][k] : 0;
 		}
-	if (single <= rare_share * all)
+	if (few <= rare_share * all)
 		return;
 	for (uint32_t j = y; j < low; j++)
 		for (uint32_t i = x; i < right; i++) {

@@ -34,13 +34,6 @@ static inline float *tile_error_apart(const struct tile_error *t, size_t pixel)
 	return t->apart + pixel * 3 * t->groups;
 }
 
-/* Whether one group has most of the pixel's variance. A single outlier would have a kurtosis of nearly the number of
- * groups. */
-static inline bool tile_error_is_single(const struct tile_error *t, size_t pixel, size_t k)
-{
-	return t->kurtosis[pixel][k] > 0.6 * t->groups;
-}
-
 /* Fills in what follows from the film of the tile at (x, y): apart, brightness, square, kurtosis, mean_square, lit.
  * Counts the image's unvisited pixels. */
 void tile_error_load(struct making *m, struct tile_error *t);

@@ -19,8 +19,8 @@ list=list
 # would catch everything.
 run() {
 	case $1 in
-	*@*) ROOM=${1#*@} build/tests/limit/limit 300 900 "build/tests/${1%@*}" < /dev/null > /dev/null 2>&1 ;;
-	*) build/tests/limit/limit 300 900 "build/tests/$1" < /dev/null > /dev/null 2>&1 ;;
+	*@*) ROOM=${1#*@} build/tests/limit/limit 900 900 "build/tests/${1%@*}" < /dev/null > /dev/null 2>&1 ;;
+	*) build/tests/limit/limit 900 900 "build/tests/$1" < /dev/null > /dev/null 2>&1 ;;
 	esac
 }
 binaries() {
