@@ -11,9 +11,10 @@
 #include <string.h>
 
 /* Squares of up to RARE pixels a side share their variance where more than rare_share of it is that of pixels in which
- * one or two groups outweigh all others: their kurtosis is above rare_kurtosis times the number of groups. */
+ * one or two groups outweigh all others: their kurtosis is above rare_kurtosis times the number of groups, and above
+ * that of eight groups, since normal values of fewer have as much. */
 enum { RARE = 16 };
-static const double rare_share = 1. / 3, rare_kurtosis = 0.45;
+static const double rare_share = 1. / 3, rare_kurtosis = 0.45, rare_kurtosis_least = 3.6;
 
 /* The inner loops run over groups and are independent, so the compiler vectorises them. */
 static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
@@ -99,12 +100,13 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
 {
 	uint32_t right = x + size < t->width ? x + size : t->width, low = y + size < t->height ? y + size : t->height;
-	double all = 0, few = 0, n = (double)(right - x) * (low - y);
+	double limit = fmax(rare_kurtosis * t->groups, rare_kurtosis_least), all = 0, few = 0,
+	       n = (double)(right - x) * (low - y);
 	for (uint32_t j = y; j < low; j++)
 		for (uint32_t i = x; i < right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
 			all += t->square[pixel][k];
-			few += t->kurtosis[pixel][k] > rare_kurtosis * t->groups ? t->square[pixel][k] : 0;
+			few += t->kurtosis[pixel][k] > limit ? t->square[pixel][k] : 0;
 		}
 	if (few <= rare_share * all)
 		return;
