@@ -23,6 +23,8 @@ enum {
 	DEFAULT_CHAINS = 1024,
 	DEFAULT_BOOTSTRAP = 1000000,
 	LEAST_BOOTSTRAP = 16384,
+	FEW_BOOTSTRAP = 4096,	    /* of samples, which it only scales, in short renders */
+	SHARE_BOOTSTRAP = 64,	    /* one in so many of their samples */
 	LEAST_BOOTSTRAP_SLOW = 256, /* a bootstrap sample of thousands of rays joins as many vertices: 256 find light if
 				       there is any */
 	LEAST_CHAINS = 16,
@@ -377,7 +379,7 @@ static int make_bootstrap(const struct plan_request *r, struct plan *p, uint64_t
 	uint64_t n = r->bootstrap, leases = (uint64_t)p->groups * p->parts;
 	double expected = fmin(total ? (double)total : INFINITY, room_in_time(r));
 	if (!n && p->kind == PLAN_SAMPLES)
-		n = LEAST_BOOTSTRAP;
+		n = clamp((uint64_t)fmin(expected / SHARE_BOOTSTRAP, LEAST_BOOTSTRAP), FEW_BOOTSTRAP, LEAST_BOOTSTRAP);
 	else if (!n)
 		n = clamp((uint64_t)fmin(expected / 8, DEFAULT_BOOTSTRAP), LEAST_BOOTSTRAP, DEFAULT_BOOTSTRAP);
 	if (!r->bootstrap && (r->seconds > 0 || r->target_error > 0)) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Makes the map of brightness that all leases of a job share. It is sampled by bdpt, which finds all light that the
- * render finds, with about one sample a pixel: that costs little compared with any render.
+ * render finds, with about one sample a pixel, and in short renders with no more samples than their bootstrap has.
  *
  * -ENOMEM; -EDOM after an invalid floating-point operation. Nothing is left allocated then.
  */
@@ -13,12 +13,16 @@
 #include "common/base/mem.h"
 #include "worker/render/math/fptrap.h"
 
-enum { SAMPLES_LEAST = 1 << 12, SAMPLES_MOST = 1 << 17 };
+enum { SAMPLES_LEAST = 1 << 12, SAMPLES_SHORT = 1 << 14, SAMPLES_MOST = 1 << 17 };
 
-static uint64_t samples_of(const struct film_window *w)
+/* The nearest power of two. */
+static uint64_t samples_of(const struct film_window *w, const struct plan *p)
 {
 	uint64_t n = SAMPLES_LEAST;
-	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < w->width * w->height)
+	double want = w->width * w->height;
+	if (p->bootstrap < SAMPLES_SHORT)
+		want = fmin(want, (double)p->bootstrap);
+	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < want)
 		n *= 2;
 	return n;
 }
@@ -31,8 +35,8 @@ static int sample_map(struct brightness *map, struct path_context *c, const stru
 				 "an invalid floating-point operation (SIGFPE) in the map of brightness for '%s'",
 				 p->integrator);
 	jmp_buf *caught = fptrap_catch(&back);
-	int rc = brightness_of_samples(map, c, path_trace_both_ways, p->seed, RNG_BRIGHTNESS, 0, samples_of(&c->window),
-				       e);
+	int rc = brightness_of_samples(map, c, path_trace_both_ways, p->seed, RNG_BRIGHTNESS, 0,
+				       samples_of(&c->window, p), e);
 	fptrap_catch(caught);
 	return rc;
 }
