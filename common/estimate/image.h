@@ -60,6 +60,9 @@ struct canvas_image {
 	uint32_t tiles_across, tiles_down;
 	float *r_hat, *tile_error, *tile_share;
 	struct path_class_energy classes[PATH_CLASSES];
+	/* Samples that leave some of their light to chains: the chains' share in b, and in its variance between the
+	 * groups; NAN where that is 0 / 0. */
+	double chains_energy, chains_variance;
 	double b, b_error; /* pooled b and its standard error (chains); stated_b_doubt says when that is not valid */
 	double b_tail;	   /* tail index of the independent samples whose mean is b; 0: not known */
 	double beyond_share;

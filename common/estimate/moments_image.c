@@ -93,6 +93,12 @@ static double chains_time(const struct moments *m, uint32_t group, size_t class,
 	return exact_sum_value(&sum);
 }
 
+/* What the unit of a class's sums carries: chains count time, samples what they leave to chains. */
+static double unit_of(const struct moments *m, const struct moments_group *of)
+{
+	return m->plan.kind == PLAN_CHAINS ? of->b : 1;
+}
+
 static void make_class(const struct moments *m, const struct moments_group *groups, size_t class, bool open_rounds,
 		       struct path_class_energy *out)
 {
@@ -103,7 +109,7 @@ static void make_class(const struct moments *m, const struct moments_group *grou
 		double sum = exact_sum_value(&m->bootstrap[(size_t)g * PATH_CLASSES + class]);
 		double time = of->mutations ? chains_time(m, g, class, open_rounds) : 0;
 		bootstrap[g] = of->bootstrap ? sum / (double)of->bootstrap : 0;
-		chains[g] = of->mutations ? of->b * time / (double)of->mutations : 0;
+		chains[g] = of->mutations ? unit_of(m, of) * time / (double)of->mutations : 0;
 		difference[g] = chains[g] - bootstrap[g];
 	}
 	out->bootstrap = mean_of(bootstrap, count, &out->bootstrap_error);
@@ -111,6 +117,23 @@ static void make_class(const struct moments *m, const struct moments_group *grou
 	double mean = mean_of(difference, count, &error);
 	bool compared = m->per_lease && (out->bootstrap > 0 || out->chains > 0);
 	out->difference_t = compared && !(mean == 0 && error == 0) ? mean / error : NAN;
+}
+
+/* The share of chains in the light, and in the variance of b, of samples that leave some of it to them. */
+static void find_chains_part(const struct moments *m, const struct moments_group *groups, bool open_rounds,
+			     struct canvas_image *img)
+{
+	double chains[PLAN_MAX_GROUPS], rest[PLAN_MAX_GROUPS], chains_error, rest_error;
+	for (uint32_t g = 0; g < m->plan.groups; g++) {
+		chains[g] = 0;
+		for (size_t k = 0; k < PATH_CLASSES && groups[g].mutations; k++)
+			chains[g] += chains_time(m, g, k, open_rounds) / (double)groups[g].mutations;
+		rest[g] = groups[g].b - chains[g];
+	}
+	double of_chains = mean_of(chains, m->plan.groups, &chains_error),
+	       of_rest = mean_of(rest, m->plan.groups, &rest_error);
+	img->chains_energy = of_chains / (of_chains + of_rest);
+	img->chains_variance = chains_error * chains_error / (chains_error * chains_error + rest_error * rest_error);
 }
 
 int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
@@ -121,6 +144,8 @@ int moments_image(const struct moments *m, const struct moments_group *groups, u
 	img->tiles_down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
 	for (size_t k = 0; k < PATH_CLASSES; k++)
 		make_class(m, groups, k, open_rounds, &img->classes[k]);
+	if (p->kind == PLAN_SAMPLES)
+		find_chains_part(m, groups, open_rounds, img);
 	if (m->per_lease == 0 || open_rounds || rounds == 0)
 		return 0;
 	double chains = (double)(p->chains / m->leases / m->per_lease);

@@ -50,6 +50,7 @@ enum batch_counter {
 				   started this one */
 	COUNT_SPREAD,		/* contributions too bright for a sample, which chains spread */
 	COUNT_SPREAD_MUTATIONS, /* mutations of these chains */
+	COUNT_SPREAD_RAYS,	/* rays that these chains took, part of COUNT_RAYS_CLOSEST and COUNT_RAYS_SHADOW */
 };
 
 /* Counters of the chains of a lease for each strategy of the plan's mixture; names in common/estimate/strategy.h.
@@ -101,7 +102,7 @@ struct batch {
 	 * not part of independent_sum (b is the integral of what chains can reach). */
 	double independent_sum, independent_square, beyond_sum;
 	/* By path class. Bootstrap: the terms of independent_sum. Chains: time, the sum of w times the class's share
-	 * of the state's I. Otherwise 0. */
+	 * of the state's I. Samples: the part of independent_sum that chains spread. */
 	double classes[PATH_CLASSES];
 	double cpu_seconds; /* not part of the result's bits */
 	uint32_t tile_count;

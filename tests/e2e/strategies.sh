@@ -56,4 +56,22 @@ counters "$DIR/status.json" >"$DIR/by-farm"
 [ "$(wc -l <"$DIR/by-farm")" -ge 30 ] || fail "the status has few counters: $(cat "$DIR/by-farm")"
 cmp -s "$DIR/by-render" "$DIR/by-farm" || fail "other counters: $(diff "$DIR/by-render" "$DIR/by-farm")"
 "$BIN/hslt-status" "$id" | grep -q '^hslt  *[0-9]' || fail "hslt-status shows no table"
+
+# Samples that leave some of their light to chains: each part's share of light, variance and rays; a farm has them from batches.
+GLASS="$(dirname "$0")/../scenes/displaced/water.xml --integrator erpt --size 64x36 --spp 32"
+"$BIN/hslt-render" $GLASS -o "$DIR/parts.exr" --stats "$DIR/parts.json" 2>"$DIR/parts.log" || fail "erpt ended with $?"
+grep -q '^chains that spread .* % of the light, .* % of the variance of b, .* % of the rays' "$DIR/parts.log" || fail "no parts"
+"${PYTHON:-python3}" - "$DIR/parts.json" <<-'END' || fail "$(grep -A 16 '"parts"' "$DIR/parts.json")"
+	import json, sys
+
+	stats = json.load(open(sys.argv[1]))
+	samples, chains = stats["parts"]
+	assert [samples["part"], chains["part"]] == ["samples", "chains"]
+	for share in "energy", "varianceOfB", "rays":
+	    assert abs(samples[share] + chains[share] - 1) < 1e-9 and 0 < chains[share] < 1, share
+	spread = sum(c["chains"] for c in stats["classes"])
+	assert abs(spread / stats["b"] - chains["energy"]) < 1e-9
+END
+id=$(submit $GLASS -o "$DIR/parts-farm.exr" --wait) || fail "hslt-submit ended with $?"
+same "$DIR/parts.exr" "$DIR/parts-farm.exr"
 echo "$(sed -n '/^hslt /p' "$DIR/render.log")"

@@ -28,6 +28,7 @@ static const char *const counter_names[BATCH_COUNTERS] = {
 	[COUNT_STATES_LOST] = "statesLost",
 	[COUNT_SPREAD] = "spread",
 	[COUNT_SPREAD_MUTATIONS] = "spreadMutations",
+	[COUNT_SPREAD_RAYS] = "spreadRays",
 };
 
 static json_t *plan_json(const struct stats *s)
@@ -63,6 +64,32 @@ static json_t *image_json(const struct canvas_image *i)
 			 "beyondShare", forecast_real(i->beyond_share), "counters", counters);
 }
 
+double stats_chains_rays(const struct canvas_image *i)
+{
+	const uint64_t *c = i->counts.counters, all = c[COUNT_RAYS_CLOSEST] + c[COUNT_RAYS_SHADOW];
+	return all ? (double)c[COUNT_SPREAD_RAYS] / (double)all : 0;
+}
+
+static json_t *part_json(const char *name, double energy, double variance, double rays)
+{
+	return json_pack("{s:s s:o s:o s:o}", "part", name, "energy", forecast_real(energy), "varianceOfB",
+			 forecast_real(variance), "rays", forecast_real(rays));
+}
+
+/* Of a render whose samples leave some light to chains: what each part has of the light, of the noise and of the work.
+ */
+static json_t *parts_json(const struct canvas_image *i)
+{
+	json_t *parts = json_array();
+	double rays = stats_chains_rays(i);
+	if (i->counts.counters[COUNT_SPREAD] > 0) {
+		json_array_append_new(parts,
+				      part_json("samples", 1 - i->chains_energy, 1 - i->chains_variance, 1 - rays));
+		json_array_append_new(parts, part_json("chains", i->chains_energy, i->chains_variance, rays));
+	}
+	return parts;
+}
+
 static json_t *effects_json(const struct render_summary *m)
 {
 	json_t *effects = json_array();
@@ -91,6 +118,7 @@ int stats_write(const char *path, const struct stats *s, struct error *e)
 	bool whole = json_object_update_new(o, image_json(s->image)) == 0 &&
 		     json_object_set_new(o, "choice", choice_to_json(s->choice)) == 0 &&
 		     json_object_set_new(o, "effects", effects_json(s->summary)) == 0 &&
+		     json_object_set_new(o, "parts", parts_json(s->image)) == 0 &&
 		     json_object_set_new(o, "looks", forecast_looks_to_json(s->looks)) == 0 &&
 		     json_object_update_new(o, end_json(s)) == 0;
 	char *text = whole ? json_dumps(o, JSON_INDENT(2)) : NULL;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The contents of --stats FILE, as JSON: plan, reasons for its integrator, times, counters, strategies, effects, the
- * bound that ended the render. One thread.
+ * The contents of --stats FILE, as JSON: plan, reasons for its integrator, times, counters, strategies, effects, parts
+ * that samples and chains have, the bound that ended the render. One thread.
  */
 #ifndef WORKER_CLI_RENDER_STATS_H
 #define WORKER_CLI_RENDER_STATS_H
@@ -21,6 +21,9 @@ struct stats {
 	const struct forecast_history *looks;
 	const struct choice *choice; /* of the integrator */
 };
+
+/* The share of all rays that chains took which spread the light of samples. */
+double stats_chains_rays(const struct canvas_image *i);
 
 int stats_write(const char *path, const struct stats *s, struct error *e);
 

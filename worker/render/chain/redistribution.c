@@ -16,6 +16,7 @@
 #include "worker/render/chain/path_place.h"
 #include "worker/render/math/logsum.h"
 #include "worker/render/mutation/mixture.h"
+#include "worker/render/path/classes.h"
 #include "worker/render/path/full_path_density.h"
 #include "worker/render/world/build.h"
 
@@ -39,7 +40,7 @@ struct redistribution {
 	struct mutation_ctx mutation;
 	uint64_t unread[STRATEGY_COUNTERS];
 	uint64_t pixel, sample;
-	double taken;
+	double taken, *classes;
 	struct spread_place start, places[2];
 };
 
@@ -143,6 +144,11 @@ static unsigned chains_for(double units, double u, double *each)
 	return (unsigned)n;
 }
 
+static uint64_t rays_of(const struct path_context *c)
+{
+	return c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW];
+}
+
 static spectrum keep(struct path_split *split, struct path_context *c, unsigned s, unsigned t, const double film[2],
 		     spectrum l)
 {
@@ -162,13 +168,16 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 	rng_uniform4(r->mutation.seed, RNG_REDISTRIBUTION, r->pixel, r->sample, technique * 2, u);
 	unsigned n = chains_for(share * relative / carries, u[0], &each);
 	r->taken += share * intensity;
+	r->classes[path_class_whole(&x->place.path)] += share * intensity;
 	c->counters[COUNT_SPREAD]++;
 	c->counters[COUNT_SPREAD_MUTATIONS] += (uint64_t)n * r->rule.length;
 	rng_bits4(r->mutation.seed, RNG_REDISTRIBUTION, r->pixel, r->sample, technique * 2 + 1, id);
+	const uint64_t rays = rays_of(c);
 	for (unsigned k = 0; k < n; k++) {
 		r->mutation.chain = id[0] + k;
 		spread(r, x, each / r->rule.mutations / (c->window.width * c->window.height));
 	}
+	c->counters[COUNT_SPREAD_RAYS] += rays_of(c) - rays;
 	return spectrum_scale(1 - share, l);
 }
 
@@ -188,7 +197,7 @@ static void leave_out_independent(struct mixture *m)
 
 int redistribution_new(struct redistribution **out, const struct redistribution_rule *rule,
 		       const struct path_context *c, const struct brightness *map, uint64_t seed,
-		       struct film_sums *film, struct error *e)
+		       struct film_sums *film, double classes[PATH_CLASSES], struct error *e)
 {
 	struct render_summary summary;
 	struct redistribution *r = *out = mem_alloc(1, sizeof *r);
@@ -202,6 +211,7 @@ int redistribution_new(struct redistribution **out, const struct redistribution_
 	r->light_every = c->light_every;
 	r->map = map;
 	r->film = film;
+	r->classes = classes;
 	world_summary(c->w, &summary);
 	mixture_default(&summary, &r->mixture);
 	leave_out_independent(&r->mixture);

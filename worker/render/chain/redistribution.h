@@ -41,8 +41,10 @@ extern const struct redistribution_rule redistribution_usual;
 enum { REDISTRIBUTION_CHAINS = 64 }; /* for one contribution */
 
 /* c: that of the samples; world, window, depths, light_every and counters are taken from it. -ENOMEM */
+/* classes: gets the sums of what is spread, I by path class. */
 int redistribution_new(struct redistribution **r, const struct redistribution_rule *rule, const struct path_context *c,
-		       const struct brightness *map, uint64_t seed, struct film_sums *film, struct error *e);
+		       const struct brightness *map, uint64_t seed, struct film_sums *film,
+		       double classes[PATH_CLASSES], struct error *e);
 void redistribution_free(struct redistribution *r);
 
 /* For path_context.split while the next sample is evaluated. The two numbers tell it from all others of the plan: its

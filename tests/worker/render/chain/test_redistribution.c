@@ -64,6 +64,7 @@ struct trial {
 	struct redistribution *r;
 	uint64_t counters[BATCH_COUNTERS];
 	double intensity; /* of all samples, with what was taken */
+	double taken, classes[PATH_CLASSES];
 };
 
 static void trial_begin(struct trial *t, const struct world *w, const struct redistribution_rule *rule,
@@ -87,7 +88,7 @@ static void trial_begin(struct trial *t, const struct world *w, const struct red
 	assert_int_equal(film_sums_init(&t->unspread, &t->plan, &w->settings, &e), 0);
 	memset(t->counters, 0, sizeof t->counters);
 	t->context.light_every = light_every;
-	assert_int_equal(redistribution_new(&t->r, rule, &t->context, &t->map, seed, &t->film, &e), 0);
+	assert_int_equal(redistribution_new(&t->r, rule, &t->context, &t->map, seed, &t->film, t->classes, &e), 0);
 }
 
 static void trial_end(struct trial *t)
@@ -112,6 +113,7 @@ static void trial_sample(struct trial *t, uint64_t seed, uint64_t index)
 {
 	evaluate(t, seed, index, redistribution_begin(t->r, index, 0), &t->film);
 	t->intensity += t->sample.intensity + redistribution_taken(t->r);
+	t->taken += redistribution_taken(t->r);
 }
 
 /* The same sample as bdpt has it. Its intensity. */
@@ -239,7 +241,8 @@ static void the_brightest_begin_no_more_than_so_many_chains(void **state)
 	world_free(w);
 }
 
-/* The sum that b is estimated from is that of bdpt with the same random numbers. */
+/* The sum that b is estimated from is that of bdpt with the same random numbers. What was taken of it has classes,
+ * found from full paths, none of which has more than bdpt's samples have of it, found from their sub-paths. */
 static void nothing_is_lost_of_the_sum(void **state)
 {
 	(void)state;
@@ -247,11 +250,22 @@ static void nothing_is_lost_of_the_sum(void **state)
 	static struct trial t;
 	struct world *w = room_of_balls();
 	trial_begin(&t, w, &half, 1, stats_seed(__func__));
-	double whole = 0;
+	t.context.unclassed = false;
+	double whole = 0, of_class[PATH_CLASSES] = {0}, taken = 0;
+	uint64_t rays = 0;
 	for (uint64_t i = 0; i < 512; i++) {
 		trial_sample(&t, stats_seed(__func__), i);
+		rays += t.counters[COUNT_RAYS_CLOSEST] + t.counters[COUNT_RAYS_SHADOW];
 		whole += unspread_sample(&t, stats_seed(__func__), i);
+		for (int k = 0; k < PATH_CLASSES; k++)
+			of_class[k] += t.sample.of_class[k];
 	}
+	for (int k = 0; k < PATH_CLASSES; k++) {
+		assert_true(t.classes[k] <= of_class[k] * (1 + 1e-9));
+		taken += t.classes[k];
+	}
+	assert_true(taken > 0.5 * whole && fabs(taken - t.taken) < 1e-9 * taken);
+	assert_true(t.counters[COUNT_SPREAD_RAYS] > 100 && t.counters[COUNT_SPREAD_RAYS] < rays);
 	assert_true(t.counters[COUNT_SPREAD] > 100);
 	assert_true(fabs(t.intensity - whole) < 1e-9 * whole);
 	trial_end(&t);
