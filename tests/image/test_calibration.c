@@ -14,7 +14,7 @@
  * holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders: 95 % fails with less than
  * 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %. planted    intervals and
  * errors made too small by 1.3 (the relMSE by 1.69) are refused. FULL=1: larger pictures with more
- * samples, and the cases after the third.
+ * samples, and the cases after the fourth.
  * HSLT_TEST_SCALE=N: N times fewer renders, which are made and not judged.
  */
 #include "tests/support/length.h"
@@ -203,6 +203,8 @@ CASE(room_path, "diffuse room", "path", DIFFUSE, 32, 1, 1024, 0, 0.1)
 CASE(room_pssmlt, "diffuse room", "pssmlt", DIFFUSE, 160, 60, 4096, 16, 0.1)
 CASE(room_hslt, "diffuse room", "hslt", DIFFUSE, 640, 240, 4096, 16, 0.1)
 CASE(glass_path, "glass, fireflies", "path", GLASS, 256, 4, 1024, 0, 0.1)
+CASE(glass_erpt, "glass, fireflies", "erpt", GLASS, 192, 3, 1024, 0, 0.1)
+CASE(glass_erpt4, "glass, fireflies", "erpt4", GLASS, 192, 3, 1024, 0, 0.1)
 /* Where b is hardly known the estimate is too large rather than too small: its denominators lean on the neighbourhood.
  */
 CASE(glass_pssmlt, "glass, little known of b", "pssmlt", GLASS, 160, 60, 1024, 16, 0.15)
@@ -221,10 +223,11 @@ static int forget(void **unused)
 
 int main(void)
 {
-	enum { SHORT = 3 };
+	enum { SHORT = 8 };
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(room_path),   cmocka_unit_test(glass_path), cmocka_unit_test(glass_hslt),
-		cmocka_unit_test(room_pssmlt), cmocka_unit_test(room_hslt),  cmocka_unit_test(glass_pssmlt),
+		cmocka_unit_test(room_path),  cmocka_unit_test(glass_path),   cmocka_unit_test(glass_hslt),
+		cmocka_unit_test(glass_erpt), cmocka_unit_test(glass_erpt4),  cmocka_unit_test(room_pssmlt),
+		cmocka_unit_test(room_hslt),  cmocka_unit_test(glass_pssmlt),
 	};
 	return _cmocka_run_group_tests("calibration", tests, test_full() ? sizeof tests / sizeof *tests : SHORT, NULL,
 				       forget);
