@@ -132,11 +132,18 @@ start_worker() {
 	PIDS="$PIDS $WORKER"
 }
 
-# start_faulty_worker NAME FAULTS [OPTION...]: one that does wrong what FAULTS lists (faulty_worker.c)
+build_id() {
+	LC_ALL=C readelf -n "$1" | sed -n 's/.*Build ID: //p'
+}
+
+# start_faulty_worker NAME FAULTS [OPTION...]: a worker with the faults that FAULTS lists (faulty_worker.c). If its build id differs
+# from hslt-worker's, so does its numeric fingerprint, and it would never get a lease of a job that hslt-worker has begun.
 start_faulty_worker() {
 	name=$1 faults=$2
 	shift 2
 	[ -x "$BUILD/tests/e2e/faulty_worker" ] || fail "no $BUILD/tests/e2e/faulty_worker; make tests builds it"
+	[ "$(build_id "$BUILD/tests/e2e/faulty_worker")" = "$(build_id "$BIN/hslt-worker")" ] ||
+		fail "$BUILD/tests/e2e/faulty_worker and hslt-worker are of different builds; make tests builds it again"
 	HSLT_FAULTS=$faults "$BUILD/tests/e2e/faulty_worker" --threads 1 --name "$name" --cache "$DIR/cache" "$@" 2>>"$DIR/$name.log" &
 	WORKER=$!
 	PIDS="$PIDS $WORKER"
