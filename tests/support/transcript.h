@@ -1,22 +1,43 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Conversations with the coordinator's core as readable text, one line an event and all that the core says to it:
+ * Transcripts: the events of a farm and the core's answers, as readable text, one event a line:
  *
  *   [110] w2 batch j1 g3 p0 e1 -> merge, merged, w2 gets j1 g3 p0 e2
  *
- * Events:
- *   wN joins F threads=T | wN leaves | wN heartbeat | wN wants N
- *   wN batch KEY [bad TEXT] | wN fails KEY TEXT | wN lacks KEY TEXT (its own machine's fault) | wN refuses KEY TEXT
- * (its states) | wN denies KEY TEXT | wN recalls KEY TEXT (the same, and what came before them is gone) | wN returns
- * KEY        KEY: j1 g0 p0 e0, or j1 g0 p0 boot submit [NAME=VALUE ...]: priority mixed groups parts rounds seconds
- * target boot owner restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [as
- * submit]: the slots' next epochs hold [order] J TEXT | release [order] J | priority J N | extend J [as submit: the new
- * plan]        (order: by somebody, not for want of room) cancel J | prepared J [black | bad TEXT] | error J R E |
- * broken J TEXT | tick
- * "[60] unread=40 ...": with any of them: what came in the last so many seconds may not have been read.
- * "[0] wake -> T": when the core wants to be called again, as it said last.
- * "-> -" is silence. A line that does not fit is printed beside what was said, and the test fails at the end; so it
- * does when, after a line, a job waits and does not say for what.
+ * In brackets stands the time in seconds, after the arrow all actions of the core; "-> -" means none. If an answer is
+ * another one, both are printed and the test fails at its end, and so it does if a job waits after a line and does not
+ * say for what.
+ *
+ * Events of worker N (KEY: j1 g0 p0 e0, or j1 g0 p0 boot):
+ *
+ *   wN joins F threads=T [certificate=C] [name=N] [home=H] [start=K]
+ *   wN leaves
+ *   wN heartbeat
+ *   wN wants N
+ *   wN batch KEY [bad] [says X]      a result; X: its digest
+ *   wN stored KEY [says X]           a result of an earlier run, read from the journal
+ *   wN delivers KEY                  a result has been received and will be judged later
+ *   wN returns KEY                   gives the lease back
+ *   wN fails KEY TEXT                could not compute it
+ *   wN lacks KEY TEXT                ... because of the worker's own machine
+ *   wN refuses KEY TEXT              ... because of the lease's chain states; their predecessors are still known
+ *   wN denies KEY TEXT               ... because of the lease's chain states; their predecessors are not known
+ *   wN recalls KEY TEXT              could not use chain states that have been replaced since
+ *
+ * Other events:
+ *
+ *   submit [OPTION...]        priority= mixed owner= verify= groups= parts= rounds= seconds= target= boot=
+ *   restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [OPTION of submit...]
+ *                             N: the next epoch of each slot
+ *   extend J [OPTION...]      with the new plan's options
+ *   hold [order|files] J TEXT, release [order|files] J
+ *                             by a client, because of files; otherwise because of storage
+ *   priority J N, cancel J, prepared J [black|bad TEXT], error J R E, image J [disagrees], broken J TEXT
+ *   quarantined [name=N]
+ *   tick
+ *
+ * "[60] unread=40 ..." with any of them: messages of the last 40 s may not have been read yet.
+ * "[0] wake -> T": the core asked to be called again at T.
  */
 #ifndef TESTS_SUPPORT_TRANSCRIPT_H
 #define TESTS_SUPPORT_TRANSCRIPT_H
