@@ -49,4 +49,16 @@ void transcript_play(struct farm *f, const char *const *lines); /* up to NULL */
 /* Both, and frees the farm. */
 void transcript(const char *const *lines);
 
+/* clang-format off */
+/* Two workers, and a job whose bootstrap is done: each of them has a lease of its first round. */
+#define START_TWO                                                                      \
+	"[0] submit -> j1 submitted, j1 is queued",                                    \
+	"[0] w1 joins A threads=1 -> -", "[0] w2 joins A threads=1 -> -",              \
+	"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",                    \
+	"[0] w2 wants 1 -> w2 gets j1 g1 p0 boot",                                     \
+	"[1] w1 batch j1 g0 p0 boot -> merge, merged",                                 \
+	"[1] w2 batch j1 g1 p0 boot -> merge, merged, j1 prepare",                     \
+	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w2 gets j1 g1 p0 e0"
+/* clang-format on */
+
 #endif

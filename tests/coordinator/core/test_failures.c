@@ -1,0 +1,269 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Leases that workers cannot compute, as transcripts: who pauses, who tries next, when the job fails, and what the job
+ * waits for meanwhile.
+ */
+#include "tests/support/transcript.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
+static void failed_lease(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w1 fails j1 g0 p0 e0 out of memory -> -",
+		"[3] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g0 p0 e0",
+		"[4] w1 fails j1 g0 p0 e0 stale -> -",
+		"[11.9] tick -> -",
+		/* ten seconds of pause */
+		"[12] tick -> w1 gets j1 g1 p0 e1",
+		"[13] w2 fails j1 g0 p0 e0 out of memory -> -",
+		"[14] w3 joins A threads=1 -> -",
+		"[14] w3 wants 1 -> w3 gets j1 g0 p0 e0",
+		"[15] w3 fails j1 g0 p0 e0 out of memory -> w1 loses j1 g1 p0 e1, j1 is failed (failed: w3: out of memory)",
+		NULL,
+	});
+}
+
+static void never_a_success(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 fails j1 g0 p0 boot no such file -> -",
+		"[1] wake -> 11",
+		"[11] tick -> w1 gets j1 g1 p0 boot",
+		"[12] w1 fails j1 g1 p0 boot no such file -> -",
+		"[31] tick -> -",
+		"[32] tick -> w1 gets j1 g0 p0 boot",
+		"[33] w1 fails j1 g0 p0 boot no such file -> j1 is failed (failed: w1: no such file)",
+		NULL,
+	});
+}
+
+/* One worker that is out of order, however many leases it has, fails no job that others could make. */
+static void out_of_order(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=5 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=3 -> -",
+		"[0] w2 joins A threads=1 -> -",
+		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w1 gets j1 g3 p0 boot",
+		"[0] w2 wants 1 -> w2 gets j1 g4 p0 boot",
+		"[1] w1 fails j1 g0 p0 boot no disk -> -",
+		"[1] w1 fails j1 g1 p0 boot no disk -> -",
+		"[1] w1 fails j1 g2 p0 boot no disk -> -",
+		"[1] w1 fails j1 g3 p0 boot no disk -> -",
+		"[1] wake -> 11",
+		"[11] w1 wants 1 -> w1 gets j1 g0 p0 boot",
+		"[11] w1 fails j1 g0 p0 boot no disk -> -",
+		"[31] w2 heartbeat -> w1 gets j1 g1 p0 boot",
+		"[31] w1 fails j1 g1 p0 boot no disk -> -",
+		"[32] w2 batch j1 g4 p0 boot -> merge, merged, w2 gets j1 g2 p0 boot",
+		NULL,
+	});
+}
+
+/* On all that there are, and three times; on three at once. */
+static void out_of_order_all(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=5 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w2 joins A threads=1 -> -",
+		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+		"[0] w2 wants 1 -> w2 gets j1 g2 p0 boot",
+		"[1] w1 fails j1 g0 p0 boot no mesh -> -",
+		"[1] w1 fails j1 g1 p0 boot no mesh -> -",
+		"[1] w2 fails j1 g2 p0 boot no mesh -> -",
+		"[1] w3 joins A threads=1 -> -",
+		"[1] w3 wants 1 -> w3 gets j1 g3 p0 boot",
+		"[1] w3 fails j1 g3 p0 boot no mesh -> j1 is failed (failed: w3: no mesh)",
+		"[2] submit groups=5 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot, w2 gets j2 g1 p0 boot, "
+		"w3 gets j2 g2 p0 boot, w1 gets j2 g3 p0 boot",
+		"[2] w3 leaves -> -",
+		"[2] w1 fails j2 g0 p0 boot no mesh -> -",
+		"[2] w1 fails j2 g3 p0 boot no mesh -> -",
+		"[2] w2 fails j2 g1 p0 boot no mesh -> -",
+		"[12] w1 wants 1 -> w1 gets j2 g4 p0 boot, w2 gets j2 g2 p0 boot",
+		"[12] w1 fails j2 g4 p0 boot no mesh -> w2 loses j2 g2 p0 boot, j2 is failed (failed: w1: no mesh)",
+		NULL,
+	});
+}
+
+/* What is made is not lost to one worker, however often it fails and calls again: the job waits, and says for what. */
+static void one_bad_worker(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   START_TWO,
+				   "[2] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g1 p0 e1",
+				   "[2] w2 leaves -> -",
+				   "[2] w1 fails j1 g0 p0 e0 sorry -> -",
+				   "[3] w1 wants 1 -> -",
+				   "[3] w1 leaves -> -",
+				   /* its pause is its own, not its connection's */
+				   "[3] w3 joins A threads=1 name=a home=a start=1 -> -",
+				   "[3] w3 wants 1 -> w3 gets j1 g0 p0 e0",
+				   "[4] w3 fails j1 g0 p0 e0 sorry -> -",
+				   "[4] w4 joins A threads=1 name=b home=a start=2 -> close w3",
+				   "[4] w4 wants 1 -> -",
+				   "[13] tick -> -",
+				   "[14] tick -> w4 gets j1 g0 p0 e0",
+				   "[14] w4 fails j1 g0 p0 e0 sorry -> -",
+				   "[34] w4 heartbeat -> w4 gets j1 g0 p0 e0",
+				   "[34] w4 fails j1 g0 p0 e0 sorry -> -",
+				   "[60] w4 heartbeat -> -",
+				   "[74] w4 heartbeat -> w4 gets j1 g0 p0 e0",
+				   "[74] w4 fails j1 g0 p0 e0 sorry -> -",
+				   "[100] w4 heartbeat -> -",
+				   "[125] w4 heartbeat -> -",
+				   "[150] w4 heartbeat -> -",
+				   "[154] w4 heartbeat -> w4 gets j1 g0 p0 e0",
+				   "[154] w4 fails j1 g0 p0 e0 sorry -> -",
+				   NULL,
+			   });
+	struct job_status s;
+	assert_true(farm_job(f, 1, 160, &s));
+	assert_int_equal(s.state, JOB_RUNNING);
+	assert_string_equal(s.waiting, "no worker can compute it: b: sorry");
+	transcript_play(f, (const char *const[]){
+				   "[160] w5 joins A threads=1 name=c -> -",
+				   "[160] w5 wants 1 -> w5 gets j1 g0 p0 e0",
+				   "[161] w5 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w5 gets j1 g1 p0 e1",
+				   NULL,
+			   });
+	farm_free(f);
+}
+
+/* Three machines with full disks end no job that a fourth can compute, whatever comes first. */
+static void three_full_disks(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   "[0] submit groups=5 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=1 -> -",
+				   "[0] w2 joins A threads=1 -> -",
+				   "[0] w3 joins A threads=1 -> -",
+				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   "[0] w2 wants 1 -> w2 gets j1 g1 p0 boot",
+				   "[0] w3 wants 1 -> w3 gets j1 g2 p0 boot",
+				   "[1] w1 lacks j1 g0 p0 boot disk full -> -",
+				   "[1] w2 lacks j1 g1 p0 boot disk full -> -",
+				   "[1] w3 lacks j1 g2 p0 boot disk full -> -",
+				   /* they pause as others that failed, and it goes on like that for as long as nobody
+				      else comes */
+				   "[1] wake -> 11",
+				   "[11] tick -> w1 gets j1 g3 p0 boot, w2 gets j1 g4 p0 boot, w3 gets j1 g0 p0 boot",
+				   "[12] w1 lacks j1 g3 p0 boot disk full -> -",
+				   "[12] w2 lacks j1 g4 p0 boot disk full -> -",
+				   "[12] w3 lacks j1 g0 p0 boot disk full -> -",
+				   NULL,
+			   });
+	struct job_status s;
+	assert_true(farm_job(f, 1, 12, &s));
+	assert_int_equal(s.state, JOB_BOOTSTRAP);
+	assert_int_equal(s.counts.failures, 6);
+	assert_string_equal(
+		s.waiting,
+		"no worker can compute it, because of a problem on the machines of w1, w2, w3; the last one: w3: disk full");
+	transcript_play(f, (const char *const[]){
+				   "[13] w4 joins A threads=1 -> -",
+				   "[13] w4 wants 1 -> w4 gets j1 g1 p0 boot",
+				   "[14] w4 batch j1 g1 p0 boot -> merge, merged, w4 gets j1 g2 p0 boot",
+				   NULL,
+			   });
+	assert_true(farm_job(f, 1, 14, &s));
+	assert_string_equal(s.waiting, "");
+	farm_free(f);
+}
+
+/* It takes nothing away from what others say of the job: for its end who lacks something is not here. */
+static void full_disks_and_a_bad_scene(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=5 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w2 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[0] w2 wants 1 -> w2 gets j1 g1 p0 boot",
+		"[1] w1 lacks j1 g0 p0 boot disk full -> -",
+		"[1] w2 fails j1 g1 p0 boot no mesh -> -",
+		"[11] w1 wants 2 -> w1 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot, w1 gets j1 g4 p0 boot",
+		"[11] w1 lacks j1 g2 p0 boot disk full -> -",
+		"[11] w1 fails j1 g4 p0 boot no mesh -> -", /* a second reason: a second try */
+		"[12] w2 fails j1 g3 p0 boot no mesh -> j1 is failed (failed: w2: no mesh)",
+		"[13] submit groups=5 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot, w2 gets j2 g1 p0 boot, w1 gets j2 g2 p0 boot",
+		"[13] w1 wants 0 -> -",
+		"[13] w1 lacks j2 g0 p0 boot disk full -> -",
+		"[13] w1 lacks j2 g2 p0 boot disk full -> -",
+		"[13] w2 fails j2 g1 p0 boot no mesh -> -",
+		"[23] w2 heartbeat -> w2 gets j2 g3 p0 boot",
+		"[23] w2 fails j2 g3 p0 boot no mesh -> -",
+		"[33] w1 heartbeat -> -",
+		"[43] w2 heartbeat -> w2 gets j2 g4 p0 boot",
+		"[43] w2 fails j2 g4 p0 boot no mesh -> j2 is failed (failed: w2: no mesh)",
+		NULL,
+	});
+}
+
+/* Names cost nothing, certificates do: where the farm knows three, three names of one are not three workers. */
+static void made_up_names(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 certificate=a name=a -> -",
+		"[0] w2 joins A threads=1 certificate=b name=a -> -",
+		"[0] w3 joins A threads=1 certificate=c name=a -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare",
+		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[1] w1 leaves -> -",
+		"[1] w2 leaves -> -",
+		"[2] w3 wants 1 -> w3 gets j1 g0 p0 e0",
+		"[2] w3 fails j1 g0 p0 e0 sorry -> -",
+		"[2] w4 joins A threads=1 certificate=c name=b -> -",
+		"[2] w4 wants 1 -> w4 gets j1 g0 p0 e0",
+		"[2] w4 fails j1 g0 p0 e0 sorry -> -",
+		"[2] w5 joins A threads=1 certificate=c name=c -> -",
+		"[2] w5 wants 1 -> w5 gets j1 g0 p0 e0",
+		"[2] w5 fails j1 g0 p0 e0 sorry -> -",
+		"[2] w6 joins A threads=1 certificate=c name=d -> -",
+		"[2] w6 wants 1 -> w6 gets j1 g0 p0 e0",
+		"[2] w6 fails j1 g0 p0 e0 sorry -> -",
+		"[3] w7 joins A threads=1 certificate=a name=b -> -",
+		"[3] w7 wants 1 -> w7 gets j1 g0 p0 e0",
+		"[3] w7 fails j1 g0 p0 e0 sorry -> -",
+		"[4] w8 joins A threads=1 certificate=b name=b -> -",
+		"[4] w8 wants 1 -> w8 gets j1 g0 p0 e0",
+		"[4] w8 fails j1 g0 p0 e0 sorry -> j1 is failed (failed: b: sorry)",
+		NULL,
+	});
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(failed_lease),
+		cmocka_unit_test(never_a_success),
+		cmocka_unit_test(out_of_order),
+		cmocka_unit_test(out_of_order_all),
+		cmocka_unit_test(one_bad_worker),
+		cmocka_unit_test(three_full_disks),
+		cmocka_unit_test(full_disks_and_a_bad_scene),
+		cmocka_unit_test(made_up_names),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
