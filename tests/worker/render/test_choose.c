@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which integrator a scene calls for: scenes whose light is easy and hard to find, the rule itself, and the same choice
- * twice. */
+/* The integrator that is chosen for scenes whose light is easy or hard to find, and the length of the pilot. The rule
+ * itself: test_choose_rule.c. */
 #include "tests/support/worlds.h"
 #include "worker/render/render.h"
 #include "worker/render/choose.h"
@@ -275,35 +275,6 @@ static void the_pilot_of_hours_is_bounded(void **state)
 	world_free(w);
 }
 
-/* The sentence is for people; figures are in the JSON. */
-static void the_reason_is_a_sentence_without_figures(void **state)
-{
-	(void)state;
-	static const struct {
-		const char *integrator;
-		struct render_choice c;
-		const char *says;
-	} of[] = {
-		{"path", {.path = {1, 0, 4, 4, 0, 0}}, "find the light evenly, and no surface focuses it"},
-		{"bdpt8", {.path = {1, 0, 4, 4, 0, 0}, .focuses = true}, "one sample in eight starts at the lamps"},
-		{"erpt4", {.path = {1, 0, 1.2, 2, 0.3, 0}}, "one sample in four starts at the lamps"},
-		{"erpt", {.path = {1, 0, 4, 4, 0, 0}}, "less noise in the same time"},
-		{"erpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .settled = true}, "leave fireflies"},
-		{"erpt", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "cannot find all light"},
-		{"hslt", {.path = {0, 0, 1, 1, 1, 0}}, "next to no light"},
-		{"hslt", {.path = {1, 0.9, 0.5, 0.5, 1, 0}}, "few, very bright paths"},
-	};
-	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
-		char text[512], shortest[8];
-		render_choice_text(of[i].integrator, &of[i].c, text, sizeof text);
-		assert_non_null(strstr(text, of[i].says));
-		assert_int_equal(strncmp(text, of[i].integrator, strlen(of[i].integrator)), 0);
-		assert_null(strpbrk(text + strlen(of[i].integrator), "0123456789%"));
-		render_choice_text(of[i].integrator, &of[i].c, shortest, sizeof shortest);
-		assert_int_equal(strlen(shortest), sizeof shortest - 1);
-	}
-}
-
 static void the_same_request_gives_the_same_choice(void **state)
 {
 	(void)state;
@@ -344,161 +315,17 @@ static void a_crop_is_rendered_as_the_whole_is(void **state)
 	world_free(w);
 }
 
-static void the_rule(void **state)
+static void a_short_render_has_a_brief_pilot(void **state)
 {
 	(void)state;
-	enum { FLAT, FOCUSES, MISSES };
-	static const struct {
-		double path[6], bdpt[6]; /* cost, rare, tail, extreme, extreme-value index, most */
-		int scene;
-		const char *name;
-		bool settled;
-	} cases[] = {
-		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
-		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, FOCUSES, "bdpt8", false}, /* what it throws may be rare */
-		{{1, 0, 2.2, 2.2, 1, 0.02}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
-		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt4", false}, /* a firefly among the few */
-		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FOCUSES, "erpt4", false},
-		{{1.9, 0, 3, 3, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt", false},  /* not much better, and less sure */
-		{{1, 0, 1.9, 1.5, 1, 0}, {0, 0, 1, 1, 1, 0}, FLAT, "erpt", true}, /* better but for its tail */
-		{{1, 0, 1.9, 1.5, 1, 0.5}, {0, 0, 1, 1, 1, 0}, FLAT, "erpt", true},
-		{{1, 0, 4, 4, 1, 0}, {2, 0, 1.5, 1.5, 1, 0}, FLAT, "path", false},
-		{{1, 0.9, 0.5, 0.5, 1, 0},
-		 {2, 0, 3, 3, 1, 0},
-		 FOCUSES,
-		 "erpt",
-		 false}, /* bdpt finds what path does not */
-		{{1, 0, 4, 4, 1, 0}, {2, 0.9, 0.5, 0.5, 1, 0}, FOCUSES, "erpt", false},	     /* path does not meet it */
-		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 2, 0.6, 1, 0}, FOCUSES, "erpt", false}, /* by luck one of them */
-		{{1, 0.2, 3.5, 1.5, 1, 0}, {5, 0.04, 1, 1.05, 1, 0}, FOCUSES, "bdpt8", false}, /* with an end to them */
-		{{1, 0.5, 1.1, 1.1, 1, 0}, {2, 0.25, 1.4, 1.8, 1, 0}, FOCUSES, "erpt", false}, /* rare to path alone */
-		{{1, 0.35, 1.4, 1.7, 1, 0}, {5, 0.3, 1.26, 1.95, 1, 0}, FOCUSES, "erpt", false}, /* but it has a mean */
-		{{1, 0.35, 1.4, 0.7, 1, 0}, {5, 0.3, 1.24, 1.95, 1, 0}, FOCUSES, "hslt", false}, /* not for sure */
-		{{1, 0.35, 1.4, 0.7, 1, 0}, {5, 0.3, 1.26, 1.95, 1, 0}, FOCUSES, "erpt", false},
-		{{1, 0.35, 1.4, 1.1, 1, 0},
-		 {5, 0.3, 1.24, 1.95, 1, 0},
-		 FOCUSES,
-		 "erpt",
-		 false}, /* path is lucky enough */
-		{{1, 0.5, 0.5, 0.9, 1, 0}, {2, 0.5, 0.5, 3, 1, 0}, FOCUSES, "hslt", false},
-		{{1, 0.5, 0.5, 0.9, 1, 0}, {2, 0.1, 0.5, 0.5, 1, 0}, FOCUSES, "erpt", false},
-		{{1, 0, 0.5, 0.6, 1, 0}, {2, 0.9, 0.3, 0.4, 1, 0}, FOCUSES, "hslt", false}, /* path says: no mean */
-		{{1, 0.07, 1.6, 1.7, 1, 0}, {600, 0.5, 1.2, 0.75, 1, 0}, FOCUSES, "erpt", false}, /* path says: some */
-		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 0.7, 1, 0}, FOCUSES, "erpt", false},	  /* too little */
-		{{1, 0.1, 1.5, 0.7, 1, 0}, {2, 0.1, 1.5, 1.2, 1, 0}, FOCUSES, "erpt", false},	  /* for one it does */
-		{{1, 0.1, 1.5, 0.5, 1, 0},
-		 {2, 0.1, 1.5, 1.0, 1, 0},
-		 FOCUSES,
-		 "erpt",
-		 false}, /* however heavy the other */
-		{{1, 0.06, 1.5, 0.7, 1, 0},
-		 {2, 0.01, 1.5, 0.7, 1, 0},
-		 FOCUSES,
-		 "erpt",
-		 false},								   /* nearly all is there */
-		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FOCUSES, "erpt4", false}, /* a range with an end */
-		{{1, 0, 2, 4, 0.3, 0}, {2, 0, 3, 3, 0.1, 0}, FLAT, "erpt4", false},	   /* never path by that */
-		{{1, 0, 1.1, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", true},
-		{{1.85, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt", false},
-		{{1, 0, 0.9, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt4", false},
-		{{1, 0, 2.2, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "path", false}, /* one of the two is enough */
-		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, MISSES, "erpt", false},
-		{{0, 0, 1, 1, 1, 0}, {0, 0, 1, 1, 1, 0}, MISSES, "hslt", false},
-		{{1, 0.05, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", false}, /* rare light is no end */
-		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "erpt", false}, /* what is missed has no part in it */
-		{{1, 0, 1.9, 1.5, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "erpt", false},
-		{{1, 0, 3, 3, 1, 0}, {2, 0.9, 0.5, 0.9, 1, 0}, MISSES, "hslt", false}, /* what path says is nothing */
-		{{1, 0, 0.3, 0.3, 1, 0}, {2, 0.9, 0.5, 3, 1, 0}, MISSES, "erpt", false},
-		{{0, 0, 1, 1, 1, 0}, {1, 0, 3, 3, 1, 0}, MISSES, "erpt", false}, /* all of it, and bdpt does not */
-	};
-	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		const double *p = cases[i].path, *b = cases[i].bdpt;
-		struct render_choice c = {.path = {p[0], p[1], p[2], p[3], p[4], p[5]},
-					  .bdpt = {b[0], b[1], b[2], b[3], b[4], b[5]},
-					  .misses = cases[i].scene == MISSES,
-					  .focuses = cases[i].scene != FLAT};
-		assert_string_equal(render_choice_of(&c), cases[i].name);
-		assert_int_equal(render_choice_is_settled(&c), cases[i].settled);
-	}
-}
-
-/* A brief pilot of demo finds no fireflies in half of the cases: chains are kept in reserve. */
-static void a_brief_pilot_does_not_trust_the_tail(void **state)
-{
-	(void)state;
-	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true};
-	assert_string_equal(render_choice_of(&c), "bdpt8");
-	c.brief = true;
-	assert_string_equal(render_choice_of(&c), "erpt4");
-	c.focuses = false;
-	assert_string_equal(render_choice_of(&c), "path");
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
 	struct plan_request r;
+	struct render_choice c;
 	choose(w, 1, 2, &r, &c);
 	assert_true(c.brief);
 	choose(w, 1, 400, &r, &c);
 	assert_false(c.brief);
 	world_free(w);
-}
-
-/* Whatever the others say; not a share as in scenes where bdpt is the best. */
-static void light_that_is_rare_by_merging_needs_chains(void **state)
-{
-	(void)state;
-	struct render_choice c = {.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true};
-	for (int i = 0; i < 2; i++) {
-		c.merged.share = 0.008;
-		assert_string_equal(render_choice_of(&c), i ? "erpt" : "bdpt8");
-		assert_int_equal(render_choice_is_settled(&c), i);
-		c.merged.share = 0.05;
-		assert_string_equal(render_choice_of(&c), "erpt");
-		assert_true(render_choice_is_settled(&c));
-		c.path.extreme = 0.9;
-		assert_string_equal(render_choice_of(&c), "hslt");
-		c.path.extreme = 4;
-		c.misses = true;
-		assert_string_equal(render_choice_of(&c), "hslt");
-		c.misses = false;
-		c.path.tail = 1.5;
-	}
-}
-
-/* What looks rare to path is not to bdpt where photons see most of the light and merging finds hardly any that is. */
-static void light_that_photons_see_is_not_rare(void **state)
-{
-	(void)state;
-	static const struct {
-		double share, seen, bdpt_rare;
-		const char *name;
-	} cases[] = {{0.005, 0.6, 0.05, "erpt"},
-		     {0.005, 0.1, 0.05, "erpt"}, /* hardly a photon arrives, but bdpt finds it all */
-		     {0.02, 0.6, 0.05, "erpt"},
-		     {0.005, 0.6, 0.5, "hslt"}}; /* bdpt's own samples say so */
-	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct render_choice c = {.path = {1, 0.9, 0.5, 0.5, 1, 0},
-					  .bdpt = {2, cases[i].bdpt_rare, 0.9, 0.8, 1, 0},
-					  .merged = {cases[i].share, cases[i].seen},
-					  .focuses = true};
-		assert_string_equal(render_choice_of(&c), cases[i].name);
-		c.bdpt = (struct render_found){2, 0, 3, 3, 1, 0};
-		c.misses = c.dark = true;
-		assert_string_equal(render_choice_of(&c),
-				    cases[i].share < 0.01 && cases[i].seen > 0.5 ? "erpt" : "hslt");
-	}
-}
-
-/* What path alone settles, nothing that bdpt could say would change. */
-static void what_is_settled_is_the_same_with_bdpt(void **state)
-{
-	(void)state;
-	static const double costs[] = {0, 1, 1000}, shares[] = {0, 0.1, 0.9}, tails[] = {0.3, 1.5, 4};
-	for (int i = 0; i < 81; i++) {
-		struct render_choice c = {
-			.path = {1, 0.02, 1.9, 0.9, 1, 0},
-			.bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27 % 3], 1, 0}};
-		assert_true(render_choice_is_settled(&c));
-		assert_string_equal(render_choice_of(&c), "erpt");
-	}
 }
 
 /* A share of the render, whatever its length; no less than says anything of a tail. */
@@ -586,14 +413,9 @@ int main(void)
 		cmocka_unit_test(light_that_is_found_by_luck_needs_chains),
 		cmocka_unit_test(where_no_light_is_found_the_longest_search_goes_on),
 		cmocka_unit_test(the_pilot_of_hours_is_bounded),
-		cmocka_unit_test(the_reason_is_a_sentence_without_figures),
 		cmocka_unit_test(the_same_request_gives_the_same_choice),
 		cmocka_unit_test(a_crop_is_rendered_as_the_whole_is),
-		cmocka_unit_test(the_rule),
-		cmocka_unit_test(a_brief_pilot_does_not_trust_the_tail),
-		cmocka_unit_test(light_that_is_rare_by_merging_needs_chains),
-		cmocka_unit_test(light_that_photons_see_is_not_rare),
-		cmocka_unit_test(what_is_settled_is_the_same_with_bdpt),
+		cmocka_unit_test(a_short_render_has_a_brief_pilot),
 		cmocka_unit_test(the_pilot_is_a_small_part_of_the_render),
 		cmocka_unit_test(a_render_without_a_number_of_samples_has_a_short_pilot),
 		cmocka_unit_test(what_cannot_be_rendered_is_said),
