@@ -1,17 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Leases: results that depend on plan and key alone, in any order; stopping; what comes from outside refused; a crop's
- * pixels; memory that runs out; and the film of one lease.
+ * Leases: a result depends on the plan and the key alone, in any order; a lease can be stopped; bad input is refused; a
+ * crop has the pixels of the whole image, and borders their energy; memory may run out.
  */
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
 #include "tests/support/failing_memory.h"
-#include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
-#include "worker/render/render.h"
-#include "worker/render/film/sums.h"
 #include "worker/render/path/integrator.h"
+#include "worker/render/render.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -479,53 +477,6 @@ static void test_borders(void **state)
 	}
 }
 
-/* Every kernel that the reader lets through has integral 1, and splats all of it. */
-static void test_kernels(void **state)
-{
-	(void)state;
-	static const struct scene_settings cases[] = {
-		{.filter = FILTER_BOX, .filter_radius = 0.5},
-		{.filter = FILTER_BOX, .filter_radius = 2},
-		{.filter = FILTER_BOX, .filter_radius = 64},
-		{.filter = FILTER_TENT, .filter_radius = 1},
-		{.filter = FILTER_TENT, .filter_radius = 0.25},
-		{.filter = FILTER_TENT, .filter_radius = 40},
-		{.filter = FILTER_GAUSSIAN, .filter_radius = 2, .filter_stddev = 0.5},
-		{.filter = FILTER_GAUSSIAN, .filter_radius = 1, .filter_stddev = 2},
-		{.filter = FILTER_GAUSSIAN, .filter_radius = 64, .filter_stddev = 16},
-		{.filter = FILTER_CUBIC, .filter_radius = 2, .filter_b = 1.0 / 3, .filter_c = 1.0 / 3},
-		{.filter = FILTER_CUBIC, .filter_radius = 2, .filter_b = 0, .filter_c = 0.5},
-		{.filter = FILTER_LANCZOS, .filter_radius = 3},
-		{.filter = FILTER_LANCZOS, .filter_radius = 1},
-	};
-	struct plan p = {
-		.width = 300, .height = 300, .crop_x = 20, .crop_y = 10, .crop_width = 260, .crop_height = 270};
-	for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
-		struct film_sums f;
-		assert_int_equal(film_sums_init(&f, &p, &cases[k], NULL), 0);
-		enum { N = 200000 };
-		double sum = 0, r = cases[k].filter_radius;
-		for (int i = 0; i < N; i++)
-			sum += film_kernel(&f, 1.01 * r * (2 * (i + 0.5) / N - 1)) * 2.02 * r / N;
-		assert_true(fabs(sum - 1) < 1e-4);
-		assert_true(film_kernel(&f, 1.001 * r) == 0 && film_kernel(&f, -1.001 * r) == 0);
-		/* Splats at all places within a pixel bring their energy in the mean. */
-		double energy = 0, value[3] = {1, 2, 3};
-		enum { PLACES = 40 };
-		for (int i = 0; i < PLACES * PLACES; i++) {
-			struct splat s = {150 + (i % PLACES + 0.5) / PLACES,
-					  145 + (i / PLACES + 0.5) / PLACES,
-					  {value[0], value[1], value[2]}};
-			film_sums_splat(&f, &s, 1.0 / (PLACES * PLACES));
-		}
-		for (size_t i = 0; i < (size_t)f.width * f.height; i++)
-			energy += f.xyz[3 * i + 1];
-		if (!(fabs(energy / 2 - 1) < 2e-3))
-			fail_msg("kernel %zu of radius %g splats %g of its energy", k, r, energy / 2);
-		film_sums_fini(&f);
-	}
-}
-
 /* The n-th allocation fails, for each n: an error or a result, nothing else; leaks are for the sanitizer to see. */
 static void test_no_memory(void **state)
 {
@@ -563,37 +514,6 @@ static void test_no_memory(void **state)
 	world_free(w);
 }
 
-static void test_no_memory_for_a_world(void **state)
-{
-	(void)state;
-	static const char text[] = "<scene version='3.0.0'>" SENSOR(
-		"0,0,5",
-		"0,0,0") "<shape type='cube'><bsdf type='twosided'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/></bsdf></bsdf></shape>"
-			 "<shape type='sphere'><bsdf type='roughdielectric'/></shape><shape type='rectangle'><emitter type='area'/></shape>"
-			 "<emitter type='constant'/></scene>";
-	const struct memory_file files[] = {{"a.xml", text, sizeof text - 1}, {NULL, NULL, 0}};
-	struct asset_source assets = memory_assets(files);
-	struct error e = {""};
-	struct scene s;
-	if (scene_read(&s, &assets, "a.xml", render_plugins(), NULL, 0, &e))
-		fail_msg("%s", e.text);
-	int failed = 0;
-	for (long i = 0;; i++) {
-		struct world *w = NULL;
-		mem_fail_after(i);
-		int rc = world_new(&w, &s, &assets, NULL, &e);
-		mem_fail_after(-1);
-		assert_true(rc == 0 || (rc == -ENOMEM && !w));
-		world_free(w);
-		if (rc == 0)
-			break;
-		failed++;
-	}
-	print_message("%d allocations\n", failed);
-	assert_true(failed >= 4);
-	scene_fini(&s);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -606,9 +526,7 @@ int main(void)
 		cmocka_unit_test(test_ticks),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_borders),
-		cmocka_unit_test(test_kernels),
 		cmocka_unit_test(test_no_memory),
-		cmocka_unit_test(test_no_memory_for_a_world),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

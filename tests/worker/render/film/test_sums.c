@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The film of one lease: reconstruction filters are normalised, and a splat keeps its energy. */
+#include "worker/render/film/sums.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+/* Every kernel that the reader lets through has integral 1, and splats all of it. */
+static void kernels_have_integral_1(void **state)
+{
+	(void)state;
+	static const struct scene_settings cases[] = {
+		{.filter = FILTER_BOX, .filter_radius = 0.5},
+		{.filter = FILTER_BOX, .filter_radius = 2},
+		{.filter = FILTER_BOX, .filter_radius = 64},
+		{.filter = FILTER_TENT, .filter_radius = 1},
+		{.filter = FILTER_TENT, .filter_radius = 0.25},
+		{.filter = FILTER_TENT, .filter_radius = 40},
+		{.filter = FILTER_GAUSSIAN, .filter_radius = 2, .filter_stddev = 0.5},
+		{.filter = FILTER_GAUSSIAN, .filter_radius = 1, .filter_stddev = 2},
+		{.filter = FILTER_GAUSSIAN, .filter_radius = 64, .filter_stddev = 16},
+		{.filter = FILTER_CUBIC, .filter_radius = 2, .filter_b = 1.0 / 3, .filter_c = 1.0 / 3},
+		{.filter = FILTER_CUBIC, .filter_radius = 2, .filter_b = 0, .filter_c = 0.5},
+		{.filter = FILTER_LANCZOS, .filter_radius = 3},
+		{.filter = FILTER_LANCZOS, .filter_radius = 1},
+	};
+	struct plan p = {
+		.width = 300, .height = 300, .crop_x = 20, .crop_y = 10, .crop_width = 260, .crop_height = 270};
+	for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+		struct film_sums f;
+		assert_int_equal(film_sums_init(&f, &p, &cases[k], NULL), 0);
+		enum { N = 200000 };
+		double sum = 0, r = cases[k].filter_radius;
+		for (int i = 0; i < N; i++)
+			sum += film_kernel(&f, 1.01 * r * (2 * (i + 0.5) / N - 1)) * 2.02 * r / N;
+		assert_true(fabs(sum - 1) < 1e-4);
+		assert_true(film_kernel(&f, 1.001 * r) == 0 && film_kernel(&f, -1.001 * r) == 0);
+		/* Splats at all places within a pixel bring their energy in the mean. */
+		double energy = 0, value[3] = {1, 2, 3};
+		enum { PLACES = 40 };
+		for (int i = 0; i < PLACES * PLACES; i++) {
+			struct splat s = {150 + (i % PLACES + 0.5) / PLACES,
+					  145 + (i / PLACES + 0.5) / PLACES,
+					  {value[0], value[1], value[2]}};
+			film_sums_splat(&f, &s, 1.0 / (PLACES * PLACES));
+		}
+		for (size_t i = 0; i < (size_t)f.width * f.height; i++)
+			energy += f.xyz[3 * i + 1];
+		if (!(fabs(energy / 2 - 1) < 2e-3))
+			fail_msg("kernel %zu of radius %g splats %g of its energy", k, r, energy / 2);
+		film_sums_fini(&f);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(kernels_have_integral_1),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
