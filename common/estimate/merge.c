@@ -16,6 +16,7 @@
 #include "common/base/mem.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/tail.h"
+#include "common/plan/resample.h"
 
 #include <assert.h>
 #include <errno.h>

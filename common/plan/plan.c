@@ -2,13 +2,11 @@
 /*
  * plan_make divides a request into groups, parts, chains, epochs and rounds, by sizes that depend on the request alone.
  * plan_check checks that a plan from the network has every property that plan_make guarantees, so that its users need
- * no further checks. plan_resample draws the chains' seeds from the bootstrap's weights by systematic resampling.
+ * no further checks.
  *
  * Failures: -EINVAL with a sentence that names the number and its range.
  */
 #include "common/plan/plan.h"
-
-#include <Random123/threefry.h>
 
 #include <math.h>
 #include <stdio.h>
@@ -40,7 +38,6 @@ enum {
 	RAYS_USUAL = 8,		      /* the most that a mutation or a sample usually takes */
 	PIXEL_BYTES = 12,	      /* bytes of a tile on the wire */
 	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
-	STREAM_RESAMPLING = 5,	      /* RNG_RESAMPLING of the renderer's random numbers */
 };
 #define TOTAL_MOST (UINT64_C(1) << 62)
 #define LEASE_MOST (UINT64_C(1) << 40)
@@ -526,40 +523,6 @@ int plan_check(const struct plan *p, struct error *e)
 	if (rc == 0)
 		rc = check_cut(p, e);
 	return rc ? rc : check_end(p, e);
-}
-
-/* ---- seeds */
-
-double plan_resample_u(const struct plan *p, uint32_t group)
-{
-	threefry4x64_key_t key = {{p->seed, STREAM_RESAMPLING, 0, 0}};
-	threefry4x64_ctr_t counter = {{group, 0, 0, 0}};
-	return (double)(threefry4x64(counter, key).v[0] >> 11) * 0x1p-53;
-}
-
-bool plan_resample(const struct plan *p, uint32_t group, const float *weight, uint64_t weight_count, double u,
-		   uint32_t count, uint64_t *index)
-{
-	double total = 0;
-	uint64_t last = 0;
-	for (uint64_t i = 0; i < weight_count; i++) {
-		total += (double)weight[i];
-		if (weight[i] > 0)
-			last = i;
-	}
-	if (!(total > 0))
-		return false;
-	uint64_t first = plan_bootstrap_range(p, group, 0).begin;
-	double sum = (double)weight[0];
-	uint64_t i = 0;
-	for (uint32_t k = 0; k < count; k++) {
-		double at = ((double)k + u) / count * total;
-		/* `last` guards against the rounding of `at` up to the total; an index of weight 0 is never chosen. */
-		while (i < last && sum <= at)
-			sum += (double)weight[++i];
-		index[k] = first + i;
-	}
-	return true;
 }
 
 /* ---- texts ---- */

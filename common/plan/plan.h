@@ -142,11 +142,4 @@ void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size
  * special to a shell. */
 bool plan_text_ok(const char *text, size_t size);
 
-/* Systematic resampling of a group's seeds over its bootstrap weights, in index order (docs/design.md, rules 2).
- * weight[i] >= 0 and finite, i in the group's range; writes `count` bootstrap indices. false: all weights are 0. */
-bool plan_resample(const struct plan *p, uint32_t group, const float *weight, uint64_t weight_count, double u,
-		   uint32_t count, uint64_t *index);
-/* The u above: a function of seed and group. */
-double plan_resample_u(const struct plan *p, uint32_t group);
-
 #endif

@@ -2,6 +2,7 @@
 #include "tests/bench/subject.h"
 
 #include "common/base/mem.h"
+#include "common/plan/resample.h"
 #include "tests/bench/bench.h"
 #include "worker/render/render.h"
 #include "worker/render/geom/embree.h"

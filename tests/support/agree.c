@@ -3,6 +3,7 @@
 #include "tests/support/agree.h"
 
 #include "common/estimate/merge.h"
+#include "common/plan/resample.h"
 #include "tests/support/length.h"
 #include "tests/support/stats.h"
 

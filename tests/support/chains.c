@@ -2,6 +2,8 @@
 #include "worker/render/render.h"
 #include "tests/support/chains.h"
 
+#include "common/plan/resample.h"
+
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -8,6 +8,8 @@
  */
 #include "worker/render/rays.h"
 
+#include "common/plan/resample.h"
+
 #include <string.h>
 
 enum {

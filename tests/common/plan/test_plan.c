@@ -2,6 +2,7 @@
 /* The mixture of mutations in a plan: what is one and what is not, and the texts that it appears in. */
 #include "common/plan/plan.h"
 #include "common/plan/plan_text.h"
+#include "common/plan/resample.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -6,6 +6,7 @@
  * that carry no light are counted. Nothing here is left to chance but the number of pssmlt's independent proposals.
  */
 #include "common/estimate/merge.h"
+#include "common/plan/resample.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/render/local.h"
 #include "worker/render/render.h"
