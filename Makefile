@@ -60,6 +60,8 @@ CTL_CLI    := $(patsubst coordinator/ctl/hslt_%.c,hslt-%,$(wildcard coordinator/
 PROGRAMS   := $(if $(wildcard coordinator/main.c),hslt-coordinator) $(if $(wildcard worker/daemon/main.c),hslt-worker) \
               $(WORKER_CLI) $(CTL_CLI)
 
+# What a failed command left is not what it should have made.
+.DELETE_ON_ERROR:
 .PHONY: all programs tests test demo bench fuzz fuzzers install uninstall clean
 all: programs
 programs: $(addprefix $(BUILD)/bin/,$(PROGRAMS))

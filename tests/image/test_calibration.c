@@ -223,7 +223,7 @@ static int forget(void **unused)
 
 int main(void)
 {
-	enum { SHORT = 8 };
+	enum { SHORT = 4 };
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(room_path),  cmocka_unit_test(glass_path),   cmocka_unit_test(glass_hslt),
 		cmocka_unit_test(glass_erpt), cmocka_unit_test(glass_erpt4),  cmocka_unit_test(room_pssmlt),
