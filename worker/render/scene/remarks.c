@@ -58,7 +58,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e, "is ignored: the image shows all light on surfaces, without media%s",
+			rc = remark(r, n, e, "the image shows all light on surfaces, without media%s",
 				    strncmp(n->type, "direct", strlen("direct")) == 0
 					    ? "; --max-depth 2 omits indirect light"
 					    : "");
