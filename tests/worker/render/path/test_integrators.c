@@ -19,7 +19,7 @@
 #include <cmocka.h>
 
 /* Samples a pixel are what the power asks for; 0: the scene says nothing new about chains (single_spp: of single paths,
- * whose states say less a mutation than those of all techniques) or about bdpt8 (rare_spp). */
+ * whose states say less a mutation than those of all techniques) or about few light sub-paths (rare_spp). */
 static void check_all(const char *name, struct world *w, uint64_t path_spp, uint64_t bdpt_spp, uint64_t rare_spp,
 		      uint64_t chain_spp, uint64_t single_spp)
 {
@@ -29,9 +29,10 @@ static void check_all(const char *name, struct world *w, uint64_t path_spp, uint
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct render_integrator *r = render_integrator_at(i);
 		uint64_t spp = r->kind == PLAN_SAMPLES ? bdpt_spp : r->has_mutations ? single_spp : chain_spp;
-		if (strcmp(r->name, "bdpt8") == 0)
-			spp = rare_spp;
-		if (integrator_find(r->name)->redistributes)
+		const struct integrator *of = integrator_find(r->name);
+		if (of->light_every > 1)
+			spp = of->redistributes && rare_spp ? spp : rare_spp;
+		if (of->redistributes)
 			spp = spp * 9 / 4; /* a chain brings its light in one piece */
 		if (strcmp(r->name, "path") == 0 || spp == 0)
 			continue;
