@@ -354,16 +354,7 @@ void outage_begin(struct farm_run *f, uint64_t seed)
 {
 	struct error e;
 	memset(f, 0, sizeof *f);
-	f->request = (struct plan_request){.integrator = "pssmlt",
-					   .kind = PLAN_CHAINS,
-					   .width = 20,
-					   .height = 10,
-					   .mutations = 3200,
-					   .max_depth = 5,
-					   .groups = 2,
-					   .chains = 8,
-					   .epoch = 100,
-					   .bootstrap = 64};
+	f->request = scripted_request;
 	assert_int_equal(plan_make(&f->request, &f->plan, &e), 0);
 	f->disk = (struct faulty_disk){.root = outage.root, .after = after, .seed = seed, .counts = outage.counts};
 	if (getenv("HSLT_POWER_FORGET"))

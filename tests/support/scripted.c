@@ -23,6 +23,31 @@
 
 enum { PATIENCE_MS = 60000 };
 
+const struct plan_request scripted_request = {.integrator = "pssmlt",
+					      .kind = PLAN_CHAINS,
+					      .width = 20,
+					      .height = 10,
+					      .mutations = 3200,
+					      .max_depth = 5,
+					      .groups = 2,
+					      .chains = 8,
+					      .epoch = 100,
+					      .bootstrap = 64};
+
+uint16_t scripted_port(const char *port_file)
+{
+	unsigned port = 0;
+	for (int i = 0; i < PATIENCE_MS && !port; i++) {
+		FILE *f = fopen(port_file, "r");
+		if (f && fscanf(f, "%u", &port) != 1)
+			port = 0;
+		if (f)
+			fclose(f);
+		usleep(1000);
+	}
+	return (uint16_t)port;
+}
+
 /* Frees the bytes. */
 static bool send_all(const struct scripted *p, unsigned char *bytes, size_t size)
 {
@@ -288,4 +313,14 @@ bool scripted_send(const struct scripted *p, const struct batch *b, const struct
 	unsigned char *bytes = checksummed_frame(frame, size, &size);
 	mem_free(frame);
 	return send_all(p, bytes, size);
+}
+
+uint64_t scripted_submit_whole(struct scripted *p, const struct plan_request *r, const char *scene)
+{
+	assert_true(scripted_submit(p, r, scene));
+	const Farm__Envelope *m = scripted_hear(p);
+	if (m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->n_missing)
+		m = scripted_send_scene(p, scene) ? scripted_hear(p) : NULL;
+	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->job);
+	return m->submit_answer->job;
 }

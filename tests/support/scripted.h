@@ -19,6 +19,8 @@ struct scripted {
 	unsigned heartbeats; /* heard */
 };
 
+/* The port that a coordinator writes into this file once it listens; 0: not within a minute. */
+uint16_t scripted_port(const char *port_file);
 struct scripted *scripted_connect(uint16_t port); /* without a word; NULL: nobody answers */
 const Farm__HelloAck *scripted_hello(struct scripted *p, uint32_t version, Farm__Role role); /* NULL: no such answer */
 struct scripted *scripted_call(uint16_t port, Farm__Role role);				     /* NULL: nobody answers */
@@ -30,7 +32,11 @@ const Farm__Envelope *scripted_hear(struct scripted *p);
 bool scripted_is_merged(const Farm__Envelope *m);	 /* the word that a result is, and stored; NULL is not */
 bool scripted_has(struct scripted *p, int milliseconds); /* something to hear, or the end */
 
+/* Two groups of eight chains on a film of 20 x 10. */
+extern const struct plan_request scripted_request;
 bool scripted_submit(const struct scripted *p, const struct plan_request *r, const char *scene);
+/* Sends the scene, too, if it is asked for. The job; a refusal fails the test. */
+uint64_t scripted_submit_whole(struct scripted *p, const struct plan_request *r, const char *scene);
 bool scripted_send_scene(const struct scripted *p, const char *scene);
 bool scripted_want(const struct scripted *p, uint32_t leases);
 bool scripted_list(const struct scripted *p);

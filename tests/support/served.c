@@ -111,16 +111,7 @@ int served_start(double hello_seconds, double heartbeat_seconds, double stall_se
 		log_set_level(LOG_LEVEL_ERROR);
 		_exit(serve(&c));
 	}
-	unsigned number = 0;
-	for (int i = 0; i < LOOKS && !number; i++) {
-		FILE *f = fopen(port_file, "r");
-		if (f && fscanf(f, "%u", &number) != 1)
-			number = 0;
-		if (f)
-			fclose(f);
-		usleep(LOOK_US);
-	}
-	port = (uint16_t)number;
+	port = scripted_port(port_file);
 	return port ? 0 : -1;
 }
 

@@ -21,19 +21,9 @@
 #include <unistd.h>
 
 enum { STATE_BYTES = 3000, PATIENCE = 60000, BOOTSTRAP_LEASES = 8 };
-static const char scene[] = "<scene/>";
 
 struct staged_disk *staged_disk;
-struct staged staged = {.request = {.integrator = "pssmlt",
-				    .kind = PLAN_CHAINS,
-				    .width = 20,
-				    .height = 10,
-				    .mutations = 3200,
-				    .max_depth = 5,
-				    .groups = 2,
-				    .chains = 8,
-				    .epoch = 100,
-				    .bootstrap = 64}};
+struct staged staged;
 static _Thread_local bool fail_next_folder;
 static pid_t pid;
 static char port_file[100];
@@ -114,7 +104,6 @@ static void serve(void)
 
 void staged_start(void)
 {
-	unsigned port = 0;
 	unlink(port_file);
 	fflush(NULL);
 	pid = fork();
@@ -122,16 +111,9 @@ void staged_start(void)
 		signal(SIGSEGV, SIG_DFL); /* or the test would go on in it */
 		serve();
 	}
-	for (int i = 0; i < PATIENCE && !port; i++) {
-		FILE *f = fopen(port_file, "r");
-		if (f && fscanf(f, "%u", &port) != 1)
-			port = 0;
-		if (f)
-			fclose(f);
-		usleep(1000);
-	}
-	staged.client = scripted_call((uint16_t)port, FARM__ROLE__ROLE_CLIENT);
-	staged.worker = scripted_call((uint16_t)port, FARM__ROLE__ROLE_WORKER);
+	uint16_t port = scripted_port(port_file);
+	staged.client = scripted_call(port, FARM__ROLE__ROLE_CLIENT);
+	staged.worker = scripted_call(port, FARM__ROLE__ROLE_WORKER);
 	assert_true(staged.client && staged.worker && scripted_want(staged.worker, 3));
 }
 
@@ -149,12 +131,7 @@ void staged_end(int signal, bool well)
 
 uint64_t staged_submit(void)
 {
-	assert_true(scripted_submit(staged.client, &staged.request, scene));
-	const Farm__Envelope *m = scripted_hear(staged.client);
-	if (m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->n_missing)
-		m = scripted_send_scene(staged.client, scene) ? scripted_hear(staged.client) : NULL;
-	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->job);
-	return m->submit_answer->job;
+	return scripted_submit_whole(staged.client, &scripted_request, "<scene/>");
 }
 
 void staged_order(const Farm__Envelope *m)
@@ -282,5 +259,5 @@ int staged_set_up(void **state)
 	memset(staged_disk, 0, sizeof *staged_disk);
 	staged.journal_bytes = 2000;
 	staged.keep_bytes = 0;
-	return rc ? rc : plan_make(&staged.request, &staged.plan, &e);
+	return rc ? rc : plan_make(&scripted_request, &staged.plan, &e);
 }

@@ -31,8 +31,7 @@ extern struct staged_disk *staged_disk;
 
 /* What the test sets before staged_start, and the peers. */
 extern struct staged {
-	struct plan_request request;
-	struct plan plan; /* of that request */
+	struct plan plan; /* of scripted_request */
 	uint64_t journal_bytes, keep_bytes;
 	char spool[100];
 	struct scripted *client, *worker;

@@ -50,7 +50,7 @@ static void extend(uint64_t job, uint64_t mutations)
 	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
 	m.control = &c;
 	staged_order(&m);
-	struct plan_request longer = staged.request;
+	struct plan_request longer = scripted_request;
 	longer.mutations += mutations;
 	assert_int_equal(plan_make(&longer, &staged.plan, &e), 0);
 }

@@ -33,7 +33,6 @@ enum {
 	RESULTS = 20,
 	LEASES = 8 + 4 * 8 /* of the job */
 };
-static const char scene[] = "<scene/>";
 
 /* Shared with the coordinator, which is another process. */
 static struct {
@@ -42,16 +41,6 @@ static struct {
 static atomic_bool is_film[FILES]; /* by descriptor */
 
 static struct plan plan;
-static struct plan_request request = {.integrator = "pssmlt",
-				      .kind = PLAN_CHAINS,
-				      .width = 20,
-				      .height = 10,
-				      .mutations = 3200,
-				      .max_depth = 5,
-				      .groups = 2,
-				      .chains = 8,
-				      .epoch = 100,
-				      .bootstrap = 64};
 static uint64_t journal_most;
 static pid_t pid;
 static uint16_t port;
@@ -99,7 +88,6 @@ static void serve(void)
 
 static void start(int allowed)
 {
-	unsigned number = 0;
 	disk->allowed = allowed;
 	disk->asked = 0;
 	unlink(port_file);
@@ -109,15 +97,7 @@ static void start(int allowed)
 		signal(SIGSEGV, SIG_DFL);
 		serve();
 	}
-	for (int i = 0; i < PATIENCE && !number; i++) {
-		FILE *f = fopen(port_file, "r");
-		if (f && fscanf(f, "%u", &number) != 1)
-			number = 0;
-		if (f)
-			fclose(f);
-		usleep(1000);
-	}
-	port = (uint16_t)number;
+	port = scripted_port(port_file);
 }
 
 static void end(int signal, bool well)
@@ -143,16 +123,6 @@ static bool is_done(const struct lease_key *k)
 		    done[i].epoch == k->epoch)
 			return true;
 	return false;
-}
-
-static uint64_t submit(void)
-{
-	assert_true(scripted_submit(client, &request, scene));
-	const Farm__Envelope *m = scripted_hear(client);
-	if (m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->n_missing)
-		m = scripted_send_scene(client, scene) ? scripted_hear(client) : NULL;
-	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->job);
-	return m->submit_answer->job;
 }
 
 /* Sends so many results in all, until they are acknowledged, each once. */
@@ -188,7 +158,7 @@ static uint64_t begin_a_job(void)
 	client = scripted_call(port, FARM__ROLE__ROLE_CLIENT);
 	worker = scripted_call(port, FARM__ROLE__ROLE_WORKER);
 	assert_true(client && worker && scripted_want(worker, 3));
-	uint64_t job = submit();
+	uint64_t job = scripted_submit_whole(client, &scripted_request, "<scene/>");
 	work_until(RESULTS);
 	end(SIGKILL, false);
 	return job;
@@ -251,7 +221,7 @@ static int set_up(void **state)
 	snprintf(port_file, sizeof port_file, "%s/port", folder);
 	memset(disk, 0, sizeof *disk);
 	journal_most = 1 << 20;
-	return rc ? rc : plan_make(&request, &plan, &e);
+	return rc ? rc : plan_make(&scripted_request, &plan, &e);
 }
 
 static void answers_while_it_reads(uint64_t job)

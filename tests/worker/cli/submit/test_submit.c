@@ -4,6 +4,7 @@
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
+#include "tests/support/scripted.h"
 #include "worker/cli/submit/reconnect.h"
 
 #include "common/base/log.h"
@@ -42,7 +43,6 @@ static void serve(const char *listen, const char *spool, const char *port_file)
 static int start(const char *listen, const char *spool_name)
 {
 	char spool[96], port_file[96];
-	unsigned port = 0;
 	snprintf(spool, sizeof spool, "%s/%s", folder, spool_name);
 	snprintf(port_file, sizeof port_file, "%s/port", folder);
 	remove(port_file);
@@ -50,14 +50,7 @@ static int start(const char *listen, const char *spool_name)
 	pid = fork();
 	if (pid == 0)
 		serve(listen, spool, port_file);
-	for (int i = 0; i < 60000 && !port; i++) {
-		FILE *f = fopen(port_file, "r");
-		if (f && fscanf(f, "%u", &port) != 1)
-			port = 0;
-		if (f)
-			fclose(f);
-		usleep(1000);
-	}
+	uint16_t port = scripted_port(port_file);
 	snprintf(address, sizeof address, "127.0.0.1:%u", port);
 	return port ? 0 : -1;
 }
