@@ -53,6 +53,12 @@ enum batch_counter {
 	COUNT_SPREAD_RAYS,	/* rays that these chains took, part of COUNT_RAYS_CLOSEST and COUNT_RAYS_SHADOW */
 };
 
+/* All rays. Of one batch: its counters are bounded, those of many may be saturated. */
+static inline uint64_t batch_rays(const uint64_t counters[BATCH_COUNTERS])
+{
+	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
+}
+
 /* Counters of the chains of a lease for each strategy of the plan's mixture; names in common/estimate/strategy.h.
  * From STRATEGY_FAIL_FIRST on: why a proposal could not be made or carried no light, one reason per proposal. */
 enum { BATCH_STRATEGIES = PLAN_MAX_STRATEGIES };

@@ -48,7 +48,7 @@ static struct figures run_subject(const struct subject *s)
 	const uint64_t *there = record_walks.there, *back = record_walks.back;
 	struct figures f = {.seconds = bench_cpu_seconds() - begin,
 			    .mutations = (double)b.counters[COUNT_SAMPLES],
-			    .rays = (double)(b.counters[COUNT_RAYS_CLOSEST] + b.counters[COUNT_RAYS_SHADOW]),
+			    .rays = (double)batch_rays(b.counters),
 			    .accepted = (double)b.counters[COUNT_ACCEPTED],
 			    .there = sum(there, WALK_OK, WALK_ITERATIONS),
 			    .failed = sum(there, WALK_OK + 1, WALK_ITERATIONS),

@@ -39,7 +39,7 @@ uint64_t subject_render(const struct subject *s)
 {
 	struct batch b;
 	subject_run(s, &b);
-	uint64_t rays = b.counters[COUNT_RAYS_CLOSEST] + b.counters[COUNT_RAYS_SHADOW];
+	uint64_t rays = batch_rays(b.counters);
 	batch_fini(&b);
 	return rays;
 }

@@ -344,7 +344,7 @@ static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t fi
 		add_pixel(t, p->parts);
 	}
 	t->samples = (double)(end / IN_PIXEL * IN_PIXEL);
-	t->rays = (double)(p->counters[COUNT_RAYS_CLOSEST] + p->counters[COUNT_RAYS_SHADOW]);
+	t->rays = (double)batch_rays(p->counters);
 	return found(t);
 }
 

@@ -49,7 +49,7 @@ static int make_plan(const struct plan_request *r, struct plan *p, struct error 
 
 static void add(struct counted *c, const struct batch *b)
 {
-	c->rays += (double)(b->counters[COUNT_RAYS_CLOSEST] + b->counters[COUNT_RAYS_SHADOW]);
+	c->rays += (double)batch_rays(b->counters);
 	c->steps += (double)b->counters[COUNT_SAMPLES];
 }
 

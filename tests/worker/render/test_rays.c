@@ -79,7 +79,7 @@ static struct plan made(const struct plan_request *r)
 
 static double rays_of(const struct batch *b)
 {
-	return (double)(b->counters[COUNT_RAYS_CLOSEST] + b->counters[COUNT_RAYS_SHADOW]);
+	return (double)batch_rays(b->counters);
 }
 
 static double bootstrap_rays(const struct world *w, const struct plan *p)
@@ -142,8 +142,7 @@ static void the_pilot_counts_what_a_render_takes(void **state)
 			fail_msg("%s", e.text);
 		struct canvas_counts all;
 		canvas_counts(run.canvas, false, &all);
-		double step = (double)(all.counters[COUNT_RAYS_CLOSEST] + all.counters[COUNT_RAYS_SHADOW]) /
-			      (double)all.counters[COUNT_SAMPLES],
+		double step = (double)batch_rays(all.counters) / (double)all.counters[COUNT_SAMPLES],
 		       bootstrap = bootstrap_rays(w, &p) / (double)p.bootstrap;
 		print_message("%s: %.1f of %.1f rays a bootstrap sample, %.2f of %.2f a step\n", names[i / 2],
 			      rays.bootstrap, bootstrap, rays.step, step);

@@ -66,8 +66,9 @@ static json_t *image_json(const struct canvas_image *i)
 
 double stats_chains_rays(const struct canvas_image *i)
 {
-	const uint64_t *c = i->counts.counters, all = c[COUNT_RAYS_CLOSEST] + c[COUNT_RAYS_SHADOW];
-	return all ? (double)c[COUNT_SPREAD_RAYS] / (double)all : 0;
+	const uint64_t *c = i->counts.counters;
+	double all = (double)c[COUNT_RAYS_CLOSEST] + (double)c[COUNT_RAYS_SHADOW];
+	return all > 0 ? (double)c[COUNT_SPREAD_RAYS] / all : 0;
 }
 
 static json_t *part_json(const char *name, double energy, double variance, double rays)

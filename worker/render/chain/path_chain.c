@@ -116,11 +116,6 @@ static void flush(struct chain *base)
 	splat(path_of(base), path_of(base)->current);
 }
 
-static uint64_t rays(const uint64_t *counters)
-{
-	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
-}
-
 /* The probability of acceptance; 0 if there is no valid proposal, the reason for which is counted. */
 static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move,
 		      struct chain_sums *sums)
@@ -162,9 +157,9 @@ static void step(struct chain *base, struct chain_sums *sums)
 	counters[COUNT_SAMPLES]++;
 	counters[COUNT_INDEPENDENT] += entry->ops->independent;
 	struct move move = {0};
-	uint64_t before = rays(counters);
+	uint64_t before = batch_rays(counters);
 	double a = propose(c, entry, &move, sums);
-	m->count[STRATEGY_RAYS] += rays(counters) - before;
+	m->count[STRATEGY_RAYS] += batch_rays(counters) - before;
 	bool accepted = r[1] < a;
 	chain_count(base, accepted);
 	if (!black)

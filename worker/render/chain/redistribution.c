@@ -144,11 +144,6 @@ static unsigned chains_for(double units, double u, double *each)
 	return (unsigned)n;
 }
 
-static uint64_t rays_of(const struct path_context *c)
-{
-	return c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW];
-}
-
 static spectrum keep(struct path_split *split, struct path_context *c, unsigned s, unsigned t, const double film[2],
 		     spectrum l)
 {
@@ -172,12 +167,12 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 	c->counters[COUNT_SPREAD]++;
 	c->counters[COUNT_SPREAD_MUTATIONS] += (uint64_t)n * r->rule.length;
 	rng_bits4(r->mutation.seed, RNG_REDISTRIBUTION, r->pixel, r->sample, technique * 2 + 1, id);
-	const uint64_t rays = rays_of(c);
+	const uint64_t rays = batch_rays(c->counters);
 	for (unsigned k = 0; k < n; k++) {
 		r->mutation.chain = id[0] + k;
 		spread(r, x, each / r->rule.mutations / (c->window.width * c->window.height));
 	}
-	c->counters[COUNT_SPREAD_RAYS] += rays_of(c) - rays;
+	c->counters[COUNT_SPREAD_RAYS] += batch_rays(c->counters) - rays;
 	return spectrum_scale(1 - share, l);
 }
 

@@ -40,8 +40,8 @@ extern const struct redistribution_rule redistribution_usual;
 
 enum { REDISTRIBUTION_CHAINS = 64 }; /* for one contribution */
 
-/* c: that of the samples; world, window, depths, light_every and counters are taken from it. -ENOMEM */
-/* classes: gets the sums of what is spread, I by path class. */
+/* c: that of the samples; world, window, depths, light_every and counters are taken from it. classes: gets
+ * the sums of what is spread, I by path class. -ENOMEM */
 int redistribution_new(struct redistribution **r, const struct redistribution_rule *rule, const struct path_context *c,
 		       const struct brightness *map, uint64_t seed, struct film_sums *film,
 		       double classes[PATH_CLASSES], struct error *e);

@@ -255,7 +255,7 @@ static void nothing_is_lost_of_the_sum(void **state)
 	uint64_t rays = 0;
 	for (uint64_t i = 0; i < 512; i++) {
 		trial_sample(&t, stats_seed(__func__), i);
-		rays += t.counters[COUNT_RAYS_CLOSEST] + t.counters[COUNT_RAYS_SHADOW];
+		rays += batch_rays(t.counters);
 		whole += unspread_sample(&t, stats_seed(__func__), i);
 		for (int k = 0; k < PATH_CLASSES; k++)
 			of_class[k] += t.sample.of_class[k];

@@ -349,9 +349,9 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	start = y;
 	struct path_vertex first = y.v[b], last = y.v[end];
 	struct walk_limits limits = walk_limits_of(&accuracy);
-	uint64_t before = c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW];
+	uint64_t before = batch_rays(c->counters);
 	enum walk_end e = halfvec_walk(c, &y, b, end, target, false, &limits, &s);
-	t->rays += c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW] - before;
+	t->rays += batch_rays(c->counters) - before;
 	t->walks++;
 	t->ends[e]++;
 	t->iterations += s.iterations;
