@@ -157,8 +157,6 @@ static bool class_apart(const struct path_class_energy *c, double b, uint32_t gr
 
 static void judge_classes(const struct plan *p, const struct canvas_image *img, struct convergence *a)
 {
-	if (p->kind != PLAN_CHAINS)
-		return;
 	for (unsigned k = 0; k < PATH_CLASSES; k++) {
 		a->classes_flagged |= (uint32_t)class_flagged(&img->classes[k], img->b, p->groups) << k;
 		a->classes_apart |= (uint32_t)class_apart(&img->classes[k], img->b, p->groups) << k;

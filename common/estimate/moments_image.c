@@ -99,8 +99,9 @@ static double unit_of(const struct moments *m, const struct moments_group *of)
 	return m->plan.kind == PLAN_CHAINS ? of->b : 1;
 }
 
+/* Adds what chains have of the class to `of_chains`, by group. */
 static void make_class(const struct moments *m, const struct moments_group *groups, size_t class, bool open_rounds,
-		       struct path_class_energy *out)
+		       double of_chains[PLAN_MAX_GROUPS], struct path_class_energy *out)
 {
 	uint32_t count = m->plan.groups;
 	double bootstrap[PLAN_MAX_GROUPS], chains[PLAN_MAX_GROUPS], difference[PLAN_MAX_GROUPS], error;
@@ -111,6 +112,7 @@ static void make_class(const struct moments *m, const struct moments_group *grou
 		bootstrap[g] = of->bootstrap ? sum / (double)of->bootstrap : 0;
 		chains[g] = of->mutations ? unit_of(m, of) * time / (double)of->mutations : 0;
 		difference[g] = chains[g] - bootstrap[g];
+		of_chains[g] += chains[g];
 	}
 	out->bootstrap = mean_of(bootstrap, count, &out->bootstrap_error);
 	out->chains = mean_of(chains, count, &out->chains_error);
@@ -120,19 +122,14 @@ static void make_class(const struct moments *m, const struct moments_group *grou
 }
 
 /* The share of chains in the light, and in the variance of b, of samples that leave some of it to them. */
-static void find_chains_part(const struct moments *m, const struct moments_group *groups, bool open_rounds,
+static void find_chains_part(const double *of_chains, const struct moments_group *groups, uint32_t count,
 			     struct canvas_image *img)
 {
-	double chains[PLAN_MAX_GROUPS], rest[PLAN_MAX_GROUPS], chains_error, rest_error;
-	for (uint32_t g = 0; g < m->plan.groups; g++) {
-		chains[g] = 0;
-		for (size_t k = 0; k < PATH_CLASSES && groups[g].mutations; k++)
-			chains[g] += chains_time(m, g, k, open_rounds) / (double)groups[g].mutations;
-		rest[g] = groups[g].b - chains[g];
-	}
-	double of_chains = mean_of(chains, m->plan.groups, &chains_error),
-	       of_rest = mean_of(rest, m->plan.groups, &rest_error);
-	img->chains_energy = of_chains / (of_chains + of_rest);
+	double rest[PLAN_MAX_GROUPS], chains_error, rest_error;
+	for (uint32_t g = 0; g < count; g++)
+		rest[g] = groups[g].b - of_chains[g];
+	double chains = mean_of(of_chains, count, &chains_error), others = mean_of(rest, count, &rest_error);
+	img->chains_energy = chains / (chains + others);
 	img->chains_variance = chains_error * chains_error / (chains_error * chains_error + rest_error * rest_error);
 }
 
@@ -142,10 +139,11 @@ int moments_image(const struct moments *m, const struct moments_group *groups, u
 	const struct plan *p = &m->plan;
 	img->tiles_across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
 	img->tiles_down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	double of_chains[PLAN_MAX_GROUPS] = {0};
 	for (size_t k = 0; k < PATH_CLASSES; k++)
-		make_class(m, groups, k, open_rounds, &img->classes[k]);
+		make_class(m, groups, k, open_rounds, of_chains, &img->classes[k]);
 	if (p->kind == PLAN_SAMPLES)
-		find_chains_part(m, groups, open_rounds, img);
+		find_chains_part(of_chains, groups, p->groups, img);
 	if (m->per_lease == 0 || open_rounds || rounds == 0)
 		return 0;
 	double chains = (double)(p->chains / m->leases / m->per_lease);

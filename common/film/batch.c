@@ -238,11 +238,8 @@ static int check_strategies(const struct batch *b, const struct plan *p, struct 
 
 static int check_classes(const struct batch *b, const struct plan *p, struct error *e)
 {
-	double sum = 0, most;
-	if (b->key.kind == LEASE_BOOTSTRAP)
-		most = b->independent_sum;
-	else
-		most = p->kind == PLAN_CHAINS ? (double)b->counters[COUNT_SAMPLES] : b->independent_sum;
+	bool is_time = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
+	double sum = 0, most = is_time ? (double)b->counters[COUNT_SAMPLES] : b->independent_sum;
 	for (int i = 0; i < PATH_CLASSES; i++) {
 		if (!(b->classes[i] >= 0) || !isfinite(b->classes[i]))
 			return error_set(e, EBADMSG, "the sum of a path class is negative or not finite");
