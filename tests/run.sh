@@ -8,8 +8,8 @@
 # lines name what failed, as `failed: NAME`, what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`;
 # the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 #
-# As many tests run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts run one after the
-# other; programs have the other processors, and all of them when the scripts have ended.
+# As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts wait for half of
+# their time, so two of them share one processor; when they have ended, programs have that one too.
 # HSLT_TEST_KINDS: "unit script" (default both). No test has a limit of wall clock, which a busy machine would reach: it is ended when
 # its processes have used HSLT_TEST_CPU seconds of processor time (default 1800; with FULL=1 28800), or have been idle without output for
 # HSLT_TEST_IDLE seconds (900; 3600), see tests/limit/limit.c.
@@ -110,8 +110,8 @@ list() {
 			}
 			{ name = $0; sub(/.*\/tests\//, "", name); print ($0 in s ? s[$0] : 1000000 + first[name]), NR, $0 }' | sort -k1,1nr -k2,2n | cut -d' ' -f3
 }
-one() { # one KIND PROGRAMS_AT_A_TIME: the process is the caller's
-	exec xargs -r <"$run/$1.list" -n 1 -P "$2" sh tests/run.sh --one "$run" "$1"
+one() { # one KIND TESTS_AT_A_TIME: the process is the caller's
+	exec xargs -r <"$run/$1.list" -n 1 -P "$2" --process-slot-var=HSLT_TEST_SLOT sh tests/run.sh --one "$run" "$1"
 }
 
 for kind in unit script; do
@@ -119,7 +119,7 @@ for kind in unit script; do
 done
 jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)} beside=0
 [ ! -s "$run/script.list" ] || [ "$jobs" -lt 2 ] || beside=1
-one script 1 &
+one script $((1 + beside)) &
 scripts=$!
 one unit $((jobs - beside)) &
 units=$!

@@ -86,9 +86,10 @@ until_true() {
 	done
 }
 
-# free_ports COUNT: so many in a row that nobody uses, below those that the kernel gives out; the first one is in port
+# free_ports COUNT: so many in a row that nobody uses, below those that the kernel gives out; the first one is in port. Tests that
+# run at the same time (HSLT_TEST_SLOT: 0 or 1) look in different places.
 free_ports() {
-	port=$((10000 + $$ * 4 % 20000))
+	port=$((10000 + ${HSLT_TEST_SLOT:-0} * 11000 + $$ * 4 % 10000))
 	while [ $port -lt 32000 ]; do
 		busy=0
 		for k in $(seq 0 $(($1 - 1))); do

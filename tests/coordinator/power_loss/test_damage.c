@@ -6,6 +6,7 @@
  * acknowledged and are handed out again are counted.
  */
 #include "tests/support/folder.h"
+#include "tests/support/length.h"
 #include "tests/support/outage.h"
 
 #include <setjmp.h>
@@ -114,10 +115,10 @@ static void before(uint64_t journal_bytes)
 static void a_bit_of_a_journal(void **state)
 {
 	(void)state;
-	enum { RUNS = 30 };
+	const uint64_t most = test_scaled() ? 12 : 30;
 	uint64_t all = 0, behind = 0, runs = 0;
 	before(1 << 20);
-	for (uint64_t seed = 1; seed <= RUNS; seed++) {
+	for (uint64_t seed = 1; seed <= most; seed++) {
 		char path[256];
 		begin(seed);
 		size_t size = largest("jobs/j*/journal.*", path);
@@ -150,7 +151,7 @@ static void a_bit_of_a_journal(void **state)
 	/* Bits of the torn tail, or of what a checkpoint already has, cost nothing: from half of them (10 of 21, alone
 	 * on a machine) to three quarters (15 of 20, sanitized on a busy one). Some must, or no bit was tried that
 	 * matters. */
-	assert_true(runs > RUNS / 3 && all > 0 && behind > 2 * runs);
+	assert_true(runs > most / 3 && all > 0 && behind > 2 * runs);
 }
 
 /* ---- the database of jobs */
@@ -185,9 +186,10 @@ static void flip_in(const char *name, uint64_t seed)
 static void damaged_database(void **state)
 {
 	(void)state;
-	enum { KINDS = 12, RUNS = 3 * KINDS };
+	enum { KINDS = 12 };
+	const uint64_t runs = test_scaled() ? KINDS : 3 * KINDS;
 	before(0);
-	for (uint64_t seed = 1; seed <= RUNS; seed++) {
+	for (uint64_t seed = 1; seed <= runs; seed++) {
 		begin(100 + seed);
 		switch (seed % KINDS) {
 		case 0:

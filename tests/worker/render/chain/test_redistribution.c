@@ -7,6 +7,7 @@
 #include "worker/render/chain/redistribution.h"
 
 #include "tests/support/agree.h"
+#include "tests/support/length.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/render/path/integrate_bdpt.h"
@@ -170,7 +171,7 @@ static void expect_the_same(const char *test, struct world *w, const struct redi
 			    uint32_t light_every, uint64_t spp)
 {
 	static struct agree_image image;
-	assert_true(compare(test, w, rule, light_every, spp, &image) > 1);
+	assert_true(compare(test, w, rule, light_every, test_scaled() ? spp / 8 : spp, &image) > 1);
 	agree_expect(test, &image, 1);
 	world_free(w);
 }
