@@ -6,8 +6,9 @@
  * is charged the pilot on top, so that two times of the same samples do not differ by the machine's load. The reference
  * is a long render by what the default chooses, kept in build/bench-references (the error that it has itself is taken
  * off, pixel by pixel); a third figure leaves out the pixels in which that is largest. HSLT_BENCH_SECONDS: other than
- * 10 for each picture; references take ten times that. HSLT_BENCH_SEEDS: other than 5. HSLT_BENCH_METHODS: only the
- * first so many; with 6 and 7, bdpt8 and erpt too, which are not among those that the default is held against.
+ * 10 for each picture. HSLT_BENCH_REFERENCE: references take other than ten times that. HSLT_BENCH_SEEDS: other than 5.
+ * HSLT_BENCH_METHODS: only the first so many; with 6 and 7, bdpt8 and erpt too, which are not among those that the
+ * default is held against.
  */
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
@@ -24,7 +25,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { REFERENCE_TIMES = 10, AROUND = 3 /* pixels */, SEEDS_MOST = 32, REFERENCE_SEED = 99 };
+enum { REFERENCE_TIMES = 10, REFERENCE_MOST = 10000, AROUND = 3 /* pixels */, SEEDS_MOST = 32, REFERENCE_SEED = 99 };
 #define TRIM 0.001   /* share of the pixels left out, the worst */
 #define UNKNOWN 0.01 /* and of those in which the reference itself is the worst, which no method has a part in */
 enum { ALL, TRIMMED, KNOWN, KINDS }; /* pixels that count */
@@ -402,12 +403,12 @@ static void print_trials(const struct trial *of, size_t count, unsigned seeds)
 }
 
 static void compare_all(const struct world *w, const struct trial_scene *s, double seconds, unsigned seeds,
-			size_t count)
+			size_t count, unsigned times)
 {
 	struct measure by;
 	static struct trial of[METHODS];
 	size_t best[KINDS] = {1, 1, 1};
-	make_reference(w, s, REFERENCE_TIMES * seconds, &by.reference);
+	make_reference(w, s, times * seconds, &by.reference);
 	by.scale = scales_of(&by.reference.image);
 	by.known = scales_where_known(&by.reference.image, by.scale);
 	memset(of, 0, sizeof of);
@@ -454,7 +455,8 @@ void bench_equal_time(const char *bin)
 	const char *time = getenv("HSLT_BENCH_SECONDS"), *only = getenv("HSLT_BENCH_SCENE");
 	double seconds = time ? atof(time) : 10;
 	unsigned seeds = asked("HSLT_BENCH_SEEDS", 5, SEEDS_MOST),
-		 count = asked("HSLT_BENCH_METHODS", METHODS, METHODS);
+		 count = asked("HSLT_BENCH_METHODS", METHODS, METHODS),
+		 times = asked("HSLT_BENCH_REFERENCE", REFERENCE_TIMES, REFERENCE_MOST);
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		const struct trial_scene *s = &scenes[i];
 		const struct render_options size = {.width = s->width, .height = s->height};
@@ -469,7 +471,7 @@ void bench_equal_time(const char *bin)
 			bench_skip("HSLT_SCENES does not name a folder with this scene");
 			continue;
 		}
-		compare_all(w, s, seconds, seeds, count);
+		compare_all(w, s, seconds, seeds, count, times);
 		world_free(w);
 	}
 }
