@@ -15,13 +15,17 @@ tree=build/mutants
 command -v ccache > /dev/null && CC="ccache ${CC:-gcc}"
 rm -rf "$tree" && mkdir -p "$tree" && git archive HEAD | tar x -C "$tree" && cp "$list" "$tree/list" && cd "$tree" || exit 1
 list=list
-# run TEST, or TEST@ROOM: with that room alone. Ended by processor time, as by tests/run.sh: on a busy machine a limit of wall clock
-# would catch everything.
+# run TEST [SECONDS], or TEST@ROOM: with that room alone. Ended by processor time, as by tests/run.sh: on a busy machine a limit of wall
+# clock would catch everything.
 run() {
 	case $1 in
-	*@*) ROOM=${1#*@} build/tests/limit/limit 900 900 "build/tests/${1%@*}" < /dev/null > /dev/null 2>&1 ;;
-	*) build/tests/limit/limit 900 900 "build/tests/$1" < /dev/null > /dev/null 2>&1 ;;
+	*@*) ROOM=${1#*@} build/tests/limit/limit "${2:-900}" 900 "build/tests/${1%@*}" < /dev/null > /dev/null 2>&1 ;;
+	*) build/tests/limit/limit "${2:-900}" 900 "build/tests/$1" < /dev/null > /dev/null 2>&1 ;;
 	esac
+}
+# limit_of TEST: half a minute more than ten times what it took without a fault, which may make it go on for ever
+limit_of() {
+	echo $((30 + 10 * $(awk -v t="$1" '$1 == t { print $2 }' sound.txt)))
 }
 binaries() {
 	tr ' ' '\n' | sed 's|@.*||; s|^|build/tests/|' | sort -u
@@ -29,7 +33,9 @@ binaries() {
 make -s ${CC:+CC="$CC"} programs build/tests/limit/limit $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | binaries) > make.log 2>&1 || { cat make.log; exit 1; }
 # Without any fault all of them pass, or they would catch everything.
 for t in $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | tr ' ' '\n' | sort -u); do
+	begin=$(date +%s)
 	run "$t" || { echo "$t fails without a fault"; exit 1; }
+	echo "$t $(($(date +%s) - begin))" >> sound.txt
 done
 caught=0 survived=0 faulty=0
 result=results.txt
@@ -48,7 +54,7 @@ while IFS=$tab read -r file old new tests; do
 	else
 		by=
 		for t in $tests; do
-			run "$t" || { by=$t && break; }
+			run "$t" "$(limit_of "$t")" || { by=$t && break; }
 		done
 		if [ "$by" ]; then
 			echo "caught    $file: '$old' -> '$new' by $by, $(($(date +%s) - begin)) s"

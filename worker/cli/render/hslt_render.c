@@ -410,8 +410,8 @@ static int run_session(struct session *s, struct error *e)
 	if (!rc && s->image.rel_mse_doubt)
 		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
-		rc = error_set(e, EINTR, "interrupted: %s contains the %llu complete rounds", s->a->output,
-			       (unsigned long long)s->image.rounds);
+		rc = error_set(e, EINTR, "interrupted: %s contains the %llu complete round%s", s->a->output,
+			       (unsigned long long)s->image.rounds, s->image.rounds == 1 ? "" : "s");
 	return rc;
 }
 
