@@ -24,7 +24,7 @@ EMBREE   := $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
 WARN     := -Wall -Wextra -Wconversion -Wshadow -Wmissing-prototypes -Wstrict-prototypes -Wvla -Wpointer-arith \
             -Wcast-qual -Wwrite-strings -Wundef -Wformat=2 -Wold-style-definition -Werror
 OPT      ?= $(if $(SAN),-O2,-O3)
-CFLAGS   := -std=c17 $(OPT) -g -ffp-contract=off -fno-fast-math -fno-math-errno -fno-strict-aliasing -fno-common $(WARN) \
+CFLAGS   := -std=c17 $(OPT) $(if $(SAN),-g1,-g) -ffp-contract=off -fno-fast-math -fno-math-errno -fno-strict-aliasing -fno-common $(WARN) \
             $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer) $(EXTRA_CFLAGS)
 CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen -MMD -MP
 LDFLAGS  := $(if $(SAN),-fsanitize=$(SAN)) $(EXTRA_LDFLAGS)
@@ -62,7 +62,7 @@ PROGRAMS   := $(if $(wildcard coordinator/main.c),hslt-coordinator) $(if $(wildc
 
 # What a failed command left is not what it should have made.
 .DELETE_ON_ERROR:
-.PHONY: all programs tests test demo bench fuzz fuzzers install uninstall clean
+.PHONY: all programs tests test-objects test demo bench fuzz fuzzers install uninstall clean
 all: programs
 programs: $(addprefix $(BUILD)/bin/,$(PROGRAMS))
 
@@ -135,6 +135,8 @@ $(FAULTY_WORKER): $(BUILD)/bin/hslt-worker $(call obj,tests/e2e/faulty_worker.c 
 	$(CC) $(LDFLAGS) -Wl,--build-id=$${id:+0x}$${id:-none} $(FAULTY_WRAP) -o $@ $(filter-out $<,$^) $(LIBS_RENDER) $(LIBS_COMMON)
 # Every build of the tests also compiles the fuzzers (linked with clang only), the benchmarks and the calibration, so that they keep building.
 tests: $(TEST_BIN) $(LIMIT) $(FAULTY_WORKER) $(call obj,$(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c))
+# All of the tests, compiled and not linked: for a second compiler.
+test-objects: $(call obj,$(TEST_SRC) $(TEST_SUPPORT) $(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c))
 # Sanitized runs take 1/20 of the samples.
 test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
