@@ -164,6 +164,7 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 				     .height = p->crop_height,
 				     .rel_mse = NAN,
 				     .rel_mse_upper = NAN,
+				     .rel_mse_own = NAN,
 				     .rel_mse_degrees = NAN,
 				     .rel_mse_95 = {NAN, NAN},
 				     .rounds = c->rounds};

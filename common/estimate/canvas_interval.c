@@ -106,7 +106,7 @@ void canvas_interval(struct error_sums *s, struct canvas_image *img)
 		s->distance[g] = s->gram[g][g];
 	for (uint32_t g = 0; g < s->groups; g++)
 		mean += s->distance[g] / groups;
-	img->rel_mse = img->rel_mse_upper = img->rel_mse_95[0] = img->rel_mse_95[1] =
+	img->rel_mse = img->rel_mse_own = img->rel_mse_upper = img->rel_mse_95[0] = img->rel_mse_95[1] =
 		mean / (groups - 1) / (3.0 * img->width * img->height);
 	if (!(mean > 0))
 		return;
@@ -118,6 +118,7 @@ void canvas_interval(struct error_sums *s, struct canvas_image *img)
 	own = fmax(1, own / heavier_than_normal(s));
 	double low = s->share > 0 ? fmin(1, s->low / s->share) : 1,
 	       high = s->share > 0 ? fmax(1, (s->high + s->dark) / s->share) : 1;
+	img->rel_mse_own *= low;
 	img->rel_mse_upper *= high * f_quantile(0.95, own, own * (groups - 1));
 	img->rel_mse_95[0] *= low * f_quantile(0.025, own, own * (groups - 1));
 	img->rel_mse_95[1] *= high * f_quantile(0.975, own, own * (groups - 1));

@@ -36,6 +36,7 @@ struct canvas_image {
 	double rel_mse;
 	double rel_mse_upper;	/* upper end of the 90 % interval of this image's relMSE; valid only if nothing is
 				   doubtful */
+	double rel_mse_own;	/* rel_mse if every pixel is as bright as it came out: if none has a firefly */
 	double rel_mse_degrees; /* degrees of freedom: rel_mse is distributed as its expectation times chi-square over
 				   them; NAN: not known */
 	double rel_mse_95[2];	/* contains this image's relMSE in 95 % of all cases; NAN if doubtful */

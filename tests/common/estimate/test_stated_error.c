@@ -279,6 +279,12 @@ static void one_sample_decides_nothing(void **state)
 	assert_int_equal(merge_end_of(&p, 1, 0, &img), MERGE_GOES_ON);
 	stated_error(&img, text, sizeof text);
 	assert_non_null(strstr(text, "its interval is not known: 1"));
+	/* If pixel 45 is a highlight: 6.25 is its brightness and its standard error, those of the others are 0.1 /
+	 * sqrt(15) of theirs. */
+	double own = (6.25 * 6.25 / (6.3 * 6.3 + 6.25 * 6.25) + (PIXELS - 1) * 0.01 / 15) / PIXELS;
+	print_message("with its own brightness %.5f, by hand %.5f\n", img.rel_mse_own, own);
+	assert_true(fabs(img.rel_mse_own / own - 1) < 0.05);
+	assert_non_null(strstr(text, "; if the bright ones are highlights and not fireflies, the error is about 6."));
 	/* The same picture without it is known, and meets a target. */
 	img.rel_mse_doubt = ERROR_KNOWN;
 	assert_int_equal(merge_end_of(&p, 1, 0, &img), MERGE_ERROR);
@@ -388,8 +394,12 @@ static void fireflies_are_divided_by_what_others_found(void **state)
 static void words(void **state)
 {
 	(void)state;
-	struct canvas_image img = {
-		.width = 10, .height = 10, .rel_mse = 0.01, .rel_mse_upper = 0.0121, .rel_mse_95 = {0.0081, 0.0144}};
+	struct canvas_image img = {.width = 10,
+				   .height = 10,
+				   .rel_mse = 0.01,
+				   .rel_mse_own = 0.01,
+				   .rel_mse_upper = 0.0121,
+				   .rel_mse_95 = {0.0081, 0.0144}};
 	char text[STATED_ERROR_TEXT];
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(text, "relative error 10.00 % (95 %: 9.00 to 12.00 %)");
