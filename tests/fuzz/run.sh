@@ -53,17 +53,17 @@ if ! command -v "$CLANG" >/dev/null 2>&1; then
 	echo "fuzz: skipped: $CLANG is not installed (apt install clang)"
 	exit 77
 fi
-goals=fuzzers
+run=1 goals=fuzzers
 if [ "${1:-}" = --build ]; then
 	shift
-	goals=$*
+	run=0 goals=$*
 fi
 "${MAKE:-make}" --no-print-directory -j"$jobs" CC="$CLANG" BUILD="$BUILD" SAN=fuzzer-no-link,address,undefined OPT=-O1 $goals >"$BUILD.log" 2>&1 || {
 	tail -20 "$BUILD.log"
 	echo "fuzz: the build failed; all of it is in $BUILD.log"
 	exit 1
 }
-[ "$goals" = fuzzers ] || exit 0
+[ $run = 1 ] || exit 0
 
 mkdir -p "$BUILD/findings"
 for source in tests/fuzz/fuzz_*.c; do
