@@ -9,8 +9,9 @@
  * truth then. Above, a lamp in a glass shell stated 44 % where 544 % was true. */
 static const double small_error = 0.1, rare_factor = 5;
 
-/* The error that the image has if the pixels that came out bright really are, where that is less than half of the stated
- * one. A lamp smaller than a pixel looks like a firefly in short renders: 395 % was stated where 22 % was true. */
+/* The error that the image has if the pixels that came out bright really are, where that is less than half of the
+ * stated one. A lamp smaller than a pixel looks like a firefly in short renders: 395 % was stated where 22 % was true.
+ */
 static void add_own(const struct canvas_image *img, struct text *t)
 {
 	if (img->rel_mse_own < 0.25 * img->rel_mse)
