@@ -134,9 +134,10 @@ $(FAULTY_WORKER): $(BUILD)/bin/hslt-worker $(call obj,tests/e2e/faulty_worker.c 
 	@mkdir -p $(@D); id=$$(LC_ALL=C readelf -n $< | sed -n 's/.*Build ID: //p'); \
 	$(CC) $(LDFLAGS) -Wl,--build-id=$${id:+0x}$${id:-none} $(FAULTY_WRAP) -o $@ $(filter-out $<,$^) $(LIBS_RENDER) $(LIBS_COMMON)
 # Every build of the tests also compiles the fuzzers (linked with clang only), the benchmarks and the calibration, so that they keep building.
-tests: $(TEST_BIN) $(LIMIT) $(FAULTY_WORKER) $(call obj,$(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c))
+TEST_MORE := $(call obj,$(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c))
+tests: $(TEST_BIN) $(LIMIT) $(FAULTY_WORKER) $(TEST_MORE)
 # All of the tests, compiled and not linked: for a second compiler.
-test-objects: $(call obj,$(TEST_SRC) $(TEST_SUPPORT) $(wildcard tests/fuzz/*.c tests/bench/*.c tests/image/*.c))
+test-objects: $(call obj,$(TEST_SRC) $(TEST_SUPPORT)) $(TEST_MORE)
 # Sanitized runs take 1/20 of the samples.
 test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
