@@ -8,24 +8,18 @@
 #include "common/estimate/canvas_error.h"
 
 #include "common/base/mem.h"
-#include "common/estimate/inverse_square.h"
+#include "common/estimate/cancelling.h"
 #include "common/estimate/tile_error.h"
 
 #include <assert.h>
 #include <math.h>
 #include <string.h>
 
-enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS, BASE_GROUPS = 8 };
-
-/* Squared relative standard error below which a pixel's own brightness is used. */
-static const double believed = 0.08;
+enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS };
 
 /* A kurtosis above this share of the number of groups: one of them has most of the pixel's variance. A single
  * outlier would have nearly 1. */
 static const double one_group = 0.6;
-
-/* A channel darker than this share of its pixel's brightest one may be the remainder of colours that cancel. */
-static const double cancelled = 0.125;
 
 /* The tail index of errors is estimated from the largest in 128 and in 512, as that of samples when an integrator is
  * chosen (worker/render/choose.h), but from at least 32 and 8. From fewer than ERRORS_LEAST it would be the index of
@@ -48,11 +42,6 @@ struct block {
 static double divisor_square(const struct tile_error *t, double brightness, double square, double variances)
 {
 	return brightness * brightness + t->floor_square + variances * square;
-}
-
-static bool believe(double brightness, double square, double floor_square)
-{
-	return square <= believed * (brightness * brightness + floor_square);
 }
 
 /* A part of the relMSE whose pixels share one brightness, and the uncertainty of that. */
@@ -108,12 +97,11 @@ static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool beli
 	add_share(t, square / divisor, brightness, square, divisor);
 }
 
-/* The error is weighted over all brightnesses the pixel may have, by the normal distribution. */
+/* The error is weighted over all brightnesses the pixel may have. */
 static void settle_cancelling(struct tile_error *t, size_t pixel, size_t k)
 {
 	double square = t->square[pixel][k];
-	struct inverse_square weight =
-		inverse_square_expect(t->brightness[pixel][k], sqrt(square), sqrt(t->floor_square));
+	struct inverse_square weight = cancelling_weight(t, pixel, k);
 	double part = square * weight.mean;
 	float *apart = tile_error_apart(t, pixel) + k * t->groups, root = (float)sqrt(weight.mean);
 	add_bounds(t, pixel, k, part, part);
@@ -146,28 +134,6 @@ static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, s
 	return sum / n;
 }
 
-/*
- * Whether a channel is nearly zero because colours cancel in it, such as the blue of gold: the pixel's light is well
- * known, but this channel is positive in some groups and negative in others. Its value is not a lack of samples, and
- * the mean of its neighbours, whose signs differ, is not its brightness.
- */
-static bool cancels(const struct tile_error *t, size_t pixel, size_t k)
-{
-	const double *b = t->brightness[pixel];
-	size_t most = fabs(b[1]) > fabs(b[0]) ? 1 : 0;
-	most = fabs(b[2]) > fabs(b[most]) ? 2 : most;
-	if (t->groups < BASE_GROUPS || !(fabs(b[k]) < cancelled * fabs(b[most])) ||
-	    !believe(b[most], t->square[pixel][most], t->floor_square))
-		return false;
-	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
-	uint32_t above = 0, below = 0;
-	for (uint32_t g = 0; g < t->groups; g++) {
-		above += b[k] + (double)apart[g] > 0;
-		below += b[k] + (double)apart[g] < 0;
-	}
-	return above >= t->groups / 8 && below >= t->groups / 8;
-}
-
 /* A pixel keeps its own brightness if its neighbourhood is reliable. Judging each pixel alone would keep those that
  * came out too bright and average those that came out too dark. A pixel that is certain by itself keeps its
  * brightness whatever its neighbours are. */
@@ -178,9 +144,9 @@ static uint32_t find_settled(struct tile_error *t)
 		for (uint32_t x = 0; x < t->width; x++)
 			for (size_t k = 0; k < 3; k++) {
 				size_t p = (size_t)y * t->width + x;
-				t->settled[p][k] = believe(t->brightness[p][k], 8 * t->square[p][k], t->floor_square) ||
-						   noise_around(t, x, y, k) <= believed;
-				t->cancels[p][k] = !t->settled[p][k] && cancels(t, p, k);
+				bool certain = brightness_is_known(t, t->brightness[p][k], 8 * t->square[p][k]);
+				t->settled[p][k] = certain || noise_around(t, x, y, k) <= BRIGHTNESS_KNOWN;
+				t->cancels[p][k] = !certain && cancelling_channel(t, p, k);
 				t->settled[p][k] |= t->cancels[p][k];
 				waiting += !t->settled[p][k];
 			}
@@ -200,7 +166,7 @@ static double spread_square(const double *apart, uint32_t groups, double pixels)
 static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double rare, double square)
 {
 	double base = t->base[pixel][k] + rare, doubt = t->base_square[pixel][k] + square;
-	if (t->groups < BASE_GROUPS || !believe(base, doubt, t->floor_square))
+	if (t->groups < BASE_GROUPS || !brightness_is_known(t, base, doubt))
 		return false;
 	double divisor = divisor_square(t, base, doubt, 1), part = t->square[pixel][k] / divisor;
 	float *apart = tile_error_apart(t, pixel) + k * t->groups, root = (float)(1 / sqrt(divisor));
@@ -226,7 +192,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 	double brightness = (other ? b->open[k] : b->all[k]) / n;
 	const double *apart = (other ? b->open_apart : b->all_apart) + k * t->groups;
 	double square = spread_square(apart, t->groups, n);
-	if (!believe(brightness, square, t->floor_square) && size < TILE_SIZE)
+	if (!brightness_is_known(t, brightness, square) && size < TILE_SIZE)
 		return;
 	double divisor = divisor_square(t, brightness, square, 1);
 	float root = (float)(1 / sqrt(divisor));
@@ -408,6 +374,7 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	t->height = m->img->height - y < TILE_SIZE ? m->img->height - y : TILE_SIZE;
 	tile_error_load(m, t);
 	bool all_settled = find_settled(t) == 0;
+	cancelling_find_spread(t);
 	tile_error_write(m, t);
 	if (!all_settled) {
 		struct block whole;

@@ -10,6 +10,9 @@
 #include "common/estimate/making.h"
 #include "common/estimate/tail.h"
 
+/* With fewer groups there is no trimmed mean, and no colours cancel. */
+enum { BASE_GROUPS = 8 };
+
 /* A tile being worked on. Rows of `apart` hold three channels of `groups` values. */
 struct tile_error {
 	const struct canvas *c;
@@ -24,9 +27,18 @@ struct tile_error {
 		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
 	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
 	bool settled[TILE_SIZE * TILE_SIZE][3], cancels[TILE_SIZE * TILE_SIZE][3];
+	double cancelling_spread[3]; /* cancelling.h */
 	struct error_sums sum;
 	struct tail tail; /* of the groups' errors on the bright side */
 };
+
+/* Squared relative standard error up to which a brightness is used. */
+#define BRIGHTNESS_KNOWN 0.08
+
+static inline bool brightness_is_known(const struct tile_error *t, double brightness, double square)
+{
+	return square <= BRIGHTNESS_KNOWN * (brightness * brightness + t->floor_square);
+}
 
 /* A pixel's deviations: [3][groups]. */
 static inline float *tile_error_apart(const struct tile_error *t, size_t pixel)
