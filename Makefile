@@ -117,8 +117,11 @@ LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 # Whatever is linked with it can run out of memory when a test says so (tests/support/failing_memory.h).
 MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap_mem_alloc
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
+# A test calls what is built as it is used; its own code runs once, and is compiled and linked as fast as possible.
+$(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1
+TEST_LINKER := $(if $(shell command -v mold 2>/dev/null),-fuse-ld=mold)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+	$(link) $(TEST_LINKER) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 # It notes which random numbers are asked for.
 $(BUILD)/tests/worker/render/test_groups: TEST_WRAP := -Wl,--wrap=rng_uniform4,--wrap=rng_bits4
 # What tests/run.sh ends a test by. It needs no library, and no sanitizer: it is no test.
