@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/image/compare.h"
 
+#include "common/base/color.h"
 #include "common/base/mem.h"
 
 #include <float.h>
@@ -120,11 +121,6 @@ static int errors(const struct picture *a, const struct picture *b, double trim,
 	return 0;
 }
 
-static double luminance(const double rgb[3])
-{
-	return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
-
 int compare(const struct picture *a, const struct picture *b, double trim, struct compare_result *r, struct error *e)
 {
 	*r = (struct compare_result){0};
@@ -143,7 +139,7 @@ int compare(const struct picture *a, const struct picture *b, double trim, struc
 		r->mean_b[k] = mean(b->rgb[k], r->pixels);
 		r->ratio[k] = r->mean_a[k] / r->mean_b[k];
 	}
-	r->luminance_ratio = luminance(r->mean_a) / luminance(r->mean_b);
+	r->luminance_ratio = rec709_luminance(r->mean_a) / rec709_luminance(r->mean_b);
 	return 0;
 }
 

@@ -4,6 +4,7 @@
  * The BSDF itself is the inner one: the normals are bent by the geometry (worker/render/geom/relief.h), so that half
  * vectors and their derivatives take it into account.
  */
+#include "common/base/color.h"
 #include "worker/render/bsdf/create.h"
 
 struct bend {
@@ -14,7 +15,7 @@ struct bend {
 
 static double height_of(const double x[3], bool grey)
 {
-	return grey ? x[0] : 0.2126 * x[0] + 0.7152 * x[1] + 0.0722 * x[2];
+	return grey ? x[0] : rec709_luminance(x);
 }
 
 static void height_at(const void *data, double u, double v, struct relief_value *out)

@@ -13,6 +13,8 @@
  */
 #include "worker/render/emitter/envmap.h"
 
+#include "common/base/color.h"
+
 #include <string.h>
 
 #define PI 3.14159265358979323846
@@ -177,7 +179,7 @@ static double luminance(const struct envmap *m, uint32_t row, uint32_t column)
 {
 	double rgb[3];
 	raster_pixel(&m->raster, column, row, rgb);
-	return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+	return rec709_luminance(rgb);
 }
 
 /* Mean luminance of the cell's corners. */

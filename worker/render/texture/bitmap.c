@@ -4,6 +4,7 @@
  * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Linear rgb is interpolated; trilinear
  * and ewa of 0.5/0.6 become bilinear, since there are no footprints: sampling does the filtering.
  */
+#include "common/base/color.h"
 #include "worker/render/texture/raster.h"
 #include "worker/render/texture/texture.h"
 #include "worker/render/texture/uv.h"
@@ -94,7 +95,7 @@ static double bitmap_height(const struct texture *t, double u, double v)
 	double rgb[3];
 	uv_map_apply(&b->map, &u, &v);
 	raster_eval(&b->raster, u, v, rgb);
-	return b->raster.image.channels == 1 ? rgb[0] : 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+	return b->raster.image.channels == 1 ? rgb[0] : rec709_luminance(rgb);
 }
 
 static void bitmap_jet(const struct texture *t, double u, double v, struct texture_jet *j)

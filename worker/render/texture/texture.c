@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/texture/texture.h"
 
+#include "common/base/color.h"
+#include "worker/render/scene/value.h"
+
 #include <string.h>
 
 #define TEXTURE(name) extern const struct texture_ops texture_ops_##name;
@@ -22,18 +25,22 @@ int texture_create(struct texture *t, const struct scene_node *n, enum color_rol
 			*t = (struct texture){.ops = *ops};
 			return (*ops)->create(t, n, role, build, e);
 		}
-	return node_error(n, e, ENOTSUP, "\"%s\" is not a stringure that is supported", n->type);
+	return node_error(n, e, ENOTSUP, "\"%s\" is not a texture that is supported", n->type);
 }
 
+/* Of a colour its luminance, as of a coloured image. */
 static int height_from_value(struct texture *t, const struct scene_node *n, const char *name, const struct value *v,
 			     struct error *e)
 {
-	if (v->type != VALUE_FLOAT && v->type != VALUE_INT)
-		return node_error(n, e, EINVAL, "%s: a height is a number, not a colour", name);
-	double x = v->type == VALUE_INT ? (double)v->as.integer : v->as.number;
-	if (!isfinite(x))
+	double scratch[3];
+	uint32_t count;
+	const double *x = value_numbers(v, scratch, &count);
+	if (v->type == VALUE_SPECTRUM)
+		return node_error(n, e, EINVAL, "%s: a height is a number or an RGB colour, not a spectrum", name);
+	double height = count == 3 ? rec709_luminance(x) : x[0];
+	if (!isfinite(height))
 		return node_error(n, e, EINVAL, "%s: a height must be finite", name);
-	t->color = color_constant(x);
+	t->color = color_constant(height);
 	return 0;
 }
 

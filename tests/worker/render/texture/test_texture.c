@@ -277,6 +277,15 @@ static void test_scale(void **state)
 	assert_true(fabs(j.du[0] + 1.5) < 1e-12 && fabs(j.x[0] + 0.25) < 1e-12);
 }
 
+/* Of a colour the luminance, as of a coloured image. */
+static void test_coloured_height(void **state)
+{
+	struct fixture *f = *state;
+	struct texture t = make_texture(f, "checkerboard color0=rgb(1,0.5,0.25) color1=-3", COLOR_HEIGHT);
+	assert_true(fabs(texture_height(&t, 0.25, 0.25) - (0.2126 + 0.5 * 0.7152 + 0.25 * 0.0722)) < 1e-12);
+	assert_true(texture_height(&t, 0.75, 0.25) == -3);
+}
+
 static struct texture tinted(struct fixture *f, const char *scale, const char *inner, enum color_role role)
 {
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, scale);
@@ -376,6 +385,7 @@ int main(void)
 		cmocka_unit_test(test_uv_maps),
 		cmocka_unit_test(test_derivatives),
 		cmocka_unit_test(test_scale),
+		cmocka_unit_test(test_coloured_height),
 		cmocka_unit_test(test_tint),
 		cmocka_unit_test(test_product),
 		cmocka_unit_test(test_channel_and_threshold),

@@ -146,9 +146,9 @@ static void test_refused(void **state)
 	refuses("<bsdf name='displacement' type='diffuse'/>" LEVEL("1"),
 		"`displacement` may be a texture, but not a bsdf");
 	refuses("<rgb name='displacement' value='1,0.5,1'/>" LEVEL("1"), "`displacement` cannot have this type");
-	refuses("<texture name='displacement' type='checkerboard'><rgb name='color0' value='1,0,0'/></texture>" LEVEL(
+	refuses("<texture name='displacement' type='checkerboard'><spectrum name='color0' value='400:1, 700:0.5'/></texture>" LEVEL(
 			"1"),
-		"color0: a height is a number, not a colour");
+		"color0: a height is a number or an RGB colour, not a spectrum");
 }
 
 enum { SIDE = 32 };
