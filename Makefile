@@ -119,7 +119,7 @@ MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
 # A test calls what is built as it is used; its own code runs once, and is compiled and linked as fast as possible.
 $(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1
-TEST_LINKER := $(if $(shell command -v mold 2>/dev/null),-fuse-ld=mold)
+TEST_LINKER := $(shell $(CC) -fuse-ld=mold -Wl,--version >/dev/null 2>&1 && echo -fuse-ld=mold)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(TEST_LINKER) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 # It notes which random numbers are asked for.
