@@ -20,6 +20,7 @@
 #include "common/estimate/merge.h"
 #include "common/estimate/stated_error.h"
 #include "tests/support/dice.h"
+#include "tests/support/length.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -29,7 +30,13 @@
 
 #include <cmocka.h>
 
-enum { WIDTH = 16, HEIGHT = 8, PIXELS = WIDTH * HEIGHT, GROUPS = 16, PICTURES = 300 };
+enum { WIDTH = 16, HEIGHT = 8, PIXELS = WIDTH * HEIGHT, GROUPS = 16 };
+
+/* As many pictures, and a sixth of them when sanitized. */
+static int of_length(int pictures)
+{
+	return test_scaled() ? pictures / 6 : pictures;
+}
 
 static const float white[3] = {0.95046F, 1, 1.08906F}; /* D65: red, green and blue are 1 to four digits */
 static const float blue_primary[3] = {0.18048F, 0.07219F, 0.95053F};
@@ -172,13 +179,15 @@ static double realised(const struct canvas_image *img, truth_of *truth)
 	return sum / (3 * PIXELS);
 }
 
-static void check_interval(const char *name, value_of *of, truth_of *truth, int least_known, double bias)
+/* least_known: the share of the pictures whose interval is known. */
+static void check_interval(const char *name, value_of *of, truth_of *truth, double least_known, double bias)
 {
+	const int pictures = of_length(300);
 	struct plan p = plan_of(PLAN_SAMPLES, WIDTH, HEIGHT);
 	struct dice d = dice_of(name);
 	int known = 0, held = 0, planted = 0;
 	double stated = 0, own = 0;
-	for (int i = 0; i < PICTURES; i++) {
+	for (int i = 0; i < pictures; i++) {
 		struct canvas_image img;
 		image_of(&p, of, &d, &img);
 		double x = realised(&img, truth);
@@ -194,8 +203,8 @@ static void check_interval(const char *name, value_of *of, truth_of *truth, int 
 		canvas_image_fini(&img);
 	}
 	print_message("%s: %d of %d known, %d held, %d with the estimate halved; stated over true %.2f\n", name, known,
-		      PICTURES, held, planted, stated / own);
-	assert_true(known >= least_known);
+		      pictures, held, planted, stated / own);
+	assert_true(known >= least_known * pictures);
 	assert_true(held >= 0.9 * known);
 	assert_true(planted < 0.8 * known);
 	assert_true(fabs(stated / own - 1) < bias);
@@ -204,10 +213,10 @@ static void check_interval(const char *name, value_of *of, truth_of *truth, int 
 static void intervals_hold(void **state)
 {
 	(void)state;
-	check_interval("grain", grain, brightness, PICTURES, 0.15);
-	check_interval("hits", hits, brightness, PICTURES / 4, 0.2);
-	check_interval("seldom", seldom, brightness, PICTURES / 20, 0.15);
-	check_interval("checks", checks, strip, PICTURES / 5, 0.4);
+	check_interval("grain", grain, brightness, 1, 0.15);
+	check_interval("hits", hits, brightness, 0.25, 0.2);
+	check_interval("seldom", seldom, brightness, 0.05, 0.15);
+	check_interval("checks", checks, strip, 0.2, 0.4);
 }
 
 /* ---- colours that cancel */
@@ -241,7 +250,7 @@ static double no_blue(void *user, uint32_t group, uint32_t pixel)
 /* The mean stated relMSE of a hundred pictures over the one that follows from the true blue. */
 static double gold_stated_over_true(double most, double noise)
 {
-	enum { TIMES = 100 };
+	const int times = of_length(100);
 	struct plan p = plan_of(PLAN_SAMPLES, WIDTH, HEIGHT);
 	struct gold g = {dice_of("gold"), most, noise};
 	const double mean = 2.0 / 3, grey = 0.04 * 0.04 / GROUPS;
@@ -250,10 +259,10 @@ static double gold_stated_over_true(double most, double noise)
 		double square = noise * noise / GROUPS + grey, b = true_blue(&g, i), floor = 1e-4 * mean * mean;
 		expected += (2 * grey + square / (b * b + floor)) / (3 * PIXELS);
 	}
-	for (int i = 0; i < TIMES; i++) {
+	for (int i = 0; i < times; i++) {
 		struct canvas_image img;
 		image_with_blue(&p, bright, no_blue, &g, &img);
-		stated += img.rel_mse / TIMES;
+		stated += img.rel_mse / times;
 		canvas_image_fini(&img);
 	}
 	print_message("blue up to %g, noise %g: stated over true %.3f\n", most, noise, stated / expected);
