@@ -229,7 +229,7 @@ const char *render_choice_of(const struct render_choice *c)
 	bool is_short = has_no_fireflies(&c->path) && c->path.tail >= tail_least;
 	if (is_short && !c->focuses)
 		return "path";
-	return is_short && !c->brief ? "bdpt8" : "erpt4";
+	return is_short && !c->brief && !c->refracts ? "bdpt8" : "erpt4";
 }
 
 /* ---- the pilot */
@@ -472,10 +472,10 @@ static bool path_misses(const struct world *w)
 }
 
 /* What the scene has, whatever the user forces. */
-static bool focuses_light(const struct render_summary *s)
+static bool scene_has(const struct render_summary *s, const char *effect)
 {
 	for (size_t i = 0; i < s->line_count; i++)
-		if (strcmp(s->lines[i].name, "half-vectors") == 0)
+		if (strcmp(s->lines[i].name, effect) == 0)
 			return s->lines[i].on != s->lines[i].forced;
 	return true;
 }
@@ -486,7 +486,8 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 	struct plan film;
 	*out = (struct render_choice){.path = render_found_none, .bdpt = render_found_none};
 	world_summary(w, &summary);
-	out->focuses = focuses_light(&summary);
+	out->focuses = scene_has(&summary, "half-vectors");
+	out->refracts = out->focuses && scene_has(&summary, "transmission");
 	int rc = film_of(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
 	if (!rc && !p)

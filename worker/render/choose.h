@@ -16,8 +16,9 @@
  * path's tail is that of a finite variance and its second moment times rays is the smaller one. If a tail index of 2 or
  * more says so, and no sample has a share in the light that such a law does not allow, this is `path` where no lobe of
  * the scene is so narrow that it focuses light, else `bdpt8`, whose light sub-paths, one in eight samples, bound
- * fireflies. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of contributions, or
- * if the pilot is brief, it is `erpt4`, whose chains bound them, with a light sub-path in one of four samples.
+ * fireflies of reflected light. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of
+ * contributions, if the pilot is brief, or if surfaces refract, whose caustics a pilot may miss altogether, it is
+ * `erpt4`, whose chains bound fireflies, with a light sub-path in one of four samples.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -46,12 +47,14 @@ enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 struct render_choice {
 	struct render_found path, bdpt;
 	struct rare_light merged; /* to bdpt, by merging; 0 where no lobe is narrow */
-	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe, or
-			     none at all */
-	bool dark;	  /* path finds next to nothing */
-	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
-	bool brief;	  /* too few samples to trust a tail index where lobes are narrow */
-	bool settled;	  /* no choice was left before bdpt was looked at: nothing is known of it */
+	bool misses;   /* path finds less than there is: light of a point or a direction through a specular lobe, or
+			  none at all */
+	bool dark;     /* path finds next to nothing */
+	bool focuses;  /* lobes that are narrow: what they throw a pilot may have missed */
+	bool refracts; /* light passes through such a scene's surfaces: no lamp behind one is joined to what it lights
+			*/
+	bool brief;    /* too few samples to trust a tail index where lobes are narrow */
+	bool settled;  /* no choice was left before bdpt was looked at: nothing is known of it */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of
 			     a short render's, or 3 times 4,096; 1 in 30 of a long one's, 1 in 120 of one of hours; not
 			     those of `path`, an eighth at most, that single bright ones of bdpt are held against */
