@@ -117,8 +117,9 @@ LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 # Whatever is linked with it can run out of memory when a test says so (tests/support/failing_memory.h).
 MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap_mem_alloc
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
-# A test calls what is built as it is used; its own code runs once, and is compiled and linked as fast as possible.
-$(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1
+# A test calls what is built as it is used; its own code runs once, and is compiled and linked as fast as possible. (With sanitizers,
+# gcc at -O1 takes no number for short.)
+$(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1 $(if $(SAN),-Wno-format-truncation)
 TEST_LINKER := $(shell $(CC) -fuse-ld=mold -Wl,--version >/dev/null 2>&1 && echo -fuse-ld=mold)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(TEST_LINKER) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
