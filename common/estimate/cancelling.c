@@ -21,6 +21,12 @@ static size_t brightest(const double *b)
 	return fabs(b[2]) > fabs(b[most]) ? 2 : most;
 }
 
+/* M */
+static double most_of(const struct tile_error *t, size_t pixel)
+{
+	return t->brightness[pixel][brightest(t->brightness[pixel])];
+}
+
 bool cancelling_channel(const struct tile_error *t, size_t pixel, size_t k)
 {
 	const double *b = t->brightness[pixel];
@@ -45,8 +51,7 @@ void cancelling_find_spread(struct tile_error *t)
 			if (!t->cancels[p][k])
 				continue;
 			/* Over the floor, so that no square leaves the range of doubles. */
-			double most = t->brightness[p][brightest(t->brightness[p])],
-			       v = t->square[p][k] / t->floor_square,
+			double most = most_of(t, p), v = t->square[p][k] / t->floor_square,
 			       truth = t->brightness[p][k] * t->brightness[p][k] / t->floor_square - v;
 			sum += truth;
 			variance += 2 * v * v + 4 * fmax(0, truth) * v;
@@ -59,7 +64,6 @@ void cancelling_find_spread(struct tile_error *t)
 struct inverse_square cancelling_weight(const struct tile_error *t, size_t pixel, size_t k)
 {
 	double b = t->brightness[pixel][k], v = t->square[pixel][k],
-	       spread = t->cancelling_spread[k] * t->brightness[pixel][brightest(t->brightness[pixel])],
-	       share = spread * spread / (spread * spread + v);
+	       spread = t->cancelling_spread[k] * most_of(t, pixel), share = spread * spread / (spread * spread + v);
 	return inverse_square_expect(share * b, sqrt(share * v), sqrt(t->floor_square));
 }

@@ -47,14 +47,13 @@ enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 struct render_choice {
 	struct render_found path, bdpt;
 	struct rare_light merged; /* to bdpt, by merging; 0 where no lobe is narrow */
-	bool misses;   /* path finds less than there is: light of a point or a direction through a specular lobe, or
-			  none at all */
-	bool dark;     /* path finds next to nothing */
-	bool focuses;  /* lobes that are narrow: what they throw a pilot may have missed */
-	bool refracts; /* light passes through such a scene's surfaces: no lamp behind one is joined to what it lights
-			*/
-	bool brief;    /* too few samples to trust a tail index where lobes are narrow */
-	bool settled;  /* no choice was left before bdpt was looked at: nothing is known of it */
+	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe, or
+			     none at all */
+	bool dark;	  /* path finds next to nothing */
+	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
+	bool refracts;	  /* and surfaces let light through: a pilot may have missed the lamps behind them */
+	bool brief;	  /* too few samples to trust a tail index where lobes are narrow */
+	bool settled;	  /* no choice was left before bdpt was looked at: nothing is known of it */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of
 			     a short render's, or 3 times 4,096; 1 in 30 of a long one's, 1 in 120 of one of hours; not
 			     those of `path`, an eighth at most, that single bright ones of bdpt are held against */
