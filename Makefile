@@ -118,8 +118,9 @@ LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap_mem_alloc
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
 # A test's own code runs once, and is compiled and linked as fast as possible; what it calls is built as it is used. With sanitizers, gcc 12
-# at -O1 does not see the bounds of loop counters, and warns of texts that fit. The linker is looked for once, where a test is linked.
-$(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1 $(if $(SAN),-Wno-format-truncation)
+# at -O1 does not see the bounds of loop counters, and warns of texts that fit; clang does not know the warning. The linker is looked for
+# once, where a test is linked.
+$(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1 $(if $(SAN),-Wno-format-truncation -Wno-unknown-warning-option)
 TEST_LINKER = $(eval TEST_LINKER := $(shell $(CC) -fuse-ld=mold -Wl,--version >/dev/null 2>&1 && echo -fuse-ld=mold))$(TEST_LINKER)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(TEST_LINKER) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
