@@ -251,7 +251,7 @@ static int prepare_redistribution(struct job *j, const struct brightness *map, s
 	if (rc)
 		return rc;
 	return redistribution_new(&j->redistribution, &redistribution_usual, &j->context, map ? map : j->own_map,
-				  j->plan->seed, &j->film, j->out->classes, e);
+				  j->plan->seed, &j->film.target, j->out->classes, e);
 }
 
 static int prepare(struct job *j, const struct world *w, const struct lease_input *in, struct error *e)

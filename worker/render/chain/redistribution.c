@@ -35,7 +35,7 @@ struct redistribution {
 	struct path_context context; /* of the chains */
 	uint32_t light_every;	     /* of the samples */
 	const struct brightness *map;
-	struct film_sums *film;
+	struct splat_target *to;
 	struct mixture mixture; /* local strategies alone */
 	struct mutation_ctx mutation;
 	uint64_t unread[STRATEGY_COUNTERS];
@@ -76,7 +76,7 @@ static void splat(struct redistribution *r, struct spread_place *at, double unit
 		return;
 	struct splat s = {.x = at->place.path.film[0], .y = at->place.path.film[1]};
 	full_path_colour(&r->context, &at->place.path, s.xyz);
-	film_sums_splat(r->film, &s, at->place.weight * unit / at->scale);
+	r->to->splat(r->to, &s, at->place.weight * unit / at->scale);
 	at->place.weight = 0;
 }
 
@@ -192,7 +192,7 @@ static void leave_out_independent(struct mixture *m)
 
 int redistribution_new(struct redistribution **out, const struct redistribution_rule *rule,
 		       const struct path_context *c, const struct brightness *map, uint64_t seed,
-		       struct film_sums *film, double classes[PATH_CLASSES], struct error *e)
+		       struct splat_target *to, double classes[PATH_CLASSES], struct error *e)
 {
 	struct render_summary summary;
 	struct redistribution *r = *out = mem_alloc(1, sizeof *r);
@@ -205,7 +205,7 @@ int redistribution_new(struct redistribution **out, const struct redistribution_
 	r->context.light_every = 0;
 	r->light_every = c->light_every;
 	r->map = map;
-	r->film = film;
+	r->to = to;
 	r->classes = classes;
 	world_summary(c->w, &summary);
 	mixture_default(&summary, &r->mixture);

@@ -25,7 +25,6 @@
 #define WORKER_RENDER_CHAIN_REDISTRIBUTION_H
 
 #include "common/plan/plan.h"
-#include "worker/render/film/sums.h"
 #include "worker/render/path/brightness.h"
 
 struct redistribution;
@@ -40,10 +39,10 @@ extern const struct redistribution_rule redistribution_usual;
 
 enum { REDISTRIBUTION_CHAINS = 64 }; /* for one contribution */
 
-/* c: that of the samples; world, window, depths, light_every and counters are taken from it. classes: gets
- * the sums of what is spread, I by path class. -ENOMEM */
+/* c: that of the samples; world, window, depths, light_every and counters are taken from it. to: where the chains
+ * splat. classes: gets the sums of what is spread, I by path class. -ENOMEM */
 int redistribution_new(struct redistribution **r, const struct redistribution_rule *rule, const struct path_context *c,
-		       const struct brightness *map, uint64_t seed, struct film_sums *film,
+		       const struct brightness *map, uint64_t seed, struct splat_target *to,
 		       double classes[PATH_CLASSES], struct error *e);
 void redistribution_free(struct redistribution *r);
 

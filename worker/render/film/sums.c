@@ -33,9 +33,15 @@ static double windowed_sinc_integral(double radius)
 	return 2 * sum * radius / (3.0 * STEPS);
 }
 
+static void splat_on_film(struct splat_target *to, const struct splat *s, double weight)
+{
+	film_sums_splat((struct film_sums *)(void *)to, s, weight);
+}
+
 int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e)
 {
-	*f = (struct film_sums){.x = p->crop_x,
+	*f = (struct film_sums){.target = {splat_on_film},
+				.x = p->crop_x,
 				.y = p->crop_y,
 				.width = p->crop_width,
 				.height = p->crop_height,

@@ -12,6 +12,7 @@
 #include "worker/render/film/moments.h"
 
 struct film_sums {
+	struct splat_target target;   /* film_sums_splat */
 	uint32_t x, y, width, height; /* the crop */
 	uint32_t tiles_x, tiles_y;
 	enum filter_kind filter;

@@ -84,6 +84,11 @@ struct path_context {
 struct splat {
 	double x, y, xyz[3];
 };
+
+/* Where splats go: the first member of a film or of a map. */
+struct splat_target {
+	void (*splat)(struct splat_target *to, const struct splat *s, double weight);
+};
 struct path_sample {
 	uint32_t count;
 	double intensity; /* I: sum of X + Y + Z */

@@ -5,6 +5,7 @@
  * them; that bdpt is right, and erpt with it, test_integrators shows against path.
  */
 #include "worker/render/chain/redistribution.h"
+#include "worker/render/film/sums.h"
 
 #include "tests/support/agree.h"
 #include "tests/support/length.h"
@@ -89,7 +90,8 @@ static void trial_begin(struct trial *t, const struct world *w, const struct red
 	assert_int_equal(film_sums_init(&t->unspread, &t->plan, &w->settings, &e), 0);
 	memset(t->counters, 0, sizeof t->counters);
 	t->context.light_every = light_every;
-	assert_int_equal(redistribution_new(&t->r, rule, &t->context, &t->map, seed, &t->film, t->classes, &e), 0);
+	assert_int_equal(redistribution_new(&t->r, rule, &t->context, &t->map, seed, &t->film.target, t->classes, &e),
+			 0);
 }
 
 static void trial_end(struct trial *t)
