@@ -1,33 +1,91 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Makes the map of brightness that all leases of a job share. It is sampled by bdpt, which finds all light that the
- * render finds, with about one sample a pixel, and in short renders with no more samples than their bootstrap has.
+ * Makes the map of brightness that all leases of a job share, in two steps. The first map is sampled by bdpt, which
+ * finds all light that the render finds. Where most of that is in few bright samples, such a map is as noisy as an
+ * image of bdpt, however many samples it has. So the second map, which is the one in use, is made of the render's own
+ * samples and chains, guided by the first.
  *
  * -ENOMEM; -EDOM after an invalid floating-point operation. Nothing is left allocated then.
  */
+#include "worker/render/chain/redistribution.h"
 #include "worker/render/path/brightness.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
 #include "worker/render/render.h"
 
+#include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "worker/render/math/fptrap.h"
 
-enum { SAMPLES_LEAST = 1 << 12, SAMPLES_SHORT = 1 << 14, SAMPLES_MOST = 1 << 17 };
+enum {
+	FIRST_LEAST = 1 << 10,
+	SECOND_LEAST = 1 << 12,
+	SECOND_MOST = 1 << 17,
+	SHARE_FIRST = 4, /* the first map has a quarter of the samples */
+	/* A bootstrap has 1/64 of the render's samples, but no more than this (plan.c): a map has 1/32 in short
+	 * renders, at most 1/16, or one a pixel, in longer ones. */
+	BOOTSTRAP_LONG = 1 << 14,
+	TIMES_SHORT = 2,
+	TIMES_LONG = 4,
+	A_CELL = 1, /* samples in a cell, which takes the mean of its neighbourhood */
+	STEP_FIRST = 0,
+	STEP_SECOND, /* steps of RNG_BRIGHTNESS */
+};
 
-/* The nearest power of two. */
+/* Of the second map: the nearest power of two. */
 static uint64_t samples_of(const struct film_window *w, const struct plan *p)
 {
-	uint64_t n = SAMPLES_LEAST;
-	double want = w->width * w->height;
-	if (p->bootstrap < SAMPLES_SHORT)
-		want = fmin(want, (double)p->bootstrap);
-	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < want)
+	uint64_t n = SECOND_LEAST;
+	const double pixels = w->width * w->height, bootstrap = (double)p->bootstrap;
+	double want = bootstrap < BOOTSTRAP_LONG ? bootstrap * TIMES_SHORT : fmax(pixels, bootstrap * TIMES_LONG);
+	while (n < SECOND_MOST && (double)n * M_SQRT2 < want)
 		n *= 2;
 	return n;
 }
 
-static int sample_map(struct brightness *map, struct path_context *c, const struct plan *p, struct error *e)
+#define NO_PIXEL UINT64_MAX /* tells the map's chains from the render's */
+
+/* What both maps are made with. */
+struct map_maker {
+	struct path_context context;
+	struct path_sample sample;
+	uint64_t counters[BATCH_COUNTERS];
+	double classes[PATH_CLASSES];
+	struct brightness first;
+	struct redistribution *redistribution;
+};
+
+static void sample_second(struct map_maker *m, struct brightness *map, uint64_t seed, uint64_t samples)
+{
+	struct path_context *c = &m->context;
+	for (uint64_t i = 0; i < samples; i++) {
+		struct sampler_random s;
+		tick();
+		sampler_random_init(&s, seed, RNG_BRIGHTNESS, i, STEP_SECOND);
+		c->split = redistribution_begin(m->redistribution, NO_PIXEL, i);
+		path_trace_both_ways(c, &s.base, &m->sample);
+		for (uint32_t k = 0; k < m->sample.count; k++)
+			brightness_add(map, &m->sample.splats[k], 1);
+		brightness_end_sample(map);
+	}
+	brightness_settle_near(map, samples);
+}
+
+static int make_second(struct map_maker *m, struct brightness *map, uint64_t seed, uint64_t n, struct error *e)
+{
+	struct path_context *c = &m->context;
+	int rc = brightness_init(map, &c->window, n, A_CELL, e);
+	if (rc)
+		return rc;
+	rc = redistribution_new(&m->redistribution, &redistribution_usual, c, &m->first, seed, &map->target, m->classes,
+				e);
+	if (!rc)
+		sample_second(m, map, seed, n);
+	return rc;
+}
+
+static int make_maps(struct map_maker *m, struct brightness *map, const struct plan *p, uint32_t light_every,
+		     struct error *e)
 {
 	jmp_buf back;
 	if (setjmp(back))
@@ -35,15 +93,18 @@ static int sample_map(struct brightness *map, struct path_context *c, const stru
 				 "an invalid floating-point operation (SIGFPE) in the map of brightness for '%s'",
 				 p->integrator);
 	jmp_buf *caught = fptrap_catch(&back);
-	int rc = brightness_of_samples(map, c, path_trace_both_ways, p->seed, RNG_BRIGHTNESS, 0,
-				       samples_of(&c->window, p), e);
+	const uint64_t n = samples_of(&m->context.window, p), first = n / SHARE_FIRST;
+	int rc = brightness_of_samples(&m->first, &m->context, path_trace_both_ways, p->seed, RNG_BRIGHTNESS,
+				       STEP_FIRST, first < FIRST_LEAST ? FIRST_LEAST : first, e);
+	m->context.light_every = light_every;
+	if (!rc)
+		rc = make_second(m, map, p->seed, n, e);
 	fptrap_catch(caught);
 	return rc;
 }
 
 int render_map_new(const struct world *w, const struct plan *p, struct brightness **out, struct error *e)
 {
-	uint64_t counters[BATCH_COUNTERS] = {0};
 	const struct integrator *i = integrator_find(p->integrator);
 	*out = NULL;
 	if (!i)
@@ -51,13 +112,15 @@ int render_map_new(const struct world *w, const struct plan *p, struct brightnes
 	if (!i->redistributes)
 		return 0;
 	struct brightness *map = mem_alloc(1, sizeof *map);
-	struct path_context *c = mem_alloc(1, sizeof *c);
-	int rc = map && c ? 0 : error_set(e, ENOMEM, "no memory for a map of brightness");
+	struct map_maker *m = mem_alloc(1, sizeof *m);
+	int rc = map && m ? 0 : error_set(e, ENOMEM, "no memory for a map of brightness");
 	if (!rc) {
-		path_context_for_samples(c, w, p, counters);
-		rc = sample_map(map, c, p, e);
+		path_context_for_samples(&m->context, w, p, m->counters);
+		rc = make_maps(m, map, p, i->light_every, e);
+		brightness_fini(&m->first);
+		redistribution_free(m->redistribution);
 	}
-	mem_free(c);
+	mem_free(m);
 	if (rc)
 		render_map_free(map);
 	else

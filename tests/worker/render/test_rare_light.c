@@ -29,13 +29,14 @@ static double share_of(struct world *w, uint64_t seed)
 				  .roulette = PATH_ROULETTE,
 				  .unclassed = true,
 				  .counters = counters};
-	assert_int_equal(brightness_init(&map, &c.window, SAMPLES, &e), 0);
+	assert_int_equal(brightness_init(&map, &c.window, SAMPLES, BRIGHTNESS_A_CELL, &e), 0);
 	for (uint64_t i = 0; i < SAMPLES; i++) {
 		struct sampler_random s;
 		sampler_random_init(&s, seed, RNG_TEST, i, 0);
 		path_trace(&c, &s.base, &sample);
 		for (uint32_t k = 0; k < sample.count; k++)
-			brightness_add(&map, &sample.splats[k]);
+			brightness_add(&map, &sample.splats[k], 1);
+		brightness_end_sample(&map);
 	}
 	brightness_settle(&map, SAMPLES);
 	assert_int_equal(rare_light(&c, &map, seed, 0, MERGED, &found), 0);

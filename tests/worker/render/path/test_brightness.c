@@ -12,15 +12,28 @@ enum { SIDE = 64, SAMPLES = 1 << 13 };
 static const struct film_window window = {-2, 5, SIDE, SIDE};
 
 /* Samples stratified over the window; each contributes what `of` says of its place, over the density 1 / pixels. */
-static void fill(struct brightness *b, double (*of)(double x, double y))
+static void add_samples(struct brightness *b, unsigned a_cell, double (*of)(double x, double y))
 {
 	struct error e;
-	assert_int_equal(brightness_init(b, &window, SAMPLES, &e), 0);
+	assert_int_equal(brightness_init(b, &window, SAMPLES, a_cell, &e), 0);
 	for (int i = 0; i < SAMPLES; i++) {
 		double x = i % 128 * 0.5 + 0.25, y = i / 128 + 0.5, value = of(x, y) * SIDE * SIDE;
-		brightness_add(b, &(struct splat){window.x + x, window.y + y, {value / 2, value / 4, value / 4}});
+		brightness_add(b, &(struct splat){window.x + x, window.y + y, {value / 2, value / 4, value / 4}}, 1);
+		brightness_end_sample(b);
 	}
+}
+
+static void fill(struct brightness *b, double (*of)(double x, double y))
+{
+	add_samples(b, BRIGHTNESS_A_CELL, of);
 	brightness_settle(b, SAMPLES);
+}
+
+/* 64 x 64 cells with two samples each, so a pixel is a cell. */
+static void fill_near(struct brightness *b, double (*of)(double x, double y))
+{
+	add_samples(b, 1, of);
+	brightness_settle_near(b, SAMPLES);
 }
 
 static double relative(const struct brightness *b, double x, double y)
@@ -95,6 +108,66 @@ static void darkness_has_the_least_that_the_error_knows(void **state)
 	brightness_fini(&b);
 }
 
+static void a_sample_counts_once_in_a_cell(void **state)
+{
+	(void)state;
+	struct brightness b;
+	struct error e;
+	const struct splat here = {window.x, window.y, {1, 1, 1}}, there = {window.x + SIDE - 1, window.y, {1, 0, 0}};
+	assert_int_equal(brightness_init(&b, &window, SAMPLES, 1, &e), 0);
+	brightness_add(&b, &here, 2);
+	brightness_add(&b, &there, 1);
+	b.target.splat(&b.target, &here, 1.0 / (SIDE * SIDE)); /* 3 more */
+	brightness_end_sample(&b);
+	brightness_add(&b, &here, 1);
+	brightness_end_sample(&b);
+	assert_true(b.sum[0] == 9 + 3 && b.square[0] == 9 * 9 + 3 * 3);
+	assert_true(b.sum[b.across - 1] == 1 && b.square[b.across - 1] == 1);
+	brightness_fini(&b);
+}
+
+static void dark_places_beside_bright_ones_are_dark(void **state)
+{
+	(void)state;
+	struct brightness b;
+	fill_near(&b, halves);
+	for (double y = 0.5; y < SIDE; y += 7)
+		for (double x = 0.5; x < SIDE; x++) {
+			if (x > SIDE / 2 - 3 && x < SIDE / 2 + 3)
+				continue; /* neighbourhoods of 5 x 5 cells reach across */
+			double product = relative(&b, x, y) * halves(x, y);
+			assert_true(product > 0.98 && product < 1.02);
+		}
+	brightness_fini(&b);
+}
+
+/* The neighbourhood of the firefly grows to 25 x 25 cells; elsewhere it is too small to reach it. */
+static void a_firefly_is_spread_over_its_neighbourhood(void **state)
+{
+	(void)state;
+	struct brightness b;
+	fill_near(&b, firefly);
+	double there = 1 / relative(&b, 40.25, 20.5), expected = 1 + (1e6 - 1) / (2 * 25 * 25);
+	assert_true(there > 0.999 * expected && there < 1.001 * expected);
+	double away = 1 / relative(&b, 60, 20.5), mean = 1 + (1e6 - 1) / SAMPLES;
+	expected = sqrt(1 + 0.01 * mean * 0.01 * mean); /* a hundredth of the mean is added in squares */
+	assert_true(away > 0.999 * expected && away < 1.001 * expected);
+	brightness_fini(&b);
+}
+
+static void a_black_film_has_no_scale_near_either(void **state)
+{
+	(void)state;
+	struct brightness b;
+	fill_near(&b, nothing);
+	assert_true(relative(&b, 1, 1) == 0);
+	brightness_fini(&b);
+	fill_near(&b, dark_half);
+	double least = 1 / relative(&b, 60, 30);
+	assert_true(least > 0.00499 && least < 0.00501);
+	brightness_fini(&b);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -102,6 +175,10 @@ int main(void)
 		cmocka_unit_test(a_firefly_does_not_show),
 		cmocka_unit_test(a_black_film_has_no_scale),
 		cmocka_unit_test(darkness_has_the_least_that_the_error_knows),
+		cmocka_unit_test(a_sample_counts_once_in_a_cell),
+		cmocka_unit_test(dark_places_beside_bright_ones_are_dark),
+		cmocka_unit_test(a_firefly_is_spread_over_its_neighbourhood),
+		cmocka_unit_test(a_black_film_has_no_scale_near_either),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
