@@ -111,7 +111,7 @@ else
 	step "build with address and undefined sanitizers" make -s -j"$jobs" SAN=address,undefined programs tests
 	kind "tests with sanitizers, 1/20 of the samples" make -s SAN=address,undefined test
 	unset HSLT_TEST_KINDS
-	step "build with clang" sh tests/fuzz/run.sh --build programs fuzzers test-objects
+	step "build with clang" sh tests/fuzz/run.sh --build programs fuzzers test-syntax
 	if [ $mode = full ]; then
 		kind "long forms" make -s FULL=1 test
 		step "faults, each as often as the table says" sh tests/e2e/faults.sh build --all
