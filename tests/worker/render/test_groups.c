@@ -39,8 +39,7 @@ static struct {
 
 static void note(enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block)
 {
-	/* The map of brightness is the plan's: all groups share it, and none of their samples. */
-	if (!noted.on || stream == RNG_BRIGHTNESS)
+	if (!noted.on)
 		return;
 	if (noted.count == noted.room) {
 		noted.room = noted.room ? 2 * noted.room : 1 << 16;
@@ -143,13 +142,17 @@ static struct batch run_lease(const struct world *w, const struct plan *p, struc
 	return b;
 }
 
-/* All leases of a job, what they ask for noted by group; `look` sees each batch. */
+/* All leases of a job, what they ask for noted by group; `look` sees each batch. The map of brightness is the plan's:
+ * all groups share it, and none of their numbers. It is noted as that of one group more. */
 static void run_all(const struct world *w, const struct plan *p, void (*look)(void *user, const struct batch *b),
 		    void *user)
 {
 	struct bootstrap *s;
 	struct batch before[GROUPS * PARTS] = {{.key = {0}}};
 	uint64_t seeds[GROUPS][CHAINS / GROUPS];
+	struct brightness *map;
+	noted.owner = GROUPS;
+	assert_int_equal(render_map_new(w, p, &map, NULL), 0);
 	assert_int_equal(bootstrap_new(&s, p, NULL), 0);
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
 		noted.owner = i / PARTS;
@@ -162,21 +165,23 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 		bootstrap_seeds(s, g, seeds[g]);
 	for (uint32_t i = 0; i < ROUNDS * GROUPS * PARTS; i++) {
 		uint32_t lease = i % (GROUPS * PARTS), group = lease / PARTS, part = lease % PARTS;
-		struct lease_input in = {.chain_count = CHAINS / GROUPS / PARTS,
-					 .seeds = seeds[group] +
-						  plan_chain_range(p, part).begin * (p->kind == PLAN_CHAINS)};
+		struct lease_input in = {.map = map};
+		if (p->kind == PLAN_CHAINS)
+			in = (struct lease_input){.chain_count = CHAINS / GROUPS / PARTS,
+						  .seeds = seeds[group] + plan_chain_range(p, part).begin};
 		if (before[lease].states)
 			in = (struct lease_input){.chain_count = before[lease].state_count,
 						  .states = before[lease].states};
 		noted.owner = group;
-		struct batch b = run_lease(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)},
-					   p->kind == PLAN_CHAINS ? &in : NULL);
+		struct batch b =
+			run_lease(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, &in);
 		look(user, &b);
 		batch_fini(&before[lease]);
 		before[lease] = b;
 	}
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++)
 		batch_fini(&before[i]);
+	render_map_free(map);
 	bootstrap_free(s);
 }
 
@@ -192,7 +197,7 @@ static void groups_share_no_random_number(void **state)
 	struct world *w = lit_world();
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		struct plan p = plan_of(w, render_integrator_at(i));
-		size_t own[GROUPS] = {0};
+		size_t own[GROUPS + 1] = {0};
 		listen(true);
 		run_all(w, &p, ignore, NULL);
 		qsort(noted.all, noted.count, sizeof *noted.all, by_number);

@@ -124,7 +124,7 @@ static void test_rough_glass(void **state)
 					"0,-0.6,-0.3", "0.8",
 					"<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
 					"<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
-		  2048, 2048, 0, at_length(12800), at_length(21504));
+		  2560, 2560, 0, at_length(12800), at_length(21504));
 }
 
 static void test_environment(void **state)
