@@ -25,6 +25,7 @@ enum { COMPARISONS = 64 };
 struct group_run {
 	const struct world *w;
 	const struct plan *p;
+	const struct brightness *map; /* of all groups, as in a render */
 	uint32_t group;
 	double *mean;
 	double sum[AGREE_CELLS + 1];
@@ -105,7 +106,9 @@ static bool run_part(struct group_run *g, uint32_t part, const uint64_t *seeds)
 					 .seeds = epoch ? NULL : seeds + r.begin,
 					 .states = before.states};
 		struct batch b;
-		ok = lease(g, &k, g->p->kind == PLAN_CHAINS ? &in : NULL, &b);
+		if (g->p->kind == PLAN_SAMPLES)
+			in = (struct lease_input){.map = g->map};
+		ok = lease(g, &k, &in, &b);
 		batch_fini(&before);
 		before = (struct batch){.state_count = 0};
 		if (ok) {
@@ -189,16 +192,21 @@ void agree_render_chains(const struct world *w, const char *test, const char *si
 	static struct group_run runs[AGREE_MAX_GROUPS];
 	struct plan p;
 	make_plan(w, test, side, how, mutations, bootstrap, &p);
+	struct brightness *map;
+	struct error e = {""};
+	if (render_map_new(w, &p, &map, &e))
+		fail_msg("%s", e.text);
 	memset(runs, 0, sizeof runs);
 	*out = (struct agree_image){.groups = p.groups};
 	for (uint32_t g = 0; g < p.groups; g++)
-		runs[g] = (struct group_run){.w = w, .p = &p, .group = g, .mean = out->mean[g]};
+		runs[g] = (struct group_run){.w = w, .p = &p, .map = map, .group = g, .mean = out->mean[g]};
 	struct queue q = {runs, p.groups, 0};
 	pthread_t other;
 	bool two = pthread_create(&other, NULL, work, &q) == 0;
 	work(&q);
 	if (two)
 		pthread_join(other, NULL);
+	render_map_free(map);
 	for (uint32_t g = 0; g < p.groups; g++) {
 		if (runs[g].failure[0])
 			fail_msg("%s: %s", how->integrator, runs[g].failure);
