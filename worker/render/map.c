@@ -64,9 +64,7 @@ static void sample_second(struct map_maker *m, struct brightness *map, uint64_t 
 		sampler_random_init(&s, seed, RNG_BRIGHTNESS, i, STEP_SECOND);
 		c->split = redistribution_begin(m->redistribution, NO_PIXEL, i);
 		path_trace_both_ways(c, &s.base, &m->sample);
-		for (uint32_t k = 0; k < m->sample.count; k++)
-			brightness_add(map, &m->sample.splats[k], 1);
-		brightness_end_sample(map);
+		brightness_add_sample(map, &m->sample);
 	}
 	brightness_settle_near(map, samples);
 }

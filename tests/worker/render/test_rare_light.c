@@ -34,9 +34,7 @@ static double share_of(struct world *w, uint64_t seed)
 		struct sampler_random s;
 		sampler_random_init(&s, seed, RNG_TEST, i, 0);
 		path_trace(&c, &s.base, &sample);
-		for (uint32_t k = 0; k < sample.count; k++)
-			brightness_add(&map, &sample.splats[k], 1);
-		brightness_end_sample(&map);
+		brightness_add_sample(&map, &sample);
 	}
 	brightness_settle(&map, SAMPLES);
 	assert_int_equal(rare_light(&c, &map, seed, 0, MERGED, &found), 0);

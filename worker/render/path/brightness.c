@@ -83,6 +83,13 @@ void brightness_end_sample(struct brightness *b)
 	b->touched_count = 0;
 }
 
+void brightness_add_sample(struct brightness *b, const struct path_sample *sample)
+{
+	for (uint32_t k = 0; k < sample->count; k++)
+		brightness_add(b, &sample->splats[k], 1);
+	brightness_end_sample(b);
+}
+
 double brightness_scale(const struct brightness *b, double x, double y)
 {
 	return b->scale[cell_at(b, x, y)];
@@ -206,9 +213,7 @@ int brightness_of_samples(struct brightness *b, struct path_context *c, path_tra
 			tick();
 		sampler_random_init(&s, seed, stream, i, step);
 		trace(c, &s.base, &sample);
-		for (uint32_t k = 0; k < sample.count; k++)
-			brightness_add(b, &sample.splats[k], 1);
-		brightness_end_sample(b);
+		brightness_add_sample(b, &sample);
 	}
 	brightness_settle(b, samples);
 	return 0;

@@ -36,6 +36,8 @@ void brightness_fini(struct brightness *b);
 /* What a sample contributes, times a weight. All that it contributes to a cell counts as one. */
 void brightness_add(struct brightness *b, const struct splat *s, double weight);
 void brightness_end_sample(struct brightness *b);
+/* What the sample itself contributes, and its end. */
+void brightness_add_sample(struct brightness *b, const struct path_sample *sample);
 /* Call one of these when all samples have been added. */
 void brightness_settle(struct brightness *b, uint64_t samples);
 /* For samples whose fireflies are spread by chains: a cell has the mean of its neighbourhood, which is wider where less

@@ -89,6 +89,7 @@ struct splat {
 struct splat_target {
 	void (*splat)(struct splat_target *to, const struct splat *s, double weight);
 };
+
 struct path_sample {
 	uint32_t count;
 	double intensity; /* I: sum of X + Y + Z */
