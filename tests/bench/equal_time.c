@@ -4,9 +4,10 @@
  * pssmlt, bdpt and path, and the breakup against its two parts unbroken, each with several seeds, with and without the
  * worst pixels. What the default chooses has the same bits with `--integrator`: it is rendered once, and the default
  * is charged the pilot on top, so that two times of the same samples do not differ by the machine's load. The reference
- * is a long render by what the default chooses, kept in build/bench-references (the error that it has itself is taken
- * off, pixel by pixel); a third figure leaves out the pixels in which that is largest. HSLT_BENCH_SECONDS: other than
- * 10 for each picture. HSLT_BENCH_REFERENCE: references take other than ten times that. HSLT_BENCH_SEEDS: other than 5.
+ * is two long renders R, S by what the default chooses, of different seeds, kept in build/bench-references: the mean of
+ * (A - R)(A - S) is the squared error of A, whatever the errors of R and S are. A third figure leaves out the pixels in
+ * which these two differ most. HSLT_BENCH_SECONDS: other than 10 for each picture. HSLT_BENCH_REFERENCE: the two take
+ * other than ten times that together. HSLT_BENCH_SEEDS: other than 5.
  * HSLT_BENCH_METHODS: only the first so many; with 6 and 7, bdpt8 and erpt too, which are not among those that the
  * default is held against.
  */
@@ -25,9 +26,10 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { REFERENCE_TIMES = 10, REFERENCE_MOST = 10000, AROUND = 3 /* pixels */, SEEDS_MOST = 32, REFERENCE_SEED = 99 };
+enum { REFERENCE_TIMES = 10, REFERENCE_MOST = 10000, AROUND = 3 /* pixels */, SEEDS_MOST = 32 };
+enum { HALVES = 2, REFERENCE_SEED = 99 /* and the next */ };
 #define TRIM 0.001   /* share of the pixels left out, the worst */
-#define UNKNOWN 0.01 /* and of those in which the reference itself is the worst, which no method has a part in */
+#define UNKNOWN 0.01 /* and of those in which the reference's halves differ most, which no method has a part in */
 enum { ALL, TRIMMED, KNOWN, KINDS }; /* pixels that count */
 static const char *const kind_names[KINDS] = {"all pixels", "trimmed", "where the reference is known"};
 
@@ -150,18 +152,26 @@ static uint64_t shoot_for(const struct world *w, const struct method *m, double 
 	}
 }
 
-/* Colours and their standard errors, floats as they lie in memory. */
-static size_t reference_size(const struct canvas_image *i)
+/* What images are held against, three values for each pixel. */
+struct measure {
+	size_t pixels;
+	int width, height;
+	struct canvas_image half[HALVES];
+	double *own;	       /* squared errors of the halves' mean */
+	double *scale, *known; /* what squared errors are divided by */
+};
+
+static size_t values_of(const struct canvas_image *i)
 {
 	return (size_t)i->width * i->height * 3;
 }
 
+/* Colours only, floats as they lie in memory. */
 static bool read_reference(const char *path, struct canvas_image *i)
 {
-	size_t n = reference_size(i);
+	size_t n = values_of(i);
 	FILE *f = fopen(path, "rb");
-	bool ok = f && i->error && fread(i->rgb, sizeof(float), n, f) == n &&
-		  fread(i->error, sizeof(float), n, f) == n && fgetc(f) == EOF;
+	bool ok = f && fread(i->rgb, sizeof(float), n, f) == n && fgetc(f) == EOF;
 	if (f)
 		fclose(f);
 	return ok;
@@ -169,32 +179,37 @@ static bool read_reference(const char *path, struct canvas_image *i)
 
 static void write_reference(const char *path, const struct canvas_image *i)
 {
-	size_t n = reference_size(i);
+	size_t n = values_of(i);
 	FILE *f = fopen(path, "wb");
-	if (!f || fwrite(i->rgb, sizeof(float), n, f) != n || fwrite(i->error, sizeof(float), n, f) != n || fclose(f)) {
+	if (!f || fwrite(i->rgb, sizeof(float), n, f) != n || fclose(f)) {
 		perror(path);
 		exit(1);
 	}
 }
 
-static void make_reference(const struct world *w, const struct trial_scene *s, double seconds, struct shot *out)
+static void make_half(const struct world *w, const struct trial_scene *s, double seconds, unsigned half,
+		      struct canvas_image *out)
 {
 	const struct method *by = &methods[DEFAULT];
+	struct shot shot;
 	char path[256];
 	mkdir("build", 0777);
 	mkdir("build/bench-references", 0777);
-	snprintf(path, sizeof path, "build/bench-references/%s-%ux%u-%.0fs", s->name, s->width, s->height, seconds);
-	shoot(w, by, 32, REFERENCE_SEED, out); /* for its size, with errors */
-	if (read_reference(path, &out->image))
-		return;
-	canvas_image_fini(&out->image);
-	shoot_for(w, by, seconds, REFERENCE_SEED, out);
-	write_reference(path, &out->image);
+	snprintf(path, sizeof path, "build/bench-references/%s-%ux%u-%.0fs-%u", s->name, s->width, s->height, seconds,
+		 half);
+	shoot(w, by, 1, REFERENCE_SEED, &shot); /* for its size */
+	if (!read_reference(path, &shot.image)) {
+		canvas_image_fini(&shot.image);
+		shoot_for(w, by, seconds, REFERENCE_SEED + half, &shot);
+		write_reference(path, &shot.image);
+	}
+	*out = shot.image;
 }
 
+/* By magnitude: products may be negative. */
 static int descending(const void *a, const void *b)
 {
-	double x = *(const double *)a, y = *(const double *)b;
+	double x = fabs(*(const double *)a), y = fabs(*(const double *)b);
 	return (x < y) - (x > y);
 }
 
@@ -203,51 +218,79 @@ static double *doubles(size_t n)
 	return bench_alloc(n, sizeof(double));
 }
 
-/* What squared errors are measured by, as in worker/cli/image/compare.h, but for the mean of the reference around each
+static double half_mean(const struct measure *m, size_t i)
+{
+	return 0.5 * ((double)m->half[0].rgb[i] + (double)m->half[1].rgb[i]);
+}
+
+/* What squared errors are divided by, as in worker/cli/image/compare.h, but for the mean of the reference around each
  * pixel instead of the pixel itself: hard scenes leave a reference noisy, and where it happens to be dark all would
  * look wrong. */
-static double *scales_of(const struct canvas_image *r)
+static double *scales_of(const struct measure *m)
 {
-	int width = (int)r->width, height = (int)r->height;
-	double mean = 0, *scale = doubles(reference_size(r));
-	for (size_t i = 0; i < reference_size(r); i++)
-		mean += (double)r->rgb[i] / (double)reference_size(r);
-	for (int y = 0; y < height; y++)
-		for (int x = 0; x < width; x++)
+	double mean = 0, *scale = doubles(3 * m->pixels);
+	for (size_t i = 0; i < 3 * m->pixels; i++)
+		mean += half_mean(m, i) / (double)(3 * m->pixels);
+	for (int y = 0; y < m->height; y++)
+		for (int x = 0; x < m->width; x++)
 			for (int k = 0; k < 3; k++) {
 				double sum = 0, n = 0;
 				for (int v = y - AROUND; v <= y + AROUND; v++)
 					for (int u = x - AROUND; u <= x + AROUND; u++)
-						if (u >= 0 && v >= 0 && u < width && v < height) {
-							sum += (double)r->rgb[(v * width + u) * 3 + k];
+						if (u >= 0 && v >= 0 && u < m->width && v < m->height) {
+							sum += half_mean(m, (size_t)((v * m->width + u) * 3 + k));
 							n++;
 						}
-				scale[(y * width + x) * 3 + k] = sum * sum / (n * n) + 1e-4 * mean * mean;
+				scale[(y * m->width + x) * 3 + k] = sum * sum / (n * n) + 1e-4 * mean * mean;
 			}
 	return scale;
 }
 
-/* The same, and infinite where the reference itself errs most. */
-static double *scales_where_known(const struct canvas_image *r, const double *scale)
+/* The same, and infinite where the halves differ most. */
+static double *scales_where_known(const struct measure *m)
 {
-	size_t pixels = (size_t)r->width * r->height;
-	double *own = doubles(pixels), *sorted = doubles(pixels), *known = doubles(reference_size(r));
-	for (size_t i = 0; i < reference_size(r); i++)
-		own[i / 3] += (double)r->error[i] * (double)r->error[i] / scale[i];
-	memcpy(sorted, own, pixels * sizeof *own);
-	qsort(sorted, pixels, sizeof *sorted, descending);
-	double most = sorted[(size_t)(UNKNOWN * (double)pixels)];
-	for (size_t i = 0; i < reference_size(r); i++)
-		known[i] = own[i / 3] > most ? INFINITY : scale[i];
+	double *own = doubles(m->pixels), *sorted = doubles(m->pixels), *known = doubles(3 * m->pixels);
+	for (size_t i = 0; i < 3 * m->pixels; i++)
+		own[i / 3] += m->own[i] / m->scale[i];
+	memcpy(sorted, own, m->pixels * sizeof *own);
+	qsort(sorted, m->pixels, sizeof *sorted, descending);
+	double most = sorted[(size_t)(UNKNOWN * (double)m->pixels)];
+	for (size_t i = 0; i < 3 * m->pixels; i++)
+		known[i] = own[i / 3] > most ? INFINITY : m->scale[i];
 	mem_free(own);
 	mem_free(sorted);
 	return known;
 }
 
-/* relMSE of squares by pixel and channel, without a share of the pixels, the worst. */
-static double relative(const struct canvas_image *i, const double *square, const double *scale, double trim)
+static void measure_make(const struct world *w, const struct trial_scene *s, double seconds, struct measure *m)
 {
-	size_t pixels = (size_t)i->width * i->height, out = (size_t)(trim * (double)pixels);
+	for (unsigned h = 0; h < HALVES; h++)
+		make_half(w, s, seconds / HALVES, h, &m->half[h]);
+	m->width = (int)m->half[0].width;
+	m->height = (int)m->half[0].height;
+	m->pixels = values_of(&m->half[0]) / 3;
+	m->own = doubles(3 * m->pixels);
+	for (size_t i = 0; i < 3 * m->pixels; i++) {
+		double d = 0.5 * ((double)m->half[0].rgb[i] - (double)m->half[1].rgb[i]);
+		m->own[i] = d * d;
+	}
+	m->scale = scales_of(m);
+	m->known = scales_where_known(m);
+}
+
+static void measure_free(struct measure *m)
+{
+	for (unsigned h = 0; h < HALVES; h++)
+		canvas_image_fini(&m->half[h]);
+	mem_free(m->own);
+	mem_free(m->scale);
+	mem_free(m->known);
+}
+
+/* relMSE of squares by pixel and channel, without a share of the pixels, the worst. */
+static double relative(size_t pixels, const double *square, const double *scale, double trim)
+{
+	size_t out = (size_t)(trim * (double)pixels);
 	double *of = doubles(pixels), sum = 0;
 	for (size_t k = 0; k < 3 * pixels; k++)
 		of[k / 3] += square[k] / scale[k] / 3;
@@ -259,26 +302,25 @@ static double relative(const struct canvas_image *i, const double *square, const
 }
 
 /* By how far the image is from the reference, without the reference's own part. */
-static double error_by_reference(const struct canvas_image *a, const struct canvas_image *r, const double *scale,
+static double error_by_reference(const struct canvas_image *a, const struct measure *m, const double *scale,
 				 double trim)
 {
-	double *square = doubles(reference_size(r));
-	for (size_t i = 0; i < reference_size(r); i++) {
-		double d = (double)a->rgb[i] - (double)r->rgb[i], own = (double)r->error[i];
-		square[i] = d * d - own * own;
-	}
-	double e = relative(r, square, scale, trim);
+	double *square = doubles(3 * m->pixels);
+	for (size_t i = 0; i < 3 * m->pixels; i++)
+		square[i] = ((double)a->rgb[i] - (double)m->half[0].rgb[i]) *
+			    ((double)a->rgb[i] - (double)m->half[1].rgb[i]);
+	double e = relative(m->pixels, square, scale, trim);
 	mem_free(square);
 	return e;
 }
 
 /* By how far the image's independent groups are from each other. */
-static double error_by_spread(const struct canvas_image *a, const double *scale)
+static double error_by_spread(const struct canvas_image *a, const struct measure *m)
 {
-	double *square = doubles(reference_size(a));
-	for (size_t i = 0; i < reference_size(a); i++)
+	double *square = doubles(3 * m->pixels);
+	for (size_t i = 0; i < 3 * m->pixels; i++)
 		square[i] = (double)a->error[i] * (double)a->error[i];
-	double e = relative(a, square, scale, TRIM);
+	double e = relative(m->pixels, square, m->scale, TRIM);
 	mem_free(square);
 	return e;
 }
@@ -286,16 +328,10 @@ static double error_by_spread(const struct canvas_image *a, const double *scale)
 static double brightness(const struct canvas_image *i)
 {
 	double sum = 0;
-	for (size_t k = 0; k < reference_size(i); k++)
+	for (size_t k = 0; k < values_of(i); k++)
 		sum += (double)i->rgb[k];
 	return sum;
 }
-
-/* What images are held against. */
-struct measure {
-	struct shot reference;
-	double *scale, *known;
-};
 
 /* Of one method, seed by seed: relMSE times CPU seconds. */
 struct trial {
@@ -325,11 +361,10 @@ static void take_shot(const struct world *w, const struct method *m, double seco
 		shoot(w, m, out->spp, 1 + k, &shot);
 	out->cpu[k] = shot.cpu;
 	for (int t = 0; t < KINDS; t++)
-		out->value[t][k] =
-			shot.cpu * error_by_reference(&shot.image, &by->reference.image,
-						      t == KNOWN ? by->known : by->scale, t == ALL ? 0 : TRIM);
-	out->bright[k] = brightness(&shot.image) / brightness(&by->reference.image);
-	out->spread[k] = shot.cpu * error_by_spread(&shot.image, by->scale);
+		out->value[t][k] = shot.cpu * error_by_reference(&shot.image, by, t == KNOWN ? by->known : by->scale,
+								 t == ALL ? 0 : TRIM);
+	out->bright[k] = 2 * brightness(&shot.image) / (brightness(&by->half[0]) + brightness(&by->half[1]));
+	out->spread[k] = shot.cpu * error_by_spread(&shot.image, by);
 	count_seed(out, seeds, k);
 	out->pilot += shot.pilot / shot.cpu / seeds;
 	snprintf(out->chosen[k], sizeof out->chosen[k], "%s", shot.integrator);
@@ -377,7 +412,7 @@ static double student_95(double degrees)
 static void print_ratio(const char *says, const struct trial *a, const struct trial *b, int t, unsigned seeds)
 {
 	double ratio = a->mean[t] / b->mean[t], square = 0;
-	if (!(a->mean[t] > 0 && b->mean[t] > 0)) { /* the reference's own error is the larger one */
+	if (!(a->mean[t] > 0 && b->mean[t] > 0)) { /* the reference's errors are the larger ones */
 		printf("  %s: not known, the reference is too noisy\n", says);
 		return;
 	}
@@ -408,9 +443,7 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 	struct measure by;
 	static struct trial of[METHODS];
 	size_t best[KINDS] = {1, 1, 1};
-	make_reference(w, s, times * seconds, &by.reference);
-	by.scale = scales_of(&by.reference.image);
-	by.known = scales_where_known(&by.reference.image, by.scale);
+	measure_make(w, s, times * seconds, &by);
 	memset(of, 0, sizeof of);
 	for (unsigned k = 0; k < seeds; k++) {
 		for (size_t i = DEFAULT + 1; i < count; i++)
@@ -429,11 +462,9 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 		if (of[best[t]].mean[t] > 0)
 			bench_single(says, of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
 	}
-	printf("  the reference's own relMSE: %.3g\n", error_by_spread(&by.reference.image, by.scale));
+	printf("  the reference's own relMSE: %.3g\n", relative(by.pixels, by.own, by.scale, 0));
 	fflush(stdout);
-	canvas_image_fini(&by.reference.image);
-	mem_free(by.scale);
-	mem_free(by.known);
+	measure_free(&by);
 	for (size_t i = 0; i < count; i++)
 		bench_single(methods[i].name, of[i].mean[1], "relMSE s, trimmed", BENCH_INFORMS, 0);
 	if (count > UNBROKEN)
