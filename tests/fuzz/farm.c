@@ -217,8 +217,8 @@ void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope 
 void farm_say_parts(struct farm_world *w, unsigned peer, const struct step *step)
 {
 	size_t n;
-	unsigned char *frame = checked_file_parts(step->header, step->header_size, step->payload, step->payload_size,
-						  !w->peers[peer].has_spoken, &n);
+	unsigned char *frame = checksummed_parts(step->header, step->header_size, step->payload, step->payload_size,
+						 !w->peers[peer].has_spoken, &n);
 	w->peers[peer].has_spoken = true;
 	farm_say(w, peer, frame, n);
 	free(frame);

@@ -65,10 +65,10 @@ static void read_all(const uint8_t *bytes, size_t size)
 }
 
 /* The frames of an input with the checksums that belong to them: what is behind these is to be reached. malloc'd. */
-static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *checked_file_size)
+static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *out_size)
 {
 	uint8_t *all = NULL;
-	*checked_file_size = 0;
+	*out_size = 0;
 	for (size_t at = 0; size - at >= FRAME_PREFIX;) {
 		uint32_t header, payload;
 		size_t n;
@@ -76,12 +76,12 @@ static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *checked_file
 		at += FRAME_PREFIX;
 		header = header < size - at ? header : (uint32_t)(size - at);
 		payload = payload < size - at - header ? payload : (uint32_t)(size - at - header);
-		uint8_t *frame = checked_file_parts(bytes + at, header, bytes + at + header, payload, !all, &n);
-		all = realloc(all, *checked_file_size + n);
+		uint8_t *frame = checksummed_parts(bytes + at, header, bytes + at + header, payload, !all, &n);
+		all = realloc(all, *out_size + n);
 		if (!all)
 			abort();
-		memcpy(all + *checked_file_size, frame, n);
-		*checked_file_size += n;
+		memcpy(all + *out_size, frame, n);
+		*out_size += n;
 		free(frame);
 		at += header + payload;
 	}
@@ -90,9 +90,9 @@ static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *checked_file
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	size_t checked_file_size;
-	uint8_t *sealed = seal_all(bytes, size, &checked_file_size);
-	read_all(sealed, checked_file_size);
+	size_t out_size;
+	uint8_t *sealed = seal_all(bytes, size, &out_size);
+	read_all(sealed, out_size);
 	free(sealed);
 	read_all(bytes, size); /* whose checksums are hardly ever right */
 	return 0;

@@ -228,7 +228,7 @@ static void step(const struct step *s)
 	case COORDINATOR:
 		if (now.fd < 0)
 			answer();
-		bytes = checked_file_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
+		bytes = checksummed_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
 		send_bytes(bytes, size);
 		free(bytes);
 		break;

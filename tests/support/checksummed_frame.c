@@ -8,7 +8,7 @@
 #include <string.h>
 
 static unsigned char *seal(const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size,
-			   bool first, size_t *checked_file_size)
+			   bool first, size_t *out_size)
 {
 	size_t head = first ? FRAME_PREFIX : FRAME_SEALED_PREFIX;
 	unsigned char *sealed = malloc(head + size + 1);
@@ -20,7 +20,7 @@ static unsigned char *seal(const unsigned char prefix[FRAME_PREFIX], const unsig
 		frame_seal(sealed, prefix, content, size);
 	if (size)
 		memcpy(sealed + head, content, size);
-	*checked_file_size = head + size;
+	*out_size = head + size;
 	return sealed;
 }
 
@@ -36,16 +36,15 @@ static bool is_first(const unsigned char *header, size_t size)
 	return first;
 }
 
-unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t *checked_file_size)
+unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t *out_size)
 {
 	uint32_t header, payload;
 	frame_prefix_read(frame, &header, &payload);
-	return seal(frame, frame + FRAME_PREFIX, size - FRAME_PREFIX, is_first(frame + FRAME_PREFIX, header),
-		    checked_file_size);
+	return seal(frame, frame + FRAME_PREFIX, size - FRAME_PREFIX, is_first(frame + FRAME_PREFIX, header), out_size);
 }
 
 /* Of what may have been changed since it was packed; NULL: it is none, or has fields of another version. */
-static unsigned char *checked_hello(const void *header, size_t size, size_t *checked_file_size)
+static unsigned char *checked_hello(const void *header, size_t size, size_t *out_size)
 {
 	Farm__Envelope *m = farm__envelope__unpack(NULL, size, header);
 	const ProtobufCMessage *hello = !m						 ? NULL
@@ -53,17 +52,17 @@ static unsigned char *checked_hello(const void *header, size_t size, size_t *che
 					: m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK ? &m->hello_ack->base
 											 : NULL;
 	unsigned char *sealed = hello && !hello->n_unknown_fields && !m->base.n_unknown_fields
-					? checksummed_message(m, NULL, 0, checked_file_size)
+					? checksummed_message(m, NULL, 0, out_size)
 					: NULL;
 	if (m)
 		farm__envelope__free_unpacked(m, NULL);
 	return sealed;
 }
 
-unsigned char *checked_file_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
-				  bool first, size_t *checked_file_size)
+unsigned char *checksummed_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
+				 bool first, size_t *out_size)
 {
-	unsigned char *hello = first && !payload_size ? checked_hello(header, header_size, checked_file_size) : NULL;
+	unsigned char *hello = first && !payload_size ? checked_hello(header, header_size, out_size) : NULL;
 	if (hello)
 		return hello;
 	unsigned char prefix[FRAME_PREFIX], *both = malloc(header_size + payload_size + 1);
@@ -74,20 +73,19 @@ unsigned char *checked_file_parts(const void *header, size_t header_size, const 
 		memcpy(both, header, header_size);
 	if (payload_size)
 		memcpy(both + header_size, payload, payload_size);
-	unsigned char *sealed = seal(prefix, both, header_size + payload_size, first, checked_file_size);
+	unsigned char *sealed = seal(prefix, both, header_size + payload_size, first, out_size);
 	free(both);
 	return sealed;
 }
 
-unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size,
-				   size_t *checked_file_size)
+unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size, size_t *out_size)
 {
 	unsigned char *frame;
 	size_t size;
 	struct error e;
 	if (envelope_pack(m, payload, payload_size, &frame, &size, &e))
 		abort();
-	unsigned char *sealed = checksummed_frame(frame, size, checked_file_size);
+	unsigned char *sealed = checksummed_frame(frame, size, out_size);
 	mem_free(frame);
 	return sealed;
 }

@@ -9,13 +9,12 @@
 
 /* Of a frame in one piece, as envelope_pack makes it: malloc'd, never NULL. Hello and its answer, the first in their
  * direction, stay as they are. */
-unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t *checked_file_size);
+unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t *out_size);
 /* The same of a header and a payload, which need not mean anything; first: it is the first in its direction, and a
  * hello or its answer gets the checksum of its bytes. */
-unsigned char *checked_file_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
-				  bool first, size_t *checked_file_size);
+unsigned char *checksummed_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
+				 bool first, size_t *out_size);
 /* The same of a message. */
-unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size,
-				   size_t *checked_file_size);
+unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size, size_t *out_size);
 
 #endif
