@@ -1,0 +1,254 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * In plaintext a frame goes to libuv at once, as two buffers: its sealed prefix and its bytes. With TLS it waits in a
+ * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write, so that memory holds one copy
+ * of what a slow peer has not taken. `on_written` encrypts more, and says when nothing is left.
+ *
+ * Failures are told once to the owner, who closes the stream: no memory, an error of the stream or of TLS, a peer that
+ * does not read what is sent to it.
+ */
+#include "common/net/send_queue.h"
+
+#include "common/base/mem.h"
+#include "common/wire/frame.h"
+
+#include <assert.h>
+#include <string.h>
+
+enum {
+	PIECE = 1 << 16,  /* bytes encrypted at a time */
+	WINDOW = 1 << 20, /* encrypted bytes that the kernel has not taken yet */
+	FRAME_COST = 256, /* overhead of a frame that waits besides its bytes */
+};
+
+/* Replaces the prefix of a frame. */
+struct head {
+	unsigned char bytes[FRAME_SEALED_PREFIX];
+	size_t size;
+};
+
+struct send_frame {
+	struct send_frame *next;
+	struct head head; /* empty: it is being sent */
+	unsigned char *bytes;
+	size_t size, at, plain; /* plaintext: what it counts for in `unsent` */
+};
+
+/* What libuv writes. */
+struct writing {
+	uv_write_t request;
+	struct send_queue *queue;
+	struct head head;
+	unsigned char *bytes;
+	size_t size, plain; /* what it counts for in in_flight and in unsent */
+};
+
+void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link *link, size_t limit,
+		     const struct send_events *events, void *user)
+{
+	*q = (struct send_queue){.stream = stream, .link = link, .limit = limit, .events = events, .user = user};
+	q->last = &q->first;
+}
+
+static struct send_frame *drop_first(struct send_queue *q)
+{
+	struct send_frame *f = q->first;
+	q->first = f->next;
+	if (!q->first)
+		q->last = &q->first;
+	mem_free(f->bytes);
+	mem_free(f);
+	return q->first;
+}
+
+void send_queue_fini(struct send_queue *q)
+{
+	while (q->first)
+		drop_first(q);
+}
+
+bool send_queue_is_empty(const struct send_queue *q)
+{
+	return !q->unsent && !q->in_flight;
+}
+
+void send_queue_close(struct send_queue *q, enum send_state to)
+{
+	if (to > q->state)
+		q->state = to;
+}
+
+static void fail(struct send_queue *q, const char *why)
+{
+	if (q->state != SEND_CLOSED)
+		q->events->failed(q->user, why);
+}
+
+static void pump(struct send_queue *q);
+
+static void on_written(uv_write_t *r, int status)
+{
+	struct writing *w = r->data;
+	struct send_queue *q = w->queue;
+	q->in_flight -= w->size;
+	q->unsent -= w->plain;
+	mem_free(w->bytes);
+	mem_free(w);
+	if (status)
+		fail(q, uv_strerror(status));
+	else
+		pump(q);
+	if (q->state != SEND_CLOSED && send_queue_is_empty(q))
+		q->events->drained(q->user);
+}
+
+/* Takes the mem_alloc'd bytes; sends `head`, then the bytes after the first `skip`. */
+static void to_kernel(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip,
+		      size_t plain)
+{
+	struct writing *w = mem_alloc(1, sizeof *w);
+	if (!w) {
+		mem_free(bytes);
+		fail(q, "no memory to send");
+		return;
+	}
+	*w = (struct writing){
+		.queue = q, .head = head, .bytes = bytes, .size = head.size + size - skip, .plain = plain};
+	w->request.data = w;
+	uv_buf_t both[] = {uv_buf_init((char *)w->head.bytes, (unsigned)head.size),
+			   uv_buf_init((char *)bytes + skip, (unsigned)(size - skip))};
+	int rc = uv_write(&w->request, q->stream, both, 2, on_written);
+	if (rc) {
+		mem_free(bytes);
+		mem_free(w);
+		fail(q, uv_strerror(rc));
+		return;
+	}
+	q->in_flight += head.size + size - skip;
+}
+
+static void copy_to_kernel(struct send_queue *q, const void *bytes, size_t size, size_t plain)
+{
+	unsigned char *copy = mem_alloc(size, 1);
+	if (copy)
+		to_kernel(q, (struct head){.size = 0}, memcpy(copy, bytes, size), size, 0, plain);
+	else
+		fail(q, "no memory to send");
+}
+
+void send_queue_raw(struct send_queue *q, const void *bytes, size_t size)
+{
+	copy_to_kernel(q, bytes, size, 0);
+}
+
+/* Sends what TLS has produced, which contains `plain` bytes of frames. */
+static void flush(struct send_queue *q, size_t plain)
+{
+	const unsigned char *bytes;
+	size_t size = tls_link_output(q->link, &bytes);
+	if (!size || q->state == SEND_CLOSED)
+		return;
+	if (q->in_flight > 2 * WINDOW) /* a peer that sends requests and does not read the answers */
+		fail(q, "the peer does not read what is sent to it");
+	else
+		copy_to_kernel(q, bytes, size, plain);
+	tls_link_output_taken(q->link);
+}
+
+/* Encrypts the next piece of the first frame: 1 if that was its last, 0 if more is left, or -1 after a failure. */
+static int encrypt_piece(struct send_queue *q)
+{
+	static _Thread_local unsigned char joined[PIECE];
+	struct send_frame *f = q->first;
+	struct error e;
+	size_t most = PIECE - f->head.size, size = f->size - f->at < most ? f->size - f->at : most;
+	const unsigned char *bytes = f->bytes + f->at;
+	if (f->head.size) { /* in one record with what follows it */
+		memcpy(joined, f->head.bytes, f->head.size);
+		memcpy(joined + f->head.size, bytes, size);
+		bytes = joined;
+	}
+	if (tls_link_write(q->link, bytes, f->head.size + size, &e)) {
+		fail(q, e.text);
+		return -1;
+	}
+	f->head.size = 0;
+	f->at += size;
+	bool last = f->at == f->size;
+	size_t plain = last ? f->plain : size;
+	f->plain -= plain;
+	flush(q, plain);
+	return last;
+}
+
+static void pump(struct send_queue *q)
+{
+	if (!q->link || !tls_link_is_open(q->link))
+		return;
+	while (q->first && q->in_flight < WINDOW && q->state < SEND_REFUSED) {
+		int last = encrypt_piece(q);
+		if (last < 0)
+			return;
+		if (last)
+			drop_first(q);
+	}
+}
+
+void send_queue_flush(struct send_queue *q)
+{
+	flush(q, 0);
+}
+
+void send_queue_opened(struct send_queue *q)
+{
+	pump(q);
+}
+
+/* Takes the bytes, also on failure. */
+static void append(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip)
+{
+	struct send_frame *f = mem_alloc(1, sizeof *f);
+	if (!f) {
+		mem_free(bytes);
+		fail(q, "no memory to send");
+		return;
+	}
+	*f = (struct send_frame){.head = head, .bytes = bytes, .size = size, .at = skip, .plain = size + FRAME_COST};
+	*q->last = f;
+	q->last = &f->next;
+	q->unsent += f->plain;
+	pump(q);
+}
+
+static void send_all(struct send_queue *q, struct head head, unsigned char *bytes, size_t size, size_t skip)
+{
+	size_t room = q->unsent < q->limit ? q->limit - q->unsent : 0;
+	if (q->state != SEND_OPEN) {
+		mem_free(bytes);
+	} else if (q->unsent && size > room) {
+		mem_free(bytes);
+		fail(q, "the peer does not read what is sent to it");
+	} else if (q->link) {
+		append(q, head, bytes, size, skip);
+	} else {
+		q->unsent += size + FRAME_COST;
+		to_kernel(q, head, bytes, size, skip, size + FRAME_COST);
+	}
+}
+
+void send_queue_frame(struct send_queue *q, unsigned char *frame, size_t size)
+{
+	struct head head = {.size = q->sent ? FRAME_SEALED_PREFIX : FRAME_PREFIX};
+	assert(size > FRAME_PREFIX);
+	if (q->sent)
+		frame_seal(head.bytes, frame, frame + FRAME_PREFIX, size - FRAME_PREFIX);
+	else
+		memcpy(head.bytes, frame, FRAME_PREFIX);
+	q->sent = true;
+	send_all(q, head, frame, size, FRAME_PREFIX);
+}
+
+void send_queue_bytes(struct send_queue *q, unsigned char *bytes, size_t size)
+{
+	send_all(q, (struct head){.size = 0}, bytes, size, 0);
+}

@@ -1,0 +1,215 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Frames leave in their order, the first as it is and each further one sealed; what waits is bounded; each state sends
+ * what it says. Over a pair of sockets whose far end is read by hand, so that a peer that does not read is one. What
+ * goes through TLS is test_net's.
+ */
+#include "common/base/mem.h"
+#include "common/net/send_queue.h"
+#include "common/wire/frame.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <errno.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { LIMIT = 1 << 20, LARGE = 4 << 20 /* more than the kernel takes at once */ };
+
+static struct fixture {
+	uv_loop_t loop;
+	uv_pipe_t pipe;
+	int far;
+	struct send_queue queue;
+	int failed, drained;
+	char why[80];
+} f;
+
+static void on_failed(void *user, const char *why)
+{
+	struct fixture *x = user;
+	x->failed++;
+	snprintf(x->why, sizeof x->why, "%s", why);
+	send_queue_close(&x->queue, SEND_CLOSED);
+}
+
+static void on_drained(void *user)
+{
+	((struct fixture *)user)->drained++;
+}
+
+static const struct send_events events = {.failed = on_failed, .drained = on_drained};
+
+static int begin(void **state)
+{
+	int ends[2];
+	(void)state;
+	memset(&f, 0, sizeof f);
+	assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
+	f.far = ends[1];
+	assert_int_equal(uv_loop_init(&f.loop), 0);
+	assert_int_equal(uv_pipe_init(&f.loop, &f.pipe, 0), 0);
+	assert_int_equal(uv_pipe_open(&f.pipe, ends[0]), 0);
+	send_queue_init(&f.queue, (uv_stream_t *)&f.pipe, NULL, LIMIT, &events, &f);
+	return 0;
+}
+
+static int end(void **state)
+{
+	(void)state;
+	send_queue_close(&f.queue, SEND_CLOSED);
+	uv_close((uv_handle_t *)&f.pipe, NULL);
+	uv_run(&f.loop, UV_RUN_DEFAULT);
+	assert_int_equal(f.queue.in_flight, 0);
+	send_queue_fini(&f.queue);
+	close(f.far);
+	return uv_loop_close(&f.loop);
+}
+
+/* A frame of so many bytes of content, each `fill`. */
+static unsigned char *frame_of(size_t content, unsigned char fill)
+{
+	unsigned char *frame = mem_alloc(FRAME_PREFIX + content, 1);
+	assert_non_null(frame);
+	frame_prefix_write(frame, (uint32_t)content, 0);
+	memset(frame + FRAME_PREFIX, fill, content);
+	return frame;
+}
+
+static void send_frame(size_t content, unsigned char fill)
+{
+	send_queue_frame(&f.queue, frame_of(content, fill), FRAME_PREFIX + content);
+}
+
+/* What the far end gets, until there are so many bytes. */
+static unsigned char *receive(size_t size)
+{
+	unsigned char *bytes = malloc(size + 1);
+	size_t at = 0;
+	assert_non_null(bytes);
+	while (at < size) {
+		uv_run(&f.loop, UV_RUN_NOWAIT);
+		ssize_t n = recv(f.far, bytes + at, size - at, MSG_DONTWAIT);
+		assert_true(n > 0 || (n < 0 && errno == EAGAIN));
+		at += n > 0 ? (size_t)n : 0;
+	}
+	return bytes;
+}
+
+static bool nothing_comes(void)
+{
+	char byte;
+	for (int i = 0; i < 10; i++)
+		uv_run(&f.loop, UV_RUN_NOWAIT);
+	return recv(f.far, &byte, 1, MSG_DONTWAIT) < 0 && errno == EAGAIN;
+}
+
+static void first_plain_then_sealed(void **state)
+{
+	(void)state;
+	size_t plain = FRAME_PREFIX + 5, sealed = FRAME_SEALED_PREFIX + 7;
+	unsigned char *expected[] = {frame_of(5, 'a'), frame_of(7, 'b')}, head[FRAME_SEALED_PREFIX];
+	send_frame(5, 'a');
+	send_frame(7, 'b');
+	assert_false(send_queue_is_empty(&f.queue));
+	unsigned char *got = receive(plain + sealed);
+	frame_seal(head, expected[1], expected[1] + FRAME_PREFIX, 7);
+	assert_memory_equal(got, expected[0], plain);
+	assert_memory_equal(got + plain, head, sizeof head);
+	assert_memory_equal(got + plain + sizeof head, expected[1] + FRAME_PREFIX, 7);
+	assert_true(nothing_comes());
+	assert_int_equal(f.drained, 1); /* both were written in one turn of the loop */
+	assert_true(send_queue_is_empty(&f.queue));
+	free(got);
+	mem_free(expected[0]);
+	mem_free(expected[1]);
+}
+
+/* One frame of any size may wait; the next must fit. */
+static void what_waits_is_bounded(void **state)
+{
+	(void)state;
+	send_frame(LARGE, 'a');
+	assert_int_equal(f.failed, 0);
+	assert_true(f.queue.unsent > LARGE);
+	send_frame(1, 'b');
+	assert_int_equal(f.failed, 1);
+	assert_string_equal(f.why, "the peer does not read what is sent to it");
+	assert_int_equal(f.drained, 0);
+	send_frame(1, 'c'); /* freed, and no second failure */
+	assert_int_equal(f.failed, 1);
+}
+
+static void many_small_frames_reach_the_limit(void **state)
+{
+	(void)state;
+	unsigned taken = 0;
+	while (!f.failed && taken < LIMIT) {
+		send_frame(1000, 'x');
+		taken++;
+	}
+	/* With their overhead; those that the kernel took at once count until the loop says so. */
+	assert_in_range(taken, LIMIT / 1300, LIMIT / 1000);
+}
+
+static void draining_sends_what_it_has(void **state)
+{
+	(void)state;
+	send_frame(LARGE, 'a');
+	send_queue_close(&f.queue, SEND_DRAINING);
+	send_frame(3, 'b');
+	free(receive(FRAME_PREFIX + LARGE));
+	assert_true(nothing_comes());
+	assert_int_equal(f.drained, 1);
+	assert_int_equal(f.failed, 0);
+}
+
+static void states_only_advance(void **state)
+{
+	(void)state;
+	send_queue_close(&f.queue, SEND_REFUSED);
+	send_queue_close(&f.queue, SEND_DRAINING);
+	assert_int_equal(f.queue.state, SEND_REFUSED);
+	send_frame(3, 'a');
+	send_queue_raw(&f.queue, "why", 3);
+	unsigned char *got = receive(3);
+	assert_memory_equal(got, "why", 3);
+	assert_true(nothing_comes());
+	free(got);
+}
+
+/* A far end that is gone is an error of the stream, told once. */
+static void error_of_the_stream(void **state)
+{
+	(void)state;
+	close(f.far);
+	f.far = dup(0);
+	send_frame(3, 'a');
+	send_frame(3, 'b');
+	for (int i = 0; i < 10; i++)
+		uv_run(&f.loop, UV_RUN_NOWAIT);
+	assert_int_equal(f.failed, 1);
+	assert_int_equal(f.drained, 0);
+	assert_int_equal(f.queue.in_flight, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(first_plain_then_sealed, begin, end),
+		cmocka_unit_test_setup_teardown(what_waits_is_bounded, begin, end),
+		cmocka_unit_test_setup_teardown(many_small_frames_reach_the_limit, begin, end),
+		cmocka_unit_test_setup_teardown(draining_sends_what_it_has, begin, end),
+		cmocka_unit_test_setup_teardown(states_only_advance, begin, end),
+		cmocka_unit_test_setup_teardown(error_of_the_stream, begin, end),
+	};
+	signal(SIGPIPE, SIG_IGN);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
