@@ -96,6 +96,7 @@ static unsigned char *receive(size_t size)
 	assert_non_null(bytes);
 	while (at < size) {
 		uv_run(&f.loop, UV_RUN_NOWAIT);
+		assert_int_equal(f.failed, 0);
 		ssize_t n = recv(f.far, bytes + at, size - at, MSG_DONTWAIT);
 		assert_true(n > 0 || (n < 0 && errno == EAGAIN));
 		at += n > 0 ? (size_t)n : 0;
