@@ -222,28 +222,6 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 	memset(b->open_apart + k * t->groups, 0, t->groups * sizeof *b->open_apart);
 }
 
-/* Mean and its variance without the eighth of the groups that are farthest from the others: the brightness without
- * fireflies. */
-static void find_base(struct tile_error *t, size_t pixel, size_t k)
-{
-	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
-	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
-	uint32_t n = t->groups, drop = t->groups / 8;
-	for (uint32_t g = 0; g < n; g++)
-		d[g] = (double)apart[g];
-	for (; drop > 0; drop--) {
-		uint32_t far = 0;
-		for (uint32_t g = 1; g < n; g++)
-			far = fabs(d[g] - mean) > fabs(d[far] - mean) ? g : far;
-		mean = (mean * n - d[far]) / (n - 1);
-		d[far] = d[--n];
-	}
-	for (uint32_t g = 0; g < n; g++)
-		square += (d[g] - mean) * (d[g] - mean);
-	t->base[pixel][k] = t->brightness[pixel][k] + mean;
-	t->base_square[pixel][k] = square / n / (n - 1);
-}
-
 static void add_pixel(struct tile_error *t, struct block *b, size_t pixel)
 {
 	const float *apart = tile_error_apart(t, pixel);
@@ -253,7 +231,7 @@ static void add_pixel(struct tile_error *t, struct block *b, size_t pixel)
 		b->all_apart[i] += (double)apart[i];
 	for (size_t k = 0; k < 3; k++) {
 		if (groups >= BASE_GROUPS)
-			find_base(t, pixel, k);
+			tile_error_find_base(t, pixel, k);
 		double rare = t->brightness[pixel][k] - t->base[pixel][k];
 		b->rare[k] += rare;
 		b->all[k] += t->brightness[pixel][k];

@@ -8,13 +8,18 @@
 #include "common/base/color.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Squares of up to RARE pixels a side share their variance where more than rare_share of it is that of pixels in which
  * one or two groups outweigh all others: their kurtosis is above rare_kurtosis times the number of groups, and above
  * that of eight groups, since normal values of fewer have as much. */
 enum { RARE = 16 };
-static const double rare_share = 1. / 3, rare_kurtosis = 0.45, rare_kurtosis_least = 3.6;
+static const double rare_share = 1. / 3, rare_kurtosis = 0.45, rare_kurtosis_least = 3.6, rare_brighter = 10;
+
+struct square {
+	uint32_t x, y, right, low;
+};
 
 /* The inner loops run over groups and are independent, so the compiler vectorises them. */
 static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
@@ -48,6 +53,26 @@ static void pixel_error(struct making *m, struct tile_error *t, const int64_t *c
 		t->square[pixel][k] = square / groups / (groups - 1);
 		t->kurtosis[pixel][k] = square > 0 ? fourth / (square * square) * groups : 0;
 	}
+}
+
+void tile_error_find_base(struct tile_error *t, size_t pixel, size_t k)
+{
+	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
+	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
+	uint32_t n = t->groups, drop = t->groups / 8;
+	for (uint32_t g = 0; g < n; g++)
+		d[g] = (double)apart[g];
+	for (; drop > 0; drop--) {
+		uint32_t far = 0;
+		for (uint32_t g = 1; g < n; g++)
+			far = fabs(d[g] - mean) > fabs(d[far] - mean) ? g : far;
+		mean = (mean * n - d[far]) / (n - 1);
+		d[far] = d[--n];
+	}
+	for (uint32_t g = 0; g < n; g++)
+		square += (d[g] - mean) * (d[g] - mean);
+	t->base[pixel][k] = t->brightness[pixel][k] + mean;
+	t->base_square[pixel][k] = square / n / (n - 1);
 }
 
 static bool is_dark(const struct tile_error *t, size_t pixel)
@@ -92,39 +117,78 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 	return sum / n;
 }
 
-/*
- * Raises `rare` in a square of pixels to their mean variance if much of that belongs to pixels where one or two
- * groups outweigh all others. Such light is too rare for the groups to show how often it comes: pixels that it did not
- * reach have groups that agree, on too small a value. The bright pixels keep what they have, so the square's sum grows.
- */
-static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
+static double few_kurtosis(const struct tile_error *t)
 {
-	uint32_t right = x + size < t->width ? x + size : t->width, low = y + size < t->height ? y + size : t->height;
-	double limit = fmax(rare_kurtosis * t->groups, rare_kurtosis_least), all = 0, few = 0,
-	       n = (double)(right - x) * (low - y);
-	for (uint32_t j = y; j < low; j++)
-		for (uint32_t i = x; i < right; i++) {
+	return fmax(rare_kurtosis * t->groups, rare_kurtosis_least);
+}
+
+/* A pixel of a square, for one channel. */
+struct member {
+	uint32_t pixel;
+	double base, excess;
+};
+
+static int by_base(const void *a, const void *b)
+{
+	const struct member *x = a, *y = b;
+	return x->base != y->base ? (x->base > y->base) - (x->base < y->base)
+				  : (x->pixel > y->pixel) - (x->pixel < y->pixel);
+}
+
+/*
+ * Raises `rare` in a square of pixels to the square of the light that few groups found there, on average. Such light is
+ * too rare for the groups to show how often it comes: pixels that it did not reach have groups that agree, on a value
+ * that is too small by that much. Those that it reached have a larger error of their own. For a pixel only those count
+ * that would be at most `rare_brighter` times as bright without such light: what is rare in a highlight says nothing
+ * about the dark wall beside it.
+ */
+static void raise_square(struct tile_error *t, size_t k, const struct square *s, double *rare)
+{
+	struct member of[RARE * RARE];
+	size_t n = 0, upto = 0;
+	double excess = 0, floor = sqrt(t->floor_square);
+	for (uint32_t j = s->y; j < s->low; j++)
+		for (uint32_t i = s->x; i < s->right; i++) {
+			size_t pixel = (size_t)j * t->width + i;
+			tile_error_find_base(t, pixel, k);
+			of[n++] = (struct member){.pixel = (uint32_t)pixel,
+						  .base = fmax(t->base[pixel][k], floor),
+						  .excess = t->brightness[pixel][k] - t->base[pixel][k]};
+		}
+	qsort(of, n, sizeof *of, by_base);
+	for (size_t i = 0; i < n; i++) {
+		for (; upto < n && of[upto].base <= rare_brighter * of[i].base; upto++)
+			excess += of[upto].excess;
+		double missing = excess / (double)upto;
+		rare[of[i].pixel] = fmax(rare[of[i].pixel], missing * missing);
+	}
+}
+
+/* Whether much of the square's variance is that of pixels in which few groups outweigh all others. */
+static bool has_rare(const struct tile_error *t, size_t k, const struct square *s)
+{
+	double limit = few_kurtosis(t), all = 0, few = 0;
+	for (uint32_t j = s->y; j < s->low; j++)
+		for (uint32_t i = s->x; i < s->right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
 			all += t->square[pixel][k];
 			few += t->kurtosis[pixel][k] > limit ? t->square[pixel][k] : 0;
 		}
-	if (few <= rare_share * all)
-		return;
-	for (uint32_t j = y; j < low; j++)
-		for (uint32_t i = x; i < right; i++) {
-			size_t pixel = (size_t)j * t->width + i;
-			rare[pixel] = fmax(rare[pixel], all / n);
-		}
+	return few > rare_share * all;
 }
 
-static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
+static void find_rare(struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
 {
 	memset(rare, 0, 3 * sizeof *rare);
 	for (size_t k = 0; k < 3; k++)
 		for (uint32_t size = 2; size <= RARE; size *= 2)
 			for (uint32_t y = 0; y < t->height; y += size)
-				for (uint32_t x = 0; x < t->width; x += size)
-					raise_square(t, k, x, y, size, rare[k]);
+				for (uint32_t x = 0; x < t->width; x += size) {
+					struct square s = {x, y, x + size < t->width ? x + size : t->width,
+							   y + size < t->height ? y + size : t->height};
+					if (has_rare(t, k, &s))
+						raise_square(t, k, &s, rare[k]);
+				}
 }
 
 /*
@@ -133,7 +197,7 @@ static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TIL
  * light around it. A pixel that no chain visited would have a variance of 0, a false claim; it gets the variance of its
  * neighbours, of its tile, or (tile_error_fill_unvisited) of the image.
  */
-void tile_error_write(struct making *m, const struct tile_error *t)
+void tile_error_write(struct making *m, struct tile_error *t)
 {
 	double rare[3][TILE_SIZE * TILE_SIZE];
 	find_rare(t, rare);

@@ -50,8 +50,12 @@ static inline float *tile_error_apart(const struct tile_error *t, size_t pixel)
  * Counts the image's unvisited pixels. */
 void tile_error_load(struct making *m, struct tile_error *t);
 
-/* Writes the standard errors of the tile's pixels into the image; `settled` must be known. */
-void tile_error_write(struct making *m, const struct tile_error *t);
+/* base and base_square of a pixel: mean and its variance without the eighth of the groups that are farthest from the
+ * others, which is the brightness without fireflies. `apart` must still be as tile_error_load made it. */
+void tile_error_find_base(struct tile_error *t, size_t pixel, size_t k);
+
+/* Writes the standard errors of the tile's pixels into the image; `settled` must be known. May find bases. */
+void tile_error_write(struct making *m, struct tile_error *t);
 
 /* Gives the mean variance of the image to tiles that no chain visited, which have none of their own. */
 void tile_error_fill_unvisited(struct canvas_image *img);

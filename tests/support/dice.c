@@ -37,6 +37,20 @@ vec3 dice_direction(struct dice *d)
 	return (vec3){r * cos(phi), r * sin(phi), z};
 }
 
+double dice_normal(struct dice *d)
+{
+	double radius = sqrt(-2 * log(1 - dice_throw(d)));
+	return radius * cos(2 * M_PI * dice_throw(d));
+}
+
+double dice_poisson(struct dice *d, double mean)
+{
+	double n = 0, p = dice_throw(d);
+	for (double end = exp(-mean); p > end; n++)
+		p *= dice_throw(d);
+	return n;
+}
+
 size_t dice_count(size_t samples)
 {
 	samples = samples * (test_full() ? 8 : 1) / test_scale();

@@ -22,6 +22,8 @@ double dice_throw(struct dice *d); /* in [0,1) */
 double dice_between(struct dice *d, double low, double high);
 uint32_t dice_below(struct dice *d, uint32_t n); /* 0 .. n-1 */
 vec3 dice_direction(struct dice *d);		 /* uniform on the sphere */
+double dice_normal(struct dice *d);		 /* mean 0, variance 1 */
+double dice_poisson(struct dice *d, double mean);
 
 size_t dice_count(size_t samples); /* scaled by the environment, at least 1 */
 

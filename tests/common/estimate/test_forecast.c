@@ -18,15 +18,10 @@
 #include <stdio.h>
 #include <cmocka.h>
 
-static double normal(struct dice *d)
-{
-	return sqrt(-2 * log(1 - dice_throw(d))) * cos(6.283185307179586 * dice_throw(d));
-}
-
 /* Wilson and Hilferty 1931; 14 degrees and more. */
 static double chi_square(struct dice *d, double degrees)
 {
-	double s = 2 / (9 * degrees), root = 1 - s + sqrt(s) * normal(d);
+	double s = 2 / (9 * degrees), root = 1 - s + sqrt(s) * dice_normal(d);
 	return degrees * root * root * root;
 }
 
@@ -37,11 +32,11 @@ struct walk {
 
 static struct forecast_look look_at(struct walk *w, double work, struct dice *d)
 {
-	double step = work - w->work, z = normal(d);
+	double step = work - w->work, z = dice_normal(d);
 	w->square += 2 * sqrt(w->square * step) * z + step * (z * z + chi_square(d, w->degrees - 1));
 	w->work = work;
 	struct forecast_look l = {
-		.work = work, .cpu_seconds = 2e-6 * work * (1 + 0.01 * normal(d)), .degrees = w->degrees};
+		.work = work, .cpu_seconds = 2e-6 * work * (1 + 0.01 * dice_normal(d)), .degrees = w->degrees};
 	l.seconds = l.cpu_seconds / 2;
 	l.rel_mse = w->scale / work * w->square / (w->degrees * work);
 	l.rel_mse_upper = l.rel_mse * w->degrees / chi_square_5(w->degrees);

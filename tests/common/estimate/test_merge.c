@@ -85,21 +85,15 @@ struct render {
 	struct dice dice;
 };
 
-static double normal(struct dice *d)
-{
-	double radius = sqrt(-2 * log(1 - dice_throw(d)));
-	return radius * cos(6.283185307179586 * dice_throw(d));
-}
-
 static struct batch round_of(struct render *r, const struct plan *p, uint64_t round, uint32_t group)
 {
 	struct batch b = {
 		.key = {1, LEASE_RENDER, group, 0, round}, .tile_count = 1, .tiles = mem_alloc(1, sizeof *b.tiles)};
-	double n = (double)p->epoch, together = r->common * normal(&r->dice);
+	double n = (double)p->epoch, together = r->common * dice_normal(&r->dice);
 	b.tiles[0] =
 		(struct tile){0, 0, p->width, p->height, mem_alloc((size_t)p->width * p->height * 3, sizeof(float))};
 	for (size_t i = 0; i < (size_t)p->width * p->height; i++) {
-		float v = (float)(n + sqrt(n) * (together + r->each * normal(&r->dice)));
+		float v = (float)(n + sqrt(n) * (together + r->each * dice_normal(&r->dice)));
 		for (size_t k = 0; k < 3; k++)
 			b.tiles[0].xyz[3 * i + k] = v;
 	}

@@ -34,11 +34,6 @@ static void a_difference_by_hand(void **unused)
 	assert_true(isnan(stats_difference(a, 4, &none, 1, 0.05, NULL).value));
 }
 
-static double normal(struct dice *d)
-{
-	return sqrt(-2 * log(1 - dice_throw(d))) * cos(6.283185307179586 * dice_throw(d));
-}
-
 /*
  * 4,000 differences of groups of unequal spread at 95 %: the intervals hold the truth in 3,800 of them, sd 14; 75 more
  * or fewer (level 1e-6 by the normal approximation and 5 of 14 more for Welch's own) would be a fault, such as degrees
@@ -52,8 +47,8 @@ static void intervals_hold_the_truth(void **unused)
 	for (int k = 0; k < 4000; k++) {
 		double a[8], b[8];
 		for (int i = 0; i < 8; i++) {
-			a[i] = 1.03 + 0.02 * normal(&d);
-			b[i] = 1 + 0.01 * normal(&d);
+			a[i] = 1.03 + 0.02 * dice_normal(&d);
+			b[i] = 1 + 0.01 * dice_normal(&d);
 		}
 		struct interval x = stats_difference(a, 8, b, 8, 0.05, NULL);
 		held += x.low < 0.03 && 0.03 < x.high;

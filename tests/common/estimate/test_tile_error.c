@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Errors of single pixels, on groups whose truth is known. Pixels that rare light did not reach have an error as large
+ * as what they miss, and only where such light may come; pixels to which no chain came are counted and have an error.
+ */
+#include "common/estimate/merge.h"
+#include "common/estimate/stated_error.h"
+#include "common/exr/header.h"
+#include "tests/support/dice.h"
+#include "tests/support/group_image.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 16, HEIGHT = 8, PIXELS = WIDTH * HEIGHT };
+
+/* A wall known to 2 %, and as much light again that comes with one sample of a group in `hits_per_group`. */
+struct rare {
+	struct dice d;
+	double hits_per_group;
+};
+
+static double rare_light(void *user, uint32_t group, uint32_t pixel)
+{
+	struct rare *r = user;
+	(void)group;
+	(void)pixel;
+	return 1 + 0.02 * dice_normal(&r->d) + dice_poisson(&r->d, r->hits_per_group) / r->hits_per_group;
+}
+
+/* Of 50 pictures: the share of values more than three errors from the truth, and the mean squared error over the mean
+ * squared deviation. */
+static void rare_light_of(double hits_per_group, double *beyond, double *ratio)
+{
+	struct plan p = group_image_plan(PLAN_SAMPLES, WIDTH, HEIGHT);
+	struct rare r = {.d = dice_of("rare light"), .hits_per_group = hits_per_group};
+	double stated = 0, realised = 0;
+	*beyond = 0;
+	for (int picture = 0; picture < 50; picture++) {
+		struct canvas_image img;
+		group_image(&p, rare_light, &r, &img);
+		for (uint32_t i = 0; i < 3 * PIXELS; i++) {
+			double off = (double)img.rgb[i] - 2, error = (double)img.error[i];
+			*beyond += (fabs(off) > 3 * error) / (3. * PIXELS * 50);
+			stated += error * error;
+			realised += off * off;
+		}
+		canvas_image_fini(&img);
+	}
+	*ratio = stated / realised;
+}
+
+/*
+ * A quarter of a hit per pixel: three of four pixels look certain, and miss half of their light. Without their
+ * neighbours' errors 70 % of the values are more than three errors from the truth; Student's t with 15 degrees of
+ * freedom would have 0.9 %. Where every group had 40 hits, the errors are those of the groups alone: 19,200 values know
+ * the ratio of the squares to 1.8 % (their colours go together: 6,400 count), so 6 % is three standard errors.
+ */
+static void rare_light_is_in_the_errors_of_pixels(void **state)
+{
+	double beyond, ratio;
+	(void)state;
+	rare_light_of(1. / 64, &beyond, &ratio);
+	print_message("rare light: %.2f %% beyond three errors, squares %.2f of the truth\n", 100 * beyond, ratio);
+	assert_true(beyond < 0.02 && ratio > 0.9 && ratio < 1.2);
+	rare_light_of(40, &beyond, &ratio);
+	print_message("frequent light: %.2f %% beyond three errors, squares %.3f of the truth\n", 100 * beyond, ratio);
+	assert_true(beyond < 0.02 && fabs(ratio - 1) < 0.06);
+}
+
+/*
+ * Two columns of a highlight, which has a firefly in a quarter of its pixels, beside a wall a hundred times darker and
+ * known to 2 %: the wall's errors are its own. 14,336 values of 4,779 independent pixels know the ratio of the squares
+ * to 3 %, with the errors' own spread (15 degrees of freedom); if the highlight's rare light counted for the wall, it
+ * would be above 100.
+ */
+static double beside_a_highlight(void *user, uint32_t group, uint32_t pixel)
+{
+	struct rare *r = user;
+	return pixel % WIDTH < 2 ? 100 * rare_light(user, group, pixel) : 1 + 0.02 * dice_normal(&r->d);
+}
+
+static void a_highlight_says_nothing_about_the_wall(void **state)
+{
+	struct plan p = group_image_plan(PLAN_SAMPLES, WIDTH, HEIGHT);
+	struct rare r = {.d = dice_of("highlight"), .hits_per_group = 1. / 64};
+	double stated = 0, realised = 0;
+	(void)state;
+	for (int picture = 0; picture < 50; picture++) {
+		struct canvas_image img;
+		group_image(&p, beside_a_highlight, &r, &img);
+		for (uint32_t i = 0; i < 3 * PIXELS; i++) {
+			double off = (double)img.rgb[i] - 1, error = (double)img.error[i];
+			if (i / 3 % WIDTH < 3) /* neighbours of unreliable pixels share some of their variance */
+				continue;
+			stated += error * error;
+			realised += off * off;
+		}
+		canvas_image_fini(&img);
+	}
+	print_message("beside a highlight: squares %.3f of the truth\n", stated / realised);
+	assert_true(fabs(stated / realised - 1) < 0.15);
+}
+
+/* ---- chains that did not come */
+
+static double half_visited(void *user, uint32_t group, uint32_t pixel)
+{
+	(void)user;
+	return pixel % WIDTH < 9 ? 1 + 0.1 * (group % 4) : 0;
+}
+
+static void unvisited_pixels_are_counted(void **state)
+{
+	(void)state;
+	struct plan p = group_image_plan(PLAN_CHAINS, WIDTH, HEIGHT);
+	struct canvas_image img;
+	char text[STATED_ERROR_TEXT];
+	group_image(&p, half_visited, NULL, &img);
+	assert_int_equal(img.unvisited, 7 * HEIGHT);
+	for (uint32_t i = 0; i < 3 * PIXELS; i++)
+		assert_true(img.error[i] > 0);
+	stated_error(&img, text, sizeof text);
+	assert_non_null(strstr(text, "no chain came to 56 of 128 pixels"));
+	static struct header h;
+	header_fill(&h, &img, &p, &(struct header_extra){.scene = "test.xml", .date = ""});
+	bool counted = false, defined = false;
+	for (size_t i = 0; i < h.count; i++) {
+		counted |= strcmp(h.attributes[i].name, "hslt:unvisitedPixels") == 0 &&
+			   strcmp(h.attributes[i].string, "56") == 0;
+		defined |= strcmp(h.attributes[i].name, "hslt:relMSEDefinition") == 0;
+	}
+	assert_true(counted && defined);
+	canvas_image_fini(&img);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(rare_light_is_in_the_errors_of_pixels),
+		cmocka_unit_test(a_highlight_says_nothing_about_the_wall),
+		cmocka_unit_test(unvisited_pixels_are_counted),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
