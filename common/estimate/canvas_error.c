@@ -230,8 +230,6 @@ static void add_pixel(struct tile_error *t, struct block *b, size_t pixel)
 	for (size_t i = 0; i < 3 * groups; i++)
 		b->all_apart[i] += (double)apart[i];
 	for (size_t k = 0; k < 3; k++) {
-		if (groups >= BASE_GROUPS)
-			tile_error_find_base(t, pixel, k);
 		double rare = t->brightness[pixel][k] - t->base[pixel][k];
 		b->rare[k] += rare;
 		b->all[k] += t->brightness[pixel][k];
@@ -356,6 +354,7 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	tile_error_write(m, t);
 	if (!all_settled) {
 		struct block whole;
+		tile_error_find_bases(t);
 		settle_square(t, 0, 0, TILE_SIZE, &whole);
 	} else {
 		settle_pixels(t, 0, (size_t)t->width * t->height);
@@ -390,6 +389,7 @@ int canvas_error(struct making *m, struct error *e)
 		mean += (double)m->img->rgb[i];
 	mean /= (double)values;
 	t->groups = m->c->plan.groups;
+	t->floor = 0.01 * fabs(mean);
 	t->floor_square = 1e-4 * mean * mean;
 	for (uint32_t y = 0; y < m->img->height; y += TILE_SIZE)
 		for (uint32_t x = 0; x < m->img->width; x += TILE_SIZE)

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Standard errors of pixels: the spread between groups, and where it is too small because little light has arrived,
- * that of the neighbourhood. All loops run in a fixed order over exact inputs, so equal films give equal bits.
+ * what its neighbours show to be missing. All loops run in a fixed order over exact inputs, so equal films give equal
+ * bits.
  */
 #include "common/estimate/tile_error.h"
 
 #include "common/base/color.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-/* Squares of up to RARE pixels a side share their variance where more than rare_share of it is that of pixels in which
- * one or two groups outweigh all others: their kurtosis is above rare_kurtosis times the number of groups, and above
- * that of eight groups, since normal values of fewer have as much. */
-enum { RARE = 16 };
-static const double rare_share = 1. / 3, rare_kurtosis = 0.45, rare_kurtosis_least = 3.6, rare_brighter = 10;
+/* In squares of up to RARE pixels a side, pixels miss rare light if more than rare_share of the variance is that of
+ * pixels in which one or two groups outweigh all others: their kurtosis is above rare_kurtosis times the number of
+ * groups, and above that of eight groups, since normal values of fewer have as much. */
+enum { RARE = 16, RARE_BRIGHTER = 3 };
+static const double rare_share = 1. / 3, rare_kurtosis = 0.45, rare_kurtosis_least = 3.6;
 
 struct square {
 	uint32_t x, y, right, low;
@@ -55,7 +55,7 @@ static void pixel_error(struct making *m, struct tile_error *t, const int64_t *c
 	}
 }
 
-void tile_error_find_base(struct tile_error *t, size_t pixel, size_t k)
+static void find_base(struct tile_error *t, size_t pixel, size_t k)
 {
 	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
 	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
@@ -73,6 +73,19 @@ void tile_error_find_base(struct tile_error *t, size_t pixel, size_t k)
 		square += (d[g] - mean) * (d[g] - mean);
 	t->base[pixel][k] = t->brightness[pixel][k] + mean;
 	t->base_square[pixel][k] = square / n / (n - 1);
+	double times = t->base[pixel][k] / t->floor;
+	int power = times >= 1 ? ilogb(times) : 0;
+	t->base_power[pixel][k] = (uint8_t)(power < BASE_POWERS ? power : BASE_POWERS - 1);
+}
+
+void tile_error_find_bases(struct tile_error *t)
+{
+	if (t->has_bases)
+		return;
+	t->has_bases = true;
+	for (size_t pixel = 0; pixel < (size_t)t->width * t->height; pixel++)
+		for (size_t k = 0; k < 3; k++)
+			find_base(t, pixel, k);
 }
 
 static bool is_dark(const struct tile_error *t, size_t pixel)
@@ -83,7 +96,7 @@ static bool is_dark(const struct tile_error *t, size_t pixel)
 void tile_error_load(struct making *m, struct tile_error *t)
 {
 	bool chains = m->c->plan.kind == PLAN_CHAINS;
-	t->lit = false;
+	t->lit = t->has_bases = false;
 	memset(t->mean_square, 0, sizeof t->mean_square);
 	static const int64_t nothing[SLOT];
 	const int64_t *slot[PLAN_MAX_GROUPS];
@@ -122,46 +135,35 @@ static double few_kurtosis(const struct tile_error *t)
 	return fmax(rare_kurtosis * t->groups, rare_kurtosis_least);
 }
 
-/* A pixel of a square, for one channel. */
-struct member {
-	uint32_t pixel;
-	double base, excess;
-};
-
-static int by_base(const void *a, const void *b)
-{
-	const struct member *x = a, *y = b;
-	return x->base != y->base ? (x->base > y->base) - (x->base < y->base)
-				  : (x->pixel > y->pixel) - (x->pixel < y->pixel);
-}
-
 /*
  * Raises `rare` in a square of pixels to the square of the light that few groups found there, on average. Such light is
  * too rare for the groups to show how often it comes: pixels that it did not reach have groups that agree, on a value
  * that is too small by that much. Those that it reached have a larger error of their own. For a pixel only those count
- * that would be at most `rare_brighter` times as bright without such light: what is rare in a highlight says nothing
- * about the dark wall beside it.
+ * that would be at most ten times as bright without such light (8 to 16 times: RARE_BRIGHTER powers of two): what is
+ * rare in a highlight says nothing about the dark wall beside it.
  */
-static void raise_square(struct tile_error *t, size_t k, const struct square *s, double *rare)
+static void raise_square(const struct tile_error *t, size_t k, const struct square *s, double *rare)
 {
-	struct member of[RARE * RARE];
-	size_t n = 0, upto = 0;
-	double excess = 0, floor = sqrt(t->floor_square);
+	double excess[BASE_POWERS] = {0}, count[BASE_POWERS] = {0};
 	for (uint32_t j = s->y; j < s->low; j++)
 		for (uint32_t i = s->x; i < s->right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
-			tile_error_find_base(t, pixel, k);
-			of[n++] = (struct member){.pixel = (uint32_t)pixel,
-						  .base = fmax(t->base[pixel][k], floor),
-						  .excess = t->brightness[pixel][k] - t->base[pixel][k]};
+			unsigned b = t->base_power[pixel][k];
+			excess[b] += t->brightness[pixel][k] - t->base[pixel][k];
+			count[b]++;
 		}
-	qsort(of, n, sizeof *of, by_base);
-	for (size_t i = 0; i < n; i++) {
-		for (; upto < n && of[upto].base <= rare_brighter * of[i].base; upto++)
-			excess += of[upto].excess;
-		double missing = excess / (double)upto;
-		rare[of[i].pixel] = fmax(rare[of[i].pixel], missing * missing);
+	for (int b = 1; b < BASE_POWERS; b++) {
+		excess[b] += excess[b - 1];
+		count[b] += count[b - 1];
 	}
+	for (uint32_t j = s->y; j < s->low; j++)
+		for (uint32_t i = s->x; i < s->right; i++) {
+			size_t pixel = (size_t)j * t->width + i;
+			unsigned upto = t->base_power[pixel][k] + RARE_BRIGHTER;
+			upto = upto < BASE_POWERS ? upto : BASE_POWERS - 1;
+			double missing = excess[upto] / count[upto];
+			rare[pixel] = fmax(rare[pixel], missing * missing);
+		}
 }
 
 /* Whether much of the square's variance is that of pixels in which few groups outweigh all others. */
@@ -186,8 +188,10 @@ static void find_rare(struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE
 				for (uint32_t x = 0; x < t->width; x += size) {
 					struct square s = {x, y, x + size < t->width ? x + size : t->width,
 							   y + size < t->height ? y + size : t->height};
-					if (has_rare(t, k, &s))
-						raise_square(t, k, &s, rare[k]);
+					if (!has_rare(t, k, &s))
+						continue;
+					tile_error_find_bases(t);
+					raise_square(t, k, &s, rare[k]);
 				}
 }
 

@@ -12,20 +12,23 @@
 
 /* With fewer groups there is no trimmed mean, and no colours cancel. */
 enum { BASE_GROUPS = 8 };
+enum { BASE_POWERS = 32 };
 
 /* A tile being worked on. Rows of `apart` hold three channels of `groups` values. */
 struct tile_error {
 	const struct canvas *c;
 	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
-	double floor_square;
-	bool lit;	       /* rendered by chains, and some visited the tile */
-	double mean_square[3]; /* over the tile's pixels */
-	float *apart;	       /* [height][width][3][groups]: a group's image minus the mean of the groups */
+	double floor, floor_square;	      /* 0.01 m */
+	bool lit;			      /* rendered by chains, and some visited the tile */
+	double mean_square[3];		      /* over the tile's pixels */
+	float *apart; /* [height][width][3][groups]: a group's image minus the mean of the groups */
 	double brightness[TILE_SIZE * TILE_SIZE][3],
 		square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
 	double base[TILE_SIZE * TILE_SIZE][3],
 		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
-	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
+	uint8_t base_power[TILE_SIZE * TILE_SIZE][3];  /* powers of two by which the base is above the floor */
+	bool has_bases;
+	double kurtosis[TILE_SIZE * TILE_SIZE][3]; /* of the groups' values */
 	bool settled[TILE_SIZE * TILE_SIZE][3], cancels[TILE_SIZE * TILE_SIZE][3];
 	double cancelling_spread[3]; /* cancelling.h */
 	struct error_sums sum;
@@ -50,11 +53,12 @@ static inline float *tile_error_apart(const struct tile_error *t, size_t pixel)
  * Counts the image's unvisited pixels. */
 void tile_error_load(struct making *m, struct tile_error *t);
 
-/* base and base_square of a pixel: mean and its variance without the eighth of the groups that are farthest from the
- * others, which is the brightness without fireflies. `apart` must still be as tile_error_load made it. */
-void tile_error_find_base(struct tile_error *t, size_t pixel, size_t k);
+/* base, base_square and base_power of all pixels, once: mean and its variance without the eighth of the groups that are
+ * farthest from the others, which is the brightness without fireflies. `apart` must still be as tile_error_load made
+ * it. */
+void tile_error_find_bases(struct tile_error *t);
 
-/* Writes the standard errors of the tile's pixels into the image; `settled` must be known. May find bases. */
+/* Writes the standard errors of the tile's pixels into the image; `settled` must be known. May find the bases. */
 void tile_error_write(struct making *m, struct tile_error *t);
 
 /* Gives the mean variance of the image to tiles that no chain visited, which have none of their own. */
