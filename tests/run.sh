@@ -91,7 +91,7 @@ END
 took=$build/tests/took # seconds and file of the last run
 touch "$took"
 # Of a first run: what takes minutes of a core begins first.
-longest="worker/render/path/test_integrators worker/render/mutation/test_forced worker/render/path/test_ends worker/render/test_moments worker/render/mutation/test_balance"
+longest="worker/render/path/test_integrators image/test_reference worker/render/mutation/test_forced image/test_calibration worker/render/mutation/test_balance image/test_effects image/test_scenes numerics/test_hard"
 
 # The tests of a kind, one a line; programs that took long the last time first, new ones before them.
 list() {
