@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/render.h"
 #include "tests/support/chains.h"
+#include "tests/support/leases.h"
 
 #include "common/plan/resample.h"
 
@@ -12,16 +13,6 @@
 #include <string.h>
 
 #include <cmocka.h>
-
-static void lease(const struct world *w, const struct plan *p, enum lease_kind kind, const struct lease_input *in,
-		  struct batch *b)
-{
-	struct error e = {""};
-	enum lease_end end;
-	struct lease_key k = {1, kind, 0, 0, 0};
-	if (render_lease(w, p, &k, in, NULL, &end, b, &e) || batch_check(b, p, &e))
-		fail_msg("%s", e.text);
-}
 
 static void count(const struct batch *b, struct chains_result *out)
 {
@@ -50,8 +41,7 @@ static void take_film(const struct batch *b, const struct plan *p, struct chains
 
 static bool bootstrap(const struct world *w, const struct plan *p, uint64_t *seeds, struct chains_result *out)
 {
-	struct batch b;
-	lease(w, p, LEASE_BOOTSTRAP, NULL, &b);
+	struct batch b = lease_done(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}, NULL);
 	double sum = 0, most = 0;
 	for (uint64_t i = 0; i < b.weight_count; i++) {
 		sum += (double)b.weights[i];
@@ -100,8 +90,7 @@ void chains_run(const struct world *w, const struct chains_how *how, struct chai
 	assert_int_equal(unsound, 0);
 	memset(out->counters, 0, sizeof out->counters);
 	struct lease_input in = {.chain_count = how->chains, .seeds = seeds};
-	struct batch b;
-	lease(w, &p, LEASE_RENDER, &in, &b);
+	struct batch b = lease_done(w, &p, (struct lease_key){1, LEASE_RENDER, 0, 0, 0}, &in);
 	count(&b, out);
 	take_film(&b, &p, out);
 	uint64_t samples = out->counters[COUNT_SAMPLES], fresh = out->counters[COUNT_INDEPENDENT];

@@ -7,6 +7,7 @@
  */
 #include "common/estimate/merge.h"
 #include "common/plan/resample.h"
+#include "tests/support/leases.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/render/local.h"
 #include "worker/render/render.h"
@@ -130,18 +131,6 @@ static struct plan plan_of(const struct world *w, const struct render_integrator
 	return p;
 }
 
-static struct batch run_lease(const struct world *w, const struct plan *p, struct lease_key k,
-			      const struct lease_input *in)
-{
-	struct batch b;
-	struct error e = {""};
-	enum lease_end end;
-	if (render_lease(w, p, &k, in, NULL, &end, &b, &e) || batch_check(&b, p, &e))
-		fail_msg("%s: %s", p->integrator, e.text);
-	assert_int_equal(end, LEASE_DONE);
-	return b;
-}
-
 /* All leases of a job, what they ask for noted by group; `look` sees each batch. The map of brightness is the plan's:
  * all groups share it, and none of their numbers. It is noted as that of one group more. */
 static void run_all(const struct world *w, const struct plan *p, void (*look)(void *user, const struct batch *b),
@@ -156,7 +145,8 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 	assert_int_equal(bootstrap_new(&s, p, NULL), 0);
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
 		noted.owner = i / PARTS;
-		struct batch b = run_lease(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
+		struct batch b =
+			lease_done(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
 		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
 		look(user, &b);
 		batch_fini(&b);
@@ -174,7 +164,7 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 						  .states = before[lease].states};
 		noted.owner = group;
 		struct batch b =
-			run_lease(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, &in);
+			lease_done(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, &in);
 		look(user, &b);
 		batch_fini(&before[lease]);
 		before[lease] = b;
@@ -260,7 +250,7 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		if (render_integrator_at(i)->kind != PLAN_CHAINS)
 			continue;
 		struct plan p = plan_of(w, render_integrator_at(i));
-		struct batch boot = run_lease(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
+		struct batch boot = lease_done(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
 		uint64_t first = plan_bootstrap_range(&p, 1, 0).begin, n = 0, looks = 0;
 		while (!(boot.weights[n] > 0))
 			n++;
@@ -273,8 +263,8 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		batch_fini(&boot);
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
 		listen(true);
-		boot = run_lease(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
-				 &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
+		boot = lease_done(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
+				  &(struct lease_input){.chain_count = CHAINS / GROUPS / PARTS, .seeds = seeds});
 		batch_fini(&boot);
 		for (size_t k = 0; k < noted.count; k++) {
 			looks += noted.all[k].stream == RNG_BOOTSTRAP;

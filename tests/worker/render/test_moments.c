@@ -11,6 +11,7 @@
  */
 #include "common/estimate/merge.h"
 #include "tests/support/dice.h"
+#include "tests/support/leases.h"
 #include "tests/support/length.h"
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
@@ -176,23 +177,13 @@ static struct plan make_plan(const struct world *w, const char *integrator, cons
 	return p;
 }
 
-static void lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
-		  struct batch *b)
-{
-	struct error e = {""};
-	enum lease_end end;
-	if (render_lease(w, p, k, in, NULL, &end, b, &e) || batch_check(b, p, &e))
-		fail_msg("%s", e.text);
-}
-
 /* Each class's means by group, of independent samples. */
 static void sample_classes(const struct world *w, const char *integrator, const char *test,
 			   double mean[PATH_CLASSES][GROUPS])
 {
 	struct plan p = make_plan(w, integrator, test);
 	for (uint32_t g = 0; g < GROUPS; g++) {
-		struct batch b;
-		lease(w, &p, &(struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL, &b);
+		struct batch b = lease_done(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL);
 		double sum = 0;
 		for (int k = 0; k < PATH_CLASSES; k++) {
 			mean[k][g] = b.classes[k] / (double)b.weight_count;
@@ -259,17 +250,15 @@ static struct canvas *run_chains(const struct world *w, const struct plan *p,
 	assert_int_equal(bootstrap_new(&s, p, &e), 0);
 	assert_int_equal(canvas_new(&c, p, -32, NULL, &e), 0);
 	for (uint32_t g = 0; g < p->groups; g++) {
-		struct batch b;
-		lease(w, p, &(struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL, &b);
+		struct batch b = lease_done(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL);
 		assert_int_equal(bootstrap_add(s, &b, &e), 0);
 		batch_fini(&b);
 	}
 	bootstrap_to_canvas(s, c);
 	for (uint32_t g = 0; g < p->groups; g++) {
 		struct lease_input in = {.chain_count = chains, .seeds = seeds};
-		struct batch b;
 		bootstrap_seeds(s, g, seeds);
-		lease(w, p, &(struct lease_key){1, LEASE_RENDER, g, 0, 0}, &in, &b);
+		struct batch b = lease_done(w, p, (struct lease_key){1, LEASE_RENDER, g, 0, 0}, &in);
 		if (seen)
 			seen(p, &b);
 		assert_int_equal(canvas_add(c, &b, &e), 0);

@@ -5,6 +5,7 @@
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
+#include "tests/support/leases.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/sample_images.h"
 #include "tests/support/worlds.h"
@@ -153,35 +154,6 @@ static void test_refused(void **state)
 
 enum { SIDE = 32 };
 
-static float *image_of(struct world *w)
-{
-	struct plan p = {.kind = PLAN_SAMPLES,
-			 .integrator = "path",
-			 .width = SIDE,
-			 .height = SIDE,
-			 .crop_width = SIDE,
-			 .crop_height = SIDE,
-			 .groups = 1,
-			 .parts = 1,
-			 .bootstrap = 1,
-			 .epoch = 16,
-			 .rounds = 1,
-			 .min_depth = 1,
-			 .max_depth = 4};
-	float *image = calloc((size_t)SIDE * SIDE, 3 * sizeof *image);
-	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
-	struct batch b;
-	struct error e = {""};
-	enum lease_end end;
-	if (render_lease(w, &p, &k, NULL, NULL, &end, &b, &e))
-		fail_msg("%s", e.text);
-	assert_int_equal(b.tile_count, 1);
-	memcpy(image, b.tiles[0].xyz, (size_t)SIDE * SIDE * 3 * sizeof *image);
-	batch_fini(&b);
-	world_free(w);
-	return image;
-}
-
 #define GLOSSY "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>"
 #define GROUND "<transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>"
 /* clang-format off */
@@ -205,7 +177,8 @@ static struct world *flat_world(const char *displacement)
 static void test_height_zero_is_the_same_image(void **state)
 {
 	(void)state;
-	float *plain = image_of(flat_world("")), *zero = image_of(flat_world(CHECKERS SCALE("0") LEVEL("4")));
+	float *plain = lease_image(flat_world(""), SIDE, 16, 4),
+	      *zero = lease_image(flat_world(CHECKERS SCALE("0") LEVEL("4")), SIDE, 16, 4);
 	size_t differ = 0;
 	double a = 0, b = 0;
 	for (size_t i = 0; i < (size_t)SIDE * SIDE * 3; i++) {

@@ -4,6 +4,7 @@
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
+#include "tests/support/leases.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/sample_images.h"
 #include "tests/support/worlds.h"
@@ -35,31 +36,13 @@ static struct world *world_with_picture(const char *inside)
 	return w;
 }
 
+/* The luminance of each pixel. */
 static void image_of(struct world *w, double mean[SIDE * SIDE])
 {
-	struct plan p = {.kind = PLAN_SAMPLES,
-			 .integrator = "path",
-			 .width = SIDE,
-			 .height = SIDE,
-			 .crop_width = SIDE,
-			 .crop_height = SIDE,
-			 .groups = 1,
-			 .parts = 1,
-			 .bootstrap = 1,
-			 .epoch = 64,
-			 .rounds = 1,
-			 .min_depth = 1,
-			 .max_depth = 2};
-	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
-	struct batch b;
-	struct error e = {""};
-	enum lease_end end;
-	if (render_lease(w, &p, &k, NULL, NULL, &end, &b, &e))
-		fail_msg("%s", e.text);
+	float *xyz = lease_image(w, SIDE, 64, 2);
 	for (int i = 0; i < SIDE * SIDE; i++)
-		mean[i] = (double)b.tiles[0].xyz[3 * i + 1];
-	batch_fini(&b);
-	world_free(w);
+		mean[i] = (double)xyz[3 * i + 1];
+	free(xyz);
 }
 
 /* Root of the mean square of the difference, over the root of the mean square of b. */

@@ -6,6 +6,7 @@
  * large as itself: most pixels agree to 1e-5, and the mean to what few paths can change.
  */
 #include "worker/render/render.h"
+#include "tests/support/leases.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -38,36 +39,6 @@ static struct world *world_at(double s, double m)
 #undef P
 }
 
-static float *image_of(struct world *w)
-{
-	struct plan p = {.kind = PLAN_SAMPLES,
-			 .integrator = "path",
-			 .width = SIDE,
-			 .height = SIDE,
-			 .crop_width = SIDE,
-			 .crop_height = SIDE,
-			 .groups = 1,
-			 .parts = 1,
-			 .bootstrap = 1,
-			 .epoch = 32,
-			 .rounds = 1,
-			 .min_depth = 1,
-			 .max_depth = 6};
-	float *image = calloc((size_t)SIDE * SIDE, 3 * sizeof *image);
-	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
-	struct batch b;
-	struct error e = {""};
-	enum lease_end end;
-	if (render_lease(w, &p, &k, NULL, NULL, &end, &b, &e))
-		fail_msg("%s", e.text);
-	assert_int_equal(b.tile_count, 1);
-	assert_int_equal(b.tiles[0].width * b.tiles[0].height, SIDE * SIDE);
-	memcpy(image, b.tiles[0].xyz, (size_t)SIDE * SIDE * 3 * sizeof *image);
-	batch_fini(&b);
-	world_free(w);
-	return image;
-}
-
 static void test_same(void **state)
 {
 	(void)state;
@@ -79,9 +50,9 @@ static void test_same(void **state)
 		{0x1p13, -0x1p30, true}, {1e-4, 0, false},	  {1e4, 0, false},   {1, 1e5, false},
 		{3, 1e5 / 7, false},	 {1e-4, 10.0 / 3, false},
 	};
-	float *reference = image_of(world_at(1, 0));
+	float *reference = lease_image(world_at(1, 0), SIDE, 32, 6);
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-		float *image = image_of(world_at(cases[i].scale, cases[i].move));
+		float *image = lease_image(world_at(cases[i].scale, cases[i].move), SIDE, 32, 6);
 		size_t differ = 0;
 		double a = 0, b = 0;
 		for (size_t k = 0; k < (size_t)SIDE * SIDE * 3; k++) {
