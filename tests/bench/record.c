@@ -58,24 +58,24 @@ bool __wrap_accel_occluded_to_infinity(const struct accel *a, const struct ray_e
 struct recorded_walks record_walks;
 static bool walking;
 
-bool __real_full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
-bool __wrap_full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
+bool __real_full_path_visible(struct path_context *c, const struct full_path *x, unsigned e);
+bool __wrap_full_path_visible(struct path_context *c, const struct full_path *x, unsigned e);
 
-bool __wrap_full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e)
+bool __wrap_full_path_visible(struct path_context *c, const struct full_path *x, unsigned e)
 {
 	bool visible = __real_full_path_visible(c, x, e);
 	record_walks.occluded += walking && !visible;
 	return visible;
 }
 
-enum walk_end __real_halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+enum walk_end __real_halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
 				       unsigned stale, struct walk_scratch *s);
-enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
 				       unsigned stale, struct walk_scratch *s);
 
-enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
 				       unsigned stale, struct walk_scratch *s)
 {

@@ -88,7 +88,7 @@ static void write_seeds(struct chain *c)
 
 static void put_right(const struct chain *c, uint8_t *bytes, size_t size)
 {
-	static struct full_path_path x;
+	static struct full_path x;
 	double contribution;
 	put64(bytes, CHAIN);
 	put64(bytes + 8, c->step);

@@ -80,8 +80,8 @@ static int by_size(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-static void note(struct errors *e, double program, const struct world *w, const struct full_path_path *x,
-		 const struct full_path_path *y)
+static void note(struct errors *e, double program, const struct world *w, const struct full_path *x,
+		 const struct full_path *y)
 {
 	long double truth = in_long_log_weight(w, y) - in_long_log_weight(w, x);
 	double twice = in_double_log_weight(w, y) - in_double_log_weight(w, x);
@@ -99,7 +99,7 @@ static void run_case(const struct precision_case *p, unsigned most, struct error
 {
 	static struct path_context c;
 	static struct mutation_ctx m;
-	static struct full_path_path x, y;
+	static struct full_path x, y;
 	static uint64_t counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
 	const struct mutation_ops *ops = mutation_find("hslt", 4);
 	const struct mutation_setting how = {(int)p->edges, 0};

@@ -77,7 +77,7 @@ enum { WAYS_BACK = 4 };
 #define ROUNDING 1e-9
 
 /* |h_j|, and how exactly; nothing where it is exactly specular. */
-static double slope(const struct full_path_path *x, unsigned j, double *blur)
+static double slope(const struct full_path *x, unsigned j, double *blur)
 {
 	if (j == 0 || j >= x->edges || x->v[j].delta)
 		return 0;
@@ -86,7 +86,7 @@ static double slope(const struct full_path_path *x, unsigned j, double *blur)
 	return hypot(h.x, h.y);
 }
 
-static void measure(struct path_context *c, struct full_path_path *x, double *g, double *blur)
+static void measure(struct path_context *c, struct full_path *x, double *g, double *blur)
 {
 	unsigned k = x->edges;
 	double lengths = 0, roughness = 0;
@@ -132,7 +132,7 @@ struct run {
 	const char *test;
 	struct path_context *c;
 	struct mutation_ctx *m;
-	struct full_path_path *x, *y;
+	struct full_path *x, *y;
 	double weight, strict_weight;			      /* of strategies that keep the number of edges; of all */
 	double g[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS]; /* of x */
 	uint64_t checked, doubts;
@@ -189,8 +189,8 @@ static void check_accepted(struct run *r, struct balance_trial *t)
 /* y becomes x again by the vertices that the move names. */
 static void restore(struct run *r, const struct balance_trial *t, const struct move *move)
 {
-	const struct full_path_path *x = r->x;
-	struct full_path_path *y = r->y;
+	const struct full_path *x = r->x;
+	struct full_path *y = r->y;
 	bool all = t->ops->independent || y->edges != x->edges;
 	full_path_copy(y, x, all ? 0 : move->first, all ? x->edges : move->last);
 	for (unsigned i = 0; i <= x->edges; i++) {
@@ -222,7 +222,7 @@ static void compare(const struct run *r, const double *g, const double *blur, do
 }
 
 /* log P(b) P(c | b) by the heuristic. */
-static double log_choice(struct run *r, const struct full_path_path *x, const struct move *move)
+static double log_choice(struct run *r, const struct full_path *x, const struct move *move)
 {
 	double weight[FULL_PATH_MAX_VERTICES], p;
 	heuristic_roughness.weigh_b(r->c, x, weight);
@@ -234,7 +234,7 @@ static double log_choice(struct run *r, const struct full_path_path *x, const st
 	return log(p);
 }
 
-static double log_fixed(struct run *r, struct full_path_path *x, const struct move *move)
+static double log_fixed(struct run *r, struct full_path *x, const struct move *move)
 {
 	double sum = 0;
 	for (unsigned j = 0; j < move->c; j++)
@@ -245,10 +245,10 @@ static double log_fixed(struct run *r, struct full_path_path *x, const struct mo
 /* Half vectors of x, asked of a walk that begins at y, do not lead to x: there is no way back. */
 static bool stays_away(struct run *r, const struct move *move)
 {
-	static struct full_path_path back;
+	static struct full_path back;
 	static struct walk_scratch scratch;
 	struct walk_target target[FULL_PATH_MAX_VERTICES];
-	const struct full_path_path *x = r->x, *y = r->y;
+	const struct full_path *x = r->x, *y = r->y;
 	unsigned b = move->b, c = move->c;
 	full_path_copy(&back, y, 0, y->edges);
 	back.v[b] = x->v[b];
@@ -345,7 +345,7 @@ void balance_run(const struct world *w, const char *test, struct balance_trial *
 {
 	static struct path_context c;
 	static struct mutation_ctx m;
-	static struct full_path_path x, y;
+	static struct full_path x, y;
 	static uint64_t counters[BATCH_COUNTERS];
 	starts_context(&c, w, 1, BALANCE_EDGES, counters);
 	m.path = &c;

@@ -74,7 +74,7 @@ double starts_weight(const struct starts *s, unsigned edges)
 	return n ? s->of[edges].at[n - 1].sum / (double)s->pairs : 0;
 }
 
-bool starts_path(struct starts *s, unsigned edges, double u, struct full_path_path *x)
+bool starts_path(struct starts *s, unsigned edges, double u, struct full_path *x)
 {
 	size_t n = s->of[edges].count, low = 0;
 	if (n == 0)

@@ -39,6 +39,6 @@ void starts_fini(struct starts *s);
 double starts_weight(const struct starts *s, unsigned edges);
 
 /* The path at u in [0,1) of the sum. false: there is none (or it lies just outside the film's border). */
-bool starts_path(struct starts *s, unsigned edges, double u, struct full_path_path *x);
+bool starts_path(struct starts *s, unsigned edges, double u, struct full_path *x);
 
 #endif

@@ -36,7 +36,7 @@ struct group {
 	char failure[256];
 	struct path_context context;
 	struct mutation_ctx mutation;
-	struct full_path_path place[2];
+	struct full_path place[2];
 };
 
 static const char *const inner_names[INNER] = {"first", "middle", "last"};
@@ -66,7 +66,7 @@ static double unit(double a, double radius)
 }
 
 /* By their geometry terms: both ends move, and a join depends on nothing else. */
-static void look_at_edges(const struct path_context *c, const struct full_path_path *x, double out[EDGES])
+static void look_at_edges(const struct path_context *c, const struct full_path *x, double out[EDGES])
 {
 	unsigned k = x->edges;
 	for (unsigned i = 0; i < EDGES; i++) {
@@ -82,7 +82,7 @@ static void look_at_edges(const struct path_context *c, const struct full_path_p
 }
 
 /* All between 0 and 1, or nearly so. */
-static void look_at(const struct path_context *c, struct full_path_path *x, double out[STATIONARY_FUNCTIONS])
+static void look_at(const struct path_context *c, struct full_path *x, double out[STATIONARY_FUNCTIONS])
 {
 	const struct film_window *f = &c->window;
 	double u = (x->film[0] - f->x) / f->width, v = (x->film[1] - f->y) / f->height, xyz[3], *at = out,
@@ -145,13 +145,13 @@ static bool resample(struct group *g, uint64_t *index)
 }
 
 /* Of the edge at which x_b was joined. */
-static double log_geometry(const struct full_path_path *x, unsigned b)
+static double log_geometry(const struct full_path *x, unsigned b)
 {
 	return b > 0 ? log(path_cosine(&x->v[b - 1], x->edge[b - 1].w) / x->edge[b - 1].distance2) : 0;
 }
 
-static double planted(enum stationary_fault fault, const struct move *m, const struct full_path_path *x,
-		      const struct full_path_path *y)
+static double planted(enum stationary_fault fault, const struct move *m, const struct full_path *x,
+		      const struct full_path *y)
 {
 	switch (fault) {
 	case STATIONARY_NO_TRANSFER:
@@ -176,7 +176,7 @@ static void count_unsound(struct group *g, double log_weight, bool state)
 }
 
 /* The probability of acceptance of y. */
-static double propose(struct group *g, struct full_path_path *x, struct full_path_path *y, struct move *move)
+static double propose(struct group *g, struct full_path *x, struct full_path *y, struct move *move)
 {
 	const struct mutation_ops *ops = g->entry->ops;
 	enum strategy_counter end = ops->propose(&g->mutation, &g->entry->how, x, y, move);
@@ -195,7 +195,7 @@ static double propose(struct group *g, struct full_path_path *x, struct full_pat
 
 static void run_start(struct group *g, uint64_t chain, uint64_t index)
 {
-	struct full_path_path *x = &g->place[0], *y = &g->place[1];
+	struct full_path *x = &g->place[0], *y = &g->place[1];
 	double now[STATIONARY_FUNCTIONS], next[STATIONARY_FUNCTIONS], first[STATIONARY_FUNCTIONS], r[4];
 	if (!path_start(&g->context, g->seed, index, x)) {
 		snprintf(g->failure, sizeof g->failure, "start %llu is black", (unsigned long long)index);
@@ -218,7 +218,7 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 			g->change[f] += (a > 0 ? a * next[f] + (1 - a) * now[f] : now[f]) - first[f];
 		mutation_random(&g->mutation, BLOCK_STRATEGY, r);
 		if (r[1] < a) {
-			struct full_path_path *swap = x;
+			struct full_path *swap = x;
 			x = y;
 			y = swap;
 			memcpy(now, next, sizeof now);

@@ -44,7 +44,7 @@ static bool same_place(const struct path_vertex *a, const struct path_vertex *b)
 }
 
 /* Technique s of the sub-paths in c makes x. */
-static bool is_made(const struct path_context *c, const struct full_path_path *x, unsigned s)
+static bool is_made(const struct path_context *c, const struct full_path *x, unsigned s)
 {
 	unsigned k = x->edges;
 	for (unsigned i = 0; s >= 2 && i < s; i++)
@@ -62,8 +62,8 @@ struct seen {
 };
 
 /* x was made by technique `from`; a pair of sub-paths around it is drawn that another technique may have made. */
-static void check_around(struct path_context *c, struct full_path_path *x, unsigned from, uint64_t index,
-			 struct dice *d, struct seen *seen)
+static void check_around(struct path_context *c, struct full_path *x, unsigned from, uint64_t index, struct dice *d,
+			 struct seen *seen)
 {
 	static struct ensemble around;
 	struct sampler_random s;
@@ -101,7 +101,7 @@ static void check_techniques(const struct world *w, const char *name)
 	const struct ensemble_lengths all = ensemble_all_lengths(&c);
 	for (uint64_t index = 0; index < dice_count(3000); index++) {
 		struct sampler_random s;
-		struct full_path_path x;
+		struct full_path x;
 		sampler_random_init(&s, stats_seed(name), RNG_BOOTSTRAP, index, 0);
 		path_trace_both_ways(&c, &s.base, &sample);
 		double by_class[PATH_CLASSES] = {0}, sum = 0;

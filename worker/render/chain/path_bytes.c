@@ -160,7 +160,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 }
 
 /* Without its contribution. */
-static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x)
+static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x)
 {
 	if (size < PATH_EDGES)
 		return false;
@@ -196,7 +196,7 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
  * refused and no fault. A call, so that nothing of it is computed before or after the flags are looked at. stated: as
  * the bytes say. */
 __attribute__((noinline)) static bool contribution_of(struct path_context *c, const uint8_t *bytes, size_t size,
-						      bool stated, struct full_path_path *x, double *contribution)
+						      bool stated, struct full_path *x, double *contribution)
 {
 	bool ok = read_path(c, bytes, size, x);
 	*contribution = ok && x->edges ? full_path_log_f(c, x) : 0;
@@ -205,8 +205,8 @@ __attribute__((noinline)) static bool contribution_of(struct path_context *c, co
 	return ok && isfinite(*contribution);
 }
 
-static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t size, bool stated,
-			 struct full_path_path *x, double *contribution)
+static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t size, bool stated, struct full_path *x,
+			 double *contribution)
 {
 	unsigned flags = fptrap_leave();
 	bool ok = contribution_of(c, bytes, size, stated, x, contribution);
@@ -214,19 +214,19 @@ static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t si
 	return ok;
 }
 
-bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x,
+bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x,
 		       double *contribution)
 {
 	return read_guarded(c, bytes, size, false, x, contribution);
 }
 
-bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x)
+bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x)
 {
 	double contribution;
 	return read_guarded(c, bytes, size, true, x, &contribution);
 }
 
-size_t path_write(struct path_context *c, const struct full_path_path *x, struct full_path_path *again, uint8_t *bytes)
+size_t path_write(struct path_context *c, const struct full_path *x, struct full_path *again, uint8_t *bytes)
 {
 	put64(bytes, x->edges);
 	if (x->edges == 0)

@@ -9,11 +9,11 @@
  * aperture. WHOLE_BYTES are always enough. */
 enum { WHOLE_BYTES = 24 + 40 * FULL_PATH_MAX_VERTICES };
 /* What is written is read again, into `again`: 0 where that fails, and the bytes are nobody's state. */
-size_t path_write(struct path_context *c, const struct full_path_path *x, struct full_path_path *again, uint8_t *bytes);
+size_t path_write(struct path_context *c, const struct full_path *x, struct full_path *again, uint8_t *bytes);
 /* Any bytes, and log f of the path that they make, whatever they say of it. false: not a path of this world. */
-bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x,
+bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x,
 		       double *contribution);
 /* Any bytes. false: not a path of this world that path_write wrote. */
-bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x);
+bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path *x);
 
 #endif

@@ -56,7 +56,7 @@ static void begin(struct path_chain *c, const uint8_t *bytes, size_t size)
 
 static bool start(struct chain *base, uint64_t bootstrap_index)
 {
-	static const struct full_path_path black = {0};
+	static const struct full_path black = {0};
 	struct path_chain *c = path_of(base);
 	uint8_t bytes[WHOLE_BYTES];
 	set_up(c);
@@ -121,7 +121,7 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 		      struct chain_sums *sums)
 {
 	struct mutation_ctx *m = &c->mutation;
-	struct full_path_path *x = &c->current->path, *y = &c->proposal->path;
+	struct full_path *x = &c->current->path, *y = &c->proposal->path;
 	enum strategy_counter end = entry->ops->propose(m, &entry->how, x, y, move);
 	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
 	if (!end && !(to_y > -INFINITY && path_place_is_sound(m->path, to_y, entry->ops->independent)))

@@ -5,15 +5,14 @@
 
 #define LOG_FLT_MAX (FLT_MAX_EXP * M_LN2)
 
-void path_place_copy(struct full_path_path *to, const struct full_path_path *from)
+void path_place_copy(struct full_path *to, const struct full_path *from)
 {
 	if (from->edges)
 		full_path_copy(to, from, 0, from->edges);
 	to->edges = from->edges;
 }
 
-void path_place_follow(struct full_path_path *proposal, const struct full_path_path *current, const struct move *move,
-		       bool all)
+void path_place_follow(struct full_path *proposal, const struct full_path *current, const struct move *move, bool all)
 {
 	if (all || proposal->edges != current->edges)
 		path_place_copy(proposal, current);

@@ -10,14 +10,13 @@
 
 /* A state with the weight that it has accumulated since it was splatted. */
 struct path_place {
-	struct full_path_path path; /* 0 edges: black, looking for light */
+	struct full_path path; /* 0 edges: black, looking for light */
 	double weight;
 };
 
-void path_place_copy(struct full_path_path *to, const struct full_path_path *from);
+void path_place_copy(struct full_path *to, const struct full_path *from);
 /* After a step: the proposal's path equals the current one again. all: any vertex may differ. */
-void path_place_follow(struct full_path_path *proposal, const struct full_path_path *current, const struct move *move,
-		       bool all);
+void path_place_follow(struct full_path *proposal, const struct full_path *current, const struct move *move, bool all);
 /* Whether a weight with this logarithm may go to the film: not NaN, not infinite, and if bounded within the range of a
  * float. Other weights are counted. */
 bool path_place_is_sound(const struct path_context *c, double log_weight, bool bounded);

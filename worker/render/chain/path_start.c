@@ -3,7 +3,7 @@
 
 #include "worker/render/path/ensemble.h"
 
-bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index, struct full_path_path *x)
+bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index, struct full_path *x)
 {
 	struct sampler_random s;
 	double choice[SAMPLER_BLOCK];

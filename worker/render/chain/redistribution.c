@@ -45,7 +45,7 @@ struct redistribution {
 };
 
 /* Some inner vertex is not specular. */
-static bool is_scattered(const struct full_path_path *x)
+static bool is_scattered(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
 		if (!x->v[j].delta)
@@ -57,7 +57,7 @@ static bool is_scattered(const struct full_path_path *x)
 static void weigh(struct redistribution *r, struct spread_place *at)
 {
 	double log_pdf[FULL_PATH_MAX_VERTICES];
-	struct full_path_path *x = &at->place.path;
+	struct full_path *x = &at->place.path;
 	at->scale = brightness_scale(r->map, x->film[0], x->film[1]);
 	at->share = 0;
 	if (!is_scattered(x))

@@ -19,12 +19,12 @@ struct half {
 	bool matched, finite;
 };
 
-static vec3 towards_light(const struct full_path_path *x, unsigned j)
+static vec3 towards_light(const struct full_path *x, unsigned j)
 {
 	return vec3_neg(x->edge[j - 1].w);
 }
 
-static struct half half_of(const struct full_path_path *x, unsigned j, double eta)
+static struct half half_of(const struct full_path *x, unsigned j, double eta)
 {
 	const struct path_vertex *v = &x->v[j];
 	struct half r = {.sum = vec3_madd(towards_light(x, j), eta, x->edge[j].w), .along = 1, .finite = true};
@@ -39,7 +39,7 @@ static struct half half_of(const struct full_path_path *x, unsigned j, double et
 	return r;
 }
 
-vec2 halfvec_of(const struct full_path_path *x, unsigned j)
+vec2 halfvec_of(const struct full_path *x, unsigned j)
 {
 	return half_of(x, j, full_path_eta(x, j)).h;
 }
@@ -104,7 +104,7 @@ static void end_tangents(const struct world *w, const struct path_vertex *v, vec
 	n->dv = f.t;
 }
 
-static struct neighbour neighbour_of(const struct full_path_path *x, unsigned edge, bool to_light)
+static struct neighbour neighbour_of(const struct full_path *x, unsigned edge, bool to_light)
 {
 	struct neighbour n = {.w = to_light ? vec3_neg(x->edge[edge].w) : x->edge[edge].w};
 	n.rate = n.own = 1 / sqrt(x->edge[edge].distance2);
@@ -130,7 +130,7 @@ static void fill_constraint(const struct path_vertex *v, double eta, const struc
 			       by_itself(f, r, i, o, eta, change->dv, change->du, change->dn[1], change->ddu[1]));
 }
 
-void constraints_of(const struct world *w, const struct full_path_path *x, unsigned b, unsigned c, struct constraint *k)
+void constraints_of(const struct world *w, const struct full_path *x, unsigned b, unsigned c, struct constraint *k)
 {
 	assert(c < b && b <= x->edges);
 	struct surface_change change[2];

@@ -28,10 +28,9 @@ struct constraint {
 };
 
 /* Constraints of the inner vertices c+1..b-1 of x, k[j] for vertex j. Needs edges c..b-1 joined and the inner modes. */
-void constraints_of(const struct world *w, const struct full_path_path *x, unsigned b, unsigned c,
-		    struct constraint *k);
+void constraints_of(const struct world *w, const struct full_path *x, unsigned b, unsigned c, struct constraint *k);
 /* Computes h only. */
-vec2 halfvec_of(const struct full_path_path *x, unsigned j);
+vec2 halfvec_of(const struct full_path *x, unsigned j);
 
 /*
  * The block tridiagonal system of the vertices c+1..b-1 between the fixed ends x_b and x_c (b - c >= 2):

@@ -28,7 +28,7 @@ static double bsdf_limit(const struct path_context *c, const struct path_vertex 
 
 /* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale per pixel, meet the plane of the geometric
  * normal. */
-static bool pixel_footprint(const struct camera *camera, const struct full_path_path *x, mat2 *j)
+static bool pixel_footprint(const struct camera *camera, const struct full_path *x, mat2 *j)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
 	const struct surface_point *at = &x->v[x->edges - 1].x;
@@ -86,7 +86,7 @@ struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit)
 	return s;
 }
 
-void halfvec_steps(const struct path_context *c, const struct full_path_path *x, const struct constraint *k, unsigned b,
+void halfvec_steps(const struct path_context *c, const struct full_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step)
 {
 	const struct camera *camera = &c->w->camera;

@@ -28,7 +28,7 @@ double halfvec_lobe_width(const struct path_vertex *v);
 
 /* For those vertices among c_end+1..b-1 that are not specular (the others are not written), from their constraints.
  * All vertices together move the image by at most halfvec_film_step. */
-void halfvec_steps(const struct path_context *c, const struct full_path_path *x, const struct constraint *k, unsigned b,
+void halfvec_steps(const struct path_context *c, const struct full_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step);
 
 /* The step for E = e (any finite entries), `scale` pixels and at most `limit` (> 0). */

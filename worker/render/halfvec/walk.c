@@ -23,7 +23,7 @@ struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 /* The state of a walk. Predictions start from the kept state only, so a rejected trial leaves nothing to undo. */
 struct walk {
 	struct path_context *c;
-	struct full_path_path *y; /* the trial */
+	struct full_path *y; /* the trial */
 	unsigned b, end;
 	const struct walk_target *target;
 	const struct constraint_solver *solver;
@@ -39,12 +39,12 @@ static uint64_t bit(unsigned i)
 	return (uint64_t)1 << i;
 }
 
-static bool light_above(const struct full_path_path *y, unsigned j)
+static bool light_above(const struct full_path *y, unsigned j)
 {
 	return vec3_dot(y->v[j].x.ng, y->edge[j - 1].w) < 0;
 }
 
-static bool mode_holds(const struct full_path_path *y, unsigned j)
+static bool mode_holds(const struct full_path *y, unsigned j)
 {
 	return full_path_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
 }
@@ -92,7 +92,7 @@ static enum walk_end put_back(struct walk *m, unsigned j, double step)
 
 static enum walk_end trial(struct walk *m, double step)
 {
-	struct full_path_path *y = m->y;
+	struct full_path *y = m->y;
 	m->seen = 0;
 	for (unsigned j = m->b - 1;; j--) {
 		if (j > m->end) {
@@ -148,7 +148,7 @@ static enum walk_end accept_trial(struct walk *m, bool factored)
 
 static enum walk_end start(struct walk *m)
 {
-	struct full_path_path *y = m->y;
+	struct full_path *y = m->y;
 	for (unsigned e = m->end; e < m->b; e++)
 		if (!full_path_join(y, e))
 			return WALK_SINGULAR;
@@ -231,7 +231,7 @@ static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, u
 	return last == WALK_OK ? WALK_ITERATIONS : last;
 }
 
-enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 				const struct walk_target *target, bool visible, const struct walk_limits *limits,
 				unsigned stale, struct walk_scratch *s)
 {
@@ -258,7 +258,7 @@ enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y
 	return WALK_OK;
 }
 
-enum walk_end halfvec_walk(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   struct walk_scratch *s)
 {

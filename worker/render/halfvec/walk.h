@@ -55,14 +55,14 @@ struct walk_scratch {
  * reverse walk. visible: a reverse walk, whose edges the caller knows to be unoccluded. On failure y's vertices
  * c+1..b-1 are undefined. Cached values of f there are dropped. A reverse walk decides reliably whether it finds the
  * path again if its tolerances are tighter than those of the forward walk (scale 0.1: 0.2 more iterations, no rays). */
-enum walk_end halfvec_walk(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   struct walk_scratch *s);
 
 /* What is stale of s->k and s->system, which belong to the path where the walk starts: nothing; the constraint next
  * to an end that has moved since, and the system; everything. */
 enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
-enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 				const struct walk_target *target, bool visible, const struct walk_limits *limits,
 				unsigned stale, struct walk_scratch *s);
 

@@ -14,8 +14,8 @@
 
 enum { BLOCK_LENGTHS = BLOCK_VERTEX, BLOCK_AROUND };
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
-				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
 	(void)how;
 	struct path_context *c = m->path;
@@ -42,7 +42,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	return STRATEGY_PROPOSED;
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			 enum mutation_direction direction)
 {
 	(void)m, (void)into;

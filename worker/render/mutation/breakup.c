@@ -33,7 +33,7 @@
  * otherwise all are equally good. */
 #define WAVELENGTH_STEP (50.0 / 470)
 
-bool breakup_allows(const struct full_path_path *x, unsigned b, unsigned c)
+bool breakup_allows(const struct full_path *x, unsigned b, unsigned c)
 {
 	unsigned k = x->edges;
 	if (b > k || (b > 0 && b < k && x->v[b].delta))
@@ -52,7 +52,7 @@ static double move_wavelength(const struct path_context *c, double u, double r)
 }
 
 /* Whether a vertex that stays would have to move for another wavelength. */
-static bool holds_wavelength(const struct path_context *c, const struct full_path_path *x, unsigned b, unsigned c_end)
+static bool holds_wavelength(const struct path_context *c, const struct full_path *x, unsigned b, unsigned c_end)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
 		return false;
@@ -62,8 +62,7 @@ static bool holds_wavelength(const struct path_context *c, const struct full_pat
 	return false;
 }
 
-static bool move_emitter(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y,
-			 struct move *move)
+static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, struct full_path *y, struct move *move)
 {
 	const struct path_context *c = m->path;
 	const struct path_vertex *v = &x->v[0];
@@ -112,7 +111,7 @@ static double tolerance_of(const struct mutation_ctx *m, const struct path_verte
 }
 
 /* Steps of the half vectors, and their targets. */
-static void aim(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x)
+static void aim(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x)
 {
 	struct mutation_scratch *s = &m->scratch;
 	for (unsigned j = how->c + 1; j < how->b; j++) {
@@ -130,7 +129,7 @@ static void aim(struct mutation_ctx *m, const struct breakup *how, const struct 
 	}
 }
 
-static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
+static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
 			       struct move *move)
 {
 	const struct mutation_scratch *s = &m->scratch;
@@ -143,8 +142,8 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 }
 
 /* What is stale of one path's constraints when the walk to the other starts from it. */
-static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
-			 const struct full_path_path *y)
+static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
+			 const struct full_path *y)
 {
 	if (EFFECT_IS_ON(m->path->w, dispersion) && x->wavelength != y->wavelength)
 		return WALK_STALE;
@@ -155,12 +154,12 @@ static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how
 
 /* The walk from y must lead back to x: otherwise the proposal cannot be reversed, and detailed balance requires
  * rejecting it. */
-static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
-		       const struct full_path_path *y)
+static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path *x,
+		       const struct full_path *y)
 {
 	struct mutation_scratch *s = &m->scratch;
 	unsigned b = how->b, c = how->c;
-	struct full_path_path *back = &s->back;
+	struct full_path *back = &s->back;
 	full_path_copy(back, y, c, b);
 	back->v[b] = x->v[b];
 	back->v[c] = x->v[c];
@@ -192,8 +191,8 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 }
 
 /* Between x_b and x_c by half vectors. */
-static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
-				  struct full_path_path *y, struct move *move)
+static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
+				  struct full_path *y, struct move *move)
 {
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
@@ -218,13 +217,13 @@ static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *
 	return leads_back(m, how, x, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_REVERSE;
 }
 
-static enum strategy_counter join(struct mutation_ctx *m, unsigned e, struct full_path_path *y)
+static enum strategy_counter join(struct mutation_ctx *m, unsigned e, struct full_path *y)
 {
 	return full_path_join(y, e) && full_path_visible(m->path, y, e) ? STRATEGY_PROPOSED : STRATEGY_FAIL_BLOCKED;
 }
 
 /* How x_j scatters now that its neighbours have moved. */
-static bool set_mode(struct full_path_path *y, unsigned j)
+static bool set_mode(struct full_path *y, unsigned j)
 {
 	if (j == 0 || j == y->edges)
 		return true;
@@ -232,8 +231,8 @@ static bool set_mode(struct full_path_path *y, unsigned j)
 	return y->v[j].mode != 0;
 }
 
-enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
-				      struct full_path_path *y, struct move *move)
+enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
+				      struct full_path *y, struct move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges, b = how->b, c_end = b > 0 ? how->c : 0;
@@ -265,7 +264,7 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 }
 
 /* Cosines, distances and Jacobians that do not cancel between f and T, by sec. 5: one geometric normal, at x_{b-1}. */
-static double log_geometry(const struct path_context *c, const struct full_path_path *x, unsigned b, unsigned c_end)
+static double log_geometry(const struct path_context *c, const struct full_path *x, unsigned b, unsigned c_end)
 {
 	if (b == 0 || b == c_end)
 		return 0;
@@ -276,7 +275,7 @@ static double log_geometry(const struct path_context *c, const struct full_path_
 	return log_g + log(fabs(vec3_dot(x->v[b].x.sh.n, e->w)));
 }
 
-double breakup_log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction)
 {
 	const struct path_context *c = m->path;

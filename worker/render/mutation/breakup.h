@@ -19,12 +19,12 @@ struct breakup {
 };
 
 /* See mutation.h. On success everything is set but the share of move->log_density[Y_TO_X] for the choice of b and c. */
-enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
-				      struct full_path_path *y, struct move *move);
-double breakup_log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
+				      struct full_path *y, struct move *move);
+double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction);
 
 /* x_b and x_c may not be exactly specular, and c < b (unless b = 0). */
-bool breakup_allows(const struct full_path_path *x, unsigned b, unsigned c);
+bool breakup_allows(const struct full_path *x, unsigned b, unsigned c);
 
 #endif

@@ -11,7 +11,7 @@ static double roughness(const struct path_vertex *v)
 
 /* P(b = i) ~ a_i, 0.1 for both ends. If all inner vertices are specular, or x_k has only the emitter beside it, half
  * vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
-static void weigh_b(const struct path_context *c, const struct full_path_path *x, double *weight)
+static void weigh_b(const struct path_context *c, const struct full_path *x, double *weight)
 {
 	unsigned k = x->edges;
 	bool any = false;
@@ -24,7 +24,7 @@ static void weigh_b(const struct path_context *c, const struct full_path_path *x
 }
 
 /* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2; a of the emitter is 1, the scene's diameter is used for infinity. */
-static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
+static void weigh_c(const struct path_context *c, const struct full_path *x, unsigned b, double *weight)
 {
 	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity for a
 	 * pinhole. */

@@ -12,9 +12,9 @@
 struct heuristic {
 	const char *name;
 	/* weight[0..k], not normalised; 0: never chosen. */
-	void (*weigh_b)(const struct path_context *c, const struct full_path_path *x, double *weight);
+	void (*weigh_b)(const struct path_context *c, const struct full_path *x, double *weight);
 	/* weight[0..b-1]. */
-	void (*weigh_c)(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight);
+	void (*weigh_c)(const struct path_context *c, const struct full_path *x, unsigned b, double *weight);
 };
 
 /* By roughness, as in the paper. A specular vertex is never x_b or x_c. */

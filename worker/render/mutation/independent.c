@@ -31,8 +31,8 @@ static unsigned technique_count(unsigned edges)
 	return edges == 1 ? 1 : edges + 1;
 }
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
-				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
 	(void)how, (void)x;
 	struct path_context *c = m->path;
@@ -49,7 +49,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	return full_path_from_subpaths(c, s, k, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_DARK;
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			 enum mutation_direction direction)
 {
 	(void)move, (void)direction;

@@ -4,7 +4,7 @@
 #include "worker/render/world/effects_text.h"
 
 /* Any vertex that is not specular is suitable: even x_{k-1}, which another x_k sees at another film point. */
-static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
+static void weigh_c(const struct path_context *c, const struct full_path *x, unsigned b, double *weight)
 {
 	(void)c;
 	for (unsigned i = 0; i < b; i++)
@@ -14,8 +14,8 @@ static void weigh_c(const struct path_context *c, const struct full_path_path *x
 static const struct heuristic any_end = {"any", NULL, weigh_c};
 static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRAWN, .aperture = true};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
-				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, aperture))
 		return STRATEGY_FAIL_INAPPLICABLE;

@@ -43,7 +43,7 @@ struct mutation_scratch {
 	struct walk_target target[FULL_PATH_MAX_VERTICES];
 	double weight[FULL_PATH_MAX_VERTICES];
 	vec2 dh[FULL_PATH_MAX_VERTICES];
-	struct full_path_path back;
+	struct full_path back;
 };
 
 struct mutation_ctx {
@@ -62,9 +62,9 @@ struct mutation_ops {
 	/* STRATEGY_PROPOSED: y is complete, and all its rays have been cast. Otherwise the reason, and y's vertices
 	 * first..last are undefined. */
 	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how,
-					 struct full_path_path *x, struct full_path_path *y, struct move *move);
+					 struct full_path *x, struct full_path *y, struct move *move);
 	/* The weight of y for X_TO_Y, of x for Y_TO_X. -INFINITY: black. */
-	double (*log_weight)(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);
 };
 

@@ -10,7 +10,7 @@
 /* Probability of tracing only, relative to that of one vertex that can be joined. */
 #define TRACE_WEIGHT 0.1
 
-static void weigh_b(const struct path_context *c, const struct full_path_path *x, double *weight)
+static void weigh_b(const struct path_context *c, const struct full_path *x, double *weight)
 {
 	unsigned k = x->edges;
 	weight[0] = path_can_be_hit(c, &x->v[0]) ? TRACE_WEIGHT : 0;
@@ -19,7 +19,7 @@ static void weigh_b(const struct path_context *c, const struct full_path_path *x
 	weight[k] = 0;
 }
 
-static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
+static void weigh_c(const struct path_context *c, const struct full_path *x, unsigned b, double *weight)
 {
 	(void)c, (void)x;
 	for (unsigned i = 0; i < b; i++)
@@ -30,8 +30,8 @@ static const struct heuristic join = {"join", weigh_b, weigh_c};
 static const struct strategy strategy = {
 	&join, STRATEGY_DRAWN, STRATEGY_DRAWN, .wavelength = true, .aperture = true, .emitter = true};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
-				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
 	return strategy_propose(&strategy, m, how, x, y, move);
 }

@@ -13,7 +13,7 @@ static unsigned fixed_b(int b, unsigned k)
 
 /* Probabilities of b: weights of the heuristic, without what the strategy cannot use. */
 static void weigh_b(const struct strategy *s, const struct choice *forced, const struct mutation_ctx *m,
-		    const struct full_path_path *x, double *weight)
+		    const struct full_path *x, double *weight)
 {
 	s->heuristic->weigh_b(m->path, x, weight);
 	if (forced->c >= 0)
@@ -23,7 +23,7 @@ static void weigh_b(const struct strategy *s, const struct choice *forced, const
 
 /* log P(b) P(c | b) of x by the heuristic; forced choices have probability 1. -INFINITY: never chosen. */
 static double log_choice(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
-			 const struct full_path_path *x, unsigned b, unsigned c)
+			 const struct full_path *x, unsigned b, unsigned c)
 {
 	double *weight = m->scratch.weight, p = 1;
 	if (forced->b == STRATEGY_DRAWN) {
@@ -38,7 +38,7 @@ static double log_choice(const struct strategy *s, const struct choice *forced, 
 }
 
 static bool choose(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
-		   const struct full_path_path *x, struct breakup *out)
+		   const struct full_path *x, struct breakup *out)
 {
 	double *weight = m->scratch.weight, r[4];
 	unsigned k = x->edges;
@@ -67,8 +67,8 @@ static bool choose(const struct strategy *s, const struct choice *forced, struct
 }
 
 enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m,
-				       const struct mutation_setting *how, struct full_path_path *x,
-				       struct full_path_path *y, struct move *move)
+				       const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				       struct move *move)
 {
 	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};

@@ -8,7 +8,7 @@
 /* Minimum sine of the angle between the line and both normals, to be able to align frames by it. */
 #define LEAST_PROJECTION 1e-3
 
-bool trace_move_aperture(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y)
+bool trace_move_aperture(struct mutation_ctx *m, const struct full_path *x, struct full_path *y)
 {
 	const struct camera *camera = &m->path->w->camera;
 	double u[2], r[4];
@@ -20,8 +20,7 @@ bool trace_move_aperture(struct mutation_ctx *m, const struct full_path_path *x,
 	return true;
 }
 
-static bool move_film(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y,
-		      struct move *move)
+static bool move_film(struct mutation_ctx *m, const struct full_path *x, struct full_path *y, struct move *move)
 {
 	double r[4], g[2], sigma = halfvec_film_step(&m->path->w->camera);
 	mutation_random(m, BLOCK_FILM, r);
@@ -71,7 +70,7 @@ static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 }
 
 /* The direction in which the path continues from y_j. */
-static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path_path *x, struct full_path_path *y,
+static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path *x, struct full_path *y,
 		       struct move *move, vec3 *d)
 {
 	const struct path_vertex *from = &x->v[j];
@@ -114,8 +113,8 @@ static enum strategy_counter arrive(struct path_context *c, unsigned b, struct p
 	return path_can_be_hit(c, v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_EMITTER;
 }
 
-enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path_path *x,
-				  struct full_path_path *y, struct move *move)
+enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
+				  struct full_path *y, struct move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges;

@@ -8,7 +8,7 @@
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .wavelength = true};
 
-static bool must_move(const struct full_path_path *x)
+static bool must_move(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
 		if (x->v[j].delta && x->v[j].bsdf->dispersive)
@@ -16,8 +16,8 @@ static bool must_move(const struct full_path_path *x)
 	return false;
 }
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
-				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, colour))
 		return STRATEGY_FAIL_INAPPLICABLE;

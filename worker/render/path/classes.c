@@ -8,7 +8,7 @@ static bool is_smooth(const struct path_vertex *v)
 	return v->bsdf->alpha_mean < PATH_CLASS_ALPHA;
 }
 
-unsigned path_class_whole(const struct full_path_path *x)
+unsigned path_class_whole(const struct full_path *x)
 {
 	enum path_class_kind kind = PATH_NO_VERTEX;
 	for (unsigned j = x->edges - 1; j > 0; j--)

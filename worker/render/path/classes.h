@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-unsigned path_class_whole(const struct full_path_path *x);
+unsigned path_class_whole(const struct full_path *x);
 
 /* Classes of all paths that one pair of sub-paths makes, and what these carry. */
 struct classes {

@@ -91,7 +91,7 @@ void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensem
 	gather(c, camera, light, n->capped, NULL, out);
 }
 
-bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path_path *x)
+bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path *x)
 {
 	if (e->count == 0)
 		return false;
@@ -103,7 +103,7 @@ bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u,
 }
 
 /* Contribution over density of going on from beta across edge e to a vertex of density pdf, by scattering f at `at`. */
-static spectrum carry(const struct full_path_path *x, spectrum beta, spectrum f, unsigned at, unsigned e, double pdf)
+static spectrum carry(const struct full_path *x, spectrum beta, spectrum f, unsigned at, unsigned e, double pdf)
 {
 	const struct path_vertex *v = &x->v[at];
 	const struct full_path_edge *g = &x->edge[e];
@@ -121,7 +121,7 @@ static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned ver
 }
 
 /* x_k .. x_{k-t+1} as the camera's sub-path; t >= 2. */
-static void put_camera(struct path_context *c, struct sampler *s, struct full_path_path *x, unsigned t)
+static void put_camera(struct path_context *c, struct sampler *s, struct full_path *x, unsigned t)
 {
 	unsigned k = x->edges;
 	struct path_vertex *v = c->camera;
@@ -139,7 +139,7 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 }
 
 /* x_0 .. x_{s-1} as the light's sub-path; s >= 2. */
-static void put_light(struct path_context *c, struct sampler *s_numbers, struct full_path_path *x, unsigned s)
+static void put_light(struct path_context *c, struct sampler *s_numbers, struct full_path *x, unsigned s)
 {
 	struct path_vertex *v = c->light;
 	for (unsigned i = 0; i < s; i++) {
@@ -177,7 +177,7 @@ static const double *pinned_block(struct sampler *base, enum sampler_side side, 
 	return p->block;
 }
 
-static unsigned walk_camera(struct path_context *c, struct sampler *s, const struct full_path_path *x, unsigned most)
+static unsigned walk_camera(struct path_context *c, struct sampler *s, const struct full_path *x, unsigned most)
 {
 	struct pinned_sampler pinned = {.base = {pinned_block}, .under = s, .wavelength = x->wavelength};
 	double film[2];
@@ -213,7 +213,7 @@ static unsigned choose_technique(const double *log_pdf, unsigned k, double log_s
 	return s;
 }
 
-void ensemble_around(struct path_context *c, struct sampler *sampler, struct full_path_path *x, const double u[3],
+void ensemble_around(struct path_context *c, struct sampler *sampler, struct full_path *x, const double u[3],
 		     struct ensemble *out)
 {
 	unsigned k = x->edges;

@@ -36,10 +36,10 @@ struct ensemble_lengths ensemble_all_lengths(const struct path_context *c);
 /* Draws a pair of sub-paths into c and gathers its candidates. */
 void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensemble_lengths *n, struct ensemble *out);
 /* A pair among whose candidates x is. u: three numbers in [0,1), for the technique and the lengths. */
-void ensemble_around(struct path_context *c, struct sampler *s, struct full_path_path *x, const double u[3],
+void ensemble_around(struct path_context *c, struct sampler *s, struct full_path *x, const double u[3],
 		     struct ensemble *out);
 
 /* The candidate that u in [0,1) chooses, as a path; only right after ensemble_draw. false: there is none. */
-bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path_path *x);
+bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path *x);
 
 #endif

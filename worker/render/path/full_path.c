@@ -38,7 +38,7 @@ void product_mul(struct product *p, spectrum f)
 	p->exponent += bring_near_one(&p->v);
 }
 
-static void to_xyz(const struct path_context *c, const struct full_path_path *x, spectrum l, double xyz[3])
+static void to_xyz(const struct path_context *c, const struct full_path *x, spectrum l, double xyz[3])
 {
 	l = path_collapse(l, full_path_is_dispersed(c, x));
 	if (!EFFECT_IS_ON(c->w, colour))
@@ -48,14 +48,14 @@ static void to_xyz(const struct path_context *c, const struct full_path_path *x,
 		spectrum_to_xyz(l, &x->wl, xyz);
 }
 
-double product_log_intensity(const struct path_context *c, const struct full_path_path *x, const struct product *p)
+double product_log_intensity(const struct path_context *c, const struct full_path *x, const struct product *p)
 {
 	double xyz[3];
 	to_xyz(c, x, p->v, xyz);
 	return log(xyz[0] + xyz[1] + xyz[2]) + M_LN2 * p->exponent;
 }
 
-bool full_path_join(struct full_path_path *x, unsigned e)
+bool full_path_join(struct full_path *x, unsigned e)
 {
 	struct path_vertex *light = &x->v[e];
 	x->edge[e].w = path_direction(light, &x->v[e + 1], &x->edge[e].distance2);
@@ -63,7 +63,7 @@ bool full_path_join(struct full_path_path *x, unsigned e)
 	return x->edge[e].distance2 > 0;
 }
 
-unsigned full_path_mode(const struct full_path_path *x, unsigned j)
+unsigned full_path_mode(const struct full_path *x, unsigned j)
 {
 	const struct surface_point *s = &x->v[j].x;
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
@@ -73,7 +73,7 @@ unsigned full_path_mode(const struct full_path_path *x, unsigned j)
 	return no * ni > 0 ? BSDF_REFLECT : BSDF_TRANSMIT;
 }
 
-double full_path_eta(const struct full_path_path *x, unsigned j)
+double full_path_eta(const struct full_path *x, unsigned j)
 {
 	const struct path_vertex *v = &x->v[j];
 	if (!(v->mode & BSDF_TRANSMIT))
@@ -82,14 +82,14 @@ double full_path_eta(const struct full_path_path *x, unsigned j)
 	return vec3_dot(v->x.sh.n, x->edge[j].w) > 0 ? 1 / eta : eta;
 }
 
-spectrum full_path_specular(const struct full_path_path *x, unsigned j, vec3 *wi, double *chance)
+spectrum full_path_specular(const struct full_path *x, unsigned j, vec3 *wi, double *chance)
 {
 	const struct path_vertex *v = &x->v[j];
 	struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_RADIANCE);
 	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, chance);
 }
 
-static spectrum scatter(const struct full_path_path *x, unsigned j, bool halfvec)
+static spectrum scatter(const struct full_path *x, unsigned j, bool halfvec)
 {
 	const struct path_vertex *v = &x->v[j];
 	if (!full_path_mode(x, j))
@@ -105,7 +105,7 @@ static spectrum scatter(const struct full_path_path *x, unsigned j, bool halfvec
 	return halfvec ? bsdf_eval_halfvec(v->bsdf, &p, wo, wi) : v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
 }
 
-spectrum full_path_f(const struct path_context *c, struct full_path_path *x, unsigned j)
+spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j)
 {
 	if (!vertex_set_has(&x->known_f, j)) {
 		x->f[j] = j > 0 ? scatter(x, j, false) : path_emitted(c, &x->v[0], x->edge[0].w, &x->wl);
@@ -114,7 +114,7 @@ spectrum full_path_f(const struct path_context *c, struct full_path_path *x, uns
 	return x->f[j];
 }
 
-spectrum full_path_fh(const struct path_context *c, struct full_path_path *x, unsigned j)
+spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j)
 {
 	(void)c;
 	if (!vertex_set_has(&x->known_fh, j)) {
@@ -124,7 +124,7 @@ spectrum full_path_fh(const struct path_context *c, struct full_path_path *x, un
 	return x->fh[j];
 }
 
-double full_path_specular_miss(const struct full_path_path *x, unsigned j)
+double full_path_specular_miss(const struct full_path *x, unsigned j)
 {
 	vec3 wi;
 	double chance;
@@ -153,14 +153,14 @@ static void take_range(struct vertex_set *to, const struct vertex_set *from, uns
 
 static const struct vertex_set NONE = {{0}};
 
-void full_path_forget(struct full_path_path *x, unsigned first, unsigned last)
+void full_path_forget(struct full_path *x, unsigned first, unsigned last)
 {
 	unsigned from = first > 0 ? first - 1 : 0, to = last < FULL_PATH_MAX_EDGES ? last + 1 : last;
 	take_range(&x->known_f, &NONE, from, to);
 	take_range(&x->known_fh, &NONE, from, to);
 }
 
-void full_path_set_wavelength(const struct path_context *c, struct full_path_path *x, double u)
+void full_path_set_wavelength(const struct path_context *c, struct full_path *x, double u)
 {
 	x->wavelength = u;
 	x->known_f = x->known_fh = NONE;
@@ -170,7 +170,7 @@ void full_path_set_wavelength(const struct path_context *c, struct full_path_pat
 		x->wl.grey = true;
 }
 
-bool full_path_is_dispersed(const struct path_context *c, const struct full_path_path *x)
+bool full_path_is_dispersed(const struct path_context *c, const struct full_path *x)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
@@ -180,7 +180,7 @@ bool full_path_is_dispersed(const struct path_context *c, const struct full_path
 	return false;
 }
 
-void full_path_copy(struct full_path_path *to, const struct full_path_path *from, unsigned first, unsigned last)
+void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last)
 {
 	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0,
 		 edge_end = last < from->edges ? last + 1 : from->edges;
@@ -204,12 +204,12 @@ void full_path_copy(struct full_path_path *to, const struct full_path_path *from
 	take_range(&to->known_fh, &from->known_fh, edge, last_cached);
 }
 
-bool full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e)
+bool full_path_visible(struct path_context *c, const struct full_path *x, unsigned e)
 {
 	return path_visible(c, &x->v[e + 1], &x->v[e]);
 }
 
-bool whole_film(const struct path_context *c, struct full_path_path *x)
+bool whole_film(const struct path_context *c, struct full_path *x)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
 	vec3 d = vec3_neg(e->w);
@@ -226,7 +226,7 @@ bool whole_film(const struct path_context *c, struct full_path_path *x)
 }
 
 /* Vertex i of the path from vertex `from` of a sub-path; its scattering there still holds when `left` says so. */
-static void take_vertex(struct full_path_path *x, unsigned i, const struct path_vertex *from, bool left)
+static void take_vertex(struct full_path *x, unsigned i, const struct path_vertex *from, bool left)
 {
 	x->v[i] = *from;
 	if (!left) {
@@ -236,14 +236,14 @@ static void take_vertex(struct full_path_path *x, unsigned i, const struct path_
 }
 
 /* The emitter's point, drawn or hit, as the path's first vertex. */
-static void take_emitter(struct full_path_path *x, const struct path_vertex *from)
+static void take_emitter(struct full_path *x, const struct path_vertex *from)
 {
 	take_vertex(x, 0, from, false);
 	if (x->v[0].kind == VERTEX_SURFACE)
 		x->v[0].kind = VERTEX_EMITTER;
 }
 
-bool full_path_finish(const struct path_context *c, struct full_path_path *x)
+bool full_path_finish(const struct path_context *c, struct full_path *x)
 {
 	x->known_f = x->known_fh = NONE;
 	for (unsigned e = 0; e < x->edges; e++)
@@ -264,7 +264,7 @@ bool full_path_finish(const struct path_context *c, struct full_path_path *x)
 	return true;
 }
 
-bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path_path *x)
+bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path *x)
 {
 	unsigned t = edges + 1 - s;
 	assert(edges <= FULL_PATH_MAX_EDGES && t >= 1);
@@ -296,7 +296,7 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 	return full_path_finish(c, x) && (s == 0 || full_path_visible(c, x, s - 1));
 }
 
-void full_path_colour(const struct path_context *c, struct full_path_path *x, double xyz[3])
+void full_path_colour(const struct path_context *c, struct full_path *x, double xyz[3])
 {
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < x->edges; j++)

@@ -40,7 +40,7 @@ struct full_path_edge {	  /* v[e] - v[e + 1] */
 	double distance2; /* 1 where v[0] lies at infinity */
 };
 
-struct full_path_path {
+struct full_path {
 	unsigned edges; /* k; 0: no path */
 	struct wavelengths wl;
 	double wavelength; /* the number in [0,1) that wl was made of */
@@ -60,53 +60,53 @@ struct product {
 #define PRODUCT_ONE ((struct product){{{1, 1, 1, 1}}, 0})
 void product_mul(struct product *p, spectrum f);
 /* log(X + Y + Z) of what the film gets of it; -INFINITY for black. */
-double product_log_intensity(const struct path_context *c, const struct full_path_path *x, const struct product *p);
+double product_log_intensity(const struct path_context *c, const struct full_path *x, const struct product *p);
 
 /* Edge e from the positions of its ends, and to_prev of v[e]. false: the ends coincide. */
-bool full_path_join(struct full_path_path *x, unsigned e);
+bool full_path_join(struct full_path *x, unsigned e);
 
 /* What kind of scattering the directions o_j, i_j mean: BSDF_REFLECT or BSDF_TRANSMIT by the sides of both normals; 0:
  * the two normals disagree about a side, nothing scatters. */
-unsigned full_path_mode(const struct full_path_path *x, unsigned j);
+unsigned full_path_mode(const struct full_path *x, unsigned j);
 
 /* n_o / n_i at v[j]: index on the camera's side over that on the light's; 1 where it reflects. */
-double full_path_eta(const struct full_path_path *x, unsigned j);
+double full_path_eta(const struct full_path *x, unsigned j);
 
 /* v[0]: L_e towards v[1]. Inner vertices: f_radiance(o, i) without cosine, or the weight of the lobe where specular.
  * Computed when asked for the first time. */
-spectrum full_path_f(const struct path_context *c, struct full_path_path *x, unsigned j);
+spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j);
 /* Inner vertices: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the weight of the lobe where specular. */
-spectrum full_path_fh(const struct path_context *c, struct full_path_path *x, unsigned j);
+spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j);
 /* The vertices first..last are about to change: what was known of them and of their neighbours no longer holds. */
-void full_path_forget(struct full_path_path *x, unsigned first, unsigned last);
+void full_path_forget(struct full_path *x, unsigned first, unsigned last);
 /* The exactly specular lobe of v[j]'s mode seen along o_j, as bsdf_eval_delta has it: its weight, its direction in the
  * shading frame, the probability with which it is chosen. */
-spectrum full_path_specular(const struct full_path_path *x, unsigned j, vec3 *wi, double *chance);
+spectrum full_path_specular(const struct full_path *x, unsigned j, vec3 *wi, double *chance);
 /* By how far i_j is from where the exactly specular lobe of v[j]'s mode sends o_j; INFINITY: there is no such lobe. */
-double full_path_specular_miss(const struct full_path_path *x, unsigned j);
-void full_path_set_wavelength(const struct path_context *c, struct full_path_path *x, double u);
+double full_path_specular_miss(const struct full_path *x, unsigned j);
+void full_path_set_wavelength(const struct path_context *c, struct full_path *x, double u);
 /* Some vertex disperses: the path carries its hero wavelength alone. */
-bool full_path_is_dispersed(const struct path_context *c, const struct full_path_path *x);
+bool full_path_is_dispersed(const struct path_context *c, const struct full_path *x);
 
 /* Vertices first..last with their edges and caches, and what belongs to the path as a whole. */
-void full_path_copy(struct full_path_path *to, const struct full_path_path *from, unsigned first, unsigned last);
+void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last);
 
 /* Nothing lies between v[e] and v[e + 1]. Counts a ray. */
-bool full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
+bool full_path_visible(struct path_context *c, const struct full_path *x, unsigned e);
 
 /* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
-bool whole_film(const struct path_context *c, struct full_path_path *x);
+bool whole_film(const struct path_context *c, struct full_path *x);
 
 /* Everything that follows from the vertices: edges, modes (those of specular vertices are given), film point,
  * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray.
  */
-bool full_path_finish(const struct path_context *c, struct full_path_path *x);
+bool full_path_finish(const struct path_context *c, struct full_path *x);
 
 /* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with
  * everything cached. Casts the connecting ray. false: there is none, or it is black. */
-bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path_path *x);
+bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path *x);
 
 /* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
-void full_path_colour(const struct path_context *c, struct full_path_path *x, double xyz[3]);
+void full_path_colour(const struct path_context *c, struct full_path *x, double xyz[3]);
 
 #endif

@@ -25,7 +25,7 @@ static bool same_vector(vec3 a, vec3 b)
 	return vec3_dot(d, d) <= CHECK_TOLERANCE * CHECK_TOLERANCE * fmax(vec3_dot(b, b), 1);
 }
 
-static bool check_edges(struct path_context *c, const struct full_path_path *x, char *text, size_t size)
+static bool check_edges(struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
 	for (unsigned e = 0; e < x->edges; e++) {
 		double distance2;
@@ -46,7 +46,7 @@ static bool check_edges(struct path_context *c, const struct full_path_path *x, 
 /* The specular direction is met as exactly as walks do. */
 #define SPECULAR_TOLERANCE 1e-6
 
-static bool check_specular(const struct full_path_path *x, unsigned j, char *text, size_t size)
+static bool check_specular(const struct full_path *x, unsigned j, char *text, size_t size)
 {
 	double miss = full_path_specular_miss(x, j);
 	if (miss > SPECULAR_TOLERANCE)
@@ -54,9 +54,9 @@ static bool check_specular(const struct full_path_path *x, unsigned j, char *tex
 	return miss <= SPECULAR_TOLERANCE;
 }
 
-static bool check_vertices(const struct path_context *c, const struct full_path_path *x, char *text, size_t size)
+static bool check_vertices(const struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
-	struct full_path_path fresh = *x;
+	struct full_path fresh = *x;
 	fresh.known_f = fresh.known_fh = (struct vertex_set){{0}};
 	for (unsigned j = 0; j < x->edges; j++) {
 		const struct path_vertex *v = &x->v[j];
@@ -85,13 +85,13 @@ static bool check_vertices(const struct path_context *c, const struct full_path_
 /* Seen from the camera: a ray that meets a triangle in float and just misses it in double ends on its edge. */
 #define FILM_TOLERANCE 0x1p-22
 
-bool path_check(struct path_context *c, const struct full_path_path *x, char *text, size_t size)
+bool path_check(struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
 	if (x->edges < 1 || x->edges > FULL_PATH_MAX_EDGES) {
 		snprintf(text, size, "%u edges", x->edges);
 		return false;
 	}
-	struct full_path_path film = *x;
+	struct full_path film = *x;
 	double off = fmax(1e-6, FILM_TOLERANCE * c->w->camera.scale);
 	if (!whole_film(c, &film) || hypot(film.film[0] - x->film[0], film.film[1] - x->film[1]) > off) {
 		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], film.film[0],

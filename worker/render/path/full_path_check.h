@@ -7,6 +7,6 @@
 
 /* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for
  * states that come from outside. */
-bool path_check(struct path_context *c, const struct full_path_path *x, char *text, size_t size);
+bool path_check(struct path_context *c, const struct full_path *x, char *text, size_t size);
 
 #endif

@@ -5,7 +5,7 @@
 
 #include "worker/render/path/measure.h"
 
-double full_path_log_f(const struct path_context *c, struct full_path_path *x)
+double full_path_log_f(const struct path_context *c, struct full_path *x)
 {
 	unsigned k = x->edges;
 	struct product p = PRODUCT_ONE;
@@ -28,7 +28,7 @@ double full_path_log_f(const struct path_context *c, struct full_path_path *x)
 }
 
 /* Densities around a specular vertex: of v[j - 1] from the camera's side and v[j + 1] from the light's. */
-static void delta_densities(const struct full_path_path *x, unsigned j, double *to_light, double *to_camera)
+static void delta_densities(const struct full_path *x, unsigned j, double *to_light, double *to_camera)
 {
 	const struct path_vertex *v = &x->v[j];
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w), wi;
@@ -40,7 +40,7 @@ static void delta_densities(const struct full_path_path *x, unsigned j, double *
 	*to_camera = chance * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2;
 }
 
-static void fill_densities(struct path_context *c, struct full_path_path *x)
+static void fill_densities(struct path_context *c, struct full_path *x)
 {
 	unsigned k = x->edges;
 	struct path_vertex *v = x->v;
@@ -66,7 +66,7 @@ static void fill_densities(struct path_context *c, struct full_path_path *x)
 		v[0].pdf = 0;
 }
 
-void full_path_log_techniques(struct path_context *c, struct full_path_path *x, double *log_pdf)
+void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf)
 {
 	unsigned k = x->edges;
 	const struct path_vertex *v = x->v;

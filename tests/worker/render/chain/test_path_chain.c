@@ -64,7 +64,7 @@ static bool same_state(struct chain *a, struct chain *b)
 
 static void check_resume(struct chain *c, struct chain *d)
 {
-	static struct full_path_path x;
+	static struct full_path x;
 	struct chain_state s;
 	char text[200];
 	assert_int_equal(chain_path.save(c, &s), 0);
@@ -126,7 +126,7 @@ static void change(struct chain_state *s, struct dice *dice, int i)
 /* Every byte may be anything: refused, unless it is the last bits of a number that moved. */
 static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 {
-	static struct full_path_path x;
+	static struct full_path x;
 	struct chain_state s;
 	size_t refused = 0;
 	char text[200];
@@ -249,7 +249,7 @@ static struct world *on_floor(double floor)
 }
 
 /* Read back: the same path, point for point. */
-static void check_same_path(const struct full_path_path *x, const struct full_path_path *y)
+static void check_same_path(const struct full_path *x, const struct full_path *y)
 {
 	assert_int_equal(x->edges, y->edges);
 	for (unsigned j = 1; j < x->edges; j++) {
@@ -265,7 +265,7 @@ static void check_same_path(const struct full_path_path *x, const struct full_pa
  * resumes from what it saved. */
 static void check_scale(double floor)
 {
-	static struct full_path_path x, y;
+	static struct full_path x, y;
 	struct chain *c = test_malloc(chain_path.size);
 	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};

@@ -17,7 +17,7 @@ enum hand_uv { HAND_UV_NONE, HAND_UV, HAND_UV_DEGENERATE };
 
 struct hand {
 	struct world w;
-	struct full_path_path x;
+	struct full_path x;
 	struct geom_shape shape[FULL_PATH_MAX_VERTICES];
 	struct bsdf bsdf[FULL_PATH_MAX_VERTICES];
 	float position[FULL_PATH_MAX_VERTICES][3][3], normal[FULL_PATH_MAX_VERTICES][3][3],

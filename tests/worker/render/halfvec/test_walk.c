@@ -114,7 +114,7 @@ static wide direction(const struct path_vertex *a, const struct path_vertex *b)
 }
 
 /* The half vector at vertex j; also whether the vertex lies on its shape and scatters in its mode. */
-static void measure(const struct world *w, const struct full_path_path *y, unsigned j, long double h[2])
+static void measure(const struct world *w, const struct full_path *y, unsigned j, long double h[2])
 {
 	const struct path_vertex *v = &y->v[j];
 	wide p, n, s, i = direction(v, &y->v[j - 1]), o = direction(v, &y->v[j + 1]);
@@ -141,7 +141,7 @@ static struct ray_end end_of(const struct path_vertex *v)
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
-static bool occluded(const struct world *w, const struct full_path_path *y, unsigned e)
+static bool occluded(const struct world *w, const struct full_path *y, unsigned e)
 {
 	struct ray_end a = end_of(&y->v[e + 1]), b = end_of(&y->v[e]);
 	if (y->v[e].kind == VERTEX_INFINITE)
@@ -168,7 +168,7 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 }
 
 /* The camera's sub-path as a whole path. false: too short to have inner vertices. */
-static bool draw_path(struct path_context *c, uint64_t seed, uint64_t i, struct full_path_path *x)
+static bool draw_path(struct path_context *c, uint64_t seed, uint64_t i, struct full_path *x)
 {
 	struct sampler_random s;
 	double film[2];
@@ -194,7 +194,7 @@ static double gauss(struct dice *d)
 }
 
 /* Moves x_b where the ray from the vertex before it, turned a little, meets the same material. */
-static void move_end(struct path_context *c, struct dice *d, struct full_path_path *y, unsigned b)
+static void move_end(struct path_context *c, struct dice *d, struct full_path *y, unsigned b)
 {
 	if (b == y->edges)
 		return;
@@ -212,7 +212,7 @@ static void move_end(struct path_context *c, struct dice *d, struct full_path_pa
 }
 
 /* Steps as mutations make them: the width of the lobe, or what moves the vertex by some hundredth of its distance. */
-static double step_of(const struct full_path_path *x, const struct constraint *k, unsigned j)
+static double step_of(const struct full_path *x, const struct constraint *k, unsigned j)
 {
 	if (x->v[j].delta)
 		return 0;
@@ -220,7 +220,7 @@ static double step_of(const struct full_path_path *x, const struct constraint *k
 	return fmin(alpha / sqrt(M_PI), reach * sqrt(mat2_norm2(k[j].b)));
 }
 
-static void check_residuals(const struct world *w, const struct full_path_path *y, unsigned b, unsigned end,
+static void check_residuals(const struct world *w, const struct full_path *y, unsigned b, unsigned end,
 			    const struct walk_target *target, double scale, struct tally *t)
 {
 	for (unsigned j = end + 1; j < b; j++) {
@@ -234,8 +234,8 @@ static void check_residuals(const struct world *w, const struct full_path_path *
 	}
 }
 
-static void check_arrival(struct path_context *c, const struct full_path_path *x, const struct full_path_path *y,
-			  unsigned b, unsigned end, const struct walk_target *target, double scale, struct tally *t)
+static void check_arrival(struct path_context *c, const struct full_path *x, const struct full_path *y, unsigned b,
+			  unsigned end, const struct walk_target *target, double scale, struct tally *t)
 {
 	check_residuals(c->w, y, b, end, target, scale, t);
 	for (unsigned j = end + 1; j < b; j++) {
@@ -257,10 +257,10 @@ static struct walk_scratch s;
 static struct accuracy_settings accuracy;
 
 /* Back from y to x: x_b and the half vectors of x. */
-static void walk_back(struct path_context *c, const struct full_path_path *x, struct full_path_path *y, unsigned b,
-		      unsigned end, struct walk_target *target, const struct constraint *k, struct tally *t)
+static void walk_back(struct path_context *c, const struct full_path *x, struct full_path *y, unsigned b, unsigned end,
+		      struct walk_target *target, const struct constraint *k, struct tally *t)
 {
-	static struct full_path_path z;
+	static struct full_path z;
 	z = *y;
 	z.v[b] = x->v[b];
 	for (unsigned j = end + 1; j < b; j++)
@@ -285,7 +285,7 @@ static void walk_back(struct path_context *c, const struct full_path_path *x, st
 }
 
 /* Largest distance between the inner vertices. */
-static double apart(const struct full_path_path *x, const struct full_path_path *y, unsigned b, unsigned end)
+static double apart(const struct full_path *x, const struct full_path *y, unsigned b, unsigned end)
 {
 	double most = 0;
 	for (unsigned j = end + 1; j < b; j++)
@@ -294,10 +294,10 @@ static double apart(const struct full_path_path *x, const struct full_path_path 
 }
 
 /* To where it is: one iteration, which moves it by rounding alone. */
-static void walk_nowhere(struct path_context *c, const struct full_path_path *x, unsigned b, unsigned end,
+static void walk_nowhere(struct path_context *c, const struct full_path *x, unsigned b, unsigned end,
 			 struct walk_target *target, const struct constraint *k, struct tally *t)
 {
-	static struct full_path_path y;
+	static struct full_path y;
 	y = *x;
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = k[j].h;
@@ -311,10 +311,10 @@ static void walk_nowhere(struct path_context *c, const struct full_path_path *x,
 
 /* From the same start with half the tolerance: to the same place y, as far as the whole tolerance says where that is.
  */
-static void walk_again(struct path_context *c, const struct full_path_path *start, const struct full_path_path *y,
-		       unsigned b, unsigned end, const struct walk_target *target, struct tally *t)
+static void walk_again(struct path_context *c, const struct full_path *start, const struct full_path *y, unsigned b,
+		       unsigned end, const struct walk_target *target, struct tally *t)
 {
-	static struct full_path_path z;
+	static struct full_path z;
 	z = *start;
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	limits.scale = 0.5;
@@ -326,9 +326,9 @@ static void walk_again(struct path_context *c, const struct full_path_path *star
 		check_residuals(c->w, &z, b, end, target, limits.scale, t);
 }
 
-static void walk_once(struct path_context *c, struct dice *d, const struct full_path_path *x, struct tally *t)
+static void walk_once(struct path_context *c, struct dice *d, const struct full_path *x, struct tally *t)
 {
-	static struct full_path_path y, start;
+	static struct full_path y, start;
 	static struct constraint k[FULL_PATH_MAX_VERTICES];
 	struct walk_target target[FULL_PATH_MAX_VERTICES];
 	unsigned b = 2 + dice_below(d, x->edges - 1), end = dice_below(d, b - 1);
@@ -400,7 +400,7 @@ static void check_rate(size_t hits, size_t of, double expected)
 static struct tally walk_in(const char *name, struct world *w, double arrive, double come_back)
 {
 	static struct path_context c;
-	static struct full_path_path x;
+	static struct full_path x;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	struct tally t = {0};
 	struct dice d = dice_of(name);

@@ -17,7 +17,7 @@
 
 static struct path_context c;
 static uint64_t counters[BATCH_COUNTERS];
-static struct full_path_path x, y;
+static struct full_path x, y;
 static struct walk_scratch s;
 static struct constraint k[FULL_PATH_MAX_VERTICES];
 

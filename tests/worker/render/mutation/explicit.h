@@ -17,7 +17,7 @@
 #define EXPLICIT_HALFVEC 0.01
 
 /* log |n.i| |d omega_i / d h_par| at vertex j by the cosine `n_i`. */
-static inline double explicit_log_turn(const struct full_path_path *x, unsigned j, double n_i)
+static inline double explicit_log_turn(const struct full_path *x, unsigned j, double n_i)
 {
 	vec2 h = halfvec_of(x, j);
 	if (full_path_eta(x, j) == 1 && (x->v[j].mode & BSDF_TRANSMIT)) /* h is (i + o)_xy: its area is |n.i| d omega */
@@ -36,7 +36,7 @@ static inline double explicit_log_gauss(double dx, double dy, double sigma)
 }
 
 /* The half vector of x_j as it is in the frame of y_j (sec. 4), by angles. */
-static inline vec2 explicit_turned(const struct full_path_path *x, const struct full_path_path *y, unsigned j)
+static inline vec2 explicit_turned(const struct full_path *x, const struct full_path *y, unsigned j)
 {
 	vec2 h = halfvec_of(x, j);
 	vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
@@ -49,14 +49,14 @@ static inline vec2 explicit_turned(const struct full_path_path *x, const struct 
 }
 
 /* Arriving at y_j from y_{j+1}: per solid angle to per area. */
-static inline double explicit_log_arrive(const struct full_path_path *y, unsigned j)
+static inline double explicit_log_arrive(const struct full_path *y, unsigned j)
 {
 	return log(path_cosine(&y->v[j], y->edge[j].w) / y->edge[j].distance2);
 }
 
 /* log_choices: of all symmetric choices, those of the film and the traced half vectors. */
-static inline double explicit_log_traced(const struct path_context *c, const struct full_path_path *x,
-					 const struct full_path_path *y, unsigned b, double *log_choices)
+static inline double explicit_log_traced(const struct path_context *c, const struct full_path *x,
+					 const struct full_path *y, unsigned b, double *log_choices)
 {
 	unsigned k = y->edges;
 	const struct camera *camera = &c->w->camera;
@@ -85,8 +85,8 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 }
 
 /* Between the ends, at y; steps drawn at x, dh from x to y, or none. */
-static inline double explicit_log_between(const struct path_context *c, const struct full_path_path *x,
-					  const struct full_path_path *y, unsigned b, unsigned c_end, const vec2 *dh,
+static inline double explicit_log_between(const struct path_context *c, const struct full_path *x,
+					  const struct full_path *y, unsigned b, unsigned c_end, const vec2 *dh,
 					  double sign)
 {
 	static struct constraint at_x[FULL_PATH_MAX_VERTICES], at_y[FULL_PATH_MAX_VERTICES];
@@ -112,7 +112,7 @@ static inline double explicit_log_between(const struct path_context *c, const st
 
 /* Choice of b and c, where the strategy draws them by the heuristic. */
 static inline double explicit_log_choice(const struct path_context *c, const char *strategy,
-					 const struct mutation_setting *how, const struct full_path_path *x, unsigned b,
+					 const struct mutation_setting *how, const struct full_path *x, unsigned b,
 					 unsigned c_end)
 {
 	double weight[FULL_PATH_MAX_VERTICES], p = 1;

@@ -18,23 +18,23 @@
 #include <cmocka.h>
 
 static const struct mutation_ops *real;
-static struct full_path_path *from; /* x of the proposal at hand */
+static struct full_path *from; /* x of the proposal at hand */
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
-				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
 	from = x;
 	return real->propose(m, how, x, y, move);
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			 enum mutation_direction direction)
 {
 	return real->log_weight(m, into, move, direction);
 }
 
 /* log P(b) P(c | b) by the heuristic. */
-static double log_selection(struct mutation_ctx *m, const struct full_path_path *x, unsigned b, unsigned c)
+static double log_selection(struct mutation_ctx *m, const struct full_path *x, unsigned b, unsigned c)
 {
 	double weight[FULL_PATH_MAX_VERTICES], p;
 	heuristic_roughness.weigh_b(m->path, x, weight);
@@ -47,17 +47,17 @@ static double log_selection(struct mutation_ctx *m, const struct full_path_path 
 }
 
 /* The choice of b and c left out: into y it is x's, and the other way round. */
-static double no_selection(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double no_selection(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			   enum mutation_direction direction)
 {
-	static struct full_path_path *y;
+	static struct full_path *y;
 	if (direction == X_TO_Y)
 		y = into;
 	return log_weight(m, into, move, direction) +
 	       log_selection(m, direction == X_TO_Y ? from : y, move->b, move->c);
 }
 
-static double denser_upwards(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double denser_upwards(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction)
 {
 	bool up = direction == X_TO_Y && sin(2 * M_PI * (into->wavelength - from->wavelength)) > 0;
@@ -65,14 +65,14 @@ static double denser_upwards(struct mutation_ctx *m, struct full_path_path *into
 }
 
 /* As a function of the state: 10 % where the wavelength lies in the upper half. */
-static double denser_above(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double denser_above(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			   enum mutation_direction direction)
 {
 	return log_weight(m, into, move, direction) - (into->wavelength > 0.5 ? log(1.1) : 0);
 }
 
-static enum strategy_counter drift(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-				   struct full_path_path *y, struct move *move)
+static enum strategy_counter drift(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				   struct full_path *y, struct move *move)
 {
 	const double mean = 0.1; /* pixels; the deviation is 0.64 */
 	x->film[0] += mean;
@@ -81,13 +81,13 @@ static enum strategy_counter drift(struct mutation_ctx *m, const struct mutation
 	return end;
 }
 
-static void keep_f(struct path_context *c, struct full_path_path *y, unsigned j)
+static void keep_f(struct path_context *c, struct full_path *y, unsigned j)
 {
 	y->f[j] = full_path_f(c, from, j);
 	vertex_set_add(&y->known_f, j);
 }
 
-static double stale_fixed(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double stale_fixed(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction)
 {
 	for (unsigned j = 0; direction == X_TO_Y && j < move->c; j++)
@@ -95,7 +95,7 @@ static double stale_fixed(struct mutation_ctx *m, struct full_path_path *into, c
 	return log_weight(m, into, move, direction);
 }
 
-static double stale_c(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double stale_c(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 		      enum mutation_direction direction)
 {
 	if (direction == X_TO_Y)
@@ -103,7 +103,7 @@ static double stale_c(struct mutation_ctx *m, struct full_path_path *into, const
 	return log_weight(m, into, move, direction);
 }
 
-static double stale_b(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double stale_b(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 		      enum mutation_direction direction)
 {
 	if (direction == X_TO_Y && move->b < into->edges)
@@ -111,15 +111,15 @@ static double stale_b(struct mutation_ctx *m, struct full_path_path *into, const
 	return log_weight(m, into, move, direction);
 }
 
-static double no_transfer(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double no_transfer(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction)
 {
 	return log_weight(m, into, move, direction) - move->log_transfer[direction];
 }
 
 /* Steps of x back from y, too. */
-static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct mutation_setting *how,
-				       struct full_path_path *x, struct full_path_path *y, struct move *move)
+static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				       struct full_path *y, struct move *move)
 {
 	enum strategy_counter end = propose(m, how, x, y, move);
 	for (unsigned j = move->c + 1; !end && j < move->b; j++) {
@@ -133,7 +133,7 @@ static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct muta
 
 /* What the way back refused is proposed all the same; forced b and c only, whose choice has no density. */
 static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mutation_setting *how,
-					 struct full_path_path *x, struct full_path_path *y, struct move *move)
+					 struct full_path *x, struct full_path *y, struct move *move)
 {
 	enum strategy_counter end = propose(m, how, x, y, move);
 	if (end != STRATEGY_FAIL_REVERSE)
@@ -151,7 +151,7 @@ static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mu
 }
 
 /* The emitter's point as if all points were as likely. */
-static double flat_emitter(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+static double flat_emitter(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			   enum mutation_direction direction)
 {
 	const struct path_vertex *v = &into->v[0];
@@ -168,8 +168,8 @@ struct fault {
 	enum balance_side side;
 	unsigned starts, repeat;
 	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how,
-					 struct full_path_path *x, struct full_path_path *y, struct move *move);
-	double (*log_weight)(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+					 struct full_path *x, struct full_path *y, struct move *move);
+	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);
 };
 

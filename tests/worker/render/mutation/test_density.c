@@ -48,8 +48,8 @@ static size_t all_trials(struct trial *t)
 	return n;
 }
 
-static double log_t(const struct trial *t, const struct move *move, const struct full_path_path *x,
-		    const struct full_path_path *y, double sign, double *log_choices)
+static double log_t(const struct trial *t, const struct move *move, const struct full_path *x,
+		    const struct full_path *y, double sign, double *log_choices)
 {
 	unsigned b = move->b, end = move->c;
 	*log_choices = 0;
@@ -65,7 +65,7 @@ static double log_t(const struct trial *t, const struct move *move, const struct
 	return sum;
 }
 
-static void compare(struct trial *t, struct full_path_path *x, struct full_path_path *y)
+static void compare(struct trial *t, struct full_path *x, struct full_path *y)
 {
 	struct move move = {0};
 	m.step++;
@@ -100,7 +100,7 @@ static void test_ratio(void **state)
 {
 	const struct room *room = *state;
 	static struct trial trials[TRIALS];
-	static struct full_path_path x, y;
+	static struct full_path x, y;
 	struct world *w = room->build();
 	struct starts s;
 	size_t count = all_trials(trials), n = dice_count(400), bad = 0;

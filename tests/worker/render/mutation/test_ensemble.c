@@ -24,7 +24,7 @@ enum { TRIALS = 3000, EDGES = 12 };
 static struct path_context c;
 static uint64_t counters[BATCH_COUNTERS];
 static struct ensemble drawn, around, capped;
-static struct full_path_path x, y;
+static struct full_path x, y;
 
 static void begin(const struct world *w)
 {

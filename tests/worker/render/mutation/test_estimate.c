@@ -31,7 +31,7 @@ enum { GROUPS = 32, EDGES = 5 };
 /* Means of f / T by number of edges. */
 static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, size_t n, double *mean)
 {
-	static struct full_path_path x, y;
+	static struct full_path x, y;
 	static uint64_t count[STRATEGY_COUNTERS];
 	m->count = count;
 	for (size_t i = 0; i < n; i++) {

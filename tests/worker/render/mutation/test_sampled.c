@@ -65,7 +65,7 @@ static uint64_t counters[BATCH_COUNTERS], strategy_counters[STRATEGY_COUNTERS];
 struct sampling {
 	const struct example *example;
 	const struct mutation_ops *ops;
-	struct full_path_path *x, *y;
+	struct full_path *x, *y;
 	unsigned vertex[FULL_PATH_MAX_VERTICES], count, ends; /* that move; of these ends of the path */
 	double mean[MOST], factor[MOST][MOST];		      /* Cholesky's of the covariance */
 	unsigned long failures;
@@ -224,7 +224,7 @@ static bool pilot(struct sampling *s)
 	return fills(s, (const double(*)[MOST])z, n);
 }
 
-static bool all_smooth(const struct full_path_path *x)
+static bool all_smooth(const struct full_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
 		if (x->v[j].delta)
@@ -293,7 +293,7 @@ static void sample(struct sampling *s, const char *name)
 static void test_example(void **state)
 {
 	const struct example *e = *state;
-	static struct full_path_path x, y;
+	static struct full_path x, y;
 	static struct sampling s;
 	char name[64];
 	snprintf(name, sizeof name, "%s, %s, k = %u, b = %u, c = %u", e->room, e->strategy, e->edges, e->b, e->c);

@@ -27,7 +27,7 @@ enum { GROUPS = 16, BLOCKS = 4, EDGES = 5, PAIRS = 4000, STARTS = 2000 };
 
 static struct path_context context;
 static struct mutation_ctx mutation;
-static struct full_path_path x, y[2];
+static struct full_path x, y[2];
 
 struct tally {
 	uint64_t proposals, one_only, both;
@@ -40,7 +40,7 @@ static unsigned block_of(const double film[2])
 	return (film[0] >= 16) + 2u * (film[1] >= 16);
 }
 
-static double propose(const struct mutation_ops *ops, double scale, struct full_path_path *into)
+static double propose(const struct mutation_ops *ops, double scale, struct full_path *into)
 {
 	const struct mutation_setting how = {-1, -1};
 	struct move move = {0};

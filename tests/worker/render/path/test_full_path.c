@@ -39,7 +39,7 @@ static double intensity_of(struct path_context *c, spectrum l)
 }
 
 /* The balance heuristic over all techniques makes of f / p_s the value f / sum p. */
-static double f_over_p(struct path_context *c, struct full_path_path *x)
+static double f_over_p(struct path_context *c, struct full_path *x)
 {
 	double log_pdf[FULL_PATH_MAX_VERTICES], log_f = full_path_log_f(c, x), sum = 0;
 	full_path_log_techniques(c, x, log_pdf);
@@ -55,7 +55,7 @@ struct tally {
 
 static void compare(struct path_context *c, unsigned s, unsigned edges, struct tally *t)
 {
-	static struct full_path_path x;
+	static struct full_path x;
 	double film[2];
 	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film));
 	bool there = full_path_from_subpaths(c, s, edges, &x);
@@ -176,7 +176,7 @@ static void test_ends(void **state)
 static void test_sides(void **state)
 {
 	(void)state;
-	static struct full_path_path x;
+	static struct full_path x;
 	const double bend = M_PI / 3;
 	x.edges = 2;
 	x.v[1].x.sh = frame_around((vec3){0, 0, 1});

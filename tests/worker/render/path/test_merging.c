@@ -80,7 +80,7 @@ static void expect_near(double got, double want, double *worst)
 static unsigned long check_densities(const char *name, struct world *w, unsigned long samples)
 {
 	static struct path_context c;
-	static struct full_path_path x;
+	static struct full_path x;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	unsigned long compared = 0;
 	double log_pdf[FULL_PATH_MAX_VERTICES], film[2], worst = 0;
