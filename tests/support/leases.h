@@ -9,7 +9,8 @@
  * samples. */
 struct batch lease_done(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in);
 
-/* The world, which is freed, by `path` with so many samples a pixel and edges: X, Y, Z of each pixel, to be freed. */
+/* The world, which is freed, by `path` with so many samples a pixel and edges: X, Y, Z of each pixel,
+ * summed over its samples, to be freed. */
 float *lease_image(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth);
 
 #endif

@@ -55,7 +55,7 @@ static void test_all_at_once(void **state)
 		else
 			used += (size_t)snprintf(all + used, sizeof all - used, "%s%s=%s", i ? "," : "", k->name,
 						 k->sweep[0]		     ? k->sweep[1]
-						 : k->kind == SETTING_CHOICE ? "yes"
+						 : k->kind == SETTING_CHOICE ? strrchr(k->choices, ' ') + 1
 									     : "1000");
 	}
 	assert_int_equal(accuracy_settings_read(all, &a, NULL), 0);

@@ -174,7 +174,7 @@ static int read_parts(struct blend *m, struct bsdf *b, const struct scene_node *
 	}
 	if (!b->has_smooth)
 		b->alpha = 0;
-	for (uint32_t k = 0; k < m->count && b->two_sided; k++) {
+	for (uint32_t k = 0; k < m->count && b->two_sided && !build->black_backs; k++) {
 		int code = bsdf_mirror_back(&m->part[k], build->arena, e);
 		if (code)
 			return code;

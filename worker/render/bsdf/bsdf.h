@@ -50,6 +50,7 @@ struct bsdf_build {
 	bool dialect_3;
 	double least_roughness;		    /* rough metal and glass below this roughness is made smooth */
 	struct attribute_table *attributes; /* of the mesh; NULL: none */
+	bool black_backs;		    /* of opaque materials without twosided */
 };
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)

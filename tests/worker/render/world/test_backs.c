@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The setting `backs`: what an opaque material without `twosided` shows on its back, alone, under a mask and in a
+ * blend, under a sky of radiance 1, of which a grey of 0.5 shows a half; and two integrators that agree on a room of
+ * rectangles of which some face away from the light.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/leases.h"
+#include "tests/support/worlds.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 8, SPP = 64 };
+
+#define SKY "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>"
+#define GREY "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>"
+#define TWO_SIDES "<bsdf type='twosided'>" GREY "</bsdf>"
+
+/* The mean luminance of a rectangle that fills the picture. */
+static double shown(const char *accuracy, const char *material, bool back)
+{
+	worlds_accuracy = accuracy;
+	struct world *w = world_of_text(
+		SIDE, SIDE,
+		SKY SENSOR(
+			"0,0,1",
+			"0,0,0") "<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate y='1' angle='%d'/>"
+				 "</transform>%s</shape>",
+		back ? 180 : 0, material);
+	worlds_accuracy = NULL;
+	float *xyz = lease_image(w, SIDE, SPP, 2);
+	double sum = 0;
+	for (int i = 0; i < SIDE * SIDE; i++)
+		sum += (double)xyz[3 * i + 1] / (SIDE * SIDE * SPP);
+	free(xyz);
+	return sum;
+}
+
+static void backs(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *material;
+		double front, lit, black; /* the front, and the back by either setting */
+	} cases[] = {
+		{GREY, 0.5, 0.5, 0},
+		{TWO_SIDES, 0.5, 0.5, 0.5},
+		{"<bsdf type='mask'><float name='opacity' value='0.25'/>" GREY "</bsdf>", 0.875, 0.875, 0.75},
+		{"<bsdf type='blendbsdf'><float name='weight' value='0.5'/>" GREY TWO_SIDES "</bsdf>", 0.5, 0.5, 0.25},
+		{"<bsdf type='bumpmap'><texture type='checkerboard'/>" GREY "</bsdf>", 0.5, 0.5, 0},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		const double expected[] = {cases[i].front, cases[i].front, cases[i].lit, cases[i].black};
+		for (int k = 0; k < 4; k++) {
+			double is = shown(k % 2 ? "backs=black" : "backs=lit", cases[i].material, k / 2);
+			print_message("%zu, %s, backs %s: %.4f of %.4f\n", i, k / 2 ? "back" : "front",
+				      k % 2 ? "black" : "lit", is, expected[k]);
+			assert_true(fabs(is - expected[k]) <= 0.03 * expected[k]); /* 4,096 samples of one bounce */
+		}
+	}
+}
+
+/* A cube is seen from inside: all of its sides are backs. The lamp's light comes by the floor, which faces it, and by a
+ * wall that does not, and by the two sides of a screen. */
+static void integrators_agree(void **state)
+{
+	(void)state;
+	static struct agree_image a, b;
+	struct agree_side path = {"path", 1024, 32, 0, 0}, bdpt = {"bdpt", 1024, 32, 0, 0};
+	worlds_accuracy = "backs=black";
+	struct world *w = world_of_text(
+		32, 32,
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR(
+			"0,0.2,1.9",
+			"0,-0.3,-1") "<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/><translate y='-1'/></transform>" GREY
+				     "</shape>"
+				     "<shape type='rectangle'><transform name='to_world'><scale value='2'/><translate z='-1.5'/></transform>" GREY
+				     "</shape>"
+				     "<shape type='rectangle'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='150'/><translate x='0.5' z='-0.5'/></transform>" GREY
+				     "</shape>"
+				     "<shape type='rectangle'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='30'/><translate x='-0.6' z='-0.5'/></transform>" TWO_SIDES
+				     "</shape>"
+				     "<shape type='rectangle'><transform name='to_world'><scale value='1'/><rotate x='1' angle='90'/><translate y='1.5'/></transform>"
+				     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
+	agree_render(w, "backs", "path", &path, &a);
+	agree_render(w, "backs", "bdpt", &bdpt, &b);
+	agree_check("backs, bdpt and path", &b, &a);
+	world_free(w);
+	worlds_accuracy = NULL;
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(backs),
+		cmocka_unit_test(integrators_agree),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
