@@ -351,10 +351,11 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	tile_error_load(m, t);
 	bool all_settled = find_settled(t) == 0;
 	cancelling_find_spread(t);
+	if (!all_settled)
+		tile_error_find_bases(t);
 	tile_error_write(m, t);
 	if (!all_settled) {
 		struct block whole;
-		tile_error_find_bases(t);
 		settle_square(t, 0, 0, TILE_SIZE, &whole);
 	} else {
 		settle_pixels(t, 0, (size_t)t->width * t->height);

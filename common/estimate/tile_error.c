@@ -11,11 +11,8 @@
 #include <math.h>
 #include <string.h>
 
-/* In squares of up to RARE pixels a side, pixels miss rare light if more than rare_share of the variance is that of
- * pixels in which one or two groups outweigh all others: their kurtosis is above rare_kurtosis times the number of
- * groups, and above that of eight groups, since normal values of fewer have as much. */
+/* Rare light is looked for in squares of up to RARE pixels a side. */
 enum { RARE = 16, RARE_BRIGHTER = 3 };
-static const double rare_share = 1. / 3, rare_kurtosis = 0.45, rare_kurtosis_least = 3.6;
 
 struct square {
 	uint32_t x, y, right, low;
@@ -80,8 +77,6 @@ static void find_base(struct tile_error *t, size_t pixel, size_t k)
 
 void tile_error_find_bases(struct tile_error *t)
 {
-	if (t->has_bases)
-		return;
 	t->has_bases = true;
 	for (size_t pixel = 0; pixel < (size_t)t->width * t->height; pixel++)
 		for (size_t k = 0; k < 3; k++)
@@ -130,17 +125,13 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 	return sum / n;
 }
 
-static double few_kurtosis(const struct tile_error *t)
-{
-	return fmax(rare_kurtosis * t->groups, rare_kurtosis_least);
-}
-
 /*
- * Raises `rare` in a square of pixels to the square of the light that few groups found there, on average. Such light is
- * too rare for the groups to show how often it comes: pixels that it did not reach have groups that agree, on a value
- * that is too small by that much. Those that it reached have a larger error of their own. For a pixel only those count
- * that would be at most ten times as bright without such light (8 to 16 times: RARE_BRIGHTER powers of two): what is
- * rare in a highlight says nothing about the dark wall beside it.
+ * Raises `rare` in a square of pixels to the square of the light that few groups found there, on average. Where light
+ * is rare, the groups do not show how often it comes: pixels that it did not reach have groups that agree, on a value
+ * that is too small by that much. Those that it reached have a larger error of their own; where light is frequent, what
+ * few groups have above the others and below them cancels. For a pixel only those count that would be at most ten times
+ * as bright without such light (8 to 16 times: RARE_BRIGHTER powers of two): what is rare in a highlight says nothing
+ * about the dark wall beside it.
  */
 static void raise_square(const struct tile_error *t, size_t k, const struct square *s, double *rare)
 {
@@ -166,31 +157,17 @@ static void raise_square(const struct tile_error *t, size_t k, const struct squa
 		}
 }
 
-/* Whether much of the square's variance is that of pixels in which few groups outweigh all others. */
-static bool has_rare(const struct tile_error *t, size_t k, const struct square *s)
-{
-	double limit = few_kurtosis(t), all = 0, few = 0;
-	for (uint32_t j = s->y; j < s->low; j++)
-		for (uint32_t i = s->x; i < s->right; i++) {
-			size_t pixel = (size_t)j * t->width + i;
-			all += t->square[pixel][k];
-			few += t->kurtosis[pixel][k] > limit ? t->square[pixel][k] : 0;
-		}
-	return few > rare_share * all;
-}
-
-static void find_rare(struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
+static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
 {
 	memset(rare, 0, 3 * sizeof *rare);
+	if (!t->has_bases)
+		return;
 	for (size_t k = 0; k < 3; k++)
 		for (uint32_t size = 2; size <= RARE; size *= 2)
 			for (uint32_t y = 0; y < t->height; y += size)
 				for (uint32_t x = 0; x < t->width; x += size) {
 					struct square s = {x, y, x + size < t->width ? x + size : t->width,
 							   y + size < t->height ? y + size : t->height};
-					if (!has_rare(t, k, &s))
-						continue;
-					tile_error_find_bases(t);
 					raise_square(t, k, &s, rare[k]);
 				}
 }
@@ -201,7 +178,7 @@ static void find_rare(struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE
  * light around it. A pixel that no chain visited would have a variance of 0, a false claim; it gets the variance of its
  * neighbours, of its tile, or (tile_error_fill_unvisited) of the image.
  */
-void tile_error_write(struct making *m, struct tile_error *t)
+void tile_error_write(struct making *m, const struct tile_error *t)
 {
 	double rare[3][TILE_SIZE * TILE_SIZE];
 	find_rare(t, rare);

@@ -53,13 +53,14 @@ static inline float *tile_error_apart(const struct tile_error *t, size_t pixel)
  * Counts the image's unvisited pixels. */
 void tile_error_load(struct making *m, struct tile_error *t);
 
-/* base, base_square and base_power of all pixels, once: mean and its variance without the eighth of the groups that are
+/* base, base_square and base_power of all pixels: mean and its variance without the eighth of the groups that are
  * farthest from the others, which is the brightness without fireflies. `apart` must still be as tile_error_load made
  * it. */
 void tile_error_find_bases(struct tile_error *t);
 
-/* Writes the standard errors of the tile's pixels into the image; `settled` must be known. May find the bases. */
-void tile_error_write(struct making *m, struct tile_error *t);
+/* Writes the standard errors of the tile's pixels into the image; `settled` must be known, and the bases where not all
+ * pixels are settled. */
+void tile_error_write(struct making *m, const struct tile_error *t);
 
 /* Gives the mean variance of the image to tiles that no chain visited, which have none of their own. */
 void tile_error_fill_unvisited(struct canvas_image *img);
