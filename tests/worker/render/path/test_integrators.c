@@ -139,7 +139,7 @@ static void test_environment(void **state)
 				DIFFUSE("0.5,0.5,0.6") "</shape>" BALL(
 					"0,0,0", "1",
 					"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
-		320, 320, 0, at_length(6144), 14336);
+		512, 512, 0, at_length(6144), 14336);
 }
 
 int main(void)
