@@ -50,7 +50,7 @@ void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link 
 	q->last = &q->first;
 }
 
-static struct send_frame *drop_first(struct send_queue *q)
+static void drop_first(struct send_queue *q)
 {
 	struct send_frame *f = q->first;
 	q->first = f->next;
@@ -58,7 +58,6 @@ static struct send_frame *drop_first(struct send_queue *q)
 		q->last = &q->first;
 	mem_free(f->bytes);
 	mem_free(f);
-	return q->first;
 }
 
 void send_queue_fini(struct send_queue *q)
