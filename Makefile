@@ -213,10 +213,10 @@ BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occlud
 bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
 
-# build/equal-time.png, the pictures of the README: six processor seconds each, about five minutes of one core.
+# build/equal-time.png, the pictures of the README: eight processor seconds each, about seven minutes of one core.
 .PHONY: row
 row: programs
-	python3 tests/bench/row.py $(BUILD) $(BUILD)/equal-time.png 6 8
+	python3 tests/bench/row.py $(BUILD) $(BUILD)/equal-time.png 8 6
 
 # Stated errors against true ones: about an hour of one core. CALIBRATION="--renders 8 --lengths 2" for less.
 CALIBRATION_SRC := $(filter-out tests/image/test_%.c,$(wildcard tests/image/*.c))
