@@ -174,8 +174,8 @@ static int read_parts(struct blend *m, struct bsdf *b, const struct scene_node *
 	}
 	if (!b->has_smooth)
 		b->alpha = 0;
-	for (uint32_t k = 0; k < m->count && b->two_sided && !build->black_backs; k++) {
-		int code = bsdf_mirror_back(&m->part[k], build->arena, e);
+	for (uint32_t k = 0; k < m->count && b->two_sided; k++) {
+		int code = bsdf_mirror_back(&m->part[k], build, e);
 		if (code)
 			return code;
 	}

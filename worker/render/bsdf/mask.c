@@ -89,8 +89,8 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (!code && (m->inner.modes & BSDF_TRANSMIT))
 		code = node_error(n, e, ENOTSUP, "a mask over \"%s\", which transmits light itself, is not supported",
 				  inner->type);
-	if (!code && !build->black_backs)
-		code = bsdf_mirror_back(&m->inner, build->arena, e);
+	if (!code)
+		code = bsdf_mirror_back(&m->inner, build, e);
 	if (!code)
 		code = bsdf_texture(b, &m->opacity, n, "opacity", 0.5, build, e);
 	if (code)

@@ -62,11 +62,11 @@ static bool twosided_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	return true;
 }
 
-int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e)
+int bsdf_mirror_back(struct bsdf *b, const struct bsdf_build *build, struct error *e)
 {
-	if (b->two_sided || (b->modes & BSDF_TRANSMIT) || !b->modes)
+	if (build->black_backs || b->two_sided || (b->modes & BSDF_TRANSMIT) || !b->modes)
 		return 0;
-	struct twosided *t = arena_alloc(arena, 1, sizeof *t);
+	struct twosided *t = arena_alloc(build->arena, 1, sizeof *t);
 	if (!t)
 		return error_set(e, ENOMEM, "out of memory");
 	t->side[0] = t->side[1] = *b;

@@ -5,9 +5,9 @@
 
 #include "worker/render/bsdf/bsdf.h"
 
-/* Makes an opaque BSDF scatter on its back as on its front. Mitsuba leaves backs black; public scenes in this
- * language are written for renderers that do not (the walls of `cornell-box` face outwards), and no scene benefits
- * from black backs. */
-int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e);
+/* Makes an opaque BSDF scatter on its back as on its front, unless backs are to be black. Mitsuba leaves them black;
+ * some public scenes in its language are written for renderers that do not (the walls of `cornell-box` face outwards).
+ */
+int bsdf_mirror_back(struct bsdf *b, const struct bsdf_build *build, struct error *e);
 
 #endif

@@ -81,8 +81,8 @@ static int create_bsdfs(struct builder *b)
 			bsdf_black(&w->bsdfs[k]);
 		else
 			bsdf_default(&w->bsdfs[k]);
-		if (!rc && !build.black_backs)
-			rc = bsdf_mirror_back(&w->bsdfs[k], &w->arena, b->e);
+		if (!rc)
+			rc = bsdf_mirror_back(&w->bsdfs[k], &build, b->e);
 		if (rc)
 			return rc;
 		node_table_add(&made, key, attributes.asked ? w->shapes[i].index : NULL, k);

@@ -119,7 +119,7 @@ static void test_a_mirrored_back_is_a_mirror(void **state)
 	const struct bsdf_point p = {.w = &wavelengths};
 	bsdf_make(&a, "conductor material=none specular_reflectance=0.5", &b);
 	assert_true(spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT, &wi, &chance)));
-	assert_int_equal(bsdf_mirror_back(&b, &a, &e), 0);
+	assert_int_equal(bsdf_mirror_back(&b, &(struct bsdf_build){.arena = &a}, &e), 0);
 	assert_true(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT | BSDF_DELTA, &wi, &chance).v[2] == 0.5);
 	assert_true(wi.x == -0.6 && wi.z == -0.8 && chance == 1 && b.alpha_mean == 0);
 	assert_true(spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_TRANSMIT, &wi, &chance)));
