@@ -353,7 +353,7 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	cancelling_find_spread(t);
 	if (!all_settled)
 		tile_error_find_bases(t);
-	tile_error_write(m, t);
+	tile_error_write(m, t, !all_settled);
 	if (!all_settled) {
 		struct block whole;
 		settle_square(t, 0, 0, TILE_SIZE, &whole);
@@ -390,7 +390,6 @@ int canvas_error(struct making *m, struct error *e)
 		mean += (double)m->img->rgb[i];
 	mean /= (double)values;
 	t->groups = m->c->plan.groups;
-	t->floor = 0.01 * fabs(mean);
 	t->floor_square = 1e-4 * mean * mean;
 	for (uint32_t y = 0; y < m->img->height; y += TILE_SIZE)
 		for (uint32_t x = 0; x < m->img->width; x += TILE_SIZE)

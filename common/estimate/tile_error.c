@@ -11,12 +11,9 @@
 #include <math.h>
 #include <string.h>
 
-/* Rare light is looked for in squares of up to RARE pixels a side. */
+/* Rare light is looked for in squares of up to RARE pixels a side, in pixels that are brighter than one by at most
+ * RARE_BRIGHTER powers of two. */
 enum { RARE = 16, RARE_BRIGHTER = 3 };
-
-struct square {
-	uint32_t x, y, right, low;
-};
 
 /* The inner loops run over groups and are independent, so the compiler vectorises them. */
 static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
@@ -52,7 +49,7 @@ static void pixel_error(struct making *m, struct tile_error *t, const int64_t *c
 	}
 }
 
-static void find_base(struct tile_error *t, size_t pixel, size_t k)
+static void find_base(struct tile_error *t, size_t pixel, size_t k, double floor)
 {
 	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
 	const float *apart = tile_error_apart(t, pixel) + k * t->groups;
@@ -70,17 +67,17 @@ static void find_base(struct tile_error *t, size_t pixel, size_t k)
 		square += (d[g] - mean) * (d[g] - mean);
 	t->base[pixel][k] = t->brightness[pixel][k] + mean;
 	t->base_square[pixel][k] = square / n / (n - 1);
-	double times = t->base[pixel][k] / t->floor;
+	double times = t->base[pixel][k] / floor;
 	int power = times >= 1 ? ilogb(times) : 0;
 	t->base_power[pixel][k] = (uint8_t)(power < BASE_POWERS ? power : BASE_POWERS - 1);
 }
 
 void tile_error_find_bases(struct tile_error *t)
 {
-	t->has_bases = true;
+	double floor = sqrt(t->floor_square);
 	for (size_t pixel = 0; pixel < (size_t)t->width * t->height; pixel++)
 		for (size_t k = 0; k < 3; k++)
-			find_base(t, pixel, k);
+			find_base(t, pixel, k, floor);
 }
 
 static bool is_dark(const struct tile_error *t, size_t pixel)
@@ -91,7 +88,7 @@ static bool is_dark(const struct tile_error *t, size_t pixel)
 void tile_error_load(struct making *m, struct tile_error *t)
 {
 	bool chains = m->c->plan.kind == PLAN_CHAINS;
-	t->lit = t->has_bases = false;
+	t->lit = false;
 	memset(t->mean_square, 0, sizeof t->mean_square);
 	static const int64_t nothing[SLOT];
 	const int64_t *slot[PLAN_MAX_GROUPS];
@@ -133,11 +130,12 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
  * as bright without such light (8 to 16 times: RARE_BRIGHTER powers of two): what is rare in a highlight says nothing
  * about the dark wall beside it.
  */
-static void raise_square(const struct tile_error *t, size_t k, const struct square *s, double *rare)
+static void raise_square(const struct tile_error *t, size_t k, uint32_t x, uint32_t y, uint32_t size, double *rare)
 {
+	uint32_t right = x + size < t->width ? x + size : t->width, low = y + size < t->height ? y + size : t->height;
 	double excess[BASE_POWERS] = {0}, count[BASE_POWERS] = {0};
-	for (uint32_t j = s->y; j < s->low; j++)
-		for (uint32_t i = s->x; i < s->right; i++) {
+	for (uint32_t j = y; j < low; j++)
+		for (uint32_t i = x; i < right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
 			unsigned b = t->base_power[pixel][k];
 			excess[b] += t->brightness[pixel][k] - t->base[pixel][k];
@@ -147,8 +145,8 @@ static void raise_square(const struct tile_error *t, size_t k, const struct squa
 		excess[b] += excess[b - 1];
 		count[b] += count[b - 1];
 	}
-	for (uint32_t j = s->y; j < s->low; j++)
-		for (uint32_t i = s->x; i < s->right; i++) {
+	for (uint32_t j = y; j < low; j++)
+		for (uint32_t i = x; i < right; i++) {
 			size_t pixel = (size_t)j * t->width + i;
 			unsigned upto = t->base_power[pixel][k] + RARE_BRIGHTER;
 			upto = upto < BASE_POWERS ? upto : BASE_POWERS - 1;
@@ -159,17 +157,11 @@ static void raise_square(const struct tile_error *t, size_t k, const struct squa
 
 static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TILE_SIZE])
 {
-	memset(rare, 0, 3 * sizeof *rare);
-	if (!t->has_bases)
-		return;
 	for (size_t k = 0; k < 3; k++)
 		for (uint32_t size = 2; size <= RARE; size *= 2)
 			for (uint32_t y = 0; y < t->height; y += size)
-				for (uint32_t x = 0; x < t->width; x += size) {
-					struct square s = {x, y, x + size < t->width ? x + size : t->width,
-							   y + size < t->height ? y + size : t->height};
-					raise_square(t, k, &s, rare[k]);
-				}
+				for (uint32_t x = 0; x < t->width; x += size)
+					raise_square(t, k, x, y, size, rare[k]);
 }
 
 /*
@@ -178,10 +170,12 @@ static void find_rare(const struct tile_error *t, double rare[3][TILE_SIZE * TIL
  * light around it. A pixel that no chain visited would have a variance of 0, a false claim; it gets the variance of its
  * neighbours, of its tile, or (tile_error_fill_unvisited) of the image.
  */
-void tile_error_write(struct making *m, const struct tile_error *t)
+void tile_error_write(struct making *m, const struct tile_error *t, bool have_bases)
 {
 	double rare[3][TILE_SIZE * TILE_SIZE];
-	find_rare(t, rare);
+	memset(rare, 0, sizeof rare);
+	if (have_bases)
+		find_rare(t, rare);
 	for (uint32_t y = 0; y < t->height; y++)
 		for (uint32_t x = 0; x < t->width; x++)
 			for (size_t k = 0; k < 3; k++) {

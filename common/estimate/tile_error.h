@@ -19,7 +19,7 @@ enum { BASE_POWERS = 32 };
 struct tile_error {
 	const struct canvas *c;
 	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
-	double floor, floor_square;	      /* 0.01 m */
+	double floor_square;		      /* of 0.01 m */
 	bool lit;			      /* rendered by chains, and some visited the tile */
 	double mean_square[3];		      /* over the tile's pixels */
 	float *apart; /* [height][width][3][groups]: a group's image minus the mean of the groups */
@@ -28,8 +28,7 @@ struct tile_error {
 	double base[TILE_SIZE * TILE_SIZE][3],
 		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
 	uint8_t base_power[TILE_SIZE * TILE_SIZE][3];  /* powers of two by which the base is above the floor */
-	bool has_bases;
-	double kurtosis[TILE_SIZE * TILE_SIZE][3]; /* of the groups' values */
+	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
 	bool settled[TILE_SIZE * TILE_SIZE][3], cancels[TILE_SIZE * TILE_SIZE][3];
 	double cancelling_spread[3]; /* cancelling.h */
 	struct error_sums sum;
@@ -59,9 +58,9 @@ void tile_error_load(struct making *m, struct tile_error *t);
  * it. */
 void tile_error_find_bases(struct tile_error *t);
 
-/* Writes the standard errors of the tile's pixels into the image; `settled` must be known, and the bases where not all
- * pixels are settled. */
-void tile_error_write(struct making *m, const struct tile_error *t);
+/* Writes the standard errors of the tile's pixels into the image; `settled` must be known. Rare light is
+ * looked for if the bases are known: it is where not all pixels are settled. */
+void tile_error_write(struct making *m, const struct tile_error *t, bool have_bases);
 
 /* Gives the mean variance of the image to tiles that no chain visited, which have none of their own. */
 void tile_error_fill_unvisited(struct canvas_image *img);
