@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/estimate/merge.h"
 #include "tests/support/dice.h"
+#include "tests/support/group_image.h"
 #include "tests/support/length.h"
 
 #include <math.h>
@@ -16,19 +17,11 @@
 
 static struct plan plan_of(uint32_t width, uint32_t height, uint64_t epoch)
 {
-	return (struct plan){.integrator = "path",
-			     .kind = PLAN_SAMPLES,
-			     .width = width,
-			     .height = height,
-			     .crop_width = width,
-			     .crop_height = height,
-			     .groups = 16,
-			     .parts = 1,
-			     .epoch = epoch,
-			     .bootstrap = 16,
-			     .rounds = UINT64_MAX,
-			     .target_error = 0.1,
-			     .max_depth = 8};
+	struct plan p = group_image_plan(PLAN_SAMPLES, width, height);
+	p.epoch = epoch;
+	p.seconds = 0;
+	p.target_error = 0.1;
+	return p;
 }
 
 static void looks_are_geometric(void **state)
