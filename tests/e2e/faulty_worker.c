@@ -10,9 +10,12 @@
  *   repeat    every result is sent twice
  *   crash=N   the N-th lease of a process raises SIGSEGV
  *   hang=N    the N-th lease of a process never ends
+ *   slow=N    every lease takes N times as long
  *
  * Leases are counted as their threads begin them. Of N results the first, the (N+1)-th and so on are wrong.
  */
+#include "common/base/clock.h"
+#include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "common/net/conn.h"
 #include "common/wire/batch_wire.h"
@@ -38,16 +41,17 @@ int __wrap_batch_pack(const struct batch *b, const struct plan *p, unsigned char
 void __real_conn_send_frame(struct conn *c, unsigned char *frame, size_t size);
 void __wrap_conn_send_frame(struct conn *c, unsigned char *frame, size_t size);
 
-enum fault { LIE, LARGE, SPOIL, REPEAT, CRASH, HANG, FAULTS };
+enum fault { LIE, LARGE, SPOIL, REPEAT, CRASH, HANG, SLOW, FAULTS };
 
-static const char *const names[FAULTS] = {"lie", "large", "spoil", "repeat", "crash", "hang"};
+static const char *const names[FAULTS] = {"lie", "large", "spoil", "repeat", "crash", "hang", "slow"};
 static unsigned long every[FAULTS]; /* 0: not this fault */
 static atomic_ulong begun;
 static _Thread_local unsigned long lease; /* of this thread, counted from 1 */
 
 static void usage(const char *wrong)
 {
-	fprintf(stderr, "faulty_worker: HSLT_FAULTS: '%s' is none of lie=N large=N spoil=N repeat crash=N hang=N\n",
+	fprintf(stderr,
+		"faulty_worker: HSLT_FAULTS: '%s' is none of lie=N large=N spoil=N repeat crash=N hang=N slow=N\n",
 		wrong);
 	_exit(2);
 }
@@ -84,6 +88,12 @@ static bool is_due(enum fault f)
 	return every[f] && (lease - 1) % every[f] == 0;
 }
 
+static void rest(double seconds, const atomic_bool *stop)
+{
+	for (double until = clock_seconds() + seconds; clock_seconds() < until && !atomic_load(stop); tick())
+		usleep(1000);
+}
+
 int __wrap_render_lease(const struct world *w, const struct plan *p, const struct lease_key *k,
 			const struct lease_input *in, const atomic_bool *stop, enum lease_end *end, struct batch *out,
 			struct error *e)
@@ -93,7 +103,11 @@ int __wrap_render_lease(const struct world *w, const struct plan *p, const struc
 		raise(SIGSEGV);
 	while (lease == every[HANG])
 		pause();
-	return __real_render_lease(w, p, k, in, stop, end, out, e);
+	double start = clock_seconds();
+	int result = __real_render_lease(w, p, k, in, stop, end, out, e);
+	if (every[SLOW])
+		rest((double)(every[SLOW] - 1) * (clock_seconds() - start), stop);
+	return result;
 }
 
 static float *first_value(const struct batch *b)

@@ -150,8 +150,9 @@ start_faulty_worker() {
 	PIDS="$PIDS $WORKER"
 }
 
-# renders PID: the process of that worker that renders; the worker itself only sees to it
+# renders PID: the process of that worker that renders, once there is one; the worker itself only sees to it
 renders() {
+	until_true 30 grep -q . "/proc/$1/task/$1/children" || fail "worker $1 starts no process that renders" >&2
 	tr -d ' ' <"/proc/$1/task/$1/children"
 }
 
