@@ -27,14 +27,14 @@ static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo,
 		if (!(fabs(wo.z) >= DBL_MIN && f->reflected > 0)) /* 1 / wo.z must be finite */
 			return spectrum_of(0);
 		*wi = (vec3){-wo.x, -wo.y, wo.z};
-		*chance = f->reflected;
+		*chance = fresnel_chance(f, true);
 		return spectrum_scale(f->reflected, texture_eval(&g->reflectance, &p->where, p->w));
 	}
 	if (!(f->cos_t >= DBL_MIN && f->transmitted > 0))
 		return spectrum_of(0);
 	double scale = p->transport == TRANSPORT_RADIANCE ? 1 / (eta * eta) : 1;
 	*wi = (vec3){-wo.x / eta, -wo.y / eta, -copysign(f->cos_t, wo.z)};
-	*chance = f->transmitted;
+	*chance = fresnel_chance(f, false);
 	return spectrum_scale(f->transmitted * scale, texture_eval(&g->transmittance, &p->where, p->w));
 }
 
@@ -57,7 +57,7 @@ static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, 
 {
 	double eta = eta_beyond(b, p, wo);
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
-	bool reflect = u[2] < f.reflected;
+	bool reflect = u[2] < fresnel_chance(&f, true);
 	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA,
 				    .eta = reflect ? 1 : eta};
 	spectrum weight = lobe(b->data, p, wo, out->mode, eta, &f, &out->wi, &out->pdf);

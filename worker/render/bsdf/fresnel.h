@@ -4,6 +4,7 @@
 #define WORKER_RENDER_BSDF_FRESNEL_H
 
 #include <math.h>
+#include <stdbool.h>
 
 /* Shares of light; both keep their precision where they are small. */
 struct fresnel {
@@ -28,6 +29,20 @@ static inline struct fresnel fresnel_dielectric(double c, double eta)
 	if (!(t2 > 0))
 		return (struct fresnel){1, 0, 0};
 	return fresnel_between(c, sqrt(t2) / eta, eta);
+}
+
+/* The probability of following the reflection or the transmission at a smooth boundary. A lamp that is mirrored by
+ * water is seen by the two per cent of light that are reflected, and is so much brighter than what lies below that a
+ * path has to follow the reflection more often than light does: with FRESNEL_LEAST, but at most FRESNEL_TIMES as often,
+ * lest a boundary between nearly equal indices waste its samples. Transmitted paths become rarer by a tenth at most. */
+#define FRESNEL_LEAST 0.1
+#define FRESNEL_TIMES 8
+static inline double fresnel_chance(const struct fresnel *f, bool reflect)
+{
+	double often = fmin(FRESNEL_LEAST, FRESNEL_TIMES * f->reflected);
+	if (!(f->transmitted > 0) || !(f->reflected < often))
+		return reflect ? f->reflected : f->transmitted;
+	return reflect ? often : 1 - often;
 }
 
 /* Index eta - i k beyond, relative to the index here. eta = 0, k = 1 is a perfect mirror. No branches, so that a loop

@@ -46,14 +46,15 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	if (!(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
 		return spectrum_of(0);
 	*wi = (vec3){-wo.x, -wo.y, reflect ? wo.z : -wo.z};
-	*chance = share;
+	*chance = fresnel_chance(&f, reflect);
 	return spectrum_scale(share, texture_eval(reflect ? &t->reflectance : &t->transmittance, &p->where, p->w));
 }
 
 static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			struct bsdf_sample *out)
 {
-	bool reflect = u[2] < sheet(b->data, wo).reflected;
+	struct fresnel f = sheet(b->data, wo);
+	bool reflect = u[2] < fresnel_chance(&f, true);
 	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA, .eta = 1};
 	spectrum weight = thin_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
 	if (!(out->pdf > 0))

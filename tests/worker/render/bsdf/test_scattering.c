@@ -110,7 +110,32 @@ static void test_no_energy_is_gained(void **state)
 	assert_true(8 * widest < 0.05);
 }
 
-/* White materials lose only what microfacets mask; smooth ones lose nothing. */
+/* What is reflected and what is transmitted is all of the light; where both are sampled their probabilities are one. */
+static void test_smooth_boundaries_lose_nothing(void **state)
+{
+	(void)state;
+	static const char *const texts[] = {"dielectric", "dielectric int_ior=1 ext_ior=1.7",
+					    "dielectric int_ior=1.0001 ext_ior=1", "thindielectric"};
+	const struct bsdf_point p = point_of(TRANSPORT_IMPORTANCE);
+	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
+		struct arena a = {0};
+		struct bsdf b;
+		bsdf_make(&a, texts[k], &b);
+		for (int i = 0; i < 40; i++) {
+			double z = -0.975 + 0.05 * i, chance[2];
+			vec3 wo = {0, sqrt(1 - z * z), z}, wi;
+			double reflected = bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT, &wi, &chance[0]).v[0];
+			double transmitted = bsdf_eval_delta(&b, &p, wo, BSDF_TRANSMIT, &wi, &chance[1]).v[0];
+			assert_near(reflected + transmitted, 1, 1e-13, texts[k]);
+			assert_near(chance[0] + chance[1], 1, 1e-13, texts[k]);
+			assert_true(chance[0] >= reflected && chance[0] <= fmax(reflected, 0.1));
+			assert_true(chance[0] >= fmin(0.1, 8 * reflected) && chance[0] <= 8 * reflected);
+		}
+		arena_fini(&a);
+	}
+}
+
+/* White materials lose only what microfacets mask. */
 static void test_white_furnace(void **state)
 {
 	(void)state;
@@ -120,8 +145,6 @@ static void test_white_furnace(void **state)
 	} white[] = {
 		{"diffuse reflectance=1", 1 - 1e-12},
 		{"conductor material=none", 1 - 1e-12},
-		{"dielectric", 1 - 1e-12},
-		{"dielectric int_ior=1 ext_ior=1.7", 1 - 1e-12},
 		{"roughdielectric int_ior=1.3 ext_ior=1.3 alpha=0.2", 1 - 1e-12},
 		{"roughconductor material=none alpha=0.001", 0.9999},
 		{"roughconductor material=none alpha=0.2 distribution=ggx", 0.8},
@@ -181,18 +204,20 @@ static void test_closed_forms(void **state)
 	s = sample_of("conductor eta=1.5 k=2 ext_eta=1.25", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(1.2, 1.6), 1e-14, "ext_eta");
 	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, up, 0);
-	assert_near(s.pdf, 0.04, 1e-14, "normal incidence");
+	assert_near(s.f.v[0], 0.04, 1e-14, "normal incidence");
+	assert_near(s.pdf, 0.1, 1e-14, "more often than light");
 	/* Snell, and the compression of radiance. */
 	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, slant, 0.99);
 	assert_near(s.wi.x, -0.4, 1e-14, "Snell");
-	assert_near(s.f.v[0] * -s.wi.z / s.pdf, 1 / 2.25, 1e-14, "radiance");
+	double below = sqrt(0.84), rs = (0.8 - 1.5 * below) / (0.8 + 1.5 * below), rp = (1.2 - below) / (1.2 + below);
+	assert_near(s.f.v[0] * -s.wi.z, (1 - (rs * rs + rp * rp) / 2) / 2.25, 1e-14, "radiance");
 	assert_near(s.eta, 1.5, 1e-14, "eta");
 	/* Total reflection from inside. */
 	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, (vec3){0.8, 0, -0.6}, 0.999999);
 	assert_true(s.pdf == 1 && s.wi.z < 0);
 	/* Brewster's angle: only half of the light, s-polarised, is reflected. */
 	s = sample_of("dielectric int_ior=1.5 ext_ior=1", true, (vec3){1.5, 0, 1}, 0);
-	assert_near(s.pdf, 0.5 * pow((2.25 - 1) / (2.25 + 1), 2), 1e-13, "Brewster");
+	assert_near(s.f.v[0] * s.wi.z, 0.5 * pow((2.25 - 1) / (2.25 + 1), 2), 1e-13, "Brewster");
 	/* Equal indices: straight on. */
 	s = sample_of("roughdielectric int_ior=1.3 ext_ior=1.3", true, slant, 0);
 	assert_near(s.pdf, 1, 1e-15, "straight on");
@@ -437,6 +462,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_reciprocity),
 		cmocka_unit_test(test_no_energy_is_gained),
+		cmocka_unit_test(test_smooth_boundaries_lose_nothing),
 		cmocka_unit_test(test_white_furnace),
 		cmocka_unit_test(test_closed_forms),
 		cmocka_unit_test(test_microfacet_values),
