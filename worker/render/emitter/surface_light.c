@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/emitter/surface_light.h"
+
+#include "worker/render/emitter/uniform.h"
+#include "worker/render/math/sphere.h"
+
+vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int k)
+{
+	const struct emitter_surface *s = &l->surface;
+	uint32_t i = s->index[triangle][k];
+	if (s->unrounded)
+		return (vec3){s->unrounded[i][0], s->unrounded[i][1], s->unrounded[i][2]};
+	const float *p = s->position[i];
+	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
+}
+
+static int build_cdf(struct surface_light *l, struct arena *arena)
+{
+	uint32_t n = l->surface.triangle_count;
+	l->cdf = arena_alloc(arena, (size_t)n + 1, sizeof *l->cdf);
+	if (!l->cdf)
+		return -ENOMEM;
+	for (uint32_t i = 0; i < n; i++) {
+		vec3 v0 = surface_light_corner(l, i, 0), e1 = vec3_sub(surface_light_corner(l, i, 1), v0),
+		     e2 = vec3_sub(surface_light_corner(l, i, 2), v0);
+		l->cdf[i + 1] = l->cdf[i] + 0.5 * vec3_length(vec3_cross(e1, e2));
+	}
+	l->area = l->cdf[n];
+	for (uint32_t i = 1; i <= n; i++)
+		l->cdf[i] /= l->area;
+	return 0;
+}
+
+int surface_light_create(struct emitter *em, struct surface_light *l, const struct scene_node *n,
+			 const struct emitter_build *build, struct error *e)
+{
+	if (!build->surface)
+		return node_error(n, e, EINVAL,
+				  "an area emitter must stand in a shape, or have an id by which shapes refer to it");
+	l->surface = *build->surface;
+	int rc = emitter_texture(&l->radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
+	if (rc)
+		return rc;
+	if (l->surface.is_sphere)
+		l->area = 4 * M_PI * l->surface.radius * l->surface.radius;
+	else if (build_cdf(l, build->arena))
+		return error_set(e, ENOMEM, "out of memory");
+	if (!(l->area > 0))
+		return node_error(n, e, EINVAL, "an area emitter needs a shape of area above 0");
+	em->data = l;
+	em->textured = !texture_is_constant(&l->radiance);
+	em->shape = texture_shape(&l->radiance);
+	em->brightest = texture_max(&l->radiance);
+	return 0;
+}
+
+void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitter_point *x)
+{
+	x->p = vec3_madd(l->surface.center, l->surface.radius, w);
+	x->n = vec3_scale(l->surface.normal_sign, w);
+	x->where = (struct texture_point){0};
+	sphere_uv(&l->surface.sphere_axes, w, &x->where.u, &x->where.v);
+}
+
+void surface_light_on_triangle(const struct surface_light *l, uint32_t i, double b1, double b2, struct emitter_point *x)
+{
+	const struct emitter_surface *s = &l->surface;
+	vec3 v0 = surface_light_corner(l, i, 0), e1 = vec3_sub(surface_light_corner(l, i, 1), v0),
+	     e2 = vec3_sub(surface_light_corner(l, i, 2), v0);
+	x->p = vec3_madd(vec3_madd(v0, b1, e1), b2, e2);
+	x->n = vec3_normalize(vec3_cross(e1, e2));
+	x->where = (struct texture_point){b1, b2, b1, b2, i};
+	if (s->uv) {
+		const float *t0 = s->uv[s->index[i][0]], *t1 = s->uv[s->index[i][1]], *t2 = s->uv[s->index[i][2]];
+		double b0 = 1 - b1 - b2;
+		x->where.u = b0 * (double)t0[0] + b1 * (double)t1[0] + b2 * (double)t2[0];
+		x->where.v = b0 * (double)t0[1] + b1 * (double)t1[1] + b2 * (double)t2[1];
+	}
+}
+
+static uint32_t find_triangle(const struct surface_light *l, double u, double *rest)
+{
+	uint32_t lo = 0, hi = l->surface.triangle_count;
+	while (hi - lo > 1) {
+		uint32_t mid = lo + (hi - lo) / 2;
+		if (l->cdf[mid] <= u)
+			lo = mid;
+		else
+			hi = mid;
+	}
+	double width = l->cdf[lo + 1] - l->cdf[lo];
+	*rest = width > 0 ? fmin(fmax((u - l->cdf[lo]) / width, 0), 1 - 0x1p-53) : 0.5;
+	return lo;
+}
+
+bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf)
+{
+	const struct surface_light *l = em->data;
+	x->infinite = false;
+	*pdf = 1 / l->area;
+	if (l->surface.is_sphere) {
+		surface_light_on_sphere(l, direction_of_square(u), x);
+		return true;
+	}
+	double v;
+	uint32_t i = find_triangle(l, u[0], &v);
+	double root = sqrt(v);
+	surface_light_on_triangle(l, i, 1 - root, root * u[1], x);
+	return true;
+}
+
+double surface_light_pdf_point(const struct emitter *em, const struct emitter_point *x)
+{
+	(void)x;
+	return 1 / ((const struct surface_light *)em->data)->area;
+}
+
+static double below_1(double x)
+{
+	return fmin(fmax(x, 0), 1 - 0x1p-53);
+}
+
+static void triangle_inverse(const struct surface_light *l, const struct emitter_point *x, double u[2])
+{
+	vec3 v0 = surface_light_corner(l, x->where.prim, 0),
+	     e1 = vec3_sub(surface_light_corner(l, x->where.prim, 1), v0),
+	     e2 = vec3_sub(surface_light_corner(l, x->where.prim, 2), v0);
+	vec3 r = vec3_sub(x->p, v0), n = vec3_cross(e1, e2);
+	double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(r, e2), n) / n2, b2 = vec3_dot(vec3_cross(e1, r), n) / n2;
+	double root = fmin(fmax(1 - b1, 0), 1), low = l->cdf[x->where.prim], high = l->cdf[x->where.prim + 1];
+	/* Rounding must not change the triangle. */
+	u[0] = fmax(fmin(low + root * root * (high - low), nextafter(high, 0)), low);
+	u[1] = root > 0 ? below_1(b2 / root) : 0;
+}
+
+void surface_light_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
+{
+	const struct surface_light *l = em->data;
+	if (l->surface.is_sphere)
+		square_of_direction(vec3_scale(1 / l->surface.radius, vec3_sub(x->p, l->surface.center)), u);
+	else
+		triangle_inverse(l, x, u);
+}

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Shared by emitters that belong to a shape: their radiance, and points on their surface, uniform per area. `data` of
+ * such an emitter begins with struct surface_light.
+ */
+#ifndef WORKER_RENDER_EMITTER_SURFACE_LIGHT_H
+#define WORKER_RENDER_EMITTER_SURFACE_LIGHT_H
+
+#include "worker/render/emitter/emitter.h"
+
+struct surface_light {
+	struct texture radiance;
+	struct emitter_surface surface;
+	double area; /* of the rescaled world */
+	double *cdf; /* of triangles; cdf[triangle_count] = 1; NULL: a sphere */
+};
+
+/* Reads `radiance` and sets everything of `em` except its power: data, and brightest to the largest radiance. `l` is
+ * from the arena. -EINVAL with a sentence if there is no surface, or none of an area above 0. */
+int surface_light_create(struct emitter *em, struct surface_light *l, const struct scene_node *n,
+			 const struct emitter_build *build, struct error *e);
+
+/* Operations of struct emitter_ops. */
+bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf);
+double surface_light_pdf_point(const struct emitter *em, const struct emitter_point *x);
+void surface_light_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2]);
+
+/* The point of a sphere in direction w (unit) from its centre. */
+void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitter_point *x);
+/* The point of a triangle with weight b1 of its second corner and b2 of its third. */
+void surface_light_on_triangle(const struct surface_light *l, uint32_t triangle, double b1, double b2,
+			       struct emitter_point *x);
+/* A corner of a triangle, k in 0..2. */
+vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int k);
+
+#endif
