@@ -179,6 +179,19 @@ static struct world *lamp_on_glass(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
 }
 
+/* A square and a disk that shine along their normals, on a ball and on a ground. */
+static struct world *beams(const struct agree_case *k)
+{
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND
+			     "<shape type='sphere'>" AT("<scale value='0.5'/><translate y='0.7'/>" TURN)
+			     GREY("0.7") "</shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='70'/><translate y='3' z='-1'/>" TURN)
+			     "<emitter type='directionalarea'><rgb name='radiance' value='9'/></emitter></shape>"
+			     "<shape type='disk'>" AT("<scale value='0.5'/><rotate y='1' angle='80'/><translate x='-2' y='0.8'/>" TURN)
+			     "<emitter type='directionalarea'><rgb name='radiance' value='5'/></emitter></shape>");
+}
+
 /* A sky of 16 x 8 texels of about 1, one of which is 1.3e8. */
 static struct world *bright_texel(const struct agree_case *k)
 {
@@ -216,6 +229,7 @@ const struct agree_case agree_cases[] = {
 	{"coinciding surfaces", "a lamp three times", lamp_pasted, 0, 0, 5, 256, 768, ALL, 0.02},
 	{"emitter touches glass", "in a point and in an edge", lamp_on_glass, 0, 0, 6, 256, 256, ALL, 0.02},
 	{"bright texel", "1.3e8 in a sky of 1", bright_texel, 0, 0, 5, 256, 512, ALL, 0.02},
+	{"beams", "of a square and of a disk", beams, 0, 0, 5, 2048, 1024, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* One line per emitter: EMITTER(NAME) stands for its const struct emitter_ops emitter_ops_NAME. */
 EMITTER(area)
+EMITTER(directionalarea)
 EMITTER(constant)
 EMITTER(envmap)
 EMITTER(point)

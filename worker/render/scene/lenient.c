@@ -20,9 +20,8 @@ static const struct {
 } likes[] = {
 	{PLUGIN_BSDF, "measured", "roughplastic"},
 
-	{PLUGIN_BSDF, "polarizer", "null"},	     {PLUGIN_BSDF, "retarder", "null"},
-	{PLUGIN_BSDF, "circular", "null"},	     {PLUGIN_EMITTER, "timed_sunsky", "constant"},
-	{PLUGIN_EMITTER, "directionalarea", "area"},
+	{PLUGIN_BSDF, "polarizer", "null"},	   {PLUGIN_BSDF, "retarder", "null"},
+	{PLUGIN_BSDF, "circular", "null"},	   {PLUGIN_EMITTER, "timed_sunsky", "constant"},
 };
 
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)

@@ -106,7 +106,6 @@ static const struct {
 	{PLUGIN_TEXTURE, "volume"},
 	{PLUGIN_TEXTURE, "wireframe"},
 	{PLUGIN_EMITTER, "collimated"},
-	{PLUGIN_EMITTER, "directionalarea"},
 	{PLUGIN_EMITTER, "timed_sunsky"},
 	{PLUGIN_SENSOR, "distant"},
 	{PLUGIN_SENSOR, "fluxmeter"},

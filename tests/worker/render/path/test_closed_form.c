@@ -212,6 +212,23 @@ static void test_lit_floor(void **state)
 		(struct effort){512, 0, 0});
 }
 
+/* A beam straight down, wider than what the camera sees of the floor: M rho / pi. */
+static void test_beam(void **state)
+{
+	(void)state;
+	check_constant(
+		"floor under a beam",
+		world_of_text(
+			16, 16,
+			DEPTH("3") SENSOR(
+				"0,4,0.01",
+				"0,0,0") "<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='-90'/></transform>"
+					 "<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
+					 "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='6'/></transform>"
+					 "<emitter type='directionalarea'><float name='radiance' value='1.5'/></emitter></shape>"),
+		1.5 * 0.5 / M_PI, (struct effort){128, 1024, 32768});
+}
+
 /* Two plates of reflectance rho, the lower shines with 1. Between infinite plates every ray from one meets the other.
  * Radiance of the lower: 1 + rho^2 + rho^4 ..., of the upper rho + rho^3 ... The plates are 4000 gaps wide, which
  * leaves out some 1e-6 of the light that the camera in the middle sees. */
@@ -357,7 +374,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_furnace), cmocka_unit_test(test_invisible), cmocka_unit_test(test_lit_floor),
-		cmocka_unit_test(test_plates),	cmocka_unit_test(test_hard),	  cmocka_unit_test(test_black),
+		cmocka_unit_test(test_beam),	cmocka_unit_test(test_plates),	  cmocka_unit_test(test_hard),
+		cmocka_unit_test(test_black),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

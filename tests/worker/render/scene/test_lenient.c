@@ -25,7 +25,6 @@ static void test_stand_ins(void **state)
 		{PLUGIN_BSDF, "measured", LENIENT_REPLACE, "roughplastic"},
 		{PLUGIN_BSDF, "polarizer", LENIENT_REPLACE, "null"},
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "constant"},
-		{PLUGIN_EMITTER, "directionalarea", LENIENT_REPLACE, "area"},
 		{PLUGIN_EMITTER, "collimated", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
 		{PLUGIN_TEXTURE, "wireframe", LENIENT_LEAVE_OUT, NULL},

@@ -1,0 +1,266 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Light that leaves a surface along its normal, with `radiance` as the power per area. An exactly parallel beam could
+ * only be followed from the light; this one diverges by SPREAD, as a laser pointer's does, so that every integrator and
+ * every mutation has it as it has other emitters. Its edge is blurred by a thousandth of the distance.
+ *
+ * At a point x with normal n, with rho = sin(angle between w and n) / sin(SPREAD) < 1:
+ *
+ *   L(x, w) = M 2 (1 - rho^2) / (pi sin^2 SPREAD),   the integral of L cos over w is M,
+ *
+ * and directions are sampled in proportion to L cos. It falls to 0 at the edge, so that a direction that is computed
+ * again from two points, and differs by rounding, is no other light.
+ *
+ * Next event estimation from a point needs the places that shine at it: those around its projection on a plane, within
+ * the distance times the tangent; around the nearest point of a sphere; of any other surface they are not looked for,
+ * and paths must come from the light.
+ */
+#include "worker/render/emitter/surface_light.h"
+
+/* Half of the angle of the beam, in radians. */
+#define SPREAD 1e-3
+
+/* How far the corners of a plane may be off it, as a share of its extent: they are rounded. All of it shines along the
+ * plane's normal, since that of a thin triangle with rounded corners may differ by more than SPREAD. */
+#define PLANE_OFFSET 1e-5
+
+/* What is searched is wider than what shines by this factor, because of rounding. */
+#define MARGIN 1.02
+
+enum { PLANE_TRIANGLES = 256 };
+
+struct beam {
+	struct surface_light light;
+	bool is_plane;
+	vec3 origin, n; /* of the plane */
+	double offset;	/* the most that a corner is off it */
+};
+
+static const struct param params[] = {
+	{.name = "radiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
+	{.name = "sampling_weight", .types = VALUE_FLOAT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+static vec3 triangle_normal(const struct surface_light *l, uint32_t i)
+{
+	vec3 v0 = surface_light_corner(l, i, 0);
+	return vec3_cross(vec3_sub(surface_light_corner(l, i, 1), v0), vec3_sub(surface_light_corner(l, i, 2), v0));
+}
+
+/* Whether all triangles lie in the plane of their sum, and face the same side. */
+static void find_plane(struct beam *b)
+{
+	const struct surface_light *l = &b->light;
+	uint32_t count = l->surface.triangle_count;
+	if (l->surface.is_sphere || count > PLANE_TRIANGLES)
+		return;
+	vec3 sum = {0, 0, 0};
+	for (uint32_t i = 0; i < count; i++)
+		sum = vec3_add(sum, triangle_normal(l, i));
+	if (!(vec3_length(sum) > 0))
+		return;
+	b->n = vec3_normalize(sum);
+	b->origin = surface_light_corner(l, 0, 0);
+	double extent = 0;
+	for (uint32_t i = 0; i < count; i++) {
+		if (!(vec3_dot(triangle_normal(l, i), b->n) >= 0))
+			return;
+		for (int k = 0; k < 3; k++) {
+			vec3 d = vec3_sub(surface_light_corner(l, i, k), b->origin);
+			b->offset = fmax(b->offset, fabs(vec3_dot(d, b->n)));
+			extent = fmax(extent, vec3_length(d));
+		}
+	}
+	b->is_plane = b->offset <= PLANE_OFFSET * extent;
+}
+
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct beam *b = arena_alloc(build->arena, 1, sizeof *b);
+	if (!b)
+		return error_set(e, ENOMEM, "out of memory");
+	int rc = surface_light_create(em, &b->light, n, build, e);
+	if (rc)
+		return rc;
+	find_plane(b);
+	em->power = b->light.area * em->brightest;
+	em->brightest *= 2 / (M_PI * sin(SPREAD) * sin(SPREAD));
+	return 0;
+}
+
+/* L over M: per projected solid angle. 0 outside. */
+static double profile(vec3 n, vec3 w)
+{
+	double cosine = vec3_dot(n, w), edge = sin(SPREAD);
+	if (!(cosine > 0))
+		return 0;
+	vec3 c = vec3_cross(n, w);
+	double rho2 = vec3_dot(c, c) / (edge * edge);
+	return rho2 < 1 ? 2 * (1 - rho2) / (M_PI * edge * edge) : 0;
+}
+
+/* The middle of the beam from x. */
+static vec3 beam_axis(const struct beam *b, const struct emitter_point *x)
+{
+	return b->is_plane ? b->n : x->n;
+}
+
+static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
+{
+	const struct beam *b = em->data;
+	double share = profile(beam_axis(b, x), w);
+	return share > 0 ? spectrum_scale(share, texture_eval(&b->light.radiance, &x->where, wl)) : spectrum_of(0);
+}
+
+/* rho of the profile, from a number in [0,1). */
+static double sample_rho(double u)
+{
+	return sqrt(u / (1 + sqrt(1 - u))); /* rho^2 = 1 - sqrt(1 - u) */
+}
+
+static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
+			     double *pdf)
+{
+	vec3 axis = beam_axis(em->data, x);
+	struct frame f = frame_around(axis);
+	double rho = sample_rho(u[0]), s = rho * sin(SPREAD), phi = 2 * M_PI * u[1];
+	*w = frame_to_world(&f, (vec3){s * cos(phi), s * sin(phi), sqrt(1 - s * s)});
+	*pdf = profile(axis, *w) * vec3_dot(axis, *w);
+	return *pdf > 0;
+}
+
+static double pdf_direction(const struct emitter *em, const struct emitter_point *x, vec3 w)
+{
+	vec3 axis = beam_axis(em->data, x);
+	return profile(axis, w) * fmax(vec3_dot(axis, w), 0);
+}
+
+/* A round piece of the surface that holds all that shines at a point. */
+struct spot_around {
+	vec3 axis;     /* unit; the plane's normal, or from the sphere's centre to the spot */
+	vec3 center;   /* on the plane */
+	double radius; /* on the plane, or the angle at the sphere's centre */
+};
+
+static bool spot_of_plane(const struct beam *b, vec3 ref, struct spot_around *s)
+{
+	double t = vec3_dot(vec3_sub(ref, b->origin), b->n);
+	if (!(t > -b->offset))
+		return false;
+	double reach = (t + b->offset) * tan(SPREAD) * MARGIN;
+	*s = (struct spot_around){b->n, vec3_madd(ref, -t, b->n), reach};
+	return reach > 0;
+}
+
+/* A point whose normal is off the direction to ref by SPREAD is off the axis, seen from the centre, by
+ * SPREAD - asin(r / d sin SPREAD), which is SPREAD (1 - r / d) up to SPREAD^3. */
+static bool spot_of_sphere(const struct surface_light *l, vec3 ref, struct spot_around *s)
+{
+	vec3 to = vec3_sub(ref, l->surface.center);
+	double d = vec3_length(to), r = l->surface.radius;
+	if (!(d > r * (1 + 0x1p-40)))
+		return false;
+	*s = (struct spot_around){.axis = vec3_scale(1 / d, to), .radius = MARGIN * SPREAD * ((d - r) / d)};
+	return true;
+}
+
+static bool is_outward_sphere(const struct surface_light *l)
+{
+	return l->surface.is_sphere && l->surface.normal_sign > 0;
+}
+
+static double disc_pdf(const struct spot_around *s, double rho2)
+{
+	return rho2 < 1 ? 2 * (1 - rho2) / (M_PI * s->radius * s->radius) : 0;
+}
+
+static bool sample_plane(const struct beam *b, vec3 ref, const double u[2], struct emitter_point *x, double *pdf)
+{
+	struct spot_around s;
+	if (!spot_of_plane(b, ref, &s))
+		return false;
+	struct frame f = frame_around(s.axis);
+	double rho = sample_rho(u[0]), phi = 2 * M_PI * u[1], r = rho * s.radius;
+	vec3 p = vec3_add(s.center, frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), 0}));
+	for (uint32_t i = 0; i < b->light.surface.triangle_count; i++) {
+		vec3 v0 = surface_light_corner(&b->light, i, 0), d = vec3_sub(p, v0);
+		vec3 e1 = vec3_sub(surface_light_corner(&b->light, i, 1), v0),
+		     e2 = vec3_sub(surface_light_corner(&b->light, i, 2), v0), n = vec3_cross(e1, e2);
+		double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(d, e2), n) / n2,
+		       b2 = vec3_dot(vec3_cross(e1, d), n) / n2;
+		if (!(b1 >= 0 && b2 >= 0 && b1 + b2 <= 1))
+			continue;
+		surface_light_on_triangle(&b->light, i, b1, b2, x);
+		*pdf = disc_pdf(&s, rho * rho);
+		return *pdf > 0;
+	}
+	return false;
+}
+
+/* Per area of the sphere, with rho^2 as the share of the cap's height. */
+static double cap_pdf(const struct surface_light *l, const struct spot_around *s, double rho2)
+{
+	double half = sin(0.5 * s->radius);
+	return rho2 < 1 ? (1 - rho2) / (2 * M_PI * l->surface.radius * l->surface.radius * half * half) : 0;
+}
+
+static bool sample_sphere(const struct surface_light *l, vec3 ref, const double u[2], struct emitter_point *x,
+			  double *pdf)
+{
+	struct spot_around s;
+	if (!spot_of_sphere(l, ref, &s))
+		return false;
+	struct frame f = frame_around(s.axis);
+	double rho = sample_rho(u[0]), half = rho * sin(0.5 * s.radius), q = 2 * half * half, r = sqrt(q * (2 - q)),
+	       phi = 2 * M_PI * u[1];
+	surface_light_on_sphere(l, frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), 1 - q}), x);
+	*pdf = cap_pdf(l, &s, rho * rho);
+	return *pdf > 0;
+}
+
+static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x, double *pdf)
+{
+	const struct beam *b = em->data;
+	x->infinite = false;
+	if (b->is_plane)
+		return sample_plane(b, ref, u, x, pdf);
+	if (is_outward_sphere(&b->light))
+		return sample_sphere(&b->light, ref, u, x, pdf);
+	return surface_light_sample_point(em, u, x, pdf);
+}
+
+static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
+{
+	const struct beam *b = em->data;
+	struct spot_around s;
+	if (b->is_plane) {
+		if (!spot_of_plane(b, ref, &s))
+			return 0;
+		vec3 c = vec3_cross(s.axis, vec3_sub(x->p, s.center));
+		return disc_pdf(&s, vec3_dot(c, c) / (s.radius * s.radius));
+	}
+	if (!is_outward_sphere(&b->light))
+		return 1 / b->light.area;
+	if (!spot_of_sphere(&b->light, ref, &s))
+		return 0;
+	/* From the chord, which has all digits. */
+	vec3 off = vec3_sub(vec3_normalize(vec3_sub(x->p, b->light.surface.center)), s.axis);
+	double half = sin(0.5 * s.radius);
+	return cap_pdf(&b->light, &s, vec3_dot(off, off) / (4 * half * half));
+}
+
+const struct emitter_ops emitter_ops_directionalarea = {
+	.type = "directionalarea",
+	.params = params,
+	.needs_surface = true,
+	.create = create,
+	.radiance = radiance,
+	.sample_point = surface_light_sample_point,
+	.pdf_point = surface_light_pdf_point,
+	.point_inverse = surface_light_point_inverse,
+	.sample_direction = sample_direction,
+	.pdf_direction = pdf_direction,
+	.sample_toward = sample_toward,
+	.pdf_toward = pdf_toward,
+};
