@@ -8,6 +8,7 @@
  * 0.2 %, so 2 % would be found. Integrals by the midpoint rule are exact to 1e-4.
  */
 #include "tests/support/bodies.h"
+#include "tests/support/length.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
@@ -24,14 +25,15 @@ static const double power = 2.5, half_angle = 1e-3;
 #define EYE SENSOR("0,0,9", "0,0,0")
 static const struct wavelengths grey = {.grey = true};
 
-/* 2 x 3, tilted and far from the origin, so that its corners are rounded. */
-static struct world *plane_beam(void)
+/* Tilted and far from the origin, so that its corners are rounded. */
+static struct world *plane_beam(const char *shape)
 {
 	return world_of_text(
 		8, 8,
 		EYE
-		"<shape type='rectangle'><transform name='to_world'><scale x='1' y='1.5'/><rotate x='1' y='.5' z='.2' angle='37'/>"
-		"<translate x='5.3' y='-2.1' z='3.7'/></transform>" BEAM "</shape>");
+		"<shape type='%s'><transform name='to_world'><scale x='1' y='1.5'/><rotate x='1' y='.5' z='.2' angle='37'/>"
+		"<translate x='5.3' y='-2.1' z='3.7'/></transform>" BEAM "</shape>",
+		shape);
 }
 
 static struct world *sphere_beam(const char *flip)
@@ -61,8 +63,8 @@ static void check_directions(const struct emitter *em, const char *name)
 		assert_true(em->ops->sample_direction(em, &x, v, &w, &pdf));
 		assert_true(fabs(vec3_length(w) - 1) < 1e-12 && acos(fmin(vec3_dot(w, x.n), 1)) < 1.0001 * half_angle);
 		assert_true(fabs(em->ops->pdf_direction(em, &x, w) / pdf - 1) < 1e-9);
-		/* Power per area: L cos / pdf. */
-		assert_true(fabs(emitted(em, &x, w) * vec3_dot(w, x.n) / pdf / power - 1) < 1e-9);
+		/* Power per area: L cos / pdf. The normals of a disk's triangles differ by the rounding of its rim. */
+		assert_true(fabs(emitted(em, &x, w) * vec3_dot(w, x.n) / pdf / power - 1) < 1e-6);
 		assert_true(emitted(em, &x, vec3_neg(w)) == 0);
 	}
 	struct emitter_point x;
@@ -75,7 +77,7 @@ static void check_directions(const struct emitter *em, const char *name)
 		double ring = 2 * M_PI * sin(angle) * width;
 		sum += em->ops->pdf_direction(em, &x, w) * ring;
 		flux += emitted(em, &x, w) * cos(angle) * ring;
-		assert_true(angle < half_angle || emitted(em, &x, w) == 0);
+		assert_true(angle < 1.001 * half_angle || emitted(em, &x, w) == 0);
 		assert_true(emitted(em, &x, w) <= em->brightest);
 	}
 	print_message("%s: density %.6f, power per area %.6f\n", name, sum, flux);
@@ -85,9 +87,9 @@ static void check_directions(const struct emitter *em, const char *name)
 static void test_directions(void **state)
 {
 	(void)state;
-	struct world *w[] = {plane_beam(), sphere_beam("false"), sphere_beam("true")};
-	static const char *const names[] = {"plane", "sphere", "sphere, inwards"};
-	for (int i = 0; i < 3; i++) {
+	struct world *w[] = {plane_beam("rectangle"), plane_beam("disk"), sphere_beam("false"), sphere_beam("true")};
+	static const char *const names[] = {"rectangle", "disk", "sphere", "sphere, inwards"};
+	for (int i = 0; i < 4; i++) {
 		check_directions(&w[i]->emitters[0], names[i]);
 		world_free(w[i]);
 	}
@@ -121,35 +123,47 @@ static void expect_irradiance(const struct emitter *em, vec3 ref, vec3 n, double
 	print_message("%s: %.5f +- %.5f, expected %.5f\n", name, m.mean, m.error, expected);
 	if (fabs(m.mean - expected) > 8 * m.error + 1e-4 * expected)
 		fail_msg("%s: %g +- %g instead of %g", name, m.mean, m.error, expected);
-	assert_true(m.error <= 0.002 * expected);
+	assert_true(test_scaled() || m.error <= 0.002 * expected);
 }
 
-static void test_plane(void **state)
+/* Normal of a plane, from points that are far apart. */
+static vec3 plane_normal(const struct emitter *em)
 {
-	(void)state;
-	struct world *w = plane_beam();
+	static const double u[3][2] = {{0.1, 0.3}, {0.45, 0.9}, {0.8, 0.6}};
+	struct emitter_point x[3];
+	double pdf;
+	for (int i = 0; i < 3; i++)
+		assert_true(em->ops->sample_point(em, u[i], &x[i], &pdf));
+	vec3 n = vec3_normalize(vec3_cross(vec3_sub(x[1].p, x[0].p), vec3_sub(x[2].p, x[0].p)));
+	return vec3_dot(n, x[0].n) > 0 ? n : vec3_neg(n);
+}
+
+static void check_plane(const char *shape)
+{
+	struct world *w = plane_beam(shape);
 	const struct emitter *em = &w->emitters[0];
 	struct emitter_point x;
 	double pdf;
-	const double distances[] = {1e-3, 0.1, 3, 100};
+	const double distances[] = {1e-3, 0.1, 3, 10};
 	assert_true(em->ops->sample_point(em, (double[]){0.4, 0.7}, &x, &pdf));
+	vec3 n = plane_normal(em);
 	double side = sqrt(1 / pdf); /* of a square of that area, in the rescaled world */
 	for (int i = 0; i < 4; i++) {
 		char name[64];
-		snprintf(name, sizeof name, "plane at %g", distances[i]);
-		vec3 ref = vec3_madd(x.p, distances[i] * side, x.n);
-		expect_irradiance(em, ref, vec3_neg(x.n), power, name);
+		snprintf(name, sizeof name, "%s at %g", shape, distances[i]);
+		vec3 ref = vec3_madd(x.p, distances[i] * side, n);
+		expect_irradiance(em, ref, vec3_neg(n), power, name);
 	}
 	/* Behind it, and beside it. */
-	struct frame f = frame_around(x.n);
-	struct stats_mean behind = irradiance(em, vec3_madd(x.p, -side, x.n), x.n, "behind");
+	struct frame f = frame_around(n);
+	struct stats_mean behind = irradiance(em, vec3_madd(x.p, -side, n), n, "behind");
 	struct stats_mean beside =
-		irradiance(em, vec3_madd(vec3_madd(x.p, side, x.n), 3 * side, f.s), vec3_neg(x.n), "beside");
+		irradiance(em, vec3_madd(vec3_madd(x.p, side, n), 3 * side, f.s), vec3_neg(n), "beside");
 	assert_true(behind.mean == 0 && beside.mean == 0);
 	/* The density integrates to one over what it covers: the disc around the projection. */
 	enum { RINGS = 4000 };
 	double t = 0.5 * side, sum = 0;
-	vec3 ref = vec3_madd(x.p, t, x.n);
+	vec3 ref = vec3_madd(x.p, t, n);
 	for (int i = 0; i < RINGS; i++) {
 		double width = 1.2 * t * half_angle / RINGS, r = (i + 0.5) * width;
 		struct emitter_point y = x;
@@ -158,6 +172,13 @@ static void test_plane(void **state)
 	}
 	assert_true(fabs(sum - 1) < 1e-4);
 	world_free(w);
+}
+
+static void test_plane(void **state)
+{
+	(void)state;
+	check_plane("rectangle");
+	check_plane("disk");
 }
 
 static void test_sphere(void **state)
