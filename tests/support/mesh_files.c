@@ -107,6 +107,58 @@ static void put_compressed(struct mesh_file *f, const struct mesh_file *from)
 	f->size += size;
 }
 
+static void put_text(struct mesh_file *f, const char *text)
+{
+	put_bits(f, strlen(text), 4, 0);
+	append(f, text, strlen(text));
+}
+
+/* Flags are those of version 4. Both maps are there, and behind the colours an attribute of the triangles, and one that
+ * a spectral variant wrote. */
+void mesh_stream_5(struct mesh_file *f, uint32_t flags, int scale)
+{
+	f->size = 0;
+	put_bits(f, (flags & 1) | (flags & 2) << 1 | (flags & 16) | 0x1000, 4, 0);
+	put_text(f, "a solid");
+	put_bits(f, SOLID_VERTICES, 8, 0);
+	put_bits(f, SOLID_TRIANGLES, 8, 0);
+	put_bits(f, SOLID_VERTICES, 8, 0);
+	put_bits(f, 1, 8, 0);
+	for (int i = 0; i < SOLID_VERTICES; i++) {
+		for (int c = 0; c < 3; c++)
+			put_real(f, scale * solid_position[i][c], 0, 0);
+		for (int c = 0; c < 3; c++)
+			put_real(f, flags & 1 ? 5 * solid_position[i][c] : 0, 0, 0);
+		for (int c = 0; c < 2; c++)
+			put_real(f, flags & 2 ? solid_uv[i][c] : 0, 0, 0);
+	}
+	for (int i = 0; i < SOLID_TRIANGLES; i++)
+		for (int c = 0; c < 4; c++)
+			put_bits(f, c < 3 ? solid_index[i][c] : 0, 4, 0);
+	for (int i = 0; i < SOLID_VERTICES; i++)
+		put_bits(f, (uint64_t)i, 4, 0);
+	for (int i = 0; i < SOLID_VERTICES; i++)
+		put_bits(f, 0, 4, 0);
+	put_bits(f, flags & 8 ? 3 : 0, 4, 0);
+	if (!(flags & 8))
+		return;
+	put_text(f, "vertex_color");
+	put_bits(f, 0, 1, 0);
+	put_bits(f, 3, 4, 0);
+	for (int i = 0; i < 3 * SOLID_VERTICES; i++)
+		put_real(f, SOLID_COLOUR(i), 0, 0);
+	put_text(f, "vertex_spectral");
+	put_bits(f, 1, 1, 0);
+	put_bits(f, 3, 4, 0);
+	for (int i = 0; i < 3 * SOLID_VERTICES; i++)
+		put_real(f, 1, 0, 0);
+	put_text(f, "face_heat");
+	put_bits(f, 0, 1, 0);
+	put_bits(f, 1, 4, 0);
+	for (int i = 0; i < SOLID_TRIANGLES; i++)
+		put_real(f, SOLID_COLOUR(i), 0, 0);
+}
+
 void mesh_file_serialized(struct mesh_file *f, int version, int doubles, uint32_t flags, int meshes)
 {
 	static struct mesh_file one;
@@ -117,6 +169,11 @@ void mesh_file_serialized(struct mesh_file *f, int version, int doubles, uint32_
 		put_bits(f, 0x041c, 2, 0);
 		put_bits(f, (uint64_t)version, 2, 0);
 		one.size = 0;
+		if (version == 5) {
+			mesh_stream_5(&one, flags, k + 1);
+			put_compressed(f, &one);
+			continue;
+		}
 		put_bits(&one, flags | (doubles ? 0x2000 : 0x1000), 4, 0);
 		if (version == 4)
 			append(&one, "a solid", sizeof "a solid");
@@ -142,4 +199,14 @@ void mesh_file_serialized(struct mesh_file *f, int version, int doubles, uint32_
 	for (int k = 0; k < meshes; k++)
 		put_bits(f, offset[k], version == 3 ? 4 : 8, 0);
 	put_bits(f, (uint64_t)meshes, 4, 0);
+}
+
+void mesh_file_of_stream_5(struct mesh_file *f, const struct mesh_file *stream)
+{
+	f->size = 0;
+	put_bits(f, 0x041c, 2, 0);
+	put_bits(f, 5, 2, 0);
+	put_compressed(f, stream);
+	put_bits(f, 0, 8, 0);
+	put_bits(f, 1, 4, 0);
 }

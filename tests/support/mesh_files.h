@@ -25,5 +25,9 @@ enum ply_kind { PLY_ASCII, PLY_LITTLE, PLY_BIG, PLY_KINDS };
 void mesh_file_ply(struct mesh_file *f, enum ply_kind kind);
 /* `meshes` octahedra in one file, the k-th scaled by k + 1. */
 void mesh_file_serialized(struct mesh_file *f, int version, int doubles, uint32_t flags, int meshes);
+/* What a mesh of version 5 has inside, and the file of one. Flags are those of version 4. Both maps are there, and
+ * behind the colours an attribute of the triangles, and one that a spectral variant wrote. */
+void mesh_stream_5(struct mesh_file *f, uint32_t flags, int scale);
+void mesh_file_of_stream_5(struct mesh_file *f, const struct mesh_file *stream);
 
 #endif

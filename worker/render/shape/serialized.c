@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Mitsuba's own binary meshes (.serialized, versions 3 and 4): any number of meshes in one file, each compressed by
+ * Mitsuba's own binary meshes (.serialized, versions 3 to 5): any number of meshes in one file, each compressed by
  * itself, found through a table of offsets at the file's end; `shape_index` selects one.
  *
- * A mesh is a magic number, a version, and a zlib stream: flags, a name (version 4), counts, positions, then normals,
- * texture coordinates and colours by the flags, and triangles. Everything is little endian.
+ * A mesh is a magic number, a version, and a zlib stream: flags, a name (from version 4 on), counts, positions, then
+ * normals, texture coordinates and colours by the flags, and triangles. Version 5 has a record of eight floats for each
+ * vertex instead, one of four integers for each triangle, two maps from vertices to places and to normals that only an
+ * editor needs, and named attributes. Everything is little endian.
  *
  * Failures: a table that exceeds the file, a stream that is damaged or ends too early, indices out of range, numbers
- * that are not finite. Counts are checked against what the compressed bytes could hold.
+ * that are not finite, tangents (of version 5, which hide the normals), several BSDFs in one mesh. Counts are checked
+ * against what the compressed bytes could hold.
  */
 #include "common/base/bytes.h"
 #include "common/base/liveness.h"
@@ -19,9 +22,12 @@
 #define ZLIB_CONST
 #include <zlib.h>
 
-enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, NAME_MAX_BYTES = 1 << 16, CHUNK_ITEMS = 1024 };
+enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, VERSION_5 = 5, NAME_MAX_BYTES = 1 << 16, CHUNK_ITEMS = 1024 };
 enum { ZLIB_RATIO = 1032 /* a byte of deflate represents at most this many */ };
 enum { HAS_NORMALS = 1, HAS_UV = 2, HAS_COLOURS = 8, HAS_FACE_NORMALS = 16, DOUBLES = 0x2000 };
+
+/* Of version 5. */
+enum { HAS_TANGENTS_5 = 2, HAS_UV_5 = 4, FLOATS = 0x1000, RECORD = 32, FACE_RECORD = 16, ATTRIBUTES_MAX = 64 };
 
 struct stream {
 	const struct scene_node *node;
@@ -69,6 +75,23 @@ static int take_number(struct stream *s, int bytes, uint64_t *x)
 	return r;
 }
 
+static double float_of(const unsigned char *raw)
+{
+	uint32_t bits = (uint32_t)get_bytes(raw, 4);
+	float f;
+	memcpy(&f, &bits, sizeof f);
+	return (double)f;
+}
+
+static int skip(struct stream *s, uint64_t size)
+{
+	unsigned char raw[4096];
+	int r = 0;
+	for (; !r && size > 0; size -= size < sizeof raw ? size : sizeof raw)
+		r = read_stream(s, raw, size < sizeof raw ? (size_t)size : sizeof raw);
+	return r;
+}
+
 static int skip_name(struct stream *s)
 {
 	char c;
@@ -93,13 +116,10 @@ static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint3
 			return r;
 		for (size_t i = 0; i < n; i++) {
 			uint64_t bits = get_bytes(raw + i * (size_t)size, size);
-			uint32_t low = (uint32_t)bits;
-			float f;
-			memcpy(&f, &low, sizeof f);
 			if (doubles)
 				memcpy(out, &bits, sizeof *out);
 			else
-				*out = (double)f;
+				*out = float_of(raw + 4 * i);
 			if (must_be_finite && !(fabs(*out) <= MESH_COORDINATE_MAX))
 				return file_error(s, "a number that is not finite, or beyond 1e60");
 			out++;
@@ -157,11 +177,152 @@ static int check_end(struct stream *s)
 	return inflate(&s->z, Z_SYNC_FLUSH) == Z_DATA_ERROR ? file_error(s, "the compressed mesh is damaged") : 0;
 }
 
-static int take_mesh(struct stream *s, int version, struct arena *arena, struct shape_geometry *out)
+/* A length and so many bytes, ended by 0 in out. */
+static int take_text(struct stream *s, char *out, size_t room)
+{
+	uint64_t length = 0;
+	int r = take_number(s, 4, &length);
+	if (!r && length >= room)
+		return file_error(s, "a name that is too long");
+	if (!r)
+		r = read_stream(s, out, (size_t)length);
+	out[r ? 0 : length] = 0;
+	return r;
+}
+
+/* Position, normal, texture coordinates; what a mesh has not is 0 and not looked at. */
+static int take_records(struct stream *s, struct mesh *m)
+{
+	unsigned char raw[128 * RECORD];
+	for (uint32_t done = 0; done < m->vertex_count;) {
+		uint32_t left = m->vertex_count - done, n = left < sizeof raw / RECORD ? left : sizeof raw / RECORD;
+		int r = read_stream(s, raw, (size_t)n * RECORD);
+		if (r)
+			return r;
+		for (uint32_t i = 0; i < n; i++, done++)
+			for (int lane = 0; lane < 8; lane++) {
+				double *to = lane < 3	? &m->position[done][lane]
+					     : lane < 6 ? m->normal ? &m->normal[done][lane - 3] : NULL
+					     : m->uv	? &m->uv[done][lane - 6]
+							: NULL;
+				if (!to)
+					continue;
+				*to = float_of(raw + RECORD * (size_t)i + 4 * lane);
+				if (!(fabs(*to) <= MESH_COORDINATE_MAX))
+					return file_error(s, "a number that is not finite, or beyond 1e60");
+			}
+	}
+	return 0;
+}
+
+static int take_face_records(struct stream *s, struct mesh *m)
+{
+	unsigned char raw[256 * FACE_RECORD];
+	for (uint32_t done = 0; done < m->triangle_count;) {
+		uint32_t left = m->triangle_count - done,
+			 n = left < sizeof raw / FACE_RECORD ? left : sizeof raw / FACE_RECORD;
+		int r = read_stream(s, raw, (size_t)n * FACE_RECORD);
+		if (r)
+			return r;
+		for (uint32_t i = 0; i < n; i++, done++) {
+			const unsigned char *face = raw + FACE_RECORD * (size_t)i;
+			for (int k = 0; k < 3; k++) {
+				m->index[done][k] = (uint32_t)get_bytes(face + 4 * k, 4);
+				if (m->index[done][k] >= m->vertex_count)
+					return file_error(s, "a triangle's index is out of range");
+			}
+			if (get_bytes(face + 12, 4) != 0)
+				return node_error(s->node, s->error, ENOTSUP,
+						  "%s: a mesh of several BSDFs is not supported", s->name);
+		}
+	}
+	return 0;
+}
+
+/* Coefficients of a spectral variant are no colours: such an attribute is left out. */
+static int take_attribute(struct stream *s, struct mesh *m, uint32_t room, struct arena *arena)
+{
+	char name[ATTRIBUTE_NAME_MAX];
+	uint64_t coefficients, channels;
+	int r = take_text(s, name, sizeof name);
+	if (!r)
+		r = take_number(s, 1, &coefficients);
+	if (!r)
+		r = take_number(s, 4, &channels);
+	if (r)
+		return r;
+	bool per_face = strncmp(name, "face_", 5) == 0;
+	uint64_t items = per_face ? m->triangle_count : m->vertex_count;
+	if (!per_face && strncmp(name, "vertex_", 7) != 0)
+		return file_error(s, "an attribute that is neither of vertices nor of faces");
+	if (channels < 1 || channels > ATTRIBUTE_CHANNELS_MAX || items > s->most / (4 * channels))
+		return file_error(s, "an attribute of more numbers than there can be");
+	if (coefficients & 1)
+		return skip(s, 4 * items * channels);
+	struct attribute *a = mesh_add_attribute(m, name, per_face, (uint32_t)channels, room, arena);
+	if (!a)
+		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
+	for (uint64_t i = 0; !r && i < items; i++) {
+		unsigned char raw[4 * ATTRIBUTE_CHANNELS_MAX];
+		r = read_stream(s, raw, 4 * (size_t)channels);
+		for (uint32_t k = 0; !r && k < channels; k++)
+			mesh_set_attribute(a, i, k, float_of(raw + 4 * k));
+	}
+	return r;
+}
+
+static int take_attributes(struct stream *s, struct mesh *m, struct arena *arena)
+{
+	uint64_t count;
+	int r = take_number(s, 4, &count);
+	if (!r && count > ATTRIBUTES_MAX)
+		return file_error(s, "more than 64 attributes");
+	for (uint64_t i = 0; !r && i < count; i++)
+		r = take_attribute(s, m, (uint32_t)count, arena);
+	return r;
+}
+
+static int take_mesh_5(struct stream *s, struct arena *arena, struct shape_geometry *out, uint64_t *flags)
 {
 	struct mesh *m = &out->mesh;
-	uint64_t flags, vertices, triangles;
-	int r = take_number(s, 4, &flags);
+	uint64_t length = 0, count[4] = {0}; /* of vertices, triangles, places, normals */
+	int r = take_number(s, 4, flags);
+	if (!r)
+		r = take_number(s, 4, &length);
+	if (!r)
+		r = length > NAME_MAX_BYTES ? file_error(s, "a name that is too long") : skip(s, length);
+	for (int i = 0; !r && i < 4; i++)
+		r = take_number(s, 8, &count[i]);
+	if (r)
+		return r;
+	if (!(*flags & FLOATS) || count[2] > count[0] || count[3] > count[0])
+		return file_error(s, "the head of the mesh is damaged");
+	if (*flags & HAS_TANGENTS_5)
+		return node_error(s->node, s->error, ENOTSUP, "%s: shading tangents are not supported", s->name);
+	if (count[0] == 0 || count[1] == 0)
+		return file_error(s, "the mesh has no triangles");
+	if (count[1] > MESH_TRIANGLES_MAX || count[0] >= UINT32_MAX || count[0] > s->most / RECORD ||
+	    count[1] > s->most / FACE_RECORD)
+		return file_error(s, "more vertices or triangles than there can be");
+	if (!mesh_alloc(m, (uint32_t)count[0], (uint32_t)count[1], *flags & HAS_NORMALS, *flags & HAS_UV_5, arena))
+		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
+	r = take_records(s, m);
+	if (!r)
+		r = take_face_records(s, m);
+	if (!r)
+		r = skip(s, count[2] > 0 ? 4 * count[0] : 0);
+	if (!r)
+		r = skip(s, count[3] > 0 ? 4 * count[0] : 0);
+	if (!r)
+		r = take_attributes(s, m, arena);
+	return r;
+}
+
+static int take_mesh_3(struct stream *s, int version, struct arena *arena, struct shape_geometry *out, uint64_t *flags)
+{
+	struct mesh *m = &out->mesh;
+	uint64_t vertices, triangles;
+	int r = take_number(s, 4, flags);
 	if (!r && version == VERSION_4)
 		r = skip_name(s);
 	if (!r)
@@ -170,7 +331,7 @@ static int take_mesh(struct stream *s, int version, struct arena *arena, struct 
 		r = take_number(s, 8, &triangles);
 	if (r)
 		return r;
-	bool doubles = flags & DOUBLES, normals = flags & HAS_NORMALS, uv = flags & HAS_UV;
+	bool doubles = *flags & DOUBLES, normals = *flags & HAS_NORMALS, uv = *flags & HAS_UV;
 	if (vertices == 0 || triangles == 0)
 		return file_error(s, "the mesh has no triangles");
 	if (triangles > MESH_TRIANGLES_MAX || vertices >= UINT32_MAX || vertices > s->most / (doubles ? 24 : 12) ||
@@ -183,13 +344,21 @@ static int take_mesh(struct stream *s, int version, struct arena *arena, struct 
 		r = take_reals(s, doubles, true, m->vertex_count, 3, m->normal[0]);
 	if (!r && uv)
 		r = take_reals(s, doubles, true, m->vertex_count, 2, m->uv[0]);
-	if (!r && (flags & HAS_COLOURS))
+	if (!r && (*flags & HAS_COLOURS))
 		r = take_colours(s, doubles, m, arena);
 	if (!r)
 		r = take_triangles(s, m);
+	return r;
+}
+
+static int take_mesh(struct stream *s, int version, struct arena *arena, struct shape_geometry *out)
+{
+	uint64_t flags = 0;
+	int r = version == VERSION_5 ? take_mesh_5(s, arena, out, &flags) : take_mesh_3(s, version, arena, out, &flags);
 	if (!r)
 		r = check_end(s);
-	for (uint32_t i = 0; !r && normals && i < m->vertex_count; i++)
+	const struct mesh *m = &out->mesh;
+	for (uint32_t i = 0; !r && m->normal && i < m->vertex_count; i++)
 		mesh_store(m->normal[i], mesh_unit(mesh_load(m->normal[i])));
 	out->face_normals = flags & HAS_FACE_NORMALS;
 	return r;
@@ -202,8 +371,8 @@ static int find_mesh(const struct stream *s, const struct asset *a, uint64_t ind
 	if (a->size < HEAD + 4 || get_bytes(a->bytes, 2) != MAGIC)
 		return file_error(s, "this is not a serialized mesh");
 	uint64_t version = get_bytes(a->bytes + 2, 2);
-	if (version != VERSION_3 && version != VERSION_4)
-		return node_error(s->node, s->error, ENOTSUP, "%s: version %llu is not supported (supported: 3, 4)",
+	if (version < VERSION_3 || version > VERSION_5)
+		return node_error(s->node, s->error, ENOTSUP, "%s: version %llu is not supported (supported: 3, 4, 5)",
 				  s->name, (unsigned long long)version);
 	uint64_t count = get_bytes(a->bytes + a->size - 4, 4);
 	int width = version == VERSION_3 ? 4 : 8;

@@ -111,8 +111,8 @@ static void test_serialized(void **state)
 {
 	(void)state;
 	static struct mesh_file f;
-	for (int version = 3; version <= 4; version++)
-		for (int doubles = 0; doubles < 2; doubles++)
+	for (int version = 3; version <= 5; version++)
+		for (int doubles = 0; doubles < (version == 5 ? 1 : 2); doubles++)
 			for (uint32_t flags = 0; flags < 16; flags++) {
 				if (flags & 4)
 					continue; /* tangents were never written */
@@ -123,8 +123,33 @@ static void test_serialized(void **state)
 				assert_solid("serialized", "<integer name='shape_index' value='2'/>", &f, 3, true,
 					     flags & 2, false);
 			}
-	mesh_file_serialized(&f, 4, 0, 1 | 16, 1);
-	assert_solid("serialized", "", &f, 1, false, false, false);
+	for (int version = 4; version <= 5; version++) {
+		mesh_file_serialized(&f, version, 0, 1 | 16, 1);
+		assert_solid("serialized", "", &f, 1, false, false, false);
+	}
+}
+
+/* Version 5 has named attributes, of which one with coefficients of spectra is left out. */
+static void test_serialized_attributes(void **state)
+{
+	(void)state;
+	static struct mesh_file f;
+	mesh_file_serialized(&f, 5, 0, 11, 1);
+	struct built b = build("serialized", "", f.bytes, f.size);
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(m->attribute_count, 2);
+	const struct attribute *colour = &m->attributes[0], *heat = &m->attributes[1];
+	assert_string_equal(colour->name, "vertex_color");
+	assert_true(colour->channels == 3 && !colour->per_face && !colour->encoded && !colour->damaged);
+	for (int i = 0; i < 3 * SOLID_VERTICES; i++)
+		assert_true(colour->value[i] == (float)SOLID_COLOUR(i));
+	assert_string_equal(heat->name, "face_heat");
+	assert_true(heat->channels == 1 && heat->per_face);
+	for (int i = 0; i < SOLID_TRIANGLES; i++)
+		assert_true(heat->value[i] == (float)SOLID_COLOUR(i));
+	release(&b);
 }
 
 static void refuses(const char *type, const char *content, const void *bytes, size_t size, const char *text)
@@ -248,7 +273,7 @@ static void test_bad_serialized(void **state)
 		"m: shape_index=2, but it holds 2 meshes, counted from 0");
 	g = f;
 	g.bytes[2] = 9;
-	refuses("serialized", "", g.bytes, g.size, "m: version 9 is not supported (supported: 3, 4)");
+	refuses("serialized", "", g.bytes, g.size, "m: version 9 is not supported (supported: 3, 4, 5)");
 	g = f;
 	g.bytes[g.size - 1] = 0xff;
 	refuses("serialized", "", g.bytes, g.size, "the table of meshes at its end is damaged");
@@ -261,12 +286,69 @@ static void test_bad_serialized(void **state)
 	refuses("serialized", "", g.bytes, g.size, "m: the compressed mesh is damaged");
 }
 
+/* Each number of version 5 that can be wrong behind a good checksum. */
+static void test_bad_serialized_5(void **state)
+{
+	(void)state;
+	enum { RECORDS = 47, FACES = RECORDS + 32 * SOLID_VERTICES, ATTRIBUTES = FACES + 16 * SOLID_TRIANGLES + 48 };
+	static const struct {
+		size_t at;
+		uint32_t value;
+		const char *text;
+	} bad[] = {
+		{0, 0x1007, "m: shading tangents are not supported"},
+		{0, 0x0005, "m: the head of the mesh is damaged"},
+		{4, 1 << 30, "m: a name that is too long"},
+		{15, 0, "m: the head of the mesh is damaged"}, /* no vertices, but places */
+		{19, 1, "m: more vertices or triangles than there can be"},
+		{27, 1, "m: more vertices or triangles than there can be"},
+		{31, 7, "m: the head of the mesh is damaged"},
+		{39, 7, "m: the head of the mesh is damaged"},
+		{RECORDS, 0x7f800000, "m: a number that is not finite, or beyond 1e60"},
+		{RECORDS + 28, 0x7fc00000, "m: a number that is not finite, or beyond 1e60"},
+		{FACES, SOLID_VERTICES, "m: a triangle's index is out of range"},
+		{FACES + 12, 1, "m: a mesh of several BSDFs is not supported"},
+		{ATTRIBUTES, 65, "m: more than 64 attributes"},
+		{ATTRIBUTES, 4, "m: the compressed mesh is damaged or ends too early"},
+		{ATTRIBUTES + 4, 200, "m: a name that is too long"},
+		{ATTRIBUTES + 8, 0, "m: an attribute that is neither of vertices nor of faces"},
+		{ATTRIBUTES + 21, 5, "m: an attribute of more numbers than there can be"},
+		{ATTRIBUTES + 21, 0, "m: an attribute of more numbers than there can be"},
+	};
+	static struct mesh_file f, good, g;
+	mesh_stream_5(&good, 11, 1);
+	mesh_file_of_stream_5(&f, &good);
+	assert_solid("serialized", "", &f, 1, true, true, false);
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+		g = good;
+		for (int k = 0; k < 4; k++)
+			g.bytes[bad[i].at + (size_t)k] = (unsigned char)(bad[i].value >> 8 * k);
+		mesh_file_of_stream_5(&f, &g);
+		refuses("serialized", "", f.bytes, f.size, bad[i].text);
+	}
+	/* Any prefix of what is inside, and any of its bytes changed. */
+	struct dice d = dice_of("damaged streams");
+	for (size_t i = 0; i < 3000; i++) {
+		g = good;
+		if (i < good.size)
+			g.size = i;
+		else
+			g.bytes[dice_below(&d, (uint32_t)g.size)] = (unsigned char)dice_below(&d, 256);
+		mesh_file_of_stream_5(&f, &g);
+		struct built b = build("serialized", "", f.bytes, f.size);
+		assert_true(b.result < 0 || (b.result == 0 && i >= good.size));
+		for (uint32_t k = 0; b.result == 0 && k < 3 * b.g.mesh.triangle_count; k++)
+			assert_true(b.g.mesh.index[k / 3][k % 3] < b.g.mesh.vertex_count);
+		release(&b);
+	}
+}
+
 /* Any prefix, and any file with some bytes changed: a mesh or an error, never more (sanitizers watch). */
 static void test_damage(void **state)
 {
 	(void)state;
 	static struct mesh_file f, g;
-	for (int kind = 0; kind < PLY_KINDS + 2; kind++) {
+	for (int kind = 0; kind < PLY_KINDS + 3; kind++) {
 		const char *type = kind < PLY_KINDS ? "ply" : "serialized";
 		if (kind < PLY_KINDS)
 			mesh_file_ply(&f, (enum ply_kind)kind);
@@ -329,9 +411,11 @@ int main(void)
 		cmocka_unit_test(test_ply),
 		cmocka_unit_test(test_ply_polygons),
 		cmocka_unit_test(test_serialized),
+		cmocka_unit_test(test_serialized_attributes),
 		cmocka_unit_test(test_bad_ply),
 		cmocka_unit_test(test_normals_that_are_none),
 		cmocka_unit_test(test_bad_serialized),
+		cmocka_unit_test(test_bad_serialized_5),
 		cmocka_unit_test(test_damage),
 		cmocka_unit_test(test_memory_runs_out),
 	};
