@@ -38,7 +38,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 		"0 0 0 1 2 1 2 3\n1 0 0 3 4 4 5 6\n1 1 0 5 6 7 8 9\n0 1 0 7 8 0 0 0\n0.5 4 0 1 2 3 7\n0 3 0 0 1 8\n";
 	memcpy(f.bytes, attributes, f.size = sizeof attributes - 1);
 	write_seed(1, 20, &f);
-	for (int version = 3; version <= 4; version++) {
+	for (int version = 3; version <= 5; version++) {
 		mesh_file_serialized(&f, version, version == 4, 11, 2);
 		write_seed(2, 10 + (uint64_t)version, &f);
 	}
