@@ -75,14 +75,6 @@ static int take_number(struct stream *s, int bytes, uint64_t *x)
 	return r;
 }
 
-static double float_of(const unsigned char *raw)
-{
-	uint32_t bits = (uint32_t)get_bytes(raw, 4);
-	float f;
-	memcpy(&f, &bits, sizeof f);
-	return (double)f;
-}
-
 static int skip(struct stream *s, uint64_t size)
 {
 	unsigned char raw[4096];
@@ -116,10 +108,13 @@ static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint3
 			return r;
 		for (size_t i = 0; i < n; i++) {
 			uint64_t bits = get_bytes(raw + i * (size_t)size, size);
+			uint32_t low = (uint32_t)bits;
+			float f;
+			memcpy(&f, &low, sizeof f);
 			if (doubles)
 				memcpy(out, &bits, sizeof *out);
 			else
-				*out = float_of(raw + 4 * i);
+				*out = (double)f;
 			if (must_be_finite && !(fabs(*out) <= MESH_COORDINATE_MAX))
 				return file_error(s, "a number that is not finite, or beyond 1e60");
 			out++;
@@ -129,41 +124,51 @@ static int take_reals(struct stream *s, bool doubles, bool must_be_finite, uint3
 	return 0;
 }
 
-/* Linear, with Mitsuba 3's name. */
-static int take_colours(struct stream *s, bool doubles, struct mesh *m, struct arena *arena)
+static int take_values(struct stream *s, bool doubles, uint32_t items, struct attribute *a)
 {
 	enum { AT_ONCE = 256 };
-	double rgb[3 * AT_ONCE];
-	struct attribute *a = mesh_add_attribute(m, "vertex_color", false, 3, 1, arena);
-	if (!a)
-		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
-	for (uint32_t done = 0; done < m->vertex_count;) {
-		uint32_t n = m->vertex_count - done < AT_ONCE ? m->vertex_count - done : AT_ONCE;
-		int r = take_reals(s, doubles, false, n, 3, rgb);
+	double x[ATTRIBUTE_CHANNELS_MAX * AT_ONCE];
+	for (uint32_t done = 0; done < items;) {
+		uint32_t n = items - done < AT_ONCE ? items - done : AT_ONCE;
+		int r = take_reals(s, doubles, false, n, (int)a->channels, x);
 		if (r)
 			return r;
-		for (uint32_t i = 0; i < 3 * n; i++)
-			mesh_set_attribute(a, done + i / 3, i % 3, rgb[i]);
+		for (uint32_t i = 0; i < n * a->channels; i++)
+			mesh_set_attribute(a, done + i / a->channels, i % a->channels, x[i]);
 		done += n;
 	}
 	return 0;
 }
 
-static int take_triangles(struct stream *s, struct mesh *m)
+/* Linear, with Mitsuba 3's name. */
+static int take_colours(struct stream *s, bool doubles, struct mesh *m, struct arena *arena)
 {
-	unsigned char raw[CHUNK_ITEMS * 12];
+	struct attribute *a = mesh_add_attribute(m, "vertex_color", false, 3, 1, arena);
+	if (!a)
+		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
+	return take_values(s, doubles, m->vertex_count, a);
+}
+
+/* Three indices each, and in version 5 that of a BSDF. */
+static int take_triangles(struct stream *s, int version, struct mesh *m)
+{
+	size_t size = version == VERSION_5 ? FACE_RECORD : 12;
+	unsigned char raw[CHUNK_ITEMS * FACE_RECORD];
 	for (uint32_t done = 0; done < m->triangle_count;) {
 		uint32_t n = m->triangle_count - done < CHUNK_ITEMS ? m->triangle_count - done : CHUNK_ITEMS;
-		int r = read_stream(s, raw, (size_t)n * 12);
+		int r = read_stream(s, raw, n * size);
 		if (r)
 			return r;
-		for (uint32_t i = 0; i < 3 * n; i++) {
-			uint32_t v = (uint32_t)get_bytes(raw + 4 * (size_t)i, 4);
-			if (v >= m->vertex_count)
-				return file_error(s, "a triangle's index is out of range");
-			m->index[done + i / 3][i % 3] = v;
+		for (const unsigned char *face = raw; face < raw + n * size; face += size, done++) {
+			for (int k = 0; k < 3; k++) {
+				m->index[done][k] = (uint32_t)get_bytes(face + 4 * k, 4);
+				if (m->index[done][k] >= m->vertex_count)
+					return file_error(s, "a triangle's index is out of range");
+			}
+			if (version == VERSION_5 && get_bytes(face + 12, 4) != 0)
+				return node_error(s->node, s->error, ENOTSUP,
+						  "%s: a mesh of several BSDFs is not supported", s->name);
 		}
-		done += n;
 	}
 	return 0;
 }
@@ -175,6 +180,20 @@ static int check_end(struct stream *s)
 	s->z.next_out = &beyond;
 	s->z.avail_out = 1;
 	return inflate(&s->z, Z_SYNC_FLUSH) == Z_DATA_ERROR ? file_error(s, "the compressed mesh is damaged") : 0;
+}
+
+/* For so many vertices and triangles, if the stream can hold that many of their sizes in bytes. */
+static int make_room(const struct stream *s, const uint64_t count[2], uint64_t vertex_size, uint64_t triangle_size,
+		     bool normals, bool uv, struct arena *arena, struct mesh *m)
+{
+	if (count[0] == 0 || count[1] == 0)
+		return file_error(s, "the mesh has no triangles");
+	if (count[1] > MESH_TRIANGLES_MAX || count[0] >= UINT32_MAX || count[0] > s->most / vertex_size ||
+	    count[1] > s->most / triangle_size)
+		return file_error(s, "more vertices or triangles than there can be");
+	if (!mesh_alloc(m, (uint32_t)count[0], (uint32_t)count[1], normals, uv, arena))
+		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
+	return 0;
 }
 
 /* A length and so many bytes, ended by 0 in out. */
@@ -193,48 +212,19 @@ static int take_text(struct stream *s, char *out, size_t room)
 /* Position, normal, texture coordinates; what a mesh has not is 0 and not looked at. */
 static int take_records(struct stream *s, struct mesh *m)
 {
-	unsigned char raw[128 * RECORD];
-	for (uint32_t done = 0; done < m->vertex_count;) {
-		uint32_t left = m->vertex_count - done, n = left < sizeof raw / RECORD ? left : sizeof raw / RECORD;
-		int r = read_stream(s, raw, (size_t)n * RECORD);
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		double lane[8];
+		int r = take_reals(s, false, false, 1, 8, lane);
 		if (r)
 			return r;
-		for (uint32_t i = 0; i < n; i++, done++)
-			for (int lane = 0; lane < 8; lane++) {
-				double *to = lane < 3	? &m->position[done][lane]
-					     : lane < 6 ? m->normal ? &m->normal[done][lane - 3] : NULL
-					     : m->uv	? &m->uv[done][lane - 6]
-							: NULL;
-				if (!to)
-					continue;
-				*to = float_of(raw + RECORD * (size_t)i + 4 * lane);
-				if (!(fabs(*to) <= MESH_COORDINATE_MAX))
-					return file_error(s, "a number that is not finite, or beyond 1e60");
-			}
-	}
-	return 0;
-}
-
-static int take_face_records(struct stream *s, struct mesh *m)
-{
-	unsigned char raw[256 * FACE_RECORD];
-	for (uint32_t done = 0; done < m->triangle_count;) {
-		uint32_t left = m->triangle_count - done,
-			 n = left < sizeof raw / FACE_RECORD ? left : sizeof raw / FACE_RECORD;
-		int r = read_stream(s, raw, (size_t)n * FACE_RECORD);
-		if (r)
-			return r;
-		for (uint32_t i = 0; i < n; i++, done++) {
-			const unsigned char *face = raw + FACE_RECORD * (size_t)i;
-			for (int k = 0; k < 3; k++) {
-				m->index[done][k] = (uint32_t)get_bytes(face + 4 * k, 4);
-				if (m->index[done][k] >= m->vertex_count)
-					return file_error(s, "a triangle's index is out of range");
-			}
-			if (get_bytes(face + 12, 4) != 0)
-				return node_error(s->node, s->error, ENOTSUP,
-						  "%s: a mesh of several BSDFs is not supported", s->name);
-		}
+		for (int k = 0; k < 8; k++)
+			if (!(fabs(lane[k]) <= MESH_COORDINATE_MAX) && (k < 3 || (k < 6 ? !!m->normal : !!m->uv)))
+				return file_error(s, "a number that is not finite, or beyond 1e60");
+		memcpy(m->position[i], lane, sizeof m->position[i]);
+		if (m->normal)
+			memcpy(m->normal[i], lane + 3, sizeof m->normal[i]);
+		if (m->uv)
+			memcpy(m->uv[i], lane + 6, sizeof m->uv[i]);
 	}
 	return 0;
 }
@@ -262,13 +252,7 @@ static int take_attribute(struct stream *s, struct mesh *m, uint32_t room, struc
 	struct attribute *a = mesh_add_attribute(m, name, per_face, (uint32_t)channels, room, arena);
 	if (!a)
 		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
-	for (uint64_t i = 0; !r && i < items; i++) {
-		unsigned char raw[4 * ATTRIBUTE_CHANNELS_MAX];
-		r = read_stream(s, raw, 4 * (size_t)channels);
-		for (uint32_t k = 0; !r && k < channels; k++)
-			mesh_set_attribute(a, i, k, float_of(raw + 4 * k));
-	}
-	return r;
+	return take_values(s, false, (uint32_t)items, a);
 }
 
 static int take_attributes(struct stream *s, struct mesh *m, struct arena *arena)
@@ -282,33 +266,25 @@ static int take_attributes(struct stream *s, struct mesh *m, struct arena *arena
 	return r;
 }
 
-static int take_mesh_5(struct stream *s, struct arena *arena, struct shape_geometry *out, uint64_t *flags)
+static int take_mesh_5(struct stream *s, uint64_t flags, struct arena *arena, struct mesh *m)
 {
-	struct mesh *m = &out->mesh;
 	uint64_t length = 0, count[4] = {0}; /* of vertices, triangles, places, normals */
-	int r = take_number(s, 4, flags);
-	if (!r)
-		r = take_number(s, 4, &length);
+	int r = take_number(s, 4, &length);
 	if (!r)
 		r = length > NAME_MAX_BYTES ? file_error(s, "a name that is too long") : skip(s, length);
 	for (int i = 0; !r && i < 4; i++)
 		r = take_number(s, 8, &count[i]);
 	if (r)
 		return r;
-	if (!(*flags & FLOATS) || count[2] > count[0] || count[3] > count[0])
+	if (!(flags & FLOATS) || count[2] > count[0] || count[3] > count[0])
 		return file_error(s, "the head of the mesh is damaged");
-	if (*flags & HAS_TANGENTS_5)
+	if (flags & HAS_TANGENTS_5)
 		return node_error(s->node, s->error, ENOTSUP, "%s: shading tangents are not supported", s->name);
-	if (count[0] == 0 || count[1] == 0)
-		return file_error(s, "the mesh has no triangles");
-	if (count[1] > MESH_TRIANGLES_MAX || count[0] >= UINT32_MAX || count[0] > s->most / RECORD ||
-	    count[1] > s->most / FACE_RECORD)
-		return file_error(s, "more vertices or triangles than there can be");
-	if (!mesh_alloc(m, (uint32_t)count[0], (uint32_t)count[1], *flags & HAS_NORMALS, *flags & HAS_UV_5, arena))
-		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
-	r = take_records(s, m);
+	r = make_room(s, count, RECORD, FACE_RECORD, flags & HAS_NORMALS, flags & HAS_UV_5, arena, m);
 	if (!r)
-		r = take_face_records(s, m);
+		r = take_records(s, m);
+	if (!r)
+		r = take_triangles(s, VERSION_5, m);
 	if (!r)
 		r = skip(s, count[2] > 0 ? 4 * count[0] : 0);
 	if (!r)
@@ -318,46 +294,38 @@ static int take_mesh_5(struct stream *s, struct arena *arena, struct shape_geome
 	return r;
 }
 
-static int take_mesh_3(struct stream *s, int version, struct arena *arena, struct shape_geometry *out, uint64_t *flags)
+static int take_mesh_3(struct stream *s, int version, uint64_t flags, struct arena *arena, struct mesh *m)
 {
-	struct mesh *m = &out->mesh;
-	uint64_t vertices, triangles;
-	int r = take_number(s, 4, flags);
-	if (!r && version == VERSION_4)
-		r = skip_name(s);
-	if (!r)
-		r = take_number(s, 8, &vertices);
-	if (!r)
-		r = take_number(s, 8, &triangles);
+	uint64_t count[2];
+	int r = version == VERSION_4 ? skip_name(s) : 0;
+	for (int i = 0; !r && i < 2; i++)
+		r = take_number(s, 8, &count[i]);
 	if (r)
 		return r;
-	bool doubles = *flags & DOUBLES, normals = *flags & HAS_NORMALS, uv = *flags & HAS_UV;
-	if (vertices == 0 || triangles == 0)
-		return file_error(s, "the mesh has no triangles");
-	if (triangles > MESH_TRIANGLES_MAX || vertices >= UINT32_MAX || vertices > s->most / (doubles ? 24 : 12) ||
-	    triangles > s->most / 12)
-		return file_error(s, "more vertices or triangles than there can be");
-	if (!mesh_alloc(m, (uint32_t)vertices, (uint32_t)triangles, normals, uv, arena))
-		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
-	r = take_reals(s, doubles, true, m->vertex_count, 3, m->position[0]);
-	if (!r && normals)
+	bool doubles = flags & DOUBLES;
+	r = make_room(s, count, doubles ? 24 : 12, 12, flags & HAS_NORMALS, flags & HAS_UV, arena, m);
+	if (!r)
+		r = take_reals(s, doubles, true, m->vertex_count, 3, m->position[0]);
+	if (!r && m->normal)
 		r = take_reals(s, doubles, true, m->vertex_count, 3, m->normal[0]);
-	if (!r && uv)
+	if (!r && m->uv)
 		r = take_reals(s, doubles, true, m->vertex_count, 2, m->uv[0]);
-	if (!r && (*flags & HAS_COLOURS))
+	if (!r && (flags & HAS_COLOURS))
 		r = take_colours(s, doubles, m, arena);
 	if (!r)
-		r = take_triangles(s, m);
+		r = take_triangles(s, version, m);
 	return r;
 }
 
 static int take_mesh(struct stream *s, int version, struct arena *arena, struct shape_geometry *out)
 {
-	uint64_t flags = 0;
-	int r = version == VERSION_5 ? take_mesh_5(s, arena, out, &flags) : take_mesh_3(s, version, arena, out, &flags);
+	struct mesh *m = &out->mesh;
+	uint64_t flags;
+	int r = take_number(s, 4, &flags);
+	if (!r)
+		r = version == VERSION_5 ? take_mesh_5(s, flags, arena, m) : take_mesh_3(s, version, flags, arena, m);
 	if (!r)
 		r = check_end(s);
-	const struct mesh *m = &out->mesh;
 	for (uint32_t i = 0; !r && m->normal && i < m->vertex_count; i++)
 		mesh_store(m->normal[i], mesh_unit(mesh_load(m->normal[i])));
 	out->face_normals = flags & HAS_FACE_NORMALS;
