@@ -42,12 +42,6 @@ static const struct param params[] = {
 	{.name = NULL},
 };
 
-static vec3 triangle_normal(const struct surface_light *l, uint32_t i)
-{
-	vec3 v0 = surface_light_corner(l, i, 0);
-	return vec3_cross(vec3_sub(surface_light_corner(l, i, 1), v0), vec3_sub(surface_light_corner(l, i, 2), v0));
-}
-
 /* Whether all triangles lie in the plane of their sum, and face the same side. */
 static void find_plane(struct beam *b)
 {
@@ -57,14 +51,14 @@ static void find_plane(struct beam *b)
 		return;
 	vec3 sum = {0, 0, 0};
 	for (uint32_t i = 0; i < count; i++)
-		sum = vec3_add(sum, triangle_normal(l, i));
+		sum = vec3_add(sum, surface_light_normal(l, i));
 	if (!(vec3_length(sum) > 0))
 		return;
 	b->n = vec3_normalize(sum);
 	b->origin = surface_light_corner(l, 0, 0);
 	double extent = 0;
 	for (uint32_t i = 0; i < count; i++) {
-		if (!(vec3_dot(triangle_normal(l, i), b->n) >= 0))
+		if (!(vec3_dot(surface_light_normal(l, i), b->n) >= 0))
 			return;
 		for (int k = 0; k < 3; k++) {
 			vec3 d = vec3_sub(surface_light_corner(l, i, k), b->origin);
@@ -184,14 +178,11 @@ static bool sample_plane(const struct beam *b, vec3 ref, const double u[2], stru
 	double rho = sample_rho(u[0]), phi = 2 * M_PI * u[1], r = rho * s.radius;
 	vec3 p = vec3_add(s.center, frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), 0}));
 	for (uint32_t i = 0; i < b->light.surface.triangle_count; i++) {
-		vec3 v0 = surface_light_corner(&b->light, i, 0), d = vec3_sub(p, v0);
-		vec3 e1 = vec3_sub(surface_light_corner(&b->light, i, 1), v0),
-		     e2 = vec3_sub(surface_light_corner(&b->light, i, 2), v0), n = vec3_cross(e1, e2);
-		double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(d, e2), n) / n2,
-		       b2 = vec3_dot(vec3_cross(e1, d), n) / n2;
-		if (!(b1 >= 0 && b2 >= 0 && b1 + b2 <= 1))
+		double w[2];
+		surface_light_weights(&b->light, i, p, w);
+		if (!(w[0] >= 0 && w[1] >= 0 && w[0] + w[1] <= 1))
 			continue;
-		surface_light_on_triangle(&b->light, i, b1, b2, x);
+		surface_light_on_triangle(&b->light, i, w[0], w[1], x);
 		*pdf = disc_pdf(&s, rho * rho);
 		return *pdf > 0;
 	}

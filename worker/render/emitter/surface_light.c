@@ -14,17 +14,31 @@ vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int 
 	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
 }
 
+vec3 surface_light_normal(const struct surface_light *l, uint32_t triangle)
+{
+	vec3 v0 = surface_light_corner(l, triangle, 0);
+	return vec3_cross(vec3_sub(surface_light_corner(l, triangle, 1), v0),
+			  vec3_sub(surface_light_corner(l, triangle, 2), v0));
+}
+
+void surface_light_weights(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2])
+{
+	vec3 v0 = surface_light_corner(l, triangle, 0), e1 = vec3_sub(surface_light_corner(l, triangle, 1), v0),
+	     e2 = vec3_sub(surface_light_corner(l, triangle, 2), v0);
+	vec3 r = vec3_sub(p, v0), n = vec3_cross(e1, e2);
+	double n2 = vec3_dot(n, n);
+	b[0] = vec3_dot(vec3_cross(r, e2), n) / n2;
+	b[1] = vec3_dot(vec3_cross(e1, r), n) / n2;
+}
+
 static int build_cdf(struct surface_light *l, struct arena *arena)
 {
 	uint32_t n = l->surface.triangle_count;
 	l->cdf = arena_alloc(arena, (size_t)n + 1, sizeof *l->cdf);
 	if (!l->cdf)
 		return -ENOMEM;
-	for (uint32_t i = 0; i < n; i++) {
-		vec3 v0 = surface_light_corner(l, i, 0), e1 = vec3_sub(surface_light_corner(l, i, 1), v0),
-		     e2 = vec3_sub(surface_light_corner(l, i, 2), v0);
-		l->cdf[i + 1] = l->cdf[i] + 0.5 * vec3_length(vec3_cross(e1, e2));
-	}
+	for (uint32_t i = 0; i < n; i++)
+		l->cdf[i + 1] = l->cdf[i] + 0.5 * vec3_length(surface_light_normal(l, i));
 	l->area = l->cdf[n];
 	for (uint32_t i = 1; i <= n; i++)
 		l->cdf[i] /= l->area;
@@ -34,9 +48,6 @@ static int build_cdf(struct surface_light *l, struct arena *arena)
 int surface_light_create(struct emitter *em, struct surface_light *l, const struct scene_node *n,
 			 const struct emitter_build *build, struct error *e)
 {
-	if (!build->surface)
-		return node_error(n, e, EINVAL,
-				  "an area emitter must stand in a shape, or have an id by which shapes refer to it");
 	l->surface = *build->surface;
 	int rc = emitter_texture(&l->radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (rc)
@@ -122,15 +133,12 @@ static double below_1(double x)
 
 static void triangle_inverse(const struct surface_light *l, const struct emitter_point *x, double u[2])
 {
-	vec3 v0 = surface_light_corner(l, x->where.prim, 0),
-	     e1 = vec3_sub(surface_light_corner(l, x->where.prim, 1), v0),
-	     e2 = vec3_sub(surface_light_corner(l, x->where.prim, 2), v0);
-	vec3 r = vec3_sub(x->p, v0), n = vec3_cross(e1, e2);
-	double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(r, e2), n) / n2, b2 = vec3_dot(vec3_cross(e1, r), n) / n2;
-	double root = fmin(fmax(1 - b1, 0), 1), low = l->cdf[x->where.prim], high = l->cdf[x->where.prim + 1];
+	double b[2];
+	surface_light_weights(l, x->where.prim, x->p, b);
+	double root = fmin(fmax(1 - b[0], 0), 1), low = l->cdf[x->where.prim], high = l->cdf[x->where.prim + 1];
 	/* Rounding must not change the triangle. */
 	u[0] = fmax(fmin(low + root * root * (high - low), nextafter(high, 0)), low);
-	u[1] = root > 0 ? below_1(b2 / root) : 0;
+	u[1] = root > 0 ? below_1(b[1] / root) : 0;
 }
 
 void surface_light_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])

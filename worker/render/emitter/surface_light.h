@@ -16,7 +16,7 @@ struct surface_light {
 };
 
 /* Reads `radiance` and sets everything of `em` except its power: data, and brightest to the largest radiance. `l` is
- * from the arena. -EINVAL with a sentence if there is no surface, or none of an area above 0. */
+ * from the arena. -EINVAL with a sentence if the surface, which must be there, has no area above 0. */
 int surface_light_create(struct emitter *em, struct surface_light *l, const struct scene_node *n,
 			 const struct emitter_build *build, struct error *e);
 
@@ -30,6 +30,10 @@ void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitt
 /* The point of a triangle with weight b1 of its second corner and b2 of its third. */
 void surface_light_on_triangle(const struct surface_light *l, uint32_t triangle, double b1, double b2,
 			       struct emitter_point *x);
+/* Of a point in a triangle's plane: the weights of its second and third corner. */
+void surface_light_weights(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2]);
+/* Of a triangle, twice as long as its area is large. */
+vec3 surface_light_normal(const struct surface_light *l, uint32_t triangle);
 /* A corner of a triangle, k in 0..2. */
 vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int k);
 

@@ -25,26 +25,20 @@ static const double power = 2.5, half_angle = 1e-3;
 #define EYE SENSOR("0,0,9", "0,0,0")
 static const struct wavelengths grey = {.grey = true};
 
+/* A shape that shines, with what else it has. */
+static struct world *beam(const char *shape, const char *more)
+{
+	return world_of_text(8, 8, EYE "<shape type='%s'>%s" BEAM "</shape>", shape, more);
+}
+
 /* Tilted and far from the origin, so that its corners are rounded. */
 static struct world *plane_beam(const char *shape)
 {
-	return world_of_text(
-		8, 8,
-		EYE
-		"<shape type='%s'><transform name='to_world'><scale x='1' y='1.5'/><rotate x='1' y='.5' z='.2' angle='37'/>"
-		"<translate x='5.3' y='-2.1' z='3.7'/></transform>" BEAM "</shape>",
-		shape);
+	return beam(shape, "<transform name='to_world'><scale x='1' y='1.5'/><rotate x='1' y='.5' z='.2' angle='37'/>"
+			   "<translate x='5.3' y='-2.1' z='3.7'/></transform>");
 }
 
-static struct world *sphere_beam(const char *flip)
-{
-	return world_of_text(
-		8, 8,
-		EYE
-		"<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/><float name='radius' value='.5'/>"
-		"<boolean name='flip_normals' value='%s'/>" BEAM "</shape>",
-		flip);
-}
+#define BALL "<point name='center' x='.25' y='-.5' z='.125'/><float name='radius' value='.5'/>"
 
 static double emitted(const struct emitter *em, const struct emitter_point *x, vec3 w)
 {
@@ -87,7 +81,8 @@ static void check_directions(const struct emitter *em, const char *name)
 static void test_directions(void **state)
 {
 	(void)state;
-	struct world *w[] = {plane_beam("rectangle"), plane_beam("disk"), sphere_beam("false"), sphere_beam("true")};
+	struct world *w[] = {plane_beam("rectangle"), plane_beam("disk"), beam("sphere", BALL),
+			     beam("sphere", BALL "<boolean name='flip_normals' value='true'/>")};
 	static const char *const names[] = {"rectangle", "disk", "sphere", "sphere, inwards"};
 	for (int i = 0; i < 4; i++) {
 		check_directions(&w[i]->emitters[0], names[i]);
@@ -184,7 +179,7 @@ static void test_plane(void **state)
 static void test_sphere(void **state)
 {
 	(void)state;
-	struct world *w = sphere_beam("false");
+	struct world *w = beam("sphere", BALL);
 	const struct emitter *em = &w->emitters[0];
 	const struct geom_shape *s = &w->shapes[0];
 	const double gaps[] = {1e-3, 0.1, 1, 100};
