@@ -77,10 +77,9 @@ static void print_unsupported(FILE *out)
 	const char *type;
 	fprintf(out,
 		"\n## Mitsuba's plug-ins that are not supported\n\n"
-		"Refused, with file, line and the nearest name; with `--lenient` replaced. Light is unpolarised here: "
-		"`polarizer`, `retarder`, `circular` and\n`measured_polarized` have nothing to act on. `hk` is a "
-		"layer of a medium, and media are refused. Bump and normal "
-		"maps\nare those of Mitsuba up to 3.6: `flip_invalid_normals` and `use_shadowing_function`, which 3.7 has on, are off here.\n\n"
+		"Refused, with file, line and the nearest name; with `--lenient` replaced. `hk` is a layer of a medium, and "
+		"media are refused. Light is\nunpolarised here, and what polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps "
+		"are those of Mitsuba up\nto 3.6: `flip_invalid_normals` and `use_shadowing_function`, which 3.7 has on, are off here.\n\n"
 		"| class | type | with `--lenient` |\n|---|---|---|\n");
 	enum plugin_class cls;
 	for (size_t i = 0; (type = plugin_of_mitsuba(i, &cls)); i++) {

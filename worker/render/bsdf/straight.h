@@ -1,9 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A specular lobe that transmits a share of the light unchanged, for `null` and `mask`. */
+/*
+ * A specular lobe that lets light through without bending it: a share of it for `mask`, all that a filter does not
+ * absorb for `null`, `polarizer`, `circular` and `retarder`, whose only lobe it is.
+ *
+ * Light is unpolarised here. As in the unpolarised modes of Mitsuba, both polarizers then let half of it through, at
+ * any angle to each other, and a retarder all of it.
+ */
 #ifndef WORKER_RENDER_BSDF_STRAIGHT_H
 #define WORKER_RENDER_BSDF_STRAIGHT_H
 
-#include "worker/render/math/vec3.h"
+#include "worker/render/bsdf/create.h"
 
 #include <float.h>
 
@@ -13,5 +19,27 @@ static inline bool straight_direction(vec3 wo, vec3 *wi)
 	*wi = vec3_neg(wo);
 	return fabs(wo.z) >= DBL_MIN;
 }
+
+/* A filter lets `share` times the texture `transmittance` through. */
+int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
+		    struct error *e);
+spectrum straight_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+double straight_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			     double *chance);
+bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+		     struct bsdf_sample *out);
+
+/* The operations of a filter NAME, which defines NAME_params and NAME_create. */
+#define STRAIGHT_OPS(NAME)                         \
+	const struct bsdf_ops bsdf_ops_##NAME = {  \
+		.type = #NAME,                     \
+		.params = NAME##_params,           \
+		.create = NAME##_create,           \
+		.eval = straight_eval,             \
+		.pdf_solid = straight_pdf,         \
+		.eval_delta = straight_eval_delta, \
+		.sample = straight_sample,         \
+	}
 
 #endif

@@ -19,9 +19,7 @@ static const struct {
 	const char *type, *stand_in;
 } likes[] = {
 	{PLUGIN_BSDF, "measured", "roughplastic"},
-
-	{PLUGIN_BSDF, "polarizer", "null"},	   {PLUGIN_BSDF, "retarder", "null"},
-	{PLUGIN_BSDF, "circular", "null"},	   {PLUGIN_EMITTER, "timed_sunsky", "constant"},
+	{PLUGIN_EMITTER, "timed_sunsky", "constant"},
 };
 
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)
@@ -62,8 +60,8 @@ const char *lenient_param(const char *stand_in, const char *name)
 
 static bool lets_through(const struct scene_node *n)
 {
-	static const char *const always[] = {"null",	       "mask",	    "dielectric", "roughdielectric",
-					     "thindielectric", "difftrans", NULL},
+	static const char *const always[] = {"null",	   "polarizer",	      "circular",	"retarder",  "mask",
+					     "dielectric", "roughdielectric", "thindielectric", "difftrans", NULL},
 				 *const perhaps[] = {"spec_trans", "diff_trans", NULL};
 	if (is_one_of(n->type, always))
 		return true;

@@ -146,6 +146,41 @@ static void test_nothing_passes_beyond_the_critical_angle(void **state)
 	arena_fini(&a);
 }
 
+/* Filters of polarization, for light that has none, are holes in a black sheet. */
+static void test_filters_are_holes(void **state)
+{
+	(void)state;
+	static const char *const pairs[][2] = {
+		{"polarizer theta=30", "mask opacity=0.5 | diffuse reflectance=0"},
+		{"polarizer transmittance=0.5 polarizing=false", "mask opacity=0.75 | diffuse reflectance=0"},
+		{"circular left_handed=true", "mask opacity=0.5 | diffuse reflectance=0"},
+		{"circular transmittance=0.25", "mask opacity=0.875 | diffuse reflectance=0"},
+		{"retarder theta=20 delta=180", "null"},
+		{"retarder", "mask opacity=0 | diffuse"},
+	};
+	struct dice d = dice_of("filters");
+	for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+		struct arena a = {0};
+		struct bsdf filter, sheet;
+		bsdf_make(&a, pairs[i][0], &filter);
+		bsdf_make(&a, pairs[i][1], &sheet);
+		for (int k = 0; k < 20; k++) {
+			struct bsdf_point p = {.w = &wavelengths};
+			vec3 wo = any_direction(&d, k), through, also;
+			double chance;
+			spectrum weight = bsdf_eval_delta(&filter, &p, wo, BSDF_TRANSMIT, &through, &chance),
+				 expected = bsdf_eval_delta(&sheet, &p, wo, BSDF_TRANSMIT, &also, &chance);
+			assert_memory_equal(&through, &also, sizeof through);
+			for (int l = 0; l < SPECTRUM_LANES; l++)
+				if (weight.v[l] != expected.v[l])
+					fail_msg("%s lets %g through, %s %g", pairs[i][0], weight.v[l], pairs[i][1],
+						 expected.v[l]);
+			assert_true(spectrum_is_zero(bsdf_eval_delta(&filter, &p, wo, BSDF_REFLECT, &also, &chance)));
+		}
+		arena_fini(&a);
+	}
+}
+
 static void test_mean_roughness(void **state)
 {
 	(void)state;
@@ -186,6 +221,7 @@ int main(void)
 		cmocka_unit_test(test_specular_lobes_are_those_of_sample),
 		cmocka_unit_test(test_a_mirrored_back_is_a_mirror),
 		cmocka_unit_test(test_nothing_passes_beyond_the_critical_angle),
+		cmocka_unit_test(test_filters_are_holes),
 		cmocka_unit_test(test_mean_roughness),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -23,7 +23,6 @@ static void test_stand_ins(void **state)
 	} expected[] = {
 		{PLUGIN_BSDF, "hair", LENIENT_INNER, "diffuse"},
 		{PLUGIN_BSDF, "measured", LENIENT_REPLACE, "roughplastic"},
-		{PLUGIN_BSDF, "polarizer", LENIENT_REPLACE, "null"},
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "constant"},
 		{PLUGIN_EMITTER, "collimated", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},

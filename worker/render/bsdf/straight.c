@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A path counts one more edge for a filter, and next event estimation does not look through it. */
+#include "worker/render/bsdf/straight.h"
+
+struct filter {
+	struct texture transmittance;
+	double share;
+};
+
+spectrum straight_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return spectrum_of(0);
+}
+
+double straight_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return 0;
+}
+
+spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			     double *chance)
+{
+	const struct filter *f = b->data;
+	if (!(mode & BSDF_TRANSMIT) || !straight_direction(wo, wi))
+		return spectrum_of(0);
+	*chance = 1;
+	return spectrum_scale(f->share, texture_eval(&f->transmittance, &p->where, p->w));
+}
+
+bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+		     struct bsdf_sample *out)
+{
+	(void)u;
+	*out = (struct bsdf_sample){.mode = BSDF_TRANSMIT | BSDF_DELTA, .eta = 1};
+	spectrum weight = straight_eval_delta(b, p, wo, BSDF_TRANSMIT, &out->wi, &out->pdf);
+	if (!(out->pdf > 0))
+		return false;
+	out->f = spectrum_scale(1 / fabs(wo.z), weight);
+	return true;
+}
+
+int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
+		    struct error *e)
+{
+	struct filter *f = bsdf_data(b, n, build, sizeof *f, e);
+	if (!f)
+		return -ENOMEM;
+	int code = bsdf_texture(b, &f->transmittance, n, "transmittance", 1, build, e);
+	if (code)
+		return code;
+	f->share = share;
+	b->modes = BSDF_TRANSMIT | BSDF_DELTA;
+	b->has_delta = true;
+	b->two_sided = true;
+	b->alpha = b->alpha_mean = 0;
+	b->black = texture_max(&f->transmittance) == 0;
+	return 0;
+}
