@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const types[] = {"obj", "ply", "serialized"};
+static const char *const types[] = {"obj", "ply", "serialized", "linearcurve", "bsplinecurve", "hair"};
 enum { TYPES = sizeof types / sizeof *types };
 
 static void write_seed(uint8_t type, uint64_t number, const struct mesh_file *f)
@@ -42,6 +42,17 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 		mesh_file_serialized(&f, version, version == 4, 11, 2);
 		write_seed(2, 10 + (uint64_t)version, &f);
 	}
+	static const char curves[] =
+		"0 0 0 0.1\n1 0 0 0.2\n1 1 0 0.2\n0 1 1 0\n\n0 0 1 0.1\n0 0 1 0.1\n0 0 2 2\n0 0 1 0.1\n",
+			  hair[] = "BINARY_HAIR\4\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"
+				   "\0\0\x80\x3f\0\0\0\0\0\0\0\0\0\0\x80\x7f"
+				   "\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x80\x3f\0\0\0\0\0\0\0\0";
+	for (uint8_t type = 3; type < 5; type++) {
+		memcpy(f.bytes, curves, f.size = sizeof curves - 1);
+		write_seed(type, 20 + (uint64_t)type, &f);
+	}
+	memcpy(f.bytes, hair, f.size = sizeof hair - 1);
+	write_seed(5, 25, &f);
 	exit(0);
 }
 

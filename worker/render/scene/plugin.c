@@ -84,12 +84,9 @@ static const struct {
 	enum plugin_class cls;
 	const char *type;
 } mitsubas[] = {
-	{PLUGIN_SHAPE, "bsplinecurve"},
 	{PLUGIN_SHAPE, "deformable"},
 	{PLUGIN_SHAPE, "ellipsoids"},
 	{PLUGIN_SHAPE, "ellipsoidsmesh"},
-	{PLUGIN_SHAPE, "hair"},
-	{PLUGIN_SHAPE, "linearcurve"},
 	{PLUGIN_SHAPE, "sdfgrid"},
 	{PLUGIN_BSDF, "hair"},
 	{PLUGIN_BSDF, "hk"},

@@ -31,8 +31,11 @@ int shape_build(const struct scene_node *n, const struct asset_source *assets, s
 	int r = (*ops)->build(n, assets, arena, out, e);
 	if (r || out->kind != SHAPE_MESH)
 		return r;
-	struct mesh_finish f = {node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
-				out->face_normals || node_bool(n, "face_normals", false),
-				node_float(n, "max_smooth_angle", -1)};
-	return mesh_finish(&out->mesh, &f, arena, dropped, n, e);
+	struct mesh_finish f = {
+		out->placed ? mat4_identity() : node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
+		out->face_normals || node_bool(n, "face_normals", false), node_float(n, "max_smooth_angle", -1)};
+	r = mesh_finish(&out->mesh, &f, arena, dropped, n, e);
+	if (out->placed && out->mesh.triangle_count > 0)
+		*dropped = 0; /* at poles and where rings meet, by no fault of the file */
+	return r;
 }

@@ -25,6 +25,7 @@ enum shape_kind { SHAPE_MESH, SHAPE_SPHERE };
 struct shape_geometry {
 	enum shape_kind kind;
 	struct mesh mesh;  /* arrays owned by the arena given */
+	bool placed;	   /* to_world has been applied to it */
 	bool face_normals; /* its file wants flat shading */
 	bool materials;	   /* its file assigns materials to faces, which are not read */
 	struct sphere sphere;
@@ -34,7 +35,8 @@ struct shape_ops {
 	const char *type;
 	const struct param *params;
 	/* NULL: it holds other shapes (group.h), and is not built itself. */
-	/* Fills in *out: the sphere in world space, or the mesh in object space (shape_build places and checks it). */
+	/* Fills in *out: the sphere in world space, or the mesh, in object space unless it is `placed` (shape_build
+	 * places and checks it). */
 	int (*build)(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		     struct shape_geometry *out, struct error *e);
 	unsigned nested_classes; /* classes of unnamed objects that it may hold; 0: shape_nested_classes */

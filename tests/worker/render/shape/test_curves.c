@@ -1,0 +1,435 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Curves: the tubes lie where the distance to the curve, found by searching along it, is the radius; areas and volumes
+ * are those of cylinders, cones and spheres; and whatever is in a file gives a mesh or a sentence.
+ */
+#include "common/base/mem.h"
+#include "tests/support/built_shape.h"
+#include "tests/support/dice.h"
+#include "tests/support/failing_memory.h"
+#include "tests/support/scene_tables.h"
+#include "worker/render/shape/tube.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const double pi = 3.14159265358979323846;
+#define SCALE (pi / TUBE_SIDES / sin(pi / TUBE_SIDES)) /* of radii, tube.h */
+
+static struct built_shape built(const char *type, const char *content, const void *bytes, size_t size)
+{
+	char xml[1024];
+	snprintf(xml, sizeof xml,
+		 "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
+		 type, content);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes, size}, {0}};
+	return built_shape(files, scene_tables());
+}
+
+static struct built_shape built_ok(const char *type, const char *content, const char *text)
+{
+	struct built_shape b = built(type, content, text, strlen(text));
+	if (b.result)
+		fail_msg("%s: %s", type, b.error.text);
+	return b;
+}
+
+static vec3 corner(const struct mesh *m, uint32_t t, int k)
+{
+	return mesh_load(m->position[m->index[t][k]]);
+}
+
+static double area_of(const struct mesh *m)
+{
+	double sum = 0;
+	for (uint32_t t = 0; t < m->triangle_count; t++) {
+		vec3 a = corner(m, t, 0);
+		sum += 0.5 * vec3_length(vec3_cross(vec3_sub(corner(m, t, 1), a), vec3_sub(corner(m, t, 2), a)));
+	}
+	return sum;
+}
+
+/* Of a closed mesh; negative: inside out. */
+static double volume_of(const struct mesh *m)
+{
+	double sum = 0;
+	for (uint32_t t = 0; t < m->triangle_count; t++)
+		sum += vec3_dot(corner(m, t, 0), vec3_cross(corner(m, t, 1), corner(m, t, 2))) / 6;
+	return sum;
+}
+
+/* ---- the distance to a curve, by searching ---- */
+
+/* A point of the curve and its radius, at x from 0 to 1. */
+typedef void curve_at(const double (*p)[4], int count, double x, vec3 *c, double *r);
+
+static void chain_at(const double (*p)[4], int count, double x, vec3 *c, double *r)
+{
+	int i = (int)fmin(count - 2, floor(x * (count - 1)));
+	double t = x * (count - 1) - i;
+	*c = vec3_madd(vec3_scale(1 - t, mesh_load(p[i])), t, mesh_load(p[i + 1]));
+	*r = (1 - t) * p[i][3] + t * p[i + 1][3];
+}
+
+/* By de Boor's recursion over the uniform knots. */
+static void spline_at(const double (*p)[4], int count, double x, vec3 *c, double *r)
+{
+	int i = (int)fmin(count - 4, floor(x * (count - 3)));
+	double t = x * (count - 3) - i, d[4][4];
+	memcpy(d, p + i, sizeof d);
+	for (int level = 1; level <= 3; level++)
+		for (int j = 3; j >= level; j--) {
+			double a = (t + 3 - j) / (4 - level);
+			for (int k = 0; k < 4; k++)
+				d[j][k] = (1 - a) * d[j - 1][k] + a * d[j][k];
+		}
+	*c = mesh_load(d[3]);
+	*r = d[3][3];
+}
+
+/* How far q is from the spheres along the curve, over the radius of the one that is nearest. */
+static double distance(curve_at *at, const double (*p)[4], int count, vec3 q)
+{
+	enum { STEPS = 20000 };
+	double least = INFINITY, radius = 1;
+	for (int i = 0; i <= STEPS; i++) {
+		vec3 c;
+		double r;
+		at(p, count, (double)i / STEPS, &c, &r);
+		double d = vec3_length(vec3_sub(q, c)) - r;
+		if (d < least) {
+			least = d;
+			radius = r;
+		}
+	}
+	return least / radius;
+}
+
+static const double points[][4] = {{0, 0, 0, 0.3},	 {1, 0.2, 0.1, 0.3},  {1.5, 1.2, -0.3, 0.2},
+				   {1.4, 2.5, 0.5, 0.2}, {-0.5, 3, 0.2, 0.1}, {-1, 1.5, 1, 0.25}};
+enum { POINTS = sizeof points / sizeof *points };
+
+static void print_points(char *text, size_t size, int columns)
+{
+	for (int i = 0; i < POINTS; i++)
+		for (int k = 0; k < columns; k++) {
+			int used = snprintf(text, size, k + 1 < columns ? "%.17g " : "%.17g\n", points[i][k]);
+			text += used;
+			size -= (size_t)used;
+		}
+}
+
+static void check_surface(const char *type, curve_at *at, double inwards, uint32_t least)
+{
+	char text[1024];
+	uint32_t outside = 0;
+	print_points(text, sizeof text, 4);
+	struct built_shape b = built_ok(type, "", text);
+	const struct mesh *m = &b.g.mesh;
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		vec3 q = mesh_load(m->position[i]), n = mesh_load(m->normal[i]);
+		double d = distance(at, points, POINTS, q);
+		if (d > SCALE - 1 + 2e-3)
+			fail_msg("%s: vertex %u is %g radii outside", type, i, d);
+		if (d < -inwards)
+			continue; /* on the inside of a joint or of a bend */
+		outside++;
+		/* The distance grows along the normal. */
+		double further = distance(at, points, POINTS, vec3_madd(q, 0.02, n)),
+		       nearer = distance(at, points, POINTS, vec3_madd(q, -0.02, n));
+		if (!(further > d && d > nearer))
+			fail_msg("%s: vertex %u: %g, %g, %g radii along its normal", type, i, nearer, d, further);
+		assert_true(m->uv[i][0] >= 0 && m->uv[i][0] <= 1 && m->uv[i][1] >= 0 && m->uv[i][1] <= 1 + 1e-12);
+	}
+	assert_true(outside >= least);
+	built_shape_release(&b);
+}
+
+static void test_surfaces(void **state)
+{
+	(void)state;
+	check_surface("linearcurve", chain_at, 1e-3, 200);
+	check_surface("bsplinecurve", spline_at, 0.05, 150);
+}
+
+/* Normals are those of the surface between the rings, as its triangles have them: the mean over those around a vertex.
+ * The radius changes fast here. */
+static void test_normals(void **state)
+{
+	(void)state;
+	static const char text[] = "0 0 0 0.1\n1 0 0 0.2\n2 0 0 0.6\n3 1 0 0.7\n3 2 0 0.4\n3 3 1 0.1\n3 4 1 0.1\n";
+	struct built_shape b = built_ok("bsplinecurve", "", text);
+	const struct mesh *m = &b.g.mesh;
+	uint32_t last = m->vertex_count - (TUBE_SIDES + 1), steep = 0;
+	double(*sum)[3] = calloc(m->vertex_count, sizeof *sum);
+	assert_non_null(sum);
+	for (uint32_t t = 0; t < m->triangle_count; t++)
+		for (int k = 0; k < 3; k++) {
+			vec3 a = corner(m, t, k), u = mesh_unit(vec3_sub(corner(m, t, (k + 1) % 3), a)),
+			     v = mesh_unit(vec3_sub(corner(m, t, (k + 2) % 3), a));
+			double *at = sum[m->index[t][k]];
+			mesh_store(at, vec3_madd(mesh_load(at), mesh_angle(u, v), mesh_unit(vec3_cross(u, v))));
+		}
+	for (uint32_t i = TUBE_SIDES + 1; i < last; i++) {
+		uint32_t ring = i / (TUBE_SIDES + 1) * (TUBE_SIDES + 1);
+		vec3 n = mesh_load(sum[i]);
+		if (i == ring || i == ring + TUBE_SIDES) /* the seam */
+			n = vec3_add(mesh_load(sum[ring]), mesh_load(sum[ring + TUBE_SIDES]));
+		double angle = mesh_angle(n, mesh_load(m->normal[i])) * 180 / pi;
+		if (angle > 2.5)
+			fail_msg("vertex %u: its normal is off by %g degrees", i, angle);
+		vec3 middle = {0, 0, 0};
+		for (uint32_t k = 0; k < TUBE_SIDES; k++)
+			middle = vec3_madd(middle, 1.0 / TUBE_SIDES, mesh_load(m->position[ring + k]));
+		double lean = vec3_dot(mesh_unit(vec3_sub(mesh_load(m->position[i]), middle)), mesh_load(m->normal[i]));
+		steep += lean < 0.98;
+	}
+	assert_true(steep > 50); /* so a normal across the axis would not do */
+	free(sum);
+	built_shape_release(&b);
+}
+
+static bool near(double a, double b, double share)
+{
+	return fabs(a - b) <= share * fabs(b);
+}
+
+static void test_areas_and_volumes(void **state)
+{
+	(void)state;
+	/* A straight tube without ends: the area is exact. */
+	struct built_shape b = built_ok("bsplinecurve", "", "0 0 0 0.5\n1 0 0 0.5\n2 0 0 0.5\n3 0 0 0.5\n4 0 0 0.5\n");
+	assert_true(near(area_of(&b.g.mesh), 2 * pi * 0.5 * 2, 1e-12));
+	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++)
+		assert_true(near(b.g.mesh.uv[i][1], (b.g.mesh.position[i][0] - 1) / 2, 1e-12) ||
+			    b.g.mesh.position[i][0] == 1);
+	built_shape_release(&b);
+	/* With round ends, closed, facing outwards. */
+	b = built_ok("linearcurve", "", "0 0 0 0.5\n0 0 3 0.5\n");
+	assert_true(near(volume_of(&b.g.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
+	assert_true(near(area_of(&b.g.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
+	built_shape_release(&b);
+	/* One sphere inside another, and a point twice: only the large one, whichever comes first. */
+	static const char *const spheres[] = {"0 0 0 1\n0.5 0 0 0.25\n", "0.5 0 0 0.25\n0 0 0 1\n",
+					      "0 0 0 1\n0 0 0 1\n", "0 0 0 0.5\n0 0 0 1\n", "0 0 0 1\n0 0 0 0.5\n"};
+	for (size_t i = 0; i < sizeof spheres / sizeof *spheres; i++) {
+		b = built_ok("linearcurve", "", spheres[i]);
+		for (uint32_t k = 0; k < b.g.mesh.vertex_count; k++)
+			assert_true(vec3_length(mesh_load(b.g.mesh.position[k])) <= SCALE * (1 + 1e-12));
+		double volume = volume_of(&b.g.mesh);
+		if (!(volume > 0.9 * 4 * pi / 3 && volume < 1.1 * 4 * pi / 3))
+			fail_msg("spheres %zu: a volume of %g", i, volume);
+		built_shape_release(&b);
+	}
+}
+
+/* v grows over all pieces of all curves, the same for each piece. */
+static void test_v(void **state)
+{
+	(void)state;
+	static const char *const types[] = {"linearcurve", "bsplinecurve"};
+	for (int k = 0; k < 2; k++) {
+		struct built_shape b = built_ok(types[k], "",
+						"0 0 0 1\n9 0 0 1\n18 0 0 1\n27 0 0 1\n36 0 0 1\n\n"
+						"0 9 0 1\n9 9 0 1\n18 9 0 1\n27 9 0 1\n");
+		const struct mesh *m = &b.g.mesh;
+		/* Pieces: 4 and 3 from 0 to 36 and to 27; 2 and 1 from 9 to 27 and to 18. */
+		double pieces = k ? 3 : 7, from = k ? 9 : 0;
+		for (uint32_t i = 0; i < m->vertex_count; i++) {
+			double x = m->position[i][0], at = (fmin(fmax(x, from), k ? 27 : 36) - from) / 9;
+			bool second = m->position[i][1] > 4.5, end = !k && (x < 1 || x > 26);
+			if (!end && !(fabs(m->uv[i][1] - (at + (second ? k ? 2 : 4 : 0)) / pieces) < 0.02))
+				fail_msg("%s: v is %g at x = %g of curve %d", types[k], m->uv[i][1], x, second);
+		}
+		built_shape_release(&b);
+	}
+}
+
+/* The transform moves control points, and leaves their radii. */
+static void test_placed(void **state)
+{
+	(void)state;
+	static const char *const types[] = {"linearcurve", "bsplinecurve"};
+	for (int k = 0; k < 2; k++) {
+		struct built_shape a = built_ok(types[k],
+						"<transform name='to_world'><scale x='4' y='2' z='-1'/>"
+						"<translate x='1' y='2' z='3'/></transform>",
+						"0 0 0 0.5\n1 0 0 0.5\n2 1 0 0.25\n3 0 1 0.5\n"),
+				   b = built_ok(types[k], "", "1 2 3 0.5\n5 2 3 0.5\n9 4 3 0.25\n13 2 2 0.5\n");
+		assert_int_equal(a.g.mesh.vertex_count, b.g.mesh.vertex_count);
+		assert_memory_equal(a.g.mesh.position, b.g.mesh.position,
+				    b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
+		built_shape_release(&a);
+		built_shape_release(&b);
+		/* Turned inside out. */
+		a = built_ok(types[k], "<boolean name='flip_normals' value='true'/>",
+			     "0 0 0 0.5\n0 0 1 0.5\n0 0 2 0.5\n0 0 3 0.5\n");
+		for (uint32_t i = 0; i < a.g.mesh.vertex_count; i++)
+			assert_true(a.g.mesh.normal[i][0] * a.g.mesh.position[i][0] +
+					    a.g.mesh.normal[i][1] * a.g.mesh.position[i][1] <
+				    1e-9);
+		built_shape_release(&a);
+	}
+}
+
+static size_t put_float(unsigned char *to, float v)
+{
+	uint32_t bits;
+	memcpy(&bits, &v, sizeof bits);
+	for (int i = 0; i < 4; i++)
+		to[i] = (unsigned char)(bits >> 8 * i);
+	return 4;
+}
+
+/* Two hairs and, between them, one of a single point, which is none. */
+static size_t binary_hair(unsigned char *to)
+{
+	static const float v[] = {0, 0, 0, 1, 0, 0, 2, 1, 0, INFINITY, 9, 9, 9, INFINITY, 0, 2, 0, 0, 3, 0};
+	size_t size = 15;
+	memcpy(to, "BINARY_HAIR\6\0\0\0", size);
+	for (size_t i = 0; i < sizeof v / sizeof *v; i++)
+		size += put_float(to + size, v[i]);
+	return size;
+}
+
+static void test_hair(void **state)
+{
+	(void)state;
+	unsigned char bytes[256];
+	static const char text[] = "0 0 0\n1 0 0\n2 1 0\n\n9 9 9\n\n0 2 0\n0 3 0\n";
+	const char *radius = "<float name='radius' value='0.1'/>";
+	struct built_shape a = built_ok("hair", radius, text), b = built("hair", radius, bytes, binary_hair(bytes)),
+			   c = built_ok("linearcurve", "", "0 0 0 0.1\n1 0 0 0.1\n2 1 0 0.1\n\n0 2 0 0.1\n0 3 0 0.1\n"),
+			   d = built_ok("hair", "", text);
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	assert_int_equal(a.g.mesh.vertex_count, b.g.mesh.vertex_count);
+	assert_int_equal(a.g.mesh.vertex_count, c.g.mesh.vertex_count);
+	assert_memory_equal(a.g.mesh.position, b.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
+	assert_memory_equal(a.g.mesh.position, c.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
+	assert_true(near(area_of(&d.g.mesh) / area_of(&a.g.mesh), 0.25, 0.1)); /* 0.025 without a radius */
+	built_shape_release(&a);
+	built_shape_release(&b);
+	built_shape_release(&c);
+	built_shape_release(&d);
+}
+
+static void test_bad_files(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *type, *text, *error;
+	} cases[] = {
+		{"linearcurve", "", "m: has no curve"},
+		{"linearcurve", "\n\n  \n", "m: has no curve"},
+		{"linearcurve", "0 0 0 1\n", "m:1: a curve of 1 control point; it needs 2"},
+		{"linearcurve", "0 0 0 1\n1 0 0 1\n\n2 0 0 1\n\n", "m:5: a curve of 1 control point; it needs 2"},
+		{"bsplinecurve", "0 0 0 1\n1 0 0 1\n2 0 0 1\n", "m:3: a curve of 3 control points; it needs 4"},
+		{"linearcurve", "0 0 0\n1 0 0 1\n", "m:1: a control point has 4 numbers"},
+		{"linearcurve", "0 0 0 1\n1 x 0 1\n", "m:2: a control point has 4 numbers"},
+		{"linearcurve", "0 0 0 1\n1 0 0 -1\n", "m:2: control point (1, 0, 0) of radius -1"},
+		{"linearcurve", "0 0 0 1\n1 nan 0 1\n", "m:2: control point"},
+		{"linearcurve", "0 0 0 1\n1 1e99 0 1\n", "m:2: control point"},
+		{"linearcurve", "0 0 0 1\n1 0 0 inf\n", "m:2: control point"},
+		{"hair", "0 0 0\n", "m: has no curve"},
+		{"hair", "0 0\n", "m:1: a control point has 3 numbers"},
+		{"hair", "BINARY_HAI 0 0", "m:1: a control point has 3 numbers"},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct built_shape b = built(cases[i].type, "", cases[i].text, strlen(cases[i].text));
+		if (b.result >= 0 || !strstr(b.error.text, cases[i].error))
+			fail_msg("%d: %s\n not: %s", b.result, b.error.text, cases[i].error);
+		built_shape_release(&b);
+	}
+	unsigned char bytes[256];
+	size_t size = binary_hair(bytes);
+	for (size_t n = 15; n < size; n++) {
+		struct built_shape b = built("hair", "", bytes, n);
+		if (b.result >= 0 || !strstr(b.error.text, "m: ends before its last"))
+			fail_msg("%zu of %zu bytes: %d: %s", n, size, b.result, b.error.text);
+		built_shape_release(&b);
+	}
+	struct built_shape b = built("hair", "<float name='reduction' value='0.5'/>", bytes, size);
+	assert_true(b.result < 0 && strstr(b.error.text, "\"reduction\" is only supported as 0"));
+	built_shape_release(&b);
+}
+
+/* Numbers of any size, repeated points, turns on the spot: a mesh of finite numbers, or an error. */
+static void test_extremes(void **state)
+{
+	(void)state;
+	static const char *const numbers[] = {"0",	"1",	"-1",	 "1e60",  "-1e60", "1e-60", "1e-200",
+					      "5e-324", "1e30", "1e-30", "0.001", "2",	   "1e-7"};
+	struct dice d = dice_of("extreme curves");
+	uint32_t meshes = 0;
+	for (int round = 0; round < 2000; round++) {
+		char text[1024];
+		size_t used = 0;
+		for (uint32_t i = 0, n = 2 + (uint32_t)dice_below(&d, 8); i < n; i++) {
+			const char *v[4];
+			for (int k = 0; k < 4; k++)
+				v[k] = numbers[dice_below(&d, round % 2 ? 3 : sizeof numbers / sizeof *numbers)];
+			used += (size_t)snprintf(text + used, sizeof text - used, "%s %s %s %s\n", v[0], v[1], v[2],
+						 v[3][0] == '-' ? v[3] + 1 : v[3]);
+		}
+		struct built_shape b = built(round % 4 < 2 ? "linearcurve" : "bsplinecurve", "", text, used);
+		assert_true(b.result <= 0);
+		meshes += b.result == 0 && b.g.mesh.triangle_count > 0;
+		for (uint32_t i = 0; b.result == 0 && i < b.g.mesh.vertex_count; i++) {
+			assert_true(vec3_is_finite(mesh_load(b.g.mesh.position[i])));
+			assert_true(vec3_is_finite(mesh_load(b.g.mesh.normal[i])));
+		}
+		built_shape_release(&b);
+	}
+	assert_true(meshes > 1000);
+}
+
+static void test_memory_runs_out(void **state)
+{
+	(void)state;
+	char text[1024];
+	print_points(text, sizeof text, 4);
+	static const char *const types[] = {"linearcurve", "bsplinecurve"};
+	for (int k = 0; k < 2; k++) {
+		struct built_shape b = built_ok(types[k], "", text);
+		const struct memory_file files[] = {{"m", text, strlen(text)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		uint64_t dropped;
+		int r = -1;
+		long n;
+		for (n = 0; r && n < 100; n++) {
+			struct arena arena = {0};
+			struct shape_geometry g;
+			mem_fail_after(n);
+			r = shape_build(b.scene.objects[0], &assets, &arena, &g, &dropped, &b.error);
+			mem_fail_after(-1);
+			assert_true(r == 0 || r == -ENOMEM);
+			arena_fini(&arena);
+		}
+		assert_int_equal(r, 0);
+		assert_true(n > 3);
+		built_shape_release(&b);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_surfaces),
+		cmocka_unit_test(test_normals),
+		cmocka_unit_test(test_areas_and_volumes),
+		cmocka_unit_test(test_placed),
+		cmocka_unit_test(test_v),
+		cmocka_unit_test(test_hair),
+		cmocka_unit_test(test_bad_files),
+		cmocka_unit_test(test_extremes),
+		cmocka_unit_test(test_memory_runs_out),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

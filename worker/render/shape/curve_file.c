@@ -1,0 +1,211 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * curve_file_read and curve_file_read_hair open the file that the shape names and add its points one by one. The binary
+ * form of hair is "BINARY_HAIR", the number of vertices as 32 bits, and three floats for each, all little-endian; an
+ * infinity between vertices begins a new hair.
+ *
+ * Failures, with the file's name and the line: a number that is missing, not finite or too large, a negative radius, a
+ * curve with too few points; a file without points, a binary one that ends too early.
+ */
+#include "worker/render/shape/curve_file.h"
+
+#include "common/base/bytes.h"
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+#include "worker/render/scene/number.h"
+#include "worker/render/scene/text_lines.h"
+#include "worker/render/shape/mesh.h"
+
+#include <string.h>
+
+enum { POINTS_MAX = 1 << 27 };
+
+struct curve_reader {
+	const struct scene_node *node;
+	const char *name;
+	mat4 to_world;
+	double radius; /* of all points; negative: each line has one */
+	uint32_t least;
+	bool drop_short; /* curves of fewer points are left out */
+	struct curve_points *out;
+	struct error *error;
+};
+
+void curve_points_free(struct curve_points *p)
+{
+	mem_free(p->point);
+	mem_free(p->first);
+	*p = (struct curve_points){.point = NULL};
+}
+
+static bool grow(void **items, uint32_t count, uint32_t *room, size_t size)
+{
+	if (count < *room)
+		return true;
+	uint32_t more = *room ? 2 * *room : 256;
+	void *grown = mem_grow(*items, *room * size, more * size);
+	if (!grown)
+		return false;
+	*items = grown;
+	*room = more;
+	return true;
+}
+
+static int add_start(struct curve_reader *r)
+{
+	struct curve_points *o = r->out;
+	void *first = o->first;
+	if (!grow(&first, o->curves, &o->curves_room, sizeof *o->first))
+		return node_error(r->node, r->error, ENOMEM, "%s: out of memory", r->name);
+	o->first = first;
+	o->first[o->curves] = o->count;
+	return 0;
+}
+
+static int add_point(struct curve_reader *r, const double p[4], int line)
+{
+	struct curve_points *o = r->out;
+	void *points = o->point;
+	int rc = o->begun ? 0 : add_start(r);
+	if (rc)
+		return rc;
+	if (o->count >= POINTS_MAX)
+		return node_error(r->node, r->error, EFBIG, "%s: more than %d control points", r->name, POINTS_MAX);
+	if (!grow(&points, o->count, &o->room, sizeof *o->point))
+		return node_error(r->node, r->error, ENOMEM, "%s: out of memory", r->name);
+	o->point = points;
+	vec3 at = mat4_point(&r->to_world, mesh_load(p));
+	bool good = p[3] >= 0 && p[3] <= MESH_COORDINATE_MAX;
+	for (int k = 0; k < 3; k++)
+		good = good && fabs(p[k]) <= MESH_COORDINATE_MAX;
+	good = good && fabs(at.x) <= MESH_COORDINATE_MAX && fabs(at.y) <= MESH_COORDINATE_MAX &&
+	       fabs(at.z) <= MESH_COORDINATE_MAX;
+	if (!good)
+		return node_error(r->node, r->error, ERANGE, "%s:%d: control point (%g, %g, %g) of radius %g", r->name,
+				  line, p[0], p[1], p[2], p[3]);
+	mesh_store(o->point[o->count], at);
+	o->point[o->count++][3] = p[3];
+	o->begun = true;
+	return 0;
+}
+
+static int end_curve(struct curve_reader *r, int line)
+{
+	struct curve_points *o = r->out;
+	if (!o->begun)
+		return 0;
+	uint32_t points = o->count - o->first[o->curves];
+	o->begun = false;
+	if (points >= r->least)
+		o->curves++;
+	else if (r->drop_short)
+		o->count = o->first[o->curves];
+	else
+		return node_error(r->node, r->error, EINVAL, "%s:%d: a curve of %u control point%s; it needs %u",
+				  r->name, line, points, points == 1 ? "" : "s", r->least);
+	return 0;
+}
+
+static int read_line(struct curve_reader *r, const struct text_line *l)
+{
+	enum { NUMBERS = 4 };
+	const char *p = l->word, *end = l->rest + l->rest_length;
+	double v[NUMBERS] = {0, 0, 0, r->radius};
+	if (l->word_length == 0)
+		return end_curve(r, l->number);
+	int count = r->radius < 0 ? NUMBERS : NUMBERS - 1;
+	for (int i = 0; i < count; i++) {
+		while (p < end && number_is_blank(*p))
+			p++;
+		p = number_scan_printed(p, end, &v[i]);
+		if (!p)
+			return node_error(r->node, r->error, EINVAL, "%s:%d: a control point has %d numbers", r->name,
+					  l->number, count);
+	}
+	return add_point(r, v, l->number);
+}
+
+static int read_text(struct curve_reader *r, const struct asset *a)
+{
+	struct text_lines lines = {(const char *)a->bytes, (const char *)a->bytes + a->size, 0};
+	struct text_line l;
+	int rc = 0;
+	while (!rc && text_lines_next(&lines, &l)) {
+		tick();
+		rc = read_line(r, &l);
+	}
+	return rc ? rc : end_curve(r, lines.number);
+}
+
+static double float_at(const unsigned char *p)
+{
+	uint32_t bits = get32(p);
+	float v;
+	memcpy(&v, &bits, sizeof v);
+	return (double)v;
+}
+
+static const char binary_name[] = "BINARY_HAIR";
+enum { BINARY_NAME = sizeof binary_name - 1, BINARY_HEAD = BINARY_NAME + 4 };
+
+static int read_binary(struct curve_reader *r, const struct asset *a)
+{
+	const unsigned char *p = (const unsigned char *)a->bytes + BINARY_HEAD,
+			    *end = (const unsigned char *)a->bytes + a->size;
+	uint32_t left = get32((const unsigned char *)a->bytes + BINARY_NAME);
+	int rc = 0;
+	while (left > 0 && !rc) {
+		double v[4] = {0, 0, 0, r->radius};
+		tick();
+		if (end - p >= 4 && isinf(float_at(p))) {
+			rc = end_curve(r, 0);
+			p += 4;
+			continue;
+		}
+		if (end - p < 12)
+			return node_error(r->node, r->error, EINVAL, "%s: ends before its last %u vertices", r->name,
+					  left);
+		for (int k = 0; k < 3; k++, p += 4)
+			v[k] = float_at(p);
+		rc = add_point(r, v, 0);
+		left--;
+	}
+	return rc ? rc : end_curve(r, 0);
+}
+
+static int read_file(struct curve_reader *r, const struct asset_source *assets)
+{
+	struct asset a;
+	*r->out = (struct curve_points){.point = NULL};
+	r->name = node_string(r->node, "filename", "");
+	r->to_world = node_transform(r->node, "to_world");
+	int rc = mesh_open(r->node, assets, &a, r->error);
+	if (rc)
+		return rc;
+	bool binary = r->radius >= 0 && a.size >= BINARY_HEAD && memcmp(a.bytes, binary_name, BINARY_NAME) == 0;
+	rc = binary ? read_binary(r, &a) : read_text(r, &a);
+	assets->close(assets->user, &a);
+	if (!rc && r->out->curves == 0)
+		rc = node_error(r->node, r->error, EINVAL, "%s: has no curve", r->name);
+	if (!rc)
+		rc = add_start(r); /* the end of the last */
+	if (rc)
+		curve_points_free(r->out);
+	return rc;
+}
+
+int curve_file_read(const struct scene_node *n, const struct asset_source *assets, uint32_t least,
+		    struct curve_points *out, struct error *e)
+{
+	return read_file(&(struct curve_reader){.node = n, .radius = -1, .least = least, .out = out, .error = e},
+			 assets);
+}
+
+int curve_file_read_hair(const struct scene_node *n, const struct asset_source *assets, double radius,
+			 struct curve_points *out, struct error *e)
+{
+	return read_file(
+		&(struct curve_reader){
+			.node = n, .radius = radius, .least = 2, .drop_short = true, .out = out, .error = e},
+		assets);
+}

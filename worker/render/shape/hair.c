@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Mitsuba 0.6's hair: straight pieces of one radius, which to_world does not change. Joints are rounded, where Mitsuba
+ * has mitres, and ends are closed. angle_threshold, which merges pieces that are almost straight to save time, has no
+ * effect.
+ */
+#include "worker/render/shape/curve_file.h"
+#include "worker/render/shape/curve_shape.h"
+#include "worker/render/shape/declare.h"
+
+static const struct param params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"radius", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, MESH_COORDINATE_MAX, NULL},
+	{"reduction", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1, NULL},
+	{"angle_threshold", IGNORED},
+	SHAPE_PARAMS_END,
+};
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	struct curve_points points;
+	if (node_float(n, "reduction", 0) > 0)
+		return node_error(n, e, ENOTSUP, "\"reduction\" is only supported as 0: all hair is rendered");
+	int rc = curve_file_read_hair(n, assets, node_float(n, "radius", 0.025), &points, e);
+	return rc ? rc : curve_shape_chains(n, &points, arena, out, e);
+}
+
+const struct shape_ops shape_ops_hair = {.type = "hair", .params = params, .build = build};

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Curves of straight pieces: cones with spheres as joints and ends (tube.h), as in Mitsuba. to_world moves the control
+ * points and does not change their radii. u is once around, v from 0 to 1 over all pieces of the file.
+ */
+#include "worker/render/shape/curve_file.h"
+#include "worker/render/shape/curve_shape.h"
+#include "worker/render/shape/declare.h"
+
+static const struct param params[] = {{"filename", UNDERSTOOD(VALUE_STRING)}, SHAPE_PARAMS_END};
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	struct curve_points points;
+	int rc = curve_file_read(n, assets, 2, &points, e);
+	return rc ? rc : curve_shape_chains(n, &points, arena, out, e);
+}
+
+const struct shape_ops shape_ops_linearcurve = {.type = "linearcurve", .params = params, .build = build};
