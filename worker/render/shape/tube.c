@@ -80,14 +80,20 @@ static int add_cap(struct tube *t, const struct sphere_at *s, vec3 axis, double 
 	return rc;
 }
 
+/* After the ring on s where the segment before it ends. */
 static int add_joint(struct tube *t, const struct sphere_at *s, vec3 from, double a, vec3 to, double b)
 {
 	vec3 across = mesh_unit(vec3_madd(to, -vec3_dot(from, to), from));
 	double turn = mesh_angle(from, to);
 	if (vec3_length(across) == 0)
 		across = frame_around(from).s;
-	unsigned n = steps_for(fmax(turn, fabs(b - a)));
+	double way = fmax(turn, fabs(b - a));
+	unsigned n = steps_for(way);
 	int rc = 0;
+	if (way < pi / TUBE_SIDES) { /* one ring does for both segments */
+		t->count--;
+		return add_circle(t, s, mesh_unit(vec3_add(from, to)), 0.5 * (a + b), false);
+	}
 	for (unsigned i = 1; i <= n && !rc; i++) {
 		double x = (double)i / n;
 		vec3 axis = vec3_madd(vec3_scale(cos(turn * x), from), sin(turn * x), across);
