@@ -85,7 +85,7 @@ static vec3 first_axis(const double (*p)[4], uint32_t count)
 	return (vec3){0, 0, 1};
 }
 
-static int add_curve(struct tube *t, const double (*p)[4], uint32_t count, double v, double step)
+static int add_curve(struct list *rings, const double (*p)[4], uint32_t count, double v, double step)
 {
 	vec3 axis = first_axis(p, count);
 	int rc = 0;
@@ -97,7 +97,7 @@ static int add_curve(struct tube *t, const double (*p)[4], uint32_t count, doubl
 			r.first = i == 0 && k == 0;
 			r.v = v + step * (i + (double)k / n);
 			axis = r.axis;
-			rc = tube_add(t, &r);
+			rc = tube_add(rings, &r);
 		}
 	}
 	return rc;
@@ -107,17 +107,17 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		 struct shape_geometry *out, struct error *e)
 {
 	struct curve_points points;
-	struct tube tubes = {NULL, 0, 0};
+	struct list rings = {.size = sizeof(struct tube_ring)};
 	int rc = curve_file_read(n, assets, POINTS, &points, e);
 	if (rc)
 		return rc;
 	double step = 1.0 / (points.count - (POINTS - 1) * points.curves); /* pieces */
 	for (uint32_t i = 0; i < points.curves && !rc; i++) {
 		uint32_t first = points.first[i];
-		rc = add_curve(&tubes, points.point + first, points.first[i + 1] - first,
+		rc = add_curve(&rings, points.point + first, points.first[i + 1] - first,
 			       step * (first - (POINTS - 1) * i), step);
 	}
-	return curve_shape_finish(n, &points, &tubes, rc, arena, out, e);
+	return curve_shape_finish(n, &points, &rings, rc, arena, out, e);
 }
 
 const struct shape_ops shape_ops_bsplinecurve = {.type = "bsplinecurve", .params = params, .build = build};

@@ -11,7 +11,6 @@
 
 #include "common/base/bytes.h"
 #include "common/base/liveness.h"
-#include "common/base/mem.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/text_lines.h"
 #include "worker/render/shape/mesh.h"
@@ -27,82 +26,70 @@ struct curve_reader {
 	double radius; /* of all points; negative: each line has one */
 	uint32_t least;
 	bool drop_short; /* curves of fewer points are left out */
+	bool begun;	 /* the last curve has a point */
 	struct curve_points *out;
 	struct error *error;
 };
 
 void curve_points_free(struct curve_points *p)
 {
-	mem_free(p->point);
-	mem_free(p->first);
-	*p = (struct curve_points){.point = NULL};
+	list_free(&p->points);
+	list_free(&p->firsts);
 }
 
-static bool grow(void **items, uint32_t count, uint32_t *room, size_t size)
+static int out_of_memory(const struct curve_reader *r)
 {
-	if (count < *room)
-		return true;
-	uint32_t more = *room ? 2 * *room : 256;
-	void *grown = mem_grow(*items, *room * size, more * size);
-	if (!grown)
-		return false;
-	*items = grown;
-	*room = more;
-	return true;
+	return node_error(r->node, r->error, ENOMEM, "%s: out of memory", r->name);
 }
 
 static int add_start(struct curve_reader *r)
 {
-	struct curve_points *o = r->out;
-	void *first = o->first;
-	if (!grow(&first, o->curves, &o->curves_room, sizeof *o->first))
-		return node_error(r->node, r->error, ENOMEM, "%s: out of memory", r->name);
-	o->first = first;
-	o->first[o->curves] = o->count;
+	uint32_t *first = list_push(&r->out->firsts);
+	if (!first)
+		return out_of_memory(r);
+	*first = (uint32_t)r->out->points.count;
 	return 0;
 }
 
 static int add_point(struct curve_reader *r, const double p[4], int line)
 {
-	struct curve_points *o = r->out;
-	void *points = o->point;
-	int rc = o->begun ? 0 : add_start(r);
+	struct list *points = &r->out->points;
+	int rc = r->begun ? 0 : add_start(r);
 	if (rc)
 		return rc;
-	if (o->count >= POINTS_MAX)
+	if (points->count >= POINTS_MAX)
 		return node_error(r->node, r->error, EFBIG, "%s: more than %d control points", r->name, POINTS_MAX);
-	if (!grow(&points, o->count, &o->room, sizeof *o->point))
-		return node_error(r->node, r->error, ENOMEM, "%s: out of memory", r->name);
-	o->point = points;
 	vec3 at = mat4_point(&r->to_world, mesh_load(p));
-	bool good = p[3] >= 0 && p[3] <= MESH_COORDINATE_MAX;
-	for (int k = 0; k < 3; k++)
-		good = good && fabs(p[k]) <= MESH_COORDINATE_MAX;
-	good = good && fabs(at.x) <= MESH_COORDINATE_MAX && fabs(at.y) <= MESH_COORDINATE_MAX &&
-	       fabs(at.z) <= MESH_COORDINATE_MAX;
+	const double sizes[] = {p[0], p[1], p[2], p[3], at.x, at.y, at.z};
+	bool good = p[3] >= 0;
+	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+		good = good && fabs(sizes[i]) <= MESH_COORDINATE_MAX;
 	if (!good)
 		return node_error(r->node, r->error, ERANGE, "%s:%d: control point (%g, %g, %g) of radius %g", r->name,
 				  line, p[0], p[1], p[2], p[3]);
-	mesh_store(o->point[o->count], at);
-	o->point[o->count++][3] = p[3];
-	o->begun = true;
+	double *new = list_push(points);
+	if (!new)
+		return out_of_memory(r);
+	mesh_store(new, at);
+	new[3] = p[3];
+	r->begun = true;
 	return 0;
 }
 
 static int end_curve(struct curve_reader *r, int line)
 {
-	struct curve_points *o = r->out;
-	if (!o->begun)
+	struct list *points = &r->out->points, *firsts = &r->out->firsts;
+	if (!r->begun)
 		return 0;
-	uint32_t points = o->count - o->first[o->curves];
-	o->begun = false;
-	if (points >= r->least)
-		o->curves++;
-	else if (r->drop_short)
-		o->count = o->first[o->curves];
-	else
+	r->begun = false;
+	uint32_t first = ((const uint32_t *)firsts->items)[firsts->count - 1], count = (uint32_t)points->count - first;
+	if (count >= r->least)
+		return 0;
+	if (!r->drop_short)
 		return node_error(r->node, r->error, EINVAL, "%s:%d: a curve of %u control point%s; it needs %u",
-				  r->name, line, points, points == 1 ? "" : "s", r->least);
+				  r->name, line, count, count == 1 ? "" : "s", r->least);
+	points->count = first;
+	firsts->count--;
 	return 0;
 }
 
@@ -176,7 +163,8 @@ static int read_binary(struct curve_reader *r, const struct asset *a)
 static int read_file(struct curve_reader *r, const struct asset_source *assets)
 {
 	struct asset a;
-	*r->out = (struct curve_points){.point = NULL};
+	struct curve_points *out = r->out;
+	*out = (struct curve_points){.points = {.size = sizeof *out->point}, .firsts = {.size = sizeof *out->first}};
 	r->name = node_string(r->node, "filename", "");
 	r->to_world = node_transform(r->node, "to_world");
 	int rc = mesh_open(r->node, assets, &a, r->error);
@@ -185,13 +173,19 @@ static int read_file(struct curve_reader *r, const struct asset_source *assets)
 	bool binary = r->radius >= 0 && a.size >= BINARY_HEAD && memcmp(a.bytes, binary_name, BINARY_NAME) == 0;
 	rc = binary ? read_binary(r, &a) : read_text(r, &a);
 	assets->close(assets->user, &a);
-	if (!rc && r->out->curves == 0)
+	out->curves = (uint32_t)out->firsts.count;
+	if (!rc && out->curves == 0)
 		rc = node_error(r->node, r->error, EINVAL, "%s: has no curve", r->name);
 	if (!rc)
 		rc = add_start(r); /* the end of the last */
-	if (rc)
-		curve_points_free(r->out);
-	return rc;
+	if (rc) {
+		curve_points_free(out);
+		return rc;
+	}
+	out->point = out->points.items;
+	out->first = out->firsts.items;
+	out->count = (uint32_t)out->points.count;
+	return 0;
 }
 
 int curve_file_read(const struct scene_node *n, const struct asset_source *assets, uint32_t least,

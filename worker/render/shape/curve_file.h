@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Files of curves: one control point per line, position and radius, and an empty line between curves. One thread; what
- * is read is mem_alloc'd until curve_points_free.
+ * is read lasts until curve_points_free.
  */
 #ifndef WORKER_RENDER_SHAPE_CURVE_FILE_H
 #define WORKER_RENDER_SHAPE_CURVE_FILE_H
 
+#include "common/base/list.h"
 #include "worker/render/scene/scene.h"
 
 struct curve_points {
-	double (*point)[4]; /* x y z in world space (to_world applied), radius */
-	uint32_t *first;    /* of each curve, and the count of points at the end */
-	uint32_t count, room, curves, curves_room;
-	bool begun; /* the last curve has a point */
+	const double (*point)[4]; /* x y z in world space (to_world applied), radius */
+	const uint32_t *first;	  /* of each curve, and the count of points at the end */
+	uint32_t count, curves;
+	struct list points, firsts; /* which hold them */
 };
 
 /* A file of text in which a curve has at least that many points. */

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/shape/curve_shape.h"
 
-int curve_shape_finish(const struct scene_node *n, struct curve_points *points, struct tube *tubes, int rc,
+int curve_shape_finish(const struct scene_node *n, struct curve_points *points, struct list *rings, int rc,
 		       struct arena *arena, struct shape_geometry *out, struct error *e)
 {
 	out->placed = true;
 	if (!rc)
-		rc = tube_mesh(tubes, arena, &out->mesh);
-	tube_free(tubes);
+		rc = tube_mesh(rings, arena, &out->mesh);
+	list_free(rings);
 	curve_points_free(points);
 	if (rc == -EFBIG)
 		return node_error(n, e, EFBIG, "its curves make more than %d triangles", MESH_TRIANGLES_MAX);
@@ -17,13 +17,13 @@ int curve_shape_finish(const struct scene_node *n, struct curve_points *points, 
 int curve_shape_chains(const struct scene_node *n, struct curve_points *points, struct arena *arena,
 		       struct shape_geometry *out, struct error *e)
 {
-	struct tube tubes = {NULL, 0, 0};
+	struct list rings = {.size = sizeof(struct tube_ring)};
 	double step = 1.0 / (points->count - points->curves); /* pieces */
 	int rc = 0;
 	for (uint32_t i = 0; i < points->curves && !rc; i++) {
 		uint32_t first = points->first[i];
-		rc = tube_add_chain(&tubes, points->point + first, points->first[i + 1] - first, step * (first - i),
+		rc = tube_add_chain(&rings, points->point + first, points->first[i + 1] - first, step * (first - i),
 				    step);
 	}
-	return curve_shape_finish(n, points, &tubes, rc, arena, out, e);
+	return curve_shape_finish(n, points, &rings, rc, arena, out, e);
 }

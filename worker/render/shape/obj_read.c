@@ -28,19 +28,6 @@ struct reader {
 	int line;
 };
 
-static void *push(struct obj_list *l)
-{
-	if (l->count == l->room) {
-		size_t room = l->room ? 2 * l->room : 256;
-		void *more = mem_grow(l->items, l->room * l->size, room * l->size);
-		if (!more)
-			return NULL;
-		l->items = more;
-		l->room = room;
-	}
-	return (char *)l->items + l->size * l->count++;
-}
-
 static int out_of_memory(const struct reader *o)
 {
 	return node_error(o->node, o->error, ENOMEM, "%s:%d: out of memory", o->name, o->line);
@@ -71,9 +58,9 @@ static bool at_end_of_line(struct reader *o)
 	return o->p >= o->end || *o->p == '\n' || *o->p == '#';
 }
 
-static int read_numbers(struct reader *o, const char *what, struct obj_list *l, size_t least, size_t count)
+static int read_numbers(struct reader *o, const char *what, struct list *l, size_t least, size_t count)
 {
-	double *v = push(l);
+	double *v = list_push(l);
 	if (!v)
 		return out_of_memory(o);
 	for (size_t i = 0; i < count; i++) {
@@ -104,7 +91,7 @@ static int read_colour(struct reader *o)
 	}
 	if (!at_end_of_line(o))
 		return 0;
-	double *colour = push(&o->file->colours);
+	double *colour = list_push(&o->file->colours);
 	if (!colour)
 		return out_of_memory(o);
 	for (int k = 0; k < 3; k++)
@@ -173,7 +160,7 @@ static int read_corner(struct reader *o)
 	if (o->p < o->end && !number_is_blank(*o->p) && *o->p != '\\' && *o->p != '#')
 		return node_error(o->node, o->error, EINVAL, "%s:%d: a face's corners are v, v/vt, v//vn or v/vt/vn",
 				  o->name, o->line);
-	struct obj_corner *new = push(&o->file->corners);
+	struct obj_corner *new = list_push(&o->file->corners);
 	if (!new)
 		return out_of_memory(o);
 	*new = c;
@@ -192,7 +179,7 @@ static int read_face(struct reader *o)
 		if (o->file->triangles.count >= MESH_TRIANGLES_MAX)
 			return node_error(o->node, o->error, E2BIG, "%s:%d: more than %d triangles", o->name, o->line,
 					  MESH_TRIANGLES_MAX);
-		uint32_t *t = push(&o->file->triangles);
+		uint32_t *t = list_push(&o->file->triangles);
 		if (!t)
 			return out_of_memory(o);
 		t[0] = first;
@@ -211,12 +198,12 @@ static int begin_run(struct reader *o, const char *name, size_t length)
 	struct obj_file *f = o->file;
 	struct obj_run *last = f->runs.count ? (struct obj_run *)f->runs.items + (f->runs.count - 1) : NULL;
 	if (!last || last->triangle < f->triangles.count)
-		last = push(&f->runs);
+		last = list_push(&f->runs);
 	if (!last)
 		return out_of_memory(o);
 	*last = (struct obj_run){f->names.count, length, f->corners.count, f->triangles.count};
 	for (size_t i = 0; i < length; i++) {
-		char *c = push(&f->names);
+		char *c = list_push(&f->names);
 		if (!c)
 			return out_of_memory(o);
 		*c = name[i];
@@ -298,10 +285,10 @@ int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_
 
 void obj_free(struct obj_file *o)
 {
-	struct obj_list *all[] = {&o->positions, &o->uvs,	&o->normals, &o->colours,
-				  &o->corners,	 &o->triangles, &o->runs,    &o->names};
+	struct list *all[] = {&o->positions, &o->uvs,	    &o->normals, &o->colours,
+			      &o->corners,   &o->triangles, &o->runs,	 &o->names};
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-		mem_free(all[i]->items);
+		list_free(all[i]);
 	*o = (struct obj_file){0};
 }
 

@@ -6,12 +6,8 @@
 #ifndef WORKER_RENDER_SHAPE_OBJ_READ_H
 #define WORKER_RENDER_SHAPE_OBJ_READ_H
 
+#include "common/base/list.h"
 #include "worker/render/shape/mesh.h"
-
-struct obj_list {
-	void *items;
-	size_t count, room, size; /* size of one item */
-};
 
 struct obj_corner {
 	uint32_t v, vt, vn; /* from 1; 0: none */
@@ -25,12 +21,12 @@ struct obj_run {
 };
 
 struct obj_file {
-	struct obj_list positions, uvs, normals; /* double[3], double[2], double[3] */
-	struct obj_list colours;		 /* double[3], linear: of the positions, or of a part of them */
-	struct obj_list corners;		 /* struct obj_corner, one for each corner of each polygon */
-	struct obj_list triangles;		 /* uint32_t[3] into corners */
-	struct obj_list runs;			 /* struct obj_run; the first, without a name, is always there */
-	struct obj_list names;			 /* char */
+	struct list positions, uvs, normals; /* double[3], double[2], double[3] */
+	struct list colours;		     /* double[3], linear: of the positions, or of a part of them */
+	struct list corners;		     /* struct obj_corner, one for each corner of each polygon */
+	struct list triangles;		     /* uint32_t[3] into corners */
+	struct list runs;		     /* struct obj_run; the first, without a name, is always there */
+	struct list names;		     /* char */
 };
 
 /* Reads the file that the node names. After 0, release it with obj_free. */

@@ -15,33 +15,21 @@
 #include "worker/render/shape/tube.h"
 
 #include "common/base/liveness.h"
-#include "common/base/mem.h"
 #include "worker/render/math/frame.h"
 
 #include <errno.h>
 
 static const double pi = 3.14159265358979323846;
 
-int tube_add(struct tube *t, const struct tube_ring *r)
+int tube_add(struct list *rings, const struct tube_ring *r)
 {
-	if (t->count >= MESH_TRIANGLES_MAX / (2 * TUBE_SIDES))
+	if (rings->count >= MESH_TRIANGLES_MAX / (2 * TUBE_SIDES))
 		return -EFBIG;
-	if (t->count == t->room) {
-		size_t room = t->room ? 2 * t->room : 256;
-		struct tube_ring *more = mem_grow(t->rings, t->room * sizeof *more, room * sizeof *more);
-		if (!more)
-			return -ENOMEM;
-		t->rings = more;
-		t->room = room;
-	}
-	t->rings[t->count++] = *r;
+	struct tube_ring *new = list_push(rings);
+	if (!new)
+		return -ENOMEM;
+	*new = *r;
 	return 0;
-}
-
-void tube_free(struct tube *t)
-{
-	mem_free(t->rings);
-	*t = (struct tube){NULL, 0, 0};
 }
 
 /* ---- chains of cones ---- */
@@ -52,17 +40,17 @@ struct sphere_at {
 };
 
 /* A ring on the sphere at the angle a from the equator, towards the axis. */
-static int add_circle(struct tube *t, const struct sphere_at *s, vec3 axis, double a, bool first)
+static int add_circle(struct list *rings, const struct sphere_at *s, vec3 axis, double a, bool first)
 {
 	bool pole = fabs(a) >= pi / 2;
 	double sin_a = pole ? copysign(1, a) : sin(a), cos_a = pole ? 0 : cos(a);
-	return tube_add(t, &(struct tube_ring){.center = vec3_madd(s->center, s->radius * sin_a, axis),
-					       .axis = axis,
-					       .radius = s->radius * cos_a,
-					       .cos = cos_a,
-					       .sin = sin_a,
-					       .v = s->v,
-					       .first = first});
+	return tube_add(rings, &(struct tube_ring){.center = vec3_madd(s->center, s->radius * sin_a, axis),
+						   .axis = axis,
+						   .radius = s->radius * cos_a,
+						   .cos = cos_a,
+						   .sin = sin_a,
+						   .v = s->v,
+						   .first = first});
 }
 
 static unsigned steps_for(double angle)
@@ -71,17 +59,17 @@ static unsigned steps_for(double angle)
 }
 
 /* From one pole or ring to another around the same axis; without the one at `from` unless it is the first. */
-static int add_cap(struct tube *t, const struct sphere_at *s, vec3 axis, double from, double to, bool first)
+static int add_cap(struct list *rings, const struct sphere_at *s, vec3 axis, double from, double to, bool first)
 {
 	unsigned n = steps_for(to - from);
-	int rc = first ? add_circle(t, s, axis, from, true) : 0;
+	int rc = first ? add_circle(rings, s, axis, from, true) : 0;
 	for (unsigned i = 1; i <= n && !rc; i++)
-		rc = add_circle(t, s, axis, i == n ? to : from + (to - from) * i / n, false);
+		rc = add_circle(rings, s, axis, i == n ? to : from + (to - from) * i / n, false);
 	return rc;
 }
 
 /* After the ring on s where the segment before it ends. */
-static int add_joint(struct tube *t, const struct sphere_at *s, vec3 from, double a, vec3 to, double b)
+static int add_joint(struct list *rings, const struct sphere_at *s, vec3 from, double a, vec3 to, double b)
 {
 	vec3 across = mesh_unit(vec3_madd(to, -vec3_dot(from, to), from));
 	double turn = mesh_angle(from, to);
@@ -91,18 +79,18 @@ static int add_joint(struct tube *t, const struct sphere_at *s, vec3 from, doubl
 	unsigned n = steps_for(way);
 	int rc = 0;
 	if (way < pi / TUBE_SIDES) { /* one ring does for both segments */
-		t->count--;
-		return add_circle(t, s, mesh_unit(vec3_add(from, to)), 0.5 * (a + b), false);
+		rings->count--;
+		return add_circle(rings, s, mesh_unit(vec3_add(from, to)), 0.5 * (a + b), false);
 	}
 	for (unsigned i = 1; i <= n && !rc; i++) {
 		double x = (double)i / n;
 		vec3 axis = vec3_madd(vec3_scale(cos(turn * x), from), sin(turn * x), across);
-		rc = add_circle(t, s, i == n ? to : mesh_unit(axis), i == n ? b : a + (b - a) * x, false);
+		rc = add_circle(rings, s, i == n ? to : mesh_unit(axis), i == n ? b : a + (b - a) * x, false);
 	}
 	return rc;
 }
 
-int tube_add_chain(struct tube *t, const double (*points)[4], uint32_t count, double v, double v_step)
+int tube_add_chain(struct list *rings, const double (*points)[4], uint32_t count, double v, double v_step)
 {
 	struct sphere_at s = {mesh_load(points[0]), points[0][3], v};
 	vec3 axis = {0, 0, 1};
@@ -119,17 +107,17 @@ int tube_add_chain(struct tube *t, const double (*points)[4], uint32_t count, do
 			continue;
 		}
 		double a = asin(fmax(-1, fmin(1, (s.radius - next.radius) / length)));
-		rc = begun ? add_joint(t, &s, axis, angle, to, a) : add_cap(t, &s, to, -pi / 2, a, true);
+		rc = begun ? add_joint(rings, &s, axis, angle, to, a) : add_cap(rings, &s, to, -pi / 2, a, true);
 		if (!rc)
-			rc = add_circle(t, &next, to, a, false);
+			rc = add_circle(rings, &next, to, a, false);
 		begun = true;
 		axis = to;
 		angle = a;
 		s = next;
 	}
 	if (!rc && !begun)
-		rc = add_circle(t, &s, axis, -pi / 2, true);
-	return rc ? rc : add_cap(t, &s, axis, begun ? angle : -pi / 2, pi / 2, false);
+		rc = add_circle(rings, &s, axis, -pi / 2, true);
+	return rc ? rc : add_cap(rings, &s, axis, begun ? angle : -pi / 2, pi / 2, false);
 }
 
 /* ---- the mesh ---- */
@@ -178,17 +166,17 @@ static void set_sides(struct mesh *m, uint32_t triangle, uint32_t before, uint32
 	}
 }
 
-int tube_mesh(const struct tube *t, struct arena *arena, struct mesh *out)
+int tube_mesh(const struct list *rings, struct arena *arena, struct mesh *out)
 {
-	uint32_t tubes = 0, triangle = 0;
-	for (size_t i = 0; i < t->count; i++)
-		tubes += t->rings[i].first;
-	uint32_t rings = (uint32_t)t->count;
-	if (!mesh_alloc(out, rings * (TUBE_SIDES + 1), 2 * TUBE_SIDES * (rings - tubes), true, true, arena))
+	const struct tube_ring *ring = rings->items;
+	uint32_t tubes = 0, triangle = 0, count = (uint32_t)rings->count;
+	for (uint32_t i = 0; i < count; i++)
+		tubes += ring[i].first;
+	if (!mesh_alloc(out, count * (TUBE_SIDES + 1), 2 * TUBE_SIDES * (count - tubes), true, true, arena))
 		return -ENOMEM;
 	vec3 start = {0, 0, 0};
-	for (uint32_t i = 0; i < rings; i++) {
-		const struct tube_ring *r = &t->rings[i];
+	for (uint32_t i = 0; i < count; i++) {
+		const struct tube_ring *r = &ring[i];
 		uint32_t first = i * (TUBE_SIDES + 1);
 		tick();
 		start = r->first ? direction_at_start(r->axis) : carry(start, r[-1].axis, r->axis);

@@ -5,11 +5,12 @@
  * is off by at most 2.3 % of the radius. Texture coordinates: u once around, v as given. Around the axis they begin at
  * Mitsuba's direction at the start of a tube, and are carried along without twist.
  *
- * One thread; rings are mem_alloc'd until tube_free, the mesh is in the arena.
+ * One thread; the mesh is in the arena.
  */
 #ifndef WORKER_RENDER_SHAPE_TUBE_H
 #define WORKER_RENDER_SHAPE_TUBE_H
 
+#include "common/base/list.h"
 #include "worker/render/shape/mesh.h"
 
 enum { TUBE_SIDES = 12 };
@@ -25,19 +26,13 @@ struct tube_ring {
 	bool first; /* of a tube */
 };
 
-struct tube {
-	struct tube_ring *rings;
-	size_t count, room;
-};
-
-/* -EFBIG: more triangles than a mesh may have; -ENOMEM. */
-int tube_add(struct tube *t, const struct tube_ring *r);
+/* Rings are lists of struct tube_ring, freed by list_free. -EFBIG: more triangles than a mesh may have; -ENOMEM. */
+int tube_add(struct list *rings, const struct tube_ring *r);
 /*
  * A chain of cones with spheres as joints and as ends, like Embree's round linear curves: each cone touches the spheres
  * around its two ends. points: position and radius; v is 0 at the first and `v_step` more at each that follows.
  */
-int tube_add_chain(struct tube *t, const double (*points)[4], uint32_t count, double v, double v_step);
-int tube_mesh(const struct tube *t, struct arena *arena, struct mesh *out); /* -ENOMEM */
-void tube_free(struct tube *t);
+int tube_add_chain(struct list *rings, const double (*points)[4], uint32_t count, double v, double v_step);
+int tube_mesh(const struct list *rings, struct arena *arena, struct mesh *out); /* -ENOMEM */
 
 #endif
