@@ -1,6 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/built_shape.h"
 
+#include "tests/support/failing_memory.h"
+
+#include <errno.h>
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
 struct built_shape built_shape(const struct memory_file *files, const struct plugin_decl *plugins)
 {
 	struct asset_source assets = memory_assets(files);
@@ -16,4 +24,48 @@ void built_shape_release(struct built_shape *b)
 {
 	arena_fini(&b->arena);
 	scene_fini(&b->scene);
+}
+
+void built_shape_without_memory(const struct scene *scene, const struct memory_file *files, long least)
+{
+	struct asset_source assets = memory_assets(files);
+	uint64_t dropped;
+	struct error e;
+	int r = -1;
+	long n;
+	for (n = 0; r && n < 100; n++) {
+		struct arena arena = {0};
+		struct shape_geometry g;
+		mem_fail_after(n);
+		r = shape_build(scene->objects[0], &assets, &arena, &g, &dropped, &e);
+		mem_fail_after(-1);
+		assert_true(r == 0 || r == -ENOMEM);
+		arena_fini(&arena);
+	}
+	assert_int_equal(r, 0);
+	assert_true(n > least);
+}
+
+vec3 built_corner(const struct mesh *m, uint32_t triangle, int k)
+{
+	return mesh_load(m->position[m->index[triangle][k]]);
+}
+
+double built_area(const struct mesh *m)
+{
+	double sum = 0;
+	for (uint32_t t = 0; t < m->triangle_count; t++) {
+		vec3 a = built_corner(m, t, 0);
+		sum += 0.5 *
+		       vec3_length(vec3_cross(vec3_sub(built_corner(m, t, 1), a), vec3_sub(built_corner(m, t, 2), a)));
+	}
+	return sum;
+}
+
+double built_volume(const struct mesh *m)
+{
+	double sum = 0;
+	for (uint32_t t = 0; t < m->triangle_count; t++)
+		sum += vec3_dot(built_corner(m, t, 0), vec3_cross(built_corner(m, t, 1), built_corner(m, t, 2))) / 6;
+	return sum;
 }

@@ -19,4 +19,13 @@ struct built_shape {
 struct built_shape built_shape(const struct memory_file *files, const struct plugin_decl *plugins);
 void built_shape_release(struct built_shape *b);
 
+/* Builds the scene's first shape again and again, each time with one more allocation before memory runs out: an answer
+ * each time, and a shape in the end. More than `least` allocations are made. */
+void built_shape_without_memory(const struct scene *scene, const struct memory_file *files, long least);
+
+vec3 built_corner(const struct mesh *m, uint32_t triangle, int k);
+/* Of a closed mesh; negative: inside out. */
+double built_volume(const struct mesh *m);
+double built_area(const struct mesh *m);
+
 #endif

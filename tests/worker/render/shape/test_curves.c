@@ -3,10 +3,8 @@
  * Curves: the tubes lie where the distance to the curve, found by searching along it, is the radius; areas and volumes
  * are those of cylinders, cones and spheres; and whatever is in a file gives a mesh or a sentence.
  */
-#include "common/base/mem.h"
 #include "tests/support/built_shape.h"
 #include "tests/support/dice.h"
-#include "tests/support/failing_memory.h"
 #include "tests/support/scene_tables.h"
 #include "worker/render/shape/tube.h"
 
@@ -38,30 +36,6 @@ static struct built_shape built_ok(const char *type, const char *content, const 
 	if (b.result)
 		fail_msg("%s: %s", type, b.error.text);
 	return b;
-}
-
-static vec3 corner(const struct mesh *m, uint32_t t, int k)
-{
-	return mesh_load(m->position[m->index[t][k]]);
-}
-
-static double area_of(const struct mesh *m)
-{
-	double sum = 0;
-	for (uint32_t t = 0; t < m->triangle_count; t++) {
-		vec3 a = corner(m, t, 0);
-		sum += 0.5 * vec3_length(vec3_cross(vec3_sub(corner(m, t, 1), a), vec3_sub(corner(m, t, 2), a)));
-	}
-	return sum;
-}
-
-/* Of a closed mesh; negative: inside out. */
-static double volume_of(const struct mesh *m)
-{
-	double sum = 0;
-	for (uint32_t t = 0; t < m->triangle_count; t++)
-		sum += vec3_dot(corner(m, t, 0), vec3_cross(corner(m, t, 1), corner(m, t, 2))) / 6;
-	return sum;
 }
 
 /* ---- the distance to a curve, by searching ---- */
@@ -171,8 +145,8 @@ static void test_normals(void **state)
 	assert_non_null(sum);
 	for (uint32_t t = 0; t < m->triangle_count; t++)
 		for (int k = 0; k < 3; k++) {
-			vec3 a = corner(m, t, k), u = mesh_unit(vec3_sub(corner(m, t, (k + 1) % 3), a)),
-			     v = mesh_unit(vec3_sub(corner(m, t, (k + 2) % 3), a));
+			vec3 a = built_corner(m, t, k), u = mesh_unit(vec3_sub(built_corner(m, t, (k + 1) % 3), a)),
+			     v = mesh_unit(vec3_sub(built_corner(m, t, (k + 2) % 3), a));
 			double *at = sum[m->index[t][k]];
 			mesh_store(at, vec3_madd(mesh_load(at), mesh_angle(u, v), mesh_unit(vec3_cross(u, v))));
 		}
@@ -205,15 +179,15 @@ static void test_areas_and_volumes(void **state)
 	(void)state;
 	/* A straight tube without ends: the area is exact. */
 	struct built_shape b = built_ok("bsplinecurve", "", "0 0 0 0.5\n1 0 0 0.5\n2 0 0 0.5\n3 0 0 0.5\n4 0 0 0.5\n");
-	assert_true(near(area_of(&b.g.mesh), 2 * pi * 0.5 * 2, 1e-12));
+	assert_true(near(built_area(&b.g.mesh), 2 * pi * 0.5 * 2, 1e-12));
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++)
 		assert_true(near(b.g.mesh.uv[i][1], (b.g.mesh.position[i][0] - 1) / 2, 1e-12) ||
 			    b.g.mesh.position[i][0] == 1);
 	built_shape_release(&b);
 	/* With round ends, closed, facing outwards. */
 	b = built_ok("linearcurve", "", "0 0 0 0.5\n0 0 3 0.5\n");
-	assert_true(near(volume_of(&b.g.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
-	assert_true(near(area_of(&b.g.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
+	assert_true(near(built_volume(&b.g.mesh), pi * 0.25 * 3 + 4 * pi / 3 * 0.125, 0.05));
+	assert_true(near(built_area(&b.g.mesh), 2 * pi * 0.5 * 3 + 4 * pi * 0.25, 0.03));
 	built_shape_release(&b);
 	/* One sphere inside another, and a point twice: only the large one, whichever comes first. */
 	static const char *const spheres[] = {"0 0 0 1\n0.5 0 0 0.25\n", "0.5 0 0 0.25\n0 0 0 1\n",
@@ -222,7 +196,7 @@ static void test_areas_and_volumes(void **state)
 		b = built_ok("linearcurve", "", spheres[i]);
 		for (uint32_t k = 0; k < b.g.mesh.vertex_count; k++)
 			assert_true(vec3_length(mesh_load(b.g.mesh.position[k])) <= SCALE * (1 + 1e-12));
-		double volume = volume_of(&b.g.mesh);
+		double volume = built_volume(&b.g.mesh);
 		if (!(volume > 0.9 * 4 * pi / 3 && volume < 1.1 * 4 * pi / 3))
 			fail_msg("spheres %zu: a volume of %g", i, volume);
 		built_shape_release(&b);
@@ -313,7 +287,7 @@ static void test_hair(void **state)
 	assert_int_equal(a.g.mesh.vertex_count, c.g.mesh.vertex_count);
 	assert_memory_equal(a.g.mesh.position, b.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
 	assert_memory_equal(a.g.mesh.position, c.g.mesh.position, b.g.mesh.vertex_count * sizeof *b.g.mesh.position);
-	assert_true(near(area_of(&d.g.mesh) / area_of(&a.g.mesh), 0.25, 0.1)); /* 0.025 without a radius */
+	assert_true(near(built_area(&d.g.mesh) / built_area(&a.g.mesh), 0.25, 0.1)); /* 0.025 without a radius */
 	built_shape_release(&a);
 	built_shape_release(&b);
 	built_shape_release(&c);
@@ -399,21 +373,7 @@ static void test_memory_runs_out(void **state)
 	for (int k = 0; k < 2; k++) {
 		struct built_shape b = built_ok(types[k], "", text);
 		const struct memory_file files[] = {{"m", text, strlen(text)}, {0}};
-		struct asset_source assets = memory_assets(files);
-		uint64_t dropped;
-		int r = -1;
-		long n;
-		for (n = 0; r && n < 100; n++) {
-			struct arena arena = {0};
-			struct shape_geometry g;
-			mem_fail_after(n);
-			r = shape_build(b.scene.objects[0], &assets, &arena, &g, &dropped, &b.error);
-			mem_fail_after(-1);
-			assert_true(r == 0 || r == -ENOMEM);
-			arena_fini(&arena);
-		}
-		assert_int_equal(r, 0);
-		assert_true(n > 3);
+		built_shape_without_memory(&b.scene, files, 3);
 		built_shape_release(&b);
 	}
 }

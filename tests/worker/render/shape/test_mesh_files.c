@@ -3,10 +3,8 @@
  * PLY and serialized meshes: every layout of the same solid gives the same mesh; no prefix and no damaged byte of a
  * file does anything but give a mesh or a sentence.
  */
-#include "common/base/mem.h"
+#include "tests/support/built_shape.h"
 #include "tests/support/dice.h"
-#include "tests/support/failing_memory.h"
-#include "tests/support/memory_assets.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/scene_tables.h"
 
@@ -18,41 +16,21 @@
 
 #include <cmocka.h>
 
-struct built {
-	struct scene scene;
-	struct arena arena;
-	struct shape_geometry g;
-	uint64_t dropped;
-	struct error error;
-	int result;
-};
-
-static struct built build(const char *type, const char *content, const void *bytes, size_t size)
+static struct built_shape build(const char *type, const char *content, const void *bytes, size_t size)
 {
 	char xml[1024];
 	snprintf(xml, sizeof xml,
 		 "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
 		 type, content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes, size}, {0}};
-	struct asset_source assets = memory_assets(files);
-	struct built b = {.arena.limit = 64 << 20};
-	if (scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error))
-		fail_msg("%s", b.error.text);
-	b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &b.dropped, &b.error);
-	return b;
-}
-
-static void release(struct built *b)
-{
-	arena_fini(&b->arena);
-	scene_fini(&b->scene);
+	return built_shape(files, scene_tables());
 }
 
 /* Every vertex where it belongs, in the file's order; values are exact in float. */
 static void assert_solid(const char *type, const char *content, const struct mesh_file *f, double scale, bool normals,
 			 bool uv, bool flip)
 {
-	struct built b = build(type, content, f->bytes, f->size);
+	struct built_shape b = build(type, content, f->bytes, f->size);
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	const struct mesh *m = &b.g.mesh;
@@ -70,7 +48,7 @@ static void assert_solid(const char *type, const char *content, const struct mes
 			assert_true(m->uv[i][0] == solid_uv[i][0] &&
 				    m->uv[i][1] == (flip ? 1 - solid_uv[i][1] : solid_uv[i][1]));
 	}
-	release(&b);
+	built_shape_release(&b);
 }
 
 static void test_ply(void **state)
@@ -96,7 +74,7 @@ static void test_ply_polygons(void **state)
 		"ply\r\nformat ascii 1.0\r\nelement face 1\r\nproperty list uchar int vertex_index\r\nelement vertex 4\r\n"
 		"property float x\r\nproperty float y\r\nproperty float z\r\nend_header\r\n4 0 1 2 3\r\n"
 		"0 0 0\r\n1 0 0\r\n1 1 0\r\n0 1 0";
-	struct built b = build("ply", "", text, strlen(text));
+	struct built_shape b = build("ply", "", text, strlen(text));
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	const uint32_t fan[2][3] = {{0, 1, 2}, {0, 2, 3}};
@@ -104,7 +82,7 @@ static void test_ply_polygons(void **state)
 	assert_memory_equal(b.g.mesh.index, fan, sizeof fan);
 	assert_true(b.g.mesh.normal && b.g.mesh.normal[0][2] == 1);
 	assert_null(b.g.mesh.uv);
-	release(&b);
+	built_shape_release(&b);
 }
 
 static void test_serialized(void **state)
@@ -135,7 +113,7 @@ static void test_serialized_attributes(void **state)
 	(void)state;
 	static struct mesh_file f;
 	mesh_file_serialized(&f, 5, 0, 11, 1);
-	struct built b = build("serialized", "", f.bytes, f.size);
+	struct built_shape b = build("serialized", "", f.bytes, f.size);
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	const struct mesh *m = &b.g.mesh;
@@ -149,15 +127,15 @@ static void test_serialized_attributes(void **state)
 	assert_true(heat->channels == 1 && heat->per_face);
 	for (int i = 0; i < SOLID_TRIANGLES; i++)
 		assert_true(heat->value[i] == (float)SOLID_COLOUR(i));
-	release(&b);
+	built_shape_release(&b);
 }
 
 static void refuses(const char *type, const char *content, const void *bytes, size_t size, const char *text)
 {
-	struct built b = build(type, content, bytes, size);
+	struct built_shape b = build(type, content, bytes, size);
 	if (b.result >= 0 || !strstr(b.error.text, text))
 		fail_msg("%d: %s\n not: %s", b.result, b.error.text, text);
-	release(&b);
+	built_shape_release(&b);
 }
 
 static void test_bad_ply(void **state)
@@ -246,7 +224,7 @@ static void test_normals_that_are_none(void **state)
 			  obj[] = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nvn nan nan -nan(ind)\nvn 0 0 1\n"
 				  "vn -1.#IND 0 INF\nvn 0 0.6 0.8\nf 1//1 2//2 3//3\nf 1//1 3//3 4//4\n";
 	for (int k = 0; k < 2; k++) {
-		struct built b = build(k ? "obj" : "ply", "", k ? obj : ply, strlen(k ? obj : ply));
+		struct built_shape b = build(k ? "obj" : "ply", "", k ? obj : ply, strlen(k ? obj : ply));
 		if (b.result)
 			fail_msg("%s", b.error.text);
 		const struct mesh *m = &b.g.mesh;
@@ -258,7 +236,7 @@ static void test_normals_that_are_none(void **state)
 				vec3 want = leans ? (vec3){0, 0.6, 0.8} : (vec3){0, 0, 1};
 				assert_true(vec3_length(vec3_sub(mesh_load(m->normal[i]), want)) < 1e-12);
 			}
-		release(&b);
+		built_shape_release(&b);
 	}
 }
 
@@ -289,12 +267,12 @@ static void test_bad_serialized(void **state)
 /* Or an error; a mesh has indices within its range. */
 static bool gives_a_mesh(const char *type, const struct mesh_file *f)
 {
-	struct built b = build(type, "", f->bytes, f->size);
+	struct built_shape b = build(type, "", f->bytes, f->size);
 	bool good = b.result == 0;
 	assert_true(b.result <= 0);
 	for (uint32_t k = 0; good && k < 3 * b.g.mesh.triangle_count; k++)
 		assert_true(b.g.mesh.index[k / 3][k % 3] < b.g.mesh.vertex_count);
-	release(&b);
+	built_shape_release(&b);
 	return good;
 }
 
@@ -365,9 +343,9 @@ static void test_damage(void **state)
 		struct dice d = dice_of("damaged meshes");
 		size_t meshes = 0;
 		for (size_t size = 0; size < f.size; size += 1 + size / 97) {
-			struct built b = build(type, "", f.bytes, size);
+			struct built_shape b = build(type, "", f.bytes, size);
 			assert_true(b.result <= 0);
-			release(&b);
+			built_shape_release(&b);
 		}
 		for (int i = 0; i < 300; i++) {
 			g = f;
@@ -388,23 +366,10 @@ static void test_memory_runs_out(void **state)
 			mesh_file_serialized(&f, 4, 0, 0, 1);
 		else
 			mesh_file_ply(&f, PLY_LITTLE);
-		struct built b = build(kind ? "serialized" : "ply", "", f.bytes, f.size);
+		struct built_shape b = build(kind ? "serialized" : "ply", "", f.bytes, f.size);
 		const struct memory_file files[] = {{"m", f.bytes, f.size}, {0}};
-		struct asset_source assets = memory_assets(files);
-		int r = -1;
-		long n;
-		for (n = 0; r && n < 100; n++) {
-			struct arena arena = {0};
-			struct shape_geometry g;
-			mem_fail_after(n);
-			r = shape_build(b.scene.objects[0], &assets, &arena, &g, &b.dropped, &b.error);
-			mem_fail_after(-1);
-			assert_true(r == 0 || r == -ENOMEM);
-			arena_fini(&arena);
-		}
-		assert_int_equal(r, 0);
-		assert_true(n > 1);
-		release(&b);
+		built_shape_without_memory(&b.scene, files, 1);
+		built_shape_release(&b);
 	}
 }
 
