@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const types[] = {"obj", "ply", "serialized", "linearcurve", "bsplinecurve", "hair"};
+static const char *const types[] = {"obj", "ply", "serialized", "linearcurve", "bsplinecurve", "hair", "sdfgrid"};
 enum { TYPES = sizeof types / sizeof *types };
 
 static void write_seed(uint8_t type, uint64_t number, const struct mesh_file *f)
@@ -53,6 +53,11 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	}
 	memcpy(f.bytes, hair, f.size = sizeof hair - 1);
 	write_seed(5, 25, &f);
+	static const char grid[48 + 27 * 4] = "VOL\3\1\0\0\0\3\0\0\0\3\0\0\0\3\0\0\0\1";
+	memcpy(f.bytes, grid, f.size = sizeof grid);
+	for (size_t i = 0; i < 27; i++)
+		f.bytes[48 + 4 * i + 3] = i % 2 ? 0x3f : 0xbf;
+	write_seed(6, 26, &f);
 	exit(0);
 }
 

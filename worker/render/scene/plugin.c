@@ -87,7 +87,6 @@ static const struct {
 	{PLUGIN_SHAPE, "deformable"},
 	{PLUGIN_SHAPE, "ellipsoids"},
 	{PLUGIN_SHAPE, "ellipsoidsmesh"},
-	{PLUGIN_SHAPE, "sdfgrid"},
 	{PLUGIN_BSDF, "hair"},
 	{PLUGIN_BSDF, "hk"},
 	{PLUGIN_BSDF, "irawan"},

@@ -4,7 +4,7 @@
 int curve_shape_finish(const struct scene_node *n, struct curve_points *points, struct list *rings, int rc,
 		       struct arena *arena, struct shape_geometry *out, struct error *e)
 {
-	out->placed = true;
+	out->placed = out->made_here = true;
 	if (!rc)
 		rc = tube_mesh(rings, arena, &out->mesh);
 	list_free(rings);

@@ -35,7 +35,7 @@ int shape_build(const struct scene_node *n, const struct asset_source *assets, s
 		out->placed ? mat4_identity() : node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
 		out->face_normals || node_bool(n, "face_normals", false), node_float(n, "max_smooth_angle", -1)};
 	r = mesh_finish(&out->mesh, &f, arena, dropped, n, e);
-	if (out->placed && out->mesh.triangle_count > 0)
-		*dropped = 0; /* at poles and where rings meet, by no fault of the file */
+	if (out->made_here && out->mesh.triangle_count > 0)
+		*dropped = 0;
 	return r;
 }

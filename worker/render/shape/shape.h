@@ -26,6 +26,7 @@ struct shape_geometry {
 	enum shape_kind kind;
 	struct mesh mesh;  /* arrays owned by the arena given */
 	bool placed;	   /* to_world has been applied to it */
+	bool made_here;	   /* no file has its triangles, so those without area are not reported */
 	bool face_normals; /* its file wants flat shading */
 	bool materials;	   /* its file assigns materials to faces, which are not read */
 	struct sphere sphere;

@@ -132,8 +132,8 @@ static void test_unknown_names(void **state)
 		"(supported: diffuse, roughconductor");
 	refuses(S "<bsdf type='roughgrating'/>" END, "there is no bsdf of this type; --lenient takes the bsdf inside");
 	refuses(S "<rfilter type='blackman'/>" END, "; --lenient takes `gaussian` instead");
-	refuses(S "<shape type='sdfgrid'/>" END,
-		"<shape type=\"sdfgrid\">: this shape of Mitsuba's is not supported; --lenient leaves it out (supp");
+	refuses(S "<shape type='ellipsoids'/>" END,
+		"<shape type=\"ellipsoids\">: this shape of Mitsuba's is not supported; --lenient leaves it out (supp");
 	refuses(S "<medium type='homogeneous'/>" END,
 		"s.xml:1: <medium type=\"homogeneous\">: participating media are not supported; --lenient leaves");
 	refuses(S "<shape type='cube'>\n<medium type='homogeneous' name='interior'/></shape>" END,

@@ -27,7 +27,7 @@ static void test_stand_ins(void **state)
 		{PLUGIN_EMITTER, "collimated", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
 		{PLUGIN_TEXTURE, "wireframe", LENIENT_LEAVE_OUT, NULL},
-		{PLUGIN_SHAPE, "sdfgrid", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_SHAPE, "ellipsoids", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_MEDIUM, "homogeneous", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_SENSOR, "fisheye", LENIENT_REFUSE, NULL},
 		{PLUGIN_FILM, "specfilm", LENIENT_REPLACE, "hdrfilm"},

@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The surface where a grid of numbers over the unit cube, interpolated linearly in x, y and z, is 0; outside it is
+ * positive. Where it leaves the cube it is open. It has no texture coordinates.
+ *
+ * Each voxel is cut into SPLIT^3 cells, and each of these into six tetrahedra around its diagonal, one for each order
+ * in which its three sides can be walked from corner (0,0,0) to (1,1,1); neighbours meet without gaps. Where the field
+ * changes its sign along an edge there is a vertex, exactly on the surface, shared by all tetrahedra around the edge. A
+ * tetrahedron with one corner on a side has one triangle, one with two has two. Cells are visited in layers along z,
+ * and only vertices of two layers are looked up.
+ *
+ * With `normals` "smooth" a vertex has a normal, interpolated linearly between those that the eight nearest voxels have
+ * for it (Hansson-Soderlund, Evans and Akenine-Moller 2022, Ray Tracing of Signed Distance Function Grids, section
+ * 5); with "analytic" triangles are flat, where Mitsuba has the normal of the point.
+ *
+ * Failures: those of the file (volume_file.h), no surface, more triangles than a mesh may have.
+ */
+#include "worker/render/shape/declare.h"
+#include "worker/render/shape/shape.h"
+#include "worker/render/shape/volume_file.h"
+
+#include "common/base/list.h"
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+
+#include <string.h>
+
+enum { SPLIT = 2, DIRECTIONS = 7, ROOT_STEPS = 24 };
+
+static const struct param params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{.name = "normals", .types = VALUE_STRING, .choices = "smooth|analytic"},
+	SHAPE_PARAMS_END,
+};
+
+struct surface {
+	struct volume_grid grid;
+	uint32_t cells[3];
+	/* Of two layers of corners, by parity of z: the field, and one more than the vertex on the edge from a corner
+	 * in each direction (1 .. 7: bits of x, y, z), 0: none. */
+	double *field[2];
+	uint32_t (*edge[2])[DIRECTIONS];
+	struct list positions, triangles; /* double[3], in voxels; uint32_t[3] */
+};
+
+/* ---- the field, in voxels ---- */
+
+static double sample(const struct volume_grid *g, const uint32_t at[3], int corner)
+{
+	uint32_t x = at[0] + (corner & 1), y = at[1] + (corner >> 1 & 1), z = at[2] + (uint32_t)(corner >> 2);
+	return (double)g->value[((size_t)z * g->size[1] + y) * g->size[0] + x];
+}
+
+/* Interpolates between the corners of a voxel; x may lie outside it. gradient: NULL: not wanted. */
+static double interpolate(const struct volume_grid *g, const uint32_t at[3], const double x[3], double gradient[3])
+{
+	double w[3][2], sum = 0;
+	for (int i = 0; i < 3; i++) {
+		w[i][1] = x[i] - at[i];
+		w[i][0] = 1 - w[i][1];
+	}
+	for (int i = 0; gradient && i < 3; i++)
+		gradient[i] = 0;
+	for (int c = 0; c < 8; c++) {
+		double f = sample(g, at, c), wx = w[0][c & 1], wy = w[1][c >> 1 & 1], wz = w[2][c >> 2];
+		sum += f * wx * wy * wz;
+		if (!gradient)
+			continue;
+		gradient[0] += (c & 1 ? f : -f) * wy * wz;
+		gradient[1] += (c & 2 ? f : -f) * wx * wz;
+		gradient[2] += (c & 4 ? f : -f) * wx * wy;
+	}
+	return sum;
+}
+
+static double field_at(const struct volume_grid *g, const double x[3])
+{
+	uint32_t at[3];
+	for (int i = 0; i < 3; i++)
+		at[i] = (uint32_t)fmin(fmax(floor(x[i]), 0), g->size[i] - 2);
+	return interpolate(g, at, x, NULL);
+}
+
+/* In object space: the mean over the eight voxels whose centers surround x, of their normals at x. */
+static vec3 normal_at(const struct volume_grid *g, const double x[3])
+{
+	double w[3][2], sum[3] = {0, 0, 0};
+	uint32_t at[3][2];
+	for (int i = 0; i < 3; i++) {
+		double center = x[i] - 0.5, low = floor(center);
+		for (int k = 0; k < 2; k++)
+			at[i][k] = (uint32_t)fmin(fmax(low + k, 0), g->size[i] - 2);
+		w[i][1] = center - low;
+		w[i][0] = 1 - w[i][1];
+	}
+	for (int c = 0; c < 8; c++) {
+		const uint32_t voxel[3] = {at[0][c & 1], at[1][c >> 1 & 1], at[2][c >> 2]};
+		double gradient[3], weight = w[0][c & 1] * w[1][c >> 1 & 1] * w[2][c >> 2];
+		interpolate(g, voxel, x, gradient);
+		for (int i = 0; i < 3; i++)
+			gradient[i] *= g->size[i] - 1;
+		vec3 n = mesh_unit(mesh_load(gradient));
+		mesh_store(sum, vec3_madd(mesh_load(sum), weight, n));
+	}
+	return mesh_unit(mesh_load(sum));
+}
+
+/* ---- vertices ---- */
+
+/* The zero between a, where the field is fa, and b, where its sign is another, by regula falsi with Illinois weights.
+ */
+static void root(const struct volume_grid *g, const double a[3], double fa, const double b[3], double fb, double out[3])
+{
+	double low = 0, high = 1;
+	for (int i = 0; i < ROOT_STEPS; i++) {
+		double t = low + (high - low) * (fa / (fa - fb));
+		for (int k = 0; k < 3; k++)
+			out[k] = a[k] + t * (b[k] - a[k]);
+		double f = field_at(g, out);
+		if (f == 0 || !(t > low && t < high))
+			return;
+		if ((f < 0) == (fa < 0)) {
+			low = t;
+			fa = f;
+			fb *= 0.5;
+		} else {
+			high = t;
+			fb = f;
+			fa *= 0.5;
+		}
+	}
+}
+
+struct cell {
+	uint32_t at[3];
+	double field[8];
+};
+
+static size_t in_layer(const struct surface *s, uint32_t x, uint32_t y)
+{
+	return (size_t)y * (s->cells[0] + 1) + x;
+}
+
+static void place_corner(const struct cell *c, unsigned corner, double out[3])
+{
+	for (int i = 0; i < 3; i++)
+		out[i] = (c->at[i] + (corner >> i & 1)) / (double)SPLIT;
+}
+
+/* The vertex between corner `from` and another that is further along all sides in which they differ. 0: no memory. */
+static uint32_t vertex_between(struct surface *s, const struct cell *c, unsigned from, unsigned to)
+{
+	uint32_t z = c->at[2] + (from >> 2);
+	uint32_t *known =
+		&s->edge[z & 1][in_layer(s, c->at[0] + (from & 1), c->at[1] + (from >> 1 & 1))][(to & ~from) - 1];
+	double a[3], b[3], *p = *known ? NULL : list_push(&s->positions);
+	if (!p)
+		return *known;
+	place_corner(c, from, a);
+	place_corner(c, to, b);
+	root(&s->grid, a, c->field[from], b, c->field[to], p);
+	return *known = (uint32_t)s->positions.count;
+}
+
+/* ---- triangles ---- */
+
+/* Turned so that its front is where the field grows, away from the corner `inside`. */
+static int add_triangle(struct surface *s, const uint32_t v[3], const double inside[3])
+{
+	const double(*p)[3] = s->positions.items;
+	vec3 a = mesh_load(p[v[0] - 1]), b = mesh_load(p[v[1] - 1]), c = mesh_load(p[v[2] - 1]);
+	vec3 n = vec3_cross(vec3_sub(b, a), vec3_sub(c, a));
+	bool turn = vec3_dot(n, vec3_sub(mesh_load(inside), a)) > 0;
+	if (s->triangles.count >= MESH_TRIANGLES_MAX)
+		return -EFBIG;
+	uint32_t *t = list_push(&s->triangles);
+	if (!t)
+		return -ENOMEM;
+	t[0] = v[0] - 1;
+	t[1] = v[turn ? 2 : 1] - 1;
+	t[2] = v[turn ? 1 : 2] - 1;
+	return 0;
+}
+
+/* corner: of a tetrahedron, each further along than the one before. */
+static int cut_tetrahedron(struct surface *s, const struct cell *c, const unsigned corner[4])
+{
+	uint32_t between[4] = {0};
+	unsigned in[4], out[4], ins = 0, outs = 0, crossings = 0;
+	for (int i = 0; i < 4; i++)
+		if (c->field[corner[i]] < 0)
+			in[ins++] = corner[i];
+		else
+			out[outs++] = corner[i];
+	if (ins == 0 || outs == 0)
+		return 0;
+	/* In order around the cut: with two corners on each side, every second one shares its corner inside. */
+	for (unsigned i = 0; i < ins; i++)
+		for (unsigned k = 0; k < outs; k++) {
+			unsigned a = in[i], b = out[ins == 2 && i == 1 ? outs - 1 - k : k];
+			bool ordered = (a & b) == a;
+			uint32_t v = vertex_between(s, c, ordered ? a : b, ordered ? b : a);
+			if (!v)
+				return -ENOMEM;
+			between[crossings++] = v;
+		}
+	double inside[3];
+	place_corner(c, in[0], inside);
+	int rc = add_triangle(s, between, inside);
+	if (rc || crossings == 3)
+		return rc;
+	const uint32_t rest[3] = {between[0], between[2], between[3]};
+	return add_triangle(s, rest, inside);
+}
+
+static int cut_cell(struct surface *s, const struct cell *c)
+{
+	static const unsigned walks[6][2] = {{1, 2}, {1, 4}, {2, 1}, {2, 4}, {4, 1}, {4, 2}};
+	int rc = 0;
+	for (int i = 0; i < 6 && !rc; i++) {
+		unsigned first = walks[i][0], second = first | walks[i][1];
+		rc = cut_tetrahedron(s, c, (const unsigned[4]){0, first, second, 7});
+	}
+	return rc;
+}
+
+/* ---- layers ---- */
+
+static void fill_layer(struct surface *s, uint32_t z)
+{
+	size_t count = (size_t)(s->cells[0] + 1) * (s->cells[1] + 1);
+	memset(s->edge[z & 1], 0, count * sizeof *s->edge[0]);
+	for (uint32_t y = 0; y <= s->cells[1]; y++) {
+		tick();
+		for (uint32_t x = 0; x <= s->cells[0]; x++) {
+			const double p[3] = {x / (double)SPLIT, y / (double)SPLIT, z / (double)SPLIT};
+			s->field[z & 1][in_layer(s, x, y)] = field_at(&s->grid, p);
+		}
+	}
+}
+
+static int cut_layer(struct surface *s, uint32_t z)
+{
+	struct cell c = {.at = {0, 0, z}};
+	int rc = 0;
+	for (c.at[1] = 0; c.at[1] < s->cells[1] && !rc; c.at[1]++) {
+		tick();
+		for (c.at[0] = 0; c.at[0] < s->cells[0] && !rc; c.at[0]++) {
+			unsigned inside = 0;
+			for (unsigned k = 0; k < 8; k++) {
+				size_t at = in_layer(s, c.at[0] + (k & 1), c.at[1] + (k >> 1 & 1));
+				c.field[k] = s->field[(z + (k >> 2)) & 1][at];
+				inside += c.field[k] < 0;
+			}
+			if (inside > 0 && inside < 8)
+				rc = cut_cell(s, &c);
+		}
+	}
+	return rc;
+}
+
+static int cut_all(struct surface *s)
+{
+	size_t count = 1;
+	for (int i = 0; i < 3; i++) {
+		s->cells[i] = SPLIT * (s->grid.size[i] - 1);
+		count *= i < 2 ? s->cells[i] + 1 : 1;
+	}
+	for (int k = 0; k < 2; k++) {
+		s->field[k] = mem_alloc(count, sizeof *s->field[k]);
+		s->edge[k] = mem_alloc(count, sizeof *s->edge[k]);
+		if (!s->field[k] || !s->edge[k])
+			return -ENOMEM;
+	}
+	int rc = 0;
+	fill_layer(s, 0);
+	for (uint32_t z = 0; z < s->cells[2] && !rc; z++) {
+		fill_layer(s, z + 1);
+		rc = cut_layer(s, z);
+	}
+	return rc;
+}
+
+/* ---- the mesh ---- */
+
+static int make_mesh(const struct surface *s, bool smooth, struct arena *arena, struct mesh *m)
+{
+	const double(*p)[3] = s->positions.items;
+	if (!mesh_alloc(m, (uint32_t)s->positions.count, (uint32_t)s->triangles.count, smooth, false, arena))
+		return -ENOMEM;
+	memcpy(m->index, s->triangles.items, s->triangles.count * sizeof *m->index);
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		tick();
+		for (int k = 0; k < 3; k++)
+			m->position[i][k] = p[i][k] / (s->grid.size[k] - 1);
+		if (smooth)
+			mesh_store(m->normal[i], normal_at(&s->grid, p[i]));
+	}
+	return 0;
+}
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	struct surface s = {.positions = {.size = 3 * sizeof(double)}, .triangles = {.size = 3 * sizeof(uint32_t)}};
+	bool smooth = strcmp(node_string(n, "normals", "smooth"), "smooth") == 0;
+	int rc = volume_file_read(n, assets, &s.grid, e);
+	if (rc)
+		return rc;
+	rc = cut_all(&s);
+	if (!rc && s.triangles.count > 0)
+		rc = make_mesh(&s, smooth, arena, &out->mesh);
+	if (rc == -EFBIG)
+		node_error(n, e, EFBIG, "its surface has more than %d triangles", MESH_TRIANGLES_MAX);
+	else if (rc)
+		node_error(n, e, -rc, "out of memory");
+	else if (s.triangles.count == 0)
+		rc = node_error(n, e, EINVAL, "%s: its values do not change their sign: there is no surface",
+				node_string(n, "filename", ""));
+	out->face_normals = !smooth;
+	out->made_here = true;
+	for (int k = 0; k < 2; k++) {
+		mem_free(s.field[k]);
+		mem_free(s.edge[k]);
+	}
+	list_free(&s.positions);
+	list_free(&s.triangles);
+	volume_grid_free(&s.grid);
+	return rc;
+}
+
+const struct shape_ops shape_ops_sdfgrid = {
+	.type = "sdfgrid",
+	.params = params,
+	.build = build,
+	.nested_classes = 1u << PLUGIN_BSDF,
+};
