@@ -129,11 +129,11 @@ XML
 scene strange.xml wiener '<emitter type="aurora"><float name="power" value="3"/></emitter>' \
 	'<bsdf type="bark" id="stuff"><texture type="perlin" name="knots"/><bsdf type="hair"><rgb name="base_color" value="0.8 0.2 0.1"/><float name="melanin" value="0.3"/></bsdf></bsdf>' \
 	'<medium name="interior" type="homogeneous"><float name="albedo" value="0.5"/></medium>' \
-	'<shape type="hair"><string name="filename" value="h.hair"/></shape><volume type="grid"/>'
+	'<shape type="ellipsoids"><string name="filename" value="h.hair"/></shape><volume type="grid"/>'
 scene plain.xml gaussian '' '<bsdf type="diffuse" id="stuff"><rgb name="reflectance" value="0.8 0.2 0.1"/></bsdf>' '' ''
 code 1 "$BIN/hslt-scene" check "$DIR/strange.xml"
 code 0 "$BIN/hslt-scene" check --lenient "$DIR/strange.xml"
-for word in wiener aurora bark melanin "the medium" '`hair`' '<bsdf type="hair">' volume; do
+for word in wiener aurora bark melanin "the medium" '`ellipsoids`' '<bsdf type="hair">' volume; do
 	grep "^note: .*(lenient)" "$DIR/out" | grep -q "$word" || fail "nothing is noted of $word: $(cat "$DIR/out")"
 done
 code 1 "$BIN/hslt-render" -i path --spp 4 "$DIR/strange.xml" -o "$DIR/strange.exr"

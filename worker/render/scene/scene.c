@@ -23,6 +23,7 @@
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
 #include "worker/render/scene/notes.h"
+#include "worker/render/scene/old_values.h"
 #include "worker/render/scene/obj_materials.h"
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
@@ -111,15 +112,17 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 }
 
 /* Forks of Mitsuba add parameters. A name that resembles none in the table, and that no other plug-in of the class
- * has, is taken for one of these; other unknown names are mistakes. Materials and textures do not allow it, because
- * their parameters are visible in the image. */
+ * has, is taken for one of these; other unknown names are mistakes. Materials and textures of 3.x do not allow it,
+ * because their parameters are visible in the image, and Mitsuba 3 refuses them; 0.6 ignores unknown names. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
 	enum plugin_class cls = d->node->cls;
 	struct spelling s = {.wanted = name};
+	bool visible = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE;
 	if (!value_is_element(el->name) ||
-	    (cls != PLUGIN_SENSOR && cls != PLUGIN_FILM && cls != PLUGIN_SHAPE && cls != PLUGIN_EMITTER))
+	    (visible ? !el->snake
+		     : cls != PLUGIN_SENSOR && cls != PLUGIN_FILM && cls != PLUGIN_SHAPE && cls != PLUGIN_EMITTER))
 		return false;
 	plugin_offer_params(d->decl, &s);
 	for (const struct plugin_decl *other = m->decls; other->type && !s.best; other++)
@@ -186,6 +189,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		return r;
 	struct value v;
 	r = value_read(el, m->assets_from, &m->scene->arena, &v, m->error);
+	if (!r && el->snake)
+		r = old_value(&m->notes, owner, el, p, d->node->cls, &m->scene->arena, &v);
 	if (!r)
 		r = add_property(d, el, p, v, m->error);
 	if (r == -EINVAL && m->lenient && p->choices)
@@ -451,6 +456,8 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 			r = element_check(el, "name|value", false, m->error);
 		else if (strcmp(el->name, "path") == 0)
 			r = element_check(el, "value", false, m->error);
+		else if (value_is_element(el->name) && el->snake) /* a property of the scene: 0.6 has none */
+			r = note_foreign(&m->notes, el);
 		else if (strcmp(el->name, "alias") != 0)
 			r = foreign_element(m, el);
 		r = report_problem(&m->report, r, m->error);

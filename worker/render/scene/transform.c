@@ -226,10 +226,14 @@ int transform_still(const struct xml_element **el, bool lenient, bool *moves, st
 {
 	const struct xml_element *animation = *el, *first = animation->first;
 	int r = element_check(animation, "name", true, e);
-	*moves = first && first->next;
-	for (const struct xml_element *c = first; c && !r; c = c->next)
+	mat4 start, now;
+	*moves = false;
+	for (const struct xml_element *c = first; c && !r; c = c->next) {
 		if (strcmp(c->name, "transform") != 0)
 			return xml_error(c, e, EINVAL, "has no place in <animation>, which holds transforms");
+		r = transform_read(c, c == first ? &start : &now, e);
+		*moves |= !r && c != first && memcmp(&start, &now, sizeof now) != 0;
+	}
 	if (!r && !first)
 		return xml_error(animation, e, EINVAL, "holds no transform");
 	if (!r && *moves && !lenient)

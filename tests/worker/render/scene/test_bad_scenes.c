@@ -208,11 +208,11 @@ static void test_bad_values(void **state)
 	refuses(S "<shape type='sphere'><animation name='toWorld'><scale value='2'/></animation></shape>" END,
 		"has no place in <animation>");
 	refuses(S
-		"<shape type='sphere'><animation name='toWorld'><transform time='0'/><transform time='1'/></animation>"
+		"<shape type='sphere'><animation name='toWorld'><transform time='0'/><transform time='1'><scale value='2'/></transform></animation>"
 		"</shape>" END,
 		"motion is not supported; --lenient keeps the first transform");
 	refuses(S
-		"<shape type='sphere'><animation name='animation'><transform time='0'/><transform time='1'/></animation>"
+		"<shape type='sphere'><animation name='animation'><transform time='0'/><transform time='1'><scale value='2'/></transform></animation>"
 		"</shape>" END,
 		"motion is not supported; --lenient keeps the first transform");
 	refuses(S "<shape type='sphere'><animation name='toWorld' tiem='1'><transform/></animation></shape>" END,

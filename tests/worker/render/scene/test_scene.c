@@ -279,6 +279,7 @@ static void test_animations(void **state)
 	static const char *const still[] = {
 		SPHERE("<animation name='to_world'>" AT("0.5", "3") "</animation>"),
 		SPHERE("<animation name='animation'>" AT("0", "3") "</animation>"),
+		SPHERE("<animation name='to_world'>" AT("0", "3") AT("1", "3") AT("2", "3.0") "</animation>"),
 		"<scene version='0.6.0'><shape type='sphere'><animation name='toWorld'>" AT(
 			"0", "3") "</animation></shape></scene>",
 	};

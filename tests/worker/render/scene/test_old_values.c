@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What Mitsuba 0.6 accepts and 3 does not: taken with a note from files of 0.6, refused in those of 3.x. */
+#include "tests/support/memory_assets.h"
+#include "worker/render/render.h"
+#include "worker/render/scene/scene.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static int read_scene(struct scene *s, const char *version, const char *content, struct error *e)
+{
+	char xml[1024];
+	snprintf(xml, sizeof xml, "<scene version='%s'>%s</scene>", version, content);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	return scene_read(s, &assets, "s.xml", render_plugins(), NULL, 0, e);
+}
+
+/* note: NULL: there is none. */
+static struct scene read_old(const char *content, const char *note)
+{
+	struct scene s;
+	struct error e;
+	if (read_scene(&s, "0.6.0", content, &e))
+		fail_msg("%s: %s", content, e.text);
+	if (s.note_count != (note != NULL) || (note && !strstr(s.notes[0], note)))
+		fail_msg("%s: %u notes, the first: %s", content, s.note_count, s.note_count ? s.notes[0] : "");
+	return s;
+}
+
+static void refuses(const char *version, const char *content, const char *text)
+{
+	struct scene s;
+	struct error e;
+	if (read_scene(&s, version, content, &e) == 0 || !strstr(e.text, text))
+		fail_msg("%s: %s\n not: %s", content, e.text, text);
+}
+
+static bool near(double a, double b)
+{
+	return fabs(a - b) <= 1e-15;
+}
+
+static void test_reflectances_are_scaled(void **state)
+{
+	(void)state;
+	struct scene s = read_old("<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>",
+				  "s.xml:1: <bsdf type=\"diffuse\">: reflectance=2 is above 1: scaled by 0.495, as in "
+				  "Mitsuba");
+	const struct value *v = &node_find(s.objects[0], "reflectance")->value;
+	assert_true(near(v->as.rgb[0], 0.99) && near(v->as.rgb[1], 0.495) && near(v->as.rgb[2], 0.2475));
+	scene_fini(&s);
+
+	s = read_old("<bsdf type='phong'><spectrum name='specularReflectance' value='400:0.5, 500:4, 700:1'/></bsdf>",
+		     "specular_reflectance=4 is above 1: scaled by 0.2475");
+	v = &node_find(s.objects[0], "specular_reflectance")->value;
+	assert_int_equal(v->as.spectrum.count, 3);
+	assert_true(near(v->as.spectrum.value[0], 0.12375) && near(v->as.spectrum.value[1], 0.99) &&
+		    near(v->as.spectrum.value[2], 0.2475) && v->as.spectrum.nm[1] == 500);
+	scene_fini(&s);
+
+	s = read_old("<bsdf type='difftrans'><spectrum name='transmittance' value='3'/></bsdf>", "scaled by 0.33");
+	scene_fini(&s);
+	s = read_old("<bsdf type='diffuse'><rgb name='reflectance' value='1 1 1'/></bsdf>", NULL);
+	assert_true(node_find(s.objects[0], "reflectance")->value.as.rgb[0] == 1);
+	scene_fini(&s);
+
+	refuses("3.0.0", "<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>", "outside [0, 1]");
+	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectance' value='-1 2 0.5'/></bsdf>", "outside [0, 1]");
+	refuses("0.6.0", "<bsdf type='mask'><spectrum name='opacity' value='2'/><bsdf type='diffuse'/></bsdf>",
+		"outside [0, 1]");
+	refuses("0.6.0",
+		"<bsdf type='phong'><rgb name='specularReflectance' value='2 2 2'/>"
+		"<boolean name='ensureEnergyConservation' value='false'/></bsdf>",
+		"outside [0, 1]");
+}
+
+static void test_distributions(void **state)
+{
+	(void)state;
+#define ROUGH(x) "<bsdf type='roughconductor'><string name='distribution' value='" x "'/></bsdf>"
+	static const char *const old[] = {"phong", "as"};
+	for (size_t i = 0; i < sizeof old / sizeof *old; i++) {
+		char note[128];
+		snprintf(note, sizeof note, "the distribution `%s` becomes `beckmann`, which ends sooner", old[i]);
+		struct scene s = read_old(i ? ROUGH("as") : ROUGH("phong"), note);
+		assert_string_equal(node_string(s.objects[0], "distribution", ""), "beckmann");
+		scene_fini(&s);
+	}
+	refuses("3.0.0", ROUGH("phong"), "is not supported (supported: beckmann, ggx)");
+	refuses("0.6.0", ROUGH("ggy"), "did you mean `ggx`?");
+}
+
+static void test_unknown_names(void **state)
+{
+	(void)state;
+	struct scene s = read_old("<bsdf type='diffuse'><string name='guidingFile' value='x'/></bsdf>",
+				  "s.xml:1: <bsdf type=\"diffuse\">: `guiding_file` is not known and is ignored");
+	scene_fini(&s);
+	s = read_old("<integer name='maxDepth' value='10'/>", "<integer> is ignored with its contents");
+	scene_fini(&s);
+	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectence' value='1'/></bsdf>",
+		"did you mean `reflectance`?");
+	refuses("0.6.0", "<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>", "has no `exponent`");
+	refuses("3.0.0", "<bsdf type='diffuse'><string name='guiding_file' value='x'/></bsdf>",
+		"has no `guiding_file` (supported: reflectance)");
+	refuses("3.0.0", "<integer name='max_depth' value='10'/>", "has no place in <scene>");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_reflectances_are_scaled),
+		cmocka_unit_test(test_distributions),
+		cmocka_unit_test(test_unknown_names),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
