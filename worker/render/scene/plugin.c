@@ -93,7 +93,6 @@ static const struct {
 	{PLUGIN_BSDF, "measured"},
 	{PLUGIN_BSDF, "measured_polarized"},
 	{PLUGIN_TEXTURE, "curvature"},
-	{PLUGIN_TEXTURE, "gridtexture"},
 	{PLUGIN_TEXTURE, "mesh_attribute"},
 	{PLUGIN_TEXTURE, "vertexcolors"},
 	{PLUGIN_TEXTURE, "volume"},

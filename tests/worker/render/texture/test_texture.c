@@ -176,6 +176,23 @@ static void test_checkerboard(void **state)
 	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
 }
 
+static void test_gridtexture(void **state)
+{
+	struct texture t = make_texture(*state, "gridtexture", COLOR_REFLECTANCE);
+	assert_value(&t, 0.5, 0.5, 0.2);
+	assert_value(&t, 0.98, 0.02, 0.2);
+	assert_value(&t, 0.995, 0.5, 0.4);
+	assert_value(&t, 0.5, 3.005, 0.4);
+	assert_value(&t, -1.005, -0.5, 0.4);
+	t = make_texture(*state, "gridtexture color0=1 color1=0 line_width=0.1 uscale=4 voffset=0.5",
+			 COLOR_REFLECTANCE);
+	assert_value(&t, 0.25, 0, 0);
+	assert_value(&t, 0.27, 0, 0);
+	assert_value(&t, 0.28, 0, 1);
+	assert_value(&t, 0.375, 0.5, 0);
+	assert_value(&t, 0.375, 0.35, 1);
+}
+
 static void test_plain_values_and_fallback(void **state)
 {
 	struct fixture *f = *state;
@@ -392,6 +409,7 @@ int main(void)
 		cmocka_unit_test(test_gamma),
 		cmocka_unit_test(test_colours),
 		cmocka_unit_test(test_checkerboard),
+		cmocka_unit_test(test_gridtexture),
 		cmocka_unit_test(test_plain_values_and_fallback),
 		cmocka_unit_test(test_refusals_say_why),
 	};
