@@ -43,6 +43,26 @@ static int scale(struct value *v, double factor, struct arena *arena)
 	return 0;
 }
 
+static double *components(struct value *v)
+{
+	return v->type == VALUE_FLOAT ? &v->as.number : v->type == VALUE_RGB ? v->as.rgb : NULL;
+}
+
+/* The reflectance of a metal depends on the squares of eta and k only. */
+static int drop_sign(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		     const struct param *p, struct value *v)
+{
+	double *x = components(v), least = 0;
+	for (int i = 0; x && i < (v->type == VALUE_RGB ? 3 : 1); i++) {
+		least = fmin(least, x[i]);
+		x[i] = fabs(x[i]);
+	}
+	return least == 0 ? 0
+			  : note(t, owner, xml_attribute(owner, "type"), p->name,
+				 "%s:%d: <%.64s type=\"%.64s\">: %s=%g is below 0: its sign is ignored, as in Mitsuba",
+				 el->file, el->line, owner->name, xml_attribute(owner, "type"), p->name, least);
+}
+
 static int scale_reflectance(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 			     const struct param *p, struct arena *arena, struct value *v)
 {
@@ -82,6 +102,8 @@ int old_value(const struct notes *t, const struct xml_element *owner, const stru
 		return 0;
 	if (v->type == VALUE_STRING)
 		return strcmp(p->name, "distribution") == 0 ? replace_distribution(t, owner, el, v) : 0;
+	if ((strcmp(p->name, "eta") == 0 || strcmp(p->name, "k") == 0) && p->min == 0)
+		return drop_sign(t, owner, el, p, v);
 	bool reflects = strstr(p->name, "reflectance") || strstr(p->name, "transmittance");
 	return reflects && p->max == 1 ? scale_reflectance(t, owner, el, p, arena, v) : 0;
 }

@@ -15,6 +15,7 @@
  *
  *   Reflectances and transmittances above 1 are scaled to at most 0.99, as Mitsuba does, unless the material says
  *   that it need not conserve energy.
+ *   The components of the complex index of a metal lose their signs, on which nothing depends.
  *   The microfacet distributions `phong` and `as` become `beckmann` of the same roughness.
  */
 int old_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,

@@ -113,7 +113,8 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 
 /* Forks of Mitsuba add parameters. A name that resembles none in the table, and that no other plug-in of the class
  * has, is taken for one of these; other unknown names are mistakes. Materials and textures of 3.x do not allow it,
- * because their parameters are visible in the image, and Mitsuba 3 refuses them; 0.6 ignores unknown names. */
+ * because their parameters are visible in the image, and Mitsuba 3 refuses them; 0.6 ignores unknown names, and in its
+ * files a material may have the parameter of another, left there when its type was changed. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
@@ -125,7 +126,7 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 		     : cls != PLUGIN_SENSOR && cls != PLUGIN_FILM && cls != PLUGIN_SHAPE && cls != PLUGIN_EMITTER))
 		return false;
 	plugin_offer_params(d->decl, &s);
-	for (const struct plugin_decl *other = m->decls; other->type && !s.best; other++)
+	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !visible; other++)
 		if (other->cls == cls && plugin_param(other, name))
 			return false;
 	return !s.best;
@@ -480,6 +481,16 @@ static int list_assets(struct maker *m)
 	return 0;
 }
 
+/* In 3.x a texture may be written as a spectrum, which is a texture of one colour there. */
+static void name_textures(const struct maker *m, struct xml_element *el)
+{
+	const char *type = xml_attribute(el, "type");
+	if (!el->snake && type && strcmp(el->name, "spectrum") == 0 && plugin_find(m->decls, PLUGIN_TEXTURE, type))
+		el->name = "texture";
+	for (struct xml_element *c = el->first; c; c = c->next)
+		name_textures(m, c);
+}
+
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
@@ -488,6 +499,7 @@ static int make_scene(struct maker *m)
 		return out_of_memory(m);
 	s->dialect_3 = m->tree->dialect_3;
 	s->objects = objects;
+	name_textures(m, m->tree->root);
 	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
 	if (!r)
 		r = obj_materials_spread(m->tree, &m->ids, m->assets_from, &m->assets, &m->scene->arena, &m->report,

@@ -98,6 +98,23 @@ static void test_distributions(void **state)
 	refuses("0.6.0", ROUGH("ggy"), "did you mean `ggx`?");
 }
 
+static void test_metals_lose_their_signs(void **state)
+{
+	(void)state;
+	struct scene s = read_old("<bsdf type='roughconductor'><rgb name='eta' value='-0.0485226, 4.14275, 4.66977'/>"
+				  "</bsdf>",
+				  "eta=-0.0485226 is below 0: its sign is ignored, as in Mitsuba");
+	const double *eta = node_find(s.objects[0], "eta")->value.as.rgb;
+	assert_true(eta[0] == 0.0485226 && eta[1] == 4.14275 && eta[2] == 4.66977);
+	scene_fini(&s);
+	s = read_old("<bsdf type='conductor'><float name='k' value='-3'/></bsdf>", "k=-3 is below 0");
+	assert_true(node_find(s.objects[0], "k")->value.as.number == 3);
+	scene_fini(&s);
+	s = read_old("<bsdf type='conductor'><rgb name='k' value='3 2 0'/></bsdf>", NULL);
+	scene_fini(&s);
+	refuses("3.0.0", "<bsdf type='conductor'><rgb name='k' value='3 -2 1'/></bsdf>", "k=-2 is outside");
+}
+
 static void test_unknown_names(void **state)
 {
 	(void)state;
@@ -108,10 +125,17 @@ static void test_unknown_names(void **state)
 	scene_fini(&s);
 	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectence' value='1'/></bsdf>",
 		"did you mean `reflectance`?");
-	refuses("0.6.0", "<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>", "has no `exponent`");
+	/* The parameter of another material is a mistake in 3.x only. */
+	s = read_old("<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>",
+		     "`exponent` is not known and is ignored");
+	scene_fini(&s);
+	refuses("3.0.0", "<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>", "has no `exponent`");
+	refuses("0.6.0", "<shape type='sphere'><float name='height' value='9'/></shape>", "has no `height`");
 	refuses("3.0.0", "<bsdf type='diffuse'><string name='guiding_file' value='x'/></bsdf>",
 		"has no `guiding_file` (supported: reflectance)");
 	refuses("3.0.0", "<integer name='max_depth' value='10'/>", "has no place in <scene>");
+	refuses("0.6.0", "<bsdf type='diffuse'><spectrum name='reflectance' type='bitmap'/></bsdf>",
+		"there is no spectrum of this type");
 }
 
 int main(void)
@@ -119,6 +143,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_reflectances_are_scaled),
 		cmocka_unit_test(test_distributions),
+		cmocka_unit_test(test_metals_lose_their_signs),
 		cmocka_unit_test(test_unknown_names),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -314,8 +314,11 @@ static void test_nesting_and_references(void **state)
 		"<shape type='rectangle'><ref id='m'/></shape>"
 		"<shape type='rectangle'><bsdf type='diffuse'><texture type='checkerboard' name='reflectance'>"
 		"<rgb name='color0' value='1'/><ref id='t' name='color1'/></texture></bsdf></shape>"
+		"<spectrum type='bitmap' id='s'><string name='filename' value='a/b.png'/></spectrum>"
+		"<shape type='cube'><bsdf type='diffuse'><ref name='reflectance' id='s'/></bsdf></shape>"
 		"</scene>");
-	assert_int_equal(s.object_count, 5);
+	assert_int_equal(s.object_count, 7);
+	assert_ptr_equal(node_ref(node_child(s.objects[6], PLUGIN_BSDF, 0), "reflectance"), s.objects[5]);
 	const struct scene_node *t = s.objects[0], *m = s.objects[1], *cube = s.objects[2];
 	assert_string_equal(m->id, "m");
 	const struct scene_node *diffuse = node_child(m, PLUGIN_BSDF, 0);
