@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Daylight (daylight.h) as an environment map: `sky`, `sun`, `sunsky`. A sky has 512 x 256 pixels, one with a sun 2048
- * x 1024: its disk is three pixels wide, and its total power is preserved. Below the horizon it is black. Up is +y in
- * 0.5/0.6 and +z in 3.x; if time and place determine the sun, north is -z and +y.
+ * x 1024: its disk is three pixels wide, and its total power is preserved. Below the horizon it is black, unless
+ * `stretch` or `extend` of 0.6 are given. Up is +y in 0.5/0.6 and +z in 3.x; if time and place determine the sun, north
+ * is -z and +y.
  */
 #include "worker/render/emitter/daylight.h"
 #include "worker/render/emitter/envmap.h"
@@ -37,17 +38,34 @@ static double angle_between(vec3 a, vec3 b)
 	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
 }
 
-static void bake_sky(const struct baking *b, double scale)
+/* The part of the horizon's light that `extend` sends up from below it: all at the horizon, none from the nadir. */
+static double extended(double angle)
+{
+	double t = fmin(2 - 2 * angle / PI, 1);
+	return t * t * (3 - 2 * t);
+}
+
+/* stretch: the horizon goes down to so many times its angle from the zenith, and all above with it. */
+static void bake_sky(const struct baking *b, double scale, double stretch, bool extend)
 {
 	const struct image *m = &b->image;
-	for (uint32_t y = 0; y < m->height / 2; y++)
-		for (uint32_t x = 0; x < m->width; x++) {
-			vec3 d = direction(m, x + 0.5, y + 0.5);
-			double rgb[3];
-			daylight_sky(&b->sky, PI * (y + 0.5) / m->height, angle_between(d, b->towards), rgb);
-			for (int k = 0; k < 3; k++)
-				pixel(m, x, y)[k] = (float)(scale * rgb[k]);
+	const double horizon = nextafter(0.5 * PI, 0);
+	for (uint32_t y = 0; y < m->height; y++) {
+		double angle = PI * (y + 0.5) / m->height, model = angle / stretch, factor = scale;
+		if (model > horizon && !extend)
+			break;
+		if (extend) {
+			model = fmin(model, horizon);
+			factor *= extended(angle);
 		}
+		for (uint32_t x = 0; x < m->width; x++) {
+			vec3 d = direction(m, x + 0.5, model * m->height / PI);
+			double rgb[3];
+			daylight_sky(&b->sky, model, angle_between(d, b->towards), rgb);
+			for (int k = 0; k < 3; k++)
+				pixel(m, x, y)[k] = (float)(factor * rgb[k]);
+		}
+	}
 }
 
 /* Share of a pixel that the disk covers. */
@@ -150,7 +168,7 @@ static int bake_environment(struct emitter *em, const struct scene_node *n, cons
 		return node_error(n, e, ENOMEM, "out of memory");
 	double rgb[3];
 	if (parts.sky)
-		bake_sky(&b, node_float(n, "sky_scale", 1));
+		bake_sky(&b, node_float(n, "sky_scale", 1), node_float(n, "stretch", 1), node_bool(n, "extend", false));
 	daylight_sun(turbidity, sun, rgb);
 	for (int k = 0; k < 3; k++)
 		rgb[k] *= node_float(n, "sun_scale", 1);
@@ -203,13 +221,13 @@ static const struct param params[] = {
 	NUMBER("hour", 0, 24),
 	NUMBER("minute", 0, 60),
 	NUMBER("second", 0, 60),
+	NUMBER("stretch", 1, 2),
+	{.name = "extend", .types = VALUE_BOOL},
 	{.name = "to_world", .types = VALUE_TRANSFORM},
 	{.name = "albedo", .types = VALUE_TEXTURE, .status = PARAM_DIFFERS}, /* Preetham's model has one ground */
 	{.name = "resolution", .types = VALUE_INT, .status = PARAM_IGNORED},
 	{.name = "complex_sun", .types = VALUE_BOOL, .status = PARAM_IGNORED},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = "stretch", .types = VALUE_FLOAT, .status = PARAM_REFUSED},
-	{.name = "extend", .types = VALUE_BOOL, .status = PARAM_REFUSED},
 	{.name = NULL},
 };
 

@@ -140,6 +140,42 @@ static void test_picture(void **state)
 	}
 }
 
+static double seen(const struct emitter *em, double angle, double azimuth)
+{
+	const struct wavelengths grey = {.grey = true};
+	vec3 d = {sin(angle) * sin(azimuth), cos(angle), sin(angle) * cos(azimuth)};
+	const struct emitter_point x = {.p = d, .infinite = true};
+	return em->ops->radiance(em, &x, vec3_neg(d), &grey).v[0];
+}
+
+/* `stretch` moves the sky down, `extend` fades it out below the horizon: both by the formula at some angles, which the
+ * map interpolates. */
+static void test_below_the_horizon(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct emitter plain, defaults, stretched, extended;
+	struct error e = {""};
+	assert_int_equal(make_emitter(&a, "sky", false, &plain, &e), 0);
+	assert_int_equal(make_emitter(&a, "sky stretch=1 extend=false", false, &defaults, &e), 0);
+	assert_int_equal(make_emitter(&a, "sky stretch=1.5", false, &stretched, &e), 0);
+	assert_int_equal(make_emitter(&a, "sky extend=true", false, &extended, &e), 0);
+	for (double azimuth = 0; azimuth < 6; azimuth += 0.7) {
+		for (double angle = 0.05; angle < 3.1; angle += 0.1) {
+			double l = seen(&plain, angle, azimuth), s = seen(&stretched, angle, azimuth);
+			double above = seen(&plain, angle / 1.5, azimuth), fade = 2 - 2 * angle / PI;
+			assert_true(seen(&defaults, angle, azimuth) == l);
+			assert_true((l > 0) == (angle < 0.5 * PI));
+			if (fabs(angle - 0.75 * PI) > 0.05) /* its edge */
+				assert_true(fabs(s - above) <= 0.02 * above);
+			double below = seen(&plain, 0.5 * PI - 0.01, azimuth) * fade * fade * (3 - 2 * fade);
+			double x = seen(&extended, angle, azimuth), due = angle < 0.5 * PI ? l : below;
+			assert_true(fabs(x - due) <= 0.05 * due + 1e-4 * seen(&plain, 1.5, azimuth));
+		}
+	}
+	arena_fini(&a);
+}
+
 static void test_refused(void **state)
 {
 	(void)state;
@@ -165,6 +201,7 @@ int main(void)
 		cmocka_unit_test(test_where_the_sun_stands),
 		cmocka_unit_test(test_how_bright_it_is),
 		cmocka_unit_test(test_picture),
+		cmocka_unit_test(test_below_the_horizon),
 		cmocka_unit_test(test_refused),
 	};
 	return cmocka_run_group_tests_name("daylight", tests, NULL, NULL);
