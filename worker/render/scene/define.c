@@ -93,7 +93,8 @@ static int refuse_unknown(struct define_table *t, const char *name, size_t lengt
 }
 
 /* One pass; with out NULL only the length is found. */
-static int expand(struct define_table *t, const char *text, size_t size_max, char *out, size_t *length, struct error *e)
+static int expand(struct define_table *t, const char *text, bool keep_unknown, size_t size_max, char *out,
+		  size_t *length, struct error *e)
 {
 	size_t n = 0;
 	while (*text) {
@@ -104,12 +105,15 @@ static int expand(struct define_table *t, const char *text, size_t size_max, cha
 			while (is_name_character(text[1 + name_length]))
 				name_length++;
 			struct define_entry *entry = find(t, text + 1, name_length);
-			if (!entry)
+			if (!entry && !keep_unknown)
 				return refuse_unknown(t, text + 1, name_length, e);
-			entry->used = true;
-			piece = entry->value;
-			piece_length = strlen(piece);
-			text += 1 + name_length;
+			piece_length = 1 + name_length;
+			text += piece_length;
+			if (entry) {
+				entry->used = true;
+				piece = entry->value;
+				piece_length = strlen(piece);
+			}
 		} else {
 			text++;
 		}
@@ -123,17 +127,18 @@ static int expand(struct define_table *t, const char *text, size_t size_max, cha
 	return 0;
 }
 
-int define_substitute(struct define_table *t, const char *text, size_t size_max, const char **out, struct error *e)
+int define_substitute(struct define_table *t, const char *text, bool keep_unknown, size_t size_max, const char **out,
+		      struct error *e)
 {
 	size_t length;
-	int r = expand(t, text, size_max, NULL, &length, e);
+	int r = expand(t, text, keep_unknown, size_max, NULL, &length, e);
 	if (r)
 		return r;
 	char *copy = arena_alloc(t->arena, length + 1, 1);
 	if (!copy)
 		return error_set(e, ENOMEM, "out of memory, or the scene files take too much of it");
 	*out = copy;
-	return expand(t, text, size_max, copy, &length, e);
+	return expand(t, text, keep_unknown, size_max, copy, &length, e);
 }
 
 int define_check_used(const struct define_table *t, struct error *e)

@@ -32,9 +32,10 @@ int define_init(struct define_table *t, const struct scene_define *given, size_t
 int define_default(struct define_table *t, const char *name, const char *value, struct error *e);
 
 /* Replaces every $name in text, once: what is put in is not looked at again. The text itself where it has none.
- * The longest run of letters, digits and '_' after '$' must be a name. -ENOENT: there is none of that name, and it is
- * asked for the first time; -EEXIST: that has been said. */
-int define_substitute(struct define_table *t, const char *text, size_t size_max, const char **out, struct error *e);
+ * The longest run of letters, digits and '_' after '$' must be a name, or stays as it is if `keep_unknown` is set.
+ * -ENOENT: there is none of that name, and it is asked for the first time; -EEXIST: that has been said. */
+int define_substitute(struct define_table *t, const char *text, bool keep_unknown, size_t size_max, const char **out,
+		      struct error *e);
 
 /* A name of the command line that no file had a use for is a mistake. */
 int define_check_used(const struct define_table *t, struct error *e);

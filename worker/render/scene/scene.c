@@ -114,19 +114,18 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 /* Forks of Mitsuba add parameters. A name that resembles none in the table, and that no other plug-in of the class
  * has, is taken for one of these; other unknown names are mistakes. Materials and textures of 3.x do not allow it,
  * because their parameters are visible in the image, and Mitsuba 3 refuses them; 0.6 ignores unknown names, and in its
- * files a material may have the parameter of another, left there when its type was changed. */
+ * files an object may have the parameter of another, left there when its type was changed. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
 	enum plugin_class cls = d->node->cls;
 	struct spelling s = {.wanted = name};
-	bool visible = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE;
-	if (!value_is_element(el->name) ||
-	    (visible ? !el->snake
-		     : cls != PLUGIN_SENSOR && cls != PLUGIN_FILM && cls != PLUGIN_SHAPE && cls != PLUGIN_EMITTER))
+	bool visible = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE,
+	     hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
+	if (!value_is_element(el->name) || !(hidden || (visible && el->snake)))
 		return false;
 	plugin_offer_params(d->decl, &s);
-	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !visible; other++)
+	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !el->snake; other++)
 		if (other->cls == cls && plugin_param(other, name))
 			return false;
 	return !s.best;

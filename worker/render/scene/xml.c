@@ -136,8 +136,9 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 		int c = 0;
 		if (el->ignored || !strchr(value, '$'))
 			a[i].value = arena_strdup(r->arena, value);
-		else
-			c = define_substitute(&r->defines, value, XML_VALUE_MAX, &a[i].value, r->error);
+		else /* $scene['memUsage'] is for the labels that Mitsuba 0.6 writes into images */
+			c = define_substitute(&r->defines, value, r->snake && strchr(value, '['), XML_VALUE_MAX,
+					      &a[i].value, r->error);
 		if (c == -ENOENT || c == -EEXIST) {
 			c = c == -ENOENT ? note_missing(r, el, a[i].name) : 0;
 			a[i].value = arena_strdup(r->arena, value);

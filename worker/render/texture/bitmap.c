@@ -2,7 +2,8 @@
 /*
  * An image file. (u,v) = (0,0) is the upper left corner of the image in both dialects: Mitsuba's OBJ loaders invert v
  * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Linear rgb is interpolated; trilinear
- * and ewa of 0.5/0.6 become bilinear, since there are no footprints: sampling does the filtering.
+ * and ewa of 0.5/0.6 become bilinear, since there are no footprints: sampling does the filtering. `isotropic` and
+ * `none` are names of before 0.5.
  */
 #include "common/base/color.h"
 #include "worker/render/texture/raster.h"
@@ -22,17 +23,35 @@ struct bitmap {
 	double max;
 };
 
+/* In the order of enum raster_wrap. `zero` and `one` are other words of 0.6 for the last two. */
+#define WRAP_MODES "repeat|mirror|clamp|black|white|zero|one"
+
 static enum raster_wrap wrap_of(const char *mode)
 {
-	return strcmp(mode, "mirror") == 0 ? RASTER_MIRROR : strcmp(mode, "clamp") == 0 ? RASTER_CLAMP : RASTER_REPEAT;
+	static const char *const names[] = {"repeat", "mirror", "clamp", "black", "white"};
+	if (strcmp(mode, "zero") == 0)
+		return RASTER_BLACK;
+	if (strcmp(mode, "one") == 0)
+		return RASTER_WHITE;
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (strcmp(mode, names[i]) == 0)
+			return (enum raster_wrap)i;
+	return RASTER_REPEAT;
+}
+
+static bool is_nearest(const char *filter)
+{
+	return strcmp(filter, "nearest") == 0 || strcmp(filter, "none") == 0;
 }
 
 static double upper_bound(const struct bitmap *b)
 {
+	bool white = b->raster.wrap_u == RASTER_WHITE || b->raster.wrap_v == RASTER_WHITE;
+	double largest = fmax(raster_max(&b->raster), white ? 1 : 0);
 	if (b->role == COLOR_ILLUMINANT)
-		return raster_max(&b->raster) * color_max_d65();
-	if (b->shape == COLOR_SHAPE_CONSTANT)
-		return raster_max(&b->raster);
+		return largest * color_max_d65();
+	if (b->shape == COLOR_SHAPE_CONSTANT || white)
+		return largest;
 	uint32_t w = b->raster.image.width, h = b->raster.image.height;
 	double m = 0, *known = b->raster.shared ? &b->raster.shared->bound : NULL;
 	if (known && *known >= 0)
@@ -67,7 +86,7 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	const char *both = node_string(n, "wrap_mode", "repeat");
 	b->raster.wrap_u = wrap_of(node_string(n, "wrap_mode_u", both));
 	b->raster.wrap_v = wrap_of(node_string(n, "wrap_mode_v", both));
-	b->raster.nearest = strcmp(node_string(n, "filter_type", "bilinear"), "nearest") == 0;
+	b->raster.nearest = is_nearest(node_string(n, "filter_type", "bilinear"));
 	b->map = uv_map_read(n);
 	b->role = role;
 	if (color_role_is_number(role))
@@ -132,11 +151,10 @@ static enum color_shape bitmap_shape(const struct texture *t)
 	return ((const struct bitmap *)t->data)->shape;
 }
 
-#define WRAP_MODES "repeat|mirror|clamp"
 static const struct param bitmap_params[] = {
 	RASTER_PARAMS,
 	UV_PARAMS,
-	{.name = "filter_type", .types = VALUE_STRING, .choices = "bilinear|nearest|trilinear|ewa"},
+	{.name = "filter_type", .types = VALUE_STRING, .choices = "bilinear|nearest|trilinear|ewa|isotropic|none"},
 	{.name = "wrap_mode", .types = VALUE_STRING, .choices = WRAP_MODES},
 	{.name = "wrap_mode_u", .types = VALUE_STRING, .choices = WRAP_MODES},
 	{.name = "wrap_mode_v", .types = VALUE_STRING, .choices = WRAP_MODES},

@@ -76,11 +76,20 @@ void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
 		rgb[k] = (double)p[r->image.channels == 3 ? k : 0];
 }
 
-/* Into the unit interval. */
+enum { OUTSIDE = UINT32_MAX }; /* a column or row in a border of one colour */
+
+static bool has_border(enum raster_wrap mode)
+{
+	return mode == RASTER_BLACK || mode == RASTER_WHITE;
+}
+
+/* Into the unit interval; if the image has a border, into that or near it. */
 static double wrap(double x, enum raster_wrap mode)
 {
 	if (!isfinite(x))
 		return 0;
+	if (has_border(mode))
+		return fmin(fmax(x, -1), 2);
 	if (mode == RASTER_CLAMP)
 		return fmin(fmax(x, 0), 1);
 	if (mode == RASTER_REPEAT)
@@ -92,11 +101,22 @@ static double wrap(double x, enum raster_wrap mode)
 /* A pixel's neighbour beyond the border: on the other side if repeated, itself if mirrored or clamped. */
 static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
 {
+	if (has_border(mode) && (i < 0 || i >= (int64_t)n))
+		return OUTSIDE;
 	if (i < 0)
 		return mode == RASTER_REPEAT ? n - 1 : 0;
 	if (i >= (int64_t)n)
 		return mode == RASTER_REPEAT ? 0 : n - 1;
 	return (uint32_t)i;
+}
+
+static void texel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
+{
+	if (x != OUTSIDE && y != OUTSIDE) {
+		raster_pixel(r, x, y, rgb);
+		return;
+	}
+	rgb[0] = rgb[1] = rgb[2] = (x == OUTSIDE ? r->wrap_u : r->wrap_v) == RASTER_WHITE;
 }
 
 /* The four pixels around a position, and the fractions between them. */
@@ -114,14 +134,17 @@ static void find_corners(const struct raster *r, double u, double v, struct corn
 	uint32_t xs[2] = {neighbour(i, w, r->wrap_u), neighbour(i + 1, w, r->wrap_u)};
 	uint32_t ys[2] = {neighbour(j, h, r->wrap_v), neighbour(j + 1, h, r->wrap_v)};
 	for (int n = 0; n < 4; n++)
-		raster_pixel(r, xs[n & 1], ys[n >> 1], k->c[n]);
+		texel(r, xs[n & 1], ys[n >> 1], k->c[n]);
+}
+
+static uint32_t nearest(double u, uint32_t n, enum raster_wrap mode)
+{
+	return neighbour((int64_t)floor(wrap(u, mode) * n), n, mode == RASTER_REPEAT ? RASTER_CLAMP : mode);
 }
 
 static void eval_nearest(const struct raster *r, double u, double v, double rgb[3])
 {
-	uint32_t w = r->image.width, h = r->image.height;
-	double x = wrap(u, r->wrap_u) * w, y = wrap(v, r->wrap_v) * h;
-	raster_pixel(r, x >= w ? w - 1 : (uint32_t)x, y >= h ? h - 1 : (uint32_t)y, rgb);
+	texel(r, nearest(u, r->image.width, r->wrap_u), nearest(v, r->image.height, r->wrap_v), rgb);
 }
 
 static double between(const struct corners *q, int k)

@@ -11,7 +11,8 @@
 #include "worker/render/scene/scene.h"
 #include "worker/render/texture/picture_cache.h"
 
-enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP };
+/* BLACK, WHITE: around the image all is 0, or 1. */
+enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP, RASTER_BLACK, RASTER_WHITE };
 
 struct raster {
 	struct image image;

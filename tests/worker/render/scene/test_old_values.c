@@ -125,17 +125,35 @@ static void test_unknown_names(void **state)
 	scene_fini(&s);
 	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectence' value='1'/></bsdf>",
 		"did you mean `reflectance`?");
-	/* The parameter of another material is a mistake in 3.x only. */
+	/* The parameter of another plug-in is a mistake in 3.x only. */
 	s = read_old("<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>",
 		     "`exponent` is not known and is ignored");
 	scene_fini(&s);
 	refuses("3.0.0", "<bsdf type='diffuse'><float name='exponent' value='9'/></bsdf>", "has no `exponent`");
-	refuses("0.6.0", "<shape type='sphere'><float name='height' value='9'/></shape>", "has no `height`");
+	s = read_old("<emitter type='constant'><float name='scale' value='2'/></emitter>",
+		     "`scale` is not known and is ignored");
+	scene_fini(&s);
+	refuses("3.0.0", "<emitter type='constant'><float name='scale' value='2'/></emitter>", "has no `scale`");
 	refuses("3.0.0", "<bsdf type='diffuse'><string name='guiding_file' value='x'/></bsdf>",
 		"has no `guiding_file` (supported: reflectance)");
 	refuses("3.0.0", "<integer name='max_depth' value='10'/>", "has no place in <scene>");
 	refuses("0.6.0", "<bsdf type='diffuse'><spectrum name='reflectance' type='bitmap'/></bsdf>",
 		"there is no spectrum of this type");
+}
+
+/* What the Blender exporter of 0.5 writes into images by default. */
+static void test_labels(void **state)
+{
+	(void)state;
+	struct scene s = read_old("<default name='a' value='7'/><bsdf type='diffuse'>"
+				  "<string name='label[10,10]' value=\"Time: $scene['renderTime'], $a\"/></bsdf>",
+				  "`label[10,10]` is not known and is ignored");
+	scene_fini(&s);
+	s = read_old("<default name='ab' value='7'/><bsdf type='diffuse' id='$x[$ab]$'/>", NULL);
+	assert_string_equal(s.objects[0]->id, "$x[7]$");
+	scene_fini(&s);
+	refuses("0.6.0", "<bsdf type='diffuse' id='$x'/>", "$x is not defined");
+	refuses("3.0.0", "<bsdf type='diffuse' id='$x[0]'/>", "$x is not defined");
 }
 
 int main(void)
@@ -145,6 +163,7 @@ int main(void)
 		cmocka_unit_test(test_distributions),
 		cmocka_unit_test(test_metals_lose_their_signs),
 		cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_labels),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

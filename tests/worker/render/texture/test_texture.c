@@ -112,6 +112,37 @@ static void test_wrapping(void **state)
 	assert_value(&mixed, -1, 1.25, 0);
 }
 
+/* Around the image all is black, or white; between the outermost pixels' centres and the border's it is mixed. */
+static void test_borders(void **state)
+{
+	struct texture black = make_texture(*state, "bitmap filename=p0 wrap_mode=black", COLOR_REFLECTANCE),
+		       white = make_texture(*state, "bitmap filename=p0 wrap_mode=one", COLOR_REFLECTANCE),
+		       mixed = make_texture(*state, "bitmap filename=p0 wrap_mode_u=zero wrap_mode_v=white",
+					    COLOR_REFLECTANCE),
+		       column = make_texture(*state, "bitmap filename=p0 wrap_mode_u=white", COLOR_REFLECTANCE),
+		       nearest = make_texture(*state, "bitmap filename=p0 wrap_mode=white filter_type=none",
+					      COLOR_REFLECTANCE);
+	assert_value(&black, 2.5 / 3, 0.75, 0.125);
+	assert_value(&black, 1, 0.75, 0.0625);
+	assert_value(&black, 1 + 0.25 / 3, 0.75, 0.03125);
+	assert_value(&black, 1 + 0.5 / 3, 0.75, 0);
+	assert_value(&black, 1e9, 0.75, 0);
+	assert_value(&white, 0, 0.25, 0.5);
+	assert_value(&white, -0.5 / 3, 0.25, 1);
+	assert_value(&white, 0.5 / 3, -1e30, 1);
+	assert_value(&mixed, -0.5, 0.75, 0);
+	assert_value(&mixed, 2.5 / 3, 1, 0.5625);
+	assert_value(&mixed, -0.5, 1.5, 0);
+	assert_value(&column, -0.5, 7.75, 1);
+	assert_value(&column, 2.5 / 3, 7.75, 0.125);
+	assert_value(&nearest, 0, 0, 0);
+	assert_value(&nearest, -0x1p-60, 0.25, 1);
+	assert_value(&nearest, 0.999, 0.999, 0.125);
+	assert_value(&nearest, 1, 0.75, 1);
+	struct texture lamp = make_texture(*state, "bitmap filename=p1 wrap_mode=white", COLOR_REFLECTANCE);
+	assert_true(texture_max(&lamp) == 1);
+}
+
 static void test_nearest(void **state)
 {
 	struct texture t = make_texture(*state, "bitmap filename=p0 filter_type=nearest", COLOR_REFLECTANCE);
@@ -255,6 +286,7 @@ static void test_derivatives(void **state)
 				     "bitmap filename=p0 raw=true uscale=2 vscale=-3 uoffset=0.1",
 				     "bitmap filename=p0 raw=true wrap_mode=mirror",
 				     "bitmap filename=p0 raw=true wrap_mode=clamp",
+				     "bitmap filename=p0 raw=true wrap_mode_u=white wrap_mode_v=black",
 				     "bitmap filename=p1 raw=true filter_type=nearest",
 				     "checkerboard color0=1 color1=-3"};
 	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
@@ -398,6 +430,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_orientation_and_pixel_centres),
 		cmocka_unit_test(test_wrapping),
+		cmocka_unit_test(test_borders),
 		cmocka_unit_test(test_nearest),
 		cmocka_unit_test(test_uv_maps),
 		cmocka_unit_test(test_derivatives),
