@@ -387,7 +387,7 @@ static const struct param principled_params[] = {
 	PRINCIPLED_SHARE("clearcoat"),
 	PRINCIPLED_SHARE("clearcoat_gloss"),
 	PRINCIPLED_SHARE("anisotropic"),
-	{.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+	{.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 8},
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},
 	{.name = "main_specular_sampling_rate", .status = PARAM_IGNORED},

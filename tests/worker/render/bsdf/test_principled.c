@@ -124,6 +124,8 @@ static void test_specular_is_an_index(void **state)
 	(void)state;
 	/* 0.08 x 0.5 at normal incidence is an index of 1.5. */
 	same("principled base_color=0 specular=0.5", "principled base_color=0 eta=1.5", 0, 1);
+	/* Exporters write a little more than 1, and Mitsuba takes any. */
+	same("principled base_color=0 specular=2", "principled base_color=0 eta=2.3333333333333335", 0, 1);
 }
 
 /* A texture that has one value is the number, and one that varies is it at each point. */
