@@ -2,10 +2,21 @@
 /* A path counts one more edge for a filter, and next event estimation does not look through it. */
 #include "worker/render/bsdf/straight.h"
 
+#include <float.h>
+
+extern const struct bsdf_ops bsdf_ops_null;
+
 struct filter {
 	struct texture transmittance;
 	double share;
 };
+
+/* 1 / |wo.z| must be finite. */
+static bool straight_direction(vec3 wo, vec3 *wi)
+{
+	*wi = vec3_neg(wo);
+	return fabs(wo.z) >= DBL_MIN;
+}
 
 spectrum straight_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
@@ -57,4 +68,10 @@ int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsd
 	b->alpha = b->alpha_mean = 0;
 	b->black = texture_max(&f->transmittance) == 0;
 	return 0;
+}
+
+int straight_make(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	*b = (struct bsdf){.ops = &bsdf_ops_null, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
+	return straight_create(b, n, build, 1, e);
 }

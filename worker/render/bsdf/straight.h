@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A specular lobe that lets light through without bending it: a share of it for `mask`, all that a filter does not
- * absorb for `null`, `polarizer`, `circular` and `retarder`, whose only lobe it is.
+ * A specular lobe that lets light through without bending it, all that a filter does not absorb: the only lobe of
+ * `null`, `polarizer`, `circular` and `retarder`, and the holes of a `mask`.
  *
  * Light is unpolarised here. As in the unpolarised modes of Mitsuba, both polarizers then let half of it through, at
  * any angle to each other, and a retarder all of it.
@@ -11,18 +11,11 @@
 
 #include "worker/render/bsdf/create.h"
 
-#include <float.h>
-
-/* 1 / |wo.z| must be finite. */
-static inline bool straight_direction(vec3 wo, vec3 *wi)
-{
-	*wi = vec3_neg(wo);
-	return fabs(wo.z) >= DBL_MIN;
-}
-
 /* A filter lets `share` times the texture `transmittance` through. */
 int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
 		    struct error *e);
+/* A `null`, for a BSDF n that has holes; n has no `transmittance`. */
+int straight_make(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 spectrum straight_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 double straight_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,

@@ -1,0 +1,174 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/bsdf/blend.h"
+
+#include "worker/render/bsdf/twosided.h"
+
+/* For each part: its share of the light, and the probability of choosing it. */
+struct shares {
+	spectrum f[BLEND_PARTS_MAX];
+	double chance[BLEND_PARTS_MAX];
+};
+
+static void find_shares(const struct blend *m, const struct bsdf_point *p, struct shares *s)
+{
+	double sum = 0;
+	if (!m->is_fixed) {
+		int weighted = m->weight_of_first ? 0 : 1;
+		spectrum weight = texture_eval(&m->weight, &p->where, p->w);
+		s->f[weighted] = weight;
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			s->f[1 - weighted].v[i] = 1 - weight.v[i];
+		s->chance[0] = spectrum_mean(s->f[0]);
+		s->chance[1] = spectrum_mean(s->f[1]);
+		return;
+	}
+	for (uint32_t k = 0; k < m->count; k++)
+		sum += m->fixed[k];
+	for (uint32_t k = 0; k < m->count; k++) {
+		s->f[k] = spectrum_of(m->fixed[k]);
+		s->chance[k] = m->fixed[k] / sum;
+	}
+}
+
+static spectrum mix(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi,
+		    spectrum (*eval)(const struct bsdf *, const struct bsdf_point *, vec3, vec3))
+{
+	const struct blend *m = b->data;
+	struct shares s;
+	spectrum sum = spectrum_of(0);
+	find_shares(m, p, &s);
+	for (uint32_t k = 0; k < m->count; k++)
+		sum = spectrum_add(sum, spectrum_mul(s.f[k], eval(&m->part[k], p, wo, wi)));
+	return sum;
+}
+
+static spectrum part_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	return b->ops->eval(b, p, wo, wi);
+}
+
+spectrum blend_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	return mix(b, p, wo, wi, part_eval);
+}
+
+spectrum blend_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	return mix(b, p, wo, wi, bsdf_eval_halfvec);
+}
+
+double blend_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct blend *m = b->data;
+	struct shares s;
+	double sum = 0;
+	find_shares(m, p, &s);
+	for (uint32_t k = 0; k < m->count; k++)
+		sum += s.chance[k] * m->part[k].ops->pdf_solid(&m->part[k], p, wo, wi);
+	return sum;
+}
+
+/* Specular lobes of all parts have the same direction. */
+spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			  double *chance)
+{
+	const struct blend *m = b->data;
+	struct shares s;
+	spectrum sum = spectrum_of(0);
+	double all = 0;
+	find_shares(m, p, &s);
+	for (uint32_t k = 0; k < m->count; k++) {
+		double one;
+		spectrum weight = bsdf_eval_delta(&m->part[k], p, wo, mode, wi, &one);
+		if (spectrum_is_zero(weight))
+			continue;
+		sum = spectrum_add(sum, spectrum_mul(s.f[k], weight));
+		all += s.chance[k] * one;
+	}
+	*chance = all;
+	return sum;
+}
+
+bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
+{
+	const struct blend *m = b->data;
+	struct shares s;
+	uint32_t k = 0;
+	double rest = u[2];
+	find_shares(m, p, &s);
+	while (k + 1 < m->count && rest >= s.chance[k])
+		rest -= s.chance[k++];
+	if (!(s.chance[k] > 0))
+		return false;
+	const double next[3] = {u[0], u[1], fmin(rest / s.chance[k], 1 - 0x1p-53)};
+	if (!m->part[k].ops->sample(&m->part[k], p, wo, next, out))
+		return false;
+	if (out->mode & BSDF_DELTA) {
+		spectrum weight = blend_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
+		out->f = spectrum_scale(1 / fabs(out->wi.z), weight);
+	} else {
+		out->pdf = blend_pdf(b, p, wo, out->wi);
+		out->f = blend_eval(b, p, wo, out->wi);
+	}
+	return out->pdf > 0;
+}
+
+int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const struct scene_node *n, struct error *e)
+{
+	if (part->modes & BSDF_TRANSMIT) {
+		bool other = (b->modes & BSDF_TRANSMIT) && b->eta != part->eta;
+		if (part->dispersive || other)
+			return node_error(n, e, ENOTSUP, "its part \"%s\" %s", type,
+					  part->dispersive
+						  ? "is dispersive, which parts of a blend may not be"
+						  : "has a different index of refraction than an earlier part");
+		b->eta = part->eta;
+	}
+	b->two_sided |= part->two_sided;
+	b->modes |= part->modes;
+	b->has_smooth |= part->has_smooth;
+	b->has_delta |= part->has_delta;
+	b->textured |= part->textured;
+	b->black &= part->black;
+	if (part->has_smooth)
+		b->alpha = fmin(b->alpha, part->alpha);
+	bsdf_add_shape(b, part->shape);
+	return 0;
+}
+
+struct blend *blend_begin(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, uint32_t count,
+			  struct error *e)
+{
+	struct blend *m = bsdf_data(b, n, build, sizeof *m, e);
+	if (!m)
+		return NULL;
+	b->black = true;
+	m->count = count;
+	m->part = arena_alloc(build->arena, count, sizeof *m->part);
+	if (!m->part)
+		node_error(n, e, ENOMEM, "out of memory");
+	return m->part ? m : NULL;
+}
+
+int blend_read_parts(struct blend *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+		     struct error *e)
+{
+	for (uint32_t k = 0; k < m->count; k++) {
+		const struct scene_node *inner = node_child(n, PLUGIN_BSDF, k);
+		int code = bsdf_create(&m->part[k], inner, build, e);
+		if (!code)
+			code = bsdf_take_relief(b, &m->part[k], k == 0, n, e);
+		if (!code)
+			code = blend_join(b, &m->part[k], inner->type, n, e);
+		if (code)
+			return code;
+	}
+	if (!b->has_smooth)
+		b->alpha = 0;
+	for (uint32_t k = 0; k < m->count && b->two_sided; k++) {
+		int code = bsdf_mirror_back(&m->part[k], build, e);
+		if (code)
+			return code;
+	}
+	return 0;
+}

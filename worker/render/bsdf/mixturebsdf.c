@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Any number of BSDFs by fixed weights; what these leave of 1 is absorbed, and they are scaled if they exceed it. */
+#include "worker/render/bsdf/blend.h"
+#include "worker/render/scene/number.h"
+
+/* As many weights as parts. */
+static int read_weights(struct blend *m, const struct scene_node *n, struct error *e)
+{
+	const char *text = node_string(n, "weights", "");
+	double sum = 0;
+	if (number_list(text, m->fixed, BLEND_PARTS_MAX) != (int)m->count)
+		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weights, one for each BSDF", text, m->count);
+	for (uint32_t k = 0; k < m->count; k++) {
+		if (!(m->fixed[k] >= 0 && m->fixed[k] <= 1e6))
+			return node_error(n, e, ERANGE, "weights=\"%s\": must be within [0, 1e6]", text);
+		sum += m->fixed[k];
+	}
+	if (!(sum > 0))
+		return node_error(n, e, EINVAL, "weights=\"%s\": all are 0", text);
+	for (uint32_t k = 0; k < m->count && sum > 1; k++)
+		m->fixed[k] /= sum;
+	return bsdf_check_energy(n, sum, e);
+}
+
+static int mixturebsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			      struct error *e)
+{
+	uint32_t count = 0;
+	while (node_child(n, PLUGIN_BSDF, count))
+		if (count++ == BLEND_PARTS_MAX)
+			return node_error(n, e, ERANGE, "more than %d BSDFs inside", BLEND_PARTS_MAX);
+	if (count == 0)
+		return node_error(n, e, EINVAL, "needs BSDFs inside");
+	struct blend *m = blend_begin(b, n, build, count, e);
+	if (!m)
+		return -ENOMEM;
+	m->is_fixed = true;
+	int code = read_weights(m, n, e);
+	if (!code)
+		code = blend_read_parts(m, b, n, build, e);
+	double sum = 0;
+	for (uint32_t k = 0; k < m->count && !code; k++)
+		sum += m->fixed[k];
+	b->alpha_mean = 0;
+	for (uint32_t k = 0; k < m->count && !code; k++)
+		b->alpha_mean += m->fixed[k] / sum * m->part[k].alpha_mean;
+	return code;
+}
+
+static const struct param mixturebsdf_params[] = {
+	{.name = "weights", .types = VALUE_STRING},
+	BSDF_ENERGY_PARAM,
+	{.name = NULL},
+};
+
+BLEND_OPS(mixturebsdf);
