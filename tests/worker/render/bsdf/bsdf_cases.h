@@ -93,6 +93,9 @@ static const char *const bsdf_cases[] = {
 	"mask opacity=0.3 | plastic",
 	"mask opacity=0.8 | roughconductor alpha=0.2",
 	"mask opacity=1 | conductor material=none",
+	"mask opacity=0.6 | difftrans transmittance=rgb(0.9,0.5,0.2)",
+	"mask opacity=0.7 | thindielectric",
+	"mask opacity=0.4 | principledthin spec_trans=0.5 diff_trans=1 roughness=0.4",
 	"blendbsdf weight=0.3 | diffuse reflectance=0.8 | roughconductor alpha=0.2 material=Au",
 	"blendbsdf weight=0.6 | plastic | conductor material=Ag",
 	"blendbsdf weight=0.4 | diffuse | roughplastic alpha=0.3", /* chooses with what is left of the same number */

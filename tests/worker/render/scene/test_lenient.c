@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What leniency puts in the place of what is not supported: every stand-in is a plug-in of its class that there is. */
+#include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/render.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/plugin.h"
@@ -57,11 +58,46 @@ static void test_colours_are_kept(void **state)
 	assert_string_equal(lenient_param("roughplastic", "diffuse_reflectance"), "diffuse_reflectance");
 }
 
+/* Covers go where they are not supported, and only there: what bsdf_create says of the same node. */
+static void test_covers(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		bool goes;
+	} covers[] = {
+		{"coating | diffuse", false},
+		{"coating | difftrans", true},
+		{"twosided | polarizer", true},
+		{"roughcoating | principledthin spec_trans=0.5", true},
+		{"mask | diffuse", false},
+		{"mask | difftrans", false},
+		{"mask | thindielectric", false},
+		{"mask | principledthin spec_trans=0.5 diff_trans=1", false},
+		{"mask | dielectric", true},
+		{"mask | roughdielectric alpha=0.1", true},
+		{"mask | principled spec_trans=0.5", true},
+		{"mask | principled spec_trans=0", false},
+	};
+	for (size_t i = 0; i < sizeof covers / sizeof *covers; i++) {
+		struct arena a = {0};
+		struct bsdf b;
+		struct error e;
+		bool goes = lenient_uncovered(bsdf_node(&a, covers[i].text)) != NULL,
+		     refused = bsdf_try(&a, covers[i].text, true, &b, &e) < 0;
+		if (goes != covers[i].goes || refused != covers[i].goes)
+			fail_msg("%s is %ssupported and %s", covers[i].text, refused ? "not " : "",
+				 goes ? "goes" : "stays");
+		arena_fini(&a);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_stand_ins),
 		cmocka_unit_test(test_colours_are_kept),
+		cmocka_unit_test(test_covers),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What Mitsuba 0.6 accepts and 3 does not: taken with a note from files of 0.6, refused in those of 3.x. */
+/*
+ * What Mitsuba 0.6 accepts and 3 does not: taken with a note from files of 0.6, refused in those of 3.x. And what
+ * exporters write by default.
+ */
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 #include "worker/render/scene/scene.h"
@@ -156,6 +159,19 @@ static void test_labels(void **state)
 	refuses("3.0.0", "<bsdf type='diffuse' id='$x[0]'/>", "$x is not defined");
 }
 
+/* The Blender exporter for 3.x writes a little more than 1. */
+static void test_specular(void **state)
+{
+	(void)state;
+	struct scene s;
+	struct error e;
+	assert_int_equal(
+		read_scene(&s, "3.0.0", "<bsdf type='principled'><float name='specular' value='1.001'/></bsdf>", &e),
+		0);
+	scene_fini(&s);
+	refuses("3.0.0", "<bsdf type='principled'><float name='specular' value='9'/></bsdf>", "outside [0, 8]");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -164,6 +180,7 @@ int main(void)
 		cmocka_unit_test(test_metals_lose_their_signs),
 		cmocka_unit_test(test_unknown_names),
 		cmocka_unit_test(test_labels),
+		cmocka_unit_test(test_specular),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -58,6 +58,15 @@ static void test_mask(void **state)
 		HALF("0.5", DIFFUSE("0.8")));
 }
 
+/* A leaf: lit from behind through itself, and through what is cut off. */
+static void test_mask_over_what_transmits(void **state)
+{
+	(void)state;
+#define LEAF "<bsdf type='difftrans'><rgb name='transmittance' value='0.7'/></bsdf>"
+	compare("leaf", "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") LEAF "</bsdf></shape>",
+		HALF("0.5", LEAF));
+}
+
 static void test_blend(void **state)
 {
 	(void)state;
@@ -69,6 +78,7 @@ static void test_blend(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask), cmocka_unit_test(test_blend)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask), cmocka_unit_test(test_mask_over_what_transmits),
+					   cmocka_unit_test(test_blend)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
