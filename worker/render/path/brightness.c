@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a sample contributes is collected in `now` and added to a cell's sums of x and x^2 when the sample ends, so that
+ * the relative standard error sqrt(sum of x^2) / (sum of x) is that of samples, however often each lands in the cell.
+ * When all are in, the sums become scales, of squares that are known well enough or of neighbourhoods.
+ *
+ * Lack of memory is an error of brightness_init and brightness_of_samples; nothing else fails. Where all is black the
+ * scales are 0, and so is one that would not be finite.
+ */
 #include "worker/render/path/brightness.h"
 
 #include "common/base/liveness.h"
