@@ -8,12 +8,15 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	const struct memory_file files[] = {{"i", bytes, size}, {0}};
+	static const char *const names[] = {"i", "i.tga"}; /* which TGA is recognised by */
+	const struct memory_file files[] = {{names[0], bytes, size}, {names[1], bytes, size}, {0}};
 	struct asset_source assets = memory_assets(files);
-	struct arena arena = {.limit = 256 << 20};
-	struct image img;
-	struct error e;
-	image_read(&assets, "i", false, &arena, &img, &e);
-	arena_fini(&arena);
+	for (int k = 0; k < 2; k++) {
+		struct arena arena = {.limit = 256 << 20};
+		struct image img;
+		struct error e;
+		image_read(&assets, names[k], false, &arena, &img, &e);
+		arena_fini(&arena);
+	}
 	return 0;
 }

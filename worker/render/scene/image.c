@@ -13,9 +13,16 @@ static const struct format {
 	int (*decode)(const struct image_input *in, struct image *out);
 	bool alpha;
 } formats[] = {
-	{"\x89PNG\r\n\x1a\n", 8, image_decode_png, true}, {"\xff\xd8\xff", 3, image_decode_jpeg, false},
-	{"\x76\x2f\x31\x01", 4, image_decode_exr, false}, {"#?RADIANCE", 10, image_decode_hdr, false},
-	{"#?RGBE", 6, image_decode_hdr, false},		  {"BM", 2, image_decode_bmp, false},
+	{"\x89PNG\r\n\x1a\n", 8, image_decode_png, true},
+	{"\xff\xd8\xff", 3, image_decode_jpeg, false},
+	{"\x76\x2f\x31\x01", 4, image_decode_exr, false},
+	{"#?RADIANCE", 10, image_decode_hdr, false},
+	{"#?RGBE", 6, image_decode_hdr, false},
+	{"BM", 2, image_decode_bmp, false},
+	{"P5", 2, image_decode_pnm, false},
+	{"P6", 2, image_decode_pnm, false},
+	{"PF", 2, image_decode_pnm, false},
+	{"Pf", 2, image_decode_pnm, false},
 };
 
 /* A grey value as three equal ones, in place. */
@@ -35,11 +42,15 @@ static int decode(const struct image_input *in, struct image *out)
 		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
 			continue;
 		if (in->alpha && !formats[i].alpha)
-			return error_set(in->error, ENOTSUP, "%s: alpha is only read from PNG", in->name);
+			return error_set(in->error, ENOTSUP, "%s: alpha is only read from PNG and TGA", in->name);
 		return formats[i].decode(in, out);
 	}
-	return error_set(in->error, EINVAL,
-			 "%s: unknown image format (supported: PNG, JPEG, OpenEXR, Radiance HDR, BMP)", in->name);
+	if (image_is_tga(in)) /* the only one without a beginning of its own */
+		return image_decode_tga(in, out);
+	return error_set(
+		in->error, EINVAL,
+		"%s: unknown image format (supported: PNG, JPEG, OpenEXR, Radiance HDR, BMP, TGA, PGM, PPM, PFM)",
+		in->name);
 }
 
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,

@@ -27,8 +27,12 @@ struct image_input {
 int image_decode_png(const struct image_input *in, struct image *out);
 int image_decode_jpeg(const struct image_input *in, struct image *out);
 int image_decode_bmp(const struct image_input *in, struct image *out);
+int image_decode_tga(const struct image_input *in, struct image *out);
+int image_decode_pnm(const struct image_input *in, struct image *out);
 int image_decode_hdr(const struct image_input *in, struct image *out);
 int image_decode_exr(const struct image_input *in, struct image *out);
+
+bool image_is_tga(const struct image_input *in);
 
 /* Checks the size, also against the fewest bytes that such an image can take (bytes_least, for the format's best
  * compression), before anything is allocated; then allocates the pixels. */
