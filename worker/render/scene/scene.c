@@ -111,10 +111,10 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 	return 0;
 }
 
-/* Forks of Mitsuba add parameters. A name that resembles none in the table, and that no other plug-in of the class
- * has, is taken for one of these; other unknown names are mistakes. Materials and textures of 3.x do not allow it,
- * because their parameters are visible in the image, and Mitsuba 3 refuses them; 0.6 ignores unknown names, and in its
- * files an object may have the parameter of another, left there when its type was changed. */
+/* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and that no other plug-in of
+ * the class has, is taken for one of these; other unknown names are mistakes. Materials and textures of 3.x do not
+ * allow it, because their parameters are visible in the image, and Mitsuba 3 refuses them; 0.6 ignores unknown names,
+ * and in its files an object may have the parameter of another, left there when its type was changed. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
@@ -128,7 +128,8 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !el->snake; other++)
 		if (other->cls == cls && plugin_param(other, name))
 			return false;
-	return !s.best;
+	const struct param *meant = s.best ? plugin_param(d->decl, s.best) : NULL;
+	return !s.best || (meant && meant->status == PARAM_IGNORED);
 }
 
 /* What the table says of a name: *p understood, or NULL with the matter settled (ignored, or an error). */

@@ -137,6 +137,12 @@ static void test_unknown_names(void **state)
 		     "`scale` is not known and is ignored");
 	scene_fini(&s);
 	refuses("3.0.0", "<emitter type='constant'><float name='scale' value='2'/></emitter>", "has no `scale`");
+	/* A name that resembles one without effect does no harm. */
+	s = read_old("<emitter type='constant'><float name='samplingWeights' value='2'/></emitter>",
+		     "`sampling_weights` is not known and is ignored");
+	scene_fini(&s);
+	refuses("0.6.0", "<emitter type='sky'><float name='turbidit' value='3'/></emitter>",
+		"did you mean `turbidity`?");
 	refuses("3.0.0", "<bsdf type='diffuse'><string name='guiding_file' value='x'/></bsdf>",
 		"has no `guiding_file` (supported: reflectance)");
 	refuses("3.0.0", "<integer name='max_depth' value='10'/>", "has no place in <scene>");
