@@ -58,9 +58,9 @@ const char *lenient_param(const char *stand_in, const char *name)
 	return name;
 }
 
-/* Light passes a BSDF of one of these types, or one in which one of these parameters is not 0. */
+/* Light passes a BSDF of one of these types, or one in which one of these parameters is not 0; not so in one type. */
 struct passage {
-	const char *const *types, *const *parameters;
+	const char *const *types, *const *parameters, *except;
 };
 
 static bool has_passage(const struct scene_node *n, const struct passage *p)
@@ -70,7 +70,7 @@ static bool has_passage(const struct scene_node *n, const struct passage *p)
 	for (uint32_t i = 0; i < n->property_count; i++) {
 		const struct value *v = &n->properties[i].value;
 		bool zero = v->type == VALUE_FLOAT && v->as.number == 0;
-		if (is_one_of(n->properties[i].name, p->parameters) && !zero)
+		if (is_one_of(n->properties[i].name, p->parameters) && !zero && strcmp(n->type, p->except) != 0)
 			return true;
 	}
 	for (uint32_t i = 0; i < n->child_count; i++)
@@ -86,15 +86,15 @@ const struct scene_node *lenient_uncovered(const struct scene_node *n)
 				 *const any_parameters[] = {"spec_trans", "diff_trans", NULL},
 				 *const bent_types[] = {"dielectric", "roughdielectric", NULL},
 				 *const bent_parameters[] = {"spec_trans", NULL};
-	static const struct passage any = {any_types, any_parameters}, bent = {bent_types, bent_parameters};
+	static const struct passage any = {any_types, any_parameters, ""},
+				    bent = {bent_types, bent_parameters, "principledthin"};
 	static const char *const opaque_covers[] = {"coating", "roughcoating", "twosided", NULL};
 	const struct scene_node *inner = n->cls == PLUGIN_BSDF ? node_child(n, PLUGIN_BSDF, 0) : NULL;
 	if (!inner)
 		return NULL;
 	if (is_one_of(n->type, opaque_covers))
 		return has_passage(inner, &any) ? inner : NULL;
-	bool refracts = strcmp(n->type, "mask") == 0 && has_passage(inner, &bent);
-	return refracts && strcmp(inner->type, "principledthin") != 0 ? inner : NULL;
+	return strcmp(n->type, "mask") == 0 && has_passage(inner, &bent) ? inner : NULL;
 }
 
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el)
