@@ -156,6 +156,13 @@ for file in covered plain; do
 done
 code 0 "$BIN/hslt-compare" "$DIR/covered.exr" "$DIR/plain.exr"
 grep -q "^relMSE  *0 " "$DIR/out" || fail "an uncovered mask is another: $(cat "$DIR/out")"
+# What only building a scene shows: all of that, too.
+scene deep.xml box '' '<bsdf type="conductor" id="stuff"><string name="material" value="Xy"/></bsdf>' '' \
+	'<shape type="sphere"><bsdf type="mask"><bsdf type="dielectric"/></bsdf></shape>'
+code 1 "$BIN/hslt-scene" check "$DIR/deep.xml"
+for word in 'unknown conductor "Xy"' 'a mask over "dielectric"' '2 problems'; do
+	grep -q "$word" "$DIR/out" || fail "$word: $(cat "$DIR/out")"
+done
 # Leniency is not for what is supported and wrong, nor for what has no stand-in.
 sed 's/value="24"/value="wide"/' "$DIR/strange.xml" >"$DIR/wrong.xml"
 code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The scene is read such that every problem is found (scene_read_all); if there is none, meshes, images and
- * combinations of values are checked as a worker would. `show` collects everything as JSON, from which the text is
- * made.
+ * combinations of values are checked as a worker would, again all of them. `show` collects everything as JSON, from
+ * which the text is made.
  *
  * For a scene that cannot be rendered the exit code is 1, with one line per problem; a file that cannot be read at all
  * gets only that line.
@@ -63,21 +63,37 @@ static uint32_t print_missing(const struct scene *s, const struct asset_source *
 	return missing;
 }
 
-/* What the reader cannot see, meshes, pictures and values that do not go together, is looked at when all else is right;
- * that ends with the first thing that is wrong. */
+/* What the reader cannot see, in meshes, pictures and values that do not go together. */
+static uint32_t print_deeper(const struct scene *s, const struct asset_source *assets, struct render_summary *m)
+{
+	const struct render_options as_it_is = {0};
+	struct arena arena = {0};
+	struct report found;
+	struct error e;
+	int rc = report_init(&found, &arena, &e);
+	uint32_t problems = 0;
+	if (!rc) {
+		rc = render_check_all(s, assets, &as_it_is, &found, m, &e);
+		problems = found.problem_count;
+	}
+	for (uint32_t i = 0; i < problems; i++)
+		printf("%s\n", found.problems[i]);
+	if (rc)
+		printf("%s\n", e.text);
+	arena_fini(&arena);
+	return problems + (rc != 0);
+}
+
+/* That is looked at when all else is right. */
 static int print_check(const struct scene *s, const struct asset_source *assets, const char *name, bool *bad)
 {
 	static struct render_summary m; /* large */
-	struct error deeper;
 	uint32_t problems = s->problem_count, notes = s->note_count;
 	for (uint32_t i = 0; i < s->problem_count; i++)
 		printf("%s\n", s->problems[i]);
 	problems += print_missing(s, assets);
-	const struct render_options as_it_is = {0};
-	if (!problems && render_check(s, assets, &as_it_is, &m, &deeper)) {
-		printf("%s\n", deeper.text);
-		problems = 1;
-	}
+	if (!problems)
+		problems = print_deeper(s, assets, &m);
 	for (uint32_t i = 0; i < s->note_count; i++)
 		printf("note: %s\n", s->notes[i]);
 	char text[512];

@@ -83,7 +83,7 @@ static int create_bsdfs(struct builder *b)
 			bsdf_default(&w->bsdfs[k]);
 		if (!rc)
 			rc = bsdf_mirror_back(&w->bsdfs[k], &build, b->e);
-		if (rc)
+		if (rc && (rc = build_go_on(b, rc)))
 			return rc;
 		node_table_add(&made, key, attributes.asked ? w->shapes[i].index : NULL, k);
 		w->shapes[i].relief = w->bsdfs[k].relief;
@@ -133,10 +133,10 @@ static int create_emitters(struct builder *b)
 		build.surface = &surface;
 		build.attributes = &attributes;
 		int rc = emitter_create(&w->emitters[w->emitter_count], n, &build, b->e);
-		if (rc)
+		if (!rc && !isfinite(w->emitters[w->emitter_count].power))
+			rc = power_error(n, b->e);
+		if (rc && (rc = build_go_on(b, rc)))
 			return rc;
-		if (!isfinite(w->emitters[w->emitter_count].power))
-			return power_error(n, b->e);
 		w->emitter_shape[w->emitter_count] = i;
 		b->emitter_nodes[w->emitter_count] = n;
 		w->parts[i].emitter = (int32_t)w->emitter_count++;
@@ -151,16 +151,16 @@ static int create_emitters(struct builder *b)
 			continue;
 		struct emitter *em = &w->emitters[w->emitter_count];
 		int rc = emitter_create(em, n, &build, b->e);
-		if (rc)
-			return rc;
 		bool environment = em->infinite && !em->delta;
-		if (environment && w->environment >= 0)
-			return node_error(n, b->e, EINVAL,
-					  "a scene may have one environment only; remove this one or the one before");
+		if (!rc && environment && w->environment >= 0)
+			rc = node_error(n, b->e, EINVAL,
+					"a scene may have one environment only; remove this one or the one before");
 		if (em->infinite)
 			em->power *= M_PI * w->radius * w->radius;
-		if (!isfinite(em->power))
-			return power_error(n, b->e);
+		if (!rc && !isfinite(em->power))
+			rc = power_error(n, b->e);
+		if (rc && (rc = build_go_on(b, rc)))
+			return rc;
 		if (environment)
 			w->environment = (int32_t)w->emitter_count;
 		b->emitter_nodes[w->emitter_count] = n;
@@ -258,6 +258,8 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = create_bsdfs(b);
 	if (!rc)
 		rc = create_emitters(b);
+	if (b->found && b->found->problem_count)
+		return rc;
 	if (!rc)
 		rc = find_coincidence(b);
 	if (!rc)
@@ -270,12 +272,12 @@ static int prepare(struct builder *b, const struct render_options *o)
 }
 
 static int new_world(struct world **out, bool with_accel, const struct scene *s, const struct asset_source *assets,
-		     const struct render_options *o, struct error *e)
+		     const struct render_options *o, struct report *found, struct error *e)
 {
 	*out = NULL;
 	struct asset_keeper keeper = {.inner = assets};
 	struct asset_source kept = asset_keeper_source(&keeper);
-	struct builder b = {.scene = s, .assets = &kept, .e = e, .w = mem_alloc(1, sizeof *b.w)};
+	struct builder b = {.scene = s, .assets = &kept, .found = found, .e = e, .w = mem_alloc(1, sizeof *b.w)};
 	if (!b.w)
 		return build_out_of_memory(e);
 	struct picture_cache decoded = {.arena = &b.w->arena};
@@ -301,18 +303,29 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 int world_new(struct world **out, const struct scene *s, const struct asset_source *assets,
 	      const struct render_options *o, struct error *e)
 {
-	return new_world(out, true, s, assets, o, e);
+	return new_world(out, true, s, assets, o, NULL, e);
 }
 
 int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 		 struct render_summary *out, struct error *e)
 {
 	struct world *w;
-	int rc = new_world(&w, false, s, assets, o, e);
+	int rc = new_world(&w, false, s, assets, o, NULL, e);
 	if (!rc)
 		world_summary(w, out);
 	world_free(w);
 	return rc;
+}
+
+int render_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		     struct report *found, struct render_summary *out, struct error *e)
+{
+	struct world *w;
+	int rc = new_world(&w, false, s, assets, o, found, e);
+	if (!rc && !found->problem_count)
+		world_summary(w, out);
+	world_free(w);
+	return rc == REPORT_FULL ? 0 : rc;
 }
 
 /* ---- finished worlds ---- */

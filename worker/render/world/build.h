@@ -6,6 +6,7 @@
 #ifndef WORKER_RENDER_WORLD_BUILD_H
 #define WORKER_RENDER_WORLD_BUILD_H
 
+#include "worker/render/scene/report.h"
 #include "worker/render/world/summary.h"
 
 struct world;
@@ -14,6 +15,11 @@ struct world;
  * that passes can be rendered by workers. */
 int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 		 struct render_summary *out, struct error *e);
+
+/* The same, going on after an error in a shape, a material or an emitter. *found (report_init) has all of these, each
+ * once; *out is filled in if there is none. Any other error ends it, as above. */
+int render_check_all(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		     struct report *found, struct render_summary *out, struct error *e);
 
 /* Builds Embree's scene, and ticks meanwhile (common/base/liveness.h). The scene description may be freed
  * afterwards. */

@@ -6,10 +6,13 @@
 #ifndef WORKER_RENDER_WORLD_BUILD_PRIVATE_H
 #define WORKER_RENDER_WORLD_BUILD_PRIVATE_H
 
+#include "worker/render/scene/report.h"
 #include "worker/render/shape/shape.h"
 #include "worker/render/texture/attribute_table.h"
 #include "worker/render/world/origin.h"
 #include "worker/render/world/world.h"
+
+#include <string.h>
 
 /* Data needed for building, but not in the world. */
 struct builder {
@@ -28,8 +31,20 @@ struct builder {
 	struct attribute_pool attributes;
 	struct emitter_surface *surfaces;
 	struct box all, *boxes; /* boxes: one a shape */
+	struct report *found;	/* the problems after which building goes on; NULL: the first ends it */
 	struct error *e;
 };
+
+/* An object has failed with `code`. 0: the problem is noted, and building goes on without the object. */
+static inline int build_go_on(struct builder *b, int code)
+{
+	if (!b->found)
+		return code;
+	for (uint32_t i = 0; i < b->found->problem_count && code != -ENOMEM; i++)
+		if (strcmp(b->found->problems[i], b->e->text) == 0)
+			return 0; /* of an object that several refer to */
+	return report_problem(b->found, code, b->e);
+}
 
 static inline int build_out_of_memory(struct error *e)
 {

@@ -169,7 +169,8 @@ int build_read_shapes(struct builder *b)
 	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 	struct counted counted = {0};
 	for (uint32_t i = 0; i < listed && !rc; i++)
-		rc = read_listed(b, &list[i], meshes, &counted);
+		if ((rc = read_listed(b, &list[i], meshes, &counted)))
+			rc = build_go_on(b, rc);
 	if (rc)
 		return rc;
 	note_flat(b->w, &counted);

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* render_check_all: every shape, material and emitter that is wrong, each once; of a good scene what render_check says.
+ */
+#include "tests/support/memory_assets.h"
+#include "worker/render/render.h"
+#include "worker/render/world/build.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define METAL(name) "<bsdf type='conductor'><string name='material' value='" name "'/></bsdf>"
+#define SPHERE(content) "<shape type='sphere'>" content "</shape>\n"
+#define ENVIRONMENT "<emitter type='constant'/>\n"
+
+struct checked {
+	struct scene scene;
+	struct arena arena;
+	struct report found;
+	struct render_summary summary;
+};
+
+static void check(const char *xml, struct checked *c)
+{
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"a.ply", "plx", 3}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct error e;
+	*c = (struct checked){.arena = {0}};
+	if (scene_read(&c->scene, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	assert_int_equal(report_init(&c->found, &c->arena, &e), 0);
+	const struct render_options as_it_is = {0};
+	if (render_check_all(&c->scene, &assets, &as_it_is, &c->found, &c->summary, &e))
+		fail_msg("%s", e.text);
+}
+
+static void finish(struct checked *c)
+{
+	scene_fini(&c->scene);
+	arena_fini(&c->arena);
+}
+
+static void test_all_problems(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'>\n"
+				  "<bsdf type='mask' id='m'><bsdf type='dielectric'/></bsdf>\n" /* line 2 */
+		SPHERE(METAL("Cu")) SPHERE(METAL("Xy"))						/* 4 */
+		SPHERE("<ref id='m'/>")
+			SPHERE("<ref id='m'/>") "<shape type='ply'><string name='filename' value='a.ply'/>" METAL(
+				"Xz") "</shape>\n" /* 7 */
+		SPHERE("<emitter type='area'><texture name='radiance' type='bitmap'>"
+		       "<string name='filename' value='a.ply'/></texture></emitter>") /* 8 */
+		ENVIRONMENT ENVIRONMENT						      /* 10 */
+			SPHERE(METAL("Xw"))					      /* 11 */
+		"<shape type='shapegroup' id='g'><shape type='ply'><string name='filename' value='a.ply'/></shape></shape>\n"
+		"<shape type='instance'><ref id='g'/></shape><shape type='instance'><ref id='g'/></shape>" /* of 12 */
+		"</scene>";
+	static const char *const expected[] = {
+		"s.xml:7: ", "s.xml:12: ", "s.xml:4: ", "s.xml:2: ", "s.xml:11: ", "s.xml:8: ", "s.xml:10: "};
+	enum { COUNT = sizeof expected / sizeof *expected };
+	struct checked c;
+	check(xml, &c);
+	for (uint32_t i = 0; i < c.found.problem_count; i++)
+		if (i >= COUNT || strncmp(c.found.problems[i], expected[i], strlen(expected[i])) != 0)
+			fail_msg("problem %u: %s", i, c.found.problems[i]);
+	assert_int_equal(c.found.problem_count, COUNT);
+	finish(&c);
+}
+
+static void test_good_scene(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'>" SPHERE(METAL("Cu")) ENVIRONMENT "</scene>";
+	struct checked c;
+	struct render_summary alone;
+	struct error e;
+	check(xml, &c);
+	assert_int_equal(c.found.problem_count, 0);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	const struct render_options as_it_is = {0};
+	assert_int_equal(render_check(&c.scene, &assets, &as_it_is, &alone, &e), 0);
+	assert_true(c.summary.shapes == 1 && alone.shapes == 1 && c.summary.brightest == alone.brightest);
+	finish(&c);
+}
+
+/* No more than there is room for. */
+static void test_too_many(void **state)
+{
+	(void)state;
+	enum { MANY = REPORT_PROBLEMS_MAX + 50 };
+	size_t room = MANY * sizeof SPHERE(METAL("X")) + 100, n;
+	char *xml = malloc(room);
+	assert_non_null(xml);
+	n = (size_t)sprintf(xml, "<scene version='3.0.0'>\n");
+	for (int i = 0; i < MANY; i++)
+		n += (size_t)sprintf(xml + n, "%s", SPHERE(METAL("X")));
+	sprintf(xml + n, "</scene>");
+	struct checked c;
+	check(xml, &c);
+	assert_int_equal(c.found.problem_count, REPORT_PROBLEMS_MAX);
+	finish(&c);
+	free(xml);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_all_problems),
+		cmocka_unit_test(test_good_scene),
+		cmocka_unit_test(test_too_many),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
