@@ -30,15 +30,38 @@ static void find_shares(const struct blend *m, const struct bsdf_point *p, struc
 	}
 }
 
-static spectrum mix(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi,
+static spectrum mix(const struct blend *m, const struct shares *s, const struct bsdf_point *p, vec3 wo, vec3 wi,
 		    spectrum (*eval)(const struct bsdf *, const struct bsdf_point *, vec3, vec3))
 {
-	const struct blend *m = b->data;
-	struct shares s;
 	spectrum sum = spectrum_of(0);
-	find_shares(m, p, &s);
 	for (uint32_t k = 0; k < m->count; k++)
-		sum = spectrum_add(sum, spectrum_mul(s.f[k], eval(&m->part[k], p, wo, wi)));
+		sum = spectrum_add(sum, spectrum_mul(s->f[k], eval(&m->part[k], p, wo, wi)));
+	return sum;
+}
+
+static double mix_pdf(const struct blend *m, const struct shares *s, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	double sum = 0;
+	for (uint32_t k = 0; k < m->count; k++)
+		sum += s->chance[k] * m->part[k].ops->pdf_solid(&m->part[k], p, wo, wi);
+	return sum;
+}
+
+/* Specular lobes of all parts have the same direction. */
+static spectrum mix_delta(const struct blend *m, const struct shares *s, const struct bsdf_point *p, vec3 wo,
+			  unsigned mode, vec3 *wi, double *chance)
+{
+	spectrum sum = spectrum_of(0);
+	double all = 0;
+	for (uint32_t k = 0; k < m->count; k++) {
+		double one;
+		spectrum weight = bsdf_eval_delta(&m->part[k], p, wo, mode, wi, &one);
+		if (spectrum_is_zero(weight))
+			continue;
+		sum = spectrum_add(sum, spectrum_mul(s->f[k], weight));
+		all += s->chance[k] * one;
+	}
+	*chance = all;
 	return sum;
 }
 
@@ -49,44 +72,31 @@ static spectrum part_eval(const struct bsdf *b, const struct bsdf_point *p, vec3
 
 spectrum blend_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	return mix(b, p, wo, wi, part_eval);
+	struct shares s;
+	find_shares(b->data, p, &s);
+	return mix(b->data, &s, p, wo, wi, part_eval);
 }
 
 spectrum blend_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	return mix(b, p, wo, wi, bsdf_eval_halfvec);
+	struct shares s;
+	find_shares(b->data, p, &s);
+	return mix(b->data, &s, p, wo, wi, bsdf_eval_halfvec);
 }
 
 double blend_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	const struct blend *m = b->data;
 	struct shares s;
-	double sum = 0;
-	find_shares(m, p, &s);
-	for (uint32_t k = 0; k < m->count; k++)
-		sum += s.chance[k] * m->part[k].ops->pdf_solid(&m->part[k], p, wo, wi);
-	return sum;
+	find_shares(b->data, p, &s);
+	return mix_pdf(b->data, &s, p, wo, wi);
 }
 
-/* Specular lobes of all parts have the same direction. */
 spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			  double *chance)
 {
-	const struct blend *m = b->data;
 	struct shares s;
-	spectrum sum = spectrum_of(0);
-	double all = 0;
-	find_shares(m, p, &s);
-	for (uint32_t k = 0; k < m->count; k++) {
-		double one;
-		spectrum weight = bsdf_eval_delta(&m->part[k], p, wo, mode, wi, &one);
-		if (spectrum_is_zero(weight))
-			continue;
-		sum = spectrum_add(sum, spectrum_mul(s.f[k], weight));
-		all += s.chance[k] * one;
-	}
-	*chance = all;
-	return sum;
+	find_shares(b->data, p, &s);
+	return mix_delta(b->data, &s, p, wo, mode, wi, chance);
 }
 
 bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
@@ -104,11 +114,11 @@ bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, con
 	if (!m->part[k].ops->sample(&m->part[k], p, wo, next, out))
 		return false;
 	if (out->mode & BSDF_DELTA) {
-		spectrum weight = blend_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
+		spectrum weight = mix_delta(m, &s, p, wo, out->mode, &out->wi, &out->pdf);
 		out->f = spectrum_scale(1 / fabs(out->wi.z), weight);
 	} else {
-		out->pdf = blend_pdf(b, p, wo, out->wi);
-		out->f = blend_eval(b, p, wo, out->wi);
+		out->pdf = mix_pdf(m, &s, p, wo, out->wi);
+		out->f = mix(m, &s, p, wo, out->wi, part_eval);
 	}
 	return out->pdf > 0;
 }
