@@ -73,11 +73,11 @@ struct jobs {
 	struct durable_ack *acks, **acks_last; /* waiting for a flush */
 	struct durable_ack *parked;	       /* ... for a new journal to replace one that failed */
 	struct ending *endings;		       /* jobs that ended and whose records could not be written yet */
-	double endings_again;
-	struct seen seen;	   /* when this run started */
-	double folders_next;	   /* next check of jobs' folders */
-	double clear_next;	   /* next check of finished jobs */
-	struct clearing *clearing; /* that check is running */
+	double endings_again, ledger_again;    /* next attempts */
+	struct seen seen;		       /* when this run started */
+	double folders_next;		       /* next check of jobs' folders */
+	double clear_next;		       /* next check of finished jobs */
+	struct clearing *clearing;	       /* that check is running */
 	bool flushing;
 	bool stepping, stopping;
 	bool feeding;			     /* results stored ahead of their predecessors */

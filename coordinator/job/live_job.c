@@ -45,19 +45,15 @@ static void begin_record(struct live_job *job, const char *owner, double submitt
 	struct job_record *r = &job->record;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
-	r->id = job->id;
-	text_copy(r->name, sizeof r->name, m->name);
+	record_begin(r, job->id, m->name, owner);
 	text_copy(r->integrator, sizeof r->integrator, job->plan.integrator);
 	text_copy(r->mixture, sizeof r->mixture, job->plan.mutations);
 	text_copy(r->state, sizeof r->state, "queued");
 	text_copy(r->output, sizeof r->output, m->output);
 	r->priority = m->priority;
-	r->rel_error = -1;
-	record_begin_convergence(r);
 	record_take_effects(r, effects_to_json(m));
 	r->target_error = job->plan.target_error;
 	r->submitted = submitted > 0 ? submitted : (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-	text_copy(r->owner, sizeof r->owner, owner);
 }
 
 int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, const struct plan *plan,
@@ -86,8 +82,6 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
 		rc = bootstrap_new(&job->bootstrap, plan, e);
-	if (!rc && !(submitted > 0)) /* otherwise it exists; a full disk must not keep the job from being registered */
-		rc = spool_write_record(s, &job->record, e);
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, "log", path);
 	job->log = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);

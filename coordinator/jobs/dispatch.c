@@ -38,7 +38,7 @@ static void submitted(struct jobs *jobs, const struct action *a, struct submissi
 	struct error e;
 	const Farm__Submit *m = from->submit->message->submit;
 	from->job = a->job;
-	int rc = spool_take_job(jobs->spool, a->job, &e);
+	int rc = spool_make_job(jobs->spool, a->job, &e);
 	if (!rc)
 		rc = live_job_new(&job, a->job, from->submit, from->plan, from->owner, 0, jobs->spool, &e);
 	if (!rc && (rc = durable_begin(jobs, job, &e))) {
@@ -47,6 +47,7 @@ static void submitted(struct jobs *jobs, const struct action *a, struct submissi
 		live_job_free(job);
 	}
 	if (rc) {
+		spool_drop_job(jobs->spool, a->job);
 		text_copy(from->refusal, sizeof from->refusal, e.text);
 		jobs_break(jobs, a->job, e.text);
 		return;

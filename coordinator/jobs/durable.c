@@ -22,7 +22,6 @@
 #include "coordinator/job/stored.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/retention/keep.h"
-#include "coordinator/store/row_file.h"
 
 #include <assert.h>
 #include <stdlib.h>
@@ -35,7 +34,6 @@ enum { NOBODY = 0 /* peers are numbered from 1 */ };
 struct ending {
 	struct ending *next;
 	struct job_record record;
-	bool written; /* the record is written, but not the row of the ledger */
 };
 
 struct durable_ack {
@@ -87,6 +85,7 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission, *plan;
+	char *record = NULL;
 	struct ledger_job j = {.id = job->id,
 			       .owner = job->record.owner,
 			       .name = job->record.name,
@@ -97,59 +96,54 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 	spool_job_path(jobs->spool, job->id, NULL, folder);
 	int rc = durable_pack(job, &j, &submission, &plan, e);
 	if (!rc)
-		rc = journal_create(&job->journal, folder, job->id, 0, e);
+		rc = record_to_json(&job->record, &record, e);
 	if (!rc)
+		rc = journal_create(&job->journal, folder, job->id, 0, e);
+	if (!rc) {
+		j.record = record;
 		rc = ledger_add(jobs->ledger, &j, e);
-	if (!rc) { /* after the row: without one, it would mean that the row was lost */
-		j.held = "";
-		rc = row_file_write(jobs->spool, &j, e);
-		if (rc)
-			ledger_end(jobs->ledger, job->id, 0, "failed", NULL);
+		if (rc) /* in case it was written after all: nobody waits for the job */
+			ledger_forget(jobs->ledger, job->id, NULL);
 	}
-	if (rc) { /* in case the row was written after all: nobody waits for the job */
-		text_copy(job->record.state, sizeof job->record.state, "failed");
-		text_copy(job->record.why, sizeof job->record.why, e ? e->text : "");
-		job->record.exit_code = 3;
-		spool_write_record(jobs->spool, &job->record, NULL);
-	}
+	mem_free(record);
 	mem_free(submission);
 	mem_free(plan);
 	return rc;
 }
 
-/* Deletes its journal only once the record durably says that it has ended. kept: the films stay (keep.h). */
+/* Deletes its films only once the ledger durably says that it has ended. kept: they stay (keep.h). */
 static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
-	int rc = spool_write_record(jobs->spool, r, e);
+	int rc = ledger_end(jobs->ledger, r, kept, e);
 	if (rc && !r->has_result) /* its merged data is useless now, and may be what fills the disk */
 		keep_drop(jobs, r->id);
 	if (rc == -ENOSPC)
 		keep_drop_all(jobs);
 	if (rc)
-		rc = spool_write_record(jobs->spool, r, e);
+		rc = ledger_end(jobs->ledger, r, kept, e);
 	if (!rc && !kept)
 		keep_drop(jobs, r->id);
 	return rc;
 }
 
-static void end_later(struct jobs *jobs, const struct job_record *r, bool written)
+static void end_later(struct jobs *jobs, const struct job_record *r)
 {
 	struct ending *n = mem_alloc(1, sizeof *n);
 	if (!n)
 		return;
-	*n = (struct ending){jobs->endings, *r, written};
+	*n = (struct ending){jobs->endings, *r};
 	jobs->endings = n;
 	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
 }
 
-void durable_end_row(struct jobs *jobs, const struct job_record *r)
+void durable_end_again(struct jobs *jobs, const struct job_record *r)
 {
 	struct error e;
-	if (ledger_end(jobs->ledger, r->id, r->extended, r->state, &e) == 0)
+	if (ledger_end(jobs->ledger, r, true, &e) == 0)
 		return;
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id,
 		  log_quote(e.text).text);
-	end_later(jobs, r, true);
+	end_later(jobs, r);
 }
 
 int durable_end(struct jobs *jobs, struct live_job *job)
@@ -157,7 +151,7 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 	struct error e;
 	if (journal_write(job->journal, &e)) /* for an extension; what is not stored is computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	int rc = write_end(jobs, &job->record, keep_order(jobs, job), &e);
+	int rc = write_end(jobs, &job->record, keep_films(jobs, job), &e);
 	if (rc)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 	if (rc && job->record.has_result) {
@@ -165,9 +159,8 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 		return rc;
 	}
 	if (rc) {
-		end_later(jobs, &job->record, false);
+		end_later(jobs, &job->record);
 	} else {
-		durable_end_row(jobs, &job->record);
 		journal_settle(job->journal); /* the record contains more than what still waits for a flush */
 	}
 	journal_release(job->journal); /* with its last reference it frees its room, too */
@@ -182,9 +175,7 @@ static void end_again(struct jobs *jobs)
 		return;
 	jobs->endings_again = jobs_now(jobs) + jobs->config.retry_seconds;
 	for (struct ending *n; (n = jobs->endings);) {
-		const struct job_record *r = &n->record;
-		n->written = n->written || write_end(jobs, r, false, &e) == 0;
-		if (!n->written || ledger_end(jobs->ledger, r->id, r->extended, r->state, &e))
+		if (write_end(jobs, &n->record, false, &e))
 			return;
 		jobs->endings = n->next;
 		mem_free(n);
@@ -450,6 +441,16 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 	return rc;
 }
 
+static void mend_ledger(struct jobs *jobs)
+{
+	struct error e;
+	if (jobs_now(jobs) < jobs->ledger_again)
+		return;
+	jobs->ledger_again = jobs_now(jobs) + jobs->config.retry_seconds;
+	if (ledger_mend(jobs->ledger, &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+}
+
 void durable_tick(struct jobs *jobs)
 {
 	for (struct live_job *job = jobs->live; job; job = job->next)
@@ -457,6 +458,7 @@ void durable_tick(struct jobs *jobs)
 	if (jobs->parked)
 		unpark(jobs);
 	end_again(jobs);
+	mend_ledger(jobs);
 }
 
 void durable_close(struct jobs *jobs)

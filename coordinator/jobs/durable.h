@@ -18,8 +18,8 @@ int durable_pack(const struct live_job *job, struct ledger_job *j, unsigned char
 /* The job has ended: writes its record, and keeps (keep.h) or deletes its films. Not 0: its record cannot be
  * written; if it has a result, nobody may be told of it yet. Also retries the records of others. */
 int durable_end(struct jobs *jobs, struct live_job *job);
-/* A job's record says that it has ended: now the ledger does too, or as soon as it can be written. */
-void durable_end_row(struct jobs *jobs, const struct job_record *r);
+/* A job that was extended has ended again, as it was: now, or as soon as that can be written. */
+void durable_end_again(struct jobs *jobs, const struct job_record *r);
 
 /* Before the core sees a batch: prepares the frame for the journal, in `in`, and room on the disk. -ENOSPC, -EFBIG:
  * the disk is full, and the job is held until there is room. */

@@ -16,10 +16,9 @@
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/listing.h"
-#include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/restore.h"
+#include "coordinator/retention/keep.h"
 #include "coordinator/jobs/step.h"
-#include "coordinator/store/row_file.h"
 
 #include <assert.h>
 #include <math.h>
@@ -75,8 +74,6 @@ static int store(struct jobs *jobs, const struct live_job *job, struct error *e)
 	int rc = durable_pack(job, &j, &submission, &plan, e);
 	if (!rc)
 		rc = ledger_extend(jobs->ledger, &j, e);
-	if (!rc)
-		reconcile_row(jobs, job->id);
 	mem_free(submission);
 	mem_free(plan);
 	return rc;
@@ -135,15 +132,15 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 
 /* ---- finished jobs ---- */
 
-/* What is kept beside its row. */
-static int read_job(const struct jobs *jobs, uint64_t job, struct row_file *f, struct error *e)
+/* Its row, if its films are kept. */
+static int read_row(const struct jobs *jobs, uint64_t job, struct ledger_job *j, struct error *e)
 {
-	struct ledger_job j;
-	int rc = ledger_get(jobs->ledger, job, &j, e);
-	rc = rc == 0 ? -ENOENT : rc < 0 ? rc : row_file_read(jobs->spool, job, f, e);
-	if (rc == -ENOENT)
-		return error_set(e, ENOENT, "its films have been deleted: %s", again);
-	return rc ? error_prefix(e, rc, "what was kept of it") : 0;
+	int rc = ledger_get(jobs->ledger, job, j, e);
+	if (rc < 0)
+		return error_prefix(e, rc, "what was kept of it");
+	return rc && j->submission_size && keep_bytes(jobs, job)
+		       ? 0
+		       : error_set(e, ENOENT, "its films have been deleted: %s", again);
 }
 
 /* The journal's numbers are from shortly before the end: the record of the end is more accurate. */
@@ -179,7 +176,7 @@ static int begin_again(struct jobs *jobs, const struct requester *by, struct liv
 	ended_jobs_add(jobs, r);
 	struct job_record over = *r;
 	over.extended = job->record.extended;
-	durable_end_row(jobs, &over);
+	durable_end_again(jobs, &over);
 	return rc;
 }
 
@@ -268,13 +265,12 @@ static int ask_beforehand(const struct jobs *jobs, const struct requester *by, c
 static int start_reading(struct jobs *jobs, const struct extension_request *q, const struct job_record *r,
 			 struct error *e)
 {
-	struct row_file f;
-	int rc = read_job(jobs, r->id, &f, e);
+	struct ledger_job j;
+	int rc = read_row(jobs, r->id, &j, e);
 	if (rc)
 		return rc;
 	struct reading *w = mem_alloc(1, sizeof *w);
-	rc = w ? restore_live_job(jobs, &f.job, &w->job, e) : error_set(e, ENOMEM, "no memory for a job");
-	row_file_free(&f);
+	rc = w ? restore_live_job(jobs, &j, &w->job, e) : error_set(e, ENOMEM, "no memory for a job");
 	if (rc) {
 		mem_free(w);
 		return error_prefix(e, rc, "it cannot continue: %s", again);

@@ -4,7 +4,6 @@
 #include "common/base/disk.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/late_feed.h"
-#include "coordinator/jobs/reconcile.h"
 
 #include <errno.h>
 #include <string.h>
@@ -17,9 +16,7 @@ static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
 	spool_path(jobs->spool, "jobs", path);
 	int rc = disk_make_folder(path, e);
 	if (!rc)
-		rc = spool_take_job(jobs->spool, job->id, e);
-	if (!rc)
-		rc = spool_write_record(jobs->spool, &job->record, e);
+		rc = spool_make_job(jobs->spool, job->id, e);
 	if (rc)
 		return rc;
 	spool_job_path(jobs->spool, job->id, "log", path);
@@ -28,7 +25,6 @@ static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	disk_close(job->log);
 	job->log = fd;
-	reconcile_row(jobs, job->id);
 	return 0;
 }
 

@@ -55,7 +55,7 @@ bool jobs_view(struct jobs *jobs, uint64_t id, struct job_view *v)
 			view_of_record(v, &jobs->ended[i]);
 			return true;
 		}
-	if (spool_read_record(jobs->spool, id, &r, NULL))
+	if (ledger_read_record(jobs->ledger, id, &r, NULL))
 		return false;
 	view_of_record(v, &r);
 	return true;

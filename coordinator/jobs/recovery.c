@@ -126,8 +126,7 @@ static void write_end(struct jobs *jobs, struct job_record *r, const char *why)
 	r->ended = (double)now.tv_sec;
 	r->ended_seen = ages_now(jobs);
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
-	if (spool_take_job(jobs->spool, r->id, &e) || spool_write_record(jobs->spool, r, &e) ||
-	    ledger_end(jobs->ledger, r->id, r->extended, r->state, &e))
+	if (ledger_end(jobs->ledger, r, false, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	ended_jobs_add(jobs, r);
 }
@@ -142,7 +141,7 @@ static int give_up(struct jobs *jobs, uint64_t id, uint64_t extended, int rc, st
 	struct job_record *r = mem_alloc(1, sizeof *r);
 	rc = r ? restore_record(jobs, id, r, &there, e) : error_set(e, ENOMEM, "no memory for the jobs");
 	if (!rc && !there)
-		*r = (struct job_record){.id = id, .rel_error = -1};
+		record_begin(r, id, "", "");
 	if (!rc) {
 		r->extended = extended;
 		write_end(jobs, r, why.text);
@@ -303,22 +302,19 @@ static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error
 int recovery_begin(struct jobs *jobs, struct error *e)
 {
 	struct ledger_job j;
-	uint64_t id = 0;
-	int rc;
 	struct recovery *r = jobs->recovery = mem_alloc(1, sizeof *r);
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	r->jobs = jobs;
 	r->work.data = r;
 	r->last = &jobs->found;
-	while ((rc = ledger_next(jobs->ledger, id, &j, e)) > 0) {
-		id = j.id;
-		rc = add_found(jobs, &j, e);
+	for (size_t i = 0; i < jobs->restored_count; i++) {
+		int rc = ledger_get(jobs->ledger, jobs->restored[i], &j, e);
+		if (rc > 0)
+			rc = add_found(jobs, &j, e);
 		if (rc)
 			return rc;
 	}
-	if (rc)
-		return rc;
 	r->at = jobs->found;
 	return read_next(jobs, e);
 }

@@ -15,7 +15,6 @@
 #include "common/base/text.h"
 #include "common/base/version.h"
 #include "coordinator/job/stored_frame.h"
-#include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 
@@ -120,7 +119,7 @@ static int hold_blobs(struct jobs *jobs, const Farm__Submit *m, struct error *e)
 
 int restore_record(const struct jobs *jobs, uint64_t id, struct job_record *r, bool *there, struct error *e)
 {
-	int rc = spool_read_record(jobs->spool, id, r, e);
+	int rc = ledger_read_record(jobs->ledger, id, r, e);
 	*there = rc == 0;
 	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
 }
@@ -195,30 +194,7 @@ int restore_live_job(struct jobs *jobs, const struct ledger_job *j, struct live_
 
 int restore_open(struct jobs *jobs, struct error *e)
 {
-	struct ledger_job j;
-	struct job_record *r = mem_alloc(1, sizeof *r);
-	int rc = r ? reconcile(jobs, e) : error_set(e, ENOMEM, "no memory for the jobs");
-	uint64_t id = 0;
-	while (!rc && (rc = ledger_next(jobs->ledger, id, &j, e)) > 0) {
-		id = j.id;
-		bool there;
-		rc = restore_record(jobs, id, r, &there, e);
-		if (rc)
-			break;
-		/* Its record was written before its end was in the ledger. */
-		if (there && record_is_ended(r) && r->extended == j.extended) {
-			rc = ledger_end(jobs->ledger, id, r->extended, r->state, e);
-			continue;
-		}
-		uint64_t *more = mem_grow(jobs->restored, jobs->restored_count * sizeof *more,
-					  (jobs->restored_count + 1) * sizeof *more);
-		if (!more)
-			rc = error_set(e, ENOMEM, "no memory for the jobs");
-		else
-			(jobs->restored = more)[jobs->restored_count++] = id;
-	}
-	mem_free(r);
-	return rc;
+	return ledger_ids(jobs->ledger, LEDGER_LIVE, &jobs->restored, &jobs->restored_count, e);
 }
 
 bool restore_lives(const struct jobs *jobs, uint64_t job)

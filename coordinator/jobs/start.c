@@ -16,6 +16,7 @@
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/folder.h"
 #include "coordinator/jobs/follow_up.h"
+#include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/jobs/retry.h"
@@ -32,6 +33,8 @@ int jobs_open(struct jobs *jobs, struct error *e)
 	if (!rc)
 		rc = blob_store_open(&jobs->blobs, spool_blobs(jobs->spool), jobs->config.blob_bytes, e);
 	if (!rc)
+		rc = reconcile(jobs, e);
+	if (!rc)
 		ages_open(jobs);
 	if (!rc)
 		rc = restore_open(jobs, e);
@@ -43,7 +46,7 @@ int jobs_open(struct jobs *jobs, struct error *e)
 		return error_set(e, errno, "%s: %s", jobs->config.keep_partials, strerror(errno));
 	farm_config_init(&config);
 	config.max_peers = jobs->config.max_connections;
-	config.first_job = spool_next_job(jobs->spool);
+	config.first_job = ledger_next_id(jobs->ledger);
 	config.silent_after = 3 * jobs->config.heartbeat_seconds;
 	config.max_faults = jobs->config.max_faults;
 	config.first_pause = 2 * jobs->config.heartbeat_seconds;
@@ -101,10 +104,10 @@ void jobs_close(struct jobs *jobs)
 		mem_free(jobs->deferred);
 		jobs->deferred = next;
 	}
-	durable_close(jobs);
-	clear_close(jobs);
 	if (jobs->seen.up > 0)
 		ages_keep(jobs);
+	durable_close(jobs);
+	clear_close(jobs);
 	if (jobs->farm)
 		farm_free(jobs->farm);
 	blob_store_close(jobs->blobs);

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char file[] = "aside";
+static const char note[] = "quarantined"; /* in the ledger */
 
-/* ---- the file of quarantined workers */
+/* ---- the list of quarantined workers */
 
 static int add_worker(json_t *list, const struct worker_status *w, struct error *e)
 {
@@ -37,7 +37,7 @@ static void write_quarantined(struct jobs *jobs)
 	if (!rc && !text)
 		rc = error_set(&e, ENOMEM, "no memory for the list of quarantined workers");
 	if (!rc)
-		rc = spool_write_own(jobs->spool, file, text, strlen(text), &e);
+		rc = ledger_set(jobs->ledger, note, text, &e);
 	if (rc)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	free(text);
@@ -67,33 +67,26 @@ static void tell_core(struct jobs *jobs, const json_t *w)
 }
 
 /* The farm does not stop for it: a worker that gives wrong results will do so again, and be found again. */
-static int put_by(struct jobs *jobs, struct error *e)
+static int put_by(struct jobs *jobs, const char *text, struct error *e)
 {
-	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
-	spool_path(jobs->spool, file, from);
-	spool_path(jobs->spool, "aside.damaged", to);
-	spool_path(jobs->spool, "", folder);
-	log_event(
-		LOG_SPOOL_FAULT,
-		"text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is quarantined\"",
-		file, file);
-	return spool_rename(from, to, folder, e);
+	log_event(LOG_SPOOL_FAULT,
+		  "text=\"the note %s in jobs.db is no list of workers: it is kept as %s-damaged, and nobody in it is "
+		  "quarantined\"",
+		  note, note);
+	int rc = ledger_set(jobs->ledger, "quarantined-damaged", text, e);
+	return rc ? rc : ledger_set(jobs->ledger, note, "{\"schema\": 1, \"workers\": []}", e);
 }
 
 int trust_open(struct jobs *jobs, struct error *e)
 {
 	char *text;
-	size_t size;
-	json_error_t fault;
-	int rc = spool_read_own(jobs->spool, file, &text, &size, e);
-	if (rc == -EFBIG)
-		return put_by(jobs, e);
+	int rc = ledger_note(jobs->ledger, note, &text, e);
 	if (rc)
 		return rc == -ENOENT ? 0 : rc;
-	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
+	json_t *o = json_loads(text, JSON_REJECT_DUPLICATES, NULL);
 	const json_t *list = json_object_get(o, "workers");
 	if (!json_is_array(list))
-		rc = put_by(jobs, e);
+		rc = put_by(jobs, text, e);
 	for (size_t i = 0; i < json_array_size(list); i++)
 		tell_core(jobs, json_array_get(list, i));
 	json_decref(o);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Records workers that gave wrong results. Quarantined ones are listed in the spool's file `aside`, so they stay
+ * Records workers that gave wrong results. Quarantined ones are listed in a note of the ledger, so they stay
  * quarantined after a restart; an operator readmits one with --forgive. A job's log and note say how many unverified
  * results of such a worker are in its image, where they cannot be taken out. Who made which result is known until the
  * coordinator ends. The loop's thread.
@@ -10,8 +10,8 @@
 
 #include "coordinator/job/jobs.h"
 
-/* Tells the core who is quarantined, except for workers that the configuration forgives. A damaged file is kept as
- * aside.damaged, and the log says so. */
+/* Tells the core who is quarantined, except for workers that the configuration forgives. A damaged list is kept as
+ * quarantined-damaged, and the log says so. */
 int trust_open(struct jobs *jobs, struct error *e);
 
 /* Share of the job's leases to verify: what it requests, but at least the minimum for all jobs; none of a mixed job. */

@@ -3,7 +3,6 @@
 
 #include "common/base/text.h"
 #include "coordinator/jobs/extend.h"
-#include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/client_answers.h"
@@ -41,7 +40,6 @@ static void hold(struct session *p, uint64_t id, const char *who)
 		not_for_long(p, &e);
 		return;
 	}
-	reconcile_row(jobs, id);
 	struct live_job *job = jobs_find(jobs, id);
 	if (job)
 		live_job_log(job, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released",
@@ -59,7 +57,6 @@ static void set_priority(struct session *p, uint64_t id, int priority)
 		not_for_long(p, &e);
 		return;
 	}
-	reconcile_row(jobs, id);
 	struct live_job *job = jobs_find(jobs, id);
 	if (job)
 		live_job_log(job, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);

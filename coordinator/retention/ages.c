@@ -8,7 +8,7 @@
 #include <string.h>
 #include <time.h>
 
-static const char file[] = "clock";
+static const char note[] = "clock"; /* in the ledger */
 
 static double seconds_of(clockid_t id)
 {
@@ -34,13 +34,12 @@ void ages_open(struct jobs *jobs)
 	struct seen last;
 	struct error e = {""};
 	char *text;
-	size_t size;
-	int rc = spool_read_own(jobs->spool, file, &text, &size, &e);
+	int rc = ledger_note(jobs->ledger, note, &text, &e);
 	if (!rc) {
-		if ((rc = seen_from_text(text, size, &last)))
+		if ((rc = seen_from_text(text, strlen(text), &last)))
 			error_set(&e, EBADMSG,
-				  "the file %s of the spool is damaged: finished jobs count as if they had just ended",
-				  file);
+				  "the note %s in jobs.db is damaged: finished jobs count as if they had just ended",
+				  note);
 		mem_free(text);
 	}
 	if (rc && rc != -ENOENT)
@@ -62,6 +61,7 @@ void ages_keep(const struct jobs *jobs)
 	struct error e;
 	struct seen now = clocks();
 	now.seconds = ages_now(jobs);
-	if (spool_write_own(jobs->spool, file, text, seen_to_text(&now, text), &e))
+	seen_to_text(&now, text);
+	if (ledger_set(jobs->ledger, note, text, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 }

@@ -2,13 +2,13 @@
 /*
  * Clears finished jobs, by age and by space.
  *
- * A round starts every hour, and soon after a job has ended: it lists the jobs of the spool, reads the record of each,
- * lets age.h choose, and clears those one by one. The work is divided into steps of one job; clear_tick does as many as
- * fit into 5 ms. A job is cleared in the order record, files, row, so that a client that asks for its result meanwhile
- * is told when it was deleted.
+ * A round starts every hour, and soon after a job has ended: it reads the records of all ended jobs, lets age.h choose,
+ * and clears those one by one. The work is divided into steps of one job; clear_tick does as many as fit into 5 ms. A
+ * job is cleared in the order record, files, row, so that a client that asks for its result meanwhile is told when it
+ * was deleted.
  *
  * A job that runs again, or whose result a client fetches, is skipped. If a record cannot be written, the job waits for
- * the next round; if memory runs out or the folder of jobs cannot be read, the round ends and the next one tries again.
+ * the next round; if memory runs out or the ledger cannot be read, the round ends and the next one tries again.
  */
 #include "coordinator/retention/clear.h"
 
@@ -57,20 +57,13 @@ static uint64_t result_bytes(const struct jobs *jobs, uint64_t job)
 
 static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint64_t id)
 {
-	if (is_needed(jobs, id))
-		return;
-	int rc = spool_read_record(jobs->spool, id, &c->record, NULL);
-	if (rc == -ENOENT) { /* only if it is empty */
-		char path[SPOOL_PATH_MAX];
-		spool_job_path(jobs->spool, id, NULL, path);
-		disk_rmdir(path);
-	}
-	if (rc || !record_is_ended(&c->record))
+	if (is_needed(jobs, id) || ledger_read_record(jobs->ledger, id, &c->record, NULL) ||
+	    !record_is_ended(&c->record))
 		return;
 	double now = ages_now(jobs);
 	if (c->record.ended_seen < 0 || c->record.ended_seen > now) { /* its age is unknown: it counts from now */
 		c->record.ended_seen = now;
-		if (spool_write_record(jobs->spool, &c->record, NULL))
+		if (ledger_write_record(jobs->ledger, &c->record, NULL))
 			return;
 	}
 	c->jobs[c->job_count++] = (struct age_job){.id = id,
@@ -95,8 +88,8 @@ static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_r
 	if (r->has_result) {
 		r->has_result = false;
 		r->cleared = now;
-		if (spool_write_record(jobs->spool, r,
-				       &e)) { /* the result is kept until its record can say that it is deleted */
+		if (ledger_write_record(jobs->ledger, r,
+					&e)) { /* the result is kept until its record can say that it is deleted */
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)j->id,
 				  log_quote(e.text).text);
 			return;
@@ -131,7 +124,7 @@ static void clear_job(struct jobs *jobs, struct clearing *c, const struct age_jo
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
 		return;
 	if (is_needed(jobs, j->id) || jobs->peers.uses_result(jobs->peers.user, j->id) ||
-	    spool_read_record(jobs->spool, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
+	    ledger_read_record(jobs->ledger, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
 		return;
 	if (j->no_films && j->films) {
 		keep_drop(jobs, j->id);
@@ -171,7 +164,7 @@ static bool step(struct jobs *jobs, struct clearing *c)
 }
 
 /* All at once, because each change of the database is flushed. */
-static void drop_rows(struct jobs *jobs, const struct clearing *c)
+static void drop_rows(struct jobs *jobs, struct clearing *c)
 {
 	struct error e;
 	if (c->records && ledger_drop(jobs->ledger, c->ids, c->records, &e))
@@ -195,7 +188,7 @@ static bool begin_round(struct jobs *jobs)
 	struct clearing *c = jobs->clearing = mem_alloc(1, sizeof *c);
 	if (!c)
 		return false;
-	if (spool_jobs(jobs->spool, &c->ids, &c->id_count, &e))
+	if (ledger_ids(jobs->ledger, LEDGER_ENDED, &c->ids, &c->id_count, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	c->jobs = c->id_count ? mem_alloc(c->id_count, sizeof *c->jobs) : NULL;
 	if (!c->jobs)

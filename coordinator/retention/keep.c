@@ -6,28 +6,24 @@
 
 #include <string.h>
 
-bool keep_order(struct jobs *jobs, const struct live_job *job)
+bool keep_films(const struct jobs *jobs, const struct live_job *job)
 {
-	char path[SPOOL_PATH_MAX];
-	struct stat st;
-	if (!jobs->config.keep_bytes || !job->canvas || job->lit.black || canvas_rounds(job->canvas) == 0 ||
-	    (strcmp(job->record.state, job_state_name(JOB_DONE)) != 0 && !job->overflowed))
-		return false;
-	spool_job_path(jobs->spool, job->id, "order", path);
-	return disk_stat(path, &st) == 0;
+	return jobs->config.keep_bytes && job->canvas && !job->lit.black && canvas_rounds(job->canvas) > 0 &&
+	       (strcmp(job->record.state, job_state_name(JOB_DONE)) == 0 || job->overflowed);
 }
 
 void keep_drop(const struct jobs *jobs, uint64_t job)
 {
 	char path[SPOOL_PATH_MAX];
+	struct error e;
 	if (jobs_is_read(jobs, job))
 		return;
 	spool_job_path(jobs->spool, job, NULL, path);
 	journal_clear(path, UINT64_MAX);
 	spool_job_path(jobs->spool, job, "checkpoint", path);
 	disk_unlink(path);
-	spool_job_path(jobs->spool, job, "order", path);
-	disk_unlink(path);
+	if (ledger_drop_submission(jobs->ledger, job, &e))
+		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
 uint64_t keep_bytes(const struct jobs *jobs, uint64_t job)
@@ -38,8 +34,7 @@ uint64_t keep_bytes(const struct jobs *jobs, uint64_t job)
 	spool_job_path(jobs->spool, job, NULL, folder);
 	DIR *d = disk_opendir(folder);
 	for (struct dirent *f; d && (f = readdir(d));) {
-		if (strcmp(f->d_name, "order") != 0 && strcmp(f->d_name, "checkpoint") != 0 &&
-		    strncmp(f->d_name, "journal.", 8) != 0)
+		if (strcmp(f->d_name, "checkpoint") != 0 && strncmp(f->d_name, "journal.", 8) != 0)
 			continue;
 		spool_job_path(jobs->spool, job, f->d_name, path);
 		sum += disk_stat(path, &st) == 0 ? (uint64_t)st.st_size : 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is kept of a finished job for extensions (extend.h): its last checkpoint and the journal after it, and
- * jobs/jN/order (store/row_file.h). If all films together exceed the limit, those of the jobs that ended first are
+ * What is kept of a finished job for extensions (extend.h): its films (the last checkpoint and the journal after it),
+ * and its submission in the ledger. If all films together exceed the limit, those of the jobs that ended first are
  * deleted; if a running job has no room, all are. Results stay. The loop's thread.
  */
 #ifndef COORDINATOR_RETENTION_KEEP_H
@@ -10,7 +10,7 @@
 #include "coordinator/job/jobs.h"
 
 /* For a job that has just ended. false: it cannot be extended, and nothing need be kept. */
-bool keep_order(struct jobs *jobs, const struct live_job *job);
+bool keep_films(const struct jobs *jobs, const struct live_job *job);
 void keep_drop(const struct jobs *jobs, uint64_t job);
 uint64_t keep_bytes(const struct jobs *jobs, uint64_t job); /* on the disk */
 bool keep_drop_all(const struct jobs *jobs); /* deletes the films of listed jobs; true: there were some */

@@ -1,368 +1,361 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The jobs in an SQLite database: one row each, with a checksum over its columns.
+ * jobs.db and jobs-copy.db, the latter attached to the connection of the former as schema `copy`.
  *
- * ledger_open upgrades an older scheme and checks all rows. A change reads its row first, so that a damaged one is
- * noticed instead of getting a new checksum, and commits before it returns (WAL, synchronous FULL). ledger_next
- * iterates over the jobs that have not ended, ledger_after over all.
+ * ledger_open prepares each file alone (ledger_file.h), then compares their rows: of two undamaged ones the one with
+ * the higher revision counts, and replaces the other. A change reads the row of jobs.db first, so that a damaged one is
+ * noticed instead of getting a new checksum, writes it there with the next revision, and then writes the copy. Once
+ * both are open, no transaction writes both files, because SQLite does not commit two WALs at once.
  *
- * A damaged row is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that is no database -EBADMSG,
- * any other fault of SQLite -EIO or -ENOMEM. A newer scheme is -EPROTO.
+ * A row that is damaged in both files is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that is
+ * no database -EBADMSG, any other fault of SQLite -EIO or -ENOMEM. If the copy cannot be written, the call succeeds,
+ * `behind` is set, and nothing is written to it before ledger_mend has compared the files again.
  */
 #include "coordinator/store/ledger.h"
 
-#include "common/base/crc.h"
+#include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/store/ids.h"
+#include "coordinator/store/ledger_file.h"
+#include "coordinator/store/ledger_side.h"
 
-#include <sqlite3.h>
-#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
+enum { PATH_MOST = 4200, SQL_MOST = 400, SIDES = 2 };
+
+static const char *const names[SIDES] = {"jobs.db", "jobs-copy.db"}, *const schemas[SIDES] = {"main", "copy"};
+static const char next_job[] = "next-job";
+
 struct ledger {
 	sqlite3 *db;
-	sqlite3_stmt *add, *change, *drop, *remove, *next, *get, *all;
+	struct ledger_side jobs, copy;
+	uint64_t next; /* id */
+	bool behind;   /* the copy lacks changes */
 };
 
-/* The n-th upgrades a database of version n to n + 1; never changed, only added to. */
-static const char *const migrations[] = {
-	"CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
-	" priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL, ended REAL,"
-	" submission BLOB, plan BLOB) STRICT;"
-	"CREATE INDEX living ON jobs (id) WHERE ended IS NULL;",
-	"ALTER TABLE jobs ADD COLUMN held TEXT NOT NULL DEFAULT '';",
-	"ALTER TABLE jobs ADD COLUMN extended INTEGER NOT NULL DEFAULT 0;",
-	"ALTER TABLE jobs ADD COLUMN revision INTEGER NOT NULL DEFAULT 0; ALTER TABLE jobs ADD COLUMN checksum INTEGER;",
-};
-enum { VERSION = sizeof migrations / sizeof *migrations };
+/* ---- the copy ---- */
 
-#define COLUMNS \
-	"id, owner, name, version, priority, mixed, submitted, submission, plan, held, extended, state, ended, revision, checksum"
-
-static int fault(const struct ledger *l, struct error *e)
+static void fall_behind(struct ledger *l, const struct error *e)
 {
-	int code = sqlite3_errcode(l->db);
-	int as = code == SQLITE_FULL				   ? ENOSPC
-		 : code == SQLITE_NOMEM				   ? ENOMEM
-		 : code == SQLITE_NOTADB || code == SQLITE_CORRUPT ? EBADMSG
-								   : EIO;
-	return error_set(e, as, "the database of jobs: %s", sqlite3_errmsg(l->db));
+	l->behind = true;
+	log_event(LOG_SPOOL_FAULT, "file=%s text=%s action=\"it is tried again\"", names[1], log_quote(e->text).text);
 }
 
-static int run_statements(struct ledger *l, const char *sql, struct error *e)
+static void log_repair(const struct ledger_job *j, const char *what)
 {
-	return sqlite3_exec(l->db, sql, NULL, NULL, NULL) == SQLITE_OK ? 0 : fault(l, e);
+	log_event(LOG_SPOOL_FAULT, "job=j%llu text=\"its row in %s\"", (unsigned long long)j->id, what);
 }
 
-static int prepare(struct ledger *l, sqlite3_stmt **s, const char *sql, struct error *e)
+static int put(struct ledger_side *s, const struct ledger_job *j, struct error *e)
 {
-	return sqlite3_prepare_v3(l->db, sql, -1, SQLITE_PREPARE_PERSISTENT, s, NULL) == SQLITE_OK ? 0 : fault(l, e);
+	ledger_side_bind(s, j);
+	return ledger_side_put(s, e);
 }
 
-static int version_of(struct ledger *l, int *version, struct error *e)
+/* a, b: the row in jobs.db and in the copy; at most one of them is NULL. */
+static int merge_row(struct ledger *l, const struct ledger_job *a, const struct ledger_job *b, struct error *e)
 {
-	sqlite3_stmt *s = NULL;
-	int rc = prepare(l, &s, "PRAGMA user_version", e);
-	if (!rc && sqlite3_step(s) != SQLITE_ROW)
-		rc = fault(l, e);
-	*version = rc ? 0 : sqlite3_column_int(s, 0);
-	sqlite3_finalize(s);
-	return rc;
-}
-
-static int migrate(struct ledger *l, struct error *e)
-{
-	int version;
-	int rc = version_of(l, &version, e);
-	if (!rc && version > VERSION)
-		return error_set(
-			e, EPROTO,
-			"the database of jobs has version %d, and this coordinator knows version %d: a later one wrote it",
-			version, (int)VERSION);
-	if (!rc && version < 0)
-		return error_set(e, EBADMSG, "the database of jobs is damaged: no coordinator writes a version %d",
-				 version);
-	for (; !rc && version < VERSION; version++) {
-		char done[64];
-		snprintf(done, sizeof done, "PRAGMA user_version = %d; COMMIT", version + 1);
-		rc = run_statements(l, "BEGIN IMMEDIATE", e);
-		if (!rc)
-			rc = run_statements(l, migrations[version], e);
-		if (!rc)
-			rc = run_statements(l, done, e);
+	bool use_a = a && !a->damaged, use_b = b && !b->damaged;
+	if (use_b && (!use_a || b->revision > a->revision)) {
+		log_repair(b, !a      ? "jobs.db was lost: restored from jobs-copy.db"
+			      : use_a ? "jobs.db was older than in jobs-copy.db: restored from there"
+				      : "jobs.db was damaged: restored from jobs-copy.db");
+		return put(&l->jobs, b, e);
 	}
+	if (!use_a || (use_b && a->revision == b->revision))
+		return 0;
+	if (b && !use_b)
+		log_repair(a, "jobs-copy.db was damaged: restored from jobs.db");
+	return put(&l->copy, a, e);
+}
+
+static int merge_rows(struct ledger *l, struct error *e)
+{
+	int rc = 0;
+	for (uint64_t id = 0; !rc;) {
+		struct ledger_job a, b;
+		int has_a = ledger_side_after(&l->jobs, id, &a, e);
+		int has_b = has_a < 0 ? 0 : ledger_side_after(&l->copy, id, &b, e);
+		if (has_a <= 0 && has_b <= 0) {
+			rc = has_a ? has_a : has_b;
+			break;
+		}
+		if (has_a < 0 || has_b < 0)
+			return has_a < 0 ? has_a : has_b;
+		id = !has_b || (has_a && a.id < b.id) ? a.id : b.id;
+		rc = merge_row(l, has_a && a.id == id ? &a : NULL, has_b && b.id == id ? &b : NULL, e);
+	}
+	ledger_side_release(&l->jobs);
+	ledger_side_release(&l->copy);
 	return rc;
 }
 
-/* ---- rows ---- */
-
-static uint32_t check_text(uint32_t crc, const char *text)
+static int merge_notes(struct ledger *l, const char *from, const char *to, struct error *e)
 {
-	return crc32c(crc, text, strlen(text) + 1);
+	char sql[SQL_MOST];
+	text_print(sql, sizeof sql,
+		   "INSERT OR REPLACE INTO %s.notes SELECT * FROM %s.notes AS n WHERE NOT EXISTS"
+		   " (SELECT 1 FROM %s.notes AS o WHERE o.name = n.name AND o.revision >= n.revision)",
+		   to, from, to);
+	return ledger_file_run(l->db, sql, e);
 }
 
-/* The checksum of everything in a row. */
-static uint32_t check(const struct ledger_job *j)
+/* In one transaction. At the start both files may be written, later only the copy, which is behind. */
+static int merge(struct ledger *l, struct error *e)
 {
-	const struct {
-		uint64_t id, extended, revision, submission_size, plan_size;
-		double submitted, ended;
-		int32_t priority, mixed;
-	} numbers = {j->id,    j->extended, j->revision, j->submission_size, j->plan_size, j->submitted,
-		     j->ended, j->priority, j->mixed};
-	uint32_t crc = crc32c(0, &numbers, sizeof numbers);
-	crc = check_text(crc, j->owner);
-	crc = check_text(crc, j->name);
-	crc = check_text(crc, j->version);
-	crc = check_text(crc, j->held);
-	crc = check_text(crc, j->state);
-	crc = crc32c(crc, j->submission, j->submission_size);
-	return crc32c(crc, j->plan, j->plan_size);
-}
-
-static const char *text_at(sqlite3_stmt *s, int column)
-{
-	const void *text = sqlite3_column_text(s, column);
-	return text ? text : "";
-}
-
-static int row(struct ledger *l, sqlite3_stmt *s, uint64_t id, struct ledger_job *j, struct error *e)
-{
-	sqlite3_reset(s); /* here, so that the previous answer was valid until now */
-	sqlite3_bind_int64(s, 1, (sqlite3_int64)id);
-	int rc = sqlite3_step(s);
-	if (rc != SQLITE_ROW) {
-		rc = rc == SQLITE_DONE ? 0 : fault(l, e);
-		sqlite3_reset(s);
+	ledger_side_release(&l->jobs);
+	int rc = ledger_file_run(l->db, "BEGIN", e);
+	if (rc)
 		return rc;
-	}
-	*j = (struct ledger_job){.id = (uint64_t)sqlite3_column_int64(s, 0),
-				 .owner = text_at(s, 1),
-				 .name = text_at(s, 2),
-				 .version = text_at(s, 3),
-				 .priority = sqlite3_column_int(s, 4),
-				 .mixed = sqlite3_column_int(s, 5),
-				 .submitted = sqlite3_column_double(s, 6),
-				 .held = text_at(s, 9),
-				 .extended = (uint64_t)sqlite3_column_int64(s, 10),
-				 .state = text_at(s, 11),
-				 .ended = sqlite3_column_double(s, 12),
-				 .revision = (uint64_t)sqlite3_column_int64(s, 13)};
-	j->submission = sqlite3_column_blob(s, 7);
-	j->submission_size = (size_t)sqlite3_column_bytes(s, 7);
-	j->plan = sqlite3_column_blob(s, 8);
-	j->plan_size = (size_t)sqlite3_column_bytes(s, 8);
-	j->damaged = (uint64_t)sqlite3_column_int64(s, 14) != check(j);
-	return 1;
-}
-
-/* Runs a statement that returns no rows. */
-static int finish(struct ledger *l, sqlite3_stmt *s, struct error *e)
-{
-	int rc = sqlite3_step(s) == SQLITE_DONE ? 0 : fault(l, e);
-	sqlite3_reset(s);
-	sqlite3_clear_bindings(s);
+	rc = merge_rows(l, e);
+	if (!rc)
+		rc = merge_notes(l, schemas[0], schemas[1], e);
+	if (!rc && !l->behind)
+		rc = merge_notes(l, schemas[1], schemas[0], e);
+	if (!rc)
+		rc = ledger_file_run(l->db, "COMMIT", e);
+	if (rc)
+		ledger_file_run(l->db, "ROLLBACK", NULL);
 	return rc;
 }
 
-/* Copies everything in a row, which may be one that was read. */
-static void bind(sqlite3_stmt *s, const struct ledger_job *j)
+int ledger_mend(struct ledger *l, struct error *e)
 {
-	sqlite3_bind_int64(s, 1, (sqlite3_int64)j->id);
-	sqlite3_bind_text(s, 2, j->owner, -1, SQLITE_TRANSIENT);
-	sqlite3_bind_text(s, 3, j->name, -1, SQLITE_TRANSIENT);
-	sqlite3_bind_text(s, 4, j->version, -1, SQLITE_TRANSIENT);
-	sqlite3_bind_int(s, 5, j->priority);
-	sqlite3_bind_int(s, 6, j->mixed);
-	sqlite3_bind_double(s, 7, j->submitted);
-	if (j->submission_size)
-		sqlite3_bind_blob64(s, 8, j->submission, j->submission_size, SQLITE_TRANSIENT);
-	if (j->plan_size)
-		sqlite3_bind_blob64(s, 9, j->plan, j->plan_size, SQLITE_TRANSIENT);
-	sqlite3_bind_text(s, 10, j->held, -1, SQLITE_TRANSIENT);
-	sqlite3_bind_int64(s, 11, (sqlite3_int64)j->extended);
-	sqlite3_bind_text(s, 12, j->state, -1, SQLITE_TRANSIENT);
-	if (j->ended > 0)
-		sqlite3_bind_double(s, 13, j->ended);
-	sqlite3_bind_int64(s, 14, (sqlite3_int64)j->revision);
-	sqlite3_bind_int64(s, 15, check(j));
-}
-
-/* 0: there is none. */
-static int get_whole(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
-{
-	int rc = row(l, l->get, id, j, e);
-	return rc > 0 && j->damaged ? error_set(e, EBADMSG, "the database of jobs: the row of j%llu is damaged",
-						(unsigned long long)id)
-				    : rc;
-}
-
-static int change(struct ledger *l, struct ledger_job *j, struct error *e)
-{
-	j->revision++;
-	bind(l->change, j);
-	sqlite3_reset(l->get);
-	return finish(l, l->change, e);
+	int rc = l->behind ? merge(l, e) : 0;
+	l->behind = rc != 0;
+	return rc;
 }
 
 /* ---- opening ---- */
 
-static int look_through(struct ledger *l, struct error *e)
+/* A file that is damaged is made anew; its contents come from the other one. */
+static int prepare_file(const char *path, int side, struct error *e)
 {
-	sqlite3_stmt *s = NULL;
-	int rc = prepare(l, &s, "PRAGMA integrity_check(1)", e);
-	if (!rc && sqlite3_step(s) != SQLITE_ROW)
-		rc = fault(l, e);
-	if (!rc && strcmp(text_at(s, 0), "ok") != 0)
-		rc = error_set(e, EBADMSG, "the database of jobs is damaged: %s", text_at(s, 0));
-	sqlite3_finalize(s);
-	return rc;
+	int rc = ledger_file_prepare(path, e);
+	if (rc != -EBADMSG)
+		return rc;
+	log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is kept as %s.damaged, and restored from %s\"",
+		  log_quote(e->text).text, names[side], names[!side]);
+	rc = ledger_file_put_aside(path, e);
+	return rc ? rc : ledger_file_prepare(path, e);
 }
 
-/* Rows of versions without checksums are trusted, once. */
-static int make_checksums(struct ledger *l, struct error *e)
+static int open_both(struct ledger *l, const char *folder, struct error *e)
 {
-	sqlite3_stmt *s = NULL;
-	struct ledger_job j;
-	int rc =
-		prepare(l, &s, "SELECT " COLUMNS " FROM jobs WHERE id > ? AND checksum IS NULL ORDER BY id LIMIT 1", e);
-	uint64_t id = 0;
-	while (!rc && (rc = row(l, s, id, &j, e)) > 0) {
-		id = j.id;
-		rc = change(l, &j, e);
+	char path[SIDES][PATH_MOST];
+	int rc = 0;
+	for (int s = 0; !rc && s < SIDES; s++) {
+		text_print(path[s], PATH_MOST, "%s/%s", folder, names[s]);
+		rc = prepare_file(path[s], s, e);
 	}
-	sqlite3_finalize(s);
+	if (!rc)
+		rc = ledger_file_open(path[0], &l->db, e);
+	if (!rc)
+		rc = ledger_file_attach(l->db, path[1], schemas[1], e);
+	if (!rc)
+		rc = ledger_side_open(&l->jobs, l->db, schemas[0], e);
+	return rc ? rc : ledger_side_open(&l->copy, l->db, schemas[1], e);
+}
+
+/* false: it was skipped already. */
+static bool skip(struct ledger *l, uint64_t id)
+{
+	if (id < l->next || id >= UINT64_MAX / 2)
+		return false;
+	l->next = id + 1;
+	return true;
+}
+
+/* The next id, from the note and the rows. */
+static int find_next(struct ledger *l, struct error *e)
+{
+	char *text;
+	uint64_t *ids;
+	size_t count;
+	l->next = 1;
+	int rc = ledger_note(l, next_job, &text, e);
+	if (!rc) {
+		skip(l, strtoull(text, NULL, 10) - 1);
+		mem_free(text);
+	} else if (rc != -ENOENT) {
+		return rc;
+	}
+	rc = ledger_ids(l, LEDGER_ALL, &ids, &count, e);
+	if (!rc && count)
+		skip(l, ids[count - 1]);
+	mem_free(ids);
 	return rc;
 }
 
-int ledger_open(struct ledger **out, const char *path, struct error *e)
+int ledger_open(struct ledger **out, const char *folder, struct error *e)
 {
 	struct ledger *l = mem_alloc(1, sizeof *l);
 	if (!l)
 		return error_set(e, ENOMEM, "no memory for the database of jobs");
-	int rc = 0;
-	if (sqlite3_open_v2(path, &l->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL) !=
-	    SQLITE_OK)
-		rc = l->db ? fault(l, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
-	/* The spool's lock excludes others; without shared memory it works on any file system. */
+	int rc = open_both(l, folder, e);
 	if (!rc)
-		rc = run_statements(
-			l,
-			"PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
-			"PRAGMA journal_size_limit = 1048576; PRAGMA trusted_schema = OFF",
-			e);
+		rc = merge(l, e);
 	if (!rc)
-		rc = migrate(l, e);
-	if (!rc)
-		rc = look_through(l, e);
-	if (!rc)
-		rc = prepare(l, &l->add,
-			     "INSERT INTO jobs (" COLUMNS ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", e);
-	if (!rc)
-		rc = prepare(
-			l, &l->change,
-			"UPDATE jobs SET owner = ?2, name = ?3, version = ?4, priority = ?5, mixed = ?6, submitted = ?7, submission = ?8,"
-			" plan = ?9, held = ?10, extended = ?11, state = ?12, ended = ?13, revision = ?14, checksum = ?15 WHERE id = ?1",
-			e);
-	if (!rc)
-		rc = prepare(l, &l->remove, "DELETE FROM jobs WHERE id = ?1", e);
-	if (!rc)
-		rc = prepare(l, &l->drop, "DELETE FROM jobs WHERE id = ?1 AND ended IS NOT NULL", e);
-	if (!rc)
-		rc = prepare(l, &l->next,
-			     "SELECT " COLUMNS " FROM jobs WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
-	if (!rc)
-		rc = prepare(l, &l->get, "SELECT " COLUMNS " FROM jobs WHERE id = ?", e);
-	if (!rc)
-		rc = prepare(l, &l->all, "SELECT " COLUMNS " FROM jobs WHERE id > ? ORDER BY id LIMIT 1", e);
-	if (!rc)
-		rc = make_checksums(l, e);
-	if (rc) {
+		rc = find_next(l, e);
+	if (rc)
 		ledger_close(l);
-		return rc == -EPROTO ? rc : error_prefix(e, rc, "%s", path);
-	}
-	*out = l;
-	return 0;
+	else
+		*out = l;
+	return rc;
 }
 
 void ledger_close(struct ledger *l)
 {
 	if (!l)
 		return;
-	sqlite3_finalize(l->add);
-	sqlite3_finalize(l->change);
-	sqlite3_finalize(l->remove);
-	sqlite3_finalize(l->all);
-	sqlite3_finalize(l->get);
-	sqlite3_finalize(l->drop);
-	sqlite3_finalize(l->next);
+	ledger_side_close(&l->jobs);
+	ledger_side_close(&l->copy);
 	sqlite3_close(l->db);
 	mem_free(l);
 }
 
+/* ---- rows ---- */
+
+static int put_both(struct ledger *l, const struct ledger_job *j, struct error *e)
+{
+	struct error fault;
+	ledger_side_bind(&l->jobs, j);
+	if (!l->behind)
+		ledger_side_bind(&l->copy, j);
+	ledger_side_release(&l->jobs); /* j may be from there */
+	int rc = ledger_side_put(&l->jobs, e);
+	if (!rc && !l->behind && ledger_side_put(&l->copy, &fault))
+		fall_behind(l, &fault);
+	return rc;
+}
+
+static int change(struct ledger *l, struct ledger_job *j, struct error *e)
+{
+	j->revision++;
+	return put_both(l, j, e);
+}
+
+static int get_whole(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
+{
+	int rc = ledger_side_get(&l->jobs, id, j, e);
+	return rc > 0 && j->damaged ? error_set(e, EBADMSG, "the database of jobs: the row of j%llu is damaged",
+						(unsigned long long)id)
+				    : rc;
+}
+
+static int remove_all(struct ledger *l, struct ledger_side *s, const uint64_t *ids, size_t count, struct error *e)
+{
+	ledger_side_release(&l->jobs);
+	int rc = ledger_file_run(l->db, "BEGIN", e);
+	for (size_t i = 0; !rc && i < count; i++)
+		rc = ids[i] ? ledger_side_remove(s, ids[i], e) : 0;
+	if (!rc)
+		rc = ledger_file_run(l->db, "COMMIT", e);
+	if (rc)
+		ledger_file_run(l->db, "ROLLBACK", NULL);
+	return rc;
+}
+
+/* First from the copy: after a fault in between the rows still exist, and are dropped again. */
+static int remove_both(struct ledger *l, const uint64_t *ids, size_t count, struct error *e)
+{
+	int rc = remove_all(l, &l->copy, ids, count, e);
+	return rc ? rc : remove_all(l, &l->jobs, ids, count, e);
+}
+
+/* ---- jobs ---- */
+
+uint64_t ledger_next_id(const struct ledger *l)
+{
+	return l->next;
+}
+
+int ledger_skip_ids(struct ledger *l, uint64_t id, struct error *e)
+{
+	char text[32];
+	if (!skip(l, id))
+		return 0;
+	text_print(text, sizeof text, "%llu", (unsigned long long)l->next);
+	return ledger_set(l, next_job, text, e);
+}
+
 int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)
 {
-	struct ledger_job live = *j;
+	struct ledger_job live, old;
+	int rc = ledger_side_get(&l->jobs, j->id, &old, e);
+	if (rc)
+		return rc < 0 ? rc
+			      : error_set(e, EEXIST, "the database of jobs has a j%llu", (unsigned long long)j->id);
+	rc = ledger_skip_ids(l, j->id, e);
+	if (rc)
+		return rc;
+	live = *j;
 	live.state = "live";
 	live.ended = 0;
 	live.held = "";
-	bind(l->add, &live);
-	return finish(l, l->add, e);
+	return put_both(l, &live, e);
 }
 
 int ledger_put(struct ledger *l, const struct ledger_job *j, struct error *e)
 {
-	int rc = run_statements(l, "BEGIN IMMEDIATE", e);
-	if (rc)
-		return rc;
-	sqlite3_bind_int64(l->remove, 1, (sqlite3_int64)j->id);
-	rc = finish(l, l->remove, e);
-	bind(l->add, j);
-	if (!rc)
-		rc = finish(l, l->add, e);
-	if (!rc)
-		rc = run_statements(l, "COMMIT", e);
-	if (rc)
-		run_statements(l, "ROLLBACK", NULL);
-	return rc;
+	return put_both(l, j, e);
 }
 
 int ledger_forget(struct ledger *l, uint64_t id, struct error *e)
 {
-	sqlite3_bind_int64(l->remove, 1, (sqlite3_int64)id);
-	return finish(l, l->remove, e);
+	return remove_both(l, &id, 1, e);
 }
 
-int ledger_end(struct ledger *l, uint64_t id, uint64_t extended, const char *state, struct error *e)
+int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e)
+{
+	for (size_t i = 0; i < count; i++) {
+		struct ledger_job j;
+		int rc = ledger_side_get(&l->jobs, ids[i], &j, e);
+		if (rc < 0)
+			return rc;
+		if (rc && !(j.ended > 0))
+			ids[i] = 0;
+	}
+	return remove_both(l, ids, count, e);
+}
+
+int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, struct error *e)
 {
 	struct timespec now;
 	struct ledger_job j;
-	int rc = get_whole(l, id, &j, e);
-	if (rc <= 0 || j.ended > 0 || j.extended != extended)
+	char *record;
+	int rc = get_whole(l, r->id, &j, e);
+	if (rc <= 0 || j.extended != r->extended)
 		return rc < 0 ? rc : 0;
+	rc = record_to_json(r, &record, e);
+	if (rc)
+		return rc;
 	clock_gettime(CLOCK_REALTIME, &now);
 	j.ended = now.tv_sec > 0 ? (double)now.tv_sec : 1;
-	j.state = state;
+	j.state = r->state;
 	j.held = "";
+	j.record = record;
+	if (!extendable) {
+		j.submission = j.plan = NULL;
+		j.submission_size = j.plan_size = 0;
+	}
+	rc = change(l, &j, e);
+	mem_free(record);
+	return rc;
+}
+
+int ledger_drop_submission(struct ledger *l, uint64_t id, struct error *e)
+{
+	struct ledger_job j;
+	int rc = get_whole(l, id, &j, e);
+	if (rc <= 0 || !(j.ended > 0) || !j.submission_size)
+		return rc < 0 ? rc : 0;
 	j.submission = j.plan = NULL;
 	j.submission_size = j.plan_size = 0;
 	return change(l, &j, e);
-}
-
-int ledger_drop(struct ledger *l, const uint64_t *ids, size_t count, struct error *e)
-{
-	int rc = run_statements(l, "BEGIN IMMEDIATE", e);
-	if (rc)
-		return rc;
-	for (size_t i = 0; !rc && i < count; i++) {
-		sqlite3_bind_int64(l->drop, 1, (sqlite3_int64)ids[i]);
-		rc = finish(l, l->drop, e);
-	}
-	if (!rc)
-		rc = run_statements(l, "COMMIT", e);
-	if (rc)
-		run_statements(l, "ROLLBACK", NULL);
-	return rc;
 }
 
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e)
@@ -398,21 +391,80 @@ int ledger_extend(struct ledger *l, const struct ledger_job *more, struct error 
 	return change(l, &j, e);
 }
 
-int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e)
+int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t *count, struct error *e)
 {
-	int rc = row(l, l->next, after, j, e);
-	if (rc > 0 && j->id <= after) /* otherwise a caller that asks for the next one would never stop */
-		return error_set(e, EBADMSG, "jobs.db is damaged: its jobs are not in order");
+	static const char *const sql[] = {[LEDGER_ALL] = "SELECT id FROM main.jobs ORDER BY id",
+					  [LEDGER_LIVE] = "SELECT id FROM main.jobs WHERE ended IS NULL ORDER BY id",
+					  [LEDGER_ENDED] =
+						  "SELECT id FROM main.jobs WHERE ended IS NOT NULL ORDER BY id"};
+	sqlite3_stmt *s = NULL;
+	int rc = sqlite3_prepare_v2(l->db, sql[which], -1, &s, NULL) == SQLITE_OK ? 0 : ledger_file_error(l->db, e),
+	    step = SQLITE_DONE;
+	*ids = NULL;
+	*count = 0;
+	while (!rc && (step = sqlite3_step(s)) == SQLITE_ROW)
+		if (!ids_add(ids, count, (uint64_t)sqlite3_column_int64(s, 0)))
+			rc = error_set(e, ENOMEM, "no memory for the list of jobs");
+	if (!rc && step != SQLITE_DONE)
+		rc = ledger_file_error(l->db, e);
+	sqlite3_finalize(s);
+	if (rc) {
+		mem_free(*ids);
+		*ids = NULL;
+		*count = 0;
+	}
 	return rc;
-}
-
-int ledger_after(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e)
-{
-	int rc = row(l, l->all, after, j, e);
-	return rc > 0 && j->id <= after ? error_set(e, EBADMSG, "jobs.db is damaged: its jobs are not in order") : rc;
 }
 
 int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
 {
-	return row(l, l->get, id, j, e);
+	return ledger_side_get(&l->jobs, id, j, e);
+}
+
+int ledger_write_record(struct ledger *l, const struct job_record *r, struct error *e)
+{
+	struct ledger_job j;
+	char *record;
+	int rc = get_whole(l, r->id, &j, e);
+	if (rc <= 0)
+		return rc < 0 ? rc
+			      : error_set(e, ENOENT, "the database of jobs has no j%llu", (unsigned long long)r->id);
+	rc = record_to_json(r, &record, e);
+	if (rc)
+		return rc;
+	j.record = record;
+	rc = change(l, &j, e);
+	mem_free(record);
+	return rc;
+}
+
+int ledger_read_record(struct ledger *l, uint64_t id, struct job_record *r, struct error *e)
+{
+	struct ledger_job j;
+	int rc = get_whole(l, id, &j, e);
+	if (rc < 0)
+		return rc;
+	if (!rc || !*j.record)
+		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)id);
+	rc = record_from_json(j.record, strlen(j.record), r, e);
+	if (!rc && r->id != id)
+		rc = error_set(e, EBADMSG, "the record of another job");
+	return rc ? error_prefix(e, rc, "the record of j%llu", (unsigned long long)id) : 0;
+}
+
+/* ---- notes ---- */
+
+int ledger_set(struct ledger *l, const char *name, const char *text, struct error *e)
+{
+	struct error fault;
+	ledger_side_release(&l->jobs);
+	int rc = ledger_side_set(&l->jobs, name, text, e);
+	if (!rc && !l->behind && ledger_side_set(&l->copy, name, text, &fault))
+		fall_behind(l, &fault);
+	return rc;
+}
+
+int ledger_note(struct ledger *l, const char *name, char **text, struct error *e)
+{
+	return ledger_side_note(&l->jobs, name, text, e);
 }

@@ -1,15 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The farm's jobs in an SQLite database (spool/jobs.db; the only user of SQLite): the submission of each, and whether
- * it has ended. WAL, synchronous FULL: everything written is durable when a call returns. Each row has a checksum,
- * because SQLite has none; changing a damaged row fails with -EBADMSG. A job that has ended keeps its row, without the
- * submission, until it is dropped. One thread. The scheme's version is the database's user_version; older ones are
- * upgraded when the database is opened, newer ones refused.
+ * What the coordinator knows, in SQLite (the only user of SQLite): a row for each job, with its submission and its
+ * record, and named notes. Two files in the spool, jobs.db and jobs-copy.db, have the same contents: what one of them
+ * has lost or damaged is restored from the other when they are opened. WAL, synchronous FULL: everything written is
+ * durable in jobs.db when a call returns. jobs-copy.db follows; if it cannot be written, that is logged, and
+ * ledger_mend tries again.
+ *
+ * Each row has a checksum, because SQLite has none; changing a damaged row fails with -EBADMSG. A job that has ended
+ * keeps its row until it is dropped. One thread. The scheme's version is the database's user_version; the one before
+ * is upgraded when the database is opened, others are refused.
  */
 #ifndef COORDINATOR_STORE_LEDGER_H
 #define COORDINATOR_STORE_LEDGER_H
 
 #include "common/base/error.h"
+#include "coordinator/store/ledger_job.h"
+#include "coordinator/store/record.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -17,44 +23,49 @@
 
 struct ledger;
 
-struct ledger_job {
-	uint64_t id;
-	const char *owner, *name, *version; /* version of the program that accepted it */
-	const char *held;		    /* by whom; "": it is not held. Ignored by ledger_add */
-	uint64_t extended;		    /* number of extensions after its end; as `held` */
-	int priority;
-	bool mixed;
-	double submitted;			/* seconds since 1970 */
-	const unsigned char *submission, *plan; /* frames, as common/wire packs them */
-	size_t submission_size, plan_size;
-	/* Ignored by ledger_add and ledger_extend. */
-	const char *state;
-	double ended;	   /* s since 1970; 0: it has not ended */
-	uint64_t revision; /* incremented with every change of the row */
-	bool damaged;	   /* when read: the checksum does not match, and nothing of it can be trusted */
-};
-
-/* -EPROTO: a later version; -EBADMSG: damaged. */
-int ledger_open(struct ledger **l, const char *path, struct error *e);
+/* folder: the spool. A file that is not a database is renamed to *.damaged and restored from the other. -EPROTO: of
+ * another version. */
+int ledger_open(struct ledger **l, const char *folder, struct error *e);
 void ledger_close(struct ledger *l); /* l may be NULL */
-/* Writes a row, including its revision, to replace one that was lost or damaged. */
+/* Brings jobs-copy.db up to date, if it could not be written. Call now and then. */
+int ledger_mend(struct ledger *l, struct error *e);
+
+/* ---- jobs */
+
+/* No job had an id from here on, not even one whose row was dropped. */
+uint64_t ledger_next_id(const struct ledger *l);
+int ledger_skip_ids(struct ledger *l, uint64_t id, struct error *e); /* ids up to this one are not given */
+/* A new job, live. -EEXIST: the id is taken. */
+int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e);
+/* Writes a row, including its revision, in place of any that exists. */
 int ledger_put(struct ledger *l, const struct ledger_job *j, struct error *e);
 int ledger_forget(struct ledger *l, uint64_t id, struct error *e); /* deletes it, whatever it is */
-int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e);
-/* The job has ended, after this many extensions; ignored for one that was extended since. */
-int ledger_end(struct ledger *l, uint64_t id, uint64_t extended, const char *state, struct error *e);
-int ledger_drop(struct ledger *l, const uint64_t *ids, size_t count,
-		struct error *e); /* deletes these rows at once; none may be of a live job */
+/* Deletes these rows at once, except those of live jobs, whose ids become 0. */
+int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e);
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e); /* "": release */
 int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e);
+/* The job has ended, after r->extended extensions, with this record; ignored for one that was extended since.
+ * extendable: the row keeps its submission and plan. */
+int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, struct error *e);
 /* Sets another submission, plan and number of extensions; a job that has ended runs again. -ENOENT */
 int ledger_extend(struct ledger *l, const struct ledger_job *j, struct error *e);
-/* The live job with the smallest id above `after`; its texts and bytes are valid until the next call. 1: found; 0:
- * no more. */
-int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e);
-/* As ledger_next, including jobs that have ended. */
-int ledger_after(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e);
-/* That job, ended or not; valid until the next call of this. 0: not found. */
+/* The row of an ended job forgets its submission and plan. */
+int ledger_drop_submission(struct ledger *l, uint64_t id, struct error *e);
+
+enum ledger_which { LEDGER_ALL, LEDGER_LIVE, LEDGER_ENDED };
+/* Their ids, ascending; mem_alloc'd, NULL: none. */
+int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t *count, struct error *e);
+/* Texts and bytes are valid until the next call. 1; 0: not found. */
 int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e);
+
+int ledger_write_record(struct ledger *l, const struct job_record *r, struct error *e); /* -ENOENT */
+/* -ENOENT: no such job, or it has no record; -EBADMSG: damaged; -EPROTO: of another version. */
+int ledger_read_record(struct ledger *l, uint64_t id, struct job_record *r, struct error *e);
+
+/* ---- notes */
+
+int ledger_set(struct ledger *l, const char *name, const char *text, struct error *e);
+/* mem_alloc'd. -ENOENT */
+int ledger_note(struct ledger *l, const char *name, char **text, struct error *e);
 
 #endif

@@ -70,8 +70,13 @@ void record_add_doubt(struct job_record *r)
 		record_add_note(r, text);
 }
 
-void record_begin_convergence(struct job_record *r)
+void record_begin(struct job_record *r, uint64_t id, const char *name, const char *owner)
 {
+	memset(r, 0, sizeof *r);
+	r->id = id;
+	text_copy(r->name, sizeof r->name, name);
+	text_copy(r->owner, sizeof r->owner, owner);
+	r->ended_seen = r->rel_error = -1;
 	convergence_from_json(NULL, &r->agreement);
 	classes_from_json(NULL, r->classes);
 	r->b = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What is kept of a job in its spool folder (jobs/jN/job.json): enough to list it and to fetch its result after a
+ * What the ledger keeps of a job as JSON: enough to list it and to fetch its result after a
  * restart. Pure except for memory.
  */
 #ifndef COORDINATOR_STORE_RECORD_H
@@ -45,7 +45,7 @@ void record_take_counted(struct job_record *r, const struct plan *p, const struc
 void record_add_note(struct job_record *r, const char *text); /* "": nothing to note */
 void record_add_doubt(struct job_record *r);		      /* why the interval of the error is not known, if so */
 void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
-void record_begin_convergence(struct job_record *r);			      /* initialises: nothing is known */
+void record_begin(struct job_record *r, uint64_t id, const char *name, const char *owner); /* nothing else is known */
 void record_take_error(struct job_record *r, const struct canvas_image *img); /* of an image with an estimate */
 void record_take_effects(struct job_record *r, json_t *list);		      /* takes the reference; NULL: none */
 json_t *record_effects(const struct job_record *r);			      /* an array */

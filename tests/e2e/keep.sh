@@ -19,14 +19,13 @@ LISTEN=$COORDINATOR start_coordinator
 sleep 1
 [ -s "$DIR/spool/jobs/j2/result.exr" ] || fail "thirty days are less than a second"
 "$BIN/hslt-job" fetch j2 -o "$DIR/second.exr"
+first_end=$(value j1 ended) second_end=$(value j2 ended)
+[ "$first_end" ] && [ "$second_end" ] || fail "the status does not say when they ended"
 stop $COORDINATOR_PID
 
 # For so long that j2 is old enough now, and j1 not yet ten times as old: then its record would go, too.
-ended() {
-	sed -n 's/.*"ended": *\([0-9.]*\).*/\1/p' "$DIR/spool/jobs/$1/job.json"
-}
-seconds=$(awk -v a="$(ended j1)" -v b="$(ended j2)" 'BEGIN { print (b - a > 2 ? b - a : 2) }')
-sleep "$(awk -v s="$seconds" -v b="$(ended j2)" -v now="$(date +%s.%N)" 'BEGIN { print (now - b < s ? s - now + b : 0) }')"
+seconds=$(awk -v a="$first_end" -v b="$second_end" 'BEGIN { print (b - a > 2 ? b - a : 2) }')
+sleep "$(awk -v s="$seconds" -v b="$second_end" -v now="$(date +%s.%N)" 'BEGIN { print (now - b < s ? s - now + b : 0) }')"
 LISTEN=$COORDINATOR start_coordinator --keep-days "$(awk -v s="$seconds" 'BEGIN { printf "%.9f", s / 86400 }')"
 until_true 20 test ! -e "$DIR/spool/jobs/j2/result.exr" || fail "its result is still there"
 for j in j1 j2; do

@@ -9,12 +9,14 @@
 #include "common/wire/batch_wire.h"
 #include "coordinator/store/journal.h"
 #include "coordinator/store/ledger.h"
+#include "proto/stored.pb-c.h"
 #include "tests/fuzz/farm.h"
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/seeds.h"
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum what {
@@ -27,6 +29,7 @@ enum what {
 	DATABASE_CHANGED,
 	SUBMISSION,
 	ASIDE,
+	OLD_ROW,
 	WHATS
 };
 enum { EDIT = 4, EDITS_MOST = 32, SEED_MOST = 16000, FILE_MOST = 1 << 20 };
@@ -110,7 +113,6 @@ static void write_journal(const char *spool, const uint8_t *bytes, size_t size)
 /* A new job's submission and plan: what the database would hold; the first two bytes say where one ends. */
 static void write_submission(const char *spool, const uint8_t *bytes, size_t size)
 {
-	char path[512];
 	struct ledger *l;
 	struct error e;
 	size_t first = size < 2 ? 0 : (size_t)bytes[0] << 8 | bytes[1];
@@ -123,13 +125,13 @@ static void write_submission(const char *spool, const uint8_t *bytes, size_t siz
 				 .owner = "",
 				 .name = "n",
 				 .version = "1",
+				 .record = "",
 				 .submitted = 1,
 				 .submission = bytes,
 				 .submission_size = first,
 				 .plan = bytes + first,
 				 .plan_size = size - first};
-	path_in(spool, "jobs.db", path);
-	if (ledger_open(&l, path, &e))
+	if (ledger_open(&l, spool, &e))
 		abort();
 	ledger_add(l, &job, &e);
 	ledger_close(l);
@@ -140,9 +142,17 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 	char path[512];
 	size_t n;
 	switch (what) {
-	case RECORD:
-		path_in(spool, "jobs/j1/job.json", path);
+	case RECORD: /* of a job that an earlier coordinator finished */
+		path_in(spool, "jobs/j7", path);
+		mkdir(path, 0777);
+		path_in(spool, "jobs/j7/job.json", path);
 		store(path, bytes, size);
+		break;
+	case OLD_ROW:
+		path_in(spool, "jobs/j7", path);
+		mkdir(path, 0777);
+		path_in(spool, "jobs/j7/order", path);
+		seal(path, bytes, size);
 		break;
 	case JOURNAL:
 		journal_path(spool, path);
@@ -257,6 +267,33 @@ static size_t take_file(const char *path)
 	return n;
 }
 
+/* What an earlier coordinator kept of such a job, as j7. */
+static void write_old_seeds(const struct ledger_job *job)
+{
+	Stored__Row m;
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	char *text;
+	struct error e;
+	stored__row__init(&m);
+	m.id = 7;
+	m.submission = (ProtobufCBinaryData){job->submission_size, file};
+	m.plan = (ProtobufCBinaryData){job->plan_size, file + job->submission_size};
+	memcpy(file, job->submission, job->submission_size);
+	memcpy(file + job->submission_size, job->plan, job->plan_size);
+	memcpy(seed + 1, "hsltO003", 8);
+	write_seed(OLD_ROW, 8 + stored__row__pack(&m, seed + 9));
+	if (!r)
+		abort();
+	record_begin(r, 7, "n", "");
+	strcpy(r->state, "done");
+	if (record_to_json(r, &text, &e))
+		abort();
+	memcpy(seed + 1, text, strlen(text));
+	write_seed(RECORD, strlen(text));
+	mem_free(text);
+	mem_free(r);
+}
+
 static void write_seeds(const char *spool)
 {
 	static const char aside[] =
@@ -269,8 +306,6 @@ static void write_seeds(const char *spool)
 	struct ledger_job job;
 	struct error e;
 	struct journal_found found;
-	path_in(spool, "jobs/j1/job.json", path);
-	write_seed(RECORD, take_file(path));
 	path_in(spool, "jobs/j2/checkpoint", path);
 	size_t n = take_file(path);
 	if (n < 4)
@@ -288,9 +323,9 @@ static void write_seeds(const char *spool)
 		abort();
 	journal_release(j);
 	write_seed(JOURNAL_BODIES, seeded);
-	path_in(spool, "jobs.db", path);
-	if (ledger_open(&l, path, &e) || ledger_next(l, 0, &job, &e) <= 0)
+	if (ledger_open(&l, spool, &e) || ledger_get(l, FARM_BOOTSTRAP, &job, &e) <= 0)
 		abort();
+	write_old_seeds(&job);
 	seed[1] = (uint8_t)(job.submission_size >> 8);
 	seed[2] = (uint8_t)job.submission_size;
 	memcpy(seed + 3, job.submission, job.submission_size);

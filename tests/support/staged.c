@@ -38,10 +38,6 @@ static bool ends_with(const char *path, const char *end)
 
 static int own_rename(const char *from, const char *to)
 {
-	if (ends_with(to, "/job.json") && staged_disk->fail_records) {
-		errno = EIO;
-		return -1;
-	}
 	if (ends_with(to, "/checkpoint") && staged_disk->hold_up) {
 		staged_disk->held_up = true;
 		while (!staged_disk->go_on)
@@ -80,6 +76,21 @@ static int own_fallocate(int fd, int mode, off_t at, off_t size)
 	return disk_system.fallocate(fd, mode, at, size);
 }
 
+static int refuse_commit(void *user)
+{
+	(void)user;
+	return staged_disk->fail_ledger;
+}
+
+/* SQLite calls it for each connection that it opens. */
+int staged_hook_commits(sqlite3 *db, const char **text, const struct sqlite3_api_routines *api)
+{
+	(void)text;
+	(void)api;
+	sqlite3_commit_hook(db, refuse_commit, NULL);
+	return SQLITE_OK;
+}
+
 static void serve(void)
 {
 	struct disk own = disk_system;
@@ -91,6 +102,7 @@ static void serve(void)
 	own.fdatasync = own_fdatasync;
 	own.fallocate = own_fallocate;
 	disk_use(&own);
+	sqlite3_auto_extension((void (*)(void))staged_hook_commits);
 	server_config_init(&c);
 	c.listen = "127.0.0.1:0";
 	c.spool = staged.spool;

@@ -9,6 +9,7 @@
 
 #include "tests/support/scripted.h"
 
+#include <sqlite3.h>
 #include <stdatomic.h>
 #include <stddef.h>
 
@@ -18,7 +19,7 @@ struct staged_disk {
 	/* hold_up: the next checkpoint waits before it is renamed to its name, until go_on. */
 	_Atomic bool hold_up, held_up, go_on;
 	_Atomic bool fail_folder; /* then the flush of its folder fails */
-	_Atomic bool fail_records;
+	_Atomic bool fail_ledger; /* nothing can be written to it */
 	/* hold_flush: the next flush of a journal waits until end_flush. */
 	_Atomic bool hold_flush, held_flush, end_flush;
 	_Atomic bool fail_flush; /* then it fails */
@@ -55,6 +56,8 @@ bool staged_work_on(void);
 uint64_t staged_begin_a_job(void);
 void staged_await_state(uint64_t job, const char *state);
 
+/* For sqlite3_auto_extension, which staged_start calls in the coordinator: fail_ledger counts. */
+int staged_hook_commits(sqlite3 *db, const char **text, const struct sqlite3_api_routines *api);
 /* A coordinator on the same spool in this process; NULL: it did not start. */
 struct server *staged_open_here(void);
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Who was quarantined is known after a restart, however long the list has become; a damaged list stops no farm. */
+#include "common/base/mem.h"
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
@@ -90,11 +91,17 @@ static void a_damaged_list(void **state)
 	FILE *f = begin();
 	fputs("{\"schema\":1,\"workers\":[{\"cert", f);
 	assert_int_equal(fclose(f), 0);
-	struct server *s = start();
-	assert_int_equal(farm_next_quarantined(s->jobs.farm, 0), 0);
-	server_close(s);
+	for (int i = 0; i < 2; i++) { /* as the first start left it, too */
+		struct server *s = start();
+		struct error e;
+		char *text;
+		assert_int_equal(farm_next_quarantined(s->jobs.farm, 0), 0);
+		assert_int_equal(ledger_note(s->jobs.ledger, "quarantined-damaged", &text, &e), 0);
+		assert_string_equal(text, "{\"schema\":1,\"workers\":[{\"cert");
+		mem_free(text);
+		server_close(s);
+	}
 	assert_int_equal(access(path("aside"), F_OK), -1);
-	assert_int_equal(access(path("aside.damaged"), F_OK), 0);
 }
 
 int main(void)

@@ -39,13 +39,38 @@ static void fill(void)
 	static const uint64_t ids[] = {3, 1, 2};
 	for (size_t i = 0; i < 3; i++) {
 		ended[i] = (struct job_record){.id = ids[i]};
-		write_file(ids[i], "order", 100);
-		write_file(ids[i], "checkpoint", 400);
+		write_file(ids[i], "checkpoint", 500);
 		write_file(ids[i], "journal.2", 500);
 		write_file(ids[i], "result.exr", 9000);
 	}
 	jobs.ended = ended;
 	jobs.ended_count = 3;
+}
+
+static void add(uint64_t id)
+{
+	struct error e;
+	struct job_record r;
+	struct ledger_job j = {.id = id,
+			       .owner = "",
+			       .name = "",
+			       .version = "",
+			       .record = "",
+			       .submission = (const unsigned char *)"s",
+			       .submission_size = 1};
+	record_begin(&r, id, "", "");
+	assert_int_equal(spool_make_job(jobs.spool, id, &e), 0);
+	assert_int_equal(ledger_add(jobs.ledger, &j, &e), 0);
+	assert_int_equal(ledger_end(jobs.ledger, &r, true, &e), 0);
+}
+
+/* It can be extended. */
+static bool has_submission(uint64_t id)
+{
+	struct error e;
+	struct ledger_job j;
+	assert_int_equal(ledger_get(jobs.ledger, id, &j, &e), 1);
+	return j.submission_size > 0;
 }
 
 static void the_first_go_first(void **state)
@@ -55,21 +80,24 @@ static void the_first_go_first(void **state)
 	char path[128];
 	snprintf(path, sizeof path, "%s/spool", folder);
 	assert_int_equal(spool_open(&jobs.spool, path, &e), 0);
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
 	for (uint64_t id = 1; id <= 3; id++)
-		assert_int_equal(spool_take_job(jobs.spool, id, &e), 0);
+		add(id);
 	fill();
 	jobs.config.keep_bytes = 3000;
 	keep_trim(&jobs);
-	assert_true(has(3, "order") && has(1, "checkpoint") && has(2, "journal.2"));
+	assert_true(has(3, "checkpoint") && has(1, "checkpoint") && has(2, "journal.2"));
 	jobs.config.keep_bytes = 2999;
 	keep_trim(&jobs);
-	assert_false(has(3, "order") || has(3, "checkpoint") || has(3, "journal.2"));
-	assert_true(has(1, "order") && has(2, "order"));
+	assert_false(has(3, "checkpoint") || has(3, "journal.2"));
+	assert_true(has(1, "journal.2") && has(2, "checkpoint"));
+	assert_true(!has_submission(3) && has_submission(1));
 	assert_true(keep_drop_all(&jobs));
-	assert_false(has(1, "order") || has(2, "checkpoint"));
+	assert_false(has(1, "journal.2") || has(2, "checkpoint"));
 	assert_false(keep_drop_all(&jobs)); /* there is nothing more to be had */
 	for (uint64_t id = 1; id <= 3; id++)
 		assert_true(has(id, "result.exr"));
+	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
 

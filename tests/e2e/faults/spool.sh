@@ -98,7 +98,7 @@ clock_goes_ahead() {
 	echo 0 >"$DIR/clock"
 }
 
-fault jobs_database 8 2 "jobs.db or its WAL is missing, truncated, or has a wrong bit when the coordinator starts"
+fault jobs_database 8 2 "jobs.db, jobs-copy.db or a WAL is missing, truncated, or has a wrong bit when the coordinator starts"
 jobs_database() {
 	farm
 	worker w0
@@ -111,7 +111,7 @@ jobs_database() {
 database_is_damaged() {
 	kill -9 "$COORDINATOR_PID"
 	wait "$COORDINATOR_PID" 2>/dev/null || :
-	db=$DIR/spool/jobs.db
+	db=$DIR/spool/jobs$([ "$i" -le 4 ] || echo -copy).db
 	[ -s "$db-wal" ] || : >>"$db-wal"
 	case $((i % 4)) in
 	1) rm "$db-wal" ;;
@@ -131,7 +131,7 @@ plan_changed() {
 	job
 	each_time plan_is_changed
 	finish_job
-	[ "$(grep -c 'its row in jobs.db was damaged: restored from its folder' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
+	[ "$(grep -c 'its row in jobs.db was damaged: restored from jobs-copy.db' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
 }
 plan_is_changed() {
 	kill -9 "$COORDINATOR_PID"
@@ -146,26 +146,33 @@ TEXT
 	again
 }
 
-fault row_lost 1 1 "a row of jobs.db and its copy in the job's folder are missing: the coordinator starts only with --accept-loss"
+fault row_lost 1 1 "a job's row is missing in jobs.db and in jobs-copy.db: the coordinator starts only with --accept-loss"
 row_lost() {
 	farm
 	worker w0
 	worker w1
-	other=$("$BIN/hslt-submit" "$BOX" -o "$DIR/other.exr" --integrator path --size 16x16 --spp 100000000 2>>"$DIR/submit.log") || fail "$NAME: no other job"
-	"$BIN/hslt-job" hold "$other" 2>>"$DIR/hold.log"
+	job
+	other=$ID
+	until_true 60 is_merged 3 || fail "$NAME: nothing is merged"
+	"$BIN/hslt-job" hold "$other" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	job
 	each_time row_is_lost
 	finish_job
-	[ -s "$DIR/spool/lost/$other/why" ] && [ -s "$DIR/spool/lost/$other/job.json" ] || fail "$NAME: what was left of $other is gone"
+	[ -s "$DIR/spool/lost/$other/why" ] && [ -s "$DIR/spool/lost/$other/journal.0" ] || fail "$NAME: what was left of $other is gone"
 }
 row_is_lost() {
 	kill -9 "$COORDINATOR_PID"
 	wait "$COORDINATOR_PID" 2>/dev/null || :
-	printf x >>"$DIR/spool/jobs/$other/order"
-	rm "$DIR/spool/jobs.db" "$DIR/spool/jobs.db-wal"
+	"$PYTHON" - "$DIR/spool" "${other#j}" <<'TEXT' || fail "$NAME: no row"
+import sqlite3, sys
+for name in "jobs.db", "jobs-copy.db":
+    db = sqlite3.connect(sys.argv[1] + "/" + name)
+    db.execute("DELETE FROM jobs WHERE id = ?", (int(sys.argv[2]),))
+    db.commit()
+TEXT
 	"$BIN/hslt-coordinator" --listen "$COORDINATOR" --spool "$DIR/spool" >"$DIR/refused.out" 2>"$DIR/refused.log" && fail "$NAME: it starts"
 	grep -q "has lost 1 job: $other .*--accept-loss" "$DIR/refused.log" || fail "$NAME: it says: $(tail -n 1 "$DIR/refused.log")"
-	[ -s "$DIR/spool/jobs/$other/job.json" ] || fail "$NAME: refused, and deleted"
+	[ -s "$DIR/spool/jobs/$other/journal.0" ] || fail "$NAME: refused, and deleted"
 	again --accept-loss
 }
 

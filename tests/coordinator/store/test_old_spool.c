@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A row of the ledger comes back out of its file, also out of one of version 002; what is damaged or hostile does not.
- */
-#include "coordinator/store/row_file.h"
+/* A job's row comes back out of the file that held its copy, of versions 002 and 003; what is damaged or hostile does
+ * not. */
+#include "coordinator/store/old_spool.h"
 
 #include "common/base/bytes.h"
 #include "common/base/checked_file.h"
+#include "proto/stored.pb-c.h"
 #include "tests/support/failing_memory.h"
 #include "tests/support/folder.h"
 
@@ -22,20 +23,8 @@ static struct spool *spool;
 static char path[SPOOL_PATH_MAX];
 static struct error e;
 
-static const struct ledger_job row = {.id = 1,
-				      .owner = "anna",
-				      .name = "glass",
-				      .version = "0.2",
-				      .held = "",
-				      .extended = 3,
-				      .revision = 0x0102030405060708,
-				      .priority = -7,
-				      .mixed = true,
-				      .submitted = 1.5,
-				      .submission = (const unsigned char *)"sub\0m",
-				      .plan = (const unsigned char *)"plan",
-				      .submission_size = 5,
-				      .plan_size = 4};
+enum { JOB = 1 };
+static const uint64_t revision = 0x0102030405060708;
 
 /* As version 002 wrote that row. */
 static const unsigned char old_file[] = {
@@ -54,9 +43,9 @@ static int set_up(void **state)
 	if (folder_set_up(state))
 		return -1;
 	snprintf(name, sizeof name, "%s/spool", folder);
-	if (spool_open(&spool, name, &e) || spool_take_job(spool, row.id, &e))
+	if (spool_open(&spool, name, &e) || spool_make_job(spool, JOB, &e))
 		return -1;
-	spool_job_path(spool, row.id, "order", path);
+	spool_job_path(spool, JOB, "order", path);
 	return 0;
 }
 
@@ -77,21 +66,33 @@ static void write_file(const void *bytes, size_t size)
 	checked_file_close(&out);
 }
 
-static size_t read_file(unsigned char *bytes, size_t most)
+/* As version 003 wrote that row. */
+static size_t pack_row(unsigned char *bytes)
 {
-	FILE *f = fopen(path, "rb");
-	assert_non_null(f);
-	size_t n = fread(bytes, 1, most, f);
-	fclose(f);
-	return n;
+	Stored__Row m;
+	char text[5][8] = {"anna", "glass", "0.2", "sub\0m", "plan"};
+	stored__row__init(&m);
+	m.id = JOB;
+	m.extended = 3;
+	m.revision = revision;
+	m.submitted = 1.5;
+	m.priority = -7;
+	m.mixed = true;
+	m.owner = text[0];
+	m.name = text[1];
+	m.version = text[2];
+	m.submission = (ProtobufCBinaryData){5, (uint8_t *)text[3]};
+	m.plan = (ProtobufCBinaryData){4, (uint8_t *)text[4]};
+	memcpy(bytes, "hsltO003", 8);
+	return 8 + stored__row__pack(&m, bytes + 8);
 }
 
 static void assert_row(void)
 {
-	struct row_file f;
+	struct old_row f;
 	const struct ledger_job *j = &f.job;
-	assert_int_equal(row_file_read(spool, row.id, &f, &e), 0);
-	assert_true(j->id == 1 && j->extended == 3 && j->revision == row.revision && j->priority == -7 && j->mixed);
+	assert_int_equal(old_spool_row(spool, JOB, &f, &e), 0);
+	assert_true(j->id == 1 && j->extended == 3 && j->revision == revision && j->priority == -7 && j->mixed);
 	assert_true(j->submitted == 1.5 && j->ended == 0 && !j->damaged);
 	assert_string_equal(j->owner, "anna");
 	assert_string_equal(j->name, "glass");
@@ -99,16 +100,16 @@ static void assert_row(void)
 	assert_string_equal(j->held, "");
 	assert_string_equal(j->state, "live");
 	assert_int_equal(j->submission_size, 5);
-	assert_memory_equal(j->submission, row.submission, 5);
+	assert_memory_equal(j->submission, "sub\0m", 5);
 	assert_int_equal(j->plan_size, 4);
-	assert_memory_equal(j->plan, row.plan, 4);
-	row_file_free(&f);
+	assert_memory_equal(j->plan, "plan", 4);
+	old_spool_row_free(&f);
 }
 
 static void assert_refused(int rc)
 {
-	struct row_file f;
-	assert_int_equal(row_file_read(spool, row.id, &f, &e), rc);
+	struct old_row f;
+	assert_int_equal(old_spool_row(spool, JOB, &f, &e), rc);
 	assert_null(f.memory);
 	assert_null(f.message);
 }
@@ -117,23 +118,22 @@ static void comes_back(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
-	struct row_file f;
+	struct old_row f;
 	assert_refused(-ENOENT);
-	assert_int_equal(row_file_write(spool, &row, &e), 0);
+	size_t size = pack_row(bytes);
+	write_file(bytes, size);
 	assert_row();
-	size_t size = read_file(bytes, sizeof bytes);
-	assert_memory_equal(bytes, "hsltO003", 8);
 	for (int n = 0; n < 4; n++) {
 		mem_fail_after(n);
-		int rc = row_file_read(spool, row.id, &f, &e);
+		int rc = old_spool_row(spool, JOB, &f, &e);
 		mem_fail_after(-1);
 		assert_true(rc == -ENOMEM || rc == 0);
-		row_file_free(&f);
+		old_spool_row_free(&f);
 	}
-	assert_int_equal(spool_take_job(spool, 2, &e), 0); /* another job's row is not this one's */
+	assert_int_equal(spool_make_job(spool, 2, &e), 0); /* another job's row is not this one's */
 	spool_job_path(spool, 2, "order", path);
-	write_file(bytes, size - 4);
-	assert_int_equal(row_file_read(spool, 2, &f, &e), -EBADMSG);
+	write_file(bytes, size);
+	assert_int_equal(old_spool_row(spool, 2, &f, &e), -EBADMSG);
 }
 
 static void old_file_is_read(void **state)
@@ -150,15 +150,14 @@ static void truncated(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
-	assert_int_equal(row_file_write(spool, &row, &e), 0);
-	size_t size = read_file(bytes, sizeof bytes) - 4;
+	size_t size = pack_row(bytes);
 	for (int old = 0; old < 2; old++) {
 		const unsigned char *whole = old ? old_file : bytes;
 		size_t all = old ? sizeof old_file - 4 : size;
 		for (size_t n = 0; n < all; n++) {
-			struct row_file f;
+			struct old_row f;
 			write_file(whole, n);
-			int rc = row_file_read(spool, row.id, &f, &e);
+			int rc = old_spool_row(spool, JOB, &f, &e);
 			assert_true(rc == -EBADMSG || rc == -EPROTO);
 			assert_int_equal(truncate(path, (off_t)n), 0);
 			assert_refused(-EBADMSG);
@@ -192,8 +191,7 @@ static void of_another_version(void **state)
 {
 	(void)state;
 	unsigned char bytes[256];
-	assert_int_equal(row_file_write(spool, &row, &e), 0);
-	size_t size = read_file(bytes, sizeof bytes) - 4;
+	size_t size = pack_row(bytes);
 	memcpy(bytes + size, "\xc0\x0c\x01", 3); /* field 200 */
 	write_file(bytes, size + 3);
 	assert_refused(-EPROTO);
@@ -217,5 +215,5 @@ int main(void)
 		cmocka_unit_test_setup_teardown(sizes_beyond_bounds, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(of_another_version, set_up, tear_down),
 	};
-	return cmocka_run_group_tests_name("coordinator/store/test_row_file", tests, NULL, NULL);
+	return cmocka_run_group_tests_name("coordinator/store/test_old_spool", tests, NULL, NULL);
 }

@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/store/ledger_side.h"
+
+#include "common/base/crc.h"
+#include "common/base/mem.h"
+#include "coordinator/store/ledger_file.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define COLUMNS \
+	"id, owner, name, version, priority, mixed, submitted, submission, plan, held, extended, state, ended, revision, checksum, record"
+
+enum { UNCHECKED = -1 }; /* the checksum of a row of a version that had none (ledger_file.c) */
+
+/* Each is beginning, schema, end. */
+static const char *const sql[LEDGER_STATEMENTS][2] = {
+	[LEDGER_PUT] = {"INSERT OR REPLACE INTO ",
+			".jobs (" COLUMNS ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"},
+	[LEDGER_REMOVE] = {"DELETE FROM ", ".jobs WHERE id = ?"},
+	[LEDGER_GET] = {"SELECT " COLUMNS " FROM ", ".jobs WHERE id = ?"},
+	[LEDGER_AFTER] = {"SELECT " COLUMNS " FROM ", ".jobs WHERE id > ? ORDER BY id LIMIT 1"},
+	[LEDGER_SET] = {"INSERT INTO ", ".notes (name, text, revision) VALUES (?1, ?2, 1)"
+					" ON CONFLICT (name) DO UPDATE SET text = ?2, revision = revision + 1"},
+	[LEDGER_NOTE] = {"SELECT text FROM ", ".notes WHERE name = ?"},
+};
+
+int ledger_side_open(struct ledger_side *s, sqlite3 *db, const char *schema, struct error *e)
+{
+	s->db = db;
+	for (int i = 0; i < LEDGER_STATEMENTS; i++) {
+		char text[400];
+		snprintf(text, sizeof text, "%s%s%s", sql[i][0], schema, sql[i][1]);
+		if (sqlite3_prepare_v3(db, text, -1, SQLITE_PREPARE_PERSISTENT, &s->statements[i], NULL) != SQLITE_OK)
+			return ledger_file_error(db, e);
+	}
+	return 0;
+}
+
+void ledger_side_close(struct ledger_side *s)
+{
+	for (int i = 0; i < LEDGER_STATEMENTS; i++)
+		sqlite3_finalize(s->statements[i]);
+}
+
+/* Runs a statement that returns no rows. */
+static int finish(struct ledger_side *s, enum ledger_statement which, struct error *e)
+{
+	int rc = sqlite3_step(s->statements[which]) == SQLITE_DONE ? 0 : ledger_file_error(s->db, e);
+	sqlite3_reset(s->statements[which]);
+	sqlite3_clear_bindings(s->statements[which]);
+	return rc;
+}
+
+static uint32_t check_text(uint32_t crc, const char *text)
+{
+	return crc32c(crc, text, strlen(text) + 1);
+}
+
+/* The checksum of everything in a row. */
+static uint32_t check(const struct ledger_job *j)
+{
+	const struct {
+		uint64_t id, extended, revision, submission_size, plan_size;
+		double submitted, ended;
+		int32_t priority, mixed;
+	} numbers = {j->id,    j->extended, j->revision, j->submission_size, j->plan_size, j->submitted,
+		     j->ended, j->priority, j->mixed};
+	uint32_t crc = crc32c(0, &numbers, sizeof numbers);
+	crc = check_text(crc, j->owner);
+	crc = check_text(crc, j->name);
+	crc = check_text(crc, j->version);
+	crc = check_text(crc, j->held);
+	crc = check_text(crc, j->state);
+	crc = crc32c(crc, j->submission, j->submission_size);
+	crc = crc32c(crc, j->plan, j->plan_size);
+	return *j->record ? check_text(crc, j->record) : crc; /* version 4 had none */
+}
+
+static const char *text_at(sqlite3_stmt *s, int column)
+{
+	const void *text = sqlite3_column_text(s, column);
+	return text ? text : "";
+}
+
+static int row(struct ledger_side *side, enum ledger_statement which, uint64_t id, struct ledger_job *j,
+	       struct error *e)
+{
+	sqlite3_stmt *s = side->statements[which];
+	sqlite3_reset(s); /* here, so that the previous answer was valid until now */
+	sqlite3_bind_int64(s, 1, (sqlite3_int64)id);
+	int rc = sqlite3_step(s);
+	if (rc != SQLITE_ROW) {
+		rc = rc == SQLITE_DONE ? 0 : ledger_file_error(side->db, e);
+		sqlite3_reset(s);
+		return rc;
+	}
+	*j = (struct ledger_job){.id = (uint64_t)sqlite3_column_int64(s, 0),
+				 .owner = text_at(s, 1),
+				 .name = text_at(s, 2),
+				 .version = text_at(s, 3),
+				 .priority = sqlite3_column_int(s, 4),
+				 .mixed = sqlite3_column_int(s, 5),
+				 .submitted = sqlite3_column_double(s, 6),
+				 .held = text_at(s, 9),
+				 .extended = (uint64_t)sqlite3_column_int64(s, 10),
+				 .state = text_at(s, 11),
+				 .ended = sqlite3_column_double(s, 12),
+				 .revision = (uint64_t)sqlite3_column_int64(s, 13),
+				 .record = text_at(s, 15)};
+	j->submission = sqlite3_column_blob(s, 7);
+	j->submission_size = (size_t)sqlite3_column_bytes(s, 7);
+	j->plan = sqlite3_column_blob(s, 8);
+	j->plan_size = (size_t)sqlite3_column_bytes(s, 8);
+	sqlite3_int64 checksum = sqlite3_column_int64(s, 14);
+	j->damaged = checksum != check(j) && checksum != UNCHECKED;
+	return 1;
+}
+
+int ledger_side_get(struct ledger_side *s, uint64_t id, struct ledger_job *j, struct error *e)
+{
+	return row(s, LEDGER_GET, id, j, e);
+}
+
+int ledger_side_after(struct ledger_side *s, uint64_t id, struct ledger_job *j, struct error *e)
+{
+	int rc = row(s, LEDGER_AFTER, id, j, e);
+	/* Otherwise a caller that asks for the next one would never stop. */
+	return rc > 0 && j->id <= id
+		       ? error_set(e, EBADMSG, "the database of jobs is damaged: its jobs are not in order")
+		       : rc;
+}
+
+void ledger_side_release(struct ledger_side *s)
+{
+	sqlite3_reset(s->statements[LEDGER_GET]);
+	sqlite3_reset(s->statements[LEDGER_AFTER]);
+}
+
+void ledger_side_bind(struct ledger_side *side, const struct ledger_job *j)
+{
+	sqlite3_stmt *s = side->statements[LEDGER_PUT];
+	sqlite3_clear_bindings(s);
+	sqlite3_bind_int64(s, 1, (sqlite3_int64)j->id);
+	sqlite3_bind_text(s, 2, j->owner, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_text(s, 3, j->name, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_text(s, 4, j->version, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_int(s, 5, j->priority);
+	sqlite3_bind_int(s, 6, j->mixed);
+	sqlite3_bind_double(s, 7, j->submitted);
+	if (j->submission_size)
+		sqlite3_bind_blob64(s, 8, j->submission, j->submission_size, SQLITE_TRANSIENT);
+	if (j->plan_size)
+		sqlite3_bind_blob64(s, 9, j->plan, j->plan_size, SQLITE_TRANSIENT);
+	sqlite3_bind_text(s, 10, j->held, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_int64(s, 11, (sqlite3_int64)j->extended);
+	sqlite3_bind_text(s, 12, j->state, -1, SQLITE_TRANSIENT);
+	if (j->ended > 0)
+		sqlite3_bind_double(s, 13, j->ended);
+	sqlite3_bind_int64(s, 14, (sqlite3_int64)j->revision);
+	sqlite3_bind_int64(s, 15, check(j));
+	sqlite3_bind_text(s, 16, j->record, -1, SQLITE_TRANSIENT);
+}
+
+int ledger_side_put(struct ledger_side *s, struct error *e)
+{
+	return finish(s, LEDGER_PUT, e);
+}
+
+int ledger_side_remove(struct ledger_side *s, uint64_t id, struct error *e)
+{
+	sqlite3_bind_int64(s->statements[LEDGER_REMOVE], 1, (sqlite3_int64)id);
+	return finish(s, LEDGER_REMOVE, e);
+}
+
+int ledger_side_set(struct ledger_side *s, const char *name, const char *text, struct error *e)
+{
+	sqlite3_bind_text(s->statements[LEDGER_SET], 1, name, -1, SQLITE_STATIC);
+	sqlite3_bind_text(s->statements[LEDGER_SET], 2, text, -1, SQLITE_STATIC);
+	return finish(s, LEDGER_SET, e);
+}
+
+int ledger_side_note(struct ledger_side *side, const char *name, char **text, struct error *e)
+{
+	sqlite3_stmt *s = side->statements[LEDGER_NOTE];
+	sqlite3_bind_text(s, 1, name, -1, SQLITE_STATIC);
+	int rc = sqlite3_step(s);
+	if (rc == SQLITE_ROW)
+		rc = (*text = mem_strdup(text_at(s, 0))) ? 0 : error_set(e, ENOMEM, "no memory for %s", name);
+	else
+		rc = rc == SQLITE_DONE ? error_set(e, ENOENT, "there is no %s", name) : ledger_file_error(side->db, e);
+	sqlite3_reset(s);
+	return rc;
+}

@@ -1,0 +1,339 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What earlier coordinators kept in files of the spool is in the ledger after the next start, whatever of it is left.
+ */
+#include "coordinator/jobs/import.h"
+
+#include "common/base/checked_file.h"
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/jobs/reconcile.h"
+#include "proto/stored.pb-c.h"
+#include "tests/support/folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { JOB = 3 };
+static struct jobs jobs;
+static struct error e;
+
+static int set_up(void **state)
+{
+	static char spool[128];
+	if (folder_set_up(state))
+		return -1;
+	memset(&jobs, 0, sizeof jobs);
+	snprintf(spool, sizeof spool, "%s/spool", folder);
+	jobs.config.spool = spool;
+	return spool_open(&jobs.spool, spool, &e) || spool_make_job(jobs.spool, JOB, &e);
+}
+
+static int tear_down(void **state)
+{
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+	return folder_tear_down(state);
+}
+
+static bool has(const char *file)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(jobs.spool, JOB, file, path);
+	return access(path, F_OK) == 0;
+}
+
+/* ---- as an earlier coordinator wrote them */
+
+/* ended: the row knows that the job has. */
+static void old_row(uint64_t revision, bool ended)
+{
+	struct ledger *l;
+	struct ledger_job j = {.id = JOB,
+			       .owner = "ann",
+			       .name = "box",
+			       .version = "0.1",
+			       .held = "",
+			       .record = "",
+			       .priority = 5,
+			       .submitted = 2,
+			       .revision = revision,
+			       .state = ended ? "done" : "live",
+			       .ended = ended ? 9 : 0};
+	if (!ended) {
+		j.submission = (const unsigned char *)"row";
+		j.submission_size = 3;
+		j.plan = (const unsigned char *)"plan";
+		j.plan_size = 4;
+	}
+	assert_int_equal(ledger_open(&l, jobs.config.spool, &e), 0);
+	assert_int_equal(ledger_put(l, &j, &e), 0);
+	ledger_close(l);
+}
+
+static void old_copy(uint64_t revision, uint64_t extended)
+{
+	char path[SPOOL_PATH_MAX], text[5][8] = {"ann", "box", "0.1", "copy", "plan"};
+	unsigned char bytes[200];
+	struct checked_file out;
+	Stored__Row m;
+	stored__row__init(&m);
+	m.id = JOB;
+	m.revision = revision;
+	m.extended = extended;
+	m.priority = 7;
+	m.owner = text[0];
+	m.name = text[1];
+	m.version = text[2];
+	m.submission = (ProtobufCBinaryData){4, (uint8_t *)text[3]};
+	m.plan = (ProtobufCBinaryData){4, (uint8_t *)text[4]};
+	spool_job_path(jobs.spool, JOB, "order", path);
+	memcpy(bytes, "hsltO003", 8);
+	assert_int_equal(checked_file_create(&out, path, &e), 0);
+	assert_int_equal(checked_file_write(&out, bytes, 8 + stored__row__pack(&m, bytes + 8), &e), 0);
+	assert_int_equal(checked_file_finish(&out, &e), 0);
+	checked_file_close(&out);
+}
+
+static void old_record(const char *state)
+{
+	struct job_record r;
+	char *text;
+	record_begin(&r, JOB, "box", "ann");
+	text_copy(r.state, sizeof r.state, state);
+	r.mutations = 77;
+	r.ended = 11;
+	assert_int_equal(record_to_json(&r, &text, &e), 0);
+	assert_int_equal(spool_write(jobs.spool, JOB, "job.json", text, strlen(text), &e), 0);
+	mem_free(text);
+}
+
+static void old_file(const char *name, const char *text)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_path(jobs.spool, name, path);
+	FILE *f = fopen(path, "w");
+	assert_true(f && fputs(text, f) >= 0 && fclose(f) == 0);
+}
+
+/* ---- as it is now */
+
+/* Twice, as two starts. */
+static void import(struct ledger_job *j)
+{
+	for (int i = 0; i < 2; i++) {
+		assert_int_equal(ledger_open(&jobs.ledger, jobs.config.spool, &e), 0);
+		assert_int_equal(import_files(&jobs, &e), 0);
+		if (i == 0) {
+			ledger_close(jobs.ledger);
+			jobs.ledger = NULL;
+		}
+	}
+	assert_int_equal(ledger_get(jobs.ledger, JOB, j, &e), 1);
+	assert_false(j->damaged);
+	assert_string_equal(j->owner, "ann");
+	assert_string_equal(j->name, "box");
+	assert_false(has("job.json") || has("order"));
+}
+
+static void assert_submission(const struct ledger_job *j, const char *text)
+{
+	assert_int_equal(j->submission_size, strlen(text));
+	if (*text)
+		assert_memory_equal(j->submission, text, strlen(text));
+}
+
+static void assert_ended(const char *submission)
+{
+	struct ledger_job j;
+	struct job_record r;
+	import(&j);
+	assert_string_equal(j.state, "done");
+	assert_true(j.ended == 11);
+	assert_submission(&j, submission);
+	assert_int_equal(ledger_read_record(jobs.ledger, JOB, &r, &e), 0);
+	assert_int_equal(r.mutations, 77);
+}
+
+static void a_live_job(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	old_row(2, false);
+	old_copy(2, 0);
+	old_record("queued");
+	import(&j);
+	assert_submission(&j, "row");
+	assert_true(j.priority == 5 && j.ended == 0 && j.revision == 3);
+}
+
+static void its_row_is_older_than_the_copy(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	old_row(2, false);
+	old_copy(3, 0);
+	old_record("queued");
+	import(&j);
+	assert_submission(&j, "copy");
+	assert_true(j.priority == 7 && j.ended == 0 && j.revision == 4);
+}
+
+static void its_row_is_lost(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	old_copy(3, 0);
+	import(&j);
+	assert_submission(&j, "copy");
+	assert_string_equal(j.state, "live");
+}
+
+static void an_ended_job(void **state)
+{
+	(void)state;
+	old_row(2, true);
+	old_record("done");
+	assert_ended("");
+}
+
+static void with_films(void **state)
+{
+	(void)state;
+	old_row(2, true);
+	old_copy(1, 0);
+	old_record("done");
+	assert_ended("copy");
+}
+
+/* The coordinator was stopped between the two. */
+static void ended_in_its_record_only(void **state)
+{
+	(void)state;
+	old_row(2, false);
+	old_copy(2, 0);
+	old_record("done");
+	assert_ended("copy");
+}
+
+static void of_an_ended_job_the_record_is_left(void **state)
+{
+	(void)state;
+	old_record("done");
+	assert_ended("");
+}
+
+/* It runs again: the record is of its first end. */
+static void an_extended_job(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	struct job_record r;
+	old_copy(3, 1);
+	old_record("done");
+	import(&j);
+	assert_true(j.ended == 0 && j.extended == 1);
+	assert_string_equal(j.state, "live");
+	assert_int_equal(ledger_read_record(jobs.ledger, JOB, &r, &e), 0);
+	assert_int_equal(r.mutations, 77);
+}
+
+static void a_damaged_record(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	struct job_record r;
+	old_row(2, true);
+	assert_int_equal(spool_write(jobs.spool, JOB, "job.json", "{\"schema\":", 10, &e), 0);
+	assert_int_equal(spool_write(jobs.spool, JOB, "result.exr", "image", 5, &e), 0);
+	import(&j);
+	assert_true(j.ended == 9);
+	assert_int_equal(ledger_read_record(jobs.ledger, JOB, &r, &e), 0);
+	assert_true(r.has_result && r.priority == 5 && r.ended == 9);
+	assert_string_equal(r.state, "done");
+	assert_non_null(strstr(r.note, "was damaged"));
+}
+
+static void what_is_unknown_stays(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	old_record("running");
+	assert_int_equal(spool_write(jobs.spool, JOB, "checkpoint", "films", 5, &e), 0);
+	assert_int_equal(reconcile(&jobs, &e), -EBADMSG);
+	assert_non_null(strstr(e.text, "has lost 1 job: j3 (jobs.db and jobs-copy.db have no row for it"));
+	assert_int_equal(ledger_get(jobs.ledger, JOB, &j, &e), 0);
+	assert_true(has("job.json") && has("checkpoint"));
+}
+
+static void what_was_never_accepted_goes(void **state)
+{
+	(void)state;
+	old_record("queued");
+	assert_int_equal(spool_write(jobs.spool, JOB, "log", "line", 4, &e), 0);
+	assert_int_equal(reconcile(&jobs, &e), 0);
+	assert_false(has(NULL));
+	assert_int_equal(ledger_next_id(jobs.ledger), JOB + 1);
+}
+
+static void of_another_version(void **state)
+{
+	(void)state;
+	old_row(2, true);
+	assert_int_equal(spool_write(jobs.spool, JOB, "job.json", "{\"schema\":2}", 12, &e), 0);
+	assert_int_equal(ledger_open(&jobs.ledger, jobs.config.spool, &e), 0);
+	assert_int_equal(import_files(&jobs, &e), -EPROTO);
+	assert_true(has("job.json"));
+}
+
+static void notes(void **state)
+{
+	(void)state;
+	static const char *const names[][2] = {{"clock", "clock"}, {"aside", "quarantined"}};
+	char *text;
+	old_file("next-job", "41\n");
+	for (int i = 0; i < 2; i++)
+		old_file(names[i][0], "{}");
+	for (int start = 0; start < 2; start++) {
+		assert_int_equal(ledger_open(&jobs.ledger, jobs.config.spool, &e), 0);
+		assert_int_equal(import_files(&jobs, &e), 0);
+		assert_int_equal(ledger_next_id(jobs.ledger), 41);
+		for (int i = 0; i < 2; i++) {
+			assert_int_equal(ledger_note(jobs.ledger, names[i][1], &text, &e), 0);
+			assert_string_equal(text, "{}");
+			mem_free(text);
+		}
+		if (start == 0)
+			ledger_close(jobs.ledger);
+	}
+	old_file("next-job", "none\n");
+	assert_int_equal(import_files(&jobs, &e), -EBADMSG);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(a_live_job, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(its_row_is_older_than_the_copy, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(its_row_is_lost, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(an_ended_job, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(with_films, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(ended_in_its_record_only, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(of_an_ended_job_the_record_is_left, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(an_extended_job, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_damaged_record, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(what_is_unknown_stays, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(what_was_never_accepted_goes, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(of_another_version, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(notes, set_up, tear_down),
+	};
+	log_set_level(LOG_LEVEL_ERROR);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

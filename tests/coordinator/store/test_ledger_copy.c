@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What one of the two files of the ledger has lost is restored from the other; what both have lost is not invented. */
+#include "coordinator/store/ledger.h"
+
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "tests/support/folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <sqlite3.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { ROWS = 5 };
+static const char *const files[] = {"jobs.db", "jobs-copy.db"};
+static struct error e;
+
+static char *path_of(const char *file)
+{
+	static char path[200];
+	snprintf(path, sizeof path, "%s/%s", folder, file);
+	return path;
+}
+
+/* As somebody else than the ledger would. */
+static void change(const char *file, const char *sql)
+{
+	sqlite3 *db;
+	assert_int_equal(sqlite3_open(path_of(file), &db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+	assert_int_equal(sqlite3_close(db), SQLITE_OK);
+}
+
+static struct ledger *open_ledger(void)
+{
+	struct ledger *l;
+	assert_int_equal(ledger_open(&l, folder, &e), 0);
+	return l;
+}
+
+static void fill(void)
+{
+	struct ledger *l = open_ledger();
+	struct job_record r;
+	for (uint64_t id = 1; id <= ROWS; id++) {
+		struct ledger_job j = {.id = id,
+				       .owner = "ann",
+				       .name = "box",
+				       .version = "1",
+				       .record = "",
+				       .submission = (const unsigned char *)"submission",
+				       .submission_size = 10,
+				       .plan = (const unsigned char *)"plan",
+				       .plan_size = 4};
+		assert_int_equal(ledger_add(l, &j, &e), 0);
+	}
+	record_begin(&r, ROWS, "box", "ann");
+	text_copy(r.state, sizeof r.state, "done");
+	assert_int_equal(ledger_end(l, &r, false, &e), 0);
+	assert_int_equal(ledger_priority(l, 2, 7, &e), 0);
+	assert_int_equal(ledger_set(l, "clock", "later", &e), 0);
+	ledger_close(l);
+}
+
+/* Twice: what was restored is there the next time, too. */
+static void assert_filled(void)
+{
+	for (int again = 0; again < 2; again++) {
+		struct ledger *l = open_ledger();
+		struct job_record r;
+		struct ledger_job j;
+		char *text;
+		for (uint64_t id = 1; id <= ROWS; id++) {
+			assert_int_equal(ledger_get(l, id, &j, &e), 1);
+			assert_true(!j.damaged && j.priority == (id == 2 ? 7 : 0));
+			assert_string_equal(j.state, id == ROWS ? "done" : "live");
+			assert_int_equal(j.submission_size, id == ROWS ? 0 : 10);
+		}
+		assert_int_equal(ledger_read_record(l, ROWS, &r, &e), 0);
+		assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+		assert_string_equal(text, "later");
+		mem_free(text);
+		assert_int_equal(ledger_next_id(l), ROWS + 1);
+		ledger_close(l);
+	}
+}
+
+static void spoil(const char *file)
+{
+	int fd = open(path_of(file), O_RDWR | O_TRUNC);
+	static const char text[] = "This is no database, but a text that is long enough to be looked at as one, if any"
+				   "body looked; and so on.";
+	assert_int_equal(write(fd, text, sizeof text), sizeof text);
+	close(fd);
+}
+
+static void a_file_is_lost(void **state)
+{
+	(void)state;
+	fill();
+	for (int i = 0; i < 2; i++) {
+		assert_int_equal(unlink(path_of(files[i])), 0);
+		assert_filled();
+	}
+}
+
+static void a_file_is_no_database(void **state)
+{
+	(void)state;
+	fill();
+	for (int i = 0; i < 2; i++) {
+		char damaged[40];
+		spoil(files[i]);
+		assert_filled();
+		snprintf(damaged, sizeof damaged, "%s.damaged", files[i]);
+		assert_int_equal(access(path_of(damaged), F_OK), 0);
+	}
+}
+
+static void rows_are_lost_or_changed(void **state)
+{
+	(void)state;
+	static const char *const statements[] = {
+		"DELETE FROM jobs",
+		"DELETE FROM notes",
+		"UPDATE jobs SET priority = 3",
+		"UPDATE jobs SET record = '{}'",
+		"UPDATE jobs SET ended = 5, state = 'done', submission = NULL, plan = NULL WHERE ended IS NULL",
+		"UPDATE jobs SET plan = CAST('plaN' AS BLOB) WHERE id = 3",
+		"UPDATE jobs SET checksum = NULL",
+		"DROP TABLE notes; CREATE TABLE notes (name TEXT PRIMARY KEY, text TEXT NOT NULL, revision INTEGER NOT NULL)",
+	};
+	fill();
+	for (size_t s = 0; s < sizeof statements / sizeof *statements; s++)
+		for (int i = 0; i < 2; i++) {
+			change(files[i], statements[s]);
+			assert_filled();
+		}
+}
+
+/* A backup of jobs.db from before a change is put back. */
+static void a_file_is_older(void **state)
+{
+	(void)state;
+	char command[500];
+	struct ledger *l = open_ledger();
+	struct ledger_job j = {.id = 1, .owner = "", .name = "", .version = "", .record = ""};
+	assert_int_equal(ledger_add(l, &j, &e), 0);
+	ledger_close(l);
+	for (int i = 0; i < 2; i++) {
+		snprintf(command, sizeof command, "cp '%s/%s' '%s/old'", folder, files[i], folder);
+		assert_int_equal(system(command), 0);
+		l = open_ledger();
+		assert_int_equal(ledger_priority(l, 1, 10 + i, &e), 0);
+		assert_int_equal(ledger_set(l, "clock", i ? "2" : "1", &e), 0);
+		ledger_close(l);
+		snprintf(command, sizeof command, "mv '%s/old' '%s/%s'", folder, folder, files[i]);
+		assert_int_equal(system(command), 0);
+		l = open_ledger();
+		char *text;
+		assert_int_equal(ledger_get(l, 1, &j, &e), 1);
+		assert_int_equal(j.priority, 10 + i);
+		assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+		assert_string_equal(text, i ? "2" : "1");
+		mem_free(text);
+		ledger_close(l);
+	}
+}
+
+static void both_are_damaged(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	struct job_record r;
+	fill();
+	for (int i = 0; i < 2; i++)
+		change(files[i], "UPDATE jobs SET priority = 3 WHERE id IN (1, 5)");
+	struct ledger *l = open_ledger();
+	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
+	assert_true(j.damaged && j.id == 1);
+	assert_int_equal(ledger_hold(l, 1, "bob", &e), -EBADMSG);
+	assert_non_null(strstr(e.text, "the row of j1 is damaged"));
+	assert_int_equal(ledger_read_record(l, 5, &r, &e), -EBADMSG);
+	assert_int_equal(ledger_get(l, 2, &j, &e), 1);
+	assert_false(j.damaged);
+	assert_int_equal(ledger_forget(l, 1, &e), 0);
+	assert_int_equal(ledger_get(l, 1, &j, &e), 0);
+	ledger_close(l);
+	for (int i = 0; i < 2; i++)
+		spoil(files[i]);
+	l = open_ledger();
+	assert_int_equal(ledger_next_id(l), 1);
+	ledger_close(l);
+}
+
+/* ---- a copy that cannot be written ---- */
+
+static _Atomic bool refuse;
+static sqlite3 *connection; /* of the ledger */
+
+static int take_connection(sqlite3 *db, const char **text, const struct sqlite3_api_routines *api)
+{
+	(void)text;
+	(void)api;
+	connection = db;
+	return SQLITE_OK;
+}
+
+/* Called before each write of a table; the copy refuses. */
+static int deny(void *user, int what, const char *a, const char *b, const char *file, const char *trigger)
+{
+	(void)user;
+	(void)a;
+	(void)b;
+	(void)trigger;
+	bool writes = what == SQLITE_INSERT || what == SQLITE_UPDATE || what == SQLITE_DELETE;
+	return refuse && writes && file && strcmp(file, "copy") == 0 ? SQLITE_DENY : SQLITE_OK;
+}
+
+/* What is written meanwhile is in jobs.db, and in the copy once it can be written. */
+static void the_copy_falls_behind(void **state)
+{
+	(void)state;
+	struct ledger_job j;
+	fill();
+	sqlite3_auto_extension((void (*)(void))take_connection);
+	struct ledger *l = open_ledger();
+	sqlite3_reset_auto_extension();
+	/* Statements are compiled again for the authorizer. */
+	assert_int_equal(sqlite3_set_authorizer(connection, deny, NULL), SQLITE_OK);
+	refuse = true;
+	assert_int_equal(ledger_priority(l, 3, 9, &e), 0);
+	assert_int_equal(ledger_set(l, "clock", "latest", &e), 0);
+	assert_true(ledger_mend(l, &e) < 0);
+	assert_true(ledger_drop(l, (uint64_t[]){ROWS}, 1, &e) < 0);
+	refuse = false;
+	assert_int_equal(ledger_mend(l, &e), 0);
+	assert_int_equal(ledger_drop(l, (uint64_t[]){ROWS}, 1, &e), 0);
+	ledger_close(l);
+	assert_int_equal(unlink(path_of("jobs.db")), 0);
+	l = open_ledger();
+	char *text;
+	assert_int_equal(ledger_get(l, 3, &j, &e), 1);
+	assert_int_equal(j.priority, 9);
+	assert_int_equal(ledger_get(l, ROWS, &j, &e), 0);
+	assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+	assert_string_equal(text, "latest");
+	mem_free(text);
+	ledger_close(l);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(a_file_is_lost, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_file_is_no_database, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(rows_are_lost_or_changed, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_file_is_older, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(both_are_damaged, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(the_copy_falls_behind, folder_set_up, folder_tear_down),
+	};
+	log_set_level(LOG_LEVEL_ERROR);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
