@@ -18,27 +18,37 @@
 
 #include <cmocka.h>
 
-/* Samples a pixel are what the power asks for; 0: the scene says nothing new about chains (single_spp: of single paths,
- * whose states say less a mutation than those of all techniques) or about few light sub-paths (rare_spp). */
-static void check_all(const char *name, struct world *w, uint64_t path_spp, uint64_t bdpt_spp, uint64_t rare_spp,
-		      uint64_t chain_spp, uint64_t single_spp)
+/* Samples a pixel, as many as the power asks for; 0: the scene says nothing new of such an integrator. */
+struct lengths {
+	uint64_t path, bdpt;
+	uint64_t rare;	 /* of few light sub-paths */
+	uint64_t spread; /* of short chains from samples; rare_spread: from samples with few light sub-paths */
+	uint64_t rare_spread;
+	uint64_t chain;	 /* of chains of all techniques */
+	uint64_t single; /* of chains of single paths, whose states say less a mutation */
+};
+
+static uint64_t samples_of(const struct lengths *n, const struct render_integrator *r)
+{
+	const struct integrator *of = integrator_find(r->name);
+	bool rare = of->light_every > 1;
+	if (of->redistributes)
+		return rare ? n->rare_spread : n->spread;
+	return r->kind != PLAN_SAMPLES ? (r->has_mutations ? n->single : n->chain) : rare ? n->rare : n->bdpt;
+}
+
+static void check_all(const char *name, struct world *w, const struct lengths *n)
 {
 	static struct agree_image reference, other;
-	struct agree_side path = {"path", path_spp, 32, 0, 0};
+	struct agree_side path = {"path", n->path, 32, 0, 0};
 	agree_render(w, name, "path", &path, &reference);
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct render_integrator *r = render_integrator_at(i);
-		uint64_t spp = r->kind == PLAN_SAMPLES ? bdpt_spp : r->has_mutations ? single_spp : chain_spp;
-		const struct integrator *of = integrator_find(r->name);
-		if (of->light_every > 1)
-			spp = of->redistributes && rare_spp ? spp : rare_spp;
-		if (of->redistributes)
-			spp = spp * 9 / 4; /* a chain brings its light in one piece */
-		if (strcmp(r->name, "path") == 0 || spp == 0)
-			continue;
+		struct agree_side side = {r->name, samples_of(n, r), 32, 0, 0};
 		char test[64];
+		if (strcmp(r->name, "path") == 0 || !samples_of(n, r))
+			continue;
 		snprintf(test, sizeof test, "%s %s", name, r->name);
-		struct agree_side side = {r->name, spp, 32, 0, 0};
 		agree_render(w, test, r->name, &side, &other);
 		agree_check(test, &other, &reference);
 	}
@@ -79,7 +89,12 @@ static void test_diffuse(void **state)
 				DEPTH("3") ROOM LAMP "<shape type='cube'>" AT(
 					"<scale value='0.5'/><rotate y='1' angle='25'/><translate y='-1.5' z='-0.5'/>")
 					DIFFUSE("0.7,0.2,0.1") "</shape>"),
-		  640, 640, 512, at_length(6656), 0);
+		  &(struct lengths){.path = 640,
+				    .bdpt = 640,
+				    .rare = 512,
+				    .spread = 1440,
+				    .rare_spread = at_length(1440),
+				    .chain = at_length(6656)});
 }
 
 static void test_glossy(void **state)
@@ -101,7 +116,7 @@ static void test_glossy(void **state)
 															BALL("-0.5,0.6,-0.9", "0.4", "<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>") "<shape type='rectangle'>" AT(
 																"<scale value='0.5'/><translate x='0.9' y='0.5' z='-0.3'/>") "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='blendbsdf'><bsdf type='diffuse'/>"
 																							     "<bsdf type='conductor'><string name='material' value='Ag'/></bsdf></bsdf></bsdf></shape>"),
-		1536, 1536, 1280, 0, 0);
+		&(struct lengths){.path = 1536, .bdpt = 1536, .rare = 1280, .spread = 3456, .rare_spread = 3456});
 }
 
 static void test_glass(void **state)
@@ -112,7 +127,11 @@ static void test_glass(void **state)
 				DEPTH("6") ROOM LAMP BALL("0,-0.6,-0.3", "0.8",
 							  "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
 							  "<float name='ext_ior' value='1'/></bsdf>")),
-		  2560, 2560, at_length(2048), 0, 0);
+		  &(struct lengths){.path = 2560,
+				    .bdpt = 2560,
+				    .rare = at_length(2048),
+				    .spread = 5760,
+				    .rare_spread = at_length(5760)});
 }
 
 static void test_rough_glass(void **state)
@@ -124,7 +143,11 @@ static void test_rough_glass(void **state)
 					"0,-0.6,-0.3", "0.8",
 					"<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
 					"<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
-		  2560, 2560, 0, at_length(12800), at_length(21504));
+		  &(struct lengths){.path = 2560,
+				    .bdpt = 2560,
+				    .spread = at_length(5760),
+				    .chain = at_length(12800),
+				    .single = at_length(21504)});
 }
 
 static void test_environment(void **state)
@@ -139,7 +162,7 @@ static void test_environment(void **state)
 				DIFFUSE("0.5,0.5,0.6") "</shape>" BALL(
 					"0,0,0", "1",
 					"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
-		512, 512, 0, at_length(6144), 14336);
+		&(struct lengths){.path = 512, .bdpt = 512, .spread = 1152, .chain = at_length(6144), .single = 14336});
 }
 
 int main(void)
