@@ -251,9 +251,9 @@ static void print_workers(const json_t *snapshot)
 	json_array_foreach(json_object_get(snapshot, "workers"), i, worker)
 	{
 		if (i == 0)
-			printf("\n%-24s %-8s %5s %7s %6s %8s %s\n", "WORKER", "STATE", "START", "THREADS", "LEASES",
+			printf("\n%-24s %-11s %5s %7s %6s %8s %s\n", "WORKER", "STATE", "START", "THREADS", "LEASES",
 			       "MERGED", "LAST FAULT");
-		printf("%-24s %-8s %5.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
+		printf("%-24s %-11s %5.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
 		       number_of(worker, "restarts"), number_of(worker, "threads"), number_of(worker, "leases"),
 		       number_of(worker, "merged"), text_of(worker, "text"));
 	}
@@ -275,7 +275,7 @@ static void print_quarantined(const json_t *snapshot)
 {
 	size_t i;
 	const json_t *worker;
-	json_array_foreach(json_object_get(snapshot, "aside"), i, worker) printf(
+	json_array_foreach(json_object_get(snapshot, "quarantined"), i, worker) printf(
 		"quarantined: %s%s%s: %s\n", text_of(worker, "name"), *text_of(worker, "certificate") ? " of " : "",
 		text_of(worker, "certificate"), text_of(worker, "why"));
 }

@@ -38,7 +38,7 @@ struct publishing { /* at most one at a time per live job */
 	double wall_seconds;
 	enum job_end end;
 	struct canvas_image image;
-	struct convergence agreement;
+	struct convergence convergence;
 	int rc;
 	struct error error;
 };

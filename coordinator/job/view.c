@@ -177,7 +177,7 @@ json_t *view_to_json(const struct job_view *v)
 	add_forecast(o, v);
 	json_object_set_new(o, "counts", record_counts(r));
 	json_object_set_new(o, "strategies", record_strategies(r));
-	json_object_set_new(o, "agreement", convergence_to_json(&r->agreement));
+	json_object_set_new(o, "agreement", convergence_to_json(&r->convergence));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));
 	return o;
@@ -185,7 +185,7 @@ json_t *view_to_json(const struct job_view *v)
 
 json_t *view_peer_to_json(const struct peer_status *p, double now)
 {
-	static const char *const states[] = {"active", "silent", "aside"};
+	static const char *const states[] = {"active", "silent", "quarantined"};
 	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}",		      /* */
 			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state],		      /* */
 			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want,     /* */
@@ -196,7 +196,7 @@ json_t *view_peer_to_json(const struct peer_status *p, double now)
 			 "restarts", (json_int_t)p->restarts, "text", p->text);
 }
 
-json_t *view_aside_to_json(const struct worker_status *w)
+json_t *view_quarantined_to_json(const struct worker_status *w)
 {
 	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", w->name, "certificate", w->certificate, "home",
 			 w->home, /* */

@@ -53,7 +53,7 @@ struct view_looks {
 void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out); /* borrows both */
 json_t *view_to_json(const struct job_view *v);
 json_t *view_peer_to_json(const struct peer_status *p, double now);
-json_t *view_aside_to_json(const struct worker_status *w);
+json_t *view_quarantined_to_json(const struct worker_status *w);
 json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now);
 
 #endif

@@ -56,7 +56,7 @@ static void work_on_film(uv_work_t *work)
 	struct publishing *w = work->data;
 	w->rc = canvas_image(w->job->canvas, w->what == PUBLISH_PREVIEW, &w->image, &w->error);
 	if (!w->rc)
-		convergence_judge(&w->job->plan, &w->image, &w->agreement);
+		convergence_judge(&w->job->plan, &w->image, &w->convergence);
 	if (!w->rc && w->what != PUBLISH_ERROR_ONLY)
 		w->rc = write_image(w);
 }
@@ -83,11 +83,11 @@ static void tell_error(const struct publishing *w)
 static void tell_image(const struct publishing *w)
 {
 	uint64_t job = w->job->id;
-	if (*w->agreement.text)
-		live_job_log(w->job, LOG_JOB_NOTE, "text=%s", log_quote(w->agreement.text).text);
+	if (*w->convergence.text)
+		live_job_log(w->job, LOG_JOB_NOTE, "text=%s", log_quote(w->convergence.text).text);
 	struct event ev = {.kind = EVENT_IMAGE_KNOWN,
 			   .job = job,
-			   .image_known = {.job = job, .disagrees = w->agreement.verdict == CHAINS_DISAGREE}};
+			   .image_known = {.job = job, .disagrees = w->convergence.verdict == CHAINS_DISAGREE}};
 	jobs_step(w->jobs, &ev);
 }
 
@@ -119,7 +119,7 @@ static void take_outcome(struct publishing *w)
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
 		record_take_error(&job->record, &w->image);
 	if (!w->rc)
-		record_take_convergence(&job->record, &w->image, &w->agreement);
+		record_take_convergence(&job->record, &w->image, &w->convergence);
 	if (w->what == PUBLISH_RESULT && !w->rc)
 		job->black = w->image.black;
 	if (w->what == PUBLISH_RESULT && w->rc)

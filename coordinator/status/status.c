@@ -109,7 +109,7 @@ static json_t *quarantined_json(const struct peers *s)
 	struct worker_status w;
 	for (uint64_t who = 0;
 	     (who = farm_next_quarantined(s->jobs->farm, who)) && farm_worker(s->jobs->farm, who, &w);)
-		json_array_append_new(list, view_aside_to_json(&w));
+		json_array_append_new(list, view_quarantined_to_json(&w));
 	return list;
 }
 
@@ -129,7 +129,7 @@ static void add_workers(const struct peers *s, json_t *o)
 			json_array_append_new(leases, view_lease_to_json(&l, p.name, now));
 	}
 	json_object_set_new(o, "workers", workers);
-	json_object_set_new(o, "aside", quarantined_json(s));
+	json_object_set_new(o, "quarantined", quarantined_json(s));
 	json_object_set_new(o, "leases", leases);
 }
 

@@ -52,7 +52,7 @@ void record_take_counted(struct job_record *r, const struct plan *p, const struc
 	memcpy(r->strategy, n->strategy, sizeof r->strategy);
 	strategy_note(p, n, black, r->note, sizeof r->note);
 	strategy_add_beyond(beyond_share, r->note, sizeof r->note);
-	convergence_add_note(&r->agreement, r->note, sizeof r->note);
+	convergence_add_note(&r->convergence, r->note, sizeof r->note);
 }
 
 void record_add_note(struct job_record *r, const char *text)
@@ -77,14 +77,14 @@ void record_begin(struct job_record *r, uint64_t id, const char *name, const cha
 	text_copy(r->name, sizeof r->name, name);
 	text_copy(r->owner, sizeof r->owner, owner);
 	r->ended_seen = r->rel_error = -1;
-	convergence_from_json(NULL, &r->agreement);
+	convergence_from_json(NULL, &r->convergence);
 	classes_from_json(NULL, r->classes);
 	r->b = 0;
 }
 
 void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a)
 {
-	r->agreement = *a;
+	r->convergence = *a;
 	r->b = img->b;
 	memcpy(r->classes, img->classes, sizeof r->classes);
 }
@@ -173,7 +173,7 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 	}
 	json_object_set_new(o, "counts", record_counts(r));
 	json_object_set_new(o, "strategies", record_strategies(r));
-	json_object_set_new(o, "agreement", convergence_to_json(&r->agreement));
+	json_object_set_new(o, "agreement", convergence_to_json(&r->convergence));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));
 	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
@@ -217,7 +217,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	fields_read(fields, FIELD_COUNT, r, o);
 	fields_read(counts, COUNTS_COUNT, r, json_object_get(o, "counts"));
 	take_strategies(o, r);
-	convergence_from_json(json_object_get(o, "agreement"), &r->agreement);
+	convergence_from_json(json_object_get(o, "agreement"), &r->convergence);
 	classes_from_json(json_object_get(o, "classes"), r->classes);
 	forecast_looks_from_json(json_object_get(o, "looks"), &r->looks);
 	json_t *effects = json_object_get(o, "effects");

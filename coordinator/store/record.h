@@ -35,7 +35,7 @@ struct job_record {
 	char effects[RECORD_EFFECTS]; /* a JSON array: the effects that the scene needs, and why; "": not known, or too
 					 long */
 	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
-	struct convergence agreement;				/* statistics of the last image */
+	struct convergence convergence;				/* statistics of the last image */
 	struct path_class_energy classes[PATH_CLASSES];
 };
 

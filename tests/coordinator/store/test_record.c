@@ -43,7 +43,7 @@ static void records_come_back(void **state)
 	r.longest_stuck = 5210;
 	for (uint64_t i = 0; i < 2 * STRATEGY_COUNTERS; i++)
 		r.strategy[i / STRATEGY_COUNTERS][i % STRATEGY_COUNTERS] = i * i;
-	r.agreement = (struct convergence){
+	r.convergence = (struct convergence){
 		CHAINS_DISAGREE,      12, 3, 0.125, 1.01, 2.5, 64, 128, 1U << 7 | 1, 1U << 19 | 2, 0.25,
 		"chains \"disagree\""};
 	r.b = 1.0 / 7;
@@ -76,13 +76,13 @@ static void records_come_back(void **state)
 	assert_string_equal(back.effects, r.effects);
 	assert_true(back.stuck == 3 && back.longest_stuck == 5210);
 	assert_memory_equal(back.strategy, r.strategy, sizeof r.strategy);
-	const struct convergence *a = &back.agreement;
+	const struct convergence *a = &back.convergence;
 	assert_true(a->verdict == CHAINS_DISAGREE && a->tiles == 12 && a->tiles_flagged == 3 &&
 		    a->energy_flagged == 0.125);
 	assert_true(a->r_hat_median == 1.01 && a->r_hat_worst == 2.5 && a->worst_x == 64 && a->worst_y == 128);
-	assert_true(a->classes_flagged == r.agreement.classes_flagged &&
-		    a->classes_apart == r.agreement.classes_apart && a->stuck_share == 0.25 && back.b == r.b);
-	assert_string_equal(a->text, r.agreement.text);
+	assert_true(a->classes_flagged == r.convergence.classes_flagged &&
+		    a->classes_apart == r.convergence.classes_apart && a->stuck_share == 0.25 && back.b == r.b);
+	assert_string_equal(a->text, r.convergence.text);
 	assert_memory_equal(&back.classes[7], &r.classes[7], sizeof *r.classes);
 	assert_true(back.classes[0].chains == 0.4 && isnan(back.classes[0].difference_t) &&
 		    isnan(back.classes[0].chains_error));
@@ -105,7 +105,7 @@ static void other_records(void **state)
 	char *text;
 	assert_int_equal(from_text("{\"schema\":1,\"id\":7,\"name\":\"a\"}", &r), 0);
 	assert_true(*r.mixture == 0 && *r.note == 0 && r.stuck == 0);
-	assert_true(r.agreement.verdict == CHAINS_AGREE && isnan(r.agreement.r_hat_worst) && r.b == 0);
+	assert_true(r.convergence.verdict == CHAINS_AGREE && isnan(r.convergence.r_hat_worst) && r.b == 0);
 	assert_int_equal(from_text("{\"schema\":1,\"id\":7,\"mixture\":\"a,,b\",\"strategies\":7}", &r), 0);
 	assert_true(*r.mixture == 0);
 	assert_int_equal(from_text("{}", &r), -EBADMSG);

@@ -101,7 +101,7 @@ large_pixel() {
 	finish_job
 	[ "$(grep -c 'event=batch_refused .*worker="w2" ' "$DIR/coordinator.log")" -ge 3 ] || fail "$NAME: it is not named"
 	! grep 'event=batch_refused' "$DIR/coordinator.log" | grep -v 'worker="w2"\|text="the job is over"' || fail "$NAME: others are refused"
-	"$BIN/hslt-status" | grep -q '^w2 .* aside ' || fail "$NAME: $("$BIN/hslt-status")"
+	"$BIN/hslt-status" | grep -q '^w2 .* quarantined ' || fail "$NAME: $("$BIN/hslt-status")"
 	blameless
 }
 

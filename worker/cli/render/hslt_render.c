@@ -116,7 +116,7 @@ struct session {
 	struct local_run run;
 	struct canvas_image image;
 	struct forecast_history looks;
-	struct convergence agreement;
+	struct convergence convergence;
 	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
 	char forecast[160];
 	double build_seconds;
@@ -267,7 +267,7 @@ static int render(struct session *s, struct error *e)
 				 s->kept.said);
 	rc = canvas_image(s->run.canvas, false, &s->image, e);
 	if (!rc)
-		convergence_judge(&s->plan, &s->image, &s->agreement);
+		convergence_judge(&s->plan, &s->image, &s->convergence);
 	return rc;
 }
 
@@ -312,7 +312,7 @@ static void print_summary(const struct session *s)
 	strategy_table(p->mutations, &i->counts, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
-	convergence_table(i->classes, i->b, &s->agreement, text, sizeof text);
+	convergence_table(i->classes, i->b, &s->convergence, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
 	if (s->a->stats && i->counts.counters[COUNT_SPREAD])
@@ -322,7 +322,7 @@ static void print_summary(const struct session *s)
 			100 * i->chains_energy, 100 * i->chains_variance, 100 * stats_chains_rays(i));
 	strategy_note(p, &i->counts, i->black, text, sizeof text);
 	strategy_add_beyond(i->beyond_share, text, sizeof text);
-	convergence_add_note(&s->agreement, text, sizeof text);
+	convergence_add_note(&s->convergence, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
@@ -402,7 +402,7 @@ static int run_session(struct session *s, struct error *e)
 		kept_bootstrap_end(&s->kept);
 	if (!rc && s->a->stats)
 		rc = stats_write(s->a->stats,
-				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement,
+				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->convergence,
 						 s->build_seconds, &s->looks, &s->choice},
 				 e);
 	if (!rc && !s->a->quiet)
@@ -437,7 +437,7 @@ int main(int argc, char **argv)
 		fprintf(stderr, "hslt-render: %s\n", e.text);
 		return s.usage ? 2 : 1;
 	}
-	if (s.agreement.verdict == CHAINS_DISAGREE)
+	if (s.convergence.verdict == CHAINS_DISAGREE)
 		return 5;
 	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR && !s.run.lit.black;
 	return missed ? 4 : 0;

@@ -107,10 +107,11 @@ static json_t *end_json(const struct stats *s)
 	char note[STRATEGY_NOTE];
 	strategy_note(p, &s->image->counts, s->image->black, note, sizeof note);
 	strategy_add_beyond(s->image->beyond_share, note, sizeof note);
-	convergence_add_note(s->agreement, note, sizeof note);
+	convergence_add_note(s->convergence, note, sizeof note);
 	return json_pack("{s:s s:s s:o s:s s:o s:o}", "end", merge_end_name(s->run->end, s->run->lit.black), "mixture",
 			 p->mutations, "strategies", strategy_to_json(p->mutations, &s->image->counts), "note", note,
-			 "agreement", convergence_to_json(s->agreement), "classes", classes_to_json(s->image->classes));
+			 "agreement", convergence_to_json(s->convergence), "classes",
+			 classes_to_json(s->image->classes));
 }
 
 int stats_write(const char *path, const struct stats *s, struct error *e)

@@ -16,8 +16,8 @@ struct stats {
 	const struct render_summary *summary;
 	const struct local_run *run; /* has ended */
 	const struct canvas_image *image;
-	const struct convergence *agreement; /* of the image */
-	double build_seconds;		     /* of the world */
+	const struct convergence *convergence; /* of the image */
+	double build_seconds;		       /* of the world */
 	const struct forecast_history *looks;
 	const struct choice *choice; /* of the integrator */
 };
