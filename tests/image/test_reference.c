@@ -262,6 +262,9 @@ int main(void)
 		cmocka_unit_test(veach_mis_in_colour),
 	};
 	size_t count = sizeof tests / sizeof *tests;
-	return _cmocka_run_group_tests("reference", tests, test_scaled() ? 1 : test_full() ? count : count - 1, NULL,
-				       NULL);
+	return _cmocka_run_group_tests("reference", tests,
+				       test_scaled() ? 1
+				       : test_full() ? count
+						     : count - 1,
+				       NULL, NULL);
 }

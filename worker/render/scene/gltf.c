@@ -14,6 +14,8 @@
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/gltf_light.h"
 #include "worker/render/scene/gltf_mesh.h"
+#include "worker/render/scene/gltf_node.h"
+#include "worker/render/scene/gltf_numbers.h"
 #include "worker/render/scene/gltf_tree.h"
 #include "common/base/bytes.h"
 
@@ -21,7 +23,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { NODES_DEEP = 256, INSTANCES_MAX = 1 << 17, GLB_HEADER = 12, GLB_CHUNK = 8 };
+enum { INSTANCES_MAX = 1 << 17, GLB_HEADER = 12, GLB_CHUNK = 8 };
 #define GLB_MAGIC 0x46546c67u  /* "glTF" */
 #define GLB_JSON 0x4e4f534au   /* "JSON" */
 #define GLB_BINARY 0x004e4942u /* "BIN" */
@@ -113,10 +115,16 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 /* Extensions that are known, whatever becomes of them. */
 static bool is_known(const char *extension)
 {
-	static const char *const known[] = {"KHR_lights_punctual",	  "KHR_materials_clearcoat",
-					    "KHR_materials_dispersion",	  "KHR_materials_emissive_strength",
-					    "KHR_materials_ior",	  "KHR_materials_specular",
-					    "KHR_materials_transmission", "KHR_materials_volume",
+	static const char *const known[] = {"EXT_mesh_gpu_instancing",
+					    "KHR_lights_punctual",
+					    "KHR_materials_clearcoat",
+					    "KHR_materials_dispersion",
+					    "KHR_materials_emissive_strength",
+					    "KHR_materials_ior",
+					    "KHR_materials_specular",
+					    "KHR_materials_transmission",
+					    "KHR_materials_volume",
+					    "KHR_mesh_quantization",
 					    "KHR_texture_transform"};
 	for (size_t i = 0; i < sizeof known / sizeof *known; i++)
 		if (strcmp(known[i], extension) == 0)
@@ -167,9 +175,8 @@ static void check_file(struct gltf *g)
 	}
 	note_unknown(g);
 	if (json_array_size(json_object_get(g->root, "animations")))
-		gltf_note(g, "its animations are ignored");
-	if (json_array_size(json_object_get(g->root, "skins")))
-		gltf_note(g, "its skins are ignored");
+		gltf_note(g,
+			  "its animations are ignored: nodes, skins and morph targets are as they stand in the file");
 }
 
 /* ---- nodes */
@@ -180,44 +187,14 @@ struct walk {
 	size_t nodes, visited;
 };
 
-static mat4 matrix_of(struct gltf *g, const struct gltf_at *node)
-{
-	double m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, t[3] = {0}, r[4] = {0, 0, 0, 1},
-	       s[3] = {1, 1, 1};
-	gltf_numbers(g, node, node->json, "matrix", m, 16); /* by columns */
-	gltf_numbers(g, node, node->json, "translation", t, 3);
-	gltf_numbers(g, node, node->json, "rotation", r, 4); /* a quaternion x y z w */
-	gltf_numbers(g, node, node->json, "scale", s, 3);
-	mat4 out;
-	for (int i = 0; i < 16; i++)
-		out.m[i % 4][i / 4] = m[i];
-	if (json_object_get(node->json, "matrix"))
-		return out;
-	double norm = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
-	if (!(norm > 0) || !isfinite(norm)) {
-		gltf_fail(g, node, EINVAL, "its rotation is not a quaternion");
-		return mat4_identity();
-	}
-	double x = r[0], y = r[1], z = r[2], w = r[3], k = 2 / norm;
-	const double turn[3][3] = {{1 - k * (y * y + z * z), k * (x * y - z * w), k * (x * z + y * w)},
-				   {k * (x * y + z * w), 1 - k * (x * x + z * z), k * (y * z - x * w)},
-				   {k * (x * z - y * w), k * (y * z + x * w), 1 - k * (x * x + y * y)}};
-	out = mat4_identity();
-	for (int i = 0; i < 3; i++) {
-		for (int j = 0; j < 3; j++)
-			out.m[i][j] = turn[i][j] * s[j];
-		out.m[i][3] = t[i];
-	}
-	return out;
-}
-
 static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world)
 {
 	struct gltf_at what;
-	if (gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing"))
-		gltf_fail(g, node, ENOTSUP, "EXT_mesh_gpu_instancing is not supported");
-	if (gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0)
-		gltf_mesh(g, &what, to_world);
+	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
+	if (gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && instances)
+		gltf_mesh_instances(g, &what, node, instances, to_world);
+	else if (!g->failed && json_object_get(node->json, "mesh"))
+		gltf_mesh(g, &what, node, to_world);
 	if (gltf_follow(g, node, node->json, "camera", GLTF_CAMERAS, &what) > 0)
 		gltf_camera(g, &what, to_world);
 	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
@@ -231,16 +208,16 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth)
 	struct gltf_at node;
 	if (g->failed || !gltf_entry(g, GLTF_NODES, index, &node))
 		return;
-	if (w->above[index] || depth > NODES_DEEP) {
+	if (w->above[index] || depth > GLTF_NODES_DEEP) {
 		gltf_fail(g, &node, ELOOP, w->above[index] ? "it is its own ancestor" : "nodes are more than %d deep",
-			  NODES_DEEP);
+			  GLTF_NODES_DEEP);
 		return;
 	}
 	if (++w->visited > INSTANCES_MAX) {
 		gltf_fail(g, &node, E2BIG, "more than %d nodes", INSTANCES_MAX);
 		return;
 	}
-	mat4 own = matrix_of(g, &node), to_world = mat4_mul(*above, own);
+	mat4 own = gltf_node_matrix(g, &node), to_world = mat4_mul(*above, own);
 	visit_lists(g, &node, &to_world);
 	const json_t *children = json_object_get(node.json, "children");
 	w->above[index] = true;
@@ -324,6 +301,18 @@ static void *allocate(struct gltf *g, enum gltf_array array, size_t size)
 	return arena_alloc(g->arena, json_array_size(json_object_get(g->root, gltf_array_name(array))) + 1, size);
 }
 
+/* Nodes that are not in the scene count, too: what follows is right without them, and sooner without asking. */
+static void count_uses(struct gltf *g)
+{
+	const json_t *nodes = json_object_get(g->root, "nodes");
+	size_t meshes = json_array_size(json_object_get(g->root, "meshes"));
+	for (size_t i = 0; i < json_array_size(nodes); i++) {
+		const json_t *mesh = json_object_get(json_array_get(nodes, i), "mesh");
+		if (json_is_integer(mesh) && json_integer_value(mesh) >= 0 && (size_t)json_integer_value(mesh) < meshes)
+			g->mesh_uses[json_integer_value(mesh)]++;
+	}
+}
+
 static int read_file(struct gltf *g)
 {
 	if (read_json(g))
@@ -331,8 +320,11 @@ static int read_file(struct gltf *g)
 	g->buffers = allocate(g, GLTF_BUFFERS, sizeof *g->buffers);
 	g->images = allocate(g, GLTF_IMAGES, sizeof *g->images);
 	g->material_made = allocate(g, GLTF_MATERIALS, sizeof *g->material_made);
-	if (!g->buffers || !g->images || !g->material_made)
+	g->mesh_uses = allocate(g, GLTF_MESHES, sizeof *g->mesh_uses);
+	g->mesh_made = allocate(g, GLTF_MESHES, sizeof *g->mesh_made);
+	if (!g->buffers || !g->images || !g->material_made || !g->mesh_uses || !g->mesh_made)
 		return gltf_fail(g, NULL, ENOMEM, "out of memory");
+	count_uses(g);
 	g->scene = gltf_element(g, NULL, NULL, "scene");
 	gltf_attribute(g, g->scene, "version", "3.0.0");
 	g->tree->root = g->scene;
@@ -366,6 +358,7 @@ int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char 
 	g.bytes = file.bytes;
 	g.size = file.size;
 	rc = read_file(&g);
+	gltf_numbers_close(&g);
 	json_decref(g.root);
 	assets->close(assets->user, &file);
 	return rc;

@@ -1,12 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Each primitive of triangles becomes a shape of type "gltf" that names its buffer and the position of its numbers
- * there. Points and lines have no area and are left out, with a note. Failures: accessors of a type that the attribute
- * cannot have, accessors that exceed their views, sparse ones, attributes in different buffers.
+ * there, or has its vertices itself where they have to be computed (gltf_pose.h). Points and lines have no area and are
+ * left out, with a note. A mesh of several nodes that is large becomes a shapegroup, and each of its nodes an instance.
+ * Failures: accessors of a type that the attribute cannot have, accessors that exceed their views.
  */
 #include "worker/render/scene/gltf_mesh.h"
 #include "worker/render/scene/gltf_buffer.h"
 #include "worker/render/scene/gltf_material.h"
+#include "worker/render/scene/gltf_node.h"
+#include "worker/render/scene/gltf_numbers.h"
+#include "worker/render/scene/gltf_pose.h"
 #include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
@@ -43,11 +47,6 @@ struct primitive {
 	enum gltf_colours colours;
 };
 
-static bool same_buffer(const struct gltf_range *a, const struct gltf_range *b)
-{
-	return a->first == b->first && strcmp(a->file, b->file) == 0;
-}
-
 /* The attribute `name` of the shape, from that accessor. */
 static void put_accessor(struct primitive *p, const struct gltf_at *a, const char *name, const char *type,
 			 uint64_t components)
@@ -59,11 +58,8 @@ static void put_accessor(struct primitive *p, const struct gltf_at *a, const cha
 	const char *component = type_name(gltf_whole(g, a, a->json, "componentType", 0), &size);
 	if (!component || strcmp(gltf_text(g, a, a->json, "type", ""), type) != 0)
 		gltf_fail(g, a, EINVAL, "of a type that %s cannot have", name);
-	if (json_object_get(a->json, "sparse"))
-		gltf_fail(g, a, ENOTSUP, "sparse accessors are not supported");
-	if (gltf_follow(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) == 0)
-		gltf_fail(g, a, ENOTSUP, "without a bufferView");
-	if (g->failed || gltf_buffer_view(g, &view, &buffer, &first, &count))
+	if (gltf_follow(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) <= 0 ||
+	    gltf_buffer_view(g, &view, &buffer, &first, &count) || g->failed)
 		return;
 	uint64_t offset = gltf_whole(g, a, a->json, "byteOffset", 0), wanted = gltf_whole(g, a, a->json, "count", 0),
 		 stride = gltf_whole(g, &view, view.json, "byteStride", size * components);
@@ -71,24 +67,24 @@ static void put_accessor(struct primitive *p, const struct gltf_at *a, const cha
 	    (wanted > 0 &&
 	     (count - offset < size * components || (wanted - 1) > (count - offset - size * components) / stride)))
 		gltf_fail(g, a, EINVAL, "it exceeds bufferViews[%zu]", view.index);
-	if (p->buffer.file && !same_buffer(&p->buffer, &buffer))
-		gltf_fail(g, p->mesh, ENOTSUP, "attributes of a primitive in different buffers are not supported");
 	p->buffer = buffer;
 	uint64_t begin = first + offset, end = wanted > 0 ? begin + (wanted - 1) * stride + size * components : begin;
 	p->numbers[p->count++] = (struct numbers){name, component, begin, stride, wanted, end};
+}
+
+static enum gltf_colours colours_of(struct gltf *g, const struct gltf_at *a)
+{
+	return strcmp(gltf_text(g, a, a->json, "type", ""), "VEC4") == 0 ? GLTF_COLOURS_AND_ALPHA : GLTF_COLOURS;
 }
 
 /* Of three or four components; the fourth is another accessor of the shape. */
 static void put_colours(struct primitive *p, const struct gltf_at *a)
 {
 	struct gltf *g = p->g;
-	bool alpha = strcmp(gltf_text(g, a, a->json, "type", ""), "VEC4") == 0;
-	put_accessor(p, a, "color", alpha ? "VEC4" : "VEC3", alpha ? 4 : 3);
-	if (g->failed)
-		return;
-	p->colours = alpha ? GLTF_COLOURS_AND_ALPHA : GLTF_COLOURS;
+	bool alpha = colours_of(g, a) == GLTF_COLOURS_AND_ALPHA;
 	uint64_t size;
-	if (!alpha || !type_name(gltf_whole(g, a, a->json, "componentType", 0), &size))
+	put_accessor(p, a, "color", alpha ? "VEC4" : "VEC3", alpha ? 4 : 3);
+	if (g->failed || !alpha || !type_name(gltf_whole(g, a, a->json, "componentType", 0), &size))
 		return;
 	struct numbers fourth = p->numbers[p->count - 1];
 	fourth.name = "alpha";
@@ -132,33 +128,53 @@ static void grow_box(struct gltf *g, const struct gltf_at *a, const mat4 *to_wor
 	}
 }
 
-static void put_attributes(struct primitive *p, const json_t *primitive, const json_t *attributes, const mat4 *to_world)
+/* As they stand in a buffer. */
+static void put_in_place(struct primitive *p, const struct gltf_primitive *from, const mat4 *to_world)
 {
-	struct gltf *g = p->g;
-	struct gltf_at a;
-	if (gltf_follow(g, p->mesh, attributes, "POSITION", GLTF_ACCESSORS, &a) <= 0) {
-		gltf_fail(g, p->mesh, EINVAL, "a primitive has no POSITION");
-		return;
+	static const struct {
+		const char *name, *type;
+		unsigned components;
+	} forms[GLTF_SOURCES] = {{"position", "VEC3", 3},
+				 {"normal", "VEC3", 3},
+				 {"texcoord", "VEC2", 2},
+				 {NULL, NULL, 0},
+				 {"index", "SCALAR", 1}};
+	for (int i = 0; i < GLTF_SOURCES; i++) {
+		const struct gltf_at *a = &from->sources[i];
+		if (a->json && i == GLTF_COLOR)
+			put_colours(p, a);
+		else if (a->json)
+			put_accessor(p, a, forms[i].name, forms[i].type, forms[i].components);
 	}
-	put_accessor(p, &a, "position", "VEC3", 3);
-	grow_box(g, &a, to_world);
-	if (gltf_follow(g, p->mesh, attributes, "NORMAL", GLTF_ACCESSORS, &a) > 0)
-		put_accessor(p, &a, "normal", "VEC3", 3);
-	else
-		gltf_put_bool(g, p->shape, p->mesh, "face_normals", true); /* as the format says */
-	struct gltf_at material;
-	char texcoord[32];
-	bool has = gltf_follow(g, p->mesh, primitive, "material", GLTF_MATERIALS, &material) > 0;
-	snprintf(texcoord, sizeof texcoord, "TEXCOORD_%u", has ? gltf_material_set(g, &material) : 0);
-	if (gltf_follow(g, p->mesh, attributes, texcoord, GLTF_ACCESSORS, &a) > 0)
-		put_accessor(p, &a, "texcoord", "VEC2", 2);
-	if (gltf_follow(g, p->mesh, attributes, "COLOR_0", GLTF_ACCESSORS, &a) > 0)
-		put_colours(p, &a);
-	if (gltf_follow(g, p->mesh, primitive, "indices", GLTF_ACCESSORS, &a) > 0)
-		put_accessor(p, &a, "index", "SCALAR", 1);
+	grow_box(p->g, &from->sources[GLTF_POSITION], to_world);
+	if (!p->g->failed)
+		put_numbers(p);
 }
 
-static void put_primitive(struct gltf *g, const struct gltf_at *mesh, const json_t *primitive, const mat4 *to_world)
+static void find_source(struct gltf *g, struct gltf_primitive *p, const json_t *o, const char *key,
+			enum gltf_source which)
+{
+	if (gltf_follow(g, p->mesh, o, key, GLTF_ACCESSORS, &p->sources[which]) <= 0)
+		p->sources[which].json = NULL;
+}
+
+static void find_sources(struct gltf *g, struct gltf_primitive *p, const json_t *attributes)
+{
+	struct gltf_at material;
+	char texcoord[32];
+	bool has = gltf_follow(g, p->mesh, p->json, "material", GLTF_MATERIALS, &material) > 0;
+	snprintf(texcoord, sizeof texcoord, "TEXCOORD_%u", has ? gltf_material_set(g, &material) : 0);
+	find_source(g, p, attributes, "POSITION", GLTF_POSITION);
+	find_source(g, p, attributes, "NORMAL", GLTF_NORMAL);
+	find_source(g, p, attributes, texcoord, GLTF_TEXCOORD);
+	find_source(g, p, attributes, "COLOR_0", GLTF_COLOR);
+	find_source(g, p, p->json, "indices", GLTF_INDEX);
+	if (!p->sources[GLTF_POSITION].json)
+		gltf_fail(g, p->mesh, EINVAL, "a primitive has no POSITION");
+}
+
+static void put_primitive(struct gltf *g, struct xml_element *parent, const struct gltf_at *mesh,
+			  const struct gltf_at *node, const json_t *primitive, mat4 to_world)
 {
 	uint64_t mode = gltf_whole(g, mesh, primitive, "mode", MODE_TRIANGLES);
 	const json_t *attributes = gltf_object(g, mesh, primitive, "attributes");
@@ -174,18 +190,26 @@ static void put_primitive(struct gltf *g, const struct gltf_at *mesh, const json
 		gltf_fail(g, mesh, EINVAL, "a primitive without attributes, or of mode %llu", (unsigned long long)mode);
 		return;
 	}
-	struct primitive p = {.g = g, .mesh = mesh, .shape = gltf_plugin(g, g->scene, mesh, "shape", "gltf", NULL)};
+	struct gltf_primitive from = {.mesh = mesh, .node = node, .json = primitive};
+	struct primitive p = {.g = g, .mesh = mesh, .shape = gltf_plugin(g, parent, mesh, "shape", "gltf", NULL)};
 	/* All of a .glb stands in one line: messages name shapes by this. */
 	gltf_attribute(g, p.shape, "id", "shape %u, of meshes[%zu]", g->primitives, mesh->index);
-	put_attributes(&p, primitive, attributes, to_world);
+	find_sources(g, &from, attributes);
 	if (g->failed)
 		return;
-	put_numbers(&p);
+	if (gltf_is_posed(g, &from))
+		gltf_put_pose(g, p.shape, &from, &to_world);
+	else
+		put_in_place(&p, &from, &to_world);
+	if (g->failed)
+		return;
+	if (from.sources[GLTF_COLOR].json)
+		p.colours = colours_of(g, &from.sources[GLTF_COLOR]);
+	if (!from.sources[GLTF_NORMAL].json)
+		gltf_put_bool(g, p.shape, mesh, "face_normals", true); /* as the format says */
 	if (mode != MODE_TRIANGLES)
 		gltf_put_text(g, p.shape, mesh, "mode", mode == MODE_STRIP ? "strip" : "fan");
-	gltf_put_matrix(g, p.shape, mesh, "to_world", to_world);
-	if (json_array_size(json_object_get(primitive, "targets")))
-		gltf_note(g, "its morph targets are ignored");
+	gltf_put_matrix(g, p.shape, mesh, "to_world", &to_world);
 	struct gltf_at material;
 	if (gltf_follow(g, mesh, primitive, "material", GLTF_MATERIALS, &material) > 0)
 		gltf_material(g, p.shape, &material, p.colours);
@@ -193,7 +217,8 @@ static void put_primitive(struct gltf *g, const struct gltf_at *mesh, const json
 		gltf_default_material(g, p.shape, p.colours);
 }
 
-void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world)
+static void put_primitives(struct gltf *g, struct xml_element *parent, const struct gltf_at *mesh,
+			   const struct gltf_at *node, const mat4 *to_world)
 {
 	const json_t *primitives = json_object_get(mesh->json, "primitives");
 	for (size_t i = 0; i < json_array_size(primitives) && !g->failed; i++) {
@@ -201,8 +226,123 @@ void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world)
 		if (++g->primitives > GLTF_PRIMITIVES_MAX)
 			gltf_fail(g, mesh, E2BIG, "more than %d primitives", GLTF_PRIMITIVES_MAX);
 		else if (json_is_object(primitive))
-			put_primitive(g, mesh, primitive, to_world);
+			put_primitive(g, parent, mesh, node, primitive, *to_world);
 		else
 			gltf_fail(g, mesh, EINVAL, "its primitives are not objects");
 	}
+}
+
+/* ---- meshes of several nodes */
+
+/* Triangles that copies would have beyond the first; below that copies are faster than instances. */
+static const double copied_most = 200000;
+
+static bool shines(const struct gltf *g, const json_t *primitive)
+{
+	const json_t *index = json_object_get(primitive, "material"),
+		     *material = json_is_integer(index) ? json_array_get(json_object_get(g->root, "materials"),
+									 (size_t)json_integer_value(index))
+							: NULL,
+		     *factor = json_object_get(material, "emissiveFactor");
+	for (size_t i = 0; i < json_array_size(factor); i++)
+		if (json_number_value(json_array_get(factor, i)) > 0)
+			return true;
+	return false;
+}
+
+/* A group, which may hold no lamps, and no mesh that each node moves in its own way. */
+static bool is_shared(const struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node)
+{
+	const json_t *primitives = json_object_get(mesh->json, "primitives");
+	double corners = 0, uses = g->mesh_uses[mesh->index];
+	if (uses < 2 || json_object_get(node->json, "skin") || json_object_get(node->json, "weights"))
+		return false;
+	for (size_t i = 0; i < json_array_size(primitives); i++) {
+		const json_t *o = json_array_get(primitives, i), *index = json_object_get(o, "indices");
+		if (!json_is_integer(index))
+			index = json_object_get(json_object_get(o, "attributes"), "POSITION");
+		corners += json_number_value(json_object_get(
+			json_array_get(json_object_get(g->root, "accessors"), (size_t)json_integer_value(index)),
+			"count"));
+		if (shines(g, o))
+			return false;
+	}
+	return corners / 3 * (uses - 1) > copied_most;
+}
+
+static void put_instance(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node, const mat4 *to_world)
+{
+	static const char id[] = "group of meshes[%zu]";
+	const json_t *primitives = json_object_get(mesh->json, "primitives");
+	struct gltf_at a;
+	if (!g->mesh_made[mesh->index]) {
+		const mat4 identity = mat4_identity();
+		struct xml_element *group = gltf_plugin(g, g->scene, mesh, "shape", "shapegroup", NULL);
+		const vec3 low = g->low, high = g->high;
+		gltf_attribute(g, group, "id", id, mesh->index);
+		put_primitives(g, group, mesh, node, &identity);
+		g->low = low;
+		g->high = high;
+		g->mesh_made[mesh->index] = true;
+	}
+	for (size_t i = 0; i < json_array_size(primitives); i++)
+		if (gltf_follow(g, mesh, json_object_get(json_array_get(primitives, i), "attributes"), "POSITION",
+				GLTF_ACCESSORS, &a) > 0)
+			grow_box(g, &a, to_world);
+	struct xml_element *instance = gltf_plugin(g, g->scene, mesh, "shape", "instance", NULL);
+	gltf_attribute(g, gltf_element(g, instance, mesh, "ref"), "id", id, mesh->index);
+	gltf_put_matrix(g, instance, mesh, "to_world", to_world);
+}
+
+void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node, const mat4 *to_world)
+{
+	if (is_shared(g, mesh, node))
+		put_instance(g, mesh, node, to_world);
+	else
+		put_primitives(g, g->scene, mesh, node, to_world);
+}
+
+/* ---- EXT_mesh_gpu_instancing */
+
+/* false: there is no such attribute, or it cannot be read. */
+static bool read_instances(struct gltf *g, const struct gltf_at *node, const json_t *attributes, const char *name,
+			   unsigned components, struct gltf_vectors *out)
+{
+	struct gltf_at a;
+	out->x = NULL;
+	return gltf_follow(g, node, attributes, name, GLTF_ACCESSORS, &a) > 0 &&
+	       gltf_vectors_read(g, &a, name, components, out);
+}
+
+void gltf_mesh_instances(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node,
+			 const json_t *extension, const mat4 *to_world)
+{
+	const json_t *attributes = gltf_object(g, node, extension, "attributes");
+	static const char *const parts[3] = {"TRANSLATION", "ROTATION", "SCALE"};
+	struct gltf_vectors v[3] = {{.x = NULL}};
+	uint64_t count = 0;
+	for (int i = 0; i < 3; i++) {
+		if (!read_instances(g, node, attributes, parts[i], i == 1 ? 4 : 3, &v[i]))
+			continue;
+		if (count && v[i].count != count)
+			gltf_fail(g, node, EINVAL, "attributes of instances with different numbers of entries");
+		count = v[i].count;
+	}
+	if (!count)
+		gltf_fail(g, node, EINVAL, "EXT_mesh_gpu_instancing without instances");
+	g->mesh_uses[mesh->index] += (double)count;
+	for (uint64_t i = 0; i < count && !g->failed; i++) {
+		bool valid;
+		mat4 own = gltf_compose(v[0].x ? v[0].x + 3 * i : (const double[3]){0, 0, 0},
+					v[1].x ? v[1].x + 4 * i : (const double[4]){0, 0, 0, 1},
+					v[2].x ? v[2].x + 3 * i : (const double[3]){1, 1, 1}, &valid);
+		own = mat4_mul(*to_world, own);
+		if (valid)
+			gltf_mesh(g, mesh, node, &own);
+		else
+			gltf_fail(g, node, EINVAL, "the rotation of instance %llu is not a quaternion",
+				  (unsigned long long)i);
+	}
+	for (int i = 0; i < 3; i++)
+		gltf_vectors_fini(&v[i]);
 }

@@ -5,7 +5,10 @@
 
 #include "worker/render/scene/gltf_tree.h"
 
-/* The shapes of a mesh under that matrix. */
-void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world);
+/* The shapes of that mesh of a node, under that matrix. */
+void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node, const mat4 *to_world);
+/* As often as the extension EXT_mesh_gpu_instancing says. */
+void gltf_mesh_instances(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node,
+			 const json_t *extension, const mat4 *to_world);
 
 #endif

@@ -15,7 +15,8 @@ static const char *const array_names[GLTF_ARRAYS] = {
 	[GLTF_ACCESSORS] = "accessors", [GLTF_BUFFERS] = "buffers", [GLTF_BUFFER_VIEWS] = "bufferViews",
 	[GLTF_CAMERAS] = "cameras",	[GLTF_IMAGES] = "images",   [GLTF_LIGHTS] = "lights",
 	[GLTF_MATERIALS] = "materials", [GLTF_MESHES] = "meshes",   [GLTF_NODES] = "nodes",
-	[GLTF_SAMPLERS] = "samplers",	[GLTF_SCENES] = "scenes",   [GLTF_TEXTURES] = "textures",
+	[GLTF_SAMPLERS] = "samplers",	[GLTF_SCENES] = "scenes",   [GLTF_SKINS] = "skins",
+	[GLTF_TEXTURES] = "textures",
 };
 
 const char *gltf_array_name(enum gltf_array array)

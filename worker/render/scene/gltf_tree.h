@@ -30,6 +30,7 @@ enum gltf_array {
 	GLTF_NODES,
 	GLTF_SAMPLERS,
 	GLTF_SCENES,
+	GLTF_SKINS,
 	GLTF_TEXTURES,
 	GLTF_ARRAYS
 };
@@ -66,6 +67,11 @@ struct gltf {
 	struct gltf_range *buffers, *images; /* embedded data that has been located, by entry */
 	unsigned embedded, primitives;
 	unsigned char *material_made; /* bits 1 << enum gltf_colours */
+	struct gltf_open *open;	      /* the buffer that is read (gltf_numbers.h) */
+	size_t *parents;	      /* of each node (gltf_node.h); NULL: not needed so far */
+	uint64_t embedded_bytes;      /* of vertices that are computed */
+	double *mesh_uses;	      /* number of nodes that have each mesh */
+	bool *mesh_made;	      /* it is a shapegroup already */
 	struct xml_element *scene;
 	bool has_camera, has_light;
 	vec3 low, high; /* over all vertices */

@@ -46,7 +46,7 @@ struct accessor {
 
 /* 1: the property is absent. */
 static int read_accessor(struct accessor *a, const struct scene_node *n, const char *name, unsigned components,
-			 unsigned allowed, const struct asset_part *buffer, struct error *e)
+			 unsigned allowed, const struct asset_range *buffer, struct error *e)
 {
 	const char *text = node_string(n, name, NULL);
 	if (!text)
@@ -140,7 +140,7 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 
 /* A number or colour at the vertices; linear. */
 static int add_attribute(struct mesh *m, const struct scene_node *n, const char *name, const char *attribute,
-			 unsigned components, const struct asset_part *buffer, struct arena *arena, struct error *e)
+			 unsigned components, const struct asset_range *buffer, struct arena *arena, struct error *e)
 {
 	struct accessor from;
 	int rc = read_accessor(&from, n, name, components, 1u << F32 | 1u << U8 | 1u << U16, buffer, e);
@@ -157,7 +157,7 @@ static int add_attribute(struct mesh *m, const struct scene_node *n, const char 
 	return 0;
 }
 
-static int make_mesh(const struct scene_node *n, const struct asset_part *buffer, struct arena *arena, struct mesh *m,
+static int make_mesh(const struct scene_node *n, const struct asset_range *buffer, struct arena *arena, struct mesh *m,
 		     struct error *e)
 {
 	struct accessor position, normal, texcoord, index;
@@ -192,12 +192,12 @@ static int make_mesh(const struct scene_node *n, const struct asset_part *buffer
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
-	struct asset_part buffer;
+	struct asset_range buffer;
 	int rc = asset_part_open(&buffer, n, assets, e);
 	if (rc)
 		return rc;
 	rc = make_mesh(n, &buffer, arena, &out->mesh, e);
-	asset_part_close(&buffer, assets);
+	asset_range_close(&buffer, assets);
 	return rc;
 }
 

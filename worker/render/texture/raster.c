@@ -4,13 +4,13 @@
 static int decode(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		  const struct picture_key *k, struct arena *arena, struct error *e)
 {
-	struct asset_part part;
+	struct asset_range part;
 	struct error reason;
 	int code = asset_part_open(&part, n, assets, e);
 	if (code)
 		return code;
 	code = image_decode(part.bytes, part.size, k->name, k->linear, k->channel, arena, &r->image, &reason);
-	asset_part_close(&part, assets);
+	asset_range_close(&part, assets);
 	if (!code)
 		code = image_power(&r->image, k->power, &reason);
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;

@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The buffer of the last accessor stays open, because neighbours share it. Its file joins those that the scene consists
+ * of (the tree's includes), as no shape names it. Failures: as the accessor says it, views that are too short, more
+ * numbers than a mesh may have.
+ */
+#include "worker/render/scene/gltf_numbers.h"
+
+#include "common/base/bytes.h"
+#include "common/base/liveness.h"
+#include "common/base/mem.h"
+#include "worker/render/scene/asset_range.h"
+#include "worker/render/scene/gltf_buffer.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT = 5125, FLOAT };
+enum { COMPONENTS_MAX = 16 };
+#define NUMBERS_MAX (UINT64_C(1) << 28)
+
+struct gltf_open {
+	struct asset_range part;
+	const char *file;
+	uint64_t first, count;
+	bool base64;
+};
+
+/* ---- bytes ---- */
+
+void gltf_numbers_close(struct gltf *g)
+{
+	if (g->open && g->open->file)
+		asset_range_close(&g->open->part, g->assets);
+	if (g->open)
+		g->open->file = NULL;
+}
+
+static bool list_file(struct gltf *g, const char *file)
+{
+	struct xml_tree *t = g->tree;
+	for (uint32_t i = 0; i < t->include_count; i++)
+		if (strcmp(t->includes[i], file) == 0)
+			return true;
+	if (t->include_count == XML_FILES_MAX) {
+		gltf_fail(g, NULL, E2BIG, "more than %d files", XML_FILES_MAX);
+		return false;
+	}
+	t->includes[t->include_count++] = file;
+	return true;
+}
+
+static bool open_buffer(struct gltf *g, const struct gltf_range *r)
+{
+	struct error inner;
+	struct gltf_open *o = g->open;
+	if (!o && !(o = g->open = arena_alloc(g->arena, 1, sizeof *o))) {
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+		return false;
+	}
+	if (o->file && strcmp(o->file, r->file) == 0 && o->first == r->first && o->count == r->count)
+		return true;
+	gltf_numbers_close(g);
+	int rc = asset_range_open(&o->part, g->assets, r->file, r->first, r->count, r->base64, &inner);
+	if (rc) {
+		gltf_fail(g, NULL, -rc, "%s", inner.text);
+		return false;
+	}
+	*o = (struct gltf_open){o->part, r->file, r->first, r->count, r->base64};
+	return list_file(g, r->file);
+}
+
+const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
+{
+	struct gltf_range buffer;
+	uint64_t first;
+	if (gltf_buffer_view(g, view, &buffer, &first, count) || !open_buffer(g, &buffer))
+		return NULL;
+	if (first <= g->open->part.size && *count <= g->open->part.size - first)
+		return g->open->part.bytes + first;
+	gltf_fail(g, view, EINVAL, "it exceeds its buffer of %zu bytes", g->open->part.size);
+	return NULL;
+}
+
+/* ---- numbers ---- */
+
+static unsigned size_of(uint64_t component)
+{
+	return component == BYTE || component == UNSIGNED_BYTE	   ? 1
+	       : component == SHORT || component == UNSIGNED_SHORT ? 2
+	       : component == UNSIGNED_INT || component == FLOAT   ? 4
+								   : 0;
+}
+
+static double number(const unsigned char *p, uint64_t component, bool normalized)
+{
+	uint32_t bits = (uint32_t)get_bytes(p, (int)size_of(component));
+	float f;
+	switch (component) {
+	case BYTE:
+		return normalized ? fmax((int8_t)bits / 127.0, -1) : (int8_t)bits;
+	case UNSIGNED_BYTE:
+		return normalized ? bits / 255.0 : bits;
+	case SHORT:
+		return normalized ? fmax((int16_t)bits / 32767.0, -1) : (int16_t)bits;
+	case UNSIGNED_SHORT:
+		return normalized ? bits / 65535.0 : bits;
+	case UNSIGNED_INT:
+		return bits;
+	default:
+		memcpy(&f, &bits, sizeof f);
+		return (double)f;
+	}
+}
+
+static unsigned components_of(const char *type)
+{
+	static const struct {
+		const char *name;
+		unsigned count;
+	} types[] = {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}};
+	for (size_t i = 0; i < sizeof types / sizeof *types; i++)
+		if (strcmp(types[i].name, type) == 0)
+			return types[i].count;
+	return 0;
+}
+
+/* An array of vectors in a view. */
+struct packed {
+	uint64_t component, stride, offset;
+	bool normalized;
+};
+
+/* Vector k goes to `to[k]`, or to vector k. */
+static void unpack(struct gltf *g, const struct gltf_at *a, const struct gltf_at *view, const struct packed *p,
+		   uint64_t count, const double *to, struct gltf_vectors *out)
+{
+	uint64_t size, width = size_of(p->component), used = width * out->components;
+	const unsigned char *bytes = gltf_view_bytes(g, view, &size);
+	if (!bytes)
+		return;
+	if (p->stride < used || p->offset > size ||
+	    (count > 0 && (size - p->offset < used || (count - 1) > (size - p->offset - used) / p->stride))) {
+		gltf_fail(g, a, EINVAL, "it exceeds bufferViews[%zu]", view->index);
+		return;
+	}
+	for (uint64_t i = 0; i < count; i++) {
+		uint64_t at = to ? (uint64_t)to[i] : i;
+		if (at >= out->count) {
+			gltf_fail(g, a, EINVAL, "its sparse indices exceed its count");
+			return;
+		}
+		for (unsigned k = 0; k < out->components; k++)
+			out->x[at * out->components + k] =
+				number(bytes + p->offset + i * p->stride + k * width, p->component, p->normalized);
+		if (i % 65536 == 0)
+			tick();
+	}
+}
+
+static void read_sparse(struct gltf *g, const struct gltf_at *a, const struct packed *whole, struct gltf_vectors *out)
+{
+	const json_t *sparse = gltf_object(g, a, a->json, "sparse"), *indices, *values;
+	struct gltf_at view[2];
+	if (!sparse)
+		return;
+	uint64_t count = gltf_whole(g, a, sparse, "count", 0);
+	indices = gltf_object(g, a, sparse, "indices");
+	values = gltf_object(g, a, sparse, "values");
+	if (!indices || !values || count > out->count ||
+	    gltf_follow(g, a, indices, "bufferView", GLTF_BUFFER_VIEWS, &view[0]) <= 0 ||
+	    gltf_follow(g, a, values, "bufferView", GLTF_BUFFER_VIEWS, &view[1]) <= 0) {
+		gltf_fail(g, a, EINVAL, "its sparse part has no indices or values, or too many");
+		return;
+	}
+	struct packed p = {gltf_whole(g, a, indices, "componentType", 0), 0, gltf_whole(g, a, indices, "byteOffset", 0),
+			   false};
+	p.stride = size_of(p.component);
+	struct gltf_vectors at = {mem_alloc(count + 1, sizeof *at.x), count, 1};
+	if (!at.x)
+		gltf_fail(g, a, ENOMEM, "out of memory");
+	else if (p.component != UNSIGNED_BYTE && p.component != UNSIGNED_SHORT && p.component != UNSIGNED_INT)
+		gltf_fail(g, a, EINVAL, "its sparse indices are no whole numbers");
+	else
+		unpack(g, a, &view[0], &p, count, NULL, &at);
+	p = *whole;
+	p.stride = (uint64_t)size_of(p.component) * out->components;
+	p.offset = gltf_whole(g, a, values, "byteOffset", 0);
+	if (!g->failed)
+		unpack(g, a, &view[1], &p, count, at.x, out);
+	gltf_vectors_fini(&at);
+}
+
+bool gltf_vectors_read(struct gltf *g, const struct gltf_at *a, const char *use, unsigned components,
+		       struct gltf_vectors *out)
+{
+	struct gltf_at view;
+	unsigned has = components_of(gltf_text(g, a, a->json, "type", ""));
+	struct packed p = {gltf_whole(g, a, a->json, "componentType", 0), 0, gltf_whole(g, a, a->json, "byteOffset", 0),
+			   json_is_true(json_object_get(a->json, "normalized"))};
+	*out = (struct gltf_vectors){NULL, gltf_whole(g, a, a->json, "count", 0), has};
+	if (!has || (components && has != components) || !size_of(p.component))
+		gltf_fail(g, a, EINVAL, "of a type that %s cannot have", use);
+	if (out->count > NUMBERS_MAX / COMPONENTS_MAX)
+		gltf_fail(g, a, E2BIG, "more than %llu vectors", (unsigned long long)NUMBERS_MAX / COMPONENTS_MAX);
+	if (!g->failed && !(out->x = mem_alloc(out->count * has + 1, sizeof *out->x)))
+		gltf_fail(g, a, ENOMEM, "out of memory");
+	if (!g->failed && gltf_follow(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) > 0) {
+		p.stride = gltf_whole(g, &view, view.json, "byteStride", (uint64_t)size_of(p.component) * has);
+		unpack(g, a, &view, &p, out->count, NULL, out);
+	}
+	if (!g->failed)
+		read_sparse(g, a, &p, out);
+	if (g->failed)
+		gltf_vectors_fini(out);
+	return !g->failed;
+}
+
+void gltf_vectors_fini(struct gltf_vectors *v)
+{
+	mem_free(v->x);
+	v->x = NULL;
+}
