@@ -4,6 +4,7 @@
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/ior.h"
 
+#include <stdbool.h>
 #include <string.h>
 #include <strings.h>
 
@@ -16,6 +17,14 @@ static const struct {
 #include "conductors.inc"
 };
 
+/* Mitsuba's name of a second source for a metal that it has in two; of Na, Ni and V it has this one alone. Here each
+ * is in the table once. */
+static bool is_named(const char *name, const char *metal)
+{
+	size_t n = strlen(metal);
+	return strncmp(name, metal, n) == 0 && (name[n] == 0 || strcmp(name + n, "_palik") == 0);
+}
+
 static int named(struct metal *m, const char *name, const struct scene_node *n, struct arena *arena, struct error *e)
 {
 	if (strcasecmp(name, "none") == 0) {
@@ -24,7 +33,7 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 		return 0;
 	}
 	for (size_t i = 0; i < sizeof metals / sizeof *metals; i++) {
-		if (strcmp(metals[i].name, name) != 0)
+		if (!is_named(name, metals[i].name))
 			continue;
 		double *room = arena_alloc(arena, 3 * METAL_ROWS, sizeof *room);
 		if (!room)

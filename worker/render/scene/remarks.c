@@ -83,6 +83,23 @@ static int on_emitter(struct report *r, const struct scene_node *n, struct error
 		      "daylight after Preetham (1999), which differs a little from Mitsuba's after Hosek and Wilkie");
 }
 
+/* Mitsuba has two tables for most metals. Of these three it has one, which ours is. */
+static int on_metals(struct report *r, const struct scene_node *n, struct error *e)
+{
+	static const char *const single[] = {"Na_palik", "Ni_palik", "V_palik"};
+	const char *name = n->cls == PLUGIN_BSDF ? node_string(n, "material", "") : "";
+	const char *end = strstr(name, "_palik");
+	bool other = end != NULL;
+	int rc = 0;
+	for (size_t i = 0; i < sizeof single / sizeof *single; i++)
+		other = other && strcmp(name, single[i]) != 0;
+	if (other)
+		rc = remark(r, n, e, "the indices of %.*s stand for those of %.32s", (int)(end - name), name, name);
+	for (uint32_t i = 0; i < n->child_count && !rc; i++)
+		rc = on_metals(r, n->children[i], e);
+	return rc;
+}
+
 int remarks_on(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e)
 {
 	const struct scene_node *camera = NULL;
@@ -92,6 +109,9 @@ int remarks_on(const struct scene_node *const *objects, uint32_t count, struct r
 	for (uint32_t i = 0; i < count && !rc; i++) {
 		const struct scene_node *n = objects[i];
 		light |= shines(n);
+		rc = on_metals(r, n, e);
+		if (rc)
+			break;
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
 		else if (n->cls == PLUGIN_EMITTER)
