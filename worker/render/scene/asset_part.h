@@ -18,7 +18,6 @@ int asset_part_open(struct asset_range *p, const struct scene_node *n, const str
 #define ASSET_PART_PARAMS                                                                          \
 	{.name = "first_byte", .types = VALUE_INT, .min = 0, .max = ASSET_PART_BYTES_MAX},         \
 		{.name = "byte_count", .types = VALUE_INT, .min = 0, .max = ASSET_PART_BYTES_MAX}, \
-		{.name = "embedded", .types = VALUE_STRING},                                       \
 	{                                                                                          \
 		.name = "base64", .types = VALUE_BOOL                                              \
 	}

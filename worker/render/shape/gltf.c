@@ -20,6 +20,7 @@
 static const struct param params[] = {
 	{"filename", UNDERSTOOD(VALUE_STRING)},
 	ASSET_PART_PARAMS,
+	{"embedded", UNDERSTOOD(VALUE_STRING)}, /* the buffer in base64, in place of a file */
 	{"position", UNDERSTOOD(VALUE_STRING)},
 	{"normal", UNDERSTOOD(VALUE_STRING)},
 	{"texcoord", UNDERSTOOD(VALUE_STRING)},
