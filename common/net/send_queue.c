@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * In plaintext a frame goes to libuv at once, as two buffers: its sealed prefix and its bytes. With TLS it waits in a
+ * In plaintext a frame goes to libuv at once, as two buffers: its checked prefix and its bytes. With TLS it waits in a
  * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write, so that memory holds one copy
  * of what a slow peer has not taken. `on_written` encrypts more, and says when nothing is left.
  *
@@ -23,7 +23,7 @@ enum {
 
 /* Replaces the prefix of a frame. */
 struct head {
-	unsigned char bytes[FRAME_SEALED_PREFIX];
+	unsigned char bytes[FRAME_CHECKED_PREFIX];
 	size_t size;
 };
 
@@ -237,10 +237,10 @@ static void send_all(struct send_queue *q, struct head head, unsigned char *byte
 
 void send_queue_frame(struct send_queue *q, unsigned char *frame, size_t size)
 {
-	struct head head = {.size = q->sent ? FRAME_SEALED_PREFIX : FRAME_PREFIX};
+	struct head head = {.size = q->sent ? FRAME_CHECKED_PREFIX : FRAME_PREFIX};
 	assert(size > FRAME_PREFIX);
 	if (q->sent)
-		frame_seal(head.bytes, frame, frame + FRAME_PREFIX, size - FRAME_PREFIX);
+		frame_add_checksums(head.bytes, frame, frame + FRAME_PREFIX, size - FRAME_PREFIX);
 	else
 		memcpy(head.bytes, frame, FRAME_PREFIX);
 	q->sent = true;

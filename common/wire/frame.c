@@ -30,8 +30,8 @@ void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_si
 	*payload_size = read_u32(in + 4);
 }
 
-void frame_seal(unsigned char out[FRAME_SEALED_PREFIX], const unsigned char prefix[FRAME_PREFIX],
-		const unsigned char *content, size_t size)
+void frame_add_checksums(unsigned char out[FRAME_CHECKED_PREFIX], const unsigned char prefix[FRAME_PREFIX],
+			 const unsigned char *content, size_t size)
 {
 	memcpy(out, prefix, FRAME_PREFIX);
 	write_u32(out + 8, crc32c(0, content, size));
@@ -52,7 +52,7 @@ void frame_reader_fini(struct frame_reader *r)
 
 static uint32_t prefix_wanted(const struct frame_reader *r)
 {
-	return r->sealed ? FRAME_SEALED_PREFIX : FRAME_PREFIX;
+	return r->checked ? FRAME_CHECKED_PREFIX : FRAME_PREFIX;
 }
 
 static bool is_whole(const struct frame_reader *r)
@@ -76,7 +76,7 @@ void frame_reader_drop(struct frame_reader *r)
 	if (r->payload.capacity > KEEP)
 		buf_fini(&r->payload);
 	r->header.size = r->payload.size = 0;
-	r->sealed = r->sealed || whole;
+	r->checked = r->checked || whole;
 	r->prefix_size = r->header_size = r->payload_size = r->sum = 0;
 }
 
@@ -87,7 +87,7 @@ static int changed(struct error *e)
 
 static int take_prefix(struct frame_reader *r, struct error *e)
 {
-	if (r->sealed && crc32c(0, r->prefix, 12) != read_u32(r->prefix + 12))
+	if (r->checked && crc32c(0, r->prefix, 12) != read_u32(r->prefix + 12))
 		return changed(e);
 	frame_prefix_read(r->prefix, &r->header_size, &r->payload_size);
 	if (r->header_size == 0)
@@ -109,7 +109,7 @@ static int take_part(struct frame_reader *r, struct buf *b, size_t want, const u
 	size_t n = want - b->size < count - *used ? want - b->size : count - *used;
 	if (!buf_append(b, bytes + *used, n))
 		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", want);
-	if (r->sealed)
+	if (r->checked)
 		r->sum = crc32c(r->sum, bytes + *used, n);
 	*used += n;
 	return 0;
@@ -135,5 +135,5 @@ int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t
 		rc = take_part(r, &r->payload, r->payload_size, bytes, count, used, e);
 	if (rc || !is_whole(r))
 		return rc;
-	return r->sealed && r->sum != read_u32(r->prefix + 8) ? changed(e) : 1;
+	return r->checked && r->sum != read_u32(r->prefix + 8) ? changed(e) : 1;
 }

@@ -15,7 +15,7 @@
 
 #include <stdint.h>
 
-enum { FRAME_PREFIX = 8, FRAME_SEALED_PREFIX = 16 };
+enum { FRAME_PREFIX = 8, FRAME_CHECKED_PREFIX = 16 };
 
 struct frame_limits {
 	uint32_t header, payload;
@@ -23,8 +23,8 @@ struct frame_limits {
 
 struct frame_reader {
 	struct frame_limits limits; /* may be changed between frames */
-	bool sealed;		    /* the first frame has been received */
-	unsigned char prefix[FRAME_SEALED_PREFIX];
+	bool checked;		    /* the first frame has been received */
+	unsigned char prefix[FRAME_CHECKED_PREFIX];
 	uint32_t prefix_size, header_size, payload_size;
 	uint32_t sum; /* of the received part of header and payload */
 	struct buf header, payload;
@@ -44,7 +44,7 @@ bool frame_reader_is_midway(const struct frame_reader *r); /* part of a frame ha
 void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_size, uint32_t *payload_size);
 void frame_prefix_write(unsigned char out[FRAME_PREFIX], uint32_t header_size, uint32_t payload_size);
 /* The prefix of a frame on a connection, for all frames but the first; `content` is header and payload. */
-void frame_seal(unsigned char out[FRAME_SEALED_PREFIX], const unsigned char prefix[FRAME_PREFIX],
-		const unsigned char *content, size_t size);
+void frame_add_checksums(unsigned char out[FRAME_CHECKED_PREFIX], const unsigned char prefix[FRAME_PREFIX],
+			 const unsigned char *content, size_t size);
 
 #endif

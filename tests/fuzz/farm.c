@@ -419,9 +419,9 @@ static void answer(struct farm_world *w, unsigned worker, struct lease_key k)
 	struct error e;
 	need(batch_pack(&b, &plan, &frame, &size, &e) == 0, e.text);
 	size_t n;
-	unsigned char *sealed = checksummed_frame(frame, size, &n);
-	farm_say(w, worker, sealed, n);
-	free(sealed);
+	unsigned char *checked = checksummed_frame(frame, size, &n);
+	farm_say(w, worker, checked, n);
+	free(checked);
 	const Farm__LeaseAck *a = hear_kind(w, worker, FARM__ENVELOPE__BODY_LEASE_ACK)->lease_ack;
 	bool noted = a->verdict == FARM__VERDICT__VERDICT_NOTED;
 	need(noted || a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);

@@ -21,7 +21,7 @@ struct farm_peer {
 	struct frame_reader reader;
 	struct envelope received;
 	bool has_frame;
-	bool has_spoken; /* what it says from now on is sealed */
+	bool has_spoken; /* what it says from now on is checked */
 };
 
 struct farm_world {

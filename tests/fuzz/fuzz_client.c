@@ -69,10 +69,10 @@ static void *speak(void *user)
 	for (size_t i = 0; i < now.count; i++) {
 		const struct step *s = &now.steps[i];
 		size_t size;
-		unsigned char *sealed = checksummed_parts(s->header, s->header_size, s->payload, s->payload_size,
-							  i == 0 && !now.hello, &size);
-		send_bytes(fd, sealed, size);
-		free(sealed);
+		unsigned char *checked = checksummed_parts(s->header, s->header_size, s->payload, s->payload_size,
+							   i == 0 && !now.hello, &size);
+		send_bytes(fd, checked, size);
+		free(checked);
 	}
 	shutdown(fd, SHUT_WR);
 	while (recv(fd, bytes, sizeof bytes, 0) > 0)

@@ -65,7 +65,7 @@ static void read_all(const uint8_t *bytes, size_t size)
 }
 
 /* The frames of an input with the checksums that belong to them: what is behind these is to be reached. malloc'd. */
-static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *out_size)
+static uint8_t *check_all(const uint8_t *bytes, size_t size, size_t *out_size)
 {
 	uint8_t *all = NULL;
 	*out_size = 0;
@@ -91,9 +91,9 @@ static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *out_size)
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
 	size_t out_size;
-	uint8_t *sealed = seal_all(bytes, size, &out_size);
-	read_all(sealed, out_size);
-	free(sealed);
+	uint8_t *checked = check_all(bytes, size, &out_size);
+	read_all(checked, out_size);
+	free(checked);
 	read_all(bytes, size); /* whose checksums are hardly ever right */
 	return 0;
 }

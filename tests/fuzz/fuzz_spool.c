@@ -79,7 +79,7 @@ static void change_file(const char *path, const uint8_t *edits, size_t size)
 	store(path, file, n);
 }
 
-static void seal(const char *path, const void *bytes, size_t size)
+static void write_checked(const char *path, const void *bytes, size_t size)
 {
 	struct checked_file s;
 	struct error e;
@@ -152,7 +152,7 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		path_in(spool, "jobs/j7", path);
 		mkdir(path, 0777);
 		path_in(spool, "jobs/j7/order", path);
-		seal(path, bytes, size);
+		write_checked(path, bytes, size);
 		break;
 	case JOURNAL:
 		journal_path(spool, path);
@@ -171,11 +171,11 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		if (n < 4)
 			abort();
 		change(bytes, size, file, n - 4);
-		seal(path, file, n - 4);
+		write_checked(path, file, n - 4);
 		break;
 	case CHECKPOINT_BODY:
 		path_in(spool, "jobs/j2/checkpoint", path);
-		seal(path, bytes, size);
+		write_checked(path, bytes, size);
 		break;
 	case DATABASE_CHANGED:
 		path_in(spool, "jobs.db", path);

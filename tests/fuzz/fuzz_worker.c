@@ -22,7 +22,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum speaker { COORDINATOR, CREW, NETWORK, SIGNAL, SPEAKERS };
+enum speaker { COORDINATOR, POOL, NETWORK, SIGNAL, SPEAKERS };
 enum { WORK_MOST = 3000, PIXELS_MOST = 10000 };
 
 /* ---- the thread pool ---- */
@@ -37,7 +37,7 @@ int thread_pool_new(struct thread_pool **c, uv_loop_t *loop, unsigned threads, s
 	(void)loop;
 	(void)threads;
 	*c = mem_alloc(1, sizeof **c);
-	return *c ? 0 : error_set(e, ENOMEM, "no memory for a crew");
+	return *c ? 0 : error_set(e, ENOMEM, "no memory for a thread pool");
 }
 
 void thread_pool_add(struct thread_pool *c, struct task *t)
@@ -232,7 +232,7 @@ static void step(const struct step *s)
 		send_bytes(bytes, size);
 		free(bytes);
 		break;
-	case CREW:
+	case POOL:
 		work();
 		break;
 	case NETWORK:
@@ -354,10 +354,10 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 			job_end.job = keys[i].job;
 			grant(&s, &keys[i]);
 			describe_job(&s, keys[i].job);
-			seed_raw(&s, CREW, "-");
+			seed_raw(&s, POOL, "-");
 			if (end == 1)
 				SEED_SAY(&s, COORDINATOR, LEASE_REVOKE, lease_revoke, &revoke);
-			seed_raw(&s, end == 2 ? SIGNAL : CREW, "-");
+			seed_raw(&s, end == 2 ? SIGNAL : POOL, "-");
 			if (end == 0) {
 				seed_raw(&s, NETWORK, "-");
 				describe_job(&s, keys[i].job);

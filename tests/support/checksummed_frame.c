@@ -7,21 +7,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-static unsigned char *seal(const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size,
-			   bool first, size_t *out_size)
+static unsigned char *add_checksums(const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size,
+				    bool first, size_t *out_size)
 {
-	size_t head = first ? FRAME_PREFIX : FRAME_SEALED_PREFIX;
-	unsigned char *sealed = malloc(head + size + 1);
-	if (!sealed)
+	size_t head = first ? FRAME_PREFIX : FRAME_CHECKED_PREFIX;
+	unsigned char *checked = malloc(head + size + 1);
+	if (!checked)
 		abort();
 	if (first)
-		memcpy(sealed, prefix, FRAME_PREFIX);
+		memcpy(checked, prefix, FRAME_PREFIX);
 	else
-		frame_seal(sealed, prefix, content, size);
+		frame_add_checksums(checked, prefix, content, size);
 	if (size)
-		memcpy(sealed + head, content, size);
+		memcpy(checked + head, content, size);
 	*out_size = head + size;
-	return sealed;
+	return checked;
 }
 
 static bool is_first(const unsigned char *header, size_t size)
@@ -40,7 +40,8 @@ unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t
 {
 	uint32_t header, payload;
 	frame_prefix_read(frame, &header, &payload);
-	return seal(frame, frame + FRAME_PREFIX, size - FRAME_PREFIX, is_first(frame + FRAME_PREFIX, header), out_size);
+	return add_checksums(frame, frame + FRAME_PREFIX, size - FRAME_PREFIX, is_first(frame + FRAME_PREFIX, header),
+			     out_size);
 }
 
 /* Of what may have been changed since it was packed; NULL: it is none, or has fields of another version. */
@@ -51,12 +52,12 @@ static unsigned char *checked_hello(const void *header, size_t size, size_t *out
 					: m->body_case == FARM__ENVELOPE__BODY_HELLO	 ? &m->hello->base
 					: m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK ? &m->hello_ack->base
 											 : NULL;
-	unsigned char *sealed = hello && !hello->n_unknown_fields && !m->base.n_unknown_fields
-					? checksummed_message(m, NULL, 0, out_size)
-					: NULL;
+	unsigned char *checked = hello && !hello->n_unknown_fields && !m->base.n_unknown_fields
+					 ? checksummed_message(m, NULL, 0, out_size)
+					 : NULL;
 	if (m)
 		farm__envelope__free_unpacked(m, NULL);
-	return sealed;
+	return checked;
 }
 
 unsigned char *checksummed_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
@@ -73,9 +74,9 @@ unsigned char *checksummed_parts(const void *header, size_t header_size, const v
 		memcpy(both, header, header_size);
 	if (payload_size)
 		memcpy(both + header_size, payload, payload_size);
-	unsigned char *sealed = seal(prefix, both, header_size + payload_size, first, out_size);
+	unsigned char *checked = add_checksums(prefix, both, header_size + payload_size, first, out_size);
 	free(both);
-	return sealed;
+	return checked;
 }
 
 unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size, size_t *out_size)
@@ -85,7 +86,7 @@ unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload,
 	struct error e;
 	if (envelope_pack(m, payload, payload_size, &frame, &size, &e))
 		abort();
-	unsigned char *sealed = checksummed_frame(frame, size, out_size);
+	unsigned char *checked = checksummed_frame(frame, size, out_size);
 	mem_free(frame);
-	return sealed;
+	return checked;
 }

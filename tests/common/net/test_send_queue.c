@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Frames leave in their order, the first as it is and each further one sealed; what waits is bounded; each state sends
+ * Frames leave in their order, the first as it is and each further one checked; what waits is bounded; each state sends
  * what it says. Over a pair of sockets whose far end is read by hand, so that a peer that does not read is one. What
  * goes through TLS is test_net's.
  */
@@ -112,16 +112,16 @@ static bool nothing_comes(void)
 	return recv(f.far, &byte, 1, MSG_DONTWAIT) < 0 && errno == EAGAIN;
 }
 
-static void first_plain_then_sealed(void **state)
+static void first_plain_then_checked(void **state)
 {
 	(void)state;
-	size_t plain = FRAME_PREFIX + 5, sealed = FRAME_SEALED_PREFIX + 7;
-	unsigned char *expected[] = {frame_of(5, 'a'), frame_of(7, 'b')}, head[FRAME_SEALED_PREFIX];
+	size_t plain = FRAME_PREFIX + 5, checked = FRAME_CHECKED_PREFIX + 7;
+	unsigned char *expected[] = {frame_of(5, 'a'), frame_of(7, 'b')}, head[FRAME_CHECKED_PREFIX];
 	send_frame(5, 'a');
 	send_frame(7, 'b');
 	assert_false(send_queue_is_empty(&f.queue));
-	unsigned char *got = receive(plain + sealed);
-	frame_seal(head, expected[1], expected[1] + FRAME_PREFIX, 7);
+	unsigned char *got = receive(plain + checked);
+	frame_add_checksums(head, expected[1], expected[1] + FRAME_PREFIX, 7);
 	assert_memory_equal(got, expected[0], plain);
 	assert_memory_equal(got + plain, head, sizeof head);
 	assert_memory_equal(got + plain + sizeof head, expected[1] + FRAME_PREFIX, 7);
@@ -204,7 +204,7 @@ static void error_of_the_stream(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(first_plain_then_sealed, begin, end),
+		cmocka_unit_test_setup_teardown(first_plain_then_checked, begin, end),
 		cmocka_unit_test_setup_teardown(what_waits_is_bounded, begin, end),
 		cmocka_unit_test_setup_teardown(many_small_frames_reach_the_limit, begin, end),
 		cmocka_unit_test_setup_teardown(draining_sends_what_it_has, begin, end),

@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-/* The second one is sealed, by checksums that were computed elsewhere (a bit at a time, Python). */
+/* The second one is checked, by checksums that were computed elsewhere (a bit at a time, Python). */
 static const unsigned char two_frames[] = {0,	 0,    0,    2,	  0,  0, 0, 3, 'h',  'i',  'a',	 'b',  'c', /* */
 					   0,	 0,    0,    1,	  0,  0, 0, 1, 0xda, 0x06, 0xef, 0x2c, 0x9e,
 					   0x67, 0x09, 0x20, 'x', 'y'};
@@ -69,13 +69,13 @@ static void any_changed_bit_is_noticed(void **state)
 	}
 }
 
-static void what_is_sealed_is_read(void **state)
+static void what_is_checked_is_read(void **state)
 {
 	(void)state;
-	unsigned char prefix[FRAME_PREFIX], sealed[FRAME_SEALED_PREFIX];
+	unsigned char prefix[FRAME_PREFIX], checked[FRAME_CHECKED_PREFIX];
 	frame_prefix_write(prefix, 1, 1);
-	frame_seal(sealed, prefix, (const unsigned char *)"xy", 2);
-	assert_memory_equal(sealed, two_frames + FIRST, sizeof sealed);
+	frame_add_checksums(checked, prefix, (const unsigned char *)"xy", 2);
+	assert_memory_equal(checked, two_frames + FIRST, sizeof checked);
 }
 
 static int first_answer(const unsigned char prefix[8], struct frame_limits limits)
@@ -117,7 +117,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(any_cut_gives_the_same_frames), cmocka_unit_test(any_changed_bit_is_noticed),
-		cmocka_unit_test(what_is_sealed_is_read),	 cmocka_unit_test(lengths_are_held_against_limits),
+		cmocka_unit_test(what_is_checked_is_read),	 cmocka_unit_test(lengths_are_held_against_limits),
 		cmocka_unit_test(the_prefix_is_what_is_read),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

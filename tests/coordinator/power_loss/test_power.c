@@ -311,13 +311,13 @@ static size_t load(const char *path, unsigned char bytes[FILE_MOST])
 	return n;
 }
 
-static void store(const char *path, const unsigned char *bytes, size_t size, bool seal)
+static void store(const char *path, const unsigned char *bytes, size_t size, bool check)
 {
 	struct checked_file out;
 	struct error e;
 	FILE *f = fopen(path, "wb");
 	assert_true(f && fwrite(bytes, 1, size, f) == size && fclose(f) == 0);
-	if (!seal)
+	if (!check)
 		return;
 	assert_int_equal(checked_file_create(&out, path, &e), 0);
 	assert_int_equal(checked_file_write(&out, bytes, size - sizeof(uint32_t), &e), 0);

@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * An image as a texture's table of texels: decoded once for all textures that use it alike (the assets' cache, if they
+ * have one), then looked up with its wrap modes and filter.
+ *
+ * Failures: a file that is missing or no image, with the node's place. Look-ups cannot fail.
+ */
 #include "worker/render/texture/raster.h"
 
 static int decode(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
