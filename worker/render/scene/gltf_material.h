@@ -11,8 +11,6 @@ enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
 /* The references of a shape with this material. */
 void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
 		   enum gltf_colours colours);
-/* The set of texture coordinates that its textures use, if all use the same; otherwise 0. */
-unsigned gltf_material_set(struct gltf *g, const struct gltf_at *material);
 void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours);
 
 #endif

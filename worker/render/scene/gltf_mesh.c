@@ -11,6 +11,7 @@
 #include "worker/render/scene/gltf_node.h"
 #include "worker/render/scene/gltf_numbers.h"
 #include "worker/render/scene/gltf_pose.h"
+#include "worker/render/scene/gltf_texture.h"
 #include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
@@ -163,7 +164,7 @@ static void find_sources(struct gltf *g, struct gltf_primitive *p, const json_t 
 	struct gltf_at material;
 	char texcoord[32];
 	bool has = gltf_follow(g, p->mesh, p->json, "material", GLTF_MATERIALS, &material) > 0;
-	snprintf(texcoord, sizeof texcoord, "TEXCOORD_%u", has ? gltf_material_set(g, &material) : 0);
+	snprintf(texcoord, sizeof texcoord, "TEXCOORD_%u", has ? gltf_texture_set(g, &material) : 0);
 	find_source(g, p, attributes, "POSITION", GLTF_POSITION);
 	find_source(g, p, attributes, "NORMAL", GLTF_NORMAL);
 	find_source(g, p, attributes, texcoord, GLTF_TEXCOORD);

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Extensions of materials. Private to gltf*.c. */
+#ifndef WORKER_RENDER_SCENE_GLTF_LAYERS_H
+#define WORKER_RENDER_SCENE_GLTF_LAYERS_H
+
+#include "worker/render/scene/gltf_tree.h"
+
+/* All of a material, as properties of a `principled`. */
+void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *material);
+/* Members of an extension without counterpart, up to NULL, as properties that no table has. */
+void gltf_put_unsupported(struct gltf *g, struct xml_element *el, const struct gltf_at *material,
+			  const json_t *extension, const char *const *members);
+/* Unknown extensions, which would change the image, likewise. */
+void gltf_put_foreign(struct gltf *g, struct xml_element *el, const struct gltf_at *material);
+
+#endif
