@@ -2,10 +2,12 @@
 /*
  * The extensions of materials as properties of `principled`. Transmission refracts, as in importers of modelling tools:
  * thin walls are not distinguished from solids. The clear coat's strength is four times the parameter of `principled`,
- * which ends at a quarter of the format's.
+ * which ends at a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses differ by less
+ * than a factor of ten.
  *
- * What `principled` does not have becomes a property that its table does not know: refused with its name, or left out
- * with --lenient.
+ * Details that `principled` does not have are left out with a note: what a coat, a sheen or a reflection varies by.
+ * What changes the picture as a whole becomes a property that its table does not know: refused with its name, or left
+ * out with --lenient.
  */
 #include "worker/render/scene/gltf_layers.h"
 #include "worker/render/scene/gltf_texture.h"
@@ -22,9 +24,19 @@ void gltf_put_unsupported(struct gltf *g, struct xml_element *el, const struct g
 			gltf_put_text(g, el, at, *members, ELEMENT_UNSUPPORTED);
 }
 
+/* Members that are left out. what: of which layer, and why that matters little. */
+static void note_members(struct gltf *g, const json_t *extension, const char *const *members, const char *note)
+{
+	for (; *members; members++)
+		if (json_object_get(extension, *members)) {
+			gltf_note(g, note);
+			return;
+		}
+}
+
 static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
-	static const char *const others[] = {"specularTexture", "specularColorTexture", NULL};
+	static const char *const others[] = {"specularTexture", "specularColorTexture", "specularColorFactor", NULL};
 	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
 		     *specular = gltf_extension(g, at, at->json, "KHR_materials_specular");
 	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5,
@@ -32,27 +44,67 @@ static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_
 	/* The reflectance at normal incidence, scaled; an index of 0 means total reflection in the format. */
 	double root = eta > 0 ? (eta - 1) / (eta + 1) : 1, scaled = fabs(root) * sqrt(fmin(fmax(factor, 0), 1));
 	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
-	double tint[3] = {1, 1, 1};
-	if (specular)
-		gltf_numbers(g, at, specular, "specularColorFactor", tint, 3);
-	if (tint[0] != 1 || tint[1] != 1 || tint[2] != 1)
-		gltf_put_text(g, el, at, "specularColorFactor", ELEMENT_UNSUPPORTED);
-	gltf_put_unsupported(g, el, at, specular, others);
+	note_members(g, specular, others,
+		     "the reflection of what is no metal is white and the same everywhere: textures and colours of "
+		     "KHR_materials_specular are left out");
 }
 
 static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
-	static const char *const others[] = {"clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture",
-					     NULL};
+	static const char *const others[] = {"clearcoatRoughnessTexture", "clearcoatNormalTexture", NULL};
 	const json_t *coat = gltf_extension(g, at, at->json, "KHR_materials_clearcoat");
 	double factor = coat ? gltf_number(g, at, coat, "clearcoatFactor", 0) : 0;
 	if (!(factor > 0))
 		return;
 	double roughness = gltf_number(g, at, coat, "clearcoatRoughnessFactor", 0);
 	gltf_note(g, "clear coats reflect a quarter of what the format says, the maximum of `principled`");
-	gltf_put_number(g, el, at, "clearcoat", factor);
+	gltf_put_share(g, el, at, "clearcoat", factor, gltf_object(g, at, coat, "clearcoatTexture"), "r");
 	gltf_put_number(g, el, at, "clearcoat_gloss", fmin(fmax((0.1 - roughness * roughness) / 0.099, 0), 1));
-	gltf_put_unsupported(g, el, at, coat, others);
+	note_members(g, coat, others,
+		     "the roughness and the normals of clear coats do not vary: their textures are left out");
+}
+
+/* The format's sheen is of cloth (Estevez and Kulla 2017), Burley's of its edges. */
+static void put_sheen(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	const json_t *sheen = gltf_extension(g, at, at->json, "KHR_materials_sheen");
+	double rgb[3] = {0, 0, 0};
+	if (sheen)
+		gltf_numbers(g, at, sheen, "sheenColorFactor", rgb, 3);
+	double most = fmax(rgb[0], fmax(rgb[1], rgb[2])), least = fmin(rgb[0], fmin(rgb[1], rgb[2]));
+	if (!(most > 0))
+		return;
+	gltf_note(g,
+		  "sheen is that of `principled`, which differs from the format's: no roughness, no textures, and its "
+		  "colour is white or the surface's");
+	gltf_put_number(g, el, at, "sheen", fmin(most, 1));
+	gltf_put_number(g, el, at, "sheen_tint", fmin(1 - least / most, 1));
+}
+
+/* The format widens the roughness along the tangent to a_t = a + (1 - a) s^2, and leaves a across; `principled` divides
+ * and multiplies a by sqrt(1 - 0.9 x). With r for their ratio: x = (1 - 1 / r) / 0.9, and a becomes sqrt(a_t a). */
+static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct gltf_at *at, double *roughness,
+			   bool textured)
+{
+	const json_t *o = gltf_extension(g, at, at->json, "KHR_materials_anisotropy");
+	double s = o ? gltf_number(g, at, o, "anisotropyStrength", 0) : 0,
+	       turn = o ? gltf_number(g, at, o, "anisotropyRotation", 0) : 0, a = *roughness * *roughness;
+	if (s == 0)
+		return;
+	double wide = a + (1 - a) * s * s, ratio = a > 0 ? wide / a : INFINITY;
+	if (textured || turn != 0 || json_object_get(o, "anisotropyTexture") || !(ratio < 10)) {
+		gltf_note(g, "anisotropy with a texture, a rotation, or of a smooth surface is left out");
+		return;
+	}
+	gltf_put_number(g, el, at, "anisotropic", (1 - 1 / ratio) / 0.9);
+	*roughness = sqrt(sqrt(wide * a));
+}
+
+static void note_iridescence(struct gltf *g, const struct gltf_at *at)
+{
+	const json_t *o = gltf_extension(g, at, at->json, "KHR_materials_iridescence");
+	if (o && gltf_number(g, at, o, "iridescenceFactor", 0) > 0)
+		gltf_note(g, "the colours of thin films (KHR_materials_iridescence) are left out");
 }
 
 static void put_transmission(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
@@ -62,8 +114,7 @@ static void put_transmission(struct gltf *g, struct xml_element *el, const struc
 		     *dispersion = gltf_extension(g, at, at->json, "KHR_materials_dispersion");
 	double factor = t ? gltf_number(g, at, t, "transmissionFactor", 0) : 0;
 	if (factor > 0) {
-		gltf_put_number(g, el, at, "spec_trans", factor);
-		gltf_put_unsupported(g, el, at, t, (const char *const[]){"transmissionTexture", NULL});
+		gltf_put_share(g, el, at, "spec_trans", factor, gltf_object(g, at, t, "transmissionTexture"), "r");
 		gltf_put_unsupported(g, el, at, volume, (const char *const[]){"attenuationDistance", NULL});
 		if (dispersion && gltf_number(g, at, dispersion, "dispersion", 0) > 0)
 			gltf_put_unsupported(g, el, at, dispersion, (const char *const[]){"dispersion", NULL});
@@ -72,10 +123,13 @@ static void put_transmission(struct gltf *g, struct xml_element *el, const struc
 
 void gltf_put_foreign(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
-	static const char *const known[] = {"KHR_materials_clearcoat",
+	static const char *const known[] = {"KHR_materials_anisotropy",
+					    "KHR_materials_clearcoat",
 					    "KHR_materials_dispersion",
 					    "KHR_materials_emissive_strength",
 					    "KHR_materials_ior",
+					    "KHR_materials_iridescence",
+					    "KHR_materials_sheen",
 					    "KHR_materials_specular",
 					    "KHR_materials_transmission",
 					    "KHR_materials_volume",
@@ -92,8 +146,13 @@ void gltf_put_foreign(struct gltf *g, struct xml_element *el, const struct gltf_
 	}
 }
 
-void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *at, double roughness,
+		     const json_t *texture)
 {
+	put_anisotropy(g, el, at, &roughness, roughness > 0 && texture);
+	gltf_put_share(g, el, at, "roughness", roughness, roughness > 0 ? texture : NULL, "g");
+	put_sheen(g, el, at);
+	note_iridescence(g, at);
 	put_index(g, el, at);
 	put_coat(g, el, at);
 	put_transmission(g, el, at);

@@ -5,8 +5,10 @@
 
 #include "worker/render/scene/gltf_tree.h"
 
-/* All of a material, as properties of a `principled`. */
-void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *material);
+/* All of a material, as properties of a `principled`, and its roughness, times the green of the texture (NULL: none),
+ * which one of them changes. */
+void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *material, double roughness,
+		     const json_t *texture);
 /* Members of an extension without counterpart, up to NULL, as properties that no table has. */
 void gltf_put_unsupported(struct gltf *g, struct xml_element *el, const struct gltf_at *material,
 			  const json_t *extension, const char *const *members);

@@ -132,7 +132,7 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const doubl
 	bool clear = base[0] == 1 && base[1] == 1 && base[2] == 1 && metallic == 0 &&
 		     !json_object_get(metal, "baseColorTexture") && !json_object_get(metal, "metallicRoughnessTexture");
 	if (!(strength > 0) || !clear || !t || gltf_number(g, at, t, "transmissionFactor", 0) != 1 ||
-	    gltf_extension(g, at, at->json, "KHR_materials_clearcoat") ||
+	    json_object_get(t, "transmissionTexture") || gltf_extension(g, at, at->json, "KHR_materials_clearcoat") ||
 	    gltf_extension(g, at, at->json, "KHR_materials_specular"))
 		return false;
 	double n = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5;
@@ -147,7 +147,6 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const doubl
 		gltf_put_text(g, bsdf, at, "distribution", "ggx");
 		gltf_put_number(g, bsdf, at, "alpha", roughness * roughness);
 	}
-	gltf_put_unsupported(g, bsdf, at, t, (const char *const[]){"transmissionTexture", NULL});
 	gltf_put_unsupported(g, bsdf, at, gltf_extension(g, at, at->json, "KHR_materials_volume"),
 			     (const char *const[]){"attenuationDistance", NULL});
 	gltf_put_foreign(g, bsdf, at);
@@ -174,8 +173,7 @@ static void put_principled(struct gltf *g, const struct gltf_at *at, enum gltf_c
 		     *both = metal ? gltf_object(g, at, metal, "metallicRoughnessTexture") : NULL;
 	put_base_colour(g, bsdf, at, base, colour, colours);
 	gltf_put_share(g, bsdf, at, "metallic", metallic, metallic > 0 ? both : NULL, "b");
-	gltf_put_share(g, bsdf, at, "roughness", roughness, roughness > 0 ? both : NULL, "g");
-	gltf_put_layers(g, bsdf, at);
+	gltf_put_layers(g, bsdf, at, roughness, both);
 	if (g->failed)
 		return;
 	while (bsdf->parent != g->scene)

@@ -234,10 +234,13 @@ static const struct {
 	 "`color` has another number of entries than `position`"},
 	{"{\"index\": 0},\n\"metallicFactor\"", "{\"index\": 0, \"texCoord\": 1},\n\"metallicFactor\"",
 	 "<texture type=\"bitmap\">: `texCoord` is not supported; --lenient leaves it out"},
-	{"\"KHR_materials_ior\"", "\"KHR_materials_sheen\"",
-	 "<bsdf type=\"principled\">: `KHR_materials_sheen` is not supported; --lenient leaves it out"},
-	{"\"KHR_materials_ior\": {\"ior\": 1.75}", "\"KHR_materials_specular\": {\"specularTexture\": {}}",
-	 "specularTexture"},
+	{"\"KHR_materials_ior\"", "\"KHR_materials_diffuse_transmission\"",
+	 "<bsdf type=\"principled\">: `KHR_materials_diffuse_transmission` is not supported; --lenient leaves it out"},
+	{"\"KHR_materials_ior\": {\"ior\": 1.75}", "\"KHR_materials_volume\": {\"attenuationDistance\": 2}",
+	 "`attenuationDistance` is not supported"},
+	{"\"KHR_materials_ior\": {\"ior\": 1.75}",
+	 "\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 1, \"clearcoatTexture\": {}}",
+	 "a texture without an index"},
 	{"\"mode\": 5,", "\"mode\": 5, \"extensions\": {\"KHR_draco_mesh_compression\": {}},", "without compression"},
 	{"\"mesh\": 0,", "\"mesh\": 0, \"extensions\": {\"EXT_mesh_gpu_instancing\": {}},",
 	 "nodes[0]: EXT_mesh_gpu_instancing without instances"},
@@ -421,6 +424,60 @@ static const struct scene_node *named(const struct scene *s, const char *id)
 }
 
 #define IOR "\"KHR_materials_ior\": {"
+/* Layers that `principled` has in its own way, textures of two of them, and details that are left out with a note. */
+static void test_layers(void **state)
+{
+	(void)state;
+	static const char third[] = "bsdf of materials[2]";
+	struct scene s = read_changed(
+		IOR,
+		"\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5, \"clearcoatTexture\": {\"index\": 0}, "
+		"\"clearcoatNormalTexture\": {\"index\": 0}}, \"KHR_materials_iridescence\": {\"iridescenceFactor\": 1}, "
+		"\"KHR_materials_sheen\": {\"sheenColorFactor\": [0.5, 0.25, 0.125]}, " IOR,
+		false);
+	const struct scene_node *coat = node_ref(named(&s, third), "clearcoat");
+	assert_string_equal(coat->type, "scale");
+	assert_near(node_float(coat, "scale", 0), 0.5);
+	assert_string_equal(node_string(node_child(coat, PLUGIN_TEXTURE, 0), "channel", ""), "r");
+	assert_near(node_float(named(&s, third), "sheen", 0), 0.5);
+	assert_near(node_float(named(&s, third), "sheen_tint", 0), 0.75);
+	assert_true(has_note(&s, "sheen is that of") && has_note(&s, "thin films") &&
+		    has_note(&s, "normals of clear coats"));
+	scene_fini(&s);
+
+	s = read_changed("\"transmissionFactor\": 1",
+			 "\"transmissionFactor\": 1, \"transmissionTexture\": {\"index\": 0}", false);
+	assert_string_equal(node_string(node_ref(named(&s, third), "spec_trans"), "channel", ""), "r");
+	scene_fini(&s);
+
+	s = read_changed(IOR, "\"KHR_materials_specular\": {\"specularColorFactor\": [1, 0.5, 0.5]}, " IOR, false);
+	assert_true(has_note(&s, "textures and colours of KHR_materials_specular"));
+	scene_fini(&s);
+}
+
+/* The two roughnesses of `principled` are those of the format. */
+static void test_anisotropy(void **state)
+{
+	(void)state;
+	static const char third[] = "bsdf of materials[2]";
+	struct scene s = read_changed(IOR, "\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6}, " IOR, false);
+	const struct scene_node *bsdf = named(&s, third);
+	double x = node_float(bsdf, "anisotropic", 0), r = node_float(bsdf, "roughness", 0), aspect = sqrt(1 - 0.9 * x);
+	assert_true(x > 0);
+	assert_near(r * r / aspect, 0.25 + 0.75 * 0.36);
+	assert_near(r * r * aspect, 0.25);
+	scene_fini(&s);
+	static const char *const left_out[] = {
+		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyRotation\": 1}, " IOR,
+		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyTexture\": {}}, " IOR};
+	for (int i = 0; i < 2; i++) {
+		s = read_changed(IOR, left_out[i], false);
+		assert_null(node_find(named(&s, third), "anisotropic"));
+		assert_true(has_note(&s, "anisotropy with a texture, a rotation"));
+		scene_fini(&s);
+	}
+}
+
 static void test_materials(void **state)
 {
 	(void)state;
@@ -460,8 +517,8 @@ static void test_materials(void **state)
 	scene_fini(&s);
 
 	/* What is known and not supported goes with --lenient, and is said. */
-	s = read_changed(IOR, "\"KHR_materials_sheen\": {}, " IOR, true);
-	assert_true(has_note(&s, "KHR_materials_sheen"));
+	s = read_changed(IOR, "\"KHR_materials_diffuse_transmission\": {}, " IOR, true);
+	assert_true(has_note(&s, "KHR_materials_diffuse_transmission"));
 	scene_fini(&s);
 
 	s = read_changed(", \"material\": 0}", "}", false);
@@ -498,6 +555,8 @@ int main(void)
 		cmocka_unit_test(test_lights_and_cameras),
 		cmocka_unit_test(test_no_camera_no_light),
 		cmocka_unit_test(test_materials),
+		cmocka_unit_test(test_layers),
+		cmocka_unit_test(test_anisotropy),
 		cmocka_unit_test(test_notes),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);
