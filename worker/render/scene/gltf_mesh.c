@@ -322,12 +322,14 @@ void gltf_mesh_instances(struct gltf *g, const struct gltf_at *mesh, const struc
 	static const char *const parts[3] = {"TRANSLATION", "ROTATION", "SCALE"};
 	struct gltf_vectors v[3] = {{.x = NULL}};
 	uint64_t count = 0;
+	bool any = false;
 	for (int i = 0; i < 3; i++) {
 		if (!read_instances(g, node, attributes, parts[i], i == 1 ? 4 : 3, &v[i]))
 			continue;
-		if (count && v[i].count != count)
+		if (any && v[i].count != count)
 			gltf_fail(g, node, EINVAL, "attributes of instances with different numbers of entries");
 		count = v[i].count;
+		any = true;
 	}
 	if (!count)
 		gltf_fail(g, node, EINVAL, "EXT_mesh_gpu_instancing without instances");

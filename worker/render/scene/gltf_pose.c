@@ -18,7 +18,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { UNSIGNED_BYTE = 5121, UNSIGNED_SHORT = 5123, FLOAT = 5126, SETS_MAX = 8 };
+enum { UNSIGNED_BYTE = 5121, UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126, SETS_MAX = 8 };
 #define EMBEDDED_MAX (UINT64_C(512) << 20)
 
 /* ---- which */
@@ -233,7 +233,7 @@ static void pack(const struct gltf_vectors *v, bool whole, unsigned char *out)
 {
 	for (uint64_t i = 0; i < v->count * v->components; i++) {
 		float f = (float)v->x[i];
-		uint32_t bits = (uint32_t)v->x[i];
+		uint32_t bits = whole ? (uint32_t)v->x[i] : 0;
 		memcpy(out + 4 * i, whole ? (const void *)&bits : &f, 4);
 	}
 }
@@ -296,6 +296,9 @@ void gltf_put_pose(struct gltf *g, struct xml_element *shape, const struct gltf_
 		if (p->sources[i].json && gltf_vectors_read(g, &p->sources[i], names[i], components[i], &v[i]) &&
 		    i != GLTF_INDEX && v[i].count != v[GLTF_POSITION].count)
 			gltf_fail(g, &p->sources[i], EINVAL, "another number of entries than POSITION has");
+	uint64_t type = gltf_whole(g, p->mesh, p->sources[GLTF_INDEX].json, "componentType", UNSIGNED_INT);
+	if (!g->failed && type != UNSIGNED_BYTE && type != UNSIGNED_SHORT && type != UNSIGNED_INT)
+		gltf_fail(g, &p->sources[GLTF_INDEX], EINVAL, "of a type that index cannot have");
 	if (!g->failed && v[GLTF_COLOR].x && v[GLTF_COLOR].components < 3)
 		gltf_fail(g, &p->sources[GLTF_COLOR], EINVAL, "of a type that color cannot have");
 	if (!g->failed)

@@ -160,6 +160,9 @@ static void sparse(void **state)
 	struct world *w = world_of_files(4, 4, file.list);
 	assert_triangle(w, 0, (vec3){0, 0, 0}, 1);
 	world_free(w);
+	char *type = strstr(file.json, "5123"); /* -1 would be an index */
+	memcpy(type, "5122", 4);
+	refuses("accessors[1]: of a type that index cannot have");
 	file.bytes[0][1] = 3; /* there is no such vertex */
 	finish(json);
 	refuses("accessors[0]: its sparse indices exceed its count");
@@ -282,6 +285,8 @@ static void of_a_list(void **state)
 	assert_triangle(w, 1, (vec3){9, 0, 0}, 2);
 	world_free(w);
 	finish(INSTANCES("1"));
+	refuses("nodes[0]: attributes of instances with different numbers of entries");
+	memcpy(strstr(file.json, "\"count\": 2"), "\"count\": 0", 10); /* of TRANSLATION, which comes first */
 	refuses("nodes[0]: attributes of instances with different numbers of entries");
 }
 
