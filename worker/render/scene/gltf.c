@@ -115,13 +115,21 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 /* Extensions that are known, whatever becomes of them. */
 static bool is_known(const char *extension)
 {
-	static const char *const known[] = {"EXT_mesh_gpu_instancing",	  "KHR_materials_anisotropy",
-					    "KHR_materials_iridescence",  "KHR_materials_sheen",
-					    "KHR_lights_punctual",	  "KHR_materials_clearcoat",
-					    "KHR_materials_dispersion",	  "KHR_materials_emissive_strength",
-					    "KHR_materials_ior",	  "KHR_materials_specular",
-					    "KHR_materials_transmission", "KHR_materials_volume",
-					    "KHR_mesh_quantization",	  "KHR_texture_transform"};
+	static const char *const known[] = {"EXT_mesh_gpu_instancing",
+					    "KHR_materials_anisotropy",
+					    "KHR_materials_iridescence",
+					    "KHR_materials_pbrSpecularGlossiness",
+					    "KHR_materials_sheen",
+					    "KHR_lights_punctual",
+					    "KHR_materials_clearcoat",
+					    "KHR_materials_dispersion",
+					    "KHR_materials_emissive_strength",
+					    "KHR_materials_ior",
+					    "KHR_materials_specular",
+					    "KHR_materials_transmission",
+					    "KHR_materials_volume",
+					    "KHR_mesh_quantization",
+					    "KHR_texture_transform"};
 	for (size_t i = 0; i < sizeof known / sizeof *known; i++)
 		if (strcmp(known[i], extension) == 0)
 			return true;

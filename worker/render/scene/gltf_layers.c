@@ -129,6 +129,7 @@ void gltf_put_foreign(struct gltf *g, struct xml_element *el, const struct gltf_
 					    "KHR_materials_emissive_strength",
 					    "KHR_materials_ior",
 					    "KHR_materials_iridescence",
+					    "KHR_materials_pbrSpecularGlossiness",
 					    "KHR_materials_sheen",
 					    "KHR_materials_specular",
 					    "KHR_materials_transmission",

@@ -5,6 +5,7 @@
  */
 #include "worker/render/scene/gltf_material.h"
 #include "worker/render/scene/gltf_layers.h"
+#include "worker/render/scene/gltf_surface.h"
 #include "worker/render/scene/gltf_texture.h"
 
 #include <math.h>
@@ -45,10 +46,9 @@ static void put_base_colour(struct gltf *g, struct xml_element *el, const struct
 
 /* Wraps the BSDF in what transmits a part of the light. */
 static struct xml_element *put_mask(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
-				    const json_t *metal, double alpha, bool vertex_alpha)
+				    const json_t *texture, double alpha, bool vertex_alpha)
 {
 	const char *mode = gltf_text(g, at, at->json, "alphaMode", "OPAQUE");
-	const json_t *texture = metal ? gltf_object(g, at, metal, "baseColorTexture") : NULL;
 	bool cut = strcmp(mode, "MASK") == 0;
 	if (strcmp(mode, "OPAQUE") == 0 || (!texture && !cut && alpha == 1 && !vertex_alpha))
 		return parent;
@@ -120,17 +120,15 @@ static bool shines(struct gltf *g, const struct gltf_at *at, double rgb[3])
 
 /* Clear glass with a varying index: a dielectric, with Cauchy's law for the Abbe number 20 / dispersion. false:
  * another material. */
-static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const double base[4], double metallic,
-			   double roughness)
+static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struct gltf_surface *s)
 {
 	static const double f_line = 0.48613, c_line = 0.65627; /* micrometres */
 	const json_t *t = gltf_extension(g, at, at->json, "KHR_materials_transmission"),
 		     *dispersion = gltf_extension(g, at, at->json, "KHR_materials_dispersion"),
-		     *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
-		     *metal = json_object_get(at->json, "pbrMetallicRoughness");
+		     *ior = gltf_extension(g, at, at->json, "KHR_materials_ior");
 	double strength = dispersion ? gltf_number(g, at, dispersion, "dispersion", 0) : 0;
-	bool clear = base[0] == 1 && base[1] == 1 && base[2] == 1 && metallic == 0 &&
-		     !json_object_get(metal, "baseColorTexture") && !json_object_get(metal, "metallicRoughnessTexture");
+	bool clear =
+		s->base[0] == 1 && s->base[1] == 1 && s->base[2] == 1 && s->metallic == 0 && !s->colour && !s->both;
 	if (!(strength > 0) || !clear || !t || gltf_number(g, at, t, "transmissionFactor", 0) != 1 ||
 	    json_object_get(t, "transmissionTexture") || gltf_extension(g, at, at->json, "KHR_materials_clearcoat") ||
 	    gltf_extension(g, at, at->json, "KHR_materials_specular"))
@@ -138,14 +136,14 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const doubl
 	double n = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5;
 	double spread = 1 / (f_line * f_line) - 1 / (c_line * c_line);
 	struct xml_element *parent = put_normal_map(g, g->scene, at),
-			   *bsdf = gltf_plugin(g, parent, at, "bsdf", roughness > 0 ? "roughdielectric" : "dielectric",
-					       NULL);
+			   *bsdf = gltf_plugin(g, parent, at, "bsdf",
+					       s->roughness > 0 ? "roughdielectric" : "dielectric", NULL);
 	gltf_put_number(g, bsdf, at, "int_ior", n);
 	gltf_put_number(g, bsdf, at, "ext_ior", 1);
 	gltf_put_number(g, bsdf, at, "int_cauchy_b", (n - 1) * strength / 20 / spread);
-	if (roughness > 0) {
+	if (s->roughness > 0) {
 		gltf_put_text(g, bsdf, at, "distribution", "ggx");
-		gltf_put_number(g, bsdf, at, "alpha", roughness * roughness);
+		gltf_put_number(g, bsdf, at, "alpha", s->roughness * s->roughness);
 	}
 	gltf_put_unsupported(g, bsdf, at, gltf_extension(g, at, at->json, "KHR_materials_volume"),
 			     (const char *const[]){"attenuationDistance", NULL});
@@ -157,23 +155,14 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const doubl
 
 static void put_principled(struct gltf *g, const struct gltf_at *at, enum gltf_colours colours)
 {
-	const json_t *metal = gltf_object(g, at, at->json, "pbrMetallicRoughness");
-	double base[4] = {1, 1, 1, 1}, metallic = 1, roughness = 1;
-	if (metal) {
-		gltf_numbers(g, at, metal, "baseColorFactor", base, 4);
-		metallic = gltf_number(g, at, metal, "metallicFactor", 1);
-		roughness = gltf_number(g, at, metal, "roughnessFactor", 1);
-	}
-	if (!colours && put_dispersive(g, at, base, metallic, roughness))
+	const struct gltf_surface s = gltf_surface_read(g, at);
+	if (!colours && put_dispersive(g, at, &s))
 		return;
-	struct xml_element *parent = put_normal_map(
-				   g, put_mask(g, g->scene, at, metal, base[3], colours == GLTF_COLOURS_AND_ALPHA), at),
-			   *bsdf = gltf_plugin(g, parent, at, "bsdf", "principled", NULL);
-	const json_t *colour = metal ? gltf_object(g, at, metal, "baseColorTexture") : NULL,
-		     *both = metal ? gltf_object(g, at, metal, "metallicRoughnessTexture") : NULL;
-	put_base_colour(g, bsdf, at, base, colour, colours);
-	gltf_put_share(g, bsdf, at, "metallic", metallic, metallic > 0 ? both : NULL, "b");
-	gltf_put_layers(g, bsdf, at, roughness, both);
+	struct xml_element *mask = put_mask(g, g->scene, at, s.colour, s.base[3], colours == GLTF_COLOURS_AND_ALPHA),
+			   *bsdf = gltf_plugin(g, put_normal_map(g, mask, at), at, "bsdf", "principled", NULL);
+	put_base_colour(g, bsdf, at, s.base, s.colour, colours);
+	gltf_put_share(g, bsdf, at, "metallic", s.metallic, s.metallic > 0 ? s.both : NULL, "b");
+	gltf_put_layers(g, bsdf, at, s.roughness, s.both);
 	if (g->failed)
 		return;
 	while (bsdf->parent != g->scene)

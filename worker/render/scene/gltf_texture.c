@@ -59,9 +59,11 @@ static uint64_t set_of(struct gltf *g, const struct gltf_at *at, const json_t *i
 unsigned gltf_texture_set(struct gltf *g, const struct gltf_at *at)
 {
 	const json_t *metal = json_object_get(at->json, "pbrMetallicRoughness");
+	const json_t *gloss = gltf_extension(g, at, at->json, "KHR_materials_pbrSpecularGlossiness");
 	const json_t *infos[] = {
-		json_object_get(metal, "baseColorTexture"), json_object_get(metal, "metallicRoughnessTexture"),
-		json_object_get(at->json, "normalTexture"), json_object_get(at->json, "emissiveTexture")};
+		metal ? NULL : json_object_get(gloss, "diffuseTexture"), json_object_get(metal, "baseColorTexture"),
+		json_object_get(metal, "metallicRoughnessTexture"), json_object_get(at->json, "normalTexture"),
+		json_object_get(at->json, "emissiveTexture")};
 	uint64_t set = 0;
 	bool any = false;
 	for (size_t i = 0; i < sizeof infos / sizeof *infos; i++) {

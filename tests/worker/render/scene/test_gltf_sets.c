@@ -4,6 +4,7 @@
 #include "worker/render/render.h"
 #include "worker/render/scene/scene.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -124,6 +125,56 @@ static void test_light(void **state)
 	}
 }
 
+/* Base and metal are those of which the two colours were made. */
+static void test_specular_glossiness(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *more;
+		double base[3], metallic, roughness;
+	} cases[] = {
+		{"\"diffuseFactor\": [0.5, 0.25, 0.125, 1], \"specularFactor\": [0.04, 0.04, 0.04], \"glossinessFactor\": 0.75",
+		 {0.5, 0.25, 0.125},
+		 0,
+		 0.25},
+		{"\"diffuseFactor\": [0, 0, 0, 1], \"specularFactor\": [1, 0.75, 0.25]", {1, 0.75, 0.25}, 1, 0},
+		{"\"diffuseFactor\": [0.42352941176, 0.42352941176, 0.42352941176, 1], \"specularFactor\": [0.32, 0.32, 0.32]",
+		 {0.6, 0.6, 0.6},
+		 0.5,
+		 0},
+		{"\"diffuseFactor\": [0.5, 0.25, 0.125, 1], \"specularGlossinessTexture\": {\"index\": 0}",
+		 {0.5, 0.25, 0.125},
+		 0,
+		 0},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char json[2048];
+		snprintf(json, sizeof json,
+			 FILE_OF("\"2.0\"", "}, \"extensions\": {\"KHR_materials_pbrSpecularGlossiness\": {%s}", "",
+				 BOUNDS),
+			 cases[i].more);
+		char *metal = strstr(json, "\"pbrMetallicRoughness\": {}, ");
+		assert_non_null(metal);
+		memset(metal, ' ', strlen("\"pbrMetallicRoughness\": {}, "));
+		struct scene s = read_text(json);
+		const struct scene_node *bsdf = NULL;
+		for (uint32_t k = 0; k < s.object_count; k++)
+			if (s.objects[k]->cls == PLUGIN_BSDF)
+				bsdf = s.objects[k];
+		assert_non_null(bsdf);
+		const struct property *base = node_find(bsdf, "base_color");
+		for (int c = 0; c < 3; c++)
+			assert_true(fabs(base->value.as.rgb[c] - cases[i].base[c]) < 1e-6);
+		assert_true(fabs(node_float(bsdf, "metallic", -1) - cases[i].metallic) < 1e-6);
+		assert_true(fabs(node_float(bsdf, "roughness", -1) - cases[i].roughness) < 1e-6);
+		bool noted = false;
+		for (uint32_t k = 0; k < s.note_count; k++)
+			noted |= strstr(s.notes[k], "such materials are no metals") != NULL;
+		assert_true(noted == (i == 3));
+		scene_fini(&s);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -131,6 +182,7 @@ int main(void)
 		cmocka_unit_test(test_versions),
 		cmocka_unit_test(test_camera),
 		cmocka_unit_test(test_light),
+		cmocka_unit_test(test_specular_glossiness),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
