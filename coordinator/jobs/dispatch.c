@@ -38,7 +38,9 @@ static void submitted(struct jobs *jobs, const struct action *a, struct submissi
 	struct error e;
 	const Farm__Submit *m = from->submit->message->submit;
 	from->job = a->job;
-	int rc = spool_make_job(jobs->spool, a->job, &e);
+	int rc = ledger_skip_ids(jobs->ledger, a->job, &e); /* before there is a folder: reconcile.c */
+	if (!rc)
+		rc = spool_make_job(jobs->spool, a->job, &e);
 	if (!rc)
 		rc = live_job_new(&job, a->job, from->submit, from->plan, from->owner, 0, jobs->spool, &e);
 	if (!rc && (rc = durable_begin(jobs, job, &e))) {

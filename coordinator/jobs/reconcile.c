@@ -3,9 +3,10 @@
  * Opens the ledger and compares it with the jobs' folders, before any job is read.
  *
  * Files of earlier coordinators are imported first (import.h). A folder without a row is deleted if nothing was merged
- * in it: its job was never accepted. Otherwise the job is lost, as is one whose row is damaged in both files of the
- * ledger: without --accept-loss the start ends with -EBADMSG and a list of what is missing; with it the folder is moved
- * to spool/lost with an explanation. An error of the machine ends the start without further changes.
+ * in it: its job was never accepted, unless the whole ledger is missing. Otherwise the job is lost, as is one whose row
+ * is damaged in both files of the ledger: without --accept-loss the start ends with -EBADMSG and a list of what is
+ * missing; with it the folder is moved to spool/lost with an explanation. An error of the machine ends the start
+ * without further changes.
  */
 #include "coordinator/jobs/reconcile.h"
 
@@ -79,8 +80,9 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 
 /* ---- one job ---- */
 
-/* Something of it was merged or started, so the job had been accepted. */
-static bool has_results(const struct spool *spool, uint64_t id)
+/* Something of it was merged or started, so the job had been accepted. started: it has a journal at least, as each
+ * accepted job has; for a ledger that knows no job, since each is noted there before it gets a folder. */
+static bool has_results(const struct spool *spool, uint64_t id, bool started)
 {
 	char path[SPOOL_PATH_MAX];
 	struct stat st;
@@ -92,7 +94,7 @@ static bool has_results(const struct spool *spool, uint64_t id)
 		if (!journal && strcmp(f->d_name, "checkpoint") != 0 && strcmp(f->d_name, "result.exr") != 0)
 			continue;
 		spool_job_path(spool, id, f->d_name, path);
-		any = disk_stat(path, &st) == 0 && (!journal || st.st_size > (off_t)JOURNAL_HEAD);
+		any = disk_stat(path, &st) == 0 && (!journal || started || st.st_size > (off_t)JOURNAL_HEAD);
 	}
 	if (d)
 		closedir(d);
@@ -107,7 +109,7 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 		return rc;
 	if (rc && j.damaged)
 		return is_lost(l, id, "its rows in jobs.db and jobs-copy.db are damaged", e);
-	if (!rc && has_results(l->jobs->spool, id))
+	if (!rc && has_results(l->jobs->spool, id, ledger_is_new(l->jobs->ledger)))
 		return is_lost(l, id, "jobs.db and jobs-copy.db have no row for it, and its folder has results", e);
 	if (!rc)
 		spool_drop_job(l->jobs->spool, id);

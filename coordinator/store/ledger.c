@@ -33,7 +33,8 @@ struct ledger {
 	sqlite3 *db;
 	struct ledger_side jobs, copy;
 	uint64_t next; /* id */
-	bool behind;   /* the copy lacks changes */
+	bool is_new;
+	bool behind; /* the copy lacks changes */
 };
 
 /* ---- the copy ---- */
@@ -79,12 +80,9 @@ static int merge_rows(struct ledger *l, struct error *e)
 		struct ledger_job a, b;
 		int has_a = ledger_side_after(&l->jobs, id, &a, e);
 		int has_b = has_a < 0 ? 0 : ledger_side_after(&l->copy, id, &b, e);
-		if (has_a <= 0 && has_b <= 0) {
-			rc = has_a ? has_a : has_b;
+		rc = has_a < 0 ? has_a : has_b < 0 ? has_b : 0;
+		if (rc || (!has_a && !has_b))
 			break;
-		}
-		if (has_a < 0 || has_b < 0)
-			return has_a < 0 ? has_a : has_b;
 		id = !has_b || (has_a && a.id < b.id) ? a.id : b.id;
 		rc = merge_row(l, has_a && a.id == id ? &a : NULL, has_b && b.id == id ? &b : NULL, e);
 	}
@@ -177,6 +175,7 @@ static int find_next(struct ledger *l, struct error *e)
 	size_t count;
 	l->next = 1;
 	int rc = ledger_note(l, next_job, &text, e);
+	l->is_new = rc == -ENOENT;
 	if (!rc) {
 		skip(l, strtoull(text, NULL, 10) - 1);
 		mem_free(text);
@@ -184,8 +183,10 @@ static int find_next(struct ledger *l, struct error *e)
 		return rc;
 	}
 	rc = ledger_ids(l, LEDGER_ALL, &ids, &count, e);
-	if (!rc && count)
+	if (!rc && count) {
 		skip(l, ids[count - 1]);
+		l->is_new = false;
+	}
 	mem_free(ids);
 	return rc;
 }
@@ -215,6 +216,11 @@ void ledger_close(struct ledger *l)
 	ledger_side_close(&l->copy);
 	sqlite3_close(l->db);
 	mem_free(l);
+}
+
+bool ledger_is_new(const struct ledger *l)
+{
+	return l->is_new;
 }
 
 /* ---- rows ---- */

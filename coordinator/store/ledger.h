@@ -6,9 +6,9 @@
  * durable in jobs.db when a call returns. jobs-copy.db follows; if it cannot be written, that is logged, and
  * ledger_mend tries again.
  *
- * Each row has a checksum, because SQLite has none; changing a damaged row fails with -EBADMSG. A job that has ended
- * keeps its row until it is dropped. One thread. The scheme's version is the database's user_version; the one before
- * is upgraded when the database is opened, others are refused.
+ * Each job's row has a checksum, because SQLite has none; changing a damaged row fails with -EBADMSG. A job that has
+ * ended keeps its row until it is dropped. One thread. The scheme's version is the database's user_version; the one
+ * before is upgraded when the database is opened, others are refused.
  */
 #ifndef COORDINATOR_STORE_LEDGER_H
 #define COORDINATOR_STORE_LEDGER_H
@@ -27,6 +27,8 @@ struct ledger;
  * another version. */
 int ledger_open(struct ledger **l, const char *folder, struct error *e);
 void ledger_close(struct ledger *l); /* l may be NULL */
+/* No job was in it when it was opened, and none ever had been: of a new spool, or of one that has lost both files. */
+bool ledger_is_new(const struct ledger *l);
 /* Brings jobs-copy.db up to date, if it could not be written. Call now and then. */
 int ledger_mend(struct ledger *l, struct error *e);
 

@@ -8,6 +8,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/reconcile.h"
+#include "coordinator/store/journal.h"
 #include "proto/stored.pb-c.h"
 #include "tests/support/folder.h"
 
@@ -273,6 +274,42 @@ static void what_is_unknown_stays(void **state)
 	assert_true(has("job.json") && has("checkpoint"));
 }
 
+/* Both files of the ledger are gone, and of a job that waited nothing else than an empty journal is left. */
+static void a_waiting_job_without_a_ledger_stays(void **state)
+{
+	(void)state;
+	struct journal *j;
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(jobs.spool, JOB, NULL, path);
+	assert_int_equal(journal_create(&j, path, JOB, 0, &e), 0);
+	journal_release(j);
+	assert_int_equal(reconcile(&jobs, &e), -EBADMSG);
+	assert_non_null(strstr(e.text, "has lost 1 job: j3"));
+	assert_true(has("journal.0"));
+	ledger_close(jobs.ledger);
+	jobs.config.accept_loss = true;
+	assert_int_equal(reconcile(&jobs, &e), 0);
+	assert_false(has(NULL));
+	assert_int_equal(ledger_next_id(jobs.ledger), JOB + 1);
+}
+
+/* The coordinator was stopped before the job got its row; the ledger knows others. */
+static void a_journal_without_a_row_goes(void **state)
+{
+	(void)state;
+	struct journal *j;
+	struct ledger *l;
+	char path[SPOOL_PATH_MAX];
+	assert_int_equal(ledger_open(&l, jobs.config.spool, &e), 0);
+	assert_int_equal(ledger_skip_ids(l, JOB - 1, &e), 0);
+	ledger_close(l);
+	spool_job_path(jobs.spool, JOB, NULL, path);
+	assert_int_equal(journal_create(&j, path, JOB, 0, &e), 0);
+	journal_release(j);
+	assert_int_equal(reconcile(&jobs, &e), 0);
+	assert_false(has(NULL));
+}
+
 static void what_was_never_accepted_goes(void **state)
 {
 	(void)state;
@@ -331,6 +368,8 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_damaged_record, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(what_is_unknown_stays, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(what_was_never_accepted_goes, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_waiting_job_without_a_ledger_stays, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_journal_without_a_row_goes, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(of_another_version, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(notes, set_up, tear_down),
 	};
