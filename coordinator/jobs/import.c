@@ -7,8 +7,8 @@
  * of a job that has ended, from its record. The record says whether the job has ended: it was written before the row. A
  * job of which neither row nor copy is left keeps its files, and is reported as lost (reconcile.h).
  *
- * A record that is damaged is replaced by what the row knows, with a note. An error of the machine, or a file of
- * another version, ends the import.
+ * A record that is damaged is kept as job.json.damaged and replaced by what the row knows, with a note. An error of the
+ * machine, or a file of another version, ends the import.
  */
 #include "coordinator/jobs/import.h"
 
@@ -132,8 +132,10 @@ static int make_record(const struct jobs *jobs, struct ledger_job *j, struct old
 	r->exit_code = r->has_result ? 0 : 3;
 	r->progress = r->has_result;
 	record_add_note(r, "its record (job.json) was damaged: what it counted and estimated is lost");
-	log_event(LOG_SPOOL_FAULT, "job=j%llu text=\"its record (job.json) was damaged: restored from jobs.db\"",
-		  (unsigned long long)j->id);
+	log_event(
+		LOG_SPOOL_FAULT,
+		"job=j%llu text=\"its record (job.json) was damaged: kept as job.json.damaged, and restored from jobs.db\"",
+		(unsigned long long)j->id);
 	return record_to_json(r, &old->text, e);
 }
 
@@ -162,7 +164,7 @@ static int put_row(struct jobs *jobs, uint64_t id, struct old_job *old, struct e
 
 static int import_job(struct jobs *jobs, uint64_t id, struct old_job *old, struct error *e)
 {
-	char path[SPOOL_PATH_MAX];
+	char path[SPOOL_PATH_MAX], kept[SPOOL_PATH_MAX];
 	*old = (struct old_job){.text = NULL};
 	int rc = read_old_job(jobs, id, old, e);
 	if (!rc && (old->text || old->damaged || old->row.job.id))
@@ -174,7 +176,9 @@ static int import_job(struct jobs *jobs, uint64_t id, struct old_job *old, struc
 	if (rc)
 		return rc == -ENOENT ? 0 : rc;
 	spool_job_path(jobs->spool, id, record_file, path);
-	disk_unlink(path);
+	spool_job_path(jobs->spool, id, "job.json.damaged", kept);
+	if (!old->damaged || disk_rename(path, kept))
+		disk_unlink(path);
 	spool_job_path(jobs->spool, id, row_file, path);
 	disk_unlink(path);
 	return 0;

@@ -260,6 +260,7 @@ static void a_damaged_record(void **state)
 	assert_true(r.has_result && r.priority == 5 && r.ended == 9);
 	assert_string_equal(r.state, "done");
 	assert_non_null(strstr(r.note, "was damaged"));
+	assert_true(has("job.json.damaged"));
 }
 
 static void what_is_unknown_stays(void **state)
