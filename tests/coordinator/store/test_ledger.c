@@ -5,6 +5,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "tests/support/folder.h"
+#include "tests/support/ledger_files.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,7 +15,6 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <sqlite3.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -104,34 +104,19 @@ static void living_jobs(void **state)
 	ledger_close(l);
 }
 
-static char *path_of(const char *file)
-{
-	static char path[200];
-	snprintf(path, sizeof path, "%s/%s", folder, file);
-	return path;
-}
-
-/* As somebody else than the ledger would. */
-static void change(const char *file, const char *sql)
-{
-	sqlite3 *db;
-	assert_int_equal(sqlite3_open(path_of(file), &db), SQLITE_OK);
-	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
-	assert_int_equal(sqlite3_close(db), SQLITE_OK);
-}
-
 /* As the first version made it, with a job in it. */
 static void earlier_versions(void **state)
 {
 	(void)state;
 	struct ledger_job j;
-	change("jobs.db",
-	       "CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
-	       " priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL,"
-	       " ended REAL, submission BLOB, plan BLOB) STRICT;"
-	       "CREATE INDEX living ON jobs (id) WHERE ended IS NULL;"
-	       "INSERT INTO jobs VALUES (7, 'ann', 'old', '0.1', 2, 0, 'live', 5.5, NULL, x'0001', x'02');"
-	       "PRAGMA user_version = 1");
+	ledger_files_change(
+		"jobs.db",
+		"CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
+		" priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL,"
+		" ended REAL, submission BLOB, plan BLOB) STRICT;"
+		"CREATE INDEX living ON jobs (id) WHERE ended IS NULL;"
+		"INSERT INTO jobs VALUES (7, 'ann', 'old', '0.1', 2, 0, 'live', 5.5, NULL, x'0001', x'02');"
+		"PRAGMA user_version = 1");
 	struct ledger *l = open_ledger();
 	for (int again = 0; again < 2; again++) {
 		assert_int_equal(next_live(l, 0, &j), 1);
@@ -211,7 +196,7 @@ static void extended(void **state)
 
 static void set_version(const char *file, int32_t version)
 {
-	int fd = open(path_of(file), O_RDWR); /* user_version: bytes 60 to 63, big endian */
+	int fd = open(ledger_files_path(file), O_RDWR); /* user_version: bytes 60 to 63, big endian */
 	uint32_t bytes = htonl((uint32_t)version);
 	assert_int_equal(pwrite(fd, &bytes, sizeof bytes, 60), sizeof bytes);
 	close(fd);
@@ -327,9 +312,9 @@ static void stays_small(void **state)
 		assert_int_equal(ledger_add(l, &j, &e), 0);
 		assert_int_equal(ledger_end(l, record_of(id, 0, "done"), false, &e), 0);
 	}
-	assert_int_equal(stat(path_of("jobs.db-wal"), &st), 0);
+	assert_int_equal(stat(ledger_files_path("jobs.db-wal"), &st), 0);
 	assert_true(st.st_size < 8 << 20);
-	assert_int_equal(stat(path_of("jobs.db"), &st), 0);
+	assert_int_equal(stat(ledger_files_path("jobs.db"), &st), 0);
 	assert_true(st.st_size < 2 << 20); /* the submissions alone would be 6 MB */
 	ledger_close(l);
 }

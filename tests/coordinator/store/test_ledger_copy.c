@@ -6,6 +6,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "tests/support/folder.h"
+#include "tests/support/ledger_files.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,22 +24,6 @@
 enum { ROWS = 5 };
 static const char *const files[] = {"jobs.db", "jobs-copy.db"};
 static struct error e;
-
-static char *path_of(const char *file)
-{
-	static char path[200];
-	snprintf(path, sizeof path, "%s/%s", folder, file);
-	return path;
-}
-
-/* As somebody else than the ledger would. */
-static void change(const char *file, const char *sql)
-{
-	sqlite3 *db;
-	assert_int_equal(sqlite3_open(path_of(file), &db), SQLITE_OK);
-	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
-	assert_int_equal(sqlite3_close(db), SQLITE_OK);
-}
 
 static struct ledger *open_ledger(void)
 {
@@ -96,7 +81,7 @@ static void assert_filled(void)
 
 static void spoil(const char *file)
 {
-	int fd = open(path_of(file), O_RDWR | O_TRUNC);
+	int fd = open(ledger_files_path(file), O_RDWR | O_TRUNC);
 	static const char text[] = "This is no database, but a text that is long enough to be looked at as one, if any"
 				   "body looked; and so on.";
 	assert_int_equal(write(fd, text, sizeof text), sizeof text);
@@ -108,7 +93,7 @@ static void a_file_is_lost(void **state)
 	(void)state;
 	fill();
 	for (int i = 0; i < 2; i++) {
-		assert_int_equal(unlink(path_of(files[i])), 0);
+		assert_int_equal(unlink(ledger_files_path(files[i])), 0);
 		assert_filled();
 	}
 }
@@ -122,7 +107,7 @@ static void a_file_is_no_database(void **state)
 		spoil(files[i]);
 		assert_filled();
 		snprintf(damaged, sizeof damaged, "%s.damaged", files[i]);
-		assert_int_equal(access(path_of(damaged), F_OK), 0);
+		assert_int_equal(access(ledger_files_path(damaged), F_OK), 0);
 	}
 }
 
@@ -142,7 +127,7 @@ static void rows_are_lost_or_changed(void **state)
 	fill();
 	for (size_t s = 0; s < sizeof statements / sizeof *statements; s++)
 		for (int i = 0; i < 2; i++) {
-			change(files[i], statements[s]);
+			ledger_files_change(files[i], statements[s]);
 			assert_filled();
 		}
 }
@@ -183,7 +168,7 @@ static void both_are_damaged(void **state)
 	struct job_record r;
 	fill();
 	for (int i = 0; i < 2; i++)
-		change(files[i], "UPDATE jobs SET priority = 3 WHERE id IN (1, 5)");
+		ledger_files_change(files[i], "UPDATE jobs SET priority = 3 WHERE id IN (1, 5)");
 	struct ledger *l = open_ledger();
 	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
 	assert_true(j.damaged && j.id == 1);
@@ -246,7 +231,7 @@ static void the_copy_falls_behind(void **state)
 	assert_int_equal(ledger_mend(l, &e), 0);
 	assert_int_equal(ledger_drop(l, (uint64_t[]){ROWS}, 1, &e), 0);
 	ledger_close(l);
-	assert_int_equal(unlink(path_of("jobs.db")), 0);
+	assert_int_equal(unlink(ledger_files_path("jobs.db")), 0);
 	l = open_ledger();
 	char *text;
 	assert_int_equal(ledger_get(l, 3, &j, &e), 1);
