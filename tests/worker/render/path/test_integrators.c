@@ -92,7 +92,7 @@ static void test_diffuse(void **state)
 		  &(struct lengths){.path = 640,
 				    .bdpt = 640,
 				    .rare = 512,
-				    .spread = 1440,
+				    .spread = 1000,
 				    .rare_spread = at_length(1440),
 				    .chain = at_length(6656)});
 }
@@ -130,7 +130,7 @@ static void test_glass(void **state)
 		  &(struct lengths){.path = 2560,
 				    .bdpt = 2560,
 				    .rare = at_length(2048),
-				    .spread = 5760,
+				    .spread = 4000,
 				    .rare_spread = at_length(5760)});
 }
 
@@ -143,8 +143,8 @@ static void test_rough_glass(void **state)
 					"0,-0.6,-0.3", "0.8",
 					"<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
 					"<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
-		  &(struct lengths){.path = 2560,
-				    .bdpt = 2560,
+		  &(struct lengths){.path = 2000,
+				    .bdpt = 2000,
 				    .spread = at_length(5760),
 				    .chain = at_length(12800),
 				    .single = at_length(21504)});
@@ -162,7 +162,7 @@ static void test_environment(void **state)
 				DIFFUSE("0.5,0.5,0.6") "</shape>" BALL(
 					"0,0,0", "1",
 					"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
-		&(struct lengths){.path = 512, .bdpt = 512, .spread = 1152, .chain = at_length(6144), .single = 14336});
+		&(struct lengths){.path = 512, .bdpt = 512, .spread = 900, .chain = at_length(6144), .single = 12600});
 }
 
 int main(void)
