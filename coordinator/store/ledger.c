@@ -252,6 +252,32 @@ static int get_whole(struct ledger *l, uint64_t id, struct ledger_job *j, struct
 				    : rc;
 }
 
+/* As get_whole, but there has to be one. */
+static int get_existing(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
+{
+	int rc = get_whole(l, id, j, e);
+	return rc ? (rc < 0 ? rc : 0)
+		  : error_set(e, ENOENT, "the database of jobs has no j%llu", (unsigned long long)id);
+}
+
+static int change_record(struct ledger *l, struct ledger_job *j, const struct job_record *r, struct error *e)
+{
+	char *record;
+	int rc = record_to_json(r, &record, e);
+	if (rc)
+		return rc;
+	j->record = record;
+	rc = change(l, j, e);
+	mem_free(record);
+	return rc;
+}
+
+static void forget_submission(struct ledger_job *j)
+{
+	j->submission = j->plan = NULL;
+	j->submission_size = j->plan_size = 0;
+}
+
 static int remove_all(struct ledger *l, struct ledger_side *s, const uint64_t *ids, size_t count, struct error *e)
 {
 	ledger_side_release(&l->jobs);
@@ -332,25 +358,16 @@ int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, st
 {
 	struct timespec now;
 	struct ledger_job j;
-	char *record;
 	int rc = get_whole(l, r->id, &j, e);
 	if (rc <= 0 || j.extended != r->extended)
 		return rc < 0 ? rc : 0;
-	rc = record_to_json(r, &record, e);
-	if (rc)
-		return rc;
 	clock_gettime(CLOCK_REALTIME, &now);
 	j.ended = now.tv_sec > 0 ? (double)now.tv_sec : 1;
 	j.state = r->state;
 	j.held = "";
-	j.record = record;
-	if (!extendable) {
-		j.submission = j.plan = NULL;
-		j.submission_size = j.plan_size = 0;
-	}
-	rc = change(l, &j, e);
-	mem_free(record);
-	return rc;
+	if (!extendable)
+		forget_submission(&j);
+	return change_record(l, &j, r, e);
 }
 
 int ledger_drop_submission(struct ledger *l, uint64_t id, struct error *e)
@@ -359,8 +376,7 @@ int ledger_drop_submission(struct ledger *l, uint64_t id, struct error *e)
 	int rc = get_whole(l, id, &j, e);
 	if (rc <= 0 || !(j.ended > 0) || !j.submission_size)
 		return rc < 0 ? rc : 0;
-	j.submission = j.plan = NULL;
-	j.submission_size = j.plan_size = 0;
+	forget_submission(&j);
 	return change(l, &j, e);
 }
 
@@ -383,10 +399,9 @@ int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e
 int ledger_extend(struct ledger *l, const struct ledger_job *more, struct error *e)
 {
 	struct ledger_job j;
-	int rc = get_whole(l, more->id, &j, e);
-	if (rc <= 0)
-		return rc < 0 ? rc
-			      : error_set(e, ENOENT, "the database of jobs has no j%llu", (unsigned long long)more->id);
+	int rc = get_existing(l, more->id, &j, e);
+	if (rc)
+		return rc;
 	j.submission = more->submission;
 	j.submission_size = more->submission_size;
 	j.plan = more->plan;
@@ -430,18 +445,8 @@ int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error
 int ledger_write_record(struct ledger *l, const struct job_record *r, struct error *e)
 {
 	struct ledger_job j;
-	char *record;
-	int rc = get_whole(l, r->id, &j, e);
-	if (rc <= 0)
-		return rc < 0 ? rc
-			      : error_set(e, ENOENT, "the database of jobs has no j%llu", (unsigned long long)r->id);
-	rc = record_to_json(r, &record, e);
-	if (rc)
-		return rc;
-	j.record = record;
-	rc = change(l, &j, e);
-	mem_free(record);
-	return rc;
+	int rc = get_existing(l, r->id, &j, e);
+	return rc ? rc : change_record(l, &j, r, e);
 }
 
 int ledger_read_record(struct ledger *l, uint64_t id, struct job_record *r, struct error *e)
