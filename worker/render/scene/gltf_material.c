@@ -107,7 +107,7 @@ static void put_ref(struct gltf *g, struct xml_element *shape, const struct gltf
 	put_id(g, gltf_element(g, shape, at, "ref"), at, what, colours);
 }
 
-static bool shines(struct gltf *g, const struct gltf_at *at, double rgb[3])
+bool gltf_material_shines(struct gltf *g, const struct gltf_at *at, double rgb[3])
 {
 	const json_t *more = gltf_extension(g, at, at->json, "KHR_materials_emissive_strength");
 	double strength = more ? gltf_number(g, at, more, "emissiveStrength", 1) : 1;
@@ -173,7 +173,7 @@ static void put_principled(struct gltf *g, const struct gltf_at *at, enum gltf_c
 static void put_emitter(struct gltf *g, const struct gltf_at *at)
 {
 	double rgb[3];
-	if (!shines(g, at, rgb))
+	if (!gltf_material_shines(g, at, rgb))
 		return;
 	struct xml_element *emitter = gltf_plugin(g, g->scene, at, "emitter", "area", NULL);
 	gltf_put_colour(g, emitter, at, "radiance", rgb, gltf_object(g, at, at->json, "emissiveTexture"));
@@ -192,7 +192,7 @@ void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_
 		put_emitter(g, at);
 	g->material_made[at->index] |= (unsigned char)(1u << colours);
 	put_ref(g, shape, at, "bsdf", colours);
-	if (shines(g, at, rgb))
+	if (gltf_material_shines(g, at, rgb))
 		put_ref(g, shape, at, "emitter", GLTF_NO_COLOURS);
 }
 

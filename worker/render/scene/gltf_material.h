@@ -11,6 +11,7 @@ enum gltf_colours { GLTF_NO_COLOURS, GLTF_COLOURS, GLTF_COLOURS_AND_ALPHA };
 /* The references of a shape with this material. */
 void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material,
 		   enum gltf_colours colours);
+bool gltf_material_shines(struct gltf *g, const struct gltf_at *material, double rgb[3]); /* rgb: its radiance */
 void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours);
 
 #endif

@@ -18,17 +18,16 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { UNSIGNED_BYTE = 5121, UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126 };
 enum { MODE_TRIANGLES = 4, MODE_STRIP = 5, MODE_FAN = 6 };
 
 static const char *type_name(uint64_t component, uint64_t *size)
 {
-	*size = component == UNSIGNED_BYTE ? 1 : component == UNSIGNED_SHORT ? 2 : 4;
-	return component == UNSIGNED_BYTE    ? "u8"
-	       : component == UNSIGNED_SHORT ? "u16"
-	       : component == UNSIGNED_INT   ? "u32"
-	       : component == FLOAT	     ? "f32"
-					     : NULL;
+	*size = component == GLTF_UNSIGNED_BYTE ? 1 : component == GLTF_UNSIGNED_SHORT ? 2 : 4;
+	return component == GLTF_UNSIGNED_BYTE	  ? "u8"
+	       : component == GLTF_UNSIGNED_SHORT ? "u16"
+	       : component == GLTF_UNSIGNED_INT	  ? "u32"
+	       : component == GLTF_FLOAT	  ? "f32"
+						  : NULL;
 }
 
 /* Numbers in a buffer. */
@@ -123,9 +122,8 @@ static void grow_box(struct gltf *g, const struct gltf_at *a, const mat4 *to_wor
 	gltf_numbers(g, a, a->json, "min", bound[0], 3);
 	gltf_numbers(g, a, a->json, "max", bound[1], 3);
 	for (int i = 0; i < 8; i++) {
-		vec3 p = mat4_point(to_world, (vec3){bound[i & 1][0], bound[i >> 1 & 1][1], bound[i >> 2 & 1][2]});
-		g->low = (vec3){fmin(g->low.x, p.x), fmin(g->low.y, p.y), fmin(g->low.z, p.z)};
-		g->high = (vec3){fmax(g->high.x, p.x), fmax(g->high.y, p.y), fmax(g->high.z, p.z)};
+		gltf_grow_box(
+			g, mat4_point(to_world, (vec3){bound[i & 1][0], bound[i >> 1 & 1][1], bound[i >> 2 & 1][2]}));
 	}
 }
 
@@ -238,21 +236,16 @@ static void put_primitives(struct gltf *g, struct xml_element *parent, const str
 /* Triangles that copies would have beyond the first; below that copies are faster than instances. */
 static const double copied_most = 200000;
 
-static bool shines(const struct gltf *g, const json_t *primitive)
+static bool shines(struct gltf *g, const struct gltf_at *mesh, const json_t *primitive)
 {
-	const json_t *index = json_object_get(primitive, "material"),
-		     *material = json_is_integer(index) ? json_array_get(json_object_get(g->root, "materials"),
-									 (size_t)json_integer_value(index))
-							: NULL,
-		     *factor = json_object_get(material, "emissiveFactor");
-	for (size_t i = 0; i < json_array_size(factor); i++)
-		if (json_number_value(json_array_get(factor, i)) > 0)
-			return true;
-	return false;
+	struct gltf_at material;
+	double rgb[3];
+	return gltf_follow(g, mesh, primitive, "material", GLTF_MATERIALS, &material) > 0 &&
+	       gltf_material_shines(g, &material, rgb);
 }
 
 /* A group, which may hold no lamps, and no mesh that each node moves in its own way. */
-static bool is_shared(const struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node)
+static bool is_shared(struct gltf *g, const struct gltf_at *mesh, const struct gltf_at *node)
 {
 	const json_t *primitives = json_object_get(mesh->json, "primitives");
 	double corners = 0, uses = g->mesh_uses[mesh->index];
@@ -265,7 +258,7 @@ static bool is_shared(const struct gltf *g, const struct gltf_at *mesh, const st
 		corners += json_number_value(json_object_get(
 			json_array_get(json_object_get(g->root, "accessors"), (size_t)json_integer_value(index)),
 			"count"));
-		if (shines(g, o))
+		if (shines(g, mesh, o))
 			return false;
 	}
 	return corners / 3 * (uses - 1) > copied_most;

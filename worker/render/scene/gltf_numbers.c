@@ -15,7 +15,6 @@
 #include <math.h>
 #include <string.h>
 
-enum { BYTE = 5120, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT = 5125, FLOAT };
 enum { COMPONENTS_MAX = 16 };
 #define NUMBERS_MAX (UINT64_C(1) << 28)
 
@@ -86,10 +85,10 @@ const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at *view,
 
 static unsigned size_of(uint64_t component)
 {
-	return component == BYTE || component == UNSIGNED_BYTE	   ? 1
-	       : component == SHORT || component == UNSIGNED_SHORT ? 2
-	       : component == UNSIGNED_INT || component == FLOAT   ? 4
-								   : 0;
+	return component == GLTF_BYTE || component == GLTF_UNSIGNED_BYTE     ? 1
+	       : component == GLTF_SHORT || component == GLTF_UNSIGNED_SHORT ? 2
+	       : component == GLTF_UNSIGNED_INT || component == GLTF_FLOAT   ? 4
+									     : 0;
 }
 
 static double number(const unsigned char *p, uint64_t component, bool normalized)
@@ -97,15 +96,15 @@ static double number(const unsigned char *p, uint64_t component, bool normalized
 	uint32_t bits = (uint32_t)get_bytes(p, (int)size_of(component));
 	float f;
 	switch (component) {
-	case BYTE:
+	case GLTF_BYTE:
 		return normalized ? fmax((int8_t)bits / 127.0, -1) : (int8_t)bits;
-	case UNSIGNED_BYTE:
+	case GLTF_UNSIGNED_BYTE:
 		return normalized ? bits / 255.0 : bits;
-	case SHORT:
+	case GLTF_SHORT:
 		return normalized ? fmax((int16_t)bits / 32767.0, -1) : (int16_t)bits;
-	case UNSIGNED_SHORT:
+	case GLTF_UNSIGNED_SHORT:
 		return normalized ? bits / 65535.0 : bits;
-	case UNSIGNED_INT:
+	case GLTF_UNSIGNED_INT:
 		return bits;
 	default:
 		memcpy(&f, &bits, sizeof f);
@@ -179,7 +178,8 @@ static void read_sparse(struct gltf *g, const struct gltf_at *a, const struct pa
 	struct gltf_vectors at = {mem_alloc(count + 1, sizeof *at.x), count, 1};
 	if (!at.x)
 		gltf_fail(g, a, ENOMEM, "out of memory");
-	else if (p.component != UNSIGNED_BYTE && p.component != UNSIGNED_SHORT && p.component != UNSIGNED_INT)
+	else if (p.component != GLTF_UNSIGNED_BYTE && p.component != GLTF_UNSIGNED_SHORT &&
+		 p.component != GLTF_UNSIGNED_INT)
 		gltf_fail(g, a, EINVAL, "its sparse indices are no whole numbers");
 	else
 		unpack(g, a, &view[0], &p, count, NULL, &at);

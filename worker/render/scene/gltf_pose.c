@@ -18,7 +18,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { UNSIGNED_BYTE = 5121, UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126, SETS_MAX = 8 };
+enum { SETS_MAX = 8 };
 #define EMBEDDED_MAX (UINT64_C(512) << 20)
 
 /* ---- which */
@@ -28,10 +28,10 @@ static bool is_in_place(struct gltf *g, const struct gltf_at *a, enum gltf_sourc
 	struct gltf_at view;
 	struct gltf_range own;
 	uint64_t first, count, type = gltf_whole(g, a, a->json, "componentType", 0);
-	bool share = type == UNSIGNED_BYTE || type == UNSIGNED_SHORT;
-	if ((which == GLTF_POSITION || which == GLTF_NORMAL) && type != FLOAT)
+	bool share = type == GLTF_UNSIGNED_BYTE || type == GLTF_UNSIGNED_SHORT;
+	if ((which == GLTF_POSITION || which == GLTF_NORMAL) && type != GLTF_FLOAT)
 		return false;
-	if ((which == GLTF_TEXCOORD || which == GLTF_COLOR) && type != FLOAT &&
+	if ((which == GLTF_TEXCOORD || which == GLTF_COLOR) && type != GLTF_FLOAT &&
 	    !(share && json_is_true(json_object_get(a->json, "normalized"))))
 		return false;
 	if (json_object_get(a->json, "sparse") || !json_object_get(a->json, "bufferView"))
@@ -282,9 +282,7 @@ static void put_bytes(struct gltf *g, struct xml_element *shape, const struct gl
 static void grow_box(struct gltf *g, const struct gltf_vectors *v, const mat4 *to_world)
 {
 	for (uint64_t i = 0; i < v->count; i++) {
-		vec3 p = mat4_point(to_world, vector(v->x + 3 * i));
-		g->low = (vec3){fmin(g->low.x, p.x), fmin(g->low.y, p.y), fmin(g->low.z, p.z)};
-		g->high = (vec3){fmax(g->high.x, p.x), fmax(g->high.y, p.y), fmax(g->high.z, p.z)};
+		gltf_grow_box(g, mat4_point(to_world, vector(v->x + 3 * i)));
 	}
 }
 
@@ -296,8 +294,8 @@ void gltf_put_pose(struct gltf *g, struct xml_element *shape, const struct gltf_
 		if (p->sources[i].json && gltf_vectors_read(g, &p->sources[i], names[i], components[i], &v[i]) &&
 		    i != GLTF_INDEX && v[i].count != v[GLTF_POSITION].count)
 			gltf_fail(g, &p->sources[i], EINVAL, "another number of entries than POSITION has");
-	uint64_t type = gltf_whole(g, p->mesh, p->sources[GLTF_INDEX].json, "componentType", UNSIGNED_INT);
-	if (!g->failed && type != UNSIGNED_BYTE && type != UNSIGNED_SHORT && type != UNSIGNED_INT)
+	uint64_t type = gltf_whole(g, p->mesh, p->sources[GLTF_INDEX].json, "componentType", GLTF_UNSIGNED_INT);
+	if (!g->failed && type != GLTF_UNSIGNED_BYTE && type != GLTF_UNSIGNED_SHORT && type != GLTF_UNSIGNED_INT)
 		gltf_fail(g, &p->sources[GLTF_INDEX], EINVAL, "of a type that index cannot have");
 	if (!g->failed && v[GLTF_COLOR].x && v[GLTF_COLOR].components < 3)
 		gltf_fail(g, &p->sources[GLTF_COLOR], EINVAL, "of a type that color cannot have");

@@ -247,3 +247,9 @@ void gltf_note(struct gltf *g, const char *text)
 	if (!g->failed && g->tree->note_count < XML_NOTES_MAX)
 		g->tree->notes[g->tree->note_count++] = text;
 }
+
+void gltf_grow_box(struct gltf *g, vec3 p)
+{
+	g->low = (vec3){fmin(g->low.x, p.x), fmin(g->low.y, p.y), fmin(g->low.z, p.z)};
+	g->high = (vec3){fmax(g->high.x, p.x), fmax(g->high.y, p.y), fmax(g->high.z, p.z)};
+}

@@ -35,6 +35,16 @@ enum gltf_array {
 	GLTF_ARRAYS
 };
 
+/* Types of an accessor's components. */
+enum gltf_component {
+	GLTF_BYTE = 5120,
+	GLTF_UNSIGNED_BYTE,
+	GLTF_SHORT,
+	GLTF_UNSIGNED_SHORT,
+	GLTF_UNSIGNED_INT = 5125,
+	GLTF_FLOAT
+};
+
 /* An entry of one of them. */
 struct gltf_at {
 	enum gltf_array array;
@@ -113,6 +123,7 @@ void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at 
 void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
 		  const double rgb[3]);
 void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m);
+void gltf_grow_box(struct gltf *g, vec3 p); /* of all vertices, for a camera that sees everything */
 /* A note that the file gets once. */
 void gltf_note(struct gltf *g, const char *text);
 
