@@ -140,9 +140,11 @@ static int look_at_rows(struct looking *l, struct error *e)
 	int rc = ledger_ids(l->jobs->ledger, LEDGER_ALL, &ids, &count, e);
 	for (size_t i = 0; i < count && !rc; i++) {
 		spool_job_path(l->jobs->spool, ids[i], NULL, path);
+		if (disk_stat(path, &st) == 0) /* look_at has read its row */
+			continue;
 		rc = ledger_get(l->jobs->ledger, ids[i], &j, e);
 		if (rc > 0)
-			rc = j.damaged && disk_stat(path, &st)
+			rc = j.damaged
 				     ? is_lost(l, ids[i],
 					       "its rows in jobs.db and jobs-copy.db are damaged, and its folder is missing",
 					       e)
