@@ -170,7 +170,8 @@ lines "a message, on the wire" 1 2 proto/farm.proto
 lines "a counter, in stored messages" 1 1 proto/stored.proto
 
 # Without optimisation: what is compiled anew has to run, not to be fast.
-make -s -C "$TREE" -j2 OPT=-O0 programs >"$DIR/make.log" 2>&1 || fail "$(grep -m 3 error "$DIR/make.log")"
+# The tests have a build of their own in the environment, and may have been called by a make.
+env -u MAKEFLAGS -u MAKELEVEL make -s -C "$TREE" -j2 BUILD=build OPT=-O0 programs >"$DIR/make.log" 2>&1 || fail "$(grep -m 3 error "$DIR/make.log")"
 BIN=$TREE/build/bin
 cat >"$DIR/new.xml" <<'TEXT'
 <scene version="3.0.0">
