@@ -72,14 +72,25 @@ int node_error(const struct scene_node *n, struct error *e, int errno_value, con
 			 n->type, text);
 }
 
+const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX])
+{
+	enum { MOST = NODE_PLACE_MAX - 16 }; /* beside "...", ":", a line and the end of the string */
+	size_t length = strlen(n->file);
+	snprintf(text, NODE_PLACE_MAX, "%s%s:%d", length > MOST ? "..." : "",
+		 n->file + (length > MOST ? length - MOST : 0), n->line);
+	return text;
+}
+
 const char *node_title(const struct scene_node *n, char text[NODE_TITLE_MAX])
 {
 	const char *material = node_string(n, "material", NULL);
+	char place[NODE_PLACE_MAX];
+	node_place(n, place);
 	if (n->id)
-		snprintf(text, NODE_TITLE_MAX, "`%.40s` (line %d)", n->id, n->line);
+		snprintf(text, NODE_TITLE_MAX, "`%.40s` (%s)", n->id, place);
 	else if (material && n->cls == PLUGIN_SHAPE)
-		snprintf(text, NODE_TITLE_MAX, "the %.24s in line %d (`%.32s`)", n->type, n->line, material);
+		snprintf(text, NODE_TITLE_MAX, "the %.24s in %s (`%.32s`)", n->type, place, material);
 	else
-		snprintf(text, NODE_TITLE_MAX, "the %.24s in line %d", n->type, n->line);
+		snprintf(text, NODE_TITLE_MAX, "the %.24s in %s", n->type, place);
 	return text;
 }

@@ -58,9 +58,13 @@ mat4 node_transform(const struct scene_node *n, const char *name); /* identity i
 const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index); /* NULL: none */
 const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* VALUE_NODE or NULL */
 
-/* "`lamp` (line 3)" for a node that has an id, otherwise "the obj in line 3", with the material whose faces it has.
- * Returns text. */
-enum { NODE_TITLE_MAX = 96 };
+/* "room.xml:3"; of a long file name the end. Returns text. */
+enum { NODE_PLACE_MAX = 64 };
+const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX]);
+
+/* "`lamp` (room.xml:3)" for a node that has an id, otherwise "the obj in room.xml:3", with the material whose faces it
+ * has. Returns text. */
+enum { NODE_TITLE_MAX = 160 };
 const char *node_title(const struct scene_node *n, char text[NODE_TITLE_MAX]);
 
 /* error_set with "file:line: <element>: " before the text. */

@@ -108,6 +108,7 @@ int remarks_on(const struct scene_node *const *objects, uint32_t count, struct r
 	int rc = 0;
 	for (uint32_t i = 0; i < count && !rc; i++) {
 		const struct scene_node *n = objects[i];
+		char place[NODE_PLACE_MAX];
 		light |= shines(n);
 		rc = on_metals(r, n, e);
 		if (rc)
@@ -117,9 +118,9 @@ int remarks_on(const struct scene_node *const *objects, uint32_t count, struct r
 		else if (n->cls == PLUGIN_EMITTER)
 			rc = on_emitter(r, n, e);
 		else if (n->cls == PLUGIN_SENSOR && camera)
-			rc = remark(r, n, e, "sensor %u%s%.64s%s; without --sensor the first, in line %d, is rendered",
+			rc = remark(r, n, e, "sensor %u%s%.64s%s; without --sensor the first, in %s, is rendered",
 				    ++sensors, n->id ? " (\"" : "", n->id ? n->id : "", n->id ? "\")" : "",
-				    camera->line);
+				    node_place(camera, place));
 		else if (n->cls == PLUGIN_SENSOR) {
 			camera = n;
 			sensors = 1;

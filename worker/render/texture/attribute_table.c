@@ -9,20 +9,22 @@
 #include <stdio.h>
 #include <string.h>
 
-/* "the mesh of bunny.ply (line 12)", "the rectangle of line 3" */
+/* "the mesh of bunny.ply (room.xml:12)", "the rectangle in room.xml:3" */
 static const char *describe(const struct scene_node *shape, char *text, size_t size)
 {
 	const char *file = node_string(shape, "filename", NULL);
+	char place[NODE_PLACE_MAX];
+	node_place(shape, place);
 	if (file)
-		snprintf(text, size, "the mesh of %.80s (line %d)", file, shape->line);
+		snprintf(text, size, "the mesh of %.80s (%s)", file, place);
 	else
-		snprintf(text, size, "the %.24s of line %d", shape->type, shape->line);
+		snprintf(text, size, "the %.24s in %s", shape->type, place);
 	return text;
 }
 
 static int none_such(const struct attribute_table *t, const char *name, const struct scene_node *n, struct error *e)
 {
-	char mesh[128], hint[160] = "", all[160] = "";
+	char mesh[160], hint[160] = "", all[160] = "";
 	struct spelling s = {.wanted = name};
 	for (uint32_t i = 0; i < t->count; i++) {
 		spelling_offer(&s, t->attributes[i].name);
@@ -38,7 +40,7 @@ static int none_such(const struct attribute_table *t, const char *name, const st
 const struct attribute *attribute_find(const struct attribute_table *t, const char *name, const struct scene_node *n,
 				       struct error *e)
 {
-	char mesh[128];
+	char mesh[160];
 	uint32_t i = 0;
 	while (i < t->count && strcmp(t->attributes[i].name, name) != 0)
 		i++;

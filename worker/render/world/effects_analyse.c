@@ -17,11 +17,12 @@
 /* A count, and the first by name. */
 struct tally {
 	size_t count;
-	char first[64];
+	char first[112];
 };
 
 static void count(struct tally *t, const struct scene_node *n, const char *nameless)
 {
+	char place[NODE_PLACE_MAX];
 	if (t->count++)
 		return;
 	if (!n)
@@ -29,17 +30,19 @@ static void count(struct tally *t, const struct scene_node *n, const char *namel
 	else if (n->id)
 		snprintf(t->first, sizeof t->first, "`%.40s`", n->id);
 	else
-		snprintf(t->first, sizeof t->first, "the %.24s%s in line %d", n->type,
-			 n->cls == PLUGIN_EMITTER ? " emitter" : "", n->line);
+		snprintf(t->first, sizeof t->first, "the %.24s%s in %s", n->type,
+			 n->cls == PLUGIN_EMITTER ? " emitter" : "", node_place(n, place));
 }
 
+enum { NAMES_MAX = 144 };
+
 /* "`glass1`", "`glass1` and 2 more" */
-static const char *names_of(const struct tally *t, char text[96])
+static const char *names_of(const struct tally *t, char text[NAMES_MAX])
 {
 	if (t->count > 1)
-		snprintf(text, 96, "%s and %zu more", t->first, t->count - 1);
+		snprintf(text, NAMES_MAX, "%s and %zu more", t->first, t->count - 1);
 	else
-		snprintf(text, 96, "%s", t->first);
+		snprintf(text, NAMES_MAX, "%s", t->first);
 	return text;
 }
 
@@ -196,7 +199,7 @@ static const char *hidden_because(enum visibility_bounds r)
 static void colour(struct report *r, const struct census *c)
 {
 	struct effects *fx = r->fx;
-	char text[96];
+	char text[NAMES_MAX];
 	bool one_shape =
 		c->shape[COLOR_SHAPE_OTHER] == 0 && (!c->shape[COLOR_SHAPE_CONSTANT] || !c->shape[COLOR_SHAPE_D65]);
 	bool called = c->coloured.count > 0 || !one_shape;
@@ -226,7 +229,7 @@ static void force_colour(struct report *r, const char *by)
 
 static void dispersion(struct report *r, const struct census *c)
 {
-	char text[96];
+	char text[NAMES_MAX];
 	bool called = c->dispersive.count > 0, on;
 	const struct tally *t = called			     ? &c->dispersive
 				: c->hidden_dispersive.count ? &c->hidden_dispersive
@@ -266,7 +269,7 @@ static void spectral(struct report *r, const struct census *c)
 static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
 		      const char *none)
 {
-	char text[96];
+	char text[NAMES_MAX];
 	if (t->count)
 		return line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many));
 	return line(r, which, false, "no material that light meets %s", none);
@@ -277,7 +280,7 @@ static void lobes(struct report *r, const struct census *c)
 	struct effects *fx = r->fx;
 	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: known after the other two */
 	if (!c->specular.count && c->hidden_specular.count) {
-		char text[96];
+		char text[NAMES_MAX];
 		fx->specular =
 			line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", names_of(&c->hidden_specular, text),
 			     verb(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
@@ -305,7 +308,7 @@ static void lobes(struct report *r, const struct census *c)
 
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
 {
-	char text[96], more[96];
+	char text[NAMES_MAX], more[NAMES_MAX];
 	struct effects *fx = r->fx;
 	if (c->textured.count && c->textured_light.count)
 		fx->textures = line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured",
@@ -349,14 +352,14 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 static bool lights(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
 		   const char *none)
 {
-	char text[96];
+	char text[NAMES_MAX];
 	return t->count ? line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many))
 			: line(r, which, false, "%s", none);
 }
 
 static void emitter_moves(struct report *r, const struct census *c)
 {
-	char text[96];
+	char text[NAMES_MAX];
 	bool called = c->area.count + c->environment.count > 0;
 	if (called)
 		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",

@@ -117,10 +117,11 @@ int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct sce
 	struct placement *p = arena_alloc(&w->arena, 1, sizeof *p);
 	if (!p)
 		return build_out_of_memory(b->e);
+	char of[NODE_PLACE_MAX];
 	mat4 place = node_transform(instance, "to_world"), all = to_world(w, m, &place);
 	if (!placement_make(p, &all, m->box.low, m->box.high))
-		return node_error(instance, b->e, EINVAL, "no triangle of the %.24s in line %d has an area there",
-				  b->shape_nodes[id]->type, b->shape_nodes[id]->line);
+		return node_error(instance, b->e, EINVAL, "no triangle of the %.24s in %s has an area there",
+				  b->shape_nodes[id]->type, node_place(b->shape_nodes[id], of));
 	p->first = m->first;
 	w->instance_count++;
 	if (p->mirrored && !turn_triangles(m, &w->arena))

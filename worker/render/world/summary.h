@@ -15,7 +15,7 @@ struct effect_line {
 	bool on;
 	bool forced;	  /* overridden by the user */
 	bool other_scene; /* forced off: the image is that of another scene */
-	char why[160];
+	char why[240];
 	const char *saves; /* what omitting it saves */
 };
 enum { RENDER_EFFECTS_MAX = 24 };
@@ -37,9 +37,9 @@ struct render_coincident {
 
 /* What was noticed while shapes were read; "" if nothing was. */
 struct world_notes {
-	char scales[256];    /* a shape that is too small relative to another, by name */
-	char flat[256];	     /* how many triangles without area were left out */
-	char materials[256]; /* how many files of shapes have materials that are not read */
+	char scales[512];    /* a shape that is too small relative to another, by name */
+	char flat[384];	     /* how many triangles without area were left out */
+	char materials[384]; /* how many files of shapes have materials that are not read */
 };
 
 struct render_summary {

@@ -160,7 +160,7 @@ static void test_several_sensors(void **state)
 	assert_int_equal(s.note_count, 1);
 	assert_string_equal(
 		s.notes[0],
-		"s.xml:3: <sensor type=\"perspective\">: sensor 2; without --sensor the first, in line 2, is rendered");
+		"s.xml:3: <sensor type=\"perspective\">: sensor 2; without --sensor the first, in s.xml:2, is rendered");
 	scene_fini(&s);
 }
 

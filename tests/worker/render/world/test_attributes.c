@@ -347,15 +347,15 @@ static void test_refused(void **state)
 	(void)state;
 #define OF(attribute) DIFFUSE(FIELD("reflectance", attribute))
 	refuses(PLY("grid.ply", OF("vertex_colour")),
-		"the mesh of grid.ply (line 1) has no attribute `vertex_colour`, only vertex_color, vertex_pair, "
+		"the mesh of grid.ply (s.xml:1) has no attribute `vertex_colour`, only vertex_color, vertex_pair, "
 		"vertex_wild, face_heat; did you mean `vertex_color`?");
 	refuses("<shape type='rectangle'>" OF("vertex_color") "</shape>",
-		"the rectangle of line 1 has no attribute `vertex_color`, nor any other");
+		"the rectangle in s.xml:1 has no attribute `vertex_color`, nor any other");
 	refuses("<shape type='sphere'>" OF("face_heat") "</shape>",
-		"the sphere of line 1 has no attribute `face_heat`");
-	refuses("<shape type='cube'>" COLOURS "</shape>", "the cube of line 1 has no attribute `vertex_color`");
+		"the sphere in s.xml:1 has no attribute `face_heat`");
+	refuses("<shape type='cube'>" COLOURS "</shape>", "the cube in s.xml:1 has no attribute `vertex_color`");
 	refuses(PLY("grid.ply", OF("color")), "needs a name that begins with `vertex_` or `face_`");
-	refuses(PLY("grid.ply", OF("vertex_pair")), "`vertex_pair` of the mesh of grid.ply (line 1) has two channels");
+	refuses(PLY("grid.ply", OF("vertex_pair")), "`vertex_pair` of the mesh of grid.ply (s.xml:1) has two channels");
 	refuses(PLY("grid.ply", OF("vertex_wild")), "has a value that is not finite, or beyond 1e12");
 	refuses(PLY("grid.ply", "<bsdf type='bumpmap'><bsdf type='diffuse'/>" FIELD("", "face_heat") "</bsdf>"),
 		"an attribute of a mesh cannot be a bump or normal map");

@@ -48,32 +48,32 @@ static void test_notes(void **state)
 	(void)state;
 	expect(VIEW FLOOR(GREY) CUBE("block", "2", "0.6", GREY) LAMP, NULL, NULL, false);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) LAMP,
-	       "`glass` (line 2) and `lamp` (line 3) coincide: where they overlap, only the latter is present, because it shines",
+	       "`glass` (test.xml:2) and `lamp` (test.xml:3) coincide: where they overlap, only the latter is present, because it shines",
 	       NULL, true);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) FLOOR(GREY),
-	       "`glass` (line 2) and `floor` (line 3) coincide: where they overlap, only the latter is present, because it is opaque",
+	       "`glass` (test.xml:2) and `floor` (test.xml:3) coincide: where they overlap, only the latter is present, because it is opaque",
 	       NULL, true);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS)
 		       CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
-	       "`ice` (line 3) and `glass` (line 2) coincide: where they overlap, only the latter is present, because it comes first in the file"
+	       "`ice` (test.xml:3) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file"
 	       "; where two media touch, use one surface with the int_ior and ext_ior of both",
-	       "`hole` (line 4) and `glass` (line 2) coincide: where they overlap, only the latter is present, because it refracts or scatters",
+	       "`hole` (test.xml:4) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, because it refracts or scatters",
 	       true);
 	/* Two lamps back to back are one, which shines to its own side; a lamp that is there twice loses nothing. */
 	expect(VIEW LAMP "<shape type='rectangle' id='back'>" AT(
 		       "<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
 	       "</shape>\n",
-	       "`back` (line 3) and `lamp` (line 2) coincide: where they overlap, only the latter is present, because it comes first in the file"
+	       "`back` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file"
 	       "; light to the other side is lost: for a lamp with two sides use two, slightly apart",
 	       NULL, true);
 	expect(VIEW LAMP "<shape type='rectangle' id='twin'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>")
 		       SHINES "</shape>\n",
-	       "`twin` (line 3) and `lamp` (line 2) coincide: where they overlap, only the latter is present, because it comes first in the file",
+	       "`twin` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file",
 	       NULL, true);
 	/* A block on a floor shows nothing of it; a picture on the wall that is the wall does. */
 	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
 	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
-	       "the rectangle in line 3 and `floor` (line 2) coincide: where they overlap, only the latter is present, because it comes first in the file",
+	       "the rectangle in test.xml:3 and `floor` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file",
 	       NULL, true);
 }
 
@@ -93,7 +93,7 @@ static void test_scales(void **state)
 		if (far)
 			assert_string_equal(
 				note,
-				"`block` (line 2) is too small for the scene, with the rectangle in line 3: double precision does "
+				"`block` (test.xml:2) is too small for the scene, with the rectangle in test.xml:3: double precision does "
 				"not suffice for both, and its image may be wrong");
 		world_free(w);
 	}

@@ -47,7 +47,7 @@ static void test_effect(void **state)
 				  LEVEL("3") "</shape>%s",
 			  "");
 	assert_true(effect(w)->on && w->effects.displacement);
-	assert_string_equal(effect(w)->why, "the rectangle in line 1 and 1 more are displaced: 8704 triangles");
+	assert_string_equal(effect(w)->why, "the rectangle in test.xml:1 and 1 more are displaced: 8704 triangles");
 	assert_false(w->shapes[1].is_sphere);
 	world_free(w);
 }

@@ -123,8 +123,8 @@ static void test_flat(void **state)
 	assert_true(w->shapes[2].is_sphere && w->parts[2].emitter >= 0 && w->parts[1].emitter < 0);
 	assert_true(w->parts[0].bsdf != w->parts[1].bsdf);
 	assert_int_equal(w->emitter_count, 2); /* the sphere and the sky */
-	assert_non_null(
-		strstr(w->notes.flat, "3 triangles without area are left out, in 2 shapes (first: the obj in line 1)"));
+	assert_non_null(strstr(w->notes.flat,
+			       "3 triangles without area are left out, in 2 shapes (first: the obj in scene.xml:1)"));
 	assert_non_null(strstr(w->notes.flat, "1 of these shapes has no others"));
 	world_free(w);
 }
@@ -152,7 +152,8 @@ static void test_materials_of_files(void **state)
 		const struct memory_file files[] = {
 			{"scene.xml", scene, strlen(scene)}, {"a.obj", mesh, strlen(mesh)}, {NULL, NULL, 0}};
 		struct world *w = world_of_files(8, 8, files);
-		const char *said = strstr(w->notes.materials, "of 1 mesh without a bsdf (first: the obj in line 2)");
+		const char *said =
+			strstr(w->notes.materials, "of 1 mesh without a bsdf (first: the obj in scene.xml:2)");
 		assert_true(cases[i].said ? said != NULL : !*w->notes.materials);
 		world_free(w);
 	}
