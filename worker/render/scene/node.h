@@ -43,6 +43,7 @@ struct scene_node {
 	const char *file; /* as the user named it */
 	int line;
 	const struct plugin_decl *decl;
+	bool shines; /* an emitter, or a shape that holds one, however deep */
 	uint32_t property_count, child_count;
 	const struct property *properties;
 	const struct scene_node *const *children; /* nested objects without a name */

@@ -65,16 +65,6 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	return rc ? rc : on_depth(r, n, e);
 }
 
-static bool shines(const struct scene_node *n)
-{
-	if (n->cls == PLUGIN_EMITTER)
-		return true;
-	for (uint32_t i = 0; n->cls == PLUGIN_SHAPE && i < n->child_count; i++)
-		if (shines(n->children[i]))
-			return true;
-	return false;
-}
-
 static int on_emitter(struct report *r, const struct scene_node *n, struct error *e)
 {
 	if (strcmp(n->type, "sky") != 0 && strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0)
@@ -84,23 +74,24 @@ static int on_emitter(struct report *r, const struct scene_node *n, struct error
 }
 
 /* Mitsuba has two tables for most metals. Of these three it has one, which ours is. */
-static int on_metals(struct report *r, const struct scene_node *n, struct error *e)
+static int on_metal(struct report *r, const struct scene_node *n, struct error *e)
 {
 	static const char *const single[] = {"Na_palik", "Ni_palik", "V_palik"};
-	const char *name = n->cls == PLUGIN_BSDF ? node_string(n, "material", "") : "";
-	const char *end = strstr(name, "_palik");
+	const char *name = node_string(n, "material", ""), *end = strstr(name, "_palik");
 	bool other = end != NULL;
-	int rc = 0;
 	for (size_t i = 0; i < sizeof single / sizeof *single; i++)
 		other = other && strcmp(name, single[i]) != 0;
-	if (other)
-		rc = remark(r, n, e, "the indices of %.*s stand for those of %.32s", (int)(end - name), name, name);
-	for (uint32_t i = 0; i < n->child_count && !rc; i++)
-		rc = on_metals(r, n->children[i], e);
-	return rc;
+	if (!other)
+		return 0;
+	return remark(r, n, e, "the indices of %.*s stand for those of %.32s", (int)(end - name), name, name);
 }
 
-int remarks_on(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e)
+int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e)
+{
+	return n->cls == PLUGIN_BSDF ? on_metal(r, n, e) : 0;
+}
+
+int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e)
 {
 	const struct scene_node *camera = NULL;
 	bool light = false;
@@ -109,10 +100,7 @@ int remarks_on(const struct scene_node *const *objects, uint32_t count, struct r
 	for (uint32_t i = 0; i < count && !rc; i++) {
 		const struct scene_node *n = objects[i];
 		char place[NODE_PLACE_MAX];
-		light |= shines(n);
-		rc = on_metals(r, n, e);
-		if (rc)
-			break;
+		light |= n->shines;
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
 		else if (n->cls == PLUGIN_EMITTER)

@@ -267,6 +267,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">, which may have one",
 				 plugin_class_name(cls), owner->name, d->node->type);
 	d->children[d->node->child_count++] = child;
+	d->node->shines |= child->shines;
 	return 0;
 }
 
@@ -406,7 +407,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 				      .id = xml_attribute(el, "id"),
 				      .file = el->file,
 				      .line = el->line,
-				      .decl = decl};
+				      .decl = decl,
+				      .shines = cls == PLUGIN_EMITTER};
 	el->busy = true;
 	m->depth++;
 	r = fill_node(m, &d, el);
@@ -414,6 +416,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	el->busy = false;
 	el->nesting = d.nesting;
 	*out = d.node;
+	if (!r)
+		r = remarks_on_object(d.node, &m->report, m->error);
 	if (!r && m->lenient)
 		r = uncover(m, el, out);
 	el->node = *out;
@@ -509,7 +513,7 @@ static int make_scene(struct maker *m)
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
 		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
 	if (!r)
-		r = remarks_on(m->scene->objects, m->scene->object_count, &m->report, m->error);
+		r = remarks_on_scene(m->scene->objects, m->scene->object_count, &m->report, m->error);
 	return r ? r : list_assets(m);
 }
 

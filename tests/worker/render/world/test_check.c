@@ -96,7 +96,8 @@ static void test_second_tables(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>" SPHERE(METAL("Ni_palik"))
-		SPHERE("<bsdf type='twosided'>" METAL("Cu_palik") "</bsdf>") ENVIRONMENT "</scene>";
+		SPHERE("<bsdf type='twosided' id='t'>" METAL("Cu_palik") "</bsdf>") SPHERE("<ref id='t'/>") ENVIRONMENT
+		"</scene>";
 	struct checked c;
 	check(xml, &c);
 	assert_int_equal(c.found.problem_count, 0);
