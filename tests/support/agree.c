@@ -179,7 +179,7 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 	if (i->has_mutations && render_mutations(mutations, &summary, p->mutations, &e))
 		fail_msg("%s", e.text);
 	p->chains = i->kind == PLAN_CHAINS ? groups * 8 : 0;
-	p->bootstrap = groups * (test_scaled() ? bootstrap / 4 : bootstrap);
+	p->bootstrap = groups * (test_scaled() ? bootstrap / 8 : bootstrap);
 	uint64_t per = i->kind == PLAN_CHAINS ? spp * pixels / p->chains : spp / groups;
 	p->epoch = per / 2 ? per / 2 : 1;
 	if (plan_check(p, &e))

@@ -79,6 +79,7 @@ static int own_fallocate(int fd, int mode, off_t at, off_t size)
 static int refuse_commit(void *user)
 {
 	(void)user;
+	staged_disk->refused += staged_disk->fail_ledger;
 	return staged_disk->fail_ledger;
 }
 

@@ -5,6 +5,7 @@
  * Level: 1e-7 a test, about 350 tests, so below 1e-4 for all. Power: a roughness wrong by 10 % is found with certainty,
  * which a test of its own shows. Seeds: the name of the test.
  */
+#include "tests/support/length.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/math/rng.h"
@@ -183,7 +184,7 @@ static void test_samples_follow_the_density(void **state)
 		struct arena a = {0};
 		struct bsdf b;
 		bsdf_make(&a, bsdf_cases[k], &b);
-		for (int i = 0; i < DIRECTIONS; i++) {
+		for (int i = 0; i < DIRECTIONS; i += test_scaled() ? 5 : 1) {
 			vec3 wo = direction(i, b.two_sided);
 			double integral, p = chi_square(&b, &b, wo, stats_seed(bsdf_cases[k]) + (uint64_t)i, &integral);
 			if (!(p > LEVEL) || !(integral < 1 + 2e-3))

@@ -6,6 +6,7 @@
  */
 #include "common/base/mem.h"
 #include "tests/support/append.h"
+#include "tests/support/length.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
 
@@ -132,7 +133,7 @@ static void test_chains(void **state)
 		ladder(all[i].element, all[i].type, all[i].leaf, 8192, 1, "");
 		put("</scene>");
 		expect(sentence);
-		ladder(all[i].element, all[i].type, all[i].leaf, 60000, 1, "");
+		ladder(all[i].element, all[i].type, all[i].leaf, test_scaled() ? 10000 : 60000, 1, "");
 		put("</scene>");
 		expect(sentence);
 	}
