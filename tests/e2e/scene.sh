@@ -158,9 +158,9 @@ code 0 "$BIN/hslt-compare" "$DIR/covered.exr" "$DIR/plain.exr"
 grep -q "^relMSE  *0 " "$DIR/out" || fail "an uncovered mask is another: $(cat "$DIR/out")"
 # What only building a scene shows: all of that, too.
 scene deep.xml box '' '<bsdf type="conductor" id="stuff"><string name="material" value="Xy"/></bsdf>' '' \
-	'<shape type="sphere"><bsdf type="mask"><bsdf type="dielectric"/></bsdf></shape>'
+	'<shape type="sphere"><bsdf type="coating"><bsdf type="dielectric"/></bsdf></shape>'
 code 1 "$BIN/hslt-scene" check "$DIR/deep.xml"
-for word in 'unknown conductor "Xy"' 'a mask over "dielectric"' '2 problems'; do
+for word in 'unknown conductor "Xy"' 'a coating over "dielectric"' '2 problems'; do
 	grep -q "$word" "$DIR/out" || fail "$word: $(cat "$DIR/out")"
 done
 # Leniency is not for what is supported and wrong, nor for what has no stand-in.

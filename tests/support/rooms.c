@@ -40,7 +40,7 @@ static struct world *cloudy(void)
 
 static struct world *glass(void)
 {
-	return world_of_text(32, 32, ROOM LAMP BALL(GLASS));
+	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='mask'><float name='opacity' value='0.8'/>" GLASS "</bsdf>"));
 }
 
 static struct world *gold(void)

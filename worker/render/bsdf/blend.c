@@ -47,7 +47,7 @@ static double mix_pdf(const struct blend *m, const struct shares *s, const struc
 	return sum;
 }
 
-/* Specular lobes of all parts have the same direction. */
+/* All parts' specular lobes of one mode have the same direction. */
 static spectrum mix_delta(const struct blend *m, const struct shares *s, const struct bsdf_point *p, vec3 wo,
 			  unsigned mode, vec3 *wi, double *chance)
 {
@@ -125,14 +125,15 @@ bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, con
 
 int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const struct scene_node *n, struct error *e)
 {
-	if (part->modes & BSDF_TRANSMIT) {
-		bool other = (b->modes & BSDF_TRANSMIT) && b->eta != part->eta;
+	if ((part->modes & BSDF_TRANSMIT) && !part->only_straight) {
+		bool other = !b->only_straight && b->eta != part->eta;
 		if (part->dispersive || other)
 			return node_error(n, e, ENOTSUP, "its part \"%s\" %s", type,
 					  part->dispersive
 						  ? "is dispersive, which parts of a blend may not be"
 						  : "has a different index of refraction than an earlier part");
 		b->eta = part->eta;
+		b->only_straight = false;
 	}
 	b->two_sided |= part->two_sided;
 	b->modes |= part->modes;
@@ -152,7 +153,7 @@ struct blend *blend_begin(struct bsdf *b, const struct scene_node *n, const stru
 	struct blend *m = bsdf_data(b, n, build, sizeof *m, e);
 	if (!m)
 		return NULL;
-	b->black = true;
+	b->black = b->only_straight = true;
 	m->count = count;
 	m->part = arena_alloc(build->arena, count, sizeof *m->part);
 	if (!m->part)

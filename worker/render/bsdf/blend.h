@@ -3,8 +3,8 @@
  * Several BSDFs, each with a share of the light: `blendbsdf` two by a weight, `mixturebsdf` any number by fixed
  * weights, `mask` one and what passes it by.
  *
- * A surface has one index of refraction, and specular lobes of the same kind must have the same direction: transmitting
- * parts must have the same index, and none may be dispersive.
+ * A surface has one index of refraction, and specular lobes of the same mode must have the same direction: parts that
+ * transmit must have the same index unless all they transmit passes straight through, and none may be dispersive.
  */
 #ifndef WORKER_RENDER_BSDF_BLEND_H
 #define WORKER_RENDER_BSDF_BLEND_H

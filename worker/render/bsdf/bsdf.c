@@ -57,7 +57,9 @@ spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec
 spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			 double *chance)
 {
-	return b->ops->eval_delta ? b->ops->eval_delta(b, p, wo, mode, wi, chance) : spectrum_of(0);
+	if (!b->ops->eval_delta || (mode & BSDF_STRAIGHT & ~b->modes))
+		return spectrum_of(0);
+	return b->ops->eval_delta(b, p, wo, mode, wi, chance);
 }
 
 static spectrum black_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)

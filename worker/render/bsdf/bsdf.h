@@ -19,7 +19,8 @@
 enum bsdf_mode {
 	BSDF_REFLECT = 1,
 	BSDF_TRANSMIT = 2,
-	BSDF_DELTA = 4, /* combined with one of the two above */
+	BSDF_DELTA = 4,	   /* combined with one of the two above */
+	BSDF_STRAIGHT = 8, /* combined with TRANSMIT and DELTA: not bent, whatever the surface's index */
 };
 
 /* Which quantity a sub-path carries while it is traced: a camera sub-path traces importance backwards and thus
@@ -81,13 +82,14 @@ struct bsdf {
 	unsigned modes;	 /* union of all modes it can have (with both REFLECT|DELTA and REFLECT, both bits are set) */
 	bool has_smooth; /* some lobe is not specular: eval is not identically 0 */
 	bool has_delta;
-	double alpha;	   /* smallest roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
-	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta
-			      only */
-	double eta;	   /* index below the surface (against the normal) over the one above, at 587.6 nm where it
-			      depends on the wavelength; 1: opaque or none */
-	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength
-			    */
+	double alpha;	    /* smallest roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
+	double alpha_mean;  /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta
+			       only */
+	double eta;	    /* index below the surface (against the normal) over the one above, at 587.6 nm where it
+			       depends on the wavelength; 1: opaque or none. Lobes with BSDF_STRAIGHT ignore it */
+	bool only_straight; /* no lobe transmits but those with BSDF_STRAIGHT: eta means nothing */
+	bool dispersive; /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength
+			  */
 	const struct ior *ior; /* for both sides (enum ior_side); NULL: only eta is known */
 	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
@@ -109,9 +111,9 @@ double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
  */
 spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 
-/* The exactly specular lobe `mode` (REFLECT or TRANSMIT, with or without the DELTA bit) seen from wo: its direction wi,
- * the probability with which `sample` chooses it, and its weight f |wi.z| (f as in struct bsdf_sample). Zero: there is
- * none, or light is totally reflected; wi and chance are then not to be read. */
+/* The exactly specular lobe `mode` (REFLECT, TRANSMIT or TRANSMIT | STRAIGHT, with or without the DELTA bit) seen from
+ * wo: its direction wi, the probability with which `sample` chooses it, and its weight f |wi.z| (f as in struct
+ * bsdf_sample). Zero: there is none, or light is totally reflected; wi and chance are then not to be read. */
 spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			 double *chance);
 

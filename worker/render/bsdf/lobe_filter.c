@@ -63,9 +63,9 @@ int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struc
 	b->ops = &ops;
 	b->data = x;
 	if (lobes & BSDF_WITHOUT_TRANSMISSION)
-		b->modes &= ~(unsigned)BSDF_TRANSMIT;
+		b->modes &= ~(unsigned)(BSDF_TRANSMIT | BSDF_STRAIGHT);
 	if (lobes & BSDF_WITHOUT_DELTA) {
-		b->modes &= ~(unsigned)BSDF_DELTA;
+		b->modes &= ~(unsigned)(BSDF_DELTA | BSDF_STRAIGHT);
 		b->has_delta = false;
 	}
 	if (lobes & BSDF_WITHOUT_SMOOTH)

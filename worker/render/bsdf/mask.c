@@ -17,9 +17,6 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 		return -ENOMEM;
 	m->weight_of_first = true;
 	int code = bsdf_create(&m->part[0], inner, build, e);
-	if (!code && (m->part[0].modes & BSDF_TRANSMIT) && (m->part[0].eta != 1 || m->part[0].dispersive))
-		code = node_error(n, e, ENOTSUP, "a mask over \"%s\", which refracts light, is not supported",
-				  inner->type);
 	if (!code)
 		code = bsdf_mirror_back(&m->part[0], build, e);
 	if (!code)

@@ -34,7 +34,7 @@ spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, v
 			     double *chance)
 {
 	const struct filter *f = b->data;
-	if (!(mode & BSDF_TRANSMIT) || !straight_direction(wo, wi))
+	if (!(mode & BSDF_STRAIGHT) || !straight_direction(wo, wi))
 		return spectrum_of(0);
 	*chance = 1;
 	return spectrum_scale(f->share, texture_eval(&f->transmittance, &p->where, p->w));
@@ -44,8 +44,8 @@ bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 		     struct bsdf_sample *out)
 {
 	(void)u;
-	*out = (struct bsdf_sample){.mode = BSDF_TRANSMIT | BSDF_DELTA, .eta = 1};
-	spectrum weight = straight_eval_delta(b, p, wo, BSDF_TRANSMIT, &out->wi, &out->pdf);
+	*out = (struct bsdf_sample){.mode = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT, .eta = 1};
+	spectrum weight = straight_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
 	if (!(out->pdf > 0))
 		return false;
 	out->f = spectrum_scale(1 / fabs(wo.z), weight);
@@ -62,7 +62,8 @@ int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsd
 	if (code)
 		return code;
 	f->share = share;
-	b->modes = BSDF_TRANSMIT | BSDF_DELTA;
+	b->modes = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
+	b->only_straight = true;
 	b->has_delta = true;
 	b->two_sided = true;
 	b->alpha = b->alpha_mean = 0;

@@ -43,7 +43,8 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	struct fresnel f = sheet(t, wo);
 	bool reflect = mode & BSDF_REFLECT;
 	double share = reflect ? f.reflected : f.transmitted;
-	if (!(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
+	if (!(mode & (BSDF_REFLECT | BSDF_STRAIGHT)) ||
+	    !(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
 		return spectrum_of(0);
 	*wi = (vec3){-wo.x, -wo.y, reflect ? wo.z : -wo.z};
 	*chance = fresnel_chance(&f, reflect);
@@ -55,7 +56,8 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 {
 	struct fresnel f = sheet(b->data, wo);
 	bool reflect = u[2] < fresnel_chance(&f, true);
-	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA, .eta = 1};
+	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT | BSDF_STRAIGHT) | BSDF_DELTA,
+				    .eta = 1};
 	spectrum weight = thin_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
 	if (!(out->pdf > 0))
 		return false;
@@ -79,7 +81,8 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (code)
 		return code;
 	t->eta = inside / outside;
-	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA;
+	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
+	b->only_straight = true;
 	b->has_delta = true;
 	b->two_sided = true;
 	b->alpha = b->alpha_mean = 0;

@@ -139,7 +139,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
 	if (is_huge(w, place) || at[0] > VERTEX_INFINITE || at[2] > 1 || at[3] != 0 ||
 	    (v->kind == VERTEX_CAMERA) != (i == edges) || (v->kind == VERTEX_SURFACE) != (i > 0 && i < edges) ||
-	    (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA)))
+	    (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT)))
 		return false;
 	if (v->kind == VERTEX_CAMERA) {
 		double u[2];

@@ -76,7 +76,7 @@ unsigned full_path_mode(const struct full_path *x, unsigned j)
 double full_path_eta(const struct full_path *x, unsigned j)
 {
 	const struct path_vertex *v = &x->v[j];
-	if (!(v->mode & BSDF_TRANSMIT))
+	if (!(v->mode & BSDF_TRANSMIT) || (v->mode & BSDF_STRAIGHT))
 		return 1;
 	double eta = bsdf_eta(v->bsdf, &x->wl);
 	return vec3_dot(v->x.sh.n, x->edge[j].w) > 0 ? 1 / eta : eta;

@@ -58,43 +58,31 @@ const char *lenient_param(const char *stand_in, const char *name)
 	return name;
 }
 
-/* Light passes a BSDF of one of these types, or one in which one of these parameters is not 0; not so in one type. */
-struct passage {
-	const char *const *types, *const *parameters, *except;
-};
-
-static bool has_passage(const struct scene_node *n, const struct passage *p)
+/* Light passes it, or something in it. */
+static bool has_passage(const struct scene_node *n)
 {
-	if (is_one_of(n->type, p->types))
+	static const char *const types[] = {"null",	  "polarizer",	     "circular",       "retarder",  "mask",
+					    "dielectric", "roughdielectric", "thindielectric", "difftrans", NULL},
+				 *const parameters[] = {"spec_trans", "diff_trans", NULL};
+	if (is_one_of(n->type, types))
 		return true;
 	for (uint32_t i = 0; i < n->property_count; i++) {
 		const struct value *v = &n->properties[i].value;
 		bool zero = v->type == VALUE_FLOAT && v->as.number == 0;
-		if (is_one_of(n->properties[i].name, p->parameters) && !zero && strcmp(n->type, p->except) != 0)
+		if (is_one_of(n->properties[i].name, parameters) && !zero)
 			return true;
 	}
 	for (uint32_t i = 0; i < n->child_count; i++)
-		if (n->children[i]->cls == PLUGIN_BSDF && has_passage(n->children[i], p))
+		if (n->children[i]->cls == PLUGIN_BSDF && has_passage(n->children[i]))
 			return true;
 	return false;
 }
 
 const struct scene_node *lenient_uncovered(const struct scene_node *n)
 {
-	static const char *const any_types[] = {"null",	      "polarizer",	 "circular",	   "retarder",	"mask",
-						"dielectric", "roughdielectric", "thindielectric", "difftrans", NULL},
-				 *const any_parameters[] = {"spec_trans", "diff_trans", NULL},
-				 *const bent_types[] = {"dielectric", "roughdielectric", NULL},
-				 *const bent_parameters[] = {"spec_trans", NULL};
-	static const struct passage any = {any_types, any_parameters, ""},
-				    bent = {bent_types, bent_parameters, "principledthin"};
-	static const char *const opaque_covers[] = {"coating", "roughcoating", "twosided", NULL};
+	static const char *const covers[] = {"coating", "roughcoating", "twosided", NULL};
 	const struct scene_node *inner = n->cls == PLUGIN_BSDF ? node_child(n, PLUGIN_BSDF, 0) : NULL;
-	if (!inner)
-		return NULL;
-	if (is_one_of(n->type, opaque_covers))
-		return has_passage(inner, &any) ? inner : NULL;
-	return strcmp(n->type, "mask") == 0 && has_passage(inner, &bent) ? inner : NULL;
+	return inner && is_one_of(n->type, covers) && has_passage(inner) ? inner : NULL;
 }
 
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el)

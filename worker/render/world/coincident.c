@@ -14,7 +14,7 @@ static enum surface_rank rank_of(const struct world *w, const struct world_shape
 		return SURFACE_SHINES;
 	if (!(b->modes & BSDF_TRANSMIT))
 		return SURFACE_OPAQUE;
-	bool passes = b->ops && (strcmp(b->ops->type, "null") == 0 || strcmp(b->ops->type, "mask") == 0);
+	bool passes = b->eta == 1 && b->ops && (strcmp(b->ops->type, "null") == 0 || strcmp(b->ops->type, "mask") == 0);
 	return passes ? SURFACE_PASSES : SURFACE_TRANSMITS;
 }
 

@@ -96,6 +96,10 @@ static const char *const bsdf_cases[] = {
 	"mask opacity=0.6 | difftrans transmittance=rgb(0.9,0.5,0.2)",
 	"mask opacity=0.7 | thindielectric",
 	"mask opacity=0.4 | principledthin spec_trans=0.5 diff_trans=1 roughness=0.4",
+	"mask opacity=0.6 | dielectric int_ior=1.5 ext_ior=1",
+	"mask opacity=0.7 | roughdielectric int_ior=1.5 ext_ior=1 alpha=0.3 distribution=ggx",
+	"mask opacity=0.5 | principled base_color=rgb(0.9,0.8,0.7) roughness=0.4 spec_trans=0.7",
+	"blendbsdf weight=0.4 | thindielectric | dielectric int_ior=1.5 ext_ior=1",
 	"blendbsdf weight=0.3 | diffuse reflectance=0.8 | roughconductor alpha=0.2 material=Au",
 	"blendbsdf weight=0.6 | plastic | conductor material=Ag",
 	"blendbsdf weight=0.4 | diffuse | roughplastic alpha=0.3", /* chooses with what is left of the same number */

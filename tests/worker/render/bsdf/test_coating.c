@@ -146,7 +146,8 @@ static void test_a_sheet_is_a_series(void **state)
 		vec3 wi, wo = vec3_neg(direction(z));
 		double chance;
 		assert_true(fabs(bsdf_eval_delta(&b, &point, wo, BSDF_REFLECT, &wi, &chance).v[0] - back) < 1e-12);
-		assert_true(fabs(bsdf_eval_delta(&b, &point, wo, BSDF_TRANSMIT, &wi, &chance).v[0] - through) < 1e-12);
+		assert_true(fabs(bsdf_eval_delta(&b, &point, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi, &chance).v[0] -
+				 through) < 1e-12);
 		assert_true(wi.x == -wo.x && wi.y == -wo.y && wi.z == -wo.z);
 	}
 	arena_fini(&a);

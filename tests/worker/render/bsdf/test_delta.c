@@ -49,10 +49,11 @@ static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf
 static double chances(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
 {
 	double sum = 0;
-	for (unsigned mode = BSDF_REFLECT; mode <= BSDF_TRANSMIT; mode++) {
+	static const unsigned modes[] = {BSDF_REFLECT, BSDF_TRANSMIT, BSDF_TRANSMIT | BSDF_STRAIGHT};
+	for (int i = 0; i < 3; i++) {
 		vec3 wi;
 		double chance;
-		if (!spectrum_is_zero(bsdf_eval_delta(b, p, wo, mode, &wi, &chance)))
+		if (!spectrum_is_zero(bsdf_eval_delta(b, p, wo, modes[i], &wi, &chance)))
 			sum += chance;
 	}
 	return sum;
@@ -158,6 +159,7 @@ static void test_filters_are_holes(void **state)
 		{"retarder theta=20 delta=180", "null"},
 		{"retarder", "mask opacity=0 | diffuse"},
 	};
+	const unsigned straight = BSDF_TRANSMIT | BSDF_STRAIGHT;
 	struct dice d = dice_of("filters");
 	for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
 		struct arena a = {0};
@@ -168,8 +170,8 @@ static void test_filters_are_holes(void **state)
 			struct bsdf_point p = {.w = &wavelengths};
 			vec3 wo = any_direction(&d, k), through, also;
 			double chance;
-			spectrum weight = bsdf_eval_delta(&filter, &p, wo, BSDF_TRANSMIT, &through, &chance),
-				 expected = bsdf_eval_delta(&sheet, &p, wo, BSDF_TRANSMIT, &also, &chance);
+			spectrum weight = bsdf_eval_delta(&filter, &p, wo, straight, &through, &chance),
+				 expected = bsdf_eval_delta(&sheet, &p, wo, straight, &also, &chance);
 			assert_memory_equal(&through, &also, sizeof through);
 			for (int l = 0; l < SPECTRUM_LANES; l++)
 				if (weight.v[l] != expected.v[l])
@@ -179,6 +181,35 @@ static void test_filters_are_holes(void **state)
 		}
 		arena_fini(&a);
 	}
+}
+
+/* Glass with holes has three specular lobes: the two of the glass, weaker by its share, and what the holes let through.
+ * No lobe answers for another. */
+static void test_masked_glass_has_three_lobes(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf glass, masked;
+	const struct bsdf_point p = {.w = &wavelengths};
+	struct dice d = dice_of("masked glass");
+	bsdf_make(&a, "dielectric int_ior=1.5 ext_ior=1", &glass);
+	bsdf_make(&a, "mask opacity=0.25 | dielectric int_ior=1.5 ext_ior=1", &masked);
+	for (int k = 0; k < 100; k++) {
+		vec3 wo = any_direction(&d, k), wi[2] = {{0, 0, 0}, {0, 0, 0}};
+		double chance[2];
+		for (unsigned mode = BSDF_REFLECT; mode <= BSDF_TRANSMIT; mode++) {
+			spectrum whole = bsdf_eval_delta(&glass, &p, wo, mode, &wi[0], &chance[0]),
+				 part = bsdf_eval_delta(&masked, &p, wo, mode, &wi[1], &chance[1]);
+			assert_true(part.v[0] == 0.25 * whole.v[0]);
+			if (part.v[0] > 0)
+				assert_true(chance[1] == 0.25 * chance[0] && wi[0].z == wi[1].z);
+		}
+		spectrum holes = bsdf_eval_delta(&masked, &p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi[1], &chance[1]);
+		assert_true(holes.v[0] == 0.75 && chance[1] == 0.75 && wi[1].x == -wo.x && wi[1].z == -wo.z);
+		assert_true(spectrum_is_zero(
+			bsdf_eval_delta(&glass, &p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi[0], &chance[0])));
+	}
+	arena_fini(&a);
 }
 
 static void test_mean_roughness(void **state)
@@ -222,6 +253,7 @@ int main(void)
 		cmocka_unit_test(test_a_mirrored_back_is_a_mirror),
 		cmocka_unit_test(test_nothing_passes_beyond_the_critical_angle),
 		cmocka_unit_test(test_filters_are_holes),
+		cmocka_unit_test(test_masked_glass_has_three_lobes),
 		cmocka_unit_test(test_mean_roughness),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -123,6 +123,7 @@ static void test_parts_that_let_light_through(void **state)
 	struct arena a = {0};
 	struct bsdf leaf, pane, glass;
 	const vec3 wo = {0.6, 0, 0.8}, back = {0, 0.6, -0.8}, front = {0, 0.6, 0.8};
+	const unsigned straight = BSDF_TRANSMIT | BSDF_STRAIGHT;
 	vec3 wi;
 	double chance, whole;
 	bsdf_make(&a, "blendbsdf weight=0.25 | diffuse reflectance=0.8 | difftrans transmittance=0.4", &leaf);
@@ -132,8 +133,8 @@ static void test_parts_that_let_light_through(void **state)
 	assert_true(value(&leaf, vec3_neg(wo), back) == value(&leaf, wo, front));
 	bsdf_make(&a, "thindielectric", &glass);
 	bsdf_make(&a, "blendbsdf weight=0.25 | thindielectric | null", &pane);
-	whole = bsdf_eval_delta(&glass, &point, wo, BSDF_TRANSMIT, &wi, &chance).v[0];
-	double through = bsdf_eval_delta(&pane, &point, wo, BSDF_TRANSMIT, &wi, &chance).v[0];
+	whole = bsdf_eval_delta(&glass, &point, wo, straight, &wi, &chance).v[0];
+	double through = bsdf_eval_delta(&pane, &point, wo, straight, &wi, &chance).v[0];
 	assert_true(fabs(through - (0.75 * whole + 0.25)) < 1e-14 && wi.z == -wo.z);
 	arena_fini(&a);
 }

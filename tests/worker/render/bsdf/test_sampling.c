@@ -133,7 +133,8 @@ static void check_sample(const struct bsdf *b, vec3 wo, const struct bsdf_sample
 	assert_true(fabs(vec3_length(s->wi) - 1) < 1e-12);
 	assert_int_equal(s->mode & ~b->modes, 0);
 	assert_true(s->mode & (s->wi.z * wo.z > 0 ? BSDF_REFLECT : BSDF_TRANSMIT));
-	double below = bsdf_eta(b, &wavelengths), eta = s->wi.z * wo.z > 0 ? 1 : wo.z > 0 ? below : 1 / below;
+	bool bent = s->wi.z * wo.z < 0 && !(s->mode & BSDF_STRAIGHT);
+	double below = bsdf_eta(b, &wavelengths), eta = !bent ? 1 : wo.z > 0 ? below : 1 / below;
 	assert_true(close_to(s->eta, eta));
 	assert_true(spectrum_is_valid(s->f));
 	if (s->mode & BSDF_DELTA) {

@@ -110,7 +110,11 @@ static void test_surfaces(void **state)
 	      world_of_text(32, 32,
 			    ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")),
 	      1500);
-	check("glass", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='dielectric'/>")), 3000);
+	check("glass with holes",
+	      world_of_text(32, 32,
+			    ROOM LAMP BALL("<bsdf type='mask'><float name='opacity' value='0.8'/>"
+					   "<bsdf type='dielectric'/></bsdf>")),
+	      3000);
 	check("gold",
 	      world_of_text(32, 32,
 			    ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),

@@ -125,10 +125,11 @@ static void test_glass(void **state)
 	check_all("glass",
 		  world_of_text(32, 32,
 				DEPTH("6") ROOM LAMP BALL("0,-0.6,-0.3", "0.8",
+							  "<bsdf type='mask'><float name='opacity' value='0.8'/>"
 							  "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
-							  "<float name='ext_ior' value='1'/></bsdf>")),
-		  &(struct lengths){.path = 2560,
-				    .bdpt = 2560,
+							  "<float name='ext_ior' value='1'/></bsdf></bsdf>")),
+		  &(struct lengths){.path = 3072,
+				    .bdpt = 3072,
 				    .rare = at_length(2048),
 				    .spread = 4000,
 				    .rare_spread = at_length(5760)});

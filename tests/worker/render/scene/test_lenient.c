@@ -74,10 +74,10 @@ static void test_covers(void **state)
 		{"mask | difftrans", false},
 		{"mask | thindielectric", false},
 		{"mask | principledthin spec_trans=0.5 diff_trans=1", false},
-		{"mask | dielectric", true},
-		{"mask | roughdielectric alpha=0.1", true},
-		{"mask | principled spec_trans=0.5", true},
-		{"mask | principled spec_trans=0", false},
+		{"mask | dielectric", false},
+		{"mask | principled spec_trans=0.5", false},
+		{"coating | principled spec_trans=0.5", true},
+		{"coating | principled spec_trans=0", false},
 	};
 	for (size_t i = 0; i < sizeof covers / sizeof *covers; i++) {
 		struct arena a = {0};

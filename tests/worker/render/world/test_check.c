@@ -50,8 +50,8 @@ static void test_all_problems(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='3.0.0'>\n"
-				  "<bsdf type='mask' id='m'><bsdf type='dielectric'/></bsdf>\n" /* line 2 */
-		SPHERE(METAL("Ni_palik")) SPHERE(METAL("Xy"))					/* 4 */
+				  "<bsdf type='twosided' id='m'><bsdf type='dielectric'/></bsdf>\n" /* line 2 */
+		SPHERE(METAL("Ni_palik")) SPHERE(METAL("Xy"))					    /* 4 */
 		SPHERE("<ref id='m'/>")
 			SPHERE("<ref id='m'/>") "<shape type='ply'><string name='filename' value='a.ply'/>" METAL(
 				"Xz") "</shape>\n" /* 7 */

@@ -15,6 +15,7 @@
 #define RED "<bsdf type='diffuse'><rgb name='reflectance' value='0.5,0.1,0.1'/></bsdf>"
 #define GREY "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>"
 #define GLASS "<bsdf type='dielectric'/>"
+#define HOLES(in) "<bsdf type='mask'>" in "</bsdf>"
 #define FLOOR(inside) \
 	"<shape type='rectangle' id='floor'>" AT("<rotate x='1' angle='-90'/><scale value='4'/>") inside "</shape>\n"
 #define CUBE(id, x, y, inside) \
@@ -58,6 +59,13 @@ static void test_notes(void **state)
 	       "`ice` (test.xml:3) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file"
 	       "; where two media touch, use one surface with the int_ior and ext_ior of both",
 	       "`hole` (test.xml:4) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, because it refracts or scatters",
+	       true);
+	/* Glass with holes is glass, which a sheet with holes is not. */
+	expect(VIEW CUBE("lace", "0", "0.5", HOLES(GLASS)) CUBE("glass", "1", "0.5", GLASS)
+		       CUBE("net", "-1", "0.5", HOLES(GREY)),
+	       "`glass` (test.xml:3) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file"
+	       "; where two media touch, use one surface with the int_ior and ext_ior of both",
+	       "`net` (test.xml:4) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, because it refracts or scatters",
 	       true);
 	/* Two lamps back to back are one, which shines to its own side; a lamp that is there twice loses nothing. */
 	expect(VIEW LAMP "<shape type='rectangle' id='back'>" AT(

@@ -27,7 +27,7 @@
 	"<texture type='bitmap' name='" name "'><string name='filename' value='p0'/>" \
 	"<boolean name='raw' value='true'/><string name='filter_type' value='nearest'/></texture>"
 
-static void compare(const char *test, const char *cut, const char *halves)
+static void compare(const char *test, uint32_t samples, const char *cut, const char *halves)
 {
 	static struct agree_image image[2];
 	const char *body[2] = {cut, halves};
@@ -42,7 +42,7 @@ static void compare(const char *test, const char *cut, const char *halves)
 		const struct memory_file files[] = {
 			{"s.xml", xml, (size_t)n}, {"p0", p.file[0].bytes, p.file[0].size}, {NULL, NULL, 0}};
 		struct world *w = world_of_files(16, 16, files);
-		const struct agree_side how = {"path", 1024, 32, 1, 16};
+		const struct agree_side how = {"path", samples, 32, 1, 16};
 		agree_render(w, test, i ? "halves" : "cut", &how, &image[i]);
 		world_free(w);
 	}
@@ -53,7 +53,7 @@ static void compare(const char *test, const char *cut, const char *halves)
 static void test_mask(void **state)
 {
 	(void)state;
-	compare("mask",
+	compare("mask", 1024,
 		"<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") DIFFUSE("0.8") "</bsdf></shape>",
 		HALF("0.5", DIFFUSE("0.8")));
 }
@@ -63,14 +63,28 @@ static void test_mask_over_what_transmits(void **state)
 {
 	(void)state;
 #define LEAF "<bsdf type='difftrans'><rgb name='transmittance' value='0.7'/></bsdf>"
-	compare("leaf", "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") LEAF "</bsdf></shape>",
+	compare("leaf", 1024, "<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") LEAF "</bsdf></shape>",
 		HALF("0.5", LEAF));
+}
+
+/* A pane of glass whose one half is cut off, and frosted glass likewise: what refracts and what passes stay apart. */
+static void test_mask_over_glass(void **state)
+{
+	(void)state;
+#define PANE(type) "<bsdf type='" type "'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/></bsdf>"
+	compare("glass", 1408,
+		"<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity") PANE("dielectric") "</bsdf></shape>",
+		HALF("0.5", PANE("dielectric")));
+	compare("frosted", 2048,
+		"<shape type='rectangle'><bsdf type='mask'>" PICTURE("opacity")
+			PANE("roughdielectric") "</bsdf></shape>",
+		HALF("0.5", PANE("roughdielectric")));
 }
 
 static void test_blend(void **state)
 {
 	(void)state;
-	compare("blend",
+	compare("blend", 1024,
 		"<shape type='rectangle'><bsdf type='blendbsdf'>" PICTURE("weight") DIFFUSE("0.8")
 			DIFFUSE("0.3") "</bsdf></shape>",
 		HALF("-0.5", DIFFUSE("0.8")) HALF("0.5", DIFFUSE("0.3")));
@@ -79,6 +93,6 @@ static void test_blend(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask), cmocka_unit_test(test_mask_over_what_transmits),
-					   cmocka_unit_test(test_blend)};
+					   cmocka_unit_test(test_mask_over_glass), cmocka_unit_test(test_blend)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
