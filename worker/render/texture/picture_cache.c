@@ -48,7 +48,7 @@ struct picture *picture_add(struct picture_cache *c, const struct picture_key *k
 	char *name = arena_strdup(arena, k->name);
 	if (!p || !name)
 		return NULL;
-	*p = (struct picture_entry){*k, {*image, -1}, least, largest, cut, c->first};
+	*p = (struct picture_entry){*k, {*image, .largest = -1, .bound = -1}, least, largest, cut, c->first};
 	p->key.name = name;
 	if (!cut)
 		own_range(image, &p->least, &p->largest);

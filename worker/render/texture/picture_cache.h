@@ -26,7 +26,9 @@ struct picture_key {
 
 struct picture {
 	struct image image;
-	double bound; /* space for the user: of the spectra of all pixels; negative: not known yet */
+	/* Space for users; negative: not known yet. */
+	double largest; /* of all numbers, at least 0 */
+	double bound;	/* of the spectra of all pixels */
 };
 
 /* The pixels with that key whose values equal those clamped to [least, largest]. NULL: there are none. */

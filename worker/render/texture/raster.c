@@ -211,7 +211,11 @@ double raster_max(const struct raster *r)
 {
 	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
 	float m = 0;
+	if (r->shared && r->shared->largest >= 0)
+		return r->shared->largest;
 	for (size_t i = 0; i < count; i++)
 		m = r->image.pixels[i] > m ? r->image.pixels[i] : m;
+	if (r->shared)
+		r->shared->largest = (double)m;
 	return (double)m;
 }

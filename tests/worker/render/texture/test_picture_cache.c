@@ -31,6 +31,15 @@ static void close_counted(void *user, struct asset *a)
 	c->inner.close(c->inner.user, a);
 }
 
+/* Whether its maximum was found before, by another texture, or not. */
+static void check_maximum(const struct raster *r)
+{
+	double m = 0;
+	for (uint32_t i = 0; i < r->image.width * r->image.height * r->image.channels; i++)
+		m = r->image.pixels[i] > (float)m ? (double)r->image.pixels[i] : m;
+	assert_true(raster_max(r) == m && raster_max(r) == m);
+}
+
 static const float *pixels(const struct asset_source *s, const char *text, const struct raster_range *range,
 			   struct arena *a)
 {
@@ -40,6 +49,7 @@ static const float *pixels(const struct asset_source *s, const char *text, const
 	snprintf(plugin, sizeof plugin, "bitmap %s", text);
 	if (raster_read(&r, node_make(a, PLUGIN_TEXTURE, plugin), s, range, a, &e))
 		fail_msg("%s: %s", text, e.text);
+	check_maximum(&r);
 	return r.image.pixels;
 }
 
