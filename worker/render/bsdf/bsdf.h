@@ -44,6 +44,7 @@ struct bsdf_sample {
 
 struct bsdf;
 struct ior;
+struct boundary_table;
 
 struct bsdf_build {
 	const struct asset_source *assets;
@@ -52,6 +53,7 @@ struct bsdf_build {
 	double least_roughness;		    /* rough metal and glass below this roughness is made smooth */
 	struct attribute_table *attributes; /* of the mesh; NULL: none */
 	bool black_backs;		    /* of opaque materials without twosided */
+	struct boundary_table **boundaries; /* tables that materials of the scene share; NULL: each has its own */
 };
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)

@@ -35,18 +35,56 @@ static double look_up(const double row[BOUNDARY_NODES], double cosine)
 	return (1 - t) * row[i] + t * row[i + 1];
 }
 
-static void tabulate(struct rough_boundary *r, int row)
+static void tabulate(const struct boundary_table *t, int row)
 {
 	struct microfacet m;
-	double alpha = r->least * exp(row * r->step), sum = 0;
-	microfacet_set(&m, r->roughness.fixed.ggx, alpha, alpha);
+	struct boundary_row *r = &t->row[row];
+	double alpha = t->least * exp(row * t->step), sum = 0;
+	microfacet_set(&m, t->ggx, alpha, alpha);
 	for (int i = 0; i < BOUNDARY_NODES; i++)
-		r->transmitted[row][i] = 1 - reflected_by(&m, r->eta, node_cosine(i));
+		r->transmitted[i] = 1 - reflected_by(&m, t->eta, node_cosine(i));
 	for (int i = 0; i < STEPS; i++) {
 		double c = (i + 0.5) / STEPS;
-		sum += look_up(r->transmitted[row], c) * 2 * c;
+		sum += look_up(r->transmitted, c) * 2 * c;
 	}
-	r->escape[row] = sum / STEPS;
+	r->escape = sum / STEPS;
+}
+
+static const struct boundary_table *find_table(const struct boundary_table *like, const struct boundary_table *made)
+{
+	for (const struct boundary_table *t = made; t; t = t->next)
+		if (t->ggx == like->ggx && t->eta == like->eta && t->least == like->least && t->step == like->step &&
+		    t->rows == like->rows)
+			return t;
+	return NULL;
+}
+
+/* One of those that the scene has already, or a new one. NULL: out of memory. */
+static const struct boundary_table *table_of(const struct rough_map *roughness, double eta,
+					     const struct bsdf_build *build)
+{
+	struct boundary_table wanted = {.ggx = roughness->fixed.ggx,
+					.eta = eta,
+					.least = roughness->fixed.alpha,
+					.rows = 1,
+					.next = build->boundaries ? *build->boundaries : NULL};
+	if (roughness->varies && roughness->most > wanted.least) {
+		wanted.rows = BOUNDARY_ROWS;
+		wanted.step = log(roughness->most / wanted.least) / (BOUNDARY_ROWS - 1);
+	}
+	const struct boundary_table *found = find_table(&wanted, wanted.next);
+	if (found)
+		return found;
+	struct boundary_table *t = arena_alloc(build->arena, 1, sizeof *t);
+	wanted.row = arena_alloc(build->arena, (size_t)wanted.rows, sizeof *wanted.row);
+	if (!t || !wanted.row)
+		return NULL;
+	*t = wanted;
+	for (int i = 0; i < t->rows; i++)
+		tabulate(t, i);
+	if (build->boundaries)
+		*build->boundaries = t;
+	return t;
 }
 
 int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, const struct scene_node *n,
@@ -58,21 +96,17 @@ int rough_boundary_read(struct rough_boundary *r, double eta, struct bsdf *b, co
 		code = node_error(n, e, ENOTSUP, "alpha_u and alpha_v differ; only isotropic coatings are supported");
 	if (code)
 		return code;
-	r->eta = eta;
-	r->least = r->roughness.fixed.alpha;
-	r->rows = r->roughness.varies && r->roughness.most > r->least ? BOUNDARY_ROWS : 1;
-	r->step = r->rows > 1 ? log(r->roughness.most / r->least) / (r->rows - 1) : 0;
-	for (int i = 0; i < r->rows; i++)
-		tabulate(r, i);
-	return 0;
+	r->table = table_of(&r->roughness, eta, build);
+	return r->table ? 0 : node_error(n, e, ENOMEM, "out of memory");
 }
 
 struct boundary_point rough_boundary_at(const struct rough_boundary *r, const struct bsdf_point *p)
 {
-	struct boundary_point at = {.of = r, .facets = rough_map_at(&r->roughness, p)};
-	if (r->rows > 1) {
-		double x = fmin(fmax(log(at.facets.alpha / r->least) / r->step, 0), r->rows - 1);
-		at.row = x < r->rows - 2 ? (int)x : r->rows - 2;
+	const struct boundary_table *t = r->table;
+	struct boundary_point at = {.of = t, .facets = rough_map_at(&r->roughness, p)};
+	if (t->rows > 1) {
+		double x = fmin(fmax(log(at.facets.alpha / t->least) / t->step, 0), t->rows - 1);
+		at.row = x < t->rows - 2 ? (int)x : t->rows - 2;
 		at.rest = x - at.row;
 	}
 	return at;
@@ -85,15 +119,15 @@ static double between(double rest, double here, double next)
 
 double boundary_transmitted(const struct boundary_point *at, double cosine)
 {
-	const struct rough_boundary *r = at->of;
-	double here = look_up(r->transmitted[at->row], cosine);
-	return at->rest > 0 ? between(at->rest, here, look_up(r->transmitted[at->row + 1], cosine)) : here;
+	const struct boundary_row *r = &at->of->row[at->row];
+	double here = look_up(r->transmitted, cosine);
+	return at->rest > 0 ? between(at->rest, here, look_up(r[1].transmitted, cosine)) : here;
 }
 
 double boundary_escape(const struct boundary_point *at)
 {
-	const double *escape = at->of->escape;
-	return at->rest > 0 ? between(at->rest, escape[at->row], escape[at->row + 1]) : escape[at->row];
+	const struct boundary_row *r = &at->of->row[at->row];
+	return at->rest > 0 ? between(at->rest, r->escape, r[1].escape) : r->escape;
 }
 
 double boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf)

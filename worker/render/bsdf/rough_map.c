@@ -30,6 +30,7 @@ static void find_least(struct rough_map *r, const struct bsdf_build *build)
 {
 	const struct bsdf_probes probes = bsdf_probes_of(build);
 	struct microfacet least = {.alpha = INFINITY, .ratio = 1};
+	r->most = 0;
 	for (uint32_t i = 0; i < probes.count; i++) {
 		const struct bsdf_point at = bsdf_probe(&probes, i);
 		struct microfacet m = rough_map_look_up(r, &at);

@@ -54,11 +54,13 @@ static int create_bsdfs(struct builder *b)
 	struct node_table made; /* a mesh is identified by its triangles */
 	if (!w->bsdfs || !b->bsdf_nodes || node_table_init(&made, w->shape_count, &b->scratch))
 		return build_out_of_memory(b->e);
+	struct boundary_table *boundaries = NULL;
 	struct bsdf_build build = {.assets = b->assets,
 				   .arena = &w->arena,
 				   .dialect_3 = b->scene->dialect_3,
 				   .least_roughness = w->accuracy.roughness,
-				   .black_backs = w->accuracy.backs > 0};
+				   .black_backs = w->accuracy.backs > 0,
+				   .boundaries = &boundaries};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
 		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;

@@ -3,6 +3,7 @@
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/microfacet.h"
+#include "worker/render/bsdf/rough_boundary.h"
 
 #include <math.h>
 
@@ -263,6 +264,48 @@ static void test_a_layer_on_both_sides(void **state)
 	arena_fini(&a);
 }
 
+/* Boundaries of a scene share a table if they are equal, and only then. */
+static void test_equal_boundaries_share_a_table(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		double eta;
+		int same_as; /* of those before; -1: none */
+	} all[] = {
+		{"roughplastic alpha=0.2", 1.5, -1},
+		{"roughplastic alpha=0.2 diffuse_reflectance=0.1", 1.5, 0},
+		{"roughplastic alpha=0.2", 1.6, -1},
+		{"roughplastic alpha=0.3", 1.5, -1},
+		{"roughplastic alpha=0.2 distribution=ggx", 1.5, -1},
+		{"roughplastic | @alpha checkerboard color0=0.2 color1=0.3", 1.5, -1},
+		{"roughplastic | @alpha checkerboard color0=0.2 color1=0.4", 1.5, -1},
+		{"roughplastic | @alpha checkerboard color0=0.3 color1=0.2", 1.5, 5},
+		{"roughplastic | @alpha checkerboard color0=0.2 color1=0.2", 1.5, 0},
+		{"roughplastic alpha=0.3", 1.5, 3},
+	};
+	enum { COUNT = sizeof all / sizeof *all };
+	struct arena a = {0};
+	struct boundary_table *boundaries = NULL;
+	const struct bsdf_build build = {.arena = &a, .dialect_3 = true, .boundaries = &boundaries},
+				alone = {.arena = &a, .dialect_3 = true};
+	struct rough_boundary r[COUNT], own;
+	for (int i = 0; i < COUNT; i++) {
+		struct bsdf b = {.alpha = INFINITY};
+		struct error e;
+		struct scene_node *n = bsdf_node(&a, all[i].text);
+		assert_int_equal(rough_boundary_read(&r[i], all[i].eta, &b, n, &build, &e), 0);
+		assert_int_equal(rough_boundary_read(&own, all[i].eta, &b, n, &alone, &e), 0);
+		for (int k = 0; k < i; k++)
+			if ((r[k].table == r[i].table) !=
+			    (k == all[i].same_as || (all[i].same_as >= 0 && all[k].same_as == all[i].same_as)))
+				fail_msg("%s and %s", all[k].text, all[i].text);
+		assert_true(own.table != r[i].table && own.table->rows == r[i].table->rows);
+		assert_memory_equal(own.table->row, r[i].table->row, (size_t)own.table->rows * sizeof *own.table->row);
+	}
+	arena_fini(&a);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -276,6 +319,7 @@ int main(void)
 		cmocka_unit_test(test_a_layer_is_what_goes_in_and_out),
 		cmocka_unit_test(test_textured_coatings),
 		cmocka_unit_test(test_a_layer_on_both_sides),
+		cmocka_unit_test(test_equal_boundaries_share_a_table),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
