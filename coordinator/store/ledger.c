@@ -37,6 +37,16 @@ struct ledger {
 	bool behind; /* the copy lacks changes */
 };
 
+/* Ends a transaction: what it did counts if rc is 0. */
+static int conclude(struct ledger *l, int rc, struct error *e)
+{
+	if (!rc)
+		rc = ledger_file_run(l->db, "COMMIT", e);
+	if (rc)
+		ledger_file_run(l->db, "ROLLBACK", NULL);
+	return rc;
+}
+
 /* ---- the copy ---- */
 
 static void fall_behind(struct ledger *l, const struct error *e)
@@ -113,11 +123,7 @@ static int merge(struct ledger *l, struct error *e)
 		rc = merge_notes(l, schemas[0], schemas[1], e);
 	if (!rc && !l->behind)
 		rc = merge_notes(l, schemas[1], schemas[0], e);
-	if (!rc)
-		rc = ledger_file_run(l->db, "COMMIT", e);
-	if (rc)
-		ledger_file_run(l->db, "ROLLBACK", NULL);
-	return rc;
+	return conclude(l, rc, e);
 }
 
 int ledger_mend(struct ledger *l, struct error *e)
@@ -284,11 +290,7 @@ static int remove_all(struct ledger *l, struct ledger_side *s, const uint64_t *i
 	int rc = ledger_file_run(l->db, "BEGIN", e);
 	for (size_t i = 0; !rc && i < count; i++)
 		rc = ids[i] ? ledger_side_remove(s, ids[i], e) : 0;
-	if (!rc)
-		rc = ledger_file_run(l->db, "COMMIT", e);
-	if (rc)
-		ledger_file_run(l->db, "ROLLBACK", NULL);
-	return rc;
+	return conclude(l, rc, e);
 }
 
 /* First from the copy: after a fault in between the rows still exist, and are dropped again. */
@@ -314,21 +316,37 @@ int ledger_skip_ids(struct ledger *l, uint64_t id, struct error *e)
 	return ledger_set(l, next_job, text, e);
 }
 
+/* The row, and the number after it, in one transaction. */
+static int add_to(struct ledger *l, struct ledger_side *s, const struct ledger_job *j, struct error *e)
+{
+	char next[32];
+	text_print(next, sizeof next, "%llu", (unsigned long long)l->next);
+	int rc = ledger_file_run(l->db, "BEGIN", e);
+	if (!rc)
+		rc = ledger_side_set(s, next_job, next, e);
+	if (!rc)
+		rc = put(s, j, e);
+	return conclude(l, rc, e);
+}
+
 int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)
 {
 	struct ledger_job live, old;
+	struct error fault;
 	int rc = ledger_side_get(&l->jobs, j->id, &old, e);
 	if (rc)
 		return rc < 0 ? rc
 			      : error_set(e, EEXIST, "the database of jobs has a j%llu", (unsigned long long)j->id);
-	rc = ledger_skip_ids(l, j->id, e);
-	if (rc)
-		return rc;
+	skip(l, j->id);
 	live = *j;
 	live.state = "live";
 	live.ended = 0;
 	live.held = "";
-	return put_both(l, &live, e);
+	ledger_side_release(&l->jobs);
+	rc = add_to(l, &l->jobs, &live, e);
+	if (!rc && !l->behind && add_to(l, &l->copy, &live, &fault))
+		fall_behind(l, &fault);
+	return rc;
 }
 
 int ledger_put(struct ledger *l, const struct ledger_job *j, struct error *e)
