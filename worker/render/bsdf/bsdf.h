@@ -45,6 +45,7 @@ struct bsdf_sample {
 struct bsdf;
 struct ior;
 struct boundary_table;
+struct bend;
 
 struct bsdf_build {
 	const struct asset_source *assets;
@@ -54,6 +55,7 @@ struct bsdf_build {
 	struct attribute_table *attributes; /* of the mesh; NULL: none */
 	bool black_backs;		    /* of opaque materials without twosided */
 	struct boundary_table **boundaries; /* tables that materials of the scene share; NULL: each has its own */
+	struct bend **bends;		    /* likewise bump and normal maps of one material */
 };
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)

@@ -9,8 +9,10 @@
 
 struct bend {
 	struct relief relief;
+	const struct scene_node *node; /* of the texture */
 	struct texture texture;
-	double scale; /* of heights, or of a normal's first two components */
+	double scale;	   /* of heights, or of a normal's first two components */
+	struct bend *next; /* of the material */
 };
 
 static double height_of(const double x[3], bool grey)
@@ -41,6 +43,16 @@ static void normal_at(const void *data, double u, double v, struct relief_value 
 	out->dv = (vec3){2 * k * j.dv[0], 2 * k * j.dv[1], 2 * j.dv[2]};
 }
 
+/* One like it that the material has already, in another of its parts: a surface has one normal. */
+static const struct bend *find_bend(const struct bend *like, const struct bend *made)
+{
+	for (const struct bend *b = made; b; b = b->next)
+		if (b->relief.kind == like->relief.kind && b->relief.handed == like->relief.handed &&
+		    b->scale == like->scale && node_same(b->node, like->node))
+			return b;
+	return NULL;
+}
+
 static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, enum relief_kind kind,
 		  struct error *e)
 {
@@ -51,15 +63,20 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 	if (!bend)
 		return node_error(n, e, ENOMEM, "out of memory");
 	bend->scale = node_float(n, "scale", 1);
+	bend->node = texture;
 	bend->relief = (struct relief){kind, kind == RELIEF_HEIGHT ? height_at : normal_at, bend,
 				       node_bool(n, "handedness", false)};
+	bend->next = build->bends ? *build->bends : NULL;
+	const struct bend *same = find_bend(bend, bend->next);
 	const struct texture_build of_texture = bsdf_texture_build(build);
-	int code = texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
+	int code = same ? 0 : texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
+	if (!code && !same && build->bends)
+		*build->bends = bend;
 	if (!code)
 		code = bsdf_create(b, inner, build, e);
 	if (!code && b->relief)
 		code = node_error(n, e, ENOTSUP, "one bump or normal map in another is not supported");
-	b->relief = &bend->relief;
+	b->relief = same ? &same->relief : &bend->relief;
 	b->textured = true;
 	return code;
 }

@@ -24,9 +24,8 @@ void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
 int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n, struct error *e)
 {
 	if (!first && part->relief != b->relief)
-		return node_error(
-			n, e, ENOTSUP,
-			"its two BSDFs bend normals differently; one bump or normal map around both is supported");
+		return node_error(n, e, ENOTSUP,
+				  "its two BSDFs bend normals differently, and a surface has one normal");
 	b->relief = part->relief;
 	return 0;
 }

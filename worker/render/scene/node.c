@@ -61,6 +61,64 @@ const struct scene_node *node_ref(const struct scene_node *n, const char *name)
 	return p && p->value.type == VALUE_NODE ? p->value.as.node : NULL;
 }
 
+static bool same_objects(const struct scene_node *a, const struct scene_node *b, uint32_t *left);
+
+static bool same_values(const struct value *a, const struct value *b, uint32_t *left)
+{
+	if (a->type != b->type)
+		return false;
+	switch (a->type) {
+	case VALUE_BOOL:
+		return a->as.boolean == b->as.boolean;
+	case VALUE_INT:
+		return a->as.integer == b->as.integer;
+	case VALUE_FLOAT:
+		return a->as.number == b->as.number;
+	case VALUE_STRING:
+		return strcmp(a->as.string, b->as.string) == 0;
+	case VALUE_POINT:
+		return memcmp(&a->as.point, &b->as.point, sizeof a->as.point) == 0;
+	case VALUE_RGB:
+		return memcmp(a->as.rgb, b->as.rgb, sizeof a->as.rgb) == 0;
+	case VALUE_SPECTRUM:
+		return a->as.spectrum.count == b->as.spectrum.count &&
+		       memcmp(a->as.spectrum.value, b->as.spectrum.value, a->as.spectrum.count * sizeof(double)) == 0 &&
+		       (a->as.spectrum.count == 1 ||
+			memcmp(a->as.spectrum.nm, b->as.spectrum.nm, a->as.spectrum.count * sizeof(double)) == 0);
+	case VALUE_TRANSFORM:
+		return memcmp(&a->as.transform, &b->as.transform, sizeof a->as.transform) == 0;
+	case VALUE_NODE:
+		return same_objects(a->as.node, b->as.node, left);
+	}
+	return false;
+}
+
+/* left: so many more are looked at, because a few lines can hold an object in another over and over. */
+static bool same_objects(const struct scene_node *a, const struct scene_node *b, uint32_t *left)
+{
+	if (a == b)
+		return true;
+	if (*left == 0 || a->cls != b->cls || strcmp(a->type, b->type) != 0 || a->property_count != b->property_count ||
+	    a->child_count != b->child_count)
+		return false;
+	--*left;
+	for (uint32_t i = 0; i < a->property_count; i++) {
+		const struct property *other = node_find(b, a->properties[i].name);
+		if (!other || !same_values(&a->properties[i].value, &other->value, left))
+			return false;
+	}
+	for (uint32_t i = 0; i < a->child_count; i++)
+		if (!same_objects(a->children[i], b->children[i], left))
+			return false;
+	return true;
+}
+
+bool node_same(const struct scene_node *a, const struct scene_node *b)
+{
+	uint32_t left = NODE_SAME_MOST;
+	return same_objects(a, b, &left);
+}
+
 int node_error(const struct scene_node *n, struct error *e, int errno_value, const char *format, ...)
 {
 	char text[768];

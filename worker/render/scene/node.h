@@ -59,6 +59,11 @@ mat4 node_transform(const struct scene_node *n, const char *name); /* identity i
 const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index); /* NULL: none */
 const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* VALUE_NODE or NULL */
 
+/* Whether both say the same: type, parameters and what they hold, wherever they stand. Of more than NODE_SAME_MOST
+ * objects it is not found out: false. */
+enum { NODE_SAME_MOST = 1000 };
+bool node_same(const struct scene_node *a, const struct scene_node *b);
+
 /* "room.xml:3"; of a long file name the end. Returns text. */
 enum { NODE_PLACE_MAX = 64 };
 const char *node_place(const struct scene_node *n, char text[NODE_PLACE_MAX]);

@@ -75,7 +75,9 @@ static int create_bsdfs(struct builder *b)
 		w->parts[i].bsdf = k;
 		b->bsdf_nodes[k] = key;
 		struct attribute_table attributes = attributes_of(b, i);
+		struct bend *bends = NULL;
 		build.attributes = &attributes;
+		build.bends = &bends;
 		int rc = 0;
 		if (n)
 			rc = bsdf_create(&w->bsdfs[k], n, &build, b->e);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What `scale` makes of a normal map: against the same map without it. */
+/* What `scale` makes of a normal map: against the same map without it. And that parts of a material may bend normals if
+ * they do it alike. */
 #include "tests/support/pictures.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
@@ -43,8 +44,56 @@ static void test_scale(void **state)
 	pictures_fini(&p);
 }
 
+static struct scene_node *bent(struct arena *a, const char *map, const char *texture, const char *inner)
+{
+	struct scene_node *n = node_make(a, PLUGIN_BSDF, map);
+	node_add_child(a, n, node_make(a, PLUGIN_TEXTURE, texture));
+	node_add_child(a, n, node_make(a, PLUGIN_BSDF, inner));
+	return n;
+}
+
+static int blend_of(struct scene_node *first, struct scene_node *second, struct arena *a, struct bsdf *b,
+		    struct error *e)
+{
+	struct bend *bends = NULL;
+	const struct bsdf_build build = {.arena = a, .dialect_3 = true, .bends = &bends};
+	struct scene_node *n = node_make(a, PLUGIN_BSDF, "blendbsdf weight=0.3");
+	node_add_child(a, n, first);
+	node_add_child(a, n, second);
+	return bsdf_create(b, n, &build, e);
+}
+
+static void test_parts_that_bend_alike(void **state)
+{
+	(void)state;
+	static const char map[] = "bumpmap scale=0.5", tiles[] = "checkerboard color0=0.1";
+	static const struct {
+		const char *map, *texture;
+	} others[] = {{"bumpmap scale=0.6", tiles},
+		      {"normalmap scale=0.5", tiles},
+		      {map, "checkerboard color0=0.2"},
+		      {map, "checkerboard color0=0.1 color1=0.7"},
+		      {map, "gridtexture color0=0.1"}};
+	struct arena a = {0};
+	struct bsdf b;
+	struct error e;
+	struct relief_value v, one;
+	struct scene_node *first = bent(&a, map, tiles, "diffuse");
+	assert_int_equal(blend_of(first, bent(&a, map, tiles, "phong"), &a, &b, &e), 0);
+	b.relief->at(b.relief->data, 0.4, 0.55, &v);
+	assert_int_equal(blend_of(first, first, &a, &b, &e), 0);
+	b.relief->at(b.relief->data, 0.4, 0.55, &one);
+	assert_memory_equal(&v, &one, sizeof v);
+	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+		assert_true(blend_of(first, bent(&a, others[i].map, others[i].texture, "phong"), &a, &b, &e) < 0);
+		assert_non_null(strstr(e.text, "bend normals differently"));
+	}
+	assert_true(blend_of(first, node_make(&a, PLUGIN_BSDF, "phong"), &a, &b, &e) < 0);
+	arena_fini(&a);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_scale)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_scale), cmocka_unit_test(test_parts_that_bend_alike)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,7 +3,6 @@
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 
-#include <limits.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -541,21 +540,6 @@ static void test_asset_names_are_canonical(void **state)
 	scene_fini(&s);
 }
 
-/* Of a long name the end is told, which differs between the files of a scene. */
-static void test_places(void **state)
-{
-	(void)state;
-	char text[NODE_TITLE_MAX], place[NODE_PLACE_MAX];
-	struct scene_node n = {.cls = PLUGIN_SHAPE, .type = "sphere", .file = "room.xml", .line = 7};
-	assert_string_equal(node_place(&n, place), "room.xml:7");
-	assert_string_equal(node_title(&n, text), "the sphere in room.xml:7");
-	n.id = "lamp";
-	n.line = INT_MAX;
-	n.file = "0123456789/0123456789/0123456789/0123456789/lamps.xml";
-	assert_string_equal(node_title(&n, text),
-			    "`lamp` (...56789/0123456789/0123456789/0123456789/lamps.xml:2147483647)");
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -571,7 +555,6 @@ int main(void)
 		cmocka_unit_test(test_numbers_given_as_colours),
 		cmocka_unit_test(test_lenient_numbers),
 		cmocka_unit_test(test_animations),
-		cmocka_unit_test(test_places),
 		cmocka_unit_test(test_nesting_and_references),
 		cmocka_unit_test(test_forward_references_and_aliases),
 		cmocka_unit_test(test_parameters),
