@@ -158,13 +158,12 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 		text_copy(job->record.why, sizeof job->record.why, e.text);
 		return rc;
 	}
-	if (rc) {
-		end_later(jobs, &job->record);
-	} else {
+	if (!rc)
 		journal_settle(job->journal); /* the record contains more than what still waits for a flush */
-	}
-	journal_release(job->journal); /* with its last reference it frees its room, too */
+	journal_release(job->journal);	      /* with its last reference it frees its room, too */
 	job->journal = NULL;
+	if (rc && write_end(jobs, &job->record, false, &e))
+		end_later(jobs, &job->record);
 	return 0;
 }
 
