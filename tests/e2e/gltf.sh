@@ -42,8 +42,9 @@ for form in files.gltf one.glb; do
 done
 
 # what is wrong has its line; what is not supported is left out where that is asked for
-sed 's/"alphaMode": "BLEND"/"alphaMode": "BLEND", "extensions": {"KHR_materials_diffuse_transmission": {}}/' "$DIR/files.gltf" >"$DIR/thin.gltf"
-code 1 "$BIN/hslt-scene" check "$DIR/thin.gltf"
-grep -q 'thin.gltf:[1-9][0-9]*: .*KHR_materials_diffuse_transmission' "$DIR/out" || fail "$(cat "$DIR/out")"
-code 0 "$BIN/hslt-scene" check --lenient "$DIR/thin.gltf"
-grep -q 'KHR_materials_diffuse_transmission` is not supported and left out' "$DIR/out" || fail "$(cat "$DIR/out")"
+amber='"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"attenuationDistance": 1}'
+sed "s/\"alphaMode\": \"BLEND\"/\"alphaMode\": \"BLEND\", \"extensions\": {$amber}/" "$DIR/files.gltf" >"$DIR/amber.gltf"
+code 1 "$BIN/hslt-scene" check "$DIR/amber.gltf"
+grep -q 'amber.gltf:[1-9][0-9]*: .*`attenuationDistance` is not supported' "$DIR/out" || fail "$(cat "$DIR/out")"
+code 0 "$BIN/hslt-scene" check --lenient "$DIR/amber.gltf"
+grep -q 'attenuationDistance` is not supported and left out' "$DIR/out" || fail "$(cat "$DIR/out")"

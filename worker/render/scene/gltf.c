@@ -112,50 +112,21 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
 }
 
-/* Extensions that are known, whatever becomes of them. */
-static bool is_known(const char *extension)
-{
-	static const char *const known[] = {"EXT_mesh_gpu_instancing",
-					    "KHR_materials_anisotropy",
-					    "KHR_materials_iridescence",
-					    "KHR_materials_pbrSpecularGlossiness",
-					    "KHR_materials_sheen",
-					    "KHR_lights_punctual",
-					    "KHR_materials_clearcoat",
-					    "KHR_materials_dispersion",
-					    "KHR_materials_emissive_strength",
-					    "KHR_materials_ior",
-					    "KHR_materials_specular",
-					    "KHR_materials_transmission",
-					    "KHR_materials_volume",
-					    "KHR_mesh_quantization",
-					    "KHR_texture_transform"};
-	for (size_t i = 0; i < sizeof known / sizeof *known; i++)
-		if (strcmp(known[i], extension) == 0)
-			return true;
-	return false;
-}
-
 /* A note with the extensions that the file uses and the reader does not know: their effect is missing. */
 static void note_unknown(struct gltf *g)
 {
-	enum { ROOM = 512 };
 	const json_t *used = json_object_get(g->root, "extensionsUsed");
-	char *text = NULL;
+	char text[512];
 	size_t length = 0;
-	for (size_t i = 0; i < json_array_size(used) && !g->failed; i++) {
+	for (size_t i = 0; i < json_array_size(used); i++) {
 		const char *name = json_string_value(json_array_get(used, i));
-		if (!name || is_known(name))
+		if (!name || gltf_knows(name))
 			continue;
-		if (!text && !(text = arena_alloc(g->arena, ROOM, 1))) {
-			gltf_fail(g, NULL, ENOMEM, "out of memory");
-			return;
-		}
-		int n = snprintf(text + length, ROOM - length, "%s%.64s",
+		int n = snprintf(text + length, sizeof text - length, "%s%.64s",
 				 length ? ", " : "these extensions are not supported and ignored: ", name);
-		length = n < 0 || length + (size_t)n >= ROOM ? ROOM - 1 : length + (size_t)n;
+		length = n < 0 || length + (size_t)n >= sizeof text ? sizeof text - 1 : length + (size_t)n;
 	}
-	if (text)
+	if (length)
 		gltf_note(g, text);
 }
 
@@ -173,7 +144,7 @@ static void check_file(struct gltf *g)
 	const json_t *required = json_object_get(g->root, "extensionsRequired");
 	for (size_t i = 0; i < json_array_size(required); i++) {
 		const char *name = json_string_value(json_array_get(required, i));
-		if (!name || !is_known(name))
+		if (!name || !gltf_knows(name))
 			gltf_fail(g, NULL, ENOTSUP, "it requires the extension %.64s, which is not supported",
 				  name ? name : "(no text)");
 	}

@@ -5,14 +5,15 @@
  * which ends at a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses differ by less
  * than a factor of ten.
  *
- * Details that `principled` does not have are left out with a note: what a coat, a sheen or a reflection varies by.
- * What changes the picture as a whole becomes a property that its table does not know: refused with its name, or left
- * out with --lenient.
+ * Details that `principled` does not have are left out with a note: what a coat, a sheen or a reflection varies by. So
+ * are extensions that are not known, as the format wants it of those that a file does not require. What fills a body
+ * becomes a property that the table does not know: refused with its name, or left out with --lenient.
  */
 #include "worker/render/scene/gltf_layers.h"
 #include "worker/render/scene/gltf_texture.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* Members of an extension without counterpart, as properties that no table has. */
@@ -121,29 +122,29 @@ static void put_transmission(struct gltf *g, struct xml_element *el, const struc
 	}
 }
 
-void gltf_put_foreign(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+static bool is_listed(const struct gltf *g, const char *extension)
 {
-	static const char *const known[] = {"KHR_materials_anisotropy",
-					    "KHR_materials_clearcoat",
-					    "KHR_materials_dispersion",
-					    "KHR_materials_emissive_strength",
-					    "KHR_materials_ior",
-					    "KHR_materials_iridescence",
-					    "KHR_materials_pbrSpecularGlossiness",
-					    "KHR_materials_sheen",
-					    "KHR_materials_specular",
-					    "KHR_materials_transmission",
-					    "KHR_materials_volume",
-					    NULL};
-	const json_t *all = json_object_get(at->json, "extensions");
-	for (void *i = json_object_iter((json_t *)(uintptr_t)all); i;
-	     i = json_object_iter_next((json_t *)(uintptr_t)all, i)) {
+	const json_t *used = json_object_get(g->root, "extensionsUsed");
+	for (size_t i = 0; i < json_array_size(used); i++) {
+		const char *name = json_string_value(json_array_get(used, i));
+		if (name && strcmp(name, extension) == 0)
+			return true;
+	}
+	return false;
+}
+
+void gltf_note_foreign(struct gltf *g, const struct gltf_at *at)
+{
+	json_t *all = json_object_get(at->json, "extensions");
+	for (void *i = json_object_iter(all); i; i = json_object_iter_next(all, i)) {
 		const char *name = json_object_iter_key(i);
-		size_t k = 0;
-		while (known[k] && strcmp(known[k], name) != 0)
-			k++;
-		if (!known[k])
-			gltf_put_text(g, el, at, name, ELEMENT_UNSUPPORTED);
+		char text[160];
+		if (gltf_knows(name) || is_listed(g, name))
+			continue;
+		snprintf(text, sizeof text,
+			 "the extension %.64s of a material is not supported and ignored; `extensionsUsed` lacks it",
+			 name);
+		gltf_note(g, text);
 	}
 }
 
@@ -157,5 +158,5 @@ void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_a
 	put_index(g, el, at);
 	put_coat(g, el, at);
 	put_transmission(g, el, at);
-	gltf_put_foreign(g, el, at);
+	gltf_note_foreign(g, at);
 }

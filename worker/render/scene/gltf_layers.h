@@ -12,7 +12,7 @@ void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_a
 /* Members of an extension without counterpart, up to NULL, as properties that no table has. */
 void gltf_put_unsupported(struct gltf *g, struct xml_element *el, const struct gltf_at *material,
 			  const json_t *extension, const char *const *members);
-/* Unknown extensions, which would change the image, likewise. */
-void gltf_put_foreign(struct gltf *g, struct xml_element *el, const struct gltf_at *material);
+/* A note of each unknown extension that the file does not list: gltf.c tells of those that it does. */
+void gltf_note_foreign(struct gltf *g, const struct gltf_at *material);
 
 #endif

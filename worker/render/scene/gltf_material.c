@@ -147,7 +147,7 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 	}
 	gltf_put_unsupported(g, bsdf, at, gltf_extension(g, at, at->json, "KHR_materials_volume"),
 			     (const char *const[]){"attenuationDistance", NULL});
-	gltf_put_foreign(g, bsdf, at);
+	gltf_note_foreign(g, at);
 	if (!g->failed)
 		put_id(g, parent == g->scene ? bsdf : parent, at, "bsdf", GLTF_NO_COLOURS);
 	return true;

@@ -244,8 +244,27 @@ void gltf_note(struct gltf *g, const char *text)
 	for (uint32_t i = 0; i < g->tree->note_count; i++)
 		if (strcmp(g->tree->notes[i], text) == 0)
 			return;
-	if (!g->failed && g->tree->note_count < XML_NOTES_MAX)
-		g->tree->notes[g->tree->note_count++] = text;
+	if (g->failed || g->tree->note_count >= XML_NOTES_MAX)
+		return;
+	const char *copy = arena_strdup(g->arena, text);
+	if (copy)
+		g->tree->notes[g->tree->note_count++] = copy;
+	else
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+}
+
+bool gltf_knows(const char *extension)
+{
+	static const char *const known[] = {
+		"EXT_mesh_gpu_instancing", "KHR_lights_punctual",	"KHR_materials_anisotropy",
+		"KHR_materials_clearcoat", "KHR_materials_dispersion",	"KHR_materials_emissive_strength",
+		"KHR_materials_ior",	   "KHR_materials_iridescence", "KHR_materials_pbrSpecularGlossiness",
+		"KHR_materials_sheen",	   "KHR_materials_specular",	"KHR_materials_transmission",
+		"KHR_materials_volume",	   "KHR_mesh_quantization",	"KHR_texture_transform"};
+	for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+		if (strcmp(known[i], extension) == 0)
+			return true;
+	return false;
 }
 
 void gltf_grow_box(struct gltf *g, vec3 p)
