@@ -162,6 +162,7 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 		journal_settle(job->journal); /* the record contains more than what still waits for a flush */
 	journal_release(job->journal);	      /* with its last reference it frees its room, too */
 	job->journal = NULL;
+	/* The journal that write_end deleted took up its room until now. */
 	if (rc && write_end(jobs, &job->record, false, &e))
 		end_later(jobs, &job->record);
 	return 0;
