@@ -54,10 +54,18 @@ spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec
 	return b->ops->eval_halfvec ? b->ops->eval_halfvec(b, p, wo, wi) : halfvec_product(b, p, wo, wi);
 }
 
+/* A straight lobe and a bent one go to the same side, and neither answers for the other. */
+static bool may_have(const struct bsdf *b, unsigned mode)
+{
+	if (mode & BSDF_STRAIGHT)
+		return b->modes & BSDF_STRAIGHT;
+	return !(mode & BSDF_TRANSMIT) || !b->only_straight;
+}
+
 spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			 double *chance)
 {
-	if (!b->ops->eval_delta || (mode & BSDF_STRAIGHT & ~b->modes))
+	if (!b->ops->eval_delta || !may_have(b, mode))
 		return spectrum_of(0);
 	return b->ops->eval_delta(b, p, wo, mode, wi, chance);
 }

@@ -34,7 +34,7 @@ spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, v
 			     double *chance)
 {
 	const struct filter *f = b->data;
-	if (!(mode & BSDF_STRAIGHT) || !straight_direction(wo, wi))
+	if (!(mode & BSDF_TRANSMIT) || !straight_direction(wo, wi))
 		return spectrum_of(0);
 	*chance = 1;
 	return spectrum_scale(f->share, texture_eval(&f->transmittance, &p->where, p->w));

@@ -43,8 +43,7 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	struct fresnel f = sheet(t, wo);
 	bool reflect = mode & BSDF_REFLECT;
 	double share = reflect ? f.reflected : f.transmitted;
-	if (!(mode & (BSDF_REFLECT | BSDF_STRAIGHT)) ||
-	    !(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
+	if (!(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
 		return spectrum_of(0);
 	*wi = (vec3){-wo.x, -wo.y, reflect ? wo.z : -wo.z};
 	*chance = fresnel_chance(&f, reflect);
