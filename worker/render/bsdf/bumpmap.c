@@ -53,32 +53,49 @@ static const struct bend *find_bend(const struct bend *like, const struct bend *
 	return NULL;
 }
 
+/* That one, or a new one. */
+static int bend_of(const struct scene_node *n, const struct scene_node *texture, enum relief_kind kind,
+		   const struct bsdf_build *build, const struct bend **out, struct error *e)
+{
+	const struct bend wanted = {.relief = {.kind = kind,
+					       .at = kind == RELIEF_HEIGHT ? height_at : normal_at,
+					       .handed = node_bool(n, "handedness", false)},
+				    .node = texture,
+				    .scale = node_float(n, "scale", 1),
+				    .next = build->bends ? *build->bends : NULL};
+	*out = find_bend(&wanted, wanted.next);
+	if (*out)
+		return 0;
+	struct bend *bend = arena_alloc(build->arena, 1, sizeof *bend);
+	if (!bend)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*bend = wanted;
+	bend->relief.data = bend;
+	const struct texture_build of_texture = bsdf_texture_build(build);
+	int code = texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
+	if (!code && build->bends)
+		*build->bends = bend;
+	*out = bend;
+	return code;
+}
+
 static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, enum relief_kind kind,
 		  struct error *e)
 {
 	const struct scene_node *inner = node_child(n, PLUGIN_BSDF, 0), *texture = node_child(n, PLUGIN_TEXTURE, 0);
+	const struct bend *bend;
 	if (!inner || !texture || node_child(n, PLUGIN_BSDF, 1))
 		return node_error(n, e, EINVAL, "needs a texture and exactly one BSDF inside");
-	struct bend *bend = arena_alloc(build->arena, 1, sizeof *bend);
-	if (!bend)
-		return node_error(n, e, ENOMEM, "out of memory");
-	bend->scale = node_float(n, "scale", 1);
-	bend->node = texture;
-	bend->relief = (struct relief){kind, kind == RELIEF_HEIGHT ? height_at : normal_at, bend,
-				       node_bool(n, "handedness", false)};
-	bend->next = build->bends ? *build->bends : NULL;
-	const struct bend *same = find_bend(bend, bend->next);
-	const struct texture_build of_texture = bsdf_texture_build(build);
-	int code = same ? 0 : texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
-	if (!code && !same && build->bends)
-		*build->bends = bend;
+	int code = bend_of(n, texture, kind, build, &bend, e);
 	if (!code)
 		code = bsdf_create(b, inner, build, e);
 	if (!code && b->relief)
 		code = node_error(n, e, ENOTSUP, "one bump or normal map in another is not supported");
-	b->relief = same ? &same->relief : &bend->relief;
+	if (code)
+		return code;
+	b->relief = &bend->relief;
 	b->textured = true;
-	return code;
+	return 0;
 }
 
 static int bumpmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
