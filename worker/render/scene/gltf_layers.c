@@ -122,10 +122,13 @@ static void put_transmission(struct gltf *g, struct xml_element *el, const struc
 	}
 }
 
+/* Only so many entries are looked at for each material; one further behind is told of twice. */
+enum { LISTED_MOST = 64 };
+
 static bool is_listed(const struct gltf *g, const char *extension)
 {
 	const json_t *used = json_object_get(g->root, "extensionsUsed");
-	for (size_t i = 0; i < json_array_size(used); i++) {
+	for (size_t i = 0; i < json_array_size(used) && i < LISTED_MOST; i++) {
 		const char *name = json_string_value(json_array_get(used, i));
 		if (name && strcmp(name, extension) == 0)
 			return true;
