@@ -106,26 +106,55 @@ bool process_is_running(const struct process *p)
 	return waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
 }
 
+/* A worker's rendering is done by a child of the process that was started (worker/daemon/supervise.h). */
+static size_t with_children(pid_t pid, pid_t all[16])
+{
+	char path[64];
+	size_t count = 1;
+	snprintf(path, sizeof path, "/proc/%d/task/%d/children", (int)pid, (int)pid);
+	FILE *f = fopen(path, "r");
+	if (!f) {
+		perror("bench: list of children");
+		exit(1);
+	}
+	all[0] = pid;
+	for (int child; count < 16 && fscanf(f, "%d", &child) == 1;)
+		all[count++] = child;
+	fclose(f);
+	return count;
+}
+
 double process_cpu_seconds(const struct process *p)
 {
-	clockid_t clock;
-	struct timespec t = {0, 0};
-	if (clock_getcpuclockid(p->pid, &clock) == 0)
-		clock_gettime(clock, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+	pid_t all[16];
+	double sum = 0;
+	for (size_t i = 0, n = with_children(p->pid, all); i < n; i++) {
+		clockid_t clock;
+		struct timespec t = {0, 0};
+		if (clock_getcpuclockid(all[i], &clock) == 0)
+			clock_gettime(clock, &t);
+		sum += (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+	}
+	return sum;
 }
 
 double process_peak_bytes(const struct process *p, double *now)
 {
-	char path[64], line[256];
-	snprintf(path, sizeof path, "/proc/%d/status", (int)p->pid);
-	FILE *f = fopen(path, "r");
+	pid_t all[16];
 	double peak = 0, resident = 0;
-	while (f && fgets(line, sizeof line, f))
-		if (sscanf(line, "VmHWM: %lf", &peak) != 1)
-			sscanf(line, "VmRSS: %lf", &resident);
-	if (f)
-		fclose(f);
+	for (size_t i = 0, n = with_children(p->pid, all); i < n; i++) {
+		char path[64], line[256];
+		double kilobytes;
+		snprintf(path, sizeof path, "/proc/%d/status", (int)all[i]);
+		FILE *f = fopen(path, "r");
+		while (f && fgets(line, sizeof line, f))
+			if (sscanf(line, "VmHWM: %lf", &kilobytes) == 1)
+				peak += kilobytes;
+			else if (sscanf(line, "VmRSS: %lf", &kilobytes) == 1)
+				resident += kilobytes;
+		if (f)
+			fclose(f);
+	}
 	if (now)
 		*now = 1024 * resident;
 	return 1024 * peak;

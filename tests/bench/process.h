@@ -25,7 +25,7 @@ __attribute__((format(printf, 4, 5))) void process_start(struct process *p, cons
 void process_wait(struct process *p);
 void process_stop(struct process *p); /* SIGTERM, waits */
 bool process_is_running(const struct process *p);
-/* Of a running one. */
+/* Of a running one and its children. */
 double process_cpu_seconds(const struct process *p);
 double process_peak_bytes(const struct process *p, double *now); /* resident; now may be NULL */
 
