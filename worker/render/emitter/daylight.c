@@ -6,45 +6,49 @@
 #include <stdbool.h>
 
 #define PI 3.14159265358979323846
-#define LUMENS_PER_WATT 683.0
 
-/* Table A.2: coefficients A to E as slope and offset in the turbidity, of Y, x and y. */
-static const double distribution[3][5][2] = {
-	{{0.1787, -1.4630}, {-0.3554, 0.4275}, {-0.0227, 5.3251}, {0.1206, -2.5771}, {-0.0670, 0.3703}},
-	{{-0.0193, -0.2592}, {-0.0665, 0.0008}, {-0.0004, 0.2125}, {-0.0641, -0.8989}, {-0.0033, 0.0452}},
-	{{-0.0167, -0.2608}, {-0.0950, 0.0092}, {-0.0079, 0.2102}, {-0.0441, -1.6537}, {-0.0109, 0.0529}},
+/* By albedo 0 and 1, turbidity 1 to 10 and control point: A to G, I, H, and the mean radiance. */
+enum { TURBIDITIES = 10, POINTS = 6, NUMBERS = 10 };
+static const double table[3][2][TURBIDITIES][POINTS][NUMBERS] = {
+#include "worker/render/emitter/data/hosek_wilkie.inc"
 };
 
-/* Zenith's chromaticities: rows T^2, T, 1; columns sun^3, sun^2, sun, 1. */
-static const double zenith_x[3][4] = {
-	{0.00166, -0.00375, 0.00209, 0}, {-0.02903, 0.06377, -0.03202, 0.00394}, {0.11693, -0.21196, 0.06052, 0.25886}};
-static const double zenith_y[3][4] = {
-	{0.00275, -0.00610, 0.00317, 0}, {-0.04214, 0.08970, -0.04153, 0.00516}, {0.15346, -0.26756, 0.06670, 0.26688}};
-
-static double chromaticity(const double m[3][4], double t, double s)
+/* Weights of the control points: a Bezier curve of degree 5 in the cube root of the elevation over a right angle. */
+static void point_weights(double sun, double weight[POINTS])
 {
-	double sum = 0;
-	for (int row = 0; row < 3; row++)
-		sum = sum * t + ((m[row][0] * s + m[row][1]) * s + m[row][2]) * s + m[row][3];
-	return sum;
+	static const double binomial[POINTS] = {1, 5, 10, 10, 5, 1};
+	double t = cbrt(fmin(fmax(1 - 2 * sun / PI, 0), 1));
+	for (int i = 0; i < POINTS; i++)
+		weight[i] = binomial[i] * pow(t, i) * pow(1 - t, POINTS - 1 - i);
 }
 
-static double perez(const double c[5], double angle, double gamma)
+struct daylight daylight_of(double turbidity, const double albedo[3], double sun)
 {
-	return (1 + c[0] * exp(c[1] / cos(angle))) * (1 + c[2] * exp(c[3] * gamma) + c[4] * cos(gamma) * cos(gamma));
-}
-
-struct daylight daylight_of(double turbidity, double sun)
-{
-	struct daylight d = {.sun = sun};
+	struct daylight d = {.mean = {0}};
+	double weight[POINTS], above = fmin(fmax(turbidity - 1, 0), TURBIDITIES - 1);
+	int low = (int)fmin(above, TURBIDITIES - 2);
+	point_weights(sun, weight);
 	for (int k = 0; k < 3; k++)
-		for (int c = 0; c < 5; c++)
-			d.perez[k][c] = distribution[k][c][0] * turbidity + distribution[k][c][1];
-	double chi = (4.0 / 9 - turbidity / 120) * (PI - 2 * sun);
-	d.zenith[0] = fmax((4.0453 * turbidity - 4.9710) * tan(chi) - 0.2155 * turbidity + 2.4192, 0);
-	d.zenith[1] = chromaticity(zenith_x, turbidity, sun);
-	d.zenith[2] = chromaticity(zenith_y, turbidity, sun);
+		for (int corner = 0; corner < 4; corner++) {
+			int ground = corner & 1, high = corner >> 1;
+			double share = (ground ? albedo[k] : 1 - albedo[k]) * (high ? above - low : low + 1 - above);
+			for (int i = 0; i < POINTS; i++) {
+				const double *number = table[k][ground][low + high][i];
+				for (int c = 0; c < 9; c++)
+					d.shape[k][c] += share * weight[i] * number[c];
+				d.mean[k] += share * weight[i] * number[9];
+			}
+		}
 	return d;
+}
+
+/* Equation (8) with chi of equation (9). */
+static double radiance_of(const double s[9], double angle, double gamma)
+{
+	double up = cos(angle), toward = cos(gamma);
+	double chi = (1 + toward * toward) / pow(1 + s[8] * s[8] - 2 * s[8] * toward, 1.5);
+	return (1 + s[0] * exp(s[1] / (up + 0.01))) *
+	       (s[2] + s[3] * exp(s[4] * gamma) + s[5] * toward * toward + s[6] * chi + s[7] * sqrt(fmax(up, 0)));
 }
 
 static void rgb_from_xyz(const double xyz[3], double rgb[3])
@@ -58,34 +62,53 @@ static void rgb_from_xyz(const double xyz[3], double rgb[3])
 
 void daylight_sky(const struct daylight *d, double angle, double gamma, double rgb[3])
 {
-	double v[3];
-	/* The horizon itself gets the limit from above. */
-	double low = fmin(angle, 0.5 * PI - 1e-3);
-	for (int k = 0; k < 3; k++)
-		v[k] = d->zenith[k] * perez(d->perez[k], low, gamma) / perez(d->perez[k], 0, d->sun);
-	double luminance = angle < 0.5 * PI ? fmax(v[0], 0) * 1000 / (LUMENS_PER_WATT * CIE_Y_SUM) : 0;
-	const double xyz[3] = {luminance * v[1] / v[2], luminance, luminance * (1 - v[1] - v[2]) / v[2]};
+	double xyz[3] = {0, 0, 0};
+	for (int k = 0; k < 3 && angle < 0.5 * PI; k++)
+		xyz[k] = fmax(d->mean[k] * radiance_of(d->shape[k], angle, gamma), 0) / CIE_Y_SUM;
 	rgb_from_xyz(xyz, rgb);
 }
 
-/* W / (m^2 sr nm); nm in nanometres. */
-static double planck(double nm, double kelvin)
+/* Preetham's table 2: the sun outside the atmosphere, W / (m^2 sr nm), and absorption by ozone and water vapour, 1 /
+ * cm, from 380 nm by 10. Other gases absorb next to 760 nm only. */
+enum { TABLE_NM = 380, TABLE_STEP = 10, TABLE_COUNT = 38 };
+static const double sun_outside[TABLE_COUNT] = {16559.0, 16233.7, 21127.5, 25888.2, 25829.1, 24232.3, 26760.5, 29658.3,
+						30545.4, 30057.5, 30663.7, 28830.4, 28712.1, 27825.0, 27100.6, 27233.6,
+						26361.3, 25503.8, 25060.2, 25311.6, 25355.9, 25134.2, 24631.5, 24173.2,
+						23685.3, 23212.1, 22827.7, 22339.8, 21970.2, 21526.7, 21097.9, 20728.3,
+						20240.4, 19870.8, 19427.2, 19072.4, 18628.9, 18259.2};
+static const double ozone[TABLE_COUNT] = {0,	 0,	0,     0,     0,     0,	    0,	   0.003, 0.006, 0.009,
+					  0.014, 0.021, 0.03,  0.04,  0.048, 0.063, 0.075, 0.085, 0.103, 0.12,
+					  0.12,	 0.115, 0.125, 0.12,  0.105, 0.09,  0.079, 0.067, 0.057, 0.048,
+					  0.036, 0.028, 0.023, 0.018, 0.014, 0.011, 0.01,  0.009};
+static const double vapour[TABLE_COUNT] = {[31] = 0.016, 0.024, 0.0125, 1, 0.87, 0.061, 0.001};
+
+/* Beyond the table its last value. */
+static double at_wavelength(const double table_of[TABLE_COUNT], double nm)
 {
-	const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23, l = nm * 1e-9;
-	return 2e-9 * h * c * c / (l * l * l * l * l * expm1(h * c / (l * k * kelvin)));
+	double x = fmin(fmax((nm - TABLE_NM) / TABLE_STEP, 0), TABLE_COUNT - 1);
+	int low = (int)fmin(x, TABLE_COUNT - 2);
+	return table_of[low] + (x - low) * (table_of[low + 1] - table_of[low]);
+}
+
+/* What an amount x of an absorber lets through. */
+static double through_vapour(double x)
+{
+	return exp(-0.2385 * x / pow(1 + 20.07 * x, 0.45));
 }
 
 void daylight_sun(double turbidity, double sun, double rgb[3])
 {
 	double xyz[3] = {0, 0, 0}, degrees = sun * 180 / PI;
-	/* Relative optical mass: Kasten 1966. Aerosols: Angstrom's law. */
+	/* Relative optical mass: Kasten 1966. Aerosols: Angstrom's law. 0.35 cm of ozone, 2 cm of water. */
 	double mass = 1 / (cos(sun) + 0.15 * pow(93.885 - degrees, -1.253)),
 	       beta = fmax(0.04608 * turbidity - 0.04586, 0);
 	for (int i = 0; i < CIE_COUNT; i++) {
 		double nm = CIE_FIRST_NM + i, l = nm / 1000;
-		double through = exp(-mass * (0.008735 * pow(l, -4.08) + beta * pow(l, -1.3)));
+		double through = exp(-mass * (0.008735 * pow(l, -4.08) + beta * pow(l, -1.3) +
+					      0.35 * at_wavelength(ozone, nm))) *
+				 through_vapour(2 * mass * at_wavelength(vapour, nm));
 		for (int k = 0; k < 3; k++)
-			xyz[k] += cie_observer[i][k] * planck(nm, 5778) * through / CIE_Y_SUM;
+			xyz[k] += cie_observer[i][k] * at_wavelength(sun_outside, nm) * through / CIE_Y_SUM;
 	}
 	rgb_from_xyz(xyz, rgb);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Daylight after Preetham, Shirley and Smits 1999, "A Practical Analytic Model for Daylight". Angles in radians, from
+ * Daylight: the sky of Hosek and Wilkie 2012, "An Analytic Model for Full Spectral Sky-Dome Radiance", and the sun of
+ * Preetham, Shirley and Smits 1999, "A Practical Analytic Model for Daylight", appendix A.1. Angles in radians, from
  * the zenith; colours are linear Rec. 709 in W / (m^2 sr nm), like Mitsuba's spectra: CIE Y = 1 is 1 W / (m^2 sr nm) at
  * all wavelengths. Pure; any thread.
  */
@@ -9,18 +10,22 @@
 
 #include "worker/render/math/vec3.h"
 
-#define DAYLIGHT_SUN_RADIUS 0.0046526 /* angular radius of the sun's disk seen from the earth */
+#define DAYLIGHT_SUN_RADIUS                                                                       \
+	0.0046757 /* angular radius of the sun's disk seen from the earth: half of 0.5358 degrees \
+		   */
 
+/* Of X, Y and Z. */
 struct daylight {
-	double sun;		       /* the sun's angle */
-	double perez[3][5], zenith[3]; /* of Y (kcd / m^2), x, y */
+	double shape[3][9]; /* A to G, I and H of equations (8) and (9) */
+	double mean[3];	    /* radiance, W / (m^2 sr) */
 };
 
-/* turbidity 1.7 (clear) to 10 (haze); sun below pi/2. */
-struct daylight daylight_of(double turbidity, double sun);
+/* turbidity 1 (clear) to 10 (haze); albedo of the ground for X, Y and Z, 0 to 1; sun from 0 to pi/2. */
+struct daylight daylight_of(double turbidity, const double albedo[3], double sun);
 /* The sky at `angle` from the zenith and `gamma` from the sun; not negative. Black below the horizon. */
 void daylight_sky(const struct daylight *d, double angle, double gamma, double rgb[3]);
-/* The sun's disk through the air: Planck's law at 5778 K, Rayleigh scattering and aerosols (no ozone). */
+/* The sun's disk through the air, which scatters (Rayleigh, aerosols) and absorbs (ozone, other gases, water vapour).
+ */
 void daylight_sun(double turbidity, double sun, double rgb[3]);
 
 /* Where and when; time in hours by the clock of the zone, east and north positive. */

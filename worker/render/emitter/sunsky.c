@@ -7,6 +7,7 @@
  */
 #include "worker/render/emitter/daylight.h"
 #include "worker/render/emitter/envmap.h"
+#include "worker/render/math/cie.h"
 
 #define PI 3.14159265358979323846
 #define RADIANS (PI / 180)
@@ -140,6 +141,30 @@ static int read_sun(const struct scene_node *n, const vec3 axis[3], vec3 *toward
 	return 0;
 }
 
+/* Of the ground, seen by X, Y and Z. */
+static int read_albedo(const struct scene_node *n, const struct emitter_build *build, double albedo[3], struct error *e)
+{
+	const struct texture_build inner = {build->assets, build->arena, build->dialect_3, NULL};
+	struct texture t;
+	int code = texture_from_node(&t, n, "albedo", build->dialect_3 ? 0.3 : 0.2, COLOR_REFLECTANCE, &inner, e);
+	if (code)
+		return code;
+	if (!texture_is_constant(&t))
+		return node_error(n, e, ENOTSUP, "an albedo that depends on the place is not supported");
+	double whole[3] = {0, 0, 0}, reflected[3] = {0, 0, 0};
+	for (int i = 0; i < CIE_COUNT; i++) {
+		double nm = CIE_FIRST_NM + i,
+		       a = color_eval(&t.color, &(struct wavelengths){.nm = {nm, nm, nm, nm}}).v[0];
+		for (int k = 0; k < 3; k++) {
+			whole[k] += cie_observer[i][k];
+			reflected[k] += a * cie_observer[i][k];
+		}
+	}
+	for (int k = 0; k < 3; k++)
+		albedo[k] = reflected[k] / whole[k];
+	return 0;
+}
+
 static int bake_environment(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 			    struct parts parts, struct error *e)
 {
@@ -160,7 +185,10 @@ static int bake_environment(struct emitter *em, const struct scene_node *n, cons
 	double sun = angle_between(b.towards, (vec3){0, 1, 0});
 	if (!(sun < 0.5 * PI - 1e-3))
 		return node_error(n, e, EINVAL, "the sun is not above the horizon (%.1f degrees)", 90 - sun / RADIANS);
-	b.sky = daylight_of(turbidity, sun);
+	double albedo[3];
+	if ((code = read_albedo(n, build, albedo, e)))
+		return code;
+	b.sky = daylight_of(turbidity, albedo, sun);
 	b.radius = DAYLIGHT_SUN_RADIUS * node_float(n, "sun_radius_scale", 1);
 	b.radius = node_float(n, "sun_aperture", 2 * b.radius / RADIANS) * RADIANS / 2;
 	b.image.pixels = arena_alloc(build->arena, (size_t)b.image.width * b.image.height, 3 * sizeof *b.image.pixels);
@@ -205,7 +233,7 @@ static int sunsky_create(struct emitter *em, const struct scene_node *n, const s
 	}
 
 static const struct param params[] = {
-	NUMBER("turbidity", 1.7, 10),
+	NUMBER("turbidity", 1, 10),
 	NUMBER("scale", 0, PARAM_LIGHT_MAX),
 	NUMBER("sky_scale", 0, 1e9),
 	NUMBER("sun_scale", 0, 1e9),
@@ -224,7 +252,7 @@ static const struct param params[] = {
 	NUMBER("stretch", 1, 2),
 	{.name = "extend", .types = VALUE_BOOL},
 	{.name = "to_world", .types = VALUE_TRANSFORM},
-	{.name = "albedo", .types = VALUE_TEXTURE, .status = PARAM_DIFFERS}, /* Preetham's model has one ground */
+	{.name = "albedo", .types = VALUE_TEXTURE, .max = 1},
 	{.name = "resolution", .types = VALUE_INT, .status = PARAM_IGNORED},
 	{.name = "complex_sun", .types = VALUE_BOOL, .status = PARAM_IGNORED},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},

@@ -65,12 +65,12 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	return rc ? rc : on_depth(r, n, e);
 }
 
-static int on_emitter(struct report *r, const struct scene_node *n, struct error *e)
+static int on_emitter(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
 {
-	if (strcmp(n->type, "sky") != 0 && strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0)
+	if (!dialect_3 || (strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0))
 		return 0;
 	return remark(r, n, e,
-		      "daylight after Preetham (1999), which differs a little from Mitsuba's after Hosek and Wilkie");
+		      "the sun is that of Mitsuba 0.6 (Preetham 1999): Mitsuba 3's differs a little in colour");
 }
 
 /* Mitsuba has two tables for most metals. Of these three it has one, which ours is. */
@@ -91,7 +91,8 @@ int remarks_on_object(const struct scene_node *n, struct report *r, struct error
 	return n->cls == PLUGIN_BSDF ? on_metal(r, n, e) : 0;
 }
 
-int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e)
+int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,
+		     struct error *e)
 {
 	const struct scene_node *camera = NULL;
 	bool light = false;
@@ -104,7 +105,7 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, st
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
 		else if (n->cls == PLUGIN_EMITTER)
-			rc = on_emitter(r, n, e);
+			rc = on_emitter(r, n, dialect_3, e);
 		else if (n->cls == PLUGIN_SENSOR && camera)
 			rc = remark(r, n, e, "sensor %u%s%.64s%s; without --sensor the first, in %s, is rendered",
 				    ++sensors, n->id ? " (\"" : "", n->id ? n->id : "", n->id ? "\")" : "",

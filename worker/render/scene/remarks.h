@@ -11,6 +11,7 @@
  * -ENOMEM. */
 int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e);
 /* About the scene, whose top-level objects these are. Likewise. */
-int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, struct report *r, struct error *e);
+int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,
+		     struct error *e);
 
 #endif

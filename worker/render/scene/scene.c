@@ -513,7 +513,7 @@ static int make_scene(struct maker *m)
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
 		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
 	if (!r)
-		r = remarks_on_scene(m->scene->objects, m->scene->object_count, &m->report, m->error);
+		r = remarks_on_scene(objects, s->object_count, s->dialect_3, &m->report, m->error);
 	return r ? r : list_assets(m);
 }
 

@@ -70,7 +70,7 @@ static void test_how_bright_it_is(void **state)
 	double direct = luminance(rgb) * lux * solid;
 	/* A clear noon has 70 to 110 klx from the sun, and 10 to 25 from the sky, which the model makes brighter. */
 	assert_true(direct > 7e4 && direct < 1.1e5);
-	struct daylight d = daylight_of(3, sun);
+	struct daylight d = daylight_of(3, (const double[3]){0.2, 0.2, 0.2}, sun);
 	double sky = 0;
 	enum { N = 200 };
 	for (int i = 0; i < N; i++)
@@ -82,18 +82,60 @@ static void test_how_bright_it_is(void **state)
 		}
 	print_message("sun %.0f lx, sky %.0f lx\n", direct, sky);
 	assert_true(sky > 8e3 && sky < 4e4);
-	/* Blue far from the sun; the zenith is what the model says it is; below the horizon nothing. */
+	/* Blue far from the sun; below the horizon nothing. */
 	daylight_sky(&d, 60 * PI / 180, 90 * PI / 180, rgb);
 	assert_true(rgb[2] > 1.3 * rgb[0]);
-	daylight_sky(&d, 0, sun, rgb);
-	double chi = (4.0 / 9 - 3.0 / 120) * (PI - 2 * sun),
-	       zenith = (4.0453 * 3 - 4.9710) * tan(chi) - 0.2155 * 3 + 2.4192;
-	assert_true(fabs(luminance(rgb) * lux / 1000 / zenith - 1) < 1e-3);
 	daylight_sky(&d, 1.6, 1, rgb);
 	assert_true(rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0);
 	/* A red sun low in the haze. */
 	daylight_sun(8, 85 * PI / 180, rgb);
 	assert_true(rgb[0] > 3 * rgb[2]);
+}
+
+/* X, Y and Z, W / (m^2 sr), as the model's authors' own program computes them. */
+static void test_the_model(void **state)
+{
+	(void)state;
+	static const struct {
+		double turbidity, albedo, sun, angle, gamma, xyz[3]; /* degrees */
+	} known[] = {
+		{1, 0, 89.98, 0, 89.98, {0.460808527, 0.472004726, 0.60890716}},
+		{1, 0, 89.98, 30, 20, {0.849739368, 0.876193566, 1.03511884}},
+		{1, 0, 89.98, 75, 110, {1.73336382, 1.84602352, 1.45589929}},
+		{1, 0, 89.98, 89.5, 0.48, {4.87413801, 4.76328722, 1.85417168}},
+		{2.3, 0.2, 80, 0, 80, {1.62348512, 1.68961492, 3.25163517}},
+		{2.3, 0.2, 80, 30, 20, {3.76443276, 3.9095927, 5.58282788}},
+		{2.3, 0.2, 80, 75, 110, {5.92550099, 6.57640816, 8.96693448}},
+		{2.3, 0.2, 80, 89.5, 9.5, {37.3000137, 38.9256923, 20.9755741}},
+		{3, 0.3, 55, 0, 55, {3.53008302, 3.63098306, 7.54572657}},
+		{3, 0.3, 55, 30, 20, {8.05935723, 8.44116268, 13.281678}},
+		{3, 0.3, 55, 75, 110, {9.96026152, 10.7478143, 18.4516038}},
+		{3, 0.3, 55, 89.5, 34.5, {31.278191, 33.8943268, 33.8735252}},
+		{7.75, 0.65, 30, 0, 30, {15.7485973, 16.6452744, 22.5882306}},
+		{7.75, 0.65, 30, 30, 20, {32.1916792, 34.2607164, 39.6158452}},
+		{7.75, 0.65, 30, 75, 110, {16.8800196, 17.9819131, 26.7439119}},
+		{7.75, 0.65, 30, 89.5, 59.5, {33.4506246, 35.3576759, 36.0411933}},
+		{10, 1, 1, 0, 1, {115.752617, 122.379096, 114.547686}},
+		{10, 1, 1, 30, 20, {52.1085098, 54.8959478, 57.4176542}},
+		{10, 1, 1, 75, 110, {19.4684489, 20.0582904, 26.0189694}},
+		{10, 1, 1, 89.5, 88.5, {27.7474789, 28.4249511, 28.3164276}},
+	};
+	static const double to_xyz[3][3] = {{0.4124564, 0.3575761, 0.1804375},
+					    {0.2126729, 0.7151522, 0.0721750},
+					    {0.0193339, 0.1191920, 0.9503041}};
+	for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+		double ground = known[i].albedo, rgb[3];
+		struct daylight d = daylight_of(known[i].turbidity, (const double[3]){ground, ground, ground},
+						known[i].sun * PI / 180);
+		daylight_sky(&d, known[i].angle * PI / 180, known[i].gamma * PI / 180, rgb);
+		for (int k = 0; k < 3; k++) {
+			double x = 0;
+			for (int c = 0; c < 3; c++)
+				x += to_xyz[k][c] * rgb[c] * CIE_Y_SUM;
+			if (!(fabs(x - known[i].xyz[k]) <= 1e-5 * known[i].xyz[k]))
+				fail_msg("row %zu: %c is %.9g, not %.9g", i, "XYZ"[k], x, known[i].xyz[k]);
+		}
+	}
 }
 
 static int make_emitter(struct arena *a, const char *text, bool dialect_3, struct emitter *em, struct error *e)
@@ -140,12 +182,41 @@ static void test_picture(void **state)
 	}
 }
 
-static double seen(const struct emitter *em, double angle, double azimuth)
+static double seen_at(const struct emitter *em, double angle, double azimuth, const struct wavelengths *w)
 {
-	const struct wavelengths grey = {.grey = true};
 	vec3 d = {sin(angle) * sin(azimuth), cos(angle), sin(angle) * cos(azimuth)};
 	const struct emitter_point x = {.p = d, .infinite = true};
-	return em->ops->radiance(em, &x, vec3_neg(d), &grey).v[0];
+	return em->ops->radiance(em, &x, vec3_neg(d), w).v[0];
+}
+
+static double seen(const struct emitter *em, double angle, double azimuth)
+{
+	return seen_at(em, angle, azimuth, &(struct wavelengths){.grey = true});
+}
+
+/* A brighter ground brightens the sky, a green one the green in it; the dialects assume different ones. */
+static void test_ground(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct error e = {""};
+	struct emitter old, recent, dark, grey[2], green;
+	assert_int_equal(make_emitter(&a, "sky", false, &old, &e), 0);
+	assert_int_equal(make_emitter(&a, "sky", true, &recent, &e), 0);
+	assert_int_equal(make_emitter(&a, "sky albedo=0", false, &dark, &e), 0);
+	assert_int_equal(make_emitter(&a, "sky albedo=0.2", false, &grey[0], &e), 0);
+	assert_int_equal(make_emitter(&a, "sky albedo=0.3", true, &grey[1], &e), 0);
+	double by[2] = {seen(&old, 1, 2) / seen(&dark, 1, 2), recent.power / dark.power};
+	print_message("brighter by %.3f and %.3f\n", by[0], by[1]);
+	assert_true(by[0] > 1.02 && by[1] > 1.5 * by[0] - 0.5 && by[1] < 1.3);
+	assert_true(seen(&old, 1, 2) == seen(&grey[0], 1, 2) && recent.power == grey[1].power);
+	const struct wavelengths w[2] = {{.nm = {540, 540, 540, 540}}, {.nm = {440, 440, 440, 440}}};
+	assert_int_equal(make_emitter(&a, "sky albedo=rgb(0,0.9,0)", false, &green, &e), 0);
+	for (int i = 0; i < 2; i++)
+		by[i] = seen_at(&green, 1, 2, &w[i]) / seen_at(&dark, 1, 2, &w[i]);
+	print_message("a green ground: green by %.3f, blue by %.3f\n", by[0], by[1]);
+	assert_true(by[0] > 1.05 && by[0] - 1 > 3 * (by[1] - 1));
+	arena_fini(&a);
 }
 
 /* `stretch` moves the sky down, `extend` fades it out below the horizon: both by the formula at some angles, which the
@@ -161,6 +232,9 @@ static void test_below_the_horizon(void **state)
 	assert_int_equal(make_emitter(&a, "sky stretch=1.5", false, &stretched, &e), 0);
 	assert_int_equal(make_emitter(&a, "sky extend=true", false, &extended, &e), 0);
 	for (double azimuth = 0; azimuth < 6; azimuth += 0.7) {
+		/* The map's first row below the horizon, whose light the model gives only above it. */
+		double horizon = seen(&extended, 0.5 * PI + 0.5 * PI / 256, azimuth);
+		assert_true(fabs(horizon / seen(&plain, 0.5 * PI - 0.5 * PI / 256, azimuth) - 1) < 0.2);
 		for (double angle = 0.05; angle < 3.1; angle += 0.1) {
 			double l = seen(&plain, angle, azimuth), s = seen(&stretched, angle, azimuth);
 			double above = seen(&plain, angle / 1.5, azimuth), fade = 2 - 2 * angle / PI;
@@ -168,9 +242,9 @@ static void test_below_the_horizon(void **state)
 			assert_true((l > 0) == (angle < 0.5 * PI));
 			if (fabs(angle - 0.75 * PI) > 0.05) /* its edge */
 				assert_true(fabs(s - above) <= 0.02 * above);
-			double below = seen(&plain, 0.5 * PI - 0.01, azimuth) * fade * fade * (3 - 2 * fade);
+			double below = horizon * fade * fade * (3 - 2 * fade);
 			double x = seen(&extended, angle, azimuth), due = angle < 0.5 * PI ? l : below;
-			assert_true(fabs(x - due) <= 0.05 * due + 1e-4 * seen(&plain, 1.5, azimuth));
+			assert_true(fabs(x - due) <= 0.02 * due + 1e-4 * horizon);
 		}
 	}
 	arena_fini(&a);
@@ -193,6 +267,14 @@ static void test_refused(void **state)
 			fail_msg("%s: %s", bad[i].text, e.text);
 		arena_fini(&a);
 	}
+	struct arena a = {0};
+	struct emitter em;
+	struct error e = {""};
+	struct scene_node *n = node_make(&a, PLUGIN_EMITTER, "sky");
+	node_add_ref(&a, n, "albedo", node_make(&a, PLUGIN_TEXTURE, "checkerboard"));
+	const struct emitter_build build = {.arena = &a, .scale = 1};
+	assert_true(emitter_create(&em, n, &build, &e) < 0 && strstr(e.text, "depends on the place"));
+	arena_fini(&a);
 }
 
 int main(void)
@@ -200,7 +282,9 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_where_the_sun_stands),
 		cmocka_unit_test(test_how_bright_it_is),
+		cmocka_unit_test(test_the_model),
 		cmocka_unit_test(test_picture),
+		cmocka_unit_test(test_ground),
 		cmocka_unit_test(test_below_the_horizon),
 		cmocka_unit_test(test_refused),
 	};
