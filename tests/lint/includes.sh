@@ -43,7 +43,8 @@ edges() {
 	!reading || substr($3, 1, 1) != "\"" { next }
 	{
 		header = substr($3, 2); folder = header
-		if (!sub("/[^/]*$", "", folder) || folder == $2)
+		# Numbers in FOLDER/data are part of FOLDER.
+		if (!sub("(/data)?/[^/]*$", "", folder) || folder == $2)
 			next
 		if (!($2 in allowed))
 			print $1 ": the folder " $2 " is not in the list"

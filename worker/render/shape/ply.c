@@ -57,7 +57,8 @@ struct ply {
 	const char *name;
 	struct error *error;
 	const char *p, *end;
-	int line; /* of the header */
+	char newline; /* ends a line of the header: \n, also after \r, or \r alone, as Rhino writes */
+	int line;     /* of the header */
 	enum format format;
 	uint32_t element_count;
 	struct element elements[ELEMENTS_MAX];
@@ -81,7 +82,7 @@ static const struct param params[] = {
 /* A word of the header's line; false: end of the line. */
 static bool next_word(struct ply *f, char word[WORD_MAX])
 {
-	while (f->p < f->end && (*f->p == ' ' || *f->p == '\t' || *f->p == '\r'))
+	while (f->p < f->end && (*f->p == ' ' || *f->p == '\t' || (*f->p == '\r' && f->newline == '\n')))
 		f->p++;
 	size_t n = 0;
 	for (; f->p < f->end && !number_is_blank(*f->p); f->p++)
@@ -93,7 +94,7 @@ static bool next_word(struct ply *f, char word[WORD_MAX])
 
 static void end_line(struct ply *f)
 {
-	const char *newline = memchr(f->p, '\n', (size_t)(f->end - f->p));
+	const char *newline = memchr(f->p, f->newline, (size_t)(f->end - f->p));
 	f->p = newline ? newline + 1 : f->end;
 	f->line++;
 }
@@ -212,8 +213,11 @@ static int read_header(struct ply *f)
 	char word[WORD_MAX];
 	bool formatted = false;
 	f->line = 1;
+	f->newline = '\n';
 	if (!next_word(f, word) || strcmp(word, "ply") != 0)
 		return header_error(f, "this is not a PLY file");
+	if (f->end - f->p >= 2 && f->p[0] == '\r' && f->p[1] != '\n')
+		f->newline = '\r';
 	for (;;) {
 		end_line(f);
 		if (f->p >= f->end)
