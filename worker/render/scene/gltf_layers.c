@@ -35,6 +35,20 @@ static void note_members(struct gltf *g, const json_t *extension, const char *co
 		}
 }
 
+/* Only so many entries are looked at for each material; one further behind is told of twice. */
+enum { LISTED_MOST = 64 };
+
+static bool is_listed(const struct gltf *g, const char *list, const char *extension)
+{
+	const json_t *used = json_object_get(g->root, list);
+	for (size_t i = 0; i < json_array_size(used) && i < LISTED_MOST; i++) {
+		const char *name = json_string_value(json_array_get(used, i));
+		if (name && strcmp(name, extension) == 0)
+			return true;
+	}
+	return false;
+}
+
 static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	static const char *const others[] = {"specularTexture", "specularColorTexture", "specularColorFactor", NULL};
@@ -101,6 +115,19 @@ static void put_anisotropy(struct gltf *g, struct xml_element *el, const struct 
 	*roughness = sqrt(sqrt(wide * a));
 }
 
+/* Such surfaces show their colour whatever the light, which no material does. A file that requires it does not want
+ * them lit. */
+static void put_unlit(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
+{
+	const char *name = "KHR_materials_unlit";
+	if (!gltf_extension(g, at, at->json, name))
+		return;
+	if (is_listed(g, "extensionsRequired", name))
+		gltf_put_text(g, el, at, name, ELEMENT_UNSUPPORTED);
+	else
+		gltf_note(g, "surfaces of KHR_materials_unlit are lit like others");
+}
+
 static void note_iridescence(struct gltf *g, const struct gltf_at *at)
 {
 	const json_t *o = gltf_extension(g, at, at->json, "KHR_materials_iridescence");
@@ -122,27 +149,13 @@ static void put_transmission(struct gltf *g, struct xml_element *el, const struc
 	}
 }
 
-/* Only so many entries are looked at for each material; one further behind is told of twice. */
-enum { LISTED_MOST = 64 };
-
-static bool is_listed(const struct gltf *g, const char *extension)
-{
-	const json_t *used = json_object_get(g->root, "extensionsUsed");
-	for (size_t i = 0; i < json_array_size(used) && i < LISTED_MOST; i++) {
-		const char *name = json_string_value(json_array_get(used, i));
-		if (name && strcmp(name, extension) == 0)
-			return true;
-	}
-	return false;
-}
-
 void gltf_note_foreign(struct gltf *g, const struct gltf_at *at)
 {
 	json_t *all = json_object_get(at->json, "extensions");
 	for (void *i = json_object_iter(all); i; i = json_object_iter_next(all, i)) {
 		const char *name = json_object_iter_key(i);
 		char text[160];
-		if (gltf_knows(name) || is_listed(g, name))
+		if (gltf_knows(name) || is_listed(g, "extensionsUsed", name))
 			continue;
 		snprintf(text, sizeof text,
 			 "the extension %.64s of a material is not supported and ignored; `extensionsUsed` lacks it",
@@ -158,6 +171,7 @@ void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_a
 	gltf_put_share(g, el, at, "roughness", roughness, roughness > 0 ? texture : NULL, "g");
 	put_sheen(g, el, at);
 	note_iridescence(g, at);
+	put_unlit(g, el, at);
 	put_index(g, el, at);
 	put_coat(g, el, at);
 	put_transmission(g, el, at);

@@ -42,7 +42,7 @@ struct primitive {
 	const struct gltf_at *mesh;
 	struct xml_element *shape;
 	struct gltf_range buffer; /* of all its attributes */
-	struct numbers numbers[6];
+	struct numbers numbers[GLTF_SOURCES + 1];
 	unsigned count;
 	enum gltf_colours colours;
 };
@@ -133,11 +133,8 @@ static void put_in_place(struct primitive *p, const struct gltf_primitive *from,
 	static const struct {
 		const char *name, *type;
 		unsigned components;
-	} forms[GLTF_SOURCES] = {{"position", "VEC3", 3},
-				 {"normal", "VEC3", 3},
-				 {"texcoord", "VEC2", 2},
-				 {NULL, NULL, 0},
-				 {"index", "SCALAR", 1}};
+	} forms[GLTF_SOURCES] = {{"position", "VEC3", 3},	{"normal", "VEC3", 3}, {"texcoord", "VEC2", 2},
+				 {"texcoord_other", "VEC2", 2}, {NULL, NULL, 0},       {"index", "SCALAR", 1}};
 	for (int i = 0; i < GLTF_SOURCES; i++) {
 		const struct gltf_at *a = &from->sources[i];
 		if (a->json && i == GLTF_COLOR)
@@ -160,12 +157,16 @@ static void find_source(struct gltf *g, struct gltf_primitive *p, const json_t *
 static void find_sources(struct gltf *g, struct gltf_primitive *p, const json_t *attributes)
 {
 	struct gltf_at material;
-	char texcoord[32];
+	char texcoord[2][32];
 	bool has = gltf_follow(g, p->mesh, p->json, "material", GLTF_MATERIALS, &material) > 0;
-	snprintf(texcoord, sizeof texcoord, "TEXCOORD_%u", has ? gltf_texture_set(g, &material) : 0);
+	struct gltf_sets sets = has ? gltf_texture_sets(g, &material) : (struct gltf_sets){{0, 0}, 0};
+	for (int i = 0; i < 2; i++)
+		snprintf(texcoord[i], sizeof texcoord[i], "TEXCOORD_%u", sets.set[i]);
 	find_source(g, p, attributes, "POSITION", GLTF_POSITION);
 	find_source(g, p, attributes, "NORMAL", GLTF_NORMAL);
-	find_source(g, p, attributes, texcoord, GLTF_TEXCOORD);
+	find_source(g, p, attributes, texcoord[0], GLTF_TEXCOORD);
+	if (sets.count > 1)
+		find_source(g, p, attributes, texcoord[1], GLTF_TEXCOORD_OTHER);
 	find_source(g, p, attributes, "COLOR_0", GLTF_COLOR);
 	find_source(g, p, p->json, "indices", GLTF_INDEX);
 	if (!p->sources[GLTF_POSITION].json)

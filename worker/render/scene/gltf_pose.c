@@ -221,7 +221,7 @@ static void apply_skin(struct gltf *g, const struct gltf_primitive *p, struct gl
 
 /* ---- the shape's bytes */
 
-static const char *const names[GLTF_SOURCES] = {"position", "normal", "texcoord", "color", "index"};
+static const char *const names[GLTF_SOURCES] = {"position", "normal", "texcoord", "texcoord_other", "color", "index"};
 
 static size_t bytes_of(const struct gltf_vectors *v)
 {
@@ -288,7 +288,7 @@ static void grow_box(struct gltf *g, const struct gltf_vectors *v, const mat4 *t
 
 void gltf_put_pose(struct gltf *g, struct xml_element *shape, const struct gltf_primitive *p, mat4 *to_world)
 {
-	static const unsigned components[GLTF_SOURCES] = {3, 3, 2, 0, 1};
+	static const unsigned components[GLTF_SOURCES] = {3, 3, 2, 2, 0, 1};
 	struct gltf_vectors v[GLTF_SOURCES] = {{.x = NULL}};
 	for (int i = 0; i < GLTF_SOURCES && !g->failed; i++)
 		if (p->sources[i].json && gltf_vectors_read(g, &p->sources[i], names[i], components[i], &v[i]) &&

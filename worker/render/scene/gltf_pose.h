@@ -8,7 +8,15 @@
 
 #include "worker/render/scene/gltf_tree.h"
 
-enum gltf_source { GLTF_POSITION, GLTF_NORMAL, GLTF_TEXCOORD, GLTF_COLOR, GLTF_INDEX, GLTF_SOURCES };
+enum gltf_source {
+	GLTF_POSITION,
+	GLTF_NORMAL,
+	GLTF_TEXCOORD,
+	GLTF_TEXCOORD_OTHER,
+	GLTF_COLOR,
+	GLTF_INDEX,
+	GLTF_SOURCES
+};
 
 /* The accessors of a primitive; .json NULL: it has none of that. */
 struct gltf_primitive {

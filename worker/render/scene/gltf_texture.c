@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A texture becomes a `bitmap` with the sampler's wrap modes and the transform of KHR_texture_transform, inside a
- * `scale` if it has a factor. Failures: indices of nothing, images of formats without a source. Two sets of texture
- * coordinates in one material become a property that no table knows: refused with its name, or left out with --lenient.
+ * `scale` if it has a factor. Of a material's sets of texture coordinates one is the shape's, by which normal maps
+ * bend, and another its attribute vertex_texcoord. Failures: indices of nothing, images of formats without a source. A
+ * third set becomes a property that no table knows: refused with its name, or left out with --lenient.
  */
 #include "worker/render/scene/gltf_texture.h"
 #include "worker/render/scene/gltf_buffer.h"
@@ -56,26 +57,25 @@ static uint64_t set_of(struct gltf *g, const struct gltf_at *at, const json_t *i
 	return t ? gltf_whole(g, at, t, "texCoord", own) : own;
 }
 
-unsigned gltf_texture_set(struct gltf *g, const struct gltf_at *at)
+struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 {
 	const json_t *metal = json_object_get(at->json, "pbrMetallicRoughness");
 	const json_t *gloss = gltf_extension(g, at, at->json, "KHR_materials_pbrSpecularGlossiness");
 	const json_t *infos[] = {
-		metal ? NULL : json_object_get(gloss, "diffuseTexture"), json_object_get(metal, "baseColorTexture"),
-		json_object_get(metal, "metallicRoughnessTexture"), json_object_get(at->json, "normalTexture"),
-		json_object_get(at->json, "emissiveTexture")};
-	uint64_t set = 0;
-	bool any = false;
-	for (size_t i = 0; i < sizeof infos / sizeof *infos; i++) {
-		if (!infos[i])
-			continue;
-		uint64_t own = set_of(g, at, infos[i]);
-		if (any && own != set)
-			return 0;
-		set = own;
-		any = true;
+		json_object_get(at->json, "normalTexture"),
+		metal ? NULL : json_object_get(gloss, "diffuseTexture"),
+		json_object_get(metal, "baseColorTexture"),
+		json_object_get(metal, "metallicRoughnessTexture"),
+		json_object_get(at->json, "emissiveTexture"),
+		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_transmission"), "transmissionTexture"),
+		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_clearcoat"), "clearcoatTexture")};
+	struct gltf_sets sets = {{0, 0}, 0};
+	for (size_t i = 0; i < sizeof infos / sizeof *infos && sets.count < 2; i++) {
+		uint64_t own = infos[i] ? set_of(g, at, infos[i]) : 0;
+		if (infos[i] && own < UINT_MAX && (sets.count == 0 || own != sets.set[0]))
+			sets.set[sets.count++] = (unsigned)own;
 	}
-	return set < UINT_MAX ? (unsigned)set : 0;
+	return sets;
 }
 
 void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
@@ -110,7 +110,13 @@ void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_
 		gltf_put_number(g, bitmap, &texture, "threshold", c->cutoff);
 	put_sampler(g, bitmap, &texture);
 	put_transform(g, bitmap, at, info);
-	if (set_of(g, at, info) != gltf_texture_set(g, at))
+	const struct gltf_sets sets = gltf_texture_sets(g, at);
+	uint64_t own = set_of(g, at, info);
+	if (own == sets.set[0])
+		return;
+	if (sets.count > 1 && own == sets.set[1])
+		gltf_put_text(g, bitmap, &texture, "coordinates", "vertex_texcoord");
+	else
 		gltf_put_text(g, bitmap, at, "texCoord", ELEMENT_UNSUPPORTED);
 }
 

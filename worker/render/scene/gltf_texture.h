@@ -13,8 +13,12 @@ struct gltf_channel {
 	double cutoff;	  /* factor of alpha; negative: none */
 };
 
-/* The set of texture coordinates that a material's textures use, if all use the same; otherwise 0. */
-unsigned gltf_texture_set(struct gltf *g, const struct gltf_at *material);
+/* The sets of texture coordinates that a material's textures use, up to two; the first is the normal map's if there is
+ * one. Without any, set[0] is 0. */
+struct gltf_sets {
+	unsigned set[2], count;
+};
+struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *material);
 /* The texture that `info` of the material names, as the property `name` of el. */
 void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_at *material, const char *name,
 		      const json_t *info, const struct gltf_channel *c);

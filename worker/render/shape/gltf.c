@@ -24,6 +24,7 @@ static const struct param params[] = {
 	{"position", UNDERSTOOD(VALUE_STRING)},
 	{"normal", UNDERSTOOD(VALUE_STRING)},
 	{"texcoord", UNDERSTOOD(VALUE_STRING)},
+	{"texcoord_other", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_texcoord */
 	{"index", UNDERSTOOD(VALUE_STRING)},
 	{"mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "triangles|strip|fan"},
 	{"color", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_color */
@@ -139,7 +140,7 @@ static int fill_mesh(struct mesh *m, const struct scene_node *n, const struct ac
 	return 0;
 }
 
-/* A number or colour at the vertices; linear. */
+/* Numbers at the vertices, as they stand in the buffer. */
 static int add_attribute(struct mesh *m, const struct scene_node *n, const char *name, const char *attribute,
 			 unsigned components, const struct asset_range *buffer, struct arena *arena, struct error *e)
 {
@@ -149,7 +150,7 @@ static int add_attribute(struct mesh *m, const struct scene_node *n, const char 
 		return rc < 0 ? rc : 0;
 	if (from.count != m->vertex_count)
 		return node_error(n, e, EINVAL, "`%s` has another number of entries than `position`", name);
-	struct attribute *a = mesh_add_attribute(m, attribute, false, components, 2, arena);
+	struct attribute *a = mesh_add_attribute(m, attribute, false, components, 3, arena);
 	if (!a)
 		return node_error(n, e, ENOMEM, "out of memory");
 	for (uint32_t i = 0; i < m->vertex_count; i++)
@@ -187,7 +188,9 @@ static int make_mesh(const struct scene_node *n, const struct asset_range *buffe
 	rc = fill_mesh(m, n, &position, &normal, &texcoord, no_index ? NULL : &index, mode, e);
 	if (!rc)
 		rc = add_attribute(m, n, "color", "vertex_color", 3, buffer, arena, e);
-	return rc ? rc : add_attribute(m, n, "alpha", "vertex_alpha", 1, buffer, arena, e);
+	if (!rc)
+		rc = add_attribute(m, n, "alpha", "vertex_alpha", 1, buffer, arena, e);
+	return rc ? rc : add_attribute(m, n, "texcoord_other", "vertex_texcoord", 2, buffer, arena, e);
 }
 
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,

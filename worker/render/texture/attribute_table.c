@@ -37,8 +37,8 @@ static int none_such(const struct attribute_table *t, const char *name, const st
 			  spelling_hint(&s, hint, sizeof hint));
 }
 
-const struct attribute *attribute_find(const struct attribute_table *t, const char *name, const struct scene_node *n,
-				       struct error *e)
+const struct attribute *attribute_find(const struct attribute_table *t, const char *name, enum attribute_use use,
+				       const struct scene_node *n, struct error *e)
 {
 	char mesh[160];
 	uint32_t i = 0;
@@ -50,7 +50,11 @@ const struct attribute *attribute_find(const struct attribute_table *t, const ch
 	}
 	const struct attribute *a = &t->attributes[i];
 	describe(t->shape, mesh, sizeof mesh);
-	if (a->channels == 2) {
+	if (use == ATTRIBUTE_COORDINATES && (a->channels != 2 || a->per_face)) {
+		node_error(n, e, EINVAL, "`%s` of %s is not two numbers at each vertex", name, mesh);
+		return NULL;
+	}
+	if (use == ATTRIBUTE_COLOR && a->channels == 2) {
 		node_error(n, e, EINVAL, "`%s` of %s has two channels: neither a number nor a colour", name, mesh);
 		return NULL;
 	}

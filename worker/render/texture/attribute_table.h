@@ -37,10 +37,12 @@ struct attribute_table {
 	bool asked; /* set if a texture was made that uses one */
 };
 
+enum attribute_use { ATTRIBUTE_COLOR, ATTRIBUTE_COORDINATES };
+
 /* The attribute `name`; NULL, with -EINVAL's sentence, which names the mesh and the nearest name: there is none, or
- * its numbers are not valid colours. n: the texture. */
-const struct attribute *attribute_find(const struct attribute_table *t, const char *name, const struct scene_node *n,
-				       struct error *e);
+ * its numbers are not valid for that use. n: the texture. */
+const struct attribute *attribute_find(const struct attribute_table *t, const char *name, enum attribute_use use,
+				       const struct scene_node *n, struct error *e);
 
 /* Its numbers, decoded from sRGB if `decode`; allocated in the arena, or shared. NULL: out of memory. */
 const struct attribute_values *attribute_keep(struct attribute_table *t, const struct attribute *a, bool decode,

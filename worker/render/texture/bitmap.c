@@ -6,6 +6,7 @@
  * `none` are names of before 0.5.
  */
 #include "common/base/color.h"
+#include "worker/render/texture/attribute_table.h"
 #include "worker/render/texture/raster.h"
 #include "worker/render/texture/texture.h"
 #include "worker/render/texture/uv.h"
@@ -18,6 +19,8 @@ enum { BOUND_PIXELS_MAX = 1 << 22 }; /* with more pixels, the upper bound is not
 struct bitmap {
 	struct raster raster;
 	struct uv_map map;
+	const float *coordinates; /* two at each vertex, for (u,v); NULL: those of the shape */
+	const uint32_t (*index)[3];
 	enum color_role role;
 	enum color_shape shape;
 	double max;
@@ -69,6 +72,29 @@ static double upper_bound(const struct bitmap *b)
 	return m;
 }
 
+/* `coordinates`: an attribute of the mesh takes the place of (u,v). */
+static int read_coordinates(struct bitmap *b, const struct scene_node *n, const struct texture_build *build,
+			    struct error *e)
+{
+	const char *name = node_string(n, "coordinates", NULL);
+	struct attribute_table *table = build->attributes;
+	if (!name)
+		return 0;
+	if (color_role_is_number(b->role))
+		return node_error(n, e, ENOTSUP, "a map of heights or normals cannot have `coordinates`");
+	if (!table)
+		return node_error(n, e, EINVAL, "attributes are only available on a mesh");
+	const struct attribute *a = attribute_find(table, name, ATTRIBUTE_COORDINATES, n, e);
+	if (!a)
+		return -EINVAL;
+	const struct attribute_values *v = attribute_keep(table, a, false, build->arena);
+	if (!v)
+		return node_error(n, e, ENOMEM, "out of memory");
+	b->coordinates = v->value;
+	b->index = table->index;
+	return 0;
+}
+
 static int bitmap_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			 const struct texture_build *build, struct error *e)
 {
@@ -89,8 +115,9 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	b->raster.nearest = is_nearest(node_string(n, "filter_type", "bilinear"));
 	b->map = uv_map_read(n);
 	b->role = role;
-	if (color_role_is_number(role))
-		return 0;
+	code = read_coordinates(b, n, build, e);
+	if (code || color_role_is_number(role))
+		return code;
 	b->shape = !raster_is_grey(&b->raster) ? COLOR_SHAPE_OTHER
 		   : role == COLOR_ILLUMINANT  ? COLOR_SHAPE_D65
 					       : COLOR_SHAPE_CONSTANT;
@@ -102,6 +129,14 @@ static spectrum bitmap_eval(const struct texture *t, const struct texture_point 
 {
 	const struct bitmap *b = t->data;
 	double rgb[3], u = at->u, v = at->v;
+	if (b->coordinates) {
+		const uint32_t *i = b->index[at->prim];
+		const float *p0 = b->coordinates + 2 * (size_t)i[0], *p1 = b->coordinates + 2 * (size_t)i[1],
+			    *p2 = b->coordinates + 2 * (size_t)i[2];
+		double b0 = 1 - at->b1 - at->b2;
+		u = b0 * (double)p0[0] + at->b1 * (double)p1[0] + at->b2 * (double)p2[0];
+		v = b0 * (double)p0[1] + at->b1 * (double)p1[1] + at->b2 * (double)p2[1];
+	}
 	uv_map_apply(&b->map, &u, &v);
 	raster_eval(&b->raster, u, v, rgb);
 	return b->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
@@ -154,6 +189,7 @@ static enum color_shape bitmap_shape(const struct texture *t)
 static const struct param bitmap_params[] = {
 	RASTER_PARAMS,
 	UV_PARAMS,
+	{.name = "coordinates", .types = VALUE_STRING},
 	{.name = "filter_type", .types = VALUE_STRING, .choices = "bilinear|nearest|trilinear|ewa|isotropic|none"},
 	{.name = "wrap_mode", .types = VALUE_STRING, .choices = WRAP_MODES},
 	{.name = "wrap_mode_u", .types = VALUE_STRING, .choices = WRAP_MODES},

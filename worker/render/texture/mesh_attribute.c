@@ -50,7 +50,7 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 		return refuse_role(n, role, e);
 	if (!table)
 		return node_error(n, e, EINVAL, "attributes are only available on a mesh");
-	const struct attribute *a = attribute_find(table, name, n, e);
+	const struct attribute *a = attribute_find(table, name, ATTRIBUTE_COLOR, n, e);
 	if (!a)
 		return -EINVAL;
 	bool decode = a->encoded && strcmp(n->type, "vertexcolors") == 0;

@@ -28,6 +28,8 @@
 #define SECOND "\"baseColorTexture\": {\"index\": 0, \"texCoord\": 1}"
 #define BOTH(set) "\"metallicRoughnessTexture\": {\"index\": 0, \"texCoord\": " set "}"
 
+#define NORMAL(set) ", \"normalTexture\": {\"index\": 0, \"texCoord\": " set "}"
+
 static struct scene read_text(const char *json)
 {
 	const struct memory_file files[] = {{"s.gltf", json, strlen(json)}, {0}};
@@ -72,16 +74,67 @@ static void test_sets(void **state)
 	(void)state;
 	takes(FILE_OF("\"2.0\"", FIRST, "", BOUNDS), "36");
 	takes(FILE_OF("\"2.0\"", SECOND, "", BOUNDS), "60");
-	takes(FILE_OF("\"2.0\"", SECOND "," BOTH("1"), ", \"normalTexture\": {\"index\": 0, \"texCoord\": 1}", BOUNDS),
-	      "60");
+	takes(FILE_OF("\"2.0\"", SECOND "," BOTH("1"), NORMAL("1"), BOUNDS), "60");
 	takes(FILE_OF("\"2.0\"",
 		      "\"baseColorTexture\": {\"index\": 0, \"extensions\": {\"KHR_texture_transform\": {\"texCoord\": 1}}}",
 		      "", BOUNDS),
 	      "60");
-	refuses(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), "", BOUNDS),
+	refuses(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), NORMAL("2"), BOUNDS),
 		"`texCoord` is not supported; --lenient leaves it out");
-	refuses(FILE_OF("\"2.0\"", SECOND, ", \"normalTexture\": {\"index\": 0}", BOUNDS),
-		"`texCoord` is not supported");
+}
+
+static const struct scene_node *material_of(const struct scene *s)
+{
+	for (uint32_t i = 0; i < s->object_count; i++)
+		if (s->objects[i]->cls == PLUGIN_BSDF)
+			return s->objects[i];
+	fail_msg("there is no material");
+	return NULL;
+}
+
+/* By which coordinates the image of a property is looked up. */
+static const char *coordinates_of(const struct scene_node *bsdf, const char *name)
+{
+	const struct property *p = node_find(bsdf, name);
+	assert_non_null(p);
+	return node_string(p->value.as.node, "coordinates", "");
+}
+
+/* One set is the shape's, the normal map's if there is one, the other an attribute. */
+static void test_two_sets(void **state)
+{
+	(void)state;
+	struct scene s = read_text(FILE_OF("\"2.0\"", FIRST "," BOTH("1"), "", BOUNDS));
+	assert_true(strstr(node_string(shape_of(&s), "texcoord", ""), "36") ==
+		    node_string(shape_of(&s), "texcoord", ""));
+	assert_string_equal(node_string(shape_of(&s), "texcoord_other", ""), "60 8 3 f32");
+	assert_string_equal(coordinates_of(material_of(&s), "base_color"), "");
+	assert_string_equal(coordinates_of(material_of(&s), "metallic"), "vertex_texcoord");
+	assert_string_equal(coordinates_of(material_of(&s), "roughness"), "vertex_texcoord");
+	scene_fini(&s);
+	s = read_text(FILE_OF("\"2.0\"", SECOND, NORMAL("0"), BOUNDS));
+	assert_string_equal(node_string(shape_of(&s), "texcoord", ""), "36 8 3 f32");
+	assert_string_equal(node_string(shape_of(&s), "texcoord_other", ""), "60 8 3 f32");
+	const struct scene_node *bent = node_child(material_of(&s), PLUGIN_BSDF, 0);
+	assert_string_equal(coordinates_of(bent, "base_color"), "vertex_texcoord");
+	scene_fini(&s);
+}
+
+/* Lit, with a note; a file that requires it is refused. */
+static void test_unlit(void **state)
+{
+	(void)state;
+#define UNLIT ", \"extensions\": {\"KHR_materials_unlit\": {}}"
+	struct scene s = read_text(FILE_OF("\"2.0\"", FIRST, UNLIT, BOUNDS));
+	bool noted = false;
+	shape_of(&s);
+	for (uint32_t i = 0; i < s.note_count; i++)
+		noted |= strstr(s.notes[i], "surfaces of KHR_materials_unlit are lit like others") != NULL;
+	assert_true(noted);
+	scene_fini(&s);
+	refuses(FILE_OF("\"2.0\"", FIRST,
+			UNLIT "}], \"extensionsRequired\": [\"KHR_materials_unlit\"], \"cameras\": [{", BOUNDS),
+		"`KHR_materials_unlit` is not supported; --lenient leaves it out");
 }
 
 static void test_versions(void **state)
@@ -179,6 +232,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_sets),
+		cmocka_unit_test(test_two_sets),
+		cmocka_unit_test(test_unlit),
 		cmocka_unit_test(test_versions),
 		cmocka_unit_test(test_camera),
 		cmocka_unit_test(test_light),

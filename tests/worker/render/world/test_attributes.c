@@ -62,8 +62,8 @@ static size_t write_grid(char *text, int heat, bool linear)
 		node_colour(k % SIDE, k / SIDE, rgb);
 		if (linear)
 			rgb[0] = (x + 1) / 2, rgb[1] = (y + 1) / 2, rgb[2] = (2 + x - y) / 4;
-		PUT("%.9g %.9g 0 %.9g %.9g %.9g %.9g %.9g 0 0 %s\n", x, y, u, v, rgb[0], rgb[1], rgb[2],
-		    k == 3 ? "1e300" : "0");
+		PUT("%.9g %.9g 0 %.9g %.9g %.9g %.9g %.9g %.9g %.9g %s\n", x, y, u, v, rgb[0], rgb[1], rgb[2], v,
+		    u / 2 - 1, k == 3 ? "1e300" : "0");
 	}
 	for (int t = 0; t < TRIANGLES; t++) {
 		int p = t / 2 / (SIDE - 1) * SIDE + t / 2 % (SIDE - 1), odd = t % 2;
@@ -184,6 +184,26 @@ static void test_picture(void **state)
 	struct world *w = world_of(SKY PLY("grid.ply", DIFFUSE(FIELD("reflectance", "vertex_color")))
 					   PLY("grid.ply", DIFFUSE("<texture type='bitmap' name='reflectance'>"
 								   "<string name='filename' value='p0'/></texture>")));
+	for (uint32_t t = 0; t < TRIANGLES; t++)
+		for (int k = 0; k < 8; k++) {
+			struct surface_point a, b;
+			double b1 = k / 10.0, b2 = (7 - k) / 9.0 * (t % 5) / 4;
+			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, t}, b1, b2, &a);
+			surface_on_triangle(&w->shapes[1], (struct prim_ref){1, t}, b1, b2, &b);
+			assert_close(albedo(w, &a), albedo(w, &b), 1e-5);
+		}
+	world_free(w);
+}
+
+/* An image by other coordinates: pairs of numbers at the vertices that are an affine map of (u,v), against that map. */
+static void test_coordinates(void **state)
+{
+	(void)state;
+#define BITMAP(inner) \
+	DIFFUSE("<texture type='bitmap' name='reflectance'><string name='filename' value='p0'/>" inner "</texture>")
+	struct world *w = world_of(SKY PLY("grid.ply", BITMAP("<string name='coordinates' value='vertex_pair'/>"))
+					   PLY("grid.ply", BITMAP("<transform name='to_uv'><matrix value='0 1 0 0 "
+								  "0.5 0 0 -1 0 0 1 0 0 0 0 1'/></transform>")));
 	for (uint32_t t = 0; t < TRIANGLES; t++)
 		for (int k = 0; k < 8; k++) {
 			struct surface_point a, b;
@@ -326,8 +346,10 @@ static void refuses(const char *body, const char *sentence)
 {
 	static char xml[TEXT_MAX];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW SKY "%s</scene>", body);
-	const struct memory_file files[] = {
-		{"s.xml", xml, (size_t)n}, {"grid.ply", grid, write_grid(grid, -1, false)}, {NULL, NULL, 0}};
+	const struct memory_file files[] = {{"s.xml", xml, (size_t)n},
+					    {"grid.ply", grid, write_grid(grid, -1, false)},
+					    {"p0", pictures.file[0].bytes, pictures.file[0].size},
+					    {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
 	struct render_summary m;
 	struct render_options o = {0};
@@ -357,6 +379,15 @@ static void test_refused(void **state)
 	refuses(PLY("grid.ply", OF("color")), "needs a name that begins with `vertex_` or `face_`");
 	refuses(PLY("grid.ply", OF("vertex_pair")), "`vertex_pair` of the mesh of grid.ply (s.xml:1) has two channels");
 	refuses(PLY("grid.ply", OF("vertex_wild")), "has a value that is not finite, or beyond 1e12");
+	refuses(PLY("grid.ply", BITMAP("<string name='coordinates' value='face_heat'/>")),
+		"`face_heat` of the mesh of grid.ply (s.xml:1) is not two numbers at each vertex");
+	refuses(PLY("grid.ply",
+		    "<bsdf type='normalmap'><bsdf type='diffuse'/><texture type='bitmap'><string name='filename' "
+		    "value='p0'/><string name='coordinates' value='vertex_pair'/></texture></bsdf>"),
+		"a map of heights or normals cannot have `coordinates`");
+	refuses("<emitter type='projector'><texture type='bitmap' name='irradiance'><string name='filename' value='p0'/>"
+		"<string name='coordinates' value='vertex_pair'/></texture></emitter>",
+		"attributes are only available on a mesh");
 	refuses(PLY("grid.ply", "<bsdf type='bumpmap'><bsdf type='diffuse'/>" FIELD("", "face_heat") "</bsdf>"),
 		"an attribute of a mesh cannot be a bump or normal map");
 	refuses(PLY("grid.ply", FIELD("displacement", "face_heat") "<integer name='displacement_level' value='1'/>"),
@@ -375,9 +406,10 @@ static int teardown(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_linear),	     cmocka_unit_test(test_instances), cmocka_unit_test(test_picture),
-		cmocka_unit_test(test_faces),	     cmocka_unit_test(test_light),     cmocka_unit_test(test_roughness),
-		cmocka_unit_test(test_vertexcolors), cmocka_unit_test(test_shared),    cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_linear),	    cmocka_unit_test(test_instances),	 cmocka_unit_test(test_picture),
+		cmocka_unit_test(test_coordinates), cmocka_unit_test(test_faces),	 cmocka_unit_test(test_light),
+		cmocka_unit_test(test_roughness),   cmocka_unit_test(test_vertexcolors), cmocka_unit_test(test_shared),
+		cmocka_unit_test(test_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, teardown);
 }
