@@ -4,7 +4,7 @@
  * two, whose message is made here so that the bytes reach the decoder; an image as the coordinator keeps it.
  */
 #include "common/base/mem.h"
-#include "common/exr/exr_image.h"
+#include "common/exr/exr_read.h"
 #include "common/exr/exr_tile.h"
 #include "common/wire/batch_wire.h"
 #include "tests/fuzz/messages.h"

@@ -3,7 +3,7 @@
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
-#include "common/exr/exr_image.h"
+#include "common/exr/exr_read.h"
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"

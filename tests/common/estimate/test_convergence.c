@@ -5,6 +5,7 @@
 
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
+#include "common/exr/exr_read.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/exr/exr_image.h"
+#include "common/exr/exr_read.h"
 #include "common/exr/exr_tile.h"
 
 #include "common/base/mem.h"

@@ -11,6 +11,7 @@
 #include "common/base/mem.h"
 #include "common/exr/header.h"
 #include "common/exr/image_file.h"
+#include "common/exr/exr_read.h"
 
 #include <inttypes.h>
 #include <math.h>

@@ -3,6 +3,7 @@
 
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
+#include "common/exr/exr_read.h"
 
 #include <png.h>
 #include <stdio.h>

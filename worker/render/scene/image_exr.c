@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/image_decode.h"
 
-#include "common/exr/exr_image.h"
+#include "common/exr/exr_read.h"
 
 #include <math.h>
 #include <string.h>
