@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/image_decode.h"
 
+#include "common/exr/exr_dwa.h"
 #include "common/exr/exr_read.h"
 
 #include <math.h>
@@ -38,6 +39,8 @@ int image_decode_exr(const struct image_input *in, struct image *out)
 {
 	struct exr_image x = {0};
 	int r = exr_read_within(in->bytes, in->size, IMAGE_BYTES_MAX, &x, in->error);
+	if (r == -ENOTSUP)
+		r = exr_read_dwa(in->bytes, in->size, IMAGE_BYTES_MAX, &x, in->error);
 	if (r)
 		return error_prefix(in->error, r, "%s", in->name);
 	r = copy_planes(in, &x, out);

@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Images compressed by DWA, as OpenEXR itself writes them: the pixels come back but for what DWA loses; damaged files
+ * are refused, or read as something.
+ */
+#include "common/exr/exr_dwa.h"
+
+#include "common/base/mem.h"
+#include "common/exr/exr_read.h"
+
+#include <OpenEXR/ImfCRgbaFile.h>
+
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { W = 71, H = 300, LEFT = -9, TOP = 4 };
+
+/* Smooth, from 0.2 to 3. */
+static double value_at(int channel, int x, int y)
+{
+	return 1.6 + (channel == 1 ? -1 : 1) * 1.4 * sin(0.05 * x + 0.02 * y + channel);
+}
+
+/* A file of W x H pixels; tiled: in tiles of 32 x 16. */
+static unsigned char *dwa_file(int compression, int channels, bool tiled, size_t *size)
+{
+	static ImfRgba pixels[W * H];
+	char path[32];
+	int fd = memfd_create("written.exr", MFD_CLOEXEC);
+	assert_true(fd >= 0);
+	snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+	for (int i = 0; i < W * H; i++) {
+		ImfFloatToHalf((float)value_at(0, i % W, i / W), &pixels[i].r);
+		ImfFloatToHalf((float)value_at(channels == IMF_WRITE_Y ? 0 : 1, i % W, i / W), &pixels[i].g);
+		ImfFloatToHalf((float)value_at(channels == IMF_WRITE_Y ? 0 : 2, i % W, i / W), &pixels[i].b);
+		ImfFloatToHalf(0.5f, &pixels[i].a);
+	}
+	ImfHeader *h = ImfNewHeader();
+	ImfHeaderSetDataWindow(h, LEFT, TOP, LEFT + W - 1, TOP + H - 1);
+	ImfHeaderSetDisplayWindow(h, LEFT, TOP, LEFT + W - 1, TOP + H - 1);
+	ImfHeaderSetCompression(h, compression);
+	const ImfRgba *origin = (const ImfRgba *)((intptr_t)pixels - (LEFT + TOP * W) * (intptr_t)sizeof *pixels);
+	if (tiled) {
+		ImfTiledOutputFile *out = ImfOpenTiledOutputFile(path, h, channels, 32, 16, IMF_ONE_LEVEL, 0);
+		assert_non_null(out);
+		assert_int_equal(ImfTiledOutputSetFrameBuffer(out, origin, 1, W), 1);
+		assert_int_equal(ImfTiledOutputWriteTiles(out, 0, (W + 31) / 32 - 1, 0, (H + 15) / 16 - 1, 0, 0), 1);
+		assert_int_equal(ImfCloseTiledOutputFile(out), 1);
+	} else {
+		ImfOutputFile *out = ImfOpenOutputFile(path, h, channels);
+		assert_non_null(out);
+		assert_int_equal(ImfOutputSetFrameBuffer(out, origin, 1, W), 1);
+		assert_int_equal(ImfOutputWritePixels(out, H), 1);
+		assert_int_equal(ImfCloseOutputFile(out), 1);
+	}
+	ImfDeleteHeader(h);
+	*size = (size_t)lseek(fd, 0, SEEK_END);
+	unsigned char *bytes = mem_alloc(*size, 1);
+	assert_int_equal(pread(fd, bytes, *size, 0), (ssize_t)*size);
+	close(fd);
+	return bytes;
+}
+
+static void test_pixels(void **state)
+{
+	(void)state;
+	static const struct {
+		int compression, channels;
+		bool tiled;
+	} cases[] = {{IMF_DWAA_COMPRESSION, IMF_WRITE_RGB, false},
+		     {IMF_DWAB_COMPRESSION, IMF_WRITE_RGBA, false},
+		     {IMF_DWAA_COMPRESSION, IMF_WRITE_Y, false},
+		     {IMF_DWAB_COMPRESSION, IMF_WRITE_RGB, true},
+		     {IMF_DWAA_COMPRESSION, IMF_WRITE_RGBA, true}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct exr_image img;
+		struct error e = {""};
+		size_t size;
+		unsigned char *bytes = dwa_file(cases[i].compression, cases[i].channels, cases[i].tiled, &size);
+		bool grey = cases[i].channels == IMF_WRITE_Y;
+		assert_int_equal(exr_read_within(bytes, size, INT64_MAX, &img, &e), -ENOTSUP);
+		assert_non_null(strstr(e.text, "DWA"));
+		if (exr_read_dwa(bytes, size, INT64_MAX, &img, &e))
+			fail_msg("%zu: %s", i, e.text);
+		assert_int_equal(img.width, W);
+		assert_int_equal(img.height, H);
+		assert_int_equal(img.channel_count, grey ? 1 : 3);
+		assert_string_equal(img.names[0], grey ? "Y" : "R");
+		double worst = 0;
+		for (uint32_t c = 0; c < img.channel_count; c++)
+			for (int k = 0; k < W * H; k++)
+				worst = fmax(worst,
+					     fabs((double)img.planes[c][k] / value_at((int)c, k % W, k / W) - 1));
+		print_message("file %zu: %zu bytes, off by at most %.4f\n", i, size, worst);
+		assert_true(worst < 0.05);
+		exr_image_fini(&img);
+		mem_free(bytes);
+	}
+}
+
+/* More than is allowed; not DWA; cut short; bits changed. */
+static void test_damage(void **state)
+{
+	(void)state;
+	struct exr_image img;
+	struct error e = {""};
+	size_t size, refused = 0, count = 0;
+	unsigned char *bytes = dwa_file(IMF_DWAA_COMPRESSION, IMF_WRITE_RGB, false, &size), *copy = mem_alloc(size, 1);
+	assert_int_equal(exr_read_dwa(bytes, size, (int64_t)W * H * 3 * 4 - 1, &img, &e), -EFBIG);
+	assert_int_equal(exr_read_dwa(bytes, 3, INT64_MAX, &img, &e), -EBADMSG);
+	for (size_t n = 0; n < size; n += 61, count++) {
+		memcpy(copy, bytes, n);
+		if (exr_read_dwa(copy, n, INT64_MAX, &img, &e) == 0)
+			exr_image_fini(&img);
+		else
+			refused++;
+	}
+	assert_int_equal(refused, count);
+	for (size_t i = 0; i < 600; i++) {
+		memcpy(copy, bytes, size);
+		copy[i * (size - 1) / 600] ^= (unsigned char)(1u << (i * 7 % 8));
+		if (exr_read_dwa(copy, size, INT64_MAX, &img, &e) == 0)
+			exr_image_fini(&img);
+	}
+	mem_free(copy);
+	mem_free(bytes);
+	bytes = dwa_file(IMF_DWAA_COMPRESSION, IMF_WRITE_A, false, &size);
+	assert_int_equal(exr_read_dwa(bytes, size, INT64_MAX, &img, &e), -ENOTSUP);
+	assert_non_null(strstr(e.text, "without channels R, G and B, or Y"));
+	mem_free(bytes);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_pixels), cmocka_unit_test(test_damage)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
