@@ -128,15 +128,6 @@ bool text_ratio(const char *text, double *ratio)
 	return true;
 }
 
-bool text_share(const char *text, double *share)
-{
-	double x;
-	if (!text_ratio(text, &x) || !(x >= 0 && x <= 1))
-		return false;
-	*share = x;
-	return true;
-}
-
 /* A non-negative number, followed by at most one letter of `units`, which selects the factor at the same index. */
 static bool with_unit(const char *text, const char *units, const double *factors, double *value)
 {

@@ -20,9 +20,8 @@ void text_clean(char *text);
 /* Casts const away for interfaces that lack it but change nothing: generated messages, constant arguments. */
 char *text_borrow(const char *text);
 
-/* "0.05" or "5%". false: not a number. A share is from 0 to 1. */
+/* "0.05" or "5%". false: not a number. */
 bool text_ratio(const char *text, double *ratio);
-bool text_share(const char *text, double *share);
 
 /* A whole number with decimal units: "1000", "1.5k", "2M", "1G"; a time: "90", "90s", "5m", "2h", "1d". false:
  * malformed, not finite, negative, or not a whole number. */

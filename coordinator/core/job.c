@@ -169,7 +169,7 @@ double job_straggles_at(const struct farm_config *c, const struct job *j, const 
 	return s->since + (isnan(j->median) ? c->first_copy : straggler_medians * j->median);
 }
 
-double job_lease_mutations(const struct job *j)
+static double job_lease_mutations(const struct job *j)
 {
 	uint64_t n = j->kind == LEASE_BOOTSTRAP ? j->plan.bootstrap : plan_round_mutations(&j->plan);
 	return (double)n / j->slot_count;

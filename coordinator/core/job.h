@@ -24,7 +24,6 @@ void job_place_all(struct job *j); /* and recomputes counts, from the progress o
 double job_idle_timeout(const struct farm_config *c, const struct slot *s); /* see farm_config */
 double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s);
 double job_straggles_at(const struct farm_config *c, const struct job *j, const struct slot *s);
-double job_lease_mutations(const struct job *j);
 
 /* Call when the slot's next epoch is merged. true: its round is complete. */
 bool job_merge(struct job *j, struct slot *s, double now, double duration);

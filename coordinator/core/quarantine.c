@@ -9,7 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
-void quarantine_worker(struct farm *f, struct identity *who)
+/* Permanently: no leases, and nothing that it sends counts. */
+static void quarantine_worker(struct farm *f, struct identity *who)
 {
 	if (who->quarantined)
 		return;

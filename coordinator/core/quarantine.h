@@ -13,8 +13,6 @@ struct slot;
 
 /* Counts a wrong result; the text describes it in a few words. */
 void quarantine_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k);
-/* Permanently: no leases, and nothing that it sends counts. */
-void quarantine_worker(struct farm *f, struct identity *who);
 
 void quarantine_fault(struct farm *f, struct peer *p,
 		      const char *text); /* it sent something that no correct worker sends */

@@ -196,11 +196,3 @@ int restore_open(struct jobs *jobs, struct error *e)
 {
 	return ledger_ids(jobs->ledger, LEDGER_LIVE, &jobs->restored, &jobs->restored_count, e);
 }
-
-bool restore_lives(const struct jobs *jobs, uint64_t job)
-{
-	for (size_t i = 0; i < jobs->restored_count; i++)
-		if (jobs->restored[i] == job)
-			return true;
-	return false;
-}

@@ -134,7 +134,8 @@ static void on_tick(uv_timer_t *t)
 	}
 }
 
-void server_stop(struct server *s)
+/* Nothing new is started; the loop ends when running work has ended. */
+static void server_stop(struct server *s)
 {
 	if (s->jobs.stopping)
 		return;

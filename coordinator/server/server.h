@@ -33,7 +33,6 @@ struct server {
 /* Starts to listen; the loop reads the jobs of an earlier run (recovery.h). */
 int server_open(struct server **s, const struct server_config *c, struct error *e);
 int server_await_jobs(struct server *s, struct error *e); /* runs the loop until they have been read */
-void server_stop(struct server *s);  /* nothing new is started; the loop ends when running work has ended */
-void server_close(struct server *s); /* stops it, unless a signal has */
+void server_close(struct server *s);			  /* stops it, unless a signal has */
 
 #endif

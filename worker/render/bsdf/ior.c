@@ -61,7 +61,7 @@ int ior_read(const struct scene_node *n, const char *name, double fallback, doub
 	return 0;
 }
 
-double ior_at(const struct ior *i, double nm)
+static double ior_at(const struct ior *i, double nm)
 {
 	if (i->terms == 0) {
 		double k = 1e6 / (nm * nm), d = 1e6 / (IOR_NM * IOR_NM);

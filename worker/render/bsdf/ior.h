@@ -42,7 +42,6 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 		.name = "ext_sellmeier", .types = VALUE_STRING                                     \
 	}
 
-double ior_at(const struct ior *i, double nm);
 /* The index inside over the index outside; by enum ior_side. */
 double ior_eta(const struct ior side[2], double nm);
 

@@ -48,7 +48,8 @@ struct microfacet principled_facets(double anisotropic, double roughness)
 }
 
 /* Textures of roughness and metallic are grey: the mean over the lanes. */
-double principled_share_at(const struct texture *t, const struct bsdf_point *at)
+/* The value of a number or texture at a point: textures of shares are grey, the mean over the lanes. */
+static double principled_share_at(const struct texture *t, const struct bsdf_point *at)
 {
 	return fmin(fmax(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
 }

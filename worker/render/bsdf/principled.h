@@ -38,9 +38,6 @@ spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_
 int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		      struct error *e);
 
-/* The value of a number or texture at a point: textures of shares are grey, the mean over the lanes. */
-double principled_share_at(const struct texture *t, const struct bsdf_point *at);
-
 #define PRINCIPLED_SHARE(name_)                                                                  \
 	{                                                                                        \
 		.name = name_, .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 1 \

@@ -38,6 +38,17 @@ void product_mul(struct product *p, spectrum f)
 	p->exponent += bring_near_one(&p->v);
 }
 
+/* Some vertex disperses: the path carries its hero wavelength alone. */
+static bool full_path_is_dispersed(const struct path_context *c, const struct full_path *x)
+{
+	if (!EFFECT_IS_ON(c->w, dispersion))
+		return false;
+	for (unsigned j = 1; j < x->edges; j++)
+		if (x->v[j].bsdf->dispersive)
+			return true;
+	return false;
+}
+
 static void to_xyz(const struct path_context *c, const struct full_path *x, spectrum l, double xyz[3])
 {
 	l = path_collapse(l, full_path_is_dispersed(c, x));
@@ -168,16 +179,6 @@ void full_path_set_wavelength(const struct path_context *c, struct full_path *x,
 		x->wl = wavelengths_sample_few(u, (unsigned)c->w->accuracy.wavelengths);
 	else
 		x->wl.grey = true;
-}
-
-bool full_path_is_dispersed(const struct path_context *c, const struct full_path *x)
-{
-	if (!EFFECT_IS_ON(c->w, dispersion))
-		return false;
-	for (unsigned j = 1; j < x->edges; j++)
-		if (x->v[j].bsdf->dispersive)
-			return true;
-	return false;
 }
 
 void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last)

@@ -85,8 +85,6 @@ spectrum full_path_specular(const struct full_path *x, unsigned j, vec3 *wi, dou
 /* By how far i_j is from where the exactly specular lobe of v[j]'s mode sends o_j; INFINITY: there is no such lobe. */
 double full_path_specular_miss(const struct full_path *x, unsigned j);
 void full_path_set_wavelength(const struct path_context *c, struct full_path *x, double u);
-/* Some vertex disperses: the path carries its hero wavelength alone. */
-bool full_path_is_dispersed(const struct path_context *c, const struct full_path *x);
 
 /* Vertices first..last with their edges and caches, and what belongs to the path as a whole. */
 void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last);

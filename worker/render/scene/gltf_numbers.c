@@ -69,7 +69,8 @@ static bool open_buffer(struct gltf *g, const struct gltf_range *r)
 	return list_file(g, r->file);
 }
 
-const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
+/* The bytes of a view, valid until those of another buffer are wanted. NULL after a failure. */
+static const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
 {
 	struct gltf_range buffer;
 	uint64_t first;

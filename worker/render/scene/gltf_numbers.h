@@ -19,8 +19,6 @@ struct gltf_vectors {
 bool gltf_vectors_read(struct gltf *g, const struct gltf_at *accessor, const char *use, unsigned components,
 		       struct gltf_vectors *out);
 void gltf_vectors_fini(struct gltf_vectors *v);
-/* The bytes of a view, valid until those of another buffer are wanted. NULL after a failure. */
-const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count);
 void gltf_numbers_close(struct gltf *g);
 
 #endif

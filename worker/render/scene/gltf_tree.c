@@ -24,7 +24,7 @@ const char *gltf_array_name(enum gltf_array array)
 	return array_names[array];
 }
 
-int gltf_line(const struct gltf *g, enum gltf_array array, size_t index)
+static int gltf_line(const struct gltf *g, enum gltf_array array, size_t index)
 {
 	return index < g->line_count[array] ? g->lines[array][index] : 1;
 }

@@ -93,7 +93,6 @@ bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gl
 /* The entry whose index is the value of `key`. 1: found, 0: no such key, negative: an error. */
 int gltf_follow(struct gltf *g, const struct gltf_at *from, const json_t *object, const char *key,
 		enum gltf_array array, struct gltf_at *out);
-int gltf_line(const struct gltf *g, enum gltf_array array, size_t index);
 /* Sets g->failed, with "file:line: array[index]: ". */
 __attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value,
 						    const char *format, ...);

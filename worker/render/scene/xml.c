@@ -81,7 +81,8 @@ static void *expat_realloc(void *p, size_t size)
 
 static const XML_Memory_Handling_Suite expat_memory = {expat_alloc, expat_realloc, expat_free};
 
-bool xml_is_foreign(const char *element)
+/* Elements for which this is true are marked ignored, with everything inside. */
+static bool xml_is_foreign(const char *element)
 {
 	/* Final or preview mode, objects hidden by an editor, settings of another renderer. */
 	return !strcmp(element, "mode") || !strcmp(element, "hide") || !strcmp(element, "dpt");

@@ -40,9 +40,6 @@ struct xml_tree {
 		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
 };
 
-/* Elements for which this is true are marked ignored, with everything inside. */
-bool xml_is_foreign(const char *element);
-
 int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,
 	     const struct scene_define *defines, size_t define_count, struct arena *arena, struct error *e);
 

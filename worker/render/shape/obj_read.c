@@ -253,7 +253,17 @@ static int read_lines(struct reader *o)
 	return 0;
 }
 
-int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e)
+static void obj_free(struct obj_file *o)
+{
+	struct list *all[] = {&o->positions, &o->uvs,	    &o->normals, &o->colours,
+			      &o->corners,   &o->triangles, &o->runs,	 &o->names};
+	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+		list_free(all[i]);
+	*o = (struct obj_file){0};
+}
+
+/* Reads the file that the node names. After 0, release it with obj_free. */
+static int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e)
 {
 	*o = (struct obj_file){0};
 	struct asset a;
@@ -281,15 +291,6 @@ int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_
 	if (r)
 		obj_free(o);
 	return r;
-}
-
-void obj_free(struct obj_file *o)
-{
-	struct list *all[] = {&o->positions, &o->uvs,	    &o->normals, &o->colours,
-			      &o->corners,   &o->triangles, &o->runs,	 &o->names};
-	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-		list_free(all[i]);
-	*o = (struct obj_file){0};
 }
 
 int obj_cache_read(struct obj_cache *c, const struct scene_node *n, const struct asset_source *assets, struct error *e)

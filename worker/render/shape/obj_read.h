@@ -29,10 +29,6 @@ struct obj_file {
 	struct list names;		     /* char */
 };
 
-/* Reads the file that the node names. After 0, release it with obj_free. */
-int obj_read(struct obj_file *o, const struct scene_node *n, const struct asset_source *assets, struct error *e);
-void obj_free(struct obj_file *o);
-
 /* The file read last, kept if a shape took one material of it, because the next shape usually takes another. */
 struct obj_cache {
 	char *name; /* NULL: nothing is kept */

@@ -135,13 +135,6 @@ static double residual_of(const struct upsample *s, const double target[3], cons
 	return norm3(residual);
 }
 
-void upsample_rgb(const struct upsample *s, const double c[3], double rgb[3])
-{
-	double xyz[3], unused[3][3];
-	to_xyz(s, c, xyz, unused);
-	solve3(s->xyz_from_rgb, xyz, rgb);
-}
-
 double upsample_fit(const struct upsample *s, const double rgb[3], double tolerance, double c[3])
 {
 	enum { ITERATIONS = 60 };

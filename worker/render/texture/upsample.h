@@ -30,9 +30,6 @@ static inline double upsample_sigmoid(double x)
 
 void upsample_init(struct upsample *s, int step_nm); /* a divisor of 470 */
 
-/* The colour under D65 of the reflectance with these coefficients. */
-void upsample_rgb(const struct upsample *s, const double c[3], double rgb[3]);
-
 /* Improves c (start: any finite values) by damped Gauss-Newton steps until the colour difference is below
  * `tolerance` or nothing helps. Returns the remaining difference, in CIELAB units. rgb in [0,1]. */
 double upsample_fit(const struct upsample *s, const double rgb[3], double tolerance, double c[3]);
