@@ -168,6 +168,19 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 	return 0;
 }
 
+int durable_end_soon(struct jobs *jobs, const struct live_job *job, const struct job_record *r, struct error *e)
+{
+	return ledger_end(jobs->ledger, r, keep_films(jobs, job), e);
+}
+
+int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e)
+{
+	for (const struct ending *n = jobs->endings; n; n = n->next)
+		if (n->record.id == job)
+			return error_set(e, EIO, "the disk refuses it, and it is tried again");
+	return 0;
+}
+
 static void end_again(struct jobs *jobs)
 {
 	struct error e;

@@ -18,6 +18,11 @@ int durable_pack(const struct live_job *job, struct ledger_job *j, unsigned char
 /* The job has ended: writes its record, and keeps (keep.h) or deletes its films. Not 0: its record cannot be
  * written; if it has a result, nobody may be told of it yet. Also retries the records of others. */
 int durable_end(struct jobs *jobs, struct live_job *job);
+/* The job has ended, but its films are being read: writes this record, so that it stays ended if the coordinator is
+ * killed before durable_end. */
+int durable_end_soon(struct jobs *jobs, const struct live_job *job, const struct job_record *r, struct error *e);
+/* 0, or why the end of the job, which is live no more, is not in the ledger yet. */
+int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e);
 /* A job that was extended has ended again, as it was: now, or as soon as that can be written. */
 void durable_end_again(struct jobs *jobs, const struct job_record *r);
 

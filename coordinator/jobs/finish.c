@@ -17,21 +17,26 @@
 
 #include <time.h>
 
-static void finish(struct jobs *jobs, struct live_job *job)
+static struct job_record record_of(const struct jobs *jobs, const struct live_job *job)
 {
 	struct job_view v;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
-	jobs_view(jobs, job->id, &v);
+	jobs_view_end(jobs, job, &v);
 	v.record.ended_seen = ages_now(jobs);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-	job->record = v.record;
+	return v.record;
+}
+
+static void finish(struct jobs *jobs, struct live_job *job)
+{
+	job->record = record_of(jobs, job);
 	if (durable_end(jobs, job)) { /* try again later */
 		job->unrecorded = true;
 		job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
 		return;
 	}
-	ended_jobs_add(jobs, &v.record);
+	ended_jobs_add(jobs, &job->record);
 	jobs->peers.job_ended(jobs->peers.user, job->id);
 	keep_trim(jobs);
 	clear_soon(jobs);
@@ -50,6 +55,17 @@ static void finish(struct jobs *jobs, struct live_job *job)
 		waiting_batch_free(late);
 		late = next;
 	}
+}
+
+int finish_cancelled(struct jobs *jobs, uint64_t id, struct error *e)
+{
+	struct live_job *job = jobs_find(jobs, id);
+	if (!job)
+		return durable_ended(jobs, id, e);
+	if (!job->ended)
+		return 0;
+	struct job_record r = record_of(jobs, job);
+	return durable_end_soon(jobs, job, &r, e);
 }
 
 void finish_ended(struct jobs *jobs)

@@ -8,5 +8,8 @@
 /* Finishes all jobs that the core has ended and whose films are free: record, workers, memory. Then handles
  * extensions that waited for them. */
 void finish_ended(struct jobs *jobs);
+/* After a job was cancelled: 0 if it stays so when the coordinator is killed, even if a thread still reads its films;
+ * or why not. */
+int finish_cancelled(struct jobs *jobs, uint64_t job, struct error *e);
 
 #endif

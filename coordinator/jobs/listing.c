@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void view_live(struct jobs *jobs, const struct live_job *job, struct job_view *v)
+bool jobs_view_end(const struct jobs *jobs, const struct live_job *job, struct job_view *v)
 {
 	struct job_status status;
 	struct canvas_counts counted;
@@ -25,8 +25,15 @@ static void view_live(struct jobs *jobs, const struct live_job *job, struct job_
 	if (job->ended)
 		record_add_doubt(&v->record);
 	if (!farm_job(jobs->farm, job->id, jobs_now(jobs), &status))
-		return;
+		return false;
 	view_add_status(v, &status);
+	return true;
+}
+
+static void view_live(const struct jobs *jobs, const struct live_job *job, struct job_view *v)
+{
+	if (!jobs_view_end(jobs, job, v))
+		return;
 	if (job->ended && (job->busy || job->unpublished || job->unrecorded)) { /* not before its image exists */
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*job->record.why)

@@ -3,6 +3,7 @@
 
 #include "common/base/text.h"
 #include "coordinator/jobs/extend.h"
+#include "coordinator/jobs/finish.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/client_answers.h"
@@ -76,9 +77,10 @@ static bool finds(struct session *p, uint64_t job, bool over_too)
 
 void control_cancel(struct session *p, uint64_t job)
 {
+	struct error e;
 	struct event ev = {.kind = EVENT_CANCEL, .job = job};
-	if (finds(p, job, false))
-		ask_core(p, &ev);
+	if (finds(p, job, false) && !ask_core(p, &ev) && finish_cancelled(p->jobs, job, &e))
+		not_for_long(p, &e);
 	client_send_done(p, "");
 }
 

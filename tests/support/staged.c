@@ -147,14 +147,20 @@ uint64_t staged_submit(void)
 	return scripted_submit_whole(staged.client, &scripted_request, "<scene/>");
 }
 
-void staged_order(const Farm__Envelope *m)
+static const Farm__Done *ask(const Farm__Envelope *m)
 {
 	assert_true(scripted_say(staged.client, m, NULL, 0));
 	const Farm__Envelope *answer = scripted_hear(staged.client);
-	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_DONE && answer->done->ok);
+	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_DONE);
+	return answer->done;
 }
 
-void staged_cancel(uint64_t job)
+void staged_order(const Farm__Envelope *m)
+{
+	assert_true(ask(m)->ok);
+}
+
+static const Farm__Done *cancel(uint64_t job)
 {
 	Farm__Cancel c;
 	Farm__Envelope m;
@@ -163,7 +169,19 @@ void staged_cancel(uint64_t job)
 	c.job = job;
 	m.body_case = FARM__ENVELOPE__BODY_CANCEL;
 	m.cancel = &c;
-	staged_order(&m);
+	return ask(&m);
+}
+
+void staged_cancel(uint64_t job)
+{
+	assert_true(cancel(job)->ok);
+}
+
+void staged_cancel_unstored(uint64_t job)
+{
+	const Farm__Done *answer = cancel(job);
+	assert_true(!answer->ok &&
+		    strstr(answer->text, "it applies until the coordinator stops, but cannot be stored"));
 }
 
 bool staged_answer(const struct lease_key *k)

@@ -48,6 +48,7 @@ void staged_end(int signal, bool well); /* well: its exit code has to be 0 */
 uint64_t staged_submit(void);
 void staged_order(const Farm__Envelope *m); /* to the client; the answer has to be yes */
 void staged_cancel(uint64_t job);
+void staged_cancel_unstored(uint64_t job);     /* the answer has to be that it cannot be stored */
 bool staged_answer(const struct lease_key *k); /* false: the coordinator hung up */
 /* Answers leases until *until. keep: if not NULL, gets the first lease of the image, which stays unanswered. */
 void staged_work(const _Atomic bool *until, struct lease_key *keep);

@@ -91,6 +91,22 @@ static void cancelled_while_its_checkpoint_fails(void **state)
 	staged_end(SIGTERM, true);
 }
 
+/* Killed while the films of a cancelled job are still being read: its client was told that it is over. */
+static void cancelled_and_killed(void **state)
+{
+	(void)state;
+	staged_disk->hold_up = true;
+	staged_start();
+	uint64_t job = staged_submit();
+	staged_work(&staged_disk->held_up, NULL);
+	staged_cancel(job);
+	staged_end(SIGKILL, false);
+	staged_disk->go_on = true;
+	staged_start();
+	staged_await_state(job, "cancelled");
+	staged_end(SIGTERM, true);
+}
+
 /* The failures that the job's record knows when the coordinator had its ticks after the failure, and after the
  * checkpoint. */
 static uint64_t failures_after(useconds_t ticks_us)
@@ -170,7 +186,7 @@ static void a_record_is_written_later(void **state)
 	free(frame);
 	staged_start();
 	staged_disk->fail_ledger = true;
-	staged_cancel(job);
+	staged_cancel_unstored(job);
 	usleep(STAGED_TICKS_US);
 	staged_await_state(job, "running");
 	staged_disk->fail_ledger = false;
@@ -288,6 +304,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(cancelled_while_its_checkpoint_fails, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(cancelled_and_killed, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(counted_while_a_checkpoint_is_written, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_record_is_written_later, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_during_a_slow_flush, staged_set_up, folder_tear_down),
