@@ -108,7 +108,8 @@ const struct attribute_values *attribute_keep(struct attribute_table *t, const s
 	}
 	const float *from = own ? own : a->value;
 	uint64_t hash = hash_of(from, count);
-	for (struct attribute_values *v = t->pool->first; v; v = v->next)
+	struct attribute_values **first = &t->pool->first[hash % ATTRIBUTE_POOL_LISTS];
+	for (struct attribute_values *v = *first; v; v = v->next)
 		if (v->hash == hash && v->count == count && v->channels == a->channels &&
 		    memcmp(v->value, from, count * sizeof *from) == 0)
 			return v;
@@ -120,8 +121,8 @@ const struct attribute_values *attribute_keep(struct attribute_table *t, const s
 	}
 	if (!v || !own)
 		return NULL;
-	*v = (struct attribute_values){t->pool->first, count, hash, a->channels, .value = own};
+	*v = (struct attribute_values){*first, count, hash, a->channels, .value = own};
 	find_range(v);
-	t->pool->first = v;
+	*first = v;
 	return v;
 }

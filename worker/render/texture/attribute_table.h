@@ -22,9 +22,10 @@ struct attribute_values {
 	const float *value;
 };
 
-/* Attributes that textures use; in the world's arena. */
+/* Attributes that textures use, by their hashes; in the world's arena. A scene may have 2^18 meshes with colours. */
+enum { ATTRIBUTE_POOL_LISTS = 1 << 12 };
 struct attribute_pool {
-	struct attribute_values *first;
+	struct attribute_values *first[ATTRIBUTE_POOL_LISTS];
 };
 
 struct attribute_table {

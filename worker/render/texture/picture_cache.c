@@ -18,9 +18,26 @@ static bool same_key(const struct picture_key *a, const struct picture_key *b)
 	       a->power == b->power && strcmp(a->name, b->name) == 0;
 }
 
+static uint64_t mix(uint64_t h, uint64_t word)
+{
+	return (h ^ word) * 0x100000001b3 ^ h >> 29;
+}
+
+/* Keys that are equal have equal hashes. */
+static size_t list_of(const struct picture_key *k)
+{
+	const double number[2] = {k->threshold, k->power};
+	uint64_t words[2], h = 0xcbf29ce484222325;
+	memcpy(words, number, sizeof words);
+	for (const char *p = k->name; *p; p++)
+		h = mix(h, (unsigned char)*p);
+	h = mix(mix(mix(h, (uint64_t)k->first_byte), words[0]), words[1]);
+	return (h ^ h >> 32) % PICTURE_LISTS;
+}
+
 struct picture *picture_find(const struct picture_cache *c, const struct picture_key *k, double least, double largest)
 {
-	for (struct picture_entry *p = c->first; p; p = p->next) {
+	for (struct picture_entry *p = c->first[list_of(k)]; p; p = p->next) {
 		bool fits = p->cut ? p->least == least && p->largest == largest
 				   : p->least >= least && p->largest <= largest;
 		if (fits && same_key(&p->key, k))
@@ -44,14 +61,14 @@ static void own_range(const struct image *i, double *least, double *largest)
 struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct image *image,
 			    double least, double largest, bool cut, struct arena *arena)
 {
-	struct picture_entry *p = arena_alloc(arena, 1, sizeof *p);
+	struct picture_entry *p = arena_alloc(arena, 1, sizeof *p), **first = &c->first[list_of(k)];
 	char *name = arena_strdup(arena, k->name);
 	if (!p || !name)
 		return NULL;
-	*p = (struct picture_entry){*k, {*image, .largest = -1, .bound = -1}, least, largest, cut, c->first};
+	*p = (struct picture_entry){*k, {*image, .largest = -1, .bound = -1}, least, largest, cut, *first};
 	p->key.name = name;
 	if (!cut)
 		own_range(image, &p->least, &p->largest);
-	c->first = p;
+	*first = p;
 	return &p->picture;
 }

@@ -10,9 +10,11 @@
 
 struct picture_entry;
 
+/* By hashes of their keys: a scene may read one image in 10^5 ways. */
+enum { PICTURE_LISTS = 1 << 10 };
 struct picture_cache {
 	const struct arena *arena; /* further images are not shared */
-	struct picture_entry *first;
+	struct picture_entry *first[PICTURE_LISTS];
 };
 
 /* Everything that determines the pixels, except for the range that they are clamped to. */

@@ -328,7 +328,7 @@ static void test_shared(void **state)
 				  {.name = "vertex_b", .channels = 3, .value = b},
 				  {.name = "vertex_c", .channels = 3, .value = c}};
 	struct arena arena = {0};
-	struct attribute_pool pool = {NULL};
+	static struct attribute_pool pool;
 	struct attribute_table t = {.vertex_count = 2, .attributes = of, .count = 3, .pool = &pool};
 	const struct attribute_values *first = attribute_keep(&t, &of[0], false, &arena);
 	assert_true(first && t.asked && first->value != a && memcmp(first->value, a, sizeof a) == 0);
