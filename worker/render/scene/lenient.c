@@ -19,7 +19,9 @@ static const struct {
 	const char *type, *stand_in;
 } likes[] = {
 	{PLUGIN_BSDF, "measured", "roughplastic"},
-	{PLUGIN_EMITTER, "timed_sunsky", "constant"},
+	/* 3 p.m. of the first day, instead of all times together */
+	{PLUGIN_EMITTER, "timed_sunsky", "sunsky"},
+	{PLUGIN_EMITTER, "avg_sunsky", "sunsky"},
 };
 
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)
@@ -53,8 +55,11 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 const char *lenient_param(const char *stand_in, const char *name)
 {
 	static const char *const colors[] = {"base_color", "diffuse_reflectance", "color", "diffuse", "albedo", NULL};
+	static const char *const days[] = {"start_year", "start_month", "start_day", NULL};
 	if (strcmp(stand_in, "diffuse") == 0 && is_one_of(name, colors))
 		return "reflectance";
+	if (strcmp(stand_in, "sunsky") == 0 && is_one_of(name, days))
+		return name + strlen("start_");
 	return name;
 }
 

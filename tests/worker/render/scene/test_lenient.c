@@ -24,7 +24,7 @@ static void test_stand_ins(void **state)
 	} expected[] = {
 		{PLUGIN_BSDF, "hair", LENIENT_INNER, "diffuse"},
 		{PLUGIN_BSDF, "measured", LENIENT_REPLACE, "roughplastic"},
-		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "constant"},
+		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "sunsky"},
 		{PLUGIN_EMITTER, "collimated", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
 		{PLUGIN_TEXTURE, "wireframe", LENIENT_LEAVE_OUT, NULL},
@@ -55,6 +55,8 @@ static void test_colours_are_kept(void **state)
 	assert_string_equal(lenient_param("diffuse", "base_color"), "reflectance");
 	assert_string_equal(lenient_param("diffuse", "diffuse_reflectance"), "reflectance");
 	assert_string_equal(lenient_param("diffuse", "alpha"), "alpha");
+	assert_string_equal(lenient_param("sunsky", "start_month"), "month");
+	assert_string_equal(lenient_param("sunsky", "turbidity"), "turbidity");
 	assert_string_equal(lenient_param("roughplastic", "diffuse_reflectance"), "diffuse_reflectance");
 }
 
