@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * OpenEXRCore checks the header, then the bytes go into a memory file, because the RGBA interface opens files by name,
- * and are decoded some rows at a time. Failures: what exr_check refuses, images without R, G and B, or Y, and what
- * OpenEXR refuses, all with a sentence.
+ * OpenEXRCore checks the header and copies the compressed chunks into a file with a header of ours, so that OpenEXR's
+ * C++ library, which believes sizes in headers, never sees a foreign one. That file is in memory, but has a name,
+ * because the RGBA interface opens files by name; it decodes some rows at a time.
+ *
+ * Failures: what exr_check refuses, images without R, G and B, or Y, chunks larger than the file, and what OpenEXR
+ * refuses, all with a sentence.
  */
 #include "common/exr/exr_dwa.h"
 
@@ -56,15 +59,108 @@ static int choose_channels(struct exr_image *img, struct error *e)
 	return 0;
 }
 
-static int check(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img, struct error *e)
+static exr_result_t write_header(exr_context_t from, exr_context_t to, const struct exr_image *img, bool tiled)
+{
+	exr_compression_t compression = EXR_COMPRESSION_NONE;
+	const exr_attr_chlist_t *channels = NULL;
+	const exr_attr_v2f_t center = {{{0, 0}}};
+	exr_attr_box2i_t all = exr_box(0, 0, img->width, img->height);
+	int32_t tile_w, tile_h;
+	int part;
+	exr_result_t rc = exr_add_part(to, NULL, tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
+	if (rc == EXR_ERR_SUCCESS)
+		rc = exr_get_compression(from, 0, &compression);
+	if (rc == EXR_ERR_SUCCESS)
+		rc = exr_initialize_required_attr(to, part, &all, &all, 1, &center, 1, EXR_LINEORDER_INCREASING_Y,
+						  compression);
+	if (rc == EXR_ERR_SUCCESS && tiled)
+		rc = exr_get_tile_sizes(from, 0, 0, 0, &tile_w, &tile_h);
+	if (rc == EXR_ERR_SUCCESS && tiled)
+		rc = exr_set_tile_descriptor(to, part, (uint32_t)tile_w, (uint32_t)tile_h, EXR_TILE_ONE_LEVEL,
+					     EXR_TILE_ROUND_DOWN);
+	if (rc == EXR_ERR_SUCCESS)
+		rc = exr_get_channels(from, 0, &channels);
+	if (rc == EXR_ERR_SUCCESS)
+		rc = exr_set_channels(to, part, channels);
+	return rc == EXR_ERR_SUCCESS ? exr_write_header(to) : rc;
+}
+
+/* The compressed bytes of a chunk; mem_alloc'd. most: of the file. */
+static exr_result_t read_packed(exr_context_t from, const exr_chunk_info_t *chunk, size_t most, void **packed)
+{
+	if (chunk->packed_size > most)
+		return EXR_ERR_BAD_CHUNK_LEADER;
+	*packed = mem_alloc((size_t)chunk->packed_size, 1);
+	return *packed ? exr_read_chunk(from, 0, chunk, *packed) : EXR_ERR_OUT_OF_MEMORY;
+}
+
+static exr_result_t copy_rows(exr_context_t from, exr_context_t to, const struct exr_image *img, size_t most)
+{
+	exr_attr_box2i_t data;
+	int32_t rows = 1;
+	exr_result_t rc = exr_get_data_window(from, 0, &data);
+	if (rc == EXR_ERR_SUCCESS)
+		rc = exr_get_scanlines_per_chunk(from, 0, &rows);
+	for (uint32_t y = 0; rc == EXR_ERR_SUCCESS && y < img->height; y += (uint32_t)rows) {
+		exr_chunk_info_t chunk;
+		void *packed = NULL;
+		rc = exr_read_scanline_chunk_info(from, 0, data.min.y + (int)y, &chunk);
+		if (rc == EXR_ERR_SUCCESS)
+			rc = read_packed(from, &chunk, most, &packed);
+		if (rc == EXR_ERR_SUCCESS)
+			rc = exr_write_scanline_chunk(to, 0, (int)y, packed, chunk.packed_size);
+		mem_free(packed);
+	}
+	return rc;
+}
+
+static exr_result_t copy_tiles(exr_context_t from, exr_context_t to, const struct exr_image *img, size_t most)
+{
+	int32_t w = 0, h = 0;
+	exr_result_t rc = exr_get_tile_sizes(from, 0, 0, 0, &w, &h);
+	if (rc == EXR_ERR_SUCCESS && (w < 1 || h < 1))
+		rc = EXR_ERR_BAD_CHUNK_LEADER;
+	for (uint32_t y = 0; rc == EXR_ERR_SUCCESS && y * (uint64_t)h < img->height; y++)
+		for (uint32_t x = 0; rc == EXR_ERR_SUCCESS && x * (uint64_t)w < img->width; x++) {
+			exr_chunk_info_t chunk;
+			void *packed = NULL;
+			rc = exr_read_tile_chunk_info(from, 0, (int)x, (int)y, 0, 0, &chunk);
+			if (rc == EXR_ERR_SUCCESS)
+				rc = read_packed(from, &chunk, most, &packed);
+			if (rc == EXR_ERR_SUCCESS)
+				rc = exr_write_tile_chunk(to, 0, (int)x, (int)y, 0, 0, packed, chunk.packed_size);
+			mem_free(packed);
+		}
+	return rc;
+}
+
+/* A file with the same pixels from (0, 0) on; mem_alloc'd. */
+static int rewrite(exr_context_t from, size_t most, const struct exr_image *img, bool tiled, unsigned char **bytes,
+		   size_t *size, struct error *e)
+{
+	exr_context_t to;
+	struct exr_stream s;
+	int rc = exr_open_write(&to, &s, most, e);
+	if (rc)
+		return rc;
+	exr_result_t done = write_header(from, to, img, tiled);
+	if (done == EXR_ERR_SUCCESS)
+		done = tiled ? copy_tiles(from, to, img, most) : copy_rows(from, to, img, most);
+	return exr_close_write(&to, &s, done, bytes, size, e);
+}
+
+static int check_and_rewrite(const unsigned char *foreign, size_t foreign_size, int64_t bytes_most,
+			     struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e)
 {
 	exr_context_t x;
 	struct exr_stream s;
 	bool tiled;
-	int rc = exr_open_read(&x, &s, bytes, size, e);
+	int rc = exr_open_read(&x, &s, foreign, foreign_size, e);
 	if (rc)
 		return rc;
 	rc = exr_check(x, &s, &(struct exr_limits){bytes_most, INFLATION_MOST}, img, &tiled, e);
+	if (!rc)
+		rc = rewrite(x, foreign_size, img, tiled, bytes, size, e);
 	exr_finish(&x);
 	return rc ? rc : choose_channels(img, e);
 }
@@ -86,21 +182,16 @@ static int memory_file(const unsigned char *bytes, size_t size, struct error *e)
 	return fd >= 0 ? fd : error_set(e, ENOMEM, "no memory for an EXR file");
 }
 
-/* rows: room for ROWS rows. The interface wants the address that pixel (0, 0) would have. */
+/* rows: room for up to ROWS rows. The interface wants the address that pixel (0, 0) would have. */
 static int read_rows(ImfInputFile *in, ImfRgba *rows, struct exr_image *img, struct error *e)
 {
-	int low_x, low_y, high_x, high_y;
-	ImfHeaderDataWindow(ImfInputHeader(in), &low_x, &low_y, &high_x, &high_y);
-	if ((int64_t)high_x - low_x + 1 != img->width || (int64_t)high_y - low_y + 1 != img->height)
-		return error_set(e, EBADMSG, "the EXR file's header says two things");
 	for (uint32_t y = 0; y < img->height; y += ROWS) {
 		uint32_t count = img->height - y < ROWS ? img->height - y : ROWS;
-		int64_t offset = (int64_t)low_x + ((int64_t)low_y + y) * img->width;
-		ImfRgba *origin = (ImfRgba *)((intptr_t)rows - (intptr_t)(offset * (int64_t)sizeof *rows));
-		if (!ImfInputSetFrameBuffer(in, origin, 1, img->width) ||
-		    !ImfInputReadPixels(in, low_y + (int)y, low_y + (int)(y + count - 1)))
-			return refused(e);
 		size_t first = (size_t)y * img->width, pixels = (size_t)count * img->width;
+		ImfRgba *origin = (ImfRgba *)((uintptr_t)rows - first * sizeof *rows);
+		if (!ImfInputSetFrameBuffer(in, origin, 1, img->width) ||
+		    !ImfInputReadPixels(in, (int)y, (int)(y + count - 1)))
+			return refused(e);
 		for (size_t i = 0; i < pixels; i++) {
 			const ImfHalf value[3] = {rows[i].r, rows[i].g, rows[i].b};
 			for (uint32_t c = 0; c < img->channel_count; c++)
@@ -115,7 +206,8 @@ static int decode(int fd, struct exr_image *img, struct error *e)
 {
 	char path[32];
 	snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
-	ImfRgba *rows = mem_alloc((size_t)ROWS * img->width, sizeof *rows);
+	size_t count = img->height < ROWS ? img->height : ROWS;
+	ImfRgba *rows = mem_alloc(count * img->width, sizeof *rows);
 	if (!rows)
 		return error_set(e, ENOMEM, "no memory to decode an image");
 	pthread_mutex_lock(&one_at_a_time);
@@ -130,9 +222,12 @@ static int decode(int fd, struct exr_image *img, struct error *e)
 
 int exr_read_dwa(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img, struct error *e)
 {
+	unsigned char *ours = NULL;
+	size_t ours_size = 0;
 	*img = (struct exr_image){0};
-	int rc = check(bytes, size, bytes_most, img, e);
-	int fd = rc ? -1 : memory_file(bytes, size, e);
+	int rc = check_and_rewrite(bytes, size, bytes_most, img, &ours, &ours_size, e);
+	int fd = rc ? -1 : memory_file(ours, ours_size, e);
+	mem_free(ours);
 	if (!rc && fd < 0)
 		rc = fd;
 	if (!rc)
