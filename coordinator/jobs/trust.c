@@ -66,6 +66,8 @@ static void tell_core(struct jobs *jobs, const json_t *w)
 	jobs_step(jobs, &ev);
 }
 
+static const char empty[] = "{\"schema\": 1, \"workers\": []}";
+
 /* The farm does not stop for it: a worker that gives wrong results will do so again, and be found again. */
 static int put_by(struct jobs *jobs, const char *text, struct error *e)
 {
@@ -74,13 +76,17 @@ static int put_by(struct jobs *jobs, const char *text, struct error *e)
 		  "quarantined\"",
 		  note, note);
 	int rc = ledger_set(jobs->ledger, "quarantined-damaged", text, e);
-	return rc ? rc : ledger_set(jobs->ledger, note, "{\"schema\": 1, \"workers\": []}", e);
+	return rc ? rc : ledger_set(jobs->ledger, note, empty, e);
 }
 
 int trust_open(struct jobs *jobs, struct error *e)
 {
 	char *text;
 	int rc = ledger_note(jobs->ledger, note, &text, e);
+	if (rc == -EBADMSG) {
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"nobody in it is quarantined\"", log_quote(e->text).text);
+		return ledger_set(jobs->ledger, note, empty, e);
+	}
 	if (rc)
 		return rc == -ENOENT ? 0 : rc;
 	json_t *o = json_loads(text, JSON_REJECT_DUPLICATES, NULL);

@@ -19,6 +19,7 @@
 #include "coordinator/store/ids.h"
 #include "coordinator/store/ledger_file.h"
 #include "coordinator/store/ledger_side.h"
+#include "coordinator/store/note.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -101,6 +102,21 @@ static int merge_rows(struct ledger *l, struct error *e)
 	return rc;
 }
 
+/* Drops the notes of a file that the other one has with a checksum that holds, and it has not. */
+static int drop_damaged(struct ledger *l, int side, struct error *e)
+{
+	char sql[SQL_MOST];
+	text_print(sql, sizeof sql,
+		   "DELETE FROM %s.notes AS n WHERE EXISTS (SELECT 1 FROM %s.notes AS o WHERE o.name = n.name"
+		   " AND note_rank(o.name, o.text) > note_rank(n.name, n.text))",
+		   schemas[side], schemas[!side]);
+	int before = sqlite3_total_changes(l->db), rc = ledger_file_run(l->db, sql, e);
+	if (!rc && sqlite3_total_changes(l->db) > before)
+		log_event(LOG_SPOOL_FAULT, "text=\"notes in %s were damaged: restored from %s\"", names[side],
+			  names[!side]);
+	return rc;
+}
+
 static int merge_notes(struct ledger *l, const char *from, const char *to, struct error *e)
 {
 	char sql[SQL_MOST];
@@ -119,6 +135,10 @@ static int merge(struct ledger *l, struct error *e)
 	if (rc)
 		return rc;
 	rc = merge_rows(l, e);
+	if (!rc && !l->behind)
+		rc = drop_damaged(l, 0, e);
+	if (!rc)
+		rc = drop_damaged(l, 1, e);
 	if (!rc)
 		rc = merge_notes(l, schemas[0], schemas[1], e);
 	if (!rc && !l->behind)
@@ -160,6 +180,8 @@ static int open_both(struct ledger *l, const char *folder, struct error *e)
 	if (!rc)
 		rc = ledger_file_attach(l->db, path[1], schemas[1], e);
 	if (!rc)
+		rc = note_register(l->db, e);
+	if (!rc)
 		rc = ledger_side_open(&l->jobs, l->db, schemas[0], e);
 	return rc ? rc : ledger_side_open(&l->copy, l->db, schemas[1], e);
 }
@@ -185,6 +207,9 @@ static int find_next(struct ledger *l, struct error *e)
 	if (!rc) {
 		skip(l, strtoull(text, NULL, 10) - 1);
 		mem_free(text);
+	} else if (rc == -EBADMSG) {
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"the next number follows from the jobs that are known\"",
+			  log_quote(e->text).text);
 	} else if (rc != -ENOENT) {
 		return rc;
 	}

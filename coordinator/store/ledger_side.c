@@ -4,6 +4,7 @@
 #include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "coordinator/store/ledger_file.h"
+#include "coordinator/store/note.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -175,9 +176,26 @@ int ledger_side_remove(struct ledger_side *s, uint64_t id, struct error *e)
 
 int ledger_side_set(struct ledger_side *s, const char *name, const char *text, struct error *e)
 {
+	char *stored = note_seal(name, text);
+	if (!stored)
+		return error_set(e, ENOMEM, "no memory for %s", name);
 	sqlite3_bind_text(s->statements[LEDGER_SET], 1, name, -1, SQLITE_STATIC);
-	sqlite3_bind_text(s->statements[LEDGER_SET], 2, text, -1, SQLITE_STATIC);
-	return finish(s, LEDGER_SET, e);
+	sqlite3_bind_text(s->statements[LEDGER_SET], 2, stored, -1, SQLITE_STATIC);
+	int rc = finish(s, LEDGER_SET, e);
+	mem_free(stored);
+	return rc;
+}
+
+static int unseal(const char *name, const char *stored, char **text, struct error *e)
+{
+	size_t size;
+	if (note_rank(name, stored, &size) == NOTE_DAMAGED)
+		return error_set(e, EBADMSG, "the note %s is damaged in jobs.db and in jobs-copy.db", name);
+	*text = mem_strdup(stored);
+	if (!*text)
+		return error_set(e, ENOMEM, "no memory for %s", name);
+	(*text)[size] = 0;
+	return 0;
 }
 
 int ledger_side_note(struct ledger_side *side, const char *name, char **text, struct error *e)
@@ -186,7 +204,7 @@ int ledger_side_note(struct ledger_side *side, const char *name, char **text, st
 	sqlite3_bind_text(s, 1, name, -1, SQLITE_STATIC);
 	int rc = sqlite3_step(s);
 	if (rc == SQLITE_ROW)
-		rc = (*text = mem_strdup(text_at(s, 0))) ? 0 : error_set(e, ENOMEM, "no memory for %s", name);
+		rc = unseal(name, text_at(s, 0), text, e);
 	else
 		rc = rc == SQLITE_DONE ? error_set(e, ENOENT, "there is no %s", name) : ledger_file_error(side->db, e);
 	sqlite3_reset(s);

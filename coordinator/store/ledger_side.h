@@ -39,6 +39,7 @@ void ledger_side_bind(struct ledger_side *s, const struct ledger_job *j);
 int ledger_side_put(struct ledger_side *s, struct error *e);
 int ledger_side_remove(struct ledger_side *s, uint64_t id, struct error *e);
 int ledger_side_set(struct ledger_side *s, const char *name, const char *text, struct error *e);
-int ledger_side_note(struct ledger_side *s, const char *name, char **text, struct error *e); /* mem_alloc'd; -ENOENT */
+/* mem_alloc'd; -ENOENT, -EBADMSG: its checksum does not hold. */
+int ledger_side_note(struct ledger_side *s, const char *name, char **text, struct error *e);
 
 #endif

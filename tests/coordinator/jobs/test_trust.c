@@ -4,6 +4,7 @@
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
+#include "tests/support/ledger_files.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -104,11 +105,36 @@ static void a_damaged_list(void **state)
 	assert_int_equal(access(path("aside"), F_OK), -1);
 }
 
+/* One name has changed: whoever was meant is not guessed. In one file it is restored from the other. */
+static void a_list_that_somebody_changed(void **state)
+{
+	(void)state;
+	static const char *const files[] = {"spool/jobs.db", "spool/jobs-copy.db"};
+	static const char change[] =
+		"UPDATE notes SET text = replace(text, 'anna', 'hanna') WHERE name = 'quarantined'";
+	struct worker_status w;
+	FILE *f = begin();
+	fputs("{\"schema\":1,\"workers\":[{\"certificate\":\"c\",\"name\":\"anna\",\"home\":\"h\",\"restarts\":1,"
+	      "\"why\":\"torn\"}]}",
+	      f);
+	assert_int_equal(fclose(f), 0);
+	for (int changed = 0; changed < 3; changed++) {
+		for (int i = 0; i < changed; i++)
+			ledger_files_change(files[i], change);
+		struct server *s = start();
+		uint64_t who = farm_next_quarantined(s->jobs.farm, 0);
+		assert_true((changed == 2) == !who);
+		assert_true(!who || (farm_worker(s->jobs.farm, who, &w) && strcmp(w.name, "anna") == 0));
+		server_close(s);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(a_long_list, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_damaged_list, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_list_that_somebody_changed, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -117,6 +117,9 @@ static void rows_are_lost_or_changed(void **state)
 	static const char *const statements[] = {
 		"DELETE FROM jobs",
 		"DELETE FROM notes",
+		"UPDATE notes SET text = replace(text, 'later', 'latex')",
+		"UPDATE notes SET text = replace(text, 'crc32c', 'crc32d'), revision = revision + 9",
+		"UPDATE notes SET text = replace(text, 'later', 'never'), revision = revision + 9",
 		"UPDATE jobs SET priority = 3",
 		"UPDATE jobs SET record = '{}'",
 		"UPDATE jobs SET ended = 5, state = 'done', submission = NULL, plan = NULL WHERE ended IS NULL",
@@ -166,12 +169,19 @@ static void both_are_damaged(void **state)
 	(void)state;
 	struct ledger_job j;
 	struct job_record r;
+	char *text;
 	fill();
 	for (int i = 0; i < 2; i++)
-		ledger_files_change(files[i], "UPDATE jobs SET priority = 3 WHERE id IN (1, 5)");
+		ledger_files_change(files[i], "UPDATE jobs SET priority = 3 WHERE id IN (1, 5);"
+					      "UPDATE notes SET text = replace(text, 'later', 'never')");
 	struct ledger *l = open_ledger();
 	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
 	assert_true(j.damaged && j.id == 1);
+	assert_int_equal(ledger_note(l, "clock", &text, &e), -EBADMSG);
+	assert_int_equal(ledger_set(l, "clock", "again", &e), 0);
+	assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+	assert_string_equal(text, "again");
+	mem_free(text);
 	assert_int_equal(ledger_hold(l, 1, "bob", &e), -EBADMSG);
 	assert_non_null(strstr(e.text, "the row of j1 is damaged"));
 	assert_int_equal(ledger_read_record(l, 5, &r, &e), -EBADMSG);
@@ -184,6 +194,24 @@ static void both_are_damaged(void **state)
 		spoil(files[i]);
 	l = open_ledger();
 	assert_int_equal(ledger_next_id(l), 1);
+	ledger_close(l);
+}
+
+/* Notes of spools from before they had checksums. The number of the next job is none: that of the jobs is. */
+static void notes_without_checksums(void **state)
+{
+	(void)state;
+	char *text;
+	fill();
+	for (int i = 0; i < 2; i++)
+		ledger_files_change(files[i],
+				    "UPDATE notes SET text = 'earlier';"
+				    "INSERT OR REPLACE INTO notes VALUES ('next-job', '77\ncrc32c=00000000', 1)");
+	struct ledger *l = open_ledger();
+	assert_int_equal(ledger_note(l, "clock", &text, &e), 0);
+	assert_string_equal(text, "earlier");
+	mem_free(text);
+	assert_int_equal(ledger_next_id(l), ROWS + 1);
 	ledger_close(l);
 }
 
@@ -251,6 +279,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(rows_are_lost_or_changed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_file_is_older, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(both_are_damaged, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(notes_without_checksums, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(the_copy_falls_behind, folder_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
