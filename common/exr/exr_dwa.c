@@ -23,8 +23,9 @@
 
 /* Of 64 numbers that are all the same, DWA stores one, and deflate compresses it. */
 #define INFLATION_MOST (INT64_C(64) * 1032)
-/* DWAB compresses 256 rows at a time, DWAA 32. */
-enum { ROWS = 256 };
+/* DWAB compresses 256 rows at a time, DWAA 32, and the library has room for a whole such chunk, or tile, even if the
+ * image has less. */
+enum { ROWS = 256, CHUNK_PIXELS_MOST = 1 << 25 };
 
 /* OpenEXR's C interface keeps its last message in one place. */
 static pthread_mutex_t one_at_a_time = PTHREAD_MUTEX_INITIALIZER;
@@ -149,6 +150,17 @@ static int rewrite(exr_context_t from, size_t most, const struct exr_image *img,
 	return exr_close_write(&to, &s, done, bytes, size, e);
 }
 
+static int check_chunks(exr_context_t x, const struct exr_image *img, bool tiled, struct error *e)
+{
+	int32_t w = (int32_t)img->width, h = ROWS;
+	if (tiled && (exr_get_tile_sizes(x, 0, 0, 0, &w, &h) != EXR_ERR_SUCCESS || w < 1 || h < 1))
+		return error_set(e, EBADMSG, "the EXR file has no tiles");
+	if ((int64_t)w * h > CHUNK_PIXELS_MOST)
+		return error_set(e, EFBIG, "the EXR file is compressed in chunks of %d x %d pixels; at most %d", w, h,
+				 CHUNK_PIXELS_MOST);
+	return 0;
+}
+
 static int check_and_rewrite(const unsigned char *foreign, size_t foreign_size, int64_t bytes_most,
 			     struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e)
 {
@@ -159,6 +171,8 @@ static int check_and_rewrite(const unsigned char *foreign, size_t foreign_size, 
 	if (rc)
 		return rc;
 	rc = exr_check(x, &s, &(struct exr_limits){bytes_most, INFLATION_MOST}, img, &tiled, e);
+	if (!rc)
+		rc = check_chunks(x, img, tiled, e);
 	if (!rc)
 		rc = rewrite(x, foreign_size, img, tiled, bytes, size, e);
 	exr_finish(&x);
