@@ -131,6 +131,15 @@ static void test_damage(void **state)
 		if (exr_read_dwa(copy, size, INT64_MAX, &img, &e) == 0)
 			exr_image_fini(&img);
 	}
+	/* So wide that the library's room for 256 rows would be 300 MB. */
+	static const char window[] = "dataWindow\0box2i\0\x10\0\0";
+	const int32_t right = LEFT + 140000 - 1;
+	size_t at = 0;
+	while (memcmp(bytes + at, window, sizeof window) != 0)
+		at++;
+	memcpy(bytes + at + sizeof window + 8, &right, sizeof right);
+	assert_int_equal(exr_read_dwa(bytes, size, INT64_MAX, &img, &e), -EFBIG);
+	assert_non_null(strstr(e.text, "chunks of 140000 x 256 pixels"));
 	mem_free(copy);
 	mem_free(bytes);
 	bytes = dwa_file(IMF_DWAA_COMPRESSION, IMF_WRITE_A, false, &size);
