@@ -10,7 +10,7 @@
 #
 # As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts wait for half of
 # their time, so two of them share one processor; when they have ended, programs have that one too.
-# HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: part of the names of tests that are left out. No test has a limit of wall clock, which a busy machine would reach: it is ended when
+# HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: an extended regular expression for those that are left out. No test has a limit of wall clock, which a busy machine would reach: it is ended when
 # its processes have used HSLT_TEST_CPU seconds of processor time (default 1800; with FULL=1 28800), or have been idle without output for
 # HSLT_TEST_IDLE seconds (900; 3600), see tests/limit/limit.c.
 set -u
@@ -98,7 +98,7 @@ list() {
 	case $1 in
 	unit) find "$build/tests" -type f -name 'test_*' -perm -u+x | sort ;;
 	script) ls tests/lint/*.sh tests/e2e/*.sh | grep -v '/lib\.sh$' ;;
-	esac | grep -F -e "$pattern" | if [ -n "${HSLT_TEST_WITHOUT:-}" ]; then grep -vF -e "$HSLT_TEST_WITHOUT"; else cat; fi |
+	esac | grep -F -e "$pattern" | if [ -n "${HSLT_TEST_WITHOUT:-}" ]; then grep -vE -e "$HSLT_TEST_WITHOUT"; else cat; fi |
 		awk -v took="$took" -v longest="$longest" 'BEGIN {
 				n = split(longest, names, " ")
 				for (i = 1; i <= n; i++)
