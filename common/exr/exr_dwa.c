@@ -37,10 +37,7 @@ static int refused(struct error *e)
 
 static bool has(const struct exr_image *img, const char *name)
 {
-	for (uint32_t c = 0; c < img->channel_count; c++)
-		if (strcmp(img->names[c], name) == 0)
-			return true;
-	return false;
+	return exr_channel(img, name) < EXR_CHANNELS_MOST;
 }
 
 /* Only the planes that are read. */

@@ -43,12 +43,18 @@ static exr_result_t write_attributes(exr_context_t x, const struct exr_image *im
 	return rc;
 }
 
-static const float *plane_of(const struct exr_image *img, const char *name)
+uint32_t exr_channel(const struct exr_image *img, const char *name)
 {
 	for (uint32_t c = 0; c < img->channel_count; c++)
 		if (strcmp(img->names[c], name) == 0)
-			return img->planes[c];
-	return NULL;
+			return c;
+	return EXR_CHANNELS_MOST;
+}
+
+const float *exr_plane(const struct exr_image *img, const char *name)
+{
+	uint32_t c = exr_channel(img, name);
+	return c < EXR_CHANNELS_MOST ? img->planes[c] : NULL;
 }
 
 /* Attributes for any viewer: who wrote the file, and that the colours are those of ITU-R BT.709, linear, white D65
@@ -57,8 +63,9 @@ static exr_result_t write_origin(exr_context_t x, const struct exr_image *img)
 {
 	static const exr_attr_chromaticities_t bt709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
 	exr_result_t rc = exr_attr_set_string(x, 0, "software", "HSLT Farm " HSLT_VERSION);
-	return rc == EXR_ERR_SUCCESS && plane_of(img, "R") ? exr_attr_set_chromaticities(x, 0, "chromaticities", &bt709)
-							   : rc;
+	return rc == EXR_ERR_SUCCESS && exr_plane(img, "R")
+		       ? exr_attr_set_chromaticities(x, 0, "chromaticities", &bt709)
+		       : rc;
 }
 
 static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
@@ -109,7 +116,7 @@ static exr_result_t write_chunk(exr_context_t x, const struct exr_image *img, ui
 		return rc;
 	for (int c = 0; c < encode.channel_count; c++) {
 		exr_coding_channel_info_t *to = &encode.channels[c];
-		const float *plane = plane_of(img, to->channel_name) + (size_t)first_row * img->width;
+		const float *plane = exr_plane(img, to->channel_name) + (size_t)first_row * img->width;
 		to->encode_from_ptr = (const uint8_t *)plane;
 		to->user_pixel_stride = sizeof(float);
 		to->user_line_stride = (int32_t)(img->width * sizeof(float));

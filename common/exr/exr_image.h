@@ -30,6 +30,10 @@ struct exr_image {
 	struct exr_attribute *attributes; /* when read: all hslt:* attributes of these types; owned */
 };
 
+/* The number of the channel of that name; EXR_CHANNELS_MOST: there is none. */
+uint32_t exr_channel(const struct exr_image *img, const char *name);
+const float *exr_plane(const struct exr_image *img, const char *name); /* NULL: there is none */
+
 /* bytes are mem_alloc'd; free them with mem_free. */
 int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e);
 void exr_image_fini(struct exr_image *img);

@@ -15,10 +15,7 @@ static int find_rgb(struct picture *p, struct error *e)
 {
 	const struct exr_image *img = &p->image;
 	for (int k = 0; k < 3; k++) {
-		p->rgb[k] = NULL;
-		for (uint32_t c = 0; c < img->channel_count; c++)
-			if (strcmp(img->names[c], rgb_names[k]) == 0)
-				p->rgb[k] = img->planes[c];
+		p->rgb[k] = exr_plane(img, rgb_names[k]);
 		if (!p->rgb[k])
 			return error_set(e, EINVAL, "it has no channel %s (of R, G and B); its first one is %s",
 					 rgb_names[k], img->names[0]);

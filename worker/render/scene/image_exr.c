@@ -5,23 +5,14 @@
 #include "common/exr/exr_read.h"
 
 #include <math.h>
-#include <string.h>
-
-static const float *find_plane(const struct exr_image *x, const char *name)
-{
-	for (uint32_t i = 0; i < x->channel_count; i++)
-		if (strcmp(x->names[i], name) == 0)
-			return x->planes[i];
-	return NULL;
-}
 
 static int copy_planes(const struct image_input *in, const struct exr_image *x, struct image *out)
 {
 	static const char *const rgb[3] = {"R", "G", "B"};
-	uint32_t channels = find_plane(x, "R") || !find_plane(x, "Y") ? 3 : 1;
-	const float *planes[3] = {channels == 1 ? find_plane(x, "Y") : NULL};
+	uint32_t channels = exr_plane(x, "R") || !exr_plane(x, "Y") ? 3 : 1;
+	const float *planes[3] = {channels == 1 ? exr_plane(x, "Y") : NULL};
 	for (uint32_t k = 0; channels == 3 && k < 3; k++)
-		if (!(planes[k] = find_plane(x, rgb[k])))
+		if (!(planes[k] = exr_plane(x, rgb[k])))
 			return error_set(in->error, EINVAL, "%s: OpenEXR without channel %s; R, G, B or Y are required",
 					 in->name, rgb[k]);
 	int r = image_allocate(in, out, x->width, x->height, channels, 0);
