@@ -130,12 +130,8 @@ static spectrum bitmap_eval(const struct texture *t, const struct texture_point 
 	const struct bitmap *b = t->data;
 	double rgb[3], u = at->u, v = at->v;
 	if (b->coordinates) {
-		const uint32_t *i = b->index[at->prim];
-		const float *p0 = b->coordinates + 2 * (size_t)i[0], *p1 = b->coordinates + 2 * (size_t)i[1],
-			    *p2 = b->coordinates + 2 * (size_t)i[2];
-		double b0 = 1 - at->b1 - at->b2;
-		u = b0 * (double)p0[0] + at->b1 * (double)p1[0] + at->b2 * (double)p2[0];
-		v = b0 * (double)p0[1] + at->b1 * (double)p1[1] + at->b2 * (double)p2[1];
+		u = texture_interpolate(b->coordinates, 2, b->index, at, 0);
+		v = texture_interpolate(b->coordinates, 2, b->index, at, 1);
 	}
 	uv_map_apply(&b->map, &u, &v);
 	raster_eval(&b->raster, u, v, rgb);

@@ -92,13 +92,8 @@ static void look_up(const struct mesh_attribute *m, const struct texture_point *
 			rgb[k] = m->scale * (double)p[k * step];
 		return;
 	}
-	const uint32_t *i = m->index[at->prim];
-	const float *p0 = m->value + i[0] * n, *p1 = m->value + i[1] * n, *p2 = m->value + i[2] * n;
-	double b0 = 1 - at->b1 - at->b2;
-	for (size_t k = 0; k < 3; k++) {
-		size_t c = k * step;
-		rgb[k] = m->scale * (b0 * (double)p0[c] + at->b1 * (double)p1[c] + at->b2 * (double)p2[c]);
-	}
+	for (size_t k = 0; k < 3; k++)
+		rgb[k] = m->scale * texture_interpolate(m->value, n, m->index, at, k * step);
 }
 
 static spectrum mesh_attribute_eval(const struct texture *t, const struct texture_point *at,

@@ -19,6 +19,16 @@ struct texture_point {
 	uint32_t prim;
 };
 
+/* Channel k of numbers at the vertices of a mesh, interpolated linearly: `channels` a vertex, by the mesh's indices. */
+static inline double texture_interpolate(const float *value, size_t channels, const uint32_t (*index)[3],
+					 const struct texture_point *at, size_t k)
+{
+	const uint32_t *i = index[at->prim];
+	double b0 = 1 - at->b1 - at->b2;
+	return b0 * (double)value[i[0] * channels + k] + at->b1 * (double)value[i[1] * channels + k] +
+	       at->b2 * (double)value[i[2] * channels + k];
+}
+
 /* What making a texture needs. */
 struct texture_build {
 	const struct asset_source *assets;
