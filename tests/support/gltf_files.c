@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/gltf_files.h"
+#include "worker/render/render.h"
 
 #include "tests/support/mesh_files.h"
 
@@ -208,4 +209,46 @@ void gltf_files_pack(struct gltf_files *f, enum gltf_form form)
 	memcpy(f->json, json, sizeof json);
 	f->list[0] = (struct memory_file){form == GLTF_BINARY ? "s.glb" : "s.gltf", f->file, f->file_size};
 	f->list[1] = (struct memory_file){"the mesh.bin", f->buffer, f->buffer_size};
+}
+
+const struct memory_file *gltf_files_change(struct gltf_files *f, const char *from, const char *to)
+{
+	gltf_files_make(f);
+	if (from)
+		gltf_files_replace(f, from, to);
+	gltf_files_pack(f, GLTF_EXTERNAL);
+	return f->list;
+}
+
+int gltf_files_read(const struct memory_file *files, bool lenient, struct scene *s, struct error *e)
+{
+	struct asset_source assets = memory_assets(files);
+	return (lenient ? scene_read_lenient : scene_read)(s, &assets, files[0].name, render_plugins(), NULL, 0, e);
+}
+
+struct scene gltf_files_scene(const char *from, const char *to, bool lenient)
+{
+	static struct gltf_files f;
+	struct scene s;
+	struct error e;
+	if (gltf_files_read(gltf_files_change(&f, from, to), lenient, &s, &e))
+		fail_msg("%s", e.text);
+	return s;
+}
+
+bool scene_has_note(const struct scene *s, const char *text)
+{
+	for (uint32_t i = 0; i < s->note_count; i++)
+		if (strstr(s->notes[i], text))
+			return true;
+	return false;
+}
+
+const struct scene_node *scene_named(const struct scene *s, const char *id)
+{
+	for (uint32_t i = 0; i < s->object_count; i++)
+		if (s->objects[i]->id && strcmp(s->objects[i]->id, id) == 0)
+			return s->objects[i];
+	fail_msg("there is no %s", id);
+	return NULL;
 }

@@ -8,6 +8,7 @@
 #define TESTS_SUPPORT_GLTF_FILES_H
 
 #include "tests/support/memory_assets.h"
+#include "worker/render/scene/scene.h"
 
 enum gltf_form { GLTF_EXTERNAL, GLTF_EMBEDDED, GLTF_BINARY, GLTF_FORMS };
 
@@ -24,5 +25,16 @@ void gltf_files_make(struct gltf_files *f);
 void gltf_files_pack(struct gltf_files *f, enum gltf_form form);
 /* Every `from` in the JSON becomes `to`; fails the test where there is none. */
 void gltf_files_replace(struct gltf_files *f, const char *from, const char *to);
+
+/* "s.gltf" with `from` replaced (NULL: as it is), its buffer in a file of its own. */
+const struct memory_file *gltf_files_change(struct gltf_files *f, const char *from, const char *to);
+int gltf_files_read(const struct memory_file *files, bool lenient, struct scene *s, struct error *e);
+/* The scene of a changed file; fails the test where that is refused. */
+struct scene gltf_files_scene(const char *from, const char *to, bool lenient);
+
+/* A note that contains the text. */
+bool scene_has_note(const struct scene *s, const char *text);
+/* The object with that id; fails the test where there is none. */
+const struct scene_node *scene_named(const struct scene *s, const char *id);
 
 #endif

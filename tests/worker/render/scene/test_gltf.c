@@ -137,22 +137,6 @@ static void test_twin(void **state)
 
 static struct gltf_files changed;
 
-/* "s.gltf", with `from` replaced. */
-static const struct memory_file *change(const char *from, const char *to)
-{
-	gltf_files_make(&changed);
-	if (from)
-		gltf_files_replace(&changed, from, to);
-	gltf_files_pack(&changed, GLTF_EXTERNAL);
-	return changed.list;
-}
-
-static int read_files(const struct memory_file *files, bool lenient, struct scene *s, struct error *e)
-{
-	struct asset_source assets = memory_assets(files);
-	return (lenient ? scene_read_lenient : scene_read)(s, &assets, files[0].name, render_plugins(), NULL, 0, e);
-}
-
 static int build_shapes(const struct scene *s, const struct memory_file *files, struct error *e)
 {
 	struct asset_source assets = memory_assets(files);
@@ -173,7 +157,7 @@ static void refuses(const struct memory_file *files, const char *text)
 {
 	struct scene s;
 	struct error e = {"no error at all"};
-	int rc = read_files(files, false, &s, &e);
+	int rc = gltf_files_read(files, false, &s, &e);
 	if (!rc) {
 		rc = build_shapes(&s, files, &e);
 		scene_fini(&s);
@@ -247,7 +231,8 @@ static void test_malformed(void **state)
 	(void)state;
 	for (size_t i = 0; i < sizeof malformed / sizeof *malformed; i++) {
 		bool buffer = strcmp(malformed[i].from, "BUFFER") == 0; /* what pack would put there */
-		const struct memory_file *files = change(buffer ? NULL : malformed[i].from, malformed[i].to);
+		const struct memory_file *files =
+			gltf_files_change(&changed, buffer ? NULL : malformed[i].from, malformed[i].to);
 		if (buffer) {
 			gltf_files_replace(&changed, "BUFFER", malformed[i].to);
 			changed.list[0].size = changed.file_size = strlen(changed.json);
@@ -318,7 +303,7 @@ static void test_damaged(void **state)
 				changed.file[at] = (unsigned char)dice_below(&d, 256);
 			struct scene s;
 			struct error e = {""};
-			int rc = read_files(changed.list, i % 2, &s, &e);
+			int rc = gltf_files_read(changed.list, i % 2, &s, &e);
 			if (!rc) {
 				rc = build_shapes(&s, changed.list, &e);
 				scene_fini(&s);
@@ -329,15 +314,6 @@ static void test_damaged(void **state)
 
 /* ---- what becomes of materials, cameras and lights */
 
-static struct scene read_changed(const char *from, const char *to, bool lenient)
-{
-	struct scene s;
-	struct error e;
-	if (read_files(change(from, to), lenient, &s, &e))
-		fail_msg("%s", e.text);
-	return s;
-}
-
 static const struct scene_node *find(const struct scene *s, enum plugin_class cls, const char *type)
 {
 	for (uint32_t i = 0; i < s->object_count; i++)
@@ -345,14 +321,6 @@ static const struct scene_node *find(const struct scene *s, enum plugin_class cl
 			return s->objects[i];
 	fail_msg("there is no %s", type);
 	return NULL;
-}
-
-static bool has_note(const struct scene *s, const char *text)
-{
-	for (uint32_t i = 0; i < s->note_count; i++)
-		if (strstr(s->notes[i], text))
-			return true;
-	return false;
 }
 
 static void assert_near(double got, double want)
@@ -364,7 +332,7 @@ static void assert_near(double got, double want)
 static void test_lights_and_cameras(void **state)
 {
 	(void)state;
-	struct scene s = read_changed(
+	struct scene s = gltf_files_scene(
 		"\"type\": \"point\"",
 		"\"type\": \"spot\", \"spot\": {\"innerConeAngle\": 0.25, \"outerConeAngle\": 0.5}", false);
 	const struct scene_node *spot = find(&s, PLUGIN_EMITTER, "spot");
@@ -373,11 +341,11 @@ static void test_lights_and_cameras(void **state)
 	assert_near(node_float(spot, "beam_width", 0), 0.25 * 180 / M_PI);
 	assert_true(m.m[2][2] == -1 && m.m[0][3] == 2 && m.m[2][3] == 2); /* it shines along -z */
 	scene_fini(&s);
-	s = read_changed("\"type\": \"point\"", "\"type\": \"directional\"", false);
+	s = gltf_files_scene("\"type\": \"point\"", "\"type\": \"directional\"", false);
 	m = node_transform(find(&s, PLUGIN_EMITTER, "directional"), "to_world");
 	assert_true(m.m[2][2] == -1);
 	scene_fini(&s);
-	s = read_changed("\"perspective\": {", "\"orthographic\": {\"xmag\": 2, \"ymag\": 1}, \"x\": {", false);
+	s = gltf_files_scene("\"perspective\": {", "\"orthographic\": {\"xmag\": 2, \"ymag\": 1}, \"x\": {", false);
 	const struct scene_node *sensor = find(&s, PLUGIN_SENSOR, "orthographic");
 	m = node_transform(sensor, "to_world");
 	assert_true(m.m[0][0] == -2 && m.m[1][1] == 2 && m.m[2][2] == -1 && m.m[2][3] == 6);
@@ -396,10 +364,10 @@ static void test_no_camera_no_light(void **state)
 	gltf_files_pack(&changed, GLTF_EXTERNAL);
 	struct scene s;
 	struct error e;
-	if (read_files(changed.list, false, &s, &e))
+	if (gltf_files_read(changed.list, false, &s, &e))
 		fail_msg("%s", e.text);
-	assert_true(has_note(&s, "it has no camera") && has_note(&s, "it has no light") &&
-		    has_note(&s, "points and lines"));
+	assert_true(scene_has_note(&s, "it has no camera") && scene_has_note(&s, "it has no light") &&
+		    scene_has_note(&s, "points and lines"));
 	find(&s, PLUGIN_EMITTER, "constant");
 	mat4 m = node_transform(find(&s, PLUGIN_SENSOR, "perspective"), "to_world");
 	vec3 eye = {m.m[0][3], m.m[1][3], m.m[2][3]}, ahead = {m.m[0][2], m.m[1][2], m.m[2][2]};
@@ -407,119 +375,6 @@ static void test_no_camera_no_light(void **state)
 		vec3 corner = {i & 1 ? 4 : -4, i & 2 ? 3 : -1, i & 4 ? 4 : -4}, to = vec3_sub(corner, eye);
 		assert_true(vec3_dot(vec3_normalize(to), ahead) > cos(20 * M_PI / 180));
 	}
-	scene_fini(&s);
-}
-
-static const struct scene_node *named(const struct scene *s, const char *id)
-{
-	for (uint32_t i = 0; i < s->object_count; i++)
-		if (s->objects[i]->id && strcmp(s->objects[i]->id, id) == 0)
-			return s->objects[i];
-	fail_msg("there is no %s", id);
-	return NULL;
-}
-
-#define IOR "\"KHR_materials_ior\": {"
-/* Layers that `principled` has in its own way, textures of two of them, and details that are left out with a note. */
-static void test_layers(void **state)
-{
-	(void)state;
-	static const char third[] = "bsdf of materials[2]";
-	struct scene s = read_changed(
-		IOR,
-		"\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5, \"clearcoatTexture\": {\"index\": 0}, "
-		"\"clearcoatNormalTexture\": {\"index\": 0}}, \"KHR_materials_iridescence\": {\"iridescenceFactor\": 1}, "
-		"\"KHR_materials_sheen\": {\"sheenColorFactor\": [0.5, 0.25, 0.125]}, " IOR,
-		false);
-	const struct scene_node *coat = node_ref(named(&s, third), "clearcoat");
-	assert_string_equal(coat->type, "scale");
-	assert_near(node_float(coat, "scale", 0), 0.5);
-	assert_string_equal(node_string(node_child(coat, PLUGIN_TEXTURE, 0), "channel", ""), "r");
-	assert_near(node_float(named(&s, third), "sheen", 0), 0.5);
-	assert_near(node_float(named(&s, third), "sheen_tint", 0), 0.75);
-	assert_true(has_note(&s, "sheen is that of") && has_note(&s, "thin films") &&
-		    has_note(&s, "normals of clear coats"));
-	scene_fini(&s);
-
-	s = read_changed("\"transmissionFactor\": 1",
-			 "\"transmissionFactor\": 1, \"transmissionTexture\": {\"index\": 0}", false);
-	assert_string_equal(node_string(node_ref(named(&s, third), "spec_trans"), "channel", ""), "r");
-	scene_fini(&s);
-
-	s = read_changed(IOR, "\"KHR_materials_specular\": {\"specularColorFactor\": [1, 0.5, 0.5]}, " IOR, false);
-	assert_true(has_note(&s, "textures and colours of KHR_materials_specular"));
-	scene_fini(&s);
-}
-
-/* The two roughnesses of `principled` are those of the format. */
-static void test_anisotropy(void **state)
-{
-	(void)state;
-	static const char third[] = "bsdf of materials[2]";
-	struct scene s = read_changed(IOR, "\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6}, " IOR, false);
-	const struct scene_node *bsdf = named(&s, third);
-	double x = node_float(bsdf, "anisotropic", 0), r = node_float(bsdf, "roughness", 0), aspect = sqrt(1 - 0.9 * x);
-	assert_true(x > 0);
-	assert_near(r * r / aspect, 0.25 + 0.75 * 0.36);
-	assert_near(r * r * aspect, 0.25);
-	scene_fini(&s);
-	static const char *const left_out[] = {
-		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyRotation\": 1}, " IOR,
-		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyTexture\": {}}, " IOR};
-	for (int i = 0; i < 2; i++) {
-		s = read_changed(IOR, left_out[i], false);
-		assert_null(node_find(named(&s, third), "anisotropic"));
-		assert_true(has_note(&s, "anisotropy with a texture, a rotation"));
-		scene_fini(&s);
-	}
-}
-
-static void test_materials(void **state)
-{
-	(void)state;
-	static const char second[] = "bsdf of materials[1]", third[] = "bsdf of materials[2]";
-	struct scene s = read_changed("\"metallicFactor\": 0.5,",
-				      "\"metallicFactor\": 0.5},\n\"alphaMode\": \"MASK\", \"alphaCutoff\": 0.25, "
-				      "\"normalTexture\": {\"index\": 0, \"scale\": 2}, \"x\": {",
-				      false);
-	const struct scene_node *mask = named(&s, second), *map = node_child(mask, PLUGIN_BSDF, 0),
-				*opacity = node_ref(mask, "opacity");
-	assert_string_equal(mask->type, "mask");
-	assert_string_equal(node_string(opacity, "channel", ""), "a");
-	assert_near(node_float(opacity, "threshold", 0), 0.25);
-	assert_string_equal(map->type, "normalmap");
-	assert_true(node_float(map, "scale", 0) == 2 && node_bool(map, "handedness", false));
-	assert_string_equal(node_child(map, PLUGIN_BSDF, 0)->type, "principled");
-	scene_fini(&s);
-
-	/* Abbe's number is 20 / dispersion: (n(d) - 1) / (n(F) - n(C)). */
-	s = read_changed(IOR, "\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, " IOR, false);
-	const struct scene_node *glass = named(&s, third);
-	double b = node_float(glass, "int_cauchy_b", 0);
-	assert_string_equal(glass->type, "roughdielectric");
-	assert_near(0.75 / (b / (0.48613 * 0.48613) - b / (0.65627 * 0.65627)), 40);
-	assert_near(node_float(glass, "alpha", 0), 0.25);
-	scene_fini(&s);
-
-	/* The reflectance at normal incidence is the factor's share of the index's. */
-	s = read_changed(IOR, "\"KHR_materials_specular\": {\"specularFactor\": 0.5}, " IOR, false);
-	double eta = node_float(named(&s, third), "eta", 0), root = (eta - 1) / (eta + 1);
-	assert_near(root * root, 0.5 * (0.75 / 2.75) * (0.75 / 2.75));
-	scene_fini(&s);
-
-	s = read_changed(IOR, "\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5}, " IOR, false);
-	assert_near(node_float(named(&s, third), "clearcoat", 0), 0.5);
-	assert_true(has_note(&s, "clear coats"));
-	scene_fini(&s);
-
-	/* What is not known is ignored, and said, even if the file does not list it. */
-	s = read_changed(IOR, "\"ACME_materials_fur\": {}, " IOR, false);
-	assert_true(has_note(&s, "ACME_materials_fur of a material is not supported and ignored"));
-	assert_false(has_note(&s, "KHR_materials_ior"));
-	scene_fini(&s);
-
-	s = read_changed(", \"material\": 0}", "}", false);
-	named(&s, "bsdf of materials[4]"); /* the format's own, one behind the last */
 	scene_fini(&s);
 }
 
@@ -534,10 +389,10 @@ static void test_notes(void **state)
 	gltf_files_pack(&changed, GLTF_EXTERNAL);
 	struct scene s;
 	struct error e;
-	if (read_files(changed.list, false, &s, &e))
+	if (gltf_files_read(changed.list, false, &s, &e))
 		fail_msg("%s", e.text);
-	assert_true(has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
-	assert_true(has_note(&s, "ranges of lights are ignored"));
+	assert_true(scene_has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
+	assert_true(scene_has_note(&s, "ranges of lights are ignored"));
 	scene_fini(&s);
 }
 
@@ -551,9 +406,6 @@ int main(void)
 		cmocka_unit_test(test_damaged),
 		cmocka_unit_test(test_lights_and_cameras),
 		cmocka_unit_test(test_no_camera_no_light),
-		cmocka_unit_test(test_materials),
-		cmocka_unit_test(test_layers),
-		cmocka_unit_test(test_anisotropy),
 		cmocka_unit_test(test_notes),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);

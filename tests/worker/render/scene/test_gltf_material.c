@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Materials of glTF: what becomes of the format's layers and extensions. */
+#include "tests/support/gltf_files.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static void assert_near(double got, double want)
+{
+	if (!(fabs(got - want) <= 1e-12 * fabs(want)))
+		fail_msg("%.17g is not %.17g", got, want);
+}
+
+#define IOR "\"KHR_materials_ior\": {"
+/* Layers that `principled` has in its own way, textures of two of them, and details that are left out with a note. */
+static void test_layers(void **state)
+{
+	(void)state;
+	static const char third[] = "bsdf of materials[2]";
+	struct scene s = gltf_files_scene(
+		IOR,
+		"\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5, \"clearcoatTexture\": {\"index\": 0}, "
+		"\"clearcoatNormalTexture\": {\"index\": 0}}, \"KHR_materials_iridescence\": {\"iridescenceFactor\": 1}, "
+		"\"KHR_materials_sheen\": {\"sheenColorFactor\": [0.5, 0.25, 0.125]}, " IOR,
+		false);
+	const struct scene_node *coat = node_ref(scene_named(&s, third), "clearcoat");
+	assert_string_equal(coat->type, "scale");
+	assert_near(node_float(coat, "scale", 0), 0.5);
+	assert_string_equal(node_string(node_child(coat, PLUGIN_TEXTURE, 0), "channel", ""), "r");
+	assert_near(node_float(scene_named(&s, third), "sheen", 0), 0.5);
+	assert_near(node_float(scene_named(&s, third), "sheen_tint", 0), 0.75);
+	assert_true(scene_has_note(&s, "sheen is that of") && scene_has_note(&s, "thin films") &&
+		    scene_has_note(&s, "normals of clear coats"));
+	scene_fini(&s);
+
+	s = gltf_files_scene("\"transmissionFactor\": 1",
+			     "\"transmissionFactor\": 1, \"transmissionTexture\": {\"index\": 0}", false);
+	assert_string_equal(node_string(node_ref(scene_named(&s, third), "spec_trans"), "channel", ""), "r");
+	scene_fini(&s);
+
+	s = gltf_files_scene(IOR, "\"KHR_materials_specular\": {\"specularColorFactor\": [1, 0.5, 0.5]}, " IOR, false);
+	assert_true(scene_has_note(&s, "textures and colours of KHR_materials_specular"));
+	scene_fini(&s);
+}
+
+/* The two roughnesses of `principled` are those of the format. */
+static void test_anisotropy(void **state)
+{
+	(void)state;
+	static const char third[] = "bsdf of materials[2]";
+	struct scene s =
+		gltf_files_scene(IOR, "\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6}, " IOR, false);
+	const struct scene_node *bsdf = scene_named(&s, third);
+	double x = node_float(bsdf, "anisotropic", 0), r = node_float(bsdf, "roughness", 0), aspect = sqrt(1 - 0.9 * x);
+	assert_true(x > 0);
+	assert_near(r * r / aspect, 0.25 + 0.75 * 0.36);
+	assert_near(r * r * aspect, 0.25);
+	scene_fini(&s);
+	static const char *const left_out[] = {
+		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyRotation\": 1}, " IOR,
+		"\"KHR_materials_anisotropy\": {\"anisotropyStrength\": 0.6, \"anisotropyTexture\": {}}, " IOR};
+	for (int i = 0; i < 2; i++) {
+		s = gltf_files_scene(IOR, left_out[i], false);
+		assert_null(node_find(scene_named(&s, third), "anisotropic"));
+		assert_true(scene_has_note(&s, "anisotropy with a texture, a rotation"));
+		scene_fini(&s);
+	}
+}
+
+static void test_materials(void **state)
+{
+	(void)state;
+	static const char second[] = "bsdf of materials[1]", third[] = "bsdf of materials[2]";
+	struct scene s = gltf_files_scene("\"metallicFactor\": 0.5,",
+					  "\"metallicFactor\": 0.5},\n\"alphaMode\": \"MASK\", \"alphaCutoff\": 0.25, "
+					  "\"normalTexture\": {\"index\": 0, \"scale\": 2}, \"x\": {",
+					  false);
+	const struct scene_node *mask = scene_named(&s, second), *map = node_child(mask, PLUGIN_BSDF, 0),
+				*opacity = node_ref(mask, "opacity");
+	assert_string_equal(mask->type, "mask");
+	assert_string_equal(node_string(opacity, "channel", ""), "a");
+	assert_near(node_float(opacity, "threshold", 0), 0.25);
+	assert_string_equal(map->type, "normalmap");
+	assert_true(node_float(map, "scale", 0) == 2 && node_bool(map, "handedness", false));
+	assert_string_equal(node_child(map, PLUGIN_BSDF, 0)->type, "principled");
+	scene_fini(&s);
+
+	/* Abbe's number is 20 / dispersion: (n(d) - 1) / (n(F) - n(C)). */
+	s = gltf_files_scene(IOR, "\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, " IOR, false);
+	const struct scene_node *glass = scene_named(&s, third);
+	double b = node_float(glass, "int_cauchy_b", 0);
+	assert_string_equal(glass->type, "roughdielectric");
+	assert_near(0.75 / (b / (0.48613 * 0.48613) - b / (0.65627 * 0.65627)), 40);
+	assert_near(node_float(glass, "alpha", 0), 0.25);
+	scene_fini(&s);
+
+	/* The reflectance at normal incidence is the factor's share of the index's. */
+	s = gltf_files_scene(IOR, "\"KHR_materials_specular\": {\"specularFactor\": 0.5}, " IOR, false);
+	double eta = node_float(scene_named(&s, third), "eta", 0), root = (eta - 1) / (eta + 1);
+	assert_near(root * root, 0.5 * (0.75 / 2.75) * (0.75 / 2.75));
+	scene_fini(&s);
+
+	s = gltf_files_scene(IOR, "\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5}, " IOR, false);
+	assert_near(node_float(scene_named(&s, third), "clearcoat", 0), 0.5);
+	assert_true(scene_has_note(&s, "clear coats"));
+	scene_fini(&s);
+
+	/* What is not known is ignored, and said, even if the file does not list it. */
+	s = gltf_files_scene(IOR, "\"ACME_materials_fur\": {}, " IOR, false);
+	assert_true(scene_has_note(&s, "ACME_materials_fur of a material is not supported and ignored"));
+	assert_false(scene_has_note(&s, "KHR_materials_ior"));
+	scene_fini(&s);
+
+	s = gltf_files_scene(", \"material\": 0}", "}", false);
+	scene_named(&s, "bsdf of materials[4]"); /* the format's own, one behind the last */
+	scene_fini(&s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_materials),
+		cmocka_unit_test(test_layers),
+		cmocka_unit_test(test_anisotropy),
+	};
+	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
+}
