@@ -179,6 +179,22 @@ static struct world *lamp_on_glass(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
 }
 
+/* A sheet that shines on both sides, between balls; and a half transparent box around a ball that does, so that light from its inside comes out. */
+static struct world *two_sided_lamps(const struct agree_case *k)
+{
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND
+			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate y='1' angle='80'/><translate y='0.5'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='4'/><boolean name='two_sided' value='true'/></emitter></shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.3'/><translate x='-0.6' y='0.3' z='0.3'/>" TURN) GREY("0.7") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.3'/><translate x='0.6' y='0.3' z='0.2'/>" TURN)
+			     "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf></shape>"
+			     "<shape type='cube'>" AT("<scale value='0.3'/><translate y='0.5' z='-1'/>" TURN)
+			     "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='diffuse'/></bsdf>"
+			     "<emitter type='area'><rgb name='radiance' value='1'/><boolean name='two_sided' value='true'/></emitter></shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate y='0.5' z='-1'/>" TURN) GREY("0.7") "</shape>");
+}
+
 /* A square and a disk that shine along their normals, on a ball and on a ground. */
 static struct world *beams(const struct agree_case *k)
 {
@@ -229,6 +245,7 @@ const struct agree_case agree_cases[] = {
 	{"coinciding surfaces", "a lamp three times", lamp_pasted, 0, 0, 5, 256, 768, ALL, 0.02},
 	{"emitter touches glass", "in a point and in an edge", lamp_on_glass, 0, 0, 6, 256, 256, ALL, 0.02},
 	{"bright texel", "1.3e8 in a sky of 1", bright_texel, 0, 0, 5, 256, 512, ALL, 0.02},
+	{"two-sided lamps", "a sheet, and a box around a ball", two_sided_lamps, 0, 0, 6, 512, 1024, ALL, 0.02},
 	{"beams", "of a square and of a disk", beams, 0, 0, 5, 2048, 1024, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},

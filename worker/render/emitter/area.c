@@ -1,52 +1,79 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Light from a surface, equal in all directions on the side of its normal. Meshes: uniform per area. Spheres: uniform
- * per area for light sub-paths; seen from outside, uniform over the cone that the sphere subtends (Shirley, Wang,
- * Zimmerman 1996, sec. 4.1.1), with its angle computed from the sine so that distant spheres keep their precision.
+ * Light from a surface, equal in all directions on the side of its normal, or on both (two_sided). Meshes: uniform per
+ * area. Spheres: uniform per area for light sub-paths; seen from outside, uniform over the cone that the sphere
+ * subtends (Shirley, Wang, Zimmerman 1996, sec. 4.1.1), with its angle computed from the sine so that distant spheres
+ * keep their precision.
+ *
+ * A light sub-path leaves on either side by chance. What encloses a body is mostly seen from outside, so few start
+ * inside it; which of them do is a matter of variance, not of the result.
  */
 #include "worker/render/emitter/surface_light.h"
 
 static const struct param params[] = {
 	{"radiance", VALUE_TEXTURE, PARAM_UNDERSTOOD, 0, PARAM_LIGHT_MAX, NULL},
+	{"two_sided", VALUE_BOOL, PARAM_UNDERSTOOD, 0, 0, NULL},
 	{"sampling_weight", VALUE_FLOAT, PARAM_IGNORED, 0, 0, NULL},
 	{NULL, 0, PARAM_UNDERSTOOD, 0, 0, NULL},
 };
 
+struct area_light {
+	struct surface_light light; /* first: surface_light.h */
+	double back;		    /* probability that a sub-path leaves against the normal; 0: one side */
+};
+
+/* The triangles' normals, weighted by area, add up to 0 where they enclose a body. */
+static bool is_closed(const struct surface_light *l)
+{
+	vec3 sum = {0, 0, 0};
+	if (l->surface.is_sphere)
+		return true;
+	for (uint32_t i = 0; i < l->surface.triangle_count; i++)
+		sum = vec3_add(sum, surface_light_normal(l, i));
+	return vec3_length(sum) < 1e-3 * l->area;
+}
+
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct surface_light *l = arena_alloc(build->arena, 1, sizeof *l);
+	struct area_light *l = arena_alloc(build->arena, 1, sizeof *l);
 	if (!l)
 		return error_set(e, ENOMEM, "out of memory");
-	int rc = surface_light_create(em, l, n, build, e);
+	int rc = surface_light_create(em, &l->light, n, build, e);
 	if (rc)
 		return rc;
-	em->power = l->area * M_PI * em->brightest;
+	bool both = node_bool(n, "two_sided", false);
+	l->back = !both ? 0 : is_closed(&l->light) ? 0.0625 : 0.5;
+	em->power = l->light.area * M_PI * em->brightest * (both ? 2 : 1);
 	return 0;
 }
 
 static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
 {
-	const struct surface_light *l = em->data;
-	if (!(vec3_dot(x->n, w) > 0))
+	const struct area_light *l = em->data;
+	double cosine = vec3_dot(x->n, w);
+	if (!(cosine > 0 || (l->back > 0 && cosine < 0)))
 		return spectrum_of(0);
-	return texture_eval(&l->radiance, &x->where, wl);
+	return texture_eval(&l->light.radiance, &x->where, wl);
 }
 
 static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
 			     double *pdf)
 {
-	(void)em;
+	const struct area_light *l = em->data;
 	struct frame f = frame_around(x->n);
-	double r = sqrt(u[0]), phi = 2 * M_PI * u[1], z = sqrt(1 - u[0]);
-	*w = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), z});
-	*pdf = z / M_PI;
+	bool behind = u[0] < l->back;
+	double share = behind ? l->back : 1 - l->back, rest = behind ? u[0] / share : (u[0] - l->back) / share;
+	double r = sqrt(rest), phi = 2 * M_PI * u[1], z = sqrt(1 - rest);
+	*w = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), behind ? -z : z});
+	*pdf = share * z / M_PI;
 	return z > 0;
 }
 
 static double pdf_direction(const struct emitter *em, const struct emitter_point *x, vec3 w)
 {
-	(void)em;
-	return fmax(vec3_dot(x->n, w), 0) / M_PI;
+	const struct area_light *l = em->data;
+	double cosine = vec3_dot(x->n, w);
+	return (cosine > 0 ? (1 - l->back) * cosine : -l->back * cosine) / M_PI;
 }
 
 /* The sphere as seen from outside: distance and squared sine of its half angle. false: seen from inside, or it emits

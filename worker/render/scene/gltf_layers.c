@@ -49,19 +49,33 @@ static bool is_listed(const struct gltf *g, const char *list, const char *extens
 	return false;
 }
 
+/* The reflectance at normal incidence in the format is min(r^2 c, 1) f for an index of reflectance r^2, a colour c and
+ * a factor f. Here it is grey and decides the index, which is left alone where light enters. */
 static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
-	static const char *const others[] = {"specularTexture", "specularColorTexture", "specularColorFactor", NULL};
 	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
-		     *specular = gltf_extension(g, at, at->json, "KHR_materials_specular");
-	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5,
-	       factor = specular ? gltf_number(g, at, specular, "specularFactor", 1) : 1;
-	/* The reflectance at normal incidence, scaled; an index of 0 means total reflection in the format. */
-	double root = eta > 0 ? (eta - 1) / (eta + 1) : 1, scaled = fabs(root) * sqrt(fmin(fmax(factor, 0), 1));
+		     *specular = gltf_extension(g, at, at->json, "KHR_materials_specular"),
+		     *transmission = gltf_extension(g, at, at->json, "KHR_materials_transmission");
+	double eta = ior ? gltf_number(g, at, ior, "ior", 1.5) : 1.5, factor = 1, rgb[3] = {1, 1, 1};
+	if (specular) {
+		factor = gltf_number(g, at, specular, "specularFactor", 1);
+		gltf_numbers(g, at, specular, "specularColorFactor", rgb, 3);
+		note_members(g, specular, (const char *const[]){"specularTexture", "specularColorTexture", NULL},
+			     "the reflection of what is no metal is the same everywhere: textures of "
+			     "KHR_materials_specular are left out");
+	}
+	double grey = fmax(0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2], 0);
+	if (rgb[0] != rgb[1] || rgb[1] != rgb[2])
+		gltf_note(g, "the reflection of what is no metal is white, as bright as the colour of "
+			     "KHR_materials_specular");
+	if (transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0 && factor * grey != 1) {
+		gltf_note(g, "KHR_materials_specular does not change what reflects from materials that transmit light");
+		factor = grey = 1;
+	}
+	/* An index of 0 means total reflection in the format. */
+	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1,
+	       scaled = fmin(root * sqrt(grey), 1) * sqrt(fmin(fmax(factor, 0), 1));
 	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
-	note_members(g, specular, others,
-		     "the reflection of what is no metal is white and the same everywhere: textures and colours of "
-		     "KHR_materials_specular are left out");
 }
 
 static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)

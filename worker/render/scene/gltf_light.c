@@ -1,13 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Cameras, and lights of KHR_lights_punctual. Both look along -z with y up; sensors and spots of this scene language
- * look along z, with x to the left. Candela and lux are used as radiant intensity and irradiance. What the file lacks
- * is supplied with a note: a camera that sees the whole scene, an environment of radiance 1.
+ * look along z, with x to the left. Candela and lux are used as radiant intensity and irradiance, and emission, which
+ * the format has in nits, as radiance. Blender's exporter writes emission as it is but multiplies the watts of lamps by
+ * 683 lumens, so lamps of its files are divided by that: otherwise they would be 683 times too bright beside what
+ * shines. What the file lacks is supplied with a note: a camera that sees the whole scene, an environment of
+ * radiance 1.
  */
 #include "worker/render/scene/gltf_light.h"
 #include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { FILM_WIDTH = 768 };
@@ -69,15 +73,32 @@ void gltf_camera(struct gltf *g, const struct gltf_at *at, const mat4 *to_world)
 	g->has_camera = true;
 }
 
+/* The exporter's `generator` ends in its version; since 3.4 lamps are in lumens unless the user wants otherwise. */
+void gltf_lamp_scale(struct gltf *g, const char *generator)
+{
+	static const char blender[] = "Khronos glTF Blender I/O v";
+	unsigned major = 0, minor = 0;
+	g->lamp_scale = 1;
+	if (generator && strncmp(generator, blender, strlen(blender)) == 0 &&
+	    sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) == 2 &&
+	    (major > 3 || (major == 3 && minor >= 4)))
+		g->lamp_scale = 1.0 / 683;
+}
+
 void gltf_light(struct gltf *g, const struct gltf_at *at, const mat4 *to_world)
 {
 	double rgb[3] = {1, 1, 1}, intensity = gltf_number(g, at, at->json, "intensity", 1);
 	const char *type = gltf_text(g, at, at->json, "type", "");
 	gltf_numbers(g, at, at->json, "color", rgb, 3);
 	for (int k = 0; k < 3; k++)
-		rgb[k] *= intensity;
+		rgb[k] *= intensity * g->lamp_scale;
 	mat4 m = looking(to_world);
 	g->has_light = true;
+	if (g->lamp_scale != 1)
+		gltf_note(
+			g,
+			"lamps are divided by 683, by which Blender multiplies them in its lighting mode \"Standard\"; "
+			"files that it writes in another mode are too dark");
 	if (json_object_get(at->json, "range"))
 		gltf_note(g, "ranges of lights are ignored: intensity falls off with the square of the distance");
 	if (strcmp(type, "directional") == 0) {

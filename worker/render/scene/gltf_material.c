@@ -177,6 +177,8 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 		return;
 	struct xml_element *emitter = gltf_plugin(g, g->scene, at, "emitter", "area", NULL);
 	gltf_put_colour(g, emitter, at, "radiance", rgb, gltf_object(g, at, at->json, "emissiveTexture"));
+	if (json_is_true(json_object_get(at->json, "doubleSided")))
+		gltf_put_bool(g, emitter, at, "two_sided", true);
 	put_id(g, emitter, at, "emitter", GLTF_NO_COLOURS);
 	/* Emission of at most 1 is that of a screen, which does not light a room: viewers show such files in
 	 * surroundings that do. */

@@ -84,7 +84,8 @@ struct gltf {
 	bool *mesh_made;	      /* it is a shapegroup already */
 	struct xml_element *scene;
 	bool has_camera, has_light;
-	vec3 low, high; /* over all vertices */
+	double lamp_scale; /* of the intensities of KHR_lights_punctual */
+	vec3 low, high;	   /* over all vertices */
 };
 
 const char *gltf_array_name(enum gltf_array array);

@@ -236,32 +236,58 @@ static double cosine_density(const void *arg, vec3 w)
 	return s->em->ops->pdf_direction(s->em, &x, w);
 }
 
-static void test_direction(void **state)
+/* back: the share of directions against the normal, where light leaves as it does along it unless the share is 0. */
+static void check_direction(const char *what, struct world *w, double back)
 {
-	(void)state;
-	struct world *w = sphere_light("false");
 	static uint64_t counts[CELLS * CELLS];
 	static double expected[CELLS * CELLS];
 	memset(counts, 0, sizeof counts);
 	struct seen s = {&w->emitters[0], NULL, vec3_normalize((vec3){0.3, -0.8, 0.4})};
 	struct emitter_point x = {.n = s.ref};
-	struct dice d = dice_of("direction");
+	struct wavelengths wl = {.grey = true};
+	struct dice d = dice_of(what);
 	size_t n = dice_count(400000);
+	double behind = 0;
 	for (size_t i = 0; i < n; i++) {
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
 		vec3 dir;
 		assert_true(s.em->ops->sample_direction(s.em, &x, u, &dir, &pdf));
 		assert_true(fabs(vec3_length(dir) - 1) < 1e-12);
 		assert_true(fabs(pdf - s.em->ops->pdf_direction(s.em, &x, dir)) < 1e-12);
-		struct wavelengths wl = {.grey = true};
-		assert_true(s.em->ops->radiance(s.em, &x, dir, &wl).v[0] > 0);
-		assert_true(s.em->ops->radiance(s.em, &x, vec3_neg(dir), &wl).v[0] == 0);
+		double ahead = s.em->ops->radiance(s.em, &x, dir, &wl).v[0],
+		       opposite = s.em->ops->radiance(s.em, &x, vec3_neg(dir), &wl).v[0];
+		assert_true(ahead > 0 && opposite == (back > 0 ? ahead : 0));
 		counts[sphere_cell(dir)]++;
+		behind += vec3_dot(dir, x.n) < 0;
 	}
 	double sum = expect(cosine_density, &s, (double)n, expected);
 	assert_true(fabs(sum - 1) < 1e-4);
-	check_counts("direction", counts, expected, CELLS * CELLS);
+	check_counts(what, counts, expected, CELLS * CELLS);
+	assert_true(fabs(behind / (double)n - back) <= 6 * sqrt(back * (1 - back) / (double)n));
 	world_free(w);
+}
+
+#define TWO_SIDED(shape)                                                                                          \
+	SENSOR("0,0,3", "0,0,0")                                                                                  \
+	"<shape type='" shape "'><emitter type='area'><boolean name='two_sided' value='true'/></emitter></shape>" \
+	"<shape type='sphere'><float name='radius' value='4'/></shape>"
+
+/* Few leave against the normal where the surface encloses a body, half elsewhere; the power is that of two sides. */
+static void test_direction(void **state)
+{
+	(void)state;
+	check_direction("direction", sphere_light("false"), 0);
+	check_direction("direction, two sides of a rectangle", world_of_text(8, 8, TWO_SIDED("rectangle")), 0.5);
+	check_direction("direction, two sides of a cube", world_of_text(8, 8, TWO_SIDED("cube")), 0.0625);
+	struct world *w[2] = {
+		world_of_text(8, 8, TWO_SIDED("cube")),
+		world_of_text(
+			8, 8,
+			SENSOR("0,0,3", "0,0,0") "<shape type='cube'><emitter type='area'/></shape>"
+						 "<shape type='sphere'><float name='radius' value='4'/></shape>")};
+	assert_true(w[1]->emitters[0].power > 0 && w[0]->emitters[0].power == 2 * w[1]->emitters[0].power);
+	world_free(w[0]);
+	world_free(w[1]);
 }
 
 /* Triangles by area, and evenly inside each: four equal parts of each triangle (by its midpoints) get the same. */

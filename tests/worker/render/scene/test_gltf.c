@@ -353,6 +353,33 @@ static void test_lights_and_cameras(void **state)
 	scene_fini(&s);
 }
 
+/* Lamps of Blender are in lumens since 3.4, its emission never is. */
+static void test_lamps_of_blender(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *generator;
+		double scale;
+	} files[] = {
+		{"\"Khronos glTF Blender I/O v3.4.50\"", 1.0 / 683},
+		{"\"Khronos glTF Blender I/O v4.0.1\"", 1.0 / 683},
+		{"\"Khronos glTF Blender I/O v3.3.27\"", 1},
+		{"\"Khronos glTF Blender I/O v\"", 1},
+		{"\"Another v3.4.50\"", 1},
+		{"3.4", 1},
+	};
+	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+		char asset[128];
+		snprintf(asset, sizeof asset, "{\"generator\": %s, \"version\": \"2.0\"}", files[i].generator);
+		struct scene s = gltf_files_scene("{\"version\": \"2.0\"}", asset, false);
+		const double *rgb = node_find(find(&s, PLUGIN_EMITTER, "point"), "intensity")->value.as.rgb;
+		for (int k = 0; k < 3; k++)
+			assert_near(rgb[k], (4 >> k) * files[i].scale);
+		assert_true(scene_has_note(&s, "lamps are divided by 683") == (files[i].scale < 1));
+		scene_fini(&s);
+	}
+}
+
 /* All of the scene's box is within the field of view of the camera that stands in. */
 static void test_no_camera_no_light(void **state)
 {
@@ -406,6 +433,7 @@ int main(void)
 		cmocka_unit_test(test_damaged),
 		cmocka_unit_test(test_lights_and_cameras),
 		cmocka_unit_test(test_no_camera_no_light),
+		cmocka_unit_test(test_lamps_of_blender),
 		cmocka_unit_test(test_notes),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -40,10 +41,6 @@ static void test_layers(void **state)
 	s = gltf_files_scene("\"transmissionFactor\": 1",
 			     "\"transmissionFactor\": 1, \"transmissionTexture\": {\"index\": 0}", false);
 	assert_string_equal(node_string(node_ref(scene_named(&s, third), "spec_trans"), "channel", ""), "r");
-	scene_fini(&s);
-
-	s = gltf_files_scene(IOR, "\"KHR_materials_specular\": {\"specularColorFactor\": [1, 0.5, 0.5]}, " IOR, false);
-	assert_true(scene_has_note(&s, "textures and colours of KHR_materials_specular"));
 	scene_fini(&s);
 }
 
@@ -98,12 +95,6 @@ static void test_materials(void **state)
 	assert_near(node_float(glass, "alpha", 0), 0.25);
 	scene_fini(&s);
 
-	/* The reflectance at normal incidence is the factor's share of the index's. */
-	s = gltf_files_scene(IOR, "\"KHR_materials_specular\": {\"specularFactor\": 0.5}, " IOR, false);
-	double eta = node_float(scene_named(&s, third), "eta", 0), root = (eta - 1) / (eta + 1);
-	assert_near(root * root, 0.5 * (0.75 / 2.75) * (0.75 / 2.75));
-	scene_fini(&s);
-
 	s = gltf_files_scene(IOR, "\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5}, " IOR, false);
 	assert_near(node_float(scene_named(&s, third), "clearcoat", 0), 0.5);
 	assert_true(scene_has_note(&s, "clear coats"));
@@ -120,12 +111,63 @@ static void test_materials(void **state)
 	scene_fini(&s);
 }
 
+/* What reflects at normal incidence is min(r^2 c, 1) f, of the colour its brightness; glass keeps its index. */
+static void test_reflection(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *members;
+		double ior, want;
+		const char *note;
+	} files[] = {
+		{"\"specularFactor\": 0.5", 1.75, 0.5 * (0.75 / 2.75) * (0.75 / 2.75), NULL},
+		{"\"specularColorFactor\": [2, 2, 2]", 1.75, 2 * (0.75 / 2.75) * (0.75 / 2.75), NULL},
+		{"\"specularColorFactor\": [100, 100, 100], \"specularFactor\": 0.25", 1.75, 0.25, NULL},
+		{"\"specularColorFactor\": [0, 0, 0]", 1.5, 0, NULL},
+		{"\"specularColorFactor\": [0, 1, 0], \"specularFactor\": 0.5", 1.5, 0.5 * 0.7152 * 0.04, "is white"},
+		{"\"specularTexture\": {\"index\": 0}", 1.5, 0.04, "textures of KHR_materials_specular"},
+	};
+	static const char *const notes[] = {"is white", "textures of KHR_materials_specular", "does not change what"};
+	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++)
+		for (int glass = 0; glass < 2; glass++) {
+			char from[64], to[256];
+			snprintf(from, sizeof from, "\"KHR_materials_%s\": {%s",
+				 glass ? "transmission" : "emissive_strength", glass ? "" : "\"emissiveStrength\": 8}");
+			snprintf(to, sizeof to, "\"KHR_materials_specular\": {%s}, %s%.2f}, %s", files[i].members,
+				 glass ? "\"x\": {\"ior\": " : IOR "\"ior\": ", files[i].ior, from);
+			struct scene s = gltf_files_scene(from, to, false);
+			const struct scene_node *bsdf =
+				scene_named(&s, glass ? "bsdf of materials[2]" : "bsdf of materials[3]");
+			double eta = node_float(bsdf, "eta", 0), root = (eta - 1) / (eta + 1);
+			assert_near(root * root, glass ? (0.75 / 2.75) * (0.75 / 2.75) : files[i].want);
+			for (int k = 0; k < 3; k++) {
+				bool said = files[i].note && strcmp(files[i].note, notes[k]) == 0;
+				assert_true(scene_has_note(&s, notes[k]) == (k == 2 ? glass && i != 5 : said));
+			}
+			scene_fini(&s);
+		}
+}
+
+/* Both sides of a surface that is doubleSided shine. */
+static void test_both_sides_shine(void **state)
+{
+	(void)state;
+	static const char factor[] = "\"emissiveFactor\": [1, 0.5, 0.5]";
+	static const char *const files[] = {factor, "\"doubleSided\": false, \"emissiveFactor\": [1, 0.5, 0.5]",
+					    "\"doubleSided\": true, \"emissiveFactor\": [1, 0.5, 0.5]"};
+	for (int i = 0; i < 3; i++) {
+		struct scene s = gltf_files_scene(factor, files[i], false);
+		assert_true(node_bool(scene_named(&s, "emitter of materials[3]"), "two_sided", false) == (i == 2));
+		scene_fini(&s);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_materials),
-		cmocka_unit_test(test_layers),
-		cmocka_unit_test(test_anisotropy),
+		cmocka_unit_test(test_materials),	 cmocka_unit_test(test_layers),
+		cmocka_unit_test(test_anisotropy),	 cmocka_unit_test(test_reflection),
+		cmocka_unit_test(test_both_sides_shine),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
 }
