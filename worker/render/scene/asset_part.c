@@ -18,5 +18,11 @@ int asset_part_open(struct asset_range *p, const struct scene_node *n, const str
 	} else {
 		return node_error(n, e, EINVAL, "needs a filename");
 	}
-	return rc ? node_error(n, e, -rc, "%s", inner.text) : 0;
+	if (rc)
+		return node_error(n, e, -rc, "%s", inner.text);
+	size_t skip = (size_t)node_int(n, "skip_bytes", 0);
+	skip = skip < p->size ? skip : p->size;
+	p->bytes += skip;
+	p->size -= skip;
+	return 0;
 }

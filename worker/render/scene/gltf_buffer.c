@@ -58,7 +58,7 @@ static int embedded(struct gltf *g, const struct gltf_at *at, const char *uri, s
 		return gltf_fail(g, at, ENOTSUP, "its embedded data is written with escapes; use .glb");
 	while (padding < n && comma[n - padding] == '=')
 		padding++;
-	*out = (struct gltf_range){g->file, (uint64_t)(there - g->bytes), n, true, (n - padding) * 3 / 4};
+	*out = (struct gltf_range){g->file, (uint64_t)(there - g->bytes), n, true, (n - padding) * 3 / 4, 0};
 	known[at->index] = *out;
 	return 0;
 }
@@ -81,7 +81,7 @@ static int buffer_range(struct gltf *g, const struct gltf_at *buffer, struct glt
 	if (!uri && buffer->index > 0)
 		return gltf_fail(g, buffer, EINVAL, "it has no uri");
 	if (!uri)
-		*out = (struct gltf_range){g->file, g->binary_first, g->binary_count, false, g->binary_count};
+		*out = (struct gltf_range){g->file, g->binary_first, g->binary_count, false, g->binary_count, 0};
 	else if (range_of_uri(g, buffer, uri, out))
 		return g->failed;
 	if (length > out->size)
@@ -125,10 +125,23 @@ int gltf_image_range(struct gltf *g, const struct gltf_at *image, struct gltf_ra
 		return rc ? rc : gltf_fail(g, image, EINVAL, "it has no uri and no bufferView");
 	if (gltf_buffer_view(g, &view, &buffer, &first, &count))
 		return g->failed;
-	if (buffer.base64)
-		return gltf_fail(g, image, ENOTSUP, "an image in an embedded buffer; use .glb");
-	*out = (struct gltf_range){buffer.file, buffer.first + first, count, false, count};
+	*out = gltf_range_part(&buffer, first, first + count);
 	return 0;
+}
+
+struct gltf_range gltf_range_part(const struct gltf_range *r, uint64_t begin, uint64_t end)
+{
+	struct gltf_range part = *r;
+	part.size = end - begin;
+	if (!r->base64) {
+		part.first += begin;
+		part.count = end - begin;
+		return part;
+	}
+	part.skip = (unsigned)(begin % 3);
+	part.first += begin / 3 * 4;
+	part.count = ((end - begin + part.skip) * 4 + 2) / 3;
+	return part;
 }
 
 void gltf_put_range(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const struct gltf_range *r)
@@ -140,4 +153,6 @@ void gltf_put_range(struct gltf *g, struct xml_element *el, const struct gltf_at
 	gltf_put_whole(g, el, at, "byte_count", r->count);
 	if (r->base64)
 		gltf_put_bool(g, el, at, "base64", true);
+	if (r->skip)
+		gltf_put_whole(g, el, at, "skip_bytes", r->skip);
 }

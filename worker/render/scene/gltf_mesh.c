@@ -95,7 +95,6 @@ static void put_colours(struct primitive *p, const struct gltf_at *a)
 /* The shape reads the part of the buffer that it needs; for base64 that starts at a group of three bytes. */
 static void put_numbers(struct primitive *p)
 {
-	struct gltf_range part = p->buffer;
 	uint64_t begin = UINT64_MAX, end = 0;
 	for (unsigned i = 0; i < p->count; i++) {
 		begin = p->numbers[i].first < begin ? p->numbers[i].first : begin;
@@ -103,8 +102,7 @@ static void put_numbers(struct primitive *p)
 	}
 	begin -= begin % 3;
 	end = end > begin ? end : begin;
-	part.first += part.base64 ? begin / 3 * 4 : begin;
-	part.count = part.base64 ? ((end - begin) * 4 + 2) / 3 : end - begin;
+	const struct gltf_range part = gltf_range_part(&p->buffer, begin, end);
 	gltf_put_range(p->g, p->shape, p->mesh, &part);
 	for (unsigned i = 0; i < p->count; i++) {
 		const struct numbers *n = &p->numbers[i];

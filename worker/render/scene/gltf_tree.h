@@ -58,6 +58,7 @@ struct gltf_range {
 	uint64_t first, count;
 	bool base64;   /* first and count refer to the text; a view's offset to the decoded bytes */
 	uint64_t size; /* decoded */
+	unsigned skip; /* of the decoded bytes, at the beginning */
 };
 
 struct gltf {

@@ -13,9 +13,9 @@ struct picture_entry {
 
 static bool same_key(const struct picture_key *a, const struct picture_key *b)
 {
-	return a->first_byte == b->first_byte && a->byte_count == b->byte_count && a->base64 == b->base64 &&
-	       a->linear == b->linear && a->channel == b->channel && a->threshold == b->threshold &&
-	       a->power == b->power && strcmp(a->name, b->name) == 0;
+	return a->first_byte == b->first_byte && a->byte_count == b->byte_count && a->skip_bytes == b->skip_bytes &&
+	       a->base64 == b->base64 && a->linear == b->linear && a->channel == b->channel &&
+	       a->threshold == b->threshold && a->power == b->power && strcmp(a->name, b->name) == 0;
 }
 
 static uint64_t mix(uint64_t h, uint64_t word)

@@ -20,7 +20,7 @@ struct picture_cache {
 /* Everything that determines the pixels, except for the range that they are clamped to. */
 struct picture_key {
 	const char *name;
-	int64_t first_byte, byte_count;
+	int64_t first_byte, byte_count, skip_bytes;
 	bool base64, linear;
 	enum image_channel channel;
 	double threshold, power; /* power: what the stored numbers are raised to; 1 unless linear */

@@ -54,6 +54,7 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 		.name = name,
 		.first_byte = node_int(n, "first_byte", 0),
 		.byte_count = node_int(n, "byte_count", 0),
+		.skip_bytes = node_int(n, "skip_bytes", 0),
 		.base64 = node_bool(n, "base64", false),
 		.linear = gamma > 0 || node_bool(n, "raw", range->raw && gamma != -1),
 		.channel = image_channel_named(channel),

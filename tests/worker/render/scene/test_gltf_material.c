@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Materials of glTF: what becomes of the format's layers and extensions. */
 #include "tests/support/gltf_files.h"
+#include "tests/support/pictures.h"
+#include "worker/render/texture/raster.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -162,12 +164,67 @@ static void test_both_sides_shine(void **state)
 	}
 }
 
+/* An image in the middle of a buffer is the same as in a file, wherever it begins, in each form that files have. */
+static void test_images_in_buffers(void **state)
+{
+	(void)state;
+	static const double rgb[12] = {0.5, 0.25, 0.75, 0.125, 0.5, 0.25, 0.75, 0.75, 0.5, 0.25, 0.75, 0.875};
+	static struct gltf_files f;
+	struct pictures p = {0};
+	pictures_add(&p, 2, 2, rgb);
+	for (int form = 0; form < GLTF_FORMS; form++)
+		for (size_t offset = 0; offset < 4; offset++) {
+			char view[128], length[64];
+			struct scene s;
+			struct error e;
+			struct raster r = {0};
+			const struct raster_range range = {0, 1, false};
+			struct arena arena = {.limit = 1 << 20};
+			gltf_files_make(&f);
+			size_t at = f.buffer_size + offset, size = p.file[0].size;
+			memset(f.buffer + f.buffer_size, 0x5a, offset);
+			memcpy(f.buffer + at, p.file[0].bytes, size);
+			snprintf(length, sizeof length, "\"byteLength\": %zu}]", f.buffer_size);
+			f.buffer_size = at + size + 1;
+			f.buffer[at + size] = 0x5a;
+			snprintf(view, sizeof view,
+				 "\"bufferViews\": [\n{\"buffer\": 0, \"byteOffset\": %zu, \"byteLength\": %zu},", at,
+				 size);
+			gltf_files_replace(&f, "\"bufferViews\": [", view);
+			for (int i = 12; i >= 0; i--) {
+				char from[32], to[32];
+				snprintf(from, sizeof from, "{\"bufferView\": %d,", i);
+				snprintf(to, sizeof to, "{\"bufferView\": %d,", i + 1);
+				if (strstr(f.json, from))
+					gltf_files_replace(&f, from, to);
+			}
+			gltf_files_replace(&f, "{\"uri\": \"rgb.hdr\"}",
+					   "{\"bufferView\": 0, \"mimeType\": \"image/hdr\"}");
+			char longer[64];
+			snprintf(longer, sizeof longer, "\"byteLength\": %zu}]", f.buffer_size);
+			gltf_files_replace(&f, length, longer);
+			gltf_files_pack(&f, (enum gltf_form)form);
+			if (gltf_files_read(f.list, false, &s, &e))
+				fail_msg("%s", e.text);
+			const struct scene_node *bitmap = node_child(
+				node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color"), PLUGIN_TEXTURE, 0);
+			struct asset_source assets = memory_assets(f.list);
+			if (raster_read(&r, bitmap, &assets, &range, &arena, &e))
+				fail_msg("form %d, offset %zu: %s", form, offset, e.text);
+			for (int i = 0; i < 12; i++)
+				assert_near((double)r.image.pixels[i], rgb[i]);
+			arena_fini(&arena);
+			scene_fini(&s);
+		}
+	pictures_fini(&p);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_materials),	 cmocka_unit_test(test_layers),
 		cmocka_unit_test(test_anisotropy),	 cmocka_unit_test(test_reflection),
-		cmocka_unit_test(test_both_sides_shine),
+		cmocka_unit_test(test_both_sides_shine), cmocka_unit_test(test_images_in_buffers),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
 }
