@@ -3,8 +3,8 @@
  * Reads OBJ files.
  *
  * obj_read opens the file and reads it line by line in one pass. Numbers, corners and triangles go to lists that grow
- * by doubling; polygons are cut into triangles; `usemtl` begins a run of faces with one material. The cache keeps the
- * file that was read last.
+ * by doubling; polygons are cut into triangles (polygon.h); `usemtl` begins a run of faces with one material. The cache
+ * keeps the file that was read last.
  *
  * An error names the file and the line: a number that cannot be read, an index of something that the file has not
  * defined yet. A file without faces or above 4 GB is refused. After an error nothing is left allocated.
@@ -15,6 +15,7 @@
 #include "common/base/mem.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/srgb.h"
+#include "worker/render/shape/polygon.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -167,6 +168,23 @@ static int read_corner(struct reader *o)
 	return 0;
 }
 
+/* The fan that was read becomes the polygon's triangles. Larger ones stay fans. */
+static void cut_face(struct reader *o, uint32_t first, uint32_t n)
+{
+	const double(*position)[3] = o->file->positions.items;
+	const struct obj_corner *c = (const struct obj_corner *)o->file->corners.items + first;
+	uint32_t(*t)[3] = (uint32_t(*)[3])o->file->triangles.items + (o->file->triangles.count - (n - 2));
+	struct polygon p;
+	if (n > POLYGON_MOST)
+		return;
+	for (p.n = 0; p.n < n; p.n++)
+		p.corner[p.n] = mesh_load(position[c[p.n].v - 1]);
+	polygon_cut(&p, t);
+	for (uint32_t i = 0; i < n - 2; i++)
+		for (int k = 0; k < 3; k++)
+			t[i][k] += first;
+}
+
 static int read_face(struct reader *o)
 {
 	uint32_t first = (uint32_t)o->file->corners.count, n = 0;
@@ -189,6 +207,8 @@ static int read_face(struct reader *o)
 	if (n < 3)
 		return node_error(o->node, o->error, EINVAL, "%s:%d: a face of %u corners; it needs 3", o->name,
 				  o->line, n);
+	if (n > 3)
+		cut_face(o, first, n);
 	return 0;
 }
 

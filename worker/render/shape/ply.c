@@ -3,8 +3,9 @@
  * Stanford PLY: ascii and both byte orders, with any order of elements and properties.
  *
  * The header describes the data. A first pass over the faces counts triangles, so that memory is allocated once; a
- * second pass reads. Vertices have x y z, nx ny nz and u v (or s t), faces vertex_indices (or vertex_index); polygons
- * become fans of triangles. All other numbers of vertices and faces are attributes: integers represent 0 to 1 and are
+ * second pass reads, and a third where faces come before the vertices, because concave polygons are cut by their
+ * corners' positions (polygon.h). Vertices have x y z, nx ny nz and u v (or s t), faces vertex_indices (or
+ * vertex_index). All other numbers of vertices and faces are attributes: integers represent 0 to 1 and are
  * decoded from sRGB, as in Mitsuba. Lists and other elements are skipped.
  *
  * Failures: an invalid header, a file that ends too early, indices out of range, numbers that are not finite. Counts in
@@ -16,6 +17,7 @@
 #include "worker/render/shape/attribute_names.h"
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
+#include "worker/render/shape/polygon.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -294,6 +296,21 @@ static int item_error(const struct ply *f, const struct element *el, uint64_t i,
 	return node_error(f->node, f->error, EINVAL, "%s: %s %llu: %s", f->name, el->name, (unsigned long long)i, what);
 }
 
+/* The fan from triangle `first` on becomes the polygon's triangles. Larger ones stay fans. */
+static void cut_face(struct mesh *m, uint32_t first, uint32_t n)
+{
+	uint32_t index[POLYGON_MOST];
+	struct polygon p;
+	for (p.n = 0; p.n < n; p.n++) {
+		index[p.n] = p.n < 2 ? m->index[first][p.n] : m->index[first + p.n - 2][2];
+		p.corner[p.n] = mesh_load(m->position[index[p.n]]);
+	}
+	polygon_cut(&p, m->index + first);
+	for (uint32_t i = 0; i < n - 2; i++)
+		for (int k = 0; k < 3; k++)
+			m->index[first + i][k] = index[m->index[first + i][k]];
+}
+
 static int read_list(struct ply *f, const struct element *el, uint64_t item, const struct ply_property *p,
 		     uint32_t first_triangle)
 {
@@ -320,6 +337,8 @@ static int read_list(struct ply *f, const struct element *el, uint64_t item, con
 	if (p->role == ROLE_INDICES) {
 		if (n < 3)
 			return item_error(f, el, item, "a face needs three corners");
+		if (n > 3 && n <= POLYGON_MOST && f->mesh->index)
+			cut_face(f->mesh, first_triangle - (uint32_t)(n - 2), (uint32_t)n);
 		f->triangles += (uint64_t)n - 2;
 		if (f->triangles > MESH_TRIANGLES_MAX)
 			return item_error(f, el, item, "more triangles than 2^27");
@@ -474,6 +493,14 @@ static int add_attributes(struct ply *f, struct element *el, uint64_t bytes, str
 	return 0;
 }
 
+static bool faces_come_first(const struct ply *f)
+{
+	for (uint32_t i = 0; i < f->element_count; i++)
+		if (f->elements[i].kind != ELEMENT_OTHER)
+			return f->elements[i].kind == ELEMENT_FACE;
+	return false;
+}
+
 static int read_file(struct ply *f, struct arena *arena)
 {
 	int r = read_header(f);
@@ -490,10 +517,11 @@ static int read_file(struct ply *f, struct arena *arena)
 	for (uint32_t k = 0; k < f->element_count && !r; k++)
 		if (f->elements[k].kind != ELEMENT_OTHER)
 			r = add_attributes(f, &f->elements[k], (uint64_t)(f->end - body), arena);
-	if (r)
-		return r;
-	f->p = body;
-	return read_body(f);
+	for (int pass = 0; pass < (faces_come_first(f) ? 2 : 1) && !r; pass++) {
+		f->p = body;
+		r = read_body(f);
+	}
+	return r;
 }
 
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,

@@ -100,6 +100,41 @@ static void test_ply_polygons(void **state)
 	built_shape_release(&b);
 }
 
+/* An arrow head, whose fan around the first corner would turn one triangle over. */
+#define ARROW "-1 -1 0\n0 0.5 0\n1 -1 0\n0 1 0\n"
+static void test_concave_faces(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *type, *text;
+	} files[] = {
+		{"ply", HEAD "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+			     "property list uchar int vertex_index\nend_header\n" ARROW "4 0 1 2 3\n"},
+		{"ply",
+		 HEAD "element face 1\nproperty list uchar int vertex_index\nelement vertex 4\nproperty float x\n"
+		      "property float y\nproperty float z\nend_header\n4 0 1 2 3\n" ARROW},
+		{"obj", "v 9 9 9\nv -1 -1 0\nv 0 0.5 0\nv 1 -1 0\nv 0 1 0\nf 2 3 4\nf 2 3 4 5\n"},
+	};
+	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+		struct built_shape b = build(files[i].type, "", files[i].text, strlen(files[i].text));
+		if (b.result)
+			fail_msg("%s", b.error.text);
+		const struct mesh *m = &b.g.mesh;
+		uint32_t first = m->triangle_count - 2;
+		double sum = 0;
+		for (uint32_t t = first; t < first + 2; t++) {
+			vec3 p[3];
+			for (int k = 0; k < 3; k++)
+				p[k] = mesh_load(m->position[m->index[t][k]]);
+			double z = vec3_cross(vec3_sub(p[1], p[0]), vec3_sub(p[2], p[0])).z;
+			assert_true(z > 0);
+			sum += z / 2;
+		}
+		assert_true(fabs(sum - 0.5) < 1e-6);
+		built_shape_release(&b);
+	}
+}
+
 static void test_serialized(void **state)
 {
 	(void)state;
@@ -393,6 +428,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_ply),
 		cmocka_unit_test(test_ply_polygons),
+		cmocka_unit_test(test_concave_faces),
 		cmocka_unit_test(test_serialized),
 		cmocka_unit_test(test_serialized_attributes),
 		cmocka_unit_test(test_bad_ply),
