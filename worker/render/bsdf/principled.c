@@ -10,6 +10,12 @@
  * surface there is only the boundary, (1 - m) t of it. Tints divide c by its luminance. As in the originals the lobes
  * are added, not layered: at grazing angles, and with sheen above all, more may come back than arrives, up to 1.5
  * times.
+ *
+ * `coat` (ours; for glTF, whose clear coat reflects four times what the original's does) is a layer: a share k of the
+ * surface has it, with GGX facets of its own and Schlick's factor S of an index of 1.5. What lies below loses what the
+ * coat reflects, in both directions:
+ *
+ *   f (1 - k S(wo)) (1 - k S(wi)) + k S D G1 G1 / 4
  */
 #include "worker/render/bsdf/principled.h"
 
@@ -19,7 +25,7 @@
 #define PRINCIPLED_ALPHA_MIN 1e-3
 #define CLEARCOAT_REFLECTANCE 0.04 /* of an index of 1.5 */
 
-enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_TRANSMIT, LOBES };
+enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_COAT, LOBE_TRANSMIT, LOBES };
 
 /* base_color over its luminance, from eight wavelengths weighted by the eye's sensitivity. */
 static spectrum tint_of(const struct principled *p, const struct bsdf_point *at, spectrum base)
@@ -47,7 +53,6 @@ struct microfacet principled_facets(double anisotropic, double roughness)
 	return m;
 }
 
-/* Textures of roughness and metallic are grey: the mean over the lanes. */
 /* The value of a number or texture at a point: textures of shares are grey, the mean over the lanes. */
 static double principled_share_at(const struct texture *t, const struct bsdf_point *at)
 {
@@ -63,6 +68,8 @@ struct stuff principled_stuff(const struct principled *p, const struct bsdf_poin
 	for (int i = 0; i < SHARES; i++)
 		s.share[i] = p->varies && p->share[i].ops ? principled_share_at(&p->share[i], at) : p->most[i];
 	s.facets = principled_facets(s.share[ANISOTROPIC], s.roughness);
+	if (s.share[COAT] > 0)
+		s.coat = principled_facets(0, s.share[COAT_ROUGHNESS]);
 	s.tint = s.share[SPEC_TINT] > 0 || s.share[SHEEN_TINT] > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
 	return s;
 }
@@ -126,6 +133,12 @@ static double clearcoat_of(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, doub
 	       microfacet_g1_over_cos(&shadow, wi);
 }
 
+/* What the coat reflects of light at an angle. */
+static double coat_reflects(const struct stuff *s, double cosine)
+{
+	return s->share[COAT] * (CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cosine));
+}
+
 /* Probabilities of the lobes for light from wo. */
 static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
 {
@@ -139,6 +152,11 @@ static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
 	chance[LOBE_DIFFUSE] =
 		below ? 0 : clear * fmax((1 - s->share[TRANSMISSION]) * p->base_max, fmin(s->share[SHEEN], 1) * 0.2);
 	chance[LOBE_CLEARCOAT] = below ? 0 : 0.25 * s->share[CLEARCOAT] * (CLEARCOAT_REFLECTANCE + schlick(wo.z));
+	double coat = below ? 0 : coat_reflects(s, wo.z);
+	chance[LOBE_COAT] = 0;
+	for (int i = 0; i < LOBES; i++)
+		chance[i] *= 1 - coat;
+	chance[LOBE_COAT] = coat;
 	for (int i = 0; i < LOBES; i++)
 		sum += chance[i];
 	for (int i = 0; i < LOBES; i++)
@@ -174,6 +192,7 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 	double passes = (1 - s->metallic) * s->share[TRANSMISSION] *
 			fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
 	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
+	f *= 1 - coat_reflects(s, eta > 1 ? wo.z : -wi.z);
 	if (transport == TRANSPORT_RADIANCE)
 		f /= eta * eta;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
@@ -202,6 +221,14 @@ static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, d
 	if (s->share[CLEARCOAT] > 0) {
 		out->f = spectrum_add(out->f, spectrum_of(clearcoat_of(s, wo, wi, h, cos_d)));
 		out->pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(s, h.z) * h.z / (4 * cos_d);
+	}
+	if (s->share[COAT] > 0) {
+		double lobe = 0.25 * microfacet_d(&s->coat, h) * microfacet_g1_over_cos(&s->coat, wo);
+		double through = (1 - coat_reflects(s, wo.z)) * (1 - coat_reflects(s, wi.z));
+		out->f = spectrum_add(
+			spectrum_scale(through, out->f),
+			spectrum_of(coat_reflects(s, cos_d) * lobe * microfacet_g1_over_cos(&s->coat, wi)));
+		out->pdf += chance[LOBE_COAT] * lobe;
 	}
 }
 
@@ -249,8 +276,9 @@ static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const d
 		*wi = warp_cosine_hemisphere(u[0], u[1]);
 		return wi->z > 0;
 	}
-	vec3 h = lobe == LOBE_CLEARCOAT ? clearcoat_normal(s, u[0], u[1])
-					: microfacet_sample_visible(&s->facets, wo, u[0], u[1]);
+	vec3 h = lobe == LOBE_CLEARCOAT
+			 ? clearcoat_normal(s, u[0], u[1])
+			 : microfacet_sample_visible(lobe == LOBE_COAT ? &s->coat : &s->facets, wo, u[0], u[1]);
 	double c = fmin(vec3_dot(wo, h), 1);
 	if (!(c > 0))
 		return false;
@@ -314,9 +342,10 @@ int principled_shares(struct principled *p, struct bsdf *b, const struct scene_n
 		      struct error *e)
 {
 	static const char *const names[SHARES] = {
-		[TRANSMISSION] = "spec_trans",	       [SPEC_TINT] = "spec_tint",    [SHEEN] = "sheen",
-		[SHEEN_TINT] = "sheen_tint",	       [FLATNESS] = "flatness",	     [CLEARCOAT] = "clearcoat",
-		[CLEARCOAT_GLOSS] = "clearcoat_gloss", [ANISOTROPIC] = "anisotropic"};
+		[TRANSMISSION] = "spec_trans",	       [SPEC_TINT] = "spec_tint",     [SHEEN] = "sheen",
+		[SHEEN_TINT] = "sheen_tint",	       [FLATNESS] = "flatness",	      [CLEARCOAT] = "clearcoat",
+		[CLEARCOAT_GLOSS] = "clearcoat_gloss", [ANISOTROPIC] = "anisotropic", [COAT] = "coat",
+		[COAT_ROUGHNESS] = "coat_roughness"};
 	for (int i = 0; i < SHARES; i++) {
 		p->share[i] = (struct texture){.ops = NULL};
 		if (!node_ref(n, names[i])) {
@@ -371,6 +400,12 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	b->eta = glass ? p->eta : 1;
 	b->alpha = fmin(microfacet_least(&least),
 			p->most[CLEARCOAT] > 0 ? clearcoat_alpha(p->most[CLEARCOAT_GLOSS]) : INFINITY);
+	if (p->most[COAT] > 0) {
+		const struct texture *t = &p->share[COAT_ROUGHNESS];
+		struct microfacet coat =
+			principled_facets(0, t->ops ? principled_least(t, build) : p->most[COAT_ROUGHNESS]);
+		b->alpha = fmin(b->alpha, microfacet_least(&coat));
+	}
 	double diffuse = (1 - metallic) * (1 - p->most[TRANSMISSION]);
 	b->alpha_mean = diffuse + (1 - diffuse) * microfacet_mean(&least);
 	return 0;
@@ -388,6 +423,8 @@ static const struct param principled_params[] = {
 	PRINCIPLED_SHARE("clearcoat"),
 	PRINCIPLED_SHARE("clearcoat_gloss"),
 	PRINCIPLED_SHARE("anisotropic"),
+	PRINCIPLED_SHARE("coat"),
+	PRINCIPLED_SHARE("coat_roughness"),
 	{.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 8},
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},

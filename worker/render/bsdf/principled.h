@@ -8,7 +8,19 @@
 #include "worker/render/bsdf/microfacet.h"
 
 /* The parameters that are shares, from 0 to 1: numbers or textures. */
-enum { TRANSMISSION, SPEC_TINT, SHEEN, SHEEN_TINT, FLATNESS, CLEARCOAT, CLEARCOAT_GLOSS, ANISOTROPIC, SHARES };
+enum {
+	TRANSMISSION,
+	SPEC_TINT,
+	SHEEN,
+	SHEEN_TINT,
+	FLATNESS,
+	CLEARCOAT,
+	CLEARCOAT_GLOSS,
+	ANISOTROPIC,
+	COAT,
+	COAT_ROUGHNESS,
+	SHARES
+};
 
 struct principled {
 	struct texture base, roughness, metallic;
@@ -23,7 +35,7 @@ struct stuff {
 	const struct principled *p;
 	spectrum base, tint;
 	double roughness, metallic, share[SHARES];
-	struct microfacet facets;
+	struct microfacet facets, coat; /* coat: only where there is one */
 };
 
 struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at);

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The extensions of materials as properties of `principled`. Transmission refracts, as in importers of modelling tools:
- * thin walls are not distinguished from solids. The clear coat's strength is four times the parameter of `principled`,
- * which ends at a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses differ by less
- * than a factor of ten.
+ * thin walls are not distinguished from solids. The clear coat is the parameter `coat`, since the original model's ends
+ * at a quarter of the format's. Anisotropic roughness is exact as long as the two roughnesses differ by less than a
+ * factor of ten.
  *
- * Details that `principled` does not have are left out with a note: what a coat, a sheen or a reflection varies by. So
+ * Details that `principled` does not have are left out with a note: normals of a coat, what a sheen or a reflection
+ * varies by. So
  * are extensions that are not known, as the format wants it of those that a file does not require. What fills a body
  * becomes a property that the table does not know: refused with its name, or left out with --lenient.
  */
@@ -80,17 +81,16 @@ static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_
 
 static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
-	static const char *const others[] = {"clearcoatRoughnessTexture", "clearcoatNormalTexture", NULL};
 	const json_t *coat = gltf_extension(g, at, at->json, "KHR_materials_clearcoat");
 	double factor = coat ? gltf_number(g, at, coat, "clearcoatFactor", 0) : 0;
 	if (!(factor > 0))
 		return;
 	double roughness = gltf_number(g, at, coat, "clearcoatRoughnessFactor", 0);
-	gltf_note(g, "clear coats reflect a quarter of what the format says, the maximum of `principled`");
-	gltf_put_share(g, el, at, "clearcoat", factor, gltf_object(g, at, coat, "clearcoatTexture"), "r");
-	gltf_put_number(g, el, at, "clearcoat_gloss", fmin(fmax((0.1 - roughness * roughness) / 0.099, 0), 1));
-	note_members(g, coat, others,
-		     "the roughness and the normals of clear coats do not vary: their textures are left out");
+	gltf_put_share(g, el, at, "coat", factor, gltf_object(g, at, coat, "clearcoatTexture"), "r");
+	gltf_put_share(g, el, at, "coat_roughness", roughness,
+		       roughness > 0 ? gltf_object(g, at, coat, "clearcoatRoughnessTexture") : NULL, "g");
+	note_members(g, coat, (const char *const[]){"clearcoatNormalTexture", NULL},
+		     "the normals of clear coats are those of the surface: their textures are left out");
 }
 
 /* The format's sheen is of cloth (Estevez and Kulla 2017), Burley's of its edges. */

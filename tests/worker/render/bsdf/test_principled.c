@@ -119,6 +119,56 @@ static void test_clearcoat(void **state)
 	arena_fini(&a);
 }
 
+/* The layer over a metal, whose lobe is known from the bare one: what it adds is GGX with Schlick's factor, as of
+ * `roughconductor`, and what is below loses as much on both ways. */
+static void test_coat(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf coated, bare, layer;
+	bsdf_make(&a, "principled base_color=0.3 metallic=1 roughness=0.8 coat=0.6 coat_roughness=0.5", &coated);
+	bsdf_make(&a, "principled base_color=0.3 metallic=1 roughness=0.8", &bare);
+	bsdf_make(&a, "roughconductor material=none distribution=ggx alpha=0.25", &layer);
+	for (int i = 0; i < 300; i++) {
+		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
+		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
+		double cos_d = sqrt((1 + vec3_dot(wo, wi)) / 2);
+		double at[3] = {wo.z, wi.z, cos_d}, reflects[3];
+		for (int k = 0; k < 3; k++)
+			reflects[k] = 0.6 * (0.04 + 0.96 * pow(1 - at[k], 5));
+		double expected = (1 - reflects[0]) * (1 - reflects[1]) * bare.ops->eval(&bare, &point, wo, wi).v[0] +
+				  reflects[2] * layer.ops->eval(&layer, &point, wo, wi).v[0];
+		double told = coated.ops->eval(&coated, &point, wo, wi).v[0];
+		assert_true(fabs(told - expected) <= 1e-9 * expected);
+	}
+	arena_fini(&a);
+}
+
+/* Light that passes into or out of glass crosses the layer once, above the surface. */
+static void test_coat_on_glass(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf coated, bare;
+	int pass = 0;
+	bsdf_make(&a, "principled base_color=1 spec_trans=1 roughness=0.9 coat=0.6 coat_roughness=0.5", &coated);
+	bsdf_make(&a, "principled base_color=1 spec_trans=1 roughness=0.9", &bare);
+	for (int i = 0; i < 100; i++) {
+		vec3 above = direction(0.1 + 0.8 * (i % 10) / 10, 1),
+		     below = vec3_neg(direction(0.15 + 0.08 * (i / 10), 0.7));
+		double passes = 1 - 0.6 * (0.04 + 0.96 * pow(1 - above.z, 5));
+		for (int k = 0; k < 2; k++) {
+			vec3 wo = k ? below : above, wi = k ? above : below;
+			double expected = passes * bare.ops->eval(&bare, &point, wo, wi).v[0],
+			       told = coated.ops->eval(&coated, &point, wo, wi).v[0];
+			assert_true(fabs(told - expected) <= 1e-9 * expected);
+			pass += expected > 0;
+		}
+	}
+	assert_true(pass > 100);
+	arena_fini(&a);
+}
+
 static void test_specular_is_an_index(void **state)
 {
 	(void)state;
@@ -135,12 +185,14 @@ static void test_metallic_texture(void **state)
 	same("principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 | @metallic checkerboard color0=0.7 color1=0.7",
 	     "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.7", 0, 1);
 	/* each of the shares, and the roughness of facets that goes with them */
-	static const char *const shares[] = {"spec_trans", "spec_tint", "sheen",	   "sheen_tint",
-					     "flatness",   "clearcoat", "clearcoat_gloss", "anisotropic"};
+	static const char *const shares[] = {"spec_trans", "spec_tint",	    "sheen",	       "sheen_tint",
+					     "flatness",   "clearcoat",	    "clearcoat_gloss", "anisotropic",
+					     "coat",	   "coat_roughness"};
 	for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
 		static const char base[] = "base_color=rgb(0.8,0.3,0.1) roughness=0.4";
 		const char *with = strcmp(shares[i], "sheen_tint") == 0	       ? "sheen=0.5"
 				   : strcmp(shares[i], "clearcoat_gloss") == 0 ? "clearcoat=0.5"
+				   : strcmp(shares[i], "coat_roughness") == 0  ? "coat=0.5"
 									       : "";
 		char map[256], number[256];
 		snprintf(map, sizeof map, "principled %s %s | @%s checkerboard color0=1 color1=0.25", base, with,
@@ -217,6 +269,8 @@ int main(void)
 		cmocka_unit_test(test_metal_is_schlick_over_ggx),
 		cmocka_unit_test(test_diffuse_is_burleys),
 		cmocka_unit_test(test_clearcoat),
+		cmocka_unit_test(test_coat),
+		cmocka_unit_test(test_coat_on_glass),
 		cmocka_unit_test(test_specular_is_an_index),
 		cmocka_unit_test(test_metallic_texture),
 		cmocka_unit_test(test_a_thin_sheet),

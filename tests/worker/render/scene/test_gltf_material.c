@@ -27,13 +27,16 @@ static void test_layers(void **state)
 	struct scene s = gltf_files_scene(
 		IOR,
 		"\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5, \"clearcoatTexture\": {\"index\": 0}, "
+		"\"clearcoatRoughnessFactor\": 0.5, \"clearcoatRoughnessTexture\": {\"index\": 0}, "
 		"\"clearcoatNormalTexture\": {\"index\": 0}}, \"KHR_materials_iridescence\": {\"iridescenceFactor\": 1}, "
 		"\"KHR_materials_sheen\": {\"sheenColorFactor\": [0.5, 0.25, 0.125]}, " IOR,
 		false);
-	const struct scene_node *coat = node_ref(scene_named(&s, third), "clearcoat");
+	const struct scene_node *coat = node_ref(scene_named(&s, third), "coat");
 	assert_string_equal(coat->type, "scale");
 	assert_near(node_float(coat, "scale", 0), 0.5);
 	assert_string_equal(node_string(node_child(coat, PLUGIN_TEXTURE, 0), "channel", ""), "r");
+	const struct scene_node *rough = node_ref(scene_named(&s, third), "coat_roughness");
+	assert_string_equal(node_string(node_child(rough, PLUGIN_TEXTURE, 0), "channel", ""), "g");
 	assert_near(node_float(scene_named(&s, third), "sheen", 0), 0.5);
 	assert_near(node_float(scene_named(&s, third), "sheen_tint", 0), 0.75);
 	assert_true(scene_has_note(&s, "sheen is that of") && scene_has_note(&s, "thin films") &&
@@ -97,9 +100,13 @@ static void test_materials(void **state)
 	assert_near(node_float(glass, "alpha", 0), 0.25);
 	scene_fini(&s);
 
-	s = gltf_files_scene(IOR, "\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5}, " IOR, false);
-	assert_near(node_float(scene_named(&s, third), "clearcoat", 0), 0.5);
-	assert_true(scene_has_note(&s, "clear coats"));
+	s = gltf_files_scene(
+		IOR,
+		"\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5, \"clearcoatRoughnessFactor\": 0.25}, " IOR,
+		false);
+	assert_near(node_float(scene_named(&s, third), "coat", 0), 0.5);
+	assert_near(node_float(scene_named(&s, third), "coat_roughness", 0), 0.25);
+	assert_false(scene_has_note(&s, "clear coats"));
 	scene_fini(&s);
 
 	/* What is not known is ignored, and said, even if the file does not list it. */
