@@ -141,7 +141,7 @@ static void check_file(struct gltf *g)
 	const char *version = asset ? gltf_text(g, NULL, asset, "version", "") : "";
 	if (strncmp(version, "2.", 2) != 0)
 		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);
-	gltf_lamp_scale(g, json_string_value(json_object_get(asset, "generator")));
+	gltf_written_by(g, json_string_value(json_object_get(asset, "generator")));
 	const json_t *required = json_object_get(g->root, "extensionsRequired");
 	for (size_t i = 0; i < json_array_size(required); i++) {
 		const char *name = json_string_value(json_array_get(required, i));

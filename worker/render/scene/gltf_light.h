@@ -5,8 +5,8 @@
 
 #include "worker/render/scene/gltf_tree.h"
 
-/* Sets the scale of lamps from the program that wrote the file (NULL: unknown). */
-void gltf_lamp_scale(struct gltf *g, const char *generator);
+/* Notes which program wrote the file (NULL: unknown), and what follows for lamps. */
+void gltf_written_by(struct gltf *g, const char *generator);
 void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);
 void gltf_camera(struct gltf *g, const struct gltf_at *camera, const mat4 *to_world);
 /* Supplies what the file lacks: a camera that sees everything, an environment. */

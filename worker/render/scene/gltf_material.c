@@ -198,13 +198,18 @@ void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_
 		put_ref(g, shape, at, "emitter", GLTF_NO_COLOURS);
 }
 
+/* The format's is rough white metal; what has no material in Blender is grey there. */
 void gltf_default_material(struct gltf *g, struct xml_element *shape, enum gltf_colours colours)
 {
-	json_t *empty = json_object();
+	static const char grey[] =
+		"{\"pbrMetallicRoughness\": {\"baseColorFactor\": [0.8, 0.8, 0.8, 1], \"metallicFactor\": 0,"
+		"\"roughnessFactor\": 0.5},"
+		"\"extensions\": {\"KHR_materials_specular\": {\"specularFactor\": 0}}}";
+	json_t *material = json_loads(g->is_blenders ? grey : "{}", 0, NULL);
 	size_t count = json_array_size(json_object_get(g->root, "materials"));
-	if (empty)
-		gltf_material(g, shape, &(struct gltf_at){GLTF_MATERIALS, count, empty}, colours);
+	if (material)
+		gltf_material(g, shape, &(struct gltf_at){GLTF_MATERIALS, count, material}, colours);
 	else
 		gltf_fail(g, NULL, ENOMEM, "out of memory");
-	json_decref(empty);
+	json_decref(material);
 }

@@ -85,6 +85,7 @@ struct gltf {
 	bool *mesh_made;	      /* it is a shapegroup already */
 	struct xml_element *scene;
 	bool has_camera, has_light;
+	bool is_blenders;  /* its exporter wrote the file */
 	double lamp_scale; /* of the intensities of KHR_lights_punctual */
 	vec3 low, high;	   /* over all vertices */
 };

@@ -171,6 +171,31 @@ static void test_both_sides_shine(void **state)
 	}
 }
 
+/* Without a material: the format's default, which is metal, or Blender's, which is grey. */
+static void test_no_material(void **state)
+{
+	(void)state;
+	static const char version[] = "{\"version\": \"2.0\"}";
+	for (int blender = 0; blender < 2; blender++) {
+		static struct gltf_files f;
+		struct scene s;
+		struct error e;
+		gltf_files_make(&f);
+		gltf_files_replace(&f, ", \"material\": 0}", "}");
+		if (blender)
+			gltf_files_replace(
+				&f, version,
+				"{\"generator\": \"Khronos glTF Blender I/O v3.3.27\", \"version\": \"2.0\"}");
+		gltf_files_pack(&f, GLTF_EXTERNAL);
+		if (gltf_files_read(f.list, false, &s, &e))
+			fail_msg("%s", e.text);
+		const struct scene_node *bsdf = scene_named(&s, "bsdf of materials[4]");
+		assert_true(node_float(bsdf, "metallic", -1) == (blender ? 0 : 1));
+		assert_near(node_float(bsdf, "eta", 0), blender ? 1 : 1.5);
+		scene_fini(&s);
+	}
+}
+
 /* An image in the middle of a buffer is the same as in a file, wherever it begins, in each form that files have. */
 static void test_images_in_buffers(void **state)
 {
@@ -232,6 +257,7 @@ int main(void)
 		cmocka_unit_test(test_materials),	 cmocka_unit_test(test_layers),
 		cmocka_unit_test(test_anisotropy),	 cmocka_unit_test(test_reflection),
 		cmocka_unit_test(test_both_sides_shine), cmocka_unit_test(test_images_in_buffers),
+		cmocka_unit_test(test_no_material),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
 }
