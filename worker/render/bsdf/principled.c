@@ -7,7 +7,8 @@
  *   f = D G1 G1 F / 4 + (1 - m) (1 - t) diffuse + (1 - m) sheen + clearcoat / 4 + (1 - m) t sqrt(c) refracted
  *
  * where F mixes Fresnel's factor of the boundary (what is not metal) with Schlick's of colour c (metal). Below the
- * surface there is only the boundary, (1 - m) t of it. Tints divide c by its luminance. As in the originals the lobes
+ * surface there is only the boundary, (1 - m) t of it. Tints divide c by its luminance; a given `specular_color` (ours,
+ * for glTF) takes the place of a tint of 1. As in the originals the lobes
  * are added, not layered: at grazing angles, and with sheen above all, more may come back than arrives, up to 1.5
  * times.
  *
@@ -71,6 +72,11 @@ struct stuff principled_stuff(const struct principled *p, const struct bsdf_poin
 	if (s.share[COAT] > 0)
 		s.coat = principled_facets(0, s.share[COAT_ROUGHNESS]);
 	s.tint = s.share[SPEC_TINT] > 0 || s.share[SHEEN_TINT] > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
+	s.specular = s.tint;
+	if (p->has_specular) {
+		s.share[SPEC_TINT] = 1;
+		s.specular = texture_eval(&p->specular, &at->where, at->w);
+	}
 	return s;
 }
 
@@ -88,7 +94,7 @@ spectrum principled_fresnel(const struct stuff *s, double cosine)
 	double boundary = clear * (1 - s->share[SPEC_TINT]) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double tinted = fmin(s->tint.v[i] * root * root, 1);
+		double tinted = fmin(s->specular.v[i] * root * root, 1);
 		f.v[i] = boundary + s->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest) +
 			 clear * s->share[SPEC_TINT] * (tinted + (1 - tinted) * rest);
 	}
@@ -386,6 +392,9 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 		code = bsdf_texture(b, &p->metallic, n, "metallic", 0, build, e);
 	if (!code)
 		code = principled_shares(p, b, n, build, e);
+	p->has_specular = node_find(n, "specular_color") != NULL;
+	if (!code && p->has_specular)
+		code = bsdf_texture(b, &p->specular, n, "specular_color", 1, build, e);
 	if (!code)
 		code = read_index(p, n, e);
 	if (code)
@@ -425,6 +434,7 @@ static const struct param principled_params[] = {
 	PRINCIPLED_SHARE("anisotropic"),
 	PRINCIPLED_SHARE("coat"),
 	PRINCIPLED_SHARE("coat_roughness"),
+	{.name = "specular_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	{.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 8},
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},

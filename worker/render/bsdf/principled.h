@@ -23,17 +23,18 @@ enum {
 };
 
 struct principled {
-	struct texture base, roughness, metallic;
+	struct texture base, roughness, metallic, specular; /* specular: if has_specular */
 	struct texture share[SHARES];
 	double most[SHARES]; /* the largest value of each, for textures as found by bsdf_probe */
 	double eta, base_max;
 	bool varies; /* some parameter is a texture */
+	bool has_specular;
 };
 
 /* The parameters at a point of the surface. */
 struct stuff {
 	const struct principled *p;
-	spectrum base, tint;
+	spectrum base, tint, specular; /* specular: what SPEC_TINT mixes in */
 	double roughness, metallic, share[SHARES];
 	struct microfacet facets, coat; /* coat: only where there is one */
 };

@@ -51,7 +51,8 @@ static bool is_listed(const struct gltf *g, const char *list, const char *extens
 }
 
 /* The reflectance at normal incidence in the format is min(r^2 c, 1) f for an index of reflectance r^2, a colour c and
- * a factor f. Here it is grey and decides the index, which is left alone where light enters. */
+ * a factor f. Here the largest component of c decides the index, and the rest is `specular_color`. Where light enters,
+ * the index is left alone. */
 static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const json_t *ior = gltf_extension(g, at, at->json, "KHR_materials_ior"),
@@ -61,22 +62,28 @@ static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_
 	if (specular) {
 		factor = gltf_number(g, at, specular, "specularFactor", 1);
 		gltf_numbers(g, at, specular, "specularColorFactor", rgb, 3);
-		note_members(g, specular, (const char *const[]){"specularTexture", "specularColorTexture", NULL},
-			     "the reflection of what is no metal is the same everywhere: textures of "
-			     "KHR_materials_specular are left out");
+		note_members(
+			g, specular, (const char *const[]){"specularTexture", NULL},
+			"the reflection of what is no metal is equally strong everywhere: specularTexture is left out");
 	}
-	double grey = fmax(0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2], 0);
-	if (rgb[0] != rgb[1] || rgb[1] != rgb[2])
-		gltf_note(g, "the reflection of what is no metal is white, as bright as the colour of "
-			     "KHR_materials_specular");
-	if (transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0 && factor * grey != 1) {
+	double most = fmax(fmax(rgb[0], fmax(rgb[1], rgb[2])), 0);
+	const json_t *texture = specular ? gltf_object(g, at, specular, "specularColorTexture") : NULL;
+	bool coloured = most > 0 && (texture || rgb[0] != rgb[1] || rgb[1] != rgb[2]);
+	if (transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0 &&
+	    (factor * most != 1 || coloured)) {
 		gltf_note(g, "KHR_materials_specular does not change what reflects from materials that transmit light");
-		factor = grey = 1;
+		factor = most = 1;
+		coloured = false;
 	}
 	/* An index of 0 means total reflection in the format. */
 	double root = eta > 0 ? fabs((eta - 1) / (eta + 1)) : 1,
-	       scaled = fmin(root * sqrt(grey), 1) * sqrt(fmin(fmax(factor, 0), 1));
+	       scaled = fmin(root * sqrt(most), 1) * sqrt(fmin(fmax(factor, 0), 1));
 	gltf_put_number(g, el, at, "eta", fmin((1 + scaled) / fmax(1 - scaled, 0.1), 10));
+	if (!coloured)
+		return;
+	for (int k = 0; k < 3; k++)
+		rgb[k] = fmax(rgb[k], 0) / most;
+	gltf_put_colour(g, el, at, "specular_color", rgb, texture);
 }
 
 static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_at *at)

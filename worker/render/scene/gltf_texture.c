@@ -70,7 +70,8 @@ struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_transmission"), "transmissionTexture"),
 		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_clearcoat"), "clearcoatTexture"),
 		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_clearcoat"),
-				"clearcoatRoughnessTexture")};
+				"clearcoatRoughnessTexture"),
+		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_specular"), "specularColorTexture")};
 	struct gltf_sets sets = {{0, 0}, 0};
 	for (size_t i = 0; i < sizeof infos / sizeof *infos && sets.count < 2; i++) {
 		uint64_t own = infos[i] ? set_of(g, at, infos[i]) : 0;

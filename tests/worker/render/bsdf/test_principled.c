@@ -178,6 +178,18 @@ static void test_specular_is_an_index(void **state)
 	same("principled base_color=0 specular=2", "principled base_color=0 eta=2.3333333333333335", 0, 1);
 }
 
+/* A colour of the reflection scales Schlick's factor at normal incidence, as that of a metal. */
+static void test_specular_color(void **state)
+{
+	(void)state;
+	same("principled base_color=0 roughness=0.4 eta=1.5 specular_color=0.5",
+	     "principled base_color=0.02 roughness=0.4 metallic=1", 0, 1);
+	same("principled base_color=0.7 roughness=0.4 spec_tint=1 sheen=0.4 sheen_tint=0.5",
+	     "principled base_color=0.7 roughness=0.4 specular_color=1 sheen=0.4 sheen_tint=0.5", 0, 1);
+	same("principled base_color=0.7 roughness=0.4 | @specular_color checkerboard color0=0.3 color1=0.3",
+	     "principled base_color=0.7 roughness=0.4 specular_color=0.3", 0, 1);
+}
+
 /* A texture that has one value is the number, and one that varies is it at each point. */
 static void test_metallic_texture(void **state)
 {
@@ -269,6 +281,7 @@ int main(void)
 		cmocka_unit_test(test_metal_is_schlick_over_ggx),
 		cmocka_unit_test(test_diffuse_is_burleys),
 		cmocka_unit_test(test_clearcoat),
+		cmocka_unit_test(test_specular_color),
 		cmocka_unit_test(test_coat),
 		cmocka_unit_test(test_coat_on_glass),
 		cmocka_unit_test(test_specular_is_an_index),

@@ -120,23 +120,24 @@ static void test_materials(void **state)
 	scene_fini(&s);
 }
 
-/* What reflects at normal incidence is min(r^2 c, 1) f, of the colour its brightness; glass keeps its index. */
+/* What reflects at normal incidence is min(r^2 c, 1) f; a colour is its largest component times `specular_color`; glass
+ * keeps its index. */
 static void test_reflection(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *members;
 		double ior, want;
-		const char *note;
+		const char *colour; /* "rgb", or the type of a texture; NULL: none */
 	} files[] = {
 		{"\"specularFactor\": 0.5", 1.75, 0.5 * (0.75 / 2.75) * (0.75 / 2.75), NULL},
 		{"\"specularColorFactor\": [2, 2, 2]", 1.75, 2 * (0.75 / 2.75) * (0.75 / 2.75), NULL},
 		{"\"specularColorFactor\": [100, 100, 100], \"specularFactor\": 0.25", 1.75, 0.25, NULL},
 		{"\"specularColorFactor\": [0, 0, 0]", 1.5, 0, NULL},
-		{"\"specularColorFactor\": [0, 1, 0], \"specularFactor\": 0.5", 1.5, 0.5 * 0.7152 * 0.04, "is white"},
-		{"\"specularTexture\": {\"index\": 0}", 1.5, 0.04, "textures of KHR_materials_specular"},
+		{"\"specularColorFactor\": [0, 2, 1], \"specularFactor\": 0.5", 1.5, 2 * 0.5 * 0.04, "rgb"},
+		{"\"specularColorTexture\": {\"index\": 0}", 1.5, 0.04, "bitmap"},
+		{"\"specularTexture\": {\"index\": 0}", 1.5, 0.04, NULL},
 	};
-	static const char *const notes[] = {"is white", "textures of KHR_materials_specular", "does not change what"};
 	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++)
 		for (int glass = 0; glass < 2; glass++) {
 			char from[64], to[256];
@@ -147,12 +148,18 @@ static void test_reflection(void **state)
 			struct scene s = gltf_files_scene(from, to, false);
 			const struct scene_node *bsdf =
 				scene_named(&s, glass ? "bsdf of materials[2]" : "bsdf of materials[3]");
+			const struct property *colour = node_find(bsdf, "specular_color");
+			const char *want = glass ? NULL : files[i].colour;
 			double eta = node_float(bsdf, "eta", 0), root = (eta - 1) / (eta + 1);
 			assert_near(root * root, glass ? (0.75 / 2.75) * (0.75 / 2.75) : files[i].want);
-			for (int k = 0; k < 3; k++) {
-				bool said = files[i].note && strcmp(files[i].note, notes[k]) == 0;
-				assert_true(scene_has_note(&s, notes[k]) == (k == 2 ? glass && i != 5 : said));
-			}
+			assert_true((colour != NULL) == (want != NULL));
+			if (want && strcmp(want, "rgb") == 0)
+				assert_true(colour->value.as.rgb[0] == 0 && colour->value.as.rgb[1] == 1 &&
+					    colour->value.as.rgb[2] == 0.5);
+			else if (want)
+				assert_string_equal(node_ref(bsdf, "specular_color")->type, want);
+			assert_true(scene_has_note(&s, "specularTexture is left out") == (i == 6));
+			assert_true(scene_has_note(&s, "does not change what") == (glass && i < 6));
 			scene_fini(&s);
 		}
 }
