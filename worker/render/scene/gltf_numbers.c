@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The buffer of the last accessor stays open, because neighbours share it. Its file joins those that the scene consists
- * of (the tree's includes), as no shape names it. Failures: as the accessor says it, views that are too short, more
- * numbers than a mesh may have.
+ * The buffer of the last accessor stays open, because neighbours share it, and so does every buffer in base64, because
+ * decoding one for each of many accessors could take hours. Its file joins those that the scene consists of (the tree's
+ * includes), as no shape names it. Failures: as the accessor says it, views that are too short, more numbers than a
+ * mesh may have.
  */
 #include "worker/render/scene/gltf_numbers.h"
 
@@ -20,19 +21,25 @@ enum { COMPONENTS_MAX = 16 };
 
 struct gltf_open {
 	struct asset_range part;
-	const char *file;
+	const char *file; /* NULL: it is closed */
 	uint64_t first, count;
-	bool base64;
+	struct gltf_open *next;
 };
 
 /* ---- bytes ---- */
 
+static void close_open(struct gltf *g, struct gltf_open *o)
+{
+	if (o && o->file)
+		asset_range_close(&o->part, g->assets);
+}
+
 void gltf_numbers_close(struct gltf *g)
 {
-	if (g->open && g->open->file)
-		asset_range_close(&g->open->part, g->assets);
-	if (g->open)
-		g->open->file = NULL;
+	close_open(g, g->plain);
+	for (; g->decoded; g->decoded = g->decoded->next)
+		close_open(g, g->decoded);
+	g->plain = g->open = NULL;
 }
 
 static bool list_file(struct gltf *g, const char *file)
@@ -49,23 +56,50 @@ static bool list_file(struct gltf *g, const char *file)
 	return true;
 }
 
+static bool is_open(const struct gltf_open *o, const struct gltf_range *r)
+{
+	return o->file && o->first == r->first && o->count == r->count && strcmp(o->file, r->file) == 0;
+}
+
+/* Room for a buffer, which may be open already; file NULL: it is not. */
+static struct gltf_open *find_open(struct gltf *g, const struct gltf_range *r)
+{
+	struct gltf_open *o = r->base64 ? g->decoded : g->plain;
+	while (r->base64 && o && !is_open(o, r))
+		o = o->next;
+	if (o && is_open(o, r))
+		return o;
+	if (o) {
+		close_open(g, o);
+		o->file = NULL;
+		return o;
+	}
+	o = arena_alloc(g->arena, 1, sizeof *o);
+	if (!o)
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+	else if (r->base64) {
+		o->next = g->decoded;
+		g->decoded = o;
+	} else
+		g->plain = o;
+	return o;
+}
+
 static bool open_buffer(struct gltf *g, const struct gltf_range *r)
 {
 	struct error inner;
-	struct gltf_open *o = g->open;
-	if (!o && !(o = g->open = arena_alloc(g->arena, 1, sizeof *o))) {
-		gltf_fail(g, NULL, ENOMEM, "out of memory");
-		return false;
-	}
-	if (o->file && strcmp(o->file, r->file) == 0 && o->first == r->first && o->count == r->count)
-		return true;
-	gltf_numbers_close(g);
+	struct gltf_open *o = g->open && is_open(g->open, r) ? g->open : find_open(g, r);
+	g->open = o;
+	if (!o || o->file)
+		return o != NULL;
 	int rc = asset_range_open(&o->part, g->assets, r->file, r->first, r->count, r->base64, &inner);
 	if (rc) {
 		gltf_fail(g, NULL, -rc, "%s", inner.text);
 		return false;
 	}
-	*o = (struct gltf_open){o->part, r->file, r->first, r->count, r->base64};
+	o->file = r->file;
+	o->first = r->first;
+	o->count = r->count;
 	return list_file(g, r->file);
 }
 

@@ -77,12 +77,13 @@ struct gltf {
 	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
 	struct gltf_range *buffers, *images; /* embedded data that has been located, by entry */
 	unsigned embedded, primitives;
-	unsigned char *material_made; /* bits 1 << enum gltf_colours */
-	struct gltf_open *open;	      /* the buffer that is read (gltf_numbers.h) */
-	size_t *parents;	      /* of each node (gltf_node.h); NULL: not needed so far */
-	uint64_t embedded_bytes;      /* of vertices that are computed */
-	double *mesh_uses;	      /* number of nodes that have each mesh */
-	bool *mesh_made;	      /* it is a shapegroup already */
+	unsigned char *material_made;	   /* bits 1 << enum gltf_colours */
+	struct gltf_open *open;		   /* the buffer that is read (gltf_numbers.c), one of these: */
+	struct gltf_open *plain, *decoded; /* the last one that is a file; a list of those in base64 */
+	size_t *parents;		   /* of each node (gltf_node.h); NULL: not needed so far */
+	uint64_t embedded_bytes;	   /* of vertices that are computed */
+	double *mesh_uses;		   /* number of nodes that have each mesh */
+	bool *mesh_made;		   /* it is a shapegroup already */
 	struct xml_element *scene;
 	bool has_camera, has_light;
 	bool is_blenders;  /* its exporter wrote the file */
