@@ -12,6 +12,7 @@
  * parameters has: there it is refused, or left out.
  */
 #include "worker/render/scene/gltf.h"
+#include "worker/render/scene/gltf_animation.h"
 #include "worker/render/scene/gltf_light.h"
 #include "worker/render/scene/gltf_mesh.h"
 #include "worker/render/scene/gltf_node.h"
@@ -150,9 +151,6 @@ static void check_file(struct gltf *g)
 				  name ? name : "(no text)");
 	}
 	note_unknown(g);
-	if (json_array_size(json_object_get(g->root, "animations")))
-		gltf_note(g,
-			  "its animations are ignored: nodes, skins and morph targets are as they stand in the file");
 }
 
 /* ---- nodes */
@@ -306,6 +304,7 @@ static int read_file(struct gltf *g)
 	g->tree->root = g->scene;
 	g->tree->dialect_3 = true;
 	check_file(g);
+	gltf_animation_begin(g);
 	read_scene(g);
 	if (!g->has_camera)
 		gltf_default_camera(g);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Reads all attributes as numbers, adds the morph targets by their weights (glTF 2.0, section 3.7.2.2), moves the
- * vertices by the skin's joints (3.7.3) where they stand in the file, and puts floats and indices into the shape as
+ * vertices by the skin's joints (3.7.3), and puts floats and indices into the shape as
  * base64 (scene/asset_range.h). Failures: attributes of different lengths, joints that are none, more bytes than
  * EMBEDDED_MAX in one file.
  */

@@ -317,12 +317,140 @@ static void of_several_nodes(void **state)
 	world_free(w);
 }
 
+/* ---- animations */
+
+/* A triangle with two morph targets; the first animation puts it at (1, 2, 3), turns it by 90 degrees about z, makes it
+ * twice as large and, by the second target, half as large again; the second one is for nobody. */
+#define CHANNEL(sampler, path) "{'sampler': " sampler ", 'target': {'node': 0, 'path': '" path "'}}"
+#define ANIMATED(channels, accessors)                                                                                 \
+	"{" NODES                                                                                                     \
+	", 'translation': [7, 7, 7], 'weights': [1, 1]}], 'animations': [{'name': 'Walk', 'channels': [" channels     \
+	"], 'samplers': [{'input': 0, 'output': 3}, {'input': 0, 'output': 4, 'interpolation': 'STEP'}, "             \
+	"{'input': 0, 'output': 5, 'interpolation': 'CUBICSPLINE'}, {'input': 0, 'output': 6}, {'input': 0}]}, "      \
+	"{'channels': [{}], 'samplers': []}], 'meshes': [{'primitives': [{'attributes': {'POSITION': 0}, 'targets': " \
+	"[{'POSITION': 1}, {'POSITION': 2}]}]}], 'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': 3, " \
+	"'type': 'VEC3'}, {'bufferView': 0, 'byteOffset': 36, 'componentType': 5126, 'count': 3, 'type': 'VEC3'}, "   \
+	"{'bufferView': 0, 'byteOffset': 72, 'componentType': 5126, 'count': 3, 'type': 'VEC3'}, " accessors "], "    \
+	"'bufferViews': [{'buffer': 0, 'byteLength': 108}, {'buffer': 1, 'byteLength': 24}, {'buffer': 1, "           \
+	"'byteOffset': 24, 'byteLength': 8}, {'buffer': 1, 'byteOffset': 32, 'byteLength': 36}, {'buffer': 1, "       \
+	"'byteOffset': 68, 'byteLength': 16}], 'buffers': [$0, $1]}"
+#define PLACE "{'bufferView': 1, 'componentType': 5126, 'count': 2, 'type': 'VEC3'}, "
+#define TURN_OF(more) \
+	"{'bufferView': 2, 'componentType': 5122, 'normalized': true, 'count': 1, 'type': 'VEC4'" more "}, "
+#define SIZE "{'bufferView': 3, 'componentType': 5126, 'count': 3, 'type': 'VEC3'}, "
+#define WEIGHTS_OF(count) "{'bufferView': 4, 'componentType': 5126, 'count': " count ", 'type': 'SCALAR'}"
+#define ALL_CHANNELS                \
+	CHANNEL("0", "translation") \
+	", " CHANNEL("1", "rotation") ", " CHANNEL("2", "scale") ", " CHANNEL("3", "weights")
+
+static void animation(void **state)
+{
+	(void)state;
+	static const float up[9] = {0, 0, 1, 0, 0, 1, 0, 0, 1}, larger[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+	static const float places[6] = {1, 2, 3, 9, 9, 9}, sizes[9] = {5, 5, 5, 2, 2, 2, 5, 5, 5},
+			   weights[4] = {0, 0.5f, 9, 9};
+	static const int16_t turn[4] = {0, 0, 23170, 23170};
+	begin();
+	add_bytes(0, plain, sizeof plain);
+	add_bytes(0, up, sizeof up);
+	add_bytes(0, larger, sizeof larger);
+	add_bytes(1, places, sizeof places);
+	add_bytes(1, turn, sizeof turn);
+	add_bytes(1, sizes, sizeof sizes);
+	add_bytes(1, weights, sizeof weights);
+	finish(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	struct world *w = world_of_files(4, 4, file.list);
+	assert_at(w, 0, 0, (vec3){1, 2, 3});
+	assert_at(w, 0, 1, (vec3){1, 5, 3});
+	assert_at(w, 0, 2, (vec3){-2, 2, 3});
+	world_free(w);
+	finish(ANIMATED(
+		CHANNEL("0", "translation") ", {'sampler': 0, 'target': {'path': 'pointer'}}, " CHANNEL("3", "blur"),
+		PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	w = world_of_files(4, 4, file.list); /* what is not animated is the node's */
+	assert_triangle(w, 0, (vec3){1, 2, 4}, 2);
+	world_free(w);
+	finish(ANIMATED(
+		CHANNEL("1", "rotation"),
+		PLACE TURN_OF(", 'sparse': {'count': 1, 'indices': {'bufferView': 0, 'componentType': 5121}, 'values': "
+			      "{'bufferView': 2}}") SIZE WEIGHTS_OF("4")));
+	w = world_of_files(4, 4, file.list);
+	assert_triangle(w, 0, (vec3){7, 7, 8}, 2);
+	world_free(w);
+	finish(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("1")));
+	refuses("accessors[6]: fewer values than its animation needs");
+	finish(ANIMATED(CHANNEL("0", "rotation"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	refuses("accessors[3]: of a type that animation cannot have");
+	finish(ANIMATED(CHANNEL("9", "scale"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	refuses("animations[0]: a channel without a sampler");
+	static const float infinite[1] = {INFINITY};
+	memcpy(file.bytes[1], infinite, sizeof infinite);
+	finish(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
+	refuses("accessors[3]: a value that is not finite");
+}
+
+/* ---- buffers */
+
+static int opened;
+static struct asset_source inner;
+
+static int open_counted(void *user, const char *name, struct asset *out, struct error *e)
+{
+	(void)user;
+	opened++;
+	return inner.open(inner.user, name, out, e);
+}
+
+static void close_counted(void *user, struct asset *a)
+{
+	(void)user;
+	inner.close(inner.user, a);
+}
+
+/* Vertices that are computed, from two buffers by turns: each is decoded once. */
+static void by_turns(void **state)
+{
+	(void)state;
+	static const int8_t i8[12] = {0, 0, 0, 0, 127, 0, 0, 0, 0, 127, 0, 0};
+	static const int8_t other[12] = {0, 0, 0, 0, 63, 0, 0, 0, 0, 63, 0, 0};
+	char json[4096], meshes[2048] = "", nodes[512] = "", roots[256] = "";
+	for (int i = 0; i < 20; i++) {
+		const char *comma = i ? ", " : "";
+		size_t m = strlen(meshes), n = strlen(nodes), r = strlen(roots);
+		snprintf(meshes + m, sizeof meshes - m, "%s{'primitives': [{'attributes': {'POSITION': %d}}]}", comma,
+			 i % 2);
+		snprintf(nodes + n, sizeof nodes - n, "%s{'mesh': %d}", comma, i);
+		snprintf(roots + r, sizeof roots - r, "%s%d", comma, i);
+	}
+	begin();
+	add_bytes(0, i8, sizeof i8);
+	add_bytes(1, other, sizeof other);
+	snprintf(
+		json, sizeof json,
+		"{'asset': {'version': '2.0'}, 'scene': 0, 'scenes': [{'nodes': [%s]}], 'nodes': [%s], 'meshes': [%s], "
+		"'accessors': [{'bufferView': 0, 'componentType': 5120, 'normalized': true, 'count': 3, 'type': 'VEC3'}, "
+		"{'bufferView': 1, 'componentType': 5120, 'normalized': true, 'count': 3, 'type': 'VEC3'}], 'bufferViews': "
+		"[{'buffer': 0, 'byteLength': 12, 'byteStride': 4}, {'buffer': 1, 'byteLength': 12, 'byteStride': 4}], "
+		"'buffers': [$0, $1]}",
+		roots, nodes, meshes);
+	finish(json);
+	struct scene s;
+	struct error e;
+	inner = memory_assets(file.list);
+	opened = 0;
+	const struct asset_source assets = {.open = open_counted, .close = close_counted};
+	if (scene_read(&s, &assets, "s.gltf", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	assert_int_equal(opened, 3); /* the scene, and each buffer in it */
+	scene_fini(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(of_each_type),	    cmocka_unit_test(sparse), cmocka_unit_test(in_several_buffers),
-		cmocka_unit_test(morph_targets),    cmocka_unit_test(skins),  cmocka_unit_test(of_a_list),
-		cmocka_unit_test(of_several_nodes),
+		cmocka_unit_test(of_each_type),	    cmocka_unit_test(sparse),	 cmocka_unit_test(in_several_buffers),
+		cmocka_unit_test(morph_targets),    cmocka_unit_test(skins),	 cmocka_unit_test(of_a_list),
+		cmocka_unit_test(of_several_nodes), cmocka_unit_test(animation), cmocka_unit_test(by_turns),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
