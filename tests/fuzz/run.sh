@@ -49,6 +49,11 @@ if [ "${1:-}" = --one ]; then
 	exit
 fi
 
+for target in ${FUZZ_TARGETS:-}; do
+	[ -f "tests/fuzz/fuzz_$target.c" ] && continue
+	echo "fuzz: there is no target $target; there are" tests/fuzz/fuzz_*.c | sed 's|tests/fuzz/fuzz_||g; s|\.c||g'
+	exit 2
+done
 if ! command -v "$CLANG" >/dev/null 2>&1; then
 	echo "fuzz: skipped: $CLANG is not installed (apt install clang)"
 	exit 77
