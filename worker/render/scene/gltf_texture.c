@@ -90,8 +90,10 @@ void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_
 		gltf_fail(g, at, EINVAL, "a texture without an index");
 		return;
 	}
-	if (gltf_follow(g, &texture, texture.json, "source", GLTF_IMAGES, &image) <= 0) {
-		gltf_fail(g, &texture, ENOTSUP, "it has no source that is PNG or JPEG");
+	/* Where there are two, the other is for those who cannot read WebP. */
+	const json_t *webp = gltf_extension(g, &texture, texture.json, "EXT_texture_webp");
+	if (gltf_follow(g, &texture, webp ? webp : texture.json, "source", GLTF_IMAGES, &image) <= 0) {
+		gltf_fail(g, &texture, ENOTSUP, "it has no source that is PNG, JPEG or WebP");
 		return;
 	}
 	if (gltf_image_range(g, &image, &range))

@@ -18,6 +18,7 @@ static const struct format {
 	{"\x76\x2f\x31\x01", 4, image_decode_exr, false},
 	{"#?RADIANCE", 10, image_decode_hdr, false},
 	{"#?RGBE", 6, image_decode_hdr, false},
+	{"RIFF", 4, image_decode_webp, true},
 	{"BM", 2, image_decode_bmp, false},
 	{"P5", 2, image_decode_pnm, false},
 	{"P6", 2, image_decode_pnm, false},
@@ -42,14 +43,14 @@ static int decode(const struct image_input *in, struct image *out)
 		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
 			continue;
 		if (in->alpha && !formats[i].alpha)
-			return error_set(in->error, ENOTSUP, "%s: alpha is only read from PNG and TGA", in->name);
+			return error_set(in->error, ENOTSUP, "%s: alpha is only read from PNG, WebP and TGA", in->name);
 		return formats[i].decode(in, out);
 	}
 	if (image_is_tga(in)) /* the only one without a beginning of its own */
 		return image_decode_tga(in, out);
 	return error_set(
 		in->error, EINVAL,
-		"%s: unknown image format (supported: PNG, JPEG, OpenEXR, Radiance HDR, BMP, TGA, PGM, PPM, PFM)",
+		"%s: unknown image format (supported: PNG, JPEG, WebP, OpenEXR, Radiance HDR, BMP, TGA, PGM, PPM, PFM)",
 		in->name);
 }
 

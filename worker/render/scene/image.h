@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR, BMP, PGM,
- * PPM and PFM are recognised by content, TGA by its name or its end. Integers of any format are sRGB, whatever gamma it
- * claims. Damaged files are an error, never half an image. Any thread, each with its own arena.
+ * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, WebP, EXR, Radiance HDR, BMP,
+ * PGM, PPM and PFM are recognised by content, TGA by its name or its end. Integers of any format are sRGB, whatever
+ * gamma it claims. Damaged files are an error, never half an image. Any thread, each with its own arena.
  */
 #ifndef WORKER_RENDER_SCENE_IMAGE_H
 #define WORKER_RENDER_SCENE_IMAGE_H
@@ -19,7 +19,7 @@ enum image_channel {
 	IMAGE_RED,
 	IMAGE_GREEN,
 	IMAGE_BLUE,
-	IMAGE_ALPHA, /* of PNG and TGA; 1 if an image has none, -ENOTSUP for formats whose alpha is not read */
+	IMAGE_ALPHA, /* of PNG, WebP and TGA; 1 if an image has none, -ENOTSUP for formats whose alpha is not read */
 };
 
 /* "r", "g", "b" or "a"; all of each pixel for any other name. */

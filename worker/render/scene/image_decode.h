@@ -30,6 +30,7 @@ int image_decode_bmp(const struct image_input *in, struct image *out);
 int image_decode_tga(const struct image_input *in, struct image *out);
 int image_decode_pnm(const struct image_input *in, struct image *out);
 int image_decode_hdr(const struct image_input *in, struct image *out);
+int image_decode_webp(const struct image_input *in, struct image *out);
 int image_decode_exr(const struct image_input *in, struct image *out);
 
 bool image_is_tga(const struct image_input *in);

@@ -178,6 +178,27 @@ static void test_both_sides_shine(void **state)
 	}
 }
 
+/* A WebP image is preferred to the one for those who cannot read it. */
+static void test_webp(void **state)
+{
+	(void)state;
+	static struct gltf_files f;
+	struct scene s;
+	struct error e;
+	gltf_files_make(&f);
+	gltf_files_replace(&f, "{\"source\": 0, ",
+			   "{\"source\": 0, \"extensions\": {\"EXT_texture_webp\": {\"source\": 1}}, ");
+	gltf_files_replace(&f, "{\"uri\": \"rgb.hdr\"}", "{\"uri\": \"rgb.hdr\"}, {\"uri\": \"b.webp\"}");
+	gltf_files_replace(&f, "\"extensionsUsed\"",
+			   "\"extensionsRequired\": [\"EXT_texture_webp\"], \"extensionsUsed\"");
+	gltf_files_pack(&f, GLTF_EXTERNAL);
+	if (gltf_files_read(f.list, false, &s, &e))
+		fail_msg("%s", e.text);
+	const struct scene_node *scale = node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color");
+	assert_string_equal(node_string(node_child(scale, PLUGIN_TEXTURE, 0), "filename", ""), "b.webp");
+	scene_fini(&s);
+}
+
 /* Without a material: the format's default, which is metal, or Blender's, which is grey. */
 static void test_no_material(void **state)
 {
@@ -264,7 +285,7 @@ int main(void)
 		cmocka_unit_test(test_materials),	 cmocka_unit_test(test_layers),
 		cmocka_unit_test(test_anisotropy),	 cmocka_unit_test(test_reflection),
 		cmocka_unit_test(test_both_sides_shine), cmocka_unit_test(test_images_in_buffers),
-		cmocka_unit_test(test_no_material),
+		cmocka_unit_test(test_no_material),	 cmocka_unit_test(test_webp),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
 }

@@ -124,7 +124,7 @@ static void test_channels(void **state)
 	struct image img;
 	struct error e;
 	assert_int_equal(image_decode(jpeg, size, "i", false, IMAGE_ALPHA, &arena, &img, &e), -ENOTSUP);
-	assert_string_equal(e.text, "i: alpha is only read from PNG and TGA");
+	assert_string_equal(e.text, "i: alpha is only read from PNG, WebP and TGA");
 	arena_fini(&arena);
 	free(jpeg);
 }

@@ -247,7 +247,7 @@ static void test_refusals_say_why(void **state)
 		   {"bitmap filename=nowhere", "nowhere"},
 		   {"bitmap filename=p0 gamma=-2", "gamma = -2; it is -1 (sRGB), 1 (linear) or"},
 		   {"bitmap filename=p2 gamma=70", "gamma = 70 makes a number that is too large: 4 to that power"},
-		   {"bitmap filename=p0 channel=a", "alpha is only read from PNG and TGA"},
+		   {"bitmap filename=p0 channel=a", "alpha is only read from PNG, WebP and TGA"},
 		   {"checkerboard color0=3", "color0"}};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		struct texture t;
