@@ -6,7 +6,8 @@
  * keep their precision.
  *
  * A light sub-path leaves on either side by chance. What encloses a body is mostly seen from outside, so few start
- * inside it; which of them do is a matter of variance, not of the result.
+ * inside it, unless it is so large that it may be a dome around the scene; how many do is a matter of variance, not of
+ * the result.
  */
 #include "worker/render/emitter/surface_light.h"
 
@@ -42,7 +43,8 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (rc)
 		return rc;
 	bool both = node_bool(n, "two_sided", false);
-	l->back = !both ? 0 : is_closed(&l->light) ? 0.0625 : 0.5;
+	/* The scene's radius is 1: a ball of half of that has an area of pi. */
+	l->back = !both ? 0 : is_closed(&l->light) && l->light.area < M_PI ? 0.0625 : 0.5;
 	em->power = l->light.area * M_PI * em->brightest * (both ? 2 : 1);
 	return 0;
 }

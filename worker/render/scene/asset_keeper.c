@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A file that nobody uses any more stays until another one is opened. While it is in use, others are opened beside it
- * and not kept. Failures are the inner source's; without memory for the name a file is not kept.
+ * and not kept. Failures are the inner source's, and too many bytes; without memory for the name a file is not kept.
  */
 #include "worker/render/scene/asset_keeper.h"
 
@@ -27,7 +27,12 @@ static int keeper_open(void *user, const char *name, struct asset *out, struct e
 	}
 	if (k->users == 0)
 		drop(k); /* before the other takes memory */
+	if (k->read > ASSET_KEEPER_BYTES_MAX)
+		return error_set(e, E2BIG, "%s: the scene asks for its files again and again; %llu GB were read so far",
+				 name, (unsigned long long)k->read >> 30);
 	int rc = k->inner->open(k->inner->user, name, out, e);
+	if (!rc)
+		k->read += out->size;
 	if (rc || k->users > 0)
 		return rc;
 	size_t size = strlen(name) + 1;

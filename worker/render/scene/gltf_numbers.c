@@ -10,6 +10,7 @@
 #include "common/base/bytes.h"
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
+#include "worker/render/scene/asset_keeper.h"
 #include "worker/render/scene/asset_range.h"
 #include "worker/render/scene/gltf_buffer.h"
 
@@ -100,7 +101,11 @@ static bool open_buffer(struct gltf *g, const struct gltf_range *r)
 	o->file = r->file;
 	o->first = r->first;
 	o->count = r->count;
-	return list_file(g, r->file);
+	g->read += o->part.file.size;
+	if (g->read > ASSET_KEEPER_BYTES_MAX)
+		gltf_fail(g, NULL, E2BIG, "its files are wanted again and again; %llu GB were read so far",
+			  (unsigned long long)g->read >> 30);
+	return !g->failed && list_file(g, r->file);
 }
 
 /* The bytes of a view, valid until those of another buffer are wanted. NULL after a failure. */

@@ -82,6 +82,7 @@ struct gltf {
 	struct gltf_open *plain, *decoded; /* the last one that is a file; a list of those in base64 */
 	size_t *parents;		   /* of each node (gltf_node.h); NULL: not needed so far */
 	uint64_t embedded_bytes;	   /* of vertices that are computed */
+	uint64_t read;			   /* bytes of files with buffers, so far */
 	double *mesh_uses;		   /* number of nodes that have each mesh */
 	bool *mesh_made;		   /* it is a shapegroup already */
 	struct xml_element *scene;

@@ -272,13 +272,22 @@ static void check_direction(const char *what, struct world *w, double back)
 	"<shape type='" shape "'><emitter type='area'><boolean name='two_sided' value='true'/></emitter></shape>" \
 	"<shape type='sphere'><float name='radius' value='4'/></shape>"
 
-/* Few leave against the normal where the surface encloses a body, half elsewhere; the power is that of two sides. */
+/* Few leave against the normal where the surface encloses a body smaller than the scene, half elsewhere; the power is
+ * that of two sides. */
 static void test_direction(void **state)
 {
 	(void)state;
 	check_direction("direction", sphere_light("false"), 0);
 	check_direction("direction, two sides of a rectangle", world_of_text(8, 8, TWO_SIDED("rectangle")), 0.5);
 	check_direction("direction, two sides of a cube", world_of_text(8, 8, TWO_SIDED("cube")), 0.0625);
+	check_direction(
+		"direction, two sides of a dome",
+		world_of_text(
+			8, 8,
+			SENSOR("0,0,3",
+			       "0,0,0") "<shape type='sphere'><float name='radius' value='4'/><emitter type='area'>"
+					"<boolean name='two_sided' value='true'/></emitter></shape>"),
+		0.5);
 	struct world *w[2] = {
 		world_of_text(8, 8, TWO_SIDED("cube")),
 		world_of_text(

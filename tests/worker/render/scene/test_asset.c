@@ -305,11 +305,30 @@ static void test_keeper(void **state)
 	assert_true(c.opened == 4 && c.closed == 4);
 }
 
+/* It does not read for ever. */
+static void test_keeper_ends(void **state)
+{
+	(void)state;
+	struct counts c = {0, 0};
+	const struct asset_source inner = {.user = &c, .open = count_open, .close = count_close};
+	struct asset_keeper keeper = {.inner = &inner, .read = ASSET_KEEPER_BYTES_MAX};
+	struct asset_source s = asset_keeper_source(&keeper);
+	struct asset other;
+	struct error e;
+	use(&s, "a");
+	use(&s, "a");
+	assert_int_equal(s.open(s.user, "b", &other, &e), -E2BIG);
+	assert_non_null(strstr(e.text, "b: the scene asks for its files again and again; 256 GB"));
+	asset_keeper_fini(&keeper);
+	assert_true(c.opened == 1 && c.closed == 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_files_below),	cmocka_unit_test(test_files_elsewhere),
 		cmocka_unit_test(test_canonical_names), cmocka_unit_test(test_search),
-		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_keeper)};
+		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_keeper),
+		cmocka_unit_test(test_keeper_ends)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }

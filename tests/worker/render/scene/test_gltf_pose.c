@@ -407,10 +407,9 @@ static void close_counted(void *user, struct asset *a)
 	inner.close(inner.user, a);
 }
 
-/* Vertices that are computed, from two buffers by turns: each is decoded once. */
-static void by_turns(void **state)
+/* Twenty meshes whose vertices are computed, from two buffers by turns. */
+static void make_by_turns(const char *buffers)
 {
-	(void)state;
 	static const int8_t i8[12] = {0, 0, 0, 0, 127, 0, 0, 0, 0, 127, 0, 0};
 	static const int8_t other[12] = {0, 0, 0, 0, 63, 0, 0, 0, 0, 63, 0, 0};
 	char json[4096], meshes[2048] = "", nodes[512] = "", roots[256] = "";
@@ -431,26 +430,60 @@ static void by_turns(void **state)
 		"'accessors': [{'bufferView': 0, 'componentType': 5120, 'normalized': true, 'count': 3, 'type': 'VEC3'}, "
 		"{'bufferView': 1, 'componentType': 5120, 'normalized': true, 'count': 3, 'type': 'VEC3'}], 'bufferViews': "
 		"[{'buffer': 0, 'byteLength': 12, 'byteStride': 4}, {'buffer': 1, 'byteLength': 12, 'byteStride': 4}], "
-		"'buffers': [$0, $1]}",
-		roots, nodes, meshes);
+		"'buffers': [%s]}",
+		roots, nodes, meshes, buffers);
 	finish(json);
+}
+
+/* Of those in the file itself each is decoded once. */
+static void by_turns(void **state)
+{
+	(void)state;
 	struct scene s;
 	struct error e;
+	const struct asset_source assets = {.open = open_counted, .close = close_counted};
+	make_by_turns("$0, $1");
 	inner = memory_assets(file.list);
 	opened = 0;
-	const struct asset_source assets = {.open = open_counted, .close = close_counted};
 	if (scene_read(&s, &assets, "s.gltf", render_plugins(), NULL, 0, &e))
 		fail_msg("%s", e.text);
 	assert_int_equal(opened, 3); /* the scene, and each buffer in it */
 	scene_fini(&s);
 }
 
+/* Files of 60 GB, as they say. */
+static int open_large(void *user, const char *name, struct asset *out, struct error *e)
+{
+	int rc = open_counted(user, name, out, e);
+	if (!rc && strstr(name, ".bin"))
+		out->size = (size_t)60 << 30;
+	return rc;
+}
+
+/* Other files are read again, but not for ever. */
+static void by_turns_for_ever(void **state)
+{
+	(void)state;
+	struct scene s;
+	struct error e;
+	make_by_turns("{'byteLength': 12, 'uri': 'a.bin'}, {'byteLength': 12, 'uri': 'b.bin'}");
+	const struct memory_file list[] = {
+		file.list[0], {"a.bin", file.bytes[0], file.size[0]}, {"b.bin", file.bytes[1], file.size[1]}, {0}};
+	const struct asset_source assets = {.open = open_large, .close = close_counted};
+	inner = memory_assets(list);
+	opened = 0;
+	assert_int_equal(scene_read(&s, &assets, "s.gltf", render_plugins(), NULL, 0, &e), -E2BIG);
+	assert_non_null(strstr(e.text, "its files are wanted again and again; 300 GB were read so far"));
+	assert_int_equal(opened, 6);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(of_each_type),	    cmocka_unit_test(sparse),	 cmocka_unit_test(in_several_buffers),
-		cmocka_unit_test(morph_targets),    cmocka_unit_test(skins),	 cmocka_unit_test(of_a_list),
-		cmocka_unit_test(of_several_nodes), cmocka_unit_test(animation), cmocka_unit_test(by_turns),
+		cmocka_unit_test(of_each_type),	     cmocka_unit_test(sparse),	  cmocka_unit_test(in_several_buffers),
+		cmocka_unit_test(morph_targets),     cmocka_unit_test(skins),	  cmocka_unit_test(of_a_list),
+		cmocka_unit_test(of_several_nodes),  cmocka_unit_test(animation), cmocka_unit_test(by_turns),
+		cmocka_unit_test(by_turns_for_ever),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
