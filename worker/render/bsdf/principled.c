@@ -159,12 +159,10 @@ static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
 		below ? 0 : clear * fmax((1 - s->share[TRANSMISSION]) * p->base_max, fmin(s->share[SHEEN], 1) * 0.2);
 	chance[LOBE_CLEARCOAT] = below ? 0 : 0.25 * s->share[CLEARCOAT] * (CLEARCOAT_REFLECTANCE + schlick(wo.z));
 	double coat = below ? 0 : coat_reflects(s, wo.z);
-	chance[LOBE_COAT] = 0;
-	for (int i = 0; i < LOBES; i++)
-		chance[i] *= 1 - coat;
-	chance[LOBE_COAT] = coat;
-	for (int i = 0; i < LOBES; i++)
+	for (int i = 0; i < LOBES; i++) {
+		chance[i] = i == LOBE_COAT ? coat : chance[i] * (1 - coat);
 		sum += chance[i];
+	}
 	for (int i = 0; i < LOBES; i++)
 		chance[i] = sum > 0 ? chance[i] / sum : 0;
 }

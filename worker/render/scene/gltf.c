@@ -131,6 +131,18 @@ static void note_unknown(struct gltf *g)
 		gltf_note(g, text);
 }
 
+/* The exporter's `generator` ends in its version; since 3.4 lamps are in lumens unless the user wants otherwise. */
+static void note_writer(struct gltf *g, const char *generator)
+{
+	static const char blender[] = "Khronos glTF Blender I/O v";
+	unsigned major = 0, minor = 0;
+	g->lamp_scale = 1;
+	g->is_blenders = generator && strncmp(generator, blender, strlen(blender)) == 0;
+	if (g->is_blenders && sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) == 2 &&
+	    (major > 3 || (major == 3 && minor >= 4)))
+		g->lamp_scale = 1.0 / 683;
+}
+
 static void check_file(struct gltf *g)
 {
 	const json_t *asset = gltf_object(g, NULL, g->root, "asset");
@@ -142,7 +154,7 @@ static void check_file(struct gltf *g)
 	const char *version = asset ? gltf_text(g, NULL, asset, "version", "") : "";
 	if (strncmp(version, "2.", 2) != 0)
 		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);
-	gltf_written_by(g, json_string_value(json_object_get(asset, "generator")));
+	note_writer(g, json_string_value(json_object_get(asset, "generator")));
 	const json_t *required = json_object_get(g->root, "extensionsRequired");
 	for (size_t i = 0; i < json_array_size(required); i++) {
 		const char *name = json_string_value(json_array_get(required, i));

@@ -11,7 +11,6 @@
 #include "worker/render/scene/gltf_tree.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 enum { FILM_WIDTH = 768 };
@@ -71,18 +70,6 @@ void gltf_camera(struct gltf *g, const struct gltf_at *at, const mat4 *to_world)
 	gltf_put_matrix(g, sensor, at, "to_world", &m);
 	put_film(g, sensor, at, x / y);
 	g->has_camera = true;
-}
-
-/* The exporter's `generator` ends in its version; since 3.4 lamps are in lumens unless the user wants otherwise. */
-void gltf_written_by(struct gltf *g, const char *generator)
-{
-	static const char blender[] = "Khronos glTF Blender I/O v";
-	unsigned major = 0, minor = 0;
-	g->lamp_scale = 1;
-	g->is_blenders = generator && strncmp(generator, blender, strlen(blender)) == 0;
-	if (g->is_blenders && sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) == 2 &&
-	    (major > 3 || (major == 3 && minor >= 4)))
-		g->lamp_scale = 1.0 / 683;
 }
 
 void gltf_light(struct gltf *g, const struct gltf_at *at, const mat4 *to_world)

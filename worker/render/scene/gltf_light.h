@@ -5,8 +5,6 @@
 
 #include "worker/render/scene/gltf_tree.h"
 
-/* Notes which program wrote the file (NULL: unknown), and what follows for lamps. */
-void gltf_written_by(struct gltf *g, const char *generator);
 void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);
 void gltf_camera(struct gltf *g, const struct gltf_at *camera, const mat4 *to_world);
 /* Supplies what the file lacks: a camera that sees everything, an environment. */

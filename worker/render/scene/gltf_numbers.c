@@ -40,7 +40,7 @@ void gltf_numbers_close(struct gltf *g)
 	close_open(g, g->plain);
 	for (; g->decoded; g->decoded = g->decoded->next)
 		close_open(g, g->decoded);
-	g->plain = g->open = NULL;
+	g->plain = NULL;
 }
 
 static bool list_file(struct gltf *g, const char *file)
@@ -86,17 +86,17 @@ static struct gltf_open *find_open(struct gltf *g, const struct gltf_range *r)
 	return o;
 }
 
-static bool open_buffer(struct gltf *g, const struct gltf_range *r)
+/* NULL after a failure. */
+static const struct gltf_open *open_buffer(struct gltf *g, const struct gltf_range *r)
 {
 	struct error inner;
-	struct gltf_open *o = g->open && is_open(g->open, r) ? g->open : find_open(g, r);
-	g->open = o;
+	struct gltf_open *o = find_open(g, r);
 	if (!o || o->file)
-		return o != NULL;
+		return o;
 	int rc = asset_range_open(&o->part, g->assets, r->file, r->first, r->count, r->base64, &inner);
 	if (rc) {
 		gltf_fail(g, NULL, -rc, "%s", inner.text);
-		return false;
+		return NULL;
 	}
 	o->file = r->file;
 	o->first = r->first;
@@ -105,7 +105,7 @@ static bool open_buffer(struct gltf *g, const struct gltf_range *r)
 	if (g->read > ASSET_KEEPER_BYTES_MAX)
 		gltf_fail(g, NULL, E2BIG, "its files are wanted again and again; %llu GB were read so far",
 			  (unsigned long long)g->read >> 30);
-	return !g->failed && list_file(g, r->file);
+	return !g->failed && list_file(g, r->file) ? o : NULL;
 }
 
 /* The bytes of a view, valid until those of another buffer are wanted. NULL after a failure. */
@@ -113,11 +113,12 @@ static const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at
 {
 	struct gltf_range buffer;
 	uint64_t first;
-	if (gltf_buffer_view(g, view, &buffer, &first, count) || !open_buffer(g, &buffer))
+	const struct gltf_open *o;
+	if (gltf_buffer_view(g, view, &buffer, &first, count) || !(o = open_buffer(g, &buffer)))
 		return NULL;
-	if (first <= g->open->part.size && *count <= g->open->part.size - first)
-		return g->open->part.bytes + first;
-	gltf_fail(g, view, EINVAL, "it exceeds its buffer of %zu bytes", g->open->part.size);
+	if (first <= o->part.size && *count <= o->part.size - first)
+		return o->part.bytes + first;
+	gltf_fail(g, view, EINVAL, "it exceeds its buffer of %zu bytes", o->part.size);
 	return NULL;
 }
 

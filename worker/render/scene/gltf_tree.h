@@ -78,8 +78,7 @@ struct gltf {
 	struct gltf_range *buffers, *images; /* embedded data that has been located, by entry */
 	unsigned embedded, primitives;
 	unsigned char *material_made;	   /* bits 1 << enum gltf_colours */
-	struct gltf_open *open;		   /* the buffer that is read (gltf_numbers.c), one of these: */
-	struct gltf_open *plain, *decoded; /* the last one that is a file; a list of those in base64 */
+	struct gltf_open *plain, *decoded; /* open buffers: the last that is a file; a list of those in base64 */
 	size_t *parents;		   /* of each node (gltf_node.h); NULL: not needed so far */
 	uint64_t embedded_bytes;	   /* of vertices that are computed */
 	uint64_t read;			   /* bytes of files with buffers, so far */
