@@ -226,29 +226,24 @@ int gltf_files_read(const struct memory_file *files, bool lenient, struct scene 
 	return (lenient ? scene_read_lenient : scene_read)(s, &assets, files[0].name, render_plugins(), NULL, 0, e);
 }
 
-struct scene gltf_files_scene(const char *from, const char *to, bool lenient)
+static struct scene read_sound(const struct memory_file *files, bool lenient)
 {
-	static struct gltf_files f;
 	struct scene s;
 	struct error e;
-	if (gltf_files_read(gltf_files_change(&f, from, to), lenient, &s, &e))
+	if (gltf_files_read(files, lenient, &s, &e))
 		fail_msg("%s", e.text);
 	return s;
 }
 
-bool scene_has_note(const struct scene *s, const char *text)
+struct scene gltf_files_scene(const char *from, const char *to, bool lenient)
 {
-	for (uint32_t i = 0; i < s->note_count; i++)
-		if (strstr(s->notes[i], text))
-			return true;
-	return false;
+	static struct gltf_files f;
+	gltf_files_change(&f, from, to);
+	return read_sound(f.list, lenient);
 }
 
-const struct scene_node *scene_named(const struct scene *s, const char *id)
+struct scene gltf_files_packed(struct gltf_files *f, enum gltf_form form)
 {
-	for (uint32_t i = 0; i < s->object_count; i++)
-		if (s->objects[i]->id && strcmp(s->objects[i]->id, id) == 0)
-			return s->objects[i];
-	fail_msg("there is no %s", id);
-	return NULL;
+	gltf_files_pack(f, form);
+	return read_sound(f->list, false);
 }

@@ -31,10 +31,7 @@ const struct memory_file *gltf_files_change(struct gltf_files *f, const char *fr
 int gltf_files_read(const struct memory_file *files, bool lenient, struct scene *s, struct error *e);
 /* The scene of a changed file; fails the test where that is refused. */
 struct scene gltf_files_scene(const char *from, const char *to, bool lenient);
-
-/* A note that contains the text. */
-bool scene_has_note(const struct scene *s, const char *text);
-/* The object with that id; fails the test where there is none. */
-const struct scene_node *scene_named(const struct scene *s, const char *id);
+/* Packs what was changed; the same. */
+struct scene gltf_files_packed(struct gltf_files *f, enum gltf_form form);
 
 #endif

@@ -8,6 +8,7 @@
 #include "tests/support/gltf_files.h"
 #include "tests/support/pictures.h"
 #include "tests/support/render_picture.h"
+#include "tests/support/scene_parts.h"
 #include "tests/support/worlds.h"
 #include "worker/render/shape/shape.h"
 #include "worker/render/world/build.h"
@@ -388,11 +389,7 @@ static void test_no_camera_no_light(void **state)
 	gltf_files_replace(&changed, "\"camera\": 0,", "");
 	gltf_files_replace(&changed, "\"emissiveFactor\": [1, 0.5, 0.5],", "");
 	gltf_files_replace(&changed, "{\"translation\": [2, 2, 2], \"ext", "{\"translation\": [2, 2, 2], \"ext_");
-	gltf_files_pack(&changed, GLTF_EXTERNAL);
-	struct scene s;
-	struct error e;
-	if (gltf_files_read(changed.list, false, &s, &e))
-		fail_msg("%s", e.text);
+	struct scene s = gltf_files_packed(&changed, GLTF_EXTERNAL);
 	assert_true(scene_has_note(&s, "it has no camera") && scene_has_note(&s, "it has no light") &&
 		    scene_has_note(&s, "points and lines"));
 	find(&s, PLUGIN_EMITTER, "constant");
@@ -413,11 +410,7 @@ static void test_notes(void **state)
 	gltf_files_replace(&changed, "\"extensionsUsed\": [\"KHR_lights_punctual\"]",
 			   "\"extensionsUsed\": [\"KHR_lights_punctual\", \"ACME_fog\", \"ACME_wind\"]");
 	gltf_files_replace(&changed, "\"intensity\": ", "\"range\": 5, \"intensity\": ");
-	gltf_files_pack(&changed, GLTF_EXTERNAL);
-	struct scene s;
-	struct error e;
-	if (gltf_files_read(changed.list, false, &s, &e))
-		fail_msg("%s", e.text);
+	struct scene s = gltf_files_packed(&changed, GLTF_EXTERNAL);
 	assert_true(scene_has_note(&s, "these extensions are not supported and ignored: ACME_fog, ACME_wind"));
 	assert_true(scene_has_note(&s, "ranges of lights are ignored"));
 	scene_fini(&s);

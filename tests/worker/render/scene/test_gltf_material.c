@@ -2,6 +2,7 @@
 /* Materials of glTF: what becomes of the format's layers and extensions. */
 #include "tests/support/gltf_files.h"
 #include "tests/support/pictures.h"
+#include "tests/support/scene_parts.h"
 #include "worker/render/texture/raster.h"
 
 #include <math.h>
@@ -184,16 +185,13 @@ static void test_webp(void **state)
 	(void)state;
 	static struct gltf_files f;
 	struct scene s;
-	struct error e;
 	gltf_files_make(&f);
 	gltf_files_replace(&f, "{\"source\": 0, ",
 			   "{\"source\": 0, \"extensions\": {\"EXT_texture_webp\": {\"source\": 1}}, ");
 	gltf_files_replace(&f, "{\"uri\": \"rgb.hdr\"}", "{\"uri\": \"rgb.hdr\"}, {\"uri\": \"b.webp\"}");
 	gltf_files_replace(&f, "\"extensionsUsed\"",
 			   "\"extensionsRequired\": [\"EXT_texture_webp\"], \"extensionsUsed\"");
-	gltf_files_pack(&f, GLTF_EXTERNAL);
-	if (gltf_files_read(f.list, false, &s, &e))
-		fail_msg("%s", e.text);
+	s = gltf_files_packed(&f, GLTF_EXTERNAL);
 	const struct scene_node *scale = node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color");
 	assert_string_equal(node_string(node_child(scale, PLUGIN_TEXTURE, 0), "filename", ""), "b.webp");
 	scene_fini(&s);
@@ -207,16 +205,13 @@ static void test_no_material(void **state)
 	for (int blender = 0; blender < 2; blender++) {
 		static struct gltf_files f;
 		struct scene s;
-		struct error e;
 		gltf_files_make(&f);
 		gltf_files_replace(&f, ", \"material\": 0}", "}");
 		if (blender)
 			gltf_files_replace(
 				&f, version,
 				"{\"generator\": \"Khronos glTF Blender I/O v3.3.27\", \"version\": \"2.0\"}");
-		gltf_files_pack(&f, GLTF_EXTERNAL);
-		if (gltf_files_read(f.list, false, &s, &e))
-			fail_msg("%s", e.text);
+		s = gltf_files_packed(&f, GLTF_EXTERNAL);
 		const struct scene_node *bsdf = scene_named(&s, "bsdf of materials[4]");
 		assert_true(node_float(bsdf, "metallic", -1) == (blender ? 0 : 1));
 		assert_near(node_float(bsdf, "eta", 0), blender ? 1 : 1.5);
@@ -263,9 +258,7 @@ static void test_images_in_buffers(void **state)
 			char longer[64];
 			snprintf(longer, sizeof longer, "\"byteLength\": %zu}]", f.buffer_size);
 			gltf_files_replace(&f, length, longer);
-			gltf_files_pack(&f, (enum gltf_form)form);
-			if (gltf_files_read(f.list, false, &s, &e))
-				fail_msg("%s", e.text);
+			s = gltf_files_packed(&f, (enum gltf_form)form);
 			const struct scene_node *bitmap = node_child(
 				node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color"), PLUGIN_TEXTURE, 0);
 			struct asset_source assets = memory_assets(f.list);

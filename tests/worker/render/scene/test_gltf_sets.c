@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* glTF files with several sets of texture coordinates, without extents, of version 1; how their shapes are called. */
 #include "tests/support/memory_assets.h"
+#include "tests/support/scene_parts.h"
 #include "worker/render/render.h"
 #include "worker/render/scene/scene.h"
 
@@ -126,11 +127,8 @@ static void test_unlit(void **state)
 	(void)state;
 #define UNLIT ", \"extensions\": {\"KHR_materials_unlit\": {}}"
 	struct scene s = read_text(FILE_OF("\"2.0\"", FIRST, UNLIT, BOUNDS));
-	bool noted = false;
 	shape_of(&s);
-	for (uint32_t i = 0; i < s.note_count; i++)
-		noted |= strstr(s.notes[i], "surfaces of KHR_materials_unlit are lit like others") != NULL;
-	assert_true(noted);
+	assert_true(scene_has_note(&s, "surfaces of KHR_materials_unlit are lit like others"));
 	scene_fini(&s);
 	refuses(FILE_OF("\"2.0\"", FIRST,
 			UNLIT "}], \"extensionsRequired\": [\"KHR_materials_unlit\"], \"cameras\": [{", BOUNDS),
@@ -220,10 +218,7 @@ static void test_specular_glossiness(void **state)
 			assert_true(fabs(base->value.as.rgb[c] - cases[i].base[c]) < 1e-6);
 		assert_true(fabs(node_float(bsdf, "metallic", -1) - cases[i].metallic) < 1e-6);
 		assert_true(fabs(node_float(bsdf, "roughness", -1) - cases[i].roughness) < 1e-6);
-		bool noted = false;
-		for (uint32_t k = 0; k < s.note_count; k++)
-			noted |= strstr(s.notes[k], "such materials are no metals") != NULL;
-		assert_true(noted == (i == 3));
+		assert_true(scene_has_note(&s, "such materials are no metals") == (i == 3));
 		scene_fini(&s);
 	}
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/memory_assets.h"
+#include "tests/support/scene_parts.h"
 #include "tests/support/scene_tables.h"
 
 #include <setjmp.h>
@@ -187,11 +188,8 @@ static void test_notes_on_the_whole(void **state)
 		struct asset_source assets = memory_assets(files);
 		struct scene s;
 		struct error e;
-		bool found = false;
 		assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
-		for (uint32_t k = 0; k < s.note_count; k++)
-			found |= strstr(s.notes[k], cases[i].note) != NULL;
-		if (!found)
+		if (!scene_has_note(&s, cases[i].note))
 			fail_msg("%s: no note says: %s", cases[i].xml, cases[i].note);
 		scene_fini(&s);
 	}

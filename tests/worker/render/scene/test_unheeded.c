@@ -2,6 +2,7 @@
 /* Parameters that change light a little and are not supported: a note by name, none where the file says that it is off.
  */
 #include "tests/support/memory_assets.h"
+#include "tests/support/scene_parts.h"
 #include "worker/render/render.h"
 #include "worker/render/scene/scene.h"
 
@@ -24,15 +25,12 @@ static void check(const char *inside, const char *note)
 	char xml[1024];
 	struct scene s;
 	struct error e;
-	bool found = false;
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", inside);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
 	struct asset_source assets = memory_assets(files);
 	if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 		fail_msg("%s: %s", inside, e.text);
-	for (uint32_t i = 0; i < s.note_count; i++)
-		found |= strstr(s.notes[i], note ? note : "not supported") != NULL;
-	if (found != (note != NULL))
+	if (scene_has_note(&s, note ? note : "not supported") != (note != NULL))
 		fail_msg("%s: %s", inside, note ? note : "a note too many");
 	scene_fini(&s);
 }

@@ -4,6 +4,7 @@
  * objects with the same values. And against themselves: before 0.4 the camera's left is its right.
  */
 #include "tests/support/memory_assets.h"
+#include "tests/support/scene_parts.h"
 #include "worker/render/render.h"
 #include "worker/render/scene/scene.h"
 #include "worker/render/scene/value.h"
@@ -164,14 +165,6 @@ static void test_each_file_for_itself(void **state)
 	}
 }
 
-static bool says(const struct scene *s, const char *words)
-{
-	bool said = false;
-	for (uint32_t i = 0; i < s->note_count; i++)
-		said |= strstr(s->notes[i], words) != NULL;
-	return said;
-}
-
 /* The same text as of 0.3 and as of 0.4, which read it without turning anything. */
 static void test_left_is_right(void **state)
 {
@@ -183,7 +176,7 @@ static void test_left_is_right(void **state)
 		for (int k = 0; k < 4; k++)
 			assert_true(m.m[i][k] == (k == 0 ? -n.m[i][k] : n.m[i][k]));
 	assert_int_equal(a.note_count, b.note_count + 1);
-	assert_true(says(&a, "mirrors the cameras") && !says(&b, "mirrors the cameras"));
+	assert_true(scene_has_note(&a, "mirrors the cameras") && !scene_has_note(&b, "mirrors the cameras"));
 	scene_fini(&a);
 	scene_fini(&b);
 }
