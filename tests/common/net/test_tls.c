@@ -223,8 +223,9 @@ static void certificates_need_one_role_and_a_name(void **state)
 	raw_caller(forge("name", "../name", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
 	raw_caller(forge("line", "a\nb", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
 	/* Whose purpose would do, but who is no coordinator, cannot play one. */
-	refuses(pair_at(pair_ours, "node"), forge("false", "farm", "URI:hslt:role:worker"),
-		"certificate of a worker, not of a coordinator", "does not accept this certificate");
+	const char *farm = forge("false", "farm", "URI:hslt:role:worker"); /* uses what pair_at returns */
+	refuses(pair_at(pair_ours, "node"), farm, "certificate of a worker, not of a coordinator",
+		"does not accept this certificate");
 }
 
 static void who_has_expired_is_not(void **state)

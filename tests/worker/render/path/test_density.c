@@ -339,11 +339,12 @@ static void check_ratios(struct path_context *c, struct route *r, struct tally *
 
 static bool joins(struct path_context *c, unsigned s, unsigned t)
 {
-	const struct path_vertex *y = &c->light[s - 1], *z = &c->camera[t - 1];
+	const struct path_vertex *z = &c->camera[t - 1];
 	if (s == 0)
 		return z->emitter >= 0 && vec3_dot(z->x.ng, z->to_prev) > 0;
 	if (z->kind == VERTEX_INFINITE)
 		return false;
+	const struct path_vertex *y = &c->light[s - 1];
 	vec3 w = towards(z, y);
 	double film[2];
 	if (t == 1 && !camera_project(&c->w->camera, z->x.p, w, 1, &film[0], &film[1]))

@@ -1,0 +1,23 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# The same bits by two builds: sh tests/numerics/compilers.sh BUILD OTHER
+#
+# OTHER is by another compiler, or with other options. Arithmetic is strict IEEE, so that only an order of evaluation that C
+# leaves open, a value that was never set or a contracted operation can make a difference.
+set -eu
+build=$1 other=$2
+dir=$(mktemp -d)
+trap 'rm -rf "$dir"' EXIT
+for scene in demo/scene displaced/water numbers/glass; do
+	for integrator in path bdpt erpt hslt pssmlt; do
+		for by in "$build" "$other"; do
+			"$by/bin/hslt-render" "tests/scenes/$scene.xml" -o "$dir/image.exr" --size 32 --spp 4 --integrator $integrator \
+				--quiet 2>"$dir/err" || { cat "$dir/err" && exit 1; }
+			mv "$dir/image.exr" "$dir/$(echo "$by" | tr / _).exr"
+		done
+		set -- "$dir"/*.exr
+		"$build/bin/hslt-compare" --exact "$1" "$2" >"$dir/out" || {
+			echo "$scene by $integrator: $build and $other differ: $(cat "$dir/out")" && exit 1
+		}
+	done
+done
