@@ -185,28 +185,35 @@ static void cut_face(struct reader *o, uint32_t first, uint32_t n)
 			t[i][k] += first;
 }
 
+static int add_triangle(struct reader *o, uint32_t a, uint32_t b, uint32_t c)
+{
+	if (o->file->triangles.count >= MESH_TRIANGLES_MAX)
+		return node_error(o->node, o->error, E2BIG, "%s:%d: more than %d triangles", o->name, o->line,
+				  MESH_TRIANGLES_MAX);
+	uint32_t *t = list_push(&o->file->triangles);
+	if (!t)
+		return out_of_memory(o);
+	t[0] = a;
+	t[1] = b;
+	t[2] = c;
+	return 0;
+}
+
 static int read_face(struct reader *o)
 {
 	uint32_t first = (uint32_t)o->file->corners.count, n = 0;
 	for (; !at_end_of_line(o); n++) {
 		int r = read_corner(o);
+		if (!r && n >= 2)
+			r = add_triangle(o, first, first + n - 1, first + n);
 		if (r)
 			return r;
-		if (n < 2)
-			continue;
-		if (o->file->triangles.count >= MESH_TRIANGLES_MAX)
-			return node_error(o->node, o->error, E2BIG, "%s:%d: more than %d triangles", o->name, o->line,
-					  MESH_TRIANGLES_MAX);
-		uint32_t *t = list_push(&o->file->triangles);
-		if (!t)
-			return out_of_memory(o);
-		t[0] = first;
-		t[1] = first + n - 1;
-		t[2] = first + n;
 	}
+	if (n == 0)
+		return node_error(o->node, o->error, EINVAL, "%s:%d: a face without corners", o->name, o->line);
+	/* One or two corners, as exporters write points and lines: a triangle without area. */
 	if (n < 3)
-		return node_error(o->node, o->error, EINVAL, "%s:%d: a face of %u corners; it needs 3", o->name,
-				  o->line, n);
+		return add_triangle(o, first, first + n - 1, first + n - 1);
 	if (n > 3)
 		cut_face(o, first, n);
 	return 0;

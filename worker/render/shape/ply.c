@@ -317,6 +317,8 @@ static int read_list(struct ply *f, const struct element *el, uint64_t item, con
 	double n, corner[3] = {0, 0, 0};
 	if (!next_number(f, p->count_type, &n) || !(n >= 0) || n != floor(n))
 		return item_error(f, el, item, "a list without a length, or the file ends here");
+	if (p->role == ROLE_INDICES && n < 1)
+		return item_error(f, el, item, "a face without corners");
 	for (double k = 0; k < n; k++) {
 		double x;
 		if (!next_number(f, p->type, &x))
@@ -326,8 +328,11 @@ static int read_list(struct ply *f, const struct element *el, uint64_t item, con
 		if (!(x >= 0 && x < (double)f->mesh->vertex_count) || x != floor(x))
 			return item_error(f, el, item, "an index out of range");
 		corner[k < 2 ? (int)k : 2] = x;
-		if (k < 2)
+		if (k < 2 && k < n - 1)
 			continue;
+		/* One or two corners, as exporters write points and lines: a triangle without area. */
+		for (int i = (int)k + 1; i < 3; i++)
+			corner[i] = x;
 		if (f->mesh->index)
 			for (int i = 0; i < 3; i++)
 				f->mesh->index[first_triangle][i] = (uint32_t)corner[i];
@@ -335,11 +340,9 @@ static int read_list(struct ply *f, const struct element *el, uint64_t item, con
 		corner[1] = x;
 	}
 	if (p->role == ROLE_INDICES) {
-		if (n < 3)
-			return item_error(f, el, item, "a face needs three corners");
 		if (n > 3 && n <= POLYGON_MOST && f->mesh->index)
 			cut_face(f->mesh, first_triangle - (uint32_t)(n - 2), (uint32_t)n);
-		f->triangles += (uint64_t)n - 2;
+		f->triangles += n < 3 ? 1 : (uint64_t)n - 2;
 		if (f->triangles > MESH_TRIANGLES_MAX)
 			return item_error(f, el, item, "more triangles than 2^27");
 	}

@@ -100,6 +100,27 @@ static void test_ply_polygons(void **state)
 	built_shape_release(&b);
 }
 
+/* Points and lines that are written as faces are triangles without area; the others keep their colours. */
+static void test_ply_lines(void **state)
+{
+	(void)state;
+	const char *text =
+		"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+		"element face 4\nproperty list uchar int vertex_indices\nproperty float r\nproperty float g\n"
+		"property float b\nend_header\n0 0 0\n1 0 0\n1 1 0\n"
+		"1 0 .1 .1 .1\n3 0 1 2 .25 .5 .75\n2 0 1 .2 .2 .2\n3 2 1 0 .75 .5 .25\n";
+	struct built_shape b = build("ply", "", text, strlen(text));
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	const uint32_t index[2][3] = {{0, 1, 2}, {2, 1, 0}};
+	assert_int_equal(b.g.mesh.triangle_count, 2);
+	assert_memory_equal(b.g.mesh.index, index, sizeof index);
+	assert_int_equal(b.g.mesh.attribute_count, 1);
+	const float colours[] = {.25F, .5F, .75F, .75F, .5F, .25F};
+	assert_memory_equal(b.g.mesh.attributes[0].value, colours, sizeof colours);
+	built_shape_release(&b);
+}
+
 /* An arrow head, whose fan around the first corner would turn one triangle over. */
 #define ARROW "-1 -1 0\n0 0.5 0\n1 -1 0\n0 1 0\n"
 static void test_concave_faces(void **state)
@@ -219,9 +240,8 @@ static void test_bad_ply(void **state)
 		{QUAD
 		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 0.5",
 		 "an index"},
-		{QUAD
-		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 2 0 1",
-		 "a face needs three corners"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 0",
+		 "m: face 0: a face without corners"},
 		{QUAD
 		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 -3 0 1 2",
 		 "without a length"},
@@ -428,6 +448,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_ply),
 		cmocka_unit_test(test_ply_polygons),
+		cmocka_unit_test(test_ply_lines),
 		cmocka_unit_test(test_concave_faces),
 		cmocka_unit_test(test_serialized),
 		cmocka_unit_test(test_serialized_attributes),

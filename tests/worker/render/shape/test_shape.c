@@ -425,6 +425,11 @@ static void test_flat_triangles_are_dropped(void **state)
 	assert_int_equal(b.g.mesh.triangle_count, 1);
 	assert_int_equal(b.dropped, 3);
 	release(&b);
+	/* Points and lines that are written as faces. */
+	b = build_ok("obj", "", SQUARE "f 1\nf 1 2 3\nf 1 2\n");
+	assert_int_equal(b.g.mesh.triangle_count, 1);
+	assert_int_equal(b.dropped, 2);
+	release(&b);
 }
 
 static void test_bad_objs(void **state)
@@ -447,7 +452,7 @@ static void test_bad_objs(void **state)
 	refuses("", SQUARE "f 1 2 99999999999999999999\n", "m.obj:5: a face's corners");
 	refuses("", SQUARE "f 1/1 2/1 3/1\n", "texture coordinate 1 is out of range; there are 0");
 	refuses("", SQUARE "f 1//1 2//1 3//1\n", "normal 1 is out of range");
-	refuses("", SQUARE "f 1 2\n", "a face of 2 corners");
+	refuses("", SQUARE "f\n", "m.obj:5: a face without corners");
 	refuses("", SQUARE "f 1/ 2/ 3/\n", "a face's corners are");
 	refuses("", SQUARE "f 1/x 2 3\n", "a face's corners are");
 	refuses("", SQUARE "f 1.5 2 3\n", "a face's corners are");
