@@ -15,7 +15,8 @@ static int digit(char c)
 	return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
 }
 
-/* The canonical name of a file in a URI: %20 is a blank. */
+/* The canonical name of a file in a URI: %20 is a blank. Exporters on Windows write folders with '\\', which no URI
+ * has. */
 static const char *file_name(struct gltf *g, const struct gltf_at *at, const char *uri)
 {
 	size_t n = strlen(uri), k = 0;
@@ -27,7 +28,7 @@ static const char *file_name(struct gltf *g, const struct gltf_at *at, const cha
 	for (size_t i = 0; i < n; i++) {
 		int high = uri[i] == '%' && i + 2 < n ? digit(uri[i + 1]) : -1,
 		    low = high >= 0 ? digit(uri[i + 2]) : -1;
-		char c = low >= 0 ? (char)(16 * high + low) : uri[i];
+		char c = low >= 0 ? (char)(16 * high + low) : uri[i] == '\\' ? '/' : uri[i];
 		i += low >= 0 ? 2 : 0;
 		if (c == 0) {
 			gltf_fail(g, at, EINVAL, "its uri names no file");

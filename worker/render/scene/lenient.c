@@ -90,6 +90,30 @@ const struct scene_node *lenient_uncovered(const struct scene_node *n)
 	return inner && is_one_of(n->type, covers) && has_passage(inner) ? inner : NULL;
 }
 
+bool lenient_needs_texture(const char *type)
+{
+	static const char *const types[] = {"bumpmap", "normalmap", "mask", "scale", NULL};
+	return is_one_of(type, types);
+}
+
+const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el)
+{
+	if (strcmp(el->name, "texture") != 0)
+		return NULL;
+	for (const struct xml_element *c = el->first; c; c = c->next) {
+		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value");
+		struct asset there;
+		struct error e;
+		if (strcmp(c->name, "string") != 0 || !name || strcmp(name, "filename") != 0 || !file)
+			continue;
+		int r = assets->open(assets->user, file, &there, &e);
+		if (!r)
+			assets->close(assets->user, &there);
+		return r == -ENOENT ? file : NULL;
+	}
+	return NULL;
+}
+
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el)
 {
 	struct error unused;

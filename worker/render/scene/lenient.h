@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Replacements for what is not supported, with --lenient. The reader notes whatever is replaced or left out. Pure; any
- * thread.
+ * Replacements for what is not supported or missing, with --lenient. The reader notes whatever is replaced or left
+ * out. Any thread; only lenient_missing opens files.
  */
 #ifndef WORKER_RENDER_SCENE_LENIENT_H
 #define WORKER_RENDER_SCENE_LENIENT_H
 
+#include "worker/render/scene/asset.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/node.h"
 #include "worker/render/scene/param.h"
@@ -27,6 +28,13 @@ const char *lenient_param(const char *stand_in, const char *name);
 
 /* The BSDF inside `n` if `n` may only hold opaque ones and holds one that transmits light; NULL: nothing is wrong. */
 const struct scene_node *lenient_uncovered(const struct scene_node *n);
+
+/* An object that is nothing without the texture inside it. */
+bool lenient_needs_texture(const char *type);
+
+/* The file of a texture that the scene does not come with; NULL: it is there, or it is another kind of object, or it
+ * needs no file. Textures of old scenes are often lost; a mesh, or an environment, has no replacement. */
+const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el);
 
 /* The BSDF inside one that is not supported; NULL: none. */
 struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el);

@@ -62,6 +62,7 @@ struct draft {
 	struct scene_node *node;
 	const struct plugin_decl *decl;
 	bool stands_in; /* replaces a plug-in that is not supported */
+	bool lacks;	/* something inside it was left out, or is wrong */
 	struct property *properties;
 	const struct scene_node **children;
 	struct xml_nesting nesting;
@@ -310,7 +311,9 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	d->node->properties = d->properties;
 	d->node->children = d->children;
 	for (struct xml_element *c = el->first; c; c = c->next) {
-		int r = report_problem(&m->report, read_content(m, d, el, c), m->error);
+		int r = read_content(m, d, el, c);
+		d->lacks |= r == REPORT_TOLD;
+		r = report_problem(&m->report, r, m->error);
 		if (r)
 			return r;
 	}
@@ -349,18 +352,31 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 	return *decl ? 0 : refuse_type(m->decls, el, cls, *type, m->error);
 }
 
-/* Removes a covering that its inner BSDF does not allow. */
-static int uncover(struct maker *m, const struct xml_element *el, const struct scene_node **node)
+/* Removes a covering that its inner BSDF does not allow, or that lacks its texture. REPORT_TOLD: nothing is left. */
+static int uncover(struct maker *m, const struct xml_element *el, bool lacks, const struct scene_node **node)
 {
 	const char *type = (*node)->type;
-	const struct scene_node *inner = lenient_uncovered(*node);
+	bool bare = lacks && lenient_needs_texture(type);
+	const struct scene_node *inner = bare ? node_child(*node, PLUGIN_BSDF, 0) : lenient_uncovered(*node);
 	if (!inner)
-		return 0;
+		return bare ? REPORT_TOLD : 0;
 	*node = inner;
 	return note(&m->notes, el, type, inner->type,
-		    "%s:%d: <bsdf type=\"%.64s\"> over \"%.64s\", which lets light through, is not supported; the BSDF "
-		    "inside stands in for it (lenient)",
-		    el->file, el->line, type, inner->type);
+		    "%s:%d: <bsdf type=\"%.64s\"> %s%s%s; the BSDF inside stands in for it (lenient)", el->file,
+		    el->line, type, bare ? "has no texture left" : "over \"", bare ? "" : inner->type,
+		    bare ? "" : "\", which lets light through, is not supported");
+}
+
+/* REPORT_TOLD: a texture whose file is missing, which is left out. */
+static int miss_texture(struct maker *m, const struct xml_element *el, const char *type)
+{
+	const char *file = lenient_missing(m->assets_from, el);
+	if (!file)
+		return 0;
+	int r = note(&m->notes, el, type, file,
+		     "%s:%d: <texture type=\"%.64s\">: there is no file %.256s; left out (lenient)", el->file, el->line,
+		     type, file);
+	return r ? r : REPORT_TOLD;
 }
 
 /* An object with errors inside still becomes a node, so that all errors are found. One that is not an object of any
@@ -396,6 +412,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		type = decl->type;
 	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(&m->notes, el, decl)))
 		return r;
+	if (m->lenient && (r = miss_texture(m, el, type)))
+		return r;
 	struct draft d = {.node = allocate(m, 1, sizeof *d.node),
 			  .decl = decl,
 			  .stands_in = stands_in,
@@ -418,8 +436,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	*out = d.node;
 	if (!r)
 		r = remarks_on_object(d.node, &m->report, m->error);
-	if (!r && m->lenient)
-		r = uncover(m, el, out);
+	if (!r && m->lenient && (r = uncover(m, el, d.lacks, out)) == REPORT_TOLD)
+		return r;
 	el->node = *out;
 	return r;
 }

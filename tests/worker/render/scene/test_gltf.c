@@ -207,6 +207,7 @@ static const struct {
 	{"BUFFER", "\"uri\": \"http://x/y.bin\",", "not from a network"},
 	{"BUFFER", "\"uri\": \"../y.bin\",", "%2e%2e/y.bin"},
 	{"BUFFER", "\"uri\": \"x%20y/%2E%2e/.%2e/y%25.bin\",", "%2e%2e/y%.bin"},
+	{"BUFFER", "\"uri\": \"..\\\\x\\\\y%5C.bin\",", "%2e%2e/x/y\\.bin"},
 	{"BUFFER", "\"uri\": \"a%00b\",", "its uri names no file"},
 	{"BUFFER", "\"uri\": \"data:text/plain,abc\",", "buffers[0]: its embedded data is not base64"},
 	{"BUFFER", "\"uri\": \"data:;base64,AAAA\",", "buffers[0]: it states 601 bytes and has 3"},

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What leniency puts in the place of what is not supported: every stand-in is a plug-in of its class that there is. */
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_parts.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/render.h"
 #include "worker/render/scene/lenient.h"
@@ -94,12 +96,68 @@ static void test_covers(void **state)
 	}
 }
 
+/* Textures whose file is missing, or whose plug-in is unknown: what holds one and is nothing without it goes, too. */
+static void test_lost_textures(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='3.0.0'>\n"
+		"<texture type='bitmap' id='lost'><string name='filename' value='lost.png'/></texture>\n"
+		"<texture type='bitmap' id='there'><string name='filename' value='there.png'/></texture>\n"
+		"<bsdf type='diffuse' id='plain'><ref name='reflectance' id='lost'/></bsdf>\n"
+		"<bsdf type='diffuse' id='scaled'><texture type='scale' name='reflectance'><ref id='lost'/>"
+		"<float name='scale' value='0.5'/></texture></bsdf>\n"
+		"<bsdf type='bumpmap' id='bump'><texture type='nowhere'/><bsdf type='conductor'/></bsdf>\n"
+		"<bsdf type='normalmap' id='normal'><ref name='normalmap' id='lost'/><ref id='plain'/></bsdf>\n"
+		"<bsdf type='mask' id='cut'><ref name='opacity' id='lost'/><ref id='plain'/></bsdf>\n"
+		"<bsdf type='mask' id='kept'><ref name='opacity' id='there'/><ref id='plain'/></bsdf>\n"
+		"<emitter type='envmap'><string name='filename' value='sky.exr'/></emitter></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {"there.png", "", 0}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	/* Whoever is strict keeps it, and its maker reports that there is no file. */
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", render_plugins(), NULL, 0, false, &e), 0);
+	assert_int_equal(s.problem_count, 1); /* `nowhere` */
+	assert_string_equal(scene_named(&s, "lost")->type, "bitmap");
+	scene_fini(&s);
+	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_null(node_find(scene_named(&s, "plain"), "reflectance"));
+	assert_null(node_find(scene_named(&s, "scaled"), "reflectance"));
+	int conductors = 0, diffuse = 0, masks = 0, textures = 0, emitters = 0;
+	for (uint32_t i = 0; i < s.object_count; i++) {
+		const char *type = s.objects[i]->type;
+		conductors += strcmp(type, "conductor") == 0;
+		diffuse += strcmp(type, "diffuse") == 0;
+		masks += strcmp(type, "mask") == 0;
+		textures += strcmp(type, "bitmap") == 0;
+		emitters += strcmp(type, "envmap") == 0;
+	}
+	/* The bump's conductor; `plain` three times, and `scaled`; what has its file. An environment has no
+	 * replacement. */
+	assert_int_equal(conductors, 1);
+	assert_int_equal(diffuse, 4);
+	assert_int_equal(masks, 1);
+	assert_int_equal(textures, 1);
+	assert_int_equal(emitters, 1);
+	assert_int_equal(s.object_count, 8);
+	assert_true(scene_has_note(
+		&s, "s.xml:2: <texture type=\"bitmap\">: there is no file lost.png; left out (lenient)"));
+	assert_true(scene_has_note(
+		&s, "s.xml:6: <texture>: the plug-in `nowhere` is not supported and left out (lenient)"));
+	assert_true(scene_has_note(
+		&s,
+		"s.xml:6: <bsdf type=\"bumpmap\"> has no texture left; the BSDF inside stands in for it (lenient)"));
+	scene_fini(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_stand_ins),
 		cmocka_unit_test(test_colours_are_kept),
 		cmocka_unit_test(test_covers),
+		cmocka_unit_test(test_lost_textures),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
