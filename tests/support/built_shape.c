@@ -13,10 +13,9 @@ struct built_shape built_shape(const struct memory_file *files, const struct plu
 {
 	struct asset_source assets = memory_assets(files);
 	struct built_shape b = {0};
-	uint64_t dropped;
 	b.result = scene_read(&b.scene, &assets, "s.xml", plugins, NULL, 0, &b.error);
 	if (!b.result)
-		b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &dropped, &b.error);
+		b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &b.dropped, &b.error);
 	return b;
 }
 

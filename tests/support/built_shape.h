@@ -11,6 +11,7 @@ struct built_shape {
 	struct scene scene;
 	struct arena arena;
 	struct shape_geometry g;
+	uint64_t dropped; /* triangles without area */
 	struct error error;
 	int result; /* 0, or that of what refused it, with its sentence in `error` */
 };

@@ -21,6 +21,7 @@
 #include "worker/render/world/effects_text.h"
 #include "worker/render/world/geometry.h"
 #include "worker/render/world/node_table.h"
+#include "worker/render/world/unseen.h"
 #include "worker/render/world/visibility_bounds.h"
 
 #include <string.h>
@@ -270,6 +271,8 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = find_effects(b, o ? o->max_depth : 0);
 	if (!rc)
 		rc = choose_emitters(b);
+	if (!rc)
+		unseen_note(b->w, b->boxes);
 	if (!rc && !b->w->effects.colour)
 		set_grey(b->w);
 	return rc;

@@ -35,11 +35,12 @@ struct render_coincident {
 	bool incomplete;     /* the search was incomplete */
 };
 
-/* What was noticed while shapes were read; "" if nothing was. */
+/* What was noticed while shapes were read and placed; "" if nothing was. */
 struct world_notes {
 	char scales[512];    /* a shape that is too small relative to another, by name */
 	char flat[384];	     /* how many triangles without area were left out */
 	char materials[384]; /* how many files of shapes have materials that are not read */
+	char unseen[192];    /* that the camera sees no shape */
 };
 
 struct render_summary {

@@ -114,6 +114,7 @@ static void test_ply_lines(void **state)
 		fail_msg("%s", b.error.text);
 	const uint32_t index[2][3] = {{0, 1, 2}, {2, 1, 0}};
 	assert_int_equal(b.g.mesh.triangle_count, 2);
+	assert_int_equal(b.dropped, 2);
 	assert_memory_equal(b.g.mesh.index, index, sizeof index);
 	assert_int_equal(b.g.mesh.attribute_count, 1);
 	const float colours[] = {.25F, .5F, .75F, .75F, .5F, .25F};

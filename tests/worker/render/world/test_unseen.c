@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Cameras that see nothing, against rays: where the note stands, no ray of the camera's meets a shape; and of random
+ * cameras that none of 4,096 rays leads from to a shape, it stands for most.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/worlds.h"
+#include "worker/render/geom/accel.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define NOTE "the camera sees no shape"
+#define BALLS(x) "<shape type='sphere'><point name='center' x='" x "'/></shape><emitter type='constant'/>"
+#define LOOK(t, more)                                                                             \
+	"<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,5' target='" t \
+	"' up='0,1,0'/></transform>" more "</sensor>"
+
+/* What the world says of it; "": nothing. */
+static void note_of(const struct world *w, char note[1024])
+{
+	struct render_summary s;
+	char sentence[1024];
+	world_summary(w, &s);
+	*note = 0;
+	for (size_t i = 0; render_scene_note(&s, i, sentence, sizeof sentence); i++)
+		if (strstr(sentence, NOTE))
+			strcpy(note, sentence);
+}
+
+/* "": there is no note. */
+static void assert_note(const char *text, const char *why)
+{
+	struct world *w = world_of_text(32, 32, "%s", text);
+	char note[1024];
+	note_of(w, note);
+	if (*why ? !strstr(note, why) : *note)
+		fail_msg("of %s: '%s', not '%s'", text, note, why);
+	world_free(w);
+}
+
+static void test_sentences(void **state)
+{
+	(void)state;
+	assert_note(LOOK("0,0,0", "") BALLS("0"), "");
+	assert_note(LOOK("0,0,9", "") BALLS("0"), "all are behind it");
+	assert_note(LOOK("9,0,5", "") BALLS("0"), "beside the image or behind it");
+	assert_note(LOOK("0,0,0", "<float name='far_clip' value='3'/>") BALLS("0"), "beyond its far plane");
+	assert_note(LOOK("0,0,0", "<float name='near_clip' value='7'/>") BALLS("0"), "nearer than its near plane");
+	assert_note(LOOK("0,0,0", "<float name='far_clip' value='4.5'/>") BALLS("0"), "");
+	assert_note(LOOK("0,0,0", "") "<emitter type='constant'/>", "");
+	/* One that it sees is enough, in any place of the list. */
+	assert_note(LOOK("0,0,9", "") BALLS("0") "<shape type='sphere'><point name='center' z='9'/></shape>", "");
+	/* The film's edge: a ball that is at the left, seen by the whole film, not by a window at the right. */
+	assert_note(LOOK("0,0,0", "<film type='hdrfilm'/>") BALLS("-2"), "");
+	assert_note(LOOK("0,0,0", "<film type='hdrfilm'/>") BALLS("-9"), "beside");
+	assert_note(LOOK("0,0,0", "<film type='hdrfilm'/>") BALLS("9"), "beside");
+}
+
+/* One of n x n rays, from places all over the aperture, meets something. */
+static bool meets(const struct world *w, uint32_t n)
+{
+	const struct camera *c = &w->camera;
+	for (uint32_t i = 0; i < n * n; i++) {
+		double u[2] = {(i * 7 % n + 0.5) / n, (i / n * 5 % n + 0.5) / n}, low, high;
+		struct ray_end from = {.p = camera_point(c, u), .prim = PRIM_NONE};
+		vec3 d = camera_direction(c, from.p, (i % n + 0.5) / n * c->width, (i / n + 0.5) / n * c->height);
+		struct ray_hit hit;
+		camera_clip(c, d, &low, &high);
+		if (accel_closest(w->accel, &from, d, low, high, &hit))
+			return true;
+	}
+	return false;
+}
+
+static void test_against_rays(void **state)
+{
+	(void)state;
+	static const char *const kinds[] = {
+		"<sensor type='perspective'><float name='fov' value='30'/>",
+		"<sensor type='orthographic'>",
+		"<sensor type='thinlens'><float name='aperture_radius' value='0.5'/><float name='focus_distance' value='3'/>"
+		"<float name='fov' value='20'/>",
+	};
+	struct dice d = dice_of("cameras that see nothing");
+	uint32_t blind = 0, noted = 0;
+	for (size_t i = 0; i < 300; i++) {
+		double x[9];
+		for (int k = 0; k < 9; k++)
+			x[k] = dice_between(&d, -4, 4);
+		struct world *w = world_of_text(
+			48, 32,
+			"%s<transform name='to_world'><lookat origin='%g,%g,%g' target='0,0,%g' up='0,1,0'/></transform></sensor>"
+			"<shape type='cube'><transform name='to_world'><scale value='0.3'/><translate x='%g' y='%g' z='%g'/>"
+			"</transform></shape><shape type='sphere'><float name='radius' value='0.3'/><point name='center' x='%g' "
+			"y='%g' z='%g'/></shape><emitter type='constant'/>",
+			kinds[i % 3], x[0], x[1], 2 * x[2] + copysign(2, x[2]), x[3], x[4], x[5], x[6], x[7], x[8],
+			-x[4]);
+		char note[1024];
+		note_of(w, note);
+		bool seen = meets(w, 64);
+		if (*note && seen)
+			fail_msg("case %zu: a ray meets a shape, but '%s'", i, note);
+		blind += !seen;
+		noted += *note != 0;
+		world_free(w);
+	}
+	print_message("of 300 cameras %u see nothing, and of %u this is said\n", blind, noted);
+	assert_true(blind > 60 && noted > blind * 3 / 4 && blind < 240);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_sentences),
+		cmocka_unit_test(test_against_rays),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

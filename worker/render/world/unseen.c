@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/unseen.h"
+
+#include <stdio.h>
+
+/* The sides that a box can be beyond: the near and the far plane, and four planes through the edges of the film. */
+enum { NEAR, FAR, LEFT, RIGHT, TOP, BOTTOM, SIDES };
+
+/* Slopes of rays through the edges of what is rendered, with the pixels whose filter reaches in. */
+struct view {
+	double slope[SIDES];
+};
+
+static struct view view_of(const struct world *w)
+{
+	const struct camera *c = &w->camera;
+	const struct scene_settings *s = &w->settings;
+	double x = s->crop_x, y = s->crop_y, width = s->crop_width ? s->crop_width : s->width,
+	       height = s->crop_width ? s->crop_height : s->height, more = 1.0 + s->border;
+	return (struct view){.slope = {[LEFT] = (x - more - c->center_x) / c->scale,
+				       [RIGHT] = (x + width + more - c->center_x) / c->scale,
+				       [TOP] = (y - more - c->center_y) / c->scale,
+				       [BOTTOM] = (y + height + more - c->center_y) / c->scale}};
+}
+
+/* Whether p, in the camera's frame, is beyond that side for every point of the aperture: the ray from one at r across
+ * the axis has a slope that differs by -r / focus, so at a depth of z it is r (1 - z / focus) from the pinhole's. What
+ * is beyond a side is convex: a box whose corners are, is. */
+static bool is_beyond(const struct camera *c, const struct view *v, int side, vec3 p)
+{
+	double blur = c->aperture > 0 ? c->aperture * fabs(1 - p.z / c->focus) : 0, edge = v->slope[side] * p.z;
+	switch (side) {
+	case NEAR:
+		return p.z < c->near_clip;
+	case FAR:
+		return p.z > c->far_clip;
+	case LEFT:
+		return p.x < edge - blur;
+	case RIGHT:
+		return p.x > edge + blur;
+	case TOP:
+		return p.y < edge - blur;
+	default:
+		return p.y > edge + blur;
+	}
+}
+
+/* The sides, as bits, that all corners are beyond. */
+static unsigned sides_of(const struct world *w, const struct view *v, const struct box *b)
+{
+	const struct camera *c = &w->camera;
+	unsigned beyond = (1U << SIDES) - 1;
+	for (int k = 0; k < 8; k++) {
+		vec3 corner = {k & 1 ? b->high.x : b->low.x, k & 2 ? b->high.y : b->low.y,
+			       k & 4 ? b->high.z : b->low.z};
+		vec3 in_world = vec3_scale(w->scale, vec3_sub(corner, w->center));
+		vec3 p = frame_to_local(&c->axes, vec3_sub(in_world, c->position));
+		for (int side = 0; side < SIDES; side++)
+			if (!is_beyond(c, v, side, p))
+				beyond &= ~(1U << side);
+	}
+	return beyond;
+}
+
+void unseen_note(struct world *w, const struct box *boxes)
+{
+	const struct view v = view_of(w);
+	unsigned all = (1U << SIDES) - 1;
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		unsigned beyond = sides_of(w, &v, &boxes[i]);
+		if (!beyond)
+			return;
+		all &= beyond;
+	}
+	if (w->shape_count > 0)
+		snprintf(w->notes.unseen, sizeof w->notes.unseen,
+			 "the camera sees no shape: %s; its to_world says where it is and where it looks",
+			 all >> NEAR & 1  ? "all are behind it, or nearer than its near plane"
+			 : all >> FAR & 1 ? "all are beyond its far plane"
+					  : "all are beside the image or behind it");
+}
