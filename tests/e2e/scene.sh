@@ -49,6 +49,23 @@ code 1 "$BIN/hslt-scene" check "$DIR/gone2.xml"
 grep -q "^gone2.xml: 3 problems" "$DIR/out" && grep -q 'gone2.xml:2: <shape type="obj">: a.obj: no such file' "$DIR/out" ||
 	fail "not all missing files are said: $(cat "$DIR/out")"
 
+# Textures that are not there, or nowhere that may be read, are left out by --lenient.
+cat >"$DIR/lost.xml" <<'XML'
+<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><shape type="sphere"><bsdf type="mask">
+<texture type="bitmap" name="opacity"><string name="filename" value="lost.png"/></texture>
+<bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="/etc/lost.png"/></texture></bsdf>
+</bsdf></shape></scene>
+XML
+code 1 "$BIN/hslt-scene" check "$DIR/lost.xml"
+grep -q "^lost.xml: 2 problems" "$DIR/out" || fail "of lost textures it says: $(cat "$DIR/out")"
+code 1 "$BIN/hslt-render" --size 16 --spp 1 "$DIR/lost.xml" -o "$DIR/lost.exr"
+grep -q "lost.xml:[23]: .*lost.png: " "$DIR/err.log" || fail "a render with a lost texture: $(cat "$DIR/err.log")"
+code 0 "$BIN/hslt-scene" check --lenient "$DIR/lost.xml"
+grep -q "lost.xml:2: .*lost.png is not among the scene's files; left out" "$DIR/out" &&
+	grep -q "lost.xml:3: .*/etc/lost.png is not among the scene's files; left out" "$DIR/out" ||
+	fail "of lost textures --lenient says: $(cat "$DIR/out")"
+code 0 "$BIN/hslt-render" --lenient --size 16 --spp 1 "$DIR/lost.xml" -o "$DIR/lost.exr"
+
 # Files in another folder: found where --path says, with the same picture.
 mkdir "$DIR/apart" "$DIR/library"
 sed 's:<sensor:<path value="../library"/><sensor:' "$BOX" >"$DIR/apart/box.xml"

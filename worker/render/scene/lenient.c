@@ -109,7 +109,7 @@ const char *lenient_missing(const struct asset_source *assets, const struct xml_
 		int r = assets->open(assets->user, file, &there, &e);
 		if (!r)
 			assets->close(assets->user, &there);
-		return r == -ENOENT ? file : NULL;
+		return r == -ENOENT || (r && *file == '/') ? file : NULL;
 	}
 	return NULL;
 }

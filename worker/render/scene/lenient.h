@@ -32,7 +32,8 @@ const struct scene_node *lenient_uncovered(const struct scene_node *n);
 /* An object that is nothing without the texture inside it. */
 bool lenient_needs_texture(const char *type);
 
-/* The file of a texture that the scene does not come with; NULL: it is there, or it is another kind of object, or it
+/* The file of a texture that the scene does not come with: it is missing, or its name begins at the root, from which
+ * nothing is read. NULL: it is there, or outside the folders that may be read, or it is another kind of object, or it
  * needs no file. Textures of old scenes are often lost; a mesh, or an environment, has no replacement. */
 const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el);
 

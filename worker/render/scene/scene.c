@@ -374,8 +374,8 @@ static int miss_texture(struct maker *m, const struct xml_element *el, const cha
 	if (!file)
 		return 0;
 	int r = note(&m->notes, el, type, file,
-		     "%s:%d: <texture type=\"%.64s\">: there is no file %.256s; left out (lenient)", el->file, el->line,
-		     type, file);
+		     "%s:%d: <texture type=\"%.64s\">: %.256s is not among the scene's files; left out (lenient)",
+		     el->file, el->line, type, file);
 	return r ? r : REPORT_TOLD;
 }
 

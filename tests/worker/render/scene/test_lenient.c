@@ -142,7 +142,7 @@ static void test_lost_textures(void **state)
 	assert_int_equal(emitters, 1);
 	assert_int_equal(s.object_count, 8);
 	assert_true(scene_has_note(
-		&s, "s.xml:2: <texture type=\"bitmap\">: there is no file lost.png; left out (lenient)"));
+		&s, "s.xml:2: <texture type=\"bitmap\">: lost.png is not among the scene's files; left out (lenient)"));
 	assert_true(scene_has_note(
 		&s, "s.xml:6: <texture>: the plug-in `nowhere` is not supported and left out (lenient)"));
 	assert_true(scene_has_note(

@@ -84,8 +84,8 @@ static void test_against_rays(void **state)
 	static const char *const kinds[] = {
 		"<sensor type='perspective'><float name='fov' value='30'/>",
 		"<sensor type='orthographic'>",
-		"<sensor type='thinlens'><float name='aperture_radius' value='0.5'/><float name='focus_distance' value='3'/>"
-		"<float name='fov' value='20'/>",
+		("<sensor type='thinlens'><float name='aperture_radius' value='0.5'/>"
+		 "<float name='focus_distance' value='3'/><float name='fov' value='20'/>"),
 	};
 	struct dice d = dice_of("cameras that see nothing");
 	uint32_t blind = 0, noted = 0;
