@@ -21,10 +21,12 @@ PREFIX   ?= /usr/local
 PYTHON   ?= python3
 
 EMBREE   := $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
+IS_CLANG := $(findstring clang,$(shell $(CC) --version))
 WARN     := -Wall -Wextra -Wconversion -Wshadow -Wmissing-prototypes -Wstrict-prototypes -Wvla -Wpointer-arith \
             -Wcast-qual -Wwrite-strings -Wundef -Wformat=2 -Wold-style-definition -Werror
-OPT      ?= $(if $(SAN),-O2,-O3)
-IS_CLANG := $(findstring clang,$(shell $(CC) --version))
+# At -O1 and with sanitizers gcc 12 does not see the bounds of loop counters, and warns of texts that fit.
+WARN     += $(if $(SAN),$(if $(IS_CLANG),,-Wno-format-truncation))
+OPT      ?= $(if $(SAN),-O1,-O3)
 # Invalid operations trap (worker/render/math/fptrap.h): gcc expects that, clang must be told.
 TRAPS    := $(if $(IS_CLANG),-ffp-exception-behavior=maytrap)
 CFLAGS   := -std=c17 $(OPT) $(if $(SAN),-g1,-g) -ffp-contract=off -fno-fast-math -fno-math-errno -fno-strict-aliasing -fno-common $(TRAPS) $(WARN) \
@@ -120,9 +122,9 @@ LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 # Whatever is linked with it can run out of memory when a test says so (tests/support/failing_memory.h).
 MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap_mem_alloc
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
-# A test's own code runs once, and is compiled and linked as fast as possible; what it calls is built as it is used. With sanitizers, gcc 12
-# at -O1 does not see the bounds of loop counters, and warns of texts that fit. The linker is looked for once, where a test is linked.
-$(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1 $(if $(SAN),$(if $(IS_CLANG),,-Wno-format-truncation))
+# A test's own code runs once, and is compiled and linked as fast as possible; what it calls is built as it is used. The
+# linker is looked for once, where a test is linked.
+$(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1
 TEST_LINKER = $(eval TEST_LINKER := $(shell $(CC) -fuse-ld=mold -Wl,--version >/dev/null 2>&1 && echo -fuse-ld=mold))$(TEST_LINKER)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(TEST_LINKER) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)

@@ -114,13 +114,13 @@ else
 	step "build with clang" sh tests/fuzz/run.sh --build programs fuzzers test-syntax
 	step "the same bits as by clang's build" sh tests/numerics/compilers.sh build build/fuzz
 	if [ $mode = full ]; then
-		kind "tests with clang's sanitizers" env HSLT_TEST_KINDS=unit \
-			make -s -j"$jobs" CC=clang OPT=-O1 BUILD=build/clang SAN=address,undefined test
+		kind "tests with clang's sanitizers" env HSLT_TEST_KINDS=unit make -s -j"$jobs" CC=clang BUILD=build/clang \
+			SAN=address,undefined test
 		kind "long forms" make -s FULL=1 test
 		step "faults, each as often as the table says" sh tests/e2e/faults.sh build --all
 		step "fuzzers, 10 minutes each" make -s fuzz FUZZ_SECONDS=600
 	else
-		step "fuzzers, 5 s each" make -s fuzz FUZZ_SECONDS=5
+		step "fuzzers, 3 s each" make -s fuzz FUZZ_SECONDS=3
 	fi
 fi
 sum_up

@@ -63,7 +63,7 @@ if [ "${1:-}" = --build ]; then
 	shift
 	run=0 goals=$*
 fi
-"${MAKE:-make}" --no-print-directory -j"$jobs" CC="$CLANG" BUILD="$BUILD" SAN=fuzzer-no-link,address,undefined OPT=-O1 $goals >"$BUILD.log" 2>&1 || {
+"${MAKE:-make}" --no-print-directory -j"$jobs" CC="$CLANG" BUILD="$BUILD" SAN=fuzzer-no-link,address,undefined $goals >"$BUILD.log" 2>&1 || {
 	tail -20 "$BUILD.log"
 	echo "fuzz: the build failed; all of it is in $BUILD.log"
 	exit 1

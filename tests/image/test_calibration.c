@@ -5,16 +5,19 @@
  * comparison. The figures of the run that this was written with are in tests/image/README.md.
  *
  * Checked for each case:
- *   interval   rel_mse_95, where it is stated, holds the realised relMSE of at least 90 % of the renders. Level and
- * power, if all 200 state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with 0.9 %,
- * at 92 % with 12 %; at 85 % it is found with 97 %, at 80 % with 99.99 %. (Seeds are fixed: a run that passes passes
- * always.) middle     the median of realised over estimated relMSE is within 10 % of 1, or as far as the case says.
- *   pixels     the share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is within
- * 0.87 and 0.975: Student's t with 15 degrees would be 93.1 %, skewed pixels have less. b          chains: b_error
- * holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders: 95 % fails with less than
- * 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %. planted    intervals and
- * errors made too small by 1.3 (the relMSE by 1.69) are refused. FULL=1: larger pictures with more
- * samples, and the cases after the fourth.
+ *
+ * - The interval. rel_mse_95, where it is stated, holds the realised relMSE of at least 90 % of the renders. Level and
+ *   power, if all 200 state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with
+ *   0.9 %, at 92 % with 12 %; at 85 % it is found with 97 %, at 80 % with 99.99 %. Seeds are fixed: a run that passes
+ *   passes always.
+ * - The middle. The median of realised over estimated relMSE is within 10 % of 1, or as far as the case says.
+ * - The pixels. The share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is within
+ *   0.87 and 0.975: Student's t with 15 degrees would be 93.1 %, skewed pixels have less.
+ * - b, with chains. b_error holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders:
+ *   95 % fails with less than 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %.
+ * - Planted faults. Intervals and errors made too small by 1.3 (the relMSE by 1.69) are refused.
+ *
+ * FULL=1: larger pictures with more samples, and the cases after the fourth.
  * HSLT_TEST_SCALE=N: N times fewer renders, which are made and not judged.
  */
 #include "tests/support/length.h"

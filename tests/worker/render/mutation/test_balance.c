@@ -22,7 +22,7 @@ enum { TRIALS = 64 };
 
 /* Proposals from a start. Strategies that choose for themselves get more than forced ones; those that the room has by
  * default so many that all rooms together find a fault of 2 %. */
-enum { REPEAT = 2, REPEAT_DEFAULT = 9, REPEAT_MORE = 14, REPEAT_RARE = 25, STARTS_RARE = 5, MOST_STARTS = 256 };
+enum { REPEAT = 2, REPEAT_DEFAULT = 8, REPEAT_MORE = 14, REPEAT_RARE = 25, STARTS_RARE = 5, MOST_STARTS = 256 };
 #define MUST_FIND 0.02
 
 /* Of the strategies that rooms have by default, over all rooms. */

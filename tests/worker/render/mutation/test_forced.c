@@ -41,7 +41,7 @@ struct scene_cases {
 
 static const struct scene_cases shorter[] = {
 	{"diffuse", {{3, "hslt@b0 hslt@b3c0 bidirectional independent rejoin hslt"}, {2, "hslt@b2c0"}}},
-	{"glossy", {{3, "*"}, {4, "hslt@b4c0 hslt@b3c1"}}},
+	{"glossy", {{3, "hslt@b2c1 hslt@b3c0 bidirectional hslt halfvec rejoin light"}, {4, "hslt@b4c0 hslt@b3c1"}}},
 	{"rough glass", {{4, "*"}, {6, "hslt@b6c2 hslt@b5c2 hslt"}, {8, "hslt@b8c4 hslt"}}},
 	{"smooth glass", {{4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt halfvec light"}, {5, "hslt@b5c0 hslt@b5c1"}}},
 	{"specular chain", {{5, "hslt@b0 hslt@b5c0 hslt@b5c1 hslt@b5c2 hslt"}, {7, "hslt@b7c1"}}},

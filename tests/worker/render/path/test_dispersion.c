@@ -69,13 +69,13 @@ static void check_both_ways(const char *name, const char *bsdf, uint64_t spp)
 static void test_smooth_glass(void **state)
 {
 	(void)state;
-	check_both_ways("smooth glass that disperses", SMOOTH(STRONG), 2560);
+	check_both_ways("smooth glass that disperses", SMOOTH(STRONG), 768);
 }
 
 static void test_rough_glass(void **state)
 {
 	(void)state;
-	check_both_ways("rough glass that disperses", ROUGH(STRONG), 2560);
+	check_both_ways("rough glass that disperses", ROUGH(STRONG), 768);
 }
 
 static void check_one_against_four(const char *name, const char *hardly, const char *plain, uint64_t spp)
@@ -95,8 +95,8 @@ static void check_one_against_four(const char *name, const char *hardly, const c
 static void test_one_wavelength_stands_for_four(void **state)
 {
 	(void)state;
-	check_one_against_four("one wavelength, smooth", SMOOTH(HARDLY), SMOOTH(PLAIN), 2560);
-	check_one_against_four("one wavelength, rough", ROUGH(HARDLY), ROUGH(PLAIN), 2560);
+	check_one_against_four("one wavelength, smooth", SMOOTH(HARDLY), SMOOTH(PLAIN), 768);
+	check_one_against_four("one wavelength, rough", ROUGH(HARDLY), ROUGH(PLAIN), 768);
 }
 
 static void test_no_coefficient_is_the_plain_scene(void **state)

@@ -116,7 +116,11 @@ static void test_glossy(void **state)
 															BALL("-0.5,0.6,-0.9", "0.4", "<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>") "<shape type='rectangle'>" AT(
 																"<scale value='0.5'/><translate x='0.9' y='0.5' z='-0.3'/>") "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='blendbsdf'><bsdf type='diffuse'/>"
 																							     "<bsdf type='conductor'><string name='material' value='Ag'/></bsdf></bsdf></bsdf></shape>"),
-		&(struct lengths){.path = 1536, .bdpt = 1536, .rare = 1280, .spread = 3456, .rare_spread = 3456});
+		&(struct lengths){.path = 1536,
+				  .bdpt = 1536,
+				  .rare = at_length(1280),
+				  .spread = at_length(3456),
+				  .rare_spread = 3456});
 }
 
 static void test_glass(void **state)
