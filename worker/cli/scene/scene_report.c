@@ -12,6 +12,7 @@
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
 #include "worker/render/scene/gltf.h"
+#include "worker/render/scene/lenient.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -53,8 +54,10 @@ static uint32_t print_missing(const struct scene *s, const struct asset_source *
 		struct asset a;
 		struct error e;
 		const char *place = s->asset_places[i];
-		if (assets->open(assets->user, s->assets[i], &a, &e)) {
-			printf("%s%s%s\n", place, *place ? ": " : "", e.text);
+		int rc = assets->open(assets->user, s->assets[i], &a, &e);
+		if (rc) {
+			bool texture = rc == -ENOENT && strstr(place, ": <texture ");
+			printf("%s%s%s%s\n", place, *place ? ": " : "", e.text, texture ? LENIENT_TEXTURE_HINT : "");
 			missing++;
 		} else {
 			assets->close(assets->user, &a);

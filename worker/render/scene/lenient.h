@@ -32,6 +32,9 @@ const struct scene_node *lenient_uncovered(const struct scene_node *n);
 /* An object that is nothing without the texture inside it. */
 bool lenient_needs_texture(const char *type);
 
+/* After a sentence that says that a texture's file is missing. */
+#define LENIENT_TEXTURE_HINT "; --lenient leaves the texture out"
+
 /* The file of a texture that the scene does not come with: it is missing, or its name begins at the root, from which
  * nothing is read. NULL: it is there, or outside the folders that may be read, or it is another kind of object, or it
  * needs no file. Textures of old scenes are often lost; a mesh, or an environment, has no replacement. */
