@@ -95,7 +95,7 @@ if [ $mode = plain ]; then
 	sh deploy/setup.sh
 else
 	sh deploy/setup.sh --full
-	export HSLT_TEST_ALL=1
+	export HSLT_TEST_ALL=1 WERROR=-Werror
 fi
 
 step "build" make -s -j"$jobs" programs tests

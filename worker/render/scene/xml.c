@@ -97,7 +97,11 @@ static void stop(struct reader *r, int code)
 
 static int line_now(const struct reader *r)
 {
+#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9 /* where the other is deprecated */
+	return (int)XML_GetCurrentLineNumber64(r->parser);
+#else
 	return (int)XML_GetCurrentLineNumber(r->parser);
+#endif
 }
 
 static int out_of_memory(struct reader *r)
@@ -429,8 +433,6 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 	r->parser = XML_ParserCreate_MM(NULL, &expat_memory, NULL);
 	if (!r->parser)
 		return error_set(r->error, ENOMEM, "%s: out of memory", r->file);
-	/* A fixed salt makes runs reproducible; the limits on elements and attributes bound the cost of collisions. */
-	XML_SetHashSalt(r->parser, 0x9e3779b9u);
 	XML_SetUserData(r->parser, r);
 	XML_SetElementHandler(r->parser, on_start, on_end);
 	XML_SetCharacterDataHandler(r->parser, on_text);

@@ -67,7 +67,7 @@ static void read_svg(const struct plot *p, struct content *c)
 	XML_SetElementHandler(x, begin, end);
 	XML_SetCharacterDataHandler(x, text);
 	if (XML_Parse(x, svg, (int)size, 1) != XML_STATUS_OK)
-		fail_msg("not XML at line %lu: %s", XML_GetCurrentLineNumber(x), XML_ErrorString(XML_GetErrorCode(x)));
+		fail_msg("not XML: %s", XML_ErrorString(XML_GetErrorCode(x)));
 	XML_ParserFree(x);
 	mem_free(svg);
 }
