@@ -155,7 +155,7 @@ def write_twin():
     write("ball.obj", obj(ball()))
     picture = '<texture type="bitmap"%s><string name="filename" value="%s"/>%s<string name="filter_type" value="nearest"/></texture>'
     raw = '<boolean name="raw" value="true"/><string name="channel" value="%s"/>'
-    principled = '<bsdf type="principled"><float name="eta" value="1.5"/>%s</bsdf>'
+    principled = '<bsdf type="principled"><float name="eta" value="1.5"/><boolean name="lambertian" value="true"/>%s</bsdf>'
     colour = '<rgb name="base_color" value="%s"/><float name="roughness" value="1"/>'
     floor = ('<texture type="scale" name="base_color"><rgb name="scale" value="0.9 0.9 1"/>%s</texture>'
              '<float name="roughness" value="0.8"/>' % (picture % ("", "base.png", "")))

@@ -12,6 +12,9 @@
  * are added, not layered: at grazing angles, and with sheen above all, more may come back than arrives, up to 1.5
  * times.
  *
+ * With `lambertian` (ours; for glTF, Appendix B.3.5 of its specification) the diffuse lobe is Lambert's, and loses what
+ * the boundary reflects at the half vector: c / pi (1 - F).
+ *
  * `coat` (ours; for glTF, whose clear coat reflects four times what the original's does) is a layer: a share k of the
  * surface has it, with GGX facets of its own and Schlick's factor S of an index of 1.5. What lies below loses what the
  * coat reflects, in both directions:
@@ -86,18 +89,27 @@ static double schlick(double cosine)
 	return x * x * x * x * x;
 }
 
-/* F of the header comment. */
-spectrum principled_fresnel(const struct stuff *s, double cosine)
+/* Fresnel's factor of the boundary alone. */
+static spectrum boundary_reflects(const struct stuff *s, double cosine)
 {
 	const struct principled *p = s->p;
-	double rest = schlick(cosine), clear = 1 - s->metallic, root = (p->eta - 1) / (p->eta + 1);
-	double boundary = clear * (1 - s->share[SPEC_TINT]) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
+	double rest = schlick(cosine), root = (p->eta - 1) / (p->eta + 1), tint = s->share[SPEC_TINT];
+	double plain = (1 - tint) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double tinted = fmin(s->specular.v[i] * root * root, 1);
-		f.v[i] = boundary + s->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest) +
-			 clear * s->share[SPEC_TINT] * (tinted + (1 - tinted) * rest);
+		f.v[i] = plain + tint * (tinted + (1 - tinted) * rest);
 	}
+	return f;
+}
+
+/* F of the header comment. */
+spectrum principled_fresnel(const struct stuff *s, double cosine)
+{
+	double rest = schlick(cosine);
+	spectrum f = boundary_reflects(s, cosine);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		f.v[i] = (1 - s->metallic) * f.v[i] + s->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest);
 	return f;
 }
 
@@ -109,12 +121,14 @@ spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_
 	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
 	double ss = (1 + (0.5 * retro - 1) * fo) * (1 + (0.5 * retro - 1) * fi);
 	double flat = 1.25 * (ss * (1 / fmax(wo.z + wi.z, 1e-300) - 0.5) + 0.5);
-	double diffuse = (1 - s->metallic) * (1 - s->share[TRANSMISSION]) *
-			 (base + s->share[FLATNESS] * (flat - base)) / WARP_PI;
+	double most = (1 - s->metallic) * (1 - s->share[TRANSMISSION]) / WARP_PI,
+	       burley = base + s->share[FLATNESS] * (flat - base);
 	double sheen = (1 - s->metallic) * s->share[SHEEN] * schlick(cos_d);
-	spectrum f;
-	for (int i = 0; i < SPECTRUM_LANES; i++)
+	spectrum f, lost = s->p->lambertian ? boundary_reflects(s, cos_d) : spectrum_of(0);
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double diffuse = most * (s->p->lambertian ? 1 - lost.v[i] : burley);
 		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + s->share[SHEEN_TINT] * (s->tint.v[i] - 1));
+	}
 	return f;
 }
 
@@ -397,6 +411,7 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 		code = read_index(p, n, e);
 	if (code)
 		return code;
+	p->lambertian = node_bool(n, "lambertian", false);
 	p->base_max = texture_max(&p->base);
 	struct microfacet least = principled_facets(p->most[ANISOTROPIC], principled_least(&p->roughness, build));
 	double metallic = principled_least(&p->metallic, build);
@@ -433,6 +448,7 @@ static const struct param principled_params[] = {
 	PRINCIPLED_SHARE("coat"),
 	PRINCIPLED_SHARE("coat_roughness"),
 	{.name = "specular_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "lambertian", .types = VALUE_BOOL},
 	{.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 8},
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},

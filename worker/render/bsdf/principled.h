@@ -29,6 +29,7 @@ struct principled {
 	double eta, base_max;
 	bool varies; /* some parameter is a texture */
 	bool has_specular;
+	bool lambertian; /* the diffuse lobe */
 };
 
 /* The parameters at a point of the surface. */

@@ -131,15 +131,18 @@ static void note_unknown(struct gltf *g)
 		gltf_note(g, text);
 }
 
-/* The exporter's `generator` ends in its version; since 3.4 lamps are in lumens unless the user wants otherwise. */
+/* The exporter's `generator` ends in its version. Since 3.4 lamps are in lumens unless the user wants otherwise; since
+ * 4.0 Blender's diffuse surfaces are the format's. */
 static void note_writer(struct gltf *g, const char *generator)
 {
 	static const char blender[] = "Khronos glTF Blender I/O v";
 	unsigned major = 0, minor = 0;
 	g->lamp_scale = 1;
 	g->is_blenders = generator && strncmp(generator, blender, strlen(blender)) == 0;
-	if (g->is_blenders && sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) == 2 &&
-	    (major > 3 || (major == 3 && minor >= 4)))
+	if (!g->is_blenders || sscanf(generator + strlen(blender), "%4u.%4u", &major, &minor) != 2)
+		return;
+	g->is_burleys = major < 4;
+	if (major > 3 || (major == 3 && minor >= 4))
 		g->lamp_scale = 1.0 / 683;
 }
 

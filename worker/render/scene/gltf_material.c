@@ -163,6 +163,8 @@ static void put_principled(struct gltf *g, const struct gltf_at *at, enum gltf_c
 	put_base_colour(g, bsdf, at, s.base, s.colour, colours);
 	gltf_put_share(g, bsdf, at, "metallic", s.metallic, s.metallic > 0 ? s.both : NULL, "b");
 	gltf_put_layers(g, bsdf, at, s.roughness, s.both);
+	if (!g->is_burleys)
+		gltf_put_bool(g, bsdf, at, "lambertian", true);
 	if (g->failed)
 		return;
 	while (bsdf->parent != g->scene)

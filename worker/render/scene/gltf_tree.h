@@ -87,6 +87,7 @@ struct gltf {
 	struct xml_element *scene;
 	bool has_camera, has_light;
 	bool is_blenders;  /* its exporter wrote the file */
+	bool is_burleys;   /* its writer's diffuse surfaces are not Lambert's, as the format's are, but Burley's */
 	double lamp_scale; /* of the intensities of KHR_lights_punctual */
 	vec3 low, high;	   /* over all vertices */
 };

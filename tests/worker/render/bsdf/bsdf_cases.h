@@ -76,6 +76,8 @@ static const char *const bsdf_cases[] = {
 	"principled base_color=0.4 roughness=0.6 clearcoat=1 clearcoat_gloss=0.1",
 	"principled base_color=0.9 roughness=0.6 coat=1 coat_roughness=0.3",
 	"principled base_color=0.3 roughness=0.4 metallic=0.3 eta=3 specular_color=rgb(0.9,0.2,0.6)",
+	"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.2 lambertian=true eta=1.7",
+	"principled base_color=0.9 roughness=0.7 lambertian=true specular_color=rgb(0.9,0.2,0.6) sheen=0.3 spec_trans=0.4",
 	"principled base_color=rgb(0.2,0.8,0.7) roughness=0.5 spec_trans=0.9 coat=0.7 coat_roughness=0.5",
 	"principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 spec_trans=0.3 | @metallic checkerboard color0=0.2 color1=0.9",
 	"principled base_color=rgb(0.9,0.8,0.7) roughness=0.4 spec_trans=1 eta=1.6",

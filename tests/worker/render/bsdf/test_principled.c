@@ -92,6 +92,34 @@ static void test_diffuse_is_burleys(void **state)
 	arena_fini(&a);
 }
 
+/* As glTF says it (B.3.5): what of the boundary's light is not reflected at the half vector is scattered evenly. The
+ * factor is found from the specular lobe, by what a perfectly black base has left, and from Fresnel's formulas. */
+static void test_diffuse_is_lamberts(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf full, black;
+	bsdf_make(&a, "principled base_color=0.6 roughness=0.7 eta=1.5 lambertian=true", &full);
+	bsdf_make(&a, "principled base_color=0 roughness=0.7 eta=1.5 lambertian=true", &black);
+	for (int i = 0; i < 300; i++) {
+		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
+		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
+		double c = sqrt((1 + vec3_dot(wo, wi)) / 2), t = sqrt(1 - (1 - c * c) / (1.5 * 1.5));
+		double s = (c - 1.5 * t) / (c + 1.5 * t), p = (t - 1.5 * c) / (t + 1.5 * c);
+		double expected = 0.6 / PI * (1 - 0.5 * (s * s + p * p));
+		double told = full.ops->eval(&full, &point, wo, wi).v[1] - black.ops->eval(&black, &point, wo, wi).v[1];
+		assert_true(fabs(told - expected) <= 1e-9 * expected);
+	}
+	/* Where the reflection has a colour, so has what is left: Schlick's factor, per wavelength. */
+	bsdf_make(&a, "principled base_color=0.6 roughness=0.7 eta=3 lambertian=true specular_color=0.5", &full);
+	bsdf_make(&a, "principled base_color=0 roughness=0.7 eta=3 lambertian=true specular_color=0.5", &black);
+	vec3 wo = direction(0.3, 0), wi = direction(0.4, 2);
+	double c = sqrt((1 + vec3_dot(wo, wi)) / 2), f0 = 0.5 * 0.25, f = f0 + (1 - f0) * pow(1 - c, 5);
+	double told = full.ops->eval(&full, &point, wo, wi).v[2] - black.ops->eval(&black, &point, wo, wi).v[2];
+	assert_true(fabs(told - 0.6 / PI * (1 - f)) <= 1e-9 * told);
+	arena_fini(&a);
+}
+
 /* The clear coat's half vectors are a distribution: the integral of D cos over the hemisphere is 1; what the coat adds
  * at one pair by hand. */
 static void test_clearcoat(void **state)
@@ -280,6 +308,7 @@ int main(void)
 		cmocka_unit_test(test_glass_is_roughdielectric),
 		cmocka_unit_test(test_metal_is_schlick_over_ggx),
 		cmocka_unit_test(test_diffuse_is_burleys),
+		cmocka_unit_test(test_diffuse_is_lamberts),
 		cmocka_unit_test(test_clearcoat),
 		cmocka_unit_test(test_specular_color),
 		cmocka_unit_test(test_coat),

@@ -45,12 +45,10 @@ static const char fan_obj[] = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nvt 0 1\nv
 /* b.hdr and g.hdr hold what rgb.hdr has of these. */
 static const char twin[] = "<scene version='3.0.0'>" OBJ(
 	"strip.obj",
-	"<boolean name='face_normals' value='true'/>" MATRIX(
-		"4 0 0 0 0 1 0 -1 0 0 4 0 0 0 0 1") "<bsdf type='principled'><rgb name='base_color' value='0.8 0.4 0.2'/>" FLOAT("metallic",
-																 "0")
-		FLOAT("roughness", "1") FLOAT("eta", "1.5") "</bsdf>")
+	"<boolean name='face_normals' value='true'/>" MATRIX("4 0 0 0 0 1 0 -1 0 0 4 0 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/><rgb name='base_color' value='0.8 0.4 0.2'/>" FLOAT(
+		"metallic", "0") FLOAT("roughness", "1") FLOAT("eta", "1.5") "</bsdf>")
 	OBJ("solid.obj",
-	    MATRIX("2.2204460492503131e-16 0 1 -1 0 1 0 0.5 -1 0 2.2204460492503131e-16 0 0 0 0 1") "<bsdf type='principled'>"
+	    MATRIX("2.2204460492503131e-16 0 1 -1 0 1 0 0.5 -1 0 2.2204460492503131e-16 0 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/>"
 												    "<texture name='base_color' type='scale'><rgb name='scale' value='0.5 1 0.25'/>" BITMAP(
 													    "x",
 													    "rgb.hdr") "</texture></texture><texture name='metallic' type='scale'>" FLOAT("scale",
@@ -61,19 +59,18 @@ static const char twin[] = "<scene version='3.0.0'>" OBJ(
 	    "</texture>" BITMAP("roughness", "g.hdr") RAW FLOAT(
 		    "eta",
 		    "1.5") "</bsdf>") OBJ("solid.obj",
-					  MATRIX("0.5 0 0 1 0 0.5 0 0 0 0 0.5 0.5 0 0 0 1") "<bsdf type='principled'><rgb name='base_color' value='1 1 1'/>" FLOAT(
+					  MATRIX("0.5 0 0 1 0 0.5 0 0 0 0 0.5 0.5 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/><rgb name='base_color' value='1 1 1'/>" FLOAT(
 						  "metallic", "0") FLOAT("roughness", "0.5") FLOAT("eta", "1.75")
 						  FLOAT("spec_trans", "1") "</bsdf>")
 		OBJ("fan.obj",
-		    "<boolean name='face_normals' value='true'/>" MATRIX(
-			    "1 0 0 0 0 -1 0 3 0 0 -1 0 0 0 0 1") "<bsdf type='principled'><rgb name='base_color' value='1 1 1'/>" FLOAT("metallic",
-																	"0")
-			    FLOAT("roughness", "1") FLOAT(
-				    "eta",
-				    "1.5") "</bsdf><emitter type='area'><rgb name='radiance' value='8 4 4'/></emitter>") "<sensor type='perspective'><float name='fov' value='42.971834634811742'/><string name='fov_axis' value='y'/>" MATRIX("-1 0 0 0 0 1 0 0.5 0 0 -1 6 0 0 0 1") "<film type='hdrfilm'><integer name='width' value='768'/>"
-																																		      "<integer name='height' value='768'/></film></sensor>"
-																																		      "<emitter type='point'><rgb name='intensity' value='4 2 1'/><point name='position' x='2' y='2' z='2'/></emitter>"
-																																		      "</scene>";
+		    "<boolean name='face_normals' value='true'/>" MATRIX("1 0 0 0 0 -1 0 3 0 0 -1 0 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/><rgb name='base_color' value='1 1 1'/>" FLOAT(
+			    "metallic",
+			    "0") FLOAT("roughness", "1")
+			    FLOAT("eta",
+				  "1.5") "</bsdf><emitter type='area'><rgb name='radiance' value='8 4 4'/></emitter>") "<sensor type='perspective'><float name='fov' value='42.971834634811742'/><string name='fov_axis' value='y'/>" MATRIX("-1 0 0 0 0 1 0 0.5 0 0 -1 6 0 0 0 1") "<film type='hdrfilm'><integer name='width' value='768'/>"
+																																		    "<integer name='height' value='768'/></film></sensor>"
+																																		    "<emitter type='point'><rgb name='intensity' value='4 2 1'/><point name='position' x='2' y='2' z='2'/></emitter>"
+																																		    "</scene>";
 
 static struct picture render(const struct memory_file *files)
 {
@@ -355,20 +352,21 @@ static void test_lights_and_cameras(void **state)
 	scene_fini(&s);
 }
 
-/* Lamps of Blender are in lumens since 3.4, its emission never is. */
-static void test_lamps_of_blender(void **state)
+/* Lamps of Blender are in lumens since 3.4, its emission never is; its diffuse surfaces are the format's since 4.0. */
+static void test_versions_of_blender(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *generator;
 		double scale;
+		bool lambertian;
 	} files[] = {
-		{"\"Khronos glTF Blender I/O v3.4.50\"", 1.0 / 683},
-		{"\"Khronos glTF Blender I/O v4.0.1\"", 1.0 / 683},
-		{"\"Khronos glTF Blender I/O v3.3.27\"", 1},
-		{"\"Khronos glTF Blender I/O v\"", 1},
-		{"\"Another v3.4.50\"", 1},
-		{"3.4", 1},
+		{"\"Khronos glTF Blender I/O v3.4.50\"", 1.0 / 683, false},
+		{"\"Khronos glTF Blender I/O v4.0.1\"", 1.0 / 683, true},
+		{"\"Khronos glTF Blender I/O v3.3.27\"", 1, false},
+		{"\"Khronos glTF Blender I/O v\"", 1, true},
+		{"\"Another v3.4.50\"", 1, true},
+		{"3.4", 1, true},
 	};
 	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
 		char asset[128];
@@ -378,6 +376,8 @@ static void test_lamps_of_blender(void **state)
 		for (int k = 0; k < 3; k++)
 			assert_near(rgb[k], (4 >> k) * files[i].scale);
 		assert_true(scene_has_note(&s, "lamps are divided by 683") == (files[i].scale < 1));
+		const struct scene_node *bsdf = find(&s, PLUGIN_BSDF, "principled");
+		assert_true(node_bool(bsdf, "lambertian", false) == files[i].lambertian);
 		scene_fini(&s);
 	}
 }
@@ -427,7 +427,7 @@ int main(void)
 		cmocka_unit_test(test_damaged),
 		cmocka_unit_test(test_lights_and_cameras),
 		cmocka_unit_test(test_no_camera_no_light),
-		cmocka_unit_test(test_lamps_of_blender),
+		cmocka_unit_test(test_versions_of_blender),
 		cmocka_unit_test(test_notes),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);
