@@ -3,25 +3,13 @@
 # as the image's user; then deploy/systemd there, booted by systemd-nspawn. Minutes and downloads: only with FULL=1, as by
 # deploy/test.sh --full; the tests of every day and CI name it among what they skip.
 . "$(dirname "$0")/lib.sh"
-[ "${FULL:-0}" != 0 ] || skip "downloads two Debians: FULL=1, or deploy/test.sh --full"
-command -v debootstrap >/dev/null || lacks "no debootstrap (deploy/setup.sh --full installs it)"
-[ "$(id -u)" = 0 ] || skip "debootstrap wants root"
-unshare --mount --pid --fork true 2>/dev/null || skip "no namespaces for mounts and processes here"
+need_debians
 TREE=$(cd "$HERE/../.." && pwd)
 FILE=$TREE/deploy/container/Containerfile
 SUITE=$(sed -n 's/^FROM .*debian:\([a-z]*\)-slim.*/\1/p' "$FILE" | sort -u)
 [ "$(echo "$SUITE" | wc -w)" = 1 ] || fail "which Debian? $SUITE"
 
-# inside ROOT [USER] COMMAND: with /proc, with the network's names, with nothing of it left afterwards
-inside() {
-	unshare --mount --pid --fork --kill-child sh -c 'mount -t proc proc "$1/proc" && mount --rbind /dev "$1/dev" && exec chroot \
-		${3:+--userspec="$3"} "$1" /usr/bin/env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin sh -ec "$2"' \
-		sh "$1" "$2" "${3:-}" >>"$DIR/inside.log" 2>&1
-}
-
-debootstrap --variant=minbase "$SUITE" "$DIR/base" "${HSLT_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$DIR/debootstrap.log" 2>&1 ||
-	skip "debootstrap: $(tail -n 1 "$DIR/debootstrap.log")"
-cp /etc/resolv.conf /etc/hosts "$DIR/base/etc/"
+fresh_debian "$SUITE" "$DIR/base"
 stage=0 user=
 while read -r word rest; do
 	case $word in

@@ -66,6 +66,28 @@ need() {
 	done
 }
 
+# For tests that run in Debians of their own.
+need_debians() {
+	[ "${FULL:-0}" != 0 ] || skip "downloads Debians: FULL=1, or deploy/test.sh --full"
+	command -v debootstrap >/dev/null || lacks "no debootstrap (deploy/setup.sh --full installs it)"
+	[ "$(id -u)" = 0 ] || skip "debootstrap wants root"
+	unshare --mount --pid --fork true 2>/dev/null || skip "no namespaces for mounts and processes here"
+}
+
+# fresh_debian SUITE ROOT
+fresh_debian() {
+	debootstrap --variant=minbase "$1" "$2" "${HSLT_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$DIR/debootstrap.log" 2>&1 ||
+		skip "debootstrap: $(tail -n 1 "$DIR/debootstrap.log")"
+	cp /etc/resolv.conf /etc/hosts "$2/etc/"
+}
+
+# inside ROOT COMMAND [USER]: with /proc, with the network's names, with nothing of it left afterwards
+inside() {
+	unshare --mount --pid --fork --kill-child sh -c 'mount -t proc proc "$1/proc" && mount --rbind /dev "$1/dev" && exec chroot \
+		${3:+--userspec="$3"} "$1" /usr/bin/env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin sh -ec "$2"' \
+		sh "$1" "$2" "${3:-}" >>"$DIR/inside.log" 2>&1
+}
+
 # code WANTED COMMAND...: its exit code; what it says is in out and err.log
 code() {
 	wanted=$1
