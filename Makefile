@@ -33,7 +33,9 @@ OPT      ?= $(if $(SAN),-O1,-O3)
 TRAPS    := $(if $(IS_CLANG),-ffp-exception-behavior=maytrap)
 CFLAGS   := -std=c17 $(OPT) $(if $(SAN),-g1,-g) -ffp-contract=off -fno-fast-math -fno-math-errno -fno-strict-aliasing -fno-common $(TRAPS) $(WARN) \
             $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer) $(EXTRA_CFLAGS)
-CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen -MMD -MP
+# From 3.2 on, OpenEXR's headers look for each other in their own folder.
+OPENEXR  := $(patsubst -I%,-isystem %,$(filter -I%,$(shell pkg-config --cflags OpenEXR 2>/dev/null)))
+CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen $(OPENEXR) -MMD -MP
 LDFLAGS  := $(if $(SAN),-fsanitize=$(SAN)) $(EXTRA_LDFLAGS)
 
 LIBS_COMMON := -lOpenEXRCore -lprotobuf-c -luv -lssl -lcrypto -ljansson -lsqlite3 -lm -lpthread
