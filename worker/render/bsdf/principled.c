@@ -89,8 +89,7 @@ static double schlick(double cosine)
 	return x * x * x * x * x;
 }
 
-/* Fresnel's factor of the boundary alone. */
-static spectrum boundary_reflects(const struct stuff *s, double cosine)
+spectrum principled_boundary(const struct stuff *s, double cosine)
 {
 	const struct principled *p = s->p;
 	double rest = schlick(cosine), root = (p->eta - 1) / (p->eta + 1), tint = s->share[SPEC_TINT];
@@ -104,18 +103,18 @@ static spectrum boundary_reflects(const struct stuff *s, double cosine)
 }
 
 /* F of the header comment. */
-spectrum principled_fresnel(const struct stuff *s, double cosine)
+spectrum principled_fresnel(const struct stuff *s, spectrum boundary, double cosine)
 {
 	double rest = schlick(cosine);
-	spectrum f = boundary_reflects(s, cosine);
+	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		f.v[i] = (1 - s->metallic) * f.v[i] + s->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest);
+		f.v[i] = (1 - s->metallic) * boundary.v[i] + s->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest);
 	return f;
 }
 
 /* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. The
  * caller excludes wi below the surface. */
-spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_d)
+spectrum principled_diffuse(const struct stuff *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d)
 {
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
 	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
@@ -124,9 +123,9 @@ spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_
 	double most = (1 - s->metallic) * (1 - s->share[TRANSMISSION]) / WARP_PI,
 	       burley = base + s->share[FLATNESS] * (flat - base);
 	double sheen = (1 - s->metallic) * s->share[SHEEN] * schlick(cos_d);
-	spectrum f, lost = s->p->lambertian ? boundary_reflects(s, cos_d) : spectrum_of(0);
+	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double diffuse = most * (s->p->lambertian ? 1 - lost.v[i] : burley);
+		double diffuse = most * (s->p->lambertian ? 1 - boundary.v[i] : burley);
 		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + s->share[SHEEN_TINT] * (s->tint.v[i] - 1));
 	}
 	return f;
@@ -234,7 +233,9 @@ static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, d
 				     fresnel_dielectric(cos_d, eta).reflected);
 		return;
 	}
-	out->f = spectrum_add(spectrum_scale(both, principled_fresnel(s, cos_d)), principled_diffuse(s, wo, wi, cos_d));
+	spectrum boundary = principled_boundary(s, cos_d);
+	out->f = spectrum_add(spectrum_scale(both, principled_fresnel(s, boundary, cos_d)),
+			      principled_diffuse(s, boundary, wo, wi, cos_d));
 	out->pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
 	if (s->share[CLEARCOAT] > 0) {
 		out->f = spectrum_add(out->f, spectrum_of(clearcoat_of(s, wo, wi, h, cos_d)));

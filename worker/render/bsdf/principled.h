@@ -43,10 +43,12 @@ struct stuff {
 struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at);
 struct microfacet principled_facets(double anisotropic, double roughness);
 
-/* Fresnel's factor of boundary and metal, for light from above. */
-spectrum principled_fresnel(const struct stuff *s, double cosine);
-/* The diffuse lobe with sheen; cos_d: cosine of either direction to the half vector. Both directions are above. */
-spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_d);
+/* Fresnel's factor of the boundary alone, and with it that of boundary and metal, for light from above. */
+spectrum principled_boundary(const struct stuff *s, double cosine);
+spectrum principled_fresnel(const struct stuff *s, spectrum boundary, double cosine);
+/* The diffuse lobe with sheen; cos_d: cosine of either direction to the half vector, at which the boundary reflects
+ * that much. Both directions are above. */
+spectrum principled_diffuse(const struct stuff *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d);
 
 /* Reads those of the parameters that the plug-in has; the others are 0. */
 int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,

@@ -91,8 +91,9 @@ static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
 	double cosine = fmin(0.5 * length, 1), seen = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, o),
 	       both = x->spec_trans * seen * microfacet_g1_over_cos(m, i), diffuse = 1 - x->spec_trans;
 	if (reflect) {
-		spectrum d = principled_diffuse(&x->s, o, i, cosine);
-		out.f = spectrum_add(spectrum_scale(both, principled_fresnel(&x->s, cosine)),
+		spectrum boundary = principled_boundary(&x->s, cosine),
+			 d = principled_diffuse(&x->s, boundary, o, i, cosine);
+		out.f = spectrum_add(spectrum_scale(both, principled_fresnel(&x->s, boundary, cosine)),
 				     spectrum_scale(diffuse * (1 - x->through), d));
 		out.pdf = x->chance[THIN_REFLECT] * seen + x->chance[THIN_DIFFUSE] * i.z / WARP_PI;
 	} else {
