@@ -8,15 +8,16 @@ set -eu
 build=$1 other=$2
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
+render() { # BUILD IMAGE
+	"$1/bin/hslt-render" "tests/scenes/$scene.xml" -o "$2" --size 32 --spp 4 --integrator "$integrator" --quiet 2>"$dir/err" ||
+		{ cat "$dir/err" && exit 1; }
+}
+
 for scene in demo/scene displaced/water numbers/glass; do
 	for integrator in path bdpt erpt hslt pssmlt; do
-		for by in "$build" "$other"; do
-			"$by/bin/hslt-render" "tests/scenes/$scene.xml" -o "$dir/image.exr" --size 32 --spp 4 --integrator $integrator \
-				--quiet 2>"$dir/err" || { cat "$dir/err" && exit 1; }
-			mv "$dir/image.exr" "$dir/$(echo "$by" | tr / _).exr"
-		done
-		set -- "$dir"/*.exr
-		"$build/bin/hslt-compare" --exact "$1" "$2" >"$dir/out" || {
+		render "$build" "$dir/one.exr"
+		render "$other" "$dir/other.exr"
+		"$build/bin/hslt-compare" --exact "$dir/one.exr" "$dir/other.exr" >"$dir/out" || {
 			echo "$scene by $integrator: $build and $other differ: $(cat "$dir/out")" && exit 1
 		}
 	done
