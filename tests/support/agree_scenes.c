@@ -208,6 +208,25 @@ static struct world *beams(const struct agree_case *k)
 			     "<emitter type='directionalarea'><rgb name='radiance' value='5'/></emitter></shape>");
 }
 
+/* A wall stands before the near plane and another behind the far one, which cuts the ground: of neither does the camera see anything.
+ * a = 1: the camera is orthographic, and the first wall behind it. */
+static struct world *clipped_view(const struct agree_case *k)
+{
+#define CLIPPED(type, more, turn) "<sensor type='" type "'>" more "<float name='near_clip' value='2'/><float name='far_clip' value='7'/>" \
+	AT(turn "<lookat origin='0,2,5' target='0,0.7,0' up='0,1,0'/>" TURN) FILM "</sensor>"
+	return world_of_text(32, 32, "%s" GROUND SKY
+			     "<shape type='rectangle'>" AT("<scale value='2'/><translate y='1' z='%.17g'/>" TURN) GREY("0.5") "</shape>"
+			     "<shape type='rectangle'>" AT("<scale value='2'/><translate y='1' z='-3'/>" TURN) GREY("0.8") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.5'/><translate x='-0.5' y='0.5'/>" TURN) GLASS("1.5") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.4'/><translate x='0.6' y='0.4'/>" TURN)
+			     "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf></shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>",
+			     k->a > 0 ? CLIPPED("orthographic", "", "<scale x='1.6' y='1.6' z='1'/>")
+				      : CLIPPED("perspective", "<float name='fov' value='35'/>", ""),
+			     k->a > 0 ? 6. : 4.);
+}
+
 /* A sky of 16 x 8 texels of about 1, one of which is 1.3e8. */
 static struct world *bright_texel(const struct agree_case *k)
 {
@@ -247,6 +266,8 @@ const struct agree_case agree_cases[] = {
 	{"bright texel", "1.3e8 in a sky of 1", bright_texel, 0, 0, 5, 256, 512, ALL, 0.02},
 	{"two-sided lamps", "a sheet, and a box around a ball", two_sided_lamps, 0, 0, 6, 512, 1024, ALL, 0.02},
 	{"beams", "of a square and of a disk", beams, 0, 0, 5, 2048, 1024, ALL, 0.02},
+	{"clipped view", "a wall before the near plane", clipped_view, 0, 0, 6, 512, 512, ALL, 0.02},
+	{"clipped view", "a wall behind an orthographic camera", clipped_view, 1, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},

@@ -128,9 +128,32 @@ static struct ray_end end_of(const struct path_vertex *v)
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
+/* What is before the near plane hides nothing: an orthographic camera has a whole room there. camera_project refuses a
+ * b that is behind the far one. */
+static bool seen_by_camera(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *b)
+{
+	const struct camera *camera = &c->w->camera;
+	bool endless = b->kind == VERTEX_INFINITE;
+	vec3 d = endless ? b->x.p : vec3_sub(b->x.p, eye->x.p);
+	if (!(vec3_dot(camera->axes.n, d) > 0))
+		return false;
+	double t_min, t_max;
+	camera_clip(camera, d, &t_min, &t_max); /* units of d */
+	struct ray_end from = end_of(eye), to = end_of(b);
+	struct ray_hit hit;
+	if (endless)
+		return !accel_closest(c->w->accel, &from, d, t_min, t_max, &hit);
+	if (!(t_min < 1))
+		return false;
+	from.p = vec3_madd(eye->x.p, t_min, d);
+	return !accel_occluded(c->w->accel, &from, &to);
+}
+
 bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
 {
 	c->counters[COUNT_RAYS_SHADOW]++;
+	if (a->kind == VERTEX_CAMERA)
+		return seen_by_camera(c, a, b);
 	struct ray_end from = end_of(a);
 	if (b->kind == VERTEX_INFINITE)
 		return !accel_occluded_to_infinity(c->w->accel, &from, b->x.p);
@@ -219,7 +242,7 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
 	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2),
 			   l);
-	if (spectrum_is_zero(l) || !path_visible(c, y, eye))
+	if (spectrum_is_zero(l) || !path_visible(c, eye, y))
 		return spectrum_of(0);
 	film[0] = x[0];
 	film[1] = x[1];

@@ -141,14 +141,6 @@ static struct ray_end end_of(const struct path_vertex *v)
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
-static bool occluded(const struct world *w, const struct full_path *y, unsigned e)
-{
-	struct ray_end a = end_of(&y->v[e + 1]), b = end_of(&y->v[e]);
-	if (y->v[e].kind == VERTEX_INFINITE)
-		return accel_occluded_to_infinity(w->accel, &a, y->v[e].x.p);
-	return accel_occluded(w->accel, &a, &b);
-}
-
 /* What a run over one world found. */
 struct tally {
 	size_t walks, arrived, strict, returned, ends[WALK_ITERATIONS + 1], back_ends[WALK_ITERATIONS + 1];
@@ -249,7 +241,7 @@ static void check_arrival(struct path_context *c, const struct full_path *x, con
 		assert_memory_equal(&w, &y->edge[e].w, sizeof w);
 		assert_memory_equal(&w, &y->v[e].to_prev, sizeof w);
 		assert_true(distance2 == y->edge[e].distance2);
-		t->occluded += occluded(c->w, y, e);
+		t->occluded += !full_path_visible(c, y, e);
 	}
 }
 

@@ -175,6 +175,26 @@ static void test_ends(void **state)
 	      world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
 
+/* A wall before the near plane, another behind the far one, and the sky: all that a camera path finds between the
+ * planes is visible. */
+static void test_clipped(void **state)
+{
+	(void)state;
+	static const char sensor[] =
+		"<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='2'/>"
+		"<float name='far_clip' value='7'/>" AT(
+			"<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>") "</sensor>";
+	static const char walls[] = "<shape type='rectangle'>" AT(
+		"<scale value='3'/><translate z='4'/>") "</shape>"
+							"<shape type='rectangle'>" AT(
+								"<scale value='3'/><translate z='-3'/>") "</shape>";
+	check("clipped",
+	      world_of_text(
+		      32, 32, "%s%s%s", sensor, walls,
+		      BALL("<bsdf type='diffuse'/>") "<emitter type='constant'><float name='radiance' value='.2'/></emitter>"),
+	      3000);
+}
+
 /* Both directions lie on the same side of the shading and of the geometric normal, each, or nothing scatters: the eight
  * cases of a normal that is bent by 60 degrees. */
 static void test_sides(void **state)
@@ -203,7 +223,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_surfaces), cmocka_unit_test(test_round_lamp), cmocka_unit_test(test_environment),
-		cmocka_unit_test(test_ends),	 cmocka_unit_test(test_sides),
+		cmocka_unit_test(test_ends),	 cmocka_unit_test(test_clipped),    cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
