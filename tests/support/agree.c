@@ -258,6 +258,8 @@ struct verdict {
 
 static struct verdict compare(const struct cell *a, const struct cell *b)
 {
+	if (a->mean == b->mean) /* both may be black */
+		return (struct verdict){0, 0, 30};
 	double v = a->error2 + b->error2, reference = fabs(b->mean);
 	double da = a->degrees > 0 ? a->error2 * a->error2 / a->degrees : 0;
 	double db = b->degrees > 0 ? b->error2 * b->error2 / b->degrees : 0;

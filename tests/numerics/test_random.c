@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Random scenes (tests/support/random_scene.h), each by integrators that reach the same light in different ways:
+ * pssmlt, hslt, erpt or erpt4, bdpt8 and, unless there are beams whose caustics it cannot find, path, against bdpt; and
+ * bdpt with all effects, whether or not the scene needs them. The other tests of agreement look where somebody thought
+ * of looking.
+ *
+ * Level: that of tests/support/agree.h for each comparison. Where groups seldom find something bright, their means are
+ * skewed and t is not to be trusted: what differs is compared again, with other seeds and 16 times the samples, and
+ * must differ again. Power: the bias of the mean that is found with 95 % probability stands in the row. A plain run has
+ * six scenes and is there for what breaks altogether; HSLT_TEST_ROWS=1 has 24 with 4 times the samples, FULL=1 100 with
+ * 16 times. SCENES=7 or SCENES=100-200 chooses others.
+ */
+#include "worker/render/render.h"
+#include "tests/numerics/rows.h"
+#include "tests/support/agree.h"
+#include "tests/support/random_scene.h"
+#include "tests/support/worlds.h"
+#include "tests/worker/render/bsdf/bsdf_cases.h"
+
+static struct rows rows;
+
+enum { BDPT_SPP = 64 };
+
+static uint64_t times(void)
+{
+	return test_full() ? 16 : getenv("HSLT_TEST_ROWS") ? 4 : 1;
+}
+
+struct trial {
+	char name[32];
+	struct random_scene scene;
+	struct agree_image reference;
+};
+
+/* side: what is compared, by which the random numbers differ. */
+static void render(const struct trial *t, const char *side, const char *integrator, uint64_t spp, uint64_t more,
+		   struct world *w, struct agree_image *out)
+{
+	char test[64];
+	snprintf(test, sizeof test, "%s, %llu", t->name, (unsigned long long)more);
+	struct agree_side how = {integrator, spp * times() * more, 16, 0, 0};
+	agree_render_chains(w, test, side, &how, 8192 * times() * more, NULL, out);
+}
+
+static void compare(const struct trial *t, const char *side, const char *integrator, uint64_t spp, struct world *w)
+{
+	static struct agree_image other, again;
+	struct agree_difference d;
+	char measured[300], title[80];
+	snprintf(title, sizeof title, "%s, %s", t->name, side);
+	render(t, side, integrator, spp, 1, w, &other);
+	agree_measure(&other, &t->reference, &d);
+	if (!d.holds) {
+		render(t, "reference", "bdpt", BDPT_SPP, 16, w, &again);
+		render(t, side, integrator, spp, 16, w, &other);
+		agree_measure(&other, &again, &d);
+	}
+	snprintf(measured, sizeof measured,
+		 "differs from bdpt by %+.2f %% +- %.2f %%; finds %.1f %% of the mean, %.1f %% of a block",
+		 100 * d.mean, 100 * d.error, 100 * d.found, 100 * d.found_block);
+	row(&rows, "random scenes", title, measured, "the same image", d.holds);
+	if (!d.holds)
+		printf("%s: %s\n%s\n", t->name, t->scene.materials, t->scene.body);
+}
+
+static void compare_scene(uint64_t number)
+{
+	static struct trial t;
+	snprintf(t.name, sizeof t.name, "%llu", (unsigned long long)number);
+	random_scene_make(&t.scene, number, bsdf_cases, BSDF_CASES);
+	struct world *w = random_scene_world(&t.scene, 32, 24);
+	render(&t, "reference", "bdpt", BDPT_SPP, 1, w, &t.reference);
+	if (!t.scene.needs_light_paths)
+		compare(&t, "path", "path", 128, w);
+	compare(&t, "bdpt8", "bdpt8", 96, w);
+	compare(&t, "pssmlt", "pssmlt", 64, w);
+	compare(&t, "hslt", "hslt", 64, w);
+	const char *erpt = number % 2 ? "erpt4" : "erpt";
+	compare(&t, erpt, erpt, 48, w);
+	world_free(w);
+	worlds_effects = "all";
+	w = random_scene_world(&t.scene, 32, 24);
+	worlds_effects = NULL;
+	compare(&t, "bdpt with all effects", "bdpt", BDPT_SPP, w);
+	world_free(w);
+}
+
+static void test_random(void **state)
+{
+	(void)state;
+	const char *scenes = getenv("SCENES");
+	unsigned long long first = 0, last = test_full() ? 99 : getenv("HSLT_TEST_ROWS") ? 23 : 5;
+	if (scenes && sscanf(scenes, "%llu-%llu", &first, &last) == 1)
+		last = first;
+	for (unsigned long long i = first; i <= last; i++)
+		compare_scene(i);
+	printf("integrators on random scenes: %u comparisons, %u failed\n", rows.cases, rows.failed);
+	assert_int_equal(rows.failed, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_random)};
+	return cmocka_run_group_tests_name("integrators on random scenes", tests, NULL, NULL);
+}

@@ -1,0 +1,348 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "tests/support/random_scene.h"
+
+#include "tests/support/append.h"
+#include "tests/support/dice.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/worlds.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct maker {
+	struct random_scene *s;
+	struct dice d;
+	const char *const *materials;
+	uint32_t count;
+};
+
+/* clang-format off */
+#define PUT(m, ...) append((m)->s->body, sizeof (m)->s->body, &(m)->s->used, __VA_ARGS__)
+/* clang-format on */
+
+static bool chance(struct maker *m, double p)
+{
+	return dice_throw(&m->d) < p;
+}
+
+static double between(struct maker *m, double low, double high)
+{
+	return dice_between(&m->d, low, high);
+}
+
+/* One number a call: the order in which arguments are evaluated is the compiler's. */
+static void put_between(struct maker *m, const char *before, double low, double high, const char *after)
+{
+	PUT(m, "%s%.3f%s", before, between(m, low, high), after);
+}
+
+static void put_rgb(struct maker *m, const char *name, double low, double high)
+{
+	PUT(m, "<rgb name='%s' value='", name);
+	put_between(m, "", low, high, ",");
+	put_between(m, "", low, high, ",");
+	put_between(m, "", low, high, "'/>");
+}
+
+/* "name=value" as an element: a colour, a number, a truth value, or a text. */
+static void put_value(struct maker *m, char *word)
+{
+	char *value = strchr(word, '='), *end;
+	*value++ = 0;
+	double rgb[3];
+	if (sscanf(value, "rgb(%lf,%lf,%lf)", &rgb[0], &rgb[1], &rgb[2]) == 3)
+		PUT(m, "<rgb name='%s' value='%g,%g,%g'/>", word, rgb[0], rgb[1], rgb[2]);
+	else if (strtod(value, &end), *end == 0)
+		PUT(m, "<float name='%s' value='%s'/>", word, value);
+	else if (strcmp(value, "true") == 0 || strcmp(value, "false") == 0)
+		PUT(m, "<boolean name='%s' value='%s'/>", word, value);
+	else
+		PUT(m, "<string name='%s' value='%s'/>", word, value);
+}
+
+/* Words up to the next "texture" or the end; an object's element is left open. */
+static void put_object(struct maker *m, const char *element, const char *name, char **rest)
+{
+	PUT(m, "<%s type='%s'", element, strtok_r(NULL, " ", rest));
+	if (name)
+		PUT(m, " name='%s'", name);
+	PUT(m, ">");
+	for (char *word; (word = strtok_r(NULL, " ", rest));) {
+		if (strcmp(word, "texture") == 0) {
+			put_object(m, "texture", NULL, rest);
+			PUT(m, "</texture>");
+			return;
+		}
+		put_value(m, word);
+	}
+}
+
+/* What stands between two bars: a BSDF, "texture ...", or "@name ..." for a texture of that name. */
+static void put_part(struct maker *m, char *text)
+{
+	char *rest = text + strspn(text, " ");
+	if (*rest == '@') {
+		char *name = strtok_r(NULL, " ", &rest);
+		put_object(m, "texture", name + 1, &rest);
+		PUT(m, "</texture>");
+	} else if (strncmp(rest, "texture ", 8) == 0) {
+		strtok_r(NULL, " ", &rest);
+		put_object(m, "texture", NULL, &rest);
+		PUT(m, "</texture>");
+	} else {
+		put_object(m, "bsdf", NULL, &rest);
+		PUT(m, "</bsdf>");
+	}
+}
+
+static void put_material(struct maker *m)
+{
+	const char *chosen = m->materials[dice_below(&m->d, m->count)];
+	size_t used = strlen(m->s->materials);
+	append(m->s->materials, sizeof m->s->materials, &used, "%s%s", used ? "; " : "", chosen);
+	char copy[256], *bar = copy;
+	snprintf(copy, sizeof copy, "%s", chosen);
+	char *first = strtok_r(NULL, "|", &bar);
+	put_object(m, "bsdf", NULL, &first);
+	for (char *part; (part = strtok_r(NULL, "|", &bar));)
+		put_part(m, part);
+	PUT(m, "</bsdf>");
+}
+
+/* Of shapes of about the unit ball: stretched, turned, and put into a box around (0, y, 0). */
+static void put_place(struct maker *m, double size, double y, double reach)
+{
+	vec3 axis = dice_direction(&m->d);
+	put_between(m, "<transform name='to_world'><scale x='", 0.5 * size, 1.3 * size, "'");
+	put_between(m, " y='", 0.5 * size, 1.3 * size, "'");
+	put_between(m, " z='", 0.5 * size, 1.3 * size, "'/>");
+	PUT(m, "<rotate x='%.3f' y='%.3f' z='%.3f'", axis.x, axis.y, axis.z);
+	put_between(m, " angle='", 0, 360, "'/>");
+	put_between(m, "<translate x='", -reach, reach, "'");
+	put_between(m, " y='", y - reach, y + reach, "'");
+	put_between(m, " z='", -reach, reach, "'/></transform>");
+}
+
+static const char wedge[] =
+	"v -1 -1 -1\nv 1 -1 -1\nv 1 -1 1\nv -1 -1 1\nv -1 1 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+	"f 1/1 2/2 3/3 4/4\nf 4/1 3/2 6/3 5/4\nf 2/1 1/2 5/3 6/4\nf 1/1 4/2 5/3\nf 3/1 2/2 6/3\n";
+static const char curve[] = "-1 -0.5 0 0.2\n-0.4 0.7 0.3 0.3\n0.3 -0.6 0.2 0.2\n1 0.4 -0.4 0.3\n";
+
+static const struct {
+	const char *type, *inner;
+} shapes[] = {
+	{"sphere", ""},
+	{"cube", ""},
+	{"disk", ""},
+	{"rectangle", ""},
+	{"cylinder", "<point name='p0' x='0' y='0' z='-1'/>"},
+	{"obj", "<string name='filename' value='wedge.obj'/>"},
+	{"heightfield", "<string name='filename' value='picture.ppm'/><float name='scale' value='0.5'/>"},
+	{"linearcurve", "<string name='filename' value='curve.txt'/>"},
+	{"bsplinecurve", "<string name='filename' value='curve.txt'/>"},
+	{"sphere",
+	 "<texture name='displacement' type='checkerboard'><float name='color0' value='0'/><float name='color1' value='1'/>"
+	 "<transform name='to_uv'><scale x='6' y='6'/></transform></texture><float name='displacement_scale' value='0.05'/>"
+	 "<integer name='displacement_level' value='4'/>"},
+};
+enum { SHAPES = sizeof shapes / sizeof *shapes };
+
+static void put_shape(struct maker *m)
+{
+	unsigned k = dice_below(&m->d, SHAPES + 1);
+	if (k == SHAPES) { /* the same mesh in two places */
+		size_t id = m->s->used;
+		PUT(m, "<shape type='shapegroup' id='g%zu'><shape type='cylinder'>", id);
+		put_material(m);
+		PUT(m, "</shape></shape>");
+		for (int i = 0; i < 2; i++) {
+			PUT(m, "<shape type='instance'><ref id='g%zu'/>", id);
+			put_place(m, between(m, 0.3, 0.6), -0.2, 1);
+			PUT(m, "</shape>");
+		}
+		return;
+	}
+	PUT(m, "<shape type='%s'>%s", shapes[k].type, shapes[k].inner);
+	if (chance(m, 0.1))
+		PUT(m, "<boolean name='flip_normals' value='true'/>");
+	put_place(m, between(m, 0.3, 0.7), -0.2, 1);
+	put_material(m);
+	PUT(m, "</shape>");
+}
+
+static void put_wall(struct maker *m, const char *turn, const char *move)
+{
+	PUT(m,
+	    "<shape type='rectangle'><transform name='to_world'><scale value='2'/>%s<translate %s/></transform>"
+	    "<bsdf type='twosided'><bsdf type='diffuse'>",
+	    turn, move);
+	if (chance(m, 0.3)) {
+		PUT(m, "<texture name='reflectance' type='checkerboard'>");
+		put_rgb(m, "color0", 0.05, 0.8);
+		put_rgb(m, "color1", 0.05, 0.8);
+		PUT(m, "</texture>");
+	} else
+		put_rgb(m, "reflectance", 0.05, 0.8);
+	PUT(m, "</bsdf></bsdf></shape>");
+}
+
+static void put_daylight(struct maker *m, const char *type)
+{
+	PUT(m, "<emitter type='%s'><transform name='to_world'><rotate x='1' angle='-90'/></transform>", type);
+	put_between(m, "<vector name='sun_direction' y='1' x='", -1, 1, "'");
+	put_between(m, " z='", -1, 1, "'/>");
+	PUT(m, "<float name='sun_scale' value='0.02'/><float name='sky_scale' value='0.05'/>"
+	       "<float name='sun_radius_scale' value='40'/></emitter>");
+}
+
+static void put_environment(struct maker *m)
+{
+	switch (dice_below(&m->d, 5)) {
+	case 0:
+		PUT(m, "<emitter type='constant'>");
+		put_rgb(m, "radiance", 0.1, 1);
+		PUT(m, "</emitter>");
+		break;
+	case 1:
+		PUT(m, "<emitter type='envmap'><string name='filename' value='picture.ppm'/></emitter>");
+		break;
+	case 2:
+		put_daylight(m, "sky");
+		break;
+	case 3:
+		put_daylight(m, "sun");
+		break;
+	default:
+		put_daylight(m, "sunsky");
+	}
+}
+
+/* A lamp that paths can hit. */
+static void put_lamp(struct maker *m)
+{
+	unsigned k = dice_below(&m->d, SHAPES - 1); /* not the displaced ball */
+	PUT(m, "<shape type='%s'>%s<emitter type='area'>", shapes[k].type, shapes[k].inner);
+	if (chance(m, 0.2))
+		PUT(m,
+		    "<texture name='radiance' type='bitmap'><string name='filename' value='picture.ppm'/></texture>");
+	else
+		put_rgb(m, "radiance", 2, 9);
+	PUT(m, "%s</emitter>", chance(m, 0.3) ? "<boolean name='two_sided' value='true'/>" : "");
+	put_place(m, between(m, 0.25, 0.5), 1.2, 0.5);
+	if (chance(m, 0.2))
+		put_material(m);
+	PUT(m, "</shape>");
+}
+
+/* Under the ceiling, aimed at the floor. */
+static void put_aimed(struct maker *m, const char *type)
+{
+	PUT(m, "<emitter type='%s'><transform name='to_world'><lookat target='0,-1,0' up='0,0,1' origin='", type);
+	put_between(m, "", -1, 1, ",1.8,");
+	put_between(m, "", -1, 1, "'/></transform>");
+}
+
+static void put_beam(struct maker *m)
+{
+	m->s->needs_light_paths = true;
+	switch (dice_below(&m->d, 5)) {
+	case 0:
+		put_between(m,
+			    "<shape type='disk'><transform name='to_world'><scale value='0.4'/><rotate x='1' angle='",
+			    70, 110, "'/><translate y='1.7'/></transform><emitter type='directionalarea'>");
+		put_rgb(m, "radiance", 2, 9);
+		PUT(m, "</emitter></shape>");
+		break;
+	case 1:
+		put_between(m, "<emitter type='point'><point name='position' y='1.6' x='", -1, 1, "'");
+		put_between(m, " z='", -1, 1, "'/>");
+		put_rgb(m, "intensity", 2, 9);
+		PUT(m, "</emitter>");
+		break;
+	case 2:
+		put_aimed(m, "spot");
+		put_rgb(m, "intensity", 4, 19);
+		put_between(m, "<float name='cutoff_angle' value='", 20, 60, "'/></emitter>");
+		break;
+	case 3:
+		put_aimed(m, "projector");
+		PUT(m,
+		    "<texture name='irradiance' type='bitmap'><string name='filename' value='picture.ppm'/></texture>"
+		    "<float name='scale' value='20'/>");
+		put_between(m, "<float name='fov' value='", 30, 70, "'/></emitter>");
+		break;
+	default:
+		put_between(m, "<emitter type='directional'><vector name='direction' y='-1' x='", -0.8, 0.8, "'");
+		put_between(m, " z='", -0.8, 0.8, "'/>");
+		put_rgb(m, "irradiance", 1, 3);
+		PUT(m, "</emitter>");
+	}
+}
+
+static void put_camera(struct maker *m)
+{
+	static const char *const types[] = {"perspective", "perspective", "thinlens", "orthographic"};
+	unsigned k = dice_below(&m->d, 4);
+	PUT(m, "<sensor type='%s'>", types[k]);
+	if (chance(m, 0.3))
+		put_between(m, "<float name='near_clip' value='", 0.1, 2, "'/>");
+	if (k < 3)
+		put_between(m, "<float name='fov' value='", 35, 60, "'/>");
+	if (k < 3 && chance(m, 0.2))
+		put_between(m, "<float name='principal_point_offset_x' value='", -0.3, 0.3, "'/>");
+	if (k == 2) {
+		put_between(m, "<float name='aperture_radius' value='", 0.02, 0.2, "'/>");
+		put_between(m, "<float name='focus_distance' value='", 2.5, 4.5, "'/>");
+	}
+	PUT(m, "<transform name='to_world'>%s<lookat up='0,1,0' origin='", k == 3 ? "<scale x='2' y='2' z='1'/>" : "");
+	put_between(m, "", -1, 1, ",");
+	put_between(m, "", -0.5, 1, ",3.8' target='");
+	put_between(m, "", -0.4, 0.4, ",0,0'/></transform>");
+	PUT(m, "<film type='hdrfilm'><rfilter type='%s'/></film></sensor>", chance(m, 0.5) ? "box" : "gaussian");
+}
+
+void random_scene_make(struct random_scene *s, uint64_t number, const char *const *materials, uint32_t count)
+{
+	static const char *const walls[][2] = {
+		{"<rotate x='1' angle='90'/>", "y='2'"},    {"", "z='-2'"},
+		{"<rotate y='1' angle='90'/>", "x='-2'"},   {"<rotate y='1' angle='-90'/>", "x='2'"},
+		{"<rotate y='1' angle='180'/>", "z='4.2'"},
+	};
+	char name[64];
+	snprintf(name, sizeof name, "random scene %llu", (unsigned long long)number);
+	*s = (struct random_scene){.used = 0};
+	struct maker m = {.s = s, .d = dice_of(name), .materials = materials, .count = count};
+	PUT(&m, "<integrator type='path'><integer name='max_depth' value='%u'/></integrator>", 3 + dice_below(&m.d, 5));
+	put_camera(&m);
+	bool room = chance(&m, 0.6);
+	put_wall(&m, "<rotate x='1' angle='-90'/>", "y='-1.6'");
+	for (unsigned i = 0; room && i < sizeof walls / sizeof *walls; i++)
+		if (chance(&m, 0.85))
+			put_wall(&m, walls[i][0], walls[i][1]);
+	for (unsigned i = 0, n = 2 + dice_below(&m.d, 3); i < n; i++)
+		put_shape(&m);
+	if (!room || chance(&m, 0.2))
+		put_environment(&m);
+	if (room || chance(&m, 0.5))
+		put_lamp(&m);
+	if (chance(&m, 0.25))
+		put_beam(&m);
+}
+
+struct world *random_scene_world(const struct random_scene *s, uint32_t width, uint32_t height)
+{
+	enum { SIDE = 8 };
+	static char xml[sizeof s->body + 64];
+	static unsigned char picture[16 + 3 * SIDE * SIDE];
+	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", s->body);
+	int head = sprintf((char *)picture, "P6 %d %d 255\n", SIDE, SIDE);
+	for (int i = 0; i < 3 * SIDE * SIDE; i++)
+		picture[head + i] = (unsigned char)(40 + (i * 37 + i / SIDE * 91) % 200);
+	const struct memory_file files[] = {{"test.xml", xml, (size_t)n},
+					    {"picture.ppm", picture, (size_t)head + 3 * SIDE * SIDE},
+					    {"wedge.obj", wedge, sizeof wedge - 1},
+					    {"curve.txt", curve, sizeof curve - 1},
+					    {NULL, NULL, 0}};
+	return world_of_files(width, height, files);
+}

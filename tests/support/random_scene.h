@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Scenes that nobody thought of: some shapes with materials drawn from a list, in a room with gaps or on a floor, lamps
+ * and a camera of any kind. A function of the number alone. Everything is a few units large and no lobe is narrower
+ * than the list has it, so that each integrator converges.
+ */
+#ifndef TESTS_SUPPORT_RANDOM_SCENE_H
+#define TESTS_SUPPORT_RANDOM_SCENE_H
+
+#include "worker/render/world/world.h"
+
+#include <stdbool.h>
+
+struct random_scene {
+	char body[1 << 15]; /* between <scene> and </scene>, of 3.x */
+	size_t used;
+	char materials[512];	/* of the list, separated by "; " */
+	bool needs_light_paths; /* some of its light is a beam or a point, whose caustics `path` cannot find */
+};
+
+/* materials: texts as tests/worker/render/bsdf/bsdf_cases.h has them. */
+void random_scene_make(struct random_scene *s, uint64_t number, const char *const *materials, uint32_t count);
+/* The caller frees it. */
+struct world *random_scene_world(const struct random_scene *s, uint32_t width, uint32_t height);
+
+#endif
