@@ -15,6 +15,7 @@
 #include "worker/render/scene/lenient.h"
 
 #include <jansson.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -216,15 +217,17 @@ static void print_text(json_t *all)
 		    "maxDepth", &depth, "shapes", &shapes, "triangles", &triangles, "instances", &instances,
 		    "sharedMeshes", &meshes, "storedTriangles", &stored, "memoryBytes", &memory);
 	bool gltf = strncmp(dialect, "glTF", 4) == 0;
-	printf("%s: %s%s, film %d x %d, field of view %.4g degrees (%s), %lld samples per pixel, paths of at most %d edges\n",
-	       name, gltf ? "" : "Mitsuba ", dialect, width, height, fov, axis, spp, depth);
-	printf("%lld shapes", shapes);
+	printf("%s: %s%s, film %d x %d, field of view %.4g degrees (%s), ", name, gltf ? "" : "Mitsuba ", dialect,
+	       width, height, fov, axis);
+	if (spp)
+		printf("%lld sample%s per pixel, ", spp, spp == 1 ? "" : "s");
+	printf("paths of at most %d edges\n%lld shape%s", depth, shapes, shapes == 1 ? "" : "s");
 	if (instances)
 		printf(" (%lld instances of %lld mesh%s)", instances, meshes, meshes == 1 ? "" : "es");
-	printf(", %lld triangles", triangles);
+	printf(", %lld triangle%s", triangles, triangles == 1 ? "" : "s");
 	if (instances)
 		printf(" (%lld in memory)", stored);
-	printf(", about %.3g MB; calls for", (double)memory * 0x1p-20);
+	printf(", about %.0f MB; calls for", ceil((double)memory * 0x1p-20));
 	json_array_foreach(json_object_get(all, "effects"), i, one)
 		printf("%s %s", i ? "," : "", json_string_value(one));
 	printf("\n");
