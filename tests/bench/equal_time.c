@@ -8,14 +8,16 @@
  * (A - R)(A - S) is the squared error of A, whatever the errors of R and S are. A third figure leaves out the pixels in
  * which these two differ most. HSLT_BENCH_SECONDS: other than 10 for each picture. HSLT_BENCH_REFERENCE: the two take
  * other than ten times that together. HSLT_BENCH_SEEDS: other than 5.
- * HSLT_BENCH_METHODS: only the first so many; with 6 and 7, bdpt8 and erpt too, which are not among those that the
- * default is held against.
+ * HSLT_BENCH_METHODS: only the first so many; with 6, 7 and 8, bdpt8, erpt and erpt4 too, which are not among those
+ * that the default is held against. HSLT_BENCH_RANDOM=0-9: random scenes (tests/support/random_scene.h) instead.
  */
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
+#include "tests/support/random_scene.h"
 #include "tests/support/stats.h"
+#include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/cli/render/local.h"
 #include "worker/render/render.h"
 #include "worker/render/choose.h"
@@ -74,10 +76,11 @@ static const struct method {
 	{"path", "path", NULL},
 	{"bdpt8", "bdpt8", NULL},
 	{"erpt", "erpt", NULL},
+	{"erpt4", "erpt4", NULL},
 	{"breakup", "hslt", "hslt=0.95,bidirectional=0.05"},
 	{"unbroken", "hslt", "halfvec=0.475,multichain=0.475,bidirectional=0.05"},
 };
-enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, PEERS_END = 5, BREAKUP = 7, UNBROKEN = 8 };
+enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, PEERS_END = 5, BREAKUP = 8, UNBROKEN = 9 };
 
 struct shot {
 	struct canvas_image image;
@@ -480,29 +483,58 @@ static unsigned asked(const char *name, unsigned usual, unsigned most)
 	return n < 1 ? usual : n > (long)most ? most : (unsigned)n;
 }
 
+struct lengths {
+	double seconds;
+	unsigned seeds, methods, reference;
+};
+
+/* Frees the world. */
+static void run_scene(struct world *w, const struct trial_scene *s, const struct lengths *l)
+{
+	char says[128];
+	snprintf(says, sizeof says, "%s, %ux%u, %g CPU seconds and %u seeds each", s->name, s->width, s->height,
+		 l->seconds, l->seeds);
+	bench_group("equal-time", says);
+	if (!w) {
+		bench_skip("HSLT_SCENES does not name a folder with this scene");
+		return;
+	}
+	compare_all(w, s, l->seconds, l->seeds, l->methods, l->reference);
+	world_free(w);
+}
+
+/* "3" or "0-9". */
+static void run_random(const char *numbers, const struct lengths *l)
+{
+	static struct random_scene scene;
+	unsigned long first = 0, last = 0;
+	if (sscanf(numbers, "%lu-%lu", &first, &last) == 1)
+		last = first;
+	for (; first <= last; first++) {
+		char name[32];
+		snprintf(name, sizeof name, "random-%lu", first);
+		const struct trial_scene s = {.name = name, .width = 96, .height = 72};
+		random_scene_make(&scene, first, bsdf_cases, BSDF_CASES);
+		run_scene(random_scene_world(&scene, s.width, s.height), &s, l);
+	}
+}
+
 void bench_equal_time(const char *bin)
 {
 	(void)bin;
-	const char *time = getenv("HSLT_BENCH_SECONDS"), *only = getenv("HSLT_BENCH_SCENE");
-	double seconds = time ? atof(time) : 10;
-	unsigned seeds = asked("HSLT_BENCH_SEEDS", 5, SEEDS_MOST),
-		 count = asked("HSLT_BENCH_METHODS", METHODS, METHODS),
-		 times = asked("HSLT_BENCH_REFERENCE", REFERENCE_TIMES, REFERENCE_MOST);
+	const char *time = getenv("HSLT_BENCH_SECONDS"), *only = getenv("HSLT_BENCH_SCENE"),
+		   *random = getenv("HSLT_BENCH_RANDOM");
+	const struct lengths l = {time ? atof(time) : 10, asked("HSLT_BENCH_SEEDS", 5, SEEDS_MOST),
+				  asked("HSLT_BENCH_METHODS", METHODS, METHODS),
+				  asked("HSLT_BENCH_REFERENCE", REFERENCE_TIMES, REFERENCE_MOST)};
+	if (random) {
+		run_random(random, &l);
+		return;
+	}
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		const struct trial_scene *s = &scenes[i];
 		const struct render_options size = {.width = s->width, .height = s->height};
-		char says[128];
-		if (only && strcmp(only, s->name) != 0)
-			continue;
-		snprintf(says, sizeof says, "%s, %ux%u, %g CPU seconds and %u seeds each", s->name, s->width, s->height,
-			 seconds, seeds);
-		bench_group("equal-time", says);
-		struct world *w = bench_world(s->file, s->shipped, &size);
-		if (!w) {
-			bench_skip("HSLT_SCENES does not name a folder with this scene");
-			continue;
-		}
-		compare_all(w, s, seconds, seeds, count, times);
-		world_free(w);
+		if (!only || strcmp(only, s->name) == 0)
+			run_scene(bench_world(s->file, s->shipped, &size), s, &l);
 	}
 }
