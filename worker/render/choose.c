@@ -93,6 +93,8 @@ static const double evi_most = 0.5;
  * cornell-box and 0.5 to 0.9 in veach-mis, where path and bdpt8 win, 2.1 or more in glossy-room, where erpt4 needs 1.8
  * times the time of erpt. */
 static const double path_cost = 0.9;
+/* Where path cannot find all light it must find more of it than this share. */
+static const double missed_little = 0.9;
 
 /* ---- contributions of samples */
 
@@ -219,13 +221,21 @@ static bool has_rare_light(const struct render_choice *c)
 	return c->bdpt.rare > rare_some || (c->path.rare > rare_some && c->bdpt.extreme < lucky_extreme);
 }
 
+/* What path misses is little, and bdpt finds it evenly. */
+static bool misses_little(const struct render_choice *c)
+{
+	return c->found > missed_little && has_no_fireflies(&c->bdpt);
+}
+
 const char *render_choice_of(const struct render_choice *c)
 {
 	if (wants_chains(c))
 		return RENDER_INTEGRATOR_CHAINS;
-	if (render_choice_is_settled(c) || c->misses || has_rare_light(c) || !is_tame(&c->path) ||
+	if (render_choice_is_settled(c) || has_rare_light(c) || !is_tame(&c->path) ||
 	    !(c->path.cost < path_cost * c->bdpt.cost))
 		return "erpt";
+	if (c->misses)
+		return misses_little(c) ? "erpt4" : "erpt";
 	bool is_short = has_no_fireflies(&c->path) && c->path.tail >= tail_least;
 	if (is_short && !c->focuses)
 		return "path";
@@ -237,6 +247,7 @@ const char *render_choice_of(const struct render_choice *c)
 struct pilot {
 	const struct world *w;
 	uint64_t seed, samples;
+	double path_mean; /* contribution of a sample, relative to the brightness there */
 	struct path_context context;
 	struct path_sample sample;
 	struct brightness map;
@@ -360,6 +371,7 @@ static void look_at_path(struct pilot *p, struct render_choice *out)
 {
 	struct tally t = begin_look(p);
 	out->path = look_on(p, STREAM_PATH, 0, p->samples, path_trace, &t);
+	p->path_mean = t.energy / t.samples;
 	out->samples += p->samples;
 }
 
@@ -372,6 +384,7 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 	if (is_clear(out))
 		return;
 	out->bdpt = look_on(p, STREAM_BDPT, few, p->samples, path_trace_both_ways, &t);
+	out->found = t.energy > 0 ? p->path_mean / (t.energy / t.samples) : 0;
 	out->samples += p->samples - few;
 }
 
@@ -523,8 +536,12 @@ static const char *reason(const char *integrator, const struct render_choice *c)
 		return "paths from the camera find the light evenly; as some surfaces may focus it, one sample in eight "
 		       "starts at the lamps, too, which keeps out most fireflies";
 	if (strcmp(integrator, "erpt4") == 0)
-		return "paths from the camera find the light evenly; as some may be bright nevertheless, one sample in "
-		       "four starts at the lamps, too, and what is too bright for a sample is spread by short chains";
+		return c->misses
+			       ? "paths from the camera find the light evenly, but for a little that they cannot find; one "
+				 "sample in four starts at the lamps, too, and short chains spread what is too bright"
+			       : "paths from the camera find the light evenly; as some may be bright nevertheless, one "
+				 "sample in four starts at the lamps, too, and what is too bright for a sample is "
+				 "spread by short chains";
 	if (c->misses)
 		return "paths from the camera cannot find all light, such as that of a point light through glass";
 	return has_no_fireflies(&c->path)

@@ -18,7 +18,8 @@
  * the scene is so narrow that it focuses light, else `bdpt8`, whose light sub-paths, one in eight samples, bound
  * fireflies of reflected light. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of
  * contributions, if the pilot is brief, or if surfaces refract, whose caustics a pilot may miss altogether, it is
- * `erpt4`, whose chains bound fireflies, with a light sub-path in one of four samples.
+ * `erpt4`, whose chains bound fireflies, with a light sub-path in one of four samples. `erpt4` also stands in where
+ * path misses a little of the light, such as that of a point light by a mirror, and bdpt finds that evenly.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -47,6 +48,7 @@ enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 struct render_choice {
 	struct render_found path, bdpt;
 	struct rare_light merged; /* to bdpt, by merging; 0 where no lobe is narrow */
+	double found;		  /* path's mean over bdpt's: the share of the light that path finds; 0: not known */
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe, or
 			     none at all */
 	bool dark;	  /* path finds next to nothing */

@@ -104,6 +104,27 @@ static void a_brief_pilot_and_glass_are_not_left_to_samples_alone(void **state)
 	assert_string_equal(render_choice_of(&c), "path");
 }
 
+/* A point light and a mirror ball in a room: one sample in four is enough for the little that path cannot find. */
+static void little_that_path_misses_needs_few_light_paths(void **state)
+{
+	(void)state;
+	const struct render_choice easy = {
+		.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .found = 0.98, .misses = true, .focuses = true};
+	struct render_choice c = easy;
+	assert_string_equal(render_choice_of(&c), "erpt4");
+	c.found = 0.85; /* not so little */
+	assert_string_equal(render_choice_of(&c), "erpt");
+	c = easy;
+	c.bdpt.tail = 1.9; /* nor is it found evenly, */
+	assert_string_equal(render_choice_of(&c), "erpt");
+	c = easy;
+	c.bdpt.most = 0.04; /* or a sample of it is a firefly, */
+	assert_string_equal(render_choice_of(&c), "erpt");
+	c = easy;
+	c.path.cost = 1.9; /* or all of it costs as much. */
+	assert_string_equal(render_choice_of(&c), "erpt");
+}
+
 /* Whatever the others say; not a share as in scenes where bdpt is the best. */
 static void light_that_is_rare_by_merging_needs_chains(void **state)
 {
@@ -176,6 +197,7 @@ static void the_reason_is_a_sentence_without_figures(void **state)
 		{"path", {.path = {1, 0, 4, 4, 0, 0}}, "find the light evenly, and no surface focuses it"},
 		{"bdpt8", {.path = {1, 0, 4, 4, 0, 0}, .focuses = true}, "one sample in eight starts at the lamps"},
 		{"erpt4", {.path = {1, 0, 1.2, 2, 0.3, 0}}, "one sample in four starts at the lamps"},
+		{"erpt4", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "a little that they cannot find"},
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}}, "less noise in the same time"},
 		{"erpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .settled = true}, "leave fireflies"},
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "cannot find all light"},
@@ -198,6 +220,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(the_rule),
 		cmocka_unit_test(a_brief_pilot_and_glass_are_not_left_to_samples_alone),
+		cmocka_unit_test(little_that_path_misses_needs_few_light_paths),
 		cmocka_unit_test(light_that_is_rare_by_merging_needs_chains),
 		cmocka_unit_test(light_that_photons_see_is_not_rare),
 		cmocka_unit_test(what_is_settled_is_the_same_with_bdpt),

@@ -77,9 +77,9 @@ json_t *choice_to_json(const struct choice *c)
 	if (!c->made)
 		return json_null();
 	const struct render_choice *f = &c->found;
-	return json_pack("{s:s s:o s:I s:f s:b s:b s:b s:f s:o s:o}", "why", c->text, "considered",
+	return json_pack("{s:s s:o s:I s:f s:b s:b s:b s:f s:f s:o s:o}", "why", c->text, "considered",
 			 considered_to_json(), "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds,
 			 "pathMissesLight", (int)f->misses, "surfacesFocusLight", (int)f->focuses, "surfacesRefract",
-			 (int)f->refracts, "mergedRareShare", f->merged.share, "path", found_to_json(&f->path), "bdpt",
-			 f->settled ? json_null() : found_to_json(&f->bdpt));
+			 (int)f->refracts, "mergedRareShare", f->merged.share, "shareFoundByPath", f->found, "path",
+			 found_to_json(&f->path), "bdpt", f->settled ? json_null() : found_to_json(&f->bdpt));
 }
