@@ -8,7 +8,7 @@
  * Level: that of tests/support/agree.h for each comparison. Where groups seldom find something bright, their means are
  * skewed and t is not to be trusted: what differs is compared again, with other seeds and 16 times the samples, and
  * must differ again. Power: the bias of the mean that is found with 95 % probability stands in the row. A plain run has
- * six scenes and is there for what breaks altogether; HSLT_TEST_ROWS=1 has 24 with 4 times the samples, FULL=1 100 with
+ * four scenes and is there for what breaks altogether; HSLT_TEST_ROWS=1 has 24 with 4 times the samples, FULL=1 40 with
  * 16 times. SCENES=7 or SCENES=100-200 chooses others.
  */
 #include "worker/render/render.h"
@@ -64,6 +64,15 @@ static void compare(const struct trial *t, const char *side, const char *integra
 		printf("%s: %s\n%s\n", t->name, t->scene.materials, t->scene.body);
 }
 
+/* In some scene a lamp is in a box, or shines away from everything. */
+static bool is_black(const struct agree_image *a)
+{
+	for (uint32_t g = 0; g < a->groups; g++)
+		if (!(a->mean[g][AGREE_CELLS] > 0))
+			return true;
+	return false;
+}
+
 static void compare_scene(uint64_t number)
 {
 	static struct trial t;
@@ -71,6 +80,11 @@ static void compare_scene(uint64_t number)
 	random_scene_make(&t.scene, number, bsdf_cases, BSDF_CASES);
 	struct world *w = random_scene_world(&t.scene, 32, 24);
 	render(&t, "reference", "bdpt", BDPT_SPP, 1, w, &t.reference);
+	if (is_black(&t.reference)) {
+		printf("random scene %s has next to no light\n", t.name);
+		world_free(w);
+		return;
+	}
 	if (!t.scene.needs_light_paths)
 		compare(&t, "path", "path", 128, w);
 	compare(&t, "bdpt8", "bdpt8", 96, w);
@@ -90,7 +104,7 @@ static void test_random(void **state)
 {
 	(void)state;
 	const char *scenes = getenv("SCENES");
-	unsigned long long first = 0, last = test_full() ? 99 : getenv("HSLT_TEST_ROWS") ? 23 : 5;
+	unsigned long long first = 0, last = test_full() ? 39 : getenv("HSLT_TEST_ROWS") ? 23 : 3;
 	if (scenes && sscanf(scenes, "%llu-%llu", &first, &last) == 1)
 		last = first;
 	for (unsigned long long i = first; i <= last; i++)

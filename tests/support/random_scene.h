@@ -14,7 +14,7 @@
 struct random_scene {
 	char body[1 << 15]; /* between <scene> and </scene>, of 3.x */
 	size_t used;
-	char materials[512];	/* of the list, separated by "; " */
+	char materials[1024];	/* of the list, separated by "; " */
 	bool needs_light_paths; /* some of its light is a beam or a point, whose caustics `path` cannot find */
 };
 
