@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Writes the XML piece by piece: camera, walls, shapes, environment, lamp, beam. A material's text ("mask opacity=0.3 |
+ * plastic") becomes nested elements. What does not fit into the body fails the test.
+ */
 #include "tests/support/random_scene.h"
 
 #include "tests/support/append.h"
