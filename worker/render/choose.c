@@ -93,7 +93,8 @@ static const double evi_most = 0.5;
  * cornell-box and 0.5 to 0.9 in veach-mis, where path and bdpt8 win, 2.1 or more in glossy-room, where erpt4 needs 1.8
  * times the time of erpt. */
 static const double path_cost = 0.9;
-/* Where path cannot find all light it must find more of it than this share. */
+/* Where path cannot find all light it must find more of it than this share. It is 0.97 and 0.98 in random scenes where
+ * erpt4 needs 0.50 and 0.90 of the time of erpt, and 0.90 in one where it needs 1.2 times that. */
 static const double missed_little = 0.9;
 
 /* ---- contributions of samples */

@@ -52,7 +52,7 @@ vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double fi
 bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, double *film_x, double *film_y);
 /* The same for all x_k. */
 double camera_jac_film_from_solid(const struct camera *c, vec3 d);
-/* Along d from x_k, where the near and far planes are. */
+/* Along d from x_k, in units of d, where the near and far planes are. d points forward. */
 void camera_clip(const struct camera *c, vec3 d, double *t_min, double *t_max);
 
 #endif

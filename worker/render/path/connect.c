@@ -138,7 +138,7 @@ static bool seen_by_camera(const struct path_context *c, const struct path_verte
 	if (!(vec3_dot(camera->axes.n, d) > 0))
 		return false;
 	double t_min, t_max;
-	camera_clip(camera, d, &t_min, &t_max); /* units of d */
+	camera_clip(camera, d, &t_min, &t_max);
 	struct ray_end from = end_of(eye), to = end_of(b);
 	struct ray_hit hit;
 	if (endless)
