@@ -503,18 +503,15 @@ static void run_scene(struct world *w, const struct trial_scene *s, const struct
 	world_free(w);
 }
 
-/* "3" or "0-9". */
 static void run_random(const char *numbers, const struct lengths *l)
 {
 	static struct random_scene scene;
-	unsigned long first = 0, last = 0;
-	if (sscanf(numbers, "%lu-%lu", &first, &last) == 1)
-		last = first;
-	for (; first <= last; first++) {
+	uint64_t number, last;
+	for (random_scene_range(numbers, &number, &last); number <= last; number++) {
 		char name[32];
-		snprintf(name, sizeof name, "random-%lu", first);
+		snprintf(name, sizeof name, "random-%llu", (unsigned long long)number);
 		const struct trial_scene s = {.name = name, .width = 96, .height = 72};
-		random_scene_make(&scene, first, bsdf_cases, BSDF_CASES);
+		random_scene_make(&scene, number, bsdf_cases, BSDF_CASES);
 		run_scene(random_scene_world(&scene, s.width, s.height), &s, l);
 	}
 }

@@ -74,3 +74,39 @@ void node_add_transform(struct arena *a, struct scene_node *n, const char *name,
 {
 	add(a, n, name, (struct value){.type = VALUE_TRANSFORM, .as.transform = transform});
 }
+
+/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard". */
+static struct scene_node *part(struct arena *a, char *text)
+{
+	char *first = strstr(text, "texture "), *second = first ? strstr(first + 1, " texture ") : NULL;
+	if (!first)
+		return node_make(a, PLUGIN_BSDF, text);
+	if (second)
+		*second = 0;
+	struct scene_node *n = node_make(a, PLUGIN_TEXTURE, first + strlen("texture "));
+	if (second)
+		node_add_child(a, n, node_make(a, PLUGIN_TEXTURE, second + strlen(" texture ")));
+	return n;
+}
+
+/* " @alpha checkerboard": a texture of that name. Any other is a child without one. */
+static void add_part(struct arena *a, struct scene_node *n, char *text)
+{
+	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;
+	if (!space) {
+		node_add_child(a, n, part(a, text));
+		return;
+	}
+	*space = 0;
+	node_add_ref(a, n, at + 1, node_make(a, PLUGIN_TEXTURE, space + 1));
+}
+
+struct scene_node *node_bsdf(struct arena *a, const char *text)
+{
+	char copy[256], *rest = copy;
+	snprintf(copy, sizeof copy, "%s", text);
+	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
+	for (char *child; (child = strtok_r(NULL, "|", &rest));)
+		add_part(a, n, child);
+	return n;
+}

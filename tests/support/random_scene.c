@@ -1,18 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Writes the XML piece by piece: camera, walls, shapes, environment, lamp, beam. A material's text ("mask opacity=0.3 |
- * plastic") becomes nested elements. What does not fit into the body fails the test.
+ * Writes the XML piece by piece: camera, walls, shapes, environment, lamp, beam. A material's nodes
+ * become nested elements. What does not fit into the body fails the test.
  */
 #include "tests/support/random_scene.h"
 
 #include "tests/support/append.h"
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
+#include "tests/support/nodes.h"
 #include "tests/support/worlds.h"
 
+#include <setjmp.h>
+#include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include <cmocka.h>
 
 struct maker {
 	struct random_scene *s;
@@ -49,55 +53,45 @@ static void put_rgb(struct maker *m, const char *name, double low, double high)
 	put_between(m, "", low, high, "'/>");
 }
 
-/* "name=value" as an element: a colour, a number, a truth value, or a text. */
-static void put_value(struct maker *m, char *word)
+static void put_node(struct maker *m, const struct scene_node *n, const char *name);
+
+static void put_property(struct maker *m, const struct property *p)
 {
-	char *value = strchr(word, '='), *end;
-	*value++ = 0;
-	double rgb[3];
-	if (sscanf(value, "rgb(%lf,%lf,%lf)", &rgb[0], &rgb[1], &rgb[2]) == 3)
-		PUT(m, "<rgb name='%s' value='%g,%g,%g'/>", word, rgb[0], rgb[1], rgb[2]);
-	else if (strtod(value, &end), *end == 0)
-		PUT(m, "<float name='%s' value='%s'/>", word, value);
-	else if (strcmp(value, "true") == 0 || strcmp(value, "false") == 0)
-		PUT(m, "<boolean name='%s' value='%s'/>", word, value);
-	else
-		PUT(m, "<string name='%s' value='%s'/>", word, value);
+	const struct value *v = &p->value;
+	switch (v->type) {
+	case VALUE_RGB:
+		PUT(m, "<rgb name='%s' value='%.17g,%.17g,%.17g'/>", p->name, v->as.rgb[0], v->as.rgb[1], v->as.rgb[2]);
+		break;
+	case VALUE_FLOAT:
+		PUT(m, "<float name='%s' value='%.17g'/>", p->name, v->as.number);
+		break;
+	case VALUE_BOOL:
+		PUT(m, "<boolean name='%s' value='%s'/>", p->name, v->as.boolean ? "true" : "false");
+		break;
+	case VALUE_STRING:
+		PUT(m, "<string name='%s' value='%s'/>", p->name, v->as.string);
+		break;
+	case VALUE_NODE:
+		put_node(m, v->as.node, p->name);
+		break;
+	default:
+		fail_msg("%s has a value that materials of tests have not", p->name);
+	}
 }
 
-/* Words up to the next "texture" or the end; an object's element is left open. */
-static void put_object(struct maker *m, const char *element, const char *name, char **rest)
+/* name: NULL if it has none. */
+static void put_node(struct maker *m, const struct scene_node *n, const char *name)
 {
-	PUT(m, "<%s type='%s'", element, strtok_r(NULL, " ", rest));
+	const char *element = n->cls == PLUGIN_BSDF ? "bsdf" : "texture";
+	PUT(m, "<%s type='%s'", element, n->type);
 	if (name)
 		PUT(m, " name='%s'", name);
 	PUT(m, ">");
-	for (char *word; (word = strtok_r(NULL, " ", rest));) {
-		if (strcmp(word, "texture") == 0) {
-			put_object(m, "texture", NULL, rest);
-			PUT(m, "</texture>");
-			return;
-		}
-		put_value(m, word);
-	}
-}
-
-/* What stands between two bars: a BSDF, "texture ...", or "@name ..." for a texture of that name. */
-static void put_part(struct maker *m, char *text)
-{
-	char *rest = text + strspn(text, " ");
-	if (*rest == '@') {
-		char *name = strtok_r(NULL, " ", &rest);
-		put_object(m, "texture", name + 1, &rest);
-		PUT(m, "</texture>");
-	} else if (strncmp(rest, "texture ", 8) == 0) {
-		strtok_r(NULL, " ", &rest);
-		put_object(m, "texture", NULL, &rest);
-		PUT(m, "</texture>");
-	} else {
-		put_object(m, "bsdf", NULL, &rest);
-		PUT(m, "</bsdf>");
-	}
+	for (uint32_t i = 0; i < n->property_count; i++)
+		put_property(m, &n->properties[i]);
+	for (uint32_t i = 0; i < n->child_count; i++)
+		put_node(m, n->children[i], NULL);
+	PUT(m, "</%s>", element);
 }
 
 static void put_material(struct maker *m)
@@ -105,13 +99,9 @@ static void put_material(struct maker *m)
 	const char *chosen = m->materials[dice_below(&m->d, m->count)];
 	size_t used = strlen(m->s->materials);
 	append(m->s->materials, sizeof m->s->materials, &used, "%s%s", used ? "; " : "", chosen);
-	char copy[256], *bar = copy;
-	snprintf(copy, sizeof copy, "%s", chosen);
-	char *first = strtok_r(NULL, "|", &bar);
-	put_object(m, "bsdf", NULL, &first);
-	for (char *part; (part = strtok_r(NULL, "|", &bar));)
-		put_part(m, part);
-	PUT(m, "</bsdf>");
+	struct arena a = {0};
+	put_node(m, node_bsdf(&a, chosen), NULL);
+	arena_fini(&a);
 }
 
 /* Of shapes of about the unit ball: stretched, turned, and put into a box around (0, y, 0). */
@@ -349,4 +339,12 @@ struct world *random_scene_world(const struct random_scene *s, uint32_t width, u
 					    {"curve.txt", curve, sizeof curve - 1},
 					    {NULL, NULL, 0}};
 	return world_of_files(width, height, files);
+}
+
+void random_scene_range(const char *text, uint64_t *first, uint64_t *last)
+{
+	unsigned long long a = 0, b = 0;
+	int n = sscanf(text, "%llu-%llu", &a, &b);
+	*first = a;
+	*last = n == 2 ? b : a;
 }

@@ -18,8 +18,10 @@ struct random_scene {
 	bool needs_light_paths; /* some of its light is a beam or a point, whose caustics `path` cannot find */
 };
 
-/* materials: texts as tests/worker/render/bsdf/bsdf_cases.h has them. */
+/* materials: texts for node_bsdf (tests/support/nodes.h). */
 void random_scene_make(struct random_scene *s, uint64_t number, const char *const *materials, uint32_t count);
+/* "3" or "0-9". */
+void random_scene_range(const char *text, uint64_t *first, uint64_t *last);
 /* The caller frees it. */
 struct world *random_scene_world(const struct random_scene *s, uint32_t width, uint32_t height);
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The BSDFs that the generic tests run over: several parameter sets each, as text (see tests/support/nodes.h), nested
- * ones after '|', textures after the word "texture" or, with a name, "@NAME". A BSDF of the registry without a set here
- * fails the tests.
+ * The BSDFs that the generic tests run over: several parameter sets each, as text (see node_bsdf in
+ * tests/support/nodes.h). A BSDF of the registry without a set here fails the tests.
  */
 #ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
 #define TESTS_WORKER_BSDF_BSDF_CASES_H
@@ -139,48 +138,10 @@ static const char *const bsdf_cases[] = {
 };
 enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
 
-/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard". */
-static inline struct scene_node *bsdf_child(struct arena *a, char *text)
-{
-	char *first = strstr(text, "texture "), *second = first ? strstr(first + 1, " texture ") : NULL;
-	if (!first)
-		return node_make(a, PLUGIN_BSDF, text);
-	if (second)
-		*second = 0;
-	struct scene_node *n = node_make(a, PLUGIN_TEXTURE, first + strlen("texture "));
-	if (second)
-		node_add_child(a, n, node_make(a, PLUGIN_TEXTURE, second + strlen(" texture ")));
-	return n;
-}
-
-/* " @alpha checkerboard": a texture of that name. Any other is a child without one. */
-static inline void bsdf_add_child(struct arena *a, struct scene_node *n, char *text)
-{
-	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;
-	if (!space) {
-		node_add_child(a, n, bsdf_child(a, text));
-		return;
-	}
-	*space = 0;
-	char *name = arena_alloc(a, strlen(at), 1);
-	memcpy(name, at + 1, strlen(at));
-	node_add_ref(a, n, name, node_make(a, PLUGIN_TEXTURE, space + 1));
-}
-
-static inline struct scene_node *bsdf_node(struct arena *a, const char *text)
-{
-	char copy[256], *rest = copy;
-	snprintf(copy, sizeof copy, "%s", text);
-	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
-	for (char *child; (child = strtok_r(NULL, "|", &rest));)
-		bsdf_add_child(a, n, child);
-	return n;
-}
-
 static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
 {
 	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3};
-	return bsdf_create(b, bsdf_node(a, text), &build, e);
+	return bsdf_create(b, node_bsdf(a, text), &build, e);
 }
 
 static inline void bsdf_make(struct arena *a, const char *text, struct bsdf *b)

@@ -293,7 +293,7 @@ static void test_equal_boundaries_share_a_table(void **state)
 	for (int i = 0; i < COUNT; i++) {
 		struct bsdf b = {.alpha = INFINITY};
 		struct error e;
-		struct scene_node *n = bsdf_node(&a, all[i].text);
+		struct scene_node *n = node_bsdf(&a, all[i].text);
 		assert_int_equal(rough_boundary_read(&r[i], all[i].eta, &b, n, &build, &e), 0);
 		assert_int_equal(rough_boundary_read(&own, all[i].eta, &b, n, &alone, &e), 0);
 		for (int k = 0; k < i; k++)

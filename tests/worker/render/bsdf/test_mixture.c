@@ -149,10 +149,10 @@ static void test_two_sides_of_two_sides(void **state)
 	struct error e;
 	struct dice d = dice_of("two sides");
 	size_t seen = 0;
-	struct scene_node *outer = bsdf_node(&a, "twosided"), *layer = bsdf_node(&a, "coating int_ior=1.3"),
-			  *over = bsdf_node(&a, "twosided");
-	node_add_child(&a, outer, bsdf_node(&a, "twosided | roughconductor alpha=0.3 | diffuse reflectance=0.2"));
-	node_add_child(&a, layer, bsdf_node(&a, "twosided | roughconductor alpha=0.3"));
+	struct scene_node *outer = node_bsdf(&a, "twosided"), *layer = node_bsdf(&a, "coating int_ior=1.3"),
+			  *over = node_bsdf(&a, "twosided");
+	node_add_child(&a, outer, node_bsdf(&a, "twosided | roughconductor alpha=0.3 | diffuse reflectance=0.2"));
+	node_add_child(&a, layer, node_bsdf(&a, "twosided | roughconductor alpha=0.3"));
 	node_add_child(&a, over, layer);
 	bsdf_make(&a, "twosided | roughconductor alpha=0.3", &front);
 	bsdf_make(&a, "coating int_ior=1.3 | roughconductor alpha=0.3", &coated);

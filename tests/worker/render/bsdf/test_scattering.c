@@ -437,7 +437,7 @@ static void test_out_of_memory_is_an_answer(void **state)
 	(void)state;
 	struct arena nodes = {0};
 	for (int k = 0; k < BSDF_CASES; k++) {
-		const struct scene_node *n = bsdf_node(&nodes, bsdf_cases[k]);
+		const struct scene_node *n = node_bsdf(&nodes, bsdf_cases[k]);
 		int code = -ENOMEM;
 		for (size_t limit = 1; code; limit += 64) {
 			struct arena a = {.limit = limit};

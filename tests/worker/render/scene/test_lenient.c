@@ -87,7 +87,7 @@ static void test_covers(void **state)
 		struct arena a = {0};
 		struct bsdf b;
 		struct error e;
-		bool goes = lenient_uncovered(bsdf_node(&a, covers[i].text)) != NULL,
+		bool goes = lenient_uncovered(node_bsdf(&a, covers[i].text)) != NULL,
 		     refused = bsdf_try(&a, covers[i].text, true, &b, &e) < 0;
 		if (goes != covers[i].goes || refused != covers[i].goes)
 			fail_msg("%s is %ssupported and %s", covers[i].text, refused ? "not " : "",
