@@ -2,6 +2,7 @@
 #include "common/exr/exr_check.h"
 
 #include <stdio.h>
+#include <string.h>
 
 #define VALUES_MOST (INT64_C(1) << 30)
 
@@ -34,6 +35,17 @@ static int64_t pixel_bytes(const exr_attr_chlist_t *list)
 bool exr_is_dwa(exr_compression_t c)
 {
 	return c == EXR_COMPRESSION_DWAA || c == EXR_COMPRESSION_DWAB;
+}
+
+static void read_primaries(exr_context_t x, struct exr_image *img)
+{
+	exr_attr_chromaticities_t c;
+	if (exr_attr_get_chromaticities(x, 0, "chromaticities", &c) != EXR_ERR_SUCCESS)
+		return;
+	img->has_primaries = true;
+	memcpy(img->primaries,
+	       (float[]){c.red_x, c.red_y, c.green_x, c.green_y, c.blue_x, c.blue_y, c.white_x, c.white_y},
+	       sizeof img->primaries);
 }
 
 int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limits *most, struct exr_image *img,
@@ -74,6 +86,7 @@ int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limi
 	img->y = dy > 0 ? (uint32_t)dy : 0;
 	img->full_width = (uint32_t)((int64_t)display.max.x - display.min.x + 1);
 	img->full_height = (uint32_t)((int64_t)display.max.y - display.min.y + 1);
+	read_primaries(x, img);
 	*tiled = storage == EXR_STORAGE_TILED;
 	return check_channels(channels, img, e);
 }

@@ -7,6 +7,7 @@
 
 #include "common/base/error.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -26,6 +27,8 @@ struct exr_image {
 	uint32_t full_width, full_height, x, y; /* the display window, and the data window's corner */
 	char names[EXR_CHANNELS_MOST][32];	/* "R", "error.G", sorted by the library */
 	float *planes[EXR_CHANNELS_MOST];	/* [height][width] each */
+	bool has_primaries;			/* when read: the header says what R, G and B are */
+	float primaries[8];			/* CIE 1931 x, y of red, green, blue and white, as stored */
 	size_t attribute_count;
 	struct exr_attribute *attributes; /* when read: all hslt:* attributes of these types; owned */
 };

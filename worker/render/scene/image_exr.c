@@ -3,6 +3,7 @@
 
 #include "common/exr/exr_dwa.h"
 #include "common/exr/exr_read.h"
+#include "worker/render/scene/primaries.h"
 
 #include <math.h>
 
@@ -26,6 +27,36 @@ static int copy_planes(const struct image_input *in, const struct exr_image *x, 
 	return r;
 }
 
+/* Colours in another space, such as ACEScg, become those of BT.709, whose negative ones are out of its gamut. */
+static int convert(const struct image_input *in, const struct exr_image *x, struct image *out)
+{
+	struct primaries p;
+	double m[3][3];
+	if (!x->has_primaries || out->channels != 3)
+		return 0;
+	for (int k = 0; k < 4; k++) {
+		p.x[k] = x->primaries[2 * k];
+		p.y[k] = x->primaries[2 * k + 1];
+	}
+	if (primaries_are_bt709(&p))
+		return 0;
+	if (!primaries_to_bt709(&p, m))
+		return error_set(in->error, EBADMSG, "%s: OpenEXR: no colours have the chromaticities in its header",
+				 in->name);
+	for (size_t i = 0; i < (size_t)out->width * out->height; i++) {
+		float *to = out->pixels + 3 * i;
+		const double from[3] = {to[0], to[1], to[2]};
+		for (int k = 0; k < 3; k++) {
+			to[k] = (float)(m[k][0] * from[0] + m[k][1] * from[1] + m[k][2] * from[2]);
+			if (!isfinite(to[k]))
+				return error_set(in->error, EBADMSG,
+						 "%s: OpenEXR: pixel (%zu, %zu) is not finite in BT.709", in->name,
+						 i % out->width, i / out->width);
+		}
+	}
+	return 0;
+}
+
 int image_decode_exr(const struct image_input *in, struct image *out)
 {
 	struct exr_image x = {0};
@@ -35,6 +66,8 @@ int image_decode_exr(const struct image_input *in, struct image *out)
 	if (r)
 		return error_prefix(in->error, r, "%s", in->name);
 	r = copy_planes(in, &x, out);
+	if (!r)
+		r = convert(in, &x, out);
 	exr_image_fini(&x);
 	return r;
 }
