@@ -34,10 +34,7 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 /* A scene that asks for a part of the light, or for something other than light, gets another image, which is noted. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
-	static const char *const others[] = {"direct",
-					     "direct_projective",
-					     "direct_reparam",
-					     "emission_reparam",
+	static const char *const others[] = {"emission_reparam",
 					     "volpath",
 					     "volpathmis",
 					     "prbvolpath",
@@ -58,10 +55,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e, "the image shows all light on surfaces, without media%s",
-				    strncmp(n->type, "direct", strlen("direct")) == 0
-					    ? "; --max-depth 2 omits indirect light"
-					    : "");
+			rc = remark(r, n, e, "the image shows all light on surfaces, without media");
 	return rc ? rc : on_depth(r, n, e);
 }
 

@@ -19,23 +19,30 @@
 #include <string.h>
 
 enum { FILM_PIXELS_MAX = 1 << 28, RADIUS_MAX = 64 };
-enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
+enum { ROULETTE_DEPTH = 5, DIRECT_DEPTH = 2 }; /* Mitsuba's */
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
 #define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 #define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
 
-/* For both cameras. Shutters have no effect, because nothing moves. */
-#define CAMERA_PARAMS                                                                                             \
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                      \
-		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},                \
-		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},           \
-		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, {"shutter_open", IGNORED}, {"shutter_close", IGNORED}, \
-		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                                        \
-		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)},                                        \
-	{                                                                                                         \
-		"srf", REFUSED                                                                                    \
+/* No effect, because nothing moves. */
+#define SHUTTER_PARAMS                                                                            \
+	{"shutter_open", IGNORED}, {"shutter_close", IGNORED}, {"rolling_shutter_type", IGNORED}, \
+	{                                                                                         \
+		"rolling_shutter_duration", IGNORED                                               \
+	}
+/* For both cameras. Pixels are sampled all over, and textures are not filtered, whatever jitter and cone_scale say. */
+#define CAMERA_PARAMS                                                                                   \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},            \
+		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},      \
+		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, \
+		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS,                              \
+		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                              \
+		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)}, {"jitter", IGNORED},         \
+		{"cone_scale", IGNORED},                                                                \
+	{                                                                                               \
+		"srf", REFUSED                                                                          \
 	}
 
 static const struct param perspective_params[] = {
@@ -55,15 +62,15 @@ static const struct param orthographic_params[] = {
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
 	{"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
 	{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
-	{"shutter_open", IGNORED},
-	{"shutter_close", IGNORED},
+	SHUTTER_PARAMS,
 	{"focus_distance", IGNORED},
+	{"jitter", IGNORED},
+	{"cone_scale", IGNORED},
 	{"srf", REFUSED},
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
-static const struct param batch_params[] = {
-	{"shutter_open", IGNORED}, {"shutter_close", IGNORED}, {"srf", REFUSED}, {NULL, 0, 0, 0, 0, NULL}};
+static const struct param batch_params[] = {SHUTTER_PARAMS, {"srf", REFUSED}, {NULL, 0, 0, 0, 0, NULL}};
 
 static const struct param film_params[] = {
 	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
@@ -230,7 +237,12 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 	return 0;
 }
 
-/* The innermost one has it, as in Mitsuba. */
+static bool is_direct(const struct scene_node *integrator)
+{
+	return strncmp(integrator->type, "direct", strlen("direct")) == 0;
+}
+
+/* The innermost one has it, as in Mitsuba, whose `direct` shows light that is scattered once. */
 static int read_depth(const struct scene *s, struct scene_settings *out, struct error *e)
 {
 	uint32_t count;
@@ -244,7 +256,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	snprintf(out->integrator, sizeof out->integrator, "%s", integrator->type);
 	int64_t depth = -1, roulette = ROULETTE_DEPTH;
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
-		depth = node_int(n, "max_depth", depth);
+		depth = node_int(n, "max_depth", is_direct(n) ? DIRECT_DEPTH : depth);
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
 		roulette = node_int(n, "rr_depth", roulette);
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An image file. (u,v) = (0,0) is the upper left corner of the image in both dialects: Mitsuba's OBJ loaders invert v
- * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Linear rgb is interpolated; trilinear
- * and ewa of 0.5/0.6 become bilinear, since there are no footprints: sampling does the filtering. `isotropic` and
+ * (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Linear rgb is interpolated; trilinear,
+ * anisotropic and ewa become bilinear, since there are no footprints: sampling does the filtering. `isotropic` and
  * `none` are names of before 0.5.
  */
 #include "common/base/color.h"
@@ -186,7 +186,9 @@ static const struct param bitmap_params[] = {
 	RASTER_PARAMS,
 	UV_PARAMS,
 	{.name = "coordinates", .types = VALUE_STRING},
-	{.name = "filter_type", .types = VALUE_STRING, .choices = "bilinear|nearest|trilinear|ewa|isotropic|none"},
+	{.name = "filter_type",
+	 .types = VALUE_STRING,
+	 .choices = "bilinear|nearest|trilinear|anisotropic|ewa|isotropic|none"},
 	{.name = "wrap_mode", .types = VALUE_STRING, .choices = WRAP_MODES},
 	{.name = "wrap_mode_u", .types = VALUE_STRING, .choices = WRAP_MODES},
 	{.name = "wrap_mode_v", .types = VALUE_STRING, .choices = WRAP_MODES},

@@ -122,6 +122,13 @@ static void test_sampler_and_integrator(void **state)
 		assert_int_equal(read_ok(before, "").max_depth, depths[i].want);
 		assert_int_equal(read_ok(before, "").roulette_depth, 5);
 	}
+	assert_int_equal(read_ok("<integrator type='direct'/>", "").max_depth, 2);
+	assert_int_equal(
+		read_ok("<integrator type='moment'><integrator type='direct_projective'/></integrator>", "").max_depth,
+		2);
+	assert_int_equal(
+		read_ok("<integrator type='direct'><integer name='max_depth' value='1'/></integrator>", "").max_depth,
+		1);
 }
 
 static void test_camera(void **state)
@@ -174,10 +181,8 @@ static void test_notes_on_the_whole(void **state)
 	} cases[] = {
 		{"<sensor type='perspective'/>",
 		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
-		{"<integrator type='direct'/>",
-		 "s.xml:1: <integrator type=\"direct\">: the image shows all light on surfaces, without media; --max-depth 2 omits indirect light"},
-		{"<integrator type='volpath'/>", "without media"},
-		{"<integrator type='direct_projective'/>", "without media; --max-depth 2 omits indirect light"},
+		{"<integrator type='volpath'/>",
+		 "s.xml:1: <integrator type=\"volpath\">: the image shows all light on surfaces, without media"},
 		{"<integrator type='multichannel'/>", "the image shows all light on surfaces"},
 		{"<integrator type='volprim_rf_basic'/>", "the image shows all light on surfaces"},
 	};
