@@ -31,6 +31,7 @@
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/snake_case.h"
+#include "worker/render/scene/texture_names.h"
 #include "worker/render/scene/transform.h"
 #include "worker/render/scene/value.h"
 #include "worker/render/scene/xml.h"
@@ -503,16 +504,6 @@ static int list_assets(struct maker *m)
 	return 0;
 }
 
-/* In 3.x a texture may be written as a spectrum, which is a texture of one colour there. */
-static void name_textures(const struct maker *m, struct xml_element *el)
-{
-	const char *type = xml_attribute(el, "type");
-	if (!el->snake && type && strcmp(el->name, "spectrum") == 0 && plugin_find(m->decls, PLUGIN_TEXTURE, type))
-		el->name = "texture";
-	for (struct xml_element *c = el->first; c; c = c->next)
-		name_textures(m, c);
-}
-
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
@@ -521,7 +512,7 @@ static int make_scene(struct maker *m)
 		return out_of_memory(m);
 	s->dialect_3 = m->tree->dialect_3;
 	s->objects = objects;
-	name_textures(m, m->tree->root);
+	texture_names_settle(m->decls, m->tree->root);
 	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
 	if (!r)
 		r = obj_materials_spread(m->tree, &m->ids, m->assets_from, &m->assets, &m->scene->arena, &m->report,

@@ -285,12 +285,28 @@ static int read_irregular(const struct xml_element *el, struct arena *arena, str
 			   : xml_error(el, e, EINVAL, "%d wavelengths, but %d values", n, values);
 }
 
+/* What the colour of <rgb name="NAME" value="..."/> is; one number stands for three. */
+static int inner_colour(const struct xml_element *el, const char *name, double scale, struct value *out,
+			struct error *e)
+{
+	const char *text = inner_value(el, name);
+	double *rgb = out->as.rgb;
+	*out = (struct value){.type = VALUE_RGB};
+	int n = text ? number_list(text, rgb, 3) : 0;
+	if (n != 1 && n != 3)
+		return xml_error(el, e, EINVAL, "needs `%s`, three numbers", name);
+	for (int k = 0; k < 3; k++)
+		rgb[k] = scale * rgb[n == 1 ? 0 : k];
+	return 0;
+}
+
+/* Of a colour if it has one: then it is what <rgb> is for light. */
 static int read_d65(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
 {
 	double scale, *nm, *value;
 	int r = inner_number(el, "scale", NULL, 1, &scale, e);
-	if (r)
-		return r;
+	if (r || inner_value(el, "color"))
+		return r ? r : inner_colour(el, "color", scale, out, e);
 	if (!table(el, CIE_COUNT, arena, out, &nm, &value, e))
 		return -ENOMEM;
 	double unit = scale / d65_normalization();
@@ -320,11 +336,16 @@ static int read_inner_blackbody(const struct xml_element *el, struct arena *aren
 static int read_srgb(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
 {
 	(void)arena;
-	const char *text = inner_value(el, "color");
-	*out = (struct value){.type = VALUE_RGB};
-	if (!text || number_list(text, out->as.rgb, 3) != 3)
-		return xml_error(el, e, EINVAL, "needs `color`, three numbers");
-	return 0;
+	return inner_colour(el, "color", 1, out, e);
+}
+
+/* One number, the same at each wavelength, or three. */
+static int read_rawconstant(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	double x[3];
+	const char *text = inner_value(el, "value");
+	return text && number_list(text, x, 3) == 3 ? inner_colour(el, "value", 1, out, e)
+						    : read_uniform(el, arena, out, e);
 }
 
 static const struct {
@@ -334,12 +355,21 @@ static const struct {
 	{"uniform", "value|wavelength_min|wavelength_max|lambda_min|lambda_max", read_uniform},
 	{"regular", "wavelength_min|wavelength_max|lambda_min|lambda_max|values", read_regular},
 	{"irregular", "wavelengths|values", read_irregular},
-	{"d65", "scale", read_d65},
+	{"d65", "scale|color", read_d65},
 	{"blackbody", "temperature|scale|wavelength_min|wavelength_max|lambda_min|lambda_max", read_inner_blackbody},
 	{"srgb", "color", read_srgb},
 	{"rgb", "color", read_srgb},
+	{"rawconstant", "value", read_rawconstant},
 };
 enum { TYPES = sizeof types / sizeof *types };
+
+bool spectral_is_type(const char *type)
+{
+	for (int i = 0; i < TYPES; i++)
+		if (strcmp(types[i].type, type) == 0)
+			return true;
+	return false;
+}
 
 static bool is_listed(const char *list, const char *wanted)
 {

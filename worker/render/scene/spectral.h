@@ -11,8 +11,11 @@
 #include "worker/render/scene/node.h"
 #include "worker/render/scene/xml.h"
 
+#include <stdbool.h>
+
 enum { SPECTRAL_POINTS_MAX = 65536 };
 
+bool spectral_is_type(const char *type); /* of <spectrum type="..."> */
 /* A <spectrum>; *out may also become an rgb colour (three numbers in 0.6, type="srgb" and "rgb"). */
 int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena,
 		  struct value *out, struct error *e);

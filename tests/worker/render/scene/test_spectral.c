@@ -95,6 +95,27 @@ static void test_types(void **state)
 	}
 	assert_true(fabs(y / one - 3) < 1e-12);
 	scene_fini(&scene);
+	v = eta_of("3.0.0", "<spectrum name='eta' type='d65'><rgb name='color' value='0.5 0.25 1'/>"
+			    "<float name='scale' value='3'/></spectrum>");
+	assert_true(v->type == VALUE_RGB && v->as.rgb[0] == 1.5 && v->as.rgb[1] == 0.75 && v->as.rgb[2] == 3);
+	scene_fini(&scene);
+}
+
+/* In 3.x a spectrum is a texture of one colour, and may be written so. */
+static void test_textures(void **state)
+{
+	(void)state;
+	const struct value *v =
+		eta_of("3.0.0", "<texture name='eta' type='uniform'><float name='value' value='2.5'/></texture>");
+	assert_true(v->as.spectrum.count == 1 && v->as.spectrum.value[0] == 2.5);
+	scene_fini(&scene);
+	v = eta_of("3.0.0", "<texture name='eta' type='rawconstant'><float name='value' value='0.5'/></texture>");
+	assert_true(v->as.spectrum.count == 1 && v->as.spectrum.value[0] == 0.5);
+	scene_fini(&scene);
+	v = eta_of("3.0.0",
+		   "<texture name='eta' type='rawconstant'><vector name='value' value='0.5 0.25 1'/></texture>");
+	assert_true(v->type == VALUE_RGB && v->as.rgb[0] == 0.5 && v->as.rgb[1] == 0.25 && v->as.rgb[2] == 1);
+	scene_fini(&scene);
 }
 
 /* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: with today's c2 at 2855.5 K;
@@ -143,8 +164,8 @@ static void test_booleans(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_files),	  cmocka_unit_test(test_three_numbers), cmocka_unit_test(test_types),
-		cmocka_unit_test(test_blackbody), cmocka_unit_test(test_booleans),
+		cmocka_unit_test(test_files),	 cmocka_unit_test(test_three_numbers), cmocka_unit_test(test_types),
+		cmocka_unit_test(test_textures), cmocka_unit_test(test_blackbody),     cmocka_unit_test(test_booleans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

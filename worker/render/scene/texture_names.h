@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* One name for what 3.x lets a file write as a texture or as a spectrum: there, a spectrum is a texture of one colour.
+ */
+#ifndef WORKER_RENDER_SCENE_TEXTURE_NAMES_H
+#define WORKER_RENDER_SCENE_TEXTURE_NAMES_H
+
+#include "worker/render/scene/plugin.h"
+#include "worker/render/scene/xml.h"
+
+/* <spectrum type="bitmap"> becomes a <texture>, <texture type="uniform"> a <spectrum>, in all of the tree. */
+void texture_names_settle(const struct plugin_decl *decls, struct xml_element *root);
+
+#endif
