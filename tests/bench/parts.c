@@ -87,7 +87,7 @@ static double splat(const struct setting *s, unsigned i)
 
 static struct bsdf_point point_of(const struct setting *s, unsigned i)
 {
-	return (struct bsdf_point){{.u = s->u[i][0], .v = s->u[i][1]}, &s->wl[i], TRANSPORT_RADIANCE};
+	return (struct bsdf_point){.where = {.u = s->u[i][0], .v = s->u[i][1]}, .w = &s->wl[i]};
 }
 
 static double bsdf_eval(const struct setting *s, unsigned i)

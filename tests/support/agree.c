@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 /* Comparisons in the whole suite, at most: the family-wise level of 1e-4 is shared among them. */
-enum { COMPARISONS = 64 };
+enum { COMPARISONS = 128 };
 #define LEVEL (1e-4 / COMPARISONS)
 
 /* One group: its own bootstrap (chains), all its leases of all rounds. */

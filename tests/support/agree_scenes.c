@@ -247,6 +247,35 @@ static struct world *bright_texel(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
+/* Each material has parts with different normals, some by a bump map with 8 x 8 heights. a = 1: among them glass. */
+static struct world *tilted_parts(const struct agree_case *k)
+{
+	enum { SIDE = 8 };
+	static const char head[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 8\n";
+	static char xml[1 << 12];
+	unsigned char hdr[sizeof head - 1 + 4 * SIDE * SIDE];
+	memcpy(hdr, head, sizeof head - 1);
+	for (size_t i = 0; i < SIDE * SIDE; i++) {
+		unsigned char grey = (unsigned char)(16 + 40 * ((i * i + 3 * i) % 5));
+		memcpy(hdr + sizeof head - 1 + 4 * i, (unsigned char[]){grey, grey, grey, 0x80}, 4);
+	}
+#define DENTED(scale, inner) "<bsdf type='bumpmap'><float name='scale' value='" scale "'/><texture type='bitmap'><string name='filename' value='dents.hdr'/></texture>" inner "</bsdf>"
+#define SLANTED(inner) "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.4,0.9'/><rgb name='color1' value='0.35,0.6,0.9'/></texture>" inner "</bsdf>"
+#define HALVES(a, b) "<bsdf type='blendbsdf'><float name='weight' value='0.5'/>" a b "</bsdf>"
+#define METAL(alpha) "<bsdf type='roughconductor'><float name='alpha' value='" alpha "'/></bsdf>"
+	int n = snprintf(xml, sizeof xml,
+			 "<scene version='3.0.0'>" LOOK_AT_IT SKY
+			 "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/>" TURN) HALVES(DENTED("0.3", GREY("0.7")), SLANTED(METAL("0.3"))) "</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.5'/><translate x='-0.6' y='0.6'/>" TURN) HALVES("%s", DENTED("0.2", "<bsdf type='%s'/>")) "</shape>"
+			 "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='30'/><translate x='0.6' y='0.4'/>" TURN)
+			 "<bsdf type='twosided'>" HALVES(METAL("0.15"), SLANTED("<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>")) "</bsdf></shape>"
+			 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape></scene>",
+			 k->a > 0 ? GLASS("1.5") : METAL("0.1"), k->a > 0 ? "diffuse" : "difftrans");
+	const struct memory_file files[] = {{"test.xml", xml, (size_t)n}, {"dents.hdr", hdr, sizeof hdr}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
 const struct agree_case agree_cases[] = {
 	{"mixed scales", "1 on a floor of 10", on_a_floor, 1, 10, 5, 1024, 512, ALL, 0.02},
 	{"mixed scales", "1 on a floor of 1e6", on_a_floor, 1, 1e6, 5, 1024, 512, ALL, 0.02},
@@ -268,6 +297,8 @@ const struct agree_case agree_cases[] = {
 	{"beams", "of a square and of a disk", beams, 0, 0, 5, 2048, 1024, ALL, 0.02},
 	{"clipped view", "a wall before the near plane", clipped_view, 0, 0, 6, 512, 512, ALL, 0.02},
 	{"clipped view", "a wall behind an orthographic camera", clipped_view, 1, 0, 6, 512, 512, ALL, 0.02},
+	{"tilted parts", "rough metal, paper and plastic", tilted_parts, 0, 0, 5, 512, 512, ALL, 0.02},
+	{"tilted parts", "chalk and glass", tilted_parts, 1, 0, 6, 1024, 1024, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},

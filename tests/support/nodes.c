@@ -75,9 +75,14 @@ void node_add_transform(struct arena *a, struct scene_node *n, const char *name,
 	add(a, n, name, (struct value){.type = VALUE_TRANSFORM, .as.transform = transform});
 }
 
-/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard". */
-static struct scene_node *part(struct arena *a, char *text)
+/* A BSDF and its parts, which the first of these characters separates, and theirs the next. */
+static struct scene_node *nested(struct arena *a, char *text, const char *separators);
+
+/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard", or a BSDF with parts. */
+static struct scene_node *part(struct arena *a, char *text, const char *separators)
 {
+	if (*separators && strchr(text, *separators))
+		return nested(a, text, separators);
 	char *first = strstr(text, "texture "), *second = first ? strstr(first + 1, " texture ") : NULL;
 	if (!first)
 		return node_make(a, PLUGIN_BSDF, text);
@@ -90,23 +95,30 @@ static struct scene_node *part(struct arena *a, char *text)
 }
 
 /* " @alpha checkerboard": a texture of that name. Any other is a child without one. */
-static void add_part(struct arena *a, struct scene_node *n, char *text)
+static void add_part(struct arena *a, struct scene_node *n, char *text, const char *separators)
 {
 	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;
-	if (!space) {
-		node_add_child(a, n, part(a, text));
+	if (!space || (*separators && strchr(text, *separators))) {
+		node_add_child(a, n, part(a, text, separators));
 		return;
 	}
 	*space = 0;
 	node_add_ref(a, n, at + 1, node_make(a, PLUGIN_TEXTURE, space + 1));
 }
 
+static struct scene_node *nested(struct arena *a, char *text, const char *separators)
+{
+	const char here[] = {*separators, 0};
+	char *rest = text;
+	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(text, here, &rest));
+	for (char *child; (child = strtok_r(NULL, here, &rest));)
+		add_part(a, n, child, separators + 1);
+	return n;
+}
+
 struct scene_node *node_bsdf(struct arena *a, const char *text)
 {
-	char copy[256], *rest = copy;
+	char copy[512];
 	snprintf(copy, sizeof copy, "%s", text);
-	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
-	for (char *child; (child = strtok_r(NULL, "|", &rest));)
-		add_part(a, n, child);
-	return n;
+	return nested(a, copy, "|/;");
 }

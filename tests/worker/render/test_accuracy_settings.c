@@ -175,7 +175,7 @@ static void test_roughness(void **state)
 		assert_true(!b->has_smooth && b->has_delta && b->alpha == 0);
 		assert_true(!w->effects.glossy && w->effects.specular);
 		const struct wavelengths wl = wavelengths_sample(0.3);
-		const struct bsdf_point p = {{.u = 0.5, .v = 0.5}, &wl, TRANSPORT_RADIANCE};
+		const struct bsdf_point p = {.where = {.u = 0.5, .v = 0.5}, .w = &wl};
 		vec3 wo = {0, 0.6, 0.8}, wi;
 		double chance;
 		spectrum f = bsdf_eval_delta(b, &p, wo, BSDF_REFLECT, &wi, &chance);

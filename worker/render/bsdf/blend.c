@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/blend.h"
 
+#include "worker/render/bsdf/tilted.h"
 #include "worker/render/bsdf/twosided.h"
 
 /* For each part: its share of the light, and the probability of choosing it. */
@@ -140,6 +141,7 @@ int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const 
 	b->has_smooth |= part->has_smooth;
 	b->has_delta |= part->has_delta;
 	b->textured |= part->textured;
+	b->tilted |= part->tilted;
 	b->black &= part->black;
 	if (part->has_smooth)
 		b->alpha = fmin(b->alpha, part->alpha);
@@ -168,12 +170,13 @@ int blend_read_parts(struct blend *m, struct bsdf *b, const struct scene_node *n
 		const struct scene_node *inner = node_child(n, PLUGIN_BSDF, k);
 		int code = bsdf_create(&m->part[k], inner, build, e);
 		if (!code)
-			code = bsdf_take_relief(b, &m->part[k], k == 0, n, e);
-		if (!code)
 			code = blend_join(b, &m->part[k], inner->type, n, e);
 		if (code)
 			return code;
 	}
+	int tilts = bsdf_share_relief(b, m->part, m->count, n, build, e);
+	if (tilts)
+		return tilts;
 	if (!b->has_smooth)
 		b->alpha = 0;
 	for (uint32_t k = 0; k < m->count && b->two_sided; k++) {

@@ -31,6 +31,7 @@ struct bsdf_point {
 	struct texture_point where;
 	const struct wavelengths *w;
 	enum transport transport;
+	struct relief_place place; /* for parts that have another shading frame (tilted.h) */
 };
 
 struct bsdf_sample {
@@ -97,6 +98,7 @@ struct bsdf {
 	const struct ior *ior; /* for both sides (enum ior_side); NULL: only eta is known */
 	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
+	bool tilted;		     /* some part has another shading normal than the surface (tilted.h) */
 	bool black;		     /* neither reflects nor transmits */
 	enum color_shape shape;	     /* CONSTANT: carries no colour */
 	const struct relief *relief; /* bends the shading normals of the surface; NULL: none */

@@ -21,15 +21,6 @@ void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
 	b->alpha = b->alpha_mean = 0;
 }
 
-int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n, struct error *e)
-{
-	if (!first && part->relief != b->relief)
-		return node_error(n, e, ENOTSUP,
-				  "its two BSDFs bend normals differently, and a surface has one normal");
-	b->relief = part->relief;
-	return 0;
-}
-
 int bsdf_check_energy(const struct scene_node *n, double sum, struct error *e)
 {
 	if (!(sum > 1) || node_bool(n, "ensure_energy_conservation", true))

@@ -29,10 +29,6 @@ struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i);
 /* Marks b, whose data begins like that of `ops`, as having specular lobes only. */
 void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops);
 
-/* Gives b the relief of one of its parts: a surface has one normal. -ENOTSUP if b has a different one. first: no
- * part came before. */
-int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n, struct error *e);
-
 /* Marks b as having a part of this colour. */
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape);
 

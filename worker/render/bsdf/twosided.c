@@ -2,6 +2,7 @@
 /* One or two opaque BSDFs: the first on the side of the normal, the second (or the first again) on the other. */
 #include "worker/render/bsdf/twosided.h"
 #include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/tilted.h"
 
 extern const struct bsdf_ops bsdf_ops_twosided;
 
@@ -14,12 +15,31 @@ static vec3 mirror(vec3 v)
 	return (vec3){v.x, v.y, -v.z};
 }
 
+/* In mirrored coordinates. */
+static struct frame mirrored_frame(const void *front, const struct relief *r)
+{
+	const struct relief_place *place = front;
+	struct frame f = place->frame(place->point, r);
+	return (struct frame){mirror(f.s), mirror(f.t), vec3_neg(mirror(f.n))};
+}
+
+/* The point for the BSDF of the back, which sees all from the other side: p, or made in q, which must live as long. */
+static const struct bsdf_point *from_back(const struct bsdf *b, const struct bsdf_point *p, struct bsdf_point *q)
+{
+	if (!b->tilted || !p->place.frame)
+		return p;
+	*q = *p;
+	q->place = (struct relief_place){&p->place, mirrored_frame};
+	return q;
+}
+
 static spectrum twosided_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct twosided *t = b->data;
 	if (wo.z > 0)
 		return t->side[0].ops->eval(&t->side[0], p, wo, wi);
-	return t->side[1].ops->eval(&t->side[1], p, mirror(wo), mirror(wi));
+	struct bsdf_point q;
+	return t->side[1].ops->eval(&t->side[1], from_back(b, p, &q), mirror(wo), mirror(wi));
 }
 
 static double twosided_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -27,7 +47,8 @@ static double twosided_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 	const struct twosided *t = b->data;
 	if (wo.z > 0)
 		return t->side[0].ops->pdf_solid(&t->side[0], p, wo, wi);
-	return t->side[1].ops->pdf_solid(&t->side[1], p, mirror(wo), mirror(wi));
+	struct bsdf_point q;
+	return t->side[1].ops->pdf_solid(&t->side[1], from_back(b, p, &q), mirror(wo), mirror(wi));
 }
 
 static spectrum twosided_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -35,7 +56,8 @@ static spectrum twosided_eval_halfvec(const struct bsdf *b, const struct bsdf_po
 	const struct twosided *t = b->data;
 	if (wo.z > 0)
 		return bsdf_eval_halfvec(&t->side[0], p, wo, wi);
-	return bsdf_eval_halfvec(&t->side[1], p, mirror(wo), mirror(wi));
+	struct bsdf_point q;
+	return bsdf_eval_halfvec(&t->side[1], from_back(b, p, &q), mirror(wo), mirror(wi));
 }
 
 static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
@@ -44,7 +66,8 @@ static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_poin
 	const struct twosided *t = b->data;
 	if (wo.z > 0)
 		return bsdf_eval_delta(&t->side[0], p, wo, mode, wi, chance);
-	spectrum weight = bsdf_eval_delta(&t->side[1], p, mirror(wo), mode, wi, chance);
+	struct bsdf_point q;
+	spectrum weight = bsdf_eval_delta(&t->side[1], from_back(b, p, &q), mirror(wo), mode, wi, chance);
 	if (!spectrum_is_zero(weight))
 		*wi = mirror(*wi);
 	return weight;
@@ -56,7 +79,8 @@ static bool twosided_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	const struct twosided *t = b->data;
 	if (wo.z > 0)
 		return t->side[0].ops->sample(&t->side[0], p, wo, u, out);
-	if (!t->side[1].ops->sample(&t->side[1], p, mirror(wo), u, out))
+	struct bsdf_point q;
+	if (!t->side[1].ops->sample(&t->side[1], from_back(b, p, &q), mirror(wo), u, out))
 		return false;
 	out->wi = mirror(out->wi);
 	return true;
@@ -97,11 +121,9 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 			return node_error(inner, e, EINVAL,
 					  "\"%s\" transmits light; twosided only accepts opaque BSDFs", inner->type);
 	}
-	for (int i = 0; i < 2; i++) {
-		int code = bsdf_take_relief(b, &t->side[i], i == 0, n, e);
-		if (code)
-			return code;
-	}
+	int tilts = bsdf_share_relief(b, t->side, 2, n, build, e);
+	if (tilts)
+		return tilts;
 	b->two_sided = true;
 	b->black = t->side[0].black && t->side[1].black;
 	b->alpha = fmin(t->side[0].has_smooth ? t->side[0].alpha : INFINITY,

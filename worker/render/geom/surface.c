@@ -143,23 +143,27 @@ static struct relief_site site_on_triangle(const struct geom_shape *s, const str
 	return r;
 }
 
+/* Before relief. Normals that point to the back somewhere inside the triangle are unusable: shade flat. */
+static vec3 smooth_normal(const struct geom_shape *s, const uint32_t i[3], const struct surface_point *x)
+{
+	if (!s->normal)
+		return x->ng;
+	vec3 m = interpolated_normal(s, i, x->b1, x->b2);
+	return vec3_dot(m, x->ng) > 0 ? vec3_normalize(m) : x->ng;
+}
+
 static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
 			  struct surface_point *x)
 {
 	double b0 = 1 - b1 - b2;
+	x->shape = s;
 	x->b1 = b1;
 	x->b2 = b2;
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
 	struct tangents t = tangents_of(s, i, c->e1, c->e2);
 	x->dpdu = t.any ? t.u : carried_axis(x->ng);
-	vec3 n = x->ng;
-	if (s->normal) {
-		vec3 m = interpolated_normal(s, i, b1, b2);
-		/* Normals that point to the back somewhere inside the triangle are unusable: shade flat. */
-		if (vec3_dot(m, x->ng) > 0)
-			n = vec3_normalize(m);
-	}
+	vec3 n = smooth_normal(s, i, x);
 	x->u = b1;
 	x->v = b2;
 	if (s->uv) {
@@ -205,6 +209,7 @@ static struct relief_site site_on_sphere(const struct geom_shape *s, const struc
 static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	x->prim = prim;
+	x->shape = s;
 	x->p = vec3_madd(s->center, s->radius, w);
 	x->b1 = x->b2 = 0;
 	x->ng = vec3_scale(s->normal_sign, w);
@@ -223,6 +228,28 @@ void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w,
 {
 	on_sphere(s, prim, w, x);
 	surface_uv(s, x);
+}
+
+static struct relief_site site_of(const struct surface_point *x)
+{
+	const struct geom_shape *s = x->shape;
+	if (s->is_sphere) {
+		struct surface_point y = *x;
+		surface_uv(s, &y);
+		return site_on_sphere(s, &y);
+	}
+	const uint32_t *i = s->index[x->prim.prim];
+	struct corner c = corner_of(s, i);
+	struct tangents t = tangents_of(s, i, c.e1, c.e2);
+	return site_on_triangle(s, &c, &t, smooth_normal(s, i, x), x);
+}
+
+struct frame surface_frame_with(const void *surface_point, const struct relief *r)
+{
+	const struct surface_point *x = surface_point;
+	struct relief_site site = site_of(x);
+	struct frame f = frame_along(r ? relief_normal(r, &site) : site.n, x->dpdu);
+	return (struct frame){frame_to_local(&x->sh, f.s), frame_to_local(&x->sh, f.t), frame_to_local(&x->sh, f.n)};
 }
 
 /* The hit in double: the root nearest to Embree's. */

@@ -37,6 +37,7 @@ struct surface_point {
 	double b1, b2; /* barycentrics on a triangle; 0 on a sphere */
 	vec3 dpdu;
 	struct prim_ref prim;
+	const struct geom_shape *shape; /* of prim; NULL for a point that lies on none */
 };
 
 /* Derivatives of a point's frame as it moves, per unit length, [0] along du and [1] along dv. */
@@ -61,6 +62,9 @@ void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w,
  * sphere without relief, which cost as much as everything else, are left for surface_uv. */
 bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
 		       double t_near, struct surface_point *x);
+
+/* The frame that the surface_point would have with another relief, NULL for none: as in struct relief_place. */
+struct frame surface_frame_with(const void *surface_point, const struct relief *r);
 
 void surface_uv(const struct geom_shape *s, struct surface_point *x);
 

@@ -6,7 +6,7 @@
 #ifndef WORKER_RENDER_MATH_RELIEF_H
 #define WORKER_RENDER_MATH_RELIEF_H
 
-#include "worker/render/math/vec3.h"
+#include "worker/render/math/frame.h"
 
 #include <stdbool.h>
 
@@ -25,6 +25,15 @@ struct relief {
 	void (*at)(const void *data, double u, double v, struct relief_value *out);
 	const void *data;
 	bool handed; /* for RELIEF_NORMAL: y runs against dp/dv, not along n x dp/du, where the two differ */
+};
+
+/*
+ * Where a part of a material finds the shading frame that a point would have with the part's relief instead of the
+ * surface's: in the coordinates of the frame that it has. r: NULL for none.
+ */
+struct relief_place {
+	const void *point;						  /* for frame */
+	struct frame (*frame)(const void *point, const struct relief *r); /* NULL: there is no surface */
 };
 
 #endif

@@ -62,7 +62,7 @@ static inline struct emitter_point world_emitter_point(const struct surface_poin
 static inline struct bsdf_point world_bsdf_point(const struct surface_point *x, const struct wavelengths *w,
 						 enum transport transport)
 {
-	return (struct bsdf_point){{x->u, x->v, x->b1, x->b2, x->prim.prim}, w, transport};
+	return (struct bsdf_point){{x->u, x->v, x->b1, x->b2, x->prim.prim}, w, transport, {x, surface_frame_with}};
 }
 
 #endif

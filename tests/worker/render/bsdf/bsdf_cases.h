@@ -135,6 +135,14 @@ static const char *const bsdf_cases[] = {
 	"twosided | diffuse | conductor material=Cr",
 	"bumpmap scale=0.1 | roughconductor alpha=0.2 | texture checkerboard",
 	"normalmap | texture scale scale=0.5 texture checkerboard | roughdielectric alpha=0.3",
+	/* Parts with other normals: they tilt on a surface alone. */
+	"blendbsdf weight=0.4 | normalmap / roughplastic alpha=0.2 / texture checkerboard color0=rgb(0.7,0.5,0.9) "
+	"color1=rgb(0.4,0.35,0.9) | roughconductor alpha=0.1",
+	"blendbsdf weight=0.7 | conductor | normalmap / difftrans / texture checkerboard color0=rgb(0.7,0.5,0.9)",
+	"twosided | normalmap / diffuse / texture checkerboard color0=rgb(0.3,0.3,0.8) | roughconductor alpha=0.2",
+	"blendbsdf weight=0.5 | roughdielectric alpha=0.1 | blendbsdf weight=0.4 / normalmap ; diffuse ; texture "
+	"checkerboard color0=rgb(0.4,0.7,0.9) / normalmap ; roughconductor alpha=0.3 ; texture checkerboard "
+	"color1=rgb(0.6,0.3,0.8)",
 };
 enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
 

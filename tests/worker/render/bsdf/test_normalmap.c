@@ -52,7 +52,7 @@ static struct scene_node *bent(struct arena *a, const char *map, const char *tex
 	return n;
 }
 
-static int blend_of(struct scene_node *first, struct scene_node *second, struct arena *a, struct bsdf *b,
+static int blend_of(const struct scene_node *first, const struct scene_node *second, struct arena *a, struct bsdf *b,
 		    struct error *e)
 {
 	struct bend *bends = NULL;
@@ -84,11 +84,32 @@ static void test_parts_that_bend_alike(void **state)
 	assert_int_equal(blend_of(first, first, &a, &b, &e), 0);
 	b.relief->at(b.relief->data, 0.4, 0.55, &one);
 	assert_memory_equal(&v, &one, sizeof v);
+	assert_false(b.tilted);
+	const struct scene_node *specular = bent(&a, map, tiles, "plastic");
 	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
-		assert_true(blend_of(first, bent(&a, others[i].map, others[i].texture, "phong"), &a, &b, &e) < 0);
+		assert_int_equal(blend_of(first, bent(&a, others[i].map, others[i].texture, "phong"), &a, &b, &e), 0);
+		assert_true(b.tilted);
+		assert_true(blend_of(specular, bent(&a, others[i].map, others[i].texture, "conductor"), &a, &b, &e) <
+			    0);
 		assert_non_null(strstr(e.text, "bend normals differently"));
 	}
-	assert_true(blend_of(first, node_make(&a, PLUGIN_BSDF, "phong"), &a, &b, &e) < 0);
+	/* The surface has the normal of the narrowest; what passes straight on needs none. */
+	assert_int_equal(blend_of(first, specular, &a, &b, &e), 0);
+	assert_false(b.tilted);
+	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "phong"), specular, &a, &b, &e), 0);
+	assert_true(b.tilted && b.relief);
+	assert_int_equal(blend_of(first, node_make(&a, PLUGIN_BSDF, "conductor"), &a, &b, &e), 0);
+	assert_true(b.tilted && !b.relief);
+	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "null"), first, &a, &b, &e), 0);
+	assert_true(!b.tilted && b.relief);
+	struct scene_node *twice = node_make(&a, PLUGIN_BSDF, map),
+			  *both = node_bsdf(&a, "blendbsdf weight=0.5 | diffuse");
+	node_add_child(&a, both, first);
+	node_add_child(&a, twice, node_make(&a, PLUGIN_TEXTURE, tiles));
+	node_add_child(&a, twice, both);
+	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+	assert_true(bsdf_create(&b, twice, &build, &e) < 0);
+	assert_non_null(strstr(e.text, "one bump or normal map in another"));
 	arena_fini(&a);
 }
 

@@ -1,86 +1,254 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A normal map of one colour against a rectangle that is really tilted. Seen from one direction and lit from one, both
- * are equally bright all over.
+ * Parts of a material with different bump and normal maps: at every point of a surface they scatter the sum of what
+ * materials of one part scatter there, each with its own normal, and what is sampled has the density that is stated.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/pictures.h"
-#include "tests/support/render_picture.h"
+#include "tests/support/stats.h"
 #include "tests/support/worlds.h"
+#include "worker/render/math/rng.h"
+#include "worker/render/world/world.h"
 
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
 
-enum { SIDE = 16 };
+#define VIEW                                                                                           \
+	"<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,5' target='0,0,0' " \
+	"up='0,1,0'/></transform><film type='hdrfilm'/></sensor><emitter type='constant'/>"
+#define DENTS "<bsdf type='bumpmap'><texture type='bitmap'><string name='filename' value='p0'/></texture>%s</bsdf>"
+#define SLOPE                                                                                           \
+	"<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.45,0.9'/>" \
+	"<rgb name='color1' value='0.4,0.6,0.85'/></texture>%s</bsdf>"
+#define METAL "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>"
+#define PLASTIC "<bsdf type='roughplastic'><float name='alpha' value='0.4'/></bsdf>"
+#define PAPER "<bsdf type='difftrans'/>"
+#define CHALK "<bsdf type='diffuse'/>"
+#define BLEND(weight, a, b) "<bsdf type='blendbsdf'><float name='weight' value='" weight "'/>" a b "</bsdf>"
 
-#define VIEW                                                                                                         \
-	"<sensor type='orthographic'><transform name='to_world'><lookat origin='2,-1,9' target='0,0,0' up='0,1,0'/>" \
-	"</transform><film type='hdrfilm'><rfilter type='box'/></film></sensor>"
-#define SUN "<emitter type='directional'><vector name='direction' x='-1' y='-2' z='-4'/></emitter>"
-#define WIDE "<scale value='100'/>"
+static const struct wavelengths white = {.nm = {450, 500, 550, 600}};
 
-static double brightness(const char *turn, const char *bsdf, const struct picture_file *map)
+/* shape: its type. */
+static struct world *world_of(const char *shape, const char *bsdf)
 {
-	char xml[2048];
-	int n = snprintf(xml, sizeof xml,
-			 "<scene version='3.0.0'>" VIEW SUN "<shape type='rectangle'><transform name='to_world'>" WIDE
-			 "%s</transform>%s</shape></scene>",
-			 turn, bsdf);
-	assert_true(n > 0 && (size_t)n < sizeof xml);
-	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"p0", map->bytes, map->size}, {NULL, NULL, 0}};
-	struct world *w = world_of_files(SIDE, SIDE, files);
-	const struct render_picture_how how = {.integrator = "path", .test = "tilted", .spp = 4, .max_depth = 2};
-	struct picture p;
-	render_picture_xyz(w, &how, &p);
-	double middle = (double)p.rgb[1][SIDE * SIDE / 2 + SIDE / 2];
-	picture_fini(&p);
-	world_free(w);
-	assert_true(middle > 0);
-	return middle;
+	static struct pictures pictures;
+	static char xml[4096];
+	if (pictures.count == 0) {
+		double rgb[3 * 16];
+		for (uint64_t k = 0; k < 16; k++) {
+			double u[4];
+			rng_uniform4(7, RNG_TEST, k, 0, 0, u);
+			rgb[3 * k] = rgb[3 * k + 1] = rgb[3 * k + 2] = floor(8 * u[0]) / 32;
+		}
+		pictures_add(&pictures, 4, 4, rgb);
+	}
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW "<shape type='%s'>%s</shape></scene>", shape, bsdf);
+	const struct memory_file files[] = {
+		{"s.xml", xml, strlen(xml)}, {"p0", pictures.file[0].bytes, pictures.file[0].size}, {NULL, NULL, 0}};
+	return world_of_files(8, 8, files);
 }
 
-/* The map's normal leans by x and y for 0.75 of height. */
-static void tilts(const char *bsdf, double x, double y)
+static vec3 direction(const double u[2])
 {
-	struct pictures p = {.count = 0};
-	char turn[128], bent[1024];
-	pictures_add(&p, 1, 1, (const double[]){(1 + x) / 2, (1 + y) / 2, 0.875});
-	/* About the axis that is square to (x, y), from z towards it. */
-	snprintf(turn, sizeof turn, "<rotate x='%.17g' y='%.17g' z='0' angle='%.17g'/>", -y, x,
-		 atan2(hypot(x, y), 0.75) * 180 / acos(-1));
-	snprintf(bent, sizeof bent,
-		 "<bsdf type='normalmap'><texture type='bitmap'><string name='filename' value='p0'/>"
-		 "<boolean name='raw' value='true'/></texture>%s</bsdf>",
-		 bsdf);
-	double map = brightness("", bent, &p.file[0]), real = brightness(turn, bsdf, &p.file[0]),
-	       flat = brightness("", bsdf, &p.file[0]);
-	print_message("leaning by %g, %g: map %.9g, tilted %.9g, flat %.9g\n", x, y, map, real, flat);
-	if (!(fabs(map - real) <= 1e-5 * real && fabs(flat - real) > 0.02 * real))
-		fail_msg("%s: %.9g with the map, %.9g tilted, %.9g flat", bsdf, map, real, flat);
-	pictures_fini(&p);
+	double z = 2 * u[0] - 1, r = sqrt(1 - z * z);
+	return (vec3){r * cos(2 * M_PI * u[1]), r * sin(2 * M_PI * u[1]), z};
 }
 
-static void test_tilted(void **state)
+/* The i-th point of the world's only shape. */
+static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
+{
+	double u[4];
+	rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
+	if (w->shapes[0].is_sphere)
+		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, direction(u), x);
+	else
+		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, i % 2}, u[0] * (1 - u[1]), u[1] * u[0], x);
+}
+
+/* f |cos| of light from wi that goes to wo, both in the world; *side: whether the shading normal sees both as the
+ * geometric one does. */
+static spectrum scattered(const struct world *w, uint64_t i, vec3 wo, vec3 wi, enum transport t, bool *side)
+{
+	struct surface_point x;
+	point_on(w, i, &x);
+	const struct bsdf *b = &w->bsdfs[w->parts[0].bsdf];
+	const struct bsdf_point p = world_bsdf_point(&x, &white, t);
+	vec3 o = frame_to_local(&x.sh, wo), in = frame_to_local(&x.sh, wi);
+	*side = o.z * vec3_dot(x.ng, wo) > 0 && in.z * vec3_dot(x.ng, wi) > 0;
+	return spectrum_scale(fabs(t == TRANSPORT_RADIANCE ? in.z : o.z), b->ops->eval(b, &p, o, in));
+}
+
+static const char *dents(const char *inner)
+{
+	static char text[2][512];
+	static int k;
+	k = !k;
+	snprintf(text[k], sizeof text[k], DENTS, inner);
+	return text[k];
+}
+
+static const char *slope(const char *inner)
+{
+	static char text[2][512];
+	static int k;
+	k = !k;
+	snprintf(text[k], sizeof text[k], SLOPE, inner);
+	return text[k];
+}
+
+/* via: a part that must see both directions, too, for any but the first to be lit; 0: none. */
+static void compare(const char *shape, const char *whole, const char *const *bsdf, const double *share, int parts,
+		    int via)
+{
+	enum { POINTS = 400 };
+	struct world *all = world_of(shape, whole), *one[3] = {NULL};
+	int lit = 0;
+	for (int k = 0; k < parts; k++)
+		one[k] = world_of(shape, bsdf[k]);
+	for (uint64_t i = 0; i < 4 * POINTS; i++) {
+		double u[4];
+		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
+		vec3 wo = direction(u), wi = direction(u + 2);
+		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
+		bool side, part_side, via_side = true;
+		spectrum got = scattered(all, i, wo, wi, t, &side), expected = spectrum_of(0);
+		if (!side) /* the integrators ask no further */
+			continue;
+		if (via)
+			scattered(one[via], i, wo, wi, t, &via_side);
+		for (int k = 0; k < parts; k++) {
+			spectrum f = scattered(one[k], i, wo, wi, t, &part_side);
+			if (part_side && (via_side || k == 0))
+				expected = spectrum_add(expected, spectrum_scale(share[k], f));
+		}
+		lit += spectrum_mean(expected) > 0;
+		for (int l = 0; l < SPECTRUM_LANES; l++)
+			if (!(fabs(got.v[l] - expected.v[l]) <= 1e-9 * fabs(expected.v[l])))
+				fail_msg("%s, point %d: %.12g is not %.12g", whole, (int)i, got.v[l], expected.v[l]);
+	}
+	print_message("%d of %d pairs are lit\n", lit, 4 * POINTS);
+	assert_true(lit > POINTS / 2);
+	world_free(all);
+	for (int k = 0; k < parts; k++)
+		world_free(one[k]);
+}
+
+static void both_shapes(const char *whole, const char *const *bsdf, const double *share, int parts, int via)
+{
+	compare("sphere", whole, bsdf, share, parts, via);
+	compare("rectangle", whole, bsdf, share, parts, via);
+}
+
+static void test_two_normals(void **state)
 {
 	(void)state;
-	static const char *const bsdf[] = {
-		"<bsdf type='diffuse'/>",
-		"<bsdf type='roughconductor'><float name='alpha' value='0.5'/></bsdf>",
-		"<bsdf type='roughplastic'><float name='alpha' value='0.4'/></bsdf>",
-	};
-	static const double lean[][2] = {{0.25, 0}, {-0.25, 0}, {0, 0.25}, {0, -0.25}, {0.375, 0.125}};
-	for (size_t i = 0; i < sizeof bsdf / sizeof *bsdf; i++)
-		for (size_t k = 0; k < sizeof lean / sizeof *lean; k++)
-			tilts(bsdf[i], lean[k][0], lean[k][1]);
+	char a[512], b[512], whole[2048];
+	snprintf(a, sizeof a, "%s", dents(PLASTIC));
+	snprintf(b, sizeof b, "%s", slope(METAL));
+	snprintf(whole, sizeof whole, BLEND("0.3", "%s", "%s"), a, b);
+	both_shapes(whole, (const char *const[]){a, b}, (const double[]){0.7, 0.3}, 2, 0);
+	/* One is smooth. */
+	snprintf(whole, sizeof whole, BLEND("0.3", "%s", "%s"), METAL, dents(PAPER));
+	snprintf(a, sizeof a, "%s", dents(PAPER));
+	both_shapes(whole, (const char *const[]){METAL, a}, (const double[]){0.7, 0.3}, 2, 0);
+}
+
+/* A part of a blend is itself a blend whose parts differ; the last gives it its normal. */
+static void test_nested(void **state)
+{
+	(void)state;
+	char a[512], b[512], c[512], whole[4096];
+	snprintf(a, sizeof a, "%s", dents(CHALK));
+	snprintf(b, sizeof b, "%s", slope(PLASTIC));
+	snprintf(c, sizeof c, "%s", METAL);
+	snprintf(whole, sizeof whole, BLEND("0.25", "%s", BLEND("0.5", "%s", "%s")), c, a, b);
+	both_shapes(whole, (const char *const[]){c, a, b}, (const double[]){0.75, 0.125, 0.125}, 3, 2);
+}
+
+static void test_two_sides(void **state)
+{
+	(void)state;
+	char a[512], b[512], whole[2048];
+	snprintf(a, sizeof a, "%s", dents(PLASTIC));
+	snprintf(b, sizeof b, "%s", slope(METAL));
+	snprintf(whole, sizeof whole, "<bsdf type='twosided'>%s%s</bsdf>", a, b);
+	/* Its one side, and then its other: what is seen from the wrong side of one alone is black. */
+	char front[1024], back[1024];
+	static const char black[] = "<bsdf type='diffuse'><rgb name='reflectance' value='0'/></bsdf>";
+	snprintf(front, sizeof front, "<bsdf type='twosided'>%s%s</bsdf>", a, dents(black));
+	snprintf(back, sizeof back, "<bsdf type='twosided'>%s%s</bsdf>", slope(black), b);
+	both_shapes(whole, (const char *const[]){front, back}, (const double[]){1, 1}, 2, 0);
+}
+
+/* Sampled directions against the density, in the moments 1, x, y, z, xy and z^2 over the sphere: 6 per case, two-sided,
+ * at 1e-6 each; an error of 2 % of a moment of size 0.3 is found with a power of 99 %. And what comes with a sample is
+ * what eval and pdf_solid say of it. */
+static void check_sampling(const char *whole)
+{
+	enum { SAMPLES = 60000, MOMENTS = 6 };
+	struct world *w = world_of("sphere", whole);
+	const struct bsdf *b = &w->bsdfs[w->parts[0].bsdf];
+	struct surface_point x;
+	point_on(w, 3, &x);
+	const struct bsdf_point p = world_bsdf_point(&x, &white, TRANSPORT_RADIANCE);
+	double drawn[MOMENTS] = {0}, drawn2[MOMENTS] = {0}, stated[MOMENTS] = {0}, stated2[MOMENTS] = {0};
+	vec3 wo = vec3_normalize((vec3){0.5, -0.3, 0.6});
+	for (uint64_t i = 0; i < SAMPLES; i++) {
+		double u[4];
+		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
+		vec3 other = direction(u);
+		double density = 4 * M_PI * b->ops->pdf_solid(b, &p, wo, other);
+		struct bsdf_sample s;
+		bool any = b->ops->sample(b, &p, wo, u, &s);
+		if (any) {
+			assert_true(fabs(s.pdf / b->ops->pdf_solid(b, &p, wo, s.wi) - 1) < 1e-9);
+			assert_true(fabs(spectrum_mean(s.f) / spectrum_mean(b->ops->eval(b, &p, wo, s.wi)) - 1) < 1e-9);
+		}
+		vec3 d = any ? s.wi : (vec3){0, 0, 0};
+		const double m[MOMENTS] = {any, d.x, d.y, d.z, d.x * d.y, d.z * d.z},
+			     n[MOMENTS] = {1, other.x, other.y, other.z, other.x * other.y, other.z * other.z};
+		for (int k = 0; k < MOMENTS; k++) {
+			drawn[k] += m[k] / SAMPLES;
+			drawn2[k] += m[k] * m[k] / SAMPLES;
+			stated[k] += density * n[k] / SAMPLES;
+			stated2[k] += density * density * n[k] * n[k] / SAMPLES;
+		}
+	}
+	for (int k = 0; k < MOMENTS; k++) {
+		double variance = (drawn2[k] - drawn[k] * drawn[k] + stated2[k] - stated[k] * stated[k]) / SAMPLES;
+		if (!(fabs(drawn[k] - stated[k]) <= 4.9 * sqrt(variance) + 1e-12))
+			fail_msg("%s: moment %d is %.5f, the density says %.5f", whole, k, drawn[k], stated[k]);
+	}
+	assert_true(drawn[0] > 0.5);
+	world_free(w);
+}
+
+static void test_sampling(void **state)
+{
+	(void)state;
+	char whole[4096];
+	snprintf(whole, sizeof whole, BLEND("0.3", "%s", "%s"), METAL, dents(PAPER));
+	check_sampling(whole);
+	snprintf(whole, sizeof whole, BLEND("0.25", "%s", BLEND("0.5", "%s", "%s")), METAL, dents(CHALK),
+		 slope(PLASTIC));
+	check_sampling(whole);
+	snprintf(whole, sizeof whole, "<bsdf type='twosided'>%s%s</bsdf>", slope(METAL), dents(CHALK));
+	check_sampling(whole);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_tilted)};
-	return cmocka_run_group_tests_name("tilted", tests, NULL, NULL);
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_two_normals),
+		cmocka_unit_test(test_nested),
+		cmocka_unit_test(test_two_sides),
+		cmocka_unit_test(test_sampling),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
 }
