@@ -183,6 +183,8 @@ static void test_notes_on_the_whole(void **state)
 		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
 		{"<integrator type='volpath'/>",
 		 "s.xml:1: <integrator type=\"volpath\">: the image shows all light on surfaces, without media"},
+		{"<integrator type='direct'/>",
+		 "s.xml:1: <integrator type=\"direct\">: the image shows light that is scattered once; --max-depth shows more"},
 		{"<integrator type='multichannel'/>", "the image shows all light on surfaces"},
 		{"<integrator type='volprim_rf_basic'/>", "the image shows all light on surfaces"},
 	};
