@@ -276,6 +276,22 @@ static struct world *tilted_parts(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
+/* A ball of coloured glass around a stone, which states no medium, and a bubble; beside it water with a lamp in it. */
+static struct world *absorbing_media(const struct agree_case *k)
+{
+#define WITHIN(side, sigma) "<medium type='homogeneous' name='" side "'><rgb name='sigma_a' value='" sigma "'/><spectrum name='sigma_s' value='0'/></medium>"
+#define ROUGH(eta) "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/><float name='int_ior' value='" eta "'/></bsdf>"
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
+			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) ROUGH("1.5") WITHIN("interior", "0.5,1.5,3") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.5' y='1.1'/>" TURN) ROUGH("0.8") WITHIN("exterior", "0.5,1.5,3") "</shape>"
+			     "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) GLASS("1.33") WITHIN("interior", "2,0.8,0.4") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='0.7' y='0.5'/>" TURN) "<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>");
+}
+
 const struct agree_case agree_cases[] = {
 	{"mixed scales", "1 on a floor of 10", on_a_floor, 1, 10, 5, 1024, 512, ALL, 0.02},
 	{"mixed scales", "1 on a floor of 1e6", on_a_floor, 1, 1e6, 5, 1024, 512, ALL, 0.02},
@@ -299,6 +315,7 @@ const struct agree_case agree_cases[] = {
 	{"clipped view", "a wall behind an orthographic camera", clipped_view, 1, 0, 6, 512, 512, ALL, 0.02},
 	{"tilted parts", "rough metal, paper and plastic", tilted_parts, 0, 0, 5, 512, 512, ALL, 0.02},
 	{"tilted parts", "chalk and glass", tilted_parts, 1, 0, 6, 1024, 1024, ALL, 0.02},
+	{"absorbing media", "glass and water", absorbing_media, 0, 0, 8, 2048, 1024, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},

@@ -123,6 +123,15 @@ static const char wedge[] =
 	"f 1/1 2/2 3/3 4/4\nf 4/1 3/2 6/3 5/4\nf 2/1 1/2 5/3 6/4\nf 1/1 4/2 5/3\nf 3/1 2/2 6/3\n";
 static const char curve[] = "-1 -0.5 0 0.2\n-0.4 0.7 0.3 0.3\n0.3 -0.6 0.2 0.2\n1 0.4 -0.4 0.3\n";
 
+/* That absorbs: on either side of any shape, whether it is closed or not. */
+static void put_medium(struct maker *m)
+{
+	PUT(m, "<medium type='homogeneous' name='%s'><float name='albedo' value='0'/>",
+	    chance(m, 0.7) ? "interior" : "exterior");
+	put_rgb(m, "sigma_t", 0, 2);
+	PUT(m, "</medium>");
+}
+
 static const struct {
 	const char *type, *inner;
 } shapes[] = {
@@ -162,6 +171,8 @@ static void put_shape(struct maker *m)
 		PUT(m, "<boolean name='flip_normals' value='true'/>");
 	put_place(m, between(m, 0.3, 0.7), -0.2, 1);
 	put_material(m);
+	if (chance(m, 0.2))
+		put_medium(m);
 	PUT(m, "</shape>");
 }
 

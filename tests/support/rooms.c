@@ -138,9 +138,27 @@ static struct world *dents(void)
 			     "<float name='displacement_scale' value='0.06'/><integer name='displacement_level' value='3'/></shape>");
 }
 
+/* In it a stone, which states no medium. */
+static struct world *coloured_glass(void)
+{
+	return world_of_text(32, 32, ROOM LAMP BALL(CLOUDY("0.25") "<medium type='homogeneous' name='interior'><float name='albedo' value='0'/>"
+						    "<rgb name='sigma_t' value='0.3,0.8,1.5'/></medium>")
+			     "<shape type='sphere'><point name='center' value='0.2,-0.8,-0.3'/><float name='radius' value='0.3'/>" METAL("0.2") "</shape>");
+}
+
+/* Each part of a material has a normal of its own. */
+static struct world *tilted_parts(void)
+{
+	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='blendbsdf'><float name='weight' value='0.5'/>" METAL("0.15")
+						    "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.45,0.9'/>"
+						    "<rgb name='color1' value='0.4,0.6,0.85'/></texture><bsdf type='roughplastic'>"
+						    "<float name='alpha' value='0.3'/></bsdf></bsdf></bsdf>"));
+}
+
 const struct room rooms[] = {
 	{"rough glass", cloudy}, {"glass", glass}, {"gold", gold}, {"mirror", mirror}, {"bent normals", bent}, {"sky", sky},
 	{"picture", picture}, {"prism", prism}, {"lens", lens}, {"point and spot", deltas}, {"sun", sun}, {"dents", dents},
+	{"coloured glass", coloured_glass}, {"tilted parts", tilted_parts},
 	{NULL, NULL},
 };
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/scene_tables.h"
 
+#include "worker/render/medium/medium.h"
+
 #include <assert.h>
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
@@ -69,6 +71,8 @@ const struct plugin_decl *scene_tables(void)
 										  : shape_nested_classes,
 						PARAM_UNDERSTOOD};
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
+		all[n++] = *d;
+	for (const struct plugin_decl *d = medium_decls; d->type; d++)
 		all[n++] = *d;
 	assert(n < sizeof all / sizeof *all);
 	all[n] = (struct plugin_decl){0};

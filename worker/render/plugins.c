@@ -4,6 +4,7 @@
 
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/emitter/emitter.h"
+#include "worker/render/medium/medium.h"
 #include "worker/render/settings/accuracy_settings.h"
 #include "worker/render/shape/shape.h"
 
@@ -36,6 +37,8 @@ static void gather(void)
 	for (size_t i = 0; texture_registry[i]; i++)
 		add_plugin((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params,
 						texture_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+	for (const struct plugin_decl *d = medium_decls; d->type; d++)
+		add_plugin(*d);
 	for (size_t i = 0; emitter_registry[i]; i++)
 		add_plugin((struct plugin_decl){PLUGIN_EMITTER, emitter_registry[i]->type, emitter_registry[i]->params,
 						emitter_registry[i]->nested_classes, PARAM_UNDERSTOOD});

@@ -78,7 +78,7 @@ static void print_unsupported(FILE *out)
 	fprintf(out,
 		"\n## Mitsuba's plug-ins that are not supported\n\n"
 		"Refused, with file, line and the nearest name; with `--lenient` replaced. `hk` is a layer of a medium, and "
-		"media are refused. Light is\nunpolarised here, and what polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps "
+		"media that scatter are refused. Light is\nunpolarised here, and what polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps "
 		"are those of Mitsuba up\nto 3.6: `flip_invalid_normals` and `use_shadowing_function`, which 3.7 has on, are off here.\n\n"
 		"| class | type | with `--lenient` |\n|---|---|---|\n");
 	enum plugin_class cls;

@@ -282,6 +282,8 @@ double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const 
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < into->edges; j++)
 		product_mul(&p, j <= move->c || j == move->b ? full_path_f(c, into, j) : full_path_fh(c, into, j));
+	if (EFFECT_IS_ON(c->w, absorption))
+		full_path_absorb(c->w, into, &p);
 	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) +
 	       move->log_transfer[direction] - move->log_density[direction];
 }

@@ -212,6 +212,26 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 	return true;
 }
 
+/* What the edges of the light's sub-path before its vertex s - 1, which was reached through `medium`, let through. */
+static spectrum absorption_of_light(const struct path_context *c, unsigned s, uint32_t medium)
+{
+	spectrum t = spectrum_of(1);
+	for (unsigned i = s - 1; i > 0; i--) {
+		const struct path_vertex *v = &c->light[i];
+		medium = path_medium_after(c->w, v, medium, v->to_prev);
+		t = spectrum_mul(t, path_transmittance(c->w, &c->wl, medium, v, v - 1));
+	}
+	return t;
+}
+
+/* What is left of light on its way to z through y, vertex s - 1 of the light's sub-path. */
+static spectrum absorbed(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
+			 const struct path_vertex *y, unsigned s)
+{
+	uint32_t medium = path_medium_after(c->w, z, z->medium, to_light);
+	return spectrum_mul(path_transmittance(c->w, &c->wl, medium, z, y), absorption_of_light(c, s, medium));
+}
+
 static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 {
 	const struct path_vertex *z = &c->camera[t - 1];
@@ -225,6 +245,8 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	spectrum f = path_scatter(c, z, z->to_prev, to_light);
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
 	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
+	if (EFFECT_IS_ON(c->w, absorption))
+		l = spectrum_mul(l, absorbed(c, z, to_light, &y, 1));
 	if (spectrum_is_zero(l) || !path_visible(c, z, &y))
 		return spectrum_of(0);
 	return weighted(c, &y, 1, t, max_s, l);
@@ -242,6 +264,8 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
 	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2),
 			   l);
+	if (EFFECT_IS_ON(c->w, absorption))
+		l = spectrum_mul(l, absorption_of_light(c, s, 0));
 	if (spectrum_is_zero(l) || !path_visible(c, eye, y))
 		return spectrum_of(0);
 	film[0] = x[0];
@@ -276,6 +300,8 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 		return l;
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
 	l = spectrum_scale(geometry_term(z->x.ng, y->x.ng, to_light, distance2), l);
+	if (EFFECT_IS_ON(c->w, absorption))
+		l = spectrum_mul(l, absorbed(c, z, to_light, y, s));
 	if (spectrum_is_zero(l) || !is_made(c, s + t - 1, &l) || !path_visible(c, z, y))
 		return spectrum_of(0);
 	return weighted(c, c->light, s, t, max_s, l);

@@ -133,8 +133,14 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 	}
 	v[0].beta = spectrum_of(1);
 	v[1].beta = spectrum_of(c->window.width * c->window.height);
-	for (unsigned i = 2; i < t; i++)
+	v[1].medium = 0;
+	for (unsigned i = 2; i < t; i++) {
 		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
+		if (!EFFECT_IS_ON(c->w, absorption))
+			continue;
+		v[i].medium = path_medium_after(c->w, &v[i - 1], v[i - 1].medium, vec3_neg(x->edge[k - i].w));
+		v[i].beta = spectrum_mul(v[i].beta, path_transmittance(c->w, &x->wl, v[i].medium, &v[i - 1], &v[i]));
+	}
 	v[t - 1].delta = false;
 }
 

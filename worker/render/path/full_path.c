@@ -297,11 +297,22 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 	return full_path_finish(c, x) && (s == 0 || full_path_visible(c, x, s - 1));
 }
 
+void full_path_absorb(const struct world *w, const struct full_path *x, struct product *p)
+{
+	uint32_t medium = 0;
+	for (unsigned e = x->edges - 1; e > 0; e--) {
+		medium = path_medium_after(w, &x->v[e], medium, vec3_neg(x->edge[e - 1].w));
+		product_mul(p, path_transmittance(w, &x->wl, medium, &x->v[e], &x->v[e - 1]));
+	}
+}
+
 void full_path_colour(const struct path_context *c, struct full_path *x, double xyz[3])
 {
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < x->edges; j++)
 		product_mul(&p, vertex_set_has(&x->known_fh, j) ? x->fh[j] : full_path_f(c, x, j));
+	if (EFFECT_IS_ON(c->w, absorption))
+		full_path_absorb(c->w, x, &p);
 	to_xyz(c, x, p.v, xyz);
 	double sum = xyz[0] + xyz[1] + xyz[2];
 	for (int i = 0; i < 3; i++)

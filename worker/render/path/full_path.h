@@ -104,6 +104,9 @@ bool full_path_finish(const struct path_context *c, struct full_path *x);
  * everything cached. Casts the connecting ray. false: there is none, or it is black. */
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path *x);
 
+/* Multiplies p by what the media along the path let through (path.h). */
+void full_path_absorb(const struct world *w, const struct full_path *x, struct product *p);
+
 /* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
 void full_path_colour(const struct path_context *c, struct full_path *x, double xyz[3]);
 

@@ -19,6 +19,8 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 			log_geometry +=
 				log(fabs(vec3_dot(v->x.sh.n, x->edge[j - 1].w) / vec3_dot(v->x.ng, x->edge[j - 1].w)));
 	}
+	if (EFFECT_IS_ON(c->w, absorption))
+		full_path_absorb(c->w, x, &p);
 	for (unsigned e = 0; e < k; e++) {
 		const struct full_path_edge *g = &x->edge[e];
 		log_geometry += log(path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2);

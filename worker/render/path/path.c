@@ -71,6 +71,26 @@ static bool same_side(const struct surface_point *x, vec3 w)
 	return vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0;
 }
 
+uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, uint32_t medium, vec3 away)
+{
+	if (v->kind != VERTEX_SURFACE)
+		return medium;
+	const struct world_shape *s = &w->parts[v->x.prim.shape];
+	if (!s->interior && !s->exterior)
+		return medium;
+	return vec3_dot(v->x.ng, away) > 0 ? s->exterior : s->interior;
+}
+
+spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
+			    const struct path_vertex *a, const struct path_vertex *b)
+{
+	if (!medium)
+		return spectrum_of(1);
+	bool endless = a->kind == VERTEX_INFINITE || b->kind == VERTEX_INFINITE;
+	double distance = endless ? INFINITY : vec3_length(vec3_sub(a->x.p, b->x.p));
+	return medium_transmittance(&w->media[medium - 1], distance, wl);
+}
+
 static struct bsdf_point bsdf_point_of(const struct path_context *c, const struct path_vertex *v,
 				       enum transport transport)
 {
@@ -231,6 +251,13 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 	return true;
 }
 
+/* The light's sub-path does so when it is joined: only the camera's knows which medium it is in. */
+static void absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to)
+{
+	to->medium = path_medium_after(c->w, at, at->medium, wi);
+	to->beta = spectrum_mul(to->beta, path_transmittance(c->w, &c->wl, to->medium, at, to));
+}
+
 /* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is a surface. start: beta to which roulette compares. */
 static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampler_side side, struct path_vertex *v,
 			   unsigned n, unsigned max, double start)
@@ -256,6 +283,8 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		at->delta = out.delta;
 		at->mode = out.mode;
 		to->beta = out.beta;
+		if (EFFECT_IS_ON(c->w, absorption) && side == SIDE_CAMERA)
+			absorb(c, at, out.wi, to);
 		to->pdf = reach_pdf(c, at, to, out.pdf, ahead);
 		if (!c->one_way)
 			v[n - 2].pdf_rev = reach_pdf(c, at, &v[n - 2], out.pdf_rev, back);
@@ -289,6 +318,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	if (!path_extend(c, &v[0], d, t_min, t_max, &v[1]))
 		return 1;
 	v[1].beta = spectrum_of(area);
+	v[1].medium = 0;
 	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_RADIANCE);
 	if (v[1].kind == VERTEX_INFINITE)
 		return 2;

@@ -33,6 +33,7 @@ struct path_vertex {
 	unsigned mode;		 /* of enum bsdf_mode: how its own sub-path left it */
 	int32_t emitter;	 /* shines: index; -1 */
 	const struct bsdf *bsdf; /* VERTEX_SURFACE */
+	uint32_t medium;	 /* on the camera's sub-path: the medium between it and the vertex before */
 	struct surface_point
 		x;	/* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is 0 */
 	vec3 to_prev;	/* unit; towards the vertex before it on its own sub-path */
@@ -153,6 +154,19 @@ bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d,
 
 /* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
 vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
+
+/*
+ * Media that absorb are numbers: 0 is none, others are 1 + an index into world.media. The camera stands in none. From
+ * it on, the medium changes where the path leaves a shape that states an interior or an exterior, to the one on that
+ * side (a side without one is empty), and nowhere else, as in Mitsuba: a stone in water need not state any. So the
+ * medium of every edge follows from the path seen from the camera, whichever technique made it.
+ */
+
+/* The medium of the edge that leaves v along `away`, towards the light, if v was reached through `medium`. */
+uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, uint32_t medium, vec3 away);
+/* The share of light that the edge between two vertices lets through. */
+spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
+			    const struct path_vertex *a, const struct path_vertex *b);
 
 /* I = X + Y + Z of what the film gets of l. */
 double path_intensity(const struct path_context *c, spectrum l);

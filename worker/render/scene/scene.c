@@ -15,6 +15,7 @@
  */
 #include "worker/render/scene/scene.h"
 
+#include "worker/render/scene/absorbing.h"
 #include "worker/render/scene/asset_list.h"
 #include "worker/render/scene/batch.h"
 #include "worker/render/scene/element.h"
@@ -218,13 +219,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	enum plugin_class cls;
 	bool is_class = plugin_class_find(target->name, &cls);
 	assert(is_class);
-	if (cls == PLUGIN_MEDIUM && d->decl->status != PARAM_IGNORED) {
-		if (el != target) /* it is told where it is made */
-			return REPORT_TOLD;
-		const char *type = xml_attribute(el, "type");
-		return m->lenient ? leave_out(&m->notes, el, type ? type : "", "", "the medium")
-				  : refuse_medium(el, m->error);
-	}
+	if (cls == PLUGIN_MEDIUM && d->decl->status != PARAM_IGNORED && d->node->cls != PLUGIN_SHAPE)
+		return medium_elsewhere(&m->notes, m->lenient, d->node->cls, el, target);
 	const char *written = xml_attribute(el, "name");
 	const struct param *p = NULL;
 	bool nested = d->decl->nested_classes >> cls & 1;
@@ -288,6 +284,8 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	if (plugin_class_find(el->name, &cls))
 		return read_object(m, d, owner, el, el);
 	if (strcmp(el->name, "default") == 0)
+		return 0;
+	if (d->node->cls == PLUGIN_MEDIUM && strcmp(el->name, "phase") == 0) /* of light that is not scattered */
 		return 0;
 	if (strcmp(el->name, "ref") != 0)
 		return d->decl->status == PARAM_IGNORED ? 0 : foreign_element(m, el);
@@ -400,6 +398,10 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	int r = element_check(el, "type|id|name", true, m->error);
 	if (r)
 		return r;
+	if (cls == PLUGIN_MEDIUM && !medium_only_absorbs(el)) {
+		r = medium_refuse(&m->notes, m->lenient, el);
+		return r ? r : REPORT_TOLD;
+	}
 	const char *type = xml_attribute(el, "type");
 	if (!type)
 		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");

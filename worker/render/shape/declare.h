@@ -17,6 +17,7 @@
 /* The parameters of every shape, and the end of its table. */
 #define SHAPE_PARAMS_END                                                                     \
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)}, \
+		{"interior", UNDERSTOOD(VALUE_NODE)}, {"exterior", UNDERSTOOD(VALUE_NODE)},  \
 		{"silhouette_sampling_weight", IGNORED}, DISPLACE_PARAMS,                    \
 	{                                                                                    \
 		NULL, 0, 0, 0, 0, NULL                                                       \

@@ -96,6 +96,48 @@ static int create_bsdfs(struct builder *b)
 	return 0;
 }
 
+/* The number of a shape's medium, 1 + its index, which is made at its first use; 0: it has none. -1: an error. */
+static int64_t medium_of(struct builder *b, const struct scene_node *shape, const char *name,
+			 const struct scene_node **made)
+{
+	struct world *w = b->w;
+	const struct scene_node *n = node_ref(shape, name);
+	if (!n)
+		return 0;
+	for (uint32_t i = 0; i < w->media_count; i++)
+		if (made[i] == n)
+			return i + 1;
+	if (medium_create(&w->media[w->media_count], n, w->scale, &w->arena, b->e))
+		return -1;
+	made[w->media_count] = n;
+	return ++w->media_count;
+}
+
+static int create_media(struct builder *b)
+{
+	struct world *w = b->w;
+	uint32_t count = 0;
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		count += node_ref(b->shape_nodes[i], "interior") ? 1 : 0;
+		count += node_ref(b->shape_nodes[i], "exterior") ? 1 : 0;
+	}
+	if (!count)
+		return 0;
+	const struct scene_node **made = arena_alloc(&b->scratch, count, sizeof *made);
+	w->media = arena_alloc(&w->arena, count, sizeof *w->media);
+	if (!made || !w->media)
+		return build_out_of_memory(b->e);
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		int64_t interior = medium_of(b, b->shape_nodes[i], "interior", made),
+			exterior = interior < 0 ? -1 : medium_of(b, b->shape_nodes[i], "exterior", made);
+		if (exterior < 0)
+			return -EINVAL;
+		w->parts[i].interior = (uint32_t)interior;
+		w->parts[i].exterior = (uint32_t)exterior;
+	}
+	return 0;
+}
+
 static struct emitter_surface emitter_surface_of(const struct geom_shape *g)
 {
 	return (struct emitter_surface){
@@ -261,6 +303,8 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = build_place_shapes(b);
 	if (!rc)
 		rc = create_bsdfs(b);
+	if (!rc)
+		rc = create_media(b);
 	if (!rc)
 		rc = create_emitters(b);
 	if (b->found && b->found->problem_count)

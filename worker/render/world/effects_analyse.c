@@ -55,6 +55,7 @@ struct census {
 	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
 	struct tally hidden_specular, hidden_dispersive,
 		unused_dispersive; /* materials that no path meets; that no shape uses */
+	struct tally absorbing;
 	struct tally environment, area, delta, textured_light, coloured_light;
 	enum visibility_bounds why_hidden;
 	size_t shape[3];
@@ -137,6 +138,16 @@ static void add_emitter(struct census *c, const struct emitter *em, const struct
 	c->shape[em->shape]++;
 }
 
+static void add_medium(struct census *c, const struct world *w, uint32_t medium, const struct scene_node *shape,
+		       const char *name)
+{
+	if (!medium || !(color_max(&w->media[medium - 1].sigma_a) * w->media[medium - 1].per_length > 0))
+		return;
+	count(&c->absorbing, shape, "");
+	if (w->media[medium - 1].sigma_a.shape != COLOR_SHAPE_CONSTANT)
+		count(&c->coloured, node_ref(shape, name), "");
+}
+
 static struct census take_census(const struct world *w, const struct effects_source *src,
 				 const enum visibility_bounds *shape)
 {
@@ -152,6 +163,11 @@ static struct census take_census(const struct world *w, const struct effects_sou
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		if (visibility_bounds_emitter(w, shape, i))
 			add_emitter(&c, &w->emitters[i], src->emitter[i]);
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (shape[i] == VISIBILITY_YES) {
+			add_medium(&c, w, w->parts[i].interior, src->shape[i], "interior");
+			add_medium(&c, w, w->parts[i].exterior, src->shape[i], "exterior");
+		}
 	add_unused(&c, w, src);
 	return c;
 }
@@ -304,6 +320,10 @@ static void lobes(struct report *r, const struct census *c)
 				"is diffuse only");
 	fx->transmission = materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through",
 				     "let light through", "lets it through");
+	char text[NAMES_MAX];
+	fx->absorption = c->absorbing.count ? line(r, EFFECT_ABSORPTION, true, "%s border%s on a medium that absorbs",
+						   names_of(&c->absorbing, text), verb(&c->absorbing, "s", ""))
+					    : line(r, EFFECT_ABSORPTION, false, "no medium absorbs");
 }
 
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)

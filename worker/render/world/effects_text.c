@@ -29,6 +29,7 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_DIFFUSE] = {"diffuse", ON | SCENE, "nothing: it costs only paths that meet such a surface", NULL},
 	[EFFECT_TRANSMISSION] = {"transmission", ON | SCENE, "nothing: it costs only paths that meet such a surface",
 				 NULL},
+	[EFFECT_ABSORPTION] = {"absorption", ON | SCENE, "no medium and no exponential per edge", NULL},
 	[EFFECT_TEXTURES] = {"textures", ON, "colours are constants: no look-ups by (u,v)",
 			     "without its textures a scene has no colours"},
 	[EFFECT_DISPLACEMENT] = {"displacement", ON | SCENE, "no finer meshes are made: time and memory of building",

@@ -9,12 +9,14 @@
 
 #include "worker/render/camera/camera.h"
 #include "worker/render/geom/surface.h"
+#include "worker/render/medium/medium.h"
 #include "worker/render/settings/accuracy_settings.h"
 #include "worker/render/world/effects.h"
 
 struct world_shape {
 	uint32_t bsdf;
-	int32_t emitter; /* -1: not an emitter */
+	int32_t emitter;	     /* -1: not an emitter */
+	uint32_t interior, exterior; /* medium, 1 + its index; 0: none */
 };
 
 struct world {
@@ -31,6 +33,8 @@ struct world {
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
+	uint32_t media_count;
+	struct medium *media;
 	uint32_t *emitter_shape;	     /* that it belongs to; UINT32_MAX: none */
 	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */
 	int32_t environment;		     /* index of the emitter that escaping rays meet; -1: none */

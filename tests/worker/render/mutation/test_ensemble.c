@@ -10,7 +10,9 @@
 #include "tests/support/stats.h"
 #include "worker/render/mutation/mutation.h"
 #include "worker/render/mutation/trace.h"
+#include "worker/render/math/logsum.h"
 #include "worker/render/path/ensemble.h"
+#include "worker/render/path/full_path_density.h"
 #include "worker/render/world/build.h"
 
 #include <setjmp.h>
@@ -65,13 +67,37 @@ static bool has(const struct ensemble *e, unsigned edges, double intensity, bool
 	return false;
 }
 
+/* Each candidate of a pair around a path contributes what its own path says of itself. */
+static unsigned check_candidates(const char *name)
+{
+	unsigned checked = 0;
+	double before = 0;
+	for (unsigned k = 0; k < around.count; before += around.of[k++].intensity) {
+		const struct candidate *a = &around.of[k];
+		double log_pdf[FULL_PATH_MAX_VERTICES];
+		/* The path's own point on the emitter is not the one that the random numbers draw. */
+		bool own = a->s == 1 && a->edges == x.edges;
+		if (own || a->intensity < 1e-6 * around.total ||
+		    !ensemble_choose(&c, &around, (before + 0.5 * a->intensity) / around.total, &y))
+			continue;
+		full_path_log_techniques(&c, &y, log_pdf);
+		double chances = chance(y.edges + 1 - a->s) * chance(a->s),
+		       want = exp(full_path_log_f(&c, &y) - log_sum_exp(log_pdf, y.edges + 1)) / chances;
+		if (!(fabs(a->intensity / want - 1) < 1e-6))
+			fail_msg("%s: %u edges by technique %u: %.9g, not %.9g", name, y.edges, a->s, a->intensity,
+				 want);
+		checked++;
+	}
+	return checked;
+}
+
 /* The path's own candidate, in a pair around it, contributes what it did where it was found, over the chance of the
  * lengths. */
 static void check_own_candidate(const char *name)
 {
 	struct world *w = room_of(name);
 	uint64_t seed = stats_seed(name);
-	unsigned checked = 0, longest = 0;
+	unsigned checked = 0, longest = 0, others = 0;
 	begin(w);
 	const struct ensemble_lengths all = ensemble_all_lengths(&c);
 	for (uint64_t i = 0; i < TRIALS; i++) {
@@ -92,8 +118,9 @@ static void check_own_candidate(const char *name)
 				 (unsigned long long)i, own.edges, own.s, own.intensity);
 		checked++;
 		longest += own.edges > 5;
+		others += check_candidates(name);
 	}
-	print_message("%s: %u paths, %u of more than 5 edges\n", name, checked, longest);
+	print_message("%s: %u paths, %u of more than 5 edges, %u candidates\n", name, checked, longest, others);
 	assert_true(checked > TRIALS / 4 && longest > 20);
 	world_free(w);
 }
@@ -103,6 +130,7 @@ static void test_own_candidate(void **state)
 	(void)state;
 	check_own_candidate("gold");
 	check_own_candidate("rough glass");
+	check_own_candidate("coloured glass");
 	check_own_candidate("bent normals");
 }
 

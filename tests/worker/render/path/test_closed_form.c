@@ -122,6 +122,35 @@ static void test_invisible(void **state)
 		       0.7, (struct effort){1536, 1024, 0});
 }
 
+/* Through 1.4 of a medium of 1.1, behind 0.6 of one of 0.5: seen at a right angle, and without refraction. What is in
+ * the second states no medium. */
+static void test_absorbing(void **state)
+{
+	(void)state;
+#define SLAB(size, inner)                                                           \
+	"<shape type='cube'><transform name='to_world'><scale x='9' y='9' z='" size \
+	"'/></transform><bsdf type='null'/>" inner "</shape>"
+	static const char view[] =
+		"<sensor type='orthographic'><float name='far_clip' value='100'/><transform name='to_world'><lookat "
+		"origin='0.2,0.1,40' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>"
+		"</film></sensor>";
+	check_constant(
+		"absorbing slabs",
+		world_of_text(
+			16, 16,
+			"%s<integrator type='path'><integer name='max_depth' value='16'/><integer name='rr_depth' "
+			"value='16'/></integrator>" SKY
+			"<medium type='homogeneous' id='haze'><spectrum name='sigma_t' value='0.25'/><float name='scale' value='2'/>"
+			"<spectrum name='albedo' value='0'/><phase type='isotropic'/></medium>" SLAB(
+				"1", "<ref name='interior' id='haze'/>")
+				SLAB("0.7",
+				     "<medium type='homogeneous' name='interior'><spectrum name='sigma_a' value='1.1'/>"
+				     "<spectrum name='sigma_s' value='0'/></medium><ref name='exterior' id='haze'/>")
+					SLAB("0.1", ""),
+			view),
+		0.7 * exp(-1.1 * 1.4 - 0.5 * 0.6), (struct effort){64, 64, 0});
+}
+
 /* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r,
  * all of it above the horizon: pi r^2 / d^2 times the cosine. Irradiance at (x, z) from its foot, radiance 1. */
 struct lamp {
@@ -373,9 +402,9 @@ static void test_black(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_furnace), cmocka_unit_test(test_invisible), cmocka_unit_test(test_lit_floor),
-		cmocka_unit_test(test_beam),	cmocka_unit_test(test_plates),	  cmocka_unit_test(test_hard),
-		cmocka_unit_test(test_black),
+		cmocka_unit_test(test_furnace),	  cmocka_unit_test(test_invisible), cmocka_unit_test(test_absorbing),
+		cmocka_unit_test(test_lit_floor), cmocka_unit_test(test_beam),	    cmocka_unit_test(test_plates),
+		cmocka_unit_test(test_hard),	  cmocka_unit_test(test_black),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

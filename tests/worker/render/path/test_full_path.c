@@ -31,10 +31,13 @@
 
 enum { EDGES = 8 };
 
-static double intensity_of(struct path_context *c, spectrum l)
+/* X + Y + Z, and their shares. */
+static double intensity_of(struct path_context *c, spectrum l, double share[3])
 {
 	struct path_sample s = {.count = 0, .intensity = 0};
 	path_splat(c, &s, 0, 0, l);
+	for (int k = 0; k < 3 && s.intensity > 0; k++)
+		share[k] = s.splats[0].xyz[k] / s.intensity;
 	return s.intensity;
 }
 
@@ -56,8 +59,8 @@ struct tally {
 static void compare(struct path_context *c, unsigned s, unsigned edges, struct tally *t)
 {
 	static struct full_path x;
-	double film[2];
-	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film));
+	double film[2], share[3], colour[3];
+	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film), share);
 	bool there = full_path_from_subpaths(c, s, edges, &x);
 	if (!there || want == 0) {
 		/* A film point that is drawn on the border may be computed on its other side. */
@@ -69,6 +72,9 @@ static void compare(struct path_context *c, unsigned s, unsigned edges, struct t
 	if (!path_check(c, &x, text, sizeof text))
 		fail_msg("technique %u of %u edges: %s", s, edges, text);
 	double got = f_over_p(c, &x), off = fabs(got - want) / want;
+	full_path_colour(c, &x, colour);
+	for (int k = 0; k < 3; k++)
+		off = fmax(off, fabs(colour[k] - share[k]));
 	t->compared++;
 	if (off > t->worst)
 		t->worst = off;
@@ -121,6 +127,35 @@ static void test_surfaces(void **state)
 	      1500);
 	check("mirror", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
 	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
+}
+
+/* Coloured glass around a stone that states no medium, and around a bubble that states what is outside of it; water up
+ * to the lamp. */
+static void test_media(void **state)
+{
+	(void)state;
+#define MEDIUM(side, sigma)                                                                                           \
+	"<medium type='homogeneous' name='" side "'><rgb name='sigma_a' value='" sigma "'/><spectrum name='sigma_s' " \
+	"value='0'/></medium>"
+#define INSIDE(radius, x, inner)                                                                                 \
+	"<shape type='sphere'><point name='center' value='" x ",-0.6,-0.3'/><float name='radius' value='" radius \
+	"'/>" inner "</shape>"
+	struct world *w = world_of_text(
+		32, 32,
+		ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>" MEDIUM(
+			"interior", "0.3,1,2")) INSIDE("0.3", "-0.3", "<bsdf type='diffuse'/>")
+			INSIDE("0.2", "0.3",
+			       "<bsdf type='roughdielectric'><float name='int_ior' value='1.2'/><float name='ext_ior' "
+			       "value='1.5'/><float name='alpha' value='0.3'/></bsdf>" MEDIUM("exterior", "0.3,1,2")));
+	assert_true(w->effects.absorption && w->media_count == 2);
+	check("coloured glass", w, 4000);
+	check("a layer of water",
+	      world_of_text(
+		      32, 32,
+		      ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>") "<shape type='cube'>" AT(
+			      "<scale x='1.9' y='0.5' z='1.9'/><translate y='-1.4'/>") "<bsdf type='dielectric'><float name='int_ior' value='1.33'/></bsdf>" MEDIUM("interior",
+																				    "0.9,0.4,0.2") "</shape>"),
+	      4000);
 }
 
 /* A sphere is drawn towards a vertex within the cone in which it is seen, and on all of its area for a light sub-path.
@@ -222,8 +257,9 @@ static void test_sides(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces), cmocka_unit_test(test_round_lamp), cmocka_unit_test(test_environment),
-		cmocka_unit_test(test_ends),	 cmocka_unit_test(test_clipped),    cmocka_unit_test(test_sides),
+		cmocka_unit_test(test_surfaces),    cmocka_unit_test(test_media), cmocka_unit_test(test_round_lamp),
+		cmocka_unit_test(test_environment), cmocka_unit_test(test_ends),  cmocka_unit_test(test_clipped),
+		cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

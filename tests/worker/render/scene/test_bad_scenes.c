@@ -332,6 +332,42 @@ static void test_media_are_told_once(void **state)
 	scene_fini(&s);
 }
 
+/* Of those that only absorb, a shape has one on each side, an emitter may be in one, and a camera may not. */
+static void test_absorbing_media(void **state)
+{
+	(void)state;
+#define ABSORBS "<rgb name='sigma_s' value='0, 0, 0'/><rgb name='sigma_a' value='1, 2, 3'/>"
+	static const char xml[] = S "<medium type='homogeneous' id='tea'>" ABSORBS "<phase type='hg'/></medium>"
+				    "<shape type='cube'><ref id='tea' name='interior'/></shape>"
+				    "<shape type='sphere'><emitter type='area'><ref id='tea'/></emitter></shape>" END;
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	if (scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	const struct scene_node *tea = node_ref(s.objects[1], "interior");
+	assert_true(tea && tea->cls == PLUGIN_MEDIUM && node_find(tea, "sigma_a"));
+	assert_null(node_ref(s.objects[1], "exterior"));
+	scene_fini(&s);
+	refuses(S "<medium type='homogeneous' id='tea'>" ABSORBS "</medium><sensor type='perspective'><ref id='tea'/>"
+		  "</sensor>" END,
+		"<ref>: a medium around a sensor is not supported");
+	refuses(S "<shape type='cube'><medium type='homogeneous'>" ABSORBS "</medium></shape>" END,
+		"a medium without a name has no place in <shape type=\"cube\">");
+	refuses(S "<shape type='cube'><medium type='homogeneous' name='interior'>" ABSORBS
+		  "<float name='sigma' value='1'/></medium></shape>" END,
+		"<medium type=\"homogeneous\"> has no `sigma`; did you mean `sigma_");
+	static const char *const scatter[] = {
+		"<rgb name='sigma_s' value='0, 0.1, 0'/>", "<float name='albedo' value='0.1'/>",
+		"<spectrum name='sigma_s' value='none'/>", "<volume name='albedo' type='grid'/>"};
+	for (size_t i = 0; i < sizeof scatter / sizeof *scatter; i++) {
+		char one[512];
+		snprintf(one, sizeof one, S "<medium type='homogeneous'>%s</medium>" END, scatter[i]);
+		refuses(one, "participating media are not supported");
+	}
+}
+
 /* What a fork's parameter is taken for is in test_scene.c. */
 static void test_misplaced_parameters(void **state)
 {
@@ -413,21 +449,14 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_broken_xml),
-		cmocka_unit_test(test_entity_bomb),
-		cmocka_unit_test(test_parameter_bomb),
-		cmocka_unit_test(test_deep_nesting),
-		cmocka_unit_test(test_too_many_elements),
-		cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_names_without_values),
-		cmocka_unit_test(test_media_are_told_once),
-		cmocka_unit_test(test_misplaced_parameters),
-		cmocka_unit_test(test_bad_values),
-		cmocka_unit_test(test_bad_transforms),
-		cmocka_unit_test(test_bad_references),
-		cmocka_unit_test(test_flat_shapes),
-		cmocka_unit_test(test_bad_includes),
-		cmocka_unit_test(test_bad_films),
+		cmocka_unit_test(test_broken_xml),	     cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),	     cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements),    cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_names_without_values), cmocka_unit_test(test_media_are_told_once),
+		cmocka_unit_test(test_absorbing_media),	     cmocka_unit_test(test_misplaced_parameters),
+		cmocka_unit_test(test_bad_values),	     cmocka_unit_test(test_bad_transforms),
+		cmocka_unit_test(test_bad_references),	     cmocka_unit_test(test_flat_shapes),
+		cmocka_unit_test(test_bad_includes),	     cmocka_unit_test(test_bad_films),
 		cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
