@@ -6,9 +6,9 @@
  * factor of ten.
  *
  * Details that `principled` does not have are left out with a note: normals of a coat, what a sheen or a reflection
- * varies by. So
- * are extensions that are not known, as the format wants it of those that a file does not require. What fills a body
- * becomes a property that the table does not know: refused with its name, or left out with --lenient.
+ * varies by. So are extensions that are not known, as the format wants it of those that a file does not require. The
+ * dispersion of anything but clear glass becomes a property that the table does not know: refused with its name, or
+ * left out with --lenient.
  */
 #include "worker/render/scene/gltf_layers.h"
 #include "worker/render/scene/gltf_texture.h"
@@ -16,15 +16,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-/* Members of an extension without counterpart, as properties that no table has. */
-void gltf_put_unsupported(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const json_t *extension,
-			  const char *const *members)
-{
-	for (; *members; members++)
-		if (json_object_get(extension, *members))
-			gltf_put_text(g, el, at, *members, ELEMENT_UNSUPPORTED);
-}
 
 /* Members that are left out. what: of which layer, and why that matters little. */
 static void note_members(struct gltf *g, const json_t *extension, const char *const *members, const char *note)
@@ -159,14 +150,12 @@ static void note_iridescence(struct gltf *g, const struct gltf_at *at)
 static void put_transmission(struct gltf *g, struct xml_element *el, const struct gltf_at *at)
 {
 	const json_t *t = gltf_extension(g, at, at->json, "KHR_materials_transmission"),
-		     *volume = gltf_extension(g, at, at->json, "KHR_materials_volume"),
 		     *dispersion = gltf_extension(g, at, at->json, "KHR_materials_dispersion");
 	double factor = t ? gltf_number(g, at, t, "transmissionFactor", 0) : 0;
 	if (factor > 0) {
 		gltf_put_share(g, el, at, "spec_trans", factor, gltf_object(g, at, t, "transmissionTexture"), "r");
-		gltf_put_unsupported(g, el, at, volume, (const char *const[]){"attenuationDistance", NULL});
 		if (dispersion && gltf_number(g, at, dispersion, "dispersion", 0) > 0)
-			gltf_put_unsupported(g, el, at, dispersion, (const char *const[]){"dispersion", NULL});
+			gltf_put_text(g, el, at, "dispersion", ELEMENT_UNSUPPORTED);
 	}
 }
 

@@ -9,9 +9,6 @@
  * which one of them changes. */
 void gltf_put_layers(struct gltf *g, struct xml_element *el, const struct gltf_at *material, double roughness,
 		     const json_t *texture);
-/* Members of an extension without counterpart, up to NULL, as properties that no table has. */
-void gltf_put_unsupported(struct gltf *g, struct xml_element *el, const struct gltf_at *material,
-			  const json_t *extension, const char *const *members);
 /* A note of each unknown extension that the file does not list: gltf.c tells of those that it does. */
 void gltf_note_foreign(struct gltf *g, const struct gltf_at *material);
 

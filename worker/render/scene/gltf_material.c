@@ -12,6 +12,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define DARKEST 1e-6 /* no light at all would be an infinite coefficient */
+
 static void put_attribute(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
 			  const char *attribute)
 {
@@ -101,10 +103,12 @@ static void put_id(struct gltf *g, struct xml_element *el, const struct gltf_at 
 	gltf_attribute(g, el, "id", "%s of materials[%zu]%s", what, at->index, with[colours]);
 }
 
-static void put_ref(struct gltf *g, struct xml_element *shape, const struct gltf_at *at, const char *what,
-		    enum gltf_colours colours)
+static struct xml_element *put_ref(struct gltf *g, struct xml_element *shape, const struct gltf_at *at,
+				   const char *what, enum gltf_colours colours)
 {
-	put_id(g, gltf_element(g, shape, at, "ref"), at, what, colours);
+	struct xml_element *ref = gltf_element(g, shape, at, "ref");
+	put_id(g, ref, at, what, colours);
+	return ref;
 }
 
 bool gltf_material_shines(struct gltf *g, const struct gltf_at *at, double rgb[3])
@@ -145,8 +149,6 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 		gltf_put_text(g, bsdf, at, "distribution", "ggx");
 		gltf_put_number(g, bsdf, at, "alpha", s->roughness * s->roughness);
 	}
-	gltf_put_unsupported(g, bsdf, at, gltf_extension(g, at, at->json, "KHR_materials_volume"),
-			     (const char *const[]){"attenuationDistance", NULL});
 	gltf_note_foreign(g, at);
 	if (!g->failed)
 		put_id(g, parent == g->scene ? bsdf : parent, at, "bsdf", GLTF_NO_COLOURS);
@@ -187,17 +189,48 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 	g->has_light |= rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
 }
 
+/* Of what is left of white light after `distance` this is the colour: the coefficient of Beer's law. Without thickness
+ * a volume is a sheet, which absorbs nothing. */
+static bool absorbs(struct gltf *g, const struct gltf_at *at, double sigma_a[3])
+{
+	const json_t *volume = gltf_extension(g, at, at->json, "KHR_materials_volume"),
+		     *t = gltf_extension(g, at, at->json, "KHR_materials_transmission");
+	double distance = volume ? gltf_number(g, at, volume, "attenuationDistance", 0) : 0, left[3] = {1, 1, 1};
+	if (!(distance > 0) || !t || !(gltf_number(g, at, t, "transmissionFactor", 0) > 0) ||
+	    !(gltf_number(g, at, volume, "thicknessFactor", 0) > 0))
+		return false;
+	gltf_numbers(g, at, volume, "attenuationColor", left, 3);
+	for (int k = 0; k < 3; k++)
+		sigma_a[k] = -log(fmin(fmax(left[k], DARKEST), 1)) / distance;
+	return sigma_a[0] > 0 || sigma_a[1] > 0 || sigma_a[2] > 0;
+}
+
+static void put_medium(struct gltf *g, const struct gltf_at *at)
+{
+	double sigma_a[3];
+	if (!absorbs(g, at, sigma_a))
+		return;
+	struct xml_element *medium = gltf_plugin(g, g->scene, at, "medium", "homogeneous", NULL);
+	gltf_put_rgb(g, medium, at, "sigma_a", sigma_a);
+	gltf_put_number(g, medium, at, "albedo", 0);
+	put_id(g, medium, at, "medium", GLTF_NO_COLOURS);
+}
+
 void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *at, enum gltf_colours colours)
 {
 	double rgb[3];
 	if (!(g->material_made[at->index] >> colours & 1))
 		put_principled(g, at, colours);
-	if (!g->material_made[at->index])
+	if (!g->material_made[at->index]) {
 		put_emitter(g, at);
+		put_medium(g, at);
+	}
 	g->material_made[at->index] |= (unsigned char)(1u << colours);
 	put_ref(g, shape, at, "bsdf", colours);
 	if (gltf_material_shines(g, at, rgb))
 		put_ref(g, shape, at, "emitter", GLTF_NO_COLOURS);
+	if (absorbs(g, at, rgb))
+		gltf_attribute(g, put_ref(g, shape, at, "medium", GLTF_NO_COLOURS), "name", "interior");
 }
 
 /* The format's is rough white metal; what has no material in Blender is grey there. */

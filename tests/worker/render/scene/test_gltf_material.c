@@ -50,6 +50,34 @@ static void test_layers(void **state)
 	scene_fini(&s);
 }
 
+/* Of white light a quarter of the red, half of the green and nearly nothing of the blue is left after 2. */
+static void test_volume(void **state)
+{
+	(void)state;
+	static const char volume[] =
+		"\"KHR_materials_volume\": {\"attenuationDistance\": 2, \"attenuationColor\": [0.25, 0.5, 0]",
+			  third[] = "medium of materials[2]";
+	char with[256], thin[256];
+	snprintf(with, sizeof with, "%s, \"thicknessFactor\": 0.1}, " IOR, volume);
+	snprintf(thin, sizeof thin, "%s}, " IOR, volume);
+	struct scene s = gltf_files_scene(IOR, with, false);
+	const struct scene_node *medium = scene_named(&s, third);
+	const double *sigma_a = node_find(medium, "sigma_a")->value.as.rgb;
+	assert_near(exp(-2 * sigma_a[0]), 0.25);
+	assert_near(exp(-2 * sigma_a[1]), 0.5);
+	assert_true(exp(-2 * sigma_a[2]) < 2e-6);
+	uint32_t inside = 0;
+	for (uint32_t i = 0; i < s.object_count; i++)
+		if (s.objects[i]->cls == PLUGIN_SHAPE && node_ref(s.objects[i], "interior") == medium)
+			inside++;
+	assert_true(inside > 0);
+	scene_fini(&s);
+	s = gltf_files_scene(IOR, thin, false);
+	for (uint32_t i = 0; i < s.object_count; i++)
+		assert_true(s.objects[i]->cls != PLUGIN_MEDIUM);
+	scene_fini(&s);
+}
+
 /* The two roughnesses of `principled` are those of the format. */
 static void test_anisotropy(void **state)
 {
@@ -275,10 +303,15 @@ static void test_images_in_buffers(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_materials),	 cmocka_unit_test(test_layers),
-		cmocka_unit_test(test_anisotropy),	 cmocka_unit_test(test_reflection),
-		cmocka_unit_test(test_both_sides_shine), cmocka_unit_test(test_images_in_buffers),
-		cmocka_unit_test(test_no_material),	 cmocka_unit_test(test_webp),
+		cmocka_unit_test(test_materials),
+		cmocka_unit_test(test_layers),
+		cmocka_unit_test(test_volume),
+		cmocka_unit_test(test_anisotropy),
+		cmocka_unit_test(test_reflection),
+		cmocka_unit_test(test_both_sides_shine),
+		cmocka_unit_test(test_images_in_buffers),
+		cmocka_unit_test(test_no_material),
+		cmocka_unit_test(test_webp),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
 }
