@@ -302,7 +302,8 @@ void full_path_absorb(const struct world *w, const struct full_path *x, struct p
 	uint32_t medium = 0;
 	for (unsigned e = x->edges - 1; e > 0; e--) {
 		medium = path_medium_after(w, &x->v[e], medium, vec3_neg(x->edge[e - 1].w));
-		product_mul(p, path_transmittance(w, &x->wl, medium, &x->v[e], &x->v[e - 1]));
+		if (medium)
+			product_mul(p, path_transmittance(w, &x->wl, medium, &x->v[e], &x->v[e - 1]));
 	}
 }
 

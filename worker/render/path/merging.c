@@ -15,7 +15,8 @@
  * are summed up when the photon is stored.
  *
  * Photons behind an edge or on another surface are told by their normals and their distance from z's plane. A surface
- * that bends within r blurs, and so does a shadow's edge: of a sum over all samples little is lost.
+ * that bends within r blurs, and so does a shadow's edge: of a sum over all samples little is lost. What media absorb
+ * of a photon's light is not counted: only the path that it will belong to says which media it was in.
  */
 #include "worker/render/path/merging.h"
 
