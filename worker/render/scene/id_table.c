@@ -16,18 +16,29 @@ static int compare_ids(const void *a, const void *b)
 	return strcmp(x->id, y->id);
 }
 
+bool id_table_names(const struct xml_element *el)
+{
+	enum plugin_class cls;
+	if (el->ignored || !xml_attribute(el, "id"))
+		return false;
+	return plugin_class_find(el->name, &cls) || (strcmp(el->name, "spectrum") == 0 && xml_attribute(el, "type"));
+}
+
+struct xml_element *id_table_look(const struct id_table *t, const char *id)
+{
+	struct id_entry key = {id, NULL};
+	const struct id_entry *found = bsearch(&key, t->entries, t->count, sizeof key, compare_ids);
+	return found ? found->element : NULL;
+}
+
 int id_table_find(struct id_table *t, const struct xml_element *el, const char *attribute, struct xml_element **out,
 		  struct error *e)
 {
 	const char *id = xml_attribute(el, attribute);
 	if (!id)
 		return xml_error(el, e, EINVAL, "needs an attribute `%s`", attribute);
-	struct id_entry key = {id, NULL};
-	const struct id_entry *found = bsearch(&key, t->entries, t->count, sizeof key, compare_ids);
-	if (found) {
-		*out = found->element;
+	if ((*out = id_table_look(t, id)))
 		return 0;
-	}
 	char hint[128];
 	struct spelling s = {.wanted = id};
 	for (size_t i = 0; i < t->count && t->compared < COMPARED_MAX; i++, t->compared++)
@@ -86,18 +97,15 @@ static int read_alias(struct id_table *t, const struct xml_element *el, struct e
 int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena *arena, struct error *e)
 {
 	enum { ALIASES_MAX = 256 };
-	enum plugin_class cls;
 	size_t n = 0, aliases = 0;
 	for (struct xml_element *el = tree->root; el; el = next_element(el))
 		n += xml_attribute(el, "id") != NULL;
 	t->entries = arena_alloc(arena, n, sizeof *t->entries);
 	if (!t->entries)
 		return error_set(e, ENOMEM, "out of memory, or the scene files take too much of it");
-	for (struct xml_element *el = tree->root; el; el = next_element(el)) {
-		const char *id = xml_attribute(el, "id");
-		if (id && !el->ignored && plugin_class_find(el->name, &cls))
-			t->entries[t->count++] = (struct id_entry){id, el};
-	}
+	for (struct xml_element *el = tree->root; el; el = next_element(el))
+		if (id_table_names(el))
+			t->entries[t->count++] = (struct id_entry){xml_attribute(el, "id"), el};
 	int r = check_unique(t, e);
 	for (struct xml_element *el = tree->root; el && !r; el = next_element(el)) {
 		if (el->ignored || strcmp(el->name, "alias") != 0)

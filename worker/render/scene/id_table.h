@@ -20,6 +20,12 @@ struct id_table {
  * of nothing, is an error. */
 int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena *arena, struct error *e);
 
+/* Whether it is an element that an id may name: an object, or a spectrum with a type. */
+bool id_table_names(const struct xml_element *el);
+
+/* The object of that id. NULL: none. */
+struct xml_element *id_table_look(const struct id_table *t, const char *id);
+
 /* The object that el's attribute names. -ENOENT, with the nearest id. */
 int id_table_find(struct id_table *t, const struct xml_element *el, const char *attribute, struct xml_element **out,
 		  struct error *e);

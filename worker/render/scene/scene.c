@@ -395,7 +395,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	el->told = true; /* reset on success */
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);
-	int r = element_check(el, "type|id|name", true, m->error);
+	bool file = el->parent && strcmp(el->parent->name, "include") == 0;
+	int r = element_check(el, file ? "type|id|name|version" : "type|id|name", true, m->error);
 	if (r)
 		return r;
 	if (cls == PLUGIN_MEDIUM && !medium_only_absorbs(el)) {
@@ -445,14 +446,6 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	return r;
 }
 
-static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
-
-static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
-{
-	int r = element_check(el, "filename", true, m->error);
-	return r ? r : read_top(m, el->first, objects);
-}
-
 static int make_object(struct maker *m, struct xml_element *el, const struct scene_node **out)
 {
 	int r = make_node(m, el, out);
@@ -465,29 +458,39 @@ static int make_object(struct maker *m, struct xml_element *el, const struct sce
 	return r;
 }
 
-static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects)
+static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
+
+static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
 {
-	int r = element_check(scene, "version", true, m->error);
+	int r = element_check(el, "filename", true, m->error);
+	return r ? r : read_top(m, strcmp(el->first->name, "scene") == 0 ? el->first : el, objects);
+}
+
+/* An element that stands directly in <scene>, or alone in a file that is included there. */
+static int read_top_element(struct maker *m, struct xml_element *el, const struct scene_node **objects)
+{
+	enum plugin_class cls;
+	if (el->ignored)
+		return note_foreign(&m->notes, el);
+	if (plugin_class_find(el->name, &cls))
+		return make_object(m, el, &objects[m->scene->object_count]);
+	if (strcmp(el->name, "include") == 0)
+		return read_include(m, el, objects);
+	if (strcmp(el->name, "default") == 0)
+		return element_check(el, "name|value", false, m->error);
+	if (strcmp(el->name, "path") == 0)
+		return element_check(el, "value", false, m->error);
+	if (value_is_element(el->name) && el->snake) /* a property of the scene: 0.6 has none */
+		return note_foreign(&m->notes, el);
+	return strcmp(el->name, "alias") == 0 || id_table_names(el) ? 0 : foreign_element(m, el);
+}
+
+static int read_top(struct maker *m, const struct xml_element *around, const struct scene_node **objects)
+{
+	int r = strcmp(around->name, "scene") == 0 ? element_check(around, "version", true, m->error) : 0;
 	r = report_problem(&m->report, r, m->error);
-	for (struct xml_element *el = scene->first; el && !r; el = el->next) {
-		enum plugin_class cls;
-		const struct scene_node **next = &objects[m->scene->object_count];
-		if (el->ignored)
-			r = note_foreign(&m->notes, el);
-		else if (plugin_class_find(el->name, &cls))
-			r = make_object(m, el, next);
-		else if (strcmp(el->name, "include") == 0)
-			r = read_include(m, el, objects);
-		else if (strcmp(el->name, "default") == 0)
-			r = element_check(el, "name|value", false, m->error);
-		else if (strcmp(el->name, "path") == 0)
-			r = element_check(el, "value", false, m->error);
-		else if (value_is_element(el->name) && el->snake) /* a property of the scene: 0.6 has none */
-			r = note_foreign(&m->notes, el);
-		else if (strcmp(el->name, "alias") != 0)
-			r = foreign_element(m, el);
-		r = report_problem(&m->report, r, m->error);
-	}
+	for (struct xml_element *el = around->first; el && !r; el = el->next)
+		r = report_problem(&m->report, read_top_element(m, el, objects), m->error);
 	return r;
 }
 
@@ -516,6 +519,8 @@ static int make_scene(struct maker *m)
 	s->objects = objects;
 	texture_names_settle(m->decls, m->tree->root);
 	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
+	if (!r)
+		r = texture_names_follow(m->tree->root, &m->ids, &m->scene->arena, m->error);
 	if (!r)
 		r = obj_materials_spread(m->tree, &m->ids, m->assets_from, &m->assets, &m->scene->arena, &m->report,
 					 m->error);

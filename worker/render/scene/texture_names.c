@@ -3,6 +3,7 @@
 
 #include "worker/render/scene/spectral.h"
 
+#include <errno.h>
 #include <string.h>
 
 void texture_names_settle(const struct plugin_decl *decls, struct xml_element *root)
@@ -14,4 +15,39 @@ void texture_names_settle(const struct plugin_decl *decls, struct xml_element *r
 		root->name = "spectrum";
 	for (struct xml_element *c = root->first; c; c = c->next)
 		texture_names_settle(decls, c);
+}
+
+/* The attributes of the spectrum under the name, if any, by which it is referred to. */
+static int become(struct xml_element *ref, const struct xml_element *spectrum, struct arena *arena, struct error *e)
+{
+	const char *name = xml_attribute(ref, "name");
+	struct xml_attribute *a = arena_alloc(arena, spectrum->attribute_count + 1, sizeof *a);
+	if (!a)
+		return xml_error(ref, e, ENOMEM, "out of memory");
+	uint32_t n = 0;
+	for (uint32_t i = 0; i < spectrum->attribute_count; i++)
+		if (strcmp(spectrum->attributes[i].name, "name") != 0)
+			a[n++] = spectrum->attributes[i];
+	if (name)
+		a[n++] = (struct xml_attribute){"name", name};
+	ref->name = spectrum->name;
+	ref->attributes = a;
+	ref->attribute_count = n;
+	ref->first = spectrum->first;
+	ref->last = spectrum->last;
+	return 0;
+}
+
+int texture_names_follow(struct xml_element *root, struct id_table *ids, struct arena *arena, struct error *e)
+{
+	if (strcmp(root->name, "spectrum") == 0) /* which holds values alone; one that holds a <ref> is refused later */
+		return 0;
+	const char *id = strcmp(root->name, "ref") == 0 && !root->ignored ? xml_attribute(root, "id") : NULL;
+	const struct xml_element *target = id ? id_table_look(ids, id) : NULL;
+	if (target && strcmp(target->name, "spectrum") == 0)
+		return become(root, target, arena, e);
+	int r = 0;
+	for (struct xml_element *c = root->first; c && !r; c = c->next)
+		r = texture_names_follow(c, ids, arena, e);
+	return r;
 }

@@ -4,10 +4,15 @@
 #ifndef WORKER_RENDER_SCENE_TEXTURE_NAMES_H
 #define WORKER_RENDER_SCENE_TEXTURE_NAMES_H
 
+#include "worker/render/scene/id_table.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/xml.h"
 
 /* <spectrum type="bitmap"> becomes a <texture>, <texture type="uniform"> a <spectrum>, in all of the tree. */
 void texture_names_settle(const struct plugin_decl *decls, struct xml_element *root);
+
+/* A <ref> to a spectrum that is an object, <spectrum type="blackbody" id="lamp">, becomes that spectrum. 0, or -ENOMEM.
+ */
+int texture_names_follow(struct xml_element *root, struct id_table *ids, struct arena *arena, struct error *e);
 
 #endif

@@ -161,10 +161,10 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 	return 0;
 }
 
-/* The version determines which dialect's names and rules apply. */
+/* The version determines which dialect's names and rules apply. An included file may hold one object alone. */
 static int begin_file(struct reader *r, struct xml_element *el)
 {
-	if (strcmp(el->name, "scene") != 0)
+	if (!el->parent && strcmp(el->name, "scene") != 0)
 		return xml_error(el, r->error, EINVAL, "a scene file must begin with <scene version=\"...\">");
 	const char *version = xml_attribute(el, "version");
 	int64_t major;
@@ -352,7 +352,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	const char *name = xml_attribute(el, "filename");
 	if (!name)
 		return xml_error(el, r->error, EINVAL, "needs filename");
-	if (el->parent != r->top)
+	if (el->parent != r->top || strcmp(r->top->name, "scene") != 0)
 		return xml_error(el, r->error, EINVAL, "may stand directly in <scene> only");
 	if (r->includes >= XML_INCLUDE_MAX)
 		return xml_error(el, r->error, ELOOP, "files include each other more than %d deep", XML_INCLUDE_MAX);

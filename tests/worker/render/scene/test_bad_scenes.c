@@ -382,6 +382,23 @@ static void test_misplaced_parameters(void **state)
 	refuses(BSDF("<rgb name='alpha' value='2'/>"), "alpha=2 is outside");
 }
 
+static void test_bad_spectra(void **state)
+{
+	(void)state;
+	static const char use[] = "<bsdf type='diffuse'><ref name='reflectance' id='s'/></bsdf>";
+	char text[512];
+	snprintf(text, sizeof text, S "<spectrum type='uniform' id='s'>\n<ref name='value' id='s'/></spectrum>%s" END,
+		 use);
+	refuses(text, "s.xml:2: <ref>: has no place in a spectrum of type `uniform`");
+	snprintf(text, sizeof text, S "<spectrum value='1' id='s'/>\n%s" END, use);
+	refuses(text, "s.xml:1: <spectrum>: has no place in <scene>");
+	snprintf(text, sizeof text, S "<spectrum type='uniform' id='s'/><texture type='checkerboard' id='s'/>%s" END,
+		 use);
+	refuses(text, "the id \"s\" is given twice");
+	snprintf(text, sizeof text, S "<spectrum type='unifrm' id='s'/>%s" END, use);
+	refuses(text, "there is no spectrum of this type; did you mean `uniform`?");
+}
+
 static void test_bad_includes(void **state)
 {
 	(void)state;
@@ -391,10 +408,16 @@ static void test_bad_includes(void **state)
 	refuses(S "<include filename='s.xml'/>" END, "files include each other more than 8 deep");
 	static const char main_file[] = S "<include filename='i.xml'/>" END,
 			  broken[] = S "\n\n<bsdf type='difuse'/>" END,
-			  doctype[] = "<!DOCTYPE scene><scene version='3.0.0'/>";
+			  doctype[] = "<!DOCTYPE scene><scene version='3.0.0'/>",
+			  no_version[] = "<shape type='sphere'/>", no_object[] = "<spere version='3.0.0'/>",
+			  inside[] = "<shape type='sphere' version='3.0.0'><include filename='i.xml'/></shape>";
 	static const struct {
 		const char *bytes, *text;
-	} cases[] = {{broken, "i.xml:3: <bsdf type=\"difuse\">"}, {doctype, "i.xml:1: <!DOCTYPE>"}};
+	} cases[] = {{broken, "i.xml:3: <bsdf type=\"difuse\">"},
+		     {doctype, "i.xml:1: <!DOCTYPE>"},
+		     {no_version, "i.xml:1: <shape type=\"sphere\">: needs version="},
+		     {no_object, "i.xml:1: <spere>: has no place in <include>"},
+		     {inside, "may stand directly in <scene> only"}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const struct memory_file files[] = {{"s.xml", main_file, sizeof main_file - 1},
 						    {"i.xml", cases[i].bytes, strlen(cases[i].bytes)},
@@ -449,14 +472,23 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_broken_xml),	     cmocka_unit_test(test_entity_bomb),
-		cmocka_unit_test(test_parameter_bomb),	     cmocka_unit_test(test_deep_nesting),
-		cmocka_unit_test(test_too_many_elements),    cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_names_without_values), cmocka_unit_test(test_media_are_told_once),
-		cmocka_unit_test(test_absorbing_media),	     cmocka_unit_test(test_misplaced_parameters),
-		cmocka_unit_test(test_bad_values),	     cmocka_unit_test(test_bad_transforms),
-		cmocka_unit_test(test_bad_references),	     cmocka_unit_test(test_flat_shapes),
-		cmocka_unit_test(test_bad_includes),	     cmocka_unit_test(test_bad_films),
+		cmocka_unit_test(test_broken_xml),
+		cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),
+		cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements),
+		cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_names_without_values),
+		cmocka_unit_test(test_media_are_told_once),
+		cmocka_unit_test(test_absorbing_media),
+		cmocka_unit_test(test_misplaced_parameters),
+		cmocka_unit_test(test_bad_values),
+		cmocka_unit_test(test_bad_transforms),
+		cmocka_unit_test(test_bad_references),
+		cmocka_unit_test(test_flat_shapes),
+		cmocka_unit_test(test_bad_spectra),
+		cmocka_unit_test(test_bad_includes),
+		cmocka_unit_test(test_bad_films),
 		cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

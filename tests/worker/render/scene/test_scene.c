@@ -210,6 +210,22 @@ static void test_both_dialects(void **state)
 	files[1] = (struct memory_file){0};
 }
 
+/* A file may hold one object without a <scene> around it, which is an object like others. */
+static void test_one_object_in_a_file(void **state)
+{
+	(void)state;
+	static const char metal[] = "<bsdf type='roughconductor' id='m' version='3.0.0'><float name='ext_eta' "
+				    "value='2'/></bsdf>";
+	files[1] = (struct memory_file){"m.xml", metal, sizeof metal - 1};
+	struct scene s = read_ok("<scene version='3.0.0'><shape type='sphere'><ref id='m'/></shape>"
+				 "<include filename='m.xml'/></scene>");
+	assert_int_equal(s.object_count, 2);
+	assert_true(node_float(s.objects[1], "ext_eta", 0) == 2);
+	assert_ptr_equal(node_child(s.objects[0], PLUGIN_BSDF, 0), s.objects[1]);
+	scene_fini(&s);
+	files[1] = (struct memory_file){0};
+}
+
 static void test_capitals_of_types(void **state)
 {
 	(void)state;
@@ -550,6 +566,7 @@ int main(void)
 		cmocka_unit_test(test_transforms),
 		cmocka_unit_test(test_dialects),
 		cmocka_unit_test(test_both_dialects),
+		cmocka_unit_test(test_one_object_in_a_file),
 		cmocka_unit_test(test_capitals_of_types),
 		cmocka_unit_test(test_parameters_of_forks),
 		cmocka_unit_test(test_numbers_given_as_colours),

@@ -118,6 +118,22 @@ static void test_textures(void **state)
 	scene_fini(&scene);
 }
 
+/* A spectrum with a type is an object, which others may refer to, by an alias as well. */
+static void test_references(void **state)
+{
+	(void)state;
+	const struct value *v = eta_of(
+		"3.0.0",
+		"<ref name='eta' id='other'/></bsdf><alias id='s' as='other'/>"
+		"<spectrum type='uniform' id='s'><float name='value' value='2.5'/></spectrum>"
+		"<bsdf type='roughconductor'><spectrum name='k' type='uniform' id='k'><float name='value' value='3'/>"
+		"</spectrum><ref name='eta' id='k'/>");
+	assert_true(v->as.spectrum.count == 1 && v->as.spectrum.value[0] == 2.5);
+	assert_true(node_find(scene.objects[1], "eta")->value.as.spectrum.value[0] == 3);
+	assert_int_equal(scene.object_count, 2);
+	scene_fini(&scene);
+}
+
 /* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: with today's c2 at 2855.5 K;
  * relative to 560 nm its table says 14.708 at 400 nm and 198.261 at 700 nm. And against Stefan and Boltzmann's law in
  * order of magnitude: 5000 K radiate 1.29e4 W / (m^2 sr nm) at 550 nm. */
@@ -165,7 +181,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_files),	 cmocka_unit_test(test_three_numbers), cmocka_unit_test(test_types),
-		cmocka_unit_test(test_textures), cmocka_unit_test(test_blackbody),     cmocka_unit_test(test_booleans),
+		cmocka_unit_test(test_textures), cmocka_unit_test(test_references),    cmocka_unit_test(test_blackbody),
+		cmocka_unit_test(test_booleans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
