@@ -482,7 +482,10 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 		return element_check(el, "value", false, m->error);
 	if (value_is_element(el->name) && el->snake) /* a property of the scene: 0.6 has none */
 		return note_foreign(&m->notes, el);
-	return strcmp(el->name, "alias") == 0 || id_table_names(el) ? 0 : foreign_element(m, el);
+	struct value unused;
+	if (id_table_names(el)) /* a spectrum; those who refer to it hold it */
+		return value_read(el, m->assets_from, &m->scene->arena, &unused, m->error);
+	return strcmp(el->name, "alias") == 0 ? 0 : foreign_element(m, el);
 }
 
 static int read_top(struct maker *m, const struct xml_element *around, const struct scene_node **objects)

@@ -395,8 +395,9 @@ static void test_bad_spectra(void **state)
 	snprintf(text, sizeof text, S "<spectrum type='uniform' id='s'/><texture type='checkerboard' id='s'/>%s" END,
 		 use);
 	refuses(text, "the id \"s\" is given twice");
-	snprintf(text, sizeof text, S "<spectrum type='unifrm' id='s'/>%s" END, use);
-	refuses(text, "there is no spectrum of this type; did you mean `uniform`?");
+	snprintf(text, sizeof text, S "<spectrum type='unifrm' id='t'/>%s" END, use);
+	refuses(text,
+		"s.xml:1: <spectrum type=\"unifrm\">: there is no spectrum of this type; did you mean `uniform`?");
 }
 
 static void test_bad_includes(void **state)
