@@ -25,15 +25,19 @@ bool medium_only_absorbs(const struct xml_element *el)
 {
 	static const char *const names[] = {"sigma_s", "sigmaS", "albedo"};
 	const char *type = xml_attribute(el, "type");
+	bool says = false;
 	if (!type || strcasecmp(type, "homogeneous") != 0)
 		return false;
 	for (const struct xml_element *c = el->first; c; c = c->next) {
 		const char *name = xml_attribute(c, "name"), *value = xml_attribute(c, "value");
 		for (size_t i = 0; name && value && i < sizeof names / sizeof *names; i++)
-			if (strcmp(name, names[i]) == 0 && is_zero(value))
-				return true;
+			if (strcmp(name, names[i]) == 0) {
+				if (!is_zero(value))
+					return false;
+				says = true;
+			}
 	}
-	return false;
+	return says;
 }
 
 int medium_refuse(const struct notes *k, bool lenient, const struct xml_element *el)

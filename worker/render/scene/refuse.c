@@ -33,9 +33,10 @@ static const char *lenient_hint(enum plugin_class cls, const char *type, char *t
 
 int refuse_medium(const struct xml_element *el, struct error *e)
 {
-	return xml_error(el, e, EINVAL,
-			 "participating media are not supported; --lenient leaves them out (homogeneous ones with a "
-			 "sigma_s or albedo of 0 are)");
+	return xml_error(
+		el, e, EINVAL,
+		"media that scatter light are not supported; --lenient leaves them out (homogeneous ones whose "
+		"sigma_s or albedo is 0 are supported)");
 }
 
 /* What other programs' files and people call an element; NULL: none that is known. */

@@ -135,10 +135,10 @@ static void test_unknown_names(void **state)
 	refuses(S "<shape type='ellipsoids'/>" END,
 		"<shape type=\"ellipsoids\">: this shape of Mitsuba's is not supported; --lenient leaves it out (supp");
 	refuses(S "<medium type='homogeneous'/>" END,
-		"s.xml:1: <medium type=\"homogeneous\">: participating media are not supported; --lenient leaves");
+		"s.xml:1: <medium type=\"homogeneous\">: media that scatter light are not supported; --lenient leaves");
 	refuses(S "<shape type='cube'>\n<medium type='homogeneous' name='interior'/></shape>" END,
-		"s.xml:2: <medium type=\"homogeneous\">: participating media");
-	refuses(S "\n<phase type='hg' id='p'/>" END, "s.xml:2: <phase type=\"hg\">: participating media are not");
+		"s.xml:2: <medium type=\"homogeneous\">: media that scatter light");
+	refuses(S "\n<phase type='hg' id='p'/>" END, "s.xml:2: <phase type=\"hg\">: media that scatter light are not");
 	refuses(S "<shape type='cube'>\n<subsurface type='dipole'/></shape>" END, "subsurface scattering is not");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");
@@ -360,11 +360,12 @@ static void test_absorbing_media(void **state)
 		"<medium type=\"homogeneous\"> has no `sigma`; did you mean `sigma_");
 	static const char *const scatter[] = {
 		"<rgb name='sigma_s' value='0, 0.1, 0'/>", "<float name='albedo' value='0.1'/>",
-		"<spectrum name='sigma_s' value='none'/>", "<volume name='albedo' type='grid'/>"};
+		"<spectrum name='sigma_s' value='none'/>", "<volume name='albedo' type='grid'/>",
+		"<float name='albedo' value='0'/><float name='sigma_s' value='1'/>"};
 	for (size_t i = 0; i < sizeof scatter / sizeof *scatter; i++) {
 		char one[512];
 		snprintf(one, sizeof one, S "<medium type='homogeneous'>%s</medium>" END, scatter[i]);
-		refuses(one, "participating media are not supported");
+		refuses(one, "media that scatter light are not supported");
 	}
 }
 
