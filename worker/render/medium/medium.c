@@ -41,7 +41,9 @@ int medium_create(struct medium *m, const struct scene_node *n, double unit, str
 spectrum medium_transmittance(const struct medium *m, double distance, const struct wavelengths *w)
 {
 	spectrum t = color_eval(&m->sigma_a, w);
-	for (int i = 0; i < SPECTRUM_LANES; i++)
-		t.v[i] = t.v[i] > 0 ? exp(-t.v[i] * m->per_length * distance) : 1; /* not 0 times infinity */
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double per_length = t.v[i] * m->per_length;
+		t.v[i] = per_length > 0 ? exp(-per_length * distance) : 1; /* not 0 times infinity */
+	}
 	return t;
 }

@@ -96,44 +96,53 @@ static int create_bsdfs(struct builder *b)
 	return 0;
 }
 
-/* The number of a shape's medium, 1 + its index, which is made at its first use; 0: it has none. -1: an error. */
-static int64_t medium_of(struct builder *b, const struct scene_node *shape, const char *name,
-			 const struct scene_node **made)
+/* Gives the shape's medium of that name its number, 1 + its index in the order of first use; 0: it has none. */
+static uint32_t number_medium(const struct scene_node *shape, const char *name, struct node_table *numbers)
+{
+	const struct scene_node *n = node_ref(shape, name);
+	uint32_t number = 0;
+	if (n && !node_table_find(numbers, n, NULL, &number)) {
+		number = (uint32_t)numbers->count + 1;
+		node_table_add(numbers, n, NULL, number);
+	}
+	return number;
+}
+
+static int create_medium(struct builder *b, const struct scene_node *shape, const char *name, uint32_t number)
 {
 	struct world *w = b->w;
-	const struct scene_node *n = node_ref(shape, name);
-	if (!n)
+	if (number <= w->media_count) /* none, or one that is made */
 		return 0;
-	for (uint32_t i = 0; i < w->media_count; i++)
-		if (made[i] == n)
-			return i + 1;
-	if (medium_create(&w->media[w->media_count], n, w->scale, &w->arena, b->e))
-		return -1;
-	made[w->media_count] = n;
-	return ++w->media_count;
+	int rc = medium_create(&w->media[w->media_count++], node_ref(shape, name), w->scale, &w->arena, b->e);
+	return rc ? build_go_on(b, rc) : 0;
 }
 
 static int create_media(struct builder *b)
 {
 	struct world *w = b->w;
-	uint32_t count = 0;
+	struct node_table numbers;
+	uint32_t uses = 0;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
-		count += node_ref(b->shape_nodes[i], "interior") ? 1 : 0;
-		count += node_ref(b->shape_nodes[i], "exterior") ? 1 : 0;
+		uses += node_ref(b->shape_nodes[i], "interior") ? 1 : 0;
+		uses += node_ref(b->shape_nodes[i], "exterior") ? 1 : 0;
 	}
-	if (!count)
+	if (!uses)
 		return 0;
-	const struct scene_node **made = arena_alloc(&b->scratch, count, sizeof *made);
-	w->media = arena_alloc(&w->arena, count, sizeof *w->media);
-	if (!made || !w->media)
+	if (node_table_init(&numbers, uses, &b->scratch))
 		return build_out_of_memory(b->e);
 	for (uint32_t i = 0; i < w->shape_count; i++) {
-		int64_t interior = medium_of(b, b->shape_nodes[i], "interior", made),
-			exterior = interior < 0 ? -1 : medium_of(b, b->shape_nodes[i], "exterior", made);
-		if (exterior < 0)
-			return -EINVAL;
-		w->parts[i].interior = (uint32_t)interior;
-		w->parts[i].exterior = (uint32_t)exterior;
+		w->parts[i].interior = number_medium(b->shape_nodes[i], "interior", &numbers);
+		w->parts[i].exterior = number_medium(b->shape_nodes[i], "exterior", &numbers);
+	}
+	w->media = arena_alloc(&w->arena, numbers.count, sizeof *w->media);
+	if (!w->media)
+		return build_out_of_memory(b->e);
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		int rc = create_medium(b, b->shape_nodes[i], "interior", w->parts[i].interior);
+		if (!rc)
+			rc = create_medium(b, b->shape_nodes[i], "exterior", w->parts[i].exterior);
+		if (rc)
+			return rc;
 	}
 	return 0;
 }

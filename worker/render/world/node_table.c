@@ -33,17 +33,17 @@ static struct node_entry *place_of(struct node_table *t, const void *node, const
 	}
 }
 
-bool node_table_find(struct node_table *t, const void *node, const void *mesh, uint32_t *bsdf)
+bool node_table_find(struct node_table *t, const void *node, const void *mesh, uint32_t *number)
 {
 	const struct node_entry *at = place_of(t, node, mesh);
-	*bsdf = at->bsdf;
+	*number = at->number;
 	return at->used;
 }
 
-void node_table_add(struct node_table *t, const void *node, const void *mesh, uint32_t bsdf)
+void node_table_add(struct node_table *t, const void *node, const void *mesh, uint32_t number)
 {
 	struct node_entry *at = place_of(t, node, mesh);
 	assert(!at->used && t->count < t->most);
-	*at = (struct node_entry){node, mesh, bsdf, true};
+	*at = (struct node_entry){node, mesh, number, true};
 	t->count++;
 }

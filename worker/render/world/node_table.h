@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Maps a node to its BSDF, for all meshes or for one of them: a hash table with linear probing, at most half full.
- * Nothing is removed. One thread; allocated in the given arena.
+ * Maps a node to the number of its BSDF, for all meshes or for one of them, or of its medium: a hash table with linear
+ * probing, at most half full. Nothing is removed. One thread; allocated in the given arena.
  */
 #ifndef WORKER_RENDER_WORLD_NODE_TABLE_H
 #define WORKER_RENDER_WORLD_NODE_TABLE_H
@@ -13,7 +13,7 @@
 
 struct node_entry {
 	const void *node, *mesh; /* the key; NULL is a valid node; mesh NULL: for all meshes */
-	uint32_t bsdf;
+	uint32_t number;
 	bool used;
 };
 
@@ -27,9 +27,9 @@ struct node_table {
 int node_table_init(struct node_table *t, uint32_t most, struct arena *arena);
 
 /* false: not found. */
-bool node_table_find(struct node_table *t, const void *node, const void *mesh, uint32_t *bsdf);
+bool node_table_find(struct node_table *t, const void *node, const void *mesh, uint32_t *number);
 
 /* Adds one that is not in the table. */
-void node_table_add(struct node_table *t, const void *node, const void *mesh, uint32_t bsdf);
+void node_table_add(struct node_table *t, const void *node, const void *mesh, uint32_t number);
 
 #endif
