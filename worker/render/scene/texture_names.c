@@ -38,16 +38,37 @@ static int become(struct xml_element *ref, const struct xml_element *spectrum, s
 	return 0;
 }
 
+/* Of what is read again for each <ref>. */
+static uint64_t bytes_of(const struct xml_element *spectrum)
+{
+	uint64_t n = 0;
+	for (const struct xml_element *c = spectrum->first; c; c = c->next, n += sizeof *c)
+		for (uint32_t i = 0; i < c->attribute_count; i++)
+			n += strlen(c->attributes[i].value);
+	return n;
+}
+
+static int follow(struct xml_element *el, struct id_table *ids, struct arena *arena, uint64_t *bytes, struct error *e)
+{
+	if (strcmp(el->name, "spectrum") == 0) /* which holds values alone; one that holds a <ref> is refused later */
+		return 0;
+	const char *id = strcmp(el->name, "ref") == 0 && !el->ignored ? xml_attribute(el, "id") : NULL;
+	const struct xml_element *target = id ? id_table_look(ids, id) : NULL;
+	if (target && strcmp(target->name, "spectrum") == 0) {
+		*bytes += bytes_of(target);
+		if (*bytes > XML_FILES_BYTES)
+			return xml_error(el, e, E2BIG, "spectra have more than %d MB when all references are followed",
+					 XML_FILES_BYTES >> 20);
+		return become(el, target, arena, e);
+	}
+	int r = 0;
+	for (struct xml_element *c = el->first; c && !r; c = c->next)
+		r = follow(c, ids, arena, bytes, e);
+	return r;
+}
+
 int texture_names_follow(struct xml_element *root, struct id_table *ids, struct arena *arena, struct error *e)
 {
-	if (strcmp(root->name, "spectrum") == 0) /* which holds values alone; one that holds a <ref> is refused later */
-		return 0;
-	const char *id = strcmp(root->name, "ref") == 0 && !root->ignored ? xml_attribute(root, "id") : NULL;
-	const struct xml_element *target = id ? id_table_look(ids, id) : NULL;
-	if (target && strcmp(target->name, "spectrum") == 0)
-		return become(root, target, arena, e);
-	int r = 0;
-	for (struct xml_element *c = root->first; c && !r; c = c->next)
-		r = texture_names_follow(c, ids, arena, e);
-	return r;
+	uint64_t bytes = 0;
+	return follow(root, ids, arena, &bytes, e);
 }

@@ -11,8 +11,8 @@
 /* <spectrum type="bitmap"> becomes a <texture>, <texture type="uniform"> a <spectrum>, in all of the tree. */
 void texture_names_settle(const struct plugin_decl *decls, struct xml_element *root);
 
-/* A <ref> to a spectrum that is an object, <spectrum type="blackbody" id="lamp">, becomes that spectrum. 0, or -ENOMEM.
- */
+/* A <ref> to a spectrum that is an object, <spectrum type="blackbody" id="lamp">, becomes that spectrum.
+ * -E2BIG: references make too much of it; -ENOMEM. */
 int texture_names_follow(struct xml_element *root, struct id_table *ids, struct arena *arena, struct error *e);
 
 #endif

@@ -208,6 +208,26 @@ static void test_bytes_included(void **state)
 	mem_free(blanks);
 }
 
+/* A long spectrum to which many refer: one of many blanks, and one of many parts. */
+static void test_long_spectra(void **state)
+{
+	(void)state;
+	enum { BLANKS = 1 << 19, PARTS = 20000, USERS = 2000 };
+	for (int parts = 0; parts < 2; parts++) {
+		used = 0;
+		put("<scene version='3.0.0'>\n<spectrum type='uniform' id='s'>");
+		for (int i = 0; i < PARTS && parts; i++)
+			put("<float name='value' value='1'/>");
+		if (!parts)
+			put("<float name='value' value='%*s1'/>", BLANKS, "");
+		put("</spectrum>\n");
+		for (int i = 0; i < USERS; i++)
+			put("<emitter type='point'><ref name='intensity' id='s'/></emitter>");
+		put("</scene>");
+		expect("s.xml:3: <ref>: spectra have more than 256 MB when all references are followed");
+	}
+}
+
 /* A file that misses as many names as it has ids: to compare each with each would take hours. */
 static void test_many_missing_names(void **state)
 {
@@ -240,6 +260,7 @@ int main(void)
 		cmocka_unit_test(test_the_deepest_is_built),
 		cmocka_unit_test(test_includes),
 		cmocka_unit_test(test_bytes_included),
+		cmocka_unit_test(test_long_spectra),
 		cmocka_unit_test(test_many_missing_names),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
