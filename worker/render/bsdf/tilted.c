@@ -22,8 +22,7 @@ static struct frame frame_inside(const void *point, const struct relief *r)
 {
 	const struct view *v = point;
 	struct frame f = v->outer.frame(v->outer.point, r);
-	return (struct frame){frame_to_local(&v->frame, f.s), frame_to_local(&v->frame, f.t),
-			      frame_to_local(&v->frame, f.n)};
+	return frame_within(&v->frame, &f);
 }
 
 static void look(const struct bsdf *inner, const struct bsdf_point *p, struct view *v)

@@ -249,7 +249,7 @@ struct frame surface_frame_with(const void *surface_point, const struct relief *
 	const struct surface_point *x = surface_point;
 	struct relief_site site = site_of(x);
 	struct frame f = frame_along(r ? relief_normal(r, &site) : site.n, x->dpdu);
-	return (struct frame){frame_to_local(&x->sh, f.s), frame_to_local(&x->sh, f.t), frame_to_local(&x->sh, f.n)};
+	return frame_within(&x->sh, &f);
 }
 
 /* The hit in double: the root nearest to Embree's. */

@@ -19,6 +19,12 @@ static inline vec3 frame_to_world(const struct frame *f, vec3 v)
 	return vec3_madd(vec3_madd(vec3_scale(v.x, f->s), v.y, f->t), v.z, f->n);
 }
 
+/* A frame, in the coordinates of another. */
+static inline struct frame frame_within(const struct frame *outer, const struct frame *f)
+{
+	return (struct frame){frame_to_local(outer, f->s), frame_to_local(outer, f->t), frame_to_local(outer, f->n)};
+}
+
 /* Any frame around the unit vector n (Duff et al. 2017, Building an Orthonormal Basis, Revisited, sec. 3). */
 static inline struct frame frame_around(vec3 n)
 {

@@ -120,7 +120,7 @@ static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned ver
 		v->next_event[i] = u[DIM_NEXT_EVENT + i];
 }
 
-/* x_k .. x_{k-t+1} as the camera's sub-path; t >= 2. */
+/* x_k .. x_{k-t+1} as the camera's sub-path; t >= 2. The wavelengths are those of x. */
 static void put_camera(struct path_context *c, struct sampler *s, struct full_path *x, unsigned t)
 {
 	unsigned k = x->edges;
@@ -136,10 +136,8 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 	v[1].medium = 0;
 	for (unsigned i = 2; i < t; i++) {
 		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
-		if (!EFFECT_IS_ON(c->w, absorption))
-			continue;
-		v[i].medium = path_medium_after(c->w, &v[i - 1], v[i - 1].medium, vec3_neg(x->edge[k - i].w));
-		v[i].beta = spectrum_mul(v[i].beta, path_transmittance(c->w, &x->wl, v[i].medium, &v[i - 1], &v[i]));
+		if (EFFECT_IS_ON(c->w, absorption))
+			path_absorb(c, &v[i - 1], vec3_neg(x->edge[k - i].w), &v[i]);
 	}
 	v[t - 1].delta = false;
 }

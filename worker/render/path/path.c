@@ -251,8 +251,7 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 	return true;
 }
 
-/* The light's sub-path does so when it is joined: only the camera's knows which medium it is in. */
-static void absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to)
+void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to)
 {
 	to->medium = path_medium_after(c->w, at, at->medium, wi);
 	to->beta = spectrum_mul(to->beta, path_transmittance(c->w, &c->wl, to->medium, at, to));
@@ -284,7 +283,7 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		at->mode = out.mode;
 		to->beta = out.beta;
 		if (EFFECT_IS_ON(c->w, absorption) && side == SIDE_CAMERA)
-			absorb(c, at, out.wi, to);
+			path_absorb(c, at, out.wi, to);
 		to->pdf = reach_pdf(c, at, to, out.pdf, ahead);
 		if (!c->one_way)
 			v[n - 2].pdf_rev = reach_pdf(c, at, &v[n - 2], out.pdf_rev, back);

@@ -167,6 +167,9 @@ uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, u
 /* The share of light that the edge between two vertices lets through. */
 spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
 			    const struct path_vertex *a, const struct path_vertex *b);
+/* Gives `to`, which the camera's sub-path reached from `at` along wi, its medium, and to its beta what that lets
+ * through. On the light's sub-path that is done when it is joined: only the camera's knows which medium it is in. */
+void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to);
 
 /* I = X + Y + Z of what the film gets of l. */
 double path_intensity(const struct path_context *c, spectrum l);

@@ -56,7 +56,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
 			rc = remark(r, n, e, "the image shows all light on surfaces, without media");
-	if (!rc && strncmp(n->type, "direct", strlen("direct")) == 0 && !node_find(n, "max_depth"))
+	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
 	return rc ? rc : on_depth(r, n, e);
 }

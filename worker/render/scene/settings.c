@@ -19,7 +19,7 @@
 #include <string.h>
 
 enum { FILM_PIXELS_MAX = 1 << 28, RADIUS_MAX = 64 };
-enum { ROULETTE_DEPTH = 5, DIRECT_DEPTH = 2 }; /* Mitsuba's */
+enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
@@ -237,11 +237,6 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 	return 0;
 }
 
-static bool is_direct(const struct scene_node *integrator)
-{
-	return strncmp(integrator->type, "direct", strlen("direct")) == 0;
-}
-
 /* The innermost one has it, as in Mitsuba, whose `direct` shows light that is scattered once. */
 static int read_depth(const struct scene *s, struct scene_settings *out, struct error *e)
 {
@@ -256,7 +251,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	snprintf(out->integrator, sizeof out->integrator, "%s", integrator->type);
 	int64_t depth = -1, roulette = ROULETTE_DEPTH;
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
-		depth = node_int(n, "max_depth", is_direct(n) ? DIRECT_DEPTH : depth);
+		depth = node_int(n, "max_depth", depth_is_direct(n->type) ? SCENE_DIRECT_DEPTH : depth);
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
 		roulette = node_int(n, "rr_depth", roulette);
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
