@@ -22,14 +22,17 @@
 #define VIEW                                                                                           \
 	"<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,5' target='0,0,0' " \
 	"up='0,1,0'/></transform><film type='hdrfilm'/></sensor><emitter type='constant'/>"
-#define DENTS "<bsdf type='bumpmap'><texture type='bitmap'><string name='filename' value='p0'/></texture>%s</bsdf>"
-#define SLOPE                                                                                           \
-	"<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.45,0.9'/>" \
-	"<rgb name='color1' value='0.4,0.6,0.85'/></texture>%s</bsdf>"
+#define DENTS(inner) \
+	"<bsdf type='bumpmap'><texture type='bitmap'><string name='filename' value='p0'/></texture>" inner "</bsdf>"
+#define SLOPE(inner)                                                                                                                                             \
+	"<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.45,0.9'/><rgb name='color1' value='0.4,0.6,0.85'/></texture>" inner \
+	"</bsdf>"
 #define METAL "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>"
 #define PLASTIC "<bsdf type='roughplastic'><float name='alpha' value='0.4'/></bsdf>"
 #define PAPER "<bsdf type='difftrans'/>"
 #define CHALK "<bsdf type='diffuse'/>"
+#define BLACK "<bsdf type='diffuse'><rgb name='reflectance' value='0'/></bsdf>"
+#define TWOSIDED(front, back) "<bsdf type='twosided'>" front back "</bsdf>"
 #define BLEND(weight, a, b) "<bsdf type='blendbsdf'><float name='weight' value='" weight "'/>" a b "</bsdf>"
 
 static const struct wavelengths white = {.nm = {450, 500, 550, 600}};
@@ -84,24 +87,6 @@ static spectrum scattered(const struct world *w, uint64_t i, vec3 wo, vec3 wi, e
 	return spectrum_scale(fabs(t == TRANSPORT_RADIANCE ? in.z : o.z), b->ops->eval(b, &p, o, in));
 }
 
-static const char *dents(const char *inner)
-{
-	static char text[2][512];
-	static int k;
-	k = !k;
-	snprintf(text[k], sizeof text[k], DENTS, inner);
-	return text[k];
-}
-
-static const char *slope(const char *inner)
-{
-	static char text[2][512];
-	static int k;
-	k = !k;
-	snprintf(text[k], sizeof text[k], SLOPE, inner);
-	return text[k];
-}
-
 /* via: a part that must see both directions, too, for any but the first to be lit; 0: none. */
 static void compare(const char *shape, const char *whole, const char *const *bsdf, const double *share, int parts,
 		    int via)
@@ -148,42 +133,29 @@ static void both_shapes(const char *whole, const char *const *bsdf, const double
 static void test_two_normals(void **state)
 {
 	(void)state;
-	char a[512], b[512], whole[2048];
-	snprintf(a, sizeof a, "%s", dents(PLASTIC));
-	snprintf(b, sizeof b, "%s", slope(METAL));
-	snprintf(whole, sizeof whole, BLEND("0.3", "%s", "%s"), a, b);
-	both_shapes(whole, (const char *const[]){a, b}, (const double[]){0.7, 0.3}, 2, 0);
+	both_shapes(BLEND("0.3", DENTS(PLASTIC), SLOPE(METAL)), (const char *const[]){DENTS(PLASTIC), SLOPE(METAL)},
+		    (const double[]){0.7, 0.3}, 2, 0);
 	/* One is smooth. */
-	snprintf(whole, sizeof whole, BLEND("0.3", "%s", "%s"), METAL, dents(PAPER));
-	snprintf(a, sizeof a, "%s", dents(PAPER));
-	both_shapes(whole, (const char *const[]){METAL, a}, (const double[]){0.7, 0.3}, 2, 0);
+	both_shapes(BLEND("0.3", METAL, DENTS(PAPER)), (const char *const[]){METAL, DENTS(PAPER)},
+		    (const double[]){0.7, 0.3}, 2, 0);
 }
 
 /* A part of a blend is itself a blend whose parts differ; the last gives it its normal. */
 static void test_nested(void **state)
 {
 	(void)state;
-	char a[512], b[512], c[512], whole[4096];
-	snprintf(a, sizeof a, "%s", dents(CHALK));
-	snprintf(b, sizeof b, "%s", slope(PLASTIC));
-	snprintf(c, sizeof c, "%s", METAL);
-	snprintf(whole, sizeof whole, BLEND("0.25", "%s", BLEND("0.5", "%s", "%s")), c, a, b);
-	both_shapes(whole, (const char *const[]){c, a, b}, (const double[]){0.75, 0.125, 0.125}, 3, 2);
+	both_shapes(BLEND("0.25", METAL, BLEND("0.5", DENTS(CHALK), SLOPE(PLASTIC))),
+		    (const char *const[]){METAL, DENTS(CHALK), SLOPE(PLASTIC)}, (const double[]){0.75, 0.125, 0.125}, 3,
+		    2);
 }
 
+/* Its one side, and then its other: what is seen from the wrong side of one alone is black. */
 static void test_two_sides(void **state)
 {
 	(void)state;
-	char a[512], b[512], whole[2048];
-	snprintf(a, sizeof a, "%s", dents(PLASTIC));
-	snprintf(b, sizeof b, "%s", slope(METAL));
-	snprintf(whole, sizeof whole, "<bsdf type='twosided'>%s%s</bsdf>", a, b);
-	/* Its one side, and then its other: what is seen from the wrong side of one alone is black. */
-	char front[1024], back[1024];
-	static const char black[] = "<bsdf type='diffuse'><rgb name='reflectance' value='0'/></bsdf>";
-	snprintf(front, sizeof front, "<bsdf type='twosided'>%s%s</bsdf>", a, dents(black));
-	snprintf(back, sizeof back, "<bsdf type='twosided'>%s%s</bsdf>", slope(black), b);
-	both_shapes(whole, (const char *const[]){front, back}, (const double[]){1, 1}, 2, 0);
+	both_shapes(TWOSIDED(DENTS(PLASTIC), SLOPE(METAL)),
+		    (const char *const[]){TWOSIDED(DENTS(PLASTIC), DENTS(BLACK)), TWOSIDED(SLOPE(BLACK), SLOPE(METAL))},
+		    (const double[]){1, 1}, 2, 0);
 }
 
 /* Sampled directions against the density, in the moments 1, x, y, z, xy and z^2 over the sphere: 6 per case, two-sided,
@@ -232,14 +204,9 @@ static void check_sampling(const char *whole)
 static void test_sampling(void **state)
 {
 	(void)state;
-	char whole[4096];
-	snprintf(whole, sizeof whole, BLEND("0.3", "%s", "%s"), METAL, dents(PAPER));
-	check_sampling(whole);
-	snprintf(whole, sizeof whole, BLEND("0.25", "%s", BLEND("0.5", "%s", "%s")), METAL, dents(CHALK),
-		 slope(PLASTIC));
-	check_sampling(whole);
-	snprintf(whole, sizeof whole, "<bsdf type='twosided'>%s%s</bsdf>", slope(METAL), dents(CHALK));
-	check_sampling(whole);
+	check_sampling(BLEND("0.3", METAL, DENTS(PAPER)));
+	check_sampling(BLEND("0.25", METAL, BLEND("0.5", DENTS(CHALK), SLOPE(PLASTIC))));
+	check_sampling(TWOSIDED(SLOPE(METAL), DENTS(CHALK)));
 }
 
 int main(void)
