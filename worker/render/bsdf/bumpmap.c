@@ -1,15 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Another BSDF on a surface whose shading normals are bent by a height (`bumpmap`) or given by an image (`normalmap`).
+ * Another BSDF on a surface whose shading normals are bent by a height (`bumpmap`) or given by an image or one colour
+ * (`normalmap`).
  * The BSDF itself is the inner one: the normals are bent by the geometry (worker/render/geom/relief.h), so that half
  * vectors and their derivatives take it into account.
  */
 #include "common/base/color.h"
 #include "worker/render/bsdf/create.h"
 
+#include <string.h>
+
 struct bend {
 	struct relief relief;
-	const struct scene_node *node; /* of the texture */
+	const struct scene_node *node; /* of the texture; NULL: it is one colour */
 	struct texture texture;
 	double scale;	   /* of heights, or of a normal's first two components */
 	struct bend *next; /* of the material */
@@ -43,26 +46,38 @@ static void normal_at(const void *data, double u, double v, struct relief_value 
 	out->dv = (vec3){2 * k * j.dv[0], 2 * k * j.dv[1], 2 * j.dv[2]};
 }
 
+static bool same_texture(const struct bend *a, const struct bend *b)
+{
+	if (!a->node || !b->node)
+		return a->node == b->node &&
+		       memcmp(a->texture.relief, b->texture.relief, sizeof a->texture.relief) == 0;
+	return node_same(a->node, b->node);
+}
+
 /* One like it that the material has already, in another of its parts: a surface has one normal. */
 static const struct bend *find_bend(const struct bend *like, const struct bend *made)
 {
 	for (const struct bend *b = made; b; b = b->next)
 		if (b->relief.kind == like->relief.kind && b->relief.handed == like->relief.handed &&
-		    b->scale == like->scale && node_same(b->node, like->node))
+		    b->scale == like->scale && same_texture(b, like))
 			return b;
 	return NULL;
 }
 
-/* That one, or a new one. */
+/* That one, or a new one. texture: NULL for the colour that n has. */
 static int bend_of(const struct scene_node *n, const struct scene_node *texture, enum relief_kind kind,
 		   const struct bsdf_build *build, const struct bend **out, struct error *e)
 {
-	const struct bend wanted = {.relief = {.kind = kind,
-					       .at = kind == RELIEF_HEIGHT ? height_at : normal_at,
-					       .handed = node_bool(n, "handedness", false)},
-				    .node = texture,
-				    .scale = node_float(n, "scale", 1),
-				    .next = build->bends ? *build->bends : NULL};
+	const struct texture_build of_texture = bsdf_texture_build(build);
+	struct bend wanted = {.relief = {.kind = kind,
+					 .at = kind == RELIEF_HEIGHT ? height_at : normal_at,
+					 .handed = node_bool(n, "handedness", false)},
+			      .node = texture,
+			      .scale = node_float(n, "scale", 1),
+			      .next = build->bends ? *build->bends : NULL};
+	int code = texture ? 0 : texture_from_node(&wanted.texture, n, "normalmap", 0, COLOR_RELIEF, &of_texture, e);
+	if (code)
+		return code;
 	*out = find_bend(&wanted, wanted.next);
 	if (*out)
 		return 0;
@@ -71,8 +86,8 @@ static int bend_of(const struct scene_node *n, const struct scene_node *texture,
 		return node_error(n, e, ENOMEM, "out of memory");
 	*bend = wanted;
 	bend->relief.data = bend;
-	const struct texture_build of_texture = bsdf_texture_build(build);
-	int code = texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
+	if (texture)
+		code = texture_create(&bend->texture, texture, COLOR_RELIEF, &of_texture, e);
 	if (!code && build->bends)
 		*build->bends = bend;
 	*out = bend;
@@ -84,7 +99,9 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 {
 	const struct scene_node *inner = node_child(n, PLUGIN_BSDF, 0), *texture = node_child(n, PLUGIN_TEXTURE, 0);
 	const struct bend *bend;
-	if (!inner || !texture || node_child(n, PLUGIN_BSDF, 1))
+	if (node_ref(n, "normalmap"))
+		texture = node_ref(n, "normalmap");
+	if (!inner || !(texture || node_find(n, "normalmap")) || node_child(n, PLUGIN_BSDF, 1))
 		return node_error(n, e, EINVAL, "needs a texture and exactly one BSDF inside");
 	int code = bend_of(n, texture, kind, build, &bend, e);
 	if (!code)
@@ -122,6 +139,7 @@ static const struct param bumpmap_params[] = {
 };
 /* scale and handedness: as in glTF. */
 static const struct param normalmap_params[] = {
+	{.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
 	{.name = "handedness", .types = VALUE_BOOL},
 	OF_MITSUBA_3_7,

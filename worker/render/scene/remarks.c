@@ -55,7 +55,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e, "the image shows all light on surfaces, without media");
+			rc = remark(r, n, e, "the image shows all light on surfaces, and media that only absorb it");
 	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
 	return rc ? rc : on_depth(r, n, e);

@@ -28,7 +28,7 @@ int texture_create(struct texture *t, const struct scene_node *n, enum color_rol
 	return node_error(n, e, ENOTSUP, "\"%s\" is not a texture that is supported", n->type);
 }
 
-/* Of a colour its luminance, as of a coloured image. */
+/* A height is a colour's luminance, as in a coloured image. */
 static int height_from_value(struct texture *t, const struct scene_node *n, const char *name, const struct value *v,
 			     struct error *e)
 {
@@ -36,11 +36,14 @@ static int height_from_value(struct texture *t, const struct scene_node *n, cons
 	uint32_t count;
 	const double *x = value_numbers(v, scratch, &count);
 	if (v->type == VALUE_SPECTRUM)
-		return node_error(n, e, EINVAL, "%s: a height is a number or an RGB colour, not a spectrum", name);
+		return node_error(n, e, EINVAL, "%s: a height or a normal is a number or an RGB colour, not a spectrum",
+				  name);
 	double height = count == 3 ? rec709_luminance(x) : x[0];
 	if (!isfinite(height))
 		return node_error(n, e, EINVAL, "%s: a height must be finite", name);
 	t->color = color_constant(height);
+	for (int k = 0; k < 3; k++)
+		t->relief[k] = x[count == 3 ? k : 0];
 	return 0;
 }
 

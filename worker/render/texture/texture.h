@@ -58,8 +58,9 @@ struct texture_ops {
 };
 
 struct texture {
-	const struct texture_ops *ops; /* NULL: constant, `color` below */
+	const struct texture_ops *ops; /* NULL: constant, `color` below, or `relief` */
 	struct color color;
+	double relief[3]; /* COLOR_RELIEF; `color` is their luminance */
 	void *data;
 };
 
@@ -87,7 +88,7 @@ static inline void texture_jet(const struct texture *t, double u, double v, stru
 	if (t->ops)
 		t->ops->jet(t, u, v, j);
 	else
-		*j = (struct texture_jet){.x = {t->color.scale, t->color.scale, t->color.scale}, .grey = true};
+		*j = (struct texture_jet){.x = {t->relief[0], t->relief[1], t->relief[2]}};
 }
 
 double texture_aspect(const struct texture *t);

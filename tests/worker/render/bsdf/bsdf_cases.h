@@ -135,6 +135,7 @@ static const char *const bsdf_cases[] = {
 	"twosided | diffuse | conductor material=Cr",
 	"bumpmap scale=0.1 | roughconductor alpha=0.2 | texture checkerboard",
 	"normalmap | texture scale scale=0.5 texture checkerboard | roughdielectric alpha=0.3",
+	"normalmap normalmap=rgb(0.7,0.45,0.9) | roughconductor alpha=0.2",
 	/* Parts with other normals: they tilt on a surface alone. */
 	"blendbsdf weight=0.4 | normalmap / roughplastic alpha=0.2 / texture checkerboard color0=rgb(0.7,0.5,0.9) "
 	"color1=rgb(0.4,0.35,0.9) | roughconductor alpha=0.1",

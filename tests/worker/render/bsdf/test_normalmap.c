@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What `scale` makes of a normal map: against the same map without it. And that parts of a material may bend normals if
- * they do it alike. */
+/* What `scale` makes of a normal map: against the same map without it. A map of one colour: against a texture that has
+ * it everywhere. And that parts of a material may bend normals if they do it alike. */
 #include "tests/support/pictures.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 
@@ -52,6 +52,29 @@ static struct scene_node *bent(struct arena *a, const char *map, const char *tex
 	return n;
 }
 
+static void test_one_color(void **state)
+{
+	(void)state;
+	static const char even[] = "checkerboard color0=rgb(0.75,0.5,0.875) color1=rgb(0.75,0.5,0.875)";
+	struct arena a = {0};
+	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+	struct bsdf of_texture, of_color;
+	struct relief_value wanted, got;
+	struct error e;
+	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap scale=2", even, "diffuse"), &build, &e), 0);
+	assert_int_equal(bsdf_create(&of_color,
+				     node_bsdf(&a, "normalmap normalmap=rgb(0.75,0.5,0.875) scale=2 | diffuse"), &build,
+				     &e),
+			 0);
+	of_texture.relief->at(of_texture.relief->data, 0.4, 0.55, &wanted);
+	of_color.relief->at(of_color.relief->data, 0.7, 0.1, &got);
+	assert_vec(got.x, wanted.x.x, wanted.x.y, wanted.x.z);
+	assert_vec(got.du, wanted.du.x, wanted.du.y, wanted.du.z);
+	assert_vec(got.dv, wanted.dv.x, wanted.dv.y, wanted.dv.z);
+	assert_vec(got.x, 1, 0, 0.75);
+	arena_fini(&a);
+}
+
 static int blend_of(const struct scene_node *first, const struct scene_node *second, struct arena *a, struct bsdf *b,
 		    struct error *e)
 {
@@ -93,6 +116,19 @@ static void test_parts_that_bend_alike(void **state)
 			    0);
 		assert_non_null(strstr(e.text, "bend normals differently"));
 	}
+	static const char *const colors[] = {"0.6,0.5,0.9", "0.6,0.5,0.9", "0.6,0.45,0.9"};
+	const struct scene_node *even[3];
+	for (size_t i = 0; i < 3; i++) {
+		char text[80];
+		snprintf(text, sizeof text, "normalmap normalmap=rgb(%s) scale=0.5 | phong", colors[i]);
+		even[i] = node_bsdf(&a, text);
+	}
+	assert_int_equal(blend_of(even[0], even[1], &a, &b, &e), 0);
+	assert_false(b.tilted);
+	assert_int_equal(blend_of(even[0], even[2], &a, &b, &e), 0);
+	assert_true(b.tilted);
+	assert_int_equal(blend_of(even[0], bent(&a, "normalmap scale=0.5", tiles, "phong"), &a, &b, &e), 0);
+	assert_true(b.tilted);
 	/* The surface has the normal of the narrowest; what passes straight on needs none. */
 	assert_int_equal(blend_of(first, specular, &a, &b, &e), 0);
 	assert_false(b.tilted);
@@ -115,6 +151,7 @@ static void test_parts_that_bend_alike(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_scale), cmocka_unit_test(test_parts_that_bend_alike)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_scale), cmocka_unit_test(test_one_color),
+					   cmocka_unit_test(test_parts_that_bend_alike)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -182,7 +182,7 @@ static void test_notes_on_the_whole(void **state)
 		{"<sensor type='perspective'/>",
 		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
 		{"<integrator type='volpath'/>",
-		 "s.xml:1: <integrator type=\"volpath\">: the image shows all light on surfaces, without media"},
+		 "s.xml:1: <integrator type=\"volpath\">: the image shows all light on surfaces, and media that only absorb it"},
 		{"<integrator type='direct'/>",
 		 "s.xml:1: <integrator type=\"direct\">: the image shows light that is scattered once; --max-depth shows more"},
 		{"<integrator type='multichannel'/>", "the image shows all light on surfaces"},

@@ -149,7 +149,7 @@ static void test_refused(void **state)
 	refuses("<rgb name='displacement' value='1,0.5,1'/>" LEVEL("1"), "`displacement` cannot have this type");
 	refuses("<texture name='displacement' type='checkerboard'><spectrum name='color0' value='400:1, 700:0.5'/></texture>" LEVEL(
 			"1"),
-		"color0: a height is a number or an RGB colour, not a spectrum");
+		"color0: a height or a normal is a number or an RGB colour, not a spectrum");
 }
 
 enum { SIDE = 32 };
