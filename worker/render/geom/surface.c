@@ -134,7 +134,7 @@ static struct relief_site site_on_triangle(const struct geom_shape *s, const str
 					   vec3 n, const struct surface_point *x)
 {
 	struct relief_site r = {
-		.ng = x->ng, .n = n, .axis = x->dpdu, .tu = c->e1, .tv = c->e2, .u = x->u, .v = x->v, .unit = s->unit};
+		.ng = x->ng, .n = n, .axis = x->axis, .tu = c->e1, .tv = c->e2, .u = x->u, .v = x->v, .unit = s->unit};
 	if (s->uv) {
 		bool any = t->any && vec3_is_finite(t->v);
 		r.tu = any ? t->u : (vec3){0, 0, 0};
@@ -162,7 +162,7 @@ static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
 	struct tangents t = tangents_of(s, i, c->e1, c->e2);
-	x->dpdu = t.any ? t.u : carried_axis(x->ng);
+	x->axis = t.any ? t.u : carried_axis(x->ng);
 	vec3 n = smooth_normal(s, i, x);
 	x->u = b1;
 	x->v = b2;
@@ -174,7 +174,7 @@ static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const
 		struct relief_site site = site_on_triangle(s, c, &t, n, x);
 		n = relief_normal(s->relief, &site);
 	}
-	x->sh = frame_along(n, x->dpdu);
+	x->sh = frame_along(n, x->axis);
 }
 
 void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2,
@@ -195,13 +195,13 @@ void surface_uv(const struct geom_shape *s, struct surface_point *x)
 /* A sphere's point before relief. At the poles dp/du is 0. */
 static struct relief_site site_on_sphere(const struct geom_shape *s, const struct surface_point *x)
 {
-	struct relief_site r = {.ng = x->ng, .n = x->ng, .axis = x->dpdu, .u = x->u, .v = x->v, .unit = s->unit};
+	struct relief_site r = {.ng = x->ng, .n = x->ng, .axis = x->axis, .u = x->u, .v = x->v, .unit = s->unit};
 	const struct frame *f = &s->sphere_axes;
-	double length = vec3_length(x->dpdu);
+	double length = vec3_length(x->axis);
 	if (!(length > 0))
 		return r;
-	r.tu = vec3_scale(vec3_dot(vec3_cross(f->s, f->t), f->n) < 0 ? -1 : 1, x->dpdu);
-	r.tv = vec3_scale(M_PI * s->radius * s->normal_sign / length, vec3_cross(x->dpdu, x->ng));
+	r.tu = vec3_scale(vec3_dot(vec3_cross(f->s, f->t), f->n) < 0 ? -1 : 1, x->axis);
+	r.tv = vec3_scale(M_PI * s->radius * s->normal_sign / length, vec3_cross(x->axis, x->ng));
 	return r;
 }
 
@@ -214,14 +214,14 @@ static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, 
 	x->b1 = x->b2 = 0;
 	x->ng = vec3_scale(s->normal_sign, w);
 	/* du along the longitude: axis x normal; undefined at the poles, where frame_along chooses a frame. */
-	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
+	x->axis = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
 	vec3 n = x->ng;
 	if (s->relief) {
 		surface_uv(s, x);
 		struct relief_site site = site_on_sphere(s, x);
 		n = relief_normal(s->relief, &site);
 	}
-	x->sh = frame_along(n, x->dpdu);
+	x->sh = frame_along(n, x->axis);
 }
 
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
@@ -248,7 +248,7 @@ struct frame surface_frame_with(const void *surface_point, const struct relief *
 {
 	const struct surface_point *x = surface_point;
 	struct relief_site site = site_of(x);
-	struct frame f = frame_along(r ? relief_normal(r, &site) : site.n, x->dpdu);
+	struct frame f = frame_along(r ? relief_normal(r, &site) : site.n, x->axis);
 	return frame_within(&x->sh, &f);
 }
 
@@ -287,7 +287,7 @@ void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
 		*dv = x->sh.t;
 		return;
 	}
-	struct frame f = frame_along(x->ng, x->dpdu);
+	struct frame f = frame_along(x->ng, x->axis);
 	*du = f.s;
 	*dv = f.t;
 }
@@ -304,26 +304,26 @@ static void change_on_sphere(const struct geom_shape *s, const struct surface_po
 	vec3 turn = vec3_scale(-bend, w);
 	if (sine > 0)
 		turn = vec3_madd(turn, bend * cosine / sine, vec3_cross(w, c->du));
-	c->ddu[0] = vec3_is_finite(turn) ? turn : vec3_scale(-bend, w);
+	c->daxis[0] = vec3_is_finite(turn) ? turn : vec3_scale(-bend, w);
 }
 
 static void bend_on_sphere(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
 {
 	struct relief_site site = site_on_sphere(s, x);
 	double tu2 = vec3_dot(site.tu, site.tu), tv2 = vec3_dot(site.tv, site.tv),
-	       hand = vec3_dot(site.tu, x->dpdu) < 0 ? -1 : 1;
+	       hand = vec3_dot(site.tu, x->axis) < 0 ? -1 : 1;
 	if (!(tu2 > 0) || !(tv2 > 0))
 		return;
 	vec3 w = vec3_scale(s->normal_sign, x->ng);
-	site.axis = c->du;
+	site.axis = c->axis;
 	for (int k = 0; k < 2; k++) {
 		vec3 along = k ? c->dv : c->du;
 		struct relief_step d = {.dn = c->dn[k],
-					.daxis = c->ddu[k],
+					.daxis = c->daxis[k],
 					.du = vec3_dot(along, site.tu) / tu2,
 					.dv = vec3_dot(along, site.tv) / tv2};
 		d.dtu = vec3_scale(2 * M_PI * hand, vec3_cross(s->sphere_axes.n, along));
-		d.dtv = vec3_scale(M_PI, vec3_madd(vec3_cross(c->du, along), s->radius, vec3_cross(c->ddu[k], w)));
+		d.dtv = vec3_scale(M_PI, vec3_madd(vec3_cross(c->du, along), s->radius, vec3_cross(c->daxis[k], w)));
 		c->dn[k] = relief_turn(s->relief, &site, &d);
 	}
 }
@@ -375,7 +375,7 @@ static void bend_on_triangle(const struct geom_shape *s, const struct surface_po
 	}
 	vec3 g1, g2;
 	barycentric_gradients(&k, &g1, &g2);
-	site.axis = c->du;
+	site.axis = c->axis;
 	for (int a = 0; a < 2; a++) {
 		vec3 along = a ? c->dv : c->du;
 		double b1 = vec3_dot(along, g1), b2 = vec3_dot(along, g2);
@@ -388,6 +388,7 @@ void surface_change_of(const struct geom_shape *s, const struct surface_point *x
 {
 	*c = (struct surface_change){.dn = {{0, 0, 0}}};
 	surface_tangents(x, &c->du, &c->dv);
+	c->axis = c->du;
 	if (s->is_sphere) {
 		change_on_sphere(s, x, c);
 		if (s->relief)

@@ -35,18 +35,18 @@ struct surface_point {
 	struct frame sh; /* sh.n is the shading normal, bent by relief */
 	double u, v;
 	double b1, b2; /* barycentrics on a triangle; 0 on a sphere */
-	vec3 dpdu;
+	vec3 axis;     /* along which the shading frame is laid (frame_along): dp/du, or another where there is none */
 	struct prim_ref prim;
 	const struct geom_shape *shape; /* of prim; NULL for a point that lies on none */
 };
 
 /* Derivatives of a point's frame as it moves, per unit length, [0] along du and [1] along dv. */
 struct surface_change {
-	vec3 du, dv; /* orthonormal, in the plane of ng, du along dpdu, or as chosen by frame_along if there is no dpdu
-		      */
-	vec3 dn[2];  /* of the shading normal; 0 on flat-shaded triangles */
-	vec3 ddu[2]; /* of the field of unit du: 0 on a triangle, turning with the meridians on a sphere (except at its
-			poles) */
+	vec3 du, dv;   /* orthonormal, in the plane of ng: frame_along(ng, axis) */
+	vec3 dn[2];    /* of the shading normal; 0 on flat-shaded triangles */
+	vec3 axis;     /* the unit axis */
+	vec3 daxis[2]; /* of the unit axis: 0 on a triangle, turning with the meridians on a sphere (except at its
+			  poles) */
 };
 
 /* The point of a primitive nearest to p, which should be on it: as exact as the primitive is small, wherever it is. */

@@ -66,16 +66,16 @@ static inline mat2 by_neighbour(const struct frame *f, const struct half *r, con
 }
 
 /* The vertex itself moves along d: both directions turn, and the frame with the shading normal (by dn) and with the
- * field of du (by ddu). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is the rate at which s = N(du - n
- * (n.du)) turns around n. */
+ * axis a (by da). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is the rate at which s = N(a - n (n.a)) turns
+ * around n. */
 static inline vec2 by_itself(const struct frame *f, const struct half *r, const struct neighbour *i,
-			     const struct neighbour *o, double eta, vec3 d, vec3 du, vec3 dn, vec3 ddu)
+			     const struct neighbour *o, double eta, vec3 d, vec3 a, vec3 dn, vec3 da)
 {
 	vec3 sum = vec3_add(turn(i->w, d, -i->own), turn(o->w, d, -eta * o->own));
 	vec2 c = slope_change(f, r, sum);
 	double dns = vec3_dot(f->s, dn), dnt = vec3_dot(f->t, dn);
-	double bent = vec3_dot(f->s, du); /* |du - n (n.du)| */
-	double twist = bent > 0 ? (vec3_dot(f->t, ddu) - dnt * vec3_dot(f->n, du)) / bent : 0;
+	double bent = vec3_dot(f->s, a); /* |a - n (n.a)| */
+	double twist = bent > 0 ? (vec3_dot(f->t, da) - dnt * vec3_dot(f->n, a)) / bent : 0;
 	double normal = 1, stretch = 0; /* of the half vector that the slopes are computed from */
 	if (r->matched)
 		normal = vec3_dot(r->sum, f->n);
@@ -126,8 +126,8 @@ static void fill_constraint(const struct path_vertex *v, double eta, const struc
 		return;
 	k->a = by_neighbour(f, r, i, 1);
 	k->c = by_neighbour(f, r, o, eta);
-	k->b = mat2_of_columns(by_itself(f, r, i, o, eta, change->du, change->du, change->dn[0], change->ddu[0]),
-			       by_itself(f, r, i, o, eta, change->dv, change->du, change->dn[1], change->ddu[1]));
+	k->b = mat2_of_columns(by_itself(f, r, i, o, eta, change->du, change->axis, change->dn[0], change->daxis[0]),
+			       by_itself(f, r, i, o, eta, change->dv, change->axis, change->dn[1], change->daxis[1]));
 }
 
 void constraints_of(const struct world *w, const struct full_path *x, unsigned b, unsigned c, struct constraint *k)

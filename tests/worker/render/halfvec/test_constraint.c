@@ -235,7 +235,7 @@ static double step_of(const struct hand *h)
 	for (unsigned j = 0; j < 3; j++) {
 		if (h->x.v[j].kind == VERTEX_SURFACE) {
 			surface_change_of(&h->shape[j], &h->x.v[j].x, &c);
-			double bend = fmax(fmax(vec3_length(c.dn[0]), vec3_length(c.dn[1])), vec3_length(c.ddu[0]));
+			double bend = fmax(fmax(vec3_length(c.dn[0]), vec3_length(c.dn[1])), vec3_length(c.daxis[0]));
 			l = fmin(l, 1 / fmax(bend, 1));
 		}
 		if (j < 2)
@@ -379,7 +379,7 @@ static void test_degenerate(void **state)
 	hand_sphere(&h, 1, (vec3){0, 0, 0}, (vec3){0, 0, 1}, 0.5, 1, 0, &d);
 	h.shape[1].sphere_axes = frame_around((vec3){0, 0, 1});
 	surface_on_sphere(&h.shape[1], (struct prim_ref){1, 0}, (vec3){0, 0, 1}, &h.x.v[1].x);
-	assert_true(vec3_length(h.x.v[1].x.dpdu) == 0);
+	assert_true(vec3_length(h.x.v[1].x.axis) == 0);
 	hand_camera(&h, 2, (vec3){-0.5, 0.1, 0.25});
 	hand_join(&h);
 	constraints_of(&h.w, &h.x, 2, 0, k);

@@ -101,7 +101,7 @@ static void shape_says(const struct world *w, const struct path_vertex *v, wide 
 		}
 		*n = wide_dot(m, flat) > 0 ? wide_unit(m) : flat;
 	}
-	wide d = widen(v->x.dpdu);
+	wide d = widen(v->x.axis);
 	d = wide_add(d, -wide_dot(d, *n), *n);
 	*s = wide_dot(d, d) > 0 ? wide_unit(d) : widen(v->x.sh.s);
 }
