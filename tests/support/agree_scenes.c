@@ -247,6 +247,49 @@ static struct world *bright_texel(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
+/* The unit sphere by 8 meridians and 4 circles, with its normals and texture coordinates. */
+static size_t coarse_sphere(char *out, size_t size)
+{
+	size_t at = 0;
+	for (int j = 0; j <= 4; j++)
+		for (int i = 0; i <= 8; i++) {
+			double a = M_PI * j / 4, b = M_PI * i / 4, x = sin(a) * cos(b), y = sin(a) * sin(b), z = cos(a);
+			at += (size_t)snprintf(out + at, size - at, "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %g %g\n", x, y, z, x, y, z, i / 8., j / 4.);
+		}
+	for (int k = 0; k < 32; k++) {
+		int a = k / 8 * 9 + k % 8 + 1, b = a + 1, c = a + 9, d = c + 1;
+		if (k >= 8)
+			at += (size_t)snprintf(out + at, size - at, "f %d/%d/%d %d/%d/%d %d/%d/%d\n", a, a, a, c, c, c, b, b, b);
+		if (k < 24)
+			at += (size_t)snprintf(out + at, size - at, "f %d/%d/%d %d/%d/%d %d/%d/%d\n", b, b, b, c, c, c, d, d, d);
+	}
+	return at;
+}
+
+/* Anisotropic metal, anisotropic glass, and a normal map on meshes of few triangles, one of them a stretched and mirrored instance: their
+ * frames turn within each triangle. */
+static struct world *smooth_tangents(const struct agree_case *k)
+{
+	static char xml[1 << 12], obj[1 << 13];
+	(void)k;
+	size_t size = coarse_sphere(obj, sizeof obj);
+#define COARSE(place, bsdf) "<shape type='obj'><string name='filename' value='m.obj'/>" AT(place TURN) bsdf "</shape>"
+#define ALONG(type) "<bsdf type='" type "'><float name='alpha_u' value='0.3'/><float name='alpha_v' value='0.1'/></bsdf>"
+	int n = snprintf(xml, sizeof xml,
+			 "<scene version='3.0.0'>" LOOK_AT_IT SKY GROUND
+			 COARSE("<scale value='0.5'/><translate x='-0.9' y='0.6'/>", ALONG("roughconductor"))
+			 COARSE("<scale value='0.5'/><rotate x='1' angle='70'/><translate x='0.1' y='0.6' z='0.6'/>", ALONG("roughdielectric"))
+			 "<shape type='shapegroup' id='g'><shape type='obj'><string name='filename' value='m.obj'/>"
+			 "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.65,0.45,0.9'/><rgb name='color1' value='0.4,0.55,0.9'/></texture>"
+			 ALONG("roughconductor") "</bsdf></shape></shape>"
+			 "<shape type='instance'><ref id='g'/>" AT("<scale x='-0.4' y='0.5' z='0.6'/><translate x='1.1' y='0.6'/>" TURN) "</shape>"
+			 "<shape type='instance'><ref id='g'/>" AT("<scale value='0.3'/><translate x='0.5' y='0.4' z='1.5'/>" TURN) "</shape>"
+			 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape></scene>");
+	const struct memory_file files[] = {{"test.xml", xml, (size_t)n}, {"m.obj", obj, size}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
 /* Each material has parts with different normals, some by a bump map with 8 x 8 heights. a = 1: among them glass. */
 static struct world *tilted_parts(const struct agree_case *k)
 {
@@ -315,6 +358,7 @@ const struct agree_case agree_cases[] = {
 	{"clipped view", "a wall behind an orthographic camera", clipped_view, 1, 0, 6, 512, 512, ALL, 0.02},
 	{"tilted parts", "rough metal, paper and plastic", tilted_parts, 0, 0, 5, 512, 512, ALL, 0.02},
 	{"tilted parts", "chalk and glass", tilted_parts, 1, 0, 6, 1024, 1024, ALL, 0.02},
+	{"smooth tangents", "brushed metal and glass", smooth_tangents, 0, 0, 6, 1024, 1024, ALL, 0.02},
 	{"absorbing media", "glass and water", absorbing_media, 0, 0, 8, 2048, 1024, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},

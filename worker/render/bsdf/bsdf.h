@@ -99,6 +99,7 @@ struct bsdf {
 	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
 	bool tilted;		     /* some part has another shading normal than the surface (tilted.h) */
+	bool uses_tangents;	     /* differs along the two axes of the frame, or bends normals by a normal map */
 	bool black;		     /* neither reflects nor transmits */
 	enum color_shape shape;	     /* CONSTANT: carries no colour */
 	const struct relief *relief; /* bends the shading normals of the surface; NULL: none */

@@ -112,6 +112,7 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 		return code;
 	b->relief = &bend->relief;
 	b->textured = true;
+	b->uses_tangents |= kind == RELIEF_NORMAL;
 	return 0;
 }
 

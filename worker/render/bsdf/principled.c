@@ -377,6 +377,7 @@ int principled_shares(struct principled *p, struct bsdf *b, const struct scene_n
 		p->most[i] = range_of(&p->share[i], build, true);
 		p->varies = true;
 	}
+	b->uses_tangents = p->most[ANISOTROPIC] > 0;
 	return 0;
 }
 

@@ -54,6 +54,7 @@ int rough_map_read(struct rough_map *r, struct bsdf *b, const struct scene_node 
 		return code;
 	if (r->varies)
 		find_least(r, build);
+	b->uses_tangents = r->fixed.ratio != 1 || node_ref(n, "alpha_u") || node_ref(n, "alpha_v");
 	b->alpha = microfacet_least(&r->fixed);
 	b->alpha_mean = microfacet_mean(&r->fixed);
 	return 0;

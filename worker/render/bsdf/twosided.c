@@ -133,6 +133,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 		b->has_smooth |= t->side[i].has_smooth;
 		b->has_delta |= t->side[i].has_delta;
 		b->textured |= t->side[i].textured;
+		b->uses_tangents |= t->side[i].uses_tangents;
 		bsdf_add_shape(b, t->side[i].shape);
 	}
 	if (!b->has_smooth)

@@ -152,6 +152,20 @@ static vec3 smooth_normal(const struct geom_shape *s, const uint32_t i[3], const
 	return vec3_dot(m, x->ng) > 0 ? vec3_normalize(m) : x->ng;
 }
 
+/* The interpolated tangent, not normalised. false: there is none, or opposite ones cancel. */
+static bool smooth_axis(const struct geom_shape *s, uint32_t prim, double b1, double b2, vec3 *axis)
+{
+	if (!s->tangent)
+		return false;
+	const float(*t)[3] = (const float(*)[3])s->tangent[prim];
+	vec3 a = vec3_madd(vec3_madd(vec3_scale(1 - b1 - b2, vertex_at(t, 0)), b1, vertex_at(t, 1)), b2,
+			   vertex_at(t, 2));
+	if (!(vec3_dot(a, a) > 0x1p-20))
+		return false;
+	*axis = s->place ? placement_vector(s->place, a) : a;
+	return true;
+}
+
 static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
 			  struct surface_point *x)
 {
@@ -162,7 +176,8 @@ static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
 	struct tangents t = tangents_of(s, i, c->e1, c->e2);
-	x->axis = t.any ? t.u : carried_axis(x->ng);
+	if (!smooth_axis(s, x->prim.prim, b1, b2, &x->axis))
+		x->axis = t.any ? t.u : carried_axis(x->ng);
 	vec3 n = smooth_normal(s, i, x);
 	x->u = b1;
 	x->v = b2;
@@ -337,6 +352,31 @@ static void barycentric_gradients(const struct corner *k, vec3 *g1, vec3 *g2)
 	*g2 = vec3_scale(inverse, vec3_cross(area, k->e1));
 }
 
+/* How the interpolated tangent turns. */
+static void turn_axis(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	vec3 a, g1, g2;
+	if (!smooth_axis(s, x->prim.prim, x->b1, x->b2, &a))
+		return;
+	const float(*t)[3] = (const float(*)[3])s->tangent[x->prim.prim];
+	vec3 a1 = vec3_sub(vertex_at(t, 1), vertex_at(t, 0)), a2 = vec3_sub(vertex_at(t, 2), vertex_at(t, 0));
+	if (s->place) {
+		a1 = placement_vector(s->place, a1);
+		a2 = placement_vector(s->place, a2);
+	}
+	struct corner k = corner_of(s, s->index[x->prim.prim]);
+	barycentric_gradients(&k, &g1, &g2);
+	double length = vec3_length(a);
+	c->axis = vec3_scale(1 / length, a);
+	for (int d = 0; d < 2; d++) {
+		vec3 along = d ? c->dv : c->du;
+		vec3 da = vec3_madd(vec3_scale(vec3_dot(along, g1), a1), vec3_dot(along, g2), a2);
+		vec3 turn = vec3_scale(1 / length, vec3_madd(da, -vec3_dot(c->axis, da), c->axis));
+		if (vec3_is_finite(turn))
+			c->daxis[d] = turn;
+	}
+}
+
 /* The normal without relief, and its derivatives in c->dn. */
 static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
 {
@@ -379,7 +419,10 @@ static void bend_on_triangle(const struct geom_shape *s, const struct surface_po
 	for (int a = 0; a < 2; a++) {
 		vec3 along = a ? c->dv : c->du;
 		double b1 = vec3_dot(along, g1), b2 = vec3_dot(along, g2);
-		struct relief_step d = {.dn = c->dn[a], .du = b1 * t1[0] + b2 * t2[0], .dv = b1 * t1[1] + b2 * t2[1]};
+		struct relief_step d = {.dn = c->dn[a],
+					.daxis = c->daxis[a],
+					.du = b1 * t1[0] + b2 * t2[0],
+					.dv = b1 * t1[1] + b2 * t2[1]};
 		c->dn[a] = relief_turn(s->relief, &site, &d);
 	}
 }
@@ -394,6 +437,7 @@ void surface_change_of(const struct geom_shape *s, const struct surface_point *x
 		if (s->relief)
 			bend_on_sphere(s, x, c);
 	} else if (s->normal || s->relief) {
+		turn_axis(s, x, c);
 		vec3 n = change_on_triangle(s, x, c);
 		if (s->relief)
 			bend_on_triangle(s, x, n, c);

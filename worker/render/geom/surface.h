@@ -25,6 +25,8 @@ struct geom_shape {
 	uint32_t (*index)[3];
 	float (*normal)[3];	       /* NULL: flat */
 	float (*uv)[2];		       /* NULL: barycentrics are used */
+	float (*tangent)[3][3];	       /* unit, at each corner of each triangle, three times 0: it has none; NULL: dp/du
+					  is used */
 	const struct relief *relief;   /* bends shading normals; NULL: none */
 	const struct placement *place; /* for instances; NULL: positions and normals are in world space */
 	double unit;		       /* the scene's unit of length in world units: for relief */
@@ -35,7 +37,8 @@ struct surface_point {
 	struct frame sh; /* sh.n is the shading normal, bent by relief */
 	double u, v;
 	double b1, b2; /* barycentrics on a triangle; 0 on a sphere */
-	vec3 axis;     /* along which the shading frame is laid (frame_along): dp/du, or another where there is none */
+	vec3 axis; /* along which the shading frame is laid (frame_along): the interpolated tangent, dp/du, or another
+		  direction where there is none */
 	struct prim_ref prim;
 	const struct geom_shape *shape; /* of prim; NULL for a point that lies on none */
 };
@@ -45,8 +48,8 @@ struct surface_change {
 	vec3 du, dv;   /* orthonormal, in the plane of ng: frame_along(ng, axis) */
 	vec3 dn[2];    /* of the shading normal; 0 on flat-shaded triangles */
 	vec3 axis;     /* the unit axis */
-	vec3 daxis[2]; /* of the unit axis: 0 on a triangle, turning with the meridians on a sphere (except at its
-			  poles) */
+	vec3 daxis[2]; /* of the unit axis: 0 on a triangle without tangents, turning with the meridians on a sphere
+			  (except at its poles) */
 };
 
 /* The point of a primitive nearest to p, which should be on it: as exact as the primitive is small, wherever it is. */

@@ -21,6 +21,7 @@
 #include "worker/render/world/effects_text.h"
 #include "worker/render/world/geometry.h"
 #include "worker/render/world/node_table.h"
+#include "worker/render/world/smooth_tangents.h"
 #include "worker/render/world/unseen.h"
 #include "worker/render/world/visibility_bounds.h"
 
@@ -318,6 +319,8 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = create_emitters(b);
 	if (b->found && b->found->problem_count)
 		return rc;
+	if (!rc)
+		rc = smooth_tangents_make(b->w, &b->scratch, b->e);
 	if (!rc)
 		rc = find_coincidence(b);
 	if (!rc)

@@ -84,6 +84,39 @@ static struct stats_mean albedo(const struct bsdf *b, vec3 wo, enum transport t,
 }
 
 /* Level: 8 standard errors with 15 degrees of freedom, below 1e-6 a test. A gain of 5 % anywhere would be found. */
+static vec3 turned(vec3 w, double angle)
+{
+	double c = cos(angle), s = sin(angle);
+	return (vec3){c * w.x - s * w.y, s * w.x + c * w.y, w.z};
+}
+
+/* What does not say that it uses tangents is the same however the frame lies around the normal; so it gets none. */
+static void test_tangents(void **state)
+{
+	(void)state;
+	int without = 0;
+	for (int k = 0; k < BSDF_CASES; k++) {
+		struct arena a = {0};
+		struct bsdf b;
+		bsdf_make(&a, bsdf_cases[k], &b);
+		const struct bsdf_point at = point_of(TRANSPORT_RADIANCE);
+		for (uint64_t i = 0; i < 400 && !b.uses_tangents; i++) {
+			double u[4];
+			struct bsdf_sample s;
+			rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
+			vec3 wo = uniform_direction(u[0], u[1]), wi = uniform_direction(u[2], u[3]);
+			if (i % 2 && b.ops->sample(&b, &at, wo, u, &s))
+				wi = s.wi;
+			spectrum f = b.ops->eval(&b, &at, wo, wi),
+				 g = b.ops->eval(&b, &at, turned(wo, 1 + u[0]), turned(wi, 1 + u[0]));
+			assert_near(f.v[0], g.v[0], 1e-6, bsdf_cases[k]);
+		}
+		without += !b.uses_tangents;
+		arena_fini(&a);
+	}
+	assert_true(without > BSDF_CASES / 2 && without < BSDF_CASES - 5);
+}
+
 static void test_no_energy_is_gained(void **state)
 {
 	(void)state;
@@ -471,6 +504,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_reciprocity),
+		cmocka_unit_test(test_tangents),
 		cmocka_unit_test(test_no_energy_is_gained),
 		cmocka_unit_test(test_smooth_boundaries_lose_nothing),
 		cmocka_unit_test(test_white_furnace),

@@ -13,7 +13,7 @@
 #include <assert.h>
 #include <string.h>
 
-enum hand_uv { HAND_UV_NONE, HAND_UV, HAND_UV_DEGENERATE };
+enum hand_uv { HAND_UV_NONE, HAND_UV, HAND_UV_DEGENERATE, HAND_TANGENTS };
 
 struct hand {
 	struct world w;
@@ -21,7 +21,7 @@ struct hand {
 	struct geom_shape shape[FULL_PATH_MAX_VERTICES];
 	struct bsdf bsdf[FULL_PATH_MAX_VERTICES];
 	float position[FULL_PATH_MAX_VERTICES][3][3], normal[FULL_PATH_MAX_VERTICES][3][3],
-		uv[FULL_PATH_MAX_VERTICES][3][2];
+		uv[FULL_PATH_MAX_VERTICES][3][2], tangent[FULL_PATH_MAX_VERTICES][1][3][3];
 	uint32_t index[FULL_PATH_MAX_VERTICES][1][3];
 };
 
@@ -82,14 +82,23 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 		vec3 k = vec3_scale(gain, vec3_madd(vec3_madd(n, x, ga), y, gb));
 		memcpy(h->position[j][m], (float[3]){(float)q.x, (float)q.y, (float)q.z}, sizeof(float[3]));
 		memcpy(h->normal[j][m], (float[3]){(float)k.x, (float)k.y, (float)k.z}, sizeof(float[3]));
-		h->uv[j][m][0] = t->uv == HAND_UV ? (float)dice_throw(d) : 0.5f;
-		h->uv[j][m][1] = t->uv == HAND_UV ? (float)dice_throw(d) : 0.5f;
+		bool varied = t->uv == HAND_UV || t->uv == HAND_TANGENTS;
+		h->uv[j][m][0] = varied ? (float)dice_throw(d) : 0.5f;
+		h->uv[j][m][1] = varied ? (float)dice_throw(d) : 0.5f;
 		h->index[j][0][m] = (uint32_t)m;
 	}
 	*s = (struct geom_shape){
 		.vertex_count = 3, .triangle_count = 1, .position = h->position[j], .index = h->index[j]};
 	s->normal = t->flat ? NULL : h->normal[j];
 	s->uv = t->uv == HAND_UV_NONE ? NULL : h->uv[j];
+	if (t->uv == HAND_TANGENTS) { /* that turn by up to a radian between corners */
+		vec3 along = hand_across(d, n);
+		for (int m = 0; m < 3; m++) {
+			vec3 q = vec3_normalize(vec3_madd(along, 0.5, dice_direction(d)));
+			memcpy(h->tangent[j][0][m], (float[3]){(float)q.x, (float)q.y, (float)q.z}, sizeof(float[3]));
+		}
+		s->tangent = h->tangent[j];
+	}
 	surface_on_triangle(s, (struct prim_ref){j, 0}, w[1] / sum, w[2] / sum, &h->x.v[j].x);
 	h->x.v[j].kind = VERTEX_SURFACE;
 }

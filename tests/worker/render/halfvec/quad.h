@@ -83,8 +83,9 @@ struct quad_vertex {
 	bool smooth;
 	qvec e1, e2, normal[3]; /* triangle */
 	quad b1, b2;
-	quad of_e1, of_e2; /* dp/du = of_e1 e1 + of_e2 e2, or carried by the normal */
-	bool carried;
+	quad of_e1, of_e2; /* dp/du = of_e1 e1 + of_e2 e2, or carried by the normal, or between the corners' tangents */
+	bool carried, turning;
+	qvec tangent[3];
 	qvec center, axis; /* sphere */
 	quad radius, sign;
 	qvec du, dv; /* of points and directions */
@@ -95,10 +96,17 @@ struct quad_place {
 	qvec p, s, t, n;
 };
 
-/* dp/du of a triangle. Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the
- * normal. */
-static inline qvec quad_along(const struct quad_vertex *v)
+static inline qvec quad_between(const qvec corner[3], quad b1, quad b2)
 {
+	return q_madd(q_madd(q_scale(1 - b1 - b2, corner[0]), b1, corner[1]), b2, corner[2]);
+}
+
+/* dp/du of a triangle. Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the
+ * normal. With tangents: the one at the barycentrics (b1, b2). */
+static inline qvec quad_along(const struct quad_vertex *v, quad b1, quad b2)
+{
+	if (v->turning)
+		return quad_between(v->tangent, b1, b2);
 	qvec from = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
 	qvec ng = q_unit(q_cross(v->e1, v->e2));
 	if (v->carried)
@@ -110,7 +118,7 @@ static inline void quad_tangents(const struct quad_vertex *v, qvec *du, qvec *dv
 {
 	if (v->kind == QUAD_TRIANGLE) {
 		qvec ng = q_unit(q_cross(v->e1, v->e2));
-		*du = q_across(quad_along(v), ng);
+		*du = q_across(quad_along(v, v->b1, v->b2), ng);
 		*dv = q_cross(ng, *du);
 	} else if (v->kind == QUAD_SPHERE) {
 		qvec w = q_unit(q_sub(v->p, v->center));
@@ -131,15 +139,15 @@ static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, qua
 	if (v->kind == QUAD_DIRECTION)
 		r.p = q_unit(r.p);
 	if (v->kind == QUAD_TRIANGLE) {
-		along = quad_along(v);
 		/* move = c1 e1 + c2 e2 */
 		qvec move = q_sub(r.p, v->p), area = q_cross(v->e1, v->e2);
 		quad inverse = 1 / q_dot(area, area);
 		quad b1 = v->b1 + inverse * q_dot(q_cross(move, v->e2), area),
 		     b2 = v->b2 + inverse * q_dot(q_cross(v->e1, move), area);
+		along = quad_along(v, b1, b2);
 		r.n = q_unit(area);
 		if (v->smooth) {
-			qvec m = q_madd(q_madd(q_scale(1 - b1 - b2, v->normal[0]), b1, v->normal[1]), b2, v->normal[2]);
+			qvec m = quad_between(v->normal, b1, b2);
 			if (q_dot(m, r.n) > 0)
 				r.n = q_unit(m);
 		}
@@ -219,6 +227,9 @@ static inline struct quad_vertex quad_of_surface(const struct hand *h, unsigned 
 	for (int m = 0; m < 3 && v.smooth; m++)
 		v.normal[m] = q_of_float(s->normal[m]);
 	v.carried = true;
+	v.turning = s->tangent != NULL;
+	for (int m = 0; m < 3 && v.turning; m++)
+		v.tangent[m] = q_of_float(s->tangent[0][m]);
 	if (s->uv) {
 		quad u1 = (quad)s->uv[1][0] - (quad)s->uv[0][0], v1 = (quad)s->uv[1][1] - (quad)s->uv[0][1];
 		quad u2 = (quad)s->uv[2][0] - (quad)s->uv[0][0], v2 = (quad)s->uv[2][1] - (quad)s->uv[0][1];
@@ -276,8 +287,9 @@ static inline struct quad_problem quad_problem_shaken(const struct quad_problem 
 	struct quad_problem r = *q;
 	for (int k = 0; k < 3; k++) {
 		struct quad_vertex *v = &r.v[k];
-		qvec *vectors[] = {&v->p,	  &v->e1,	 &v->e2,     &v->normal[0],
-				   &v->normal[1], &v->normal[2], &v->center, &v->axis};
+		qvec *vectors[] = {&v->p,	   &v->e1,	  &v->e2,	  &v->normal[0],
+				   &v->normal[1],  &v->normal[2], &v->tangent[0], &v->tangent[1],
+				   &v->tangent[2], &v->center,	  &v->axis};
 		for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
 			*vectors[i] = q_shaken(*vectors[i], d);
 		v->b1 = quad_shaken(v->b1, d);

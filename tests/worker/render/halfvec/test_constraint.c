@@ -38,6 +38,8 @@ static const struct corner corners[] = {
 	{"reflection, interpolated normals", SMOOTH, {0}, {1e-3, 1}, 0.35, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
 	{"reflection, without uv", SMOOTH, {0}, {1e-3, 1}, 0.35, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV_NONE, 0},
 	{"reflection, degenerate uv", SMOOTH, {0}, {1e-3, 1}, 0.35, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV_DEGENERATE, 0},
+	{"reflection, tangents", SMOOTH, {0}, {1e-3, 1}, 0.35, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_TANGENTS, 0},
+	{"into glass, tangents", SMOOTH, {1.5, 1.5}, {1e-3, 1}, 0.35, 1, AT_INFINITY, CAMERA, HAND_TANGENTS, 0},
 	{"reflection, spheres", BALL, {0}, {1e-3, 1}, 0, 0, ON_BALL, ON_BALL, HAND_UV, 0},
 	{"reflection, inside a sphere", BALL_INVERTED, {0}, {1e-3, 1}, 0, 0, ON_BALL, ON_TRIANGLE, HAND_UV, 0},
 	{"into glass, interpolated normals",

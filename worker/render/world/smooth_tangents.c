@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/smooth_tangents.h"
+
+#include "worker/render/shape/mesh.h"
+#include "worker/render/world/node_table.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* What makes two vertices one. */
+struct weld {
+	float key[8]; /* position, normal, texture coordinates */
+	uint32_t vertex;
+};
+
+/* Of a vertex: of triangles whose texture coordinates run as on a picture seen from outside, and of mirrored ones. */
+struct sums {
+	vec3 of[2];
+	double angle[2];
+};
+
+static vec3 load(const float v[3])
+{
+	return (vec3){(double)v[0], (double)v[1], (double)v[2]};
+}
+
+static int compare_welds(const void *a, const void *b)
+{
+	const struct weld *x = a, *y = b;
+	int order = memcmp(x->key, y->key, sizeof x->key);
+	return order ? order : (x->vertex > y->vertex) - (x->vertex < y->vertex);
+}
+
+/* Gives equal vertices the same number. Their count, or 0: out of memory. */
+static uint32_t weld_vertices(const struct geom_shape *g, uint32_t **number, struct arena *scratch)
+{
+	struct weld *w = arena_alloc(scratch, g->vertex_count, sizeof *w);
+	uint32_t count = 0;
+	*number = arena_alloc(scratch, g->vertex_count, sizeof **number);
+	if (!w || !*number)
+		return 0;
+	for (uint32_t i = 0; i < g->vertex_count; i++) {
+		memcpy(w[i].key, g->position[i], sizeof g->position[i]);
+		memcpy(w[i].key + 3, g->normal[i], sizeof g->normal[i]);
+		memcpy(w[i].key + 6, g->uv[i], sizeof g->uv[i]);
+		for (int k = 0; k < 8; k++)
+			w[i].key[k] += 0.0f; /* -0 is 0 */
+		w[i].vertex = i;
+	}
+	qsort(w, g->vertex_count, sizeof *w, compare_welds);
+	for (uint32_t i = 0; i < g->vertex_count; i++) {
+		count += i == 0 || memcmp(w[i].key, w[i - 1].key, sizeof w[i].key) != 0;
+		(*number)[w[i].vertex] = count - 1;
+	}
+	return count;
+}
+
+/* The direction of a triangle's dp/du, and whether its texture coordinates are mirrored. false: it has none. */
+static bool triangle_tangent(const struct geom_shape *g, const uint32_t i[3], vec3 *tangent, bool *mirrored)
+{
+	const float *a = g->uv[i[0]], *b = g->uv[i[1]], *c = g->uv[i[2]];
+	double du1 = (double)b[0] - (double)a[0], dv1 = (double)b[1] - (double)a[1], du2 = (double)c[0] - (double)a[0],
+	       dv2 = (double)c[1] - (double)a[1], det = du1 * dv2 - dv1 * du2;
+	vec3 p = load(g->position[i[0]]), e1 = vec3_sub(load(g->position[i[1]]), p),
+	     e2 = vec3_sub(load(g->position[i[2]]), p);
+	*mirrored = det < 0;
+	*tangent = mesh_unit(vec3_scale(*mirrored ? -1 : 1, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2))));
+	return det != 0 && vec3_dot(*tangent, *tangent) > 0;
+}
+
+static vec3 in_plane(vec3 v, vec3 n)
+{
+	return mesh_unit(vec3_madd(v, -vec3_dot(v, n), n));
+}
+
+static void add_triangle(const struct geom_shape *g, const uint32_t i[3], const uint32_t *number, struct sums *sums)
+{
+	vec3 tangent;
+	bool mirrored;
+	if (!triangle_tangent(g, i, &tangent, &mirrored))
+		return;
+	for (int k = 0; k < 3; k++) {
+		vec3 n = mesh_unit(load(g->normal[i[k]])), p = load(g->position[i[k]]);
+		vec3 next = in_plane(vec3_sub(load(g->position[i[(k + 1) % 3]]), p), n),
+		     before = in_plane(vec3_sub(load(g->position[i[(k + 2) % 3]]), p), n);
+		struct sums *s = &sums[number[i[k]]];
+		double angle = mesh_angle(next, before);
+		s->of[mirrored] = vec3_madd(s->of[mirrored], angle, in_plane(tangent, n));
+		s->angle[mirrored] += angle;
+	}
+}
+
+/* 0 where tangents cancel, such as around the middle of a fan, and only rounding would be left. */
+static vec3 vertex_tangent(const struct sums *s, int mirrored)
+{
+	bool any = vec3_length(s->of[mirrored]) > 0x1p-10 * s->angle[mirrored];
+	return any ? mesh_unit(s->of[mirrored]) : (vec3){0, 0, 0};
+}
+
+/* A triangle without a tangent takes its neighbours', if all three corners have one of the same kind. */
+static bool corner_tangents(const struct geom_shape *g, const uint32_t i[3], const uint32_t *number,
+			    const struct sums *sums, vec3 out[3])
+{
+	vec3 unused;
+	bool mirrored, own = triangle_tangent(g, i, &unused, &mirrored);
+	for (int side = 0; side < 2; side++) {
+		bool all = !own || mirrored == (side == 1);
+		for (int k = 0; k < 3; k++) {
+			out[k] = vertex_tangent(&sums[number[i[k]]], side);
+			all = all && vec3_dot(out[k], out[k]) > 0;
+		}
+		if (all)
+			return true;
+	}
+	return false;
+}
+
+static int make_tangents(struct world *w, struct geom_shape *g, struct arena *scratch)
+{
+	uint32_t *number, count = weld_vertices(g, &number, scratch);
+	struct sums *sums = count ? arena_alloc(scratch, count, sizeof *sums) : NULL;
+	g->tangent = sums ? arena_alloc(&w->arena, g->triangle_count, sizeof *g->tangent) : NULL;
+	if (!g->tangent)
+		return -ENOMEM;
+	for (uint32_t i = 0; i < g->triangle_count; i++)
+		add_triangle(g, g->index[i], number, sums);
+	for (uint32_t i = 0; i < g->triangle_count; i++) {
+		vec3 t[3];
+		if (!corner_tangents(g, g->index[i], number, sums, t))
+			continue;
+		for (int k = 0; k < 3; k++) {
+			g->tangent[i][k][0] = (float)t[k].x;
+			g->tangent[i][k][1] = (float)t[k].y;
+			g->tangent[i][k][2] = (float)t[k].z;
+		}
+	}
+	return 0;
+}
+
+int smooth_tangents_make(struct world *w, struct arena *scratch, struct error *e)
+{
+	struct node_table made; /* by triangles: those of mirrored instances have another order */
+	bool begun = false;
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		struct geom_shape *g = &w->shapes[i];
+		uint32_t like;
+		if (g->is_sphere || !g->normal || !g->uv || !w->bsdfs[w->parts[i].bsdf].uses_tangents)
+			continue;
+		if (!begun && node_table_init(&made, w->shape_count, scratch))
+			return error_set(e, ENOMEM, "out of memory");
+		begun = true;
+		if (node_table_find(&made, g->index, NULL, &like)) {
+			g->tangent = w->shapes[like].tangent;
+			continue;
+		}
+		if (make_tangents(w, g, scratch))
+			return error_set(e, ENOMEM, "out of memory for the tangents of %u triangles",
+					 g->triangle_count);
+		node_table_add(&made, g->index, NULL, i);
+	}
+	return 0;
+}
