@@ -32,6 +32,7 @@
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/snake_case.h"
+#include "worker/render/scene/substitute.h"
 #include "worker/render/scene/texture_names.h"
 #include "worker/render/scene/transform.h"
 #include "worker/render/scene/value.h"
@@ -319,63 +320,16 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	return 0;
 }
 
-/* For a plug-in that is not supported: refuses it, or finds the table and type that replace it, or puts the node
- * inside it into *out (*decl stays NULL). REPORT_TOLD: it is left out. */
-static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class cls, const char **type,
-		    const struct plugin_decl **decl, const struct scene_node **out)
+/* The node of `inner`, which stands in for el. */
+static int make_inner(struct maker *m, struct xml_element *el, struct xml_element *inner, const struct scene_node **out)
 {
-	const char *other;
-	enum lenient_way way = m->lenient ? lenient_plugin(cls, *type, &other) : LENIENT_REFUSE;
-	if (way == LENIENT_REFUSE)
-		return refuse_type(m->decls, el, cls, *type, m->error);
-	struct xml_element *inner = way == LENIENT_INNER ? lenient_inner(&m->ids, el) : NULL;
-	int r = way == LENIENT_LEAVE_OUT
-			? leave_out(&m->notes, el, *type, "", "the plug-in")
-			: note(&m->notes, el, *type, "",
-			       "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)",
-			       el->file, el->line, el->name, *type, inner ? "the BSDF inside" : "a standard ",
-			       inner ? "" : other);
-	if (r || way == LENIENT_LEAVE_OUT)
-		return r ? r : REPORT_TOLD;
-	if (inner) {
-		el->busy = true;
-		m->depth++;
-		r = make_node(m, inner, out);
-		m->depth--;
-		el->busy = false;
-		el->nesting = inner->nesting;
-		return r;
-	}
-	*type = other;
-	*decl = plugin_find(m->decls, cls, other);
-	return *decl ? 0 : refuse_type(m->decls, el, cls, *type, m->error);
-}
-
-/* Removes a covering that its inner BSDF does not allow, or that lacks its texture. REPORT_TOLD: nothing is left. */
-static int uncover(struct maker *m, const struct xml_element *el, bool lacks, const struct scene_node **node)
-{
-	const char *type = (*node)->type;
-	bool bare = lacks && lenient_needs_texture(type);
-	const struct scene_node *inner = bare ? node_child(*node, PLUGIN_BSDF, 0) : lenient_uncovered(*node);
-	if (!inner)
-		return bare ? REPORT_TOLD : 0;
-	*node = inner;
-	return note(&m->notes, el, type, inner->type,
-		    "%s:%d: <bsdf type=\"%.64s\"> %s%s%s; the BSDF inside stands in for it (lenient)", el->file,
-		    el->line, type, bare ? "has no texture left" : "over \"", bare ? "" : inner->type,
-		    bare ? "" : "\", which lets light through, is not supported");
-}
-
-/* REPORT_TOLD: a texture whose file is missing, which is left out. */
-static int miss_texture(struct maker *m, const struct xml_element *el, const char *type)
-{
-	const char *file = lenient_missing(m->assets_from, el);
-	if (!file)
-		return 0;
-	int r = note(&m->notes, el, type, file,
-		     "%s:%d: <texture type=\"%.64s\">: %.256s is not among the scene's files; left out (lenient)",
-		     el->file, el->line, type, file);
-	return r ? r : REPORT_TOLD;
+	el->busy = true;
+	m->depth++;
+	int r = make_node(m, inner, out);
+	m->depth--;
+	el->busy = false;
+	el->nesting = inner->nesting;
+	return r;
 }
 
 /* An object with errors inside still becomes a node, so that all errors are found. One that is not an object of any
@@ -408,15 +362,21 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");
 	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);
 	bool stands_in = !decl;
-	if (!decl && (r = stand_in(m, el, cls, &type, &decl, out)))
+	struct xml_element *inner = NULL;
+	if (!decl && !m->lenient)
+		return refuse_type(m->decls, el, cls, type, m->error);
+	if (!decl && (r = substitute_plugin(&m->notes, m->decls, &m->ids, el, cls, &type, &decl, &inner)))
 		return r;
-	if (!decl) /* *out is the replacement */
-		return el->node = *out, 0;
+	if (inner) {
+		r = make_inner(m, el, inner, out);
+		el->node = r ? NULL : *out;
+		return r;
+	}
 	if (strcasecmp(type, decl->type) == 0)
 		type = decl->type;
 	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(&m->notes, el, decl)))
 		return r;
-	if (m->lenient && (r = miss_texture(m, el, type)))
+	if (m->lenient && (r = substitute_texture(&m->notes, m->assets_from, el, type)))
 		return r;
 	struct draft d = {.node = allocate(m, 1, sizeof *d.node),
 			  .decl = decl,
@@ -440,7 +400,7 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	*out = d.node;
 	if (!r)
 		r = remarks_on_object(d.node, &m->report, m->error);
-	if (!r && m->lenient && (r = uncover(m, el, d.lacks, out)) == REPORT_TOLD)
+	if (!r && m->lenient && (r = substitute_cover(&m->notes, el, d.lacks, out)) == REPORT_TOLD)
 		return r;
 	el->node = *out;
 	return r;

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/substitute.h"
+
+#include "worker/render/scene/plugin.h"
+#include "worker/render/scene/refuse.h"
+
+int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, struct id_table *ids,
+		      const struct xml_element *el, enum plugin_class cls, const char **type,
+		      const struct plugin_decl **decl, struct xml_element **inner)
+{
+	const char *other;
+	enum lenient_way way = lenient_plugin(cls, *type, &other);
+	if (way == LENIENT_REFUSE)
+		return refuse_type(decls, el, cls, *type, t->error);
+	*inner = way == LENIENT_INNER ? lenient_inner(ids, el) : NULL;
+	int r = way == LENIENT_LEAVE_OUT
+			? leave_out(t, el, *type, "", "the plug-in")
+			: note(t, el, *type, "",
+			       "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)",
+			       el->file, el->line, el->name, *type, *inner ? "the BSDF inside" : "a standard ",
+			       *inner ? "" : other);
+	if (r || way == LENIENT_LEAVE_OUT)
+		return r ? r : REPORT_TOLD;
+	if (*inner)
+		return 0;
+	*type = other;
+	*decl = plugin_find(decls, cls, other);
+	return *decl ? 0 : refuse_type(decls, el, cls, *type, t->error);
+}
+
+int substitute_texture(const struct notes *t, const struct asset_source *assets, const struct xml_element *el,
+		       const char *type)
+{
+	const char *file = lenient_missing(assets, el);
+	if (!file)
+		return 0;
+	int r = note(t, el, type, file,
+		     "%s:%d: <texture type=\"%.64s\">: %.256s is not among the scene's files; left out (lenient)",
+		     el->file, el->line, type, file);
+	return r ? r : REPORT_TOLD;
+}
+
+int substitute_cover(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node **node)
+{
+	const char *type = (*node)->type;
+	bool bare = lacks && lenient_needs_texture(type);
+	const struct scene_node *inner = bare ? node_child(*node, PLUGIN_BSDF, 0) : lenient_uncovered(*node);
+	if (!inner)
+		return bare ? REPORT_TOLD : 0;
+	*node = inner;
+	return note(t, el, type, inner->type,
+		    "%s:%d: <bsdf type=\"%.64s\"> %s%s%s; the BSDF inside stands in for it (lenient)", el->file,
+		    el->line, type, bare ? "has no texture left" : "over \"", bare ? "" : inner->type,
+		    bare ? "" : "\", which lets light through, is not supported");
+}

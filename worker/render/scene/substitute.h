@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What takes the place of things that are not supported or missing, with --lenient (lenient.h says what), and the notes
+ * that say so. Each returns 0, REPORT_TOLD where nothing is left in its place, or another error. One thread.
+ */
+#ifndef WORKER_RENDER_SCENE_SUBSTITUTE_H
+#define WORKER_RENDER_SCENE_SUBSTITUTE_H
+
+#include "worker/render/scene/lenient.h"
+#include "worker/render/scene/notes.h"
+
+/* A plug-in that no table has: *type and *decl become those of its replacement, or *inner the BSDF inside it. Refused
+ * where there is neither. */
+int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, struct id_table *ids,
+		      const struct xml_element *el, enum plugin_class cls, const char **type,
+		      const struct plugin_decl **decl, struct xml_element **inner);
+
+/* A texture whose file is missing is left out. */
+int substitute_texture(const struct notes *t, const struct asset_source *assets, const struct xml_element *el,
+		       const char *type);
+
+/* *node becomes the BSDF inside it if it does not allow that, or if it `lacks` the texture that it needs. */
+int substitute_cover(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node **node);
+
+#endif
