@@ -100,7 +100,10 @@ static int expand(struct define_table *t, const char *text, bool keep_unknown, s
 	while (*text) {
 		const char *piece = text;
 		size_t piece_length = 1;
-		if (*text == '$') {
+		if (text[0] == '\\' && text[1] == '$') { /* a $ that begins no name */
+			piece = text + 1;
+			text += 2;
+		} else if (*text == '$') {
 			size_t name_length = 0;
 			while (is_name_character(text[1 + name_length]))
 				name_length++;

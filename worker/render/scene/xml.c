@@ -347,13 +347,36 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 
 static int read_file(struct reader *r, const char *name);
 
+/* An <include> inside an object becomes the object that its file holds. */
+static int become_included(struct xml_element *el, struct error *e)
+{
+	const struct xml_element include = *el;
+	if (strcmp(el->first->name, "scene") == 0)
+		return xml_error(el, e, EINVAL, "a file that holds a <scene> may be included directly in <scene> only");
+	*el = *el->first;
+	el->parent = include.parent;
+	el->next = include.next;
+	for (struct xml_element *c = el->first; c; c = c->next)
+		c->parent = el;
+	uint32_t kept = 0;
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (strcmp(el->attributes[i].name, "version") != 0)
+			el->attributes[kept++] = el->attributes[i];
+	el->attribute_count = kept;
+	return 0;
+}
+
 static int read_include(struct reader *r, struct xml_element *el)
 {
+	bool at_top = el->parent == r->top && strcmp(r->top->name, "scene") == 0;
 	const char *name = xml_attribute(el, "filename");
 	if (!name)
 		return xml_error(el, r->error, EINVAL, "needs filename");
-	if (el->parent != r->top || strcmp(r->top->name, "scene") != 0)
-		return xml_error(el, r->error, EINVAL, "may stand directly in <scene> only");
+	if (!at_top && r->minor >= 0)
+		return xml_error(el, r->error, EINVAL, "in files before 0.5 it may stand directly in <scene> only");
+	int c = at_top ? 0 : element_check(el, "filename", false, r->error);
+	if (c)
+		return c;
 	if (r->includes >= XML_INCLUDE_MAX)
 		return xml_error(el, r->error, ELOOP, "files include each other more than %d deep", XML_INCLUDE_MAX);
 	if (r->tree->include_count >= XML_FILES_MAX)
@@ -363,11 +386,13 @@ static int read_include(struct reader *r, struct xml_element *el)
 	r->parser = NULL;
 	r->top = r->current = NULL;
 	r->hook = el;
-	r->depth = 0;
+	r->depth = at_top ? 0 : outer.depth;
 	r->includes++;
-	int c = read_file(r, name);
+	c = read_file(r, name);
 	if (c && r->file == outer.file)
 		c = error_prefix(r->error, c, "%s:%d: <include>", el->file, el->line);
+	if (!c && !at_top)
+		c = become_included(el, r->error);
 	outer.failed = r->failed;
 	outer.mixed = r->mixed;
 	outer.upgraded = r->upgraded;

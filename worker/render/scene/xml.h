@@ -30,7 +30,8 @@ enum {
 };
 
 struct xml_tree {
-	struct xml_element *root; /* <scene>; each include is replaced by a <scene> element */
+	struct xml_element *root; /* <scene>; what a file holds is inside its <include>, or in the place of one that
+				     stands in an object */
 	bool dialect_3;
 	uint32_t element_count, include_count, path_count, note_count, missing_count;
 	const char *includes[XML_FILES_MAX];  /* names of included files; repeated where included more than once */

@@ -108,6 +108,33 @@ static void test_deep_nesting(void **state)
 	refuses(xml, "objects refer to each other more than 64 deep");
 }
 
+/* Files that objects include count on. */
+static void test_deep_nesting_by_files(void **state)
+{
+	(void)state;
+	enum { DEEP = 40 };
+	static char outer[4096], inner[4096];
+	const char *name[] = {"i.xml", "n.xml"};
+	char *text[] = {outer, inner};
+	for (int k = 0; k < 2; k++) {
+		char *p = text[k];
+		for (int i = 0; i < DEEP; i++)
+			p += sprintf(p, "<bsdf type='twosided'%s>", i ? "" : " version='3.0.0'");
+		p += k ? 0 : sprintf(p, "<include filename='n.xml'/>");
+		for (int i = 0; i < DEEP; i++)
+			p += sprintf(p, "</bsdf>");
+	}
+	static const char main_file[] = S "<include filename='i.xml'/>" END;
+	const struct memory_file files[] = {{"s.xml", main_file, sizeof main_file - 1},
+					    {name[0], outer, strlen(outer)},
+					    {name[1], inner, strlen(inner)},
+					    {0}};
+	struct error e = {""};
+	assert_true(read_files(files, &e) < 0);
+	if (!strstr(e.text, "n.xml:1: <bsdf>: elements are nested more than 64 deep"))
+		fail_msg("%s", e.text);
+}
+
 static void test_too_many_elements(void **state)
 {
 	(void)state;
@@ -406,23 +433,29 @@ static void test_bad_includes(void **state)
 	(void)state;
 	refuses(S "\n<include filename='x.xml'/>" END, "s.xml:2: <include>: x.xml: no such file");
 	refuses(S "<include/>" END, "needs filename");
-	refuses(S "<bsdf type='diffuse'><include filename='s.xml'/></bsdf>" END, "directly in <scene> only");
+	refuses(S "<bsdf type='diffuse'><include filename='s.xml'/></bsdf>" END, "more than 8 deep");
+	refuses(S "<bsdf type='mask'><include filename='s.xml' nme='x'/></bsdf>" END, "has no attribute `nme`");
+	refuses("<scene version='0.4.0'><bsdf type='mask'>\n<include filename='i.xml'/></bsdf>" END,
+		"s.xml:2: <include>: in files before 0.5 it may stand directly in <scene> only");
 	refuses(S "<include filename='s.xml'/>" END, "files include each other more than 8 deep");
 	static const char main_file[] = S "<include filename='i.xml'/>" END,
 			  broken[] = S "\n\n<bsdf type='difuse'/>" END,
 			  doctype[] = "<!DOCTYPE scene><scene version='3.0.0'/>",
 			  no_version[] = "<shape type='sphere'/>", no_object[] = "<spere version='3.0.0'/>",
-			  inside[] = "<shape type='sphere' version='3.0.0'><include filename='i.xml'/></shape>";
+			  inside[] = "<shape type='sphere' version='3.0.0'><include filename='i.xml'/></shape>",
+			  in_object[] = S "<shape type='sphere'>\n<include filename='empty.xml'/></shape>" END;
 	static const struct {
 		const char *bytes, *text;
 	} cases[] = {{broken, "i.xml:3: <bsdf type=\"difuse\">"},
 		     {doctype, "i.xml:1: <!DOCTYPE>"},
 		     {no_version, "i.xml:1: <shape type=\"sphere\">: needs version="},
 		     {no_object, "i.xml:1: <spere>: has no place in <include>"},
-		     {inside, "may stand directly in <scene> only"}};
+		     {inside, "files include each other more than 8 deep"},
+		     {in_object, "i.xml:2: <include>: a file that holds a <scene> may be included"}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const struct memory_file files[] = {{"s.xml", main_file, sizeof main_file - 1},
 						    {"i.xml", cases[i].bytes, strlen(cases[i].bytes)},
+						    {"empty.xml", S END, strlen(S END)},
 						    {0}};
 		struct error e = {""};
 		assert_true(read_files(files, &e) < 0);
@@ -478,6 +511,7 @@ int main(void)
 		cmocka_unit_test(test_entity_bomb),
 		cmocka_unit_test(test_parameter_bomb),
 		cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_deep_nesting_by_files),
 		cmocka_unit_test(test_too_many_elements),
 		cmocka_unit_test(test_unknown_names),
 		cmocka_unit_test(test_names_without_values),

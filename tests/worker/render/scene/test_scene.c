@@ -401,6 +401,38 @@ static void test_include(void **state)
 	files[1] = (struct memory_file){0};
 }
 
+/* Inside an object, of an object: two files deep, and used twice. */
+static void test_include_in_objects(void **state)
+{
+	(void)state;
+	static const char inner[] = "<bsdf type='twosided' version='3.0.0'><include filename='parts/n.xml'/></bsdf>",
+			  innermost[] = "<bsdf type='phong' id='p' version='3.0.0'/>";
+	files[1] = (struct memory_file){"parts/m.xml", inner, sizeof inner - 1};
+	files[2] = (struct memory_file){"parts/n.xml", innermost, sizeof innermost - 1};
+	struct scene s = read_ok("<scene version='3.0.0'><shape type='cube'><float name='displacement' value='1'/>"
+				 "<include filename='parts/m.xml'/></shape><shape type='sphere'><ref id='p'/></shape>"
+				 "</scene>");
+	assert_int_equal(s.object_count, 2);
+	const struct scene_node *sides = node_child(s.objects[0], PLUGIN_BSDF, 0);
+	assert_string_equal(sides->type, "twosided");
+	assert_string_equal(sides->file, "parts/m.xml");
+	const struct scene_node *phong = node_child(sides, PLUGIN_BSDF, 0);
+	assert_string_equal(phong->file, "parts/n.xml");
+	assert_ptr_equal(node_child(s.objects[1], PLUGIN_BSDF, 0), phong);
+	assert_int_equal(s.asset_count, 2);
+	scene_fini(&s);
+	files[1] = files[2] = (struct memory_file){0};
+}
+
+static void test_escaped_dollar(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='3.0.0'><default name='x' value='y'/>"
+				 "<bsdf type='diffuse' id='a\\$x $x \\\\$x\\'/></scene>");
+	assert_string_equal(s.objects[0]->id, "a$x y \\$x\\");
+	scene_fini(&s);
+}
+
 static void test_ignored_is_noted_once(void **state)
 {
 	(void)state;
@@ -576,6 +608,8 @@ int main(void)
 		cmocka_unit_test(test_forward_references_and_aliases),
 		cmocka_unit_test(test_parameters),
 		cmocka_unit_test(test_include),
+		cmocka_unit_test(test_include_in_objects),
+		cmocka_unit_test(test_escaped_dollar),
 		cmocka_unit_test(test_ignored_is_noted_once),
 		cmocka_unit_test(test_depths_beyond_the_limit_are_noted),
 		cmocka_unit_test(test_assets_are_sorted_and_unique),
