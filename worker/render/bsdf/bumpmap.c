@@ -71,7 +71,7 @@ static int bend_of(const struct scene_node *n, const struct scene_node *texture,
 	const struct texture_build of_texture = bsdf_texture_build(build);
 	struct bend wanted = {.relief = {.kind = kind,
 					 .at = kind == RELIEF_HEIGHT ? height_at : normal_at,
-					 .handed = node_bool(n, "handedness", false)},
+					 .handed = node_bool(n, "handedness", true)},
 			      .node = texture,
 			      .scale = node_float(n, "scale", 1),
 			      .next = build->bends ? *build->bends : NULL};
@@ -138,7 +138,7 @@ static const struct param bumpmap_params[] = {
 	OF_MITSUBA_3_7,
 	{.name = NULL},
 };
-/* scale and handedness: as in glTF. */
+/* scale: as in glTF. handedness (ours): false for the frames of Mitsuba before August 2026, n x t. */
 static const struct param normalmap_params[] = {
 	{.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},

@@ -88,7 +88,6 @@ static struct xml_element *put_normal_map(struct gltf *g, struct xml_element *pa
 	struct xml_element *map = gltf_plugin(g, parent, at, "bsdf", "normalmap", NULL);
 	const struct gltf_channel c = {.factor = {1}, .cutoff = -1};
 	gltf_put_texture(g, map, at, NULL, info, &c);
-	gltf_put_bool(g, map, at, "handedness", true);
 	double scale = gltf_number(g, at, info, "scale", 1);
 	if (scale != 1)
 		gltf_put_number(g, map, at, "scale", scale);
