@@ -5,6 +5,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <strings.h>
 
 /* One note for each kind of thing, where it is met first. */
@@ -33,7 +34,8 @@ int note_difference(const struct notes *t, const struct xml_element *owner, cons
 		    const char *name)
 {
 	const char *type = xml_attribute(owner, "type"), *value = xml_attribute(el, "value");
-	if (value && strcasecmp(value, "false") == 0)
+	char *end;
+	if (value && (strcasecmp(value, "false") == 0 || (strtod(value, &end) == 0 && end != value && !*end)))
 		return 0;
 	return note(
 		t, owner, type, name,

@@ -35,7 +35,7 @@ enum value_type {
 enum param_class {
 	PARAM_UNDERSTOOD,
 	PARAM_IGNORED, /* has no effect on light: reported once, with file and line */
-	PARAM_DIFFERS, /* changes light a little and is not modelled: a warning, unless the scene says `false` */
+	PARAM_DIFFERS, /* changes light a little and is not modelled: a warning, unless the scene says `false` or 0 */
 	PARAM_REFUSED, /* would change light: the scene is refused, with what is supported */
 };
 

@@ -45,6 +45,8 @@ static void test_notes(void **state)
 	check(BENT("normalmap", "use_shadowing_function", "true"), "`use_shadowing_function` is not supported");
 	check(BENT("bumpmap", "use_shadowing_function", "False"), NULL);
 	check(BENT("normalmap", "flip_invalid_normals", "false"), NULL);
+	check("<emitter type='directional'><float name='angle' value='0.53'/></emitter>", "`angle` is not supported");
+	check("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
 }
 
 int main(void)
