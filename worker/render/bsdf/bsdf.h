@@ -31,7 +31,7 @@ struct bsdf_point {
 	struct texture_point where;
 	const struct wavelengths *w;
 	enum transport transport;
-	struct relief_place place; /* for parts that have another shading frame (tilted.h) */
+	struct relief_place place; /* for parts that look at other shading frames (tilted.h) */
 };
 
 struct bsdf_sample {
@@ -98,7 +98,8 @@ struct bsdf {
 	const struct ior *ior; /* for both sides (enum ior_side); NULL: only eta is known */
 	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
-	bool tilted;		     /* some part has another shading normal than the surface (tilted.h) */
+	bool uses_place;	     /* some part looks at other shading frames of the surface: bsdf_point.place */
+	bool passes;		     /* a mask, or nothing at all: what lies behind shows through */
 	bool uses_tangents;	     /* differs along the two axes of the frame, or bends normals by a normal map */
 	bool black;		     /* neither reflects nor transmits */
 	enum color_shape shape;	     /* CONSTANT: carries no colour */

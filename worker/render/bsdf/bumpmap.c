@@ -106,7 +106,7 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 	int code = bend_of(n, texture, kind, build, &bend, e);
 	if (!code)
 		code = bsdf_create(b, inner, build, e);
-	if (!code && (b->relief || b->tilted))
+	if (!code && (b->relief || b->uses_place))
 		code = node_error(n, e, ENOTSUP, "one bump or normal map in another is not supported");
 	if (code)
 		return code;

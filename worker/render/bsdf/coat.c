@@ -225,7 +225,7 @@ static int read_inner(struct coat *c, struct bsdf *b, const struct scene_node *n
 	if (code)
 		return code;
 	b->relief = c->inner.relief;
-	b->tilted = c->inner.tilted;
+	b->uses_place = c->inner.uses_place;
 	b->modes = BSDF_REFLECT | c->inner.modes;
 	b->has_smooth = c->inner.has_smooth;
 	b->has_delta = c->inner.has_delta;

@@ -12,6 +12,18 @@ void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 	return b->data;
 }
 
+int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n, const struct bsdf_build *build,
+	      struct error *e)
+{
+	struct bsdf *inner = arena_alloc(build->arena, 1, sizeof *inner);
+	if (!inner)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*inner = *b;
+	b->ops = ops;
+	b->data = inner;
+	return 0;
+}
+
 void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
 {
 	b->ops = ops;

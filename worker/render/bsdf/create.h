@@ -9,6 +9,10 @@
 void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size,
 		struct error *e);
 
+/* Puts `ops`, whose data is a BSDF, around b: all that b says of itself stays. */
+int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n, const struct bsdf_build *build,
+	      struct error *e);
+
 /* Reads a reflectance and sets b's colour and texture flags. */
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		 const struct bsdf_build *build, struct error *e);

@@ -30,7 +30,8 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (code)
 		return code;
 	b->relief = m->part[0].relief;
-	b->tilted = m->part[0].tilted;
+	b->uses_place = m->part[0].uses_place;
+	b->passes = true;
 	b->alpha_mean = m->part[0].alpha_mean;
 	if (!b->has_smooth)
 		b->alpha = 0;

@@ -4,6 +4,7 @@
 
 static int null_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
+	b->passes = true;
 	return straight_create(b, n, build, 1, e);
 }
 

@@ -32,7 +32,7 @@ static void look(const struct bsdf *inner, const struct bsdf_point *p, struct vi
 	v->outer = p->place;
 	v->frame = surface ? p->place.frame(p->place.point, inner->relief) : same;
 	v->p = *p;
-	if (surface && inner->tilted)
+	if (surface && inner->uses_place)
 		v->p.place = (struct relief_place){v, frame_inside};
 }
 
@@ -92,18 +92,6 @@ static const struct bsdf_ops tilted_ops = {
 	.sample = tilted_sample,
 };
 
-static int tilt(struct bsdf *part, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
-{
-	struct bsdf *inner = arena_alloc(build->arena, 1, sizeof *inner);
-	if (!inner)
-		return node_error(n, e, ENOMEM, "out of memory");
-	*inner = *part;
-	part->ops = &tilted_ops;
-	part->data = inner;
-	part->tilted = true;
-	return 0;
-}
-
 /* Light that passes straight on does so whatever the normal is. */
 static bool needs_normal(const struct bsdf *part)
 {
@@ -127,17 +115,17 @@ int bsdf_share_relief(struct bsdf *b, struct bsdf *part, uint32_t count, const s
 	const struct bsdf *first = narrowest(part, count);
 	b->relief = first ? first->relief : NULL;
 	for (uint32_t k = 0; k < count; k++) {
-		b->tilted |= part[k].tilted;
+		b->uses_place |= part[k].uses_place;
 		if (part[k].relief == b->relief || !needs_normal(&part[k]))
 			continue;
 		if (part[k].has_delta)
 			return node_error(n, e, ENOTSUP,
 					  "two of its BSDFs that have specular lobes or are masked bend normals "
 					  "differently");
-		int code = tilt(&part[k], n, build, e);
+		int code = bsdf_wrap(&part[k], &tilted_ops, n, build, e);
 		if (code)
 			return code;
-		b->tilted = true;
+		b->uses_place = true;
 	}
 	return 0;
 }

@@ -26,7 +26,7 @@ static struct frame mirrored_frame(const void *front, const struct relief *r)
 /* The point for the BSDF of the back, which sees all from the other side: p, or made in q, which must live as long. */
 static const struct bsdf_point *from_back(const struct bsdf *b, const struct bsdf_point *p, struct bsdf_point *q)
 {
-	if (!b->tilted || !p->place.frame)
+	if (!b->uses_place || !p->place.frame)
 		return p;
 	*q = *p;
 	q->place = (struct relief_place){&p->place, mirrored_frame};

@@ -5,7 +5,6 @@
 #include "worker/render/geom/coincide_find.h"
 
 #include <stdio.h>
-#include <string.h>
 
 static enum surface_rank rank_of(const struct world *w, const struct world_shape *part)
 {
@@ -14,8 +13,7 @@ static enum surface_rank rank_of(const struct world *w, const struct world_shape
 		return SURFACE_SHINES;
 	if (!(b->modes & BSDF_TRANSMIT))
 		return SURFACE_OPAQUE;
-	bool passes = b->eta == 1 && b->ops && (strcmp(b->ops->type, "null") == 0 || strcmp(b->ops->type, "mask") == 0);
-	return passes ? SURFACE_PASSES : SURFACE_TRANSMITS;
+	return b->passes && b->eta == 1 ? SURFACE_PASSES : SURFACE_TRANSMITS;
 }
 
 struct accel_shape *coincident_shapes(const struct world *w, struct arena *arena)

@@ -111,11 +111,11 @@ static void test_parts_that_bend_alike(void **state)
 	assert_int_equal(blend_of(first, first, &a, &b, &e), 0);
 	b.relief->at(b.relief->data, 0.4, 0.55, &one);
 	assert_memory_equal(&v, &one, sizeof v);
-	assert_false(b.tilted);
+	assert_false(b.uses_place);
 	const struct scene_node *specular = bent(&a, map, tiles, "plastic");
 	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
 		assert_int_equal(blend_of(first, bent(&a, others[i].map, others[i].texture, "phong"), &a, &b, &e), 0);
-		assert_true(b.tilted);
+		assert_true(b.uses_place);
 		assert_true(blend_of(specular, bent(&a, others[i].map, others[i].texture, "conductor"), &a, &b, &e) <
 			    0);
 		assert_non_null(strstr(e.text, "bend normals differently"));
@@ -128,20 +128,20 @@ static void test_parts_that_bend_alike(void **state)
 		even[i] = node_bsdf(&a, text);
 	}
 	assert_int_equal(blend_of(even[0], even[1], &a, &b, &e), 0);
-	assert_false(b.tilted);
+	assert_false(b.uses_place);
 	assert_int_equal(blend_of(even[0], even[2], &a, &b, &e), 0);
-	assert_true(b.tilted);
+	assert_true(b.uses_place);
 	assert_int_equal(blend_of(even[0], bent(&a, "normalmap scale=0.5", tiles, "phong"), &a, &b, &e), 0);
-	assert_true(b.tilted);
+	assert_true(b.uses_place);
 	/* The surface has the normal of the narrowest; what passes straight on needs none. */
 	assert_int_equal(blend_of(first, specular, &a, &b, &e), 0);
-	assert_false(b.tilted);
+	assert_false(b.uses_place);
 	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "phong"), specular, &a, &b, &e), 0);
-	assert_true(b.tilted && b.relief);
+	assert_true(b.uses_place && b.relief);
 	assert_int_equal(blend_of(first, node_make(&a, PLUGIN_BSDF, "conductor"), &a, &b, &e), 0);
-	assert_true(b.tilted && !b.relief);
+	assert_true(b.uses_place && !b.relief);
 	assert_int_equal(blend_of(node_make(&a, PLUGIN_BSDF, "null"), first, &a, &b, &e), 0);
-	assert_true(!b.tilted && b.relief);
+	assert_true(!b.uses_place && b.relief);
 	struct scene_node *twice = node_make(&a, PLUGIN_BSDF, map),
 			  *both = node_bsdf(&a, "blendbsdf weight=0.5 | diffuse");
 	node_add_child(&a, both, first);
