@@ -31,7 +31,7 @@ struct bsdf_point {
 	struct texture_point where;
 	const struct wavelengths *w;
 	enum transport transport;
-	struct relief_place place; /* for parts that look at other shading frames (tilted.h) */
+	struct relief_place place; /* for parts that look at other shading frames: tilted.h, bump_shadow.h */
 };
 
 struct bsdf_sample {

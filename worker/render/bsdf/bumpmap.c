@@ -6,6 +6,7 @@
  * vectors and their derivatives take it into account.
  */
 #include "common/base/color.h"
+#include "worker/render/bsdf/bump_shadow.h"
 #include "worker/render/bsdf/create.h"
 
 #include <string.h>
@@ -113,7 +114,8 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 	b->relief = &bend->relief;
 	b->textured = true;
 	b->uses_tangents |= kind == RELIEF_NORMAL;
-	return 0;
+	bool shadow = node_bool(n, "use_shadowing_function", build->dialect_3);
+	return shadow ? bsdf_shadow_bumps(b, n, build, e) : 0;
 }
 
 static int bumpmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
@@ -126,11 +128,11 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 	return create(b, n, build, RELIEF_NORMAL, e);
 }
 
-/* What Mitsuba 3.7 does if the bent normal and the surface disagree. */
-#define OF_MITSUBA_3_7                                                                         \
-	{.name = "flip_invalid_normals", .types = VALUE_BOOL, .status = PARAM_DIFFERS},        \
-	{                                                                                      \
-		.name = "use_shadowing_function", .types = VALUE_BOOL, .status = PARAM_DIFFERS \
+/* What Mitsuba 3.7 does where the bent normal and the surface disagree. */
+#define OF_MITSUBA_3_7                                                                  \
+	{.name = "flip_invalid_normals", .types = VALUE_BOOL, .status = PARAM_DIFFERS}, \
+	{                                                                               \
+		.name = "use_shadowing_function", .types = VALUE_BOOL                   \
 	}
 
 static const struct param bumpmap_params[] = {

@@ -259,11 +259,19 @@ static struct relief_site site_of(const struct surface_point *x)
 	return site_on_triangle(s, &c, &t, smooth_normal(s, i, x), x);
 }
 
+static vec3 normal_with(const struct surface_point *x, const struct relief *r)
+{
+	const struct geom_shape *s = x->shape;
+	if (!r)
+		return s->is_sphere ? x->ng : smooth_normal(s, s->index[x->prim.prim], x);
+	struct relief_site site = site_of(x);
+	return relief_normal(r, &site);
+}
+
 struct frame surface_frame_with(const void *surface_point, const struct relief *r)
 {
 	const struct surface_point *x = surface_point;
-	struct relief_site site = site_of(x);
-	struct frame f = frame_along(r ? relief_normal(r, &site) : site.n, x->axis);
+	struct frame f = frame_along(normal_with(x, r), x->axis);
 	return frame_within(&x->sh, &f);
 }
 

@@ -42,9 +42,9 @@ static void test_notes(void **state)
 	check("<emitter type='sky'/>", NULL);
 	check(BENT("bumpmap", "flip_invalid_normals", "true"),
 	      "`flip_invalid_normals` is not supported: the image differs a little from Mitsuba's");
-	check(BENT("normalmap", "use_shadowing_function", "true"), "`use_shadowing_function` is not supported");
-	check(BENT("bumpmap", "use_shadowing_function", "False"), NULL);
-	check(BENT("normalmap", "flip_invalid_normals", "false"), NULL);
+	check(BENT("normalmap", "flip_invalid_normals", "True"), "`flip_invalid_normals` is not supported");
+	check(BENT("normalmap", "flip_invalid_normals", "False"), NULL);
+	check(BENT("bumpmap", "use_shadowing_function", "true"), NULL);
 	check("<emitter type='directional'><float name='angle' value='0.53'/></emitter>", "`angle` is not supported");
 	check("<emitter type='directional'><float name='angle' value='0.0'/></emitter>", NULL);
 }

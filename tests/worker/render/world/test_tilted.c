@@ -2,6 +2,7 @@
 /*
  * Parts of a material with different bump and normal maps: at every point of a surface they scatter the sum of what
  * materials of one part scatter there, each with its own normal, and what is sampled has the density that is stated.
+ * And the shadow that bumps cast on each other, against a material without it.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/pictures.h"
@@ -27,6 +28,7 @@
 #define SLOPE(inner)                                                                                                                                             \
 	"<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.45,0.9'/><rgb name='color1' value='0.4,0.6,0.85'/></texture>" inner \
 	"</bsdf>"
+#define LIT "<boolean name='use_shadowing_function' value='false'/>"
 #define METAL "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>"
 #define PLASTIC "<bsdf type='roughplastic'><float name='alpha' value='0.4'/></bsdf>"
 #define PAPER "<bsdf type='difftrans'/>"
@@ -209,13 +211,93 @@ static void test_sampling(void **state)
 	check_sampling(TWOSIDED(SLOPE(METAL), DENTS(CHALK)));
 }
 
+/* What Smith's model of microfacets leaves of the light from a direction, by its function Lambda. */
+static double smith(const struct surface_point *x, vec3 light)
+{
+	double bent = acos(fmin(vec3_dot(x->sh.n, x->ng), 1)), angle = acos(fabs(vec3_dot(x->ng, light))),
+	       a = fmin(tan(bent) / sqrt(8), 1);
+	return 1 / (1 + (sqrt(1 + pow(a * tan(angle), 2)) - 1) / 2);
+}
+
+static void assert_scaled(const char *what, spectrum got, double k, spectrum plain)
+{
+	for (int l = 0; l < SPECTRUM_LANES; l++)
+		if (!(fabs(got.v[l] - k * plain.v[l]) <= 1e-9 * fabs(plain.v[l])))
+			fail_msg("%s: %.12g is not %.12g of %.12g", what, got.v[l], k, plain.v[l]);
+}
+
+/* Returns the least that is left of the light. */
+static double check_shadow(const char *shape, const char *with, const char *without)
+{
+	enum { POINTS = 2000 };
+	struct world *shadowed = world_of(shape, with), *lit = world_of(shape, without);
+	const struct bsdf *b = &shadowed->bsdfs[0], *plain = &lit->bsdfs[0];
+	double least = 1;
+	int specular = 0, smooth = 0;
+	for (uint64_t i = 0; i < POINTS; i++) {
+		double u[4];
+		struct surface_point x, y;
+		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
+		point_on(shadowed, i, &x);
+		point_on(lit, i, &y);
+		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
+		const struct bsdf_point p = world_bsdf_point(&x, &white, t), q = world_bsdf_point(&y, &white, t);
+		vec3 wo = direction(u), wi = direction(u + 2), o = frame_to_local(&x.sh, wo),
+		     in = frame_to_local(&x.sh, wi);
+		double k = smith(&x, t == TRANSPORT_RADIANCE ? wi : wo);
+		spectrum f = plain->ops->eval(plain, &q, o, in);
+		assert_scaled("eval", b->ops->eval(b, &p, o, in), k, f);
+		assert_true(b->ops->pdf_solid(b, &p, o, in) == plain->ops->pdf_solid(plain, &q, o, in));
+		assert_scaled("halfvec", bsdf_eval_halfvec(b, &p, o, in), smith(&x, wi),
+			      bsdf_eval_halfvec(plain, &q, o, in));
+		if (!spectrum_is_zero(f)) {
+			smooth++;
+			least = fmin(least, k);
+		}
+		struct bsdf_sample s, r;
+		if (plain->ops->sample(plain, &q, o, u + 1, &r)) {
+			assert_true(b->ops->sample(b, &p, o, u + 1, &s));
+			assert_true(s.pdf == r.pdf && s.mode == r.mode && vec3_length(vec3_sub(s.wi, r.wi)) == 0);
+			k = smith(&x, t == TRANSPORT_RADIANCE ? frame_to_world(&x.sh, s.wi) : wo);
+			assert_scaled("sample", s.f, k, r.f);
+			specular += (s.mode & BSDF_DELTA) != 0;
+		}
+		double chance, other;
+		spectrum weight = bsdf_eval_delta(plain, &q, o, BSDF_REFLECT, &r.wi, &other);
+		if (!spectrum_is_zero(weight)) {
+			spectrum got = bsdf_eval_delta(b, &p, o, BSDF_REFLECT, &s.wi, &chance);
+			assert_true(chance == other && vec3_length(vec3_sub(s.wi, r.wi)) == 0);
+			k = smith(&x, t == TRANSPORT_RADIANCE ? frame_to_world(&x.sh, s.wi) : wo);
+			assert_scaled("eval_delta", got, k, weight);
+		}
+	}
+	assert_true(smooth > POINTS / 20 || specular > POINTS / 4);
+	world_free(shadowed);
+	world_free(lit);
+	return least;
+}
+
+static void test_shadow(void **state)
+{
+	(void)state;
+#define BOTH(shape, MAP, inner) check_shadow(shape, MAP(inner), MAP(LIT inner))
+#define DENTS_ON_BOTH_SIDES(inner) TWOSIDED(DENTS(inner), )
+#define SLOPES_ON_BOTH_SIDES(inner) TWOSIDED(SLOPE(inner), SLOPE(inner))
+	assert_true(BOTH("sphere", SLOPE, METAL) < 0.5);
+	assert_true(BOTH("rectangle", SLOPE, METAL) < 0.5);
+	assert_true(BOTH("sphere", DENTS, PLASTIC) < 0.9);
+	assert_true(BOTH("rectangle", DENTS, PAPER) < 0.5);
+	assert_true(BOTH("sphere", DENTS_ON_BOTH_SIDES, CHALK) < 0.9);
+	assert_true(BOTH("rectangle", SLOPES_ON_BOTH_SIDES, PLASTIC) < 0.5);
+	BOTH("sphere", SLOPE, "<bsdf type='conductor'/>");
+	BOTH("rectangle", DENTS, "<bsdf type='dielectric'/>");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_two_normals),
-		cmocka_unit_test(test_nested),
-		cmocka_unit_test(test_two_sides),
-		cmocka_unit_test(test_sampling),
+		cmocka_unit_test(test_two_normals), cmocka_unit_test(test_nested), cmocka_unit_test(test_two_sides),
+		cmocka_unit_test(test_sampling),    cmocka_unit_test(test_shadow),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
