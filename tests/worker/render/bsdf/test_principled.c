@@ -359,7 +359,7 @@ static double written_out(const struct recipe *r, vec3 wo, vec3 wi)
 static void test_all_together(void **state)
 {
 	(void)state;
-	static const struct {
+	const struct {
 		const char *text;
 		struct recipe r;
 		double mitsubas[4]; /* for wi at 0, 6, 12 and 18 nineteenths of a right angle */
