@@ -319,6 +319,22 @@ static struct world *tilted_parts(const struct agree_case *k)
 	return world_of_files(32, 32, files);
 }
 
+/* Normals bent so far that many face away from the camera. a = 1: rough glass among them. */
+static struct world *turned_normals(const struct agree_case *k)
+{
+#define STEEP(inner) "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.9,0.4,0.8'/><rgb name='color1' value='0.2,0.8,0.75'/><transform name='to_uv'><scale value='4'/></transform></texture>" inner "</bsdf>"
+	static char xml[1 << 12];
+	snprintf(xml, sizeof xml, LOOK_AT_IT SKY
+		 "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/>" TURN) STEEP(GREY("0.7")) "</shape>"
+		 "<shape type='sphere'>" AT("<scale value='0.6'/><translate x='-0.6' y='0.65'/>" TURN) STEEP("%s") "</shape>"
+		 "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='30'/><translate x='0.6' y='0.4'/>" TURN)
+		 "<bsdf type='twosided'>" STEEP("<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>") "</bsdf></shape>"
+		 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+		 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>",
+		 k->a > 0 ? "<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>" : METAL("0.1"));
+	return world_of_text(32, 32, "%s", xml);
+}
+
 /* A ball of coloured glass around a stone, which states no medium, and a bubble; beside it water with a lamp in it. */
 static struct world *absorbing_media(const struct agree_case *k)
 {
@@ -363,6 +379,8 @@ const struct agree_case agree_cases[] = {
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},
+	{"turned normals", "metal, chalk and plastic", turned_normals, 0, 0, 5, 512, 512, ALL, 0.02},
+	{"turned normals", "glass, chalk and plastic", turned_normals, 1, 0, 6, 1024, 1024, ALL, 0.02},
 	{"mixed scales", "1 on a tilted floor of 1e8", on_a_tilted_floor, 1, 1e8, 5, 1024, 512, {"bdpt", "hslt"}, 0.02},
 	{"mixed scales", "1 on a floor of 1e12", on_a_floor, 1, 1e12, 5, 1024, 512, ALL, 0.02},
 	{"mixed scales", "1e18 on a floor of 1e19", on_a_floor, 1e18, 1e19, 5, 1024, 512, ALL, 0.02},

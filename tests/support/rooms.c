@@ -155,10 +155,18 @@ static struct world *tilted_parts(void)
 						    "<float name='alpha' value='0.3'/></bsdf></bsdf></bsdf>"));
 }
 
+/* Steep enough that many face away from the camera. */
+static struct world *turned_normals(void)
+{
+	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.9,0.35,0.8'/>"
+						    "<rgb name='color1' value='0.15,0.8,0.75'/></texture>" METAL("0.3") "</bsdf>"));
+}
+
 const struct room rooms[] = {
 	{"rough glass", cloudy}, {"glass", glass}, {"gold", gold}, {"mirror", mirror}, {"bent normals", bent}, {"sky", sky},
 	{"picture", picture}, {"prism", prism}, {"lens", lens}, {"point and spot", deltas}, {"sun", sun}, {"dents", dents},
 	{"coloured glass", coloured_glass}, {"tilted parts", tilted_parts},
+	{"turned normals", turned_normals},
 	{NULL, NULL},
 };
 

@@ -60,7 +60,7 @@ static const struct bend *find_bend(const struct bend *like, const struct bend *
 {
 	for (const struct bend *b = made; b; b = b->next)
 		if (b->relief.kind == like->relief.kind && b->relief.handed == like->relief.handed &&
-		    b->scale == like->scale && same_texture(b, like))
+		    b->relief.turns == like->relief.turns && b->scale == like->scale && same_texture(b, like))
 			return b;
 	return NULL;
 }
@@ -72,6 +72,7 @@ static int bend_of(const struct scene_node *n, const struct scene_node *texture,
 	const struct texture_build of_texture = bsdf_texture_build(build);
 	struct bend wanted = {.relief = {.kind = kind,
 					 .at = kind == RELIEF_HEIGHT ? height_at : normal_at,
+					 .turns = node_bool(n, "flip_invalid_normals", build->dialect_3),
 					 .handed = node_bool(n, "handedness", true)},
 			      .node = texture,
 			      .scale = node_float(n, "scale", 1),
@@ -129,10 +130,10 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 }
 
 /* What Mitsuba 3.7 does where the bent normal and the surface disagree. */
-#define OF_MITSUBA_3_7                                                                  \
-	{.name = "flip_invalid_normals", .types = VALUE_BOOL, .status = PARAM_DIFFERS}, \
-	{                                                                               \
-		.name = "use_shadowing_function", .types = VALUE_BOOL                   \
+#define OF_MITSUBA_3_7                                                \
+	{.name = "flip_invalid_normals", .types = VALUE_BOOL},        \
+	{                                                             \
+		.name = "use_shadowing_function", .types = VALUE_BOOL \
 	}
 
 static const struct param bumpmap_params[] = {

@@ -275,6 +275,12 @@ struct frame surface_frame_with(const void *surface_point, const struct relief *
 	return frame_within(&x->sh, &f);
 }
 
+void surface_turn_relief(struct surface_point *x)
+{
+	vec3 n0 = normal_with(x, NULL), n = vec3_madd(vec3_neg(x->sh.n), 2 * vec3_dot(x->sh.n, n0), n0);
+	x->sh = frame_along(vec3_normalize(n), x->axis);
+}
+
 /* The hit in double: the root nearest to Embree's. */
 static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double t)
 {

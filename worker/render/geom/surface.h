@@ -69,6 +69,9 @@ bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct 
 /* The frame that the surface_point would have with another relief, NULL for none: as in struct relief_place. */
 struct frame surface_frame_with(const void *surface_point, const struct relief *r);
 
+/* Turns a shading normal bent by relief to the other side of the one without: n' = 2 (n.n0) n0 - n. */
+void surface_turn_relief(struct surface_point *x);
+
 void surface_uv(const struct geom_shape *s, struct surface_point *x);
 
 /* Only du and dv of struct surface_change. */

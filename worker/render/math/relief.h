@@ -25,6 +25,7 @@ struct relief {
 	void (*at)(const void *data, double u, double v, struct relief_value *out);
 	const void *data;
 	bool handed; /* for RELIEF_NORMAL: y runs against dp/dv, not along n x dp/du, where the two differ */
+	bool turns;  /* normals that face away from the camera's side of a path are turned round, see path_facing */
 };
 
 /*

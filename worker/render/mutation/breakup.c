@@ -231,6 +231,15 @@ static bool set_mode(struct full_path *y, unsigned j)
 	return y->v[j].mode != 0;
 }
 
+/* Half vectors do not describe it, and so it has no weight and no move. */
+static bool turned_beyond(const struct full_path *x, unsigned b, unsigned c)
+{
+	for (unsigned j = c + 1; j < x->edges; j++)
+		if (j != b && full_path_turned(x, j))
+			return true;
+	return false;
+}
+
 enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
 				      struct full_path *y, struct move *move)
 {
@@ -244,6 +253,8 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 	}
 	bool aperture = how->aperture && EFFECT_IS_ON(c->w, aperture);
 	enum strategy_counter end = STRATEGY_PROPOSED;
+	if (turned_beyond(x, b, c_end))
+		return STRATEGY_FAIL_MODE;
 	if (b == c_end && b > 0)
 		return STRATEGY_PROPOSED;
 	if (b < k)
@@ -270,9 +281,12 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 		return 0;
 	const struct full_path_edge *e = &x->edge[b - 1];
 	double log_g = log(path_cosine(&x->v[b - 1], e->w) / e->distance2);
+	if (c_end > 0 && full_path_turned(x, c_end)) /* it stays, but its normal is that of x or of y alone */
+		log_g += log(full_path_cosine_to_light(x, c_end) /
+			     fabs(vec3_dot(x->v[c_end].x.sh.n, x->edge[c_end - 1].w)));
 	if (b == x->edges)
 		return log_g + log(camera_jac_film_from_solid(&c->w->camera, vec3_neg(e->w)));
-	return log_g + log(fabs(vec3_dot(x->v[b].x.sh.n, e->w)));
+	return log_g + log(full_path_cosine_to_light(x, b));
 }
 
 double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,

@@ -109,7 +109,7 @@ static spectrum carry(const struct full_path *x, spectrum beta, spectrum f, unsi
 	const struct full_path_edge *g = &x->edge[e];
 	double geometry = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2;
 	if (at > 0 && !v->delta)
-		geometry *= fabs(vec3_dot(v->x.sh.n, x->edge[at - 1].w) / vec3_dot(v->x.ng, x->edge[at - 1].w));
+		geometry *= full_path_cosine_to_light(x, at) / fabs(vec3_dot(v->x.ng, x->edge[at - 1].w));
 	return spectrum_scale(geometry / pdf, spectrum_mul(beta, f));
 }
 

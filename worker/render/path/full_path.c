@@ -74,9 +74,27 @@ bool full_path_join(struct full_path *x, unsigned e)
 	return x->edge[e].distance2 > 0;
 }
 
+static const struct surface_point *facing(const struct full_path *x, unsigned j, struct surface_point *turned)
+{
+	return path_facing(&x->v[j], x->edge[j].w, turned);
+}
+
+bool full_path_turned(const struct full_path *x, unsigned j)
+{
+	struct surface_point turned;
+	return facing(x, j, &turned) == &turned;
+}
+
+double full_path_cosine_to_light(const struct full_path *x, unsigned j)
+{
+	struct surface_point turned;
+	return fabs(vec3_dot(facing(x, j, &turned)->sh.n, x->edge[j - 1].w));
+}
+
 unsigned full_path_mode(const struct full_path *x, unsigned j)
 {
-	const struct surface_point *s = &x->v[j].x;
+	struct surface_point turned;
+	const struct surface_point *s = facing(x, j, &turned);
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
 	double no = vec3_dot(s->sh.n, o), ni = vec3_dot(s->sh.n, i);
 	if (!(no * vec3_dot(s->ng, o) > 0 && ni * vec3_dot(s->ng, i) > 0))
@@ -110,9 +128,13 @@ static spectrum scatter(const struct full_path *x, unsigned j, bool halfvec)
 		double chance;
 		return full_path_specular(x, j, &wi, &chance);
 	}
-	struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_RADIANCE);
-	vec3 wo = frame_to_local(&v->x.sh, x->edge[j].w);
-	wi = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w));
+	struct surface_point turned;
+	const struct surface_point *s = facing(x, j, &turned);
+	if (halfvec && s == &turned)
+		return spectrum_of(0);
+	struct bsdf_point p = world_bsdf_point(s, &x->wl, TRANSPORT_RADIANCE);
+	vec3 wo = frame_to_local(&s->sh, x->edge[j].w);
+	wi = frame_to_local(&s->sh, vec3_neg(x->edge[j - 1].w));
 	return halfvec ? bsdf_eval_halfvec(v->bsdf, &p, wo, wi) : v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
 }
 

@@ -65,6 +65,12 @@ double product_log_intensity(const struct path_context *c, const struct full_pat
 /* Edge e from the positions of its ends, and to_prev of v[e]. false: the ends coincide. */
 bool full_path_join(struct full_path *x, unsigned e);
 
+/* Whether an inner vertex scatters with another shading normal than that of v[j].x: path_facing. Half vectors are those
+ * of v[j].x, and do not describe such a vertex. */
+bool full_path_turned(const struct full_path *x, unsigned j);
+/* |n . i_j| at an inner vertex, n the shading normal with which it scatters. */
+double full_path_cosine_to_light(const struct full_path *x, unsigned j);
+
 /* What kind of scattering the directions o_j, i_j mean: BSDF_REFLECT or BSDF_TRANSMIT by the sides of both normals; 0:
  * the two normals disagree about a side, nothing scatters. */
 unsigned full_path_mode(const struct full_path *x, unsigned j);
@@ -75,7 +81,8 @@ double full_path_eta(const struct full_path *x, unsigned j);
 /* v[0]: L_e towards v[1]. Inner vertices: f_radiance(o, i) without cosine, or the weight of the lobe where specular.
  * Computed when asked for the first time. */
 spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j);
-/* Inner vertices: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the weight of the lobe where specular. */
+/* Inner vertices: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the weight of the lobe where specular; 0 where
+ * full_path_turned. */
 spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j);
 /* The vertices first..last are about to change: what was known of them and of their neighbours no longer holds. */
 void full_path_forget(struct full_path *x, unsigned first, unsigned last);

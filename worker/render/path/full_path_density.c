@@ -17,7 +17,7 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 		/* Measured in the direction towards the light, projected on the geometric normal. */
 		if (!v->delta)
 			log_geometry +=
-				log(fabs(vec3_dot(v->x.sh.n, x->edge[j - 1].w) / vec3_dot(v->x.ng, x->edge[j - 1].w)));
+				log(full_path_cosine_to_light(x, j) / fabs(vec3_dot(v->x.ng, x->edge[j - 1].w)));
 	}
 	if (EFFECT_IS_ON(c->w, absorption))
 		full_path_absorb(c->w, x, &p);

@@ -91,29 +91,38 @@ spectrum path_transmittance(const struct world *w, const struct wavelengths *wl,
 	return medium_transmittance(&w->media[medium - 1], distance, wl);
 }
 
-static struct bsdf_point bsdf_point_of(const struct path_context *c, const struct path_vertex *v,
-				       enum transport transport)
+const struct surface_point *path_facing(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned)
 {
-	return world_bsdf_point(&v->x, &c->wl, transport);
+	const struct geom_shape *s = v->x.shape;
+	if (!s || !s->relief || !s->relief->turns || v->bsdf->has_delta || same_side(&v->x, to_camera))
+		return &v->x;
+	*turned = v->x;
+	surface_turn_relief(turned);
+	return same_side(turned, to_camera) ? turned : &v->x;
 }
 
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light)
 {
-	if (!v->bsdf->has_smooth || !same_side(&v->x, to_camera) || !same_side(&v->x, to_light))
+	struct surface_point turned;
+	const struct surface_point *x = path_facing(v, to_camera, &turned);
+	if (!v->bsdf->has_smooth || !same_side(x, to_camera) || !same_side(x, to_light))
 		return spectrum_of(0);
-	struct bsdf_point p = bsdf_point_of(c, v, TRANSPORT_RADIANCE);
-	vec3 wo = frame_to_local(&v->x.sh, to_camera), wi = frame_to_local(&v->x.sh, to_light);
+	struct bsdf_point p = world_bsdf_point(x, &c->wl, TRANSPORT_RADIANCE);
+	vec3 wo = frame_to_local(&x->sh, to_camera), wi = frame_to_local(&x->sh, to_light);
 	spectrum f = v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
 	return spectrum_scale(fabs(wi.z) / fabs(vec3_dot(v->x.ng, to_light)), f);
 }
 
+/* What a path from the light samples is on the camera's side of a normal as it is: it never turns one. */
 static double surface_pdf(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi,
 			  enum transport transport)
 {
-	if (!v->bsdf->has_smooth || !same_side(&v->x, wo) || !same_side(&v->x, wi))
+	struct surface_point turned;
+	const struct surface_point *x = transport == TRANSPORT_RADIANCE ? path_facing(v, wo, &turned) : &v->x;
+	if (!v->bsdf->has_smooth || !same_side(x, wo) || !same_side(x, wi))
 		return 0;
-	struct bsdf_point p = bsdf_point_of(c, v, transport);
-	return v->bsdf->ops->pdf_solid(v->bsdf, &p, frame_to_local(&v->x.sh, wo), frame_to_local(&v->x.sh, wi));
+	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
+	return v->bsdf->ops->pdf_solid(v->bsdf, &p, frame_to_local(&x->sh, wo), frame_to_local(&x->sh, wi));
 }
 
 static double disk_pdf(const struct world *w)
@@ -195,13 +204,15 @@ struct departure {
 static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
 		   enum transport transport, struct departure *out)
 {
-	struct bsdf_point p = bsdf_point_of(c, v, transport);
+	struct surface_point turned;
+	const struct surface_point *x = transport == TRANSPORT_RADIANCE ? path_facing(v, v->to_prev, &turned) : &v->x;
+	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
 	struct bsdf_sample s;
-	vec3 wo = frame_to_local(&v->x.sh, v->to_prev);
-	if (!same_side(&v->x, v->to_prev) || !v->bsdf->ops->sample(v->bsdf, &p, wo, u, &s) || !(s.pdf > 0))
+	vec3 wo = frame_to_local(&x->sh, v->to_prev);
+	if (!same_side(x, v->to_prev) || !v->bsdf->ops->sample(v->bsdf, &p, wo, u, &s) || !(s.pdf > 0))
 		return false;
-	out->wi = frame_to_world(&v->x.sh, s.wi);
-	if (!same_side(&v->x, out->wi))
+	out->wi = frame_to_world(&x->sh, s.wi);
+	if (!same_side(x, out->wi))
 		return false;
 	out->mode = s.mode;
 	out->delta = (s.mode & BSDF_DELTA) != 0;
@@ -212,10 +223,10 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 	out->pdf = s.pdf;
 	out->eta = s.eta;
 	out->pdf_rev = 0;
-	if (c->one_way)
+	if (c->one_way || x == &turned)
 		return true;
-	struct bsdf_point back =
-		bsdf_point_of(c, v, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
+	struct bsdf_point back = world_bsdf_point(
+		x, &c->wl, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
 	out->pdf_rev = out->delta ? s.pdf : v->bsdf->ops->pdf_solid(v->bsdf, &back, s.wi, wo);
 	return true;
 }

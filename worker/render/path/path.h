@@ -131,6 +131,11 @@ static inline bool path_can_be_hit(const struct path_context *c, const struct pa
 /* Kind, emitter and place of a point drawn on an emitter; the rest is 0. */
 struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p);
 
+/* The point of a surface vertex with the shading frame in which it scatters towards the camera. Where relief bends the
+ * normal away from the camera, that is the one turned round (relief.turns), made in *turned: otherwise such places were
+ * black. Surfaces with specular lobes keep theirs: their paths are found by the normal, before the side is known. */
+const struct surface_point *path_facing(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned);
+
 /* F of the head comment at a surface vertex for unit directions towards camera and light. */
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
 

@@ -87,6 +87,8 @@ static struct xml_element *put_normal_map(struct gltf *g, struct xml_element *pa
 		return parent;
 	struct xml_element *map = gltf_plugin(g, parent, at, "bsdf", "normalmap", NULL);
 	const struct gltf_channel c = {.factor = {1}, .cutoff = -1};
+	/* What Mitsuba's maps do besides, and the format does not. */
+	gltf_put_bool(g, map, at, "flip_invalid_normals", false);
 	gltf_put_bool(g, map, at, "use_shadowing_function", false);
 	gltf_put_texture(g, map, at, NULL, info, &c);
 	double scale = gltf_number(g, at, info, "scale", 1);

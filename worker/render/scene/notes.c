@@ -6,7 +6,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <strings.h>
 
 /* One note for each kind of thing, where it is met first. */
 int note(const struct notes *t, const struct xml_element *el, const char *type, const char *property,
@@ -35,7 +34,7 @@ int note_difference(const struct notes *t, const struct xml_element *owner, cons
 {
 	const char *type = xml_attribute(owner, "type"), *value = xml_attribute(el, "value");
 	char *end;
-	if (value && (strcasecmp(value, "false") == 0 || (strtod(value, &end) == 0 && end != value && !*end)))
+	if (value && strtod(value, &end) == 0 && end != value && !*end)
 		return 0;
 	return note(
 		t, owner, type, name,

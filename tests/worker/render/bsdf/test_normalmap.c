@@ -98,6 +98,7 @@ static void test_parts_that_bend_alike(void **state)
 	static const struct {
 		const char *map, *texture;
 	} others[] = {{"bumpmap scale=0.6", tiles},
+		      {"bumpmap scale=0.5 flip_invalid_normals=true", tiles},
 		      {"normalmap scale=0.5", tiles},
 		      {map, "checkerboard color0=0.2"},
 		      {map, "checkerboard color0=0.1 color1=0.7"},

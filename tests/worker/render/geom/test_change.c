@@ -95,9 +95,9 @@ static void wave_normal(const void *data, double u, double v, struct relief_valu
 
 static double wave[3];
 enum { RELIEFS = 3 };
-static const struct relief reliefs[RELIEFS] = {{RELIEF_HEIGHT, wave_height, wave, false},
-					       {RELIEF_NORMAL, wave_normal, wave, false},
-					       {RELIEF_NORMAL, wave_normal, wave, true}};
+static const struct relief reliefs[RELIEFS] = {{RELIEF_HEIGHT, wave_height, wave, false, false},
+					       {RELIEF_NORMAL, wave_normal, wave, false, false},
+					       {RELIEF_NORMAL, wave_normal, wave, true, false}};
 
 static struct geom_shape bent(struct geom_shape s, struct dice *d, int kind)
 {
@@ -282,7 +282,7 @@ static void test_mirrored_pictures(void **state)
 	} cases[] = {{upright, false, 1, 1},  {upright, true, 1, 1},   {mirrored, false, -1, -1},
 		     {mirrored, true, -1, 1}, {turned, false, -1, -1}, {turned, true, -1, -1}};
 	for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
-		const struct relief r = {RELIEF_NORMAL, tilted, &x, cases[k].handed};
+		const struct relief r = {RELIEF_NORMAL, tilted, &x, cases[k].handed, false};
 		const struct geom_shape s = {.vertex_count = 3,
 					     .triangle_count = 1,
 					     .position = corners,

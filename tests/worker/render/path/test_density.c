@@ -10,6 +10,7 @@
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
+#include "tests/support/rooms.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/render/path/connect.h"
@@ -70,6 +71,19 @@ static struct emitter_point emitter_point_of(const struct path_vertex *v)
 	return p;
 }
 
+/* Where relief turns a normal away from the camera, it is mirrored at the geometric one: the shapes with such relief
+ * are flat or spheres here. */
+static bool turned_from(const struct path_vertex *at, const struct path_vertex *camera, struct surface_point *x)
+{
+	vec3 w = towards(at, camera);
+	*x = at->x;
+	if (!x->shape->relief || !x->shape->relief->turns || at->bsdf->has_delta ||
+	    vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0)
+		return false;
+	x->sh = frame_along(vec3_sub(vec3_scale(2 * vec3_dot(x->sh.n, x->ng), x->ng), x->sh.n), x->axis);
+	return true;
+}
+
 /* The specular lobe that leads from `from` over `at` to `to`. */
 static struct bsdf_sample specular_lobe(const struct path_context *c, const struct path_vertex *from,
 					const struct path_vertex *at, const struct path_vertex *to,
@@ -94,9 +108,13 @@ static struct bsdf_sample specular_lobe(const struct path_context *c, const stru
 static double scattered(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at,
 			bool delta, const struct path_vertex *to, enum transport transport)
 {
-	vec3 wo = frame_to_local(&at->x.sh, towards(at, from)), wi = frame_to_local(&at->x.sh, towards(at, to));
+	struct surface_point x;
+	bool from_light = transport == TRANSPORT_IMPORTANCE, turned = turned_from(at, from_light ? to : from, &x);
+	if (from_light && turned)
+		return 0;
+	vec3 wo = frame_to_local(&x.sh, towards(at, from)), wi = frame_to_local(&x.sh, towards(at, to));
 	if (!delta) {
-		struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, transport);
+		struct bsdf_point p = world_bsdf_point(&x, &c->wl, transport);
 		return at->bsdf->ops->pdf_solid(at->bsdf, &p, wo, wi) * per_area(at, to);
 	}
 	double density = specular_lobe(c, from, at, to, transport).pdf * per_area(at, to);
@@ -214,10 +232,12 @@ static double scatter(const struct path_context *c, const struct path_vertex *ca
 		struct bsdf_sample s = specular_lobe(c, camera, at, light, TRANSPORT_RADIANCE);
 		return s.f.v[0] * fabs(s.wi.z);
 	}
-	struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, TRANSPORT_RADIANCE);
+	struct surface_point x;
+	turned_from(at, camera, &x);
+	struct bsdf_point p = world_bsdf_point(&x, &c->wl, TRANSPORT_RADIANCE);
 	vec3 wo = towards(at, camera), wi = towards(at, light);
-	spectrum f = at->bsdf->ops->eval(at->bsdf, &p, frame_to_local(&at->x.sh, wo), frame_to_local(&at->x.sh, wi));
-	return f.v[0] * fabs(vec3_dot(at->x.sh.n, wi) / vec3_dot(at->x.ng, wi));
+	spectrum f = at->bsdf->ops->eval(at->bsdf, &p, frame_to_local(&x.sh, wo), frame_to_local(&x.sh, wi));
+	return f.v[0] * fabs(vec3_dot(x.sh.n, wi) / vec3_dot(x.ng, wi));
 }
 
 /* Along a sub-path: beta x densities = source x product of F x product of G. */
@@ -583,6 +603,7 @@ static void test_bent_normals(void **state)
 	const struct memory_file files[] = {
 		{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent, sizeof bent - 1}, {NULL, NULL, 0}};
 	check_world("bent normals", world_of_files(32, 24, files), 20000);
+	check_world("turned normals", room_of("turned normals"), 12000);
 }
 
 int main(void)

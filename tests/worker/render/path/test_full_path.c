@@ -126,6 +126,13 @@ static void test_surfaces(void **state)
 			    ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
 	      1500);
 	check("mirror", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
+	check("turned normals",
+	      world_of_text(
+		      32, 32,
+		      ROOM LAMP BALL("<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' "
+				     "value='.9,.35,.8'/><rgb name='color1' value='.15,.8,.75'/></texture>"
+				     "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf></bsdf>")),
+	      1500);
 	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
 }
 

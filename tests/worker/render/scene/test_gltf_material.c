@@ -118,6 +118,7 @@ static void test_materials(void **state)
 	assert_string_equal(map->type, "normalmap");
 	assert_true(node_float(map, "scale", 0) == 2);
 	assert_false(node_bool(map, "use_shadowing_function", true));
+	assert_false(node_bool(map, "flip_invalid_normals", true));
 	assert_string_equal(node_child(map, PLUGIN_BSDF, 0)->type, "principled");
 	scene_fini(&s);
 
