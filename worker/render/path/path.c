@@ -91,10 +91,9 @@ spectrum path_transmittance(const struct world *w, const struct wavelengths *wl,
 	return medium_transmittance(&w->media[medium - 1], distance, wl);
 }
 
-const struct surface_point *path_facing(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned)
+const struct surface_point *path_facing_bent(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned)
 {
-	const struct geom_shape *s = v->x.shape;
-	if (!s || !s->relief || !s->relief->turns || v->bsdf->has_delta || same_side(&v->x, to_camera))
+	if (v->bsdf->has_delta || same_side(&v->x, to_camera))
 		return &v->x;
 	*turned = v->x;
 	surface_turn_relief(turned);

@@ -134,7 +134,13 @@ struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, c
 /* The point of a surface vertex with the shading frame in which it scatters towards the camera. Where relief bends the
  * normal away from the camera, that is the one turned round (relief.turns), made in *turned: otherwise such places were
  * black. Surfaces with specular lobes keep theirs: their paths are found by the normal, before the side is known. */
-const struct surface_point *path_facing(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned);
+const struct surface_point *path_facing_bent(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned);
+static inline const struct surface_point *path_facing(const struct path_vertex *v, vec3 to_camera,
+						      struct surface_point *turned)
+{
+	const struct geom_shape *s = v->x.shape;
+	return s && s->relief && s->relief->turns ? path_facing_bent(v, to_camera, turned) : &v->x;
+}
 
 /* F of the head comment at a surface vertex for unit directions towards camera and light. */
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
