@@ -5,7 +5,8 @@
  * The integrand over area measure: L_e prod G prod F W_e, all G with geometric normals, and at each inner vertex
  * F = f_radiance(to camera, to light) |ns . to light| / |ng . to light|: what a path tracer that starts at the camera
  * realises with shading normals, whichever way the path was sampled.
- * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals).
+ * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals); which
+ * shading normal that is, the camera's side of the path may decide (path_facing).
  *
  * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; x_0 on a delta
  * emitter counts: 1 times the choice of the emitter, and 0 as found by a path from the camera; times a delta
