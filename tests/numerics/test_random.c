@@ -8,8 +8,8 @@
  * Level: that of tests/support/agree.h for each comparison. Where groups seldom find something bright, their means are
  * skewed and t is not to be trusted: what differs is compared again, with other seeds and 16 times the samples, and
  * must differ again. Power: the bias of the mean that is found with 95 % probability stands in the row. A plain run has
- * five scenes that need no second look and is there for what breaks altogether; HSLT_TEST_ROWS=1 has 24 with 4 times
- * the samples, FULL=1 40 with 16 times. SCENES=7 or SCENES=100-200 chooses others.
+ * six scenes that need no second look, one of them with relief, and is there for what breaks altogether;
+ * HSLT_TEST_ROWS=1 has 24 with 4 times the samples, FULL=1 40 with 16 times. SCENES=7 or SCENES=100-200 chooses others.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"
@@ -112,6 +112,8 @@ static void test_random(void **state)
 		random_scene_range(scenes, &first, &last);
 	for (uint64_t i = first; i <= last; i++)
 		compare_scene(i);
+	if (is_plain && !scenes)
+		compare_scene(RANDOM_SCENES_WITH_RELIEF);
 	printf("integrators on random scenes: %u comparisons, %u failed\n", rows.cases, rows.failed);
 	assert_int_equal(rows.failed, 0);
 }

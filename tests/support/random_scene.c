@@ -23,6 +23,7 @@ struct maker {
 	struct dice d;
 	const char *const *materials;
 	uint32_t count;
+	bool relief;
 };
 
 /* clang-format off */
@@ -94,14 +95,31 @@ static void put_node(struct maker *m, const struct scene_node *n, const char *na
 	PUT(m, "</%s>", element);
 }
 
+/* Tiles of two normals, up to 60 degrees off the surface's. */
+static void begin_relief(struct maker *m)
+{
+	PUT(m, "<bsdf type='normalmap'><texture type='checkerboard'>");
+	for (int i = 0; i < 2; i++) {
+		double angle = between(m, 0, 60 * M_PI / 180), around = between(m, 0, 2 * M_PI);
+		PUT(m, "<rgb name='color%d' value='%.3f,%.3f,%.3f'/>", i, 0.5 + 0.5 * sin(angle) * cos(around),
+		    0.5 + 0.5 * sin(angle) * sin(around), 0.5 + 0.5 * cos(angle));
+	}
+	PUT(m, "<transform name='to_uv'><scale value='%u'/></transform></texture>", 1 + dice_below(&m->d, 6));
+}
+
 static void put_material(struct maker *m)
 {
 	const char *chosen = m->materials[dice_below(&m->d, m->count)];
+	bool bent = m->relief && chance(m, 0.6) && !strstr(chosen, "bumpmap") && !strstr(chosen, "normalmap");
+	if (bent)
+		begin_relief(m);
 	size_t used = strlen(m->s->materials);
 	append(m->s->materials, sizeof m->s->materials, &used, "%s%s", used ? "; " : "", chosen);
 	struct arena a = {0};
 	put_node(m, node_bsdf(&a, chosen), NULL);
 	arena_fini(&a);
+	if (bent)
+		PUT(m, "</bsdf>");
 }
 
 /* Of shapes of about the unit ball: stretched, turned, and put into a box around (0, y, 0). */
@@ -317,7 +335,11 @@ void random_scene_make(struct random_scene *s, uint64_t number, const char *cons
 	char name[64];
 	snprintf(name, sizeof name, "random scene %llu", (unsigned long long)number);
 	*s = (struct random_scene){.used = 0};
-	struct maker m = {.s = s, .d = dice_of(name), .materials = materials, .count = count};
+	struct maker m = {.s = s,
+			  .d = dice_of(name),
+			  .materials = materials,
+			  .count = count,
+			  .relief = number >= RANDOM_SCENES_WITH_RELIEF};
 	PUT(&m, "<integrator type='path'><integer name='max_depth' value='%u'/></integrator>", 3 + dice_below(&m.d, 5));
 	put_camera(&m);
 	bool room = chance(&m, 0.6);
