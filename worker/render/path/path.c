@@ -112,12 +112,18 @@ spectrum path_scatter(const struct path_context *c, const struct path_vertex *v,
 	return spectrum_scale(fabs(wi.z) / fabs(vec3_dot(v->x.ng, to_light)), f);
 }
 
-/* What a path from the light samples is on the camera's side of a normal as it is: it never turns one. */
+/* As a path that comes from `from` samples it: one from the light never turns a normal. */
+static const struct surface_point *sampled_at(const struct path_vertex *v, vec3 from, enum transport transport,
+					      struct surface_point *turned)
+{
+	return transport == TRANSPORT_RADIANCE ? path_facing(v, from, turned) : &v->x;
+}
+
 static double surface_pdf(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi,
 			  enum transport transport)
 {
 	struct surface_point turned;
-	const struct surface_point *x = transport == TRANSPORT_RADIANCE ? path_facing(v, wo, &turned) : &v->x;
+	const struct surface_point *x = sampled_at(v, wo, transport, &turned);
 	if (!v->bsdf->has_smooth || !same_side(x, wo) || !same_side(x, wi))
 		return 0;
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
@@ -204,7 +210,7 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 		   enum transport transport, struct departure *out)
 {
 	struct surface_point turned;
-	const struct surface_point *x = transport == TRANSPORT_RADIANCE ? path_facing(v, v->to_prev, &turned) : &v->x;
+	const struct surface_point *x = sampled_at(v, v->to_prev, transport, &turned);
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
 	struct bsdf_sample s;
 	vec3 wo = frame_to_local(&x->sh, v->to_prev);

@@ -7,6 +7,7 @@
 #include "tests/support/memory_assets.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
+#include "worker/render/emitter/uniform.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/path/path.h"
 
@@ -37,19 +38,13 @@ static struct world *world_of(const char *shape, const char *color, bool flip, c
 	return world_of_files(8, 8, files);
 }
 
-static vec3 direction(const double u[2])
-{
-	double z = 2 * u[0] - 1, r = sqrt(1 - z * z);
-	return (vec3){r * cos(2 * M_PI * u[1]), r * sin(2 * M_PI * u[1]), z};
-}
-
 static struct path_vertex vertex_on(const struct world *w, uint64_t i)
 {
 	double u[4];
 	rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 	struct path_vertex v = {.kind = VERTEX_SURFACE, .emitter = -1, .bsdf = &w->bsdfs[w->parts[0].bsdf]};
 	if (w->shapes[0].is_sphere)
-		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, direction(u), &v.x);
+		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, direction_of_square(u), &v.x);
 	else
 		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0}, u[0] * (1 - u[1]), u[1] * u[0], &v.x);
 	return v;
@@ -101,7 +96,7 @@ static void check(const char *shape, const char *inner, bool turns)
 	for (uint64_t k = 0; k < POINTS; k++) {
 		double u[4];
 		rng_uniform4(stats_seed(__func__), RNG_TEST, k, 0, 0, u);
-		vec3 o = direction(u), i = direction(u + 2);
+		vec3 o = direction_of_square(u), i = direction_of_square(u + 2);
 		struct path_vertex v = vertex_on(w, k), p = vertex_on(plain, k), q = vertex_on(other, k);
 		bool away = !right_side(&p, o) && right_side(&q, o);
 		struct seen got = see(w, &v, o, i), as_it_is = see(plain, &p, o, i), turned = see(other, &q, o, i);

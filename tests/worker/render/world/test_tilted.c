@@ -8,6 +8,7 @@
 #include "tests/support/pictures.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
+#include "worker/render/emitter/uniform.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/world/world.h"
 
@@ -59,19 +60,13 @@ static struct world *world_of(const char *shape, const char *bsdf)
 	return world_of_files(8, 8, files);
 }
 
-static vec3 direction(const double u[2])
-{
-	double z = 2 * u[0] - 1, r = sqrt(1 - z * z);
-	return (vec3){r * cos(2 * M_PI * u[1]), r * sin(2 * M_PI * u[1]), z};
-}
-
 /* The i-th point of the world's only shape. */
 static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
 {
 	double u[4];
 	rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 	if (w->shapes[0].is_sphere)
-		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, direction(u), x);
+		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, direction_of_square(u), x);
 	else
 		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, i % 2}, u[0] * (1 - u[1]), u[1] * u[0], x);
 }
@@ -101,7 +96,7 @@ static void compare(const char *shape, const char *whole, const char *const *bsd
 	for (uint64_t i = 0; i < 4 * POINTS; i++) {
 		double u[4];
 		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
-		vec3 wo = direction(u), wi = direction(u + 2);
+		vec3 wo = direction_of_square(u), wi = direction_of_square(u + 2);
 		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 		bool side, part_side, via_side = true;
 		spectrum got = scattered(all, i, wo, wi, t, &side), expected = spectrum_of(0);
@@ -176,7 +171,7 @@ static void check_sampling(const char *whole)
 	for (uint64_t i = 0; i < SAMPLES; i++) {
 		double u[4];
 		rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
-		vec3 other = direction(u);
+		vec3 other = direction_of_square(u);
 		double density = 4 * M_PI * b->ops->pdf_solid(b, &p, wo, other);
 		struct bsdf_sample s;
 		bool any = b->ops->sample(b, &p, wo, u, &s);
@@ -242,7 +237,7 @@ static double check_shadow(const char *shape, const char *with, const char *with
 		point_on(lit, i, &y);
 		enum transport t = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 		const struct bsdf_point p = world_bsdf_point(&x, &white, t), q = world_bsdf_point(&y, &white, t);
-		vec3 wo = direction(u), wi = direction(u + 2), o = frame_to_local(&x.sh, wo),
+		vec3 wo = direction_of_square(u), wi = direction_of_square(u + 2), o = frame_to_local(&x.sh, wo),
 		     in = frame_to_local(&x.sh, wi);
 		double k = smith(&x, t == TRANSPORT_RADIANCE ? wi : wo);
 		spectrum f = plain->ops->eval(plain, &q, o, in);
