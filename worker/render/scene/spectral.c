@@ -145,6 +145,12 @@ static int read_value(const struct xml_element *el, const char *text, struct are
 	double x[3];
 	if (strchr(text, ':'))
 		return read_pairs(el, text, text + strlen(text), ':', arena, out, e);
+	/* A number is rgb in 0.6, so that it is white as light; in 3.x it is the same at each wavelength. */
+	if (number_parse(text, x) && el->snake) {
+		*out = (struct value){.type = VALUE_FLOAT};
+		out->as.number = x[0];
+		return 0;
+	}
 	if (number_parse(text, x))
 		return constant(el, x[0], arena, out, e);
 	/* 0.6 built with three lanes accepts r, g, b here; with more it accepts as many numbers. */

@@ -298,7 +298,7 @@ static void test_tables(void **state)
 	assert_int_equal(color_from_value(&v, COLOR_REFLECTANCE, &arena, &c, &e), 0);
 	assert_int_equal(c.shape, COLOR_SHAPE_CONSTANT);
 	assert_int_equal(color_from_value(&v, COLOR_ILLUMINANT, &arena, &c, &e), 0);
-	assert_int_equal(c.shape, COLOR_SHAPE_D65);
+	assert_int_equal(c.shape, COLOR_SHAPE_CONSTANT);
 	arena_fini(&arena);
 }
 

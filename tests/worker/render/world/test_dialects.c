@@ -8,8 +8,10 @@
 #include "tests/support/render_picture.h"
 #include "tests/support/worlds.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -110,8 +112,49 @@ static void test_twins(void **state)
 	pictures_fini(&p);
 }
 
+/* As light, <spectrum value="2"> is 2 at each wavelength in 3.x, where Mitsuba documents its colour as purple-ish, and
+ * rgb 2 in 0.6; as a reflectance it is the same in both. */
+static void test_number_as_spectrum(void **state)
+{
+	(void)state;
+	static const char sky[] = "<scene version='%s'><integrator type='path'/><sensor type='perspective'>"
+				  "<film type='hdrfilm'><rfilter type='box'/></film></sensor>%s"
+				  "<emitter type='constant'>%s</emitter></scene>",
+			  ball[] = "<shape type='sphere'><point name='center' z='4'/><float name='radius' value='3'/>"
+				   "<bsdf type='diffuse'>"
+				   "<spectrum name='reflectance' value='0.5'/></bsdf></shape>";
+	static const struct {
+		const char *version, *light;
+		double xyz[3];
+	} cases[] = {
+		{"3.0.0", "<spectrum name='radiance' value='2'/>", {2, 2, 2}},
+		{"3.0.0",
+		 "<spectrum name='radiance' type='uniform'><float name='value' value='2'/></spectrum>",
+		 {2, 2, 2}},
+		{"3.0.0", "<rgb name='radiance' value='2'/>", {1.9009, 2, 2.1780}},
+		{"3.0.0", "<float name='radiance' value='2'/>", {1.9009, 2, 2.1780}},
+		{"0.6.0", "<spectrum name='radiance' value='2'/>", {1.9009, 2, 2.1780}},
+	};
+	for (size_t i = 0; i < 2 * (sizeof cases / sizeof *cases); i++) {
+		char xml[1024];
+		struct pictures none = {.count = 0};
+		struct picture image;
+		size_t k = i / 2;
+		snprintf(xml, sizeof xml, sky, cases[k].version, i % 2 ? ball : "", cases[k].light);
+		render(xml, &none, &image);
+		for (int c = 0; c < 3; c++) {
+			double sum = 0, want = (i % 2 ? 0.5 : 1) * cases[k].xyz[c];
+			for (size_t p = 0; p < (size_t)SIDE * SIDE; p++)
+				sum += (double)image.rgb[c][p] / (SIDE * SIDE);
+			if (fabs(sum / want - 1) > (i % 2 ? 0.02 : 1e-3))
+				fail_msg("case %zu, channel %d: %.5g for %.5g", i, c, sum, want);
+		}
+		picture_fini(&image);
+	}
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_twins)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_twins), cmocka_unit_test(test_number_as_spectrum)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
