@@ -14,14 +14,20 @@
 
 const char *worlds_accuracy, *worlds_effects;
 
+static struct render_options options(uint32_t width, uint32_t height)
+{
+	struct render_options o = {.width = width, .height = height};
+	snprintf(o.accuracy, sizeof o.accuracy, "%s", worlds_accuracy ? worlds_accuracy : "");
+	snprintf(o.effects, sizeof o.effects, "%s", worlds_effects ? worlds_effects : "");
+	return o;
+}
+
 static struct world *build(const struct asset_source *assets, const char *name, uint32_t width, uint32_t height)
 {
 	struct error e = {""};
 	struct scene s;
 	struct world *w = NULL;
-	struct render_options o = {.width = width, .height = height};
-	snprintf(o.accuracy, sizeof o.accuracy, "%s", worlds_accuracy ? worlds_accuracy : "");
-	snprintf(o.effects, sizeof o.effects, "%s", worlds_effects ? worlds_effects : "");
+	struct render_options o = options(width, height);
 	int rc = scene_read(&s, assets, name, render_plugins(), NULL, 0, &e);
 	if (!rc) {
 		rc = world_new(&w, &s, assets, &o, &e);
@@ -58,7 +64,8 @@ void world_refused(const char *body, const char *sentence)
 	struct error e = {""};
 	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
 	if (!rc) {
-		rc = world_new(&w, &s, &assets, NULL, &e);
+		struct render_options o = options(0, 0);
+		rc = world_new(&w, &s, &assets, &o, &e);
 		scene_fini(&s);
 	}
 	if (rc >= 0 || !strstr(e.text, sentence))

@@ -41,14 +41,9 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 		for (size_t c = 0; c < 3; c++)
 			for (size_t r = 0; r < METAL_ROWS; r++)
 				room[c * METAL_ROWS + r] = metals[i].row[r][c];
-		m->eta = (struct color){.shape = COLOR_SHAPE_OTHER,
-					.scale = 1,
-					.count = METAL_ROWS,
-					.per_nm = (METAL_ROWS - 1) / (room[METAL_ROWS - 1] - room[0]),
-					.nm = room,
-					.value = room + METAL_ROWS};
-		m->k = m->eta;
-		m->k.value = room + 2 * METAL_ROWS;
+		/* As rgb, Mitsuba takes a metal's tables for light. */
+		m->eta = color_of_table(METAL_ROWS, room, room + METAL_ROWS, false, false);
+		m->k = color_of_table(METAL_ROWS, room, room + 2 * METAL_ROWS, false, false);
 		return 0;
 	}
 	return node_error(n, e, ENOTSUP, "unknown conductor \"%s\"; eta and k are accepted, too", name);

@@ -22,6 +22,7 @@
  */
 #include "worker/render/bsdf/principled.h"
 
+#include "common/base/color.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/warp.h"
 
@@ -30,7 +31,7 @@
 
 enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_COAT, LOBE_TRANSMIT, LOBES };
 
-/* base_color over its luminance, from eight wavelengths weighted by the eye's sensitivity. */
+/* base_color over its luminance, from eight wavelengths weighted by the eye's sensitivity, or from rgb. */
 static spectrum tint_of(const struct principled *p, const struct bsdf_point *at, spectrum base)
 {
 	static const struct wavelengths seen[2] = {{.nm = {440, 520, 560, 620}}, {.nm = {480, 540, 580, 660}}};
@@ -38,6 +39,10 @@ static spectrum tint_of(const struct principled *p, const struct bsdf_point *at,
 	double sum = 0, all = 0;
 	if (WAVELENGTHS_GREY(at->w))
 		return spectrum_of(1);
+	if (at->w->rgb) {
+		double luminance = rec709_luminance(base.v);
+		return luminance > 0 ? spectrum_scale(1 / luminance, base) : spectrum_of(1);
+	}
 	for (int k = 0; k < 2; k++) {
 		spectrum c = texture_eval(&p->base, &at->where, &seen[k]);
 		for (int l = 0; l < SPECTRUM_LANES; l++) {

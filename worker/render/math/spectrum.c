@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/math/spectrum.h"
 
+#include "common/base/color.h"
 #include "worker/render/math/cie.h"
 
 static int cell_of(double nm)
@@ -52,6 +53,10 @@ static void lane_weights(const struct wavelengths *w, int i, double xyz[3])
 
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
 {
+	if (w->rgb) {
+		rec709_to_xyz(l.v, xyz);
+		return;
+	}
 	xyz[0] = xyz[1] = xyz[2] = 0;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double lane[3];
@@ -63,8 +68,14 @@ void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
 
 spectrum spectrum_intensity_weights(const struct wavelengths *w)
 {
-	spectrum sum;
-	for (int i = 0; i < SPECTRUM_LANES; i++) {
+	spectrum sum = spectrum_of(0);
+	for (int i = 0; w->rgb && i < 3; i++) {
+		const double one[3] = {i == 0, i == 1, i == 2};
+		double xyz[3];
+		rec709_to_xyz(one, xyz);
+		sum.v[i] = xyz[0] + xyz[1] + xyz[2];
+	}
+	for (int i = 0; !w->rgb && i < SPECTRUM_LANES; i++) {
 		double lane[3];
 		lane_weights(w, i, lane);
 		sum.v[i] = lane[0] + lane[1] + lane[2];

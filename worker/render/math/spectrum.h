@@ -10,7 +10,9 @@
  * wavelength has density 0. The relative variance of R, G, B for white (D65) is then 0.07, 0.03, 0.02; with uniform
  * wavelengths it is 0.61, 0.17, 0.67. Times D65 it would be 0.10, 0.03, 0.04.
  *
- * In a grey scene (struct wavelengths.grey) all lanes are equal and stand for the common illuminant's shape.
+ * In a grey scene (struct wavelengths.grey) all lanes are equal and stand for the common illuminant's shape. Where
+ * colours are rgb (struct wavelengths.rgb) the lanes are R, G and B of linear Rec. 709 and once more G, so that a mean
+ * over the lanes is near to a luminance; the fourth is not part of any colour.
  */
 #ifndef WORKER_RENDER_MATH_SPECTRUM_H
 #define WORKER_RENDER_MATH_SPECTRUM_H
@@ -29,7 +31,8 @@ typedef struct {
 struct wavelengths {
 	double nm[SPECTRUM_LANES];
 	bool grey;    /* the scene has no colour: nm is undefined */
-	double u;     /* the number that nm was made from; 0 if grey */
+	bool rgb;     /* the lanes are no wavelengths: nm is undefined */
+	double u;     /* the number that nm was made from; 0 if grey or rgb */
 	unsigned few; /* 0: all differ; 1 or 2: nm repeats after this many, for the same mean from fewer wavelengths */
 };
 
@@ -43,6 +46,11 @@ struct wavelengths {
 static inline spectrum spectrum_of(double x)
 {
 	return (spectrum){{x, x, x, x}};
+}
+
+static inline spectrum spectrum_of_rgb(const double rgb[3])
+{
+	return (spectrum){{rgb[0], rgb[1], rgb[2], rgb[1]}};
 }
 
 static inline spectrum spectrum_add(spectrum a, spectrum b)
@@ -115,8 +123,8 @@ static inline spectrum spectrum_repeat(spectrum s, int lanes)
 }
 
 /* The CIE 1931 colour of a spectrum estimated from its four lanes (one-sample estimate of the integral of
- * L x_bar / 106.857 nm, each lane over its density, so that an emitter of rgb 1 has Y = 1). Not for grey: the film has
- * its own factor. */
+ * L x_bar / 106.857 nm, each lane over its density, so that an emitter of rgb 1 has Y = 1), or that of rgb. Not for
+ * grey: the film has its own factor. */
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3]);
 /* X + Y + Z of that is the sum of l times these, lane by lane. */
 spectrum spectrum_intensity_weights(const struct wavelengths *w);

@@ -197,10 +197,7 @@ void full_path_set_wavelength(const struct path_context *c, struct full_path *x,
 {
 	x->wavelength = u;
 	x->known_f = x->known_fh = NONE;
-	if (EFFECT_IS_ON(c->w, colour))
-		x->wl = wavelengths_sample_few(u, (unsigned)c->w->accuracy.wavelengths);
-	else
-		x->wl.grey = true;
+	x->wl = world_wavelengths(c->w, u);
 }
 
 void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last)

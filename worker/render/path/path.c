@@ -318,10 +318,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	film[0] = c->window.x + u[DIM_FILM_X] * c->window.width;
 	film[1] = c->window.y + u[DIM_FILM_Y] * c->window.height;
-	if (EFFECT_IS_ON(w, colour))
-		c->wl = wavelengths_sample_few(u[DIM_WAVELENGTH], (unsigned)w->accuracy.wavelengths);
-	else
-		c->wl.grey = true;
+	c->wl = world_wavelengths(w, u[DIM_WAVELENGTH]);
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};
 	v[0].x.p = camera_point(&w->camera, u + DIM_APERTURE_U);
 	v[0].x.prim = PRIM_NONE;

@@ -25,6 +25,8 @@ SETTING(roughness, "roughness", SETTING_REAL, SETTING_WORLD, 0, 0, 1, NULL,
 	"Rough metal and glass of less roughness is taken for smooth", "0", "0.001", "0.003", "0.01", "0.03", "0.1")
 SETTING(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, NULL,
 	"Factor of the parts into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
+SETTING(colour, "colour", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "spectral rgb",
+	"Light and colours are spectra, or R, G and B as in most renderers: then nothing disperses", NULL)
 SETTING(backs, "backs", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "lit black",
 	"Backs of opaque materials without twosided scatter light as their fronts do, or none, as in Mitsuba", NULL)
 SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",

@@ -8,6 +8,7 @@
  */
 #include "worker/render/texture/color.h"
 
+#include "common/base/color.h"
 #include "worker/render/math/cie.h"
 #include "worker/render/texture/upsample.h"
 
@@ -80,6 +81,8 @@ spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelength
 {
 	if (WAVELENGTHS_GREY(w) || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
 		return spectrum_of(rgb[0]);
+	if (w->rgb)
+		return spectrum_of_rgb(rgb);
 	double c[3];
 	table_lookup(rgb, c);
 	spectrum s;
@@ -95,6 +98,8 @@ spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths
 	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2]));
 	if (largest == 0 || WAVELENGTHS_GREY(w))
 		return spectrum_of(largest);
+	if (w->rgb)
+		return spectrum_of_rgb(rgb);
 	const double unit[3] = {rgb[0] / largest, rgb[1] / largest, rgb[2] / largest};
 	spectrum s = color_eval_rgb_reflectance(unit, w);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
@@ -147,7 +152,8 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 	out->shape = COLOR_SHAPE_OTHER;
 	out->sigmoid = true;
 	out->scale = role == COLOR_REFLECTANCE ? 1 : role == COLOR_ILLUMINANT ? largest : 2 * largest;
-	double unit[3], c[3];
+	double *unit = out->rgb, c[3];
+	out->tinted = true;
 	for (int k = 0; k < 3; k++)
 		unit[k] = rgb[k] / out->scale;
 	table_lookup(unit, c);
@@ -155,66 +161,6 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 	upsample_init(&s, 1);
 	upsample_fit(&s, unit, 1e-9, c);
 	coefficients_in_nm(c, out->coefficient);
-	return 0;
-}
-
-static int color_from_table(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
-			    struct error *e)
-{
-	uint32_t n = v->as.spectrum.count;
-	for (uint32_t i = 0; i < n; i++) {
-		double x = v->as.spectrum.value[i], nm = v->as.spectrum.nm[i];
-		if (!(x >= 0) || !(x <= role_max(role)) || !isfinite(nm))
-			return error_set(e, EINVAL, "%g at %g nm is outside [0, %g]", x, nm, role_max(role));
-		if (i && !(nm > v->as.spectrum.nm[i - 1]))
-			return error_set(e, EINVAL, "the wavelengths of a spectrum must increase");
-	}
-	double *copy = arena_alloc(arena, (size_t)n * 2, sizeof *copy);
-	if (!copy)
-		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
-	memcpy(copy, v->as.spectrum.nm, n * sizeof *copy);
-	memcpy(copy + n, v->as.spectrum.value, n * sizeof *copy);
-	*out = (struct color){.shape = COLOR_SHAPE_OTHER,
-			      .scale = 1,
-			      .count = n,
-			      .per_nm = (n - 1) / (copy[n - 1] - copy[0]),
-			      .nm = copy,
-			      .value = copy + n,
-			      .zero_outside = role == COLOR_ILLUMINANT};
-	return 0;
-}
-
-int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
-		     struct error *e)
-{
-	double x;
-	bool one = false;
-	switch (v->type) {
-	case VALUE_RGB:
-		if (color_from_rgb(v->as.rgb, role, out))
-			return error_set(e, EINVAL, "rgb %g %g %g: must be within [0, %g]", v->as.rgb[0], v->as.rgb[1],
-					 v->as.rgb[2], role_max(role));
-		return 0;
-	case VALUE_SPECTRUM:
-		if (v->as.spectrum.count > 1)
-			return color_from_table(v, role, arena, out, e);
-		if (v->as.spectrum.count == 0)
-			return error_set(e, EINVAL, "a spectrum without values");
-		x = v->as.spectrum.value[0];
-		one = true;
-		break;
-	case VALUE_FLOAT:
-		x = v->as.number;
-		break;
-	case VALUE_INT:
-		x = (double)v->as.integer;
-		break;
-	default:
-		return error_set(e, EINVAL, "not a colour");
-	}
-	if (!(x >= 0) || !(x <= role_max(role)))
-		return error_set(e, EINVAL, "%g: must be within [0, %g]", x, role_max(role));
-	*out = one ? color_constant(x) : color_white(x, role);
 	return 0;
 }
 
@@ -260,6 +206,96 @@ static double table_value(const struct color *c, double nm)
 	return piece_value(c, piece_of(c, nm));
 }
 
+/* What the lanes are where colours are rgb, for scale 1: D65 is white, and negative components are 0. */
+static void set_rgb(struct color *c, bool under_d65)
+{
+	double xyz[3] = {0, 0, 0}, d65_xyz[3] = {0, 0, 0}, white[3];
+	for (int i = 0; i < CIE_COUNT; i++) {
+		double nm = CIE_FIRST_NM + i, d65 = color_d65(nm),
+		       x = (c->count ? table_value(c, nm) : 1) * (under_d65 ? d65 : 1);
+		for (int k = 0; k < 3; k++) {
+			xyz[k] += cie_observer[i][k] * x;
+			d65_xyz[k] += cie_observer[i][k] * d65;
+		}
+	}
+	rec709_from_xyz(xyz, c->rgb);
+	rec709_from_xyz(d65_xyz, white);
+	for (int k = 0; k < 3; k++)
+		c->rgb[k] = fmax(c->rgb[k] / white[k], 0);
+	c->tinted = true;
+}
+
+struct color color_of_table(uint32_t n, const double *nm, const double *value, bool is_light, bool under_d65)
+{
+	struct color c = {.shape = COLOR_SHAPE_OTHER,
+			  .scale = 1,
+			  .count = n,
+			  .per_nm = (n - 1) / (nm[n - 1] - nm[0]),
+			  .nm = nm,
+			  .value = value,
+			  .zero_outside = is_light};
+	set_rgb(&c, under_d65);
+	return c;
+}
+
+static int color_from_table(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+			    struct error *e)
+{
+	uint32_t n = v->as.spectrum.count;
+	for (uint32_t i = 0; i < n; i++) {
+		double x = v->as.spectrum.value[i], nm = v->as.spectrum.nm[i];
+		if (!(x >= 0) || !(x <= role_max(role)) || !isfinite(nm))
+			return error_set(e, EINVAL, "%g at %g nm is outside [0, %g]", x, nm, role_max(role));
+		if (i && !(nm > v->as.spectrum.nm[i - 1]))
+			return error_set(e, EINVAL, "the wavelengths of a spectrum must increase");
+	}
+	double *copy = arena_alloc(arena, (size_t)n * 2, sizeof *copy);
+	if (!copy)
+		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
+	memcpy(copy, v->as.spectrum.nm, n * sizeof *copy);
+	memcpy(copy + n, v->as.spectrum.value, n * sizeof *copy);
+	*out = color_of_table(n, copy, copy + n, role == COLOR_ILLUMINANT, role != COLOR_ILLUMINANT);
+	for (int k = 0; k < 3 && role == COLOR_REFLECTANCE; k++)
+		out->rgb[k] = fmin(out->rgb[k], 1);
+	return 0;
+}
+
+int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+		     struct error *e)
+{
+	double x;
+	bool one = false;
+	switch (v->type) {
+	case VALUE_RGB:
+		if (color_from_rgb(v->as.rgb, role, out))
+			return error_set(e, EINVAL, "rgb %g %g %g: must be within [0, %g]", v->as.rgb[0], v->as.rgb[1],
+					 v->as.rgb[2], role_max(role));
+		return 0;
+	case VALUE_SPECTRUM:
+		if (v->as.spectrum.count > 1)
+			return color_from_table(v, role, arena, out, e);
+		if (v->as.spectrum.count == 0)
+			return error_set(e, EINVAL, "a spectrum without values");
+		x = v->as.spectrum.value[0];
+		one = true;
+		break;
+	case VALUE_FLOAT:
+		x = v->as.number;
+		break;
+	case VALUE_INT:
+		x = (double)v->as.integer;
+		break;
+	default:
+		return error_set(e, EINVAL, "not a colour");
+	}
+	if (!(x >= 0) || !(x <= role_max(role)))
+		return error_set(e, EINVAL, "%g: must be within [0, %g]", x, role_max(role));
+	*out = one ? color_constant(x) : color_white(x, role);
+	if (one && role == COLOR_ILLUMINANT)
+		set_rgb(out, false);
+	return 0;
+}
+
 static inline spectrum eval_lanes(const struct color *c, const struct wavelengths *w, int lanes)
 {
 	spectrum s = spectrum_of(c->scale);
@@ -280,6 +316,8 @@ static inline spectrum eval_lanes(const struct color *c, const struct wavelength
 
 spectrum color_eval(const struct color *c, const struct wavelengths *w)
 {
+	if (!WAVELENGTHS_GREY(w) && w->rgb)
+		return c->tinted ? spectrum_scale(c->scale, spectrum_of_rgb(c->rgb)) : spectrum_of(c->scale);
 	if (WAVELENGTHS_GREY(w) || c->shape == COLOR_SHAPE_CONSTANT) {
 		assert(c->shape != COLOR_SHAPE_OTHER);
 		return spectrum_of(c->scale);
@@ -291,7 +329,7 @@ spectrum color_eval(const struct color *c, const struct wavelengths *w)
 
 void color_eval_both(const struct color *a, const struct color *b, const struct wavelengths *w, spectrum out[2])
 {
-	if (!a->count || a->nm != b->nm || a->zero_outside || WAVELENGTHS_GREY(w)) {
+	if (!a->count || a->nm != b->nm || a->zero_outside || WAVELENGTHS_GREY(w) || w->rgb) {
 		out[0] = color_eval(a, w);
 		out[1] = color_eval(b, w);
 		return;

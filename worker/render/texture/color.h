@@ -34,12 +34,17 @@ struct color {
 	double per_nm;	/* pieces, on average */
 	const double *nm, *value; /* in the arena */
 	bool zero_outside;
+	bool tinted; /* where colours are rgb: the scale times rgb; otherwise three times the scale */
+	double rgb[3];
 };
 
 /* value: one of VALUE_COLOR. Reflectances outside [0,1] are an error; negative values always are. */
 int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
 		     struct error *e);
 int color_from_rgb(const double rgb[3], enum color_role role, struct color *out);
+/* Linear between n >= 2 values at ascending nm, which must outlive it. Beyond the ends, light is 0 and everything else
+ * has the value at the end. Where colours are rgb it is that of light with these values, times D65's if under_d65. */
+struct color color_of_table(uint32_t n, const double *nm, const double *value, bool is_light, bool under_d65);
 struct color color_constant(double x);
 spectrum color_eval(const struct color *c, const struct wavelengths *w);
 /* color_eval of both; one search where their tables have the same wavelengths, such as those of a metal's n and k. */

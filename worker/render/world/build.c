@@ -302,6 +302,10 @@ static int prepare(struct builder *b, const struct render_options *o)
 	int rc = effects_parse(o ? o->effects : "", &b->forced, b->e);
 	if (!rc)
 		rc = accuracy_settings_read(o ? o->accuracy : NULL, &b->w->accuracy, b->e);
+	if (!rc && b->w->accuracy.colour > 0 &&
+	    (b->forced.of[EFFECT_WAVELENGTH] > 0 || b->forced.of[EFFECT_DISPERSION] > 0))
+		rc = error_set(b->e, EINVAL,
+			       "effects: `wavelength` and `dispersion` need spectra, and colours are rgb");
 	if (!rc)
 		rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, (uint32_t)b->w->accuracy.sensor,
 					 &b->w->settings, b->e);

@@ -243,7 +243,7 @@ static void force_colour(struct report *r, const char *by)
 	snprintf(l->why + strlen(l->why), sizeof l->why - strlen(l->why), "; %s needs it", by);
 }
 
-static void dispersion(struct report *r, const struct census *c)
+static void dispersion(struct report *r, const struct census *c, bool rgb)
 {
 	char text[NAMES_MAX];
 	bool called = c->dispersive.count > 0, on;
@@ -252,7 +252,10 @@ static void dispersion(struct report *r, const struct census *c)
 				: c->unused_dispersive.count ? &c->unused_dispersive
 							     : &c->constant_eta;
 	const char *name = t->count ? names_of(t, text) : "";
-	if (called)
+	if (called && rgb)
+		on = line(r, EFFECT_DISPERSION, false, "the index of %s varies with wavelength, but colours are rgb",
+			  name);
+	else if (called)
 		on = line(r, EFFECT_DISPERSION, true,
 			  "the index of %s varies with wavelength: paths that meet %s carry one", name,
 			  verb(t, "it", "them"));
@@ -269,12 +272,14 @@ static void dispersion(struct report *r, const struct census *c)
 	r->fx->dispersion = on;
 }
 
-static void spectral(struct report *r, const struct census *c)
+static void spectral(struct report *r, const struct census *c, bool rgb)
 {
 	colour(r, c);
-	bool wavelength = line(r, EFFECT_WAVELENGTH, r->fx->colour,
-			       r->fx->colour ? "paths carry wavelengths" : "paths carry no wavelength");
-	dispersion(r, c);
+	bool wavelength = line(r, EFFECT_WAVELENGTH, r->fx->colour && !rgb, "paths carry %s",
+			       !r->fx->colour ? "no wavelength"
+			       : rgb	      ? "R, G and B"
+					      : "wavelengths");
+	dispersion(r, c, rgb);
 	if (wavelength)
 		force_colour(r, "wavelength");
 	if (r->fx->dispersion)
@@ -414,7 +419,7 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	visibility_bounds_shapes(w, src, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
 	struct census c = take_census(w, src, shape);
 	struct report r = {fx, forced};
-	spectral(&r, &c);
+	spectral(&r, &c, w->accuracy.colour > 0);
 	if (w->settings.aperture_radius > 0)
 		fx->aperture = line(&r, EFFECT_APERTURE, true, "a lens of radius %g, focused at a distance of %g",
 				    w->settings.aperture_radius, w->settings.focus_distance);

@@ -53,6 +53,16 @@ struct world {
 #define EFFECT_IS_ON(w, effect) ((w)->effects.effect)
 #endif
 
+/* What paths carry, made of a number in [0,1): wavelengths, R, G and B, or nothing in a grey scene. */
+static inline struct wavelengths world_wavelengths(const struct world *w, double u)
+{
+	if (!EFFECT_IS_ON(w, colour))
+		return (struct wavelengths){.grey = true};
+	if (w->accuracy.colour > 0)
+		return (struct wavelengths){.rgb = true};
+	return wavelengths_sample_few(u, (unsigned)w->accuracy.wavelengths);
+}
+
 /* The emitter selected by a number in [0,1); -1 if there is none. */
 int32_t world_pick_emitter(const struct world *w, double u);
 

@@ -171,6 +171,25 @@ static void test_xyz_is_unbiased(void **state)
 	unbiased_of(1);
 }
 
+/* X + Y + Z in one step, for lanes that are wavelengths and for R, G and B, whose fourth lane does not count. */
+static void test_intensity_weights(void **state)
+{
+	(void)state;
+	const struct wavelengths all[] = {wavelengths_sample(0.3), wavelengths_sample_few(0.7, 2), {.rgb = true}};
+	const spectrum l = {{0.3, 1.7, 0.9, 5}};
+	for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
+		spectrum weights = spectrum_intensity_weights(&all[k]);
+		double xyz[3], rgb[3], sum = 0;
+		spectrum_to_xyz(l, &all[k], xyz);
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			sum += l.v[i] * weights.v[i];
+		assert_true(fabs(sum / (xyz[0] + xyz[1] + xyz[2]) - 1) < 1e-12);
+		rec709_from_xyz(xyz, rgb);
+		for (int i = 0; i < 3 && all[k].rgb; i++)
+			assert_true(fabs(rgb[i] - l.v[i]) < 1e-14);
+	}
+}
+
 /* Of lanes whose sum is beyond the largest double, too; and to the bit what the sum's quarter is, where that is finite.
  */
 static void test_mean(void **state)
@@ -186,13 +205,10 @@ static void test_mean(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_published_sums),
-		cmocka_unit_test(test_wavelengths_in_range_and_apart),
-		cmocka_unit_test(test_density_of_wavelengths),
-		cmocka_unit_test(test_white_has_little_colour_noise),
-		cmocka_unit_test(test_few_wavelengths),
-		cmocka_unit_test(test_xyz_is_unbiased),
-		cmocka_unit_test(test_mean),
+		cmocka_unit_test(test_published_sums),	       cmocka_unit_test(test_wavelengths_in_range_and_apart),
+		cmocka_unit_test(test_density_of_wavelengths), cmocka_unit_test(test_white_has_little_colour_noise),
+		cmocka_unit_test(test_few_wavelengths),	       cmocka_unit_test(test_xyz_is_unbiased),
+		cmocka_unit_test(test_intensity_weights),      cmocka_unit_test(test_mean),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What is not said of each lane alone where the lanes are R, G and B: the indices of metals, and tints. */
+#include "tests/worker/render/bsdf/bsdf_cases.h"
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/texture/color.h"
+
+#include <math.h>
+
+static const struct wavelengths rgb_lanes = {.rgb = true};
+static const struct bsdf_point point = {.w = &rgb_lanes, .transport = TRANSPORT_RADIANCE};
+
+/* Of silver, as computed by others with Mitsuba's rules from its tables of n and k. */
+static void test_silver(void **state)
+{
+	(void)state;
+	static const double eta[3] = {0.155276, 0.116728, 0.138388}, k[3] = {4.828354, 3.122222, 2.146901};
+	struct arena a = {0};
+	struct bsdf b;
+	bsdf_make(&a, "conductor material=Ag", &b);
+	for (int step = 1; step <= 10; step++) {
+		double z = step / 10.0, chance;
+		const vec3 wo = {sqrt((1 - z) * (1 + z)), 0, z};
+		vec3 wi;
+		spectrum f = bsdf_eval_delta(&b, &point, wo, BSDF_REFLECT, &wi, &chance);
+		for (int c = 0; c < 3; c++) {
+			double want = fresnel_conductor(z, eta[c], k[c]);
+			if (!(fabs(f.v[c] - want) < 2e-4))
+				fail_msg("channel %d at cosine %g: %.7f, expected %.7f", c, z, f.v[c], want);
+		}
+		assert_true(f.v[3] == f.v[1]);
+	}
+	arena_fini(&a);
+}
+
+/* Tables of the same wavelengths are looked up together where lanes are wavelengths. */
+static void test_two_tables(void **state)
+{
+	(void)state;
+	static const double nm[] = {400, 500, 600, 700}, n[] = {1, 0.5, 0.3, 0.2}, k[] = {2, 3, 4, 5};
+	struct color a = color_of_table(4, nm, n, false, false), b = color_of_table(4, nm, k, false, false);
+	spectrum both[2], sa = color_eval(&a, &rgb_lanes), sb = color_eval(&b, &rgb_lanes);
+	color_eval_both(&a, &b, &rgb_lanes, both);
+	assert_memory_equal(&both[0], &sa, sizeof sa);
+	assert_memory_equal(&both[1], &sb, sizeof sb);
+}
+
+/* A tint is the base colour over its luminance, here 0.39186. It scales the 0.04 that an index of 1.5 reflects, as a
+ * quarter of it does the 0.16 of an index of 7/3. */
+static void test_tint(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf tinted, coloured;
+	bsdf_make(&a, "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 eta=1.5 spec_tint=1", &tinted);
+	bsdf_make(&a,
+		  "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 eta=2.3333333333333335 "
+		  "specular_color=rgb(0.5103864,0.1913949,0.0637983)",
+		  &coloured);
+	const vec3 wo = {0.28, 0, 0.96}, wi = {-0.6, 0, 0.8};
+	spectrum f = tinted.ops->eval(&tinted, &point, wo, wi), g = coloured.ops->eval(&coloured, &point, wo, wi);
+	for (int c = 0; c < SPECTRUM_LANES; c++)
+		if (!(fabs(f.v[c] / g.v[c] - 1) < 1e-6))
+			fail_msg("lane %d: %.9g, expected %.9g", c, f.v[c], g.v[c]);
+	arena_fini(&a);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_silver), cmocka_unit_test(test_two_tables),
+					   cmocka_unit_test(test_tint)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
