@@ -22,7 +22,7 @@ near() {
 
 for form in files.gltf embedded.gltf one.glb twin.xml; do
 	code 0 "$BIN/hslt-scene" check "$DIR/$form"
-	picture "$form" "$form" --integrator path --spp 64
+	picture "$form" "$form" --integrator path --spp 64 --set backs=lit
 done
 near files.gltf embedded.gltf 0
 near files.gltf one.glb 0

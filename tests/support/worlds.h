@@ -23,7 +23,8 @@ void world_refused(const char *body, const char *sentence);
 	"<integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
 /* clang-format on */
 
-/* Of the worlds that are built from now on; NULL: all at their defaults. */
+/* Of the worlds that are built from now on; NULL: all at their defaults, but opaque backs scatter light in files
+ * of 3.x, too, unless `backs` is named. */
 extern const char *worlds_accuracy;
 /* Effects that the next worlds force, as a plan spells them; NULL: none. */
 extern const char *worlds_effects;

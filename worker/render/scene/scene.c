@@ -479,6 +479,7 @@ static int make_scene(struct maker *m)
 	if (!objects)
 		return out_of_memory(m);
 	s->dialect_3 = m->tree->dialect_3;
+	s->black_backs = m->tree->black_backs;
 	s->objects = objects;
 	texture_names_settle(m->decls, m->tree->root);
 	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);

@@ -18,7 +18,8 @@
 
 struct scene {
 	struct arena arena;
-	bool dialect_3; /* version >= 2: Mitsuba 3 rules */
+	bool dialect_3;	  /* version >= 2: Mitsuba 3 rules */
+	bool black_backs; /* of opaque materials without twosided, unless the setting `backs` says otherwise */
 	uint32_t object_count;
 	const struct scene_node *const *objects; /* top level, in file order */
 	uint32_t asset_count;

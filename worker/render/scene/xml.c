@@ -187,6 +187,7 @@ static int begin_file(struct reader *r, struct xml_element *el)
 			"includes a file of another dialect; everything is read as by Mitsuba 3, with the old names in "
 			"the old files";
 	}
+	r->tree->black_backs |= dialect_3;
 	r->tree->dialect_3 |= dialect_3; /* 3.x reads older files, 0.6 no newer ones */
 	return 0;
 }

@@ -33,6 +33,7 @@ struct xml_tree {
 	struct xml_element *root; /* <scene>; what a file holds is inside its <include>, or in the place of one that
 				     stands in an object */
 	bool dialect_3;
+	bool black_backs; /* XML of version >= 2 */
 	uint32_t element_count, include_count, path_count, note_count, missing_count;
 	const char *includes[XML_FILES_MAX];  /* names of included files; repeated where included more than once */
 	const char *notes[XML_NOTES_MAX];     /* what whoever reads the file should know */

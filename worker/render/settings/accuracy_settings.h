@@ -35,7 +35,8 @@ struct render_setting {
 /* NULL at the end. */
 const struct render_setting *render_setting_at(size_t index);
 
-enum { SETTING_DOUBLE, SETTING_SINGLE }; /* precision */
+enum { SETTING_DOUBLE, SETTING_SINGLE };			     /* precision */
+enum { SETTING_BACKS_AUTO, SETTING_BACKS_LIT, SETTING_BACKS_BLACK }; /* backs */
 
 struct accuracy_settings {
 #define SETTING(field, ...) double field;

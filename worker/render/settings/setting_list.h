@@ -27,8 +27,10 @@ SETTING(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, 
 	"Factor of the parts into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
 SETTING(colour, "colour", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "spectral rgb",
 	"Light and colours are spectra, or R, G and B as in most renderers: then nothing disperses", NULL)
-SETTING(backs, "backs", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "lit black",
-	"Backs of opaque materials without twosided scatter light as their fronts do, or none, as in Mitsuba", NULL)
+SETTING(backs, "backs", SETTING_CHOICE, SETTING_WORLD, SETTING_BACKS_AUTO, SETTING_BACKS_AUTO, SETTING_BACKS_BLACK,
+	"auto lit black",
+	"Backs of opaque materials without twosided scatter light as their fronts do, or none; auto: none in files of 3.x",
+	NULL)
 SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
 	"What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)
 SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000, NULL,

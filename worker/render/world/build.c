@@ -15,6 +15,7 @@
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/shape/obj_read.h"
 #include "worker/render/texture/picture_cache.h"
+#include "worker/render/world/backs_note.h"
 #include "worker/render/world/coincident.h"
 #include "worker/render/world/effects_analyse.h"
 #include "worker/render/world/effects_apply.h"
@@ -45,6 +46,12 @@ static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
 	return t;
 }
 
+static bool backs_are_black(const struct builder *b)
+{
+	double backs = b->w->accuracy.backs;
+	return backs > SETTING_BACKS_AUTO ? backs > SETTING_BACKS_LIT : b->scene->black_backs;
+}
+
 /* One BSDF per node, however many shapes refer to it, unless it uses the shape's attributes: then one per mesh,
  * which instances share. The default is grey, or black for emitters. */
 static int create_bsdfs(struct builder *b)
@@ -61,7 +68,7 @@ static int create_bsdfs(struct builder *b)
 				   .arena = &w->arena,
 				   .dialect_3 = b->scene->dialect_3,
 				   .least_roughness = w->accuracy.roughness,
-				   .black_backs = w->accuracy.backs > 0,
+				   .black_backs = backs_are_black(b),
 				   .boundaries = &boundaries};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
@@ -358,6 +365,8 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	crash_place("building Embree's tree", NULL, 0);
 	if (!rc && with_accel)
 		rc = build_accel(&b);
+	if (!rc && with_accel && s->black_backs && b.w->accuracy.backs <= SETTING_BACKS_AUTO)
+		backs_note(b.w);
 	crash_place(NULL, NULL, 0);
 	arena_fini(&b.scratch);
 	if (rc)
