@@ -223,8 +223,11 @@ void client_tick(struct session *p)
 	m.body_case = FARM__ENVELOPE__BODY_JOB_STATUS;
 	m.job_status = &status;
 	session_send(p, &m, NULL, 0);
-	if (record_is_ended(&v.record))
+	if (record_is_ended(&v.record)) {
+		p->ended.job = p->watched;
+		p->ended.at = jobs_now(p->jobs);
 		p->watched = 0;
+	}
 }
 
 void client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)

@@ -189,8 +189,10 @@ void fetch_begin(struct session *p, const Farm__Fetch *f)
 bool fetch_uses(const struct peers *s, uint64_t job)
 {
 	static const double fetching_seconds = 60;
+	double since = jobs_now(s->jobs) - fetching_seconds;
 	for (const struct session *p = s->sessions; p; p = p->next)
-		if (p->watched == job || (p->fetch.job == job && jobs_now(s->jobs) - p->fetch.at < fetching_seconds))
+		if (p->watched == job || (p->ended.job == job && p->ended.at > since) ||
+		    (p->fetch.job == job && p->fetch.at > since))
 			return true;
 	return false;
 }

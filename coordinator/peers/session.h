@@ -43,8 +43,12 @@ struct session {
 	double heard;	       /* s of the loop's clock: the last heartbeat sent during a long message */
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job being watched; 0: none */
-	struct fetching {      /* a file being received */
-		uint64_t job;  /* 0: none */
+	struct {
+		uint64_t job;
+		double at;    /* s of the loop's clock */
+	} ended;	      /* the job that it watched until it was told, then, that it has ended */
+	struct fetching {     /* a file being received */
+		uint64_t job; /* 0: none */
 		Farm__What what;
 		int fd;
 		uint64_t size; /* its size when it was opened: a log grows */

@@ -2,10 +2,10 @@
 /*
  * Clears finished jobs, by age and by space.
  *
- * A round starts every hour, and soon after a job has ended: it reads the records of all ended jobs, lets age.h choose,
- * and clears those one by one. The work is divided into steps of one job; clear_tick does as many as fit into 5 ms. A
- * job is cleared in the order record, files, row, so that a client that asks for its result meanwhile is told when it
- * was deleted.
+ * A round starts every hour, and soon after a job has ended and its result was fetched: it reads the records of all
+ * ended jobs, lets age.h choose, and clears those one by one. The work is divided into steps of one job; clear_tick
+ * does as many as fit into 5 ms. A job is cleared in the order record, files, row, so that a client that asks for its
+ * result meanwhile is told when it was deleted.
  *
  * A job that runs again, or whose result a client fetches, is skipped. If a record cannot be written, the job waits for
  * the next round; if memory runs out or the ledger cannot be read, the round ends and the next one tries again.
@@ -22,7 +22,7 @@
 #include <string.h>
 #include <time.h>
 
-static const double every_seconds = 3600, soon_seconds = 2, tick_seconds = 0.005;
+static const double every_seconds = 3600, soon_seconds = 2, fresh_seconds = 60, tick_seconds = 0.005;
 static const char *const results[] = {"result.exr", "preview.exr", "log"};
 enum { RESULTS = sizeof results / sizeof *results };
 
@@ -33,6 +33,7 @@ struct clearing {
 	struct age_job *jobs; /* those that have ended */
 	size_t job_count, cleared, records;
 	double now; /* s since 1970, when it was chosen; 0: not yet */
+	bool again; /* a job that has just ended is being fetched: soon once more */
 	/* The ids of jobs without record overwrite those already looked at. */
 	struct job_record record; /* index of the current one */
 };
@@ -66,11 +67,13 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 		if (ledger_write_record(jobs->ledger, &c->record, NULL))
 			return;
 	}
+	bool busy = jobs->peers.uses_result(jobs->peers.user, id);
+	c->again |= busy && now - c->record.ended_seen < fresh_seconds;
 	c->jobs[c->job_count++] = (struct age_job){.id = id,
 						   .ended = c->record.ended_seen,
 						   .films = keep_bytes(jobs, id),
 						   .result = result_bytes(jobs, id),
-						   .busy = jobs->peers.uses_result(jobs->peers.user, id)};
+						   .busy = busy};
 }
 
 static struct job_record *listed(struct jobs *jobs, uint64_t job)
@@ -216,5 +219,7 @@ void clear_tick(struct jobs *jobs)
 		if (jobs_now(jobs) - now > tick_seconds)
 			return;
 	drop_rows(jobs, jobs->clearing);
+	if (jobs->clearing->again)
+		clear_soon(jobs);
 	clear_close(jobs);
 }

@@ -210,6 +210,40 @@ static void what_is_read_stays(void **state)
 	spool_close(jobs.spool);
 }
 
+static bool is_fetching;
+static bool somebody_fetches(void *user, uint64_t job)
+{
+	(void)user;
+	return is_fetching && job == 1;
+}
+
+/* By space: a result that a client waits for stays until it was fetched, and goes soon after, not in an hour. */
+static void what_has_just_ended_is_fetched_first(void **state)
+{
+	(void)state;
+	struct disk quick = disk_system;
+	quick.fsync = no_flush;
+	disk_use(&quick);
+	open_jobs();
+	jobs.peers.uses_result = somebody_fetches;
+	jobs.config.clear_seconds = 0;
+	jobs.config.clear_bytes = 1;
+	add(1, (double)time(NULL));
+	add(2, (double)time(NULL) - DAY);
+	for (int fetching = 1; fetching >= 0; fetching--) {
+		is_fetching = fetching;
+		jobs.clear_next = 0;
+		do
+			clear_tick(&jobs);
+		while (jobs.clearing);
+		assert_true(has(1, "result.exr") == fetching && !has(2, "result.exr"));
+		assert_true((jobs.clear_next - jobs_now(&jobs) < 10) == fetching);
+	}
+	disk_use(NULL);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -217,6 +251,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(of_unknown_age, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_has_changed_stays, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_read_stays, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_has_just_ended_is_fetched_first, folder_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -22,7 +22,8 @@ static int try_once(struct client *cl, const struct submitted *job, const char *
 		    struct error *e)
 {
 	int rc = submit_wait(cl, job, end, e);
-	if (!rc && end->has_result)
+	/* A job that made an image which is gone is no success: the coordinator says what became of it. */
+	if (!rc && (end->has_result || end->exit_code != 3))
 		rc = client_fetch(cl, job->job, FARM__WHAT__WHAT_RESULT, output, e);
 	return rc;
 }
