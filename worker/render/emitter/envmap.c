@@ -2,14 +2,14 @@
 /*
  * An equirectangular environment map. Local +y is up (the top row), the middle column looks along +z and the one a
  * quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel centres are at
- * half-integers, also vertically, where Mitsuba 3 puts the first and last rows onto the poles: a shift of up to half a
- * pixel.
+ * half-integers, but in 3.x the centres of the first and last rows are the poles, and the others are at equal angles
+ * between them.
  *
  * Sampling: the radiance is bilinear between pixel centres, so the cells of the density also lie between pixel centres
- * (and between the outer rows and the poles). Within a cell the density is constant in solid angle and proportional to
- * the mean luminance of its four corners: it is positive wherever there is light. The probabilities of a row's cells
- * are multiples of 2^-31, at least one where there is light, stored as running sums: sampling and density use the same
- * numbers.
+ * (and between the outer rows and the poles, where these are not one). Within a cell the density is constant in solid
+ * angle and proportional to the mean luminance of its four corners: it is positive wherever there is light. The
+ * probabilities of a row's cells are multiples of 2^-31, at least one where there is light, stored as running sums:
+ * sampling and density use the same numbers.
  */
 #include "worker/render/emitter/envmap.h"
 
@@ -23,7 +23,8 @@ struct envmap {
 	struct raster raster;
 	double scale;
 	vec3 axis[3];	    /* the local axes in the world */
-	uint32_t rows;	    /* height + 1 */
+	bool to_poles;	    /* the outer rows are the poles */
+	uint32_t rows;	    /* of cells: height + 1, to_poles: height - 1 */
 	uint32_t columns;   /* width */
 	double *row_cdf;    /* rows + 1; the last is 1; all 0 when black */
 	uint32_t *cell_cdf; /* [rows][columns + 1] */
@@ -48,12 +49,16 @@ spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x
 	const struct envmap *m = em->data;
 	double u, v, rgb[3];
 	coordinates(m, x->p, &u, &v);
+	if (m->to_poles)
+		v = (v * m->rows + 0.5) / (m->rows + 1);
 	raster_eval(&m->raster, u, v, rgb);
 	return spectrum_scale(m->scale, color_eval_rgb_illuminant(rgb, wl));
 }
 
 static double row_edge(const struct envmap *m, uint32_t row) /* angle from the pole above row */
 {
+	if (m->to_poles)
+		return PI * row / m->rows;
 	return row == 0 ? 0 : row == m->rows ? PI : PI * (row - 0.5) / (m->rows - 1);
 }
 
@@ -74,7 +79,7 @@ static void find_place(const struct envmap *m, vec3 d, uint32_t *row, uint32_t *
 	double u, v;
 	coordinates(m, d, &u, &v);
 	/* Cell 0 of a row begins at the centre of pixel 0; the half pixel before belongs to the last cell. */
-	double c = u * m->columns - 0.5, r = v * (m->rows - 1) + 0.5;
+	double c = u * m->columns - 0.5, r = m->to_poles ? v * m->rows : v * (m->rows - 1) + 0.5;
 	*column = c < 0 || c >= m->columns ? m->columns - 1 : (uint32_t)c;
 	*row = r >= m->rows ? m->rows - 1 : (uint32_t)r;
 	*across = (c < 0 ? c + m->columns : c) - *column;
@@ -186,6 +191,10 @@ static double luminance(const struct envmap *m, uint32_t row, uint32_t column)
 static double cell_weight(const struct envmap *m, uint32_t row, uint32_t column)
 {
 	uint32_t above = row == 0 ? 0 : row - 1, below = row == m->rows - 1 ? row - 1 : row;
+	if (m->to_poles) {
+		above = row;
+		below = row + 1;
+	}
 	uint32_t next = column + 1 == m->columns ? 0 : column + 1;
 	return 0.25 * (luminance(m, above, column) + luminance(m, above, next) + luminance(m, below, column) +
 		       luminance(m, below, next));
@@ -234,7 +243,7 @@ int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e)
 	return 0;
 }
 
-int envmap_make(struct emitter *em, const struct raster *picture, double scale, const vec3 axis[3],
+int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles, double scale, const vec3 axis[3],
 		const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	struct envmap *m = arena_alloc(build->arena, 1, sizeof *m);
@@ -246,7 +255,8 @@ int envmap_make(struct emitter *em, const struct raster *picture, double scale, 
 	m->raster.wrap_v = RASTER_CLAMP;
 	m->scale = scale;
 	m->columns = m->raster.image.width;
-	m->rows = m->raster.image.height + 1;
+	m->to_poles = to_poles && m->raster.image.height > 1;
+	m->rows = m->to_poles ? m->raster.image.height - 1 : m->raster.image.height + 1;
 	m->row_cdf = arena_alloc(build->arena, (size_t)m->rows + 1, sizeof *m->row_cdf);
 	m->cell_cdf = arena_alloc(build->arena, (size_t)m->rows * ((size_t)m->columns + 1), sizeof *m->cell_cdf);
 	if (!m->row_cdf || !m->cell_cdf)
@@ -270,7 +280,7 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	if (!code)
 		code = raster_read(&picture, n, build->assets, &(struct raster_range){0, HUGE_VAL, false}, build->arena,
 				   e);
-	return code ? code : envmap_make(em, &picture, node_float(n, "scale", 1), axis, n, build, e);
+	return code ? code : envmap_make(em, &picture, build->dialect_3, node_float(n, "scale", 1), axis, n, build, e);
 }
 
 static const struct param envmap_params[] = {

@@ -8,8 +8,8 @@
 
 /* The local axes x, y (up) and z in the world. -ENOTSUP: to_world does more than rotate. */
 int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e);
-/* Makes em from the image, times scale. The image is kept. */
-int envmap_make(struct emitter *em, const struct raster *picture, double scale, const vec3 axis[3],
+/* Makes em from the image, times scale. to_poles: its first and last rows are the poles. The image is kept. */
+int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles, double scale, const vec3 axis[3],
 		const struct scene_node *n, const struct emitter_build *build, struct error *e);
 
 spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl);

@@ -202,7 +202,7 @@ static int bake_environment(struct emitter *em, const struct scene_node *n, cons
 		rgb[k] *= node_float(n, "sun_scale", 1);
 	if (parts.sun)
 		bake_sun(&b, rgb);
-	return envmap_make(em, &(struct raster){.image = b.image}, scale, axis, n, build, e);
+	return envmap_make(em, &(struct raster){.image = b.image}, false, scale, axis, n, build, e);
 }
 
 static int sky_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
