@@ -41,7 +41,7 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 		for (size_t c = 0; c < 3; c++)
 			for (size_t r = 0; r < METAL_ROWS; r++)
 				room[c * METAL_ROWS + r] = metals[i].row[r][c];
-		/* As rgb, Mitsuba takes a metal's tables for light. */
+		/* Where colours are rgb, Mitsuba converts n and k as if they were light, without D65. */
 		m->eta = color_of_table(METAL_ROWS, room, room + METAL_ROWS, false, false);
 		m->k = color_of_table(METAL_ROWS, room, room + 2 * METAL_ROWS, false, false);
 		return 0;

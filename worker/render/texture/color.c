@@ -264,7 +264,7 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 		     struct error *e)
 {
 	double x;
-	bool one = false;
+	bool equal = false; /* at all wavelengths, not white */
 	switch (v->type) {
 	case VALUE_RGB:
 		if (color_from_rgb(v->as.rgb, role, out))
@@ -277,7 +277,7 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 		if (v->as.spectrum.count == 0)
 			return error_set(e, EINVAL, "a spectrum without values");
 		x = v->as.spectrum.value[0];
-		one = true;
+		equal = true;
 		break;
 	case VALUE_FLOAT:
 		x = v->as.number;
@@ -290,8 +290,8 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 	}
 	if (!(x >= 0) || !(x <= role_max(role)))
 		return error_set(e, EINVAL, "%g: must be within [0, %g]", x, role_max(role));
-	*out = one ? color_constant(x) : color_white(x, role);
-	if (one && role == COLOR_ILLUMINANT)
+	*out = equal ? color_constant(x) : color_white(x, role);
+	if (equal && role == COLOR_ILLUMINANT)
 		set_rgb(out, false);
 	return 0;
 }
