@@ -4,6 +4,7 @@
 
 #include "common/base/mem.h"
 #include "tests/support/stats.h"
+#include "worker/render/world/world.h"
 
 #include <pthread.h>
 #include <setjmp.h>
@@ -67,6 +68,7 @@ static struct plan make_plan(const struct world *w, const struct render_picture_
 			 .min_depth = 1,
 			 .max_depth = how->max_depth ? how->max_depth : s.settings.max_depth};
 	snprintf(p.integrator, sizeof p.integrator, "%s", how->integrator);
+	accuracy_settings_print(&w->accuracy, p.accuracy);
 	struct error e = {""};
 	if (plan_check(&p, &e))
 		fail_msg("%s", e.text);
