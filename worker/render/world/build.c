@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Builds a world: geometry in double, the scene moved into the unit sphere, floats (geometry.c); then BSDFs, emitters,
- * effects and what they omit, and last Embree's structure. render_check stops before Embree.
+ * effects and what they omit, and last Embree's structure, before which render_check stops in large scenes.
  *
  * Failures have the object's place and leave nothing behind: the world is one arena. Surfaces that coincide are notes,
  * not errors.
@@ -345,6 +345,22 @@ static int prepare(struct builder *b, const struct render_options *o)
 	return rc;
 }
 
+/* They are black by the file's rule, not by the user's choice. */
+static bool backs_may_surprise(const struct builder *b)
+{
+	return b->scene->black_backs && b->w->accuracy.backs <= SETTING_BACKS_AUTO;
+}
+
+/* A check needs no tree, but what it can say of black backs is worth a fraction of a second. */
+static bool is_quick_to_build(const struct world *w)
+{
+	enum { QUICK = 1 << 18 };
+	uint64_t triangles = 0;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		triangles += w->shapes[i].triangle_count;
+	return triangles <= QUICK;
+}
+
 static int new_world(struct world **out, bool with_accel, const struct scene *s, const struct asset_source *assets,
 		     const struct render_options *o, struct report *found, struct error *e)
 {
@@ -363,9 +379,10 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	obj_cache_fini(&parsed);
 	asset_keeper_fini(&keeper);
 	crash_place("building Embree's tree", NULL, 0);
-	if (!rc && with_accel)
+	bool whole = !rc && !(found && found->problem_count), look = whole && backs_may_surprise(&b);
+	if (whole && (with_accel || (look && is_quick_to_build(b.w))))
 		rc = build_accel(&b);
-	if (!rc && with_accel && s->black_backs && b.w->accuracy.backs <= SETTING_BACKS_AUTO)
+	if (!rc && look && b.w->accel)
 		backs_note(b.w);
 	crash_place(NULL, NULL, 0);
 	arena_fini(&b.scratch);
