@@ -96,6 +96,8 @@ unsigned full_path_mode(const struct full_path *x, unsigned j)
 	struct surface_point turned;
 	const struct surface_point *s = facing(x, j, &turned);
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
+	if (x->v[j].delta && (x->v[j].mode & BSDF_STRAIGHT)) /* whatever the shading normal is */
+		return vec3_dot(s->ng, o) * vec3_dot(s->ng, i) < 0 ? BSDF_TRANSMIT : 0;
 	double no = vec3_dot(s->sh.n, o), ni = vec3_dot(s->sh.n, i);
 	if (!(no * vec3_dot(s->ng, o) > 0 && ni * vec3_dot(s->ng, i) > 0))
 		return 0;

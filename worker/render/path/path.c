@@ -214,10 +214,12 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
 	struct bsdf_sample s;
 	vec3 wo = frame_to_local(&x->sh, v->to_prev);
-	if (!same_side(x, v->to_prev) || !v->bsdf->ops->sample(v->bsdf, &p, wo, u, &s) || !(s.pdf > 0))
+	bool seen = same_side(x, v->to_prev);
+	if (!(seen || (v->bsdf->modes & BSDF_STRAIGHT)) || !v->bsdf->ops->sample(v->bsdf, &p, wo, u, &s) ||
+	    !(s.pdf > 0))
 		return false;
 	out->wi = frame_to_world(&x->sh, s.wi);
-	if (!same_side(x, out->wi))
+	if (!(s.mode & BSDF_STRAIGHT) && !(seen && same_side(x, out->wi)))
 		return false;
 	out->mode = s.mode;
 	out->delta = (s.mode & BSDF_DELTA) != 0;

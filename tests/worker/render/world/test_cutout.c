@@ -8,6 +8,7 @@
 #include "tests/support/pictures.h"
 #include "tests/support/worlds.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -90,9 +91,62 @@ static void test_blend(void **state)
 		HALF("-0.5", DIFFUSE("0.8")) HALF("0.5", DIFFUSE("0.3")));
 }
 
+/* By a normal that faces away from the camera, and by one that faces it. */
+#define BENT(opacity, y)                                                                              \
+	"<shape type='rectangle'><bsdf type='mask'><float name='opacity' value='" opacity "'/>"       \
+	"<bsdf type='twosided'><bsdf type='normalmap'><rgb name='normalmap' value='0.5 " y " 0.67'/>" \
+	"<boolean name='flip_invalid_normals' value='false'/>" DIFFUSE("0.8") "</bsdf></bsdf></bsdf></shape>"
+
+/* Light passes through a hole whatever the normal would be. */
+static void test_bent_hole(void **state)
+{
+	(void)state;
+	static const char *const bodies[] = {BENT("0", "0.03"), BENT("0", "0.97")};
+	static const struct agree_side how = {"bdpt", 16, 16, 1, 16};
+	for (int i = 0; i < 2; i++) {
+		static struct agree_image image;
+		struct world *w =
+			world_of_text(16, 16, "<emitter type='constant'/>" SENSOR("0,-3,1", "0,0,0") "%s", bodies[i]);
+		agree_render(w, "bent hole", "bdpt", &how, &image);
+		for (uint32_t g = 0; g < image.groups; g++)
+			for (int k = 0; k <= AGREE_CELLS; k++)
+				assert_true(fabs(image.mean[g][k] / image.mean[0][0] - 1) < 1e-5);
+		double white = 0.95047 + 1 + 1.08883;
+		assert_true(fabs(image.mean[0][0] / white - 1) < 1e-3);
+		world_free(w);
+	}
+}
+
+/* A lamp through panes that let half of the light pass and face the camera, or not. */
+static void test_bent_panes(void **state)
+{
+	(void)state;
+	static struct agree_image path, bdpt, hslt;
+	static const struct agree_side how[] = {
+		{"path", 2048, 32, 1, 6}, {"bdpt", 2048, 32, 1, 6}, {"hslt", 8192, 32, 1, 6}};
+	struct world *w = world_of_text(
+		16, 16,
+		SENSOR("0,-3,1", "0,0,0") LIGHT_AND_FLOOR BENT("0.5", "0.03") "<shape type='rectangle'><transform "
+									      "name='to_world'><scale value='0.7'/>"
+									      "<rotate x='1' angle='180'/>"
+									      "<translate z='2'/></transform><emitter "
+									      "type='area'><rgb name='radiance' "
+									      "value='8'/></emitter></shape>");
+	agree_render(w, "bent panes", "path", &how[0], &path);
+	agree_render(w, "bent panes", "bdpt", &how[1], &bdpt);
+	agree_render(w, "bent panes", "hslt", &how[2], &hslt);
+	agree_within_errors("bent panes, bdpt and path", &bdpt, &path);
+	agree_within_errors("bent panes, hslt and bdpt", &hslt, &bdpt);
+	world_free(w);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask), cmocka_unit_test(test_mask_over_what_transmits),
-					   cmocka_unit_test(test_mask_over_glass), cmocka_unit_test(test_blend)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mask),
+					   cmocka_unit_test(test_mask_over_what_transmits),
+					   cmocka_unit_test(test_mask_over_glass),
+					   cmocka_unit_test(test_blend),
+					   cmocka_unit_test(test_bent_hole),
+					   cmocka_unit_test(test_bent_panes)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
