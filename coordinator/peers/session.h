@@ -46,7 +46,7 @@ struct session {
 	struct {
 		uint64_t job;
 		double at;    /* s of the loop's clock */
-	} ended;	      /* the job that it watched until it was told, then, that it has ended */
+	} ended;	      /* the watched job that it was told the end of: it will fetch the result */
 	struct fetching {     /* a file being received */
 		uint64_t job; /* 0: none */
 		Farm__What what;

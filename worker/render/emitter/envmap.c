@@ -190,11 +190,8 @@ static double luminance(const struct envmap *m, uint32_t row, uint32_t column)
 /* Mean luminance of the cell's corners. */
 static double cell_weight(const struct envmap *m, uint32_t row, uint32_t column)
 {
-	uint32_t above = row == 0 ? 0 : row - 1, below = row == m->rows - 1 ? row - 1 : row;
-	if (m->to_poles) {
-		above = row;
-		below = row + 1;
-	}
+	uint32_t below = row + m->to_poles, above = below == 0 ? 0 : below - 1;
+	below = below < m->raster.image.height ? below : m->raster.image.height - 1;
 	uint32_t next = column + 1 == m->columns ? 0 : column + 1;
 	return 0.25 * (luminance(m, above, column) + luminance(m, above, next) + luminance(m, below, column) +
 		       luminance(m, below, next));

@@ -41,9 +41,14 @@ struct wavelengths wavelengths_sample_few(double u, unsigned count)
 	return w;
 }
 
-/* Lane i's contribution to the three integrals for a value of 1. */
+/* Lane i's contribution to the three integrals for a value of 1; none of the fourth where the lanes are R, G and B. */
 static void lane_weights(const struct wavelengths *w, int i, double xyz[3])
 {
+	if (w->rgb) {
+		const double one[3] = {i == 0, i == 1, i == 2};
+		rec709_to_xyz(one, xyz);
+		return;
+	}
 	int cell = cell_of(w->nm[i]);
 	double b = w->nm[i] - CIE_FIRST_NM - cell, a = 1 - b;
 	double factor = 1 / (wavelength_cells[cell].share * (CIE_Y_SUM * SPECTRUM_LANES));
@@ -53,10 +58,6 @@ static void lane_weights(const struct wavelengths *w, int i, double xyz[3])
 
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
 {
-	if (w->rgb) {
-		rec709_to_xyz(l.v, xyz);
-		return;
-	}
 	xyz[0] = xyz[1] = xyz[2] = 0;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double lane[3];
@@ -68,14 +69,8 @@ void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
 
 spectrum spectrum_intensity_weights(const struct wavelengths *w)
 {
-	spectrum sum = spectrum_of(0);
-	for (int i = 0; w->rgb && i < 3; i++) {
-		const double one[3] = {i == 0, i == 1, i == 2};
-		double xyz[3];
-		rec709_to_xyz(one, xyz);
-		sum.v[i] = xyz[0] + xyz[1] + xyz[2];
-	}
-	for (int i = 0; !w->rgb && i < SPECTRUM_LANES; i++) {
+	spectrum sum;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double lane[3];
 		lane_weights(w, i, lane);
 		sum.v[i] = lane[0] + lane[1] + lane[2];

@@ -145,14 +145,14 @@ static int read_value(const struct xml_element *el, const char *text, struct are
 	double x[3];
 	if (strchr(text, ':'))
 		return read_pairs(el, text, text + strlen(text), ':', arena, out, e);
-	/* A number is rgb in 0.6, so that it is white as light; in 3.x it is the same at each wavelength. */
-	if (number_parse(text, x) && el->snake) {
+	if (number_parse(text, x)) {
+		if (!el->snake)
+			return constant(el, x[0], arena, out, e);
+		/* In 0.6 it is rgb, so that light is white; in 3.x it is the same at each wavelength. */
 		*out = (struct value){.type = VALUE_FLOAT};
 		out->as.number = x[0];
 		return 0;
 	}
-	if (number_parse(text, x))
-		return constant(el, x[0], arena, out, e);
 	/* 0.6 built with three lanes accepts r, g, b here; with more it accepts as many numbers. */
 	if (el->snake && number_list(text, x, 3) == 3) {
 		*out = (struct value){.type = VALUE_RGB};

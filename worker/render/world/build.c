@@ -348,7 +348,7 @@ static int prepare(struct builder *b, const struct render_options *o)
 /* They are black by the file's rule, not by the user's choice. */
 static bool backs_may_surprise(const struct builder *b)
 {
-	return b->scene->black_backs && b->w->accuracy.backs <= SETTING_BACKS_AUTO;
+	return b->w->accuracy.backs <= SETTING_BACKS_AUTO && backs_are_black(b);
 }
 
 /* A check needs no tree, but what it can say of black backs is worth a fraction of a second. */
