@@ -126,13 +126,10 @@ LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 # Whatever is linked with it can run out of memory when a test says so (tests/support/failing_memory.h).
 MEMORY_WRAP  := -Wl,--wrap=mem_alloc,--wrap=mem_grow,--wrap=mem_strdup,-u,__wrap_mem_alloc
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
-# A test's own code runs once, and is compiled and linked as fast as possible; what it calls is built as it is used. The
-# linker is looked for once, where a test is linked. mold 1.10 begins RELRO at thread-local variables, even where they end up
-# on a page before the data's, which is not mapped: such a program does not start. No test needs RELRO.
+# A test's own code runs once, and is compiled as fast as possible; what it calls is built as it is used.
 $(call obj,$(TEST_SRC)): CFLAGS += -O1 -g1
-TEST_LINKER = $(eval TEST_LINKER := $(shell $(CC) -fuse-ld=mold -Wl,--version >/dev/null 2>&1 && echo -fuse-ld=mold -Wl,-z,norelro))$(TEST_LINKER)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) $(TEST_LINKER) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+	$(link) $(TEST_WRAP) $(MEMORY_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 # It notes which random numbers are asked for.
 $(BUILD)/tests/worker/render/test_groups: TEST_WRAP := -Wl,--wrap=rng_uniform4,--wrap=rng_bits4
 # What tests/run.sh ends a test by. It needs no library, and no sanitizer: it is no test.
