@@ -15,6 +15,8 @@
 #include "worker/render/path/connect.h"
 
 #include "worker/render/path/measure.h"
+#include "worker/render/path/media.h"
+#include "worker/render/path/visible.h"
 
 /* Beyond this a weight is zero in double anyway; infinities would breed NaN. */
 #define RATIO_LIMIT 1e200
@@ -121,44 +123,6 @@ static void join(const struct path_context *c, const struct path_vertex *light, 
 		p->v[i] = &light[i];
 	for (unsigned i = 0; i < t; i++)
 		p->v[p->edges - i] = &c->camera[i];
-}
-
-static struct ray_end end_of(const struct path_vertex *v)
-{
-	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
-}
-
-/* What is before the near plane hides nothing: an orthographic camera has a whole room there. camera_project refuses a
- * b that is behind the far one. */
-static bool seen_by_camera(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *b)
-{
-	const struct camera *camera = &c->w->camera;
-	bool endless = b->kind == VERTEX_INFINITE;
-	vec3 d = endless ? b->x.p : vec3_sub(b->x.p, eye->x.p);
-	if (!(vec3_dot(camera->axes.n, d) > 0))
-		return false;
-	double t_min, t_max;
-	camera_clip(camera, d, &t_min, &t_max);
-	struct ray_end from = end_of(eye), to = end_of(b);
-	struct ray_hit hit;
-	if (endless)
-		return !accel_closest(c->w->accel, &from, d, t_min, t_max, &hit);
-	if (!(t_min < 1))
-		return false;
-	from.p = vec3_madd(eye->x.p, t_min, d);
-	return !accel_occluded(c->w->accel, &from, &to);
-}
-
-bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
-{
-	c->counters[COUNT_RAYS_SHADOW]++;
-	if (a->kind == VERTEX_CAMERA)
-		return seen_by_camera(c, a, b);
-	struct ray_end from = end_of(a);
-	if (b->kind == VERTEX_INFINITE)
-		return !accel_occluded_to_infinity(c->w->accel, &from, b->x.p);
-	struct ray_end to = end_of(b);
-	return !accel_occluded(c->w->accel, &from, &to);
 }
 
 spectrum path_collapse(spectrum l, bool dispersive)

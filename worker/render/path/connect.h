@@ -30,10 +30,6 @@ double path_pdf_emitter(const struct path_context *c, const struct path_vertex *
 double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
 /* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
 bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf);
-/* Nothing lies between a (not at infinity) and b (not the camera). For a camera, what is before its near plane or
- * behind its far one is not there. Counts a ray. */
-bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b);
-
 /* What a whole path brings, whose contribution is l. Where it scatters at a dispersive BSDF, however it does so there,
  * its directions and densities are those of nm[0], and only that one travels on: four times its share, unbiased because
  * nm[0] is uniform. A property of the path, so that all techniques that make it agree. */

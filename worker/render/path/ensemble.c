@@ -14,6 +14,7 @@
 
 #include "worker/render/math/logsum.h"
 #include "worker/render/path/full_path_density.h"
+#include "worker/render/path/media.h"
 
 /* A sub-path has these vertices for sure, and n > 5 or more with probability (5/n)^2: 10 on average where nothing ends
  * it. A fixed probability of going on would make the weights of long paths grow as fast as light dies away, or faster

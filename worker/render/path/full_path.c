@@ -10,6 +10,8 @@
 
 #include "worker/render/path/connect.h"
 #include "worker/render/path/measure.h"
+#include "worker/render/path/media.h"
+#include "worker/render/path/visible.h"
 
 #include <assert.h>
 #include <string.h>

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/path/full_path_check.h"
 
+#include "worker/render/path/visible.h"
+
 #include <stdio.h>
 
 /* Cached and fresh values may differ by rounding, amplified where a lobe is narrow. */

@@ -12,6 +12,7 @@
 #include "worker/render/path/path.h"
 
 #include "worker/render/path/measure.h"
+#include "worker/render/path/media.h"
 
 #include <float.h>
 #include <string.h>
@@ -37,58 +38,10 @@ void path_context_for_samples(struct path_context *c, const struct world *w, con
 				   .counters = counters};
 }
 
-vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2)
-{
-	*distance2 = 1;
-	if (b->kind == VERTEX_INFINITE)
-		return b->x.p;
-	if (a->kind == VERTEX_INFINITE)
-		return vec3_neg(a->x.p);
-	vec3 d = vec3_sub(b->x.p, a->x.p);
-	*distance2 = vec3_dot(d, d);
-	return *distance2 > 0 ? vec3_scale(1 / sqrt(*distance2), d) : (vec3){0, 0, 0};
-}
-
-double path_cosine(const struct path_vertex *v, vec3 w)
-{
-	vec3 n = v->x.ng;
-	if (v->kind == VERTEX_CAMERA || v->kind == VERTEX_INFINITE || (n.x == 0 && n.y == 0 && n.z == 0))
-		return 1;
-	return fabs(vec3_dot(n, w));
-}
-
-spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl)
-{
-	const struct emitter *em = &c->w->emitters[v->emitter];
-	struct emitter_point p = world_emitter_point(&v->x);
-	p.infinite = v->kind == VERTEX_INFINITE;
-	return em->ops->radiance(em, &p, w, wl);
-}
-
 /* Both normals see w from the same side. */
 static bool same_side(const struct surface_point *x, vec3 w)
 {
 	return vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0;
-}
-
-uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, uint32_t medium, vec3 away)
-{
-	if (v->kind != VERTEX_SURFACE)
-		return medium;
-	const struct world_shape *s = &w->parts[v->x.prim.shape];
-	if (!s->interior && !s->exterior)
-		return medium;
-	return vec3_dot(v->x.ng, away) > 0 ? s->exterior : s->interior;
-}
-
-spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
-			    const struct path_vertex *a, const struct path_vertex *b)
-{
-	if (!medium)
-		return spectrum_of(1);
-	bool endless = a->kind == VERTEX_INFINITE || b->kind == VERTEX_INFINITE;
-	double distance = endless ? INFINITY : vec3_length(vec3_sub(a->x.p, b->x.p));
-	return medium_transmittance(&w->media[medium - 1], distance, wl);
 }
 
 const struct surface_point *path_facing_bent(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned)
@@ -135,20 +88,6 @@ static double disk_pdf(const struct world *w)
 	return 1 / (M_PI * w->radius * w->radius);
 }
 
-struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p)
-{
-	struct path_vertex v = {.kind = p->infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
-	uint32_t shape = w->emitter_shape[emitter];
-	v.x.p = p->p;
-	v.x.ng = v.x.sh.n = p->n;
-	v.x.u = p->where.u;
-	v.x.v = p->where.v;
-	v.x.b1 = p->where.b1;
-	v.x.b2 = p->where.b2;
-	v.x.prim = shape == UINT32_MAX ? PRIM_NONE : (struct prim_ref){shape, p->where.prim};
-	return v;
-}
-
 double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
 		const struct path_vertex *next, enum transport transport)
 {
@@ -169,31 +108,6 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 		solid = surface_pdf(c, at, path_direction(at, prev, &unused), omega, transport);
 	}
 	return next->kind == VERTEX_INFINITE ? solid : solid * jac_solid_from_area(next->x.ng, omega, distance2);
-}
-
-bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
-		 struct path_vertex *to)
-{
-	struct ray_end start = {from->x.p, from->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : from->x.ng, from->x.prim};
-	struct ray_hit hit;
-	c->counters[COUNT_RAYS_CLOSEST]++;
-	to->to_prev = vec3_neg(d);
-	to->delta = false;
-	to->pdf_rev = 0;
-	if (accel_closest(c->w->accel, &start, d, t_min, t_max, &hit)) {
-		const struct world_shape *part = &c->w->parts[hit.prim.shape];
-		surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, d, &hit, &to->x);
-		to->kind = VERTEX_SURFACE;
-		to->bsdf = &c->w->bsdfs[part->bsdf];
-		to->emitter = part->emitter;
-		return true;
-	}
-	to->kind = VERTEX_INFINITE;
-	to->x.p = d;
-	to->x.prim = PRIM_NONE;
-	to->emitter = c->w->environment;
-	to->bsdf = NULL;
-	return to->emitter >= 0;
 }
 
 /* How a sub-path leaves a vertex by its BSDF. */
@@ -267,12 +181,6 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 		return false;
 	*beta = spectrum_scale(1 / q, *beta);
 	return true;
-}
-
-void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to)
-{
-	to->medium = path_medium_after(c->w, at, at->medium, wi);
-	to->beta = spectrum_mul(to->beta, path_transmittance(c->w, &c->wl, to->medium, at, to));
 }
 
 /* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is a surface. start: beta to which roulette compares. */

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/path/vertex.h"
+
+spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl)
+{
+	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_point p = world_emitter_point(&v->x);
+	p.infinite = v->kind == VERTEX_INFINITE;
+	return em->ops->radiance(em, &p, w, wl);
+}
+
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p)
+{
+	struct path_vertex v = {.kind = p->infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
+	uint32_t shape = w->emitter_shape[emitter];
+	v.x.p = p->p;
+	v.x.ng = v.x.sh.n = p->n;
+	v.x.u = p->where.u;
+	v.x.v = p->where.v;
+	v.x.b1 = p->where.b1;
+	v.x.b2 = p->where.b2;
+	v.x.prim = shape == UINT32_MAX ? PRIM_NONE : (struct prim_ref){shape, p->where.prim};
+	return v;
+}
+
+bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
+		 struct path_vertex *to)
+{
+	struct ray_end start = {from->x.p, from->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : from->x.ng, from->x.prim};
+	struct ray_hit hit;
+	c->counters[COUNT_RAYS_CLOSEST]++;
+	to->to_prev = vec3_neg(d);
+	to->delta = false;
+	to->pdf_rev = 0;
+	if (accel_closest(c->w->accel, &start, d, t_min, t_max, &hit)) {
+		const struct world_shape *part = &c->w->parts[hit.prim.shape];
+		surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, d, &hit, &to->x);
+		to->kind = VERTEX_SURFACE;
+		to->bsdf = &c->w->bsdfs[part->bsdf];
+		to->emitter = part->emitter;
+		return true;
+	}
+	to->kind = VERTEX_INFINITE;
+	to->x.p = d;
+	to->x.prim = PRIM_NONE;
+	to->emitter = c->w->environment;
+	to->bsdf = NULL;
+	return to->emitter >= 0;
+}

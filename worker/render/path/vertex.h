@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Vertices of paths, and what surrounds their making.
+ *
+ * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; x_0 on a delta
+ * emitter counts: 1 times the choice of the emitter, and 0 as found by a path from the camera; times a delta
+ * distribution in the direction towards the light, projected on the geometric normal, where scattering is exactly
+ * specular (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled with
+ * density 1 / pixels (struct film_window).
+ */
+#ifndef WORKER_RENDER_PATH_VERTEX_H
+#define WORKER_RENDER_PATH_VERTEX_H
+
+#include "common/film/batch.h"
+#include "worker/render/world/world.h"
+
+enum { PATH_MAX_EDGES = 128 };
+
+enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE };
+
+struct path_vertex {
+	enum vertex_kind kind;
+	bool delta;		 /* its own sub-path left it by an exactly specular lobe */
+	unsigned mode;		 /* of enum bsdf_mode: how its own sub-path left it */
+	int32_t emitter;	 /* shines: index; -1 */
+	const struct bsdf *bsdf; /* VERTEX_SURFACE */
+	uint32_t medium;	 /* on the camera's sub-path: the medium between it and the vertex before */
+	struct surface_point
+		x;	/* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is 0 */
+	vec3 to_prev;	/* unit; towards the vertex before it on its own sub-path */
+	spectrum beta;	/* carried to this vertex over the density of getting here */
+	double pdf;	/* of this vertex from its own sub-path, see above */
+	double pdf_rev; /* of this vertex as generated from the next two of its own sub-path */
+	double next_event[3]; /* random numbers kept for next event estimation */
+};
+
+/* The film points that are sampled: the crop and its border, in pixels. */
+struct film_window {
+	double x, y, width, height;
+};
+
+static inline bool film_window_holds(const struct film_window *w, const double film[2])
+{
+	return film[0] >= w->x && film[0] < w->x + w->width && film[1] >= w->y && film[1] < w->y + w->height;
+}
+
+struct path_context;
+
+/* Divides each contribution between the film and somebody else. `keep` is told the weighted contribution l of joining s
+ * vertices of the light with t of the camera's at a film point, returns the part of it that the film gets, and sees to
+ * the rest. It must leave the context as it finds it. */
+struct path_split {
+	spectrum (*keep)(struct path_split *p, struct path_context *c, unsigned s, unsigned t, const double film[2],
+			 spectrum l);
+};
+
+/* One evaluation's surroundings; one a thread. */
+struct path_context {
+	const struct world *w;
+	struct film_window window;
+	struct wavelengths wl;
+	uint32_t min_depth, max_depth; /* edges */
+	double roulette;	       /* the most that a sub-path goes on with; 0: no roulette */
+	bool unclassed;		       /* nobody asks for path_sample.classes */
+	bool one_way;		       /* nobody asks for pdf_rev: no technique has more than one light vertex */
+	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
+				 all have */
+	double faint;	      /* what a connection of two surfaces must bring to be made for certain; 0: anything */
+	double faint_place;   /* of the next such connection in systematic sampling: see connect.c */
+	uint64_t *counters;   /* of enum batch_counter */
+	struct path_split *split; /* NULL: the film gets all */
+	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
+};
+
+/* false: x_0 on a delta emitter, which no path from the camera finds. */
+static inline bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v)
+{
+	bool end = v->kind == VERTEX_EMITTER || v->kind == VERTEX_INFINITE;
+	return !end || v->emitter < 0 || !c->w->emitters[v->emitter].delta;
+}
+
+/* Kind, emitter and place of a point drawn on an emitter; the rest is 0. */
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p);
+
+/* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity, a point light. */
+static inline double path_cosine(const struct path_vertex *v, vec3 w)
+{
+	vec3 n = v->x.ng;
+	if (v->kind == VERTEX_CAMERA || v->kind == VERTEX_INFINITE || (n.x == 0 && n.y == 0 && n.z == 0))
+		return 1;
+	return fabs(vec3_dot(n, w));
+}
+
+/* Radiance that leaves an emitter's point in direction w. */
+spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl);
+
+/* The vertex where the ray from `from` along d ends: a surface, the emitter at infinity, or nothing (false). Counts a
+ * ray. */
+bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
+		 struct path_vertex *to);
+
+/* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
+static inline vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2)
+{
+	*distance2 = 1;
+	if (b->kind == VERTEX_INFINITE)
+		return b->x.p;
+	if (a->kind == VERTEX_INFINITE)
+		return vec3_neg(a->x.p);
+	vec3 d = vec3_sub(b->x.p, a->x.p);
+	*distance2 = vec3_dot(d, d);
+	return *distance2 > 0 ? vec3_scale(1 / sqrt(*distance2), d) : (vec3){0, 0, 0};
+}
+
+#endif
