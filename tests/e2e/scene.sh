@@ -17,7 +17,7 @@ cat >"$DIR/bad.xml" <<'XML'
 <shape type="sphere">
 	<ref id="fur"/>
 	<float name="radios" value="1"/>
-	<medium type="homogeneous" name="interior"/>
+	<medium type="heterogeneous" name="interior"/>
 </shape>
 <shape type="cube"><ref id="fur"/><bsdf type="diffuse"><rgb name="reflectance" value="2 0 0"/></bsdf></shape>
 <shape type="cube"><transform name="to_world"><rotate angle="10"/></transform></shape>
@@ -145,7 +145,7 @@ XML
 }
 scene strange.xml wiener '<emitter type="aurora"><float name="power" value="3"/></emitter>' \
 	'<bsdf type="bark" id="stuff"><texture type="perlin" name="knots"/><bsdf type="hair"><rgb name="base_color" value="0.8 0.2 0.1"/><float name="melanin" value="0.3"/></bsdf></bsdf>' \
-	'<medium name="interior" type="homogeneous"><float name="albedo" value="0.5"/></medium>' \
+	'<medium name="interior" type="heterogeneous"><float name="albedo" value="0.5"/></medium>' \
 	'<shape type="ellipsoids"><string name="filename" value="h.hair"/></shape><volume type="grid"/>'
 scene plain.xml gaussian '' '<bsdf type="diffuse" id="stuff"><rgb name="reflectance" value="0.8 0.2 0.1"/></bsdf>' '' ''
 code 1 "$BIN/hslt-scene" check "$DIR/strange.xml"

@@ -91,9 +91,11 @@ static void compare_scene(uint64_t number)
 		compare(&t, "path", "path", 128, w);
 	compare(&t, "bdpt8", "bdpt8", 96, w);
 	compare(&t, "pssmlt", "pssmlt", 64, w);
-	compare(&t, "hslt", "hslt", 64, w);
 	const char *erpt = number % 2 ? "erpt4" : "erpt";
-	compare(&t, erpt, erpt, 48, w);
+	if (!w->effects.scattering) {
+		compare(&t, "hslt", "hslt", 64, w);
+		compare(&t, erpt, erpt, 48, w);
+	}
 	world_free(w);
 	worlds_effects = "all";
 	w = random_scene_world(&t.scene, 32, 24);
@@ -112,8 +114,10 @@ static void test_random(void **state)
 		random_scene_range(scenes, &first, &last);
 	for (uint64_t i = first; i <= last; i++)
 		compare_scene(i);
-	if (is_plain && !scenes)
+	if (is_plain && !scenes) {
 		compare_scene(RANDOM_SCENES_WITH_RELIEF);
+		compare_scene(RANDOM_SCENES_WITH_FOG);
+	}
 	printf("integrators on random scenes: %u comparisons, %u failed\n", rows.cases, rows.failed);
 	assert_int_equal(rows.failed, 0);
 }

@@ -335,19 +335,49 @@ static struct world *turned_normals(const struct agree_case *k)
 	return world_of_text(32, 32, "%s", xml);
 }
 
-/* A ball of coloured glass around a stone, which states no medium, and a bubble; beside it water with a lamp in it. */
-static struct world *absorbing_media(const struct agree_case *k)
-{
+/* A ball of coloured glass around a stone, which states no medium, and a bubble; beside it water with a lamp in it. All
+ * in haze of that density, in which the camera stands. */
 #define WITHIN(side, sigma) "<medium type='homogeneous' name='" side "'><rgb name='sigma_a' value='" sigma "'/><spectrum name='sigma_s' value='0'/></medium>"
 #define ROUGH(eta) "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/><float name='int_ior' value='" eta "'/></bsdf>"
-	(void)k;
-	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
-			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) ROUGH("1.5") WITHIN("interior", "0.5,1.5,3") "</shape>"
+#define FOG(albedo, phase) "<medium type='homogeneous' id='fog'><float name='sigma_t' value='%g'/><float name='albedo' value='" albedo "'/>" phase "</medium>"
+#define OUTSIDE "<ref name='exterior' id='fog'/>"
+#define LOOK_FROM_FOG "<sensor type='perspective'><float name='fov' value='35'/>" AT("<lookat origin='0.4,2.2,5' target='0,0.7,0' up='0,1,0'/>" TURN) FILM "<ref name='medium' id='fog'/></sensor>"
+static struct world *absorbing_media(const struct agree_case *k)
+{
+	return world_of_text(32, 32, FOG("0", "") LOOK_FROM_FOG GROUND SKY
+			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) ROUGH("1.5") OUTSIDE WITHIN("interior", "0.5,1.5,3") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.5' y='1.1'/>" TURN) ROUGH("0.8") WITHIN("exterior", "0.5,1.5,3") "</shape>"
-			     "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) GLASS("1.33") WITHIN("interior", "2,0.8,0.4") "</shape>"
+			     "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) GLASS("1.33") OUTSIDE WITHIN("interior", "2,0.8,0.4") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='0.7' y='0.5'/>" TURN) "<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
 			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
+}
+
+/* A coloured cloud around a stone and a lamp, which state no medium, beside milk in rough glass; and all that in fog in
+ * which the camera stands. */
+static struct world *scattering_media(const struct agree_case *k)
+{
+#define SCATTERS(side, sigma, albedo, phase) "<medium type='homogeneous' name='" side "'><rgb name='sigma_t' value='" sigma "'/><rgb name='albedo' value='" albedo "'/>" phase "</medium>"
+	return world_of_text(32, 32, FOG("0.8", "<phase type='rayleigh'/>") LOOK_FROM_FOG GROUND SKY
+			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) "<bsdf type='null'/>" OUTSIDE SCATTERS("interior", "0.5,1.5,3", "0.9,0.8,0.7", "<phase type='hg'><float name='g' value='0.6'/></phase>") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='-0.5' y='1.1'/>" TURN) "<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
+			     "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) ROUGH("1.33") OUTSIDE SCATTERS("interior", "1,2,4", "1,0.95,0.9", "") "</shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
+}
+
+/* A lamp in a cloud that says something else of what is around it; and a lamp outside, from which light enters the cloud
+ * through a face that states haze there. Most light sub-paths are in other media than the camera's. */
+static struct world *media_that_do_not_fit(const struct agree_case *k)
+{
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND
+			     "<medium type='homogeneous' id='haze'><float name='sigma_t' value='0.8'/><float name='albedo' value='0.6'/></medium>"
+			     "<shape type='sphere'>" AT("<scale value='0.8'/><translate y='0.85'/>" TURN) "<bsdf type='null'/><ref name='exterior' id='haze'/>" SCATTERS("interior", "1.5,1,0.5", "0.9,0.9,0.9", "") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.2' y='0.8'/>" TURN) "<emitter type='area'><rgb name='radiance' value='9'/></emitter><ref name='exterior' id='haze'/></shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.5'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>");
 }
 
@@ -376,6 +406,10 @@ const struct agree_case agree_cases[] = {
 	{"tilted parts", "chalk and glass", tilted_parts, 1, 0, 6, 1024, 1024, ALL, 0.02},
 	{"smooth tangents", "brushed metal and glass", smooth_tangents, 0, 0, 6, 1024, 1024, ALL, 0.02},
 	{"absorbing media", "glass and water", absorbing_media, 0, 0, 8, 2048, 1024, ALL, 0.02},
+	{"absorbing media", "glass and water in haze", absorbing_media, 0.3, 0, 8, 2048, 1024, ALL, 0.07},
+	{"scattering media", "a cloud and milk", scattering_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt"}, 0.02},
+	{"scattering media", "a cloud and milk in fog", scattering_media, 0.2, 0, 10, 4096, 2048, {"bdpt", "pssmlt"}, 0.03},
+	{"scattering media", "that do not fit together", media_that_do_not_fit, 0, 0, 6, 1024, 1024, {"bdpt", "pssmlt"}, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},

@@ -23,7 +23,7 @@ struct maker {
 	struct dice d;
 	const char *const *materials;
 	uint32_t count;
-	bool relief;
+	bool relief, fog;
 };
 
 /* clang-format off */
@@ -141,11 +141,24 @@ static const char wedge[] =
 	"f 1/1 2/2 3/3 4/4\nf 4/1 3/2 6/3 5/4\nf 2/1 1/2 5/3 6/4\nf 1/1 4/2 5/3\nf 3/1 2/2 6/3\n";
 static const char curve[] = "-1 -0.5 0 0.2\n-0.4 0.7 0.3 0.3\n0.3 -0.6 0.2 0.2\n1 0.4 -0.4 0.3\n";
 
-/* That absorbs: on either side of any shape, whether it is closed or not. */
-static void put_medium(struct maker *m)
+static void put_phase(struct maker *m)
 {
-	PUT(m, "<medium type='homogeneous' name='%s'><float name='albedo' value='0'/>",
-	    chance(m, 0.7) ? "interior" : "exterior");
+	unsigned k = dice_below(&m->d, 3);
+	PUT(m, "<phase type='%s'>", k == 0 ? "isotropic" : k == 1 ? "rayleigh" : "hg");
+	if (k == 2)
+		put_between(m, "<float name='g' value='", -0.8, 0.8, "'/>");
+	PUT(m, "</phase>");
+}
+
+/* That absorbs, or in fog may scatter. */
+static void put_medium(struct maker *m, const char *name)
+{
+	PUT(m, "<medium type='homogeneous' name='%s'>", name);
+	if (m->fog && chance(m, 0.8)) {
+		put_rgb(m, "albedo", 0.3, 1);
+		put_phase(m);
+	} else
+		PUT(m, "<float name='albedo' value='0'/>");
 	put_rgb(m, "sigma_t", 0, 2);
 	PUT(m, "</medium>");
 }
@@ -188,9 +201,13 @@ static void put_shape(struct maker *m)
 	if (chance(m, 0.1))
 		PUT(m, "<boolean name='flip_normals' value='true'/>");
 	put_place(m, between(m, 0.3, 0.7), -0.2, 1);
-	put_material(m);
-	if (chance(m, 0.2))
-		put_medium(m);
+	if (m->fog && chance(m, 0.4))
+		PUT(m, "<bsdf type='null'/>");
+	else
+		put_material(m);
+	/* on either side of any shape, whether it is closed or not: most of them do not fit together */
+	if (chance(m, m->fog ? 0.7 : 0.2))
+		put_medium(m, chance(m, 0.7) ? "interior" : "exterior");
 	PUT(m, "</shape>");
 }
 
@@ -322,6 +339,8 @@ static void put_camera(struct maker *m)
 	put_between(m, "", -1, 1, ",");
 	put_between(m, "", -0.5, 1, ",3.8' target='");
 	put_between(m, "", -0.4, 0.4, ",0,0'/></transform>");
+	if (m->fog && chance(m, 0.3))
+		put_medium(m, "medium");
 	PUT(m, "<film type='hdrfilm'><rfilter type='%s'/></film></sensor>", chance(m, 0.5) ? "box" : "gaussian");
 }
 
@@ -339,7 +358,8 @@ void random_scene_make(struct random_scene *s, uint64_t number, const char *cons
 			  .d = dice_of(name),
 			  .materials = materials,
 			  .count = count,
-			  .relief = number >= RANDOM_SCENES_WITH_RELIEF};
+			  .relief = number >= RANDOM_SCENES_WITH_RELIEF && number < RANDOM_SCENES_WITH_FOG,
+			  .fog = number >= RANDOM_SCENES_WITH_FOG};
 	PUT(&m, "<integrator type='path'><integer name='max_depth' value='%u'/></integrator>", 3 + dice_below(&m.d, 5));
 	put_camera(&m);
 	bool room = chance(&m, 0.6);

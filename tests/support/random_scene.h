@@ -18,8 +18,9 @@ struct random_scene {
 	bool needs_light_paths; /* some of its light is a beam or a point, whose caustics `path` cannot find */
 };
 
-/* From this number on, most materials of shapes have a normal map. */
-enum { RANDOM_SCENES_WITH_RELIEF = 1000 };
+/* From the first number on, most materials of shapes have a normal map; from the second on they have none, but there
+ * are media that scatter. */
+enum { RANDOM_SCENES_WITH_RELIEF = 1000, RANDOM_SCENES_WITH_FOG = 2000 };
 
 /* materials: texts for node_bsdf (tests/support/nodes.h). */
 void random_scene_make(struct random_scene *s, uint64_t number, const char *const *materials, uint32_t count);

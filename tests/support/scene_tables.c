@@ -74,6 +74,9 @@ const struct plugin_decl *scene_tables(void)
 		all[n++] = *d;
 	for (const struct plugin_decl *d = medium_decls; d->type; d++)
 		all[n++] = *d;
+	for (size_t i = 0; phase_registry[i]; i++)
+		all[n++] = (struct plugin_decl){PLUGIN_PHASE, phase_registry[i]->type, phase_registry[i]->params, 0,
+						PARAM_UNDERSTOOD};
 	assert(n < sizeof all / sizeof *all);
 	all[n] = (struct plugin_decl){0};
 	return all;

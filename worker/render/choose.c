@@ -228,8 +228,21 @@ static bool misses_little(const struct render_choice *c)
 	return c->found > missed_little && has_no_fireflies(&c->bdpt);
 }
 
+/* Where media scatter, chains on half vectors have no paths to begin with, and bdpt stands in for them. */
+static const char *choice_in_media(const struct render_choice *c)
+{
+	if (c->misses || render_choice_is_settled(c) || !is_tame(&c->path) ||
+	    !(c->path.cost < path_cost * c->bdpt.cost) || !has_no_fireflies(&c->path) || c->path.tail < tail_least)
+		return "bdpt";
+	if (!c->focuses)
+		return "path";
+	return c->brief || c->refracts ? "bdpt" : "bdpt8";
+}
+
 const char *render_choice_of(const struct render_choice *c)
 {
+	if (c->scatters)
+		return choice_in_media(c);
 	if (wants_chains(c))
 		return RENDER_INTEGRATOR_CHAINS;
 	if (render_choice_is_settled(c) || has_rare_light(c) || !is_tame(&c->path) ||
@@ -394,7 +407,7 @@ static int look_at_merged(struct pilot *p, struct render_choice *out)
 {
 	uint64_t n = p->samples / MERGED;
 	n = n < MERGED_LEAST ? MERGED_LEAST : n > MERGED_MOST ? MERGED_MOST : n;
-	if (!out->focuses)
+	if (!out->focuses || out->scatters)
 		return 0;
 	out->samples += n;
 	p->context.counters = p->uncounted;
@@ -501,6 +514,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 	*out = (struct render_choice){.path = render_found_none, .bdpt = render_found_none};
 	world_summary(w, &summary);
 	out->focuses = scene_has(&summary, "half-vectors");
+	out->scatters = w->effects.scattering;
 	out->refracts = out->focuses && scene_has(&summary, "transmission");
 	int rc = film_of(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
@@ -527,6 +541,9 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 
 static const char *reason(const char *integrator, const struct render_choice *c)
 {
+	if (strcmp(integrator, "bdpt") == 0)
+		return "media scatter light, which chains on half vectors do not support; paths from the camera and from "
+		       "the lamps, joined, leave less noise than paths from the camera alone";
 	if (strcmp(integrator, "hslt") == 0)
 		return !(c->path.cost > 0) ? "paths from the camera find next to no light; chains search for it longest"
 					   : "much of the light arrives by few, very bright paths, such as caustics; "

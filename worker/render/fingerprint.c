@@ -38,6 +38,8 @@ uint64_t fingerprint_self_test(void)
 		mix(&hash, atan2(x, 1 - x));
 		mix(&hash, acos(x));
 		mix(&hash, sinh(x));
+		mix(&hash, asinh(x));
+		mix(&hash, log1p(-x));
 		mix(&hash, cbrt(x));
 		mix(&hash, erf(x));
 		mix(&hash, hypot(x, 0.3));

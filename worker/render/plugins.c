@@ -39,6 +39,9 @@ static void gather(void)
 						texture_registry[i]->nested_classes, PARAM_UNDERSTOOD});
 	for (const struct plugin_decl *d = medium_decls; d->type; d++)
 		add_plugin(*d);
+	for (size_t i = 0; phase_registry[i]; i++)
+		add_plugin((struct plugin_decl){PLUGIN_PHASE, phase_registry[i]->type, phase_registry[i]->params, 0,
+						PARAM_UNDERSTOOD});
 	for (size_t i = 0; emitter_registry[i]; i++)
 		add_plugin((struct plugin_decl){PLUGIN_EMITTER, emitter_registry[i]->type, emitter_registry[i]->params,
 						emitter_registry[i]->nested_classes, PARAM_UNDERSTOOD});

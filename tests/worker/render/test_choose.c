@@ -58,6 +58,25 @@ static void an_open_room_needs_no_chains(void **state)
 	world_free(w);
 }
 
+/* Nor has fog any, and merging does not know it: only samples are left, whatever the scene has besides. */
+static void fog_has_no_chains(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(
+		32, 32,
+		SENSOR("0,0,5",
+		       "0,0,0") "<emitter type='point'><point name='position' x='0' y='3' z='0'/></emitter>"
+				"<shape type='sphere'><bsdf type='dielectric'/><medium type='homogeneous' "
+				"name='interior'/></shape><shape type='rectangle'><transform name='to_world'><scale "
+				"value='4'/><translate z='-2'/></transform></shape>");
+	struct plan_request r;
+	struct render_choice c;
+	choose(w, 1, SPP, &r, &c);
+	assert_string_equal(r.integrator, "bdpt");
+	assert_true(c.scatters && c.focuses && c.merged.share == 0 && c.merged.seen == 0);
+	world_free(w);
+}
+
 /* Light sub-paths bring it: the samples of bdpt begin the chains, and bdpt itself need not be looked at. */
 static bool merging_finds_rare_light(struct world *w, uint64_t seed)
 {
@@ -400,6 +419,7 @@ static void what_cannot_be_rendered_is_said(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(fog_has_no_chains),
 		cmocka_unit_test(an_open_room_needs_no_chains),
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),
 		cmocka_unit_test(a_small_lamp_in_a_mirror_is_not_rare_light),

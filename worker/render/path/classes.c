@@ -5,7 +5,7 @@ _Static_assert(PATH_CLASSES <= 32, "a bit a class");
 
 static bool is_smooth(const struct path_vertex *v)
 {
-	return v->bsdf->alpha_mean < PATH_CLASS_ALPHA;
+	return v->kind == VERTEX_SURFACE && v->bsdf->alpha_mean < PATH_CLASS_ALPHA;
 }
 
 unsigned path_class_whole(const struct full_path *x)
@@ -30,7 +30,7 @@ void classes_begin(struct classes *k, const struct path_context *c, unsigned cam
 	for (unsigned i = 1; i < camera; i++) {
 		const struct path_vertex *v = &c->camera[i];
 		k->emitter[i + 1] = (unsigned char)kind;
-		if (v->kind != VERTEX_SURFACE) /* infinity */
+		if (v->kind == VERTEX_INFINITE)
 			break;
 		bool smooth = is_smooth(v);
 		k->camera[i + 1] = (unsigned char)path_class_kind_next(kind, smooth);

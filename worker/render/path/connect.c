@@ -49,7 +49,31 @@ static bool technique_exists(const struct joined_path *p, unsigned j)
 {
 	if (j == 0)
 		return true;
+	if (p->other_medium && j > p->other_medium)
+		return false;
 	return p->edges >= 2 && j <= p->edges && !is_delta(p, j - 1) && !is_delta(p, j);
+}
+
+/* Edge i, and its media at x_i-1 and at x_i. Where media scatter. */
+struct joined_edge {
+	const struct path_edge *edge;
+	uint32_t light, camera;
+};
+
+static struct joined_edge edge_of(const struct joined_path *p, unsigned i)
+{
+	const struct path_edge *e = i == p->s ? p->joint : i < p->s ? &p->v[i]->edge : &p->v[i - 1]->edge;
+	bool from_light = i < p->s;
+	return (struct joined_edge){e, from_light ? e->before : e->medium, from_light ? e->medium : e->before};
+}
+
+/* What edge i contributes to the density of x_i (or, if back, of x_i-1) as generated from its other end. */
+static double edge_pdf(const struct path_context *c, const struct joined_path *p, unsigned i, bool back)
+{
+	if (!EFFECT_IS_ON(c->w, scattering))
+		return 1;
+	struct joined_edge e = edge_of(p, i);
+	return path_edge_pdf(c, e.edge, back ? e.light : e.camera, p->v[back ? i - 1 : i]);
 }
 
 /* Density of x_i as generated from the light, for i >= s. */
@@ -61,7 +85,7 @@ static double light_pdf(const struct path_context *c, const struct joined_path *
 	if (i >= s + 2)
 		return p->v[i]->pdf_rev;
 	const struct path_vertex *prev = i >= 2 ? p->v[i - 2] : NULL;
-	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE);
+	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) * edge_pdf(c, p, i, false);
 }
 
 /* Density of x_i as generated from the camera, for i < s. */
@@ -71,7 +95,7 @@ static double camera_pdf(const struct path_context *c, const struct joined_path 
 	if (i + 3 <= s)
 		return p->v[i]->pdf_rev;
 	const struct path_vertex *prev = i + 2 <= k ? p->v[i + 2] : NULL;
-	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE);
+	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true);
 }
 
 void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
@@ -137,17 +161,61 @@ static bool disperses(const struct path_context *c, const struct joined_path *p)
 	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
 	for (unsigned i = 1; i < p->edges; i++)
-		if (p->v[i]->bsdf->dispersive)
+		if (path_disperses(p->v[i]))
 			return true;
 	return false;
 }
 
-/* The end of every contribution. */
+/* Whether edge i is in the medium that its end has, for a sub-path that comes from there. */
+static bool edge_is_in(const struct joined_edge *e, uint32_t medium, bool from_light)
+{
+	return e->edge->fits && medium == (from_light ? e->light : e->camera);
+}
+
+/* Whether a sub-path from the camera is in the media in which the light's edges were made. */
+static bool camera_agrees(const struct path_context *c, const struct joined_path *p)
+{
+	double unused;
+	for (unsigned i = p->s; i-- > 1;) {
+		struct joined_edge e = edge_of(p, i), before = edge_of(p, i + 1);
+		vec3 d = path_direction(p->v[i], p->v[i - 1], &unused);
+		if (!edge_is_in(&e, path_medium_after(c->w, p->v[i], before.light, d), false))
+			return false;
+	}
+	return true;
+}
+
+/* Finds p->other_medium. */
+static void ask_light(const struct path_context *c, struct joined_path *p)
+{
+	double unused;
+	uint32_t medium = path_medium_of_emitter(c->w, p->v[0], path_direction(p->v[0], p->v[1], &unused));
+	for (unsigned i = 1; i <= p->edges; i++) {
+		struct joined_edge e = edge_of(p, i);
+		if (i > 1)
+			medium = path_medium_after(c->w, p->v[i - 1], medium,
+						   path_direction(p->v[i - 1], p->v[i], &unused));
+		if (!edge_is_in(&e, medium, true)) {
+			p->other_medium = i;
+			return;
+		}
+		medium = e.camera;
+	}
+}
+
+/* The end of every contribution. joint: of edge s, where media scatter and s > 0. */
 static spectrum weighted(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
-			 unsigned max_s, spectrum l)
+			 unsigned max_s, const struct path_edge *joint, spectrum l)
 {
 	struct joined_path p;
 	join(c, light, s, t, &p);
+	p.joint = joint;
+	p.other_medium = 0;
+	if (EFFECT_IS_ON(c->w, scattering)) {
+		ask_light(c, &p);
+		if (!technique_exists(&p, s) || !camera_agrees(c, &p))
+			return spectrum_of(0);
+	}
 	return path_collapse(spectrum_scale(path_balance_weight(c, &p, max_s), l), disperses(c, &p));
 }
 
@@ -157,7 +225,7 @@ static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	if (z->emitter < 0)
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(z->beta, path_emitted(c, z, z->to_prev, &c->wl));
-	return spectrum_is_zero(l) ? l : weighted(c, NULL, 0, t, max_s, l);
+	return spectrum_is_zero(l) ? l : weighted(c, NULL, 0, t, max_s, NULL, l);
 }
 
 bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf)
@@ -188,12 +256,30 @@ static spectrum absorption_of_light(const struct path_context *c, unsigned s, ui
 	return t;
 }
 
-/* What is left of light on its way to z through y, vertex s - 1 of the light's sub-path. */
+/* What media that only absorb leave of light on its way to z through y, vertex s - 1 of the light's sub-path. */
 static spectrum absorbed(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
 			 const struct path_vertex *y, unsigned s)
 {
-	uint32_t medium = path_medium_after(c->w, z, z->medium, to_light);
+	uint32_t medium = path_medium_after(c->w, z, z->edge.medium, to_light);
 	return spectrum_mul(path_transmittance(c->w, &c->wl, medium, z, y), absorption_of_light(c, s, medium));
+}
+
+/* Whether z and y see each other; where media scatter, the edge between them and what is left of l. */
+static bool is_seen(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+		    struct path_edge *joint, spectrum *l)
+{
+	spectrum left;
+	if (!EFFECT_IS_ON(c->w, scattering))
+		return path_visible(c, z, y);
+	if (!path_see_in_media(c, z, y, joint, &left))
+		return false;
+	*l = spectrum_mul(*l, left);
+	return !spectrum_is_zero(*l);
+}
+
+static bool only_absorbs(const struct path_context *c)
+{
+	return EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering);
 }
 
 static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
@@ -201,7 +287,7 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	const struct path_vertex *z = &c->camera[t - 1];
 	struct path_vertex y;
 	double pdf, distance2;
-	if (!z->bsdf->has_smooth || !path_next_event(c, z, &y, &pdf))
+	if (!path_scatters_smoothly(z) || !path_next_event(c, z, &y, &pdf))
 		return spectrum_of(0);
 	vec3 to_light = path_direction(z, &y, &distance2);
 	if (!(distance2 > 0))
@@ -209,11 +295,12 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	spectrum f = path_scatter(c, z, z->to_prev, to_light);
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
 	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
-	if (EFFECT_IS_ON(c->w, absorption))
+	if (only_absorbs(c))
 		l = spectrum_mul(l, absorbed(c, z, to_light, &y, 1));
-	if (spectrum_is_zero(l) || !path_visible(c, z, &y))
+	struct path_edge joint;
+	if (spectrum_is_zero(l) || !is_seen(c, z, &y, &joint, &l))
 		return spectrum_of(0);
-	return weighted(c, &y, 1, t, max_s, l);
+	return weighted(c, &y, 1, t, max_s, &joint, l);
 }
 
 static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, double film[2])
@@ -226,15 +313,16 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	if (!film_window_holds(&c->window, x))
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
-	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2),
+	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * path_jac_solid_from_vertex(y, d, distance2),
 			   l);
-	if (EFFECT_IS_ON(c->w, absorption))
-		l = spectrum_mul(l, absorption_of_light(c, s, 0));
-	if (spectrum_is_zero(l) || !path_visible(c, eye, y))
+	if (only_absorbs(c))
+		l = spectrum_mul(l, absorbed(c, eye, d, y, s));
+	struct path_edge joint;
+	if (spectrum_is_zero(l) || !is_seen(c, eye, y, &joint, &l))
 		return spectrum_of(0);
 	film[0] = x[0];
 	film[1] = x[1];
-	return weighted(c, c->light, s, 1, max_s, l);
+	return weighted(c, c->light, s, 1, max_s, &joint, l);
 }
 
 /* false: left to chance, and not made. The weight is not known yet; light_every / edges stands for it, as if all
@@ -263,12 +351,13 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 	if (spectrum_is_zero(l)) /* the other side of an opaque surface, most often */
 		return l;
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
-	l = spectrum_scale(geometry_term(z->x.ng, y->x.ng, to_light, distance2), l);
-	if (EFFECT_IS_ON(c->w, absorption))
+	l = spectrum_scale(path_geometry_term(z, y, to_light, distance2), l);
+	if (only_absorbs(c))
 		l = spectrum_mul(l, absorbed(c, z, to_light, y, s));
-	if (spectrum_is_zero(l) || !is_made(c, s + t - 1, &l) || !path_visible(c, z, y))
+	struct path_edge joint;
+	if (spectrum_is_zero(l) || !is_made(c, s + t - 1, &l) || !is_seen(c, z, y, &joint, &l))
 		return spectrum_of(0);
-	return weighted(c, c->light, s, t, max_s, l);
+	return weighted(c, c->light, s, t, max_s, &joint, l);
 }
 
 spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2])

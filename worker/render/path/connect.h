@@ -15,6 +15,9 @@
 struct joined_path {
 	unsigned edges, s;
 	const struct path_vertex *v[PATH_MAX_EDGES + 2];
+	/* Where media scatter; otherwise unused and 0. Edge i joins x_i-1 and x_i. */
+	const struct path_edge *joint; /* edge s, of which x_s is the vertex before */
+	unsigned other_medium;	       /* the first edge about which a light sub-path does not agree; 0: none */
 };
 
 /* Density of technique j for this path over the density of the technique s that made it: 0 where j cannot make it.

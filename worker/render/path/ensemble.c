@@ -133,8 +133,10 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 			v[i].kind = VERTEX_SURFACE;
 	}
 	v[0].beta = spectrum_of(1);
+	v[0].edge.medium = c->w->camera_medium;
 	v[1].beta = spectrum_of(c->window.width * c->window.height);
-	v[1].medium = 0;
+	if (EFFECT_IS_ON(c->w, absorption) && t > 1)
+		path_absorb(c, &v[0], vec3_neg(x->edge[k - 1].w), &v[1]);
 	for (unsigned i = 2; i < t; i++) {
 		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
 		if (EFFECT_IS_ON(c->w, absorption))

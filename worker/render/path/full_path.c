@@ -322,8 +322,8 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 
 void full_path_absorb(const struct world *w, const struct full_path *x, struct product *p)
 {
-	uint32_t medium = 0;
-	for (unsigned e = x->edges - 1; e > 0; e--) {
+	uint32_t medium = w->camera_medium;
+	for (unsigned e = x->edges; e > 0; e--) {
 		medium = path_medium_after(w, &x->v[e], medium, vec3_neg(x->edge[e - 1].w));
 		if (medium)
 			product_mul(p, path_transmittance(w, &x->wl, medium, &x->v[e], &x->v[e - 1]));

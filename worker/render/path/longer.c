@@ -46,10 +46,10 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 	sampler_random_init(&s, seed, RNG_BEYOND, index, 0);
 	unsigned n = path_walk_camera(c, &s.base, most, film);
 	spectrum sum = gather(c, first, n, before, least, longest, film);
-	for (uint64_t stretch = 1; n == FULL && c->camera[n - 1].kind == VERTEX_SURFACE && before + n - 1 < longest;
+	for (uint64_t stretch = 1; n == FULL && c->camera[n - 1].kind != VERTEX_INFINITE && before + n - 1 < longest;
 	     stretch++) {
 		for (unsigned i = 1; i + CARRIED < n; i++)
-			dispersed = dispersed || c->camera[i].bsdf->dispersive;
+			dispersed = dispersed || path_disperses(&c->camera[i]);
 		memmove(&c->camera[CARRIED_END - CARRIED], &c->camera[n - CARRIED], CARRIED * sizeof *c->camera);
 		before += n - CARRIED_END;
 		sampler_random_init(&s, seed, RNG_BEYOND, index, stretch);

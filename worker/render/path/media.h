@@ -1,22 +1,68 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Media that absorb are numbers: 0 is none, others are 1 + an index into world.media. The camera stands in none. From
- * it on, the medium changes where the path leaves a shape that states an interior or an exterior, to the one on that
- * side (a side without one is empty), and nowhere else, as in Mitsuba: a stone in water need not state any. So the
- * medium of every edge follows from the path seen from the camera, whichever technique made it.
+ * Media are numbers: 0 is none, others are 1 + an index into world.media. The camera stands in the one that the sensor
+ * states. From it on, the medium changes where the path leaves a shape that states an interior or an exterior, to the
+ * one on that side (a side without one is empty), and nowhere else, as in Mitsuba: a stone in water need not state any.
+ * So the medium of every edge follows from the path seen from the camera, whichever technique made it.
+ *
+ * Where media only absorb, what the light's sub-path loses is found when it is joined to the camera's.
+ *
+ * Where one scatters, faces of `null` are no vertices: edges pass them, so that a lamp outside of a cloud is seen from
+ * its inside, and only the medium changes there. An edge's distance to an event is drawn from the optical depth at one
+ * of the wavelengths, chosen evenly; its density is the mean over all of them (the balance heuristic), so that none
+ * counts more than four times. It is the same in both directions but for the coefficient at the event. Media that only
+ * absorb have no events.
+ *
+ * A light sub-path must know earlier where events can happen: it starts in the medium that surrounds its emitter,
+ * follows the same rule, and is joined only if both sub-paths agree about every edge. Where they cannot, since the
+ * scene states media that do not fit together, that technique does not exist for that path, and the others have its
+ * weight.
  */
 #ifndef WORKER_RENDER_PATH_MEDIA_H
 #define WORKER_RENDER_PATH_MEDIA_H
 
 #include "worker/render/path/vertex.h"
 
-/* The medium of the edge that leaves v along `away`, towards the light, if v was reached through `medium`. */
+/* The medium of that number, which is not 0. */
+static inline const struct medium *path_medium(const struct world *w, uint32_t number)
+{
+	return &w->media[number - 1];
+}
+
+/* The medium of the edge that leaves v along `away`, if v was reached through `medium`. */
 uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, uint32_t medium, vec3 away);
+
+/* ---- where media only absorb ---- */
+
 /* The share of light that the edge between two vertices lets through. */
 spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
 			    const struct path_vertex *a, const struct path_vertex *b);
 /* Gives `to`, which the camera's sub-path reached from `at` along wi, its medium, and to its beta what that lets
- * through. On the light's sub-path that is done when it is joined: only the camera's knows which medium it is in. */
+ * through. */
 void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to);
+
+/* ---- where media scatter ---- */
+
+/* The medium around a point of an emitter, on the side of `away`. */
+uint32_t path_medium_of_emitter(const struct world *w, const struct path_vertex *v, vec3 away);
+
+/* path_extend to the next event in a medium, for u in [0,1), or to what is behind the faces of `null`. *left: the share
+ * of light that the edge lets through. */
+bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
+			  double u, struct path_vertex *to, spectrum *left);
+/* Whether z (not at infinity; any end of the camera's sub-path) and y see each other through faces of `null`. Fills in
+ * the edge to y, with `before` at z, and what it lets through. Counts rays. */
+bool path_see_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+		       struct path_edge *edge, spectrum *left);
+
+/* What the edge contributes to the density of `to` as generated from its other end: the density per length of an event
+ * in `medium`, which is the one there, or the probability that there is none on the way. */
+double path_edge_pdf(const struct path_context *c, const struct path_edge *edge, uint32_t medium,
+		     const struct path_vertex *to);
+/* That for the last edge of a sub-path, into its density, and with what is left into its beta. */
+void path_travel(const struct path_context *c, struct path_vertex *to, spectrum left);
+
+/* sigma_s times the phase function, of VERTEX_MEDIUM. 1 / length / solid angle */
+spectrum path_scatter_in_medium(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi);
 
 #endif

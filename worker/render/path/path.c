@@ -56,6 +56,8 @@ const struct surface_point *path_facing_bent(const struct path_vertex *v, vec3 t
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light)
 {
 	struct surface_point turned;
+	if (v->kind == VERTEX_MEDIUM)
+		return path_scatter_in_medium(c, v, to_camera, to_light);
 	const struct surface_point *x = path_facing(v, to_camera, &turned);
 	if (!v->bsdf->has_smooth || !same_side(x, to_camera) || !same_side(x, to_light))
 		return spectrum_of(0);
@@ -96,7 +98,7 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 	if (!(distance2 > 0) || !path_can_be_hit(c, next))
 		return 0;
 	if (at->kind == VERTEX_INFINITE)
-		return disk_pdf(c->w) * jac_disk_from_area(next->x.ng, omega);
+		return disk_pdf(c->w) * (next->kind == VERTEX_MEDIUM ? 1 : jac_disk_from_area(next->x.ng, omega));
 	if (at->kind == VERTEX_CAMERA) {
 		solid = camera_jac_film_from_solid(&c->w->camera, omega) / (c->window.width * c->window.height);
 	} else if (at->kind == VERTEX_EMITTER || !prev) {
@@ -105,9 +107,19 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 		solid = em->ops->pdf_direction(em, &p, omega);
 	} else {
 		double unused;
-		solid = surface_pdf(c, at, path_direction(at, prev, &unused), omega, transport);
+		vec3 back = path_direction(at, prev, &unused);
+		solid = at->kind == VERTEX_MEDIUM ? phase_eval(&path_medium(c->w, at->edge.medium)->phase, back, omega)
+						  : surface_pdf(c, at, back, omega, transport);
 	}
-	return next->kind == VERTEX_INFINITE ? solid : solid * jac_solid_from_area(next->x.ng, omega, distance2);
+	return next->kind == VERTEX_INFINITE ? solid : solid * path_jac_solid_from_vertex(next, omega, distance2);
+}
+
+/* To the next vertex, for u in [0,1) where media scatter. *left: what they let through. */
+static bool go_on(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, double u,
+		  struct path_vertex *to, spectrum *left)
+{
+	return EFFECT_IS_ON(c->w, scattering) ? path_extend_in_media(c, at, d, t_min, t_max, u, to, left)
+					      : path_extend(c, at, d, t_min, t_max, to);
 }
 
 /* How a sub-path leaves a vertex by its BSDF. */
@@ -120,10 +132,24 @@ struct departure {
 	bool delta;
 };
 
+static void depart_in_medium(const struct path_context *c, const struct path_vertex *v, const double u[2],
+			     struct departure *out)
+{
+	const struct medium *m = path_medium(c->w, v->edge.medium);
+	*out = (struct departure){.eta = 1};
+	out->wi = phase_sample(&m->phase, v->to_prev, u, &out->pdf);
+	out->pdf_rev = out->pdf;
+	out->beta = spectrum_mul(v->beta, medium_scattering(m, &c->wl));
+}
+
 static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
 		   enum transport transport, struct departure *out)
 {
 	struct surface_point turned;
+	if (v->kind == VERTEX_MEDIUM) {
+		depart_in_medium(c, v, u, out);
+		return true;
+	}
 	const struct surface_point *x = sampled_at(v, v->to_prev, transport, &turned);
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
 	struct bsdf_sample s;
@@ -162,7 +188,7 @@ static double reach_pdf(const struct path_context *c, const struct path_vertex *
 	if (!(distance2 > 0) || !path_can_be_hit(c, to))
 		return 0;
 	double lobe = solid * per_solid;
-	return to->kind == VERTEX_INFINITE ? lobe : lobe * jac_solid_from_area(to->x.ng, omega, distance2);
+	return to->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(to, omega, distance2);
 }
 
 void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
@@ -198,7 +224,9 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 			return n;
 		if (!survives(c, n - 1, start, u[DIM_ROULETTE], &out.beta) || spectrum_is_zero(out.beta))
 			return n;
-		if (!path_extend(c, at, out.wi, 0, INFINITY, to) || (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
+		spectrum left = spectrum_of(1);
+		if (!go_on(c, at, out.wi, 0, INFINITY, u[DIM_DISTANCE], to, &left) ||
+		    (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
 			return n;
 		double ahead = 1, back = 1;
 		if (out.delta && side == SIDE_CAMERA)
@@ -208,11 +236,15 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		at->delta = out.delta;
 		at->mode = out.mode;
 		to->beta = out.beta;
-		if (EFFECT_IS_ON(c->w, absorption) && side == SIDE_CAMERA)
-			path_absorb(c, at, out.wi, to);
 		to->pdf = reach_pdf(c, at, to, out.pdf, ahead);
 		if (!c->one_way)
 			v[n - 2].pdf_rev = reach_pdf(c, at, &v[n - 2], out.pdf_rev, back);
+		if (EFFECT_IS_ON(c->w, scattering)) {
+			path_travel(c, to, left);
+			v[n - 2].pdf_rev *= path_edge_pdf(c, &at->edge, at->edge.before, &v[n - 2]);
+		} else if (EFFECT_IS_ON(c->w, absorption) && side == SIDE_CAMERA) {
+			path_absorb(c, at, out.wi, to);
+		}
 		if (!(to->pdf > 0))
 			return n;
 		n++;
@@ -232,16 +264,21 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};
 	v[0].x.p = camera_point(&w->camera, u + DIM_APERTURE_U);
 	v[0].x.prim = PRIM_NONE;
+	v[0].edge.medium = w->camera_medium;
 	if (max_vertices < 2)
 		return 1;
 	vec3 d = camera_direction(&w->camera, v[0].x.p, film[0], film[1]);
 	double t_min, t_max, area = c->window.width * c->window.height;
 	camera_clip(&w->camera, d, &t_min, &t_max);
-	if (!path_extend(c, &v[0], d, t_min, t_max, &v[1]))
+	spectrum left = spectrum_of(1);
+	if (!go_on(c, &v[0], d, t_min, t_max, u[DIM_CAMERA_DISTANCE], &v[1], &left))
 		return 1;
 	v[1].beta = spectrum_of(area);
-	v[1].medium = 0;
 	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_RADIANCE);
+	if (EFFECT_IS_ON(w, scattering))
+		path_travel(c, &v[1], left);
+	else if (EFFECT_IS_ON(w, absorption))
+		path_absorb(c, &v[0], d, &v[1]);
 	if (v[1].kind == VERTEX_INFINITE)
 		return 2;
 	if (!(v[1].pdf > 0))
@@ -250,7 +287,8 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 }
 
 /* The first step of light from infinity: through a disk as wide as the world, across the direction. */
-static bool leave_infinity(struct path_context *c, struct path_vertex *v, const double u[2])
+static bool leave_infinity(struct path_context *c, struct path_vertex *v, const double u[2], double distance,
+			   spectrum *left)
 {
 	const struct world *w = c->w;
 	vec3 d = vec3_neg(v[0].x.p);
@@ -262,13 +300,14 @@ static bool leave_infinity(struct path_context *c, struct path_vertex *v, const 
 	const struct emitter *em = &w->emitters[v[0].emitter];
 	struct emitter_point p = {.p = v[0].x.p, .infinite = true};
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
-	if (!path_extend(c, &start, d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
+	if (!go_on(c, &start, d, 0, INFINITY, distance, &v[1], left) || v[1].kind == VERTEX_INFINITE)
 		return false;
 	v[1].beta = spectrum_scale(1 / disk_pdf(w), spectrum_mul(v[0].beta, l));
 	return true;
 }
 
-static bool leave_surface(struct path_context *c, struct path_vertex *v, const double u[2])
+static bool leave_surface(struct path_context *c, struct path_vertex *v, const double u[2], double distance,
+			  spectrum *left)
 {
 	const struct emitter *em = &c->w->emitters[v[0].emitter];
 	struct emitter_point p = world_emitter_point(&v[0].x);
@@ -277,7 +316,7 @@ static bool leave_surface(struct path_context *c, struct path_vertex *v, const d
 	if (!em->ops->sample_direction(em, &p, u, &d, &solid) || !(solid > 0))
 		return false;
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
-	if (!path_extend(c, &v[0], d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
+	if (!go_on(c, &v[0], d, 0, INFINITY, distance, &v[1], left) || v[1].kind == VERTEX_INFINITE)
 		return false;
 	v[1].beta = spectrum_scale(path_cosine(&v[0], d) / solid, spectrum_mul(v[0].beta, l));
 	return true;
@@ -302,11 +341,14 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	v[0].beta = spectrum_of(1 / pdf);
 	if (max_vertices < 2)
 		return 1;
-	bool left = p.infinite ? leave_infinity(c, v, u + DIM_EMITTER_DIRECTION)
-			       : leave_surface(c, v, u + DIM_EMITTER_DIRECTION);
-	if (!left || spectrum_is_zero(v[1].beta))
+	spectrum left = spectrum_of(1);
+	bool leaves = p.infinite ? leave_infinity(c, v, u + DIM_EMITTER_DIRECTION, u[DIM_DISTANCE], &left)
+				 : leave_surface(c, v, u + DIM_EMITTER_DIRECTION, u[DIM_DISTANCE], &left);
+	if (!leaves || spectrum_is_zero(v[1].beta))
 		return 1;
 	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_IMPORTANCE);
+	if (EFFECT_IS_ON(w, scattering))
+		path_travel(c, &v[1], left);
 	if (!(v[1].pdf > 0))
 		return 1;
 	return scatter_on(c, s, SIDE_LIGHT, v, 2, max_vertices, spectrum_max(v[1].beta));

@@ -4,7 +4,8 @@
  *
  * The integrand over area measure: L_e prod G prod F W_e, all G with geometric normals, and at each inner vertex
  * F = f_radiance(to camera, to light) |ns . to light| / |ng . to light|: what a path tracer that starts at the camera
- * realises with shading normals, whichever way the path was sampled.
+ * realises with shading normals, whichever way the path was sampled. In a medium F = sigma_s times the phase function,
+ * and G has no cosine there; every edge counts what media let through (media.h).
  * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals); which
  * shading normal that is, the camera's side of the path may decide (path_facing).
  */

@@ -2,11 +2,11 @@
 /*
  * Vertices of paths, and what surrounds their making.
  *
- * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; x_0 on a delta
- * emitter counts: 1 times the choice of the emitter, and 0 as found by a path from the camera; times a delta
- * distribution in the direction towards the light, projected on the geometric normal, where scattering is exactly
- * specular (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled with
- * density 1 / pixels (struct film_window).
+ * Densities of vertices: per area of the rescaled world, in a medium per volume; per solid angle for a vertex at
+ * infinity; x_0 on a delta emitter counts: 1 times the choice of the emitter, and 0 as found by a path from the camera;
+ * times a delta distribution in the direction towards the light, projected on the geometric normal, where scattering is
+ * exactly specular (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled
+ * with density 1 / pixels (struct film_window).
  */
 #ifndef WORKER_RENDER_PATH_VERTEX_H
 #define WORKER_RENDER_PATH_VERTEX_H
@@ -16,7 +16,17 @@
 
 enum { PATH_MAX_EDGES = 128 };
 
-enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE };
+enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE, VERTEX_MEDIUM };
+
+/* What is between a vertex and the one before it: path/media.h. On the camera's sub-path; where media scatter, on the
+ * light's, too. */
+struct path_edge {
+	uint32_t medium; /* at the vertex; the one that VERTEX_MEDIUM is in */
+	/* Where media scatter: */
+	uint32_t before; /* at the vertex before */
+	bool fits;	 /* each face on the way states the medium that it is reached through */
+	spectrum free;	 /* exp(-optical depth), without that of media that only absorb */
+};
 
 struct path_vertex {
 	enum vertex_kind kind;
@@ -24,14 +34,14 @@ struct path_vertex {
 	unsigned mode;		 /* of enum bsdf_mode: how its own sub-path left it */
 	int32_t emitter;	 /* shines: index; -1 */
 	const struct bsdf *bsdf; /* VERTEX_SURFACE */
-	uint32_t medium;	 /* on the camera's sub-path: the medium between it and the vertex before */
-	struct surface_point
-		x;	/* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is 0 */
-	vec3 to_prev;	/* unit; towards the vertex before it on its own sub-path */
-	spectrum beta;	/* carried to this vertex over the density of getting here */
-	double pdf;	/* of this vertex from its own sub-path, see above */
-	double pdf_rev; /* of this vertex as generated from the next two of its own sub-path */
-	double next_event[3]; /* random numbers kept for next event estimation */
+	struct path_edge edge;	 /* from the vertex before it on its own sub-path */
+	struct surface_point x;	 /* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is
+				    0. VERTEX_MEDIUM: p, and nothing else */
+	vec3 to_prev;		 /* unit; towards the vertex before it on its own sub-path */
+	spectrum beta;		 /* carried to this vertex over the density of getting here */
+	double pdf;		 /* of this vertex from its own sub-path, see above */
+	double pdf_rev;		 /* of this vertex as generated from the next two of its own sub-path */
+	double next_event[3];	 /* random numbers kept for next event estimation */
 };
 
 /* The film points that are sampled: the crop and its border, in pixels. */
@@ -82,13 +92,39 @@ static inline bool path_can_be_hit(const struct path_context *c, const struct pa
 /* Kind, emitter and place of a point drawn on an emitter; the rest is 0. */
 struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p);
 
-/* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity, a point light. */
+/* Whether it scatters light in a range of directions, so that it can be joined. Only what is not an end. */
+static inline bool path_scatters_smoothly(const struct path_vertex *v)
+{
+	return v->kind == VERTEX_MEDIUM || v->bsdf->has_smooth;
+}
+
+/* One wavelength goes on alone from there. */
+static inline bool path_disperses(const struct path_vertex *v)
+{
+	return v->kind == VERTEX_SURFACE && v->bsdf->dispersive;
+}
+
+/* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity, a point light, a
+ * medium. */
 static inline double path_cosine(const struct path_vertex *v, vec3 w)
 {
 	vec3 n = v->x.ng;
 	if (v->kind == VERTEX_CAMERA || v->kind == VERTEX_INFINITE || (n.x == 0 && n.y == 0 && n.z == 0))
 		return 1;
 	return fabs(vec3_dot(n, w));
+}
+
+/* Density per solid angle at x -> per area at y, or per volume in a medium. omega: the unit direction between them. */
+static inline double path_jac_solid_from_vertex(const struct path_vertex *y, vec3 omega, double distance2)
+{
+	return path_cosine(y, omega) / distance2;
+}
+
+/* The geometry term without visibility. */
+static inline double path_geometry_term(const struct path_vertex *x, const struct path_vertex *y, vec3 omega,
+					double distance2)
+{
+	return path_cosine(x, omega) * path_cosine(y, omega) / distance2;
 }
 
 /* Radiance that leaves an emitter's point in direction w. */

@@ -39,6 +39,9 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 	case PLUGIN_RFILTER:
 		*stand_in = "gaussian"; /* filters with negative lobes are sharper */
 		return LENIENT_REPLACE;
+	case PLUGIN_PHASE:
+		*stand_in = "isotropic";
+		return LENIENT_REPLACE;
 	case PLUGIN_FILM:
 		*stand_in = "hdrfilm"; /* with the same size, filter and crop window; other parameters are left out */
 		return LENIENT_REPLACE;

@@ -8,7 +8,7 @@ static const char *const class_names[PLUGIN_CLASSES] = {
 	[PLUGIN_SHAPE] = "shape",     [PLUGIN_BSDF] = "bsdf",	    [PLUGIN_TEXTURE] = "texture",
 	[PLUGIN_EMITTER] = "emitter", [PLUGIN_SENSOR] = "sensor",   [PLUGIN_FILM] = "film",
 	[PLUGIN_RFILTER] = "rfilter", [PLUGIN_SAMPLER] = "sampler", [PLUGIN_INTEGRATOR] = "integrator",
-	[PLUGIN_MEDIUM] = "medium",
+	[PLUGIN_MEDIUM] = "medium",   [PLUGIN_PHASE] = "phase",
 };
 
 const char *plugin_class_name(enum plugin_class cls)
@@ -109,6 +109,12 @@ static const struct {
 	{PLUGIN_FILM, "specfilm"},
 	{PLUGIN_MEDIUM, "heterogeneous"},
 	{PLUGIN_MEDIUM, "homogeneous"},
+	{PLUGIN_PHASE, "blendphase"},
+	{PLUGIN_PHASE, "kkay"},
+	{PLUGIN_PHASE, "microflake"},
+	{PLUGIN_PHASE, "mixturephase"},
+	{PLUGIN_PHASE, "sggx"},
+	{PLUGIN_PHASE, "tabphase"},
 };
 
 const char *plugin_of_mitsuba(size_t index, enum plugin_class *cls)

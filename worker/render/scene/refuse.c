@@ -31,14 +31,6 @@ static const char *lenient_hint(enum plugin_class cls, const char *type, char *t
 	return text;
 }
 
-int refuse_medium(const struct xml_element *el, struct error *e)
-{
-	return xml_error(
-		el, e, EINVAL,
-		"media that scatter light are not supported; --lenient leaves them out (homogeneous ones whose "
-		"sigma_s or albedo is 0 are supported)");
-}
-
 /* What other programs' files and people call an element; NULL: none that is known. */
 static const char *usual_name(const char *name)
 {
@@ -62,8 +54,9 @@ int refuse_element(const struct xml_element *el, struct error *e)
 	char hint[128];
 	if (strcmp(el->name, "subsurface") == 0)
 		return xml_error(el, e, EINVAL, "subsurface scattering is not supported; --lenient leaves it out");
-	if (strcmp(el->name, "phase") == 0 || strcmp(el->name, "volume") == 0)
-		return refuse_medium(el, e);
+	if (strcmp(el->name, "volume") == 0)
+		return xml_error(el, e, EINVAL,
+				 "media that vary from place to place are not supported; --lenient leaves it out");
 	struct spelling s = {.wanted = el->name};
 	plugin_offer_classes(&s);
 	value_offer_elements(&s);
@@ -86,8 +79,6 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 {
 	char hint[128], list[512];
 	struct spelling s = {.wanted = type};
-	if (cls == PLUGIN_MEDIUM)
-		return refuse_medium(el, e);
 	plugin_offer_types(decls, cls, &s);
 	plugin_list_types(decls, cls, list, sizeof list);
 	if (plugin_is_mitsubas(cls, type))

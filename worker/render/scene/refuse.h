@@ -14,9 +14,6 @@ int refuse_element(const struct xml_element *el, struct error *e);
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
 		struct error *e);
 
-/* A medium, anywhere. */
-int refuse_medium(const struct xml_element *el, struct error *e);
-
 /* A parameter of `owner`, whose type in the file is `type`: unknown (p NULL), or not supported. */
 int refuse_property(const struct plugin_decl *owner, const char *type, const struct xml_element *el, const char *name,
 		    const struct param *p, struct error *e);

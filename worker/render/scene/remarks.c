@@ -35,10 +35,6 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
 	static const char *const others[] = {"emission_reparam",
-					     "volpath",
-					     "volpathmis",
-					     "prbvolpath",
-					     "volpath_simple",
 					     "volprim_rf_basic",
 					     "aov",
 					     "multichannel",
@@ -55,7 +51,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e, "the image shows all light on surfaces, and media that only absorb it");
+			rc = remark(r, n, e, "the image shows all light, on surfaces and in homogeneous media");
 	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
 	return rc ? rc : on_depth(r, n, e);

@@ -15,7 +15,6 @@
  */
 #include "worker/render/scene/scene.h"
 
-#include "worker/render/scene/absorbing.h"
 #include "worker/render/scene/asset_list.h"
 #include "worker/render/scene/batch.h"
 #include "worker/render/scene/element.h"
@@ -220,8 +219,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	enum plugin_class cls;
 	bool is_class = plugin_class_find(target->name, &cls);
 	assert(is_class);
-	if (cls == PLUGIN_MEDIUM && d->decl->status != PARAM_IGNORED && d->node->cls != PLUGIN_SHAPE)
-		return medium_elsewhere(&m->notes, m->lenient, d->node->cls, el, target);
+	if (cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_EMITTER) /* the world finds out where it stands */
+		return 0;
 	const char *written = xml_attribute(el, "name");
 	const struct param *p = NULL;
 	bool nested = d->decl->nested_classes >> cls & 1;
@@ -285,8 +284,6 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	if (plugin_class_find(el->name, &cls))
 		return read_object(m, d, owner, el, el);
 	if (strcmp(el->name, "default") == 0)
-		return 0;
-	if (d->node->cls == PLUGIN_MEDIUM && strcmp(el->name, "phase") == 0) /* of light that is not scattered */
 		return 0;
 	if (strcmp(el->name, "ref") != 0)
 		return d->decl->status == PARAM_IGNORED ? 0 : foreign_element(m, el);
@@ -353,10 +350,6 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	int r = element_check(el, file ? "type|id|name|version" : "type|id|name", true, m->error);
 	if (r)
 		return r;
-	if (cls == PLUGIN_MEDIUM && !medium_only_absorbs(el)) {
-		r = medium_refuse(&m->notes, m->lenient, el);
-		return r ? r : REPORT_TOLD;
-	}
 	const char *type = xml_attribute(el, "type");
 	if (!type)
 		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");

@@ -127,15 +127,13 @@ static const struct param integrator_params[] = {
 };
 
 #define HOLDS(cls) (1u << (cls))
+#define CAMERA_HOLDS (HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER) | HOLDS(PLUGIN_MEDIUM))
 
 const struct plugin_decl setting_decls[] = {
-	{PLUGIN_SENSOR, "perspective", perspective_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
-	 PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "thinlens", thinlens_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "orthographic", orthographic_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
-	 PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "batch", batch_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER) | HOLDS(PLUGIN_SENSOR),
-	 PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "perspective", perspective_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "thinlens", thinlens_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "orthographic", orthographic_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "batch", batch_params, CAMERA_HOLDS | HOLDS(PLUGIN_SENSOR), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "mfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "tiledhdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
@@ -342,6 +340,12 @@ int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct e
 	s->to_world =
 		mat4_translate((vec3){low.x + (high.x - low.x) / 2, low.y + (high.y - low.y) / 2, low.z - distance});
 	return 0;
+}
+
+const struct scene_node *scene_sensor(const struct scene *s, uint32_t which)
+{
+	uint32_t sensors;
+	return find_object(s, PLUGIN_SENSOR, which, &sensors);
 }
 
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t which,

@@ -39,6 +39,9 @@ struct scene_settings {
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
 			struct scene_settings *out, struct error *e);
 
+/* The sensor of that number; NULL: there is none. */
+const struct scene_node *scene_sensor(const struct scene *s, uint32_t which);
+
 /* For a scene without a sensor, whose shapes lie between low and high: places the camera that both Mitsubas supply. */
 int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct error *e);
 

@@ -247,8 +247,17 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 	struct bsdf_reach *of_bsdf = arena_alloc(&b->scratch, w->bsdf_count, sizeof *of_bsdf);
 	if (!reached || !room || !of_bsdf)
 		return build_out_of_memory(b->e);
-	const struct effects_source src = {b->scene,  b->shape_nodes, b->bsdf_nodes, b->emitter_nodes,
-					   max_depth, b->boxes,	      room,	     of_bsdf};
+	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor);
+	const struct effects_source src = {.scene = b->scene,
+					   .shape = b->shape_nodes,
+					   .bsdf = b->bsdf_nodes,
+					   .emitter = b->emitter_nodes,
+					   .sensor = sensor,
+					   .camera_medium = build_camera_medium(sensor),
+					   .max_depth = max_depth,
+					   .box = b->boxes,
+					   .room = room,
+					   .reach = of_bsdf};
 	effects_analyse(w, &src, &b->forced, reached);
 	return effects_apply(w, &b->forced, reached, b->e);
 }
@@ -332,6 +341,8 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	bool whole = !rc && !(found && found->problem_count), look = whole && backs_may_surprise(&b);
 	if (whole && (with_accel || (look && is_quick_to_build(b.w))))
 		rc = build_accel(&b);
+	if (!rc && b.w->accel)
+		rc = build_scattering(&b);
 	if (!rc && look && b.w->accel)
 		backs_note(b.w);
 	crash_place(NULL, NULL, 0);

@@ -1,26 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/world/build_media.h"
 
+#include "worker/render/geom/accel.h"
 #include "worker/render/world/node_table.h"
 
-/* Gives the shape's medium of that name its number, 1 + its index in the order of first use; 0: it has none. */
-static uint32_t number_medium(const struct scene_node *shape, const char *name, struct node_table *numbers)
+const struct scene_node *build_camera_medium(const struct scene_node *sensor)
 {
-	const struct scene_node *n = node_ref(shape, name);
-	uint32_t number = 0;
-	if (n && !node_table_find(numbers, n, NULL, &number)) {
-		number = (uint32_t)numbers->count + 1;
-		node_table_add(numbers, n, NULL, number);
-	}
-	return number;
+	return sensor ? node_child(sensor, PLUGIN_MEDIUM, 0) : NULL;
 }
 
-static int create_medium(struct builder *b, const struct scene_node *shape, const char *name, uint32_t number)
+/* Gives a medium its number, 1 + its index in the order of first use; 0: there is none. It is made at first use. */
+static int number_medium(struct builder *b, const struct scene_node *n, struct node_table *numbers, uint32_t *number)
 {
 	struct world *w = b->w;
-	if (number <= w->media_count) /* none, or one that is made */
+	*number = 0;
+	if (!n || node_table_find(numbers, n, NULL, number))
 		return 0;
-	int rc = medium_create(&w->media[w->media_count++], node_ref(shape, name), w->scale, &w->arena, b->e);
+	*number = ++w->media_count;
+	node_table_add(numbers, n, NULL, *number);
+	const struct medium_build build = {.unit = w->scale, .dialect_3 = b->scene->dialect_3, .arena = &w->arena};
+	int rc = medium_create(&w->media[*number - 1], n, &build, b->e);
 	return rc ? build_go_on(b, rc) : 0;
 }
 
@@ -28,28 +27,73 @@ int build_media(struct builder *b)
 {
 	struct world *w = b->w;
 	struct node_table numbers;
-	uint32_t uses = 0;
+	const struct scene_node *camera = build_camera_medium(scene_sensor(b->scene, (uint32_t)w->accuracy.sensor));
+	uint32_t uses = camera ? 1 : 0;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		uses += node_ref(b->shape_nodes[i], "interior") ? 1 : 0;
 		uses += node_ref(b->shape_nodes[i], "exterior") ? 1 : 0;
 	}
 	if (!uses)
 		return 0;
-	if (node_table_init(&numbers, uses, &b->scratch))
+	w->media = arena_alloc(&w->arena, uses, sizeof *w->media);
+	if (!w->media || node_table_init(&numbers, uses, &b->scratch))
 		return build_out_of_memory(b->e);
-	for (uint32_t i = 0; i < w->shape_count; i++) {
-		w->parts[i].interior = number_medium(b->shape_nodes[i], "interior", &numbers);
-		w->parts[i].exterior = number_medium(b->shape_nodes[i], "exterior", &numbers);
-	}
-	w->media = arena_alloc(&w->arena, numbers.count, sizeof *w->media);
-	if (!w->media)
-		return build_out_of_memory(b->e);
-	for (uint32_t i = 0; i < w->shape_count; i++) {
-		int rc = create_medium(b, b->shape_nodes[i], "interior", w->parts[i].interior);
+	int rc = 0;
+	for (uint32_t i = 0; i < w->shape_count && !rc; i++) {
+		const struct scene_node *n = b->shape_nodes[i];
+		rc = number_medium(b, node_ref(n, "interior"), &numbers, &w->parts[i].interior);
 		if (!rc)
-			rc = create_medium(b, b->shape_nodes[i], "exterior", w->parts[i].exterior);
-		if (rc)
-			return rc;
+			rc = number_medium(b, node_ref(n, "exterior"), &numbers, &w->parts[i].exterior);
 	}
+	return rc ? rc : number_medium(b, camera, &numbers, &w->camera_medium);
+}
+
+/* The medium on this side of the next surface along d that states one. Where none does, it is the camera's. */
+static uint32_t next_medium(const struct world *w, struct ray_end from, vec3 d)
+{
+	enum { SURFACES = 1024 }; /* that state none, at most */
+	struct ray_hit hit;
+	struct surface_point x;
+	for (int i = 0; i < SURFACES && accel_closest(w->accel, &from, d, 0, INFINITY, &hit); i++) {
+		const struct world_shape *s = &w->parts[hit.prim.shape];
+		surface_from_hit(&w->shapes[hit.prim.shape], from.p, d, &hit, &x);
+		if (s->interior || s->exterior)
+			return vec3_dot(x.ng, d) < 0 ? s->exterior : s->interior;
+		from = (struct ray_end){x.p, x.ng, x.prim};
+	}
+	return w->camera_medium;
+}
+
+static uint32_t medium_around(const struct world *w, uint32_t emitter)
+{
+	static const double middle[2] = {0.5, 0.5};
+	static const vec3 any = {0.48, 0.6, 0.64};
+	const struct emitter *em = &w->emitters[emitter];
+	struct emitter_point p;
+	double pdf;
+	if (!em->ops->sample_point(em, middle, &p, &pdf) || p.infinite)
+		return 0;
+	uint32_t shape = w->emitter_shape[emitter];
+	bool surface = shape != UINT32_MAX;
+	struct ray_end from = {p.p, surface ? p.n : (vec3){0, 0, 0},
+			       surface ? (struct prim_ref){shape, p.where.prim} : PRIM_NONE};
+	return next_medium(w, from, surface ? p.n : any);
+}
+
+int build_scattering(struct builder *b)
+{
+	struct world *w = b->w;
+	if (!w->effects.scattering)
+		return 0;
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		w->parts[i].passable =
+			strcmp(w->bsdfs[w->parts[i].bsdf].ops->type, "null") == 0 && w->parts[i].emitter < 0;
+		w->has_passable = w->has_passable || w->parts[i].passable;
+	}
+	w->emitter_medium = arena_alloc(&w->arena, w->emitter_count, sizeof *w->emitter_medium);
+	if (!w->emitter_medium)
+		return build_out_of_memory(b->e);
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		w->emitter_medium[i] = medium_around(w, i);
 	return 0;
 }

@@ -25,6 +25,7 @@ enum effect {
 	EFFECT_DIFFUSE,
 	EFFECT_TRANSMISSION,
 	EFFECT_ABSORPTION,
+	EFFECT_SCATTERING,
 	EFFECT_TEXTURES,
 	EFFECT_DISPLACEMENT,
 	EFFECT_BUMP,
@@ -64,7 +65,7 @@ struct effects {
 	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light,
 		delta_light;
 	bool displacement, half_vectors, emitter_move;
-	bool absorption;	     /* some medium absorbs */
+	bool absorption, scattering; /* some medium does */
 	enum color_shape illuminant; /* of all emitters, if colour is off */
 	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */
 	struct effect_line lines[RENDER_EFFECTS_MAX];

@@ -55,7 +55,7 @@ struct census {
 	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
 	struct tally hidden_specular, hidden_dispersive,
 		unused_dispersive; /* materials that no path meets; that no shape uses */
-	struct tally absorbing;
+	struct tally absorbing, scattering;
 	struct tally environment, area, delta, textured_light, coloured_light;
 	enum visibility_bounds why_hidden;
 	size_t shape[3];
@@ -138,14 +138,18 @@ static void add_emitter(struct census *c, const struct emitter *em, const struct
 	c->shape[em->shape]++;
 }
 
-static void add_medium(struct census *c, const struct world *w, uint32_t medium, const struct scene_node *shape,
-		       const char *name)
+static void add_medium(struct census *c, const struct world *w, uint32_t number, const struct scene_node *owner,
+		       const struct scene_node *medium)
 {
-	if (!medium || !(color_max(&w->media[medium - 1].sigma_a) * w->media[medium - 1].per_length > 0))
+	const struct medium *m = number ? &w->media[number - 1] : NULL;
+	if (!m)
 		return;
-	count(&c->absorbing, shape, "");
-	if (w->media[medium - 1].sigma_a.shape != COLOR_SHAPE_CONSTANT)
-		count(&c->coloured, node_ref(shape, name), "");
+	if (m->absorbs)
+		count(&c->absorbing, owner, "");
+	if (m->scatters)
+		count(&c->scattering, owner, "");
+	if ((m->absorbs || m->scatters) && medium_is_coloured(m))
+		count(&c->coloured, medium, "");
 }
 
 static struct census take_census(const struct world *w, const struct effects_source *src,
@@ -165,9 +169,11 @@ static struct census take_census(const struct world *w, const struct effects_sou
 			add_emitter(&c, &w->emitters[i], src->emitter[i]);
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (shape[i] == VISIBILITY_YES) {
-			add_medium(&c, w, w->parts[i].interior, src->shape[i], "interior");
-			add_medium(&c, w, w->parts[i].exterior, src->shape[i], "exterior");
+			const struct scene_node *n = src->shape[i];
+			add_medium(&c, w, w->parts[i].interior, n, node_ref(n, "interior"));
+			add_medium(&c, w, w->parts[i].exterior, n, node_ref(n, "exterior"));
 		}
+	add_medium(&c, w, w->camera_medium, src->sensor, src->camera_medium);
 	add_unused(&c, w, src);
 	return c;
 }
@@ -329,6 +335,9 @@ static void lobes(struct report *r, const struct census *c)
 	fx->absorption = c->absorbing.count ? line(r, EFFECT_ABSORPTION, true, "%s border%s on a medium that absorbs",
 						   names_of(&c->absorbing, text), verb(&c->absorbing, "s", ""))
 					    : line(r, EFFECT_ABSORPTION, false, "no medium absorbs");
+	fx->scattering = c->scattering.count ? line(r, EFFECT_SCATTERING, true, "%s border%s on a medium that scatters",
+						    names_of(&c->scattering, text), verb(&c->scattering, "s", ""))
+					     : line(r, EFFECT_SCATTERING, false, "no medium scatters");
 }
 
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
@@ -400,7 +409,7 @@ static void depth(struct report *r, const struct world *w, const struct effects_
 		  const enum visibility_bounds *shape)
 {
 	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth,
-		 bound = visibility_bounds_depth(w, shape);
+		 bound = w->effects.scattering ? UINT32_MAX : visibility_bounds_depth(w, shape);
 	uint32_t useful = bound < asked ? bound : asked;
 	bool on;
 	if (useful < asked)

@@ -66,6 +66,10 @@ int effects_apply(struct world *w, const struct effects_choice *forced, const en
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		if (is_switched_off(&w->emitters[i], forced))
 			remove_emitter(w, i);
+	for (uint32_t i = 0; i < w->media_count; i++) {
+		w->media[i].absorbs = w->media[i].absorbs && w->effects.absorption;
+		w->media[i].scatters = w->media[i].scatters && w->effects.scattering;
+	}
 	if (forced->of[EFFECT_APERTURE])
 		camera_force_aperture(&w->camera, w->effects.aperture);
 	return 0;

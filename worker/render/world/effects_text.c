@@ -30,6 +30,10 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_TRANSMISSION] = {"transmission", ON | SCENE, "nothing: it costs only paths that meet such a surface",
 				 NULL},
 	[EFFECT_ABSORPTION] = {"absorption", ON | SCENE, "no medium and no exponential per edge", NULL},
+	[EFFECT_SCATTERING] =
+		{"scattering", OFF | EFFECT_OF_THE_SCENE,
+		 "paths turn at surfaces only, no distances are drawn, and chains on half vectors can be chosen",
+		 "what a medium scatters is the scene's"},
 	[EFFECT_TEXTURES] = {"textures", ON, "colours are constants: no look-ups by (u,v)",
 			     "without its textures a scene has no colours"},
 	[EFFECT_DISPLACEMENT] = {"displacement", ON | SCENE, "no finer meshes are made: time and memory of building",

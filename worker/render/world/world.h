@@ -17,6 +17,7 @@ struct world_shape {
 	uint32_t bsdf;
 	int32_t emitter;	     /* -1: not an emitter */
 	uint32_t interior, exterior; /* medium, 1 + its index; 0: none */
+	bool passable;		     /* a face of `null` that is no vertex of paths: path/media.h */
 };
 
 struct world {
@@ -33,8 +34,10 @@ struct world {
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
-	uint32_t media_count;
+	uint32_t media_count, camera_medium; /* the latter a number as those of shapes */
 	struct medium *media;
+	bool has_passable;		     /* some shape is */
+	uint32_t *emitter_medium;	     /* around emitters whose shapes state none; only where media scatter */
 	uint32_t *emitter_shape;	     /* that it belongs to; UINT32_MAX: none */
 	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */
 	int32_t environment;		     /* index of the emitter that escaping rays meet; -1: none */

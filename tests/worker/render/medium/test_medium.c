@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What a medium lets through: Beer and Lambert's law as the limit of many thin layers that each take their share, its
- * values at the ends of all ranges, and the units of length. Media of many shapes have a number each, those that are
- * referred to one.
+ * values at the ends of all ranges, and the units of length. Both ways of giving coefficients, and what is left where
+ * an effect is switched off. Media of many shapes have a number each, those that are referred to one.
  */
 #include "worker/render/medium/medium.h"
+#include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 
 #include <math.h>
@@ -12,12 +13,14 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 
 static double through(double sigma, double per_length, double distance)
 {
-	const struct medium m = {color_constant(sigma), per_length};
+	const struct medium m = {
+		.first = color_constant(sigma), .second = color_constant(0), .absorbs = true, .per_length = per_length};
 	const struct wavelengths w = wavelengths_sample(0.3);
 	spectrum t = medium_transmittance(&m, distance, &w);
 	for (int i = 1; i < SPECTRUM_LANES; i++)
@@ -48,6 +51,89 @@ static void test_ends(void **state)
 	assert_true(through(1e-200, 1, INFINITY) == 0);
 	assert_true(through(1, 1, 0) == 1);
 	assert_true(through(1e30, 1e30, 1e30) == 0);
+}
+
+/* Coefficients that differ by wavelength, some of them 0, given in both ways. */
+static const struct wavelengths four = {.nm = {450, 500, 550, 600}};
+static const double nm[] = {450, 500, 550, 600};
+static const double sigma_a[] = {0.5, 0, 1, 0}, sigma_s[] = {1.5, 0.25, 3, 0};
+static const double sigma_t[] = {2, 0.25, 4, 0}, albedo[] = {0.75, 1, 0.75, 0.5};
+
+static struct medium coloured(bool by_albedo)
+{
+	return (struct medium){.first = color_of_table(4, nm, by_albedo ? sigma_t : sigma_a, false, false),
+			       .second = color_of_table(4, nm, by_albedo ? albedo : sigma_s, false, false),
+			       .by_albedo = by_albedo,
+			       .absorbs = true,
+			       .scatters = true,
+			       .per_length = 2};
+}
+
+static void test_coefficients(void **state)
+{
+	(void)state;
+	for (int by_albedo = 0; by_albedo <= 1; by_albedo++) {
+		struct medium m = coloured(by_albedo);
+		spectrum s = medium_scattering(&m, &four), left = medium_transmittance(&m, 0.3, &four);
+		for (int i = 0; i < SPECTRUM_LANES; i++) {
+			assert_true(fabs(s.v[i] - 2 * sigma_s[i]) < 1e-12);
+			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_t[i])) < 1e-12);
+		}
+		m.absorbs = false;
+		left = medium_transmittance(&m, 0.3, &four);
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_s[i])) < 1e-12);
+		m.absorbs = true;
+		m.scatters = false;
+		assert_true(spectrum_is_zero(medium_scattering(&m, &four)));
+		left = medium_transmittance(&m, 0.3, &four);
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			assert_true(fabs(left.v[i] - exp(-0.6 * sigma_a[i])) < 1e-12);
+	}
+}
+
+/* Whatever stands for a medium in a file of 0.6 or 3.x. -EINVAL: it is refused with this text. */
+static struct world *world_with(const char *version, const char *inner)
+{
+	static char xml[1 << 11];
+	snprintf(xml, sizeof xml,
+		 "<scene version='%s'>" SENSOR(
+			 "0,0,9", "0,0,0") "<emitter type='constant'/><shape type='sphere'>"
+					   "<medium type='homogeneous' name='interior'>%s</medium></shape></scene>",
+		 version, inner);
+	const struct memory_file files[] = {{"test.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
+	return world_of_files(8, 8, files);
+}
+
+static void check_rgb(const char *version, const char *inner, double red_s, double red_t)
+{
+	struct world *w = world_with(version, inner);
+	const struct wavelengths rgb = {.rgb = true};
+	double s = medium_scattering(&w->media[0], &rgb).v[0] * w->scale,
+	       t = medium_extinction(&w->media[0], &rgb).v[0] * w->scale;
+	if (fabs(s - red_s) > 1e-9 || fabs(t - red_t) > 1e-9)
+		fail_msg("%s: sigma_s %g and sigma_t %g, not %g and %g", inner, s, t, red_s, red_t);
+	world_free(w);
+}
+
+/* The defaults of both dialects, and 0.6's names of materials. */
+static void test_descriptions(void **state)
+{
+	(void)state;
+	check_rgb("3.0.0", "", 0.75, 1);
+	check_rgb("0.6.0", "", 0.74, 0.74 + 0.032);
+	check_rgb("0.6.0", "<string name='material' value='Ketchup'/><float name='scale' value='10'/>", 1.8, 2.41);
+	check_rgb("0.6.0", "<rgb name='sigmaS' value='1,2,3'/><rgb name='sigmaA' value='3,2,1'/>", 1, 4);
+	check_rgb("3.0.0", "<rgb name='sigma_t' value='4,2,1'/><rgb name='albedo' value='0.5,0.1,0'/>", 2, 4);
+	check_rgb("3.0.0", "<rgb name='sigma_t' value='4,2,1'/>", 3, 4);
+	check_rgb("3.0.0", "<float name='sigma_s' value='2'/>", 2, 2);
+#define INSIDE(inner) "<shape type='sphere'><medium type='homogeneous' name='interior'>" inner "</medium></shape>"
+	world_refused(INSIDE("<string name='material' value='tea'/>"),
+		      "there is no material 'tea' (supported: apple, chicken1, ");
+	world_refused(INSIDE("<float name='sigma_a' value='2'/><float name='albedo' value='0.5'/>"),
+		      "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
+	world_refused(INSIDE("<float name='sigma_t' value='2'/><string name='material' value='apple'/>"),
+		      "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
 }
 
 #define AMBER(attribute)     \
@@ -81,8 +167,8 @@ static void test_numbers(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_layers),
-		cmocka_unit_test(test_ends),
+		cmocka_unit_test(test_layers),	     cmocka_unit_test(test_ends),
+		cmocka_unit_test(test_coefficients), cmocka_unit_test(test_descriptions),
 		cmocka_unit_test(test_numbers),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images that are known without rendering: furnaces, directly lit planes, two plates; and scenes at the edge of what
- * numbers can hold. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
+ * Images that are known without rendering: furnaces, directly lit planes, two plates, layers that scatter; and scenes
+ * at the edge of what numbers can hold. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power
+ * printed and bounded).
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -37,8 +38,8 @@ static void forgive_rounding(struct agree_image *image, double expected)
 				image->mean[g][c] = expected;
 }
 
-/* Each cell of the image has the radiance L of a grey scene. Takes the world. */
-static void check_constant(const char *name, struct world *w, double radiance, struct effort e)
+/* Each cell of the image has the radiance L of a grey scene, by paths of `least` edges or more. Takes the world. */
+static void check_depths(const char *name, struct world *w, uint32_t least, double radiance, struct effort e)
 {
 	static struct agree_image image;
 	const struct {
@@ -51,12 +52,17 @@ static void check_constant(const char *name, struct world *w, double radiance, s
 			continue;
 		char test[64];
 		snprintf(test, sizeof test, "%s, %s", name, runs[i].integrator);
-		struct agree_side side = {runs[i].integrator, runs[i].spp, 32, 0, 0};
+		struct agree_side side = {runs[i].integrator, runs[i].spp, 32, least, 0};
 		agree_render(w, test, runs[i].integrator, &side, &image);
 		forgive_rounding(&image, radiance * sum3(w->grey_xyz));
 		agree_expect(test, &image, radiance * sum3(w->grey_xyz));
 	}
 	world_free(w);
+}
+
+static void check_constant(const char *name, struct world *w, double radiance, struct effort e)
+{
+	check_depths(name, w, 0, radiance, e);
 }
 
 #define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
@@ -148,7 +154,139 @@ static void test_absorbing(void **state)
 				     "<spectrum name='sigma_s' value='0'/></medium><ref name='exterior' id='haze'/>")
 					SLAB("0.1", ""),
 			view),
-		0.7 * exp(-1.1 * 1.4 - 0.5 * 0.6), (struct effort){64, 64, 0});
+		0.7 * exp(-1.1 * 1.4 - 0.5 * 0.6), (struct effort){512, 512, 0});
+}
+
+/* A camera in a medium, 3 before a face behind which there is none; the medium before its near plane is not there. */
+static void test_camera_in_medium(void **state)
+{
+	(void)state;
+	check_constant(
+		"camera in a medium",
+		world_of_text(
+			16, 16,
+			SKY
+			"<sensor type='orthographic'><float name='near_clip' value='36'/><transform name='to_world'>"
+			"<lookat origin='0.2,0.1,40' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'>"
+			"<rfilter type='box'/></film><medium type='homogeneous' id='haze'><float name='sigma_a' "
+			"value='0.2'/></medium></sensor><shape type='rectangle'><transform name='to_world'>"
+			"<scale value='9'/><translate z='1'/></transform><bsdf type='null'/><ref name='exterior' "
+			"id='haze'/></shape>"),
+		0.7 * exp(-0.2 * 3), (struct effort){64, 64, 0});
+}
+
+#define FROM_ABOVE(near_clip, medium)                                                                               \
+	"<sensor type='orthographic'><float name='near_clip' value='" near_clip                                     \
+	"'/><float name='far_clip' value='1000'/><transform name='to_world'><lookat "                               \
+	"origin='0.2,0.1,90' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>" \
+	"</film>" medium "</sensor>"
+/* Between z = 0 and twice `half` below, and so wide that its sides are out of reach. */
+#define LAYER(half, albedo, phase)                                                                                                  \
+	"<shape type='cube'><transform name='to_world'><translate z='-1'/><scale x='40' y='40' z='" half                            \
+	"'/></transform><bsdf type='null'/><medium type='homogeneous' name='interior' id='layer'><float name='sigma_t' value='1'/>" \
+	"<spectrum name='albedo' value='" albedo "'/>" phase "</medium></shape>"
+#define WITHOUT_ROULETTE(depth)                                              \
+	"<integrator type='volpath'><integer name='max_depth' value='" depth \
+	"'/><integer name='rr_depth' value='128'/></integrator>"
+
+/* Where nothing is absorbed, everything looks like the sky. */
+static void test_white_media(void **state)
+{
+	(void)state;
+	static const char *const boundary[] = {"<bsdf type='null'/>", "<bsdf type='dielectric'/>"};
+	for (int i = 0; i < 2; i++)
+		check_constant(
+			i ? "milk in glass" : "white fog",
+			world_of_text(
+				16, 16,
+				WITHOUT_ROULETTE("128") SKY
+				"<sensor type='perspective'><float name='fov' value='25'/><transform name='to_world'><lookat "
+				"origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>"
+				"</film></sensor><shape type='sphere'>%s<medium type='homogeneous' name='interior'>"
+				"<float name='sigma_s' value='2'/><phase type='hg'><float name='g' value='0.6'/></phase>"
+				"</medium></shape>",
+				boundary[i]),
+			0.7, i ? (struct effort){320, 0, 0} : (struct effort){3072, 6144, 0});
+}
+
+/* E_2(x) / 2: what reaches a depth of x through a plane, of light from all directions of one half. By the midpoint rule
+ * over the cosine. */
+static double half_exponential_integral(double x)
+{
+	enum { STEPS = 2000 };
+	double sum = 0;
+	for (int i = 0; i < STEPS; i++)
+		sum += exp(-x * STEPS / (i + 0.5));
+	return sum / (2 * STEPS);
+}
+
+/* Light of the sky that a layer of optical depth 2 scatters once, seen from above, or from a near plane in it at depth
+ * `begin`: the integral of exp(begin - x) times the albedo times what reaches x from both sides. The layer's faces are
+ * no vertices: two edges. */
+static void check_scattered_once(const char *name, double begin, const char *sensor)
+{
+	enum { STEPS = 1000 };
+	double depth = 2, sum = 0, step = (depth - begin) / STEPS;
+	for (int i = 0; i < STEPS; i++) {
+		double x = begin + (i + 0.5) * step;
+		sum += exp(begin - x) * (half_exponential_integral(x) + half_exponential_integral(depth - x)) * step;
+	}
+	check_depths(name, world_of_text(16, 16, WITHOUT_ROULETTE("2") SKY "%s" LAYER("1", "0.6", ""), sensor), 2,
+		     0.7 * 0.6 * sum, (struct effort){14336, 10240, 0});
+}
+
+static void test_scattered_once(void **state)
+{
+	(void)state;
+	check_scattered_once("scattered once", 0, FROM_ABOVE("0.01", ""));
+	check_scattered_once("scattered once, seen from inside", 0.5,
+			     FROM_ABOVE("90.5", "<ref name='medium' id='layer'/>"));
+}
+
+/* Chandrasekhar 1960, sec. 36 and 58: under a sky of radiance 1 a half-space that scatters isotropically reflects
+ * 1 - H(mu) sqrt(1 - albedo). H by iterating its equation, in the form whose integral is positive. */
+static double chandrasekhar_h(double albedo, double mu)
+{
+	enum { STEPS = 400, ROUNDS = 60 };
+	double h[STEPS], root = sqrt(1 - albedo), at = 1;
+	for (int i = 0; i < STEPS; i++)
+		h[i] = 1;
+	for (int round = 0; round < ROUNDS; round++) {
+		double next[STEPS];
+		for (int i = 0; i <= STEPS; i++) {
+			double m = i < STEPS ? (i + 0.5) / STEPS : mu, sum = 0;
+			for (int k = 0; k < STEPS; k++)
+				sum += (k + 0.5) / STEPS * h[k] / (m + (k + 0.5) / STEPS) / STEPS;
+			at = 1 / (root + albedo / 2 * sum);
+			if (i < STEPS)
+				next[i] = at;
+		}
+		memcpy(h, next, sizeof h);
+	}
+	return at;
+}
+
+static void test_half_space(void **state)
+{
+	(void)state;
+	double albedo = 0.8;
+	check_constant("half-space",
+		       world_of_text(16, 16, WITHOUT_ROULETTE("128") SKY FROM_ABOVE("0.01", "") LAYER("8", "0.8", "")),
+		       0.7 * (1 - chandrasekhar_h(albedo, 1) * sqrt(1 - albedo)), (struct effort){3072, 3072, 0});
+}
+
+/* A beam at an angle, scattered once by Rayleigh's function. */
+static void test_beam_in_layer(void **state)
+{
+	(void)state;
+	double cosine = 0.6, along = 1 + 1 / cosine, phase = 3 / (16 * M_PI) * (1 + cosine * cosine);
+	check_depths("beam in a layer",
+		     world_of_text(16, 16,
+				   WITHOUT_ROULETTE(
+					   "2") "<emitter type='directional'><vector name='direction' x='0.8' y='0' "
+						"z='-0.6'/><float name='irradiance' value='5'/></emitter>" FROM_ABOVE(
+							"0.01", "") LAYER("1", "0.6", "<phase type='rayleigh'/>")),
+		     2, 5 * 0.6 * phase * (1 - exp(-2 * along)) / along, (struct effort){512, 512, 0});
 }
 
 /* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r,
@@ -402,9 +540,13 @@ static void test_black(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_furnace),	  cmocka_unit_test(test_invisible), cmocka_unit_test(test_absorbing),
-		cmocka_unit_test(test_lit_floor), cmocka_unit_test(test_beam),	    cmocka_unit_test(test_plates),
-		cmocka_unit_test(test_hard),	  cmocka_unit_test(test_black),
+		cmocka_unit_test(test_furnace),	    cmocka_unit_test(test_invisible),
+		cmocka_unit_test(test_absorbing),   cmocka_unit_test(test_camera_in_medium),
+		cmocka_unit_test(test_white_media), cmocka_unit_test(test_scattered_once),
+		cmocka_unit_test(test_half_space),  cmocka_unit_test(test_beam_in_layer),
+		cmocka_unit_test(test_lit_floor),   cmocka_unit_test(test_beam),
+		cmocka_unit_test(test_plates),	    cmocka_unit_test(test_hard),
+		cmocka_unit_test(test_black),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

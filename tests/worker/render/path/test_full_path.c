@@ -156,6 +156,15 @@ static void test_media(void **state)
 			       "value='1.5'/><float name='alpha' value='0.3'/></bsdf>" MEDIUM("exterior", "0.3,1,2")));
 	assert_true(w->effects.absorption && w->media_count == 2);
 	check("coloured glass", w, 4000);
+	check("from haze",
+	      world_of_text(
+		      32, 32,
+		      "<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='0.5'/>" AT(
+			      "<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+			      MEDIUM("medium", "0.4,0.2,0.1") "</sensor><shape type='cube'>" AT(
+				      "<scale value='2'/>") "</shape>" LAMP
+				      BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")),
+	      1500);
 	check("a layer of water",
 	      world_of_text(
 		      32, 32,

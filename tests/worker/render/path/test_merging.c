@@ -60,7 +60,7 @@ static bool meet(struct path_context *c, unsigned s, unsigned t)
 	z->to_prev = vec3_neg(w);
 	z->pdf = pdf;
 	z->beta = spectrum_mul(at->beta, path_scatter(c, at, at->to_prev, w));
-	z->beta = spectrum_scale(geometry_term(at->x.ng, y->x.ng, w, distance2) / pdf, z->beta);
+	z->beta = spectrum_scale(path_geometry_term(at, y, w, distance2) / pdf, z->beta);
 	at->delta = false;
 	if (t >= 2)
 		at[-1].pdf_rev = path_pdf(c, y, at, at - 1, TRANSPORT_IMPORTANCE);

@@ -161,11 +161,18 @@ static void test_unknown_names(void **state)
 	refuses(S "<rfilter type='blackman'/>" END, "; --lenient takes `gaussian` instead");
 	refuses(S "<shape type='ellipsoids'/>" END,
 		"<shape type=\"ellipsoids\">: this shape of Mitsuba's is not supported; --lenient leaves it out (supp");
-	refuses(S "<medium type='homogeneous'/>" END,
-		"s.xml:1: <medium type=\"homogeneous\">: media that scatter light are not supported; --lenient leaves");
-	refuses(S "<shape type='cube'>\n<medium type='homogeneous' name='interior'/></shape>" END,
-		"s.xml:2: <medium type=\"homogeneous\">: media that scatter light");
-	refuses(S "\n<phase type='hg' id='p'/>" END, "s.xml:2: <phase type=\"hg\">: media that scatter light are not");
+	refuses(S "<medium type='heterogeneous'/>" END,
+		"s.xml:1: <medium type=\"heterogeneous\">: this medium of Mitsuba's is not supported; --lenient leaves it "
+		"out (supported: homogeneous)");
+	refuses(S "<medium type='homogeneous'>\n<phase type='sggx'/></medium>" END,
+		"s.xml:2: <phase type=\"sggx\">: this phase of Mitsuba's is not supported; --lenient takes `isotropic` "
+		"instead (supported: isotropic, hg, rayleigh)");
+	refuses(S "<medium type='homogeneous'>\n<volume type='gridvolume' name='albedo'/></medium>" END,
+		"s.xml:2: <volume type=\"gridvolume\">: media that vary from place to place are not supported; --lenient "
+		"leaves it out");
+	refuses(S "<phase type='isotropic'><float name='g' value='0.5'/></phase>" END,
+		"<phase type=\"isotropic\"> has no `g`");
+	refuses(S "<shape type='cube'><phase type='hg'/></shape>" END, "a phase without a name has no place in <shape");
 	refuses(S "<shape type='cube'>\n<subsurface type='dipole'/></shape>" END, "subsurface scattering is not");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");
@@ -345,7 +352,7 @@ static void test_media_are_told_once(void **state)
 {
 	(void)state;
 	static const char xml[] =
-		S "<medium type='homogeneous' id='fog'/><shape type='cube'><ref id='fog' name='interior'/>"
+		S "<medium type='heterogeneous' id='fog'/><shape type='cube'><ref id='fog' name='interior'/>"
 		  "</shape><shape type='sphere'><ref id='fog' name='exterior'/></shape>" END;
 	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
 	struct asset_source assets = memory_assets(files);
@@ -359,14 +366,16 @@ static void test_media_are_told_once(void **state)
 	scene_fini(&s);
 }
 
-/* Of those that only absorb, a shape has one on each side, an emitter may be in one, and a camera may not. */
-static void test_absorbing_media(void **state)
+/* A shape has one on each side, a camera may be in one, and an emitter need not say. */
+static void test_media(void **state)
 {
 	(void)state;
-#define ABSORBS "<rgb name='sigma_s' value='0, 0, 0'/><rgb name='sigma_a' value='1, 2, 3'/>"
-	static const char xml[] = S "<medium type='homogeneous' id='tea'>" ABSORBS "<phase type='hg'/></medium>"
-				    "<shape type='cube'><ref id='tea' name='interior'/></shape>"
-				    "<shape type='sphere'><emitter type='area'><ref id='tea'/></emitter></shape>" END;
+#define TEA \
+	"<medium type='homogeneous' id='tea'><rgb name='sigma_s' value='0, 1, 0'/><rgb name='sigma_a' value='1, 2, 3'/>"
+	static const char xml[] = S TEA "<phase type='hg'/></medium>"
+					"<shape type='cube'><ref id='tea' name='interior'/></shape>"
+					"<shape type='sphere'><emitter type='area'><ref id='tea'/></emitter></shape>"
+					"<sensor type='perspective'><ref name='medium' id='tea'/></sensor>" END;
 	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
@@ -375,25 +384,18 @@ static void test_absorbing_media(void **state)
 		fail_msg("%s", e.text);
 	const struct scene_node *tea = node_ref(s.objects[1], "interior");
 	assert_true(tea && tea->cls == PLUGIN_MEDIUM && node_find(tea, "sigma_a"));
+	assert_string_equal(node_child(tea, PLUGIN_PHASE, 0)->type, "hg");
 	assert_null(node_ref(s.objects[1], "exterior"));
+	assert_ptr_equal(node_child(scene_sensor(&s, 1), PLUGIN_MEDIUM, 0), tea);
 	scene_fini(&s);
-	refuses(S "<medium type='homogeneous' id='tea'>" ABSORBS "</medium><sensor type='perspective'><ref id='tea'/>"
-		  "</sensor>" END,
-		"<ref>: a medium around a sensor is not supported");
-	refuses(S "<shape type='cube'><medium type='homogeneous'>" ABSORBS "</medium></shape>" END,
+	refuses(S TEA "</medium><sensor type='perspective'><ref id='tea'/><ref id='tea'/></sensor>" END,
+		"a second medium in <sensor type=\"perspective\">, which may have one");
+	refuses(S "<shape type='cube'>" TEA "</medium></shape>" END,
 		"a medium without a name has no place in <shape type=\"cube\">");
-	refuses(S "<shape type='cube'><medium type='homogeneous' name='interior'>" ABSORBS
-		  "<float name='sigma' value='1'/></medium></shape>" END,
+	refuses(S TEA "<float name='sigma' value='1'/></medium>" END,
 		"<medium type=\"homogeneous\"> has no `sigma`; did you mean `sigma_");
-	static const char *const scatter[] = {
-		"<rgb name='sigma_s' value='0, 0.1, 0'/>", "<float name='albedo' value='0.1'/>",
-		"<spectrum name='sigma_s' value='none'/>", "<volume name='albedo' type='grid'/>",
-		"<float name='albedo' value='0'/><float name='sigma_s' value='1'/>"};
-	for (size_t i = 0; i < sizeof scatter / sizeof *scatter; i++) {
-		char one[512];
-		snprintf(one, sizeof one, S "<medium type='homogeneous'>%s</medium>" END, scatter[i]);
-		refuses(one, "media that scatter light are not supported");
-	}
+	refuses(S "<medium type='homogeneous'><phase type='hg'/><phase type='hg'/></medium>" END,
+		"a second phase in <medium type=\"homogeneous\">, which may have one");
 }
 
 /* What a fork's parameter is taken for is in test_scene.c. */
@@ -516,7 +518,7 @@ int main(void)
 		cmocka_unit_test(test_unknown_names),
 		cmocka_unit_test(test_names_without_values),
 		cmocka_unit_test(test_media_are_told_once),
-		cmocka_unit_test(test_absorbing_media),
+		cmocka_unit_test(test_media),
 		cmocka_unit_test(test_misplaced_parameters),
 		cmocka_unit_test(test_bad_values),
 		cmocka_unit_test(test_bad_transforms),

@@ -181,12 +181,12 @@ static void test_notes_on_the_whole(void **state)
 	} cases[] = {
 		{"<sensor type='perspective'/>",
 		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
-		{"<integrator type='volpath'/>",
-		 "s.xml:1: <integrator type=\"volpath\">: the image shows all light on surfaces, and media that only absorb it"},
+		{"<integrator type='photonmapper'/>",
+		 "s.xml:1: <integrator type=\"photonmapper\">: the image shows all light, on surfaces and in homogeneous media"},
 		{"<integrator type='direct'/>",
 		 "s.xml:1: <integrator type=\"direct\">: the image shows light that is scattered once; --max-depth shows more"},
-		{"<integrator type='multichannel'/>", "the image shows all light on surfaces"},
-		{"<integrator type='volprim_rf_basic'/>", "the image shows all light on surfaces"},
+		{"<integrator type='multichannel'/>", "the image shows all light, on surfaces and"},
+		{"<integrator type='volprim_rf_basic'/>", "the image shows all light, on surfaces and"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[512];

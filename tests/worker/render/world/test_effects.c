@@ -187,6 +187,43 @@ static void test_forced(void **state)
 	world_free(w);
 }
 
+#define CLOUD(sigma_s)                                                                                    \
+	"<bsdf type='null'/><medium type='homogeneous' name='interior'><float name='sigma_a' value='1'/>" \
+	"<spectrum name='sigma_s' value='" sigma_s "'/></medium>"
+
+/* Media that scatter also let light turn where no surface does. Forced off, what they scatter counts for nothing; it
+ * cannot be forced on, as nothing says what would be scattered. */
+static void test_scattering(void **state)
+{
+	(void)state;
+	struct world *w = forced("", VIEW LAMP BALL("1", CLOUD("0")));
+	assert_true(w->effects.absorption && !w->effects.scattering && !w->parts[1].passable);
+	assert_string_equal(line_of(w, "scattering")->why, "no medium scatters");
+	world_free(w);
+	w = forced("", VIEW LAMP BALL("1", CLOUD("2")));
+	assert_true(w->effects.absorption && w->effects.scattering && w->parts[1].passable && w->has_passable);
+	assert_true(w->media[0].scatters && w->media[0].absorbs);
+	assert_non_null(strstr(line_of(w, "scattering")->why, "borders on a medium that scatters"));
+	world_free(w);
+	w = forced("", VIEW LAMP BALL("1", CLOUD("2") "<emitter type='area'/>"));
+	assert_true(w->effects.scattering && !w->has_passable); /* what shines is a vertex */
+	world_free(w);
+	w = forced("-scattering", VIEW LAMP BALL("1", CLOUD("2")));
+	assert_true(!w->effects.scattering && !w->media[0].scatters && w->media[0].absorbs && !w->has_passable);
+	assert_true(line_of(w, "scattering")->other_scene);
+	world_free(w);
+	w = forced("-absorption", VIEW LAMP BALL("1", CLOUD("2")));
+	assert_true(w->media[0].scatters && !w->media[0].absorbs);
+	world_free(w);
+	w = forced("", "<sensor type='perspective'><medium type='homogeneous' name='m'/></sensor>" LAMP);
+	assert_true(w->effects.scattering && w->camera_medium == 1 && w->effects.max_depth == 128);
+	world_free(w);
+	char text[PLAN_EFFECTS_MAX];
+	struct error e;
+	assert_int_equal(render_effects("+scattering", text, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "scattering cannot be forced on"));
+}
+
 static void test_texts(void **state)
 {
 	(void)state;
@@ -245,6 +282,7 @@ int main(void)
 		cmocka_unit_test(test_lights_and_depth),
 		cmocka_unit_test(test_surfaces),
 		cmocka_unit_test(test_forced),
+		cmocka_unit_test(test_scattering),
 		cmocka_unit_test(test_texts),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

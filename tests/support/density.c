@@ -1,0 +1,501 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "tests/support/density.h"
+
+#include "tests/support/dice.h"
+#include "tests/support/stats.h"
+#include "worker/render/path/connect.h"
+#include "worker/render/world/build.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { DEPTH = 7 };
+
+/* x[0] on the emitter .. x[k] at the camera; from_light[i], from_camera[i]: density of x[i] as generated from that
+ * side. */
+struct route {
+	unsigned k;
+	struct path_vertex x[DEPTH + 2];
+	bool delta[DEPTH + 2];
+	double from_light[DEPTH + 2], from_camera[DEPTH + 2];
+};
+
+static double squared(double x)
+{
+	return x * x;
+}
+
+static vec3 towards(const struct path_vertex *a, const struct path_vertex *b)
+{
+	if (b->kind == VERTEX_INFINITE)
+		return b->x.p;
+	if (a->kind == VERTEX_INFINITE)
+		return vec3_neg(a->x.p);
+	return vec3_normalize(vec3_sub(b->x.p, a->x.p));
+}
+
+static bool on_delta(const struct path_context *c, const struct path_vertex *x0)
+{
+	return c->w->emitters[x0->emitter].delta;
+}
+
+static double per_area(const struct path_vertex *at, const struct path_vertex *to)
+{
+	if (to->kind == VERTEX_INFINITE)
+		return 1;
+	vec3 d = vec3_sub(to->x.p, at->x.p);
+	if (to->kind == VERTEX_MEDIUM)
+		return 1 / vec3_dot(d, d);
+	return fabs(vec3_dot(to->x.ng, towards(at, to))) / vec3_dot(d, d);
+}
+
+/* Of the only medium there is, which is everywhere; before a camera's near plane there is none. */
+static double length_between(const struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
+{
+	const struct path_vertex *eye = a->kind == VERTEX_CAMERA ? a : b;
+	double t_min = 0, t_max;
+	if (eye->kind == VERTEX_CAMERA)
+		camera_clip(&c->w->camera, towards(eye, eye == a ? b : a), &t_min, &t_max);
+	return vec3_length(vec3_sub(a->x.p, b->x.p)) - t_min;
+}
+
+/* What the distance contributes to the density of `to`: by one wavelength of four, that of an event or of none. */
+static double by_distance(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *to)
+{
+	double sum = 0;
+	if (!c->w->effects.scattering)
+		return 1;
+	spectrum sigma = medium_extinction(&c->w->media[0], &c->wl);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		sum += exp(-sigma.v[i] * length_between(c, at, to)) * (to->kind == VERTEX_MEDIUM ? sigma.v[i] : 1);
+	return sum / SPECTRUM_LANES;
+}
+
+/* Of the first wavelength. */
+static double left_over(const struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
+{
+	if (!c->w->effects.scattering)
+		return 1;
+	return exp(-medium_extinction(&c->w->media[0], &c->wl).v[0] * length_between(c, a, b));
+}
+
+static struct emitter_point emitter_point_of(const struct path_vertex *v)
+{
+	struct emitter_point p = world_emitter_point(&v->x);
+	p.infinite = v->kind == VERTEX_INFINITE;
+	return p;
+}
+
+/* Where relief turns a normal away from the camera, it is mirrored at the geometric one: the shapes with such relief
+ * are flat or spheres here. */
+static bool turned_from(const struct path_vertex *at, const struct path_vertex *camera, struct surface_point *x)
+{
+	vec3 w = towards(at, camera);
+	*x = at->x;
+	if (!x->shape->relief || !x->shape->relief->turns || at->bsdf->has_delta ||
+	    vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0)
+		return false;
+	x->sh = frame_along(vec3_sub(vec3_scale(2 * vec3_dot(x->sh.n, x->ng), x->ng), x->sh.n), x->axis);
+	return true;
+}
+
+/* The specular lobe that leads from `from` over `at` to `to`. */
+static struct bsdf_sample specular_lobe(const struct path_context *c, const struct path_vertex *from,
+					const struct path_vertex *at, const struct path_vertex *to,
+					enum transport transport)
+{
+	struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, transport);
+	vec3 wo = frame_to_local(&at->x.sh, towards(at, from)), wi = frame_to_local(&at->x.sh, towards(at, to));
+	for (int i = 0; i < 2; i++) {
+		double u[3] = {0.5, 0.5, i ? 1 - 0x1p-53 : 0};
+		struct bsdf_sample s;
+		if (at->bsdf->ops->sample(at->bsdf, &p, wo, u, &s) && s.wi.z * wi.z > 0) {
+			assert_true(vec3_length(vec3_sub(s.wi, wi)) < 1e-6);
+			return s;
+		}
+	}
+	return (struct bsdf_sample){.pdf = 0};
+}
+
+/* Density of `to`, generated from `at`, come from `from`. Specular lobes: a distribution in the direction towards the
+ * light, projected on the geometric normal. Towards the camera the two solid angles are to each other as the squared
+ * indices and the cosines with the shading normal, about which light is refracted (etendue). */
+static double scattered(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at,
+			bool delta, const struct path_vertex *to, enum transport transport)
+{
+	struct surface_point x;
+	if (at->kind == VERTEX_MEDIUM)
+		return phase_eval(&c->w->media[0].phase, towards(at, from), towards(at, to)) * per_area(at, to);
+	bool from_light = transport == TRANSPORT_IMPORTANCE, turned = turned_from(at, from_light ? to : from, &x);
+	if (from_light && turned)
+		return 0;
+	vec3 wo = frame_to_local(&x.sh, towards(at, from)), wi = frame_to_local(&x.sh, towards(at, to));
+	if (!delta) {
+		struct bsdf_point p = world_bsdf_point(&x, &c->wl, transport);
+		return at->bsdf->ops->pdf_solid(at->bsdf, &p, wo, wi) * per_area(at, to);
+	}
+	double density = specular_lobe(c, from, at, to, transport).pdf * per_area(at, to);
+	if (transport == TRANSPORT_RADIANCE)
+		return density * fabs(vec3_dot(at->x.ng, towards(at, to)));
+	density *= fabs(wi.z / wo.z) * fabs(vec3_dot(at->x.ng, towards(at, from)));
+	if (wo.z * wi.z < 0)
+		density *= wi.z > 0 ? squared(1 / bsdf_eta(at->bsdf, &c->wl)) : squared(bsdf_eta(at->bsdf, &c->wl));
+	return density;
+}
+
+static double density_from_light(const struct path_context *c, const struct route *r, unsigned i)
+{
+	const struct path_vertex *x = r->x;
+	const struct emitter *em = &c->w->emitters[x[0].emitter];
+	struct emitter_point p = emitter_point_of(&x[0]);
+	if (i == 0)
+		return c->w->emitter_pdf[x[0].emitter] * em->ops->pdf_point(em, &p);
+	if (i >= 2)
+		return scattered(c, &x[i - 2], &x[i - 1], r->delta[i - 1], &x[i], TRANSPORT_IMPORTANCE) *
+		       by_distance(c, &x[i - 1], &x[i]);
+	vec3 w = towards(&x[0], &x[1]);
+	if (x[0].kind == VERTEX_INFINITE)
+		return fabs(vec3_dot(x[1].x.ng, w)) / (M_PI * squared(c->w->radius));
+	return em->ops->pdf_direction(em, &p, w) * per_area(&x[0], &x[1]) * by_distance(c, &x[0], &x[1]);
+}
+
+static double density_from_camera(const struct path_context *c, const struct route *r, unsigned i)
+{
+	const struct path_vertex *x = r->x;
+	if (i == r->k)
+		return 1;
+	if (i == 0 && on_delta(c, &x[0]))
+		return 0;
+	if (i + 2 <= r->k)
+		return scattered(c, &x[i + 2], &x[i + 1], r->delta[i + 1], &x[i], TRANSPORT_RADIANCE) *
+		       by_distance(c, &x[i + 1], &x[i]);
+	vec3 w = towards(&x[r->k], &x[i]);
+	double cosine = vec3_dot(c->w->camera.axes.n, w), pixels = c->window.width * c->window.height;
+	return squared(c->w->camera.scale) / (cosine * cosine * cosine * pixels) * per_area(&x[r->k], &x[i]) *
+	       by_distance(c, &x[r->k], &x[i]);
+}
+
+/* False where double cannot tell: two points almost the same, or seen almost from the side. */
+static bool well_conditioned(const struct route *r)
+{
+	for (unsigned i = 0; i < r->k; i++) {
+		const struct path_vertex *a = &r->x[i], *b = &r->x[i + 1];
+		vec3 w = towards(a, b);
+		bool has_normal = a->kind != VERTEX_INFINITE && vec3_length(a->x.ng) > 0;
+		if (a->kind != VERTEX_INFINITE && vec3_length(vec3_sub(a->x.p, b->x.p)) < 1e-3)
+			return false;
+		if (has_normal && fabs(vec3_dot(w, a->x.ng)) < 1e-3)
+			return false;
+		if (b->kind != VERTEX_CAMERA && b->kind != VERTEX_MEDIUM && fabs(vec3_dot(w, b->x.ng)) < 1e-3)
+			return false;
+	}
+	return true;
+}
+
+static double relative(double a, double b)
+{
+	return a == b ? 0 : fabs(a - b) / fmax(fabs(a), fabs(b));
+}
+
+/* The path that technique s made. */
+static void take_route(const struct path_context *c, unsigned s, unsigned t, const struct path_vertex *light,
+		       struct route *r)
+{
+	*r = (struct route){.k = s + t - 1};
+	for (unsigned i = 0; i < s; i++)
+		r->x[i] = light[i];
+	for (unsigned i = 0; i < t; i++)
+		r->x[r->k - i] = c->camera[i];
+	for (unsigned i = 1; i < r->k; i++)
+		r->delta[i] = r->x[i].delta && i + 1 != s && i != s;
+}
+
+static void fill_densities(const struct path_context *c, struct route *r)
+{
+	for (unsigned i = 0; i <= r->k; i++) {
+		r->from_light[i] = density_from_light(c, r, i);
+		r->from_camera[i] = density_from_camera(c, r, i);
+	}
+}
+
+/* Directions between points are 1e-13 off at the distances and cosines allowed; lobes as narrow as alpha 0.1 take that
+ * times 1e3. A hit that Embree's floats put just beside its triangle is moved by up to 1e-7 off the ray: rare, and
+ * counted. */
+static void compare(struct density_tally *tally, double a, double b)
+{
+	if (relative(a, b) < 1e-9)
+		tally->worst = fmax(tally->worst, relative(a, b));
+	else if (relative(a, b) < 1e-5)
+		tally->off++;
+	else
+		fail_msg("%.12g is to be %.12g", a, b);
+}
+
+static void check_walk(const struct route *r, unsigned s, struct density_tally *tally)
+{
+	for (unsigned i = 0; i <= r->k; i++) {
+		bool light = i < s;
+		double own = light ? r->from_light[i] : r->from_camera[i],
+		       other = light ? r->from_camera[i] : r->from_light[i];
+		compare(tally, r->x[i].pdf, own);
+		/* Two more vertices of the same sub-path have made the reverse density. */
+		if (light ? i + 3 <= s : i >= s + 2 && i < r->k)
+			compare(tally, r->x[i].pdf_rev, other);
+	}
+}
+
+/* F of path.h's head comment; of a specular lobe what stands before the delta distribution. */
+static double scatter(const struct path_context *c, const struct path_vertex *camera, const struct path_vertex *at,
+		      const struct path_vertex *light)
+{
+	if (at->kind == VERTEX_MEDIUM)
+		return medium_scattering(&c->w->media[0], &c->wl).v[0] *
+		       phase_eval(&c->w->media[0].phase, towards(at, camera), towards(at, light));
+	if (at->delta) {
+		struct bsdf_sample s = specular_lobe(c, camera, at, light, TRANSPORT_RADIANCE);
+		return s.f.v[0] * fabs(s.wi.z);
+	}
+	struct surface_point x;
+	turned_from(at, camera, &x);
+	struct bsdf_point p = world_bsdf_point(&x, &c->wl, TRANSPORT_RADIANCE);
+	vec3 wo = towards(at, camera), wi = towards(at, light);
+	spectrum f = at->bsdf->ops->eval(at->bsdf, &p, frame_to_local(&x.sh, wo), frame_to_local(&x.sh, wi));
+	return f.v[0] * fabs(vec3_dot(x.sh.n, wi) / vec3_dot(x.ng, wi));
+}
+
+/* Along a sub-path: beta x densities = source x product of F x product of G. */
+static void check_beta(const struct path_context *c, const struct path_vertex *v, unsigned n,
+		       struct density_tally *tally)
+{
+	double density = v[0].pdf, value;
+	bool light = v[0].kind != VERTEX_CAMERA;
+	vec3 w = towards(&v[0], &v[1]);
+	if (light) {
+		const struct emitter *em = &c->w->emitters[v[0].emitter];
+		struct emitter_point p = emitter_point_of(&v[0]);
+		value = em->ops->radiance(em, &p, w, &c->wl).v[0];
+		double leaving = on_delta(c, &v[0]) ? 1 : fabs(vec3_dot(v[0].x.ng, w));
+		value *= v[0].kind == VERTEX_INFINITE ? fabs(vec3_dot(v[1].x.ng, w)) : leaving * per_area(&v[0], &v[1]);
+	} else {
+		value = squared(c->w->camera.scale) / pow(vec3_dot(c->w->camera.axes.n, w), 3) * per_area(&v[0], &v[1]);
+	}
+	for (unsigned i = 1; i < n; i++) {
+		density *= v[i].pdf;
+		value *= left_over(c, &v[i - 1], &v[i]);
+		compare(tally, v[i].beta.v[0] * density, value);
+		tally->betas++;
+		if (i + 1 == n)
+			return;
+		value *= light ? scatter(c, &v[i + 1], &v[i], &v[i - 1]) : scatter(c, &v[i - 1], &v[i], &v[i + 1]);
+		value *= path_cosine(&v[i], towards(&v[i], &v[i + 1])) * per_area(&v[i], &v[i + 1]);
+	}
+}
+
+static bool exists(const struct path_context *c, const struct route *r, unsigned j)
+{
+	if (j == 0)
+		return !on_delta(c, &r->x[0]);
+	return (r->k >= 2 && !r->delta[j - 1] && !r->delta[j]);
+}
+
+/* Logarithm of the density of the whole path by technique j. */
+static double technique(const struct path_context *c, const struct route *r, unsigned j)
+{
+	double sum = 0;
+	for (unsigned i = 0; i <= r->k; i++)
+		sum += log(i < j ? r->from_light[i] : r->from_camera[i]);
+	if (j != 1)
+		return sum;
+	const struct emitter *em = &c->w->emitters[r->x[0].emitter];
+	struct emitter_point p = emitter_point_of(&r->x[0]);
+	double toward = c->w->emitter_pdf[r->x[0].emitter] * em->ops->pdf_toward(em, r->x[1].x.p, &p);
+	return sum - log(r->from_light[0]) + log(toward);
+}
+
+/* The edge between two points, as a sub-path makes it. */
+static struct path_edge edge_between(const struct path_context *c, const struct path_vertex *a,
+				     const struct path_vertex *b)
+{
+	struct path_edge e = {.medium = 1, .before = 1, .fits = true};
+	spectrum sigma = medium_extinction(&c->w->media[0], &c->wl);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		e.free.v[i] = exp(-sigma.v[i] * length_between(c, a, b));
+	return e;
+}
+
+/* As if technique s had made it. */
+static void relabel(const struct path_context *c, struct route *r, unsigned s, struct joined_path *p,
+		    struct path_edge *joint)
+{
+	p->edges = r->k;
+	p->s = s;
+	p->other_medium = 0;
+	p->joint = joint;
+	for (unsigned i = 1; i <= r->k && c->w->effects.scattering; i++) {
+		struct path_edge *edge = i == s ? joint : i < s ? &r->x[i].edge : &r->x[i - 1].edge;
+		*edge = edge_between(c, &r->x[i], &r->x[i - 1]);
+	}
+	for (unsigned i = 0; i <= r->k; i++) {
+		struct path_vertex *v = &r->x[i];
+		v->delta = r->delta[i];
+		v->pdf = i < s ? r->from_light[i] : r->from_camera[i];
+		/* What the sub-path has not gone far enough to know. */
+		v->pdf_rev = NAN;
+		if (i + 3 <= s || i >= s + 2)
+			v->pdf_rev = i < s ? r->from_camera[i] : r->from_light[i];
+		p->v[i] = v;
+	}
+	if (r->x[0].kind != VERTEX_INFINITE)
+		r->x[0].kind = s ? VERTEX_EMITTER : VERTEX_SURFACE;
+}
+
+/* Where only one in eight samples has a light sub-path, techniques with two light vertices or more count an eighth. */
+static void check_rare_light(struct path_context *c, const struct joined_path *p, const double *ratio)
+{
+	double sum = 0;
+	for (unsigned j = 0; j <= p->edges; j++)
+		sum += j < 2 ? ratio[j] : 0.125 * ratio[j];
+	c->light_every = 8;
+	double weight = path_balance_weight(c, p, PATH_MAX_EDGES);
+	c->light_every = 1;
+	if (!(relative(weight, 1 / sum) < 1e-12))
+		fail_msg("made by %u of %u, light in one of eight: weight %.12g, not %.12g", p->s, p->edges, weight,
+			 1 / sum);
+}
+
+static void check_ratios(struct path_context *c, struct route *r, struct density_tally *tally)
+{
+	double p[DEPTH + 2], ratio[DEPTH + 2], most = -INFINITY;
+	for (unsigned j = 0; j <= r->k; j++) {
+		p[j] = technique(c, r, j);
+		most = fmax(most, p[j]);
+		if (!exists(c, r, j))
+			p[j] = -INFINITY;
+	}
+	for (unsigned s = 0; s <= r->k; s++) {
+		struct joined_path joined;
+		struct path_edge joint;
+		/* No technique makes a path that is 1e100 times less likely than by another. */
+		if (!exists(c, r, s) || most - p[s] > 230)
+			continue;
+		relabel(c, r, s, &joined, &joint);
+		for (unsigned max_s = s > 1 ? PATH_MAX_EDGES : 1; max_s <= PATH_MAX_EDGES;
+		     max_s += PATH_MAX_EDGES - 1) {
+			path_technique_ratios(c, &joined, max_s, ratio);
+			double sum = 0;
+			for (unsigned j = 0; j <= r->k; j++) {
+				double expected = j <= max_s ? exp(p[j] - p[s]) : 0;
+				sum += expected;
+				if (!(relative(ratio[j], expected) < 1e-9))
+					fail_msg("technique %u of %u edges, made by %u: %.12g instead of %.12g", j,
+						 r->k, s, ratio[j], expected);
+				tally->worst_ratio = fmax(tally->worst_ratio, relative(ratio[j], expected));
+			}
+			double weight = path_balance_weight(c, &joined, max_s);
+			if (!(relative(weight, 1 / sum) < 1e-9))
+				fail_msg("made by %u of %u, up to %u: weight %.12g, not %.12g", s, r->k, max_s, weight,
+					 1 / sum);
+		}
+		check_rare_light(c, &joined, ratio); /* of all techniques */
+		tally->relabelled++;
+	}
+}
+
+static bool joins(struct path_context *c, unsigned s, unsigned t)
+{
+	const struct path_vertex *z = &c->camera[t - 1];
+	if (s == 0)
+		return z->emitter >= 0 && vec3_dot(z->x.ng, z->to_prev) > 0;
+	if (z->kind == VERTEX_INFINITE)
+		return false;
+	const struct path_vertex *y = &c->light[s - 1];
+	vec3 w = towards(z, y);
+	double film[2];
+	if (t == 1 && !camera_project(&c->w->camera, z->x.p, w, 1, &film[0], &film[1]))
+		return false;
+	if (t > 1 && spectrum_is_zero(path_scatter(c, z, z->to_prev, w)))
+		return false;
+	if (s > 1)
+		return !spectrum_is_zero(path_scatter(c, y, vec3_neg(w), y->to_prev));
+	const struct emitter *em = &c->w->emitters[y->emitter];
+	struct emitter_point p = emitter_point_of(y);
+	return !spectrum_is_zero(em->ops->radiance(em, &p, vec3_neg(w), &c->wl));
+}
+
+static void check_route(struct path_context *c, unsigned s, unsigned t, struct density_tally *tally)
+{
+	struct route r;
+	take_route(c, s, t, c->light, &r);
+	if (!well_conditioned(&r)) {
+		tally->skipped++;
+		return;
+	}
+	fill_densities(c, &r);
+	check_walk(&r, s, tally);
+	tally->routes++;
+	tally->infinite += r.x[0].kind == VERTEX_INFINITE;
+	for (unsigned i = 0; i <= r.k; i++)
+		if (r.delta[i]) {
+			tally->with_delta++;
+			break;
+		}
+	check_ratios(c, &r, tally);
+}
+
+/* What is joined to the camera lands where the film sees it from this x_k. */
+static void check_landing(struct path_context *c, unsigned s)
+{
+	double film[2];
+	if (spectrum_is_zero(path_connect(c, s, 1, PATH_MAX_EDGES, film)))
+		return;
+	vec3 w = camera_direction(&c->w->camera, c->camera[0].x.p, film[0], film[1]);
+	assert_true(vec3_length(vec3_sub(w, towards(&c->camera[0], &c->light[s - 1]))) < 1e-12);
+}
+
+struct density_tally density_check(const char *name, struct world *w, size_t walks)
+{
+	static struct path_context c;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	struct density_tally tally = {0};
+	c = (struct path_context){.w = w,
+				  .window = {-1, -1, w->settings.width + 2.0, w->settings.height + 2.0},
+				  .min_depth = 1,
+				  .max_depth = DEPTH,
+				  .counters = counters};
+	for (uint64_t i = 0; i < dice_count(walks); i++) {
+		struct sampler_random s;
+		double film[2];
+		sampler_random_init(&s, stats_seed(name), RNG_TEST, i, 0);
+		unsigned camera = path_walk_camera(&c, &s.base, DEPTH + 1, film);
+		unsigned light = path_walk_light(&c, &s.base, DEPTH);
+		struct route whole;
+		if (camera > 1) {
+			take_route(&c, 0, camera, NULL, &whole);
+			if (well_conditioned(&whole))
+				check_beta(&c, c.camera, camera, &tally);
+		}
+		if (light > 1) {
+			take_route(&c, light, 1, c.light, &whole);
+			if (well_conditioned(&whole))
+				check_beta(&c, c.light, light, &tally);
+		}
+		for (unsigned j = 2; j <= light; j++)
+			check_landing(&c, j);
+		for (unsigned t = 1; t <= camera; t++)
+			for (unsigned j = t == 1 ? 2 : 0; j <= light && t + j - 1 <= DEPTH; j++)
+				if (t + j >= 2 && joins(&c, j, t))
+					check_route(&c, j, t, &tally);
+	}
+	print_message(
+		"%s: %zu paths (%zu with specular vertices, %zu from infinity, %zu too flat to tell), %zu relabelled\n",
+		name, tally.routes, tally.with_delta, tally.infinite, tally.skipped, tally.relabelled);
+	print_message("  worst: pdf and beta (of %zu vertices) %.1e, ratio %.1e; %zu off the ray\n", tally.betas,
+		      tally.worst, tally.worst_ratio, tally.off);
+	assert_true(tally.off <= tally.routes / 200 + 10);
+	assert_true(tally.routes > dice_count(walks) && tally.relabelled > 2 * tally.routes);
+	world_free(w);
+	return tally;
+}

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Measured media by the names that Mitsuba 0.6 has for them: Jensen, Marschner, Levoy and Hanrahan 2001, A Practical
+ * Model for Subsurface Light Transport, fig. 5. The scattering coefficients are reduced ones: with them light scatters
+ * evenly in all directions. 1/mm, for R, G and B. Pure.
+ */
+#ifndef WORKER_RENDER_MEDIUM_MEASURED_H
+#define WORKER_RENDER_MEDIUM_MEASURED_H
+
+#include <stddef.h>
+
+struct measured_medium {
+	const char *name;
+	double sigma_s[3], sigma_a[3];
+};
+
+#define MEASURED_DEFAULT "skin1" /* of 0.6, where a file says nothing else */
+
+/* By its name in any case; NULL: there is none, and list has the names. */
+const struct measured_medium *measured_find(const char *name, char *list, size_t size);
+
+#endif

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Henyey and Greenstein 1941: p(c) = (1 - g^2) / (4 pi (1 + g^2 - 2 g c)^(3/2)), whose mean cosine is g. Its
+ * distribution function is inverted by c = (1 + g^2 - ((1 - g^2) / (1 + g s))^2) / 2g with s = 2u - 1; written out as a
+ * quotient of polynomials, g divides the numerator, and nothing cancels where g is small.
+ */
+#include "worker/render/medium/phase.h"
+
+#include <math.h>
+
+/* At 0.999 half of the light goes on within 0.1 degrees. */
+static const struct param params[] = {
+	{"g", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -0.999, 0.999, NULL},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+static void create(struct phase *p, const struct scene_node *n)
+{
+	p->g = node_float(n, "g", 0.8);
+}
+
+static double eval(const struct phase *p, double cosine)
+{
+	double g = p->g, square = (1 - g) * (1 - g) + 2 * g * (1 - cosine); /* 1 + g^2 - 2 g c */
+	return (1 - g) * (1 + g) / (4 * M_PI * square * sqrt(square));
+}
+
+static double sample(const struct phase *p, double u)
+{
+	double g = p->g, s = 2 * u - 1, d = 1 + g * s;
+	return (2 * s + g * (s * s + 3) + 2 * g * g * s + g * g * g * (s * s - 1)) / (2 * d * d);
+}
+
+const struct phase_ops phase_ops_hg = {
+	.type = "hg",
+	.params = params,
+	.create = create,
+	.eval = eval,
+	.sample = sample,
+};

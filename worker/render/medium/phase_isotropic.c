@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* All directions alike. */
+#include "worker/render/medium/phase.h"
+
+#include <math.h>
+
+static const struct param params[] = {{NULL, 0, 0, 0, 0, NULL}};
+
+static double eval(const struct phase *p, double cosine)
+{
+	(void)p;
+	(void)cosine;
+	return 1 / (4 * M_PI);
+}
+
+static double sample(const struct phase *p, double u)
+{
+	(void)p;
+	return 2 * u - 1;
+}
+
+const struct phase_ops phase_ops_isotropic = {
+	.type = "isotropic",
+	.params = params,
+	.eval = eval,
+	.sample = sample,
+};
