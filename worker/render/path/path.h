@@ -52,7 +52,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 /* Light sub-path: vertex 0 lies on an emitter. 0: no emitter, or it could not be sampled. */
 unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max_vertices);
 
-/* Goes on from a sub-path of n >= 2 vertices, the last of them a surface. Returns the number of vertices. */
+/* Goes on from a sub-path of n >= 2 vertices, the last of them not at infinity. Returns the number of vertices. */
 unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n,
 		      unsigned max_vertices);
 

@@ -57,6 +57,24 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	return rc ? rc : on_depth(r, n, e);
 }
 
+static bool has_medium(const struct scene_node *n)
+{
+	return n->cls == PLUGIN_SHAPE ? node_ref(n, "interior") || node_ref(n, "exterior")
+				      : n->cls == PLUGIN_SENSOR && node_child(n, PLUGIN_MEDIUM, 0);
+}
+
+/* Mitsuba has integrators with and without media; here each scene is shown with them. */
+static int on_media(struct report *r, const struct scene_node *integrator, struct error *e)
+{
+	static const char *const without[] = {"path", "direct", "prb"};
+	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+		for (size_t i = 0; i < sizeof without / sizeof *without; i++)
+			if (strcmp(n->type, without[i]) == 0)
+				return remark(r, n, e, "Mitsuba's `%s` leaves media out; the image shows them",
+					      n->type);
+	return 0;
+}
+
 static int on_emitter(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
 {
 	if (!dialect_3 || (strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0))
@@ -86,14 +104,16 @@ int remarks_on_object(const struct scene_node *n, struct report *r, struct error
 int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,
 		     struct error *e)
 {
-	const struct scene_node *camera = NULL;
-	bool light = false;
+	const struct scene_node *camera = NULL, *integrator = NULL;
+	bool light = false, media = false;
 	uint32_t sensors = 0;
 	int rc = 0;
 	for (uint32_t i = 0; i < count && !rc; i++) {
 		const struct scene_node *n = objects[i];
 		char place[NODE_PLACE_MAX];
 		light |= n->shines;
+		media |= has_medium(n);
+		integrator = n->cls == PLUGIN_INTEGRATOR ? n : integrator;
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
 		else if (n->cls == PLUGIN_EMITTER)
@@ -107,6 +127,8 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bo
 			sensors = 1;
 		}
 	}
+	if (!rc && media)
+		rc = on_media(r, integrator, e);
 	if (!rc && !light && camera && r->problem_count == 0)
 		rc = remark(r, camera, e, "the scene has no emitter: the image is black");
 	return rc;

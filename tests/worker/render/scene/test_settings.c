@@ -185,6 +185,11 @@ static void test_notes_on_the_whole(void **state)
 		 "s.xml:1: <integrator type=\"photonmapper\">: the image shows all light, on surfaces and in homogeneous media"},
 		{"<integrator type='direct'/>",
 		 "s.xml:1: <integrator type=\"direct\">: the image shows light that is scattered once; --max-depth shows more"},
+		{"<integrator type='path'/><shape type='sphere'><medium type='homogeneous' name='interior'/></shape>",
+		 "s.xml:1: <integrator type=\"path\">: Mitsuba's `path` leaves media out; the image shows them"},
+		{"<integrator type='aov'><integrator type='path'/></integrator><sensor type='perspective'>"
+		 "<medium type='homogeneous'/></sensor>",
+		 "Mitsuba's `path` leaves media out"},
 		{"<integrator type='multichannel'/>", "the image shows all light, on surfaces and"},
 		{"<integrator type='volprim_rf_basic'/>", "the image shows all light, on surfaces and"},
 	};
