@@ -209,7 +209,8 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 	return true;
 }
 
-/* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is not at infinity. start: beta to which roulette compares. */
+/* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is not at infinity. start: beta to which roulette
+ * compares. */
 static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampler_side side, struct path_vertex *v,
 			   unsigned n, unsigned max, double start)
 {
