@@ -150,7 +150,7 @@ scene strange.xml wiener '<emitter type="aurora"><float name="power" value="3"/>
 scene plain.xml gaussian '' '<bsdf type="diffuse" id="stuff"><rgb name="reflectance" value="0.8 0.2 0.1"/></bsdf>' '' ''
 code 1 "$BIN/hslt-scene" check "$DIR/strange.xml"
 code 0 "$BIN/hslt-scene" check --lenient "$DIR/strange.xml"
-for word in wiener aurora bark melanin "the medium" '`ellipsoids`' '<bsdf type="hair">' volume; do
+for word in wiener aurora bark melanin '`heterogeneous`' '`ellipsoids`' '<bsdf type="hair">' volume; do
 	grep "^note: .*(lenient)" "$DIR/out" | grep -q "$word" || fail "nothing is noted of $word: $(cat "$DIR/out")"
 done
 code 1 "$BIN/hslt-render" -i path --spp 4 "$DIR/strange.xml" -o "$DIR/strange.exr"
