@@ -228,11 +228,20 @@ static bool misses_little(const struct render_choice *c)
 	return c->found > missed_little && has_no_fireflies(&c->bdpt);
 }
 
+static bool path_is_cheaper(const struct render_choice *c)
+{
+	return !render_choice_is_settled(c) && is_tame(&c->path) && c->path.cost < path_cost * c->bdpt.cost;
+}
+
+static bool is_short(const struct render_found *path)
+{
+	return has_no_fireflies(path) && path->tail >= tail_least;
+}
+
 /* Where media scatter, chains on half vectors have no paths to begin with, and bdpt stands in for them. */
 static const char *choice_in_media(const struct render_choice *c)
 {
-	if (c->misses || render_choice_is_settled(c) || !is_tame(&c->path) ||
-	    !(c->path.cost < path_cost * c->bdpt.cost) || !has_no_fireflies(&c->path) || c->path.tail < tail_least)
+	if (c->misses || !path_is_cheaper(c) || !is_short(&c->path))
 		return "bdpt";
 	if (!c->focuses)
 		return "path";
@@ -245,15 +254,13 @@ const char *render_choice_of(const struct render_choice *c)
 		return choice_in_media(c);
 	if (wants_chains(c))
 		return RENDER_INTEGRATOR_CHAINS;
-	if (render_choice_is_settled(c) || has_rare_light(c) || !is_tame(&c->path) ||
-	    !(c->path.cost < path_cost * c->bdpt.cost))
+	if (has_rare_light(c) || !path_is_cheaper(c))
 		return "erpt";
 	if (c->misses)
 		return misses_little(c) ? "erpt4" : "erpt";
-	bool is_short = has_no_fireflies(&c->path) && c->path.tail >= tail_least;
-	if (is_short && !c->focuses)
+	if (is_short(&c->path) && !c->focuses)
 		return "path";
-	return is_short && !c->brief && !c->refracts ? "bdpt8" : "erpt4";
+	return is_short(&c->path) && !c->brief && !c->refracts ? "bdpt8" : "erpt4";
 }
 
 /* ---- the pilot */

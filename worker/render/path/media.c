@@ -17,11 +17,7 @@ enum { FACES_MOST = 1024 };
 /* The medium on the side of `away` of a shape that states one, or any; false: it states none. */
 static bool side_of(const struct world *w, const struct surface_point *x, vec3 away, uint32_t *medium)
 {
-	const struct world_shape *s = &w->parts[x->prim.shape];
-	if (!s->interior && !s->exterior)
-		return false;
-	*medium = vec3_dot(x->ng, away) > 0 ? s->exterior : s->interior;
-	return true;
+	return world_medium_of_side(&w->parts[x->prim.shape], vec3_dot(x->ng, away) > 0, medium);
 }
 
 uint32_t path_medium_after(const struct world *w, const struct path_vertex *v, uint32_t medium, vec3 away)
@@ -72,7 +68,16 @@ void path_absorb(const struct path_context *c, const struct path_vertex *at, vec
 struct walk {
 	struct path_edge *edge; /* medium: where the ray is; free: unused until the end */
 	spectrum all, events;	/* optical depths so far: of all media, of those that scatter */
+	spectrum sigma_t;	/* of the medium where the ray is; 0: there is none */
+	bool scatters;		/* that medium does */
 };
+
+static void walk_enter(const struct path_context *c, struct walk *k, uint32_t medium)
+{
+	k->edge->medium = medium;
+	k->scatters = medium && path_medium(c->w, medium)->scatters;
+	k->sigma_t = medium ? medium_extinction(path_medium(c->w, medium), &c->wl) : spectrum_of(0);
+}
 
 static struct walk walk_begin(const struct path_context *c, const struct path_vertex *at, vec3 d,
 			      struct path_edge *edge)
@@ -80,20 +85,18 @@ static struct walk walk_begin(const struct path_context *c, const struct path_ve
 	bool emitter = at->kind == VERTEX_EMITTER || at->kind == VERTEX_INFINITE;
 	uint32_t medium =
 		emitter ? path_medium_of_emitter(c->w, at, d) : path_medium_after(c->w, at, at->edge.medium, d);
-	*edge = (struct path_edge){.medium = medium, .before = medium, .fits = true};
-	return (struct walk){.edge = edge, .all = spectrum_of(0), .events = spectrum_of(0)};
+	struct walk k = {.edge = edge, .all = spectrum_of(0), .events = spectrum_of(0)};
+	*edge = (struct path_edge){.before = medium, .fits = true};
+	walk_enter(c, &k, medium);
+	return k;
 }
 
-static void walk_length(const struct path_context *c, struct walk *k, double length)
+static void walk_length(struct walk *k, double length)
 {
-	if (!k->edge->medium)
-		return;
-	const struct medium *m = path_medium(c->w, k->edge->medium);
-	spectrum sigma_t = medium_extinction(m, &c->wl);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double depth = sigma_t.v[i] > 0 ? sigma_t.v[i] * length : 0; /* not 0 times infinity */
+		double depth = k->sigma_t.v[i] > 0 ? k->sigma_t.v[i] * length : 0; /* not 0 times infinity */
 		k->all.v[i] += depth;
-		k->events.v[i] += m->scatters ? depth : 0;
+		k->events.v[i] += k->scatters ? depth : 0;
 	}
 }
 
@@ -104,7 +107,7 @@ static void walk_through(const struct path_context *c, struct walk *k, const str
 	if (!side_of(c->w, x, vec3_neg(d), &near) || !side_of(c->w, x, d, &far))
 		return;
 	k->edge->fits = k->edge->fits && near == k->edge->medium;
-	k->edge->medium = far;
+	walk_enter(c, k, far);
 }
 
 static spectrum walk_end(struct walk *k)
@@ -123,10 +126,9 @@ static bool is_face(const struct world *w, const struct path_vertex *v)
 }
 
 /* The distance of the next event along the ray, which has so much optical depth to go at one wavelength. */
-static double next_event(const struct path_context *c, const struct walk *k, int lane, double depth)
+static double next_event(const struct walk *k, int lane, double depth)
 {
-	const struct medium *m = k->edge->medium ? path_medium(c->w, k->edge->medium) : NULL;
-	double sigma = m && m->scatters ? medium_extinction(m, &c->wl).v[lane] : 0;
+	double sigma = k->scatters ? k->sigma_t.v[lane] : 0;
 	return sigma > 0 ? fmax(depth - k->events.v[lane], 0) / sigma : INFINITY;
 }
 
@@ -144,17 +146,17 @@ bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, 
 	double place = u * SPECTRUM_LANES, lane = floor(place), depth = -log1p(lane - place);
 	struct path_edge edge;
 	struct walk k = walk_begin(c, at, d, &edge);
-	struct path_vertex from = {.kind = at->kind, .x.p = at->x.p, .x.ng = at->x.ng, .x.prim = at->x.prim};
+	struct path_vertex from = *at;
 	for (int i = 0; i < FACES_MOST; i++) {
 		bool met = path_extend(c, &from, d, t_min, t_max, to);
 		double end = met && to->kind == VERTEX_SURFACE ? vec3_length(vec3_sub(to->x.p, from.x.p)) : INFINITY;
-		double event = t_min + next_event(c, &k, (int)lane, depth);
+		double event = t_min + next_event(&k, (int)lane, depth);
 		if (event < fmin(end, t_max)) {
 			stop_in_medium(to, from.x.p, event, d);
-			walk_length(c, &k, event - t_min);
+			walk_length(&k, event - t_min);
 			met = vec3_is_finite(to->x.p);
 		} else {
-			walk_length(c, &k, end - t_min);
+			walk_length(&k, end - t_min);
 		}
 		if (!met || !is_face(c->w, to)) {
 			*left = walk_end(&k);
@@ -175,17 +177,17 @@ bool path_see_in_media(struct path_context *c, const struct path_vertex *z, cons
 	double distance2;
 	vec3 d = path_direction(z, y, &distance2);
 	struct walk k = walk_begin(c, z, d, edge);
-	struct path_vertex from = {.kind = z->kind, .x.p = z->x.p, .x.ng = z->x.ng, .x.prim = z->x.prim}, face;
+	struct path_vertex from = *z, face;
 	double begin = near_plane(c->w, z, d);
 	for (int i = 0; i < FACES_MOST; i++) {
 		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from.x.p));
 		bool met = c->w->has_passable && path_extend(c, &from, d, begin, end, &face);
 		if (!met || !is_face(c->w, &face)) {
-			walk_length(c, &k, fmax(end - begin, 0));
+			walk_length(&k, fmax(end - begin, 0));
 			*left = walk_end(&k);
 			return path_visible(c, &from, y);
 		}
-		walk_length(c, &k, vec3_length(vec3_sub(face.x.p, from.x.p)) - begin);
+		walk_length(&k, vec3_length(vec3_sub(face.x.p, from.x.p)) - begin);
 		walk_through(c, &k, &face.x, d);
 		from = face;
 		begin = 0;

@@ -247,13 +247,11 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 	struct bsdf_reach *of_bsdf = arena_alloc(&b->scratch, w->bsdf_count, sizeof *of_bsdf);
 	if (!reached || !room || !of_bsdf)
 		return build_out_of_memory(b->e);
-	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor);
 	const struct effects_source src = {.scene = b->scene,
 					   .shape = b->shape_nodes,
 					   .bsdf = b->bsdf_nodes,
 					   .emitter = b->emitter_nodes,
-					   .sensor = sensor,
-					   .camera_medium = build_camera_medium(sensor),
+					   .sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor),
 					   .max_depth = max_depth,
 					   .box = b->boxes,
 					   .room = room,

@@ -4,11 +4,6 @@
 #include "worker/render/geom/accel.h"
 #include "worker/render/world/node_table.h"
 
-const struct scene_node *build_camera_medium(const struct scene_node *sensor)
-{
-	return sensor ? node_child(sensor, PLUGIN_MEDIUM, 0) : NULL;
-}
-
 /* Gives a medium its number, 1 + its index in the order of first use; 0: there is none. It is made at first use. */
 static int number_medium(struct builder *b, const struct scene_node *n, struct node_table *numbers, uint32_t *number)
 {
@@ -27,7 +22,8 @@ int build_media(struct builder *b)
 {
 	struct world *w = b->w;
 	struct node_table numbers;
-	const struct scene_node *camera = build_camera_medium(scene_sensor(b->scene, (uint32_t)w->accuracy.sensor));
+	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor),
+				*camera = sensor ? node_child(sensor, PLUGIN_MEDIUM, 0) : NULL;
 	uint32_t uses = camera ? 1 : 0;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		uses += node_ref(b->shape_nodes[i], "interior") ? 1 : 0;
@@ -54,11 +50,11 @@ static uint32_t next_medium(const struct world *w, struct ray_end from, vec3 d)
 	enum { SURFACES = 1024 }; /* that state none, at most */
 	struct ray_hit hit;
 	struct surface_point x;
+	uint32_t medium;
 	for (int i = 0; i < SURFACES && accel_closest(w->accel, &from, d, 0, INFINITY, &hit); i++) {
-		const struct world_shape *s = &w->parts[hit.prim.shape];
 		surface_from_hit(&w->shapes[hit.prim.shape], from.p, d, &hit, &x);
-		if (s->interior || s->exterior)
-			return vec3_dot(x.ng, d) < 0 ? s->exterior : s->interior;
+		if (world_medium_of_side(&w->parts[hit.prim.shape], vec3_dot(x.ng, d) < 0, &medium))
+			return medium;
 		from = (struct ray_end){x.p, x.ng, x.prim};
 	}
 	return w->camera_medium;

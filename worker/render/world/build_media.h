@@ -9,8 +9,6 @@
 
 #include "worker/render/world/build_private.h"
 
-/* What surrounds a sensor; NULL: nothing. */
-const struct scene_node *build_camera_medium(const struct scene_node *sensor);
 int build_media(struct builder *b);
 /* After Embree's tree: which shapes light passes without a vertex, and the media around emitters. */
 int build_scattering(struct builder *b);

@@ -173,7 +173,8 @@ static struct census take_census(const struct world *w, const struct effects_sou
 			add_medium(&c, w, w->parts[i].interior, n, node_ref(n, "interior"));
 			add_medium(&c, w, w->parts[i].exterior, n, node_ref(n, "exterior"));
 		}
-	add_medium(&c, w, w->camera_medium, src->sensor, src->camera_medium);
+	if (w->camera_medium)
+		add_medium(&c, w, w->camera_medium, src->sensor, node_child(src->sensor, PLUGIN_MEDIUM, 0));
 	add_unused(&c, w, src);
 	return c;
 }
@@ -292,6 +293,15 @@ static void spectral(struct report *r, const struct census *c, bool rgb)
 		force_colour(r, "dispersion");
 }
 
+/* A line that names what has something, or another sentence. */
+static bool tallied(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
+		    const char *none)
+{
+	char text[NAMES_MAX];
+	return t->count ? line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many))
+			: line(r, which, false, "%s", none);
+}
+
 /* A line that names the materials that have something, or "no material ...". */
 static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
 		      const char *none)
@@ -331,13 +341,10 @@ static void lobes(struct report *r, const struct census *c)
 				"is diffuse only");
 	fx->transmission = materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through",
 				     "let light through", "lets it through");
-	char text[NAMES_MAX];
-	fx->absorption = c->absorbing.count ? line(r, EFFECT_ABSORPTION, true, "%s border%s on a medium that absorbs",
-						   names_of(&c->absorbing, text), verb(&c->absorbing, "s", ""))
-					    : line(r, EFFECT_ABSORPTION, false, "no medium absorbs");
-	fx->scattering = c->scattering.count ? line(r, EFFECT_SCATTERING, true, "%s border%s on a medium that scatters",
-						    names_of(&c->scattering, text), verb(&c->scattering, "s", ""))
-					     : line(r, EFFECT_SCATTERING, false, "no medium scatters");
+	fx->absorption = tallied(r, EFFECT_ABSORPTION, &c->absorbing, "borders on a medium that absorbs",
+				 "border on a medium that absorbs", "no medium absorbs");
+	fx->scattering = tallied(r, EFFECT_SCATTERING, &c->scattering, "borders on a medium that scatters",
+				 "border on a medium that scatters", "no medium scatters");
 }
 
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
@@ -381,14 +388,6 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		line(r, EFFECT_COINCIDENCE, true, "only opaque bodies touch");
 	else
 		line(r, EFFECT_COINCIDENCE, false, "no surfaces lie in one place");
-}
-
-static bool lights(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
-		   const char *none)
-{
-	char text[NAMES_MAX];
-	return t->count ? line(r, which, true, "%s %s", names_of(t, text), verb(t, one, many))
-			: line(r, which, false, "%s", none);
 }
 
 static void emitter_moves(struct report *r, const struct census *c)
@@ -437,13 +436,13 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	emitter_moves(&r, &c);
 	lobes(&r, &c);
 	surfaces(&r, &c, w, src);
-	fx->environment = lights(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
-				 "rays that escape meet nothing");
-	fx->area_light = lights(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
-				"no surface shines");
+	fx->environment = tallied(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on everything that escapes", "",
+				  "rays that escape meet nothing");
+	fx->area_light = tallied(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
+				 "no surface shines");
 	fx->delta_light =
-		lights(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
-		       "are points or parallel light, which no path hits by chance",
-		       "no emitter is a point or parallel light");
+		tallied(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
+			"are points or parallel light, which no path hits by chance",
+			"no emitter is a point or parallel light");
 	depth(&r, w, src, shape);
 }

@@ -22,7 +22,7 @@ struct effects_source {
 	const struct scene *scene;
 	const struct scene_node *const *shape, *const *bsdf; /* one per shape; one per BSDF, NULL: the default one */
 	const struct scene_node *const *emitter;	     /* one per emitter */
-	const struct scene_node *sensor, *camera_medium;     /* NULL: there is none */
+	const struct scene_node *sensor;		     /* NULL: there is none */
 	uint32_t max_depth;				     /* as requested; 0: the scene's */
 	const struct box *box;				     /* one per shape, in any unit */
 	struct weighed *room;				     /* space for one per shape */

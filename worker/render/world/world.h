@@ -20,6 +20,15 @@ struct world_shape {
 	bool passable;		     /* a face of `null` that is no vertex of paths: path/media.h */
 };
 
+/* The medium on one side of a shape that states any; false: it states none. */
+static inline bool world_medium_of_side(const struct world_shape *s, bool outside, uint32_t *medium)
+{
+	if (!s->interior && !s->exterior)
+		return false;
+	*medium = outside ? s->exterior : s->interior;
+	return true;
+}
+
 struct world {
 	struct arena arena;
 	struct scene_settings settings;
