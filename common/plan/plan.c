@@ -425,7 +425,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	if (rc == 0)
 		rc = asked_total(r, p, &total, e);
 	if (rc == 0 && !total && !(r->seconds > 0) && !(r->target_error > 0))
-		rc = error_set(e, EINVAL, "no bound is given: samples per pixel, mutations, seconds or an error");
+		rc = error_set(e, EINVAL, "no bound is given: --spp, --mutations, --time or --target-error");
 	if (rc == 0)
 		rc = r->kind == PLAN_CHAINS ? make_chains(r, p, total, e) : make_samples(r, p, total, e);
 	if (rc == 0)

@@ -8,6 +8,8 @@
 #include <stdio.h>
 #include <string.h>
 
+enum { USUAL_SPP = 64 }; /* nothing is rendered, so none need be asked for */
+
 static const char *state_of(const struct effect_line *l)
 {
 	if (l->forced)
@@ -95,6 +97,9 @@ int explain(const char *path, struct render_arguments *a, bool json, bool *usage
 		rc = render_plan_from_scene(a, &m, e);
 		*usage = rc == -EINVAL;
 	}
+	const struct plan_request *p = &a->plan;
+	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))
+		a->plan.spp = USUAL_SPP;
 	struct choice choice;
 	if (!rc)
 		rc = choice_make(a, folder, name, &choice, e);
