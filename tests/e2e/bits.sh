@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, other settings, a crop that ends by its error,
+# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, other settings, smoke, a crop that ends by its error,
 # a scene whose files lie outside its folder.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-render hslt-compare
@@ -15,17 +15,22 @@ options_of() {
 	hslt) echo "--integrator hslt --mutations hslt=0.9,independent=0.1 --bootstrap 20000 --mutations 60000" ;;
 	settings) echo "--integrator hslt --bootstrap 5000 --mutations 20000 --set roughness=0.1,wavelengths=2 --set precision=single,tolerance=0.0001" ;;
 	auto) echo "--spp 8 --seed 3" ;;
+	smoke) echo "--integrator bdpt --spp 4 --size 64x48" ;;
 	error) echo "--integrator path --crop 8,8,24,16 --target-error 4% --epoch 1 --spp 4096 --seed 7" ;;
 	esac
 }
 
-KINDS="path bdpt bdpt8 erpt erpt4 pssmlt auto"
+scene_of() {
+	if [ "$1" = smoke ]; then echo "${BOX%/*}/../smoke/scene.xml"; else echo "$BOX"; fi
+}
+
+KINDS="path bdpt bdpt8 erpt erpt4 pssmlt auto smoke"
 if "$BIN/hslt-render" --help | grep -q 'integrator=NAME.* hslt'; then
 	KINDS="$KINDS hslt settings"
 fi
 KINDS="$KINDS error"
 for kind in $KINDS; do
-	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $(options_of $kind) 2>>"$DIR/render.log" || fail "hslt-render: $kind"
+	"$BIN/hslt-render" "$(scene_of $kind)" -o "$DIR/$kind.exr" $(options_of $kind) 2>>"$DIR/render.log" || fail "hslt-render: $kind"
 done
 if "$BIN/hslt-compare" --exact "$DIR/path.exr" "$DIR/bdpt.exr" >/dev/null 2>&1; then
 	fail "path and bdpt cannot be equal: what compares does not look"
@@ -43,7 +48,7 @@ for workers in 1 2 4; do
 	until_true 10 sh -c "[ \$('$BIN/hslt-status' --json | grep -o '\"fingerprint\"' | wc -l) -eq $workers ]" ||
 		fail "$workers workers do not show"
 	for kind in $KINDS; do
-		submit "$BOX" -o "$DIR/$kind-$workers.exr" $(options_of $kind) --wait >"$DIR/id" || fail "$kind: $?"
+		submit "$(scene_of $kind)" -o "$DIR/$kind-$workers.exr" $(options_of $kind) --wait >"$DIR/id" || fail "$kind: $?"
 		same "$DIR/$kind.exr" "$DIR/$kind-$workers.exr"
 	done
 done

@@ -14,6 +14,8 @@ SCENE=$DIR/scene/box.xml
 "$BIN/hslt-render" --explain "$SCENE" >"$DIR/list" 2>"$DIR/log" || fail "--explain ended with $?: $(cat "$DIR/log")"
 grep -q '^textures  *off' "$DIR/list" || fail "textures of a material that nobody uses: $(cat "$DIR/list")"
 grep -q '^aperture  *off' "$DIR/list" || fail "no word on the aperture"
+# Of a scene that asks for no samples, and without a bound.
+"$BIN/hslt-render" --explain "${BOX%/*}/../smoke/scene.xml" | grep -q '^scattering *on ' || fail "--explain needs a bound"
 "$BIN/hslt-render" --explain --effects=+aperture "$SCENE" 2>/dev/null | grep -q '^aperture  *on (forced)' || fail "not forced"
 
 # Which integrators were considered, what was chosen, and why: by --explain and by --stats.

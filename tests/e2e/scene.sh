@@ -17,7 +17,7 @@ cat >"$DIR/bad.xml" <<'XML'
 <shape type="sphere">
 	<ref id="fur"/>
 	<float name="radios" value="1"/>
-	<medium type="heterogeneous" name="interior"/>
+	<medium type="smoke" name="interior"/>
 </shape>
 <shape type="cube"><ref id="fur"/><bsdf type="diffuse"><rgb name="reflectance" value="2 0 0"/></bsdf></shape>
 <shape type="cube"><transform name="to_world"><rotate angle="10"/></transform></shape>
@@ -145,12 +145,12 @@ XML
 }
 scene strange.xml wiener '<emitter type="aurora"><float name="power" value="3"/></emitter>' \
 	'<bsdf type="bark" id="stuff"><texture type="perlin" name="knots"/><bsdf type="hair"><rgb name="base_color" value="0.8 0.2 0.1"/><float name="melanin" value="0.3"/></bsdf></bsdf>' \
-	'<medium name="interior" type="heterogeneous"><float name="albedo" value="0.5"/></medium>' \
+	'<medium name="interior" type="heterogeneous"><volume type="volcache" name="sigma_t"/><float name="albedo" value="0.5"/></medium>' \
 	'<shape type="ellipsoids"><string name="filename" value="h.hair"/></shape><volume type="grid"/>'
 scene plain.xml gaussian '' '<bsdf type="diffuse" id="stuff"><rgb name="reflectance" value="0.8 0.2 0.1"/></bsdf>' '' ''
 code 1 "$BIN/hslt-scene" check "$DIR/strange.xml"
 code 0 "$BIN/hslt-scene" check --lenient "$DIR/strange.xml"
-for word in wiener aurora bark melanin '`heterogeneous`' '`ellipsoids`' '<bsdf type="hair">' volume; do
+for word in wiener aurora bark melanin '`volcache`' 'type="heterogeneous"' '`ellipsoids`' '<bsdf type="hair">' volume; do
 	grep "^note: .*(lenient)" "$DIR/out" | grep -q "$word" || fail "nothing is noted of $word: $(cat "$DIR/out")"
 done
 code 1 "$BIN/hslt-render" -i path --spp 4 "$DIR/strange.xml" -o "$DIR/strange.exr"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's bundle, from the scene file to the world before Embree has it: the scene, a mesh, and a picture in one input
- * (the scene up to the first zero byte, u16 BE size of the mesh, mesh, picture). Scenes that ask for many triangles by
- * displacement get what they ask for, so those are left out here.
+ * A job's bundle, from the scene file to the world before Embree has it: the scene, a mesh, and a picture or a grid in
+ * one input (the scene up to the first zero byte, u16 BE size of the mesh, mesh, picture). Scenes that ask for many
+ * triangles by displacement get what they ask for, so those are left out here.
  */
 #include "tests/fuzz/messages.h"
 #include "tests/support/memory_assets.h"
@@ -59,10 +59,13 @@ static bool is_moderate(const struct scene *s)
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
 	struct input in = cut(bytes, size);
-	const struct memory_file files[] = {
-		{"s.xml", in.scene, in.scene_size},	{"i.xml", in.scene, in.scene_size},
-		{"m.obj", in.mesh, in.mesh_size},	{"p.png", in.picture, in.picture_size},
-		{"p.exr", in.picture, in.picture_size}, {0}};
+	const struct memory_file files[] = {{"s.xml", in.scene, in.scene_size},
+					    {"i.xml", in.scene, in.scene_size},
+					    {"m.obj", in.mesh, in.mesh_size},
+					    {"p.png", in.picture, in.picture_size},
+					    {"p.exr", in.picture, in.picture_size},
+					    {"g.vol", in.picture, in.picture_size},
+					    {0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
 	struct error e;

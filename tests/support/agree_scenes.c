@@ -4,8 +4,10 @@
 #include "tests/support/agree_scenes.h"
 
 #include "tests/support/memory_assets.h"
+#include "tests/support/vol.h"
 #include "tests/support/worlds.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -368,6 +370,40 @@ static struct world *scattering_media(const struct agree_case *k)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
 }
 
+/* A cloud of three colours around a stone and a lamp, with holes in it, beside rough glass that is clouded within; a > 0:
+ * they only absorb. Their grids are upright, the scene is not. */
+static double puffs(double x, double y, double z, uint32_t channel)
+{
+	return fmax(0, 0.4 + sin(9 * x + 0.3 * channel) * cos(8 * y) * sin(7 * z + channel));
+}
+
+static struct world *uneven_media(const struct agree_case *k)
+{
+#define GRID(name, params) "<volume type='gridvolume' name='" name "'><string name='filename' value='puffs.vol'/>" params "</volume>"
+#define UNEVEN(scale, sigma_t, albedo) "<medium type='heterogeneous' name='interior'>" sigma_t albedo "<float name='scale' value='" scale "'/></medium>"
+#define SIZED AT("<translate x='-.5' y='-.4' z='-.5'/><scale value='2.6'/>")
+#define BLACK "<float name='albedo' value='0'/>"
+#define CLOUD(albedo) UNEVEN("3", GRID("sigma_t", SIZED), albedo)
+#define CLOUDED(albedo) UNEVEN("4", GRID("sigma_t", SIZED "<string name='filter_type' value='nearest'/>"), albedo)
+	static char xml[1 << 13];
+	static struct vol grid;
+	bool black = k->a > 0;
+	vol_make(&grid, (const uint32_t[3]){6, 5, 7}, 3, puffs);
+	for (size_t i = 0; i < 6 * 5 * 7 * 3; i++)
+		grid.value[i] = fminf(grid.value[i], 1);
+	vol_write(&grid);
+	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" LOOK_AT_IT GROUND SKY
+			 "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) "<bsdf type='null'/>%s</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='-0.5' y='1.1'/>" TURN) "<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
+			 "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) ROUGH("1.33") "%s</shape>"
+			 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
+			 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape></scene>",
+			 black ? CLOUD(BLACK) : CLOUD(GRID("albedo", SIZED)), black ? CLOUDED(BLACK) : CLOUDED("<rgb name='albedo' value='1,0.95,0.9'/>"));
+	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"puffs.vol", grid.bytes, grid.size}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
 /* A lamp in a cloud that says something else of what is around it; and a lamp outside, from which light enters the cloud
  * through a face that states haze there. Most light sub-paths are in other media than the camera's. */
 static struct world *media_that_do_not_fit(const struct agree_case *k)
@@ -407,6 +443,8 @@ const struct agree_case agree_cases[] = {
 	{"smooth tangents", "brushed metal and glass", smooth_tangents, 0, 0, 6, 1024, 1024, ALL, 0.02},
 	{"absorbing media", "glass and water", absorbing_media, 0, 0, 8, 2048, 1024, ALL, 0.02},
 	{"absorbing media", "glass and water in haze", absorbing_media, 0.3, 0, 8, 2048, 1024, ALL, 0.07},
+	{"absorbing media", "that vary", uneven_media, 1, 0, 8, 1024, 1024, ALL, 0.02},
+	{"scattering media", "that vary", uneven_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt"}, 0.02},
 	{"scattering media", "a cloud and milk", scattering_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt"}, 0.02},
 	{"scattering media", "a cloud and milk in fog", scattering_media, 0.2, 0, 10, 4096, 2048, {"bdpt", "pssmlt"}, 0.03},
 	{"scattering media", "that do not fit together", media_that_do_not_fit, 0, 0, 6, 1024, 1024, {"bdpt", "pssmlt"}, 0.02},

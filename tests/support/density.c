@@ -2,6 +2,7 @@
 #include "tests/support/density.h"
 
 #include "tests/support/dice.h"
+#include "tests/support/slow_grid.h"
 #include "tests/support/stats.h"
 #include "worker/render/path/connect.h"
 #include "worker/render/world/build.h"
@@ -52,14 +53,52 @@ static double per_area(const struct path_vertex *at, const struct path_vertex *t
 	return fabs(vec3_dot(to->x.ng, towards(at, to))) / vec3_dot(d, d);
 }
 
-/* Of the only medium there is, which is everywhere; before a camera's near plane there is none. */
-static double length_between(const struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
+/* By how much a channel of the grid counts in sigma_t; of a medium that is the same everywhere, sigma_t. */
+static double coefficient(const struct path_context *c, int channel, int lane)
 {
-	const struct path_vertex *eye = a->kind == VERTEX_CAMERA ? a : b;
-	double t_min = 0, t_max;
+	const struct medium *m = &c->w->media[0];
+	if (!m->first.grid)
+		return medium_extinction(m, (vec3){0, 0, 0}, &c->wl).v[lane];
+	if (m->first.grid->channels == 1)
+		return m->per_length;
+	double sum = 0, own = 0;
+	for (int k = 0; k < m->first.grid->channels; k++) {
+		double x = color_eval(&m->first.primary[k], &c->wl).v[lane];
+		sum += x;
+		own = k == channel ? x : own;
+	}
+	return m->per_length * own / sum;
+}
+
+/* Sigma_t of the only medium there is, which is everywhere. */
+static double sigma_at(const struct path_context *c, const struct path_vertex *v, int lane)
+{
+	const struct grid *g = c->w->media[0].first.grid;
+	double x[3], sum = 0;
+	if (!g)
+		return coefficient(c, 0, lane);
+	slow_grid_cells(g, &(struct grid_ray){v->x.p, {0, 0, 0}, 0, 0}, 0, x);
+	for (int k = 0; k < g->channels && slow_grid_has(g, v->x.p); k++)
+		sum += coefficient(c, k, lane) * slow_grid_value(g, x, k);
+	return sum;
+}
+
+/* Its optical depth; before a camera's near plane there is none. */
+static spectrum depth_between(const struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
+{
+	const struct grid *g = c->w->media[0].first.grid;
+	const struct path_vertex *eye = b->kind == VERTEX_CAMERA ? b : a, *other = eye == a ? b : a;
+	double t_min = 0, t_max, length = vec3_length(vec3_sub(a->x.p, b->x.p));
+	spectrum depth = spectrum_of(0);
 	if (eye->kind == VERTEX_CAMERA)
-		camera_clip(&c->w->camera, towards(eye, eye == a ? b : a), &t_min, &t_max);
-	return vec3_length(vec3_sub(a->x.p, b->x.p)) - t_min;
+		camera_clip(&c->w->camera, towards(eye, other), &t_min, &t_max);
+	const struct grid_ray r = {eye->x.p, towards(eye, other), t_min, length};
+	for (int k = 0; k < (g ? g->channels : 1); k++) {
+		double along = g ? slow_grid_integral(g, &r, k) : length - t_min;
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			depth.v[i] += coefficient(c, k, i) * along;
+	}
+	return depth;
 }
 
 /* What the distance contributes to the density of `to`: by one wavelength of four, that of an event or of none. */
@@ -68,9 +107,9 @@ static double by_distance(const struct path_context *c, const struct path_vertex
 	double sum = 0;
 	if (!c->w->effects.scattering)
 		return 1;
-	spectrum sigma = medium_extinction(&c->w->media[0], &c->wl);
+	spectrum depth = depth_between(c, at, to);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		sum += exp(-sigma.v[i] * length_between(c, at, to)) * (to->kind == VERTEX_MEDIUM ? sigma.v[i] : 1);
+		sum += exp(-depth.v[i]) * (to->kind == VERTEX_MEDIUM ? sigma_at(c, to, i) : 1);
 	return sum / SPECTRUM_LANES;
 }
 
@@ -79,7 +118,7 @@ static double left_over(const struct path_context *c, const struct path_vertex *
 {
 	if (!c->w->effects.scattering)
 		return 1;
-	return exp(-medium_extinction(&c->w->media[0], &c->wl).v[0] * length_between(c, a, b));
+	return exp(-depth_between(c, a, b).v[0]);
 }
 
 static struct emitter_point emitter_point_of(const struct path_vertex *v)
@@ -252,7 +291,7 @@ static double scatter(const struct path_context *c, const struct path_vertex *ca
 		      const struct path_vertex *light)
 {
 	if (at->kind == VERTEX_MEDIUM)
-		return medium_scattering(&c->w->media[0], &c->wl).v[0] *
+		return medium_scattering(&c->w->media[0], at->x.p, &c->wl).v[0] *
 		       phase_eval(&c->w->media[0].phase, towards(at, camera), towards(at, light));
 	if (at->delta) {
 		struct bsdf_sample s = specular_lobe(c, camera, at, light, TRANSPORT_RADIANCE);
@@ -320,9 +359,9 @@ static struct path_edge edge_between(const struct path_context *c, const struct 
 				     const struct path_vertex *b)
 {
 	struct path_edge e = {.medium = 1, .before = 1, .fits = true};
-	spectrum sigma = medium_extinction(&c->w->media[0], &c->wl);
+	spectrum depth = depth_between(c, a, b);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		e.free.v[i] = exp(-sigma.v[i] * length_between(c, a, b));
+		e.free.v[i] = exp(-depth.v[i]);
 	return e;
 }
 

@@ -2,6 +2,7 @@
 #include "tests/support/scene_tables.h"
 
 #include "worker/render/medium/medium.h"
+#include "worker/render/volume/volume.h"
 
 #include <assert.h>
 
@@ -73,6 +74,8 @@ const struct plugin_decl *scene_tables(void)
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		all[n++] = *d;
 	for (const struct plugin_decl *d = medium_decls; d->type; d++)
+		all[n++] = *d;
+	for (const struct plugin_decl *d = volume_decls; d->type; d++)
 		all[n++] = *d;
 	for (size_t i = 0; phase_registry[i]; i++)
 		all[n++] = (struct plugin_decl){PLUGIN_PHASE, phase_registry[i]->type, phase_registry[i]->params, 0,

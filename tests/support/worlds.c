@@ -54,24 +54,29 @@ struct world *world_of_text(uint32_t width, uint32_t height, const char *format,
 	return build(&assets, "test.xml", width, height);
 }
 
-void world_refused(const char *body, const char *sentence)
+void world_of_files_refused(const struct memory_file *files, const char *sentence)
 {
-	static char xml[2048];
-	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "%s</scene>", body);
-	assert_true(n > 0 && (size_t)n < sizeof xml);
-	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
 	struct world *w = NULL;
 	struct error e = {""};
-	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
+	int rc = scene_read(&s, &assets, files[0].name, render_plugins(), NULL, 0, &e);
 	if (!rc) {
 		struct render_options o = options(0, 0);
 		rc = world_new(&w, &s, &assets, &o, &e);
 		scene_fini(&s);
 	}
 	if (rc >= 0 || !strstr(e.text, sentence))
-		fail_msg("%s\n gave %d: %s\n not: %s", body, rc, e.text, sentence);
+		fail_msg("%.*s\n gave %d: %s\n not: %s", (int)files[0].size, (const char *)files[0].bytes, rc, e.text,
+			 sentence);
+}
+
+void world_refused(const char *body, const char *sentence)
+{
+	static char xml[2048];
+	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0") "%s</scene>", body);
+	assert_true(n > 0 && (size_t)n < sizeof xml);
+	world_of_files_refused((const struct memory_file[]){{"s.xml", xml, (size_t)n}, {NULL, NULL, 0}}, sentence);
 }
 
 struct world *world_of_files(uint32_t width, uint32_t height, const struct memory_file *files)

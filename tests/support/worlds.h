@@ -32,6 +32,7 @@ extern const char *worlds_effects;
 /* From files in memory (tests/support/memory_assets.h): the first is the scene. */
 struct memory_file;
 struct world *world_of_files(uint32_t width, uint32_t height, const struct memory_file *files);
+void world_of_files_refused(const struct memory_file *files, const char *sentence); /* as world_refused */
 
 /* From the folder that HSLT_SCENES names; NULL: the variable is not set. */
 struct world *world_of_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height);

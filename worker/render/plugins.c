@@ -7,6 +7,7 @@
 #include "worker/render/medium/medium.h"
 #include "worker/render/settings/accuracy_settings.h"
 #include "worker/render/shape/shape.h"
+#include "worker/render/volume/volume.h"
 
 #include <assert.h>
 #include <pthread.h>
@@ -38,6 +39,8 @@ static void gather(void)
 		add_plugin((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params,
 						texture_registry[i]->nested_classes, PARAM_UNDERSTOOD});
 	for (const struct plugin_decl *d = medium_decls; d->type; d++)
+		add_plugin(*d);
+	for (const struct plugin_decl *d = volume_decls; d->type; d++)
 		add_plugin(*d);
 	for (size_t i = 0; phase_registry[i]; i++)
 		add_plugin((struct plugin_decl){PLUGIN_PHASE, phase_registry[i]->type, phase_registry[i]->params, 0,

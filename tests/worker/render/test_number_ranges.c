@@ -27,6 +27,10 @@ static const char ply[] =
 	"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 	"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
+/* Two bytes along x. */
+static const char vol[] = "VOL\3\3\0\0\0\2\0\0\0\1\0\0\0\1\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"
+			  "\0\0\200?\0\0\200?\0\0\200?\10\20";
+
 /* The property as XML; 0: the parameter takes no value of that type. */
 static int print_value(char *out, size_t size, const struct param *p, enum value_type type, double x)
 {
@@ -63,8 +67,9 @@ static const char *companions(const struct plugin_decl *d, const struct param *p
 
 static const char *file_of(const struct plugin_decl *d)
 {
-	return strcmp(d->type, "obj") == 0   ? "<string name='filename' value='m.obj'/>"
-	       : strcmp(d->type, "ply") == 0 ? "<string name='filename' value='m.ply'/>"
+	return strcmp(d->type, "obj") == 0	    ? "<string name='filename' value='m.obj'/>"
+	       : strcmp(d->type, "ply") == 0	    ? "<string name='filename' value='m.ply'/>"
+	       : strcmp(d->type, "gridvolume") == 0 ? "<string name='filename' value='m.vol'/>"
 	       : strcmp(d->type, "bitmap") == 0 || strcmp(d->type, "envmap") == 0
 		       ? "<string name='filename' value='sky.hdr'/>"
 		       : "";
@@ -81,11 +86,18 @@ static const char *file_of(const struct plugin_decl *d)
 static void print_scene(char *text, const struct plugin_decl *d, const char *companion, const char *property)
 {
 	char own[2048], sensor[2600], ball[2600] = "", light[2600] = "";
-	bool medium = d->cls == PLUGIN_MEDIUM, phase = d->cls == PLUGIN_PHASE;
+	bool medium = d->cls == PLUGIN_MEDIUM, volume = d->cls == PLUGIN_VOLUME,
+	     in_medium = volume || d->cls == PLUGIN_PHASE;
 	snprintf(own, sizeof own, "\n%s<%s type='%s'%s>" PROPERTY "</%s>%s%s\n",
-		 phase ? "<medium type='homogeneous' name='interior'>" : "", plugin_class_name(d->cls), d->type,
-		 medium ? " name='interior'" : "", file_of(d), companion, property, plugin_class_name(d->cls),
-		 phase ? "</medium>" : "", medium || phase ? "<bsdf type='null'/>" : "");
+		 volume	     ? "<medium type='heterogeneous' name='interior'>"
+		 : in_medium ? "<medium type='homogeneous' name='interior'>"
+			     : "",
+		 plugin_class_name(d->cls), d->type,
+		 medium	  ? " name='interior'"
+		 : volume ? " name='sigma_t'"
+			  : "",
+		 file_of(d), companion, property, plugin_class_name(d->cls), in_medium ? "</medium>" : "",
+		 medium || in_medium ? "<bsdf type='null'/>" : "");
 	bool nested = d->cls == PLUGIN_FILM || d->cls == PLUGIN_RFILTER || d->cls == PLUGIN_SAMPLER;
 	if (d->cls == PLUGIN_SENSOR)
 		snprintf(sensor, sizeof sensor, "\n<sensor type='%s'>" LOOK "%s%s</sensor>", d->type, companion,
@@ -94,7 +106,7 @@ static void print_scene(char *text, const struct plugin_decl *d, const char *com
 		snprintf(sensor, sizeof sensor, "<sensor type='perspective'>" LOOK "%s%s%s</sensor>",
 			 d->cls == PLUGIN_RFILTER ? "<film type='hdrfilm'>" : "", nested ? own : "",
 			 d->cls == PLUGIN_RFILTER ? "</film>" : "");
-	if (d->cls == PLUGIN_BSDF || medium || phase)
+	if (d->cls == PLUGIN_BSDF || medium || in_medium)
 		snprintf(ball, sizeof ball, BALL, own);
 	else if (d->cls == PLUGIN_TEXTURE)
 		snprintf(ball, sizeof ball,
@@ -120,11 +132,9 @@ static int try_value(const struct plugin_decl *d, const struct param *p, enum va
 	if (!print_value(property, sizeof property, p, type, x))
 		return 0;
 	print_scene(text, d, companions(d, p), property);
-	const struct memory_file files[] = {{"s.xml", text, strlen(text)},
-					    {"sky.hdr", sky, sizeof sky - 1},
-					    {"m.obj", obj, sizeof obj - 1},
-					    {"m.ply", ply, sizeof ply - 1},
-					    {NULL, NULL, 0}};
+	const struct memory_file files[] = {{"s.xml", text, strlen(text)},  {"sky.hdr", sky, sizeof sky - 1},
+					    {"m.obj", obj, sizeof obj - 1}, {"m.ply", ply, sizeof ply - 1},
+					    {"m.vol", vol, sizeof vol - 1}, {NULL, NULL, 0}};
 	return scene_trial(files, said, size);
 }
 

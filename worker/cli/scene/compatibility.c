@@ -8,10 +8,10 @@
 #include <string.h>
 
 static const char *const headings[PLUGIN_CLASSES] = {
-	[PLUGIN_SHAPE] = "Shapes",     [PLUGIN_BSDF] = "Materials",   [PLUGIN_TEXTURE] = "Textures",
-	[PLUGIN_EMITTER] = "Emitters", [PLUGIN_SENSOR] = "Sensors",   [PLUGIN_FILM] = "Films",
-	[PLUGIN_RFILTER] = "Filters",  [PLUGIN_SAMPLER] = "Samplers", [PLUGIN_INTEGRATOR] = "Integrators",
-	[PLUGIN_MEDIUM] = "Media",
+	[PLUGIN_SHAPE] = "Shapes",     [PLUGIN_BSDF] = "Materials",	   [PLUGIN_TEXTURE] = "Textures",
+	[PLUGIN_EMITTER] = "Emitters", [PLUGIN_SENSOR] = "Sensors",	   [PLUGIN_FILM] = "Films",
+	[PLUGIN_RFILTER] = "Filters",  [PLUGIN_SAMPLER] = "Samplers",	   [PLUGIN_INTEGRATOR] = "Integrators",
+	[PLUGIN_MEDIUM] = "Media",     [PLUGIN_PHASE] = "Phase functions", [PLUGIN_VOLUME] = "Volumes",
 };
 
 static void print_params(FILE *out, const struct plugin_decl *d, enum param_class status)
@@ -78,7 +78,7 @@ static void print_unsupported(FILE *out)
 	fprintf(out,
 		"\n## Mitsuba's plug-ins that are not supported\n\n"
 		"Refused, with file, line and the nearest name; with `--lenient` replaced. `hk` is a layer of a medium, and "
-		"media that vary from\nplace to place are refused. Light is unpolarised here, and what polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps "
+		"media\nthat shine are refused. Light is unpolarised here, and what polarizes acts as in Mitsuba's unpolarized modes. Bump and normal maps "
 		"of\nmaterials with a specular lobe or a mask do without `flip_invalid_normals`, which is on in Mitsuba since 3.7.\n\n"
 		"| class | type | with `--lenient` |\n|---|---|---|\n");
 	enum plugin_class cls;

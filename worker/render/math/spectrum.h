@@ -67,6 +67,14 @@ static inline spectrum spectrum_mul(spectrum a, spectrum b)
 	return a;
 }
 
+/* What an optical depth leaves. */
+static inline spectrum spectrum_attenuation(spectrum depth)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		depth.v[i] = exp(-depth.v[i]);
+	return depth;
+}
+
 static inline spectrum spectrum_scale(double s, spectrum a)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++)

@@ -7,41 +7,49 @@
 #include <string.h>
 
 #define COEFFICIENT VALUE_COLOR, PARAM_UNDERSTOOD, 0, 1e30, NULL
+#define VARIES VALUE_TEXTURE, PARAM_UNDERSTOOD, 0
 #define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 
 /* Ways of sampling distances are not the scene's choice here. */
+#define SAMPLING_PARAMS                                                                            \
+	{"has_spectral_extinction", IGNORED}, {"sample_emitters", IGNORED}, {"strategy", IGNORED}, \
+		{"sampling_density", IGNORED},                                                     \
+	{                                                                                          \
+		"medium_sampling_mode", IGNORED                                                    \
+	}
+
 static const struct param homogeneous_params[] = {
 	{"sigma_a", COEFFICIENT},
 	{"sigma_s", COEFFICIENT},
-	{"sigma_t", COEFFICIENT},
-	{"albedo", VALUE_COLOR, PARAM_UNDERSTOOD, 0, 1, NULL},
+	{"sigma_t", VARIES, 1e30, NULL},
+	{"albedo", VARIES, 1, NULL},
 	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
 	{"material", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, NULL}, /* of 0.6: measured.h */
-	{"has_spectral_extinction", IGNORED},
-	{"sample_emitters", IGNORED},
-	{"strategy", IGNORED},
-	{"sampling_density", IGNORED},
-	{"medium_sampling_mode", IGNORED},
+	SAMPLING_PARAMS,
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+/* 0.6's name of sigma_t is density. */
+static const struct param heterogeneous_params[] = {
+	{"sigma_t", VARIES, 1e30, NULL},
+	{"albedo", VARIES, 1, NULL},
+	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
+	{"method", IGNORED},
+	{"step_size", IGNORED},
+	{"majorant_resolution_factor", IGNORED},
+	{"majorant_factor", IGNORED},
+	SAMPLING_PARAMS,
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
 const struct plugin_decl medium_decls[] = {
 	{PLUGIN_MEDIUM, "homogeneous", homogeneous_params, 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
+	{PLUGIN_MEDIUM, "heterogeneous", heterogeneous_params, 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
 	{0, NULL, NULL, 0, 0},
 };
 
 /* Mitsuba 3's defaults. */
 static const double default_sigma_t = 1, default_albedo = 0.75;
-
-static int read_coefficient(struct color *c, const struct scene_node *n, const char *name, enum color_role role,
-			    double fallback, struct arena *arena, struct error *e)
-{
-	const struct property *p = node_find(n, name);
-	struct error reason;
-	*c = color_constant(fallback);
-	int code = p ? color_from_value(&p->value, role, arena, c, &reason) : 0;
-	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
-}
 
 /* -EINVAL: no such material. */
 static int read_measured(struct medium *m, const struct scene_node *n, const char *name, struct error *e)
@@ -50,21 +58,26 @@ static int read_measured(struct medium *m, const struct scene_node *n, const cha
 	const struct measured_medium *found = measured_find(name, list, sizeof list);
 	if (!found)
 		return node_error(n, e, EINVAL, "there is no material '%.64s' (supported: %s)", name, list);
-	int rc = color_from_rgb(found->sigma_a, COLOR_UNBOUNDED, &m->first);
-	return rc ? rc : color_from_rgb(found->sigma_s, COLOR_UNBOUNDED, &m->second);
+	int rc = color_from_rgb(found->sigma_a, COLOR_UNBOUNDED, &m->first.color);
+	return rc ? rc : color_from_rgb(found->sigma_s, COLOR_UNBOUNDED, &m->second.color);
 }
 
-static int read_coefficients(struct medium *m, const struct scene_node *n, struct arena *arena, struct error *e)
+static int read_coefficients(struct medium *m, const struct scene_node *n, const struct volume_build *build,
+			     struct error *e)
 {
-	int rc = m->by_albedo ? read_coefficient(&m->first, n, "sigma_t", COLOR_UNBOUNDED, default_sigma_t, arena, e)
-			      : read_coefficient(&m->first, n, "sigma_a", COLOR_UNBOUNDED, 0, arena, e);
-	if (rc)
-		return rc;
-	return m->by_albedo ? read_coefficient(&m->second, n, "albedo", COLOR_REFLECTANCE, default_albedo, arena, e)
-			    : read_coefficient(&m->second, n, "sigma_s", COLOR_UNBOUNDED, 0, arena, e);
+	if (!m->by_albedo) {
+		int rc = volume_from_node(&m->first, n, "sigma_a", 0, COLOR_UNBOUNDED, false, build, e);
+		return rc ? rc : volume_from_node(&m->second, n, "sigma_s", 0, COLOR_UNBOUNDED, false, build, e);
+	}
+	bool uneven = strcmp(n->type, "heterogeneous") == 0;
+	int rc = volume_from_node(&m->first, n, "sigma_t", default_sigma_t, COLOR_UNBOUNDED, uneven && build->dialect_3,
+				  build, e);
+	if (!rc && !uneven && volume_varies(&m->first))
+		rc = node_error(n, e, EINVAL, "sigma_t is the same everywhere in a homogeneous medium");
+	return rc ? rc : volume_from_node(&m->second, n, "albedo", default_albedo, COLOR_REFLECTANCE, false, build, e);
 }
 
-int medium_create(struct medium *m, const struct scene_node *n, const struct medium_build *build, struct error *e)
+int medium_create(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	bool apart = node_find(n, "sigma_a") || node_find(n, "sigma_s"),
 	     together = node_find(n, "sigma_t") || node_find(n, "albedo");
@@ -72,29 +85,34 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct med
 	if (apart + together + (material != NULL) > 1)
 		return node_error(n, e, EINVAL,
 				  "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
+	if (!build->dialect_3 && strcmp(n->type, "heterogeneous") == 0 &&
+	    !(node_find(n, "sigma_t") && node_find(n, "albedo")))
+		return node_error(n, e, EINVAL, "needs a density and an albedo");
 	if (!material && !apart && !together && !build->dialect_3)
 		material = MEASURED_DEFAULT;
-	*m = (struct medium){.by_albedo = !apart && !material, .per_length = node_float(n, "scale", 1) / build->unit};
-	int rc = material ? read_measured(m, n, material, e) : read_coefficients(m, n, build->arena, e);
+	*m = (struct medium){.by_albedo = !apart && !material, .per_length = node_float(n, "scale", 1) / build->scale};
+	int rc = material ? read_measured(m, n, material, e) : read_coefficients(m, n, build, e);
 	if (rc)
 		return rc;
 	phase_create(&m->phase, node_child(n, PLUGIN_PHASE, 0));
-	bool first = color_max(&m->first) > 0, second = color_max(&m->second) > 0,
-	     all = m->second.shape == COLOR_SHAPE_CONSTANT && color_max(&m->second) == 1;
+	bool first = volume_max(&m->first) > 0, second = volume_max(&m->second) > 0,
+	     all = volume_least(&m->second) == 1;
 	m->absorbs = m->per_length > 0 && first && !(m->by_albedo && all);
 	m->scatters = m->per_length > 0 && second && (first || !m->by_albedo);
+	if (volume_varies(&m->second))
+		m->absorbs = m->scatters = m->absorbs || m->scatters;
 	return 0;
 }
 
 bool medium_is_coloured(const struct medium *m)
 {
-	return m->first.shape != COLOR_SHAPE_CONSTANT || m->second.shape != COLOR_SHAPE_CONSTANT;
+	return volume_is_coloured(&m->first) || volume_is_coloured(&m->second);
 }
 
-/* Sigma_s, and sigma_t of what the medium does. 1 / length */
-static spectrum coefficients(const struct medium *m, const struct wavelengths *w, spectrum *sigma_t)
+/* Sigma_s, and sigma_t of what the medium does, for these values of both. 1 / length */
+static spectrum coefficients(const struct medium *m, spectrum first, spectrum second, spectrum *sigma_t)
 {
-	spectrum first = color_eval(&m->first, w), second = color_eval(&m->second, w), sigma_s;
+	spectrum sigma_s;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double scattered = m->by_albedo ? first.v[i] * second.v[i] : second.v[i];
 		double absorbed = m->by_albedo ? first.v[i] - scattered : first.v[i];
@@ -104,23 +122,70 @@ static spectrum coefficients(const struct medium *m, const struct wavelengths *w
 	return sigma_s;
 }
 
-spectrum medium_scattering(const struct medium *m, const struct wavelengths *w)
+/* Where `second` varies, both is done and sigma_t does not depend on it. */
+static spectrum extinction(const struct medium *m, spectrum first, const struct wavelengths *w)
 {
 	spectrum sigma_t;
-	return coefficients(m, w, &sigma_t);
-}
-
-spectrum medium_extinction(const struct medium *m, const struct wavelengths *w)
-{
-	spectrum sigma_t;
-	coefficients(m, w, &sigma_t);
+	coefficients(m, first, volume_varies(&m->second) ? spectrum_of(0) : color_eval(&m->second.color, w), &sigma_t);
 	return sigma_t;
 }
 
-spectrum medium_transmittance(const struct medium *m, double distance, const struct wavelengths *w)
+spectrum medium_scattering(const struct medium *m, vec3 p, const struct wavelengths *w)
 {
-	spectrum t = medium_extinction(m, w);
-	for (int i = 0; i < SPECTRUM_LANES; i++)
-		t.v[i] = t.v[i] > 0 ? exp(-t.v[i] * distance) : 1; /* not 0 times infinity */
+	spectrum unused;
+	return coefficients(m, volume_at(&m->first, p, true, w), volume_at(&m->second, p, false, w), &unused);
+}
+
+spectrum medium_extinction(const struct medium *m, vec3 p, const struct wavelengths *w)
+{
+	return extinction(m, volume_at(&m->first, p, true, w), w);
+}
+
+struct medium_lanes medium_at(const struct medium *m, const struct wavelengths *w)
+{
+	struct medium_lanes l = {.grid = m->first.grid, .channels = 1};
+	if (!l.grid) {
+		l.sigma_t[0] = extinction(m, color_eval(&m->first.color, w), w);
+		return l;
+	}
+	spectrum unit = extinction(m, color_eval(&m->first.color, w), w);
+	l.channels = volume_weights(&m->first, w, l.sigma_t);
+	for (int k = 0; k < l.channels; k++)
+		l.sigma_t[k] = spectrum_mul(l.sigma_t[k], unit);
+	return l;
+}
+
+/* Of channels that add up to `sum` along a ray. */
+static spectrum depth_of(const struct medium_lanes *m, const double sum[GRID_CHANNELS_MAX])
+{
+	spectrum depth = spectrum_of(0);
+	for (int k = 0; k < m->channels; k++)
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			depth.v[i] +=
+				m->sigma_t[k].v[i] > 0 ? m->sigma_t[k].v[i] * sum[k] : 0; /* not 0 times infinity */
+	return depth;
+}
+
+spectrum medium_depth(const struct medium_lanes *m, const struct grid_ray *r)
+{
+	double sum[GRID_CHANNELS_MAX] = {fmax(r->t1 - r->t0, 0)};
+	if (m->grid)
+		grid_integrate(m->grid, r, sum);
+	return depth_of(m, sum);
+}
+
+double medium_reach(const struct medium_lanes *m, const struct grid_ray *r, int lane, double least, spectrum *depth)
+{
+	double weight[GRID_CHANNELS_MAX] = {0}, sum[GRID_CHANNELS_MAX], t;
+	for (int k = 0; k < m->channels; k++)
+		weight[k] = m->sigma_t[k].v[lane];
+	if (m->grid) {
+		t = grid_reach(m->grid, r, weight, least, sum);
+	} else {
+		t = weight[0] > 0 ? r->t0 + least / weight[0] : INFINITY;
+		t = t < r->t1 ? t : INFINITY;
+		sum[0] = fmax(fmin(t, r->t1) - r->t0, 0);
+	}
+	*depth = depth_of(m, sum);
 	return t;
 }

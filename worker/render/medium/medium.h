@@ -1,40 +1,47 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Homogeneous media. Light that travels a distance d through one keeps exp(-sigma_t d) of its radiance: sigma_a of
- * sigma_t = sigma_a + sigma_s is absorbed, sigma_s scattered into other directions by a phase function (phase.h).
- * Lengths are those of the rescaled world. Immutable after creation; any thread.
+ * Media. Light that travels through one along s keeps exp(-integral of sigma_t ds) of its radiance, the optical depth:
+ * sigma_a of sigma_t = sigma_a + sigma_s is absorbed, sigma_s scattered into other directions by a phase function
+ * (phase.h). Sigma_t and the share of it that is scattered may vary from place to place (worker/render/volume). Optical
+ * depths are exact but for rounding, so that densities of distances are known. Lengths are those of the rescaled world.
+ * Immutable after creation; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_MEDIUM_MEDIUM_H
 #define WORKER_RENDER_MEDIUM_MEDIUM_H
 
 #include "worker/render/medium/phase.h"
-#include "worker/render/texture/color.h"
+#include "worker/render/volume/volume.h"
 
 struct medium {
-	struct color first, second; /* sigma_a and sigma_s, or if by_albedo sigma_t and its scattered share */
-	bool by_albedo;
-	bool absorbs, scatters; /* false: that coefficient counts as 0 */
-	double per_length;	/* times the coefficients: 1 / length */
+	struct volume first, second; /* sigma_a and sigma_s, or if by_albedo sigma_t and its scattered share */
+	bool by_albedo;		     /* otherwise neither varies from place to place */
+	bool absorbs, scatters;	     /* false: that coefficient counts as 0; not where `second` varies */
+	double per_length;	     /* times the coefficients: 1 / length */
 	struct phase phase;
 };
 
 extern const struct plugin_decl medium_decls[]; /* ends with a NULL type */
 
-struct medium_build {
-	double unit;	     /* the scene's unit of length, in that of the distances */
-	bool dialect_3;	     /* otherwise 0.6's defaults */
-	struct arena *arena; /* for tables of the coefficients */
-};
-
-int medium_create(struct medium *m, const struct scene_node *n, const struct medium_build *build, struct error *e);
+int medium_create(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
 bool medium_is_coloured(const struct medium *m); /* its coefficients vary with wavelength */
 
-/* 1 / length; the second is sigma_t. */
-spectrum medium_scattering(const struct medium *m, const struct wavelengths *w);
-spectrum medium_extinction(const struct medium *m, const struct wavelengths *w);
+/* Sigma_s at p. 1 / length */
+spectrum medium_scattering(const struct medium *m, vec3 p, const struct wavelengths *w);
+spectrum medium_extinction(const struct medium *m, vec3 p, const struct wavelengths *w); /* sigma_t */
 
-/* The share that is left. distance may be INFINITY. */
-spectrum medium_transmittance(const struct medium *m, double distance, const struct wavelengths *w);
+/* A medium at some wavelengths. */
+struct medium_lanes {
+	const struct grid *grid; /* NULL: sigma_t[0] everywhere */
+	int channels;
+	spectrum sigma_t[GRID_CHANNELS_MAX]; /* where that channel of the grid is 1 */
+};
+
+struct medium_lanes medium_at(const struct medium *m, const struct wavelengths *w);
+/* The optical depth of a part of a ray. */
+spectrum medium_depth(const struct medium_lanes *m, const struct grid_ray *r);
+/* The t at which that reaches `least` at one wavelength, with the depth up to there; INFINITY, with all of it: not
+ * before t1. */
+double medium_reach(const struct medium_lanes *m, const struct grid_ray *r, int lane, double least, spectrum *depth);
 
 #endif

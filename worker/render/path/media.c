@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Edges through media that scatter are walked from one face of `null` on the ray to the next: walk_length adds up
- * optical depths, walk_through enters the medium behind the face. path_extend_in_media ends where the depth at one
+ * Edges through media that scatter are walked from one face of `null` on the ray to the next: walk_on adds up optical
+ * depths, walk_through enters the medium behind the face. path_extend_in_media ends where the depth at one
  * wavelength reaches the one that was drawn, or at anything else than such a face; path_see_in_media at the other
  * vertex.
  *
@@ -47,15 +47,16 @@ static double near_plane(const struct world *w, const struct path_vertex *from, 
 spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
 			    const struct path_vertex *a, const struct path_vertex *b)
 {
-	double distance2, distance = INFINITY;
 	if (!medium)
 		return spectrum_of(1);
-	if (a->kind != VERTEX_INFINITE && b->kind != VERTEX_INFINITE) {
-		const struct path_vertex *from = b->kind == VERTEX_CAMERA ? b : a, *to = from == a ? b : a;
-		vec3 d = path_direction(from, to, &distance2);
-		distance = fmax(sqrt(distance2) - near_plane(w, from, d), 0);
-	}
-	return medium_transmittance(path_medium(w, medium), distance, wl);
+	bool backwards = b->kind == VERTEX_CAMERA || a->kind == VERTEX_INFINITE;
+	const struct path_vertex *from = backwards ? b : a, *to = backwards ? a : b;
+	double distance2;
+	vec3 d = path_direction(from, to, &distance2);
+	bool endless = to->kind == VERTEX_INFINITE;
+	const struct medium_lanes m = medium_at(path_medium(w, medium), wl);
+	const struct grid_ray r = {from->x.p, d, near_plane(w, from, d), endless ? INFINITY : sqrt(distance2)};
+	return spectrum_attenuation(medium_depth(&m, &r));
 }
 
 void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to)
@@ -66,17 +67,19 @@ void path_absorb(const struct path_context *c, const struct path_vertex *at, vec
 
 /* A ray on its way. */
 struct walk {
-	struct path_edge *edge; /* medium: where the ray is; free: unused until the end */
-	spectrum all, events;	/* optical depths so far: of all media, of those that scatter */
-	spectrum sigma_t;	/* of the medium where the ray is; 0: there is none */
-	bool scatters;		/* that medium does */
+	struct path_edge *edge;	   /* medium: where the ray is; free: unused until the end */
+	vec3 d;			   /* its direction */
+	spectrum all, events;	   /* optical depths so far: of all media, of those that scatter */
+	struct medium_lanes lanes; /* of the medium where the ray is, if there is one */
+	bool scatters;		   /* that medium does */
 };
 
 static void walk_enter(const struct path_context *c, struct walk *k, uint32_t medium)
 {
 	k->edge->medium = medium;
 	k->scatters = medium && path_medium(c->w, medium)->scatters;
-	k->sigma_t = medium ? medium_extinction(path_medium(c->w, medium), &c->wl) : spectrum_of(0);
+	if (medium)
+		k->lanes = medium_at(path_medium(c->w, medium), &c->wl);
 }
 
 static struct walk walk_begin(const struct path_context *c, const struct path_vertex *at, vec3 d,
@@ -85,26 +88,44 @@ static struct walk walk_begin(const struct path_context *c, const struct path_ve
 	bool emitter = at->kind == VERTEX_EMITTER || at->kind == VERTEX_INFINITE;
 	uint32_t medium =
 		emitter ? path_medium_of_emitter(c->w, at, d) : path_medium_after(c->w, at, at->edge.medium, d);
-	struct walk k = {.edge = edge, .all = spectrum_of(0), .events = spectrum_of(0)};
+	struct walk k = {.edge = edge, .d = d, .all = spectrum_of(0), .events = spectrum_of(0)};
 	*edge = (struct path_edge){.before = medium, .fits = true};
 	walk_enter(c, &k, medium);
 	return k;
 }
 
-static void walk_length(struct walk *k, double length)
+static void walk_add(struct walk *k, spectrum depth)
 {
-	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double depth = k->sigma_t.v[i] > 0 ? k->sigma_t.v[i] * length : 0; /* not 0 times infinity */
-		k->all.v[i] += depth;
-		k->events.v[i] += k->scatters ? depth : 0;
-	}
+	k->all = spectrum_add(k->all, depth);
+	k->events = k->scatters ? spectrum_add(k->events, depth) : k->events;
 }
 
-/* Through a face of `null` at x, along d. */
-static void walk_through(const struct path_context *c, struct walk *k, const struct surface_point *x, vec3 d)
+/* On from t0 to t1 behind o. */
+static void walk_on(struct walk *k, vec3 o, double t0, double t1)
+{
+	if (k->edge->medium)
+		walk_add(k, medium_depth(&k->lanes, &(struct grid_ray){o, k->d, t0, t1}));
+}
+
+/* The same, but at most to an event, which is where the depth at one wavelength is `depth`; INFINITY: there is none. */
+static double walk_to_event(struct walk *k, vec3 o, double t0, double t1, int lane, double depth)
+{
+	spectrum passed;
+	if (!k->scatters) {
+		walk_on(k, o, t0, t1);
+		return INFINITY;
+	}
+	double t = medium_reach(&k->lanes, &(struct grid_ray){o, k->d, t0, t1}, lane,
+				fmax(depth - k->events.v[lane], 0), &passed);
+	walk_add(k, passed);
+	return t;
+}
+
+/* Through a face of `null` at x. */
+static void walk_through(const struct path_context *c, struct walk *k, const struct surface_point *x)
 {
 	uint32_t near, far;
-	if (!side_of(c->w, x, vec3_neg(d), &near) || !side_of(c->w, x, d, &far))
+	if (!side_of(c->w, x, vec3_neg(k->d), &near) || !side_of(c->w, x, k->d, &far))
 		return;
 	k->edge->fits = k->edge->fits && near == k->edge->medium;
 	walk_enter(c, k, far);
@@ -112,24 +133,13 @@ static void walk_through(const struct path_context *c, struct walk *k, const str
 
 static spectrum walk_end(struct walk *k)
 {
-	spectrum left;
-	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		k->edge->free.v[i] = exp(-k->events.v[i]);
-		left.v[i] = exp(-k->all.v[i]);
-	}
-	return left;
+	k->edge->free = spectrum_attenuation(k->events);
+	return spectrum_attenuation(k->all);
 }
 
 static bool is_face(const struct world *w, const struct path_vertex *v)
 {
 	return v->kind == VERTEX_SURFACE && w->parts[v->x.prim.shape].passable;
-}
-
-/* The distance of the next event along the ray, which has so much optical depth to go at one wavelength. */
-static double next_event(const struct walk *k, int lane, double depth)
-{
-	double sigma = k->scatters ? k->sigma_t.v[lane] : 0;
-	return sigma > 0 ? fmax(depth - k->events.v[lane], 0) / sigma : INFINITY;
 }
 
 static void stop_in_medium(struct path_vertex *to, vec3 from, double distance, vec3 d)
@@ -150,20 +160,19 @@ bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, 
 	for (int i = 0; i < FACES_MOST; i++) {
 		bool met = path_extend(c, &from, d, t_min, t_max, to);
 		double end = met && to->kind == VERTEX_SURFACE ? vec3_length(vec3_sub(to->x.p, from.x.p)) : INFINITY;
-		double event = t_min + next_event(&k, (int)lane, depth);
-		if (event < fmin(end, t_max)) {
+		double event = walk_to_event(&k, from.x.p, t_min, fmin(end, t_max), (int)lane, depth);
+		if (event < INFINITY) {
 			stop_in_medium(to, from.x.p, event, d);
-			walk_length(&k, event - t_min);
 			met = vec3_is_finite(to->x.p);
-		} else {
-			walk_length(&k, end - t_min);
+		} else if (end > t_max) {
+			walk_on(&k, from.x.p, t_max, end);
 		}
 		if (!met || !is_face(c->w, to)) {
 			*left = walk_end(&k);
 			to->edge = edge;
 			return met;
 		}
-		walk_through(c, &k, &to->x, d);
+		walk_through(c, &k, &to->x);
 		from = *to;
 		t_max -= end;
 		t_min = 0;
@@ -183,12 +192,14 @@ bool path_see_in_media(struct path_context *c, const struct path_vertex *z, cons
 		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from.x.p));
 		bool met = c->w->has_passable && path_extend(c, &from, d, begin, end, &face);
 		if (!met || !is_face(c->w, &face)) {
-			walk_length(&k, fmax(end - begin, 0));
+			if (!path_visible(c, &from, y))
+				return false;
+			walk_on(&k, from.x.p, begin, end);
 			*left = walk_end(&k);
-			return path_visible(c, &from, y);
+			return true;
 		}
-		walk_length(&k, vec3_length(vec3_sub(face.x.p, from.x.p)) - begin);
-		walk_through(c, &k, &face.x, d);
+		walk_on(&k, from.x.p, begin, vec3_length(vec3_sub(face.x.p, from.x.p)));
+		walk_through(c, &k, &face.x);
 		from = face;
 		begin = 0;
 	}
@@ -200,7 +211,7 @@ double path_edge_pdf(const struct path_context *c, const struct path_edge *edge,
 {
 	if (to->kind != VERTEX_MEDIUM)
 		return spectrum_mean(edge->free);
-	return spectrum_mean(spectrum_mul(medium_extinction(path_medium(c->w, medium), &c->wl), edge->free));
+	return spectrum_mean(spectrum_mul(medium_extinction(path_medium(c->w, medium), to->x.p, &c->wl), edge->free));
 }
 
 void path_travel(const struct path_context *c, struct path_vertex *to, spectrum left)
@@ -213,5 +224,5 @@ void path_travel(const struct path_context *c, struct path_vertex *to, spectrum 
 spectrum path_scatter_in_medium(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi)
 {
 	const struct medium *m = path_medium(c->w, v->edge.medium);
-	return spectrum_scale(phase_eval(&m->phase, wo, wi), medium_scattering(m, &c->wl));
+	return spectrum_scale(phase_eval(&m->phase, wo, wi), medium_scattering(m, v->x.p, &c->wl));
 }

@@ -139,7 +139,7 @@ static void depart_in_medium(const struct path_context *c, const struct path_ver
 	*out = (struct departure){.eta = 1};
 	out->wi = phase_sample(&m->phase, v->to_prev, u, &out->pdf);
 	out->pdf_rev = out->pdf;
-	out->beta = spectrum_mul(v->beta, medium_scattering(m, &c->wl));
+	out->beta = spectrum_mul(v->beta, medium_scattering(m, v->x.p, &c->wl));
 }
 
 static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],

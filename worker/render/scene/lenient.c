@@ -49,6 +49,7 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 	case PLUGIN_EMITTER:
 	case PLUGIN_TEXTURE:
 	case PLUGIN_MEDIUM:
+	case PLUGIN_VOLUME:
 		return LENIENT_LEAVE_OUT;
 	default:
 		return LENIENT_REFUSE;

@@ -8,7 +8,7 @@ static const char *const class_names[PLUGIN_CLASSES] = {
 	[PLUGIN_SHAPE] = "shape",     [PLUGIN_BSDF] = "bsdf",	    [PLUGIN_TEXTURE] = "texture",
 	[PLUGIN_EMITTER] = "emitter", [PLUGIN_SENSOR] = "sensor",   [PLUGIN_FILM] = "film",
 	[PLUGIN_RFILTER] = "rfilter", [PLUGIN_SAMPLER] = "sampler", [PLUGIN_INTEGRATOR] = "integrator",
-	[PLUGIN_MEDIUM] = "medium",   [PLUGIN_PHASE] = "phase",
+	[PLUGIN_MEDIUM] = "medium",   [PLUGIN_PHASE] = "phase",	    [PLUGIN_VOLUME] = "volume",
 };
 
 const char *plugin_class_name(enum plugin_class cls)
@@ -73,6 +73,7 @@ const char *plugin_new_name(const struct plugin_decl *d, const char *name)
 	} names[] = {
 		{PLUGIN_BSDF, "diffuse", "diffuse_reflectance", "reflectance"},
 		{PLUGIN_BSDF, "roughdiffuse", "diffuse_reflectance", "reflectance"},
+		{PLUGIN_MEDIUM, "heterogeneous", "density", "sigma_t"},
 	};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		if (names[i].cls == d->cls && strcmp(names[i].type, d->type) == 0 && strcmp(names[i].old, name) == 0)
@@ -115,6 +116,8 @@ static const struct {
 	{PLUGIN_PHASE, "mixturephase"},
 	{PLUGIN_PHASE, "sggx"},
 	{PLUGIN_PHASE, "tabphase"},
+	{PLUGIN_VOLUME, "hgridvolume"},
+	{PLUGIN_VOLUME, "volcache"},
 };
 
 const char *plugin_of_mitsuba(size_t index, enum plugin_class *cls)

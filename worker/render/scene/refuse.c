@@ -54,9 +54,6 @@ int refuse_element(const struct xml_element *el, struct error *e)
 	char hint[128];
 	if (strcmp(el->name, "subsurface") == 0)
 		return xml_error(el, e, EINVAL, "subsurface scattering is not supported; --lenient leaves it out");
-	if (strcmp(el->name, "volume") == 0)
-		return xml_error(el, e, EINVAL,
-				 "media that vary from place to place are not supported; --lenient leaves it out");
 	struct spelling s = {.wanted = el->name};
 	plugin_offer_classes(&s);
 	value_offer_elements(&s);

@@ -244,9 +244,10 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",
 				 plugin_class_name(cls), written ? "" : " without a name", owner->name, d->node->type);
 	}
-	if (p && (p->types & VALUE_COLOR) && cls != PLUGIN_TEXTURE)
-		return xml_error(el, m->error, EINVAL, "`%s` may be a texture, but not a %s", p->name,
-				 plugin_class_name(cls));
+	enum plugin_class colours = d->node->cls == PLUGIN_MEDIUM ? PLUGIN_VOLUME : PLUGIN_TEXTURE;
+	if (p && (p->types & VALUE_COLOR) && (p->types & VALUE_NODE) && cls != colours)
+		return xml_error(el, m->error, EINVAL, "`%s` may be a %s, but not a %s", p->name,
+				 plugin_class_name(colours), plugin_class_name(cls));
 	if (p && m->lenient && !(p->types & VALUE_NODE))
 		return leave_out(&m->notes, el, xml_attribute(owner, "type"), p->name, "an object for the parameter");
 	const struct scene_node *child;
@@ -393,6 +394,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	*out = d.node;
 	if (!r)
 		r = remarks_on_object(d.node, &m->report, m->error);
+	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d.lacks, d.node)))
+		return r;
 	if (!r && m->lenient && (r = substitute_cover(&m->notes, el, d.lacks, out)) == REPORT_TOLD)
 		return r;
 	el->node = *out;

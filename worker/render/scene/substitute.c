@@ -53,3 +53,12 @@ int substitute_cover(const struct notes *t, const struct xml_element *el, bool l
 		    el->line, type, bare ? "has no texture left" : "over \"", bare ? "" : inner->type,
 		    bare ? "" : "\", which lets light through, is not supported");
 }
+
+int substitute_medium(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node *node)
+{
+	if (node->cls != PLUGIN_MEDIUM || !lacks)
+		return 0;
+	int r = note(t, el, node->type, "", "%s:%d: <medium type=\"%.64s\"> is left out with what it lacks (lenient)",
+		     el->file, el->line, node->type);
+	return r ? r : REPORT_TOLD;
+}

@@ -22,4 +22,7 @@ int substitute_texture(const struct notes *t, const struct asset_source *assets,
 /* *node becomes the BSDF inside it if it does not allow that, or if it `lacks` the texture that it needs. */
 int substitute_cover(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node **node);
 
+/* A medium that `lacks` something that was left out, such as its density, goes, too. */
+int substitute_medium(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node *node);
+
 #endif

@@ -13,11 +13,11 @@
  * for it (Hansson-Soderlund, Evans and Akenine-Moller 2022, Ray Tracing of Signed Distance Function Grids, section
  * 5); with "analytic" triangles are flat, where Mitsuba has the normal of the point.
  *
- * Failures: those of the file (volume_file.h), no surface, more triangles than a mesh may have.
+ * Failures: those of the file (grid_file.h), no surface, more triangles than a mesh may have.
  */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/shape.h"
-#include "worker/render/shape/volume_file.h"
+#include "worker/render/volume/grid_file.h"
 
 #include "common/base/list.h"
 #include "common/base/liveness.h"
@@ -34,7 +34,7 @@ static const struct param params[] = {
 };
 
 struct surface {
-	struct volume_grid grid;
+	struct grid_file grid;
 	uint32_t cells[3];
 	/* Of two layers of corners, by parity of z: the field, and one more than the vertex on the edge from a corner
 	 * in each direction (1 .. 7: bits of x, y, z), 0: none. */
@@ -45,14 +45,14 @@ struct surface {
 
 /* ---- the field, in voxels ---- */
 
-static double sample(const struct volume_grid *g, const uint32_t at[3], int corner)
+static double sample(const struct grid_file *g, const uint32_t at[3], int corner)
 {
 	uint32_t x = at[0] + (corner & 1), y = at[1] + (corner >> 1 & 1), z = at[2] + (uint32_t)(corner >> 2);
 	return (double)g->value[((size_t)z * g->size[1] + y) * g->size[0] + x];
 }
 
 /* Interpolates between the corners of a voxel; x may lie outside it. gradient: NULL: not wanted. */
-static double interpolate(const struct volume_grid *g, const uint32_t at[3], const double x[3], double gradient[3])
+static double interpolate(const struct grid_file *g, const uint32_t at[3], const double x[3], double gradient[3])
 {
 	double w[3][2], sum = 0;
 	for (int i = 0; i < 3; i++) {
@@ -73,7 +73,7 @@ static double interpolate(const struct volume_grid *g, const uint32_t at[3], con
 	return sum;
 }
 
-static double field_at(const struct volume_grid *g, const double x[3])
+static double field_at(const struct grid_file *g, const double x[3])
 {
 	uint32_t at[3];
 	for (int i = 0; i < 3; i++)
@@ -82,7 +82,7 @@ static double field_at(const struct volume_grid *g, const double x[3])
 }
 
 /* In object space: the mean over the eight voxels whose centers surround x, of their normals at x. */
-static vec3 normal_at(const struct volume_grid *g, const double x[3])
+static vec3 normal_at(const struct grid_file *g, const double x[3])
 {
 	double w[3][2], sum[3] = {0, 0, 0};
 	uint32_t at[3][2];
@@ -109,7 +109,7 @@ static vec3 normal_at(const struct volume_grid *g, const double x[3])
 
 /* The zero between a, where the field is fa, and b, where its sign is another, by regula falsi with Illinois weights.
  */
-static void root(const struct volume_grid *g, const double a[3], double fa, const double b[3], double fb, double out[3])
+static void root(const struct grid_file *g, const double a[3], double fa, const double b[3], double fb, double out[3])
 {
 	double low = 0, high = 1;
 	for (int i = 0; i < ROOT_STEPS; i++) {
@@ -299,14 +299,28 @@ static int make_mesh(const struct surface *s, bool smooth, struct arena *arena, 
 	return 0;
 }
 
+static int read_field(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		      struct grid_file *grid, struct error *e)
+{
+	int rc = grid_file_read(n, assets, false, arena, grid, e);
+	for (int i = 0; i < 3 && !rc; i++)
+		if (grid->size[i] < 2)
+			rc = node_error(n, e, ERANGE, "%s: %u values along %c; 2 to %d are supported",
+					node_string(n, "filename", ""), grid->size[i], "xyz"[i], GRID_SIDE_MAX);
+	return rc;
+}
+
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
 	struct surface s = {.positions = {.size = 3 * sizeof(double)}, .triangles = {.size = 3 * sizeof(uint32_t)}};
 	bool smooth = strcmp(node_string(n, "normals", "smooth"), "smooth") == 0;
-	int rc = volume_file_read(n, assets, &s.grid, e);
-	if (rc)
+	struct arena field = {.limit = 0};
+	int rc = read_field(n, assets, &field, &s.grid, e);
+	if (rc) {
+		arena_fini(&field);
 		return rc;
+	}
 	rc = cut_all(&s);
 	if (!rc && s.triangles.count > 0)
 		rc = make_mesh(&s, smooth, arena, &out->mesh);
@@ -325,7 +339,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	}
 	list_free(&s.positions);
 	list_free(&s.triangles);
-	volume_grid_free(&s.grid);
+	arena_fini(&field);
 	return rc;
 }
 

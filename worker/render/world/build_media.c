@@ -2,26 +2,38 @@
 #include "worker/render/world/build_media.h"
 
 #include "worker/render/geom/accel.h"
+#include "worker/render/volume/grid_file.h"
 #include "worker/render/world/node_table.h"
 
+struct media_build {
+	struct node_table numbers;
+	struct grid_cache grids;
+	struct volume_build volumes;
+};
+
 /* Gives a medium its number, 1 + its index in the order of first use; 0: there is none. It is made at first use. */
-static int number_medium(struct builder *b, const struct scene_node *n, struct node_table *numbers, uint32_t *number)
+static int number_medium(struct builder *b, const struct scene_node *n, struct media_build *media, uint32_t *number)
 {
 	struct world *w = b->w;
+	struct node_table *numbers = &media->numbers;
 	*number = 0;
 	if (!n || node_table_find(numbers, n, NULL, number))
 		return 0;
 	*number = ++w->media_count;
 	node_table_add(numbers, n, NULL, *number);
-	const struct medium_build build = {.unit = w->scale, .dialect_3 = b->scene->dialect_3, .arena = &w->arena};
-	int rc = medium_create(&w->media[*number - 1], n, &build, b->e);
+	int rc = medium_create(&w->media[*number - 1], n, &media->volumes, b->e);
 	return rc ? build_go_on(b, rc) : 0;
 }
 
 int build_media(struct builder *b)
 {
 	struct world *w = b->w;
-	struct node_table numbers;
+	struct media_build media = {.volumes = {.assets = b->assets,
+						.arena = &w->arena,
+						.cache = &media.grids,
+						.dialect_3 = b->scene->dialect_3,
+						.center = w->center,
+						.scale = w->scale}};
 	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor),
 				*camera = sensor ? node_child(sensor, PLUGIN_MEDIUM, 0) : NULL;
 	uint32_t uses = camera ? 1 : 0;
@@ -32,16 +44,16 @@ int build_media(struct builder *b)
 	if (!uses)
 		return 0;
 	w->media = arena_alloc(&w->arena, uses, sizeof *w->media);
-	if (!w->media || node_table_init(&numbers, uses, &b->scratch))
+	if (!w->media || node_table_init(&media.numbers, uses, &b->scratch))
 		return build_out_of_memory(b->e);
 	int rc = 0;
 	for (uint32_t i = 0; i < w->shape_count && !rc; i++) {
 		const struct scene_node *n = b->shape_nodes[i];
-		rc = number_medium(b, node_ref(n, "interior"), &numbers, &w->parts[i].interior);
+		rc = number_medium(b, node_ref(n, "interior"), &media, &w->parts[i].interior);
 		if (!rc)
-			rc = number_medium(b, node_ref(n, "exterior"), &numbers, &w->parts[i].exterior);
+			rc = number_medium(b, node_ref(n, "exterior"), &media, &w->parts[i].exterior);
 	}
-	return rc ? rc : number_medium(b, camera, &numbers, &w->camera_medium);
+	return rc ? rc : number_medium(b, camera, &media, &w->camera_medium);
 }
 
 /* The medium on this side of the next surface along d that states one. Where none does, it is the camera's. */

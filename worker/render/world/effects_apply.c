@@ -46,6 +46,23 @@ static unsigned lobes_without(const struct bsdf *b, const struct effects_choice 
 	return without;
 }
 
+/* Of a medium whose albedo varies, optical depths are known for both effects together (medium.h). */
+static int apply_to_medium(struct medium *m, const struct effects *fx, const struct effects_choice *forced,
+			   struct error *e)
+{
+	m->absorbs = m->absorbs && fx->absorption;
+	m->scatters = m->scatters && fx->scattering;
+	if (!volume_varies(&m->second) || m->absorbs == m->scatters)
+		return 0;
+	m->absorbs = m->scatters = false; /* no path reaches it, unless: */
+	return forced->of[EFFECT_ABSORPTION] < 0 || forced->of[EFFECT_SCATTERING] < 0
+		       ? error_set(
+				 e, EINVAL,
+				 "absorption and scattering can only be switched off together in this scene: it has a "
+				 "medium whose albedo varies from place to place")
+		       : 0;
+}
+
 int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
 		  struct error *e)
 {
@@ -67,8 +84,9 @@ int effects_apply(struct world *w, const struct effects_choice *forced, const en
 		if (is_switched_off(&w->emitters[i], forced))
 			remove_emitter(w, i);
 	for (uint32_t i = 0; i < w->media_count; i++) {
-		w->media[i].absorbs = w->media[i].absorbs && w->effects.absorption;
-		w->media[i].scatters = w->media[i].scatters && w->effects.scattering;
+		int rc = apply_to_medium(&w->media[i], &w->effects, forced, e);
+		if (rc)
+			return rc;
 	}
 	if (forced->of[EFFECT_APERTURE])
 		camera_force_aperture(&w->camera, w->effects.aperture);

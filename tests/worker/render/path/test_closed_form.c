@@ -8,6 +8,8 @@
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
 #include "tests/support/leases.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/vol.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -181,10 +183,11 @@ static void test_camera_in_medium(void **state)
 	"origin='0.2,0.1,90' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>" \
 	"</film>" medium "</sensor>"
 /* Between z = 0 and twice `half` below, and so wide that its sides are out of reach. */
-#define LAYER(half, albedo, phase)                                                                                                  \
-	"<shape type='cube'><transform name='to_world'><translate z='-1'/><scale x='40' y='40' z='" half                            \
-	"'/></transform><bsdf type='null'/><medium type='homogeneous' name='interior' id='layer'><float name='sigma_t' value='1'/>" \
+#define LAYER_OF(type, half, sigma_t, albedo, phase)                                                     \
+	"<shape type='cube'><transform name='to_world'><translate z='-1'/><scale x='40' y='40' z='" half \
+	"'/></transform><bsdf type='null'/><medium type='" type "' name='interior' id='layer'>" sigma_t  \
 	"<spectrum name='albedo' value='" albedo "'/>" phase "</medium></shape>"
+#define LAYER(half, albedo, phase) LAYER_OF("homogeneous", half, "<float name='sigma_t' value='1'/>", albedo, phase)
 #define WITHOUT_ROULETTE(depth)                                              \
 	"<integrator type='volpath'><integer name='max_depth' value='" depth \
 	"'/><integer name='rr_depth' value='128'/></integrator>"
@@ -275,18 +278,40 @@ static void test_half_space(void **state)
 		       0.7 * (1 - chandrasekhar_h(albedo, 1) * sqrt(1 - albedo)), (struct effort){3072, 0, 0});
 }
 
-/* A beam at an angle, scattered once by Rayleigh's function. */
+/* From 0 to -2 along z, the mean is 1: as deep as LAYER. */
+static double strata(double x, double y, double z, uint32_t channel)
+{
+	(void)x;
+	(void)y;
+	(void)channel;
+	return z == 0 ? 0.3 : z < 0.4 ? 2.9 : z < 0.7 ? 0 : 0.8;
+}
+
+/* A beam at an angle, scattered once by Rayleigh's function: only the optical depth counts, not where it comes from. */
 static void test_beam_in_layer(void **state)
 {
 	(void)state;
+#define BEAM_IN(layer)                                                                                          \
+	"<scene version='3.0.0'>" WITHOUT_ROULETTE("2") "<emitter type='directional'><vector name='direction' " \
+							"x='0.8' y='0' z='-0.6'/><float name='irradiance' "     \
+							"value='5'/></emitter>" FROM_ABOVE("0.01", "") layer    \
+		"</scene>"
+#define STRATA                                                                                             \
+	"<volume name='sigma_t' type='gridvolume'><string name='filename' value='strata.vol'/><transform " \
+	"name='to_world'><translate x='-.5' y='-.5' z='-1'/><scale x='80' y='80' z='2'/></transform></volume>"
+	static const char even[] = BEAM_IN(LAYER("1", "0.6", "<phase type='rayleigh'/>")),
+			  layered[] =
+				  BEAM_IN(LAYER_OF("heterogeneous", "1", STRATA, "0.6", "<phase type='rayleigh'/>"));
+	static struct vol grid;
+	vol_make(&grid, (const uint32_t[3]){1, 1, 4}, 1, strata);
 	double cosine = 0.6, along = 1 + 1 / cosine, phase = 3 / (16 * M_PI) * (1 + cosine * cosine);
-	check_depths("beam in a layer",
-		     world_of_text(16, 16,
-				   WITHOUT_ROULETTE(
-					   "2") "<emitter type='directional'><vector name='direction' x='0.8' y='0' "
-						"z='-0.6'/><float name='irradiance' value='5'/></emitter>" FROM_ABOVE(
-							"0.01", "") LAYER("1", "0.6", "<phase type='rayleigh'/>")),
-		     2, 5 * 0.6 * phase * (1 - exp(-2 * along)) / along, (struct effort){512, 512, 0});
+	for (int i = 0; i < 2; i++) {
+		const struct memory_file files[] = {{"beam.xml", i ? layered : even, strlen(i ? layered : even)},
+						    {"strata.vol", grid.bytes, grid.size},
+						    {NULL, NULL, 0}};
+		check_depths(i ? "beam in strata" : "beam in a layer", world_of_files(16, 16, files), 2,
+			     5 * 0.6 * phase * (1 - exp(-2 * along)) / along, (struct effort){512, 512, 0});
+	}
 }
 
 /* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r,

@@ -3,10 +3,12 @@
 #include "tests/support/density.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/rooms.h"
+#include "tests/support/vol.h"
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -125,14 +127,12 @@ static void test_delta_lights(void **state)
 	assert_true(t.with_delta > t.routes / 20);
 }
 
-/* All in coloured fog that scatters forwards, before a near plane; of a lamp and a point. */
-static void test_fog(void **state)
+/* All in fog that scatters forwards, before a near plane; of a lamp and a point. */
+static void check_fog(const char *name, const char *medium, const struct vol *grid, size_t walks)
 {
-	(void)state;
-	struct world *w = world_of_text(
-		32, 24, "%s%s",
-		"<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='.2,.5,.9'/><rgb name='albedo' value='.9,.8,.7'/>"
-		"<phase type='hg'><float name='g' value='.5'/></phase></medium>"
+	char xml[4096];
+	snprintf(
+		xml, sizeof xml, "<scene version='3.0.0'>%s%s%s</scene>", medium,
 		"<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='.4'/><transform name='to_world'>"
 		"<lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/></transform><ref id='fog'/></sensor>",
 		BOX LAMPS
@@ -140,10 +140,51 @@ static void test_fog(void **state)
 			"0", "0", "0.5",
 			"<bsdf type='dielectric'/><ref id='fog' name='interior'/><ref id='fog' name='exterior'/>")
 			BALL("1.4", "-.5", "0", "<bsdf type='diffuse'/>"));
+	const struct memory_file files[] = {{"fog.xml", xml, strlen(xml)},
+					    {"fog.vol", grid ? grid->bytes : NULL, grid ? grid->size : 0},
+					    {NULL, NULL, 0}};
+	struct world *w = world_of_files(32, 24, files);
 	assert_true(w->effects.scattering && w->media_count == 1);
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		assert_int_equal(w->emitter_medium[i], 1);
-	density_check("fog", w, 12000);
+	density_check(name, w, walks);
+}
+
+#define FORWARDS "<phase type='hg'><float name='g' value='.5'/></phase></medium>"
+
+static void test_fog(void **state)
+{
+	(void)state;
+	check_fog("fog",
+		  "<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='.2,.5,.9'/>"
+		  "<rgb name='albedo' value='.9,.8,.7'/>" FORWARDS,
+		  NULL, 12000);
+}
+
+static double puffs(double x, double y, double z, uint32_t channel)
+{
+	return 0.5 + 0.5 * sin(3 * x + channel) * cos(2 * y - channel) * sin(1 + 5 * z);
+}
+
+/* Denser here than there, of one colour and of three, in a box that does not fill the room. */
+static void test_puffs(void **state)
+{
+	(void)state;
+	static struct vol grid;
+	static const char *const media[] = {"<float name='albedo' value='.8'/>",
+					    "<rgb name='albedo' value='.9,.8,.7'/>"};
+	for (uint32_t channels = 1; channels <= 3; channels += 2) {
+		char medium[1024];
+		vol_make(&grid, (const uint32_t[3]){4, 3, 5}, channels, puffs);
+		snprintf(
+			medium, sizeof medium,
+			"<medium type='heterogeneous' id='fog'><volume type='gridvolume' name='sigma_t'>"
+			"<string name='filename' value='fog.vol'/><transform name='to_world'>"
+			"<rotate x='1' y='1' angle='20'/><translate x='-.5' y='-.5' z='-.5'/><scale value='4'/></transform>"
+			"</volume>%s" FORWARDS,
+			media[channels / 2]);
+		check_fog(channels == 1 ? "grey puffs" : "coloured puffs", medium, &grid, 300);
+	}
 }
 
 /* A wide lens, focused before the balls: x_k differs from path to path. */
@@ -192,6 +233,7 @@ int main(void)
 		cmocka_unit_test(test_specular),
 		cmocka_unit_test(test_infinity),
 		cmocka_unit_test(test_fog),
+		cmocka_unit_test(test_puffs),
 		cmocka_unit_test(test_lens),
 		cmocka_unit_test(test_delta_lights),
 		cmocka_unit_test(test_bent_normals),

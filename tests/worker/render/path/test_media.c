@@ -3,15 +3,19 @@
  * Edges through media that scatter (worker/render/path/media.h), on a ray through three layers with faces of `null`:
  * one that scatters, one that only absorbs, and one of other coefficients, in which a glass pane states no medium.
  * Events drawn for evenly spaced numbers are counted between any two places as often as the integral of their density
- * says; an edge has the same depths from both ends; faces that do not fit are noticed; and emitters know what surrounds
- * them.
+ * says; a grid is the same as layers of its values; an edge has the same depths from both ends; faces that do not fit
+ * are noticed; and emitters know what surrounds them.
  */
 #include "worker/render/path/media.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/vol.h"
 #include "tests/support/worlds.h"
 
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -50,6 +54,15 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 
 static const vec3 down = {0, 0, -1};
 
+/* Of a medium that is the same everywhere. */
+static spectrum let_through(const struct medium *m, double distance, const struct wavelengths *w)
+{
+	spectrum t = medium_extinction(m, down, w);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		t.v[i] = exp(-t.v[i] * distance);
+	return t;
+}
+
 static void test_events(void **state)
 {
 	(void)state;
@@ -75,9 +88,8 @@ static void test_events(void **state)
 	}
 	assert_true(fabs(free_ones / (double)NUMBERS - pdf_free) < 8.0 / NUMBERS);
 	const struct medium *first = &w->media[0], *second = &w->media[1], *third = &w->media[2];
-	spectrum a = medium_transmittance(first, 2 * w->scale, &c.wl),
-		 b = medium_transmittance(second, w->scale, &c.wl),
-		 d = medium_transmittance(third, 4 * w->scale, &c.wl);
+	spectrum a = let_through(first, 2 * w->scale, &c.wl), b = let_through(second, w->scale, &c.wl),
+		 d = let_through(third, 4 * w->scale, &c.wl);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		assert_true(fabs(carried.v[i] / (a.v[i] * b.v[i] * d.v[i]) - 1) < 1e-9);
 	assert_true(fabs(pdf_free / spectrum_mean(spectrum_mul(a, d)) - 1) < 1e-9);
@@ -95,6 +107,109 @@ static void test_events(void **state)
 		/* a face falls between steps; four wavelengths have an event or not at either end */
 		assert_true(fabs(events[k] / (double)NUMBERS - sum) < 1.5e-3);
 	}
+	world_free(w);
+}
+
+/* A grid of four values, one above the other, and as many layers almost next to each other. */
+#define VALUES 4
+static const double steps[VALUES] = {0.4, 2, 0, 0.9};
+
+static struct world *as_layers(bool scatters)
+{
+	static char xml[4096], *at;
+	at = xml + sprintf(xml, "<emitter type='constant'/>%s", SENSOR("0,0,5", "0,0,0"));
+	for (int i = 0; i < VALUES; i++)
+		at += sprintf(
+			at,
+			"<shape type='cube'><transform name='to_world'><scale x='9' y='9' z='0.4999999'/><translate "
+			"z='%g'/></transform><bsdf type='null'/><medium type='homogeneous' name='interior'>"
+			"<rgb name='sigma_t' value='%g,%g,%g'/><float name='albedo' value='%g'/></medium></shape>",
+			i - 3.5, 2 * steps[i], steps[i], steps[i] / 2, scatters ? 0.5 : 0);
+	return world_of_text(8, 8, "%s", xml);
+}
+
+static struct world *as_grid(bool scatters)
+{
+	static char xml[4096];
+	static struct vol grid;
+	grid.side[0] = grid.side[1] = 1;
+	grid.side[2] = VALUES;
+	grid.channels = 3;
+	for (int i = 0; i < VALUES; i++)
+		for (int k = 0; k < 3; k++)
+			grid.value[3 * i + k] = (float)(steps[i] * (k == 0 ? 2 : k == 1 ? 1 : 0.5));
+	vol_write(&grid);
+	int n = snprintf(
+		xml, sizeof xml,
+		"<scene version='3.0.0'><emitter type='constant'/>%s<shape type='cube'><transform name='to_world'>"
+		"<scale x='9' y='9' z='2'/><translate z='-2'/></transform><bsdf type='null'/><medium "
+		"type='heterogeneous' name='interior'><volume type='gridvolume' name='sigma_t'>"
+		"<string name='filename' value='g'/><string name='filter_type' value='nearest'/><transform "
+		"name='to_world'><translate x='-.5' y='-.5' z='-1'/><scale x='18' y='18' z='4'/></transform></volume>"
+		"<float name='albedo' value='%g'/></medium></shape></scene>",
+		SENSOR("0,0,5", "0,0,0"), scatters ? 0.5 : 0);
+	const struct memory_file files[] = {{"s", xml, (size_t)n}, {"g", grid.bytes, grid.size}, {NULL, NULL, 0}};
+	return world_of_files(8, 8, files);
+}
+
+/* Where a grid steps from one value to the next, events are where they are in homogeneous layers, and as much light is
+ * left. Three channels are compared where colours are rgb. */
+static void test_grid_as_layers(void **state)
+{
+	(void)state;
+	enum { NUMBERS = 400 };
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	struct world *w[2] = {as_layers(true), as_grid(true)};
+	const vec3 along = vec3_normalize((vec3){0.3, -0.2, -1});
+	unsigned in_media = 0;
+	assert_true(w[0]->scale == w[1]->scale);
+	for (int n = 0; n < NUMBERS; n++) {
+		struct path_vertex to[2];
+		spectrum left[2];
+		double pdf[2];
+		for (int i = 0; i < 2; i++) {
+			struct path_context c = context_of(w[i], counters);
+			c.wl = (struct wavelengths){.rgb = true};
+			struct path_vertex at = start_at(w[i], 0.5);
+			assert_true(path_extend_in_media(&c, &at, along, 0, INFINITY, (n + 0.5) / NUMBERS, &to[i],
+							 &left[i]));
+			pdf[i] = path_edge_pdf(&c, &to[i].edge, to[i].edge.medium, &to[i]);
+		}
+		assert_int_equal(to[0].kind, to[1].kind);
+		in_media += to[0].kind == VERTEX_MEDIUM;
+		if (to[0].kind == VERTEX_MEDIUM) /* the first scene's middle may differ from the second's */
+			assert_true(fabs(to[0].x.p.z / w[0]->scale + w[0]->center.z - to[1].x.p.z / w[1]->scale -
+					 w[1]->center.z) < 1e-5);
+		assert_true(fabs(pdf[0] / pdf[1] - 1) < 1e-5);
+		for (int k = 0; k < 3; k++)
+			assert_true(fabs(left[0].v[k] / left[1].v[k] - 1) < 1e-5);
+	}
+	assert_true(in_media > NUMBERS / 2 && in_media < NUMBERS);
+	world_free(w[0]);
+	world_free(w[1]);
+}
+
+/* The same where media only absorb, between points on both sides of the boundaries and within them. */
+static void test_absorbing_grid(void **state)
+{
+	(void)state;
+	struct world *w = as_grid(false);
+	assert_false(w->effects.scattering);
+	const struct wavelengths rgb = {.rgb = true};
+	for (double a = -3.9; a < 0; a += 0.37)
+		for (double b = -3.8; b < 0; b += 0.41) {
+			struct path_vertex from = start_at(w, a), to = start_at(w, b);
+			spectrum left = path_transmittance(w, &rgb, 1, &from, &to);
+			double depth = 0;
+			for (int i = 0; i < VALUES; i++)
+				depth += steps[i] * fmax(fmin(fmax(a, b), i - 3) - fmax(fmin(a, b), i - 4), 0);
+			for (int k = 0; k < 3; k++)
+				assert_true(fabs(left.v[k] / exp(-depth * (k == 0 ? 2 : k == 1 ? 1 : 0.5)) - 1) < 1e-7);
+		}
+	struct path_vertex from = start_at(w, 2), sky = {.kind = VERTEX_INFINITE, .x.p = {0, 0, -1}};
+	double depth = steps[0] + steps[1] + steps[2] + steps[3];
+	assert_true(fabs(path_transmittance(w, &rgb, 1, &from, &sky).v[0] / exp(-2 * depth) - 1) < 1e-7);
+	assert_true(fabs(path_transmittance(w, &rgb, 1, &sky, &from).v[0] / exp(-2 * depth) - 1) < 1e-7);
 	world_free(w);
 }
 
@@ -163,8 +278,8 @@ static void test_emitters(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_events),
-		cmocka_unit_test(test_both_ends),
+		cmocka_unit_test(test_events),	       cmocka_unit_test(test_grid_as_layers),
+		cmocka_unit_test(test_absorbing_grid), cmocka_unit_test(test_both_ends),
 		cmocka_unit_test(test_emitters),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -161,15 +161,17 @@ static void test_unknown_names(void **state)
 	refuses(S "<rfilter type='blackman'/>" END, "; --lenient takes `gaussian` instead");
 	refuses(S "<shape type='ellipsoids'/>" END,
 		"<shape type=\"ellipsoids\">: this shape of Mitsuba's is not supported; --lenient leaves it out (supp");
-	refuses(S "<medium type='heterogeneous'/>" END,
-		"s.xml:1: <medium type=\"heterogeneous\">: this medium of Mitsuba's is not supported; --lenient leaves it "
-		"out (supported: homogeneous)");
+	refuses(S "<medium type='smoke'/>" END,
+		"s.xml:1: <medium type=\"smoke\">: there is no medium of this type; --lenient leaves it out (supported: "
+		"homogeneous, heterogeneous)");
 	refuses(S "<medium type='homogeneous'>\n<phase type='sggx'/></medium>" END,
 		"s.xml:2: <phase type=\"sggx\">: this phase of Mitsuba's is not supported; --lenient takes `isotropic` "
 		"instead (supported: isotropic, hg, rayleigh)");
-	refuses(S "<medium type='homogeneous'>\n<volume type='gridvolume' name='albedo'/></medium>" END,
-		"s.xml:2: <volume type=\"gridvolume\">: media that vary from place to place are not supported; --lenient "
-		"leaves it out");
+	refuses(S "<medium type='homogeneous'>\n<volume type='volcache' name='albedo'/></medium>" END,
+		"s.xml:2: <volume type=\"volcache\">: this volume of Mitsuba's is not supported; --lenient leaves it out "
+		"(supported: constvolume, gridvolume)");
+	refuses(S "<shape type='cube'><volume type='constvolume'/></shape>" END,
+		"a volume without a name has no place in <shape");
 	refuses(S "<phase type='isotropic'><float name='g' value='0.5'/></phase>" END,
 		"<phase type=\"isotropic\"> has no `g`");
 	refuses(S "<shape type='cube'><phase type='hg'/></shape>" END, "a phase without a name has no place in <shape");
@@ -351,9 +353,8 @@ static void test_names_without_values(void **state)
 static void test_media_are_told_once(void **state)
 {
 	(void)state;
-	static const char xml[] =
-		S "<medium type='heterogeneous' id='fog'/><shape type='cube'><ref id='fog' name='interior'/>"
-		  "</shape><shape type='sphere'><ref id='fog' name='exterior'/></shape>" END;
+	static const char xml[] = S "<medium type='smoke' id='fog'/><shape type='cube'><ref id='fog' name='interior'/>"
+				    "</shape><shape type='sphere'><ref id='fog' name='exterior'/></shape>" END;
 	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;

@@ -6,6 +6,7 @@
 #include "tests/support/built_shape.h"
 #include "tests/support/dice.h"
 #include "tests/support/scene_tables.h"
+#include "tests/support/vol.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -16,52 +17,11 @@
 
 #include <cmocka.h>
 
-enum { HEAD = 48, VALUES_MAX = 24 * 24 * 24 };
 static const double pi = 3.14159265358979323846;
 
-struct vol {
-	unsigned char bytes[HEAD + 4 * VALUES_MAX];
-	size_t size;
-	uint32_t side[3];
-	float value[VALUES_MAX];
-};
-
-static void put(unsigned char *to, uint32_t v)
+static void fill(struct vol *v, uint32_t nx, uint32_t ny, uint32_t nz, vol_field *f)
 {
-	for (int i = 0; i < 4; i++)
-		to[i] = (unsigned char)(v >> 8 * i);
-}
-
-static void write_vol(struct vol *v)
-{
-	size_t count = (size_t)v->side[0] * v->side[1] * v->side[2];
-	memset(v->bytes, 0, HEAD);
-	memcpy(v->bytes, "VOL\3", 4);
-	put(v->bytes + 4, 1);
-	for (int i = 0; i < 3; i++)
-		put(v->bytes + 8 + 4 * i, v->side[i]);
-	put(v->bytes + 20, 1);
-	for (size_t i = 0; i < count; i++) {
-		uint32_t bits;
-		memcpy(&bits, &v->value[i], sizeof bits);
-		put(v->bytes + HEAD + 4 * i, bits);
-	}
-	v->size = HEAD + 4 * count;
-}
-
-typedef double field(double x, double y, double z);
-
-static void fill(struct vol *v, uint32_t nx, uint32_t ny, uint32_t nz, field *f)
-{
-	v->side[0] = nx;
-	v->side[1] = ny;
-	v->side[2] = nz;
-	size_t at = 0;
-	for (uint32_t k = 0; k < nz; k++)
-		for (uint32_t j = 0; j < ny; j++)
-			for (uint32_t i = 0; i < nx; i++)
-				v->value[at++] = (float)f(i / (nx - 1.0), j / (ny - 1.0), k / (nz - 1.0));
-	write_vol(v);
+	vol_make(v, (const uint32_t[3]){nx, ny, nz}, 1, f);
 }
 
 static struct built_shape built(const char *content, const struct vol *v)
@@ -125,27 +85,29 @@ static void check_edges(const struct mesh *m, bool closed)
 	free(edges);
 }
 
-static double ball(double x, double y, double z)
+static double ball(double x, double y, double z, uint32_t channel)
 {
+	(void)channel;
 	x -= 0.51, y -= 0.48, z -= 0.5;
 	return sqrt(x * x + y * y + z * z) - 0.37;
 }
 
-static double ring(double x, double y, double z)
+static double ring(double x, double y, double z, uint32_t channel)
 {
+	(void)channel;
 	x -= 0.51, y -= 0.48, z -= 0.5;
 	return hypot(hypot(x, y) - 0.29, z) - 0.131;
 }
 
-static vec3 gradient_of(field *f, vec3 p)
+static vec3 gradient_of(vol_field *f, vec3 p)
 {
 	const double h = 1e-6;
-	return mesh_unit((vec3){f(p.x + h, p.y, p.z) - f(p.x - h, p.y, p.z),
-				f(p.x, p.y + h, p.z) - f(p.x, p.y - h, p.z),
-				f(p.x, p.y, p.z + h) - f(p.x, p.y, p.z - h)});
+	return mesh_unit((vec3){f(p.x + h, p.y, p.z, 0) - f(p.x - h, p.y, p.z, 0),
+				f(p.x, p.y + h, p.z, 0) - f(p.x, p.y - h, p.z, 0),
+				f(p.x, p.y, p.z + h, 0) - f(p.x, p.y, p.z - h, 0)});
 }
 
-static void check_body(const struct vol *v, field *f, double volume, double most_degrees)
+static void check_body(const struct vol *v, vol_field *f, double volume, double most_degrees)
 {
 	struct built_shape b = built("", v), flat = built("<string name='normals' value='analytic'/>", v);
 	if (b.result || flat.result)
@@ -187,8 +149,9 @@ static void test_bodies(void **state)
 	check_body(&v, ring, 2 * pi * pi * 0.29 * 0.131 * 0.131, 5);
 }
 
-static double slope(double x, double y, double z)
+static double slope(double x, double y, double z, uint32_t channel)
 {
+	(void)channel;
 	return 2 * x + y - z - 0.613;
 }
 
@@ -229,7 +192,7 @@ static void test_noise(void **state)
 					double value = 0.01 + dice_throw(&d);
 					v.value[at] = (float)(face || dice_below(&d, 2) ? value : -value);
 				}
-		write_vol(&v);
+		vol_write(&v);
 		struct built_shape b = built("<string name='normals' value='analytic'/>", &v);
 		if (b.result) {
 			assert_non_null(strstr(b.error.text, "there is no surface"));
@@ -260,30 +223,31 @@ static void test_bad_files(void **state)
 		const char *text;
 	} bad[] = {
 		{0, 0, "m: this is not a grid of numbers (.vol)"},
-		{4, 2, "m: version 3, type 2, 1 channels; supported are version 3, type 1 (floats), 1 channel"},
+		{4, 2,
+		 "m: version 3, type 2, 1 channels; supported are version 3, types 1 (floats) and 3 (bytes), 1 channel"},
 		{20, 3, "type 1, 3 channels"},
 		{8, 1, "m: 1 values along x; 2 to 1024 are supported"},
 		{12, 1025, "m: 1025 values along y"},
 		{16, 0xffffffff, "m: 4294967295 values along z"},
 		{16, 1000, "m: too short for 16000 values"},
-		{HEAD, 0x7fc00000, "m: value 0 is not finite"},
-		{HEAD + 4, 0x7f800000, "m: value 1 is not finite"},
+		{VOL_HEAD, 0x7fc00000, "m: value 0 is not finite"},
+		{VOL_HEAD + 4, 0x7f800000, "m: value 1 is not finite"},
 	};
 	fill(&good, 4, 4, 4, ball);
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		v = good;
-		put(v.bytes + bad[i].at, bad[i].value);
+		vol_put32(&v, bad[i].at, bad[i].value);
 		refuses(&v, bad[i].text);
 	}
 	for (size_t size = 0; size < good.size; size++) {
 		v = good;
 		v.size = size;
-		refuses(&v, size < HEAD ? "this is not a grid" : "too short for 64 values");
+		refuses(&v, size < VOL_HEAD ? "this is not a grid" : "too short for 64 values");
 	}
 	v = good;
 	for (size_t i = 0; i < 64; i++)
 		v.value[i] = 1;
-	write_vol(&v);
+	vol_write(&v);
 	refuses(&v, "m: its values do not change their sign: there is no surface");
 	/* Zeros and numbers of any size: a mesh, or an error. */
 	static const float numbers[] = {0, -0.0f, 1, -1, 3e38f, -3e38f, 1e-45f, -1e-45f, 1e-20f, -1e-20f};
@@ -291,7 +255,7 @@ static void test_bad_files(void **state)
 	for (int round = 0; round < 500; round++) {
 		for (size_t i = 0; i < 64; i++)
 			v.value[i] = numbers[dice_below(&d, sizeof numbers / sizeof *numbers)];
-		write_vol(&v);
+		vol_write(&v);
 		struct built_shape b = built("", &v);
 		assert_true(b.result <= 0);
 		for (uint32_t i = 0; b.result == 0 && i < b.g.mesh.vertex_count; i++)

@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "tests/support/slow_grid.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { CUTS_MAX = 256 };
+
+static int wrapped(const struct grid *g, int i, int n)
+{
+	while (i < 0 || i >= n) {
+		if (g->outside == GRID_REPEAT)
+			i += i < 0 ? n : -n;
+		else if (g->outside == GRID_MIRROR)
+			i = i < 0 ? -1 - i : 2 * n - 1 - i;
+		else
+			i = i < 0 ? 0 : n - 1;
+	}
+	return i;
+}
+
+static double weight_of(const struct grid *g, int point, double x)
+{
+	return g->nearest ? x >= point && x < point + 1 : fmax(1 - fabs(x - point), 0);
+}
+
+double slow_grid_value(const struct grid *g, const double x[3], int channel)
+{
+	double sum = 0;
+	for (int k = (int)x[2] - 2; k <= x[2] + 2; k++) {
+		double z = weight_of(g, k, x[2]);
+		for (int j = (int)x[1] - 2; j <= x[1] + 2 && z > 0; j++) {
+			double y = z * weight_of(g, j, x[1]);
+			for (int i = (int)x[0] - 2; i <= x[0] + 2 && y > 0; i++) {
+				size_t row = (size_t)(wrapped(g, k, g->size[2]) * g->size[1] +
+						      wrapped(g, j, g->size[1])),
+				       at = row * (size_t)g->size[0] + (size_t)wrapped(g, i, g->size[0]);
+				double value = (double)g->value[at * (size_t)g->channels + (size_t)channel];
+				sum += y * weight_of(g, i, x[0]) * value;
+			}
+		}
+	}
+	return sum;
+}
+
+void slow_grid_cells(const struct grid *g, const struct grid_ray *r, double t, double x[3])
+{
+	vec3 p = mat4_point(&g->to_cells, vec3_madd(r->o, t, r->d));
+	x[0] = p.x;
+	x[1] = p.y;
+	x[2] = p.z;
+}
+
+static int ascending(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+bool slow_grid_has(const struct grid *g, vec3 p)
+{
+	double x[3];
+	const double at[3] = {p.x, p.y, p.z}, least[3] = {g->least.x, g->least.y, g->least.z},
+		     most[3] = {g->most.x, g->most.y, g->most.z};
+	slow_grid_cells(g, &(struct grid_ray){p, {0, 0, 0}, 0, 0}, 0, x);
+	for (int i = 0; i < 3; i++)
+		if (g->turned ? at[i] < least[i] || at[i] > most[i] : x[i] < g->low[i] || x[i] > g->high[i])
+			return false;
+	return true;
+}
+
+static size_t add_cut(double *cut, size_t cuts, double t)
+{
+	if (t > cut[0] && t < cut[1])
+		cut[cuts++] = t;
+	return cuts;
+}
+
+double slow_grid_integral(const struct grid *g, const struct grid_ray *r, int channel)
+{
+	double cut[CUTS_MAX], sum = 0, a[3], b[3];
+	size_t cuts = 0;
+	cut[cuts++] = r->t0;
+	cut[cuts++] = fmin(r->t1, 1000);
+	slow_grid_cells(g, r, 0, a);
+	slow_grid_cells(g, r, 1, b);
+	for (int i = 0; i < 3; i++)
+		for (double plane = -1; plane <= g->size[i] + 1; plane += 0.5) {
+			cuts = add_cut(cut, cuts, (plane - a[i]) / (b[i] - a[i]));
+		}
+	for (int i = 0; i < 2 && g->turned; i++) {
+		vec3 p = i ? g->most : g->least;
+		cuts = add_cut(cut, cuts, (p.x - r->o.x) / r->d.x);
+		cuts = add_cut(cut, cuts, (p.y - r->o.y) / r->d.y);
+		cuts = add_cut(cut, cuts, (p.z - r->o.z) / r->d.z);
+	}
+	qsort(cut, cuts, sizeof *cut, ascending);
+	for (size_t i = 0; i + 1 < cuts; i++) {
+		double x[3], v[3], length = cut[i + 1] - cut[i];
+		if (!slow_grid_has(g, vec3_madd(r->o, cut[i] + length / 2, r->d)))
+			continue;
+		/* Halfway towards the ends, where a value may jump: three points are exact for a cubic anywhere. */
+		for (int k = 0; k < 3; k++) {
+			slow_grid_cells(g, r, cut[i] + length * (k + 1) / 4, x);
+			v[k] = slow_grid_value(g, x, channel);
+		}
+		sum += length * (2 * v[0] - v[1] + 2 * v[2]) / 3;
+	}
+	return sum;
+}

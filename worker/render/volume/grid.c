@@ -1,0 +1,430 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A ray visits cells in order: in each it goes to the nearest of the three planes that it leaves the cell through
+ * (Amanatides and Woo 1987). Where it crosses a plane is computed from the plane's number, so that errors do not add
+ * up. Bricks of cells without anything are crossed at once. Gauss's rule with two points is exact for the cubic
+ * polynomial of a cell; where an integral reaches a value is found by Newton's steps, with bisection where one leaves
+ * the bracket.
+ *
+ * Cannot fail: a ray that does not meet the box, or is not finite, passes no cell.
+ */
+#include "worker/render/volume/grid.h"
+
+#include "common/base/liveness.h"
+
+#include <math.h>
+#include <stddef.h>
+
+/* ---- values ---- */
+
+/* Which point stands for the i-th, which may not exist. */
+static int point_of(enum grid_outside outside, int i, int n)
+{
+	if (i >= 0 && i < n)
+		return i;
+	if (outside == GRID_REPEAT)
+		return (i % n + n) % n;
+	if (outside == GRID_MIRROR) {
+		int j = (i % (2 * n) + 2 * n) % (2 * n);
+		return j < n ? j : 2 * n - 1 - j;
+	}
+	return i < 0 ? 0 : n - 1;
+}
+
+/* Coordinates of which those outside of the grid have their like nearby, so that they fit an int. */
+static double bring_near(enum grid_outside outside, double x, int n)
+{
+	int period = outside == GRID_REPEAT ? n : 2 * n;
+	if (outside == GRID_REPEAT || outside == GRID_MIRROR)
+		return isfinite(x) ? x - period * floor(x / period) : 0;
+	return fmin(fmax(x, -1), n);
+}
+
+/* The points around a cell, those further along x, y and z in the bits 1, 2 and 4. */
+static void corners_of(const struct grid *g, const int cell[3], const float *corner[8])
+{
+	size_t stride[3] = {(size_t)g->channels, (size_t)g->channels * (size_t)g->size[0],
+			    (size_t)g->channels * (size_t)g->size[0] * (size_t)g->size[1]};
+	size_t at[3][2];
+	for (int i = 0; i < 3; i++) {
+		int next = g->nearest ? cell[i] : cell[i] + 1;
+		bool within = cell[i] >= 0 && next < g->size[i];
+		at[i][0] = stride[i] * (size_t)(within ? cell[i] : point_of(g->outside, cell[i], g->size[i]));
+		at[i][1] = stride[i] * (size_t)(within ? next : point_of(g->outside, next, g->size[i]));
+	}
+	for (int k = 0; k < 8; k++)
+		corner[k] = g->value + at[2][k >> 2] + at[1][k >> 1 & 1] + at[0][k & 1];
+}
+
+/* The weights that select a channel. */
+static const double one_of[GRID_CHANNELS_MAX][GRID_CHANNELS_MAX] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+/* The weighted sum of the channels at each corner. */
+static void weigh(const float *const corner[8], int channels, const double weight[GRID_CHANNELS_MAX], double v[8])
+{
+	for (int i = 0; i < 8; i++) {
+		v[i] = weight[0] * (double)corner[i][0];
+		for (int k = 1; k < channels; k++)
+			v[i] += weight[k] * (double)corner[i][k];
+	}
+}
+
+static double mix(double t, double a, double b)
+{
+	return a + t * (b - a);
+}
+
+/* x: from 0 to 1 in the cell. */
+static double interpolate(const double c[8], const double x[3])
+{
+	double low = mix(x[1], mix(x[0], c[0], c[1]), mix(x[0], c[2], c[3])),
+	       high = mix(x[1], mix(x[0], c[4], c[5]), mix(x[0], c[6], c[7]));
+	return mix(x[2], low, high);
+}
+
+static bool is_inside(const struct grid *g, vec3 p, const double x[3])
+{
+	if (g->turned)
+		return p.x >= g->least.x && p.y >= g->least.y && p.z >= g->least.z && p.x <= g->most.x &&
+		       p.y <= g->most.y && p.z <= g->most.z;
+	for (int i = 0; i < 3; i++)
+		if (!(x[i] >= g->low[i] && x[i] <= g->high[i]))
+			return false;
+	return true;
+}
+
+bool grid_at(const struct grid *g, vec3 p, double value[GRID_CHANNELS_MAX])
+{
+	vec3 place = mat4_point(&g->to_cells, p);
+	double x[3] = {place.x, place.y, place.z};
+	int cell[3];
+	bool inside = is_inside(g, p, x);
+	for (int k = 0; k < GRID_CHANNELS_MAX; k++)
+		value[k] = 0;
+	if (!inside && g->outside == GRID_ZERO)
+		return false;
+	for (int i = 0; i < 3; i++) {
+		x[i] = bring_near(g->outside, x[i], g->size[i]);
+		cell[i] = (int)floor(x[i]);
+		x[i] -= cell[i];
+	}
+	const float *corner[8];
+	corners_of(g, cell, corner);
+	for (int k = 0; k < GRID_CHANNELS_MAX; k++) {
+		double v[8];
+		weigh(corner, g->channels, one_of[k < g->channels ? k : 0], v);
+		value[k] = interpolate(v, x);
+	}
+	return inside;
+}
+
+/* ---- bricks ---- */
+
+static int bricks_along(const struct grid *g, int i)
+{
+	return (int)((unsigned)g->size[i] / GRID_BRICK + 1);
+}
+
+size_t grid_bricks(const struct grid *g)
+{
+	return (size_t)bricks_along(g, 0) * (size_t)bricks_along(g, 1) * (size_t)bricks_along(g, 2);
+}
+
+/* Cells begin at -1. */
+static size_t brick_of(const struct grid *g, const int cell[3])
+{
+	size_t at[3];
+	for (int i = 0; i < 3; i++)
+		at[i] = (unsigned)(cell[i] + 1) / GRID_BRICK;
+	return (at[2] * (size_t)bricks_along(g, 1) + at[1]) * (size_t)bricks_along(g, 0) + at[0];
+}
+
+/* The first cells of those bricks along axis i that the point counts in: in the cells before and behind it, and where
+ * the grid repeats itself at its other end. */
+static int cells_with(const struct grid *g, int i, int point, int cell[3])
+{
+	int n = 0;
+	cell[n++] = point;
+	if ((point + 1) % GRID_BRICK == 0)
+		cell[n++] = point - 1;
+	if (g->outside == GRID_REPEAT && (point == 0 || point == g->size[i] - 1))
+		cell[n++] = point == 0 ? g->size[i] - 1 : -1;
+	return n;
+}
+
+void grid_find_full(const struct grid *g, unsigned char *full)
+{
+	const float *v = g->value;
+	int x[3], y[3], z[3];
+	for (int k = 0; k < g->size[2]; k++) {
+		int nz = cells_with(g, 2, k, z);
+		tick();
+		for (int j = 0; j < g->size[1]; j++) {
+			int ny = cells_with(g, 1, j, y);
+			for (int i = 0; i < g->size[0]; i++, v += g->channels) {
+				if (v[0] == 0 && (g->channels == 1 || (v[1] == 0 && v[2] == 0)))
+					continue;
+				int nx = cells_with(g, 0, i, x);
+				for (int m = 0; m < nx * ny * nz; m++)
+					full[brick_of(g, (const int[3]){x[m % nx], y[m / nx % ny], z[m / nx / ny]})] =
+						1;
+			}
+		}
+	}
+}
+
+/* ---- rays ---- */
+
+/* Cells that are crossed at once: one; an empty brick of them; or where the values at the border go on for ever all
+ * those outside along an axis, which differ from each other along the other axes only. */
+struct block {
+	int first[3], last[3];
+	bool empty, wide; /* wide: may be more than one cell */
+};
+
+/* A ray on its way through the cells. */
+struct cells {
+	const struct grid *g;
+	double o[3], d[3], per[3]; /* in cells, in cells per unit of t, and its inverse */
+	double t, end;
+	int cell[3], past[3], step[3]; /* past: the first cell behind the box in the direction of the ray */
+	struct block block;	       /* around the cell */
+	double leave[3];	       /* the t at which the ray leaves it along each axis */
+};
+
+/* The t at which the ray meets the plane of that number across axis i. */
+static double crossing(const struct cells *c, int i, double plane)
+{
+	return (plane - c->o[i]) * c->per[i];
+}
+
+/* To what lies between two planes across an axis, for the ray o + t d; false: nothing does. */
+static bool clip(struct cells *c, double o, double d, double low, double high)
+{
+	if (d == 0)
+		return o >= low && o <= high;
+	double a = (low - o) / d, b = (high - o) / d;
+	c->t = fmax(c->t, fmin(a, b));
+	c->end = fmin(c->end, fmax(a, b));
+	return c->t < c->end;
+}
+
+static bool clip_to_box(struct cells *c, const struct grid_ray *r)
+{
+	const struct grid *g = c->g;
+	if (g->turned)
+		return clip(c, r->o.x, r->d.x, g->least.x, g->most.x) &&
+		       clip(c, r->o.y, r->d.y, g->least.y, g->most.y) && clip(c, r->o.z, r->d.z, g->least.z, g->most.z);
+	for (int i = 0; i < 3; i++)
+		if (!clip(c, c->o[i], c->d[i], g->low[i], g->high[i]))
+			return false;
+	return true;
+}
+
+static void find_leave(struct cells *c, int i)
+{
+	int plane = c->step[i] > 0 ? c->block.last[i] + 1 : c->block.first[i];
+	c->leave[i] = c->step[i] ? crossing(c, i, plane) : INFINITY;
+}
+
+/* The block around a cell that is outside of the points or in an empty brick; `within` is the nearest one inside. */
+static void find_wide_block(struct cells *c, const int within[3], bool outside)
+{
+	const struct grid *g = c->g;
+	struct block *b = &c->block;
+	b->empty = !g->full[brick_of(g, within)];
+	for (int i = 0; i < 3; i++) {
+		b->first[i] = b->last[i] = c->cell[i];
+		if (c->cell[i] < -1 || within[i] < c->cell[i]) {
+			bool below = c->cell[i] < 0;
+			b->first[i] = below ? (int)floor(g->low[i]) : g->size[i];
+			b->last[i] = below ? -1 : (int)ceil(g->high[i]) - 1;
+		} else if (b->empty && !outside) {
+			b->first[i] = (c->cell[i] + 1) / GRID_BRICK * GRID_BRICK - 1;
+			b->last[i] = b->first[i] + GRID_BRICK - 1;
+		}
+		find_leave(c, i);
+	}
+	b->wide = true;
+}
+
+/* crossed: the axis along which the ray came into the cell; 3: it begins there. */
+static void enter_cell(struct cells *c, int crossed)
+{
+	const struct grid *g = c->g;
+	struct block *b = &c->block;
+	bool outside = false;
+	int within[3];
+	for (int i = 0; i < 3; i++) {
+		int last = g->size[i] - 1, x = c->cell[i];
+		within[i] = x < -1 ? -1 : x > last ? last : x;
+		outside = outside || within[i] != x;
+	}
+	if (outside || !g->full[brick_of(g, within)]) {
+		find_wide_block(c, within, outside);
+		return;
+	}
+	bool all = b->wide || crossed == 3;
+	b->empty = b->wide = false;
+	for (int i = 0; i < 3; i++)
+		if (all || i == crossed) {
+			b->first[i] = b->last[i] = c->cell[i];
+			find_leave(c, i);
+		}
+}
+
+/* The axis across which the ray leaves the block first. */
+static int way_out(const struct cells *c)
+{
+	int axis = c->leave[1] < c->leave[0] ? 1 : 0;
+	return c->leave[2] < c->leave[axis] ? 2 : axis;
+}
+
+/* Goes on to the next block; false: that is the end. */
+static bool go_on(struct cells *c, int axis)
+{
+	const struct block *b = &c->block;
+	if (!(c->leave[axis] < c->end))
+		return false;
+	c->t = c->leave[axis];
+	for (int i = 0; i < 3 && b->wide; i++) {
+		double x = floor(c->o[i] + c->t * c->d[i]);
+		c->cell[i] = x < b->last[i] ? (x > b->first[i] ? (int)x : b->first[i]) : b->last[i];
+	}
+	c->cell[axis] = c->step[axis] > 0 ? b->last[axis] + 1 : b->first[axis] - 1;
+	if (c->step[axis] > 0 ? c->cell[axis] >= c->past[axis] : c->cell[axis] <= c->past[axis])
+		return false;
+	enter_cell(c, axis);
+	return true;
+}
+
+static bool begin(struct cells *c, const struct grid *g, const struct grid_ray *r)
+{
+	vec3 o = mat4_point(&g->to_cells, r->o), d = mat4_vector(&g->to_cells, r->d);
+	*c = (struct cells){.g = g,
+			    .o = {o.x, o.y, o.z},
+			    .d = {d.x, d.y, d.z},
+			    .per = {1 / d.x, 1 / d.y, 1 / d.z},
+			    .t = r->t0,
+			    .end = r->t1};
+	if (!vec3_is_finite(vec3_add(o, d)) || !clip_to_box(c, r) || !isfinite(c->end))
+		return false;
+	for (int i = 0; i < 3; i++) {
+		int first = (int)floor(g->low[i]), last = (int)ceil(g->high[i]) - 1;
+		double x = c->o[i] + c->t * c->d[i];
+		c->cell[i] = x < last ? (x > first ? (int)floor(x) : first) : last;
+		c->step[i] = c->d[i] > 0 ? 1 : c->d[i] < 0 ? -1 : 0;
+		c->past[i] = c->d[i] > 0 ? last + 1 : first - 1;
+	}
+	enter_cell(c, 3);
+	return true;
+}
+
+static double value_at(const struct cells *c, const double corner[8], double t)
+{
+	double x[3];
+	for (int i = 0; i < 3; i++)
+		x[i] = c->o[i] + t * c->d[i] - c->cell[i];
+	return interpolate(corner, x);
+}
+
+/* Over t from a to b, in this cell. */
+static double integral(const struct cells *c, const double corner[8], double a, double b)
+{
+	static const double gauss = 0.57735026918962576; /* 1 / sqrt 3 */
+	double half = (b - a) / 2, middle = a + half;
+	return half * (value_at(c, corner, middle - gauss * half) + value_at(c, corner, middle + gauss * half));
+}
+
+/* Of each channel up to `end` in this cell. */
+static void integrate_cell(const struct cells *c, const float *const corner[8], double end,
+			   double part[GRID_CHANNELS_MAX])
+{
+	for (int k = 0; k < c->g->channels; k++) {
+		double v[8];
+		bool empty = true;
+		for (int i = 0; i < 8; i++) {
+			v[i] = (double)corner[i][k];
+			empty = empty && v[i] == 0;
+		}
+		part[k] = empty ? 0 : integral(c, v, c->t, end);
+	}
+}
+
+void grid_integrate(const struct grid *g, const struct grid_ray *r, double sum[GRID_CHANNELS_MAX])
+{
+	struct cells c;
+	int axis;
+	for (int k = 0; k < GRID_CHANNELS_MAX; k++)
+		sum[k] = 0;
+	if (!begin(&c, g, r))
+		return;
+	do {
+		axis = way_out(&c);
+		double end = fmin(c.leave[axis], c.end);
+		if (end > c.t && !c.block.empty) {
+			const float *corner[8];
+			double part[GRID_CHANNELS_MAX];
+			corners_of(g, c.cell, corner);
+			integrate_cell(&c, corner, end, part);
+			for (int k = 0; k < g->channels; k++)
+				sum[k] += part[k];
+		}
+	} while (go_on(&c, axis));
+}
+
+/* The t in [a,b] where the integral from a on is `least`, which is at most that up to b. */
+static double reach_in_cell(const struct cells *c, const double corner[8], double a, double b, double least)
+{
+	enum { STEPS_MAX = 100 };
+	double low = a, high = b, t = a + (b - a) / 2;
+	for (int i = 0; i < STEPS_MAX; i++) {
+		double over = integral(c, corner, a, t) - least;
+		if (over < 0)
+			low = t;
+		else
+			high = t;
+		double next = t - over / value_at(c, corner, t);
+		if (!(next > low && next < high))
+			next = low + (high - low) / 2;
+		if (next == t || next == low || next == high)
+			break;
+		t = next;
+	}
+	return t;
+}
+
+double grid_reach(const struct grid *g, const struct grid_ray *r, const double weight[GRID_CHANNELS_MAX], double least,
+		  double sum[GRID_CHANNELS_MAX])
+{
+	struct cells c;
+	int axis;
+	for (int k = 0; k < GRID_CHANNELS_MAX; k++)
+		sum[k] = 0;
+	if (!begin(&c, g, r))
+		return INFINITY;
+	do {
+		axis = way_out(&c);
+		double end = fmin(c.leave[axis], c.end), part[GRID_CHANNELS_MAX], here = 0;
+		const float *corner[8];
+		if (!(end > c.t) || c.block.empty)
+			continue;
+		corners_of(g, c.cell, corner);
+		integrate_cell(&c, corner, end, part);
+		for (int k = 0; k < g->channels; k++)
+			here += weight[k] * part[k];
+		bool reached = here >= least && here > 0;
+		if (reached) {
+			double v[8];
+			weigh(corner, g->channels, weight, v);
+			end = reach_in_cell(&c, v, c.t, end, least);
+			integrate_cell(&c, corner, end, part);
+		}
+		for (int k = 0; k < g->channels; k++)
+			sum[k] += part[k];
+		if (reached)
+			return end;
+		least -= here;
+	} while (go_on(&c, axis));
+	return INFINITY;
+}

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * "VOL", the version 3, and as 32-bit little-endian numbers: the type (1: floats, 3: bytes), three sizes, the number of
+ * channels, a box of six floats, the values.
+ *
+ * Failures: another format, type or number of channels, a side of more than GRID_SIDE_MAX, a file that is too short, a
+ * value that is not finite.
+ */
+#include "worker/render/volume/grid_file.h"
+
+#include "common/base/bytes.h"
+#include "common/base/liveness.h"
+#include "worker/render/scene/asset_part.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { VERSION = 3, FLOATS = 1, BYTES = 3, HEAD = 4 + 4 * 5 + 4 * 6, TICK_INTERVAL = 1 << 16 };
+
+static float float_at(const unsigned char *p)
+{
+	uint32_t bits = get32(p);
+	float x;
+	memcpy(&x, &bits, sizeof x);
+	return x;
+}
+
+/* *count: of all values. */
+static int read_head(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, bool three,
+		     struct grid_file *out, uint64_t *count, struct error *e)
+{
+	if (size < HEAD || memcmp(p, "VOL", 3) != 0)
+		return node_error(n, e, EINVAL, "%s: this is not a grid of numbers (.vol)", name);
+	uint32_t type = get32(p + 4);
+	out->channels = get32(p + 20);
+	if (p[3] != VERSION || (type != FLOATS && type != BYTES) ||
+	    !(out->channels == 1 || (three && out->channels == 3)))
+		return node_error(n, e, ENOTSUP,
+				  "%s: version %u, type %u, %u channels; supported are version 3, types 1 (floats) and "
+				  "3 (bytes), 1 channel%s",
+				  name, p[3], type, out->channels, three ? " or 3" : "");
+	*count = out->channels;
+	for (int i = 0; i < 3; i++) {
+		out->size[i] = get32(p + 8 + 4 * i);
+		if (out->size[i] < 1 || out->size[i] > GRID_SIDE_MAX)
+			return node_error(n, e, ERANGE, "%s: %u values along %c; 1 to %d are supported", name,
+					  out->size[i], "xyz"[i], GRID_SIDE_MAX);
+		*count *= out->size[i];
+		for (int k = 0; k < 2; k++)
+			out->box[k][i] = (double)float_at(p + 24 + 4 * (3 * k + i));
+	}
+	if ((size - HEAD) / (type == FLOATS ? 4 : 1) < *count)
+		return node_error(n, e, EINVAL, "%s: too short for %llu values", name, (unsigned long long)*count);
+	return 0;
+}
+
+static int read_grid(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, bool three,
+		     struct arena *arena, struct grid_file *out, struct error *e)
+{
+	uint64_t count = 0;
+	int rc = read_head(p, size, n, name, three, out, &count, e);
+	if (rc)
+		return rc;
+	bool floats = get32(p + 4) == FLOATS;
+	out->value = arena_alloc(arena, count, sizeof *out->value);
+	if (!out->value)
+		return node_error(n, e, ENOMEM, "%s: out of memory", name);
+	out->least = INFINITY;
+	out->largest = -INFINITY;
+	for (uint64_t i = 0; i < count; i++) {
+		out->value[i] = floats ? float_at(p + HEAD + 4 * i) : (float)p[HEAD + i] / 255;
+		if (!isfinite(out->value[i]))
+			return node_error(n, e, EINVAL, "%s: value %llu is not finite", name, (unsigned long long)i);
+		out->least = fmin(out->least, (double)out->value[i]);
+		out->largest = fmax(out->largest, (double)out->value[i]);
+		if (i % TICK_INTERVAL == 0)
+			tick();
+	}
+	return 0;
+}
+
+int grid_file_read(const struct scene_node *n, const struct asset_source *assets, bool three, struct arena *arena,
+		   struct grid_file *out, struct error *e)
+{
+	struct asset_range a;
+	*out = (struct grid_file){.value = NULL};
+	int rc = asset_part_open(&a, n, assets, e);
+	if (rc)
+		return rc;
+	rc = read_grid(a.bytes, a.size, n, node_string(n, "filename", ""), three, arena, out, e);
+	asset_range_close(&a, assets);
+	return rc;
+}
+
+/* ---- the cache ---- */
+
+struct grid_entry {
+	const char *name;
+	struct grid_file file;
+	struct grid_entry *next;
+};
+
+static struct grid_entry **list_of(struct grid_cache *cache, const char *name)
+{
+	uint32_t h = 0x811c9dc5;
+	for (; *name; name++)
+		h = (h ^ (unsigned char)*name) * 0x01000193;
+	return &cache->first[(h ^ h >> 16) % GRID_LISTS];
+}
+
+int grid_file_share(struct grid_cache *cache, const struct scene_node *n, const struct asset_source *assets,
+		    struct arena *arena, struct grid_file *out, struct error *e)
+{
+	const char *name = node_string(n, "filename", "");
+	struct grid_entry **list = list_of(cache, name), *entry;
+	for (entry = *list; entry; entry = entry->next)
+		if (strcmp(entry->name, name) == 0) {
+			*out = entry->file;
+			return 0;
+		}
+	int rc = grid_file_read(n, assets, true, arena, out, e);
+	entry = rc ? NULL : arena_alloc(arena, 1, sizeof *entry);
+	if (!entry)
+		return rc ? rc : node_error(n, e, ENOMEM, "out of memory");
+	*entry = (struct grid_entry){name, *out, *list};
+	*list = entry;
+	return 0;
+}

@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Where a grid lies. In Mitsuba 3 its values are those of the cells of the unit cube, which to_world takes to its
+ * place; with use_grid_bbox that cube is first fitted to the file's box. In 0.6 the outermost values lie on the faces
+ * of the file's box, or of that from `min` to `max`, before to_world.
+ *
+ * Failures: those of the file, negative numbers, a box without a volume, reflectances above 1.
+ */
+#include "worker/render/volume/volume.h"
+
+#include "worker/render/scene/value.h"
+#include "worker/render/volume/grid_file.h"
+
+#include <string.h>
+
+#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
+#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
+#define PLACE VALUE_POINT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL
+
+/* Of numbers that are no reflectances. */
+#define LARGEST 1e30
+
+static const struct param constvolume_params[] = {
+	{"value", VALUE_COLOR, PARAM_UNDERSTOOD, 0, LARGEST, NULL},
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+static const struct param gridvolume_params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
+	{"use_grid_bbox", UNDERSTOOD(VALUE_BOOL)},
+	{"filter_type", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "trilinear|nearest"},
+	{"wrap_mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "clamp|repeat|mirror"},
+	{"min", PLACE}, /* of 0.6 */
+	{"max", PLACE},
+	{"raw", IGNORED}, /* numbers are never decoded */
+	{"max_value", IGNORED},
+	{"accel", IGNORED},
+	{"send_data", IGNORED},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+const struct plugin_decl volume_decls[] = {
+	{PLUGIN_VOLUME, "constvolume", constvolume_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_VOLUME, "gridvolume", gridvolume_params, 0, PARAM_UNDERSTOOD},
+	{0, NULL, NULL, 0, 0},
+};
+
+/* ---- place ---- */
+
+/* The box that to_world is applied to. */
+static void box_of(const struct scene_node *n, const struct grid_file *f, bool dialect_3, double box[2][3])
+{
+	const struct property *min = node_find(n, "min"), *max = node_find(n, "max");
+	vec3 low = {0, 0, 0}, high = {1, 1, 1};
+	if (min && max) {
+		low = min->value.as.point;
+		high = max->value.as.point;
+	} else if (!dialect_3 || node_bool(n, "use_grid_bbox", false)) {
+		low = (vec3){f->box[0][0], f->box[0][1], f->box[0][2]};
+		high = (vec3){f->box[1][0], f->box[1][1], f->box[1][2]};
+	}
+	const double corner[2][3] = {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+	memcpy(box, corner, sizeof corner);
+}
+
+/* Mitsuba 3 limits a medium by the box around its volume that is parallel to the world's axes. */
+static void find_box(struct grid *g, const mat4 *to_cells)
+{
+	mat4 to_world;
+	mat4_invert(*to_cells, &to_world); /* it was made of an inverse */
+	g->least = (vec3){INFINITY, INFINITY, INFINITY};
+	g->most = vec3_neg(g->least);
+	for (int k = 0; k < 8; k++) {
+		vec3 p = mat4_point(&to_world, (vec3){k & 1 ? g->high[0] : g->low[0], k & 2 ? g->high[1] : g->low[1],
+						      k & 4 ? g->high[2] : g->low[2]});
+		g->least = (vec3){fmin(g->least.x, p.x), fmin(g->least.y, p.y), fmin(g->least.z, p.z)};
+		g->most = (vec3){fmax(g->most.x, p.x), fmax(g->most.y, p.y), fmax(g->most.z, p.z)};
+	}
+	for (int k = 0; k < 8; k++) {
+		vec3 p = mat4_point(to_cells, (vec3){k & 1 ? g->most.x : g->least.x, k & 2 ? g->most.y : g->least.y,
+						     k & 4 ? g->most.z : g->least.z});
+		const double x[3] = {p.x, p.y, p.z};
+		for (int i = 0; i < 3; i++) {
+			g->low[i] = fmax(fmin(g->low[i], x[i]), -GRID_CELL_MAX);
+			g->high[i] = fmin(fmax(g->high[i], x[i]), GRID_CELL_MAX);
+		}
+	}
+}
+
+/* Whether an axis of the volume is not along one of the world's. */
+static bool is_turned(const mat4 *m)
+{
+	for (int i = 0; i < 3; i++) {
+		int along = 0;
+		for (int k = 0; k < 3; k++)
+			along += m->m[i][k] != 0;
+		if (along != 1)
+			return true;
+	}
+	return false;
+}
+
+static int place(struct grid *g, const struct scene_node *n, double box[2][3], const struct volume_build *b,
+		 struct error *e)
+{
+	double per[3], offset = b->dialect_3 && !g->nearest ? -0.5 : 0;
+	mat4 to_world = node_transform(n, "to_world"), to_volume;
+	for (int i = 0; i < 3; i++) {
+		double cells = b->dialect_3 || g->nearest ? g->size[i] : g->size[i] - 1;
+		per[i] = cells / (box[1][i] - box[0][i]);
+		g->low[i] = offset;
+		g->high[i] = cells + offset;
+		if (!(per[i] > 0 && isfinite(per[i])))
+			return node_error(n, e, EINVAL, "its box, or its grid, is flat along %c", "xyz"[i]);
+	}
+	if (!mat4_invert(to_world, &to_volume))
+		return node_error(n, e, EINVAL, "to_world flattens the volume (it has no inverse)");
+	mat4 to_cells = mat4_mul(mat4_scale((vec3){per[0], per[1], per[2]}),
+				 mat4_translate((vec3){-box[0][0], -box[0][1], -box[0][2]}));
+	to_cells = mat4_mul(mat4_translate((vec3){offset, offset, offset}), mat4_mul(to_cells, to_volume));
+	mat4 to_scene =
+		mat4_mul(mat4_translate(b->center), mat4_scale((vec3){1 / b->scale, 1 / b->scale, 1 / b->scale}));
+	g->to_cells = mat4_mul(to_cells, to_scene);
+	g->turned = b->dialect_3 && is_turned(&g->to_cells);
+	if (g->turned)
+		find_box(g, &g->to_cells);
+	return 0;
+}
+
+/* ---- reading ---- */
+
+static int check_values(const struct scene_node *n, const struct grid_file *f, enum color_role role, struct error *e)
+{
+	double most = role == COLOR_REFLECTANCE ? 1 : LARGEST;
+	if (f->least >= 0 && f->largest <= most)
+		return 0;
+	return node_error(n, e, ERANGE, "%s: its values go from %g to %g; [0, %g] is supported here",
+			  node_string(n, "filename", ""), f->least, f->largest, most);
+}
+
+static enum grid_outside outside_of(const struct scene_node *n, bool dialect_3)
+{
+	const char *mode = node_string(n, "wrap_mode", "clamp");
+	if (!dialect_3)
+		return GRID_ZERO;
+	return strcmp(mode, "repeat") == 0 ? GRID_REPEAT : strcmp(mode, "mirror") == 0 ? GRID_MIRROR : GRID_CLAMP;
+}
+
+/* A copy of `made`, with its place and what is found out from its values. */
+static int add_grid(struct volume *v, const struct grid *made, const struct scene_node *n, double box[2][3],
+		    const struct volume_build *b, struct error *e)
+{
+	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	unsigned char *full = arena_alloc(b->arena, grid_bricks(made), 1);
+	if (!g || !full)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*g = *made;
+	grid_find_full(g, full);
+	g->full = full;
+	v->grid = g;
+	return place(g, n, box, b, e);
+}
+
+static int read_grid(struct volume *v, const struct scene_node *n, enum color_role role, const struct volume_build *b,
+		     struct error *e)
+{
+	struct grid_file f;
+	double box[2][3];
+	int rc = grid_file_share(b->cache, n, b->assets, b->arena, &f, e);
+	if (!rc)
+		rc = check_values(n, &f, role, e);
+	if (rc)
+		return rc;
+	v->color = color_constant(1);
+	v->least = f.least;
+	v->largest = f.largest;
+	for (int k = 0; k < GRID_CHANNELS_MAX && !rc; k++) {
+		const double rgb[3] = {k == 0, k == 1, k == 2};
+		rc = color_from_rgb(rgb, COLOR_REFLECTANCE, &v->primary[k]);
+	}
+	const struct grid made = {.size = {(int)f.size[0], (int)f.size[1], (int)f.size[2]},
+				  .channels = (int)f.channels,
+				  .value = f.value,
+				  .nearest = strcmp(node_string(n, "filter_type", "trilinear"), "nearest") == 0,
+				  .outside = outside_of(n, b->dialect_3)};
+	box_of(n, &f, b->dialect_3, box);
+	if (!rc)
+		rc = add_grid(v, &made, n, box, b, e);
+	if (!rc && v->grid->turned && role != COLOR_REFLECTANCE && made.outside != GRID_CLAMP)
+		rc = node_error(n, e, ENOTSUP, "a density that is turned cannot repeat itself (wrap_mode)");
+	return rc;
+}
+
+/* The same colour in the unit cube, and nothing outside. */
+static int add_cube(struct volume *v, const struct scene_node *n, const struct volume_build *b, struct error *e)
+{
+	static const float one = 1;
+	double unit[2][3] = {{0, 0, 0}, {1, 1, 1}};
+	const struct grid made = {
+		.size = {1, 1, 1}, .channels = 1, .value = &one, .nearest = true, .outside = GRID_CLAMP};
+	v->largest = 1;
+	return add_grid(v, &made, n, unit, b, e);
+}
+
+int volume_from_node(struct volume *v, const struct scene_node *n, const char *name, double fallback,
+		     enum color_role role, bool in_cube, const struct volume_build *b, struct error *e)
+{
+	const struct property *p = node_find(n, name);
+	bool nested = p && p->value.type == VALUE_NODE;
+	*v = (struct volume){.color = color_constant(fallback)};
+	if (nested) {
+		n = p->value.as.node;
+		if (strcmp(n->type, "gridvolume") == 0)
+			return read_grid(v, n, role, b, e);
+		p = node_find(n, "value");
+		if (!p && !b->dialect_3)
+			return node_error(n, e, EINVAL, "needs a value");
+		v->color = color_constant(1);
+	}
+	struct error reason;
+	int code = p ? color_from_value(&p->value, role, b->arena, &v->color, &reason) : 0;
+	if (code)
+		return node_error(n, e, -code, "%s: %s", nested ? "value" : name, reason.text);
+	return in_cube ? add_cube(v, n, b, e) : 0;
+}
+
+/* ---- evaluation ---- */
+
+double volume_least(const struct volume *v)
+{
+	double color = v->color.shape == COLOR_SHAPE_CONSTANT ? color_max(&v->color) : 0;
+	return v->grid ? v->least * color : color;
+}
+
+double volume_max(const struct volume *v)
+{
+	return v->grid ? v->largest * color_max(&v->color) : color_max(&v->color);
+}
+
+bool volume_is_coloured(const struct volume *v)
+{
+	return v->color.shape != COLOR_SHAPE_CONSTANT || (v->grid && v->grid->channels > 1);
+}
+
+int volume_weights(const struct volume *v, const struct wavelengths *w, spectrum weight[GRID_CHANNELS_MAX])
+{
+	spectrum sum = spectrum_of(0);
+	int channels = v->grid->channels;
+	weight[0] = spectrum_of(1);
+	if (channels == 1)
+		return 1;
+	for (int k = 0; k < channels; k++) {
+		weight[k] = color_eval(&v->primary[k], w);
+		sum = spectrum_add(sum, weight[k]);
+	}
+	for (int k = 0; k < channels; k++)
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			weight[k].v[i] = sum.v[i] > 0 ? weight[k].v[i] / sum.v[i] : 1.0 / channels;
+	return channels;
+}
+
+spectrum volume_at(const struct volume *v, vec3 p, bool bounded, const struct wavelengths *w)
+{
+	spectrum color = color_eval(&v->color, w);
+	if (!v->grid)
+		return color;
+	double value[GRID_CHANNELS_MAX];
+	spectrum weight[GRID_CHANNELS_MAX], sum = spectrum_of(0);
+	if (!grid_at(v->grid, p, value) && bounded)
+		return sum;
+	int channels = volume_weights(v, w, weight);
+	for (int k = 0; k < channels; k++)
+		sum = spectrum_add(sum, spectrum_scale(value[k], weight[k]));
+	return spectrum_mul(sum, color);
+}
