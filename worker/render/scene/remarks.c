@@ -51,7 +51,7 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e, "the image shows all light, on surfaces and in homogeneous media");
+			rc = remark(r, n, e, "the image shows all light, on surfaces and in media");
 	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
 	return rc ? rc : on_depth(r, n, e);
@@ -61,6 +61,17 @@ static bool has_medium(const struct scene_node *n)
 {
 	return n->cls == PLUGIN_SHAPE ? node_ref(n, "interior") || node_ref(n, "exterior")
 				      : n->cls == PLUGIN_SENSOR && node_child(n, PLUGIN_MEDIUM, 0);
+}
+
+/* Easily forgotten, and the medium is never seen. In 0.6 light passes such a shape. */
+static int on_boundary(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
+{
+	if (!dialect_3 || !node_ref(n, "interior") || n->shines || node_child(n, PLUGIN_BSDF, 0))
+		return 0;
+	return remark(
+		r, n, e,
+		"without a BSDF it is grey and opaque, as in Mitsuba 3, and the medium inside is not seen; `null` "
+		"lets light through");
 }
 
 /* Mitsuba has integrators with and without media; here each scene is shown with them. */
@@ -116,6 +127,8 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bo
 		integrator = n->cls == PLUGIN_INTEGRATOR ? n : integrator;
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
+		else if (n->cls == PLUGIN_SHAPE)
+			rc = on_boundary(r, n, dialect_3, e);
 		else if (n->cls == PLUGIN_EMITTER)
 			rc = on_emitter(r, n, dialect_3, e);
 		else if (n->cls == PLUGIN_SENSOR && camera)

@@ -53,8 +53,17 @@ static bool backs_are_black(const struct builder *b)
 	return backs > SETTING_BACKS_AUTO ? backs > SETTING_BACKS_LIT : b->scene->black_backs;
 }
 
+/* In 0.6 a shape that bounds a medium and has no BSDF lets light through: the node of a `null` in its place. */
+static const struct scene_node *add_null(struct builder *b, const struct scene_node *shape)
+{
+	struct scene_node *n = arena_alloc(&b->scratch, 1, sizeof *n);
+	if (n)
+		*n = (struct scene_node){.cls = PLUGIN_BSDF, .type = "null", .file = shape->file, .line = shape->line};
+	return n;
+}
+
 /* One BSDF per node, however many shapes refer to it, unless it uses the shape's attributes: then one per mesh,
- * which instances share. The default is grey, or black for emitters. */
+ * which instances share. The default is grey, or black for emitters, or in 0.6 none for media. */
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
@@ -65,6 +74,7 @@ static int create_bsdfs(struct builder *b)
 	if (!w->bsdfs || !b->bsdf_nodes || node_table_init(&made, w->shape_count, &b->scratch))
 		return build_out_of_memory(b->e);
 	struct boundary_table *boundaries = NULL;
+	const struct scene_node *null = NULL;
 	struct bsdf_build build = {.assets = b->assets,
 				   .arena = &w->arena,
 				   .dialect_3 = b->scene->dialect_3,
@@ -72,8 +82,16 @@ static int create_bsdfs(struct builder *b)
 				   .black_backs = backs_are_black(b),
 				   .boundaries = &boundaries};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
-		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
-		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;
+		const struct scene_node *shape = b->shape_nodes[i], *n = node_child(shape, PLUGIN_BSDF, 0),
+					*light = node_child(shape, PLUGIN_EMITTER, 0);
+		if (!n && !light && !b->scene->dialect_3 &&
+		    (node_ref(shape, "interior") || node_ref(shape, "exterior"))) {
+			null = null ? null : add_null(b, shape);
+			if (!null)
+				return build_out_of_memory(b->e);
+			n = null;
+		}
+		const struct scene_node *key = n ? n : light;
 		uint32_t k;
 		if (node_table_find(&made, key, NULL, &k) ||
 		    (w->shapes[i].index && node_table_find(&made, key, w->shapes[i].index, &k))) {

@@ -182,7 +182,7 @@ static void test_notes_on_the_whole(void **state)
 		{"<sensor type='perspective'/>",
 		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
 		{"<integrator type='photonmapper'/>",
-		 "s.xml:1: <integrator type=\"photonmapper\">: the image shows all light, on surfaces and in homogeneous media"},
+		 "s.xml:1: <integrator type=\"photonmapper\">: the image shows all light, on surfaces and in media"},
 		{"<integrator type='direct'/>",
 		 "s.xml:1: <integrator type=\"direct\">: the image shows light that is scattered once; --max-depth shows more"},
 		{"<integrator type='path'/><shape type='sphere'><medium type='homogeneous' name='interior'/></shape>",
@@ -190,6 +190,8 @@ static void test_notes_on_the_whole(void **state)
 		{"<integrator type='aov'><integrator type='path'/></integrator><sensor type='perspective'>"
 		 "<medium type='homogeneous'/></sensor>",
 		 "Mitsuba's `path` leaves media out"},
+		{"<shape type='sphere'><medium type='homogeneous' name='interior'/></shape>",
+		 "s.xml:1: <shape type=\"sphere\">: without a BSDF it is grey and opaque, as in Mitsuba 3"},
 		{"<integrator type='multichannel'/>", "the image shows all light, on surfaces and"},
 		{"<integrator type='volprim_rf_basic'/>", "the image shows all light, on surfaces and"},
 	};

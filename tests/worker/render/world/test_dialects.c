@@ -153,8 +153,33 @@ static void test_number_as_spectrum(void **state)
 	}
 }
 
+/* Shapes without a BSDF are grey, on both sides in tests; in 0.6 those that bound a medium let light through, unless
+ * they shine. */
+static void test_boundaries_of_media(void **state)
+{
+	(void)state;
+#define MEDIUM(side) "<medium name='" side "' type='homogeneous'/>"
+	static const char body[] =
+		"<emitter type='constant'/><shape type='sphere'/><shape type='sphere'>" MEDIUM("interior") "</shape><shape type='sphere'>" MEDIUM(
+			"exterior") "</shape><shape "
+				    "type='sphere'><emitter type='area'/>" MEDIUM("interior") "</shape><shape type='sphere'>" MEDIUM(
+					    "interior") "<bsdf type='dielectric'/></shape>";
+	static const char *const types[2][5] = {{"twosided", "null", "null", "black", "dielectric"},
+						{"twosided", "twosided", "twosided", "black", "dielectric"}};
+	for (int i = 0; i < 2; i++) {
+		char xml[2048];
+		snprintf(xml, sizeof xml, "<scene version='%s'>%s</scene>", i ? "3.0.0" : "0.6.0", body);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
+		struct world *w = world_of_files(8, 8, files);
+		for (uint32_t k = 0; k < 5; k++)
+			assert_string_equal(w->bsdfs[w->parts[k].bsdf].ops->type, types[i][k]);
+		world_free(w);
+	}
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_twins), cmocka_unit_test(test_number_as_spectrum)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_twins), cmocka_unit_test(test_number_as_spectrum),
+					   cmocka_unit_test(test_boundaries_of_media)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
