@@ -12,6 +12,7 @@
 
 #include "common/base/liveness.h"
 
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 
@@ -298,18 +299,24 @@ static bool go_on(struct cells *c, int axis)
 	return true;
 }
 
+/* What has no inverse is none. */
+static double without_tiny(double d)
+{
+	return fabs(d) >= DBL_MIN ? d : 0;
+}
+
 static bool begin(struct cells *c, const struct grid *g, const struct grid_ray *r)
 {
 	vec3 o = mat4_point(&g->to_cells, r->o), d = mat4_vector(&g->to_cells, r->d);
 	*c = (struct cells){.g = g,
 			    .o = {o.x, o.y, o.z},
-			    .d = {d.x, d.y, d.z},
-			    .per = {1 / d.x, 1 / d.y, 1 / d.z},
+			    .d = {without_tiny(d.x), without_tiny(d.y), without_tiny(d.z)},
 			    .t = r->t0,
 			    .end = r->t1};
 	if (!vec3_is_finite(vec3_add(o, d)) || !clip_to_box(c, r) || !isfinite(c->end))
 		return false;
 	for (int i = 0; i < 3; i++) {
+		c->per[i] = c->d[i] != 0 ? 1 / c->d[i] : 0;
 		int first = (int)floor(g->low[i]), last = (int)ceil(g->high[i]) - 1;
 		double x = c->o[i] + c->t * c->d[i];
 		c->cell[i] = x < last ? (x > first ? (int)floor(x) : first) : last;
@@ -384,7 +391,7 @@ static double reach_in_cell(const struct cells *c, const double corner[8], doubl
 			low = t;
 		else
 			high = t;
-		double next = t - over / value_at(c, corner, t);
+		double slope = value_at(c, corner, t), next = slope > 0 ? t - over / slope : low;
 		if (!(next > low && next < high))
 			next = low + (high - low) / 2;
 		if (next == t || next == low || next == high)
