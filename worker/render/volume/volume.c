@@ -66,10 +66,11 @@ static void box_of(const struct scene_node *n, const struct grid_file *f, bool d
 }
 
 /* Mitsuba 3 limits a medium by the box around its volume that is parallel to the world's axes. */
-static void find_box(struct grid *g, const mat4 *to_cells)
+static bool find_box(struct grid *g, const mat4 *to_cells)
 {
 	mat4 to_world;
-	mat4_invert(*to_cells, &to_world); /* it was made of an inverse */
+	if (!mat4_invert(*to_cells, &to_world))
+		return false;
 	g->least = (vec3){INFINITY, INFINITY, INFINITY};
 	g->most = vec3_neg(g->least);
 	for (int k = 0; k < 8; k++) {
@@ -87,20 +88,21 @@ static void find_box(struct grid *g, const mat4 *to_cells)
 			g->high[i] = fmin(fmax(g->high[i], x[i]), GRID_CELL_MAX);
 		}
 	}
+	return true;
 }
 
-/* Whether an axis of the volume is not along one of the world's. */
+/* Whether an axis of the volume is not along one of the world's, by more than the sine of 180 degrees is off. */
 static bool is_turned(const mat4 *m)
 {
 	for (int i = 0; i < 3; i++) {
-		int along = 0;
-		for (int k = 0; k < 3; k++)
-			along += m->m[i][k] != 0;
-		if (along != 1)
+		double x = fabs(m->m[i][0]), y = fabs(m->m[i][1]), z = fabs(m->m[i][2]), most = fmax(x, fmax(y, z));
+		if ((x > 1e-12 * most) + (y > 1e-12 * most) + (z > 1e-12 * most) != 1)
 			return true;
 	}
 	return false;
 }
+
+#define FLATTENED "to_world flattens the volume (it has no inverse)"
 
 static int place(struct grid *g, const struct scene_node *n, double box[2][3], const struct volume_build *b,
 		 struct error *e)
@@ -109,14 +111,15 @@ static int place(struct grid *g, const struct scene_node *n, double box[2][3], c
 	mat4 to_world = node_transform(n, "to_world"), to_volume;
 	for (int i = 0; i < 3; i++) {
 		double cells = b->dialect_3 || g->nearest ? g->size[i] : g->size[i] - 1;
-		per[i] = cells / (box[1][i] - box[0][i]);
+		bool known = isfinite(box[0][i]) && isfinite(box[1][i]);
+		per[i] = known && box[1][i] > box[0][i] ? cells / (box[1][i] - box[0][i]) : 0;
 		g->low[i] = offset;
 		g->high[i] = cells + offset;
-		if (!(per[i] > 0 && isfinite(per[i])))
+		if (!(isfinite(per[i]) && per[i] > 0))
 			return node_error(n, e, EINVAL, "its box, or its grid, is flat along %c", "xyz"[i]);
 	}
 	if (!mat4_invert(to_world, &to_volume))
-		return node_error(n, e, EINVAL, "to_world flattens the volume (it has no inverse)");
+		return node_error(n, e, EINVAL, FLATTENED);
 	mat4 to_cells = mat4_mul(mat4_scale((vec3){per[0], per[1], per[2]}),
 				 mat4_translate((vec3){-box[0][0], -box[0][1], -box[0][2]}));
 	to_cells = mat4_mul(mat4_translate((vec3){offset, offset, offset}), mat4_mul(to_cells, to_volume));
@@ -124,9 +127,7 @@ static int place(struct grid *g, const struct scene_node *n, double box[2][3], c
 		mat4_mul(mat4_translate(b->center), mat4_scale((vec3){1 / b->scale, 1 / b->scale, 1 / b->scale}));
 	g->to_cells = mat4_mul(to_cells, to_scene);
 	g->turned = b->dialect_3 && is_turned(&g->to_cells);
-	if (g->turned)
-		find_box(g, &g->to_cells);
-	return 0;
+	return !g->turned || find_box(g, &g->to_cells) ? 0 : node_error(n, e, EINVAL, FLATTENED);
 }
 
 /* ---- reading ---- */

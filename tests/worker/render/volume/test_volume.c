@@ -11,6 +11,7 @@
 #include "tests/support/worlds.h"
 #include "worker/render/scene/node.h"
 
+#include <fenv.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -388,6 +389,12 @@ static void test_refused(void **state)
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, numbers);
 	world_of_files_refused(scene_of("3.0.0", "homogeneous", GRID("sigma_t", "")),
 			       "sigma_t is the same everywhere in a homogeneous medium");
+	struct world *upright = world_with(
+		"3.0.0",
+		GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform name='to_world'><rotate x='1' "
+				"angle='90'/><rotate z='1' angle='180'/></transform>"));
+	assert_false(upright->media[0].first.grid->turned);
+	world_free(upright);
 	refused("3.0.0",
 		GRID("sigma_t", "<string name='wrap_mode' value='mirror'/><transform name='to_world'><rotate x='1' "
 				"angle='10'/></transform>"),
@@ -410,6 +417,10 @@ static void test_refused(void **state)
 	refused("0.6.0", GRID("density", "") EVEN, "its box, or its grid, is flat along y");
 	vol_set_box(&grid, (const float[3]){0, 0, 1}, (const float[3]){1, 1, 1});
 	refused("3.0.0", GRID("sigma_t", "<boolean name='use_grid_bbox' value='true'/>"), "is flat along z");
+	feclearexcept(FE_INVALID);
+	vol_set_box(&grid, (const float[3]){0, NAN, -INFINITY}, (const float[3]){1, NAN, -INFINITY});
+	refused("3.0.0", GRID("sigma_t", "<boolean name='use_grid_bbox' value='true'/>"), "is flat along y");
+	assert_false(fetestexcept(FE_INVALID)); /* renderers trap it */
 	refused("3.0.0", GRID("sigma_t", "<transform name='to_world'><scale x='0'/></transform>"),
 		"to_world flattens the volume");
 	refused("0.6.0", "<volume type='constvolume' name='density'><float name='value' value='1'/></volume>",
