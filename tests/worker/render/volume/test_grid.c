@@ -223,7 +223,7 @@ static void test_hard_rays(void **state)
 	(void)state;
 	static struct trial t;
 	struct dice d = dice_of("hard rays through grids");
-	const double slopes[] = {0, -0.0, 1e-320, 1e-200, -1e-200, 1e-30, -1e-17};
+	const double slopes[] = {0, -0.0, 1e-320, -1e-320, 1e-200, -1e-200, 1e-30, -1e-17};
 	for (int round = 0; round < 2000; round++) {
 		make(&t, &d, true);
 		double x = dice_between(&d, 0, 3), y = dice_between(&d, 0, 3), sum[3], straight[3];
