@@ -514,15 +514,27 @@ static bool scene_has(const struct render_summary *s, const char *effect)
 	return true;
 }
 
+/* Where media scatter, faces of `null` are no vertices, and neither focus nor refract. */
+static void find_lobes(const struct world *w, const struct render_summary *s, struct render_choice *out)
+{
+	bool narrow = !w->effects.scattering, transmits = narrow;
+	for (uint32_t i = 0; i < w->bsdf_count && w->effects.scattering; i++) {
+		const struct bsdf *b = &w->bsdfs[i];
+		narrow = narrow || (!b->passes && (b->has_delta || (b->has_smooth && isfinite(b->alpha))));
+		transmits = transmits || (!b->passes && (b->modes & BSDF_TRANSMIT));
+	}
+	out->focuses = narrow && scene_has(s, "half-vectors");
+	out->refracts = out->focuses && transmits && scene_has(s, "transmission");
+}
+
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e)
 {
 	struct render_summary summary;
 	struct plan film;
 	*out = (struct render_choice){.path = render_found_none, .bdpt = render_found_none};
 	world_summary(w, &summary);
-	out->focuses = scene_has(&summary, "half-vectors");
 	out->scatters = w->effects.scattering;
-	out->refracts = out->focuses && scene_has(&summary, "transmission");
+	find_lobes(w, &summary, out);
 	int rc = film_of(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
 	if (!rc && !p)

@@ -77,6 +77,32 @@ static void fog_has_no_chains(void **state)
 	world_free(w);
 }
 
+/* The faces of a cloud are no surfaces that could focus light; those of glass in it are. */
+static void clouds_focus_nothing(void **state)
+{
+	(void)state;
+	static const char *const inner[] = {"",
+					    "<shape type='sphere'><float name='radius' value='.3'/>"
+					    "<bsdf type='roughconductor'/></shape>",
+					    "<shape type='sphere'><float name='radius' value='.3'/>"
+					    "<bsdf type='dielectric'/></shape>"};
+	for (int i = 0; i < 3; i++) {
+		struct world *w = world_of_text(
+			32, 32,
+			SENSOR("0,0,5",
+			       "0,0,0") "<emitter type='constant'/><shape type='sphere'><bsdf type='null'/><medium "
+					"type='homogeneous' name='interior'/></shape>%s",
+			inner[i]);
+		struct plan_request r;
+		struct render_choice c;
+		choose(w, 1, SPP, &r, &c);
+		assert_int_equal(c.focuses, i > 0);
+		assert_int_equal(c.refracts, i == 2);
+		assert_string_equal(r.integrator, i == 0 ? "path" : "bdpt");
+		world_free(w);
+	}
+}
+
 /* Light sub-paths bring it: the samples of bdpt begin the chains, and bdpt itself need not be looked at. */
 static bool merging_finds_rare_light(struct world *w, uint64_t seed)
 {
@@ -420,6 +446,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(fog_has_no_chains),
+		cmocka_unit_test(clouds_focus_nothing),
 		cmocka_unit_test(an_open_room_needs_no_chains),
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),
 		cmocka_unit_test(a_small_lamp_in_a_mirror_is_not_rare_light),
