@@ -143,12 +143,10 @@ spectrum medium_extinction(const struct medium *m, vec3 p, const struct waveleng
 
 struct medium_lanes medium_at(const struct medium *m, const struct wavelengths *w)
 {
-	struct medium_lanes l = {.grid = m->first.grid, .channels = 1};
-	if (!l.grid) {
-		l.sigma_t[0] = extinction(m, color_eval(&m->first.color, w), w);
-		return l;
-	}
 	spectrum unit = extinction(m, color_eval(&m->first.color, w), w);
+	struct medium_lanes l = {.grid = m->first.grid, .channels = 1, .sigma_t = {unit}};
+	if (!l.grid)
+		return l;
 	l.channels = volume_weights(&m->first, w, l.sigma_t);
 	for (int k = 0; k < l.channels; k++)
 		l.sigma_t[k] = spectrum_mul(l.sigma_t[k], unit);
