@@ -140,15 +140,15 @@ static size_t brick_of(const struct grid *g, const int cell[3])
 	return (at[2] * (size_t)bricks_along(g, 1) + at[1]) * (size_t)bricks_along(g, 0) + at[0];
 }
 
-/* The first cells of those bricks along axis i that the point counts in: in the cells before and behind it, and where
- * the grid repeats itself at its other end. */
+/* A cell of each brick along axis i that the point counts in: in the cells before and behind it, and if the grid
+ * repeats itself, at its other end. */
 static int cells_with(const struct grid *g, int i, int point, int cell[3])
 {
 	int n = 0;
 	cell[n++] = point;
 	if ((point + 1) % GRID_BRICK == 0)
 		cell[n++] = point - 1;
-	if (g->outside == GRID_REPEAT && (point == 0 || point == g->size[i] - 1))
+	if (point == 0 || point == g->size[i] - 1)
 		cell[n++] = point == 0 ? g->size[i] - 1 : -1;
 	return n;
 }

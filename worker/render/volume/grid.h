@@ -40,7 +40,8 @@ struct grid {
  */
 enum { GRID_BRICK = 8 };
 size_t grid_bricks(const struct grid *g);
-void grid_find_full(const struct grid *g, unsigned char *full); /* sets what is full of so many zeros */
+/* Sets what is full of so many zeros, whatever is outside. Of the grid it needs sizes, channels and values. */
+void grid_find_full(const struct grid *g, unsigned char *full);
 
 /* The values at p, three if there is one channel, too. false: p is outside of the box, where integrals count 0. */
 bool grid_at(const struct grid *g, vec3 p, double value[GRID_CHANNELS_MAX]);

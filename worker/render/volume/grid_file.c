@@ -11,6 +11,7 @@
 #include "common/base/bytes.h"
 #include "common/base/liveness.h"
 #include "worker/render/scene/asset_part.h"
+#include "worker/render/volume/grid.h"
 
 #include <math.h>
 #include <string.h>
@@ -119,9 +120,16 @@ int grid_file_share(struct grid_cache *cache, const struct scene_node *n, const 
 			return 0;
 		}
 	int rc = grid_file_read(n, assets, true, arena, out, e);
-	entry = rc ? NULL : arena_alloc(arena, 1, sizeof *entry);
-	if (!entry)
-		return rc ? rc : node_error(n, e, ENOMEM, "out of memory");
+	if (rc)
+		return rc;
+	const struct grid g = {.size = {(int)out->size[0], (int)out->size[1], (int)out->size[2]},
+			       .channels = (int)out->channels,
+			       .value = out->value};
+	out->full = arena_alloc(arena, grid_bricks(&g), 1);
+	entry = arena_alloc(arena, 1, sizeof *entry);
+	if (!out->full || !entry)
+		return node_error(n, e, ENOMEM, "out of memory");
+	grid_find_full(&g, out->full);
 	*entry = (struct grid_entry){name, *out, *list};
 	*list = entry;
 	return 0;

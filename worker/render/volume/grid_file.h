@@ -13,6 +13,7 @@ struct grid_file {
 	double box[2][3];      /* two corners, as the file states them */
 	float *value;	       /* channels fastest, then x, z slowest; finite; bytes count as 0 to 1; in the arena */
 	double least, largest; /* of all values */
+	unsigned char *full;   /* the grid's bricks (grid.h), of files that are shared; in the arena */
 };
 
 /* The files that a scene has read: volumes of one file share its numbers. By hashes of their names. */

@@ -8,7 +8,6 @@
  */
 #include "worker/render/volume/volume.h"
 
-#include "worker/render/scene/value.h"
 #include "worker/render/volume/grid_file.h"
 
 #include <string.h>
@@ -149,17 +148,14 @@ static enum grid_outside outside_of(const struct scene_node *n, bool dialect_3)
 	return strcmp(mode, "repeat") == 0 ? GRID_REPEAT : strcmp(mode, "mirror") == 0 ? GRID_MIRROR : GRID_CLAMP;
 }
 
-/* A copy of `made`, with its place and what is found out from its values. */
+/* A copy of `made`, with its place. */
 static int add_grid(struct volume *v, const struct grid *made, const struct scene_node *n, double box[2][3],
 		    const struct volume_build *b, struct error *e)
 {
 	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
-	unsigned char *full = arena_alloc(b->arena, grid_bricks(made), 1);
-	if (!g || !full)
+	if (!g)
 		return node_error(n, e, ENOMEM, "out of memory");
 	*g = *made;
-	grid_find_full(g, full);
-	g->full = full;
 	v->grid = g;
 	return place(g, n, box, b, e);
 }
@@ -177,13 +173,14 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 	v->color = color_constant(1);
 	v->least = f.least;
 	v->largest = f.largest;
-	for (int k = 0; k < GRID_CHANNELS_MAX && !rc; k++) {
+	for (int k = 0; k < GRID_CHANNELS_MAX && f.channels > 1 && !rc; k++) {
 		const double rgb[3] = {k == 0, k == 1, k == 2};
 		rc = color_from_rgb(rgb, COLOR_REFLECTANCE, &v->primary[k]);
 	}
 	const struct grid made = {.size = {(int)f.size[0], (int)f.size[1], (int)f.size[2]},
 				  .channels = (int)f.channels,
 				  .value = f.value,
+				  .full = f.full,
 				  .nearest = strcmp(node_string(n, "filter_type", "trilinear"), "nearest") == 0,
 				  .outside = outside_of(n, b->dialect_3)};
 	box_of(n, &f, b->dialect_3, box);
@@ -198,9 +195,10 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 static int add_cube(struct volume *v, const struct scene_node *n, const struct volume_build *b, struct error *e)
 {
 	static const float one = 1;
+	static const unsigned char full = 1;
 	double unit[2][3] = {{0, 0, 0}, {1, 1, 1}};
 	const struct grid made = {
-		.size = {1, 1, 1}, .channels = 1, .value = &one, .nearest = true, .outside = GRID_CLAMP};
+		.size = {1, 1, 1}, .channels = 1, .value = &one, .full = &full, .nearest = true, .outside = GRID_CLAMP};
 	v->largest = 1;
 	return add_grid(v, &made, n, unit, b, e);
 }

@@ -366,6 +366,7 @@ static void test_shared(void **state)
 	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, numbers);
 	struct world *w = world_with("3.0.0", GRID("sigma_t", "") GRID("albedo", TWICE));
 	assert_ptr_equal(w->media[0].first.grid->value, w->media[0].second.grid->value);
+	assert_ptr_equal(w->media[0].first.grid->full, w->media[0].second.grid->full);
 	assert_true(w->media[0].first.grid->to_cells.m[0][0] > 1.5 * w->media[0].second.grid->to_cells.m[0][0]);
 	world_free(w);
 	char inner[512];
