@@ -45,6 +45,14 @@ static inline uint64_t get64(const uint8_t *p)
 	return get_bytes(p, 8);
 }
 
+static inline float get_float(const uint8_t *p)
+{
+	uint32_t bits = get32(p);
+	float v;
+	memcpy(&v, &bits, sizeof v);
+	return v;
+}
+
 static inline void put_double(uint8_t *p, double v)
 {
 	uint64_t bits;

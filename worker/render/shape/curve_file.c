@@ -124,14 +124,6 @@ static int read_text(struct curve_reader *r, const struct asset *a)
 	return rc ? rc : end_curve(r, lines.number);
 }
 
-static double float_at(const unsigned char *p)
-{
-	uint32_t bits = get32(p);
-	float v;
-	memcpy(&v, &bits, sizeof v);
-	return (double)v;
-}
-
 static const char binary_name[] = "BINARY_HAIR";
 enum { BINARY_NAME = sizeof binary_name - 1, BINARY_HEAD = BINARY_NAME + 4 };
 
@@ -144,7 +136,7 @@ static int read_binary(struct curve_reader *r, const struct asset *a)
 	while (left > 0 && !rc) {
 		double v[4] = {0, 0, 0, r->radius};
 		tick();
-		if (end - p >= 4 && isinf(float_at(p))) {
+		if (end - p >= 4 && isinf(get_float(p))) {
 			rc = end_curve(r, 0);
 			p += 4;
 			continue;
@@ -153,7 +145,7 @@ static int read_binary(struct curve_reader *r, const struct asset *a)
 			return node_error(r->node, r->error, EINVAL, "%s: ends before its last %u vertices", r->name,
 					  left);
 		for (int k = 0; k < 3; k++, p += 4)
-			v[k] = float_at(p);
+			v[k] = (double)get_float(p);
 		rc = add_point(r, v, 0);
 		left--;
 	}

@@ -18,14 +18,6 @@
 
 enum { VERSION = 3, FLOATS = 1, BYTES = 3, HEAD = 4 + 4 * 5 + 4 * 6, TICK_INTERVAL = 1 << 16 };
 
-static float float_at(const unsigned char *p)
-{
-	uint32_t bits = get32(p);
-	float x;
-	memcpy(&x, &bits, sizeof x);
-	return x;
-}
-
 /* *count: of all values. */
 static int read_head(const unsigned char *p, size_t size, const struct scene_node *n, const char *name, bool three,
 		     struct grid_file *out, uint64_t *count, struct error *e)
@@ -48,7 +40,7 @@ static int read_head(const unsigned char *p, size_t size, const struct scene_nod
 					  out->size[i], "xyz"[i], GRID_SIDE_MAX);
 		*count *= out->size[i];
 		for (int k = 0; k < 2; k++)
-			out->box[k][i] = (double)float_at(p + 24 + 4 * (3 * k + i));
+			out->box[k][i] = (double)get_float(p + 24 + 4 * (3 * k + i));
 	}
 	if ((size - HEAD) / (type == FLOATS ? 4 : 1) < *count)
 		return node_error(n, e, EINVAL, "%s: too short for %llu values", name, (unsigned long long)*count);
@@ -69,7 +61,7 @@ static int read_grid(const unsigned char *p, size_t size, const struct scene_nod
 	out->least = INFINITY;
 	out->largest = -INFINITY;
 	for (uint64_t i = 0; i < count; i++) {
-		out->value[i] = floats ? float_at(p + HEAD + 4 * i) : (float)p[HEAD + i] / 255;
+		out->value[i] = floats ? get_float(p + HEAD + 4 * i) : (float)p[HEAD + i] / 255;
 		if (!isfinite(out->value[i]))
 			return node_error(n, e, EINVAL, "%s: value %llu is not finite", name, (unsigned long long)i);
 		out->least = fmin(out->least, (double)out->value[i]);
