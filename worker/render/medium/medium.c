@@ -8,7 +8,6 @@
 
 #define COEFFICIENT VALUE_COLOR, PARAM_UNDERSTOOD, 0, 1e30, NULL
 #define VARIES VALUE_TEXTURE, PARAM_UNDERSTOOD, 0
-#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 
 /* Ways of sampling distances are not the scene's choice here. */
 #define SAMPLING_PARAMS                                                                            \

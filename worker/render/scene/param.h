@@ -49,6 +49,11 @@ struct param {
 	const char *choices; /* for VALUE_STRING: "beckmann|ggx", NULL: any */
 };
 
+/* The end of a row without a range, after its name. */
+#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
+#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
+#define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
+
 enum plugin_class {
 	PLUGIN_SHAPE,
 	PLUGIN_BSDF,

@@ -21,10 +21,7 @@
 enum { FILM_PIXELS_MAX = 1 << 28, RADIUS_MAX = 64 };
 enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
-#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
-#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
-#define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
 
 /* No effect, because nothing moves. */
 #define SHUTTER_PARAMS                                                                            \

@@ -6,9 +6,6 @@
 #include "worker/render/scene/param.h"
 #include "worker/render/shape/displace.h"
 
-#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
-#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
-#define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
 /* For meshes from files (smooth.h). */
 #define MESH_SMOOTH_PARAM                                                                   \
 	{                                                                                   \

@@ -12,8 +12,6 @@
 
 #include <string.h>
 
-#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
-#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 #define PLACE VALUE_POINT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL
 
 /* Of numbers that are no reflectances. */
