@@ -391,6 +391,11 @@ static int make_bootstrap(const struct plan_request *r, struct plan *p, uint64_t
 	return 0;
 }
 
+bool plan_request_is_bounded(const struct plan_request *r)
+{
+	return r->spp || r->mutations || r->seconds > 0 || r->target_error > 0;
+}
+
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 {
 	*p = (struct plan){
@@ -424,7 +429,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 			       PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
 	if (rc == 0)
 		rc = asked_total(r, p, &total, e);
-	if (rc == 0 && !total && !(r->seconds > 0) && !(r->target_error > 0))
+	if (rc == 0 && !plan_request_is_bounded(r))
 		rc = error_set(e, EINVAL, "no bound is given: --spp, --mutations, --time or --target-error");
 	if (rc == 0)
 		rc = r->kind == PLAN_CHAINS ? make_chains(r, p, total, e) : make_samples(r, p, total, e);

@@ -90,6 +90,9 @@ struct plan {
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
+/* Whether it says when to stop: by samples, mutations, time or an error. */
+bool plan_request_is_bounded(const struct plan_request *r);
+
 /* Checks the request (sizes, crop, counts) and chooses what it leaves open. -EINVAL with a sentence. */
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 /*

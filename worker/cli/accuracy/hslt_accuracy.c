@@ -59,10 +59,9 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	const struct plan_request *p = &a->render.plan;
 	if (!a->scene || !a->output)
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
-	if (p->spp || p->mutations || p->seconds > 0 || p->target_error > 0)
+	if (plan_request_is_bounded(&a->render.plan))
 		return error_set(e, EINVAL,
 				 "use --budget or --seconds instead of --spp, --mutations N, --time or --target-error");
 	return 0;

@@ -404,7 +404,7 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	/* Longer paths carry no light; but the requested minimum must be measured against something. */
 	if (p->max_depth > summary->useful_depth && summary->useful_depth >= p->min_depth)
 		p->max_depth = summary->useful_depth;
-	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))
+	if (!plan_request_is_bounded(p))
 		p->spp = s->spp;
 	return integrator->has_mutations ? render_mutations(a->mixture, summary, p->mixture, e) : 0;
 }

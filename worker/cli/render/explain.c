@@ -97,8 +97,7 @@ int explain(const char *path, struct render_arguments *a, bool json, bool *usage
 		rc = render_plan_from_scene(a, &m, e);
 		*usage = rc == -EINVAL;
 	}
-	const struct plan_request *p = &a->plan;
-	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))
+	if (!plan_request_is_bounded(&a->plan))
 		a->plan.spp = USUAL_SPP;
 	struct choice choice;
 	if (!rc)
