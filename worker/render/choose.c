@@ -517,14 +517,20 @@ static bool scene_has(const struct render_summary *s, const char *effect)
 /* Where media scatter, faces of `null` are no vertices, and neither focus nor refract. */
 static void find_lobes(const struct world *w, const struct render_summary *s, struct render_choice *out)
 {
-	bool narrow = !w->effects.scattering, transmits = narrow;
-	for (uint32_t i = 0; i < w->bsdf_count && w->effects.scattering; i++) {
+	bool narrow = false, transmits = false;
+	out->focuses = scene_has(s, "half-vectors");
+	out->refracts = out->focuses && scene_has(s, "transmission");
+	if (!w->effects.scattering)
+		return;
+	for (uint32_t i = 0; i < w->bsdf_count; i++) {
 		const struct bsdf *b = &w->bsdfs[i];
-		narrow = narrow || (!b->passes && (b->has_delta || (b->has_smooth && isfinite(b->alpha))));
-		transmits = transmits || (!b->passes && (b->modes & BSDF_TRANSMIT));
+		if (b->passes)
+			continue;
+		narrow |= b->has_delta || (b->has_smooth && isfinite(b->alpha));
+		transmits |= (b->modes & BSDF_TRANSMIT) != 0;
 	}
-	out->focuses = narrow && scene_has(s, "half-vectors");
-	out->refracts = out->focuses && transmits && scene_has(s, "transmission");
+	out->focuses &= narrow;
+	out->refracts &= narrow && transmits;
 }
 
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e)
