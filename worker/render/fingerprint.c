@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/fingerprint.h"
 
+#include "common/base/fnv.h"
 #include "common/base/version.h"
 #include "worker/render/render.h"
 
@@ -15,15 +16,12 @@ enum { INPUTS = 512, ID_BYTES = 20 };
 
 static void mix(uint64_t *hash, double x)
 {
-	unsigned char bytes[sizeof x];
-	memcpy(bytes, &x, sizeof x);
-	for (size_t i = 0; i < sizeof bytes; i++)
-		*hash = (*hash ^ bytes[i]) * 0x100000001b3u;
+	*hash = fnv_add(*hash, &x, sizeof x);
 }
 
 uint64_t fingerprint_self_test(void)
 {
-	uint64_t hash = 0xcbf29ce484222325u;
+	uint64_t hash = FNV_BEGIN;
 	/* volatile: computed at run time by the installed library, not by the compiler */
 	volatile double seed = 0.123456789;
 	double x = seed;

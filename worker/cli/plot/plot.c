@@ -9,6 +9,7 @@
  */
 #include "worker/cli/plot/plot.h"
 
+#include "common/base/fnv.h"
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
 #include "worker/cli/base/text_file.h"
@@ -155,14 +156,6 @@ static void put_series(struct text_file *s, const struct plot *p, size_t k)
 	}
 }
 
-static uint64_t hash(const struct buf *b)
-{
-	uint64_t h = 0xcbf29ce484222325u;
-	for (size_t i = 0; i < b->size; i++)
-		h = (h ^ b->bytes[i]) * 0x100000001b3u;
-	return h;
-}
-
 static int write_script(struct text_file *s, const struct plot *p, bool png, struct error *e)
 {
 	struct plot_axis x, y;
@@ -186,7 +179,7 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 	text_file_put(&body, "\n");
 	/* Plots in one page need distinct ids for their parts: derived from their contents, so that they are
 	 * reproducible. */
-	put_style(s, png, hash(&body.text));
+	put_style(s, png, fnv_add(FNV_BEGIN, body.text.bytes, body.text.size));
 	text_file_bytes(s, body.text.bytes, body.text.size);
 	s->full = s->full || body.full;
 	text_file_fini(&body);

@@ -9,6 +9,7 @@
 #include "worker/render/volume/grid_file.h"
 
 #include "common/base/bytes.h"
+#include "common/base/fnv.h"
 #include "common/base/liveness.h"
 #include "worker/render/scene/asset_part.h"
 #include "worker/render/volume/grid.h"
@@ -95,10 +96,8 @@ struct grid_entry {
 
 static struct grid_entry **list_of(struct grid_cache *cache, const char *name)
 {
-	uint32_t h = 0x811c9dc5;
-	for (; *name; name++)
-		h = (h ^ (unsigned char)*name) * 0x01000193;
-	return &cache->first[(h ^ h >> 16) % GRID_LISTS];
+	uint64_t h = fnv_add(FNV_BEGIN, name, strlen(name));
+	return &cache->first[(h ^ h >> 32) % GRID_LISTS];
 }
 
 int grid_file_share(struct grid_cache *cache, const struct scene_node *n, const struct asset_source *assets,
