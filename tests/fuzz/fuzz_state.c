@@ -17,10 +17,10 @@
 
 #include <string.h>
 
-enum { SIDE = 32, EDGES = 8, STEPS = 5, ROOMS_MOST = 64, STATE_MOST = 1 << 14, CHAIN = 3 };
+enum { SIDE = 32, EDGES = 8, STEPS = 5, BUILT_MOST = 64, STATE_MOST = 1 << 14, CHAIN = 3 };
 static const char mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";
 
-static struct world *worlds[ROOMS_MOST];
+static struct world *worlds[BUILT_MOST];
 static unsigned world_count;
 static struct path_context context;
 static struct film_sums film;
@@ -32,7 +32,7 @@ static void set_up(void)
 	static const struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	static const struct scene_settings settings = {
 		.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
-	while (world_count < ROOMS_MOST && rooms[world_count].name) {
+	while (world_count < BUILT_MOST && rooms[world_count].name) {
 		worlds[world_count] = rooms[world_count].build();
 		world_count++;
 	}

@@ -11,7 +11,7 @@ struct agree_case {
 	double a, b;					   /* what make takes */
 	uint32_t max_depth;
 	uint64_t path_spp, spp; /* of path, of the others */
-	const char *against[3];
+	const char *against[4];
 	double find; /* smallest bias of the mean that the table must find */
 };
 

@@ -76,10 +76,10 @@ enum { WAYS_BACK = 4 };
 /* Rounding, of numbers that are equal otherwise. */
 #define ROUNDING 1e-9
 
-/* |h_j|, and how exactly; nothing where it is exactly specular. */
+/* |h_j|, and how exactly; nothing where it is exactly specular, or an event in a medium. */
 static double slope(const struct full_path *x, unsigned j, double *blur)
 {
-	if (j == 0 || j >= x->edges || x->v[j].delta)
+	if (j == 0 || j >= x->edges || x->v[j].delta || x->v[j].kind == VERTEX_MEDIUM)
 		return 0;
 	vec2 h = halfvec_of(x, j);
 	*blur = WALK_BLUR * fmin(x->v[j].bsdf->alpha, 1);
@@ -93,7 +93,8 @@ static void measure(struct path_context *c, struct full_path *x, double *g, doub
 	for (unsigned e = 0; e < k; e++)
 		lengths += log(x->edge[e].distance2);
 	for (unsigned j = 1; j < k; j++)
-		roughness += x->v[j].delta ? 0 : fmin(x->v[j].bsdf->alpha_mean, 1);
+		if (x->v[j].kind == VERTEX_SURFACE)
+			roughness += x->v[j].delta ? 0 : fmin(x->v[j].bsdf->alpha_mean, 1);
 	double at_light = 0, at_camera = 0;
 	double first = slope(x, 1, &at_light), last = slope(x, k - 1, &at_camera);
 	vec3 near = x->v[k - 1].x.p, far = x->v[k > 1 ? 1 : 0].x.p, light = x->v[0].x.p;

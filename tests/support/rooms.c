@@ -30,6 +30,7 @@
 #define METAL(alpha) "<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='" alpha "'/></bsdf>"
 #define CLOUDY(alpha) "<bsdf type='roughdielectric'><float name='alpha' value='" alpha "'/></bsdf>"
 #define GLASS "<bsdf type='dielectric'/>"
+#define INSIDE(of) "<medium type='homogeneous' name='interior'>" of "</medium>"
 #define MIRROR "<bsdf type='conductor'><string name='material' value='none'/></bsdf>"
 #define OBJ(inner) "<shape type='obj'><string name='filename' value='bent.obj'/>" inner "</shape>"
 
@@ -162,13 +163,38 @@ static struct world *turned_normals(void)
 						    "<rgb name='color1' value='0.15,0.8,0.75'/></texture>" METAL("0.3") "</bsdf>"));
 }
 
+/* A cloud of three colours that its null faces let light into, and milk in rough glass. */
+static struct world *clouds(void)
+{
+	return world_of_text(32, 32, ROOM LAMP
+			     "<shape type='cube'>" AT("<scale value='0.6'/><translate x='-0.9' y='-0.6' z='-0.6'/>") "<bsdf type='null'/>"
+			     INSIDE("<rgb name='sigma_t' value='2,1.5,1'/><float name='albedo' value='0.9'/>"
+				    "<phase type='hg'><float name='g' value='0.5'/></phase>") "</shape>"
+			     "<shape type='sphere'><point name='center' value='0.7,-0.7,-0.2'/><float name='radius' value='0.7'/>"
+			     CLOUDY("0.25") INSIDE("<float name='sigma_t' value='2'/><rgb name='albedo' value='0.9,0.8,0.6'/>") "</shape>");
+}
+
+/* The camera and a ball of smooth glass with milk in it, in fog. */
+static struct world *fog(void)
+{
+	return world_of_text(32, 32,
+			     "<medium type='homogeneous' id='fog'><float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/></medium>"
+			     "<sensor type='perspective'><float name='fov' value='40'/>" AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+			     "<rfilter type='box'/></film><ref name='medium' id='fog'/></sensor>" BOX("0.5,0.45,0.35") LAMP
+			     "<shape type='sphere'><point name='center' value='0.2,-0.6,-0.2'/><float name='radius' value='0.7'/>" GLASS
+			     INSIDE("<float name='sigma_t' value='2'/><float name='albedo' value='0.9'/>") "<ref name='exterior' id='fog'/></shape>");
+}
+
 const struct room rooms[] = {
 	{"rough glass", cloudy}, {"glass", glass}, {"gold", gold}, {"mirror", mirror}, {"bent normals", bent}, {"sky", sky},
 	{"picture", picture}, {"prism", prism}, {"lens", lens}, {"point and spot", deltas}, {"sun", sun}, {"dents", dents},
 	{"coloured glass", coloured_glass}, {"tilted parts", tilted_parts},
-	{"turned normals", turned_normals},
+	{"turned normals", turned_normals}, {"clouds", clouds}, {"fog", fog},
 	{NULL, NULL},
 };
+
+_Static_assert(sizeof rooms / sizeof *rooms <= ROOMS_MOST, "with its end");
 
 struct world *room_of(const char *name)
 {

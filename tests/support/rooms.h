@@ -13,6 +13,7 @@ struct room {
 	struct world *(*build)(void);
 };
 
+enum { ROOMS_MOST = 24 };		 /* of the list, with a test or two about all of them */
 extern const struct room rooms[];	 /* ends with a NULL name */
 struct world *room_of(const char *name); /* fails the test when there is none */
 

@@ -102,8 +102,7 @@ static int child(const struct memory_file *files)
 		return end_with(TRIAL_FAILED, e.text);
 	world_summary(w, &summary);
 	for (size_t i = 0; render_integrator_at(i); i++)
-		if (!(render_effect_on(&summary, "scattering") && render_integrator_at(i)->surfaces_only) &&
-		    render(w, &summary, render_integrator_at(i), &e))
+		if (render(w, &summary, render_integrator_at(i), &e))
 			return end_with(TRIAL_FAILED, e.text);
 	return TRIAL_RENDERED;
 }

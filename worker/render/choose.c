@@ -238,20 +238,8 @@ static bool is_short(const struct render_found *path)
 	return has_no_fireflies(path) && path->tail >= tail_least;
 }
 
-/* Where media scatter, chains on half vectors have no paths to begin with, and bdpt stands in for them. */
-static const char *choice_in_media(const struct render_choice *c)
-{
-	if (c->misses || !path_is_cheaper(c) || !is_short(&c->path))
-		return "bdpt";
-	if (!c->focuses)
-		return "path";
-	return c->brief || c->refracts ? "bdpt" : "bdpt8";
-}
-
 const char *render_choice_of(const struct render_choice *c)
 {
-	if (c->scatters)
-		return choice_in_media(c);
 	if (wants_chains(c))
 		return RENDER_INTEGRATOR_CHAINS;
 	if (has_rare_light(c) || !path_is_cheaper(c))
@@ -409,12 +397,12 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 	out->samples += p->samples - few;
 }
 
-/* Where no lobe is narrow nothing is hidden from bdpt. */
+/* Where no lobe is narrow nothing is hidden from bdpt. Merging knows no media that scatter. */
 static int look_at_merged(struct pilot *p, struct render_choice *out)
 {
 	uint64_t n = p->samples / MERGED;
 	n = n < MERGED_LEAST ? MERGED_LEAST : n > MERGED_MOST ? MERGED_MOST : n;
-	if (!out->focuses || out->scatters)
+	if (!out->focuses || p->w->effects.scattering)
 		return 0;
 	out->samples += n;
 	p->context.counters = p->uncounted;
@@ -539,7 +527,6 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 	struct plan film;
 	*out = (struct render_choice){.path = render_found_none, .bdpt = render_found_none};
 	world_summary(w, &summary);
-	out->scatters = w->effects.scattering;
 	find_lobes(w, &summary, out);
 	int rc = film_of(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
@@ -566,9 +553,6 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 
 static const char *reason(const char *integrator, const struct render_choice *c)
 {
-	if (strcmp(integrator, "bdpt") == 0)
-		return "media scatter light, which chains on half vectors do not support; paths from the camera and from "
-		       "the lamps, joined, leave less noise than paths from the camera alone";
 	if (strcmp(integrator, "hslt") == 0)
 		return !(c->path.cost > 0) ? "paths from the camera find next to no light; chains search for it longest"
 					   : "much of the light arrives by few, very bright paths, such as caustics; "

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which integrator a scene calls for: `path`, `bdpt8`, `bdpt`, `erpt4`, `erpt`, or the chains of `hslt`. Decided once,
+ * Which integrator a scene calls for: `path`, `bdpt8`, `erpt4`, `erpt`, or the chains of `hslt`. Decided once,
  * before the plan is made, from a pilot that counts rays instead of seconds and draws random numbers of its own: the
  * same on every machine for the same request, and the plan names what was chosen.
  *
@@ -19,8 +19,7 @@
  * fireflies of reflected light. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of
  * contributions, if the pilot is brief, or if surfaces refract, whose caustics a pilot may miss altogether, it is
  * `erpt4`, whose chains bound fireflies, with a light sub-path in one of four samples. `erpt4` also stands in where
- * path misses a little of the light, such as that of a point light by a mirror, and bdpt finds that evenly. Where media
- * scatter light, only path, bdpt8 and bdpt are left.
+ * path misses a little of the light, such as that of a point light by a mirror, and bdpt finds that evenly.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -29,7 +28,7 @@
 #include "worker/render/render.h"
 
 /* What a pilot chooses among, besides RENDER_INTEGRATOR_CHAINS: the first name and the others. */
-#define RENDER_CHOICES(first, other) first("path") other("bdpt8") other("bdpt") other("erpt4") other("erpt")
+#define RENDER_CHOICES(first, other) first("path") other("bdpt8") other("erpt4") other("erpt")
 #define RENDER_CHOICES_FIRST(name) name
 #define RENDER_CHOICES_OTHER(name) ", " name
 #define RENDER_CHOICES_TEXT RENDER_CHOICES(RENDER_CHOICES_FIRST, RENDER_CHOICES_OTHER)
@@ -48,14 +47,13 @@ enum { RENDER_TAIL = 128, RENDER_EXTREME = 512, RENDER_EVI = 256 };
 
 struct render_choice {
 	struct render_found path, bdpt;
-	struct rare_light merged; /* to bdpt, by merging; 0 where no lobe is narrow */
+	struct rare_light merged; /* to bdpt, by merging; 0 where no lobe is narrow, or media scatter */
 	double found;		  /* path's mean over bdpt's: the share of the light that path finds; 0: not known */
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe, or
 			     none at all */
 	bool dark;	  /* path finds next to nothing */
 	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
 	bool refracts;	  /* and surfaces let light through: a pilot may have missed the lamps behind them */
-	bool scatters;	  /* media scatter: chains on half vectors cannot be chosen */
 	bool brief;	  /* too few samples to trust a tail index where lobes are narrow */
 	bool settled;	  /* no choice was left before bdpt was looked at: nothing is known of it */
 	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of

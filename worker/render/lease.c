@@ -240,8 +240,6 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 				 accuracy);
 	if (i->face.has_mutations && mixture_parse(p->mutations, &unused, e))
 		return -EINVAL;
-	if (w->effects.scattering && i->face.surfaces_only)
-		return error_set(e, EINVAL, RENDER_SURFACES_ONLY, p->integrator);
 	if (p->max_depth < 1 || p->max_depth > PATH_MAX_EDGES)
 		return error_set(e, EINVAL, "a depth of %u edges is not within 1 and %d", p->max_depth, PATH_MAX_EDGES);
 	return 0;

@@ -21,8 +21,6 @@ const struct plugin_decl *render_plugins(void);
 /* Stands for the integrator that worker/render/choose.h selects for the scene, before the plan is made. */
 #define RENDER_INTEGRATOR_DEFAULT "auto"
 #define RENDER_INTEGRATOR_CHAINS "hslt"
-/* With the integrator's name. */
-#define RENDER_SURFACES_ONLY "media scatter light in this scene, which %s does not support: use bdpt, pssmlt or path"
 
 /* Versions of libraries that affect bits, for the numeric fingerprint: "embree 3.13.5 avx2". */
 const char *render_numeric_version(void);

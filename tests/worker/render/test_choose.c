@@ -58,8 +58,8 @@ static void an_open_room_needs_no_chains(void **state)
 	world_free(w);
 }
 
-/* Nor has fog any, and merging does not know it: only samples are left, whatever the scene has besides. */
-static void fog_has_no_chains(void **state)
+/* Merging knows no media that scatter: the choice is by samples alone. */
+static void fog_is_not_merged(void **state)
 {
 	(void)state;
 	struct world *w = world_of_text(
@@ -72,8 +72,8 @@ static void fog_has_no_chains(void **state)
 	struct plan_request r;
 	struct render_choice c;
 	choose(w, 1, SPP, &r, &c);
-	assert_string_equal(r.integrator, "bdpt");
-	assert_true(c.scatters && c.focuses && c.merged.share == 0 && c.merged.seen == 0);
+	assert_string_equal(r.integrator, "erpt");
+	assert_true(c.misses && c.focuses && c.merged.share == 0 && c.merged.seen == 0);
 	world_free(w);
 }
 
@@ -98,7 +98,7 @@ static void clouds_focus_nothing(void **state)
 		choose(w, 1, SPP, &r, &c);
 		assert_int_equal(c.focuses, i > 0);
 		assert_int_equal(c.refracts, i == 2);
-		assert_string_equal(r.integrator, i == 0 ? "path" : "bdpt");
+		assert_string_equal(r.integrator, i == 0 ? "path" : "erpt4");
 		world_free(w);
 	}
 }
@@ -445,7 +445,7 @@ static void what_cannot_be_rendered_is_said(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(fog_has_no_chains),
+		cmocka_unit_test(fog_is_not_merged),
 		cmocka_unit_test(clouds_focus_nothing),
 		cmocka_unit_test(an_open_room_needs_no_chains),
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),

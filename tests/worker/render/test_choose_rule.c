@@ -215,38 +215,9 @@ static void the_reason_is_a_sentence_without_figures(void **state)
 	}
 }
 
-/* Where media scatter, no chains. */
-static void in_media(void **state)
-{
-	(void)state;
-	static const struct {
-		struct render_choice found;
-		const char *name;
-	} cases[] = {
-		{{.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}}, "path"},
-		{{.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true}, "bdpt8"},
-		{{.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true, .brief = true}, "bdpt"},
-		{{.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .focuses = true, .refracts = true}, "bdpt"},
-		{{.path = {1.9, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}}, "bdpt"},
-		{{.path = {1, 0, 4, 4, 1, 0.5}, .bdpt = {2, 0, 3, 3, 1, 0}}, "bdpt"},
-		{{.path = {1, 0, 1.9, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}}, "bdpt"},
-		{{.path = {1, 0, 4, 4, 1, 0}, .bdpt = {2, 0, 3, 3, 1, 0}, .misses = true}, "bdpt"},
-		{{.path = {1, 0, 0.3, 0.3, 1, 0}, .bdpt = {2, 0.9, 0.5, 0.9, 1, 0}}, "bdpt"},
-	};
-	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-		struct render_choice c = cases[i].found;
-		c.scatters = true;
-		assert_string_equal(render_choice_of(&c), cases[i].name);
-	}
-	char text[512];
-	render_choice_text("bdpt", &cases[4].found, text, sizeof text);
-	assert_non_null(strstr(text, "media scatter light"));
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(in_media),
 		cmocka_unit_test(the_rule),
 		cmocka_unit_test(a_brief_pilot_and_glass_are_not_left_to_samples_alone),
 		cmocka_unit_test(little_that_path_misses_needs_few_light_paths),

@@ -383,8 +383,6 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 			  chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
 	const struct render_integrator *integrator =
 		render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
-	if (integrator->surfaces_only && (!open || chains) && render_effect_on(summary, "scattering"))
-		return error_set(e, EINVAL, RENDER_SURFACES_ONLY, integrator->name);
 	p->kind = integrator->kind;
 	p->width = s->width;
 	p->height = s->height;

@@ -62,21 +62,14 @@ static json_t *found_to_json(const struct render_found *f)
 			 forecast_real(f->cost));
 }
 
-/* Where media scatter, bdpt stands in for those that do not support it. */
-static bool is_considered(const char *name, const struct render_choice *c)
-{
-	return c->scatters ? !render_integrator_find(name)->surfaces_only : strcmp(name, "bdpt") != 0;
-}
-
-static json_t *considered_to_json(const struct render_choice *c)
+static json_t *considered_to_json(void)
 {
 #define AFTER_A_COMMA(name) , name
 	static const char *const names[] = {RENDER_CHOICES(RENDER_CHOICES_FIRST, AFTER_A_COMMA),
 					    RENDER_INTEGRATOR_CHAINS};
 	json_t *list = json_array();
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (is_considered(names[i], c))
-			json_array_append_new(list, json_string(names[i]));
+		json_array_append_new(list, json_string(names[i]));
 	return list;
 }
 
@@ -86,7 +79,7 @@ json_t *choice_to_json(const struct choice *c)
 		return json_null();
 	const struct render_choice *f = &c->found;
 	return json_pack("{s:s s:o s:I s:f s:b s:b s:b s:f s:f s:o s:o}", "why", c->text, "considered",
-			 considered_to_json(f), "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds,
+			 considered_to_json(), "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds,
 			 "pathMissesLight", (int)f->misses, "surfacesFocusLight", (int)f->focuses, "surfacesRefract",
 			 (int)f->refracts, "mergedRareShare", f->merged.share, "shareFoundByPath", f->found, "path",
 			 found_to_json(&f->path), "bdpt", f->settled ? json_null() : found_to_json(&f->bdpt));

@@ -10,7 +10,7 @@
 
 const struct integrator integrator_hslt = {
 	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, FULL_PATH_MAX_EDGES,
-		 .has_mutations = true, .surfaces_only = true},
+		 .has_mutations = true},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
 	.chain = &chain_path,

@@ -7,8 +7,8 @@
  *
  * What is refused: numbers that are not finite, indices of what the scene does not have, points outside their
  * primitives, vertices that do not scatter as they say, paths that leave the window or carry no light, another
- * contribution than stated. Nothing is allocated and no ray is cast: whether anything lies between two vertices is not
- * asked.
+ * contribution than stated. Nothing is allocated. Unless media scatter, no ray is cast: whether anything lies between
+ * two vertices is not asked.
  */
 #include "worker/render/chain/path_bytes.h"
 
@@ -137,10 +137,15 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	struct prim_ref prim = {get32(at + 8), get32(at + 12)};
 	vec3 place = {get_double(at + 16), get_double(at + 24), get_double(at + 32)};
 	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
-	if (is_huge(w, place) || at[0] > VERTEX_INFINITE || at[2] > 1 || at[3] != 0 ||
-	    (v->kind == VERTEX_CAMERA) != (i == edges) || (v->kind == VERTEX_SURFACE) != (i > 0 && i < edges) ||
+	if (is_huge(w, place) || at[0] > VERTEX_MEDIUM || at[2] > 1 || at[3] != 0 ||
+	    (v->kind == VERTEX_CAMERA) != (i == edges) ||
+	    (v->kind == VERTEX_SURFACE || v->kind == VERTEX_MEDIUM) != (i > 0 && i < edges) ||
 	    (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT)))
 		return false;
+	if (v->kind == VERTEX_MEDIUM) {
+		v->x = (struct surface_point){.p = place, .prim = PRIM_NONE};
+		return EFFECT_IS_ON(w, scattering) && emitter == -1 && !v->delta;
+	}
 	if (v->kind == VERTEX_CAMERA) {
 		double u[2];
 		v->x.prim = PRIM_NONE;

@@ -20,6 +20,9 @@ struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 				    k->reverse_tolerance,    constraint_solver_of(k)};
 }
 
+/* More faces than these between two vertices count as nothing found. */
+enum { FACES_MOST = 1024 };
+
 /* The state of a walk. Predictions start from the kept state only, so a rejected trial leaves nothing to undo. */
 struct walk {
 	struct path_context *c;
@@ -49,7 +52,7 @@ static bool mode_holds(const struct full_path *y, unsigned j)
 	return full_path_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
 }
 
-/* By a ray: onto another primitive of the same material. */
+/* By a ray: onto another primitive of the same material, past faces that are no vertices (path/media.h). */
 static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 {
 	const struct world *w = m->c->w;
@@ -61,13 +64,21 @@ static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 	if (camera)
 		camera_clip(&w->camera, d, &t_min, &t_max);
 	struct ray_hit hit;
-	m->c->counters[COUNT_RAYS_CLOSEST]++;
-	if (!accel_closest(w->accel, &start, d, t_min, t_max, &hit))
-		return WALK_MISSED;
-	const struct world_shape *part = &w->parts[hit.prim.shape];
+	const struct world_shape *part;
+	for (unsigned faces = 0;; faces++) {
+		m->c->counters[COUNT_RAYS_CLOSEST]++;
+		if (faces > FACES_MOST || !accel_closest(w->accel, &start, d, t_min, t_max, &hit))
+			return WALK_MISSED;
+		part = &w->parts[hit.prim.shape];
+		surface_from_hit(&w->shapes[hit.prim.shape], start.p, d, &hit, &to->x);
+		if (!part->passable)
+			break;
+		t_max -= vec3_length(vec3_sub(to->x.p, start.p));
+		start = (struct ray_end){to->x.p, to->x.ng, to->x.prim};
+		t_min = 0;
+	}
 	if (&w->bsdfs[part->bsdf] != to->bsdf)
 		return WALK_BLOCKED;
-	surface_from_hit(&w->shapes[hit.prim.shape], from->x.p, d, &hit, &to->x);
 	to->emitter = part->emitter;
 	m->seen |= bit(j);
 	return WALK_OK;
@@ -161,10 +172,12 @@ static enum walk_end start(struct walk *m)
 	return WALK_OK;
 }
 
+/* Where media scatter, what an edge lets through is asked of each. */
 static bool all_visible(const struct walk *m)
 {
+	uint64_t seen = EFFECT_IS_ON(m->c->w, scattering) ? 0 : m->seen;
 	for (unsigned e = m->b; e-- > m->end;)
-		if (!(m->seen & bit(e)) && !full_path_visible(m->c, m->y, e))
+		if (!(seen & bit(e)) && !full_path_visible(m->c, m->y, e))
 			return false;
 	return true;
 }

@@ -17,6 +17,7 @@
 #include "worker/render/mutation/breakup.h"
 
 #include "worker/render/mutation/trace.h"
+#include "worker/render/path/media.h"
 
 #include <string.h>
 
@@ -38,6 +39,9 @@ bool breakup_allows(const struct full_path *x, unsigned b, unsigned c)
 	unsigned k = x->edges;
 	if (b > k || (b > 0 && b < k && x->v[b].delta))
 		return false;
+	for (unsigned j = c + 1; j < b; j++)
+		if (x->v[j].kind == VERTEX_MEDIUM)
+			return false;
 	return b == 0 || (c < b && !(c > 0 && x->v[c].delta));
 }
 
@@ -231,6 +235,26 @@ static bool set_mode(struct full_path *y, unsigned j)
 	return y->v[j].mode != 0;
 }
 
+/* Whether x_c .. x_0 are in the media that they were in before. They are, unless x_c is reached through another medium
+ * and lets it be. */
+static bool media_hold(const struct path_context *c, const struct full_path *y, unsigned c_end)
+{
+	const struct path_vertex *v = &y->v[c_end];
+	if (!EFFECT_IS_ON(c->w, scattering) || c_end == 0)
+		return true;
+	vec3 to_light = vec3_neg(y->edge[c_end - 1].w);
+	return path_medium_after(c->w, v, v->edge.medium, to_light) == y->v[c_end - 1].edge.before;
+}
+
+/* Edges let through another share of another wavelength's light. */
+static bool see_wavelength(struct path_context *c, const struct full_path *x, struct full_path *y, struct move *move)
+{
+	if (!EFFECT_IS_ON(c->w, scattering) || y->wavelength == x->wavelength)
+		return true;
+	move->first = 0;
+	return full_path_see_media(c, y);
+}
+
 /* Half vectors do not describe it, and so it has no weight and no move. */
 static bool turned_beyond(const struct full_path *x, unsigned b, unsigned c)
 {
@@ -256,7 +280,7 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 	if (turned_beyond(x, b, c_end))
 		return STRATEGY_FAIL_MODE;
 	if (b == c_end && b > 0)
-		return STRATEGY_PROPOSED;
+		return see_wavelength(c, x, y, move) ? STRATEGY_PROPOSED : STRATEGY_FAIL_BLOCKED;
 	if (b < k)
 		end = trace_chain(m, b, aperture, x, y, move);
 	else if (aperture && !trace_move_aperture(m, x, y))
@@ -269,8 +293,10 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 	if (end)
 		return end;
 	full_path_forget(y, c_end + 1, k);
-	if (!set_mode(y, b) || !set_mode(y, c_end))
+	if (!set_mode(y, b) || !set_mode(y, c_end) || !media_hold(c, y, c_end))
 		return STRATEGY_FAIL_MODE;
+	if (!see_wavelength(c, x, y, move))
+		return STRATEGY_FAIL_BLOCKED;
 	return b < k || whole_film(c, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_OUTSIDE;
 }
 
@@ -289,6 +315,16 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 	return log_g + log(full_path_cosine_to_light(x, b));
 }
 
+/* Distances of the traced part to events in media take steps in their logarithm. */
+static double log_distances(const struct full_path *x, unsigned b)
+{
+	double sum = 0;
+	for (unsigned j = b; j < x->edges; j++)
+		if (x->v[j].kind == VERTEX_MEDIUM)
+			sum += 0.5 * log(x->edge[j].distance2);
+	return sum;
+}
+
 double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction)
 {
@@ -296,8 +332,8 @@ double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const 
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < into->edges; j++)
 		product_mul(&p, j <= move->c || j == move->b ? full_path_f(c, into, j) : full_path_fh(c, into, j));
-	if (EFFECT_IS_ON(c->w, absorption))
-		full_path_absorb(c->w, into, &p);
+	full_path_attenuate(c->w, into, &p);
 	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) +
-	       move->log_transfer[direction] - move->log_density[direction];
+	       (EFFECT_IS_ON(c->w, scattering) ? log_distances(into, move->b) : 0) + move->log_transfer[direction] -
+	       move->log_density[direction];
 }

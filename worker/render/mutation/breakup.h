@@ -24,7 +24,7 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction);
 
-/* x_b and x_c may not be exactly specular, and c < b (unless b = 0). */
+/* x_b and x_c may not be exactly specular, c < b (unless b = 0), and no event in a medium may lie between them. */
 bool breakup_allows(const struct full_path *x, unsigned b, unsigned c);
 
 #endif

@@ -6,6 +6,8 @@
 
 static double roughness(const struct path_vertex *v)
 {
+	if (v->kind == VERTEX_MEDIUM)
+		return 1;
 	return v->delta ? 0 : fmin(v->bsdf->alpha_mean, 1);
 }
 

@@ -21,6 +21,18 @@ static void weigh_b(const struct strategy *s, const struct choice *forced, const
 			weight[i] = 0;
 }
 
+/* Probabilities of c, the same way: nothing walks past an event in a medium. */
+static void weigh_c(const struct strategy *s, const struct mutation_ctx *m, const struct full_path *x, unsigned b,
+		    double *weight)
+{
+	s->heuristic->weigh_c(m->path, x, b, weight);
+	bool past = false;
+	for (unsigned i = b; i-- > 0;) {
+		weight[i] = past ? 0 : weight[i];
+		past = past || x->v[i].kind == VERTEX_MEDIUM;
+	}
+}
+
 /* log P(b) P(c | b) of x by the heuristic; forced choices have probability 1. -INFINITY: never chosen. */
 static double log_choice(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
 			 const struct full_path *x, unsigned b, unsigned c)
@@ -31,7 +43,7 @@ static double log_choice(const struct strategy *s, const struct choice *forced, 
 		p *= heuristic_probability(weight, x->edges + 1, b);
 	}
 	if (forced->c == STRATEGY_DRAWN && b > 0) {
-		s->heuristic->weigh_c(m->path, x, b, weight);
+		weigh_c(s, m, x, b, weight);
 		p *= heuristic_probability(weight, b, c);
 	}
 	return log(p);
@@ -53,7 +65,7 @@ static bool choose(const struct strategy *s, const struct choice *forced, struct
 		return false;
 	out->c = 0;
 	if (out->b > 0 && forced->c == STRATEGY_DRAWN) {
-		s->heuristic->weigh_c(m->path, x, out->b, weight);
+		weigh_c(s, m, x, out->b, weight);
 		out->c = heuristic_choose(weight, out->b, r[1]);
 	} else if (out->b > 0) {
 		out->c = (unsigned)forced->c;
@@ -72,6 +84,8 @@ enum strategy_counter strategy_propose(const struct strategy *s, struct mutation
 {
 	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
+	if (EFFECT_IS_ON(m->path->w, scattering))
+		br.wavelength = s->wavelength_in_media;
 	if (!choose(s, &forced, m, x, &br))
 		return STRATEGY_FAIL_INAPPLICABLE;
 	const struct world *w = m->path->w;

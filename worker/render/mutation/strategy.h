@@ -11,6 +11,7 @@ struct strategy {
 	const struct heuristic *heuristic;
 	int b, c;				      /* a number, or one of the above */
 	bool halfvecs, wavelength, aperture, emitter; /* see struct breakup */
+	bool wavelength_in_media; /* even where each edge then lets through another share of light */
 };
 
 /* A breakup by this strategy; `how` takes precedence. */

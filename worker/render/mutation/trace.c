@@ -1,10 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/mutation/trace.h"
 
+#include "worker/render/path/media.h"
+
 /* Half vectors take steps of this many lobe widths. */
 #define HALFVEC_STEP 0.01
 /* Steps of x_k, in the numbers that make it. */
 #define APERTURE_STEP 0.1
+/* Steps of the logarithm of the distance to an event in a medium, and of the direction in which it is left. */
+#define DISTANCE_STEP 0.02
+#define DIRECTION_STEP 0.02
 /* Minimum sine of the angle between the line and both normals, to be able to align frames by it. */
 #define LEAST_PROJECTION 1e-3
 
@@ -69,12 +74,32 @@ static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 	return o.z * i->z < 0;
 }
 
+/* Turns with the direction that the path comes from, and takes a step that is as likely back. */
+static vec3 scatter_in_medium(struct mutation_ctx *m, unsigned j, const struct full_path *x, const struct full_path *y,
+			      struct move *move)
+{
+	double r[4], g[2];
+	mutation_random(m, BLOCK_VERTEX + j, r);
+	mutation_normals(r, g);
+	struct frame from = frame_around(x->edge[j].w), to = frame_around(y->edge[j].w);
+	vec3 i = frame_to_world(&to, frame_to_local(&from, vec3_neg(x->edge[j - 1].w)));
+	struct frame around = frame_around(i);
+	double across = 1 + DIRECTION_STEP * DIRECTION_STEP * (g[0] * g[0] + g[1] * g[1]);
+	move->log_symmetric -=
+		0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * DIRECTION_STEP * DIRECTION_STEP) - 1.5 * log(across);
+	return vec3_normalize(frame_to_world(&around, (vec3){DIRECTION_STEP * g[0], DIRECTION_STEP * g[1], 1}));
+}
+
 /* The direction in which the path continues from y_j. */
 static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path *x, struct full_path *y,
 		       struct move *move, vec3 *d)
 {
 	const struct path_vertex *from = &x->v[j];
 	struct path_vertex *v = &y->v[j];
+	if (from->kind == VERTEX_MEDIUM) {
+		*d = scatter_in_medium(m, j, x, y, move);
+		return true;
+	}
 	vec3 o = frame_to_local(&v->x.sh, y->edge[j].w), i;
 	v->mode = from->mode;
 	v->delta = from->delta;
@@ -105,12 +130,49 @@ static enum strategy_counter arrive(struct path_context *c, unsigned b, struct p
 	v->delta = false;
 	v->mode = 0;
 	if (b > 0)
-		return v->kind == VERTEX_SURFACE && v->bsdf->has_smooth ? STRATEGY_PROPOSED : STRATEGY_FAIL_MODE;
+		return v->kind != VERTEX_INFINITE && path_scatters_smoothly(v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_MODE;
 	if (v->emitter < 0)
 		return STRATEGY_FAIL_EMITTER;
 	if (v->kind == VERTEX_SURFACE)
 		v->kind = VERTEX_EMITTER;
 	return path_can_be_hit(c, v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_EMITTER;
+}
+
+/* To an event in a medium that is about as far away as x's. */
+static bool go_to_event(struct mutation_ctx *m, unsigned j, vec3 d, double t_min, double t_max,
+			const struct full_path *x, struct full_path *y, struct move *move)
+{
+	double r[4], g[2];
+	mutation_random(m, BLOCK_VERTEX + j, r);
+	mutation_normals(r + 2, g);
+	move->log_symmetric -= 0.5 * g[0] * g[0] + 0.5 * log(2 * M_PI * DISTANCE_STEP * DISTANCE_STEP);
+	double distance = sqrt(x->edge[j - 1].distance2) * exp(DISTANCE_STEP * g[0]);
+	if (!(distance > t_min && distance < t_max))
+		return false;
+	y->v[j - 1] = (struct path_vertex){.mode = BSDF_REFLECT};
+	path_stop_in_medium(&y->v[j - 1], y->v[j].x.p, distance, d);
+	return full_path_join(y, j - 1) && full_path_visible(m->path, y, j - 1);
+}
+
+/* From y_j along d to y_{j-1}, which is of x_{j-1}'s kind, except at the end. */
+static bool go_on(struct mutation_ctx *m, unsigned j, vec3 d, const struct full_path *x, struct full_path *y,
+		  struct move *move)
+{
+	struct path_context *c = m->path;
+	struct path_vertex *to = &y->v[j - 1];
+	double t_min = 0, t_max = INFINITY;
+	if (j == x->edges)
+		camera_clip(&c->w->camera, d, &t_min, &t_max);
+	if (!EFFECT_IS_ON(c->w, scattering))
+		return path_extend(c, &y->v[j], d, t_min, t_max, to) && full_path_join(y, j - 1);
+	if (x->v[j - 1].kind == VERTEX_MEDIUM)
+		return go_to_event(m, j, d, t_min, t_max, x, y, move);
+	c->wl = y->wl;
+	spectrum left;
+	if (!path_extend_past_events(c, &y->v[j], d, t_min, t_max, to, &left) || !full_path_join(y, j - 1))
+		return false;
+	y->edge[j - 1].left = left;
+	return true;
 }
 
 enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
@@ -123,17 +185,11 @@ enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool apert
 	if (!move_film(m, x, y, move))
 		return STRATEGY_FAIL_OUTSIDE;
 	vec3 d = camera_direction(&c->w->camera, y->v[k].x.p, y->film[0], y->film[1]);
-	double t_min, t_max;
-	camera_clip(&c->w->camera, d, &t_min, &t_max);
 	for (unsigned j = k; j > b; j--) {
 		if (j < k && !scatter_on(m, j, x, y, move, &d))
 			return STRATEGY_FAIL_MODE;
 		move->first = j - 1;
-		if (!path_extend(c, &y->v[j], d, j == k ? t_min : 0, j == k ? t_max : INFINITY, &y->v[j - 1]))
-			return STRATEGY_FAIL_MISSED;
-		if (j - 1 > b && y->v[j - 1].kind != VERTEX_SURFACE)
-			return STRATEGY_FAIL_MISSED;
-		if (!full_path_join(y, j - 1))
+		if (!go_on(m, j, d, x, y, move) || (j - 1 > b && y->v[j - 1].kind != x->v[j - 1].kind))
 			return STRATEGY_FAIL_MISSED;
 		if (j < k && full_path_mode(y, j) != (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return STRATEGY_FAIL_MODE;

@@ -6,7 +6,8 @@
 #include "worker/render/mutation/strategy.h"
 #include "worker/render/world/effects_text.h"
 
-static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .wavelength = true};
+static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .wavelength = true,
+					 .wavelength_in_media = true};
 
 static bool must_move(const struct full_path *x)
 {

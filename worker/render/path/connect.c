@@ -185,8 +185,7 @@ static bool camera_agrees(const struct path_context *c, const struct joined_path
 	return true;
 }
 
-/* Finds p->other_medium. */
-static void ask_light(const struct path_context *c, struct joined_path *p)
+unsigned path_other_medium(const struct path_context *c, const struct joined_path *p)
 {
 	double unused;
 	uint32_t medium = path_medium_of_emitter(c->w, p->v[0], path_direction(p->v[0], p->v[1], &unused));
@@ -195,12 +194,11 @@ static void ask_light(const struct path_context *c, struct joined_path *p)
 		if (i > 1)
 			medium = path_medium_after(c->w, p->v[i - 1], medium,
 						   path_direction(p->v[i - 1], p->v[i], &unused));
-		if (!edge_is_in(&e, medium, true)) {
-			p->other_medium = i;
-			return;
-		}
+		if (!edge_is_in(&e, medium, true))
+			return i;
 		medium = e.camera;
 	}
+	return 0;
 }
 
 /* The end of every contribution. joint: of edge s, where media scatter and s > 0. */
@@ -212,7 +210,7 @@ static spectrum weighted(const struct path_context *c, const struct path_vertex 
 	p.joint = joint;
 	p.other_medium = 0;
 	if (EFFECT_IS_ON(c->w, scattering)) {
-		ask_light(c, &p);
+		p.other_medium = path_other_medium(c, &p);
 		if (!technique_exists(&p, s) || !camera_agrees(c, &p))
 			return spectrum_of(0);
 	}

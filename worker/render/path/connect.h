@@ -27,6 +27,9 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
  * of techniques with two light vertices or more divided by light_every. */
 double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
 
+/* What other_medium is. Only where media scatter. */
+unsigned path_other_medium(const struct path_context *c, const struct joined_path *p);
+
 /* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards
  * ref. */
 double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v);

@@ -104,14 +104,16 @@ bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u,
 }
 
 /* Contribution over density of going on from beta across edge e to a vertex of density pdf, by scattering f at `at`. */
-static spectrum carry(const struct full_path *x, spectrum beta, spectrum f, unsigned at, unsigned e, double pdf)
+static spectrum carry(const struct path_context *c, const struct full_path *x, spectrum beta, spectrum f, unsigned at,
+		      unsigned e, double pdf)
 {
 	const struct path_vertex *v = &x->v[at];
 	const struct full_path_edge *g = &x->edge[e];
 	double geometry = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2;
-	if (at > 0 && !v->delta)
+	if (at > 0 && !v->delta && v->kind != VERTEX_MEDIUM)
 		geometry *= full_path_cosine_to_light(x, at) / fabs(vec3_dot(v->x.ng, x->edge[at - 1].w));
-	return spectrum_scale(geometry / pdf, spectrum_mul(beta, f));
+	spectrum all = spectrum_scale(geometry / pdf, spectrum_mul(beta, f));
+	return EFFECT_IS_ON(c->w, scattering) ? spectrum_mul(all, g->left) : all;
 }
 
 static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned vertex, struct path_vertex *v)
@@ -135,14 +137,26 @@ static void put_camera(struct path_context *c, struct sampler *s, struct full_pa
 	v[0].beta = spectrum_of(1);
 	v[0].edge.medium = c->w->camera_medium;
 	v[1].beta = spectrum_of(c->window.width * c->window.height);
-	if (EFFECT_IS_ON(c->w, absorption) && t > 1)
+	if (EFFECT_IS_ON(c->w, scattering))
+		v[1].beta = spectrum_scale(v[1].beta.v[0] / path_edge_pdf(c, &v[1].edge, v[1].edge.medium, &v[1]),
+					   x->edge[k - 1].left);
+	else if (EFFECT_IS_ON(c->w, absorption))
 		path_absorb(c, &v[0], vec3_neg(x->edge[k - 1].w), &v[1]);
 	for (unsigned i = 2; i < t; i++) {
-		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
-		if (EFFECT_IS_ON(c->w, absorption))
+		v[i].beta = carry(c, x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
+		if (EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering))
 			path_absorb(c, &v[i - 1], vec3_neg(x->edge[k - i].w), &v[i]);
 	}
 	v[t - 1].delta = false;
+}
+
+/* x_i as reached from x_i-1. */
+static void turn_edge(const struct full_path *x, unsigned i, struct path_vertex *v)
+{
+	v->to_prev = vec3_neg(x->edge[i - 1].w);
+	v->edge = x->v[i - 1].edge;
+	v->edge.medium = x->v[i - 1].edge.before;
+	v->edge.before = x->v[i - 1].edge.medium;
 }
 
 /* x_0 .. x_{s-1} as the light's sub-path; s >= 2. */
@@ -154,12 +168,12 @@ static void put_light(struct path_context *c, struct sampler *s_numbers, struct 
 		v[i].pdf = x->v[i].pdf_rev;
 		v[i].pdf_rev = x->v[i].pdf;
 		if (i > 0)
-			v[i].to_prev = vec3_neg(x->edge[i - 1].w);
+			turn_edge(x, i, &v[i]);
 		keep_numbers(s_numbers, SIDE_LIGHT, i, &v[i]);
 	}
 	v[0].beta = spectrum_of(1 / v[0].pdf);
 	for (unsigned i = 1; i < s; i++)
-		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
+		v[i].beta = carry(c, x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
 	v[s - 1].delta = false;
 }
 

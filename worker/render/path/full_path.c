@@ -46,7 +46,7 @@ static bool full_path_is_dispersed(const struct path_context *c, const struct fu
 	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
 	for (unsigned j = 1; j < x->edges; j++)
-		if (x->v[j].bsdf->dispersive)
+		if (path_disperses(&x->v[j]))
 			return true;
 	return false;
 }
@@ -84,18 +84,22 @@ static const struct surface_point *facing(const struct full_path *x, unsigned j,
 bool full_path_turned(const struct full_path *x, unsigned j)
 {
 	struct surface_point turned;
-	return facing(x, j, &turned) == &turned;
+	return x->v[j].kind == VERTEX_SURFACE && facing(x, j, &turned) == &turned;
 }
 
 double full_path_cosine_to_light(const struct full_path *x, unsigned j)
 {
 	struct surface_point turned;
+	if (x->v[j].kind == VERTEX_MEDIUM)
+		return 1;
 	return fabs(vec3_dot(facing(x, j, &turned)->sh.n, x->edge[j - 1].w));
 }
 
 unsigned full_path_mode(const struct full_path *x, unsigned j)
 {
 	struct surface_point turned;
+	if (x->v[j].kind == VERTEX_MEDIUM)
+		return BSDF_REFLECT;
 	const struct surface_point *s = facing(x, j, &turned);
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
 	if (x->v[j].delta && (x->v[j].mode & BSDF_STRAIGHT)) /* whatever the shading normal is */
@@ -122,9 +126,11 @@ spectrum full_path_specular(const struct full_path *x, unsigned j, vec3 *wi, dou
 	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, chance);
 }
 
-static spectrum scatter(const struct full_path *x, unsigned j, bool halfvec)
+static spectrum scatter(const struct path_context *c, const struct full_path *x, unsigned j, bool halfvec)
 {
 	const struct path_vertex *v = &x->v[j];
+	if (v->kind == VERTEX_MEDIUM)
+		return path_scatter_in_medium(c->w, &x->wl, v, x->edge[j].w, vec3_neg(x->edge[j - 1].w));
 	if (!full_path_mode(x, j))
 		return spectrum_of(0);
 	vec3 wi;
@@ -145,7 +151,7 @@ static spectrum scatter(const struct full_path *x, unsigned j, bool halfvec)
 spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned j)
 {
 	if (!vertex_set_has(&x->known_f, j)) {
-		x->f[j] = j > 0 ? scatter(x, j, false) : path_emitted(c, &x->v[0], x->edge[0].w, &x->wl);
+		x->f[j] = j > 0 ? scatter(c, x, j, false) : path_emitted(c, &x->v[0], x->edge[0].w, &x->wl);
 		vertex_set_add(&x->known_f, j);
 	}
 	return x->f[j];
@@ -153,9 +159,8 @@ spectrum full_path_f(const struct path_context *c, struct full_path *x, unsigned
 
 spectrum full_path_fh(const struct path_context *c, struct full_path *x, unsigned j)
 {
-	(void)c;
 	if (!vertex_set_has(&x->known_fh, j)) {
-		x->fh[j] = scatter(x, j, true);
+		x->fh[j] = scatter(c, x, j, true);
 		vertex_set_add(&x->known_fh, j);
 	}
 	return x->fh[j];
@@ -216,8 +221,10 @@ void full_path_copy(struct full_path *to, const struct full_path *from, unsigned
 	to->film[0] = from->film[0];
 	to->film[1] = from->film[1];
 	memcpy(&to->v[first], &from->v[first], n * sizeof to->v[0]);
-	if (edge < first)
+	if (edge < first) {
 		to->v[edge].to_prev = from->v[edge].to_prev;
+		to->v[edge].edge = from->v[edge].edge;
+	}
 	memcpy(&to->edge[edge], &from->edge[edge], (edge_end - edge) * sizeof to->edge[0]);
 	/* Neighbours scatter along the edges that came with the vertices. */
 	unsigned last_cached = last < from->edges ? last + 1 : last;
@@ -228,9 +235,25 @@ void full_path_copy(struct full_path *to, const struct full_path *from, unsigned
 	take_range(&to->known_fh, &from->known_fh, edge, last_cached);
 }
 
-bool full_path_visible(struct path_context *c, const struct full_path *x, unsigned e)
+bool full_path_visible(struct path_context *c, struct full_path *x, unsigned e)
 {
-	return path_visible(c, &x->v[e + 1], &x->v[e]);
+	struct path_vertex *v = &x->v[e];
+	if (!EFFECT_IS_ON(c->w, scattering))
+		return path_visible(c, v + 1, v);
+	c->wl = x->wl;
+	if (!path_see_in_media(c, v + 1, v, &v->edge, &x->edge[e].left))
+		return false;
+	uint32_t medium = v->edge.medium;
+	return v->kind != VERTEX_MEDIUM || (medium && path_medium(c->w, medium)->scatters);
+}
+
+bool full_path_see_media(struct path_context *c, struct full_path *x)
+{
+	x->v[x->edges].edge.medium = c->w->camera_medium;
+	for (unsigned e = x->edges; e-- > 0;)
+		if (!full_path_visible(c, x, e))
+			return false;
+	return true;
 }
 
 bool whole_film(const struct path_context *c, struct full_path *x)
@@ -267,7 +290,7 @@ static void take_emitter(struct full_path *x, const struct path_vertex *from)
 		x->v[0].kind = VERTEX_EMITTER;
 }
 
-bool full_path_finish(const struct path_context *c, struct full_path *x)
+bool full_path_finish(struct path_context *c, struct full_path *x)
 {
 	x->known_f = x->known_fh = NONE;
 	for (unsigned e = 0; e < x->edges; e++)
@@ -280,7 +303,7 @@ bool full_path_finish(const struct path_context *c, struct full_path *x)
 		if (!mode || mode != (x->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return false;
 	}
-	if (!whole_film(c, x))
+	if (!whole_film(c, x) || (EFFECT_IS_ON(c->w, scattering) && !full_path_see_media(c, x)))
 		return false;
 	for (unsigned j = 0; j < x->edges; j++)
 		if (spectrum_is_zero(full_path_f(c, x, j)))
@@ -298,7 +321,7 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 	x->edges = edges;
 	x->wl = c->wl;
 	x->wavelength = EFFECT_IS_ON(c->w, colour) ? c->wl.u : 0;
-	if (s > 0 && t > 1 && (z->kind != VERTEX_SURFACE || !z->bsdf->has_smooth))
+	if (s > 0 && t > 1 && (z->kind == VERTEX_INFINITE || !path_scatters_smoothly(z)))
 		return false;
 	if (s == 0) {
 		if (z->emitter < 0)
@@ -309,7 +332,7 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 			return false;
 		take_emitter(x, &drawn);
 	} else {
-		if (!c->light[s - 1].bsdf->has_smooth)
+		if (!path_scatters_smoothly(&c->light[s - 1]))
 			return false;
 		take_emitter(x, &c->light[0]);
 		for (unsigned i = 1; i < s; i++)
@@ -317,12 +340,16 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 	}
 	for (unsigned i = s > 0 ? s : 1; i <= edges; i++)
 		take_vertex(x, i, &c->camera[edges - i], s == 0 || i > s);
-	return full_path_finish(c, x) && (s == 0 || full_path_visible(c, x, s - 1));
+	return full_path_finish(c, x) && (s == 0 || EFFECT_IS_ON(c->w, scattering) || full_path_visible(c, x, s - 1));
 }
 
-void full_path_absorb(const struct world *w, const struct full_path *x, struct product *p)
+void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p)
 {
 	uint32_t medium = w->camera_medium;
+	for (unsigned e = 0; EFFECT_IS_ON(w, scattering) && e < x->edges; e++)
+		product_mul(p, x->edge[e].left);
+	if (!EFFECT_IS_ON(w, absorption) || EFFECT_IS_ON(w, scattering))
+		return;
 	for (unsigned e = x->edges; e > 0; e--) {
 		medium = path_medium_after(w, &x->v[e], medium, vec3_neg(x->edge[e - 1].w));
 		if (medium)
@@ -335,8 +362,7 @@ void full_path_colour(const struct path_context *c, struct full_path *x, double 
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < x->edges; j++)
 		product_mul(&p, vertex_set_has(&x->known_fh, j) ? x->fh[j] : full_path_f(c, x, j));
-	if (EFFECT_IS_ON(c->w, absorption))
-		full_path_absorb(c->w, x, &p);
+	full_path_attenuate(c->w, x, &p);
 	to_xyz(c, x, p.v, xyz);
 	double sum = xyz[0] + xyz[1] + xyz[2];
 	for (int i = 0; i < 3; i++)

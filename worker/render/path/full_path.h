@@ -38,6 +38,7 @@ static inline void vertex_set_add(struct vertex_set *s, unsigned j)
 struct full_path_edge {	  /* v[e] - v[e + 1] */
 	vec3 w;		  /* unit, from v[e] to v[e + 1] */
 	double distance2; /* 1 where v[0] lies at infinity */
+	spectrum left;	  /* where media scatter: the share of light that it lets through */
 };
 
 struct full_path {
@@ -96,23 +97,26 @@ void full_path_set_wavelength(const struct path_context *c, struct full_path *x,
 /* Vertices first..last with their edges and caches, and what belongs to the path as a whole. */
 void full_path_copy(struct full_path *to, const struct full_path *from, unsigned first, unsigned last);
 
-/* Nothing lies between v[e] and v[e + 1]. Counts a ray. */
-bool full_path_visible(struct path_context *c, const struct full_path *x, unsigned e);
+/* Whether nothing lies between v[e] and v[e + 1]. Where media scatter it also finds what edge e has of them, of which
+ * v[e + 1] must know its own, and an event outside of such a medium is not seen. Counts rays. */
+bool full_path_visible(struct path_context *c, struct full_path *x, unsigned e);
+/* That of all edges, for x's wavelengths; only where media scatter. */
+bool full_path_see_media(struct path_context *c, struct full_path *x);
 
 /* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
 bool whole_film(const struct path_context *c, struct full_path *x);
 
 /* Everything that follows from the vertices: edges, modes (those of specular vertices are given), film point,
- * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray.
- */
-bool full_path_finish(const struct path_context *c, struct full_path *x);
+ * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray,
+ * unless media scatter: then it is also false where an edge is occluded. */
+bool full_path_finish(struct path_context *c, struct full_path *x);
 
 /* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with
  * everything cached. Casts the connecting ray. false: there is none, or it is black. */
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path *x);
 
-/* Multiplies p by what the media along the path let through (path.h). */
-void full_path_absorb(const struct world *w, const struct full_path *x, struct product *p);
+/* Multiplies p by what the media along the path let through, if there are any. */
+void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p);
 
 /* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
 void full_path_colour(const struct path_context *c, struct full_path *x, double xyz[3]);

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/path/full_path_check.h"
 
-#include "worker/render/path/visible.h"
-
 #include <stdio.h>
 
 /* Cached and fresh values may differ by rounding, amplified where a lobe is narrow. */
@@ -29,6 +27,7 @@ static bool same_vector(vec3 a, vec3 b)
 
 static bool check_edges(struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
+	struct full_path seen = *x;
 	for (unsigned e = 0; e < x->edges; e++) {
 		double distance2;
 		vec3 w = path_direction(&x->v[e], &x->v[e + 1], &distance2);
@@ -37,7 +36,7 @@ static bool check_edges(struct path_context *c, const struct full_path *x, char 
 			snprintf(text, size, "edge %u of %u is not the one between its ends", e, x->edges);
 			return false;
 		}
-		if (!path_visible(c, &x->v[e + 1], &x->v[e])) {
+		if (!full_path_visible(c, &seen, e)) {
 			snprintf(text, size, "edge %u of %u is occluded", e, x->edges);
 			return false;
 		}

@@ -4,6 +4,7 @@
 #include "worker/render/path/full_path_density.h"
 
 #include "worker/render/path/measure.h"
+#include "worker/render/path/media.h"
 
 double full_path_log_f(const struct path_context *c, struct full_path *x)
 {
@@ -15,12 +16,11 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 		product_mul(&p, full_path_f(c, x, j));
 		const struct path_vertex *v = &x->v[j];
 		/* Measured in the direction towards the light, projected on the geometric normal. */
-		if (!v->delta)
+		if (!v->delta && v->kind != VERTEX_MEDIUM)
 			log_geometry +=
 				log(full_path_cosine_to_light(x, j) / fabs(vec3_dot(v->x.ng, x->edge[j - 1].w)));
 	}
-	if (EFFECT_IS_ON(c->w, absorption))
-		full_path_absorb(c->w, x, &p);
+	full_path_attenuate(c->w, x, &p);
 	for (unsigned e = 0; e < k; e++) {
 		const struct full_path_edge *g = &x->edge[e];
 		log_geometry += log(path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2);
@@ -40,6 +40,17 @@ static void delta_densities(const struct full_path *x, unsigned j, double *to_li
 	path_delta_per_solid(&v->x, i, o, full_path_eta(x, j), &light, &camera);
 	*to_light = chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2;
 	*to_camera = chance * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2;
+}
+
+/* Of events, or of none, along edge e: for v[e] from the camera's side, for v[e + 1] from the light's. */
+static void multiply_by_media(const struct path_context *c, struct path_vertex *v, unsigned edges)
+{
+	for (unsigned e = 0; e < edges; e++) {
+		const struct path_edge *edge = &v[e].edge;
+		v[e].pdf *= path_edge_pdf(c, edge, edge->medium, &v[e]);
+		if (e + 1 < edges)
+			v[e + 1].pdf_rev *= path_edge_pdf(c, edge, edge->before, &v[e + 1]);
+	}
 }
 
 static void fill_densities(struct path_context *c, struct full_path *x)
@@ -64,8 +75,20 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 		if (j + 1 < k)
 			v[j + 1].pdf_rev = to_camera;
 	}
+	if (EFFECT_IS_ON(c->w, scattering))
+		multiply_by_media(c, v, k);
 	if (!path_can_be_hit(c, &v[0]))
 		v[0].pdf = 0;
+}
+
+/* The first edge about whose media a light sub-path does not agree; none: one more than there are. */
+static unsigned last_edge_of_light(const struct path_context *c, const struct full_path *x)
+{
+	struct joined_path p = {.edges = x->edges};
+	for (unsigned i = 0; i <= x->edges; i++)
+		p.v[i] = &x->v[i];
+	unsigned other = path_other_medium(c, &p);
+	return other ? other : x->edges + 1;
 }
 
 void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf)
@@ -73,6 +96,7 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	unsigned k = x->edges;
 	const struct path_vertex *v = x->v;
 	fill_densities(c, x);
+	unsigned most = EFFECT_IS_ON(c->w, scattering) ? last_edge_of_light(c, x) : k;
 	double camera = 0; /* of v[s .. k] from the camera's side */
 	for (unsigned s = k; s > 0; s--) {
 		log_pdf[s] = camera;
@@ -82,7 +106,7 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	double light = 0; /* of v[0 .. s - 1] from the light's */
 	for (unsigned s = 1; s <= k; s++) {
 		light += log(v[s - 1].pdf_rev);
-		bool exists = k >= 2 && !(s > 1 && v[s - 1].delta) && !(s < k && v[s].delta);
+		bool exists = k >= 2 && s <= most && !(s > 1 && v[s - 1].delta) && !(s < k && v[s].delta);
 		double from_light = s == 1 && exists ? log(path_pdf_toward(c, &v[0], v[1].x.p)) : light;
 		log_pdf[s] = exists ? log_pdf[s] + from_light : -INFINITY;
 	}

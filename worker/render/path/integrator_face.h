@@ -10,7 +10,6 @@ struct render_integrator {
 	enum plan_kind kind;
 	uint32_t max_depth; /* edges its state holds */
 	bool has_mutations; /* its chains draw proposals from a mixture of strategies */
-	bool surfaces_only; /* its paths turn at surfaces, and not where media scatter */
 };
 /* NULL when there is none of that name; index from 0, NULL at the end. */
 const struct render_integrator *render_integrator_find(const char *name);

@@ -111,7 +111,7 @@ static void walk_on(struct walk *k, vec3 o, double t0, double t1)
 static double walk_to_event(struct walk *k, vec3 o, double t0, double t1, int lane, double depth)
 {
 	spectrum passed;
-	if (!k->scatters) {
+	if (!k->scatters || depth == INFINITY) {
 		walk_on(k, o, t0, t1);
 		return INFINITY;
 	}
@@ -142,7 +142,7 @@ static bool is_face(const struct world *w, const struct path_vertex *v)
 	return v->kind == VERTEX_SURFACE && w->parts[v->x.prim.shape].passable;
 }
 
-static void stop_in_medium(struct path_vertex *to, vec3 from, double distance, vec3 d)
+void path_stop_in_medium(struct path_vertex *to, vec3 from, double distance, vec3 d)
 {
 	to->kind = VERTEX_MEDIUM;
 	to->emitter = -1;
@@ -150,19 +150,19 @@ static void stop_in_medium(struct path_vertex *to, vec3 from, double distance, v
 	to->x = (struct surface_point){.p = vec3_madd(from, distance, d), .prim = PRIM_NONE};
 }
 
-bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
-			  double u, struct path_vertex *to, spectrum *left)
+/* To the event where the depth at one wavelength is `depth`; INFINITY: to none. */
+static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, int lane,
+		   double depth, struct path_vertex *to, spectrum *left)
 {
-	double place = u * SPECTRUM_LANES, lane = floor(place), depth = -log1p(lane - place);
 	struct path_edge edge;
 	struct walk k = walk_begin(c, at, d, &edge);
 	struct path_vertex from = *at;
 	for (int i = 0; i < FACES_MOST; i++) {
 		bool met = path_extend(c, &from, d, t_min, t_max, to);
 		double end = met && to->kind == VERTEX_SURFACE ? vec3_length(vec3_sub(to->x.p, from.x.p)) : INFINITY;
-		double event = walk_to_event(&k, from.x.p, t_min, fmin(end, t_max), (int)lane, depth);
+		double event = walk_to_event(&k, from.x.p, t_min, fmin(end, t_max), lane, depth);
 		if (event < INFINITY) {
-			stop_in_medium(to, from.x.p, event, d);
+			path_stop_in_medium(to, from.x.p, event, d);
 			met = vec3_is_finite(to->x.p);
 		} else if (end > t_max) {
 			walk_on(&k, from.x.p, t_max, end);
@@ -178,6 +178,19 @@ bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, 
 		t_min = 0;
 	}
 	return false;
+}
+
+bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
+			  double u, struct path_vertex *to, spectrum *left)
+{
+	double place = u * SPECTRUM_LANES, lane = floor(place);
+	return extend(c, at, d, t_min, t_max, (int)lane, -log1p(lane - place), to, left);
+}
+
+bool path_extend_past_events(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
+			     struct path_vertex *to, spectrum *left)
+{
+	return extend(c, at, d, t_min, t_max, 0, INFINITY, to, left);
 }
 
 bool path_see_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
@@ -221,8 +234,9 @@ void path_travel(const struct path_context *c, struct path_vertex *to, spectrum 
 	to->beta = pdf > 0 ? spectrum_scale(1 / pdf, spectrum_mul(to->beta, left)) : spectrum_of(0);
 }
 
-spectrum path_scatter_in_medium(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi)
+spectrum path_scatter_in_medium(const struct world *w, const struct wavelengths *wl, const struct path_vertex *v,
+				vec3 wo, vec3 wi)
 {
-	const struct medium *m = path_medium(c->w, v->edge.medium);
-	return spectrum_scale(phase_eval(&m->phase, wo, wi), medium_scattering(m, v->x.p, &c->wl));
+	const struct medium *m = path_medium(w, v->edge.medium);
+	return spectrum_scale(phase_eval(&m->phase, wo, wi), medium_scattering(m, v->x.p, wl));
 }

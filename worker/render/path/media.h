@@ -50,6 +50,11 @@ uint32_t path_medium_of_emitter(const struct world *w, const struct path_vertex 
  * of light that the edge lets through. */
 bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
 			  double u, struct path_vertex *to, spectrum *left);
+/* The same without events. */
+bool path_extend_past_events(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
+			     struct path_vertex *to, spectrum *left);
+/* An event at that distance along d. Its edge is not known yet. */
+void path_stop_in_medium(struct path_vertex *to, vec3 from, double distance, vec3 d);
 /* Whether z (not at infinity; any end of the camera's sub-path) and y see each other through faces of `null`. Fills in
  * the edge to y, with `before` at z, and what it lets through. Counts rays. */
 bool path_see_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
@@ -63,6 +68,7 @@ double path_edge_pdf(const struct path_context *c, const struct path_edge *edge,
 void path_travel(const struct path_context *c, struct path_vertex *to, spectrum left);
 
 /* sigma_s times the phase function, of VERTEX_MEDIUM. 1 / length / solid angle */
-spectrum path_scatter_in_medium(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi);
+spectrum path_scatter_in_medium(const struct world *w, const struct wavelengths *wl, const struct path_vertex *v,
+				vec3 wo, vec3 wi);
 
 #endif

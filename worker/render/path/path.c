@@ -57,7 +57,7 @@ spectrum path_scatter(const struct path_context *c, const struct path_vertex *v,
 {
 	struct surface_point turned;
 	if (v->kind == VERTEX_MEDIUM)
-		return path_scatter_in_medium(c, v, to_camera, to_light);
+		return path_scatter_in_medium(c->w, &c->wl, v, to_camera, to_light);
 	const struct surface_point *x = path_facing(v, to_camera, &turned);
 	if (!v->bsdf->has_smooth || !same_side(x, to_camera) || !same_side(x, to_light))
 		return spectrum_of(0);

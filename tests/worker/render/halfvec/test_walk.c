@@ -226,7 +226,7 @@ static void check_residuals(const struct world *w, const struct full_path *y, un
 	}
 }
 
-static void check_arrival(struct path_context *c, const struct full_path *x, const struct full_path *y, unsigned b,
+static void check_arrival(struct path_context *c, const struct full_path *x, struct full_path *y, unsigned b,
 			  unsigned end, const struct walk_target *target, double scale, struct tally *t)
 {
 	check_residuals(c->w, y, b, end, target, scale, t);

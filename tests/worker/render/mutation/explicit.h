@@ -15,6 +15,9 @@
 /* As published: sec. 4; deviations of the film step in parts of its smaller side, of half vectors in lobe widths. */
 #define EXPLICIT_FILM 0.02
 #define EXPLICIT_HALFVEC 0.01
+/* In media: of the logarithm of distances, and of slopes from a direction. */
+#define EXPLICIT_DISTANCE 0.02
+#define EXPLICIT_DIRECTION 0.02
 
 /* log |n.i| |d omega_i / d h_par| at vertex j by the cosine `n_i`. */
 static inline double explicit_log_turn(const struct full_path *x, unsigned j, double n_i)
@@ -54,6 +57,27 @@ static inline double explicit_log_arrive(const struct full_path *y, unsigned j)
 	return log(path_cosine(&y->v[j], y->edge[j].w) / y->edge[j].distance2);
 }
 
+/* What arriving at an event has besides: the density of its distance, of which `choice` is that of the logarithm. */
+static inline double explicit_log_event(const struct full_path *x, const struct full_path *y, unsigned j,
+					double *choice)
+{
+	if (y->v[j].kind != VERTEX_MEDIUM)
+		return 0;
+	double from = 0.5 * log(x->edge[j].distance2), to = 0.5 * log(y->edge[j].distance2);
+	double steps = (to - from) / EXPLICIT_DISTANCE;
+	*choice += -0.5 * steps * steps - log(sqrt(2 * M_PI) * EXPLICIT_DISTANCE);
+	return -to;
+}
+
+/* The density per solid angle of the direction in which y leaves an event. */
+static inline double explicit_log_leave(const struct full_path *x, const struct full_path *y, unsigned j)
+{
+	struct frame a = frame_around(x->edge[j].w), b = frame_around(y->edge[j].w);
+	vec3 from = frame_to_world(&b, frame_to_local(&a, vec3_neg(x->edge[j - 1].w))), to = vec3_neg(y->edge[j - 1].w);
+	double cosine = vec3_dot(from, to), slope = vec3_length(vec3_cross(from, to)) / cosine;
+	return explicit_log_gauss(slope, 0, EXPLICIT_DIRECTION) - 3 * log(cosine);
+}
+
 /* log_choices: of all symmetric choices, those of the film and the traced half vectors. */
 static inline double explicit_log_traced(const struct path_context *c, const struct full_path *x,
 					 const struct full_path *y, unsigned b, double *log_choices)
@@ -65,11 +89,13 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 		return 0;
 	*log_choices = explicit_log_gauss(y->film[0] - x->film[0], y->film[1] - x->film[1],
 					  EXPLICIT_FILM * fmin(camera->width, camera->height));
-	double sum =
-		log(camera_jac_film_from_solid(camera, vec3_neg(y->edge[k - 1].w))) + explicit_log_arrive(y, k - 1);
+	double sum = log(camera_jac_film_from_solid(camera, vec3_neg(y->edge[k - 1].w))) +
+		     explicit_log_arrive(y, k - 1) + explicit_log_event(x, y, k - 1, log_choices);
 	for (unsigned j = k - 1; j > b; j--) {
 		const struct path_vertex *v = &y->v[j];
-		if (v->delta) {
+		if (v->kind == VERTEX_MEDIUM) {
+			*log_choices += explicit_log_leave(x, y, j);
+		} else if (v->delta) {
 			/* 1 per solid angle projected on the geometric normal. */
 			sum += log(fabs(vec3_dot(v->x.ng, y->edge[j - 1].w)));
 		} else {
@@ -79,7 +105,7 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 			*log_choices += explicit_log_gauss(h.x - from.x, h.y - from.y, sigma);
 			sum -= explicit_log_turn(y, j, 1);
 		}
-		sum += explicit_log_arrive(y, j - 1);
+		sum += explicit_log_arrive(y, j - 1) + explicit_log_event(x, y, j - 1, log_choices);
 	}
 	return sum + *log_choices;
 }
@@ -126,6 +152,10 @@ static inline double explicit_log_choice(const struct path_context *c, const cha
 	}
 	if (hslt && b > 0) {
 		heuristic_roughness.weigh_c(c, x, b, weight);
+		for (unsigned i = b; i-- > 1;) /* no half vectors beyond the first event */
+			if (x->v[i].kind == VERTEX_MEDIUM)
+				for (unsigned beyond = 0; beyond < i; beyond++)
+					weight[beyond] = 0;
 		p *= heuristic_probability(weight, b, c_end);
 	}
 	if (strcmp(strategy, "rejoin") == 0) {

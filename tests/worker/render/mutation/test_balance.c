@@ -152,7 +152,7 @@ static void test_all_rooms(void **state)
 
 int main(void)
 {
-	struct CMUnitTest tests[16] = {0};
+	struct CMUnitTest tests[ROOMS_MOST] = {0};
 	const char *only = getenv("ROOM");
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)

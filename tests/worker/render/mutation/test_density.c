@@ -140,7 +140,7 @@ static struct world *thin_sheet(void)
 int main(void)
 {
 	static const struct room sheet = {"thin sheet", thin_sheet};
-	struct CMUnitTest tests[16] = {0};
+	struct CMUnitTest tests[ROOMS_MOST] = {0};
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
 		tests[n++] = (struct CMUnitTest){r->name, test_ratio, NULL, NULL, (void *)(uintptr_t)r};

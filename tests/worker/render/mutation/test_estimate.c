@@ -133,7 +133,7 @@ static void test_integral(void **state)
 
 int main(void)
 {
-	struct CMUnitTest tests[16] = {0};
+	struct CMUnitTest tests[ROOMS_MOST] = {0};
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
 		tests[n++] = (struct CMUnitTest){r->name, test_integral, NULL, NULL, (void *)(uintptr_t)r};
