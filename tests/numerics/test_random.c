@@ -92,10 +92,8 @@ static void compare_scene(uint64_t number)
 	compare(&t, "bdpt8", "bdpt8", 96, w);
 	compare(&t, "pssmlt", "pssmlt", 64, w);
 	const char *erpt = number % 2 ? "erpt4" : "erpt";
-	if (!w->effects.scattering) {
-		compare(&t, "hslt", "hslt", 64, w);
-		compare(&t, erpt, erpt, 48, w);
-	}
+	compare(&t, "hslt", "hslt", 64, w);
+	compare(&t, erpt, erpt, 48, w);
 	world_free(w);
 	worlds_effects = "all";
 	w = random_scene_world(&t.scene, 32, 24);

@@ -10,9 +10,11 @@
  *
  * with f_0 = L_e, i_j the direction from x_j towards the light, h in slopes, G_b the cosines, the distance and the
  * camera's Jacobian at the edge x_b x_{b-1}, and q the densities of the choice of b and c, of the steps and of the
- * point on the emitter; factors common to f and q are never computed. A proposal fails, with the reason counted, where
- * a ray misses, an edge is occluded, a vertex would scatter in another mode, the matrix is singular, the walk does not
- * converge or does not lead back, or the path leaves the film.
+ * point on the emitter; factors common to f and q are never computed. What media let through is a factor of each edge.
+ * Where they scatter, x_j may be an event: f_j is then sigma_s times the phase function, without a half vector, and a
+ * traced one has the factor |x_j - x_{j+1}|, as its distance takes steps in the logarithm. A proposal fails, with the
+ * reason counted, where a ray misses, an edge is occluded, a vertex would scatter in another mode, the matrix is
+ * singular, the walk does not converge or does not lead back, or the path leaves the film.
  */
 #include "worker/render/mutation/breakup.h"
 
@@ -297,6 +299,8 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 		return STRATEGY_FAIL_MODE;
 	if (!see_wavelength(c, x, y, move))
 		return STRATEGY_FAIL_BLOCKED;
+	if (EFFECT_IS_ON(c->w, scattering) && !full_path_is_made(c, y))
+		return STRATEGY_FAIL_DARK;
 	return b < k || whole_film(c, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_OUTSIDE;
 }
 

@@ -2,7 +2,7 @@
 /*
  * The half vector multi-chain perturbation (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4): from a nearby film point, a
  * path is traced whose half vectors are those of the old path, rotated into the new tangent frames, plus a little
- * noise.
+ * noise. Events in media keep their distances and directions, plus a little noise.
  */
 #ifndef WORKER_RENDER_MUTATION_TRACE_H
 #define WORKER_RENDER_MUTATION_TRACE_H

@@ -290,6 +290,32 @@ static void take_emitter(struct full_path *x, const struct path_vertex *from)
 		x->v[0].kind = VERTEX_EMITTER;
 }
 
+unsigned full_path_most_light(const struct path_context *c, const struct full_path *x)
+{
+	struct joined_path p = {.edges = x->edges};
+	if (!EFFECT_IS_ON(c->w, scattering))
+		return x->edges;
+	for (unsigned i = 0; i <= x->edges; i++)
+		p.v[i] = &x->v[i];
+	unsigned other = path_other_medium(c, &p);
+	return other ? other : x->edges;
+}
+
+bool full_path_joins(const struct full_path *x, unsigned s)
+{
+	return x->edges >= 2 && !(s > 1 && x->v[s - 1].delta) && !(s < x->edges && x->v[s].delta);
+}
+
+bool full_path_is_made(const struct path_context *c, const struct full_path *x)
+{
+	if (path_can_be_hit(c, &x->v[0]))
+		return true;
+	for (unsigned s = full_path_most_light(c, x); s > 0; s--)
+		if (full_path_joins(x, s))
+			return true;
+	return false;
+}
+
 bool full_path_finish(struct path_context *c, struct full_path *x)
 {
 	x->known_f = x->known_fh = NONE;
@@ -303,7 +329,9 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 		if (!mode || mode != (x->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return false;
 	}
-	if (!whole_film(c, x) || (EFFECT_IS_ON(c->w, scattering) && !full_path_see_media(c, x)))
+	if (!whole_film(c, x))
+		return false;
+	if (EFFECT_IS_ON(c->w, scattering) && !(full_path_see_media(c, x) && full_path_is_made(c, x)))
 		return false;
 	for (unsigned j = 0; j < x->edges; j++)
 		if (spectrum_is_zero(full_path_f(c, x, j)))

@@ -106,6 +106,13 @@ bool full_path_see_media(struct path_context *c, struct full_path *x);
 /* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
 bool whole_film(const struct path_context *c, struct full_path *x);
 
+/* The technique with the most light vertices: fewer than all where media do not fit together (path/media.h). */
+unsigned full_path_most_light(const struct path_context *c, const struct full_path *x);
+/* Whether technique s > 0 can make it, as far as specular vertices go. */
+bool full_path_joins(const struct full_path *x, unsigned s);
+/* Whether any technique makes it: where media do not fit together, there are paths that none does. */
+bool full_path_is_made(const struct path_context *c, const struct full_path *x);
+
 /* Everything that follows from the vertices: edges, modes (those of specular vertices are given), film point,
  * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray,
  * unless media scatter: then it is also false where an edge is occluded. */

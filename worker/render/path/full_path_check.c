@@ -25,6 +25,12 @@ static bool same_vector(vec3 a, vec3 b)
 	return vec3_dot(d, d) <= CHECK_TOLERANCE * CHECK_TOLERANCE * fmax(vec3_dot(b, b), 1);
 }
 
+static bool check_media(const struct path_edge *a, const struct path_edge *b, spectrum left, spectrum fresh)
+{
+	return a->medium == b->medium && a->before == b->before && a->fits == b->fits &&
+	       same_spectrum(a->free, b->free) && same_spectrum(left, fresh);
+}
+
 static bool check_edges(struct path_context *c, const struct full_path *x, char *text, size_t size)
 {
 	struct full_path seen = *x;
@@ -38,6 +44,11 @@ static bool check_edges(struct path_context *c, const struct full_path *x, char 
 		}
 		if (!full_path_visible(c, &seen, e)) {
 			snprintf(text, size, "edge %u of %u is occluded", e, x->edges);
+			return false;
+		}
+		if (EFFECT_IS_ON(c->w, scattering) &&
+		    !check_media(&x->v[e].edge, &seen.v[e].edge, x->edge[e].left, seen.edge[e].left)) {
+			snprintf(text, size, "edge %u of %u does not know its media", e, x->edges);
 			return false;
 		}
 	}

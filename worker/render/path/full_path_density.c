@@ -81,22 +81,12 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 		v[0].pdf = 0;
 }
 
-/* The first edge about whose media a light sub-path does not agree; none: one more than there are. */
-static unsigned last_edge_of_light(const struct path_context *c, const struct full_path *x)
-{
-	struct joined_path p = {.edges = x->edges};
-	for (unsigned i = 0; i <= x->edges; i++)
-		p.v[i] = &x->v[i];
-	unsigned other = path_other_medium(c, &p);
-	return other ? other : x->edges + 1;
-}
-
 void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf)
 {
 	unsigned k = x->edges;
 	const struct path_vertex *v = x->v;
 	fill_densities(c, x);
-	unsigned most = EFFECT_IS_ON(c->w, scattering) ? last_edge_of_light(c, x) : k;
+	unsigned most = full_path_most_light(c, x);
 	double camera = 0; /* of v[s .. k] from the camera's side */
 	for (unsigned s = k; s > 0; s--) {
 		log_pdf[s] = camera;
@@ -106,7 +96,7 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	double light = 0; /* of v[0 .. s - 1] from the light's */
 	for (unsigned s = 1; s <= k; s++) {
 		light += log(v[s - 1].pdf_rev);
-		bool exists = k >= 2 && s <= most && !(s > 1 && v[s - 1].delta) && !(s < k && v[s].delta);
+		bool exists = s <= most && full_path_joins(x, s);
 		double from_light = s == 1 && exists ? log(path_pdf_toward(c, &v[0], v[1].x.p)) : light;
 		log_pdf[s] = exists ? log_pdf[s] + from_light : -INFINITY;
 	}
