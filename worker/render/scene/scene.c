@@ -123,9 +123,8 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 {
 	enum plugin_class cls = d->node->cls;
 	struct spelling s = {.wanted = name};
-	bool visible = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE,
-	     hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
-	if (!value_is_element(el->name) || !(hidden || (visible && el->snake)))
+	bool hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
+	if (!value_is_element(el->name) || !(el->snake || hidden))
 		return false;
 	plugin_offer_params(d->decl, &s);
 	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !el->snake; other++)

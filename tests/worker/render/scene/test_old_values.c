@@ -150,6 +150,36 @@ static void test_unknown_names(void **state)
 		"there is no spectrum of this type");
 }
 
+/* Mitsuba 0.6 warns of names that nobody asks for, whatever the object's class. */
+static void test_unknown_names_of_all_classes(void **state)
+{
+	(void)state;
+#define INSIDE(x) "<medium type='homogeneous'>" x "</medium>"
+#define SENSOR(x) "<emitter type='constant'/><sensor type='perspective'>" x "</sensor>"
+	static const char *const kept[] = {
+		INSIDE("<string name='guidingFile' value='x'/>"),
+		INSIDE("<phase type='hg'><string name='guidingFile' value='x'/></phase>"),
+		"<volume type='constvolume'><float name='value' value='1'/><string name='guidingFile' value='x'/></volume>",
+		SENSOR("<film type='hdrfilm'><rfilter type='box'><string name='guidingFile' value='x'/></rfilter></film>"),
+		SENSOR("<film type='hdrfilm'><string name='guidingFile' value='x'/></film>"),
+		SENSOR("<string name='guidingFile' value='x'/>"),
+	};
+	for (size_t i = 0; i < sizeof kept / sizeof *kept; i++) {
+		struct scene s = read_old(kept[i], "is not known and is ignored");
+		scene_fini(&s);
+	}
+	/* All that is said of samplers and integrators is what of them matters. */
+	struct scene s = read_old("<integrator type='path'><string name='guidingFile' value='x'/></integrator>",
+				  "is ignored except for");
+	scene_fini(&s);
+	refuses("3.0.0", INSIDE("<phase type='hg'><string name='guiding_file' value='x'/></phase>"),
+		"has no `guiding_file`");
+	refuses("3.0.0", INSIDE("<string name='guiding_file' value='x'/>"), "has no `guiding_file`");
+	refuses("0.6.0", INSIDE("<float name='sigmaT1' value='x'/>"), "did you mean `sigma_t`?");
+#undef INSIDE
+#undef SENSOR
+}
+
 /* What the Blender exporter of 0.5 writes into images by default. */
 static void test_labels(void **state)
 {
@@ -185,6 +215,7 @@ int main(void)
 		cmocka_unit_test(test_distributions),
 		cmocka_unit_test(test_metals_lose_their_signs),
 		cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_unknown_names_of_all_classes),
 		cmocka_unit_test(test_labels),
 		cmocka_unit_test(test_specular),
 	};
