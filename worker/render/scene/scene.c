@@ -28,6 +28,7 @@
 #include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/refuse.h"
+#include "worker/render/scene/relief_files.h"
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/snake_case.h"
@@ -115,9 +116,10 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 }
 
 /* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and that no other plug-in of
- * the class has, is taken for one of these; other unknown names are mistakes. Materials and textures of 3.x do not
- * allow it, because their parameters are visible in the image, and Mitsuba 3 refuses them; 0.6 ignores unknown names,
- * and in its files an object may have the parameter of another, left there when its type was changed. */
+ * the class has, is taken for one of these; other unknown names are mistakes. In 3.x sensors, films, shapes and
+ * emitters alone allow it: elsewhere parameters are visible in the image, and Mitsuba 3 refuses them. 0.6 ignores
+ * unknown names of all classes, and in its files an object may have the parameter of another, left there when its type
+ * was changed. */
 static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
 				 const char *name)
 {
@@ -395,6 +397,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		r = remarks_on_object(d.node, &m->report, m->error);
 	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d.lacks, d.node)))
 		return r;
+	if (!r && m->lenient && !m->scene->dialect_3 && (r = substitute_volume(&m->notes, el, d.node)))
+		return r;
 	if (!r && m->lenient && (r = substitute_cover(&m->notes, el, d.lacks, out)) == REPORT_TOLD)
 		return r;
 	el->node = *out;
@@ -477,7 +481,9 @@ static int make_scene(struct maker *m)
 	s->black_backs = m->tree->black_backs;
 	s->objects = objects;
 	texture_names_settle(m->decls, m->tree->root);
-	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
+	int r = relief_files_settle(m->tree->root, &m->scene->arena, m->error);
+	if (!r)
+		r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
 	if (!r)
 		r = texture_names_follow(m->tree->root, &m->ids, &m->scene->arena, m->error);
 	if (!r)

@@ -4,6 +4,8 @@
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/refuse.h"
 
+#include <string.h>
+
 int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, struct id_table *ids,
 		      const struct xml_element *el, enum plugin_class cls, const char **type,
 		      const struct plugin_decl **decl, struct xml_element **inner)
@@ -59,6 +61,15 @@ int substitute_medium(const struct notes *t, const struct xml_element *el, bool 
 	if (node->cls != PLUGIN_MEDIUM || !lacks)
 		return 0;
 	int r = note(t, el, node->type, "", "%s:%d: <medium type=\"%.64s\"> is left out with what it lacks (lenient)",
+		     el->file, el->line, node->type);
+	return r ? r : REPORT_TOLD;
+}
+
+int substitute_volume(const struct notes *t, const struct xml_element *el, const struct scene_node *node)
+{
+	if (node->cls != PLUGIN_VOLUME || strcmp(node->type, "constvolume") != 0 || node_find(node, "value"))
+		return 0;
+	int r = note(t, el, node->type, "", "%s:%d: <volume type=\"%.64s\"> has no `value`: left out (lenient)",
 		     el->file, el->line, node->type);
 	return r ? r : REPORT_TOLD;
 }

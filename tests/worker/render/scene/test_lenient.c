@@ -151,6 +151,36 @@ static void test_lost_textures(void **state)
 	scene_fini(&s);
 }
 
+/* A volume that names its value otherwise has none: it goes, and the medium that needs it. In 3.x there is a default.
+ */
+static void test_volumes_without_a_value(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='0.6.0'>\n<medium type='heterogeneous' id='smoke'>\n"
+		"<volume name='density' type='constvolume'><float name='value' value='3'/></volume>\n"
+		"<volume name='albedo' type='constvolume'><spectrum name='color' value='0.9'/></volume>\n</medium>\n"
+		"<shape type='sphere'><ref name='interior' id='smoke'/></shape></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0); /* its maker refuses it */
+	scene_fini(&s);
+	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_int_equal(s.object_count, 1);
+	assert_null(node_ref(s.objects[0], "interior"));
+	assert_true(scene_has_note(&s, "s.xml:4: <volume type=\"constvolume\"> has no `value`: left out (lenient)"));
+	assert_true(scene_has_note(&s, "s.xml:2: <medium type=\"heterogeneous\"> is left out with what it lacks"));
+	scene_fini(&s);
+	static const char new[] = "<scene version='3.0.0'><volume type='constvolume'/></scene>";
+	const struct memory_file new_files[] = {{"s.xml", new, sizeof new - 1}, {0}};
+	const struct asset_source of_new = memory_assets(new_files);
+	assert_int_equal(scene_read_lenient(&s, &of_new, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_int_equal(s.object_count, 1);
+	scene_fini(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -158,6 +188,7 @@ int main(void)
 		cmocka_unit_test(test_colours_are_kept),
 		cmocka_unit_test(test_covers),
 		cmocka_unit_test(test_lost_textures),
+		cmocka_unit_test(test_volumes_without_a_value),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
