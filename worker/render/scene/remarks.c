@@ -2,6 +2,7 @@
 #include "worker/render/scene/remarks.h"
 
 #include "worker/render/scene/depth.h"
+#include "worker/render/scene/integrators.h"
 #include "worker/render/scene/plugin.h"
 
 #include <stdarg.h>
@@ -34,24 +35,7 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 /* A scene that asks for a part of the light, or for something other than light, gets another image, which is noted. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
-	static const char *const others[] = {"emission_reparam",
-					     "volprim_rf_basic",
-					     "aov",
-					     "multichannel",
-					     "stokes",
-					     "moment",
-					     "depth",
-					     "field",
-					     "ao",
-					     "vpl",
-					     "irrcache",
-					     "sppm",
-					     "ppm",
-					     "photonmapper"};
-	int rc = 0;
-	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
-		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e, "the image shows all light, on surfaces and in media");
+	int rc = integrators_show_other(n) ? remark(r, n, e, "the image shows all light, on surfaces and in media") : 0;
 	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
 	return rc ? rc : on_depth(r, n, e);
@@ -78,7 +62,7 @@ static int on_boundary(struct report *r, const struct scene_node *n, bool dialec
 static int on_media(struct report *r, const struct scene_node *integrator, struct error *e)
 {
 	static const char *const without[] = {"path", "direct", "prb"};
-	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
 		for (size_t i = 0; i < sizeof without / sizeof *without; i++)
 			if (strcmp(n->type, without[i]) == 0)
 				return remark(r, n, e, "Mitsuba's `%s` leaves media out; the image shows them",

@@ -12,6 +12,7 @@
 #include "common/plan/plan.h"
 #include "worker/render/scene/depth.h"
 #include "worker/render/scene/film.h"
+#include "worker/render/scene/integrators.h"
 #include "worker/render/scene/number.h"
 
 #include <math.h>
@@ -142,7 +143,8 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_RFILTER, "catmullrom", no_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "lanczos", lanczos_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_SAMPLER, "*", sampler_params, 0, PARAM_IGNORED},
-	/* irrcache, adaptive, aov and others contain the integrator with the depth. */
+	/* irrcache, adaptive, aov and others contain the integrator with the depth, multichannel and aov also several.
+	 */
 	{PLUGIN_INTEGRATOR, "*", integrator_params, HOLDS(PLUGIN_INTEGRATOR), PARAM_IGNORED},
 	{0, NULL, NULL, 0, 0},
 };
@@ -244,12 +246,10 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	if (count > 1)
 		return node_error(integrator, e, EINVAL, "a second integrator in the scene");
 	snprintf(out->integrator, sizeof out->integrator, "%s", integrator->type);
-	int64_t depth = -1, roulette = ROULETTE_DEPTH;
-	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
-		depth = node_int(n, "max_depth", depth_is_direct(n->type) ? SCENE_DIRECT_DEPTH : depth);
-	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+	int64_t depth = integrators_depth(integrator), roulette = ROULETTE_DEPTH;
+	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
 		roulette = node_int(n, "rr_depth", roulette);
-	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
 		out->hide_emitters |= node_bool(n, "hide_emitters", false);
 	if (depth == 0)
 		return node_error(integrator, e, ERANGE,

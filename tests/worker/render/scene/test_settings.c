@@ -122,6 +122,18 @@ static void test_sampler_and_integrator(void **state)
 		assert_int_equal(read_ok(before, "").max_depth, depths[i].want);
 		assert_int_equal(read_ok(before, "").roulette_depth, 5);
 	}
+	/* Of several the first that shows light. */
+	static const char *const outer[] = {"multichannel", "aov"};
+	for (int i = 0; i < 2; i++) {
+		char xml[512];
+		snprintf(xml, sizeof xml,
+			 "<integrator type='%s'><integrator type='field'/><integrator type='path'><integer "
+			 "name='maxDepth' value='7'/><integer name='rrDepth' value='4'/></integrator>"
+			 "<integrator type='path'><integer name='maxDepth' value='3'/></integrator></integrator>",
+			 outer[i]);
+		s = read_ok(xml, "");
+		assert_true(s.max_depth == 7 && s.roulette_depth == 4);
+	}
 	assert_int_equal(read_ok("<integrator type='direct'/>", "").max_depth, 2);
 	assert_int_equal(
 		read_ok("<integrator type='moment'><integrator type='direct_projective'/></integrator>", "").max_depth,

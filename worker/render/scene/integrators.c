@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/integrators.h"
+
+#include "worker/render/scene/depth.h"
+
+bool integrators_show_other(const struct scene_node *n)
+{
+	static const char *const others[] = {"emission_reparam",
+					     "volprim_rf_basic",
+					     "aov",
+					     "multichannel",
+					     "stokes",
+					     "moment",
+					     "depth",
+					     "field",
+					     "ao",
+					     "vpl",
+					     "irrcache",
+					     "sppm",
+					     "ppm",
+					     "photonmapper"};
+	for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+		if (strcmp(n->type, others[i]) == 0)
+			return true;
+	return false;
+}
+
+const struct scene_node *integrators_inner(const struct scene_node *n)
+{
+	const struct scene_node *inner;
+	for (uint32_t i = 0; (inner = node_child(n, PLUGIN_INTEGRATOR, i)); i++)
+		if (!integrators_show_other(inner))
+			return inner;
+	return node_child(n, PLUGIN_INTEGRATOR, 0);
+}
+
+int64_t integrators_depth(const struct scene_node *n)
+{
+	int64_t depth = -1;
+	for (; n; n = integrators_inner(n))
+		depth = node_int(n, "max_depth", depth_is_direct(n->type) ? SCENE_DIRECT_DEPTH : depth);
+	return depth;
+}

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What Mitsuba's integrators, one in another, would show of a scene. Pure; any thread. */
+#ifndef WORKER_RENDER_SCENE_INTEGRATORS_H
+#define WORKER_RENDER_SCENE_INTEGRATORS_H
+
+#include "worker/render/scene/node.h"
+
+/* The one inside n; of several (`multichannel`, `aov`) the first that shows light, if any does. NULL: none. */
+const struct scene_node *integrators_inner(const struct scene_node *n);
+
+/* Whether its image is of something other than all light: a part of it, or normals, depths and the like. */
+bool integrators_show_other(const struct scene_node *n);
+
+/* Edges of the longest path, by the innermost that states them; -1: no limit. */
+int64_t integrators_depth(const struct scene_node *n);
+
+#endif
