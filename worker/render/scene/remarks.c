@@ -41,6 +41,25 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 	return rc ? rc : on_depth(r, n, e);
 }
 
+/* Emitters that a path of one edge meets: all that are not a point, nor at a single direction. */
+static bool is_seen(const struct scene_node *n)
+{
+	static const char *const unseen[] = {"point", "spot", "projector", "directional"};
+	for (size_t i = 0; i < sizeof unseen / sizeof *unseen; i++)
+		if (n->cls == PLUGIN_EMITTER && strcmp(n->type, unseen[i]) == 0)
+			return false;
+	return n->shines;
+}
+
+static int on_one_edge(struct report *r, const struct scene_node *integrator, struct error *e)
+{
+	if (!integrator || integrators_depth(integrator) != 1)
+		return 0;
+	return remark(r, integrator, e,
+		      "max_depth 1 shows emitters themselves, and the scene has none that can be seen: the image is "
+		      "black; --max-depth 2 shows surfaces that they light");
+}
+
 static bool has_medium(const struct scene_node *n)
 {
 	return n->cls == PLUGIN_SHAPE ? node_ref(n, "interior") || node_ref(n, "exterior")
@@ -100,13 +119,14 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bo
 		     struct error *e)
 {
 	const struct scene_node *camera = NULL, *integrator = NULL;
-	bool light = false, media = false;
+	bool light = false, seen = false, media = false;
 	uint32_t sensors = 0;
 	int rc = 0;
 	for (uint32_t i = 0; i < count && !rc; i++) {
 		const struct scene_node *n = objects[i];
 		char place[NODE_PLACE_MAX];
 		light |= n->shines;
+		seen |= is_seen(n);
 		media |= has_medium(n);
 		integrator = n->cls == PLUGIN_INTEGRATOR ? n : integrator;
 		if (n->cls == PLUGIN_INTEGRATOR)
@@ -126,6 +146,8 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bo
 	}
 	if (!rc && media)
 		rc = on_media(r, integrator, e);
+	if (!rc && light && !seen)
+		rc = on_one_edge(r, integrator, e);
 	if (!rc && !light && camera && r->problem_count == 0)
 		rc = remark(r, camera, e, "the scene has no emitter: the image is black");
 	return rc;

@@ -2,6 +2,7 @@
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "tests/support/scene_tables.h"
+#include "worker/render/render.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -221,6 +222,40 @@ static void test_notes_on_the_whole(void **state)
 	}
 }
 
+#define ONE_EDGE "<integrator type='path'><integer name='max_depth' value='1'/></integrator>"
+
+/* A path of one edge ends at an emitter, which a point is not. */
+static void test_notes_on_one_edge(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *xml;
+		bool black;
+	} cases[] = {
+		{ONE_EDGE "<emitter type='point'/>", true},
+		{ONE_EDGE "<emitter type='spot'/><emitter type='directional'/>", true},
+		{ONE_EDGE "<emitter type='point'/><emitter type='constant'/>", false},
+		{ONE_EDGE "<shape type='sphere'><emitter type='area'/></shape>", false},
+		{"<integrator type='path'><integer name='max_depth' value='2'/></integrator><emitter type='point'/>",
+		 false},
+		{"<integrator type='direct'/><emitter type='point'/>", false},
+		{"<emitter type='point'/>", false},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[512];
+		snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", cases[i].xml);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e;
+		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%s: %s", cases[i].xml, e.text);
+		if (scene_has_note(&s, "max_depth 1 shows emitters themselves") != cases[i].black)
+			fail_msg("%s: %s", cases[i].xml, cases[i].black ? "no note" : "a note");
+		scene_fini(&s);
+	}
+}
+
 static void test_crop(void **state)
 {
 	(void)state;
@@ -335,6 +370,7 @@ int main(void)
 		cmocka_unit_test(test_camera),
 		cmocka_unit_test(test_several_sensors),
 		cmocka_unit_test(test_notes_on_the_whole),
+		cmocka_unit_test(test_notes_on_one_edge),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_size_is_overridden),
 		cmocka_unit_test(test_no_sensor),
