@@ -9,6 +9,7 @@
 
 #include <errno.h>
 #include <string.h>
+#include <strings.h>
 
 /* Minor version before which it applies: 0.3 is `before` 4. NULL: any. */
 struct new_name {
@@ -109,7 +110,7 @@ static bool turn_camera(struct xml_element *camera, struct arena *arena)
 		    !put_first(c, "scale", "x", "-1", NULL, NULL, arena))
 			return false;
 		if (is_named(c, "boolean") && strcmp(name, "mapSmallerSide") == 0) {
-			axis = value && strcmp(value, "false") == 0 ? "larger" : axis;
+			axis = value && strcasecmp(value, "false") == 0 ? "larger" : axis;
 			c->ignored = true;
 		}
 	}

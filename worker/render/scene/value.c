@@ -14,6 +14,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 static int need_value(const struct xml_element *el, const char **text, struct error *e)
 {
@@ -27,9 +28,8 @@ static int read_bool(const struct xml_element *el, struct value *out, struct err
 	int r = need_value(el, &text, e);
 	if (r)
 		return r;
-	/* Python's exporters write True. */
-	out->as.boolean = strcmp(text, "true") == 0 || strcmp(text, "True") == 0;
-	if (!out->as.boolean && strcmp(text, "false") != 0 && strcmp(text, "False") != 0)
+	out->as.boolean = strcasecmp(text, "true") == 0; /* Python's exporters write True */
+	if (!out->as.boolean && strcasecmp(text, "false") != 0)
 		return xml_error(el, e, EINVAL, "`%.64s` is neither true nor false", text);
 	return 0;
 }

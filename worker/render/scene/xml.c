@@ -161,11 +161,29 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 	return 0;
 }
 
+/* Mitsuba takes type, id and name there, and they mean nothing; editors add namespaces. */
+static bool means_nothing(const char *attribute)
+{
+	return !strcmp(attribute, "type") || !strcmp(attribute, "id") || !strcmp(attribute, "name") ||
+	       !strcmp(attribute, "xmlns") || strchr(attribute, ':');
+}
+
+static void drop_attributes(struct xml_element *scene)
+{
+	uint32_t kept = 0;
+	for (uint32_t i = 0; i < scene->attribute_count; i++)
+		if (!means_nothing(scene->attributes[i].name))
+			scene->attributes[kept++] = scene->attributes[i];
+	scene->attribute_count = kept;
+}
+
 /* The version determines which dialect's names and rules apply. An included file may hold one object alone. */
 static int begin_file(struct reader *r, struct xml_element *el)
 {
 	if (!el->parent && strcmp(el->name, "scene") != 0)
 		return xml_error(el, r->error, EINVAL, "a scene file must begin with <scene version=\"...\">");
+	if (strcmp(el->name, "scene") == 0)
+		drop_attributes(el);
 	const char *version = xml_attribute(el, "version");
 	int64_t major;
 	const char *rest = version ? number_scan_int(version, version + strlen(version), &major) : NULL;

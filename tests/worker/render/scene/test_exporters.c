@@ -235,8 +235,36 @@ static void test_are_read(void **state)
 	}
 }
 
+/* What Mitsuba allows in <scene> beside the version, and what editors of XML add there; also in included files. */
+static void test_roots(void **state)
+{
+	(void)state;
+	static const char *const roots[] = {
+		"<scene version='3.0.0' type='scene' id='all' name='whole'>",
+		"<scene xmlns:xi='http://www.w3.org/2001/XInclude' version='3.0.0' xmlns='x'>",
+		"<scene version='0.6.0' id='all' xmlns:xsi='x' xsi:noNamespaceSchemaLocation='s.xsd'>",
+	};
+	for (size_t i = 0; i < sizeof roots / sizeof *roots; i++) {
+		char inner[256];
+		snprintf(inner, sizeof inner, "%s<bsdf type='diffuse' id='all'/></scene>", roots[i]);
+		char outer[256];
+		snprintf(outer, sizeof outer, "%s<include filename='i.xml'/></scene>", roots[i]);
+		const struct memory_file files[] = {
+			{"s.xml", outer, strlen(outer)}, {"i.xml", inner, strlen(inner)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e;
+		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%s: %s", roots[i], e.text);
+		assert_int_equal(s.object_count, 1);
+		assert_string_equal(s.objects[0]->id, "all");
+		assert_int_equal(s.note_count, 0);
+		scene_fini(&s);
+	}
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_are_read)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_are_read), cmocka_unit_test(test_roots)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -160,7 +160,8 @@ static void test_booleans(void **state)
 	static const struct {
 		const char *written;
 		bool value;
-	} cases[] = {{"true", true}, {"True", true}, {"false", false}, {"False", false}};
+	} cases[] = {{"true", true},   {"True", true}, {"false", false},
+		     {"False", false}, {"TRUE", true}, {"fAlSe", false}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[256];
 		struct error e;
