@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/asset_name.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { UP = sizeof ASSET_NAME_UP - 1 };
@@ -48,4 +49,15 @@ size_t asset_name_up(const char *canonical, const char **rest)
 	}
 	*rest = canonical;
 	return count;
+}
+
+const char *asset_name_shown(const char *canonical, char *out, size_t size)
+{
+	const char *rest;
+	size_t used = 0;
+	for (size_t up = asset_name_up(canonical, &rest); up > 0 && used < size; up--)
+		used += (size_t)snprintf(out + used, size - used, "../");
+	if (used < size)
+		snprintf(out + used, size - used, "%s", rest);
+	return out;
 }

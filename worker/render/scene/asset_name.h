@@ -23,4 +23,7 @@ void asset_name_canonical(const char *written, char *out);
 /* How many folders up from the scene's; *rest is what follows. */
 size_t asset_name_up(const char *canonical, const char **rest);
 
+/* As its author would write it, with ".." for what leads out. Returns out; ends early where there is no room. */
+const char *asset_name_shown(const char *canonical, char *out, size_t size);
+
 #endif

@@ -15,6 +15,12 @@ const char *xml_attribute(const struct xml_element *el, const char *name)
 	return NULL;
 }
 
+const char *element_spelling(const struct xml_element *el, const char *name)
+{
+	const char *written = el->snake ? xml_attribute(el, "name") : NULL;
+	return written ? written : name;
+}
+
 int xml_error(const struct xml_element *el, struct error *e, int errno_value, const char *format, ...)
 {
 	char text[768];

@@ -41,6 +41,10 @@ struct xml_element {
 
 const char *xml_attribute(const struct xml_element *el, const char *name); /* NULL: none */
 
+/* How the file spells the parameter that the element gives; `name`, the spelling of 3.x, where it has no name of its
+ * own. */
+const char *element_spelling(const struct xml_element *el, const char *name);
+
 /* error_set with "file:line: <element>: " before the text. */
 __attribute__((format(printf, 4, 5))) int xml_error(const struct xml_element *el, struct error *e, int errno_value,
 						    const char *format, ...);

@@ -60,7 +60,8 @@ static int drop_sign(const struct notes *t, const struct xml_element *owner, con
 	return least == 0 ? 0
 			  : note(t, owner, xml_attribute(owner, "type"), p->name,
 				 "%s:%d: <%.64s type=\"%.64s\">: %s=%g is below 0: its sign is ignored, as in Mitsuba",
-				 el->file, el->line, owner->name, xml_attribute(owner, "type"), p->name, least);
+				 el->file, el->line, owner->name, xml_attribute(owner, "type"),
+				 element_spelling(el, p->name), least);
 }
 
 static int scale_reflectance(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
@@ -78,7 +79,7 @@ static int scale_reflectance(const struct notes *t, const struct xml_element *ow
 		return error_set(t->error, ENOMEM, "out of memory");
 	return note(t, owner, xml_attribute(owner, "type"), p->name,
 		    "%s:%d: <%.64s type=\"%.64s\">: %s=%g is above 1: scaled by %.4g, as in Mitsuba", el->file,
-		    el->line, owner->name, xml_attribute(owner, "type"), p->name, most, factor);
+		    el->line, owner->name, xml_attribute(owner, "type"), element_spelling(el, p->name), most, factor);
 }
 
 static int replace_distribution(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,

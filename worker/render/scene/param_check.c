@@ -19,8 +19,8 @@ static int refuse_choice(const struct xml_element *el, const struct param *p, co
 	}
 	for (const char *rest = p->choices; (rest = element_next_name(rest, one, sizeof one));)
 		spelling_list(list, sizeof list, one);
-	return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not supported%s (supported: %s)", p->name, given,
-			 spelling_hint(&s, hint, sizeof hint), list);
+	return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not supported%s (supported: %s)",
+			 element_spelling(el, p->name), given, spelling_hint(&s, hint, sizeof hint), list);
 }
 
 static int check_range(const struct xml_element *el, const struct param *p, const struct value *v, struct error *e)
@@ -30,7 +30,8 @@ static int check_range(const struct xml_element *el, const struct param *p, cons
 	const double *x = value_numbers(v, scratch, &count);
 	for (uint32_t i = 0; i < count; i++)
 		if (!(x[i] >= p->min && x[i] <= p->max))
-			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", p->name, x[i], p->min, p->max);
+			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", element_spelling(el, p->name),
+					 x[i], p->min, p->max);
 	return 0;
 }
 
@@ -62,7 +63,8 @@ int param_check(const struct xml_element *el, const struct param *p, struct valu
 	if (!(v->type & p->types)) {
 		char list[256];
 		value_type_names(p->types, list, sizeof list);
-		return xml_error(el, e, EINVAL, "`%s` cannot have this type (supported: %s)", p->name, list);
+		return xml_error(el, e, EINVAL, "`%s` cannot have this type (supported: %s)",
+				 element_spelling(el, p->name), list);
 	}
 	if (p->min < p->max && (r = check_range(el, p, v, e)))
 		return r;

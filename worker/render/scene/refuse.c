@@ -67,40 +67,42 @@ int refuse_element(const struct xml_element *el, struct error *e)
 		s.best = usual;
 	else if (s.best && strcmp(s.best, el->name) == 0) /* the right name in the wrong place */
 		return xml_error(el, e, EINVAL, "has no place in <%.64s>", around);
-	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s", around,
-			 spelling_hint(&s, hint, sizeof hint));
+	return xml_error(el, e, EINVAL, "there is no element of this name%s",
+			 s.best ? spelling_hint(&s, hint, sizeof hint) : "; --lenient leaves it out");
 }
 
 int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, enum plugin_class cls, const char *type,
 		struct error *e)
 {
-	char hint[128], list[512];
+	char hint[128], near[128] = "", list[512];
 	struct spelling s = {.wanted = type};
 	plugin_offer_types(decls, cls, &s);
 	plugin_list_types(decls, cls, list, sizeof list);
 	if (plugin_is_mitsubas(cls, type))
 		return xml_error(el, e, EINVAL, "this %s of Mitsuba's is not supported%s (supported: %s)",
 				 plugin_class_name(cls), lenient_hint(cls, type, hint, sizeof hint), list);
-	return xml_error(el, e, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
-			 s.best ? spelling_hint(&s, hint, sizeof hint) : lenient_hint(cls, type, hint, sizeof hint),
-			 list);
+	spelling_hint(&s, near, sizeof near);
+	const char *lenient = lenient_hint(cls, type, hint, sizeof hint);
+	return xml_error(el, e, EINVAL, "there is no %s of this type%s%s (supported: %s)", plugin_class_name(cls), near,
+			 *near && *lenient ? lenient + 1 : lenient, list); /* after "?" without ";" */
 }
 
 int refuse_property(const struct plugin_decl *owner, const char *type, const struct xml_element *el, const char *name,
 		    const struct param *p, struct error *e)
 {
 	char list[512], hint[128] = "";
+	const char *written = element_spelling(el, name);
 	plugin_list_params(owner, list, sizeof list);
 	if (p)
 		return xml_error(el, e, EINVAL,
 				 "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
 				 "supported: %s",
-				 name, plugin_class_name(owner->cls), type, list);
+				 written, plugin_class_name(owner->cls), type, list);
 	const char *value = xml_attribute(el, "value");
 	if (gltf_is(el->file) && value && strcmp(value, ELEMENT_UNSUPPORTED) == 0)
 		return xml_error(el->parent, e, ENOTSUP, "`%.64s` is not supported; --lenient leaves it out", name);
 	struct spelling s = {.wanted = name};
 	plugin_offer_params(owner, &s);
 	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",
-			 plugin_class_name(owner->cls), type, name, spelling_hint(&s, hint, sizeof hint), list);
+			 plugin_class_name(owner->cls), type, written, spelling_hint(&s, hint, sizeof hint), list);
 }

@@ -142,6 +142,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 {
 	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
 	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
+	const char *written = element_spelling(el, name);
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
@@ -149,17 +150,17 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	}
 	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
-		return note_property(&m->notes, owner, el, name);
+		return note_property(&m->notes, owner, el, written);
 	if (!found && is_foreign_parameter(m, d, el, name))
-		return note_foreign_parameter(&m->notes, owner, el, name);
+		return note_foreign_parameter(&m->notes, owner, el, written);
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
-		return leave_out(&m->notes, el, xml_attribute(owner, "type"), name, "the parameter");
+		return leave_out(&m->notes, el, xml_attribute(owner, "type"), written, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
-		return note_property(&m->notes, owner, el, name);
+		return note_property(&m->notes, owner, el, written);
 	if (found->status == PARAM_DIFFERS)
-		return note_difference(&m->notes, owner, el, name);
+		return note_difference(&m->notes, owner, el, written);
 	*p = found;
 	return 0;
 }
@@ -247,10 +248,11 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	}
 	enum plugin_class colours = d->node->cls == PLUGIN_MEDIUM ? PLUGIN_VOLUME : PLUGIN_TEXTURE;
 	if (p && (p->types & VALUE_COLOR) && (p->types & VALUE_NODE) && cls != colours)
-		return xml_error(el, m->error, EINVAL, "`%s` may be a %s, but not a %s", p->name,
+		return xml_error(el, m->error, EINVAL, "`%s` may be a %s, but not a %s", element_spelling(el, p->name),
 				 plugin_class_name(colours), plugin_class_name(cls));
 	if (p && m->lenient && !(p->types & VALUE_NODE))
-		return leave_out(&m->notes, el, xml_attribute(owner, "type"), p->name, "an object for the parameter");
+		return leave_out(&m->notes, el, xml_attribute(owner, "type"), element_spelling(el, p->name),
+				 "an object for the parameter");
 	const struct scene_node *child;
 	int r = make_node(m, target, &child);
 	bool once = d->node->cls == PLUGIN_SHAPE && cls == PLUGIN_BSDF;
@@ -508,7 +510,8 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 	*m = (struct maker){.scene = s, .assets_from = assets, .decls = decls, .error = m->error, .lenient = lenient};
 	m->notes = (struct notes){&m->report, m->error};
 	m->tree = allocate(m, 1, sizeof *m->tree);
-	int r = m->tree ? report_init(&m->report, &s->arena, m->error) : out_of_memory(m);
+	s->file = arena_strdup(&s->arena, name);
+	int r = m->tree && s->file ? report_init(&m->report, &s->arena, m->error) : out_of_memory(m);
 	if (r)
 		return r;
 	m->name = name;

@@ -18,6 +18,7 @@
 
 struct scene {
 	struct arena arena;
+	const char *file; /* as it was opened */
 	bool dialect_3;	  /* version >= 2: Mitsuba 3 rules */
 	bool black_backs; /* of opaque materials without twosided, unless the setting `backs` says otherwise */
 	uint32_t object_count;

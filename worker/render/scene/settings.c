@@ -326,12 +326,15 @@ static const struct scene_node stand_in = {.cls = PLUGIN_SENSOR,
 					   .property_count = 1,
 					   .properties = stand_in_properties};
 
-int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct error *e)
+int scene_settings_place(struct scene_settings *s, const char *file, vec3 low, vec3 high, struct error *e)
 {
 	double size = fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z)),
 	       distance = size / (2 * tan(STAND_IN_FOV / 2 / 57.295779513082320877));
 	if (!(size > 0))
-		return error_set(e, EINVAL, "the scene has no <sensor>, and no shape to place one in front of");
+		return error_set(e, EINVAL,
+				 "%.256s: has no <sensor>, and no shape to place one in front of; it looks like a file "
+				 "that a scene includes",
+				 file);
 	s->near_clip = distance / 100;
 	s->far_clip = 5 * size + distance;
 	s->to_world =

@@ -42,8 +42,9 @@ int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, 
 /* The sensor of that number; NULL: there is none. */
 const struct scene_node *scene_sensor(const struct scene *s, uint32_t which);
 
-/* For a scene without a sensor, whose shapes lie between low and high: places the camera that both Mitsubas supply. */
-int scene_settings_place(struct scene_settings *s, vec3 low, vec3 high, struct error *e);
+/* For a scene without a sensor, whose shapes lie between low and high: places the camera that both Mitsubas supply.
+ * file: the scene's, for the message where there is no shape. */
+int scene_settings_place(struct scene_settings *s, const char *file, vec3 low, vec3 high, struct error *e);
 
 /* Declarations of perspective, thinlens, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL
  * type ends. */

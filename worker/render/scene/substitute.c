@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/substitute.h"
 
+#include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/refuse.h"
 
@@ -36,9 +37,10 @@ int substitute_texture(const struct notes *t, const struct asset_source *assets,
 	const char *file = lenient_missing(assets, el);
 	if (!file)
 		return 0;
+	char shown[257];
 	int r = note(t, el, type, file,
-		     "%s:%d: <texture type=\"%.64s\">: %.256s is not among the scene's files; left out (lenient)",
-		     el->file, el->line, type, file);
+		     "%s:%d: <texture type=\"%.64s\">: %s is not among the scene's files; left out (lenient)", el->file,
+		     el->line, type, asset_name_shown(file, shown, sizeof shown));
 	return r ? r : REPORT_TOLD;
 }
 

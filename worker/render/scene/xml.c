@@ -500,7 +500,8 @@ static int read_file(struct reader *r, const char *name)
 	int c = r->assets->open(r->assets->user, name, &a, r->error);
 	if (c)
 		return c;
-	r->file = name;
+	char *shown = arena_alloc(r->arena, strlen(name) + 1, 1);
+	r->file = shown ? asset_name_shown(name, shown, strlen(name) + 1) : name;
 	c = parse_bytes(r, &a);
 	r->assets->close(r->assets->user, &a);
 	return c;

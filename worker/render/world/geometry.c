@@ -211,7 +211,9 @@ int build_rescale(struct builder *b)
 	if (!isfinite(vec3_length(vec3_sub(b->all.high, b->all.low))))
 		return error_set(b->e, EINVAL, "the scene's extent is not finite");
 	note_scales(b);
-	int rc = w->settings.unplaced ? scene_settings_place(&w->settings, b->all.low, b->all.high, b->e) : 0;
+	int rc = w->settings.unplaced
+			 ? scene_settings_place(&w->settings, b->scene->file, b->all.low, b->all.high, b->e)
+			 : 0;
 	if (rc)
 		return rc;
 	w->center = origin_choose(&b->all, b->boxes, w->shape_count, room);

@@ -152,6 +152,11 @@ static void test_canonical_names(void **state)
 	assert_int_equal(asset_name_up("%2e%2e/%2e%2e/b/%2e%2e", &rest), 2);
 	assert_string_equal(rest, "b/%2e%2e");
 	assert_int_equal(asset_name_up("%2e%2e", &rest), 0);
+	char shown[16], little[8];
+	assert_string_equal(asset_name_shown("a/b", shown, sizeof shown), "a/b");
+	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/b", shown, sizeof shown), "../../b");
+	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/b.png", little, sizeof little), "../../b");
+	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/%2e%2e/b", little, sizeof little), "../../.");
 }
 
 /* Counts; two files whose handles tell them apart. */

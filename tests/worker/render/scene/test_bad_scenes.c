@@ -153,7 +153,10 @@ static void test_unknown_names(void **state)
 	(void)state;
 	refuses(S "\n<bsdf type='difuse'/>" END,
 		"s.xml:2: <bsdf type=\"difuse\">: there is no bsdf of this type; did you mean "
-		"`diffuse`? (supported: diffuse, ");
+		"`diffuse`? --lenient takes the bsdf inside it, or `diffuse`, instead (supported: diffuse, ");
+	refuses(S "<sensor type='perspectiv'/>" END, "did you mean `perspective`? (supported: perspective");
+	refuses(S "<probe type='x'/>" END,
+		"<probe type=\"x\">: there is no element of this name; --lenient leaves it out");
 	refuses(S "<bsdf type='hair'/>" END,
 		"this bsdf of Mitsuba's is not supported; --lenient takes the bsdf inside it, or `diffuse`, instead "
 		"(supported: diffuse, roughconductor");
@@ -179,8 +182,8 @@ static void test_unknown_names(void **state)
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");
 	refuses(S "<float name='a' value='1'/>" END, "<float>: has no place in <scene>");
-	refuses(S "<light type='point'/>" END, "or is not supported; did you mean `emitter`?");
-	refuses(BSDF("<int name='a' value='1'/>"), "or is not supported; did you mean `integer`?");
+	refuses(S "<light type='point'/>" END, "there is no element of this name; did you mean `emitter`?");
+	refuses(BSDF("<int name='a' value='1'/>"), "there is no element of this name; did you mean `integer`?");
 	refuses(S "<bsdf/>" END, "needs an attribute `type`");
 	refuses(S "<sensor type='spherical'/>" END, "supported: perspective, thinlens, orthographic");
 	refuses(S "<sensor type='perspective'><film type='hdrfilm'><rfilter type='wiener'/></film></sensor>" END,
@@ -195,6 +198,19 @@ static void test_unknown_names(void **state)
 	refuses(BSDF("<flaot name='alpha' value='1'/>"), "did you mean `float`?");
 	/* what is quoted and cut stays UTF-8: 63 letters and half of one */
 	refuses(S "<bsdf type='" SIXTY "xxx\xc3\xa4'/>" END, "<bsdf type=\"" SIXTY "xxx?\">: there is no bsdf");
+}
+
+/* A file outside the scene's folder is called as its author calls it. */
+static void test_places_outside(void **state)
+{
+	(void)state;
+	static const char outer[] = S "<include filename='a/../../i.xml'/>" END,
+			  inner[] = S "\n<shape type='cub'/>" END;
+	const struct memory_file files[] = {
+		{"s.xml", outer, sizeof outer - 1}, {"%2e%2e/i.xml", inner, sizeof inner - 1}, {0}};
+	struct error e;
+	assert_int_equal(read_files(files, &e), -EINVAL);
+	assert_memory_equal(e.text, "../i.xml:2: <shape", 18);
 }
 
 static void test_bad_values(void **state)
@@ -452,7 +468,7 @@ static void test_bad_includes(void **state)
 	} cases[] = {{broken, "i.xml:3: <bsdf type=\"difuse\">"},
 		     {doctype, "i.xml:1: <!DOCTYPE>"},
 		     {no_version, "i.xml:1: <shape type=\"sphere\">: needs version="},
-		     {no_object, "i.xml:1: <spere>: has no place in <include>"},
+		     {no_object, "i.xml:1: <spere>: there is no element of this name"},
 		     {inside, "files include each other more than 8 deep"},
 		     {in_object, "i.xml:2: <include>: a file that holds a <scene> may be included"}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -521,6 +537,7 @@ int main(void)
 		cmocka_unit_test(test_media_are_told_once),
 		cmocka_unit_test(test_media),
 		cmocka_unit_test(test_misplaced_parameters),
+		cmocka_unit_test(test_places_outside),
 		cmocka_unit_test(test_bad_values),
 		cmocka_unit_test(test_bad_transforms),
 		cmocka_unit_test(test_bad_references),

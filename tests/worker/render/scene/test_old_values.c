@@ -62,7 +62,7 @@ static void test_reflectances_are_scaled(void **state)
 	scene_fini(&s);
 
 	s = read_old("<bsdf type='phong'><spectrum name='specularReflectance' value='400:0.5, 500:4, 700:1'/></bsdf>",
-		     "specular_reflectance=4 is above 1: scaled by 0.2475");
+		     "specularReflectance=4 is above 1: scaled by 0.2475");
 	v = &node_find(s.objects[0], "specular_reflectance")->value;
 	assert_int_equal(v->as.spectrum.count, 3);
 	assert_true(near(v->as.spectrum.value[0], 0.12375) && near(v->as.spectrum.value[1], 0.99) &&
@@ -122,7 +122,7 @@ static void test_unknown_names(void **state)
 {
 	(void)state;
 	struct scene s = read_old("<bsdf type='diffuse'><string name='guidingFile' value='x'/></bsdf>",
-				  "s.xml:1: <bsdf type=\"diffuse\">: `guiding_file` is not known and is ignored");
+				  "s.xml:1: <bsdf type=\"diffuse\">: `guidingFile` is not known and is ignored");
 	scene_fini(&s);
 	s = read_old("<integer name='maxDepth' value='10'/>", "<integer> is ignored with its contents");
 	scene_fini(&s);
@@ -139,7 +139,7 @@ static void test_unknown_names(void **state)
 	refuses("3.0.0", "<emitter type='constant'><float name='scale' value='2'/></emitter>", "has no `scale`");
 	/* A name that resembles one without effect does no harm. */
 	s = read_old("<emitter type='constant'><float name='samplingWeights' value='2'/></emitter>",
-		     "`sampling_weights` is not known and is ignored");
+		     "`samplingWeights` is not known and is ignored");
 	scene_fini(&s);
 	refuses("0.6.0", "<emitter type='sky'><float name='turbidit' value='3'/></emitter>",
 		"did you mean `turbidity`?");
@@ -175,7 +175,7 @@ static void test_unknown_names_of_all_classes(void **state)
 	refuses("3.0.0", INSIDE("<phase type='hg'><string name='guiding_file' value='x'/></phase>"),
 		"has no `guiding_file`");
 	refuses("3.0.0", INSIDE("<string name='guiding_file' value='x'/>"), "has no `guiding_file`");
-	refuses("0.6.0", INSIDE("<float name='sigmaT1' value='x'/>"), "did you mean `sigma_t`?");
+	refuses("0.6.0", INSIDE("<float name='sigmaT1' value='x'/>"), "has no `sigmaT1`; did you mean `sigma_t`?");
 #undef INSIDE
 #undef SENSOR
 }

@@ -448,7 +448,7 @@ static void test_ignored_is_noted_once(void **state)
 	assert_string_equal(
 		s.notes[1],
 		"s.xml:3: <integrator type=\"unheard\"> is ignored except for: max_depth, rr_depth, hide_emitters");
-	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sample_visible`"));
+	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sampleVisible`"));
 	assert_non_null(strstr(s.notes[3], "s.xml:6: <dpt>"));
 	assert_int_equal(node_int(s.objects[0], "max_depth", 0), 7);
 	assert_int_equal(s.objects[0]->property_count, 1);

@@ -190,7 +190,7 @@ static void test_refused(void **state)
 		{"0.2.0", "<bsdf type='phong'/>", "is not supported in files before version 0.3"},
 		{"0.2.0", "<shape type='sphere'><bsdf type='mirror'/></shape>", "before version 0.3"},
 		{"0.3.0", "<bsdf type='lambertian'/>", "there is no bsdf of this type"},
-		{"0.4.0", "<luminaire type='constant'/>", "has no place in <scene>"},
+		{"0.4.0", "<luminaire type='constant'/>", "there is no element of this name; did you mean `emitter`?"},
 		{"0.5.0", "<bsdf type='bump'/>", "there is no bsdf of this type"},
 		{"0.3.0",
 		 "<camera type='perspective'><boolean name='mapSmallerSide' value='true'/>"
