@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/metal.h"
 
+#include "common/base/spelling.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/ior.h"
 
@@ -25,6 +26,19 @@ static bool is_named(const char *name, const char *metal)
 	return strncmp(name, metal, n) == 0 && (name[n] == 0 || strcmp(name + n, "_palik") == 0);
 }
 
+static int refuse_name(const char *name, const struct scene_node *n, struct error *e)
+{
+	char hint[128], list[512] = "";
+	struct spelling s = {.wanted = name};
+	for (size_t i = 0; i < sizeof metals / sizeof *metals; i++) {
+		spelling_offer(&s, metals[i].name);
+		spelling_list(list, sizeof list, metals[i].name);
+	}
+	spelling_list(list, sizeof list, "none");
+	return node_error(n, e, ENOTSUP, "unknown conductor \"%.64s\"%s; eta and k are accepted, too (known: %s)", name,
+			  spelling_hint(&s, hint, sizeof hint), list);
+}
+
 static int named(struct metal *m, const char *name, const struct scene_node *n, struct arena *arena, struct error *e)
 {
 	if (strcasecmp(name, "none") == 0) {
@@ -46,7 +60,7 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 		m->k = color_of_table(METAL_ROWS, room, room + 2 * METAL_ROWS, false, false);
 		return 0;
 	}
-	return node_error(n, e, ENOTSUP, "unknown conductor \"%s\"; eta and k are accepted, too", name);
+	return refuse_name(name, n, e);
 }
 
 static int given(struct color *c, const struct scene_node *n, const char *name, struct arena *arena, struct error *e)

@@ -97,17 +97,17 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 		      "the sun is that of Mitsuba 0.6 (Preetham 1999): Mitsuba 3's differs a little in colour");
 }
 
-/* Mitsuba has two tables for most metals. Of these three it has one, which ours is. */
+/* Mitsuba has two tables for most metals, and those of which here is one, the first, are listed. Of Na, Ni and V it has
+ * one, under the second name. */
 static int on_metal(struct report *r, const struct scene_node *n, struct error *e)
 {
-	static const char *const single[] = {"Na_palik", "Ni_palik", "V_palik"};
+	static const char *const doubled[] = {"Be", "Cu", "Cu2O", "CuO",  "Hg", "HgTe", "Ir",  "K",   "Li", "Mo",
+					      "Nb", "Rh", "SiC",  "SnTe", "Ta", "Te",	"TiC", "TiN", "VC", "VN"};
 	const char *name = node_string(n, "material", ""), *end = strstr(name, "_palik");
-	bool other = end != NULL;
-	for (size_t i = 0; i < sizeof single / sizeof *single; i++)
-		other = other && strcmp(name, single[i]) != 0;
-	if (!other)
-		return 0;
-	return remark(r, n, e, "the indices of %.*s stand for those of %.32s", (int)(end - name), name, name);
+	for (size_t i = 0; i < sizeof doubled / sizeof *doubled && end; i++)
+		if (strlen(doubled[i]) == (size_t)(end - name) && strncmp(doubled[i], name, (size_t)(end - name)) == 0)
+			return remark(r, n, e, "the indices of %s stand for those of %.32s", doubled[i], name);
+	return 0;
 }
 
 int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e)

@@ -107,6 +107,24 @@ static void test_second_tables(void **state)
 	finish(&c);
 }
 
+/* A name that Mitsuba has and this does not is unknown, and stands for nothing. */
+static void test_unknown_metals(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='3.0.0'>" SPHERE(METAL("TiO2_palik")) ENVIRONMENT "\n" SPHERE(METAL("Agg")) "</scene>";
+	struct checked c;
+	check(xml, &c);
+	assert_int_equal(c.scene.note_count, 0);
+	assert_int_equal(c.found.problem_count, 2);
+	assert_non_null(strstr(c.found.problems[0],
+			       "unknown conductor \"TiO2_palik\"; eta and k are accepted, too (known: "
+			       "a-C, Ag, "));
+	assert_non_null(strstr(c.found.problems[0], ", W, none)"));
+	assert_non_null(strstr(c.found.problems[1], "unknown conductor \"Agg\"; did you mean `Ag`?"));
+	finish(&c);
+}
+
 /* No more than there is room for. */
 static void test_too_many(void **state)
 {
@@ -129,9 +147,8 @@ static void test_too_many(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_all_problems),
-		cmocka_unit_test(test_good_scene),
-		cmocka_unit_test(test_second_tables),
+		cmocka_unit_test(test_all_problems),  cmocka_unit_test(test_good_scene),
+		cmocka_unit_test(test_second_tables), cmocka_unit_test(test_unknown_metals),
 		cmocka_unit_test(test_too_many),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
