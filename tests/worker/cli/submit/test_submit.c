@@ -4,8 +4,10 @@
 #include "coordinator/server/server.h"
 #include "coordinator/server/server_options.h"
 #include "tests/support/folder.h"
+#include "tests/support/memory_assets.h"
 #include "tests/support/scripted.h"
 #include "worker/cli/submit/reconnect.h"
+#include "worker/render/render.h"
 
 #include "common/base/log.h"
 
@@ -20,6 +22,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -166,6 +169,98 @@ static void what_is_elsewhere_is_sent_too(void **state)
 	assert_int_equal(rename(moved, mesh), 0);
 }
 
+static void write_file(const char *name, const char *text)
+{
+	char path[256];
+	snprintf(path, sizeof path, "%s/nested/%s", folder, name);
+	FILE *f = fopen(path, "w");
+	assert_non_null(f);
+	assert_true(fputs(text, f) >= 0);
+	assert_int_equal(fclose(f), 0);
+}
+
+static const char *type_of(const struct scene *s, const char *id)
+{
+	for (uint32_t i = 0; i < s->object_count; i++)
+		if (s->objects[i]->id && strcmp(s->objects[i]->id, id) == 0)
+			return s->objects[i]->type;
+	return "";
+}
+
+static bool is_in(const struct scene_bundle *b, const char *name)
+{
+	for (size_t i = 0; i < b->count; i++)
+		if (strcmp(b->files[i].name, name) == 0)
+			return true;
+	return false;
+}
+
+#define PART(x) "<scene version='3.0.0'>" x "</scene>"
+
+/* Files named by included files lie in their folders, or in the scene's own: sent under the names that a worker, who
+ * has nothing else, finds them by. */
+static void what_included_files_name_is_sent(void **state)
+{
+	(void)state;
+	char path[256];
+	static const char *const folders[] = {"", "/parts", "/parts/deep"};
+	for (int i = 0; i < 3; i++) {
+		snprintf(path, sizeof path, "%s/nested%s", folder, folders[i]);
+		assert_int_equal(mkdir(path, 0700), 0);
+	}
+	write_file("s.xml", PART("<include filename='parts/a.xml'/><shape type='sphere'/><emitter type='constant'/>"));
+	write_file("parts/a.xml", PART("<include filename='deep/b.xml'/><include filename='own.xml'/>"));
+	write_file("parts/deep/b.xml", PART("<include filename='both.xml'/><include filename='../up.xml'/>"
+					    "<bsdf type='conductor'><spectrum name='eta' filename='eta.spd'/>"
+					    "<float name='k' value='1'/></bsdf>"));
+	write_file("parts/deep/both.xml", PART("<bsdf type='conductor' id='both'/>"));
+	write_file("parts/both.xml", PART("<bsdf type='plastic' id='both'/>"));
+	write_file("both.xml", PART("<bsdf type='diffuse' id='both'/>"));
+	write_file("parts/up.xml", PART("<bsdf type='conductor' id='up'/>"));
+	write_file("parts/eta.spd", "400 1\n700 2\n"); /* in the folder of the file around it */
+	write_file("own.xml", PART("<bsdf type='diffuse' id='own'/>"));
+	static const char *const sent_names[] = {
+		"s.xml",	 "own.xml",	"parts/a.xml", "parts/deep/b.xml", "parts/deep/both.xml",
+		"parts/eta.spd", "parts/up.xml"};
+	enum { SENT = sizeof sent_names / sizeof *sent_names };
+	struct scene_bundle b;
+	static struct render_arguments o; /* large */
+	struct error e;
+	o.render.max_depth = 4;
+	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
+	if (scene_bundle_read(&b, path, &o, &e))
+		fail_msg("%s", e.text);
+	struct memory_file files[SENT + 1] = {{0}};
+	char *bytes[SENT];
+	assert_int_equal(b.count, SENT);
+	for (size_t i = 0; i < SENT; i++) {
+		assert_true(is_in(&b, sent_names[i]));
+		snprintf(path, sizeof path, "%s/nested/%s", folder, sent_names[i]);
+		FILE *f = fopen(path, "r");
+		assert_non_null(f);
+		bytes[i] = calloc(1, 1024);
+		files[i] = (struct memory_file){sent_names[i], bytes[i], fread(bytes[i], 1, 1023, f)};
+		assert_int_equal(fclose(f), 0);
+	}
+	scene_bundle_fini(&b);
+	struct scene s;
+	struct asset_source store = memory_assets(files);
+	if (scene_read(&s, &store, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	assert_string_equal(type_of(&s, "both"), "conductor");
+	assert_string_equal(type_of(&s, "up"), "conductor");
+	assert_string_equal(type_of(&s, "own"), "diffuse");
+	assert_int_equal(s.asset_count, SENT - 1);
+	/* What is there, but not below the scene's folder, stays closed. */
+	write_file("parts/own.xml", PART("<include filename='../../box/box.xml'/>"));
+	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
+	assert_int_equal(scene_bundle_read(&b, path, &o, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "../box/box.xml: leads out of the scene's folder"));
+	scene_fini(&s);
+	for (size_t i = 0; i < SENT; i++)
+		free(bytes[i]);
+}
+
 static void cancel(uint64_t job)
 {
 	Farm__Cancel question;
@@ -231,8 +326,8 @@ static void one_job_is_waited_for(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(what_was_checked_is_sent),
-					   cmocka_unit_test(what_is_elsewhere_is_sent_too),
-					   cmocka_unit_test(one_job_is_waited_for)};
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(what_was_checked_is_sent), cmocka_unit_test(what_is_elsewhere_is_sent_too),
+		cmocka_unit_test(what_included_files_name_is_sent), cmocka_unit_test(one_job_is_waited_for)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
