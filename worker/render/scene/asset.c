@@ -8,8 +8,8 @@
  * scene's folder (asset_name_up) is resolved by its text alone, and opened if it ends below one of the other folders.
  *
  * Failures are one sentence in struct error: an absolute name or one that leads out (-EINVAL, with the --path that
- * would allow it), anything but a regular file, a file above 4 GB or one that shrinks while it is read. Kernels
- * without openat2 do not follow symbolic links at all.
+ * would allow it), one that is not there (-ENOENT, with the --path that would find it), anything but a regular file, a
+ * file above 4 GB or one that shrinks while it is read. Kernels without openat2 do not follow symbolic links at all.
  */
 #include "worker/render/scene/asset.h"
 
@@ -162,6 +162,7 @@ static int open_outside(const struct asset_folders *f, size_t up, const char *re
 			;
 	}
 	strcpy(shown + used, rest);
+	size_t top = end; /* the folder to which ".." leads: it has all that is named by as many */
 	snprintf(path + end, sizeof path - end, "/%s", rest);
 	int rc = 0;
 	for (size_t i = 0; i < f->count && (rc == 0 || rc == -ENOENT || rc == -ENOTDIR); i++) {
@@ -171,12 +172,9 @@ static int open_outside(const struct asset_folders *f, size_t up, const char *re
 	}
 	if (rc)
 		return rc;
-	*strrchr(path, '/') = 0;
-	return error_set(
-		e, EINVAL,
-		"%.256s: leads out of the scene's folder; to allow it, give --path %.400s or a folder that contains "
-		"it",
-		shown, *path ? path : "/");
+	*(top > 0 ? path + top : strrchr(path, '/')) = 0;
+	return error_set(e, EINVAL, "%.256s: leads out of the scene's folder; to allow that, give --path %.400s", shown,
+			 *path ? path : "/");
 }
 
 static int open_any(const struct asset_folders *f, const char *name, struct asset *out, struct error *e)
@@ -191,6 +189,32 @@ static int open_any(const struct asset_folders *f, const char *name, struct asse
 	return rc;
 }
 
+static bool has(const char *folder, const char *name)
+{
+	int fd = open_below(folder, name);
+	if (fd >= 0)
+		close(fd);
+	return fd >= 0;
+}
+
+/* Where else the file is, as --path would take it: below the current folder, from which the scene was perhaps
+ * written, or below one around the scene's. NULL: in none of them. */
+static const char *find_elsewhere(const char *scene_folder, const char *name, char path[PATH_MAX])
+{
+	enum { UP = 8 };
+	if (!is_below(name))
+		return NULL;
+	if (has(".", name))
+		return strcpy(path, ".");
+	char *end = realpath(*scene_folder ? scene_folder : ".", path) ? strrchr(path, '/') : NULL;
+	for (int i = 0; i < UP && end && end > path; i++, end = strrchr(path, '/')) {
+		*end = 0;
+		if (has(path, name))
+			return path;
+	}
+	return NULL;
+}
+
 /* For whoever may say --path. */
 static int search_open(void *user, const char *name, struct asset *out, struct error *e)
 {
@@ -199,8 +223,13 @@ static int search_open(void *user, const char *name, struct asset *out, struct e
 	int rc = open_any(f, name, out, e);
 	if (rc != -ENOENT || asset_name_up(name, &rest) > 0)
 		return rc;
-	return error_set(e, ENOENT, "%.256s: no such file in the scene's folder%s", name,
-			 f->count > 1 ? " or those of --path" : "; --path FOLDER searches there, too");
+	char path[PATH_MAX];
+	const char *there = find_elsewhere(f->folder[0], name, path);
+	return error_set(e, ENOENT, "%.256s: no such file in the scene's folder%s%s%.400s%s", name,
+			 f->count > 1 ? " or those of --path" : "", there ? "; --path " : "", there ? there : "",
+			 there		? " finds it"
+			 : f->count > 1 ? ""
+					: "; --path FOLDER searches there, too");
 }
 
 static int folder_open(void *user, const char *name, struct asset *out, struct error *e)

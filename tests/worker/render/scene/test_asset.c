@@ -257,7 +257,7 @@ static void test_outside_is_said(void **state)
 	snprintf(real, sizeof real, "%s", base);
 	free(base);
 	snprintf(wanted, sizeof wanted,
-		 "../common/a.png: leads out of the scene's folder; to allow it, give --path %s/common", real);
+		 "../common/a.png: leads out of the scene's folder; to allow that, give --path %s", real);
 	refuses("%2e%2e/common/a.png", wanted);
 	reads("%2e%2e/scene/a.obj", "inside");
 	refuses("%2e%2e/scene/none.obj", "../scene/none.obj: No such file");
@@ -273,10 +273,21 @@ static void test_outside_is_said(void **state)
 	more = asset_search(&f);
 	assert_int_equal(more.open(more.user, "none.obj", &a, &e), -ENOENT);
 	assert_string_equal(e.text, "none.obj: no such file in the scene's folder or those of --path");
+	/* what is in a folder around the scene's, or below the current one */
+	f = asset_folders_of(folder, NULL, 0);
+	assert_int_equal(own.open(own.user, "more/theirs", &a, &e), -ENOENT);
+	snprintf(wanted, sizeof wanted, "more/theirs: no such file in the scene's folder; --path %s finds it", real);
+	assert_string_equal(e.text, wanted);
+	char *before = getcwd(NULL, 0);
+	assert_true(before && chdir(root) == 0);
+	assert_int_equal(own.open(own.user, "more/theirs", &a, &e), -ENOENT);
+	assert_int_equal(chdir(before), 0);
+	free(before);
+	assert_string_equal(e.text, "more/theirs: no such file in the scene's folder; --path . finds it");
 	for (int i = 0; i < 64; i++)
 		strcat(deep, "%2e%2e/");
 	strcat(deep, "a");
-	refuses(deep, "give --path / ");
+	refuses(deep, "give --path /");
 }
 
 /* A file that is asked for again and again is opened once, and in the end all that was opened is closed. */
