@@ -360,7 +360,8 @@ void random_scene_make(struct random_scene *s, uint64_t number, const char *cons
 			  .count = count,
 			  .relief = number >= RANDOM_SCENES_WITH_RELIEF && number < RANDOM_SCENES_WITH_FOG,
 			  .fog = number >= RANDOM_SCENES_WITH_FOG};
-	PUT(&m, "<integrator type='path'><integer name='max_depth' value='%u'/></integrator>", 3 + dice_below(&m.d, 5));
+	PUT(&m, "<integrator type='volpath'><integer name='max_depth' value='%u'/></integrator>",
+	    3 + dice_below(&m.d, 5));
 	put_camera(&m);
 	bool room = chance(&m, 0.6);
 	put_wall(&m, "<rotate x='1' angle='-90'/>", "y='-1.6'");

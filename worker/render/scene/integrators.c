@@ -41,3 +41,14 @@ int64_t integrators_depth(const struct scene_node *n)
 		depth = node_int(n, "max_depth", depth_is_direct(n->type) ? SCENE_DIRECT_DEPTH : depth);
 	return depth;
 }
+
+const struct scene_node *integrators_without_media(const struct scene_node *n)
+{
+	static const char *const without[] = {"path", "direct",	   "direct_projective",
+					      "prb",  "prb_basic", "prb_projective"};
+	for (; n; n = integrators_inner(n))
+		for (size_t i = 0; i < sizeof without / sizeof *without; i++)
+			if (strcmp(n->type, without[i]) == 0)
+				return n;
+	return NULL;
+}

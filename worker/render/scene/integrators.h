@@ -14,4 +14,7 @@ bool integrators_show_other(const struct scene_node *n);
 /* Edges of the longest path, by the innermost that states them; -1: no limit. */
 int64_t integrators_depth(const struct scene_node *n);
 
+/* The first in n, or inside it, whose image has no media in Mitsuba; NULL: none. n may be NULL. */
+const struct scene_node *integrators_without_media(const struct scene_node *n);
+
 #endif

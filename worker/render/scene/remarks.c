@@ -77,16 +77,16 @@ static int on_boundary(struct report *r, const struct scene_node *n, bool dialec
 		"lets light through");
 }
 
-/* Mitsuba has integrators with and without media; here each scene is shown with them. */
+/* Which of the two, the setting `media` may have the last word. */
 static int on_media(struct report *r, const struct scene_node *integrator, struct error *e)
 {
-	static const char *const without[] = {"path", "direct", "prb"};
-	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
-		for (size_t i = 0; i < sizeof without / sizeof *without; i++)
-			if (strcmp(n->type, without[i]) == 0)
-				return remark(r, n, e, "Mitsuba's `%s` leaves media out; the image shows them",
-					      n->type);
-	return 0;
+	const struct scene_node *n = integrators_without_media(integrator);
+	if (!n)
+		return 0;
+	return remark(r, n, e,
+		      "Mitsuba's `%s` leaves media out: the image has them only with --set media=shown, or "
+		      "with `volpath` in its place",
+		      n->type);
 }
 
 static int on_emitter(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)

@@ -20,6 +20,7 @@
 #include "worker/render/scene/element.h"
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/id_table.h"
+#include "worker/render/scene/integrators.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"
 #include "worker/render/scene/notes.h"
@@ -494,6 +495,9 @@ static int make_scene(struct maker *m)
 					 m->error);
 	if (!r)
 		r = read_top(m, m->tree->root, objects);
+	for (uint32_t i = 0; i < s->object_count; i++)
+		s->without_media |=
+			objects[i]->cls == PLUGIN_INTEGRATOR && integrators_without_media(objects[i]) != NULL;
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
 		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
 	if (!r)

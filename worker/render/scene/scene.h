@@ -18,9 +18,10 @@
 
 struct scene {
 	struct arena arena;
-	const char *file; /* as it was opened */
-	bool dialect_3;	  /* version >= 2: Mitsuba 3 rules */
-	bool black_backs; /* of opaque materials without twosided, unless the setting `backs` says otherwise */
+	const char *file;   /* as it was opened */
+	bool dialect_3;	    /* version >= 2: Mitsuba 3 rules */
+	bool black_backs;   /* of opaque materials without twosided, unless the setting `backs` says otherwise */
+	bool without_media; /* Mitsuba's image has none, unless the setting `media` says otherwise */
 	uint32_t object_count;
 	const struct scene_node *const *objects; /* top level, in file order */
 	uint32_t asset_count;

@@ -22,7 +22,7 @@ struct scene_settings {
 	uint32_t max_depth;				  /* edges, 1..128 (-1 and more become 128); default 128 */
 	uint32_t roulette_depth; /* scattering events before Russian roulette begins, rr_depth; from 1 on, default 5 */
 	bool hide_emitters;	 /* hides paths of one edge, emitters seen directly */
-	char integrator[32];	 /* the scene's own ("": none): ignored except for its depths */
+	char integrator[32];	 /* the scene's own ("": none): ignored except for its depths and media */
 	/* perspective, thinlens */
 	mat4 to_world;	   /* camera: +z forward, +x LEFT on the image, +y up; without scale */
 	double half_width; /* above 0: orthographic, half of the film's width in scene units */

@@ -35,8 +35,9 @@ struct render_setting {
 /* NULL at the end. */
 const struct render_setting *render_setting_at(size_t index);
 
-enum { SETTING_DOUBLE, SETTING_SINGLE };			     /* precision */
-enum { SETTING_BACKS_AUTO, SETTING_BACKS_LIT, SETTING_BACKS_BLACK }; /* backs */
+enum { SETTING_DOUBLE, SETTING_SINGLE };			      /* precision */
+enum { SETTING_BACKS_AUTO, SETTING_BACKS_LIT, SETTING_BACKS_BLACK };  /* backs */
+enum { SETTING_MEDIA_AUTO, SETTING_MEDIA_SHOWN, SETTING_MEDIA_NONE }; /* media */
 
 struct accuracy_settings {
 #define SETTING(field, ...) double field;

@@ -31,6 +31,10 @@ SETTING(backs, "backs", SETTING_CHOICE, SETTING_WORLD, SETTING_BACKS_AUTO, SETTI
 	"auto lit black",
 	"Backs of opaque materials without twosided scatter light as their fronts do, or none; auto: none in files of 3.x",
 	NULL)
+SETTING(media, "media", SETTING_CHOICE, SETTING_WORLD, SETTING_MEDIA_AUTO, SETTING_MEDIA_AUTO, SETTING_MEDIA_NONE,
+	"auto shown none",
+	"Media are shown, or left out; auto: left out where the scene's own integrator leaves them out, such as path",
+	NULL)
 SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
 	"What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)
 SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000, NULL,

@@ -313,8 +313,10 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = find_effects(b, o ? o->max_depth : 0);
 	if (!rc)
 		rc = choose_emitters(b);
-	if (!rc)
+	if (!rc) {
 		unseen_note(b->w, b->boxes);
+		build_media_note(b);
+	}
 	if (!rc && !b->w->effects.colour)
 		set_grey(b->w);
 	return rc;

@@ -5,6 +5,8 @@
 #include "worker/render/volume/grid_file.h"
 #include "worker/render/world/node_table.h"
 
+#include <stdio.h>
+
 struct media_build {
 	struct node_table numbers;
 	struct grid_cache grids;
@@ -25,9 +27,17 @@ static int number_medium(struct builder *b, const struct scene_node *n, struct m
 	return rc ? build_go_on(b, rc) : 0;
 }
 
+static bool are_left_out(const struct builder *b)
+{
+	double media = b->w->accuracy.media;
+	return media > SETTING_MEDIA_AUTO ? media > SETTING_MEDIA_SHOWN : b->scene->without_media;
+}
+
 int build_media(struct builder *b)
 {
 	struct world *w = b->w;
+	if (are_left_out(b))
+		return 0;
 	struct media_build media = {.volumes = {.assets = b->assets,
 						.arena = &w->arena,
 						.cache = &media.grids,
@@ -54,6 +64,34 @@ int build_media(struct builder *b)
 			rc = number_medium(b, node_ref(n, "exterior"), &media, &w->parts[i].exterior);
 	}
 	return rc ? rc : number_medium(b, camera, &media, &w->camera_medium);
+}
+
+/* Whether some shape ends it, or it ends by itself. */
+static bool is_bounded(const struct world *w, uint32_t medium)
+{
+	const struct medium *m = &w->media[medium - 1];
+	if (volume_varies(&m->first) || !(m->absorbs || m->scatters))
+		return true;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (w->parts[i].interior == medium)
+			return true;
+	return false;
+}
+
+void build_media_note(struct builder *b)
+{
+	struct world *w = b->w;
+	if (!w->camera_medium || is_bounded(w, w->camera_medium))
+		return;
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (w->emitters[i].infinite) {
+			snprintf(
+				w->notes.endless, sizeof w->notes.endless,
+				"the medium around the camera ends nowhere, so that no light of the `%s` emitter, or of "
+				"any other at infinity, gets through; a shape that has it inside would end it",
+				w->emitters[i].ops->type);
+			return;
+		}
 }
 
 /* The medium on this side of the next surface along d that states one. Where none does, it is the camera's. */

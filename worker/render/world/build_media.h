@@ -10,6 +10,8 @@
 #include "worker/render/world/build_private.h"
 
 int build_media(struct builder *b);
+/* After the emitters: sets w->notes.endless if one around the camera hides what shines from infinity. */
+void build_media_note(struct builder *b);
 /* After Embree's tree: which shapes light passes without a vertex, and the media around emitters. */
 int build_scattering(struct builder *b);
 

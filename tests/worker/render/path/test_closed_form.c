@@ -146,7 +146,7 @@ static void test_absorbing(void **state)
 		"absorbing slabs",
 		world_of_text(
 			16, 16,
-			"%s<integrator type='path'><integer name='max_depth' value='16'/><integer name='rr_depth' "
+			"%s<integrator type='volpath'><integer name='max_depth' value='16'/><integer name='rr_depth' "
 			"value='16'/></integrator>" SKY
 			"<medium type='homogeneous' id='haze'><spectrum name='sigma_t' value='0.25'/><float name='scale' value='2'/>"
 			"<spectrum name='albedo' value='0'/><phase type='isotropic'/></medium>" SLAB(

@@ -199,7 +199,8 @@ static void test_notes_on_the_whole(void **state)
 		{"<integrator type='direct'/>",
 		 "s.xml:1: <integrator type=\"direct\">: the image shows light that is scattered once; --max-depth shows more"},
 		{"<integrator type='path'/><shape type='sphere'><medium type='homogeneous' name='interior'/></shape>",
-		 "s.xml:1: <integrator type=\"path\">: Mitsuba's `path` leaves media out; the image shows them"},
+		 "s.xml:1: <integrator type=\"path\">: Mitsuba's `path` leaves media out: the image has them only "
+		 "with --set media=shown, or with `volpath` in its place"},
 		{"<integrator type='aov'><integrator type='path'/></integrator><sensor type='perspective'>"
 		 "<medium type='homogeneous'/></sensor>",
 		 "Mitsuba's `path` leaves media out"},
