@@ -436,6 +436,8 @@ static int read_include(struct reader *r, struct xml_element *el)
 	int c = at_top ? 0 : element_check(el, "filename", false, r->error);
 	if (c)
 		return c;
+	if (r->tree->missing_count && strchr(name, '$')) /* which is the problem, and has been noted */
+		return 0;
 	if (r->includes >= XML_INCLUDE_MAX)
 		return xml_error(el, r->error, ELOOP, "files include each other more than %d deep", XML_INCLUDE_MAX);
 	if (r->tree->include_count >= XML_FILES_MAX)

@@ -213,7 +213,7 @@ int volume_from_node(struct volume *v, const struct scene_node *n, const char *n
 			return read_grid(v, n, role, b, e);
 		p = node_find(n, "value");
 		if (!p && !b->dialect_3)
-			return node_error(n, e, EINVAL, "needs a value");
+			return node_error(n, e, EINVAL, "needs a value; --lenient leaves it out");
 		v->color = color_constant(1);
 	}
 	struct error reason;

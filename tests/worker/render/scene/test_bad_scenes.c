@@ -348,18 +348,20 @@ static void test_names_without_values(void **state)
 	(void)state;
 	static const char xml[] =
 		S "\n<default name='there' value='1'/><shape type='$kind'><float name='radius' value='$r'/>\n"
-		  "<float name='x' value='$there'/><float name='y' value='$there$hte'/></shape><bsdf type='$r'/>" END;
+		  "<float name='x' value='$there'/><float name='y' value='$there$hte'/></shape><bsdf type='$r'/>\n"
+		  "<include filename='$part.xml'/><bsdf type='mask'><include filename='a/$part.xml'/></bsdf>" END;
 	static const char *const said[] = {
 		"s.xml:2: <shape>: attribute `type`: $kind is not defined",
 		"s.xml:2: <float>: attribute `value`: $r is not defined by a <default> before this line; -D r=VALUE",
-		"s.xml:3: <float>: attribute `value`: $hte is not defined"};
+		"s.xml:3: <float>: attribute `value`: $hte is not defined",
+		"s.xml:4: <include>: attribute `filename`: $part is not defined"};
 	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
 	struct error e;
 	assert_int_equal(scene_read_all(&s, &assets, "s.xml", scene_tables(), NULL, 0, false, &e), 0);
-	assert_int_equal(s.problem_count, 3);
-	for (size_t i = 0; i < 3; i++)
+	assert_int_equal(s.problem_count, 4);
+	for (size_t i = 0; i < 4; i++)
 		if (strncmp(s.problems[i], said[i], strlen(said[i])) != 0)
 			fail_msg("%s\n not: %s", s.problems[i], said[i]);
 	scene_fini(&s);
