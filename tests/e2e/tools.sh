@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # hslt-compare and hslt-tonemap as programs: exit codes, what they print, the files they leave.
 . "$(dirname "$0")/lib.sh"
-need hslt-render hslt-compare hslt-tonemap
+need hslt-render hslt-compare hslt-tonemap hslt-assemble hslt-accuracy hslt-submit
 
 render() { # FILE SEED SIZE
 	code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/$1.exr" --integrator path --spp 4 --seed "$2" --size "$3" --threads 1 --quiet --stats /dev/null
@@ -21,9 +21,12 @@ render a 1 32x32
 render again 1 32x32
 render other 2 32x32
 render large 1 64x64
-mkdir "$DIR/folder" && echo old >"$DIR/folder/real.exr" && ln -s folder/real.exr "$DIR/link.exr"
+mkdir "$DIR/folder" && cp "$DIR/other.exr" "$DIR/folder/real.exr" && ln -s folder/real.exr "$DIR/link.exr"
 render link 1 32x32
 "$BIN/hslt-render" "$BOX" -o - --integrator path --spp 4 --seed 1 --size 32x32 --threads 1 >"$DIR/stdout.exr" 2>"$DIR/err.log" || fail "-o -: $(cat "$DIR/err.log")"
+cp "$BOX" "$DIR/scene.xml"
+cp "$BOX" "$DIR/box.xml"
+cp -r "${BOX%/*}/meshes" "$DIR"
 cd "$DIR"
 code 0 "$BIN/hslt-compare" --exact a.exr again.exr
 code 0 "$BIN/hslt-compare" --exact a.exr stdout.exr
@@ -62,4 +65,38 @@ code 1 "$BIN/hslt-tonemap" a.exr none/a.png
 # 8 bytes of signature, then IHDR with the size
 [ "$(od -An -tx1 -j0 -N8 a.png | tr -d ' ')" = 89504e470d0a1a0a ] || fail "a.png is no PNG"
 [ "$(od -An -tx1 -j16 -N8 heat.png | tr -d ' ')" = 0000001000000010 ] || fail "heat.png is not 16x16"
+
+# kept FILE SENTENCE COMMAND...: it fails, says why, and leaves the file as it was
+kept() {
+	file=$1 sentence=$2
+	shift 2
+	cp "$file" before
+	code 1 "$@"
+	grep -q -- "$sentence" err.log || fail "$* says: $(cat err.log)"
+	cmp "$file" before || fail "$* has changed $file"
+}
+ln -s scene.xml link.xml
+ln -s a.exr link.png
+kept scene.xml 'which is an input' "$BIN/hslt-render" scene.xml -o scene.xml
+kept scene.xml 'which is an input' "$BIN/hslt-render" link.xml -o link.xml
+kept scene.xml 'scene.xml exists and is not an OpenEXR file' "$BIN/hslt-render" box.xml -o scene.xml
+kept scene.xml 'not a file of statistics' "$BIN/hslt-render" box.xml -o new.exr --stats scene.xml
+kept scene.xml 'are the same file' "$BIN/hslt-render" scene.xml -o new.exr --stats ./new.exr
+kept a.exr 'which is an input' "$BIN/hslt-compare" a.exr other.exr --heatmap a.exr
+kept again.exr 'not a PNG file' "$BIN/hslt-compare" a.exr other.exr --heatmap again.exr
+kept a.exr 'which is an input' "$BIN/hslt-assemble" a.exr -o ./a.exr
+kept scene.xml 'not an OpenEXR file' "$BIN/hslt-assemble" a.exr -o scene.xml
+kept link.png "which is an input" "$BIN/hslt-tonemap" a.exr link.png
+kept scene.xml 'not a PNG file' "$BIN/hslt-tonemap" a.exr scene.xml
+kept scene.xml 'not an HTML file' "$BIN/hslt-accuracy" box.xml -o scene.xml
+kept scene.xml 'are the same file' "$BIN/hslt-accuracy" scene.xml -o r.html --csv r.html
+kept scene.xml 'which is an input' "$BIN/hslt-submit" -c 127.0.0.1:1 scene.xml -o scene.xml --wait
+# a file that the scene names is an input, too
+cp other.exr sky.exr
+cp other.exr lamp.exr
+sed 's|</scene>|<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter></scene>|' box.xml >sky.xml
+kept sky.exr 'would replace sky.exr, which is an input' "$BIN/hslt-render" sky.xml -o sky.exr
+kept sky.exr 'would replace sky.exr, which is an input' "$BIN/hslt-submit" -c 127.0.0.1:1 sky.xml -o sky.exr --wait
+code 0 "$BIN/hslt-render" sky.xml -o lamp.exr --integrator path --spp 4 --size 8x8 --quiet --stats s.json
+code 0 "$BIN/hslt-render" sky.xml -o lamp.exr --integrator path --spp 4 --size 8x8 --quiet --stats s.json
 echo "compare and tonemap: exit codes and files"

@@ -181,7 +181,8 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 		return error_set(e, ENOMEM, "%s: cannot be mapped", name);
 	}
 	*map = (struct mapping){st.st_size > 0 ? at : NULL, (size_t)st.st_size};
-	*out = (struct asset){st.st_size > 0 ? at : (const unsigned char *)"", (size_t)st.st_size, map};
+	*out = (struct asset){
+		.bytes = st.st_size > 0 ? at : (const unsigned char *)"", .size = (size_t)st.st_size, .handle = map};
 	return 0;
 }
 

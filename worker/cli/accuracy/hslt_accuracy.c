@@ -8,9 +8,10 @@
 #include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/base/progress.h"
-#include "common/exr/image_file.h"
+#include "common/exr/output_files.h"
 #include "worker/cli/accuracy/accuracy_csv.h"
 #include "worker/cli/accuracy/accuracy_html.h"
+#include "worker/cli/base/guarded_source.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
 
@@ -93,6 +94,8 @@ struct session {
 	struct scene scene;
 	bool scene_read, usage; /* usage: the command line is wrong */
 	struct asset_folders folders;
+	struct output_files outputs;
+	struct guarded_source files;
 	struct asset_source assets;
 	struct render_summary summary;
 	struct accuracy_design design;
@@ -117,7 +120,7 @@ static int load(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	s->folders = option_folders(r, s->folder);
-	s->assets = asset_search(&s->folders);
+	s->assets = guarded_source(&s->files, asset_search(&s->folders), &s->outputs);
 	rc = option_scene_read(&s->scene, &s->assets, s->name, r, e);
 	if (rc)
 		return rc;
@@ -217,9 +220,9 @@ static void print_summary(const struct session *s)
 
 static int run_session(struct session *s, struct error *e)
 {
-	int rc = image_file_probe(s->a->output, e);
-	if (!rc && s->a->csv)
-		rc = image_file_probe(s->a->csv, e);
+	const char *inputs[] = {s->a->scene, s->a->reference};
+	s->outputs = (struct output_files){{{"-o", s->a->output, OUTPUT_HTML}, {"--csv", s->a->csv, OUTPUT_CSV}}};
+	int rc = output_files_check(&s->outputs, inputs, 2, e);
 	if (!rc && s->a->reference)
 		rc = picture_read(&s->reference, s->a->reference, e);
 	if (!rc)

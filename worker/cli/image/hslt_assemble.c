@@ -3,6 +3,7 @@
 #include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/exr/image_file.h"
+#include "common/exr/output_files.h"
 #include "worker/cli/image/assemble.h"
 
 #include <stdio.h>
@@ -58,7 +59,10 @@ int main(int argc, char **argv)
 	bool disagree = false;
 	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
-	int rc = assemble(a.crops, a.count, &bytes, &size, &disagree, &e);
+	struct output_files outputs = {{{"-o", a.out, OUTPUT_EXR}}};
+	int rc = output_files_check(&outputs, a.crops, a.count, &e);
+	if (!rc)
+		rc = assemble(a.crops, a.count, &bytes, &size, &disagree, &e);
 	if (!rc)
 		rc = image_file_write(a.out, bytes, size, &e);
 	mem_free(bytes);

@@ -10,6 +10,7 @@
 #include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/estimate/stated_error.h"
+#include "common/exr/output_files.h"
 #include "worker/cli/image/compare.h"
 #include "worker/cli/image/compare_exact.h"
 
@@ -190,7 +191,10 @@ int main(int argc, char **argv)
 	int code = 0;
 	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
-	int rc = picture_read(&p[0], a.path[0], &e);
+	struct output_files outputs = {{{"--heatmap", a.heatmap, OUTPUT_PNG}}};
+	int rc = output_files_check(&outputs, a.path, 2, &e);
+	if (rc == 0)
+		rc = picture_read(&p[0], a.path[0], &e);
 	if (rc == 0)
 		rc = picture_read(&p[1], a.path[1], &e);
 	if (rc == 0)

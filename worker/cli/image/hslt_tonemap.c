@@ -3,6 +3,7 @@
 #include "common/base/output.h"
 #include "common/base/picture_name.h"
 #include "common/base/program.h"
+#include "common/exr/output_files.h"
 #include "worker/cli/image/picture.h"
 #include "worker/cli/image/tonemap.h"
 
@@ -56,7 +57,10 @@ static const struct program program = {
 static int tonemap_file(const struct arguments *a, struct error *e)
 {
 	struct picture p;
-	int rc = picture_read(&p, a->in, e);
+	struct output_files outputs = {{{"the output", a->out, OUTPUT_PNG}}};
+	int rc = output_files_check(&outputs, &a->in, 1, e);
+	if (!rc)
+		rc = picture_read(&p, a->in, e);
 	if (rc)
 		return rc;
 	size_t pixels = (size_t)p.image.width * p.image.height;

@@ -22,6 +22,7 @@
 #include "worker/cli/render/explain.h"
 #include "worker/cli/render/kept_bootstrap.h"
 #include "worker/cli/render/local_pilot.h"
+#include "worker/cli/base/guarded_source.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
 #include "worker/cli/render/pilot.h"
@@ -123,6 +124,8 @@ struct session {
 	struct choice choice;
 	struct progress progress;
 	struct kept_bootstrap kept;
+	struct output_files outputs;
+	struct guarded_source files;
 	bool usage; /* the command line is wrong */
 };
 
@@ -134,7 +137,8 @@ static int load(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	struct asset_folders folders = option_folders(&s->a->render, s->folder);
-	struct asset_source files = asset_search(&folders), assets = kept_bootstrap_source(&s->kept, &files);
+	struct asset_source files = guarded_source(&s->files, asset_search(&folders), &s->outputs),
+			    assets = kept_bootstrap_source(&s->kept, &files);
 	rc = option_scene_read(&scene, &assets, s->name, &s->a->render, e);
 	if (rc)
 		return rc;
@@ -354,9 +358,7 @@ static int report(const struct session *s, const struct local_pilot *p, struct e
 
 static int estimate(struct session *s, struct error *e)
 {
-	int rc = s->a->plot ? image_file_probe(s->a->plot, e) : 0;
-	if (!rc)
-		rc = load(s, e);
+	int rc = load(s, e);
 	if (!rc) {
 		rc = pilot_plan_from_scene(&s->a->render, &s->summary, e);
 		s->usage = rc == -EINVAL;
@@ -381,17 +383,25 @@ static int estimate(struct session *s, struct error *e)
 	return rc ? rc : report(s, &p, e);
 }
 
+static int check_outputs(struct session *s, struct error *e)
+{
+	const struct arguments *a = s->a;
+	s->outputs = (struct output_files){{
+		{"-o", a->output, OUTPUT_EXR},
+		{"--stats", a->stats, OUTPUT_JSON},
+		{"--plot", a->plot, output_format_of_plot(a->plot ? a->plot : "")},
+	}};
+	return output_files_check(&s->outputs, &a->scene, 1, e);
+}
+
 static int run_session(struct session *s, struct error *e)
 {
-	if (s->a->estimate)
-		return estimate(s, e);
 	if (s->a->explain)
 		return explain(s->a->scene, &s->a->render, s->a->json, &s->usage, e);
-	int rc = image_file_probe(s->a->output, e);
-	if (!rc && s->a->stats)
-		rc = image_file_probe(s->a->stats, e);
-	if (!rc)
-		rc = load(s, e);
+	int rc = check_outputs(s, e);
+	if (rc || s->a->estimate)
+		return rc ? rc : estimate(s, e);
+	rc = load(s, e);
 	if (!rc)
 		rc = make_plan(s, e);
 	if (!rc)

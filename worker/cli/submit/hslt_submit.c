@@ -10,7 +10,6 @@
 #include "common/base/crash.h"
 #include "common/base/output.h"
 #include "common/base/program.h"
-#include "common/exr/image_file.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/render/choice.h"
 #include "worker/cli/render/estimate.h"
@@ -247,9 +246,11 @@ int main(int argc, char **argv)
 	output_check_at_exit();
 	crash_exit("hslt-submit");
 	program_options(&program, argc, argv, &a);
-	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;
+	struct output_files outputs = {{{"-o", a.wait ? a.output : NULL, OUTPUT_EXR},
+					{"--plot", a.plot, output_format_of_plot(a.plot ? a.plot : "")}}};
+	int rc = output_files_check(&outputs, &a.scene, 1, &e);
 	if (!rc)
-		rc = scene_bundle_read(&b, a.scene, &a.render, &e);
+		rc = scene_bundle_read(&b, a.scene, &a.render, &outputs, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		return 1;

@@ -13,6 +13,7 @@
 #include "common/base/progress.h"
 #include "common/base/text.h"
 #include "common/wire/plan_wire.h"
+#include "worker/cli/base/guarded_source.h"
 #include "worker/cli/base/options.h"
 
 #include <math.h>
@@ -75,7 +76,8 @@ static int copy_notes(struct scene_bundle *b, const struct scene *s, struct erro
 	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
 }
 
-int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a, struct error *e)
+int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a,
+		      const struct output_files *outputs, struct error *e)
 {
 	struct scene scene;
 	memset(b, 0, sizeof *b);
@@ -83,7 +85,8 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_ar
 	if (rc)
 		return rc;
 	b->folders = option_folders(a, b->folder);
-	struct opened opened = {asset_search(&b->folders), b};
+	struct guarded_source files;
+	struct opened opened = {guarded_source(&files, asset_search(&b->folders), outputs), b};
 	struct asset_source assets = {.user = &opened, .open = open_remembered, .close = close_remembered};
 	rc = option_scene_read(&scene, &assets, b->scene, a, e);
 	if (!rc) {

@@ -9,6 +9,7 @@
 #include "common/estimate/forecast.h"
 #include "common/blob/blob.h"
 #include "common/net/client.h"
+#include "common/exr/output_files.h"
 #include "common/plan/plan.h"
 #include "worker/cli/base/options.h"
 
@@ -29,8 +30,9 @@ struct scene_bundle {
 };
 
 /* Reads and checks the scene with everything that it needs; files that building its world did not need are not part
- * of the bundle. The error names file, line and element. */
-int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a, struct error *e);
+ * of the bundle. No output may replace one of them. The error names file, line and element. */
+int scene_bundle_read(struct scene_bundle *b, const char *path, struct render_arguments *a,
+		      const struct output_files *outputs, struct error *e);
 void scene_bundle_fini(struct scene_bundle *b);
 
 struct submit_request {

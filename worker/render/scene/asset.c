@@ -115,7 +115,7 @@ static int read_all(int fd, const char *name, struct asset *out, struct error *e
 		}
 		used += (size_t)n;
 	}
-	*out = (struct asset){.bytes = bytes, .size = size, .handle = bytes};
+	*out = (struct asset){.bytes = bytes, .size = size, .handle = bytes, .device = st.st_dev, .inode = st.st_ino};
 	return 0;
 }
 

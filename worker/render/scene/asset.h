@@ -9,11 +9,13 @@
 #include "common/base/error.h"
 
 #include <stddef.h>
+#include <stdint.h>
 
 struct asset {
 	const unsigned char *bytes;
 	size_t size;
 	void *handle;
+	uint64_t device, inode; /* which file it is, from a folder */
 };
 
 struct picture_cache; /* worker/render/texture/picture_cache.h */

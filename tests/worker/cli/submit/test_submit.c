@@ -28,6 +28,7 @@
 
 static char scene[96], mesh[128], secret[96], kept[96], address[32];
 static pid_t pid;
+static const struct output_files none; /* that could replace an input */
 
 static void serve(const char *listen, const char *spool, const char *port_file)
 {
@@ -129,7 +130,7 @@ static void what_was_checked_is_sent(void **state)
 	static struct render_arguments o; /* large */
 	o.render.max_depth = 4;
 	struct error e;
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), 0);
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
 	assert_int_equal(b.count, 2);
 	assert_string_equal(b.files[0].name, "box.xml");
 	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
@@ -159,9 +160,9 @@ static void what_is_elsewhere_is_sent_too(void **state)
 	snprintf(moved, sizeof moved, "%s/meshes/wedge.obj", library);
 	assert_int_equal(rename(mesh, moved), 0);
 	o.render.max_depth = 4;
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), -ENOENT);
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), -ENOENT);
 	o.paths[o.path_count++] = library;
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), 0);
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
 	assert_int_equal(b.count, 2);
 	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
 	assert_string_equal(sent(&b), "");
@@ -228,7 +229,7 @@ static void what_included_files_name_is_sent(void **state)
 	struct error e;
 	o.render.max_depth = 4;
 	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
-	if (scene_bundle_read(&b, path, &o, &e))
+	if (scene_bundle_read(&b, path, &o, &(struct output_files){0}, &e))
 		fail_msg("%s", e.text);
 	struct memory_file files[SENT + 1] = {{0}};
 	char *bytes[SENT];
@@ -254,7 +255,7 @@ static void what_included_files_name_is_sent(void **state)
 	/* What is there, but not below the scene's folder, stays closed. */
 	write_file("parts/own.xml", PART("<include filename='../../box/box.xml'/>"));
 	snprintf(path, sizeof path, "%s/nested/s.xml", folder);
-	assert_int_equal(scene_bundle_read(&b, path, &o, &e), -EINVAL);
+	assert_int_equal(scene_bundle_read(&b, path, &o, &(struct output_files){0}, &e), -EINVAL);
 	assert_non_null(strstr(e.text, "../box/box.xml: leads out of the scene's folder"));
 	scene_fini(&s);
 	for (size_t i = 0; i < SENT; i++)
@@ -297,7 +298,7 @@ static void one_job_is_waited_for(void **state)
 	struct submitted job, other;
 	struct error e;
 	char same[32];
-	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), 0);
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &none, &e), 0);
 	struct client *cl = call(), *later = call();
 	assert_int_equal(send_to(cl, &b, &job, &e), 0);
 	snprintf(same, sizeof same, "%s", address);

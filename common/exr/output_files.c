@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/exr/output_files.h"
+
+#include "common/base/picture_name.h"
+#include "common/base/target.h"
+#include "common/exr/image_file.h"
+
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { BEGINNING = 1024 };
+
+static bool is_exr(const char *begin)
+{
+	return memcmp(begin, "\x76\x2f\x31\x01", 4) == 0;
+}
+
+static bool is_png(const char *begin)
+{
+	return memcmp(begin, "\x89PNG\r\n\x1a\n", 8) == 0;
+}
+
+static bool is_svg(const char *begin)
+{
+	return strstr(begin, "<svg") != NULL;
+}
+
+static bool is_html(const char *begin)
+{
+	return strncasecmp(begin, "<!doctype html", 14) == 0;
+}
+
+/* The first column of the figures. */
+static bool is_csv(const char *begin)
+{
+	return strncmp(begin, "setting,", 8) == 0;
+}
+
+static bool is_statistics(const char *begin)
+{
+	return *begin == '{' && strncmp(begin + 1 + strspn(begin + 1, " \t\r\n"), "\"schema\"", 8) == 0;
+}
+
+static const struct {
+	const char *noun;
+	bool (*is)(const char *begin); /* BEGINNING bytes, zeros after the end of the file, and a final zero */
+} formats[] = {
+	[OUTPUT_EXR] = {"an OpenEXR file", is_exr},
+	[OUTPUT_PNG] = {"a PNG file", is_png},
+	[OUTPUT_SVG] = {"an SVG file", is_svg},
+	[OUTPUT_HTML] = {"an HTML file", is_html},
+	[OUTPUT_CSV] = {"a table of hslt-accuracy", is_csv},
+	[OUTPUT_JSON] = {"a file of statistics", is_statistics},
+};
+
+/* A file that exists is known by device and inode, another one by its path without links. */
+struct place {
+	bool exists, regular;
+	dev_t device;
+	ino_t inode;
+	char path[PATH_MAX + TARGET_PATH];
+};
+
+/* The folder's path without links, and the name in it. Where there is no such folder, nothing can be written. */
+static void find_new(struct place *p, const char *path)
+{
+	char folder[TARGET_PATH], real[PATH_MAX];
+	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+	snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
+	snprintf(p->path, sizeof p->path, "%s/%s", realpath(folder, real) ? real : folder, name);
+}
+
+static int find(struct place *p, const char *path, struct error *e)
+{
+	struct stat st;
+	struct target t;
+	*p = (struct place){0};
+	int rc = target_find(&t, path, e);
+	if (rc)
+		return rc;
+	if (t.descriptor >= 0 ? fstat(t.descriptor, &st) : stat(t.path, &st)) {
+		find_new(p, t.path);
+		return 0;
+	}
+	p->exists = true;
+	p->regular = S_ISREG(st.st_mode);
+	p->device = st.st_dev;
+	p->inode = st.st_ino;
+	return 0;
+}
+
+static bool is_same(const struct place *a, const struct place *b)
+{
+	if (a->exists != b->exists)
+		return false;
+	if (!a->exists)
+		return strcmp(a->path, b->path) == 0;
+	return a->regular && b->regular && a->device == b->device && a->inode == b->inode;
+}
+
+static int refuse_input(const struct output_file *f, const char *input, struct error *e)
+{
+	return error_set(e, EINVAL, "%s %s would replace %s, which is an input", f->option, f->path, input);
+}
+
+static int check_inputs(const struct output_file *f, const struct place *p, const char *const *inputs, size_t count,
+			struct error *e)
+{
+	for (size_t i = 0; p->regular && i < count; i++) {
+		struct stat st;
+		if (inputs[i] && stat(inputs[i], &st) == 0 && st.st_dev == p->device && st.st_ino == p->inode)
+			return refuse_input(f, inputs[i], e);
+	}
+	return 0;
+}
+
+/* A file that cannot be read is not known to be of another format. */
+static int check_format(const struct output_file *f, struct error *e)
+{
+	char begin[BEGINNING + 1] = "";
+	struct target t;
+	int rc = target_find(&t, f->path, e);
+	if (rc || t.through)
+		return rc;
+	int fd = open(t.path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+	if (fd < 0)
+		return 0;
+	ssize_t n = read(fd, begin, BEGINNING);
+	close(fd);
+	if (n <= 0 || formats[f->format].is(begin))
+		return 0;
+	return error_set(e, EEXIST, "%s exists and is not %s; it is not replaced", f->path, formats[f->format].noun);
+}
+
+int output_files_check(const struct output_files *o, const char *const *inputs, size_t input_count, struct error *e)
+{
+	struct place places[OUTPUT_FILES_MOST];
+	const struct output_file *f = o->files;
+	for (size_t i = 0; i < OUTPUT_FILES_MOST; i++) {
+		if (!f[i].path)
+			continue;
+		int rc = find(&places[i], f[i].path, e);
+		if (!rc)
+			rc = check_inputs(&f[i], &places[i], inputs, input_count, e);
+		for (size_t j = 0; !rc && j < i; j++)
+			if (f[j].path && is_same(&places[i], &places[j]))
+				rc = error_set(e, EINVAL, "%s and %s are the same file, %s", f[j].option, f[i].option,
+					       f[i].path);
+		if (!rc)
+			rc = check_format(&f[i], e);
+		if (!rc)
+			rc = image_file_probe(f[i].path, e);
+		if (rc)
+			return rc;
+	}
+	return 0;
+}
+
+int output_files_check_read(const struct output_files *o, uint64_t device, uint64_t inode, const char *name,
+			    struct error *e)
+{
+	for (size_t i = 0; i < OUTPUT_FILES_MOST; i++) {
+		const struct output_file *f = &o->files[i];
+		struct stat st;
+		if (f->path && stat(f->path, &st) == 0 && S_ISREG(st.st_mode) && st.st_dev == device &&
+		    st.st_ino == inode)
+			return refuse_input(f, name, e);
+	}
+	return 0;
+}
+
+enum output_format output_format_of_plot(const char *path)
+{
+	const char *format = picture_name_format(path);
+	return format && strcmp(format, ".png") == 0 ? OUTPUT_PNG : OUTPUT_SVG;
+}

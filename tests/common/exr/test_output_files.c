@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Outputs that would destroy an input, each other or a file of another format are refused; all else is not. */
+#include "common/exr/output_files.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static char folder[64];
+
+static int enter(void **state)
+{
+	(void)state;
+	snprintf(folder, sizeof folder, "/tmp/hslt-outputs.XXXXXX");
+	return mkdtemp(folder) && chdir(folder) == 0 && mkdir("a", 0700) == 0 ? 0 : -1;
+}
+
+static int leave(void **state)
+{
+	(void)state;
+	char command[128];
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return chdir("/") || system(command);
+}
+
+static void put(const char *path, const char *text)
+{
+	FILE *f = fopen(path, "w");
+	assert_non_null(f);
+	fputs(text, f);
+	assert_int_equal(fclose(f), 0);
+}
+
+static int check(const struct output_files *o, const char *input, struct error *e)
+{
+	return output_files_check(o, &input, 1, e);
+}
+
+static void refuses(const struct output_files *o, const char *input, const char *sentence)
+{
+	struct error e = {""};
+	assert_true(check(o, input, &e) < 0);
+	if (!strstr(e.text, sentence))
+		fail_msg("'%s', not '%s'", e.text, sentence);
+}
+
+static void accepts(const struct output_files *o, const char *input)
+{
+	struct error e = {""};
+	if (check(o, input, &e))
+		fail_msg("%s", e.text);
+}
+
+static void test_input(void **state)
+{
+	(void)state;
+	put("in.exr", "\x76\x2f\x31\x01");
+	assert_int_equal(symlink("in.exr", "link.exr"), 0);
+	assert_int_equal(link("in.exr", "hard.exr"), 0);
+	static const char *const names[] = {"in.exr", "./a/../in.exr", "link.exr", "hard.exr"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+		refuses(&(struct output_files){{{"-o", names[i], OUTPUT_EXR}}}, "in.exr", "which is an input");
+		refuses(&(struct output_files){{{"-o", "in.exr", OUTPUT_EXR}}}, names[i], "which is an input");
+	}
+	accepts(&(struct output_files){{{"-o", "out.exr", OUTPUT_EXR}}}, "in.exr");
+	accepts(&(struct output_files){{{"-o", "/dev/null", OUTPUT_EXR}}}, "/dev/null");
+	accepts(&(struct output_files){{{"-o", NULL, OUTPUT_EXR}}}, "in.exr");
+	accepts(&(struct output_files){{{"-o", "out.exr", OUTPUT_EXR}}}, "none.exr");
+	struct stat st;
+	struct error e;
+	struct output_files o = {{{"-o", "link.exr", OUTPUT_EXR}}};
+	assert_int_equal(stat("in.exr", &st), 0);
+	assert_int_equal(output_files_check_read(&o, st.st_dev, st.st_ino, "in.exr", &e), -EINVAL);
+	assert_string_equal(e.text, "-o link.exr would replace in.exr, which is an input");
+	assert_int_equal(stat("a", &st), 0);
+	assert_int_equal(output_files_check_read(&o, st.st_dev, st.st_ino, "a", &e), 0);
+}
+
+static void test_two_outputs(void **state)
+{
+	(void)state;
+	assert_int_equal(symlink("new.exr", "to_new"), 0);
+	static const char *const names[] = {"new.exr", "./new.exr", "a/../new.exr", "to_new"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		refuses(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", names[i], OUTPUT_JSON}}},
+			NULL, "-o and --stats are the same file");
+	accepts(&(struct output_files){{{"-o", "new.exr", OUTPUT_EXR}, {"--stats", "a/new.exr", OUTPUT_JSON}}}, NULL);
+	accepts(&(struct output_files){{{"-o", "/dev/null", OUTPUT_EXR}, {"--stats", "/dev/null", OUTPUT_JSON}}}, NULL);
+	assert_int_equal(access("new.exr", F_OK), -1); /* nothing is left behind */
+}
+
+static void test_formats(void **state)
+{
+	(void)state;
+	static const struct {
+		enum output_format format;
+		const char *begin, *noun;
+	} rows[] = {
+		{OUTPUT_EXR, "\x76\x2f\x31\x01\x02", "not an OpenEXR file"},
+		{OUTPUT_PNG, "\x89PNG\r\n\x1a\n", "not a PNG file"},
+		{OUTPUT_SVG, "<?xml version=\"1.0\"?>\n<svg width=\"1\">", "not an SVG file"},
+		{OUTPUT_HTML, "<!DOCTYPE html>\n<html>", "not an HTML file"},
+		{OUTPUT_CSV, "setting,parameter,value\n", "not a table of hslt-accuracy"},
+		{OUTPUT_JSON, "{\n  \"schema\": 1,", "not a file of statistics"},
+	};
+	enum { ROWS = sizeof rows / sizeof *rows };
+	for (size_t i = 0; i < ROWS; i++)
+		for (size_t j = 0; j < ROWS; j++) {
+			struct output_files o = {{{"-o", "file", rows[j].format}}};
+			put("file", rows[i].begin);
+			if (i == j)
+				accepts(&o, NULL);
+			else
+				refuses(&o, NULL, rows[j].noun);
+		}
+	for (size_t j = 0; j < ROWS; j++) {
+		struct output_files o = {{{"-o", "file", rows[j].format}}};
+		put("file", "<scene version=\"0.6.0\"/>");
+		refuses(&o, NULL, rows[j].noun);
+		put("file", "");
+		accepts(&o, NULL);
+	}
+	assert_int_equal(output_format_of_plot("cost.svg"), OUTPUT_SVG);
+	assert_int_equal(output_format_of_plot("cost.png"), OUTPUT_PNG);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_input),
+		cmocka_unit_test(test_two_outputs),
+		cmocka_unit_test(test_formats),
+	};
+	return cmocka_run_group_tests(tests, enter, leave);
+}

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The files of a scene, of which none may be an output of the command (common/exr/output_files.h). Any thread. */
+#ifndef WORKER_CLI_BASE_GUARDED_SOURCE_H
+#define WORKER_CLI_BASE_GUARDED_SOURCE_H
+
+#include "common/exr/output_files.h"
+#include "worker/render/scene/asset.h"
+
+struct guarded_source {
+	struct asset_source inner;
+	const struct output_files *outputs;
+};
+
+/* Opens as `inner` does; -EINVAL: an output would replace the file. g must outlive the result. */
+struct asset_source guarded_source(struct guarded_source *g, struct asset_source inner,
+				   const struct output_files *outputs);
+
+#endif
