@@ -67,8 +67,18 @@ if command -v gnuplot >/dev/null; then
 	grep -q '</svg>' "$DIR/plot.svg" || fail "the plot is no SVG"
 fi
 
+# As docs/guide.md has it: neither a bound nor an integrator.
+demo=$HERE/../scenes/demo/scene.xml
+plot=
+! command -v gnuplot >/dev/null || plot="--plot $DIR/cost.svg"
+estimates 2 "$BIN/hslt-render" --estimate "$demo" --size 320x180 $plot
+grep -q '^1 %' "$DIR/out" || fail "the table of the demo: $(cat "$DIR/out")"
+grep -q '^integrator .* chosen by a pilot' "$DIR/err.log" || fail "no integrator was chosen: $(cat "$DIR/err.log")"
+
 start_coordinator
 start_worker w1
+estimates 3 "$BIN/hslt-submit" --estimate "$BOX" --size 40x40
+grep -q '^1 %' "$DIR/out" || fail "the table of the farm: $(cat "$DIR/out")"
 estimates 3 "$BIN/hslt-submit" --estimate $BOX --integrator path --size 40x40 --epoch 2 --json --target-error 3%
 grep -q '"type":"estimate"' "$DIR/out" || fail "the farm's estimate: $(cat "$DIR/out")"
 set -- $(target "$DIR/out" 0.03 mutations)

@@ -443,6 +443,8 @@ static int film_of(const struct plan_request *r, struct plan *p, struct error *e
 	of.kind = PLAN_SAMPLES;
 	of.chains = 0;
 	of.groups = of.parts = 1;
+	if (!plan_request_is_bounded(&of)) /* estimates what errors will cost */
+		of.spp = 1;
 	int rc = plan_make(&of, p, e);
 	p->crop_x = p->crop_y = 0;
 	p->crop_width = p->width;
