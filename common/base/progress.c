@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 enum { BAR_MOST = 40, BAR_LEAST = 10, COLUMNS_ELSE = 80 };
-static const double line_seconds = 10, line_fraction = 0.1;
+static const double line_seconds = 10, line_seconds_most = 60, line_fraction = 0.1;
 
 void progress_start(struct progress *p)
 {
@@ -44,6 +44,7 @@ void progress_show(struct progress *p, double fraction, const char *state, const
 	}
 	double t = clock_seconds();
 	bool due = p->shown < 0 || strcmp(state, p->state) != 0 || fraction >= p->shown + line_fraction ||
+		   t >= p->shown_time + line_seconds_most ||
 		   (fraction > p->shown && (t >= p->shown_time + line_seconds || fraction >= 1));
 	if (!due)
 		return;

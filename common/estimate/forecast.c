@@ -325,6 +325,15 @@ static void costs(struct plays *s, struct forecast_cost *c)
 	c->seconds = range_of(s->wall);
 }
 
+double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target)
+{
+	const struct forecast_look *end = last(h);
+	if (!end || p->kind != PLAN_SAMPLES || !(target > 0))
+		return 0;
+	bool rare = end->doubtful || stated_error_is_rare(sqrt(end->rel_mse), sqrt(end->rel_mse_upper));
+	return rare ? stated_error_rare_stop(target) : 0;
+}
+
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
 		     struct forecast_cost *c)
 {
@@ -336,6 +345,11 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	struct plays s;
 	double round = (double)plan_round_mutations(p);
 	bool same = run == FORECAST_SAME;
+	double stop = same ? forecast_stop_in_doubt(h, p, target) : 0;
+	if (stop > 0) { /* the estimate itself is compared */
+		target = stop;
+		f.margin = f.margin_sd = 0;
+	}
 	for (int i = 0; i < PLAYS; i++) {
 		struct play y = play_of(&f, &d);
 		s.rounds[i] = play_target(&f, &y, p, target, run, &d);

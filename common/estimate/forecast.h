@@ -58,7 +58,11 @@ const struct forecast_look *forecast_reached(const struct forecast_history *h, d
 bool forecast_error(const struct forecast_history *h, struct forecast_range *error);
 /* The error of a render after this much work. */
 bool forecast_error_at(const struct forecast_history *h, double work, struct forecast_range *error);
-/* When a render of plan p (its rounds; its bounds are ignored) will reach this target. */
+/* The estimate at which the render of these looks will stop because its error is in doubt and may stay so: below the
+ * target (stated_error_rare_stop). 0: it is not in doubt, or made of chains, whose doubt ends. */
+double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target);
+/* When a render of plan p (its rounds; its bounds are ignored) will reach this target. The looks of the same render
+ * also tell whether it has to go on until forecast_stop_in_doubt. */
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
 		     struct forecast_cost *c);
 /* The cost of halving the error, counted from the last look; rounds are those of p. */

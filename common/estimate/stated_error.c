@@ -102,6 +102,16 @@ double stated_error_upper(const struct canvas_image *img, bool *doubtful)
 	return small ? fmax(upper, rare_factor * error) : upper;
 }
 
+double stated_error_rare_stop(double target)
+{
+	return fmin(target / rare_factor, small_error);
+}
+
+bool stated_error_is_rare(double error, double upper)
+{
+	return upper >= 0.9999 * rare_factor * error; /* but for rounding */
+}
+
 bool stated_error_meets(const struct canvas_image *img, double target)
 {
 	bool doubtful;

@@ -32,5 +32,9 @@ void stated_error(const struct canvas_image *img, char *text, size_t size);
 double stated_error_upper(const struct canvas_image *img, bool *doubtful);
 /* That is below or at the target: what ends a render. */
 bool stated_error_meets(const struct canvas_image *img, double target);
+/* The estimate at which a render of samples stops as long as its light is rare. */
+double stated_error_rare_stop(double target);
+/* Whether it is that rule by which `upper` was made of a relative error. */
+bool stated_error_is_rare(double error, double upper);
 
 #endif

@@ -190,6 +190,40 @@ static void a_trend_is_seen(void **state)
 	assert_true(middle[1] > 1.2 * middle[0] && middle[1] < 2.5);
 }
 
+/* Whoever waits for an error in doubt waits for a fifth of the target, and for 10 % at most. */
+static void doubt_is_waited_for(void **state)
+{
+	(void)state;
+	static const double targets[] = {0.2, 0.9};
+	static const double stops[] = {0.04, 0.1};
+	for (int rule = 0; rule < 2; rule++) /* still in doubt; or below 10 %, where five times the estimate counts */
+		for (int i = 0; i < 2; i++) {
+			struct plan p = {
+				.kind = PLAN_SAMPLES, .groups = 16, .epoch = 1, .crop_width = 10, .crop_height = 10};
+			struct forecast_history h = {0};
+			struct forecast_cost c, fresh;
+			for (double work = 1e5; work < 1e6; work *= 1.3) {
+				bool rare = rule && work > 5e5;
+				double error = 20000 / work, upper = rare ? 25 * error : 1.05 * error;
+				forecast_add_look(&h,
+						  &(struct forecast_look){work, work, work, error, upper, 3000, !rare});
+			}
+			double stop = forecast_stop_in_doubt(&h, &p, targets[i]), want = 20000 / (stops[i] * stops[i]);
+			assert_true(fabs(stop / stops[i] - 1) < 1e-9);
+			assert_true(forecast_target(&h, &p, targets[i], FORECAST_SAME, &c));
+			assert_true(c.work.middle > 0.9 * want && c.work.middle < 1.2 * want);
+			/* A pilot's doubt is not that of the render; chains' ends; without doubt the margin counts. */
+			assert_true(forecast_target(&h, &p, targets[i], FORECAST_NEW, &fresh));
+			assert_true(rule || fresh.work.middle < 0.2 * want);
+			p.kind = PLAN_CHAINS;
+			assert_true(forecast_stop_in_doubt(&h, &p, targets[i]) == 0);
+			p.kind = PLAN_SAMPLES;
+			h.looks[h.count - 1].doubtful = 0;
+			h.looks[h.count - 1].rel_mse_upper = 1.05 * h.looks[h.count - 1].rel_mse;
+			assert_true(forecast_stop_in_doubt(&h, &p, targets[i]) == 0);
+		}
+}
+
 static void what_is_no_look_is_passed_over(void **state)
 {
 	(void)state;
@@ -245,7 +279,7 @@ int main(void)
 		cmocka_unit_test(intervals_hold),	   cmocka_unit_test(own_looks_tell_more),
 		cmocka_unit_test(stops_are_on_the_ladder), cmocka_unit_test(halving_costs_three_times_what_was_paid),
 		cmocka_unit_test(a_trend_is_seen),	   cmocka_unit_test(what_is_no_look_is_passed_over),
-		cmocka_unit_test(looks_travel_as_json),
+		cmocka_unit_test(looks_travel_as_json),	   cmocka_unit_test(doubt_is_waited_for),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -119,7 +119,7 @@ struct session {
 	struct forecast_history looks;
 	struct convergence convergence;
 	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
-	char forecast[160];
+	char forecast[192];
 	double build_seconds;
 	struct choice choice;
 	struct progress progress;
@@ -190,7 +190,7 @@ static int make_plan(struct session *s, struct error *e)
 static void show(void *user, const struct local_progress *p)
 {
 	struct session *s = user;
-	char detail[224], eta[32];
+	char detail[256], eta[32];
 	double fraction = 0;
 	if (p->total != UINT64_MAX)
 		fraction = (double)p->done / (double)p->total;
@@ -199,7 +199,7 @@ static void show(void *user, const struct local_progress *p)
 	if (s->plan.seconds > 0)
 		fraction = fmax(fraction, fmin(p->seconds / s->plan.seconds, 0.99));
 	progress_time(fraction > 0 ? p->seconds * (1 / fraction - 1) : 0, eta, sizeof eta);
-	snprintf(detail, sizeof detail, "%s left%s", eta, s->forecast);
+	snprintf(detail, sizeof detail, "%s%s%s", fraction > 0 ? eta : "", fraction > 0 ? " left" : "", s->forecast);
 	progress_show(&s->progress, fraction, p->state, detail);
 }
 
@@ -218,8 +218,12 @@ static void expect(struct session *s, const struct local_round *r)
 	progress_duration(stop.seconds.low - r->seconds, low, sizeof low);
 	progress_duration(stop.seconds.high - r->seconds, high, sizeof high);
 	progress_duration(half.seconds.middle, more, sizeof more);
-	snprintf(s->forecast, sizeof s->forecast, " (%s - %s to the target), error %.3g %%, half of it in %s", low,
-		 high, 100 * error.middle, more);
+	double doubt = forecast_stop_in_doubt(&s->looks, &s->plan, s->plan.target_error);
+	int n = snprintf(s->forecast, sizeof s->forecast, " (%s - %s to the target), error %.3g %%, halved in %s", low,
+			 high, 100 * error.middle, more);
+	if (doubt > 0 && n > 0 && (size_t)n < sizeof s->forecast)
+		snprintf(s->forecast + n, sizeof s->forecast - (size_t)n, "; the error is in doubt: stops at %.3g %%",
+			 100 * doubt);
 }
 
 static void on_round(void *user, const struct local_round *r)

@@ -320,7 +320,7 @@ static void describe(const Farm__JobStatus *s, const char *rate, char *text, siz
 	}
 	if (s->n_looks && s->halving_seconds > 0) {
 		progress_duration(s->halving_seconds, low, sizeof low);
-		snprintf(error, sizeof error, ", error %.3g %%, half of it in %s",
+		snprintf(error, sizeof error, ", error %.3g %%, halved in %s",
 			 100 * sqrt(s->looks[s->n_looks - 1]->rel_mse), low);
 	}
 	snprintf(text, size, "%s/s, %s left%s%s", rate, eta, range, error);

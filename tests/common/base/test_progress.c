@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Lines of progress where there is no terminal: one for each tenth, and one a minute even if nothing changes. */
+#include "common/base/progress.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* What is written to stderr between begin and end. */
+static char said[4096];
+static FILE *file;
+static int kept;
+
+static void begin(void)
+{
+	file = tmpfile();
+	assert_non_null(file);
+	fflush(stderr);
+	kept = dup(STDERR_FILENO);
+	assert_true(kept >= 0 && dup2(fileno(file), STDERR_FILENO) >= 0);
+}
+
+static void end(void)
+{
+	fflush(stderr);
+	assert_true(dup2(kept, STDERR_FILENO) >= 0);
+	close(kept);
+	rewind(file);
+	said[fread(said, 1, sizeof said - 1, file)] = 0;
+	fclose(file);
+}
+
+static void test_lines(void **state)
+{
+	(void)state;
+	struct progress p;
+	begin();
+	progress_start(&p);
+	progress_show(&p, 0, "running", "a");
+	progress_show(&p, 0, "running", "b");
+	progress_show(&p, 0.05, "running", "c");
+	progress_show(&p, 0.11, "running", "d");
+	p.shown_time -= 30;
+	progress_show(&p, 0.11, "running", "e");
+	p.shown_time -= 30;
+	progress_show(&p, 0.11, "running", "f");
+	progress_show(&p, 0.11, "running", "g");
+	progress_end(&p);
+	end();
+	assert_string_equal(said, "running 0.0 % a\nrunning 11.0 % d\nrunning 11.0 % f\n");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_lines)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
