@@ -39,6 +39,27 @@ until_true 60 grep -q 'continues from \([0-9]*\) of \1 leases of the bootstrap' 
 stop $early
 [ $CODE = 1 ] || fail "the second time it ended with $CODE"
 
+# The end of a terminal, which may tell twice, is an end as by SIGTERM; not where SIGHUP is ignored.
+hang_up() { # HOW: env --default-signal or --ignore-signal
+	rm -f "$DIR/hup.exr"
+	env "$1=HUP" "$BIN/hslt-render" "$BOX" -o "$DIR/hup.exr" --integrator path --size 16x16 --epoch 1 --time 1h 2>"$DIR/hup.log" &
+	hup=$!
+	PIDS="$PIDS $hup"
+	until_true 60 grep -q '^running' "$DIR/hup.log" || fail "it does not run: $(cat "$DIR/hup.log")"
+	sleep 1
+	kill -HUP $hup
+	kill -HUP $hup 2>/dev/null || :
+}
+hang_up --default-signal
+CODE=0
+wait $hup || CODE=$?
+[ $CODE = 1 ] && grep -q 'interrupted: .*hup.exr' "$DIR/hup.log" && [ -s "$DIR/hup.exr" ] || fail "SIGHUP: $CODE, $(cat "$DIR/hup.log")"
+hang_up --ignore-signal
+sleep 0.5
+kill -0 $hup 2>/dev/null || fail "ignored, SIGHUP ends it: $(cat "$DIR/hup.log")"
+stop $hup
+[ $CODE = 1 ] && [ -s "$DIR/hup.exr" ] || fail "SIGTERM after SIGHUP: $CODE, $(cat "$DIR/hup.log")"
+
 # A sphere whose wall shines and reflects 99 %: 0.99^128 of its light takes more edges than are simulated.
 cat >"$DIR/bright.xml" <<-'XML'
 	<scene version="3.0.0"><integrator type="path"/>

@@ -15,6 +15,14 @@ static void interrupt(int signal_number)
 	atomic_store(&interrupted, true);
 }
 
+/* When a terminal is closed, SIGHUP may come from the kernel and from the shell; nohup has it ignored. */
+static void handle_hangup(void (*handler)(int), int flags)
+{
+	struct sigaction act = {.sa_handler = handler, .sa_flags = flags}, before;
+	if (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+		sigaction(SIGHUP, &act, NULL);
+}
+
 static void handle_first(void (*handler)(int))
 {
 	struct sigaction act = {.sa_handler = handler, .sa_flags = (int)SA_RESETHAND};
@@ -25,6 +33,7 @@ static void handle_first(void (*handler)(int))
 void interrupt_watch(void)
 {
 	handle_first(interrupt);
+	handle_hangup(interrupt, 0);
 }
 
 static const char *_Atomic last_words;
@@ -42,4 +51,5 @@ void interrupt_say(const char *text)
 {
 	atomic_store(&last_words, text);
 	handle_first(say_and_end);
+	handle_hangup(say_and_end, (int)SA_RESETHAND);
 }

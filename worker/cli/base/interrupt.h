@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * SIGINT and SIGTERM as a flag that renders check: the first signal asks for an end that keeps complete rounds, the
- * second kills. One per process.
+ * SIGINT, SIGTERM and SIGHUP (unless it is ignored) as a flag that renders check: the first signal asks for an end that
+ * keeps complete rounds, the second kills, except for SIGHUP. One per process.
  */
 #ifndef WORKER_CLI_BASE_INTERRUPT_H
 #define WORKER_CLI_BASE_INTERRUPT_H
