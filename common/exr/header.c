@@ -23,6 +23,7 @@
 enum header_name {
 	H_VERSION,
 	H_SCENE,
+	H_SCENE_HASH,
 	H_CAMERA,
 	H_INTEGRATOR,
 	H_MIXTURE,
@@ -83,13 +84,15 @@ enum { HEADER_STRATEGIES = 5120 };
 const struct header_row header_rows[] = {
 	[H_VERSION] = {"hslt:version", STRING, false, "version of the programs"},
 	[H_SCENE] = {"hslt:scene", STRING, false, "name of the scene file"},
+	[H_SCENE_HASH] = {"hslt:sceneHash", STRING, false, "SHA-256 of the scene file"},
 	[H_CAMERA] = {"hslt:camera", STRING, false,
 		      "the camera as name=value pairs: fov in degrees, to_world by rows (x left, y up, z forward)"},
 	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, hslt, ..."},
 	[H_MIXTURE] = {"hslt:mixture", STRING, false,
 		       "strategies that propose mutations, with their shares (Metropolis with several)"},
-	[H_OPTIONS] = {"hslt:options", STRING, false,
-		       "options of hslt-render and hslt-submit that reproduce the same bits"},
+	[H_OPTIONS] =
+		{"hslt:options", STRING, false,
+		 "options of hslt-render and hslt-submit that, with the same scene and files, reproduce the same bits"},
 	[H_SEED] = {"hslt:seed", STRING, false, "seed of all random numbers"},
 	[H_MIN_DEPTH] = {"hslt:minDepth", INT, false, "shortest paths, in edges"},
 	[H_MAX_DEPTH] = {"hslt:maxDepth", INT, false, "longest paths, in edges"},
@@ -222,10 +225,11 @@ static void add_count(struct header *h, enum header_name name, uint64_t value)
 	end_string(h);
 }
 
-static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
+static void add_plan(struct header *h, const struct plan *p, uint64_t rounds, const struct plan_scene *inputs)
 {
-	char options[PLAN_TEXT];
-	plan_options(p, rounds, options, sizeof options);
+	static const struct plan_scene none = {.define_count = 0};
+	char options[PLAN_OPTIONS_TEXT];
+	plan_options_with(p, rounds, inputs ? inputs : &none, options, sizeof options);
 	add_string(h, H_INTEGRATOR, p->integrator);
 	if (*p->mutations)
 		add_string(h, H_MIXTURE, p->mutations);
@@ -322,6 +326,8 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 static void add_extra(struct header *h, const struct header_extra *x)
 {
 	add_string(h, H_SCENE, x->scene ? x->scene : "");
+	if (x->scene_hash)
+		add_string(h, H_SCENE_HASH, x->scene_hash);
 	if (x->camera && *x->camera)
 		add_string(h, H_CAMERA, x->camera);
 	add_int(h, H_MIXED, x->mixed);
@@ -348,7 +354,7 @@ void header_fill(struct header *h, const struct canvas_image *img, const struct 
 {
 	h->count = h->used = 0;
 	add_string(h, H_VERSION, HSLT_VERSION);
-	add_plan(h, p, img->rounds);
+	add_plan(h, p, img->rounds, x->inputs);
 	add_result(h, img, p);
 	add_extra(h, x);
 }

@@ -9,6 +9,7 @@
 
 #include "common/estimate/canvas_image.h"
 #include "common/exr/exr_image.h"
+#include "common/plan/plan_text.h"
 
 struct header_row {
 	const char *name;
@@ -27,8 +28,10 @@ struct header_effect { /* see render_effects */
 };
 
 struct header_extra {
-	const char *scene;  /* the scene file's name, without folders */
-	const char *camera; /* render_camera_text; NULL or "": not known */
+	const char *scene;		 /* the scene file's name, without folders */
+	const char *scene_hash;		 /* its SHA-256 in hexadecimal; NULL: not known */
+	const struct plan_scene *inputs; /* NULL: none */
+	const char *camera;		 /* render_camera_text; NULL or "": not known */
 	size_t effect_count;
 	const struct header_effect *effects;
 	bool mixed; /* workers of different numeric fingerprints took part: the bits are not reproducible */
@@ -38,7 +41,7 @@ struct header_extra {
 	const char *end;  /* merge_end_name; NULL: a preview */
 };
 
-enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 32768 };
+enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 49152 };
 struct header {
 	size_t count;
 	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* storage of the strings */

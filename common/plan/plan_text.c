@@ -96,3 +96,37 @@ void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size
 		text_put(&t, " --bootstrap %llu --epoch %llu --spp %llu", (unsigned long long)p->bootstrap,
 			 (unsigned long long)p->epoch, (unsigned long long)(rounds * p->groups * p->epoch));
 }
+
+/* "a=b", or "'a=b c'" where a shell would take it for something else. */
+static void put_quoted(struct text *t, const char *word)
+{
+	static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789@=,.:+-_/%";
+	if (*word && strspn(word, plain) == strlen(word)) {
+		text_put(t, "%s", word);
+		return;
+	}
+	text_put(t, "'");
+	for (const char *at = word; *at;) {
+		size_t n = strcspn(at, "'");
+		text_put(t, "%.*s%s", (int)n, at, at[n] ? "'\\''" : "");
+		at += n + (at[n] != 0);
+	}
+	text_put(t, "'");
+}
+
+void plan_options_with(const struct plan *p, uint64_t rounds, const struct plan_scene *s, char *text, size_t size)
+{
+	char word[PLAN_OPTIONS_TEXT];
+	plan_options(p, rounds, text, size);
+	size_t used = strlen(text);
+	struct text t = {text + used, size - used};
+	for (size_t i = 0; i < s->define_count; i++) {
+		snprintf(word, sizeof word, "%s=%s", s->defines[i].name, s->defines[i].value);
+		text_put(&t, " -D ");
+		put_quoted(&t, word);
+	}
+	for (size_t i = 0; i < s->path_count; i++) {
+		text_put(&t, " --path ");
+		put_quoted(&t, s->paths[i]);
+	}
+}

@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 10 };
+enum { FARM_VERSION = 11 };
 
 struct envelope_block;
 

@@ -3,6 +3,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/blob/blob.h"
 #include "common/estimate/stated_error.h"
 #include "common/exr/image_file.h"
 #include "coordinator/jobs/durable.h"
@@ -24,13 +25,40 @@ static const char *end_name(enum job_end end)
 				  : merge_end_name(MERGE_ROUNDS, false);
 }
 
+static void inputs_of(const Farm__Submit *m, struct plan_scene *out)
+{
+	*out = (struct plan_scene){.define_count = 0};
+	for (size_t i = 0; i < m->n_defines && i < PLAN_DEFINES_MAX; i++)
+		out->defines[out->define_count++] = (struct plan_define){m->defines[i]->name, m->defines[i]->value};
+	for (size_t i = 0; i < m->n_paths && i < PLAN_PATHS_MAX; i++)
+		out->paths[out->path_count++] = m->paths[i];
+}
+
+/* false: the submission has no such file. */
+static bool scene_hash(const Farm__Submit *m, char hex[BLOB_HEX_SIZE])
+{
+	struct blob_hash h;
+	for (size_t i = 0; i < m->n_files; i++)
+		if (strcmp(m->files[i]->name, m->scene) == 0 && m->files[i]->hash.len == sizeof h.bytes) {
+			memcpy(h.bytes, m->files[i]->hash.data, sizeof h.bytes);
+			blob_hex(&h, hex);
+			return true;
+		}
+	return false;
+}
+
 static int write_image(struct publishing *w)
 {
 	const struct live_job *job = w->job;
 	const Farm__Submit *m = live_job_submit(job);
 	const char *slash = strrchr(m->scene, '/');
 	struct header_effect effects[HEADER_EFFECTS_MAX];
+	struct plan_scene inputs;
+	char hex[BLOB_HEX_SIZE];
+	inputs_of(m, &inputs);
 	struct header_extra x = {.scene = slash ? slash + 1 : m->scene,
+				 .scene_hash = scene_hash(m, hex) ? hex : NULL,
+				 .inputs = &inputs,
 				 .camera = m->camera,
 				 .effects = effects,
 				 .mixed = m->mixed,

@@ -12,13 +12,14 @@
 #include "coordinator/peers/upload.h"
 
 #include "common/base/mem.h"
+#include "common/plan/plan_text.h"
 #include "coordinator/jobs/files.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { FILES_MAX = 10000, DEFINES_MAX = 256, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
+enum { FILES_MAX = 10000, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
 /* Mutations or samples of a lease whose length was asked for: some minutes of a thread in usual scenes, an hour where
  * each is 30 us. Without that a mistyped --epoch takes a farm from all others for days. */
 enum { LEASE_MOST = 1 << 27 };
@@ -83,9 +84,12 @@ static int check_texts(const Farm__Submit *m, struct error *e)
 {
 	bool ok = envelope_text_ok(m->name, 127) && envelope_text_ok(m->scene, NAME_MAX_BYTES) &&
 		  envelope_text_ok(m->output, 1023) && envelope_text_ok(m->camera, 1023) &&
-		  m->n_defines <= DEFINES_MAX && m->n_effects <= EFFECTS_MAX && m->n_notes <= NOTES_MAX;
+		  m->n_defines <= PLAN_DEFINES_MAX && m->n_paths <= PLAN_PATHS_MAX && m->n_effects <= EFFECTS_MAX &&
+		  m->n_notes <= NOTES_MAX;
 	for (size_t i = 0; ok && i < m->n_defines; i++)
 		ok = envelope_text_ok(m->defines[i]->name, 256) && envelope_text_ok(m->defines[i]->value, 4096);
+	for (size_t i = 0; ok && i < m->n_paths; i++)
+		ok = envelope_text_ok(m->paths[i], 4096);
 	for (size_t i = 0; ok && i < m->n_effects; i++)
 		ok = envelope_text_ok(m->effects[i]->name, 64) && envelope_text_ok(m->effects[i]->why, 256) &&
 		     envelope_text_ok(m->effects[i]->saves, 256);

@@ -70,5 +70,18 @@ same "$DIR/place.exr" "$DIR/place-box.exr"
 code 0 "$BIN/hslt-compare" "$DIR/place.exr" "$DIR/place-odd.exr"
 grep -q "^relMSE  *0 " "$DIR/out" || fail "the same file by another name is another image: $(cat "$DIR/out")"
 
+# The header has all options that make the image again, and the hash of its scene; both alike on the farm.
+GIVEN="-D light=3 --path $DIR/library --integrator path --spp 2 --size 16x12"
+mkdir "$DIR/with blank"
+"$BIN/hslt-render" "$DIR/place/box.xml" $GIVEN --path "$DIR/with blank" -o "$DIR/given.exr" --stats "$DIR/given.json" --quiet || fail "with options: $?"
+submit "$DIR/place/box.xml" $GIVEN --path "$DIR/with blank" -o "$DIR/given-farm.exr" --wait >"$DIR/placed" || fail "with options on the farm: $?"
+same "$DIR/given.exr" "$DIR/given-farm.exr"
+options=$(sed -n 's/^ *"options": "\(.*\)",$/\1/p' "$DIR/given.json")
+grep -aqF -e "$options" "$DIR/given.exr" || fail "the header has other options than --stats: $options"
+grep -aqF "$(sha256sum "$DIR/place/box.xml" | cut -d ' ' -f 1)" "$DIR/given.exr" || fail "the header does not have the scene's hash"
+eval "set -- $options"
+"$BIN/hslt-render" "$DIR/place/box.xml" "$@" -o "$DIR/given-again.exr" --quiet || fail "the header's options: $options"
+same "$DIR/given.exr" "$DIR/given-again.exr"
+
 [ "$(value "$id" reason)" = error ] || fail "$id ended by its $(value "$id" reason)"
 echo "equal bits for 1, 2 and 4 workers and hslt-render; the error was reached after $(value "$id" rounds) rounds"

@@ -70,6 +70,16 @@ struct asset_folders option_folders(const struct render_arguments *a, const char
 	return asset_folders_of(folder, a->paths, a->path_count);
 }
 
+_Static_assert((int)OPTION_PATHS_MAX <= (int)PLAN_PATHS_MAX, "all folders are listed");
+void option_plan_scene(const struct render_arguments *a, struct plan_scene *out)
+{
+	*out = (struct plan_scene){.define_count = a->define_count, .path_count = a->path_count};
+	for (size_t i = 0; i < a->define_count; i++)
+		out->defines[i] = (struct plan_define){a->defines[i].name, a->defines[i].value};
+	for (size_t i = 0; i < a->path_count; i++)
+		out->paths[i] = a->paths[i];
+}
+
 bool integrator_is_open(const struct plan_request *r)
 {
 	return !*r->integrator || strcmp(r->integrator, RENDER_INTEGRATOR_DEFAULT) == 0;

@@ -4,9 +4,10 @@
 #define WORKER_CLI_BASE_OPTIONS_H
 
 #include "common/base/option.h"
+#include "common/plan/plan_text.h"
 #include "worker/render/render.h"
 
-enum { OPTION_DEFINES_MAX = 256, OPTION_PATHS_MAX = ASSET_FOLDERS_MAX - 1 };
+enum { OPTION_DEFINES_MAX = PLAN_DEFINES_MAX, OPTION_PATHS_MAX = ASSET_FOLDERS_MAX - 1 };
 
 struct render_arguments {
 	struct plan_request plan;
@@ -48,6 +49,9 @@ int option_define(char *arg, struct scene_define *defines, size_t *count, struct
 /* render_scene_read; a sensor given by id becomes a number in the settings. */
 int option_scene_read(struct scene *s, const struct asset_source *assets, const char *name, struct render_arguments *a,
 		      struct error *e);
+
+/* The options that plan_options_with writes; the texts are borrowed. */
+void option_plan_scene(const struct render_arguments *a, struct plan_scene *out);
 
 /* The folders in which the scene's files are searched: its own, then those of --path. */
 struct asset_folders option_folders(const struct render_arguments *a, const char *folder);

@@ -13,6 +13,7 @@
 #include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/base/progress.h"
+#include "common/blob/blob.h"
 #include "common/exr/image_file.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
@@ -111,6 +112,8 @@ static const struct program program = {
 struct session {
 	struct arguments *a;
 	char *folder, *name;
+	char scene_hash[BLOB_HEX_SIZE];
+	struct plan_scene inputs;
 	struct world *world;
 	struct render_summary summary;
 	struct plan plan;
@@ -129,6 +132,19 @@ struct session {
 	bool usage; /* the command line is wrong */
 };
 
+static int hash_scene(struct session *s, const struct asset_source *files, struct error *e)
+{
+	struct asset a;
+	struct blob_hash h;
+	int rc = files->open(files->user, s->name, &a, e);
+	if (rc)
+		return rc;
+	rc = blob_hash_bytes(a.bytes, a.size, &h, e);
+	files->close(files->user, &a);
+	blob_hex(&h, s->scene_hash);
+	return rc;
+}
+
 static int load(struct session *s, struct error *e)
 {
 	struct scene scene;
@@ -139,9 +155,12 @@ static int load(struct session *s, struct error *e)
 	struct asset_folders folders = option_folders(&s->a->render, s->folder);
 	struct asset_source files = guarded_source(&s->files, asset_search(&folders), &s->outputs),
 			    assets = kept_bootstrap_source(&s->kept, &files);
-	rc = option_scene_read(&scene, &assets, s->name, &s->a->render, e);
+	rc = hash_scene(s, &files, e);
+	if (!rc)
+		rc = option_scene_read(&scene, &assets, s->name, &s->a->render, e);
 	if (rc)
 		return rc;
+	option_plan_scene(&s->a->render, &s->inputs);
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
 		fprintf(stderr, "%s\n", scene.notes[i]);
 	rc = world_new(&s->world, &scene, &assets, &s->a->render.render, e);
@@ -289,6 +308,8 @@ static int write_image(const struct session *s, struct error *e)
 	char camera[RENDER_CAMERA_TEXT];
 	render_camera_text(&s->summary, camera, sizeof camera);
 	struct header_extra x = {.scene = s->name,
+				 .scene_hash = s->scene_hash,
+				 .inputs = &s->inputs,
 				 .camera = camera,
 				 .effect_count = s->summary.line_count,
 				 .effects = effects,
@@ -416,7 +437,7 @@ static int run_session(struct session *s, struct error *e)
 		kept_bootstrap_end(&s->kept);
 	if (!rc && s->a->stats)
 		rc = stats_write(s->a->stats,
-				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->convergence,
+				 &(struct stats){s->name, &s->inputs, &s->summary, &s->run, &s->image, &s->convergence,
 						 s->build_seconds, &s->looks, &s->choice},
 				 e);
 	if (!rc && !s->a->quiet)

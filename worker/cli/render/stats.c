@@ -34,9 +34,9 @@ static const char *const counter_names[BATCH_COUNTERS] = {
 static json_t *plan_json(const struct stats *s)
 {
 	const struct plan *p = s->run->plan;
-	char plan[PLAN_TEXT], again[PLAN_TEXT];
+	char plan[PLAN_TEXT], again[PLAN_OPTIONS_TEXT];
 	plan_describe(p, plan, sizeof plan);
-	plan_options(p, s->image->rounds, again, sizeof again);
+	plan_options_with(p, s->image->rounds, s->inputs, again, sizeof again);
 	return json_pack(
 		"{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:f s:I s:I}", "schema", 1, "scene", s->scene, "integrator",
 		p->integrator, "plan", plan, "options", again, "rounds", (json_int_t)s->image->rounds, "threads",

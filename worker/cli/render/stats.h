@@ -8,11 +8,13 @@
 
 #include "common/estimate/convergence.h"
 #include "common/estimate/forecast.h"
+#include "common/plan/plan_text.h"
 #include "worker/cli/render/choice.h"
 #include "worker/cli/render/local.h"
 
 struct stats {
 	const char *scene; /* file name */
+	const struct plan_scene *inputs;
 	const struct render_summary *summary;
 	const struct local_run *run; /* has ended */
 	const struct canvas_image *image;

@@ -203,6 +203,11 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	s.priority = r->priority;
 	render_camera_text(&b->summary, camera, sizeof camera);
 	s.camera = camera;
+	char *paths[OPTION_PATHS_MAX];
+	for (size_t i = 0; i < r->args->path_count; i++)
+		paths[i] = text_borrow(r->args->paths[i]);
+	s.n_paths = r->args->path_count;
+	s.paths = paths;
 	s.brightest = b->summary.brightest;
 	s.n_files = b->count;
 	s.files = l.file_at;
