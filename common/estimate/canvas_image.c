@@ -190,6 +190,8 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 	img->black = true;
 	for (size_t i = 0; i < (size_t)img->width * img->height * 3 && img->black; i++)
 		img->black = img->rgb[i] == 0;
+	if (p->groups < 2 && !open_rounds && !img->black)
+		img->rel_mse_doubt = ERROR_NO_SPREAD;
 	int rc = errors ? canvas_error(&m, e) : 0;
 	if (rc == 0)
 		rc = find_moments(&m, e);

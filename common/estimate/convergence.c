@@ -252,6 +252,14 @@ void convergence_add_note(const struct convergence *a, char *note, size_t size)
 	text_put(&t, "%s%s", used ? "; " : "", a->text);
 }
 
+static void put_energy(struct text *t, double energy, double error)
+{
+	if (isnan(error))
+		text_put(t, " %10.3f +- unknown", energy);
+	else
+		text_put(t, " %10.3f +-%8.3f", energy, error);
+}
+
 void convergence_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct convergence *a,
 		       char *text, size_t size)
 {
@@ -266,8 +274,9 @@ void convergence_table(const struct path_class_energy classes[PATH_CLASSES], dou
 		if (!any)
 			text_put(&t, "%-36s %21s %21s %9s\n", "paths, % of b", "bootstrap", "chains", "t");
 		any = true;
-		text_put(&t, "%-36s %10.3f +-%8.3f %10.3f +-%8.3f", path_class_name(k), 100 * c->bootstrap / b,
-			 100 * c->bootstrap_error / b, 100 * c->chains / b, 100 * c->chains_error / b);
+		text_put(&t, "%-36s", path_class_name(k));
+		put_energy(&t, 100 * c->bootstrap / b, 100 * c->bootstrap_error / b);
+		put_energy(&t, 100 * c->chains / b, 100 * c->chains_error / b);
 		if (isnan(c->difference_t))
 			text_put(&t, " %9s", "-");
 		else

@@ -22,9 +22,10 @@ enum error_doubt {
 	ERROR_ONE_GROUP, /* too much of it comes from pixels where one group outweighs the others: rare light */
 	ERROR_DARK,	 /* ... from pixels whose brightness, the denominator of errors, is not known */
 	ERROR_WIDE,	 /* the interval would span more than a factor of ten in relative error */
-	ERROR_TAIL,  /* the largest errors of pixels are so unequal that larger ones may still come: error_tail is not
-			above error_tail_least */
-	ERROR_SHORT, /* the chains are too short to be judged (common/estimate/convergence.h) */
+	ERROR_TAIL, /* the largest errors of pixels are so unequal that larger ones may still come: error_tail is not
+		       above error_tail_least */
+	ERROR_NO_SPREAD, /* a single group: nothing to compare it with */
+	ERROR_SHORT,	 /* the chains are too short to be judged (common/estimate/convergence.h) */
 };
 
 struct canvas_image {

@@ -9,6 +9,8 @@
  * truth then. Above, a lamp in a glass shell stated 44 % where 544 % was true. */
 static const double small_error = 0.1, rare_factor = 5;
 
+static const char no_spread[] = "one group of samples has no error; --spp 2 or more, without --groups 1, gives it one";
+
 /* The error that the image has if the pixels that came out bright really are, where that is less than half of the
  * stated one. A lamp smaller than a pixel looks like a firefly in short renders: 395 % was stated where 22 % was true.
  */
@@ -49,6 +51,9 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 			"their variance may be infinite",
 			img->error_tail, img->error_tail_least);
 		break;
+	case ERROR_NO_SPREAD:
+		text_put(&t, "%s", no_spread);
+		break;
 	case ERROR_SHORT:
 		text_put(&t, "the chains are too short to be judged");
 		break;
@@ -65,7 +70,9 @@ void stated_b_doubt(const struct canvas_image *img, char *text, size_t size)
 	struct text t = {text, size};
 	if (size)
 		text[0] = 0;
-	if (img->b_tail > 0 && img->b_tail < finite_variance)
+	if (img->rel_mse_doubt == ERROR_NO_SPREAD)
+		text_put(&t, "%s", no_spread);
+	else if (img->b_tail > 0 && img->b_tail < finite_variance)
 		text_put(
 			&t,
 			"independent samples that find light are too few or too unequal: their tail index is %.2f, and below %g their variance is "
@@ -79,9 +86,11 @@ void stated_error(const struct canvas_image *img, char *text, size_t size)
 	char why[STATED_ERROR_TEXT];
 	if (size)
 		text[0] = 0;
+	stated_error_doubt(img, why, sizeof why);
+	if (img->rel_mse_doubt == ERROR_NO_SPREAD)
+		text_put(&t, "relative error not known: %s", why);
 	if (!isfinite(img->rel_mse))
 		return;
-	stated_error_doubt(img, why, sizeof why);
 	if (*why)
 		text_put(&t, "relative error about %.3g %%, its interval is not known: %s", 100 * sqrt(img->rel_mse),
 			 why);

@@ -20,7 +20,8 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
  * too little until the rarest light has come. Empty: it is known. */
 void stated_b_doubt(const struct canvas_image *img, char *text, size_t size);
 
-/* "relative error 8.60 % (95 %: 8.41 to 8.90 %)", or "relative error about 38 %, its interval is not known: ...";
+/* "relative error 8.60 % (95 %: 8.41 to 8.90 %)", or "relative error about 38 %, its interval is not known: ...",
+ * or "relative error not known: ...";
  * also how many pixels no chain visited. Empty: there is no estimate. */
 void stated_error(const struct canvas_image *img, char *text, size_t size);
 

@@ -108,7 +108,8 @@ const struct header_row header_rows[] = {
 		       "its standard error, from the groups; absent where it is not known"},
 	[H_B_ERROR_DOUBT] = {"hslt:bErrorDoubt", STRING, false, "why it is not known"},
 	[H_BEYOND] = {"hslt:beyondShare", DOUBLE, false, "share of the energy in paths too long for the chains"},
-	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false, "estimated relMSE, from the variance between groups"},
+	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false,
+		       "estimated relMSE, from the variance between groups; absent where it is not known"},
 	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false,
 			     "upper end of its 90 % interval; absent where it is not known"},
 	[H_REL_MSE_LOW_95] =
@@ -116,7 +117,7 @@ const struct header_row header_rows[] = {
 		 "lower end of the interval that holds this image's own relMSE in 95 % of all cases; absent where it is not known"},
 	[H_REL_MSE_HIGH_95] = {"hslt:relMSEHigh95", DOUBLE, false, "its upper end; absent where it is not known"},
 	[H_REL_MSE_DEFINITION] = {"hslt:relMSEDefinition", STRING, false, "what relMSE is"},
-	[H_REL_MSE_DOUBT] = {"hslt:relMSEDoubt", STRING, false, "why the interval of relMSE is not known"},
+	[H_REL_MSE_DOUBT] = {"hslt:relMSEDoubt", STRING, false, "why relMSE or its interval is not known"},
 	[H_UNVISITED] = {"hslt:unvisitedPixels", STRING, false,
 			 "pixels to which no chain came: their error is their neighbours' (Metropolis only)"},
 	[H_ACCEPTED] = {"hslt:accepted", STRING, false, "accepted mutations"},
@@ -267,7 +268,7 @@ static void add_error(struct header *h, const struct canvas_image *img)
 	stated_error_doubt(img, why, sizeof why);
 	if (*why) {
 		add_string(h, H_REL_MSE_DOUBT, why);
-	} else {
+	} else if (isfinite(img->rel_mse)) {
 		add_double(h, H_REL_MSE_UPPER, img->rel_mse_upper);
 		add_double(h, H_REL_MSE_LOW_95, img->rel_mse_95[0]);
 		add_double(h, H_REL_MSE_HIGH_95, img->rel_mse_95[1]);
@@ -283,7 +284,7 @@ static void add_b_error(struct header *h, const struct canvas_image *img)
 	stated_b_doubt(img, why, sizeof why);
 	if (*why)
 		add_string(h, H_B_ERROR_DOUBT, why);
-	else
+	else if (isfinite(img->b_error))
 		add_double(h, H_B_ERROR, img->b_error);
 }
 
@@ -302,7 +303,8 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 	} else {
 		add_count(h, H_SAMPLES, img->rounds * p->groups * p->epoch);
 	}
-	add_double(h, H_REL_MSE, img->rel_mse);
+	if (isfinite(img->rel_mse))
+		add_double(h, H_REL_MSE, img->rel_mse);
 	add_error(h, img);
 	add_count(h, H_NAN, img->counts.counters[COUNT_NAN]);
 	add_count(h, H_INFINITE, img->counts.counters[COUNT_INFINITE]);

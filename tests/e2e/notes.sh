@@ -60,6 +60,16 @@ kill -0 $hup 2>/dev/null || fail "ignored, SIGHUP ends it: $(cat "$DIR/hup.log")
 stop $hup
 [ $CODE = 1 ] && [ -s "$DIR/hup.exr" ] || fail "SIGTERM after SIGHUP: $CODE, $(cat "$DIR/hup.log")"
 
+# One group has no error: that is said, and nothing prints a number that is none.
+for one in "--integrator path --spp 1" "--integrator pssmlt --spp 16 --groups 1"; do
+	"$BIN/hslt-render" "$BOX" -o "$DIR/one.exr" --size 16x16 $one --stats "$DIR/one.json" 2>"$DIR/one.log" || fail "$one: ended with $?"
+	grep -q 'warning: relative error not known: one group of samples has no error; --spp 2' "$DIR/one.log" || fail "$one: $(cat "$DIR/one.log")"
+	grep -q '"relMSEDoubt": "one group of samples' "$DIR/one.json" || fail "$one: --stats gives no reason"
+	! grep -E '[^a-z]-?nan[^a-z"]' "$DIR/one.log" "$DIR/one.json" || fail "$one: prints nan"
+	grep -aq 'hslt:relMSEDoubt' "$DIR/one.exr" && ! grep -aqE 'hslt:(relMSE|relMSEUpper|bError).double' "$DIR/one.exr" ||
+		fail "$one: the header has an error, or no reason for none"
+done
+
 # A sphere whose wall shines and reflects 99 %: 0.99^128 of its light takes more edges than are simulated.
 cat >"$DIR/bright.xml" <<-'XML'
 	<scene version="3.0.0"><integrator type="path"/>

@@ -387,6 +387,14 @@ static void words(void **state)
 	img.rel_mse = NAN;
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(text, "");
+	img.rel_mse_doubt = ERROR_NO_SPREAD;
+	stated_error(&img, text, sizeof text);
+	assert_string_equal(
+		text,
+		"relative error not known: one group of samples has no error; --spp 2 or more, without --groups 1, gives it one");
+	assert_false(stated_error_meets(&img, 10));
+	stated_b_doubt(&img, text, sizeof text);
+	assert_true(strncmp(text, "one group of samples has no error;", 34) == 0);
 }
 
 /* ---- the floor */
