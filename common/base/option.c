@@ -184,7 +184,11 @@ static int store_argument(const struct option_row *r, void *target, char *arg, s
 	void *field = (char *)target + r->offset;
 	if (r->values && check_value(r->name, r->values, arg, e))
 		return -EINVAL;
-	if (arg && r->kind != OPTION_IS_TEXT && *r->arg == '+' && *arg == '+')
+	if (arg && !*arg && strncmp(r->arg, "FILE", 4) == 0)
+		return error_set(e, EINVAL, "--%s takes the name of a file, not ''", r->name);
+	if (arg && *r->arg == '+' && *arg != '+')
+		return error_set(e, EINVAL, "--%s takes what is to be added, such as +8, not '%s'", r->name, arg);
+	if (arg && *r->arg == '+')
 		arg++;
 	switch (r->kind) {
 	case OPTION_IS_FLAG:

@@ -46,8 +46,11 @@ static const struct option_row rows[] = {
 static int take_word(void *target, size_t index, char *word, struct error *e)
 {
 	struct arguments *a = target;
+	const char *digits = word + (*word == 'j');
 	if (index > 0)
 		return error_set(e, EINVAL, "'%s': one job at a time", word);
+	if (!*digits || digits[strspn(digits, "0123456789")] || strlen(digits) > 20)
+		return error_set(e, EINVAL, "'%s' is not a job: expected something like j12", word);
 	snprintf(a->job_text, sizeof a->job_text, "%s%s", *word == 'j' ? "" : "j", word);
 	a->job = a->job_text;
 	return 0;
@@ -251,9 +254,9 @@ static void print_workers(const json_t *snapshot)
 	json_array_foreach(json_object_get(snapshot, "workers"), i, worker)
 	{
 		if (i == 0)
-			printf("\n%-24s %-11s %5s %7s %6s %8s %s\n", "WORKER", "STATE", "START", "THREADS", "LEASES",
+			printf("\n%-24s %-11s %6s %7s %6s %8s %s\n", "WORKER", "STATE", "STARTS", "THREADS", "LEASES",
 			       "MERGED", "LAST FAULT");
-		printf("%-24s %-11s %5.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
+		printf("%-24s %-11s %6.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
 		       number_of(worker, "restarts"), number_of(worker, "threads"), number_of(worker, "leases"),
 		       number_of(worker, "merged"), text_of(worker, "text"));
 	}
@@ -347,7 +350,7 @@ static bool show(const struct arguments *a, const json_t *snapshot, bool first, 
 {
 	const json_t *job = a->job ? find_job(snapshot, a->job) : NULL;
 	if (a->job && !job) {
-		fprintf(stderr, "hslt-status: there is no job %s\n", a->job);
+		fprintf(stderr, "hslt-status: %s: no such job\n", a->job);
 		*code = 1;
 		return false;
 	}

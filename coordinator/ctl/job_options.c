@@ -17,13 +17,21 @@
 
 enum { PRIORITY_MOST = 100 };
 
+static int take_output(void *target, char *arg, struct error *e)
+{
+	struct job_options *o = target;
+	(void)e;
+	o->output = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
+	return 0;
+}
+
 static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct job_options, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
 	{"output", 'o', "FILE",
-	 "fetch: the output file, which is replaced (without it: into the current folder, under the last "
-	 "part of the name given to hslt-submit, never replacing a file)",
-	 OPTION_TEXT(struct job_options, output)},
+	 "fetch: the output file; only an image is replaced (without it: into the current folder, under the last "
+	 "part of the name given to hslt-submit, never replacing a file); -: stdout",
+	 OPTION_TAKE(take_output)},
 	{"preview", 0, NULL, "fetch: the image so far, while the job runs", OPTION_FLAG(struct job_options, preview)},
 	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},
@@ -111,17 +119,20 @@ static const struct program program = {
 	.name = "hslt-job",
 	.words = "VERB [JOB] [PRIORITY]",
 	.summary = "Manages the jobs of a coordinator.",
-	.examples =
-		"hslt-job --coordinator 127.0.0.1:7700 list\n"
-		"hslt-job fetch j12 -o room.exr\n"
-		"hslt-job fetch j12 --preview -o so-far.exr\n"
-		"hslt-job hold j12             no more of its leases go out; those that are out count\n"
-		"hslt-job release j12\n"
-		"hslt-job priority j12 -5      -100 to 100; from the next lease on\n"
-		"hslt-job extend j12 --spp +8  goes on with it, as if that many more had been asked for; done or not\n"
-		"hslt-job extend j12 --target-error 2%\n"
-		"hslt-job cancel j12\n"
-		"hslt-job log j12",
+	.examples = "hslt-job --coordinator 127.0.0.1:7700 list\n"
+		    "hslt-job fetch j12 -o room.exr\n"
+		    "hslt-job fetch j12 --preview -o so-far.exr\n"
+		    "hslt-job hold j12             no more of its leases go out; those that are out count\n"
+		    "hslt-job release j12\n"
+		    "hslt-job priority j12 -5      -100 to 100; from the next lease on\n"
+		    "hslt-job extend j12 --spp +8  continues it, whether running or finished\n"
+		    "hslt-job extend j12 --target-error 2%\n"
+		    "hslt-job cancel j12\n"
+		    "hslt-job log j12",
+	.details =
+		"list: all jobs; cancel: end a job; fetch: download its image; log: print its log; hold: hand out no more of its work; "
+		"release: end the hold; priority: -100 to 100, higher first; extend: continue it with --spp, --mutations, --time "
+		"or --target-error.",
 	.exits = "0 done, 1 failed, 2 usage, 6 refused, 75 coordinator not reachable",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.verbs = verb_at,

@@ -2,6 +2,7 @@
 #include "coordinator/ctl/job_verbs.h"
 
 #include "common/base/progress.h"
+#include "common/exr/output_files.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -144,8 +145,11 @@ static int fetch(struct client *cl, const struct job_options *o, struct error *e
 {
 	Farm__What what = o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT;
 	char name[CLIENT_NAME_BYTES];
-	int rc =
-		o->output ? client_fetch(cl, o->job, what, o->output, e) : client_fetch_here(cl, o->job, what, name, e);
+	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}};
+	int rc = client_local(output_files_check(&outputs, NULL, 0, e));
+	if (!rc)
+		rc = o->output ? client_fetch(cl, o->job, what, o->output, e)
+			       : client_fetch_here(cl, o->job, what, name, e);
 	if (!rc)
 		fprintf(stderr, "j%llu: %s in %s\n", (unsigned long long)o->job,
 			o->preview ? "preview, the image so far," : "image", o->output ? o->output : name);

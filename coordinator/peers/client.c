@@ -191,7 +191,7 @@ static void take_watch(struct session *p, uint64_t job)
 {
 	struct job_view v;
 	if (!client_finds_job(p, job, &v)) {
-		session_fault(p, "there is no job j%llu", (unsigned long long)job);
+		session_fault(p, "j%llu: no such job", (unsigned long long)job);
 		return;
 	}
 	p->watched = job;

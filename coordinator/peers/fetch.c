@@ -89,7 +89,7 @@ static int begin_fetch(struct session *p, const Farm__Fetch *f, struct job_view 
 	const char *file = file_of(f->what);
 	fetch_end(p);
 	if (!client_finds_job(p, f->job, v))
-		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
+		return error_set(e, ENOENT, "j%llu: no such job", (unsigned long long)f->job);
 	if (!file)
 		return error_set(e, EINVAL, "unknown kind of file to fetch");
 	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)

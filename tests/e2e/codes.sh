@@ -56,6 +56,11 @@ for p in render submit; do
 	grep -q "^tolerance=0.001 " "$DIR/out" || fail "hslt-$p --set help says: $(cat "$DIR/out")"
 done
 code 1 "$BIN/hslt-job" fetch j1
+grep -q '^hslt-job: j1: no such job$' "$DIR/err.log" || fail "hslt-job fetch j1 says: $(cat "$DIR/err.log")"
+code 1 "$BIN/hslt-status" j99
+grep -q '^hslt-status: j99: no such job$' "$DIR/err.log" || fail "hslt-status j99 says: $(cat "$DIR/err.log")"
+code 2 "$BIN/hslt-status" banana
+code 2 "$BIN/hslt-status" j
 code 1 "$BIN/hslt-job" cancel j1
 code 2 "$BIN/hslt-job" cancel j18446744073709551616 # more than there can be
 

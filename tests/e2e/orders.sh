@@ -96,6 +96,11 @@ e=$(submit "$BOX" -o "$DIR/extended.exr" $CHAINS --spp 100)
 done_in 60 "$e"
 job fetch "$e" -o "$DIR/short.exr"
 "$BIN/hslt-compare" --exact "$DIR/short.exr" "$DIR/long.exr" >/dev/null 2>&1 && fail "100 and 600 samples a pixel are the same"
+echo '<scene/>' >"$DIR/scene.xml"
+refused 1 'scene.xml exists and is not an OpenEXR file' job fetch "$e" -o "$DIR/scene.xml"
+[ "$(cat "$DIR/scene.xml")" = '<scene/>' ] || fail "fetch has replaced a scene"
+refused 2 'the name of a file' job fetch "$e" -o ''
+"$BIN/hslt-job" fetch "$e" -o - >"$DIR/stdout.exr" 2>"$DIR/fetch.log" && cmp "$DIR/stdout.exr" "$DIR/short.exr" || fail "fetch -o -: $(cat "$DIR/fetch.log")"
 refused 2 'a bound is missing' job extend "$e"
 job extend "$e" --spp +100
 job fetch "$e" -o "$DIR/between.exr" || fail "the image of before is gone while it goes on"
@@ -104,7 +109,8 @@ done_in 60 "$e"
 again # and after its end
 first=$(value "$e" rounds)
 before=$(value "$e" merged)
-job extend "$e" --spp 300
+refused 2 "such as +8, not .300." job extend "$e" --spp 300
+job extend "$e" --spp +300
 until_true 60 merged_more "$e" "$before" || fail "nothing more of $e is merged"
 job extend "$e" --spp +100 # while it runs, at a worker that knows the bound of before, or just after
 until_true 60 more_rounds "$e" "$first" || fail "$e does not go on after $first rounds"

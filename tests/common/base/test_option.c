@@ -165,6 +165,9 @@ static void test_bounds(void **state)
 	refused("list -o x --share two", "--share takes something like 0.02 or 2%, not 'two'");
 	refused("list -o x --time 0", "--time takes a number of seconds above 0 and at most 1000000000, not '0'");
 	refused("list -o x --time 5y", "--time takes a time such as 90, 90s, 5m or 2h, not '5y'");
+	refused("list --output=", "--output takes the name of a file, not ''");
+	refused("list -o x --spp 8", "--spp takes what is to be added, such as +8, not '8'");
+	refused("list -o x --spp ++8", "--spp takes a whole number such as 4000 or 1.5k, not '+8'");
 	refused("list -o x --threads +3", "--threads takes a whole number such as 4000 or 1.5k, not '+3'");
 }
 
@@ -236,7 +239,7 @@ static void test_checks(void **state)
 	(void)state;
 	refused("list", "--output FILE is needed");
 	refused("list -o x -w -q", "--wait is not quiet");
-	refused("list -o x --spp 13", "no 13");
+	refused("list -o x --spp +13", "no 13");
 }
 
 /* Before whatever else is wrong. */
