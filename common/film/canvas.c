@@ -72,9 +72,31 @@ static int open_unlinked(const char *folder, struct error *e)
 	return fd;
 }
 
+enum { IN_MEMORY = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE };
+
+/* NULL: an error. */
+static void *map_films(size_t bytes, int flags, int fd, struct error *e)
+{
+	void *map = mmap(NULL, bytes, PROT_READ | PROT_WRITE, flags, fd, 0);
+	int code = errno;
+	if (map != MAP_FAILED)
+		return map;
+	error_set(e, code, "no room for the films, %.3g GB: %s; --crop and fewer --groups need less",
+		  1e-9 * (double)bytes, strerror(code));
+	return NULL;
+}
+
+int canvas_probe(const struct plan *p, struct error *e)
+{
+	void *map = map_films(canvas_bytes(p), IN_MEMORY, -1, e);
+	if (map)
+		munmap(map, canvas_bytes(p));
+	return map ? 0 : -ENOMEM;
+}
+
 static int map_sums(struct canvas *c, const char *folder, struct error *e)
 {
-	int flags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE;
+	int flags = IN_MEMORY;
 	if (folder) {
 		c->fd = open_unlinked(folder, e);
 		if (c->fd < 0)
@@ -86,13 +108,8 @@ static int map_sums(struct canvas *c, const char *folder, struct error *e)
 		}
 		flags = MAP_SHARED;
 	}
-	void *map = mmap(NULL, c->bytes, PROT_READ | PROT_WRITE, flags, c->fd, 0);
-	if (map == MAP_FAILED) {
-		int code = errno;
-		return error_set(e, code, "cannot map %zu bytes for the films: %s", c->bytes, strerror(code));
-	}
-	c->sums = map;
-	return 0;
+	c->sums = map_films(c->bytes, flags, c->fd, e);
+	return c->sums ? 0 : -ENOMEM;
 }
 
 static uint32_t tiles_along(uint32_t pixels)

@@ -29,7 +29,9 @@ int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest
 
 int canvas_new(struct canvas **c, const struct plan *p, int grid_exponent, const char *folder, struct error *e);
 void canvas_free(struct canvas *c);
-size_t canvas_bytes(const struct plan *p);     /* of its films */
+size_t canvas_bytes(const struct plan *p); /* of its films */
+/* Whether there is room for films in memory: what canvas_new without a folder says after a bootstrap. */
+int canvas_probe(const struct plan *p, struct error *e);
 bool canvas_is_mapped(const struct canvas *c); /* to a file */
 
 /* Bootstrap batches add only their independent sums. Counters and sums of render batches belong to their round.

@@ -364,6 +364,9 @@ int tls_open(struct tls **out, const char *folder, struct error *e)
 		return error_set(e, ENOMEM, "no memory for TLS");
 	int n = snprintf(t->folder, sizeof t->folder, "%s", folder);
 	int rc = n < 0 || (size_t)n >= sizeof t->folder ? error_set(e, EINVAL, "%s: the name is too long", folder) : 0;
+	struct stat st;
+	if (!rc && (stat(folder, &st) || !S_ISDIR(st.st_mode)))
+		rc = error_set(e, EPERM, "%s is not a folder", folder);
 	t->recheck = 60;
 	stat_files(t, t->stamps);
 	memcpy(t->seen, t->stamps, sizeof t->seen);

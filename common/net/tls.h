@@ -42,7 +42,7 @@ bool tls_expiry(const struct tls_peer *p, time_t now, char *text, size_t size);
 
 struct tls;
 
-/* -EPERM if others than owner and group can read the key, -ENOENT, -EBADMSG. */
+/* -EPERM if others than owner and group can read the key, or if the folder is none; -ENOENT, -EBADMSG. */
 int tls_open(struct tls **t, const char *folder, struct error *e);
 void tls_close(struct tls *t); /* open links keep what they need */
 /* Reads the files again if they have changed. 1: they had; new links use them, and open links are checked against

@@ -126,7 +126,7 @@ static int check_film(const struct plan *p, struct error *e)
 				 "the crop %u,%u,%u,%u (x,y,width,height) does not lie inside the film of %ux%u",
 				 p->crop_x, p->crop_y, p->crop_width, p->crop_height, p->width, p->height);
 	if (crop_pixels(p) > PLAN_MAX_PIXELS)
-		return error_set(e, EINVAL, "the image has %llu pixels; at most %d are supported (crop it)",
+		return error_set(e, EINVAL, "the image has %llu pixels; a render has at most %d: --crop renders a part",
 				 (unsigned long long)crop_pixels(p), PLAN_MAX_PIXELS);
 	if (p->border > PLAN_MAX_BORDER)
 		return error_set(e, EINVAL, "the filter extends %u pixels beyond the image; at most %d", p->border,

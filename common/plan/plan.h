@@ -26,6 +26,7 @@ enum {
 	PLAN_MAX_GROUPS = 64,
 	PLAN_MAX_PIXELS = 1 << 24, /* of the crop: bounds a batch */
 	PLAN_MAX_SIZE = 65536,	   /* width and height of the full film */
+	PLAN_MAX_FILM = 1 << 28,   /* its pixels; what is larger than PLAN_MAX_PIXELS is rendered in crops */
 	PLAN_MAX_BORDER = 256,
 	PLAN_MAX_PARTS = 64,
 	PLAN_MAX_CHAINS = 1 << 20,

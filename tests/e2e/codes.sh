@@ -28,6 +28,29 @@ code 75 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 "$BOX" -o "$DIR/a.exr"
 code 75 "$BIN/hslt-job" --coordinator 127.0.0.1:1 list
 code 75 "$BIN/hslt-status" --socket "$DIR/none"
 
+code 2 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 --tls "$DIR/nofolder" "$BOX" -o "$DIR/a.exr" -i path
+code 2 "$BIN/hslt-job" --coordinator 127.0.0.1:1 --tls "$DIR/nofolder" list
+code 2 "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --tls "$DIR/nofolder" --cache "$DIR/cache"
+# Films that cannot be held are refused before the bootstrap. A folder that the worker may not read is not a refusal by the coordinator, for which nobody restarts it.
+if (ulimit -v 40000000 && "$BIN/hslt-render" --version) >/dev/null 2>&1; then
+	(ulimit -v 40000000 && code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --size 4096x4096 --groups 64 --spp 64 -i path) || exit 1
+	grep -q 'no room for the films, [0-9.]* GB: .*--groups' "$DIR/err.log" && ! grep -q '^bootstrap' "$DIR/err.log" ||
+		fail "films without room: $(cat "$DIR/err.log")"
+else
+	skip_part "it cannot run within 40 GB of addresses"
+fi
+mkdir -m 700 "$DIR/closed"
+other=
+[ "$(id -u)" != 0 ] || other="setpriv --reuid=65534 --regid=65534 --clear-groups"
+[ -n "$other" ] || chmod 0 "$DIR/closed"
+if $other "$BIN/hslt-worker" --version >/dev/null 2>&1; then
+	code 1 $other "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --cache "$DIR/closed/cache"
+	grep -q 'Permission denied' "$DIR/err.log" || fail "a closed cache: $(cat "$DIR/err.log")"
+else
+	skip_part "no other user here"
+fi
+chmod 700 "$DIR/closed"
+
 start_coordinator
 code 1 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/spool" # one master a spool
 code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # before hours are spent, not after
@@ -52,6 +75,12 @@ for p in render submit; do
 	done
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --set tolerence=1e-3
 	grep -q "did you mean .tolerance" "$DIR/err.log" || fail "hslt-$p says: $(cat "$DIR/err.log")"
+	for wrong in "--min-depth 9 --max-depth 3" "--crop 1000,0,9,9" "--size 70000x2" "--size 9000x9000" "--groups 65" "--parts 65"; do
+		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" $wrong
+		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path $wrong
+		code 2 "$BIN/hslt-$p" --estimate "$BOX" -i path $wrong
+	done
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --chains 2M
 	code 0 "$BIN/hslt-$p" --set help
 	grep -q "^tolerance=0.001 " "$DIR/out" || fail "hslt-$p --set help says: $(cat "$DIR/out")"
 done

@@ -10,7 +10,7 @@ for p in render submit; do
 	code 2 "$BIN/hslt-$p" --estimate
 done
 code 1 "$BIN/hslt-render" --estimate "$BOX" --plot "$DIR/no/such/folder.svg"
-code 1 "$BIN/hslt-render" --estimate "$BOX" --groups 1 --size 16x16 --integrator path --pilot 0.2
+code 2 "$BIN/hslt-render" --estimate "$BOX" --groups 1 --size 16x16 --integrator path --pilot 0.2
 grep -q -- --groups "$DIR/err.log" || fail "one group: $(cat "$DIR/err.log")"
 
 # estimates SECONDS COMMAND...: with a pilot of so many, or of more where the machine is too busy for them and that is said

@@ -359,8 +359,8 @@ int agent_run(const struct agent_config *c, struct error *e)
 {
 	struct agent *a;
 	int rc = agent_open(&a, c, e);
-	if (rc)
-		return rc;
+	if (rc) /* -EACCES means that a coordinator refuses, not a file */
+		return rc == -EACCES ? -EIO : rc;
 	notify_send("READY=1"); /* it may wait for its coordinator for long */
 	while (!a->gone || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);

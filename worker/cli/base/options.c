@@ -107,8 +107,8 @@ static int take_path(void *target, char *arg, struct error *e)
 	return option_path(arg, a->paths, &a->path_count, e);
 }
 
-static int take_numbers(const char *option, const char *arg, const char *separators, uint32_t *out, int count,
-			struct error *e)
+/* Nonzero: they are not `count` numbers with these separators. */
+static int take_numbers(const char *arg, const char *separators, uint32_t *out, int count)
 {
 	const char *at = arg;
 	for (int i = 0; i < count; i++) {
@@ -117,7 +117,7 @@ static int take_numbers(const char *option, const char *arg, const char *separat
 		unsigned long n = strtoul(at, &end, 10);
 		char wanted = i + 1 < count ? separators[i] : 0;
 		if (*at < '0' || *at > '9' || errno || n > UINT32_MAX || *end != wanted)
-			return error_set(e, EINVAL, "%s: invalid argument '%s' (try --help)", option, arg);
+			return -EINVAL;
 		out[i] = (uint32_t)n;
 		at = end + 1;
 	}
@@ -130,11 +130,13 @@ static int take_size(void *target, char *arg, struct error *e)
 	struct render_arguments *a = target;
 	uint32_t n[2] = {0, 0};
 	bool both = strchr(arg, 'x') != NULL;
-	int rc = take_numbers("--size", arg, "x", n, both ? 2 : 1, e);
-	if (rc)
-		return rc;
+	if (take_numbers(arg, "x", n, both ? 2 : 1))
+		return error_set(e, EINVAL, "--size takes W or WxH, such as 640x360, not '%s'", arg);
 	if (n[0] == 0 || (both && n[1] == 0))
 		return error_set(e, EINVAL, "--size takes a film of at least 1x1 pixels");
+	if (n[0] > PLAN_MAX_SIZE || n[1] > PLAN_MAX_SIZE || (uint64_t)n[0] * n[1] > PLAN_MAX_FILM)
+		return error_set(e, EINVAL, "--size %s: a film has at most %d pixels a side and %d in all", arg,
+				 PLAN_MAX_SIZE, PLAN_MAX_FILM);
 	a->render.width = n[0];
 	a->render.height = n[1];
 	return 0;
@@ -144,9 +146,8 @@ static int take_crop(void *target, char *arg, struct error *e)
 {
 	struct render_arguments *a = target;
 	uint32_t n[4];
-	int rc = take_numbers("--crop", arg, ",,,", n, 4, e);
-	if (rc)
-		return rc;
+	if (take_numbers(arg, ",,,", n, 4))
+		return error_set(e, EINVAL, "--crop takes X,Y,W,H in pixels, such as 0,0,320,360, not '%s'", arg);
 	if (n[2] == 0 || n[3] == 0)
 		return error_set(e, EINVAL, "--crop takes a part of at least 1x1 pixels");
 	a->plan.crop_x = n[0];
@@ -219,8 +220,9 @@ static int take_sensor(void *target, char *arg, struct error *e)
 		a->sensor = arg;
 		return 0;
 	}
-	int rc = take_numbers("--sensor", arg, "", &n, 1, e);
-	return rc ? rc : set_sensor(a, n, e);
+	if (take_numbers(arg, "", &n, 1))
+		return error_set(e, EINVAL, "--sensor takes the number of a sensor or its id, not '%s'", arg);
+	return set_sensor(a, n, e);
 }
 
 static int find_sensor(const struct scene *s, struct render_arguments *a, struct error *e)

@@ -92,16 +92,16 @@ int explain(const char *path, struct render_arguments *a, bool json, bool *usage
 	int rc = scene_path_split(path, &folder, &name, e);
 	if (rc)
 		return rc;
+	struct choice choice;
 	rc = summarise(folder, name, a, &m, e);
 	if (!rc) {
 		rc = render_plan_from_scene(a, &m, e);
+		if (!plan_request_is_bounded(&a->plan))
+			a->plan.spp = USUAL_SPP;
+		if (!rc)
+			rc = choice_make(a, folder, name, &choice, e);
 		*usage = rc == -EINVAL;
 	}
-	if (!plan_request_is_bounded(&a->plan))
-		a->plan.spp = USUAL_SPP;
-	struct choice choice;
-	if (!rc)
-		rc = choice_make(a, folder, name, &choice, e);
 	if (!rc && json)
 		rc = print_json(name, &m, &a->plan, &choice, e);
 	else if (!rc)

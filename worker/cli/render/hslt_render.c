@@ -187,11 +187,13 @@ static int make_plan(struct session *s, struct error *e)
 	struct plan_request *p = &s->a->render.plan;
 	char text[PLAN_TEXT];
 	int rc = render_plan_from_scene(&s->a->render, &s->summary, e);
-	s->usage = rc == -EINVAL;
 	if (!rc)
 		rc = choose(s, e);
 	if (!rc)
 		rc = plan_make(p, &s->plan, e);
+	s->usage = rc == -EINVAL;
+	if (!rc)
+		rc = canvas_probe(&s->plan, e);
 	if (rc || s->a->quiet)
 		return rc;
 	plan_describe(&s->plan, text, sizeof text);
@@ -386,10 +388,12 @@ static int estimate(struct session *s, struct error *e)
 	int rc = load(s, e);
 	if (!rc) {
 		rc = pilot_plan_from_scene(&s->a->render, &s->summary, e);
+		if (!rc)
+			rc = choose(s, e);
+		if (!rc)
+			rc = pilot_render_plan(&s->a->render.plan, &s->plan, e);
 		s->usage = rc == -EINVAL;
 	}
-	if (!rc)
-		rc = choose(s, e);
 	if (rc)
 		return rc;
 	struct local_pilot p = {.world = s->world,

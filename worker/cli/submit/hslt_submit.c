@@ -118,7 +118,7 @@ static const struct program program = {
 		"the coordinator restarts.",
 	.exits =
 		"0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
-		"there, and its note says where), 6 refused, 75 coordinator not reachable",
+		"there, and its note says where), 6 refused, 75 coordinator not reachable, 130 interrupted while it waited (the job continues)",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
 	.shared_offset = offsetof(struct arguments, render),
@@ -218,6 +218,13 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 	return client_local(estimate_report(&m, a->json, a->plot, e));
 }
 
+/* Whether the coordinator can make a plan of it. */
+static int check_plan(const struct arguments *a, struct error *e)
+{
+	struct plan plan;
+	return a->estimate ? pilot_render_plan(&a->render.plan, &plan, e) : plan_make(&a->render.plan, &plan, e);
+}
+
 /* The duration of leases is measured only if it matters; with --epoch it is known. */
 static void measure(struct arguments *a, const struct scene_bundle *b)
 {
@@ -271,10 +278,12 @@ int main(int argc, char **argv)
 	a.request.name = a.name ? a.name : b.scene;
 	struct choice choice;
 	rc = choice_make(&a.render, b.folder, b.scene, &choice, &e);
+	if (!rc)
+		rc = check_plan(&a, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		scene_bundle_fini(&b);
-		return 1;
+		return rc == -EINVAL ? 2 : 1;
 	}
 	choice_print(&choice, a.render.plan.integrator);
 	measure(&a, &b);

@@ -19,7 +19,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { FILM_PIXELS_MAX = 1 << 28, RADIUS_MAX = 64 };
+enum { FILM_PIXELS_MAX = PLAN_MAX_FILM, RADIUS_MAX = 64 };
 enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
@@ -196,8 +196,8 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 	if (out->width > PLAN_MAX_SIZE || out->height > PLAN_MAX_SIZE ||
 	    (uint64_t)out->width * out->height > FILM_PIXELS_MAX)
 		return node_error(film ? film : sensor, e, ERANGE,
-				  "a film of %u x %u pixels; at most %d a side and %d in all", out->width, out->height,
-				  PLAN_MAX_SIZE, FILM_PIXELS_MAX);
+				  "a film of %u x %u pixels; at most %d a side and %d in all, %d of them in one render",
+				  out->width, out->height, PLAN_MAX_SIZE, FILM_PIXELS_MAX, PLAN_MAX_PIXELS);
 	return film && !width && !height ? read_crop(film, out, e) : 0;
 }
 
