@@ -183,35 +183,68 @@ int image_file_write(const char *path, const unsigned char *bytes, size_t size, 
 	return t.through ? write_through(&t, path, bytes, size, e) : replace(t.path, bytes, size, e);
 }
 
+/* Of a pipe, whose length is not known. *bytes and *size: what came, also after a failure. */
+static int read_stream(int fd, const char *path, unsigned char **bytes, size_t *size, struct error *e)
+{
+	size_t room = 0;
+	*bytes = NULL;
+	*size = 0;
+	for (;;) {
+		if (*size == room) {
+			size_t more = room ? 2 * room : 1 << 16;
+			unsigned char *all = more <= (size_t)FILE_MOST ? mem_grow(*bytes, room, more) : NULL;
+			if (!all)
+				return error_set(e, ENOMEM, "%s: no memory for it, or more than 4 GiB", path);
+			*bytes = all;
+			room = more;
+		}
+		ssize_t n = read(fd, *bytes + *size, room - *size);
+		if (n < 0 && errno != EINTR)
+			return failed(e, path, "read");
+		if (n == 0)
+			return 0;
+		*size += n < 0 ? 0 : (size_t)n;
+	}
+}
+
+static int read_regular(int fd, const struct stat *st, const char *path, unsigned char **bytes, size_t *size,
+			struct error *e)
+{
+	*size = 0;
+	*bytes = mem_alloc((size_t)st->st_size, 1);
+	if (!*bytes)
+		return error_set(e, ENOMEM, "%s: no memory for it", path);
+	while (*size < (size_t)st->st_size) {
+		ssize_t n = read(fd, *bytes + *size, (size_t)st->st_size - *size);
+		if (n < 0 && errno != EINTR)
+			return failed(e, path, "read");
+		if (n == 0)
+			break;
+		*size += n < 0 ? 0 : (size_t)n;
+	}
+	return 0;
+}
+
 int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e)
 {
 	struct stat st;
 	int fd = open(path, O_RDONLY | O_CLOEXEC);
 	if (fd < 0)
 		return failed(e, path, "open");
-	int rc = 0;
-	unsigned char *all = NULL;
-	size_t got = 0;
+	int rc;
+	*bytes = NULL;
 	if (fstat(fd, &st) != 0)
 		rc = failed(e, path, "read");
+	else if (S_ISFIFO(st.st_mode) || S_ISSOCK(st.st_mode))
+		rc = read_stream(fd, path, bytes, size, e);
 	else if (!S_ISREG(st.st_mode) || st.st_size > FILE_MOST)
-		rc = error_set(e, EINVAL, "%s: not a regular file of at most 4 GiB", path);
-	else if (!(all = mem_alloc((size_t)st.st_size, 1)))
-		rc = error_set(e, ENOMEM, "%s: no memory for it", path);
-	while (rc == 0 && got < (size_t)st.st_size) {
-		ssize_t n = read(fd, all + got, (size_t)st.st_size - got);
-		if (n < 0 && errno != EINTR)
-			rc = failed(e, path, "read");
-		if (n == 0)
-			break;
-		got += n < 0 ? 0 : (size_t)n;
-	}
+		rc = error_set(e, EINVAL, "%s: not a pipe, and not a regular file of at most 4 GiB", path);
+	else
+		rc = read_regular(fd, &st, path, bytes, size, e);
 	close(fd);
 	if (rc) {
-		mem_free(all);
-		return rc;
+		mem_free(*bytes);
+		*bytes = NULL;
 	}
-	*bytes = all;
-	*size = got;
-	return 0;
+	return rc;
 }

@@ -17,7 +17,7 @@ int image_file_write(const char *path, const unsigned char *bytes, size_t size, 
 /* Whether image_file_write could write there: checked before hours are spent. Leaves nothing behind. */
 int image_file_probe(const char *path, struct error *e);
 
-/* Reads the whole file, at most 2^32 bytes; bytes are mem_alloc'd. */
+/* Reads the whole file, or a pipe to its end, at most 2^32 bytes; bytes are mem_alloc'd. */
 int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e);
 
 #endif

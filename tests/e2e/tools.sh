@@ -50,6 +50,20 @@ grep -q '^left out  *2 of 256' out || fail "--trim says: $(cat out)"
 code 0 "$BIN/hslt-tonemap" a.exr a.png --exposure -1
 code 2 "$BIN/hslt-tonemap" a.exr a.png --exposure bright
 code 2 "$BIN/hslt-tonemap" a.exr a.JPG && [ ! -e a.JPG ] || fail "a PNG has the name of another format"
+grep -q 'writes PNG only' err.log || fail "a.JPG: $(cat err.log)"
+# - is stdin or stdout, everywhere
+code 0 "$BIN/hslt-tonemap" a.exr dash.png
+"$BIN/hslt-tonemap" - - <a.exr 2>err.log | cmp - dash.png || fail "tonemap - -: $(cat err.log)"
+"$BIN/hslt-render" box.xml -o - --integrator path --spp 4 --seed 1 --size 32x32 --threads 1 --quiet 2>err.log | "$BIN/hslt-tonemap" - piped.png ||
+	fail "render | tonemap: $(cat err.log)"
+cmp piped.png dash.png || fail "a pipe makes another picture"
+cat a.exr | code 0 "$BIN/hslt-compare" --exact - again.exr
+cat a.exr | code 1 "$BIN/hslt-compare" --exact other.exr -
+code 2 "$BIN/hslt-compare" --exact - -
+printf x | code 1 "$BIN/hslt-tonemap" - piped.png
+"$BIN/hslt-assemble" a.exr -o - 2>err.log >whole.exr && code 0 "$BIN/hslt-tonemap" whole.exr piped.png && cmp piped.png dash.png ||
+	fail "assemble -o -: $(cat err.log)"
+rm dash.png piped.png
 # What is no regular file is written to and stays; of a link the file that it leads to is replaced.
 code 0 "$BIN/hslt-tonemap" a.exr b.png --exposure -1
 "$BIN/hslt-tonemap" a.exr /dev/stdout --exposure -1 2>err.log | cmp - b.png || fail "/dev/stdout: $(cat err.log)"

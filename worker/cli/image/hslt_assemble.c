@@ -7,6 +7,7 @@
 #include "worker/cli/image/assemble.h"
 
 #include <stdio.h>
+#include <string.h>
 
 enum { CROPS_MOST = 4096 };
 
@@ -15,8 +16,16 @@ struct arguments {
 	size_t count;
 };
 
+static int take_output(void *target, char *arg, struct error *e)
+{
+	struct arguments *a = target;
+	(void)e;
+	a->out = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
+	return 0;
+}
+
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The image", OPTION_TEXT(struct arguments, out)},
+	{"output", 'o', "FILE", "The image; -: stdout", OPTION_TAKE(take_output)},
 	{0},
 };
 

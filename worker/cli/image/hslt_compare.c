@@ -18,12 +18,14 @@
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 struct arguments {
 	const char *path[2], *heatmap;
 	double trim, most; /* most: negative: none */
 	uint32_t width, height;
 	bool exact, json;
+	int dashes; /* images from stdin */
 };
 
 static int take_size(void *target, char *arg, struct error *e)
@@ -53,8 +55,10 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	struct arguments *a = target;
 	if (index > 1)
 		return error_set(e, EINVAL, "only two images can be compared");
-	a->path[index] = word;
-	return 0;
+	bool dash = strcmp(word, "-") == 0;
+	a->path[index] = dash ? "/dev/stdin" : word;
+	a->dashes += dash;
+	return a->dashes < 2 ? 0 : error_set(e, EINVAL, "only one image can come from stdin");
 }
 
 static int check(void *target, struct error *e)
@@ -79,7 +83,7 @@ static const struct program program = {
 		"relMSE is the mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its "
 		"square root; PSNR takes the 99.5th percentile of B as peak. --trim omits the worst pixels from relMSE, RMSE and PSNR, not from the means.\n--exact compares "
 		"every channel and the header, except for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end and "
-		"hslt:date.",
+		"hslt:date. - is stdin.",
 	.exits = "0 done, 1 failed, different, or above --max-relmse, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,

@@ -26,7 +26,11 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	struct arguments *a = target;
 	if (index > 1)
 		return error_set(e, EINVAL, "only two files are accepted");
-	*(index == 0 ? &a->in : &a->out) = word;
+	bool dash = strcmp(word, "-") == 0;
+	if (index == 0)
+		a->in = dash ? "/dev/stdin" : word;
+	else
+		a->out = dash ? "/dev/stdout" : word;
 	return 0;
 }
 
@@ -38,7 +42,7 @@ static int check(void *target, struct error *e)
 		return error_set(e, EINVAL, "IN.exr and OUT.png are needed");
 	if (!format || strcmp(format, ".png") == 0)
 		return 0;
-	return error_set(e, EINVAL, "it makes PNG files, and '%s' would not be what its name says", a->out);
+	return error_set(e, EINVAL, "writes PNG only, not '%s': name the output *.png", a->out);
 }
 
 static const struct program program = {
@@ -46,9 +50,10 @@ static const struct program program = {
 	.words = "IN.exr OUT.png",
 	.summary = "Converts the channels R, G, B of an EXR file to a PNG file of 8-bit sRGB.",
 	.examples = "hslt-tonemap room.exr room.png\n"
-		    "hslt-tonemap --exposure -1.5 room.exr darker.png",
+		    "hslt-tonemap --exposure -1.5 room.exr darker.png\n"
+		    "hslt-render room.xml -o - | hslt-tonemap - room.png",
 	.details = "Values are multiplied by 2^STOPS and clipped to [0,1]. NaN becomes 0, infinities become 0 or "
-		   "255; both are counted on stderr.",
+		   "255; both are counted on stderr. - is stdin or stdout.",
 	.exits = "0 done, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,
