@@ -33,6 +33,18 @@ grep -q "^bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(tail -n
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
 grep -q "bad.xml:3.*and 5 more: hslt-scene check lists them" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
 
+# In the order of lines, files that are not there among them.
+cat >"$DIR/order.xml" <<'XML'
+<scene version="3.0.0"><integrator type="path"/>
+<shape type="obj"><string name="filename" value="none.obj"/></shape>
+<shape type="sphere"><float name="radios" value="1"/></shape>
+<shape type="obj"><string name="filename" value="none-either.obj"/></shape>
+<shape type="sphere"><float name="radios" value="1"/></shape>
+</scene>
+XML
+code 1 "$BIN/hslt-scene" check "$DIR/order.xml"
+[ "$(sed -n 's/^order.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 3 4 5 " ] || fail "not in the order of lines: $(cat "$DIR/out")"
+
 # What the reader cannot see by itself.
 sed 's/filename" value="[^"]*"/filename" value="gone.obj"/' "$BOX" >"$DIR/gone.xml"
 if grep -q gone.obj "$DIR/gone.xml"; then

@@ -17,6 +17,7 @@
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* An open scene file: its folder, its name there, and the folder's files. */
@@ -47,10 +48,72 @@ static const char *plural(uint64_t n)
 	return n == 1 ? "" : "s";
 }
 
+/* Lines "file:12: ...", printed by file as they came, and in a file by line. */
+struct problem {
+	char *text;
+	size_t file; /* the first problem of its file */
+	size_t index;
+	unsigned long line;
+};
+
+struct problem_list {
+	size_t count;
+	struct problem *at;
+};
+
+/* "file:12" -> 4 and 12. */
+static size_t place_of(const char *text, unsigned long *line)
+{
+	const char *colon = strchr(text, ':');
+	*line = colon ? strtoul(colon + 1, NULL, 10) : 0;
+	return colon ? (size_t)(colon - text) : 0;
+}
+
+static void add_problem(struct problem_list *p, const char *text)
+{
+	unsigned long line, other;
+	size_t n = place_of(text, &line), file = 0;
+	struct problem *more = mem_grow(p->at, p->count * sizeof *more, (p->count + 1) * sizeof *more);
+	char *copy = mem_strdup(text);
+	p->at = more ? more : p->at;
+	if (!more || !copy) {
+		mem_free(copy);
+		printf("%s\n", text);
+		return;
+	}
+	while (file < p->count && (place_of(p->at[file].text, &other) != n || memcmp(p->at[file].text, text, n) != 0))
+		file++;
+	file = file < p->count ? p->at[file].file : p->count;
+	p->at[p->count] = (struct problem){copy, file, p->count, line};
+	p->count++;
+}
+
+static int by_place(const void *x, const void *y)
+{
+	const struct problem *a = x, *b = y;
+	if (a->file != b->file)
+		return a->file < b->file ? -1 : 1;
+	if (a->line != b->line)
+		return a->line < b->line ? -1 : 1;
+	return a->index < b->index ? -1 : 1;
+}
+
+static void print_problems(struct problem_list *p)
+{
+	if (p->count)
+		qsort(p->at, p->count, sizeof *p->at, by_place);
+	for (size_t i = 0; i < p->count; i++) {
+		printf("%s\n", p->at[i].text);
+		mem_free(p->at[i].text);
+	}
+	mem_free(p->at);
+}
+
 /* Files that cannot be opened, all of them. Others are as their users find them. */
-static uint32_t print_missing(const struct scene *s, const struct asset_source *assets)
+static uint32_t find_missing(const struct scene *s, const struct asset_source *assets, struct problem_list *list)
 {
 	uint32_t missing = 0;
+	char text[2048];
 	for (uint32_t i = 0; i < s->asset_count; i++) {
 		struct asset a;
 		struct error e;
@@ -58,7 +121,9 @@ static uint32_t print_missing(const struct scene *s, const struct asset_source *
 		int rc = assets->open(assets->user, s->assets[i], &a, &e);
 		if (rc) {
 			bool texture = rc == -ENOENT && strstr(place, ": <texture ");
-			printf("%s%s%s%s\n", place, *place ? ": " : "", e.text, texture ? LENIENT_TEXTURE_HINT : "");
+			snprintf(text, sizeof text, "%s%s%s%s", place, *place ? ": " : "", e.text,
+				 texture ? LENIENT_TEXTURE_HINT : "");
+			add_problem(list, text);
 			missing++;
 		} else {
 			assets->close(assets->user, &a);
@@ -93,9 +158,11 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 {
 	static struct render_summary m; /* large */
 	uint32_t problems = s->problem_count, notes = s->note_count;
+	struct problem_list list = {0};
 	for (uint32_t i = 0; i < s->problem_count; i++)
-		printf("%s\n", s->problems[i]);
-	problems += print_missing(s, assets);
+		add_problem(&list, s->problems[i]);
+	problems += find_missing(s, assets, &list);
+	print_problems(&list);
 	if (!problems)
 		problems = print_deeper(s, assets, &m);
 	for (uint32_t i = 0; i < s->note_count; i++)
