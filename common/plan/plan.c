@@ -289,7 +289,7 @@ void plan_describe_epoch(const struct plan_request *r, const struct plan *p, cha
 	enum epoch_rule rule = asked_total(r, p, &total, &e) ? RULE_ASKED : choose_epoch(r, &q, total, &epoch);
 	const char *thing = p->kind == PLAN_CHAINS ? "mutations" : "samples";
 	if (rule == RULE_ROUNDS)
-		snprintf(text, size, "epochs: for %d rounds", AIM_ROUNDS);
+		snprintf(text, size, "epochs: for %s%d rounds", p->rounds < AIM_ROUNDS ? "at most " : "", AIM_ROUNDS);
 	else if (rule == RULE_FILM)
 		snprintf(text, size, "epochs: by the size of the film");
 	else if (rule == RULE_ROOM)

@@ -151,7 +151,12 @@ int main(int argc, char **argv)
 	program_options(&program, argc, argv, &a);
 	if (!a.ca || !*a.ca) {
 		const char *where = getenv("HOME");
-		snprintf(home, sizeof home, "%s/.hslt-ca", where ? where : ".");
+		if (!where || !*where) {
+			fprintf(stderr,
+				"hslt-ca: there is no $HOME for the authority: --ca DIR (or $HSLT_CA) is needed\n");
+			return 2;
+		}
+		snprintf(home, sizeof home, "%s/.hslt-ca", where);
 		a.ca = home;
 	}
 	int rc = run_command(&a, &e);

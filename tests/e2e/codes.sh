@@ -51,6 +51,10 @@ else
 fi
 chmod 700 "$DIR/closed"
 
+mkdir "$DIR/homeless"
+(cd "$DIR/homeless" && unset HOME HSLT_CA && code 2 "$BIN/hslt-ca" init) || exit 1
+grep -q -- '--ca DIR' "$DIR/err.log" && [ -z "$(ls -A "$DIR/homeless")" ] || fail "hslt-ca without a home: $(cat "$DIR/err.log")"
+
 start_coordinator
 code 1 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/spool" # one master a spool
 code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # before hours are spent, not after
@@ -81,6 +85,9 @@ for p in render submit; do
 		code 2 "$BIN/hslt-$p" --estimate "$BOX" -i path $wrong
 	done
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --chains 2M
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --chains 10
+	grep -q -- '--chains 10: the integrator path has no chains' "$DIR/err.log" || fail "hslt-$p: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-$p" "$BOX" -o ''
 	code 0 "$BIN/hslt-$p" --set help
 	grep -q "^tolerance=0.001 " "$DIR/out" || fail "hslt-$p --set help says: $(cat "$DIR/out")"
 done

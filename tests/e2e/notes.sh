@@ -70,6 +70,11 @@ for one in "--integrator path --spp 1" "--integrator pssmlt --spp 16 --groups 1"
 		fail "$one: the header has an error, or no reason for none"
 done
 
+"$BIN/hslt-render" "$BOX" -o "$DIR/deep.exr" --size 8x8 -i pssmlt --max-depth 60 --spp 16 2>"$DIR/deep.log" || fail "deep: ended with $?"
+noted "$DIR/deep.log" 'chains of pssmlt hold paths of up to 32 edges'
+"$BIN/hslt-render" "$BOX" -o "$DIR/deep.exr" --size 8x8 -i pssmlt --max-depth 32 --spp 16 2>"$DIR/deep.log" || fail "deep: ended with $?"
+! grep -q 'hold paths' "$DIR/deep.log" || fail "32 edges are too many: $(cat "$DIR/deep.log")"
+
 # A sphere whose wall shines and reflects 99 %: 0.99^128 of its light takes more edges than are simulated.
 cat >"$DIR/bright.xml" <<-'XML'
 	<scene version="3.0.0"><integrator type="path"/>

@@ -479,6 +479,9 @@ static void short_jobs_ask_for_no_pilot(void **state)
 	struct plan p = made(&r), q;
 	assert_false(plan_wants_speed(&r, &p));
 	assert_true(ends_with_rule(&r, "for 8 rounds"));
+	struct plan_request one = request(PLAN_SAMPLES, "");
+	assert_int_equal(made(&one).rounds, 1);
+	assert_true(ends_with_rule(&one, "for at most 8 rounds"));
 	r.speed = 5000;
 	q = made(&r);
 	assert_memory_equal(&p, &q, sizeof p);

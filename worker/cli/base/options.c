@@ -377,6 +377,9 @@ static int check(void *target, struct error *e)
 	struct render_arguments *a = target;
 	const char *name = integrator_is_open(&a->plan) ? RENDER_INTEGRATOR_CHAINS : a->plan.integrator;
 	a->render.max_depth = a->plan.max_depth;
+	if (a->plan.chains && render_integrator_find(name)->kind != PLAN_CHAINS)
+		return error_set(e, EINVAL, "--chains %u: the integrator %s has no chains that could be counted",
+				 a->plan.chains, name);
 	if (a->mixture && !render_integrator_find(name)->has_mutations)
 		return error_set(e, EINVAL, "--mutations %s: the integrator %s has no strategies to choose from",
 				 a->mixture, name);
@@ -417,6 +420,18 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	if (!plan_request_is_bounded(p))
 		p->spp = s->spp;
 	return integrator->has_mutations ? render_mutations(a->mixture, summary, p->mixture, e) : 0;
+}
+
+void option_depth_note(const char *integrator, uint32_t max_depth, char *text, size_t size)
+{
+	const struct render_integrator *i = render_integrator_find(integrator);
+	*text = 0;
+	if (i && i->max_depth < max_depth)
+		text_print(
+			text, size,
+			"the chains of %s hold paths of up to %u edges; light of longer ones is missing, and reported if it is more "
+			"than 0.1 %%",
+			i->name, i->max_depth);
 }
 
 int scene_path_split(const char *path, char **folder, char **name, struct error *e)

@@ -31,6 +31,9 @@ bool integrator_is_open(const struct plan_request *r);
  * mixture is invalid, a usage error. */
 int render_plan_from_scene(struct render_arguments *a, const struct render_summary *s, struct error *e);
 
+/* That the integrator's chains hold shorter paths than the plan has; empty: they do not. */
+void option_depth_note(const char *integrator, uint32_t max_depth, char *text, size_t size);
+
 unsigned option_threads_default(void); /* number of processors */
 
 /* For rows of tables; -EINVAL with a sentence is a usage error. The file of an image, which is OpenEXR: an error if

@@ -201,6 +201,9 @@ static int make_plan(struct session *s, struct error *e)
 	plan_describe_changes(p, &s->plan, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "%s\n", text);
+	option_depth_note(s->plan.integrator, s->plan.max_depth, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "hslt-render: note: %s\n", text);
 	for (size_t i = 0; render_scene_note(&s->summary, i, text, sizeof text); i++)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB of Embree's\n", s->build_seconds,

@@ -286,6 +286,9 @@ int main(int argc, char **argv)
 		return rc == -EINVAL ? 2 : 1;
 	}
 	choice_print(&choice, a.render.plan.integrator);
+	option_depth_note(a.render.plan.integrator, a.render.plan.max_depth, note, sizeof note);
+	if (*note)
+		fprintf(stderr, "hslt-submit: note: %s\n", note);
 	measure(&a, &b);
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
