@@ -425,8 +425,9 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	uint64_t total = 0;
 	int rc = check_film(p, e);
 	if (rc == 0 && (r->groups > PLAN_MAX_GROUPS || r->parts > PLAN_MAX_PARTS))
-		rc = error_set(e, EINVAL, "%u groups of %u parts; at most %d of %d", r->groups, r->parts,
-			       PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
+		rc = error_set(e, EINVAL, "--%s %u is above %d", r->groups > PLAN_MAX_GROUPS ? "groups" : "parts",
+			       r->groups > PLAN_MAX_GROUPS ? r->groups : r->parts,
+			       r->groups > PLAN_MAX_GROUPS ? PLAN_MAX_GROUPS : PLAN_MAX_PARTS);
 	if (rc == 0)
 		rc = asked_total(r, p, &total, e);
 	if (rc == 0 && !plan_request_is_bounded(r))
@@ -512,7 +513,9 @@ static int check_end(const struct plan *p, struct error *e)
 	} else if (p->rounds < 1 || (wide)p->rounds * plan_round_mutations(p) > TOTAL_MOST * 2) {
 		return error_set(e, EINVAL, "%llu rounds are not possible", (unsigned long long)p->rounds);
 	}
-	if (p->max_depth < 1 || p->max_depth > PLAN_MAX_DEPTH || p->min_depth > p->max_depth)
+	if (p->max_depth >= 1 && p->min_depth > p->max_depth)
+		return error_set(e, EINVAL, "--min-depth %u is above --max-depth %u", p->min_depth, p->max_depth);
+	if (p->max_depth < 1 || p->max_depth > PLAN_MAX_DEPTH)
 		return error_set(e, EINVAL, "path lengths from %u to %u edges; at most %d", p->min_depth, p->max_depth,
 				 PLAN_MAX_DEPTH);
 	return 0;

@@ -6,6 +6,11 @@
 #include <stdio.h>
 #include <string.h>
 
+static const char *plural(uint64_t n)
+{
+	return n == 1 ? "" : "s";
+}
+
 void plan_describe(const struct plan *p, char *text, size_t size)
 {
 	struct text t = {text, size};
@@ -13,11 +18,13 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	if (p->kind == PLAN_CHAINS)
 		text_put(
 			&t,
-			"%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations per chain in %u leases",
-			p->integrator, p->chains, p->groups, bootstrap, epoch, p->groups * p->parts);
+			"%s: %u chains in %u group%s, %llu bootstrap samples, epochs of %llu mutation%s per chain in %u lease%s",
+			p->integrator, p->chains, p->groups, plural(p->groups), bootstrap, epoch, plural(epoch),
+			p->groups * p->parts, plural((uint64_t)p->groups * p->parts));
 	else
-		text_put(&t, "%s: %u groups, rounds of %llu samples per pixel in %u leases, scaled by %llu samples",
-			 p->integrator, p->groups, p->groups * epoch, p->groups * p->parts, bootstrap);
+		text_put(&t, "%s: %u group%s, rounds of %llu sample%s per pixel in %u lease%s, scaled by %llu samples",
+			 p->integrator, p->groups, plural(p->groups), p->groups * epoch, plural(p->groups * epoch),
+			 p->groups * p->parts, plural((uint64_t)p->groups * p->parts), bootstrap);
 	if (*p->mutations)
 		text_put(&t, ", mutations %s", p->mutations);
 	if (*p->accuracy)
@@ -29,11 +36,11 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	if (p->rounds != UINT64_MAX) {
 		unsigned long long rounds = (unsigned long long)p->rounds;
 		if (p->kind == PLAN_CHAINS)
-			text_put(&t, "%llu round%s (%llu mutations)", rounds, rounds == 1 ? "" : "s",
+			text_put(&t, "%llu round%s (%llu mutations)", rounds, plural(rounds),
 				 rounds * plan_round_mutations(p));
 		else
-			text_put(&t, "%llu round%s (%llu samples per pixel)", rounds, rounds == 1 ? "" : "s",
-				 rounds * p->groups * p->epoch);
+			text_put(&t, "%llu round%s (%llu sample%s per pixel)", rounds, plural(rounds),
+				 rounds * p->groups * p->epoch, plural(rounds * p->groups * p->epoch));
 		or = " or ";
 	}
 	if (p->seconds > 0) {
@@ -48,6 +55,21 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	text_put(&t, ", paths of %u to %u edges, seed %llu", p->min_depth, p->max_depth, (unsigned long long)p->seed);
 }
 
+/* In the unit that was asked for. */
+static void describe_total(const struct plan_request *r, const struct plan *p, const char *then, struct text *t)
+{
+	unsigned long long pixels = (unsigned long long)p->crop_width * p->crop_height;
+	unsigned long long made = p->kind == PLAN_CHAINS ? p->rounds * plan_round_mutations(p)
+							 : p->rounds * p->groups * p->epoch * pixels;
+	bool by_spp = r->spp && (!r->mutations || r->spp <= r->mutations / pixels);
+	if (by_spp && r->spp * pixels != made)
+		text_put(t, "%ssamples per pixel %llu -> %.6g: whole rounds", then, (unsigned long long)r->spp,
+			 (double)made / (double)pixels);
+	else if (!by_spp && r->mutations != made)
+		text_put(t, "%s%s %llu -> %llu: whole rounds", then, p->kind == PLAN_CHAINS ? "mutations" : "samples",
+			 (unsigned long long)r->mutations, made);
+}
+
 void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size)
 {
 	struct text t = {text, size};
@@ -55,20 +77,12 @@ void plan_describe_changes(const struct plan_request *r, const struct plan *p, c
 		text[0] = 0;
 	unsigned leases = p->groups * p->parts;
 	if (p->kind == PLAN_CHAINS && r->chains && r->chains != p->chains)
-		text_put(&t, "chains %u -> %u: a multiple of the %u leases of a round. ", r->chains, p->chains, leases);
+		text_put(&t, "chains %u -> %u: a multiple of the %u leases of a round", r->chains, p->chains, leases);
 	if (r->bootstrap && r->bootstrap != p->bootstrap)
-		text_put(&t, "bootstrap %llu -> %llu: a multiple of the %u leases. ", (unsigned long long)r->bootstrap,
-			 (unsigned long long)p->bootstrap, leases);
-	if (p->rounds == UINT64_MAX)
-		return;
-	unsigned long long pixels = (unsigned long long)p->crop_width * p->crop_height;
-	unsigned long long made = p->kind == PLAN_CHAINS ? p->rounds * plan_round_mutations(p)
-							 : p->rounds * p->groups * p->epoch * pixels;
-	bool by_spp = r->spp && (!r->mutations || r->spp <= r->mutations / pixels);
-	unsigned long long asked = by_spp ? r->spp * pixels : r->mutations;
-	if (asked != made)
-		text_put(&t, "%s %llu -> %llu: whole rounds. ", p->kind == PLAN_CHAINS ? "mutations" : "samples", asked,
-			 made);
+		text_put(&t, "%sbootstrap %llu -> %llu: a multiple of the %u leases", *text ? "; " : "",
+			 (unsigned long long)r->bootstrap, (unsigned long long)p->bootstrap, leases);
+	if (p->rounds != UINT64_MAX)
+		describe_total(r, p, *text ? "; " : "", &t);
 }
 
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size)

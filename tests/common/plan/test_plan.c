@@ -41,28 +41,6 @@ static void a_mixture_is_kept_and_told(void **state)
 	assert_null(strstr(text, "--mutations 0"));
 }
 
-static void scene_options_are_quoted(void **state)
-{
-	(void)state;
-	struct plan_request r = request(PLAN_SAMPLES, "");
-	struct plan p;
-	struct error e;
-	char text[PLAN_OPTIONS_TEXT];
-	struct plan_scene s = {.define_count = 3,
-			       .defines = {{"light", "3"}, {"name", "it's a sun; $x"}, {"none", ""}},
-			       .path_count = 2,
-			       .paths = {"../lib", "my textures"}};
-	assert_int_equal(plan_make(&r, &p, &e), 0);
-	plan_options_with(&p, 1, &s, text, sizeof text);
-	assert_non_null(
-		strstr(text, " -D light=3 -D 'name=it'\\''s a sun; $x' -D none= --path ../lib --path 'my textures'"));
-	plan_options_with(&p, 1, &(struct plan_scene){.define_count = 0}, text, sizeof text);
-	assert_null(strstr(text, " -D"));
-	char few[40];
-	plan_options_with(&p, 1, &s, few, sizeof few);
-	assert_int_equal(strlen(few), sizeof few - 1);
-}
-
 static void settings_and_effects_are_kept_and_told(void **state)
 {
 	(void)state;
@@ -598,7 +576,6 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_mixture_is_kept_and_told),
 		cmocka_unit_test(settings_and_effects_are_kept_and_told),
-		cmocka_unit_test(scene_options_are_quoted),
 		cmocka_unit_test(other_texts_are_none),
 		cmocka_unit_test(entries_are_counted_and_named),
 		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
