@@ -141,15 +141,16 @@ static int try_value(const struct plugin_decl *d, const struct param *p, enum va
 static void check_inside(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
 			 struct counts *c)
 {
-	char said[1024], text[TEXT], own[120];
+	char said[1024], text[TEXT], own[120], positive[120];
 	int end = try_value(d, p, type, x, said, sizeof said, text);
 	if (!end)
 		return;
 	snprintf(own, sizeof own, "%s=%g is outside [", p->name, x);
+	snprintf(positive, sizeof positive, "%s=%g must be positive", p->name, x);
 	c->trials++;
 	c->rendered += end == TRIAL_RENDERED;
 	c->refused += end == TRIAL_REFUSED;
-	if (end == TRIAL_RENDERED || (end == TRIAL_REFUSED && !strstr(said, own)))
+	if (end == TRIAL_RENDERED || (end == TRIAL_REFUSED && !strstr(said, own) && !strstr(said, positive)))
 		return;
 	c->bad++;
 	print_message("%s, %s = %g: ends with %d: %s\n", d->type, p->name, x, end, said);
@@ -163,7 +164,8 @@ static void check_beyond(const struct plugin_decl *d, const struct param *p, enu
 	if (!end)
 		return;
 	c->trials++;
-	if (end == TRIAL_REFUSED && strstr(said, "s.xml:2: ") && strstr(said, "is outside ["))
+	if (end == TRIAL_REFUSED && strstr(said, "s.xml:2: ") &&
+	    (strstr(said, "is outside [") || strstr(said, " must be positive")))
 		return;
 	c->bad++;
 	print_message("%s, %s = %g, beyond its range [%g, %g]: ends with %d: %s\n", d->type, p->name, x, p->min, p->max,

@@ -5,6 +5,7 @@
 #include "worker/render/scene/element.h"
 #include "worker/render/scene/value.h"
 
+#include <float.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -28,6 +29,9 @@ static int check_range(const struct xml_element *el, const struct param *p, cons
 	double scratch[3];
 	uint32_t count;
 	const double *x = value_numbers(v, scratch, &count);
+	for (uint32_t i = 0; i < count; i++)
+		if (p->min > 0 && p->min <= DBL_MIN && !(x[i] > 0))
+			return xml_error(el, e, ERANGE, "%s=%g must be positive", p->name, x[i]);
 	for (uint32_t i = 0; i < count; i++)
 		if (!(x[i] >= p->min && x[i] <= p->max))
 			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", element_spelling(el, p->name),

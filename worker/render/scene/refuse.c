@@ -19,10 +19,10 @@ static const char *lenient_hint(enum plugin_class cls, const char *type, char *t
 		snprintf(text, size, "; --lenient leaves it out");
 		break;
 	case LENIENT_REPLACE:
-		snprintf(text, size, "; --lenient takes `%s` instead", other);
+		snprintf(text, size, "; --lenient uses `%s` instead", other);
 		break;
 	case LENIENT_INNER:
-		snprintf(text, size, "; --lenient takes the %s inside it, or `%s`, instead", plugin_class_name(cls),
+		snprintf(text, size, "; --lenient uses the %s inside it, or `%s`, instead", plugin_class_name(cls),
 			 other);
 		break;
 	default:

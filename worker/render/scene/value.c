@@ -38,6 +38,9 @@ static int read_int(const struct xml_element *el, struct value *out, struct erro
 {
 	const char *text;
 	int r = need_value(el, &text, e);
+	if (!r && !number_parse_int(text, &out->as.integer) && number_parse(text, &(double){0}) &&
+	    !strpbrk(text, ".eE"))
+		return xml_error(el, e, ERANGE, "`%.64s` is too large", text);
 	if (!r && !number_parse_int(text, &out->as.integer))
 		return xml_error(el, e, EINVAL, "`%.64s` is not a whole number", text);
 	return r;

@@ -526,8 +526,12 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 	XML_Parser parser = r->parser;
 	enum XML_Status status = XML_Parse(parser, a->size ? (const char *)a->bytes : "", (int)a->size, XML_TRUE);
 	int c = r->failed;
-	if (!c && status != XML_STATUS_OK) {
-		enum XML_Error code = XML_GetErrorCode(parser);
+	enum XML_Error code = XML_GetErrorCode(parser);
+	if (!c && status != XML_STATUS_OK && code == XML_ERROR_NO_ELEMENTS) {
+		c = r->current ? error_set(r->error, EINVAL, "%s:%d: the file ends before </%.64s>", r->file,
+					   line_now(r), r->current->name)
+			       : error_set(r->error, EINVAL, "%s: the file is empty", r->file);
+	} else if (!c && status != XML_STATUS_OK) {
 		c = error_set(r->error, code == XML_ERROR_NO_MEMORY ? ENOMEM : EINVAL, "%s:%d: %s%s%.64s%s", r->file,
 			      line_now(r), XML_ErrorString(code), r->current ? " in <" : "",
 			      r->current ? r->current->name : "", r->current ? ">" : "");

@@ -3,16 +3,15 @@
  * greatest value; choices, the first of them worth 0 unless they are numbers; what it does, in one sentence; values
  * worth a sweep. */
 SETTING(tolerance, "tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 1, NULL,
-	"How near its target a walk brings each half vector, of the smaller of lobe and step", "0.1", "0.01", "0.001",
-	"0.0001", "1e-05", "1e-06", "1e-08")
-SETTING(iterations, "iterations", SETTING_WHOLE, SETTING_CHAINS, 15, 1, 1000, NULL,
-	"Steps of Newton after which a walk is given up", "2", "3", "4", "6", "10", "15", "30")
+	"Residual at which a walk has reached its half vectors, relative to the lobe or the step, whichever is smaller",
+	"0.1", "0.01", "0.001", "0.0001", "1e-05", "1e-06", "1e-08")
+SETTING(iterations, "iterations", SETTING_WHOLE, SETTING_CHAINS, 15, 1, 1000, NULL, "Newton steps before a walk fails",
+	"2", "3", "4", "6", "10", "15", "30")
 SETTING(least_step, "least-step", SETTING_REAL, SETTING_CHAINS, 0.3, 1e-9, 1, NULL,
-	"Share of a step of Newton below which a walk that goes wrong is given up", "1", "0.3", "0.1", "0.03", "0.001",
-	"1e-05")
+	"Fraction of a Newton step below which a diverging walk fails", "1", "0.3", "0.1", "0.03", "0.001", "1e-05")
 SETTING(reverse_tolerance, "reverse-tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 0.5, NULL,
-	"How near to where it began the way back of a walk must end, of the largest step that a vertex made", "0.1",
-	"0.01", "0.001", "0.0001", "1e-06")
+	"How close to its start the reverse walk must end, relative to the largest step of a vertex", "0.1", "0.01",
+	"0.001", "0.0001", "1e-06")
 SETTING(precision, "precision", SETTING_CHOICE, SETTING_CHAINS, SETTING_DOUBLE, SETTING_DOUBLE, SETTING_SINGLE,
 	"double single", "Of the matrices that walks and densities of half vectors solve; positions are double",
 	"double", "single")

@@ -38,7 +38,8 @@ const struct effect_decl effect_table[EFFECTS] = {
 			     "without its textures a scene has no colours"},
 	[EFFECT_DISPLACEMENT] = {"displacement", ON | SCENE, "no finer meshes are made: time and memory of building",
 				 NULL},
-	[EFFECT_BUMP] = {"bump", 0, "normals are the mesh's", "bending normals costs nothing where there is no relief"},
+	[EFFECT_BUMP] = {"bump", 0, "normals are the mesh's",
+			 "bump and normal maps cost nothing where no material has one"},
 	[EFFECT_ALPHA] = {"alpha", 0, "no opacity test per ray: one filter less in Embree", "masks are specular lobes"},
 	[EFFECT_COINCIDENCE] = {"coincidence", 0, "no test per ray which of two surfaces is present",
 				"surfaces coincide or they do not"},
@@ -82,7 +83,7 @@ static int parse_item(const char *item, size_t length, struct effects_choice *ou
 		return 0;
 	}
 	if (length < 2 || (*item != '+' && *item != '-'))
-		return error_set(e, EINVAL, "'%.*s': effects are forced by all, +NAME or -NAME, separated by commas",
+		return error_set(e, EINVAL, "takes 'all', or +NAME and -NAME separated by commas, not '%.*s'",
 				 (int)length, item);
 	enum effect which = find(item + 1, length - 1);
 	if (which == EFFECTS)

@@ -48,9 +48,9 @@ static void refuses(const char *xml, const char *text)
 static void test_broken_xml(void **state)
 {
 	(void)state;
-	refuses("", "s.xml:1: no element found");
+	refuses("", "s.xml: the file is empty");
 	refuses("hello", "s.xml:1: syntax error");
-	refuses(S "\n<shape type='cube'>\n", "s.xml:3: no element found in <shape>");
+	refuses(S "\n<shape type='cube'>\n", "s.xml:3: the file ends before </shape>");
 	refuses(S "\n<shape type='cube'></bsdf>" END, "s.xml:2: mismatched tag in <shape>");
 	refuses(S "<shape type='cube' type='obj'/>" END, "duplicate attribute");
 	refuses(S "<shape type='cube'/>" END "<x/>", "junk after document element");
@@ -158,17 +158,17 @@ static void test_unknown_names(void **state)
 	refuses(S "<probe type='x'/>" END,
 		"<probe type=\"x\">: there is no element of this name; --lenient leaves it out");
 	refuses(S "<bsdf type='hair'/>" END,
-		"this bsdf of Mitsuba's is not supported; --lenient takes the bsdf inside it, or `diffuse`, instead "
+		"this bsdf of Mitsuba's is not supported; --lenient uses the bsdf inside it, or `diffuse`, instead "
 		"(supported: diffuse, roughconductor");
-	refuses(S "<bsdf type='roughgrating'/>" END, "there is no bsdf of this type; --lenient takes the bsdf inside");
-	refuses(S "<rfilter type='blackman'/>" END, "; --lenient takes `gaussian` instead");
+	refuses(S "<bsdf type='roughgrating'/>" END, "there is no bsdf of this type; --lenient uses the bsdf inside");
+	refuses(S "<rfilter type='blackman'/>" END, "; --lenient uses `gaussian` instead");
 	refuses(S "<shape type='ellipsoids'/>" END,
 		"<shape type=\"ellipsoids\">: this shape of Mitsuba's is not supported; --lenient leaves it out (supp");
 	refuses(S "<medium type='smoke'/>" END,
 		"s.xml:1: <medium type=\"smoke\">: there is no medium of this type; --lenient leaves it out (supported: "
 		"homogeneous, heterogeneous)");
 	refuses(S "<medium type='homogeneous'>\n<phase type='sggx'/></medium>" END,
-		"s.xml:2: <phase type=\"sggx\">: this phase of Mitsuba's is not supported; --lenient takes `isotropic` "
+		"s.xml:2: <phase type=\"sggx\">: this phase of Mitsuba's is not supported; --lenient uses `isotropic` "
 		"instead (supported: isotropic, hg, rayleigh)");
 	refuses(S "<medium type='homogeneous'>\n<volume type='volcache' name='albedo'/></medium>" END,
 		"s.xml:2: <volume type=\"volcache\">: this volume of Mitsuba's is not supported; --lenient leaves it out "
@@ -272,8 +272,8 @@ static void test_bad_values(void **state)
 	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value, a folder");
 	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END,
 		"neither true nor false");
-	refuses(S "<shape type='sphere'><float name='radius' value='0'/></shape>" END, "outside");
-	refuses(S "<shape type='sphere'><float name='radius' value='-1'/></shape>" END, "outside");
+	refuses(S "<shape type='sphere'><float name='radius' value='0'/></shape>" END, "must be positive");
+	refuses(S "<shape type='sphere'><float name='radius' value='-1'/></shape>" END, "must be positive");
 	refuses(S "<shape type='obj'><string name='filename' value=''/></shape>" END, "an empty file name");
 }
 
@@ -492,7 +492,7 @@ static void test_bad_films(void **state)
 	refuses(FILM("<integer name='width' value='0'/>"), "s.xml:2: <integer>: width=0 is outside [1, 65536]");
 	refuses(FILM("<integer name='height' value='1000000000'/>"), "height=1e+09 is outside");
 	refuses(FILM("<integer name='width' value='-5'/>"), "outside");
-	refuses(FILM("<integer name='width' value='99999999999999999999999'/>"), "is not a whole number");
+	refuses(FILM("<integer name='width' value='99999999999999999999999'/>"), "is too large");
 	refuses(FILM("<integer name='crop_width' value='0'/>"), "crop_width=0 is outside [1, 65536]");
 	refuses(FILM("<string name='size' value='5'/>"), "would change the image and is not supported");
 #undef FILM

@@ -135,7 +135,7 @@ static void test_refused(void **state)
 	(void)state;
 	refuses(CHECKERS LEVEL("-1"), "displacement_level=-1 is outside [0, 13]");
 	refuses(CHECKERS LEVEL("14"), "displacement_level=14 is outside [0, 13]");
-	refuses(CHECKERS LEVEL("99999999999999999999"), "is not a whole number");
+	refuses(CHECKERS LEVEL("99999999999999999999"), "is too large");
 	refuses(CHECKERS LEVEL("2.5"), "is not a whole number");
 	refuses(CHECKERS, "displacement needs displacement_level, 0 to 13");
 	refuses(CHECKERS SCALE("nan") LEVEL("1"), "`nan` is not");

@@ -152,7 +152,7 @@ static void test_surfaces(void **state)
 	expect(VIEW LAMP BALL("1", ""), "aperture", false, "the sensor is a pinhole");
 	expect(VIEW LAMP BALL("1", ""), "textures", false, "no material and no emitter has a texture");
 	expect(VIEW LAMP BALL("1", ""), "displacement", false, "no shape is displaced");
-	expect(VIEW LAMP BALL("1", ""), "bump", false, "bending normals costs nothing where there is no relief");
+	expect(VIEW LAMP BALL("1", ""), "bump", false, "bump and normal maps cost nothing where no material has one");
 	expect(VIEW LAMP BALL("1", ""), "alpha", false, "masks are specular lobes");
 	expect(VIEW LAMP BALL("1", ""), "instancing", false, "no mesh stands in several places");
 }
