@@ -22,8 +22,8 @@ Example:
 
 Called again with the same options it goes on: crops that are there are not rendered again. Jobs that run when it is ended go on and
 are not found again by it: hslt-job list, hslt-job cancel. Exit codes are those of hslt-submit --wait (0 done, 4 done, but a bound came
-before the target error in some crop, 5 done, but chains of some crop disagree, 2 usage); when a crop failed 1, and what its hslt-submit
-said.
+before the target error in some crop, 5 done, but chains of some crop disagree, 2 usage), or 1 if a crop failed, with the message of
+its hslt-submit.
 TEXT
 }
 
@@ -64,7 +64,7 @@ done
 [ -n "$coordinators" ] || die "no coordinator: --coordinators A,B or HSLT_COORDINATORS"
 cells=$(pair --grid "$grid") && film=$(pair --size "$size") || exit 2
 columns=${cells% *} rows=${cells#* } width=${film% *} height=${film#* }
-[ $((columns * rows)) -le 1024 ] && [ "$columns" -le "$width" ] && [ "$rows" -le "$height" ] || die "a grid of $grid for $size: at most 1024 crops, each of a pixel at least"
+[ $((columns * rows)) -le 1024 ] && [ "$columns" -le "$width" ] && [ "$rows" -le "$height" ] || die "--grid $grid for --size $size: at most 1024 crops, each of at least one pixel"
 if [ -z "$path" ]; then
 	path=$(dirname "$0")/../build/bin
 	[ -x "$path/hslt-assemble" ] || path=

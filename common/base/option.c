@@ -116,9 +116,7 @@ static int take_count(const struct option_row *r, void *field, const char *arg, 
 {
 	char range[80];
 	uint64_t n = 0;
-	if (!text_count(arg, &n))
-		return error_set(e, EINVAL, "--%s takes a whole number such as 4000 or 1.5k, not '%s'", r->name, arg);
-	if (!is_within(r, (double)n)) {
+	if (!text_count(arg, &n) || !is_within(r, (double)n)) {
 		range_text(r, range, sizeof range);
 		return error_set(e, EINVAL, "--%s takes a whole number %s, not '%s'", r->name, range, arg);
 	}

@@ -26,7 +26,7 @@ int quota_check(const struct quota *q, const struct quota_use *has, const struct
 	if (q->film_bytes && films > q->film_bytes)
 		return error_set(
 			e, EDQUOT,
-			"quota: films of %.3f MB, and %.3f MB is the most: a smaller --size or --crop, or less --groups",
+			"quota: the films need %.0f MB; the limit is %.0f MB: a smaller --size or --crop, or fewer --groups",
 			1e-6 * (double)films, 1e-6 * (double)q->film_bytes);
 	if (q->mutations && p->rounds == UINT64_MAX)
 		return error_set(e, EDQUOT,

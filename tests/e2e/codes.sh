@@ -88,6 +88,8 @@ for p in render submit; do
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i path --chains 10
 	grep -q -- '--chains 10: the integrator path has no chains' "$DIR/err.log" || fail "hslt-$p: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o ''
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --size wide
+	grep -q -- '--size takes W or WxH, such as 640x360' "$DIR/err.log" || fail "hslt-$p --size wide: $(cat "$DIR/err.log")"
 	code 0 "$BIN/hslt-$p" --set help
 	grep -q "^tolerance=0.001 " "$DIR/out" || fail "hslt-$p --set help says: $(cat "$DIR/out")"
 done

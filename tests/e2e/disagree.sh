@@ -87,7 +87,7 @@ has "$DIR/shown" "the error's interval is not known: $doubt"
 "$BIN/hslt-status" >"$DIR/shown"
 has "$DIR/shown" 'its chains are too short to be judged'
 ends 0 "$DIR/large.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $LARGE $CHAINS --integrator hslt --mutations 1280000
-grep -q 'note:' "$DIR/large.log" && fail "nothing is wrong, but: $(grep note: "$DIR/large.log")"
+grep -q ': note:' "$DIR/large.log" && fail "nothing is wrong, but: $(grep ': note:' "$DIR/large.log")"
 grep -a -q hslt:disagreement "$DIR/b.exr" && fail "the header finds something wrong"
 ends 0 "$DIR/path.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SMALL --size 160x120 --integrator path --spp 1
 sed -n 's/.*note: //p' "$DIR/render.log"

@@ -60,6 +60,15 @@ kill -0 $hup 2>/dev/null || fail "ignored, SIGHUP ends it: $(cat "$DIR/hup.log")
 stop $hup
 [ $CODE = 1 ] && [ -s "$DIR/hup.exr" ] || fail "SIGTERM after SIGHUP: $CODE, $(cat "$DIR/hup.log")"
 
+# What stops it is named as the command line has it.
+"$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --size 8x8 -i path --spp 4 2>"$DIR/ends.log" && grep -q 'stopped by: --spp$' "$DIR/ends.log" ||
+	fail "--spp: $(cat "$DIR/ends.log")"
+"$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --size 8x8 -i path 2>"$DIR/ends.log" && grep -q "stopped by: the scene's samples per pixel" "$DIR/ends.log" ||
+	fail "no bound: $(cat "$DIR/ends.log")"
+grep -q '^note: box.xml:15: ' "$DIR/ends.log" && grep -q 'MB for Embree$' "$DIR/ends.log" || fail "notes: $(cat "$DIR/ends.log")"
+code 2 "$BIN/hslt-render" "$BOX" -o "$DIR/ends.exr" --json
+grep -q -- '--json requires --estimate or --explain' "$DIR/err.log" || fail "--json: $(cat "$DIR/err.log")"
+
 # One group has no error: that is said, and nothing prints a number that is none.
 for one in "--integrator path --spp 1" "--integrator pssmlt --spp 16 --groups 1"; do
 	"$BIN/hslt-render" "$BOX" -o "$DIR/one.exr" --size 16x16 $one --stats "$DIR/one.json" 2>"$DIR/one.log" || fail "$one: ended with $?"

@@ -244,8 +244,8 @@ until_true 10 test -s "$DIR/port2" || fail "the plain coordinator does not liste
 refused "TLS to a port without" 6 "does not speak TLS" $list --coordinator "127.0.0.1:$(cat "$DIR/port2")"
 # Its quotas; the box has 1,920 pixels, which are one tile of 4.7 MB in 16 groups, and 2 KB. There is no worker, so that jobs stay.
 plain="$BIN/hslt-submit --coordinator 127.0.0.1:$(cat "$DIR/port2") --tls"
-refused "a film beyond the quota" 6 "quota: films" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 16 --size 100x80
-refused "groups beyond the quota" 6 "quota: films" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 64 --groups 64
+refused "a film beyond the quota" 6 "quota: the films need" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 16 --size 100x80
+refused "groups beyond the quota" 6 "quota: the films need" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 64 --groups 64
 refused "samples beyond the quota" 6 "quota: .* samples" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1000
 refused "samples without a bound" 6 "quota: at most" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --target-error 1%
 cp -r "$(dirname "$BOX")" "$DIR/large"

@@ -156,7 +156,7 @@ static void test_bounds(void **state)
 	(void)state;
 	refused("list -o x --threads 0", "--threads takes a whole number from 1 to 1024, not '0'");
 	refused("list -o x --threads 1025", "--threads takes a whole number from 1 to 1024, not '1025'");
-	refused("list -o x --threads 1.5", "--threads takes a whole number such as 4000 or 1.5k, not '1.5'");
+	refused("list -o x --threads 1.5", "--threads takes a whole number from 1 to 1024, not '1.5'");
 	refused("list -o x --trim 1", "--trim takes a number of at least 0 and below 1, not '1'");
 	refused("list -o x --exposure nan", "--exposure takes a number from -100 to 100, not 'nan'");
 	refused("list -o x --exposure 1x", "--exposure takes a number from -100 to 100, not '1x'");
@@ -167,8 +167,8 @@ static void test_bounds(void **state)
 	refused("list -o x --time 5y", "--time takes a time such as 90, 90s, 5m or 2h, not '5y'");
 	refused("list --output=", "--output takes the name of a file, not ''");
 	refused("list -o x --spp 8", "--spp takes what is to be added, such as +8, not '8'");
-	refused("list -o x --spp ++8", "--spp takes a whole number such as 4000 or 1.5k, not '+8'");
-	refused("list -o x --threads +3", "--threads takes a whole number such as 4000 or 1.5k, not '+3'");
+	refused("list -o x --spp ++8", "--spp takes a whole number from 1 to 1000000000, not '+8'");
+	refused("list -o x --threads +3", "--threads takes a whole number from 1 to 1024, not '+3'");
 }
 
 static void test_defaults_and_environment(void **state)

@@ -126,7 +126,7 @@ static int load(struct session *s, struct error *e)
 		return rc;
 	s->scene_read = true;
 	for (uint32_t i = 0; !s->a->quiet && i < s->scene.note_count; i++)
-		fprintf(stderr, "%s\n", s->scene.notes[i]);
+		fprintf(stderr, "note: %s\n", s->scene.notes[i]);
 	return render_check(&s->scene, &s->assets, &r->render, &s->summary, e);
 }
 
@@ -155,8 +155,8 @@ static int design(struct session *s, struct error *e)
 	s->usage = rc == -EINVAL;
 	if (rc || s->a->quiet)
 		return rc;
-	fprintf(stderr, "%zu settings: the default, a reference and %zu parameters\n", s->design.count,
-		s->design.sweep_count);
+	fprintf(stderr, "%zu settings: the default, a reference and %zu parameter%s\n", s->design.count,
+		s->design.sweep_count, s->design.sweep_count == 1 ? "" : "s");
 	for (size_t i = 0; i < s->design.left_out_count; i++)
 		fprintf(stderr, "left out: %s (%s)\n", s->design.left_out[i].parameter, s->design.left_out[i].why);
 	return 0;

@@ -80,8 +80,10 @@ static int check(void *target, struct error *e)
 	if (a->explain && (a->output || a->stats || a->estimate))
 		return error_set(e, EINVAL,
 				 "--explain renders nothing and cannot be combined with -o, --stats or --estimate");
-	if (!a->estimate && (a->pilot > 0 || a->plot || (a->json && !a->explain)))
-		return error_set(e, EINVAL, "--pilot, --plot and --json require --estimate");
+	if (!a->estimate && (a->pilot > 0 || a->plot))
+		return error_set(e, EINVAL, "--pilot and --plot require --estimate");
+	if (a->json && !a->estimate && !a->explain)
+		return error_set(e, EINVAL, "--json requires --estimate or --explain");
 	return 0;
 }
 
@@ -129,7 +131,8 @@ struct session {
 	struct kept_bootstrap kept;
 	struct output_files outputs;
 	struct guarded_source files;
-	bool usage; /* the command line is wrong */
+	bool scene_spp; /* no bound was given: the scene's number of samples */
+	bool usage;	/* the command line is wrong */
 };
 
 static int hash_scene(struct session *s, const struct asset_source *files, struct error *e)
@@ -162,7 +165,7 @@ static int load(struct session *s, struct error *e)
 		return rc;
 	option_plan_scene(&s->a->render, &s->inputs);
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
-		fprintf(stderr, "%s\n", scene.notes[i]);
+		fprintf(stderr, "note: %s\n", scene.notes[i]);
 	rc = world_new(&s->world, &scene, &assets, &s->a->render.render, e);
 	scene_fini(&scene);
 	if (rc)
@@ -186,6 +189,7 @@ static int make_plan(struct session *s, struct error *e)
 {
 	struct plan_request *p = &s->a->render.plan;
 	char text[PLAN_TEXT];
+	s->scene_spp = !plan_request_is_bounded(p);
 	int rc = render_plan_from_scene(&s->a->render, &s->summary, e);
 	if (!rc)
 		rc = choose(s, e);
@@ -206,7 +210,7 @@ static int make_plan(struct session *s, struct error *e)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 	for (size_t i = 0; render_scene_note(&s->summary, i, text, sizeof text); i++)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
-	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB of Embree's\n", s->build_seconds,
+	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB for Embree\n", s->build_seconds,
 		(unsigned long long)s->summary.triangles, world_embree_bytes(s->world) >> 20);
 	return 0;
 }
@@ -332,14 +336,22 @@ static int write_image(const struct session *s, struct error *e)
 	return rc;
 }
 
+/* As the command line has it. */
+static const char *end_text(const struct session *s)
+{
+	const struct plan_request *r = &s->a->render.plan;
+	if (s->run.end != MERGE_ROUNDS || s->run.lit.black)
+		return merge_end_name(s->run.end, s->run.lit.black);
+	return s->scene_spp ? "the scene's samples per pixel" : r->mutations ? "--mutations" : "--spp";
+}
+
 static void print_summary(const struct session *s)
 {
 	const struct canvas_image *i = &s->image;
 	const struct plan *p = &s->plan;
 	char text[STRATEGY_TABLE];
 	fprintf(stderr, "%llu round%s in %.1f s (%.1f s of CPU time); stopped by: %s\n", (unsigned long long)i->rounds,
-		i->rounds == 1 ? "" : "s", s->run.seconds, s->run.cpu_seconds,
-		merge_end_name(s->run.end, s->run.lit.black));
+		i->rounds == 1 ? "" : "s", s->run.seconds, s->run.cpu_seconds, end_text(s));
 	stated_error(i, text, sizeof text);
 	if (*text && !i->rel_mse_doubt)
 		fprintf(stderr, "%s\n", text);
@@ -388,13 +400,14 @@ static int report(const struct session *s, const struct local_pilot *p, struct e
 
 static int estimate(struct session *s, struct error *e)
 {
+	struct plan plan;
 	int rc = load(s, e);
 	if (!rc) {
 		rc = pilot_plan_from_scene(&s->a->render, &s->summary, e);
 		if (!rc)
 			rc = choose(s, e);
 		if (!rc)
-			rc = pilot_render_plan(&s->a->render.plan, &s->plan, e);
+			rc = pilot_render_plan(&s->a->render.plan, &plan, e);
 		s->usage = rc == -EINVAL;
 	}
 	if (rc)
@@ -452,7 +465,7 @@ static int run_session(struct session *s, struct error *e)
 	if (!rc && s->image.rel_mse_doubt)
 		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
-		rc = error_set(e, EINTR, "interrupted: %s contains the %llu complete round%s", s->a->output,
+		rc = error_set(e, EINTR, "interrupted: %s holds %llu complete round%s", s->a->output,
 			       (unsigned long long)s->image.rounds, s->image.rounds == 1 ? "" : "s");
 	return rc;
 }

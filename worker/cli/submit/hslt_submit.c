@@ -263,7 +263,7 @@ int main(int argc, char **argv)
 		return 1;
 	}
 	for (size_t i = 0; i < b.note_count; i++)
-		fprintf(stderr, "%s\n", b.notes[i]);
+		fprintf(stderr, "note: %s\n", b.notes[i]);
 	rc = a.estimate ? pilot_plan_from_scene(&a.render, &b.summary, &e)
 			: render_plan_from_scene(&a.render, &b.summary, &e);
 	if (rc) {
