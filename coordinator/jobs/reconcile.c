@@ -80,24 +80,31 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 
 /* ---- one job ---- */
 
-/* Something of it was merged or started, so the job had been accepted. started: it has a journal at least, as each
- * accepted job has; for a ledger that knows no job, since each is noted there before it gets a folder. */
-static bool has_results(const struct spool *spool, uint64_t id, bool started)
+/* Something of it was merged or started, so the job had been accepted: 1 or 0. started: it has a journal at least, as
+ * each accepted job has; for a ledger that knows no job, since each is noted there before it gets a folder. A folder
+ * that cannot be read says nothing: -errno. */
+static int has_results(const struct spool *spool, uint64_t id, bool started, struct error *e)
 {
-	char path[SPOOL_PATH_MAX];
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
 	struct stat st;
-	spool_job_path(spool, id, NULL, path);
-	DIR *d = disk_opendir(path);
-	bool any = false;
-	for (struct dirent *f; d && !any && (f = readdir(d));) {
+	int any = 0;
+	spool_job_path(spool, id, NULL, folder);
+	DIR *d = disk_opendir(folder);
+	if (!d)
+		return errno == ENOTDIR ? 0 : error_set(e, errno, "%s: %s", folder, strerror(errno));
+	for (struct dirent *f; !any && (errno = 0, f = readdir(d));) {
 		bool journal = strncmp(f->d_name, "journal.", 8) == 0;
 		if (!journal && strcmp(f->d_name, "checkpoint") != 0 && strcmp(f->d_name, "result.exr") != 0)
 			continue;
 		spool_job_path(spool, id, f->d_name, path);
-		any = disk_stat(path, &st) == 0 && (!journal || started || st.st_size > (off_t)JOURNAL_HEAD);
+		if (disk_stat(path, &st))
+			any = error_set(e, errno, "%s: %s", path, strerror(errno));
+		else
+			any = !journal || started || st.st_size > (off_t)JOURNAL_HEAD;
 	}
-	if (d)
-		closedir(d);
+	if (!any && errno)
+		any = error_set(e, errno, "%s: %s", folder, strerror(errno));
+	closedir(d);
 	return any;
 }
 
@@ -107,12 +114,14 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 	int rc = ledger_get(l->jobs->ledger, id, &j, e);
 	if (rc < 0)
 		return rc;
-	if (rc && j.damaged)
-		return is_lost(l, id, "its rows in jobs.db and jobs-copy.db are damaged", e);
-	if (!rc && has_results(l->jobs->spool, id, ledger_is_new(l->jobs->ledger)))
+	if (rc)
+		return j.damaged ? is_lost(l, id, "its rows in jobs.db and jobs-copy.db are damaged", e) : 0;
+	rc = has_results(l->jobs->spool, id, ledger_is_new(l->jobs->ledger), e);
+	if (rc < 0)
+		return rc;
+	if (rc)
 		return is_lost(l, id, "jobs.db and jobs-copy.db have no row for it, and its folder has results", e);
-	if (!rc)
-		spool_drop_job(l->jobs->spool, id);
+	spool_drop_job(l->jobs->spool, id);
 	return 0;
 }
 
