@@ -168,6 +168,7 @@ static int finish(struct jobs *jobs, struct error *e)
 		struct ledger_job j;
 		struct job_counts known;
 		struct live_job *job = f->job;
+		uint64_t id = job->id;
 		jobs->found = f->next;
 		job->next = jobs->live;
 		jobs->live = job;
@@ -176,12 +177,12 @@ static int finish(struct jobs *jobs, struct error *e)
 		rc = rc > 0   ? restore_tell(jobs, job, j.held, 0, e)
 		     : rc < 0 ? rc
 			      : error_set(e, ENOENT, "its row is missing");
-		if (!rc)
+		if (!rc && (job = jobs_find(jobs, id))) /* it may have ended at once */
 			files_look(jobs, job);
-		if (!rc && !farm_counts(jobs->farm, job->id, &known))
+		if (!rc && !farm_counts(jobs->farm, id, &known))
 			rc = error_set(e, ENOMEM, "no memory for a job");
 		if (rc)
-			rc = error_prefix(e, rc, "j%llu", (unsigned long long)job->id);
+			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
 	}
 	if (rc)
 		return rc;

@@ -146,6 +146,7 @@ void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFai
 	if (job && *f->text && !blamed && !files_are_right(jobs, job)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
+		job = NULL;
 	}
 	struct back back = {0};
 	bool holds = farm_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
