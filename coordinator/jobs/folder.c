@@ -47,7 +47,8 @@ static void restore_folder(struct jobs *jobs, struct live_job *job)
 		return;
 	journal_distrust(job->journal);
 	if (job->checkpoint_bytes) {
-		late_drop(jobs, job); /* no checkpoint has them */
+		if (!late_drop(jobs, job->id)) /* no checkpoint has them */
+			return;
 		job->unsure = true;
 		if (job->generation_least <= journal_generation(job->journal))
 			job->generation_least = journal_generation(job->journal) + 1;

@@ -57,26 +57,31 @@ static int offer(struct jobs *jobs, const struct live_job *job, const struct lat
 	return rc;
 }
 
-void late_drop(struct jobs *jobs, struct live_job *job)
+bool late_drop(struct jobs *jobs, uint64_t id)
 {
-	while (job->late_count) {
+	struct live_job *job;
+	while ((job = jobs_find(jobs, id)) && job->late_count) {
 		struct late_result l = job->late[--job->late_count];
 		give_up(jobs, job, &l, "a waiting result in the journal is computed again");
 	}
+	return job != NULL;
 }
 
-/* true: one more counts, and others may follow. */
+/* true: a step was made: others may follow, and any job may be gone. */
 static bool feed_one(struct jobs *jobs, struct live_job *job)
 {
 	for (size_t i = 0; i < job->late_count; i++) {
 		struct late_result l = job->late[i];
 		struct error e;
+		const uint64_t id = job->id;
 		enum replay_place place = replay_place(job, &l.key);
 		if (place == REPLAY_LATE)
 			continue;
 		int rc = place == REPLAY_FITS ? offer(jobs, job, &l, &e) : 0;
 		if (rc == -ENOMEM) /* later */
 			return false;
+		if (!rc && !jobs_find(jobs, id)) /* a result outside the films' range ends its job */
+			return true;
 		if (!rc && replay_place(job, &l.key) != REPLAY_MERGED) /* the core waits for an estimate of the error */
 			continue;
 		l = job->late[i];

@@ -5,8 +5,8 @@
 
 #include "coordinator/job/jobs.h"
 
-/* They are computed again instead. */
-void late_drop(struct jobs *jobs, struct live_job *job);
+/* They are computed again instead. false: the job has ended meanwhile, and is gone. */
+bool late_drop(struct jobs *jobs, uint64_t job);
 /* Gives the core all results that can count now. Call after every step, and when films are free again. */
 void late_feed(struct jobs *jobs);
 
