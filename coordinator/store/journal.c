@@ -506,13 +506,16 @@ static int copy_records(struct journal *j, int to, struct error *e)
 		damaged += p.what == JOURNAL_WHOLE ? 0 : p.count;
 		if (p.what == JOURNAL_WHOLE)
 			mem_free(p.body);
-		if ((rc = copy_bytes(j, to, p.from, p.to, e)))
-			break;
+		int failed = copy_bytes(j, to, p.from, p.to, e);
+		if (failed) {
+			journal_scan_end(&s);
+			return failed;
+		}
 	}
-	if (!rc && (damaged != j->damaged || s.at != j->written))
-		rc = fault(j, EIO, e);
+	uint64_t at = s.at;
 	journal_scan_end(&s);
-	uint64_t at = j->written;
+	if (rc || damaged != j->damaged || at != j->written)
+		return fault(j, rc ? -rc : EIO, e);
 	for (struct unwritten *n = j->first; !rc && n; at += size_of(&n->record), n = n->next)
 		if ((rc = write_one(j, to, at, n)))
 			rc = fault(j, -rc, e);

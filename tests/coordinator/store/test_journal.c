@@ -356,6 +356,34 @@ static void read_errors_cut_nothing(void **state)
 	}
 }
 
+/* One read after the other fails while it is copied: each time a sentence says so, and at last it is copied. */
+static void read_errors_while_it_is_renewed(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1];
+	struct journal_found found;
+	struct journal *j;
+	struct seen s;
+	struct disk failing = disk_system;
+	failing.pread = failing_pread;
+	write_all(ends);
+	assert_int_equal(open_again(&j, &s, &found), 0);
+	journal_distrust(j);
+	int rc = -1;
+	unsigned n = 0;
+	failing_with = EIO;
+	for (; rc; n++) {
+		struct error e = {""};
+		reads_left = n;
+		disk_use(&failing);
+		rc = journal_renew(j, &e);
+		disk_use(NULL);
+		assert_true(rc == 0 || (rc == -EIO && strstr(e.text, "journal.") && journal_is_bad(j)));
+	}
+	assert_true(n > 2 * RECORDS && !journal_is_bad(j));
+	journal_release(j);
+}
+
 /* Whatever it looks like behind the name: it is left alone, and the sentence says of which version it is. */
 static void of_another_version(void **state)
 {
@@ -519,6 +547,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_hole, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_record_in_a_record, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(of_another_job, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(read_errors_while_it_is_renewed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(read_errors_cut_nothing, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(of_another_version, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(others_are_cleared, folder_set_up, folder_tear_down),
