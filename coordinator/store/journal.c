@@ -399,12 +399,15 @@ int journal_reserve(struct journal *j, size_t body, struct error *e)
 	return room_for(j, j->record, e);
 }
 
-/* Called before the reserved space runs out, by whoever flushes. */
+/* Called before the reserved space runs out, by whoever flushes. With the writer's lock: otherwise the space might be
+ * cut off between its reservation and the note of it. */
 static void reserve_ahead(struct journal *j)
 {
+	pthread_mutex_lock(&j->writer);
 	uint64_t size = j->record, end = journal_bytes(j);
-	if (size && AHEAD * size <= AHEAD_MOST && end + AHEAD / 2 * size > j->room)
+	if (size && !j->bad && AHEAD * size <= AHEAD_MOST && end + AHEAD / 2 * size > j->room)
 		reserve(j, end, AHEAD * size);
+	pthread_mutex_unlock(&j->writer);
 }
 
 static struct journal_record record_of(const struct journal *j, enum journal_kind kind, const struct lease_key *lease,
