@@ -75,6 +75,27 @@ int disk_write_all(int fd, const void *bytes, size_t size)
 	return 0;
 }
 
+int disk_replace(const char *path, const void *bytes, size_t size, mode_t mode, struct error *e)
+{
+	char temporary[4096];
+	int n = snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	if (n < 0 || (size_t)n >= sizeof temporary)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
+	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
+	int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
+	if (!rc && disk_fsync(fd))
+		rc = -errno;
+	if (fd >= 0 && disk_close(fd) && !rc)
+		rc = -errno;
+	if (!rc && disk_rename(temporary, path))
+		rc = -errno;
+	if (!rc)
+		return 0;
+	if (fd >= 0)
+		disk_unlink(temporary);
+	return error_set(e, -rc, "%s: %s", path, strerror(-rc));
+}
+
 int disk_sync_folder(const char *path, struct error *e)
 {
 	int fd = disk_open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);

@@ -170,22 +170,11 @@ void spool_job_path(const struct spool *s, uint64_t id, const char *file, char p
 
 int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e)
 {
-	char path[SPOOL_PATH_MAX], temporary[SPOOL_PATH_MAX + 8];
+	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, file, path);
-	snprintf(temporary, sizeof temporary, "%s.tmp", path);
-	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
-	if (!rc && disk_fsync(fd))
-		rc = -errno;
-	if (fd >= 0 && disk_close(fd) && !rc)
-		rc = -errno;
-	if (!rc && disk_rename(temporary, path))
-		rc = -errno;
-	if (rc) {
-		if (fd >= 0)
-			disk_unlink(temporary);
-		return error_set(e, -rc, "%s: %s", path, strerror(-rc));
-	}
+	int rc = disk_replace(path, bytes, size, 0600, e);
+	if (rc)
+		return rc;
 	spool_job_path(s, id, NULL, path);
 	return disk_sync_folder(path, e);
 }

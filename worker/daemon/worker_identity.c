@@ -38,23 +38,10 @@ static void read_last(const char *path, char seed[SEED_HEX], uint64_t *count)
 
 static int write_next(const char *folder, const char *path, const char *seed, uint64_t count, struct error *e)
 {
-	char line[LINE_BYTES], temporary[PATH_BYTES + 4];
+	char line[LINE_BYTES];
 	int n = snprintf(line, sizeof line, "%s %" PRIu64 "\n", seed, count);
-	snprintf(temporary, sizeof temporary, "%s.new", path);
-	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	if (fd < 0)
-		return error_set(e, errno, "%s: %s", temporary, strerror(errno));
-	int rc = disk_write_all(fd, line, (size_t)n);
-	if (!rc && disk_fsync(fd))
-		rc = -errno;
-	disk_close(fd);
-	if (!rc && disk_rename(temporary, path))
-		rc = -errno;
-	if (rc) {
-		disk_unlink(temporary);
-		return error_set(e, -rc, "%s: %s", path, strerror(-rc));
-	}
-	return disk_sync_folder(folder, e);
+	int rc = disk_replace(path, line, (size_t)n, 0600, e);
+	return rc ? rc : disk_sync_folder(folder, e);
 }
 
 int worker_identity_begin(struct worker_identity *l, const char *folder, const char *name, struct error *e)
