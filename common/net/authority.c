@@ -9,6 +9,7 @@
  */
 #include "common/net/authority.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 
 #include <dirent.h>
@@ -64,11 +65,15 @@ static int write_pem(const char *path, BIO *b, mode_t mode, struct error *e)
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	unlink(temporary);
 	int fd = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-	int rc = fd < 0 || fchmod(fd, mode) || write(fd, bytes, (size_t)size) != size || fsync(fd) ? -1 : 0;
-	if (fd >= 0 && close(fd))
-		rc = -1;
-	if (rc || rename(temporary, path)) {
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	int rc = fd < 0 || fchmod(fd, mode) ? -errno : disk_write_all(fd, bytes, (size_t)size);
+	if (!rc && fsync(fd))
+		rc = -errno;
+	if (fd >= 0 && close(fd) && !rc)
+		rc = -errno;
+	if (!rc && rename(temporary, path))
+		rc = -errno;
+	if (rc) {
+		error_set(e, -rc, "%s: %s", path, strerror(-rc));
 		unlink(temporary);
 	}
 	BIO_free(b);

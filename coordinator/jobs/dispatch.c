@@ -123,11 +123,12 @@ static void keep_partials(const struct jobs *jobs, const struct lease_key *k, co
 			 log_u64(k->job), log_u64(k->epoch), k->group, k->part, in->batch->tiles[i].x,
 			 in->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-		if (fd < 0 || disk_write_all(fd, bytes, size))
+		int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
+		if (fd >= 0 && disk_close(fd) && !rc)
+			rc = -errno;
+		if (rc)
 			log_event(LOG_SPOOL_FAULT, "path=%s text=%s", log_quote(path).text,
-				  log_quote(strerror(errno)).text);
-		if (fd >= 0)
-			disk_close(fd);
+				  log_quote(strerror(-rc)).text);
 	}
 }
 

@@ -23,7 +23,6 @@
 #include "coordinator/status/status.h"
 
 #include <assert.h>
-#include <fcntl.h>
 #include <signal.h>
 #include <string.h>
 
@@ -40,17 +39,9 @@ static void on_connection(uv_stream_t *listener, int status)
 
 static int write_port(const char *path, unsigned port, struct error *e)
 {
-	char text[16], temporary[4096];
+	char text[16];
 	int n = snprintf(text, sizeof text, "%u\n", port);
-	snprintf(temporary, sizeof temporary, "%s.tmp", path);
-	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-	int rc = fd < 0 || disk_write_all(fd, text, (size_t)n) ? error_set(e, errno, "%s: %s", path, strerror(errno))
-							       : 0;
-	if (fd >= 0)
-		disk_close(fd);
-	if (!rc && disk_rename(temporary, path))
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
-	return rc;
+	return disk_replace(path, text, (size_t)n, 0644, e);
 }
 
 static int start_listening(struct server *s, struct error *e)

@@ -212,6 +212,12 @@ void journal_release(struct journal *j)
 	mem_free(j);
 }
 
+static int write_head(int fd, const unsigned char head[JOURNAL_HEAD])
+{
+	int rc = disk_write_all(fd, head, JOURNAL_HEAD);
+	return rc ? rc : disk_fsync(fd) ? -errno : 0;
+}
+
 int journal_create(struct journal **out, const char *folder, uint64_t job, uint64_t generation, struct error *e)
 {
 	struct journal *j = make_journal(folder, job, generation, O_RDWR | O_CREAT | O_TRUNC, e);
@@ -224,8 +230,8 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 	pack_head(j, head);
 	if (!rc && j->fd < 0)
 		rc = fault(j, errno, e);
-	else if (!rc && (disk_write_all(j->fd, head, sizeof head) || disk_fsync(j->fd)))
-		rc = fault(j, errno ? errno : ENOSPC, e);
+	else if (!rc && (rc = write_head(j->fd, head)))
+		rc = fault(j, -rc, e);
 	if (!rc)
 		rc = disk_sync_folder(folder, e);
 	if (rc) {
@@ -536,9 +542,8 @@ int journal_renew(struct journal *j, struct error *e)
 		return error_set(e, EAGAIN, "%s: is being flushed", j->path);
 	pack_head(j, head);
 	int fd = disk_open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	int rc = fd < 0					 ? fault(j, errno, e)
-		 : disk_write_all(fd, head, sizeof head) ? fault(j, errno ? errno : ENOSPC, e)
-							 : copy_records(j, fd, e);
+	int rc = fd < 0 ? -errno : disk_write_all(fd, head, sizeof head);
+	rc = rc ? fault(j, -rc, e) : copy_records(j, fd, e);
 	if (!rc && (disk_fsync(fd) || disk_rename(path, j->path)))
 		rc = fault(j, errno, e);
 	if (!rc)

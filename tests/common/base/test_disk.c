@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A file that cannot be replaced stays as it was, whichever call fails, and the error is that call's. */
+#include "common/base/disk.h"
+#include "tests/support/folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char path[200], temporary[210];
+static struct error e;
+
+static int no_open(const char *name, int flags, mode_t mode)
+{
+	(void)name, (void)flags, (void)mode;
+	errno = EMFILE;
+	return -1;
+}
+
+static ssize_t no_room(int fd, const void *bytes, size_t size)
+{
+	(void)fd, (void)bytes, (void)size;
+	errno = 0; /* as a disk that is full answers */
+	return 0;
+}
+
+static int no_flush(int fd)
+{
+	(void)fd;
+	errno = EIO;
+	return -1;
+}
+
+static int no_close(int fd)
+{
+	disk_system.close(fd);
+	errno = EDQUOT;
+	return -1;
+}
+
+static int no_rename(const char *from, const char *to)
+{
+	(void)from, (void)to;
+	errno = EACCES;
+	return -1;
+}
+
+static void check(struct disk own, int want)
+{
+	char text[8] = "";
+	e.text[0] = 0;
+	disk_use(&own);
+	int rc = disk_replace(path, "new", 3, 0600, &e);
+	disk_use(NULL);
+	assert_int_equal(rc, want);
+	assert_true(!want || strstr(e.text, strerror(-want)));
+	FILE *f = fopen(path, "r");
+	assert_non_null(f);
+	assert_int_equal(fread(text, 1, sizeof text, f), 3);
+	fclose(f);
+	assert_string_equal(text, want ? "old" : "new");
+	assert_int_not_equal(access(temporary, F_OK), 0);
+}
+
+static void replaced_or_unchanged(void **state)
+{
+	(void)state;
+	snprintf(path, sizeof path, "%s/file", folder);
+	snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	assert_int_equal(disk_replace(path, "old", 3, 0600, &e), 0);
+	struct disk bad[5] = {disk_system, disk_system, disk_system, disk_system, disk_system};
+	bad[0].open = no_open;
+	bad[1].write = no_room;
+	bad[2].fsync = no_flush;
+	bad[3].close = no_close;
+	bad[4].rename = no_rename;
+	const int codes[5] = {-EMFILE, -ENOSPC, -EIO, -EDQUOT, -EACCES};
+	for (int i = 0; i < 5; i++)
+		check(bad[i], codes[i]);
+	check(disk_system, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(replaced_or_unchanged, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
