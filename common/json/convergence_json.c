@@ -2,6 +2,7 @@
 #include "common/json/convergence_json.h"
 
 #include "common/base/text.h"
+#include "common/json/whole.h"
 
 #include <math.h>
 #include <string.h>
@@ -28,7 +29,7 @@ static json_t *names_of(uint32_t classes)
 	json_t *list = json_array();
 	for (unsigned k = 0; k < PATH_CLASSES; k++)
 		if (classes >> k & 1)
-			json_array_append_new(list, json_string(path_class_name(k)));
+			list = json_and(list, json_string(path_class_name(k)));
 	return list;
 }
 
@@ -91,11 +92,11 @@ json_t *classes_to_json(const struct path_class_energy classes[PATH_CLASSES])
 		const struct path_class_energy *c = &classes[k];
 		if (!(c->bootstrap > 0) && !(c->chains > 0))
 			continue;
-		json_array_append_new(
-			list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k), "bootstrap",
-					real_or_null(c->bootstrap), "bootstrapError", real_or_null(c->bootstrap_error),
-					"chains", real_or_null(c->chains), "chainsError", real_or_null(c->chains_error),
-					"t", real_or_null(c->difference_t)));
+		list = json_and(list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k), "bootstrap",
+						real_or_null(c->bootstrap), "bootstrapError",
+						real_or_null(c->bootstrap_error), "chains", real_or_null(c->chains),
+						"chainsError", real_or_null(c->chains_error), "t",
+						real_or_null(c->difference_t)));
 	}
 	return list;
 }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/json/forecast_json.h"
 
+#include "common/json/whole.h"
+
 #include <math.h>
 
 json_t *forecast_real(double x)
@@ -19,10 +21,12 @@ json_t *forecast_looks_to_json(const struct forecast_history *h)
 	json_t *list = json_array();
 	for (uint32_t i = 0; i < h->count; i++) {
 		const struct forecast_look *l = &h->looks[i];
-		json_array_append_new(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work,
-						      "cpuSeconds", l->cpu_seconds, "wallSeconds", l->seconds, "relMSE",
-						      l->rel_mse, "relMSEUpper", l->rel_mse_upper, "degrees",
-						      forecast_real(l->degrees), "doubtful", l->doubtful != 0));
+		if (!isfinite(l->work + l->cpu_seconds + l->seconds + l->rel_mse + l->rel_mse_upper))
+			continue; /* JSON has no such numbers */
+		list = json_and(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work, "cpuSeconds",
+						l->cpu_seconds, "wallSeconds", l->seconds, "relMSE", l->rel_mse,
+						"relMSEUpper", l->rel_mse_upper, "degrees", forecast_real(l->degrees),
+						"doubtful", l->doubtful != 0));
 	}
 	return list;
 }

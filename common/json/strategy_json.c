@@ -2,6 +2,7 @@
 #include "common/json/strategy_json.h"
 
 #include "common/estimate/strategy.h"
+#include "common/json/whole.h"
 
 #include <string.h>
 
@@ -10,21 +11,24 @@ static json_t *integer(uint64_t n)
 	return json_integer(n > INT64_MAX ? INT64_MAX : (json_int_t)n);
 }
 
+static json_t *one_strategy(const char *name, const uint64_t counts[STRATEGY_COUNTERS])
+{
+	json_t *o = json_with(json_object(), "name", json_string(name)), *failures = json_object();
+	for (int k = 0; k < STRATEGY_COUNTERS; k++) {
+		json_t **at = k < STRATEGY_FAIL_FIRST ? &o : &failures;
+		*at = json_with(*at, strategy_counter_name((enum strategy_counter)k), integer(counts[k]));
+	}
+	return json_with(o, "failures", failures);
+}
+
 json_t *strategy_to_json(const char *mixture, const struct canvas_counts *n)
 {
 	json_t *list = json_array();
 	int count = plan_strategy_count(mixture);
 	for (int i = 0; i < count; i++) {
 		char name[PLAN_MUTATIONS_MAX];
-		json_t *o = json_object(), *failures = json_object();
 		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
-		json_object_set_new(o, "name", json_string(name));
-		for (int k = 0; k < STRATEGY_COUNTERS; k++)
-			json_object_set_new(k < STRATEGY_FAIL_FIRST ? o : failures,
-					    strategy_counter_name((enum strategy_counter)k),
-					    integer(n->strategy[i][k]));
-		json_object_set_new(o, "failures", failures);
-		json_array_append_new(list, o);
+		list = json_and(list, one_strategy(name, n->strategy[i]));
 	}
 	return list;
 }

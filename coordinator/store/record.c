@@ -18,9 +18,9 @@
 #include "common/json/convergence_json.h"
 #include "common/json/forecast_json.h"
 #include "common/json/strategy_json.h"
+#include "common/json/whole.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { SCHEMA = 1 };
@@ -104,11 +104,7 @@ void record_take_effects(struct job_record *r, json_t *list)
 
 json_t *record_effects(const struct job_record *r)
 {
-	json_t *list = *r->effects ? json_loads(r->effects, JSON_REJECT_DUPLICATES, NULL) : NULL;
-	if (json_is_array(list))
-		return list;
-	json_decref(list);
-	return json_array();
+	return *r->effects ? json_loads(r->effects, JSON_REJECT_DUPLICATES, NULL) : json_array();
 }
 
 json_t *record_strategies(const struct job_record *r)
@@ -136,18 +132,25 @@ bool record_show(const struct job_record *r, json_t *o)
 json_t *record_counts(const struct job_record *r)
 {
 	json_t *o = json_object();
-	fields_store(counts, COUNTS_COUNT, r, o, NULL);
-	return o;
+	if (fields_store(counts, COUNTS_COUNT, r, o, NULL) == 0)
+		return o;
+	json_decref(o);
+	return NULL;
 }
 
-/* Checksum of the content, whatever its formatting. -ENOMEM */
+static int add_to_checksum(const char *piece, size_t size, void *sum)
+{
+	*(uint32_t *)sum = crc32c(*(uint32_t *)sum, piece, size);
+	return 0;
+}
+
+/* Checksum of the content, whatever its formatting; piece by piece, without a copy. -ENOMEM */
 static int checksum(const json_t *o, json_int_t *sum, struct error *e)
 {
-	char *text = json_dumps(o, JSON_COMPACT | JSON_SORT_KEYS);
-	if (!text)
+	uint32_t crc = 0;
+	if (json_dump_callback(o, add_to_checksum, &crc, JSON_COMPACT | JSON_SORT_KEYS))
 		return error_set(e, ENOMEM, "no memory for a record");
-	*sum = crc32c(0, text, strlen(text));
-	free(text);
+	*sum = crc;
 	return 0;
 }
 
@@ -171,23 +174,28 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 		json_decref(o);
 		return error_prefix(e, rc, "the record of job j%llu cannot be written", (unsigned long long)r->id);
 	}
-	json_object_set_new(o, "counts", record_counts(r));
-	json_object_set_new(o, "strategies", record_strategies(r));
-	json_object_set_new(o, "agreement", convergence_to_json(&r->convergence));
-	json_object_set_new(o, "classes", classes_to_json(r->classes));
-	json_object_set_new(o, "effects", record_effects(r));
-	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
+	o = json_with(o, "counts", record_counts(r));
+	o = json_with(o, "strategies", record_strategies(r));
+	o = json_with(o, "agreement", convergence_to_json(&r->convergence));
+	o = json_with(o, "classes", classes_to_json(r->classes));
+	o = json_with(o, "effects", record_effects(r));
+	o = json_with(o, "looks", forecast_looks_to_json(&r->looks));
 	json_int_t sum = 0;
-	rc = checksum(o, &sum, e);
-	if (rc || json_object_set_new(o, "crc32c", json_integer(sum))) {
+	if (!o || checksum(o, &sum, e) || !(o = json_with(o, "crc32c", json_integer(sum)))) {
 		json_decref(o);
 		return error_set(e, ENOMEM, "no memory for a record");
 	}
-	char *text = json_dumps(o, JSON_INDENT(2));
+	/* Not json_dumps: it loses parts of the text if memory runs out. */
+	size_t size = json_dumpb(o, NULL, 0, JSON_INDENT(2));
+	char *text = size ? mem_alloc(size + 1, 1) : NULL;
+	bool whole = text && json_dumpb(o, text, size, JSON_INDENT(2)) == size;
 	json_decref(o);
-	*out = text ? mem_strdup(text) : NULL;
-	free(text);
-	return *out ? 0 : error_set(e, ENOMEM, "no memory for the record of a job");
+	if (whole) {
+		*out = text;
+		return 0;
+	}
+	mem_free(text);
+	return error_set(e, ENOMEM, "no memory for the record of a job");
 }
 
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e)

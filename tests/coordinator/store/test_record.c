@@ -11,7 +11,9 @@
 
 #include <cmocka.h>
 
+#include <jansson.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static struct error e;
@@ -92,6 +94,45 @@ static void records_come_back(void **state)
 	assert_non_null(strstr(e.text, "the record of job j7 cannot be written: Invalid UTF-8"));
 }
 
+static long until_it_fails; /* allocations of the JSON library; < 0: none fails */
+
+static void *scarce(size_t size)
+{
+	return until_it_fails-- == 0 ? NULL : malloc(size);
+}
+
+/* One allocation after the other fails: what is written is whole, or it is not written. */
+static void whole_or_not(void **state)
+{
+	(void)state;
+	struct job_record r;
+	char *whole, *text;
+	record_begin(&r, 7, "box", "ann");
+	strcpy(r.mixture, "independent=0.1,hslt=0.9");
+	r.convergence.classes_apart = 3;
+	r.classes[0] = (struct path_class_energy){0.3, NAN, 0.4, NAN, NAN};
+	record_take_effects(&r, json_pack("[{s:s}]", "name", "dispersion"));
+	forecast_add_look(&r.looks, &(struct forecast_look){1e5, 0.1, 0.05, 0.3, 0.4, 20, 0});
+	assert_int_equal(record_to_json(&r, &whole, &e), 0);
+	json_set_alloc_funcs(scarce, free);
+	unsigned refused = 0;
+	for (long n = 0;; n++) {
+		until_it_fails = n;
+		int rc = record_to_json(&r, &text, &e);
+		bool over = until_it_fails >= 0;
+		refused += rc != 0;
+		if (rc == 0) {
+			assert_string_equal(text, whole);
+			mem_free(text);
+		}
+		if (over)
+			break;
+	}
+	json_set_alloc_funcs(malloc, free);
+	assert_true(refused > 100);
+	mem_free(whole);
+}
+
 static int from_text(const char *text, struct job_record *r)
 {
 	return record_from_json(text, strlen(text), r, &e);
@@ -125,6 +166,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(records_come_back),
 		cmocka_unit_test(other_records),
+		cmocka_unit_test(whole_or_not),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
