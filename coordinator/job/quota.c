@@ -17,7 +17,7 @@ int quota_check(const struct quota *q, const struct quota_use *has, const struct
 	uint64_t films = canvas_bytes(p);
 	uint64_t mutations = times(p->rounds, plan_round_mutations(p));
 	if (q->jobs && has->jobs >= q->jobs)
-		return error_set(e, EDQUOT, "quota: at most %" PRIu64 " live jobs", has->jobs);
+		return error_set(e, EDQUOT, "quota: at most %" PRIu64 " live jobs", q->jobs);
 	if (q->asset_bytes && (has->asset_bytes > q->asset_bytes || asset_bytes > q->asset_bytes - has->asset_bytes))
 		return error_set(e, EDQUOT,
 				 "quota: its files have %.3f MB, those of other jobs %.3f MB, and %.3f MB is the most",

@@ -37,6 +37,15 @@ static int check(const struct quota *q, uint64_t jobs, uint64_t bytes, uint64_t 
 	return rc;
 }
 
+/* The sentence names the limit, not what is there: more jobs may be live if the limit was lowered. */
+static void says_the_limit(void **state)
+{
+	(void)state;
+	struct error e;
+	assert_int_equal(quota_check(&(struct quota){.jobs = 2}, &(struct quota_use){5, 0}, &plan, 0, &e), -EDQUOT);
+	assert_non_null(strstr(e.text, "at most 2 live jobs"));
+}
+
 static void none_is_none(void **state)
 {
 	(void)state;
@@ -77,6 +86,7 @@ static void edges(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(none_is_none), cmocka_unit_test(edges)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(none_is_none), cmocka_unit_test(says_the_limit),
+					   cmocka_unit_test(edges)};
 	return cmocka_run_group_tests(tests, make_plan, NULL);
 }
