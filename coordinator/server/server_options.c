@@ -46,7 +46,7 @@ static const struct option_row rows[] = {
 	{"keep-films", 0, "MB", "Films kept of finished jobs, for hslt-job extend; the oldest are deleted",
 	 OPTION_SCALED(CONFIG, keep_bytes, 0, 1e9, 1e6), .standard = "2000"},
 	{"keep-days", 0, "N",
-	 "Results of finished jobs are kept this long, their records ten times as long; 0: forever; 0: forever",
+	 "Results of finished jobs are kept this long, their records ten times as long; 0: forever",
 	 OPTION_SCALED(CONFIG, clear_seconds, 0, 1e6, 86400), .standard = "30"},
 	{"keep-gb", 0, "N",
 	 "Limit for all finished jobs: films are deleted first, then results, the oldest first; 0: none",
