@@ -63,8 +63,8 @@ static void log_repair(const struct ledger_job *j, const char *what)
 
 static int put(struct ledger_side *s, const struct ledger_job *j, struct error *e)
 {
-	ledger_side_bind(s, j);
-	return ledger_side_put(s, e);
+	int rc = ledger_side_bind(s, j, e);
+	return rc ? rc : ledger_side_put(s, e);
 }
 
 /* a, b: the row in jobs.db and in the copy; at most one of them is NULL. */
@@ -259,12 +259,14 @@ bool ledger_is_new(const struct ledger *l)
 static int put_both(struct ledger *l, const struct ledger_job *j, struct error *e)
 {
 	struct error fault;
-	ledger_side_bind(&l->jobs, j);
-	if (!l->behind)
-		ledger_side_bind(&l->copy, j);
+	int rc = ledger_side_bind(&l->jobs, j, e);
+	int behind = l->behind ? 0 : ledger_side_bind(&l->copy, j, &fault);
 	ledger_side_release(&l->jobs); /* j may be from there */
-	int rc = ledger_side_put(&l->jobs, e);
-	if (!rc && !l->behind && ledger_side_put(&l->copy, &fault))
+	if (!rc)
+		rc = ledger_side_put(&l->jobs, e);
+	if (!rc && !l->behind && !behind)
+		behind = ledger_side_put(&l->copy, &fault);
+	if (!rc && behind)
 		fall_behind(l, &fault);
 	return rc;
 }

@@ -138,29 +138,37 @@ void ledger_side_release(struct ledger_side *s)
 	sqlite3_reset(s->statements[LEDGER_AFTER]);
 }
 
-void ledger_side_bind(struct ledger_side *side, const struct ledger_job *j)
+static bool bind_text(sqlite3_stmt *s, int at, const char *text)
+{
+	return sqlite3_bind_text(s, at, text, -1, SQLITE_TRANSIENT) == SQLITE_OK;
+}
+
+static bool bind_bytes(sqlite3_stmt *s, int at, const void *bytes, size_t size)
+{
+	return !size || sqlite3_bind_blob64(s, at, bytes, size, SQLITE_TRANSIENT) == SQLITE_OK;
+}
+
+int ledger_side_bind(struct ledger_side *side, const struct ledger_job *j, struct error *e)
 {
 	sqlite3_stmt *s = side->statements[LEDGER_PUT];
 	sqlite3_clear_bindings(s);
 	sqlite3_bind_int64(s, 1, (sqlite3_int64)j->id);
-	sqlite3_bind_text(s, 2, j->owner, -1, SQLITE_TRANSIENT);
-	sqlite3_bind_text(s, 3, j->name, -1, SQLITE_TRANSIENT);
-	sqlite3_bind_text(s, 4, j->version, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_int(s, 5, j->priority);
 	sqlite3_bind_int(s, 6, j->mixed);
 	sqlite3_bind_double(s, 7, j->submitted);
-	if (j->submission_size)
-		sqlite3_bind_blob64(s, 8, j->submission, j->submission_size, SQLITE_TRANSIENT);
-	if (j->plan_size)
-		sqlite3_bind_blob64(s, 9, j->plan, j->plan_size, SQLITE_TRANSIENT);
-	sqlite3_bind_text(s, 10, j->held, -1, SQLITE_TRANSIENT);
 	sqlite3_bind_int64(s, 11, (sqlite3_int64)j->extended);
-	sqlite3_bind_text(s, 12, j->state, -1, SQLITE_TRANSIENT);
 	if (j->ended > 0)
 		sqlite3_bind_double(s, 13, j->ended);
 	sqlite3_bind_int64(s, 14, (sqlite3_int64)j->revision);
 	sqlite3_bind_int64(s, 15, check(j));
-	sqlite3_bind_text(s, 16, j->record, -1, SQLITE_TRANSIENT);
+	/* Those that are copied, which takes memory: what is missing would be NULL in the row. */
+	if (bind_text(s, 2, j->owner) && bind_text(s, 3, j->name) && bind_text(s, 4, j->version) &&
+	    bind_bytes(s, 8, j->submission, j->submission_size) && bind_bytes(s, 9, j->plan, j->plan_size) &&
+	    bind_text(s, 10, j->held) && bind_text(s, 12, j->state) && bind_text(s, 16, j->record))
+		return 0;
+	int rc = ledger_file_error(side->db, e);
+	sqlite3_clear_bindings(s);
+	return rc;
 }
 
 int ledger_side_put(struct ledger_side *s, struct error *e)

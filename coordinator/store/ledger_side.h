@@ -34,8 +34,9 @@ int ledger_side_get(struct ledger_side *s, uint64_t id, struct ledger_job *j, st
 int ledger_side_after(struct ledger_side *s, uint64_t id, struct ledger_job *j, struct error *e);
 void ledger_side_release(struct ledger_side *s);
 
-/* Writes a row in two steps: the first copies it, so that it may be one that was read and is released in between. */
-void ledger_side_bind(struct ledger_side *s, const struct ledger_job *j);
+/* Writes a row in two steps: the first copies it, so that it may be one that was read and is released in between.
+ * -ENOMEM */
+int ledger_side_bind(struct ledger_side *s, const struct ledger_job *j, struct error *e);
 int ledger_side_put(struct ledger_side *s, struct error *e);
 int ledger_side_remove(struct ledger_side *s, uint64_t id, struct error *e);
 int ledger_side_set(struct ledger_side *s, const char *name, const char *text, struct error *e);

@@ -15,6 +15,7 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
+#include <sqlite3.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -67,6 +68,37 @@ static void add(struct ledger *l, uint64_t id)
 			       .plan = plan,
 			       .plan_size = sizeof plan};
 	assert_int_equal(ledger_add(l, &j, &e), 0);
+}
+
+/* Memory runs out for the copy of a submission: the row is not written without it. */
+static void no_memory(void **state)
+{
+	(void)state;
+	enum { SIZE = 8 << 20 };
+	struct ledger_job j;
+	struct ledger *l = open_ledger();
+	add(l, 1);
+	unsigned char *submission = mem_alloc(SIZE, 1);
+	assert_non_null(submission);
+	const struct ledger_job large = {.id = 2,
+					 .owner = "7",
+					 .name = "large",
+					 .version = "0.1",
+					 .record = "",
+					 .submission = submission,
+					 .submission_size = SIZE};
+	j = large;
+	sqlite3_hard_heap_limit64(sqlite3_memory_used() + SIZE / 2);
+	int rc = ledger_add(l, &j, &e);
+	sqlite3_hard_heap_limit64(0);
+	assert_int_equal(rc, -ENOMEM);
+	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
+	j = large;
+	assert_int_equal(ledger_add(l, &j, &e), 0);
+	assert_int_equal(ledger_get(l, 2, &j, &e), 1);
+	assert_true(!j.damaged && j.submission_size == SIZE);
+	ledger_close(l);
+	mem_free(submission);
 }
 
 static void living_jobs(void **state)
@@ -323,6 +355,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(living_jobs, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(no_memory, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(earlier_versions, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(orders, folder_set_up, folder_tear_down),
