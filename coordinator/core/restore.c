@@ -25,14 +25,9 @@ static void pin(struct farm *f, struct job *j, const char *fingerprint)
 /* The maker may be a worker that is no longer known. */
 static void take_makers(struct farm *f, struct job *j, const struct event_join *makers)
 {
-	for (uint32_t i = 0; makers && i < j->slot_count; i++) {
-		const char *refused;
-		struct identity *k = makers[i].name ? worker_registry_use(f, &makers[i], &refused) : NULL;
-		if (!k)
-			continue;
-		j->slots[i].doubt.maker = k->id;
-		worker_registry_drop(f, k);
-	}
+	for (uint32_t i = 0; makers && i < j->slot_count; i++)
+		if (makers[i].name)
+			j->slots[i].doubt.maker = worker_registry_recall(f, &makers[i]);
 }
 
 static void take_times(struct farm *f, struct job *j, const struct event_restore *r)

@@ -56,18 +56,34 @@ static uint64_t certificate_id(const struct farm *f, const char *certificate, ui
 	return otherwise;
 }
 
-struct identity *worker_registry_use(struct farm *f, const struct event_join *e, const char **refused)
+/* The existing entry, or a new one. NULL: no room. */
+static struct identity *find_or_add(struct farm *f, const struct event_join *e)
 {
 	struct identity *k = worker_registry_find(f, e);
+	if (k || !(k = room_for_one(f, e->certificate)))
+		return k;
+	*k = (struct identity){.id = ++f->identities, .window = PEER_WINDOW, .restarts = e->restarts, .seen = f->now};
+	k->certificate_id = certificate_id(f, e->certificate, k->id);
+	text_copy(k->certificate, sizeof k->certificate, e->certificate);
+	text_copy(k->name, sizeof k->name, e->name);
+	text_copy(k->home, sizeof k->home, e->home);
+	return k;
+}
+
+uint64_t worker_registry_recall(struct farm *f, const struct event_join *e)
+{
+	struct identity *k = find_or_add(f, e);
+	if (k && !k->calls && strcmp(k->home, e->home) == 0 && k->restarts < e->restarts)
+		k->restarts = e->restarts; /* of its results, the latest tells */
+	return k ? k->id : 0;
+}
+
+struct identity *worker_registry_use(struct farm *f, const struct event_join *e, const char **refused)
+{
+	struct identity *k = find_or_add(f, e);
 	if (!k) {
-		k = room_for_one(f, e->certificate);
-		if (!k) {
-			*refused = "the coordinator has no room for another worker";
-			return NULL;
-		}
-		*k = (struct identity){.id = ++f->identities, .window = PEER_WINDOW};
-		k->certificate_id = certificate_id(f, e->certificate, k->id);
-		text_copy(k->certificate, sizeof k->certificate, e->certificate);
+		*refused = "the coordinator has no room for another worker";
+		return NULL;
 	}
 	/* A quarantined worker stays known by the names it had. */
 	if (!k->quarantined || strcmp(k->home, e->home) == 0)

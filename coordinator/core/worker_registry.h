@@ -17,6 +17,9 @@
 /* The existing entry, updated as reported, or a new one; referenced by the caller. NULL, with a sentence: refused. */
 struct identity *worker_registry_use(struct farm *f, const struct event_join *e, const char **refused);
 void worker_registry_drop(struct farm *f, struct identity *who);
+/* The id of a worker that a result of an earlier run came from, which may be connected: what it reported itself stays.
+ * Not a reference. 0: no room. */
+uint64_t worker_registry_recall(struct farm *f, const struct event_join *e);
 void worker_registry_free(struct farm *f);
 
 /* NULL: no worker with this home or, failing that, this name. */

@@ -200,12 +200,65 @@ static void more_than_are_taken(void **state)
 	farm_free(f);
 }
 
+/* A job that is extended brings back what its makers reported then: what is known of those that are connected stays,
+ * and of the others the latest counts. */
+static void makers(void **state)
+{
+	(void)state;
+	const struct plan plan = {.kind = PLAN_CHAINS,
+				  .width = 8,
+				  .height = 8,
+				  .crop_width = 8,
+				  .crop_height = 8,
+				  .groups = 3,
+				  .parts = 1,
+				  .chains = 12,
+				  .rounds = 9,
+				  .epoch = 100,
+				  .bootstrap = 1000};
+	const uint64_t next[3] = {2, 2, 2};
+	const struct event_join by[3] = {{.name = "old", .certificate = "", .home = "a", .restarts = 2},
+					 {.name = "two", .certificate = "", .home = "b", .restarts = 7},
+					 {.name = "two", .certificate = "", .home = "b", .restarts = 6}};
+	const struct forecast_history looks = {.count = 0};
+	struct farm *f = transcript_farm();
+	struct peer_status p;
+	struct worker_status w;
+	struct update u;
+	transcript_play(f, (const char *const[]){"[0] w1 joins A threads=1 name=c home=a start=5 -> -", NULL});
+	struct event ev = {.kind = EVENT_RESTORE,
+			   .restore = {.job = 3,
+				       .submit = {.plan = &plan, .name = "job", .owner = ""},
+				       .fingerprint = "A",
+				       .kind = LEASE_RENDER,
+				       .next = next,
+				       .makers = by,
+				       .elapsed = 1,
+				       .opened = 0,
+				       .completed = 1,
+				       .looks = &looks}};
+	farm_step(f, &ev, &u);
+	assert_true(farm_peer(f, 1, &p) && farm_worker(f, p.who, &w));
+	assert_int_equal(w.restarts, 5);
+	assert_string_equal(w.name, "c");
+	assert_string_equal(farm_maker(f, &(struct lease_key){3, LEASE_RENDER, 0, 0, 2}), "c");
+	assert_string_equal(farm_maker(f, &(struct lease_key){3, LEASE_RENDER, 1, 0, 2}), "two");
+	assert_true(farm_worker(f, p.who + 1, &w));
+	assert_int_equal(w.restarts, 7);
+	transcript_play(f, (const char *const[]){
+				   "[1] w1 leaves -> -",
+				   "[2] w2 joins A threads=1 name=c home=a start=4 -> rejected: this is start 4 of c, "
+				   "and its start 5 has connected before",
+				   NULL});
+	farm_free(f);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(in_the_bootstrap),    cmocka_unit_test(in_a_round), cmocka_unit_test(stored_results),
 		cmocka_unit_test(before_anything),     cmocka_unit_test(bounds),     cmocka_unit_test(held),
-		cmocka_unit_test(more_than_are_taken),
+		cmocka_unit_test(more_than_are_taken), cmocka_unit_test(makers),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
