@@ -70,8 +70,10 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		return;
 	}
 	struct waiting *w = mem_alloc(1, sizeof *w);
-	if (!w)
+	if (!w) {
+		conn_close(cl->conn, "no memory for a message of the coordinator");
 		return;
+	}
 	w->message.payload.limit = size;
 	cl->waiting_bytes += env->used + size;
 	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES ||
@@ -384,14 +386,32 @@ int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd
 	return rc;
 }
 
+/* Unless there is a file of that name. Not every file system can tell while it renames, and not every one has hard
+ * links: then an empty file takes the name first. */
+static int rename_to_new(const char *temporary, const char *path)
+{
+	if (renameat2(AT_FDCWD, temporary, AT_FDCWD, path, RENAME_NOREPLACE) == 0)
+		return 0;
+	if (errno != EINVAL && errno != ENOSYS)
+		return -1;
+	int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+	if (fd < 0)
+		return -1;
+	close(fd);
+	if (rename(temporary, path) == 0)
+		return 0;
+	int code = errno;
+	unlink(path);
+	errno = code;
+	return -1;
+}
+
 /* replace: whether an existing file of that name is replaced. */
 static int give_name(const char *temporary, const char *path, bool replace, struct error *e)
 {
-	if ((replace ? rename(temporary, path) : link(temporary, path)) != 0)
-		return error_set(e, errno == EEXIST ? EEXIST : EIO, "%s: %s", path, strerror(errno));
-	if (!replace)
-		unlink(temporary);
-	return 0;
+	if ((replace ? rename(temporary, path) : rename_to_new(temporary, path)) == 0)
+		return 0;
+	return error_set(e, errno == EEXIST ? EEXIST : EIO, "%s: %s", path, strerror(errno));
 }
 
 static int copy(int from, int to, struct error *e)

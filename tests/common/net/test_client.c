@@ -7,6 +7,7 @@
 #include "common/net/client.h"
 #include "common/wire/frame.h"
 #include "tests/support/checksummed_frame.h"
+#include "tests/support/failing_memory.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,7 +16,9 @@
 #include <cmocka.h>
 
 #include <arpa/inet.h>
+#include <errno.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,7 +38,32 @@ struct coordinator {
 	const char *name;      /* answers one Fetch, and calls the result so */
 	uint64_t sizes[2];     /* or two, and says that the file is so long */
 	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
+	atomic_bool hold;      /* but not yet */
+	atomic_bool said;
 };
+
+/* ---- a file system ---- */
+
+static bool is_plain; /* neither hard links nor renames that replace nothing */
+
+int __real_link(const char *from, const char *to);
+int __wrap_link(const char *from, const char *to);
+int __real_renameat2(int from_folder, const char *from, int to_folder, const char *to, unsigned flags);
+int __wrap_renameat2(int from_folder, const char *from, int to_folder, const char *to, unsigned flags);
+
+int __wrap_link(const char *from, const char *to)
+{
+	errno = EPERM;
+	return is_plain ? -1 : __real_link(from, to);
+}
+
+int __wrap_renameat2(int from_folder, const char *from, int to_folder, const char *to, unsigned flags)
+{
+	errno = EINVAL;
+	return is_plain ? -1 : __real_renameat2(from_folder, from, to_folder, to, flags);
+}
+
+/* ---- messages ---- */
 
 static void send_message(int fd, const Farm__Envelope *m, const void *payload, size_t payload_size)
 {
@@ -82,7 +110,7 @@ static void say_chunk(int fd, const char *name, uint64_t offset, uint64_t file_s
 
 static void *coordinate(void *user)
 {
-	const struct coordinator *c = user;
+	struct coordinator *c = user;
 	char bytes[4096];
 	unsigned char *rubbish = calloc(1, c->payload + 1);
 	Farm__Done done;
@@ -94,8 +122,11 @@ static void *coordinate(void *user)
 	m.done = &done;
 	if (recv(fd, bytes, sizeof bytes, 0) > 0)
 		say_hello(fd);
+	while (c->hold)
+		usleep(1000);
 	for (size_t i = 0; i < c->flood; i++)
 		send_message(fd, &m, rubbish, c->payload);
+	c->said = true;
 	if (c->name && recv(fd, bytes, sizeof bytes, 0) > 0)
 		say_chunk(fd, c->name, 0, sizeof image);
 	for (int i = 0; i < 2 && c->sizes[0] && recv(fd, bytes, sizeof bytes, 0) > 0; i++)
@@ -170,14 +201,13 @@ static unsigned files_here(void)
 	return count;
 }
 
-static void names_lead_nowhere(void **state)
+static void lead_nowhere(const char *here)
 {
-	(void)state;
 	char taken[CLIENT_NAME_BYTES], path[128], longest[1024];
 	struct stat st;
 	write_text("above.exr");
-	assert_int_equal(mkdir("here", 0700), 0);
-	assert_int_equal(chdir("here"), 0);
+	assert_int_equal(mkdir(here, 0700), 0);
+	assert_int_equal(chdir(here), 0);
 	/* folders are not looked at */
 	snprintf(path, sizeof path, "%s/above.exr", folder);
 	assert_int_equal(fetch_as(path, taken), 0);
@@ -205,6 +235,15 @@ static void names_lead_nowhere(void **state)
 	assert_int_not_equal(stat("../nobody.exr", &st), 0);
 	assert_int_equal(files_here(), 6); /* and nothing half done */
 	assert_int_equal(chdir(".."), 0);
+}
+
+static void names_lead_nowhere(void **state)
+{
+	(void)state;
+	lead_nowhere("here");
+	is_plain = true;
+	lead_nowhere("there");
+	is_plain = false;
 }
 
 static void who_names_a_file_gets_it(void **state)
@@ -297,6 +336,28 @@ static void floods_are_dammed(void **state)
 	}
 }
 
+/* One allocation after the other fails: nobody waits for a message that was lost. */
+static void no_memory_for_a_message(void **state)
+{
+	(void)state;
+	int rc = -1;
+	for (long n = 0; rc; n++) {
+		struct coordinator c = {.flood = 1, .hold = true};
+		struct client *cl = meet(&c);
+		struct client_message m;
+		struct error e;
+		c.hold = false;
+		while (!c.said)
+			usleep(1000);
+		mem_fail_after(n);
+		rc = client_wait(cl, 60, &m, &e);
+		mem_fail_after(-1);
+		assert_true(rc == 0 || rc == -ECONNRESET);
+		client_message_fini(&m);
+		part(&c, cl);
+	}
+}
+
 static int set_up(void **state)
 {
 	(void)state;
@@ -320,6 +381,7 @@ int main(void)
 		cmocka_unit_test(a_file_of_another_size_is_another_file),
 		cmocka_unit_test(own_files_are_own_faults),
 		cmocka_unit_test(floods_are_dammed),
+		cmocka_unit_test(no_memory_for_a_message),
 	};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
