@@ -16,9 +16,10 @@ struct work {
 
 struct shared {
 	unsigned threads;
-	atomic_uint taken; /* entries that a thread has */
-	atomic_int number; /* of the signal that ended the process; 0: none */
-	atomic_int hit;	   /* the entry of the thread that received it; -1: none of these */
+	atomic_uint taken;   /* entries that a thread has */
+	atomic_bool claimed; /* a thread writes the next three: number last, which says that the others are written */
+	atomic_int number;   /* of the signal that ended the process; 0: none */
+	atomic_int hit;	     /* the entry of the thread that received it; -1: none of these */
 	char text[CRASH_TEXT];
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
@@ -41,11 +42,11 @@ int work_share(unsigned threads, struct error *e)
 
 static void last_words(int number, const char *text)
 {
-	int none = 0;
-	if (!atomic_compare_exchange_strong(&shared->number, &none, number))
-		return; /* another thread came first */
+	if (atomic_exchange(&shared->claimed, true))
+		return; /* another thread came first; perhaps it ends the process before that one is done */
 	atomic_store(&shared->hit, own && atomic_load(&own->busy) ? (int)(own - shared->of) : -1);
 	memcpy(shared->text, text, sizeof shared->text);
+	atomic_store(&shared->number, number);
 }
 
 void work_catch(void)
@@ -101,7 +102,7 @@ static void drop_reported(void)
 
 unsigned work_lose(int number)
 {
-	int said = atomic_load(&shared->number), hit = atomic_load(&shared->hit);
+	int said = atomic_load(&shared->number), hit = said ? atomic_load(&shared->hit) : -1;
 	unsigned before;
 	drop_reported();
 	before = shared->lost_count;
@@ -116,6 +117,7 @@ unsigned work_lose(int number)
 	atomic_store(&shared->taken, 0);
 	atomic_store(&shared->number, 0);
 	atomic_store(&shared->hit, -1);
+	atomic_store(&shared->claimed, false);
 	return shared->lost_count - before;
 }
 
