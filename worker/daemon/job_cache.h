@@ -36,6 +36,7 @@ struct job_cache {
 	unsigned users;		/* number of leases that need it */
 	uint64_t last_used;	/* value of the counter of uses */
 	bool ended;		/* the coordinator does not need it any more */
+	bool confirmed;		/* on this connection: the coordinator's job of this number is this one */
 	double build_seconds;
 	void *owner;
 	void (*built)(struct job_cache *); /* called on the loop's thread: READY or FAILED */

@@ -345,14 +345,16 @@ static void take_job_end(struct agent *a, uint64_t job)
 }
 
 /* The coordinator has started over, and the job's number is now another job's: the results of the old one are
- * useless. */
+ * useless. What it has granted meanwhile is of the new one, and is given back; it ignores what it has not granted. */
 static void disown(struct agent *a, struct job_cache *b)
 {
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"", log_u64(b->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->bundle == b && !l->unwanted)
-			forget_lease(a, l);
+		if (l->bundle != b || l->unwanted)
+			continue;
+		send_failed(a, &l->grant.key, "", false);
+		forget_lease(a, l);
 	}
 	limit_backlog(a);
 	b->ended = true;
@@ -370,6 +372,7 @@ static void take_job_info(struct agent *a, struct envelope *env)
 		disown(a, b);
 		return;
 	}
+	b->confirmed = true;
 	if (b->state == JOB_CACHE_ASKED && job_cache_set_info(b, env, &e))
 		fail_job_cache(a, b, &e);
 	fetch_or_build(a, b);
@@ -456,9 +459,11 @@ void lease_queue_welcome(struct agent *a)
 	tell_lost(a);
 	fetch_reconnected(a);
 	/* Asks whether the jobs still live. The answers resume unfinished fetches and send unsent results. */
-	for (struct job_cache *b = a->bundles; b; b = b->next)
+	for (struct job_cache *b = a->bundles; b; b = b->next) {
+		b->confirmed = false;
 		if (!b->ended)
 			send_job_get(a, b->job);
+	}
 	send_request(a);
 }
 

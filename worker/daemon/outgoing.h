@@ -15,6 +15,7 @@ void send_job_get(struct agent *a, uint64_t job);
 void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own);
 /* The maker of the chain states in the grant is at fault. */
 void send_bad_states(struct agent *a, const struct grant *g, const char *text);
-void send_result(struct agent *a, struct lease_task *l); /* once per connection */
+/* Once per connection, and not before the coordinator has described the job: another one may have its number now. */
+void send_result(struct agent *a, struct lease_task *l);
 
 #endif

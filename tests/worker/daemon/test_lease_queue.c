@@ -105,7 +105,7 @@ static void hear_job_get(uint64_t job)
 	assert_int_equal(m->job_get->job, job);
 }
 
-static void grant(uint64_t job)
+static void say_grant(uint64_t job)
 {
 	const struct lease_key k = {.job = job, .kind = LEASE_RENDER};
 	unsigned char *frame;
@@ -116,6 +116,11 @@ static void grant(uint64_t job)
 	assert_int_equal(send(t.at->fd, bytes, size, MSG_NOSIGNAL), size);
 	free(bytes);
 	mem_free(frame);
+}
+
+static void grant(uint64_t job)
+{
+	say_grant(job);
 	hear_job_get(job);
 }
 
@@ -345,6 +350,32 @@ static void a_new_connection_goes_on(void **state)
 	finish();
 }
 
+/* A coordinator that has lost its spool, and grants a lease of another job 1 before the worker knows: it gets it back,
+ * and can grant it again. */
+static void another_job_of_that_number(void **state)
+{
+	(void)state;
+	start(0);
+	begin_jobs(1);
+	hear_blob_get(&t.mesh, 0);
+	hang_up();
+	welcome();
+	hear_job_get(1);
+	assert_int_equal(hear()->body_case, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	say_grant(1);
+	make_file(&t.scenes[0], "another", 7);
+	describe(1);
+	assert_int_equal(hear_failed(""), 1);
+	assert_string_equal(t.at->env.message->lease_failed->text, "");
+	grant(1);
+	describe(1);
+	hear_blob_get(&t.scenes[0], 0);
+	send_piece(&t.scenes[0], 0);
+	serve_mesh(0, PIECES);
+	hear_built(1);
+	finish();
+}
+
 /* Pieces that nobody asked for, or not now, or not there. */
 static void what_was_not_asked_for_is_refused(void **state)
 {
@@ -454,6 +485,7 @@ int main(void)
 		TEST(whoever_asked_may_go),
 		TEST(a_late_job_takes_over),
 		TEST(a_new_connection_goes_on),
+		TEST(another_job_of_that_number),
 		TEST(what_was_not_asked_for_is_refused),
 		TEST(lies_are_noticed),
 		TEST(a_store_without_room_fails_each_once),
