@@ -340,55 +340,142 @@ void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path
 
 /* ---- checking ---- */
 
-static int hash_file(const char *path, struct blob_hash *out, struct error *e)
-{
-	enum { PIECE = 1 << 18 };
-	int fd = disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0);
-	if (fd < 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
-	unsigned char *bytes = mem_alloc(PIECE, 1);
-	EVP_MD_CTX *md = EVP_MD_CTX_new();
-	ssize_t n = 0;
-	bool ok = bytes && md && EVP_DigestInit_ex(md, EVP_sha256(), NULL) == 1;
-	while (ok && ((n = disk_read(fd, bytes, PIECE)) > 0 || (n < 0 && errno == EINTR)))
-		ok = n < 0 || EVP_DigestUpdate(md, bytes, (size_t)n) == 1;
-	int rc = !ok	 ? error_set(e, ENOMEM, "no memory to check %s", path)
-		 : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno))
-			 : 0;
-	if (!rc && EVP_DigestFinal_ex(md, out->bytes, NULL) != 1)
-		rc = error_set(e, EIO, "SHA-256 failed");
-	EVP_MD_CTX_free(md);
-	mem_free(bytes);
-	disk_close(fd);
-	return rc;
-}
+struct blob_check {
+	struct blob_store *store;
+	struct blob_hash hash;
+	double begun;
+	bool was_given; /* when it began */
+	bool whole;	/* nothing is left to read */
+	int fd, rc;
+	EVP_MD_CTX *md;
+	struct error error;
+};
 
-int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e)
+int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct blob_hash *h, double seconds,
+		     struct error *e)
 {
-	char path[PATH_MOST], aside[PATH_MOST + 16], hex[BLOB_HEX_SIZE];
-	struct blob_hash got;
+	char hex[BLOB_HEX_SIZE];
 	struct entry *n = find_there(s, h);
 	blob_hex(h, hex);
 	if (!n)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
 	if (n->checked > 0 && (seconds == BLOB_SINCE_GIVEN ? !n->given : clock_seconds() - n->checked <= seconds))
 		return 0;
-	blob_path(s, h, path, sizeof path);
-	int rc = hash_file(path, &got, e);
-	if (rc && rc != -ENOENT)
-		return rc;
-	if (!rc && blob_hash_equal(&got, h)) {
-		n->checked = clock_seconds();
-		n->given = false;
-		return 0;
+	struct blob_check *c = mem_alloc(1, sizeof *c);
+	if (!c)
+		return error_set(e, ENOMEM, "no memory to check the blob %s", hex);
+	*c = (struct blob_check){
+		.store = s, .hash = *h, .begun = clock_seconds(), .was_given = n->given, .fd = -1, .rc = 0};
+	n->given = false; /* what is given from now on may be read too late for this check */
+	n->holds++;
+	*out = c;
+	return 1;
+}
+
+/* The store's path does not change: no lock. */
+static int check_open(struct blob_check *c, const char *path)
+{
+	c->fd = disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0);
+	if (c->fd < 0)
+		return error_set(&c->error, errno, "%s: %s", path, strerror(errno));
+	c->md = EVP_MD_CTX_new();
+	if (!c->md || EVP_DigestInit_ex(c->md, EVP_sha256(), NULL) != 1)
+		return error_set(&c->error, ENOMEM, "no memory to check %s", path);
+	return 0;
+}
+
+static int check_some(struct blob_check *c, const char *path)
+{
+	enum { PIECE = 1 << 18, PIECES = 128 };
+	unsigned char *bytes = mem_alloc(PIECE, 1);
+	if (!bytes)
+		return error_set(&c->error, ENOMEM, "no memory to check %s", path);
+	int rc = 0;
+	for (int i = 0; !rc && !c->whole && i < PIECES; i++) {
+		ssize_t n = disk_read(c->fd, bytes, PIECE);
+		c->whole = n == 0;
+		if (n < 0 && errno != EINTR)
+			rc = error_set(&c->error, errno, "%s: %s", path, strerror(errno));
+		else if (n > 0 && EVP_DigestUpdate(c->md, bytes, (size_t)n) != 1)
+			rc = error_set(&c->error, EIO, "SHA-256 failed");
 	}
+	mem_free(bytes);
+	return rc;
+}
+
+bool blob_check_read(struct blob_check *c)
+{
+	char path[PATH_MOST];
+	blob_path(c->store, &c->hash, path, sizeof path);
+	if (c->fd < 0)
+		c->rc = check_open(c, path);
+	if (!c->rc)
+		c->rc = check_some(c, path);
+	return !c->rc && !c->whole;
+}
+
+/* What the bytes say: 0, -EBADMSG, -ENOENT: no file, or why they are not known. */
+static int check_result(struct blob_check *c, struct error *e)
+{
+	struct blob_hash got;
+	if (c->rc) {
+		*e = c->error;
+		return c->rc;
+	}
+	if (!c->whole)
+		return error_set(e, ECANCELED, "the check was not finished");
+	if (EVP_DigestFinal_ex(c->md, got.bytes, NULL) != 1)
+		return error_set(e, EIO, "SHA-256 failed");
+	return blob_hash_equal(&got, &c->hash) ? 0 : -EBADMSG;
+}
+
+/* Its contents are wrong, or there is none. */
+static int set_aside(struct blob_store *s, struct entry *n, bool there, struct error *e)
+{
+	char path[PATH_MOST], aside[PATH_MOST + 16], hex[BLOB_HEX_SIZE];
+	blob_hex(&n->hash, hex);
+	blob_path(s, &n->hash, path, sizeof path);
 	snprintf(aside, sizeof aside, "%s/damaged.%s", s->folder, hex);
-	if (!rc)
+	if (!n->gone && there)
 		disk_rename(path, aside);
 	n->gone = true;
 	s->bytes -= n->size;
 	n->size = 0;
-	return error_set(e, EBADMSG, rc ? "%s is gone" : "%s is damaged: its contents do not match its name", path);
+	return error_set(e, EBADMSG, there ? "%s is damaged: its contents do not match its name" : "%s is gone", path);
+}
+
+int blob_check_end(struct blob_check *c, struct error *e)
+{
+	struct error ignored;
+	struct blob_store *s = c->store;
+	struct entry *n = find(s, &c->hash); /* it is held */
+	int rc = check_result(c, e ? e : &ignored);
+	if (n->checked > c->begun) { /* written or checked by another one meanwhile */
+		rc = 0;
+	} else if (rc == -EBADMSG || rc == -ENOENT) {
+		rc = set_aside(s, n, rc == -EBADMSG, e);
+	} else if (rc) {
+		n->given |= c->was_given;
+	} else {
+		n->checked = clock_seconds();
+	}
+	n->holds--;
+	if (c->fd >= 0)
+		disk_close(c->fd);
+	EVP_MD_CTX_free(c->md);
+	mem_free(c);
+	return rc;
+}
+
+int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e)
+{
+	struct blob_check *c;
+	int rc = blob_check_begin(&c, s, h, seconds, e);
+	if (rc <= 0)
+		return rc;
+	while (blob_check_read(c))
+		continue;
+	return blob_check_end(c, e);
 }
 
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e)

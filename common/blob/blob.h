@@ -43,6 +43,14 @@ void blob_release(struct blob_store *s, const struct blob_hash *h);
  * store. Any other error: it cannot be read at the moment. */
 enum { BLOB_SINCE_GIVEN = -1 };
 int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e);
+/* The same in parts, for a store whose thread must not wait for the disk: begin (1: begun; 0 or an error: the answer),
+ * read on any thread while it says that there is more, some megabytes each time, and end, which frees it. The blob is
+ * held meanwhile. Ended early: -ECANCELED, and nothing is known. */
+struct blob_check;
+int blob_check_begin(struct blob_check **c, struct blob_store *s, const struct blob_hash *h, double seconds,
+		     struct error *e);
+bool blob_check_read(struct blob_check *c);
+int blob_check_end(struct blob_check *c, struct error *e);
 /* Holds a blob, present or not: one that is written later is held from the start. -ENOMEM */
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e);
 

@@ -22,6 +22,7 @@
 struct follow_up;
 struct incoming;
 struct clearing;
+struct file_check;
 struct durable_ack;
 struct ending;
 struct extension_request;
@@ -59,8 +60,9 @@ struct jobs {
 	struct spool *spool;
 	struct blob_store *blobs;
 	struct ledger *ledger;
-	struct live_job *live;	  /* running jobs */
-	struct job_record *ended; /* at most ENDED_MAX, oldest first */
+	struct file_check *checks; /* files that are being read (coordinator/jobs/files.c) */
+	struct live_job *live;	   /* running jobs */
+	struct job_record *ended;  /* at most ENDED_MAX, oldest first */
 	size_t ended_count;
 	struct deferred *deferred, **deferred_last;
 	char refusal[256];	   /* why the core refused the last event */

@@ -246,12 +246,12 @@ static size_t waiting_size(const struct waiting_batch *w)
 }
 
 bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
-		      struct buf *payload)
+		      struct buf *payload, bool checked)
 {
 	struct waiting_batch *w = mem_alloc(1, sizeof *w);
 	if (!w)
 		return false;
-	*w = (struct waiting_batch){NULL, peer, *k, *env, *payload};
+	*w = (struct waiting_batch){NULL, peer, *k, *env, *payload, checked};
 	memset(env, 0, sizeof *env);
 	memset(payload, 0, sizeof *payload);
 	*job->waiting_last = w;
@@ -290,16 +290,35 @@ void live_jobs_drop_waiting(struct live_job *first, uint64_t peer)
 		drop_waiting(job, peer);
 }
 
-struct waiting_batch *live_job_take_waiting(struct live_job *job)
+static struct waiting_batch *take(struct live_job *job, struct waiting_batch **at)
 {
-	struct waiting_batch *w = job->waiting;
+	struct waiting_batch *w = *at;
 	if (!w)
 		return NULL;
-	job->waiting = w->next;
-	if (!job->waiting)
-		job->waiting_last = &job->waiting;
+	*at = w->next;
+	if (!*at)
+		job->waiting_last = at;
 	job->waiting_bytes -= waiting_size(w);
 	return w;
+}
+
+struct waiting_batch *live_job_take_waiting(struct live_job *job)
+{
+	return take(job, &job->waiting);
+}
+
+static bool is_failure(const struct waiting_batch *w)
+{
+	const Farm__Envelope *m = w->envelope.message;
+	return m->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED && !m->lease_failed->bad_states;
+}
+
+struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer)
+{
+	struct waiting_batch **at = &job->waiting;
+	while (*at && ((*at)->peer != peer || !is_failure(*at)))
+		at = &(*at)->next;
+	return take(job, at);
 }
 
 void waiting_batch_free(struct waiting_batch *w)

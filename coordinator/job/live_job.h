@@ -43,13 +43,14 @@ struct publishing { /* at most one at a time per live job */
 	struct error error;
 };
 
-/* A result that arrived while the canvas was busy. */
+/* A result that arrived while the canvas was busy, or a failure while the job's files are read. */
 struct waiting_batch {
 	struct waiting_batch *next;
 	uint64_t peer;
 	struct lease_key key;
 	struct envelope envelope;
 	struct buf payload;
+	bool checked; /* a failure: the job's files have been read since it came */
 };
 
 /* Seconds after the job's first lease, including earlier runs: at the last merged batch, at the start of the first
@@ -112,6 +113,7 @@ struct live_job {
 	double checkpoint_after;   /* s of the loop's clock: next attempt */
 	double look_written;	   /* work of the last estimate stored in the journal */
 	bool lacks_file;	   /* files of its scene, for which it is held */
+	bool unread;		   /* one of them could not be read, or was wrong, when they were last read */
 	bool held;		   /* the disk has no room for a result of so many bytes: */
 	size_t held_bytes;
 	double try_again;
@@ -163,13 +165,15 @@ int live_job_pack_lease(const struct live_job *job, const struct lease_key *k, b
 			size_t *size, struct error *e);
 void live_job_count_worker(struct live_job *job, uint64_t peer);
 
-/* Takes both. false: out of memory. */
+/* Takes both. checked: as in struct waiting_batch. false: out of memory. */
 bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,
-		      struct buf *payload);
+		      struct buf *payload, bool checked);
 const struct waiting_batch *
 live_job_waits_for(const struct live_job *job,
 		   const struct lease_key *k);			   /* NULL: no result of that lease is waiting */
 struct waiting_batch *live_job_take_waiting(struct live_job *job); /* NULL: none */
+/* The first waiting failure of a worker that is no refusal of chain states; NULL: none. */
+struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer);
 /* Drops the waiting results of a worker that is gone. */
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer);
 void waiting_batch_free(struct waiting_batch *w);

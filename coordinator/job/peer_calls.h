@@ -6,6 +6,7 @@
 #ifndef COORDINATOR_JOB_PEER_CALLS_H
 #define COORDINATOR_JOB_PEER_CALLS_H
 
+#include "common/blob/blob.h"
 #include "coordinator/core/farm.h"
 
 #include <stdbool.h>
@@ -33,6 +34,8 @@ struct peer_calls {
 	void (*job_ended)(void *user, uint64_t job);  /* workers */
 	void (*jobs_let_go)(void *user);	      /* clients that watch a job that ended */
 	void (*films_free)(void *user, uint64_t job); /* those waiting for a preview */
+	/* A file that files_check has begun to read: 0, or an error and its sentence. */
+	void (*file_read)(void *user, const struct blob_hash *h, int rc, const char *text);
 	void (*jobs_read)(void *user); /* the jobs of the last run have been read: requests that waited for that */
 
 	bool (*uses_result)(void *user, uint64_t job); /* a client is fetching or awaiting it */

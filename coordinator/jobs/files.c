@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/jobs/files.h"
 
+#include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/step.h"
 
+#include <assert.h>
 #include <string.h>
 
 static void hold(struct jobs *jobs, struct live_job *job, const char *text)
@@ -54,35 +56,167 @@ static void look_at_all(struct jobs *jobs)
 		job = look(jobs, job) ? jobs->live : job->next;
 }
 
-/* -EBADMSG, -ENOENT: the jobs that need it are to wait. */
-static int verify(struct jobs *jobs, const struct blob_hash *h, double seconds, struct error *e)
+/* ---- reading: some megabytes at a time, so that a large scene keeps no thread of the pool from others ---- */
+
+struct file_check {
+	struct file_check *next; /* one is read at a time, the first */
+	uv_work_t work;
+	struct jobs *jobs;
+	struct blob_hash hash;
+	struct blob_check *check;
+	bool more;
+};
+
+static void read_some(uv_work_t *work)
 {
-	int rc = blob_check(jobs->blobs, h, seconds, e);
-	if (rc == -EBADMSG)
-		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
-	return rc;
+	struct file_check *c = work->data;
+	c->more = blob_check_read(c->check);
 }
 
-int files_check(struct jobs *jobs, const struct blob_hash *h, double seconds, struct error *e)
-{
-	int rc = verify(jobs, h, seconds, e);
-	if (rc == -EBADMSG || rc == -ENOENT)
-		look_at_all(jobs);
-	return rc;
-}
-
-bool files_are_right(struct jobs *jobs, const struct live_job *job)
+static bool needs(const struct live_job *job, const struct blob_hash *h)
 {
 	const Farm__Submit *m = live_job_submit(job);
+	for (size_t i = 0; i < m->n_files; i++)
+		if (memcmp(m->files[i]->hash.data, h->bytes, BLOB_HASH_SIZE) == 0)
+			return true;
+	return false;
+}
+
+static void on_read(uv_work_t *work, int status);
+
+static void read_first(struct jobs *jobs)
+{
+	struct file_check *c = jobs->checks;
+	if (!c)
+		return;
+	c->work.data = c;
+	int rc = uv_queue_work(jobs->loop, &c->work, read_some, on_read);
+	assert(rc == 0);
+	(void)rc;
+}
+
+/* Whoever waits for the first one goes on. */
+static void finish_first(struct jobs *jobs)
+{
+	struct file_check *c = jobs->checks;
+	struct error e = {""};
+	int rc = blob_check_end(c->check, &e);
+	jobs->checks = c->next;
+	read_first(jobs);
+	if (rc == -EBADMSG)
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	for (struct live_job *job = jobs->live; rc && job; job = job->next)
+		job->unread = job->unread || needs(job, &c->hash);
+	if (rc == -EBADMSG)
+		look_at_all(jobs);
+	jobs->peers.file_read(jobs->peers.user, &c->hash, rc, e.text);
+	jobs_films_free(jobs); /* complaints that waited for it */
+	mem_free(c);
+}
+
+static void stop(struct jobs *jobs)
+{
+	while (jobs->checks) {
+		struct file_check *c = jobs->checks;
+		jobs->checks = c->next;
+		blob_check_end(c->check, NULL);
+		mem_free(c);
+	}
+}
+
+static void on_read(uv_work_t *work, int status)
+{
+	struct file_check *c = work->data;
+	struct jobs *jobs = c->jobs;
+	(void)status;
+	if (jobs->stopping)
+		stop(jobs);
+	else if (c->more)
+		read_first(jobs);
+	else
+		finish_first(jobs);
+}
+
+static bool is_read(const struct jobs *jobs, const struct blob_hash *h)
+{
+	const struct file_check *c = jobs->checks;
+	while (c && !blob_hash_equal(&c->hash, h))
+		c = c->next;
+	return c != NULL;
+}
+
+static int check(struct jobs *jobs, const struct blob_hash *h, double seconds, struct error *e)
+{
+	if (is_read(jobs, h))
+		return -EINPROGRESS;
+	struct file_check *c = mem_alloc(1, sizeof *c);
+	if (!c)
+		return error_set(e, ENOMEM, "no memory to check a file");
+	int rc = blob_check_begin(&c->check, jobs->blobs, h, seconds, e);
+	if (rc <= 0) {
+		mem_free(c);
+		return rc;
+	}
+	c->jobs = jobs;
+	c->hash = *h;
+	struct file_check **last = &jobs->checks;
+	while (*last)
+		last = &(*last)->next;
+	*last = c;
+	if (c == jobs->checks)
+		read_first(jobs);
+	return -EINPROGRESS;
+}
+
+int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
+{
+	int rc = check(jobs, h, FILES_CHECKED, e);
+	if (rc == -ENOENT)
+		look_at_all(jobs);
+	return rc;
+}
+
+bool files_are_read(const struct jobs *jobs, const struct live_job *job)
+{
+	const struct file_check *c = jobs->checks;
+	while (c && !needs(job, &c->hash))
+		c = c->next;
+	return c != NULL;
+}
+
+/* Within *at_once it is read here. */
+static int reread(struct jobs *jobs, const struct blob_hash *h, uint64_t *at_once)
+{
+	uint64_t size;
 	struct error e;
-	bool right = true;
+	if (!blob_has(jobs->blobs, h, &size) || size > *at_once)
+		return check(jobs, h, BLOB_SINCE_GIVEN, &e);
+	*at_once -= size;
+	int rc = blob_check(jobs->blobs, h, BLOB_SINCE_GIVEN, &e);
+	if (rc == -EBADMSG)
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	return rc;
+}
+
+void files_read(struct jobs *jobs, struct live_job *job)
+{
+	const Farm__Submit *m = live_job_submit(job);
+	uint64_t at_once = 1 << 16; /* bytes: a small scene's failure need not wait */
+	bool missing = false;
+	job->unread = false;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
-		right = verify(jobs, &h, BLOB_SINCE_GIVEN, &e) == 0 && right;
+		int rc = reread(jobs, &h, &at_once);
+		missing |= rc == -ENOENT || rc == -EBADMSG;
+		job->unread |= rc && rc != -EINPROGRESS;
 	}
-	if (!right) /* last: the job may be gone afterwards */
+	if (missing) /* last: the job may be gone afterwards */
 		look_at_all(jobs);
-	return right;
+}
+
+bool files_are_right(const struct jobs *jobs, const struct live_job *job)
+{
+	return !job->unread && !lacking(jobs, job);
 }
 
 void files_tick(struct jobs *jobs)

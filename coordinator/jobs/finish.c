@@ -51,7 +51,7 @@ static void finish(struct jobs *jobs, struct live_job *job)
 	live_job_free(job);
 	while (late) { /* the core knows that the job is over */
 		struct waiting_batch *next = late->next;
-		results_take(jobs, late->peer, &late->envelope, &late->payload);
+		results_take_waiting(jobs, late);
 		waiting_batch_free(late);
 		late = next;
 	}

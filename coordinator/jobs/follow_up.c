@@ -8,6 +8,7 @@
 
 #include "coordinator/jobs/checkpoint.h"
 #include "coordinator/jobs/dispatch.h"
+#include "coordinator/jobs/files.h"
 #include "coordinator/jobs/finish.h"
 #include "coordinator/jobs/late_feed.h"
 #include "coordinator/jobs/results.h"
@@ -17,12 +18,12 @@ static void on_drain(uv_timer_t *t)
 {
 	struct jobs *jobs = t->data;
 	struct live_job *job = jobs->live;
-	while (job && (job->busy || !job->waiting))
+	while (job && (job->busy || !job->waiting || files_are_read(jobs, job)))
 		job = job->next;
 	if (!job)
 		return;
 	struct waiting_batch *w = live_job_take_waiting(job);
-	results_take(jobs, w->peer, &w->envelope, &w->payload);
+	results_take_waiting(jobs, w);
 	waiting_batch_free(w);
 	if (!jobs->stopping)
 		uv_timer_start(&jobs->drain, on_drain, 0, 0);

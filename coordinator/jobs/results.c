@@ -98,7 +98,7 @@ static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, cons
 		return;
 	if (awaited == DELIVERY_USELESS)
 		ev.kind = EVENT_BATCH;
-	else if (w || !has_room(jobs, payload) || !live_job_put_off(job, peer, k, env, payload)) {
+	else if (w || !has_room(jobs, payload) || !live_job_put_off(job, peer, k, env, payload, false)) {
 		refuse(jobs, peer, k,
 		       w ? "another worker's result of this lease waits" : "no room for results that wait");
 		return;
@@ -123,7 +123,7 @@ static void log_failure(const struct jobs *jobs, const char *from, struct live_j
 			     name.text, f->own, said.text, (int)k->kind, k->group, k->part, epoch);
 }
 
-void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f)
+static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f)
 {
 	struct error e;
 	char text[1024];
@@ -146,7 +146,6 @@ void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFai
 	if (job && *f->text && !blamed && !files_are_right(jobs, job)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
-		job = NULL;
 	}
 	struct back back = {0};
 	bool holds = farm_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
@@ -163,25 +162,63 @@ void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFai
 	back_fini(&back);
 }
 
-/* Its states are refused: handled when nobody reads the film. */
-static void take_refusal(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload)
+/* A failure that may be the spool's fault: its job's files are read first, once. false: they have been. */
+static bool awaits_files(struct jobs *jobs, struct live_job *job, bool *checked)
+{
+	if (*checked)
+		return false;
+	const uint64_t id = job->id;
+	bool reading = files_are_read(jobs, job); /* perhaps since before the failure */
+	if (!reading)
+		files_read(jobs, job);
+	*checked = !reading;
+	job = jobs_find(jobs, id);
+	return job && files_are_read(jobs, job);
+}
+
+/* Refused states are handled when nobody reads the film. checked: as in struct waiting_batch. */
+static void take_failure(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload, bool checked)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;
 	struct live_job *job = m->key ? jobs_find(jobs, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
-	if (!job || !job->busy || lease_key_from_wire(m->key, &k, &e)) {
+	bool waits = false;
+	if (job && lease_key_from_wire(m->key, &k, &e) == 0)
+		waits = m->bad_states ? job->busy : *m->text && !m->own && awaits_files(jobs, job, &checked);
+	if (!waits) {
 		if (jobs->peers.name(jobs->peers.user, peer))
-			results_take_failure(jobs, peer, m);
-	} else if (!has_room(jobs, payload) || !live_job_put_off(job, peer, &k, env, payload)) {
+			fail_lease(jobs, peer, m);
+	} else if (!has_room(jobs, payload) || !live_job_put_off(job, peer, &k, env, payload, checked)) {
 		refuse(jobs, peer, &k, "no room for results that wait");
 	}
+}
+
+void results_take_waiting(struct jobs *jobs, struct waiting_batch *w)
+{
+	if (w->envelope.message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED)
+		take_failure(jobs, w->peer, &w->envelope, &w->payload, w->checked);
+	else
+		results_take(jobs, w->peer, &w->envelope, &w->payload);
+}
+
+void results_let_go(struct jobs *jobs, uint64_t peer)
+{
+	for (struct live_job *job = jobs->live; job;) {
+		struct waiting_batch *w = live_job_take_failure(job, peer);
+		if (w) {
+			take_failure(jobs, peer, &w->envelope, &w->payload, true);
+			waiting_batch_free(w);
+		}
+		job = w ? jobs->live : job->next; /* the list may have changed */
+	}
+	live_jobs_drop_waiting(jobs->live, peer);
 }
 
 void results_take(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	if (env->message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED) {
-		take_refusal(jobs, peer, env, payload);
+		take_failure(jobs, peer, env, payload, false);
 		return;
 	}
 	const Farm__LeaseResult *m = env->message->lease_result;

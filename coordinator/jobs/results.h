@@ -5,9 +5,13 @@
 
 #include "coordinator/job/jobs.h"
 
-/* A LeaseResult, or a LeaseFailed that refuses chain states: now, or when the films are free. May take either. */
+/* A LeaseResult or a LeaseFailed: now, or when the films are free and the job's files have been read. May take either.
+ */
 void results_take(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload);
-/* Any other LeaseFailed. */
-void results_take_failure(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f);
+/* One that was put off; the caller frees it. */
+void results_take_waiting(struct jobs *jobs, struct waiting_batch *w);
+/* A worker leaves. Its failures count by what is known of the files so far, because a worker that hangs says so and
+ * leaves; its results are dropped. */
+void results_let_go(struct jobs *jobs, uint64_t peer);
 
 #endif

@@ -117,6 +117,26 @@ static void submit(struct session *p)
 	client_upload_abort(p);
 }
 
+/* Asks for the files that the store lacks; those that it has are read first. */
+static void look_for_files(struct session *p)
+{
+	struct error e;
+	int rc = upload_look(p->upload, p->jobs, &e);
+	if (rc == -EINPROGRESS)
+		return;
+	if (!rc && p->upload->missing_count == 0) {
+		submit(p);
+		return;
+	}
+	if (rc || within_quota(p, &e)) {
+		answer_submit(p, 0, e.text, NULL);
+		client_upload_abort(p);
+		return;
+	}
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
+	answer_submit(p, 0, "", p->upload);
+}
+
 static void take_submit(struct session *p, struct envelope *env)
 {
 	struct error e;
@@ -129,23 +149,20 @@ static void take_submit(struct session *p, struct envelope *env)
 		answer_submit(p, 0, e.text, NULL);
 		return;
 	}
-	if (p->upload->missing_count == 0) {
-		submit(p);
-		return;
-	}
-	if (within_quota(p, &e)) {
-		answer_submit(p, 0, e.text, NULL);
-		client_upload_abort(p);
-		return;
-	}
-	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
-	answer_submit(p, 0, "", p->upload);
+	p->told = jobs_now(p->jobs);
+	look_for_files(p);
+}
+
+void client_file_read(struct session *p, const struct blob_hash *h, bool right)
+{
+	if (p->state == SESSION_CLIENT && p->upload && upload_file_read(p->upload, h, right))
+		look_for_files(p);
 }
 
 static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
-	if (!p->upload) {
+	if (!p->upload || upload_is_looking(p->upload)) {
 		session_fault(p, "a blob without a submission");
 		return;
 	}

@@ -8,6 +8,8 @@
 /* Handles a message. May take the envelope. */
 void client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
 void client_tick(struct session *p); /* sends what has changed in the job that it watches */
+/* A file has been checked: a submission that waits for that goes on. */
+void client_file_read(struct session *p, const struct blob_hash *h, bool right);
 void client_upload_abort(struct session *p);
 
 #endif

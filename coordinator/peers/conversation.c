@@ -17,6 +17,7 @@
 #include "common/base/text.h"
 #include "coordinator/jobs/extend.h"
 #include "coordinator/jobs/recovery.h"
+#include "coordinator/jobs/results.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/client.h"
 #include "coordinator/peers/fetch.h"
@@ -202,6 +203,8 @@ static void on_closed(void *user, const char *why)
 {
 	struct session *p = user;
 	struct peers *s = p->peers;
+	if (!p->jobs->stopping)
+		results_let_go(p->jobs, p->id); /* while it has a name */
 	peers_delist(s, p);
 	client_upload_abort(p);
 	fetch_end(p);
@@ -215,7 +218,6 @@ static void on_closed(void *user, const char *why)
 					       : LOG_PEER_ACCEPT,
 		  "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
 		  log_quote(p->name).text, log_quote(why).text);
-	live_jobs_drop_waiting(p->jobs->live, p->id);
 	if (p->joined && !p->jobs->stopping) {
 		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
 		jobs_step(p->jobs, &ev);

@@ -3,6 +3,7 @@
 
 #include "common/base/mem.h"
 #include "coordinator/jobs/recovery.h"
+#include "coordinator/peers/upload.h"
 
 #include <string.h>
 
@@ -57,7 +58,8 @@ void held_tick(struct session *p)
 {
 	Farm__Heartbeat beat;
 	Farm__Envelope m;
-	if (!p->held || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
+	bool waits = p->held || (p->upload && upload_is_looking(p->upload));
+	if (!waits || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
 		return;
 	p->told = jobs_now(p->jobs);
 	farm__heartbeat__init(&beat);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Requests that wait while the jobs of an earlier run are read (recovery.h), and are answered in order afterwards.
- * Hello, heartbeats and lists of jobs are answered at once. Peers that wait get heartbeats, as often as workers must
- * send them. The loop's thread.
+ * Hello, heartbeats and lists of jobs are answered at once. Peers that wait, also for the files of a submission to be
+ * read, get heartbeats, as often as workers must send them. The loop's thread.
  */
 #ifndef COORDINATOR_PEERS_HELD_H
 #define COORDINATOR_PEERS_HELD_H

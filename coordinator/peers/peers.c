@@ -17,6 +17,7 @@
 #include "coordinator/peers/conversation.h"
 #include "coordinator/peers/fetch.h"
 #include "coordinator/peers/held.h"
+#include "coordinator/peers/worker_requests.h"
 #include "coordinator/peers/worker_send.h"
 
 static void on_refused(void *user, const char *why)
@@ -174,6 +175,15 @@ static void films_free(void *user, uint64_t job)
 	fetch_previews(user, job);
 }
 
+static void file_read(void *user, const struct blob_hash *h, int rc, const char *text)
+{
+	const struct peers *s = user;
+	for (struct session *p = s->sessions; p; p = p->next) {
+		worker_requests_file_read(p, h, rc ? text : "");
+		client_file_read(p, h, rc == 0);
+	}
+}
+
 static void jobs_read(void *user)
 {
 	conversations_go_on(user);
@@ -205,6 +215,7 @@ void peers_init(struct peers *s)
 					     .job_ended = job_ended,
 					     .jobs_let_go = jobs_let_go,
 					     .films_free = films_free,
+					     .file_read = file_read,
 					     .jobs_read = jobs_read,
 					     .uses_result = uses_result,
 					     .uploading = uploading};

@@ -3,8 +3,9 @@
  * A submission on its way from its message to the core.
  *
  * upload_new checks it: names and texts, that paths stay inside the bundle, sizes against the limits, and the plan.
- * Files that the spool has are held at once. The client is told the hashes of the others and sends these, each in
- * order, and upload_add stores them under their hashes. When none is missing any more, the job can be submitted.
+ * upload_look holds the files that the spool has, each once it has been read and is right. The client is told the
+ * hashes of the others and sends these, each in order, and upload_add stores them under their hashes. When none is
+ * missing any more, the job can be submitted.
  *
  * Errors are -EINVAL with a sentence for the client, including bytes with a wrong hash or out of order. upload_free
  * releases everything that is held.
@@ -183,15 +184,11 @@ static void hold_blob(struct upload *u, const struct blob_hash *h)
 	}
 }
 
-static void look_for_blobs(struct upload *u)
+/* The next file that was looked for is right, or missing. */
+static void take_look(struct upload *u, const struct blob_hash *h, bool right)
 {
-	const Farm__Submit *m = u->submit.message->submit;
-	u->missing_count = 0;
-	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = live_job_file_hash(m->files[i]);
-		u->held[i] = blob_check(u->blobs, &h, FILES_CHECKED, NULL) == 0 && blob_hold(u->blobs, &h);
-		u->missing_count += !u->held[i];
-	}
+	u->held[u->looked] = right && blob_hold(u->blobs, h);
+	u->missing_count += !u->held[u->looked++];
 }
 
 /* A size that differs from the blob's would mislead workers. */
@@ -233,15 +230,40 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 	u->submit = *submit;
 	memset(submit, 0, sizeof *submit);
 	rc = sort_hashes(u, e);
-	if (!rc)
-		look_for_blobs(u);
-	if (!rc)
-		rc = check_sizes(u, e);
 	if (rc)
 		upload_free(u);
 	else
 		*out = u;
 	return rc;
+}
+
+bool upload_is_looking(const struct upload *u)
+{
+	return u->looked < u->submit.message->submit->n_files;
+}
+
+int upload_look(struct upload *u, struct jobs *jobs, struct error *e)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	while (upload_is_looking(u)) {
+		struct blob_hash h = live_job_file_hash(m->files[u->looked]);
+		int rc = blob_has(u->blobs, &h, NULL) ? files_check(jobs, &h, NULL) : -ENOENT;
+		if (rc == -EINPROGRESS)
+			return rc;
+		take_look(u, &h, rc == 0);
+	}
+	return check_sizes(u, e);
+}
+
+bool upload_file_read(struct upload *u, const struct blob_hash *h, bool right)
+{
+	if (!upload_is_looking(u))
+		return false;
+	struct blob_hash next = live_job_file_hash(u->submit.message->submit->files[u->looked]);
+	if (!blob_hash_equal(&next, h))
+		return false;
+	take_look(u, h, right);
+	return true;
 }
 
 void upload_free(struct upload *u)

@@ -9,6 +9,7 @@
 #include "common/blob/blob.h"
 #include "common/plan/plan.h"
 #include "common/wire/envelope.h"
+#include "coordinator/job/jobs.h"
 
 struct upload {
 	struct envelope submit; /* owned */
@@ -17,13 +18,19 @@ struct upload {
 	struct blob_store *blobs;
 	bool *held;	      /* by file: its blob is in the store and held */
 	uint32_t *by_hash;    /* the files, sorted by hash */
-	size_t missing_count; /* files not held */
+	size_t looked;	      /* so many files have been looked for in the store */
+	size_t missing_count; /* of these, not held */
 	struct blob_writer *writer;
 	struct blob_hash writing;
 };
 
 /* Takes the envelope of a Submit. bandwidth: as in struct plan_request. -EINVAL with a sentence for the client. */
 int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e);
+/* Then its files are looked for in the store. -EINPROGRESS: one is being read; it goes on after upload_file_read has
+ * said true. Otherwise all are known: 0, or -EINVAL with a sentence. */
+int upload_look(struct upload *u, struct jobs *jobs, struct error *e);
+bool upload_is_looking(const struct upload *u);
+bool upload_file_read(struct upload *u, const struct blob_hash *h, bool right);
 void upload_free(struct upload *u); /* releases the blobs that it holds */
 
 /* One chunk from the client. 1: a blob is complete. */

@@ -14,14 +14,10 @@
 
 #include <string.h>
 
-/* A failure that takes an epoch back must not be handled while others read the films. */
 static void take_lease_failed(struct session *p, struct envelope *env)
 {
 	struct buf nothing = {0};
-	if (env->message->lease_failed->bad_states)
-		results_take(p->jobs, p->id, env, &nothing);
-	else
-		results_take_failure(p->jobs, p->id, env->message->lease_failed);
+	results_take(p->jobs, p->id, env, &nothing);
 }
 
 static void take_blob_get(struct session *p, const Farm__BlobGet *g)

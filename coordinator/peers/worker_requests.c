@@ -3,6 +3,7 @@
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "coordinator/jobs/files.h"
 #include "coordinator/peers/session.h"
 #include "coordinator/peers/worker_send.h"
@@ -43,20 +44,20 @@ static void send_job_info(struct session *p, uint64_t id)
 	session_send(p, &m, NULL, 0);
 }
 
-static void send_piece(struct session *p, const struct worker_request *a)
+/* refusal: why it cannot be sent; "": it can. */
+static void send_piece(struct session *p, const struct worker_request *a, const char *refusal)
 {
 	Farm__BlobChunk chunk;
 	Farm__Envelope m;
-	struct error e = {""};
+	struct error e;
 	struct blob_hash h = a->hash;
 	uint64_t size = 0;
 	farm__blob_chunk__init(&chunk);
 	farm__envelope__init(&m);
 	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
 	ssize_t n = 0;
-	int fd = a->number == 0 && files_check(p->jobs, &h, FILES_CHECKED, &e)
-			 ? -1
-			 : blob_open(p->jobs->blobs, &h, &size, &e);
+	text_copy(e.text, sizeof e.text, refusal);
+	int fd = *refusal ? -1 : blob_open(p->jobs->blobs, &h, &size, &e);
 	if (fd >= 0 && bytes)
 		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
 	if (fd >= 0 && (!bytes || n < 0 || a->number > size))
@@ -73,20 +74,24 @@ static void send_piece(struct session *p, const struct worker_request *a)
 	mem_free(bytes);
 }
 
-static void answer(struct session *p, const struct worker_request *a)
+/* Before its first piece is sent, a file is checked. false: it is being read for that. */
+static bool answer(struct session *p, const struct worker_request *a)
 {
-	if (a->blob)
-		send_piece(p, a);
-	else
+	struct error e = {""};
+	if (!a->blob) {
 		send_job_info(p, a->number);
+		return true;
+	}
+	if (a->number == 0 && files_check(p->jobs, &a->hash, &e) == -EINPROGRESS)
+		return false;
+	send_piece(p, a, e.text);
+	return true;
 }
 
 void worker_requests_take(struct session *p, const struct worker_request *a)
 {
-	if (!p->asks && conn_unsent(p->conn) <= AHEAD) {
-		answer(p, a);
+	if (!p->asks && conn_unsent(p->conn) <= AHEAD && answer(p, a))
 		return;
-	}
 	struct worker_request *last = p->ask_count < ASKS_MOST ? mem_alloc(1, sizeof *last) : NULL;
 	if (!last) {
 		session_fault(p, "%u chunks and jobs were requested and not read: no worker needs so many",
@@ -111,10 +116,20 @@ static void drop_first(struct session *p)
 
 void worker_requests_go_on(struct session *p)
 {
-	while (p->asks && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD) {
-		answer(p, p->asks);
+	while (p->asks && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD && answer(p, p->asks))
+		drop_first(p);
+}
+
+void worker_requests_file_read(struct session *p, const struct blob_hash *h, const char *refusal)
+{
+	const struct worker_request *a = p->asks;
+	if (!a || p->state != SESSION_WORKER)
+		return;
+	if (a->blob && a->number == 0 && blob_hash_equal(&a->hash, h)) { /* not checked again, however long it took */
+		send_piece(p, a, refusal);
 		drop_first(p);
 	}
+	worker_requests_go_on(p);
 }
 
 void worker_requests_drop(struct session *p)

@@ -25,6 +25,7 @@ enum { STATE_BYTES = 3000, PATIENCE = 60000, BOOTSTRAP_LEASES = 8 };
 struct staged_disk *staged_disk;
 struct staged staged;
 static _Thread_local bool fail_next_folder;
+static atomic_int scene_fd = -1; /* the scene's file that was opened last */
 static pid_t pid;
 static char port_file[100];
 
@@ -55,7 +56,20 @@ static int own_open(const char *path, int flags, mode_t mode)
 		errno = EIO;
 		return -1;
 	}
-	return disk_system.open(path, flags, mode);
+	int fd = disk_system.open(path, flags, mode);
+	if (strstr(path, "/blobs/") && !(flags & O_CREAT))
+		scene_fd = fd;
+	return fd;
+}
+
+static ssize_t own_read(int fd, void *bytes, size_t size)
+{
+	if (fd == scene_fd && atomic_exchange(&staged_disk->hold_read, false)) {
+		staged_disk->held_read = true;
+		while (!staged_disk->end_read)
+			usleep(1000);
+	}
+	return disk_system.read(fd, bytes, size);
 }
 
 static int own_fdatasync(int fd)
@@ -100,6 +114,7 @@ static void serve(void)
 	prctl(PR_SET_PDEATHSIG, SIGKILL);
 	own.rename = own_rename;
 	own.open = own_open;
+	own.read = own_read;
 	own.fdatasync = own_fdatasync;
 	own.fallocate = own_fallocate;
 	disk_use(&own);
@@ -190,6 +205,22 @@ bool staged_answer(const struct lease_key *k)
 	bool said = scripted_send(staged.worker, &b, &staged.plan);
 	batch_fini(&b);
 	return said;
+}
+
+void staged_fail(const struct lease_key *k)
+{
+	Farm__LeaseFailed f;
+	Farm__LeaseKey key;
+	Farm__Envelope m;
+	char text[] = "it does not work";
+	farm__lease_failed__init(&f);
+	farm__envelope__init(&m);
+	lease_key_to_wire(k, &key);
+	f.key = &key;
+	f.text = text;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
+	m.lease_failed = &f;
+	assert_true(scripted_say(staged.worker, &m, NULL, 0));
 }
 
 void staged_work(const _Atomic bool *until, struct lease_key *keep)

@@ -24,6 +24,8 @@ struct staged_disk {
 	/* hold_flush: the next flush of a journal waits until end_flush. */
 	_Atomic bool hold_flush, held_flush, end_flush;
 	_Atomic bool fail_flush; /* then it fails */
+	/* hold_read: the next reading of a scene's file waits until end_read. */
+	_Atomic bool hold_read, held_read, end_read;
 	/* fail_memory: once room is made for a result, the allocation after so many others fails. */
 	_Atomic bool fail_memory;
 	_Atomic unsigned allocations;
@@ -49,6 +51,7 @@ uint64_t staged_submit(void);
 void staged_order(const Farm__Envelope *m); /* to the client; the answer has to be yes */
 void staged_cancel(uint64_t job);
 void staged_cancel_unstored(uint64_t job);     /* the answer has to be that it cannot be stored */
+void staged_fail(const struct lease_key *k);   /* the worker could not compute it */
 bool staged_answer(const struct lease_key *k); /* false: the coordinator hung up */
 /* Answers leases until *until. keep: if not NULL, gets the first lease of the image, which stays unanswered. */
 void staged_work(const _Atomic bool *until, struct lease_key *keep);

@@ -288,6 +288,47 @@ static void damaged_at_rest(void **state)
 	blob_store_close(s);
 }
 
+/* A check in parts: what happens to the blob in between. */
+static void checked_in_parts(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_check *c, *other;
+	struct error e;
+	char path[4096];
+	uint64_t size;
+	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	struct blob_hash h = store_text(s, "bytes that are checked");
+	blob_release(s, &h);
+	blob_path(s, &h, path, sizeof path);
+	/* ended early: nothing is known, and nothing is lost */
+	assert_int_equal(blob_check_begin(&c, s, &h, 0, &e), 1);
+	assert_int_equal(blob_check_end(c, &e), -ECANCELED);
+	close(blob_open(s, &h, &size, &e));
+	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
+	assert_int_equal(blob_check_end(c, &e), -ECANCELED);
+	/* it is held, and given again before its check has ended */
+	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
+	struct blob_hash more = hash_of("other bytes, too many of them");
+	struct blob_writer *w;
+	assert_int_equal(blob_write_begin(&w, s, &more, 29, &e), -EFBIG);
+	close(blob_open(s, &h, &size, &e));
+	while (blob_check_read(c))
+		continue;
+	assert_int_equal(blob_check_end(c, &e), 0);
+	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
+	/* two at once find the damage, and it is written again before the second says so */
+	assert_int_equal(truncate(path, 3), 0);
+	assert_int_equal(blob_check_begin(&other, s, &h, 0, &e), 1);
+	while (blob_check_read(c) || blob_check_read(other))
+		continue;
+	assert_int_equal(blob_check_end(c, &e), -EBADMSG);
+	store_text(s, "bytes that are checked");
+	assert_int_equal(blob_check_end(other, &e), 0);
+	assert_true(blob_has(s, &h, &size) && size == 22);
+	blob_store_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -298,6 +339,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(room_is_promised_once, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(held_before_it_is_trimmed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(damaged_at_rest, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
 	};

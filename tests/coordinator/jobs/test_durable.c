@@ -21,22 +21,6 @@
 
 #include <cmocka.h>
 
-static void fail_lease(const struct lease_key *k)
-{
-	Farm__LeaseFailed f;
-	Farm__LeaseKey key;
-	Farm__Envelope m;
-	char text[] = "it does not work";
-	farm__lease_failed__init(&f);
-	farm__envelope__init(&m);
-	lease_key_to_wire(k, &key);
-	f.key = &key;
-	f.text = text;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
-	m.lease_failed = &f;
-	assert_true(scripted_say(staged.worker, &m, NULL, 0));
-}
-
 static void extend(uint64_t job, uint64_t mutations)
 {
 	Farm__Control c;
@@ -121,7 +105,7 @@ static uint64_t failures_after(useconds_t ticks_us)
 	uint64_t job = staged_submit();
 	staged_work(&staged_disk->held_up, &kept);
 	assert_true(kept.job == job);
-	fail_lease(&kept);
+	staged_fail(&kept);
 	usleep(ticks_us);
 	staged_disk->go_on = true;
 	usleep(ticks_us);

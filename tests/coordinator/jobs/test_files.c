@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Scenes' files are read again, which takes long: a submission and a worker's complaint wait for it, and nobody else
+ * does.
+ */
+#include "common/base/log.h"
+#include "coordinator/store/ledger.h"
+#include "tests/support/folder.h"
+#include "tests/support/staged.h"
+
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char scene[100001]; /* not so small that it is read at once */
+
+/* A job whose scene has not been read since the start. */
+static uint64_t restart_with_a_job(void)
+{
+	memset(scene, ' ', sizeof scene - 1);
+	staged_start();
+	uint64_t job = scripted_submit_whole(staged.client, &scripted_request, scene);
+	staged_end(SIGTERM, true);
+	staged_disk->hold_read = true;
+	staged_disk->held_read = staged_disk->end_read = false;
+	staged_start();
+	return job;
+}
+
+static void await_reading(void)
+{
+	while (!staged_disk->held_read)
+		usleep(1000);
+}
+
+static void submitted_again(void **state)
+{
+	(void)state;
+	uint64_t job = restart_with_a_job();
+	assert_true(scripted_submit(staged.client, &scripted_request, scene));
+	await_reading();
+	assert_true(scripted_list(staged.client));
+	assert_int_equal(scripted_hear(staged.client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	staged_disk->end_read = true;
+	const Farm__Envelope *m = scripted_hear(staged.client);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
+	assert_string_equal(m->submit_answer->refusal, "");
+	assert_int_equal(m->submit_answer->n_missing, 0);
+	assert_int_equal(m->submit_answer->job, job + 1);
+	staged_end(SIGTERM, true);
+}
+
+static struct lease_key first_lease(void)
+{
+	struct lease_key k;
+	struct error e;
+	const Farm__Envelope *m;
+	do
+		m = scripted_hear(staged.worker);
+	while (m && m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT);
+	assert_non_null(m);
+	assert_int_equal(lease_key_from_wire(m->lease_grant->key, &k, &e), 0);
+	return k;
+}
+
+/* The scene is damaged, and a worker fails because of it: the job waits for the file, and is repaired. */
+static void complained_of(void **state)
+{
+	(void)state;
+	char command[200];
+	uint64_t job = restart_with_a_job();
+	struct lease_key k = first_lease();
+	snprintf(command, sizeof command, "for f in %s/blobs/*; do printf '<gibberi' >\"$f\"; done", staged.spool);
+	assert_int_equal(system(command), 0);
+	staged_fail(&k);
+	await_reading();
+	staged_await_state(job, "bootstrap");
+	staged_disk->end_read = true;
+	staged_await_state(job, "held");
+	assert_int_equal(scripted_submit_whole(staged.client, &scripted_request, scene), job + 1);
+	staged_end(SIGTERM, true);
+}
+
+/* It hangs up before the files are read: its failure counts. */
+static void failed_and_left(void **state)
+{
+	(void)state;
+	struct job_record r;
+	struct ledger *l;
+	struct error e;
+	uint64_t job = restart_with_a_job();
+	struct lease_key k = first_lease();
+	staged_fail(&k);
+	await_reading();
+	scripted_hang_up(staged.worker);
+	staged.worker = NULL;
+	usleep(STAGED_TICKS_US);
+	staged_disk->end_read = true;
+	staged_cancel(job);
+	staged_await_state(job, "cancelled");
+	staged_end(SIGTERM, true);
+	assert_int_equal(ledger_open(&l, staged.spool, &e), 0);
+	assert_int_equal(ledger_read_record(l, job, &r, &e), 0);
+	ledger_close(l);
+	assert_int_equal(r.counts.failures, 1);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(submitted_again, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(complained_of, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(failed_and_left, staged_set_up, folder_tear_down),
+	};
+	log_set_level(LOG_LEVEL_ERROR);
+	return staged_open() ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
+}
