@@ -53,7 +53,7 @@ int job_cache_new(struct job_cache **out, uint64_t job, struct blob_store *blobs
 
 void job_cache_free(struct job_cache *b)
 {
-	assert(b->state != JOB_CACHE_BUILDING);
+	assert(b->state != JOB_CACHE_BUILDING && !b->reading.check);
 	for (size_t i = 0; b->info.message && b->held && i < info_of(b)->n_files; i++) {
 		struct blob_hash h = hash_of(info_of(b)->files[i]);
 		if (b->held[i])
@@ -131,17 +131,54 @@ bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info)
 	return same;
 }
 
-bool job_cache_next_missing(struct job_cache *b)
+static void read_some(uv_work_t *work)
 {
-	for (size_t i = 0; i < info_of(b)->n_files; i++) {
-		b->wanted = hash_of(info_of(b)->files[i]);
-		/* Files in the cache may have been damaged since they arrived: those are fetched again. */
-		if (!b->held[i] && blob_check(b->blobs, &b->wanted, CHECKED_SECONDS, NULL) == 0)
-			b->held[i] = blob_hold(b->blobs, &b->wanted);
-		if (!b->held[i])
-			return true;
+	struct job_cache *b = work->data;
+	b->reading.more = blob_check_read(b->reading.check);
+}
+
+static void on_read(uv_work_t *work, int status)
+{
+	struct job_cache *b = work->data;
+	if (status == 0 && b->reading.more && !*b->reading.stop &&
+	    uv_queue_work(work->loop, work, read_some, on_read) == 0)
+		return;
+	int rc = blob_check_end(b->reading.check, NULL);
+	b->reading.check = NULL;
+	b->held[b->reading.file] = rc == 0 && blob_hold(b->blobs, &b->wanted);
+	b->reading.failed = rc != 0;
+	b->reading.done(b);
+}
+
+/* Files in the cache may have been damaged since they arrived: those are fetched again. */
+static enum job_cache_files look_for(struct job_cache *b, size_t i, uv_loop_t *loop)
+{
+	b->wanted = hash_of(info_of(b)->files[i]);
+	bool failed = b->reading.failed && b->reading.file == i;
+	b->reading.failed = false;
+	int rc = failed ? -EBADMSG : blob_check_begin(&b->reading.check, b->blobs, &b->wanted, CHECKED_SECONDS, NULL);
+	if (rc > 0) {
+		b->reading.file = i;
+		b->reading.work.data = b;
+		if (uv_queue_work(loop, &b->reading.work, read_some, on_read) == 0)
+			return JOB_CACHE_READS;
+		rc = blob_check_end(b->reading.check, NULL);
+		b->reading.check = NULL;
 	}
-	return false;
+	b->held[i] = rc == 0 && blob_hold(b->blobs, &b->wanted);
+	return b->held[i] ? JOB_CACHE_HAS : JOB_CACHE_LACKS;
+}
+
+enum job_cache_files job_cache_look(struct job_cache *b, uv_loop_t *loop)
+{
+	if (b->reading.check)
+		return JOB_CACHE_READS;
+	for (size_t i = 0; i < info_of(b)->n_files; i++) {
+		enum job_cache_files found = b->held[i] ? JOB_CACHE_HAS : look_for(b, i, loop);
+		if (found != JOB_CACHE_HAS)
+			return found;
+	}
+	return JOB_CACHE_HAS;
 }
 
 /* ---- assets: the builder's thread ---- */

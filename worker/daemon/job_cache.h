@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job at a worker: its description (JobInfo), its files in the cache, its world. The world is built on a thread of
- * the pool and shared by all leases; everything else is the loop's thread.
+ * the pool and shared by all leases; files that the cache has are read by libuv's pool, some megabytes at a time;
+ * everything else is the loop's thread.
  */
 #ifndef WORKER_DAEMON_JOB_CACHE_H
 #define WORKER_DAEMON_JOB_CACHE_H
@@ -19,6 +20,12 @@ enum job_cache_state {
 	JOB_CACHE_FAILED, /* error is the reason */
 };
 
+enum job_cache_files {
+	JOB_CACHE_HAS,	 /* all of them */
+	JOB_CACHE_LACKS, /* `wanted` must be fetched */
+	JOB_CACHE_READS, /* `wanted` is being read by libuv's pool: `read` is called, then ask again */
+};
+
 struct job_cache {
 	struct task task; /* building */
 	struct job_cache *next;
@@ -30,6 +37,15 @@ struct job_cache {
 	bool *held;		 /* by file: in the cache, and held */
 	char **paths;		 /* by file, for the builder's thread */
 	struct blob_hash wanted; /* while FETCHING: the blob being waited for */
+	struct {
+		uv_work_t work;
+		struct blob_check *check; /* NULL: nothing is being read */
+		size_t file;
+		bool more;
+		bool failed;			  /* the file cannot be used: it is fetched */
+		const bool *stop;		  /* nothing more is to be read */
+		void (*done)(struct job_cache *); /* on the loop's thread */
+	} reading;
 	struct world *world;
 	struct brightness *map; /* see render_map_new */
 	struct lease_key waits; /* one of the leases that wait for the world; job 0: none */
@@ -45,16 +61,17 @@ struct job_cache {
 };
 
 int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, struct error *e);
-/* Not while BUILDING. */
+/* Not while BUILDING, nor while a file is being read. */
 void job_cache_free(struct job_cache *b);
 
-/* Takes the answer to JobGet; then call job_cache_next_missing. -EBADMSG. */
+/* Takes the answer to JobGet; then call job_cache_look. -EBADMSG. */
 int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e);
 /* Whether it is the same job: number and everything but the bounds, which may have been changed. If that cannot be
  * known: false. */
 bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info);
-/* Holds the files in the cache, and puts the next hash to fetch into b->wanted. false: all files are there. */
-bool job_cache_next_missing(struct job_cache *b);
+/* Holds the files in the cache, up to the first that it lacks, or that has to be read first. b->reading.stop and done
+ * must be set. */
+enum job_cache_files job_cache_look(struct job_cache *b, uv_loop_t *loop);
 /* All files are there: builds the world in the thread pool. */
 int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e);
 

@@ -68,7 +68,7 @@ static void drop_unused_bundles(struct agent *a)
 		struct job_cache *oldest = NULL, *ended = NULL;
 		unsigned idle = 0;
 		for (struct job_cache *b = a->bundles; b; b = b->next) {
-			if (b->users || b->state == JOB_CACHE_BUILDING)
+			if (b->users || b->state == JOB_CACHE_BUILDING || b->reading.check)
 				continue;
 			idle++;
 			if (b->ended || b->state == JOB_CACHE_FAILED)
@@ -139,17 +139,22 @@ static void on_built(struct job_cache *b)
 	a->settle(a);
 }
 
-/* Requests the next missing chunk, unless another job has done so, or builds. */
+static void on_file_read(struct job_cache *b);
+
+/* Requests the next missing chunk, unless another job has done so, or builds, once the files of the cache are read. */
 static void fetch_or_build(struct agent *a, struct job_cache *b)
 {
 	struct error e;
-	int rc;
+	int rc = 0;
 	if (b->state != JOB_CACHE_FETCHING)
 		return;
-	if (job_cache_next_missing(b)) {
+	b->owner = a;
+	b->reading.stop = &a->gone;
+	b->reading.done = on_file_read;
+	enum job_cache_files files = job_cache_look(b, &a->loop);
+	if (files == JOB_CACHE_LACKS) {
 		rc = fetch_want(a, &b->wanted, &e);
-	} else {
-		b->owner = a;
+	} else if (files == JOB_CACHE_HAS) {
 		b->built = on_built;
 		for (const struct lease_task *l = a->leases; l; l = l->next)
 			if (l->bundle == b)
@@ -160,6 +165,17 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 		b->own = rc == -ENOMEM;
 		fail_job_cache(a, b, &e);
 	}
+}
+
+static void on_file_read(struct job_cache *b)
+{
+	struct agent *a = b->owner;
+	if (a->gone)
+		return;
+	if (!b->ended)
+		fetch_or_build(a, b);
+	drop_unused_bundles(a);
+	a->settle(a);
 }
 
 /* ---- leases ---- */

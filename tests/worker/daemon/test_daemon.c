@@ -206,6 +206,54 @@ static void on_built(struct job_cache *b)
 	assert_true(b->state == JOB_CACHE_READY || b->state == JOB_CACHE_FAILED);
 }
 
+static const bool never = false;
+static unsigned files_read;
+
+static void on_read(struct job_cache *b)
+{
+	(void)b;
+	files_read++;
+}
+
+/* Files of an earlier run are read before they are used, not on the loop's thread: the damaged one is fetched again. */
+static void files_of_an_earlier_run_are_read(void **state)
+{
+	(void)state;
+	struct cache cache;
+	struct job_cache *b;
+	struct error e;
+	uv_loop_t loop;
+	char command[200];
+	const char *texts[] = {"<scene>", "second file"};
+	assert_int_equal(uv_loop_init(&loop), 0);
+	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
+	store_text(&cache, texts[0]);
+	store_text(&cache, texts[1]);
+	cache_close(&cache);
+	snprintf(command, sizeof command, "for f in $(grep -l second -r %s); do printf damaged >$f; done", folder);
+	assert_int_equal(system(command), 0);
+	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
+	assert_int_equal(job_cache_new(&b, 5, cache.blobs, &e), 0);
+	set_info(b, texts, 2);
+	b->reading.stop = &never;
+	b->reading.done = on_read;
+	for (unsigned i = 0; i < 2; i++) {
+		files_read = 0;
+		assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_READS);
+		assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_READS);
+		assert_int_equal(files_read, 0);
+		uv_run(&loop, UV_RUN_DEFAULT);
+		assert_int_equal(files_read, 1);
+	}
+	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_LACKS);
+	assert_true(b->held[0] && !b->held[1]);
+	store_text(&cache, texts[1]);
+	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_HAS);
+	job_cache_free(b);
+	assert_int_equal(uv_loop_close(&loop), 0);
+	cache_close(&cache);
+}
+
 static void a_bundle_holds_what_it_needs(void **state)
 {
 	(void)state;
@@ -220,17 +268,20 @@ static void a_bundle_holds_what_it_needs(void **state)
 	assert_int_equal(job_cache_new(&b, 5, cache.blobs, &e), 0);
 	set_info(b, texts, 4);
 	assert_int_equal(blob_hash_bytes(texts[0], 7, &first, &e), 0);
-	assert_true(job_cache_next_missing(b));
+	assert_int_equal(uv_loop_init(&loop), 0);
+	b->reading.stop = &never;
+	b->reading.done = on_read;
+	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_LACKS);
 	assert_true(blob_hash_equal(&b->wanted, &first));
 	store_text(&cache, texts[0]);
-	assert_true(job_cache_next_missing(b));
+	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_LACKS);
 	assert_false(blob_hash_equal(&b->wanted, &first));
 	store_text(&cache, texts[1]);
-	assert_true(job_cache_next_missing(b)); /* the third is the first again; the empty one is left */
+	assert_int_equal(job_cache_look(b, &loop),
+			 JOB_CACHE_LACKS); /* the third is the first again; the empty one is left */
 	store_text(&cache, texts[3]);
-	assert_false(job_cache_next_missing(b));
+	assert_int_equal(job_cache_look(b, &loop), JOB_CACHE_HAS);
 	/* The scene is none: that is found by the builder, and said. */
-	assert_int_equal(uv_loop_init(&loop), 0);
 	assert_int_equal(thread_pool_new(&thread_pool, &loop, 1, &e), 0);
 	b->built = on_built;
 	assert_int_equal(job_cache_build(b, thread_pool, &e), 0);
@@ -268,6 +319,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_cache_of_others_is_not_used, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_bundle_holds_what_it_needs, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(files_of_an_earlier_run_are_read, folder_set_up, folder_tear_down),
 		cmocka_unit_test(the_fingerprint_is_stable),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
