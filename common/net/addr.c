@@ -7,9 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { HOST_MAX = 256 };
-
-static int split(const char *host_port, char host[HOST_MAX], const char **port, struct error *e)
+int net_addr_split(const char *host_port, char host[NET_HOST_MAX], const char **port, struct error *e)
 {
 	const char *colon = strrchr(host_port, ':');
 	const char *begin = host_port, *end = colon;
@@ -19,7 +17,7 @@ static int split(const char *host_port, char host[HOST_MAX], const char **port, 
 	} else if (colon && memchr(host_port, ':', (size_t)(colon - host_port))) {
 		return error_set(e, EINVAL, "'%s': an IPv6 address is written as [ADDRESS]:PORT", host_port);
 	}
-	if (!colon || end == begin || end - begin >= HOST_MAX)
+	if (!colon || end == begin || end - begin >= NET_HOST_MAX)
 		return error_set(e, EINVAL, "'%s' is not HOST:PORT", host_port);
 	char *stop;
 	long number = strtol(colon + 1, &stop, 10);
@@ -31,21 +29,52 @@ static int split(const char *host_port, char host[HOST_MAX], const char **port, 
 	return 0;
 }
 
-int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e)
+void net_addrs_take(struct net_addrs *l, const struct addrinfo *found)
 {
-	char host[HOST_MAX];
+	enum { MOST = sizeof l->all / sizeof *l->all };
+	memset(l, 0, sizeof *l);
+	for (; found && l->count < MOST; found = found->ai_next)
+		memcpy(&l->all[l->count++].storage, found->ai_addr, found->ai_addrlen);
+}
+
+int net_addrs_resolve(struct net_addrs *l, const char *host_port, struct error *e)
+{
+	char host[NET_HOST_MAX];
 	const char *port = "";
-	int rc = split(host_port, host, &port, e);
+	int rc = net_addr_split(host_port, host, &port, e);
 	if (rc)
 		return rc;
 	struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICSERV}, *found = NULL;
 	int code = getaddrinfo(host, port, &hints, &found);
 	if (code)
 		return error_set(e, EHOSTUNREACH, "'%s': %s", host_port, gai_strerror(code));
-	memset(a, 0, sizeof *a);
-	memcpy(&a->storage, found->ai_addr, found->ai_addrlen);
+	net_addrs_take(l, found);
 	freeaddrinfo(found);
 	return 0;
+}
+
+int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e)
+{
+	struct net_addrs l;
+	int rc = net_addrs_resolve(&l, host_port, e);
+	if (!rc)
+		*a = l.all[0];
+	return rc;
+}
+
+int net_addrs_allow(struct net_addrs *l, const char *host_port, bool safe, struct error *e)
+{
+	unsigned kept = 0;
+	int rc = 0;
+	for (unsigned i = 0; i < l->count; i++) {
+		int refused = net_addr_allow(&l->all[i], host_port, safe, e);
+		if (refused)
+			rc = refused;
+		else
+			l->all[kept++] = l->all[i];
+	}
+	l->count = kept;
+	return kept ? 0 : rc;
 }
 
 bool net_addr_is_loopback(const struct net_addr *a)

@@ -8,6 +8,7 @@
 
 #include "common/base/error.h"
 
+#include <netdb.h>
 #include <netinet/in.h>
 #include <stdbool.h>
 #include <sys/socket.h>
@@ -16,8 +17,21 @@ struct net_addr {
 	struct sockaddr_storage storage;
 };
 
+/* What a name stands for, in the order in which the addresses are to be tried. */
+struct net_addrs {
+	struct net_addr all[8]; /* more are ignored */
+	unsigned count;
+};
+
 /* Resolves the name (may block on DNS). -EINVAL: not HOST:PORT; -EHOSTUNREACH: unknown name. Port 0 is allowed. */
-int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e);
+int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e); /* the first one */
+int net_addrs_resolve(struct net_addrs *l, const char *host_port, struct error *e);
+/* For those who resolve it themselves: the parts of HOST:PORT, and what getaddrinfo has found. */
+enum { NET_HOST_MAX = 256 };
+int net_addr_split(const char *host_port, char host[NET_HOST_MAX], const char **port, struct error *e);
+void net_addrs_take(struct net_addrs *l, const struct addrinfo *found);
+/* Keeps those that net_addr_allow allows; -EPERM: none. */
+int net_addrs_allow(struct net_addrs *l, const char *host_port, bool safe, struct error *e);
 bool net_addr_is_loopback(const struct net_addr *a);
 /* -EPERM, with what to do about it, unless the address is loopback or `safe` (TLS, or --insecure). */
 int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, struct error *e);

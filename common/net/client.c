@@ -219,13 +219,28 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 	return rc;
 }
 
+/* One of a name's addresses; cl->opened: it answers. */
+static int connect_to(struct client *cl, const struct net_addr *a, struct error *e)
+{
+	const struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls};
+	if (cl->conn) /* the one before did not answer in time */
+		conn_close(cl->conn, "no answer in time");
+	while (cl->conn)
+		uv_run(&cl->loop, UV_RUN_ONCE);
+	int rc = conn_connect(&cl->conn, &cl->loop, a, &config, &events, cl, e);
+	start_clock(cl, HELLO_SECONDS);
+	while (!rc && cl->conn && !cl->opened && !cl->timed_out)
+		uv_run(&cl->loop, UV_RUN_ONCE);
+	return rc;
+}
+
 int client_open(struct client **out, const char *host_port, const char *tls, bool insecure, const char *name,
 		struct error *e)
 {
-	struct net_addr a;
-	int rc = net_addr_resolve(&a, host_port, e);
+	struct net_addrs to;
+	int rc = net_addrs_resolve(&to, host_port, e);
 	if (!rc)
-		rc = net_addr_allow(&a, host_port, insecure || (tls && *tls), e);
+		rc = net_addrs_allow(&to, host_port, insecure || (tls && *tls), e);
 	if (rc)
 		return rc;
 	struct client *cl = mem_alloc(1, sizeof *cl);
@@ -250,11 +265,8 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 	uv_timer_init(&cl->loop, &cl->timeout);
 	uv_timer_init(&cl->loop, &cl->heartbeat);
 	cl->timeout.data = cl->heartbeat.data = cl;
-	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls};
-	rc = conn_connect(&cl->conn, &cl->loop, &a, &config, &events, cl, e);
-	start_clock(cl, HELLO_SECONDS);
-	while (!rc && cl->conn && !cl->opened && !cl->timed_out)
-		uv_run(&cl->loop, UV_RUN_ONCE);
+	for (unsigned i = 0; !rc && i < to.count && !cl->opened && !cl->distrust; i++)
+		rc = connect_to(cl, &to.all[i], e);
 	if (!rc && !cl->opened && cl->distrust)
 		rc = unwelcome(cl, host_port, e);
 	else if (!rc && !cl->opened)

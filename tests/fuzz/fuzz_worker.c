@@ -168,8 +168,10 @@ static void answer(void)
 {
 	struct agent *a = now.agent;
 	for (int i = 0; i < 1000 && now.fd < 0 && !a->gone; i++) {
-		if (!a->conn)
+		if (!a->conn && !a->resolves)
 			uv_timer_start(&a->retry, a->retry.timer_cb, 0, 0);
+		if (a->resolves)
+			uv_run(&a->loop, UV_RUN_ONCE);
 		turn();
 		now.fd = accept4(now.listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
 	}

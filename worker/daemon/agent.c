@@ -103,6 +103,7 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 	}
 	uint64_t ms = ack->heartbeat_ms >= 10 ? ack->heartbeat_ms : 10;
 	a->welcome = true;
+	a->attempt--; /* this address first when the connection is lost */
 	a->back_off = first_back_off;
 	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator,
 		  (unsigned long long)a->cache.life.restarts);
@@ -150,21 +151,46 @@ static void on_closed(void *user, const char *why)
 
 static const struct conn_events events = {.opened = on_opened, .message = on_message, .closed = on_closed};
 
+static void fail_to_connect(struct agent *a, const struct error *e)
+{
+	log_event(LOG_CONNECT_FAILED, "coordinator=%s text=%s", a->config.coordinator, log_quote(e->text).text);
+	try_later(a);
+}
+
+static void on_resolved(uv_getaddrinfo_t *r, int status, struct addrinfo *found)
+{
+	struct agent *a = r->data;
+	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10, a->tls};
+	struct net_addrs to;
+	struct error e;
+	a->resolves = false;
+	net_addrs_take(&to, found);
+	uv_freeaddrinfo(found);
+	if (a->gone)
+		return;
+	int rc = status ? error_set(&e, EHOSTUNREACH, "'%s': %s", a->config.coordinator, uv_strerror(status))
+			: net_addrs_allow(&to, a->config.coordinator, a->config.insecure || a->tls, &e);
+	if (!rc)
+		rc = conn_connect(&a->conn, &a->loop, &to.all[a->attempt++ % to.count], &config, &events, a, &e);
+	if (rc)
+		fail_to_connect(a, &e);
+}
+
+/* The name may have another address by now. Looking it up may take long: libuv's pool does. */
 static void connect_now(struct agent *a)
 {
-	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10, a->tls};
+	const struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICSERV};
+	char host[NET_HOST_MAX];
+	const char *port = "";
 	struct error e;
 	refresh_tls(a);
-	/* The name may have another address by now. */
-	int rc = net_addr_resolve(&a->address, a->config.coordinator, &e);
-	if (!rc)
-		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure || a->tls, &e);
-	if (!rc)
-		rc = conn_connect(&a->conn, &a->loop, &a->address, &config, &events, a, &e);
-	if (rc) {
-		log_event(LOG_CONNECT_FAILED, "coordinator=%s text=%s", a->config.coordinator, log_quote(e.text).text);
-		try_later(a);
-	}
+	int rc = net_addr_split(a->config.coordinator, host, &port, &e);
+	a->resolving.data = a;
+	if (!rc && (rc = uv_getaddrinfo(&a->loop, &a->resolving, on_resolved, host, port, &hints)))
+		rc = error_set(&e, -rc, "'%s': %s", a->config.coordinator, uv_strerror(rc));
+	a->resolves = !rc;
+	if (rc)
+		fail_to_connect(a, &e);
 }
 
 /* ---- leaving ---- */
@@ -183,6 +209,8 @@ static void disconnect_for_good(struct agent *a)
 	send_message(a, &m);
 	if (a->conn)
 		conn_close_when_sent(a->conn, "leaving");
+	if (a->resolves)
+		uv_cancel((uv_req_t *)&a->resolving);
 	uv_close((uv_handle_t *)&a->retry, NULL);
 	uv_close((uv_handle_t *)&a->heartbeat, NULL);
 	uv_close((uv_handle_t *)&a->grace, NULL);
@@ -294,11 +322,12 @@ static void init_handles(struct agent *a)
 
 static int start(struct agent *a, struct error *e)
 {
+	struct net_addrs to;
 	int rc = a->config.tls && *a->config.tls ? tls_open(&a->tls, a->config.tls, e) : 0;
 	if (!rc)
-		rc = net_addr_resolve(&a->address, a->config.coordinator, e);
+		rc = net_addrs_resolve(&to, a->config.coordinator, e);
 	if (!rc)
-		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure || a->tls, e);
+		rc = net_addrs_allow(&to, a->config.coordinator, a->config.insecure || a->tls, e);
 	if (!rc)
 		rc = cache_open(&a->cache, a->config.cache, a->config.cache_bytes, e);
 	if (rc)
@@ -364,7 +393,8 @@ int agent_run(const struct agent_config *c, struct error *e)
 	notify_send("READY=1"); /* it may wait for its coordinator for long */
 	while (!a->gone || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);
-	if (a->hung || thread_pool_pending(a->thread_pool)) /* its threads cannot be joined; everything has been sent */
+	if (a->hung || a->resolves ||
+	    thread_pool_pending(a->thread_pool)) /* its threads cannot be joined; everything has been sent */
 		_exit(a->hung ? AGENT_HUNG : a->refused ? AGENT_REFUSED : 0);
 	int refused = a->refused ? error_set(e, EACCES, "%s refuses: %s", a->config.coordinator, a->why) : 0;
 	agent_close(a);

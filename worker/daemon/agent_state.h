@@ -18,7 +18,9 @@ struct agent {
 	uv_loop_t loop;
 	uv_timer_t retry, heartbeat, grace, pulse, watch;
 	uv_signal_t on_term, on_int;
-	struct net_addr address;
+	uv_getaddrinfo_t resolving;
+	bool resolves;	   /* the coordinator's name is being looked up */
+	unsigned attempt;  /* of the name's addresses, in turn */
 	struct tls *tls;   /* NULL: plaintext */
 	struct conn *conn; /* NULL: not connected */
 	bool welcome;	   /* hello was accepted */

@@ -17,6 +17,7 @@
 
 #include <arpa/inet.h>
 #include <errno.h>
+#include <netdb.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -35,6 +36,7 @@ struct coordinator {
 	pthread_t thread;
 	int listener;
 	char address[32];
+	const char *host;      /* by which the client calls it; NULL: 127.0.0.1 */
 	const char *name;      /* answers one Fetch, and calls the result so */
 	uint64_t sizes[2];     /* or two, and says that the file is so long */
 	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
@@ -61,6 +63,20 @@ int __wrap_renameat2(int from_folder, const char *from, int to_folder, const cha
 {
 	errno = EINVAL;
 	return is_plain ? -1 : __real_renameat2(from_folder, from, to_folder, to, flags);
+}
+
+/* ---- a name server ---- */
+
+int __real_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found);
+int __wrap_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found);
+
+/* Nobody listens at the first address of "two". */
+int __wrap_getaddrinfo(const char *host, const char *port, const struct addrinfo *hints, struct addrinfo **found)
+{
+	if (strcmp(host, "two") != 0)
+		return __real_getaddrinfo(host, port, hints, found);
+	int rc = __real_getaddrinfo("127.0.0.2", port, hints, found);
+	return rc ? rc : __real_getaddrinfo("127.0.0.1", port, hints, &(*found)->ai_next);
 }
 
 /* ---- messages ---- */
@@ -148,7 +164,7 @@ static struct client *meet(struct coordinator *c)
 	assert_int_equal(bind(c->listener, (struct sockaddr *)&a, size), 0);
 	assert_int_equal(listen(c->listener, 1), 0);
 	assert_int_equal(getsockname(c->listener, (struct sockaddr *)&a, &size), 0);
-	snprintf(c->address, sizeof c->address, "127.0.0.1:%u", ntohs(a.sin_port));
+	snprintf(c->address, sizeof c->address, "%s:%u", c->host ? c->host : "127.0.0.1", ntohs(a.sin_port));
 	assert_int_equal(pthread_create(&c->thread, NULL, coordinate, c), 0);
 	assert_int_equal(client_open(&cl, c->address, NULL, false, "test", &e), 0);
 	return cl;
@@ -336,6 +352,13 @@ static void floods_are_dammed(void **state)
 	}
 }
 
+static void the_second_address_answers(void **state)
+{
+	(void)state;
+	struct coordinator c = {.host = "two"};
+	part(&c, meet(&c));
+}
+
 /* One allocation after the other fails: nobody waits for a message that was lost. */
 static void no_memory_for_a_message(void **state)
 {
@@ -382,6 +405,7 @@ int main(void)
 		cmocka_unit_test(own_files_are_own_faults),
 		cmocka_unit_test(floods_are_dammed),
 		cmocka_unit_test(no_memory_for_a_message),
+		cmocka_unit_test(the_second_address_answers),
 	};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
