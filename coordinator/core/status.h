@@ -23,8 +23,8 @@ struct job_status {
 	double progress;		  /* [0,1], never decreases */
 	double rate;		  /* mutations (bootstrap: samples) merged per second, over the last half minute */
 	double eta;		  /* s; NAN: unknown */
-	bool disagrees;		  /* the chains of its final image disagree */
 	double eta_low, eta_high; /* its 90 % interval */
+	bool disagrees;		  /* the chains of its final image disagree */
 	double rel_error;	  /* as last estimated; NAN: none */
 	uint64_t rel_error_rounds;
 	double bootstrap_seconds; /* wall-clock time from the first lease to the first round; NAN: not yet */

@@ -114,9 +114,9 @@ struct live_job {
 	double look_written;	   /* work of the last estimate stored in the journal */
 	bool lacks_file;	   /* files of its scene, for which it is held */
 	bool unread;		   /* one of them could not be read, or was wrong, when they were last read */
-	bool held;		   /* the disk has no room for a result of so many bytes: */
-	size_t held_bytes;
-	double try_again;
+	bool held;		   /* its results cannot be stored */
+	size_t held_bytes;	   /* of the result that the disk had no room for */
+	double try_again;	   /* s of the loop's clock: what the disk refused */
 	bool unsure; /* whether the last checkpoint was renamed is unknown: nothing is stored before the next one */
 	uint64_t generation_least; /* of that one */
 	bool unprepared;	   /* the disk has no room for its films yet */

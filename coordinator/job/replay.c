@@ -31,7 +31,7 @@ struct replay {
 	struct replay_progress *progress; /* NULL: nobody watches */
 	double elapsed;
 	uint64_t batches;
-	struct lease_key damaged[DAMAGED_MOST]; /* the fingerprint of the records */
+	struct lease_key damaged[DAMAGED_MOST]; /* of records that are to be computed again */
 	size_t damaged_count;
 };
 

@@ -37,9 +37,9 @@ struct session {
 	char name[128], address[64];
 	struct tls_peer who; /* role in its certificate; TLS_NOBODY without TLS, when everybody may do everything */
 	uint32_t payload_limit;
-	size_t leases_most;	     /* bytes of as many leases as it wants */
-	struct worker_request *asks; /* bytes waiting for it to read */
-	unsigned ask_count;
+	size_t leases_most;		 /* bytes of as many leases as it wants */
+	struct worker_request *requests; /* that wait until it has read what was sent, or until a file is read */
+	unsigned request_count;
 	double heard;	       /* s of the loop's clock: the last heartbeat sent during a long message */
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job being watched; 0: none */

@@ -10,8 +10,8 @@
 
 enum {
 	BLOB_CHUNK = 1 << 20,
-	AHEAD = 1 << 22, /* bytes that may be unsent when the next answer is made */
-	ASKS_MOST = 512, /* twice what a worker can need that has leases of as many jobs as it may hold */
+	AHEAD = 1 << 22,     /* bytes that may be unsent when the next answer is made */
+	REQUESTS_MOST = 512, /* twice what a worker can need that has leases of as many jobs as it may hold */
 };
 
 static void send_job_info(struct session *p, uint64_t id)
@@ -90,39 +90,39 @@ static bool answer(struct session *p, const struct worker_request *a)
 
 void worker_requests_take(struct session *p, const struct worker_request *a)
 {
-	if (!p->asks && conn_unsent(p->conn) <= AHEAD && answer(p, a))
+	if (!p->requests && conn_unsent(p->conn) <= AHEAD && answer(p, a))
 		return;
-	struct worker_request *last = p->ask_count < ASKS_MOST ? mem_alloc(1, sizeof *last) : NULL;
+	struct worker_request *last = p->request_count < REQUESTS_MOST ? mem_alloc(1, sizeof *last) : NULL;
 	if (!last) {
 		session_fault(p, "%u chunks and jobs were requested and not read: no worker needs so many",
-			      p->ask_count);
+			      p->request_count);
 		return;
 	}
 	*last = *a;
-	struct worker_request **at = &p->asks;
+	struct worker_request **at = &p->requests;
 	while (*at)
 		at = &(*at)->next;
 	*at = last;
-	p->ask_count++;
+	p->request_count++;
 }
 
 static void drop_first(struct session *p)
 {
-	struct worker_request *a = p->asks;
-	p->asks = a->next;
-	p->ask_count--;
+	struct worker_request *a = p->requests;
+	p->requests = a->next;
+	p->request_count--;
 	mem_free(a);
 }
 
 void worker_requests_go_on(struct session *p)
 {
-	while (p->asks && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD && answer(p, p->asks))
+	while (p->requests && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD && answer(p, p->requests))
 		drop_first(p);
 }
 
 void worker_requests_file_read(struct session *p, const struct blob_hash *h, const char *refusal)
 {
-	const struct worker_request *a = p->asks;
+	const struct worker_request *a = p->requests;
 	if (!a || p->state != SESSION_WORKER)
 		return;
 	if (a->blob && a->number == 0 && blob_hash_equal(&a->hash, h)) { /* not checked again, however long it took */
@@ -134,6 +134,6 @@ void worker_requests_file_read(struct session *p, const struct blob_hash *h, con
 
 void worker_requests_drop(struct session *p)
 {
-	while (p->asks)
+	while (p->requests)
 		drop_first(p);
 }

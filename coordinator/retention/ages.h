@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The age of finished jobs, in observed time (store/seen.h), which the spool's file `clock` carries from one run to the
+ * The age of finished jobs, in observed time (store/seen.h), which a note in the ledger carries from one run to the
  * next. A jump of the wall clock ages nothing. The loop's thread.
  */
 #ifndef COORDINATOR_RETENTION_AGES_H
@@ -8,7 +8,7 @@
 
 #include "coordinator/job/jobs.h"
 
-/* If the file is missing or damaged, observed time starts again: finished jobs then count as new. Never fails. */
+/* If the note is missing or damaged, observed time starts again: finished jobs then count as new. Never fails. */
 void ages_open(struct jobs *jobs);
 double ages_now(const struct jobs *jobs); /* s */
 void ages_keep(const struct jobs *jobs);  /* stores it; if the disk refuses, the next call tries again */

@@ -31,11 +31,11 @@ struct clearing {
 	uint64_t *ids;
 	size_t id_count, looked;
 	struct age_job *jobs; /* those that have ended */
-	size_t job_count, cleared, records;
-	double now; /* s since 1970, when it was chosen; 0: not yet */
-	bool again; /* a job that has just ended is being fetched: soon once more */
-	/* The ids of jobs without record overwrite those already looked at. */
-	struct job_record record; /* index of the current one */
+	size_t job_count, cleared;
+	size_t records;		  /* to be dropped: their ids overwrite those already looked at */
+	double now;		  /* s since 1970, when it was chosen; 0: not yet */
+	bool again;		  /* a job that has just ended is being fetched: soon once more */
+	struct job_record record; /* of the current one */
 };
 
 /* Runs, or is about to run again: its films are being read for an extension. */

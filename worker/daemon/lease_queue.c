@@ -108,7 +108,7 @@ static void fail_leases_of(struct agent *a, struct job_cache *b, const struct er
 	}
 }
 
-/* The next tidy() drops it. */
+/* The next drop_unused_bundles drops it. */
 static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
 {
 	b->state = JOB_CACHE_FAILED;
