@@ -149,18 +149,12 @@ int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const 
 	return 0;
 }
 
-struct blend *blend_begin(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, uint32_t count,
-			  struct error *e)
+struct blend *blend_begin(struct bsdf *b, uint32_t count)
 {
-	struct blend *m = bsdf_data(b, n, build, sizeof *m, e);
-	if (!m)
-		return NULL;
+	struct blend *m = b->data;
 	b->black = b->only_straight = true;
 	m->count = count;
-	m->part = arena_alloc(build->arena, count, sizeof *m->part);
-	if (!m->part)
-		node_error(n, e, ENOMEM, "out of memory");
-	return m->part ? m : NULL;
+	return m;
 }
 
 int blend_read_parts(struct blend *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,

@@ -15,16 +15,15 @@ enum { BLEND_PARTS_MAX = 16 };
 
 struct blend {
 	uint32_t count;
-	struct bsdf *part;
+	struct bsdf part[BLEND_PARTS_MAX];
 	struct texture weight; /* of two parts */
 	bool weight_of_first;  /* else of the second */
 	bool is_fixed;	       /* weights are these: */
 	double fixed[BLEND_PARTS_MAX];
 };
 
-/* b->data: a blend of `count` parts, which are not made yet. NULL after an error. */
-struct blend *blend_begin(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, uint32_t count,
-			  struct error *e);
+/* b->data: a blend of `count` parts, which are not made yet. */
+struct blend *blend_begin(struct bsdf *b, uint32_t count);
 /* Makes each part from the BSDF inside n, and joins it. */
 int blend_read_parts(struct blend *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		     struct error *e);
@@ -45,6 +44,7 @@ bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, con
 		.type = #NAME,                      \
 		.params = NAME##_params,            \
 		.nested_classes = 1 << PLUGIN_BSDF, \
+		.data_size = sizeof(struct blend),  \
 		.create = NAME##_create,            \
 		.eval = blend_eval,                 \
 		.pdf_solid = blend_pdf,             \

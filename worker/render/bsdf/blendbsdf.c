@@ -6,9 +6,7 @@ static int blendbsdf_create(struct bsdf *b, const struct scene_node *n, const st
 {
 	if (!node_child(n, PLUGIN_BSDF, 1) || node_child(n, PLUGIN_BSDF, 2))
 		return node_error(n, e, EINVAL, "needs exactly two BSDFs inside");
-	struct blend *m = blend_begin(b, n, build, 2, e);
-	if (!m)
-		return -ENOMEM;
+	struct blend *m = blend_begin(b, 2);
 	int code = blend_read_parts(m, b, n, build, e);
 	if (code)
 		return code;

@@ -17,13 +17,23 @@ const struct bsdf_ops *const bsdf_registry[] = {
 	NULL,
 };
 
+int bsdf_create_as(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n,
+		   const struct bsdf_build *build, struct error *e)
+{
+	*b = (struct bsdf){.ops = ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
+	if (ops->data_size > 0) {
+		b->data = arena_alloc(build->arena, 1, ops->data_size);
+		if (!b->data)
+			return node_error(n, e, ENOMEM, "out of memory");
+	}
+	return ops->create(b, n, build, e);
+}
+
 int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	for (const struct bsdf_ops *const *ops = bsdf_registry; *ops; ops++)
-		if (strcmp((*ops)->type, n->type) == 0) {
-			*b = (struct bsdf){.ops = *ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
-			return (*ops)->create(b, n, build, e);
-		}
+		if (strcmp((*ops)->type, n->type) == 0)
+			return bsdf_create_as(b, *ops, n, build, e);
 	return node_error(n, e, ENOTSUP, "\"%s\" is not a supported BSDF", n->type);
 }
 

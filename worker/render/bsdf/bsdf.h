@@ -68,6 +68,7 @@ struct bsdf_ops {
 	const char *type;
 	const struct param *params;
 	unsigned nested_classes; /* of struct plugin_decl */
+	size_t data_size;	 /* of b->data, which is zeroed memory before `create`; 0: it has none */
 	int (*create)(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 	spectrum (*eval)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 	double (*pdf_solid)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
@@ -126,6 +127,9 @@ spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 
 			 double *chance);
 
 int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
+/* The same with these operations, whatever the node's type is. */
+int bsdf_create_as(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n,
+		   const struct bsdf_build *build, struct error *e);
 void bsdf_black(struct bsdf *b); /* absorbs everything: for emitters without a BSDF */
 
 extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */

@@ -22,7 +22,8 @@ struct coat {
 	struct texture specular;
 	struct color absorption; /* sigma_a */
 	double thickness, eta, specular_max;
-	struct rough_boundary *rough; /* NULL: smooth */
+	struct rough_boundary boundary;
+	struct rough_boundary *rough; /* that one, or NULL: smooth */
 };
 
 /* The layer at a point, and a direction through it. */
@@ -274,9 +275,7 @@ static int read_layer(struct coat *c, struct bsdf *b, const struct scene_node *n
 
 static int coating_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct coat *c = bsdf_data(b, n, build, sizeof *c, e);
-	if (!c)
-		return -ENOMEM;
+	struct coat *c = b->data;
 	int code = read_inner(c, b, n, build, e);
 	if (!code)
 		code = read_layer(c, b, n, build, e);
@@ -290,12 +289,8 @@ static int coating_create(struct bsdf *b, const struct scene_node *n, const stru
 static int roughcoating_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			       struct error *e)
 {
-	struct coat *c = bsdf_data(b, n, build, sizeof *c, e);
-	if (!c)
-		return -ENOMEM;
-	c->rough = arena_alloc(build->arena, 1, sizeof *c->rough);
-	if (!c->rough)
-		return node_error(n, e, ENOMEM, "out of memory");
+	struct coat *c = b->data;
+	c->rough = &c->boundary;
 	int code = read_inner(c, b, n, build, e);
 	double alpha = b->alpha, mean = b->alpha_mean;
 	if (!code)
@@ -324,6 +319,7 @@ const struct bsdf_ops bsdf_ops_coating = {
 	.type = "coating",
 	.params = coating_params,
 	.nested_classes = 1u << PLUGIN_BSDF,
+	.data_size = sizeof(struct coat),
 	.create = coating_create,
 	.eval = coat_eval,
 	.pdf_solid = coat_pdf,
@@ -335,6 +331,7 @@ const struct bsdf_ops bsdf_ops_roughcoating = {
 	.type = "roughcoating",
 	.params = roughcoating_params,
 	.nested_classes = 1u << PLUGIN_BSDF,
+	.data_size = sizeof(struct coat),
 	.create = roughcoating_create,
 	.eval = coat_eval,
 	.pdf_solid = coat_pdf,

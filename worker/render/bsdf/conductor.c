@@ -41,9 +41,7 @@ static bool conductor_sample(const struct bsdf *b, const struct bsdf_point *p, v
 
 static int conductor_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct metal *m = bsdf_data(b, n, build, sizeof *m, e);
-	if (!m)
-		return -ENOMEM;
+	struct metal *m = b->data;
 	b->modes = BSDF_REFLECT | BSDF_DELTA;
 	b->has_delta = true;
 	b->alpha = 0;
@@ -55,6 +53,7 @@ static const struct param conductor_params[] = {METAL_PARAMS, MICROFACET_PARAMS_
 const struct bsdf_ops bsdf_ops_conductor = {
 	.type = "conductor",
 	.params = conductor_params,
+	.data_size = sizeof(struct metal),
 	.create = conductor_create,
 	.eval = conductor_eval,
 	.pdf_solid = conductor_pdf,

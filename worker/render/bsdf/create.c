@@ -3,15 +3,6 @@
 
 #include "worker/render/texture/attribute_table.h"
 
-void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size,
-		struct error *e)
-{
-	b->data = arena_alloc(build->arena, 1, size);
-	if (!b->data)
-		node_error(n, e, ENOMEM, "out of memory");
-	return b->data;
-}
-
 int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n, const struct bsdf_build *build,
 	      struct error *e)
 {

@@ -5,10 +5,6 @@
 
 #include "worker/render/bsdf/bsdf.h"
 
-/* Zeroed memory for b->data; NULL after an error. */
-void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size,
-		struct error *e);
-
 /* Puts `ops`, whose data is a BSDF, around b: all that b says of itself stays. */
 int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n, const struct bsdf_build *build,
 	      struct error *e);

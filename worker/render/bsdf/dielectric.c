@@ -70,9 +70,7 @@ static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, 
 static int dielectric_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			     struct error *e)
 {
-	struct glass *g = bsdf_data(b, n, build, sizeof *g, e);
-	if (!g)
-		return -ENOMEM;
+	struct glass *g = b->data;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA;
 	b->has_delta = true;
 	b->alpha = 0;
@@ -84,6 +82,7 @@ static const struct param dielectric_params[] = {GLASS_PARAMS, MICROFACET_PARAMS
 const struct bsdf_ops bsdf_ops_dielectric = {
 	.type = "dielectric",
 	.params = dielectric_params,
+	.data_size = sizeof(struct glass),
 	.create = dielectric_create,
 	.eval = dielectric_eval,
 	.pdf_solid = dielectric_pdf,

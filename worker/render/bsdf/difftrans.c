@@ -38,9 +38,7 @@ static bool difftrans_sample(const struct bsdf *b, const struct bsdf_point *p, v
 
 static int difftrans_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct difftrans *d = bsdf_data(b, n, build, sizeof *d, e);
-	if (!d)
-		return -ENOMEM;
+	struct difftrans *d = b->data;
 	int code = bsdf_texture(b, &d->transmittance, n, "transmittance", 0.5, build, e);
 	b->black = !code && texture_max(&d->transmittance) == 0;
 	b->modes = BSDF_TRANSMIT;
@@ -56,6 +54,7 @@ static const struct param difftrans_params[] = {{.name = "transmittance", .types
 const struct bsdf_ops bsdf_ops_difftrans = {
 	.type = "difftrans",
 	.params = difftrans_params,
+	.data_size = sizeof(struct difftrans),
 	.create = difftrans_create,
 	.eval = difftrans_eval,
 	.pdf_solid = difftrans_pdf,

@@ -35,9 +35,7 @@ static bool diffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 
 static int diffuse_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct texture *t = bsdf_data(b, n, build, sizeof *t, e);
-	if (!t)
-		return -ENOMEM;
+	struct texture *t = b->data;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
 	b->alpha_mean = 1;
@@ -54,6 +52,7 @@ static const struct param diffuse_params[] = {
 const struct bsdf_ops bsdf_ops_diffuse = {
 	.type = "diffuse",
 	.params = diffuse_params,
+	.data_size = sizeof(struct texture),
 	.create = diffuse_create,
 	.eval = diffuse_eval,
 	.pdf_solid = diffuse_pdf,

@@ -12,15 +12,13 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	const struct scene_node *inner = node_child(n, PLUGIN_BSDF, 0);
 	if (!inner || node_child(n, PLUGIN_BSDF, 1))
 		return node_error(n, e, EINVAL, "needs exactly one BSDF inside");
-	struct blend *m = blend_begin(b, n, build, 2, e);
-	if (!m)
-		return -ENOMEM;
+	struct blend *m = blend_begin(b, 2);
 	m->weight_of_first = true;
 	int code = bsdf_create(&m->part[0], inner, build, e);
 	if (!code)
 		code = bsdf_mirror_back(&m->part[0], build, e);
 	if (!code)
-		code = straight_make(&m->part[1], n, build, e);
+		code = bsdf_create_as(&m->part[1], &bsdf_ops_null, n, build, e); /* no `transmittance` */
 	if (!code)
 		code = blend_join(b, &m->part[0], inner->type, n, e);
 	if (!code)

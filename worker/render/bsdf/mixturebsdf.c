@@ -31,9 +31,7 @@ static int mixturebsdf_create(struct bsdf *b, const struct scene_node *n, const 
 			return node_error(n, e, ERANGE, "more than %d BSDFs inside", BLEND_PARTS_MAX);
 	if (count == 0)
 		return node_error(n, e, EINVAL, "needs BSDFs inside");
-	struct blend *m = blend_begin(b, n, build, count, e);
-	if (!m)
-		return -ENOMEM;
+	struct blend *m = blend_begin(b, count);
 	m->is_fixed = true;
 	int code = read_weights(m, n, e);
 	if (!code)

@@ -67,9 +67,7 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 
 static int phong_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct phong *ph = bsdf_data(b, n, build, sizeof *ph, e);
-	if (!ph)
-		return -ENOMEM;
+	struct phong *ph = b->data;
 	int code = bsdf_texture(b, &ph->diffuse, n, "diffuse_reflectance", 0.5, build, e);
 	if (!code)
 		code = bsdf_texture(b, &ph->specular, n, "specular_reflectance", 0.2, build, e);
@@ -100,6 +98,7 @@ static const struct param phong_params[] = {
 const struct bsdf_ops bsdf_ops_phong = {
 	.type = "phong",
 	.params = phong_params,
+	.data_size = sizeof(struct phong),
 	.create = phong_create,
 	.eval = phong_eval,
 	.pdf_solid = phong_pdf,

@@ -79,9 +79,7 @@ static double let_in(double eta)
 
 static int plastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct plastic *s = bsdf_data(b, n, build, sizeof *s, e);
-	if (!s)
-		return -ENOMEM;
+	struct plastic *s = b->data;
 	int code = coating_read(&s->coating, b, n, build, e);
 	if (code)
 		return code;
@@ -97,6 +95,7 @@ static const struct param plastic_params[] = {COATING_PARAMS, MICROFACET_PARAMS_
 const struct bsdf_ops bsdf_ops_plastic = {
 	.type = "plastic",
 	.params = plastic_params,
+	.data_size = sizeof(struct plastic),
 	.create = plastic_create,
 	.eval = plastic_eval,
 	.pdf_solid = plastic_pdf,

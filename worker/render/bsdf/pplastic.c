@@ -86,9 +86,7 @@ static bool pplastic_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 
 static int pplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct pplastic *s = bsdf_data(b, n, build, sizeof *s, e);
-	if (!s)
-		return -ENOMEM;
+	struct pplastic *s = b->data;
 	int code = coating_read(&s->coating, b, n, build, e);
 	if (!code)
 		code = rough_map_read(&s->roughness, b, n, build, e);
@@ -113,6 +111,7 @@ static const struct param pplastic_params[] = {
 const struct bsdf_ops bsdf_ops_pplastic = {
 	.type = "pplastic",
 	.params = pplastic_params,
+	.data_size = sizeof(struct pplastic),
 	.create = pplastic_create,
 	.eval = pplastic_eval,
 	.pdf_solid = pplastic_pdf,

@@ -401,9 +401,7 @@ static int read_index(struct principled *p, const struct scene_node *n, struct e
 static int principled_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			     struct error *e)
 {
-	struct principled *p = bsdf_data(b, n, build, sizeof *p, e);
-	if (!p)
-		return -ENOMEM;
+	struct principled *p = b->data;
 	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
 	if (!code)
 		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
@@ -467,6 +465,7 @@ static const struct param principled_params[] = {
 const struct bsdf_ops bsdf_ops_principled = {
 	.type = "principled",
 	.params = principled_params,
+	.data_size = sizeof(struct principled),
 	.create = principled_create,
 	.eval = principled_eval,
 	.pdf_solid = principled_pdf,

@@ -167,9 +167,7 @@ static int read_through(struct bsdf *b, struct thin *t, const struct scene_node 
 
 static int thin_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct thin *t = bsdf_data(b, n, build, sizeof *t, e);
-	if (!t)
-		return -ENOMEM;
+	struct thin *t = b->data;
 	struct principled *p = &t->p;
 	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
 	if (!code)
@@ -216,6 +214,7 @@ static const struct param thin_params[] = {
 const struct bsdf_ops bsdf_ops_principledthin = {
 	.type = "principledthin",
 	.params = thin_params,
+	.data_size = sizeof(struct thin),
 	.create = thin_create,
 	.eval = thin_eval,
 	.pdf_solid = thin_pdf,

@@ -77,9 +77,7 @@ static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point 
 static int roughconductor_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 				 struct error *e)
 {
-	struct roughconductor *r = bsdf_data(b, n, build, sizeof *r, e);
-	if (!r)
-		return -ENOMEM;
+	struct roughconductor *r = b->data;
 	int code = rough_map_read(&r->roughness, b, n, build, e);
 	if (code)
 		return code;
@@ -97,6 +95,7 @@ static const struct param roughconductor_params[] = {METAL_PARAMS, ROUGH_MAP_PAR
 const struct bsdf_ops bsdf_ops_roughconductor = {
 	.type = "roughconductor",
 	.params = roughconductor_params,
+	.data_size = sizeof(struct roughconductor),
 	.create = roughconductor_create,
 	.eval = roughconductor_eval,
 	.pdf_solid = roughconductor_pdf,

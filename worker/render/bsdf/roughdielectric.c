@@ -166,9 +166,7 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 				  struct error *e)
 {
-	struct roughdielectric *r = bsdf_data(b, n, build, sizeof *r, e);
-	if (!r)
-		return -ENOMEM;
+	struct roughdielectric *r = b->data;
 	int code = rough_map_read(&r->roughness, b, n, build, e);
 	if (!code)
 		code = glass_read(&r->glass, b, n, build, e);
@@ -189,6 +187,7 @@ static const struct param roughdielectric_params[] = {GLASS_PARAMS, ROUGH_MAP_PA
 const struct bsdf_ops bsdf_ops_roughdielectric = {
 	.type = "roughdielectric",
 	.params = roughdielectric_params,
+	.data_size = sizeof(struct roughdielectric),
 	.create = roughdielectric_create,
 	.eval = roughdielectric_eval,
 	.pdf_solid = roughdielectric_pdf,

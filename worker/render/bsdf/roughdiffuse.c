@@ -74,9 +74,7 @@ static bool roughdiffuse_sample(const struct bsdf *b, const struct bsdf_point *p
 static int roughdiffuse_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			       struct error *e)
 {
-	struct roughdiffuse *r = bsdf_data(b, n, build, sizeof *r, e);
-	if (!r)
-		return -ENOMEM;
+	struct roughdiffuse *r = b->data;
 	double alpha = node_float(n, "alpha", 0.2), s2 = 0.5 * alpha * alpha;
 	bool fast = node_bool(n, "use_fast_approx", false);
 	r->a = 1 - 0.5 * s2 / (s2 + 0.33);
@@ -101,6 +99,7 @@ static const struct param roughdiffuse_params[] = {
 const struct bsdf_ops bsdf_ops_roughdiffuse = {
 	.type = "roughdiffuse",
 	.params = roughdiffuse_params,
+	.data_size = sizeof(struct roughdiffuse),
 	.create = roughdiffuse_create,
 	.eval = roughdiffuse_eval,
 	.pdf_solid = roughdiffuse_pdf,

@@ -60,9 +60,7 @@ static bool roughplastic_sample(const struct bsdf *b, const struct bsdf_point *p
 static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			       struct error *e)
 {
-	struct roughplastic *r = bsdf_data(b, n, build, sizeof *r, e);
-	if (!r)
-		return -ENOMEM;
+	struct roughplastic *r = b->data;
 	int code = coating_read(&r->coating, b, n, build, e);
 	/* A diffuse base gains nothing from an exact mirror above it: the coating stays rough, however smooth it is. */
 	if (!code)
@@ -81,6 +79,7 @@ static const struct param roughplastic_params[] = {COATING_PARAMS, ROUGH_BOUNDAR
 const struct bsdf_ops bsdf_ops_roughplastic = {
 	.type = "roughplastic",
 	.params = roughplastic_params,
+	.data_size = sizeof(struct roughplastic),
 	.create = roughplastic_create,
 	.eval = roughplastic_eval,
 	.pdf_solid = roughplastic_pdf,

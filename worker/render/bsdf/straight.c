@@ -4,13 +4,6 @@
 
 #include <float.h>
 
-extern const struct bsdf_ops bsdf_ops_null;
-
-struct filter {
-	struct texture transmittance;
-	double share;
-};
-
 /* 1 / |wo.z| must be finite. */
 static bool straight_direction(vec3 wo, vec3 *wi)
 {
@@ -55,9 +48,7 @@ bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
 		    struct error *e)
 {
-	struct filter *f = bsdf_data(b, n, build, sizeof *f, e);
-	if (!f)
-		return -ENOMEM;
+	struct filter *f = b->data;
 	int code = bsdf_texture(b, &f->transmittance, n, "transmittance", 1, build, e);
 	if (code)
 		return code;
@@ -69,10 +60,4 @@ int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsd
 	b->alpha = b->alpha_mean = 0;
 	b->black = texture_max(&f->transmittance) == 0;
 	return 0;
-}
-
-int straight_make(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
-{
-	*b = (struct bsdf){.ops = &bsdf_ops_null, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
-	return straight_create(b, n, build, 1, e);
 }

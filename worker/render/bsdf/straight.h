@@ -11,11 +11,16 @@
 
 #include "worker/render/bsdf/create.h"
 
+struct filter {
+	struct texture transmittance;
+	double share;
+};
+
+extern const struct bsdf_ops bsdf_ops_null;
+
 /* A filter lets `share` times the texture `transmittance` through. */
 int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
 		    struct error *e);
-/* A `null`, for a BSDF n that has holes; n has no `transmittance`. */
-int straight_make(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 spectrum straight_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 double straight_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
@@ -24,15 +29,16 @@ bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 		     struct bsdf_sample *out);
 
 /* The operations of a filter NAME, which defines NAME_params and NAME_create. */
-#define STRAIGHT_OPS(NAME)                         \
-	const struct bsdf_ops bsdf_ops_##NAME = {  \
-		.type = #NAME,                     \
-		.params = NAME##_params,           \
-		.create = NAME##_create,           \
-		.eval = straight_eval,             \
-		.pdf_solid = straight_pdf,         \
-		.eval_delta = straight_eval_delta, \
-		.sample = straight_sample,         \
+#define STRAIGHT_OPS(NAME)                          \
+	const struct bsdf_ops bsdf_ops_##NAME = {   \
+		.type = #NAME,                      \
+		.params = NAME##_params,            \
+		.data_size = sizeof(struct filter), \
+		.create = NAME##_create,            \
+		.eval = straight_eval,              \
+		.pdf_solid = straight_pdf,          \
+		.eval_delta = straight_eval_delta,  \
+		.sample = straight_sample,          \
 	}
 
 #endif

@@ -66,10 +66,8 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 
 static int thin_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct thin *t = bsdf_data(b, n, build, sizeof *t, e);
+	struct thin *t = b->data;
 	double inside, outside;
-	if (!t)
-		return -ENOMEM;
 	int code = ior_read(n, "int_ior", IOR_BK7_DEFAULT, &inside, e);
 	if (!code)
 		code = ior_read(n, "ext_ior", IOR_AIR_DEFAULT, &outside, e);
@@ -101,6 +99,7 @@ static const struct param thin_params[] = {
 const struct bsdf_ops bsdf_ops_thindielectric = {
 	.type = "thindielectric",
 	.params = thin_params,
+	.data_size = sizeof(struct thin),
 	.create = thin_create,
 	.eval = thin_eval,
 	.pdf_solid = thin_pdf,

@@ -102,9 +102,7 @@ int bsdf_mirror_back(struct bsdf *b, const struct bsdf_build *build, struct erro
 
 static int twosided_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct twosided *t = bsdf_data(b, n, build, sizeof *t, e);
-	if (!t)
-		return -ENOMEM;
+	struct twosided *t = b->data;
 	if (!node_child(n, PLUGIN_BSDF, 0) || node_child(n, PLUGIN_BSDF, 2))
 		return node_error(n, e, EINVAL, "twosided takes one or two nested BSDFs");
 	for (uint32_t i = 0; i < 2; i++) {
@@ -150,6 +148,7 @@ const struct bsdf_ops bsdf_ops_twosided = {
 	.type = "twosided",
 	.params = twosided_params,
 	.nested_classes = 1u << PLUGIN_BSDF,
+	.data_size = sizeof(struct twosided),
 	.create = twosided_create,
 	.eval = twosided_eval,
 	.pdf_solid = twosided_pdf,

@@ -111,9 +111,7 @@ static enum ward_form form_of(const char *name)
 
 static int ward_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct ward *w = bsdf_data(b, n, build, sizeof *w, e);
-	if (!w)
-		return -ENOMEM;
+	struct ward *w = b->data;
 	int code = bsdf_texture(b, &w->diffuse, n, "diffuse_reflectance", 0.5, build, e);
 	if (!code)
 		code = bsdf_texture(b, &w->specular, n, "specular_reflectance", 0.2, build, e);
@@ -148,6 +146,7 @@ static const struct param ward_params[] = {
 const struct bsdf_ops bsdf_ops_ward = {
 	.type = "ward",
 	.params = ward_params,
+	.data_size = sizeof(struct ward),
 	.create = ward_create,
 	.eval = ward_eval,
 	.pdf_solid = ward_pdf,
