@@ -80,13 +80,13 @@ spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return b->ops->eval_delta(b, p, wo, mode, wi, chance);
 }
 
-static spectrum black_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+spectrum bsdf_no_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)b, (void)p, (void)wo, (void)wi;
 	return spectrum_of(0);
 }
 
-static double black_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+double bsdf_no_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)b, (void)p, (void)wo, (void)wi;
 	return 0;
@@ -102,6 +102,6 @@ static bool black_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 void bsdf_black(struct bsdf *b)
 {
 	static const struct bsdf_ops ops = {
-		.type = "black", .eval = black_eval, .pdf_solid = black_pdf, .sample = black_sample};
+		.type = "black", .eval = bsdf_no_eval, .pdf_solid = bsdf_no_pdf, .sample = black_sample};
 	*b = (struct bsdf){.ops = &ops, .alpha = INFINITY, .eta = 1, .black = true, .shape = COLOR_SHAPE_CONSTANT};
 }

@@ -130,6 +130,9 @@ int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 /* The same with these operations, whatever the node's type is. */
 int bsdf_create_as(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_node *n,
 		   const struct bsdf_build *build, struct error *e);
+/* eval and pdf_solid without lobes that are not specular: zero. */
+spectrum bsdf_no_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+double bsdf_no_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 void bsdf_black(struct bsdf *b); /* absorbs everything: for emitters without a BSDF */
 
 extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */

@@ -177,7 +177,7 @@ static bool follow(const struct bsdf *b, const struct layer *l, const struct bsd
 		*delta = !c->rough;
 		if (*delta)
 			return false;
-		*wi = boundary_sample(&l->boundary, upright(wo), u[0], u[1]);
+		*wi = microfacet_sample_mirrored(&l->boundary.facets, upright(wo), u[0], u[1]);
 		wi->z = copysign(1, wo.z) * wi->z;
 		return meets(b, wo, *wi);
 	}
@@ -196,21 +196,9 @@ static bool coat_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	if (!meets(b, wo, wo))
 		return false;
 	struct layer l = layer_at(b, p);
-	*out = (struct bsdf_sample){.mode = BSDF_REFLECT, .eta = 1};
-	if (follow(b, &l, p, wo, u, &delta, &wi)) {
-		out->wi = wi;
-		out->pdf = coat_pdf(b, p, wo, wi);
-		out->f = coat_eval(b, p, wo, wi);
-		return out->pdf > 0;
-	}
-	if (!delta)
-		return false;
-	spectrum weight = coat_eval_delta(b, p, wo, BSDF_REFLECT, &out->wi, &out->pdf);
-	if (spectrum_is_zero(weight) || !(out->pdf > 0))
-		return false;
-	out->mode |= BSDF_DELTA;
-	out->f = spectrum_scale(1 / fabs(wo.z), weight);
-	return true;
+	if (follow(b, &l, p, wo, u, &delta, &wi))
+		return bsdf_sample_smooth(b, p, wo, wi, out);
+	return delta && bsdf_sample_delta(b, p, wo, BSDF_REFLECT, out) && !spectrum_is_zero(out->f);
 }
 
 static int read_inner(struct coat *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,

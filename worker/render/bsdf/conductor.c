@@ -5,18 +5,6 @@
 
 #include <float.h>
 
-static spectrum conductor_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return spectrum_of(0);
-}
-
-static double conductor_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return 0;
-}
-
 static spectrum conductor_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 				     double *chance)
 {
@@ -31,12 +19,7 @@ static bool conductor_sample(const struct bsdf *b, const struct bsdf_point *p, v
 			     struct bsdf_sample *out)
 {
 	(void)u;
-	*out = (struct bsdf_sample){.mode = BSDF_REFLECT | BSDF_DELTA, .eta = 1};
-	spectrum weight = conductor_eval_delta(b, p, wo, BSDF_REFLECT, &out->wi, &out->pdf);
-	if (!(out->pdf > 0))
-		return false;
-	out->f = spectrum_scale(1 / wo.z, weight);
-	return true;
+	return bsdf_sample_delta(b, p, wo, BSDF_REFLECT, out);
 }
 
 static int conductor_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
@@ -55,8 +38,8 @@ const struct bsdf_ops bsdf_ops_conductor = {
 	.params = conductor_params,
 	.data_size = sizeof(struct metal),
 	.create = conductor_create,
-	.eval = conductor_eval,
-	.pdf_solid = conductor_pdf,
+	.eval = bsdf_no_eval,
+	.pdf_solid = bsdf_no_pdf,
 	.eval_delta = conductor_eval_delta,
 	.sample = conductor_sample,
 };

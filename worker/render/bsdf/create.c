@@ -15,6 +15,30 @@ int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_nod
 	return 0;
 }
 
+bool bsdf_sample_smooth(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi, struct bsdf_sample *out)
+{
+	double pdf = b->ops->pdf_solid(b, p, wo, wi);
+	if (!(pdf > 0))
+		return false;
+	*out = (struct bsdf_sample){.wi = wi,
+				    .mode = (wo.z > 0) == (wi.z > 0) ? BSDF_REFLECT : BSDF_TRANSMIT,
+				    .pdf = pdf,
+				    .f = b->ops->eval(b, p, wo, wi),
+				    .eta = 1};
+	return true;
+}
+
+bool bsdf_sample_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
+		       struct bsdf_sample *out)
+{
+	*out = (struct bsdf_sample){.mode = mode | BSDF_DELTA, .eta = 1};
+	spectrum weight = b->ops->eval_delta(b, p, wo, mode, &out->wi, &out->pdf);
+	if (!(out->pdf > 0))
+		return false;
+	out->f = spectrum_scale(1 / fabs(out->wi.z), weight);
+	return true;
+}
+
 void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
 {
 	b->ops = ops;

@@ -26,6 +26,13 @@ struct bsdf_probes {
 struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build);
 struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i);
 
+/* Ends of `sample` where nothing is refracted. The lobes that are not specular send light to wi; false: the density
+ * there is 0. */
+bool bsdf_sample_smooth(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi, struct bsdf_sample *out);
+/* The specular lobe `mode` is chosen; false: there is none from wo. */
+bool bsdf_sample_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
+		       struct bsdf_sample *out);
+
 /* Marks b, whose data begins like that of `ops`, as having specular lobes only. */
 void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops);
 

@@ -6,18 +6,6 @@
 
 #include <float.h>
 
-static spectrum dielectric_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return spectrum_of(0);
-}
-
-static double dielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return 0;
-}
-
 /* f |wi.z| of one lobe with the Fresnel share f; eta: index beyond over index on wo's side. Chance 0: no such lobe. */
 static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
 		     const struct fresnel *f, vec3 *wi, double *chance)
@@ -84,8 +72,8 @@ const struct bsdf_ops bsdf_ops_dielectric = {
 	.params = dielectric_params,
 	.data_size = sizeof(struct glass),
 	.create = dielectric_create,
-	.eval = dielectric_eval,
-	.pdf_solid = dielectric_pdf,
+	.eval = bsdf_no_eval,
+	.pdf_solid = bsdf_no_pdf,
 	.eval_delta = dielectric_eval_delta,
 	.sample = dielectric_sample,
 };

@@ -28,12 +28,7 @@ static bool difftrans_sample(const struct bsdf *b, const struct bsdf_point *p, v
 	vec3 wi = warp_cosine_hemisphere(u[0], u[1]);
 	if (wo.z > 0)
 		wi.z = -wi.z;
-	double pdf = difftrans_pdf(b, p, wo, wi);
-	if (!(pdf > 0))
-		return false;
-	*out = (struct bsdf_sample){
-		.wi = wi, .mode = BSDF_TRANSMIT, .pdf = pdf, .f = difftrans_eval(b, p, wo, wi), .eta = 1};
-	return true;
+	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
 static int difftrans_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

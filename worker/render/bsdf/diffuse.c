@@ -20,17 +20,7 @@ static double diffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3
 static bool diffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			   struct bsdf_sample *out)
 {
-	if (!(wo.z > 0))
-		return false;
-	vec3 wi = warp_cosine_hemisphere(u[0], u[1]);
-	if (!(wi.z > 0))
-		return false;
-	*out = (struct bsdf_sample){.wi = wi,
-				    .mode = BSDF_REFLECT,
-				    .pdf = diffuse_pdf(b, p, wo, wi),
-				    .f = diffuse_eval(b, p, wo, wi),
-				    .eta = 1};
-	return true;
+	return bsdf_sample_smooth(b, p, wo, warp_cosine_hemisphere(u[0], u[1]), out);
 }
 
 static int diffuse_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/microfacet.h"
 
+#include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/warp.h"
 
 #include <float.h>
@@ -120,6 +121,17 @@ static vec3 ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1
 vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, double u1)
 {
 	return m->ggx ? ggx_visible(m, v, u0, u1) : beckmann_visible(m, v, u0, u1);
+}
+
+double microfacet_reflect(const struct microfacet *m, double eta, vec3 wo, vec3 wi, double *pdf)
+{
+	double length;
+	vec3 h;
+	*pdf = 0;
+	if (!microfacet_half(wo, 1, wi, &h, &length))
+		return 0;
+	*pdf = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, wo);
+	return *pdf * microfacet_g1_over_cos(m, wi) * fresnel_dielectric(fmin(0.5 * length, 1), eta).reflected;
 }
 
 void microfacet_set(struct microfacet *m, bool ggx, double alpha_u, double alpha_v)

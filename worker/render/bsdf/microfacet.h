@@ -50,6 +50,22 @@ static inline bool microfacet_half(vec3 wo, double eta, vec3 wi, vec3 *h, double
 	return true;
 }
 
+/* Where a facet with normal h sends light from w. */
+static inline vec3 microfacet_mirror(vec3 w, vec3 h)
+{
+	return vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(w, h), h), w));
+}
+
+/* A direction that a facet seen from w sends its light to. */
+static inline vec3 microfacet_sample_mirrored(const struct microfacet *m, vec3 w, double u0, double u1)
+{
+	return microfacet_mirror(w, microfacet_sample_visible(m, w, u0, u1));
+}
+
+/* The lobe that a rough dielectric boundary of this index reflects, of wo and wi above, and its density of wi:
+ * D G1(wo) / 4 wo.z. */
+double microfacet_reflect(const struct microfacet *m, double eta, vec3 wo, vec3 wi, double *pdf);
+
 /* Parameters alpha, alpha_u, alpha_v, distribution. */
 int microfacet_read(struct microfacet *m, const struct scene_node *n, struct error *e);
 #define MICROFACET_PARAMS                                                                   \

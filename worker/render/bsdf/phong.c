@@ -57,12 +57,7 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 		return false;
 	vec3 wi = u[2] < ph->specular_chance ? sample_lobe(ph->exponent, wo, u[0], u[1])
 					     : warp_cosine_hemisphere(u[0], u[1]);
-	double pdf = phong_pdf(b, p, wo, wi);
-	if (!(pdf > 0))
-		return false;
-	*out = (struct bsdf_sample){
-		.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = phong_eval(b, p, wo, wi), .eta = 1};
-	return true;
+	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
 static int phong_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

@@ -53,17 +53,9 @@ static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 	const struct coating *c = b->data;
 	if (!(wo.z > 0))
 		return false;
-	*out = (struct bsdf_sample){.mode = BSDF_REFLECT, .eta = 1};
-	if (u[2] < coating_specular_chance(c, fresnel_at(c, wo).reflected)) {
-		spectrum weight = plastic_eval_delta(b, p, wo, BSDF_REFLECT, &out->wi, &out->pdf);
-		out->mode |= BSDF_DELTA;
-		out->f = spectrum_scale(out->pdf > 0 ? 1 / wo.z : 0, weight);
-		return out->pdf > 0;
-	}
-	out->wi = warp_cosine_hemisphere(u[0], u[1]);
-	out->pdf = plastic_pdf(b, p, wo, out->wi);
-	out->f = plastic_eval(b, p, wo, out->wi);
-	return out->pdf > 0;
+	if (u[2] < coating_specular_chance(c, fresnel_at(c, wo).reflected))
+		return bsdf_sample_delta(b, p, wo, BSDF_REFLECT, out);
+	return bsdf_sample_smooth(b, p, wo, warp_cosine_hemisphere(u[0], u[1]), out);
 }
 
 /* The share of diffuse light that the boundary lets in: the integral of T over the squared sine, up to total

@@ -22,25 +22,13 @@ static struct fresnel fresnel_at(const struct pplastic *s, double cosine)
 	return fresnel_dielectric(fmin(cosine, 1), s->coating.eta);
 }
 
-/* The specular lobe without its reflectance, and its density. Both directions are above. */
-static double facets(const struct pplastic *s, const struct microfacet *m, vec3 wo, vec3 wi, double *pdf)
-{
-	vec3 h;
-	double length;
-	*pdf = 0;
-	if (!microfacet_half(wo, 1, wi, &h, &length))
-		return 0;
-	*pdf = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, wo);
-	return *pdf * microfacet_g1_over_cos(m, wi) * fresnel_at(s, 0.5 * length).reflected;
-}
-
 static spectrum pplastic_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct pplastic *s = b->data;
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
 	struct microfacet m = rough_map_at(&s->roughness, p);
-	double pdf, lobe = facets(s, &m, wo, wi, &pdf),
+	double pdf, lobe = microfacet_reflect(&m, s->coating.eta, wo, wi, &pdf),
 		    passes = fresnel_at(s, wo.z).transmitted * fresnel_at(s, wi.z).transmitted / WARP_PI;
 	return spectrum_add(spectrum_scale(lobe, texture_eval(&s->coating.specular, &p->where, p->w)),
 			    spectrum_scale(passes, texture_eval(&s->coating.diffuse, &p->where, p->w)));
@@ -58,7 +46,7 @@ static double pplastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 		return 0;
 	struct microfacet m = rough_map_at(&s->roughness, p);
 	double lobe, chance = specular_chance(s, wo);
-	facets(s, &m, wo, wi, &lobe);
+	microfacet_reflect(&m, s->coating.eta, wo, wi, &lobe);
 	return chance * lobe + (1 - chance) * wi.z / WARP_PI;
 }
 
@@ -71,17 +59,11 @@ static bool pplastic_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 	vec3 wi;
 	if (u[2] < specular_chance(s, wo)) {
 		struct microfacet m = rough_map_at(&s->roughness, p);
-		vec3 h = microfacet_sample_visible(&m, wo, u[0], u[1]);
-		wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
+		wi = microfacet_sample_mirrored(&m, wo, u[0], u[1]);
 	} else {
 		wi = warp_cosine_hemisphere(u[0], u[1]);
 	}
-	double pdf = pplastic_pdf(b, p, wo, wi);
-	if (!(pdf > 0))
-		return false;
-	*out = (struct bsdf_sample){
-		.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = pplastic_eval(b, p, wo, wi), .eta = 1};
-	return true;
+	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
 static int pplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

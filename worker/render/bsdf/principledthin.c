@@ -132,8 +132,7 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 	if (lobe == THIN_DIFFUSE || lobe == THIN_THROUGH) {
 		wi = warp_cosine_hemisphere(u[0], u[1]);
 	} else {
-		vec3 h = microfacet_sample_visible(lobe == THIN_REFLECT ? &x.s.facets : &x.passing, o, u[0], u[1]);
-		wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(o, h), h), o));
+		wi = microfacet_sample_mirrored(lobe == THIN_REFLECT ? &x.s.facets : &x.passing, o, u[0], u[1]);
 	}
 	bool through = lobe == THIN_TRANSMIT || lobe == THIN_THROUGH;
 	if (!(wi.z > 0))

@@ -132,18 +132,5 @@ double boundary_escape(const struct boundary_point *at)
 
 double boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf)
 {
-	double length;
-	vec3 h;
-	*pdf = 0;
-	if (!microfacet_half(wo, 1, wi, &h, &length))
-		return 0;
-	*pdf = 0.25 * microfacet_d(&at->facets, h) * microfacet_g1_over_cos(&at->facets, wo);
-	return *pdf * microfacet_g1_over_cos(&at->facets, wi) *
-	       fresnel_dielectric(fmin(0.5 * length, 1), at->of->eta).reflected;
-}
-
-vec3 boundary_sample(const struct boundary_point *at, vec3 wo, double u0, double u1)
-{
-	vec3 h = microfacet_sample_visible(&at->facets, wo, u0, u1);
-	return vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
+	return microfacet_reflect(&at->facets, at->of->eta, wo, wi, pdf);
 }

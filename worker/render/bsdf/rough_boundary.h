@@ -55,8 +55,7 @@ double boundary_transmitted(const struct boundary_point *at, double cosine);
 /* The share of diffuse light from inside that leaves, times eta^2. */
 double boundary_escape(const struct boundary_point *at);
 
-/* wo and wi above: the reflected lobe, and its density of wi (D G1(wo) / 4 wo.z). */
+/* microfacet_reflect of this boundary. */
 double boundary_reflect(const struct boundary_point *at, vec3 wo, vec3 wi, double *pdf);
-vec3 boundary_sample(const struct boundary_point *at, vec3 wo, double u0, double u1);
 
 #endif

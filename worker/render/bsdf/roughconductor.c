@@ -64,8 +64,7 @@ static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point 
 	if (!(wo.z > 0))
 		return false;
 	struct microfacet m = rough_map_at(&r->roughness, p);
-	vec3 h = microfacet_sample_visible(&m, wo, u[0], u[1]);
-	vec3 wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
+	vec3 wi = microfacet_sample_mirrored(&m, wo, u[0], u[1]);
 	struct facet f;
 	if (!facet_of(&m, wo, wi, &f))
 		return false;

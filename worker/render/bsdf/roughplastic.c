@@ -47,14 +47,9 @@ static bool roughplastic_sample(const struct bsdf *b, const struct bsdf_point *p
 	if (!(wo.z > 0))
 		return false;
 	struct boundary_point at = rough_boundary_at(&r->boundary, p);
-	vec3 wi = u[2] < specular_chance(r, &at, wo) ? boundary_sample(&at, wo, u[0], u[1])
+	vec3 wi = u[2] < specular_chance(r, &at, wo) ? microfacet_sample_mirrored(&at.facets, wo, u[0], u[1])
 						     : warp_cosine_hemisphere(u[0], u[1]);
-	double pdf = roughplastic_pdf(b, p, wo, wi);
-	if (!(pdf > 0))
-		return false;
-	*out = (struct bsdf_sample){
-		.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = roughplastic_eval(b, p, wo, wi), .eta = 1};
-	return true;
+	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
 static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,

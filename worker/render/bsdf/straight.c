@@ -11,18 +11,6 @@ static bool straight_direction(vec3 wo, vec3 *wi)
 	return fabs(wo.z) >= DBL_MIN;
 }
 
-spectrum straight_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return spectrum_of(0);
-}
-
-double straight_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return 0;
-}
-
 spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			     double *chance)
 {
@@ -37,12 +25,7 @@ bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 		     struct bsdf_sample *out)
 {
 	(void)u;
-	*out = (struct bsdf_sample){.mode = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT, .eta = 1};
-	spectrum weight = straight_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
-	if (!(out->pdf > 0))
-		return false;
-	out->f = spectrum_scale(1 / fabs(wo.z), weight);
-	return true;
+	return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 }
 
 int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,

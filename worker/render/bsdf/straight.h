@@ -21,8 +21,6 @@ extern const struct bsdf_ops bsdf_ops_null;
 /* A filter lets `share` times the texture `transmittance` through. */
 int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
 		    struct error *e);
-spectrum straight_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
-double straight_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 			     double *chance);
 bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -35,8 +33,8 @@ bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 		.params = NAME##_params,            \
 		.data_size = sizeof(struct filter), \
 		.create = NAME##_create,            \
-		.eval = straight_eval,              \
-		.pdf_solid = straight_pdf,          \
+		.eval = bsdf_no_eval,               \
+		.pdf_solid = bsdf_no_pdf,           \
 		.eval_delta = straight_eval_delta,  \
 		.sample = straight_sample,          \
 	}

@@ -16,18 +16,6 @@ struct thin {
 	double eta; /* of the glass over that of its surroundings */
 };
 
-static spectrum thin_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return spectrum_of(0);
-}
-
-static double thin_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p, (void)wo, (void)wi;
-	return 0;
-}
-
 /* 2 R / (1 + R) and (1 - R) / (1 + R); neither loses precision where it is small. */
 static struct fresnel sheet(const struct thin *t, vec3 wo)
 {
@@ -55,13 +43,7 @@ static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 {
 	struct fresnel f = sheet(b->data, wo);
 	bool reflect = u[2] < fresnel_chance(&f, true);
-	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT | BSDF_STRAIGHT) | BSDF_DELTA,
-				    .eta = 1};
-	spectrum weight = thin_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
-	if (!(out->pdf > 0))
-		return false;
-	out->f = spectrum_scale(1 / fabs(wo.z), weight);
-	return true;
+	return bsdf_sample_delta(b, p, wo, reflect ? BSDF_REFLECT : BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 }
 
 static int thin_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
@@ -101,8 +83,8 @@ const struct bsdf_ops bsdf_ops_thindielectric = {
 	.params = thin_params,
 	.data_size = sizeof(struct thin),
 	.create = thin_create,
-	.eval = thin_eval,
-	.pdf_solid = thin_pdf,
+	.eval = bsdf_no_eval,
+	.pdf_solid = bsdf_no_pdf,
 	.eval_delta = thin_eval_delta,
 	.sample = thin_sample,
 };

@@ -86,7 +86,7 @@ static vec3 sample_lobe(const struct microfacet *m, vec3 wo, double u0, double u
 {
 	double r = sqrt(-log1p(-u0)), phi = 2 * WARP_PI * u1;
 	vec3 h = vec3_normalize((vec3){m->alpha * r * cos(phi), m->alpha * m->ratio * r * sin(phi), 1});
-	return vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
+	return microfacet_mirror(wo, h);
 }
 
 static bool ward_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -97,11 +97,7 @@ static bool ward_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 		return false;
 	struct microfacet m = rough_map_at(&w->roughness, p);
 	vec3 wi = u[2] < w->specular_chance ? sample_lobe(&m, wo, u[0], u[1]) : warp_cosine_hemisphere(u[0], u[1]);
-	double pdf = ward_pdf(b, p, wo, wi);
-	if (!(pdf > 0))
-		return false;
-	*out = (struct bsdf_sample){.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = ward_eval(b, p, wo, wi), .eta = 1};
-	return true;
+	return bsdf_sample_smooth(b, p, wo, wi, out);
 }
 
 static enum ward_form form_of(const char *name)
