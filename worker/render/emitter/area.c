@@ -36,10 +36,8 @@ static bool is_closed(const struct surface_light *l)
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct area_light *l = arena_alloc(build->arena, 1, sizeof *l);
-	if (!l)
-		return error_set(e, ENOMEM, "out of memory");
-	int rc = surface_light_create(em, &l->light, n, build, e);
+	struct area_light *l = em->data;
+	int rc = surface_light_create(em, n, build, e);
 	if (rc)
 		return rc;
 	bool both = node_bool(n, "two_sided", false);
@@ -143,6 +141,7 @@ const struct emitter_ops emitter_ops_area = {
 	.type = "area",
 	.params = params,
 	.needs_surface = true,
+	.data_size = sizeof(struct area_light),
 	.create = create,
 	.radiance = radiance,
 	.sample_point = surface_light_sample_point,

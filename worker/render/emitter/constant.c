@@ -54,11 +54,8 @@ static int constant_create(struct emitter *em, const struct scene_node *n, const
 	int code = emitter_texture(&radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (code)
 		return code;
-	struct color *c = arena_alloc(build->arena, 1, sizeof *c);
-	if (!c)
-		return node_error(n, e, ENOMEM, "out of memory");
+	struct color *c = em->data;
 	*c = radiance.color;
-	em->data = c;
 	em->infinite = true;
 	em->shape = c->shape;
 	em->power = 4 * PI * color_mean(c);
@@ -75,6 +72,7 @@ static const struct param constant_params[] = {
 const struct emitter_ops emitter_ops_constant = {
 	.type = "constant",
 	.params = constant_params,
+	.data_size = sizeof(struct color),
 	.create = constant_create,
 	.radiance = constant_radiance,
 	.sample_point = constant_sample_point,

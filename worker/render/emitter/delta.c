@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/emitter/delta.h"
 
-int delta_create(struct emitter *em, struct delta_light *l, const struct scene_node *n, const char *name, double factor,
+int delta_create(struct emitter *em, const struct scene_node *n, const char *name, double factor,
 		 const struct emitter_build *build, struct error *e)
 {
+	struct delta_light *l = em->data;
 	struct texture t;
 	int code = emitter_texture(&t, n, name, COLOR_ILLUMINANT, build, e);
 	if (!code)
-		code = delta_place(em, l, n, factor, e);
+		code = delta_place(em, n, factor, e);
 	if (code)
 		return code;
 	l->color = t.color;
@@ -16,8 +17,9 @@ int delta_create(struct emitter *em, struct delta_light *l, const struct scene_n
 	return 0;
 }
 
-int delta_place(struct emitter *em, struct delta_light *l, const struct scene_node *n, double factor, struct error *e)
+int delta_place(struct emitter *em, const struct scene_node *n, double factor, struct error *e)
 {
+	struct delta_light *l = em->data;
 	double away = vec3_length(l->x.p);
 	if (!(away <= PARAM_REACH_MAX))
 		return node_error(n, e, ERANGE, "is %g scene radii away from the scene, more than %g", away,
@@ -25,7 +27,6 @@ int delta_place(struct emitter *em, struct delta_light *l, const struct scene_no
 	if (!(factor > 0) || !isfinite(factor))
 		return node_error(n, e, EINVAL, "this light's strength is out of range at the scene's size");
 	l->factor = factor;
-	em->data = l;
 	em->delta = true;
 	em->infinite = l->x.infinite;
 	return 0;

@@ -23,12 +23,12 @@ struct delta_light {
 	struct emitter_point x;
 };
 
-/* Reads the colour `name` of the node (default 1) and sets everything of `em` except its power, which is that of
- * intensity 1 times the result of delta_strength. */
-int delta_create(struct emitter *em, struct delta_light *l, const struct scene_node *n, const char *name, double factor,
+/* `x` of em->data is set. Reads the colour `name` of the node (default 1) and sets everything of `em` except its power,
+ * which is that of intensity 1 times the result of delta_strength. */
+int delta_create(struct emitter *em, const struct scene_node *n, const char *name, double factor,
 		 const struct emitter_build *build, struct error *e);
 /* The same without the colour: the caller sets shape, brightest and power. */
-int delta_place(struct emitter *em, struct delta_light *l, const struct scene_node *n, double factor, struct error *e);
+int delta_place(struct emitter *em, const struct scene_node *n, double factor, struct error *e);
 /* Unit axes of to_world: +z as it is, +y made perpendicular to it; a mirrored transform stays mirrored. -EINVAL with
  * a sentence if it is singular. */
 int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e);
@@ -41,5 +41,9 @@ double delta_pdf_point(const struct emitter *em, const struct emitter_point *x);
 bool delta_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 			 double *pdf_toward);
 double delta_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x);
+
+#define DELTA_OPS                                                                                               \
+	.sample_point = delta_sample_point, .pdf_point = delta_pdf_point, .sample_toward = delta_sample_toward, \
+	.pdf_toward = delta_pdf_toward
 
 #endif

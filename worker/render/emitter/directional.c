@@ -12,9 +12,7 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct delta_light *l = arena_alloc(build->arena, 1, sizeof *l);
-	if (!l)
-		return node_error(n, e, ENOMEM, "out of memory");
+	struct delta_light *l = em->data;
 	int code = delta_either(n, "direction", "to_world", e);
 	if (code)
 		return code;
@@ -26,7 +24,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		return node_error(n, e, EINVAL, "a direction of length %g", length);
 	d = (vec3){d.x / length, d.y / length, d.z / length};
 	l->x = (struct emitter_point){.p = vec3_neg(vec3_normalize(d)), .infinite = true};
-	code = delta_create(em, l, n, "irradiance", 1, build, e);
+	code = delta_create(em, n, "irradiance", 1, build, e);
 	if (!code)
 		em->power = delta_strength(l);
 	return code;
@@ -46,10 +44,8 @@ static const struct param params[] = {
 const struct emitter_ops emitter_ops_directional = {
 	.type = "directional",
 	.params = params,
+	.data_size = sizeof(struct delta_light),
 	.create = create,
 	.radiance = radiance,
-	.sample_point = delta_sample_point,
-	.pdf_point = delta_pdf_point,
-	.sample_toward = delta_sample_toward,
-	.pdf_toward = delta_pdf_toward,
+	DELTA_OPS,
 };

@@ -71,10 +71,8 @@ static void find_plane(struct beam *b)
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct beam *b = arena_alloc(build->arena, 1, sizeof *b);
-	if (!b)
-		return error_set(e, ENOMEM, "out of memory");
-	int rc = surface_light_create(em, &b->light, n, build, e);
+	struct beam *b = em->data;
+	int rc = surface_light_create(em, n, build, e);
 	if (rc)
 		return rc;
 	find_plane(b);
@@ -245,6 +243,7 @@ const struct emitter_ops emitter_ops_directionalarea = {
 	.type = "directionalarea",
 	.params = params,
 	.needs_surface = true,
+	.data_size = sizeof(struct beam),
 	.create = create,
 	.radiance = radiance,
 	.sample_point = surface_light_sample_point,

@@ -38,6 +38,11 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 	if (!ops->needs_surface && build->surface)
 		return node_error(n, e, EINVAL, "\"%s\" cannot be inside a shape", n->type);
 	*em = (struct emitter){.ops = ops};
+	if (ops->data_size > 0) {
+		em->data = arena_alloc(build->arena, 1, ops->data_size);
+		if (!em->data)
+			return node_error(n, e, ENOMEM, "out of memory");
+	}
 	return ops->create(em, n, build, e);
 }
 

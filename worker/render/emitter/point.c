@@ -27,9 +27,7 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct delta_light *l = arena_alloc(build->arena, 1, sizeof *l);
-	if (!l)
-		return node_error(n, e, ENOMEM, "out of memory");
+	struct delta_light *l = em->data;
 	int code = delta_either(n, "position", "to_world", e);
 	if (code)
 		return code;
@@ -37,7 +35,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	const struct property *position = node_find(n, "position");
 	vec3 p = position ? position->value.as.point : mat4_point(&to_world, (vec3){0, 0, 0});
 	l->x.p = vec3_scale(build->scale, vec3_sub(p, build->center));
-	code = delta_create(em, l, n, "intensity", build->scale * build->scale, build, e);
+	code = delta_create(em, n, "intensity", build->scale * build->scale, build, e);
 	if (!code)
 		em->power = 4 * M_PI * delta_strength(l);
 	return code;
@@ -54,12 +52,10 @@ static const struct param params[] = {
 const struct emitter_ops emitter_ops_point = {
 	.type = "point",
 	.params = params,
+	.data_size = sizeof(struct delta_light),
 	.create = create,
 	.radiance = radiance,
-	.sample_point = delta_sample_point,
-	.pdf_point = delta_pdf_point,
+	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
-	.sample_toward = delta_sample_toward,
-	.pdf_toward = delta_pdf_toward,
 };

@@ -70,9 +70,7 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct projector *p = arena_alloc(build->arena, 1, sizeof *p);
-	if (!p)
-		return node_error(n, e, ENOMEM, "out of memory");
+	struct projector *p = em->data;
 	mat4 to_world = node_transform(n, "to_world");
 	double degrees, scale = node_float(n, "scale", 1);
 	char axis[FOV_AXIS_MAX];
@@ -83,7 +81,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (!code)
 		code = emitter_texture(&p->irradiance, n, "irradiance", COLOR_ILLUMINANT, build, e);
 	if (!code)
-		code = delta_place(em, &p->light, n, scale * build->scale * build->scale, e);
+		code = delta_place(em, n, scale * build->scale * build->scale, e);
 	if (code)
 		return code;
 	double aspect = texture_aspect(&p->irradiance), slope = tan(degrees * (M_PI / 360)) / fov_side(axis, aspect, 1);
@@ -112,12 +110,10 @@ static const struct param params[] = {
 const struct emitter_ops emitter_ops_projector = {
 	.type = "projector",
 	.params = params,
+	.data_size = sizeof(struct projector),
 	.create = create,
 	.radiance = radiance,
-	.sample_point = delta_sample_point,
-	.pdf_point = delta_pdf_point,
+	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
-	.sample_toward = delta_sample_toward,
-	.pdf_toward = delta_pdf_toward,
 };

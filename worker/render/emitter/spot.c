@@ -83,9 +83,7 @@ static int read_texture(struct emitter *em, struct spot *s, const struct scene_n
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct spot *s = arena_alloc(build->arena, 1, sizeof *s);
-	if (!s)
-		return node_error(n, e, ENOMEM, "out of memory");
+	struct spot *s = em->data;
 	mat4 to_world = node_transform(n, "to_world");
 	vec3 axis = vec3_normalize(mat4_vector(&to_world, (vec3){0, 0, 1}));
 	if (!vec3_is_finite(axis))
@@ -98,7 +96,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	s->beam = beam * (M_PI / 180);
 	s->height = 2 * pow(sin(0.5 * s->cutoff), 2);
 	s->light.x.p = vec3_scale(build->scale, vec3_sub(mat4_point(&to_world, (vec3){0, 0, 0}), build->center));
-	int code = delta_create(em, &s->light, n, "intensity", build->scale * build->scale, build, e);
+	int code = delta_create(em, n, "intensity", build->scale * build->scale, build, e);
 	if (code)
 		return code;
 	/* Integral of the fall-off over the cone. */
@@ -120,12 +118,10 @@ static const struct param params[] = {
 const struct emitter_ops emitter_ops_spot = {
 	.type = "spot",
 	.params = params,
+	.data_size = sizeof(struct spot),
 	.create = create,
 	.radiance = radiance,
-	.sample_point = delta_sample_point,
-	.pdf_point = delta_pdf_point,
+	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
-	.sample_toward = delta_sample_toward,
-	.pdf_toward = delta_pdf_toward,
 };

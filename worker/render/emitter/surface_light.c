@@ -45,9 +45,10 @@ static int build_cdf(struct surface_light *l, struct arena *arena)
 	return 0;
 }
 
-int surface_light_create(struct emitter *em, struct surface_light *l, const struct scene_node *n,
-			 const struct emitter_build *build, struct error *e)
+int surface_light_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+			 struct error *e)
 {
+	struct surface_light *l = em->data;
 	l->surface = *build->surface;
 	int rc = emitter_texture(&l->radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (rc)
@@ -58,7 +59,6 @@ int surface_light_create(struct emitter *em, struct surface_light *l, const stru
 		return error_set(e, ENOMEM, "out of memory");
 	if (!(l->area > 0))
 		return node_error(n, e, EINVAL, "an area emitter needs a shape of area above 0");
-	em->data = l;
 	em->textured = !texture_is_constant(&l->radiance);
 	em->shape = texture_shape(&l->radiance);
 	em->brightest = texture_max(&l->radiance);

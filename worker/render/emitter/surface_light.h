@@ -15,10 +15,10 @@ struct surface_light {
 	double *cdf; /* of triangles; cdf[triangle_count] = 1; NULL: a sphere */
 };
 
-/* Reads `radiance` and sets everything of `em` except its power: data, and brightest to the largest radiance. `l` is
- * from the arena. -EINVAL with a sentence if the surface, which must be there, has no area above 0. */
-int surface_light_create(struct emitter *em, struct surface_light *l, const struct scene_node *n,
-			 const struct emitter_build *build, struct error *e);
+/* Reads `radiance` and sets everything of `em` except its power: data, and brightest to the largest radiance. -EINVAL
+ * with a sentence if the surface, which must be there, has no area above 0. */
+int surface_light_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+			 struct error *e);
 
 /* Operations of struct emitter_ops. */
 bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf);

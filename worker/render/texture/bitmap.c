@@ -98,10 +98,7 @@ static int read_coordinates(struct bitmap *b, const struct scene_node *n, const 
 static int bitmap_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			 const struct texture_build *build, struct error *e)
 {
-	struct bitmap *b = arena_alloc(build->arena, 1, sizeof *b);
-	if (!b)
-		return node_error(n, e, ENOMEM, "out of memory");
-	t->data = b;
+	struct bitmap *b = t->data;
 	if (role == COLOR_UNBOUNDED)
 		return node_error(n, e, ENOTSUP, "a bitmap cannot be used for this quantity");
 	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
@@ -201,6 +198,7 @@ static const struct param bitmap_params[] = {
 const struct texture_ops texture_ops_bitmap = {
 	.type = "bitmap",
 	.params = bitmap_params,
+	.data_size = sizeof(struct bitmap),
 	.create = bitmap_create,
 	.eval = bitmap_eval,
 	.height = bitmap_height,

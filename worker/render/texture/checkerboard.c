@@ -12,11 +12,8 @@ static unsigned square_at(const struct pattern *p, double u, double v)
 static int checkerboard_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			       const struct texture_build *build, struct error *e)
 {
-	int code;
-	struct pattern *p = pattern_create(t, n, (const double[2]){0.4, 0.2}, role, build, &code, e);
-	if (p)
-		p->which = square_at;
-	return code;
+	((struct pattern *)t->data)->which = square_at;
+	return pattern_create(t, n, (const double[2]){0.4, 0.2}, role, build, e);
 }
 
 static const struct param checkerboard_params[] = {PATTERN_PARAMS, {.name = NULL}};

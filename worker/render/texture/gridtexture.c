@@ -17,13 +17,10 @@ static unsigned line_at(const struct pattern *p, double u, double v)
 static int gridtexture_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			      const struct texture_build *build, struct error *e)
 {
-	int code;
-	struct pattern *p = pattern_create(t, n, (const double[2]){0.2, 0.4}, role, build, &code, e);
-	if (!p)
-		return code;
+	struct pattern *p = t->data;
 	p->which = line_at;
 	p->line_width = node_float(n, "line_width", 0.01);
-	return 0;
+	return pattern_create(t, n, (const double[2]){0.2, 0.4}, role, build, e);
 }
 
 static const struct param gridtexture_params[] = {

@@ -55,8 +55,8 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 		return -EINVAL;
 	bool decode = a->encoded && strcmp(n->type, "vertexcolors") == 0;
 	const struct attribute_values *v = attribute_keep(table, a, decode, build->arena);
-	struct mesh_attribute *m = arena_alloc(build->arena, 1, sizeof *m);
-	if (!v || !m)
+	struct mesh_attribute *m = t->data;
+	if (!v)
 		return node_error(n, e, ENOMEM, "out of memory");
 	*m = (struct mesh_attribute){.value = v->value,
 				     .index = a->per_face ? NULL : table->index,
@@ -64,7 +64,6 @@ static int make_attribute(struct texture *t, const struct scene_node *n, const c
 				     .scale = node_float(n, "scale", 1),
 				     .role = role};
 	find_bounds(m, v);
-	t->data = m;
 	return 0;
 }
 
@@ -127,6 +126,7 @@ static const struct param mesh_attribute_params[] = {
 const struct texture_ops texture_ops_mesh_attribute = {
 	.type = "mesh_attribute",
 	.params = mesh_attribute_params,
+	.data_size = sizeof(struct mesh_attribute),
 	.create = attribute_create,
 	.eval = mesh_attribute_eval,
 	.max = mesh_attribute_max,
@@ -138,6 +138,7 @@ static const struct param no_params[] = {{.name = NULL}};
 const struct texture_ops texture_ops_vertexcolors = {
 	.type = "vertexcolors",
 	.params = no_params,
+	.data_size = sizeof(struct mesh_attribute),
 	.create = vertexcolors_create,
 	.eval = mesh_attribute_eval,
 	.max = mesh_attribute_max,

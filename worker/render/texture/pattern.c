@@ -1,19 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/texture/pattern.h"
 
-struct pattern *pattern_create(struct texture *t, const struct scene_node *n, const double defaults[2],
-			       enum color_role role, const struct texture_build *build, int *code, struct error *e)
+int pattern_create(struct texture *t, const struct scene_node *n, const double defaults[2], enum color_role role,
+		   const struct texture_build *build, struct error *e)
 {
-	struct pattern *p = arena_alloc(build->arena, 1, sizeof *p);
-	*code = p ? 0 : node_error(n, e, ENOMEM, "out of memory");
-	if (!p)
-		return NULL;
-	t->data = p;
+	struct pattern *p = t->data;
 	p->map = uv_map_read(n);
-	*code = texture_from_node(&p->color[0], n, "color0", defaults[0], role, build, e);
-	if (!*code)
-		*code = texture_from_node(&p->color[1], n, "color1", defaults[1], role, build, e);
-	return *code ? NULL : p;
+	int code = texture_from_node(&p->color[0], n, "color0", defaults[0], role, build, e);
+	return code ? code : texture_from_node(&p->color[1], n, "color1", defaults[1], role, build, e);
 }
 
 static const struct texture *texture_at(const struct pattern *p, double u, double v)

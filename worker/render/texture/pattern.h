@@ -13,10 +13,9 @@ struct pattern {
 	double line_width;
 };
 
-/* Reads color0, color1 (with these defaults if they are absent) and the map; the caller sets the rest. NULL after an
- * error, with *code. */
-struct pattern *pattern_create(struct texture *t, const struct scene_node *n, const double defaults[2],
-			       enum color_role role, const struct texture_build *build, int *code, struct error *e);
+/* Reads color0, color1 (with these defaults if they are absent) and the map; the caller sets the rest. */
+int pattern_create(struct texture *t, const struct scene_node *n, const double defaults[2], enum color_role role,
+		   const struct texture_build *build, struct error *e);
 spectrum pattern_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w);
 double pattern_height(const struct texture *t, double u, double v);
 void pattern_jet(const struct texture *t, double u, double v, struct texture_jet *j);
@@ -32,6 +31,7 @@ enum color_shape pattern_shape(const struct texture *t);
 	const struct texture_ops texture_ops_##NAME = { \
 		.type = #NAME,                          \
 		.params = NAME##_params,                \
+		.data_size = sizeof(struct pattern),    \
 		.create = NAME##_create,                \
 		.eval = pattern_eval,                   \
 		.height = pattern_height,               \

@@ -38,10 +38,7 @@ static int read_by(struct scale *s, const struct scene_node *n, const struct tex
 static int scale_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			const struct texture_build *build, struct error *e)
 {
-	struct scale *s = arena_alloc(build->arena, 1, sizeof *s);
-	if (!s)
-		return node_error(n, e, ENOMEM, "out of memory");
-	t->data = s;
+	struct scale *s = t->data;
 	s->role = role;
 	const struct property *scale = node_find(n, "scale");
 	int code = scale && scale->value.type == VALUE_RGB ? read_tint(s, n, scale, e) : 0;
@@ -126,6 +123,7 @@ const struct texture_ops texture_ops_scale = {
 	.type = "scale",
 	.params = scale_params,
 	.nested_classes = 1u << PLUGIN_TEXTURE,
+	.data_size = sizeof(struct scale),
 	.create = scale_create,
 	.eval = scale_eval,
 	.height = scale_height,

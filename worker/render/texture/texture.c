@@ -22,7 +22,9 @@ int texture_create(struct texture *t, const struct scene_node *n, enum color_rol
 {
 	for (const struct texture_ops *const *ops = texture_registry; *ops; ops++)
 		if (n->cls == PLUGIN_TEXTURE && strcmp((*ops)->type, n->type) == 0) {
-			*t = (struct texture){.ops = *ops};
+			*t = (struct texture){.ops = *ops, .data = arena_alloc(build->arena, 1, (*ops)->data_size)};
+			if (!t->data)
+				return node_error(n, e, ENOMEM, "out of memory");
 			return (*ops)->create(t, n, role, build, e);
 		}
 	return node_error(n, e, ENOTSUP, "\"%s\" is not a texture that is supported", n->type);

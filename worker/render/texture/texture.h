@@ -47,6 +47,7 @@ struct texture_ops {
 	const char *type;
 	const struct param *params;
 	unsigned nested_classes;
+	size_t data_size; /* of t->data, which is zeroed memory before `create` */
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
 		      const struct texture_build *build, struct error *e);
 	spectrum (*eval)(const struct texture *t, const struct texture_point *at, const struct wavelengths *w);
