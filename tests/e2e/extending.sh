@@ -66,8 +66,7 @@ static int half_create(struct bsdf *b, const struct scene_node *n, const struct 
 static const struct param half_params[] = {{.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_half = {
-	.type = "half",
-	.params = half_params,
+	.decl = {PLUGIN_BSDF, "half", half_params, 0, PARAM_UNDERSTOOD},
 	.create = half_create,
 	.eval = half_eval,
 	.pdf_solid = half_pdf,
@@ -97,7 +96,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-const struct shape_ops shape_ops_triangle = {.type = "triangle", .params = params, .build = build};
+SHAPE_OPS(triangle);
 TEXT
 echo 'SHAPE(triangle)' | added worker/render/shape/shape_list.h
 

@@ -67,10 +67,7 @@ const struct plugin_decl *scene_tables(void)
 	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
 		all[n++] = own[i];
 	for (size_t i = 0; shape_registry[i]; i++)
-		all[n++] = (struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
-						shape_registry[i]->nested_classes ? shape_registry[i]->nested_classes
-										  : shape_nested_classes,
-						PARAM_UNDERSTOOD};
+		all[n++] = shape_registry[i]->decl;
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		all[n++] = *d;
 	for (const struct plugin_decl *d = medium_decls; d->type; d++)
@@ -78,8 +75,7 @@ const struct plugin_decl *scene_tables(void)
 	for (const struct plugin_decl *d = volume_decls; d->type; d++)
 		all[n++] = *d;
 	for (size_t i = 0; phase_registry[i]; i++)
-		all[n++] = (struct plugin_decl){PLUGIN_PHASE, phase_registry[i]->type, phase_registry[i]->params, 0,
-						PARAM_UNDERSTOOD};
+		all[n++] = phase_registry[i]->decl;
 	assert(n < sizeof all / sizeof *all);
 	all[n] = (struct plugin_decl){0};
 	return all;

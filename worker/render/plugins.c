@@ -26,28 +26,21 @@ static void add_plugin(struct plugin_decl d)
 static void gather(void)
 {
 	for (size_t i = 0; shape_registry[i]; i++)
-		add_plugin((struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
-						shape_registry[i]->nested_classes ? shape_registry[i]->nested_classes
-										  : shape_nested_classes,
-						PARAM_UNDERSTOOD});
+		add_plugin(shape_registry[i]->decl);
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		add_plugin(*d);
 	for (size_t i = 0; bsdf_registry[i]; i++)
-		add_plugin((struct plugin_decl){PLUGIN_BSDF, bsdf_registry[i]->type, bsdf_registry[i]->params,
-						bsdf_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+		add_plugin(bsdf_registry[i]->decl);
 	for (size_t i = 0; texture_registry[i]; i++)
-		add_plugin((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params,
-						texture_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+		add_plugin(texture_registry[i]->decl);
 	for (const struct plugin_decl *d = medium_decls; d->type; d++)
 		add_plugin(*d);
 	for (const struct plugin_decl *d = volume_decls; d->type; d++)
 		add_plugin(*d);
 	for (size_t i = 0; phase_registry[i]; i++)
-		add_plugin((struct plugin_decl){PLUGIN_PHASE, phase_registry[i]->type, phase_registry[i]->params, 0,
-						PARAM_UNDERSTOOD});
+		add_plugin(phase_registry[i]->decl);
 	for (size_t i = 0; emitter_registry[i]; i++)
-		add_plugin((struct plugin_decl){PLUGIN_EMITTER, emitter_registry[i]->type, emitter_registry[i]->params,
-						emitter_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+		add_plugin(emitter_registry[i]->decl);
 }
 
 const struct plugin_decl *render_plugins(void)

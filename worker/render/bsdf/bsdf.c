@@ -32,7 +32,7 @@ int bsdf_create_as(struct bsdf *b, const struct bsdf_ops *ops, const struct scen
 int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
 	for (const struct bsdf_ops *const *ops = bsdf_registry; *ops; ops++)
-		if (strcmp((*ops)->type, n->type) == 0)
+		if (strcmp((*ops)->decl.type, n->type) == 0)
 			return bsdf_create_as(b, *ops, n, build, e);
 	return node_error(n, e, ENOTSUP, "\"%s\" is not a supported BSDF", n->type);
 }
@@ -102,6 +102,6 @@ static bool black_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 void bsdf_black(struct bsdf *b)
 {
 	static const struct bsdf_ops ops = {
-		.type = "black", .eval = bsdf_no_eval, .pdf_solid = bsdf_no_pdf, .sample = black_sample};
+		.decl.type = "black", .eval = bsdf_no_eval, .pdf_solid = bsdf_no_pdf, .sample = black_sample};
 	*b = (struct bsdf){.ops = &ops, .alpha = INFINITY, .eta = 1, .black = true, .shape = COLOR_SHAPE_CONSTANT};
 }

@@ -65,10 +65,8 @@ static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b
 }
 
 struct bsdf_ops {
-	const char *type;
-	const struct param *params;
-	unsigned nested_classes; /* of struct plugin_decl */
-	size_t data_size;	 /* of b->data, which is zeroed memory before `create`; 0: it has none */
+	struct plugin_decl decl;
+	size_t data_size; /* of b->data, which is zeroed memory before `create`; 0: it has none */
 	int (*create)(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 	spectrum (*eval)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 	double (*pdf_solid)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);

@@ -57,7 +57,7 @@ static bool shadowed_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 }
 
 static const struct bsdf_ops shadowed_ops = {
-	.type = "bump_shadow",
+	.decl.type = "bump_shadow",
 	.eval = shadowed_eval,
 	.pdf_solid = shadowed_pdf,
 	.eval_halfvec = shadowed_eval_halfvec,

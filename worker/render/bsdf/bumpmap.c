@@ -151,14 +151,11 @@ static const struct param normalmap_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_bumpmap = {
-	.type = "bumpmap",
-	.params = bumpmap_params,
-	.nested_classes = 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE,
+	.decl = {PLUGIN_BSDF, "bumpmap", bumpmap_params, 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.create = bumpmap_create,
 };
 const struct bsdf_ops bsdf_ops_normalmap = {
-	.type = "normalmap",
-	.params = normalmap_params,
-	.nested_classes = 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE,
+	.decl = {PLUGIN_BSDF, "normalmap", normalmap_params, 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE,
+		 PARAM_UNDERSTOOD},
 	.create = normalmap_create,
 };

@@ -303,26 +303,15 @@ static int roughcoating_create(struct bsdf *b, const struct scene_node *n, const
 static const struct param coating_params[] = {COAT_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
 static const struct param roughcoating_params[] = {COAT_PARAMS, ROUGH_BOUNDARY_PARAMS, {.name = NULL}};
 
-const struct bsdf_ops bsdf_ops_coating = {
-	.type = "coating",
-	.params = coating_params,
-	.nested_classes = 1u << PLUGIN_BSDF,
-	.data_size = sizeof(struct coat),
-	.create = coating_create,
-	.eval = coat_eval,
-	.pdf_solid = coat_pdf,
-	.eval_delta = coat_eval_delta,
-	.sample = coat_sample,
-};
-
-const struct bsdf_ops bsdf_ops_roughcoating = {
-	.type = "roughcoating",
-	.params = roughcoating_params,
-	.nested_classes = 1u << PLUGIN_BSDF,
-	.data_size = sizeof(struct coat),
-	.create = roughcoating_create,
-	.eval = coat_eval,
-	.pdf_solid = coat_pdf,
-	.eval_delta = coat_eval_delta,
-	.sample = coat_sample,
-};
+#define COAT_OPS(NAME)                                                                            \
+	const struct bsdf_ops bsdf_ops_##NAME = {                                                 \
+		.decl = {PLUGIN_BSDF, #NAME, NAME##_params, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct coat),                                                 \
+		.create = NAME##_create,                                                          \
+		.eval = coat_eval,                                                                \
+		.pdf_solid = coat_pdf,                                                            \
+		.eval_delta = coat_eval_delta,                                                    \
+		.sample = coat_sample,                                                            \
+	}
+COAT_OPS(coating);
+COAT_OPS(roughcoating);

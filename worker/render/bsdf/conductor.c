@@ -34,8 +34,7 @@ static int conductor_create(struct bsdf *b, const struct scene_node *n, const st
 static const struct param conductor_params[] = {METAL_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_conductor = {
-	.type = "conductor",
-	.params = conductor_params,
+	.decl = {PLUGIN_BSDF, "conductor", conductor_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct metal),
 	.create = conductor_create,
 	.eval = bsdf_no_eval,

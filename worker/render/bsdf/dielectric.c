@@ -68,8 +68,7 @@ static int dielectric_create(struct bsdf *b, const struct scene_node *n, const s
 static const struct param dielectric_params[] = {GLASS_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_dielectric = {
-	.type = "dielectric",
-	.params = dielectric_params,
+	.decl = {PLUGIN_BSDF, "dielectric", dielectric_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct glass),
 	.create = dielectric_create,
 	.eval = bsdf_no_eval,

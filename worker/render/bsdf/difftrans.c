@@ -47,8 +47,7 @@ static const struct param difftrans_params[] = {{.name = "transmittance", .types
 						{.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_difftrans = {
-	.type = "difftrans",
-	.params = difftrans_params,
+	.decl = {PLUGIN_BSDF, "difftrans", difftrans_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct difftrans),
 	.create = difftrans_create,
 	.eval = difftrans_eval,

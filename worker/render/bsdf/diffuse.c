@@ -40,8 +40,7 @@ static const struct param diffuse_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_diffuse = {
-	.type = "diffuse",
-	.params = diffuse_params,
+	.decl = {PLUGIN_BSDF, "diffuse", diffuse_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct texture),
 	.create = diffuse_create,
 	.eval = diffuse_eval,

@@ -49,7 +49,7 @@ static bool lobe_filter_sample(const struct bsdf *b, const struct bsdf_point *p,
 int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struct error *e)
 {
 	static const struct bsdf_ops ops = {
-		.type = "without",
+		.decl.type = "without",
 		.eval = lobe_filter_eval,
 		.pdf_solid = lobe_filter_pdf,
 		.eval_halfvec = lobe_filter_eval_halfvec,

@@ -91,8 +91,7 @@ static const struct param phong_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_phong = {
-	.type = "phong",
-	.params = phong_params,
+	.decl = {PLUGIN_BSDF, "phong", phong_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct phong),
 	.create = phong_create,
 	.eval = phong_eval,

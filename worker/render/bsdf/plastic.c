@@ -85,8 +85,7 @@ static int plastic_create(struct bsdf *b, const struct scene_node *n, const stru
 static const struct param plastic_params[] = {COATING_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_plastic = {
-	.type = "plastic",
-	.params = plastic_params,
+	.decl = {PLUGIN_BSDF, "plastic", plastic_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct plastic),
 	.create = plastic_create,
 	.eval = plastic_eval,

@@ -91,8 +91,7 @@ static const struct param pplastic_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_pplastic = {
-	.type = "pplastic",
-	.params = pplastic_params,
+	.decl = {PLUGIN_BSDF, "pplastic", pplastic_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct pplastic),
 	.create = pplastic_create,
 	.eval = pplastic_eval,

@@ -463,8 +463,7 @@ static const struct param principled_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_principled = {
-	.type = "principled",
-	.params = principled_params,
+	.decl = {PLUGIN_BSDF, "principled", principled_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct principled),
 	.create = principled_create,
 	.eval = principled_eval,

@@ -211,8 +211,7 @@ static const struct param thin_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_principledthin = {
-	.type = "principledthin",
-	.params = thin_params,
+	.decl = {PLUGIN_BSDF, "principledthin", thin_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct thin),
 	.create = thin_create,
 	.eval = thin_eval,

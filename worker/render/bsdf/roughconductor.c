@@ -92,8 +92,7 @@ static int roughconductor_create(struct bsdf *b, const struct scene_node *n, con
 static const struct param roughconductor_params[] = {METAL_PARAMS, ROUGH_MAP_PARAMS, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_roughconductor = {
-	.type = "roughconductor",
-	.params = roughconductor_params,
+	.decl = {PLUGIN_BSDF, "roughconductor", roughconductor_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct roughconductor),
 	.create = roughconductor_create,
 	.eval = roughconductor_eval,

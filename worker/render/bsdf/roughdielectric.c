@@ -185,8 +185,7 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 static const struct param roughdielectric_params[] = {GLASS_PARAMS, ROUGH_MAP_PARAMS, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_roughdielectric = {
-	.type = "roughdielectric",
-	.params = roughdielectric_params,
+	.decl = {PLUGIN_BSDF, "roughdielectric", roughdielectric_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct roughdielectric),
 	.create = roughdielectric_create,
 	.eval = roughdielectric_eval,

@@ -89,8 +89,7 @@ static const struct param roughdiffuse_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_roughdiffuse = {
-	.type = "roughdiffuse",
-	.params = roughdiffuse_params,
+	.decl = {PLUGIN_BSDF, "roughdiffuse", roughdiffuse_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct roughdiffuse),
 	.create = roughdiffuse_create,
 	.eval = roughdiffuse_eval,

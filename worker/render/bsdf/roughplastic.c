@@ -72,8 +72,7 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 static const struct param roughplastic_params[] = {COATING_PARAMS, ROUGH_BOUNDARY_PARAMS, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_roughplastic = {
-	.type = "roughplastic",
-	.params = roughplastic_params,
+	.decl = {PLUGIN_BSDF, "roughplastic", roughplastic_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct roughplastic),
 	.create = roughplastic_create,
 	.eval = roughplastic_eval,

@@ -27,16 +27,15 @@ bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, 
 		     struct bsdf_sample *out);
 
 /* The operations of a filter NAME, which defines NAME_params and NAME_create. */
-#define STRAIGHT_OPS(NAME)                          \
-	const struct bsdf_ops bsdf_ops_##NAME = {   \
-		.type = #NAME,                      \
-		.params = NAME##_params,            \
-		.data_size = sizeof(struct filter), \
-		.create = NAME##_create,            \
-		.eval = bsdf_no_eval,               \
-		.pdf_solid = bsdf_no_pdf,           \
-		.eval_delta = straight_eval_delta,  \
-		.sample = straight_sample,          \
+#define STRAIGHT_OPS(NAME)                                                        \
+	const struct bsdf_ops bsdf_ops_##NAME = {                                 \
+		.decl = {PLUGIN_BSDF, #NAME, NAME##_params, 0, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct filter),                               \
+		.create = NAME##_create,                                          \
+		.eval = bsdf_no_eval,                                             \
+		.pdf_solid = bsdf_no_pdf,                                         \
+		.eval_delta = straight_eval_delta,                                \
+		.sample = straight_sample,                                        \
 	}
 
 #endif

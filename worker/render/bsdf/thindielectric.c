@@ -79,8 +79,7 @@ static const struct param thin_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_thindielectric = {
-	.type = "thindielectric",
-	.params = thin_params,
+	.decl = {PLUGIN_BSDF, "thindielectric", thin_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct thin),
 	.create = thin_create,
 	.eval = bsdf_no_eval,

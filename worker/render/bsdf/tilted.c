@@ -86,7 +86,7 @@ static bool tilted_sample(const struct bsdf *b, const struct bsdf_point *p, vec3
 }
 
 static const struct bsdf_ops tilted_ops = {
-	.type = "tilted",
+	.decl.type = "tilted",
 	.eval = tilted_eval,
 	.pdf_solid = tilted_pdf,
 	.sample = tilted_sample,

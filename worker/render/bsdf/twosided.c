@@ -145,9 +145,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 static const struct param twosided_params[] = {{.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_twosided = {
-	.type = "twosided",
-	.params = twosided_params,
-	.nested_classes = 1u << PLUGIN_BSDF,
+	.decl = {PLUGIN_BSDF, "twosided", twosided_params, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct twosided),
 	.create = twosided_create,
 	.eval = twosided_eval,

@@ -140,8 +140,7 @@ static const struct param ward_params[] = {
 };
 
 const struct bsdf_ops bsdf_ops_ward = {
-	.type = "ward",
-	.params = ward_params,
+	.decl = {PLUGIN_BSDF, "ward", ward_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct ward),
 	.create = ward_create,
 	.eval = ward_eval,

@@ -138,8 +138,7 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 }
 
 const struct emitter_ops emitter_ops_area = {
-	.type = "area",
-	.params = params,
+	.decl = {PLUGIN_EMITTER, "area", params, 0, PARAM_UNDERSTOOD},
 	.needs_surface = true,
 	.data_size = sizeof(struct area_light),
 	.create = create,

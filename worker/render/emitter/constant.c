@@ -70,8 +70,7 @@ static const struct param constant_params[] = {
 };
 
 const struct emitter_ops emitter_ops_constant = {
-	.type = "constant",
-	.params = constant_params,
+	.decl = {PLUGIN_EMITTER, "constant", constant_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct color),
 	.create = constant_create,
 	.radiance = constant_radiance,

@@ -42,8 +42,7 @@ static const struct param params[] = {
 };
 
 const struct emitter_ops emitter_ops_directional = {
-	.type = "directional",
-	.params = params,
+	.decl = {PLUGIN_EMITTER, "directional", params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct delta_light),
 	.create = create,
 	.radiance = radiance,

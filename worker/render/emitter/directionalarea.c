@@ -240,8 +240,7 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 }
 
 const struct emitter_ops emitter_ops_directionalarea = {
-	.type = "directionalarea",
-	.params = params,
+	.decl = {PLUGIN_EMITTER, "directionalarea", params, 0, PARAM_UNDERSTOOD},
 	.needs_surface = true,
 	.data_size = sizeof(struct beam),
 	.create = create,

@@ -17,7 +17,7 @@ const struct emitter_ops *const emitter_registry[] = {
 static const struct emitter_ops *find_ops(const struct scene_node *n)
 {
 	for (const struct emitter_ops *const *ops = emitter_registry; *ops; ops++)
-		if (strcmp((*ops)->type, n->type) == 0)
+		if (strcmp((*ops)->decl.type, n->type) == 0)
 			return *ops;
 	return NULL;
 }

@@ -48,9 +48,7 @@ struct emitter_build {
 struct emitter;
 
 struct emitter_ops {
-	const char *type;
-	const struct param *params;
-	unsigned nested_classes;
+	struct plugin_decl decl;
 	size_t data_size;   /* of em->data, which is zeroed memory before `create`; 0: it has none yet */
 	bool needs_surface; /* area: belongs to a shape */
 	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,

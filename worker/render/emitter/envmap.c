@@ -290,8 +290,7 @@ static const struct param envmap_params[] = {
 };
 
 const struct emitter_ops emitter_ops_envmap = {
-	.type = "envmap",
-	.params = envmap_params,
+	.decl = {PLUGIN_EMITTER, "envmap", envmap_params, 0, PARAM_UNDERSTOOD},
 	.create = envmap_create,
 	ENVMAP_OPS,
 };

@@ -50,8 +50,7 @@ static const struct param params[] = {
 };
 
 const struct emitter_ops emitter_ops_point = {
-	.type = "point",
-	.params = params,
+	.decl = {PLUGIN_EMITTER, "point", params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct delta_light),
 	.create = create,
 	.radiance = radiance,

@@ -108,8 +108,7 @@ static const struct param params[] = {
 };
 
 const struct emitter_ops emitter_ops_projector = {
-	.type = "projector",
-	.params = params,
+	.decl = {PLUGIN_EMITTER, "projector", params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct projector),
 	.create = create,
 	.radiance = radiance,

@@ -116,8 +116,7 @@ static const struct param params[] = {
 };
 
 const struct emitter_ops emitter_ops_spot = {
-	.type = "spot",
-	.params = params,
+	.decl = {PLUGIN_EMITTER, "spot", params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct spot),
 	.create = create,
 	.radiance = radiance,

@@ -259,6 +259,9 @@ static const struct param params[] = {
 	{.name = NULL},
 };
 
-const struct emitter_ops emitter_ops_sky = {.type = "sky", .params = params, .create = sky_create, ENVMAP_OPS};
-const struct emitter_ops emitter_ops_sun = {.type = "sun", .params = params, .create = sun_create, ENVMAP_OPS};
-const struct emitter_ops emitter_ops_sunsky = {.type = "sunsky", .params = params, .create = sunsky_create, ENVMAP_OPS};
+const struct emitter_ops emitter_ops_sky = {
+	.decl = {PLUGIN_EMITTER, "sky", params, 0, PARAM_UNDERSTOOD}, .create = sky_create, ENVMAP_OPS};
+const struct emitter_ops emitter_ops_sun = {
+	.decl = {PLUGIN_EMITTER, "sun", params, 0, PARAM_UNDERSTOOD}, .create = sun_create, ENVMAP_OPS};
+const struct emitter_ops emitter_ops_sunsky = {
+	.decl = {PLUGIN_EMITTER, "sunsky", params, 0, PARAM_UNDERSTOOD}, .create = sunsky_create, ENVMAP_OPS};

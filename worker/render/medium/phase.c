@@ -21,7 +21,7 @@ void phase_create(struct phase *p, const struct scene_node *n)
 {
 	*p = (struct phase){.ops = phase_registry[0]};
 	for (size_t i = 0; n && phase_registry[i]; i++)
-		if (strcmp(phase_registry[i]->type, n->type) == 0)
+		if (strcmp(phase_registry[i]->decl.type, n->type) == 0)
 			p->ops = phase_registry[i];
 	if (p->ops->create)
 		p->ops->create(p, n);

@@ -14,8 +14,7 @@
 struct phase;
 
 struct phase_ops {
-	const char *type;
-	const struct param *params;
+	struct plugin_decl decl;
 	void (*create)(struct phase *p, const struct scene_node *n); /* NULL: nothing to read */
 	/* Per solid angle; its integral over the sphere is 1. cosine: of that angle, 1 where light goes straight on. */
 	double (*eval)(const struct phase *p, double cosine);

@@ -32,8 +32,7 @@ static double sample(const struct phase *p, double u)
 }
 
 const struct phase_ops phase_ops_hg = {
-	.type = "hg",
-	.params = params,
+	.decl = {PLUGIN_PHASE, "hg", params, 0, PARAM_UNDERSTOOD},
 	.create = create,
 	.eval = eval,
 	.sample = sample,

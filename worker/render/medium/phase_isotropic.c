@@ -20,8 +20,7 @@ static double sample(const struct phase *p, double u)
 }
 
 const struct phase_ops phase_ops_isotropic = {
-	.type = "isotropic",
-	.params = params,
+	.decl = {PLUGIN_PHASE, "isotropic", params, 0, PARAM_UNDERSTOOD},
 	.eval = eval,
 	.sample = sample,
 };

@@ -22,8 +22,7 @@ static double sample(const struct phase *p, double u)
 }
 
 const struct phase_ops phase_ops_rayleigh = {
-	.type = "rayleigh",
-	.params = params,
+	.decl = {PLUGIN_PHASE, "rayleigh", params, 0, PARAM_UNDERSTOOD},
 	.eval = eval,
 	.sample = sample,
 };

@@ -120,4 +120,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return curve_shape_finish(n, &points, &rings, rc, arena, out, e);
 }
 
-const struct shape_ops shape_ops_bsplinecurve = {.type = "bsplinecurve", .params = params, .build = build};
+SHAPE_OPS(bsplinecurve);

@@ -33,4 +33,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-const struct shape_ops shape_ops_cube = {.type = "cube", .params = params, .build = build};
+SHAPE_OPS(cube);

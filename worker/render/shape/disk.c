@@ -27,4 +27,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-const struct shape_ops shape_ops_disk = {.type = "disk", .params = params, .build = build};
+SHAPE_OPS(disk);

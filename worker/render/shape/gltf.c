@@ -205,4 +205,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return rc;
 }
 
-const struct shape_ops shape_ops_gltf = {.type = "gltf", .params = params, .build = build};
+SHAPE_OPS(gltf);

@@ -11,9 +11,11 @@
 static const struct param none[] = {{.name = NULL}};
 static const struct param instance_params[] = {{.name = "to_world", .types = VALUE_TRANSFORM}, {.name = NULL}};
 
-const struct shape_ops shape_ops_merge = {"merge", none, NULL, 1u << PLUGIN_SHAPE};
-const struct shape_ops shape_ops_shapegroup = {"shapegroup", none, NULL, 1u << PLUGIN_SHAPE};
-const struct shape_ops shape_ops_instance = {"instance", instance_params, NULL, 1u << PLUGIN_SHAPE};
+const struct shape_ops shape_ops_merge = {{PLUGIN_SHAPE, "merge", none, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD}, NULL};
+const struct shape_ops shape_ops_shapegroup = {{PLUGIN_SHAPE, "shapegroup", none, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD},
+					       NULL};
+const struct shape_ops shape_ops_instance = {
+	{PLUGIN_SHAPE, "instance", instance_params, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD}, NULL};
 
 struct listing {
 	struct arena *arena;

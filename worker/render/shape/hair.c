@@ -26,4 +26,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return rc ? rc : curve_shape_chains(n, &points, arena, out, e);
 }
 
-const struct shape_ops shape_ops_hair = {.type = "hair", .params = params, .build = build};
+SHAPE_OPS(hair);

@@ -146,8 +146,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 }
 
 const struct shape_ops shape_ops_heightfield = {
-	.type = "heightfield",
-	.params = params,
+	.decl = {PLUGIN_SHAPE, "heightfield", params, 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER | 1u << PLUGIN_TEXTURE,
+		 PARAM_UNDERSTOOD},
 	.build = build,
-	.nested_classes = 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER | 1u << PLUGIN_TEXTURE,
 };

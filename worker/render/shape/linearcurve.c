@@ -17,4 +17,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return rc ? rc : curve_shape_chains(n, &points, arena, out, e);
 }
 
-const struct shape_ops shape_ops_linearcurve = {.type = "linearcurve", .params = params, .build = build};
+SHAPE_OPS(linearcurve);

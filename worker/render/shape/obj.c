@@ -179,4 +179,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return r;
 }
 
-const struct shape_ops shape_ops_obj = {.type = "obj", .params = params, .build = build};
+SHAPE_OPS(obj);

@@ -20,4 +20,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-const struct shape_ops shape_ops_rectangle = {.type = "rectangle", .params = params, .build = build};
+SHAPE_OPS(rectangle);

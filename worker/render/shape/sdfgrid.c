@@ -344,8 +344,6 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 }
 
 const struct shape_ops shape_ops_sdfgrid = {
-	.type = "sdfgrid",
-	.params = params,
+	.decl = {PLUGIN_SHAPE, "sdfgrid", params, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD},
 	.build = build,
-	.nested_classes = 1u << PLUGIN_BSDF,
 };

@@ -387,4 +387,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return r;
 }
 
-const struct shape_ops shape_ops_serialized = {.type = "serialized", .params = params, .build = build};
+SHAPE_OPS(serialized);

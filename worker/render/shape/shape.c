@@ -16,15 +16,13 @@ const struct shape_ops *const shape_registry[] = {
 	NULL,
 };
 
-const unsigned shape_nested_classes = 1 << PLUGIN_BSDF | 1 << PLUGIN_EMITTER;
-
 int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		struct shape_geometry *out, uint64_t *dropped, struct error *e)
 {
 	*out = (struct shape_geometry){.kind = SHAPE_MESH};
 	*dropped = 0;
 	const struct shape_ops *const *ops = shape_registry;
-	while (*ops && strcmp((*ops)->type, n->type) != 0)
+	while (*ops && strcmp((*ops)->decl.type, n->type) != 0)
 		ops++;
 	if (!*ops || !(*ops)->build)
 		return node_error(n, e, ENOTSUP, "\"%s\" is not a shape that is supported", n->type);

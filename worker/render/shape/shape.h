@@ -33,19 +33,19 @@ struct shape_geometry {
 };
 
 struct shape_ops {
-	const char *type;
-	const struct param *params;
+	struct plugin_decl decl;
 	/* NULL: it holds other shapes (group.h), and is not built itself. */
 	/* Fills in *out: the sphere in world space, or the mesh, in object space unless it is `placed` (shape_build
 	 * places and checks it). */
 	int (*build)(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		     struct shape_geometry *out, struct error *e);
-	unsigned nested_classes; /* classes of unnamed objects that it may hold; 0: shape_nested_classes */
 };
 
 extern const struct shape_ops *const shape_registry[]; /* ends with NULL */
-/* Classes of unnamed objects that a shape may hold: struct plugin_decl. */
-extern const unsigned shape_nested_classes;
+/* The operations of a shape NAME that may hold a BSDF and an emitter, in a source with `params` and `build`. */
+#define SHAPE_OPS(NAME)                             \
+	const struct shape_ops shape_ops_##NAME = { \
+		{PLUGIN_SHAPE, #NAME, params, 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER, PARAM_UNDERSTOOD}, build}
 
 /* Builds the geometry of a PLUGIN_SHAPE node. Checked: finite, indices in range. Triangles without area are dropped
  * and counted in *dropped; a mesh may have none left. One thread; allocates in the arena. */

@@ -77,4 +77,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return make_sphere(n, &m, scale, x, z, &out->sphere, e);
 }
 
-const struct shape_ops shape_ops_sphere = {.type = "sphere", .params = params, .build = build};
+SHAPE_OPS(sphere);

@@ -196,8 +196,7 @@ static const struct param bitmap_params[] = {
 };
 
 const struct texture_ops texture_ops_bitmap = {
-	.type = "bitmap",
-	.params = bitmap_params,
+	.decl = {PLUGIN_TEXTURE, "bitmap", bitmap_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct bitmap),
 	.create = bitmap_create,
 	.eval = bitmap_eval,

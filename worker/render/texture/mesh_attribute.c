@@ -124,8 +124,7 @@ static const struct param mesh_attribute_params[] = {
 
 /* They are only made in roles that need neither a height nor a derivative. */
 const struct texture_ops texture_ops_mesh_attribute = {
-	.type = "mesh_attribute",
-	.params = mesh_attribute_params,
+	.decl = {PLUGIN_TEXTURE, "mesh_attribute", mesh_attribute_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct mesh_attribute),
 	.create = attribute_create,
 	.eval = mesh_attribute_eval,
@@ -136,8 +135,7 @@ const struct texture_ops texture_ops_mesh_attribute = {
 static const struct param no_params[] = {{.name = NULL}};
 
 const struct texture_ops texture_ops_vertexcolors = {
-	.type = "vertexcolors",
-	.params = no_params,
+	.decl = {PLUGIN_TEXTURE, "vertexcolors", no_params, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct mesh_attribute),
 	.create = vertexcolors_create,
 	.eval = mesh_attribute_eval,

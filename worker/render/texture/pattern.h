@@ -27,17 +27,16 @@ enum color_shape pattern_shape(const struct texture *t);
 		{.name = "color1", .types = VALUE_TEXTURE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX}, \
 		UV_PARAMS
 /* The operations of a pattern NAME, which defines NAME_params and NAME_create. */
-#define PATTERN_OPS(NAME)                               \
-	const struct texture_ops texture_ops_##NAME = { \
-		.type = #NAME,                          \
-		.params = NAME##_params,                \
-		.data_size = sizeof(struct pattern),    \
-		.create = NAME##_create,                \
-		.eval = pattern_eval,                   \
-		.height = pattern_height,               \
-		.jet = pattern_jet,                     \
-		.max = pattern_max,                     \
-		.shape = pattern_shape,                 \
+#define PATTERN_OPS(NAME)                                                            \
+	const struct texture_ops texture_ops_##NAME = {                              \
+		.decl = {PLUGIN_TEXTURE, #NAME, NAME##_params, 0, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct pattern),                                 \
+		.create = NAME##_create,                                             \
+		.eval = pattern_eval,                                                \
+		.height = pattern_height,                                            \
+		.jet = pattern_jet,                                                  \
+		.max = pattern_max,                                                  \
+		.shape = pattern_shape,                                              \
 	}
 
 #endif

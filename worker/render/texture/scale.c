@@ -120,9 +120,7 @@ static const struct param scale_params[] = {
 };
 
 const struct texture_ops texture_ops_scale = {
-	.type = "scale",
-	.params = scale_params,
-	.nested_classes = 1u << PLUGIN_TEXTURE,
+	.decl = {PLUGIN_TEXTURE, "scale", scale_params, 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct scale),
 	.create = scale_create,
 	.eval = scale_eval,

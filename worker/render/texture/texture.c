@@ -21,7 +21,7 @@ int texture_create(struct texture *t, const struct scene_node *n, enum color_rol
 		   const struct texture_build *build, struct error *e)
 {
 	for (const struct texture_ops *const *ops = texture_registry; *ops; ops++)
-		if (n->cls == PLUGIN_TEXTURE && strcmp((*ops)->type, n->type) == 0) {
+		if (n->cls == PLUGIN_TEXTURE && strcmp((*ops)->decl.type, n->type) == 0) {
 			*t = (struct texture){.ops = *ops, .data = arena_alloc(build->arena, 1, (*ops)->data_size)};
 			if (!t->data)
 				return node_error(n, e, ENOMEM, "out of memory");

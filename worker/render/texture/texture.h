@@ -44,9 +44,7 @@ struct texture_jet {
 };
 
 struct texture_ops {
-	const char *type;
-	const struct param *params;
-	unsigned nested_classes;
+	struct plugin_decl decl;
 	size_t data_size; /* of t->data, which is zeroed memory before `create` */
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
 		      const struct texture_build *build, struct error *e);

@@ -89,7 +89,7 @@ void build_media_note(struct builder *b)
 				w->notes.endless, sizeof w->notes.endless,
 				"the medium around the camera ends nowhere, so that no light of the `%s` emitter, or of "
 				"any other at infinity, gets through; a shape that has it inside would end it",
-				w->emitters[i].ops->type);
+				w->emitters[i].ops->decl.type);
 			return;
 		}
 }
@@ -133,7 +133,7 @@ int build_scattering(struct builder *b)
 		return 0;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		w->parts[i].passable =
-			strcmp(w->bsdfs[w->parts[i].bsdf].ops->type, "null") == 0 && w->parts[i].emitter < 0;
+			strcmp(w->bsdfs[w->parts[i].bsdf].ops->decl.type, "null") == 0 && w->parts[i].emitter < 0;
 		w->has_passable = w->has_passable || w->parts[i].passable;
 	}
 	w->emitter_medium = arena_alloc(&w->arena, w->emitter_count, sizeof *w->emitter_medium);

@@ -90,7 +90,7 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 			if (specular) {
 				check_lobe(case_text(k), &b, &p, wo, &s);
 				lobes[(s.mode & BSDF_TRANSMIT) != 0]++;
-				mirrored += wo.z < 0 && b.ops->type[0] == 't';
+				mirrored += wo.z < 0 && b.ops->decl.type[0] == 't';
 			}
 			/* Where specular and other lobes lie on one side, only frequencies can be compared. */
 			double chance = chances(&b, &p, wo);

@@ -80,7 +80,7 @@ static void test_the_jacobian_is_the_derivative(void **state)
 {
 	(void)state;
 	static const double indices[] = {1.5, 1 / 1.5, 2.4, 1.01, 1 + 1e-3, 1 - 1e-3, 1 + 1e-6, 1 - 1e-6};
-	static const struct bsdf_ops ops = {.type = "one", .eval = eval_one};
+	static const struct bsdf_ops ops = {.decl.type = "one", .eval = eval_one};
 	struct dice d = dice_of(__func__);
 	double worst = 0;
 	size_t done[2] = {0, 0};
@@ -117,7 +117,7 @@ static void test_the_jacobian_is_the_derivative(void **state)
 static void test_the_jacobian_between_equal_indices(void **state)
 {
 	(void)state;
-	static const struct bsdf_ops ops = {.type = "one", .eval = eval_one};
+	static const struct bsdf_ops ops = {.decl.type = "one", .eval = eval_one};
 	const struct bsdf b = {.ops = &ops, .eta = 1};
 	struct dice d = dice_of(__func__);
 	size_t done = 0;

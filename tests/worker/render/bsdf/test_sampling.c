@@ -226,12 +226,12 @@ static void test_every_bsdf_has_a_case(void **state)
 {
 	(void)state;
 	for (const struct bsdf_ops *const *ops = bsdf_registry; *ops; ops++) {
-		size_t n = strlen((*ops)->type);
+		size_t n = strlen((*ops)->decl.type);
 		bool found = false;
 		for (int k = 0; k < BSDF_CASES; k++)
-			found |= strncmp(bsdf_cases[k], (*ops)->type, n) == 0 && strchr(" ", bsdf_cases[k][n]);
+			found |= strncmp(bsdf_cases[k], (*ops)->decl.type, n) == 0 && strchr(" ", bsdf_cases[k][n]);
 		if (!found)
-			fail_msg("no parameter set for \"%s\"", (*ops)->type);
+			fail_msg("no parameter set for \"%s\"", (*ops)->decl.type);
 	}
 }
 

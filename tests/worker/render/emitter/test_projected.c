@@ -130,7 +130,8 @@ static void test_directions(void **state)
 			all += radiance(w, k, d) * 4 * M_PI / N;
 			mass += em->ops->pdf_direction(em, &x, d) * 4 * M_PI / N;
 		}
-		print_message("%s: power %.4g, over the sphere %.4g, density %.4g\n", em->ops->type, sum, all, mass);
+		print_message("%s: power %.4g, over the sphere %.4g, density %.4g\n", em->ops->decl.type, sum, all,
+			      mass);
 		assert_true(fabs(all / sum - 1) < 0.05 && fabs(mass - 1) < 0.05);
 		assert_true(em->power >=
 			    sum * w->scale * w->scale *

@@ -87,7 +87,7 @@ static void test_phases(void **state)
 	(void)state;
 	for (size_t i = 0; phase_registry[i]; i++)
 		for (int k = 0; k < GS; k++) {
-			bool takes_g = phase_registry[i]->params->name != NULL;
+			bool takes_g = phase_registry[i]->decl.params->name != NULL;
 			struct phase p = {phase_registry[i], takes_g ? gs[k] : 0};
 			check(&p, p.g);
 		}
@@ -99,9 +99,9 @@ static void test_defaults(void **state)
 	(void)state;
 	struct phase p;
 	phase_create(&p, NULL);
-	assert_string_equal(p.ops->type, "isotropic");
+	assert_string_equal(p.ops->decl.type, "isotropic");
 	phase_create(&p, &(struct scene_node){.cls = PLUGIN_PHASE, .type = "hg"});
-	assert_string_equal(p.ops->type, "hg");
+	assert_string_equal(p.ops->decl.type, "hg");
 	assert_true(p.g == 0.8);
 	phase_create(&p, &(struct scene_node){.cls = PLUGIN_PHASE, .type = "rayleigh"});
 	assert_true(fabs(p.ops->eval(&p, 1) / p.ops->eval(&p, 0) - 2) < 1e-15);

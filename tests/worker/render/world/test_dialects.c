@@ -172,7 +172,7 @@ static void test_boundaries_of_media(void **state)
 		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
 		struct world *w = world_of_files(8, 8, files);
 		for (uint32_t k = 0; k < 5; k++)
-			assert_string_equal(w->bsdfs[w->parts[k].bsdf].ops->type, types[i][k]);
+			assert_string_equal(w->bsdfs[w->parts[k].bsdf].ops->decl.type, types[i][k]);
 		world_free(w);
 	}
 }
