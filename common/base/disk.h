@@ -20,87 +20,46 @@
 #include <sys/types.h>
 #include <sys/uio.h>
 
+/* X(result, NAME, parameters, arguments): disk_NAME calls the table's function. */
+#define DISK_CALLS(X)                                                                                         \
+	X(int, open, (const char *path, int flags, mode_t mode), (path, flags, mode))                         \
+	X(int, close, (int fd), (fd))                                                                         \
+	X(ssize_t, read, (int fd, void *bytes, size_t size), (fd, bytes, size))                               \
+	X(ssize_t, pread, (int fd, void *bytes, size_t size, off_t at), (fd, bytes, size, at))                \
+	X(ssize_t, write, (int fd, const void *bytes, size_t size), (fd, bytes, size))                        \
+	X(ssize_t, pwritev, (int fd, const struct iovec *parts, int count, off_t at), (fd, parts, count, at)) \
+	X(int, ftruncate, (int fd, off_t size), (fd, size))                                                   \
+	X(int, fallocate, (int fd, int mode, off_t at, off_t size), (fd, mode, at, size))                     \
+	X(int, posix_fallocate, (int fd, off_t at, off_t size), (fd, at, size)) /* returns the error code */  \
+	X(int, fsync, (int fd), (fd))                                                                         \
+	X(int, fdatasync, (int fd), (fd))                                                                     \
+	X(int, rename, (const char *from, const char *to), (from, to))                                        \
+	X(int, unlink, (const char *path), (path))                                                            \
+	X(int, mkdir, (const char *path, mode_t mode), (path, mode))                                          \
+	X(int, rmdir, (const char *path), (path))                                                             \
+	X(int, stat, (const char *path, struct stat *st), (path, st)) /* of the link itself */                \
+	X(int, fstat, (int fd, struct stat *st), (fd, st))                                                    \
+	X(int, touch, (const char *path), (path))                                                             \
+	X(int, flock, (int fd, int what), (fd, what))                                                         \
+	X(DIR *, opendir, (const char *path), (path))
+
+#define DISK_MEMBER(result, name, parameters, arguments) result(*name) parameters;
 struct disk {
-	int (*open)(const char *path, int flags, mode_t mode);
-	int (*close)(int fd);
-	ssize_t (*read)(int fd, void *bytes, size_t size);
-	ssize_t (*pread)(int fd, void *bytes, size_t size, off_t at);
-	ssize_t (*write)(int fd, const void *bytes, size_t size);
-	ssize_t (*pwritev)(int fd, const struct iovec *parts, int count, off_t at);
-	int (*ftruncate)(int fd, off_t size);
-	int (*fallocate)(int fd, int mode, off_t at, off_t size);
-	int (*posix_fallocate)(int fd, off_t at, off_t size); /* returns the error code */
-	int (*fsync)(int fd);
-	int (*fdatasync)(int fd);
-	int (*rename)(const char *from, const char *to);
-	int (*unlink)(const char *path);
-	int (*mkdir)(const char *path, mode_t mode);
-	int (*rmdir)(const char *path);
-	int (*stat)(const char *path, struct stat *st); /* of the link itself */
-	int (*fstat)(int fd, struct stat *st);
-	int (*touch)(const char *path);
-	int (*flock)(int fd, int what);
-	DIR *(*opendir)(const char *path);
+	DISK_CALLS(DISK_MEMBER)
 };
+#undef DISK_MEMBER
 
 extern const struct disk *disk_calls;
 void disk_use(const struct disk *calls); /* NULL: the system's functions */
 extern const struct disk disk_system;
 
-static inline int disk_open(const char *path, int flags, mode_t mode)
-{
-	return disk_calls->open(path, flags, mode);
-}
-
-static inline int disk_close(int fd)
-{
-	return disk_calls->close(fd);
-}
-
-static inline ssize_t disk_read(int fd, void *bytes, size_t size)
-{
-	return disk_calls->read(fd, bytes, size);
-}
-
-static inline ssize_t disk_pread(int fd, void *bytes, size_t size, off_t at)
-{
-	return disk_calls->pread(fd, bytes, size, at);
-}
-
-static inline ssize_t disk_write(int fd, const void *bytes, size_t size)
-{
-	return disk_calls->write(fd, bytes, size);
-}
-
-static inline ssize_t disk_pwritev(int fd, const struct iovec *parts, int count, off_t at)
-{
-	return disk_calls->pwritev(fd, parts, count, at);
-}
-
-static inline int disk_ftruncate(int fd, off_t size)
-{
-	return disk_calls->ftruncate(fd, size);
-}
-
-static inline int disk_fallocate(int fd, int mode, off_t at, off_t size)
-{
-	return disk_calls->fallocate(fd, mode, at, size);
-}
-
-static inline int disk_posix_fallocate(int fd, off_t at, off_t size)
-{
-	return disk_calls->posix_fallocate(fd, at, size);
-}
-
-static inline int disk_fsync(int fd)
-{
-	return disk_calls->fsync(fd);
-}
-
-static inline int disk_fdatasync(int fd)
-{
-	return disk_calls->fdatasync(fd);
-}
+#define DISK_WRAPPER(result, name, parameters, arguments) \
+	static inline result disk_##name parameters       \
+	{                                                 \
+		return disk_calls->name arguments;        \
+	}
+DISK_CALLS(DISK_WRAPPER)
+#undef DISK_WRAPPER
 
 /* The data need not stay in the page cache: it is read again only after a crash. */
 static inline void disk_forget(int fd)
@@ -113,51 +72,6 @@ static inline void disk_read_through(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_SEQUENTIAL);
 	posix_fadvise(fd, 0, 0, POSIX_FADV_WILLNEED);
-}
-
-static inline int disk_rename(const char *from, const char *to)
-{
-	return disk_calls->rename(from, to);
-}
-
-static inline int disk_unlink(const char *path)
-{
-	return disk_calls->unlink(path);
-}
-
-static inline int disk_mkdir(const char *path, mode_t mode)
-{
-	return disk_calls->mkdir(path, mode);
-}
-
-static inline int disk_rmdir(const char *path)
-{
-	return disk_calls->rmdir(path);
-}
-
-static inline int disk_stat(const char *path, struct stat *st)
-{
-	return disk_calls->stat(path, st);
-}
-
-static inline int disk_fstat(int fd, struct stat *st)
-{
-	return disk_calls->fstat(fd, st);
-}
-
-static inline int disk_touch(const char *path)
-{
-	return disk_calls->touch(path);
-}
-
-static inline int disk_flock(int fd, int what)
-{
-	return disk_calls->flock(fd, what);
-}
-
-static inline DIR *disk_opendir(const char *path)
-{
-	return disk_calls->opendir(path);
 }
 
 /* Writes all of it; 0 or -errno. */
