@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One table has each attribute's name and type, and whether equal renders may differ in it. header_fill goes through
- * plan, result and extras in the table's order. Text goes into one buffer of fixed size; what does not fit is cut at
- * its end, which is not an error.
+ * header_fill goes through plan, result and extras in the order of header_list.h. Text goes into one buffer of fixed
+ * size; what does not fit is cut at its end, which is not an error.
  */
 #include "common/exr/header.h"
 
@@ -20,60 +19,11 @@
 #include <string.h>
 #include <time.h>
 
+#define ROW(name, text, type, excluded, meaning) H_##name,
 enum header_name {
-	H_VERSION,
-	H_SCENE,
-	H_SCENE_HASH,
-	H_CAMERA,
-	H_INTEGRATOR,
-	H_MIXTURE,
-	H_OPTIONS,
-	H_SEED,
-	H_MIN_DEPTH,
-	H_MAX_DEPTH,
-	H_GROUPS,
-	H_CHAINS,
-	H_BOOTSTRAP,
-	H_EPOCH,
-	H_ROUNDS,
-	H_MUTATIONS,
-	H_SAMPLES,
-	H_B,
-	H_B_ERROR,
-	H_BEYOND,
-	H_REL_MSE,
-	H_REL_MSE_UPPER,
-	H_REL_MSE_LOW_95,
-	H_REL_MSE_HIGH_95,
-	H_REL_MSE_DEFINITION,
-	H_REL_MSE_DOUBT,
-	H_B_ERROR_DOUBT,
-	H_UNVISITED,
-	H_ACCEPTED,
-	H_INDEPENDENT,
-	H_NAN,
-	H_INFINITE,
-	H_NEGATIVE,
-	H_RAYS_CLOSEST,
-	H_RAYS_SHADOW,
-	H_STUCK,
-	H_LONGEST_STUCK,
-	H_STRATEGIES,
-	H_NOTE,
-	H_AGREEMENT,
-	H_DISAGREEMENT,
-	H_R_HAT_MEDIAN,
-	H_R_HAT_WORST,
-	H_CLASSES,
-	H_EFFECTS,
-	H_MIXED,
-	H_WALL,
-	H_CPU,
-	H_WORKERS,
-	H_DATE,
-	H_END,
-	H_CROPS,
+#include "common/exr/header_list.h"
 };
+#undef ROW
 
 enum { HEADER_STRATEGIES = 5120 };
 
@@ -82,76 +32,9 @@ enum { HEADER_STRATEGIES = 5120 };
 #define INT EXR_ATTRIBUTE_INT
 
 const struct header_row header_rows[] = {
-	[H_VERSION] = {"hslt:version", STRING, false, "version of the programs"},
-	[H_SCENE] = {"hslt:scene", STRING, false, "name of the scene file"},
-	[H_SCENE_HASH] = {"hslt:sceneHash", STRING, false, "SHA-256 of the scene file"},
-	[H_CAMERA] = {"hslt:camera", STRING, false,
-		      "the camera as name=value pairs: fov in degrees, to_world by rows (x left, y up, z forward)"},
-	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, hslt, ..."},
-	[H_MIXTURE] = {"hslt:mixture", STRING, false,
-		       "strategies that propose mutations, with their shares (Metropolis with several)"},
-	[H_OPTIONS] =
-		{"hslt:options", STRING, false,
-		 "options of hslt-render and hslt-submit that, with the same scene and files, reproduce the same bits"},
-	[H_SEED] = {"hslt:seed", STRING, false, "seed of all random numbers"},
-	[H_MIN_DEPTH] = {"hslt:minDepth", INT, false, "shortest paths, in edges"},
-	[H_MAX_DEPTH] = {"hslt:maxDepth", INT, false, "longest paths, in edges"},
-	[H_GROUPS] = {"hslt:groups", INT, false, "independent replicates"},
-	[H_CHAINS] = {"hslt:chains", INT, false, "Markov chains of all groups (Metropolis only)"},
-	[H_BOOTSTRAP] = {"hslt:bootstrap", STRING, false, "bootstrap samples of all groups"},
-	[H_EPOCH] = {"hslt:epoch", STRING, false, "mutations per chain, or samples per pixel and group, in one round"},
-	[H_ROUNDS] = {"hslt:rounds", STRING, false, "complete rounds that the image holds"},
-	[H_MUTATIONS] = {"hslt:mutations", STRING, false, "mutations that the image holds (Metropolis only)"},
-	[H_SAMPLES] = {"hslt:samples", STRING, false, "samples per pixel that the image holds (others)"},
-	[H_B] = {"hslt:b", DOUBLE, false, "integral of X+Y+Z over the image, pooled over groups (Metropolis only)"},
-	[H_B_ERROR] = {"hslt:bError", DOUBLE, false,
-		       "its standard error, from the groups; absent where it is not known"},
-	[H_B_ERROR_DOUBT] = {"hslt:bErrorDoubt", STRING, false, "why it is not known"},
-	[H_BEYOND] = {"hslt:beyondShare", DOUBLE, false, "share of the energy in paths too long for the chains"},
-	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false,
-		       "estimated relMSE, from the variance between groups; absent where it is not known"},
-	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false,
-			     "upper end of its 90 % interval; absent where it is not known"},
-	[H_REL_MSE_LOW_95] =
-		{"hslt:relMSELow95", DOUBLE, false,
-		 "lower end of the interval that holds this image's own relMSE in 95 % of all cases; absent where it is not known"},
-	[H_REL_MSE_HIGH_95] = {"hslt:relMSEHigh95", DOUBLE, false, "its upper end; absent where it is not known"},
-	[H_REL_MSE_DEFINITION] = {"hslt:relMSEDefinition", STRING, false, "what relMSE is"},
-	[H_REL_MSE_DOUBT] = {"hslt:relMSEDoubt", STRING, false, "why relMSE or its interval is not known"},
-	[H_UNVISITED] = {"hslt:unvisitedPixels", STRING, false,
-			 "pixels to which no chain came: their error is their neighbours' (Metropolis only)"},
-	[H_ACCEPTED] = {"hslt:accepted", STRING, false, "accepted mutations"},
-	[H_INDEPENDENT] = {"hslt:independent", STRING, false, "independent proposals of the chains"},
-	[H_NAN] = {"hslt:nan", STRING, false, "path contributions refused: not a number"},
-	[H_INFINITE] = {"hslt:infinite", STRING, false, "path contributions refused: infinite"},
-	[H_NEGATIVE] = {"hslt:negative", STRING, false, "path contributions refused: negative"},
-	[H_RAYS_CLOSEST] = {"hslt:raysClosest", STRING, false, "rays traced to the closest hit"},
-	[H_RAYS_SHADOW] = {"hslt:raysShadow", STRING, false, "rays traced between two points"},
-	[H_STUCK] = {"hslt:stuck", STRING, false, "times that a chain accepted nothing during a whole epoch"},
-	[H_LONGEST_STUCK] = {"hslt:longestStuck", STRING, false, "most rejections in a row"},
-	[H_STRATEGIES] = {"hslt:strategies", STRING, false, "what each strategy of the mixture did; one a line"},
-	[H_NOTE] = {"hslt:note", STRING, false, "notes on the image"},
-	[H_AGREEMENT] = {"hslt:agreement", STRING, false,
-			 "whether the chains agree: agree, too short, disagree (Metropolis only)"},
-	[H_DISAGREEMENT] = {"hslt:disagreement", STRING, false, "what disagrees, where, by how much"},
-	[H_R_HAT_MEDIAN] =
-		{"hslt:rHatMedian", DOUBLE, false,
-		 "potential scale reduction of chains, median over tiles with light; the layer rhat has it by tile"},
-	[H_R_HAT_WORST] = {"hslt:rHatWorst", DOUBLE, false, "its largest"},
-	[H_CLASSES] = {"hslt:classes", STRING, false,
-		       "energy of each class of paths in % of b, in the bootstrap and in the chains"},
-	[H_EFFECTS] = {"hslt:effects", STRING, false, "each effect, on or off, and why; one a line"},
-	[H_MIXED] = {"hslt:mixed", INT, false,
-		     "1: workers with different arithmetic took part, the bits cannot be reproduced"},
-	[H_WALL] = {"hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge"},
-	[H_CPU] = {"hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads"},
-	[H_WORKERS] = {"hslt:workers", INT, true, "workers that took part (hslt-render: threads)"},
-	[H_DATE] = {"hslt:date", STRING, true, "when the image was written, UTC"},
-	/* Not compared: --mutations with the same number of rounds gives the same bits as the error or the time that
-	 * ended them. */
-	[H_END] = {"hslt:end", STRING, true,
-		   "which bound ended the render: mutations, time, target-error, black, interrupted"},
-	[H_CROPS] = {"hslt:crops", INT, false, "number of crops that hslt-assemble made the image of"},
+#define ROW(name, text, type, excluded, meaning) [H_##name] = {text, type, excluded, meaning},
+#include "common/exr/header_list.h"
+#undef ROW
 	{NULL, 0, false, NULL},
 };
 
