@@ -4,7 +4,7 @@
  */
 #include "tests/fuzz/messages.h"
 #include "tests/support/memory_assets.h"
-#include "worker/render/scene/image.h"
+#include "tests/support/image_read.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {

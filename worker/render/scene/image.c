@@ -43,15 +43,14 @@ static int decode(const struct image_input *in, struct image *out)
 		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
 			continue;
 		if (in->alpha && !formats[i].alpha)
-			return error_set(in->error, ENOTSUP, "%s: alpha is only read from PNG, WebP and TGA", in->name);
+			return error_set(in->error, ENOTSUP, "alpha is only read from PNG, WebP and TGA");
 		return formats[i].decode(in, out);
 	}
 	if (image_is_tga(in)) /* the only one without a beginning of its own */
 		return image_decode_tga(in, out);
 	return error_set(
 		in->error, EINVAL,
-		"%s: unknown image format (supported: PNG, JPEG, WebP, OpenEXR, Radiance HDR, BMP, TGA, PGM, PPM, PFM)",
-		in->name);
+		"unknown image format (supported: PNG, JPEG, WebP, OpenEXR, Radiance HDR, BMP, TGA, PGM, PPM, PFM)");
 }
 
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
@@ -60,24 +59,13 @@ int image_decode(const unsigned char *bytes, size_t size, const char *name, bool
 	const struct image_input in = {name, bytes, size, raw, channel == IMAGE_ALPHA, arena, e};
 	*out = (struct image){0};
 	int r = decode(&in, out);
-	if (r)
+	if (r) {
 		*out = (struct image){0};
-	else if (channel != IMAGE_ALL && channel != IMAGE_ALPHA)
+		return error_prefix(e, r, "%s", name);
+	}
+	if (channel != IMAGE_ALL && channel != IMAGE_ALPHA)
 		keep_channel(out, channel);
-	return r;
-}
-
-int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
-	       struct error *e)
-{
-	*out = (struct image){0};
-	struct asset a;
-	int r = assets->open(assets->user, name, &a, e);
-	if (r)
-		return r;
-	r = image_decode(a.bytes, a.size, name, raw, IMAGE_ALL, arena, out, e);
-	assets->close(assets->user, &a);
-	return r;
+	return 0;
 }
 
 enum image_channel image_channel_named(const char *name)

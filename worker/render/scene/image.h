@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, WebP, EXR, Radiance HDR, BMP,
- * PGM, PPM and PFM are recognised by content, TGA by its name or its end. Integers of any format are sRGB, whatever
- * gamma it claims. Damaged files are an error, never half an image. Any thread, each with its own arena.
+ * PGM, PPM and PFM are recognised by content, TGA by its name or by its signature. Integers of any format are sRGB,
+ * whatever gamma it claims. Damaged files are an error, never half an image. Any thread, each with its own arena.
  */
 #ifndef WORKER_RENDER_SCENE_IMAGE_H
 #define WORKER_RENDER_SCENE_IMAGE_H
 
 #include "common/base/arena.h"
-#include "worker/render/scene/asset.h"
+#include "common/base/error.h"
 #include "worker/render/scene/image_pixels.h"
 
 #include <stdbool.h>
@@ -25,10 +25,7 @@ enum image_channel {
 /* "r", "g", "b" or "a"; all of each pixel for any other name. */
 enum image_channel image_channel_named(const char *name);
 /* raw: integers are not decoded from sRGB. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the
- * arena holds: -EFBIG, with the file and its size, before it is decoded. */
-int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
-	       struct error *e);
-/* The same for bytes in memory; name: for messages. */
+ * arena holds: -EFBIG, with the file and its size, before it is decoded. name: for messages, and for TGA. */
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
 		 struct arena *arena, struct image *out, struct error *e);
 /* Raises each number to a positive power (1: nothing changes), negative ones by their size. -ERANGE: one gets too large

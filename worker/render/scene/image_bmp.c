@@ -21,11 +21,6 @@ struct bmp {
 	uint32_t colours, entry; /* entries, and bytes of each: blue, green, red */
 };
 
-static int broken(const struct bmp *b, const char *what)
-{
-	return error_set(b->in->error, EBADMSG, "%s: BMP: %s", b->in->name, what);
-}
-
 static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
 {
 	if (b->bits > 8)
@@ -34,7 +29,7 @@ static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
 	b->colours = used ? used : 1u << b->bits;
 	uint64_t end = FILE_HEADER + (uint64_t)header + (uint64_t)b->colours * b->entry;
 	if (b->colours > 1u << b->bits || end > b->pixels_at || end > b->in->size)
-		return broken(b, "a palette that overlaps the pixels");
+		return error_set(b->in->error, EBADMSG, "BMP: a palette that overlaps the pixels");
 	b->palette = b->in->bytes + FILE_HEADER + header;
 	return 0;
 }
@@ -51,11 +46,11 @@ static int read_header(struct bmp *b)
 {
 	const unsigned char *p = b->in->bytes;
 	if (b->in->size < FILE_HEADER + CORE_HEADER)
-		return broken(b, "the header ends too early");
+		return error_set(b->in->error, EBADMSG, "BMP: the header ends too early");
 	uint32_t header = get32(p + FILE_HEADER), compression = PLAIN, used = 0;
 	b->pixels_at = get32(p + 10);
 	if (header != CORE_HEADER && (header < INFO_HEADER || header > b->in->size - FILE_HEADER))
-		return broken(b, "a header of an unknown size");
+		return error_set(b->in->error, EBADMSG, "BMP: a header of an unknown size");
 	if (header == CORE_HEADER) {
 		b->width = get16(p + 18);
 		b->height = get16(p + 20);
@@ -70,9 +65,9 @@ static int read_header(struct bmp *b)
 		used = get32(p + 46);
 	}
 	if (compression != PLAIN && !(compression == MASKED && masks_are_usual(b)))
-		return error_set(b->in->error, ENOTSUP, "%s: BMP: compressed, or with unusual masks", b->in->name);
+		return error_set(b->in->error, ENOTSUP, "BMP: compressed, or with unusual masks");
 	if (b->bits != 1 && b->bits != 4 && b->bits != 8 && b->bits != 24 && b->bits != 32)
-		return error_set(b->in->error, ENOTSUP, "%s: BMP: %u bits per pixel", b->in->name, b->bits);
+		return error_set(b->in->error, ENOTSUP, "BMP: %u bits per pixel", b->bits);
 	return read_palette(b, header, used);
 }
 
@@ -110,7 +105,7 @@ int image_decode_bmp(const struct image_input *in, struct image *out)
 	if (r)
 		return r;
 	if (b.pixels_at > in->size || stride * b.height > in->size - b.pixels_at)
-		return broken(&b, "the file ends too early");
+		return error_set(in->error, EBADMSG, "BMP: the file ends too early");
 	image_table(value, 255, in->raw);
 	float *to = out->pixels;
 	for (uint64_t y = 0; y < b.height; y++) {
@@ -118,7 +113,7 @@ int image_decode_bmp(const struct image_input *in, struct image *out)
 		for (uint64_t x = 0; x < b.width; x++, to += channels) {
 			const unsigned char *c = pixel_at(&b, row, x);
 			if (!c)
-				return broken(&b, "a pixel beyond the palette");
+				return error_set(in->error, EBADMSG, "BMP: a pixel beyond the palette");
 			for (uint32_t k = 0; k < channels; k++)
 				to[k] = value[c[2 - k]];
 		}

@@ -8,25 +8,25 @@ int image_allocate(const struct image_input *in, struct image *out, uint64_t wid
 {
 	if (width == 0 || height == 0 || width > IMAGE_PIXELS_MAX || height > IMAGE_PIXELS_MAX ||
 	    width * height > IMAGE_PIXELS_MAX)
-		return error_set(in->error, EFBIG, "%s: %llu x %llu pixels; at most %d in all, and at least one",
-				 in->name, (unsigned long long)width, (unsigned long long)height, IMAGE_PIXELS_MAX);
+		return error_set(in->error, EFBIG, "%llu x %llu pixels; at most %d in all, and at least one",
+				 (unsigned long long)width, (unsigned long long)height, IMAGE_PIXELS_MAX);
 	uint64_t need = width * height * channels * sizeof *out->pixels;
 	if (need > IMAGE_BYTES_MAX)
-		return error_set(in->error, EFBIG, "%s: %llu x %llu pixels take %llu MB decoded; at most %d MB",
-				 in->name, (unsigned long long)width, (unsigned long long)height,
-				 (unsigned long long)need >> 20, IMAGE_BYTES_MAX >> 20);
+		return error_set(in->error, EFBIG, "%llu x %llu pixels take %llu MB decoded; at most %d MB",
+				 (unsigned long long)width, (unsigned long long)height, (unsigned long long)need >> 20,
+				 IMAGE_BYTES_MAX >> 20);
 	if (need + in->arena->used > IMAGE_SCENE_BYTES_MAX)
 		return error_set(
 			in->error, EFBIG,
-			"%s: %llu x %llu pixels take %llu MB decoded, the scene before it %zu MB; at most %zu MB together",
-			in->name, (unsigned long long)width, (unsigned long long)height, (unsigned long long)need >> 20,
+			"%llu x %llu pixels take %llu MB decoded, the scene before it %zu MB; at most %zu MB together",
+			(unsigned long long)width, (unsigned long long)height, (unsigned long long)need >> 20,
 			in->arena->used >> 20, IMAGE_SCENE_BYTES_MAX >> 20);
 	if (in->size < bytes_least)
-		return error_set(in->error, EBADMSG, "%s: too short for %llu x %llu pixels", in->name,
-				 (unsigned long long)width, (unsigned long long)height);
+		return error_set(in->error, EBADMSG, "too short for %llu x %llu pixels", (unsigned long long)width,
+				 (unsigned long long)height);
 	*out = (struct image){.width = (uint32_t)width, .height = (uint32_t)height, .channels = channels};
 	out->pixels = arena_alloc(in->arena, width * height, channels * sizeof *out->pixels);
-	return out->pixels ? 0 : error_set(in->error, ENOMEM, "%s: out of memory", in->name);
+	return out->pixels ? 0 : error_set(in->error, ENOMEM, "out of memory");
 }
 
 void image_table(float *value, uint32_t max, bool raw)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The formats behind image_read: each decodes bytes in memory, whatever they contain, into an image or an error. */
+/* The formats behind image_decode: each decodes bytes in memory, whatever they contain, into an image or an error,
+ * which image_decode prefixes with the file's name. */
 #ifndef WORKER_RENDER_SCENE_IMAGE_DECODE_H
 #define WORKER_RENDER_SCENE_IMAGE_DECODE_H
 

@@ -14,14 +14,14 @@ static int copy_planes(const struct image_input *in, const struct exr_image *x, 
 	const float *planes[3] = {channels == 1 ? exr_plane(x, "Y") : NULL};
 	for (uint32_t k = 0; channels == 3 && k < 3; k++)
 		if (!(planes[k] = exr_plane(x, rgb[k])))
-			return error_set(in->error, EINVAL, "%s: OpenEXR without channel %s; R, G, B or Y are required",
-					 in->name, rgb[k]);
+			return error_set(in->error, EINVAL, "OpenEXR without channel %s; R, G, B or Y are required",
+					 rgb[k]);
 	int r = image_allocate(in, out, x->width, x->height, channels, 0);
 	for (size_t i = 0; !r && i < (size_t)x->width * x->height; i++)
 		for (uint32_t k = 0; k < channels; k++) {
 			if (!isfinite(planes[k][i]))
-				return error_set(in->error, EBADMSG, "%s: OpenEXR: pixel (%zu, %zu) is not finite",
-						 in->name, i % x->width, i / x->width);
+				return error_set(in->error, EBADMSG, "OpenEXR: pixel (%zu, %zu) is not finite",
+						 i % x->width, i / x->width);
 			out->pixels[channels * i + k] = planes[k][i];
 		}
 	return r;
@@ -41,8 +41,7 @@ static int convert(const struct image_input *in, const struct exr_image *x, stru
 	if (primaries_are_bt709(&p))
 		return 0;
 	if (!primaries_to_bt709(&p, m))
-		return error_set(in->error, EBADMSG, "%s: OpenEXR: no colours have the chromaticities in its header",
-				 in->name);
+		return error_set(in->error, EBADMSG, "OpenEXR: no colours have the chromaticities in its header");
 	for (size_t i = 0; i < (size_t)out->width * out->height; i++) {
 		float *to = out->pixels + 3 * i;
 		const double from[3] = {to[0], to[1], to[2]};
@@ -50,8 +49,8 @@ static int convert(const struct image_input *in, const struct exr_image *x, stru
 			to[k] = (float)(m[k][0] * from[0] + m[k][1] * from[1] + m[k][2] * from[2]);
 			if (!isfinite(to[k]))
 				return error_set(in->error, EBADMSG,
-						 "%s: OpenEXR: pixel (%zu, %zu) is not finite in BT.709", in->name,
-						 i % out->width, i / out->width);
+						 "OpenEXR: pixel (%zu, %zu) is not finite in BT.709", i % out->width,
+						 i / out->width);
 		}
 	}
 	return 0;
@@ -64,7 +63,7 @@ int image_decode_exr(const struct image_input *in, struct image *out)
 	if (r == -ENOTSUP)
 		r = exr_read_dwa(in->bytes, in->size, IMAGE_BYTES_MAX, &x, in->error);
 	if (r)
-		return error_prefix(in->error, r, "%s", in->name);
+		return r;
 	r = copy_planes(in, &x, out);
 	if (!r)
 		r = convert(in, &x, out);

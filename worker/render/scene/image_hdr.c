@@ -18,11 +18,6 @@ struct cursor {
 	const unsigned char *p, *end;
 };
 
-static int broken(const struct cursor *c, const char *what)
-{
-	return error_set(c->in->error, EBADMSG, "%s: Radiance HDR: %s", c->in->name, what);
-}
-
 static bool read_line(struct cursor *c, char line[LINE_MAX_BYTES])
 {
 	const unsigned char *newline = memchr(c->p, '\n', (size_t)(c->end - c->p));
@@ -50,14 +45,16 @@ static int read_header(struct cursor *c, int64_t *width, int64_t *height)
 	char line[LINE_MAX_BYTES];
 	do {
 		if (!read_line(c, line))
-			return broken(c, "the header does not end");
+			return error_set(c->in->error, EBADMSG, "Radiance HDR: the header does not end");
 		if (strncmp(line, "FORMAT=", 7) == 0 && strcmp(line + 7, "32-bit_rle_rgbe") != 0)
-			return broken(c, "only FORMAT=32-bit_rle_rgbe is supported");
+			return error_set(c->in->error, EBADMSG,
+					 "Radiance HDR: only FORMAT=32-bit_rle_rgbe is supported");
 	} while (line[0]);
 	const char *rest;
 	if (!read_line(c, line) || !(rest = read_extent(line, "-Y ", height)) ||
 	    !(rest = read_extent(rest, " +X ", width)) || *rest || *width < 1 || *height < 1)
-		return broken(c, "only the resolution line \"-Y height +X width\" is supported");
+		return error_set(c->in->error, EBADMSG,
+				 "Radiance HDR: only the resolution line \"-Y height +X width\" is supported");
 	return 0;
 }
 
@@ -96,10 +93,11 @@ static void put_pixel(float out[3], unsigned r, unsigned g, unsigned b, unsigned
 static int read_flat(struct cursor *c, float *out, size_t width)
 {
 	if ((size_t)(c->end - c->p) / 4 < width)
-		return broken(c, "the file ends too early");
+		return error_set(c->in->error, EBADMSG, "Radiance HDR: the file ends too early");
 	for (size_t x = 0; x < width; x++, c->p += 4) {
 		if (c->p[0] == 1 && c->p[1] == 1 && c->p[2] == 1)
-			return broken(c, "the old kind of run lengths is not supported");
+			return error_set(c->in->error, EBADMSG,
+					 "Radiance HDR: the old kind of run lengths is not supported");
 		put_pixel(out + 3 * x, c->p[0], c->p[1], c->p[2], c->p[3]);
 	}
 	return 0;
@@ -112,11 +110,12 @@ static int read_row(struct cursor *c, unsigned char *planes, float *out, size_t 
 	if (!runs)
 		return read_flat(c, out, width);
 	if (((size_t)c->p[2] << 8 | c->p[3]) != width)
-		return broken(c, "a scan line of another width");
+		return error_set(c->in->error, EBADMSG, "Radiance HDR: a scan line of another width");
 	c->p += 4;
 	for (size_t k = 0; k < 4; k++)
 		if (!read_runs(c, planes + k * width, width))
-			return broken(c, "run lengths that do not fill a scan line");
+			return error_set(c->in->error, EBADMSG,
+					 "Radiance HDR: run lengths that do not fill a scan line");
 	for (size_t x = 0; x < width; x++)
 		put_pixel(out + 3 * x, planes[x], planes[width + x], planes[2 * width + x], planes[3 * width + x]);
 	return 0;
@@ -136,7 +135,7 @@ int image_decode_hdr(const struct image_input *in, struct image *out)
 		return r;
 	unsigned char *planes = mem_alloc(4, w);
 	if (!planes)
-		return error_set(in->error, ENOMEM, "%s: out of memory", in->name);
+		return error_set(in->error, ENOMEM, "out of memory");
 	for (uint64_t y = 0; y < h && !r; y++)
 		r = read_row(&c, planes, out->pixels + 3 * w * y, w);
 	mem_free(planes);

@@ -35,7 +35,7 @@ static void on_error(j_common_ptr jpeg)
 	struct state *s = state_of(jpeg);
 	char text[JMSG_LENGTH_MAX];
 	jpeg->err->format_message(jpeg, text);
-	s->failed = error_set(s->in->error, EBADMSG, "%s: JPEG: %s", s->in->name, text);
+	s->failed = error_set(s->in->error, EBADMSG, "JPEG: %s", text);
 	longjmp(s->back, 1);
 }
 
@@ -53,7 +53,7 @@ static void on_progress(j_common_ptr jpeg)
 {
 	struct state *s = state_of(jpeg);
 	if (s->jpeg.input_scan_number > SCANS_MAX) {
-		s->failed = error_set(s->in->error, E2BIG, "%s: JPEG with more than %d scans", s->in->name, SCANS_MAX);
+		s->failed = error_set(s->in->error, E2BIG, "JPEG with more than %d scans", SCANS_MAX);
 		longjmp(s->back, 1);
 	}
 }
@@ -65,10 +65,9 @@ static int read_header(struct state *s)
 	jpeg_read_header(j, TRUE);
 	uint32_t channels = j->jpeg_color_space == JCS_GRAYSCALE ? 1 : 3;
 	if (j->num_components == 4 || j->jpeg_color_space == JCS_CMYK || j->jpeg_color_space == JCS_YCCK)
-		return error_set(s->in->error, EINVAL, "%s: a JPEG for printing (CMYK); supported: grey and RGB",
-				 s->in->name);
+		return error_set(s->in->error, EINVAL, "a JPEG for printing (CMYK); supported: grey and RGB");
 	if (j->arith_code)
-		return error_set(s->in->error, EINVAL, "%s: JPEG with arithmetic coding is not supported", s->in->name);
+		return error_set(s->in->error, EINVAL, "JPEG with arithmetic coding is not supported");
 	j->out_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
 	/* Every block of 8 x 8 takes at least one bit. */
 	return image_allocate(s->in, s->out, j->image_width, j->image_height, channels,
@@ -82,15 +81,15 @@ static int read_pixels(struct state *s)
 	size_t n = (size_t)j->output_width * (size_t)j->output_components;
 	if (j->output_width != s->out->width || j->output_height != s->out->height ||
 	    (uint32_t)j->output_components != s->out->channels)
-		return error_set(s->in->error, EBADMSG, "%s: JPEG of two sizes", s->in->name);
+		return error_set(s->in->error, EBADMSG, "JPEG of two sizes");
 	s->row = mem_alloc(n, 1);
 	if (!s->row)
-		return error_set(s->in->error, ENOMEM, "%s: out of memory", s->in->name);
+		return error_set(s->in->error, ENOMEM, "out of memory");
 	while (j->output_scanline < j->output_height) {
 		float *out = s->out->pixels + n * j->output_scanline;
 		JSAMPROW rows[1] = {s->row};
 		if (jpeg_read_scanlines(j, rows, 1) != 1)
-			return error_set(s->in->error, EBADMSG, "%s: JPEG ends too early", s->in->name);
+			return error_set(s->in->error, EBADMSG, "JPEG ends too early");
 		for (size_t i = 0; i < n; i++)
 			out[i] = s->value[s->row[i]];
 	}
@@ -113,7 +112,7 @@ int image_decode_jpeg(const struct image_input *in, struct image *out)
 {
 	struct state *s = mem_alloc(1, sizeof *s);
 	if (!s)
-		return error_set(in->error, ENOMEM, "%s: out of memory", in->name);
+		return error_set(in->error, ENOMEM, "out of memory");
 	s->in = in;
 	s->out = out;
 	s->jpeg.err = jpeg_std_error(&s->errors);

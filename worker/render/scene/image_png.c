@@ -36,7 +36,7 @@ static void png_release(png_structp png, png_voidp p)
 static void on_error(png_structp png, png_const_charp text)
 {
 	struct state *s = png_get_error_ptr(png);
-	s->failed = error_set(s->in->error, EBADMSG, "%s: PNG: %s", s->in->name, text);
+	s->failed = error_set(s->in->error, EBADMSG, "PNG: %s", text);
 	png_longjmp(png, 1);
 }
 
@@ -74,8 +74,7 @@ static int read_header(struct state *s)
 	s->depth = png_get_bit_depth(s->png, s->info);
 	if ((s->in->alpha ? s->channels != 2 && s->channels != 4 : s->channels != 1 && s->channels != 3) ||
 	    (s->depth != 8 && s->depth != 16))
-		return error_set(s->in->error, EINVAL, "%s: PNG with %u channels of %u bits", s->in->name, s->channels,
-				 s->depth);
+		return error_set(s->in->error, EINVAL, "PNG with %u channels of %u bits", s->channels, s->depth);
 	/* deflate produces at most 1032 bytes per byte; a pixel takes at least a bit. */
 	return image_allocate(s->in, s->out, width, height, s->in->alpha ? 1 : s->channels,
 			      (uint64_t)width * height / (8 * 1032));
@@ -87,7 +86,7 @@ static int read_pixels(struct state *s)
 	s->pixels = mem_alloc(height, stride);
 	s->rows = mem_alloc(height, sizeof *s->rows);
 	if (!s->pixels || !s->rows)
-		return error_set(s->in->error, ENOMEM, "%s: out of memory", s->in->name);
+		return error_set(s->in->error, ENOMEM, "out of memory");
 	for (size_t y = 0; y < height; y++)
 		s->rows[y] = s->pixels + y * stride;
 	png_read_image(s->png, s->rows);
@@ -109,7 +108,7 @@ static int convert(struct state *s)
 	uint32_t max = s->depth == 8 ? 255 : 65535;
 	float *value = mem_alloc((size_t)max + 1, sizeof *value);
 	if (!value)
-		return error_set(s->in->error, ENOMEM, "%s: out of memory", s->in->name);
+		return error_set(s->in->error, ENOMEM, "out of memory");
 	image_table(value, max, s->in->raw || s->in->alpha);
 	uint32_t step = s->in->alpha ? s->channels : 1, first = step - 1; /* alpha is a pixel's last */
 	size_t n = (size_t)s->out->width * s->out->channels;
@@ -134,7 +133,7 @@ int image_decode_png(const struct image_input *in, struct image *out)
 	if (s.info)
 		read_guarded(&s);
 	else
-		s.failed = error_set(in->error, ENOMEM, "%s: out of memory", in->name);
+		s.failed = error_set(in->error, ENOMEM, "out of memory");
 	if (!s.failed)
 		s.failed = convert(&s);
 	png_destroy_read_struct(&s.png, &s.info, NULL);

@@ -25,11 +25,6 @@ struct pnm {
 	bool floats, big_endian;
 };
 
-static int broken(const struct pnm *m, const char *what)
-{
-	return error_set(m->in->error, EBADMSG, "%s: portable map: %s", m->in->name, what);
-}
-
 static int peek(const struct pnm *m)
 {
 	return m->at < m->in->bytes + m->in->size ? *m->at : -1;
@@ -72,10 +67,12 @@ static int read_header(struct pnm *m)
 	if (!next_word(m, width) || !next_word(m, height) || !next_word(m, scale) ||
 	    !number_parse_int(width, &m->width) || !number_parse_int(height, &m->height) ||
 	    !number_parse(scale, &m->scale) || m->width < 1 || m->height < 1)
-		return broken(m, "needs a width, a height and a scale");
+		return error_set(m->in->error, EBADMSG, "portable map: needs a width, a height and a scale");
 	bool whole = m->scale >= 1 && m->scale <= 65535 && m->scale == floor(m->scale);
 	if (m->floats ? m->scale == 0 : !whole)
-		return broken(m, m->floats ? "a scale of 0" : "the largest sample must be within [1, 65535]");
+		return error_set(m->in->error, EBADMSG,
+				 m->floats ? "portable map: a scale of 0"
+					   : "portable map: the largest sample must be within [1, 65535]");
 	m->big_endian = !m->floats || m->scale > 0;
 	m->bytes = m->floats ? 4 : m->scale < 256 ? 1 : 2;
 	return 0;
@@ -100,7 +97,7 @@ static int read_floats(struct pnm *m, struct image *out)
 			memcpy(&x, &bits, sizeof x);
 			x = (float)((double)x * fabs(m->scale));
 			if (!isfinite(x))
-				return broken(m, "a pixel that is not finite");
+				return error_set(m->in->error, EBADMSG, "portable map: a pixel that is not finite");
 			out->pixels[row * y + i] = x;
 		}
 	return 0;
@@ -111,13 +108,13 @@ static int read_integers(struct pnm *m, struct image *out)
 	uint32_t max = (uint32_t)m->scale;
 	float *value = mem_alloc((size_t)max + 1, sizeof *value);
 	if (!value)
-		return error_set(m->in->error, ENOMEM, "%s: out of memory", m->in->name);
+		return error_set(m->in->error, ENOMEM, "out of memory");
 	image_table(value, max, m->in->raw);
 	int r = 0;
 	for (size_t i = 0; i < (size_t)out->width * out->height * out->channels && !r; i++) {
 		uint32_t x = next_sample(m);
 		if (x > max)
-			r = broken(m, "a sample above the largest");
+			r = error_set(m->in->error, EBADMSG, "portable map: a sample above the largest");
 		else
 			out->pixels[i] = value[x];
 	}
@@ -135,7 +132,7 @@ int image_decode_pnm(const struct image_input *in, struct image *out)
 	if (!r)
 		r = image_allocate(in, out, w, h, m.channels, samples);
 	if (!r && (size_t)(in->bytes + in->size - m.at) < samples)
-		r = broken(&m, "the file ends too early");
+		r = error_set(in->error, EBADMSG, "portable map: the file ends too early");
 	if (r)
 		return r;
 	return m.floats ? read_floats(&m, out) : read_integers(&m, out);

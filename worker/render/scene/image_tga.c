@@ -3,8 +3,8 @@
  * Truevision's TGA: grey of 8 bits, colours of 24 and 32 bits, palettes of these with indices of 8 bits; plain or
  * run-length encoded, from any corner. Packets may go on in the next row.
  *
- * A file begins with nothing that tells what it is. It is one if its name ends in .tga, or it in the signature of
- * version 2.
+ * Nothing at the beginning of a file tells what it is. It is one if its name ends in .tga, or if it ends with the
+ * version 2 signature.
  *
  * Failures: -EBADMSG for a file that contradicts itself or ends too early, -ENOTSUP for 15 and 16 bits, interleaved
  * rows and other kinds.
@@ -36,11 +36,6 @@ bool image_is_tga(const struct image_input *in)
 		memcmp(in->bytes + in->size - sizeof signature, signature, sizeof signature) == 0);
 }
 
-static int broken(const struct tga *t, const char *what)
-{
-	return error_set(t->in->error, EBADMSG, "%s: TGA: %s", t->in->name, what);
-}
-
 static size_t rest(const struct tga *t)
 {
 	return t->in->size - (size_t)(t->at - t->in->bytes);
@@ -51,14 +46,14 @@ static int read_map(struct tga *t, const unsigned char *header)
 	uint32_t bits = header[7];
 	uint64_t size = (uint64_t)get16(header + 5) * ((bits + 7) / 8);
 	if (header[1] > 1 || (t->kind == KIND_MAPPED && header[1] == 0))
-		return broken(t, "a palette that is not there");
+		return error_set(t->in->error, EBADMSG, "TGA: a palette that is not there");
 	if (header[1] == 0)
 		return 0;
 	if (size > rest(t))
-		return broken(t, "the palette ends too early");
+		return error_set(t->in->error, EBADMSG, "TGA: the palette ends too early");
 	if (t->kind == KIND_MAPPED) {
 		if (bits != 24 && bits != 32)
-			return error_set(t->in->error, ENOTSUP, "%s: TGA: a palette of %u bits", t->in->name, bits);
+			return error_set(t->in->error, ENOTSUP, "TGA: a palette of %u bits", bits);
 		t->map = t->at;
 		t->map_bytes = bits / 8;
 		t->map_first = get16(header + 3);
@@ -72,7 +67,7 @@ static int read_header(struct tga *t)
 {
 	const unsigned char *p = t->in->bytes;
 	if (t->in->size < HEADER || (size_t)HEADER + p[0] > t->in->size)
-		return broken(t, "the header ends too early");
+		return error_set(t->in->error, EBADMSG, "TGA: the header ends too early");
 	t->kind = p[2] & ~(uint32_t)KIND_PACKED;
 	t->packed = p[2] & KIND_PACKED;
 	t->width = get16(p + 12);
@@ -84,14 +79,13 @@ static int read_header(struct tga *t)
 	bool deep = t->kind == KIND_COLOUR && (p[16] == 24 || p[16] == 32);
 	bool flat = (t->kind == KIND_GREY || t->kind == KIND_MAPPED) && p[16] == 8;
 	if (!deep && !flat)
-		return error_set(t->in->error, ENOTSUP, "%s: TGA: pixels of kind %u with %u bits", t->in->name, p[2],
-				 p[16]);
+		return error_set(t->in->error, ENOTSUP, "TGA: pixels of kind %u with %u bits", p[2], p[16]);
 	if (p[17] & 0xc0)
-		return error_set(t->in->error, ENOTSUP, "%s: TGA: interleaved rows", t->in->name);
+		return error_set(t->in->error, ENOTSUP, "TGA: interleaved rows");
 	return read_map(t, p);
 }
 
-static const unsigned char *take(struct tga *t, size_t bytes)
+static const unsigned char *take_bytes(struct tga *t, size_t bytes)
 {
 	const unsigned char *p = t->at;
 	if (rest(t) < bytes)
@@ -104,17 +98,17 @@ static const unsigned char *take(struct tga *t, size_t bytes)
 static const unsigned char *next_pixel(struct tga *t)
 {
 	if (t->packed && t->left == 0) {
-		const unsigned char *packet = take(t, 1);
+		const unsigned char *packet = take_bytes(t, 1);
 		if (!packet)
 			return NULL;
 		t->left = (*packet & 0x7fu) + 1;
 		t->repeated = NULL;
-		if ((*packet & 0x80) && !(t->repeated = take(t, t->bytes)))
+		if ((*packet & 0x80) && !(t->repeated = take_bytes(t, t->bytes)))
 			return NULL;
 	}
 	if (t->packed)
 		t->left--;
-	const unsigned char *p = t->packed && t->repeated ? t->repeated : take(t, t->bytes);
+	const unsigned char *p = t->packed && t->repeated ? t->repeated : take_bytes(t, t->bytes);
 	if (!p || !t->map)
 		return p;
 	uint32_t i = *p - t->map_first;
@@ -141,7 +135,8 @@ int image_decode_tga(const struct image_input *in, struct image *out)
 			float *to = out->pixels + ((size_t)y * t.width + x) * channels;
 			const unsigned char *c = next_pixel(&t);
 			if (!c)
-				return broken(&t, "the file ends too early, or a pixel is beyond the palette");
+				return error_set(in->error, EBADMSG,
+						 "TGA: the file ends too early, or a pixel is beyond the palette");
 			if (in->alpha)
 				*to = has_alpha ? value[c[3]] : 1;
 			else if (grey)

@@ -19,11 +19,11 @@ int image_decode_webp(const struct image_input *in, struct image *out)
 {
 	WebPBitstreamFeatures about;
 	if (in->size < 12 || memcmp(in->bytes + 8, "WEBP", 4) != 0)
-		return error_set(in->error, EINVAL, "%s: a RIFF file that is no WebP image", in->name);
+		return error_set(in->error, EINVAL, "a RIFF file that is no WebP image");
 	if (WebPGetFeatures(in->bytes, in->size, &about) != VP8_STATUS_OK)
-		return error_set(in->error, EBADMSG, "%s: WebP: damaged, or cut off in its header", in->name);
+		return error_set(in->error, EBADMSG, "WebP: damaged, or cut off in its header");
 	if (about.has_animation)
-		return error_set(in->error, ENOTSUP, "%s: WebP: an animation; supported: single images", in->name);
+		return error_set(in->error, ENOTSUP, "WebP: an animation; supported: single images");
 	/* A lossless image of one colour takes next to nothing. */
 	int r = image_allocate(in, out, (uint64_t)about.width, (uint64_t)about.height, in->alpha ? 1 : 3, 0);
 	if (r)
@@ -31,11 +31,11 @@ int image_decode_webp(const struct image_input *in, struct image *out)
 	int width, height;
 	uint8_t *rgba = WebPDecodeRGBA(in->bytes, in->size, &width, &height);
 	if (!rgba)
-		return error_set(in->error, EBADMSG, "%s: WebP: damaged or cut off", in->name);
+		return error_set(in->error, EBADMSG, "WebP: damaged or cut off");
 	if ((uint32_t)width == out->width && (uint32_t)height == out->height)
 		store(in, rgba, out);
 	else
-		r = error_set(in->error, EBADMSG, "%s: WebP of two sizes", in->name);
+		r = error_set(in->error, EBADMSG, "WebP of two sizes");
 	WebPFree(rgba);
 	return r;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/failing_memory.h"
-#include "worker/render/scene/image.h"
+#include "tests/support/image_read.h"
 
 #include "common/base/mem.h"
 #include "common/exr/exr_image.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Windows bitmaps written by hand, from the format's description: all widths of pixels, both directions, and lies. */
 #include "tests/support/memory_assets.h"
-#include "worker/render/scene/image.h"
+#include "tests/support/image_read.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

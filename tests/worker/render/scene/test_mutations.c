@@ -7,7 +7,7 @@
 #include "tests/support/sample_images.h"
 #include "tests/support/scene_tables.h"
 #include "worker/render/math/rng.h"
-#include "worker/render/scene/image.h"
+#include "tests/support/image_read.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
