@@ -8,8 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Length of the UTF-8 sequence at p (1..4), 0 if it is invalid: RFC 3629, no surrogates, shortest form. */
-static size_t utf8_length(const unsigned char *p)
+size_t text_utf8_length(const unsigned char *p)
 {
 	if (p[0] < 0x80)
 		return 1;
@@ -35,7 +34,7 @@ bool text_is_clean(const char *text)
 {
 	size_t n;
 	for (const unsigned char *p = (const unsigned char *)text; *p; p += n) {
-		n = utf8_length(p);
+		n = text_utf8_length(p);
 		if (n == 0 || is_control(p))
 			return false;
 	}
@@ -46,7 +45,7 @@ void text_clean(char *text)
 {
 	size_t n;
 	for (unsigned char *p = (unsigned char *)text; *p; p += n ? n : 1) {
-		n = utf8_length(p);
+		n = text_utf8_length(p);
 		if (n == 0)
 			*p = '?';
 		else if (is_control(p))
@@ -63,7 +62,7 @@ static size_t whole(const char *text, size_t n)
 	if (start == 0 || (unsigned char)text[start - 1] < 0xC0)
 		return n;
 	start--;
-	return utf8_length((const unsigned char *)text + start) ? n : start;
+	return text_utf8_length((const unsigned char *)text + start) ? n : start;
 }
 
 void text_copy(char *out, size_t size, const char *from)

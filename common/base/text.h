@@ -14,6 +14,8 @@ __attribute__((format(printf, 3, 4))) void text_print(char *out, size_t size, co
 
 /* UTF-8 without control characters: safe to display, send and write as JSON. */
 bool text_is_clean(const char *text);
+/* Length of the UTF-8 sequence at p (1 to 4), 0 if it is invalid: RFC 3629, no surrogates, shortest form. */
+size_t text_utf8_length(const unsigned char *p);
 /* Makes a text safe in place: invalid UTF-8 becomes '?', a control character a blank. */
 void text_clean(char *text);
 

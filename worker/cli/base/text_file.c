@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/base/text_file.h"
 
-#include "common/base/mem.h"
+#include "common/base/text.h"
 #include "common/exr/image_file.h"
 
 #include <stdarg.h>
@@ -32,19 +32,10 @@ void text_file_put(struct text_file *p, const char *format, ...)
 size_t text_file_character(const char *at)
 {
 	const unsigned char *c = (const unsigned char *)at;
-	size_t n = *c < 0x80		     ? 1
-		   : *c >= 0xc2 && *c < 0xe0 ? 2
-		   : *c >= 0xe0 && *c < 0xf0 ? 3
-		   : *c >= 0xf0 && *c < 0xf5 ? 4
-					     : 0;
-	for (size_t i = 1; i < n; i++)
-		if ((c[i] & 0xc0) != 0x80)
-			return 0;
-	bool surrogate = n == 3 && c[0] == 0xed && c[1] >= 0xa0, overlong = n == 3 && c[0] == 0xe0 && c[1] < 0xa0;
-	bool none = n == 3 && c[0] == 0xef && c[1] == 0xbf && c[2] >= 0xbe;
-	bool range = n == 4 && ((c[0] == 0xf0 && c[1] < 0x90) || (c[0] == 0xf4 && c[1] >= 0x90));
+	size_t n = text_utf8_length(c);
+	bool none = n == 3 && c[0] == 0xef && c[1] == 0xbf && c[2] >= 0xbe; /* U+FFFE and U+FFFF */
 	bool control = n == 1 && (*c == 0x7f || (*c < 0x20 && *c != '\t' && *c != '\n'));
-	return surrogate || overlong || none || range || control ? 0 : n;
+	return none || control ? 0 : n;
 }
 
 void text_file_escaped(struct text_file *p, const char *text)
