@@ -14,6 +14,7 @@
 #include "worker/render/emitter/envmap.h"
 
 #include "common/base/color.h"
+#include "worker/render/math/search.h"
 
 #include <string.h>
 
@@ -123,20 +124,7 @@ double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 	return envmap_pdf_point(em, x);
 }
 
-/* The last index i < n with cdf[i] <= x; cdf[0] = 0. */
-static uint32_t find_row(const double *cdf, uint32_t n, double x)
-{
-	uint32_t low = 0, high = n;
-	while (high - low > 1) {
-		uint32_t middle = low + (high - low) / 2;
-		if (cdf[middle] <= x)
-			low = middle;
-		else
-			high = middle;
-	}
-	return low;
-}
-
+/* search_cell of whole numbers. */
 static uint32_t find_cell(const uint32_t *cdf, uint32_t n, double x)
 {
 	uint32_t low = 0, high = n;
@@ -155,7 +143,7 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 	const struct envmap *m = em->data;
 	if (!(em->power > 0))
 		return false;
-	uint32_t row = find_row(m->row_cdf, m->rows, u[1]);
+	uint32_t row = search_cell(m->row_cdf, m->rows, u[1]);
 	const uint32_t *cells = row_cells(m, row);
 	double target = u[0] * cells[m->columns];
 	uint32_t column = find_cell(cells, m->columns, target);

@@ -2,6 +2,7 @@
 #include "worker/render/emitter/surface_light.h"
 
 #include "worker/render/emitter/uniform.h"
+#include "worker/render/math/search.h"
 #include "worker/render/math/sphere.h"
 
 vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int k)
@@ -91,17 +92,10 @@ void surface_light_on_triangle(const struct surface_light *l, uint32_t i, double
 
 static uint32_t find_triangle(const struct surface_light *l, double u, double *rest)
 {
-	uint32_t lo = 0, hi = l->surface.triangle_count;
-	while (hi - lo > 1) {
-		uint32_t mid = lo + (hi - lo) / 2;
-		if (l->cdf[mid] <= u)
-			lo = mid;
-		else
-			hi = mid;
-	}
-	double width = l->cdf[lo + 1] - l->cdf[lo];
-	*rest = width > 0 ? fmin(fmax((u - l->cdf[lo]) / width, 0), 1 - 0x1p-53) : 0.5;
-	return lo;
+	uint32_t i = search_cell(l->cdf, l->surface.triangle_count, u);
+	double width = l->cdf[i + 1] - l->cdf[i];
+	*rest = width > 0 ? fmin(fmax((u - l->cdf[i]) / width, 0), 1 - 0x1p-53) : 0.5;
+	return i;
 }
 
 bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf)
