@@ -101,7 +101,6 @@ void job_note_look(struct job *j, double rel_error, double rel_mse, double degre
 
 void job_forecast(struct job *j)
 {
-	forecast_error(&j->looks, &j->error_now);
 	forecast_target(&j->looks, &j->plan, j->plan.target_error, FORECAST_SAME, &j->stop);
 	forecast_halving(&j->looks, &j->plan, &j->halving);
 }

@@ -61,7 +61,6 @@ struct job {
 	double opened;	  /* start of the first round; NAN: not yet */
 	double looked_at; /* when the error was last estimated */
 	struct forecast_history looks;
-	struct forecast_range error_now; /* valid if there are estimates */
 	struct forecast_cost stop, halving;
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	struct job_counts counts;

@@ -229,9 +229,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 	*s = (struct job_status){
 		.id = j->id,
 		.owner = j->owner->name,
-		.name = j->name,
 		.priority = j->priority,
-		.mixed = j->mixed,
 		.verify = j->verify,
 		.plan = &j->plan,
 		.state = job_is_held(j) && job_is_live(j) ? JOB_HELD : j->state,
@@ -244,10 +242,8 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.rate = job_is_live(j) ? rate_value(&j->rate, now) : 0,
 		.disagrees = j->disagrees,
 		.rel_error = j->rel_error,
-		.rel_error_rounds = j->rel_error_rounds,
 		.bootstrap_seconds = j->opened - j->started,
 		.looks = &j->looks,
-		.error_now = j->error_now,
 		.halving_cpu = j->halving.cpu_seconds,
 		.halving_seconds = job_halving_seconds(j, now),
 	};

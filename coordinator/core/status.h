@@ -11,9 +11,8 @@ struct farm;
 
 struct job_status {
 	uint64_t id;
-	const char *name, *owner;
+	const char *owner;
 	int priority;
-	bool mixed;
 	double verify;
 	const struct plan *plan;
 	enum job_state state;
@@ -26,12 +25,11 @@ struct job_status {
 	double eta_low, eta_high; /* its 90 % interval */
 	bool disagrees;		  /* the chains of its final image disagree */
 	double rel_error;	  /* as last estimated; NAN: none */
-	uint64_t rel_error_rounds;
 	double bootstrap_seconds; /* wall-clock time from the first lease to the first round; NAN: not yet */
-	const struct forecast_history *looks;		     /* estimates of the error, oldest first */
-	struct forecast_range error_now;		     /* these three are valid if there are estimates */
-	struct forecast_range halving_cpu, halving_seconds;  /* the remaining cost of halving the error */
-	uint64_t rounds;				     /* complete rounds */
+	const struct forecast_history *looks; /* estimates of the error, oldest first */
+	struct forecast_range halving_cpu,
+		halving_seconds; /* the cost of halving the error; valid if there are estimates */
+	uint64_t rounds;	 /* complete rounds */
 	uint64_t bootstrap_merged, leases_merged, mutations; /* leases_merged: render leases, including open rounds */
 	uint32_t leases;				     /* at workers */
 	uint32_t workers, machines;			     /* machines that hold its leases; machines that could */

@@ -307,8 +307,10 @@ static void looks_give_a_forecast(void **state)
 	near(s.looks->looks[0].work, 400);
 	near(s.looks->looks[0].cpu_seconds, 5);
 	near(s.looks->looks[0].seconds, 2);
-	near(s.error_now.middle, sqrt(0.038));
-	near(s.error_now.high, 0.2);
+	struct forecast_range error;
+	assert_true(forecast_error(s.looks, &error));
+	near(error.middle, sqrt(0.038));
+	near(error.high, 0.2);
 	/* Half of the error is four times the work: three times what was paid, at the present rate of 400 in 2.5 s. */
 	assert_true(fabs(s.halving_cpu.middle / 15 - 1) < 0.1);
 	assert_true(fabs(s.halving_seconds.middle / (1200 / s.rate) - 1) < 0.1);
