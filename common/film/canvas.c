@@ -239,11 +239,6 @@ uint64_t canvas_missing(const struct canvas *c)
 	return missing;
 }
 
-uint64_t canvas_merged(const struct canvas *c)
-{
-	return c->rounds * c->plan.groups * c->plan.parts + c->merged[0] + c->merged[1] - canvas_missing(c);
-}
-
 /* ---- pixels */
 
 /* Rounds to the nearest integer, ties to even. Above 2^51 every float is an integer. */

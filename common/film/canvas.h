@@ -54,7 +54,6 @@ void canvas_set_rounds(struct canvas *c, uint64_t rounds);
 int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e);
 bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged before */
 uint64_t canvas_rounds(const struct canvas *c);			    /* complete rounds */
-uint64_t canvas_merged(const struct canvas *c);			    /* render leases merged, including open rounds */
 
 /* Of the prefix of complete rounds; with open_rounds, of everything received. */
 void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);

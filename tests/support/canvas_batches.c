@@ -2,6 +2,7 @@
 #include "tests/support/canvas_batches.h"
 
 #include "common/base/mem.h"
+#include "common/film/canvas_films.h"
 
 #include <math.h>
 
@@ -84,4 +85,9 @@ struct batch canvas_batch(const struct plan *p, uint64_t epoch, uint32_t group, 
 float canvas_one(void)
 {
 	return 1;
+}
+
+uint64_t canvas_merged(const struct canvas *c)
+{
+	return c->rounds * c->plan.groups * c->plan.parts + c->merged[0] + c->merged[1] - canvas_missing(c);
 }

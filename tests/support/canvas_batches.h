@@ -4,6 +4,7 @@
 #define TESTS_SUPPORT_CANVAS_BATCHES_H
 
 #include "common/film/batch.h"
+#include "common/film/canvas.h"
 #include "common/plan/plan.h"
 
 extern uint64_t canvas_state; /* of a xorshift generator; not 0 */
@@ -19,5 +20,6 @@ struct tile canvas_tile(const struct plan *p, uint32_t i, float (*value)(void));
 struct batch canvas_batch(const struct plan *p, uint64_t epoch, uint32_t group, uint32_t part, uint32_t tiles,
 			  float (*value)(void));
 float canvas_one(void);
+uint64_t canvas_merged(const struct canvas *c); /* render leases merged, including open rounds */
 
 #endif
