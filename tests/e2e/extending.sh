@@ -148,14 +148,14 @@ printf '	X(unique, "unique", NOWHERE) \\\n' | inserted coordinator/core/counts.h
 echo '  uint64 unique = 99;' | inserted proto/stored.proto '^message Counts'
 echo '		j->counts.unique += v == REPEAT;' | inserted coordinator/core/answer.c 'j->counts.repeats +='
 
-# lines KIND FILES LINES PATHS...: files of before that differ, and their new lines
+# lines KIND FILES LINES PATHS...: existing files that differ, and their new lines
 lines() {
 	kind=$1 files=$2 count=$3
 	shift 3
 	(cd "$DIR" && diff -rU0 -x build $(printf 'before/%s ' "$1") "tree/$1") >"$DIR/diff" 2>/dev/null || :
 	f=$(grep -c '^+++ ' "$DIR/diff") n=$(grep -c '^+[^+]' "$DIR/diff")
 	[ "$f $n" = "$files $count" ] || fail "$kind: $f files and $n lines, not $files and $count"
-	echo "$kind: $files files of before, $count lines"
+	echo "$kind: $files existing files, $count lines"
 }
 lines "a BSDF" 1 1 worker/render/bsdf
 lines "a shape" 1 1 worker/render/shape

@@ -53,8 +53,8 @@ static void add(struct counted *c, const struct batch *b)
 	c->steps += (double)b->counters[COUNT_SAMPLES];
 }
 
-static int run(struct counter *c, enum lease_kind kind, uint32_t group, uint64_t epoch, const struct lease_input *in,
-	       struct batch *b)
+static int run_lease(struct counter *c, enum lease_kind kind, uint32_t group, uint64_t epoch,
+		     const struct lease_input *in, struct batch *b)
 {
 	const struct lease_key k = {.kind = kind, .group = group, .epoch = epoch};
 	enum lease_end end;
@@ -65,11 +65,11 @@ static int count_chain(struct counter *c, uint32_t group, uint64_t seed)
 {
 	struct lease_input in = {.chain_count = 1, .seeds = &seed};
 	struct batch first, second;
-	int rc = run(c, LEASE_RENDER, group, 0, &in, &first);
+	int rc = run_lease(c, LEASE_RENDER, group, 0, &in, &first);
 	if (rc)
 		return rc;
 	in = (struct lease_input){.chain_count = 1, .states = first.states};
-	rc = run(c, LEASE_RENDER, group, 1, &in, &second);
+	rc = run_lease(c, LEASE_RENDER, group, 1, &in, &second);
 	batch_fini(&first);
 	if (rc)
 		return rc;
@@ -82,7 +82,7 @@ static int count_group(struct counter *c, uint32_t group)
 {
 	struct batch b;
 	uint64_t seed;
-	int rc = run(c, LEASE_BOOTSTRAP, group, 0, NULL, &b);
+	int rc = run_lease(c, LEASE_BOOTSTRAP, group, 0, NULL, &b);
 	if (rc)
 		return rc;
 	add(&c->bootstrap, &b);

@@ -68,14 +68,6 @@ double microfacet_reflect(const struct microfacet *m, double eta, vec3 wo, vec3 
 
 /* Parameters alpha, alpha_u, alpha_v, distribution. */
 int microfacet_read(struct microfacet *m, const struct scene_node *n, struct error *e);
-#define MICROFACET_PARAMS                                                                   \
-	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10},           \
-		{.name = "alpha_u", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10}, \
-		{.name = "alpha_v", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10}, \
-		{.name = "distribution", .types = VALUE_STRING, .choices = "beckmann|ggx"}, \
-	{                                                                                   \
-		.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED      \
-	}
 
 /* Parameters of smooth materials that have no effect: editors leave them when a rough material is made smooth. */
 #define MICROFACET_PARAMS_IGNORED                                                                                \

@@ -25,7 +25,7 @@ static struct frame frame_inside(const void *point, const struct relief *r)
 	return frame_within(&v->frame, &f);
 }
 
-static void look(const struct bsdf *inner, const struct bsdf_point *p, struct view *v)
+static void find_view(const struct bsdf *inner, const struct bsdf_point *p, struct view *v)
 {
 	static const struct frame same = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 	bool surface = p->place.frame != NULL;
@@ -54,7 +54,7 @@ static spectrum tilted_eval(const struct bsdf *b, const struct bsdf_point *p, ve
 {
 	const struct bsdf *inner = b->data;
 	struct view v;
-	look(inner, p, &v);
+	find_view(inner, p, &v);
 	vec3 wo_in = frame_to_local(&v.frame, wo), wi_in = frame_to_local(&v.frame, wi);
 	double k = factor(p, wo, wi, wo_in, wi_in);
 	return k > 0 ? spectrum_scale(k, inner->ops->eval(inner, &v.p, wo_in, wi_in)) : spectrum_of(0);
@@ -64,7 +64,7 @@ static double tilted_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 
 {
 	const struct bsdf *inner = b->data;
 	struct view v;
-	look(inner, p, &v);
+	find_view(inner, p, &v);
 	vec3 wo_in = frame_to_local(&v.frame, wo), wi_in = frame_to_local(&v.frame, wi);
 	return same_side(wo, wo_in) && same_side(wi, wi_in) ? inner->ops->pdf_solid(inner, &v.p, wo_in, wi_in) : 0;
 }
@@ -74,7 +74,7 @@ static bool tilted_sample(const struct bsdf *b, const struct bsdf_point *p, vec3
 {
 	const struct bsdf *inner = b->data;
 	struct view v;
-	look(inner, p, &v);
+	find_view(inner, p, &v);
 	vec3 wo_in = frame_to_local(&v.frame, wo);
 	if (!same_side(wo, wo_in) || !inner->ops->sample(inner, &v.p, wo_in, u, out))
 		return false;

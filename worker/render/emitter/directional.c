@@ -34,9 +34,7 @@ static const struct param params[] = {
 	{.name = "irradiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 	{.name = "direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
 	{.name = "to_world", .types = VALUE_TRANSFORM},
-	{.name = "angle",
-	 .types = VALUE_FLOAT | VALUE_INT,
-	 .status = PARAM_DIFFERS}, /* of the cone, since August 2026 */
+	{.name = "angle", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_DIFFERS}, /* of the cone */
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = NULL},
 };

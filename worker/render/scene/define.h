@@ -24,7 +24,7 @@ struct define_table {
 	struct arena *arena;
 	struct define_entry *entries; /* DEFINE_MAX */
 	size_t count, missing_count;
-	const char *missing[DEFINE_MISSING_MAX]; /* names that were asked for and are not there, each once */
+	const char *missing[DEFINE_MISSING_MAX]; /* names that were used but not defined, each once */
 };
 
 int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena,

@@ -3,8 +3,8 @@
  * Cameras, and lights of KHR_lights_punctual. Both look along -z with y up; sensors and spots of this scene language
  * look along z, with x to the left. Candela and lux are used as radiant intensity and irradiance, and emission, which
  * the format has in nits, as radiance. Blender's exporter writes emission as it is but multiplies the watts of lamps by
- * 683 lumens, so lamps of its files are divided by that: otherwise they would be 683 times too bright beside what
- * shines. What the file lacks is supplied with a note: a camera that sees the whole scene, an environment of
+ * 683 lumens, so lamps of its files are divided by that: otherwise they would be 683 times too bright in comparison
+ * with emission. What the file lacks is supplied with a note: a camera that sees the whole scene, an environment of
  * radiance 1.
  */
 #include "worker/render/scene/gltf_light.h"

@@ -132,7 +132,7 @@ static unsigned size_of(uint64_t component)
 									     : 0;
 }
 
-static double number(const unsigned char *p, uint64_t component, bool normalized)
+static double read_number(const unsigned char *p, uint64_t component, bool normalized)
 {
 	uint32_t bits = (uint32_t)get_bytes(p, (int)size_of(component));
 	float f;
@@ -192,7 +192,7 @@ static void unpack(struct gltf *g, const struct gltf_at *a, const struct gltf_at
 		}
 		for (unsigned k = 0; k < out->components; k++)
 			out->x[at * out->components + k] =
-				number(bytes + p->offset + i * p->stride + k * width, p->component, p->normalized);
+				read_number(bytes + p->offset + i * p->stride + k * width, p->component, p->normalized);
 		if (i % 65536 == 0)
 			tick();
 	}
