@@ -139,13 +139,10 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 
 const struct emitter_ops emitter_ops_area = {
 	.decl = {PLUGIN_EMITTER, "area", params, 0, PARAM_UNDERSTOOD},
-	.needs_surface = true,
+	SURFACE_LIGHT_OPS,
 	.data_size = sizeof(struct area_light),
 	.create = create,
 	.radiance = radiance,
-	.sample_point = surface_light_sample_point,
-	.pdf_point = surface_light_pdf_point,
-	.point_inverse = surface_light_point_inverse,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
 	.sample_toward = sample_toward,

@@ -24,6 +24,9 @@ int surface_light_create(struct emitter *em, const struct scene_node *n, const s
 bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf);
 double surface_light_pdf_point(const struct emitter *em, const struct emitter_point *x);
 void surface_light_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2]);
+#define SURFACE_LIGHT_OPS                                                                                        \
+	.needs_surface = true, .sample_point = surface_light_sample_point, .pdf_point = surface_light_pdf_point, \
+	.point_inverse = surface_light_point_inverse
 
 /* The point of a sphere in direction w (unit) from its centre. */
 void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitter_point *x);

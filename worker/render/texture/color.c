@@ -10,6 +10,7 @@
 
 #include "common/base/color.h"
 #include "worker/render/math/cie.h"
+#include "worker/render/math/search.h"
 #include "worker/render/texture/upsample.h"
 
 #include <assert.h>
@@ -41,26 +42,13 @@ double color_d65(double nm)
 static const double values[UPSAMPLE_TABLE_SIZE] = {VALUES(0),  VALUES(4),  VALUES(8),  VALUES(12),
 						   VALUES(16), VALUES(20), VALUES(24), VALUES(28)};
 
-static int table_cell(double value)
-{
-	int low = 0, high = UPSAMPLE_TABLE_SIZE - 1;
-	while (high - low > 1) {
-		int middle = (low + high) / 2;
-		if (value < values[middle])
-			high = middle;
-		else
-			low = middle;
-	}
-	return low;
-}
-
 /* Coefficients by trilinear interpolation; the largest component is > 0. */
 static void table_lookup(const double rgb[3], double c[3])
 {
 	const int n = UPSAMPLE_TABLE_SIZE;
 	int l = rgb[0] >= rgb[1] ? (rgb[0] >= rgb[2] ? 0 : 2) : (rgb[1] >= rgb[2] ? 1 : 2);
 	double z = rgb[l], x = rgb[(l + 1) % 3] * (n - 1) / z, y = rgb[(l + 2) % 3] * (n - 1) / z;
-	int xi = (int)x, yi = (int)y, zi = table_cell(z);
+	int xi = (int)x, yi = (int)y, zi = (int)search_cell(values, UPSAMPLE_TABLE_SIZE - 1, z);
 	xi = xi > n - 2 ? n - 2 : xi;
 	yi = yi > n - 2 ? n - 2 : yi;
 	double fx = x - xi, fy = y - yi, fz = (z - values[zi]) / (values[zi + 1] - values[zi]);
@@ -174,23 +162,15 @@ struct piece {
 static struct piece piece_of(const struct color *c, double nm)
 {
 	const double *at = c->nm;
-	uint32_t last = c->count - 2, low = 0, high = c->count - 1;
+	uint32_t last = c->count - 2;
 	if (!(nm > at[0]))
 		return (struct piece){0, 0};
-	if (!(nm < at[high]))
+	if (!(nm < at[last + 1]))
 		return (struct piece){last, 1};
 	double guess = (nm - at[0]) * c->per_nm;
 	uint32_t g = guess >= (double)last ? last : (uint32_t)guess;
-	if (!(at[g] <= nm && nm <= at[g + 1])) {
-		while (high - low > 1) {
-			uint32_t middle = low + (high - low) / 2;
-			if (nm < at[middle])
-				high = middle;
-			else
-				low = middle;
-		}
-		g = low;
-	}
+	if (!(at[g] <= nm && nm <= at[g + 1]))
+		g = search_cell(at, c->count - 1, nm);
 	return (struct piece){g, (nm - at[g]) / (at[g + 1] - at[g])};
 }
 
