@@ -4,8 +4,9 @@
  * specular lobe, so a path counts one more edge for it, and next event estimation does not look through.
  */
 #include "worker/render/bsdf/blend.h"
-#include "worker/render/bsdf/straight.h"
 #include "worker/render/bsdf/twosided.h"
+
+extern const struct bsdf_ops bsdf_ops_null;
 
 static int mask_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {

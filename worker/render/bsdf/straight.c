@@ -1,8 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A path counts one more edge for a filter, and next event estimation does not look through it. */
-#include "worker/render/bsdf/straight.h"
+/*
+ * A specular lobe that lets light through without bending it, all that a filter does not absorb: the only lobe of
+ * `null`, `polarizer`, `circular` and `retarder`, and the holes of a `mask`. A path counts one more edge for it, and
+ * next event estimation does not look through it.
+ *
+ * Light is unpolarised here. As in the unpolarised modes of Mitsuba, both polarizers then let half of it through, at
+ * any angle to each other, and a retarder all of it.
+ */
+#include "worker/render/bsdf/create.h"
 
 #include <float.h>
+
+struct filter {
+	struct texture transmittance;
+	double share; /* that it lets through, times the texture */
+};
 
 /* 1 / |wo.z| must be finite. */
 static bool straight_direction(vec3 wo, vec3 *wi)
@@ -11,8 +23,8 @@ static bool straight_direction(vec3 wo, vec3 *wi)
 	return fabs(wo.z) >= DBL_MIN;
 }
 
-spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-			     double *chance)
+static spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				    double *chance)
 {
 	const struct filter *f = b->data;
 	if (!(mode & BSDF_TRANSMIT) || !straight_direction(wo, wi))
@@ -21,15 +33,15 @@ spectrum straight_eval_delta(const struct bsdf *b, const struct bsdf_point *p, v
 	return spectrum_scale(f->share, texture_eval(&f->transmittance, &p->where, p->w));
 }
 
-bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
-		     struct bsdf_sample *out)
+static bool straight_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			    struct bsdf_sample *out)
 {
 	(void)u;
 	return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
 }
 
-int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
-		    struct error *e)
+static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, double share,
+		  struct error *e)
 {
 	struct filter *f = b->data;
 	int code = bsdf_texture(b, &f->transmittance, n, "transmittance", 1, build, e);
@@ -44,3 +56,54 @@ int straight_create(struct bsdf *b, const struct scene_node *n, const struct bsd
 	b->black = texture_max(&f->transmittance) == 0;
 	return 0;
 }
+
+static int half_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	return create(b, n, build, 0.5, e);
+}
+
+static int whole_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	return create(b, n, build, 1, e);
+}
+
+static int null_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	b->passes = true;
+	return create(b, n, build, 1, e);
+}
+
+static const struct param null_params[] = {
+	{.name = NULL},
+};
+static const struct param polarizer_params[] = {
+	{.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "theta", .status = PARAM_IGNORED},
+	{.name = "polarizing", .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+static const struct param circular_params[] = {
+	{.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "left_handed", .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+static const struct param retarder_params[] = {
+	{.name = "theta", .status = PARAM_IGNORED},
+	{.name = "delta", .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+#define STRAIGHT_OPS(NAME, CREATE)                                                \
+	const struct bsdf_ops bsdf_ops_##NAME = {                                 \
+		.decl = {PLUGIN_BSDF, #NAME, NAME##_params, 0, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct filter),                               \
+		.create = CREATE,                                                 \
+		.eval = bsdf_no_eval,                                             \
+		.pdf_solid = bsdf_no_pdf,                                         \
+		.eval_delta = straight_eval_delta,                                \
+		.sample = straight_sample,                                        \
+	}
+STRAIGHT_OPS(null, null_create);
+STRAIGHT_OPS(polarizer, half_create);
+STRAIGHT_OPS(circular, half_create);
+STRAIGHT_OPS(retarder, whole_create);
