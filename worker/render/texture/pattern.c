@@ -1,13 +1,63 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/texture/pattern.h"
+/*
+ * Textures that are one of two others, depending on (u,v).
+ *
+ * `checkerboard`: a 2 x 2 pattern on the unit square; color0 where both halves agree.
+ * `gridtexture` (0.5/0.6): lines of color1 on color0, along the edges of the unit squares. A line is twice line_width
+ * wide, as in Mitsuba.
+ */
+#include "worker/render/texture/texture.h"
+#include "worker/render/texture/uv.h"
 
-int pattern_create(struct texture *t, const struct scene_node *n, const double defaults[2], enum color_role role,
-		   const struct texture_build *build, struct error *e)
+struct pattern {
+	struct texture color[2];
+	struct uv_map map;
+	unsigned (*which)(const struct pattern *p, double u, double v); /* index of the texture; (u,v) are mapped */
+	double line_width;
+};
+
+static unsigned square_at(const struct pattern *p, double u, double v)
+{
+	(void)p;
+	bool right = u - floor(u) > 0.5, low = v - floor(v) > 0.5;
+	return right != low;
+}
+
+/* Of the nearest whole number. */
+static double distance(double x)
+{
+	return fabs(x - round(x));
+}
+
+static unsigned line_at(const struct pattern *p, double u, double v)
+{
+	return distance(u) < p->line_width || distance(v) < p->line_width;
+}
+
+/* The defaults are those of color0 and color1. */
+static int create(struct texture *t, const struct scene_node *n, const double defaults[2], enum color_role role,
+		  const struct texture_build *build, struct error *e)
 {
 	struct pattern *p = t->data;
 	p->map = uv_map_read(n);
 	int code = texture_from_node(&p->color[0], n, "color0", defaults[0], role, build, e);
 	return code ? code : texture_from_node(&p->color[1], n, "color1", defaults[1], role, build, e);
+}
+
+static int checkerboard_create(struct texture *t, const struct scene_node *n, enum color_role role,
+			       const struct texture_build *build, struct error *e)
+{
+	((struct pattern *)t->data)->which = square_at;
+	return create(t, n, (const double[2]){0.4, 0.2}, role, build, e);
+}
+
+static int gridtexture_create(struct texture *t, const struct scene_node *n, enum color_role role,
+			      const struct texture_build *build, struct error *e)
+{
+	struct pattern *p = t->data;
+	p->which = line_at;
+	p->line_width = node_float(n, "line_width", 0.01);
+	return create(t, n, (const double[2]){0.2, 0.4}, role, build, e);
 }
 
 static const struct texture *texture_at(const struct pattern *p, double u, double v)
@@ -16,31 +66,56 @@ static const struct texture *texture_at(const struct pattern *p, double u, doubl
 	return &p->color[p->which(p, u, v)];
 }
 
-spectrum pattern_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+static spectrum pattern_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
 {
 	return texture_eval(texture_at(t->data, at->u, at->v), at, w);
 }
 
-double pattern_height(const struct texture *t, double u, double v)
+static double pattern_height(const struct texture *t, double u, double v)
 {
 	return texture_height(texture_at(t->data, u, v), u, v);
 }
 
 /* The derivative is 0 between the edges. */
-void pattern_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+static void pattern_jet(const struct texture *t, double u, double v, struct texture_jet *j)
 {
 	texture_jet(texture_at(t->data, u, v), u, v, j);
 }
 
-double pattern_max(const struct texture *t)
+static double pattern_max(const struct texture *t)
 {
 	const struct pattern *p = t->data;
 	return fmax(texture_max(&p->color[0]), texture_max(&p->color[1]));
 }
 
-enum color_shape pattern_shape(const struct texture *t)
+static enum color_shape pattern_shape(const struct texture *t)
 {
 	const struct pattern *p = t->data;
 	enum color_shape first = texture_shape(&p->color[0]);
 	return first == texture_shape(&p->color[1]) ? first : COLOR_SHAPE_OTHER;
 }
+
+#define COLORS                                                                                                 \
+	{.name = "color0", .types = VALUE_TEXTURE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},         \
+		{.name = "color1", .types = VALUE_TEXTURE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX}, \
+		UV_PARAMS
+static const struct param checkerboard_params[] = {COLORS, {.name = NULL}};
+static const struct param gridtexture_params[] = {
+	COLORS,
+	{.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+	{.name = NULL},
+};
+
+#define PATTERN_OPS(NAME)                                                            \
+	const struct texture_ops texture_ops_##NAME = {                              \
+		.decl = {PLUGIN_TEXTURE, #NAME, NAME##_params, 0, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct pattern),                                 \
+		.create = NAME##_create,                                             \
+		.eval = pattern_eval,                                                \
+		.height = pattern_height,                                            \
+		.jet = pattern_jet,                                                  \
+		.max = pattern_max,                                                  \
+		.shape = pattern_shape,                                              \
+	}
+PATTERN_OPS(checkerboard);
+PATTERN_OPS(gridtexture);
