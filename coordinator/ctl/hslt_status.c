@@ -2,8 +2,10 @@
 /*
  * hslt-status: prints what the coordinator's status socket says.
  *
- * It connects, reads the snapshot and prints jobs and workers, or one job with its leases. With --watch it subscribes
- * and prints again whenever something changes, until the job has ended. With --json it prints the objects unchanged.
+ * It connects, reads the snapshot and prints jobs and workers, or one job with its leases. A job that has ended is not
+ * in the snapshot with all that is known of it, so it asks for that one; with --all it asks for the jobs that ended
+ * earlier, page by page. With --watch it subscribes and prints again whenever something changes, until the job has
+ * ended. With --json it prints the objects unchanged.
  *
  * If nobody answers, or not a coordinator, it says so and exits with 75; 1: there is no such job.
  */
@@ -31,12 +33,13 @@ enum { EXIT_UNREACHABLE = 75, LINE_MOST = 1 << 26 };
 struct arguments {
 	const char *socket, *job;
 	char job_text[32];
-	bool json, watch;
+	bool json, watch, all;
 };
 
 static const struct option_row rows[] = {
 	{"socket", 0, "PATH", "The coordinator's status socket", OPTION_TEXT(struct arguments, socket),
 	 .environment = "HSLT_STATUS_SOCKET", .needed = true},
+	{"all", 0, NULL, "Also list jobs that ended before the last 50", OPTION_FLAG(struct arguments, all)},
 	{"json", 0, NULL, "Print JSON, one object a line", OPTION_FLAG(struct arguments, json)},
 	{"watch", 0, NULL, "Print again on every change, until the job has ended",
 	 OPTION_FLAG(struct arguments, watch)},
@@ -56,6 +59,12 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	return 0;
 }
 
+static int check(void *target, struct error *e)
+{
+	const struct arguments *a = target;
+	return a->all && a->watch ? error_set(e, EINVAL, "--all and --watch: one or the other") : 0;
+}
+
 static const struct program program = {
 	.name = "hslt-status",
 	.words = "[JOB]",
@@ -63,9 +72,11 @@ static const struct program program = {
 	.examples = "hslt-status --socket ~/farm/status\n"
 		    "hslt-status --watch j12\n"
 		    "hslt-status --json | jq '.jobs[] | {id, state, progress}'",
-	.details = "--json prints the socket's objects, one a line; with JOB only that job's.",
+	.details =
+		"Of the jobs that ended it lists the last 50. What is long, such as the effects that a scene needs, "
+		"is shown for one JOB only once it has ended. --json prints the socket's objects, one a line; with JOB only that job's.",
 	.exits = "0 done, 1 no such job, 2 usage, 75 coordinator not reachable",
-	.own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL},
+	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,
 };
 
@@ -302,6 +313,13 @@ static void print_leases(const json_t *snapshot, const char *id)
 		       json_is_true(json_object_get(lease, "overdue")) ? " (overdue)" : "");
 }
 
+static void print_others(const json_t *snapshot)
+{
+	double others = number_of(snapshot, "endedOthers");
+	if (others > 0)
+		printf("and %.0f that ended earlier: hslt-status --all\n", others);
+}
+
 static void print_snapshot(const json_t *snapshot, const char *only)
 {
 	bool colors = terminal_shows_colors(STDOUT_FILENO);
@@ -328,6 +346,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 		}
 	}
 	if (!only) {
+		print_others(snapshot);
 		print_workers(snapshot);
 		print_warnings(snapshot);
 		print_quarantined(snapshot);
@@ -336,24 +355,124 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 
 /* ---- reading ---- */
 
-static const json_t *find_job(const json_t *snapshot, const char *id)
+struct reading {
+	FILE *f;
+	char *line;
+	size_t room;
+};
+
+/* The next line; NULL: an error was printed. */
+static json_t *next_line(struct reading *r)
+{
+	json_error_t fault;
+	ssize_t n = getline(&r->line, &r->room, r->f);
+	json_t *o = n > 0 && n < LINE_MOST ? json_loadb(r->line, (size_t)n, 0, &fault) : NULL;
+	if (!o)
+		fprintf(stderr, "hslt-status: %s\n",
+			n <= 0 ? "the coordinator is gone"
+			: r->line[n - 1] != '\n'
+				? "the coordinator closed the connection: it has ended, or this program reads too slowly"
+				: "what answers is no coordinator");
+	return o;
+}
+
+/* Sends a question, and reads on to its answer, of that type or an error. NULL: an error was printed. */
+static json_t *ask(struct reading *r, const char *type, json_t *question)
+{
+	char *text = json_dumps(question, JSON_COMPACT);
+	json_t *o = NULL;
+	json_decref(question);
+	if (!text || dprintf(fileno(r->f), "%s\n", text) < 0)
+		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
+	else
+		while ((o = next_line(r)) && strcmp(text_of(o, "type"), type) != 0 &&
+		       strcmp(text_of(o, "type"), "error") != 0)
+			json_decref(o);
+	free(text);
+	return o;
+}
+
+static size_t place_of(const json_t *jobs, const char *id)
 {
 	size_t i;
 	const json_t *job;
-	json_array_foreach(json_object_get(snapshot, "jobs"), i,
-			   job) if (strcmp(text_of(job, "id"), id) == 0) return job;
-	return NULL;
+	json_array_foreach(jobs, i, job) if (strcmp(text_of(job, "id"), id) == 0) break;
+	return i;
+}
+
+/* Puts all that is known of the one job into the snapshot, which has it of live jobs already. An exit code. */
+static int complete_job(const struct arguments *a, struct reading *r, json_t *snapshot)
+{
+	json_t *jobs = json_object_get(snapshot, "jobs"), *job = json_array_get(jobs, place_of(jobs, a->job));
+	if (job && !is_ended(job))
+		return 0;
+	json_t *answer = ask(r, "job", json_pack("{s:s}", "job", a->job));
+	if (!answer)
+		return EXIT_UNREACHABLE;
+	bool known = json_is_object(json_object_get(answer, "job"));
+	if (known && job)
+		json_object_update(job, json_object_get(answer, "job"));
+	else if (known)
+		json_array_append(jobs, json_object_get(answer, "job"));
+	else
+		fprintf(stderr, "hslt-status: %s\n", text_of(answer, "text"));
+	json_decref(answer);
+	return known ? 0 : 1;
+}
+
+static int by_id(const void *x, const void *y)
+{
+	const json_t *const *a = x, *const *b = y;
+	long long i = atoll(text_of(*a, "id") + 1), k = atoll(text_of(*b, "id") + 1);
+	return (i > k) - (i < k);
+}
+
+static void sort_jobs(json_t *jobs)
+{
+	size_t count = json_array_size(jobs);
+	json_t **sorted = calloc(count + 1, sizeof *sorted);
+	if (!sorted)
+		return;
+	for (size_t i = 0; i < count; i++)
+		sorted[i] = json_incref(json_array_get(jobs, i));
+	qsort(sorted, count, sizeof *sorted, by_id);
+	json_array_clear(jobs);
+	for (size_t i = 0; i < count; i++)
+		json_array_append_new(jobs, sorted[i]);
+	free(sorted);
+}
+
+/* Adds the jobs that ended before those of the snapshot. An exit code. */
+static int complete_list(struct reading *r, json_t *snapshot)
+{
+	json_t *jobs = json_object_get(snapshot, "jobs"), *had = json_copy(jobs), *job, *before = json_null();
+	size_t i;
+	int code = 0;
+	while (before && !code) {
+		json_t *page = ask(r, "ended", json_pack("{s:o}", "endedBefore", before));
+		if (strcmp(text_of(page, "type"), "ended") != 0)
+			code = EXIT_UNREACHABLE;
+		if (*text_of(page, "text"))
+			fprintf(stderr, "hslt-status: %s\n", text_of(page, "text"));
+		json_array_foreach(json_object_get(page, "jobs"), i,
+				   job) if (place_of(had, text_of(job, "id")) == json_array_size(had))
+			json_array_append(jobs, job);
+		before = json_object_get(page, "before");
+		before = json_is_string(before) ? json_incref(before) : NULL;
+		json_decref(page);
+	}
+	json_decref(before);
+	json_decref(had);
+	sort_jobs(jobs);
+	json_object_set_new(snapshot, "endedOthers", json_integer(0));
+	return code;
 }
 
 /* Prints one snapshot in the requested form. false: stop watching. */
-static bool show(const struct arguments *a, const json_t *snapshot, bool first, int *code)
+static bool show(const struct arguments *a, const json_t *snapshot, bool first)
 {
-	const json_t *job = a->job ? find_job(snapshot, a->job) : NULL;
-	if (a->job && !job) {
-		fprintf(stderr, "hslt-status: %s: no such job\n", a->job);
-		*code = 1;
-		return false;
-	}
+	const json_t *jobs = json_object_get(snapshot, "jobs");
+	const json_t *job = a->job ? json_array_get(jobs, place_of(jobs, a->job)) : NULL;
 	if (a->json) {
 		json_dumpf(job ? job : snapshot, stdout, JSON_COMPACT);
 		putchar('\n');
@@ -369,31 +488,26 @@ static bool show(const struct arguments *a, const json_t *snapshot, bool first, 
 
 static int follow(const struct arguments *a, FILE *f)
 {
-	char *line = NULL;
-	size_t room = 0;
+	struct reading r = {.f = f};
 	int code = 0;
 	bool first = true, more = true;
 	while (more) {
-		ssize_t n = getline(&line, &room, f);
-		json_error_t fault;
-		json_t *o = n > 0 && n < LINE_MOST ? json_loadb(line, (size_t)n, 0, &fault) : NULL;
+		json_t *o = next_line(&r);
+		bool snapshot = strcmp(text_of(o, "type"), "snapshot") == 0;
 		if (!o) {
-			fprintf(stderr, "hslt-status: %s\n",
-				n > 0 ? "what answers is no coordinator" : "the coordinator is gone");
 			code = EXIT_UNREACHABLE;
-			break;
-		}
-		if (first && strcmp(text_of(o, "type"), "error") == 0) {
+		} else if (first && strcmp(text_of(o, "type"), "error") == 0) {
 			fprintf(stderr, "hslt-status: %s\n", text_of(o, "text"));
 			code = EXIT_UNREACHABLE;
-			more = false;
-		} else if (strcmp(text_of(o, "type"), "snapshot") == 0) {
-			more = show(a, o, first, &code);
+		} else if (snapshot) {
+			code = a->job ? complete_job(a, &r, o) : a->all ? complete_list(&r, o) : 0;
+			more = !code && show(a, o, first);
 			first = false;
 		}
+		more = more && !code;
 		json_decref(o);
 	}
-	free(line);
+	free(r.line);
 	return code;
 }
 

@@ -152,8 +152,14 @@ static void add_forecast(json_t *o, const struct job_view *v)
 				    ? json_null()
 				    : json_pack("{s:o s:o}", "cpuSeconds", forecast_range_to_json(&v->halving_cpu),
 						"wallSeconds", forecast_range_to_json(&v->halving_seconds)));
-	if (live) /* there may be many ended jobs */
-		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
+}
+
+static void add_details(json_t *o, const struct job_record *r)
+{
+	json_object_set_new(o, "strategies", record_strategies(r));
+	json_object_set_new(o, "classes", classes_to_json(r->classes));
+	json_object_set_new(o, "effects", record_effects(r));
+	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
 #define TEXT(member, size, key, shown, wire, core) {FIELD_TEXT, offsetof(struct job_view, member), size, key, shown},
@@ -162,7 +168,7 @@ static const struct field fields[] = {VIEW_FIELDS(TEXT, NUMBER)};
 #undef TEXT
 #undef NUMBER
 
-json_t *view_to_json(const struct job_view *v)
+json_t *view_to_json(const struct job_view *v, bool details)
 {
 	const struct job_record *r = &v->record;
 	char id[32];
@@ -176,10 +182,9 @@ json_t *view_to_json(const struct job_view *v)
 	json_object_set_new(o, "share", number_or_null(v->share, v->share >= 0 && !record_is_ended(r)));
 	add_forecast(o, v);
 	json_object_set_new(o, "counts", record_counts(r));
-	json_object_set_new(o, "strategies", record_strategies(r));
 	json_object_set_new(o, "agreement", convergence_to_json(&r->convergence));
-	json_object_set_new(o, "classes", classes_to_json(r->classes));
-	json_object_set_new(o, "effects", record_effects(r));
+	if (details)
+		add_details(o, r);
 	return o;
 }
 

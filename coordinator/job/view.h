@@ -51,7 +51,8 @@ struct view_looks {
 	Farm__Look look[FORECAST_LOOKS], *at[FORECAST_LOOKS];
 };
 void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out); /* borrows both */
-json_t *view_to_json(const struct job_view *v);
+/* details: also what is long: effects, counters of strategies, classes of paths, estimates. */
+json_t *view_to_json(const struct job_view *v, bool details);
 json_t *view_peer_to_json(const struct peer_status *p, double now);
 json_t *view_quarantined_to_json(const struct worker_status *w);
 json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now);

@@ -74,15 +74,16 @@ static int by_id(const void *a, const void *b)
 	return (x->record.id > y->record.id) - (x->record.id < y->record.id);
 }
 
-size_t jobs_views(struct jobs *jobs, struct job_view **views)
+size_t jobs_views(struct jobs *jobs, size_t ended_most, struct job_view **views)
 {
-	size_t count = jobs->ended_count + recovery_views(jobs, NULL), n = 0;
+	size_t ended = jobs->ended_count < ended_most ? jobs->ended_count : ended_most;
+	size_t count = ended + recovery_views(jobs, NULL), n = 0;
 	for (struct live_job *job = jobs->live; job; job = job->next)
 		count++;
 	*views = mem_alloc(count, sizeof **views);
 	if (!*views)
 		return 0;
-	for (size_t i = 0; i < jobs->ended_count; i++)
+	for (size_t i = jobs->ended_count - ended; i < jobs->ended_count; i++)
 		view_of_record(&(*views)[n++], &jobs->ended[i]);
 	for (struct live_job *job = jobs->live; job; job = job->next)
 		view_live(jobs, job, &(*views)[n++]);

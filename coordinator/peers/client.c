@@ -183,7 +183,7 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 static void take_list(struct session *p)
 {
 	struct job_view *views;
-	size_t count = jobs_views(p->jobs, &views);
+	size_t count = jobs_views(p->jobs, ENDED_MAX, &views);
 	Farm__JobStatus *status = mem_alloc(count, sizeof *status), **list = mem_alloc(count, sizeof *list);
 	Farm__JobListAnswer answer;
 	Farm__Envelope m;

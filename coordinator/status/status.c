@@ -6,9 +6,10 @@
  * compares each job with what was last sent about it and sends only changes; nothing is done while nobody is
  * subscribed. At the end the socket's file is removed if it is still the same.
  *
- * A line that is no subscription is answered by an error. A reader is dropped if its line is too long or if it does not
- * read: the bytes that wait for it are bounded. A path where somebody answers is -EADDRINUSE; a file that is not a
- * socket is never removed.
+ * A reader that has not read all lines when something changes gets no more of them, but one snapshot once it has read:
+ * the newest. So at most the lines of one moment wait for it. A line that is neither a subscription nor a question is
+ * answered by an error. A reader is dropped if its line is too long, or if it asks and does not read the answers. A
+ * path where somebody answers is -EADDRINUSE; a file that is not a socket is never removed.
  */
 #include "coordinator/status/status.h"
 
@@ -16,6 +17,7 @@
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/peers/session.h"
+#include "coordinator/status/lines.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -39,6 +41,8 @@ struct reader {
 	uv_pipe_t pipe;
 	unsigned topics;
 	bool closing;
+	bool behind;   /* something changed while it had not read all lines: it gets a snapshot when it has */
+	size_t unread; /* bytes of answers that wait for it */
 	size_t line_size;
 	char line[LINE_BYTES];
 };
@@ -59,22 +63,6 @@ struct status_socket {
 };
 
 /* ---- lines ---- */
-
-static json_t *object(const char *type)
-{
-	struct timespec now;
-	clock_gettime(CLOCK_REALTIME, &now);
-	return json_pack("{s:i s:s s:f}", "schema", 1, "type", type, "time",
-			 (double)now.tv_sec + 1e-9 * (double)now.tv_nsec);
-}
-
-static json_t *jobs_json(const struct job_view *views, size_t count)
-{
-	json_t *list = json_array();
-	for (size_t i = 0; i < count; i++)
-		json_array_append_new(list, view_to_json(&views[i]));
-	return list;
-}
 
 /* The state of a worker's certificate, and whether it must be renewed. */
 static void add_certificate(const struct peers *s, uint64_t peer, json_t *worker)
@@ -135,16 +123,13 @@ static void add_workers(const struct peers *s, json_t *o)
 
 static json_t *snapshot(const struct peers *s)
 {
-	struct job_view *views;
-	size_t count = jobs_views(s->jobs, &views);
-	json_t *o = object("snapshot");
-	json_object_set_new(o, "jobs", jobs_json(views, count));
+	json_t *o = line_object("snapshot");
+	line_add_jobs(o, s->jobs);
 	add_workers(s, o);
 	add_tls(s, o);
 	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)s->garbled));
 	if (recovery_is_on(s->jobs))
 		json_object_set_new(o, "reading", json_real(recovery_share(s->jobs)));
-	mem_free(views);
 	return o;
 }
 
@@ -152,7 +137,8 @@ static json_t *snapshot(const struct peers *s)
 
 struct sending {
 	uv_write_t request;
-	char *text; /* allocated by jansson */
+	char *text;    /* allocated by jansson */
+	size_t answer; /* its bytes, if it answers a line of the reader's */
 };
 
 static void on_reader_closed(uv_handle_t *h)
@@ -174,30 +160,45 @@ static void drop(struct reader *r)
 	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
 }
 
+static size_t waiting(const struct reader *r)
+{
+	return uv_stream_get_write_queue_size((const uv_stream_t *)&r->pipe);
+}
+
+static void send_object(struct reader *r, json_t *o, bool answer);
+
 static void on_written(uv_write_t *w, int status)
 {
 	struct sending *s = w->data;
 	struct reader *r = w->handle->data;
+	r->unread -= s->answer;
 	free(s->text);
 	mem_free(s);
-	if (status)
+	if (status) {
 		drop(r);
+	} else if (r->behind && !r->closing && waiting(r) == 0) {
+		r->behind = false;
+		send_object(r, snapshot(r->socket->peers), false);
+	}
 }
 
-/* Takes the object. */
-static void send_object(struct reader *r, json_t *o)
+/* Takes the object. Of what changes at most one tick's lines wait for a reader (publish_object); answers are bounded
+ * here. */
+static void send_object(struct reader *r, json_t *o, bool answer)
 {
 	char *text = json_dumps(o, JSON_COMPACT);
 	struct sending *s = text ? mem_alloc(1, sizeof *s) : NULL;
 	json_decref(o);
 	size_t size = text ? strlen(text) : 0;
-	if (!s || uv_stream_get_write_queue_size((uv_stream_t *)&r->pipe) > UNREAD_MAX) {
+	if (!s || (answer && r->unread > UNREAD_MAX)) {
 		mem_free(s);
 		free(text);
 		drop(r);
 		return;
 	}
 	s->text = text;
+	s->answer = answer ? size : 0;
+	r->unread += s->answer;
 	s->request.data = s;
 	static char newline[] = "\n";
 	uv_buf_t parts[2] = {uv_buf_init(text, (unsigned)size), uv_buf_init(newline, 1)};
@@ -208,26 +209,21 @@ static void send_object(struct reader *r, json_t *o)
 	}
 }
 
-/* ---- reading ---- */
-
-static void say_error(struct reader *r, const char *text)
+static void send_answer(struct reader *r, json_t *o)
 {
-	json_t *o = object("error");
-	json_object_set_new(o, "text", json_string(text));
-	send_object(r, o);
+	send_object(r, o, true);
 }
 
-static void take_line(struct reader *r, size_t size)
+/* ---- reading ---- */
+
+static void subscribe(struct reader *r, const json_t *list)
 {
 	static const struct {
 		const char *name;
 		enum topic topic;
 	} topics[] = {{"jobs", TOPIC_JOBS}, {"workers", TOPIC_WORKERS}, {"snapshot", TOPIC_SNAPSHOT}};
-	json_error_t fault;
-	json_t *o = json_loadb(r->line, size, JSON_REJECT_DUPLICATES, &fault);
-	const json_t *list = json_object_get(o, "subscribe");
 	unsigned wanted = 0;
-	bool known = json_is_array(list);
+	bool known = true;
 	for (size_t i = 0; i < json_array_size(list); i++) {
 		const char *name = json_string_value(json_array_get(list, i));
 		unsigned found = 0;
@@ -237,11 +233,28 @@ static void take_line(struct reader *r, size_t size)
 		known = known && found;
 		wanted |= found;
 	}
-	json_decref(o);
 	if (known)
 		r->topics |= wanted;
 	else
-		say_error(r, "expected {\"subscribe\":[...]} with jobs, workers, snapshot");
+		send_answer(r, line_error("what can be subscribed to is jobs, workers, snapshot"));
+}
+
+static void take_line(struct reader *r, size_t size)
+{
+	json_error_t fault;
+	json_t *o = json_loadb(r->line, size, JSON_REJECT_DUPLICATES, &fault);
+	const json_t *list = json_object_get(o, "subscribe"), *job = json_object_get(o, "job"),
+		     *before = json_object_get(o, "endedBefore");
+	if (json_is_array(list))
+		subscribe(r, list);
+	else if (json_is_string(job))
+		send_answer(r, line_job(r->socket->jobs, json_string_value(job)));
+	else if (json_is_string(before) || json_is_null(before))
+		send_answer(r, line_ended(r->socket->jobs, json_string_value(before)));
+	else
+		send_answer(r, line_error("expected {\"subscribe\":[...]} with jobs, workers, snapshot, "
+					  "{\"job\":\"j1\"}, or {\"endedBefore\":\"j1\"}"));
+	json_decref(o);
 }
 
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
@@ -288,7 +301,7 @@ static void on_connection(uv_stream_t *listener, int status)
 		return;
 	}
 	if (t->reader_count > READERS_MAX) { /* the kernel takes the line at once */
-		say_error(r, "the status has too many readers: 64 others are connected to its socket");
+		send_answer(r, line_error("the status has too many readers: 64 others are connected to its socket"));
 		drop(r);
 		return;
 	}
@@ -296,7 +309,7 @@ static void on_connection(uv_stream_t *listener, int status)
 		drop(r);
 		return;
 	}
-	send_object(r, snapshot(t->peers));
+	send_object(r, snapshot(t->peers), false);
 }
 
 /* ---- changes ---- */
@@ -313,8 +326,8 @@ static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 {
 	for (struct reader *r = t->readers, *next; r; r = next) {
 		next = r->next;
-		if (r->topics & topic)
-			send_object(r, json_incref(o));
+		if ((r->topics & topic) && !r->behind)
+			send_object(r, json_incref(o), false);
 	}
 	json_decref(o);
 }
@@ -331,21 +344,24 @@ void status_tick(struct status_socket *t)
 	if (!topics || t->shown_changes == t->jobs->changes)
 		return;
 	t->shown_changes = t->jobs->changes;
+	for (struct reader *r = t->readers; r; r = r->next)
+		r->behind = r->behind || (r->topics && waiting(r));
 	struct job_view *views;
-	size_t count = jobs_views(t->jobs, &views);
+	size_t count = jobs_views(t->jobs, LINES_ENDED, &views);
 	for (size_t i = 0; i < count && (topics & TOPIC_JOBS); i++) {
 		const struct job_view *before = shown_before(t, views[i].record.id);
 		if (before && memcmp(before, &views[i], sizeof *before) == 0)
 			continue;
-		json_t *o = object("job");
-		json_object_set_new(o, "job", view_to_json(&views[i]));
+		bool details = !record_is_ended(&views[i].record) || (before && !record_is_ended(&before->record));
+		json_t *o = line_object("job");
+		json_object_set_new(o, "job", view_to_json(&views[i], details));
 		publish_object(t, TOPIC_JOBS, o);
 	}
 	mem_free(t->shown);
 	t->shown = views;
 	t->shown_count = count;
 	if (topics & TOPIC_WORKERS) {
-		json_t *o = object("workers");
+		json_t *o = line_object("workers");
 		add_workers(t->peers, o);
 		publish_object(t, TOPIC_WORKERS, o);
 	}

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The status socket: a Unix stream socket (mode 0600, or 0660 for a group). A new reader gets one snapshot line (JSON)
- * at once; after a line {"subscribe":["jobs"]} (jobs, workers, snapshot) it gets lines when something changes. Every
- * object has schema, type and time; fields are only ever added. Readers that do not read are dropped. The loop's
- * thread.
+ * at once; after a line {"subscribe":["jobs"]} (jobs, workers, snapshot) it gets lines when something changes.
+ * {"job":"j12"} asks for one job with all that is known of it, and {"endedBefore":"j12"} for a page of jobs that ended
+ * and are not in the snapshot (null: the first page); the page's "before" is where the next one begins, null at the
+ * end. Every object has schema, type and time; fields are only ever added. The loop's thread.
  */
 #ifndef COORDINATOR_STATUS_STATUS_H
 #define COORDINATOR_STATUS_STATUS_H

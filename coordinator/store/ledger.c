@@ -35,7 +35,9 @@ struct ledger {
 	struct ledger_side jobs, copy;
 	uint64_t next; /* id */
 	bool is_new;
-	bool behind; /* the copy lacks changes */
+	bool behind;  /* the copy lacks changes */
+	bool counted; /* ended_count is right */
+	uint64_t ended_count;
 };
 
 /* Ends a transaction: what it did counts if rc is 0. */
@@ -378,16 +380,19 @@ int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)
 
 int ledger_put(struct ledger *l, const struct ledger_job *j, struct error *e)
 {
+	l->counted = false;
 	return put_both(l, j, e);
 }
 
 int ledger_forget(struct ledger *l, uint64_t id, struct error *e)
 {
+	l->counted = false;
 	return remove_both(l, &id, 1, e);
 }
 
 int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e)
 {
+	uint64_t dropped = 0;
 	for (size_t i = 0; i < count; i++) {
 		struct ledger_job j;
 		int rc = ledger_side_get(&l->jobs, ids[i], &j, e);
@@ -395,8 +400,12 @@ int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e)
 			return rc;
 		if (rc && !(j.ended > 0))
 			ids[i] = 0;
+		dropped += rc && j.ended > 0;
 	}
-	return remove_both(l, ids, count, e);
+	int rc = remove_both(l, ids, count, e);
+	l->counted = l->counted && !rc;
+	l->ended_count -= dropped;
+	return rc;
 }
 
 int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, struct error *e)
@@ -407,12 +416,15 @@ int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, st
 	if (rc <= 0 || j.extended != r->extended)
 		return rc < 0 ? rc : 0;
 	clock_gettime(CLOCK_REALTIME, &now);
+	bool ended = j.ended > 0;
 	j.ended = now.tv_sec > 0 ? (double)now.tv_sec : 1;
 	j.state = r->state;
 	j.held = "";
 	if (!extendable)
 		forget_submission(&j);
-	return change_record(l, &j, r, e);
+	rc = change_record(l, &j, r, e);
+	l->ended_count += !rc && !ended;
+	return rc;
 }
 
 int ledger_drop_submission(struct ledger *l, uint64_t id, struct error *e)
@@ -452,9 +464,12 @@ int ledger_extend(struct ledger *l, const struct ledger_job *more, struct error 
 	j.plan = more->plan;
 	j.plan_size = more->plan_size;
 	j.extended = more->extended;
+	bool ended = j.ended > 0;
 	j.ended = 0;
 	j.state = "live";
-	return change(l, &j, e);
+	rc = change(l, &j, e);
+	l->ended_count -= !rc && ended;
+	return rc;
 }
 
 int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t *count, struct error *e)
@@ -480,6 +495,20 @@ int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t
 		*count = 0;
 	}
 	return rc;
+}
+
+uint64_t ledger_ended_count(struct ledger *l)
+{
+	static const char sql[] = "SELECT count(*) FROM main.jobs WHERE ended IS NOT NULL";
+	sqlite3_stmt *s = NULL;
+	if (l->counted)
+		return l->ended_count;
+	if (sqlite3_prepare_v2(l->db, sql, -1, &s, NULL) == SQLITE_OK && sqlite3_step(s) == SQLITE_ROW) {
+		l->ended_count = (uint64_t)sqlite3_column_int64(s, 0);
+		l->counted = true;
+	}
+	sqlite3_finalize(s);
+	return l->counted ? l->ended_count : 0;
 }
 
 int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)

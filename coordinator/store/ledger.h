@@ -57,6 +57,7 @@ int ledger_drop_submission(struct ledger *l, uint64_t id, struct error *e);
 enum ledger_which { LEDGER_ALL, LEDGER_LIVE, LEDGER_ENDED };
 /* Their ids, ascending; mem_alloc'd, NULL: none. */
 int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t *count, struct error *e);
+uint64_t ledger_ended_count(struct ledger *l); /* read once, then counted; 0 also if it cannot be read */
 /* Texts and bytes are valid until the next call. 1; 0: not found. */
 int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e);
 

@@ -24,6 +24,25 @@ if command -v jq >/dev/null; then
 fi
 "$BIN/hslt-status" | grep -q "^$id  *done" || fail "the table does not show the job"
 "$BIN/hslt-status" j99 2>/dev/null && fail "j99 cannot be known"
+# Of what has ended a snapshot says less than of the one job that is asked for.
+"$BIN/hslt-status" "$id" | grep -q "^ *on .*direct" || fail "the job is shown without its effects"
+"$BIN/hslt-status" --json | grep -q '"effects"' && fail "a snapshot has the effects of a job that ended"
+"$BIN/hslt-status" --json --all | grep -q "\"id\":\"$id\"" || fail "--all lacks the job"
+code 2 "$BIN/hslt-status" --all --watch
+if "${PYTHON:-python3}" -c '' 2>/dev/null; then
+	"${PYTHON:-python3}" -c '
+import socket, sys
+s = socket.socket(socket.AF_UNIX)
+s.bind(sys.argv[1])
+s.listen(1)
+c = s.accept()[0]
+c.sendall(b"{\"schema\":1,")
+c.close()' "$DIR/half" &
+	PIDS="$PIDS $!"
+	until_true 10 test -S "$DIR/half" || fail "no socket"
+	code 75 "$BIN/hslt-status" --socket "$DIR/half"
+	grep -q "the coordinator closed the connection" "$DIR/err.log" || fail "half a line: $(cat "$DIR/err.log")"
+fi
 if command -v socat >/dev/null; then
 	echo '{"subscribe":["jobs"]}' | socat -t 1 - "UNIX-CONNECT:$DIR/status" | head -n 1 | grep -q '"type":"snapshot"' ||
 		fail "socat reads no snapshot"

@@ -28,6 +28,7 @@ enum { LOOKS = 6000, LOOK_US = 10000 }; /* a minute */
 static char folder[64];
 static pid_t server;
 static uint16_t port;
+static void (*prepare)(const char *path);
 
 /* While the folder has a file `busy` nobody may look at the films of jobs. */
 static void on_look(uv_timer_t *t)
@@ -87,14 +88,22 @@ void served_set_busy(bool busy)
 	assert_true((access(held, F_OK) == 0) == busy);
 }
 
+void served_prepare(void (*spool)(const char *path))
+{
+	prepare = spool;
+}
+
 int served_start(double hello_seconds, double heartbeat_seconds, double stall_seconds)
 {
-	char spool[96], port_file[96];
+	char spool[96], port_file[96], status[96];
 	strcpy(folder, "/tmp/hslt-peers.XXXXXX");
 	if (!mkdtemp(folder))
 		return -1;
 	snprintf(spool, sizeof spool, "%s/spool", folder);
 	snprintf(port_file, sizeof port_file, "%s/port", folder);
+	snprintf(status, sizeof status, "%s/status", folder);
+	if (prepare)
+		prepare(spool);
 	fflush(NULL);
 	server = fork();
 	if (server == 0) {
@@ -103,6 +112,7 @@ int served_start(double hello_seconds, double heartbeat_seconds, double stall_se
 		c.listen = "127.0.0.1:0";
 		c.spool = spool;
 		c.port_file = port_file;
+		c.status_socket = status;
 		c.max_connections = 8;
 		c.max_fetches = 2;
 		c.hello_seconds = hello_seconds;

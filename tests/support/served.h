@@ -15,8 +15,10 @@
 /* Eight connections at most, two of them with a fetch under way; 0: it listens. What a test does not wait for is to
  * last longer than a busy machine stands still. */
 int served_start(double hello_seconds, double heartbeat_seconds, double stall_seconds);
-int served_stop(void **state);	 /* a teardown: fails when it did not end well */
-const char *served_folder(void); /* holds its spool; a file `nomem` there: its next connection gets no memory */
+int served_stop(void **state);			      /* a teardown: fails when it did not end well */
+void served_prepare(void (*spool)(const char *path)); /* what makes the spool of the next start; NULL: nothing */
+/* Holds its spool and its status socket, `status`; a file `nomem` there: its next connection gets no memory. */
+const char *served_folder(void);
 void served_set_busy(bool busy); /* nobody may look at the films of its jobs */
 long served_kilobytes(void);	 /* of memory */
 void served_still_works(void);

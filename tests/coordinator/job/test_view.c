@@ -39,7 +39,7 @@ static void json_shows_the_strategies(void **state)
 	struct job_record r = record();
 	struct job_view v;
 	view_of_record(&v, &r);
-	json_t *o = view_to_json(&v);
+	json_t *o = view_to_json(&v, true);
 	const json_t *list = json_object_get(o, "strategies"), *counts = json_object_get(o, "counts");
 	assert_int_equal(json_array_size(list), 2);
 	const json_t *hslt = json_array_get(list, 1);
@@ -67,7 +67,7 @@ static void json_of_other_jobs_has_none(void **state)
 	struct job_record r = {.id = 1, .state = "done"};
 	struct job_view v;
 	view_of_record(&v, &r);
-	json_t *o = view_to_json(&v);
+	json_t *o = view_to_json(&v, true);
 	assert_true(json_is_array(json_object_get(o, "strategies")) &&
 		    json_array_size(json_object_get(o, "strategies")) == 0);
 	assert_string_equal(json_string_value(json_object_get(o, "note")), "");
@@ -85,7 +85,7 @@ static void json_says_why_no_error_is_stated(void **state)
 		img.rel_mse_doubt = known ? ERROR_KNOWN : ERROR_SHORT;
 		record_take_error(&r, &img);
 		view_of_record(&v, &r);
-		json_t *o = view_to_json(&v);
+		json_t *o = view_to_json(&v, true);
 		const char *why = json_string_value(json_object_get(o, "errorDoubt"));
 		assert_string_equal(why, known ? "" : "the chains are too short to be judged");
 		assert_true(known ? fabs(json_number_value(json_object_get(o, "error")) - 0.3) < 1e-12
@@ -109,7 +109,7 @@ static void json_shows_the_forecast(void **state)
 	v.eta_high = -1;
 	v.halving_cpu = (struct forecast_range){1, 2, INFINITY};
 	v.halving_seconds = (struct forecast_range){1, 2, 3};
-	json_t *o = view_to_json(&v);
+	json_t *o = view_to_json(&v, true);
 	assert_non_null(o);
 	const json_t *half = json_object_get(o, "nextHalving"), *error = json_object_get(o, "errorNow");
 	assert_true(json_number_value(json_object_get(error, "high")) == sqrt(0.05 / 8));
@@ -118,11 +118,15 @@ static void json_shows_the_forecast(void **state)
 	assert_true(json_number_value(json_object_get(json_object_get(o, "etaRange"), "low")) == 20);
 	assert_int_equal(json_array_size(json_object_get(o, "looks")), 8);
 	json_decref(o);
-	strcpy(v.record.state, "done"); /* what has ended has no future, and its looks stay in the spool */
-	o = view_to_json(&v);
+	strcpy(v.record.state, "done"); /* what has ended has no future */
+	o = view_to_json(&v, true);
 	assert_true(json_is_null(json_object_get(o, "nextHalving")) && json_is_null(json_object_get(o, "etaRange")));
-	assert_null(json_object_get(o, "looks"));
+	assert_int_equal(json_array_size(json_object_get(o, "looks")), 8);
 	assert_true(json_is_object(json_object_get(o, "errorNow")));
+	json_decref(o);
+	o = view_to_json(&v, false);
+	assert_null(json_object_get(o, "looks"));
+	assert_true(json_is_object(json_object_get(o, "agreement")));
 	json_decref(o);
 }
 
@@ -143,7 +147,7 @@ static void shows_the_share(void **state)
 	Farm__JobStatus wire;
 	view_of_record(&v, &r);
 	view_add_status(&v, &s);
-	json_t *o = view_to_json(&v);
+	json_t *o = view_to_json(&v, true);
 	assert_true(whole(o, "workers") == 3 && whole(o, "machines") == 8);
 	assert_true(json_number_value(json_object_get(o, "share")) == 2.5);
 	assert_string_equal(json_string_value(json_object_get(o, "owner")), "ann");
@@ -158,7 +162,7 @@ static void shows_the_share(void **state)
 	assert_string_equal(wire.place, "3 of 8 machines; 1 job of another owner comes first");
 	assert_string_equal(wire.why, "waits for a job of another owner");
 	view_of_record(&v, &r);
-	o = view_to_json(&v);
+	o = view_to_json(&v, true);
 	assert_true(json_is_null(json_object_get(o, "share")));
 	json_decref(o);
 }

@@ -126,9 +126,12 @@ static void living_jobs(void **state)
 	assert_int_equal(next_live(l, 1, &j), 1);
 	assert_int_equal(j.id, 3);
 	assert_int_equal(next_live(l, 3, &j), 0);
+	assert_int_equal(ledger_ended_count(l), 1);
 	assert_int_equal(ledger_drop(l, (uint64_t[]){7, 3}, 2, &e), 0);
+	assert_int_equal(ledger_ended_count(l), 1);
 	assert_int_equal(ledger_get(l, 2, &j, &e), 1);
 	assert_int_equal(ledger_drop(l, (uint64_t[]){2, 3}, 2, &e), 0);
+	assert_int_equal(ledger_ended_count(l), 0);
 	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
 	assert_int_equal(ledger_get(l, 3, &j, &e), 1); /* it lives */
 	struct ledger_job again = {.id = 3, .owner = "", .name = "", .version = "", .record = ""};
@@ -203,17 +206,20 @@ static void extended(void **state)
 	assert_int_equal(ledger_extend(l, &more, &e), 0);
 	assert_int_equal(next_live(l, 0, &j), 1);
 	assert_true(j.extended == 0 && j.submission_size == 3 && j.plan_size == 2);
+	assert_int_equal(ledger_ended_count(l), 0);
 	more.extended = 1; /* its end could not be written */
 	assert_int_equal(ledger_extend(l, &more, &e), 0);
 	assert_int_equal(ledger_end(l, record_of(1, 0, "done"), false, &e), 0);
 	assert_int_equal(next_live(l, 0, &j), 1);
 	assert_int_equal(j.extended, 1);
 	assert_int_equal(ledger_end(l, record_of(1, 1, "done"), false, &e), 0);
+	assert_int_equal(ledger_ended_count(l), 1);
 	assert_int_equal(next_live(l, 0, &j), 0);
 	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
 	assert_true(j.submission_size == 0 && j.priority == -3 && j.mixed);
 	more.extended = 2;
 	assert_int_equal(ledger_extend(l, &more, &e), 0);
+	assert_int_equal(ledger_ended_count(l), 0);
 	more.id = 2;
 	assert_int_equal(ledger_extend(l, &more, &e), -ENOENT);
 	ledger_close(l);

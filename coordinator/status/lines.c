@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Snapshots go to every reader on every change, so an ended job is in them without its details, and only if it is among
+ * the last that ended. The details are sent for the one job that a reader asks for, and the jobs that ended earlier by
+ * the page.
+ */
+#include "coordinator/status/lines.h"
+
+#include "common/base/mem.h"
+#include "coordinator/jobs/listing.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+json_t *line_object(const char *type)
+{
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	return json_pack("{s:i s:s s:f}", "schema", 1, "type", type, "time",
+			 (double)now.tv_sec + 1e-9 * (double)now.tv_nsec);
+}
+
+json_t *line_error(const char *text)
+{
+	json_t *o = line_object("error");
+	json_object_set_new(o, "text", json_string(text));
+	return o;
+}
+
+/* "j12"; 0: not the name of a job */
+static uint64_t id_of(const char *name)
+{
+	char *end;
+	if (!name || *name != 'j' || name[1] < '0' || name[1] > '9')
+		return 0;
+	errno = 0;
+	unsigned long long id = strtoull(name + 1, &end, 10);
+	return *end || errno ? 0 : id;
+}
+
+void line_add_jobs(json_t *o, struct jobs *jobs)
+{
+	struct job_view *views;
+	size_t count = jobs_views(jobs, LINES_ENDED, &views);
+	uint64_t ended = ledger_ended_count(jobs->ledger), shown = 0;
+	json_t *list = json_array();
+	for (size_t i = 0; i < count; i++) {
+		bool live = !record_is_ended(&views[i].record);
+		shown += !live;
+		json_array_append_new(list, view_to_json(&views[i], live));
+	}
+	mem_free(views);
+	json_object_set_new(o, "jobs", list);
+	json_object_set_new(o, "endedOthers", json_integer(ended > shown ? (json_int_t)(ended - shown) : 0));
+}
+
+json_t *line_job(struct jobs *jobs, const char *name)
+{
+	char text[64];
+	struct job_view v;
+	uint64_t id = id_of(name);
+	if (!id || !jobs_view(jobs, id, &v)) {
+		snprintf(text, sizeof text, "there is no job %.32s", name);
+		return line_error(text);
+	}
+	json_t *o = line_object("job");
+	json_object_set_new(o, "job", view_to_json(&v, true));
+	return o;
+}
+
+json_t *line_ended(struct jobs *jobs, const char *before)
+{
+	struct error e;
+	struct job_view v;
+	uint64_t *ids, below = before ? id_of(before) : UINT64_MAX;
+	size_t count, end = 0;
+	if (ledger_ids(jobs->ledger, LEDGER_ENDED, &ids, &count, &e))
+		return line_error(e.text);
+	while (end < count && ids[end] < below)
+		end++;
+	size_t first = end > LINES_ENDED ? end - LINES_ENDED : 0;
+	json_t *o = line_object("ended"), *list = json_array();
+	for (size_t i = first; i < end; i++)
+		if (jobs_view(jobs, ids[i], &v))
+			json_array_append_new(list, view_to_json(&v, false));
+	json_object_set_new(o, "jobs", list);
+	json_object_set_new(o, "before", first ? json_sprintf("j%llu", (unsigned long long)ids[first]) : json_null());
+	mem_free(ids);
+	return o;
+}

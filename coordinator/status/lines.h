@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Lines of the status socket about jobs, as JSON; NULL if memory is out. The loop's thread. */
+#ifndef COORDINATOR_STATUS_LINES_H
+#define COORDINATOR_STATUS_LINES_H
+
+#include "coordinator/job/jobs.h"
+
+#include <jansson.h>
+
+enum { LINES_ENDED = 50 /* ended jobs in a snapshot, or on a page of them */ };
+
+json_t *line_object(const char *type); /* with schema, type and time */
+json_t *line_error(const char *text);
+/* Sets "jobs" (live ones, and the last LINES_ENDED that ended, without details) and "endedOthers", the number of those
+ * that ended before. */
+void line_add_jobs(json_t *o, struct jobs *jobs);
+json_t *line_job(struct jobs *jobs, const char *name); /* one job with its details, or an error; name: "j12" */
+/* A page: the last LINES_ENDED ended jobs whose ids are below that of the name, without details; NULL: of all. */
+json_t *line_ended(struct jobs *jobs, const char *before);
+
+#endif

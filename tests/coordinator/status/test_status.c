@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The status of a farm that keeps many jobs that have ended: snapshots stay small, what they leave out can be asked
+ * for, and a reader that is slow misses snapshots but is not cut off. One server for all tests.
+ */
+#include "coordinator/store/ledger.h"
+#include "tests/support/served.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+enum { ENDED = 300, LISTED = 50, SUBMITTED = 40 };
+
+/* As large as a record gets in practice: 24 effects. */
+static void fill_record(struct job_record *r, uint64_t id)
+{
+	json_t *effects = json_array();
+	record_begin(r, id, "finished", "");
+	strcpy(r->state, "done");
+	r->submitted = r->ended = (double)id;
+	r->ended_seen = 0;
+	for (int i = 0; i < 24; i++)
+		json_array_append_new(effects, json_pack("{s:s s:b s:s s:s}", "name", "an effect", "on", 1, "why",
+							 "it takes a long sentence to say why", "saves",
+							 "and another one to say what leaving it out would save"));
+	record_take_effects(r, effects);
+}
+
+static void make_spool(const char *path)
+{
+	struct ledger *l;
+	struct error e;
+	struct job_record *r = calloc(1, sizeof *r);
+	assert_non_null(r);
+	assert_int_equal(mkdir(path, 0700), 0);
+	assert_int_equal(ledger_open(&l, path, &e), 0);
+	for (uint64_t id = 1; id <= ENDED; id++) {
+		struct ledger_job j = {.id = id, .owner = "", .name = "finished", .version = "1", .record = ""};
+		fill_record(r, id);
+		assert_int_equal(ledger_add(l, &j, &e), 0);
+		assert_int_equal(ledger_end(l, r, false, &e), 0);
+	}
+	ledger_close(l);
+	free(r);
+}
+
+static int set_up(void **state)
+{
+	(void)state;
+	served_prepare(make_spool);
+	return served_start(60, 60, 60);
+}
+
+static FILE *call_status(void)
+{
+	struct sockaddr_un a = {.sun_family = AF_UNIX};
+	struct timeval minute = {.tv_sec = 60};
+	snprintf(a.sun_path, sizeof a.sun_path, "%s/status", served_folder());
+	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+	assert_int_equal(connect(fd, (const struct sockaddr *)&a, sizeof a), 0);
+	assert_int_equal(setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &minute, sizeof minute), 0);
+	FILE *f = fdopen(fd, "r");
+	assert_non_null(f);
+	return f;
+}
+
+static void say(FILE *f, const char *line)
+{
+	assert_int_equal(send(fileno(f), line, strlen(line), MSG_NOSIGNAL), strlen(line));
+}
+
+/* The next line; size may be NULL. */
+static json_t *hear(FILE *f, size_t *size)
+{
+	static char *line;
+	static size_t room;
+	json_error_t fault;
+	ssize_t n = getline(&line, &room, f);
+	assert_true(n > 0);
+	json_t *o = json_loadb(line, (size_t)n, 0, &fault);
+	assert_non_null(o);
+	if (size)
+		*size = (size_t)n;
+	return o;
+}
+
+static const char *text_of(const json_t *o, const char *key)
+{
+	const char *s = json_string_value(json_object_get(o, key));
+	return s ? s : "";
+}
+
+static const json_t *job_of(const json_t *o, size_t i)
+{
+	return json_array_get(json_object_get(o, "jobs"), i);
+}
+
+static void a_snapshot_is_small(void **state)
+{
+	(void)state;
+	size_t size;
+	FILE *f = call_status();
+	json_t *o = hear(f, &size);
+	assert_int_equal(json_array_size(json_object_get(o, "jobs")), LISTED);
+	assert_int_equal(json_integer_value(json_object_get(o, "endedOthers")), ENDED - LISTED);
+	assert_string_equal(text_of(job_of(o, 0), "id"), "j251");
+	assert_string_equal(text_of(job_of(o, LISTED - 1), "id"), "j300");
+	assert_null(json_object_get(job_of(o, 0), "effects"));
+	assert_string_equal(text_of(job_of(o, 0), "state"), "done");
+	assert_true(size < LISTED * 2000);
+	json_decref(o);
+	fclose(f);
+}
+
+static void one_job_has_its_details(void **state)
+{
+	(void)state;
+	FILE *f = call_status();
+	json_decref(hear(f, NULL));
+	say(f, "{\"job\":\"j7\"}\n{\"job\":\"j301\"}\n{\"job\":\"7\"}\n");
+	json_t *o = hear(f, NULL);
+	const json_t *job = json_object_get(o, "job");
+	assert_string_equal(text_of(o, "type"), "job");
+	assert_string_equal(text_of(job, "id"), "j7");
+	assert_int_equal(json_array_size(json_object_get(job, "effects")), 24);
+	json_decref(o);
+	o = hear(f, NULL);
+	assert_string_equal(text_of(o, "text"), "there is no job j301");
+	json_decref(o);
+	o = hear(f, NULL);
+	assert_string_equal(text_of(o, "text"), "there is no job 7");
+	json_decref(o);
+	fclose(f);
+}
+
+static void pages_list_all_that_ended(void **state)
+{
+	(void)state;
+	char question[64] = "{\"endedBefore\":null}\n";
+	uint64_t next = ENDED;
+	FILE *f = call_status();
+	json_decref(hear(f, NULL));
+	for (size_t page = 0; page < ENDED / LISTED; page++) {
+		say(f, question);
+		json_t *o = hear(f, NULL);
+		size_t count = json_array_size(json_object_get(o, "jobs"));
+		assert_int_equal(count, LISTED);
+		for (size_t i = count; i-- > 0; next--)
+			assert_int_equal(strtoull(text_of(job_of(o, i), "id") + 1, NULL, 10), next);
+		snprintf(question, sizeof question, "{\"endedBefore\":\"%s\"}\n", text_of(o, "before"));
+		assert_true(json_is_null(json_object_get(o, "before")) == (next == 0));
+		json_decref(o);
+	}
+	assert_int_equal(next, 0);
+	fclose(f);
+}
+
+static uint64_t newest_of(const json_t *snapshot)
+{
+	size_t count = json_array_size(json_object_get(snapshot, "jobs"));
+	return strtoull(text_of(job_of(snapshot, count - 1), "id") + 1, NULL, 10);
+}
+
+static void submit(struct scripted *client, uint64_t id)
+{
+	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	const Farm__SubmitAnswer *a = peer_submit_answer(client);
+	if (a->n_missing) {
+		peer_send_blob(client, "<scene/>", "<scene/>");
+		a = peer_submit_answer(client);
+	}
+	assert_int_equal(a->job, id);
+}
+
+/* Another one that reads shows that there was a snapshot of each job. What one gets that has not read meanwhile is what
+ * its socket held, what was on its way, and the newest. */
+static void a_slow_reader_gets_the_newest(void **state)
+{
+	(void)state;
+	FILE *quick = call_status(), *slow = call_status();
+	struct scripted *client = peer_call();
+	uint64_t last = ENDED + SUBMITTED, newest = 0, lines = 0;
+	json_decref(hear(quick, NULL));
+	say(quick, "{\"subscribe\":[\"snapshot\"]}\n");
+	say(slow, "{\"subscribe\":[\"snapshot\"]}\n");
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	for (uint64_t id = ENDED + 1; id <= last; id++) {
+		for (submit(client, id); newest < id;) {
+			json_t *o = hear(quick, NULL);
+			newest = newest_of(o);
+			json_decref(o);
+		}
+	}
+	for (newest = 0; newest < last; lines++) {
+		json_t *o = hear(slow, NULL);
+		newest = newest_of(o);
+		json_decref(o);
+	}
+	assert_true(lines < SUBMITTED / 2);
+	say(slow, "{\"job\":\"j340\"}\n");
+	json_t *o = hear(slow, NULL);
+	while (strcmp(text_of(o, "type"), "snapshot") == 0) {
+		json_decref(o);
+		o = hear(slow, NULL);
+	}
+	assert_string_equal(text_of(json_object_get(o, "job"), "id"), "j340");
+	json_decref(o);
+	fclose(quick);
+	fclose(slow);
+	scripted_hang_up(client);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_snapshot_is_small),
+		cmocka_unit_test(one_job_has_its_details),
+		cmocka_unit_test(pages_list_all_that_ended),
+		cmocka_unit_test(a_slow_reader_gets_the_newest),
+	};
+	return cmocka_run_group_tests(tests, set_up, served_stop);
+}
