@@ -4,7 +4,8 @@
  * looking up is a binary search, and only contents are read from the disk.
  *
  * Writing: blob_write_begin makes room and a temporary file, blob_write_add appends and hashes, blob_write_commit
- * compares the hash, flushes, renames and adds the entry. Until then the blob does not exist.
+ * compares the hash, flushes, renames and adds the entry. Until then the blob does not exist. blob_write_keep leaves
+ * flushing and renaming to a batch; the entry is there from then on, but counts as missing until blob_enter.
  *
  * Failures: a wrong hash or more bytes than announced are -EBADMSG, and the temporary file is removed. A full disk is
  * -ENOSPC, after every blob that is not held has been evicted. A blob whose file has disappeared or changed is found by
@@ -49,48 +50,10 @@ struct blob_writer {
 	struct blob_hash hash;
 	uint64_t size, at;
 	int fd;
-	char path[PATH_MOST]; /* of the temporary file */
+	uint64_t number;      /* of the temporary file */
+	char path[PATH_MOST]; /* the same file's */
 	EVP_MD_CTX *md;
 };
-
-/* ---- hashes ---- */
-
-int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e)
-{
-	unsigned n = 0;
-	if (EVP_Digest(bytes, size, out->bytes, &n, EVP_sha256(), NULL) != 1 || n != BLOB_HASH_SIZE)
-		return error_set(e, EIO, "SHA-256 failed");
-	return 0;
-}
-
-void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE])
-{
-	for (int i = 0; i < BLOB_HASH_SIZE; i++)
-		snprintf(hex + 2 * i, 3, "%02x", h->bytes[i]);
-}
-
-static int digit(char c)
-{
-	return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
-static bool from_hex(const char *hex, struct blob_hash *h)
-{
-	if (strlen(hex) != 2 * BLOB_HASH_SIZE)
-		return false;
-	for (int i = 0; i < BLOB_HASH_SIZE; i++) {
-		int high = digit(hex[2 * i]), low = digit(hex[2 * i + 1]);
-		if (high < 0 || low < 0)
-			return false;
-		h->bytes[i] = (uint8_t)(high << 4 | low);
-	}
-	return true;
-}
-
-bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b)
-{
-	return memcmp(a->bytes, b->bytes, BLOB_HASH_SIZE) == 0;
-}
 
 /* ---- the store ---- */
 
@@ -193,7 +156,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 		path_of(s, f->d_name, path);
 		if (strncmp(f->d_name, "tmp.", 4) == 0)
 			disk_unlink(path);
-		if (!from_hex(f->d_name, &h))
+		if (!blob_from_hex(f->d_name, &h))
 			continue;
 		if (disk_stat(path, &st)) { /* if it cannot be read it is kept */
 			rc = error_set(e, errno, "%s: %s", path, strerror(errno));
@@ -504,14 +467,13 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	struct blob_writer *w = mem_alloc(1, sizeof *w);
 	if (!w)
 		return error_set(e, ENOMEM, "no memory for a blob");
-	char name[48];
 	w->store = s;
 	w->hash = *h;
 	w->size = size;
 	s->promised += size;
 	w->md = EVP_MD_CTX_new();
-	snprintf(name, sizeof name, "tmp.%ld.%llu", (long)getpid(), (unsigned long long)++s->temporary);
-	path_of(s, name, w->path);
+	w->number = ++s->temporary;
+	blob_temporary_path(s, w->number, w->path, sizeof w->path);
 	w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	if (w->fd < 0)
 		rc = error_set(e, errno, "%s: %s", s->folder, strerror(errno));
@@ -542,11 +504,10 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 	return 0;
 }
 
-static int finish(struct blob_writer *w, struct error *e)
+static int check_written(struct blob_writer *w, struct error *e)
 {
-	struct blob_store *s = w->store;
 	struct blob_hash got;
-	char hex[BLOB_HEX_SIZE], path[PATH_MOST];
+	char hex[BLOB_HEX_SIZE];
 	if (w->at != w->size)
 		return error_set(e, EBADMSG, "a blob of %llu bytes instead of %llu", (unsigned long long)w->at,
 				 (unsigned long long)w->size);
@@ -555,6 +516,26 @@ static int finish(struct blob_writer *w, struct error *e)
 	blob_hex(&w->hash, hex);
 	if (!blob_hash_equal(&got, &w->hash))
 		return error_set(e, EBADMSG, "the bytes do not match the blob %s", hex);
+	return 0;
+}
+
+/* Its file is there, and right. */
+static void come_back(struct blob_store *s, struct entry *n, uint64_t size)
+{
+	n->gone = n->given = false;
+	n->size = size;
+	s->bytes += size;
+	n->used = ++s->clock;
+	n->checked = clock_seconds();
+}
+
+static int finish(struct blob_writer *w, struct error *e)
+{
+	struct blob_store *s = w->store;
+	char path[PATH_MOST];
+	int rc = check_written(w, e);
+	if (rc)
+		return rc;
 	if (blob_hold(s, &w->hash)) { /* another writer stored it meanwhile */
 		disk_unlink(w->path);
 		return 0;
@@ -562,21 +543,11 @@ static int finish(struct blob_writer *w, struct error *e)
 	blob_path(s, &w->hash, path, sizeof path);
 	if (disk_fsync(w->fd) || disk_rename(w->path, path))
 		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
-	int rc = disk_sync_folder(s->folder, e);
-	struct entry *n = find(s, &w->hash); /* it was held before it was there */
-	if (!rc && n) {
-		n->gone = false;
-		n->size = w->size;
-		s->bytes += w->size;
-		n->holds++;
-	}
-	if (!rc && !n)
-		rc = add_entry(s, &w->hash, w->size, 1, e);
-	if (!rc) {
-		n = find(s, &w->hash);
-		n->checked = clock_seconds();
-		n->given = false;
-	}
+	rc = disk_sync_folder(s->folder, e);
+	if (!rc)
+		rc = blob_expect(s, &w->hash, e);
+	if (!rc)
+		come_back(s, find(s, &w->hash), w->size);
 	return rc;
 }
 
@@ -603,4 +574,47 @@ void blob_write_abort(struct blob_writer *w)
 	if (w->fd >= 0)
 		disk_unlink(w->path);
 	writer_free(w);
+}
+
+/* ---- files of a batch ---- */
+
+void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path, size_t size)
+{
+	snprintf(path, size, "%s/tmp.%ld.%llu", s->folder, (long)getpid(), (unsigned long long)number);
+}
+
+int blob_sync_folder(const struct blob_store *s, struct error *e)
+{
+	return disk_sync_folder(s->folder, e);
+}
+
+int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e)
+{
+	int rc = check_written(w, e);
+	if (!rc)
+		rc = blob_expect(w->store, &w->hash, e);
+	if (rc) {
+		blob_write_abort(w);
+		return rc;
+	}
+	*kept = (struct blob_kept){w->hash, w->size, w->number};
+	w->size = 0; /* what was promised for it stays so */
+	writer_free(w);
+	return 0;
+}
+
+void blob_enter(struct blob_store *s, const struct blob_kept *kept)
+{
+	struct entry *n = find(s, &kept->hash);
+	if (n->gone)
+		come_back(s, n, kept->size);
+}
+
+void blob_let_go(struct blob_store *s, const struct blob_kept *kept)
+{
+	s->promised -= kept->size;
+	blob_release(s, &kept->hash);
+	struct entry *n = find(s, &kept->hash);
+	if (n->gone && !n->holds)
+		remove_entry(s, n);
 }

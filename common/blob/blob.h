@@ -8,20 +8,11 @@
 #define COMMON_BLOB_BLOB_H
 
 #include "common/base/error.h"
+#include "common/blob/blob_hash.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-enum { BLOB_HASH_SIZE = 32, BLOB_HEX_SIZE = 65 };
-
-struct blob_hash {
-	uint8_t bytes[BLOB_HASH_SIZE];
-};
-
-int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e);
-void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE]);
-bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b);
 
 struct blob_store;
 
@@ -70,5 +61,18 @@ uint64_t blob_write_at(const struct blob_writer *w); /* bytes written so far */
 int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e);
 int blob_write_commit(struct blob_writer *w, struct error *e); /* frees the writer in any case */
 void blob_write_abort(struct blob_writer *w);
+
+/* For blob_batch.c: a file that is complete and checked, but neither flushed nor renamed. Its entry is held and counts
+ * as missing, so that nothing is evicted under its name. Any thread may ask for paths and for blob_sync_folder. */
+struct blob_kept {
+	struct blob_hash hash;
+	uint64_t size, number; /* number: of the temporary file */
+};
+
+void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path, size_t size);
+int blob_sync_folder(const struct blob_store *s, struct error *e);
+int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e); /* frees the writer in any case */
+void blob_enter(struct blob_store *s, const struct blob_kept *kept);  /* its file has its name and is flushed */
+void blob_let_go(struct blob_store *s, const struct blob_kept *kept); /* once for each that was kept */
 
 #endif

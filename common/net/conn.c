@@ -18,6 +18,7 @@
 
 enum {
 	READ_BYTES = 1 << 16,
+	FRAMES_AT_ONCE = 16, /* after a read with more of them, others are read first */
 	TICK_MS = 250,
 	TICK_MS_MOST = 1000, /* if nothing is due earlier */
 	LINGER_MS = 5000,
@@ -41,6 +42,7 @@ struct conn {
 	uint64_t checked;			/* ms of the loop's clock: the next check of the peer's certificate */
 	uint64_t linger_until;			/* 0: not closing */
 	int open_handles;
+	unsigned frames; /* in the last read */
 	bool accepted, sniffed;
 	bool distrust, garbled;
 	char why[256];
@@ -95,11 +97,15 @@ static void tick_every(struct conn *c, uint64_t ms)
 
 /* ---- reading ---- */
 
+/* libuv reads a connection again and again while there is something to read, up to 32 times before any other. Without
+ * room it goes on to the next connection. */
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 {
 	(void)suggested;
-	(void)h;
-	*out = uv_buf_init(chunk, sizeof chunk);
+	struct conn *c = h->data;
+	bool pause = c->frames > FRAMES_AT_ONCE;
+	c->frames = 0;
+	*out = uv_buf_init(chunk, pause ? 0 : sizeof chunk);
 }
 
 static void deliver(struct conn *c)
@@ -140,6 +146,7 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 			c->garbled = rc == -EILSEQ;
 			conn_close(c, e.text);
 		} else if (rc) {
+			c->frames++;
 			deliver(c);
 			frame_reader_drop(
 				&c->reader); /* now, rather than with the next frame, which may be seconds away */
@@ -206,6 +213,8 @@ static bool is_tls(struct conn *c, const char *bytes, size_t size)
 static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 {
 	struct conn *c = s->data;
+	if (count == UV_ENOBUFS)
+		return;
 	if (count < 0) {
 		bool midway = c->link && !tls_link_is_open(c->link);
 		conn_close(c, count != UV_EOF ? uv_strerror((int)count)

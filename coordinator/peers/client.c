@@ -159,6 +159,24 @@ void client_file_read(struct session *p, const struct blob_hash *h, bool right)
 		look_for_files(p);
 }
 
+static void refuse_upload(struct session *p, const struct error *e)
+{
+	answer_submit(p, 0, e->text, NULL);
+	client_upload_abort(p);
+}
+
+static void on_flushed(void *user, int rc, const struct error *why)
+{
+	struct session *p = user;
+	struct error e = *why;
+	if (p->state != SESSION_CLIENT || p->jobs->stopping)
+		return;
+	if (!rc && p->upload->missing_count == 0)
+		submit(p);
+	else if (rc || upload_flush(p->upload, p->jobs->loop, on_flushed, p, &e))
+		refuse_upload(p, &e);
+}
+
 static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
@@ -167,15 +185,13 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 		return;
 	}
 	int rc = upload_add(p->upload, c, payload, size, &e);
-	if (rc < 0) {
-		answer_submit(p, 0, e.text, NULL);
-		client_upload_abort(p);
-	} else if (rc) {
+	if (rc > 0) {
 		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id,
 			  (unsigned long long)c->size);
-		if (p->upload->missing_count == 0)
-			submit(p);
+		rc = upload_flush(p->upload, p->jobs->loop, on_flushed, p, &e);
 	}
+	if (rc < 0)
+		refuse_upload(p, &e);
 }
 
 /* ---- other requests ---- */

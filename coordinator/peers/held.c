@@ -58,7 +58,7 @@ void held_tick(struct session *p)
 {
 	Farm__Heartbeat beat;
 	Farm__Envelope m;
-	bool waits = p->held || (p->upload && upload_is_looking(p->upload));
+	bool waits = p->held || (p->upload && (upload_is_looking(p->upload) || p->upload->flush));
 	if (!waits || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
 		return;
 	p->told = jobs_now(p->jobs);

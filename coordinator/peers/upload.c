@@ -4,8 +4,9 @@
  *
  * upload_new checks it: names and texts, that paths stay inside the bundle, sizes against the limits, and the plan.
  * upload_look holds the files that the spool has, each once it has been read and is right. The client is told the
- * hashes of the others and sends these, each in order, and upload_add stores them under their hashes. When none is
- * missing any more, the job can be submitted.
+ * hashes of the others and sends these, each in order, and upload_add writes them. The pool flushes what has arrived
+ * while more arrives: a scene may have thousands of small files. What is flushed is stored under its hash and held.
+ * When none is missing any more, the job can be submitted.
  *
  * Errors are -EINVAL with a sentence for the client, including bytes with a wrong hash or out of order. upload_free
  * releases everything that is held.
@@ -25,6 +26,16 @@ enum { FILES_MAX = 10000, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1
  * each is 30 us. Without that a mistyped --epoch takes a farm from all others for days. */
 enum { LEASE_MOST = 1 << 27 };
 static const uint64_t job_cache_max = 1ull << 34; /* 16 GiB */
+
+struct upload_flush {
+	uv_work_t work;
+	struct upload *upload; /* NULL: it was freed */
+	struct blob_batch *batch;
+	upload_flushed done;
+	void *user;
+	int rc;
+	struct error error;
+};
 
 /* A relative path without "..": what a scene may refer to, and a worker may look up. */
 static bool name_ok(const char *name)
@@ -214,17 +225,19 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 	if (rc)
 		return rc;
 	struct upload *u = mem_alloc(1, sizeof *u);
-	bool *held = mem_alloc(m->n_files, sizeof *held);
+	bool *held = mem_alloc(m->n_files, sizeof *held), *arrived = mem_alloc(m->n_files, sizeof *arrived);
 	uint32_t *by_hash = mem_alloc(m->n_files, sizeof *by_hash);
-	if (!u || !held || !by_hash) {
+	if (!u || !held || !arrived || !by_hash) {
 		mem_free(u);
 		mem_free(held);
+		mem_free(arrived);
 		mem_free(by_hash);
 		return error_set(e, ENOMEM, "no memory for a submission");
 	}
 	u->plan = plan;
 	memcpy(u->rule, rule, sizeof rule);
 	u->held = held;
+	u->arrived = arrived;
 	u->by_hash = by_hash;
 	u->blobs = blobs;
 	u->submit = *submit;
@@ -270,6 +283,9 @@ void upload_free(struct upload *u)
 {
 	if (u->writer)
 		blob_write_abort(u->writer);
+	if (u->flush)
+		u->flush->upload = NULL;
+	blob_batch_free(u->batch);
 	const Farm__Submit *m = u->submit.message ? u->submit.message->submit : NULL;
 	for (size_t i = 0; m && i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
@@ -278,6 +294,7 @@ void upload_free(struct upload *u)
 	}
 	envelope_fini(&u->submit);
 	mem_free(u->held);
+	mem_free(u->arrived);
 	mem_free(u->by_hash);
 	mem_free(u);
 }
@@ -287,7 +304,22 @@ static const Farm__File *missing_file(const struct upload *u, const struct blob_
 	const Farm__Submit *m = u->submit.message->submit;
 	size_t at = place_of(u, h);
 	const Farm__File *f = at < m->n_files ? m->files[u->by_hash[at]] : NULL;
-	return f && !u->held[u->by_hash[at]] && memcmp(f->hash.data, h->bytes, BLOB_HASH_SIZE) == 0 ? f : NULL;
+	return f && !u->held[u->by_hash[at]] && !u->arrived[at] && memcmp(f->hash.data, h->bytes, BLOB_HASH_SIZE) == 0
+		       ? f
+		       : NULL;
+}
+
+/* The writer has all bytes of its blob. */
+static int keep_blob(struct upload *u, struct error *e)
+{
+	struct blob_writer *w = u->writer;
+	if (!u->batch && !(u->batch = blob_batch_new(u->blobs)))
+		return error_set(e, ENOMEM, "no memory for a submission");
+	u->writer = NULL;
+	int rc = blob_batch_add(u->batch, w, e);
+	if (!rc)
+		u->arrived[place_of(u, &u->writing)] = true;
+	return rc;
 }
 
 int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e)
@@ -310,13 +342,51 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 		rc = blob_write_add(u->writer, payload, size, e);
 	if (rc || blob_write_at(u->writer) < c->size)
 		return rc;
-	rc = blob_write_commit(u->writer, e);
-	u->writer = NULL;
-	if (rc)
-		return rc;
-	hold_blob(u, &h);
-	blob_release(u->blobs, &h); /* releases the writer's hold; each file has its own now */
-	return 1;
+	rc = keep_blob(u, e);
+	return rc ? rc : 1;
+}
+
+static void run_flush(uv_work_t *work)
+{
+	struct upload_flush *f = work->data;
+	f->rc = blob_batch_flush(f->batch, &f->error);
+}
+
+static void flush_done(uv_work_t *work, int status)
+{
+	(void)status;
+	struct upload_flush *f = work->data;
+	struct upload *u = f->upload;
+	if (u)
+		u->flush = NULL;
+	if (u && !f->rc) {
+		blob_batch_enter(f->batch);
+		for (size_t i = 0; i < blob_batch_count(f->batch); i++)
+			hold_blob(u, blob_batch_hash(f->batch, i));
+	}
+	blob_batch_free(f->batch);
+	if (u)
+		f->done(f->user, f->rc, &f->error);
+	mem_free(f);
+}
+
+int upload_flush(struct upload *u, uv_loop_t *loop, upload_flushed done, void *user, struct error *e)
+{
+	if (u->flush || !u->batch)
+		return 0;
+	struct upload_flush *f = mem_alloc(1, sizeof *f);
+	if (!f)
+		return error_set(e, ENOMEM, "no memory for a submission");
+	*f = (struct upload_flush){.upload = u, .batch = u->batch, .done = done, .user = user};
+	f->work.data = f;
+	int rc = uv_queue_work(loop, &f->work, run_flush, flush_done);
+	if (rc) {
+		mem_free(f);
+		return error_set(e, -rc, "its files cannot be flushed: %s", uv_strerror(rc));
+	}
+	u->flush = f;
+	u->batch = NULL;
+	return 0;
 }
 
 size_t upload_missing(const struct upload *u, struct blob_hash *hashes)

@@ -6,10 +6,14 @@
 #ifndef COORDINATOR_PEERS_UPLOAD_H
 #define COORDINATOR_PEERS_UPLOAD_H
 
-#include "common/blob/blob.h"
+#include "common/blob/blob_batch.h"
 #include "common/plan/plan.h"
 #include "common/wire/envelope.h"
 #include "coordinator/job/jobs.h"
+
+#include <uv.h>
+
+struct upload_flush;
 
 struct upload {
 	struct envelope submit; /* owned */
@@ -18,10 +22,13 @@ struct upload {
 	struct blob_store *blobs;
 	bool *held;	      /* by file: its blob is in the store and held */
 	uint32_t *by_hash;    /* the files, sorted by hash */
+	bool *arrived;	      /* by place in by_hash: its blob has arrived, and may not be flushed yet */
 	size_t looked;	      /* so many files have been looked for in the store */
 	size_t missing_count; /* of these, not held */
 	struct blob_writer *writer;
 	struct blob_hash writing;
+	struct blob_batch *batch;   /* blobs that arrived and wait for the next flush; NULL: none */
+	struct upload_flush *flush; /* is running; NULL: none */
 };
 
 /* Takes the envelope of a Submit. bandwidth: as in struct plan_request. -EINVAL with a sentence for the client. */
@@ -33,8 +40,12 @@ bool upload_is_looking(const struct upload *u);
 bool upload_file_read(struct upload *u, const struct blob_hash *h, bool right);
 void upload_free(struct upload *u); /* releases the blobs that it holds */
 
-/* One chunk from the client. 1: a blob is complete. */
+/* One chunk from the client. 1: a blob is complete, and waits for upload_flush. */
 int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e);
+/* The pool flushes what has arrived, unless it is doing so already. Then `done` is called, unless the upload was freed
+ * meanwhile; what was flushed is no longer missing, but more may have arrived. */
+typedef void (*upload_flushed)(void *user, int rc, const struct error *e);
+int upload_flush(struct upload *u, uv_loop_t *loop, upload_flushed done, void *user, struct error *e);
 /* Each missing hash once, ascending. Returns the number; hashes has room for missing_count. */
 size_t upload_missing(const struct upload *u, struct blob_hash *hashes);
 

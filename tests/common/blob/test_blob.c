@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The store keeps what it was given under its true name, refuses what is not it, and forgets the oldest first. */
 #include "common/base/disk.h"
-#include "common/blob/blob.h"
+#include "common/blob/blob_batch.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>
@@ -329,6 +329,88 @@ static void checked_in_parts(void **state)
 	blob_store_close(s);
 }
 
+static struct blob_writer *write_text(struct blob_store *s, const char *text, struct blob_hash *h)
+{
+	struct blob_writer *w;
+	struct error e;
+	assert_int_equal(blob_hash_bytes(text, strlen(text), h, &e), 0);
+	assert_int_equal(blob_write_begin(&w, s, h, strlen(text), &e), 0);
+	assert_int_equal(blob_write_add(w, text, strlen(text), &e), 0);
+	return w;
+}
+
+/* What a batch has is there once it was entered, and not before; what was not is gone, and so is the room for it. */
+static void flushed_together(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_hash h[3];
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	struct blob_batch *b = blob_batch_new(s);
+	assert_int_equal(blob_batch_add(b, write_text(s, "0123456789", &h[0]), &e), 0);
+	assert_int_equal(blob_batch_add(b, write_text(s, "abcdefghij", &h[1]), &e), 0);
+	assert_int_equal(blob_batch_count(b), 2);
+	assert_false(blob_has(s, &h[0], NULL) || blob_hold(s, &h[1]));
+	assert_int_equal(blob_batch_flush(b, &e), 0);
+	assert_false(blob_has(s, &h[0], NULL));
+	blob_batch_enter(b);
+	assert_true(blob_has(s, &h[0], NULL) && blob_has(s, &h[1], NULL));
+	assert_true(blob_hold(s, blob_batch_hash(b, 0)));
+	blob_batch_free(b);
+	b = blob_batch_new(s); /* its ten bytes fit, and h[1] need not go for them */
+	assert_int_equal(blob_batch_add(b, write_text(s, "ABCDEFGHIJ", &h[2]), &e), 0);
+	blob_batch_free(b);
+	assert_true(blob_has(s, &h[1], NULL) && !blob_has(s, &h[2], NULL));
+	assert_int_equal(bytes_of_folder(), 20);
+	struct blob_hash other = store_text(s, "ABCDEFGHIJ");
+	assert_true(blob_hash_equal(&other, &h[2]) && blob_has(s, &h[1], NULL));
+	blob_store_close(s);
+}
+
+/* Two send the same: one of them stores it first, and neither loses it. */
+static void stored_meanwhile(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_hash h;
+	struct error e;
+	uint64_t size;
+	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	struct blob_batch *b = blob_batch_new(s);
+	assert_int_equal(blob_batch_add(b, write_text(s, "0123456789", &h), &e), 0);
+	store_text(s, "0123456789");
+	blob_release(s, &h);
+	assert_int_equal(blob_batch_flush(b, &e), 0);
+	blob_batch_enter(b);
+	blob_batch_free(b);
+	assert_true(blob_has(s, &h, &size) && size == 10);
+	struct blob_hash more = store_text(s, "twenty bytes of text"); /* which fit beside it */
+	assert_true(blob_has(s, &h, NULL) && blob_has(s, &more, NULL));
+	blob_store_close(s);
+}
+
+/* The power goes before the flush: the next start finds nothing of it. */
+static void not_flushed(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_hash h;
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	struct blob_batch *b = blob_batch_new(s);
+	assert_int_equal(blob_batch_add(b, write_text(s, "0123456789", &h), &e), 0);
+	struct blob_store *next;
+	assert_int_equal(blob_store_open(&next, folder, 0, &e), 0);
+	assert_false(blob_has(next, &h, NULL));
+	assert_int_equal(bytes_of_folder(), 0);
+	blob_store_close(next);
+	assert_int_equal(blob_batch_flush(b, &e), -ENOENT);
+	blob_batch_free(b);
+	assert_false(blob_has(s, &h, NULL));
+	blob_store_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -341,6 +423,9 @@ int main(void)
 		cmocka_unit_test_setup_teardown(damaged_at_rest, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(flushed_together, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(stored_meanwhile, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(not_flushed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

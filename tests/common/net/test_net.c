@@ -293,6 +293,25 @@ static void on_drip(uv_timer_t *t)
 		uv_timer_stop(t);
 }
 
+/* Between two looks at the other sockets one is read once, however much it has sent. */
+static void many_frames_keep_nobody_waiting(void **state)
+{
+	(void)state;
+	enum { FRAMES = 8000, BYTES = 100, MOST = (1 << 16) / BYTES };
+	int before = 0, most = 0;
+	connect_ends();
+	for (int i = 0; i < FRAMES; i++)
+		send_bye(&here, BYTES);
+	while (there.messages < FRAMES && !there.closed) {
+		uv_run(&loop, UV_RUN_ONCE);
+		most = there.messages - before > most ? there.messages - before : most;
+		before = there.messages;
+	}
+	assert_int_equal(there.messages, FRAMES);
+	assert_in_range(most, 1, MOST);
+	close_ends();
+}
+
 /* Its bytes are words, and after 0.8 s it is whole; its time is over after 16.5 s: half a second and one for each 64
  * KB. */
 static void a_slow_frame_is_heard(void **state)
@@ -444,12 +463,12 @@ static void a_live_connection_is_checked_again(void **state)
 	assert_int_equal(remove(list), 0);
 }
 
-#define EITHER_WAY                                                                                       \
-	cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive),                  \
-		cmocka_unit_test(limits_close), cmocka_unit_test(who_does_not_read_is_cut_off),          \
-		cmocka_unit_test(half_a_frame_is_not_waited_for), cmocka_unit_test(changed_bytes_close), \
-		cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard),    \
-		cmocka_unit_test(a_late_reader_waits)
+#define EITHER_WAY                                                                                                \
+	cmocka_unit_test(many_frames_keep_nobody_waiting), cmocka_unit_test(frames_go_both_ways),                 \
+		cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close),                          \
+		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(half_a_frame_is_not_waited_for), \
+		cmocka_unit_test(changed_bytes_close), cmocka_unit_test(silence_is_not_waited_for),               \
+		cmocka_unit_test(a_slow_frame_is_heard), cmocka_unit_test(a_late_reader_waits)
 
 int main(void)
 {

@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The files have temporary names until all of them are flushed; then they get their own, and the folder is flushed. If
+ * a flush fails, those that have their names already stay: the next start reads them, and they are checked before use.
+ */
+#include "common/blob/blob_batch.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+
+#include <string.h>
+
+enum { PATH_MOST = 4096 };
+
+struct blob_batch {
+	struct blob_store *store;
+	struct blob_kept *kept;
+	size_t count, capacity;
+	size_t renamed;
+};
+
+struct blob_batch *blob_batch_new(struct blob_store *s)
+{
+	struct blob_batch *b = mem_alloc(1, sizeof *b);
+	if (b)
+		b->store = s;
+	return b;
+}
+
+static int reserve(struct blob_batch *b, struct error *e)
+{
+	if (b->count < b->capacity)
+		return 0;
+	size_t want = b->capacity ? 2 * b->capacity : 16;
+	struct blob_kept *grown = mem_grow(b->kept, b->capacity * sizeof *grown, want * sizeof *grown);
+	if (!grown)
+		return error_set(e, ENOMEM, "no memory for the list of blobs");
+	b->kept = grown;
+	b->capacity = want;
+	return 0;
+}
+
+int blob_batch_add(struct blob_batch *b, struct blob_writer *w, struct error *e)
+{
+	int rc = reserve(b, e);
+	if (rc)
+		blob_write_abort(w);
+	else
+		rc = blob_write_keep(w, &b->kept[b->count], e);
+	b->count += !rc;
+	return rc;
+}
+
+size_t blob_batch_count(const struct blob_batch *b)
+{
+	return b->count;
+}
+
+const struct blob_hash *blob_batch_hash(const struct blob_batch *b, size_t i)
+{
+	return &b->kept[i].hash;
+}
+
+static int flush_file(const char *path, struct error *e)
+{
+	int fd = disk_open(path, O_WRONLY | O_CLOEXEC | O_NOFOLLOW, 0);
+	int rc = fd < 0 || disk_fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	if (fd >= 0)
+		disk_close(fd);
+	return rc;
+}
+
+int blob_batch_flush(struct blob_batch *b, struct error *e)
+{
+	char from[PATH_MOST], to[PATH_MOST];
+	int rc = 0;
+	for (size_t i = 0; !rc && i < b->count; i++) {
+		blob_temporary_path(b->store, b->kept[i].number, from, sizeof from);
+		rc = flush_file(from, e);
+	}
+	for (; !rc && b->renamed < b->count; b->renamed += !rc) {
+		const struct blob_kept *k = &b->kept[b->renamed];
+		blob_temporary_path(b->store, k->number, from, sizeof from);
+		blob_path(b->store, &k->hash, to, sizeof to);
+		if (disk_rename(from, to))
+			rc = error_set(e, errno, "%s: %s", to, strerror(errno));
+	}
+	return rc ? rc : blob_sync_folder(b->store, e);
+}
+
+void blob_batch_enter(struct blob_batch *b)
+{
+	for (size_t i = 0; i < b->count; i++)
+		blob_enter(b->store, &b->kept[i]);
+}
+
+void blob_batch_free(struct blob_batch *b)
+{
+	char path[PATH_MOST];
+	if (!b)
+		return;
+	for (size_t i = 0; i < b->count; i++) {
+		if (i >= b->renamed) {
+			blob_temporary_path(b->store, b->kept[i].number, path, sizeof path);
+			disk_unlink(path);
+		}
+		blob_let_go(b->store, &b->kept[i]);
+	}
+	mem_free(b->kept);
+	mem_free(b);
+}

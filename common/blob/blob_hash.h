@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* SHA-256 of bytes, and as a name. Any thread. */
+#ifndef COMMON_BLOB_BLOB_HASH_H
+#define COMMON_BLOB_BLOB_HASH_H
+
+#include "common/base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { BLOB_HASH_SIZE = 32, BLOB_HEX_SIZE = 65 };
+
+struct blob_hash {
+	uint8_t bytes[BLOB_HASH_SIZE];
+};
+
+int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e);
+void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE]);
+bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b);
+bool blob_from_hex(const char *hex, struct blob_hash *h);
+
+#endif

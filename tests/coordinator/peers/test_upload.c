@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A scene of many small files: the loop's thread flushes none of them, the job is acknowledged when all are flushed,
+ * and what a client leaves behind that goes midway is removed.
+ */
+#include "common/base/disk.h"
+#include "tests/support/served.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+enum { FILES = 400 };
+
+/* Shared with the server. */
+static struct flushes {
+	_Atomic unsigned on_loop, elsewhere;
+} * flushes;
+
+static int counted_fsync(int fd)
+{
+	if (gettid() == getpid())
+		flushes->on_loop++;
+	else
+		flushes->elsewhere++;
+	return fsync(fd);
+}
+
+static void count_flushes(const char *spool)
+{
+	(void)spool;
+	static struct disk counted;
+	counted = disk_system;
+	counted.fsync = counted_fsync;
+	disk_use(&counted);
+}
+
+static int set_up(void **state)
+{
+	(void)state;
+	flushes = mmap(NULL, sizeof *flushes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	assert_true(flushes != MAP_FAILED);
+	served_prepare(count_flushes);
+	return served_start(60, 60, 60);
+}
+
+static int tear_down(void **state)
+{
+	munmap(flushes, sizeof *flushes);
+	return served_stop(state);
+}
+
+static void text_of(int i, char text[32])
+{
+	snprintf(text, 32, i ? "v %d 0 0\n" : "<scene/>", i);
+}
+
+/* A scene and FILES - 1 files of a few bytes. */
+static void submit_many(struct scripted *client)
+{
+	static Farm__File files[FILES], *list[FILES];
+	static struct blob_hash hashes[FILES];
+	static char names[FILES][16];
+	struct error e;
+	char text[32], name[] = "many", scene[] = "0";
+	Farm__Submit s;
+	Farm__PlanRequest plan;
+	Farm__Envelope m;
+	struct plan_request r = peer_plan_request(NULL);
+	plan_request_to_wire(&r, &plan);
+	farm__submit__init(&s);
+	farm__envelope__init(&m);
+	for (int i = 0; i < FILES; i++) {
+		text_of(i, text);
+		snprintf(names[i], sizeof names[i], "%d", i);
+		assert_int_equal(blob_hash_bytes(text, strlen(text), &hashes[i], &e), 0);
+		farm__file__init(&files[i]);
+		files[i].name = names[i];
+		files[i].hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hashes[i].bytes};
+		files[i].size = strlen(text);
+		list[i] = &files[i];
+	}
+	s.name = name;
+	s.scene = scene;
+	s.plan = &plan;
+	s.n_files = FILES;
+	s.files = list;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
+	m.submit = &s;
+	peer_say(client, &m, NULL, 0);
+}
+
+static void send_files(struct scripted *client, int from, int end)
+{
+	for (int i = from; i < end; i++) {
+		char text[32];
+		text_of(i, text);
+		peer_send_blob(client, text, text);
+	}
+}
+
+static void send_missing(struct scripted *client, const Farm__SubmitAnswer *a)
+{
+	bool missing[FILES] = {false};
+	char text[32];
+	struct blob_hash h;
+	struct error e;
+	for (int i = 0; i < FILES; i++) {
+		text_of(i, text);
+		assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
+		for (size_t k = 0; k < a->n_missing && !missing[i]; k++)
+			missing[i] = memcmp(a->missing[k].data, h.bytes, BLOB_HASH_SIZE) == 0;
+	}
+	for (int i = 0; i < FILES; i++)
+		if (missing[i])
+			send_files(client, i, i + 1);
+}
+
+static struct scripted *call_client(void)
+{
+	struct scripted *client = peer_call();
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	return client;
+}
+
+static void the_loop_flushes_no_file(void **state)
+{
+	(void)state;
+	struct scripted *client = call_client();
+	submit_many(client);
+	assert_int_equal(peer_submit_answer(client)->n_missing, FILES);
+	unsigned before = flushes->on_loop;
+	send_files(client, 0, FILES - 1);
+	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = scripted_hear(client);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	assert_int_equal(m->job_list_answer->n_jobs, 0);
+	send_files(client, FILES - 1, FILES);
+	assert_int_equal(peer_submit_answer(client)->job, 1);
+	assert_in_range(flushes->on_loop - before, 0, 20); /* of the job */
+	assert_in_range(flushes->elsewhere, FILES, 3 * FILES);
+	submit_many(client);
+	assert_int_equal(peer_submit_answer(client)->job, 2); /* none is missing */
+	scripted_hang_up(client);
+}
+
+static unsigned leftovers(void)
+{
+	char command[128], line[32] = "";
+	snprintf(command, sizeof command, "find %s/spool -name 'tmp.*' | wc -l", served_folder());
+	FILE *f = popen(command, "r");
+	assert_non_null(f);
+	assert_non_null(fgets(line, sizeof line, f));
+	pclose(f);
+	return (unsigned)atoi(line);
+}
+
+static void who_goes_midway_leaves_nothing(void **state)
+{
+	(void)state;
+	struct scripted *client = call_client();
+	submit_many(client);
+	assert_int_equal(peer_submit_answer(client)->n_missing, FILES);
+	send_files(client, 0, FILES / 2);
+	scripted_hang_up(client);
+	served_works_again();
+	for (int i = 0; i < 6000 && leftovers(); i++)
+		usleep(10000);
+	assert_int_equal(leftovers(), 0);
+	client = call_client();
+	submit_many(client);
+	send_missing(client, peer_submit_answer(client));
+	assert_int_equal(peer_submit_answer(client)->job, 1);
+	scripted_hang_up(client);
+}
+
+/* Each is sent once. */
+static void a_file_that_was_sent_is_not_taken_again(void **state)
+{
+	(void)state;
+	struct scripted *client = call_client();
+	submit_many(client);
+	assert_int_equal(peer_submit_answer(client)->n_missing, FILES);
+	send_files(client, 0, 1);
+	send_files(client, 0, 1);
+	const Farm__SubmitAnswer *a = peer_submit_answer(client);
+	assert_int_equal(a->job, 0);
+	assert_non_null(strstr(a->refusal, "not requested"));
+	scripted_hang_up(client);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(the_loop_flushes_no_file, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(who_goes_midway_leaves_nothing, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_file_that_was_sent_is_not_taken_again, set_up, tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
