@@ -161,6 +161,8 @@ static void print_job(const json_t *job, bool colors)
 		progress_time(json_number_value(known_eta), eta, sizeof eta);
 	if (json_is_number(known_error))
 		snprintf(error, sizeof error, "%.2f %%", 100 * json_number_value(known_error));
+	else if (json_is_number(json_object_get(job, "errorAbout")))
+		snprintf(error, sizeof error, "~%.3g %%", 100 * number_of(job, "errorAbout"));
 	const char *state = text_of(job, "state");
 	printf("%-6s %s%-10s%s %5.1f %% %9s %9s %8s %7.0f %6.0f  %s", text_of(job, "id"), color_of(state, colors),
 	       state, colors ? "\033[0m" : "", 100 * number_of(job, "progress"), rate, eta, error,
@@ -179,7 +181,8 @@ static void print_job(const json_t *job, bool colors)
 static void print_doubt(const json_t *job)
 {
 	if (*text_of(job, "errorDoubt") && !is_ended(job)) /* then the note says it */
-		printf("       the error's interval is not known: %s\n", text_of(job, "errorDoubt"));
+		printf("       the error is about %.3g %%, its interval is not known: %s\n",
+		       100 * number_of(job, "errorAbout"), text_of(job, "errorDoubt"));
 }
 
 /* "3.2 % (3.0 - 3.5 %), halving it costs 12 min of CPU time, 6.0 min more; done in 31 min (25 min - 40 min)" */

@@ -64,8 +64,10 @@ void record_add_note(struct job_record *r, const char *text)
 
 void record_add_doubt(struct job_record *r)
 {
-	char text[sizeof r->rel_error_doubt + 64];
-	snprintf(text, sizeof text, "the error's interval is not known: %s", r->rel_error_doubt);
+	char text[sizeof r->rel_error_doubt + 96], about[48] = "the error's interval";
+	if (r->rel_error_about >= 0)
+		snprintf(about, sizeof about, "the error is about %.3g %%, its interval", 100 * r->rel_error_about);
+	snprintf(text, sizeof text, "%s is not known: %s", about, r->rel_error_doubt);
 	if (*r->rel_error_doubt && !strstr(r->note, text))
 		record_add_note(r, text);
 }
@@ -76,7 +78,7 @@ void record_begin(struct job_record *r, uint64_t id, const char *name, const cha
 	r->id = id;
 	text_copy(r->name, sizeof r->name, name);
 	text_copy(r->owner, sizeof r->owner, owner);
-	r->ended_seen = r->rel_error = -1;
+	r->ended_seen = r->rel_error = r->rel_error_about = -1;
 	convergence_from_json(NULL, &r->convergence);
 	classes_from_json(NULL, r->classes);
 	r->b = 0;
@@ -91,6 +93,7 @@ void record_take_convergence(struct job_record *r, const struct canvas_image *im
 
 void record_take_error(struct job_record *r, const struct canvas_image *img)
 {
+	r->rel_error_about = sqrt(img->rel_mse);
 	r->rel_error = img->rel_mse_doubt ? -1 : sqrt(img->rel_mse_upper);
 	stated_error_doubt(img, r->rel_error_doubt, sizeof r->rel_error_doubt);
 }

@@ -77,14 +77,19 @@ ends 0 "$DIR/quiet.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SHORT --qui
 doubt=$(sed -n 's/.*"relMSEDoubt": "\(.*\)".*/\1/p' "$DIR/short.json")
 [ "$doubt" ] || fail "the statistics do not say why no error is stated"
 ends 0 "$DIR/submit.log" "$BIN/hslt-submit" "$SCENE" -o "$DIR/farm.exr" $SHORT --wait
-has "$DIR/submit.log" "the error's interval is not known: $doubt"
+about=$(sed -n 's/^hslt-render: warning: relative error about \(.* %\), its interval.*/\1/p' "$DIR/short.log")
+[ "$about" ] || fail "the warning has no error"
+has "$DIR/submit.log" "the error is about $about, its interval is not known: $doubt"
 id=$(cat "$DIR/out")
 "$BIN/hslt-status" --json "$id" >"$DIR/shown"
 has "$DIR/shown" "\"errorDoubt\":\"$doubt\""
+grep -q '"errorAbout":[0-9].*"errorDoubt":"' "$DIR/shown" || fail "the JSON lacks the error: $(cat "$DIR/shown")"
+has "$DIR/shown" '"error":null'
 has "$DIR/shown" '"verdict":"too short"'
 "$BIN/hslt-status" "$id" >"$DIR/shown"
-has "$DIR/shown" "the error's interval is not known: $doubt"
+has "$DIR/shown" "the error is about $about, its interval is not known: $doubt"
 "$BIN/hslt-status" >"$DIR/shown"
+has "$DIR/shown" " ~$about "
 has "$DIR/shown" 'its chains are too short to be judged'
 ends 0 "$DIR/large.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $LARGE $CHAINS --integrator hslt --mutations 1280000
 grep -q ': note:' "$DIR/large.log" && fail "nothing is wrong, but: $(grep ': note:' "$DIR/large.log")"

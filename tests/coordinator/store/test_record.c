@@ -39,6 +39,7 @@ static void records_come_back(void **state)
 	strcpy(r.mixture, "independent=0.1,hslt=0.9");
 	strcpy(r.note, "3 of 8 \"times\"");
 	strcpy(r.rel_error_doubt, "the chains are too short to be judged");
+	r.rel_error_about = 0.218;
 	record_take_effects(
 		&r, json_pack("[{s:s s:b s:s}]", "name", "dispersion", "on", 0, "why", "`glass` has constant eta"));
 	r.stuck = 3;
@@ -74,6 +75,13 @@ static void records_come_back(void **state)
 	assert_string_equal(back.mixture, r.mixture);
 	assert_string_equal(back.note, r.note);
 	assert_string_equal(back.rel_error_doubt, r.rel_error_doubt);
+	assert_true(back.rel_error_about == r.rel_error_about);
+	record_add_doubt(&back);
+	assert_non_null(strstr(back.note, "the error is about 21.8 %, its interval is not known: the chains are too"));
+	back.note[0] = 0;
+	back.rel_error_about = -1; /* an earlier version wrote it */
+	record_add_doubt(&back);
+	assert_string_equal(back.note, "the error's interval is not known: the chains are too short to be judged");
 	assert_true(*r.effects != 0);
 	assert_string_equal(back.effects, r.effects);
 	assert_true(back.stuck == 3 && back.longest_stuck == 5210);
