@@ -4,11 +4,12 @@
 #include <math.h>
 #include <string.h>
 
-/* Samples or mutations requested, as plan_make counts them; if there was no such bound, those that are done. */
-static uint64_t total_of(const struct plan *p, const struct plan_request *asked, uint64_t rounds)
+/* Samples or mutations requested, as plan_make counts them; if there was no such bound, or it was that of a cancelled
+ * extension, those that are done. */
+static uint64_t total_of(const struct plan *p, const struct plan_request *asked, const struct extension_from *from)
 {
-	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0;
-	if (p->rounds == UINT64_MAX)
+	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0, rounds = from->rounds;
+	if (p->rounds == UINT64_MAX || from->cut)
 		return p->kind == PLAN_CHAINS ? rounds * plan_round_mutations(p)
 					      : rounds * p->groups * p->epoch * pixels;
 	if (asked->spp)
@@ -23,7 +24,7 @@ static int more_rounds(const struct plan *p, const struct extension *x, const st
 	if (p->rounds == UINT64_MAX && !from->ended)
 		return error_set(e, EINVAL, "it has no bound on samples: give a time or an error");
 	if (__builtin_mul_overflow(x->spp, pixels, &more) || __builtin_add_overflow(more, x->mutations, &more) ||
-	    __builtin_add_overflow(more, total_of(p, asked, from->rounds), &total))
+	    __builtin_add_overflow(more, total_of(p, asked, from), &total))
 		return error_set(e, EINVAL, "more samples than can be counted");
 	asked->mutations = total;
 	return 0;
@@ -74,8 +75,8 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 		return rc;
 	if (error && from->ended && from->error <= x->target_error)
 		return error_set(e, EINVAL, "its error is already %.3g %%", 100 * from->error);
-	uint64_t total = total_of(p, asked, from->rounds);
-	bool bounded = p->rounds != UINT64_MAX;
+	uint64_t total = total_of(p, asked, from);
+	bool bounded = p->rounds != UINT64_MAX && !from->cut;
 	asked->spp = 0;
 	asked->mutations = bounded ? total : 0;
 	rc = samples ? more_rounds(p, x, from, asked, e) : 0;
@@ -85,13 +86,13 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 		asked->mutations = 0; /* already met */
 	asked->seconds = p->seconds;
 	if (time)
-		asked->seconds = (p->seconds > 0 ? p->seconds : from->seconds) + x->seconds;
-	else if (from->ended && p->seconds > 0 && from->seconds >= p->seconds)
+		asked->seconds = (p->seconds > 0 && !from->cut ? p->seconds : from->seconds) + x->seconds;
+	else if (from->cut || (from->ended && p->seconds > 0 && from->seconds >= p->seconds))
 		asked->seconds = 0;
 	asked->target_error = p->target_error;
 	if (error)
 		asked->target_error = x->target_error;
-	else if (from->ended && from->error <= p->target_error)
+	else if (from->cut || (from->ended && from->error <= p->target_error))
 		asked->target_error = 0;
 	keep_cut(p, asked);
 	rc = plan_make(asked, out, e);

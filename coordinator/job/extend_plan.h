@@ -21,7 +21,7 @@ struct extension_from {
 	uint64_t rounds; /* complete */
 	double seconds;	 /* time used */
 	double error;	 /* as last estimated; NAN: none */
-	bool ended;
+	bool ended, cut; /* cut: an extension was cancelled, and its bounds no longer apply */
 };
 
 /* -EINVAL with a sentence: nothing is named, or an invalid number. */

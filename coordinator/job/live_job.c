@@ -120,6 +120,7 @@ void live_job_free(struct live_job *job)
 		disk_close(job->log);
 	journal_release(job->journal);
 	envelope_fini(&job->submit);
+	mem_free(job->earlier);
 	mem_free(job);
 }
 

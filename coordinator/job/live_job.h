@@ -90,6 +90,7 @@ struct live_job {
 	struct envelope submit; /* owned */
 	struct plan plan;
 	struct job_record record;
+	struct job_record *earlier;  /* of its end before it was extended, whose image exists; NULL: none */
 	struct bootstrap *bootstrap; /* until the canvas exists */
 	struct canvas *canvas;	     /* from then on */
 	const char *film_folder;     /* folder for the films when it is read from the spool; NULL: memory */

@@ -151,7 +151,7 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 	struct error e;
 	if (journal_write(job->journal, &e)) /* for an extension; what is not stored is computed again */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	int rc = write_end(jobs, &job->record, keep_films(jobs, job), &e);
+	int rc = write_end(jobs, &job->record, keep_films(jobs, job, &job->record), &e);
 	if (rc)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 	if (rc && job->record.has_result) {
@@ -170,7 +170,7 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 
 int durable_end_soon(struct jobs *jobs, const struct live_job *job, const struct job_record *r, struct error *e)
 {
-	return ledger_end(jobs->ledger, r, keep_films(jobs, job), e);
+	return ledger_end(jobs->ledger, r, keep_films(jobs, job, r), e);
 }
 
 int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e)

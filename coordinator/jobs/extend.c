@@ -33,12 +33,14 @@ static double error_of(const struct forecast_history *h)
 	return h->count && !h->looks[h->count - 1].doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
 }
 
-static struct extension_from where(const struct live_job *job, double seconds, bool ended)
+/* r: the record of its end; NULL: it runs. */
+static struct extension_from where(const struct live_job *job, double seconds, const struct job_record *r)
 {
 	return (struct extension_from){.rounds = live_job_rounds(job),
 				       .seconds = seconds,
 				       .error = error_of(&job->record.looks),
-				       .ended = ended};
+				       .ended = r != NULL,
+				       .cut = r && r->cut};
 }
 
 static int plan_of(const struct jobs *jobs, const struct requester *by, const struct live_job *job,
@@ -112,7 +114,7 @@ static int extend_live(struct jobs *jobs, const struct requester *by, struct liv
 	struct plan_request asked, old_asked;
 	struct plan plan, old = job->plan;
 	double seconds = farm_elapsed(jobs->farm, job->id, jobs_now(jobs));
-	struct extension_from from = where(job, isnan(seconds) ? 0 : seconds, false);
+	struct extension_from from = where(job, isnan(seconds) ? 0 : seconds, NULL);
 	int rc = plan_request_from_wire(live_job_submit(job)->plan, &old_asked, e);
 	if (!rc)
 		rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
@@ -187,7 +189,7 @@ static int extend_read(struct jobs *jobs, const struct requester *by, struct liv
 	struct plan plan;
 	if (live_job_rounds(job) == 0)
 		return error_set(e, ENOENT, "its films have been deleted: %s", again);
-	struct extension_from from = where(job, isnan(job->times.completed) ? 0 : job->times.completed, true);
+	struct extension_from from = where(job, isnan(job->times.completed) ? 0 : job->times.completed, r);
 	int rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;
@@ -258,8 +260,8 @@ static int ask_beforehand(const struct jobs *jobs, const struct requester *by, c
 {
 	struct plan_request asked;
 	struct plan plan;
-	return plan_of(jobs, by, job, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked,
-		       &plan, e);
+	struct extension_from from = {.error = error_of(&r->looks), .ended = true, .cut = r->cut};
+	return plan_of(jobs, by, job, x, &from, &asked, &plan, e);
 }
 
 static int start_reading(struct jobs *jobs, const struct extension_request *q, const struct job_record *r,

@@ -24,7 +24,8 @@ static struct job_record record_of(const struct jobs *jobs, const struct live_jo
 	clock_gettime(CLOCK_REALTIME, &now);
 	jobs_view_end(jobs, job, &v);
 	v.record.ended_seen = ages_now(jobs);
-	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	if (!v.record.cut)
+		v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	return v.record;
 }
 

@@ -26,6 +26,13 @@ bool jobs_view_end(const struct jobs *jobs, const struct live_job *job, struct j
 		record_add_doubt(&v->record);
 	if (!farm_job(jobs->farm, job->id, jobs_now(jobs), &status))
 		return false;
+	if (status.state == JOB_CANCELLED && job->earlier) { /* its image is still that of its earlier end */
+		view_of_record(v, job->earlier);
+		v->record.extended = job->record.extended;
+		v->record.priority = job->record.priority;
+		v->record.cut = true;
+		return true;
+	}
 	view_add_status(v, &status);
 	return true;
 }

@@ -130,11 +130,16 @@ static int take_record_of(const struct jobs *jobs, const struct ledger_job *j, s
 	job->record.priority = j->priority;
 	job->record.extended = j->extended;
 	struct job_record *r = mem_alloc(1, sizeof *r);
-	bool there;
+	bool there = false;
 	int rc = r ? 0 : error_set(e, ENOMEM, "no memory for a job");
-	if (!rc && j->extended && (rc = restore_record(jobs, job->id, r, &there, e)) == 0 && there)
+	if (!rc && (j->extended || j->ended > 0))
+		rc = restore_record(jobs, job->id, r, &there, e);
+	if (!rc && there)
 		job->record.has_result = r->has_result;
-	mem_free(r);
+	if (!rc && there && r->has_result && strcmp(r->state, job_state_name(JOB_DONE)) == 0)
+		job->earlier = r;
+	else
+		mem_free(r);
 	return rc;
 }
 

@@ -4,6 +4,7 @@
 #include "common/base/text.h"
 #include "coordinator/jobs/extend.h"
 #include "coordinator/jobs/finish.h"
+#include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/peers/client_answers.h"
@@ -78,10 +79,15 @@ static bool finds(struct session *p, uint64_t job, bool over_too)
 void control_cancel(struct session *p, uint64_t job)
 {
 	struct error e;
+	char text[96] = "";
+	struct job_view v;
 	struct event ev = {.kind = EVENT_CANCEL, .job = job};
 	if (finds(p, job, false) && !ask_core(p, &ev) && finish_cancelled(p->jobs, job, &e))
 		not_for_long(p, &e);
-	client_send_done(p, "");
+	if (jobs_view(p->jobs, job, &v) && v.record.cut)
+		text_print(text, sizeof text, "the extension of j%llu is cancelled; its finished image stays",
+			   (unsigned long long)job);
+	client_send_done(p, text);
 }
 
 void control_job(struct session *p, const Farm__Control *c)

@@ -6,10 +6,10 @@
 
 #include <string.h>
 
-bool keep_films(const struct jobs *jobs, const struct live_job *job)
+bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r)
 {
 	return jobs->config.keep_bytes && job->canvas && !job->lit.black && canvas_rounds(job->canvas) > 0 &&
-	       (strcmp(job->record.state, job_state_name(JOB_DONE)) == 0 || job->overflowed);
+	       (strcmp(r->state, job_state_name(JOB_DONE)) == 0 || job->overflowed);
 }
 
 void keep_drop(const struct jobs *jobs, uint64_t job)

@@ -28,6 +28,7 @@
 	NUMBER(bool, has_result, "result", "result", AT(fetchable), KEPT)                                            \
 	NUMBER(positive, cleared, "cleared", "cleared", NOWHERE, KEPT) /* when its result was; s since 1970 */       \
 	NUMBER(u64, extended, "extended", NULL, NOWHERE, KEPT)	       /* number of extensions, as in the ledger */  \
+	NUMBER(bool, cut, "cut", NULL, NOWHERE, KEPT)		       /* an extension was cancelled since */        \
 	NUMBER(real, submitted, "submitted", "submitted", AT(submitted), KEPT) /* s since 1970 */                    \
 	NUMBER(real, ended, "ended", "ended", NOWHERE, KEPT)		       /* s since 1970; 0: not yet */        \
 	NUMBER(known, ended_seen, "endedSeen", NULL, NOWHERE, KEPT) /* observed time in s at that moment (seen.h) */ \

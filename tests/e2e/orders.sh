@@ -156,6 +156,23 @@ job extend "$h" --spp +100
 repeated "$h" "$count" || fail "$h had $count repeats, and when it goes on $(value "$h" repeats)"
 done_in 60 "$h"
 
+# an extension that is cancelled leaves the finished job, also where the coordinator is killed at once
+i=$(submit "$BOX" -o "$DIR/i.exr" $CHAINS --spp 100)
+done_in 60 "$i"
+first=$(value "$i" rounds)
+before=$(value "$i" merged)
+job extend "$i" --spp +100000
+until_true 60 merged_more "$i" "$before" || fail "nothing more of $i is merged"
+[ "$(job cancel "$i")" = "the extension of $i is cancelled; its finished image stays" ] || fail "cancel does not say that $i stays"
+again
+is_state "$i" done || fail "$i is $(value "$i" state) after its extension was cancelled"
+[ "$(value "$i" rounds)" = "$first" ] || fail "$i has $(value "$i" rounds) rounds, and its image $first"
+job fetch "$i" -o "$DIR/i.exr"
+same "$DIR/i.exr" "$DIR/short.exr"
+job extend "$i" --spp +100
+done_in 60 "$i"
+until_true 60 more_rounds "$i" "$first" || fail "$i does not go on after a cancelled extension"
+
 # what cannot be said yes to
 g=$(submit "$BOX" -o "$DIR/g.exr" --integrator path --spp 20000)
 job cancel "$g"

@@ -126,6 +126,27 @@ static void bounds_that_are_met(void **state)
 	assert_true(j.plan.seconds == 13 && j.plan.rounds == rounds && j.plan.target_error == 0.05);
 }
 
+/* The bounds of an extension that was cancelled are nobody's any more: it goes on from what is done. */
+static void after_a_cancelled_one(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS);
+	struct job j;
+	r.spp = 100;
+	r.seconds = 1000;
+	r.target_error = 0.05;
+	make_job(&j, &r, 3, true);
+	j.from.cut = true;
+	uint64_t done = 3 * plan_round_mutations(&j.plan), more = 8 * 48 * 40, round = plan_round_mutations(&j.plan);
+	assert_int_equal(extend(&j, (struct extension){.spp = 8}), 0);
+	assert_int_equal(j.plan.rounds, (done + more + round - 1) / round);
+	assert_true(j.plan.seconds == 0 && j.plan.target_error == 0);
+	make_job(&j, &r, 3, true);
+	j.from.cut = true;
+	assert_int_equal(extend(&j, (struct extension){.seconds = 3}), 0);
+	assert_true(j.plan.rounds == UINT64_MAX && j.plan.seconds == 13 && j.plan.target_error == 0);
+}
+
 static void without_a_bound(void **state)
 {
 	(void)state;
@@ -158,6 +179,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(as_one_long_one),
 		cmocka_unit_test(bounds_that_are_met),
+		cmocka_unit_test(after_a_cancelled_one),
 		cmocka_unit_test(without_a_bound),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
