@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 static int system_open(const char *path, int flags, mode_t mode)
@@ -27,6 +28,13 @@ static int system_fstat(int fd, struct stat *st)
 static int system_touch(const char *path)
 {
 	return utimensat(AT_FDCWD, path, NULL, 0);
+}
+
+static uint64_t system_capacity(const char *path)
+{
+	struct statvfs st;
+	uint64_t bytes;
+	return statvfs(path, &st) || __builtin_mul_overflow((uint64_t)st.f_blocks, st.f_frsize, &bytes) ? 0 : bytes;
 }
 
 const struct disk disk_system = {
@@ -50,6 +58,7 @@ const struct disk disk_system = {
 	.touch = system_touch,
 	.flock = flock,
 	.opendir = opendir,
+	.capacity = system_capacity,
 };
 const struct disk *disk_calls = &disk_system;
 

@@ -16,6 +16,7 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <sys/stat.h>
 #include <sys/types.h>
 #include <sys/uio.h>
@@ -41,7 +42,8 @@
 	X(int, fstat, (int fd, struct stat *st), (fd, st))                                                    \
 	X(int, touch, (const char *path), (path))                                                             \
 	X(int, flock, (int fd, int what), (fd, what))                                                         \
-	X(DIR *, opendir, (const char *path), (path))
+	X(DIR *, opendir, (const char *path), (path))                                                         \
+	X(uint64_t, capacity, (const char *path), (path)) /* bytes of its file system, used or not; 0: not known */
 
 #define DISK_MEMBER(result, name, parameters, arguments) result(*name) parameters;
 struct disk {

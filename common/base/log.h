@@ -30,6 +30,7 @@
 	X(CONNECT_FAILED, "connect_failed", WARN)          \
 	X(JOB_SUBMIT, "job_submit", INFO)                  \
 	X(JOB_STATE, "job_state", INFO)                    \
+	X(JOB_HELD, "job_held", WARN)                      \
 	X(JOB_NOTE, "job_note", INFO)                      \
 	X(JOB_DONE, "job_done", INFO)                      \
 	X(JOB_FAILED, "job_failed", ERROR)                 \

@@ -74,7 +74,7 @@ static double seconds_left(const struct job *j, double total, double now)
 
 struct forecast_range job_eta(const struct job *j, double now)
 {
-	if (!job_is_live(j))
+	if (!job_is_live(j) || job_is_held(j))
 		return (struct forecast_range){NAN, NAN, NAN};
 	struct forecast_range total = work_total(j);
 	return (struct forecast_range){seconds_left(j, total.low, now), seconds_left(j, total.middle, now),

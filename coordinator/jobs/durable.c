@@ -201,7 +201,8 @@ static void hold(struct jobs *jobs, struct live_job *job, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = job->id, .text = text};
 	if (!*text != !job->held) {
-		live_job_log(job, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+		live_job_log(job, *text ? LOG_JOB_HELD : LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released",
+			     log_quote(text).text);
 		job->held = *text != 0;
 	}
 	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;

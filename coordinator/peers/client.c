@@ -14,6 +14,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/film/canvas.h"
 #include "common/plan/plan_text.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/jobs/listing.h"
@@ -76,12 +77,28 @@ void client_upload_abort(struct session *p)
 	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, 0});
 }
 
+static void refuse_upload(struct session *p, const struct error *e)
+{
+	answer_submit(p, 0, e->text, NULL);
+	client_upload_abort(p);
+}
+
 static int within_quota(const struct session *p, struct error *e)
 {
 	if (p->who.role == TLS_OPERATOR)
 		return 0;
 	return jobs_within_quota(p->jobs, p->who.name, 0, client_uploading(p), &p->upload->plan,
 				 p->upload->submit.message->submit, e);
+}
+
+/* Whether it could be stored on an empty disk: otherwise it would be held for ever, and with it others. */
+static int fits(const struct session *p, struct error *e)
+{
+	const Farm__Submit *m = p->upload->submit.message->submit;
+	uint64_t bytes = canvas_bytes(&p->upload->plan);
+	for (size_t i = 0; i < m->n_files; i++)
+		bytes += m->files[i]->size;
+	return spool_holds(p->jobs->spool, bytes, e);
 }
 
 /* All blobs have arrived: the core decides. */
@@ -91,8 +108,7 @@ static void submit(struct session *p)
 	char name[128];
 	struct error e;
 	if (within_quota(p, &e)) { /* checked again: other jobs may have been submitted while its files arrived */
-		answer_submit(p, 0, e.text, NULL);
-		client_upload_abort(p);
+		refuse_upload(p, &e);
 		return;
 	}
 	text_copy(name, sizeof name, m->name);
@@ -129,8 +145,7 @@ static void look_for_files(struct session *p)
 		return;
 	}
 	if (rc || within_quota(p, &e)) {
-		answer_submit(p, 0, e.text, NULL);
-		client_upload_abort(p);
+		refuse_upload(p, &e);
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
@@ -149,6 +164,10 @@ static void take_submit(struct session *p, struct envelope *env)
 		answer_submit(p, 0, e.text, NULL);
 		return;
 	}
+	if (fits(p, &e)) {
+		refuse_upload(p, &e);
+		return;
+	}
 	p->told = jobs_now(p->jobs);
 	look_for_files(p);
 }
@@ -157,12 +176,6 @@ void client_file_read(struct session *p, const struct blob_hash *h, bool right)
 {
 	if (p->state == SESSION_CLIENT && p->upload && upload_file_read(p->upload, h, right))
 		look_for_files(p);
-}
-
-static void refuse_upload(struct session *p, const struct error *e)
-{
-	answer_submit(p, 0, e->text, NULL);
-	client_upload_abort(p);
 }
 
 static void on_flushed(void *user, int rc, const struct error *why)

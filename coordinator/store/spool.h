@@ -19,6 +19,8 @@ struct spool;
 int spool_open(struct spool **s, const char *folder, struct error *e);
 void spool_close(struct spool *s);
 
+/* -ENOSPC: the spool's file system is smaller, however much of it is free. */
+int spool_holds(const struct spool *s, uint64_t bytes, struct error *e);
 int spool_make_job(const struct spool *s, uint64_t id, struct error *e); /* creates the job's folder */
 
 /* "blobs", "canvas": a path in the spool, created if necessary. The text is valid until spool_close. */

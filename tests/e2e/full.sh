@@ -19,11 +19,18 @@ start_worker w1
 submit "$BOX" -o "$DIR/quiet.exr" $JOB --wait >/dev/null
 quiet=$(value j1 merged)
 
+# What could not be stored on the empty disk is refused, and holds nobody up.
+code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/large.exr" --integrator hslt --size 640x360 --spp 16
+grep -q "it needs at least .* MB for its files and films, and the disk of the coordinator's spool has 33.6 MB in all" "$DIR/err.log" ||
+	fail "the refusal does not say why: $(tail -n 1 "$DIR/err.log")"
+
 used=$(df --output=used -k "$DIR/spool" | tail -n 1)
 mount -o remount,size=$((used + 6400))k "$DIR/spool" # the films take 4,700, all batches 5,000
 id=$(submit "$BOX" -o "$DIR/full.exr" $JOB)
 until_true 20 is_state "$id" held || fail "$id is $(value "$id" state), and $(df -k "$DIR/spool" | tail -n 1)"
 value "$id" waiting | grep -q 'No space left' || fail "it does not say why: $(value "$id" waiting)"
+grep -q "level=warn event=job_held job=$id state=held" "$DIR/coordinator.log" || fail "the log does not warn"
+[ -z "$(value "$id" eta | grep -v null)" ] || fail "it states when it will be done: $(value "$id" eta)"
 before=$(value "$id" merged)
 [ "$before" -lt "$quiet" ] || fail "there was room for all"
 head -c 20000000 /dev/zero >"$DIR/spool/filler" 2>/dev/null && fail "there is room"

@@ -226,6 +226,9 @@ static void progress_and_rate(void **state)
 	near(s.eta, 16);
 	assert_int_equal(s.mutations, 800);
 	assert_true(s.started == 10 && s.submitted == 0);
+	transcript_play(f, (const char *const[]){"[15] hold order j1 held by ann -> -", NULL});
+	s = job_status_of(f, 15);
+	assert_true(isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
 	farm_free(f);
 }
 

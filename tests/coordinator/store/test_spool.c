@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A spool has one master, and a folder for each job. */
 #include "coordinator/store/spool.h"
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "tests/support/folder.h"
 
@@ -10,6 +11,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -51,10 +53,42 @@ static void jobs_have_folders(void **state)
 	spool_close(s);
 }
 
+static uint64_t ten_megabytes(const char *path)
+{
+	(void)path;
+	return 10000000;
+}
+
+static uint64_t not_known(const char *path)
+{
+	(void)path;
+	return 0;
+}
+
+static void what_is_larger_than_the_disk(void **state)
+{
+	(void)state;
+	struct spool *s;
+	struct error e;
+	struct disk small = disk_system;
+	assert_int_equal(spool_open(&s, folder, &e), 0);
+	assert_int_equal(spool_holds(s, UINT64_MAX, &e), -ENOSPC);
+	small.capacity = ten_megabytes;
+	disk_use(&small);
+	assert_int_equal(spool_holds(s, 10000000, &e), 0);
+	assert_int_equal(spool_holds(s, 10000001, &e), -ENOSPC);
+	assert_non_null(strstr(e.text, "the coordinator's spool has 10 MB in all"));
+	small.capacity = not_known;
+	assert_int_equal(spool_holds(s, UINT64_MAX, &e), 0);
+	disk_use(NULL);
+	spool_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(one_master, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_larger_than_the_disk, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(jobs_have_folders, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
