@@ -242,6 +242,19 @@ static void measure(struct arguments *a, const struct scene_bundle *b)
 		plan.kind == PLAN_CHAINS ? "mutations" : "samples");
 }
 
+/* Whether there is a coordinator that accepts us, before the work of loading the scene. The connection is closed again:
+ * while the scene is loaded nobody would keep it alive. */
+static int knock(const struct arguments *a, struct error *e)
+{
+	struct client *cl;
+	int rc = client_open(&cl, a->coordinator, a->tls, a->insecure, "hslt-submit", e);
+	if (rc)
+		return rc;
+	client_print_notes(cl, "hslt-submit");
+	client_close(cl);
+	return 0;
+}
+
 int main(int argc, char **argv)
 {
 	static struct arguments a; /* large */
@@ -256,6 +269,10 @@ int main(int argc, char **argv)
 	struct output_files outputs = {{{"-o", a.wait ? a.output : NULL, OUTPUT_EXR},
 					{"--plot", a.plot, output_format_of_plot(a.plot ? a.plot : "")}}};
 	int rc = output_files_check(&outputs, &a.scene, 1, &e);
+	if (!rc && (rc = knock(&a, &e))) {
+		fprintf(stderr, "hslt-submit: %s\n", e.text);
+		return client_exit_code(rc);
+	}
 	if (!rc)
 		rc = scene_bundle_read(&b, a.scene, &a.render, &outputs, &e);
 	if (rc) {
@@ -292,7 +309,6 @@ int main(int argc, char **argv)
 	measure(&a, &b);
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
-		client_print_notes(cl, "hslt-submit");
 		rc = a.estimate ? estimate(&a, cl, &b, &e) : submit_scene(&a, &cl, &b, &code, &e);
 		client_close(cl);
 	}
