@@ -14,6 +14,11 @@
 #include <math.h>
 #include <string.h>
 
+const char *lease_kind_name(enum lease_kind kind)
+{
+	return kind == LEASE_BOOTSTRAP ? "bootstrap" : "render";
+}
+
 bool lease_key_equal(const struct lease_key *a, const struct lease_key *b)
 {
 	return a->job == b->job && a->kind == b->kind && a->group == b->group && a->part == b->part &&

@@ -16,6 +16,7 @@ struct lease_key {
 	uint32_t group, part;
 	uint64_t epoch;
 };
+const char *lease_kind_name(enum lease_kind kind); /* "bootstrap", "render" */
 bool lease_key_equal(const struct lease_key *a, const struct lease_key *b);
 
 enum { TILE_SIZE = 64, TILE_CHANNELS = 3 }; /* X Y Z */

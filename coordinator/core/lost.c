@@ -75,8 +75,7 @@ void lost_lease(struct farm *f, struct lease *l)
 	text_print(
 		f->text, sizeof f->text,
 		"%s: %u of %d workers that were lost in a row while they held %s group %u part %u epoch %llu; the last one: %s",
-		j->name, n, LOST_FATAL, k.kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k.group, k.part,
-		(unsigned long long)k.epoch, p->name);
+		j->name, n, LOST_FATAL, lease_kind_name(k.kind), k.group, k.part, (unsigned long long)k.epoch, p->name);
 	text_copy(j->text, sizeof j->text, f->text);
 	if (n < LOST_FATAL || certificates < failure_quorum_certificates(f))
 		return;

@@ -31,8 +31,7 @@ static void quarantine_worker(struct farm *f, struct identity *who)
 void quarantine_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k)
 {
 	snprintf(who->text, sizeof who->text, "%s: j%llu %s group %u part %u epoch %llu", what,
-		 (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part,
-		 (unsigned long long)k->epoch);
+		 (unsigned long long)k->job, lease_kind_name(k->kind), k->group, k->part, (unsigned long long)k->epoch);
 	who->wrong++;
 	struct action *a = update_add(f, ACTION_WRONG);
 	a->who = who->id;

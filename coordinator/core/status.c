@@ -85,6 +85,17 @@ static bool someone_avoids(const struct farm *f, const struct job *j)
 	return false;
 }
 
+/* The job's text is "worker: why". */
+static void put_last_failure(const struct job *j, char *text, size_t size)
+{
+	const char *colon = strstr(j->text, ": ");
+	if (colon)
+		text_print(text, size, "no worker can compute it; worker %.*s failed last%s", (int)(colon - j->text),
+			   j->text, colon);
+	else
+		text_print(text, size, "no worker can compute it: %s", j->text);
+}
+
 /* Names the workers whose own machines are at fault, because somebody has to repair them. */
 static void put_failing(const struct farm *f, const struct job *j, char *text, size_t size)
 {
@@ -99,7 +110,7 @@ static void put_failing(const struct farm *f, const struct job *j, char *text, s
 			   "no worker can compute it, because of a problem on the machines of %s; the last one: %s",
 			   names, j->text);
 	else
-		text_print(text, size, "no worker can compute it: %s", j->text);
+		put_last_failure(j, text, size);
 }
 
 /* all: other owners' jobs may be named. */

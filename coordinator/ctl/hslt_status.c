@@ -167,7 +167,7 @@ static void print_job(const json_t *job, bool colors)
 	printf("%-6s %s%-10s%s %5.1f %% %9s %9s %8s %7.0f %6.0f  %s", text_of(job, "id"), color_of(state, colors),
 	       state, colors ? "\033[0m" : "", 100 * number_of(job, "progress"), rate, eta, error,
 	       number_of(job, "rounds"), number_of(job, "leases"), text_of(job, "name"));
-	const char *why = *text_of(job, "why") ? text_of(job, "why") : bound_of(job);
+	const char *said = text_of(job, "why"), *why = *said && strcmp(said, state) != 0 ? said : bound_of(job);
 	const char *verdict = text_of(json_object_get(job, "agreement"), "verdict");
 	const char *chains = strcmp(verdict, convergence_name(CHAINS_DISAGREE)) == 0 ? "its chains disagree"
 			     : is_ended(job) && strcmp(verdict, convergence_name(CHAINS_TOO_SHORT)) == 0

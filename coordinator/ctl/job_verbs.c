@@ -13,31 +13,62 @@ enum { EXIT_DISAGREE = 5 };
 
 /* ---- list ---- */
 
+static void put_error(const Farm__JobStatus *s, char *text, size_t size)
+{
+	snprintf(text, size, "-");
+	if (s->error >= 0)
+		snprintf(text, size, "%.2f %%", 100 * s->error);
+	else if (s->error_about >= 0)
+		snprintf(text, size, "~%.3g %%", 100 * s->error_about);
+}
+
+/* Its place is "3 of 8 machines; j4 comes first": the column has the numbers, what comes after them is a remark. */
+static const char *put_machines(const Farm__JobStatus *s, char *text, size_t size)
+{
+	const char *end = s->ended ? NULL : strstr(s->place, " machine"), *more = end ? strstr(end, "; ") : NULL;
+	snprintf(text, size, "%.*s", end ? (int)(end - s->place) : 1, end ? s->place : "-");
+	return more ? more + 2 : "";
+}
+
+static const char *remark_on(const Farm__JobStatus *s, const char *place)
+{
+	if (*s->why && strcmp(s->why, s->state) != 0)
+		return s->why;
+	if (s->ended)
+		return s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
+	return place;
+}
+
+static void print_row(const Farm__JobStatus *s, bool owners)
+{
+	char eta[32] = "-", machines[48], error[32], id[32];
+	if (!s->ended && s->eta >= 0)
+		progress_time(s->eta, eta, sizeof eta);
+	snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
+	const char *remark = remark_on(s, put_machines(s, machines, sizeof machines));
+	put_error(s, error, sizeof error);
+	printf("%-6s %-10s %4d %5.1f %% %-9s %-8s %8s ", id, s->state, s->priority, 100 * s->progress, eta, machines,
+	       error);
+	if (owners)
+		printf("%-12s ", *s->owner ? s->owner : "-");
+	printf("%s", s->name);
+	if (*remark)
+		printf("  # %s", remark);
+	else if (s->ended && s->target_error > 0 && strcmp(s->reason, s->state) != 0)
+		printf("  # ended by %s", s->reason);
+	printf("\n");
+}
+
+/* Owners are known by their certificates. */
 static void print_table(const Farm__JobListAnswer *a)
 {
-	if (a->n_jobs)
-		printf("%-6s %-10s %4s %7s %-9s %-8s %s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "MACHINES", "NAME");
-	for (size_t i = 0; i < a->n_jobs; i++) {
-		const Farm__JobStatus *s = a->jobs[i];
-		char eta[32] = "-", machines[48] = "-", id[32];
-		if (!s->ended && s->eta >= 0)
-			progress_time(s->eta, eta, sizeof eta);
-		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
-		if (!s->ended && s->share >= 0)
-			snprintf(machines, sizeof machines, "%u (%.1f)", s->workers, s->share);
-		const char *why = *s->why				      ? s->why
-				  : s->ended && s->exit_code == EXIT_DISAGREE ? "its chains disagree"
-									      : "";
-		printf("%-6s %-10s %4d %5.1f %% %-9s %-8s %s", id, s->state, s->priority, 100 * s->progress, eta,
-		       machines, s->name);
-		if (*why)
-			printf("  # %s", why);
-		else if (s->ended && s->target_error > 0)
-			printf("  # ended by %s", s->reason);
-		else if (!s->ended && *s->place)
-			printf("  # %s", s->place);
-		printf("\n");
-	}
+	bool owners = false;
+	for (size_t i = 0; i < a->n_jobs; i++)
+		owners = owners || *a->jobs[i]->owner;
+	printf("%-6s %-10s %4s %7s %-9s %-8s %8s %s%s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "MACHINES", "ERROR",
+	       owners ? "OWNER        " : "", "NAME");
+	for (size_t i = 0; i < a->n_jobs; i++)
+		print_row(a->jobs[i], owners);
 }
 
 static void print_json(const Farm__JobListAnswer *a)

@@ -212,8 +212,7 @@ json_t *view_lease_to_json(const struct lease_status *l, const char *worker, dou
 {
 	char id[32];
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)l->key.job);
-	return json_pack("{s:s s:s s:i s:i s:I s:s s:f s:b}", "job", id, "kind",
-			 l->key.kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", "group", (int)l->key.group, "part",
-			 (int)l->key.part, "epoch", (json_int_t)l->key.epoch, "worker", worker, "age", now - l->sent,
-			 "overdue", (int)l->overdue);
+	return json_pack("{s:s s:s s:i s:i s:I s:s s:f s:b}", "job", id, "kind", lease_kind_name(l->key.kind), "group",
+			 (int)l->key.group, "part", (int)l->key.part, "epoch", (json_int_t)l->key.epoch, "worker",
+			 worker, "age", now - l->sent, "overdue", (int)l->overdue);
 }

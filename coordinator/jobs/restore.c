@@ -64,8 +64,8 @@ int restore_tell(struct jobs *jobs, const struct live_job *job, const char *held
 						.certificate = m->certificate,
 						.home = m->home,
 						.restarts = m->restarts};
-		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu",
-			  (unsigned long long)job->id, (int)(job->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER),
+		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%s group=%u part=%u epochs=%llu",
+			  (unsigned long long)job->id, lease_kind_name(job->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER),
 			  i / job->plan.parts, i % job->plan.parts, (unsigned long long)next[i]);
 	}
 	char text[256];

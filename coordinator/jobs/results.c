@@ -23,9 +23,9 @@ static void fail(struct jobs *jobs, struct live_job *job, uint64_t peer, const s
 {
 	const char *name = jobs->peers.name(jobs->peers.user, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
-	live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu",
-		     log_quote(name ? name : "?").text, log_quote(why).text, (int)k->kind, k->group, k->part,
-		     (unsigned long long)k->epoch);
+	live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%s group=%u part=%u epoch=%llu",
+		     log_quote(name ? name : "?").text, log_quote(why).text, lease_kind_name(k->kind), k->group,
+		     k->part, (unsigned long long)k->epoch);
 	jobs->peers.acknowledge(jobs->peers.user, peer, k, ACK_REFUSED, why);
 	jobs_step(jobs, &ev);
 }
@@ -115,12 +115,12 @@ static void log_failure(const struct jobs *jobs, const char *from, struct live_j
 	unsigned long long epoch = k->epoch;
 	if (f->bad_states)
 		live_job_log(job, LOG_LEASE_FAILED,
-			     "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
+			     "states_of=%s refused_by=%s text=%s kind=%s group=%u part=%u epoch=%llu",
 			     log_quote(holds ? farm_maker(jobs->farm, k) : "?").text, name.text, said.text,
-			     (int)k->kind, k->group, k->part, epoch);
+			     lease_kind_name(k->kind), k->group, k->part, epoch);
 	else
-		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu",
-			     name.text, f->own, said.text, (int)k->kind, k->group, k->part, epoch);
+		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%s group=%u part=%u epoch=%llu",
+			     name.text, f->own, said.text, lease_kind_name(k->kind), k->group, k->part, epoch);
 }
 
 static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f)

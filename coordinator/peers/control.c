@@ -22,11 +22,10 @@ static int ask_core(struct session *p, struct event *ev)
 	return *p->rejected ? -1 : 0;
 }
 
-/* The core knows whether it can be cancelled, so it is asked first. */
-static void not_for_long(struct session *p, const struct error *e)
+/* The core knows whether it can be done, so it is asked first. done: "held" or the like. */
+static void not_for_long(struct session *p, const char *done, const struct error *e)
 {
-	text_print(p->rejected, sizeof p->rejected, "it applies until the coordinator stops, but cannot be stored: %s",
-		   e->text);
+	text_print(p->rejected, sizeof p->rejected, "%s, but only until the coordinator restarts: %s", done, e->text);
 }
 
 static void hold(struct session *p, uint64_t id, const char *who)
@@ -39,7 +38,7 @@ static void hold(struct session *p, uint64_t id, const char *who)
 	if (ask_core(p, &ev))
 		return;
 	if (ledger_hold(jobs->ledger, id, who, &e)) {
-		not_for_long(p, &e);
+		not_for_long(p, *who ? "held" : "released", &e);
 		return;
 	}
 	struct live_job *job = jobs_find(jobs, id);
@@ -56,7 +55,7 @@ static void set_priority(struct session *p, uint64_t id, int priority)
 	if (ask_core(p, &ev))
 		return;
 	if (ledger_priority(jobs->ledger, id, priority, &e)) {
-		not_for_long(p, &e);
+		not_for_long(p, "its priority is changed", &e);
 		return;
 	}
 	struct live_job *job = jobs_find(jobs, id);
@@ -83,7 +82,7 @@ void control_cancel(struct session *p, uint64_t job)
 	struct job_view v;
 	struct event ev = {.kind = EVENT_CANCEL, .job = job};
 	if (finds(p, job, false) && !ask_core(p, &ev) && finish_cancelled(p->jobs, job, &e))
-		not_for_long(p, &e);
+		not_for_long(p, "cancelled", &e);
 	if (jobs_view(p->jobs, job, &v) && v.record.cut)
 		text_print(text, sizeof text, "the extension of j%llu is cancelled; its finished image stays",
 			   (unsigned long long)job);

@@ -121,7 +121,7 @@ static const char *overreach(struct session *p, Farm__Role role, char *text, siz
 	if (may)
 		return NULL;
 	snprintf(text, size, "the certificate of %s is a %s's: it cannot %s", who->name, tls_role_name(who->role),
-		 role == FARM__ROLE__ROLE_WORKER ? "lease" : "submit or manage jobs");
+		 role == FARM__ROLE__ROLE_WORKER ? "take leases" : "submit or manage jobs");
 	return text;
 }
 

@@ -70,7 +70,9 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 	spool_job_path(p->jobs->spool, f->job, file, path);
 	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
 	if (fd < 0 && errno == ENOENT)
-		return error_set(e, ENOENT, "job j%llu has no %s yet", (unsigned long long)f->job, file);
+		return f->what == FARM__WHAT__WHAT_PREVIEW
+			       ? error_set(e, ENOENT, "no round of j%llu is complete yet", (unsigned long long)f->job)
+			       : error_set(e, ENOENT, "j%llu has no %s", (unsigned long long)f->job, file);
 	if (fd < 0 || disk_fstat(fd, &st)) {
 		int rc = error_set(e, errno, "%s", strerror(errno));
 		if (fd >= 0)

@@ -92,22 +92,64 @@ static int check_names(const Farm__Submit *m, struct error *e)
 	return rc;
 }
 
-static int check_texts(const Farm__Submit *m, struct error *e)
+static int check_text(const char *text, int most, const char *option, struct error *e)
 {
-	bool ok = envelope_text_ok(m->name, 127) && envelope_text_ok(m->scene, NAME_MAX_BYTES) &&
-		  envelope_text_ok(m->output, 1023) && envelope_text_ok(m->camera, 1023) &&
-		  m->n_defines <= PLAN_DEFINES_MAX && m->n_paths <= PLAN_PATHS_MAX && m->n_effects <= EFFECTS_MAX &&
-		  m->n_notes <= NOTES_MAX;
-	for (size_t i = 0; ok && i < m->n_defines; i++)
-		ok = envelope_text_ok(m->defines[i]->name, 256) && envelope_text_ok(m->defines[i]->value, 4096);
-	for (size_t i = 0; ok && i < m->n_paths; i++)
-		ok = envelope_text_ok(m->paths[i], 4096);
+	return envelope_text_ok(text, (size_t)most)
+		       ? 0
+		       : error_set(e, EINVAL, "%s: at most %d bytes, without control characters", option, most);
+}
+
+static int check_defines(const Farm__Submit *m, struct error *e)
+{
+	int rc = m->n_defines <= PLAN_DEFINES_MAX
+			 ? 0
+			 : error_set(e, EINVAL, "-D: at most %d, not %zu", PLAN_DEFINES_MAX, m->n_defines);
+	for (size_t i = 0; !rc && i < m->n_defines; i++) {
+		rc = check_text(m->defines[i]->name, 256, "the name of -D NAME=VALUE", e);
+		if (!rc)
+			rc = check_text(m->defines[i]->value, 4096, "the value of -D NAME=VALUE", e);
+	}
+	return rc;
+}
+
+static int check_paths(const Farm__Submit *m, struct error *e)
+{
+	int rc = m->n_paths <= PLAN_PATHS_MAX
+			 ? 0
+			 : error_set(e, EINVAL, "--path: at most %d, not %zu", PLAN_PATHS_MAX, m->n_paths);
+	for (size_t i = 0; !rc && i < m->n_paths; i++)
+		rc = check_text(m->paths[i], 4096, "--path", e);
+	return rc;
+}
+
+/* What the client made of the scene. */
+static int check_notes(const Farm__Submit *m, struct error *e)
+{
+	bool ok = m->n_effects <= EFFECTS_MAX && m->n_notes <= NOTES_MAX;
 	for (size_t i = 0; ok && i < m->n_effects; i++)
 		ok = envelope_text_ok(m->effects[i]->name, 64) && envelope_text_ok(m->effects[i]->why, 256) &&
 		     envelope_text_ok(m->effects[i]->saves, 256);
 	for (size_t i = 0; ok && i < m->n_notes; i++)
 		ok = envelope_text_ok(m->notes[i], 2048);
-	return ok ? 0 : error_set(e, EINVAL, "a text or a count of the submission is out of bounds");
+	return ok ? 0
+		  : error_set(e, EINVAL, "the scene has more than %d effects or %d notes, or one is too long",
+			      EFFECTS_MAX, NOTES_MAX);
+}
+
+static int check_texts(const Farm__Submit *m, struct error *e)
+{
+	int rc = check_text(m->name, 127, "--name", e);
+	if (!rc)
+		rc = check_text(m->scene, NAME_MAX_BYTES, "the scene's file name", e);
+	if (!rc)
+		rc = check_text(m->output, 1023, "-o", e);
+	if (!rc)
+		rc = check_text(m->camera, 1023, "--camera", e);
+	if (!rc)
+		rc = check_defines(m, e);
+	if (!rc)
+		rc = check_paths(m, e);
+	return rc ? rc : check_notes(m, e);
 }
 
 static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, char *rule, size_t rule_size,

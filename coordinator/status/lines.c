@@ -63,7 +63,7 @@ json_t *line_job(struct jobs *jobs, const char *name)
 	struct job_view v;
 	uint64_t id = id_of(name);
 	if (!id || !jobs_view(jobs, id, &v)) {
-		snprintf(text, sizeof text, "there is no job %.32s", name);
+		snprintf(text, sizeof text, "%.32s: no such job", name);
 		return line_error(text);
 	}
 	json_t *o = line_object("job");

@@ -34,7 +34,7 @@
 	NUMBER(known, ended_seen, "endedSeen", NULL, NOWHERE, KEPT) /* observed time in s at that moment (seen.h) */ \
 	NUMBER(real, progress, "progress", "progress", AT(progress), LIVE)                                           \
 	NUMBER(known, rel_error, "relError", "error", AT(error), KEPT)                                               \
-	NUMBER(known, rel_error_about, "relErrorAbout", "errorAbout", NOWHERE, KEPT) /* the estimate itself */       \
+	NUMBER(known, rel_error_about, "relErrorAbout", "errorAbout", AT(error_about), KEPT)   /* the estimate */    \
 	TEXT(rel_error_doubt, STATED_ERROR_TEXT, "relErrorDoubt", "errorDoubt", NOWHERE, KEPT) /* why not */         \
 	NUMBER(positive, target_error, "targetError", "targetError", AT(target_error), KEPT)                         \
 	NUMBER(real, cpu_seconds, "cpuSeconds", "cpuSeconds", AT(cpu_seconds), KEPT) /* of all leases */             \

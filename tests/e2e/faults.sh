@@ -29,34 +29,34 @@ done
 # worker, of which one had been given to two at once, then another one after a life.
 counted=$(sed 's/^/x event=/' <<TEXT | awk -v job=j1 -f "$HERE/faults/count.awk"
 start program=hslt-coordinator
-batch_merged job=j1 kind=2 group=0 part=0 epoch=1
-batch_merged job=j1 kind=2 group=1 part=0 epoch=0
-batch_stored job=j1 kind=2 group=1 part=0 epoch=0
-batch_merged job=j1 kind=2 group=4 part=0 epoch=0
-batch_stored job=j1 kind=2 group=4 part=0 epoch=0
+batch_merged job=j1 kind=render group=0 part=0 epoch=1
+batch_merged job=j1 kind=render group=1 part=0 epoch=0
+batch_stored job=j1 kind=render group=1 part=0 epoch=0
+batch_merged job=j1 kind=render group=4 part=0 epoch=0
+batch_stored job=j1 kind=render group=4 part=0 epoch=0
 start program=hslt-coordinator
-batch_restored job=j1 kind=2 group=0 part=0 epochs=2
-batch_merged job=j1 kind=2 group=0 part=0 epoch=0
-batch_merged job=j1 kind=2 group=1 part=0 epoch=0
-batch_acknowledged job=j1 kind=2 group=1 part=0 epoch=0 repeat=0
-batch_acknowledged job=j1 kind=2 group=0 part=0 epoch=1 repeat=1
-batch_merged job=j1 kind=2 group=4 part=0 epoch=0 late=1
-batch_merged job=j1 kind=2 group=2 part=0 epoch=0
-batch_acknowledged job=j1 kind=2 group=2 part=0 epoch=0 repeat=0
-batch_merged job=j1 kind=2 group=5 part=0 epoch=0
-batch_taken_back job=j1 kind=2 group=5 part=0 epoch=0
-batch_stored job=j1 kind=2 group=5 part=0 epoch=0
-batch_merged job=j1 kind=2 group=5 part=0 epoch=0
-batch_stored job=j1 kind=2 group=5 part=0 epoch=0
-lease_granted job=j1 peer=1 kind=2 group=3 part=0 epoch=0
-lease_granted job=j1 peer=2 kind=2 group=3 part=0 epoch=1
-lease_granted job=j1 peer=1 kind=2 group=3 part=0 epoch=1
-lease_granted job=j1 peer=4 kind=2 group=3 part=0 epoch=2
+batch_restored job=j1 kind=render group=0 part=0 epochs=2
+batch_merged job=j1 kind=render group=0 part=0 epoch=0
+batch_merged job=j1 kind=render group=1 part=0 epoch=0
+batch_acknowledged job=j1 kind=render group=1 part=0 epoch=0 repeat=0
+batch_acknowledged job=j1 kind=render group=0 part=0 epoch=1 repeat=1
+batch_merged job=j1 kind=render group=4 part=0 epoch=0 late=1
+batch_merged job=j1 kind=render group=2 part=0 epoch=0
+batch_acknowledged job=j1 kind=render group=2 part=0 epoch=0 repeat=0
+batch_merged job=j1 kind=render group=5 part=0 epoch=0
+batch_taken_back job=j1 kind=render group=5 part=0 epoch=0
+batch_stored job=j1 kind=render group=5 part=0 epoch=0
+batch_merged job=j1 kind=render group=5 part=0 epoch=0
+batch_stored job=j1 kind=render group=5 part=0 epoch=0
+lease_granted job=j1 peer=1 kind=render group=3 part=0 epoch=0
+lease_granted job=j1 peer=2 kind=render group=3 part=0 epoch=1
+lease_granted job=j1 peer=1 kind=render group=3 part=0 epoch=1
+lease_granted job=j1 peer=4 kind=render group=3 part=0 epoch=2
 peer_closed peer=1 name="w1" text="the peer hung up"
-lease_granted job=j1 peer=2 kind=2 group=3 part=0 epoch=0
-lease_granted job=j1 peer=2 kind=2 group=3 part=0 epoch=1
+lease_granted job=j1 peer=2 kind=render group=3 part=0 epoch=0
+lease_granted job=j1 peer=2 kind=render group=3 part=0 epoch=1
 start program=hslt-coordinator
-lease_granted job=j1 peer=4 kind=2 group=3 part=0 epoch=2
+lease_granted job=j1 peer=4 kind=render group=3 part=0 epoch=2
 TEXT
 )
 [ "$counted" = "2 1 7 2" ] || fail "count.awk counts $counted"

@@ -65,8 +65,8 @@ again
 until_true 30 merged_more "$c" 5 || fail "nothing of $c is merged"
 [ "$(value "$d" merged)" -eq 0 ] || fail "$d came before $c"
 job list >"$DIR/list"
-grep -q "^$c .*of 1 machine; by turns with\|^$c .*of 1 machine$" "$DIR/list" || fail "the list says of $c: $(cat "$DIR/list")"
-grep -q "^$d .*waits for $c of higher priority (7)\|^$d .*0 of 1 machine; $c comes first" "$DIR/list" || fail "the list says of $d: $(cat "$DIR/list")"
+grep -q "^$c .* [01] of 1 .*# by turns with\|^$c .* [01] of 1 [^#]*$" "$DIR/list" || fail "the list says of $c: $(cat "$DIR/list")"
+grep -q "^$d .*waits for $c of higher priority (7)\|^$d .*0 of 1 .*# $c comes first" "$DIR/list" || fail "the list says of $d: $(cat "$DIR/list")"
 "$BIN/hslt-status" "$c" | grep -q 'priority 7; [01] of 1 machine; by its priority 1' || fail "hslt-status says: $("$BIN/hslt-status" "$c")"
 job priority "$d" 50
 job release "$a"

@@ -44,7 +44,7 @@ merged() {
 	value "$1" merged
 }
 acknowledged() {
-	grep -c "event=batch_stored job=$1 .* kind=2 " "$DIR/coordinator.log" || :
+	grep -c "event=batch_stored job=$1 .* kind=render " "$DIR/coordinator.log" || :
 }
 
 start_coordinator -v --keep-films 0

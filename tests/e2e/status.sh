@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 # The status socket during a job: valid JSON, progress that grows, lines for subscribers, nobody else may read it.
 . "$(dirname "$0")/lib.sh"
-need hslt-coordinator hslt-worker hslt-submit hslt-status
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
-start_coordinator
+start_coordinator -v
 [ "$(stat -c %a "$DIR/status")" = 600 ] || fail "the socket's mode is $(stat -c %a "$DIR/status")"
+"$BIN/hslt-job" list | grep -q '^JOB .*ERROR' || fail "a list without jobs has no header"
 id=$(submit "$BOX" -o "$DIR/a.exr" --integrator pssmlt --bootstrap 20000 --mutations 300000 --name "a \"name\" with ü")
 is_state "$id" queued || fail "without workers a job waits"
 [ -n "$(value "$id" waiting)" ] || fail "it does not say why it waits"
+"$BIN/hslt-job" fetch --preview "$id" -o "$DIR/early.exr" 2>"$DIR/err.log" && fail "there is a preview of nothing"
+grep -q "no round of $id is complete yet" "$DIR/err.log" || fail "a preview of nothing: $(cat "$DIR/err.log")"
+code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/b.exr" --spp 1 --name "$(printf %0200d 0)"
+grep -q -e "--name: at most 127 bytes" "$DIR/err.log" || fail "a long name: $(cat "$DIR/err.log")"
+second=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --spp 1)
+"$BIN/hslt-job" cancel "$second" >/dev/null
+for list in "$BIN/hslt-status" "$BIN/hslt-job list"; do
+	$list | grep -q "^$second  *cancelled [^#]*$" || fail "$list says twice that it is cancelled: $($list | grep "^$second")"
+done
 timeout 400 "$BIN/hslt-status" --json --watch "$id" >"$DIR/lines" &
 watcher=$!
 PIDS="$PIDS $watcher"
@@ -24,6 +34,7 @@ if command -v jq >/dev/null; then
 fi
 "$BIN/hslt-status" | grep -q "^$id  *done" || fail "the table does not show the job"
 "$BIN/hslt-status" j99 2>/dev/null && fail "j99 cannot be known"
+grep -q "event=lease_granted .* kind=render " "$DIR/coordinator.log" || fail "the log does not name the kinds of leases"
 # Of what has ended a snapshot says less than of the one job that is asked for.
 "$BIN/hslt-status" "$id" | grep -q "^ *on .*direct" || fail "the job is shown without its effects"
 "$BIN/hslt-status" --json | grep -q '"effects"' && fail "a snapshot has the effects of a job that ended"

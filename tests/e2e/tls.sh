@@ -103,7 +103,7 @@ same "$DIR/alone.exr" "$DIR/again.exr"
 
 start_worker as-client --tls "$CA/ann"
 as_client=$WORKER
-turned_away "a client's certificate leases" "cannot lease" as-client
+turned_away "a client's certificate leases" "cannot take leases" as-client
 CODE=0
 wait "$as_client" || CODE=$?
 [ $CODE -eq 6 ] || fail "a worker with a client's certificate ends with $CODE, not 6: $(cat "$DIR/as-client.log")"

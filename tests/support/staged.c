@@ -195,8 +195,7 @@ void staged_cancel(uint64_t job)
 void staged_cancel_unstored(uint64_t job)
 {
 	const Farm__Done *answer = cancel(job);
-	assert_true(!answer->ok &&
-		    strstr(answer->text, "it applies until the coordinator stops, but cannot be stored"));
+	assert_true(!answer->ok && strstr(answer->text, "cancelled, but only until the coordinator restarts: "));
 }
 
 bool staged_answer(const struct lease_key *k)

@@ -63,8 +63,8 @@ static void send_failure(struct agent *a, const struct lease_key *k, const char 
 	m.lease_failed = &failed;
 	send_message(a, &m);
 	if (*text)
-		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", log_u64(k->job),
-			  (int)k->kind, k->group, k->part, log_u64(k->epoch), log_quote(text).text);
+		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%s group=%u part=%u epoch=%llu text=%s", log_u64(k->job),
+			  lease_kind_name(k->kind), k->group, k->part, log_u64(k->epoch), log_quote(text).text);
 }
 
 void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)

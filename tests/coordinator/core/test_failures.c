@@ -135,7 +135,7 @@ static void one_bad_worker(void **state)
 	struct job_status s;
 	assert_true(farm_job(f, 1, 160, &s));
 	assert_int_equal(s.state, JOB_RUNNING);
-	assert_string_equal(s.waiting, "no worker can compute it: b: sorry");
+	assert_string_equal(s.waiting, "no worker can compute it; worker b failed last: sorry");
 	transcript_play(f, (const char *const[]){
 				   "[160] w5 joins A threads=1 name=c -> -",
 				   "[160] w5 wants 1 -> w5 gets j1 g0 p0 e0",

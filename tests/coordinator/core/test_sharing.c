@@ -259,7 +259,7 @@ static void nobody_is_trusted(void **state)
 				   "[31] w1 fails j1 g0 p0 boot no such file -> -",
 				   NULL,
 			   });
-	assert_string_equal(waiting(f, 1), "no worker can compute it: w1: no such file");
+	assert_string_equal(waiting(f, 1), "no worker can compute it; worker w1 failed last: no such file");
 	farm_free(f);
 }
 

@@ -50,7 +50,7 @@ static const struct {
 	{{"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -",
 	  "[0] submit groups=1 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
 	  "[1] w1 fails j1 g0 p0 boot sorry -> -"},
-	 "no worker can compute it: w1: sorry"},
+	 "no worker can compute it; worker w1 failed last: sorry"},
 	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -", "[30] tick -> -"},
 	 "no worker that responds and is not quarantined (1 are known)"},
 	{{"[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 name=a -> -",

@@ -136,10 +136,10 @@ static void one_job_has_its_details(void **state)
 	assert_int_equal(json_array_size(json_object_get(job, "effects")), 24);
 	json_decref(o);
 	o = hear(f, NULL);
-	assert_string_equal(text_of(o, "text"), "there is no job j301");
+	assert_string_equal(text_of(o, "text"), "j301: no such job");
 	json_decref(o);
 	o = hear(f, NULL);
-	assert_string_equal(text_of(o, "text"), "there is no job 7");
+	assert_string_equal(text_of(o, "text"), "7: no such job");
 	json_decref(o);
 	fclose(f);
 }

@@ -70,8 +70,8 @@ function add(k, fresh) {
 			add(key(get("kind"), get("epoch")), get("late") == "") # late: from the journal
 		for (e = 0; event == "batch_restored" && e < get("epochs"); e++)
 			add(key(get("kind"), e))
-		if (event == "batch_restored" && get("kind") == 2) # after the bootstrap
-			add(key(1, 0))
+		if (event == "batch_restored" && get("kind") == "render") # after the bootstrap
+			add(key("bootstrap", 0))
 	}
 }
 

@@ -52,7 +52,7 @@ somebody_spoils() {
 	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # of no life of another
 	says coordinator "event=peer_hello .*name=\"liar$i\""
 	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
-	says "liar$i" 'event=batch_acknowledged .*kind=2'
+	says "liar$i" 'event=batch_acknowledged .*kind=render'
 	kill -9 "$WORKER"
 }
 taken_back() {
@@ -174,7 +174,7 @@ other_role() {
 }
 a_client_leases() {
 	code 6 timeout 100 "$BIN/hslt-worker" --threads 1 --name "client$i" --cache "$DIR/cache"
-	grep -q 'cannot lease' "$DIR/err.log" || fail "$NAME: it says $(cat "$DIR/err.log")"
+	grep -q 'cannot take leases' "$DIR/err.log" || fail "$NAME: it says $(cat "$DIR/err.log")"
 }
 
 fault large_picture 3 1 "a scene with a PNG of 140 KB and 16,000 x 16,000 pixels is submitted, also without hslt-submit's checks"
