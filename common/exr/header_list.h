@@ -2,7 +2,8 @@
 /* The attributes: ROW(NAME, its text in the file, type, whether equal renders may differ in it, meaning). */
 ROW(VERSION, "hslt:version", STRING, false, "version of the programs")
 ROW(SCENE, "hslt:scene", STRING, false, "name of the scene file")
-ROW(SCENE_HASH, "hslt:sceneHash", STRING, false, "SHA-256 of the scene file")
+/* Not compared: the same scene may be written in other words. */
+ROW(SCENE_HASH, "hslt:sceneHash", STRING, true, "SHA-256 of the scene file")
 ROW(CAMERA, "hslt:camera", STRING, false,
     "the camera as name=value pairs: fov in degrees, to_world by rows (x left, y up, z forward)")
 ROW(INTEGRATOR, "hslt:integrator", STRING, false, "path, bdpt, pssmlt, hslt, ...")

@@ -177,7 +177,7 @@ extreme_numbers() {
 # Each ended all workers once; and hslt-render with its own signal.
 one_extreme_scene() {
 	case $((i % 3)) in
-	0) set -- glass '<float name="intIOR" value="1.33"' '<float name="intIOR" value="1e-300"' int_ior=1e-300 ;;
+	0) set -- glass '<float name="intIOR" value="1.33"' '<float name="intIOR" value="1e-300"' intIOR=1e-300 ;;
 	1) set -- metal 'origin="0, 1.3, 5"' 'origin="3e38, 1.3, 5"' "3e+38 times\|scene radii away" ;;
 	2) set -- metal '<rgb name="k" value="3.9, 2.45, 2.14"' '<rgb name="k" value="3.9, 3e38, 2.14"' "k=3e+38" ;;
 	esac
