@@ -157,11 +157,11 @@ static bool is_sound(const struct balance_trial *t, double log_weight)
 /* As the chain does it. */
 static double acceptance(struct run *r, struct balance_trial *t, struct move *move)
 {
-	enum strategy_counter end = t->ops->propose(r->m, &t->how, r->x, r->y, move);
+	enum proposal_end end = t->ops->propose(r->m, &t->how, r->x, r->y, move);
 	double to_y = end ? -INFINITY : t->ops->log_weight(r->m, r->y, move, X_TO_Y);
 	if (!end && !is_sound(t, to_y))
-		end = STRATEGY_FAIL_DARK;
-	t->count[end]++;
+		end = PROPOSAL_DARK;
+	t->count[proposal_counter(end)]++;
 	if (end)
 		return 0;
 	double to_x = t->ops->log_weight(r->m, r->x, move, Y_TO_X);

@@ -122,12 +122,12 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 {
 	struct mutation_ctx *m = &c->mutation;
 	struct full_path *x = &c->current->path, *y = &c->proposal->path;
-	enum strategy_counter end = entry->ops->propose(m, &entry->how, x, y, move);
+	enum proposal_end end = entry->ops->propose(m, &entry->how, x, y, move);
 	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
 	if (!end && !(to_y > -INFINITY && path_place_is_sound(m->path, to_y, entry->ops->independent)))
-		end = STRATEGY_FAIL_DARK;
+		end = PROPOSAL_DARK;
 	if (end) {
-		m->count[end]++;
+		m->count[proposal_counter(end)]++;
 		return 0;
 	}
 	if (entry->ops->independent) {

@@ -14,8 +14,8 @@
 
 enum { BLOCK_LENGTHS = BLOCK_VERTEX, BLOCK_AROUND };
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				 struct full_path *y, struct move *move)
 {
 	(void)how;
 	struct path_context *c = m->path;
@@ -36,10 +36,10 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	sampler_random_init(&s, m->seed, RNG_CHAIN, m->chain, m->step);
 	ensemble_draw(c, &s.base, &n, &candidates);
 	if (!ensemble_choose(c, &candidates, u[0], y))
-		return STRATEGY_FAIL_DARK;
+		return PROPOSAL_DARK;
 	move->last = y->edges;
 	move->log_density[X_TO_Y] = -log(candidates.total);
-	return STRATEGY_PROPOSED;
+	return PROPOSAL_MADE;
 }
 
 static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,

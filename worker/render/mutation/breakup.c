@@ -88,25 +88,25 @@ static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, stru
 	return true;
 }
 
-static enum strategy_counter reason_of(enum walk_end end)
+static enum proposal_end reason_of(enum walk_end end)
 {
 	switch (end) {
 	case WALK_OK:
-		return STRATEGY_PROPOSED;
+		return PROPOSAL_MADE;
 	case WALK_MISSED:
-		return STRATEGY_FAIL_MISSED;
+		return PROPOSAL_MISSED;
 	case WALK_BLOCKED:
-		return STRATEGY_FAIL_BLOCKED;
+		return PROPOSAL_BLOCKED;
 	case WALK_MODE:
-		return STRATEGY_FAIL_MODE;
+		return PROPOSAL_MODE;
 	case WALK_SINGULAR:
-		return STRATEGY_FAIL_SINGULAR;
+		return PROPOSAL_SINGULAR;
 	case WALK_DIVERGED:
-		return STRATEGY_FAIL_DIVERGED;
+		return PROPOSAL_DIVERGED;
 	case WALK_ITERATIONS:
 		break;
 	}
-	return STRATEGY_FAIL_ITERATIONS;
+	return PROPOSAL_ITERATIONS;
 }
 
 static double tolerance_of(const struct mutation_ctx *m, const struct path_vertex *v, const struct halfvec_step *s)
@@ -197,14 +197,14 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 }
 
 /* Between x_b and x_c by half vectors. */
-static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
-				  struct full_path *y, struct move *move)
+static enum proposal_end walk(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
+			      struct full_path *y, struct move *move)
 {
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
 	constraints_of(c->w, x, how->b, how->c, s->k);
 	if (m->limits.solver->factor(s->k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
-		return STRATEGY_FAIL_SINGULAR;
+		return PROPOSAL_SINGULAR;
 	move->log_transfer[Y_TO_X] = s->walk.system.log_transfer;
 	halfvec_steps(c, x, s->k, how->b, how->c, s->step[X_TO_Y]);
 	aim(m, how, x);
@@ -216,16 +216,16 @@ static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *
 	if (end != WALK_OK)
 		return reason_of(end);
 	if (m->limits.solver->factor(s->walk.k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
-		return STRATEGY_FAIL_SINGULAR;
+		return PROPOSAL_SINGULAR;
 	move->log_transfer[X_TO_Y] = s->walk.system.log_transfer;
 	halfvec_steps(c, y, s->walk.k, how->b, how->c, s->step[Y_TO_X]);
 	add_step_densities(m, how, x, move);
-	return leads_back(m, how, x, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_REVERSE;
+	return leads_back(m, how, x, y) ? PROPOSAL_MADE : PROPOSAL_REVERSE;
 }
 
-static enum strategy_counter join(struct mutation_ctx *m, unsigned e, struct full_path *y)
+static enum proposal_end join(struct mutation_ctx *m, unsigned e, struct full_path *y)
 {
-	return full_path_join(y, e) && full_path_visible(m->path, y, e) ? STRATEGY_PROPOSED : STRATEGY_FAIL_BLOCKED;
+	return full_path_join(y, e) && full_path_visible(m->path, y, e) ? PROPOSAL_MADE : PROPOSAL_BLOCKED;
 }
 
 /* How x_j scatters now that its neighbours have moved. */
@@ -266,8 +266,8 @@ static bool turned_beyond(const struct full_path *x, unsigned b, unsigned c)
 	return false;
 }
 
-enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
-				      struct full_path *y, struct move *move)
+enum proposal_end breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
+				  struct full_path *y, struct move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges, b = how->b, c_end = b > 0 ? how->c : 0;
@@ -278,17 +278,17 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 		full_path_set_wavelength(c, y, move_wavelength(c, x->wavelength, r[0]));
 	}
 	bool aperture = how->aperture && EFFECT_IS_ON(c->w, aperture);
-	enum strategy_counter end = STRATEGY_PROPOSED;
+	enum proposal_end end = PROPOSAL_MADE;
 	if (turned_beyond(x, b, c_end))
-		return STRATEGY_FAIL_MODE;
+		return PROPOSAL_MODE;
 	if (b == c_end && b > 0)
-		return see_wavelength(c, x, y, move) ? STRATEGY_PROPOSED : STRATEGY_FAIL_BLOCKED;
+		return see_wavelength(c, x, y, move) ? PROPOSAL_MADE : PROPOSAL_BLOCKED;
 	if (b < k)
 		end = trace_chain(m, b, aperture, x, y, move);
 	else if (aperture && !trace_move_aperture(m, x, y))
-		end = STRATEGY_FAIL_OUTSIDE;
+		end = PROPOSAL_OUTSIDE;
 	if (!end && how->emitter && !move_emitter(m, x, y, move))
-		end = STRATEGY_FAIL_OUTSIDE;
+		end = PROPOSAL_OUTSIDE;
 	if (!end && b > 0)
 		end = b - c_end >= 2 ? walk(m, how, x, y, move) : join(m, c_end, y);
 	move->first = c_end;
@@ -296,12 +296,12 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 		return end;
 	full_path_forget(y, c_end + 1, k);
 	if (!set_mode(y, b) || !set_mode(y, c_end) || !media_hold(c, y, c_end))
-		return STRATEGY_FAIL_MODE;
+		return PROPOSAL_MODE;
 	if (!see_wavelength(c, x, y, move))
-		return STRATEGY_FAIL_BLOCKED;
+		return PROPOSAL_BLOCKED;
 	if (EFFECT_IS_ON(c->w, scattering) && !full_path_is_made(c, y))
-		return STRATEGY_FAIL_DARK;
-	return b < k || whole_film(c, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_OUTSIDE;
+		return PROPOSAL_DARK;
+	return b < k || whole_film(c, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
 
 /* Cosines, distances and Jacobians that do not cancel between f and T, by sec. 5: one geometric normal, at x_{b-1}. */

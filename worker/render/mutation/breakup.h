@@ -19,8 +19,8 @@ struct breakup {
 };
 
 /* See mutation.h. On success everything is set but the share of move->log_density[Y_TO_X] for the choice of b and c. */
-enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
-				      struct full_path *y, struct move *move);
+enum proposal_end breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path *x,
+				  struct full_path *y, struct move *move);
 double breakup_log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			  enum mutation_direction direction);
 

@@ -31,8 +31,8 @@ static unsigned technique_count(unsigned edges)
 	return edges == 1 ? 1 : edges + 1;
 }
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				 struct full_path *y, struct move *move)
 {
 	(void)how, (void)x;
 	struct path_context *c = m->path;
@@ -45,8 +45,8 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	sampler_random_init(&sampler, m->seed, RNG_CHAIN, m->chain, m->step);
 	c->one_way = true;
 	if (path_walk_camera(c, &sampler.base, t, film) < t || (s >= 2 && path_walk_light(c, &sampler.base, s) < s))
-		return STRATEGY_FAIL_MISSED;
-	return full_path_from_subpaths(c, s, k, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_DARK;
+		return PROPOSAL_MISSED;
+	return full_path_from_subpaths(c, s, k, y) ? PROPOSAL_MADE : PROPOSAL_DARK;
 }
 
 static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,

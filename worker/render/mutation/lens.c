@@ -14,11 +14,11 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 static const struct heuristic any_end = {"any", NULL, weigh_c};
 static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRAWN, .aperture = true};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				 struct full_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, aperture))
-		return STRATEGY_FAIL_INAPPLICABLE;
+		return PROPOSAL_INAPPLICABLE;
 	return strategy_propose(&strategy, m, how, x, y, move);
 }
 

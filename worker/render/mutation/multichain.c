@@ -4,8 +4,8 @@
 
 static const struct strategy strategy = {&heuristic_roughness, 0, 0, .wavelength = true, .aperture = true};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				 struct full_path *y, struct move *move)
 {
 	return strategy_propose(&strategy, m, how, x, y, move);
 }

@@ -25,6 +25,19 @@ const struct mutation_ops *mutation_find(const char *name, size_t length)
 	return NULL;
 }
 
+enum strategy_counter proposal_counter(enum proposal_end reason)
+{
+	static const enum strategy_counter counters[] = {
+		[PROPOSAL_MADE] = STRATEGY_PROPOSED,	      [PROPOSAL_OUTSIDE] = STRATEGY_FAIL_OUTSIDE,
+		[PROPOSAL_MISSED] = STRATEGY_FAIL_MISSED,     [PROPOSAL_BLOCKED] = STRATEGY_FAIL_BLOCKED,
+		[PROPOSAL_MODE] = STRATEGY_FAIL_MODE,	      [PROPOSAL_SINGULAR] = STRATEGY_FAIL_SINGULAR,
+		[PROPOSAL_DIVERGED] = STRATEGY_FAIL_DIVERGED, [PROPOSAL_ITERATIONS] = STRATEGY_FAIL_ITERATIONS,
+		[PROPOSAL_REVERSE] = STRATEGY_FAIL_REVERSE,   [PROPOSAL_EMITTER] = STRATEGY_FAIL_EMITTER,
+		[PROPOSAL_DARK] = STRATEGY_FAIL_DARK,	      [PROPOSAL_INAPPLICABLE] = STRATEGY_FAIL_INAPPLICABLE,
+	};
+	return counters[reason];
+}
+
 void mutation_random(const struct mutation_ctx *m, unsigned block, double out[4])
 {
 	rng_uniform4(m->seed, RNG_MUTATION, m->chain, m->step, block, out);

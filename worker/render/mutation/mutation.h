@@ -54,15 +54,33 @@ struct mutation_ctx {
 	struct mutation_scratch scratch;
 };
 
+enum proposal_end {
+	PROPOSAL_MADE,
+	/* Why there is none: the counters of common/film/batch.h say what each means. */
+	PROPOSAL_OUTSIDE,
+	PROPOSAL_MISSED,
+	PROPOSAL_BLOCKED,
+	PROPOSAL_MODE,
+	PROPOSAL_SINGULAR,
+	PROPOSAL_DIVERGED,
+	PROPOSAL_ITERATIONS,
+	PROPOSAL_REVERSE,
+	PROPOSAL_EMITTER,
+	PROPOSAL_DARK,
+	PROPOSAL_INAPPLICABLE,
+};
+/* That of a reason. */
+enum strategy_counter proposal_counter(enum proposal_end reason);
+
 struct mutation_ops {
 	const char *name, *summary;
 	bool independent; /* independent of x: also estimates b by f / T */
 	/* Weight in the default mixture of a scene with these effects; 0: not part of it. */
 	double (*useful)(const struct render_summary *scene);
-	/* STRATEGY_PROPOSED: y is complete, and all its rays have been cast. Otherwise the reason, and y's vertices
+	/* PROPOSAL_MADE: y is complete, and all its rays have been cast. Otherwise the reason, and y's vertices
 	 * first..last are undefined. */
-	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how,
-					 struct full_path *x, struct full_path *y, struct move *move);
+	enum proposal_end (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move);
 	/* The weight of y for X_TO_Y, of x for Y_TO_X. -INFINITY: black. */
 	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);

@@ -30,8 +30,8 @@ static const struct heuristic join = {"join", weigh_b, weigh_c};
 static const struct strategy strategy = {
 	&join, STRATEGY_DRAWN, STRATEGY_DRAWN, .wavelength = true, .aperture = true, .emitter = true};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				 struct full_path *y, struct move *move)
 {
 	return strategy_propose(&strategy, m, how, x, y, move);
 }

@@ -78,23 +78,22 @@ static bool choose(const struct strategy *s, const struct choice *forced, struct
 	return out->log_choice > -INFINITY;
 }
 
-enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m,
-				       const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				       struct move *move)
+enum proposal_end strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
+				   struct full_path *x, struct full_path *y, struct move *move)
 {
 	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
 	if (EFFECT_IS_ON(m->path->w, scattering))
 		br.wavelength = s->wavelength_in_media;
 	if (!choose(s, &forced, m, x, &br))
-		return STRATEGY_FAIL_INAPPLICABLE;
+		return PROPOSAL_INAPPLICABLE;
 	const struct world *w = m->path->w;
 	br.emitter = s->emitter && w->effects.emitter_move && br.b > 0 && br.c == 0 &&
 		     w->emitters[x->v[0].emitter].ops->point_inverse;
-	enum strategy_counter end = breakup_propose(m, &br, x, y, move);
+	enum proposal_end end = breakup_propose(m, &br, x, y, move);
 	if (end)
 		return end;
 	double back = log_choice(s, &forced, m, y, br.b, br.c);
 	move->log_density[Y_TO_X] += back;
-	return back > -INFINITY ? STRATEGY_PROPOSED : STRATEGY_FAIL_MODE;
+	return back > -INFINITY ? PROPOSAL_MADE : PROPOSAL_MODE;
 }

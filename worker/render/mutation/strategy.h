@@ -15,8 +15,7 @@ struct strategy {
 };
 
 /* A breakup by this strategy; `how` takes precedence. */
-enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m,
-				       const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				       struct move *move);
+enum proposal_end strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
+				   struct full_path *x, struct full_path *y, struct move *move);
 
 #endif

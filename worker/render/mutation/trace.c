@@ -125,17 +125,17 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_pat
 }
 
 /* y_b as the end of the traced part. */
-static enum strategy_counter arrive(struct path_context *c, unsigned b, struct path_vertex *v)
+static enum proposal_end arrive(struct path_context *c, unsigned b, struct path_vertex *v)
 {
 	v->delta = false;
 	v->mode = 0;
 	if (b > 0)
-		return v->kind != VERTEX_INFINITE && path_scatters_smoothly(v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_MODE;
+		return v->kind != VERTEX_INFINITE && path_scatters_smoothly(v) ? PROPOSAL_MADE : PROPOSAL_MODE;
 	if (v->emitter < 0)
-		return STRATEGY_FAIL_EMITTER;
+		return PROPOSAL_EMITTER;
 	if (v->kind == VERTEX_SURFACE)
 		v->kind = VERTEX_EMITTER;
-	return path_can_be_hit(c, v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_EMITTER;
+	return path_can_be_hit(c, v) ? PROPOSAL_MADE : PROPOSAL_EMITTER;
 }
 
 /* To an event in a medium that is about as far away as x's. */
@@ -175,24 +175,24 @@ static bool go_on(struct mutation_ctx *m, unsigned j, vec3 d, const struct full_
 	return true;
 }
 
-enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
-				  struct full_path *y, struct move *move)
+enum proposal_end trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
+			      struct full_path *y, struct move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges;
 	if (aperture && !trace_move_aperture(m, x, y))
-		return STRATEGY_FAIL_OUTSIDE;
+		return PROPOSAL_OUTSIDE;
 	if (!move_film(m, x, y, move))
-		return STRATEGY_FAIL_OUTSIDE;
+		return PROPOSAL_OUTSIDE;
 	vec3 d = camera_direction(&c->w->camera, y->v[k].x.p, y->film[0], y->film[1]);
 	for (unsigned j = k; j > b; j--) {
 		if (j < k && !scatter_on(m, j, x, y, move, &d))
-			return STRATEGY_FAIL_MODE;
+			return PROPOSAL_MODE;
 		move->first = j - 1;
 		if (!go_on(m, j, d, x, y, move) || (j - 1 > b && y->v[j - 1].kind != x->v[j - 1].kind))
-			return STRATEGY_FAIL_MISSED;
+			return PROPOSAL_MISSED;
 		if (j < k && full_path_mode(y, j) != (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
-			return STRATEGY_FAIL_MODE;
+			return PROPOSAL_MODE;
 	}
 	return arrive(c, b, &y->v[b]);
 }

@@ -12,8 +12,8 @@
 /* Makes y's vertices k-1 .. b, edges k-1 .. b, film point, and x_k if there is an aperture that is to move. Modes of
  * the vertices k-1 .. b+1 are x's; x_b (b > 0) can scatter in many directions, x_0 (b = 0) is an emitter. Sets first
  * and log_symmetric. */
-enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
-				  struct full_path *y, struct move *move);
+enum proposal_end trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,
+			      struct full_path *y, struct move *move);
 
 /* A symmetric step of x_k on the aperture. false: it leaves the aperture. */
 bool trace_move_aperture(struct mutation_ctx *m, const struct full_path *x, struct full_path *y);

@@ -17,11 +17,11 @@ static bool must_move(const struct full_path *x)
 	return false;
 }
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				 struct full_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, colour))
-		return STRATEGY_FAIL_INAPPLICABLE;
+		return PROPOSAL_INAPPLICABLE;
 	if (must_move(x)) {
 		const struct mutation_setting all = {(int)x->edges, 0};
 		return strategy_propose(&strategy, m, how->b >= 0 || how->c >= 0 ? how : &all, x, y, move);

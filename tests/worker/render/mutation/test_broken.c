@@ -20,8 +20,8 @@
 static const struct mutation_ops *real;
 static struct full_path *from; /* x of the proposal at hand */
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				 struct full_path *y, struct move *move)
 {
 	from = x;
 	return real->propose(m, how, x, y, move);
@@ -71,12 +71,12 @@ static double denser_above(struct mutation_ctx *m, struct full_path *into, const
 	return log_weight(m, into, move, direction) - (into->wavelength > 0.5 ? log(1.1) : 0);
 }
 
-static enum strategy_counter drift(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				   struct full_path *y, struct move *move)
+static enum proposal_end drift(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+			       struct full_path *y, struct move *move)
 {
 	const double mean = 0.1; /* pixels; the deviation is 0.64 */
 	x->film[0] += mean;
-	enum strategy_counter end = propose(m, how, x, y, move);
+	enum proposal_end end = propose(m, how, x, y, move);
 	x->film[0] -= mean;
 	return end;
 }
@@ -118,10 +118,10 @@ static double no_transfer(struct mutation_ctx *m, struct full_path *into, const 
 }
 
 /* Steps of x back from y, too. */
-static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				       struct full_path *y, struct move *move)
+static enum proposal_end one_sigma(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				   struct full_path *y, struct move *move)
 {
-	enum strategy_counter end = propose(m, how, x, y, move);
+	enum proposal_end end = propose(m, how, x, y, move);
 	for (unsigned j = move->c + 1; !end && j < move->b; j++) {
 		vec2 back = vec2_scale(-1, m->scratch.dh[j]);
 		if (!x->v[j].delta)
@@ -132,11 +132,11 @@ static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct muta
 }
 
 /* What the way back refused is proposed all the same; forced b and c only, whose choice has no density. */
-static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mutation_setting *how,
-					 struct full_path *x, struct full_path *y, struct move *move)
+static enum proposal_end no_way_back(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move)
 {
-	enum strategy_counter end = propose(m, how, x, y, move);
-	if (end != STRATEGY_FAIL_REVERSE)
+	enum proposal_end end = propose(m, how, x, y, move);
+	if (end != PROPOSAL_REVERSE)
 		return end;
 	unsigned ends[2] = {move->b, move->c};
 	full_path_forget(y, move->c + 1, y->edges);
@@ -145,9 +145,9 @@ static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mu
 			continue;
 		y->v[ends[i]].mode = full_path_mode(y, ends[i]);
 		if (!y->v[ends[i]].mode)
-			return STRATEGY_FAIL_MODE;
+			return PROPOSAL_MODE;
 	}
-	return move->b < y->edges || whole_film(m->path, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_OUTSIDE;
+	return move->b < y->edges || whole_film(m->path, y) ? PROPOSAL_MADE : PROPOSAL_OUTSIDE;
 }
 
 /* The emitter's point as if all points were as likely. */
@@ -167,8 +167,8 @@ struct fault {
 	struct mutation_setting how;
 	enum balance_side side;
 	unsigned starts, repeat;
-	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how,
-					 struct full_path *x, struct full_path *y, struct move *move);
+	enum proposal_end (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+				     struct full_path *y, struct move *move);
 	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);
 };
