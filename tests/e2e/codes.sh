@@ -25,7 +25,7 @@ grep -q -- --insecure "$DIR/err.log" || fail "it does not say how"
 code 2 "$BIN/hslt-worker" --coordinator 192.0.2.1:7700 --cache "$DIR/cache"
 code 2 "$BIN/hslt-submit" --coordinator 192.0.2.1:7700 "$BOX" -o "$DIR/a.exr"
 code 75 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 "$BOX" -o "$DIR/a.exr"
-code 75 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 "$DIR/none.xml" -o "$DIR/a.exr" # before the scene is looked at
+! grep -q 'chosen by a pilot' "$DIR/err.log" || fail "a pilot before anybody was asked: $(cat "$DIR/err.log")"
 code 75 "$BIN/hslt-job" --coordinator 127.0.0.1:1 list
 code 75 "$BIN/hslt-status" --socket "$DIR/none"
 

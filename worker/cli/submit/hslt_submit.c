@@ -242,8 +242,8 @@ static void measure(struct arguments *a, const struct scene_bundle *b)
 		plan.kind == PLAN_CHAINS ? "mutations" : "samples");
 }
 
-/* Whether there is a coordinator that accepts us, before the work of loading the scene. The connection is closed again:
- * while the scene is loaded nobody would keep it alive. */
+/* Whether there is a coordinator that accepts us, before the work of a pilot. The connection is closed again: meanwhile
+ * nobody would keep it alive. */
 static int knock(const struct arguments *a, struct error *e)
 {
 	struct client *cl;
@@ -269,10 +269,6 @@ int main(int argc, char **argv)
 	struct output_files outputs = {{{"-o", a.wait ? a.output : NULL, OUTPUT_EXR},
 					{"--plot", a.plot, output_format_of_plot(a.plot ? a.plot : "")}}};
 	int rc = output_files_check(&outputs, &a.scene, 1, &e);
-	if (!rc && (rc = knock(&a, &e))) {
-		fprintf(stderr, "hslt-submit: %s\n", e.text);
-		return client_exit_code(rc);
-	}
 	if (!rc)
 		rc = scene_bundle_read(&b, a.scene, &a.render, &outputs, &e);
 	if (rc) {
@@ -293,6 +289,11 @@ int main(int argc, char **argv)
 		fprintf(stderr, "hslt-submit: note: %s\n", note);
 	a.request.output = a.estimate ? "" : last_part(a.output);
 	a.request.name = a.name ? a.name : b.scene;
+	if ((rc = knock(&a, &e))) {
+		fprintf(stderr, "hslt-submit: %s\n", e.text);
+		scene_bundle_fini(&b);
+		return client_exit_code(rc);
+	}
 	struct choice choice;
 	rc = choice_make(&a.render, b.folder, b.scene, &choice, &e);
 	if (!rc)
