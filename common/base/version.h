@@ -3,6 +3,6 @@
 #ifndef COMMON_BASE_VERSION_H
 #define COMMON_BASE_VERSION_H
 
-#define HSLT_VERSION "0.1.0"
+#define HSLT_VERSION "0.2.0-dev"
 
 #endif
