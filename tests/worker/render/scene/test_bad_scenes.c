@@ -153,7 +153,7 @@ static void test_unknown_names(void **state)
 	(void)state;
 	refuses(S "\n<bsdf type='difuse'/>" END,
 		"s.xml:2: <bsdf type=\"difuse\">: there is no bsdf of this type; did you mean "
-		"`diffuse`? --lenient takes the bsdf inside it, or `diffuse`, instead (supported: diffuse, ");
+		"`diffuse`? --lenient uses the bsdf inside it, or `diffuse`, instead (supported: diffuse, ");
 	refuses(S "<sensor type='perspectiv'/>" END, "did you mean `perspective`? (supported: perspective");
 	refuses(S "<probe type='x'/>" END,
 		"<probe type=\"x\">: there is no element of this name; --lenient leaves it out");

@@ -224,7 +224,7 @@ static void test_bad_input(void **state)
 {
 	(void)state;
 	put_prism(5, NONE);
-	expect_refused(ANGLE(181), "max_smooth_angle=181 is outside [0, 180]");
+	expect_refused(ANGLE(181), "maxSmoothAngle=181 is outside [0, 180]");
 	expect_refused(ANGLE(30) "<boolean name='faceNormals' value='true'/>",
 		       "max_smooth_angle and face_normals contradict each other");
 	/* 40,000 triangles of different directions around a point */
