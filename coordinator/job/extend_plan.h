@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The plan of an extended job: the same bits as if it had been submitted with the new bounds and the same groups,
- * chains, bootstrap and epoch. A named bound is added to
- * the requested one (or to what is done, if there was none); a bound that is not named and already met is lifted. Pure.
+ * chains, bootstrap and epoch. A named bound is added to the requested one (or to what is done, if there was none); a
+ * bound that is not named and already met is lifted. Pure.
  */
 #ifndef COORDINATOR_JOB_EXTEND_PLAN_H
 #define COORDINATOR_JOB_EXTEND_PLAN_H

@@ -107,7 +107,7 @@ cat >"$TREE/worker/render/mutation/again.c" <<'TEXT'
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, STRATEGY_DRAWN, .halfvecs = false};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
+static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
 				     struct full_path *y, struct move *move)
 {
 	return strategy_propose(&strategy, m, how, x, y, move);
