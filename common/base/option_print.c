@@ -241,7 +241,9 @@ static void print_man(FILE *out, const struct program *p)
 	const struct option_row *r;
 	fputs(".TH \"", out);
 	roff(out, p->name, strlen(p->name));
-	fprintf(out, "\" 1 \"\" \"HSLT Farm %s\" \"User Commands\"\n.SH NAME\n", HSLT_VERSION);
+	fputs("\" 1 \"\" \"HSLT Farm ", out);
+	roff(out, HSLT_VERSION, strlen(HSLT_VERSION));
+	fputs("\" \"User Commands\"\n.SH NAME\n", out);
 	roff(out, p->name, strlen(p->name));
 	fputs(" \\- ", out);
 	roff_lines(out, p->summary);
