@@ -251,6 +251,17 @@ static void step(const struct step *s)
 	drain();
 }
 
+/* Files of the cache are read by libuv's pool, which nobody tells when to work; a worker that ends waits for it. */
+static void finish_reading(void)
+{
+	for (struct job_cache *b = now.agent->bundles; b;) {
+		bool reads = b->reading.check;
+		if (reads)
+			uv_run(&now.agent->loop, UV_RUN_ONCE);
+		b = reads ? now.agent->bundles : b->next;
+	}
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
 	struct step steps[SCRIPT_STEPS];
@@ -260,6 +271,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	for (size_t i = 0; i < count && !now.agent->gone; i++)
 		step(&steps[i]);
 	hang_up();
+	finish_reading();
 	if (!now.agent->gone)
 		*now.agent->thread_pool = (struct thread_pool){0};
 	lease_queue_close(now.agent);
