@@ -6,6 +6,7 @@
 #include "common/blob/blob_batch.h"
 
 #include "common/base/disk.h"
+#include "common/base/list.h"
 #include "common/base/mem.h"
 
 #include <string.h>
@@ -14,8 +15,7 @@ enum { PATH_MOST = 4096 };
 
 struct blob_batch {
 	struct blob_store *store;
-	struct blob_kept *kept;
-	size_t count, capacity;
+	struct list kept; /* struct blob_kept */
 	size_t renamed;
 };
 
@@ -23,42 +23,35 @@ struct blob_batch *blob_batch_new(struct blob_store *s)
 {
 	struct blob_batch *b = mem_alloc(1, sizeof *b);
 	if (b)
-		b->store = s;
+		*b = (struct blob_batch){.store = s, .kept.size = sizeof(struct blob_kept)};
 	return b;
 }
 
-static int reserve(struct blob_batch *b, struct error *e)
+static struct blob_kept *kept_of(const struct blob_batch *b, size_t i)
 {
-	if (b->count < b->capacity)
-		return 0;
-	size_t want = b->capacity ? 2 * b->capacity : 16;
-	struct blob_kept *grown = mem_grow(b->kept, b->capacity * sizeof *grown, want * sizeof *grown);
-	if (!grown)
-		return error_set(e, ENOMEM, "no memory for the list of blobs");
-	b->kept = grown;
-	b->capacity = want;
-	return 0;
+	return (struct blob_kept *)b->kept.items + i;
 }
 
 int blob_batch_add(struct blob_batch *b, struct blob_writer *w, struct error *e)
 {
-	int rc = reserve(b, e);
-	if (rc)
+	struct blob_kept *kept = list_push(&b->kept);
+	if (!kept) {
 		blob_write_abort(w);
-	else
-		rc = blob_write_keep(w, &b->kept[b->count], e);
-	b->count += !rc;
+		return error_set(e, ENOMEM, "no memory for the list of blobs");
+	}
+	int rc = blob_write_keep(w, kept, e);
+	b->kept.count -= rc != 0;
 	return rc;
 }
 
 size_t blob_batch_count(const struct blob_batch *b)
 {
-	return b->count;
+	return b->kept.count;
 }
 
 const struct blob_hash *blob_batch_hash(const struct blob_batch *b, size_t i)
 {
-	return &b->kept[i].hash;
+	return &kept_of(b, i)->hash;
 }
 
 static int flush_file(const char *path, struct error *e)
@@ -74,12 +67,12 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 {
 	char from[PATH_MOST], to[PATH_MOST];
 	int rc = 0;
-	for (size_t i = 0; !rc && i < b->count; i++) {
-		blob_temporary_path(b->store, b->kept[i].number, from, sizeof from);
+	for (size_t i = 0; !rc && i < b->kept.count; i++) {
+		blob_temporary_path(b->store, kept_of(b, i)->number, from, sizeof from);
 		rc = flush_file(from, e);
 	}
-	for (; !rc && b->renamed < b->count; b->renamed += !rc) {
-		const struct blob_kept *k = &b->kept[b->renamed];
+	for (; !rc && b->renamed < b->kept.count; b->renamed += !rc) {
+		const struct blob_kept *k = kept_of(b, b->renamed);
 		blob_temporary_path(b->store, k->number, from, sizeof from);
 		blob_path(b->store, &k->hash, to, sizeof to);
 		if (disk_rename(from, to))
@@ -90,8 +83,8 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 
 void blob_batch_enter(struct blob_batch *b)
 {
-	for (size_t i = 0; i < b->count; i++)
-		blob_enter(b->store, &b->kept[i]);
+	for (size_t i = 0; i < b->kept.count; i++)
+		blob_enter(b->store, kept_of(b, i));
 }
 
 void blob_batch_free(struct blob_batch *b)
@@ -99,13 +92,13 @@ void blob_batch_free(struct blob_batch *b)
 	char path[PATH_MOST];
 	if (!b)
 		return;
-	for (size_t i = 0; i < b->count; i++) {
+	for (size_t i = 0; i < b->kept.count; i++) {
 		if (i >= b->renamed) {
-			blob_temporary_path(b->store, b->kept[i].number, path, sizeof path);
+			blob_temporary_path(b->store, kept_of(b, i)->number, path, sizeof path);
 			disk_unlink(path);
 		}
-		blob_let_go(b->store, &b->kept[i]);
+		blob_let_go(b->store, kept_of(b, i));
 	}
-	mem_free(b->kept);
+	list_free(&b->kept);
 	mem_free(b);
 }
