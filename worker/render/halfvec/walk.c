@@ -12,6 +12,8 @@
  */
 #include "worker/render/halfvec/walk.h"
 
+#include "worker/render/path/media.h"
+
 #include <assert.h>
 
 struct walk_limits walk_limits_of(const struct accuracy_settings *k)
@@ -19,9 +21,6 @@ struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 	return (struct walk_limits){(unsigned)k->iterations, k->least_step,	     1, k->tolerance,
 				    k->reverse_tolerance,    constraint_solver_of(k)};
 }
-
-/* More faces than these between two vertices count as nothing found. */
-enum { FACES_MOST = 1024 };
 
 /* The state of a walk. Predictions start from the kept state only, so a rejected trial leaves nothing to undo. */
 struct walk {
@@ -67,7 +66,7 @@ static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 	const struct world_shape *part;
 	for (unsigned faces = 0;; faces++) {
 		m->c->counters[COUNT_RAYS_CLOSEST]++;
-		if (faces > FACES_MOST || !accel_closest(w->accel, &start, d, t_min, t_max, &hit))
+		if (faces > PATH_FACES_MOST || !accel_closest(w->accel, &start, d, t_min, t_max, &hit))
 			return WALK_MISSED;
 		part = &w->parts[hit.prim.shape];
 		surface_from_hit(&w->shapes[hit.prim.shape], start.p, d, &hit, &to->x);

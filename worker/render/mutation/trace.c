@@ -168,11 +168,8 @@ static bool go_on(struct mutation_ctx *m, unsigned j, vec3 d, const struct full_
 	if (x->v[j - 1].kind == VERTEX_MEDIUM)
 		return go_to_event(m, j, d, t_min, t_max, x, y, move);
 	c->wl = y->wl;
-	spectrum left;
-	if (!path_extend_past_events(c, &y->v[j], d, t_min, t_max, to, &left) || !full_path_join(y, j - 1))
-		return false;
-	y->edge[j - 1].left = left;
-	return true;
+	return path_extend_past_events(c, &y->v[j], d, t_min, t_max, to, &y->edge[j - 1].left) &&
+	       full_path_join(y, j - 1);
 }
 
 enum proposal_end trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path *x,

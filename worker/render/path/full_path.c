@@ -373,11 +373,14 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 
 void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p)
 {
-	uint32_t medium = w->camera_medium;
-	for (unsigned e = 0; EFFECT_IS_ON(w, scattering) && e < x->edges; e++)
-		product_mul(p, x->edge[e].left);
-	if (!EFFECT_IS_ON(w, absorption) || EFFECT_IS_ON(w, scattering))
+	if (EFFECT_IS_ON(w, scattering)) {
+		for (unsigned e = 0; e < x->edges; e++)
+			product_mul(p, x->edge[e].left);
 		return;
+	}
+	if (!EFFECT_IS_ON(w, absorption))
+		return;
+	uint32_t medium = w->camera_medium;
 	for (unsigned e = x->edges; e > 0; e--) {
 		medium = path_medium_after(w, &x->v[e], medium, vec3_neg(x->edge[e - 1].w));
 		if (medium)

@@ -5,14 +5,12 @@
  * wavelength reaches the one that was drawn, or at anything else than such a face; path_see_in_media at the other
  * vertex.
  *
- * Faces whose shapes state no medium are passed like all others. After FACES_MOST of them, as between faces that
+ * Faces whose shapes state no medium are passed like all others. After PATH_FACES_MOST of them, as between faces that
  * coincide, a ray counts as lost, and two vertices do not see each other.
  */
 #include "worker/render/path/media.h"
 
 #include "worker/render/path/visible.h"
-
-enum { FACES_MOST = 1024 };
 
 /* The medium on the side of `away` of a shape that states one, or any; false: it states none. */
 static bool side_of(const struct world *w, const struct surface_point *x, vec3 away, uint32_t *medium)
@@ -157,7 +155,7 @@ static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d,
 	struct path_edge edge;
 	struct walk k = walk_begin(c, at, d, &edge);
 	struct path_vertex from = *at;
-	for (int i = 0; i < FACES_MOST; i++) {
+	for (int i = 0; i < PATH_FACES_MOST; i++) {
 		bool met = path_extend(c, &from, d, t_min, t_max, to);
 		double end = met && to->kind == VERTEX_SURFACE ? vec3_length(vec3_sub(to->x.p, from.x.p)) : INFINITY;
 		double event = walk_to_event(&k, from.x.p, t_min, fmin(end, t_max), lane, depth);
@@ -201,7 +199,7 @@ bool path_see_in_media(struct path_context *c, const struct path_vertex *z, cons
 	struct walk k = walk_begin(c, z, d, edge);
 	struct path_vertex from = *z, face;
 	double begin = near_plane(c->w, z, d);
-	for (int i = 0; i < FACES_MOST; i++) {
+	for (int i = 0; i < PATH_FACES_MOST; i++) {
 		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from.x.p));
 		bool met = c->w->has_passable && path_extend(c, &from, d, begin, end, &face);
 		if (!met || !is_face(c->w, &face)) {

@@ -23,6 +23,9 @@
 
 #include "worker/render/path/vertex.h"
 
+/* More faces of `null` than these on an edge count as nothing found. */
+enum { PATH_FACES_MOST = 1024 };
+
 /* The medium of that number, which is not 0. */
 static inline const struct medium *path_medium(const struct world *w, uint32_t number)
 {
