@@ -50,3 +50,13 @@ float *lease_image(struct world *w, uint32_t side, uint64_t spp, uint32_t max_de
 	world_free(w);
 	return image;
 }
+
+double lease_brightness(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth)
+{
+	float *xyz = lease_image(w, side, spp, max_depth);
+	double sum = 0, count = (double)(side * side * spp);
+	for (uint32_t i = 0; i < side * side; i++)
+		sum += (double)xyz[3 * i + 1] / count;
+	free(xyz);
+	return sum;
+}

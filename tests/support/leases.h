@@ -12,5 +12,7 @@ struct batch lease_done(const struct world *w, const struct plan *p, struct leas
 /* The world, which is freed, by `path` with so many samples a pixel and edges: X, Y, Z of each pixel,
  * summed over its samples, to be freed. */
 float *lease_image(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth);
+/* The mean of Y over pixels and samples of that image. */
+double lease_brightness(struct world *w, uint32_t side, uint64_t spp, uint32_t max_depth);
 
 #endif
