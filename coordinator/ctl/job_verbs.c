@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What hslt-job asks and prints: list as a table or as JSON, cancel and the other orders, fetch, log.
+ *
+ * Each verb sends one message and waits for its answer; what the coordinator refuses is printed as it says it, and
+ * ends the program with an error.
+ */
 #include "coordinator/ctl/job_verbs.h"
 
 #include "common/base/progress.h"

@@ -1,4 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Checks files of scenes: a queue of files to read, the first of which is read and hashed by the pool.
+ *
+ * files_check answers at once for a file that was read within FILES_CHECKED seconds, and otherwise puts it into the
+ * queue. When the first of the queue has been read, the peers that wait for it are told. If it is damaged, all jobs
+ * are looked at: one that lacks a file waits and names it, one that has them all continues.
+ *
+ * A file that cannot be read now is not taken for a damaged one: the jobs that need it have it read again.
+ */
 #include "coordinator/jobs/files.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * One file of the ledger: a row per job and notes by name, each with a checksum over all of its columns.
+ *
+ * Statements are prepared once. A row is read in place and stays valid until the next call; a write is bound first and
+ * stepped later, so that a row that was just read can be written to the other file.
+ *
+ * A row whose checksum differs comes back with `damaged` set, a note is -EBADMSG; the caller decides what to do
+ * without it. Errors of SQLite come back with its own words.
+ */
 #include "coordinator/store/ledger_side.h"
 
 #include "common/base/crc.h"

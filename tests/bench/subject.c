@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What benchmarks run (subject.h): a lease through the integrator's own function, and Embree by itself with the rays
+ * that it cast. The raw scene is built without the filters, exact hits and null faces of worker/render/geom/accel.h,
+ * so the ratio of both is the price of these.
+ */
 #include "tests/bench/subject.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The coordinator of the fuzzers (farm.h): its spool, made once by a conversation with scripted peers and then copied
+ * for each run, its loop turned by hand, its peers as TCP and UNIX connections that are read without blocking.
+ *
+ * It is settled when all peers have hung up and no job is being written or read. What should work and does not ends
+ * the program, which libFuzzer reports.
+ */
 #include "tests/fuzz/farm.h"
 
 #include "common/base/log.h"

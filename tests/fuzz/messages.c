@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Scripts of messages (messages.h) and their mutation by protobuf-c's descriptors.
+ *
+ * script_mutate takes the input apart, adds, repeats, drops, swaps or changes steps, and puts it together again. A
+ * changed step is parsed as an Envelope, one field at a random depth gets another value (boundaries, a neighbour,
+ * bytes by libFuzzer), and it is packed. What does not parse is left to libFuzzer as bytes. All memory comes from one
+ * buffer that each mutation starts anew: nothing needs to be freed.
+ */
 #include "tests/fuzz/messages.h"
 
 #include <stdbool.h>

@@ -11,6 +11,15 @@ if [ -n "$unnamed" ]; then
 	exit 1
 fi
 echo "ok: each source names its licence"
+silent=$(for f in $sources; do
+	[ "$(wc -l < "$f")" -le 200 ] || sed -n 2p "$f" | grep -qE '^/[*/]|^ \* |^#' || echo "$f"
+done)
+if [ -n "$silent" ]; then
+	echo "WRONG: more than 200 lines, and no comment at the top that says what it does"
+	echo "$silent" | sed 's/^/	/'
+	exit 1
+fi
+echo "ok: each source above 200 lines opens with a comment"
 format=$(command -v clang-format-14 || command -v clang-format)
 if ! "${format:-false}" --version 2> /dev/null | grep -q 'version 14\.'; then
 	echo "clang-format 14 is not installed"

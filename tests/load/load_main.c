@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The load test's options, phases and report (docs/benchmarks.md says what it has measured).
+ *
+ * It makes certificates, starts the coordinator, connects the fake workers of load_worker at the rate of --ramp, lets
+ * each send a batch, and then measures for --minutes: processor time, memory and bytes written of the coordinator, how
+ * long leases take, how late its loop is. At the end what the images hold is compared with the results that the
+ * workers were told had been merged. A missed bound is exit code 1.
+ */
 #include "tests/load/load.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The simulation's shell: carries out the core's actions on simulated workers, disks and clocks, as coordinator/jobs
+ * does for real, and checks after each event what must always hold: no lease held by more than two workers, no lease
+ * for a worker that must not have one, no round or sum of a job that differs from an undisturbed run's, and a reason
+ * wherever a job waits.
+ */
 #include "tests/sim/sim_private.h"
 
 #include <inttypes.h>

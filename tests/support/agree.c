@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Do two integrators render the same image? (agree.h) Groups are rendered by threads, each batch's film is added up
+ * per block; judge_cells tests the differences of the blocks' means by Welch's t between groups, at a level shared by
+ * all cells, and prints which bias would have been found.
+ */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
 

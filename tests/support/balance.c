@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Detailed balance (balance.h): starts in proportion to f, a proposal from each, and sums per group of a phi(X, Y) for
+ * all functions; balance_judge tests each against 0 by Student's t and works out the smallest fault that it would
+ * find.
+ */
 #include "tests/support/balance.h"
 
 #include "tests/support/stats.h"

@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * All densities of a path once more (density.h), from positions, normals and BSDFs alone: per solid angle from the
+ * BSDF's pdf, per area by the cosine over the squared distance, in media times the density of the distance, along both
+ * directions of each route. Paths whose geometry makes rounding decide (grazing angles, vertices that nearly touch)
+ * are left out and counted.
+ */
 #include "tests/support/density.h"
 
 #include "tests/support/dice.h"

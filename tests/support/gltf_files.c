@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Makes glTF files from one JSON text with a few marks in it and one buffer: with the buffer in a file beside it, in a
+ * data URI, or in the binary form. Nothing is shared with the reader under test.
+ */
 #include "tests/support/gltf_files.h"
 #include "worker/render/render.h"
 

@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Writers of PLY (text, both byte orders) and of Mitsuba's serialized format (versions 3 to 5), one value after the
+ * other into a fixed buffer, so that they share nothing with the readers under test.
+ */
 #include "tests/support/mesh_files.h"
 
 #include <assert.h>

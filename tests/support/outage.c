@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Life after life of a coordinator on a faulty disk (outage.h). outage_work submits jobs, answers leases and notes
+ * every acknowledgement until the process has gone; the next life starts from what the disk has kept; each life begins
+ * with fetching all images, from whose counters one sees how many results each holds, and whose pixels must have the
+ * bits of the undisturbed run.
+ */
 #include "tests/support/outage.h"
 
 #include "common/base/log.h"

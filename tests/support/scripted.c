@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Peers of a coordinator (scripted.h): frames over a blocking socket, and messages with the least that each needs.
+ * Results are computed from the lease's tag, so that a test can tell from an image which leases it has, and how often.
+ */
 #include "tests/support/scripted.h"
 
 #include "common/base/mem.h"

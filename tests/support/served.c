@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The server of tests about peers (served.h): a child process with its own spool, and a timer that carries out the
+ * test's wishes there. The parent waits for its port, and at the end asks it to stop and looks at its exit code, so
+ * that leaks and errors of sanitizers in the child fail the test.
+ */
 #include "tests/support/served.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A coordinator whose disk calls meet the test's wishes (staged.h): the functions behind common/base/disk.h look at
+ * flags in memory that both processes share, wait until they are told to go on, or fail. Which call is meant is told
+ * by its file's name.
+ */
 #include "tests/support/staged.h"
 
 #include "common/base/disk.h"

@@ -1,4 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Stationarity of a mutation (stationary.h): groups of starts on all processors, each with its own seed; the functions
+ * looked at; the test of their differences.
+ *
+ * A group takes its starts from bdpt's samples in proportion to f, runs STATIONARY_STEPS mutations from each, and adds
+ * up each function before and after, where a proposal counts with its acceptance and the state before it with the
+ * rest. judge_groups then tests the mean difference between groups. The result does not depend on the number of
+ * threads.
+ */
 #include "tests/support/length.h"
 #include "tests/support/stationary.h"
 

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Transcripts (transcript.h): a line's words become an event, the core handles it, and its actions become text that is
+ * compared with what stands behind the arrow. A line that cannot be parsed ends the test with its text; one that
+ * differs is printed as it is and as it should be.
+ */
 #include "tests/support/transcript.h"
 
 #include <inttypes.h>

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Tiles and images as EXR: what is written comes back bit by bit, through our reader and through OpenEXR's; tiles of
+ * another film, truncated and damaged ones are refused and never crash; images of others with half floats, lines in
+ * reverse order or strange channels are read; each failing allocation is an error that leaks nothing.
+ */
 #include "common/exr/exr_read.h"
 #include "common/exr/exr_tile.h"
 

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job's film: the same bits in whatever order batches arrive, complete rounds alone in the image, chains scaled by
+ * b, blocks of groups that add up to it, values beyond the grid counted instead of added, one lease's share of a pixel
+ * bounded, and each failing allocation an error that leaks nothing.
+ */
 #include "common/estimate/canvas_image.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * hslt-compare's figures against ones worked out by hand on small images, its percentile, trimming, shrinking, heat
+ * map, and --exact, which sees one bit and each attribute that is not excluded.
+ */
 #include "worker/cli/image/compare.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Plots as gnuplot draws them, read back as XML: points stand where their values say on both kinds of axes, texts come
+ * through whatever they contain, axes have marks, an empty plot says so. Without gnuplot the error names it.
+ */
 #include "worker/cli/plot/plot.h"
 #include "worker/cli/plot/plot_axis.h"
 

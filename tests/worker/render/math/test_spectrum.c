@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The colour matching functions and the wavelengths drawn by them: published sums, the density against the shares of
+ * wavelengths that fall below given ones, XYZ without bias for 4 and for fewer wavelengths, means and weights against
+ * sums written down once more. The draws are seeded.
+ */
 #include "common/base/color.h"
 #include "worker/render/math/cie.h"
 #include "worker/render/math/spectrum.h"

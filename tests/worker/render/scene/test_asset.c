@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Which files a scene may open: those below its folder and below the search folders, by any name that leads there; not
+ * what `..`, absolute names, links out of it, folders, FIFOs and devices would reach. The canonical name of a file is
+ * the same by each way.
+ */
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/scene/asset_name.h"
 

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Readers of PNG, JPEG, HDR and EXR: all kinds and depths of pixels come out with the values that were written, with
+ * and without the sRGB curve; truncated and damaged files are refused; files that promise more pixels than a scene may
+ * have are refused before anything is allocated; each failing allocation is an error and leaks nothing.
+ */
 #include "tests/support/failing_memory.h"
 #include "tests/support/image_read.h"
 

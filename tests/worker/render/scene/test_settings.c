@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Film, camera, sampler and integrator of a scene's file: the defaults of both dialects, which sensor is taken, crop
+ * windows, what --size overrides, what is honoured, noted or refused by name.
+ */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_parts.h"
 #include "tests/support/scene_tables.h"

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Shapes as meshes: rectangle, cube, sphere, ellipsoid, disk and cylinder have the area, the outside and the texture
+ * coordinates that Mitsuba's have, OBJ files become the triangles that they name, normals that are not in a file are
+ * made as documented, and bad files are refused with the line at fault.
+ */
 #include "common/base/mem.h"
 #include "tests/support/failing_memory.h"
 #include "tests/support/memory_assets.h"

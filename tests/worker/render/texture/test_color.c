@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Spectra made from colours: back to the same RGB under D65 within what the fit promises, between 0 and 1 everywhere,
+ * constant for grey; emitters give their RGB; what many bounces do to a colour. Tables of values against a search
+ * written down once more.
+ */
 #include "worker/render/math/cie.h"
 #include "worker/render/texture/color.h"
 

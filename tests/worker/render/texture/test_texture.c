@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Textures by themselves: where an image's pixels lie in uv, wrapping, borders, filters, transforms of uv, colours and
+ * raw values, and derivatives against differences. Those made of other textures: scale, tint, product, channel,
+ * threshold, gamma. What is refused says why.
+ */
 #include "tests/support/nodes.h"
 #include "tests/support/pictures.h"
 #include "worker/render/texture/texture.h"
