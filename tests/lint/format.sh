@@ -12,7 +12,7 @@ if [ -n "$unnamed" ]; then
 fi
 echo "ok: each source names its licence"
 silent=$(for f in $sources; do
-	[ "$(wc -l < "$f")" -le 200 ] || sed -n 2p "$f" | grep -qE '^/[*/]|^ \* |^#' || echo "$f"
+	[ "$(wc -l < "$f")" -le 200 ] || sed -n 2p "$f" | grep -qE '^/[*/]' || echo "$f"
 done)
 if [ -n "$silent" ]; then
 	echo "WRONG: more than 200 lines, and no comment at the top that says what it does"
