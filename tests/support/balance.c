@@ -192,6 +192,12 @@ static void check_accepted(struct run *r, struct balance_trial *t)
 	fail_msg("%s, %s: %s", r->test, name, text);
 }
 
+static bool same_media(const struct path_edge *a, const struct path_edge *b)
+{
+	return a->medium == b->medium && a->before == b->before && a->fits == b->fits &&
+	       memcmp(&a->free, &b->free, sizeof a->free) == 0;
+}
+
 /* y becomes x again by the vertices that the move names. */
 static void restore(struct run *r, const struct balance_trial *t, const struct move *move)
 {
@@ -203,7 +209,8 @@ static void restore(struct run *r, const struct balance_trial *t, const struct m
 		const struct path_vertex *a = &x->v[i], *b = &y->v[i];
 		bool same = memcmp(&a->x.p, &b->x.p, sizeof a->x.p) == 0 && a->kind == b->kind && a->mode == b->mode &&
 			    a->delta == b->delta && a->bsdf == b->bsdf && a->emitter == b->emitter &&
-			    (i == x->edges || memcmp(&x->edge[i], &y->edge[i], sizeof x->edge[i]) == 0);
+			    (i == x->edges || (memcmp(&x->edge[i], &y->edge[i], sizeof x->edge[i]) == 0 &&
+					       same_media(&a->edge, &b->edge)));
 		if (!same)
 			fail_msg("%s, %s: vertex %u of %u is not what it was", r->test, t->ops->name, i, x->edges);
 	}

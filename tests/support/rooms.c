@@ -186,11 +186,23 @@ static struct world *fog(void)
 			     INSIDE("<float name='sigma_t' value='2'/><float name='albedo' value='0.9'/>") "<ref name='exterior' id='fog'/></shape>");
 }
 
+/* Fog of which only the camera knows: the light's own sub-paths begin outside of it, and many paths that the camera could have are
+ * none of any technique. */
+static struct world *misfit(void)
+{
+	return world_of_text(32, 32,
+			     "<sensor type='perspective'><float name='fov' value='40'/>" AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film>"
+			     "<medium type='homogeneous'><float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/></medium></sensor>"
+			     BOX("0.5,0.45,0.35") "<emitter type='point'><point name='position' value='0,1.5,0'/><rgb name='intensity' value='3,2.5,2'/></emitter>"
+			     "<shape type='sphere'><point name='center' value='0.2,-0.6,-0.2'/><float name='radius' value='0.7'/>" GLASS "</shape>");
+}
+
 const struct room rooms[] = {
 	{"rough glass", cloudy}, {"glass", glass}, {"gold", gold}, {"mirror", mirror}, {"bent normals", bent}, {"sky", sky},
 	{"picture", picture}, {"prism", prism}, {"lens", lens}, {"point and spot", deltas}, {"sun", sun}, {"dents", dents},
 	{"coloured glass", coloured_glass}, {"tilted parts", tilted_parts},
-	{"turned normals", turned_normals}, {"clouds", clouds}, {"fog", fog},
+	{"turned normals", turned_normals}, {"clouds", clouds}, {"fog", fog}, {"misfit", misfit},
 	{NULL, NULL},
 };
 

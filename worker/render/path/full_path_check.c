@@ -110,5 +110,9 @@ bool path_check(struct path_context *c, const struct full_path *x, char *text, s
 			 film.film[1]);
 		return false;
 	}
+	if (EFFECT_IS_ON(c->w, scattering) && !full_path_is_made(c, x)) {
+		snprintf(text, size, "a path of %u edges that no technique makes", x->edges);
+		return false;
+	}
 	return check_edges(c, x, text, size) && check_vertices(c, x, text, size);
 }

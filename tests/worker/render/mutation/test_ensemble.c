@@ -132,6 +132,8 @@ static void test_own_candidate(void **state)
 	check_own_candidate("rough glass");
 	check_own_candidate("coloured glass");
 	check_own_candidate("bent normals");
+	check_own_candidate("clouds");
+	check_own_candidate("fog");
 }
 
 /* Where lengths are drawn, each candidate weighs one over the chance that both sub-paths are as long as it needs. */
