@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Little-endian numbers in files, messages and chain states, on any machine. */
+/* Little-endian numbers in files, messages and chain states, on any machine. Floating point numbers are IEEE 754, by
+ * their bits. */
 #ifndef COMMON_BASE_BYTES_H
 #define COMMON_BASE_BYTES_H
 
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -45,6 +48,13 @@ static inline uint64_t get64(const uint8_t *p)
 	return get_bytes(p, 8);
 }
 
+static inline void put_float(uint8_t *p, float v)
+{
+	uint32_t bits;
+	memcpy(&bits, &v, sizeof bits);
+	put32(p, bits);
+}
+
 static inline float get_float(const uint8_t *p)
 {
 	uint32_t bits = get32(p);
@@ -66,6 +76,36 @@ static inline double get_double(const uint8_t *p)
 	double v;
 	memcpy(&v, &bits, sizeof v);
 	return v;
+}
+
+/* ---- arrays of numbers of 1, 2, 4 or 8 bytes */
+
+static inline bool is_little_endian(void)
+{
+	const uint16_t one = 1;
+	uint8_t first;
+	memcpy(&first, &one, 1);
+	return first == 1;
+}
+
+/* Each number with its bytes in the opposite order; to and from may be the same. */
+static inline void reverse_numbers(uint8_t *to, const uint8_t *from, size_t width, size_t count)
+{
+	for (; count; count--, to += width, from += width)
+		for (size_t i = 0; i < (width + 1) / 2; i++) {
+			uint8_t low = from[i], high = from[width - 1 - i];
+			to[i] = high;
+			to[width - 1 - i] = low;
+		}
+}
+
+/* From memory to little-endian bytes, or back; to and from are the same, or do not overlap. */
+static inline void copy_numbers(void *to, const void *from, size_t width, size_t count)
+{
+	if (!is_little_endian())
+		reverse_numbers(to, from, width, count);
+	else if (to != from && count)
+		memcpy(to, from, width * count);
 }
 
 #endif

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/checked_file.h"
 
+#include "common/base/bytes.h"
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -8,7 +9,7 @@
 #include <fcntl.h>
 #include <string.h>
 
-enum { BUFFER = 1 << 16 };
+enum { BUFFER = 1 << 16, CRC = 4 };
 
 static int fault(const struct checked_file *s, int code, struct error *e)
 {
@@ -39,27 +40,34 @@ static int flush(struct checked_file *s, struct error *e)
 	return rc ? fault(s, -rc, e) : 0;
 }
 
-int checked_file_write(struct checked_file *s, const void *bytes, size_t size, struct error *e)
+/* A number does not lie across two buffers. */
+int checked_file_write_numbers(struct checked_file *s, const void *numbers, size_t width, size_t count, struct error *e)
 {
-	s->crc = crc32c(s->crc, bytes, size);
-	s->bytes += size;
-	for (const unsigned char *p = bytes; size;) {
-		size_t n = size < BUFFER - s->filled ? size : BUFFER - s->filled;
-		memcpy(s->buffer + s->filled, p, n);
-		s->filled += n;
-		p += n;
-		size -= n;
-		int rc = s->filled == BUFFER ? flush(s, e) : 0;
+	for (const unsigned char *p = numbers; count;) {
+		size_t room = (BUFFER - s->filled) / width, n = count < room ? count : room, size = width * n;
+		copy_numbers(s->buffer + s->filled, p, width, n);
+		s->crc = crc32c(s->crc, s->buffer + s->filled, size);
+		s->filled += size;
+		s->bytes += size;
+		p += size;
+		count -= n;
+		int rc = BUFFER - s->filled < width ? flush(s, e) : 0;
 		if (rc)
 			return rc;
 	}
 	return 0;
 }
 
+int checked_file_write(struct checked_file *s, const void *bytes, size_t size, struct error *e)
+{
+	return checked_file_write_numbers(s, bytes, 1, size, e);
+}
+
 int checked_file_finish(struct checked_file *s, struct error *e)
 {
-	uint32_t crc = s->crc;
-	int rc = checked_file_write(s, &crc, sizeof crc, e);
+	unsigned char crc[CRC];
+	put32(crc, s->crc);
+	int rc = checked_file_write(s, crc, sizeof crc, e);
 	if (!rc)
 		rc = flush(s, e);
 	if (!rc && disk_fsync(s->fd))
@@ -108,7 +116,8 @@ static int read_bytes(struct checked_file *s, void *bytes, size_t size, struct e
 static int check(struct checked_file *s, struct error *e)
 {
 	struct stat st;
-	uint32_t crc = 0, want;
+	unsigned char want[CRC];
+	uint32_t crc = 0;
 	if (disk_fstat(s->fd, &st))
 		return fault(s, errno, e);
 	if ((uint64_t)st.st_size < sizeof want)
@@ -123,8 +132,8 @@ static int check(struct checked_file *s, struct error *e)
 		s->at += n;
 		left -= n;
 	}
-	int rc = read_bytes(s, &want, sizeof want, e);
-	return rc ? rc : want == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
+	int rc = read_bytes(s, want, sizeof want, e);
+	return rc ? rc : get32(want) == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
 }
 
 int checked_file_open_watched(struct checked_file *s, const char *path, checked_file_progress *progress, void *user,
@@ -153,6 +162,15 @@ int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct e
 		return error_set(e, EBADMSG, "%s: ends too early", s->path);
 	s->left -= size;
 	return read_bytes(s, bytes, size, e);
+}
+
+int checked_file_read_numbers(struct checked_file *s, void *numbers, size_t width, size_t count, struct error *e)
+{
+	int rc = count > SIZE_MAX / width ? error_set(e, EBADMSG, "%s: ends too early", s->path)
+					  : checked_file_read(s, numbers, width * count, e);
+	if (!rc)
+		copy_numbers(numbers, numbers, width, count);
+	return rc;
 }
 
 void checked_file_close(struct checked_file *s)

@@ -1,7 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A file with a CRC-32C at its end. It is written completely and flushed before it gets its name; a reader checks all
- * of it before it uses any of it. Any thread, but one at a time per file. Numbers have the machine's byte order.
+ * of it before it uses any of it. Any thread, but one at a time per file.
+ *
+ * offset    bytes  contents
+ * 0         N      what was written, in order
+ * N         4      CRC-32C of these N bytes
+ *
+ * Numbers are little endian, on any machine (bytes.h).
  */
 #ifndef COMMON_BASE_CHECKED_FILE_H
 #define COMMON_BASE_CHECKED_FILE_H
@@ -28,6 +34,9 @@ struct checked_file {
 
 int checked_file_create(struct checked_file *s, const char *path, struct error *e);
 int checked_file_write(struct checked_file *s, const void *bytes, size_t size, struct error *e);
+/* An array of integers or floating point numbers of `width` bytes each: 1, 2, 4 or 8. */
+int checked_file_write_numbers(struct checked_file *s, const void *numbers, size_t width, size_t count,
+			       struct error *e);
 /* Writes the CRC, flushes the file and closes it. */
 int checked_file_finish(struct checked_file *s, struct error *e);
 
@@ -36,8 +45,9 @@ int checked_file_open(struct checked_file *s, const char *path, struct error *e)
 /* The same; every byte is read twice, once for the check. */
 int checked_file_open_watched(struct checked_file *s, const char *path, checked_file_progress *progress, void *user,
 			      struct error *e);
-int checked_file_read(struct checked_file *s, void *bytes, size_t size,
-		      struct error *e);		 /* -EBADMSG: the file has fewer bytes */
+/* -EBADMSG: the file has fewer bytes. */
+int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e);
+int checked_file_read_numbers(struct checked_file *s, void *numbers, size_t width, size_t count, struct error *e);
 void checked_file_close(struct checked_file *s); /* at any time; a file that was being written is left without a CRC */
 
 #endif

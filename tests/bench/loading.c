@@ -27,15 +27,6 @@ static struct file room(size_t bytes)
 	return (struct file){bench_alloc(bytes, 1), 0};
 }
 
-static void put_float(struct file *f, double x)
-{
-	float single = (float)x;
-	uint32_t bits;
-	memcpy(&bits, &single, sizeof bits);
-	put32(f->bytes + f->size, bits);
-	f->size += 4;
-}
-
 static void put_face(struct file *f, uint32_t a, uint32_t b, uint32_t c)
 {
 	const uint32_t corner[3] = {a, b, c};
@@ -60,8 +51,8 @@ static struct file make_ply(void)
 		double u = (double)(i % SIDE) / CELLS, v = (double)(i / SIDE) / CELLS;
 		const double vertex[VERTEX_FLOATS] = {2 * u - 1, 2 * v - 1, 0.05 * sin(40 * u) * sin(40 * v), 0, 0, 1,
 						      u,	 v};
-		for (int k = 0; k < VERTEX_FLOATS; k++)
-			put_float(&f, vertex[k]);
+		for (int k = 0; k < VERTEX_FLOATS; k++, f.size += 4)
+			put_float(f.bytes + f.size, (float)vertex[k]);
 	}
 	for (uint32_t j = 0; j < CELLS; j++)
 		for (uint32_t i = 0; i < CELLS; i++) {

@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Numbers have the same bytes in a file on any machine; a file that is cut, or of which a bit has changed, is refused.
+ */
+#include "common/base/checked_file.h"
+
+#include "common/base/bytes.h"
+#include "tests/support/folder.h"
+#include "tests/support/golden.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static char path[128];
+static struct error e;
+
+static int set_up(void **state)
+{
+	int rc = folder_set_up(state);
+	snprintf(path, sizeof path, "%s/file", folder);
+	return rc;
+}
+
+/* "abc", two numbers of four bytes, one of eight, -2 as a double, 0.5 as a float, and the checksum. */
+static const unsigned char all[] = {0x61, 0x62, 0x63, 0x04, 0x03, 0x02, 0x01, 0xfe, 0xff, 0xff, 0xff, 0x08,
+				    0x07, 0x06, 0x05, 0x04, 0x03, 0x02, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00,
+				    0x00, 0x00, 0xc0, 0x00, 0x00, 0x00, 0x3f, 0x10, 0xa3, 0xbc, 0xc4};
+
+static void write_all(void)
+{
+	struct checked_file f;
+	const uint32_t words[2] = {0x01020304, (uint32_t)-2};
+	const uint64_t large = 0x0102030405060708;
+	const double two = -2;
+	const float half = 0.5f;
+	assert_int_equal(checked_file_create(&f, path, &e), 0);
+	assert_int_equal(checked_file_write(&f, "abc", 3, &e), 0);
+	assert_int_equal(checked_file_write_numbers(&f, words, sizeof *words, 2, &e), 0);
+	assert_int_equal(checked_file_write_numbers(&f, &large, sizeof large, 1, &e), 0);
+	assert_int_equal(checked_file_write_numbers(&f, &two, sizeof two, 1, &e), 0);
+	assert_int_equal(checked_file_write_numbers(&f, NULL, sizeof two, 0, &e), 0);
+	assert_int_equal(checked_file_write_numbers(&f, &half, sizeof half, 1, &e), 0);
+	assert_int_equal(checked_file_finish(&f, &e), 0);
+	assert_int_equal(f.bytes, sizeof all);
+}
+
+static void numbers_have_fixed_bytes(void **state)
+{
+	(void)state;
+	struct checked_file f;
+	char text[3];
+	uint32_t words[2];
+	uint64_t large;
+	double two;
+	float half;
+	write_all();
+	golden_compare(path, all, sizeof all);
+	assert_int_equal(checked_file_open(&f, path, &e), 0);
+	assert_int_equal(f.left, sizeof all - 4);
+	assert_int_equal(checked_file_read(&f, text, sizeof text, &e), 0);
+	assert_int_equal(checked_file_read_numbers(&f, words, sizeof *words, 2, &e), 0);
+	assert_int_equal(checked_file_read_numbers(&f, &large, sizeof large, 1, &e), 0);
+	assert_int_equal(checked_file_read_numbers(&f, &two, sizeof two, 1, &e), 0);
+	/* More than there is, and more than there can be: nothing is read. */
+	half = 7;
+	assert_int_equal(checked_file_read_numbers(&f, &two, sizeof two, 1, &e), -EBADMSG);
+	assert_int_equal(checked_file_read_numbers(&f, &half, sizeof half, SIZE_MAX / 4 + 2, &e), -EBADMSG);
+	assert_true(half == 7 && two == -2);
+	assert_int_equal(checked_file_read_numbers(&f, &half, sizeof half, 1, &e), 0);
+	assert_true(memcmp(text, "abc", 3) == 0 && words[0] == 0x01020304 && words[1] == (uint32_t)-2);
+	assert_true(large == 0x0102030405060708 && half == 0.5f);
+	assert_int_equal(checked_file_read(&f, text, 1, &e), -EBADMSG);
+	checked_file_close(&f);
+}
+
+static void other_files_are_refused(void **state)
+{
+	(void)state;
+	struct checked_file f;
+	for (size_t bit = 0; bit < 8 * sizeof all; bit++) {
+		write_all();
+		int fd = open(path, O_WRONLY);
+		unsigned char changed = (unsigned char)(all[bit / 8] ^ 1 << bit % 8);
+		assert_int_equal(pwrite(fd, &changed, 1, (off_t)(bit / 8)), 1);
+		close(fd);
+		assert_int_equal(checked_file_open(&f, path, &e), -EBADMSG);
+	}
+	for (size_t size = 0; size < sizeof all; size++) {
+		write_all();
+		assert_int_equal(truncate(path, (off_t)size), 0);
+		assert_int_equal(checked_file_open(&f, path, &e), -EBADMSG);
+	}
+	write_all();
+	FILE *more = fopen(path, "ab");
+	assert_true(more && putc(1, more) == 1 && fclose(more) == 0);
+	assert_int_equal(checked_file_open(&f, path, &e), -EBADMSG);
+}
+
+/* Across the edges of the buffer, at each distance from it. */
+static void large_arrays_come_back(void **state)
+{
+	(void)state;
+	enum { COUNT = 20000 };
+	uint64_t *numbers = malloc(COUNT * sizeof *numbers), *back = malloc(COUNT * sizeof *back);
+	assert_true(numbers && back);
+	for (size_t i = 0; i < COUNT; i++)
+		numbers[i] = i * UINT64_C(0x9e3779b97f4a7c15);
+	for (size_t before = 0; before < 9; before++) {
+		struct checked_file f;
+		char text[8];
+		assert_int_equal(checked_file_create(&f, path, &e), 0);
+		assert_int_equal(checked_file_write(&f, "12345678", before, &e), 0);
+		assert_int_equal(checked_file_write_numbers(&f, numbers, sizeof *numbers, COUNT, &e), 0);
+		assert_int_equal(checked_file_write_numbers(&f, numbers, 4, 3, &e), 0);
+		assert_int_equal(checked_file_finish(&f, &e), 0);
+		assert_int_equal(f.bytes, before + COUNT * sizeof *numbers + 12 + 4);
+		assert_int_equal(checked_file_open(&f, path, &e), 0);
+		assert_int_equal(checked_file_read(&f, text, before, &e), 0);
+		memset(back, 0, COUNT * sizeof *back);
+		assert_int_equal(checked_file_read_numbers(&f, back, sizeof *back, COUNT, &e), 0);
+		assert_memory_equal(back, numbers, COUNT * sizeof *back);
+		assert_int_equal(f.left, 12);
+		checked_file_close(&f);
+	}
+	free(numbers);
+	free(back);
+}
+
+/* What machines of the other byte order do. */
+static void reversed_numbers(void **state)
+{
+	(void)state;
+	const unsigned char from[] = {1, 2, 3, 4, 5, 6, 7, 8};
+	unsigned char to[8];
+	reverse_numbers(to, from, 8, 1);
+	assert_memory_equal(to, ((unsigned char[]){8, 7, 6, 5, 4, 3, 2, 1}), 8);
+	reverse_numbers(to, from, 4, 2);
+	assert_memory_equal(to, ((unsigned char[]){4, 3, 2, 1, 8, 7, 6, 5}), 8);
+	reverse_numbers(to, to, 2, 4);
+	assert_memory_equal(to, ((unsigned char[]){3, 4, 1, 2, 7, 8, 5, 6}), 8);
+	reverse_numbers(to, from, 1, 8);
+	assert_memory_equal(to, from, 8);
+}
+
+/* copy_numbers is put64, get64 and so on of each, signs of zeros and of NaN included. */
+static void copied_numbers(void **state)
+{
+	(void)state;
+	const double d[] = {-0.0, -NAN, 5e-324, INFINITY};
+	const float f[] = {-0.0f, NAN, 1e-45f, -INFINITY};
+	unsigned char one[32], many[32];
+	double back[4];
+	for (int i = 0; i < 4; i++)
+		put_double(one + 8 * i, d[i]);
+	copy_numbers(many, d, sizeof *d, 4);
+	assert_memory_equal(one, many, 32);
+	copy_numbers(back, many, sizeof *d, 4);
+	assert_memory_equal(back, d, sizeof d);
+	for (int i = 0; i < 4; i++)
+		put_float(one + 4 * i, f[i]);
+	copy_numbers(many, f, sizeof *f, 4);
+	assert_memory_equal(one, many, 16);
+	assert_true(get_float(many + 8) == f[2] && get_double(one) != 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(numbers_have_fixed_bytes, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(other_files_are_refused, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(large_arrays_come_back, set_up, folder_tear_down),
+		cmocka_unit_test(reversed_numbers),
+		cmocka_unit_test(copied_numbers),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
