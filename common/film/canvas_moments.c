@@ -6,7 +6,10 @@
 
 #include <assert.h>
 #include <math.h>
+#include <string.h>
 
+enum { SHAPE = 4 };
+_Static_assert(sizeof(struct exact_sum) == EXACT_SUM_WORDS * sizeof(uint64_t), "an array of them is an array of words");
 #define MUTATIONS_MOST (UINT64_C(1) << 42)
 
 static size_t first_count(const struct moments *m)
@@ -127,62 +130,65 @@ void moments_close_round(struct moments *m, uint64_t round)
 
 /* ---- files */
 
-/* Runs of a film's tiles, or of a group's classes; a run of zeros takes one byte. */
-static int save_runs(struct checked_file *out, const void *bytes, size_t run, size_t count, struct error *e)
+/* Runs of a film's tiles, or of an exact sum's words. */
+static int save_runs(struct checked_file *out, const void *numbers, size_t run, size_t count, struct error *e)
 {
-	const unsigned char *p = bytes;
 	int rc = 0;
-	for (size_t i = 0; i < count && !rc; i++, p += run) {
+	for (const uint64_t *p = numbers; count && !rc; count--, p += run) {
 		unsigned char any = 0;
 		for (size_t k = 0; k < run && !any; k++)
 			any = p[k] != 0;
 		rc = checked_file_write(out, &any, 1, e);
 		if (!rc && any)
-			rc = checked_file_write(out, p, run, e);
+			rc = checked_file_write_numbers(out, p, sizeof *p, run, e);
 	}
 	return rc;
 }
 
-static int load_runs(struct checked_file *in, void *bytes, size_t run, size_t count, struct error *e)
+static int load_runs(struct checked_file *in, void *numbers, size_t run, size_t count, struct error *e)
 {
-	unsigned char *p = bytes;
 	int rc = 0;
-	for (size_t i = 0; i < count && !rc; i++, p += run) {
+	for (uint64_t *p = numbers; count && !rc; count--, p += run) {
 		unsigned char any;
 		rc = checked_file_read(in, &any, 1, e);
 		if (!rc && any)
-			rc = checked_file_read(in, p, run, e);
+			rc = checked_file_read_numbers(in, p, sizeof *p, run, e);
 	}
 	return rc;
+}
+
+static void shape_of(const struct moments *m, uint32_t shape[SHAPE])
+{
+	const uint32_t all[SHAPE] = {m->per_lease, m->leases, m->tiles, PATH_CLASSES};
+	memcpy(shape, all, sizeof all);
 }
 
 int moments_save(const struct moments *m, struct checked_file *out, struct error *e)
 {
-	size_t film = m->tiles * sizeof *m->first, sum = sizeof *m->time;
-	uint32_t shape[4] = {m->per_lease, m->leases, m->tiles, PATH_CLASSES};
-	int rc = checked_file_write(out, shape, sizeof shape, e);
+	uint32_t shape[SHAPE];
+	shape_of(m, shape);
+	int rc = checked_file_write_numbers(out, shape, sizeof *shape, SHAPE, e);
 	if (!rc)
-		rc = save_runs(out, m->first, film, MOMENTS_SETS * first_count(m) / m->tiles, e);
+		rc = save_runs(out, m->first, m->tiles, MOMENTS_SETS * first_count(m) / m->tiles, e);
 	if (!rc)
-		rc = save_runs(out, m->second, film, MOMENTS_SETS * second_count(m) / m->tiles, e);
+		rc = save_runs(out, m->second, m->tiles, MOMENTS_SETS * second_count(m) / m->tiles, e);
 	if (!rc)
-		rc = save_runs(out, m->time, sum, MOMENTS_SETS * moments_classes(m), e);
-	return rc ? rc : save_runs(out, m->bootstrap, sum, moments_classes(m), e);
+		rc = save_runs(out, m->time, EXACT_SUM_WORDS, MOMENTS_SETS * moments_classes(m), e);
+	return rc ? rc : save_runs(out, m->bootstrap, EXACT_SUM_WORDS, moments_classes(m), e);
 }
 
 int moments_load(struct moments *m, struct checked_file *in, struct error *e)
 {
-	size_t film = m->tiles * sizeof *m->first, sum = sizeof *m->time;
-	uint32_t shape[4];
-	int rc = checked_file_read(in, shape, sizeof shape, e);
-	if (!rc &&
-	    (shape[0] != m->per_lease || shape[1] != m->leases || shape[2] != m->tiles || shape[3] != PATH_CLASSES))
+	uint32_t shape[SHAPE], want[SHAPE];
+	shape_of(m, want);
+	int rc = checked_file_read_numbers(in, shape, sizeof *shape, SHAPE, e);
+	if (!rc && memcmp(shape, want, sizeof want) != 0)
 		rc = error_set(e, EBADMSG, "moments of other chains");
 	if (!rc)
-		rc = load_runs(in, m->first, film, MOMENTS_SETS * first_count(m) / m->tiles, e);
+		rc = load_runs(in, m->first, m->tiles, MOMENTS_SETS * first_count(m) / m->tiles, e);
 	if (!rc)
-		rc = load_runs(in, m->second, film, MOMENTS_SETS * second_count(m) / m->tiles, e);
+		rc = load_runs(in, m->second, m->tiles, MOMENTS_SETS * second_count(m) / m->tiles, e);
 	if (!rc)
-		rc = load_runs(in, m->time, sum, MOMENTS_SETS * moments_classes(m), e);
-	return rc ? rc : load_runs(in, m->bootstrap, sum, moments_classes(m), e);
+		rc = load_runs(in, m->time, EXACT_SUM_WORDS, MOMENTS_SETS * moments_classes(m), e);
+	return rc ? rc : load_runs(in, m->bootstrap, EXACT_SUM_WORDS, moments_classes(m), e);
 }

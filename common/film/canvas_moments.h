@@ -5,6 +5,15 @@
  * they are integers on a grid or exact sums, with open rounds separate from the prefix, so the order of batches does
  * not matter. Memory: 24 bytes per sequence and tile, 24 per lease and tile; untouched pages cost nothing. One thread
  * at a time.
+ *
+ * In a file, numbers little endian: sequences of a lease S, leases L, tiles T, classes C, 4 bytes each; then runs. A
+ * run is one byte, 0: all of its numbers are zero, none follow; otherwise they do, 8 bytes each:
+ *
+ * runs    numbers  contents
+ * 3 L S   T        first moments: prefix, open rounds of even and odd number; lease; sequence
+ * 3 L     T        second moments; none if there are no sequences
+ * 3 G C   36       time: prefix, open rounds; group; class. An exact sum's words, least significant first
+ * G C     36       the bootstrap's energy: group; class
  */
 #ifndef COMMON_FILM_CANVAS_MOMENTS_H
 #define COMMON_FILM_CANVAS_MOMENTS_H

@@ -1,38 +1,33 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/canvas_save.h"
 
+#include "common/base/bytes.h"
 #include "common/film/canvas_films.h"
 #include "common/film/canvas_moments.h"
 
 #include <assert.h>
 #include <string.h>
 
-enum { VERSION = 2, END = UINT32_MAX };
+enum { VERSION = 2, HEAD = 40, PLACE = 8, END = UINT32_MAX };
+enum {
+	TALLY = sizeof(uint64_t) *
+		(BATCH_COUNTERS + BATCH_STRATEGIES * STRATEGY_COUNTERS + PLAN_MAX_GROUPS * (2 + 2 * EXACT_SUM_WORDS))
+};
+/* Where numbers are in the head that belong to the build, and not to the plan. */
+enum { AT_VERSION = 0, AT_TALLY = 4, AT_SLOT = 28 };
 
 /* What must be equal for a file to be loaded. */
-struct head {
-	uint32_t version, tally_bytes, groups, parts, tiles_across, tiles_down, kind, slot;
-	double quantum;
-};
-
-struct place {
-	uint32_t film, tile;
-};
-
-static struct head head_of(const struct canvas *c)
+static void pack_head(const struct canvas *c, unsigned char bytes[HEAD])
 {
-	struct head h;
-	memset(&h, 0, sizeof h);
-	h.version = VERSION;
-	h.tally_bytes = sizeof(struct tally);
-	h.groups = c->plan.groups;
-	h.parts = c->plan.parts;
-	h.tiles_across = c->tiles_across;
-	h.tiles_down = c->tiles_down;
-	h.kind = c->plan.kind;
-	h.slot = SLOT;
-	h.quantum = c->quantum;
-	return h;
+	put32(bytes + AT_VERSION, VERSION);
+	put32(bytes + AT_TALLY, TALLY);
+	put32(bytes + 8, c->plan.groups);
+	put32(bytes + 12, c->plan.parts);
+	put32(bytes + 16, c->tiles_across);
+	put32(bytes + 20, c->tiles_down);
+	put32(bytes + 24, c->plan.kind);
+	put32(bytes + AT_SLOT, SLOT);
+	put_double(bytes + 32, c->quantum);
 }
 
 static size_t films_of(const struct canvas *c)
@@ -45,21 +40,61 @@ static size_t has_bytes(const struct canvas *c)
 	return (size_t)(1 + OPEN_ROUNDS) * c->plan.groups * c->plan.parts;
 }
 
-/* Everything but the pixels, in order: writing and reading use the same list. */
-struct piece {
-	void *bytes;
-	size_t size;
-};
-enum { PIECES = 9 };
+/* ---- everything but the pixels: writing and reading go through the same list */
 
-static void pieces_of(struct canvas *c, struct piece p[PIECES])
+struct transfer {
+	struct checked_file *file;
+	bool writes;
+	int rc; /* of the first that failed; none follows */
+	struct error *e;
+};
+
+static void transfer(struct transfer *t, void *numbers, size_t width, size_t count)
 {
-	const struct piece all[PIECES] = {{&c->rounds, sizeof c->rounds},   {c->merged, sizeof c->merged},
-					  {c->has, has_bytes(c)},	    {c->bound, films_of(c) * sizeof *c->bound},
-					  {&c->prefix, sizeof c->prefix},   {&c->open[0], sizeof c->open[0]},
-					  {&c->open[1], sizeof c->open[1]}, {&c->bootstrap, sizeof c->bootstrap},
-					  {&c->b_tail, sizeof c->b_tail}};
-	memcpy(p, all, sizeof all);
+	if (!t->rc)
+		t->rc = t->writes ? checked_file_write_numbers(t->file, numbers, width, count, t->e)
+				  : checked_file_read_numbers(t->file, numbers, width, count, t->e);
+}
+
+static void transfer64(struct transfer *t, void *numbers, size_t count)
+{
+	transfer(t, numbers, sizeof(uint64_t), count);
+}
+
+static void transfer_tally(struct transfer *t, struct tally *y)
+{
+	transfer64(t, y->counts.counters, BATCH_COUNTERS);
+	transfer64(t, y->counts.strategy, BATCH_STRATEGIES * STRATEGY_COUNTERS);
+	for (uint32_t g = 0; g < PLAN_MAX_GROUPS; g++) {
+		transfer64(t, &y->group[g].samples, 1);
+		transfer64(t, &y->group[g].independent, 1);
+		transfer64(t, y->group[g].sum.word, EXACT_SUM_WORDS);
+		transfer64(t, y->group[g].beyond.word, EXACT_SUM_WORDS);
+	}
+}
+
+static int transfer_all(struct transfer *t, struct canvas *c)
+{
+	transfer64(t, &c->rounds, 1);
+	transfer(t, c->merged, sizeof *c->merged, OPEN_ROUNDS);
+	transfer(t, c->has, sizeof *c->has, has_bytes(c));
+	transfer64(t, c->bound, films_of(c));
+	transfer_tally(t, &c->prefix);
+	for (int i = 0; i < OPEN_ROUNDS; i++)
+		transfer_tally(t, &c->open[i]);
+	transfer_tally(t, &c->bootstrap);
+	transfer64(t, &c->b_tail, 1);
+	return t->rc;
+}
+
+/* ---- */
+
+static int write_place(struct checked_file *out, uint32_t film, uint32_t tile, struct error *e)
+{
+	unsigned char bytes[PLACE];
+	put32(bytes, film);
+	put32(bytes + 4, tile);
+	return checked_file_write(out, bytes, sizeof bytes, e);
 }
 
 static int save_tiles(const struct canvas *c, struct checked_file *out, struct error *e)
@@ -69,24 +104,23 @@ static int save_tiles(const struct canvas *c, struct checked_file *out, struct e
 		for (size_t tile = 0; tile < canvas_tiles(c) && !rc; tile++) {
 			if (!(*canvas_flags(c, film, tile) & TILE_USED))
 				continue;
-			struct place at = {(uint32_t)film, (uint32_t)tile};
-			rc = checked_file_write(out, &at, sizeof at, e);
+			rc = write_place(out, (uint32_t)film, (uint32_t)tile, e);
 			if (!rc)
-				rc = checked_file_write(out, canvas_slot(c, film, tile), SLOT * sizeof *c->sums, e);
+				rc = checked_file_write_numbers(out, canvas_slot(c, film, tile), sizeof *c->sums, SLOT,
+								e);
 		}
-	return rc ? rc : checked_file_write(out, &(struct place){END, END}, sizeof(struct place), e);
+	return rc ? rc : write_place(out, END, END, e);
 }
 
 int canvas_save(const struct canvas *c, struct checked_file *out, struct error *e)
 {
-	struct head h = head_of(c);
+	unsigned char head[HEAD];
+	struct canvas copy = *c; /* only read */
 	assert(canvas_missing(c) == 0);
-	struct canvas copy = *c; /* its pieces are only read */
-	struct piece p[PIECES];
-	pieces_of(&copy, p);
-	int rc = checked_file_write(out, &h, sizeof h, e);
-	for (int i = 0; i < PIECES && !rc; i++)
-		rc = checked_file_write(out, p[i].bytes, p[i].size, e);
+	pack_head(c, head);
+	int rc = checked_file_write(out, head, sizeof head, e);
+	if (!rc)
+		rc = transfer_all(&(struct transfer){out, true, 0, e}, &copy);
 	if (!rc)
 		rc = moments_save(c->moments, out, e);
 	return rc ? rc : save_tiles(c, out, e);
@@ -95,41 +129,42 @@ int canvas_save(const struct canvas *c, struct checked_file *out, struct error *
 static int load_tiles(struct canvas *c, struct checked_file *in, struct error *e)
 {
 	for (;;) {
-		struct place at;
-		int rc = checked_file_read(in, &at, sizeof at, e);
-		if (rc || at.film == END)
+		uint32_t at[2];
+		int rc = checked_file_read_numbers(in, at, sizeof *at, 2, e);
+		if (rc || at[0] == END)
 			return rc;
-		if (at.film >= films_of(c) || at.tile >= canvas_tiles(c))
+		uint32_t film = at[0], tile = at[1];
+		if (film >= films_of(c) || tile >= canvas_tiles(c))
 			return error_set(e, EBADMSG, "a tile that the films do not have");
-		rc = canvas_back_tile(c, at.film, at.tile, e);
+		rc = canvas_back_tile(c, film, tile, e);
 		/* Closing a round moves it into the prefix, so room for that is reserved now. */
 		if (!rc)
-			rc = canvas_back_tile(c, canvas_film(at.film / FILMS, FILM_PREFIX), at.tile, e);
+			rc = canvas_back_tile(c, canvas_film(film / FILMS, FILM_PREFIX), tile, e);
 		if (!rc)
-			rc = checked_file_read(in, canvas_slot(c, at.film, at.tile), SLOT * sizeof *c->sums, e);
+			rc = checked_file_read_numbers(in, canvas_slot(c, film, tile), sizeof *c->sums, SLOT, e);
 		if (rc)
 			return rc;
-		*canvas_flags(c, at.film, at.tile) |= TILE_USED;
+		*canvas_flags(c, film, tile) |= TILE_USED;
 	}
 }
 
 int canvas_load(struct canvas *c, struct checked_file *in, struct error *e)
 {
-	struct head h, want = head_of(c);
-	struct piece p[PIECES];
-	int rc = checked_file_read(in, &h, sizeof h, e);
+	unsigned char head[HEAD];
+	int rc = checked_file_read(in, head, sizeof head, e);
 	if (rc)
 		return rc;
-	if (h.version != want.version || h.tally_bytes != want.tally_bytes || h.slot != want.slot)
+	uint32_t version = get32(head + AT_VERSION);
+	if (version != VERSION || get32(head + AT_TALLY) != TALLY || get32(head + AT_SLOT) != SLOT)
 		return error_set(
 			e, EPROTO,
 			"%s: films of version %u, and this coordinator knows version %u: another one wrote them",
-			in->path, h.version, want.version);
-	if (memcmp(&h, &want, sizeof h) != 0)
+			in->path, version, VERSION);
+	unsigned char want[HEAD];
+	pack_head(c, want);
+	if (memcmp(head, want, HEAD) != 0)
 		return error_set(e, EBADMSG, "%s: the films of another plan", in->path);
-	pieces_of(c, p);
-	for (int i = 0; i < PIECES && !rc; i++)
-		rc = checked_file_read(in, p[i].bytes, p[i].size, e);
+	rc = transfer_all(&(struct transfer){in, false, 0, e}, c);
 	if (!rc)
 		rc = moments_load(c->moments, in, e);
 	return rc ? rc : load_tiles(c, in, e);

@@ -1,8 +1,32 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Saves a canvas to a file and loads it, open rounds included: adding the same batches to both gives the same bits.
- * Untouched tiles take no space. The format is that of this build (versioned, numbers in memory layout). One thread at
- * a time.
+ * Untouched tiles take no space. One thread at a time.
+ *
+ * Version 2, all numbers little endian (common/base/checked_file.h). G groups, P parts, a film is canvas_film(), a tile
+ * is numbered row by row:
+ *
+ * offset  bytes      contents
+ * 0       4          version
+ * 4       4          T, bytes of a tally: 39168
+ * 8       8          G, P
+ * 16      8          tiles across, tiles down
+ * 24      4          kind of plan
+ * 28      4          values in a tile: 64 x 64 x 3
+ * 32      8          quantum, a double
+ * 40      8          complete rounds
+ * 48      8          merged leases of the two open rounds, 4 bytes each
+ * 56      3 G P      whether a lease is merged: bootstrap, open rounds of even and odd number; group; part
+ *         24 G       by film, the bound of its sums
+ *         4 T        tallies: of the prefix, of both open rounds, of the bootstrap
+ *         8          tail index of the bootstrap, a double
+ *                    moments (canvas_moments.h)
+ *         98312 each the tiles that were touched: film and tile, 4 bytes each, then the sums, 8 bytes each
+ *         8          the end: all bits set
+ *
+ * A tally is numbers of 8 bytes: the counters, the counters of each strategy, then for each of 64 groups the samples,
+ * the independent samples, and two exact sums of 36 words each, least significant first. Numbers are those of the enums
+ * in batch.h: another number of them is another version.
  */
 #ifndef COMMON_FILM_CANVAS_SAVE_H
 #define COMMON_FILM_CANVAS_SAVE_H
