@@ -23,6 +23,8 @@
 #include <math.h>
 #include <string.h>
 
+enum { KEY = 2, SUMS = 3 }; /* of a saved lease */
+
 struct bootstrap {
 	struct plan plan;
 	float *weights;	       /* [bootstrap], in index order */
@@ -108,31 +110,25 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	return 0;
 }
 
-/* A saved lease in a file: this, then its weights. */
-struct saved_lease {
-	uint32_t group, part;
-	uint64_t counters[BATCH_COUNTERS];
-	double independent_sum, independent_square, beyond_sum, classes[PATH_CLASSES];
-};
-
 static int save_lease(const struct bootstrap *s, const struct batch *b, struct checked_file *f, struct error *e)
 {
 	struct plan_range r = plan_bootstrap_range(&s->plan, b->key.group, b->key.part);
-	struct saved_lease l = {.group = b->key.group,
-				.part = b->key.part,
-				.independent_sum = b->independent_sum,
-				.independent_square = b->independent_square,
-				.beyond_sum = b->beyond_sum};
-	memcpy(l.counters, b->counters, sizeof l.counters);
-	memcpy(l.classes, b->classes, sizeof l.classes);
-	int rc = checked_file_write(f, &l, sizeof l, e);
-	return rc ? rc : checked_file_write(f, s->weights + r.begin, (r.end - r.begin) * sizeof *s->weights, e);
+	const uint32_t key[KEY] = {b->key.group, b->key.part};
+	const double sums[SUMS] = {b->independent_sum, b->independent_square, b->beyond_sum};
+	int rc = checked_file_write_numbers(f, key, sizeof *key, KEY, e);
+	if (!rc)
+		rc = checked_file_write_numbers(f, b->counters, sizeof *b->counters, BATCH_COUNTERS, e);
+	if (!rc)
+		rc = checked_file_write_numbers(f, sums, sizeof *sums, SUMS, e);
+	if (!rc)
+		rc = checked_file_write_numbers(f, b->classes, sizeof *b->classes, PATH_CLASSES, e);
+	return rc ? rc : checked_file_write_numbers(f, s->weights + r.begin, sizeof *s->weights, r.end - r.begin, e);
 }
 
 int bootstrap_save(const struct bootstrap *s, struct checked_file *f, struct error *e)
 {
 	uint32_t leases = s->plan.groups * s->plan.parts, count = bootstrap_done(s);
-	int rc = checked_file_write(f, &count, sizeof count, e);
+	int rc = checked_file_write_numbers(f, &count, sizeof count, 1, e);
 	for (uint32_t i = 0; i < leases && !rc; i++)
 		if (s->batches[i].key.kind == LEASE_BOOTSTRAP)
 			rc = save_lease(s, &s->batches[i], f, e);
@@ -141,25 +137,32 @@ int bootstrap_save(const struct bootstrap *s, struct checked_file *f, struct err
 
 static int load_lease(struct bootstrap *s, struct checked_file *f, struct error *e)
 {
-	struct saved_lease l;
-	int rc = checked_file_read(f, &l, sizeof l, e);
+	uint32_t key[KEY];
+	double sums[SUMS];
+	int rc = checked_file_read_numbers(f, key, sizeof *key, KEY, e);
 	if (rc)
 		return rc;
-	if (l.group >= s->plan.groups || l.part >= s->plan.parts)
-		return error_set(e, EBADMSG, "a bootstrap lease of group %u, part %u", l.group, l.part);
-	struct plan_range r = plan_bootstrap_range(&s->plan, l.group, l.part);
-	struct batch b = {.key = {.kind = LEASE_BOOTSTRAP, .group = l.group, .part = l.part},
-			  .independent_sum = l.independent_sum,
-			  .independent_square = l.independent_square,
-			  .beyond_sum = l.beyond_sum,
+	if (key[0] >= s->plan.groups || key[1] >= s->plan.parts)
+		return error_set(e, EBADMSG, "a bootstrap lease of group %u, part %u", key[0], key[1]);
+	struct plan_range r = plan_bootstrap_range(&s->plan, key[0], key[1]);
+	struct batch b = {.key = {.kind = LEASE_BOOTSTRAP, .group = key[0], .part = key[1]},
 			  .weight_count = r.end - r.begin,
 			  .weights = mem_alloc(r.end - r.begin, sizeof *b.weights)};
 	if (!b.weights)
 		return error_set(e, ENOMEM, "no memory for %llu bootstrap weights",
 				 (unsigned long long)(r.end - r.begin));
-	memcpy(b.counters, l.counters, sizeof b.counters);
-	memcpy(b.classes, l.classes, sizeof b.classes);
-	rc = checked_file_read(f, b.weights, b.weight_count * sizeof *b.weights, e);
+	rc = checked_file_read_numbers(f, b.counters, sizeof *b.counters, BATCH_COUNTERS, e);
+	if (!rc)
+		rc = checked_file_read_numbers(f, sums, sizeof *sums, SUMS, e);
+	if (!rc)
+		rc = checked_file_read_numbers(f, b.classes, sizeof *b.classes, PATH_CLASSES, e);
+	if (!rc)
+		rc = checked_file_read_numbers(f, b.weights, sizeof *b.weights, b.weight_count, e);
+	if (!rc) {
+		b.independent_sum = sums[0];
+		b.independent_square = sums[1];
+		b.beyond_sum = sums[2];
+	}
 	if (!rc)
 		rc = batch_check(&b, &s->plan, e);
 	if (!rc)
@@ -172,7 +175,7 @@ int bootstrap_load(struct bootstrap *s, struct checked_file *f, struct error *e)
 {
 	uint32_t count;
 	assert(s->missing == s->plan.groups * s->plan.parts);
-	int rc = checked_file_read(f, &count, sizeof count, e);
+	int rc = checked_file_read_numbers(f, &count, sizeof count, 1, e);
 	if (!rc && count > s->missing)
 		rc = error_set(e, EBADMSG, "%u bootstrap leases of %u", count, s->missing);
 	for (uint32_t i = 0; i < count && !rc; i++)

@@ -19,8 +19,17 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e);
 bool bootstrap_has(const struct bootstrap *s, uint32_t group, uint32_t part);
 uint32_t bootstrap_missing(const struct bootstrap *s); /* leases */
 uint32_t bootstrap_done(const struct bootstrap *s);
-/* Saves the leases that have been added to a file, and loads them into an empty bootstrap of the same plan. What the
- * file contains is checked by batch_check(); -EBADMSG. */
+/*
+ * Saves the leases that have been added to a file, and loads them into an empty bootstrap of the same plan. What the
+ * file contains is checked by batch_check(); -EBADMSG. Little endian: the number of leases, 4 bytes; then each:
+ *
+ * offset  bytes  contents
+ * 0       8      group, part
+ * 8       128    counters, 8 bytes each (enum batch_counter)
+ * 136     24     doubles: independent_sum, independent_square, beyond_sum of struct batch
+ * 160     160    doubles by path class
+ * 320            weights, floats: as many as the plan has for the lease
+ */
 int bootstrap_save(const struct bootstrap *s, struct checked_file *f, struct error *e);
 int bootstrap_load(struct bootstrap *s, struct checked_file *f, struct error *e);
 /* Once complete: b by group and pooled, from the weights in index order. */

@@ -8,6 +8,7 @@
  */
 #include "worker/cli/render/kept_bootstrap.h"
 
+#include "common/base/bytes.h"
 #include "common/base/crc.h"
 #include "common/plan/plan_text.h"
 
@@ -17,6 +18,7 @@
 #include <unistd.h>
 
 static const char magic[8] = "HSLTBOO1";
+enum { MARK = 24, AT_LENGTH = 20 };
 
 static int marking_open(void *user, const char *name, struct asset *out, struct error *e)
 {
@@ -70,24 +72,28 @@ void kept_bootstrap_begin(struct kept_bootstrap *k, const char *image, const cha
 	}
 }
 
+/* What comes before the text. */
+static void pack_mark(const struct kept_bootstrap *k, unsigned char bytes[MARK])
+{
+	memcpy(bytes, magic, sizeof magic);
+	put32(bytes + 8, k->crc);
+	put64(bytes + 12, k->bytes);
+	put32(bytes + AT_LENGTH, (uint32_t)strlen(k->text));
+}
+
 static int read_mark(const struct kept_bootstrap *k, struct checked_file *f, struct error *e)
 {
-	char start[sizeof magic], text[KEPT_TEXT];
-	uint32_t crc, length;
-	uint64_t bytes;
-	int rc = checked_file_read(f, start, sizeof start, e);
-	if (!rc)
-		rc = checked_file_read(f, &crc, sizeof crc, e);
-	if (!rc)
-		rc = checked_file_read(f, &bytes, sizeof bytes, e);
-	if (!rc)
-		rc = checked_file_read(f, &length, sizeof length, e);
-	if (!rc && (memcmp(start, magic, sizeof magic) != 0 || length > sizeof text))
-		rc = error_set(e, EBADMSG, "not a kept bootstrap");
-	if (!rc)
-		rc = checked_file_read(f, text, length, e);
-	if (!rc &&
-	    (crc != k->crc || bytes != k->bytes || length != strlen(k->text) || memcmp(text, k->text, length) != 0))
+	unsigned char mark[MARK], want[MARK];
+	char text[KEPT_TEXT];
+	pack_mark(k, want);
+	int rc = checked_file_read(f, mark, sizeof mark, e);
+	if (rc)
+		return rc;
+	uint32_t length = get32(mark + AT_LENGTH);
+	if (memcmp(mark, magic, sizeof magic) != 0 || length > sizeof text)
+		return error_set(e, EBADMSG, "not a kept bootstrap");
+	rc = checked_file_read(f, text, length, e);
+	if (!rc && (memcmp(mark, want, MARK) != 0 || memcmp(text, k->text, length) != 0))
 		rc = error_set(e, ESTALE, "it is of another plan, scene, program or machine");
 	return rc;
 }
@@ -121,19 +127,14 @@ void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *
 static int write_file(const struct kept_bootstrap *k, const char *path, const struct bootstrap *b, struct error *e)
 {
 	struct checked_file f;
-	uint32_t length = (uint32_t)strlen(k->text);
+	unsigned char mark[MARK];
 	int rc = checked_file_create(&f, path, e);
 	if (rc)
 		return rc;
-	rc = checked_file_write(&f, magic, sizeof magic, e);
+	pack_mark(k, mark);
+	rc = checked_file_write(&f, mark, sizeof mark, e);
 	if (!rc)
-		rc = checked_file_write(&f, &k->crc, sizeof k->crc, e);
-	if (!rc)
-		rc = checked_file_write(&f, &k->bytes, sizeof k->bytes, e);
-	if (!rc)
-		rc = checked_file_write(&f, &length, sizeof length, e);
-	if (!rc)
-		rc = checked_file_write(&f, k->text, length, e);
+		rc = checked_file_write(&f, k->text, strlen(k->text), e);
 	if (!rc)
 		rc = bootstrap_save(b, &f, e);
 	if (!rc)

@@ -5,6 +5,16 @@
  * removes the file when its image is written. Another plan, other defines, different files or another numeric
  * fingerprint (a new build, or a machine with different rounding) make it another command: then the file is not used,
  * and replaced by the next interruption. One thread.
+ *
+ * The file, checked (common/base/checked_file.h), little endian:
+ *
+ * offset  bytes  contents
+ * 0       8      magic number and version, HSLTBOO1
+ * 8       4      CRC-32C of the scene's files, each with its name and a zero before it
+ * 12      8      their bytes, without names
+ * 20      4      N
+ * 24      N      fingerprint, plan and defines, as text
+ * 24 + N         the leases (bootstrap_save in common/estimate/merge.h)
  */
 #ifndef WORKER_CLI_RENDER_KEPT_BOOTSTRAP_H
 #define WORKER_CLI_RENDER_KEPT_BOOTSTRAP_H

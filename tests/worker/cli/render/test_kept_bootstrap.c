@@ -4,12 +4,15 @@
  * as one that was never stopped, with no lease done twice. Files of other plans, other scenes, other fingerprints
  * and damaged ones are not used. Renders are stopped from within, so that nothing depends on time.
  */
+#include "common/base/bytes.h"
 #include "tests/support/folder.h"
+#include "tests/support/golden.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/render/kept_bootstrap.h"
 #include "worker/cli/render/local.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -224,6 +227,124 @@ static void test_damage(void **state)
 	world_free(w);
 }
 
+/* ---- the bytes of the file ---- */
+
+/* As a build of x86-64 wrote it from memory: mark, text "text", one lease of two, checksum. */
+enum { OLD_SIZE = 364, OLD_LEASE = 32, OLD_WEIGHTS = OLD_LEASE + 320 };
+static const struct golden old_runs[] = {
+	{0, "48534c54424f4f31040302010c0b0a09080706050400000074657874010000000000000001"},
+	{56, "02"},
+	{96, "3412"},
+	{175, "400000000000000440000000000000d03f000000000000f43f"},
+	{350, "e83f0000c03f0000003f62bf5d74"},
+};
+
+static struct plan old_plan(void)
+{
+	return (struct plan){.integrator = "pssmlt",
+			     .kind = PLAN_CHAINS,
+			     .width = 1,
+			     .height = 1,
+			     .crop_width = 1,
+			     .crop_height = 1,
+			     .groups = 1,
+			     .parts = 2,
+			     .chains = 2,
+			     .bootstrap = 4,
+			     .epoch = 1,
+			     .rounds = 1};
+}
+
+static struct kept_bootstrap old_kept(void)
+{
+	struct kept_bootstrap k = {.crc = 0x01020304, .bytes = 0x05060708090a0b0c, .text = "text"};
+	snprintf(k.path, sizeof k.path, "%s/image.exr.bootstrap", folder);
+	return k;
+}
+
+static struct bootstrap *old_bootstrap(bool filled)
+{
+	float weights[2] = {1.5f, 0.5f};
+	struct plan p = old_plan();
+	struct batch b = {.key = {.kind = LEASE_BOOTSTRAP, .part = 1},
+			  .independent_sum = 2,
+			  .independent_square = 2.5,
+			  .beyond_sum = 0.25,
+			  .weight_count = 2,
+			  .weights = weights};
+	struct bootstrap *s;
+	struct error e;
+	b.counters[COUNT_INDEPENDENT] = 2;
+	b.counters[COUNT_RAYS_SHADOW] = 0x1234;
+	b.classes[0] = 1.25;
+	b.classes[PATH_CLASSES - 1] = 0.75;
+	assert_int_equal(bootstrap_new(&s, &p, &e), 0);
+	assert_int_equal(batch_check(&b, &p, &e), 0);
+	assert_int_equal(filled ? bootstrap_add(s, &b, &e) : 0, 0);
+	return s;
+}
+
+/* Puts these bytes there, with a checksum that fits, and says how many leases came of them; text: what was said. */
+static uint32_t resume_from(const unsigned char *bytes, size_t size, char text[512])
+{
+	struct kept_bootstrap k = old_kept();
+	struct bootstrap *s = old_bootstrap(false);
+	struct checked_file f;
+	golden_open(&f, k.path, bytes, size);
+	checked_file_close(&f);
+	kept_bootstrap_resume(&k, s, text, 512);
+	uint32_t done = bootstrap_done(s);
+	bootstrap_free(s);
+	return done;
+}
+
+static void test_bytes_stay(void **state)
+{
+	(void)state;
+	unsigned char bytes[OLD_SIZE];
+	char text[512];
+	struct kept_bootstrap k = old_kept();
+	struct bootstrap *s = old_bootstrap(true), *again = old_bootstrap(false);
+	golden_fill(old_runs, sizeof old_runs / sizeof *old_runs, bytes, sizeof bytes);
+	kept_bootstrap_write(&k, s);
+	golden_compare(k.path, bytes, sizeof bytes);
+	kept_bootstrap_resume(&k, again, text, sizeof text);
+	assert_non_null(strstr(text, "continues from 1 of 2 leases"));
+	assert_true(unlink(k.path) == 0);
+	kept_bootstrap_write(&k, again); /* all of it came back */
+	golden_compare(k.path, bytes, sizeof bytes);
+	bootstrap_free(s);
+	bootstrap_free(again);
+}
+
+/* Cut anywhere, each bit of the mark, and numbers that lead out of the plan. */
+static void test_bytes_of_none(void **state)
+{
+	(void)state;
+	enum { END = OLD_SIZE - 4 };
+	unsigned char bytes[OLD_SIZE];
+	char text[512];
+	golden_fill(old_runs, sizeof old_runs / sizeof *old_runs, bytes, sizeof bytes);
+	for (size_t size = 0; size < END; size++) {
+		assert_int_equal(resume_from(bytes, size, text), 0);
+		assert_non_null(strstr(text, "ends too early"));
+	}
+	for (size_t bit = 0; bit < 8 * (OLD_LEASE + 8); bit++) {
+		bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
+		/* One lease more or less than there are, and the other part of the group, are the only changes that do
+		 * not show before a lease is used. */
+		bool shows = bit / 8 < 28 || bit / 8 >= OLD_LEASE;
+		uint32_t done = resume_from(bytes, END, text);
+		assert_true(!shows || bit == 8 * (OLD_LEASE + 4) || (done == 0 && strstr(text, "is not used: ")));
+		bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
+	}
+	for (int large = 0; large < 2; large++) { /* a weight below 0, one that is no number */
+		put_float(bytes + OLD_WEIGHTS, large ? NAN : -1);
+		assert_int_equal(resume_from(bytes, END, text), 0);
+		assert_non_null(strstr(text, "a bootstrap weight is negative or not finite"));
+	}
+}
+
 /* Where there is no file beside the image, nothing is kept, and nothing is promised. */
 static void test_no_place(void **state)
 {
@@ -247,6 +368,8 @@ int main(void)
 		cmocka_unit_test_setup_teardown(test_of_another_command, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(test_damage, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(test_no_place, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(test_bytes_stay, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(test_bytes_of_none, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
