@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The file of a checkpoint: a magic number, the size of the head, the head (stored.h), then the seeds, chain states and
- * films of the job, with a checksum (common/base/checked_file.h). A change of what follows the head needs a new version
- * number. Files of version 004, whose head is a struct, are read, too.
+ * Writing and reading go through the parts of the file in the order of checkpoint_file.h. A change of what follows the
+ * head needs a new version number. Files of version 004, whose head is numbers at fixed offsets, are read, too.
  *
  * A damaged file is -EBADMSG, one of another version -EPROTO. Sizes are checked before anything is allocated.
  */
@@ -45,11 +44,12 @@ static int write_states(const struct live_job *job, struct checked_file *out, st
 	int rc = 0;
 	for (uint32_t i = 0; i < slots_of(job) && !rc; i++) {
 		uint32_t there = job->states[i] != NULL;
-		rc = checked_file_write(out, &there, sizeof there, e);
+		rc = checked_file_write_numbers(out, &there, sizeof there, 1, e);
 		for (uint32_t k = 0; there && k < job->chains_per_lease && !rc; k++) {
-			rc = checked_file_write(out, &job->states[i][k].size, sizeof job->states[i][k].size, e);
+			const struct chain_state *c = &job->states[i][k];
+			rc = checked_file_write_numbers(out, &c->size, sizeof c->size, 1, e);
 			if (!rc)
-				rc = checked_file_write(out, job->states[i][k].bytes, job->states[i][k].size, e);
+				rc = checked_file_write(out, c->bytes, c->size, e);
 		}
 	}
 	return rc;
@@ -61,7 +61,7 @@ static int write_head(const struct checkpoint_head *h, struct checked_file *out,
 	uint32_t size = (uint32_t)stored_pack_head(h, bytes);
 	int rc = checked_file_write(out, magic, sizeof magic, e);
 	if (!rc)
-		rc = checked_file_write(out, &size, sizeof size, e);
+		rc = checked_file_write_numbers(out, &size, sizeof size, 1, e);
 	return rc ? rc : checked_file_write(out, bytes, size, e);
 }
 
@@ -70,7 +70,7 @@ int checkpoint_write(const struct live_job *job, const struct checkpoint_head *h
 {
 	int rc = write_head(h, out, e);
 	if (!rc && job->seeds)
-		rc = checked_file_write(out, job->seeds, job->plan.chains * sizeof *job->seeds, e);
+		rc = checked_file_write_numbers(out, job->seeds, sizeof *job->seeds, job->plan.chains, e);
 	if (!rc)
 		rc = write_states(job, out, e);
 	return rc ? rc : canvas_save(job->canvas, out, e);
@@ -81,7 +81,7 @@ static int read_states(struct live_job *job, struct checked_file *in, struct err
 	int rc = 0;
 	for (uint32_t i = 0; i < slots_of(job) && !rc; i++) {
 		uint32_t there;
-		rc = checked_file_read(in, &there, sizeof there, e);
+		rc = checked_file_read_numbers(in, &there, sizeof there, 1, e);
 		if (rc || !there)
 			continue;
 		job->states[i] = mem_alloc(job->chains_per_lease, sizeof *job->states[i]);
@@ -90,7 +90,7 @@ static int read_states(struct live_job *job, struct checked_file *in, struct err
 		for (uint32_t k = 0; k < job->chains_per_lease && !rc; k++) {
 			struct chain_state *c = &job->states[i][k];
 			uint32_t size;
-			rc = checked_file_read(in, &size, sizeof size, e);
+			rc = checked_file_read_numbers(in, &size, sizeof size, 1, e);
 			if (!rc && (size == 0 || size > CHAIN_STATE_MAX))
 				rc = error_set(e, EBADMSG, "the state of a chain has %u bytes", size);
 			if (!rc && !(c->bytes = mem_alloc(size, 1)))
@@ -124,7 +124,7 @@ static int read_old_head(struct checkpoint_head *h, struct checked_file *in, str
 {
 	unsigned char bytes[STORED_OLD_HEAD];
 	uint32_t sizes[2]; /* of the head; worker_count */
-	int rc = checked_file_read(in, sizes, sizeof sizes, e);
+	int rc = checked_file_read_numbers(in, sizes, sizeof *sizes, 2, e);
 	if (!rc && sizes[0] != sizeof magic + sizeof sizes + sizeof bytes)
 		rc = error_set(e, EPROTO, "%s: its head has %u bytes: a coordinator for another machine wrote it",
 			       in->path, sizes[0]);
@@ -146,7 +146,7 @@ static int read_head(struct checkpoint_head *h, struct checked_file *in, struct 
 	if (!rc)
 		rc = spool_check_version(got, magic, in->path, e);
 	if (!rc)
-		rc = checked_file_read(in, &size, sizeof size, e);
+		rc = checked_file_read_numbers(in, &size, sizeof size, 1, e);
 	if (!rc && size > sizeof bytes)
 		rc = error_set(e, EPROTO, "%s: its head has %u bytes", in->path, size);
 	if (!rc)
@@ -169,7 +169,7 @@ static int read_all(struct live_job *job, struct checked_file *in, uint64_t *gen
 	int exponent = canvas_grid_exponent(&job->plan, job->lit.b_pooled, live_job_submit(job)->brightest);
 	rc = canvas_new(&job->canvas, &job->plan, exponent, job->film_folder, e);
 	if (!rc && job->seeds)
-		rc = checked_file_read(in, job->seeds, job->plan.chains * sizeof *job->seeds, e);
+		rc = checked_file_read_numbers(in, job->seeds, sizeof *job->seeds, job->plan.chains, e);
 	if (!rc)
 		rc = read_states(job, in, e);
 	if (!rc)

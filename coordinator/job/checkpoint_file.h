@@ -1,5 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The file of a job's checkpoint (coordinator/jobs/checkpoint.h). Any thread, while nobody changes the job. */
+/*
+ * The file of a job's checkpoint (coordinator/jobs/checkpoint.h), checked (common/base/checked_file.h), little endian:
+ *
+ * offset  bytes       contents
+ * 0       8           magic number and version, hsltC005
+ * 8       4           N
+ * 12      N           CheckpointHead of proto/stored.proto
+ * 12 + N  8 a chain   chains: the seeds, group by group
+ *                     for each group and part of it: 0, in 4 bytes, if no epoch has been merged yet; otherwise 1, and
+ * of each chain the size of its state, 4 bytes, and the state films (common/film/canvas_save.h)
+ *
+ * Any thread, while nobody changes the job.
+ */
 #ifndef COORDINATOR_JOB_CHECKPOINT_FILE_H
 #define COORDINATOR_JOB_CHECKPOINT_FILE_H
 

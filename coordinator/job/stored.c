@@ -8,10 +8,11 @@
  * fit are -EPROTO with a sentence; -ENOMEM. Packing cannot fail: the sizes are bounded by STORED_NOTE_MOST and
  * STORED_HEAD_MOST, which assertions check.
  *
- * The last part reads the structs that version 004 wrote as they lay in memory (x86-64). Their layout is asserted.
+ * The last part reads what version 004 wrote.
  */
 #include "coordinator/job/stored.h"
 
+#include "common/base/bytes.h"
 #include "common/base/text.h"
 #include "coordinator/store/message.h"
 
@@ -167,92 +168,67 @@ int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoin
 	return rc;
 }
 
-/* ---- structs stored by earlier versions, in the layout of x86-64, the only platform then ---- */
+/* ---- what earlier versions stored: numbers at the offsets of stored.h ---- */
 
-enum { OLD_GROUPS = 64, OLD_LOOKS = 64, OLD_COUNTS = 8 };
+enum { OLD_GROUPS = 64, OLD_LOOKS = 64, OLD_LOOK = 56, OLD_COUNTS = 64, OLD_FINGERPRINT = 256 };
+enum { AT_LOOKS = 608, AT_COUNTS = AT_LOOKS + OLD_LOOKS * OLD_LOOK, AT_FINGERPRINT = AT_COUNTS + OLD_COUNTS };
 
-struct old_look {
-	double work, cpu_seconds, seconds, rel_mse, rel_mse_upper, degrees;
-	uint64_t doubtful;
-};
+_Static_assert(AT_FINGERPRINT + OLD_FINGERPRINT == STORED_OLD_HEAD, "what lies on disks does not change");
+_Static_assert(OLD_GROUPS <= (int)PLAN_MAX_GROUPS && OLD_LOOKS <= (int)FORECAST_LOOKS, "all of an old head is taken");
 
-struct old_counts {
-	uint64_t repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched;
-};
-
-struct old_head { /* of version 004, after worker_count */
-	uint64_t job, generation;
-	double cpu_seconds, bootstrap_cpu_seconds, look_written, elapsed, opened, completed;
-	double b[OLD_GROUPS], b_pooled, beyond_share;
-	uint8_t black, nothing[7];
-	uint32_t look_count, nothing2;
-	struct old_look looks[OLD_LOOKS];
-	struct old_counts counts;
-	char fingerprint[256];
-};
-
-_Static_assert(sizeof(struct old_look) == 56 && sizeof(struct old_counts) == 64 &&
-		       sizeof(struct old_head) == STORED_OLD_HEAD,
-	       "what lies on disks does not change");
-_Static_assert(sizeof((struct old_head *)0)->b <= sizeof((struct bootstrap_result *)0)->b &&
-		       OLD_LOOKS <= (int)FORECAST_LOOKS,
-	       "all of an old head is taken");
-
-static struct forecast_look old_look(const struct old_look *l)
+static struct forecast_look old_look(const unsigned char *p)
 {
-	return (struct forecast_look){l->work,		l->cpu_seconds, l->seconds, l->rel_mse,
-				      l->rel_mse_upper, l->degrees,	l->doubtful};
+	return (struct forecast_look){get_double(p),	  get_double(p + 8),  get_double(p + 16), get_double(p + 24),
+				      get_double(p + 32), get_double(p + 40), get64(p + 48)};
 }
 
-static struct job_counts old_counts(const struct old_counts *c)
+static struct job_counts old_counts(const unsigned char *p)
 {
-	return (struct job_counts){.repeats = c->repeats,
-				   .refused = c->refused,
-				   .faults = c->faults,
-				   .failures = c->failures,
-				   .timeouts = c->timeouts,
-				   .duplicates = c->duplicates,
-				   .verified = c->verified,
-				   .mismatched = c->mismatched};
+	return (struct job_counts){.repeats = get64(p),
+				   .refused = get64(p + 8),
+				   .faults = get64(p + 16),
+				   .failures = get64(p + 24),
+				   .timeouts = get64(p + 32),
+				   .duplicates = get64(p + 40),
+				   .verified = get64(p + 48),
+				   .mismatched = get64(p + 56)};
 }
 
 int stored_old_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e)
 {
-	struct old_look old;
-	if (size != sizeof old)
+	if (size != OLD_LOOK)
 		return error_set(e, EPROTO, "a look of %zu bytes", size);
-	memcpy(&old, bytes, sizeof old);
-	*l = old_look(&old);
+	*l = old_look(bytes);
 	return 0;
 }
 
 int stored_old_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e)
 {
-	struct old_counts old;
-	if (size != sizeof old)
+	if (size != OLD_COUNTS)
 		return error_set(e, EPROTO, "counters of %zu bytes", size);
-	memcpy(&old, bytes, sizeof old);
-	*c = old_counts(&old);
+	*c = old_counts(bytes);
 	return 0;
 }
 
 void stored_old_head(const unsigned char bytes[STORED_OLD_HEAD], uint32_t worker_count, struct checkpoint_head *h)
 {
-	struct old_head old;
-	memcpy(&old, bytes, sizeof old);
-	*h = (struct checkpoint_head){
-		.job = old.job,
-		.generation = old.generation,
-		.worker_count = worker_count,
-		.cpu_seconds = old.cpu_seconds,
-		.bootstrap_cpu_seconds = old.bootstrap_cpu_seconds,
-		.look_written = old.look_written,
-		.times = {old.elapsed, old.opened, old.completed},
-		.lit = {.b_pooled = old.b_pooled, .beyond_share = old.beyond_share, .black = old.black != 0},
-		.counts = old_counts(&old.counts)};
-	memcpy(h->lit.b, old.b, sizeof old.b);
-	for (; h->looks.count < old.look_count && h->looks.count < OLD_LOOKS; h->looks.count++)
-		h->looks.looks[h->looks.count] = old_look(&old.looks[h->looks.count]);
-	old.fingerprint[sizeof old.fingerprint - 1] = 0;
-	text_copy(h->fingerprint, sizeof h->fingerprint, old.fingerprint);
+	char fingerprint[OLD_FINGERPRINT];
+	uint32_t looks = get32(bytes + 600);
+	*h = (struct checkpoint_head){.job = get64(bytes),
+				      .generation = get64(bytes + 8),
+				      .worker_count = worker_count,
+				      .cpu_seconds = get_double(bytes + 16),
+				      .bootstrap_cpu_seconds = get_double(bytes + 24),
+				      .look_written = get_double(bytes + 32),
+				      .times = {get_double(bytes + 40), get_double(bytes + 48), get_double(bytes + 56)},
+				      .lit = {.b_pooled = get_double(bytes + 576),
+					      .beyond_share = get_double(bytes + 584),
+					      .black = bytes[592] != 0},
+				      .counts = old_counts(bytes + AT_COUNTS)};
+	copy_numbers(h->lit.b, bytes + 64, sizeof *h->lit.b, OLD_GROUPS);
+	for (; h->looks.count < looks && h->looks.count < OLD_LOOKS; h->looks.count++)
+		h->looks.looks[h->looks.count] = old_look(bytes + AT_LOOKS + OLD_LOOK * h->looks.count);
+	memcpy(fingerprint, bytes + AT_FINGERPRINT, sizeof fingerprint);
+	fingerprint[sizeof fingerprint - 1] = 0;
+	text_copy(h->fingerprint, sizeof h->fingerprint, fingerprint);
 }

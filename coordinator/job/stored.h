@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Stored data of a job other than results, as messages of proto/stored.proto, and as structs in memory layout, which
- * earlier versions stored. Any thread.
+ * Stored data of a job other than results, as messages of proto/stored.proto, and as earlier versions stored it. Any
+ * thread.
  */
 #ifndef COORDINATOR_JOB_STORED_H
 #define COORDINATOR_JOB_STORED_H
@@ -14,8 +14,7 @@
 enum {
 	STORED_NOTE_MOST = 1024,    /* bytes of an estimate of the error ("look"), of counters */
 	STORED_HEAD_MOST = 1 << 16, /* bytes of a checkpoint's head */
-	STORED_OLD_HEAD =
-		4528 - 16, /* bytes of one of version 004 without magic, size and worker_count, its first 16 */
+	STORED_OLD_HEAD = 4512,	    /* of version 004, after magic number, size of the head and worker_count */
 };
 
 /* Returns the size. */
@@ -28,7 +27,25 @@ int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_
 int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e);
 int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoint_head *h, struct error *e);
 
-/* The same for earlier versions. -EPROTO: the wrong size. */
+/*
+ * The same for earlier versions, little endian. -EPROTO: the wrong size.
+ *
+ * A look: six doubles in the order of struct forecast_look, and the last member in 8 bytes.
+ * Counters, 8 bytes each: repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched.
+ * A head:
+ *
+ * offset  bytes  contents
+ * 0       16     job, generation
+ * 16      24     doubles: cpu_seconds, bootstrap_cpu_seconds, look_written
+ * 40      24     doubles: elapsed, opened, completed
+ * 64      512    doubles: b of 64 groups
+ * 576     16     doubles: b_pooled, beyond_share
+ * 592     1      black
+ * 600     4      number of looks
+ * 608     3584   64 looks
+ * 4192    64     counters
+ * 4256    256    fingerprint, a string
+ */
 int stored_old_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e);
 int stored_old_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e);
 void stored_old_head(const unsigned char bytes[STORED_OLD_HEAD], uint32_t worker_count, struct checkpoint_head *h);

@@ -2,6 +2,7 @@
 /* What is stored of a job comes back; what another version wrote is refused; what earlier ones wrote is read. */
 #include "coordinator/job/stored.h"
 
+#include "common/base/bytes.h"
 #include "tests/support/failing_memory.h"
 
 #include <errno.h>
@@ -125,15 +126,28 @@ static void heads_come_back(void **state)
 	}
 }
 
-/* ---- as earlier versions wrote it: all numbers of eight bytes, one behind the other ---- */
+/* ---- as earlier versions wrote it: little endian, one number behind the other ---- */
 
-static size_t put(size_t at, const void *from, size_t size)
+static size_t put_all(size_t at, const double *v, size_t count)
 {
-	memcpy(bytes + at, from, size);
-	return at + size;
+	copy_numbers(bytes + at, v, sizeof *v, count);
+	return at + count * sizeof *v;
 }
 
-static const uint64_t old_counts[] = {1, 2, 3, 4, 5, 6, 7, 8};
+static size_t put_look(size_t at, double work)
+{
+	struct forecast_look l = look(work);
+	at = put_all(at, (double[6]){l.work, l.cpu_seconds, l.seconds, l.rel_mse, l.rel_mse_upper, l.degrees}, 6);
+	put64(bytes + at, l.doubtful);
+	return at + 8;
+}
+
+static size_t put_counts(size_t at)
+{
+	for (uint64_t n = 1; n <= 8; n++, at += 8)
+		put64(bytes + at, n);
+	return at;
+}
 
 static void assert_old_counts(const struct job_counts *c)
 {
@@ -145,39 +159,41 @@ static void old_notes_are_read(void **state)
 {
 	(void)state;
 	struct job_counts back = {0};
-	struct forecast_look l = look(5), read;
-	size_t size = put(0, old_counts, sizeof old_counts);
+	struct forecast_look read;
+	size_t size = put_counts(0);
 	assert_int_equal(stored_old_counts(bytes, size, &back, &e), 0);
 	assert_old_counts(&back);
 	assert_int_equal(stored_old_counts(bytes, size + 8, &back, &e), -EPROTO);
-	size = put(0, &(double[6]){l.work, l.cpu_seconds, l.seconds, l.rel_mse, l.rel_mse_upper, l.degrees}, 48);
-	size = put(size, &(uint64_t){7}, 8);
+	assert_int_equal(stored_old_counts(bytes, size - 1, &back, &e), -EPROTO);
+	size = put_look(0, 5);
 	assert_int_equal(stored_old_look(bytes, size, &read, &e), 0);
 	assert_look(&read, 5);
 	assert_int_equal(stored_old_look(bytes, size - 8, &read, &e), -EPROTO);
+	assert_int_equal(stored_old_look(bytes, size + 1, &read, &e), -EPROTO);
 }
 
 static void old_heads_are_read(void **state)
 {
 	(void)state;
 	struct checkpoint_head h = head(), back;
-	size_t at = put(0, &(uint64_t[2]){h.job, h.generation}, 16);
-	at = put(at, &(double[6]){1.5, 2.5, 3.5, 4.5, 5.5, NAN}, 48);
-	at = put(at, h.lit.b, 64 * 8);
-	at = put(at, &(double[2]){6.5, 7.5}, 16);
-	at = put(at, &(uint64_t[2]){1, 64}, 16); /* black, so many looks */
-	for (int i = 0; i < 64; i++) {
-		struct forecast_look l = look(i);
-		at = put(at, &l, 56);
-	}
-	at = put(at, old_counts, sizeof old_counts);
-	at = put(at, h.fingerprint, 256);
-	assert_int_equal(at, STORED_OLD_HEAD);
+	put64(bytes, h.job);
+	put64(bytes + 8, h.generation);
+	size_t at = put_all(16, (double[6]){1.5, 2.5, 3.5, 4.5, 5.5, NAN}, 6);
+	at = put_all(at, h.lit.b, 64);
+	at = put_all(at, (double[2]){6.5, 7.5}, 2);
+	put64(bytes + at, 1); /* black */
+	put64(bytes + at + 8, 64);
+	at += 16;
+	for (int i = 0; i < 64; i++)
+		at = put_look(at, i);
+	at = put_counts(at);
+	memcpy(bytes + at, h.fingerprint, 256);
+	assert_int_equal(at + 256, STORED_OLD_HEAD);
 	stored_old_head(bytes, 3, &back);
 	assert_head(&back);
 	assert_old_counts(&back.counts);
 	memset(bytes + 600, 0xff, 4); /* no more looks than there can be */
-	memset(bytes + at - 256, 'a', 256);
+	memset(bytes + at, 'a', 256);
 	stored_old_head(bytes, 3, &back);
 	assert_int_equal(back.looks.count, 64);
 	assert_int_equal(strlen(back.fingerprint), 255);
