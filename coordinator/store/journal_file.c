@@ -28,7 +28,6 @@ enum { WINDOW = 1 << 20 /* bytes searched for a mark at a time */ };
 static const char magic[8] = "hsltJ002";
 static const char mark[4] = {'\xf1', 'h', 'j', '\x0d'};
 
-/* After the magic number: job, generation, salt, checksum of all before it; four bytes are unused. */
 void journal_head_pack(const struct journal_head *h, unsigned char bytes[JOURNAL_HEAD])
 {
 	memset(bytes, 0, JOURNAL_HEAD);
@@ -47,7 +46,6 @@ int journal_head_unpack(const unsigned char bytes[JOURNAL_HEAD], struct journal_
 	return rc || get32(bytes + 32) == crc32c(0, bytes, 32) ? rc : error_set(e, EBADMSG, "%s: damaged", path);
 }
 
-/* After the mark; bytes 52 to 55 and 72 to 75 are unused. The checksum covers everything before it. */
 void journal_record_pack(struct journal_record *r, unsigned char bytes[JOURNAL_RECORD], const struct buf *a,
 			 const struct buf *b)
 {

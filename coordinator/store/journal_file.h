@@ -4,8 +4,33 @@
  * mark, a checksum and a random number chosen by the journal (salt), which no peer knows: so the next record is found
  * after damaged bytes, and no result that a worker makes up can pass for a record. Bodies have their own checksum, so a
  * damaged one is still identified by its head. Heads have a fixed size, so that room for a record can be reserved
- * before it is written and damage can be searched; numbers are little endian, doubles by their bits. Any thread, one at
- * a time per scan.
+ * before it is written and damage can be searched. Any thread, one at a time per scan.
+ *
+ * Numbers are little endian. The head of the file:
+ *
+ * offset  bytes  contents
+ * 0       8      magic number and version, hsltJ002
+ * 8       8      job
+ * 16      8      generation: one more after each checkpoint
+ * 24      8      salt, which its records repeat
+ * 32      4      CRC-32C of bytes 0 to 31
+ * 36      4      zero
+ *
+ * Of a record, before its body:
+ *
+ * 0       4      mark: f1 68 6a 0d
+ * 4       4      size of the body
+ * 8       4      CRC-32C of the body
+ * 12      4      kind of record (enum journal_kind)
+ * 16      8      number of the record in its journal
+ * 24      8      number of records that were durable before it
+ * 32      8      seconds since the first lease of the job, a double
+ * 40      12     lease: kind, group, part
+ * 52      4      zero
+ * 56      8      lease: epoch
+ * 64      8      salt of the journal
+ * 72      4      zero
+ * 76      4      CRC-32C of bytes 0 to 75
  */
 #ifndef COORDINATOR_STORE_JOURNAL_FILE_H
 #define COORDINATOR_STORE_JOURNAL_FILE_H

@@ -10,6 +10,7 @@
  */
 #include "coordinator/store/ledger_side.h"
 
+#include "common/base/bytes.h"
 #include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "coordinator/store/ledger_file.h"
@@ -70,13 +71,17 @@ static uint32_t check_text(uint32_t crc, const char *text)
 /* The checksum of everything in a row. */
 static uint32_t check(const struct ledger_job *j)
 {
-	const struct {
-		uint64_t id, extended, revision, submission_size, plan_size;
-		double submitted, ended;
-		int32_t priority, mixed;
-	} numbers = {j->id,    j->extended, j->revision, j->submission_size, j->plan_size, j->submitted,
-		     j->ended, j->priority, j->mixed};
-	uint32_t crc = crc32c(0, &numbers, sizeof numbers);
+	unsigned char numbers[64];
+	put64(numbers, j->id);
+	put64(numbers + 8, j->extended);
+	put64(numbers + 16, j->revision);
+	put64(numbers + 24, j->submission_size);
+	put64(numbers + 32, j->plan_size);
+	put_double(numbers + 40, j->submitted);
+	put_double(numbers + 48, j->ended);
+	put32(numbers + 56, (uint32_t)j->priority);
+	put32(numbers + 60, j->mixed);
+	uint32_t crc = crc32c(0, numbers, sizeof numbers);
 	crc = check_text(crc, j->owner);
 	crc = check_text(crc, j->name);
 	crc = check_text(crc, j->version);

@@ -232,6 +232,26 @@ static void extended(void **state)
 	ledger_close(l);
 }
 
+/* The checksum of a row, of numbers that are all others, is what it was in the first build: a database of any machine
+ * is read on any other. */
+static void checksums_stay(void **state)
+{
+	(void)state;
+	struct ledger *l = open_ledger();
+	sqlite3 *db;
+	sqlite3_stmt *row;
+	add(l, 0x010203040506);
+	assert_int_equal(ledger_priority(l, 0x010203040506, -7, &e), 0);
+	ledger_close(l);
+	assert_int_equal(sqlite3_open(ledger_files_path("jobs.db"), &db), SQLITE_OK);
+	assert_int_equal(sqlite3_prepare_v2(db, "SELECT checksum, revision FROM jobs", -1, &row, NULL), SQLITE_OK);
+	assert_int_equal(sqlite3_step(row), SQLITE_ROW);
+	assert_int_equal(sqlite3_column_int64(row, 1), 1);
+	assert_int_equal(sqlite3_column_int64(row, 0), 0x1833dd11);
+	sqlite3_finalize(row);
+	sqlite3_close(db);
+}
+
 static void set_version(const char *file, int32_t version)
 {
 	int fd = open(ledger_files_path(file), O_RDWR); /* user_version: bytes 60 to 63, big endian */
@@ -368,6 +388,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(ended, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(ids, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(notes, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(checksums_stay, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(versions, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(stays_small, folder_set_up, folder_tear_down),
 	};
