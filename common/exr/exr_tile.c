@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/exr/exr_tile.h"
 
+#include "common/base/bytes.h"
 #include "common/base/mem.h"
 #include "common/exr/exr_stream.h"
 
@@ -35,11 +36,13 @@ static exr_result_t write_header(exr_context_t x, const struct tile *t, uint32_t
 /* The file holds a row of X, a row of Y, a row of Z, then the next row; little endian. */
 static void pack(const struct tile *t, float *to)
 {
-	for (size_t y = 0; y < t->height; y++, to += (size_t)t->width * TILE_CHANNELS) {
-		const float *row = t->xyz + y * t->width * TILE_CHANNELS;
-		for (size_t x = 0; x < t->width; x++)
+	size_t width = t->width;
+	for (size_t y = 0; y < t->height; y++, to += width * TILE_CHANNELS) {
+		const float *row = t->xyz + y * width * TILE_CHANNELS;
+		for (size_t x = 0; x < width; x++)
 			for (size_t c = 0; c < TILE_CHANNELS; c++)
-				to[c * t->width + x] = row[x * TILE_CHANNELS + c];
+				to[c * width + x] = row[x * TILE_CHANNELS + c];
+		copy_numbers(to, to, sizeof *to, width * TILE_CHANNELS);
 	}
 }
 
@@ -50,7 +53,7 @@ static void unpack(const unsigned char *from, const struct tile *t)
 	for (size_t y = 0; y < t->height; y++) {
 		float *row = t->xyz + y * t->width * TILE_CHANNELS;
 		for (size_t c = 0; c < TILE_CHANNELS; c++, from += row_bytes)
-			memcpy(line[c], from, row_bytes);
+			copy_numbers(line[c], from, sizeof(float), t->width);
 		for (size_t x = 0; x < t->width; x++) {
 			row[x * TILE_CHANNELS] = line[0][x];
 			row[x * TILE_CHANNELS + 1] = line[1][x];

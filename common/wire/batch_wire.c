@@ -125,24 +125,6 @@ static int packing_init(struct packing *k, const struct batch *b, const struct p
 	return 0;
 }
 
-/* IEEE floats, little endian on any machine. */
-static void write_floats(unsigned char *out, const float *v, uint64_t count)
-{
-	for (uint64_t i = 0; i < count; i++, out += 4) {
-		uint32_t bits;
-		memcpy(&bits, &v[i], sizeof bits);
-		put32(out, bits);
-	}
-}
-
-static void read_floats(const unsigned char *in, float *v, uint64_t count)
-{
-	for (uint64_t i = 0; i < count; i++, in += 4) {
-		uint32_t bits = get32(in);
-		memcpy(&v[i], &bits, sizeof bits);
-	}
-}
-
 static void write_payload(unsigned char *at, const struct batch *b, const struct packing *k)
 {
 	for (uint32_t i = 0; i < b->tile_count; i++) {
@@ -154,8 +136,8 @@ static void write_payload(unsigned char *at, const struct batch *b, const struct
 			memcpy(at, b->states[i].bytes, b->states[i].size);
 		at += b->states[i].size;
 	}
-	write_floats(at, b->weights, b->weight_count);
-	write_floats(at + b->weight_count * sizeof(float), b->moments, b->moment_count);
+	copy_numbers(at, b->weights, sizeof(float), b->weight_count);
+	copy_numbers(at + b->weight_count * sizeof(float), b->moments, sizeof(float), b->moment_count);
 }
 
 int batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e)
@@ -278,7 +260,7 @@ static int cut_floats(struct cutter *c, const char *what, uint64_t count, float 
 	*out = mem_alloc(count, sizeof **out);
 	if (!*out)
 		return error_set(e, ENOMEM, "no memory for %llu %s", (unsigned long long)count, what);
-	read_floats(cut(c, count * sizeof(float)), *out, count);
+	copy_numbers(*out, cut(c, count * sizeof(float)), sizeof(float), count);
 	*out_count = count;
 	return 0;
 }

@@ -7,6 +7,7 @@
 #include "common/exr/exr_read.h"
 #include "common/exr/exr_tile.h"
 
+#include "common/base/bytes.h"
 #include "common/base/mem.h"
 #include "tests/support/failing_memory.h"
 
@@ -71,6 +72,7 @@ static void a_tile_is_an_image_that_any_reader_opens(void **unused)
 	for (size_t i = 0; i < 64 * 22; i++)
 		for (size_t c = 0; c < 3; c++)
 			assert_true(img.planes[c][i] == t.xyz[i * 3 + c]);
+	assert_true(get_float(bytes + size - 4) == t.xyz[64 * 22 * 3 - 1]);
 	exr_image_fini(&img);
 	mem_free(t.xyz);
 	mem_free(bytes);

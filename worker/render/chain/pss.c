@@ -72,8 +72,8 @@ size_t pss_write(const struct pss_point *p, uint8_t *bytes, size_t room)
 	uint8_t *at = bytes + HEADER;
 	for (int side = 0; side < SAMPLER_SIDES; side++) {
 		put32(bytes + 4 * side, p->used[side]);
-		for (unsigned v = 0; v < p->used[side]; v++, at += block_size)
-			memcpy(at, p->u[side][v], block_size);
+		copy_numbers(at, p->u[side], sizeof(double), (size_t)p->used[side] * SAMPLER_BLOCK);
+		at += p->used[side] * block_size;
 	}
 	return need;
 }
@@ -88,7 +88,7 @@ size_t pss_read(struct pss_point *p, const uint8_t *bytes, size_t size)
 		if (used > PSS_MAX_VERTICES || size - at < used * block_size)
 			return 0;
 		p->used[side] = used;
-		memcpy(p->u[side], bytes + at, used * block_size);
+		copy_numbers(p->u[side], bytes + at, sizeof(double), (size_t)used * SAMPLER_BLOCK);
 		at += used * block_size;
 		for (uint32_t v = 0; v < used; v++)
 			for (int i = 0; i < SAMPLER_BLOCK; i++)

@@ -143,6 +143,26 @@ static void test_bytes(void **state)
 	}
 }
 
+/* One vertex of the camera, none of a light: the same bytes on any machine, as long as there are farms. */
+static void test_bytes_stay(void **state)
+{
+	(void)state;
+	static const double u[SAMPLER_BLOCK] = {0.5, 0.25, 0x1p-53, 0, 0.75, 0, 0, 1 - 0x1p-53};
+	static const uint8_t want[8 + 64] = {
+		1, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0,	  0,	0,    0,    0xe0, 0x3f, 0,    0,
+		0, 0, 0, 0, 0xd0, 0x3f, 0, 0, 0, 0, 0,	  0,	0xa0, 0x3c, 0,	  0,	0,    0,
+		0, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0xe8, 0x3f, 0,    0,    0,	  0,	0,    0,
+		0, 0, 0, 0, 0,	  0,	0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xef, 0x3f};
+	static struct pss_point p, q;
+	uint8_t bytes[sizeof want];
+	p.used[SIDE_CAMERA] = 1;
+	memcpy(p.u[SIDE_CAMERA][0], u, sizeof u);
+	assert_int_equal(pss_write(&p, bytes, sizeof bytes), sizeof bytes);
+	assert_memory_equal(bytes, want, sizeof want);
+	assert_int_equal(pss_read(&q, want, sizeof want), sizeof want);
+	assert_memory_equal(&p, &q, sizeof p);
+}
+
 /* Targets on a film of 16 x 16. In the first the density is a function of two numbers; in the second the path's length
  * is drawn, too, and longer ones use more blocks; the third has two splats a point, one of them dark, and holes. */
 enum { SIDE = 16 };
@@ -427,9 +447,13 @@ static void test_resume(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_small_step), cmocka_unit_test(test_both_ways),
-		cmocka_unit_test(test_bytes),	   cmocka_unit_test(test_targets),
-		cmocka_unit_test(test_resume),	   cmocka_unit_test(test_extreme_intensities),
+		cmocka_unit_test(test_small_step),
+		cmocka_unit_test(test_both_ways),
+		cmocka_unit_test(test_bytes),
+		cmocka_unit_test(test_bytes_stay),
+		cmocka_unit_test(test_targets),
+		cmocka_unit_test(test_resume),
+		cmocka_unit_test(test_extreme_intensities),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
