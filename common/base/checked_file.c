@@ -173,6 +173,12 @@ int checked_file_read_numbers(struct checked_file *s, void *numbers, size_t widt
 	return rc;
 }
 
+int checked_file_end(const struct checked_file *s, struct error *e)
+{
+	return s->left ? error_set(e, EBADMSG, "%s: %llu bytes after its end", s->path, (unsigned long long)s->left)
+		       : 0;
+}
+
 void checked_file_close(struct checked_file *s)
 {
 	if (s->buffer)

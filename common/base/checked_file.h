@@ -48,6 +48,8 @@ int checked_file_open_watched(struct checked_file *s, const char *path, checked_
 /* -EBADMSG: the file has fewer bytes. */
 int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e);
 int checked_file_read_numbers(struct checked_file *s, void *numbers, size_t width, size_t count, struct error *e);
+/* -EBADMSG: bytes are left that nothing has read. */
+int checked_file_end(const struct checked_file *s, struct error *e);
 void checked_file_close(struct checked_file *s); /* at any time; a file that was being written is left without a CRC */
 
 #endif

@@ -174,6 +174,8 @@ static int read_all(struct live_job *job, struct checked_file *in, uint64_t *gen
 		rc = read_states(job, in, e);
 	if (!rc)
 		rc = canvas_load(job->canvas, in, e);
+	if (!rc)
+		rc = checked_file_end(in, e);
 	bootstrap_free(job->bootstrap);
 	job->bootstrap = NULL;
 	job->checkpoint_bytes = in->bytes;

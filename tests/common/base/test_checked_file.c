@@ -74,7 +74,9 @@ static void numbers_have_fixed_bytes(void **state)
 	assert_int_equal(checked_file_read_numbers(&f, &two, sizeof two, 1, &e), -EBADMSG);
 	assert_int_equal(checked_file_read_numbers(&f, &half, sizeof half, SIZE_MAX / 4 + 2, &e), -EBADMSG);
 	assert_true(half == 7 && two == -2);
+	assert_int_equal(checked_file_end(&f, &e), -EBADMSG);
 	assert_int_equal(checked_file_read_numbers(&f, &half, sizeof half, 1, &e), 0);
+	assert_int_equal(checked_file_end(&f, &e), 0);
 	assert_true(memcmp(text, "abc", 3) == 0 && words[0] == 0x01020304 && words[1] == (uint32_t)-2);
 	assert_true(large == 0x0102030405060708 && half == 0.5f);
 	assert_int_equal(checked_file_read(&f, text, 1, &e), -EBADMSG);

@@ -171,13 +171,17 @@ static void files_stay_as_they_are(void **state)
 	assert_refused(OLD + size - seeds, -EPROTO);
 }
 
-static void cut_files_are_refused(void **state)
+static void cut_and_longer_files_are_refused(void **state)
 {
 	(void)state;
 	size_t size, seeds = write_file(&size);
 	for (size_t cut = 0; cut < seeds + sizeof middle; cut += cut < 16 || cut + 4 > seeds ? 1 : 13)
 		assert_refused(cut, -EBADMSG);
 	assert_refused(size - 1, -EBADMSG);
+	for (size_t more = 1; more < 200000; more *= 7) {
+		memset(bytes + size, 0, more);
+		assert_refused(size + more, -EBADMSG);
+	}
 }
 
 /* Every bit before the head is another version or another size; sizes of states that no chain has. */
@@ -210,7 +214,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(files_stay_as_they_are, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(cut_files_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(cut_and_longer_files_are_refused, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(other_files_are_refused, set_up, tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -114,6 +114,8 @@ void kept_bootstrap_resume(struct kept_bootstrap *k, struct bootstrap *b, char *
 		rc = read_mark(k, &f, &e);
 		if (!rc)
 			rc = bootstrap_load(b, &f, &e);
+		if (!rc)
+			rc = checked_file_end(&f, &e);
 		checked_file_close(&f);
 	}
 	k->resumed = bootstrap_missing(b) < all;
