@@ -126,6 +126,21 @@ int canvas_save(const struct canvas *c, struct checked_file *out, struct error *
 	return rc ? rc : save_tiles(c, out, e);
 }
 
+/* A count that never becomes that of all leases would leave its round open for ever. */
+static int check_merged(const struct canvas *c, struct error *e)
+{
+	uint32_t leases = c->plan.groups * c->plan.parts, merged[1 + OPEN_ROUNDS] = {0};
+	for (uint32_t i = 0; i < has_bytes(c); i++) {
+		if (c->has[i] > 1)
+			return error_set(e, EBADMSG, "a lease that is merged %u times", c->has[i]);
+		merged[i / leases] += c->has[i];
+	}
+	if (memcmp(merged + 1, c->merged, sizeof c->merged) != 0 || c->merged[c->rounds % OPEN_ROUNDS] == leases)
+		return error_set(e, EBADMSG, "%u and %u merged leases in open rounds of %u, %u", merged[1], merged[2],
+				 c->merged[0], c->merged[1]);
+	return 0;
+}
+
 static int load_tiles(struct canvas *c, struct checked_file *in, struct error *e)
 {
 	for (;;) {
@@ -165,6 +180,8 @@ int canvas_load(struct canvas *c, struct checked_file *in, struct error *e)
 	if (memcmp(head, want, HEAD) != 0)
 		return error_set(e, EBADMSG, "%s: the films of another plan", in->path);
 	rc = transfer_all(&(struct transfer){in, false, 0, e}, c);
+	if (!rc)
+		rc = check_merged(c, e);
 	if (!rc)
 		rc = moments_load(c->moments, in, e);
 	return rc ? rc : load_tiles(c, in, e);

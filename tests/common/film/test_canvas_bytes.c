@@ -192,7 +192,8 @@ static void cut_ones_are_refused(void **state)
 	assert_refused(&p, SIZE - 1, -EBADMSG);
 }
 
-/* Any bit of the head and of the shape of the moments, and places of tiles that the films do not have. */
+/* Any bit of the head and of the shape of the moments, counts that contradict each other, and places of tiles that the
+ * films do not have. */
 static void others_are_refused(void **state)
 {
 	(void)state;
@@ -208,6 +209,19 @@ static void others_are_refused(void **state)
 		old[MOMENTS + bit / 8] ^= (unsigned char)(1 << bit % 8);
 		assert_refused(&p, SIZE, -EBADMSG);
 		old[MOMENTS + bit / 8] ^= (unsigned char)(1 << bit % 8);
+	}
+	/* More and fewer leases than are marked, a mark that is none, a round that is complete and open. */
+	static const struct golden counts[] = {{48, "01000000"},   {52, "00000000"}, {52, "02000000"},
+					       {52, "0200000001"}, {56, "02"},	     {58, "01"},
+					       {61, "01"},	   {60, "ff"},	     {52, "02000000000100000101"}};
+	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+		unsigned char kept[16], put[16];
+		size_t n = strlen(counts[i].hex) / 2;
+		golden_fill(&(struct golden){0, counts[i].hex}, 1, put, sizeof put);
+		memcpy(kept, old + counts[i].at, sizeof kept);
+		memcpy(old + counts[i].at, put, n);
+		assert_refused(&p, SIZE, -EBADMSG);
+		memcpy(old + counts[i].at, kept, sizeof kept);
 	}
 	static const uint32_t places[][2] = {{3, 0},	      {0, 1},	       {UINT32_MAX - 1, 0},
 					     {0, UINT32_MAX}, {0x80000000, 0}, {2, 0x10000}};
