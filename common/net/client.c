@@ -101,14 +101,8 @@ static const struct conn_events events = {.opened = on_opened, .message = on_mes
 static void on_heartbeat(uv_timer_t *t)
 {
 	struct client *cl = t->data;
-	Farm__Heartbeat beat;
-	farm__heartbeat__init(&beat);
-	Farm__Envelope m;
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
-	m.heartbeat = &beat;
 	if (cl->conn)
-		conn_send(cl->conn, &m, NULL, 0);
+		conn_send(cl->conn, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
 }
 
 static void start_clock(struct client *cl, double seconds)
@@ -185,19 +179,12 @@ static int unwelcome(const struct client *cl, const char *host_port, struct erro
 
 static int say_hello(struct client *cl, const char *host_port, const char *name, struct error *e)
 {
-	Farm__Hello hello;
-	farm__hello__init(&hello);
-	Farm__Envelope m;
-	farm__envelope__init(&m);
 	char own[128];
 	struct client_message answer;
 	text_copy(own, sizeof own, name);
-	hello.version = FARM_VERSION;
-	hello.role = FARM__ROLE__ROLE_CLIENT;
-	hello.name = own;
-	m.body_case = FARM__ENVELOPE__BODY_HELLO;
-	m.hello = &hello;
-	int rc = client_send(cl, &m, NULL, 0, e);
+	int rc = client_send(
+		cl, ENVELOPE(HELLO, hello, .version = FARM_VERSION, .role = FARM__ROLE__ROLE_CLIENT, .name = own), NULL,
+		0, e);
 	if (!rc)
 		rc = client_wait(cl, HELLO_SECONDS, &answer, e);
 	if (rc && cl->distrust)
@@ -330,16 +317,8 @@ int client_local(int rc)
 static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_t offset, struct client_message *answer,
 		       struct error *e)
 {
-	Farm__Fetch fetch;
-	farm__fetch__init(&fetch);
-	Farm__Envelope m;
-	farm__envelope__init(&m);
-	fetch.job = job;
-	fetch.what = what;
-	fetch.offset = offset;
-	m.body_case = FARM__ENVELOPE__BODY_FETCH;
-	m.fetch = &fetch;
-	int rc = client_call(cl, &m, FARM__ENVELOPE__BODY_FETCH_CHUNK, answer, e);
+	int rc = client_call(cl, ENVELOPE(FETCH, fetch, .job = job, .what = what, .offset = offset),
+			     FARM__ENVELOPE__BODY_FETCH_CHUNK, answer, e);
 	if (rc)
 		return rc;
 	const Farm__FetchChunk *c = answer->envelope.message->fetch_chunk;

@@ -19,6 +19,18 @@ enum { FARM_VERSION = 11 };
 
 struct envelope_block;
 
+/* A message to be packed, by its member in Envelope: ENVELOPE(JOB_END, job_end, .job = 7) is one in its envelope, and
+ * ENVELOPE_OF(JOB_END, job_end, &m) the envelope of one that exists. What is not given is 0 or empty. Valid to the end
+ * of the block. */
+#define ENVELOPE_OF(BODY, member, message)                                               \
+	(&(Farm__Envelope){.base = PROTOBUF_C_MESSAGE_INIT(&farm__envelope__descriptor), \
+			   .body_case = FARM__ENVELOPE__BODY_##BODY,                     \
+			   .member = (message)})
+#define MESSAGE(member, ...)                                     \
+	((__typeof__(*(Farm__Envelope){.body_case = 0}.member)){ \
+		.base = PROTOBUF_C_MESSAGE_INIT(&farm__##member##__descriptor), __VA_ARGS__})
+#define ENVELOPE(BODY, member, ...) ENVELOPE_OF(BODY, member, &MESSAGE(member, __VA_ARGS__))
+
 /* An unpacked message and its memory. Zeroed memory is a valid empty one for envelope_fini. */
 struct envelope {
 	Farm__Envelope *message;

@@ -99,14 +99,8 @@ static void print_json(const Farm__JobListAnswer *a)
 
 static int list(struct client *cl, const struct job_options *o, struct error *e)
 {
-	Farm__JobList question;
-	Farm__Envelope m;
 	struct client_message answer;
-	farm__job_list__init(&question);
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST;
-	m.job_list = &question;
-	int rc = client_call(cl, &m, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER, &answer, e);
+	int rc = client_call(cl, ENVELOPE(JOB_LIST, job_list), FARM__ENVELOPE__BODY_JOB_LIST_ANSWER, &answer, e);
 	if (rc)
 		return rc;
 	(o->json ? print_json : print_table)(answer.envelope.message->job_list_answer);
@@ -146,14 +140,7 @@ static int take_done(struct client *cl, const Farm__Envelope *m, const struct jo
 
 static int cancel(struct client *cl, const struct job_options *o, struct error *e)
 {
-	Farm__Cancel question;
-	Farm__Envelope m;
-	farm__cancel__init(&question);
-	farm__envelope__init(&m);
-	question.job = o->job;
-	m.body_case = FARM__ENVELOPE__BODY_CANCEL;
-	m.cancel = &question;
-	return take_done(cl, &m, o, e);
+	return take_done(cl, ENVELOPE(CANCEL, cancel, .job = o->job), o, e);
 }
 
 static int control(struct client *cl, const struct job_options *o, struct error *e)
@@ -162,20 +149,11 @@ static int control(struct client *cl, const struct job_options *o, struct error 
 					   [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
 					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY,
 					   [JOB_EXTEND] = FARM__VERB__VERB_EXTEND};
-	Farm__Control question;
-	Farm__Envelope m;
-	farm__control__init(&question);
-	farm__envelope__init(&m);
-	question.job = o->job;
-	question.verb = verbs[o->verb];
-	question.priority = o->priority;
-	question.more_spp = o->more_spp;
-	question.more_mutations = o->more_mutations;
-	question.more_seconds = o->more_seconds;
-	question.target_error = o->target_error;
-	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
-	m.control = &question;
-	return take_done(cl, &m, o, e);
+	return take_done(cl,
+			 ENVELOPE(CONTROL, control, .job = o->job, .verb = verbs[o->verb], .priority = o->priority,
+				  .more_spp = o->more_spp, .more_mutations = o->more_mutations,
+				  .more_seconds = o->more_seconds, .target_error = o->target_error),
+			 o, e);
 }
 
 static int fetch(struct client *cl, const struct job_options *o, struct error *e)

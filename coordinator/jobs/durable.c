@@ -56,17 +56,9 @@ struct flush {
 
 static int pack_plan(const struct live_job *job, unsigned char **frame, size_t *size, struct error *e)
 {
-	Farm__JobInfo info;
 	Farm__Plan plan;
-	Farm__Envelope m;
-	farm__job_info__init(&info);
-	farm__envelope__init(&m);
 	plan_to_wire(&job->plan, &plan);
-	info.job = job->id;
-	info.plan = &plan;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
-	m.job_info = &info;
-	return envelope_pack(&m, NULL, 0, frame, size, e);
+	return envelope_pack(ENVELOPE(JOB_INFO, job_info, .job = job->id, .plan = &plan), NULL, 0, frame, size, e);
 }
 
 int durable_pack(const struct live_job *job, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
@@ -222,13 +214,10 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 		const Farm__LeaseResult *from;
 		Farm__LeaseResult *to;
 	} result = {in->result}; /* generated structures are not const */
-	Farm__Envelope m;
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
-	m.lease_result = result.to;
 	if (job->unsure)
 		return error_set(e, EIO, "the job's files cannot be written");
-	int rc = envelope_pack(&m, NULL, 0, &in->frame, &in->frame_size, e);
+	int rc = envelope_pack(ENVELOPE_OF(LEASE_RESULT, lease_result, result.to), NULL, 0, &in->frame, &in->frame_size,
+			       e);
 	if (rc)
 		return rc;
 	size_t size = in->frame_size + in->payload->size;

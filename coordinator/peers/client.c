@@ -34,14 +34,10 @@ enum { CHUNK = 1 << 20 };
 
 static void answer_submit(struct session *p, uint64_t job, const char *refusal, const struct upload *u)
 {
-	Farm__SubmitAnswer answer;
-	Farm__Envelope m;
 	char text[1024] = "", plan[PLAN_TEXT + 200] = "";
 	struct blob_hash *hashes = NULL;
 	ProtobufCBinaryData *list = NULL;
 	struct job_view v;
-	farm__submit_answer__init(&answer);
-	farm__envelope__init(&m);
 	text_copy(text, sizeof text, refusal);
 	if (u) {
 		plan_describe(&u->plan, plan, PLAN_TEXT);
@@ -52,19 +48,15 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 		hashes = mem_alloc(u->missing_count, sizeof *hashes);
 		list = mem_alloc(u->missing_count, sizeof *list);
 	}
+	Farm__SubmitAnswer answer = MESSAGE(submit_answer, .job = job, .refusal = text, .plan = plan,
+					    .submitted = job && jobs_view(p->jobs, job, &v) ? v.record.submitted : 0);
 	if (hashes && list) {
 		answer.n_missing = upload_missing(u, hashes);
 		for (size_t i = 0; i < answer.n_missing; i++)
 			list[i] = (ProtobufCBinaryData){BLOB_HASH_SIZE, hashes[i].bytes};
 		answer.missing = list;
 	}
-	answer.job = job;
-	answer.submitted = job && jobs_view(p->jobs, job, &v) ? v.record.submitted : 0;
-	answer.refusal = text;
-	answer.plan = plan;
-	m.body_case = FARM__ENVELOPE__BODY_SUBMIT_ANSWER;
-	m.submit_answer = &answer;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE_OF(SUBMIT_ANSWER, submit_answer, &answer), NULL, 0);
 	mem_free(hashes);
 	mem_free(list);
 }
@@ -214,20 +206,14 @@ static void take_list(struct session *p)
 	struct job_view *views;
 	size_t count = jobs_views(p->jobs, ENDED_MAX, &views);
 	Farm__JobStatus *status = mem_alloc(count, sizeof *status), **list = mem_alloc(count, sizeof *list);
-	Farm__JobListAnswer answer;
-	Farm__Envelope m;
-	farm__job_list_answer__init(&answer);
-	farm__envelope__init(&m);
+	Farm__JobListAnswer answer = MESSAGE(job_list_answer, .jobs = list);
 	for (size_t i = 0; status && list && i < count; i++) {
 		if (!client_may_see(p, &views[i]))
 			continue;
 		view_to_wire(&views[i], &status[i]);
 		list[answer.n_jobs++] = &status[i];
 	}
-	answer.jobs = list;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST_ANSWER;
-	m.job_list_answer = &answer;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE_OF(JOB_LIST_ANSWER, job_list_answer, &answer), NULL, 0);
 	mem_free(status);
 	mem_free(list);
 	mem_free(views);
@@ -251,7 +237,6 @@ void client_tick(struct session *p)
 	struct job_view v;
 	struct view_looks looks;
 	Farm__JobStatus status;
-	Farm__Envelope m;
 	if (!p->watched || p->state != SESSION_CLIENT || conn_unsent(p->conn))
 		return;
 	if (!client_finds_job(p, p->watched, &v)) {
@@ -263,12 +248,9 @@ void client_tick(struct session *p)
 	if (!p->shown && !(p->shown = mem_alloc(1, sizeof v)))
 		return;
 	*p->shown = v;
-	farm__envelope__init(&m);
 	view_to_wire(&v, &status);
 	view_looks_to_wire(&v, &looks, &status);
-	m.body_case = FARM__ENVELOPE__BODY_JOB_STATUS;
-	m.job_status = &status;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE_OF(JOB_STATUS, job_status, &status), NULL, 0);
 	if (record_is_ended(&v.record)) {
 		p->ended.job = p->watched;
 		p->ended.at = jobs_now(p->jobs);

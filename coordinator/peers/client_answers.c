@@ -23,16 +23,8 @@ bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v)
 void client_send_done(struct session *p, const char *text)
 {
 	char said[256];
-	Farm__Done done;
-	Farm__Envelope m;
-	farm__done__init(&done);
-	farm__envelope__init(&m);
-	done.ok = !*p->rejected;
 	text_copy(said, sizeof said, *p->rejected ? p->rejected : text);
-	done.text = said;
-	m.body_case = FARM__ENVELOPE__BODY_DONE;
-	m.done = &done;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE(DONE, done, .ok = !*p->rejected, .text = said), NULL, 0);
 }
 
 uint64_t client_uploading(const struct session *p)

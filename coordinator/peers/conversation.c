@@ -34,19 +34,12 @@
 static void answer_hello(struct session *p, bool accepted, bool final, const char *said)
 {
 	char text[256];
-	Farm__HelloAck ack;
-	Farm__Envelope m;
-	farm__hello_ack__init(&ack);
-	farm__envelope__init(&m);
 	text_copy(text, sizeof text, said);
-	ack.accepted = accepted;
-	ack.final = final;
-	ack.text = text;
-	ack.version = FARM_VERSION;
-	ack.heartbeat_ms = (uint32_t)(1000 * p->jobs->config.heartbeat_seconds);
-	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
-	m.hello_ack = &ack;
-	session_send(p, &m, NULL, 0);
+	session_send(p,
+		     ENVELOPE(HELLO_ACK, hello_ack, .accepted = accepted, .final = final, .text = text,
+			      .version = FARM_VERSION,
+			      .heartbeat_ms = (uint32_t)(1000 * p->jobs->config.heartbeat_seconds)),
+		     NULL, 0);
 	if (!accepted) {
 		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id,
 			  p->address, log_quote(p->name).text, log_quote(text).text);

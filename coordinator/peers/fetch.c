@@ -123,18 +123,12 @@ static int read_piece(const struct fetching *t, const Farm__Fetch *f, unsigned c
 
 static void answer(struct session *p, const Farm__Fetch *f)
 {
-	Farm__FetchChunk chunk;
-	Farm__Envelope m;
 	struct job_view v;
 	struct error e = {""};
 	unsigned char *bytes = mem_alloc(CHUNK, 1);
 	size_t count = 0;
-	farm__fetch_chunk__init(&chunk);
-	farm__envelope__init(&m);
-	chunk.job = f->job;
-	chunk.what = f->what;
-	chunk.offset = f->offset;
-	chunk.error = e.text;
+	Farm__FetchChunk chunk =
+		MESSAGE(fetch_chunk, .job = f->job, .what = f->what, .offset = f->offset, .error = e.text);
 	int rc = !bytes ? error_set(&e, ENOMEM, "no memory") : f->offset ? 0 : begin_fetch(p, f, &v, &e);
 	if (!rc && !f->offset)
 		chunk.output = v.record.output;
@@ -145,9 +139,7 @@ static void answer(struct session *p, const Farm__Fetch *f)
 	p->fetch.at = jobs_now(p->jobs);
 	if (rc || f->offset + count == chunk.size)
 		fetch_end(p);
-	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
-	m.fetch_chunk = &chunk;
-	session_send(p, &m, bytes, count);
+	session_send(p, ENVELOPE_OF(FETCH_CHUNK, fetch_chunk, &chunk), bytes, count);
 	mem_free(bytes);
 }
 
@@ -168,12 +160,8 @@ void fetch_previews(struct peers *s, uint64_t id)
 			publish_start(s->jobs, job, PUBLISH_PREVIEW, 0);
 			continue;
 		}
-		Farm__Fetch f;
-		farm__fetch__init(&f);
-		f.job = id;
-		f.what = FARM__WHAT__WHAT_PREVIEW;
 		p->wants_preview = 0;
-		answer(p, &f);
+		answer(p, &MESSAGE(fetch, .job = id, .what = FARM__WHAT__WHAT_PREVIEW));
 	}
 }
 

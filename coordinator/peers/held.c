@@ -56,17 +56,11 @@ bool held_take(struct session *p, struct envelope *env)
 
 void held_tick(struct session *p)
 {
-	Farm__Heartbeat beat;
-	Farm__Envelope m;
 	bool waits = p->held || (p->upload && (upload_is_looking(p->upload) || p->upload->flush));
 	if (!waits || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
 		return;
 	p->told = jobs_now(p->jobs);
-	farm__heartbeat__init(&beat);
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
-	m.heartbeat = &beat;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
 }
 
 bool held_next(struct session *p, struct envelope *env)

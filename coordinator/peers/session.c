@@ -51,21 +51,14 @@ void session_send(struct session *p, const Farm__Envelope *m, const void *payloa
 void session_fault(struct session *p, const char *format, ...)
 {
 	char text[512];
-	Farm__Fault fault;
-	Farm__Envelope m;
 	va_list ap;
 	va_start(ap, format);
 	vsnprintf(text, sizeof text, format, ap);
 	va_end(ap);
 	text_clean(text);
-	farm__fault__init(&fault);
-	farm__envelope__init(&m);
-	fault.text = text;
-	m.body_case = FARM__ENVELOPE__BODY_FAULT;
-	m.fault = &fault;
 	log_event(LOG_PEER_FAULT, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
 		  log_quote(p->name).text, log_quote(text).text);
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE(FAULT, fault, .text = text), NULL, 0);
 	p->state = SESSION_LEAVING;
 	conn_close_when_sent(p->conn, text);
 }

@@ -43,17 +43,11 @@ static void take_lease_result(struct session *p, struct envelope *env)
 void worker_heard(struct session *p)
 {
 	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
-	Farm__Heartbeat beat;
-	Farm__Envelope m;
 	if (!p->joined || p->state != SESSION_WORKER ||
 	    jobs_now(p->jobs) < p->heard + p->jobs->config.heartbeat_seconds)
 		return;
 	p->heard = jobs_now(p->jobs);
-	farm__heartbeat__init(&beat);
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
-	m.heartbeat = &beat;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
 	jobs_step(p->jobs, &ev);
 }
 

@@ -23,37 +23,22 @@ static void send_job_info(struct session *p, uint64_t id)
 	}
 	worker_allow_results(p, job);
 	const Farm__Submit *from = live_job_submit(job);
-	Farm__JobInfo info;
 	Farm__Plan plan;
-	Farm__Envelope m;
-	farm__job_info__init(&info);
-	farm__envelope__init(&m);
 	plan_to_wire(&job->plan, &plan);
-	info.job = id;
-	info.name = from->name;
-	info.scene = from->scene;
-	info.n_defines = from->n_defines;
-	info.defines = from->defines;
-	info.render_width = from->render_width;
-	info.render_height = from->render_height;
-	info.plan = &plan;
-	info.n_files = from->n_files;
-	info.files = from->files;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
-	m.job_info = &info;
-	session_send(p, &m, NULL, 0);
+	session_send(p,
+		     ENVELOPE(JOB_INFO, job_info, .job = id, .name = from->name, .scene = from->scene,
+			      .n_defines = from->n_defines, .defines = from->defines,
+			      .render_width = from->render_width, .render_height = from->render_height, .plan = &plan,
+			      .n_files = from->n_files, .files = from->files),
+		     NULL, 0);
 }
 
 /* refusal: why it cannot be sent; "": it can. */
 static void send_piece(struct session *p, const struct worker_request *a, const char *refusal)
 {
-	Farm__BlobChunk chunk;
-	Farm__Envelope m;
 	struct error e;
 	struct blob_hash h = a->hash;
 	uint64_t size = 0;
-	farm__blob_chunk__init(&chunk);
-	farm__envelope__init(&m);
 	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
 	ssize_t n = 0;
 	text_copy(e.text, sizeof e.text, refusal);
@@ -62,13 +47,10 @@ static void send_piece(struct session *p, const struct worker_request *a, const 
 		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
 	if (fd >= 0 && (!bytes || n < 0 || a->number > size))
 		error_set(&e, EIO, "the blob cannot be read there");
-	chunk.hash = (ProtobufCBinaryData){sizeof h.bytes, h.bytes};
-	chunk.offset = a->number;
-	chunk.size = size;
-	chunk.error = e.text;
-	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
-	m.blob_chunk = &chunk;
-	session_send(p, &m, bytes, *e.text ? 0 : (size_t)n);
+	session_send(p,
+		     ENVELOPE(BLOB_CHUNK, blob_chunk, .hash = {sizeof h.bytes, h.bytes}, .offset = a->number,
+			      .size = size, .error = e.text),
+		     bytes, *e.text ? 0 : (size_t)n);
 	if (fd >= 0)
 		disk_close(fd);
 	mem_free(bytes);

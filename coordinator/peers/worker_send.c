@@ -39,15 +39,8 @@ void worker_send_lease(struct session *p, const struct live_job *job, const stru
 void worker_send_revoke(struct session *p, const struct lease_key *k)
 {
 	Farm__LeaseKey key;
-	Farm__LeaseRevoke revoke;
-	Farm__Envelope m;
 	lease_key_to_wire(k, &key);
-	farm__lease_revoke__init(&revoke);
-	farm__envelope__init(&m);
-	revoke.key = &key;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_REVOKE;
-	m.lease_revoke = &revoke;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE(LEASE_REVOKE, lease_revoke, .key = &key), NULL, 0);
 }
 
 void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text)
@@ -58,28 +51,12 @@ void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack,
 						 [ACK_NOTED] = FARM__VERDICT__VERDICT_NOTED};
 	char copy[512];
 	Farm__LeaseKey key;
-	Farm__LeaseAck answer;
-	Farm__Envelope m;
 	lease_key_to_wire(k, &key);
-	farm__lease_ack__init(&answer);
-	farm__envelope__init(&m);
 	text_copy(copy, sizeof copy, text);
-	answer.key = &key;
-	answer.verdict = verdicts[ack];
-	answer.text = copy;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_ACK;
-	m.lease_ack = &answer;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE(LEASE_ACK, lease_ack, .key = &key, .verdict = verdicts[ack], .text = copy), NULL, 0);
 }
 
 void worker_send_job_end(struct session *p, uint64_t job)
 {
-	Farm__JobEnd end;
-	Farm__Envelope m;
-	farm__job_end__init(&end);
-	farm__envelope__init(&m);
-	end.job = job;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_END;
-	m.job_end = &end;
-	session_send(p, &m, NULL, 0);
+	session_send(p, ENVELOPE(JOB_END, job_end, .job = job), NULL, 0);
 }

@@ -49,21 +49,12 @@ static void on_opened(void *user)
 {
 	struct agent *a = user;
 	char name[128];
-	Farm__Hello hello;
-	Farm__Envelope m;
-	farm__hello__init(&hello);
-	farm__envelope__init(&m);
 	snprintf(name, sizeof name, "%s", a->config.name);
-	hello.version = FARM_VERSION;
-	hello.role = FARM__ROLE__ROLE_WORKER;
-	hello.name = name;
-	hello.fingerprint = a->fingerprint;
-	hello.threads = a->config.threads;
-	hello.home = a->cache.life.home;
-	hello.restarts = a->cache.life.restarts;
-	m.body_case = FARM__ENVELOPE__BODY_HELLO;
-	m.hello = &hello;
-	conn_send(a->conn, &m, NULL, 0);
+	conn_send(a->conn,
+		  ENVELOPE(HELLO, hello, .version = FARM_VERSION, .role = FARM__ROLE__ROLE_WORKER, .name = name,
+			   .fingerprint = a->fingerprint, .threads = a->config.threads, .home = a->cache.life.home,
+			   .restarts = a->cache.life.restarts),
+		  NULL, 0);
 }
 
 /* New certificates and revocation lists are used while the worker runs. */
@@ -82,13 +73,7 @@ static void refresh_tls(struct agent *a)
 
 static void on_heartbeat(uv_timer_t *t)
 {
-	Farm__Heartbeat beat;
-	Farm__Envelope m;
-	farm__heartbeat__init(&beat);
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
-	m.heartbeat = &beat;
-	send_message(t->data, &m);
+	send_message(t->data, ENVELOPE(HEARTBEAT, heartbeat));
 	refresh_tls(t->data);
 }
 
@@ -197,16 +182,10 @@ static void connect_now(struct agent *a)
 
 static void disconnect_for_good(struct agent *a)
 {
-	Farm__Bye bye;
-	Farm__Envelope m;
 	if (a->gone)
 		return;
 	a->gone = true;
-	farm__bye__init(&bye);
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_BYE;
-	m.bye = &bye;
-	send_message(a, &m);
+	send_message(a, ENVELOPE(BYE, bye));
 	if (a->conn)
 		conn_close_when_sent(a->conn, "leaving");
 	if (a->resolves)

@@ -13,16 +13,9 @@ static uint64_t fetch_offset(const struct fetch *f)
 
 static void request_piece(struct agent *a, struct fetch *f)
 {
-	Farm__BlobGet get;
-	Farm__Envelope m;
-	farm__blob_get__init(&get);
-	farm__envelope__init(&m);
-	get.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, f->hash.bytes};
-	get.offset = fetch_offset(f);
-	m.body_case = FARM__ENVELOPE__BODY_BLOB_GET;
-	m.blob_get = &get;
 	f->asked = true;
-	send_message(a, &m);
+	send_message(a,
+		     ENVELOPE(BLOB_GET, blob_get, .hash = {BLOB_HASH_SIZE, f->hash.bytes}, .offset = fetch_offset(f)));
 }
 
 int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e)

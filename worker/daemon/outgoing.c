@@ -15,26 +15,13 @@ void send_message(struct agent *a, const Farm__Envelope *m)
 
 void send_request(struct agent *a)
 {
-	Farm__LeaseRequest request;
-	Farm__Envelope m;
-	farm__lease_request__init(&request);
-	farm__envelope__init(&m);
-	request.want = a->leaving || a->backlog ? 0 : a->config.threads + 1;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
-	m.lease_request = &request;
-	send_message(a, &m);
+	uint32_t want = a->leaving || a->backlog ? 0 : a->config.threads + 1;
+	send_message(a, ENVELOPE(LEASE_REQUEST, lease_request, .want = want));
 }
 
 void send_job_get(struct agent *a, uint64_t job)
 {
-	Farm__JobGet get;
-	Farm__Envelope m;
-	farm__job_get__init(&get);
-	farm__envelope__init(&m);
-	get.job = job;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
-	m.job_get = &get;
-	send_message(a, &m);
+	send_message(a, ENVELOPE(JOB_GET, job_get, .job = job));
 }
 
 /* states: their digest; NULL: they are not at fault. */
@@ -44,24 +31,16 @@ static void send_failure(struct agent *a, const struct lease_key *k, const char 
 	char copy[1024];
 	struct blob_hash digest;
 	Farm__LeaseKey key;
-	Farm__LeaseFailed failed;
-	Farm__Envelope m;
 	lease_key_to_wire(k, &key);
-	farm__lease_failed__init(&failed);
-	farm__envelope__init(&m);
 	text_copy(copy, sizeof copy, text);
 	text_clean(copy);
-	failed.key = &key;
-	failed.text = copy;
-	failed.own = own;
-	failed.bad_states = states != NULL;
+	Farm__LeaseFailed failed =
+		MESSAGE(lease_failed, .key = &key, .text = copy, .own = own, .bad_states = states != NULL);
 	if (states) {
 		digest = *states;
 		failed.states_digest = (ProtobufCBinaryData){sizeof digest.bytes, digest.bytes};
 	}
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
-	m.lease_failed = &failed;
-	send_message(a, &m);
+	send_message(a, ENVELOPE_OF(LEASE_FAILED, lease_failed, &failed));
 	if (*text)
 		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%s group=%u part=%u epoch=%llu text=%s", log_u64(k->job),
 			  lease_kind_name(k->kind), k->group, k->part, log_u64(k->epoch), log_quote(text).text);

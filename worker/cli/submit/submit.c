@@ -186,12 +186,10 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	char camera[RENDER_CAMERA_TEXT];
 	Farm__Submit s;
 	Farm__PlanRequest plan;
-	Farm__Envelope m;
 	int rc = lists_init(&l, r, b, e);
 	if (rc)
 		return rc;
 	farm__submit__init(&s);
-	farm__envelope__init(&m);
 	plan_request_to_wire(&r->args->plan, &plan);
 	s.name = text_borrow(r->name);
 	s.scene = b->scene;
@@ -218,9 +216,7 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	s.output = text_borrow(r->output);
 	s.mixed = r->mixed;
 	s.verify = r->verify;
-	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
-	m.submit = &s;
-	rc = client_send(cl, &m, NULL, 0, e);
+	rc = client_send(cl, ENVELOPE_OF(SUBMIT, submit, &s), NULL, 0, e);
 	lists_fini(&l);
 	return rc;
 }
@@ -237,16 +233,10 @@ static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint
 		      size_t size, struct error *e)
 {
 	struct blob_hash hash = f->hash;
-	Farm__BlobChunk chunk;
-	Farm__Envelope m;
-	farm__blob_chunk__init(&chunk);
-	farm__envelope__init(&m);
-	chunk.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
-	chunk.offset = offset;
-	chunk.size = f->size;
-	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
-	m.blob_chunk = &chunk;
-	return client_send(cl, &m, bytes, size, e);
+	return client_send(cl,
+			   ENVELOPE(BLOB_CHUNK, blob_chunk, .hash = {BLOB_HASH_SIZE, hash.bytes}, .offset = offset,
+				    .size = f->size),
+			   bytes, size, e);
 }
 
 /* Opened as before, below the scene's folder or one of --path; only the bytes that were read then leave this
@@ -378,14 +368,7 @@ static int take_status(struct progress *p, const Farm__JobStatus *s, const struc
 int submit_wait(struct client *cl, const struct submitted *job, struct submit_end *end, struct error *e)
 {
 	struct progress p;
-	Farm__Watch watch;
-	Farm__Envelope m;
-	farm__watch__init(&watch);
-	farm__envelope__init(&m);
-	watch.job = job->job;
-	m.body_case = FARM__ENVELOPE__BODY_WATCH;
-	m.watch = &watch;
-	int rc = client_send(cl, &m, NULL, 0, e);
+	int rc = client_send(cl, ENVELOPE(WATCH, watch, .job = job->job), NULL, 0, e);
 	bool ended = false;
 	progress_start(&p);
 	while (!rc && !ended) {
