@@ -398,21 +398,10 @@ bool plan_request_is_bounded(const struct plan_request *r)
 
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 {
-	*p = (struct plan){
-		.kind = r->kind,
-		.width = r->width,
-		.height = r->height,
-		.crop_x = r->crop_x,
-		.crop_y = r->crop_y,
-		.crop_width = r->crop_width,
-		.crop_height = r->crop_height,
-		.border = r->border,
-		.seed = r->seed,
-		.seconds = r->seconds,
-		.target_error = r->target_error,
-		.min_depth = r->min_depth,
-		.max_depth = r->max_depth,
-	};
+	*p = (struct plan){.kind = r->kind, .seconds = r->seconds, .target_error = r->target_error};
+#define X(name) p->name = r->name;
+	PLAN_GIVEN(X)
+#undef X
 	memcpy(p->integrator, r->integrator, sizeof p->integrator);
 	memcpy(p->mutations, r->mixture, strnlen(r->mixture, sizeof p->mutations));
 	memcpy(p->accuracy, r->accuracy, strnlen(r->accuracy, sizeof p->accuracy));

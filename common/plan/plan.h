@@ -91,6 +91,16 @@ struct plan {
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
+/* Their numbers, but for the kind: those that a plan has from its request, and those that plan_make may choose.
+ * Messages have members of the same names. */
+/* clang-format off */
+#define PLAN_GIVEN(X) X(width) X(height) X(crop_x) X(crop_y) X(crop_width) X(crop_height) X(border) X(seed) X(min_depth) X(max_depth)
+#define PLAN_CHOSEN(X) X(groups) X(parts) X(chains) X(bootstrap) X(epoch)
+#define PLAN_BITS(X) PLAN_GIVEN(X) PLAN_CHOSEN(X)
+#define PLAN_NUMBERS(X) PLAN_BITS(X) X(rounds) X(seconds) X(target_error)
+#define PLAN_REQUEST_NUMBERS(X) PLAN_BITS(X) X(spp) X(mutations) X(seconds) X(target_error) X(speed)
+/* clang-format on */
+
 /* Whether it says when to stop: by samples, mutations, time or an error. */
 bool plan_request_is_bounded(const struct plan_request *r);
 

@@ -10,24 +10,9 @@ void plan_to_wire(const struct plan *p, Farm__Plan *out)
 	farm__plan__init(out);
 	out->integrator = text_borrow(p->integrator);
 	out->kind = (uint32_t)p->kind;
-	out->width = p->width;
-	out->height = p->height;
-	out->crop_x = p->crop_x;
-	out->crop_y = p->crop_y;
-	out->crop_width = p->crop_width;
-	out->crop_height = p->crop_height;
-	out->border = p->border;
-	out->seed = p->seed;
-	out->groups = p->groups;
-	out->parts = p->parts;
-	out->chains = p->chains;
-	out->bootstrap = p->bootstrap;
-	out->epoch = p->epoch;
-	out->rounds = p->rounds;
-	out->seconds = p->seconds;
-	out->target_error = p->target_error;
-	out->min_depth = p->min_depth;
-	out->max_depth = p->max_depth;
+#define X(name) out->name = p->name;
+	PLAN_NUMBERS(X)
+#undef X
 	out->mutations = text_borrow(p->mutations);
 	out->accuracy = text_borrow(p->accuracy);
 	out->effects = text_borrow(p->effects);
@@ -78,24 +63,9 @@ int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 		rc = text_from_wire(m->effects, p->effects, sizeof p->effects, e);
 	if (rc)
 		return rc;
-	p->width = m->width;
-	p->height = m->height;
-	p->crop_x = m->crop_x;
-	p->crop_y = m->crop_y;
-	p->crop_width = m->crop_width;
-	p->crop_height = m->crop_height;
-	p->border = m->border;
-	p->seed = m->seed;
-	p->groups = m->groups;
-	p->parts = m->parts;
-	p->chains = m->chains;
-	p->bootstrap = m->bootstrap;
-	p->epoch = m->epoch;
-	p->rounds = m->rounds;
-	p->seconds = m->seconds;
-	p->target_error = m->target_error;
-	p->min_depth = m->min_depth;
-	p->max_depth = m->max_depth;
+#define X(name) p->name = m->name;
+	PLAN_NUMBERS(X)
+#undef X
 	return plan_check(p, e);
 }
 
@@ -104,28 +74,11 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	farm__plan_request__init(out);
 	out->integrator = text_borrow(r->integrator);
 	out->kind = (uint32_t)r->kind;
-	out->width = r->width;
-	out->height = r->height;
-	out->crop_x = r->crop_x;
-	out->crop_y = r->crop_y;
-	out->crop_width = r->crop_width;
-	out->crop_height = r->crop_height;
-	out->border = r->border;
-	out->seed = r->seed;
-	out->spp = r->spp;
-	out->mutations = r->mutations;
-	out->seconds = r->seconds;
-	out->target_error = r->target_error;
-	out->min_depth = r->min_depth;
-	out->max_depth = r->max_depth;
-	out->chains = r->chains;
-	out->groups = r->groups;
-	out->parts = r->parts;
-	out->speed = r->speed;
+#define X(name) out->name = r->name;
+	PLAN_REQUEST_NUMBERS(X)
+#undef X
 	out->bootstrap_rays = r->rays.bootstrap;
 	out->step_rays = r->rays.step;
-	out->bootstrap = r->bootstrap;
-	out->epoch = r->epoch;
 	out->mixture = text_borrow(r->mixture);
 	out->accuracy = text_borrow(r->accuracy);
 	out->effects = text_borrow(r->effects);
@@ -149,27 +102,10 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 		rc = error_set(e, EBADMSG, "a pilot of %g and %g rays", m->bootstrap_rays, m->step_rays);
 	if (rc)
 		return rc;
-	r->width = m->width;
-	r->height = m->height;
-	r->crop_x = m->crop_x;
-	r->crop_y = m->crop_y;
-	r->crop_width = m->crop_width;
-	r->crop_height = m->crop_height;
-	r->border = m->border;
-	r->seed = m->seed;
-	r->spp = m->spp;
-	r->mutations = m->mutations;
-	r->seconds = m->seconds;
-	r->target_error = m->target_error;
-	r->min_depth = m->min_depth;
-	r->max_depth = m->max_depth;
-	r->chains = m->chains;
-	r->groups = m->groups;
-	r->parts = m->parts;
-	r->speed = m->speed;
+#define X(name) r->name = m->name;
+	PLAN_REQUEST_NUMBERS(X)
+#undef X
 	r->rays = (struct plan_rays){m->bootstrap_rays, m->step_rays};
-	r->bootstrap = m->bootstrap;
-	r->epoch = m->epoch;
 	return 0;
 }
 

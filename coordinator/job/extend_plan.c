@@ -33,28 +33,19 @@ static int more_rounds(const struct plan *p, const struct extension *x, const st
 /* Counts chosen when the plan was made are kept. */
 static void keep_cut(const struct plan *p, struct plan_request *asked)
 {
-	asked->chains = p->chains;
-	asked->groups = p->groups;
-	asked->parts = p->parts;
-	asked->bootstrap = p->bootstrap;
-	asked->epoch = p->epoch;
+#define X(name) asked->name = p->name;
+	PLAN_CHOSEN(X)
+#undef X
 }
 
 static bool same_bits(const struct plan *a, const struct plan *b)
 {
-	struct plan c = *b;
-	c.rounds = a->rounds;
-	c.seconds = a->seconds;
-	c.target_error = a->target_error;
-	return a->kind == c.kind && a->width == c.width && a->height == c.height && a->crop_x == c.crop_x &&
-	       a->crop_y == c.crop_y && a->crop_width == c.crop_width && a->crop_height == c.crop_height &&
-	       a->border == c.border && a->seed == c.seed && a->groups == c.groups && a->parts == c.parts &&
-	       a->chains == c.chains && a->bootstrap == c.bootstrap && a->epoch == c.epoch &&
-	       a->min_depth == c.min_depth && a->max_depth == c.max_depth &&
-	       memcmp(a->integrator, c.integrator, sizeof a->integrator) == 0 &&
-	       memcmp(a->mutations, c.mutations, sizeof a->mutations) == 0 &&
-	       memcmp(a->accuracy, c.accuracy, sizeof a->accuracy) == 0 &&
-	       memcmp(a->effects, c.effects, sizeof a->effects) == 0;
+#define X(name) a->name == b->name &&
+	return PLAN_BITS(X) a->kind == b->kind && memcmp(a->integrator, b->integrator, sizeof a->integrator) == 0 &&
+	       memcmp(a->mutations, b->mutations, sizeof a->mutations) == 0 &&
+	       memcmp(a->accuracy, b->accuracy, sizeof a->accuracy) == 0 &&
+	       memcmp(a->effects, b->effects, sizeof a->effects) == 0;
+#undef X
 }
 
 int extend_check(const struct extension *x, struct error *e)
