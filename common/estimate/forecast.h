@@ -27,6 +27,12 @@ struct forecast_look {
 	uint64_t doubtful; /* 1: the interval is not known (enum error_doubt), and no render stops at this look */
 };
 
+/* The numbers of one, from this struct to a message or back: their members have the same names. */
+#define FORECAST_COPY_LOOK(to, from)                                                                          \
+	((to)->work = (from)->work, (to)->cpu_seconds = (from)->cpu_seconds, (to)->seconds = (from)->seconds, \
+	 (to)->rel_mse = (from)->rel_mse, (to)->rel_mse_upper = (from)->rel_mse_upper,                        \
+	 (to)->degrees = (from)->degrees)
+
 struct forecast_history {
 	uint32_t count;
 	struct forecast_look

@@ -22,6 +22,18 @@
 _Static_assert(sizeof(struct job_counts) / sizeof(uint64_t) * 12 <= STORED_NOTE_MOST,
 	       "a number takes at most 12 bytes");
 
+/* stored_unpack_NAME: the message, then take_NAME. */
+#define UNPACK(name, type, message, descriptor)                                                                 \
+	int stored_unpack_##name(const unsigned char *bytes, size_t size, type *out, struct error *e)           \
+	{                                                                                                       \
+		int rc;                                                                                         \
+		ProtobufCMessage *m = message_unpack(&stored__##descriptor##__descriptor, bytes, size, &rc, e); \
+		if (m)                                                                                          \
+			rc = take_##name((const message *)m, out, e);                                           \
+		message_free(m);                                                                                \
+		return rc;                                                                                      \
+	}
+
 /* ---- counters ---- */
 
 static void fill_counts(const struct job_counts *c, Stored__Counts *m)
@@ -47,34 +59,21 @@ size_t stored_pack_counts(const struct job_counts *c, unsigned char bytes[STORED
 	return stored__counts__pack(&m, bytes);
 }
 
-int stored_unpack_counts(const unsigned char *bytes, size_t size, struct job_counts *c, struct error *e)
-{
-	int rc;
-	ProtobufCMessage *m = message_unpack(&stored__counts__descriptor, bytes, size, &rc, e);
-	if (m)
-		rc = take_counts((const Stored__Counts *)m, c, e);
-	message_free(m);
-	return rc;
-}
+UNPACK(counts, struct job_counts, Stored__Counts, counts)
 
 /* ---- looks ---- */
 
 static void fill_look(const struct forecast_look *l, Stored__Look *m)
 {
 	stored__look__init(m);
-	m->work = l->work;
-	m->cpu_seconds = l->cpu_seconds;
-	m->seconds = l->seconds;
-	m->rel_mse = l->rel_mse;
-	m->rel_mse_upper = l->rel_mse_upper;
-	m->degrees = l->degrees;
+	FORECAST_COPY_LOOK(m, l);
 	m->doubtful = l->doubtful;
 }
 
 static int take_look(const Stored__Look *m, struct forecast_look *l, struct error *e)
 {
-	*l = (struct forecast_look){m->work,	      m->cpu_seconds, m->seconds, m->rel_mse,
-				    m->rel_mse_upper, m->degrees,     m->doubtful};
+	FORECAST_COPY_LOOK(l, m);
+	l->doubtful = m->doubtful;
 	return message_check_known(&m->base, e);
 }
 
@@ -85,17 +84,23 @@ size_t stored_pack_look(const struct forecast_look *l, unsigned char bytes[STORE
 	return stored__look__pack(&m, bytes);
 }
 
-int stored_unpack_look(const unsigned char *bytes, size_t size, struct forecast_look *l, struct error *e)
-{
-	int rc;
-	ProtobufCMessage *m = message_unpack(&stored__look__descriptor, bytes, size, &rc, e);
-	if (m)
-		rc = take_look((const Stored__Look *)m, l, e);
-	message_free(m);
-	return rc;
-}
+UNPACK(look, struct forecast_look, Stored__Look, look)
 
 /* ---- heads of checkpoints ---- */
+
+/* X(member of struct checkpoint_head, member of the message) */
+#define HEAD_NUMBERS(X)                                 \
+	X(job, job)                                     \
+	X(generation, generation)                       \
+	X(worker_count, worker_count)                   \
+	X(cpu_seconds, cpu_seconds)                     \
+	X(bootstrap_cpu_seconds, bootstrap_cpu_seconds) \
+	X(look_written, look_written)                   \
+	X(times.elapsed, elapsed)                       \
+	X(times.opened, opened)                         \
+	X(times.completed, completed)                   \
+	X(lit.b_pooled, b_pooled)                       \
+	X(lit.beyond_share, beyond_share)
 
 size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STORED_HEAD_MOST])
 {
@@ -104,20 +109,12 @@ size_t stored_pack_head(const struct checkpoint_head *h, unsigned char bytes[STO
 	Stored__Look look[FORECAST_LOOKS], *looks[FORECAST_LOOKS];
 	double b[PLAN_MAX_GROUPS];
 	stored__checkpoint_head__init(&m);
-	m.job = h->job;
-	m.generation = h->generation;
-	m.worker_count = h->worker_count;
-	m.cpu_seconds = h->cpu_seconds;
-	m.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
-	m.look_written = h->look_written;
-	m.elapsed = h->times.elapsed;
-	m.opened = h->times.opened;
-	m.completed = h->times.completed;
+#define X(ours, theirs) m.theirs = h->ours;
+	HEAD_NUMBERS(X)
+#undef X
 	memcpy(b, h->lit.b, sizeof b);
 	m.b = b;
 	m.n_b = PLAN_MAX_GROUPS;
-	m.b_pooled = h->lit.b_pooled;
-	m.beyond_share = h->lit.beyond_share;
 	m.black = h->lit.black;
 	for (; m.n_looks < h->looks.count; m.n_looks++) {
 		fill_look(&h->looks.looks[m.n_looks], &look[m.n_looks]);
@@ -140,16 +137,10 @@ static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h,
 			       m->n_looks);
 	if (rc)
 		return rc;
-	*h = (struct checkpoint_head){
-		.job = m->job,
-		.generation = m->generation,
-		.worker_count = m->worker_count,
-		.cpu_seconds = m->cpu_seconds,
-		.bootstrap_cpu_seconds = m->bootstrap_cpu_seconds,
-		.look_written = m->look_written,
-		.times = {m->elapsed, m->opened, m->completed},
-		.lit = {.b_pooled = m->b_pooled, .beyond_share = m->beyond_share, .black = m->black != 0},
-		.looks = {.count = (uint32_t)m->n_looks}};
+	*h = (struct checkpoint_head){.lit.black = m->black != 0, .looks.count = (uint32_t)m->n_looks};
+#define X(ours, theirs) h->ours = m->theirs;
+	HEAD_NUMBERS(X)
+#undef X
 	if (m->n_b)
 		memcpy(h->lit.b, m->b, m->n_b * sizeof *m->b);
 	for (size_t i = 0; i < m->n_looks && !rc; i++)
@@ -158,15 +149,7 @@ static int take_head(const Stored__CheckpointHead *m, struct checkpoint_head *h,
 	return rc ? rc : take_counts(m->counts, &h->counts, e);
 }
 
-int stored_unpack_head(const unsigned char *bytes, size_t size, struct checkpoint_head *h, struct error *e)
-{
-	int rc;
-	ProtobufCMessage *m = message_unpack(&stored__checkpoint_head__descriptor, bytes, size, &rc, e);
-	if (m)
-		rc = take_head((const Stored__CheckpointHead *)m, h, e);
-	message_free(m);
-	return rc;
-}
+UNPACK(head, struct checkpoint_head, Stored__CheckpointHead, checkpoint_head)
 
 /* ---- what earlier versions stored: numbers at the offsets of stored.h ---- */
 

@@ -122,12 +122,7 @@ void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm
 	for (uint32_t i = 0; i < h->count; i++) {
 		Farm__Look *l = looks->at[i] = &looks->look[i];
 		farm__look__init(l);
-		l->work = h->looks[i].work;
-		l->cpu_seconds = h->looks[i].cpu_seconds;
-		l->seconds = h->looks[i].seconds;
-		l->rel_mse = h->looks[i].rel_mse;
-		l->rel_mse_upper = h->looks[i].rel_mse_upper;
-		l->degrees = h->looks[i].degrees;
+		FORECAST_COPY_LOOK(l, &h->looks[i]);
 		l->doubtful = h->looks[i].doubtful != 0;
 	}
 	out->n_looks = h->count;

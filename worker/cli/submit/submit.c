@@ -341,9 +341,9 @@ static void take_looks(const Farm__JobStatus *s, struct submit_end *end)
 	end->bootstrap_seconds = s->bootstrap_seconds;
 	end->looks.count = 0;
 	for (size_t i = 0; i < s->n_looks; i++) {
-		const Farm__Look *l = s->looks[i];
-		forecast_add_look(&end->looks, &(struct forecast_look){l->work, l->cpu_seconds, l->seconds, l->rel_mse,
-								       l->rel_mse_upper, l->degrees, l->doubtful != 0});
+		struct forecast_look l = {.doubtful = s->looks[i]->doubtful != 0};
+		FORECAST_COPY_LOOK(&l, s->looks[i]);
+		forecast_add_look(&end->looks, &l);
 	}
 }
 
