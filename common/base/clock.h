@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Seconds from an unspecified origin, for differences. Any thread. */
+/* Clocks, in seconds. All but the wall clock start at an unspecified time: only differences mean something. Any thread.
+ */
 #ifndef COMMON_BASE_CLOCK_H
 #define COMMON_BASE_CLOCK_H
 
@@ -10,6 +11,12 @@ static inline double clock_seconds_of(clockid_t clock)
 	struct timespec t;
 	clock_gettime(clock, &t);
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Since 1970. */
+static inline double clock_wall_seconds(void)
+{
+	return clock_seconds_of(CLOCK_REALTIME);
 }
 
 /* Of the monotonic clock. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/log.h"
 
+#include "common/base/clock.h"
 #include "common/base/log_limit.h"
 #include "common/base/text.h"
 
@@ -69,13 +70,6 @@ size_t log_format(char *line, size_t size, enum log_event event, const char *fie
 	return (size_t)n < size ? (size_t)n : size - 1;
 }
 
-static double seconds(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static bool may_say(enum log_event event)
 {
 	bool may = true;
@@ -83,7 +77,7 @@ static bool may_say(enum log_event event)
 		if (limited[i] != event)
 			continue;
 		pthread_mutex_lock(&bucket_lock);
-		may = log_bucket_take(&buckets[i], seconds());
+		may = log_bucket_take(&buckets[i], clock_seconds());
 		pthread_mutex_unlock(&bucket_lock);
 	}
 	return may;
@@ -93,7 +87,7 @@ void log_tick(void)
 {
 	for (int i = 0; i < LIMITED; i++) {
 		pthread_mutex_lock(&bucket_lock);
-		uint64_t n = log_bucket_withheld(&buckets[i], seconds());
+		uint64_t n = log_bucket_withheld(&buckets[i], clock_seconds());
 		pthread_mutex_unlock(&bucket_lock);
 		if (n)
 			log_event(LOG_LOG_WITHHELD, "of=%s more=%llu", events[limited[i]].name, (unsigned long long)n);

@@ -11,6 +11,7 @@
  */
 #include "coordinator/job/live_job.h"
 
+#include "common/base/clock.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
@@ -20,7 +21,6 @@
 #include <math.h>
 #include <stdarg.h>
 #include <string.h>
-#include <time.h>
 
 static const uint64_t log_most = 16 << 20;
 
@@ -43,8 +43,6 @@ static void begin_record(struct live_job *job, const char *owner, double submitt
 {
 	const Farm__Submit *m = live_job_submit(job);
 	struct job_record *r = &job->record;
-	struct timespec now;
-	clock_gettime(CLOCK_REALTIME, &now);
 	record_begin(r, job->id, m->name, owner);
 	text_copy(r->integrator, sizeof r->integrator, job->plan.integrator);
 	text_copy(r->mixture, sizeof r->mixture, job->plan.mutations);
@@ -53,7 +51,7 @@ static void begin_record(struct live_job *job, const char *owner, double submitt
 	r->priority = m->priority;
 	record_take_effects(r, effects_to_json(m));
 	r->target_error = job->plan.target_error;
-	r->submitted = submitted > 0 ? submitted : (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	r->submitted = submitted > 0 ? submitted : clock_wall_seconds();
 }
 
 int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, const struct plan *plan,

@@ -6,6 +6,7 @@
  */
 #include "coordinator/jobs/finish.h"
 
+#include "common/base/clock.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/extend.h"
@@ -15,17 +16,13 @@
 #include "coordinator/retention/clear.h"
 #include "coordinator/retention/keep.h"
 
-#include <time.h>
-
 static struct job_record record_of(const struct jobs *jobs, const struct live_job *job)
 {
 	struct job_view v;
-	struct timespec now;
-	clock_gettime(CLOCK_REALTIME, &now);
 	jobs_view_end(jobs, job, &v);
 	v.record.ended_seen = ages_now(jobs);
 	if (!v.record.cut)
-		v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+		v.record.ended = clock_wall_seconds();
 	return v.record;
 }
 

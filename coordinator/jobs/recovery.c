@@ -116,14 +116,12 @@ static bool is_lasting(int rc)
 
 static void write_end(struct jobs *jobs, struct job_record *r, const char *why)
 {
-	struct timespec now;
 	struct error e;
-	clock_gettime(CLOCK_REALTIME, &now);
 	text_copy(r->state, sizeof r->state, "failed");
 	text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
 	text_copy(r->why, sizeof r->why, why);
 	r->exit_code = 3;
-	r->ended = (double)now.tv_sec;
+	r->ended = (double)time(NULL);
 	r->ended_seen = ages_now(jobs);
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
 	if (ledger_end(jobs->ledger, r, false, &e))

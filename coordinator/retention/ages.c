@@ -1,25 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/retention/ages.h"
 
+#include "common/base/clock.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 
 #include <fcntl.h>
 #include <string.h>
-#include <time.h>
 
 static const char note[] = "clock"; /* in the ledger */
 
-static double seconds_of(clockid_t id)
-{
-	struct timespec t = {0, 0};
-	clock_gettime(id, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 static struct seen clocks(void)
 {
-	struct seen now = {.up = seconds_of(CLOCK_BOOTTIME), .wall = seconds_of(CLOCK_REALTIME)};
+	struct seen now = {.up = clock_seconds_of(CLOCK_BOOTTIME), .wall = clock_wall_seconds()};
 	int fd = disk_open("/proc/sys/kernel/random/boot_id", O_RDONLY | O_CLOEXEC, 0);
 	ssize_t n = fd < 0 ? 0 : disk_read(fd, now.boot, sizeof now.boot - 1);
 	if (fd >= 0)
@@ -51,7 +44,7 @@ void ages_open(struct jobs *jobs)
 
 double ages_now(const struct jobs *jobs)
 {
-	double since = seconds_of(CLOCK_BOOTTIME) - jobs->seen.up;
+	double since = clock_seconds_of(CLOCK_BOOTTIME) - jobs->seen.up;
 	return jobs->seen.seconds + (since > 0 ? since : 0);
 }
 

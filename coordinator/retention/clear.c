@@ -12,6 +12,7 @@
  */
 #include "coordinator/retention/clear.h"
 
+#include "common/base/clock.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "coordinator/retention/age.h"
@@ -20,7 +21,6 @@
 
 #include <math.h>
 #include <string.h>
-#include <time.h>
 
 static const double every_seconds = 3600, soon_seconds = 2, fresh_seconds = 60, tick_seconds = 0.005;
 static const char *const results[] = {"result.exr", "preview.exr", "log"};
@@ -146,9 +146,7 @@ static void clear_job(struct jobs *jobs, struct clearing *c, const struct age_jo
 static void choose(const struct jobs *jobs, struct clearing *c)
 {
 	struct age_limits limits = {jobs->config.clear_seconds, jobs->config.clear_bytes};
-	struct timespec now;
-	clock_gettime(CLOCK_REALTIME, &now);
-	c->now = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	c->now = clock_wall_seconds();
 	age_choose(c->jobs, c->job_count, &limits, ages_now(jobs));
 }
 

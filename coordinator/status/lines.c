@@ -6,6 +6,7 @@
  */
 #include "coordinator/status/lines.h"
 
+#include "common/base/clock.h"
 #include "common/base/mem.h"
 #include "coordinator/jobs/listing.h"
 
@@ -13,14 +14,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 json_t *line_object(const char *type)
 {
-	struct timespec now;
-	clock_gettime(CLOCK_REALTIME, &now);
-	return json_pack("{s:i s:s s:f}", "schema", 1, "type", type, "time",
-			 (double)now.tv_sec + 1e-9 * (double)now.tv_nsec);
+	return json_pack("{s:i s:s s:f}", "schema", 1, "type", type, "time", clock_wall_seconds());
 }
 
 json_t *line_error(const char *text)

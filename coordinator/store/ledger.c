@@ -410,14 +410,13 @@ int ledger_drop(struct ledger *l, uint64_t *ids, size_t count, struct error *e)
 
 int ledger_end(struct ledger *l, const struct job_record *r, bool extendable, struct error *e)
 {
-	struct timespec now;
 	struct ledger_job j;
+	time_t now = time(NULL);
 	int rc = get_whole(l, r->id, &j, e);
 	if (rc <= 0 || j.extended != r->extended)
 		return rc < 0 ? rc : 0;
-	clock_gettime(CLOCK_REALTIME, &now);
 	bool ended = j.ended > 0;
-	j.ended = now.tv_sec > 0 ? (double)now.tv_sec : 1;
+	j.ended = now > 0 ? (double)now : 1;
 	j.state = r->state;
 	j.held = "";
 	if (!extendable)
