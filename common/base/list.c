@@ -21,3 +21,8 @@ void list_free(struct list *l)
 	mem_free(l->items);
 	*l = (struct list){.size = l->size};
 }
+
+void *list_room(void *items, size_t count, size_t size)
+{
+	return count & (count - 1) ? items : mem_grow(items, count * size, (count ? 2 * count : 1) * size);
+}

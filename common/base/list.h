@@ -16,4 +16,9 @@ struct list {
 void *list_push(struct list *l);
 void list_free(struct list *l); /* leaves it empty */
 
+/* Room for one more in an array of `count` items that only this has made larger, or NULL, an empty one. It grows at the
+ * powers of two, so its capacity need not be known. Returns the array, which may have moved; NULL: no memory, and it is
+ * as before. */
+void *list_room(void *items, size_t count, size_t size);
+
 #endif

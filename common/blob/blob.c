@@ -15,6 +15,7 @@
 #include "common/blob/blob.h"
 
 #include "common/base/disk.h"
+#include "common/base/list.h"
 #include "common/base/mem.h"
 
 #include <fcntl.h>
@@ -144,7 +145,7 @@ static int by_age(const void *a, const void *b)
 static int read_folder(struct blob_store *s, struct error *e)
 {
 	struct found *all = NULL;
-	size_t count = 0, capacity = 0;
+	size_t count = 0;
 	int rc = 0;
 	DIR *d = disk_opendir(s->folder);
 	if (!d)
@@ -164,16 +165,12 @@ static int read_folder(struct blob_store *s, struct error *e)
 		}
 		if (!S_ISREG(st.st_mode))
 			continue;
-		if (count == capacity) {
-			size_t want = capacity ? 2 * capacity : 64;
-			struct found *grown = mem_grow(all, capacity * sizeof *all, want * sizeof *all);
-			if (!grown) {
-				rc = error_set(e, ENOMEM, "%s: no memory for its list of files", s->folder);
-				break;
-			}
-			all = grown;
-			capacity = want;
+		struct found *grown = list_room(all, count, sizeof *all);
+		if (!grown) {
+			rc = error_set(e, ENOMEM, "%s: no memory for its list of files", s->folder);
+			break;
 		}
+		all = grown;
 		all[count++] = (struct found){h, (uint64_t)st.st_size, st.st_mtim};
 	}
 	closedir(d);

@@ -10,6 +10,7 @@
 #include "common/net/authority.h"
 
 #include "common/base/disk.h"
+#include "common/base/list.h"
 #include "common/base/mem.h"
 
 #include <dirent.h>
@@ -507,7 +508,7 @@ int authority_revoke(const char *folder, const char *what, unsigned *count, stru
 struct listing {
 	const struct authority *a;
 	struct authority_entry *entries;
-	size_t count, room;
+	size_t count;
 };
 
 static time_t seconds_of(const ASN1_TIME *t)
@@ -519,15 +520,10 @@ static time_t seconds_of(const ASN1_TIME *t)
 static int list_one(void *user, X509 *cert, const struct tls_peer *who, struct error *e)
 {
 	struct listing *l = user;
-	if (l->count == l->room) {
-		size_t room = l->room ? 2 * l->room : 16;
-		struct authority_entry *more =
-			room > ENTRIES_MAX ? NULL : mem_grow(l->entries, l->room * sizeof *more, room * sizeof *more);
-		if (!more)
-			return error_set(e, ENOMEM, "no memory for the list of certificates");
-		l->entries = more;
-		l->room = room;
-	}
+	struct authority_entry *more = l->count == ENTRIES_MAX ? NULL : list_room(l->entries, l->count, sizeof *more);
+	if (!more)
+		return error_set(e, ENOMEM, "no memory for the list of certificates");
+	l->entries = more;
 	l->entries[l->count++] = (struct authority_entry){.who = *who,
 							  .from = seconds_of(X509_get0_notBefore(cert)),
 							  .until = seconds_of(X509_get0_notAfter(cert)),

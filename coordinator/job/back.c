@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/job/back.h"
 
+#include "common/base/list.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/job/late.h"
@@ -35,15 +36,10 @@ void back_note(struct live_job *job, const struct lease_key *k, uint64_t at, con
 {
 	if (job->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER)
 		return;
-	if (job->merged_count == job->merged_capacity) {
-		size_t want = job->merged_capacity ? 2 * job->merged_capacity : 64;
-		struct merged_record *more =
-			mem_grow(job->merged, job->merged_capacity * sizeof *more, want * sizeof *more);
-		if (!more)
-			return;
-		job->merged = more;
-		job->merged_capacity = want;
-	}
+	struct merged_record *more = list_room(job->merged, job->merged_count, sizeof *more);
+	if (!more)
+		return;
+	job->merged = more;
 	job->merged[job->merged_count++] = (struct merged_record){slot_of(job, k), k->epoch, at};
 	take_maker(&job->makers[slot_of(job, k)], maker);
 }
@@ -172,26 +168,27 @@ static uint64_t copy_one(const struct live_job *job, struct journal *to, const s
 }
 
 void back_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
-	       size_t *count, size_t *capacity)
+	       size_t *count)
 {
 	enum { LAST = 2 };
 	uint32_t slots = job->plan.groups * job->plan.parts;
 	struct error e;
+	*list = NULL;
 	*count = 0;
-	if (journal_write(job->journal, &e)) { /* the waiting records cannot be read */
-		*list = NULL;
+	if (journal_write(job->journal, &e)) /* the waiting records cannot be read */
 		return;
-	}
-	*capacity = (size_t)LAST * slots;
-	*list = job->merged_count ? mem_alloc(*capacity, sizeof **list) : NULL;
-	for (uint32_t s = 0; *list && s < slots; s++) {
+	for (uint32_t s = 0; s < slots; s++) {
 		uint64_t next = 0;
 		for (size_t i = 0; i < job->merged_count; i++)
 			if (job->merged[i].slot == s && job->merged[i].epoch >= next)
 				next = job->merged[i].epoch + 1;
 		for (uint64_t epoch = next < LAST ? 0 : next - LAST; epoch < next; epoch++) {
 			size_t i = find(job, s, epoch);
-			uint64_t size = i == SIZE_MAX ? 0 : copy_one(job, to, &job->merged[i], most, &(*list)[*count]);
+			struct merged_record *more = i == SIZE_MAX ? NULL : list_room(*list, *count, sizeof *more);
+			if (!more)
+				continue;
+			*list = more;
+			uint64_t size = copy_one(job, to, &job->merged[i], most, &more[*count]);
 			*count += size > 0;
 			most -= size;
 		}

@@ -37,6 +37,6 @@ int back_replay(struct live_job *job, struct journal *j, const struct lease_key 
 /* Copies them into another journal, up to so many bytes. *list, of *count, gets their places there (mem_alloc'd).
  * What does not fit is left out. */
 void back_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
-	       size_t *count, size_t *capacity);
+	       size_t *count);
 
 #endif

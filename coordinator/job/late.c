@@ -1,21 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/job/late.h"
 
-#include "common/base/mem.h"
+#include "common/base/list.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 int late_add(struct live_job *job, const struct lease_key *k, uint64_t at, struct error *e)
 {
-	if (job->late_count == job->late_capacity) {
-		size_t want = job->late_capacity ? 2 * job->late_capacity : 64;
-		struct late_result *more = mem_grow(job->late, job->late_capacity * sizeof *more, want * sizeof *more);
-		if (!more)
-			return error_set(e, ENOMEM, "no memory for results that wait");
-		job->late = more;
-		job->late_capacity = want;
-	}
+	struct late_result *more = list_room(job->late, job->late_count, sizeof *more);
+	if (!more)
+		return error_set(e, ENOMEM, "no memory for results that wait");
+	job->late = more;
 	job->late[job->late_count++] = (struct late_result){.key = *k, .at = at};
 	return 0;
 }

@@ -100,7 +100,7 @@ struct live_job {
 	struct live_job_maker *makers; /* [groups x parts]: of those */
 	bool *again;		       /* [groups x parts]: the next batch replaces one that was taken back */
 	struct merged_record *merged;  /* in order of merging */
-	size_t merged_count, merged_capacity;
+	size_t merged_count;
 	uint64_t kept_bytes; /* of the journal; earlier batches are in its checkpoint */
 	uint32_t chains_per_lease;
 	int log; /* file descriptor of the log */
@@ -136,7 +136,7 @@ struct live_job {
 	size_t credit_count;
 	char doubts[512]; /* about results of workers that are quarantined now; "": none */
 	struct late_result *late;
-	size_t late_count, late_capacity;
+	size_t late_count;
 	struct waiting_batch *waiting, **waiting_last;
 	size_t waiting_bytes;
 };

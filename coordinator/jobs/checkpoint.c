@@ -36,7 +36,7 @@ struct writing {
 	struct checkpoint_head head;
 	uint64_t bytes, kept_most;
 	struct merged_record *merged; /* in the next journal */
-	size_t merged_count, merged_capacity;
+	size_t merged_count;
 	char folder[SPOOL_PATH_MAX];
 	int rc;
 	bool unsure; /* it was renamed, but perhaps not durably */
@@ -52,7 +52,7 @@ static void write_checkpoint(uv_work_t *work)
 	snprintf(temporary, sizeof temporary, "%s/checkpoint.tmp", w->folder);
 	w->rc = journal_create(&w->journal, w->folder, w->head.job, w->head.generation, &w->error);
 	if (!w->rc)
-		back_copy(w->job, w->journal, w->kept_most, &w->merged, &w->merged_count, &w->merged_capacity);
+		back_copy(w->job, w->journal, w->kept_most, &w->merged, &w->merged_count);
 	if (!w->rc)
 		w->rc = checked_file_create(&out, temporary, &w->error);
 	if (!w->rc)
@@ -147,7 +147,6 @@ static void checkpoint_written(uv_work_t *work, int status)
 		job->merged = w->merged;
 		job->merged_count = w->merged_count;
 		job->kept_bytes = journal_bytes(job->journal);
-		job->merged_capacity = w->merged ? w->merged_capacity : 0;
 		w->merged = NULL;
 	}
 	mem_free(w->merged);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/jobs/trust.h"
 
+#include "common/base/list.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/step.h"
@@ -118,8 +119,7 @@ void trust_merged(struct live_job *job, const struct action *a)
 			job->credits[i].leases++;
 			return;
 		}
-	struct live_job_credit *more =
-		mem_grow(job->credits, job->credit_count * sizeof *more, (job->credit_count + 1) * sizeof *more);
+	struct live_job_credit *more = list_room(job->credits, job->credit_count, sizeof *more);
 	if (!more) {
 		live_job_log(job, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
 		return;

@@ -13,10 +13,10 @@
  */
 #include "coordinator/store/ledger.h"
 
+#include "common/base/list.h"
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/store/ids.h"
 #include "coordinator/store/ledger_file.h"
 #include "coordinator/store/ledger_side.h"
 #include "coordinator/store/note.h"
@@ -482,9 +482,13 @@ int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t
 	    step = SQLITE_DONE;
 	*ids = NULL;
 	*count = 0;
-	while (!rc && (step = sqlite3_step(s)) == SQLITE_ROW)
-		if (!ids_add(ids, count, (uint64_t)sqlite3_column_int64(s, 0)))
+	while (!rc && (step = sqlite3_step(s)) == SQLITE_ROW) {
+		uint64_t *more = list_room(*ids, *count, sizeof *more);
+		if (more)
+			(*ids = more)[(*count)++] = (uint64_t)sqlite3_column_int64(s, 0);
+		else
 			rc = error_set(e, ENOMEM, "no memory for the list of jobs");
+	}
 	if (!rc && step != SQLITE_DONE)
 		rc = ledger_file_error(l->db, e);
 	sqlite3_finalize(s);

@@ -9,8 +9,8 @@
 #include "coordinator/store/spool.h"
 
 #include "common/base/disk.h"
+#include "common/base/list.h"
 #include "common/base/mem.h"
-#include "coordinator/store/ids.h"
 
 #include <fcntl.h>
 #include <stdbool.h>
@@ -84,9 +84,15 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 	if (!d)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	int rc = 0;
-	for (struct dirent *f; !rc && (f = readdir(d));)
-		if (is_job_folder(f->d_name, &id) && !ids_add(ids, count, id))
+	for (struct dirent *f; !rc && (f = readdir(d));) {
+		if (!is_job_folder(f->d_name, &id))
+			continue;
+		uint64_t *more = list_room(*ids, *count, sizeof *more);
+		if (more)
+			(*ids = more)[(*count)++] = id;
+		else
 			rc = error_set(e, ENOMEM, "%s: no memory for its list", path);
+	}
 	closedir(d);
 	if (rc) {
 		mem_free(*ids);

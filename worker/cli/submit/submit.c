@@ -9,6 +9,7 @@
  */
 #include "worker/cli/submit/submit.h"
 
+#include "common/base/list.h"
 #include "common/base/mem.h"
 #include "common/base/progress.h"
 #include "common/base/text.h"
@@ -36,7 +37,7 @@ static int remember(struct scene_bundle *b, const char *name, const struct asset
 	for (size_t i = 0; i < b->count; i++)
 		if (strcmp(b->files[i].name, name) == 0)
 			return 0;
-	struct scene_bundle_file *more = mem_grow(b->files, b->count * sizeof *more, (b->count + 1) * sizeof *more);
+	struct scene_bundle_file *more = list_room(b->files, b->count, sizeof *more);
 	char *copy = mem_strdup(name);
 	b->files = more ? more : b->files;
 	if (!more || !copy) {
