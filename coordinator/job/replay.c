@@ -12,7 +12,6 @@
  */
 #include "coordinator/job/replay.h"
 
-#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/job/back.h"
@@ -219,26 +218,6 @@ static void say_damage(const struct replay *r, const struct journal_found *found
 		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
 		(unsigned long long)found->damaged, job->late_count, (unsigned long long)found->lost,
 		*text ? text : ": none any more");
-}
-
-uint64_t replay_bytes(const struct spool *spool, uint64_t job)
-{
-	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
-	uint64_t sum = 0;
-	struct stat st;
-	spool_job_path(spool, job, NULL, folder);
-	DIR *d = disk_opendir(folder);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		bool checkpoint = strcmp(f->d_name, "checkpoint") == 0;
-		if (!checkpoint && strncmp(f->d_name, "journal.", 8) != 0)
-			continue;
-		spool_job_path(spool, job, f->d_name, path);
-		if (disk_stat(path, &st) == 0)
-			sum += (uint64_t)st.st_size << checkpoint;
-	}
-	if (d)
-		closedir(d);
-	return sum;
 }
 
 int replay_films(const struct spool *spool, struct live_job *job, struct replay_progress *p, struct error *e)

@@ -14,11 +14,9 @@
 
 /* A replay that another thread watches. */
 struct replay_progress {
-	_Atomic uint64_t read; /* bytes read, of replay_bytes */
+	_Atomic uint64_t read; /* bytes read: journals once, the checkpoint twice */
 	atomic_bool stop;      /* stop soon, with -ECANCELED */
 };
-/* Bytes to be read for this job: journals once, the checkpoint twice. */
-uint64_t replay_bytes(const struct spool *spool, uint64_t job);
 
 /* Takes a second or more. Any thread that owns the live job. On failure (-EBADMSG: something is damaged or missing;
  * -EPROTO: another version) the live job can only be dropped. p: NULL: nobody watches. */

@@ -140,7 +140,7 @@ static int read_row(const struct jobs *jobs, uint64_t job, struct ledger_job *j,
 	int rc = ledger_get(jobs->ledger, job, j, e);
 	if (rc < 0)
 		return error_prefix(e, rc, "what was kept of it");
-	return rc && j->submission_size && keep_bytes(jobs, job)
+	return rc && j->submission_size && spool_film_bytes(jobs->spool, job, 1)
 		       ? 0
 		       : error_set(e, ENOENT, "its films have been deleted: %s", again);
 }

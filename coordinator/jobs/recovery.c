@@ -291,7 +291,7 @@ static int add_found(struct jobs *jobs, const struct ledger_job *j, struct error
 		return give_up(jobs, id, extended, rc, e);
 	}
 	f->record = f->job->record;
-	f->bytes = replay_bytes(jobs->spool, id);
+	f->bytes = spool_film_bytes(jobs->spool, id, 2);
 	r->bytes += f->bytes;
 	*r->last = f;
 	r->last = &f->next;

@@ -71,7 +71,7 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	c->again |= busy && now - c->record.ended_seen < fresh_seconds;
 	c->jobs[c->job_count++] = (struct age_job){.id = id,
 						   .ended = c->record.ended_seen,
-						   .films = keep_bytes(jobs, id),
+						   .films = spool_film_bytes(jobs->spool, id, 1),
 						   .result = result_bytes(jobs, id),
 						   .busy = busy};
 }

@@ -26,29 +26,11 @@ void keep_drop(const struct jobs *jobs, uint64_t job)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
-uint64_t keep_bytes(const struct jobs *jobs, uint64_t job)
-{
-	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
-	uint64_t sum = 0;
-	struct stat st;
-	spool_job_path(jobs->spool, job, NULL, folder);
-	DIR *d = disk_opendir(folder);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		if (strcmp(f->d_name, "checkpoint") != 0 && strncmp(f->d_name, "journal.", 8) != 0)
-			continue;
-		spool_job_path(jobs->spool, job, f->d_name, path);
-		sum += disk_stat(path, &st) == 0 ? (uint64_t)st.st_size : 0;
-	}
-	if (d)
-		closedir(d);
-	return sum;
-}
-
 bool keep_drop_all(const struct jobs *jobs)
 {
 	bool any = false;
 	for (size_t i = 0; i < jobs->ended_count; i++)
-		if (keep_bytes(jobs, jobs->ended[i].id)) {
+		if (spool_film_bytes(jobs->spool, jobs->ended[i].id, 1)) {
 			keep_drop(jobs, jobs->ended[i].id);
 			any = true;
 		}
@@ -59,7 +41,7 @@ void keep_trim(const struct jobs *jobs)
 {
 	uint64_t left = jobs->config.keep_bytes;
 	for (size_t i = jobs->ended_count; i-- > 0;) { /* starting with the most recent */
-		uint64_t bytes = keep_bytes(jobs, jobs->ended[i].id);
+		uint64_t bytes = spool_film_bytes(jobs->spool, jobs->ended[i].id, 1);
 		if (bytes > left)
 			keep_drop(jobs, jobs->ended[i].id);
 		else

@@ -12,7 +12,6 @@
 /* For a job that has just ended. false: it cannot be extended, and nothing need be kept. */
 bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r);
 void keep_drop(const struct jobs *jobs, uint64_t job);
-uint64_t keep_bytes(const struct jobs *jobs, uint64_t job); /* on the disk */
 bool keep_drop_all(const struct jobs *jobs); /* deletes the films of listed jobs; true: there were some */
 void keep_trim(const struct jobs *jobs);     /* call after jobs have ended, and at the start */
 

@@ -212,6 +212,26 @@ int spool_check_version(const char got[8], const char known[8], const char *path
 			 got + NAME, known + NAME);
 }
 
+uint64_t spool_film_bytes(const struct spool *s, uint64_t id, unsigned checkpoints)
+{
+	char path[SPOOL_PATH_MAX];
+	uint64_t sum = 0;
+	struct stat st;
+	spool_job_path(s, id, NULL, path);
+	DIR *d = disk_opendir(path);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		bool checkpoint = strcmp(f->d_name, "checkpoint") == 0;
+		if (!checkpoint && strncmp(f->d_name, "journal.", 8) != 0)
+			continue;
+		spool_job_path(s, id, f->d_name, path);
+		if (disk_stat(path, &st) == 0)
+			sum += (uint64_t)st.st_size * (checkpoint ? checkpoints : 1);
+	}
+	if (d)
+		closedir(d);
+	return sum;
+}
+
 void spool_drop_job(const struct spool *s, uint64_t id)
 {
 	char path[SPOOL_PATH_MAX];
