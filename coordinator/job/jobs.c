@@ -1,7 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/job/jobs.h"
 
+#include <assert.h>
 #include <string.h>
+
+void jobs_in_pool(struct jobs *jobs, uv_work_t *w, void *data, uv_work_cb work, uv_after_work_cb done)
+{
+	w->data = data;
+	int rc = uv_queue_work(jobs->loop, w, work, done);
+	assert(rc == 0);
+	(void)rc;
+}
 
 double jobs_now(const struct jobs *jobs)
 {

@@ -91,6 +91,9 @@ struct jobs {
 	uint64_t changes;     /* incremented whenever the status changes */
 };
 
+/* A thread of the pool calls `work`, then the loop's thread `done`; each finds its data in ->data. Cannot fail: libuv
+ * refuses only work without a function. */
+void jobs_in_pool(struct jobs *jobs, uv_work_t *w, void *data, uv_work_cb work, uv_after_work_cb done);
 double jobs_now(const struct jobs *jobs);			  /* s of the loop's clock */
 struct live_job *jobs_find(const struct jobs *jobs, uint64_t id); /* NULL: it is not running */
 /* Where the films of a job with this plan go. NULL: into memory, which never waits for the disk. */

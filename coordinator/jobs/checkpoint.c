@@ -111,10 +111,7 @@ static void delete_old_journals(struct jobs *jobs, struct journal *old, const ch
 	}
 	*t = (struct tidying){.jobs = jobs, .old = old, .keep = keep};
 	snprintf(t->folder, sizeof t->folder, "%s", folder);
-	t->work.data = t;
-	int rc = uv_queue_work(jobs->loop, &t->work, run_tidy, tidied);
-	assert(rc == 0);
-	(void)rc;
+	jobs_in_pool(jobs, &t->work, t, run_tidy, tidied);
 }
 
 static void checkpoint_written(uv_work_t *work, int status)
@@ -179,14 +176,11 @@ static void start(struct jobs *jobs, struct live_job *job)
 	}
 	w->jobs = jobs;
 	w->job = job;
-	w->work.data = w;
 	w->kept_most = limit_of(jobs, job);
 	spool_job_path(jobs->spool, job->id, NULL, w->folder);
 	checkpoint_head_of(&w->head, job, &status);
 	job->busy = jobs->checkpointing = true;
-	int rc = uv_queue_work(jobs->loop, &w->work, write_checkpoint, checkpoint_written);
-	assert(rc == 0);
-	(void)rc;
+	jobs_in_pool(jobs, &w->work, w, write_checkpoint, checkpoint_written);
 }
 
 void checkpoint_where_due(struct jobs *jobs)

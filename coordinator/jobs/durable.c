@@ -344,13 +344,10 @@ static void flush_next(struct jobs *jobs)
 		abort();
 	w->jobs = jobs;
 	w->acks = jobs->acks;
-	w->work.data = w;
 	jobs->acks = NULL;
 	jobs->acks_last = &jobs->acks;
 	jobs->flushing = true;
-	int rc = uv_queue_work(jobs->loop, &w->work, flush_journals, journals_flushed);
-	assert(rc == 0);
-	(void)rc;
+	jobs_in_pool(jobs, &w->work, w, flush_journals, journals_flushed);
 }
 
 void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, const struct lease_key *k, enum ack ack)

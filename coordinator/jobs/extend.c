@@ -283,16 +283,14 @@ static int start_reading(struct jobs *jobs, const struct extension_request *q, c
 		mem_free(w);
 		return rc;
 	}
-	w->work.data = w;
 	w->jobs = jobs;
 	w->by = q->by;
 	w->what = q->what;
 	w->record = *r;
 	jobs->reading = w->job;
 	jobs->reading_for = q->by.peer;
-	rc = uv_queue_work(jobs->loop, &w->work, read_ended_job, ended_job_read);
-	assert(rc == 0);
-	return rc;
+	jobs_in_pool(jobs, &w->work, w, read_ended_job, ended_job_read);
+	return 0;
 }
 
 static int extend_ended(struct jobs *jobs, const struct extension_request *q, const struct job_record *r,

@@ -14,7 +14,6 @@
 #include "common/base/text.h"
 #include "coordinator/jobs/step.h"
 
-#include <assert.h>
 #include <string.h>
 
 static void hold(struct jobs *jobs, struct live_job *job, const char *text)
@@ -96,12 +95,8 @@ static void on_read(uv_work_t *work, int status);
 static void read_first(struct jobs *jobs)
 {
 	struct file_check *c = jobs->checks;
-	if (!c)
-		return;
-	c->work.data = c;
-	int rc = uv_queue_work(jobs->loop, &c->work, read_some, on_read);
-	assert(rc == 0);
-	(void)rc;
+	if (c)
+		jobs_in_pool(jobs, &c->work, c, read_some, on_read);
 }
 
 /* Whoever waits for the first one goes on. */

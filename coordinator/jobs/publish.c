@@ -186,14 +186,12 @@ void publish_start(struct jobs *jobs, struct live_job *job, enum publish_what wh
 	assert(job && job->canvas);
 	assert(!job->busy);
 	struct publishing *w = &job->publishing;
-	*w = (struct publishing){.work.data = w, .jobs = jobs, .job = job, .what = what, .rounds = rounds};
+	*w = (struct publishing){.jobs = jobs, .job = job, .what = what, .rounds = rounds};
 	struct job_status status; /* from the first lease until now */
 	if (farm_job(jobs->farm, job->id, jobs_now(jobs), &status)) {
 		w->end = status.end;
 		w->wall_seconds = (isnan(status.ended) ? jobs_now(jobs) : status.ended) - status.started;
 	}
 	job->busy = true;
-	int rc = uv_queue_work(jobs->loop, &w->work, work_on_film, film_work_done);
-	assert(rc == 0);
-	(void)rc;
+	jobs_in_pool(jobs, &w->work, w, work_on_film, film_work_done);
 }

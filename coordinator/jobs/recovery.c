@@ -209,9 +209,8 @@ static int read_next(struct jobs *jobs, struct error *e)
 		return finish(jobs, e);
 	r->at->job->film_folder = jobs_film_folder(jobs, &r->at->job->plan);
 	r->under_way = true;
-	int rc = uv_queue_work(jobs->loop, &r->work, read_films, films_read);
-	assert(rc == 0);
-	return rc;
+	jobs_in_pool(jobs, &r->work, r, read_films, films_read);
+	return 0;
 }
 
 static void remove_found(struct recovery *r, struct found *f)
@@ -305,7 +304,6 @@ int recovery_begin(struct jobs *jobs, struct error *e)
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	r->jobs = jobs;
-	r->work.data = r;
 	r->last = &jobs->found;
 	for (size_t i = 0; i < jobs->restored_count; i++) {
 		int rc = ledger_get(jobs->ledger, jobs->restored[i], &j, e);
