@@ -14,11 +14,11 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/durable.h"
-#include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"
-#include "coordinator/retention/keep.h"
 #include "coordinator/jobs/step.h"
+#include "coordinator/retention/ended_jobs.h"
+#include "coordinator/retention/keep.h"
 
 #include <assert.h>
 #include <math.h>

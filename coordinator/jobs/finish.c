@@ -8,12 +8,12 @@
 
 #include "common/base/clock.h"
 #include "coordinator/jobs/durable.h"
-#include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/extend.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/results.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
+#include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 
 static struct job_record record_of(const struct jobs *jobs, const struct live_job *job)

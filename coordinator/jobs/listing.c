@@ -8,6 +8,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/recovery.h"
+#include "coordinator/retention/ended_jobs.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -64,14 +65,10 @@ bool jobs_view(struct jobs *jobs, uint64_t id, struct job_view *v)
 	}
 	if (recovery_view(jobs, id, v))
 		return true;
-	for (size_t i = 0; i < jobs->ended_count; i++)
-		if (jobs->ended[i].id == id) {
-			view_of_record(v, &jobs->ended[i]);
-			return true;
-		}
-	if (ledger_read_record(jobs->ledger, id, &r, NULL))
+	const struct job_record *known = ended_jobs_find(jobs, id);
+	if (!known && ledger_read_record(jobs->ledger, id, &r, NULL))
 		return false;
-	view_of_record(v, &r);
+	view_of_record(v, known ? known : &r);
 	return true;
 }
 

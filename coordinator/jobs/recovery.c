@@ -15,10 +15,10 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/retention/ages.h"
+#include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 #include "coordinator/store/journal_file.h"
 

@@ -12,7 +12,6 @@
 #include "common/base/mem.h"
 #include "coordinator/jobs/checkpoint.h"
 #include "coordinator/jobs/durable.h"
-#include "coordinator/jobs/ended_jobs.h"
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/folder.h"
 #include "coordinator/jobs/follow_up.h"
@@ -23,6 +22,7 @@
 #include "coordinator/jobs/trust.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
+#include "coordinator/retention/ended_jobs.h"
 
 #include <string.h>
 

@@ -17,6 +17,7 @@
 #include "common/base/mem.h"
 #include "coordinator/retention/age.h"
 #include "coordinator/retention/ages.h"
+#include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 
 #include <math.h>
@@ -76,18 +77,10 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 						   .busy = busy};
 }
 
-static struct job_record *listed(struct jobs *jobs, uint64_t job)
-{
-	for (size_t i = 0; i < jobs->ended_count; i++)
-		if (jobs->ended[i].id == job)
-			return &jobs->ended[i];
-	return NULL;
-}
-
 static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_record *r, double now)
 {
 	struct error e;
-	struct job_record *known = listed(jobs, j->id);
+	struct job_record *known = ended_jobs_find(jobs, j->id);
 	if (r->has_result) {
 		r->has_result = false;
 		r->cleared = now;
@@ -111,13 +104,8 @@ static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_r
 
 static void drop_record(struct jobs *jobs, const struct age_job *j)
 {
-	struct job_record *known = listed(jobs, j->id);
 	spool_drop_job(jobs->spool, j->id);
-	if (known) {
-		size_t behind = jobs->ended_count - (size_t)(known - jobs->ended) - 1;
-		memmove(known, known + 1, behind * sizeof *known);
-		jobs->ended_count--;
-	}
+	ended_jobs_remove(jobs, j->id);
 	log_event(LOG_JOB_CLEARED, "job=j%llu what=record", (unsigned long long)j->id);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/jobs/ended_jobs.h"
+#include "coordinator/retention/ended_jobs.h"
 
 #include "common/base/mem.h"
 #include "coordinator/retention/keep.h"
@@ -15,13 +15,19 @@ void ended_jobs_add(struct jobs *jobs, const struct job_record *r)
 	jobs->ended[jobs->ended_count++] = *r;
 }
 
-void ended_jobs_remove(struct jobs *jobs, uint64_t job)
+struct job_record *ended_jobs_find(const struct jobs *jobs, uint64_t job)
 {
 	for (size_t i = 0; i < jobs->ended_count; i++)
-		if (jobs->ended[i].id == job) {
-			memmove(&jobs->ended[i], &jobs->ended[i + 1], (--jobs->ended_count - i) * sizeof *jobs->ended);
-			return;
-		}
+		if (jobs->ended[i].id == job)
+			return &jobs->ended[i];
+	return NULL;
+}
+
+void ended_jobs_remove(struct jobs *jobs, uint64_t job)
+{
+	struct job_record *r = ended_jobs_find(jobs, job);
+	if (r)
+		memmove(r, r + 1, (size_t)(jobs->ended + --jobs->ended_count - r) * sizeof *r);
 }
 
 int ended_jobs_open(struct jobs *jobs, struct error *e)
