@@ -95,108 +95,90 @@ void peers_stop(struct peers *s)
 
 /* ---- calls of the jobs (peer_calls.h) ---- */
 
-static const char *name(void *user, uint64_t peer)
+static const char *name(struct peers *s, uint64_t peer)
 {
-	const struct session *p = peers_find(user, peer);
+	const struct session *p = peers_find(s, peer);
 	return p ? p->name : NULL;
 }
 
-static void send_lease(void *user, uint64_t peer, const struct live_job *job, const struct lease_key *k, bool anew)
+static void send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k, bool anew)
 {
-	struct session *p = peers_find(user, peer);
+	struct session *p = peers_find(s, peer);
 	if (p)
 		worker_send_lease(p, job, k, anew);
 }
 
-static void revoke_lease(void *user, uint64_t peer, const struct lease_key *k)
+static void revoke_lease(struct peers *s, uint64_t peer, const struct lease_key *k)
 {
-	struct session *p = peers_find(user, peer);
+	struct session *p = peers_find(s, peer);
 	if (p)
 		worker_send_revoke(p, k);
 }
 
-static void acknowledge(void *user, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text)
+static void acknowledge(struct peers *s, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text)
 {
-	struct session *p = peers_find(user, peer);
+	struct session *p = peers_find(s, peer);
 	if (p)
 		worker_send_ack(p, k, ack, text);
 }
 
-static void refused(void *user, uint64_t peer, const char *text)
+static void refused(struct peers *s, uint64_t peer, const char *text)
 {
-	struct session *p = peers_find(user, peer);
+	struct session *p = peers_find(s, peer);
 	if (p)
 		text_copy(p->rejected, sizeof p->rejected, text);
 }
 
-static void fault(void *user, uint64_t peer, const char *text)
+static void fault(struct peers *s, uint64_t peer, const char *text)
 {
-	struct session *p = peers_find(user, peer);
+	struct session *p = peers_find(s, peer);
 	if (p)
 		session_fault(p, "%s", text);
 }
 
-static void dismiss(void *user, uint64_t peer, const char *text)
+static void dismiss(struct peers *s, uint64_t peer, const char *text)
 {
-	struct session *p = peers_find(user, peer);
+	struct session *p = peers_find(s, peer);
 	if (!p)
 		return;
 	p->joined = false;
 	session_fault(p, "%s", text);
 }
 
-static void extended(void *user, uint64_t peer, const char *refusal, const char *text)
+static void extended(struct peers *s, uint64_t peer, const char *refusal, const char *text)
 {
-	struct session *p = peers_find(user, peer);
+	struct session *p = peers_find(s, peer);
 	if (!p)
 		return;
 	text_copy(p->rejected, sizeof p->rejected, refusal ? refusal : "");
 	client_send_done(p, text);
 }
 
-static void job_ended(void *user, uint64_t job)
+static void job_ended(struct peers *s, uint64_t job)
 {
-	const struct peers *s = user;
 	for (struct session *p = s->sessions; p; p = p->next)
 		if (p->state == SESSION_WORKER)
 			worker_send_job_end(p, job);
 }
 
-static void jobs_let_go(void *user)
+static void jobs_let_go(struct peers *s)
 {
-	const struct peers *s = user;
 	for (struct session *p = s->sessions; p; p = p->next)
 		if (p->watched && p->shown && !jobs_find(s->jobs, p->watched))
 			client_tick(p);
 }
 
-static void films_free(void *user, uint64_t job)
+static void file_read(struct peers *s, const struct blob_hash *h, int rc, const char *text)
 {
-	fetch_previews(user, job);
-}
-
-static void file_read(void *user, const struct blob_hash *h, int rc, const char *text)
-{
-	const struct peers *s = user;
 	for (struct session *p = s->sessions; p; p = p->next) {
 		worker_requests_file_read(p, h, rc ? text : "");
 		client_file_read(p, h, rc == 0);
 	}
 }
 
-static void jobs_read(void *user)
+static uint64_t uploading(struct peers *s, uint64_t peer)
 {
-	conversations_go_on(user);
-}
-
-static bool uses_result(void *user, uint64_t job)
-{
-	return fetch_uses(user, job);
-}
-
-static uint64_t uploading(void *user, uint64_t peer)
-{
-	const struct session *p = peers_find(user, peer);
+	const struct session *p = peers_find(s, peer);
 	return p ? client_uploading(p) : 0;
 }
 
@@ -214,9 +196,9 @@ void peers_init(struct peers *s)
 					     .extended = extended,
 					     .job_ended = job_ended,
 					     .jobs_let_go = jobs_let_go,
-					     .films_free = films_free,
+					     .films_free = fetch_previews,
 					     .file_read = file_read,
-					     .jobs_read = jobs_read,
-					     .uses_result = uses_result,
+					     .jobs_read = conversations_go_on,
+					     .uses_result = fetch_uses,
 					     .uploading = uploading};
 }

@@ -28,7 +28,7 @@ static int slow_open(const char *path, int flags, mode_t mode)
 	return disk_system.open(path, flags, mode);
 }
 
-static bool nobody_fetches(void *user, uint64_t job)
+static bool nobody_fetches(const struct peers *user, uint64_t job)
 {
 	(void)user;
 	(void)job;
@@ -211,7 +211,7 @@ static void what_is_read_stays(void **state)
 }
 
 static bool is_fetching;
-static bool somebody_fetches(void *user, uint64_t job)
+static bool somebody_fetches(const struct peers *user, uint64_t job)
 {
 	(void)user;
 	return is_fetching && job == 1;
