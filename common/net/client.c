@@ -19,6 +19,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/queue.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -32,7 +33,7 @@ enum {
 };
 
 struct waiting {
-	struct waiting *next;
+	STAILQ_ENTRY(waiting) next;
 	struct client_message message;
 };
 
@@ -40,7 +41,7 @@ struct client {
 	uv_loop_t loop;
 	uv_timer_t timeout, heartbeat;
 	struct conn *conn; /* NULL: closed */
-	struct waiting *first, **last;
+	STAILQ_HEAD(, waiting) received;
 	uint64_t patience_ms; /* from whoever waits */
 	unsigned waiting_count;
 	size_t waiting_bytes;
@@ -84,8 +85,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	}
 	w->message.envelope = *env;
 	memset(env, 0, sizeof *env);
-	*cl->last = w;
-	cl->last = &w->next;
+	STAILQ_INSERT_TAIL(&cl->received, w, next);
 }
 
 static void on_closed(void *user, const char *why)
@@ -122,7 +122,7 @@ int client_send(struct client *cl, const Farm__Envelope *m, const void *payload,
 	start_clock(cl, ANSWER_SECONDS);
 	while (cl->conn && conn_unsent(cl->conn) && !cl->timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
-	if (!cl->conn && !cl->first)
+	if (!cl->conn && STAILQ_EMPTY(&cl->received))
 		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->why);
 	return cl->timed_out ? error_set(e, ETIMEDOUT, "the coordinator does not read what is sent to it") : 0;
 }
@@ -131,17 +131,15 @@ int client_wait(struct client *cl, double seconds, struct client_message *m, str
 {
 	memset(m, 0, sizeof *m);
 	start_clock(cl, seconds);
-	while (!cl->first && cl->conn && !cl->timed_out)
+	while (STAILQ_EMPTY(&cl->received) && cl->conn && !cl->timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
-	struct waiting *w = cl->first;
+	struct waiting *w = STAILQ_FIRST(&cl->received);
 	if (!w && !cl->conn)
 		return error_set(e, ECONNRESET, "the connection to the coordinator is lost: %s", cl->why);
 	if (!w)
 		return error_set(e, ETIMEDOUT, "the coordinator did not answer in time");
 	*m = w->message;
-	cl->first = w->next;
-	if (!cl->first)
-		cl->last = &cl->first;
+	STAILQ_REMOVE_HEAD(&cl->received, next);
 	cl->waiting_count--;
 	cl->waiting_bytes -= m->envelope.used + m->payload.size;
 	mem_free(w);
@@ -234,7 +232,7 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 	if (!cl)
 		return error_set(e, ENOMEM, "no memory for a connection");
 	signal(SIGPIPE, SIG_IGN);
-	cl->last = &cl->first;
+	STAILQ_INIT(&cl->received);
 	if (tls && *tls)
 		rc = tls_open(&cl->tls, tls, e);
 	if (rc) {
@@ -289,11 +287,10 @@ void client_close(struct client *cl)
 	assert(rc == 0);
 	(void)rc;
 	tls_close(cl->tls);
-	while (cl->first) {
-		struct waiting *next = cl->first->next;
-		client_message_fini(&cl->first->message);
-		mem_free(cl->first);
-		cl->first = next;
+	for (struct waiting *w; (w = STAILQ_FIRST(&cl->received));) {
+		STAILQ_REMOVE_HEAD(&cl->received, next);
+		client_message_fini(&w->message);
+		mem_free(w);
 	}
 	mem_free(cl);
 }

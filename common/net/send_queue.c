@@ -28,7 +28,7 @@ struct head {
 };
 
 struct send_frame {
-	struct send_frame *next;
+	STAILQ_ENTRY(send_frame) next;
 	struct head head; /* empty: it is being sent */
 	unsigned char *bytes;
 	size_t size, at, plain; /* plaintext: what it counts for in `unsent` */
@@ -47,22 +47,20 @@ void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link 
 		     const struct send_events *events, void *user)
 {
 	*q = (struct send_queue){.stream = stream, .link = link, .limit = limit, .events = events, .user = user};
-	q->last = &q->first;
+	STAILQ_INIT(&q->frames);
 }
 
 static void drop_first(struct send_queue *q)
 {
-	struct send_frame *f = q->first;
-	q->first = f->next;
-	if (!q->first)
-		q->last = &q->first;
+	struct send_frame *f = STAILQ_FIRST(&q->frames);
+	STAILQ_REMOVE_HEAD(&q->frames, next);
 	mem_free(f->bytes);
 	mem_free(f);
 }
 
 void send_queue_fini(struct send_queue *q)
 {
-	while (q->first)
+	while (!STAILQ_EMPTY(&q->frames))
 		drop_first(q);
 }
 
@@ -158,7 +156,7 @@ static void flush(struct send_queue *q, size_t plain)
 static int encrypt_piece(struct send_queue *q)
 {
 	static _Thread_local unsigned char joined[PIECE];
-	struct send_frame *f = q->first;
+	struct send_frame *f = STAILQ_FIRST(&q->frames);
 	struct error e;
 	size_t most = PIECE - f->head.size, size = f->size - f->at < most ? f->size - f->at : most;
 	const unsigned char *bytes = f->bytes + f->at;
@@ -184,7 +182,7 @@ static void pump(struct send_queue *q)
 {
 	if (!q->link || !tls_link_is_open(q->link))
 		return;
-	while (q->first && q->in_flight < WINDOW && q->state < SEND_REFUSED) {
+	while (!STAILQ_EMPTY(&q->frames) && q->in_flight < WINDOW && q->state < SEND_REFUSED) {
 		int last = encrypt_piece(q);
 		if (last < 0)
 			return;
@@ -213,8 +211,7 @@ static void append(struct send_queue *q, struct head head, unsigned char *bytes,
 		return;
 	}
 	*f = (struct send_frame){.head = head, .bytes = bytes, .size = size, .at = skip, .plain = size + FRAME_COST};
-	*q->last = f;
-	q->last = &f->next;
+	STAILQ_INSERT_TAIL(&q->frames, f, next);
 	q->unsent += f->plain;
 	pump(q);
 }

@@ -9,6 +9,7 @@
 
 #include "common/net/tls.h"
 
+#include <sys/queue.h>
 #include <uv.h>
 
 enum send_state {
@@ -34,7 +35,7 @@ struct send_queue {
 	void *user;
 	size_t limit; /* most bytes of frames that wait; a peer that lets more pile up has failed */
 	enum send_state state;
-	struct send_frame *first, **last; /* waiting to be encrypted */
+	STAILQ_HEAD(, send_frame) frames; /* waiting to be encrypted */
 	size_t unsent;			  /* bytes of frames that the kernel has not taken, and their overhead */
 	size_t in_flight;		  /* what libuv has to write; with TLS including its overhead */
 	bool sent;			  /* the first frame has been taken */

@@ -17,6 +17,7 @@
 #include "coordinator/store/seen.h"
 #include "coordinator/store/spool.h"
 
+#include <sys/queue.h>
 #include <uv.h>
 
 struct follow_up;
@@ -30,7 +31,7 @@ struct recovery;
 
 /* An event for the core that arose while an update was being carried out. */
 struct deferred {
-	struct deferred *next;
+	STAILQ_ENTRY(deferred) next;
 	struct event event;
 	char text[256];
 };
@@ -60,11 +61,11 @@ struct jobs {
 	struct spool *spool;
 	struct blob_store *blobs;
 	struct ledger *ledger;
-	struct file_check *checks; /* files that are being read (coordinator/jobs/files.c) */
-	struct live_job *live;	   /* running jobs */
-	struct job_record *ended;  /* at most ENDED_MAX, oldest first */
+	STAILQ_HEAD(, file_check) checks; /* files that are being read (coordinator/jobs/files.c) */
+	struct live_job *live;		  /* running jobs */
+	struct job_record *ended;	  /* at most ENDED_MAX, oldest first */
 	size_t ended_count;
-	struct deferred *deferred, **deferred_last;
+	STAILQ_HEAD(, deferred) deferred;
 	char refusal[256];	   /* why the core refused the last event */
 	struct found *found;	   /* sorted by id */
 	struct recovery *recovery; /* jobs of an earlier run that are being read; NULL: none left */
@@ -72,14 +73,14 @@ struct jobs {
 	struct error fault_error;
 	uint64_t *restored; /* ids of the jobs that continued when this run started */
 	size_t restored_count;
-	struct durable_ack *acks, **acks_last; /* waiting for a flush */
-	struct durable_ack *parked;	       /* ... for a new journal to replace one that failed */
-	struct ending *endings;		       /* jobs that ended and whose records could not be written yet */
-	double endings_again, ledger_again;    /* next attempts */
-	struct seen seen;		       /* when this run started */
-	double folders_next;		       /* next check of jobs' folders */
-	double clear_next;		       /* next check of finished jobs */
-	struct clearing *clearing;	       /* that check is running */
+	STAILQ_HEAD(ack_list, durable_ack) acks; /* waiting for a flush */
+	struct ack_list parked;			 /* ... for a new journal to replace one that failed */
+	struct ending *endings;			 /* jobs that ended and whose records could not be written yet */
+	double endings_again, ledger_again;	 /* next attempts */
+	struct seen seen;			 /* when this run started */
+	double folders_next;			 /* next check of jobs' folders */
+	double clear_next;			 /* next check of finished jobs */
+	struct clearing *clearing;		 /* that check is running */
 	bool flushing;
 	bool stepping, stopping;
 	bool feeding;			     /* results stored ahead of their predecessors */

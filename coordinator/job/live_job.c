@@ -65,7 +65,7 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 	job->plan = *plan;
 	job->submit = *submit;
 	memset(submit, 0, sizeof *submit);
-	job->waiting_last = &job->waiting;
+	STAILQ_INIT(&job->waiting);
 	job->times = (struct live_job_times){NAN, NAN, NAN};
 	begin_record(job, owner, submitted);
 	job->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *job->states);
@@ -250,60 +250,46 @@ bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_ke
 	struct waiting_batch *w = mem_alloc(1, sizeof *w);
 	if (!w)
 		return false;
-	*w = (struct waiting_batch){NULL, peer, *k, *env, *payload, checked};
+	*w = (struct waiting_batch){.peer = peer, .key = *k, .envelope = *env, .payload = *payload, .checked = checked};
 	memset(env, 0, sizeof *env);
 	memset(payload, 0, sizeof *payload);
-	*job->waiting_last = w;
-	job->waiting_last = &w->next;
+	STAILQ_INSERT_TAIL(&job->waiting, w, next);
 	job->waiting_bytes += waiting_size(w);
 	return true;
 }
 
 const struct waiting_batch *live_job_waits_for(const struct live_job *job, const struct lease_key *k)
 {
-	const struct waiting_batch *w = job->waiting;
-	while (w && !lease_key_equal(&w->key, k))
-		w = w->next;
+	const struct waiting_batch *w;
+	STAILQ_FOREACH(w, &job->waiting, next) {
+		if (lease_key_equal(&w->key, k))
+			break;
+	}
 	return w;
 }
 
-static void drop_waiting(struct live_job *job, uint64_t peer)
+static struct waiting_batch *take(struct live_job *job, struct waiting_batch *w)
 {
-	struct waiting_batch **at = &job->waiting;
-	while (*at) {
-		struct waiting_batch *w = *at;
-		if (w->peer != peer) {
-			at = &w->next;
-			continue;
-		}
-		*at = w->next;
-		job->waiting_bytes -= waiting_size(w);
-		waiting_batch_free(w);
-	}
-	job->waiting_last = at;
+	if (!w)
+		return NULL;
+	STAILQ_REMOVE(&job->waiting, w, waiting_batch, next);
+	job->waiting_bytes -= waiting_size(w);
+	return w;
 }
 
 void live_jobs_drop_waiting(struct live_job *first, uint64_t peer)
 {
 	for (struct live_job *job = first; job; job = job->next)
-		drop_waiting(job, peer);
-}
-
-static struct waiting_batch *take(struct live_job *job, struct waiting_batch **at)
-{
-	struct waiting_batch *w = *at;
-	if (!w)
-		return NULL;
-	*at = w->next;
-	if (!*at)
-		job->waiting_last = at;
-	job->waiting_bytes -= waiting_size(w);
-	return w;
+		for (struct waiting_batch *w = STAILQ_FIRST(&job->waiting), *next; w; w = next) {
+			next = STAILQ_NEXT(w, next);
+			if (w->peer == peer)
+				waiting_batch_free(take(job, w));
+		}
 }
 
 struct waiting_batch *live_job_take_waiting(struct live_job *job)
 {
-	return take(job, &job->waiting);
+	return take(job, STAILQ_FIRST(&job->waiting));
 }
 
 static bool is_failure(const struct waiting_batch *w)
@@ -314,10 +300,10 @@ static bool is_failure(const struct waiting_batch *w)
 
 struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer)
 {
-	struct waiting_batch **at = &job->waiting;
-	while (*at && ((*at)->peer != peer || !is_failure(*at)))
-		at = &(*at)->next;
-	return take(job, at);
+	struct waiting_batch *w = STAILQ_FIRST(&job->waiting);
+	while (w && (w->peer != peer || !is_failure(w)))
+		w = STAILQ_NEXT(w, next);
+	return take(job, w);
 }
 
 void waiting_batch_free(struct waiting_batch *w)

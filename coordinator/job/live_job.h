@@ -17,6 +17,7 @@
 #include "coordinator/store/journal.h"
 #include "coordinator/store/spool.h"
 
+#include <sys/queue.h>
 #include <uv.h>
 
 struct jobs;
@@ -45,7 +46,7 @@ struct publishing { /* at most one at a time per live job */
 
 /* A result that arrived while the canvas was busy, or a failure while the job's files are read. */
 struct waiting_batch {
-	struct waiting_batch *next;
+	STAILQ_ENTRY(waiting_batch) next;
 	uint64_t peer;
 	struct lease_key key;
 	struct envelope envelope;
@@ -137,7 +138,7 @@ struct live_job {
 	char doubts[512]; /* about results of workers that are quarantined now; "": none */
 	struct late_result *late;
 	size_t late_count;
-	struct waiting_batch *waiting, **waiting_last;
+	STAILQ_HEAD(waiting_list, waiting_batch) waiting;
 	size_t waiting_bytes;
 };
 

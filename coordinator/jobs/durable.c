@@ -37,7 +37,7 @@ struct ending {
 };
 
 struct durable_ack {
-	struct durable_ack *next;
+	STAILQ_ENTRY(durable_ack) next;
 	uint64_t peer; /* NOBODY: nobody waits for the answer */
 	struct lease_key key;
 	enum ack ack;
@@ -49,7 +49,7 @@ struct durable_ack {
 struct flush {
 	uv_work_t work;
 	struct jobs *jobs;
-	struct durable_ack *acks;
+	struct ack_list acks;
 };
 
 /* ---- jobs ---- */
@@ -265,7 +265,8 @@ static void flush_next(struct jobs *jobs);
 static void flush_journals(uv_work_t *work)
 {
 	struct flush *w = work->data;
-	for (struct durable_ack *a = w->acks; a; a = a->next) {
+	struct durable_ack *a;
+	STAILQ_FOREACH(a, &w->acks, next) {
 		struct error e;
 		a->failed = journal_sync(a->journal, &e) != 0;
 		if (a->failed)
@@ -279,13 +280,6 @@ static void drop_ack(struct durable_ack *a)
 	mem_free(a);
 }
 
-static void queue(struct jobs *jobs, struct durable_ack *a)
-{
-	a->next = NULL;
-	*jobs->acks_last = a;
-	jobs->acks_last = &a->next;
-}
-
 /* Waits until the journal is replaced. */
 static void park(struct jobs *jobs, struct durable_ack *a)
 {
@@ -295,11 +289,10 @@ static void park(struct jobs *jobs, struct durable_ack *a)
 		return;
 	}
 	if (a->journal != job->journal) { /* which is resolved by now */
-		queue(jobs, a);
+		STAILQ_INSERT_TAIL(&jobs->acks, a, next);
 		return;
 	}
-	a->next = jobs->parked;
-	jobs->parked = a;
+	STAILQ_INSERT_HEAD(&jobs->parked, a, next);
 	if (!job->held)
 		durable_hold(jobs, job, "its results cannot be stored", "its journal failed to be written");
 }
@@ -326,9 +319,8 @@ static void journals_flushed(uv_work_t *work, int status)
 	assert(status == 0);
 	(void)status;
 	jobs->flushing = false;
-	while (w->acks) {
-		struct durable_ack *a = w->acks;
-		w->acks = a->next;
+	for (struct durable_ack *a; (a = STAILQ_FIRST(&w->acks));) {
+		STAILQ_REMOVE_HEAD(&w->acks, next);
 		answer(jobs, a);
 	}
 	mem_free(w);
@@ -337,15 +329,14 @@ static void journals_flushed(uv_work_t *work, int status)
 
 static void flush_next(struct jobs *jobs)
 {
-	if (jobs->flushing || !jobs->acks)
+	if (jobs->flushing || STAILQ_EMPTY(&jobs->acks))
 		return;
 	struct flush *w = mem_alloc(1, sizeof *w);
 	if (!w) /* as for an event: without 200 bytes nothing can continue */
 		abort();
 	w->jobs = jobs;
-	w->acks = jobs->acks;
-	jobs->acks = NULL;
-	jobs->acks_last = &jobs->acks;
+	STAILQ_INIT(&w->acks);
+	STAILQ_CONCAT(&w->acks, &jobs->acks);
 	jobs->flushing = true;
 	jobs_in_pool(jobs, &w->work, w, flush_journals, journals_flushed);
 }
@@ -357,7 +348,7 @@ void durable_ack(struct jobs *jobs, const struct live_job *job, uint64_t peer, c
 		return;
 	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = job->journal};
 	journal_hold(a->journal);
-	queue(jobs, a);
+	STAILQ_INSERT_TAIL(&jobs->acks, a, next);
 	flush_next(jobs);
 }
 
@@ -408,18 +399,17 @@ static void write_counts(struct jobs *jobs, struct live_job *job)
 /* Answers that waited for journals which have been replaced. */
 static void unpark(struct jobs *jobs)
 {
-	struct durable_ack *list = jobs->parked;
-	jobs->parked = NULL;
-	for (struct durable_ack *a, *next = list; (a = next);) {
+	struct ack_list list = STAILQ_HEAD_INITIALIZER(list);
+	STAILQ_CONCAT(&list, &jobs->parked);
+	for (struct durable_ack *a; (a = STAILQ_FIRST(&list));) {
 		struct live_job *job = jobs_find(jobs, a->key.job);
-		next = a->next;
+		STAILQ_REMOVE_HEAD(&list, next);
 		if (!job) {
 			drop_ack(a);
 		} else if (a->journal == job->journal && journal_is_bad(a->journal)) {
-			a->next = jobs->parked;
-			jobs->parked = a;
+			STAILQ_INSERT_HEAD(&jobs->parked, a, next);
 		} else {
-			queue(jobs, a);
+			STAILQ_INSERT_TAIL(&jobs->acks, a, next);
 		}
 	}
 	flush_next(jobs);
@@ -455,7 +445,7 @@ void durable_tick(struct jobs *jobs)
 {
 	for (struct live_job *job = jobs->live; job; job = job->next)
 		write_counts(jobs, job);
-	if (jobs->parked)
+	if (!STAILQ_EMPTY(&jobs->parked))
 		unpark(jobs);
 	end_again(jobs);
 	mend_ledger(jobs);
@@ -463,9 +453,9 @@ void durable_tick(struct jobs *jobs)
 
 void durable_close(struct jobs *jobs)
 {
-	assert(!jobs->flushing && !jobs->acks);
-	for (struct durable_ack *a; (a = jobs->parked);) {
-		jobs->parked = a->next;
+	assert(!jobs->flushing && STAILQ_EMPTY(&jobs->acks));
+	for (struct durable_ack *a; (a = STAILQ_FIRST(&jobs->parked));) {
+		STAILQ_REMOVE_HEAD(&jobs->parked, next);
 		drop_ack(a);
 	}
 	for (struct ending *n; (n = jobs->endings);) {

@@ -67,7 +67,7 @@ static void look_at_all(struct jobs *jobs)
 /* ---- reading: some megabytes at a time, so that a large scene keeps no thread of the pool from others ---- */
 
 struct file_check {
-	struct file_check *next; /* one is read at a time, the first */
+	STAILQ_ENTRY(file_check) next; /* one is read at a time, the first */
 	uv_work_t work;
 	struct jobs *jobs;
 	struct blob_hash hash;
@@ -94,7 +94,7 @@ static void on_read(uv_work_t *work, int status);
 
 static void read_first(struct jobs *jobs)
 {
-	struct file_check *c = jobs->checks;
+	struct file_check *c = STAILQ_FIRST(&jobs->checks);
 	if (c)
 		jobs_in_pool(jobs, &c->work, c, read_some, on_read);
 }
@@ -102,10 +102,10 @@ static void read_first(struct jobs *jobs)
 /* Whoever waits for the first one goes on. */
 static void finish_first(struct jobs *jobs)
 {
-	struct file_check *c = jobs->checks;
+	struct file_check *c = STAILQ_FIRST(&jobs->checks);
 	struct error e = {""};
 	int rc = blob_check_end(c->check, &e);
-	jobs->checks = c->next;
+	STAILQ_REMOVE_HEAD(&jobs->checks, next);
 	read_first(jobs);
 	if (rc == -EBADMSG)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
@@ -120,9 +120,8 @@ static void finish_first(struct jobs *jobs)
 
 static void stop(struct jobs *jobs)
 {
-	while (jobs->checks) {
-		struct file_check *c = jobs->checks;
-		jobs->checks = c->next;
+	for (struct file_check *c; (c = STAILQ_FIRST(&jobs->checks));) {
+		STAILQ_REMOVE_HEAD(&jobs->checks, next);
 		blob_check_end(c->check, NULL);
 		mem_free(c);
 	}
@@ -143,9 +142,9 @@ static void on_read(uv_work_t *work, int status)
 
 static bool is_read(const struct jobs *jobs, const struct blob_hash *h)
 {
-	const struct file_check *c = jobs->checks;
+	const struct file_check *c = STAILQ_FIRST(&jobs->checks);
 	while (c && !blob_hash_equal(&c->hash, h))
-		c = c->next;
+		c = STAILQ_NEXT(c, next);
 	return c != NULL;
 }
 
@@ -163,11 +162,8 @@ static int check(struct jobs *jobs, const struct blob_hash *h, double seconds, s
 	}
 	c->jobs = jobs;
 	c->hash = *h;
-	struct file_check **last = &jobs->checks;
-	while (*last)
-		last = &(*last)->next;
-	*last = c;
-	if (c == jobs->checks)
+	STAILQ_INSERT_TAIL(&jobs->checks, c, next);
+	if (c == STAILQ_FIRST(&jobs->checks))
 		read_first(jobs);
 	return -EINPROGRESS;
 }
@@ -182,9 +178,9 @@ int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
 
 bool files_are_read(const struct jobs *jobs, const struct live_job *job)
 {
-	const struct file_check *c = jobs->checks;
+	const struct file_check *c = STAILQ_FIRST(&jobs->checks);
 	while (c && !needs(job, &c->hash))
-		c = c->next;
+		c = STAILQ_NEXT(c, next);
 	return c != NULL;
 }
 

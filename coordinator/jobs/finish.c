@@ -43,15 +43,13 @@ static void finish(struct jobs *jobs, struct live_job *job)
 	while (*at != job)
 		at = &(*at)->next;
 	*at = job->next;
-	struct waiting_batch *late = job->waiting;
-	job->waiting = NULL;
-	job->waiting_last = &job->waiting;
+	struct waiting_list late = STAILQ_HEAD_INITIALIZER(late);
+	STAILQ_CONCAT(&late, &job->waiting);
 	live_job_free(job);
-	while (late) { /* the core knows that the job is over */
-		struct waiting_batch *next = late->next;
-		results_take_waiting(jobs, late);
-		waiting_batch_free(late);
-		late = next;
+	for (struct waiting_batch *w; (w = STAILQ_FIRST(&late));) { /* the core knows that the job is over */
+		STAILQ_REMOVE_HEAD(&late, next);
+		results_take_waiting(jobs, w);
+		waiting_batch_free(w);
 	}
 }
 

@@ -18,7 +18,7 @@ static void on_drain(uv_timer_t *t)
 {
 	struct jobs *jobs = t->data;
 	struct live_job *job = jobs->live;
-	while (job && (job->busy || !job->waiting || files_are_read(jobs, job)))
+	while (job && (job->busy || STAILQ_EMPTY(&job->waiting) || files_are_read(jobs, job)))
 		job = job->next;
 	if (!job)
 		return;

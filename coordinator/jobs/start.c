@@ -63,8 +63,10 @@ int jobs_open(struct jobs *jobs, struct error *e)
 void jobs_init(struct jobs *jobs)
 {
 	jobs->follow_up = &follow_up;
-	jobs->deferred_last = &jobs->deferred;
-	jobs->acks_last = &jobs->acks;
+	STAILQ_INIT(&jobs->deferred);
+	STAILQ_INIT(&jobs->acks);
+	STAILQ_INIT(&jobs->parked);
+	STAILQ_INIT(&jobs->checks);
 	uv_timer_init(jobs->loop, &jobs->wake);
 	uv_timer_init(jobs->loop, &jobs->drain);
 	jobs->wake.data = jobs->drain.data = jobs;
@@ -99,10 +101,9 @@ void jobs_close(struct jobs *jobs)
 		live_job_free(jobs->live);
 		jobs->live = next;
 	}
-	while (jobs->deferred) {
-		struct deferred *next = jobs->deferred->next;
-		mem_free(jobs->deferred);
-		jobs->deferred = next;
+	for (struct deferred *d; (d = STAILQ_FIRST(&jobs->deferred));) {
+		STAILQ_REMOVE_HEAD(&jobs->deferred, next);
+		mem_free(d);
 	}
 	if (jobs->seen.up > 0)
 		ages_keep(jobs);

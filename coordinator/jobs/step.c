@@ -28,8 +28,7 @@ void jobs_defer(struct jobs *jobs, const struct event *ev)
 	d->event = *ev;
 	text_copy(d->text, sizeof d->text, ev->text ? ev->text : "");
 	d->event.text = d->text;
-	*jobs->deferred_last = d;
-	jobs->deferred_last = &d->next;
+	STAILQ_INSERT_TAIL(&jobs->deferred, d, next);
 }
 
 void jobs_break(struct jobs *jobs, uint64_t job, const char *text)
@@ -73,11 +72,8 @@ void jobs_step_with(struct jobs *jobs, struct event *ev, const struct incoming *
 	assert(!jobs->stepping);
 	jobs->stepping = true;
 	one_step(jobs, ev, in);
-	while (jobs->deferred) {
-		struct deferred *d = jobs->deferred;
-		jobs->deferred = d->next;
-		if (!jobs->deferred)
-			jobs->deferred_last = &jobs->deferred;
+	for (struct deferred *d; (d = STAILQ_FIRST(&jobs->deferred));) {
+		STAILQ_REMOVE_HEAD(&jobs->deferred, next);
 		one_step(jobs, &d->event, &nothing);
 		mem_free(d);
 	}

@@ -11,7 +11,7 @@
 enum { HELD_MOST = 1 << 28, PEER_MOST = 1 << 23, MESSAGE_COST = 256 };
 
 struct held {
-	struct held *next;
+	STAILQ_ENTRY(held) next;
 	struct envelope envelope;
 };
 
@@ -30,7 +30,7 @@ static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 bool held_take(struct session *p, struct envelope *env)
 {
 	struct peers *s = p->peers;
-	if (!recovery_is_on(p->jobs) || is_answered_at_once(env->message->body_case, !p->held))
+	if (!recovery_is_on(p->jobs) || is_answered_at_once(env->message->body_case, STAILQ_EMPTY(&p->held)))
 		return false;
 	size_t cost = cost_of(env);
 	struct held *h =
@@ -41,14 +41,11 @@ bool held_take(struct session *p, struct envelope *env)
 			"the coordinator is still reading its jobs, and too many requests wait for that: try again later");
 		return true;
 	}
-	if (!p->held) {
-		p->held_last = &p->held;
+	if (STAILQ_EMPTY(&p->held))
 		p->told = jobs_now(p->jobs);
-	}
 	h->envelope = *env;
 	memset(env, 0, sizeof *env);
-	*p->held_last = h;
-	p->held_last = &h->next;
+	STAILQ_INSERT_TAIL(&p->held, h, next);
 	p->held_bytes += cost;
 	s->held_bytes += cost;
 	return true;
@@ -56,7 +53,7 @@ bool held_take(struct session *p, struct envelope *env)
 
 void held_tick(struct session *p)
 {
-	bool waits = p->held || (p->upload && (upload_is_looking(p->upload) || p->upload->flush));
+	bool waits = !STAILQ_EMPTY(&p->held) || (p->upload && (upload_is_looking(p->upload) || p->upload->flush));
 	if (!waits || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
 		return;
 	p->told = jobs_now(p->jobs);
@@ -65,10 +62,10 @@ void held_tick(struct session *p)
 
 bool held_next(struct session *p, struct envelope *env)
 {
-	struct held *h = p->held;
+	struct held *h = STAILQ_FIRST(&p->held);
 	if (!h)
 		return false;
-	p->held = h->next;
+	STAILQ_REMOVE_HEAD(&p->held, next);
 	p->held_bytes -= cost_of(&h->envelope);
 	p->peers->held_bytes -= cost_of(&h->envelope);
 	*env = h->envelope;

@@ -65,6 +65,8 @@ void peers_accept(struct peers *s)
 	p->peers = s;
 	p->jobs = s->jobs;
 	p->id = ++s->last_peer;
+	STAILQ_INIT(&p->requests);
+	STAILQ_INIT(&p->held);
 	if (conn_accept(&p->conn, (uv_stream_t *)&s->listener, &config, &conversation_events, p, &e)) {
 		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
 		s->caller_waits = true;

@@ -37,8 +37,8 @@ struct session {
 	char name[128], address[64];
 	struct tls_peer who; /* role in its certificate; TLS_NOBODY without TLS, when everybody may do everything */
 	uint32_t payload_limit;
-	size_t leases_most;		 /* bytes of as many leases as it wants */
-	struct worker_request *requests; /* that wait until it has read what was sent, or until a file is read */
+	size_t leases_most;			/* bytes of as many leases as it wants */
+	STAILQ_HEAD(, worker_request) requests; /* that wait until it has read what was sent, or until a file is read */
 	unsigned request_count;
 	double heard;	       /* s of the loop's clock: the last heartbeat sent during a long message */
 	struct upload *upload; /* a submission that waits for blobs */
@@ -54,9 +54,9 @@ struct session {
 		uint64_t size; /* its size when it was opened: a log grows */
 		double at;     /* s of the loop's clock: the last chunk */
 	} fetch;
-	uint64_t wants_preview;		/* job whose preview is being made for it; 0: none */
-	struct job_view *shown;		/* what was last sent to the watcher */
-	struct held *held, **held_last; /* requests that wait until the jobs are read */
+	uint64_t wants_preview;	  /* job whose preview is being made for it; 0: none */
+	struct job_view *shown;	  /* what was last sent to the watcher */
+	STAILQ_HEAD(, held) held; /* requests that wait until the jobs are read */
 	size_t held_bytes;
 	double told;	    /* s of the loop's clock: the last heartbeat sent meanwhile */
 	char rejected[256]; /* why the core refused; "": it did not */

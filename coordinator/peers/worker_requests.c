@@ -72,7 +72,7 @@ static bool answer(struct session *p, const struct worker_request *a)
 
 void worker_requests_take(struct session *p, const struct worker_request *a)
 {
-	if (!p->requests && conn_unsent(p->conn) <= AHEAD && answer(p, a))
+	if (STAILQ_EMPTY(&p->requests) && conn_unsent(p->conn) <= AHEAD && answer(p, a))
 		return;
 	struct worker_request *last = p->request_count < REQUESTS_MOST ? mem_alloc(1, sizeof *last) : NULL;
 	if (!last) {
@@ -81,30 +81,28 @@ void worker_requests_take(struct session *p, const struct worker_request *a)
 		return;
 	}
 	*last = *a;
-	struct worker_request **at = &p->requests;
-	while (*at)
-		at = &(*at)->next;
-	*at = last;
+	STAILQ_INSERT_TAIL(&p->requests, last, next);
 	p->request_count++;
 }
 
 static void drop_first(struct session *p)
 {
-	struct worker_request *a = p->requests;
-	p->requests = a->next;
+	struct worker_request *a = STAILQ_FIRST(&p->requests);
+	STAILQ_REMOVE_HEAD(&p->requests, next);
 	p->request_count--;
 	mem_free(a);
 }
 
 void worker_requests_go_on(struct session *p)
 {
-	while (p->requests && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD && answer(p, p->requests))
+	while (!STAILQ_EMPTY(&p->requests) && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD &&
+	       answer(p, STAILQ_FIRST(&p->requests)))
 		drop_first(p);
 }
 
 void worker_requests_file_read(struct session *p, const struct blob_hash *h, const char *refusal)
 {
-	const struct worker_request *a = p->requests;
+	const struct worker_request *a = STAILQ_FIRST(&p->requests);
 	if (!a || p->state != SESSION_WORKER)
 		return;
 	if (a->blob && a->number == 0 && blob_hash_equal(&a->hash, h)) { /* not checked again, however long it took */
@@ -116,6 +114,6 @@ void worker_requests_file_read(struct session *p, const struct blob_hash *h, con
 
 void worker_requests_drop(struct session *p)
 {
-	while (p->requests)
+	while (!STAILQ_EMPTY(&p->requests))
 		drop_first(p);
 }

@@ -8,10 +8,12 @@
 
 #include "common/blob/blob.h"
 
+#include <sys/queue.h>
+
 struct session;
 
 struct worker_request {
-	struct worker_request *next;
+	STAILQ_ENTRY(worker_request) next;
 	bool blob;	 /* otherwise for a job */
 	uint64_t number; /* id of the job; offset in the blob */
 	struct blob_hash hash;

@@ -54,7 +54,7 @@ static void no_memory_for_an_image(void **state)
 		mem_fail_after(0);
 		publish_start(&s->jobs, job, what, live_job_rounds(job));
 		mem_fail_after(-1);
-		assert_true(job->busy && !s->jobs.deferred);
+		assert_true(job->busy && STAILQ_EMPTY(&s->jobs.deferred));
 		while (job->busy || (what == PUBLISH_RESULT && !job->record.has_result))
 			uv_run(&s->loop, UV_RUN_ONCE);
 		struct job_status status;
