@@ -53,20 +53,22 @@ static int crypto_error(struct error *e, const char *what)
 	return -EBADMSG;
 }
 
-/* Writes the bytes of b, atomically. Frees b. */
-static int write_pem(const char *path, BIO *b, mode_t mode, struct error *e)
+/* Writes the bytes of b, atomically, into a file of the folder. Frees b. */
+static int write_pem(const char *folder, const char *middle, const char *name, BIO *b, mode_t mode, struct error *e)
 {
-	char temporary[PATH_SIZE + 8];
-	char *bytes = NULL;
+	char path[PATH_SIZE], temporary[PATH_SIZE + 8], *bytes = NULL;
 	long size = b ? BIO_get_mem_data(b, &bytes) : 0;
-	if (size <= 0) {
+	int rc = path_in(path, e, folder, middle, name);
+	if (!rc && size <= 0)
+		rc = crypto_error(e, path);
+	if (rc) {
 		BIO_free(b);
-		return crypto_error(e, path);
+		return rc;
 	}
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	unlink(temporary);
 	int fd = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-	int rc = fd < 0 || fchmod(fd, mode) ? -errno : disk_write_all(fd, bytes, (size_t)size);
+	rc = fd < 0 || fchmod(fd, mode) ? -errno : disk_write_all(fd, bytes, (size_t)size);
 	if (!rc && fsync(fd))
 		rc = -errno;
 	if (fd >= 0 && close(fd) && !rc)
@@ -287,9 +289,7 @@ static bool add_revoked(struct authority *a, X509 *cert)
 
 static int write_list(struct authority *a, const char *middle, struct error *e)
 {
-	char path[PATH_SIZE];
-	int rc = path_in(path, e, a->folder, middle, "crl.pem");
-	return rc ? rc : write_pem(path, pem_list(a->list), 0644, e);
+	return write_pem(a->folder, middle, "crl.pem", pem_list(a->list), 0644, e);
 }
 
 /* ---- commands ---- */
@@ -311,14 +311,12 @@ static int write_authority(struct authority *a, struct error *e)
 	if (!rc)
 		rc = make_folder(path, true, e);
 	if (!rc)
-		rc = path_in(path, e, a->folder, "", "ca.key");
-	if (!rc)
-		rc = write_pem(path, pem_key(a->key), 0600, e);
+		rc = write_pem(a->folder, "", "ca.key", pem_key(a->key), 0600, e);
 	if (!rc)
 		rc = write_list(a, "", e);
 	if (!rc) /* written last: it marks a complete authority */
-		rc = path_in(path, e, a->folder, "", "ca.pem");
-	return rc ? rc : write_pem(path, pem_cert(a->cert), 0644, e);
+		rc = write_pem(a->folder, "", "ca.pem", pem_cert(a->cert), 0644, e);
+	return rc;
 }
 
 int authority_init(const char *folder, const char *name, double days, struct error *e)
@@ -354,26 +352,17 @@ int authority_init(const char *folder, const char *name, double days, struct err
 /* Key first: a program that reads in between finds that key and certificate do not match, and keeps its old pair. */
 static int write_issued(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
 {
-	char path[PATH_SIZE], file[80];
+	char file[80];
 	struct tls_peer who;
 	int rc = tls_read_peer(cert, &who, e);
-	if (!rc) {
-		snprintf(file, sizeof file, "%s.pem", who.serial);
-		rc = path_in(path, e, a->folder, "issued", file);
-	}
+	snprintf(file, sizeof file, "%s.pem", who.serial);
 	if (!rc) /* before anybody can use it: a certificate that is not recorded cannot be revoked by name */
-		rc = write_pem(path, pem_cert(cert), 0644, e);
+		rc = write_pem(a->folder, "issued", file, pem_cert(cert), 0644, e);
 	if (!rc)
-		rc = path_in(path, e, a->folder, name, "key.pem");
+		rc = write_pem(a->folder, name, "key.pem", pem_key(key), 0600, e);
 	if (!rc)
-		rc = write_pem(path, pem_key(key), 0600, e);
-	if (!rc)
-		rc = path_in(path, e, a->folder, name, "ca.pem");
-	if (!rc)
-		rc = write_pem(path, pem_cert(a->cert), 0644, e);
-	if (!rc)
-		rc = path_in(path, e, a->folder, name, "cert.pem");
-	return rc ? rc : write_pem(path, pem_cert(cert), 0644, e);
+		rc = write_pem(a->folder, name, "ca.pem", pem_cert(a->cert), 0644, e);
+	return rc ? rc : write_pem(a->folder, name, "cert.pem", pem_cert(cert), 0644, e);
 }
 
 /* A folder may only be renewed with a certificate of the same name and role. */
