@@ -17,6 +17,11 @@ struct lease_key {
 	uint64_t epoch;
 };
 const char *lease_kind_name(enum lease_kind kind); /* "bootstrap", "render" */
+/* A lease in a line of a log, and (without its kind) in a sentence: printf(LEASE_WORDS, LEASE_PLACE(&key)). */
+#define LEASE_FORMAT "kind=%s group=%u part=%u epoch=%llu"
+#define LEASE_VALUES(k) lease_kind_name((k)->kind), LEASE_PLACE(k)
+#define LEASE_WORDS "group %u part %u epoch %llu"
+#define LEASE_PLACE(k) (k)->group, (k)->part, (unsigned long long)(k)->epoch
 bool lease_key_equal(const struct lease_key *a, const struct lease_key *b);
 
 enum { TILE_SIZE = 64, TILE_CHANNELS = 3 }; /* X Y Z */

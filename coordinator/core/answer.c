@@ -185,8 +185,8 @@ static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s
 	if (j->proofs[s - j->slots].count < VERIFY_MOST)
 		return;
 	proof_names(j, s, names, sizeof names);
-	text_print(text, sizeof text, "no two of %d workers agree on group %u part %u epoch %llu: %s", VERIFY_MOST,
-		   k->group, k->part, (unsigned long long)k->epoch, names);
+	text_print(text, sizeof text, "no two of %d workers agree on " LEASE_WORDS ": %s", VERIFY_MOST, LEASE_PLACE(k),
+		   names);
 	rounds_end(f, j, END_FAILED, text);
 }
 

@@ -90,8 +90,8 @@ static void take_back(struct farm *f, struct job *j, struct slot *s, const char 
 	a->job = j->id;
 	a->key = slot_key(j, s);
 	text_print(f->text, sizeof f->text,
-		   "group %u part %u epoch %llu is computed again: its chain states, made by %s, were refused by %s",
-		   a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker), refusers);
+		   LEASE_WORDS " is computed again: its chain states, made by %s, were refused by %s",
+		   LEASE_PLACE(&a->key), name_of(f, maker), refusers);
 	a->text = f->text;
 }
 
@@ -162,12 +162,10 @@ bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t siz
 		if (!doubt_waits(s) || s->holders)
 			continue;
 		const struct lease_key k = slot_key(j, s);
-		text_print(
-			text, size,
-			"a third worker will decide whether the chain states of group %u part %u epoch %llu are wrong: "
-			"%s made them, %s refused them",
-			k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker),
-			name_of(f, s->doubt.refuser));
+		text_print(text, size,
+			   "a third worker will decide whether the chain states of " LEASE_WORDS " are wrong: "
+			   "%s made them, %s refused them",
+			   LEASE_PLACE(&k), name_of(f, s->doubt.maker), name_of(f, s->doubt.refuser));
 		return true;
 	}
 	return false;

@@ -72,10 +72,9 @@ void lost_lease(struct farm *f, struct lease *l)
 	n = gone(&s->lost, &certificates);
 	if (n < LOST_TOLD)
 		return;
-	text_print(
-		f->text, sizeof f->text,
-		"%s: %u of %d workers that were lost in a row while they held %s group %u part %u epoch %llu; the last one: %s",
-		j->name, n, LOST_FATAL, lease_kind_name(k.kind), k.group, k.part, (unsigned long long)k.epoch, p->name);
+	text_print(f->text, sizeof f->text,
+		   "%s: %u of %d workers that were lost in a row while they held %s " LEASE_WORDS "; the last one: %s",
+		   j->name, n, LOST_FATAL, LEASE_VALUES(&k), p->name);
 	text_copy(j->text, sizeof j->text, f->text);
 	if (n < LOST_FATAL || certificates < failure_quorum_certificates(f))
 		return;

@@ -30,8 +30,8 @@ static void quarantine_worker(struct farm *f, struct identity *who)
 
 void quarantine_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k)
 {
-	snprintf(who->text, sizeof who->text, "%s: j%llu %s group %u part %u epoch %llu", what,
-		 (unsigned long long)k->job, lease_kind_name(k->kind), k->group, k->part, (unsigned long long)k->epoch);
+	snprintf(who->text, sizeof who->text, "%s: j%llu %s " LEASE_WORDS, what, (unsigned long long)k->job,
+		 LEASE_VALUES(k));
 	who->wrong++;
 	struct action *a = update_add(f, ACTION_WRONG);
 	a->who = who->id;

@@ -109,8 +109,7 @@ bool verify_why(const struct farm *f, const struct job *j, char *text, size_t si
 	if (proof_of(j, s)->count < 2)
 		snprintf(text, size, "verification waits for a second worker (%u leases have one answer)", j->noted);
 	else
-		text_print(text, size,
-			   "verification waits for another worker: %s differ on group %u part %u epoch %llu", names,
-			   k.group, k.part, (unsigned long long)k.epoch);
+		text_print(text, size, "verification waits for another worker: %s differ on " LEASE_WORDS, names,
+			   LEASE_PLACE(&k));
 	return true;
 }

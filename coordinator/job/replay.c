@@ -210,8 +210,7 @@ static void say_damage(const struct replay *r, const struct journal_found *found
 		const struct lease_key *k = &r->damaged[i];
 		if (replay_place(job, k) == REPLAY_MERGED)
 			continue;
-		text_put(&t, "%s%s group %u part %u epoch %llu", open++ ? ", " : ": ", lease_kind_name(k->kind),
-			 k->group, k->part, (unsigned long long)k->epoch);
+		text_put(&t, "%s%s " LEASE_WORDS, open++ ? ", " : ": ", LEASE_VALUES(k));
 	}
 	live_job_log(
 		job, LOG_SPOOL_FAULT,

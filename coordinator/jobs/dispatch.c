@@ -156,9 +156,8 @@ static void merge(struct jobs *jobs, const struct action *a, const struct incomi
 		jobs_break(jobs, a->job, e.text);
 	trust_merged(job, a);
 	live_job_note_times(job, farm_elapsed(jobs->farm, a->job, jobs_now(jobs)), rounds);
-	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%s group=%u part=%u epoch=%llu%s", log_u64(a->job),
-		  log_u64(a->peer), lease_kind_name(a->key.kind), a->key.group, a->key.part, log_u64(a->key.epoch),
-		  in->stored ? " late=1" : "");
+	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu " LEASE_FORMAT "%s", log_u64(a->job), log_u64(a->peer),
+		  LEASE_VALUES(&a->key), in->stored ? " late=1" : "");
 }
 
 static void take_back(struct jobs *jobs, const struct action *a, const struct incoming *in)
@@ -167,8 +166,7 @@ static void take_back(struct jobs *jobs, const struct action *a, const struct in
 	assert(job && !job->busy && in->back);
 	back_take(job, in->back);
 	trust_taken_back(job, a->who);
-	live_job_log(job, LOG_BATCH_TAKEN_BACK, "kind=%s group=%u part=%u epoch=%llu text=%s",
-		     lease_kind_name(a->key.kind), a->key.group, a->key.part, log_u64(a->key.epoch),
+	live_job_log(job, LOG_BATCH_TAKEN_BACK, LEASE_FORMAT " text=%s", LEASE_VALUES(&a->key),
 		     log_quote(a->text).text);
 }
 
@@ -184,9 +182,8 @@ static void acknowledge(struct jobs *jobs, const struct action *a)
 		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
 						: LOG_BATCH_REFUSED,
-			  "job=j%llu peer=%llu worker=%s kind=%s group=%u part=%u epoch=%llu text=%s", log_u64(a->job),
-			  log_u64(a->peer), log_quote(name ? name : "?").text, lease_kind_name(a->key.kind),
-			  a->key.group, a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
+			  "job=j%llu peer=%llu worker=%s " LEASE_FORMAT " text=%s", log_u64(a->job), log_u64(a->peer),
+			  log_quote(name ? name : "?").text, LEASE_VALUES(&a->key), log_quote(a->text).text);
 }
 
 /* ---- leases and peers ---- */
@@ -198,15 +195,15 @@ static void send_lease(struct jobs *jobs, const struct action *a)
 		return;
 	live_job_count_worker(job, a->peer);
 	jobs->peers.send_lease(jobs->peers.user, a->peer, job, &a->key, a->anew);
-	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%s group=%u part=%u epoch=%llu", log_u64(a->job),
-		  log_u64(a->peer), lease_kind_name(a->key.kind), a->key.group, a->key.part, log_u64(a->key.epoch));
+	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->job), log_u64(a->peer),
+		  LEASE_VALUES(&a->key));
 }
 
 static void revoke_lease(struct jobs *jobs, const struct action *a)
 {
 	jobs->peers.revoke(jobs->peers.user, a->peer, &a->key);
-	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu kind=%s group=%u part=%u epoch=%llu", log_u64(a->job),
-		  log_u64(a->peer), lease_kind_name(a->key.kind), a->key.group, a->key.part, log_u64(a->key.epoch));
+	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->job), log_u64(a->peer),
+		  LEASE_VALUES(&a->key));
 }
 
 static void close_peer(struct jobs *jobs, const struct action *a)

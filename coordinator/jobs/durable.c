@@ -304,9 +304,8 @@ static void answer(struct jobs *jobs, struct durable_ack *a)
 		return;
 	}
 	if (a->ack == ACK_MERGED)
-		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%s group=%u part=%u epoch=%llu",
-			  (unsigned long long)a->key.job, (unsigned long long)a->peer, lease_kind_name(a->key.kind),
-			  a->key.group, a->key.part, (unsigned long long)a->key.epoch);
+		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu " LEASE_FORMAT, log_u64(a->key.job), log_u64(a->peer),
+			  LEASE_VALUES(&a->key));
 	if (!jobs->stopping && a->peer != NOBODY)
 		jobs->peers.acknowledge(jobs->peers.user, a->peer, &a->key, a->ack, "");
 	drop_ack(a);

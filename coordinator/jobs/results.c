@@ -23,9 +23,8 @@ static void fail(struct jobs *jobs, struct live_job *job, uint64_t peer, const s
 {
 	const char *name = jobs->peers.name(jobs->peers.user, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
-	live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%s group=%u part=%u epoch=%llu",
-		     log_quote(name ? name : "?").text, log_quote(why).text, lease_kind_name(k->kind), k->group,
-		     k->part, (unsigned long long)k->epoch);
+	live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=0 text=%s " LEASE_FORMAT, log_quote(name ? name : "?").text,
+		     log_quote(why).text, LEASE_VALUES(k));
 	jobs->peers.acknowledge(jobs->peers.user, peer, k, ACK_REFUSED, why);
 	jobs_step(jobs, &ev);
 }
@@ -112,15 +111,13 @@ static void log_failure(const struct jobs *jobs, const char *from, struct live_j
 			const struct lease_key *k, const char *text, bool holds)
 {
 	struct log_value name = log_quote(from ? from : "?"), said = log_quote(text);
-	unsigned long long epoch = k->epoch;
 	if (f->bad_states)
-		live_job_log(job, LOG_LEASE_FAILED,
-			     "states_of=%s refused_by=%s text=%s kind=%s group=%u part=%u epoch=%llu",
+		live_job_log(job, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s " LEASE_FORMAT,
 			     log_quote(holds ? farm_maker(jobs->farm, k) : "?").text, name.text, said.text,
-			     lease_kind_name(k->kind), k->group, k->part, epoch);
+			     LEASE_VALUES(k));
 	else
-		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%s group=%u part=%u epoch=%llu",
-			     name.text, f->own, said.text, lease_kind_name(k->kind), k->group, k->part, epoch);
+		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s " LEASE_FORMAT, name.text, f->own,
+			     said.text, LEASE_VALUES(k));
 }
 
 static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed *f)

@@ -322,12 +322,11 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 	}
 	struct lease_task *l = find_lease(a, &k);
 	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
-		log_event(LOG_BATCH_REFUSED, "job=j%llu kind=%s group=%u part=%u epoch=%llu text=%s", log_u64(k.job),
-			  lease_kind_name(k.kind), k.group, k.part, log_u64(k.epoch), log_quote(m->text).text);
+		log_event(LOG_BATCH_REFUSED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64(k.job), LEASE_VALUES(&k),
+			  log_quote(m->text).text);
 	else if (m->verdict != FARM__VERDICT__VERDICT_NOTED)
-		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu kind=%s group=%u part=%u epoch=%llu repeat=%d",
-			  log_u64(k.job), lease_kind_name(k.kind), k.group, k.part, log_u64(k.epoch),
-			  m->verdict == FARM__VERDICT__VERDICT_REPEATED);
+		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu " LEASE_FORMAT " repeat=%d", log_u64(k.job),
+			  LEASE_VALUES(&k), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		drop_lease(a, l);
 		limit_backlog(a);

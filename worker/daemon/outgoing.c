@@ -42,8 +42,8 @@ static void send_failure(struct agent *a, const struct lease_key *k, const char 
 	}
 	send_message(a, ENVELOPE_OF(LEASE_FAILED, lease_failed, &failed));
 	if (*text)
-		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%s group=%u part=%u epoch=%llu text=%s", log_u64(k->job),
-			  lease_kind_name(k->kind), k->group, k->part, log_u64(k->epoch), log_quote(text).text);
+		log_event(LOG_LEASE_FAILED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64(k->job), LEASE_VALUES(k),
+			  log_quote(text).text);
 }
 
 void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
