@@ -102,13 +102,13 @@ int disk_replace(const char *path, const void *bytes, size_t size, mode_t mode, 
 		return 0;
 	if (fd >= 0)
 		disk_unlink(temporary);
-	return error_set(e, -rc, "%s: %s", path, strerror(-rc));
+	return error_file(e, -rc, path);
 }
 
 int disk_sync_folder(const char *path, struct error *e)
 {
 	int fd = disk_open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);
-	int rc = fd < 0 || disk_fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	int rc = fd < 0 || disk_fsync(fd) ? error_file(e, errno, path) : 0;
 	if (fd >= 0)
 		disk_close(fd);
 	return rc;
@@ -120,7 +120,7 @@ int disk_make_folder(const char *path, struct error *e)
 	bool there =
 		disk_mkdir(path, 0700) != 0; /* perhaps by a start that was interrupted: its name is flushed again */
 	if (there && errno != EEXIST)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_file(e, errno, path);
 	int n = snprintf(parent, sizeof parent, "%s", path);
 	if (n < 0 || (size_t)n >= sizeof parent)
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);

@@ -19,6 +19,11 @@ int error_set(struct error *e, int errno_value, const char *format, ...)
 	return -errno_value;
 }
 
+int error_file(struct error *e, int errno_value, const char *path)
+{
+	return error_set(e, errno_value, "%s: %s", path, strerror(errno_value));
+}
+
 int error_prefix(struct error *e, int code, const char *format, ...)
 {
 	if (e) {

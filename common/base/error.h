@@ -16,6 +16,9 @@ struct error {
 /* Writes the sentence, sanitised as in text.h, and returns -errno_value. e may be NULL if only the code is wanted. */
 __attribute__((format(printf, 3, 4))) int error_set(struct error *e, int errno_value, const char *format, ...);
 
+/* "path: " and what the system calls this error. */
+int error_file(struct error *e, int errno_value, const char *path);
+
 /* Puts "prefix: " in front of the sentence. Returns code. */
 __attribute__((format(printf, 3, 4))) int error_prefix(struct error *e, int code, const char *format, ...);
 

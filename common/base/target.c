@@ -31,7 +31,7 @@ static int follow(char path[TARGET_PATH], struct error *e)
 	char to[TARGET_PATH], next[TARGET_PATH];
 	ssize_t n = readlink(path, to, sizeof to - 1);
 	if (n < 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_file(e, errno, path);
 	to[n] = 0;
 	const char *slash = strrchr(path, '/');
 	int folder = *to == '/' || !slash ? 0 : (int)(slash - path) + 1;

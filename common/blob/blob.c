@@ -149,7 +149,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 	int rc = 0;
 	DIR *d = disk_opendir(s->folder);
 	if (!d)
-		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
+		return error_file(e, errno, s->folder);
 	for (struct dirent *f; !rc && (f = readdir(d));) {
 		struct stat st;
 		struct blob_hash h;
@@ -160,7 +160,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 		if (!blob_from_hex(f->d_name, &h))
 			continue;
 		if (disk_stat(path, &st)) { /* if it cannot be read it is kept */
-			rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+			rc = error_file(e, errno, path);
 			break;
 		}
 		if (!S_ISREG(st.st_mode))
@@ -337,7 +337,7 @@ static int check_open(struct blob_check *c, const char *path)
 {
 	c->fd = disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0);
 	if (c->fd < 0)
-		return error_set(&c->error, errno, "%s: %s", path, strerror(errno));
+		return error_file(&c->error, errno, path);
 	c->md = EVP_MD_CTX_new();
 	if (!c->md || EVP_DigestInit_ex(c->md, EVP_sha256(), NULL) != 1)
 		return error_set(&c->error, ENOMEM, "no memory to check %s", path);
@@ -355,7 +355,7 @@ static int check_some(struct blob_check *c, const char *path)
 		ssize_t n = disk_read(c->fd, bytes, PIECE);
 		c->whole = n == 0;
 		if (n < 0 && errno != EINTR)
-			rc = error_set(&c->error, errno, "%s: %s", path, strerror(errno));
+			rc = error_file(&c->error, errno, path);
 		else if (n > 0 && EVP_DigestUpdate(c->md, bytes, (size_t)n) != 1)
 			rc = error_set(&c->error, EIO, "SHA-256 failed");
 	}
@@ -473,7 +473,7 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	blob_temporary_path(s, w->number, w->path, sizeof w->path);
 	w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	if (w->fd < 0)
-		rc = error_set(e, errno, "%s: %s", s->folder, strerror(errno));
+		rc = error_file(e, errno, s->folder);
 	else if (!w->md || EVP_DigestInit_ex(w->md, EVP_sha256(), NULL) != 1)
 		rc = error_set(e, ENOMEM, "SHA-256 cannot start");
 	if (rc)
@@ -496,7 +496,7 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 		return error_set(e, EIO, "SHA-256 failed");
 	int rc = disk_write_all(w->fd, bytes, size);
 	if (rc)
-		return error_set(e, -rc, "%s: %s", w->store->folder, strerror(-rc));
+		return error_file(e, -rc, w->store->folder);
 	w->at += size;
 	return 0;
 }
@@ -539,7 +539,7 @@ static int finish(struct blob_writer *w, struct error *e)
 	}
 	blob_path(s, &w->hash, path, sizeof path);
 	if (disk_fsync(w->fd) || disk_rename(w->path, path))
-		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
+		return error_file(e, errno, s->folder);
 	rc = disk_sync_folder(s->folder, e);
 	if (!rc)
 		rc = blob_expect(s, &w->hash, e);

@@ -57,7 +57,7 @@ const struct blob_hash *blob_batch_hash(const struct blob_batch *b, size_t i)
 static int flush_file(const char *path, struct error *e)
 {
 	int fd = disk_open(path, O_WRONLY | O_CLOEXEC | O_NOFOLLOW, 0);
-	int rc = fd < 0 || disk_fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	int rc = fd < 0 || disk_fsync(fd) ? error_file(e, errno, path) : 0;
 	if (fd >= 0)
 		disk_close(fd);
 	return rc;
@@ -76,7 +76,7 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 		blob_temporary_path(b->store, k->number, from, sizeof from);
 		blob_path(b->store, &k->hash, to, sizeof to);
 		if (disk_rename(from, to))
-			rc = error_set(e, errno, "%s: %s", to, strerror(errno));
+			rc = error_file(e, errno, to);
 	}
 	return rc ? rc : blob_sync_folder(b->store, e);
 }

@@ -76,7 +76,7 @@ static int write_pem(const char *folder, const char *middle, const char *name, B
 	if (!rc && rename(temporary, path))
 		rc = -errno;
 	if (rc) {
-		error_set(e, -rc, "%s: %s", path, strerror(-rc));
+		error_file(e, -rc, path);
 		unlink(temporary);
 	}
 	BIO_free(b);
@@ -133,7 +133,7 @@ static int lock_folder(struct authority *a, const char *folder, struct error *e)
 	if (a->lock < 0 && errno == ENOENT)
 		return error_set(e, ENOENT, "%s: there is no authority here (hslt-ca init creates one)", folder);
 	if (a->lock < 0 || flock(a->lock, LOCK_EX))
-		return error_set(e, errno, "%s: %s", folder, strerror(errno));
+		return error_file(e, errno, folder);
 	return 0;
 }
 
@@ -298,7 +298,7 @@ static int make_folder(const char *path, bool may_be, struct error *e)
 {
 	if (mkdir(path, 0700) == 0 || (may_be && errno == EEXIST))
 		return 0;
-	return error_set(e, errno, "%s: %s", path, strerror(errno));
+	return error_file(e, errno, path);
 }
 
 static int write_authority(struct authority *a, struct error *e)
@@ -426,7 +426,7 @@ static int for_each_issued(const char *folder,
 	int rc = path_in(path, e, folder, "", "issued");
 	DIR *d = rc ? NULL : opendir(path);
 	if (!rc && !d)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_file(e, errno, path);
 	for (struct dirent *x; !rc && (x = readdir(d));) {
 		X509 *cert;
 		struct tls_peer who;

@@ -293,7 +293,7 @@ static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self
 	struct stat st;
 	path_of(t, 2, path, sizeof path);
 	if (stat(path, &st))
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_file(e, errno, path);
 	if (st.st_mode & 0007)
 		return error_set(e, EPERM, "%s: everybody on this machine can read the key: chmod 600", path);
 	if (SSL_CTX_use_PrivateKey_file(context, path, SSL_FILETYPE_PEM) != 1)

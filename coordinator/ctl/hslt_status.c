@@ -97,7 +97,7 @@ static FILE *reach(const char *path, struct error *e)
 	}
 	FILE *f = fdopen(fd, "r+");
 	if (!f) {
-		error_set(e, errno, "%s: %s", path, strerror(errno));
+		error_file(e, errno, path);
 		close(fd);
 	}
 	return f;

@@ -84,7 +84,7 @@ int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, co
 	spool_job_path(s, id, "log", path);
 	job->log = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
 	if (!rc && job->log < 0)
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+		rc = error_file(e, errno, path);
 	struct stat st;
 	if (!rc && disk_fstat(job->log, &st) == 0)
 		job->log_bytes = (uint64_t)st.st_size;

@@ -62,7 +62,7 @@ static void write_checkpoint(uv_work_t *work)
 	checked_file_close(&out);
 	w->bytes = out.bytes;
 	if (!w->rc)
-		w->rc = disk_rename(temporary, name) ? error_set(&w->error, errno, "%s: %s", name, strerror(errno)) : 0;
+		w->rc = disk_rename(temporary, name) ? error_file(&w->error, errno, name) : 0;
 	if (!w->rc) {
 		w->rc = disk_sync_folder(w->folder, &w->error);
 		w->unsure = w->rc != 0;

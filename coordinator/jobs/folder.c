@@ -22,7 +22,7 @@ static int make_anew(struct jobs *jobs, struct live_job *job, struct error *e)
 	spool_job_path(jobs->spool, job->id, "log", path);
 	int fd = disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
 	if (fd < 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_file(e, errno, path);
 	disk_close(job->log);
 	job->log = fd;
 	return 0;

@@ -55,8 +55,7 @@ static int put_aside(struct looking *l, uint64_t id, const char *why, struct err
 		spool_path(spool, name, to);
 		if (disk_stat(to, &st) == 0)
 			continue;
-		rc = disk_rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno))
-					   : disk_sync_folder(lost, e);
+		rc = disk_rename(from, to) ? error_file(e, errno, to) : disk_sync_folder(lost, e);
 		return rc ? rc : disk_sync_folder(jobs, e);
 	}
 	return rc;
@@ -91,19 +90,19 @@ static int has_results(const struct spool *spool, uint64_t id, bool started, str
 	spool_job_path(spool, id, NULL, folder);
 	DIR *d = disk_opendir(folder);
 	if (!d)
-		return errno == ENOTDIR ? 0 : error_set(e, errno, "%s: %s", folder, strerror(errno));
+		return errno == ENOTDIR ? 0 : error_file(e, errno, folder);
 	for (struct dirent *f; !any && (errno = 0, f = readdir(d));) {
 		bool journal = strncmp(f->d_name, "journal.", 8) == 0;
 		if (!journal && strcmp(f->d_name, "checkpoint") != 0 && strcmp(f->d_name, "result.exr") != 0)
 			continue;
 		spool_job_path(spool, id, f->d_name, path);
 		if (disk_stat(path, &st))
-			any = error_set(e, errno, "%s: %s", path, strerror(errno));
+			any = error_file(e, errno, path);
 		else
 			any = !journal || started || st.st_size > (off_t)JOURNAL_HEAD;
 	}
 	if (!any && errno)
-		any = error_set(e, errno, "%s: %s", folder, strerror(errno));
+		any = error_file(e, errno, folder);
 	closedir(d);
 	return any;
 }

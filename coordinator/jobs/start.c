@@ -43,7 +43,7 @@ int jobs_open(struct jobs *jobs, struct error *e)
 	if (rc)
 		return rc;
 	if (jobs->config.keep_partials && disk_mkdir(jobs->config.keep_partials, 0777) && errno != EEXIST)
-		return error_set(e, errno, "%s: %s", jobs->config.keep_partials, strerror(errno));
+		return error_file(e, errno, jobs->config.keep_partials);
 	farm_config_init(&config);
 	config.max_peers = jobs->config.max_connections;
 	config.first_job = ledger_next_id(jobs->ledger);

@@ -381,7 +381,7 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 		return error_set(e, EEXIST, "%s: exists and is not a socket", path);
 	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 	if (fd < 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_file(e, errno, path);
 	int fault = connect(fd, (const struct sockaddr *)a, sizeof *a) ? errno : 0;
 	close(fd);
 	if (fault == ENOENT)
@@ -390,7 +390,7 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 		return error_set(e, fault, "%s: the socket of another user: %s", path, strerror(fault));
 	if (fault != ECONNREFUSED) /* EAGAIN: its backlog is full */
 		return error_set(e, EADDRINUSE, "%s: another program answers there", path);
-	return unlink(path) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	return unlink(path) ? error_file(e, errno, path) : 0;
 }
 
 /* Through a descriptor of the file that we created: the name may refer to another one by now. */
@@ -441,7 +441,7 @@ static int open_socket(struct status_socket *t, const char *group, struct error 
 	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 	mode_t mask = umask(0177);
 	if (fd < 0 || bind(fd, (struct sockaddr *)&a, sizeof a))
-		rc = error_set(e, errno, "%s: %s", t->path, strerror(errno));
+		rc = error_file(e, errno, t->path);
 	umask(mask);
 	if (!rc && lstat(t->path, &st) == 0) {
 		t->device = st.st_dev;

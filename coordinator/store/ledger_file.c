@@ -126,7 +126,7 @@ int ledger_file_put_aside(const char *path, struct error *e)
 		text_print(from, sizeof from, "%s%s", path, ends[i]);
 		text_print(to, sizeof to, "%s.damaged%s", path, ends[i]);
 		if (disk_rename(from, to) && errno != ENOENT)
-			return error_set(e, errno, "%s: %s", to, strerror(errno));
+			return error_file(e, errno, to);
 	}
 	*strrchr(to, '/') = 0;
 	return disk_sync_folder(to, e);

@@ -18,7 +18,7 @@ int old_spool_text(const char *path, size_t most, char **text, size_t *size, str
 	struct stat st;
 	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
 	if (fd < 0 || disk_fstat(fd, &st)) {
-		int rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+		int rc = error_file(e, errno, path);
 		if (fd >= 0)
 			disk_close(fd);
 		return rc;
@@ -31,7 +31,7 @@ int old_spool_text(const char *path, size_t most, char **text, size_t *size, str
 		*size += (size_t)n;
 	int rc = there >= most ? error_set(e, EFBIG, "%s: too long", path)
 		 : !bytes      ? error_set(e, ENOMEM, "no memory to read %s", path)
-		 : n < 0       ? error_set(e, errno, "%s: %s", path, strerror(errno))
+		 : n < 0       ? error_file(e, errno, path)
 			       : 0;
 	disk_close(fd);
 	if (rc)

@@ -44,10 +44,10 @@ static int take_lock(struct spool *s, struct error *e)
 	s->lock = disk_open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
 	int rc = 0;
 	if (s->lock < 0)
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+		rc = error_file(e, errno, path);
 	else if (disk_flock(s->lock, LOCK_EX | LOCK_NB))
 		rc = errno == EWOULDBLOCK ? error_set(e, EBUSY, "%s: another coordinator uses this spool", s->folder)
-					  : error_set(e, errno, "%s: %s", path, strerror(errno));
+					  : error_file(e, errno, path);
 	mem_free(path);
 	return rc;
 }
@@ -82,7 +82,7 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 	spool_path(s, "jobs", path);
 	DIR *d = disk_opendir(path);
 	if (!d)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_file(e, errno, path);
 	int rc = 0;
 	for (struct dirent *f; !rc && (f = readdir(d));) {
 		if (!is_job_folder(f->d_name, &id))
