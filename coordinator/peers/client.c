@@ -56,7 +56,7 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 			list[i] = (ProtobufCBinaryData){BLOB_HASH_SIZE, hashes[i].bytes};
 		answer.missing = list;
 	}
-	session_send(p, ENVELOPE_OF(SUBMIT_ANSWER, submit_answer, &answer), NULL, 0);
+	conn_send(p->conn, ENVELOPE_OF(SUBMIT_ANSWER, submit_answer, &answer), NULL, 0);
 	mem_free(hashes);
 	mem_free(list);
 }
@@ -213,7 +213,7 @@ static void take_list(struct session *p)
 		view_to_wire(&views[i], &status[i]);
 		list[answer.n_jobs++] = &status[i];
 	}
-	session_send(p, ENVELOPE_OF(JOB_LIST_ANSWER, job_list_answer, &answer), NULL, 0);
+	conn_send(p->conn, ENVELOPE_OF(JOB_LIST_ANSWER, job_list_answer, &answer), NULL, 0);
 	mem_free(status);
 	mem_free(list);
 	mem_free(views);
@@ -250,7 +250,7 @@ void client_tick(struct session *p)
 	*p->shown = v;
 	view_to_wire(&v, &status);
 	view_looks_to_wire(&v, &looks, &status);
-	session_send(p, ENVELOPE_OF(JOB_STATUS, job_status, &status), NULL, 0);
+	conn_send(p->conn, ENVELOPE_OF(JOB_STATUS, job_status, &status), NULL, 0);
 	if (record_is_ended(&v.record)) {
 		p->ended.job = p->watched;
 		p->ended.at = jobs_now(p->jobs);

@@ -24,7 +24,7 @@ void client_send_done(struct session *p, const char *text)
 {
 	char said[256];
 	text_copy(said, sizeof said, *p->rejected ? p->rejected : text);
-	session_send(p, ENVELOPE(DONE, done, .ok = !*p->rejected, .text = said), NULL, 0);
+	conn_send(p->conn, ENVELOPE(DONE, done, .ok = !*p->rejected, .text = said), NULL, 0);
 }
 
 uint64_t client_uploading(const struct session *p)

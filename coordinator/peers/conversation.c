@@ -35,11 +35,11 @@ static void answer_hello(struct session *p, bool accepted, bool final, const cha
 {
 	char text[256];
 	text_copy(text, sizeof text, said);
-	session_send(p,
-		     ENVELOPE(HELLO_ACK, hello_ack, .accepted = accepted, .final = final, .text = text,
-			      .version = FARM_VERSION,
-			      .heartbeat_ms = (uint32_t)(1000 * p->jobs->config.heartbeat_seconds)),
-		     NULL, 0);
+	conn_send(p->conn,
+		  ENVELOPE(HELLO_ACK, hello_ack, .accepted = accepted, .final = final, .text = text,
+			   .version = FARM_VERSION,
+			   .heartbeat_ms = (uint32_t)(1000 * p->jobs->config.heartbeat_seconds)),
+		  NULL, 0);
 	if (!accepted) {
 		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id,
 			  p->address, log_quote(p->name).text, log_quote(text).text);

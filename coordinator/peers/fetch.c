@@ -139,7 +139,7 @@ static void answer(struct session *p, const Farm__Fetch *f)
 	p->fetch.at = jobs_now(p->jobs);
 	if (rc || f->offset + count == chunk.size)
 		fetch_end(p);
-	session_send(p, ENVELOPE_OF(FETCH_CHUNK, fetch_chunk, &chunk), bytes, count);
+	conn_send(p->conn, ENVELOPE_OF(FETCH_CHUNK, fetch_chunk, &chunk), bytes, count);
 	mem_free(bytes);
 }
 

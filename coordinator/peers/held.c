@@ -57,7 +57,7 @@ void held_tick(struct session *p)
 	if (!waits || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
 		return;
 	p->told = jobs_now(p->jobs);
-	session_send(p, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
+	conn_send(p->conn, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
 }
 
 bool held_next(struct session *p, struct envelope *env)

@@ -43,11 +43,6 @@ void peers_delist(struct peers *s, struct session *p)
 
 /* ---- one session ---- */
 
-void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size)
-{
-	conn_send(p->conn, m, payload, size);
-}
-
 void session_fault(struct session *p, const char *format, ...)
 {
 	char text[512];
@@ -58,7 +53,7 @@ void session_fault(struct session *p, const char *format, ...)
 	text_clean(text);
 	log_event(LOG_PEER_FAULT, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
 		  log_quote(p->name).text, log_quote(text).text);
-	session_send(p, ENVELOPE(FAULT, fault, .text = text), NULL, 0);
+	conn_send(p->conn, ENVELOPE(FAULT, fault, .text = text), NULL, 0);
 	p->state = SESSION_LEAVING;
 	conn_close_when_sent(p->conn, text);
 }

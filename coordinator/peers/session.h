@@ -79,7 +79,6 @@ struct session *peers_find(const struct peers *s, uint64_t id); /* NULL: it is g
 void peers_enlist(struct peers *s, struct session *p);
 void peers_delist(struct peers *s, struct session *p); /* its connection has closed */
 
-void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size);
 /* Sends the reason and closes. */
 __attribute__((format(printf, 2, 3))) void session_fault(struct session *p, const char *format, ...);
 

@@ -47,7 +47,7 @@ void worker_heard(struct session *p)
 	    jobs_now(p->jobs) < p->heard + p->jobs->config.heartbeat_seconds)
 		return;
 	p->heard = jobs_now(p->jobs);
-	session_send(p, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
+	conn_send(p->conn, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0);
 	jobs_step(p->jobs, &ev);
 }
 
@@ -57,7 +57,7 @@ void worker_message(struct session *p, struct envelope *env)
 	const Farm__Envelope *m = env->message;
 	switch (m->body_case) {
 	case FARM__ENVELOPE__BODY_HEARTBEAT: /* answered, so that a worker notices a dead connection */
-		session_send(p, m, NULL, 0);
+		conn_send(p->conn, m, NULL, 0);
 		jobs_step(p->jobs, &ev);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_REQUEST:

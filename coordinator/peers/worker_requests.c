@@ -25,12 +25,12 @@ static void send_job_info(struct session *p, uint64_t id)
 	const Farm__Submit *from = live_job_submit(job);
 	Farm__Plan plan;
 	plan_to_wire(&job->plan, &plan);
-	session_send(p,
-		     ENVELOPE(JOB_INFO, job_info, .job = id, .name = from->name, .scene = from->scene,
-			      .n_defines = from->n_defines, .defines = from->defines,
-			      .render_width = from->render_width, .render_height = from->render_height, .plan = &plan,
-			      .n_files = from->n_files, .files = from->files),
-		     NULL, 0);
+	conn_send(p->conn,
+		  ENVELOPE(JOB_INFO, job_info, .job = id, .name = from->name, .scene = from->scene,
+			   .n_defines = from->n_defines, .defines = from->defines, .render_width = from->render_width,
+			   .render_height = from->render_height, .plan = &plan, .n_files = from->n_files,
+			   .files = from->files),
+		  NULL, 0);
 }
 
 /* refusal: why it cannot be sent; "": it can. */
@@ -47,10 +47,10 @@ static void send_piece(struct session *p, const struct worker_request *a, const 
 		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
 	if (fd >= 0 && (!bytes || n < 0 || a->number > size))
 		error_set(&e, EIO, "the blob cannot be read there");
-	session_send(p,
-		     ENVELOPE(BLOB_CHUNK, blob_chunk, .hash = {sizeof h.bytes, h.bytes}, .offset = a->number,
-			      .size = size, .error = e.text),
-		     bytes, *e.text ? 0 : (size_t)n);
+	conn_send(p->conn,
+		  ENVELOPE(BLOB_CHUNK, blob_chunk, .hash = {sizeof h.bytes, h.bytes}, .offset = a->number, .size = size,
+			   .error = e.text),
+		  bytes, *e.text ? 0 : (size_t)n);
 	if (fd >= 0)
 		disk_close(fd);
 	mem_free(bytes);

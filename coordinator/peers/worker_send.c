@@ -40,7 +40,7 @@ void worker_send_revoke(struct session *p, const struct lease_key *k)
 {
 	Farm__LeaseKey key;
 	lease_key_to_wire(k, &key);
-	session_send(p, ENVELOPE(LEASE_REVOKE, lease_revoke, .key = &key), NULL, 0);
+	conn_send(p->conn, ENVELOPE(LEASE_REVOKE, lease_revoke, .key = &key), NULL, 0);
 }
 
 void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text)
@@ -53,10 +53,11 @@ void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack,
 	Farm__LeaseKey key;
 	lease_key_to_wire(k, &key);
 	text_copy(copy, sizeof copy, text);
-	session_send(p, ENVELOPE(LEASE_ACK, lease_ack, .key = &key, .verdict = verdicts[ack], .text = copy), NULL, 0);
+	conn_send(p->conn, ENVELOPE(LEASE_ACK, lease_ack, .key = &key, .verdict = verdicts[ack], .text = copy), NULL,
+		  0);
 }
 
 void worker_send_job_end(struct session *p, uint64_t job)
 {
-	session_send(p, ENVELOPE(JOB_END, job_end, .job = job), NULL, 0);
+	conn_send(p->conn, ENVELOPE(JOB_END, job_end, .job = job), NULL, 0);
 }
