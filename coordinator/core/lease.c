@@ -11,12 +11,7 @@
 
 struct lease_key lease_key(const struct lease *l)
 {
-	uint32_t index = (uint32_t)(l->slot - l->job->slots);
-	return (struct lease_key){.job = l->job->id,
-				  .kind = l->job->kind,
-				  .group = index / l->job->plan.parts,
-				  .part = index % l->job->plan.parts,
-				  .epoch = l->slot->next};
+	return slot_key(l->job, l->slot);
 }
 
 struct lease *lease_of(const struct slot *s, const struct peer *p)

@@ -367,16 +367,6 @@ bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_st
 	return false;
 }
 
-const char *farm_maker(const struct farm *f, const struct lease_key *k)
-{
-	return doubt_maker(f, k);
-}
-
-enum farm_delivery farm_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)
-{
-	return answer_awaits(f, peer, k);
-}
-
 uint64_t farm_next_peer(const struct farm *f, uint64_t after)
 {
 	uint32_t i = after == UINT64_MAX ? f->peer_count : farm_peer_place(f, after + 1);

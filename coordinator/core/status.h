@@ -64,10 +64,6 @@ struct lease_status {
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
 /* Whether a result of this lease must come with its digest. */
 bool farm_verifies(const struct farm *f, const struct lease_key *k);
-/* Whether a result of this lease that cannot be judged yet is worth keeping. Awaited: the worker holds the lease and
- * has not delivered it (EVENT_DELIVERED). Open: it may still be merged; the worker may have held the lease before it
- * reconnected. Useless: EVENT_BATCH would refuse it, whatever it contains. */
-enum farm_delivery farm_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k);
 /* What is known of a worker, connected or not. */
 struct worker_status {
 	uint64_t who, restarts;
@@ -75,8 +71,6 @@ struct worker_status {
 	uint32_t wrong; /* number of wrong results */
 	bool quarantined;
 };
-/* Who made the chain states that go with this lease, for the log; "?": it is not the next one of its group and part. */
-const char *farm_maker(const struct farm *f, const struct lease_key *k);
 /* The smallest id above `after` (start with 0) of a quarantined worker; 0: no more. */
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after);
 bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s);	    /* false: unknown */

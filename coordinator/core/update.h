@@ -32,7 +32,7 @@ enum job_end {
 	END_FAILED,
 };
 
-/* See farm_awaits (status.h). */
+/* See answer_awaits (answer.h). */
 enum farm_delivery { DELIVERY_AWAITED, DELIVERY_OPEN, DELIVERY_USELESS };
 
 enum action_kind {

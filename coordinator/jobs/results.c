@@ -4,6 +4,8 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/core/answer.h"
+#include "coordinator/core/doubt.h"
 #include "coordinator/job/back.h"
 #include "coordinator/job/digest.h"
 #include "coordinator/job/incoming.h"
@@ -91,7 +93,7 @@ static void put_off(struct jobs *jobs, struct live_job *job, uint64_t peer, cons
 		    struct envelope *env, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
-	enum farm_delivery awaited = farm_awaits(jobs->farm, peer, k);
+	enum farm_delivery awaited = answer_awaits(jobs->farm, peer, k);
 	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(job, k) : NULL;
 	if (w && w->peer == peer) /* the answer to that one answers this one */
 		return;
@@ -113,7 +115,7 @@ static void log_failure(const struct jobs *jobs, const char *from, struct live_j
 	struct log_value name = log_quote(from ? from : "?"), said = log_quote(text);
 	if (f->bad_states)
 		live_job_log(job, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s " LEASE_FORMAT,
-			     log_quote(holds ? farm_maker(jobs->farm, k) : "?").text, name.text, said.text,
+			     log_quote(holds ? doubt_maker(jobs->farm, k) : "?").text, name.text, said.text,
 			     LEASE_VALUES(k));
 	else
 		live_job_log(job, LOG_LEASE_FAILED, "worker=%s own=%d text=%s " LEASE_FORMAT, name.text, f->own,
@@ -145,7 +147,7 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 		text[0] = 0;
 	}
 	struct back back = {0};
-	bool holds = farm_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
+	bool holds = answer_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
 		     !ev.lease.other_states; /* otherwise nothing is read for it */
 	if (job && *text)
 		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);

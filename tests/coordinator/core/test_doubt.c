@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Chain states that workers refuse, as transcripts: who is asked, who is to blame, and that no job fails by it. */
+#include "coordinator/core/doubt.h"
 #include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"
 
@@ -62,12 +63,12 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 	assert_int_equal(wrong(f, 1), 1);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	assert_true(farm_peer(f, 2, &p) && p.failures == 0 && p.faults == 0);
-	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
+	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
 	/* Who made the states of other leases is not said: of an epoch before, of one that nobody has, of no states at
 	 * all. */
-	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 1}), "?");
-	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 3}), "?");
-	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}), "?");
+	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 1}), "?");
+	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 3}), "?");
+	assert_string_equal(doubt_maker(f, &(struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}), "?");
 	assert_true(farm_job(f, 1, 8, &j));
 	assert_int_equal(j.state, JOB_RUNNING);
 	farm_free(f);

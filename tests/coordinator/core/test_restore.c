@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Jobs of an earlier life, and jobs that are held, as transcripts. */
+#include "coordinator/core/doubt.h"
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>
@@ -241,8 +242,8 @@ static void makers(void **state)
 	assert_true(farm_peer(f, 1, &p) && farm_worker(f, p.who, &w));
 	assert_int_equal(w.restarts, 5);
 	assert_string_equal(w.name, "c");
-	assert_string_equal(farm_maker(f, &(struct lease_key){3, LEASE_RENDER, 0, 0, 2}), "c");
-	assert_string_equal(farm_maker(f, &(struct lease_key){3, LEASE_RENDER, 1, 0, 2}), "two");
+	assert_string_equal(doubt_maker(f, &(struct lease_key){3, LEASE_RENDER, 0, 0, 2}), "c");
+	assert_string_equal(doubt_maker(f, &(struct lease_key){3, LEASE_RENDER, 1, 0, 2}), "two");
 	assert_true(farm_worker(f, p.who + 1, &w));
 	assert_int_equal(w.restarts, 7);
 	transcript_play(f, (const char *const[]){
