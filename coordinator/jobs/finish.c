@@ -2,7 +2,7 @@
 /*
  * The end of a live job. A job that the core has ended is finished as soon as no thread reads its films: its record is
  * written and its row ended (durable.h), workers are told, its memory is freed. A record that the disk refuses is tried
- * again (retry.c), and until then the job counts as running.
+ * again (start.c), and until then the job counts as running.
  */
 #include "coordinator/jobs/finish.h"
 

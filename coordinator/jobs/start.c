@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Opens and closes the jobs.
+ * Opens and closes the jobs, and does from time to time what nobody asks for.
  *
  * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and starts to read those
  * that had not (recovery.c). An error of the spool ends the start with a sentence; jobs_close then closes what was
@@ -11,14 +11,17 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "coordinator/jobs/checkpoint.h"
+#include "coordinator/jobs/dispatch.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/files.h"
+#include "coordinator/jobs/finish.h"
 #include "coordinator/jobs/folder.h"
 #include "coordinator/jobs/follow_up.h"
+#include "coordinator/jobs/publish.h"
 #include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/restore.h"
-#include "coordinator/jobs/retry.h"
+#include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
@@ -73,12 +76,39 @@ void jobs_init(struct jobs *jobs)
 	jobs->read = jobs_now(jobs);
 }
 
+/* What the disk refused, of each live job whose time has come: its image, record, films, and the journal for its
+ * results. */
+static void retry(struct jobs *jobs)
+{
+	for (struct live_job *job = jobs->live; job; job = job->next) {
+		if (jobs_now(jobs) < job->try_again || job->busy)
+			continue;
+		if (job->unpublished) {
+			job->unpublished = false;
+			publish_start(jobs, job, PUBLISH_RESULT, job->unpublished_rounds);
+		}
+		if (job->unrecorded) {
+			job->unrecorded = false;
+			finish_ended(jobs);
+			return; /* the list may have changed; continue next time */
+		}
+		if (job->unprepared && !job->ended) {
+			struct event ev = {.kind = EVENT_TICK};
+			dispatch_prepare(jobs, job);
+			jobs_step(jobs, &ev);
+			return;
+		}
+		if (job->held && !job->ended && durable_mend(jobs, job) == 0)
+			return;
+	}
+}
+
 void jobs_tick(struct jobs *jobs)
 {
 	if (recovery_is_on(jobs))
 		jobs->changes++;
 	durable_tick(jobs);
-	retry_tick(jobs);
+	retry(jobs);
 	files_tick(jobs);
 	folder_tick(jobs);
 	clear_tick(jobs);
