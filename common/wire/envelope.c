@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Packs messages into frames and unpacks them, with protobuf-c.
+ *
+ * envelope_unpack gives protobuf-c an allocator that takes blocks of memory up to a limit, a multiple of the message's
+ * length; all of them are freed at once. Then the message is searched for fields that this version does not know.
+ * Hello and its answer, whose frames have no checksum, end with one of their own, which is computed after packing.
+ *
+ * A message that is refused leaves an empty envelope. Lack of memory is -ENOMEM, distinguished from a message that
+ * needs more than its limit.
+ */
 #include "common/wire/envelope.h"
 
 #include "common/base/bytes.h"
@@ -149,6 +159,26 @@ void envelope_fini(struct envelope *env)
 		env->blocks = next;
 	}
 	memset(env, 0, sizeof *env);
+}
+
+int envelope_unpack_frame(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
+			  const unsigned char **payload, size_t *payload_size, struct error *e)
+{
+	uint32_t header = 0, rest = 0;
+	*payload = NULL;
+	*payload_size = 0;
+	if (size >= FRAME_PREFIX)
+		frame_prefix_read(frame, &header, &rest);
+	if (size < FRAME_PREFIX || (uint64_t)header + rest != size - FRAME_PREFIX)
+		return error_set(e, EBADMSG, "a frame of another length");
+	int rc = envelope_unpack(env, frame + FRAME_PREFIX, header, e);
+	if (!rc && env->message->body_case != want) {
+		envelope_fini(env);
+		rc = error_set(e, EBADMSG, "another message than was expected");
+	}
+	*payload = frame + FRAME_PREFIX + header;
+	*payload_size = rest;
+	return rc;
 }
 
 static int pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,

@@ -43,6 +43,10 @@ struct envelope {
  * its answer, of this version, with a wrong checksum (its last field); -ENOMEM. */
 int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e);
 void envelope_fini(struct envelope *env);
+/* A stored frame that must have this message: a result in a journal, a submission or plan in the ledger. -EBADMSG,
+ * -ENOMEM. The payload points into the frame. */
+int envelope_unpack_frame(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
+			  const unsigned char **payload, size_t *payload_size, struct error *e);
 
 /* A frame in one piece, mem_alloc'd: prefix, header and room for the payload, which is copied from `payload` unless
  * that is NULL. Adds the checksum of hello and its answer. -EMSGSIZE: a length does not fit. */

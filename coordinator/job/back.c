@@ -5,7 +5,6 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/job/late.h"
-#include "coordinator/job/stored_frame.h"
 
 #include <assert.h>
 #include <string.h>
@@ -65,7 +64,7 @@ static int read_batch(const struct live_job *job, struct journal *j, const struc
 	int rc = journal_body(j, job->merged[i].at, &body, &size, e);
 	if (rc)
 		return rc;
-	rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
+	rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
 	if (!rc) {
 		rc = batch_unpack(b, &job->plan, env.message->lease_result, payload, payload_size, e);
 		take_maker(maker, env.message->lease_result->maker);

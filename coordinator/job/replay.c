@@ -18,7 +18,6 @@
 #include "coordinator/job/checkpoint_file.h"
 #include "coordinator/job/late.h"
 #include "coordinator/job/stored.h"
-#include "coordinator/job/stored_frame.h"
 #include "coordinator/store/journal_file.h"
 
 #include <string.h>
@@ -88,8 +87,8 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 	struct batch batch = {0};
 	const unsigned char *payload;
 	size_t payload_size;
-	int rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload,
-				     &payload_size, e);
+	int rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload,
+				       &payload_size, e);
 	if (rc)
 		return rc == -EBADMSG ? strange(r, "a result", item->size, e) : rc;
 	rc = batch_unpack(&batch, &r->job->plan, env.message->lease_result, payload, payload_size, e);

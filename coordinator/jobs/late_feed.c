@@ -6,7 +6,6 @@
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/late.h"
 #include "coordinator/job/replay.h"
-#include "coordinator/job/stored_frame.h"
 #include "coordinator/jobs/step.h"
 
 /* It has been damaged meanwhile: its lease is open. */
@@ -31,7 +30,7 @@ static int offer(struct jobs *jobs, const struct live_job *job, const struct lat
 	int rc = journal_body(job->journal, l->at, &body, &size, e);
 	if (rc)
 		return rc;
-	rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
+	rc = envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
 	if (rc) {
 		mem_free(body);
 		return rc;

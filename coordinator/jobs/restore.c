@@ -14,7 +14,6 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
-#include "coordinator/job/stored_frame.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 
@@ -160,15 +159,15 @@ static int make_live_job(struct jobs *jobs, const struct ledger_job *j, struct l
 	struct plan plan;
 	const unsigned char *payload;
 	size_t size;
-	int rc = stored_frame_unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
+	int rc = envelope_unpack_frame(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
 	if (rc)
 		return not_known(j, rc, e);
 	rc = info.message->job_info->plan ? plan_from_wire(info.message->job_info->plan, &plan, e)
 					  : error_set(e, EBADMSG, "there is no plan");
 	envelope_fini(&info);
 	if (!rc)
-		rc = stored_frame_unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size,
-					 &payload, &size, e);
+		rc = envelope_unpack_frame(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size,
+					   &payload, &size, e);
 	if (rc)
 		return not_known(j, rc, e);
 	rc = hold_blobs(jobs, submit.message->submit, e);
