@@ -17,7 +17,7 @@
 
 #include "common/base/checked_file.h"
 #include "coordinator/core/farm.h"
-#include "coordinator/job/checkpoint_head.h"
+#include "coordinator/job/stored.h"
 
 /* Writes the job's current state, to be followed by the next journal. */
 void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *job, const struct job_status *status);

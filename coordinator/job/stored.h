@@ -9,7 +9,19 @@
 #include "common/base/error.h"
 #include "common/estimate/forecast.h"
 #include "coordinator/core/counts.h"
-#include "coordinator/job/checkpoint_head.h"
+#include "coordinator/job/live_job.h"
+
+/* What a checkpoint contains besides seeds, chain states and films. */
+struct checkpoint_head {
+	uint64_t job, generation;
+	uint32_t worker_count;
+	double cpu_seconds, bootstrap_cpu_seconds, look_written;
+	struct live_job_times times;
+	struct bootstrap_result lit;
+	struct forecast_history looks;
+	struct job_counts counts;
+	char fingerprint[256];
+};
 
 enum {
 	STORED_NOTE_MOST = 1024,    /* bytes of an estimate of the error ("look"), of counters */
