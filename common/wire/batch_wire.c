@@ -148,14 +148,12 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 	struct blob_hash digest;
 	Farm__LeaseKey key;
 	Farm__LeaseResult m;
-	Farm__Envelope env;
 	memcpy(counters, b->counters, sizeof counters);
 	memcpy(strategy, b->strategy, sizeof strategy);
 	memcpy(classes, b->classes, sizeof classes);
 	int rc = packing_init(&k, b, p, e);
 	if (!rc) {
 		farm__lease_result__init(&m);
-		farm__envelope__init(&env);
 		lease_key_to_wire(&b->key, &key);
 		m.key = &key;
 		m.n_counters = BATCH_COUNTERS;
@@ -174,12 +172,10 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 		m.n_classes = PATH_CLASSES;
 		m.classes = classes;
 		m.moment_count = b->moment_count;
-		env.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
-		env.lease_result = &m;
 		rc = digest_to_wire(b->states, b->state_count, &digest, &m.states_digest, e);
 	}
 	if (!rc)
-		rc = envelope_pack(&env, NULL, k.payload, frame, size, e);
+		rc = envelope_pack(ENVELOPE_OF(LEASE_RESULT, lease_result, &m), NULL, k.payload, frame, size, e);
 	if (!rc)
 		write_payload(*frame + *size - k.payload, b, &k);
 	packing_fini(&k, b->tile_count);
@@ -329,8 +325,6 @@ int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct ch
 	Farm__LeaseKey key;
 	Farm__LeaseGrant m;
 	farm__lease_grant__init(&m);
-	Farm__Envelope env;
-	farm__envelope__init(&env);
 	struct blob_hash digest;
 	uint64_t *seed_copy = seeds ? mem_alloc(chain_count, sizeof *seed_copy) : NULL;
 	uint32_t *sizes = states ? mem_alloc(chain_count, sizeof *sizes) : NULL;
@@ -347,12 +341,10 @@ int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct ch
 		m.seeds = seed_copy;
 		m.n_state_sizes = states ? chain_count : 0;
 		m.state_sizes = sizes;
-		env.body_case = FARM__ENVELOPE__BODY_LEASE_GRANT;
-		env.lease_grant = &m;
 		rc = digest_to_wire(states, states ? chain_count : 0, &digest, &m.states_digest, e);
 	}
 	if (!rc)
-		rc = envelope_pack(&env, NULL, payload, frame, size, e);
+		rc = envelope_pack(ENVELOPE_OF(LEASE_GRANT, lease_grant, &m), NULL, payload, frame, size, e);
 	if (!rc && states) {
 		unsigned char *at = *frame + *size - payload;
 		for (uint32_t i = 0; i < chain_count; at += states[i++].size)
