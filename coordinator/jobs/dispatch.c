@@ -217,10 +217,12 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 	for (size_t i = 0; i < u->count; i++) {
 		const struct action *a = &u->actions[i];
 		switch (a->kind) {
+		case ACTION_CANCELLED:
+		case ACTION_ROUND_DONE:
+		case ACTION_JOB_FORGOTTEN:
+			break;
 		case ACTION_SUBMITTED:
 			submitted(jobs, a, in->submission);
-			break;
-		case ACTION_CANCELLED:
 			break;
 		case ACTION_REJECTED:
 			rejected(jobs, a);
@@ -240,8 +242,6 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 		case ACTION_BOOTSTRAP_DONE:
 			dispatch_prepare(jobs, jobs_find(jobs, a->job));
 			break;
-		case ACTION_ROUND_DONE:
-			break;
 		case ACTION_EVALUATE_ERROR:
 			publish_start(jobs, jobs_find(jobs, a->job), PUBLISH_ERROR_ONLY, a->rounds);
 			break;
@@ -250,8 +250,6 @@ void dispatch_update(struct jobs *jobs, const struct update *u, const struct inc
 			break;
 		case ACTION_JOB_CHANGED:
 			job_changed(jobs, a);
-			break;
-		case ACTION_JOB_FORGOTTEN:
 			break;
 		case ACTION_TAKE_BACK:
 			take_back(jobs, a, in);
