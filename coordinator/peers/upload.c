@@ -261,26 +261,21 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 	       struct error *e)
 {
 	const Farm__Submit *m = submit->message->submit;
-	struct plan plan;
-	char rule[sizeof(*out)->rule];
-	int rc = check(m, bandwidth, &plan, rule, sizeof rule, e);
-	if (rc)
-		return rc;
 	struct upload *u = mem_alloc(1, sizeof *u);
-	bool *held = mem_alloc(m->n_files, sizeof *held), *arrived = mem_alloc(m->n_files, sizeof *arrived);
-	uint32_t *by_hash = mem_alloc(m->n_files, sizeof *by_hash);
-	if (!u || !held || !arrived || !by_hash) {
-		mem_free(u);
-		mem_free(held);
-		mem_free(arrived);
-		mem_free(by_hash);
+	if (!u)
 		return error_set(e, ENOMEM, "no memory for a submission");
+	int rc = check(m, bandwidth, &u->plan, u->rule, sizeof u->rule, e);
+	if (!rc) {
+		u->held = mem_alloc(m->n_files, sizeof *u->held);
+		u->arrived = mem_alloc(m->n_files, sizeof *u->arrived);
+		u->by_hash = mem_alloc(m->n_files, sizeof *u->by_hash);
+		if (!u->held || !u->arrived || !u->by_hash)
+			rc = error_set(e, ENOMEM, "no memory for a submission");
 	}
-	u->plan = plan;
-	memcpy(u->rule, rule, sizeof rule);
-	u->held = held;
-	u->arrived = arrived;
-	u->by_hash = by_hash;
+	if (rc) {
+		upload_free(u);
+		return rc;
+	}
 	u->blobs = blobs;
 	u->submit = *submit;
 	memset(submit, 0, sizeof *submit);
