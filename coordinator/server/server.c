@@ -126,8 +126,9 @@ static void on_tick(uv_timer_t *t)
 }
 
 /* Nothing new is started; the loop ends when running work has ended. */
-static void server_stop(struct server *s)
+static void stop(void *server)
 {
+	struct server *s = server;
 	if (s->jobs.stopping)
 		return;
 	notify_send("STOPPING=1");
@@ -142,15 +143,10 @@ static void server_stop(struct server *s)
 	s->status = NULL;
 }
 
-static void stop(void *user)
-{
-	server_stop(user);
-}
-
 static void on_signal(uv_signal_t *h, int number)
 {
 	log_event(LOG_STOP, "signal=%d", number);
-	server_stop(h->data);
+	stop(h->data);
 }
 
 static void init_handles(struct server *s)
@@ -172,7 +168,7 @@ static void init_handles(struct server *s)
 
 void server_close(struct server *s)
 {
-	server_stop(s);
+	stop(s);
 	uv_run(&s->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&s->loop);
 	assert(closed == 0);
