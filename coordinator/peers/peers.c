@@ -103,27 +103,6 @@ static const char *name(struct peers *s, uint64_t peer)
 	return p ? p->name : NULL;
 }
 
-static void send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k, bool anew)
-{
-	struct session *p = peers_find(s, peer);
-	if (p)
-		worker_send_lease(p, job, k, anew);
-}
-
-static void revoke_lease(struct peers *s, uint64_t peer, const struct lease_key *k)
-{
-	struct session *p = peers_find(s, peer);
-	if (p)
-		worker_send_revoke(p, k);
-}
-
-static void acknowledge(struct peers *s, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text)
-{
-	struct session *p = peers_find(s, peer);
-	if (p)
-		worker_send_ack(p, k, ack, text);
-}
-
 static void refused(struct peers *s, uint64_t peer, const char *text)
 {
 	struct session *p = peers_find(s, peer);
@@ -189,9 +168,9 @@ void peers_init(struct peers *s)
 	uv_tcp_init(s->jobs->loop, &s->listener);
 	s->jobs->peers = (struct peer_calls){.user = s,
 					     .name = name,
-					     .send_lease = send_lease,
-					     .revoke = revoke_lease,
-					     .acknowledge = acknowledge,
+					     .send_lease = worker_send_lease,
+					     .revoke = worker_send_revoke,
+					     .acknowledge = worker_send_ack,
 					     .refused = refused,
 					     .fault = fault,
 					     .dismiss = dismiss,

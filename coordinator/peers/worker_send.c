@@ -22,11 +22,14 @@ static void allow_lease(struct session *p, size_t size)
 	conn_set_send_limit(p->conn, SESSION_SEND + p->leases_most);
 }
 
-void worker_send_lease(struct session *p, const struct live_job *job, const struct lease_key *k, bool anew)
+void worker_send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k, bool anew)
 {
 	unsigned char *frame;
 	size_t size;
 	struct error e;
+	struct session *p = peers_find(s, peer);
+	if (!p)
+		return;
 	worker_allow_results(p, job);
 	if (live_job_pack_lease(job, k, anew, &frame, &size, &e)) {
 		conn_close(p->conn, e.text);
@@ -36,14 +39,16 @@ void worker_send_lease(struct session *p, const struct live_job *job, const stru
 	conn_send_frame(p->conn, frame, size);
 }
 
-void worker_send_revoke(struct session *p, const struct lease_key *k)
+void worker_send_revoke(struct peers *s, uint64_t peer, const struct lease_key *k)
 {
 	Farm__LeaseKey key;
+	const struct session *p = peers_find(s, peer);
 	lease_key_to_wire(k, &key);
-	conn_send(p->conn, ENVELOPE(LEASE_REVOKE, lease_revoke, .key = &key), NULL, 0);
+	if (p)
+		conn_send(p->conn, ENVELOPE(LEASE_REVOKE, lease_revoke, .key = &key), NULL, 0);
 }
 
-void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text)
+void worker_send_ack(struct peers *s, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text)
 {
 	static const Farm__Verdict verdicts[] = {[ACK_MERGED] = FARM__VERDICT__VERDICT_MERGED,
 						 [ACK_REPEAT] = FARM__VERDICT__VERDICT_REPEATED,
@@ -51,10 +56,12 @@ void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack,
 						 [ACK_NOTED] = FARM__VERDICT__VERDICT_NOTED};
 	char copy[512];
 	Farm__LeaseKey key;
+	const struct session *p = peers_find(s, peer);
 	lease_key_to_wire(k, &key);
 	text_copy(copy, sizeof copy, text);
-	conn_send(p->conn, ENVELOPE(LEASE_ACK, lease_ack, .key = &key, .verdict = verdicts[ack], .text = copy), NULL,
-		  0);
+	if (p)
+		conn_send(p->conn, ENVELOPE(LEASE_ACK, lease_ack, .key = &key, .verdict = verdicts[ack], .text = copy),
+			  NULL, 0);
 }
 
 void worker_send_job_end(struct session *p, uint64_t job)

@@ -12,10 +12,11 @@
 /* From now on it may send results of this job, of at most this size. */
 void worker_allow_results(struct session *p, const struct live_job *job);
 
-/* anew: send seeds. */
-void worker_send_lease(struct session *p, const struct live_job *job, const struct lease_key *k, bool anew);
-void worker_send_revoke(struct session *p, const struct lease_key *k);
-void worker_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);
+/* Nothing happens if the peer is gone. anew: send seeds. */
+void worker_send_lease(struct peers *s, uint64_t peer, const struct live_job *job, const struct lease_key *k,
+		       bool anew);
+void worker_send_revoke(struct peers *s, uint64_t peer, const struct lease_key *k);
+void worker_send_ack(struct peers *s, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text);
 void worker_send_job_end(struct session *p, uint64_t job);
 
 #endif
