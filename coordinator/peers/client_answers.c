@@ -30,7 +30,7 @@ void client_send_done(struct session *p, const char *text)
 uint64_t client_uploading(const struct session *p)
 {
 	uint64_t bytes = 0;
-	for (const struct session *other = p->peers->sessions; other; other = other->next)
+	for (const struct session *other = LIST_FIRST(&p->peers->sessions); other; other = LIST_NEXT(other, next))
 		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)
 			bytes += live_job_asset_bytes(other->upload->submit.message->submit);
 	return bytes;

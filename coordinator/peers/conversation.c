@@ -187,7 +187,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 
 void conversations_go_on(struct peers *s)
 {
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		for (struct envelope env; held_next(p, &env); envelope_fini(&env))
 			take_message(p, &env, NULL, 0);
 }

@@ -57,7 +57,7 @@ static void make_room(struct peers *s)
 	struct session *silent = NULL;
 	if (s->fetches < s->jobs->config.max_fetches)
 		return;
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		if (p->fetch.job && (!silent || p->fetch.at < silent->fetch.at))
 			silent = p;
 	fetch_end(silent);
@@ -152,7 +152,7 @@ static bool is_preview_old(const struct jobs *jobs, const struct live_job *job)
 
 void fetch_previews(struct peers *s, uint64_t id)
 {
-	for (struct session *p = s->sessions; p; p = p->next) {
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		struct live_job *job = jobs_find(s->jobs, id);
 		if (p->wants_preview != id || (job && job->busy))
 			continue;
@@ -180,7 +180,7 @@ bool fetch_uses(const struct peers *s, uint64_t job)
 {
 	static const double fetching_seconds = 60;
 	double since = jobs_now(s->jobs) - fetching_seconds;
-	for (const struct session *p = s->sessions; p; p = p->next)
+	for (const struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		if (p->watched == job || (p->ended.job == job && p->ended.at > since) ||
 		    (p->fetch.job == job && p->fetch.at > since))
 			return true;

@@ -32,7 +32,7 @@ static const struct conn_events refused_events = {.closed = on_refused};
 static bool make_room(struct peers *s)
 {
 	struct session *oldest = NULL;
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		if (p->state == SESSION_NEW)
 			oldest = p;
 	if (!oldest)
@@ -82,7 +82,7 @@ void peers_tick(struct peers *s)
 {
 	if (s->caller_waits)
 		peers_accept(s);
-	for (struct session *p = s->sessions; p; p = p->next) {
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		client_tick(p);
 		held_tick(p);
 	}
@@ -91,7 +91,7 @@ void peers_tick(struct peers *s)
 void peers_stop(struct peers *s)
 {
 	uv_close((uv_handle_t *)&s->listener, NULL);
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		conn_close(p->conn, "the coordinator stops");
 }
 
@@ -137,21 +137,21 @@ static void extended(struct peers *s, uint64_t peer, const char *refusal, const 
 
 static void job_ended(struct peers *s, uint64_t job)
 {
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		if (p->state == SESSION_WORKER)
 			worker_send_job_end(p, job);
 }
 
 static void jobs_let_go(struct peers *s)
 {
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		if (p->watched && p->shown && !jobs_find(s->jobs, p->watched))
 			client_tick(p);
 }
 
 static void file_read(struct peers *s, const struct blob_hash *h, int rc, const char *text)
 {
-	for (struct session *p = s->sessions; p; p = p->next) {
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		worker_requests_file_read(p, h, rc ? text : "");
 		client_file_read(p, h, rc == 0);
 	}

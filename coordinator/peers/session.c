@@ -10,7 +10,7 @@
 
 struct session *peers_find(const struct peers *s, uint64_t id)
 {
-	for (struct session *p = s->by_id[id % SESSION_BUCKETS]; p; p = p->alike)
+	for (struct session *p = LIST_FIRST(&s->by_id[id % SESSION_BUCKETS]); p; p = LIST_NEXT(p, alike))
 		if (p->id == id)
 			return p;
 	return NULL;
@@ -18,26 +18,15 @@ struct session *peers_find(const struct peers *s, uint64_t id)
 
 void peers_enlist(struct peers *s, struct session *p)
 {
-	struct session **bucket = &s->by_id[p->id % SESSION_BUCKETS];
-	p->alike = *bucket;
-	*bucket = p;
-	p->next = s->sessions;
-	p->place = &s->sessions;
-	if (p->next)
-		p->next->place = &p->next;
-	s->sessions = p;
+	LIST_INSERT_HEAD(&s->by_id[p->id % SESSION_BUCKETS], p, alike);
+	LIST_INSERT_HEAD(&s->sessions, p, next);
 	s->session_count++;
 }
 
 void peers_delist(struct peers *s, struct session *p)
 {
-	struct session **at = &s->by_id[p->id % SESSION_BUCKETS];
-	while (*at != p)
-		at = &(*at)->alike;
-	*at = p->alike;
-	*p->place = p->next;
-	if (p->next)
-		p->next->place = p->place;
+	LIST_REMOVE(p, alike);
+	LIST_REMOVE(p, next);
 	s->session_count--;
 }
 

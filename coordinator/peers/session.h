@@ -26,8 +26,8 @@ struct upload;
 struct worker_request;
 
 struct session {
-	struct session *next, **place; /* list of all; points to the pointer to this one */
-	struct session *alike;	       /* next in the same hash bucket */
+	LIST_ENTRY(session) next;  /* of all */
+	LIST_ENTRY(session) alike; /* in the same hash bucket */
 	struct peers *peers;
 	struct jobs *jobs;
 	struct conn *conn;
@@ -67,7 +67,8 @@ struct peers {
 	struct jobs *jobs;
 	struct tls *tls;   /* NULL: plaintext */
 	uv_tcp_t listener; /* its loop is that of the jobs */
-	struct session *sessions, *by_id[SESSION_BUCKETS];
+	LIST_HEAD(, session) sessions;
+	LIST_HEAD(, session) by_id[SESSION_BUCKETS];
 	unsigned session_count, fetches;
 	size_t held_bytes; /* bytes of waiting requests while jobs are read */
 	uint64_t last_peer;
