@@ -4,8 +4,8 @@
 #define COORDINATOR_JOBS_EXTEND_H
 
 #include "common/net/tls.h"
-#include "coordinator/job/extend_plan.h"
 #include "coordinator/job/jobs.h"
+#include "coordinator/retention/extend_plan.h"
 
 /* Who requests it. */
 struct requester {

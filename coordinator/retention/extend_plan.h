@@ -4,8 +4,8 @@
  * chains, bootstrap and epoch. A named bound is added to the requested one (or to what is done, if there was none); a
  * bound that is not named and already met is lifted. Pure.
  */
-#ifndef COORDINATOR_JOB_EXTEND_PLAN_H
-#define COORDINATOR_JOB_EXTEND_PLAN_H
+#ifndef COORDINATOR_RETENTION_EXTEND_PLAN_H
+#define COORDINATOR_RETENTION_EXTEND_PLAN_H
 
 #include "common/plan/plan.h"
 

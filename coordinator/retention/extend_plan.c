@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/job/extend_plan.h"
+#include "coordinator/retention/extend_plan.h"
 
 #include <math.h>
 #include <string.h>
