@@ -11,13 +11,14 @@
 
 enum { SESSION_BUCKETS = 4096 };
 
-enum { /* bytes */
-       SESSION_HELLO_HEADER = 4096,
-       SESSION_HEADER = 1 << 20,
-       /* Bytes that may wait for a peer to read them: an error for a stranger; answers for a client; for a worker
-	* also the leases that it may hold. */
-       SESSION_HELLO_SEND = 1 << 16,
-       SESSION_SEND = 1 << 23,
+enum {
+	/* Bytes of a message, without payload: before hello, and after it. */
+	SESSION_HELLO_HEADER = 4096,
+	SESSION_HEADER = 1 << 20,
+	/* Bytes that may wait for a peer to read them: before hello, an error; after it, answers. For a worker, the
+	 * leases that it may hold are added. */
+	SESSION_HELLO_SEND = 1 << 16,
+	SESSION_SEND = 1 << 23,
 };
 
 enum session_state { SESSION_NEW, SESSION_WORKER, SESSION_CLIENT, SESSION_LEAVING };
@@ -46,7 +47,7 @@ struct session {
 	struct {
 		uint64_t job;
 		double at;    /* s of the loop's clock */
-	} ended;	      /* the watched job that it was told the end of: it will fetch the result */
+	} ended;	      /* the watched job whose end it was told: it will fetch the result */
 	struct fetching {     /* a file being received */
 		uint64_t job; /* 0: none */
 		Farm__What what;

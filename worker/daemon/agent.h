@@ -5,9 +5,9 @@
  * refused permanently. On SIGTERM it finishes running work within the grace period, or gives it up, and exits. It
  * notifies the service manager (common/net/notify.h).
  *
- * A lease that makes no progress is returned as failed, and so are leases that wait for a scene whose building makes
- * none. A thread cannot be killed, so the worker then leaves as on SIGTERM, and the program exits with AGENT_HUNG. When
- * it leaves it does not wait for scenes being built. It runs in a process that a signal may end at any time
+ * A lease that makes no progress is returned as failed. If the building of a scene makes none, all leases that wait for
+ * it are. A thread cannot be killed, so the worker then leaves as on SIGTERM, and the program exits with AGENT_HUNG.
+ * When it leaves it does not wait for scenes being built. It runs in a process that a signal may end at any time
  * (supervise.h); the leases of the previous process are returned as failed after the first welcome (work.h).
  */
 #ifndef WORKER_DAEMON_AGENT_H

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Files being fetched from the coordinator into the cache, each once, however many jobs want it: any of those still
- * present when a chunk arrives has it stored. A chunk answers one request; others are ignored. A file that no job wants
- * any more is kept until its chunk arrives or the connection ends. Loop's thread. At most FETCHES_MOST.
+ * Files that are being fetched from the coordinator into the cache, at most FETCHES_MOST. A file is fetched once,
+ * however many jobs want it: when a chunk arrives, one of the jobs that still want it stores it. Chunks that were not
+ * requested are ignored. A file that no job wants any more stays listed until the chunk that was requested arrives or
+ * the connection ends. The loop's thread.
  */
 #ifndef WORKER_DAEMON_FETCH_H
 #define WORKER_DAEMON_FETCH_H
