@@ -194,7 +194,7 @@ static bool is_small(const struct plan *p)
 
 static bool is_building(const struct task *t)
 {
-	for (const struct job_cache *b = now.agent->bundles; b; b = b->next)
+	for (const struct job_cache *b = now.agent->job_caches; b; b = b->next)
 		if (&b->task == t)
 			return true;
 	return false;
@@ -215,7 +215,7 @@ static void work(void)
 			((struct job_cache *)t)->state = JOB_CACHE_FAILED;
 	} else {
 		struct lease_task *l = (struct lease_task *)t;
-		atomic_store(&l->stop, !is_small(&l->bundle->plan));
+		atomic_store(&l->stop, !is_small(&l->job_cache->plan));
 		t->run(t);
 	}
 	c->pending--;
@@ -254,11 +254,11 @@ static void step(const struct step *s)
 /* Files of the cache are read by libuv's pool, which nobody tells when to work; a worker that ends waits for it. */
 static void finish_reading(void)
 {
-	for (struct job_cache *b = now.agent->bundles; b;) {
+	for (struct job_cache *b = now.agent->job_caches; b;) {
 		bool reads = b->reading.check;
 		if (reads)
 			uv_run(&now.agent->loop, UV_RUN_ONCE);
-		b = reads ? now.agent->bundles : b->next;
+		b = reads ? now.agent->job_caches : b->next;
 	}
 }
 

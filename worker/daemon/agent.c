@@ -52,8 +52,8 @@ static void on_opened(void *user)
 	snprintf(name, sizeof name, "%s", a->config.name);
 	conn_send(a->conn,
 		  ENVELOPE(HELLO, hello, .version = FARM_VERSION, .role = FARM__ROLE__ROLE_WORKER, .name = name,
-			   .fingerprint = a->fingerprint, .threads = a->config.threads, .home = a->cache.life.home,
-			   .restarts = a->cache.life.restarts),
+			   .fingerprint = a->fingerprint, .threads = a->config.threads, .home = a->cache.identity.home,
+			   .restarts = a->cache.identity.restarts),
 		  NULL, 0);
 }
 
@@ -91,7 +91,7 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 	a->attempt--; /* this address first when the connection is lost */
 	a->back_off = first_back_off;
 	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator,
-		  (unsigned long long)a->cache.life.restarts);
+		  (unsigned long long)a->cache.identity.restarts);
 	if (*ack->text)
 		log_event(LOG_PEER_FAULT, "coordinator=%s text=%s", a->config.coordinator, log_quote(ack->text).text);
 	uv_timer_start(&a->heartbeat, on_heartbeat, ms, ms);

@@ -28,10 +28,10 @@ struct agent {
 	char fingerprint[FINGERPRINT_MAX];
 	struct cache cache;
 	struct thread_pool *thread_pool;
-	struct job_cache *bundles;
+	struct job_cache *job_caches;
 	struct fetch *fetches;
 	struct lease_task *leases;
-	uint64_t clock;	  /* counter of uses of bundles */
+	uint64_t clock;	  /* counter of uses of job_caches */
 	bool backlog;	  /* too many results wait to be acknowledged: no new leases */
 	uint64_t busy_at; /* ms of the loop: when it last had a lease */
 	bool watched;	  /* the service manager expects notifications */

@@ -77,7 +77,7 @@ static void begin_life(struct cache *c, const char *base, int slot)
 	char name[32];
 	struct error e;
 	snprintf(name, sizeof name, "slot-%d.life", slot);
-	if (worker_identity_begin(&c->life, base, name, &e))
+	if (worker_identity_begin(&c->identity, base, name, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 

@@ -12,7 +12,7 @@
 struct cache {
 	struct blob_store *blobs;
 	int lock;
-	struct worker_identity life; /* of the slot */
+	struct worker_identity identity; /* of the slot */
 };
 
 /* folder NULL: $XDG_CACHE_HOME/hslt or ~/.cache/hslt. limit: bytes of one slot. */

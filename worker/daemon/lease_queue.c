@@ -24,11 +24,11 @@
 
 #include <stdio.h>
 
-/* ---- bundles ---- */
+/* ---- job_caches ---- */
 
 static struct job_cache *find_job_cache(const struct agent *a, uint64_t job)
 {
-	for (struct job_cache *b = a->bundles; b; b = b->next)
+	for (struct job_cache *b = a->job_caches; b; b = b->next)
 		if (b->job == job)
 			return b;
 	return NULL;
@@ -36,7 +36,7 @@ static struct job_cache *find_job_cache(const struct agent *a, uint64_t job)
 
 static void drop_job_cache(struct agent *a, struct job_cache *b)
 {
-	struct job_cache **at = &a->bundles;
+	struct job_cache **at = &a->job_caches;
 	while (*at != b)
 		at = &(*at)->next;
 	*at = b->next;
@@ -45,7 +45,7 @@ static void drop_job_cache(struct agent *a, struct job_cache *b)
 
 static struct job_cache *who_wants(const struct agent *a, const struct blob_hash *h)
 {
-	for (struct job_cache *b = a->bundles; b; b = b->next)
+	for (struct job_cache *b = a->job_caches; b; b = b->next)
 		if (b->state == JOB_CACHE_FETCHING && blob_hash_equal(&b->wanted, h))
 			return b;
 	return NULL;
@@ -61,13 +61,13 @@ static void tidy_fetches(struct agent *a)
 	}
 }
 
-/* Drops unused bundles of jobs that have ended, and the least recently used ones beyond WORLDS_KEPT. */
-static void drop_unused_bundles(struct agent *a)
+/* Drops unused job_caches of jobs that have ended, and the least recently used ones beyond WORLDS_KEPT. */
+static void drop_unused_job_caches(struct agent *a)
 {
 	for (;;) {
 		struct job_cache *oldest = NULL, *ended = NULL;
 		unsigned idle = 0;
-		for (struct job_cache *b = a->bundles; b; b = b->next) {
+		for (struct job_cache *b = a->job_caches; b; b = b->next) {
 			if (b->users || b->state == JOB_CACHE_BUILDING || b->reading.check)
 				continue;
 			idle++;
@@ -101,14 +101,14 @@ static void fail_leases_of(struct agent *a, struct job_cache *b, const struct er
 	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_u64(b->job), log_quote(e->text).text);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->bundle != b || l->state != LEASE_WAITING)
+		if (l->job_cache != b || l->state != LEASE_WAITING)
 			continue;
 		send_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
 		drop_lease(a, l);
 	}
 }
 
-/* The next drop_unused_bundles drops it. */
+/* The next drop_unused_job_caches drops it. */
 static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
 {
 	b->state = JOB_CACHE_FAILED;
@@ -132,10 +132,10 @@ static void on_built(struct job_cache *b)
 		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_u64(b->job), b->build_seconds,
 			  world_embree_bytes(b->world));
 		for (struct lease_task *l = a->leases; l; l = l->next)
-			if (l->bundle == b && l->state == LEASE_WAITING)
+			if (l->job_cache == b && l->state == LEASE_WAITING)
 				start_lease(a, l);
 	}
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 	a->settle(a);
 }
 
@@ -157,7 +157,7 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 	} else if (files == JOB_CACHE_HAS) {
 		b->built = on_built;
 		for (const struct lease_task *l = a->leases; l; l = l->next)
-			if (l->bundle == b)
+			if (l->job_cache == b)
 				b->waits = l->grant.key;
 		rc = job_cache_build(b, a->thread_pool, &e);
 	}
@@ -174,7 +174,7 @@ static void on_file_read(struct job_cache *b)
 		return;
 	if (!b->ended)
 		fetch_or_build(a, b);
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 	a->settle(a);
 }
 
@@ -230,7 +230,7 @@ static void on_rendered(struct lease_task *l)
 		send_result(a, l);
 	}
 	limit_backlog(a);
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 	a->settle(a);
 }
 
@@ -291,8 +291,8 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	if (fresh)
 		rc = job_cache_new(&b, g.key.job, a->cache.blobs, &e);
 	if (!rc && fresh) {
-		b->next = a->bundles;
-		a->bundles = b;
+		b->next = a->job_caches;
+		a->job_caches = b;
 		send_job_get(a, b->job);
 	}
 	if (!rc)
@@ -309,7 +309,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	*end = l;
 	if (b->state == JOB_CACHE_READY)
 		start_lease(a, l);
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 }
 
 static void take_ack(struct agent *a, const Farm__LeaseAck *m)
@@ -330,7 +330,7 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 	if (l && l->state == LEASE_RENDERED) {
 		drop_lease(a, l);
 		limit_backlog(a);
-		drop_unused_bundles(a);
+		drop_unused_job_caches(a);
 	}
 }
 
@@ -341,7 +341,7 @@ static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : find_lease(a, &k);
 	if (l && l->state != LEASE_RENDERED) /* a result that was sent is acknowledged all the same */
 		forget_lease(a, l);
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 }
 
 static void take_job_end(struct agent *a, uint64_t job)
@@ -351,12 +351,12 @@ static void take_job_end(struct agent *a, uint64_t job)
 		return;
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->bundle == b && !l->unwanted)
+		if (l->job_cache == b && !l->unwanted)
 			forget_lease(a, l);
 	}
 	b->ended = true;
 	limit_backlog(a);
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 }
 
 /* The coordinator has started over, and the job's number is now another job's: the results of the old one are
@@ -366,7 +366,7 @@ static void disown(struct agent *a, struct job_cache *b)
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job with this number\"", log_u64(b->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->bundle != b || l->unwanted)
+		if (l->job_cache != b || l->unwanted)
 			continue;
 		send_failed(a, &l->grant.key, "", false);
 		forget_lease(a, l);
@@ -374,7 +374,7 @@ static void disown(struct agent *a, struct job_cache *b)
 	limit_backlog(a);
 	b->ended = true;
 	b->job = 0;
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 }
 
 static void take_job_info(struct agent *a, struct envelope *env)
@@ -392,9 +392,9 @@ static void take_job_info(struct agent *a, struct envelope *env)
 		fail_job_cache(a, b, &e);
 	fetch_or_build(a, b);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: earlier results are welcome */
-		if (l->bundle == b && l->state == LEASE_RENDERED)
+		if (l->job_cache == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 }
 
 /* If it cannot be fetched for one job, the others that want it try for themselves: what the first one held is
@@ -415,13 +415,13 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 	if (end == FETCH_FAILED || end == FETCH_UNSTORED) {
 		first->own = end == FETCH_UNSTORED;
 		fail_job_cache(a, first, &e);
-		drop_unused_bundles(a);
+		drop_unused_job_caches(a);
 	}
-	for (struct job_cache *b = a->bundles; b; b = b->next)
+	for (struct job_cache *b = a->job_caches; b; b = b->next)
 		fetch_or_build(a, b);
 	if (end == FETCH_WHOLE)
 		blob_release(a->cache.blobs, &hash);
-	drop_unused_bundles(a);
+	drop_unused_job_caches(a);
 }
 
 void lease_queue_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
@@ -474,7 +474,7 @@ void lease_queue_welcome(struct agent *a)
 	tell_lost(a);
 	fetch_reconnected(a);
 	/* Asks whether the jobs still live. The answers resume unfinished fetches and send unsent results. */
-	for (struct job_cache *b = a->bundles; b; b = b->next) {
+	for (struct job_cache *b = a->job_caches; b; b = b->next) {
 		b->confirmed = false;
 		if (!b->ended)
 			send_job_get(a, b->job);
@@ -529,7 +529,7 @@ static bool watch_leases(struct agent *a)
 static bool watch_builds(struct agent *a)
 {
 	bool found = false;
-	for (struct job_cache *b = a->bundles; b; b = b->next) {
+	for (struct job_cache *b = a->job_caches; b; b = b->next) {
 		struct error e;
 		if (b->state != JOB_CACHE_BUILDING || b->task.hung || !has_hung(&b->task))
 			continue;
@@ -554,7 +554,7 @@ bool lease_queue_is_idle(const struct agent *a)
 	for (const struct lease_task *l = a->leases; l; l = l->next, left++)
 		if (!l->task.hung)
 			return false;
-	for (const struct job_cache *b = a->bundles; b; b = b->next)
+	for (const struct job_cache *b = a->job_caches; b; b = b->next)
 		left += b->state == JOB_CACHE_BUILDING;
 	return thread_pool_pending(a->thread_pool) == left;
 }
@@ -565,9 +565,9 @@ void lease_queue_close(struct agent *a)
 		fetch_drop(a, a->fetches);
 	while (a->leases)
 		drop_lease(a, a->leases);
-	while (a->bundles) {
-		if (a->bundles->state == JOB_CACHE_BUILDING) /* its thread is gone */
-			a->bundles->state = a->bundles->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
-		drop_job_cache(a, a->bundles);
+	while (a->job_caches) {
+		if (a->job_caches->state == JOB_CACHE_BUILDING) /* its thread is gone */
+			a->job_caches->state = a->job_caches->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
+		drop_job_cache(a, a->job_caches);
 	}
 }

@@ -13,7 +13,7 @@ int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *b
 		return error_set(e, ENOMEM, "no memory for a lease");
 	l->grant = *g;
 	memset(g, 0, sizeof *g);
-	l->bundle = b;
+	l->job_cache = b;
 	b->users++;
 	atomic_init(&l->stop, false);
 	*out = l;
@@ -22,7 +22,7 @@ int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *b
 
 void lease_task_free(struct lease_task *l)
 {
-	l->bundle->users--;
+	l->job_cache->users--;
 	grant_fini(&l->grant);
 	mem_free(l->frame);
 	mem_free(l);
@@ -36,17 +36,17 @@ static void render(struct task *t)
 	struct lease_input in = {.chain_count = l->grant.chain_count,
 				 .seeds = l->grant.seeds,
 				 .states = l->grant.states,
-				 .map = l->bundle->map};
-	const struct plan *p = &l->bundle->plan;
+				 .map = l->job_cache->map};
+	const struct plan *p = &l->job_cache->plan;
 	l->end = LEASE_STOPPED;
-	work_begin(&l->grant.key, l->bundle->info.message->job_info->scene);
+	work_begin(&l->grant.key, l->job_cache->info.message->job_info->scene);
 	if (!atomic_load(&l->stop))
-		l->rc = render_lease(l->bundle->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
+		l->rc = render_lease(l->job_cache->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
 	if (!l->rc && l->end == LEASE_DONE) /* what the coordinator would refuse is the scene's fault, so it is reported
 					       before it is sent */
 		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)
-		error_prefix(&l->error, l->rc, "%s", l->bundle->info.message->job_info->scene);
+		error_prefix(&l->error, l->rc, "%s", l->job_cache->info.message->job_info->scene);
 	if (!l->rc && l->end == LEASE_DONE)
 		l->rc = batch_pack(&batch, p, &l->frame, &l->frame_size, &l->error);
 	batch_fini(&batch);

@@ -12,7 +12,7 @@
 #include <stdatomic.h>
 
 enum lease_task_state {
-	LEASE_WAITING, /* for its bundle */
+	LEASE_WAITING, /* for its job cache */
 	LEASE_QUEUED,  /* for a thread, or running */
 	LEASE_RENDERED /* frame holds the result */
 };
@@ -21,7 +21,7 @@ struct lease_task {
 	struct task task;
 	struct lease_task *next;
 	struct grant grant;
-	struct job_cache *bundle;
+	struct job_cache *job_cache;
 	enum lease_task_state state;
 	atomic_bool stop;
 	bool unwanted; /* nobody wants it: dropped when its thread returns */

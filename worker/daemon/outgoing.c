@@ -58,7 +58,7 @@ void send_bad_states(struct agent *a, const struct grant *g, const char *text)
 
 void send_result(struct agent *a, struct lease_task *l)
 {
-	if (!a->conn || !a->welcome || l->sent || !l->bundle->confirmed)
+	if (!a->conn || !a->welcome || l->sent || !l->job_cache->confirmed)
 		return;
 	unsigned char *copy = mem_alloc(l->frame_size, 1);
 	if (!copy) { /* sent again after the next connect */
