@@ -25,6 +25,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/queue.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -36,7 +37,7 @@ enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, BACKLOG = 16 }
 enum topic { TOPIC_JOBS = 1, TOPIC_WORKERS = 2, TOPIC_SNAPSHOT = 4 };
 
 struct reader {
-	struct reader *next;
+	LIST_ENTRY(reader) next;
 	struct status_socket *socket;
 	uv_pipe_t pipe;
 	unsigned topics;
@@ -51,7 +52,7 @@ struct status_socket {
 	const struct peers *peers;
 	struct jobs *jobs;
 	uv_pipe_t listener;
-	struct reader *readers;
+	LIST_HEAD(, reader) readers;
 	unsigned reader_count;
 	bool caller_waits;
 	struct job_view *shown; /* the jobs as last sent to subscribers */
@@ -152,10 +153,7 @@ static void drop(struct reader *r)
 	if (r->closing)
 		return;
 	r->closing = true;
-	struct reader **at = &r->socket->readers;
-	while (*at != r)
-		at = &(*at)->next;
-	*at = r->next;
+	LIST_REMOVE(r, next);
 	r->socket->reader_count--;
 	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
 }
@@ -293,8 +291,7 @@ static void on_connection(uv_stream_t *listener, int status)
 	uv_pipe_init(listener->loop, &r->pipe, 0);
 	r->pipe.data = r;
 	r->socket = t;
-	r->next = t->readers;
-	t->readers = r;
+	LIST_INSERT_HEAD(&t->readers, r, next);
 	t->reader_count++;
 	if (uv_accept(listener, (uv_stream_t *)&r->pipe)) {
 		drop(r);
@@ -324,8 +321,8 @@ static const struct job_view *shown_before(const struct status_socket *t, uint64
 
 static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 {
-	for (struct reader *r = t->readers, *next; r; r = next) {
-		next = r->next;
+	for (struct reader *r = LIST_FIRST(&t->readers), *next; r; r = next) {
+		next = LIST_NEXT(r, next);
 		if ((r->topics & topic) && !r->behind)
 			send_object(r, json_incref(o), false);
 	}
@@ -339,12 +336,12 @@ void status_tick(struct status_socket *t)
 		return;
 	if (t->caller_waits)
 		on_connection((uv_stream_t *)&t->listener, 0);
-	for (struct reader *r = t->readers; r; r = r->next)
+	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		topics |= r->topics;
 	if (!topics || t->shown_changes == t->jobs->changes)
 		return;
 	t->shown_changes = t->jobs->changes;
-	for (struct reader *r = t->readers; r; r = r->next)
+	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		r->behind = r->behind || (r->topics && waiting(r));
 	struct job_view *views;
 	size_t count = jobs_views(t->jobs, LINES_ENDED, &views);
@@ -497,8 +494,8 @@ void status_close(struct status_socket *t)
 {
 	if (!t)
 		return;
-	while (t->readers)
-		drop(t->readers);
+	while (!LIST_EMPTY(&t->readers))
+		drop(LIST_FIRST(&t->readers));
 	struct stat st;
 	if (t->path && t->inode && lstat(t->path, &st) == 0 && st.st_dev == t->device && st.st_ino == t->inode)
 		unlink(t->path);
