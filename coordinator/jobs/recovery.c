@@ -66,17 +66,11 @@ static void view(const struct found *f, struct job_view *v)
 	memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
 }
 
-static const struct found *find(const struct jobs *jobs, uint64_t job)
+bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
 {
 	const struct found *f = jobs->found;
 	while (f && f->record.id != job)
 		f = f->next;
-	return f;
-}
-
-bool recovery_view(const struct jobs *jobs, uint64_t job, struct job_view *v)
-{
-	const struct found *f = find(jobs, job);
 	if (f)
 		view(f, v);
 	return f != NULL;
