@@ -48,11 +48,6 @@ static void answer_hello(struct session *p, bool accepted, bool final, const cha
 	}
 }
 
-static void send_hello_ack(struct session *p, bool accepted, const char *said)
-{
-	answer_hello(p, accepted, false, said);
-}
-
 /* Reasons that reconnecting does not change. */
 static void refuse_for_good(struct session *p, const char *said)
 {
@@ -90,7 +85,7 @@ static void join(struct session *p, const Farm__Hello *h)
 	jobs_step(p->jobs, &ev);
 	if (*p->rejected) {
 		p->joined = false;
-		send_hello_ack(p, false, p->rejected);
+		answer_hello(p, false, false, p->rejected);
 		return;
 	}
 	p->state = SESSION_WORKER;
@@ -99,7 +94,7 @@ static void join(struct session *p, const Farm__Hello *h)
 		"peer=%llu address=%s role=worker name=%s certificate=%s home=%s start=%llu threads=%u fingerprint=%s",
 		(unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-",
 		*h->home ? h->home : "-", (unsigned long long)h->restarts, h->threads, log_quote(h->fingerprint).text);
-	send_hello_ack(p, true, what_to_know(p, text, sizeof text));
+	answer_hello(p, true, false, what_to_know(p, text, sizeof text));
 }
 
 /* What the certificate does not allow; NULL: it allows everything. */
@@ -156,7 +151,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		join(p, h);
 	} else if (h->role == FARM__ROLE__ROLE_CLIENT) {
 		p->state = SESSION_CLIENT;
-		send_hello_ack(p, true, what_to_know(p, text, sizeof text));
+		answer_hello(p, true, false, what_to_know(p, text, sizeof text));
 	} else {
 		refuse_for_good(p, "hello must say whether it is a worker or a client");
 	}
@@ -219,15 +214,5 @@ static void on_closed(void *user, const char *why)
 	mem_free(p);
 }
 
-static void on_partial(void *user)
-{
-	worker_heard(user);
-}
-
-static void on_drained(void *user)
-{
-	worker_requests_go_on(user);
-}
-
 const struct conn_events conversation_events = {
-	.message = on_message, .partial = on_partial, .drained = on_drained, .closed = on_closed};
+	.message = on_message, .partial = worker_heard, .drained = worker_requests_go_on, .closed = on_closed};

@@ -40,8 +40,9 @@ static void take_lease_result(struct session *p, struct envelope *env)
 
 /* A long message counts as a sign of life, and its worker needs one from us meanwhile: its heartbeats, and with them
  * our answers, are queued behind that message. */
-void worker_heard(struct session *p)
+void worker_heard(void *session)
 {
+	struct session *p = session;
 	struct event ev = {.kind = EVENT_HEARTBEAT, .peer = p->id};
 	if (!p->joined || p->state != SESSION_WORKER ||
 	    jobs_now(p->jobs) < p->heard + p->jobs->config.heartbeat_seconds)

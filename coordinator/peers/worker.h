@@ -7,6 +7,6 @@
 
 /* Handles a message. May take the envelope. */
 void worker_message(struct session *p, struct envelope *env);
-void worker_heard(struct session *p); /* a part of an incomplete message has arrived */
+void worker_heard(void *session); /* a part of an incomplete message has arrived */
 
 #endif

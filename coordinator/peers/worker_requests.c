@@ -93,8 +93,9 @@ static void drop_first(struct session *p)
 	mem_free(a);
 }
 
-void worker_requests_go_on(struct session *p)
+void worker_requests_go_on(void *session)
 {
+	struct session *p = session;
 	while (!STAILQ_EMPTY(&p->requests) && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD &&
 	       answer(p, STAILQ_FIRST(&p->requests)))
 		drop_first(p);

@@ -22,7 +22,7 @@ struct worker_request {
 void worker_requests_take(
 	struct session *p,
 	const struct worker_request *a); /* copies; answers now or later, or disconnects a worker that asks too much */
-void worker_requests_go_on(struct session *p); /* the worker has read everything sent */
+void worker_requests_go_on(void *session); /* the worker has read everything sent */
 /* A file has been checked. refusal: it cannot be sent; "": it can. */
 void worker_requests_file_read(struct session *p, const struct blob_hash *h, const char *refusal);
 void worker_requests_drop(struct session *p);
