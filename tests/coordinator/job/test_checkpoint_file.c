@@ -7,7 +7,7 @@
 #include "common/base/bytes.h"
 #include "common/base/mem.h"
 #include "coordinator/job/stored.h"
-#include "coordinator/job/stored_frame.h"
+#include "common/wire/envelope.h"
 #include "tests/support/canvas_batches.h"
 #include "tests/support/folder.h"
 #include "tests/support/golden.h"
@@ -53,7 +53,7 @@ static struct live_job *make_job(void)
 	assert_int_equal(p.chains, CHAINS);
 	assert_int_equal(envelope_pack(&m, NULL, 0, &frame, &size, &e), 0);
 	assert_int_equal(
-		stored_frame_unpack(&env, FARM__ENVELOPE__BODY_SUBMIT, frame, size, &payload, &payload_size, &e), 0);
+		envelope_unpack_frame(&env, FARM__ENVELOPE__BODY_SUBMIT, frame, size, &payload, &payload_size, &e), 0);
 	assert_int_equal(live_job_new(&job, JOB, &env, &p, "", 1, spool, &e), 0);
 	mem_free(frame);
 	return job;
