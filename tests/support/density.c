@@ -356,7 +356,7 @@ static double technique(const struct path_context *c, const struct route *r, uns
 		return sum;
 	const struct emitter *em = &c->w->emitters[r->x[0].emitter];
 	struct emitter_point p = emitter_point_of(&r->x[0]);
-	double toward = c->w->emitter_pdf[r->x[0].emitter] * em->ops->pdf_toward(em, r->x[1].x.p, &p);
+	double toward = c->w->emitter_pdf[r->x[0].emitter] * emitter_pdf_toward(em, r->x[1].x.p, &p);
 	return sum - log(r->from_light[0]) + log(toward);
 }
 

@@ -3,8 +3,7 @@
 #include "worker/render/emitter/emitter.h"
 #include "worker/render/emitter/uniform.h"
 
-#define PI 3.14159265358979323846
-#define UNIFORM (1 / (4 * PI))
+#define UNIFORM (1 / (4 * M_PI))
 
 static spectrum constant_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w,
 				  const struct wavelengths *wl)
@@ -34,19 +33,6 @@ static void constant_point_inverse(const struct emitter *em, const struct emitte
 	square_of_direction(x->p, u);
 }
 
-static bool constant_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
-				   double *pdf_toward)
-{
-	(void)ref;
-	return constant_sample_point(em, u, x, pdf_toward);
-}
-
-static double constant_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
-{
-	(void)em, (void)ref, (void)x;
-	return UNIFORM;
-}
-
 static int constant_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 			   struct error *e)
 {
@@ -58,7 +44,7 @@ static int constant_create(struct emitter *em, const struct scene_node *n, const
 	*c = radiance.color;
 	em->infinite = true;
 	em->shape = c->shape;
-	em->power = 4 * PI * color_mean(c);
+	em->power = 4 * M_PI * color_mean(c);
 	em->brightest = color_max(c);
 	return 0;
 }
@@ -77,6 +63,4 @@ const struct emitter_ops emitter_ops_constant = {
 	.sample_point = constant_sample_point,
 	.pdf_point = constant_pdf_point,
 	.point_inverse = constant_point_inverse,
-	.sample_toward = constant_sample_toward,
-	.pdf_toward = constant_pdf_toward,
 };

@@ -5,8 +5,6 @@
 
 #include <stdbool.h>
 
-#define PI 3.14159265358979323846
-
 /* By albedo 0 and 1, turbidity 1 to 10 and control point: A to G, I, H, and the mean radiance. */
 enum { TURBIDITIES = 10, POINTS = 6, NUMBERS = 10 };
 static const double table[3][2][TURBIDITIES][POINTS][NUMBERS] = {
@@ -17,7 +15,7 @@ static const double table[3][2][TURBIDITIES][POINTS][NUMBERS] = {
 static void point_weights(double sun, double weight[POINTS])
 {
 	static const double binomial[POINTS] = {1, 5, 10, 10, 5, 1};
-	double t = cbrt(fmin(fmax(1 - 2 * sun / PI, 0), 1));
+	double t = cbrt(fmin(fmax(1 - 2 * sun / M_PI, 0), 1));
 	for (int i = 0; i < POINTS; i++)
 		weight[i] = binomial[i] * pow(t, i) * pow(1 - t, POINTS - 1 - i);
 }
@@ -63,7 +61,7 @@ static void rgb_from_xyz(const double xyz[3], double rgb[3])
 void daylight_sky(const struct daylight *d, double angle, double gamma, double rgb[3])
 {
 	double xyz[3] = {0, 0, 0};
-	for (int k = 0; k < 3 && angle < 0.5 * PI; k++)
+	for (int k = 0; k < 3 && angle < 0.5 * M_PI; k++)
 		xyz[k] = fmax(d->mean[k] * radiance_of(d->shape[k], angle, gamma), 0) / CIE_Y_SUM;
 	rgb_from_xyz(xyz, rgb);
 }
@@ -98,7 +96,7 @@ static double through_vapour(double x)
 
 void daylight_sun(double turbidity, double sun, double rgb[3])
 {
-	double xyz[3] = {0, 0, 0}, degrees = sun * 180 / PI;
+	double xyz[3] = {0, 0, 0}, degrees = sun * 180 / M_PI;
 	/* Relative optical mass: Kasten 1966. Aerosols: Angstrom's law. 0.35 cm of ozone, 2 cm of water. */
 	double mass = 1 / (cos(sun) + 0.15 * pow(93.885 - degrees, -1.253)),
 	       beta = fmax(0.04608 * turbidity - 0.04586, 0);
@@ -122,10 +120,10 @@ static int day_of_year(const struct daylight_time *t)
 
 vec3 daylight_position(const struct daylight_time *t)
 {
-	double day = day_of_year(t), l = t->latitude * PI / 180;
-	double solar = t->hour + 0.170 * sin(4 * PI * (day - 80) / 373) - 0.129 * sin(2 * PI * (day - 8) / 355) +
+	double day = day_of_year(t), l = t->latitude * M_PI / 180;
+	double solar = t->hour + 0.170 * sin(4 * M_PI * (day - 80) / 373) - 0.129 * sin(2 * M_PI * (day - 8) / 355) +
 		       (t->longitude - 15 * t->zone) / 15;
-	double declination = 0.4093 * sin(2 * PI * (day - 81) / 368), turn = PI * solar / 12;
+	double declination = 0.4093 * sin(2 * M_PI * (day - 81) / 368), turn = M_PI * solar / 12;
 	double up = sin(l) * sin(declination) - cos(l) * cos(declination) * cos(turn);
 	/* From south, towards the west. */
 	double west = -cos(declination) * sin(turn),

@@ -72,16 +72,3 @@ double delta_pdf_point(const struct emitter *em, const struct emitter_point *x)
 	(void)em, (void)x;
 	return 1;
 }
-
-bool delta_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
-			 double *pdf_toward)
-{
-	(void)ref;
-	return delta_sample_point(em, u, x, pdf_toward);
-}
-
-double delta_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
-{
-	(void)em, (void)ref, (void)x;
-	return 1;
-}

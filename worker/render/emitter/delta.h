@@ -38,12 +38,7 @@ int delta_either(const struct scene_node *n, const char *name, const char *other
 
 bool delta_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
 double delta_pdf_point(const struct emitter *em, const struct emitter_point *x);
-bool delta_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
-			 double *pdf_toward);
-double delta_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x);
 
-#define DELTA_OPS                                                                                               \
-	.sample_point = delta_sample_point, .pdf_point = delta_pdf_point, .sample_toward = delta_sample_toward, \
-	.pdf_toward = delta_pdf_toward
+#define DELTA_OPS .sample_point = delta_sample_point, .pdf_point = delta_pdf_point
 
 #endif

@@ -65,7 +65,7 @@ struct emitter_ops {
 	bool (*sample_direction)(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
 				 double *pdf_solid);
 	double (*pdf_direction)(const struct emitter *em, const struct emitter_point *x, vec3 w);
-	/* Samples a point for next event estimation from ref. */
+	/* Samples a point for next event estimation from ref. Both NULL: as sample_point and pdf_point. */
 	bool (*sample_toward)(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 			      double *pdf_toward);
 	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
@@ -81,6 +81,18 @@ struct emitter {
 			     bound that pixels are expected to stay below, see delta.h */
 	void *data;
 };
+
+static inline bool emitter_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+					 double *pdf_toward)
+{
+	return em->ops->sample_toward ? em->ops->sample_toward(em, ref, u, x, pdf_toward)
+				      : em->ops->sample_point(em, u, x, pdf_toward);
+}
+
+static inline double emitter_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
+{
+	return em->ops->pdf_toward ? em->ops->pdf_toward(em, ref, x) : em->ops->pdf_point(em, x);
+}
 
 /* Whether it belongs to a shape. */
 bool emitter_needs_surface(const struct scene_node *n);

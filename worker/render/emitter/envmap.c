@@ -18,8 +18,6 @@
 
 #include <string.h>
 
-#define PI 3.14159265358979323846
-
 struct envmap {
 	struct raster raster;
 	double scale;
@@ -39,9 +37,9 @@ static vec3 to_local(const struct envmap *m, vec3 d)
 static void coordinates(const struct envmap *m, vec3 direction, double *u, double *v)
 {
 	vec3 d = to_local(m, direction);
-	double turn = atan2(d.x, -d.z) / (2 * PI);
+	double turn = atan2(d.x, -d.z) / (2 * M_PI);
 	*u = turn < 0 ? turn + 1 : turn;
-	*v = atan2(hypot(d.x, d.z), d.y) / PI;
+	*v = atan2(hypot(d.x, d.z), d.y) / M_PI;
 }
 
 spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
@@ -59,8 +57,8 @@ spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x
 static double row_edge(const struct envmap *m, uint32_t row) /* angle from the pole above row */
 {
 	if (m->to_poles)
-		return PI * row / m->rows;
-	return row == 0 ? 0 : row == m->rows ? PI : PI * (row - 0.5) / (m->rows - 1);
+		return M_PI * row / m->rows;
+	return row == 0 ? 0 : row == m->rows ? M_PI : M_PI * (row - 0.5) / (m->rows - 1);
 }
 
 static double row_height(const struct envmap *m, uint32_t row) /* in the cosine: no cancellation at the poles */
@@ -97,7 +95,7 @@ double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x)
 		return 0;
 	double chance =
 		(m->row_cdf[row + 1] - m->row_cdf[row]) * (cells[column + 1] - cells[column]) / cells[m->columns];
-	return chance / (row_height(m, row) * 2 * PI / m->columns);
+	return chance / (row_height(m, row) * 2 * M_PI / m->columns);
 }
 
 void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
@@ -118,26 +116,6 @@ void envmap_point_inverse(const struct emitter *em, const struct emitter_point *
 		u[i] = fmin(fmax(u[i], 0), 1 - 0x1p-53);
 }
 
-double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
-{
-	(void)ref;
-	return envmap_pdf_point(em, x);
-}
-
-/* search_cell of whole numbers. */
-static uint32_t find_cell(const uint32_t *cdf, uint32_t n, double x)
-{
-	uint32_t low = 0, high = n;
-	while (high - low > 1) {
-		uint32_t middle = low + (high - low) / 2;
-		if (cdf[middle] <= x)
-			low = middle;
-		else
-			high = middle;
-	}
-	return low;
-}
-
 bool envmap_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point)
 {
 	const struct envmap *m = em->data;
@@ -146,12 +124,12 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 	uint32_t row = search_cell(m->row_cdf, m->rows, u[1]);
 	const uint32_t *cells = row_cells(m, row);
 	double target = u[0] * cells[m->columns];
-	uint32_t column = find_cell(cells, m->columns, target);
+	uint32_t column = search_count(cells, m->columns, target);
 	double width = cells[column + 1] - cells[column], height = m->row_cdf[row + 1] - m->row_cdf[row];
 	if (!(width > 0 && height > 0))
 		return false;
 	double across = (target - cells[column]) / width, down = (u[1] - m->row_cdf[row]) / height;
-	double phi = 2 * PI * ((column + 0.5 + across) / m->columns);
+	double phi = 2 * M_PI * ((column + 0.5 + across) / m->columns);
 	double from_pole = 2 * pow(sin(0.5 * row_edge(m, row)), 2) + down * row_height(m, row); /* 1 - cosine */
 	double sine = sqrt(fmax(0, from_pole * (2 - from_pole)));
 	vec3 d = vec3_scale(sine * sin(phi), m->axis[0]);
@@ -159,13 +137,6 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 	*x = (struct emitter_point){.p = vec3_normalize(d), .infinite = true};
 	*pdf_point = envmap_pdf_point(em, x);
 	return *pdf_point > 0;
-}
-
-bool envmap_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
-			  double *pdf_toward)
-{
-	(void)ref;
-	return envmap_sample_point(em, u, x, pdf_toward);
 }
 
 static double luminance(const struct envmap *m, uint32_t row, uint32_t column)
@@ -199,7 +170,7 @@ static double build_density(struct envmap *m)
 			cells[c + 1] = cells[c] + (w > 0 ? (uint32_t)fmax(1, floor(w / sum * unit)) : 0);
 		}
 		m->row_cdf[row] = total;
-		total += sum * row_height(m, row) * 2 * PI / m->columns;
+		total += sum * row_height(m, row) * 2 * M_PI / m->columns;
 	}
 	m->row_cdf[m->rows] = total;
 	for (uint32_t row = 0; row <= m->rows && total > 0; row++)

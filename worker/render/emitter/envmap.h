@@ -16,12 +16,9 @@ spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x
 bool envmap_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
 double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x);
 void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2]);
-bool envmap_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
-			  double *pdf_toward);
-double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x);
 
 #define ENVMAP_OPS                                                                                       \
 	.radiance = envmap_radiance, .sample_point = envmap_sample_point, .pdf_point = envmap_pdf_point, \
-	.point_inverse = envmap_point_inverse, .sample_toward = envmap_sample_toward, .pdf_toward = envmap_pdf_toward
+	.point_inverse = envmap_point_inverse
 
 #endif

@@ -9,12 +9,9 @@
 #include "worker/render/emitter/envmap.h"
 #include "worker/render/math/cie.h"
 
-#define PI 3.14159265358979323846
-#define RADIANS (PI / 180)
+#include <string.h>
 
-struct parts {
-	bool sky, sun;
-};
+#define RADIANS (M_PI / 180)
 
 struct baking {
 	struct daylight sky;
@@ -25,7 +22,7 @@ struct baking {
 
 static vec3 direction(const struct image *m, double column, double row)
 {
-	double phi = 2 * PI * column / m->width, theta = PI * row / m->height;
+	double phi = 2 * M_PI * column / m->width, theta = M_PI * row / m->height;
 	return (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)};
 }
 
@@ -42,7 +39,7 @@ static double angle_between(vec3 a, vec3 b)
 /* The part of the horizon's light that `extend` sends up from below it: all at the horizon, none from the nadir. */
 static double extended(double angle)
 {
-	double t = fmin(2 - 2 * angle / PI, 1);
+	double t = fmin(2 - 2 * angle / M_PI, 1);
 	return t * t * (3 - 2 * t);
 }
 
@@ -50,9 +47,9 @@ static double extended(double angle)
 static void bake_sky(const struct baking *b, double scale, double stretch, bool extend)
 {
 	const struct image *m = &b->image;
-	const double horizon = nextafter(0.5 * PI, 0);
+	const double horizon = nextafter(0.5 * M_PI, 0);
 	for (uint32_t y = 0; y < m->height; y++) {
-		double angle = PI * (y + 0.5) / m->height, model = angle / stretch, factor = scale;
+		double angle = M_PI * (y + 0.5) / m->height, model = angle / stretch, factor = scale;
 		if (model > horizon && !extend)
 			break;
 		if (extend) {
@@ -60,7 +57,7 @@ static void bake_sky(const struct baking *b, double scale, double stretch, bool 
 			factor *= extended(angle);
 		}
 		for (uint32_t x = 0; x < m->width; x++) {
-			vec3 d = direction(m, x + 0.5, model * m->height / PI);
+			vec3 d = direction(m, x + 0.5, model * m->height / M_PI);
 			double rgb[3];
 			daylight_sky(&b->sky, model, angle_between(d, b->towards), rgb);
 			for (int k = 0; k < 3; k++)
@@ -73,7 +70,7 @@ static void bake_sky(const struct baking *b, double scale, double stretch, bool 
 static double covered(const struct baking *b, uint32_t x, uint32_t y)
 {
 	enum { PARTS = 8 };
-	double reach = b->radius + 2 * PI / b->image.height;
+	double reach = b->radius + 2 * M_PI / b->image.height;
 	if (angle_between(direction(&b->image, x + 0.5, y + 0.5), b->towards) > reach)
 		return 0;
 	int inside = 0;
@@ -88,15 +85,15 @@ static double covered(const struct baking *b, uint32_t x, uint32_t y)
 static void bake_sun(const struct baking *b, const double rgb[3])
 {
 	const struct image *m = &b->image;
-	double solid = 0, pixel_row = 2 * PI / m->width * PI / m->height;
-	double row = angle_between(b->towards, (vec3){0, 1, 0}) * m->height / PI,
-	       reach = b->radius * m->height / PI + 2;
+	double solid = 0, pixel_row = 2 * M_PI / m->width * M_PI / m->height;
+	double row = angle_between(b->towards, (vec3){0, 1, 0}) * m->height / M_PI,
+	       reach = b->radius * m->height / M_PI + 2;
 	uint32_t first = (uint32_t)fmax(row - reach, 0), last = (uint32_t)fmin(row + reach, m->height - 1.0);
 	for (uint32_t y = first; y <= last; y++)
 		for (uint32_t x = 0; x < m->width; x++)
-			solid += covered(b, x, y) * pixel_row * sin(PI * (y + 0.5) / m->height);
+			solid += covered(b, x, y) * pixel_row * sin(M_PI * (y + 0.5) / m->height);
 	/* Solid angles of the true disk, without cancellation. */
-	double whole = 4 * PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2), factor = solid > 0 ? whole / solid : 0;
+	double whole = 4 * M_PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2), factor = solid > 0 ? whole / solid : 0;
 	for (uint32_t y = first; y <= last; y++)
 		for (uint32_t x = 0; x < m->width; x++)
 			for (int k = 0; k < 3; k++)
@@ -165,10 +162,10 @@ static int read_albedo(const struct scene_node *n, const struct emitter_build *b
 	return 0;
 }
 
-static int bake_environment(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
-			    struct parts parts, struct error *e)
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
-	struct baking b = {.image = {.width = parts.sun ? 2048 : 512, .height = parts.sun ? 1024 : 256, .channels = 3}};
+	bool has_sky = strcmp(n->type, "sun") != 0, has_sun = strcmp(n->type, "sky") != 0;
+	struct baking b = {.image = {.width = has_sun ? 2048 : 512, .height = has_sun ? 1024 : 256, .channels = 3}};
 	double turbidity = node_float(n, "turbidity", 3), scale = node_float(n, "scale", 1);
 	vec3 axis[3], towards = {0, 1, 0};
 	int code = envmap_axes(n, axis, e);
@@ -183,7 +180,7 @@ static int bake_environment(struct emitter *em, const struct scene_node *n, cons
 		return code;
 	b.towards = (vec3){vec3_dot(axis[0], towards), vec3_dot(axis[1], towards), vec3_dot(axis[2], towards)};
 	double sun = angle_between(b.towards, (vec3){0, 1, 0});
-	if (!(sun < 0.5 * PI - 1e-3))
+	if (!(sun < 0.5 * M_PI - 1e-3))
 		return node_error(n, e, EINVAL, "the sun is not above the horizon (%.1f degrees)", 90 - sun / RADIANS);
 	double albedo[3];
 	if ((code = read_albedo(n, build, albedo, e)))
@@ -195,32 +192,14 @@ static int bake_environment(struct emitter *em, const struct scene_node *n, cons
 	if (!b.image.pixels)
 		return node_error(n, e, ENOMEM, "out of memory");
 	double rgb[3];
-	if (parts.sky)
+	if (has_sky)
 		bake_sky(&b, node_float(n, "sky_scale", 1), node_float(n, "stretch", 1), node_bool(n, "extend", false));
 	daylight_sun(turbidity, sun, rgb);
 	for (int k = 0; k < 3; k++)
 		rgb[k] *= node_float(n, "sun_scale", 1);
-	if (parts.sun)
+	if (has_sun)
 		bake_sun(&b, rgb);
 	return envmap_make(em, &(struct raster){.image = b.image}, false, scale, axis, n, build, e);
-}
-
-static int sky_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
-		      struct error *e)
-{
-	return bake_environment(em, n, build, (struct parts){.sky = true}, e);
-}
-
-static int sun_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
-		      struct error *e)
-{
-	return bake_environment(em, n, build, (struct parts){.sun = true}, e);
-}
-
-static int sunsky_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
-			 struct error *e)
-{
-	return bake_environment(em, n, build, (struct parts){.sky = true, .sun = true}, e);
 }
 
 #define NUMBER(name_, min_, max_)                                                         \
@@ -259,9 +238,9 @@ static const struct param params[] = {
 	{.name = NULL},
 };
 
-const struct emitter_ops emitter_ops_sky = {
-	.decl = {PLUGIN_EMITTER, "sky", params, 0, PARAM_UNDERSTOOD}, .create = sky_create, ENVMAP_OPS};
-const struct emitter_ops emitter_ops_sun = {
-	.decl = {PLUGIN_EMITTER, "sun", params, 0, PARAM_UNDERSTOOD}, .create = sun_create, ENVMAP_OPS};
-const struct emitter_ops emitter_ops_sunsky = {
-	.decl = {PLUGIN_EMITTER, "sunsky", params, 0, PARAM_UNDERSTOOD}, .create = sunsky_create, ENVMAP_OPS};
+#define OPS(NAME)                                       \
+	const struct emitter_ops emitter_ops_##NAME = { \
+		.decl = {PLUGIN_EMITTER, #NAME, params, 0, PARAM_UNDERSTOOD}, .create = create, ENVMAP_OPS}
+OPS(sky);
+OPS(sun);
+OPS(sunsky);

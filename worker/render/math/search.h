@@ -5,17 +5,21 @@
 #include <stdint.h>
 
 /* The last index i < n with edge[i] <= x, or 0; n > 0 cells lie between ascending edges. */
-static inline uint32_t search_cell(const double *edge, uint32_t n, double x)
-{
-	uint32_t low = 0, high = n;
-	while (high - low > 1) {
-		uint32_t middle = low + (high - low) / 2;
-		if (edge[middle] <= x)
-			low = middle;
-		else
-			high = middle;
+#define SEARCH(name, type)                                                  \
+	static inline uint32_t name(const type *edge, uint32_t n, double x) \
+	{                                                                   \
+		uint32_t low = 0, high = n;                                 \
+		while (high - low > 1) {                                    \
+			uint32_t middle = low + (high - low) / 2;           \
+			if (edge[middle] <= x)                              \
+				low = middle;                               \
+			else                                                \
+				high = middle;                              \
+		}                                                           \
+		return low;                                                 \
 	}
-	return low;
-}
+SEARCH(search_cell, double)
+SEARCH(search_count, uint32_t)
+#undef SEARCH
 
 #endif

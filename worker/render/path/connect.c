@@ -34,7 +34,7 @@ double path_pdf_toward(const struct path_context *c, const struct path_vertex *v
 	const struct emitter *em = &c->w->emitters[v->emitter];
 	struct emitter_point p = world_emitter_point(&v->x);
 	p.infinite = v->kind == VERTEX_INFINITE;
-	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_toward(em, ref, &p);
+	return c->w->emitter_pdf[v->emitter] * emitter_pdf_toward(em, ref, &p);
 }
 
 /* The ends that a technique joins scatter there by connection: their sub-path's delta flag says nothing. */
@@ -234,7 +234,7 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 		return false;
 	const struct emitter *em = &w->emitters[chosen];
 	struct emitter_point p;
-	if (!em->ops->sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
+	if (!emitter_sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
 		return false;
 	*pdf *= w->emitter_pdf[chosen];
 	*y = path_emitter_vertex(w, chosen, &p);

@@ -101,7 +101,7 @@ static double toward_density(const void *arg, vec3 w)
 {
 	const struct seen *s = arg;
 	struct emitter_point x = on_sphere(s, w);
-	return s->em->ops->pdf_toward(s->em, s->ref, &x) * s->shape->radius * s->shape->radius;
+	return emitter_pdf_toward(s->em, s->ref, &x) * s->shape->radius * s->shape->radius;
 }
 
 static double point_density(const void *arg, vec3 w)
@@ -121,7 +121,7 @@ static void check_sphere(const char *what, const struct seen *s, bool toward, do
 	for (size_t i = 0; i < n; i++) {
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
 		struct emitter_point x = {0};
-		bool ok = toward ? s->em->ops->sample_toward(s->em, s->ref, u, &x, &pdf)
+		bool ok = toward ? emitter_sample_toward(s->em, s->ref, u, &x, &pdf)
 				 : s->em->ops->sample_point(s->em, u, &x, &pdf);
 		if (!ok)
 			continue;
@@ -129,7 +129,7 @@ static void check_sphere(const char *what, const struct seen *s, bool toward, do
 		vec3 w = vec3_scale(1 / s->shape->radius, vec3_sub(x.p, s->shape->center));
 		assert_true(fabs(vec3_length(w) - 1) < 1e-12);
 		assert_true(fabs(vec3_dot(w, x.n) - s->shape->normal_sign) < 1e-12);
-		double own = toward ? s->em->ops->pdf_toward(s->em, s->ref, &x) : s->em->ops->pdf_point(s->em, &x);
+		double own = toward ? emitter_pdf_toward(s->em, s->ref, &x) : s->em->ops->pdf_point(s->em, &x);
 		assert_true(fabs(own - pdf) <= 1e-9 * pdf);
 		counts[sphere_cell(w)]++;
 	}
@@ -175,11 +175,11 @@ static void check_cone(const char *what, const struct seen *s)
 	for (size_t i = 0; i < n; i++) {
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
 		struct emitter_point x;
-		if (!s->em->ops->sample_toward(s->em, s->ref, u, &x, &pdf)) {
+		if (!emitter_sample_toward(s->em, s->ref, u, &x, &pdf)) {
 			refused++;
 			continue;
 		}
-		double own = s->em->ops->pdf_toward(s->em, s->ref, &x);
+		double own = emitter_pdf_toward(s->em, s->ref, &x);
 		assert_true(fabs(own - pdf) <= 1e-9 * pdf);
 		/* The point faces ref: r n = x - c, and ref sees it where (ref - x).n > 0. */
 		assert_true(vec3_dot(vec3_sub(s->ref, x.p), x.n) > 0);
@@ -198,7 +198,7 @@ static void check_cone(const char *what, const struct seen *s)
 			       sine = sqrt(h * (2 - h));
 			vec3 w = frame_to_world(&f, (vec3){sine, 0, c});
 			struct emitter_point x = on_sphere(s, w);
-			sum += s->em->ops->pdf_toward(s->em, s->ref, &x) / SUB;
+			sum += emitter_pdf_toward(s->em, s->ref, &x) / SUB;
 		}
 		double share = sum * 2 * M_PI * r * r * (1 - r / distance) / RINGS;
 		integral += share;
@@ -326,10 +326,10 @@ static void test_mesh(void **state)
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
 		struct emitter_point x;
 		assert_true((i % 2 ? em->ops->sample_point(em, u, &x, &pdf)
-				   : em->ops->sample_toward(em, (vec3){0, 0, 1}, u, &x, &pdf)));
+				   : emitter_sample_toward(em, (vec3){0, 0, 1}, u, &x, &pdf)));
 		assert_true(x.where.prim < 3);
 		assert_true(fabs(pdf * total - 1) < 1e-12 && fabs(em->ops->pdf_point(em, &x) * total - 1) < 1e-12);
-		assert_true(em->ops->pdf_toward(em, (vec3){0, 0, 1}, &x) == pdf);
+		assert_true(emitter_pdf_toward(em, (vec3){0, 0, 1}, &x) == pdf);
 		vec3 *c = corner[x.where.prim], normal = vec3_cross(vec3_sub(c[1], c[0]), vec3_sub(c[2], c[0]));
 		double l2 = vec3_dot(normal, normal), b[3];
 		assert_true(fabs(vec3_dot(vec3_sub(x.p, c[0]), normal)) < 1e-12 * sqrt(l2));
@@ -364,7 +364,7 @@ static void test_corners(void **state)
 			assert_true(vec3_is_finite(x.p) && fabs(vec3_length(x.n) - 1) < 1e-12);
 			if (em->ops->sample_direction(em, &x, u, &dir, &pdf))
 				assert_true(pdf > 0 && fabs(vec3_length(dir) - 1) < 1e-9 && vec3_dot(dir, x.n) > 0);
-			if (em->ops->sample_toward(em, (vec3){0.9, 0.9, 0.9}, u, &x, &pdf))
+			if (emitter_sample_toward(em, (vec3){0.9, 0.9, 0.9}, u, &x, &pdf))
 				assert_true(pdf > 0 && isfinite(pdf) && vec3_is_finite(x.p));
 		}
 		world_free(w[k]);
@@ -390,7 +390,7 @@ static void test_texture_coordinates(void **state)
 		struct surface_point there;
 		double pdf;
 		assert_true(em->ops->sample_point(em, u, &x[0], &pdf));
-		assert_true(em->ops->sample_toward(em, (vec3){0.9, 0.3, -0.2}, u, &x[1], &pdf));
+		assert_true(emitter_sample_toward(em, (vec3){0.9, 0.3, -0.2}, u, &x[1], &pdf));
 		for (int k = 0; k < 2; k++) {
 			surface_on_sphere(s, (struct prim_ref){0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)),
 					  &there);

@@ -42,9 +42,9 @@ static struct emitter_point only_point(const struct emitter *em)
 	double pdf, toward;
 	assert_true(em->delta && !em->ops->point_inverse);
 	assert_true(em->ops->sample_point(em, (double[]){0.3, 0.9}, &x, &pdf));
-	assert_true(em->ops->sample_toward(em, (vec3){1, 2, 3}, (double[]){0.8, 0.1}, &y, &toward));
+	assert_true(emitter_sample_toward(em, (vec3){1, 2, 3}, (double[]){0.8, 0.1}, &y, &toward));
 	assert_true(pdf == 1 && toward == 1 && em->ops->pdf_point(em, &x) == 1 &&
-		    em->ops->pdf_toward(em, (vec3){1, 2, 3}, &x) == 1);
+		    emitter_pdf_toward(em, (vec3){1, 2, 3}, &x) == 1);
 	assert_true(x.p.x == y.p.x && x.p.y == y.p.y && x.p.z == y.p.z && x.infinite == y.infinite);
 	assert_true(x.infinite == em->infinite);
 	return x;

@@ -100,9 +100,9 @@ static struct stats_mean irradiance(const struct emitter *em, vec3 ref, vec3 n, 
 	for (size_t i = 0; i < each * GROUPS; i++) {
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
 		struct emitter_point x;
-		if (!em->ops->sample_toward(em, ref, u, &x, &pdf))
+		if (!emitter_sample_toward(em, ref, u, &x, &pdf))
 			continue;
-		assert_true(fabs(em->ops->pdf_toward(em, ref, &x) / pdf - 1) < 1e-6);
+		assert_true(fabs(emitter_pdf_toward(em, ref, &x) / pdf - 1) < 1e-6);
 		vec3 to = vec3_sub(x.p, ref);
 		double l2 = vec3_dot(to, to);
 		vec3 w = vec3_scale(1 / sqrt(l2), to);
@@ -163,7 +163,7 @@ static void check_plane(const char *shape)
 		double width = 1.2 * t * half_angle / RINGS, r = (i + 0.5) * width;
 		struct emitter_point y = x;
 		y.p = vec3_madd(x.p, r, i % 2 ? f.s : f.t);
-		sum += em->ops->pdf_toward(em, ref, &y) * 2 * M_PI * r * width;
+		sum += emitter_pdf_toward(em, ref, &y) * 2 * M_PI * r * width;
 	}
 	assert_true(fabs(sum - 1) < 1e-4);
 	world_free(w);
@@ -208,8 +208,8 @@ static void test_bent(void **state)
 	struct emitter_point x;
 	double pdf;
 	for (int i = 0; i < 100; i++) {
-		assert_true(em->ops->sample_toward(em, (vec3){0, 0, 1}, (double[]){i / 100.0, 0.5}, &x, &pdf));
-		assert_true(pdf == em->ops->pdf_point(em, &x) && pdf == em->ops->pdf_toward(em, (vec3){0, 0, 1}, &x));
+		assert_true(emitter_sample_toward(em, (vec3){0, 0, 1}, (double[]){i / 100.0, 0.5}, &x, &pdf));
+		assert_true(pdf == em->ops->pdf_point(em, &x) && pdf == emitter_pdf_toward(em, (vec3){0, 0, 1}, &x));
 	}
 	world_free(w);
 }

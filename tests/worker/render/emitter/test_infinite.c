@@ -134,8 +134,8 @@ static void check_sample(const struct emitter *em, const double u[2], const stru
 	struct emitter_point y;
 	double pdf_toward;
 	assert_true(x->infinite && fabs(vec3_length(x->p) - 1) < 1e-14 && pdf > 0 && isfinite(pdf));
-	assert_true(em->ops->pdf_point(em, x) == pdf && em->ops->pdf_toward(em, ref, x) == pdf);
-	assert_true(em->ops->sample_toward(em, ref, u, &y, &pdf_toward));
+	assert_true(em->ops->pdf_point(em, x) == pdf && emitter_pdf_toward(em, ref, x) == pdf);
+	assert_true(emitter_sample_toward(em, ref, u, &y, &pdf_toward));
 	assert_true(y.p.x == x->p.x && y.p.y == x->p.y && y.p.z == x->p.z && pdf_toward == pdf);
 }
 
