@@ -68,19 +68,19 @@ bool __wrap_full_path_visible(struct path_context *c, const struct full_path *x,
 	return visible;
 }
 
-enum walk_end __real_halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
-				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				       unsigned stale, struct walk_scratch *s);
-enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
-				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				       unsigned stale, struct walk_scratch *s);
+enum walk_end __real_halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
+				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				  unsigned stale, struct walk_scratch *s);
+enum walk_end __wrap_halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
+				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				  unsigned stale, struct walk_scratch *s);
 
-enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
-				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				       unsigned stale, struct walk_scratch *s)
+enum walk_end __wrap_halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
+				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				  unsigned stale, struct walk_scratch *s)
 {
 	walking = true;
-	enum walk_end end = __real_halfvec_walk_from(c, y, b, c_end, target, visible, limits, stale, s);
+	enum walk_end end = __real_halfvec_walk(c, y, b, c_end, target, visible, limits, stale, s);
 	walking = false;
 	/* Only a walk back knows that the path which it looks for can be seen. */
 	(visible ? record_walks.back : record_walks.there)[end]++;

@@ -11,11 +11,13 @@
 #include "tests/support/starts.h"
 #include "common/base/bytes.h"
 #include "worker/render/chain/path_bytes.h"
-#include "worker/render/chain/path_chain.h"
-#include "worker/render/chain/pss_chain.h"
+#include "worker/render/chain/chain.h"
 #include "worker/render/path/integrator.h"
 
 #include <string.h>
+
+#define chain_path (*integrator_find("hslt")->chain)
+#define chain_pss (*integrator_find("pssmlt")->chain)
 
 enum { SIDE = 32, EDGES = 8, STEPS = 5, BUILT_MOST = 64, STATE_MOST = 1 << 14, CHAIN = 3 };
 static const char mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";

@@ -8,7 +8,7 @@
 
 #include "tests/support/stats.h"
 #include "worker/render/mutation/heuristic.h"
-#include "worker/render/path/full_path_check.h"
+#include "tests/support/path_check.h"
 #include "worker/render/path/full_path_density.h"
 
 #include <setjmp.h>
@@ -280,7 +280,7 @@ static bool stays_away(struct run *r, const struct move *move)
 		target[j].tolerance =
 			delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->alpha, 1), fmin(sigma[0], sigma[1]));
 	}
-	if (halfvec_walk(r->c, &back, b, c, target, true, &limits, &scratch) != WALK_OK)
+	if (halfvec_walk(r->c, &back, b, c, target, true, &limits, WALK_STALE, &scratch) != WALK_OK)
 		return true;
 	for (unsigned j = c + 1; j < b; j++)
 		if (vec3_length(vec3_sub(back.v[j].x.p, x->v[j].x.p)) > 0.01 * farthest + 1e-9)

@@ -12,11 +12,10 @@
 #include "tests/support/stationary.h"
 
 #include "tests/support/stats.h"
-#include "worker/render/chain/path_start.h"
-#include "worker/render/path/full_path_check.h"
+#include "worker/render/chain/path_place.h"
+#include "tests/support/path_check.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/render.h"
-#include "worker/render/chain/path_chain.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/integrator.h"

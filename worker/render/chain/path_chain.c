@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
+ * Improved half vector space light transport (Hanika, Kaplanyan, Dachsbacher 2015): chains whose states are whole
+ * paths, moved by a mixture of mutations (Veach and Guibas 1997; worker/render/mutation). The target is I = X+Y+Z of
+ * the path's contribution per area; independent proposals also estimate b by f / T. Their bootstrap is that of bdpt.
+ *
  * A step copies the state, draws a strategy of the mixture, lets it propose, and accepts with probability
  * min(1, ratio of the weights). The state that is left is splatted with its accumulated weight. At the end of an epoch
  * the state is saved as bytes (path_bytes.c), from which the next epoch resumes.
@@ -7,13 +11,14 @@
  * A proposal without density, or with one that is not finite or out of range, is counted by its reason and rejected. A
  * state that cannot be resumed fails the lease (-EILSEQ).
  */
-#include "worker/render/chain/path_chain.h"
+#include "worker/render/chain/chain.h"
 
 #include "worker/render/chain/path_bytes.h"
 #include "worker/render/chain/path_place.h"
-#include "worker/render/chain/path_start.h"
 #include "worker/render/mutation/mixture.h"
 #include "worker/render/path/classes.h"
+#include "worker/render/path/integrate_bdpt.h"
+#include "worker/render/path/integrator.h"
 
 #include <string.h>
 
@@ -177,11 +182,19 @@ static void step(struct chain *base, struct chain_sums *sums)
 	path_place_follow(&c->proposal->path, &c->current->path, &move, entry->ops->independent);
 }
 
-const struct chain_ops chain_path = {
+static const struct chain_ops chain_path = {
 	.size = sizeof(struct path_chain),
 	.start = start,
 	.resume = resume,
 	.step = step,
 	.flush = flush,
 	.save = save,
+};
+
+const struct integrator integrator_hslt = {
+	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, FULL_PATH_MAX_EDGES,
+		 .has_mutations = true},
+	.stream = RNG_BOOTSTRAP,
+	.evaluate = path_trace_both_ways,
+	.chain = &chain_path,
 };

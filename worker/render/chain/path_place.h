@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What chains of full paths share, for any target function: a path with its accumulated weight, and the copy of the
- * path that the next proposal changes. One thread; nothing allocates.
+ * What chains of full paths share, for any target function: where they begin, a path with its accumulated weight, and
+ * the copy of the path that the next proposal changes. One thread; nothing allocates.
  */
 #ifndef WORKER_RENDER_CHAIN_PATH_PLACE_H
 #define WORKER_RENDER_CHAIN_PATH_PLACE_H
@@ -20,5 +20,10 @@ void path_place_follow(struct full_path *proposal, const struct full_path *curre
 /* Whether a weight with this logarithm may go to the film: not NaN, not infinite, and if bounded within the range of a
  * float. Other weights are counted. */
 bool path_place_is_sound(const struct path_context *c, double log_weight, bool bounded);
+
+/* One of the paths that bdpt makes of a bootstrap sample, chosen in proportion to what it contributes there: drawing
+ * samples in proportion to their sums and then paths like this gives paths in proportion to f. false: the sample is
+ * black. 0 edges: the path fell to rounding. */
+bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index, struct full_path *x);
 
 #endif

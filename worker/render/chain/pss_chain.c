@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/chain/pss_chain.h"
-
+/* Primary sample space Metropolis light transport (Kelemen et al. 2002), over the bidirectional path tracer. */
+#include "worker/render/chain/chain.h"
 #include "worker/render/chain/pss.h"
 #include "worker/render/math/fptrap.h"
+#include "worker/render/path/integrate_bdpt.h"
+#include "worker/render/path/integrator.h"
 
 #include <assert.h>
 
@@ -160,11 +162,21 @@ static void step(struct chain *base, struct chain_sums *sums)
 	c->proposal = swap;
 }
 
-const struct chain_ops chain_pss = {
+static const struct chain_ops chain_pss = {
 	.size = sizeof(struct pss_chain),
 	.start = start,
 	.resume = resume,
 	.step = step,
 	.flush = flush,
 	.save = save,
+};
+
+const struct integrator integrator_pssmlt = {
+	.face = {.name = "pssmlt",
+		 .summary = "primary sample space Metropolis over bdpt",
+		 .kind = PLAN_CHAINS,
+		 .max_depth = PSS_MAX_EDGES},
+	.stream = RNG_BOOTSTRAP,
+	.evaluate = path_trace_both_ways,
+	.chain = &chain_pss,
 };

@@ -243,9 +243,9 @@ static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, u
 	return last == WALK_OK ? WALK_ITERATIONS : last;
 }
 
-enum walk_end halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
-				const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				unsigned stale, struct walk_scratch *s)
+enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
+			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
+			   unsigned stale, struct walk_scratch *s)
 {
 	assert(c_end + 1 < b && b <= y->edges);
 	struct walk m = {.c = c,
@@ -268,11 +268,4 @@ enum walk_end halfvec_walk_from(struct path_context *c, struct full_path *y, uns
 	for (unsigned j = c_end + 1; j < b; j++)
 		surface_uv(&c->w->shapes[y->v[j].x.prim.shape], &y->v[j].x);
 	return WALK_OK;
-}
-
-enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
-			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
-			   struct walk_scratch *s)
-{
-	return halfvec_walk_from(c, y, b, c_end, target, visible, limits, WALK_STALE, s);
 }

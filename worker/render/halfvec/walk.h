@@ -50,6 +50,10 @@ struct walk_scratch {
 	unsigned iterations; /* output: of the last walk */
 };
 
+/* What is stale of s->k and s->system, which belong to the path where the walk starts: nothing; the constraint next
+ * to an end that has moved since, and the system; everything. */
+enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
+
 /* y: vertices b and c stay; b-1..c+1 are where the walk starts, and on WALK_OK where it ended, with edges c..b-1
  * joined. Wavelengths (indices of refraction) are y's. On WALK_OK s->k has the constraints there, except after a
  * reverse walk. visible: a reverse walk, whose edges the caller knows to be unoccluded. On failure y's vertices
@@ -57,13 +61,6 @@ struct walk_scratch {
  * path again if its tolerances are tighter than those of the forward walk (scale 0.1: 0.2 more iterations, no rays). */
 enum walk_end halfvec_walk(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
-			   struct walk_scratch *s);
-
-/* What is stale of s->k and s->system, which belong to the path where the walk starts: nothing; the constraint next
- * to an end that has moved since, and the system; everything. */
-enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
-enum walk_end halfvec_walk_from(struct path_context *c, struct full_path *y, unsigned b, unsigned c_end,
-				const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				unsigned stale, struct walk_scratch *s);
+			   unsigned stale, struct walk_scratch *s);
 
 #endif

@@ -181,7 +181,7 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 	limits.scale *= BACK_SCALE;
 	m->count[STRATEGY_REVERSE_WALKS]++;
 	enum walk_end end =
-		halfvec_walk_from(m->path, back, b, c, s->target, true, &limits, stale_of(m, how, x, y), &s->walk);
+		halfvec_walk(m->path, back, b, c, s->target, true, &limits, stale_of(m, how, x, y), &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)
@@ -210,7 +210,7 @@ static enum proposal_end walk(struct mutation_ctx *m, const struct breakup *how,
 	aim(m, how, x);
 	memcpy(&s->walk.k[how->c + 1], &s->k[how->c + 1], (how->b - how->c - 1) * sizeof s->k[0]);
 	enum walk_end end =
-		halfvec_walk_from(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
+		halfvec_walk(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)

@@ -107,3 +107,24 @@ const struct integrator integrator_bdpt = {
 	.stream = RNG_BDPT,
 	.evaluate = path_trace_both_ways,
 };
+
+const struct integrator integrator_erpt = {
+	.face = {.name = "erpt",
+		 .summary = "bdpt, whose brightest contributions are spread by short chains of mutations",
+		 .kind = PLAN_SAMPLES,
+		 .max_depth = PATH_MAX_EDGES},
+	.stream = RNG_ERPT,
+	.evaluate = path_trace_both_ways,
+	.redistributes = true,
+};
+
+const struct integrator integrator_erpt4 = {
+	.face = {.name = "erpt4",
+		 .summary = "erpt with a light sub-path in one of four samples",
+		 .kind = PLAN_SAMPLES,
+		 .max_depth = PATH_MAX_EDGES},
+	.stream = RNG_ERPT4,
+	.evaluate = path_trace_both_ways,
+	.light_every = 4,
+	.redistributes = true,
+};

@@ -11,10 +11,11 @@
 #include "tests/support/worlds.h"
 #include "common/base/bytes.h"
 #include "worker/render/chain/path_bytes.h"
-#include "worker/render/chain/path_chain.h"
-#include "worker/render/chain/path_start.h"
+#include "worker/render/chain/chain.h"
+#include "worker/render/path/integrator.h"
+#include "worker/render/chain/path_place.h"
 #include "worker/render/math/fptrap.h"
-#include "worker/render/path/full_path_check.h"
+#include "tests/support/path_check.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,6 +23,8 @@
 #include <string.h>
 
 #include <cmocka.h>
+
+#define chain_path (*integrator_find("hslt")->chain)
 
 enum { SIDE = 32, EDGES = 8 };
 static const char mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";

@@ -7,7 +7,8 @@
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
 #include "worker/render/chain/pss.h"
-#include "worker/render/chain/pss_chain.h"
+#include "worker/render/chain/chain.h"
+#include "worker/render/path/integrator.h"
 #include "worker/render/math/fptrap.h"
 
 #include "common/base/mem.h"
@@ -18,6 +19,8 @@
 #include <string.h>
 
 #include <cmocka.h>
+
+#define chain_pss (*integrator_find("pssmlt")->chain)
 
 #define LEVEL 1e-6
 

@@ -259,7 +259,7 @@ static void walk_back(struct path_context *c, const struct full_path *x, struct 
 		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	limits.scale = 0.1; /* tighter than the way there: where x lies is known, only its own residual is to tell */
-	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, &s);
+	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, WALK_STALE, &s);
 	t->back_ends[back]++;
 	if (back != WALK_OK)
 		return;
@@ -295,7 +295,7 @@ static void walk_nowhere(struct path_context *c, const struct full_path *x, unsi
 		target[j].h = k[j].h;
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	t->stays++;
-	if (halfvec_walk(c, &y, b, end, target, false, &limits, &s) != WALK_OK || s.iterations != 1)
+	if (halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE, &s) != WALK_OK || s.iterations != 1)
 		t->left++;
 	else
 		t->worst_stay = fmax(t->worst_stay, apart(x, &y, b, end));
@@ -311,7 +311,7 @@ static void walk_again(struct path_context *c, const struct full_path *start, co
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	limits.scale = 0.5;
 	t->again++;
-	if (halfvec_walk(c, &z, b, end, target, false, &limits, &s) != WALK_OK ||
+	if (halfvec_walk(c, &z, b, end, target, false, &limits, WALK_STALE, &s) != WALK_OK ||
 	    apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
 		t->elsewhere++;
 	else
@@ -342,7 +342,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	struct path_vertex first = y.v[b], last = y.v[end];
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	uint64_t before = batch_rays(c->counters);
-	enum walk_end e = halfvec_walk(c, &y, b, end, target, false, &limits, &s);
+	enum walk_end e = halfvec_walk(c, &y, b, end, target, false, &limits, WALK_STALE, &s);
 	t->rays += batch_rays(c->counters) - before;
 	t->walks++;
 	t->ends[e]++;

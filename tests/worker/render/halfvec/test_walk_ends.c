@@ -61,7 +61,7 @@ static enum walk_end walk_by(const vec2 *h, bool visible, struct walk_limits lim
 	for (unsigned j = 1; j < x.edges; j++)
 		target[j] = (struct walk_target){vec2_add(k[j].h, h[j]), 1e-9};
 	y = x;
-	return halfvec_walk(&c, &y, y.edges, 0, target, visible, &limits, &s);
+	return halfvec_walk(&c, &y, y.edges, 0, target, visible, &limits, WALK_STALE, &s);
 }
 
 /* What to ask for so that vertex 1 moves by about d (scene's units) and no other. */
@@ -146,12 +146,12 @@ static void test_names(void **state)
 	struct walk_target target[3] = {{{0, 0}, 0}, {k[1].h, 1e-9}, {{0, 0}, 0}};
 	y = x;
 	y.v[2].x.p = mirrored;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, &s), WALK_MODE);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_MODE);
 	y.v[2] = camera;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, &s), WALK_OK);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_OK);
 	/* A vertex at the end that stays. */
 	y.v[2].x.p = y.v[1].x.p;
-	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, &s), WALK_SINGULAR);
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, WALK_STALE, &s), WALK_SINGULAR);
 	world_free(w);
 }
 

@@ -5,7 +5,7 @@
  */
 #include "tests/support/worlds.h"
 #include "worker/render/path/full_path.h"
-#include "worker/render/path/full_path_check.h"
+#include "tests/support/path_check.h"
 #include "worker/render/path/full_path_density.h"
 
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/path/full_path_check.h"
+#include "tests/support/path_check.h"
 
 #include <stdio.h>
 

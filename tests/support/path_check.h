@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Whether what a full path caches is right. */
-#ifndef WORKER_RENDER_PATH_FULL_PATH_CHECK_H
-#define WORKER_RENDER_PATH_FULL_PATH_CHECK_H
+#ifndef TESTS_SUPPORT_PATH_CHECK_H
+#define TESTS_SUPPORT_PATH_CHECK_H
 
 #include "worker/render/path/full_path.h"
 
