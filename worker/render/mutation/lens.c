@@ -32,5 +32,4 @@ const struct mutation_ops mutation_lens = {
 	.summary = "moves the point on the aperture",
 	.useful = useful,
 	.propose = propose,
-	.log_weight = breakup_log_weight,
 };
