@@ -17,7 +17,9 @@
 
 #include "worker/render/scene/asset_list.h"
 #include "worker/render/scene/batch.h"
+#include "worker/render/scene/default_light.h"
 #include "worker/render/scene/element.h"
+#include "worker/render/scene/given_twice.h"
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/integrators.h"
@@ -98,20 +100,17 @@ static const char *property_name(struct maker *m, const struct xml_element *el, 
 	return snake;
 }
 
-static int add_property(struct draft *d, const struct xml_element *el, const struct param *p, struct value v,
-			struct error *e)
+static int add_property(struct maker *m, struct draft *d, const struct xml_element *el, const struct param *p,
+			struct value v)
 {
-	int r = param_check(el, p, &v, e);
+	int r = param_check(el, p, &v, m->error);
 	if (r)
 		return r;
 	const struct property *before = node_find(d->node, p->name);
-	if (before && el->snake && (before->value.type == VALUE_NODE) != (v.type == VALUE_NODE)) {
-		if (v.type == VALUE_NODE) /* in 0.6 a texture has the place of a value, in whichever order */
-			d->properties[before - d->node->properties].value = v;
-		return 0;
-	}
+	if (before && el->snake)
+		return given_again(&m->notes, d->decl, el, &d->properties[before - d->node->properties], v);
 	if (before)
-		return xml_error(el, e, EINVAL, "`%s` is given twice (first in line %d)", p->name, before->line);
+		return given_twice(el, before, m->error);
 	d->properties[d->node->property_count++] = (struct property){p->name, el->line, v};
 	return 0;
 }
@@ -199,7 +198,7 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	if (!r && el->snake)
 		r = old_value(&m->notes, owner, el, p, d->node->cls, &m->scene->arena, &v);
 	if (!r)
-		r = add_property(d, el, p, v, m->error);
+		r = add_property(m, d, el, p, v);
 	if (r == -EINVAL && m->lenient && p->choices)
 		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
@@ -264,7 +263,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (r)
 		return r;
 	if (p)
-		return add_property(d, el, p, (struct value){.type = VALUE_NODE, .as.node = child}, m->error);
+		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
 	bool many = d->node->cls == cls &&
 		    (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR || cls == PLUGIN_INTEGRATOR);
 	if (!many && node_child(d->node, cls, 0))
@@ -478,7 +477,9 @@ static int list_assets(struct maker *m)
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
-	const struct scene_node **objects = allocate(m, m->tree->element_count, sizeof *objects);
+	const struct scene_node **objects = default_light_add(m->tree, m->decls, &s->arena)
+						    ? allocate(m, m->tree->element_count, sizeof *objects)
+						    : NULL;
 	if (!objects)
 		return out_of_memory(m);
 	s->dialect_3 = m->tree->dialect_3;

@@ -40,11 +40,25 @@ static double height_at(const struct field *f, uint32_t x, uint32_t y)
 	return f->scale * z;
 }
 
+/* The texture that is scaled, if one is. */
+static const struct scene_node *unscaled(const struct scene_node *texture, double *scale)
+{
+	while (texture && strcmp(texture->type, "scale") == 0) {
+		const struct property *by = node_find(texture, "scale");
+		if (by && by->value.type != VALUE_FLOAT && by->value.type != VALUE_INT)
+			break;
+		*scale *= node_float(texture, "scale", 1);
+		texture = node_child(texture, PLUGIN_TEXTURE, 0);
+	}
+	return texture;
+}
+
 /* The image is decoded like colours, unless its texture says that it contains numbers. */
 static int read_picture(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
-			struct image *out, struct error *e)
+			struct field *f, struct error *e)
 {
-	const struct scene_node *texture = node_child(n, PLUGIN_TEXTURE, 0), *from = texture ? texture : n;
+	const struct scene_node *texture = unscaled(node_child(n, PLUGIN_TEXTURE, 0), &f->scale),
+				*from = texture ? texture : n;
 	if ((texture != NULL) == (node_find(n, "filename") != NULL))
 		return node_error(n, e, EINVAL, "needs either a filename or a bitmap inside");
 	if (texture && strcmp(texture->type, "bitmap") != 0)
@@ -57,10 +71,10 @@ static int read_picture(const struct scene_node *n, const struct asset_source *a
 	struct error inner;
 	double gamma = node_float(from, "gamma", -1);
 	bool raw = node_bool(from, "raw", gamma > 0);
-	r = image_decode(a.bytes, a.size, node_string(from, "filename", ""), raw, channel, arena, out, &inner);
+	r = image_decode(a.bytes, a.size, node_string(from, "filename", ""), raw, channel, arena, &f->picture, &inner);
 	assets->close(assets->user, &a);
 	if (!r)
-		r = image_power(out, raw && gamma > 0 ? gamma : 1, &inner);
+		r = image_power(&f->picture, raw && gamma > 0 ? gamma : 1, &inner);
 	return r ? node_error(from, e, -r, "%s", inner.text) : 0;
 }
 
@@ -137,7 +151,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	struct arena decoded = {0};
 	struct field f = {.scale = node_float(n, "scale", 1)};
 	bool smooth = node_bool(n, "shading_normals", true);
-	int r = read_picture(n, assets, &decoded, &f.picture, e);
+	int r = read_picture(n, assets, &decoded, &f, e);
 	if (!r)
 		r = make_mesh(&f, smooth, n, arena, &out->mesh, e);
 	out->face_normals = !smooth;

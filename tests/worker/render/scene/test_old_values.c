@@ -208,6 +208,80 @@ static void test_specular(void **state)
 	refuses("3.0.0", "<bsdf type='principled'><float name='specular' value='9'/></bsdf>", "outside [0, 8]");
 }
 
+/* What is given twice: the last one under a name, and the name that 0.6 has. */
+static void test_given_twice(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *first, *second, *note, *axis;
+	} cases[] = {
+		{"fovAxis' value='y", "fovAxis' value='x",
+		 "s.xml:1: <string>: `fovAxis` is given twice (first in line 1); the last counts, as in Mitsuba 0.6",
+		 "x"},
+		{"fovAxis' value='y", "fov_axis' value='x",
+		 "`fov_axis` is given twice (first in line 1); the first counts", "y"},
+		{"fov_axis' value='y", "fovAxis' value='x",
+		 "`fovAxis` is given twice (first in line 1); the last counts", "x"},
+		{"fov_axis' value='y", "fov_axis' value='x", "the last counts", "x"},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[512];
+		snprintf(
+			xml, sizeof xml,
+			"<sensor type='perspective'><float name='fov' value='45'/><string name='%s'/><string name='%s'/></sensor><emitter type='constant'/>",
+			cases[i].first, cases[i].second);
+		struct scene s = read_old(xml, cases[i].note);
+		assert_int_equal(s.objects[0]->property_count, 2);
+		assert_string_equal(node_string(s.objects[0], "fov_axis", ""), cases[i].axis);
+		scene_fini(&s);
+		refuses("3.0.0",
+			"<sensor type='perspective'><string name='fov_axis' value='x'/>"
+			"<string name='fov_axis' value='x'/></sensor>",
+			"`fov_axis` is given twice (first in line 1)");
+	}
+	/* Two names of 0.6. */
+	refuses("0.6.0",
+		"<bsdf type='diffuse'><rgb name='reflectance' value='1'/><rgb name='diffuseReflectance' value='1'/></bsdf>",
+		"`reflectance` is given twice");
+}
+
+/* Files of 0.5 and 0.6 without an emitter get the sun and sky that Mitsuba adds; those of 3.x nothing. */
+static void test_default_light(void **state)
+{
+	(void)state;
+	struct scene s =
+		read_old("<shape type='sphere'/>", "s.xml: has no emitter: sun and sky are added, as by Mitsuba 0.6");
+	assert_int_equal(s.object_count, 2);
+	const struct scene_node *n = s.objects[1];
+	assert_string_equal(n->type, "sunsky");
+	assert_true(node_float(n, "scale", 0) == 2 && node_float(n, "sun_radius_scale", 0) == 15 &&
+		    node_bool(n, "extend", false));
+	mat4 place = node_transform(n, "to_world");
+	double angle = -120 * 3.14159265358979323846 / 180;
+	assert_true(fabs(place.m[0][0] - cos(angle)) < 1e-12 && fabs(place.m[0][2] - sin(angle)) < 1e-12 &&
+		    place.m[1][1] == 1);
+	scene_fini(&s);
+
+	static const char *const lit[] = {
+		"<shape type='sphere'><emitter type='area'/></shape>",
+		"<emitter type='constant'/><shape type='sphere'/>",
+		"<shape type='shapegroup' id='g'><shape type='sphere'><emitter type='area'/></shape></shape>",
+	};
+	for (size_t i = 0; i < sizeof lit / sizeof *lit; i++) {
+		s = read_old(lit[i], NULL);
+		for (uint32_t k = 0; k < s.object_count; k++)
+			assert_true(strcmp(s.objects[k]->type, "sunsky") != 0);
+		scene_fini(&s);
+	}
+	s = read_old("<bsdf type='diffuse'/>", NULL); /* a file that others include */
+	assert_int_equal(s.object_count, 1);
+	scene_fini(&s);
+	struct error e;
+	assert_int_equal(read_scene(&s, "3.0.0", "<shape type='sphere'/>", &e), 0);
+	assert_int_equal(s.object_count, 1);
+	scene_fini(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -218,6 +292,8 @@ int main(void)
 		cmocka_unit_test(test_unknown_names_of_all_classes),
 		cmocka_unit_test(test_labels),
 		cmocka_unit_test(test_specular),
+		cmocka_unit_test(test_given_twice),
+		cmocka_unit_test(test_default_light),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

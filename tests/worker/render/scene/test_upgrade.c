@@ -192,10 +192,6 @@ static void test_refused(void **state)
 		{"0.3.0", "<bsdf type='lambertian'/>", "there is no bsdf of this type"},
 		{"0.4.0", "<luminaire type='constant'/>", "there is no element of this name; did you mean `emitter`?"},
 		{"0.5.0", "<bsdf type='bump'/>", "there is no bsdf of this type"},
-		{"0.3.0",
-		 "<camera type='perspective'><boolean name='mapSmallerSide' value='true'/>"
-		 "<string name='fovAxis' value='x'/></camera>",
-		 "given twice"},
 		{"0.-3", "<emitter type='constant'/>", ""},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {

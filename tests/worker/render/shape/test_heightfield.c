@@ -180,6 +180,27 @@ static void test_decoding(void **state)
 	free(png);
 }
 
+/* As in the documentation of Mitsuba 0.6: a bitmap inside `scale`, here inside another. */
+static void test_scaled(void **state)
+{
+	(void)state;
+	struct pictures p = {0};
+	take_picture(&p, WIDTH, HEIGHT, height);
+	struct built_shape
+		a = build_ok("heightfield", FILENAME "<float name='scale' value='-0.75'/>"),
+		b = build_ok("heightfield",
+			     "<float name='scale' value='3'/><texture type='scale'><float name='scale' value='-0.5'/>"
+			     "<texture type='scale'><float name='scale' value='0.5'/>"
+			     "<texture type='bitmap'>" FILENAME "</texture></texture></texture>");
+	assert_int_equal(a.g.mesh.vertex_count, b.g.mesh.vertex_count);
+	for (uint32_t i = 0; i < a.g.mesh.vertex_count; i++)
+		assert_memory_equal(a.g.mesh.position[i], b.g.mesh.position[i], sizeof a.g.mesh.position[i]);
+	assert_true(fabs(a.g.mesh.position[1][2] - -0.75 * height(1, 0)) < 1e-5);
+	built_shape_release(&a);
+	built_shape_release(&b);
+	pictures_fini(&p);
+}
+
 static void refuses(const char *content, const char *sentence)
 {
 	struct built_shape b = build("heightfield", content);
@@ -196,6 +217,10 @@ static void test_bad_input(void **state)
 	refuses("", "s.xml:2: <shape type=\"heightfield\">: needs either a filename or a bitmap inside");
 	refuses(FILENAME "<texture type='bitmap'>" FILENAME "</texture>", "needs either a filename or a bitmap");
 	refuses("<texture type='checkerboard'/>", "the heights of a heightfield come from a bitmap");
+	refuses("<texture type='scale'><rgb name='scale' value='1 2 3'/><texture type='bitmap'>" FILENAME
+		"</texture></texture>",
+		"<texture type=\"scale\">: the heights of a heightfield come from a bitmap");
+	refuses("<texture type='scale'/>", "needs either a filename or a bitmap inside");
 	refuses(FILENAME, "an image of 1 x 5 pixels; heights need 2 x 2");
 	refuses("<string name='filename' value='m.obj'/>", "m.obj");
 	refuses("<string name='filename' value='none.png'/>", "none.png: no such file");
@@ -205,6 +230,7 @@ static void test_bad_input(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(test_as_obj), cmocka_unit_test(test_normals),
-					   cmocka_unit_test(test_decoding), cmocka_unit_test(test_bad_input)};
+					   cmocka_unit_test(test_decoding), cmocka_unit_test(test_scaled),
+					   cmocka_unit_test(test_bad_input)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
