@@ -157,6 +157,14 @@ static int upgrade(struct xml_element *el, int minor, struct arena *arena, struc
 	return r;
 }
 
+bool upgrade_is_unmarked(const struct xml_element *scene)
+{
+	for (const struct xml_element *el = scene->first; el; el = el->next)
+		if (!el->ignored && (is_named(el, "camera") || is_named(el, "luminaire") || upgrade_is_unmarked(el)))
+			return true;
+	return false;
+}
+
 int upgrade_file(struct xml_element *scene, int minor, struct arena *arena, struct error *e)
 {
 	return upgrade(scene, minor, arena, e);

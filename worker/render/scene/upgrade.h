@@ -10,6 +10,9 @@
 #include "common/base/arena.h"
 #include "worker/render/scene/element.h"
 
+/* A file without a version is from before 0.3 if its camera or lights are called as they were then. */
+bool upgrade_is_unmarked(const struct xml_element *scene);
+
 /* scene: the root of the file, of version 0.MINOR, minor < 5. Included files are upgraded separately. */
 int upgrade_file(struct xml_element *scene, int minor, struct arena *arena, struct error *e);
 

@@ -177,6 +177,19 @@ static void drop_attributes(struct xml_element *scene)
 	scene->attribute_count = kept;
 }
 
+static int needs_version(const struct reader *r, const struct xml_element *el)
+{
+	return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
+}
+
+/* Files from before 0.3 have none. The main file turns out to be one at its end, and those that it includes follow. */
+static const char *version_of(const struct reader *r, const struct xml_element *el)
+{
+	const char *version = xml_attribute(el, "version");
+	bool old = !version && strcmp(el->name, "scene") == 0 && (!r->hook || !xml_attribute(r->tree->root, "version"));
+	return old ? "0.2" : version;
+}
+
 /* The version determines which dialect's names and rules apply. An included file may hold one object alone. */
 static int begin_file(struct reader *r, struct xml_element *el)
 {
@@ -184,11 +197,11 @@ static int begin_file(struct reader *r, struct xml_element *el)
 		return xml_error(el, r->error, EINVAL, "a scene file must begin with <scene version=\"...\">");
 	if (strcmp(el->name, "scene") == 0)
 		drop_attributes(el);
-	const char *version = xml_attribute(el, "version");
+	const char *version = version_of(r, el);
 	int64_t major;
 	const char *rest = version ? number_scan_int(version, version + strlen(version), &major) : NULL;
 	if (!rest || (*rest != 0 && *rest != '.') || major < 0)
-		return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
+		return needs_version(r, el);
 	int64_t minor = 0;
 	const char *end = *rest == '.' ? number_scan_int(rest + 1, version + strlen(version), &minor) : rest;
 	r->minor = major == 0 && end && minor >= 0 && minor < 5 ? (int)minor : -1;
@@ -482,6 +495,8 @@ static void on_end(void *user, const char *name)
 	int c = 0;
 	if (!el->ignored && strcmp(name, "include") == 0)
 		c = el->first ? xml_error(el, r->error, EINVAL, "must be empty") : read_include(r, el);
+	if (!c && el == r->top && !r->hook && !xml_attribute(el, "version") && !upgrade_is_unmarked(el))
+		c = needs_version(r, el);
 	if (!c && el == r->top && r->minor >= 0)
 		c = upgrade_file(el, r->minor, r->arena, r->error);
 	r->depth--;

@@ -208,6 +208,48 @@ static void test_refused(void **state)
 	}
 }
 
+/* Before 0.3 files had no version. Those that a file without one includes need none either. */
+static void test_no_version(void **state)
+{
+	(void)state;
+	static const char marked[] = "<scene version='0.2.0'>", plain[] = "<scene>",
+			  body[] = "<include filename='i.xml'/><camera type='perspective'><transform name='toWorld'>"
+				   "<translate x='1'/></transform></camera><luminaire type='constant'>"
+				   "<spectrum name='intensity' value='2'/></luminaire></scene>",
+			  inner[] = "<scene%s><bsdf type='lambertian' id='a'/></scene>";
+	char text[2][1024], included[2][128];
+	struct scene s[2];
+	for (int i = 0; i < 2; i++) {
+		snprintf(text[i], sizeof text[i], "%s%s", i ? plain : marked, body);
+		snprintf(included[i], sizeof included[i], inner, i ? "" : " version='0.2.0'");
+		files[0] = (struct memory_file){"s.xml", text[i], strlen(text[i])};
+		files[1] = (struct memory_file){"i.xml", included[i], strlen(included[i])};
+		struct asset_source assets = memory_assets(files);
+		struct error e;
+		if (scene_read(&s[i], &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%s", e.text);
+		assert_true(scene_has_note(&s[i], "s.xml: is of a version before 0.4: read as by Mitsuba 0.5"));
+	}
+	assert_int_equal(s[1].object_count, 3);
+	for (uint32_t k = 0; k < 3; k++)
+		assert_same_node(s[0].objects[k], s[1].objects[k]);
+	scene_fini(&s[0]);
+	scene_fini(&s[1]);
+	static const char *const refused[] = {
+		"<scene><sensor type='perspective'/><emitter type='constant'/></scene>",
+		"<scene><shape type='sphere'/></scene>",
+		"<scene version='0.2.0'><include filename='i.xml'/><camera type='perspective'/></scene>",
+	};
+	for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+		files[0] = (struct memory_file){"s.xml", refused[i], strlen(refused[i])};
+		struct asset_source assets = memory_assets(files);
+		struct error e;
+		if (!scene_read(&s[0], &assets, "s.xml", render_plugins(), NULL, 0, &e) ||
+		    !strstr(e.text, "needs version="))
+			fail_msg("%s: \"%s\"", refused[i], e.text);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -216,6 +258,7 @@ int main(void)
 		cmocka_unit_test(test_each_file_for_itself),
 		cmocka_unit_test(test_left_is_right),
 		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_no_version),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
