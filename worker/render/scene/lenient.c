@@ -56,6 +56,16 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 	}
 }
 
+enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class cls, const char *type,
+				 const char **stand_in)
+{
+	enum lenient_way way = lenient_plugin(cls, type, stand_in);
+	if (way != LENIENT_LEAVE_OUT || cls != PLUGIN_EMITTER || !el->parent || strcmp(el->parent->name, "shape") != 0)
+		return way;
+	*stand_in = "area";
+	return LENIENT_REPLACE;
+}
+
 const char *lenient_param(const char *stand_in, const char *name)
 {
 	static const char *const colors[] = {"base_color", "diffuse_reflectance", "color", "diffuse", "albedo", NULL};

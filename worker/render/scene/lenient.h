@@ -23,6 +23,10 @@ enum lenient_way {
 /* For a plug-in that no table has. */
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in);
 
+/* For such an element: a light in a shape becomes an `area`. */
+enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class cls, const char *type,
+				 const char **stand_in);
+
 /* The replacement's parameter that corresponds to `name` of the plug-in replaced; `name` itself if there is none. */
 const char *lenient_param(const char *stand_in, const char *name);
 

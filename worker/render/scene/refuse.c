@@ -11,10 +11,11 @@
 #include <string.h>
 
 /* "; --lenient ..." or "": what --lenient does instead. */
-static const char *lenient_hint(enum plugin_class cls, const char *type, char *text, size_t size)
+static const char *lenient_hint(const struct xml_element *el, enum plugin_class cls, const char *type, char *text,
+				size_t size)
 {
 	const char *other;
-	switch (lenient_plugin(cls, type, &other)) {
+	switch (lenient_element(el, cls, type, &other)) {
 	case LENIENT_LEAVE_OUT:
 		snprintf(text, size, "; --lenient leaves it out");
 		break;
@@ -80,9 +81,9 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 	plugin_list_types(decls, cls, list, sizeof list);
 	if (plugin_is_mitsubas(cls, type))
 		return xml_error(el, e, EINVAL, "this %s of Mitsuba's is not supported%s (supported: %s)",
-				 plugin_class_name(cls), lenient_hint(cls, type, hint, sizeof hint), list);
+				 plugin_class_name(cls), lenient_hint(el, cls, type, hint, sizeof hint), list);
 	spelling_hint(&s, near, sizeof near);
-	const char *lenient = lenient_hint(cls, type, hint, sizeof hint);
+	const char *lenient = lenient_hint(el, cls, type, hint, sizeof hint);
 	return xml_error(el, e, EINVAL, "there is no %s of this type%s%s (supported: %s)", plugin_class_name(cls), near,
 			 *near && *lenient ? lenient + 1 : lenient, list); /* after "?" without ";" */
 }

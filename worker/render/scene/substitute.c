@@ -12,7 +12,7 @@ int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, st
 		      const struct plugin_decl **decl, struct xml_element **inner)
 {
 	const char *other;
-	enum lenient_way way = lenient_plugin(cls, *type, &other);
+	enum lenient_way way = lenient_element(el, cls, *type, &other);
 	if (way == LENIENT_REFUSE)
 		return refuse_type(decls, el, cls, *type, t->error);
 	*inner = way == LENIENT_INNER ? lenient_inner(ids, el) : NULL;

@@ -151,6 +151,35 @@ static void test_lost_textures(void **state)
 	scene_fini(&s);
 }
 
+/* A light of another kind in a shape shines with its radiance; elsewhere it is left out. */
+static void test_lights_in_shapes(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'>\n<emitter type='photon'/>\n<shape type='rectangle'>\n"
+				  "<emitter type='angulararea'><rgb name='radiance' value='3'/>"
+				  "<float name='cutoff_angle' value='35'/></emitter></shape></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_true(scene_read_all(&s, &assets, "s.xml", render_plugins(), NULL, 0, false, &e) == 0);
+	assert_int_equal(s.problem_count, 2);
+	assert_non_null(strstr(s.problems[0], "there is no emitter of this type; --lenient leaves it out"));
+	assert_non_null(strstr(s.problems[1], "there is no emitter of this type; --lenient uses `area` instead"));
+	scene_fini(&s);
+	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_int_equal(s.object_count, 1);
+	const struct scene_node *light = node_child(s.objects[0], PLUGIN_EMITTER, 0);
+	assert_non_null(light);
+	assert_string_equal(light->type, "area");
+	assert_int_equal(light->property_count, 1);
+	assert_true(node_find(light, "radiance")->value.as.rgb[0] == 3);
+	assert_true(scene_has_note(
+		&s,
+		"s.xml:4: <emitter type=\"angulararea\"> is not supported; a standard area stands in for it (lenient)"));
+	scene_fini(&s);
+}
+
 /* A volume that names its value otherwise has none: it goes, and the medium that needs it. In 3.x there is a default.
  */
 static void test_volumes_without_a_value(void **state)
@@ -184,11 +213,9 @@ static void test_volumes_without_a_value(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_stand_ins),
-		cmocka_unit_test(test_colours_are_kept),
-		cmocka_unit_test(test_covers),
-		cmocka_unit_test(test_lost_textures),
-		cmocka_unit_test(test_volumes_without_a_value),
+		cmocka_unit_test(test_stand_ins),	 cmocka_unit_test(test_colours_are_kept),
+		cmocka_unit_test(test_covers),		 cmocka_unit_test(test_lost_textures),
+		cmocka_unit_test(test_lights_in_shapes), cmocka_unit_test(test_volumes_without_a_value),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
