@@ -3,13 +3,25 @@
 
 #include "common/base/option_print.h"
 
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
+
+/* A program may be started with some of these closed. The files that it opens would then get their numbers, and its
+ * messages would be written into them. What was closed still fails: it is opened for the other direction. */
+static void open_standard(void)
+{
+	for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++)
+		if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY) != fd)
+			exit(1); /* nobody can be told why */
+}
 
 void program_options(const struct program *p, int argc, char **argv, void *target)
 {
 	enum option_kind asked;
 	struct error e;
+	open_standard();
 	if (options_parse(p, argc, argv, target, &asked, &e)) {
 		fprintf(stderr, "%s: %s\nTry '%s --help' for more information.\n", p->name, e.text, p->name);
 		exit(2);

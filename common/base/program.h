@@ -5,7 +5,8 @@
 
 #include "common/base/option.h"
 
-/* options_parse for main: an error exits with 2, --help and the like with 0. */
+/* options_parse for main: an error exits with 2, --help and the like with 0. Before that, standard descriptors that are
+ * closed are opened, so that no file gets their numbers. */
 void program_options(const struct program *p, int argc, char **argv, void *target);
 
 #endif

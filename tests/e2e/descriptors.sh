@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+# Programs started with their standard descriptors closed write no message into another file.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
+
+# listens [OPTION...]: the coordinator was started as $!
+listens() {
+	COORDINATOR_PID=$!
+	PIDS="$PIDS $COORDINATOR_PID"
+	until_true 10 test -s "$DIR/port" || fail "the coordinator does not listen"
+	COORDINATOR=127.0.0.1:$(cat "$DIR/port")
+	export HSLT_COORDINATOR="$COORDINATOR"
+}
+
+# nothing PID: its standard descriptors lead nowhere
+nothing() {
+	for fd in 0 1 2; do
+		[ "$(readlink "/proc/$1/fd/$fd")" = /dev/null ] || fail "descriptor $fd of process $1 is $(readlink "/proc/$1/fd/$fd")"
+	done
+}
+
+JOB="--integrator path --size 32x32 --epoch 1"
+
+# ---- closed
+"$BIN/hslt-coordinator" -v --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/spool" --status-socket "$DIR/status" \
+	0<&- 1>&- 2>&- &
+listens
+nothing "$COORDINATOR_PID"
+"$BIN/hslt-worker" -v --threads 1 --cache "$DIR/cache" 0<&- 1>&- 2>&- &
+WORKER=$!
+PIDS="$PIDS $WORKER"
+nothing "$(renders $WORKER)"
+id=$(submit "$BOX" -o "$DIR/a.exr" $JOB --spp 64)
+until_true 60 is_state "$id" done || fail "$id is $(value "$id" state)"
+"$BIN/hslt-job" fetch "$id" -o "$DIR/a.exr" 2>/dev/null || fail "no image"
+"$BIN/hslt-job" fetch "$id" -o "$DIR/b.exr" 0<&- 1>&- 2>&- || fail "no image without stderr"
+cmp "$DIR/a.exr" "$DIR/b.exr" || fail "a message is in the image"
+code 1 sh -c "\"$BIN/hslt-job\" list 1>&-"
+stop $WORKER
+[ "$CODE" -eq 0 ] || fail "the worker ended with $CODE"
+stop "$COORDINATOR_PID"
+[ "$CODE" -eq 0 ] || fail "the coordinator ended with $CODE"
+
+echo "closed descriptors"
