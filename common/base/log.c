@@ -1,18 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Lines are formatted in memory and written at once. Whoever reads stderr may stop: a terminal after Ctrl-S or at the
+ * end of a connection that hangs, a pipe to a program that was stopped. A line waits for that for a moment; once a wait
+ * was in vain, lines are dropped and counted until stderr takes one again. Errors of writing are ignored.
+ */
 #include "common/base/log.h"
 
 #include "common/base/clock.h"
 #include "common/base/log_limit.h"
 #include "common/base/text.h"
 
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
-enum { LINE_MAX_BYTES = 2048 };
+enum {
+	LINE_MAX_BYTES = 2048,
+	PATIENCE_MS = 100, /* for a reader of stderr that is slow */
+};
 
 static const struct {
 	const char *name;
@@ -83,6 +95,66 @@ static bool may_say(enum log_event event)
 	return may;
 }
 
+/* ---- writing ---- */
+
+static pthread_mutex_t output_lock = PTHREAD_MUTEX_INITIALIZER;
+static int output = -1;
+static bool stuck;	 /* the last line was dropped */
+static uint64_t dropped; /* lines, since the last that was written */
+
+/* Pipes and terminals are opened again, so that writing never blocks here and still does for the other programs that
+ * have them. What cannot be opened (a socket) blocks only if poll is wrong about it. */
+static int open_output(void)
+{
+	struct stat st;
+	int fd = -1;
+	if (fstat(STDERR_FILENO, &st) == 0 && (S_ISFIFO(st.st_mode) || S_ISCHR(st.st_mode)))
+		fd = open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+	return fd >= 0 ? fd : STDERR_FILENO;
+}
+
+/* false: dropped. *before: lines that were dropped before this one was written. */
+static bool put(const char *line, size_t size, uint64_t *before)
+{
+	pthread_mutex_lock(&output_lock);
+	if (output < 0)
+		output = open_output();
+	struct pollfd p = {.fd = output, .events = POLLOUT};
+	stuck = poll(&p, 1, stuck ? 0 : PATIENCE_MS) == 0 || (write(output, line, size) < 0 && errno == EAGAIN);
+	*before = stuck ? 0 : dropped;
+	dropped = stuck ? dropped + 1 : 0;
+	bool written = !stuck;
+	pthread_mutex_unlock(&output_lock);
+	return written;
+}
+
+static void put_back(uint64_t lines)
+{
+	pthread_mutex_lock(&output_lock);
+	dropped += lines;
+	pthread_mutex_unlock(&output_lock);
+}
+
+static size_t print_dropped(char *line, size_t size, uint64_t lines)
+{
+	char text[32];
+	snprintf(text, sizeof text, "more=%llu", log_u64(lines));
+	size_t n = log_format(line, size - 1, LOG_LOG_DROPPED, text);
+	line[n++] = '\n';
+	return n;
+}
+
+static void write_line(const char *line, size_t size)
+{
+	char more[160];
+	uint64_t before, none;
+	if (!put(line, size, &before) || !before)
+		return;
+	size_t n = print_dropped(more, sizeof more, before);
+	if (!put(more, n, &none))
+		put_back(before - 1); /* this line was counted, and is not one that anybody misses */
+}
+
 void log_tick(void)
 {
 	for (int i = 0; i < LIMITED; i++) {
@@ -106,7 +178,5 @@ void log_event(enum log_event event, const char *fields, ...)
 	text_clean(text);
 	size_t n = log_format(line, sizeof line - 1, event, text);
 	line[n++] = '\n';
-	/* Errors are ignored: a log that cannot be written must not stop the farm. */
-	if (write(STDERR_FILENO, line, n) < 0)
-		return;
+	write_line(line, n);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Log lines of the daemons: one logfmt line per event on stderr, "time=... level=... event=... key=value ...". All
- * events are in the table below, so every line can be searched for by name. Any thread (one write per line). Libraries
- * do not log.
+ * events are in the table below, so every line can be searched for by name. Any thread (one write per line). If stderr
+ * takes no more, lines are dropped, and their number is logged later. Libraries do not log.
  */
 #ifndef COMMON_BASE_LOG_H
 #define COMMON_BASE_LOG_H
@@ -16,6 +16,7 @@
 	X(LIMITS, "limits", INFO)                          \
 	X(STOP, "stop", INFO)                              \
 	X(LOG_WITHHELD, "log_withheld", WARN)              \
+	X(LOG_DROPPED, "log_dropped", WARN)                \
 	X(ROOT, "runs_as_root", WARN)                      \
 	X(PEER_ACCEPT, "peer_accept", DEBUG)               \
 	X(PEER_HELLO, "peer_hello", INFO)                  \

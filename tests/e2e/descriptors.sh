@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Programs started with their standard descriptors closed write no message into another file.
+# Programs started with their standard descriptors closed write no message into another file; a log that nobody reads stops nothing.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
@@ -41,4 +41,23 @@ stop $WORKER
 stop "$COORDINATOR_PID"
 [ "$CODE" -eq 0 ] || fail "the coordinator ended with $CODE"
 
-echo "closed descriptors"
+# ---- not read: 64 KB are in the pipe before the job is done
+rm "$DIR/port"
+mkfifo "$DIR/pipe"
+sleep 100000 <"$DIR/pipe" &
+READER=$!
+PIDS="$PIDS $READER"
+"$BIN/hslt-coordinator" -v --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/spool" --status-socket "$DIR/status" \
+	2>"$DIR/pipe" &
+listens
+start_worker w
+id=$(submit "$BOX" -o "$DIR/c.exr" $JOB --spp 512)
+until_true 60 is_state "$id" done || fail "the farm waits for a reader of its log: $id is $(value "$id" state)"
+cat "$DIR/pipe" >"$DIR/coordinator.log" &
+PIDS="$PIDS $!"
+says_dropped() {
+	submit "$BOX" -o "$DIR/d.exr" $JOB --spp 1 >/dev/null
+	grep -q 'event=log_dropped more=[1-9]' "$DIR/coordinator.log"
+}
+until_true 10 says_dropped || fail "the log does not say that lines are missing"
+echo "closed descriptors, and a log that nobody reads"
