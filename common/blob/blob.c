@@ -8,8 +8,7 @@
  * flushing and renaming to a batch; the entry is there from then on, but counts as missing until blob_enter.
  *
  * Failures: a wrong hash or more bytes than announced are -EBADMSG, and the temporary file is removed. A full disk is
- * -ENOSPC, after every blob that is not held has been evicted. A blob whose file has disappeared or changed is found by
- * blob_check and dropped.
+ * -ENOSPC, after every blob that is not held has been evicted. blob_check drops a blob whose file is gone or changed.
  */
 #include "common/base/clock.h"
 #include "common/blob/blob.h"
@@ -23,7 +22,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { PATH_MOST = 4096 };
@@ -314,16 +312,18 @@ struct blob_check {
 int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct blob_hash *h, double seconds,
 		     struct error *e)
 {
-	char hex[BLOB_HEX_SIZE];
+	char path[PATH_MOST];
+	struct stat st;
 	struct entry *n = find_there(s, h);
-	blob_hex(h, hex);
+	blob_path(s, h, path, sizeof path);
 	if (!n)
-		return error_set(e, ENOENT, "there is no blob %s", hex);
-	if (n->checked > 0 && (seconds == BLOB_SINCE_GIVEN ? !n->given : clock_seconds() - n->checked <= seconds))
+		return error_set(e, ENOENT, "there is no %s", path);
+	if (n->checked > 0 && (seconds == BLOB_SINCE_GIVEN ? !n->given : clock_seconds() - n->checked <= seconds) &&
+	    (disk_stat(path, &st) == 0 || errno != ENOENT)) /* a cache can be emptied at any time */
 		return 0;
 	struct blob_check *c = mem_alloc(1, sizeof *c);
 	if (!c)
-		return error_set(e, ENOMEM, "no memory to check the blob %s", hex);
+		return error_set(e, ENOMEM, "no memory to check %s", path);
 	*c = (struct blob_check){
 		.store = s, .hash = *h, .begun = clock_seconds(), .was_given = n->given, .fd = -1, .rc = 0};
 	n->given = false; /* what is given from now on may be read too late for this check */

@@ -29,9 +29,9 @@ bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
 
 /* Verifies the file's contents, unless that was done within the last so many seconds or (BLOB_SINCE_GIVEN) since it
- * was last opened: about a second per gigabyte. -EBADMSG: the contents are wrong or the file is missing; it is kept
- * as damaged.NAME, and the blob counts as missing until it is written again, while holds remain. -ENOENT: not in the
- * store. Any other error: it cannot be read at the moment. */
+ * was last opened, and it is still there: about a second per gigabyte. -EBADMSG: the contents are wrong or the file is
+ * missing; it is kept as damaged.NAME, and the blob counts as missing until it is written again, while holds remain.
+ * -ENOENT: not in the store. Any other error: it cannot be read at the moment. */
 enum { BLOB_SINCE_GIVEN = -1 };
 int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e);
 /* The same in parts, for a store whose thread must not wait for the disk: begin (1: begun; 0 or an error: the answer),

@@ -81,33 +81,75 @@ static void begin_life(struct cache *c, const char *base, int slot)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 
+/* -EWOULDBLOCK: another worker has it. */
+static int lock_slot(const char *base, int slot, int *lock, struct error *e)
+{
+	char path[PATH_BYTES + 32];
+	snprintf(path, sizeof path, "%s/slot-%d.lock", base, slot);
+	*lock = open(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
+	if (*lock < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (flock(*lock, LOCK_EX | LOCK_NB) == 0)
+		return 0;
+	close(*lock);
+	*lock = -1;
+	return error_set(e, EWOULDBLOCK, "%s: another worker uses it", path);
+}
+
+static void slot_path(const char *base, int slot, char path[PATH_BYTES + 32])
+{
+	snprintf(path, PATH_BYTES + 32, "%s/slot-%d", base, slot);
+}
+
 int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error *e)
 {
 	char base[PATH_BYTES], path[PATH_BYTES + 32];
 	c->blobs = NULL;
 	c->lock = -1;
+	c->folder = folder;
 	int rc = base_folder(folder, base, e);
-	for (int slot = 0; !rc && slot < SLOTS; slot++) {
-		snprintf(path, sizeof path, "%s/slot-%d.lock", base, slot);
-		c->lock = open(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
-		if (c->lock < 0)
-			return error_set(e, errno, "%s: %s", path, strerror(errno));
-		if (flock(c->lock, LOCK_EX | LOCK_NB) == 0) {
-			snprintf(path, sizeof path, "%s/slot-%d", base, slot);
-			begin_life(c, base, slot);
-			rc = make_slot(path, e);
-			if (!rc)
-				rc = blob_store_open(&c->blobs, path, limit, e);
-			if (rc)
-				cache_close(c);
-			else
-				blob_store_trim(c->blobs);
+	if (rc)
+		return rc;
+	for (c->slot = 0; c->slot < SLOTS; c->slot++) {
+		rc = lock_slot(base, c->slot, &c->lock, e);
+		if (rc == -EWOULDBLOCK)
+			continue;
+		if (rc)
 			return rc;
-		}
-		close(c->lock);
-		c->lock = -1;
+		slot_path(base, c->slot, path);
+		begin_life(c, base, c->slot);
+		rc = make_slot(path, e);
+		if (!rc)
+			rc = blob_store_open(&c->blobs, path, limit, e);
+		if (rc)
+			cache_close(c);
+		else
+			blob_store_trim(c->blobs);
+		return rc;
 	}
-	return rc ? rc : error_set(e, EBUSY, "%s: %d workers use this cache already", base, SLOTS);
+	return error_set(e, EBUSY, "%s: %d workers use this cache already", base, SLOTS);
+}
+
+int cache_mend(struct cache *c, struct error *e)
+{
+	char base[PATH_BYTES], path[PATH_BYTES + 32];
+	struct stat st;
+	int lock;
+	int rc = base_folder(c->folder, base, e);
+	if (rc)
+		return rc;
+	slot_path(base, c->slot, path);
+	if (stat(path, &st) == 0 || errno != ENOENT)
+		return 0;
+	if (fstat(c->lock, &st) == 0 && st.st_nlink == 0) { /* the lock's file is gone as well */
+		rc = lock_slot(base, c->slot, &lock, e);
+		if (rc)
+			return rc;
+		close(c->lock);
+		c->lock = lock;
+	}
+	log_event(LOG_SPOOL_FAULT, "path=%s text=\"the cache was removed: it is made anew\"", log_quote(path).text);
+	return make_slot(path, e);
 }
 
 void cache_close(struct cache *c)

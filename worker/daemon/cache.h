@@ -11,12 +11,16 @@
 
 struct cache {
 	struct blob_store *blobs;
-	int lock;
+	const char *folder; /* as given */
+	int slot, lock;
 	struct worker_identity identity; /* of the slot */
 };
 
 /* folder NULL: $XDG_CACHE_HOME/hslt or ~/.cache/hslt. limit: bytes of one slot. */
-int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error *e);
+int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error *e); /* keeps `folder` */
+/* Makes the slot's folder again if somebody removed it, as anybody may do with ~/.cache at any time. Call before a file
+ * is stored. */
+int cache_mend(struct cache *c, struct error *e);
 void cache_close(struct cache *c);
 
 #endif

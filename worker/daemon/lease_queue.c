@@ -409,7 +409,11 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 	}
 	const struct blob_hash hash = f->hash;
 	struct job_cache *first = who_wants(a, &hash);
-	enum fetch_end end = first ? fetch_add(f, a->cache.blobs, c, payload, size, &e) : FETCH_MORE;
+	enum fetch_end end = FETCH_MORE;
+	if (first && !f->writer && cache_mend(&a->cache, &e))
+		end = FETCH_UNSTORED;
+	else if (first)
+		end = fetch_add(f, a->cache.blobs, c, payload, size, &e);
 	if (end != FETCH_MORE)
 		fetch_drop(a, f);
 	if (end == FETCH_FAILED || end == FETCH_UNSTORED) {

@@ -269,9 +269,15 @@ static void damaged_at_rest(void **state)
 		assert_int_equal(blob_check(s, &h, 0, &e), 0);
 		assert_true(blob_has(s, &h, &size) && size == strlen(text));
 	}
+	for (int seconds = 0; seconds <= 1000; seconds += 1000) { /* however recently it was read */
+		unlink(path);
+		assert_int_equal(blob_check(s, &h, seconds, &e), -EBADMSG);
+		assert_non_null(strstr(e.text, "gone"));
+		store_text(s, text);
+		blob_release(s, &h);
+	}
 	unlink(path);
-	assert_int_equal(blob_check(s, &h, 0, &e), -EBADMSG);
-	assert_non_null(strstr(e.text, "gone"));
+	assert_int_equal(blob_check(s, &h, BLOB_SINCE_GIVEN, &e), -EBADMSG);
 	assert_int_equal(blob_expect(s, &h, &e), 0);
 	assert_int_equal(blob_expect(s, &other, &e), 0); /* never there */
 	assert_false(blob_has(s, &other, NULL));
