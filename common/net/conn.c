@@ -4,6 +4,10 @@
  * Outgoing frames are the send queue's. A timer notices peers that are silent or stall, and certificates that expire or
  * are revoked meanwhile.
  *
+ * A long frame takes its size from the pool, if there is one. While it waits for that, nothing more of its connection
+ * is read, and its peer counts as neither silent nor slow. While others wait for the pool, whoever has a part of it
+ * must keep sending.
+ *
  * Failures end the connection, once, with a reason in words: frames beyond the limits, plaintext where TLS is required
  * (and the reverse), a peer that stalls, no memory.
  */
@@ -13,6 +17,7 @@
 #include "common/base/text.h"
 #include "common/net/send_queue.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -25,6 +30,7 @@ enum {
 	REFUSED_MS = 1000,    /* time for a peer to read the reason */
 	HANDSHAKE_MS = 10000, /* of TLS records */
 	BYTES_PER_SECOND = 1 << 16,
+	SHORT = 1 << 16, /* a frame that needs nothing of the pool */
 };
 
 struct conn {
@@ -35,12 +41,16 @@ struct conn {
 	const struct conn_events *events;
 	void *user;
 	struct frame_reader reader;
-	struct tls_link *link;	/* NULL: plaintext */
-	struct send_queue out;	/* its state is the connection's */
-	uint64_t clock, ticked; /* ms of the connection's clock and of the loop's clock at the last tick */
+	struct tls_link *link;	  /* NULL: plaintext */
+	struct receive_turn turn; /* of the frame that is being received */
+	struct send_queue out;	  /* its state is the connection's */
+	uint64_t clock, ticked;	  /* ms of the connection's clock and of the loop's clock at the last tick */
 	uint64_t begun, last_read, frame_begun; /* ms of the connection's clock at that time */
 	uint64_t checked;			/* ms of the loop's clock: the next check of the peer's certificate */
 	uint64_t linger_until;			/* 0: not closing */
+	uint64_t paced_at; /* ms of the connection's clock: when the frame last had enough new bytes, and how many then
+			    */
+	size_t paced;
 	int open_handles;
 	unsigned frames; /* in the last read */
 	bool accepted, sniffed;
@@ -52,6 +62,12 @@ struct conn {
  * callback. */
 static _Thread_local char chunk[READ_BYTES];
 
+static void give_back(struct conn *c)
+{
+	if (c->turn.has || c->turn.waits)
+		receive_pool_give(c->config.pool, &c->turn);
+}
+
 static void on_handle_closed(uv_handle_t *h)
 {
 	struct conn *c = h->data;
@@ -59,6 +75,7 @@ static void on_handle_closed(uv_handle_t *h)
 		return;
 	c->events->closed(c->user, c->why);
 	frame_reader_fini(&c->reader);
+	give_back(c);
 	tls_link_free(c->link);
 	send_queue_fini(&c->out);
 	mem_free(c);
@@ -122,11 +139,51 @@ static void deliver(struct conn *c)
 	envelope_fini(&env);
 }
 
+static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b);
+
+/* The pool has room for its frame. */
+static void read_on(struct receive_turn *t)
+{
+	struct conn *c = (struct conn *)((char *)t - offsetof(struct conn, turn));
+	if (c->out.state == SEND_CLOSED)
+		return;
+	c->last_read = c->frame_begun = c->paced_at = clock_of(c);
+	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
+	if (rc)
+		conn_close(c, uv_strerror(rc));
+}
+
+/* Part of a frame is there. */
+static void take_turn(struct conn *c)
+{
+	uint64_t size = frame_reader_size(&c->reader);
+	if (!c->config.pool || size <= SHORT || c->turn.has || c->turn.waits)
+		return;
+	c->turn.go = read_on;
+	if (!receive_pool_take(c->config.pool, &c->turn, size))
+		uv_read_stop((uv_stream_t *)&c->tcp);
+}
+
 struct buf conn_take_payload(struct conn *c)
 {
 	struct buf payload = c->reader.payload;
 	c->reader.payload = (struct buf){.limit = payload.limit};
 	return payload;
+}
+
+static void begin_frame(struct conn *c)
+{
+	c->frame_begun = c->paced_at = c->last_read;
+	c->paced = 0;
+}
+
+static void keep_pace(struct conn *c)
+{
+	size_t size = c->reader.payload.size;
+	if ((double)(size - c->paced) < c->config.stall_seconds * BYTES_PER_SECOND)
+		return;
+	c->paced = size;
+	c->paced_at = c->last_read;
 }
 
 /* Frames in plaintext, after decryption. */
@@ -141,7 +198,7 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 		int rc = frame_reader_take(&c->reader, bytes + at, size - at, &used, &e);
 		at += used;
 		if (!was_midway)
-			c->frame_begun = c->last_read;
+			begin_frame(c);
 		if (rc < 0) {
 			c->garbled = rc == -EILSEQ;
 			conn_close(c, e.text);
@@ -150,9 +207,14 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 			deliver(c);
 			frame_reader_drop(
 				&c->reader); /* now, rather than with the next frame, which may be seconds away */
+			give_back(c);
 		}
 	}
-	if (c->events->partial && frame_reader_is_midway(&c->reader) && c->out.state == SEND_OPEN)
+	if (!frame_reader_is_midway(&c->reader) || c->out.state != SEND_OPEN)
+		return;
+	take_turn(c);
+	keep_pace(c);
+	if (c->events->partial)
 		c->events->partial(c->user);
 }
 
@@ -234,7 +296,10 @@ static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 static bool has_stalled(const struct conn *c)
 {
 	double allowed = c->config.stall_seconds + (double)c->reader.payload_size / BYTES_PER_SECOND;
-	return frame_reader_is_midway(&c->reader) && (double)(c->clock - c->frame_begun) > 1000 * allowed;
+	bool awaited = c->turn.has && c->config.pool->first;
+	return frame_reader_is_midway(&c->reader) &&
+	       ((double)(c->clock - c->frame_begun) > 1000 * allowed ||
+		(awaited && (double)(c->clock - c->paced_at) > 1000 * c->config.stall_seconds));
 }
 
 /* Checks the peer's certificate again: it may have expired, or been revoked. */
@@ -251,6 +316,14 @@ static void check_again(struct conn *c, uint64_t now)
 	}
 }
 
+/* Its peer cannot send, and does not know why. */
+static void wait_on(struct conn *c)
+{
+	c->last_read = c->frame_begun = c->clock;
+	if (c->events->partial && c->out.state == SEND_OPEN)
+		c->events->partial(c->user);
+}
+
 static void on_tick(uv_timer_t *t)
 {
 	struct conn *c = t->data;
@@ -258,6 +331,8 @@ static void on_tick(uv_timer_t *t)
 	c->clock = clock_of(c);
 	c->ticked = now;
 	check_again(c, now);
+	if (c->turn.waits)
+		wait_on(c);
 	if (c->linger_until && now >= c->linger_until)
 		conn_close(c, c->why);
 	else if (c->link && !tls_link_is_open(c->link) && c->clock - c->begun > HANDSHAKE_MS)

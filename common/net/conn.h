@@ -9,6 +9,7 @@
 #define COMMON_NET_CONN_H
 
 #include "common/net/addr.h"
+#include "common/net/receive_pool.h"
 #include "common/net/tls.h"
 #include "common/wire/envelope.h"
 #include "common/wire/frame.h"
@@ -22,7 +23,8 @@ struct conn_events {
 	/* The envelope may be taken (copied and zeroed); the payload is valid during the call only, unless
 	 * conn_take_payload takes it. */
 	void (*message)(void *user, struct envelope *env, const unsigned char *payload, size_t payload_size);
-	void (*partial)(void *user); /* received bytes of an incomplete message; may be NULL */
+	void (*partial)(
+		void *user); /* a message is incomplete: bytes of it came, or it waits for the pool; may be NULL */
 	void (*drained)(void *user); /* everything sent has been taken by the kernel; may be NULL */
 	void (*closed)(void *user, const char *why);
 };
@@ -35,6 +37,7 @@ struct conn_config {
 				 does not count */
 	struct tls
 		*tls; /* NULL: plaintext. Must outlive the connection; a peer that does not use TLS is disconnected */
+	struct receive_pool *pool; /* for frames of more than 64 KB; NULL: no limit. Must outlive the connection */
 };
 
 /* -errno if the attempt could not even be made; otherwise opened or closed is called later. */

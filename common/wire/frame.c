@@ -66,6 +66,11 @@ bool frame_reader_is_midway(const struct frame_reader *r)
 	return r->prefix_size && !is_whole(r);
 }
 
+uint64_t frame_reader_size(const struct frame_reader *r)
+{
+	return (uint64_t)r->header_size + r->payload_size;
+}
+
 /* Large buffers are freed, so that an idle connection holds little memory. */
 void frame_reader_drop(struct frame_reader *r)
 {

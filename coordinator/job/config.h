@@ -33,6 +33,7 @@ struct server_config {
 	uint64_t film_bytes;	/* limit of running jobs' films in memory; those of further jobs are mapped files of the
 				   spool */
 	uint64_t waiting_bytes; /* limit of results waiting for films that are being read */
+	uint64_t receive_bytes; /* limit of messages that are being received; further ones wait */
 	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for the epochs of new
 				    jobs; 0: unlimited */
 	double hello_seconds, stall_seconds; /* time for a peer to say hello; to complete a frame */

@@ -48,7 +48,8 @@ void peers_accept(struct peers *s)
 				     SESSION_HELLO_SEND,
 				     s->jobs->config.stall_seconds,
 				     s->jobs->config.hello_seconds,
-				     s->tls};
+				     s->tls,
+				     &s->receiving};
 	struct error e;
 	bool room = s->session_count < s->jobs->config.max_connections || make_room(s);
 	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
@@ -166,6 +167,7 @@ static uint64_t uploading(struct peers *s, uint64_t peer)
 void peers_init(struct peers *s)
 {
 	uv_tcp_init(s->jobs->loop, &s->listener);
+	s->receiving.limit = s->jobs->config.receive_bytes;
 	s->jobs->peers = (struct peer_calls){.user = s,
 					     .name = name,
 					     .send_lease = worker_send_lease,

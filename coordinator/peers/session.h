@@ -71,7 +71,8 @@ struct peers {
 	LIST_HEAD(, session) sessions;
 	LIST_HEAD(, session) by_id[SESSION_BUCKETS];
 	unsigned session_count, fetches;
-	size_t held_bytes; /* bytes of waiting requests while jobs are read */
+	size_t held_bytes;   /* bytes of waiting requests while jobs are read */
+	struct receive_pool receiving;
 	uint64_t last_peer;
 	uint64_t garbled;  /* connections closed because of a wrong checksum */
 	bool caller_waits; /* a connection could not be accepted: try again */

@@ -110,6 +110,7 @@ void server_config_init(struct server_config *c)
 				    .max_fetches = FETCHES_MOST,
 				    .film_bytes = quarter_of_memory(),
 				    .waiting_bytes = quarter_of_memory(),
+				    .receive_bytes = quarter_of_memory() / 2,
 				    .hello_seconds = 10,
 				    .stall_seconds = 30};
 	option_defaults(&server_program.own, c, NULL);

@@ -1,0 +1,304 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What arrives on many connections at once never needs more memory than the pool has: long frames wait in turn, nobody
+ * who waits is taken for dead or slow, and whoever keeps others waiting must go on sending. Short ones pass.
+ */
+#include "common/base/mem.h"
+#include "common/net/conn.h"
+#include "common/wire/frame.h"
+#include "tests/support/checksummed_frame.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- turns ---- */
+
+static struct receive_turn turns[5];
+static char went[16];
+
+static void note(struct receive_turn *t)
+{
+	size_t n = strlen(went);
+	went[n] = (char)('a' + (t - turns));
+	went[n + 1] = 0;
+}
+
+static bool take(struct receive_pool *p, int i, uint64_t bytes)
+{
+	turns[i].go = note;
+	return receive_pool_take(p, &turns[i], bytes);
+}
+
+static void in_turn(void **state)
+{
+	(void)state;
+	struct receive_pool p = {.limit = 100};
+	memset(turns, 0, sizeof turns);
+	assert_true(take(&p, 0, 60));
+	assert_true(take(&p, 1, 40));
+	assert_false(take(&p, 2, 70));
+	assert_false(take(&p, 3, 1000)); /* alone, later */
+	assert_false(take(&p, 4, 1));	 /* there is room for it once one has gone, but others were first */
+	receive_pool_give(&p, &turns[1]);
+	assert_string_equal(went, "");
+	receive_pool_give(&p, &turns[0]);
+	assert_string_equal(went, "c");
+	assert_true(turns[2].has && !turns[2].waits && p.used == 70);
+	receive_pool_give(&p, &turns[2]);
+	assert_string_equal(went, "cd");
+	assert_int_equal(p.used, 1000);
+	receive_pool_give(&p, &turns[3]);
+	assert_string_equal(went, "cde");
+	receive_pool_give(&p, &turns[4]);
+	assert_true(p.used == 0 && !p.first && !p.last);
+}
+
+static void whoever_leaves_the_queue(void **state)
+{
+	(void)state;
+	struct receive_pool p = {.limit = 100};
+	memset(turns, 0, sizeof turns);
+	went[0] = 0;
+	assert_true(take(&p, 0, 100));
+	for (int i = 1; i < 5; i++)
+		assert_false(take(&p, i, 50));
+	receive_pool_give(&p, &turns[4]); /* the last, one in the middle, the first */
+	receive_pool_give(&p, &turns[2]);
+	receive_pool_give(&p, &turns[1]);
+	assert_false(take(&p, 4, 10));
+	assert_string_equal(went, "");
+	receive_pool_give(&p, &turns[0]);
+	assert_string_equal(went, "de");
+	assert_int_equal(p.used, 60);
+}
+
+/* ---- connections ---- */
+
+enum { PEERS = 4, LONG = 1 << 20, HALF = LONG / 2, PROMISED = 1 << 26, PROMISED_PART = 100000 };
+
+struct end {
+	struct conn *conn;
+	int partial, messages, closed;
+	char why[128];
+};
+
+static uv_loop_t loop;
+static uv_tcp_t listener;
+static struct net_addr bound;
+static struct conn_config config;
+static struct receive_pool pool;
+static struct end callers[PEERS], ends[PEERS];
+static int accepted, order[PEERS], arrived;
+
+static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	struct end *x = user;
+	(void)env;
+	(void)payload;
+	x->messages++;
+	if (size >= LONG)
+		order[arrived++] = (int)(x - ends);
+}
+
+static void on_partial(void *user)
+{
+	((struct end *)user)->partial++;
+}
+
+static void on_closed(void *user, const char *why)
+{
+	struct end *x = user;
+	x->closed++;
+	x->conn = NULL;
+	snprintf(x->why, sizeof x->why, "%s", why);
+}
+
+static const struct conn_events events = {.message = on_message, .partial = on_partial, .closed = on_closed};
+
+static void on_connection(uv_stream_t *l, int status)
+{
+	struct error e;
+	assert_int_equal(status, 0);
+	assert_int_equal(conn_accept(&ends[accepted].conn, l, &config, &events, &ends[accepted], &e), 0);
+	accepted++;
+}
+
+static void once(void)
+{
+	uv_run(&loop, UV_RUN_ONCE);
+}
+
+/* As a caller would send it after its hello, or part of it. */
+static void send_bytes(int i, const unsigned char *bytes, size_t size)
+{
+	unsigned char *copy = mem_alloc(size, 1);
+	assert_non_null(copy);
+	conn_send_bytes(callers[i].conn, memcpy(copy, bytes, size), size);
+}
+
+static unsigned char *long_frame(size_t *size)
+{
+	Farm__Bye bye;
+	Farm__Envelope m;
+	unsigned char *payload = calloc(LONG, 1);
+	assert_non_null(payload);
+	farm__bye__init(&bye);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_BYE;
+	m.bye = &bye;
+	unsigned char *frame = checksummed_message(&m, payload, LONG, size);
+	free(payload);
+	return frame;
+}
+
+static void send_short(int i)
+{
+	Farm__Bye bye;
+	Farm__Envelope m;
+	farm__bye__init(&bye);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_BYE;
+	m.bye = &bye;
+	conn_send(callers[i].conn, &m, NULL, 0);
+}
+
+static void open_all(double stall_seconds)
+{
+	struct net_addr a;
+	struct error e;
+	int length = sizeof bound.storage;
+	memset(callers, 0, sizeof callers);
+	memset(ends, 0, sizeof ends);
+	memset(&bound, 0, sizeof bound);
+	accepted = arrived = 0;
+	pool = (struct receive_pool){.limit = LONG + HALF};
+	config = (struct conn_config){{4096, PROMISED}, 8 << 20, stall_seconds, 0, NULL, &pool};
+	struct conn_config caller = config;
+	caller.pool = NULL;
+	assert_int_equal(uv_loop_init(&loop), 0);
+	uv_tcp_init(&loop, &listener);
+	assert_int_equal(net_addr_resolve(&a, "127.0.0.1:0", &e), 0);
+	assert_int_equal(uv_tcp_bind(&listener, (struct sockaddr *)&a.storage, 0), 0);
+	assert_int_equal(uv_listen((uv_stream_t *)&listener, 8, on_connection), 0);
+	assert_int_equal(uv_tcp_getsockname(&listener, (struct sockaddr *)&bound.storage, &length), 0);
+	for (int i = 0; i < PEERS; i++) {
+		assert_int_equal(conn_connect(&callers[i].conn, &loop, &bound, &caller, &events, &callers[i], &e), 0);
+		while (accepted <= i)
+			once();
+		send_short(i); /* the first frame, which has no checksum */
+		while (!ends[i].messages)
+			once();
+	}
+}
+
+static void close_all(void)
+{
+	for (int i = 0; i < PEERS; i++) {
+		if (callers[i].conn)
+			conn_close(callers[i].conn, "the end");
+		if (ends[i].conn)
+			conn_close(ends[i].conn, "the end");
+	}
+	uv_close((uv_handle_t *)&listener, NULL);
+	uv_run(&loop, UV_RUN_DEFAULT);
+	assert_int_equal(uv_loop_close(&loop), 0);
+	assert_true(pool.used == 0 && !pool.first);
+}
+
+static void wait_for_turn(void)
+{
+	while (!pool.first)
+		once();
+}
+
+static unsigned waiting(void)
+{
+	unsigned n = 0;
+	for (const struct receive_turn *t = pool.first; t; t = t->next)
+		n++;
+	return n;
+}
+
+/* The first has sent half of its frame. Others send all of theirs, and wait; short messages of somebody else pass. */
+static void one_after_the_other(void **state)
+{
+	(void)state;
+	size_t size;
+	unsigned char *frame = long_frame(&size);
+	open_all(1000);
+	send_bytes(0, frame, HALF);
+	while (!pool.used)
+		once();
+	for (int i = 1; i < 3; i++) {
+		send_bytes(i, frame, size);
+		while (waiting() < (unsigned)i)
+			once();
+	}
+	send_short(3);
+	while (ends[3].messages < 2)
+		once();
+	assert_true(arrived == 0 && waiting() == 2 && pool.used <= pool.limit);
+	send_bytes(0, frame + HALF, size - HALF);
+	while (arrived < 3)
+		once();
+	assert_true(order[0] == 0 && order[1] == 1 && order[2] == 2);
+	/* whoever hangs up lets others go on */
+	send_bytes(0, frame, HALF);
+	while (!pool.used)
+		once();
+	send_bytes(1, frame, size);
+	wait_for_turn();
+	conn_close(callers[0].conn, "enough");
+	while (arrived < 4)
+		once();
+	assert_int_equal(order[3], 1);
+	close_all();
+	free(frame);
+}
+
+/* A frame that is promised to be so long that minutes are allowed for it, and of which nothing more comes. */
+static void send_promise(int i)
+{
+	static unsigned char frame[FRAME_CHECKED_PREFIX + PROMISED_PART];
+	unsigned char prefix[FRAME_PREFIX];
+	frame_prefix_write(prefix, 16, PROMISED);
+	frame_add_checksums(frame, prefix, frame + FRAME_CHECKED_PREFIX, PROMISED_PART);
+	send_bytes(i, frame, sizeof frame);
+}
+
+static void whoever_keeps_others_waiting(void **state)
+{
+	(void)state;
+	size_t size;
+	unsigned char *frame = long_frame(&size);
+	open_all(0.5);
+	send_promise(0);
+	while (!pool.used)
+		once();
+	for (int i = 0; i < PEERS; i++)
+		conn_set_quiet(ends[i].conn, i ? 0.5 : 0);
+	send_bytes(1, frame, size);
+	wait_for_turn();
+	int heard = ends[1].partial;
+	while (!arrived) /* for longer than it may be silent, and than a frame of its length may take to go on */
+		once();
+	assert_true(ends[0].closed && strstr(ends[0].why, "not completed in time"));
+	assert_true(ends[1].partial > heard && !ends[1].closed);
+	close_all();
+	free(frame);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(in_turn), cmocka_unit_test(whoever_leaves_the_queue),
+					   cmocka_unit_test(one_after_the_other),
+					   cmocka_unit_test(whoever_keeps_others_waiting)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
