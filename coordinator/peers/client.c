@@ -28,7 +28,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { CHUNK = 1 << 20 };
+enum { CHUNK = 1 << 20, UPLOADS_MOST = 1 << 28 /* bytes of all submissions that wait for files */ };
 
 /* ---- submit ---- */
 
@@ -66,6 +66,8 @@ void client_upload_abort(struct session *p)
 	if (p->upload)
 		upload_free(p->upload);
 	p->upload = NULL;
+	p->peers->upload_bytes -= p->upload_bytes;
+	p->upload_bytes = 0;
 	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, 0});
 }
 
@@ -151,11 +153,18 @@ static void take_submit(struct session *p, struct envelope *env)
 		session_fault(p, "one submission at a time");
 		return;
 	}
+	size_t bytes = env->used;
+	if (bytes > UPLOADS_MOST - p->peers->upload_bytes) {
+		answer_submit(p, 0, "too many submissions are being sent to the coordinator: try again later", NULL);
+		return;
+	}
 	if (upload_new(&p->upload, env, p->jobs->blobs, p->jobs->config.worker_bandwidth, &e)) {
 		p->upload = NULL;
 		answer_submit(p, 0, e.text, NULL);
 		return;
 	}
+	p->upload_bytes = bytes;
+	p->peers->upload_bytes += bytes;
 	if (fits(p, &e)) {
 		refuse_upload(p, &e);
 		return;

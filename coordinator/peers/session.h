@@ -43,6 +43,7 @@ struct session {
 	unsigned request_count;
 	double heard;	       /* s of the loop's clock: the last heartbeat sent during a long message */
 	struct upload *upload; /* a submission that waits for blobs */
+	size_t upload_bytes;   /* its message */
 	uint64_t watched;      /* job being watched; 0: none */
 	struct {
 		uint64_t job;
@@ -72,6 +73,7 @@ struct peers {
 	LIST_HEAD(, session) by_id[SESSION_BUCKETS];
 	unsigned session_count, fetches;
 	size_t held_bytes;   /* bytes of waiting requests while jobs are read */
+	size_t upload_bytes; /* of all submissions that wait for blobs */
 	struct receive_pool receiving;
 	uint64_t last_peer;
 	uint64_t garbled;  /* connections closed because of a wrong checksum */

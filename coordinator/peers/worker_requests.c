@@ -9,10 +9,24 @@
 #include "coordinator/peers/worker_send.h"
 
 enum {
-	BLOB_CHUNK = 1 << 20,
-	AHEAD = 1 << 22,     /* bytes that may be unsent when the next answer is made */
-	REQUESTS_MOST = 512, /* twice what a worker can need that has leases of as many jobs as it may hold */
+	CHUNK_LEAST = 1 << 16,
+	CHUNK_MOST = 1 << 20,
+	AHEAD = 1 << 22,	/* bytes that may be unsent when the next answer is made */
+	AHEAD_OF_ALL = 1 << 30, /* shared by all connections: thousands of workers may begin a job at the same time */
+	REQUESTS_MOST = 512,	/* twice what a worker can need that has leases of as many jobs as it may hold */
 };
+
+static size_t ahead(const struct session *p)
+{
+	size_t share = AHEAD_OF_ALL / (p->peers->session_count + 1);
+	return share < AHEAD ? share : AHEAD;
+}
+
+static size_t chunk_size(const struct session *p)
+{
+	size_t n = ahead(p);
+	return n < CHUNK_LEAST ? CHUNK_LEAST : n < CHUNK_MOST ? n : CHUNK_MOST;
+}
 
 static void send_job_info(struct session *p, uint64_t id)
 {
@@ -39,12 +53,13 @@ static void send_piece(struct session *p, const struct worker_request *a, const 
 	struct error e;
 	struct blob_hash h = a->hash;
 	uint64_t size = 0;
-	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
+	size_t most = chunk_size(p);
+	unsigned char *bytes = mem_alloc(most, 1);
 	ssize_t n = 0;
 	text_copy(e.text, sizeof e.text, refusal);
 	int fd = *refusal ? -1 : blob_open(p->jobs->blobs, &h, &size, &e);
 	if (fd >= 0 && bytes)
-		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
+		n = disk_pread(fd, bytes, most, a->number <= size ? (off_t)a->number : 0);
 	if (fd >= 0 && (!bytes || n < 0 || a->number > size))
 		error_set(&e, EIO, "the blob cannot be read there");
 	conn_send(p->conn,
@@ -72,7 +87,7 @@ static bool answer(struct session *p, const struct worker_request *a)
 
 void worker_requests_take(struct session *p, const struct worker_request *a)
 {
-	if (STAILQ_EMPTY(&p->requests) && conn_unsent(p->conn) <= AHEAD && answer(p, a))
+	if (STAILQ_EMPTY(&p->requests) && conn_unsent(p->conn) <= ahead(p) && answer(p, a))
 		return;
 	struct worker_request *last = p->request_count < REQUESTS_MOST ? mem_alloc(1, sizeof *last) : NULL;
 	if (!last) {
@@ -96,7 +111,7 @@ static void drop_first(struct session *p)
 void worker_requests_go_on(void *session)
 {
 	struct session *p = session;
-	while (!STAILQ_EMPTY(&p->requests) && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD &&
+	while (!STAILQ_EMPTY(&p->requests) && p->state == SESSION_WORKER && conn_unsent(p->conn) <= ahead(p) &&
 	       answer(p, STAILQ_FIRST(&p->requests)))
 		drop_first(p);
 }
