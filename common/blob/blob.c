@@ -10,12 +10,13 @@
  * Failures: a wrong hash or more bytes than announced are -EBADMSG, and the temporary file is removed. A full disk is
  * -ENOSPC, after every blob that is not held has been evicted. blob_check drops a blob whose file is gone or changed.
  */
-#include "common/base/clock.h"
 #include "common/blob/blob.h"
 
+#include "common/base/clock.h"
 #include "common/base/disk.h"
 #include "common/base/list.h"
 #include "common/base/mem.h"
+#include "common/blob/blob_state.h"
 
 #include <fcntl.h>
 #include <openssl/evp.h>
@@ -24,41 +25,21 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { PATH_MOST = 4096 };
-
-struct entry {
-	struct blob_hash hash;
-	uint64_t size, used; /* used: a counter that increases with every use */
-	unsigned holds;
-	double checked; /* when its contents were last verified, in s of a monotonic clock; 0: not since the start */
-	bool given;	/* opened since then */
-	bool gone;	/* or damaged: treated as missing, except for its holds */
-};
-
-struct blob_store {
-	char *folder;
-	uint64_t limit, bytes, clock;
-	uint64_t promised;     /* reserved for open writers */
-	uint64_t temporary;    /* number of the last temporary file */
-	struct entry *entries; /* sorted by hash */
-	size_t count, capacity;
-};
-
 struct blob_writer {
 	struct blob_store *store;
 	struct blob_hash hash;
 	uint64_t size, at;
 	int fd;
-	uint64_t number;      /* of the temporary file */
-	char path[PATH_MOST]; /* the same file's */
+	uint64_t number;	   /* of the temporary file */
+	char path[BLOB_PATH_MOST]; /* the same file's */
 	EVP_MD_CTX *md;
 };
 
 /* ---- the store ---- */
 
-static void path_of(const struct blob_store *s, const char *name, char path[PATH_MOST])
+static void path_of(const struct blob_store *s, const char *name, char path[BLOB_PATH_MOST])
 {
-	snprintf(path, PATH_MOST, "%s/%s", s->folder, name);
+	snprintf(path, BLOB_PATH_MOST, "%s/%s", s->folder, name);
 }
 
 /* The index of the first entry that is not below it. */
@@ -75,16 +56,16 @@ static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
 	return low;
 }
 
-static struct entry *find(struct blob_store *s, const struct blob_hash *h)
+struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h)
 {
 	size_t i = place_of(s, h);
 	return i < s->count && blob_hash_equal(&s->entries[i].hash, h) ? &s->entries[i] : NULL;
 }
 
 /* NULL also if it is missing. */
-static struct entry *find_there(struct blob_store *s, const struct blob_hash *h)
+static struct blob_entry *find_there(struct blob_store *s, const struct blob_hash *h)
 {
-	struct entry *n = find(s, h);
+	struct blob_entry *n = blob_find(s, h);
 	return n && !n->gone ? n : NULL;
 }
 
@@ -93,7 +74,7 @@ static int reserve(struct blob_store *s, size_t count, struct error *e)
 	if (count <= s->capacity)
 		return 0;
 	size_t want = count > 2 * s->capacity ? count : 2 * s->capacity;
-	struct entry *grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
+	struct blob_entry *grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
 	if (!grown)
 		return error_set(e, ENOMEM, "no memory for the list of blobs");
 	s->entries = grown;
@@ -108,12 +89,12 @@ static int add_entry(struct blob_store *s, const struct blob_hash *h, uint64_t s
 		return rc;
 	size_t i = place_of(s, h);
 	memmove(&s->entries[i + 1], &s->entries[i], (s->count++ - i) * sizeof *s->entries);
-	s->entries[i] = (struct entry){.hash = *h, .size = size, .used = ++s->clock, .holds = holds};
+	s->entries[i] = (struct blob_entry){.hash = *h, .size = size, .used = ++s->clock, .holds = holds};
 	s->bytes += size;
 	return 0;
 }
 
-static void remove_entry(struct blob_store *s, struct entry *n)
+static void remove_entry(struct blob_store *s, struct blob_entry *n)
 {
 	s->bytes -= n->size;
 	memmove(n, n + 1, (size_t)(&s->entries[--s->count] - n) * sizeof *n);
@@ -121,7 +102,7 @@ static void remove_entry(struct blob_store *s, struct entry *n)
 
 static int by_hash(const void *a, const void *b)
 {
-	const struct entry *x = a, *y = b;
+	const struct blob_entry *x = a, *y = b;
 	return memcmp(x->hash.bytes, y->hash.bytes, BLOB_HASH_SIZE);
 }
 
@@ -151,7 +132,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 	for (struct dirent *f; !rc && (f = readdir(d));) {
 		struct stat st;
 		struct blob_hash h;
-		char path[PATH_MOST];
+		char path[BLOB_PATH_MOST];
 		path_of(s, f->d_name, path);
 		if (strncmp(f->d_name, "tmp.", 4) == 0)
 			disk_unlink(path);
@@ -177,7 +158,8 @@ static int read_folder(struct blob_store *s, struct error *e)
 	if (!rc)
 		rc = reserve(s, count, e);
 	for (size_t i = 0; !rc && i < count; i++) {
-		s->entries[s->count++] = (struct entry){.hash = all[i].hash, .size = all[i].size, .used = ++s->clock};
+		s->entries[s->count++] =
+			(struct blob_entry){.hash = all[i].hash, .size = all[i].size, .used = ++s->clock};
 		s->bytes += all[i].size;
 	}
 	if (s->count)
@@ -190,14 +172,14 @@ static int read_folder(struct blob_store *s, struct error *e)
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
 	while (s->limit && (need > s->limit || s->bytes + s->promised > s->limit - need)) {
-		struct entry *oldest = NULL;
+		struct blob_entry *oldest = NULL;
 		for (size_t i = 0; i < s->count; i++)
 			if (!s->entries[i].holds && (!oldest || s->entries[i].used < oldest->used))
 				oldest = &s->entries[i];
 		if (!oldest)
 			return error_set(e, EFBIG, "%s: %llu more bytes exceed its limit of %llu, given what is in use",
 					 s->folder, (unsigned long long)need, (unsigned long long)s->limit);
-		char path[PATH_MOST];
+		char path[BLOB_PATH_MOST];
 		blob_path(s, &oldest->hash, path, sizeof path);
 		disk_unlink(path);
 		remove_entry(s, oldest);
@@ -213,7 +195,7 @@ int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit,
 		return error_set(e, ENOMEM, "no memory for a blob store");
 	}
 	s->limit = limit;
-	int rc = strlen(folder) < PATH_MOST - 2 * BLOB_HEX_SIZE
+	int rc = strlen(folder) < BLOB_PATH_MOST - 2 * BLOB_HEX_SIZE
 			 ? disk_make_folder(folder, e)
 			 : error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
 	if (!rc)
@@ -239,12 +221,12 @@ void blob_store_trim(struct blob_store *s)
 	make_room(s, 0, NULL);
 }
 
-static struct entry *touch(struct blob_store *s, const struct blob_hash *h)
+static struct blob_entry *touch(struct blob_store *s, const struct blob_hash *h)
 {
-	struct entry *n = find_there(s, h);
+	struct blob_entry *n = find_there(s, h);
 	if (!n)
 		return NULL;
-	char path[PATH_MOST];
+	char path[BLOB_PATH_MOST];
 	blob_path(s, h, path, sizeof path);
 	n->used = ++s->clock;
 	if (s->limit)
@@ -254,7 +236,7 @@ static struct entry *touch(struct blob_store *s, const struct blob_hash *h)
 
 bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
 {
-	struct entry *n = find_there(s, h);
+	struct blob_entry *n = find_there(s, h);
 	if (n && size)
 		*size = n->size;
 	return n != NULL;
@@ -262,7 +244,7 @@ bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
 
 bool blob_hold(struct blob_store *s, const struct blob_hash *h)
 {
-	struct entry *n = touch(s, h);
+	struct blob_entry *n = touch(s, h);
 	if (n)
 		n->holds++;
 	return n != NULL;
@@ -270,17 +252,17 @@ bool blob_hold(struct blob_store *s, const struct blob_hash *h)
 
 void blob_release(struct blob_store *s, const struct blob_hash *h)
 {
-	struct entry *n = find(s, h);
+	struct blob_entry *n = blob_find(s, h);
 	if (n && n->holds)
 		n->holds--;
 }
 
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e)
 {
-	char path[PATH_MOST], hex[BLOB_HEX_SIZE];
+	char path[BLOB_PATH_MOST], hex[BLOB_HEX_SIZE];
 	blob_path(s, h, path, sizeof path);
 	blob_hex(h, hex);
-	struct entry *n = touch(s, h);
+	struct blob_entry *n = touch(s, h);
 	int fd = n ? disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0) : -1;
 	if (fd < 0)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
@@ -296,160 +278,20 @@ void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path
 	snprintf(path, size, "%s/%s", s->folder, hex);
 }
 
-/* ---- checking ---- */
-
-struct blob_check {
-	struct blob_store *store;
-	struct blob_hash hash;
-	double begun;
-	bool was_given; /* when it began */
-	bool whole;	/* nothing is left to read */
-	int fd, rc;
-	EVP_MD_CTX *md;
-	struct error error;
-};
-
-int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct blob_hash *h, double seconds,
-		     struct error *e)
-{
-	char path[PATH_MOST];
-	struct stat st;
-	struct entry *n = find_there(s, h);
-	blob_path(s, h, path, sizeof path);
-	if (!n)
-		return error_set(e, ENOENT, "there is no %s", path);
-	if (n->checked > 0 && (seconds == BLOB_SINCE_GIVEN ? !n->given : clock_seconds() - n->checked <= seconds) &&
-	    (disk_stat(path, &st) == 0 || errno != ENOENT)) /* a cache can be emptied at any time */
-		return 0;
-	struct blob_check *c = mem_alloc(1, sizeof *c);
-	if (!c)
-		return error_set(e, ENOMEM, "no memory to check %s", path);
-	*c = (struct blob_check){
-		.store = s, .hash = *h, .begun = clock_seconds(), .was_given = n->given, .fd = -1, .rc = 0};
-	n->given = false; /* what is given from now on may be read too late for this check */
-	n->holds++;
-	*out = c;
-	return 1;
-}
-
-/* The store's path does not change: no lock. */
-static int check_open(struct blob_check *c, const char *path)
-{
-	c->fd = disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0);
-	if (c->fd < 0)
-		return error_file(&c->error, errno, path);
-	c->md = EVP_MD_CTX_new();
-	if (!c->md || EVP_DigestInit_ex(c->md, EVP_sha256(), NULL) != 1)
-		return error_set(&c->error, ENOMEM, "no memory to check %s", path);
-	return 0;
-}
-
-static int check_some(struct blob_check *c, const char *path)
-{
-	enum { PIECE = 1 << 18, PIECES = 128 };
-	unsigned char *bytes = mem_alloc(PIECE, 1);
-	if (!bytes)
-		return error_set(&c->error, ENOMEM, "no memory to check %s", path);
-	int rc = 0;
-	for (int i = 0; !rc && !c->whole && i < PIECES; i++) {
-		ssize_t n = disk_read(c->fd, bytes, PIECE);
-		c->whole = n == 0;
-		if (n < 0 && errno != EINTR)
-			rc = error_file(&c->error, errno, path);
-		else if (n > 0 && EVP_DigestUpdate(c->md, bytes, (size_t)n) != 1)
-			rc = error_set(&c->error, EIO, "SHA-256 failed");
-	}
-	mem_free(bytes);
-	return rc;
-}
-
-bool blob_check_read(struct blob_check *c)
-{
-	char path[PATH_MOST];
-	blob_path(c->store, &c->hash, path, sizeof path);
-	if (c->fd < 0)
-		c->rc = check_open(c, path);
-	if (!c->rc)
-		c->rc = check_some(c, path);
-	return !c->rc && !c->whole;
-}
-
-/* What the bytes say: 0, -EBADMSG, -ENOENT: no file, or why they are not known. */
-static int check_result(struct blob_check *c, struct error *e)
-{
-	struct blob_hash got;
-	if (c->rc) {
-		*e = c->error;
-		return c->rc;
-	}
-	if (!c->whole)
-		return error_set(e, ECANCELED, "the check was not finished");
-	if (EVP_DigestFinal_ex(c->md, got.bytes, NULL) != 1)
-		return error_set(e, EIO, "SHA-256 failed");
-	return blob_hash_equal(&got, &c->hash) ? 0 : -EBADMSG;
-}
-
-/* Its contents are wrong, or there is none. */
-static int set_aside(struct blob_store *s, struct entry *n, bool there, struct error *e)
-{
-	char path[PATH_MOST], aside[PATH_MOST + 16], hex[BLOB_HEX_SIZE];
-	blob_hex(&n->hash, hex);
-	blob_path(s, &n->hash, path, sizeof path);
-	snprintf(aside, sizeof aside, "%s/damaged.%s", s->folder, hex);
-	if (!n->gone && there)
-		disk_rename(path, aside);
-	n->gone = true;
-	s->bytes -= n->size;
-	n->size = 0;
-	return error_set(e, EBADMSG, there ? "%s is damaged: its contents do not match its name" : "%s is gone", path);
-}
-
-int blob_check_end(struct blob_check *c, struct error *e)
-{
-	struct error ignored;
-	struct blob_store *s = c->store;
-	struct entry *n = find(s, &c->hash); /* it is held */
-	int rc = check_result(c, e ? e : &ignored);
-	if (n->checked > c->begun) { /* written or checked by another one meanwhile */
-		rc = 0;
-	} else if (rc == -EBADMSG || rc == -ENOENT) {
-		rc = set_aside(s, n, rc == -EBADMSG, e);
-	} else if (rc) {
-		n->given |= c->was_given;
-	} else {
-		n->checked = clock_seconds();
-	}
-	n->holds--;
-	if (c->fd >= 0)
-		disk_close(c->fd);
-	EVP_MD_CTX_free(c->md);
-	mem_free(c);
-	return rc;
-}
-
-int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e)
-{
-	struct blob_check *c;
-	int rc = blob_check_begin(&c, s, h, seconds, e);
-	if (rc <= 0)
-		return rc;
-	while (blob_check_read(c))
-		continue;
-	return blob_check_end(c, e);
-}
+/* ---- expected ones ---- */
 
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e)
 {
 	if (blob_hold(s, h))
 		return 0;
-	struct entry *n = find(s, h);
+	struct blob_entry *n = blob_find(s, h);
 	if (n) {
 		n->holds++;
 		return 0;
 	}
 	int rc = add_entry(s, h, 0, 1, e);
 	if (!rc)
-		find(s, h)->gone = true;
+		blob_find(s, h)->gone = true;
 	return rc;
 }
 
@@ -517,7 +359,7 @@ static int check_written(struct blob_writer *w, struct error *e)
 }
 
 /* Its file is there, and right. */
-static void come_back(struct blob_store *s, struct entry *n, uint64_t size)
+static void come_back(struct blob_store *s, struct blob_entry *n, uint64_t size)
 {
 	n->gone = n->given = false;
 	n->size = size;
@@ -529,7 +371,7 @@ static void come_back(struct blob_store *s, struct entry *n, uint64_t size)
 static int finish(struct blob_writer *w, struct error *e)
 {
 	struct blob_store *s = w->store;
-	char path[PATH_MOST];
+	char path[BLOB_PATH_MOST];
 	int rc = check_written(w, e);
 	if (rc)
 		return rc;
@@ -544,7 +386,7 @@ static int finish(struct blob_writer *w, struct error *e)
 	if (!rc)
 		rc = blob_expect(s, &w->hash, e);
 	if (!rc)
-		come_back(s, find(s, &w->hash), w->size);
+		come_back(s, blob_find(s, &w->hash), w->size);
 	return rc;
 }
 
@@ -602,7 +444,7 @@ int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error 
 
 void blob_enter(struct blob_store *s, const struct blob_kept *kept)
 {
-	struct entry *n = find(s, &kept->hash);
+	struct blob_entry *n = blob_find(s, &kept->hash);
 	if (n->gone)
 		come_back(s, n, kept->size);
 }
@@ -611,7 +453,7 @@ void blob_let_go(struct blob_store *s, const struct blob_kept *kept)
 {
 	s->promised -= kept->size;
 	blob_release(s, &kept->hash);
-	struct entry *n = find(s, &kept->hash);
+	struct blob_entry *n = blob_find(s, &kept->hash);
 	if (n->gone && !n->holds)
 		remove_entry(s, n);
 }

@@ -15,6 +15,7 @@
 #include <stdint.h>
 
 struct blob_store;
+struct blob_entry;
 
 /* Creates the folder if necessary and removes temporary files of earlier runs. limit: bytes; 0: none. Existing blobs
  * are kept for now. */
@@ -28,25 +29,14 @@ bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size); 
 bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
 
-/* Verifies the file's contents, unless that was done within the last so many seconds or (BLOB_SINCE_GIVEN) since it
- * was last opened, and it is still there: about a second per gigabyte. -EBADMSG: the contents are wrong or the file is
- * missing; it is kept as damaged.NAME, and the blob counts as missing until it is written again, while holds remain.
- * -ENOENT: not in the store. Any other error: it cannot be read at the moment. */
-enum { BLOB_SINCE_GIVEN = -1 };
-int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e);
-/* The same in parts, for a store whose thread must not wait for the disk: begin (1: begun; 0 or an error: the answer),
- * read on any thread while it says that there is more, some megabytes each time, and end, which frees it. The blob is
- * held meanwhile. Ended early: -ECANCELED, and nothing is known. */
-struct blob_check;
-int blob_check_begin(struct blob_check **c, struct blob_store *s, const struct blob_hash *h, double seconds,
-		     struct error *e);
-bool blob_check_read(struct blob_check *c);
-int blob_check_end(struct blob_check *c, struct error *e);
 /* Holds a blob, present or not: one that is written later is held from the start. -ENOMEM */
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e);
 
 /* A file descriptor to read from, or -ENOENT. The caller closes it. */
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e);
+
+/* Its entry, there or not; NULL: none. For blob_check.c. */
+struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h);
 
 /* The path of a held blob, for callers that map it. */
 void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size);

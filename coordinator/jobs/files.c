@@ -12,6 +12,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/blob/blob_check.h"
 #include "coordinator/jobs/step.h"
 
 #include <string.h>

@@ -7,6 +7,7 @@
 #ifndef WORKER_DAEMON_JOB_CACHE_H
 #define WORKER_DAEMON_JOB_CACHE_H
 
+#include "common/blob/blob_check.h"
 #include "common/wire/plan_wire.h"
 #include "worker/daemon/cache.h"
 #include "worker/daemon/thread_pool.h"

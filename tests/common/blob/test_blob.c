@@ -2,6 +2,7 @@
 /* The store keeps what it was given under its true name, refuses what is not it, and forgets the oldest first. */
 #include "common/base/disk.h"
 #include "common/blob/blob_batch.h"
+#include "common/blob/blob_check.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>

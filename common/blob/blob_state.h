@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A store's state: blob.c has the folder and writing, blob_check.c reads what is there. */
+#ifndef COMMON_BLOB_BLOB_STATE_H
+#define COMMON_BLOB_BLOB_STATE_H
+
+#include "common/blob/blob_hash.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { BLOB_PATH_MOST = 4096 };
+
+struct blob_entry {
+	struct blob_hash hash;
+	uint64_t size, used; /* used: a counter that increases with every use */
+	unsigned holds;
+	double checked; /* when its contents were last verified, in s of a monotonic clock; 0: not since the start */
+	bool given;	/* opened since then */
+	bool gone;	/* or damaged: treated as missing, except for its holds */
+};
+
+struct blob_store {
+	char *folder;
+	uint64_t limit, bytes, clock;
+	uint64_t promised;	    /* reserved for open writers */
+	uint64_t temporary;	    /* number of the last temporary file */
+	struct blob_entry *entries; /* sorted by hash */
+	size_t count, capacity;
+};
+
+#endif
