@@ -37,6 +37,14 @@ static uint64_t system_capacity(const char *path)
 	return statvfs(path, &st) || __builtin_mul_overflow((uint64_t)st.f_blocks, st.f_frsize, &bytes) ? 0 : bytes;
 }
 
+static uint64_t system_available(const char *path)
+{
+	struct statvfs st;
+	uint64_t bytes;
+	return statvfs(path, &st) || __builtin_mul_overflow((uint64_t)st.f_bavail, st.f_frsize, &bytes) ? UINT64_MAX
+													: bytes;
+}
+
 const struct disk disk_system = {
 	.open = system_open,
 	.close = close,
@@ -59,6 +67,7 @@ const struct disk disk_system = {
 	.flock = flock,
 	.opendir = opendir,
 	.capacity = system_capacity,
+	.available = system_available,
 };
 const struct disk *disk_calls = &disk_system;
 

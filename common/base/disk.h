@@ -22,28 +22,30 @@
 #include <sys/uio.h>
 
 /* X(result, NAME, parameters, arguments): disk_NAME calls the table's function. */
-#define DISK_CALLS(X)                                                                                         \
-	X(int, open, (const char *path, int flags, mode_t mode), (path, flags, mode))                         \
-	X(int, close, (int fd), (fd))                                                                         \
-	X(ssize_t, read, (int fd, void *bytes, size_t size), (fd, bytes, size))                               \
-	X(ssize_t, pread, (int fd, void *bytes, size_t size, off_t at), (fd, bytes, size, at))                \
-	X(ssize_t, write, (int fd, const void *bytes, size_t size), (fd, bytes, size))                        \
-	X(ssize_t, pwritev, (int fd, const struct iovec *parts, int count, off_t at), (fd, parts, count, at)) \
-	X(int, ftruncate, (int fd, off_t size), (fd, size))                                                   \
-	X(int, fallocate, (int fd, int mode, off_t at, off_t size), (fd, mode, at, size))                     \
-	X(int, posix_fallocate, (int fd, off_t at, off_t size), (fd, at, size)) /* returns the error code */  \
-	X(int, fsync, (int fd), (fd))                                                                         \
-	X(int, fdatasync, (int fd), (fd))                                                                     \
-	X(int, rename, (const char *from, const char *to), (from, to))                                        \
-	X(int, unlink, (const char *path), (path))                                                            \
-	X(int, mkdir, (const char *path, mode_t mode), (path, mode))                                          \
-	X(int, rmdir, (const char *path), (path))                                                             \
-	X(int, stat, (const char *path, struct stat *st), (path, st)) /* of the link itself */                \
-	X(int, fstat, (int fd, struct stat *st), (fd, st))                                                    \
-	X(int, touch, (const char *path), (path))                                                             \
-	X(int, flock, (int fd, int what), (fd, what))                                                         \
-	X(DIR *, opendir, (const char *path), (path))                                                         \
-	X(uint64_t, capacity, (const char *path), (path)) /* bytes of its file system, used or not; 0: not known */
+#define DISK_CALLS(X)                                                                                               \
+	X(int, open, (const char *path, int flags, mode_t mode), (path, flags, mode))                               \
+	X(int, close, (int fd), (fd))                                                                               \
+	X(ssize_t, read, (int fd, void *bytes, size_t size), (fd, bytes, size))                                     \
+	X(ssize_t, pread, (int fd, void *bytes, size_t size, off_t at), (fd, bytes, size, at))                      \
+	X(ssize_t, write, (int fd, const void *bytes, size_t size), (fd, bytes, size))                              \
+	X(ssize_t, pwritev, (int fd, const struct iovec *parts, int count, off_t at), (fd, parts, count, at))       \
+	X(int, ftruncate, (int fd, off_t size), (fd, size))                                                         \
+	X(int, fallocate, (int fd, int mode, off_t at, off_t size), (fd, mode, at, size))                           \
+	X(int, posix_fallocate, (int fd, off_t at, off_t size), (fd, at, size)) /* returns the error code */        \
+	X(int, fsync, (int fd), (fd))                                                                               \
+	X(int, fdatasync, (int fd), (fd))                                                                           \
+	X(int, rename, (const char *from, const char *to), (from, to))                                              \
+	X(int, unlink, (const char *path), (path))                                                                  \
+	X(int, mkdir, (const char *path, mode_t mode), (path, mode))                                                \
+	X(int, rmdir, (const char *path), (path))                                                                   \
+	X(int, stat, (const char *path, struct stat *st), (path, st)) /* of the link itself */                      \
+	X(int, fstat, (int fd, struct stat *st), (fd, st))                                                          \
+	X(int, touch, (const char *path), (path))                                                                   \
+	X(int, flock, (int fd, int what), (fd, what))                                                               \
+	X(DIR *, opendir, (const char *path), (path))                                                               \
+	X(uint64_t, capacity, (const char *path), (path)) /* bytes of its file system, used or not; 0: not known */ \
+	X(uint64_t, available, (const char *path),                                                                  \
+	  (path)) /* bytes of it that may still be written; UINT64_MAX: not known */
 
 #define DISK_MEMBER(result, name, parameters, arguments) result(*name) parameters;
 struct disk {

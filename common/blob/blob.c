@@ -168,22 +168,28 @@ static int read_folder(struct blob_store *s, struct error *e)
 	return rc;
 }
 
-/* Evicts blobs that are not held until `need` more bytes fit. */
+bool blob_store_evict(struct blob_store *s)
+{
+	struct blob_entry *oldest = NULL;
+	char path[BLOB_PATH_MOST];
+	for (size_t i = 0; i < s->count; i++)
+		if (!s->entries[i].holds && (!oldest || s->entries[i].used < oldest->used))
+			oldest = &s->entries[i];
+	if (!oldest)
+		return false;
+	blob_path(s, &oldest->hash, path, sizeof path);
+	disk_unlink(path);
+	remove_entry(s, oldest);
+	return true;
+}
+
+/* Evicts blobs until `need` more bytes fit into the limit. */
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
-	while (s->limit && (need > s->limit || s->bytes + s->promised > s->limit - need)) {
-		struct blob_entry *oldest = NULL;
-		for (size_t i = 0; i < s->count; i++)
-			if (!s->entries[i].holds && (!oldest || s->entries[i].used < oldest->used))
-				oldest = &s->entries[i];
-		if (!oldest)
+	while (s->limit && (need > s->limit || s->bytes + s->promised > s->limit - need))
+		if (!blob_store_evict(s))
 			return error_set(e, EFBIG, "%s: %llu more bytes exceed its limit of %llu, given what is in use",
 					 s->folder, (unsigned long long)need, (unsigned long long)s->limit);
-		char path[BLOB_PATH_MOST];
-		blob_path(s, &oldest->hash, path, sizeof path);
-		disk_unlink(path);
-		remove_entry(s, oldest);
-	}
 	return 0;
 }
 
@@ -336,10 +342,17 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 		return error_set(e, EFBIG, "more bytes than were announced");
 	if (EVP_DigestUpdate(w->md, bytes, size) != 1)
 		return error_set(e, EIO, "SHA-256 failed");
-	int rc = disk_write_all(w->fd, bytes, size);
-	if (rc)
-		return error_file(e, -rc, w->store->folder);
-	w->at += size;
+	while (size) {
+		struct iovec part = {(void *)(uintptr_t)bytes, size};
+		ssize_t n = disk_pwritev(w->fd, &part, 1, (off_t)w->at);
+		if (n < 0 && (errno == EINTR || (errno == ENOSPC && w->store->limit && blob_store_evict(w->store))))
+			continue;
+		if (n < 0)
+			return error_file(e, errno, w->store->folder);
+		w->at += (uint64_t)n;
+		bytes = (const char *)bytes + n;
+		size -= (size_t)n;
+	}
 	return 0;
 }
 

@@ -21,6 +21,8 @@ struct blob_entry;
  * are kept for now. */
 int blob_store_open(struct blob_store **s, const char *folder, uint64_t limit, struct error *e);
 void blob_store_close(struct blob_store *s);
+/* Evicts the least recently used blob that is not held, to make room on the disk; false: there is none. */
+bool blob_store_evict(struct blob_store *s);
 /* Evicts what exceeds the limit. Call once everything needed is held. */
 void blob_store_trim(struct blob_store *s);
 

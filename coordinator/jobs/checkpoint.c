@@ -2,10 +2,10 @@
 /*
  * Checkpoints: films, seeds, chain states and counters of a job in one file, so that its journal can start over.
  *
- * checkpoint_where_due starts one when a job's journal has grown beyond the last checkpoint or a minimum, one job at a
- * time. The thread pool writes the next journal (with the last results of each group and part, which may still be taken
- * back), then checkpoint.tmp, syncs it, renames it to checkpoint and syncs the folder. Results that arrive meanwhile
- * wait in memory. Then the new journal is used and older ones are deleted.
+ * checkpoint_where_due starts one when a job's journal has grown beyond the last checkpoint or a minimum (room.h), one
+ * job at a time. The thread pool writes the next journal (with the last results of each group and part, which may still
+ * be taken back), then checkpoint.tmp, syncs it, renames it to checkpoint and syncs the folder. Results that arrive
+ * meanwhile wait in memory. Then the new journal is used and older ones are deleted.
  *
  * If writing fails, the old checkpoint and journal stay in use, and another attempt follows after a pause. If only the
  * sync of the folder fails, it is unknown which of the two pairs a crash would leave; both contain everything
@@ -19,6 +19,7 @@
 #include "coordinator/job/back.h"
 #include "coordinator/job/checkpoint_file.h"
 #include "coordinator/jobs/durable.h"
+#include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/store/journal_file.h"
 
@@ -129,7 +130,8 @@ static void checkpoint_written(uv_work_t *work, int status)
 		job->checkpoint_after = jobs_now(jobs) + jobs->config.retry_seconds;
 	} else if (w->rc) { /* the old pair stays in use */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-		job->checkpoint_after = jobs_now(jobs) + pause_seconds;
+		bool room = w->rc == -ENOSPC && room_make(jobs);
+		job->checkpoint_after = jobs_now(jobs) + (room ? jobs->config.retry_seconds : pause_seconds);
 		journal_clear(w->folder, journal_generation(job->journal));
 	} else {
 		job->unsure = false;
@@ -159,13 +161,8 @@ static void checkpoint_written(uv_work_t *work, int status)
 	mem_free(w);
 }
 
-/* Of a journal. */
-static uint64_t limit_of(const struct jobs *jobs, const struct live_job *job)
-{
-	return job->checkpoint_bytes > jobs->config.journal_bytes ? job->checkpoint_bytes : jobs->config.journal_bytes;
-}
-
-static void start(struct jobs *jobs, struct live_job *job)
+/* most: as room_for_journal. */
+static void start(struct jobs *jobs, struct live_job *job, uint64_t most)
 {
 	struct job_status status;
 	struct writing *w = mem_alloc(1, sizeof *w);
@@ -176,7 +173,7 @@ static void start(struct jobs *jobs, struct live_job *job)
 	}
 	w->jobs = jobs;
 	w->job = job;
-	w->kept_most = limit_of(jobs, job);
+	w->kept_most = most;
 	spool_job_path(jobs->spool, job->id, NULL, w->folder);
 	checkpoint_head_of(&w->head, job, &status);
 	job->busy = jobs->checkpointing = true;
@@ -188,16 +185,17 @@ void checkpoint_where_due(struct jobs *jobs)
 	if (jobs->stepping || jobs->stopping ||
 	    jobs->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
+	const bool ample = room_is_ample(jobs);
 	for (struct live_job *job = jobs->live; job; job = job->next) {
 		if (!job->canvas || job->busy || job->ended ||
 		    job->late_count) /* stored results that wait are only in the journal */
 			continue;
 		if (canvas_missing(job->canvas)) /* a taken-back batch is being computed again */
 			continue;
-		uint64_t limit = limit_of(jobs, job);
+		uint64_t limit = room_for_journal(jobs, job, ample);
 		if ((journal_bytes(job->journal) - job->kept_bytes > limit || job->unsure) &&
 		    jobs_now(jobs) >= job->checkpoint_after)
-			start(jobs, job);
+			start(jobs, job, limit);
 		if (jobs->checkpointing)
 			return;
 	}

@@ -20,6 +20,7 @@
 #include "common/wire/frame.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/stored.h"
+#include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/retention/keep.h"
 
@@ -222,11 +223,13 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 		return rc;
 	size_t size = in->frame_size + in->payload->size;
 	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
-	rc = journal_reserve(job->journal, size + PINNED_ROOM, e);
-	if (rc == -ENOSPC && keep_drop_all(jobs))
-		rc = journal_reserve(job->journal, size + PINNED_ROOM, e);
-	if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
-		rc = canvas_reserve(job->canvas, in->batch, e);
+	do {
+		rc = room_is_left(jobs, job, size)
+			     ? journal_reserve(job->journal, size + PINNED_ROOM, e)
+			     : error_set(e, ENOSPC, "what the disk has left is for a checkpoint of its results");
+		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
+			rc = canvas_reserve(job->canvas, in->batch, e);
+	} while (rc == -ENOSPC && room_make(jobs));
 	if (!rc)
 		return 0;
 	job->held_bytes = size;

@@ -7,6 +7,7 @@
 #include "common/estimate/stated_error.h"
 #include "common/exr/image_file.h"
 #include "coordinator/jobs/durable.h"
+#include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 
 #include <assert.h>
@@ -125,6 +126,8 @@ static void cannot_write(struct publishing *w)
 	struct live_job *job = w->job;
 	job->unpublished = true;
 	job->unpublished_rounds = w->rounds;
+	if (w->rc == -ENOSPC)
+		room_make(w->jobs);
 	job->try_again = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
 	if (strcmp(job->record.why, w->error.text) != 0)
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",

@@ -199,10 +199,16 @@ static uint64_t do_capacity(const char *path)
 	return 0;
 }
 
+static uint64_t do_available(const char *path)
+{
+	(void)path;
+	return UINT64_MAX;
+}
+
 const struct disk faulty_disk_calls = {
 	do_open,     do_close,	   do_read,	 do_pread,	     do_write,
 	do_pwritev,  do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
 	do_fsync,    do_rename,	   do_unlink,	 do_mkdir,	     do_rmdir,
 	do_stat,     do_fstat,	   do_touch,	 do_flock,	     do_opendir,
-	do_capacity,
+	do_capacity, do_available,
 };
