@@ -329,12 +329,13 @@ static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_
 	return rc;
 }
 
-static int write_all(int fd, const unsigned char *bytes, size_t size, struct error *e)
+/* path: what it is called in a message. */
+static int write_all(int fd, const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
 	while (size) {
 		ssize_t n = write(fd, bytes, size);
 		if (n < 0 && errno != EINTR)
-			return error_set(e, EIO, "cannot write: %s", strerror(errno));
+			return error_set(e, EIO, "%s: %s", path, strerror(errno));
 		if (n > 0) {
 			bytes += n;
 			size -= (size_t)n;
@@ -344,10 +345,10 @@ static int write_all(int fd, const unsigned char *bytes, size_t size, struct err
 }
 
 static int fetch_rest(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
-		      struct error *e)
+		      const char *path, struct error *e)
 {
 	uint64_t size = first->envelope.message->fetch_chunk->size, at = first->payload.size;
-	int rc = write_all(fd, first->payload.bytes, first->payload.size, e);
+	int rc = write_all(fd, path, first->payload.bytes, first->payload.size, e);
 	while (!rc && at < size) {
 		struct client_message more;
 		rc = fetch_chunk(cl, job, what, at, &more, e);
@@ -356,7 +357,7 @@ static int fetch_rest(struct client *cl, struct client_message *first, uint64_t 
 		if (more.envelope.message->fetch_chunk->size != size)
 			rc = error_set(e, EIO, "the file changed while it was fetched");
 		if (!rc)
-			rc = write_all(fd, more.payload.bytes, more.payload.size, e);
+			rc = write_all(fd, path, more.payload.bytes, more.payload.size, e);
 		at += more.payload.size;
 		client_message_fini(&more);
 	}
@@ -369,7 +370,7 @@ int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd
 	int rc = fetch_chunk(cl, job, what, 0, &first, e);
 	if (rc)
 		return rc;
-	rc = fetch_rest(cl, &first, job, what, fd, e);
+	rc = fetch_rest(cl, &first, job, what, fd, "stdout", e);
 	client_message_fini(&first);
 	return rc;
 }
@@ -402,13 +403,13 @@ static int give_name(const char *temporary, const char *path, bool replace, stru
 	return error_set(e, errno == EEXIST ? EEXIST : EIO, "%s: %s", path, strerror(errno));
 }
 
-static int copy(int from, int to, struct error *e)
+static int copy(int from, int to, const char *path, struct error *e)
 {
 	unsigned char piece[1 << 16];
 	ssize_t n = lseek(from, 0, SEEK_SET);
 	int rc = 0;
 	while (!rc && n >= 0 && (n = read(from, piece, sizeof piece)) > 0)
-		rc = write_all(to, piece, (size_t)n, e);
+		rc = write_all(to, path, piece, (size_t)n, e);
 	return n < 0 ? error_set(e, EIO, "a temporary file: %s", strerror(errno)) : rc;
 }
 
@@ -419,12 +420,12 @@ static int fetch_through(struct client *cl, struct client_message *first, uint64
 	FILE *whole = tmpfile();
 	if (!whole)
 		return error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
-	int rc = fetch_rest(cl, first, job, what, fileno(whole), e);
+	int rc = fetch_rest(cl, first, job, what, fileno(whole), "a temporary file", e);
 	int fd = rc ? -1 : target_open(t, e);
 	if (!rc && fd < 0)
 		rc = client_local(fd);
 	if (!rc)
-		rc = copy(fileno(whole), fd, e);
+		rc = copy(fileno(whole), fd, t->path, e);
 	if (fd >= 0 && close(fd) && !rc)
 		rc = error_set(e, EIO, "%s: %s", t->path, strerror(errno));
 	fclose(whole);
@@ -450,7 +451,7 @@ static int fetch_file(struct client *cl, struct client_message *first, uint64_t 
 		return error_set(e, EIO, "%s: cannot make a file there: %s", path, strerror(errno));
 	mode_t mask = umask(0);
 	umask(mask);
-	int rc = fetch_rest(cl, first, job, what, fd, e);
+	int rc = fetch_rest(cl, first, job, what, fd, path, e);
 	if (!rc && (fchmod(fd, 0666 & ~mask) || fsync(fd)))
 		rc = error_set(e, EIO, "%s: %s", path, strerror(errno));
 	if (close(fd) && !rc)

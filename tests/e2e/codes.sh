@@ -156,4 +156,10 @@ submit "$BOX" -o "$DIR/after.exr" --integrator path --spp 4 --wait >"$DIR/id" ||
 untold 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/untold.exr" --integrator path --spp 4
 grep -q "the job's id is j8" "$DIR/err.log" || fail "it does not say which job it is: $(cat "$DIR/err.log")"
 until_true 20 is_state j8 done || fail "j8 is $(value j8 state)"
+# An image that cannot be written is not lost.
+code 1 "$BIN/hslt-submit" "$BOX" -o /dev/full --integrator path --spp 1 --wait
+id=$(cat "$DIR/out")
+grep -q "/dev/full: No space left on device. The image stays on the farm: hslt-job fetch $id -o FILE" "$DIR/err.log" ||
+	fail "a full disk: $(tail -n 1 "$DIR/err.log")"
+code 0 "$BIN/hslt-job" fetch "$id" -o "$DIR/later.exr"
 echo "exit codes and restart"

@@ -60,5 +60,10 @@ int reconnect_job(struct client **cl, const struct reconnect *o, const struct su
 		if (rc)
 			break;
 	}
+	if (rc && end->has_result) {
+		struct error why = *e;
+		rc = error_set(e, -rc, "%s. The image stays on the farm: hslt-job fetch j%llu -o FILE", why.text,
+			       (unsigned long long)job->job);
+	}
 	return rc;
 }
