@@ -320,6 +320,8 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	w->number = ++s->temporary;
 	blob_temporary_path(s, w->number, w->path, sizeof w->path);
 	w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+	if (w->fd < 0 && errno == ENOENT && disk_make_folder(s->folder, e) == 0) /* somebody removed it */
+		w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	if (w->fd < 0)
 		rc = error_file(e, errno, s->folder);
 	else if (!w->md || EVP_DigestInit_ex(w->md, EVP_sha256(), NULL) != 1)

@@ -295,6 +295,28 @@ static void damaged_at_rest(void **state)
 	blob_store_close(s);
 }
 
+/* It is made again; what was in it is missed when it is looked for. */
+static void a_folder_that_is_removed(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct error e;
+	char inside[300], path[4096];
+	uint64_t size;
+	snprintf(inside, sizeof inside, "%s/inside", folder);
+	assert_int_equal(blob_store_open(&s, inside, 1000, &e), 0);
+	struct blob_hash h = store_text(s, "lost");
+	blob_path(s, &h, path, sizeof path);
+	assert_int_equal(unlink(path), 0);
+	assert_int_equal(rmdir(inside), 0);
+	struct blob_hash other = store_text(s, "stored after that");
+	assert_true(blob_has(s, &other, &size) && size == 17);
+	assert_int_equal(blob_check(s, &h, 1000, &e), -EBADMSG);
+	store_text(s, "lost");
+	assert_int_equal(blob_check(s, &h, 0, &e), 0);
+	blob_store_close(s);
+}
+
 /* A check in parts: what happens to the blob in between. */
 static void checked_in_parts(void **state)
 {
@@ -428,6 +450,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(room_is_promised_once, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(held_before_it_is_trimmed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(damaged_at_rest, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_folder_that_is_removed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(flushed_together, folder_set_up, folder_tear_down),
