@@ -526,7 +526,8 @@ int main(int argc, char **argv)
 		return EXIT_UNREACHABLE;
 	}
 	static const char subscribe[] = "{\"subscribe\":[\"snapshot\"]}\n";
-	if (a.watch && write(fileno(f), subscribe, sizeof subscribe - 1) < 0) {
+	/* It may have hung up already: what it said before is still there to be read. */
+	if (a.watch && send(fileno(f), subscribe, sizeof subscribe - 1, MSG_NOSIGNAL) < 0 && errno != EPIPE) {
 		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
 		fclose(f);
 		return EXIT_UNREACHABLE;

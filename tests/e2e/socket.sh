@@ -84,6 +84,25 @@ time.sleep(600)' "$AT" &
 	grep -q "64 others are connected" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
 	kill $crowd
 	wait $crowd 2>/dev/null || :
+	# One that is told so and hung up on before it has asked for changes: it was ended by a signal, and said nothing.
+	"${PYTHON:-python3}" -c '
+import socket, sys
+s = socket.socket(socket.AF_UNIX)
+s.bind(sys.argv[1] + ".deaf")
+s.listen(200)
+while True:
+    c = s.accept()[0]
+    c.sendall(b"{\"type\":\"error\",\"text\":\"not now\"}\n")
+    c.close()' "$AT" &
+	deaf=$!
+	PIDS="$PIDS $deaf"
+	until_true 10 test -S "$AT.deaf" || fail "nobody listens"
+	for k in $(seq 100); do
+		code 75 "$BIN/hslt-status" --socket "$AT.deaf" --watch
+		grep -q "not now" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
+	done
+	kill $deaf
+	wait $deaf 2>/dev/null || :
 	until_true 10 answers 2>"$DIR/err.log" || fail "no answer when they have gone"
 	AT=$DIR/busy
 	"${PYTHON:-python3}" -c '
