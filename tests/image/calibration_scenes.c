@@ -34,6 +34,18 @@
 	WALL("<scale x='0.28' y='0.3'/><translate z='-1'/><rotate y='1' angle='" degrees "'/>", \
 	     "<translate y='-0.7'/>", METAL("0.05"))
 #define WARM GREY("0.5,0.45,0.35")
+/* clang-format off */
+#define SCATTERS "<integrator type='volpath'><integer name='max_depth' value='12'/></integrator>"
+#define MEDIUM(id, sigma_t, albedo, g)                                                                                           \
+	"<medium type='homogeneous' id='" id "'><rgb name='sigma_t' value='" sigma_t "'/><rgb name='albedo' value='" albedo        \
+	"'/><phase type='hg'><float name='g' value='" g "'/></phase></medium>"
+#define VIEW_IN(medium)                                                                                                          \
+	"<sensor type='perspective'><float name='fov' value='50'/><transform name='to_world'>"                                     \
+	"<lookat origin='0,0.2,1.8' target='0,-0.3,-1' up='0,1,0'/></transform><ref id='" medium "'/>"                             \
+	"<film type='hdrfilm'><rfilter type='box'/></film></sensor>"
+/* clang-format on */
+#define HOLDS(id) "<ref name='interior' id='" id "'/>"
+#define FLOOR WALL("<scale value='8'/><rotate x='1' angle='-90'/>", "<translate y='-1'/>", GREY("0.4,0.4,0.4"))
 
 /* Of the three kinds by turns, so that a run that is ended has some of each. */
 const struct calibration_scene calibration_scenes[] = {
@@ -79,6 +91,18 @@ const struct calibration_scene calibration_scenes[] = {
 		 SPHERE("0.4,-0.8,-0.3", "0.7", GLASS) SPHERE("-0.9,-1.2,-0.2", "0.5", METAL("0.1")),
 	 "bdpt", 40},
 	{"tree", "frosted", "displaced", "frosted.xml", NULL, "hslt", 40},
+	{"tree", "smoke", "smoke", "scene.xml", NULL, "bdpt", 60},
+	{"made", "fog", NULL, NULL,
+	 SCATTERS MEDIUM("fog", "0.35,0.35,0.35", "0.9,0.9,0.9", "0.5") VIEW_IN("fog") BOX(WARM HOLDS("fog"))
+		 CEILING("0.3", "30,26,20") SPHERE("0.4,-1.2,-0.6", "0.7", GREY("0.2,0.5,0.7"))
+			 SPHERE("-0.9,-1.4,-0.2", "0.5", METAL("0.15")),
+	 "bdpt", 60},
+	{"made", "milk in glass", NULL, NULL,
+	 SCATTERS SENSOR("0,1,4", "0,-0.2,0") MEDIUM("milk", "6,7,9", "0.99,0.98,0.95", "0")
+		 SPHERE("-0.75,-0.3,0", "0.7", GLASS HOLDS("milk"))
+			 SPHERE("0.85,-0.3,0.2", "0.7", CLOUDY("0.15") HOLDS("milk"))
+				 FLOOR SPHERE("1,3,1.5", "0.15", SHINES("300,280,240")),
+	 "hslt", 60},
 	{"public", "veach-door", "veach-door", "scene.xml", NULL, "bdpt", 40},
 	{NULL, NULL, NULL, NULL, NULL, NULL, 0},
 };
