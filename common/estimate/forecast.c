@@ -29,7 +29,6 @@ static const double memory = 2,
 		    memory_sd = 0.8;	/* e-folds of work over which a trend decays; the spread of its logarithm */
 static const double drift = 0.08;	/* unforeseen change per e-fold of work */
 static const double price_floor = 0.03; /* relative spread of the time per sample between stretches of time */
-static const double margin_least = 1e-3, margin_prior = 0.08, margin_steepest = -0.5; /* like an error */
 static const double log_four = 1.3862943611198906;
 
 /* ---- looks */
@@ -102,8 +101,7 @@ struct fit {
 	double spread, shift;		   /* of one look's logarithm around the fit: standard deviation, mean */
 	double seen;			   /* e-folds of work covered by the looks: the trend is extrapolated as far */
 	double now;			   /* the last look's deviation in spreads */
-	double margin, margin_sd;	   /* log of upper end over estimate, at the last look; spread */
-	double margin_power;		   /* of work, which it grows with */
+	double margin, margin_sd;	   /* log of upper end over estimate */
 	double cpu, cpu_sd, wall, wall_sd; /* seconds a sample; relative spread */
 };
 
@@ -163,29 +161,14 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 	f->correlation = -q.lt / sqrt(q.ll * q.tt);
 }
 
-static double margin_of(const struct forecast_look *l)
-{
-	return log(l->rel_mse_upper / l->rel_mse);
-}
-
-/* A power of work, since the interval is wide as long as the brightness of pixels is little known, too. The power is
- * drawn towards 0 by so much that two looks, at a work and its double, count for three quarters. */
 static void fit_margin(struct fit *f, const struct forecast_history *h, uint32_t first)
 {
-	double n = (double)(h->count - first), t = 0, y = 0, tt = 0, ty = 0, square = 0;
+	double sum = 0, square = 0, n = (double)(h->count - first);
+	for (uint32_t i = first; i < h->count; i++)
+		sum += log(h->looks[i].rel_mse_upper / h->looks[i].rel_mse);
+	f->margin = sum / n;
 	for (uint32_t i = first; i < h->count; i++) {
-		t += log(h->looks[i].work / f->work) / n;
-		y += log(fmax(margin_of(&h->looks[i]), margin_least)) / n;
-	}
-	for (uint32_t i = first; i < h->count; i++) {
-		double d = log(h->looks[i].work / f->work) - t;
-		tt += d * d;
-		ty += d * (log(fmax(margin_of(&h->looks[i]), margin_least)) - y);
-	}
-	f->margin_power = fmin(0, fmax(margin_steepest, ty / (tt + margin_prior)));
-	f->margin = exp(y - f->margin_power * t);
-	for (uint32_t i = first; i < h->count; i++) {
-		double d = margin_of(&h->looks[i]) - f->margin * pow(h->looks[i].work / f->work, f->margin_power);
+		double d = log(h->looks[i].rel_mse_upper / h->looks[i].rel_mse) - f->margin;
 		square += d * d;
 	}
 	f->margin_sd = n > 1 ? sqrt(square / (n - 1)) : f->margin / 2;
@@ -253,8 +236,7 @@ static double normal(struct dice *d)
 }
 
 struct play { /* one possible state of affairs */
-	double level, trend, memory, drift, now, cpu, wall;
-	double margin; /* beyond that of the fit */
+	double level, trend, memory, drift, margin, now, cpu, wall;
 };
 
 static struct play play_of(const struct fit *f, struct dice *d)
@@ -264,15 +246,9 @@ static struct play play_of(const struct fit *f, struct dice *d)
 	double level =
 		f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
 	double now = f->now + (f->level - level) / f->spread;
-	double margin = f->margin_sd * normal(d);
-	return (struct play){level,
-			     trend,
-			     memory * exp(memory_sd * normal(d)),
-			     drift * normal(d),
-			     now,
-			     f->cpu * exp(f->cpu_sd * normal(d)),
-			     f->wall * exp(f->wall_sd * normal(d)),
-			     margin};
+	double margin = fmax(0, f->margin + f->margin_sd * normal(d));
+	return (struct play){level,  trend, memory * exp(memory_sd * normal(d)), drift * normal(d),
+			     margin, now,   f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
 }
 
 /* How much log(relMSE x work) changes over t e-folds of work. */
@@ -289,12 +265,6 @@ static double expected(const struct fit *f, const struct play *y, double work)
 	return y->level + change(f, y, log(work / f->work)) - log(work);
 }
 
-/* The logarithm of upper end over estimate at some work. */
-static double margin_at(const struct fit *f, const struct play *y, double work)
-{
-	return fmax(0, f->margin * exp(f->margin_power * fmax(-f->seen, log(work / f->work))) + y->margin);
-}
-
 /* The number of rounds at which it stops. */
 static double play_target(const struct fit *f, const struct play *y, const struct plan *p, double target,
 			  enum forecast_run run, struct dice *d)
@@ -307,7 +277,7 @@ static double play_target(const struct fit *f, const struct play *y, const struc
 		double work = (double)rounds * round, r = before / work;
 		deviation = r * deviation + sqrt(fmax(0, 1 - r * r)) * normal(d);
 		before = work;
-		double seen = expected(f, y, work) + f->shift + f->spread * deviation + margin_at(f, y, work);
+		double seen = expected(f, y, work) + f->shift + f->spread * deviation + y->margin;
 		if (seen <= 2 * log(target))
 			return (double)rounds;
 		if (rounds >= UINT64_MAX / 4)

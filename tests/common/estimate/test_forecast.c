@@ -190,28 +190,6 @@ static void a_trend_is_seen(void **state)
 	assert_true(middle[1] > 1.2 * middle[0] && middle[1] < 2.5);
 }
 
-/* Intervals grow narrower as the brightness of pixels becomes known: a render stops sooner than a pilot's would let
- * think. */
-static double falling_margin(double work)
-{
-	return 0.8 * pow(work / 1e5, -0.35);
-}
-
-static void a_narrower_interval_is_seen(void **state)
-{
-	(void)state;
-	struct plan p = plan_of(64);
-	struct forecast_history h = {0};
-	struct forecast_cost c;
-	for (double work = 1e5; work < 5e5; work *= 1.25)
-		forecast_add_look(&h, &(struct forecast_look){work, work, work, 1e3 / work,
-							      1e3 / work * exp(falling_margin(work)), 3000, 0});
-	double work = 6 * h.looks[h.count - 1].work, target = sqrt(1e3 / work * exp(falling_margin(work)));
-	assert_true(forecast_target(&h, &p, target, FORECAST_NEW, &c));
-	printf("work over that of an interval that grows narrower: %.2f\n", c.work.middle / work);
-	assert_true(c.work.middle > 0.9 * work && c.work.middle < 1.2 * work);
-}
-
 /* Whoever waits for an error in doubt waits for a fifth of the target, and for 10 % at most. */
 static void doubt_is_waited_for(void **state)
 {
@@ -298,15 +276,10 @@ static void looks_travel_as_json(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(intervals_hold),
-		cmocka_unit_test(own_looks_tell_more),
-		cmocka_unit_test(stops_are_on_the_ladder),
-		cmocka_unit_test(halving_costs_three_times_what_was_paid),
-		cmocka_unit_test(a_trend_is_seen),
-		cmocka_unit_test(what_is_no_look_is_passed_over),
-		cmocka_unit_test(looks_travel_as_json),
-		cmocka_unit_test(doubt_is_waited_for),
-		cmocka_unit_test(a_narrower_interval_is_seen),
+		cmocka_unit_test(intervals_hold),	   cmocka_unit_test(own_looks_tell_more),
+		cmocka_unit_test(stops_are_on_the_ladder), cmocka_unit_test(halving_costs_three_times_what_was_paid),
+		cmocka_unit_test(a_trend_is_seen),	   cmocka_unit_test(what_is_no_look_is_passed_over),
+		cmocka_unit_test(looks_travel_as_json),	   cmocka_unit_test(doubt_is_waited_for),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
