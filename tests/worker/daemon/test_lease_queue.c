@@ -430,11 +430,12 @@ static void a_store_without_room_fails_each_once(void **state)
 	finish();
 }
 
-static ssize_t write_nothing(int fd, const void *bytes, size_t size)
+static ssize_t write_nothing(int fd, const struct iovec *parts, int count, off_t at)
 {
 	(void)fd;
-	(void)bytes;
-	(void)size;
+	(void)parts;
+	(void)count;
+	(void)at;
 	errno = ENOSPC;
 	return -1;
 }
@@ -443,7 +444,7 @@ static void a_full_disk_is_its_own_fault(void **state)
 {
 	(void)state;
 	struct disk full = disk_system;
-	full.write = write_nothing;
+	full.pwritev = write_nothing;
 	start(0);
 	begin_jobs(1);
 	hear_blob_get(&t.mesh, 0);
