@@ -10,7 +10,6 @@
 #include "worker/render/chain/path_place.h"
 #include "worker/render/math/fptrap.h"
 #include "worker/render/mutation/mutation.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/path/integrator.h"
 
 #include <setjmp.h>
@@ -120,10 +119,9 @@ static void run_case(const struct precision_case *p, unsigned most, struct error
 			continue;
 		full_path_copy(&y, &x, 0, x.edges);
 		m.chain = i;
-		if (mutation_propose(ops, &m, &how, &x, &y, &move))
+		if (ops->propose(&m, &how, &x, &y, &move))
 			continue;
-		double to_y = mutation_log_weight(ops, &m, &y, &move, X_TO_Y),
-		       to_x = mutation_log_weight(ops, &m, &x, &move, Y_TO_X);
+		double to_y = ops->log_weight(&m, &y, &move, X_TO_Y), to_x = ops->log_weight(&m, &x, &move, Y_TO_X);
 		double program = to_y - to_x + move.log_density[X_TO_Y] - move.log_density[Y_TO_X];
 		if (isfinite(program))
 			note(e, program, w, &x, &y);

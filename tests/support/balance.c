@@ -9,7 +9,6 @@
 #include "tests/support/stats.h"
 #include "worker/render/mutation/heuristic.h"
 #include "tests/support/path_check.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/path/full_path_density.h"
 
 #include <setjmp.h>
@@ -163,14 +162,14 @@ static bool is_sound(const struct balance_trial *t, double log_weight)
 /* As the chain does it. */
 static double acceptance(struct run *r, struct balance_trial *t, struct move *move)
 {
-	enum proposal_end end = mutation_propose(t->ops, r->m, &t->how, r->x, r->y, move);
-	double to_y = end ? -INFINITY : mutation_log_weight(t->ops, r->m, r->y, move, X_TO_Y);
+	enum proposal_end end = t->ops->propose(r->m, &t->how, r->x, r->y, move);
+	double to_y = end ? -INFINITY : t->ops->log_weight(r->m, r->y, move, X_TO_Y);
 	if (!end && !is_sound(t, to_y))
 		end = PROPOSAL_DARK;
 	t->count[proposal_counter(end)]++;
 	if (end)
 		return 0;
-	double to_x = mutation_log_weight(t->ops, r->m, r->x, move, Y_TO_X);
+	double to_x = t->ops->log_weight(r->m, r->x, move, Y_TO_X);
 	if (!is_sound(t, to_x))
 		fail_msg("%s: from y the path x is black", t->ops->name);
 	return exp(fmin(to_y - to_x, 0));

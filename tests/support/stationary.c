@@ -14,7 +14,6 @@
 #include "tests/support/stats.h"
 #include "worker/render/chain/path_place.h"
 #include "tests/support/path_check.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/render.h"
 #include "worker/render/math/fptrap.h"
@@ -188,8 +187,8 @@ static void count_unsound(struct group *g, double log_weight, bool state)
 static double propose(struct group *g, struct full_path *x, struct full_path *y, struct move *move)
 {
 	const struct mutation_ops *ops = g->entry->ops;
-	enum proposal_end end = mutation_propose(ops, &g->mutation, &g->entry->how, x, y, move);
-	double to_y = end ? -INFINITY : mutation_log_weight(ops, &g->mutation, y, move, X_TO_Y);
+	enum proposal_end end = ops->propose(&g->mutation, &g->entry->how, x, y, move);
+	double to_y = end ? -INFINITY : ops->log_weight(&g->mutation, y, move, X_TO_Y);
 	if (!end && !(to_y > -INFINITY))
 		end = PROPOSAL_DARK;
 	count_unsound(g, to_y, false);
@@ -197,7 +196,7 @@ static double propose(struct group *g, struct full_path *x, struct full_path *y,
 		g->strategy[proposal_counter(end)]++;
 		return 0;
 	}
-	double to_x = mutation_log_weight(ops, &g->mutation, x, move, Y_TO_X);
+	double to_x = ops->log_weight(&g->mutation, x, move, Y_TO_X);
 	count_unsound(g, to_x, true);
 	return exp(fmin(to_y - to_x + planted(g->how->fault, move, x, y), 0));
 }

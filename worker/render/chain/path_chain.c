@@ -16,7 +16,6 @@
 #include "worker/render/chain/path_bytes.h"
 #include "worker/render/chain/path_place.h"
 #include "worker/render/mutation/mixture.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/path/classes.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
@@ -128,8 +127,8 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 {
 	struct mutation_ctx *m = &c->mutation;
 	struct full_path *x = &c->current->path, *y = &c->proposal->path;
-	enum proposal_end end = mutation_propose(entry->ops, m, &entry->how, x, y, move);
-	double to_y = end ? -INFINITY : mutation_log_weight(entry->ops, m, y, move, X_TO_Y);
+	enum proposal_end end = entry->ops->propose(m, &entry->how, x, y, move);
+	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
 	if (!end && !(to_y > -INFINITY && path_place_is_sound(m->path, to_y, entry->ops->independent)))
 		end = PROPOSAL_DARK;
 	if (end) {
@@ -143,7 +142,7 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 	}
 	if (x->edges == 0)
 		return 1;
-	double to_x = mutation_log_weight(entry->ops, m, x, move, Y_TO_X);
+	double to_x = entry->ops->log_weight(m, x, move, Y_TO_X);
 	return path_place_is_sound(m->path, to_x, false) ? exp(fmin(to_y - to_x, 0)) : 0;
 }
 

@@ -16,7 +16,6 @@
 #include "worker/render/chain/path_place.h"
 #include "worker/render/math/logsum.h"
 #include "worker/render/mutation/mixture.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/path/classes.h"
 #include "worker/render/path/full_path_density.h"
 #include "worker/render/world/build.h"
@@ -86,15 +85,15 @@ static double propose(struct redistribution *r, const struct mixture_entry *entr
 		      struct spread_place *x, struct spread_place *y)
 {
 	struct mutation_ctx *m = &r->mutation;
-	if (mutation_propose(entry->ops, m, &entry->how, &x->place.path, &y->place.path, move))
+	if (entry->ops->propose(m, &entry->how, &x->place.path, &y->place.path, move))
 		return 0;
-	double to_y = mutation_log_weight(entry->ops, m, &y->place.path, move, X_TO_Y);
+	double to_y = entry->ops->log_weight(m, &y->place.path, move, X_TO_Y);
 	if (!(to_y > -INFINITY && path_place_is_sound(m->path, to_y, false)))
 		return 0;
 	weigh(r, y);
 	if (!(y->share > 0))
 		return 0;
-	double to_x = mutation_log_weight(entry->ops, m, &x->place.path, move, Y_TO_X);
+	double to_x = entry->ops->log_weight(m, &x->place.path, move, Y_TO_X);
 	if (!path_place_is_sound(m->path, to_x, false))
 		return 0;
 	return exp(fmin(to_y - to_x + log(y->scale * y->share / (x->scale * x->share)), 0));

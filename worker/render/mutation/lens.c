@@ -32,4 +32,5 @@ const struct mutation_ops mutation_lens = {
 	.summary = "moves the point on the aperture",
 	.useful = useful,
 	.propose = propose,
+	.log_weight = breakup_log_weight,
 };

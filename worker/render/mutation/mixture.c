@@ -127,7 +127,7 @@ void mixture_default(const struct render_summary *scene, struct mixture *out)
 {
 	*out = (struct mixture){.count = 0};
 	for (size_t i = 0; mutation_registry[i]; i++) {
-		double weight = mutation_registry[i]->useful ? mutation_registry[i]->useful(scene) : 0;
+		double weight = mutation_registry[i]->useful(scene);
 		if (weight > 0 && out->count < BATCH_STRATEGIES)
 			out->entry[out->count++] = (struct mixture_entry){mutation_registry[i], {-1, -1}, weight};
 	}

@@ -72,14 +72,11 @@ enum proposal_end {
 /* That of a reason. */
 enum strategy_counter proposal_counter(enum proposal_end reason);
 
-struct strategy;
-
 struct mutation_ops {
 	const char *name, *summary;
 	bool independent; /* independent of x: also estimates b by f / T */
-	/* Weight in the default mixture of a scene with these effects; 0, or no function: not part of it. */
+	/* Weight in the default mixture of a scene with these effects; 0: not part of it. */
 	double (*useful)(const struct render_summary *scene);
-	const struct strategy *strategy; /* of a breakup, which needs neither of the following: strategy.h */
 	/* PROPOSAL_MADE: y is complete, and all its rays have been cast. Otherwise the reason, and y's vertices
 	 * first..last are undefined. */
 	enum proposal_end (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,

@@ -97,17 +97,3 @@ enum proposal_end strategy_propose(const struct strategy *s, struct mutation_ctx
 	move->log_density[Y_TO_X] += back;
 	return back > -INFINITY ? PROPOSAL_MADE : PROPOSAL_MODE;
 }
-
-enum proposal_end mutation_propose(const struct mutation_ops *ops, struct mutation_ctx *m,
-				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				   struct move *move)
-{
-	return ops->propose ? ops->propose(m, how, x, y, move) : strategy_propose(ops->strategy, m, how, x, y, move);
-}
-
-double mutation_log_weight(const struct mutation_ops *ops, struct mutation_ctx *m, struct full_path *into,
-			   const struct move *move, enum mutation_direction direction)
-{
-	return ops->log_weight ? ops->log_weight(m, into, move, direction)
-			       : breakup_log_weight(m, into, move, direction);
-}

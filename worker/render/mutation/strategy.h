@@ -14,13 +14,6 @@ struct strategy {
 	bool wavelength_in_media; /* even where each edge then lets through another share of light */
 };
 
-/* mutation_ops.propose and log_weight of any mutation. */
-enum proposal_end mutation_propose(const struct mutation_ops *ops, struct mutation_ctx *m,
-				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
-				   struct move *move);
-double mutation_log_weight(const struct mutation_ops *ops, struct mutation_ctx *m, struct full_path *into,
-			   const struct move *move, enum mutation_direction direction);
-
 /* A breakup by this strategy; `how` takes precedence. */
 enum proposal_end strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
 				   struct full_path *x, struct full_path *y, struct move *move);

@@ -40,4 +40,5 @@ const struct mutation_ops mutation_wavelength = {
 	.summary = "another wavelength; the path moves where it must",
 	.useful = useful,
 	.propose = propose,
+	.log_weight = breakup_log_weight,
 };

@@ -7,7 +7,6 @@
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
 #include "worker/render/mutation/heuristic.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/world/build.h"
 
 #include <setjmp.h>
@@ -25,13 +24,13 @@ static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_s
 				 struct full_path *y, struct move *move)
 {
 	from = x;
-	return mutation_propose(real, m, how, x, y, move);
+	return real->propose(m, how, x, y, move);
 }
 
 static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			 enum mutation_direction direction)
 {
-	return mutation_log_weight(real, m, into, move, direction);
+	return real->log_weight(m, into, move, direction);
 }
 
 /* log P(b) P(c | b) by the heuristic. */

@@ -9,7 +9,6 @@
 #include "tests/support/stats.h"
 #include "tests/worker/render/mutation/explicit.h"
 #include "tests/worker/render/mutation/scenes.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/path/full_path_density.h"
 
 #include <setjmp.h>
@@ -71,10 +70,10 @@ static void compare(struct trial *t, struct full_path *x, struct full_path *y)
 	struct move move = {0};
 	m.step++;
 	m.count = strategy_counters;
-	enum proposal_end end = mutation_propose(t->ops, &m, &t->how, x, y, &move);
-	double to_y = end ? -INFINITY : mutation_log_weight(t->ops, &m, y, &move, X_TO_Y);
+	enum proposal_end end = t->ops->propose(&m, &t->how, x, y, &move);
+	double to_y = end ? -INFINITY : t->ops->log_weight(&m, y, &move, X_TO_Y);
 	if (to_y > -INFINITY) {
-		double to_x = mutation_log_weight(t->ops, &m, x, &move, Y_TO_X), choices, back;
+		double to_x = t->ops->log_weight(&m, x, &move, Y_TO_X), choices, back;
 		double there = log_t(t, &move, x, y, 1, &choices), here = log_t(t, &move, y, x, -1, &back);
 		double want = full_path_log_f(&c, y) - full_path_log_f(&c, x) + here - there;
 		double off = fabs(to_y - to_x - want) / fmax(1, fabs(want));

@@ -9,7 +9,6 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "worker/render/mutation/mutation.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/mutation/trace.h"
 #include "worker/render/math/logsum.h"
 #include "worker/render/path/ensemble.h"
@@ -212,7 +211,7 @@ static void test_streams_of_a_proposal(void **state)
 			continue;
 		struct move move = {0};
 		m.step = i;
-		if (mutation_propose(ops, &m, &(struct mutation_setting){-1, -1}, &x, &y, &move) != PROPOSAL_MADE)
+		if (ops->propose(&m, &(struct mutation_setting){-1, -1}, &x, &y, &move) != PROPOSAL_MADE)
 			continue;
 		double total[2], v[4], r[4];
 		const enum rng_stream stream[2] = {RNG_AROUND, RNG_CHAIN};

@@ -12,7 +12,6 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "worker/render/mutation/mutation.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/world/build.h"
 
 #include <setjmp.h>
@@ -39,8 +38,8 @@ static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, siz
 		struct move move = {0};
 		x.edges = 0;
 		m->step++;
-		if (mutation_propose(ops, m, &(struct mutation_setting){-1, -1}, &x, &y, &move) == PROPOSAL_MADE)
-			mean[y.edges] += exp(mutation_log_weight(ops, m, &y, &move, X_TO_Y)) / (double)n;
+		if (ops->propose(m, &(struct mutation_setting){-1, -1}, &x, &y, &move) == PROPOSAL_MADE)
+			mean[y.edges] += exp(ops->log_weight(m, &y, &move, X_TO_Y)) / (double)n;
 	}
 }
 

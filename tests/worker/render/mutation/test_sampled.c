@@ -13,7 +13,6 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/mutation/explicit.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/world/build.h"
 
 #include <setjmp.h>
@@ -134,7 +133,7 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 	double log_plane, unused;
 	m.step++;
 	m.count = strategy_counters;
-	enum proposal_end end = mutation_propose(s->ops, &m, &e->how, s->x, s->y, &move);
+	enum proposal_end end = s->ops->propose(&m, &e->how, s->x, s->y, &move);
 	enum outcome out = move.b != e->b || move.c != e->c ? OTHER : end ? FAILED : ELSEWHERE;
 	if (out == ELSEWHERE && coordinates(s, z, &log_plane)) {
 		out = ARRIVED;

@@ -12,7 +12,6 @@
 #include "tests/support/stats.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/mutation/mutation.h"
-#include "worker/render/mutation/strategy.h"
 #include "worker/render/world/build.h"
 
 #include <setjmp.h>
@@ -48,10 +47,10 @@ static double propose(const struct mutation_ops *ops, double scale, struct full_
 	full_path_copy(into, &x, 0, x.edges);
 	mutation.limits = walk_limits_of(&accuracy_settings_default);
 	mutation.limits.scale = scale;
-	if (mutation_propose(ops, &mutation, &how, &x, into, &move))
+	if (ops->propose(&mutation, &how, &x, into, &move))
 		return 0;
-	double to_y = mutation_log_weight(ops, &mutation, into, &move, X_TO_Y);
-	return exp(fmin(to_y - mutation_log_weight(ops, &mutation, &x, &move, Y_TO_X), 0));
+	double to_y = ops->log_weight(&mutation, into, &move, X_TO_Y);
+	return exp(fmin(to_y - ops->log_weight(&mutation, &x, &move, Y_TO_X), 0));
 }
 
 static void compare_one(const struct mutation_ops *ops, int group, struct tally *t)
