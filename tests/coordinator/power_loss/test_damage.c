@@ -256,8 +256,10 @@ static void what_is_lost(void **state)
 	static const char *const files[] = {"jobs.db", "jobs-copy.db"};
 	before(0);
 	uint64_t put_aside = 0;
-	for (uint64_t seed = 201; seed <= 206; seed++) {
+	/* Whether a life leaves a checkpoint depends on what was under way when it ended. */
+	for (uint64_t seed = 201; put_aside < 4; seed++) {
 		char path[256];
+		assert_true(seed < 240);
 		begin(seed);
 		if (largest("jobs/j*/checkpoint", path) == 0)
 			continue;
@@ -287,7 +289,6 @@ static void what_is_lost(void **state)
 		in_root("j=$(basename $(cat lost-job)); sed s,jobs/,lost/, sums | sha256sum --quiet -c && grep -q jobs.db lost/$j/why");
 		put_aside++;
 	}
-	assert_true(put_aside > 3);
 }
 
 int main(void)
