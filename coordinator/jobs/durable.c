@@ -226,7 +226,8 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 	do {
 		rc = room_is_left(jobs, job, size)
 			     ? journal_reserve(job->journal, size + PINNED_ROOM, e)
-			     : error_set(e, ENOSPC, "what the disk has left is for a checkpoint of its results");
+			     : error_set(e, ENOSPC,
+					 "No space left on the disk but what a checkpoint of its results needs");
 		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
 			rc = canvas_reserve(job->canvas, in->batch, e);
 	} while (rc == -ENOSPC && room_make(jobs));
