@@ -7,8 +7,9 @@
  * 8       4           N
  * 12      N           CheckpointHead of proto/stored.proto
  * 12 + N  8 a chain   chains: the seeds, group by group
- *                     for each group and part of it: 0, in 4 bytes, if no epoch has been merged yet; otherwise 1, and
- * of each chain the size of its state, 4 bytes, and the state films (common/film/canvas_save.h)
+ *         4 a lease   for each group and part of it: 0 if no epoch has been merged yet, otherwise 1, followed by the
+ *         4 + size    size of each of its chains' states and the state itself
+ *                     films (common/film/canvas_save.h)
  *
  * Any thread, while nobody changes the job.
  */
