@@ -3,15 +3,6 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
-# listens [OPTION...]: the coordinator was started as $!
-listens() {
-	COORDINATOR_PID=$!
-	PIDS="$PIDS $COORDINATOR_PID"
-	until_true 10 test -s "$DIR/port" || fail "the coordinator does not listen"
-	COORDINATOR=127.0.0.1:$(cat "$DIR/port")
-	export HSLT_COORDINATOR="$COORDINATOR"
-}
-
 # nothing PID: its standard descriptors lead nowhere
 nothing() {
 	for fd in 0 1 2; do

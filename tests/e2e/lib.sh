@@ -128,16 +128,21 @@ has_read() {
 	! "$BIN/hslt-status" --json 2>/dev/null | grep -q '"reading": *[0-9]'
 }
 
-# listen [OPTION...]: the coordinator, at $LISTEN, or at any free port
-listen() {
-	rm -f "$DIR/port"
-	"$BIN/hslt-coordinator" --listen "${LISTEN:-127.0.0.1:0}" --port-file "$DIR/port" --spool "$DIR/spool" \
-		--status-socket "$DIR/status" --heartbeat 0.5 "$@" 2>>"$DIR/coordinator.log" &
+# listens: the coordinator was started as $!
+listens() {
 	COORDINATOR_PID=$!
 	PIDS="$PIDS $COORDINATOR_PID"
 	until_true 10 test -s "$DIR/port" || fail "the coordinator does not listen"
 	COORDINATOR=127.0.0.1:$(cat "$DIR/port")
 	export HSLT_COORDINATOR="$COORDINATOR"
+}
+
+# listen [OPTION...]: the coordinator, at $LISTEN, or at any free port
+listen() {
+	rm -f "$DIR/port"
+	"$BIN/hslt-coordinator" --listen "${LISTEN:-127.0.0.1:0}" --port-file "$DIR/port" --spool "$DIR/spool" \
+		--status-socket "$DIR/status" --heartbeat 0.5 "$@" 2>>"$DIR/coordinator.log" &
+	listens
 }
 
 # start_coordinator [OPTION...]: until it has read its jobs
