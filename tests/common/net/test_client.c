@@ -337,14 +337,8 @@ static void floods_are_dammed(void **state)
 		struct client *cl = meet(&c);
 		struct error e;
 		unsigned char *question = calloc(1, 1 << 22); /* which is not read before the flood is over */
-		Farm__Bye bye;
-		Farm__Envelope m;
-		farm__bye__init(&bye);
-		farm__envelope__init(&m);
-		m.body_case = FARM__ENVELOPE__BODY_BYE;
-		m.bye = &bye;
-		client_send(cl, &m, question, 1 << 22, &e);
-		client_send(cl, &m, question, 1 << 22, &e);
+		client_send(cl, ENVELOPE(BYE, bye), question, 1 << 22, &e);
+		client_send(cl, ENVELOPE(BYE, bye), question, 1 << 22, &e);
 		free(question);
 		size_t taken = take_all(cl);
 		assert_true(taken <= floods[i].most && taken > floods[i].most / 2);

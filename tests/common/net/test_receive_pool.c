@@ -145,28 +145,16 @@ static void send_bytes(int i, const unsigned char *bytes, size_t size)
 
 static unsigned char *long_frame(size_t *size)
 {
-	Farm__Bye bye;
-	Farm__Envelope m;
 	unsigned char *payload = calloc(LONG, 1);
 	assert_non_null(payload);
-	farm__bye__init(&bye);
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_BYE;
-	m.bye = &bye;
-	unsigned char *frame = checksummed_message(&m, payload, LONG, size);
+	unsigned char *frame = checksummed_message(ENVELOPE(BYE, bye), payload, LONG, size);
 	free(payload);
 	return frame;
 }
 
 static void send_short(int i)
 {
-	Farm__Bye bye;
-	Farm__Envelope m;
-	farm__bye__init(&bye);
-	farm__envelope__init(&m);
-	m.body_case = FARM__ENVELOPE__BODY_BYE;
-	m.bye = &bye;
-	conn_send(callers[i].conn, &m, NULL, 0);
+	conn_send(callers[i].conn, ENVELOPE(BYE, bye), NULL, 0);
 }
 
 static void open_all(double stall_seconds)
