@@ -3,6 +3,8 @@
 #ifndef WORKER_RENDER_BSDF_FRESNEL_H
 #define WORKER_RENDER_BSDF_FRESNEL_H
 
+#include "worker/render/math/minmax.h"
+
 #include <math.h>
 #include <stdbool.h>
 
@@ -19,7 +21,7 @@ static inline struct fresnel fresnel_between(double c, double t, double eta)
 	double s = 1 / (c + eta * t), p = 1 / (eta * c + t), e = (eta - 1) * (eta + 1);
 	double rs = e * s * s, rp = e * p * ((c * c * (eta * eta + 1) - 1) * p) / (eta * eta);
 	double ts = 2 * c * s * (eta * t * s), tp = 2 * c * p * (eta * t * p);
-	return (struct fresnel){fmin(0.5 * (rs * rs + rp * rp), 1), fmin(ts + tp, 1), t};
+	return (struct fresnel){min_of(0.5 * (rs * rs + rp * rp), 1), min_of(ts + tp, 1), t};
 }
 
 static inline struct fresnel fresnel_dielectric(double c, double eta)

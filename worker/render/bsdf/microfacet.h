@@ -8,6 +8,7 @@
 #ifndef WORKER_RENDER_BSDF_MICROFACET_H
 #define WORKER_RENDER_BSDF_MICROFACET_H
 
+#include "worker/render/math/minmax.h"
 #include "worker/render/math/vec3.h"
 #include "worker/render/scene/scene.h"
 
@@ -40,7 +41,7 @@ vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, do
 static inline bool microfacet_half(vec3 wo, double eta, vec3 wi, vec3 *h, double *length)
 {
 	vec3 sum = vec3_madd(wo, eta, wi);
-	double largest = fmax(fabs(sum.x), fmax(fabs(sum.y), fabs(sum.z)));
+	double largest = max_of(fabs(sum.x), max_of(fabs(sum.y), fabs(sum.z)));
 	if (!(largest > 1e-300))
 		return false;
 	sum = vec3_scale(1 / largest, sum);

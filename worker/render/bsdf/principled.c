@@ -25,6 +25,7 @@
 #include "common/base/color.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/warp.h"
+#include "worker/render/math/minmax.h"
 
 #define PRINCIPLED_ALPHA_MIN 1e-3
 #define CLEARCOAT_REFLECTANCE 0.04 /* of an index of 1.5 */
@@ -57,39 +58,61 @@ struct microfacet principled_facets(double anisotropic, double roughness)
 {
 	struct microfacet m;
 	double a = roughness * roughness, aspect = sqrt(1 - 0.9 * anisotropic);
-	microfacet_set(&m, true, fmax(PRINCIPLED_ALPHA_MIN, a / aspect), fmax(PRINCIPLED_ALPHA_MIN, a * aspect));
+	microfacet_set(&m, true, max_of(PRINCIPLED_ALPHA_MIN, a / aspect), max_of(PRINCIPLED_ALPHA_MIN, a * aspect));
 	return m;
 }
 
 /* The value of a number or texture at a point: textures of shares are grey, the mean over the lanes. */
 static double principled_share_at(const struct texture *t, const struct bsdf_point *at)
 {
-	return fmin(fmax(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
+	return min_of(max_of(spectrum_mean(texture_eval(t, &at->where, at->w)), 0), 1);
+}
+
+/* All but colours. */
+static void read_numbers(const struct principled *p, const struct bsdf_point *at, struct stuff *s)
+{
+	s->roughness = principled_share_at(&p->roughness, at);
+	s->metallic = principled_share_at(&p->metallic, at);
+	for (int i = 0; i < SHARES; i++)
+		s->share[i] = p->share[i].ops ? principled_share_at(&p->share[i], at) : p->most[i];
+	if (p->has_specular)
+		s->share[SPEC_TINT] = 1;
+	s->facets = principled_facets(s->share[ANISOTROPIC], s->roughness);
+	if (s->share[COAT] > 0)
+		s->coat = principled_facets(0, s->share[COAT_ROUGHNESS]);
+}
+
+static bool is_number(const struct texture *t)
+{
+	return texture_is_constant(t) && texture_shape(t) == COLOR_SHAPE_CONSTANT;
+}
+
+void principled_know(struct principled *p, const struct bsdf_build *build)
+{
+	const struct bsdf_probes probes = bsdf_probes_of(build);
+	const struct bsdf_point at = bsdf_probe(&probes, 0);
+	p->varies = !is_number(&p->roughness) || !is_number(&p->metallic);
+	for (int i = 0; i < SHARES; i++)
+		p->varies |= p->share[i].ops != NULL;
+	p->known = (struct stuff){.p = p};
+	read_numbers(p, &at, &p->known);
 }
 
 struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at)
 {
-	struct stuff s = {.p = p,
-			  .base = texture_eval(&p->base, &at->where, at->w),
-			  .roughness = principled_share_at(&p->roughness, at),
-			  .metallic = principled_share_at(&p->metallic, at)};
-	for (int i = 0; i < SHARES; i++)
-		s.share[i] = p->varies && p->share[i].ops ? principled_share_at(&p->share[i], at) : p->most[i];
-	s.facets = principled_facets(s.share[ANISOTROPIC], s.roughness);
-	if (s.share[COAT] > 0)
-		s.coat = principled_facets(0, s.share[COAT_ROUGHNESS]);
-	s.tint = s.share[SPEC_TINT] > 0 || s.share[SHEEN_TINT] > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
-	s.specular = s.tint;
-	if (p->has_specular) {
-		s.share[SPEC_TINT] = 1;
-		s.specular = texture_eval(&p->specular, &at->where, at->w);
-	}
+	struct stuff s = p->known;
+	s.base = texture_eval(&p->base, &at->where, at->w);
+	if (p->varies)
+		read_numbers(p, at, &s);
+	bool tinted = (!p->has_specular && s.share[SPEC_TINT] > 0) || s.share[SHEEN_TINT] > 0;
+	s.tint = tinted ? tint_of(p, at, s.base) : spectrum_of(1);
+	s.specular = p->has_specular ? texture_eval(&p->specular, &at->where, at->w) : s.tint;
 	return s;
 }
 
 static double schlick(double cosine)
 {
-	double x = fmin(fmax(1 - cosine, 0), 1);
+	double x = min_of(max_of(1 - cosine, 0), 1);
 	return x * x * x * x * x;
 }
 
@@ -97,10 +120,10 @@ spectrum principled_boundary(const struct stuff *s, double cosine)
 {
 	const struct principled *p = s->p;
 	double rest = schlick(cosine), root = (p->eta - 1) / (p->eta + 1), tint = s->share[SPEC_TINT];
-	double plain = (1 - tint) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
+	double plain = (1 - tint) * fresnel_dielectric(min_of(cosine, 1), p->eta).reflected;
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double tinted = fmin(s->specular.v[i] * root * root, 1);
+		double tinted = min_of(s->specular.v[i] * root * root, 1);
 		f.v[i] = plain + tint * (tinted + (1 - tinted) * rest);
 	}
 	return f;
@@ -123,7 +146,7 @@ spectrum principled_diffuse(const struct stuff *s, spectrum boundary, vec3 wo, v
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
 	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
 	double ss = (1 + (0.5 * retro - 1) * fo) * (1 + (0.5 * retro - 1) * fi);
-	double flat = 1.25 * (ss * (1 / fmax(wo.z + wi.z, 1e-300) - 0.5) + 0.5);
+	double flat = 1.25 * (ss * (1 / max_of(wo.z + wi.z, 1e-300) - 0.5) + 0.5);
 	double most = (1 - s->metallic) * (1 - s->share[TRANSMISSION]) / WARP_PI,
 	       burley = base + s->share[FLATNESS] * (flat - base);
 	double sheen = (1 - s->metallic) * s->share[SHEEN] * schlick(cos_d);
@@ -169,12 +192,13 @@ static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
 	const struct principled *p = s->p;
 	bool below = wo.z < 0;
 	double clear = 1 - s->metallic, glass = clear * s->share[TRANSMISSION];
-	double reflected = fresnel_dielectric(fmin(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
+	double reflected = fresnel_dielectric(min_of(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
 	/* At total reflection some facets do not reflect. */
-	chance[LOBE_TRANSMIT] = glass * fmax(1 - reflected, 0.05);
-	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * fmax(p->base_max, 0.04);
+	chance[LOBE_TRANSMIT] = glass * max_of(1 - reflected, 0.05);
+	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * max_of(p->base_max, 0.04);
 	chance[LOBE_DIFFUSE] =
-		below ? 0 : clear * fmax((1 - s->share[TRANSMISSION]) * p->base_max, fmin(s->share[SHEEN], 1) * 0.2);
+		below ? 0
+		      : clear * max_of((1 - s->share[TRANSMISSION]) * p->base_max, min_of(s->share[SHEEN], 1) * 0.2);
 	chance[LOBE_CLEARCOAT] = below ? 0 : s->share[CLEARCOAT] * (CLEARCOAT_REFLECTANCE + schlick(wo.z)) * wo.z;
 	double coat = below ? 0 : coat_reflects(s, wo.z);
 	for (int i = 0; i < LOBES; i++) {
@@ -212,7 +236,7 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 	double spread = co * -ci * (eta / length) * (eta / length);
 	double seen = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
 	double passes = (1 - s->metallic) * s->share[TRANSMISSION] *
-			fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
+			fresnel_between(min_of(co, 1), min_of(-ci, 1), eta).transmitted;
 	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
 	f *= 1 - coat_reflects(s, eta > 1 ? wo.z : -wi.z);
 	if (transport == TRANSPORT_RADIANCE)
@@ -222,67 +246,87 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 	out->pdf += chance * seen;
 }
 
-static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, double eta, const double chance[LOBES],
-			  struct pair *out)
+/* What the coat's facets reflect, without its Fresnel factor: also the density of sampling it. */
+static double coat_lobe(const struct stuff *s, vec3 wo, vec3 h)
 {
+	return 0.25 * microfacet_d(&s->coat, h) * microfacet_g1_over_cos(&s->coat, wo);
+}
+
+/* seen: the density of sampling the boundary's facets; cos_d: the cosine to the half vector h. */
+static double reflected_pdf(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen, bool below,
+			    const double chance[LOBES])
+{
+	double pdf = chance[LOBE_SPECULAR] * seen;
+	if (below)
+		return pdf;
+	pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
+	if (s->share[CLEARCOAT] > 0)
+		pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(s, h.z) * h.z / (4 * cos_d);
+	if (s->share[COAT] > 0)
+		pdf += chance[LOBE_COAT] * coat_lobe(s, wo, h);
+	return pdf;
+}
+
+static spectrum reflected_value(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen, bool below)
+{
+	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
+	if (below)
+		return spectrum_of(both * (1 - s->metallic) * s->share[TRANSMISSION] *
+				   fresnel_dielectric(cos_d, 1 / s->p->eta).reflected);
+	spectrum boundary = principled_boundary(s, cos_d);
+	spectrum f = spectrum_add(spectrum_scale(both, principled_fresnel(s, boundary, cos_d)),
+				  principled_diffuse(s, boundary, wo, wi, cos_d));
+	if (s->share[CLEARCOAT] > 0)
+		f = spectrum_add(f, spectrum_of(clearcoat_of(s, wo, wi, h, cos_d)));
+	if (s->share[COAT] > 0) {
+		double through = (1 - coat_reflects(s, wo.z)) * (1 - coat_reflects(s, wi.z));
+		f = spectrum_add(spectrum_scale(through, f), spectrum_of(coat_reflects(s, cos_d) * coat_lobe(s, wo, h) *
+									 microfacet_g1_over_cos(&s->coat, wi)));
+	}
+	return f;
+}
+
+/* Only what is asked for: `value`, or the density if the chances of sampling the lobes are given. */
+static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transport transport, bool value,
+			   const double *chance)
+{
+	struct pair out = {spectrum_of(0), 0};
+	bool below = wo.z<0, glass = s->share[TRANSMISSION]> 0 && s->metallic < 1;
+	if (wo.z == 0 || wi.z == 0 || (below && !glass))
+		return out;
+	wo = mirror(wo, below);
+	wi = mirror(wi, below);
+	if (wi.z < 0) {
+		if (glass)
+			add_refracted(s, wo, wi, below ? 1 / s->p->eta : s->p->eta, chance ? chance[LOBE_TRANSMIT] : 0,
+				      transport, &out);
+		return out;
+	}
 	vec3 h;
 	double length;
 	if (!microfacet_half(wo, 1, wi, &h, &length))
-		return;
-	double cos_d = fmin(0.5 * length, 1),
-	       seen = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
-	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
-	out->pdf = chance[LOBE_SPECULAR] * seen;
-	if (below) {
-		out->f = spectrum_of(both * (1 - s->metallic) * s->share[TRANSMISSION] *
-				     fresnel_dielectric(cos_d, eta).reflected);
-		return;
-	}
-	spectrum boundary = principled_boundary(s, cos_d);
-	out->f = spectrum_add(spectrum_scale(both, principled_fresnel(s, boundary, cos_d)),
-			      principled_diffuse(s, boundary, wo, wi, cos_d));
-	out->pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
-	if (s->share[CLEARCOAT] > 0) {
-		out->f = spectrum_add(out->f, spectrum_of(clearcoat_of(s, wo, wi, h, cos_d)));
-		out->pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(s, h.z) * h.z / (4 * cos_d);
-	}
-	if (s->share[COAT] > 0) {
-		double lobe = 0.25 * microfacet_d(&s->coat, h) * microfacet_g1_over_cos(&s->coat, wo);
-		double through = (1 - coat_reflects(s, wo.z)) * (1 - coat_reflects(s, wi.z));
-		out->f = spectrum_add(
-			spectrum_scale(through, out->f),
-			spectrum_of(coat_reflects(s, cos_d) * lobe * microfacet_g1_over_cos(&s->coat, wi)));
-		out->pdf += chance[LOBE_COAT] * lobe;
-	}
-}
-
-static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transport transport)
-{
-	struct pair out = {spectrum_of(0), 0};
-	bool below = wo.z < 0;
-	double chance[LOBES], eta = below ? 1 / s->p->eta : s->p->eta;
-	if (wo.z == 0 || wi.z == 0 || (below && !(s->share[TRANSMISSION] > 0 && s->metallic < 1)))
 		return out;
-	chances(s, wo, chance);
-	wo = mirror(wo, below);
-	wi = mirror(wi, below);
-	if (wi.z > 0)
-		add_reflected(s, wo, wi, below, eta, chance, &out);
-	else if (chance[LOBE_TRANSMIT] > 0)
-		add_refracted(s, wo, wi, eta, chance[LOBE_TRANSMIT], transport, &out);
+	double cos_d = min_of(0.5 * length, 1);
+	double seen = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
+	if (value)
+		out.f = reflected_value(s, wo, wi, h, cos_d, seen, below);
+	if (chance)
+		out.pdf = reflected_pdf(s, wo, wi, h, cos_d, seen, below, chance);
 	return out;
 }
 
 static spectrum principled_eval(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
 {
 	struct stuff s = principled_stuff(b->data, at);
-	return pair_of(&s, wo, wi, at->transport).f;
+	return pair_of(&s, wo, wi, at->transport, true, NULL).f;
 }
 
 static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
 {
 	struct stuff s = principled_stuff(b->data, at);
-	return pair_of(&s, wo, wi, at->transport).pdf;
+	double chance[LOBES];
+	chances(&s, wo, chance);
+	return pair_of(&s, wo, wi, at->transport, false, chance).pdf;
 }
 
 /* A half vector of GTR1, exactly: the inverse of its cumulative density. */
@@ -303,7 +347,7 @@ static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const d
 	vec3 h = lobe == LOBE_CLEARCOAT
 			 ? clearcoat_normal(s, u[0], u[1])
 			 : microfacet_sample_visible(lobe == LOBE_COAT ? &s->coat : &s->facets, wo, u[0], u[1]);
-	double c = fmin(vec3_dot(wo, h), 1);
+	double c = min_of(vec3_dot(wo, h), 1);
 	if (!(c > 0))
 		return false;
 	if (lobe != LOBE_TRANSMIT) {
@@ -331,7 +375,7 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	if (!(chance[lobe] > 0) || !follow(&s, lobe, mirror(wo, below), eta, u, &wi))
 		return false;
 	wi = mirror(wi, below);
-	struct pair pair = pair_of(&s, wo, wi, at->transport);
+	struct pair pair = pair_of(&s, wo, wi, at->transport, true, chance);
 	if (!(pair.pdf > 0))
 		return false;
 	bool reflect = wo.z * wi.z > 0;
@@ -380,7 +424,6 @@ int principled_shares(struct principled *p, struct bsdf *b, const struct scene_n
 		if (code)
 			return code;
 		p->most[i] = range_of(&p->share[i], build, true);
-		p->varies = true;
 	}
 	b->uses_tangents = p->most[ANISOTROPIC] > 0;
 	return 0;
@@ -418,6 +461,7 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 		return code;
 	p->lambertian = node_bool(n, "lambertian", false);
 	p->base_max = texture_max(&p->base);
+	principled_know(p, build);
 	struct microfacet least = principled_facets(p->most[ANISOTROPIC], principled_least(&p->roughness, build));
 	double metallic = principled_least(&p->metallic, build);
 	bool glass = p->most[TRANSMISSION] > 0 && metallic < 1;

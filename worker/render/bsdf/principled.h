@@ -22,25 +22,28 @@ enum {
 	SHARES
 };
 
+/* The parameters at a point of the surface. */
+struct stuff {
+	spectrum base, tint, specular; /* specular: what SPEC_TINT mixes in */
+	double roughness, metallic, share[SHARES];
+	struct microfacet facets, coat; /* coat: only where there is one */
+	const struct principled *p;
+};
+
 struct principled {
 	struct texture base, roughness, metallic, specular; /* specular: if has_specular */
 	struct texture share[SHARES];
 	double most[SHARES]; /* the largest value of each, for textures as found by bsdf_probe */
 	double eta, base_max;
-	bool varies; /* some parameter is a texture */
+	bool varies; /* some parameter but base and specular does, over the surface or with the wavelength */
 	bool has_specular;
-	bool lambertian; /* the diffuse lobe */
-};
-
-/* The parameters at a point of the surface. */
-struct stuff {
-	const struct principled *p;
-	spectrum base, tint, specular; /* specular: what SPEC_TINT mixes in */
-	double roughness, metallic, share[SHARES];
-	struct microfacet facets, coat; /* coat: only where there is one */
+	bool lambertian;    /* the diffuse lobe */
+	struct stuff known; /* without colours; all of it unless `varies` */
 };
 
 struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at);
+/* Makes `known`, once everything else is. */
+void principled_know(struct principled *p, const struct bsdf_build *build);
 struct microfacet principled_facets(double anisotropic, double roughness);
 
 /* Fresnel's factor of the boundary alone, and with it that of boundary and metal, for light from above. */

@@ -42,7 +42,7 @@ static void find_chances(struct thin_point *x, double cosine)
 {
 	const struct thin *t = x->t;
 	double base = t->p.base_max, diffuse = 1 - x->spec_trans, sum = 0;
-	double reflected = fresnel_dielectric(fmin(cosine, 1), t->p.eta).reflected;
+	double reflected = fresnel_dielectric(min_of(cosine, 1), t->p.eta).reflected;
 	/* Facets reflect other shares than the plane they lie in, so neither lobe is ever left out. */
 	x->chance[THIN_REFLECT] = x->spec_trans * (0.25 + 0.5 * reflected);
 	x->chance[THIN_TRANSMIT] = x->spec_trans * base * (0.75 - 0.5 * reflected);
@@ -88,7 +88,7 @@ static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
 	double length;
 	if (!(o.z > 0 && i.z > 0) || !microfacet_half(o, 1, i, &h, &length))
 		return out;
-	double cosine = fmin(0.5 * length, 1), seen = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, o),
+	double cosine = min_of(0.5 * length, 1), seen = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, o),
 	       both = x->spec_trans * seen * microfacet_g1_over_cos(m, i), diffuse = 1 - x->spec_trans;
 	if (reflect) {
 		spectrum boundary = principled_boundary(&x->s, cosine),
@@ -180,6 +180,7 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 	p->metallic = (struct texture){.color = color_constant(0)};
 	p->eta = node_float(n, "eta", 1.5);
 	p->base_max = texture_max(&p->base);
+	principled_know(p, build);
 	double spec_trans = p->most[TRANSMISSION];
 	double rough = principled_least(&p->roughness, build);
 	struct microfacet facets = principled_facets(p->most[ANISOTROPIC], rough),
