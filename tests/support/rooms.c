@@ -187,7 +187,11 @@ static struct world *fog(void)
 }
 
 /* Fog of which only the camera knows: the light's own sub-paths begin outside of it, and many paths that the camera could have are
- * none of any technique. */
+ * none of any technique. The strips before the wall end it: there the light's sub-paths bring what a mirror sends, and beside them
+ * no technique does, so that a mutation that leaves a strip leaves what is rendered. */
+#define STRIP(x)                                                                                                                \
+	"<shape type='rectangle'>" AT("<scale x='0.2' y='1.2'/><translate x='" x "' y='-0.5' z='-1.9'/>") PLAIN("0.5,0.45,0.35")  \
+	INSIDE("<float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/>") "</shape>"
 static struct world *misfit(void)
 {
 	return world_of_text(32, 32,
@@ -195,6 +199,8 @@ static struct world *misfit(void)
 			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film>"
 			     "<medium type='homogeneous'><float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/></medium></sensor>"
 			     BOX("0.5,0.45,0.35") "<emitter type='point'><point name='position' value='0,1.5,0'/><rgb name='intensity' value='3,2.5,2'/></emitter>"
+			     "<shape type='rectangle'>" AT("<scale value='1.9'/><rotate y='1' angle='90'/><translate x='-1.8'/>") MIRROR "</shape>"
+			     STRIP("-0.9") STRIP("0") STRIP("0.9")
 			     "<shape type='sphere'><point name='center' value='0.2,-0.6,-0.2'/><float name='radius' value='0.7'/>" GLASS "</shape>");
 }
 
