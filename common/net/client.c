@@ -207,7 +207,7 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 /* One of a name's addresses; cl->opened: it answers. */
 static int connect_to(struct client *cl, const struct net_addr *a, struct error *e)
 {
-	const struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls, NULL};
+	const struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls, NULL, NULL};
 	if (cl->conn) /* the one before did not answer in time */
 		conn_close(cl->conn, "no answer in time");
 	while (cl->conn)

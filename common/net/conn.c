@@ -115,12 +115,13 @@ static void tick_every(struct conn *c, uint64_t ms)
 /* ---- reading ---- */
 
 /* libuv reads a connection again and again while there is something to read, up to 32 times before any other. Without
- * room it goes on to the next connection. */
+ * room it goes on to the next connection. What closed connections hold is freed when the loop comes round; until then
+ * no requests are read whose answers would need memory, too. */
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 {
 	(void)suggested;
 	struct conn *c = h->data;
-	bool pause = c->frames > FRAMES_AT_ONCE;
+	bool pause = c->frames > FRAMES_AT_ONCE || (c->config.sending && c->config.sending->leaving);
 	c->frames = 0;
 	*out = uv_buf_init(chunk, pause ? 0 : sizeof chunk);
 }
@@ -378,7 +379,7 @@ static int conn_new(struct conn **out, uv_loop_t *loop, bool accepted, const str
 	c->events = events;
 	c->user = user;
 	frame_reader_init(&c->reader, config->limits);
-	send_queue_init(&c->out, (uv_stream_t *)&c->tcp, c->link, config->send_limit, &send_events, c);
+	send_queue_init(&c->out, (uv_stream_t *)&c->tcp, c->link, config->send_limit, config->sending, &send_events, c);
 	rc = uv_tcp_init(loop, &c->tcp);
 	if (rc) {
 		tls_link_free(c->link);
@@ -488,6 +489,11 @@ bool conn_distrust(const struct conn *c)
 bool conn_garbled(const struct conn *c)
 {
 	return c->garbled;
+}
+
+bool conn_gave_way(const struct conn *c)
+{
+	return c->out.gave_way;
 }
 
 /* ---- writing ---- */

@@ -10,6 +10,7 @@
 
 #include "common/net/addr.h"
 #include "common/net/receive_pool.h"
+#include "common/net/send_pool.h"
 #include "common/net/tls.h"
 #include "common/wire/envelope.h"
 #include "common/wire/frame.h"
@@ -38,6 +39,7 @@ struct conn_config {
 	struct tls
 		*tls; /* NULL: plaintext. Must outlive the connection; a peer that does not use TLS is disconnected */
 	struct receive_pool *pool; /* for frames of more than 64 KB; NULL: no limit. Must outlive the connection */
+	struct send_pool *sending; /* for all that waits to be sent; NULL: no limit. Must outlive the connection */
 };
 
 /* -errno if the attempt could not even be made; otherwise opened or closed is called later. */
@@ -58,6 +60,8 @@ conn_peer(const struct conn *c); /* from its certificate; NULL in plaintext and 
 bool conn_distrust(const struct conn *c);
 /* In `closed`: whether it ended because bytes from the peer did not match their checksum. */
 bool conn_garbled(const struct conn *c);
+/* In `closed`: whether it ended because too much waited to be sent to all peers, and this one did not read. */
+bool conn_gave_way(const struct conn *c);
 
 /* Packs and sends; the payload is copied. A failure closes the connection, so callers need not check. */
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size);

@@ -5,7 +5,7 @@
  * of what a slow peer has not taken. `on_written` encrypts more, and says when nothing is left.
  *
  * Failures are told once to the owner, who closes the stream: no memory, an error of the stream or of TLS, a peer that
- * does not read what is sent to it.
+ * does not read what is sent to it, here or while all queues together hold too much.
  */
 #include "common/net/send_queue.h"
 
@@ -13,6 +13,7 @@
 #include "common/wire/frame.h"
 
 #include <assert.h>
+#include <stddef.h>
 #include <string.h>
 
 enum {
@@ -43,10 +44,39 @@ struct writing {
 	size_t size, plain; /* what it counts for in in_flight and in unsent */
 };
 
+static uint64_t now(const struct send_queue *q)
+{
+	return uv_now(q->stream->loop);
+}
+
+/* Bytes of frames wait, or no longer do. */
+static bool count(struct send_queue *q, size_t bytes)
+{
+	if (!send_pool_add(&q->share, bytes, now(q)))
+		return false;
+	q->unsent += bytes;
+	return true;
+}
+
+static void count_off(struct send_queue *q, size_t bytes)
+{
+	q->unsent -= bytes;
+	send_pool_sub(&q->share, bytes, now(q));
+}
+
+static uint64_t left(const struct send_share *s)
+{
+	const struct send_queue *q = (const struct send_queue *)((const char *)s - offsetof(struct send_queue, share));
+	return uv_stream_get_write_queue_size(q->stream);
+}
+
+static void give_way(struct send_share *s);
+
 void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link *link, size_t limit,
-		     const struct send_events *events, void *user)
+		     struct send_pool *pool, const struct send_events *events, void *user)
 {
 	*q = (struct send_queue){.stream = stream, .link = link, .limit = limit, .events = events, .user = user};
+	q->share = (struct send_share){.pool = pool, .left = left, .give_way = give_way};
 	STAILQ_INIT(&q->frames);
 }
 
@@ -60,8 +90,10 @@ static void drop_first(struct send_queue *q)
 
 void send_queue_fini(struct send_queue *q)
 {
+	send_queue_close(q, SEND_CLOSED);
 	while (!STAILQ_EMPTY(&q->frames))
 		drop_first(q);
+	count_off(q, q->unsent);
 }
 
 bool send_queue_is_empty(const struct send_queue *q)
@@ -73,12 +105,21 @@ void send_queue_close(struct send_queue *q, enum send_state to)
 {
 	if (to > q->state)
 		q->state = to;
+	if (q->state == SEND_CLOSED)
+		send_pool_leave(&q->share);
 }
 
 static void fail(struct send_queue *q, const char *why)
 {
 	if (q->state != SEND_CLOSED)
 		q->events->failed(q->user, why);
+}
+
+static void give_way(struct send_share *s)
+{
+	struct send_queue *q = (struct send_queue *)((char *)s - offsetof(struct send_queue, share));
+	q->gave_way = true;
+	fail(q, "too much waits to be sent to all peers, and this one does not read its part");
 }
 
 static void pump(struct send_queue *q);
@@ -88,7 +129,7 @@ static void on_written(uv_write_t *r, int status)
 	struct writing *w = r->data;
 	struct send_queue *q = w->queue;
 	q->in_flight -= w->size;
-	q->unsent -= w->plain;
+	count_off(q, w->plain);
 	mem_free(w->bytes);
 	mem_free(w);
 	if (status)
@@ -212,7 +253,6 @@ static void append(struct send_queue *q, struct head head, unsigned char *bytes,
 	}
 	*f = (struct send_frame){.head = head, .bytes = bytes, .size = size, .at = skip, .plain = size + FRAME_COST};
 	STAILQ_INSERT_TAIL(&q->frames, f, next);
-	q->unsent += f->plain;
 	pump(q);
 }
 
@@ -224,12 +264,14 @@ static void send_all(struct send_queue *q, struct head head, unsigned char *byte
 	} else if (q->unsent && size > room) {
 		mem_free(bytes);
 		fail(q, "the peer does not read what is sent to it");
+	} else if (!count(q, size + FRAME_COST)) {
+		mem_free(bytes);
 	} else if (q->link) {
 		append(q, head, bytes, size, skip);
 	} else {
-		q->unsent += size + FRAME_COST;
 		to_kernel(q, head, bytes, size, skip, size + FRAME_COST);
 	}
+	send_pool_look(&q->share, now(q));
 }
 
 void send_queue_frame(struct send_queue *q, unsigned char *frame, size_t size)

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What one connection sends: frames in the order in which they were given, encrypted if the connection uses TLS, with
- * a bound on what waits. A member of its connection; all calls on the loop's thread, none waits, each frame's memory
- * is the queue's from the call on, whatever becomes of it.
+ * a bound on what waits, and perhaps one on what waits in all queues. A member of its connection; all calls on the
+ * loop's thread, none waits, each frame's memory is the queue's from the call on, whatever becomes of it.
  */
 #ifndef COMMON_NET_SEND_QUEUE_H
 #define COMMON_NET_SEND_QUEUE_H
 
+#include "common/net/send_pool.h"
 #include "common/net/tls.h"
 
 #include <sys/queue.h>
@@ -37,12 +38,15 @@ struct send_queue {
 	enum send_state state;
 	STAILQ_HEAD(, send_frame) frames; /* waiting to be encrypted */
 	size_t unsent;			  /* bytes of frames that the kernel has not taken, and their overhead */
+	struct send_share share;	  /* the same in the pool of all queues */
 	size_t in_flight;		  /* what libuv has to write; with TLS including its overhead */
 	bool sent;			  /* the first frame has been taken */
+	bool gave_way;			  /* it failed because all queues together held too much */
 };
 
+/* pool: NULL: no limit of all. Must outlive the queue. */
 void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link *link, size_t limit,
-		     const struct send_events *events, void *user);
+		     struct send_pool *pool, const struct send_events *events, void *user);
 /* After the stream has been closed, so that libuv has given back all that it had. */
 void send_queue_fini(struct send_queue *q);
 

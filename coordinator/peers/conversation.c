@@ -8,8 +8,9 @@
  * an event for the core, and each result is checked first (results.c).
  *
  * An invalid message is answered by Fault, and the connection ends. Data that a peer does not read is bounded by a send
- * limit. When the maximum of connections is reached, the oldest one without a hello is closed. When a connection ends,
- * the core gets EVENT_LEFT, and the peer's uploads, fetches and requests are dropped.
+ * limit, data of all peers by another: then those that have not read for longest are disconnected. When the maximum of
+ * connections is reached, the oldest one without a hello is closed. When a connection ends, the core gets EVENT_LEFT,
+ * and the peer's uploads, fetches and requests are dropped.
  */
 #include "coordinator/peers/conversation.h"
 
@@ -202,6 +203,7 @@ static void on_closed(void *user, const char *why)
 	s->garbled += conn_garbled(p->conn);
 	log_event(conn_garbled(p->conn)	       ? LOG_PEER_GARBLED
 		  : conn_distrust(p->conn)     ? LOG_PEER_REFUSED
+		  : conn_gave_way(p->conn)     ? LOG_PEER_REFUSED
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
 					       : LOG_PEER_ACCEPT,
 		  "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,

@@ -49,7 +49,8 @@ void peers_accept(struct peers *s)
 				     s->jobs->config.stall_seconds,
 				     s->jobs->config.hello_seconds,
 				     s->tls,
-				     &s->receiving};
+				     &s->receiving,
+				     &s->sending};
 	struct error e;
 	bool room = s->session_count < s->jobs->config.max_connections || make_room(s);
 	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
@@ -168,6 +169,7 @@ void peers_init(struct peers *s)
 {
 	uv_tcp_init(s->jobs->loop, &s->listener);
 	s->receiving.limit = s->jobs->config.receive_bytes;
+	s->sending.limit = s->jobs->config.send_bytes;
 	s->jobs->peers = (struct peer_calls){.user = s,
 					     .name = name,
 					     .send_lease = worker_send_lease,

@@ -75,6 +75,7 @@ struct peers {
 	size_t held_bytes;   /* bytes of waiting requests while jobs are read */
 	size_t upload_bytes; /* of all submissions that wait for blobs */
 	struct receive_pool receiving;
+	struct send_pool sending;
 	uint64_t last_peer;
 	uint64_t garbled;  /* connections closed because of a wrong checksum */
 	bool caller_waits; /* a connection could not be accepted: try again */

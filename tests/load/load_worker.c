@@ -488,7 +488,7 @@ void load_connect(struct load *l, unsigned index)
 {
 	static const struct conn_events events = {
 		.opened = on_opened, .message = on_message, .drained = on_drained, .closed = on_closed};
-	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, 600, 0, l->tls, NULL};
+	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, 600, 0, l->tls, NULL, NULL};
 	struct load_worker *w = &l->workers[index];
 	struct error e;
 	w->load = l;

@@ -145,7 +145,7 @@ static void fail_to_connect(struct agent *a, const struct error *e)
 static void on_resolved(uv_getaddrinfo_t *r, int status, struct addrinfo *found)
 {
 	struct agent *a = r->data;
-	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10, a->tls, NULL};
+	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10, a->tls, NULL, NULL};
 	struct net_addrs to;
 	struct error e;
 	a->resolves = false;

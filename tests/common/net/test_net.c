@@ -131,7 +131,7 @@ static void connect_ends(void)
 	memset(&here, 0, sizeof here);
 	memset(&there, 0, sizeof there);
 	memset(&bound, 0, sizeof bound);
-	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, listening, NULL};
+	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, listening, NULL, NULL};
 	caller = config;
 	caller.tls = calling;
 	assert_int_equal(uv_loop_init(&loop), 0);

@@ -167,7 +167,7 @@ static void open_all(double stall_seconds)
 	memset(&bound, 0, sizeof bound);
 	accepted = arrived = 0;
 	pool = (struct receive_pool){.limit = LONG + HALF};
-	config = (struct conn_config){{4096, PROMISED}, 8 << 20, stall_seconds, 0, NULL, &pool};
+	config = (struct conn_config){{4096, PROMISED}, 8 << 20, stall_seconds, 0, NULL, &pool, NULL};
 	struct conn_config caller = config;
 	caller.pool = NULL;
 	assert_int_equal(uv_loop_init(&loop), 0);

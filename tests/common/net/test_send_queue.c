@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Frames leave in their order, the first as it is and each further one checked; what waits is bounded; each state sends
- * what it says. Over a pair of sockets whose far end is read by hand, so that a peer that does not read is one. What
- * goes through TLS is test_net's.
+ * Frames leave in their order, the first as it is and each further one checked; what waits is bounded, in one queue and
+ * in all; each state sends what it says. Over a pair of sockets whose far end is read by hand, so that a peer that does
+ * not read is one. What goes through TLS is test_net's.
  */
 #include "common/base/mem.h"
 #include "common/net/send_queue.h"
@@ -23,14 +23,16 @@
 
 enum { LIMIT = 1 << 20, LARGE = 4 << 20 /* more than the kernel takes at once */ };
 
+static uv_loop_t loop;
+static struct send_pool pool;
+
 static struct fixture {
-	uv_loop_t loop;
 	uv_pipe_t pipe;
 	int far;
 	struct send_queue queue;
 	int failed, drained;
 	char why[80];
-} f;
+} f, other;
 
 static void on_failed(void *user, const char *why)
 {
@@ -47,30 +49,42 @@ static void on_drained(void *user)
 
 static const struct send_events events = {.failed = on_failed, .drained = on_drained};
 
-static int begin(void **state)
+static void begin_one(struct fixture *x, size_t limit)
 {
 	int ends[2];
-	(void)state;
-	memset(&f, 0, sizeof f);
+	memset(x, 0, sizeof *x);
 	assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
-	f.far = ends[1];
-	assert_int_equal(uv_loop_init(&f.loop), 0);
-	assert_int_equal(uv_pipe_init(&f.loop, &f.pipe, 0), 0);
-	assert_int_equal(uv_pipe_open(&f.pipe, ends[0]), 0);
-	send_queue_init(&f.queue, (uv_stream_t *)&f.pipe, NULL, LIMIT, &events, &f);
+	x->far = ends[1];
+	assert_int_equal(uv_pipe_init(&loop, &x->pipe, 0), 0);
+	assert_int_equal(uv_pipe_open(&x->pipe, ends[0]), 0);
+	send_queue_init(&x->queue, (uv_stream_t *)&x->pipe, NULL, limit, &pool, &events, x);
+}
+
+static void end_one(struct fixture *x)
+{
+	send_queue_close(&x->queue, SEND_CLOSED);
+	uv_close((uv_handle_t *)&x->pipe, NULL);
+	uv_run(&loop, UV_RUN_NOWAIT);
+	assert_int_equal(x->queue.in_flight, 0);
+	send_queue_fini(&x->queue);
+	close(x->far);
+}
+
+static int begin(void **state)
+{
+	(void)state;
+	pool = (struct send_pool){.limit = 2 * LARGE + LIMIT};
+	assert_int_equal(uv_loop_init(&loop), 0);
+	begin_one(&f, LIMIT);
 	return 0;
 }
 
 static int end(void **state)
 {
 	(void)state;
-	send_queue_close(&f.queue, SEND_CLOSED);
-	uv_close((uv_handle_t *)&f.pipe, NULL);
-	uv_run(&f.loop, UV_RUN_DEFAULT);
-	assert_int_equal(f.queue.in_flight, 0);
-	send_queue_fini(&f.queue);
-	close(f.far);
-	return uv_loop_close(&f.loop);
+	end_one(&f);
+	assert_true(pool.used == 0 && pool.leaving == 0 && LIST_EMPTY(&pool.waiting));
+	return uv_loop_close(&loop);
 }
 
 /* A frame of so many bytes of content, each `fill`. */
@@ -88,6 +102,32 @@ static void send_frame(size_t content, unsigned char fill)
 	send_queue_frame(&f.queue, frame_of(content, fill), FRAME_PREFIX + content);
 }
 
+static void time_passes(void)
+{
+	for (uint64_t then = uv_now(&loop); uv_now(&loop) < then + 2;)
+		uv_update_time(&loop);
+}
+
+/* Two hold too much together: the one gives way whose far end reads nothing, though the other one has waited longer. */
+static void who_reads_stays(void **state)
+{
+	static char bytes[LIMIT];
+	(void)state;
+	begin_one(&other, 2 * LARGE);
+	send_queue_frame(&other.queue, frame_of(LARGE, 'a'), FRAME_PREFIX + LARGE);
+	time_passes();
+	send_frame(LARGE, 'b');
+	time_passes();
+	assert_true(recv(other.far, bytes, sizeof bytes, MSG_DONTWAIT) > 0);
+	uv_run(&loop, UV_RUN_NOWAIT); /* a part of a frame: only the kernel knows */
+	assert_true(f.failed == 0 && pool.used > 2 * LARGE);
+	send_queue_frame(&other.queue, frame_of(LIMIT, 'c'), FRAME_PREFIX + LIMIT);
+	assert_true(f.failed == 1 && f.queue.gave_way && other.failed == 0);
+	assert_string_equal(f.why, "too much waits to be sent to all peers, and this one does not read its part");
+	assert_true(pool.leaving > LARGE && pool.used > LARGE && pool.used <= pool.limit);
+	end_one(&other);
+}
+
 /* What the far end gets, until there are so many bytes. */
 static unsigned char *receive(size_t size)
 {
@@ -95,7 +135,7 @@ static unsigned char *receive(size_t size)
 	size_t at = 0;
 	assert_non_null(bytes);
 	while (at < size) {
-		uv_run(&f.loop, UV_RUN_NOWAIT);
+		uv_run(&loop, UV_RUN_NOWAIT);
 		assert_int_equal(f.failed, 0);
 		ssize_t n = recv(f.far, bytes + at, size - at, MSG_DONTWAIT);
 		assert_true(n > 0 || (n < 0 && errno == EAGAIN));
@@ -108,7 +148,7 @@ static bool nothing_comes(void)
 {
 	char byte;
 	for (int i = 0; i < 10; i++)
-		uv_run(&f.loop, UV_RUN_NOWAIT);
+		uv_run(&loop, UV_RUN_NOWAIT);
 	return recv(f.far, &byte, 1, MSG_DONTWAIT) < 0 && errno == EAGAIN;
 }
 
@@ -195,7 +235,7 @@ static void error_of_the_stream(void **state)
 	send_frame(3, 'a');
 	send_frame(3, 'b');
 	for (int i = 0; i < 10; i++)
-		uv_run(&f.loop, UV_RUN_NOWAIT);
+		uv_run(&loop, UV_RUN_NOWAIT);
 	assert_int_equal(f.failed, 1);
 	assert_int_equal(f.drained, 0);
 	assert_int_equal(f.queue.in_flight, 0);
@@ -207,6 +247,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(first_plain_then_checked, begin, end),
 		cmocka_unit_test_setup_teardown(what_waits_is_bounded, begin, end),
 		cmocka_unit_test_setup_teardown(many_small_frames_reach_the_limit, begin, end),
+		cmocka_unit_test_setup_teardown(who_reads_stays, begin, end),
 		cmocka_unit_test_setup_teardown(draining_sends_what_it_has, begin, end),
 		cmocka_unit_test_setup_teardown(states_only_advance, begin, end),
 		cmocka_unit_test_setup_teardown(error_of_the_stream, begin, end),
