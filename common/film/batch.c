@@ -108,6 +108,23 @@ static int check_tiles(const struct batch *b, const struct plan *p, struct error
 	return 0;
 }
 
+enum {
+	STATE_HEAD = 64,
+	STATE_VERTEX = 128, /* random numbers of both sub-paths; as a vertex of a path it has 40 */
+	STATE_COST = 48,    /* of memory besides the bytes: struct chain_state and what an allocation needs */
+};
+
+uint32_t chain_state_max(const struct plan *p)
+{
+	uint64_t vertices = (uint64_t)p->max_depth + 1, size = STATE_HEAD + STATE_VERTEX * vertices;
+	return size < CHAIN_STATE_MAX ? (uint32_t)size : CHAIN_STATE_MAX;
+}
+
+uint64_t chain_states_max(const struct plan *p)
+{
+	return (uint64_t)p->chains * (chain_state_max(p) + STATE_COST);
+}
+
 static int check_states(const struct batch *b, const struct plan *p, uint64_t *live, struct error *e)
 {
 	struct plan_range chains = plan_chain_range(p, b->key.part);
@@ -119,8 +136,10 @@ static int check_states(const struct batch *b, const struct plan *p, uint64_t *l
 				 (unsigned long long)expected);
 	for (uint32_t i = 0; i < b->state_count; i++) {
 		const struct chain_state *s = &b->states[i];
-		if (s->size > CHAIN_STATE_MAX || (s->size && !s->bytes))
-			return error_set(e, EBADMSG, "a chain state of %u bytes; at most %d", s->size, CHAIN_STATE_MAX);
+		if (s->size > chain_state_max(p) || (s->size && !s->bytes))
+			return error_set(e, EBADMSG,
+					 "a chain state of %u bytes; paths of up to %u edges have at most %u", s->size,
+					 p->max_depth, chain_state_max(p));
 		*live += s->size > 0;
 	}
 	return 0;

@@ -36,9 +36,14 @@ struct tile {
 /* The state of one chain after an epoch: opaque to all but the integrator. Any worker can continue from it. */
 struct chain_state {
 	uint8_t *bytes;
-	uint32_t size; /* 1..CHAIN_STATE_MAX */
+	uint32_t size; /* 1..chain_state_max */
 };
-enum { CHAIN_STATE_MAX = 1 << 16 };
+enum { CHAIN_STATE_MAX = 5376 }; /* of any plan */
+
+/* The longest state of a chain of this plan: so many bytes for each vertex of the longest path. */
+uint32_t chain_state_max(const struct plan *p);
+/* Memory that the states of all its chains need at most. */
+uint64_t chain_states_max(const struct plan *p);
 
 enum { BATCH_COUNTERS = 16 };
 enum batch_counter {
@@ -131,10 +136,10 @@ void batch_fini(struct batch *b);
 
 /* Checks everything that can be checked without the scene: the key is in the plan; tiles are inside the crop,
  * aligned, unique, in order; values are finite; counts match the plan (COUNT_SAMPLES of a render lease and
- * COUNT_INDEPENDENT of a bootstrap lease exactly); states have bounded sizes; weights >= 0; as many strategies as
- * the plan has, none with more proposals than samples; no class and no sequence with more time than its mutations;
- * no tile with a second moment above the first; sums that non-negative numbers can have; counters of the order of
- * the samples. -EBADMSG with a sentence. */
+ * COUNT_INDEPENDENT of a bootstrap lease exactly); states have sizes that such states can have; weights >= 0; as many
+ * strategies as the plan has, none with more proposals than samples; no class and no sequence with more time than its
+ * mutations; no tile with a second moment above the first; sums that non-negative numbers can have; counters of the
+ * order of the samples. -EBADMSG with a sentence. */
 int batch_check(const struct batch *b, const struct plan *p, struct error *e);
 
 #endif

@@ -23,7 +23,7 @@ static uint32_t chains_per_lease(const struct plan *p)
 
 uint32_t states_payload_max(const struct plan *p)
 {
-	uint64_t n = (uint64_t)chains_per_lease(p) * CHAIN_STATE_MAX;
+	uint64_t n = (uint64_t)chains_per_lease(p) * chain_state_max(p);
 	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
 }
 

@@ -91,7 +91,7 @@ static int read_states(struct live_job *job, struct checked_file *in, struct err
 			struct chain_state *c = &job->states[i][k];
 			uint32_t size;
 			rc = checked_file_read_numbers(in, &size, sizeof size, 1, e);
-			if (!rc && (size == 0 || size > CHAIN_STATE_MAX))
+			if (!rc && (size == 0 || size > chain_state_max(&job->plan)))
 				rc = error_set(e, EBADMSG, "the state of a chain has %u bytes", size);
 			if (!rc && !(c->bytes = mem_alloc(size, 1)))
 				rc = error_set(e, ENOMEM, "no memory for chains");

@@ -85,11 +85,18 @@ static int within_quota(const struct session *p, struct error *e)
 				 p->upload->submit.message->submit, e);
 }
 
-/* Whether it could be stored on an empty disk: otherwise it would be held for ever, and with it others. */
+/* Whether it could be stored on an empty disk: otherwise it would be held for ever, and with it others. Whether memory
+ * has room for its chain states, if workers send the longest that there are. */
 static int fits(const struct session *p, struct error *e)
 {
 	const Farm__Submit *m = p->upload->submit.message->submit;
-	uint64_t bytes = canvas_bytes(&p->upload->plan);
+	uint64_t bytes = canvas_bytes(&p->upload->plan), states = chain_states_max(&p->upload->plan);
+	if (states > p->jobs->config.state_bytes)
+		return error_set(e, ENOMEM,
+				 "the states of its %u chains could need %.3g MB of the coordinator's memory, and "
+				 "%.3g MB is the most: fewer --chains, or a smaller --max-depth",
+				 p->upload->plan.chains, 1e-6 * (double)states,
+				 1e-6 * (double)p->jobs->config.state_bytes);
 	for (size_t i = 0; i < m->n_files; i++)
 		bytes += m->files[i]->size;
 	return spool_holds(p->jobs->spool, bytes, e);

@@ -111,6 +111,7 @@ void server_config_init(struct server_config *c)
 				    .film_bytes = quarter_of_memory(),
 				    .waiting_bytes = quarter_of_memory(),
 				    .receive_bytes = quarter_of_memory() / 2,
+				    .state_bytes = quarter_of_memory(),
 				    .send_bytes = quarter_of_memory() / 2,
 				    .hello_seconds = 10,
 				    .stall_seconds = 30};

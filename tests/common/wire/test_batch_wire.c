@@ -273,6 +273,30 @@ static void moments_are_the_plans(void **state)
 	assert_int_equal(batch_moment_count(&p, LEASE_RENDER), 0);
 }
 
+/* No state is longer than the longest path makes it, whatever a worker sends. */
+static void states_are_as_long_as_paths(void **state)
+{
+	(void)state;
+	static const struct {
+		uint32_t max_depth, most;
+	} plans[] = {{1, 320}, {10, 1472}, {32, 4288}, {41, CHAIN_STATE_MAX}, {128, CHAIN_STATE_MAX}};
+	struct plan p = chain_plan();
+	struct batch b = chain_batch(&p);
+	struct error e;
+	assert_int_equal(batch_check(&b, &p, &e), 0);
+	for (size_t i = 0; i < sizeof plans / sizeof *plans; i++) {
+		struct chain_state *s = &b.states[1];
+		p.max_depth = plans[i].max_depth;
+		mem_free(s->bytes);
+		*s = (struct chain_state){mem_alloc(plans[i].most + 1, 1), plans[i].most};
+		assert_int_equal(batch_check(&b, &p, &e), 0);
+		assert_int_equal(chain_states_max(&p), 64 * (uint64_t)(plans[i].most + 48));
+		s->size++;
+		assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
+	}
+	batch_fini(&b);
+}
+
 static void weights_travel(void **state)
 {
 	(void)state;
@@ -459,10 +483,15 @@ static void the_largest_lease_travels(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_batch_travels),	 cmocka_unit_test(memory_may_end_anywhere),
-		cmocka_unit_test(moments_are_the_plans), cmocka_unit_test(weights_travel),
-		cmocka_unit_test(grants_travel),	 cmocka_unit_test(the_largest_lease_travels),
-		cmocka_unit_test(plans_travel),		 cmocka_unit_test(strategies_are_the_plans),
+		cmocka_unit_test(a_batch_travels),
+		cmocka_unit_test(memory_may_end_anywhere),
+		cmocka_unit_test(moments_are_the_plans),
+		cmocka_unit_test(states_are_as_long_as_paths),
+		cmocka_unit_test(weights_travel),
+		cmocka_unit_test(grants_travel),
+		cmocka_unit_test(the_largest_lease_travels),
+		cmocka_unit_test(plans_travel),
+		cmocka_unit_test(strategies_are_the_plans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

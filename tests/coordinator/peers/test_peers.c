@@ -170,6 +170,26 @@ static void submissions_are_looked_at(void **state)
 	served_still_works();
 }
 
+/* A worker may send the longest states that there are: memory must have room for them. */
+static void chains_need_memory(void **state)
+{
+	(void)state;
+	struct scripted *p = peer_call();
+	struct plan_request r = peer_plan_request(NULL);
+	assert_true(peer_hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	r.max_depth = 128;
+	r.chains = 8192;
+	assert_true(scripted_submit(p, &r, "<scene/>"));
+	const Farm__SubmitAnswer *a = peer_submit_answer(p);
+	assert_true(a->job == 0 && a->n_missing == 0);
+	assert_non_null(strstr(a->refusal, "the states of its 8192 chains could need 44.4 MB"));
+	assert_non_null(strstr(a->refusal, "and 16.8 MB is the most: fewer --chains, or a smaller --max-depth"));
+	r.max_depth = 12; /* 1,776 bytes */
+	assert_true(scripted_submit(p, &r, "<scene/>"));
+	assert_string_equal(peer_submit_answer(p)->refusal, "");
+	scripted_hang_up(p);
+}
+
 /* ---- who asks and does not read ---- */
 
 enum { PIECE = 1 << 20 };
@@ -241,7 +261,7 @@ int main(void)
 		cmocka_unit_test(rubbish_is_hung_up_on),     cmocka_unit_test(crowds_are_turned_away),
 		cmocka_unit_test(a_caller_waits_for_memory), cmocka_unit_test(the_silent_give_way),
 		cmocka_unit_test(hello_is_looked_at),	     cmocka_unit_test(submissions_are_looked_at),
-		cmocka_unit_test(the_deaf_cost_little),
+		cmocka_unit_test(chains_need_memory),	     cmocka_unit_test(the_deaf_cost_little),
 	};
 	const struct CMUnitTest quick[] = {cmocka_unit_test(stragglers_are_hung_up_on)};
 	int failed = cmocka_run_group_tests(tests, set_up, served_stop);

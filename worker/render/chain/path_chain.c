@@ -93,6 +93,7 @@ static int save(struct chain *base, struct chain_state *out)
 {
 	struct path_chain *c = path_of(base);
 	uint8_t bytes[CHAIN_STATE_HEAD + WHOLE_BYTES];
+	_Static_assert(sizeof bytes <= CHAIN_STATE_MAX, "a coordinator would refuse it");
 	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes + CHAIN_STATE_HEAD);
 	if (size == 0) {
 		base->context->counters[COUNT_STATES_LOST]++;

@@ -75,6 +75,7 @@ static int save(struct chain *base, struct chain_state *out)
 {
 	const struct pss_chain *c = pss_of(base);
 	uint8_t bytes[CHAIN_STATE_HEAD + 8 + sizeof c->current->point.u];
+	_Static_assert(sizeof bytes <= CHAIN_STATE_MAX, "a coordinator would refuse it");
 	chain_put_head(base, bytes);
 	size_t n = pss_write(&c->current->point, bytes + CHAIN_STATE_HEAD, sizeof bytes - CHAIN_STATE_HEAD);
 	assert(n > 0);
