@@ -62,9 +62,9 @@ double job_progress(const struct job *j, double now)
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
-static double seconds_left(const struct job *j, double total, double now)
+static double seconds_left(const struct job *j, double total, bool idle, double now)
 {
-	double left = INFINITY, rate = rate_value(&j->rate, now);
+	double left = INFINITY, rate = idle ? 0 : rate_value(&j->rate, now);
 	if (rate > 0)
 		left = fmax(0, total - work_done(j)) / rate;
 	if (j->plan.seconds > 0 && !isnan(j->started))
@@ -72,13 +72,13 @@ static double seconds_left(const struct job *j, double total, double now)
 	return isfinite(left) ? left : NAN;
 }
 
-struct forecast_range job_eta(const struct job *j, double now)
+struct forecast_range job_eta(const struct job *j, bool idle, double now)
 {
 	if (!job_is_live(j) || job_is_held(j))
 		return (struct forecast_range){NAN, NAN, NAN};
 	struct forecast_range total = work_total(j);
-	return (struct forecast_range){seconds_left(j, total.low, now), seconds_left(j, total.middle, now),
-				       seconds_left(j, total.high, now)};
+	return (struct forecast_range){seconds_left(j, total.low, idle, now), seconds_left(j, total.middle, idle, now),
+				       seconds_left(j, total.high, idle, now)};
 }
 
 void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds)

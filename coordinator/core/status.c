@@ -210,6 +210,16 @@ static void fill_waiting(const struct farm *f, const struct job *j, struct job_s
 		put_busy(s->owners_waiting, sizeof s->owners_waiting, j, other, false);
 }
 
+/* After fill_waiting. */
+static void fill_eta(const struct job *j, double now, struct job_status *s)
+{
+	bool idle = *s->waiting && !j->preparing && !j->evaluating;
+	struct forecast_range eta = job_eta(j, idle, now);
+	s->eta = eta.middle;
+	s->eta_low = eta.low;
+	s->eta_high = eta.high;
+}
+
 static void fill_counts(const struct job *j, struct job_status *s)
 {
 	s->rounds = j->kind == LEASE_RENDER ? j->rounds : 0;
@@ -258,14 +268,11 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.halving_cpu = j->halving.cpu_seconds,
 		.halving_seconds = job_halving_seconds(j, now),
 	};
-	struct forecast_range eta = job_eta(j, now);
-	s->eta = eta.middle;
-	s->eta_low = eta.low;
-	s->eta_high = eta.high;
 	fill_counts(j, s);
 	fill_share(f, j, s);
 	memcpy(s->text, j->text, sizeof s->text);
 	fill_waiting(f, j, s);
+	fill_eta(j, now, s);
 	return true;
 }
 

@@ -232,6 +232,43 @@ static void progress_and_rate(void **state)
 	farm_free(f);
 }
 
+/* What a job did before others took its workers says nothing about when it will be done. */
+static void no_eta_without_leases(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   START("rounds=10"),
+				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+				   "[15] submit groups=1 priority=5 -> j2 submitted, j2 is queued",
+				   NULL,
+			   });
+	near(job_status_of(f, 15).eta, 36);
+	transcript_play(f, (const char *const[]){
+				   "[17] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j2 is bootstrap, "
+				   "w1 gets j2 g0 p0 boot",
+				   NULL,
+			   });
+	struct job_status s = job_status_of(f, 17);
+	assert_string_equal(s.waiting, "waits for j2 of higher priority (5)");
+	assert_true(s.rate > 0 && isnan(s.eta) && isnan(s.eta_low) && isnan(s.eta_high));
+	farm_free(f);
+	/* a time ends it all the same */
+	f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   START("rounds=10 seconds=100"),
+				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+				   "[14] w1 leaves -> -",
+				   NULL,
+			   });
+	s = job_status_of(f, 14);
+	assert_string_equal(s.waiting, "no worker");
+	near(s.eta, 96);
+	farm_free(f);
+}
+
 static void progress_of_errors(void **state)
 {
 	(void)state;
@@ -347,6 +384,7 @@ int main(void)
 		cmocka_unit_test(cannot_be_prepared),
 		cmocka_unit_test(broken),
 		cmocka_unit_test(progress_and_rate),
+		cmocka_unit_test(no_eta_without_leases),
 		cmocka_unit_test(progress_of_errors),
 		cmocka_unit_test(doubtful_looks_end_nothing),
 		cmocka_unit_test(looks_give_a_forecast),
