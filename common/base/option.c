@@ -100,6 +100,15 @@ static void store_number(const struct option_row *r, void *field, double x)
 	}
 }
 
+static int take_name(const struct option_row *r, const char **field, const char *arg, struct error *e)
+{
+	if (!*arg || (double)strlen(arg) > r->most || !text_is_clean(arg))
+		return error_set(e, EINVAL, "--%s takes 1 to %.0f bytes of UTF-8 without control characters", r->name,
+				 r->most);
+	*field = arg;
+	return 0;
+}
+
 static int take_number(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
 	char *end, range[80];
@@ -195,6 +204,8 @@ static int store_argument(const struct option_row *r, void *target, char *arg, s
 	case OPTION_IS_TEXT:
 		*(const char **)field = arg;
 		return 0;
+	case OPTION_IS_NAME:
+		return take_name(r, field, arg, e);
 	case OPTION_IS_NUMBER:
 		return take_number(r, field, arg, e);
 	case OPTION_IS_COUNT:

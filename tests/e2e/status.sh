@@ -11,7 +11,14 @@ is_state "$id" queued || fail "without workers a job waits"
 [ -n "$(value "$id" waiting)" ] || fail "it does not say why it waits"
 "$BIN/hslt-job" fetch --preview "$id" -o "$DIR/early.exr" 2>"$DIR/err.log" && fail "there is a preview of nothing"
 grep -q "no round of $id is complete yet" "$DIR/err.log" || fail "a preview of nothing: $(cat "$DIR/err.log")"
-code 6 "$BIN/hslt-submit" "$BOX" -o "$DIR/b.exr" --spp 1 --name "$(printf %0200d 0)"
+for name in "$(printf %0200d 0)" "$(printf 'a\033[2J')"; do
+	code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/b.exr" --spp 1 --name "$name"
+	grep -q -e '--name takes 1 to 127 bytes of UTF-8 without control characters' "$DIR/err.log" || fail "a name: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-worker" --name "$name" --cache "$DIR/cache"
+done
+long=$DIR/$(printf %0150d 0).xml # without --name, the file's name is the job's
+cp "$BOX" "$long"
+code 6 "$BIN/hslt-submit" "$long" --path "$(dirname "$BOX")" -o "$DIR/b.exr" --spp 1
 grep -q -e "--name: at most 127 bytes" "$DIR/err.log" || fail "a long name: $(cat "$DIR/err.log")"
 second=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --spp 1)
 "$BIN/hslt-job" cancel "$second" >/dev/null

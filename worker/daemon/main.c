@@ -12,15 +12,6 @@
 
 #define CONFIG struct agent_config
 
-static int take_name(void *target, char *arg, struct error *e)
-{
-	struct agent_config *c = target;
-	if (!*arg || strlen(arg) > 127)
-		return error_set(e, EINVAL, "--name takes 1 to 127 bytes");
-	c->name = arg;
-	return 0;
-}
-
 static int take_verbose(void *target, char *arg, struct error *e)
 {
 	(void)target, (void)arg, (void)e;
@@ -32,7 +23,7 @@ static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(CONFIG, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
 	{"threads", 't', "N", "Render threads (all cores)", OPTION_COUNT(CONFIG, threads, 1, 1024)},
-	{"name", 0, "NAME", "Displayed name of the worker (host and process)", OPTION_TAKE(take_name)},
+	{"name", 0, "NAME", "Displayed name of the worker (host and process)", OPTION_NAME(CONFIG, name, 127)},
 	{"cache", 0, "DIR", "Folder of cached scene files (~/.cache/hslt)", OPTION_TEXT(CONFIG, cache)},
 	{"cache-size", 0, "GB", "Limit of the cache", OPTION_SCALED(CONFIG, cache_bytes, 0.001, 1e6, 1e9),
 	 .standard = "20"},

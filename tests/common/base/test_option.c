@@ -17,7 +17,7 @@ struct part {
 };
 
 struct arguments {
-	const char *output, *tls, *word[2];
+	const char *output, *tls, *name, *word[2];
 	bool wait, quiet;
 	double stops, share, trim;
 	uint32_t threads;
@@ -54,6 +54,7 @@ static void more(char *text, size_t size)
 static const struct option_row rows[] = {
 	{"output", 'o', "FILE", "The image", OPTION_TEXT(struct arguments, output), .needed = true},
 	{"tls", 0, "DIR", "Certificates", OPTION_TEXT(struct arguments, tls), .environment = "HSLT_TEST_TLS"},
+	{"name", 'n', "NAME", "Displayed", OPTION_NAME(struct arguments, name, 9)},
 	{"wait", 'w', NULL, "Show progress", OPTION_FLAG(struct arguments, wait)},
 	{"quiet", 'q', NULL, "Print errors only", OPTION_FLAG(struct arguments, quiet)},
 	{"exposure", 'e', "STOPS", "Twice as bright for each", OPTION_NUMBER(struct arguments, stops, -100, 100),
@@ -143,8 +144,10 @@ static void refused(const char *line, const char *why)
 static void test_kinds(void **state)
 {
 	(void)state;
-	accepted("list -o x --trim 0.25 --share 5% --threads 1k --time 2m --spp +2k --blobs 0.5 --kind bdpt -e -2");
+	accepted(
+		"list -o x --name gr\xc3\xbc\xc3\x9f\x65. --trim 0.25 --share 5% --threads 1k --time 2m --spp +2k --blobs 0.5 --kind bdpt -e -2");
 	assert_string_equal(a.output, "x");
+	assert_string_equal(a.name, "gr\xc3\xbc\xc3\x9f\x65.");
 	assert_true(a.trim == 0.25 && a.share == 0.05 && a.stops == -2 && a.part.seconds == 120);
 	assert_true(a.threads == 1000 && a.part.spp == 2000);
 	assert_int_equal(a.bytes, 500000000);
@@ -166,6 +169,10 @@ static void test_bounds(void **state)
 	refused("list -o x --time 0", "--time takes a number of seconds above 0 and at most 1000000000, not '0'");
 	refused("list -o x --time 5y", "--time takes a time such as 90, 90s, 5m or 2h, not '5y'");
 	refused("list --output=", "--output takes the name of a file, not ''");
+	refused("list -o x --name=", "--name takes 1 to 9 bytes of UTF-8 without control characters");
+	refused("list -o x --name 0123456789", "--name takes 1 to 9 bytes of UTF-8 without control characters");
+	refused("list -o x --name a\033[2J", "--name takes 1 to 9 bytes of UTF-8 without control characters");
+	refused("list -o x --name a\xff", "--name takes 1 to 9 bytes of UTF-8 without control characters");
 	refused("list -o x --spp 8", "--spp takes what is to be added, such as +8, not '8'");
 	refused("list -o x --spp ++8", "--spp takes a whole number from 1 to 1000000000, not '+8'");
 	refused("list -o x --threads +3", "--threads takes a whole number from 1 to 1024, not '+3'");
@@ -312,7 +319,7 @@ static void test_completion(void **state)
 	has(text, "\t--tls) mapfile -t COMPREPLY < <(compgen -d -- ");
 	has(text, "\t-k | --kind) mapfile -t COMPREPLY < <(compgen -W \"path bdpt hslt\" -- ");
 	has(text, "\t--share) mapfile -t COMPREPLY < <(compgen -W \"\" -- ");
-	has(text, "-W \"--output --tls --wait --quiet --exposure ");
+	has(text, "-W \"--output --tls --name --wait --quiet --exposure ");
 	has(text, "-W \"list fetch\" -f -- ");
 	has(text, "\ncomplete -o filenames -F _hslt_test hslt-test\n");
 	assert_null(strstr(text, "sort"));
