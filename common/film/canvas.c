@@ -128,6 +128,15 @@ bool canvas_is_mapped(const struct canvas *c)
 	return c->fd >= 0;
 }
 
+uint64_t canvas_unreserved(const struct canvas *c)
+{
+	struct stat st;
+	if (!canvas_is_mapped(c) || disk_fstat(c->fd, &st))
+		return 0;
+	uint64_t size = (uint64_t)st.st_size, has = 512 * (uint64_t)st.st_blocks;
+	return size > has ? size - has : 0;
+}
+
 int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, const char *folder, struct error *e)
 {
 	assert(grid_exponent >= -EXPONENT_MOST && grid_exponent <= EXPONENT_MOST);

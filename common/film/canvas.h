@@ -33,6 +33,8 @@ size_t canvas_bytes(const struct plan *p); /* of its films */
 /* Whether there is room for films in memory: what canvas_new without a folder says after a bootstrap. */
 int canvas_probe(const struct plan *p, struct error *e);
 bool canvas_is_mapped(const struct canvas *c); /* to a file */
+/* Bytes of that file for which the disk has not given room yet. */
+uint64_t canvas_unreserved(const struct canvas *c);
 
 /* Bootstrap batches add only their independent sums. Counters and sums of render batches belong to their round.
  * -EEXIST: merged before; -EAGAIN: the round is not open, or an earlier batch is taken back; -ERANGE: a sum left the

@@ -291,6 +291,14 @@ double farm_elapsed(const struct farm *f, uint64_t id, double now)
 	return j ? job_elapsed(j, now) : NAN;
 }
 
+bool farm_expects_results(const struct farm *f, uint64_t id, int *priority)
+{
+	const struct job *j = farm_find_job(f, id);
+	*priority = j ? j->priority : 0;
+	return j && job_is_live(j) && !*j->held[HOLD_FILES] && !*j->held[HOLD_ORDERED] &&
+	       (j->leases_out || *j->held[HOLD_STORAGE]);
+}
+
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
 {
 	const struct peer *p = farm_find_peer(f, id);

@@ -78,6 +78,8 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c);	    /* false: unknown */
 /* s since the job's first lease, without the time it was held; NAN: none yet, or unknown */
 double farm_elapsed(const struct farm *f, uint64_t id, double now);
+/* Whether results of this job may come: it has leases at workers, or only lacks room for them. Its priority, too. */
+bool farm_expects_results(const struct farm *f, uint64_t id, int *priority);
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);
 bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s); /* i-th lease of a worker */
 

@@ -224,7 +224,10 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 	size_t size = in->frame_size + in->payload->size;
 	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
 	do {
-		rc = room_is_left(jobs, job, size)
+		uint64_t first = room_first(jobs, job);
+		rc = first ? error_set(e, ENOSPC, "the disk has no room for it besides j%llu, which goes first",
+				       (unsigned long long)first)
+		     : room_is_left(jobs, job, size)
 			     ? journal_reserve(job->journal, size + PINNED_ROOM, e)
 			     : error_set(e, ENOSPC,
 					 "No space left on the disk but what a checkpoint of its results needs");
@@ -422,7 +425,7 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
 	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
-	if (job->unsure)
+	if (job->unsure || room_first(jobs, job))
 		return -EAGAIN;
 	int rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
 	if (rc && rc != -EAGAIN)

@@ -2,7 +2,10 @@
 #include "coordinator/jobs/room.h"
 
 #include "common/base/disk.h"
+#include "common/base/mem.h"
 #include "coordinator/retention/keep.h"
+
+#include <stdlib.h>
 
 bool room_make(const struct jobs *jobs)
 {
@@ -36,6 +39,70 @@ bool room_is_ample(const struct jobs *jobs)
 		largest = size > largest ? size : largest;
 	}
 	return need + largest <= available(jobs);
+}
+
+static int compare(const void *first, const void *second)
+{
+	const struct room_claim *a = first, *b = second;
+	if (a->priority != b->priority)
+		return a->priority > b->priority ? -1 : 1;
+	return a->job < b->job ? -1 : a->job > b->job;
+}
+
+void room_share(struct room_claim *claims, size_t count, uint64_t available)
+{
+	bool any = false;
+	qsort(claims, count, sizeof *claims, compare);
+	for (size_t i = 0; i < count; i++) {
+		claims[i].goes = claims[i].bytes <= available;
+		available -= claims[i].goes ? claims[i].bytes : 0;
+		any = any || claims[i].goes;
+	}
+	if (count && !any)
+		claims[0].goes = true;
+}
+
+static uint64_t claim_of(const struct jobs *jobs, const struct live_job *job)
+{
+	uint64_t size = checkpoint_size(job), most = job->kept_bytes + size, journal = journal_bytes(job->journal);
+	uint64_t films = job->canvas ? canvas_unreserved(job->canvas) : 0;
+	if (!job->canvas && jobs_film_folder(jobs, &job->plan))
+		films = canvas_bytes(&job->plan);
+	return size + (most > journal ? most - journal : 0) + films;
+}
+
+/* In order of room_share; mem_alloc'd, NULL: no memory. */
+static struct room_claim *claims_of_all(const struct jobs *jobs, const struct live_job *asking, size_t *count)
+{
+	size_t live = 0;
+	for (const struct live_job *j = jobs->live; j; j = j->next)
+		live++;
+	struct room_claim *claims = mem_alloc(live, sizeof *claims);
+	*count = 0;
+	for (const struct live_job *j = jobs->live; j && claims; j = j->next) {
+		int priority;
+		bool expects = farm_expects_results(jobs->farm, j->id, &priority);
+		if (j->journal && !j->ended && (expects || j == asking))
+			claims[(*count)++] = (struct room_claim){j->id, claim_of(jobs, j), priority, false};
+	}
+	if (claims)
+		room_share(claims, *count, available(jobs));
+	return claims;
+}
+
+uint64_t room_first(const struct jobs *jobs, const struct live_job *job)
+{
+	size_t count;
+	uint64_t first = 0;
+	struct room_claim *claims = claims_of_all(jobs, job, &count);
+	for (size_t i = count; claims && i-- > 0;) {
+		if (claims[i].goes)
+			first = claims[i].job;
+		if (first == job->id)
+			break;
+	}
+	mem_free(claims);
+	return first == job->id ? 0 : first;
 }
 
 uint64_t room_for_journal(const struct jobs *jobs, const struct live_job *job, bool ample)

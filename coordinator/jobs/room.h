@@ -10,6 +10,18 @@
 bool room_make(const struct jobs *jobs);
 /* Whether the journals of all running jobs can grow to their limits, and a checkpoint be written then. */
 bool room_is_ample(const struct jobs *jobs);
+/* What a job may have to write until a checkpoint has replaced its journal. */
+struct room_claim {
+	uint64_t job, bytes;
+	int priority;
+	bool goes; /* filled in: it may write */
+};
+/* Several jobs may fit on the disk one by one, and together fill it until none can write its checkpoint, which is what
+ * makes room again. So a job goes on only if its claim fits beside those of the jobs before it that go on: jobs of
+ * higher priority, and older ones. If none fits, the first goes on, and may need less. Sorts them. */
+void room_share(struct room_claim *claims, size_t count, uint64_t available);
+/* The job for which this one must wait by that rule, among all from which results may come; 0: it may write. */
+uint64_t room_first(const struct jobs *jobs, const struct live_job *job);
 /* Bytes of a job's journal beyond which a checkpoint replaces it: the limit that was set, or as many as the checkpoint
  * has; where room is not ample, as many as the checkpoint has. */
 uint64_t room_for_journal(const struct jobs *jobs, const struct live_job *job, bool ample);

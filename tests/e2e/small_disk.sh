@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A disk that is smaller than the limits of journals and scene files: checkpoints replace journals early, and files of no job are deleted.
+# A disk that is smaller than the limits of journals and scene files: checkpoints replace journals early, files of no job are deleted, and jobs
+# that do not fit together wait for each other.
 if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
 	if ! unshare -rm true 2>/dev/null; then
 		echo "skipped: no name spaces for mounts here"
@@ -40,3 +41,19 @@ grep -q "event=checkpoint job=$id " "$DIR/coordinator.log" || fail "there was no
 "$BIN/hslt-render" "$BOX" -o "$DIR/render.exr" $JOB 2>/dev/null
 same "$DIR/farm.exr" "$DIR/render.exr"
 echo "$(grep -c 'event=batch_merged' "$DIR/coordinator.log") results through 16 MB"
+
+# Several jobs that each fit, and not together: some wait, until those before them have ended.
+mount -o remount,size=$(($(df --output=used -k "$DIR/spool" | tail -n 1) + 14000))k "$DIR/spool"
+ids=
+for k in 1 2 3 4; do
+	ids="$ids $(submit "$BOX" -o "$DIR/none.exr" $JOB --seed $k)"
+done
+waited=
+for id in $ids; do
+	until is_state "$id" done; do
+		waited="$waited$(for other in $ids; do value "$other" waiting; done | grep 'besides j' || :)"
+		[ $((looks = ${looks:-0} + 1)) -lt 300 ] || fail "$(for other in $ids; do echo "$other $(value "$other" state): $(value "$other" waiting)"; done)"
+		sleep 0.2
+	done
+done
+[ -n "$waited" ] || fail "no job waited for another one: the disk is too large for this test"

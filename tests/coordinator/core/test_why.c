@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Why a job waits is said in each state in which one can wait, and not while somebody works on it. */
+/* Why a job waits is said in each state in which one can wait, and not while somebody works on it. Whose results may
+ * come. */
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>
@@ -106,8 +107,37 @@ static void every_state(void **state)
 	}
 }
 
+/* Room on the disk is kept for jobs that have leases at workers, or lack nothing else. */
+static void whose_results_may_come(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *line;
+		bool expected;
+	} steps[] = {
+		{"[0] submit groups=2 priority=7 -> j1 submitted, j1 is queued", false},
+		{"[0] w1 joins A threads=1 -> -", false},
+		{"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", true},
+		{"[1] hold j1 no room -> -", true},
+		{"[2] w1 leaves -> -", true},
+		{"[2] hold order j1 held by ann -> -", false},
+		{"[3] release order j1 -> -", true},
+		{"[4] release j1 -> -", false},
+		{"[5] cancel j1 -> j1 cancelled, j1 is cancelled (cancelled: cancelled)", false},
+	};
+	struct farm *f = transcript_farm();
+	for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+		int priority;
+		transcript_play(f, (const char *const[]){steps[i].line, NULL});
+		if (farm_expects_results(f, 1, &priority) != steps[i].expected)
+			fail_msg("step %zu", i);
+		assert_int_equal(priority, 7);
+	}
+	farm_free(f);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(every_state)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_state), cmocka_unit_test(whose_results_may_come)};
 	return cmocka_run_group_tests_name("coordinator/core/test_why", tests, NULL, NULL);
 }
