@@ -4,15 +4,16 @@
  * Outgoing frames are the send queue's. A timer notices peers that are silent or stall, and certificates that expire or
  * are revoked meanwhile.
  *
- * A long frame takes its size from the pool, if there is one. While it waits for that, nothing more of its connection
- * is read, and its peer counts as neither silent nor slow. While others wait for the pool, whoever has a part of it
- * must keep sending.
+ * A long frame takes its size from the pool, if there is one, where certificates take turns, or addresses without TLS.
+ * While it waits for that, nothing more of its connection is read, and its peer counts as neither silent nor slow.
+ * While others wait for the pool, whoever has a part of it must keep sending.
  *
  * Failures end the connection, once, with a reason in words: frames beyond the limits, plaintext where TLS is required
  * (and the reverse), a peer that stalls, no memory.
  */
 #include "common/net/conn.h"
 
+#include "common/base/fnv.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/net/send_queue.h"
@@ -154,6 +155,16 @@ static void read_on(struct receive_turn *t)
 		conn_close(c, uv_strerror(rc));
 }
 
+/* Whoever has the peer's certificate, or its address. */
+static uint64_t owner_of(const struct conn *c)
+{
+	char address[64];
+	const struct tls_peer *who = conn_peer(c);
+	conn_peer_name(c, address, sizeof address);
+	const char *name = who ? who->name : address, *port = who ? NULL : strrchr(address, ':');
+	return fnv_add(FNV_BEGIN, name, port ? (size_t)(port - name) : strlen(name));
+}
+
 /* Part of a frame is there. */
 static void take_turn(struct conn *c)
 {
@@ -161,6 +172,7 @@ static void take_turn(struct conn *c)
 	if (!c->config.pool || size <= SHORT || c->turn.has || c->turn.waits)
 		return;
 	c->turn.go = read_on;
+	c->turn.owner = owner_of(c);
 	if (!receive_pool_take(c->config.pool, &c->turn, size))
 		uv_read_stop((uv_stream_t *)&c->tcp);
 }

@@ -14,6 +14,21 @@ static void grant(struct receive_pool *p, struct receive_turn *t)
 	t->has = true;
 }
 
+/* In the present round, or that after the last in which its owner has a turn. */
+static void enter(struct receive_pool *p, struct receive_turn *t)
+{
+	struct receive_turn **at = &p->first;
+	t->round = p->first ? p->first->round : 0;
+	for (const struct receive_turn *w = p->first; w; w = w->next)
+		if (w->owner == t->owner)
+			t->round = w->round + 1;
+	while (*at && (*at)->round <= t->round)
+		at = &(*at)->next;
+	t->waits = true;
+	t->next = *at;
+	*at = t;
+}
+
 bool receive_pool_take(struct receive_pool *p, struct receive_turn *t, uint64_t bytes)
 {
 	t->bytes = bytes;
@@ -21,24 +36,16 @@ bool receive_pool_take(struct receive_pool *p, struct receive_turn *t, uint64_t 
 		grant(p, t);
 		return true;
 	}
-	t->waits = true;
-	t->next = NULL;
-	if (p->first)
-		p->last->next = t;
-	else
-		p->first = t;
-	p->last = t;
+	enter(p, t);
 	return false;
 }
 
 static void leave(struct receive_pool *p, struct receive_turn *t)
 {
-	struct receive_turn **at = &p->first, *before = NULL;
-	for (; *at != t; at = &(*at)->next)
-		before = *at;
+	struct receive_turn **at = &p->first;
+	while (*at != t)
+		at = &(*at)->next;
 	*at = t->next;
-	if (p->last == t)
-		p->last = before;
 	t->waits = false;
 }
 

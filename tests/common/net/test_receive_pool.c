@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What arrives on many connections at once never needs more memory than the pool has: long frames wait in turn, nobody
- * who waits is taken for dead or slow, and whoever keeps others waiting must go on sending. Short ones pass.
+ * What arrives on many connections at once never needs more memory than the pool has: long frames wait in turn, one of
+ * each owner, nobody who waits is taken for dead or slow, and whoever keeps others waiting must go on sending. Short
+ * ones pass.
  */
 #include "common/base/mem.h"
 #include "common/net/conn.h"
@@ -14,9 +15,12 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <arpa/inet.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 /* ---- turns ---- */
 
@@ -57,7 +61,7 @@ static void in_turn(void **state)
 	receive_pool_give(&p, &turns[3]);
 	assert_string_equal(went, "cde");
 	receive_pool_give(&p, &turns[4]);
-	assert_true(p.used == 0 && !p.first && !p.last);
+	assert_true(p.used == 0 && !p.first);
 }
 
 static void whoever_leaves_the_queue(void **state)
@@ -79,9 +83,30 @@ static void whoever_leaves_the_queue(void **state)
 	assert_int_equal(p.used, 60);
 }
 
+static void owners_take_turns(void **state)
+{
+	(void)state;
+	struct receive_pool p = {.limit = 100};
+	memset(turns, 0, sizeof turns);
+	went[0] = 0;
+	turns[3].owner = turns[4].owner = 7;
+	for (int i = 0; i < 4; i++)
+		assert_true(take(&p, i, 100) == (i == 0));
+	receive_pool_give(&p, &turns[0]);
+	assert_false(take(&p, 4, 100));
+	assert_false(take(&p, 0, 100));
+	receive_pool_give(&p, &turns[1]);
+	receive_pool_give(&p, &turns[3]);
+	receive_pool_give(&p, &turns[2]);
+	receive_pool_give(&p, &turns[4]);
+	receive_pool_give(&p, &turns[0]);
+	assert_string_equal(went, "bdcea");
+	assert_true(p.used == 0 && !p.first);
+}
+
 /* ---- connections ---- */
 
-enum { PEERS = 4, LONG = 1 << 20, HALF = LONG / 2, PROMISED = 1 << 26, PROMISED_PART = 100000 };
+enum { PEERS = 4, ENDS = PEERS + 1, LONG = 1 << 20, HALF = LONG / 2, PROMISED = 1 << 26, PROMISED_PART = 100000 };
 
 struct end {
 	struct conn *conn;
@@ -94,8 +119,8 @@ static uv_tcp_t listener;
 static struct net_addr bound;
 static struct conn_config config;
 static struct receive_pool pool;
-static struct end callers[PEERS], ends[PEERS];
-static int accepted, order[PEERS], arrived;
+static struct end callers[PEERS], ends[ENDS];
+static int accepted, order[ENDS], arrived;
 
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
 {
@@ -157,6 +182,24 @@ static void send_short(int i)
 	conn_send(callers[i].conn, ENVELOPE(BYE, bye), NULL, 0);
 }
 
+/* Another machine's: a plain socket at an address of its own. */
+static int open_foreign(void)
+{
+	struct sockaddr_in from = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK + 1)};
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	int fd = socket(AF_INET, SOCK_STREAM, 0), i = accepted;
+	assert_int_equal(bind(fd, (struct sockaddr *)&from, sizeof from), 0);
+	assert_int_equal(connect(fd, (struct sockaddr *)&bound.storage, sizeof from), 0);
+	assert_int_equal(envelope_pack(ENVELOPE(BYE, bye), NULL, 0, &frame, &size, &e), 0);
+	assert_int_equal(send(fd, frame, size, 0), size);
+	mem_free(frame);
+	while (accepted == i || !ends[i].messages)
+		once();
+	return fd;
+}
+
 static void open_all(double stall_seconds)
 {
 	struct net_addr a;
@@ -188,12 +231,12 @@ static void open_all(double stall_seconds)
 
 static void close_all(void)
 {
-	for (int i = 0; i < PEERS; i++) {
+	for (int i = 0; i < PEERS; i++)
 		if (callers[i].conn)
 			conn_close(callers[i].conn, "the end");
+	for (int i = 0; i < ENDS; i++)
 		if (ends[i].conn)
 			conn_close(ends[i].conn, "the end");
-	}
 	uv_close((uv_handle_t *)&listener, NULL);
 	uv_run(&loop, UV_RUN_DEFAULT);
 	assert_int_equal(uv_loop_close(&loop), 0);
@@ -251,6 +294,42 @@ static void one_after_the_other(void **state)
 	free(frame);
 }
 
+static size_t send_some(int fd, const unsigned char *bytes, size_t size)
+{
+	ssize_t n = size ? send(fd, bytes, size, MSG_DONTWAIT) : 0;
+	uv_run(&loop, UV_RUN_NOWAIT);
+	return n > 0 ? (size_t)n : 0;
+}
+
+/* Four of one machine are first; whoever calls from another one waits for one of those that wait, not for all. */
+static void machines_take_turns(void **state)
+{
+	(void)state;
+	size_t size;
+	unsigned char *frame = long_frame(&size);
+	open_all(1000);
+	int fd = open_foreign();
+	send_bytes(0, frame, HALF);
+	while (!pool.used)
+		once();
+	for (int i = 1; i < 4; i++) {
+		send_bytes(i, frame, size);
+		while (waiting() < (unsigned)i)
+			once();
+	}
+	size_t at = 0;
+	while (waiting() < 4)
+		at += send_some(fd, frame + at, size - at);
+	send_bytes(0, frame + HALF, size - HALF);
+	while (arrived < ENDS)
+		at += send_some(fd, frame + at, size - at);
+	static const int fair[ENDS] = {0, 1, 4, 2, 3};
+	assert_memory_equal(order, fair, sizeof fair);
+	close(fd);
+	close_all();
+	free(frame);
+}
+
 /* A frame that is promised to be so long that minutes are allowed for it, and of which nothing more comes. */
 static void send_promise(int i)
 {
@@ -285,8 +364,11 @@ static void whoever_keeps_others_waiting(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(in_turn), cmocka_unit_test(whoever_leaves_the_queue),
+	const struct CMUnitTest tests[] = {cmocka_unit_test(in_turn),
+					   cmocka_unit_test(whoever_leaves_the_queue),
 					   cmocka_unit_test(one_after_the_other),
+					   cmocka_unit_test(machines_take_turns),
+					   cmocka_unit_test(owners_take_turns),
 					   cmocka_unit_test(whoever_keeps_others_waiting)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
