@@ -12,7 +12,7 @@ void send_pool_look(struct send_share *s, uint64_t now)
 }
 
 /* Somebody holds something, and somebody at least the average. */
-static struct send_share *deafest(const struct send_pool *p, uint64_t now)
+static struct send_share *slowest_reader(const struct send_pool *p, uint64_t now)
 {
 	struct send_share *found = NULL;
 	uint64_t count = 0;
@@ -22,9 +22,9 @@ static struct send_share *deafest(const struct send_pool *p, uint64_t now)
 	}
 	for (struct send_share *s = LIST_FIRST(&p->waiting); s; s = LIST_NEXT(s, next)) {
 		bool large = s->bytes >= p->used / count;
-		bool deafer =
+		bool slower =
 			!found || s->moved < found->moved || (s->moved == found->moved && s->bytes > found->bytes);
-		if (large && deafer)
+		if (large && slower)
 			found = s;
 	}
 	return found;
@@ -36,10 +36,10 @@ bool send_pool_add(struct send_share *s, uint64_t bytes, uint64_t now)
 	if (!p)
 		return true;
 	while (p->used && (p->used > p->limit || bytes > p->limit - p->used)) {
-		struct send_share *deaf = deafest(p, now);
-		send_pool_leave(deaf);
-		deaf->give_way(deaf);
-		if (deaf == s)
+		struct send_share *slowest = slowest_reader(p, now);
+		send_pool_leave(slowest);
+		slowest->give_way(slowest);
+		if (slowest == s)
 			return false;
 	}
 	if (!s->bytes) {

@@ -10,6 +10,7 @@
 bool room_make(const struct jobs *jobs);
 /* Whether the journals of all running jobs can grow to their limits, and a checkpoint be written then. */
 bool room_is_ample(const struct jobs *jobs);
+
 /* What a job may have to write until a checkpoint has replaced its journal. */
 struct room_claim {
 	uint64_t job, bytes;
