@@ -82,10 +82,20 @@ enum { PROBE_SIDE = 64 };
 struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build)
 {
 	const struct attribute_table *t = build->attributes;
-	struct bsdf_probes p = {PROBE_SIDE * PROBE_SIDE, t && t->asked ? 3 * (uint64_t)t->triangle_count : 0};
-	if (p.corners > p.count)
-		p.count = p.corners < BSDF_PROBES_MAX ? (uint32_t)p.corners : BSDF_PROBES_MAX;
+	struct bsdf_probes p = {PROBE_SIDE * PROBE_SIDE, t, t ? (uint64_t)t->asked * t->triangle_count : 0};
+	if (p.points > p.count)
+		p.count = p.points < BSDF_PROBES_MAX ? (uint32_t)p.points : BSDF_PROBES_MAX;
 	return p;
+}
+
+/* Where the distances to all three edges are equal: barycentrics are in proportion to the edges across. */
+static void put_middle(const struct attribute_table *t, struct texture_point *at)
+{
+	vec3 side[3];
+	attribute_table_sides(t, at->prim, side);
+	double all = vec3_length(side[0]) + vec3_length(side[1]) + vec3_length(side[2]);
+	at->b1 = vec3_length(side[1]) / all;
+	at->b2 = vec3_length(side[2]) / all;
 }
 
 struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i)
@@ -93,11 +103,14 @@ struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i)
 	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
 	uint32_t row = i / PROBE_SIDE % PROBE_SIDE, column = i % PROBE_SIDE;
 	struct bsdf_point at = {.where = {.u = (row + 0.5) / PROBE_SIDE, .v = (column + 0.5) / PROBE_SIDE}, .w = &w};
-	if (p->corners > 0) {
-		uint64_t corner = p->corners > p->count ? i * p->corners / p->count : i % p->corners;
-		at.where.prim = (uint32_t)(corner / 3);
-		at.where.b1 = corner % 3 == 1;
-		at.where.b2 = corner % 3 == 2;
+	if (p->points > 0) {
+		uint64_t point = p->points > p->count ? i * p->points / p->count : i % p->points;
+		unsigned which = (unsigned)(point % p->mesh->asked);
+		at.where.prim = (uint32_t)(point / p->mesh->asked);
+		at.where.b1 = which == 1;
+		at.where.b2 = which == 2;
+		if (which == ASKED_ATTRIBUTES)
+			put_middle(p->mesh, &at.where);
 	}
 	return at;
 }

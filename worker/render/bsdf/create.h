@@ -14,14 +14,16 @@ int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, 
 		 const struct bsdf_build *build, struct error *e);
 
 /*
- * Points at which textures are evaluated to find their range: a grid over (u,v), and the corners of the mesh's
- * triangles in turn. An attribute has its extremes at corners, so up to BSDF_PROBES_MAX / 3 triangles its range is
- * exact; beyond that, corners are skipped evenly.
+ * Points at which textures are evaluated to find their range: a grid over (u,v), and points of the mesh's triangles in
+ * turn. An attribute has its extremes at corners, and what depends on the distance to the edges has them there and
+ * where all three are equally far, so up to BSDF_PROBES_MAX such points the range is exact; beyond that, points are
+ * skipped evenly.
  */
 enum { BSDF_PROBES_MAX = 3 << 18 };
 struct bsdf_probes {
 	uint32_t count;
-	uint64_t corners; /* of the mesh; 0: none of its attributes was evaluated */
+	const struct attribute_table *mesh; /* NULL: there is none */
+	uint64_t points;		    /* of the mesh; 0: no texture depends on it */
 };
 struct bsdf_probes bsdf_probes_of(const struct bsdf_build *build);
 struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i);

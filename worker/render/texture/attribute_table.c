@@ -65,6 +65,22 @@ const struct attribute *attribute_find(const struct attribute_table *t, const ch
 	return a;
 }
 
+static vec3 vertex(const struct attribute_table *t, uint32_t i)
+{
+	if (t->unrounded)
+		return (vec3){t->unrounded[i][0], t->unrounded[i][1], t->unrounded[i][2]};
+	return (vec3){(double)t->position[i][0], (double)t->position[i][1], (double)t->position[i][2]};
+}
+
+void attribute_table_sides(const struct attribute_table *t, uint32_t triangle, vec3 side[3])
+{
+	for (int k = 0; k < 3; k++) {
+		uint32_t a = t->index[triangle][(k + 1) % 3], b = t->index[triangle][(k + 2) % 3];
+		vec3 d = vec3_sub(vertex(t, b), vertex(t, a));
+		side[k] = vec3_madd(vec3_madd(vec3_scale(d.x, t->axis[0]), d.y, t->axis[1]), d.z, t->axis[2]);
+	}
+}
+
 /* FNV-1a over words; matches are compared. */
 static uint64_t hash_of(const float *value, size_t count)
 {
@@ -96,7 +112,8 @@ const struct attribute_values *attribute_keep(struct attribute_table *t, const s
 					      struct arena *arena)
 {
 	size_t count = (size_t)(a->per_face ? t->triangle_count : t->vertex_count) * a->channels;
-	t->asked = true;
+	if (!t->asked)
+		t->asked = ASKED_ATTRIBUTES;
 	/* Decoded before it is compared, because the pool holds decoded numbers. */
 	float *own = NULL;
 	if (decode) {

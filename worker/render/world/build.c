@@ -41,8 +41,13 @@ static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
 		t.vertex_count = g->vertex_count;
 		t.triangle_count = g->triangle_count;
 		t.index = (const uint32_t(*)[3])g->index;
+		t.position = (const float(*)[3])g->position;
+		t.unrounded = (const double(*)[3])g->unrounded;
 		t.count = from->mesh.attribute_count;
 		t.attributes = from->mesh.attributes;
+		const vec3 axis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+		for (int k = 0; k < 3; k++)
+			t.axis[k] = vec3_scale(1 / g->unit, g->place ? placement_vector(g->place, axis[k]) : axis[k]);
 	}
 	return t;
 }
@@ -63,7 +68,8 @@ static const struct scene_node *add_null(struct builder *b, const struct scene_n
 }
 
 /* One BSDF per node, however many shapes refer to it, unless it uses the shape's attributes: then one per mesh,
- * which instances share. The default is grey, or black for emitters, or in 0.6 none for media. */
+ * which instances share, or one per shape if it shows edges. The default is grey, or black for emitters, or in 0.6 none
+ * for media. */
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
@@ -117,7 +123,8 @@ static int create_bsdfs(struct builder *b)
 			rc = bsdf_mirror_back(&w->bsdfs[k], &build, b->e);
 		if (rc && (rc = build_go_on(b, rc)))
 			return rc;
-		node_table_add(&made, key, attributes.asked ? w->shapes[i].index : NULL, k);
+		if (attributes.asked != ASKED_EDGES)
+			node_table_add(&made, key, attributes.asked ? w->shapes[i].index : NULL, k);
 		w->shapes[i].relief = w->bsdfs[k].relief;
 	}
 	return 0;

@@ -29,7 +29,7 @@ static void test_stand_ins(void **state)
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "sunsky"},
 		{PLUGIN_EMITTER, "collimated", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
-		{PLUGIN_TEXTURE, "wireframe", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_TEXTURE, "curvature", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_SHAPE, "ellipsoids", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_MEDIUM, "homogeneous", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_SENSOR, "fisheye", LENIENT_REFUSE, NULL},

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * `wireframe` of 0.5/0.6: the edges of a mesh's triangles. With d the distance to the nearest edge of the triangle,
+ * in scene units, and s(t) = t^2 (3 - 2 t) on [0,1], the colour is
+ *
+ *     edge_color + (interior_color - edge_color) s((d - (1 - step_width) line_width) / (step_width line_width)),
+ *
+ * so a line has line_width on either side of an edge. Without one it is a tenth of the edges' mean length, over
+ * triangles: an edge between two counts twice. What is no mesh in Mitsuba has the interior's colour, although some are
+ * triangles here.
+ *
+ * The distance to the edge across from a corner is the corner's barycentric coordinate times its height.
+ */
+#include "worker/render/texture/attribute_table.h"
+#include "worker/render/texture/texture.h"
+
+#include <string.h>
+
+struct wireframe {
+	struct texture edge, interior;
+	struct attribute_table mesh; /* its triangles alone */
+	bool lines;
+	double inner, outer; /* the line's colour ends from here to there */
+};
+
+static bool has_lines(const struct attribute_table *mesh)
+{
+	static const char *const types[] = {"obj", "ply", "serialized", "gltf", "cube"};
+	for (size_t i = 0; mesh->triangle_count > 0 && i < sizeof types / sizeof *types; i++)
+		if (strcmp(mesh->shape->type, types[i]) == 0)
+			return true;
+	return false;
+}
+
+static double mean_side(const struct attribute_table *mesh)
+{
+	double sum = 0;
+	for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+		vec3 side[3];
+		attribute_table_sides(mesh, t, side);
+		sum += vec3_length(side[0]) + vec3_length(side[1]) + vec3_length(side[2]);
+	}
+	return sum / (3.0 * mesh->triangle_count);
+}
+
+static void read_widths(struct wireframe *f, const struct scene_node *n)
+{
+	double width = node_float(n, "line_width", 0);
+	f->outer = width > 0 ? width : 0.1 * mean_side(&f->mesh);
+	f->inner = f->outer * (1 - node_float(n, "step_width", 0.5));
+}
+
+static int create(struct texture *t, const struct scene_node *n, enum color_role role,
+		  const struct texture_build *build, struct error *e)
+{
+	struct wireframe *f = t->data;
+	if (color_role_is_number(role))
+		return node_error(n, e, ENOTSUP, "the edges of a mesh cannot %s",
+				  role == COLOR_HEIGHT ? "displace a surface" : "be a bump or normal map");
+	if (!build->attributes)
+		return node_error(n, e, EINVAL, "only a shape's material or light can show its edges");
+	int code = texture_from_node(&f->edge, n, "edge_color", 0.1, role, build, e);
+	if (!code)
+		code = texture_from_node(&f->interior, n, "interior_color", 0.5, role, build, e);
+	if (code)
+		return code;
+	build->attributes->asked = ASKED_EDGES;
+	f->mesh = *build->attributes;
+	f->lines = has_lines(&f->mesh);
+	if (f->lines)
+		read_widths(f, n);
+	return 0;
+}
+
+/* How much of the interior's colour is at a point. */
+static double share(const struct wireframe *f, const struct texture_point *at)
+{
+	if (!f->lines)
+		return 1;
+	vec3 side[3];
+	attribute_table_sides(&f->mesh, at->prim, side);
+	double twice = vec3_length(vec3_cross(side[1], side[2])), b[3] = {1 - at->b1 - at->b2, at->b1, at->b2},
+	       d = INFINITY;
+	for (int k = 0; k < 3; k++)
+		d = fmin(d, b[k] * twice / vec3_length(side[k]));
+	if (d >= f->outer)
+		return 1;
+	if (d <= f->inner)
+		return 0;
+	double x = (d - f->inner) / (f->outer - f->inner);
+	return x * x * (3 - 2 * x);
+}
+
+static spectrum eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+{
+	const struct wireframe *f = t->data;
+	double a = share(f, at);
+	spectrum edge = a < 1 ? spectrum_scale(1 - a, texture_eval(&f->edge, at, w)) : spectrum_of(0);
+	return a > 0 ? spectrum_add(edge, spectrum_scale(a, texture_eval(&f->interior, at, w))) : edge;
+}
+
+static double max(const struct texture *t)
+{
+	const struct wireframe *f = t->data;
+	return fmax(texture_max(&f->edge), texture_max(&f->interior));
+}
+
+static enum color_shape shape(const struct texture *t)
+{
+	const struct wireframe *f = t->data;
+	enum color_shape first = texture_shape(&f->edge);
+	return first == texture_shape(&f->interior) ? first : COLOR_SHAPE_OTHER;
+}
+
+static const struct param params[] = {
+	{.name = "edge_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "interior_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LENGTH_MAX},
+	{.name = "step_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+	{.name = NULL},
+};
+
+/* It is only made in roles that need neither a height nor a derivative. */
+const struct texture_ops texture_ops_wireframe = {
+	.decl = {PLUGIN_TEXTURE, "wireframe", params, 0, PARAM_UNDERSTOOD},
+	.data_size = sizeof(struct wireframe),
+	.create = create,
+	.eval = eval,
+	.max = max,
+	.shape = shape,
+};
