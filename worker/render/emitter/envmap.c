@@ -10,6 +10,9 @@
  * angle and proportional to the mean luminance of its four corners: it is positive wherever there is light. The
  * probabilities of a row's cells are multiples of 2^-31, at least one where there is light, stored as running sums:
  * sampling and density use the same numbers.
+ *
+ * to_world may stretch: a direction d sees the image where A d points, A the inverse of to_world's matrix with
+ * determinant 1. The map from d to A d / |A d| makes |A d|^-3 solid angles of one, which multiplies densities.
  */
 #include "worker/render/emitter/envmap.h"
 
@@ -18,10 +21,13 @@
 
 #include <string.h>
 
+/* Of to_world's columns, the longest being 1; below it, few pixels would fill the sphere. */
+#define ENVMAP_VOLUME_MIN 1e-6
+
 struct envmap {
 	struct raster raster;
 	double scale;
-	vec3 axis[3];	    /* the local axes in the world */
+	struct envmap_axes at;
 	bool to_poles;	    /* the outer rows are the poles */
 	uint32_t rows;	    /* of cells: height + 1, to_poles: height - 1 */
 	uint32_t columns;   /* width */
@@ -31,7 +37,19 @@ struct envmap {
 
 static vec3 to_local(const struct envmap *m, vec3 d)
 {
-	return (vec3){vec3_dot(m->axis[0], d), vec3_dot(m->axis[1], d), vec3_dot(m->axis[2], d)};
+	return (vec3){vec3_dot(m->at.back[0], d), vec3_dot(m->at.back[1], d), vec3_dot(m->at.back[2], d)};
+}
+
+static vec3 to_world(const struct envmap *m, vec3 d)
+{
+	return vec3_madd(vec3_madd(vec3_scale(d.x, m->at.axis[0]), d.y, m->at.axis[1]), d.z, m->at.axis[2]);
+}
+
+/* Solid angle around the local direction of `d`, a vector of the world, per solid angle around that of d / |d|. */
+static double jac_local_from_world(const struct envmap *m, vec3 d)
+{
+	double length = m->at.stretched ? vec3_length(to_local(m, d)) / vec3_length(d) : 1;
+	return 1 / (length * length * length);
 }
 
 static void coordinates(const struct envmap *m, vec3 direction, double *u, double *v)
@@ -95,7 +113,7 @@ double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x)
 		return 0;
 	double chance =
 		(m->row_cdf[row + 1] - m->row_cdf[row]) * (cells[column + 1] - cells[column]) / cells[m->columns];
-	return chance / (row_height(m, row) * 2 * M_PI / m->columns);
+	return chance / (row_height(m, row) * 2 * M_PI / m->columns) * jac_local_from_world(m, x->p);
 }
 
 void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
@@ -132,8 +150,7 @@ bool envmap_sample_point(const struct emitter *em, const double u[2], struct emi
 	double phi = 2 * M_PI * ((column + 0.5 + across) / m->columns);
 	double from_pole = 2 * pow(sin(0.5 * row_edge(m, row)), 2) + down * row_height(m, row); /* 1 - cosine */
 	double sine = sqrt(fmax(0, from_pole * (2 - from_pole)));
-	vec3 d = vec3_scale(sine * sin(phi), m->axis[0]);
-	d = vec3_madd(vec3_madd(d, 1 - from_pole, m->axis[1]), -sine * cos(phi), m->axis[2]);
+	vec3 d = to_world(m, (vec3){sine * sin(phi), 1 - from_pole, -sine * cos(phi)});
 	*x = (struct emitter_point){.p = vec3_normalize(d), .infinite = true};
 	*pdf_point = envmap_pdf_point(em, x);
 	return *pdf_point > 0;
@@ -146,14 +163,23 @@ static double luminance(const struct envmap *m, uint32_t row, uint32_t column)
 	return rec709_luminance(rgb);
 }
 
-/* Mean luminance of the cell's corners. */
+/* Solid angle in the world per local one, in the cell's middle. */
+static double cell_stretch(const struct envmap *m, uint32_t row, uint32_t column)
+{
+	double theta = 0.5 * (row_edge(m, row) + row_edge(m, row + 1)), phi = 2 * M_PI * (column + 1.0) / m->columns;
+	return 1 /
+	       jac_local_from_world(m, to_world(m, (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)}));
+}
+
+/* Mean luminance of the cell's corners, times its solid angle in the world per local one. */
 static double cell_weight(const struct envmap *m, uint32_t row, uint32_t column)
 {
 	uint32_t below = row + m->to_poles, above = below == 0 ? 0 : below - 1;
 	below = below < m->raster.image.height ? below : m->raster.image.height - 1;
 	uint32_t next = column + 1 == m->columns ? 0 : column + 1;
-	return 0.25 * (luminance(m, above, column) + luminance(m, above, next) + luminance(m, below, column) +
-		       luminance(m, below, next));
+	double mean = 0.25 * (luminance(m, above, column) + luminance(m, above, next) + luminance(m, below, column) +
+			      luminance(m, below, next));
+	return m->at.stretched ? mean * cell_stretch(m, row, column) : mean;
 }
 
 /* Returns the integral of the luminance over the sphere. */
@@ -178,35 +204,53 @@ static double build_density(struct envmap *m)
 	return total;
 }
 
-/* The local axes without their scale; only rotations, reflections and a uniform scale keep angles. */
-int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e)
+/* The columns of to_world, as long as keeps its volume 1, and the rows of the inverse. */
+static int stretched_axes(const struct scene_node *n, const mat4 *to_world, struct envmap_axes *a, struct error *e)
 {
-	mat4 t = node_transform(n, "to_world");
+	double longest = 0;
 	for (int c = 0; c < 3; c++) {
-		axis[c] = (vec3){t.m[0][c], t.m[1][c], t.m[2][c]};
-		double length = vec3_length(axis[c]), first = vec3_length((vec3){t.m[0][0], t.m[1][0], t.m[2][0]});
-		if (!(length > 0) || !(fabs(length - first) <= 1e-4 * first))
-			return node_error(n, e, ENOTSUP, "to_world of an environment can only rotate");
-		axis[c] = vec3_scale(1 / length, axis[c]);
-		for (int k = 0; k < c; k++)
-			if (fabs(vec3_dot(axis[k], axis[c])) > 1e-4)
-				return node_error(n, e, ENOTSUP, "to_world of an environment can only rotate");
+		a->axis[c] = (vec3){to_world->m[0][c], to_world->m[1][c], to_world->m[2][c]};
+		longest = fmax(longest, vec3_length(a->axis[c]));
 	}
-	/* Files give few digits: orthonormalised. */
-	double sign = vec3_dot(vec3_cross(axis[0], axis[1]), axis[2]) < 0 ? -1 : 1;
-	axis[1] = vec3_normalize(vec3_madd(axis[1], -vec3_dot(axis[0], axis[1]), axis[0]));
-	axis[2] = vec3_scale(sign, vec3_cross(axis[0], axis[1]));
+	for (int c = 0; c < 3; c++)
+		a->axis[c] = vec3_scale(1 / longest, a->axis[c]);
+	double volume = vec3_dot(a->axis[0], vec3_cross(a->axis[1], a->axis[2]));
+	if (!(fabs(volume) >= ENVMAP_VOLUME_MIN))
+		return node_error(n, e, EINVAL, "to_world of an environment is flat, or nearly so");
+	double unit = cbrt(fabs(volume)), sign = volume < 0 ? -1 : 1;
+	for (int c = 0; c < 3; c++)
+		a->axis[c] = vec3_scale(1 / unit, a->axis[c]);
+	for (int c = 0; c < 3; c++)
+		a->back[c] = vec3_scale(sign, vec3_cross(a->axis[(c + 1) % 3], a->axis[(c + 2) % 3]));
+	a->stretched = true;
 	return 0;
 }
 
-int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles, double scale, const vec3 axis[3],
-		const struct scene_node *n, const struct emitter_build *build, struct error *e)
+int envmap_axes_read(const struct scene_node *n, struct envmap_axes *a, struct error *e)
+{
+	mat4 t = node_transform(n, "to_world");
+	if (!mat4_keeps_angles(&t))
+		return stretched_axes(n, &t, a, e);
+	for (int c = 0; c < 3; c++)
+		a->axis[c] = vec3_normalize((vec3){t.m[0][c], t.m[1][c], t.m[2][c]});
+	/* Files give few digits: orthonormalised. */
+	double sign = vec3_dot(vec3_cross(a->axis[0], a->axis[1]), a->axis[2]) < 0 ? -1 : 1;
+	a->axis[1] = vec3_normalize(vec3_madd(a->axis[1], -vec3_dot(a->axis[0], a->axis[1]), a->axis[0]));
+	a->axis[2] = vec3_scale(sign, vec3_cross(a->axis[0], a->axis[1]));
+	memcpy(a->back, a->axis, sizeof a->back);
+	a->stretched = false;
+	return 0;
+}
+
+int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles, double scale,
+		const struct envmap_axes *axes, const struct scene_node *n, const struct emitter_build *build,
+		struct error *e)
 {
 	struct envmap *m = arena_alloc(build->arena, 1, sizeof *m);
 	if (!m)
 		return node_error(n, e, ENOMEM, "out of memory");
 	m->raster = *picture;
-	memcpy(m->axis, axis, sizeof m->axis);
+	m->at = *axes;
 	m->raster.wrap_u = RASTER_REPEAT;
 	m->raster.wrap_v = RASTER_CLAMP;
 	m->scale = scale;
@@ -231,12 +275,12 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 			 struct error *e)
 {
 	struct raster picture = {.nearest = false};
-	vec3 axis[3];
-	int code = envmap_axes(n, axis, e);
+	struct envmap_axes axes;
+	int code = envmap_axes_read(n, &axes, e);
 	if (!code)
 		code = raster_read(&picture, n, build->assets, &(struct raster_range){0, HUGE_VAL, false}, build->arena,
 				   e);
-	return code ? code : envmap_make(em, &picture, build->dialect_3, node_float(n, "scale", 1), axis, n, build, e);
+	return code ? code : envmap_make(em, &picture, build->dialect_3, node_float(n, "scale", 1), &axes, n, build, e);
 }
 
 static const struct param envmap_params[] = {

@@ -6,11 +6,19 @@
 #include "worker/render/emitter/emitter.h"
 #include "worker/render/texture/raster.h"
 
-/* The local axes x, y (up) and z in the world. -ENOTSUP: to_world does more than rotate. */
-int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e);
+/* The local axes x, y (up) and z in the world, and the rows of the inverse: the same, unless to_world stretches. Its
+ * even scale is left out. */
+struct envmap_axes {
+	vec3 axis[3], back[3];
+	bool stretched;
+};
+
+/* -EINVAL: to_world is singular. */
+int envmap_axes_read(const struct scene_node *n, struct envmap_axes *a, struct error *e);
 /* Makes em from the image, times scale. to_poles: its first and last rows are the poles. The image is kept. */
-int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles, double scale, const vec3 axis[3],
-		const struct scene_node *n, const struct emitter_build *build, struct error *e);
+int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles, double scale,
+		const struct envmap_axes *axes, const struct scene_node *n, const struct emitter_build *build,
+		struct error *e);
 
 spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl);
 bool envmap_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);

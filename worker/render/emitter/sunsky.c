@@ -167,14 +167,18 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	bool has_sky = strcmp(n->type, "sun") != 0, has_sun = strcmp(n->type, "sky") != 0;
 	struct baking b = {.image = {.width = has_sun ? 2048 : 512, .height = has_sun ? 1024 : 256, .channels = 3}};
 	double turbidity = node_float(n, "turbidity", 3), scale = node_float(n, "scale", 1);
-	vec3 axis[3], towards = {0, 1, 0};
-	int code = envmap_axes(n, axis, e);
+	struct envmap_axes axes;
+	vec3 *axis = axes.axis, towards = {0, 1, 0};
+	int code = envmap_axes_read(n, &axes, e);
+	if (!code && axes.stretched)
+		code = node_error(n, e, ENOTSUP, "to_world of a sky can only rotate");
 	if (code)
 		return code;
 	if (build->dialect_3) {
 		vec3 y = axis[1];
 		axis[1] = axis[2];
 		axis[2] = vec3_neg(y);
+		memcpy(axes.back, axis, sizeof axes.back);
 	}
 	if ((code = read_sun(n, axis, &towards, e)))
 		return code;
@@ -199,7 +203,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		rgb[k] *= node_float(n, "sun_scale", 1);
 	if (has_sun)
 		bake_sun(&b, rgb);
-	return envmap_make(em, &(struct raster){.image = b.image}, false, scale, axis, n, build, e);
+	return envmap_make(em, &(struct raster){.image = b.image}, false, scale, &axes, n, build, e);
 }
 
 #define NUMBER(name_, min_, max_)                                                         \

@@ -156,3 +156,22 @@ vec3 mat4_normal(const mat4 *inverse, vec3 n)
 		      a->m[0][1] * n.x + a->m[1][1] * n.y + a->m[2][1] * n.z,
 		      a->m[0][2] * n.x + a->m[1][2] * n.y + a->m[2][2] * n.z};
 }
+
+bool mat4_keeps_angles(const mat4 *a)
+{
+	const double tolerance = 1e-4;
+	vec3 axis[3];
+	double first = 0;
+	for (int c = 0; c < 3; c++) {
+		axis[c] = (vec3){a->m[0][c], a->m[1][c], a->m[2][c]};
+		double length = vec3_length(axis[c]);
+		first = c ? first : length;
+		if (!(length > 0) || !(fabs(length - first) <= tolerance * first))
+			return false;
+		axis[c] = vec3_scale(1 / length, axis[c]);
+		for (int k = 0; k < c; k++)
+			if (fabs(vec3_dot(axis[k], axis[c])) > tolerance)
+				return false;
+	}
+	return true;
+}

@@ -20,6 +20,8 @@ mat4 mat4_rotate(vec3 axis, double degrees);
 mat4 mat4_look_at(vec3 origin, vec3 target,
 		  vec3 up); /* camera to world: +z to the target, +x to the LEFT, as Mitsuba */
 double mat4_det3(mat4 a);   /* of the upper left 3x3 block */
+/* Whether it rotates, mirrors, moves and scales evenly, and no more, to the four digits that files give. */
+bool mat4_keeps_angles(const mat4 *a);
 
 vec3 mat4_point(const mat4 *a, vec3 p);
 vec3 mat4_vector(const mat4 *a, vec3 v);

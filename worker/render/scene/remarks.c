@@ -91,6 +91,12 @@ static int on_media(struct report *r, const struct scene_node *integrator, struc
 
 static int on_emitter(struct report *r, const struct scene_node *n, bool dialect_3, struct error *e)
 {
+	mat4 to_world = node_transform(n, "to_world");
+	if (strcmp(n->type, "envmap") == 0 && !mat4_keeps_angles(&to_world))
+		return remark(
+			r, n, e,
+			"its to_world stretches the image; Mitsuba, which takes the vectors that come of it for unit "
+			"vectors, shows it distorted otherwise");
 	if (!dialect_3 || (strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0))
 		return 0;
 	return remark(r, n, e,

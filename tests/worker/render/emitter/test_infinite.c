@@ -255,6 +255,80 @@ static void test_poles_and_ends(void **state)
 	}
 }
 
+/* Uneven scales, sheared and mirrored; an exchange of two axes, stretched along one. */
+static const mat4 stretches[] = {
+	{{{1, 0, 0, 0}, {0, 3, 0, 0}, {0, 0, 0.5, 0}, {0, 0, 0, 1}}},
+	{{{1, 0.5, 0, 9}, {0.25, -2, 0, 0}, {0, 1, 1, 0}, {0, 0, 0, 1}}},
+	{{{0, 0, 1e9, 0}, {0, 2e8, 0, 0}, {1e9, 0, 0, 0}, {0, 0, 0, 1}}},
+};
+enum { STRETCHES = sizeof stretches / sizeof *stretches };
+
+/* A direction l of the image is seen along M l. */
+static void check_places(struct fixture *f, const char *text, const mat4 *m, const struct emitter *em)
+{
+	struct emitter plain = make_emitter(f, text, NULL);
+	for (int i = 0; i < 2000; i++) {
+		vec3 l = direction((i % 50 + 0.37) / 50, (i / 50 + 0.41) / 40), d = vec3_normalize(mat4_vector(m, l));
+		double is = radiance_at(em, d, &colour).v[1], want = radiance_at(&plain, l, &colour).v[1];
+		if (fabs(is - want) > 1e-9 * (want + 1e-3 * plain.brightest))
+			fail_msg("%s: %.9g at %d, not %.9g", text, is, i, want);
+	}
+}
+
+/* Counts of samples in cells of the world against the integral of the density over them, by quadrature; the mean of
+ * radiance over density against the integral of the radiance; and the numbers that give a sample. */
+static void check_stretched(const struct emitter *em, uint64_t seed)
+{
+	enum { ROWS = 10, SIDES = 20, FINE = 100, GROUPS = 16 };
+	static double expected[ROWS * SIDES];
+	static uint64_t observed[ROWS * SIDES];
+	double total = 0, light = 0, means[GROUPS] = {0};
+	memset(observed, 0, sizeof observed);
+	memset(expected, 0, sizeof expected);
+	for (int i = 0; i < ROWS * SIDES * FINE * FINE; i++) {
+		int y = i / (SIDES * FINE), x = i % (SIDES * FINE);
+		/* Shifted from column to column: the density jumps along whole rows. */
+		double v = (y + fmod(0.5 + 0.6180339887 * x, 1)) / (ROWS * FINE);
+		vec3 d = direction((x + 0.5) / (SIDES * FINE), v);
+		double angle = sin(PI * v) * 2 * PI * PI / (ROWS * SIDES * FINE * FINE), p = angle * pdf_at(em, d);
+		total += p;
+		light += angle * radiance_at(em, d, &colour).v[1];
+		expected[y / FINE * SIDES + x / FINE] += p * SAMPLES;
+	}
+	if (fabs(total - 1) > 3e-3)
+		fail_msg("the density's integral is %g", total);
+	for (uint64_t i = 0; i < SAMPLES; i++) {
+		double u[4], back[2], pdf;
+		struct emitter_point x;
+		rng_uniform4(seed, RNG_TEST, i, 2, 0, u);
+		assert_true(em->ops->sample_point(em, u, &x, &pdf));
+		check_sample(em, u, &x, pdf);
+		em->ops->point_inverse(em, &x, back);
+		assert_true(fabs(back[0] - u[0]) < 1e-6 && fabs(back[1] - u[1]) < 1e-6);
+		double turn = atan2(x.p.x, -x.p.z) / (2 * PI);
+		int column = (int)(SIDES * (turn - floor(turn))) % SIDES, row = (int)(ROWS * acos(x.p.y) / PI);
+		observed[(row == ROWS ? row - 1 : row) * SIDES + column]++;
+		means[i % GROUPS] += radiance_at(em, x.p, &colour).v[1] / pdf / (SAMPLES / GROUPS);
+	}
+	for (int i = 0; i < ROWS * SIDES; i++)
+		expected[i] /= total;
+	assert_true(stats_counts_p(observed, expected, ROWS * SIDES) > LEVEL);
+	struct stats_mean m = stats_mean_test(means, GROUPS, light);
+	print_message("%.6g +- %.2g, by quadrature %.6g\n", m.mean, m.error, light);
+	assert_true(fabs(m.mean - light) < 8 * m.error + 3e-3 * light && m.error < 0.02 * light);
+}
+
+static void test_stretched(void **state)
+{
+	static const char *const images[] = {"envmap filename=p0", "envmap filename=p2", "envmap filename=p3"};
+	for (int k = 0; k < 3; k++)
+		for (int s = 0; s < STRETCHES; s++) {
+			struct emitter em = make_emitter(*state, images[k], &stretches[s]);
+			check_places(*state, images[k], &stretches[s], &em);
+			check_stretched(&em, stats_seed(images[k]) + (uint64_t)s);
+		}
+}
+
 static void test_black_and_refusals(void **state)
 {
 	struct emitter em = make_emitter(*state, "envmap filename=p4", NULL);
@@ -264,8 +338,9 @@ static void test_black_and_refusals(void **state)
 	assert_true(em.power == 0 && !em.ops->sample_point(&em, (double[]){0.5, 0.5}, &x, &pdf));
 	assert_true(pdf_at(&em, (vec3){0, 0, 1}) == 0);
 
-	const mat4 shear = {{{1, 0.5, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
-	assert_true(try(*state, "envmap filename=p0", &shear, &em, &e) < 0 && strstr(e.text, "rotate"));
+	const mat4 flat = {{{1, 0.5, 0, 0}, {0, 0, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+	assert_true(try(*state, "envmap filename=p0", &flat, &em, &e) < 0 && strstr(e.text, "flat"));
+	assert_true(try(*state, "sky", &stretches[0], &em, &e) < 0 && strstr(e.text, "a sky can only rotate"));
 	assert_true(try(*state, "envmap", NULL, &em, &e) < 0 && strstr(e.text, "filename"));
 	assert_true(try(*state, "moon", NULL, &em, &e) < 0 && strstr(e.text, "moon"));
 	assert_true(try(*state, "area", NULL, &em, &e) < 0 && strstr(e.text, "shape"));
@@ -285,6 +360,7 @@ int main(void)
 		cmocka_unit_test(test_orientation),
 		cmocka_unit_test(test_pixel_centres),
 		cmocka_unit_test(test_poles_and_ends),
+		cmocka_unit_test(test_stretched),
 		cmocka_unit_test(test_black_and_refusals),
 	};
 	return cmocka_run_group_tests_name("0.6", tests, setup, teardown) +

@@ -227,6 +227,37 @@ static void test_notes_on_the_whole(void **state)
 	}
 }
 
+/* Mitsuba's image of it is another one. */
+static void test_note_on_a_stretched_environment(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *transform;
+		bool stretched;
+	} cases[] = {
+		{"<scale value='2'/><rotate y='1' angle='30'/>", false},
+		{"<scale x='-1'/>", false},
+		{"<scale x='1.5'/>", true},
+		{"<matrix value='1 0.5 0 0 0 1 0 0 0 0 1 0 0 0 0 1'/>", true},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[512];
+		snprintf(xml, sizeof xml,
+			 "<scene version='3.0.0'><emitter type='envmap'><string name='filename' value='e.png'/>"
+			 "<transform name='to_world'>%s</transform></emitter></scene>",
+			 cases[i].transform);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"e.png", "", 0}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e;
+		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%s", e.text);
+		if (scene_has_note(&s, "its to_world stretches the image") != cases[i].stretched)
+			fail_msg("%s: %s", cases[i].transform, cases[i].stretched ? "no note" : "a note");
+		scene_fini(&s);
+	}
+}
+
 #define ONE_EDGE "<integrator type='path'><integer name='max_depth' value='1'/></integrator>"
 
 /* A path of one edge ends at an emitter, which a point is not. */
@@ -375,6 +406,7 @@ int main(void)
 		cmocka_unit_test(test_camera),
 		cmocka_unit_test(test_several_sensors),
 		cmocka_unit_test(test_notes_on_the_whole),
+		cmocka_unit_test(test_note_on_a_stretched_environment),
 		cmocka_unit_test(test_notes_on_one_edge),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_size_is_overridden),
