@@ -101,9 +101,12 @@ static int child(const struct memory_file *files)
 	if (world_new(&w, &s, &assets, &o, &e))
 		return end_with(TRIAL_FAILED, e.text);
 	world_summary(w, &summary);
-	for (size_t i = 0; render_integrator_at(i); i++)
-		if (render(w, &summary, render_integrator_at(i), &e))
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		const struct render_integrator *integrator = render_integrator_at(i);
+		bool refuses = integrator->from_camera && summary.beams;
+		if (!refuses && render(w, &summary, integrator, &e))
 			return end_with(TRIAL_FAILED, e.text);
+	}
 	return TRIAL_RENDERED;
 }
 

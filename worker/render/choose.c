@@ -484,10 +484,11 @@ static int run_pilot(struct pilot *p, const struct plan *film, struct render_cho
 	return rc;
 }
 
-/* A path from the camera never meets a delta emitter, and is not joined to one through an exactly specular lobe. */
+/* A path from the camera never meets a delta emitter, and is not joined to one through an exactly specular lobe, nor to
+ * a beam. */
 static bool path_misses(const struct world *w)
 {
-	bool emitter = false, lobe = false;
+	bool emitter = false, lobe = world_has_beam(w);
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		emitter = emitter || w->emitters[i].delta;
 	for (uint32_t i = 0; i < w->bsdf_count; i++)

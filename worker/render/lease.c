@@ -232,6 +232,8 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 		return error_set(
 			e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
 			p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
+	if (i->face.from_camera && world_has_beam(w))
+		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->face.name);
 	struct mixture unused;
 	char accuracy[PLAN_ACCURACY_MAX];
 	accuracy_settings_print(&w->accuracy, accuracy);

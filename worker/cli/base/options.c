@@ -398,6 +398,8 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 			  chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
 	const struct render_integrator *integrator =
 		render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
+	if (integrator->from_camera && summary->beams)
+		return error_set(e, EINVAL, RENDER_NO_BEAMS, integrator->name);
 	p->kind = integrator->kind;
 	p->width = s->width;
 	p->height = s->height;

@@ -74,6 +74,7 @@ struct emitter_ops {
 struct emitter {
 	const struct emitter_ops *ops;
 	bool infinite, textured, delta;
+	bool beam; /* a delta emitter of one direction: no path is joined to it, and light sub-paths begin all alike */
 	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere, up to a factor */
 	double power; /* for choosing among emitters: area x pi x mean radiance; infinite ones: mean radiance x 4 pi, or
 			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */

@@ -311,7 +311,7 @@ bool full_path_is_made(const struct path_context *c, const struct full_path *x)
 	if (path_can_be_hit(c, &x->v[0]))
 		return true;
 	for (unsigned s = full_path_most_light(c, x); s > 0; s--)
-		if (full_path_joins(x, s))
+		if (full_path_joins(x, s) && !(s == 1 && c->w->emitters[x->v[0].emitter].beam))
 			return true;
 	return false;
 }

@@ -42,7 +42,8 @@ const struct integrator integrator_path = {
 	.face = {.name = "path",
 		 .summary = "path tracing with next event estimation and multiple importance sampling",
 		 .kind = PLAN_SAMPLES,
-		 .max_depth = PATH_MAX_EDGES},
+		 .max_depth = PATH_MAX_EDGES,
+		 .from_camera = true},
 	.stream = RNG_PATH,
 	.evaluate = path_trace,
 };

@@ -10,7 +10,13 @@ struct render_integrator {
 	enum plan_kind kind;
 	uint32_t max_depth; /* edges its state holds */
 	bool has_mutations; /* its chains draw proposals from a mixture of strategies */
+	bool from_camera;   /* it has no light sub-paths: no light of beams */
 };
+/* What is said where one that is from_camera, by name, meets a beam. */
+#define RENDER_NO_BEAMS                                                                                                \
+	"the integrator %s finds no light of `collimated`, a beam without width: paths must begin there, as those of " \
+	"bdpt, erpt, pssmlt and hslt do"
+
 /* NULL when there is none of that name; index from 0, NULL at the end. */
 const struct render_integrator *render_integrator_find(const char *name);
 const struct render_integrator *render_integrator_at(size_t index);

@@ -97,7 +97,6 @@ static const struct {
 	{PLUGIN_TEXTURE, "mesh_attribute"},
 	{PLUGIN_TEXTURE, "vertexcolors"},
 	{PLUGIN_TEXTURE, "volume"},
-	{PLUGIN_EMITTER, "collimated"},
 	{PLUGIN_EMITTER, "timed_sunsky"},
 	{PLUGIN_SENSOR, "distant"},
 	{PLUGIN_SENSOR, "fluxmeter"},

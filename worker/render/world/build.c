@@ -417,6 +417,14 @@ double world_brightest(const struct world *w)
 	return 3 * most; /* X + Y + Z */
 }
 
+bool world_has_beam(const struct world *w)
+{
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (w->emitters[i].beam && w->emitters[i].power > 0)
+			return true;
+	return false;
+}
+
 void world_summary(const struct world *w, struct render_summary *out)
 {
 	*out = (struct render_summary){.settings = w->settings,
@@ -426,6 +434,7 @@ void world_summary(const struct world *w, struct render_summary *out)
 				       .instances = w->instance_count,
 				       .shared_meshes = w->shared_mesh_count,
 				       .brightest = world_brightest(w),
+				       .beams = world_has_beam(w),
 				       .coincident = w->coincident,
 				       .notes = w->notes};
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);

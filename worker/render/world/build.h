@@ -32,6 +32,8 @@ int world_set_accuracy(struct world *w, const char *accuracy, bool *fits, struct
 void world_summary(const struct world *w, struct render_summary *out);
 /* X+Y+Z of the brightest emitter, for canvas_grid_exponent if the bootstrap is black. */
 double world_brightest(const struct world *w);
+/* Whether some light is that of a beam, which `path` does not find. */
+bool world_has_beam(const struct world *w);
 size_t world_embree_bytes(const struct world *w);
 
 #endif

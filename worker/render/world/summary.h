@@ -55,6 +55,7 @@ struct render_summary {
 		stored_triangles; /* shapes that share meshes; number of these meshes; their memory */
 	uint64_t memory;	  /* bytes of the world, approximately; Embree's part is estimated per triangle */
 	double brightest;	  /* see world_brightest */
+	bool beams;		  /* see world_has_beam */
 	struct render_coincident coincident;
 	struct world_notes notes;
 };

@@ -27,7 +27,7 @@ static void test_stand_ins(void **state)
 		{PLUGIN_BSDF, "hair", LENIENT_INNER, "diffuse"},
 		{PLUGIN_BSDF, "measured", LENIENT_REPLACE, "roughplastic"},
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "sunsky"},
-		{PLUGIN_EMITTER, "collimated", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_EMITTER, "laser", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
 		{PLUGIN_TEXTURE, "curvature", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_SHAPE, "ellipsoids", LENIENT_LEAVE_OUT, NULL},

@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * `collimated` of 0.5/0.6: `power` along a line without width, from the origin of to_world towards its +z.
+ *
+ * Both the place and the direction of a path's first edge are given, and so is where it ends: a path begins like every
+ * path of this light, and only techniques that draw this beginning from the light, with two of its vertices or more,
+ * can make one. The delta distribution of the direction is left out of power and density alike: where the beam goes,
+ * `radiance` is the power and the density 1 per solid angle, elsewhere both are 0. No point is drawn to be joined to.
+ */
+#include "worker/render/emitter/delta.h"
+
+/* What vertices that were moved or rounded may be off. */
+static const double same_direction = 1e-7;
+
+struct beam {
+	struct delta_light light;
+	vec3 axis;
+};
+
+static bool is_along(const struct emitter *em, vec3 w)
+{
+	const struct beam *b = em->data;
+	return vec3_length(vec3_sub(w, b->axis)) <= same_direction;
+}
+
+static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
+{
+	(void)x;
+	const struct beam *b = em->data;
+	return is_along(em, w) ? spectrum_scale(b->light.factor, color_eval(&b->light.color, wl)) : spectrum_of(0);
+}
+
+static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
+			     double *pdf_solid)
+{
+	(void)x, (void)u;
+	*w = ((const struct beam *)em->data)->axis;
+	*pdf_solid = 1;
+	return true;
+}
+
+static double pdf_direction(const struct emitter *em, const struct emitter_point *x, vec3 w)
+{
+	(void)x;
+	return is_along(em, w) ? 1 : 0;
+}
+
+static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+			  double *pdf_toward)
+{
+	(void)em, (void)ref, (void)u, (void)x, (void)pdf_toward;
+	return false;
+}
+
+static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
+{
+	(void)em, (void)ref, (void)x;
+	return 0;
+}
+
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct beam *b = em->data;
+	mat4 to_world = node_transform(n, "to_world");
+	b->axis = vec3_normalize(mat4_vector(&to_world, (vec3){0, 0, 1}));
+	if (!vec3_is_finite(b->axis))
+		return node_error(n, e, EINVAL, "to_world gives the beam no direction");
+	b->light.x.p = vec3_scale(build->scale, vec3_sub(mat4_point(&to_world, (vec3){0, 0, 0}), build->center));
+	int code = delta_create(em, n, "power", build->scale * build->scale, build, e);
+	if (code)
+		return code;
+	em->beam = true;
+	em->power = delta_strength(&b->light);
+	/* All of it may come from one point, seen by one pixel: a million of them see a unit of solid angle. */
+	em->brightest *= 0x1p20;
+	return 0;
+}
+
+static const struct param params[] = {
+	{.name = "power", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_collimated = {
+	.decl = {PLUGIN_EMITTER, "collimated", params, 0, PARAM_UNDERSTOOD},
+	.data_size = sizeof(struct beam),
+	.create = create,
+	.radiance = radiance,
+	DELTA_OPS,
+	.sample_direction = sample_direction,
+	.pdf_direction = pdf_direction,
+	.sample_toward = sample_toward,
+	.pdf_toward = pdf_toward,
+};
