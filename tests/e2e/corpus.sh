@@ -8,7 +8,7 @@ echo "<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant
 for i in 1 2 3; do
 	echo "<scene version='3.0.0'><sensor type='perspective'/><bsdf type='hair'/><shape type='cube$i'/></scene>" >"$DIR/corpus/hair$i.xml"
 done
-echo "<scene version='3.0.0'><sensor type='spherical'/></scene>" >"$DIR/corpus/round.xml"
+echo "<scene version='3.0.0'><sensor type='fluxmeter'/></scene>" >"$DIR/corpus/round.xml"
 echo "<scene version='3.0.0'><bsdf type='hair' id='a'/></scene>" >"$DIR/corpus/part.xml"
 echo '{"asset": {"version": "3.0"}}' >"$DIR/corpus/other.gltf"
 code 0 sh tests/corpus/corpus.sh "$BIN/hslt-scene" "$DIR/corpus"

@@ -1,5 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The pinhole and the lens in the camera's frame: right, down, forward. A camera with a projection of its own
+ * (projection.h) leaves directions, film points and density to it. camera_init refuses what is singular, out of range
+ * or too far away; nothing else fails.
+ */
 #include "worker/render/camera/camera.h"
+
+#include "worker/render/camera/projection.h"
 #include "worker/render/scene/fov.h"
 
 /* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle
@@ -10,7 +17,8 @@ static double pixels_per_slope(const struct scene_settings *s)
 }
 
 /* An orthographic camera is a pinhole so far behind the scene that objects twice as far away look smaller by 2^-20
- * only: a thousandth of a pixel in a film of 1,000. */
+ * only: a thousandth of a pixel in a film of 1,000. A telecentric one is a lens there, of which each point of the plane
+ * of focus sees as much as of the aperture in front of it. */
 static void step_back(struct camera *c, double half_width)
 {
 	double distance = 0x1p20 * fmax(1, half_width);
@@ -18,12 +26,16 @@ static void step_back(struct camera *c, double half_width)
 	c->near_clip += distance;
 	c->far_clip += distance;
 	c->scale = 0.5 * c->width * distance / half_width;
+	if (c->aperture > 0 && c->focus > 0) {
+		c->aperture *= (distance + c->focus) / c->focus;
+		c->focus += distance;
+	}
 }
 
 int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
 		struct error *e)
 {
-	if (!(s->half_width > 0) && !(s->fov > 0 && s->fov < 180))
+	if (!(s->half_width > 0) && s->projection != PROJECTION_SPHERE && !(s->fov > 0 && s->fov < 180))
 		return error_set(e, EINVAL, "the sensor's field of view of %g degrees is not between 0 and 180",
 				 s->fov);
 	vec3 forward = mat4_vector(&s->to_world, (vec3){0, 0, 1});
@@ -41,7 +53,10 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->height = s->height;
 	c->center_x = s->width * (0.5 - s->principal_x);
 	c->center_y = s->height * (0.5 - s->principal_y);
-	c->scale = s->half_width > 0 ? 0 : pixels_per_slope(s);
+	c->projection = s->projection == PROJECTION_SPHERE	? &camera_projection_spherical
+			: s->projection == PROJECTION_DISTORTED ? &camera_projection_rdist
+								: NULL;
+	c->scale = s->half_width > 0 || s->projection == PROJECTION_SPHERE ? 0 : pixels_per_slope(s);
 	c->near_clip = s->near_clip * world_scale;
 	c->far_clip = s->far_clip * world_scale;
 	c->aperture = s->aperture_radius * world_scale;
@@ -56,7 +71,7 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
 		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius,
 				 s->focus_distance);
-	return 0;
+	return c->projection && c->projection->init ? c->projection->init(c, s, e) : 0;
 }
 
 bool camera_has_aperture(const struct camera *c)
@@ -127,9 +142,20 @@ void camera_point_inverse(const struct camera *c, vec3 p, double u[2])
 	square_from_disk(x / c->aperture, y / c->aperture, u);
 }
 
+bool camera_has(const struct camera *c, double film_x, double film_y)
+{
+	vec3 unused;
+	return !c->projection || c->projection->direction(c, film_x, film_y, &unused);
+}
+
 vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double film_y)
 {
-	vec3 l = {(film_x - c->center_x) / c->scale, (film_y - c->center_y) / c->scale, 1};
+	vec3 l = {0, 0, 1};
+	if (c->projection) {
+		c->projection->direction(c, film_x, film_y, &l);
+		return vec3_normalize(frame_to_world(&c->axes, l));
+	}
+	l = (vec3){(film_x - c->center_x) / c->scale, (film_y - c->center_y) / c->scale, 1};
 	if (camera_has_aperture(c)) {
 		double x, y;
 		aperture_offset(c, x_k, &x, &y);
@@ -142,9 +168,13 @@ vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double fi
 bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, double *film_x, double *film_y)
 {
 	vec3 l = frame_to_local(&c->axes, d);
+	if (c->projection && c->projection->all_around)
+		return c->projection->project(c, l, film_x, film_y);
 	double depth = l.z * distance;
 	if (!(l.z > 0) || depth < c->near_clip || depth > c->far_clip)
 		return false;
+	if (c->projection)
+		return c->projection->project(c, l, film_x, film_y);
 	double slope_x = l.x / l.z, slope_y = l.y / l.z;
 	if (camera_has_aperture(c)) {
 		double x, y;
@@ -159,12 +189,40 @@ bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, d
 
 double camera_jac_film_from_solid(const struct camera *c, vec3 d)
 {
+	if (c->projection)
+		return c->projection->jac_film_from_solid(c, frame_to_local(&c->axes, d));
 	double cosine = vec3_dot(c->axes.n, d);
 	return c->scale * c->scale / (cosine * cosine * cosine);
 }
 
+bool camera_looks(const struct camera *c, vec3 d)
+{
+	return (c->projection && c->projection->all_around) || vec3_dot(c->axes.n, d) > 0;
+}
+
+void camera_pixel(const struct camera *c, vec3 d, double distance, vec3 axis[2], double length[2])
+{
+	if (c->projection && c->projection->pixel) {
+		vec3 tangent[2];
+		c->projection->pixel(c, frame_to_local(&c->axes, d), tangent, length);
+		for (int i = 0; i < 2; i++) {
+			axis[i] = frame_to_world(&c->axes, tangent[i]);
+			length[i] *= distance;
+		}
+		return;
+	}
+	axis[0] = c->axes.s;
+	axis[1] = c->axes.t;
+	length[0] = length[1] = distance * vec3_dot(c->axes.n, d) / c->scale;
+}
+
 void camera_clip(const struct camera *c, vec3 d, double *t_min, double *t_max)
 {
+	if (c->projection && c->projection->all_around) {
+		*t_min = 0;
+		*t_max = INFINITY;
+		return;
+	}
 	double cosine = vec3_dot(c->axes.n, d);
 	*t_min = c->near_clip / cosine;
 	*t_max = c->far_clip / cosine;

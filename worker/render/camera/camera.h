@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The camera: a pinhole (Mitsuba's `perspective`; far away, `orthographic`) or an ideal thin lens (`thinlens`). Film
+ * The camera: a pinhole (Mitsuba's `perspective`; far away, `orthographic`) or an ideal thin lens (`thinlens`; far
+ * away, `telecentric`). Pinholes may have another projection than that of a plane (projection.h): `spherical`,
+ * `perspective_rdist`. Film
  * coordinates are pixels of the full film, x to the right, y down.
  *
  * A path's camera end x_k is the pinhole, or a point of the aperture, a disk around the camera's position across its
@@ -20,6 +22,8 @@
 #include "worker/render/math/frame.h"
 #include "worker/render/scene/settings.h"
 
+struct camera_projection;
+
 struct camera {
 	vec3 position;		     /* the pinhole, or the centre of the aperture */
 	struct frame axes;	     /* s: right on the image, t: down, n: forward */
@@ -29,6 +33,8 @@ struct camera {
 	double near_clip, far_clip; /* along the axis, in the rescaled world */
 	bool lens;		    /* x_k is drawn and mutated: the radius is above 0, or this was forced */
 	double aperture, focus;	    /* radius; distance of the plane of focus along the axis */
+	const struct camera_projection *projection; /* NULL: that of a plane */
+	double kc[2], fold; /* of perspective_rdist; the squared slope at which its image ends */
 };
 
 /* -EINVAL with a sentence if the field of view is not within (0,180) degrees, the transform is singular, or a lens
@@ -45,14 +51,21 @@ vec3 camera_point(const struct camera *c, const double u[2]);
 /* The numbers in [0,1) that give p, a point of the aperture; 1/2, 1/2 without one. */
 void camera_point_inverse(const struct camera *c, vec3 p, double u[2]);
 
-/* The unit direction in which light from a film point leaves x_k. */
+/* Whether a film point looks anywhere: points beyond the edge of a panorama do not. */
+bool camera_has(const struct camera *c, double film_x, double film_y);
+/* The unit direction in which light from a film point, which it has, leaves x_k. */
 vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double film_y);
 /* The film point that sees, through x_k, along the unit direction d. false: behind the camera or outside near and far.
  * distance: from x_k to the point seen. */
 bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, double *film_x, double *film_y);
 /* The same for all x_k. */
 double camera_jac_film_from_solid(const struct camera *c, vec3 d);
-/* Along d from x_k, in units of d, where the near and far planes are. d points forward. */
+/* Whether it sees anything along d. */
+bool camera_looks(const struct camera *c, vec3 d);
+/* How what is seen along the unit direction d, at that distance from x_k, moves across d with film_x and film_y: unit
+ * axes, but for what is along d, and lengths a pixel. As if perspective_rdist did not distort. */
+void camera_pixel(const struct camera *c, vec3 d, double distance, vec3 axis[2], double length[2]);
+/* Along d from x_k, in units of d, where the near and far planes are. It looks along d. */
 void camera_clip(const struct camera *c, vec3 d, double *t_min, double *t_max);
 
 #endif

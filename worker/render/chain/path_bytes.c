@@ -30,8 +30,8 @@ static unsigned vertex_count(const struct world *w, unsigned edges)
 	return EFFECT_IS_ON(w, aperture) ? edges + 1 : edges;
 }
 
-/* How far a point of the aperture may lie from it, in units of the world's radius, and the square of a direction
- * from 1. */
+/* How far a point of the aperture may lie from it, in units of the world's radius or of a larger aperture's, and the
+ * square of a direction from 1. */
 #define BELONGS 1e-9
 /* Roundings of a sum of barycentrics, or of a unit vector's square, that were made by a few operations. */
 #define ROUNDING 0x1p-48
@@ -72,10 +72,10 @@ static void write_vertex(const struct world *w, const struct path_vertex *v, uin
 
 /* ---- reading */
 
-static bool near(const struct world *w, vec3 a, vec3 b)
+static bool near(vec3 a, vec3 b, double size)
 {
 	vec3 d = vec3_sub(a, b);
-	return vec3_dot(d, d) <= BELONGS * BELONGS * w->radius * w->radius;
+	return vec3_dot(d, d) <= BELONGS * BELONGS * size * size;
 }
 
 static bool read_surface(const struct world *w, struct prim_ref prim, vec3 place, struct surface_point *x)
@@ -104,7 +104,7 @@ static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, str
 	struct emitter_point point = {.infinite = em->infinite};
 	double pdf;
 	if (em->delta) {
-		if (!em->ops->sample_point(em, half, &point, &pdf) || !near(w, point.p, p))
+		if (!em->ops->sample_point(em, half, &point, &pdf) || !near(point.p, p, w->radius))
 			return false;
 	} else {
 		if (!em->infinite || !(fabs(vec3_dot(p, p) - 1) <= BELONGS))
@@ -127,7 +127,7 @@ static struct path_vertex pinhole(const struct world *w)
 /* Far beyond anything that belongs to the scene: squares of such numbers would overflow. */
 static bool is_huge(const struct world *w, vec3 p)
 {
-	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w).x.p);
+	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w).x.p) + w->camera.aperture;
 	return !(fabs(p.x) <= most && fabs(p.y) <= most && fabs(p.z) <= most);
 }
 
@@ -151,7 +151,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 		v->x.prim = PRIM_NONE;
 		camera_point_inverse(&w->camera, place, u);
 		v->x.p = camera_point(&w->camera, u);
-		return near(w, v->x.p, place);
+		return near(v->x.p, place, fmax(w->radius, w->camera.aperture));
 	}
 	if (i == 0 && (emitter < 0 || (uint32_t)emitter >= w->emitter_count))
 		return false;

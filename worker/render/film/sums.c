@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Kernels are products of one in x and one in y, whose values are computed once a splat for all pixels in reach. On a
+ * panorama a splat is made again on the other side of each edge that its kernel may reach. -ENOMEM; -EINVAL: a filter
+ * that vanishes, a window that cuts a panorama's edge.
+ */
 #include "worker/render/film/sums.h"
 
 #include "common/base/mem.h"
@@ -38,6 +43,26 @@ static void splat_on_film(struct splat_target *to, const struct splat *s, double
 	film_sums_splat((struct film_sums *)(void *)to, s, weight);
 }
 
+/* Samples on the other side of a panorama's edge are taken if they are in the window. */
+static int check_around(const struct plan *p, const struct scene_settings *s, struct error *e)
+{
+	uint32_t b = s->border;
+	bool inside = p->crop_x >= b && p->crop_y >= b && p->crop_x + p->crop_width + b <= s->width &&
+		      p->crop_y + p->crop_height + b <= s->height;
+	if (s->projection != PROJECTION_SPHERE || inside)
+		return 0;
+	if (p->crop_width < s->width)
+		return error_set(
+			e, EINVAL,
+			"a window of a panorama that comes within %u pixels of its edges must be as wide as it, "
+			"because its filter reaches around",
+			b);
+	return s->filter_radius <= s->width / 2.0 && s->filter_radius <= p->crop_height
+		       ? 0
+		       : error_set(e, EINVAL, "the filter's radius of %g pixels is too large for a panorama of %u x %u",
+				   s->filter_radius, p->crop_width, p->crop_height);
+}
+
 int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e)
 {
 	*f = (struct film_sums){.target = {splat_on_film},
@@ -47,6 +72,13 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 				.height = p->crop_height,
 				.filter = s->filter,
 				.radius = s->filter_radius};
+	int rc = check_around(p, s, e);
+	if (rc)
+		return rc;
+	if (s->projection == PROJECTION_SPHERE) {
+		f->around[0] = s->width;
+		f->around[1] = s->height;
+	}
 	f->tiles_x = (f->width + TILE_SIZE - 1) / TILE_SIZE;
 	f->tiles_y = (f->height + TILE_SIZE - 1) / TILE_SIZE;
 	if (s->filter == FILTER_GAUSSIAN) {
@@ -69,7 +101,7 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 		film_sums_fini(f);
 		return error_set(e, ENOMEM, "out of memory for a film of %u x %u pixels", f->width, f->height);
 	}
-	int rc = chain_moments_init(&f->moments, p, e);
+	rc = chain_moments_init(&f->moments, p, e);
 	if (rc)
 		film_sums_fini(f);
 	return rc;
@@ -123,9 +155,8 @@ static bool reach(double position, double radius, uint32_t size, uint32_t *first
 
 enum { KERNEL_MAX = 130 }; /* pixels that a kernel may span: settings limit its radius to 64 */
 
-void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
+static void splat_at(struct film_sums *f, double x, double y, const struct splat *s, double weight)
 {
-	double x = s->x - f->x, y = s->y - f->y;
 	if (f->filter == FILTER_BOX && f->radius == 0.5) {
 		/* A point on the border of two pixels belongs to one. */
 		if (x >= 0 && y >= 0 && x < f->width && y < f->height)
@@ -145,6 +176,24 @@ void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
 			if (kx[i - i0] * ky != 0)
 				add_pixel(f, i, j, s->xyz, kx[i - i0] * ky);
 	}
+}
+
+/* Beyond the left edge is the right one; beyond a pole is the meridian half a turn away. */
+static void splat_around(struct film_sums *f, const struct splat *s, double weight)
+{
+	double w = f->around[0], h = f->around[1];
+	const double places[3][2] = {{s->x, s->y}, {s->x + 0.5 * w, -s->y}, {s->x + 0.5 * w, 2 * h - s->y}};
+	for (int i = 0; i < 3; i++)
+		for (int turn = -1; turn <= 1; turn++)
+			splat_at(f, places[i][0] + turn * w - f->x, places[i][1] - f->y, s, weight);
+}
+
+void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
+{
+	if (f->around[0] > 0)
+		splat_around(f, s, weight);
+	else
+		splat_at(f, s->x - f->x, s->y - f->y, s, weight);
 }
 
 static int take_tile(const struct film_sums *f, uint32_t tx, uint32_t ty, struct tile *t)

@@ -15,6 +15,7 @@ struct film_sums {
 	struct splat_target target;   /* film_sums_splat */
 	uint32_t x, y, width, height; /* the crop */
 	uint32_t tiles_x, tiles_y;
+	double around[2]; /* width and height of a panorama, around which the kernel reaches; 0: of another film */
 	enum filter_kind filter;
 	double radius;
 	double inverse, floor, scale; /* gaussian: scale (exp(-inverse d^2) - floor) */
@@ -24,6 +25,7 @@ struct film_sums {
 	struct chain_moments moments;
 };
 
+/* -EINVAL: also a window that cuts off a part of a panorama into which kernels reach from the other side. */
 int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e);
 void film_sums_fini(struct film_sums *f);
 void film_sums_splat(struct film_sums *f, const struct splat *s, double weight);

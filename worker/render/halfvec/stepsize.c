@@ -26,20 +26,18 @@ static double bsdf_limit(const struct path_context *c, const struct path_vertex 
 	return c->w->accuracy.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
 }
 
-/* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale per pixel, meet the plane of the geometric
- * normal. */
+/* d x_{k-1} / d pixel: rays through x_k meet the plane of the geometric normal. */
 static bool pixel_footprint(const struct camera *camera, const struct full_path *x, mat2 *j)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
 	const struct surface_point *at = &x->v[x->edges - 1].x;
-	vec3 w = vec3_neg(e->w), du, dv, d[2];
-	double depth = sqrt(e->distance2) * vec3_dot(camera->axes.n, w), cosine = vec3_dot(at->ng, w);
-	if (!(depth > 0) || !(fabs(cosine) > RATIO_LEAST))
+	vec3 w = vec3_neg(e->w), du, dv, axis[2], d[2];
+	double length[2], cosine = vec3_dot(at->ng, w);
+	camera_pixel(camera, w, sqrt(e->distance2), axis, length);
+	if (!(length[0] > 0 && length[1] > 0) || !(fabs(cosine) > RATIO_LEAST))
 		return false;
-	for (int i = 0; i < 2; i++) {
-		vec3 axis = i ? camera->axes.t : camera->axes.s;
-		d[i] = vec3_scale(depth / camera->scale, vec3_madd(axis, -vec3_dot(at->ng, axis) / cosine, w));
-	}
+	for (int i = 0; i < 2; i++)
+		d[i] = vec3_scale(length[i], vec3_madd(axis[i], -vec3_dot(at->ng, axis[i]) / cosine, w));
 	surface_tangents(at, &du, &dv);
 	*j = (mat2){vec3_dot(du, d[0]), vec3_dot(du, d[1]), vec3_dot(dv, d[0]), vec3_dot(dv, d[1])};
 	return true;

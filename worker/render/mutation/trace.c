@@ -33,7 +33,7 @@ static bool move_film(struct mutation_ctx *m, const struct full_path *x, struct 
 	for (int i = 0; i < 2; i++)
 		y->film[i] = x->film[i] + sigma * g[i];
 	move->log_symmetric -= 0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * sigma * sigma);
-	return film_window_holds(&m->path->window, y->film);
+	return film_window_holds(&m->path->window, y->film) && camera_has(&m->path->w->camera, y->film[0], y->film[1]);
 }
 
 /* The rotation that maps half vectors from x_j's frame into y_j's, by the line between the two as seen in both

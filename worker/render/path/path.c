@@ -266,7 +266,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	v[0].x.p = camera_point(&w->camera, u + DIM_APERTURE_U);
 	v[0].x.prim = PRIM_NONE;
 	v[0].edge.medium = w->camera_medium;
-	if (max_vertices < 2)
+	if (max_vertices < 2 || !camera_has(&w->camera, film[0], film[1]))
 		return 1;
 	vec3 d = camera_direction(&w->camera, v[0].x.p, film[0], film[1]);
 	double t_min, t_max, area = c->window.width * c->window.height;

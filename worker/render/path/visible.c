@@ -13,7 +13,7 @@ static bool seen_by_camera(const struct path_context *c, const struct path_verte
 	const struct camera *camera = &c->w->camera;
 	bool endless = b->kind == VERTEX_INFINITE;
 	vec3 d = endless ? b->x.p : vec3_sub(b->x.p, eye->x.p);
-	if (!(vec3_dot(camera->axes.n, d) > 0))
+	if (!camera_looks(camera, d))
 		return false;
 	double t_min, t_max;
 	camera_clip(camera, d, &t_min, &t_max);

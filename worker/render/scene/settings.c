@@ -21,6 +21,7 @@
 
 enum { FILM_PIXELS_MAX = PLAN_MAX_FILM, RADIUS_MAX = 64 };
 enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
+#define KC_MAX 1e6
 
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
 
@@ -56,14 +57,41 @@ static const struct param thinlens_params[] = {
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
-static const struct param orthographic_params[] = {
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
-	{"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
-	{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
-	SHUTTER_PARAMS,
+static const struct param rdist_params[] = {
+	CAMERA_PARAMS,
 	{"focus_distance", IGNORED},
-	{"jitter", IGNORED},
-	{"cone_scale", IGNORED},
+	{"aperture_radius", REFUSED},
+	{"kc", UNDERSTOOD(VALUE_STRING)},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+#define FAR_PARAMS                                                                              \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},  \
+		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS, {"jitter", IGNORED}, \
+		{"cone_scale", IGNORED},                                                        \
+	{                                                                                       \
+		"srf", REFUSED                                                                  \
+	}
+
+static const struct param orthographic_params[] = {
+	FAR_PARAMS,
+	{"focus_distance", IGNORED},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+static const struct param telecentric_params[] = {
+	FAR_PARAMS,
+	{"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
+	{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+/* Exporters write planes and a focus for all cameras; this one has none. */
+static const struct param spherical_params[] = {
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
+	{"near_clip", IGNORED},
+	{"far_clip", IGNORED},
+	{"focus_distance", IGNORED},
+	SHUTTER_PARAMS,
 	{"srf", REFUSED},
 	{NULL, 0, 0, 0, 0, NULL},
 };
@@ -131,6 +159,9 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_SENSOR, "perspective", perspective_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "thinlens", thinlens_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "orthographic", orthographic_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "telecentric", telecentric_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "spherical", spherical_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "perspective_rdist", rdist_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "batch", batch_params, CAMERA_HOLDS | HOLDS(PLUGIN_SENSOR), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "mfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
@@ -275,11 +306,30 @@ static int read_scale(const struct scene_node *sensor, struct scene_settings *ou
 
 static int read_fov(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
-	if (strcmp(sensor->type, "orthographic") == 0) {
+	bool far = strcmp(sensor->type, "orthographic") == 0 || strcmp(sensor->type, "telecentric") == 0;
+	if (far || out->projection == PROJECTION_SPHERE)
 		snprintf(out->fov_axis, sizeof out->fov_axis, "x");
+	if (far)
 		return read_scale(sensor, out, e);
-	}
-	return fov_read(sensor, &out->fov, out->fov_axis, e);
+	return out->projection == PROJECTION_SPHERE ? 0 : fov_read(sensor, &out->fov, out->fov_axis, e);
+}
+
+static int read_projection(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	if (strcmp(sensor->type, "spherical") == 0)
+		out->projection = PROJECTION_SPHERE;
+	if (strcmp(sensor->type, "perspective_rdist") != 0)
+		return 0;
+	const char *kc = node_string(sensor, "kc", "");
+	int count = number_list(kc, out->kc, 2);
+	if (count != 0 && count != 2)
+		return node_error(sensor, e, EINVAL, "kc=\"%.64s\" is not two numbers", kc);
+	for (int i = 0; i < count; i++)
+		if (!(fabs(out->kc[i]) <= KC_MAX))
+			return node_error(sensor, e, ERANGE, "kc=\"%.64s\" is outside [-%g, %g]", kc, KC_MAX, KC_MAX);
+	if (out->kc[0] != 0 || out->kc[1] != 0)
+		out->projection = PROJECTION_DISTORTED;
+	return 0;
 }
 
 /* Orthonormalises the columns around the view; mirrored ones stay mirrored. */
@@ -306,9 +356,10 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	if (!(out->near_clip < out->far_clip))
 		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip,
 				  out->far_clip);
-	if (strcmp(sensor->type, "thinlens") != 0)
+	bool thin = strcmp(sensor->type, "thinlens") == 0;
+	if (!thin && strcmp(sensor->type, "telecentric") != 0)
 		return 0;
-	if (!node_find(sensor, "aperture_radius"))
+	if (thin && !node_find(sensor, "aperture_radius"))
 		return node_error(sensor, e, EINVAL, "a thinlens needs an aperture_radius");
 	out->aperture_radius = node_float(sensor, "aperture_radius", 0);
 	out->focus_distance = node_float(sensor, "focus_distance", out->far_clip);
@@ -366,6 +417,8 @@ int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, 
 		r = read_filter(sensor, out, e);
 	if (!r)
 		r = read_depth(s, out, e);
+	if (!r)
+		r = read_projection(sensor, out, e);
 	if (!r)
 		r = read_fov(sensor, out, e);
 	return r ? r : read_camera(sensor, out, e);

@@ -10,6 +10,9 @@
 
 enum filter_kind { FILTER_BOX, FILTER_TENT, FILTER_GAUSSIAN, FILTER_CUBIC, FILTER_LANCZOS };
 
+/* How directions become film points: by a plane, by longitude and latitude, by a plane that kc distorts. */
+enum scene_projection { PROJECTION_PLANE, PROJECTION_SPHERE, PROJECTION_DISTORTED };
+
 struct scene_settings {
 	uint32_t width, height; /* film, 1..PLAN_MAX_SIZE each */
 	enum filter_kind filter;
@@ -23,15 +26,16 @@ struct scene_settings {
 	uint32_t roulette_depth; /* scattering events before Russian roulette begins, rr_depth; from 1 on, default 5 */
 	bool hide_emitters;	 /* hides paths of one edge, emitters seen directly */
 	char integrator[32];	 /* the scene's own ("": none): ignored except for its depths and media */
-	/* perspective, thinlens */
-	mat4 to_world;	   /* camera: +z forward, +x LEFT on the image, +y up; without scale */
-	double half_width; /* above 0: orthographic, half of the film's width in scene units */
-	double fov;	   /* degrees, along fov_axis */
-	char fov_axis[16]; /* x, y, diagonal, smaller, larger: the camera resolves it by the film's size */
+	mat4 to_world;		 /* camera: +z forward, +x LEFT on the image, +y up; without scale */
+	double half_width;	 /* above 0: orthographic or telecentric, half of the film's width in scene units */
+	double fov;		 /* degrees, along fov_axis */
+	char fov_axis[16];	 /* x, y, diagonal, smaller, larger: the camera resolves it by the film's size */
 	double principal_x, principal_y; /* offset of the principal point from the middle, relative to the film's size,
 					    as in Mitsuba 3 */
+	enum scene_projection projection;
+	double kc[2]; /* of PROJECTION_DISTORTED */
 	double near_clip, far_clip;
-	double aperture_radius, focus_distance; /* thinlens; radius 0: a pinhole, whatever the distance */
+	double aperture_radius, focus_distance; /* thinlens, telecentric; radius 0: a pinhole, whatever the distance */
 	bool unplaced; /* the scene has no sensor: scene_settings_place says where the camera is */
 };
 

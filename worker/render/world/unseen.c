@@ -64,6 +64,8 @@ static unsigned sides_of(const struct world *w, const struct view *v, const stru
 
 void unseen_note(struct world *w, const struct box *boxes)
 {
+	if (w->camera.projection) /* its rays do not end at four planes */
+		return;
 	const struct view v = view_of(w);
 	unsigned all = (1U << SIDES) - 1;
 	for (uint32_t i = 0; i < w->shape_count; i++) {

@@ -56,10 +56,61 @@ static void kernels_have_integral_1(void **state)
 	}
 }
 
+/* A panorama's kernel reaches around: nothing of a splat is lost, and what is beyond an edge is where that place is. */
+static void kernels_reach_around(void **state)
+{
+	(void)state;
+	enum { WIDTH = 40, HEIGHT = 20 };
+	const struct scene_settings s = {.width = WIDTH,
+					 .height = HEIGHT,
+					 .border = 2,
+					 .filter = FILTER_TENT,
+					 .filter_radius = 2,
+					 .projection = PROJECTION_SPHERE};
+	struct plan p = {.width = WIDTH, .height = HEIGHT, .crop_width = WIDTH, .crop_height = HEIGHT};
+	struct film_sums f;
+	struct error e;
+	static const struct {
+		double x, y;
+		uint32_t column, row; /* a pixel on the other side, at the distance 1 to the splat in one dimension */
+	} cases[] = {{0.5, 10.5, WIDTH - 1, 10},
+		     {WIDTH - 0.5, 10.5, 0, 10},
+		     {3.5, 0.5, 23, 0},
+		     {33.5, HEIGHT - 0.5, 13, HEIGHT - 1}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		assert_int_equal(film_sums_init(&f, &p, &s, &e), 0);
+		film_sums_splat(&f, &(struct splat){cases[i].x, cases[i].y, {1, 1, 1}}, 1);
+		double sum = 0, there = f.xyz[3 * (cases[i].row * WIDTH + cases[i].column)];
+		for (size_t k = 0; k < (size_t)WIDTH * HEIGHT; k++)
+			sum += f.xyz[3 * k];
+		if (!(fabs(sum - 1) < 1e-12 && fabs(there - 0.25 * 0.5) < 1e-12))
+			fail_msg("%zu: %g in all, %g there", i, sum, there);
+		film_sums_fini(&f);
+	}
+	/* A window may lie inside, or go round; otherwise some of the light would be missing. */
+	static const struct {
+		uint32_t x, y, width, height;
+		bool valid;
+	} windows[] = {{2, 2, 36, 16, true}, {0, 5, WIDTH, 4, true}, {0, 0, WIDTH, 4, true}, {1, 5, 20, 4, false},
+		       {5, 1, 20, 4, false}, {5, 5, 34, 4, false},   {0, 0, WIDTH, 1, false}};
+	for (size_t i = 0; i < sizeof windows / sizeof *windows; i++) {
+		p.crop_x = windows[i].x;
+		p.crop_y = windows[i].y;
+		p.crop_width = windows[i].width;
+		p.crop_height = windows[i].height;
+		int rc = film_sums_init(&f, &p, &s, &e);
+		if ((rc == 0) != windows[i].valid)
+			fail_msg("window %zu: %d", i, rc);
+		if (!rc)
+			film_sums_fini(&f);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(kernels_have_integral_1),
+		cmocka_unit_test(kernels_reach_around),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -84,6 +84,41 @@ static void test_furnace(void **state)
 		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct effort){64, 256, 0});
 }
 
+/* The same, seen all around from a point off its centre, with a filter that reaches around the film's edges. */
+static void test_furnace_all_around(void **state)
+{
+	(void)state;
+	check_constant(
+		"furnace, all around",
+		world_of_text(
+			16, 8,
+			DEPTH("5") "<sensor type='spherical'><film type='hdrfilm'/><transform name='to_world'>"
+				   "<translate x='0.3' y='0.5'/></transform></sensor>"
+				   "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
+				   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>"),
+		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct effort){512, 1024, 49152});
+}
+
+/* Through a telecentric lens, whose points lie a million radii away: states of chains hold them exactly enough. */
+static void test_furnace_far_lens(void **state)
+{
+	(void)state;
+	static struct agree_image image;
+	struct world *w = world_of_text(
+		16, 16,
+		DEPTH("5") "<sensor type='telecentric'><film type='hdrfilm'/><float name='aperture_radius' value='.2'/>"
+			   "<float name='focus_distance' value='.5'/><transform name='to_world'><scale value='0.3'/>"
+			   "<lookat origin='0.2,0.1,0.3' target='0.5,1,0' up='0,1,0'/></transform></sensor>"
+			   "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
+			   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>");
+	struct agree_side side = {"hslt", 512, 32, 0, 0};
+	agree_render(w, "furnace, far lens, hslt", "hslt", &side, &image);
+	if (!(image.counters[COUNT_ACCEPTED] > 0 && image.counters[COUNT_STATES_LOST] == 0))
+		fail_msg("%llu accepted, %llu states lost", (unsigned long long)image.counters[COUNT_ACCEPTED],
+			 (unsigned long long)image.counters[COUNT_STATES_LOST]);
+	check_constant("furnace, far lens", w, 1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct effort){64, 256, 0});
+}
+
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
 #define BALL(bsdf) "<shape type='sphere'>" bsdf "</shape>"
 
@@ -565,12 +600,20 @@ static void test_black(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_furnace),	    cmocka_unit_test(test_invisible),
-		cmocka_unit_test(test_absorbing),   cmocka_unit_test(test_camera_in_medium),
-		cmocka_unit_test(test_white_media), cmocka_unit_test(test_scattered_once),
-		cmocka_unit_test(test_half_space),  cmocka_unit_test(test_beam_in_layer),
-		cmocka_unit_test(test_lit_floor),   cmocka_unit_test(test_beam),
-		cmocka_unit_test(test_plates),	    cmocka_unit_test(test_hard),
+		cmocka_unit_test(test_furnace),
+		cmocka_unit_test(test_furnace_all_around),
+		cmocka_unit_test(test_furnace_far_lens),
+		cmocka_unit_test(test_invisible),
+		cmocka_unit_test(test_absorbing),
+		cmocka_unit_test(test_camera_in_medium),
+		cmocka_unit_test(test_white_media),
+		cmocka_unit_test(test_scattered_once),
+		cmocka_unit_test(test_half_space),
+		cmocka_unit_test(test_beam_in_layer),
+		cmocka_unit_test(test_lit_floor),
+		cmocka_unit_test(test_beam),
+		cmocka_unit_test(test_plates),
+		cmocka_unit_test(test_hard),
 		cmocka_unit_test(test_black),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -185,7 +185,7 @@ static void test_unknown_names(void **state)
 	refuses(S "<light type='point'/>" END, "there is no element of this name; did you mean `emitter`?");
 	refuses(BSDF("<int name='a' value='1'/>"), "there is no element of this name; did you mean `integer`?");
 	refuses(S "<bsdf/>" END, "needs an attribute `type`");
-	refuses(S "<sensor type='spherical'/>" END, "supported: perspective, thinlens, orthographic");
+	refuses(S "<sensor type='fluxmeter'/>" END, "supported: perspective, thinlens, orthographic");
 	refuses(S "<sensor type='perspective'><film type='hdrfilm'><rfilter type='wiener'/></film></sensor>" END,
 		"supported: box, tent, gaussian, mitchell, catmullrom, lanczos");
 	refuses(BSDF("\n<float name='alhpa' value='1'/>"),
