@@ -25,9 +25,10 @@ static bool project(const struct camera *c, vec3 l, double *film_x, double *film
 	double sine = hypot(l.x, l.z), turn = atan2(-l.x, -l.z) / (2 * M_PI);
 	if (!(sine > 0))
 		return false;
-	*film_x = (turn < 0 ? turn + 1 : turn) * c->width;
-	*film_y = atan2(sine, -l.y) / M_PI * c->height;
-	return *film_x<c->width && * film_y> 0 && *film_y < c->height;
+	double x = (turn < 0 ? turn + 1 : turn) * c->width, y = atan2(sine, -l.y) / M_PI * c->height;
+	*film_x = x;
+	*film_y = y;
+	return x < c->width && y > 0 && y < c->height;
 }
 
 static double jac_film_from_solid(const struct camera *c, vec3 l)
