@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Motion between keyframes, against rotations about an axis by a share of an angle: R(s angle) A ((1 - s) S0 + s S1)
+ * and a point on a line, S0 and S1 made of their eigenvectors, so that neither quaternions nor a decomposition is used
+ * to say what is right. Bounds hold every point at any time, and are not much larger than what is reached.
+ */
+#include "tests/support/dice.h"
+#include "worker/render/math/motion.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+static mat4 rotation(struct dice *d)
+{
+	return mat4_rotate(dice_direction(d), dice_between(d, 0, 360));
+}
+
+static mat4 transposed(mat4 a)
+{
+	mat4 r = mat4_identity();
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			r.m[i][k] = a.m[k][i];
+	return r;
+}
+
+/* Symmetric, with lengths from 1/8 to 8. */
+static mat4 stretch(struct dice *d)
+{
+	mat4 v = rotation(d);
+	vec3 s = {exp2(dice_between(d, -3, 3)), exp2(dice_between(d, -3, 3)), exp2(dice_between(d, -3, 3))};
+	return mat4_mul(v, mat4_mul(mat4_scale(s), transposed(v)));
+}
+
+static mat4 mixed(mat4 a, mat4 b, double s)
+{
+	for (int i = 0; i < 4; i++)
+		for (int k = 0; k < 4; k++)
+			a.m[i][k] = (1 - s) * a.m[i][k] + s * b.m[i][k];
+	return a;
+}
+
+/* From one keyframe to another. */
+struct passage {
+	mat4 turn, from, to;
+	vec3 axis, begin, end;
+	double angle, hand;
+};
+
+static struct passage passage_of(struct dice *d)
+{
+	struct passage p = {.turn = rotation(d),
+			    .from = stretch(d),
+			    .to = stretch(d),
+			    .axis = dice_direction(d),
+			    .begin = vec3_scale(3, dice_direction(d)),
+			    .end = vec3_scale(3, dice_direction(d)),
+			    .angle = dice_between(d, 0, 179),
+			    .hand = dice_throw(d) < 0.5 ? -1 : 1};
+	return p;
+}
+
+static mat4 expected(const struct passage *p, double s)
+{
+	const vec3 hand = {p->hand, p->hand, p->hand};
+	mat4 r = mat4_mul(mat4_rotate(p->axis, s * p->angle), mat4_mul(p->turn, mixed(p->from, p->to, s)));
+	vec3 at = vec3_madd(vec3_scale(1 - s, p->begin), s, p->end);
+	return mat4_mul(mat4_translate(at), mat4_mul(r, mat4_scale(hand)));
+}
+
+static void assert_same(const mat4 *a, const mat4 *b)
+{
+	for (int i = 0; i < 4; i++)
+		for (int k = 0; k < 4; k++)
+			if (!(fabs(a->m[i][k] - b->m[i][k]) <= 1e-12 * 8))
+				fail_msg("[%d][%d] is %.17g, not %.17g", i, k, a->m[i][k], b->m[i][k]);
+}
+
+static void test_between_two(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("motion between two keyframes");
+	for (size_t n = dice_count(2000); n > 0; n--) {
+		const struct passage p = passage_of(&d);
+		const struct keyframe key[2] = {{-1, expected(&p, 0)}, {3, expected(&p, 1)}};
+		const struct animation a = {2, key};
+		struct motion_key room[2];
+		struct motion m;
+		double open = dice_between(&d, -1, 2), close = dice_between(&d, open + 0.1, 3), t = dice_throw(&d);
+		assert_true(motion_make(&m, &a, open, close, room));
+		mat4 got = motion_at(&m, t), right = expected(&p, (open + t * (close - open) + 1) / 4);
+		assert_same(&got, &right);
+	}
+}
+
+/* The keyframes of one passage and of another that begins where it ends; before and after them nothing moves. */
+static void test_many(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("motion along many keyframes");
+	for (size_t n = dice_count(500); n > 0; n--) {
+		const struct passage p = passage_of(&d);
+		struct keyframe key[9];
+		for (int i = 0; i < 9; i++) /* not at equal distances */
+			key[i] = (struct keyframe){i * (i + 1) / 72.0, expected(&p, i * (i + 1) / 72.0)};
+		const struct animation a = {9, key};
+		struct motion_key room[9];
+		struct motion m;
+		assert_true(motion_make(&m, &a, -1, 2, room));
+		for (int k = 0; k < 8; k++) {
+			double t = dice_throw(&d);
+			mat4 got = motion_at(&m, t), right = expected(&p, fmin(fmax(3 * t - 1, 0), 1));
+			assert_same(&got, &right);
+		}
+	}
+}
+
+/* Only what happens while the shutter is open counts, and an open shutter is one that is open for some time. */
+static void test_when_it_moves(void **state)
+{
+	(void)state;
+	mat4 here = mat4_identity(), there = mat4_translate((vec3){4, 0, 0});
+	const struct keyframe key[4] = {{0, here}, {1, here}, {2, there}, {3, there}};
+	const struct animation a = {4, key};
+	struct motion_key room[4];
+	struct motion m;
+	assert_false(motion_make(&m, &a, 0, 1, room));
+	assert_false(motion_make(&m, &a, 2, 3, room));
+	assert_false(motion_make(&m, &a, 5, 9, room));
+	assert_false(motion_make(&m, &a, 1.25, 1.25, room));
+	mat4 at = motion_at(&m, 0);
+	assert_true(at.m[0][3] == 1);
+	assert_true(motion_make(&m, &a, 1.5, 1.75, room));
+	at = motion_at(&m, 1);
+	assert_true(at.m[0][3] == 3);
+	assert_true(motion_make(&m, &a, -8, 8, room));
+	assert_int_equal(m.count, 4);
+	assert_true(motion_make(&m, &a, 1.5, 1.75, room));
+	assert_int_equal(m.count, 2);
+	motion_rescale(&m, (vec3){1, 2, 3}, 0.5);
+	at = motion_at(&m, 1);
+	assert_true(at.m[0][3] == 1 && at.m[1][3] == -1 && at.m[2][3] == -1.5 && at.m[0][0] == 0.5);
+}
+
+static void widen(vec3 p, double low[3], double high[3])
+{
+	const double v[3] = {p.x, p.y, p.z};
+	for (int i = 0; i < 3; i++) {
+		low[i] = fmin(low[i], v[i]);
+		high[i] = fmax(high[i], v[i]);
+	}
+}
+
+static void test_bounds(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("motion's bounds");
+	for (size_t n = dice_count(200); n > 0; n--) {
+		const struct passage p = passage_of(&d);
+		const struct keyframe key[3] = {
+			{-0.5, expected(&p, 0)}, {0.3, expected(&p, 0.7)}, {0.8, expected(&p, 1)}};
+		const struct animation a = {3, key};
+		struct motion_key room[3];
+		struct motion m;
+		vec3 low, high, size = {1, 2, 0.5};
+		double least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY};
+		assert_true(motion_make(&m, &a, 0, 1, room));
+		m.before = mat4_mul(mat4_translate((vec3){0.3, 0, 1}), mat4_rotate((vec3){1, 0, 1}, 30));
+		motion_bounds(&m, vec3_neg(size), size, &low, &high);
+		for (int i = 0; i <= 1000; i++)
+			for (int k = 0; k < 8; k++) {
+				const mat4 at = motion_at(&m, i / 1000.0);
+				widen(mat4_point(&at, (vec3){k & 1 ? -1 : 1, k & 2 ? -2 : 2, k & 4 ? -0.5 : 0.5}),
+				      least, most);
+			}
+		const double l[3] = {low.x, low.y, low.z}, h[3] = {high.x, high.y, high.z};
+		double whole = most[0] - least[0] + most[1] - least[1] + most[2] - least[2];
+		for (int i = 0; i < 3; i++) {
+			double loose = 0.01 * whole;
+			if (!(l[i] <= least[i] && h[i] >= most[i]))
+				fail_msg("[%g, %g] does not hold [%g, %g]", l[i], h[i], least[i], most[i]);
+			if (!(l[i] >= least[i] - loose && h[i] <= most[i] + loose))
+				fail_msg("[%g, %g] is much more than [%g, %g]", l[i], h[i], least[i], most[i]);
+		}
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_between_two),
+		cmocka_unit_test(test_many),
+		cmocka_unit_test(test_when_it_moves),
+		cmocka_unit_test(test_bounds),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,279 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/math/motion.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Newton's iteration at least halves what is left: some 20 for lengths that differ by 2^16. */
+enum { POLAR_STEPS = 100 };
+
+static double norm3(const double a[3][3])
+{
+	double sum = 0;
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			sum += a[i][k] * a[i][k];
+	return sqrt(sum);
+}
+
+/* The inverse of the transpose. */
+static void invert_transpose(const double a[3][3], double out[3][3])
+{
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++) {
+			int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+			out[i][k] = a[i1][k1] * a[i2][k2] - a[i1][k2] * a[i2][k1];
+		}
+	double det = a[0][0] * out[0][0] + a[0][1] * out[0][1] + a[0][2] * out[0][2];
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			out[i][k] /= det;
+}
+
+/* The orthogonal factor of a (Higham 1986, Computing the Polar Decomposition). */
+static void orthogonal_factor(const double a[3][3], double q[3][3])
+{
+	double scale = 1 / norm3(a), change = INFINITY;
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			q[i][k] = scale * a[i][k];
+	for (int step = 0; step < POLAR_STEPS && change > 0x1p-50; step++) {
+		double back[3][3];
+		invert_transpose((const double(*)[3])q, back);
+		double g = change > 0.01 ? sqrt(norm3((const double(*)[3])back) / norm3((const double(*)[3])q)) : 1;
+		change = 0;
+		for (int i = 0; i < 3; i++)
+			for (int k = 0; k < 3; k++) {
+				double next = 0.5 * (g * q[i][k] + back[i][k] / g);
+				change = fmax(change, fabs(next - q[i][k]));
+				q[i][k] = next;
+			}
+	}
+}
+
+/* The largest of the four is computed first, so that the others are not divided by a small number. */
+static void quaternion_of(const double r[3][3], double q[4])
+{
+	double trace = r[0][0] + r[1][1] + r[2][2];
+	int i = 0;
+	for (int k = 1; k < 3; k++)
+		i = r[k][k] > r[i][i] ? k : i;
+	int j = (i + 1) % 3, l = (i + 2) % 3;
+	if (trace >= r[i][i]) {
+		q[0] = 1 + trace;
+		q[1] = r[2][1] - r[1][2];
+		q[2] = r[0][2] - r[2][0];
+		q[3] = r[1][0] - r[0][1];
+	} else {
+		q[0] = r[l][j] - r[j][l];
+		q[1 + i] = 1 + r[i][i] - r[j][j] - r[l][l];
+		q[1 + j] = r[j][i] + r[i][j];
+		q[1 + l] = r[l][i] + r[i][l];
+	}
+	double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+	for (int k = 0; k < 4; k++)
+		q[k] /= length;
+}
+
+static void decompose(const struct keyframe *from, struct motion_key *k)
+{
+	double a[3][3], q[3][3];
+	for (int i = 0; i < 3; i++)
+		for (int j = 0; j < 3; j++)
+			a[i][j] = from->place.m[i][j];
+	orthogonal_factor((const double(*)[3])a, q);
+	double sign = mat4_det3(from->place) < 0 ? -1 : 1;
+	for (int i = 0; i < 3; i++)
+		for (int j = 0; j < 3; j++)
+			q[i][j] *= sign;
+	for (int i = 0; i < 3; i++)
+		for (int j = 0; j <= i; j++) {
+			double s = 0;
+			for (int l = 0; l < 3; l++)
+				s += 0.5 * (q[l][i] * a[l][j] + q[l][j] * a[l][i]);
+			k->stretch[i][j] = k->stretch[j][i] = s;
+		}
+	quaternion_of((const double(*)[3])q, k->turn);
+	k->at = (vec3){from->place.m[0][3], from->place.m[1][3], from->place.m[2][3]};
+	k->angle = 0;
+}
+
+/* Of the two quaternions that are the same rotation, the one nearer to the key before. */
+static void set_angle(struct motion_key *k, struct motion_key *next)
+{
+	double apart = 0, together = 0;
+	for (int i = 0; i < 4; i++) {
+		apart += (next->turn[i] - k->turn[i]) * (next->turn[i] - k->turn[i]);
+		together += (next->turn[i] + k->turn[i]) * (next->turn[i] + k->turn[i]);
+	}
+	if (apart > together)
+		for (int i = 0; i < 4; i++)
+			next->turn[i] = -next->turn[i];
+	k->angle = 2 * atan2(sqrt(fmin(apart, together)), sqrt(fmax(apart, together)));
+}
+
+static bool same_place(const struct keyframe *a, const struct keyframe *b)
+{
+	return memcmp(&a->place, &b->place, sizeof a->place) == 0;
+}
+
+bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *room)
+{
+	uint32_t first = 0, last = a->count - 1;
+	while (first < last && a->key[first + 1].time <= open)
+		first++;
+	while (last > first && a->key[last - 1].time >= close)
+		last--;
+	double unit = close > open ? close - open : 1;
+	bool moves = false;
+	*m = (struct motion){.count = last - first + 1, .key = room, .before = mat4_identity()};
+	for (uint32_t i = 0; i < m->count; i++) {
+		const struct keyframe *from = &a->key[first + i];
+		decompose(from, &m->key[i]);
+		m->key[i].time = (from->time - open) / unit;
+		if (i > 0)
+			set_angle(&m->key[i - 1], &m->key[i]);
+		moves |=
+			i > 0 && !same_place(from - 1, from) && a->key[first + i - 1].time < close && from->time > open;
+	}
+	return moves && close > open;
+}
+
+void motion_rescale(struct motion *m, vec3 center, double scale)
+{
+	for (uint32_t i = 0; i < m->count; i++) {
+		struct motion_key *k = &m->key[i];
+		k->at = vec3_scale(scale, vec3_sub(k->at, center));
+		for (int j = 0; j < 3; j++)
+			for (int l = 0; l < 3; l++)
+				k->stretch[j][l] *= scale;
+	}
+}
+
+/* The last key that is not after that time; the first one if there is none. */
+static uint32_t key_before(const struct motion *m, double time)
+{
+	uint32_t low = 0, high = m->count;
+	while (high - low > 1) {
+		uint32_t middle = low + (high - low) / 2;
+		if (m->key[middle].time <= time)
+			low = middle;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+static void rotation_of(const double q[4], double r[3][3])
+{
+	double w = q[0], x = q[1], y = q[2], z = q[3];
+	const double m[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+				{2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+				{2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+	memcpy(r, m, sizeof m);
+}
+
+static void turn_at(const struct motion_key *a, const struct motion_key *b, double s, double q[4])
+{
+	double sine = sin(a->angle), from = 1, to = 0;
+	if (sine > 0) {
+		from = sin((1 - s) * a->angle) / sine;
+		to = sin(s * a->angle) / sine;
+	}
+	for (int i = 0; i < 4; i++)
+		q[i] = from * a->turn[i] + to * b->turn[i];
+}
+
+/* Without `before`. */
+static mat4 place_at(const struct motion_key *a, const struct motion_key *b, double s)
+{
+	double q[4], r[3][3];
+	turn_at(a, b, s, q);
+	rotation_of(q, r);
+	mat4 m = mat4_identity();
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++) {
+			double sum = 0;
+			for (int l = 0; l < 3; l++)
+				sum += r[i][l] * ((1 - s) * a->stretch[l][k] + s * b->stretch[l][k]);
+			m.m[i][k] = sum;
+		}
+	m.m[0][3] = (1 - s) * a->at.x + s * b->at.x;
+	m.m[1][3] = (1 - s) * a->at.y + s * b->at.y;
+	m.m[2][3] = (1 - s) * a->at.z + s * b->at.z;
+	return m;
+}
+
+mat4 motion_at(const struct motion *m, double time)
+{
+	uint32_t i = key_before(m, time);
+	const struct motion_key *a = &m->key[i], *b = i + 1 < m->count ? a + 1 : a;
+	double s = b > a && time > a->time ? fmin((time - a->time) / (b->time - a->time), 1) : 0;
+	return mat4_mul(place_at(a, b, s), m->before);
+}
+
+/* A turn is bounded in parts of at most this angle. */
+#define PART (M_PI / 32)
+
+struct sweep {
+	const mat4 *before;
+	vec3 middle, half; /* the box */
+	double far;	   /* how far from the origin its points are after `before`, at most */
+	vec3 low, high;
+};
+
+static void grow(struct sweep *w, const mat4 *m, double off)
+{
+	vec3 c = mat4_point(m, w->middle);
+	const double at[3] = {c.x, c.y, c.z}, half[3] = {w->half.x, w->half.y, w->half.z};
+	double *low[3] = {&w->low.x, &w->low.y, &w->low.z}, *high[3] = {&w->high.x, &w->high.y, &w->high.z};
+	for (int i = 0; i < 3; i++) {
+		double r = off;
+		for (int k = 0; k < 3; k++)
+			r += fabs(m->m[i][k]) * half[k];
+		*low[i] = fmin(*low[i], at[i] - r);
+		*high[i] = fmax(*high[i], at[i] + r);
+	}
+}
+
+/* From s = begin to end between two keys. A point is p = R q + c, where q = S x and c are linear in s. Over a part in
+ * which R turns by f, and q changes by dq, |p''| <= f^2 |q| + 2 f |dq| per square of that part, and p is off the chord
+ * between its ends by at most an eighth of that. The chord is in the hull of the boxes at the ends. */
+static void sweep_between(struct sweep *w, const struct motion_key *a, const struct motion_key *b, double begin,
+			  double end)
+{
+	double turned = 2 * a->angle * (end - begin), parts = fmax(ceil(turned / PART), 1);
+	double change[3][3], f = turned / parts;
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			change[i][k] = b->stretch[i][k] - a->stretch[i][k];
+	double q = w->far * fmax(norm3((const double(*)[3])a->stretch), norm3((const double(*)[3])b->stretch)),
+	       dq = w->far * norm3((const double(*)[3])change) * (end - begin) / parts;
+	double off = (f * f * q + 2 * f * dq) / 8;
+	for (int i = 0; i <= (int)parts; i++) {
+		mat4 m = mat4_mul(place_at(a, b, begin + (end - begin) * i / parts), *w->before);
+		grow(w, &m, off);
+	}
+}
+
+void motion_bounds(const struct motion *m, vec3 low, vec3 high, vec3 *all_low, vec3 *all_high)
+{
+	struct sweep w = {.before = &m->before,
+			  .half = vec3_scale(0.5, vec3_sub(high, low)),
+			  .low = {INFINITY, INFINITY, INFINITY},
+			  .high = {-INFINITY, -INFINITY, -INFINITY}};
+	w.middle = vec3_add(low, w.half);
+	for (int k = 0; k < 8; k++) {
+		vec3 corner = {k & 1 ? high.x : low.x, k & 2 ? high.y : low.y, k & 4 ? high.z : low.z};
+		w.far = fmax(w.far, vec3_length(mat4_point(&m->before, corner)));
+	}
+	if (m->count == 1)
+		sweep_between(&w, m->key, m->key, 0, 0);
+	for (uint32_t i = 0; i + 1 < m->count; i++) {
+		const struct motion_key *a = &m->key[i], *b = a + 1;
+		double length = b->time - a->time;
+		sweep_between(&w, a, b, fmin(fmax(-a->time / length, 0), 1), fmin(fmax((1 - a->time) / length, 0), 1));
+	}
+	*all_low = w.low;
+	*all_high = w.high;
+}
