@@ -121,11 +121,11 @@ struct surface_point body_point(const struct geom_shape *s, uint32_t shape, stru
 {
 	struct surface_point x;
 	if (s->is_sphere) {
-		surface_on_sphere(s, (struct prim_ref){shape, 0}, dice_direction(d), &x);
+		surface_on_sphere(s, (struct prim_ref){shape, 0, 0}, dice_direction(d), &x);
 		return x;
 	}
 	double root = sqrt(dice_throw(d));
-	surface_on_triangle(s, (struct prim_ref){shape, dice_below(d, s->triangle_count)}, 1 - root,
+	surface_on_triangle(s, (struct prim_ref){shape, dice_below(d, s->triangle_count), 0}, 1 - root,
 			    root * dice_throw(d), &x);
 	return x;
 }

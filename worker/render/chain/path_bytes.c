@@ -18,11 +18,12 @@
 
 enum { PATH_EDGES = 8, PATH_HEAD = PATH_EDGES + 8, VERTEX_BYTES = 40 };
 
-/* What a scene does not call for is not there: the wavelength's number without colour, the camera's vertex without
- * aperture. */
+/* What a scene does not call for is not there: the wavelength's number without colour, the time without motion, the
+ * camera's vertex without aperture. */
 static size_t head_bytes(const struct world *w)
 {
-	return PATH_HEAD + (EFFECT_IS_ON(w, colour) ? 8 : 0);
+	size_t colour = EFFECT_IS_ON(w, colour) ? 8 : 0, motion = EFFECT_IS_ON(w, motion) ? 8 : 0;
+	return PATH_HEAD + colour + motion;
 }
 
 static unsigned vertex_count(const struct world *w, unsigned edges)
@@ -97,7 +98,7 @@ static bool read_surface(const struct world *w, struct prim_ref prim, vec3 place
 }
 
 /* An emitter that has no surface. */
-static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, struct path_vertex *v)
+static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, double time, struct path_vertex *v)
 {
 	const struct emitter *em = &w->emitters[emitter];
 	const double half[2] = {0.5, 0.5};
@@ -111,15 +112,15 @@ static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, str
 			return false;
 		point.p = vec3_normalize(p);
 	}
-	*v = path_emitter_vertex(w, emitter, &point);
+	*v = path_emitter_vertex(w, emitter, &point, time);
 	return true;
 }
 
-static struct path_vertex pinhole(const struct world *w)
+static struct path_vertex pinhole(const struct world *w, double time)
 {
 	const double middle[2] = {0.5, 0.5};
 	struct path_vertex v = {.kind = VERTEX_CAMERA, .emitter = -1};
-	v.x.prim = PRIM_NONE;
+	v.x.prim = prim_none_at(time);
 	v.x.p = camera_point(&w->camera, middle);
 	return v;
 }
@@ -127,14 +128,15 @@ static struct path_vertex pinhole(const struct world *w)
 /* Far beyond anything that belongs to the scene: squares of such numbers would overflow. */
 static bool is_huge(const struct world *w, vec3 p)
 {
-	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w).x.p) + w->camera.aperture;
+	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w, 0).x.p) + w->camera.aperture;
 	return !(fabs(p.x) <= most && fabs(p.y) <= most && fabs(p.z) <= most);
 }
 
-static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, unsigned edges, struct path_vertex *v)
+static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, unsigned edges, double time,
+			struct path_vertex *v)
 {
 	int32_t emitter = (int32_t)get32(at + 4);
-	struct prim_ref prim = {get32(at + 8), get32(at + 12)};
+	struct prim_ref prim = {get32(at + 8), get32(at + 12), time};
 	vec3 place = {get_double(at + 16), get_double(at + 24), get_double(at + 32)};
 	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
 	if (is_huge(w, place) || at[0] > VERTEX_MEDIUM || at[2] > 1 || at[3] != 0 ||
@@ -143,12 +145,12 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	    (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT)))
 		return false;
 	if (v->kind == VERTEX_MEDIUM) {
-		v->x = (struct surface_point){.p = place, .prim = PRIM_NONE};
+		v->x = (struct surface_point){.p = place, .prim = prim_none_at(time)};
 		return EFFECT_IS_ON(w, scattering) && emitter == -1 && !v->delta;
 	}
 	if (v->kind == VERTEX_CAMERA) {
 		double u[2];
-		v->x.prim = PRIM_NONE;
+		v->x.prim = prim_none_at(time);
 		camera_point_inverse(&w->camera, place, u);
 		v->x.p = camera_point(&w->camera, u);
 		return near(v->x.p, place, fmax(w->radius, w->camera.aperture));
@@ -156,7 +158,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	if (i == 0 && (emitter < 0 || (uint32_t)emitter >= w->emitter_count))
 		return false;
 	if (i == 0 && w->emitter_shape[emitter] == UINT32_MAX)
-		return read_far_emitter(w, emitter, place, v) && v->kind == (enum vertex_kind)at[0];
+		return read_far_emitter(w, emitter, place, time, v) && v->kind == (enum vertex_kind)at[0];
 	if (!read_surface(w, prim, place, &v->x))
 		return false;
 	v->bsdf = &w->bsdfs[w->parts[prim.shape].bsdf];
@@ -181,13 +183,14 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
 	if (size != head + (size_t)vertices * VERTEX_BYTES)
 		return false;
 	double u = EFFECT_IS_ON(c->w, colour) ? get_double(bytes + PATH_HEAD) : 0;
-	if (!(u >= 0 && u < 1))
+	double time = EFFECT_IS_ON(c->w, motion) ? get_double(bytes + head - 8) : 0;
+	if (!(u >= 0 && u < 1 && time >= 0 && time < 1))
 		return false;
 	for (unsigned i = 0; i < vertices; i++)
-		if (!read_vertex(c->w, bytes + head + i * VERTEX_BYTES, i, x->edges, &x->v[i]))
+		if (!read_vertex(c->w, bytes + head + i * VERTEX_BYTES, i, x->edges, time, &x->v[i]))
 			return false;
 	if (vertices == x->edges)
-		x->v[x->edges] = pinhole(c->w);
+		x->v[x->edges] = pinhole(c->w, time);
 	full_path_set_wavelength(c, x, u);
 	if (!full_path_finish(c, x))
 		return false;
@@ -239,6 +242,8 @@ size_t path_write(struct path_context *c, const struct full_path *x, struct full
 	if (EFFECT_IS_ON(c->w, colour))
 		put_double(bytes + PATH_HEAD, x->wavelength);
 	uint8_t *at = bytes + head_bytes(c->w);
+	if (EFFECT_IS_ON(c->w, motion))
+		put_double(at - 8, full_path_time(x));
 	for (unsigned i = 0; i < vertex_count(c->w, x->edges); i++, at += VERTEX_BYTES)
 		write_vertex(c->w, &x->v[i], at);
 	double contribution;

@@ -74,12 +74,12 @@ static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 	const struct query *q = (const struct query *)(const void *)args->context;
 	/* Single rays only (N = 1): accessors of packets exist only in C++. */
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
-	if (query_is_end(q, (struct prim_ref){hit->geomID, hit->primID}))
+	if (query_is_end(q, (struct prim_ref){hit->geomID, hit->primID, q->from.time}))
 		args->valid[0] = 0;
 	else if (is_wide(q, args->geometryUserPtr, hit->primID))
 		args->valid[0] = 0;
 	else if (query_hides(q, hit->geomID)) {
-		if (!query_crosses_there(q, (struct prim_ref){hit->geomID, hit->primID}))
+		if (!query_crosses_there(q, (struct prim_ref){hit->geomID, hit->primID, q->from.time}))
 			args->valid[0] = 0;
 	} else if (!clearly_crosses(q, hit, (const struct RTCRay *)(const void *)args->ray) &&
 		   !query_crosses(q, args->geometryUserPtr, hit->primID))
@@ -124,7 +124,7 @@ static int attach_triangles(struct accel *a, struct accel_shape *s, uint32_t id)
 static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t id)
 {
 	struct sphere_prim *prim = &a->spheres[a->sphere_count++];
-	*prim = (struct sphere_prim){s->center, s->radius, id};
+	*prim = (struct sphere_prim){s->center, s->radius, s->place, id};
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
 	if (!g)
 		return -ENOMEM;
@@ -206,8 +206,9 @@ static double extent_of(const struct accel_shape *s)
 {
 	if (s->is_sphere)
 		return 2 * s->radius;
-	if (s->place)
-		return 2 * triangle_norm_max(s->place->half);
+	struct placement room;
+	if (accel_is_instance(s))
+		return 2 * triangle_norm_max(placement_at(s->place, 0, &room)->half);
 	float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, most = 0;
 	for (uint32_t i = 0; i < s->triangle_count; i++)
 		for (int j = 0; j < 3; j++)
@@ -228,7 +229,7 @@ static double find_detail(struct accel *a, const struct accel_shape *shapes, uin
 		const struct accel_shape *s = &shapes[i];
 		vec3 r = {s->radius, s->radius, s->radius};
 		least = fmin(least, extent_of(s));
-		if (s->is_sphere)
+		if (s->is_sphere && !s->place)
 			reach = fmax(reach, rounding_reach(vec3_sub(s->center, r), vec3_add(s->center, r)));
 		else if (s->place)
 			reach = fmax(reach, rounding_reach(vec3_sub(s->place->center, s->place->half),
@@ -246,10 +247,10 @@ static double find_detail(struct accel *a, const struct accel_shape *shapes, uin
 /* A sphere is hidden entirely or not at all. */
 static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 {
-	if (a->shapes[id].place)
+	if (accel_is_instance(&a->shapes[id]))
 		return 0;
-	if (a->shapes[id].is_sphere &&
-	    coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0}, a->shapes[id].center).shape != id)
+	if (a->shapes[id].is_sphere && !a->shapes[id].place &&
+	    coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0, 0}, a->shapes[id].center).shape != id)
 		return 0;
 	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id)
 					 : attach_triangles(a, &a->shapes[id], id);
@@ -497,8 +498,8 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
 		return false;
 	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
-	*hit = (struct ray_hit){query_there(&q, (struct prim_ref){rh.hit.geomID, rh.hit.primID}), t, (double)rh.hit.u,
-				(double)rh.hit.v};
+	*hit = (struct ray_hit){query_there(&q, (struct prim_ref){rh.hit.geomID, rh.hit.primID, q.from.time}), t,
+				(double)rh.hit.u, (double)rh.hit.v};
 	return true;
 }
 

@@ -78,7 +78,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 /* As seen along n. */
 static bool covers(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
 {
-	const struct triangle t = accel_triangle(s, prim);
+	const struct triangle t = accel_triangle(s, prim, 0);
 	double unused;
 	return triangle_meets(&t, p, n, &unused);
 }
@@ -105,10 +105,10 @@ static bool hides(const struct coincidence *c, const struct accel_shape *shapes,
 	if (at == end || at->hidden.prim != prim.prim)
 		return false;
 	const struct accel_shape *s = &shapes[prim.shape];
-	vec3 n = s->is_sphere ? (vec3){0, 0, 0} : accel_triangle(s, prim.prim).n;
+	vec3 n = s->is_sphere ? (vec3){0, 0, 0} : accel_triangle(s, prim.prim, 0).n;
 	for (; at < end && at->hidden.prim == prim.prim; at++)
 		if (at->wholly || covers(&shapes[at->by.shape], at->by.prim, p, n)) {
-			*by = at->by;
+			*by = (struct prim_ref){at->by.shape, at->by.prim, prim.time};
 			return true;
 		}
 	return false;

@@ -50,7 +50,7 @@ static void extent_of_instance(const struct accel_shape *s, uint32_t prim, int a
 		*high = along(s->place->center, axis) + along(s->place->half, axis) + margin;
 		return;
 	}
-	const struct triangle t = accel_triangle(s, prim);
+	const struct triangle t = accel_triangle(s, prim, 0);
 	double u = along(t.v[0], axis), v = along(t.v[1], axis), w = along(t.v[2], axis);
 	*low = fmin(u, fmin(v, w)) - margin;
 	*high = fmax(u, fmax(v, w)) + margin;
@@ -153,7 +153,7 @@ static bool coincide(const struct search *f, struct coincide_pair *p)
 	p->wholly = p->same_side = true;
 	if (a->is_sphere || b->is_sphere)
 		return a->is_sphere && b->is_sphere && spheres_coincide(a, b);
-	const struct triangle t = accel_triangle(a, p->hidden.prim), u = accel_triangle(b, p->by.prim);
+	const struct triangle t = accel_triangle(a, p->hidden.prim, 0), u = accel_triangle(b, p->by.prim, 0);
 	double off = (a->place ? a->place->vertex_is_off : 0) + (b->place ? b->place->vertex_is_off : 0);
 	p->same_side = vec3_dot(t.n, u.n) > 0;
 	return coincide_triangles(&t, &u, off, &p->wholly);
@@ -325,7 +325,7 @@ static size_t divide(struct search *f, uint32_t shape, const struct member *box,
 	const struct flat_parts *flat = flat_of(f, shape);
 	f->work += flat->count;
 	for (uint32_t k = 0; k < flat->count; k++) {
-		const struct member m = member_of(f, (struct prim_ref){shape, flat->prim[k]});
+		const struct member m = member_of(f, (struct prim_ref){shape, flat->prim[k], 0});
 		if (may_meet(f, &m, box))
 			out[count++] = m.prim;
 		if (k % 4096 == 0)
@@ -473,10 +473,11 @@ static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, 
 	size_t n = 0;
 	for (unsigned rank = 0; rank < SURFACE_RANKS; rank++)
 		for (uint32_t i = 0; i < count; i++) {
-			uint32_t prims = shapes[i].is_sphere || shapes[i].place ? 1 : shapes[i].triangle_count;
+			uint32_t prims = shapes[i].is_sphere || shapes[i].place ? !accel_moves(&shapes[i])
+										: shapes[i].triangle_count;
 			for (uint32_t k = 0; shapes[i].rank == rank && k < prims; k++, n++)
 				if (items)
-					items[n] = (struct prim_ref){i, shapes[i].place ? WHOLE : k};
+					items[n] = (struct prim_ref){i, shapes[i].place ? WHOLE : k, 0};
 		}
 	return n;
 }
@@ -487,14 +488,14 @@ static int find_flat_parts(struct search *f, uint32_t count, size_t *moved)
 	*moved = 0;
 	for (uint32_t i = 0; i < count; i++) {
 		const struct placement *p = f->shapes[i].place;
-		if (!p)
+		if (!p || f->shapes[i].is_sphere)
 			continue;
 		if (!f->flat && !(f->flat = mem_alloc(count, sizeof *f->flat)))
 			return -ENOMEM;
 		int rc = p->first == i ? flat_parts_find(&f->flat[i], &f->shapes[i]) : 0;
 		if (rc)
 			return rc;
-		*moved += f->flat[p->first].count;
+		*moved += p->moves ? 0 : f->flat[p->first].count;
 	}
 	return 0;
 }

@@ -23,10 +23,12 @@ struct within {
 	embree_context context;
 	const struct query *q;
 	uint32_t shape;
-	vec3 from, d;	       /* start of the segment; unit direction */
-	double length, t0, t1; /* the part of the query from t0 to t1 */
-	double reach;	       /* the error bound of Embree's floats */
-	double before, beyond; /* Embree's ray is longer by this at its ends, see query_lowness */
+	const struct placement *place; /* at the query's time */
+	struct placement room;	       /* for one that moves */
+	vec3 from, d;		       /* start of the segment; unit direction */
+	double length, t0, t1;	       /* the part of the query from t0 to t1 */
+	double reach;		       /* the error bound of Embree's floats */
+	double before, beyond;	       /* Embree's ray is longer by this at its ends, see query_lowness */
 };
 
 /* As in accel.c: both ends are so high over the triangle's plane that rounding cannot change the side. */
@@ -42,7 +44,7 @@ static void filter(const struct RTCFilterFunctionNArguments *args)
 	const struct within *w = (const struct within *)(const void *)args->context;
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
 	const struct query *q = w->q;
-	const struct prim_ref prim = {w->shape, hit->primID};
+	const struct prim_ref prim = {w->shape, hit->primID, q->from.time};
 	if (query_is_end(q, prim))
 		args->valid[0] = 0;
 	else if (query_hides(q, prim.shape)) {
@@ -87,8 +89,8 @@ int instances_init(struct instances *s, RTCDevice device, const struct accel_sha
 	*s = (struct instances){.shapes = shapes};
 	uint32_t trees = 0;
 	for (uint32_t i = 0; i < count; i++) {
-		s->count += shapes[i].place != NULL;
-		trees += shapes[i].place && shapes[i].place->first == i;
+		s->count += accel_is_instance(&shapes[i]);
+		trees += accel_is_instance(&shapes[i]) && shapes[i].place->first == i;
 	}
 	if (s->count == 0)
 		return 0;
@@ -98,7 +100,7 @@ int instances_init(struct instances *s, RTCDevice device, const struct accel_sha
 	int rc = tree_of && s->trees && s->list ? 0 : -ENOMEM;
 	s->count = 0;
 	for (uint32_t i = 0; i < count && !rc; i++) {
-		if (!shapes[i].place)
+		if (!accel_is_instance(&shapes[i]))
 			continue;
 		uint32_t first = shapes[i].place->first;
 		if (first == i) {
@@ -169,11 +171,12 @@ static vec3 lifted(vec3 p, vec3 n, vec3 d, double reach, double *longer)
 static bool enter(struct within *w, const struct instances *s, const struct instance *it, const struct query *q,
 		  double t_max)
 {
-	const struct placement *m = s->shapes[it->shape].place;
+	const struct placement *m = placement_at(s->shapes[it->shape].place, q->from.time, &w->room);
 	const struct instance_tree *tree = &s->trees[it->tree];
 	vec3 o = placement_point_back(m, q->o), d = placement_vector_back(m, q->d);
 	w->q = q;
 	w->shape = it->shape;
+	w->place = m;
 	w->reach = tree->reach + m->rounding + 0x1p-50 * triangle_norm1(o);
 	w->t0 = q->t_min;
 	w->t1 = t_max;
@@ -216,7 +219,8 @@ static void fill_ray(const struct within *w, struct RTCRay *ray)
 static double place_of_hit(const struct within *w, const struct RTCRayHit *rh)
 {
 	double share = (w->t1 - w->t0) / w->length, t = w->t0 + ((double)rh->ray.tfar - w->before) * share;
-	const struct triangle k = accel_triangle(&w->q->shapes[w->shape], rh->hit.primID);
+	const struct accel_shape *s = &w->q->shapes[w->shape];
+	const struct triangle k = placement_triangle(w->place, s->position, s->index[rh->hit.primID]);
 	double there = vec3_dot(k.n, vec3_sub(k.v[0], w->q->o)) / vec3_dot(k.n, w->q->d);
 	return fmax(fabs(there - t) <= 4 * w->before * share ? there : t, w->q->t_min);
 }

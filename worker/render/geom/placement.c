@@ -32,11 +32,9 @@ static vec3 absolute(vec3 v)
 	return (vec3){fabs(v.x), fabs(v.y), fabs(v.z)};
 }
 
-bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high)
+static void fill(struct placement *p, const mat4 *m, const mat4 *back, vec3 low, vec3 high)
 {
-	mat4 inverse;
-	if (!placement_is_even(m) || !mat4_invert(*m, &inverse) || !(norm(m) >= TINY))
-		return false;
+	const mat4 inverse = *back;
 	*p = (struct placement){.x = column(m, 0),
 				.y = column(m, 1),
 				.z = column(m, 2),
@@ -52,5 +50,46 @@ bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high)
 		    0x1p-24 * triangle_norm_max((vec3){low.y, high.y, 0}),
 		    0x1p-24 * triangle_norm_max((vec3){low.z, high.z, 0})};
 	p->vertex_is_off = vec3_length(p->x) * off.x + vec3_length(p->y) * off.y + vec3_length(p->z) * off.z;
+}
+
+bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high)
+{
+	mat4 inverse;
+	if (!placement_is_even(m) || !mat4_invert(*m, &inverse) || !(norm(m) >= TINY))
+		return false;
+	fill(p, m, &inverse, low, high);
 	return true;
+}
+
+/* Between keyframes columns are no longer than at one of them, so that what holds there holds everywhere. */
+bool placement_make_moving(struct placement *p, const struct movement *m)
+{
+	double off = 0;
+	for (uint32_t i = 0; i < m->motion.count; i++) {
+		mat4 at = motion_at(&m->motion, m->motion.key[i].time);
+		if (!placement_make(p, &at, m->low, m->high))
+			return false;
+		off = fmax(off, p->vertex_is_off);
+	}
+	mat4 open = motion_at(&m->motion, 0);
+	if (!placement_make(p, &open, m->low, m->high))
+		return false;
+	vec3 low, high;
+	motion_bounds(&m->motion, m->low, m->high, &low, &high);
+	p->half = vec3_scale(0.5, vec3_sub(high, low));
+	p->center = vec3_add(low, p->half);
+	p->vertex_is_off = off;
+	p->moves = m;
+	return true;
+}
+
+void placement_move(const struct placement *p, double time, struct placement *out)
+{
+	const struct movement *m = p->moves;
+	mat4 at = motion_at(&m->motion, time), inverse;
+	/* It has one: S is definite at the keyframes, and so between them. */
+	if (!mat4_invert(at, &inverse))
+		inverse = at;
+	fill(out, &at, &inverse, m->low, m->high);
+	out->first = p->first;
 }

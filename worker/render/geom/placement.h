@@ -9,22 +9,43 @@
 #define WORKER_RENDER_GEOM_PLACEMENT_H
 
 #include "worker/render/geom/triangle.h"
-#include "worker/render/math/mat4.h"
+#include "worker/render/math/motion.h"
+
+/* How an instance moves: from the mesh's frame, in which this is its bounding box, to the world. */
+struct movement {
+	struct motion motion;
+	vec3 low, high;
+};
 
 struct placement {
-	vec3 x, y, z, at;     /* columns: p in the world is x p.x + y p.y + z p.z + at */
-	vec3 back[3];	      /* rows of the inverse of x, y, z */
-	vec3 center, half;    /* the bounding box, in the world */
-	double rounding;      /* rounding error of world coordinates, in the mesh's frame */
-	double vertex_is_off; /* error of rounding to float in the mesh's frame, in the world */
-	uint32_t first;	      /* the first shape that is an instance of the same mesh */
-	bool mirrored;	      /* its triangles are wound opposite to the mesh's frame */
+	vec3 x, y, z, at;	      /* columns: p in the world is x p.x + y p.y + z p.z + at */
+	vec3 back[3];		      /* rows of the inverse of x, y, z */
+	vec3 center, half;	      /* the bounding box, in the world */
+	double rounding;	      /* rounding error of world coordinates, in the mesh's frame */
+	double vertex_is_off;	      /* error of rounding to float in the mesh's frame, in the world */
+	uint32_t first;		      /* the first shape that is an instance of the same mesh */
+	bool mirrored;		      /* its triangles are wound opposite to the mesh's frame */
+	const struct movement *moves; /* NULL: it is still. Otherwise this is where it is when the shutter opens, except
+					 that center, half and vertex_is_off hold for all times */
 };
 
 /* m: affine, from the mesh's frame, in which this is its bounding box, to the world. false: it has no inverse, or is
  * so uneven that lengths differ by more than 2^16, or so small relative to the world (2^-80) that products of its
  * lengths would underflow. */
 bool placement_make(struct placement *p, const mat4 *m, vec3 low, vec3 high);
+
+/* The same for an instance that moves; m must outlive it. */
+bool placement_make_moving(struct placement *p, const struct movement *m);
+void placement_move(const struct placement *p, double time, struct placement *out);
+
+/* Where it is at that time; room: for one that moves. */
+static inline const struct placement *placement_at(const struct placement *p, double time, struct placement *room)
+{
+	if (!p->moves)
+		return p;
+	placement_move(p, time, room);
+	return room;
+}
 
 /* Whether lengths differ by no more than that. */
 bool placement_is_even(const mat4 *m);

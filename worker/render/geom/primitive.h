@@ -26,23 +26,47 @@ struct accel_shape {
 	const float (*position)[3];
 	const uint32_t (*index)[3];
 	enum surface_rank rank;
-	const struct placement *place; /* where this instance of a mesh is; NULL: positions are in world space */
+	const struct placement *place; /* where this instance of a mesh is, or how a sphere moves; NULL: positions are
+					  in world space */
 	const double (*unrounded)[3];  /* vertices in double, for a shape too large for floats relative to small ones;
 					  NULL: position */
 };
 
-static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim)
+/* time: see struct prim_ref. */
+static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim, double time)
 {
 	const uint32_t *i = s->index[prim];
+	struct placement room;
 	if (s->unrounded)
 		return triangle_unrounded(s->unrounded, i);
-	return s->place ? placement_triangle(s->place, s->position, i) : triangle_from(s->position, i);
+	return s->place ? placement_triangle(placement_at(s->place, time, &room), s->position, i)
+			: triangle_from(s->position, i);
 }
 
+/* Of a mesh. A sphere with a placement moves. */
+static inline bool accel_is_instance(const struct accel_shape *s)
+{
+	return s->place && !s->is_sphere;
+}
+
+static inline bool accel_moves(const struct accel_shape *s)
+{
+	return s->place && s->place->moves;
+}
+
+/* A primitive at a time: 0 where the shutter opens, 1 where it closes. The time matters for what moves; everything that
+ * belongs to one path has the same. */
 struct prim_ref {
 	uint32_t shape, prim;
+	double time;
 };
-#define PRIM_NONE ((struct prim_ref){UINT32_MAX, UINT32_MAX})
+#define PRIM_NONE ((struct prim_ref){UINT32_MAX, UINT32_MAX, 0})
+
+/* On no primitive, at that time. */
+static inline struct prim_ref prim_none_at(double time)
+{
+	return (struct prim_ref){UINT32_MAX, UINT32_MAX, time};
+}
 
 /* An end of a ray or segment: position, primitive, and unit geometric normal there (0: not on a surface). */
 struct ray_end {

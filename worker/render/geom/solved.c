@@ -3,7 +3,7 @@
 
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim)
 {
-	const struct triangle t = accel_triangle(s, prim);
+	const struct triangle t = accel_triangle(s, prim, q->from.time);
 	double start = triangle_height(&t, q->o);
 	double beyond = q->segment ? -triangle_height(&t, q->end) : vec3_dot(t.n, q->d);
 	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
@@ -24,7 +24,7 @@ struct prim_ref query_there(const struct query *q, struct prim_ref prim)
 {
 	if (!query_hides(q, prim.shape))
 		return prim;
-	const struct triangle t = accel_triangle(&q->shapes[prim.shape], prim.prim);
+	const struct triangle t = accel_triangle(&q->shapes[prim.shape], prim.prim, q->from.time);
 	double slope = vec3_dot(t.n, q->d);
 	if (slope == 0)
 		return prim;
@@ -38,9 +38,34 @@ bool query_crosses_there(const struct query *q, struct prim_ref prim)
 	return !query_is_end(q, there) && query_crosses(q, &q->shapes[there.shape], there.prim);
 }
 
+/* Enlarged as those of a sphere that is still. */
+static void bounds_of_moving(const struct placement *p, struct RTCBounds *b)
+{
+	vec3 c = p->center, h = p->half;
+	double r = 0x1p-20 * (fmax(h.x, fmax(h.y, h.z)) + fabs(c.x) + fabs(c.y) + fabs(c.z));
+	b->lower_x = (float)(c.x - h.x - r);
+	b->lower_y = (float)(c.y - h.y - r);
+	b->lower_z = (float)(c.z - h.z - r);
+	b->upper_x = (float)(c.x + h.x + r);
+	b->upper_y = (float)(c.y + h.y + r);
+	b->upper_z = (float)(c.z + h.z + r);
+}
+
+/* Not inline: spheres that stand still go by it. */
+__attribute__((noinline)) static struct sphere_prim moved_sphere(const struct sphere_prim *s, double time)
+{
+	struct placement now;
+	placement_move(s->place, time, &now);
+	return (struct sphere_prim){placement_point(&now, s->center), s->radius * vec3_length(now.x), NULL, s->shape};
+}
+
 static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct sphere_prim *s = args->geometryUserPtr;
+	if (s->place) {
+		bounds_of_moving(s->place, args->bounds_o);
+		return;
+	}
 	/* Enlarged by one part in 2^20: more than the float rounding of the box and of Embree's slab test. */
 	double r = s->radius * (1 + 0x1p-20) + 0x1p-20 * (fabs(s->center.x) + fabs(s->center.y) + fabs(s->center.z));
 	struct RTCBounds *b = args->bounds_o;
@@ -55,8 +80,14 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 /* The nearest valid root of |o + t d - c|^2 = r^2 in (t_min, t_max). If the ray starts on the sphere one root is 0,
  * if a segment ends on it one root is 1: the other follows from Vieta's formulas without cancellation. Otherwise the
  * discriminant is computed from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
-static bool sphere_root(const struct sphere_prim *s, const struct query *q, double t_max, double *t)
+static bool sphere_root(const struct sphere_prim *still, const struct query *q, double t_max, double *t)
 {
+	struct sphere_prim moved;
+	const struct sphere_prim *s = still;
+	if (still->place) {
+		moved = moved_sphere(still, q->from.time);
+		s = &moved;
+	}
 	vec3 oc = vec3_sub(q->o, s->center);
 	double a = vec3_dot(q->d, q->d), b = vec3_dot(oc, q->d);
 	double length = vec3_length(oc), c = (length - s->radius) * (length + s->radius);
@@ -127,11 +158,11 @@ static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
 /* The same as the filter for triangles intersected by Embree; these are never PRIM_NONE. */
 static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct query *q, double t_max, double *t)
 {
-	const struct prim_ref ref = {w->id, prim};
+	const struct prim_ref ref = {w->id, prim, q->from.time};
 	if (query_is_end(q, ref) ||
 	    !(query_hides(q, w->id) ? query_crosses_there(q, ref) : query_crosses(q, w->shape, prim)))
 		return false;
-	const struct triangle k = accel_triangle(w->shape, prim);
+	const struct triangle k = accel_triangle(w->shape, prim, q->from.time);
 	return triangle_meets(&k, q->o, q->d, t) && *t > q->t_min && *t < t_max;
 }
 

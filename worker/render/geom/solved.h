@@ -30,6 +30,7 @@ struct query {
 struct sphere_prim {
 	vec3 center;
 	double radius;
+	const struct placement *place; /* how it moves; NULL: it is still */
 	uint32_t shape;
 };
 

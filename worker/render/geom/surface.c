@@ -88,6 +88,35 @@ static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[
 	return t;
 }
 
+/* A shape where it is at a time. */
+struct posed {
+	struct geom_shape shape;
+	struct placement place;
+};
+
+/* Not inline: shapes that stand still go by it. */
+__attribute__((noinline)) static const struct geom_shape *pose_moving(const struct geom_shape *s, double time,
+								      struct posed *room)
+{
+	const struct placement *p = &room->place;
+	placement_move(s->place, time, &room->place);
+	room->shape = *s;
+	room->shape.place = p;
+	if (!s->is_sphere)
+		return &room->shape;
+	room->shape.center = placement_point(p, s->center);
+	room->shape.radius = s->radius * vec3_length(p->x);
+	room->shape.sphere_axes = (struct frame){vec3_normalize(placement_vector(p, s->sphere_axes.s)),
+						 vec3_normalize(placement_vector(p, s->sphere_axes.t)),
+						 vec3_normalize(placement_vector(p, s->sphere_axes.n))};
+	return &room->shape;
+}
+
+static inline const struct geom_shape *pose(const struct geom_shape *s, double time, struct posed *room)
+{
+	return surface_moves(s) ? pose_moving(s, time, room) : s;
+}
+
 /* A triangle's first vertex and its edges from there. */
 struct corner {
 	vec3 v0, e1, e2;
@@ -166,11 +195,11 @@ static bool smooth_axis(const struct geom_shape *s, uint32_t prim, double b1, do
 	return true;
 }
 
+/* Everything but which primitive of which shape it is. */
 static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
 			  struct surface_point *x)
 {
 	double b0 = 1 - b1 - b2;
-	x->shape = s;
 	x->b1 = b1;
 	x->b2 = b2;
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
@@ -195,16 +224,22 @@ static void fill_triangle(const struct geom_shape *s, const uint32_t i[3], const
 void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2,
 			 struct surface_point *x)
 {
+	struct posed room;
+	const struct geom_shape *now = pose(s, prim.time, &room);
 	const uint32_t *i = s->index[prim.prim];
-	struct corner c = corner_of(s, i);
+	struct corner c = corner_of(now, i);
 	x->prim = prim;
-	fill_triangle(s, i, &c, b1, b2, x);
+	x->shape = s;
+	fill_triangle(now, i, &c, b1, b2, x);
 }
 
 void surface_uv(const struct geom_shape *s, struct surface_point *x)
 {
-	if (s->is_sphere)
-		sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
+	struct posed room;
+	if (!s->is_sphere)
+		return;
+	s = pose(s, x->prim.time, &room);
+	sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
 }
 
 /* A sphere's point before relief. At the poles dp/du is 0. */
@@ -220,11 +255,10 @@ static struct relief_site site_on_sphere(const struct geom_shape *s, const struc
 	return r;
 }
 
-/* Everything except u and v, unless there is relief. */
+/* Everything except which shape it is, and u and v, unless there is relief. */
 static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	x->prim = prim;
-	x->shape = s;
 	x->p = vec3_madd(s->center, s->radius, w);
 	x->b1 = x->b2 = 0;
 	x->ng = vec3_scale(s->normal_sign, w);
@@ -241,13 +275,17 @@ static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, 
 
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
-	on_sphere(s, prim, w, x);
-	surface_uv(s, x);
+	struct posed room;
+	const struct geom_shape *now = pose(s, prim.time, &room);
+	x->shape = s;
+	on_sphere(now, prim, w, x);
+	surface_uv(now, x);
 }
 
 static struct relief_site site_of(const struct surface_point *x)
 {
-	const struct geom_shape *s = x->shape;
+	struct posed room;
+	const struct geom_shape *s = pose(x->shape, x->prim.time, &room);
 	if (s->is_sphere) {
 		struct surface_point y = *x;
 		surface_uv(s, &y);
@@ -261,7 +299,8 @@ static struct relief_site site_of(const struct surface_point *x)
 
 static vec3 normal_with(const struct surface_point *x, const struct relief *r)
 {
-	const struct geom_shape *s = x->shape;
+	struct posed room;
+	const struct geom_shape *s = pose(x->shape, x->prim.time, &room);
 	if (!r)
 		return s->is_sphere ? x->ng : smooth_normal(s, s->index[x->prim.prim], x);
 	struct relief_site site = site_of(x);
@@ -296,16 +335,20 @@ static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double 
 
 void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x)
 {
+	struct posed room;
+	const struct geom_shape *now = pose(s, hit->prim.time, &room);
 	if (s->is_sphere) {
-		surface_on_sphere(s, hit->prim, sphere_direction(s, o, d, hit->t), x);
+		surface_on_sphere(now, hit->prim, sphere_direction(now, o, d, hit->t), x);
+		x->shape = s;
 		return;
 	}
 	const uint32_t *i = s->index[hit->prim.prim];
-	struct corner c = corner_of(s, i);
+	struct corner c = corner_of(now, i);
 	double b1 = fmin(fmax(hit->u, 0), 1), b2 = fmin(fmax(hit->v, 0), 1 - b1);
 	solve_triangle(o, d, c.v0, c.e1, c.e2, &b1, &b2);
 	x->prim = hit->prim;
-	fill_triangle(s, i, &c, b1, b2, x);
+	x->shape = s;
+	fill_triangle(now, i, &c, b1, b2, x);
 }
 
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
@@ -443,9 +486,11 @@ static void bend_on_triangle(const struct geom_shape *s, const struct surface_po
 
 void surface_change_of(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
 {
+	struct posed room;
 	*c = (struct surface_change){.dn = {{0, 0, 0}}};
 	surface_tangents(x, &c->du, &c->dv);
 	c->axis = c->du;
+	s = pose(s, x->prim.time, &room);
 	if (s->is_sphere) {
 		change_on_sphere(s, x, c);
 		if (s->relief)
@@ -498,16 +543,21 @@ static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, b
 bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
 		       double t_near, struct surface_point *x)
 {
+	struct posed room;
+	const struct geom_shape *now = pose(s, prim.time, &room);
 	bool same = prim.shape == from.shape && prim.prim == from.prim;
+	x->shape = s;
 	if (s->is_sphere)
-		return reproject_sphere(s, prim, same, o, d, t_near, x);
-	return !same && reproject_triangle(s, prim, o, d, x);
+		return reproject_sphere(now, prim, same, o, d, t_near, x);
+	return !same && reproject_triangle(now, prim, o, d, x);
 }
 
 bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x)
 {
+	struct posed room;
+	const struct geom_shape *now = pose(s, prim.time, &room);
 	if (s->is_sphere) {
-		vec3 d = vec3_sub(p, s->center);
+		vec3 d = vec3_sub(p, now->center);
 		if (!(vec3_dot(d, d) > 0))
 			return false;
 		surface_on_sphere(s, prim, vec3_normalize(d), x);
@@ -516,7 +566,7 @@ bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, stru
 	if (prim.prim >= s->triangle_count)
 		return false;
 	const uint32_t *i = s->index[prim.prim];
-	struct corner c = corner_of(s, i);
+	struct corner c = corner_of(now, i);
 	vec3 area = vec3_cross(c.e1, c.e2), d = vec3_sub(p, c.v0);
 	double square = vec3_dot(area, area);
 	if (!(square > 0))
@@ -527,6 +577,7 @@ bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, stru
 	if (b1 < 0 || b2 < 0 || b1 + b2 > 1)
 		move_inside(c.e1, c.e2, &b1, &b2);
 	x->prim = prim;
-	fill_triangle(s, i, &c, b1, b2, x);
+	x->shape = s;
+	fill_triangle(now, i, &c, b1, b2, x);
 	return true;
 }

@@ -28,9 +28,15 @@ struct geom_shape {
 	float (*tangent)[3][3];	       /* unit, at each corner of each triangle, three times 0: it has none; NULL: dp/du
 					  is used */
 	const struct relief *relief;   /* bends shading normals; NULL: none */
-	const struct placement *place; /* for instances; NULL: positions and normals are in world space */
+	const struct placement *place; /* for instances, and spheres that move; NULL: positions and normals are in world
+					  space */
 	double unit;		       /* the scene's unit of length in world units: for relief */
 };
+
+static inline bool surface_moves(const struct geom_shape *s)
+{
+	return s->place && s->place->moves;
+}
 
 struct surface_point {
 	vec3 p, ng;

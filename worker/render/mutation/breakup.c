@@ -83,7 +83,7 @@ static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, stru
 		return false;
 	if (!em->ops->sample_point(em, u, &p, &pdf) || !(pdf > 0))
 		return false;
-	y->v[0] = path_emitter_vertex(c->w, v->emitter, &p);
+	y->v[0] = path_emitter_vertex(c->w, v->emitter, &p, v->x.prim.time);
 	move->log_density[X_TO_Y] += log(pdf);
 	return true;
 }

@@ -150,7 +150,7 @@ static bool go_to_event(struct mutation_ctx *m, unsigned j, vec3 d, double t_min
 	if (!(distance > t_min && distance < t_max))
 		return false;
 	y->v[j - 1] = (struct path_vertex){.mode = BSDF_REFLECT};
-	path_stop_in_medium(&y->v[j - 1], y->v[j].x.p, distance, d);
+	path_stop_in_medium(&y->v[j - 1], &y->v[j], distance, d);
 	return full_path_join(y, j - 1) && full_path_visible(m->path, y, j - 1);
 }
 

@@ -237,7 +237,7 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 	if (!emitter_sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
 		return false;
 	*pdf *= w->emitter_pdf[chosen];
-	*y = path_emitter_vertex(w, chosen, &p);
+	*y = path_emitter_vertex(w, chosen, &p, z->x.prim.time);
 	y->pdf = w->emitter_pdf[chosen] * em->ops->pdf_point(em, &p);
 	return true;
 }

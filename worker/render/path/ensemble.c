@@ -177,21 +177,25 @@ static void put_light(struct path_context *c, struct sampler *s_numbers, struct 
 	v[s - 1].delta = false;
 }
 
-/* Block 0 of the camera with x's wavelength and point of the aperture. */
+/* Block 0 of the camera with x's wavelength and point of the aperture, and that of the light with its time. */
 struct pinned_sampler {
 	struct sampler base;
 	struct sampler *under;
-	double block[SAMPLER_BLOCK], wavelength, aperture[2];
+	double block[SAMPLER_BLOCK], wavelength, aperture[2], time;
 };
 
 static const double *pinned_block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
 	struct pinned_sampler *p = (struct pinned_sampler *)(void *)base;
 	const double *u = p->under->block(p->under, side, vertex);
-	if (side != SIDE_CAMERA || vertex != 0)
+	if (vertex != 0)
 		return u;
 	for (int i = 0; i < SAMPLER_BLOCK; i++)
 		p->block[i] = u[i];
+	if (side == SIDE_LIGHT) {
+		p->block[DIM_TIME] = p->time;
+		return p->block;
+	}
 	p->block[DIM_WAVELENGTH] = p->wavelength;
 	p->block[DIM_APERTURE_U] = p->aperture[0];
 	p->block[DIM_APERTURE_V] = p->aperture[1];
@@ -200,7 +204,8 @@ static const double *pinned_block(struct sampler *base, enum sampler_side side, 
 
 static unsigned walk_camera(struct path_context *c, struct sampler *s, const struct full_path *x, unsigned most)
 {
-	struct pinned_sampler pinned = {.base = {pinned_block}, .under = s, .wavelength = x->wavelength};
+	struct pinned_sampler pinned = {
+		.base = {pinned_block}, .under = s, .wavelength = x->wavelength, .time = full_path_time(x)};
 	double film[2];
 	camera_point_inverse(&c->w->camera, x->v[x->edges].x.p, pinned.aperture);
 	return path_walk_camera(c, &pinned.base, most, film);
@@ -246,6 +251,7 @@ void ensemble_around(struct path_context *c, struct sampler *sampler, struct ful
 	struct ensemble_lengths n = ensemble_lengths_of(c, u + 1, t, s);
 	c->one_way = false;
 	c->wl = x->wl;
+	c->time = full_path_time(x);
 	unsigned camera = t, light = s;
 	if (t >= 2) {
 		put_camera(c, sampler, x, t);

@@ -63,6 +63,12 @@ void product_mul(struct product *p, spectrum f);
 /* log(X + Y + Z) of what the film gets of it; -INFINITY for black. */
 double product_log_intensity(const struct path_context *c, const struct full_path *x, const struct product *p);
 
+/* At which it happens, all of it: struct prim_ref. */
+static inline double full_path_time(const struct full_path *x)
+{
+	return x->v[0].x.prim.time;
+}
+
 /* Edge e from the positions of its ends, and to_prev of v[e]. false: the ends coincide. */
 bool full_path_join(struct full_path *x, unsigned e);
 

@@ -140,12 +140,12 @@ static bool is_face(const struct world *w, const struct path_vertex *v)
 	return v->kind == VERTEX_SURFACE && w->parts[v->x.prim.shape].passable;
 }
 
-void path_stop_in_medium(struct path_vertex *to, vec3 from, double distance, vec3 d)
+void path_stop_in_medium(struct path_vertex *to, const struct path_vertex *from, double distance, vec3 d)
 {
 	to->kind = VERTEX_MEDIUM;
 	to->emitter = -1;
 	to->bsdf = NULL;
-	to->x = (struct surface_point){.p = vec3_madd(from, distance, d), .prim = PRIM_NONE};
+	to->x = (struct surface_point){.p = vec3_madd(from->x.p, distance, d), .prim = prim_none_at(from->x.prim.time)};
 }
 
 /* To the event where the depth at one wavelength is `depth`; INFINITY: to none. */
@@ -160,7 +160,7 @@ static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d,
 		double end = met && to->kind == VERTEX_SURFACE ? vec3_length(vec3_sub(to->x.p, from.x.p)) : INFINITY;
 		double event = walk_to_event(&k, from.x.p, t_min, fmin(end, t_max), lane, depth);
 		if (event < INFINITY) {
-			path_stop_in_medium(to, from.x.p, event, d);
+			path_stop_in_medium(to, &from, event, d);
 			met = vec3_is_finite(to->x.p);
 		} else if (end > t_max) {
 			walk_on(&k, from.x.p, t_max, end);

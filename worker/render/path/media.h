@@ -57,7 +57,7 @@ bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, 
 bool path_extend_past_events(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
 			     struct path_vertex *to, spectrum *left);
 /* An event at that distance along d. Its edge is not known yet. */
-void path_stop_in_medium(struct path_vertex *to, vec3 from, double distance, vec3 d);
+void path_stop_in_medium(struct path_vertex *to, const struct path_vertex *from, double distance, vec3 d);
 /* Whether z (not at infinity; any end of the camera's sub-path) and y see each other through faces of `null`. Fills in
  * the edge to y, with `before` at z, and what it lets through. Counts rays. */
 bool path_see_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,

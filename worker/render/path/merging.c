@@ -34,28 +34,31 @@ enum { PHOTONS = 4 /* places for so many a path */, TICKS = 16 };
 static const double samples_wide = 16;
 static const double same_normal = 0.9, same_plane = 0.25;
 
-/* Random numbers but for the wavelength. */
-struct one_wavelength {
+/* Random numbers but for the wavelength and the time. */
+struct pinned_numbers {
 	struct sampler_random random;
-	double wavelength;
+	double wavelength, time;
 };
 
 static const double *block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
-	struct one_wavelength *s = (struct one_wavelength *)(void *)base;
+	struct pinned_numbers *s = (struct pinned_numbers *)(void *)base;
 	double *u = s->random.value[side];
 	sampler_fill(s->random.seed, s->random.stream, s->random.index, s->random.step, side, vertex, u);
 	if (side == SIDE_CAMERA && vertex == 0)
 		u[DIM_WAVELENGTH] = s->wavelength;
+	if (side == SIDE_LIGHT && vertex == 0)
+		u[DIM_TIME] = s->time;
 	return u;
 }
 
-static void sampler_init(struct one_wavelength *s, const struct merging *m, uint64_t seed, uint64_t step,
+static void sampler_init(struct pinned_numbers *s, const struct merging *m, uint64_t seed, uint64_t step,
 			 uint64_t index)
 {
 	sampler_random_init(&s->random, seed, RNG_CHOICE, index, step);
 	s->random.base.block = block;
 	s->wavelength = m->wavelength;
+	s->time = m->time;
 }
 
 static bool is_rough(const struct path_vertex *v)
@@ -124,14 +127,15 @@ int merging_photons(struct merging *m, struct path_context *c, uint64_t seed, ui
 		return -ENOMEM;
 	rng_uniform4(seed, RNG_CHOICE, paths, step, 0, u);
 	m->wavelength = u[0];
+	m->time = u[1];
 	c->one_way = false;
 	for (; m->paths < paths && m->count + c->max_depth <= m->room; m->paths++) {
-		struct one_wavelength s;
+		struct pinned_numbers s;
 		double film[2];
 		if (m->paths % TICKS == 0)
 			tick();
 		sampler_init(&s, m, seed, step, m->paths);
-		path_walk_camera(c, &s.random.base, 1, film); /* sets the wavelengths */
+		path_walk_camera(c, &s.random.base, 1, film); /* sets the wavelengths and the time */
 		unsigned n = path_walk_light(c, &s.random.base, c->max_depth);
 		for (unsigned i = 2; i < n; i++)
 			if (is_rough(&c->light[i]))
@@ -154,7 +158,7 @@ void merging_fini(struct merging *m)
 bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t index,
 		  struct merging_place *out)
 {
-	struct one_wavelength s;
+	struct pinned_numbers s;
 	double distance = 0, unused;
 	if (index % TICKS == 0)
 		tick();

@@ -32,8 +32,8 @@ struct merging {
 	struct photon *photons;
 	struct point_tree tree;
 	size_t count, room;
-	uint64_t paths;	   /* light sub-paths that were followed */
-	double wavelength; /* the number in [0,1) of all of them: photons of others could not be merged */
+	uint64_t paths;		 /* light sub-paths that were followed */
+	double wavelength, time; /* the numbers in [0,1) of all of them: photons of others could not be merged */
 };
 
 /* The camera's sub-path in path_context. */

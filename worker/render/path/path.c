@@ -262,9 +262,10 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	film[0] = c->window.x + u[DIM_FILM_X] * c->window.width;
 	film[1] = c->window.y + u[DIM_FILM_Y] * c->window.height;
 	c->wl = world_wavelengths(w, u[DIM_WAVELENGTH]);
+	c->time = EFFECT_IS_ON(w, motion) ? s->block(s, SIDE_LIGHT, 0)[DIM_TIME] : 0;
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};
 	v[0].x.p = camera_point(&w->camera, u + DIM_APERTURE_U);
-	v[0].x.prim = PRIM_NONE;
+	v[0].x.prim = prim_none_at(c->time);
 	v[0].edge.medium = w->camera_medium;
 	if (max_vertices < 2 || !camera_has(&w->camera, film[0], film[1]))
 		return 1;
@@ -297,7 +298,7 @@ static bool leave_infinity(struct path_context *c, struct path_vertex *v, const 
 	double r = w->radius * sqrt(u[0]), phi = 2 * M_PI * u[1];
 	struct path_vertex start = {.kind = VERTEX_CAMERA};
 	start.x.p = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), -2 * w->radius});
-	start.x.prim = PRIM_NONE;
+	start.x.prim = prim_none_at(v[0].x.prim.time);
 	const struct emitter *em = &w->emitters[v[0].emitter];
 	struct emitter_point p = {.p = v[0].x.p, .infinite = true};
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
@@ -337,7 +338,7 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	if (!em->ops->sample_point(em, u + DIM_EMITTER_POINT, &p, &pdf) || !(pdf > 0))
 		return 0;
 	pdf *= w->emitter_pdf[chosen];
-	v[0] = path_emitter_vertex(w, chosen, &p);
+	v[0] = path_emitter_vertex(w, chosen, &p, c->time);
 	v[0].pdf = pdf;
 	v[0].beta = spectrum_of(1 / pdf);
 	if (max_vertices < 2)

@@ -9,7 +9,8 @@ spectrum path_emitted(const struct path_context *c, const struct path_vertex *v,
 	return em->ops->radiance(em, &p, w, wl);
 }
 
-struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p)
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p,
+				       double time)
 {
 	struct path_vertex v = {.kind = p->infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
 	uint32_t shape = w->emitter_shape[emitter];
@@ -19,7 +20,7 @@ struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, c
 	v.x.v = p->where.v;
 	v.x.b1 = p->where.b1;
 	v.x.b2 = p->where.b2;
-	v.x.prim = shape == UINT32_MAX ? PRIM_NONE : (struct prim_ref){shape, p->where.prim};
+	v.x.prim = shape == UINT32_MAX ? prim_none_at(time) : (struct prim_ref){shape, p->where.prim, time};
 	return v;
 }
 
@@ -42,7 +43,7 @@ bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d,
 	}
 	to->kind = VERTEX_INFINITE;
 	to->x.p = d;
-	to->x.prim = PRIM_NONE;
+	to->x.prim = prim_none_at(from->x.prim.time);
 	to->emitter = c->w->environment;
 	to->bsdf = NULL;
 	return to->emitter >= 0;

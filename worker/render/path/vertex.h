@@ -36,7 +36,7 @@ struct path_vertex {
 	const struct bsdf *bsdf; /* VERTEX_SURFACE */
 	struct path_edge edge;	 /* from the vertex before it on its own sub-path */
 	struct surface_point x;	 /* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is
-				    0. VERTEX_MEDIUM: p, and nothing else */
+				    0. VERTEX_MEDIUM: p, and nothing else. All: prim.time */
 	vec3 to_prev;		 /* unit; towards the vertex before it on its own sub-path */
 	spectrum beta;		 /* carried to this vertex over the density of getting here */
 	double pdf;		 /* of this vertex from its own sub-path, see above */
@@ -69,6 +69,7 @@ struct path_context {
 	const struct world *w;
 	struct film_window window;
 	struct wavelengths wl;
+	double time;		       /* of the sub-paths: struct prim_ref */
 	uint32_t min_depth, max_depth; /* edges */
 	double roulette;	       /* the most that a sub-path goes on with; 0: no roulette */
 	bool unclassed;		       /* nobody asks for path_sample.classes */
@@ -89,8 +90,9 @@ static inline bool path_can_be_hit(const struct path_context *c, const struct pa
 	return !end || v->emitter < 0 || !c->w->emitters[v->emitter].delta;
 }
 
-/* Kind, emitter and place of a point drawn on an emitter; the rest is 0. */
-struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p);
+/* Kind, emitter, place and time of a point drawn on an emitter; the rest is 0. */
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p,
+				       double time);
 
 /* Whether it scatters light in a range of directions, so that it can be joined. Only what is not an end. */
 static inline bool path_scatters_smoothly(const struct path_vertex *v)

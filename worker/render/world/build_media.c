@@ -122,7 +122,7 @@ static uint32_t medium_around(const struct world *w, uint32_t emitter)
 	uint32_t shape = w->emitter_shape[emitter];
 	bool surface = shape != UINT32_MAX;
 	struct ray_end from = {p.p, surface ? p.n : (vec3){0, 0, 0},
-			       surface ? (struct prim_ref){shape, p.where.prim} : PRIM_NONE};
+			       surface ? (struct prim_ref){shape, p.where.prim, 0} : PRIM_NONE};
 	return next_medium(w, from, surface ? p.n : any);
 }
 

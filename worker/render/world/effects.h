@@ -31,6 +31,7 @@ enum effect {
 	EFFECT_BUMP,
 	EFFECT_ALPHA,
 	EFFECT_INSTANCING,
+	EFFECT_MOTION,
 	EFFECT_COINCIDENCE,
 	EFFECT_ENVIRONMENT,
 	EFFECT_AREA_LIGHT,
@@ -66,6 +67,7 @@ struct effects {
 		delta_light;
 	bool displacement, half_vectors, emitter_move;
 	bool absorption, scattering; /* some medium does */
+	bool motion;		     /* paths have a time */
 	enum color_shape illuminant; /* of all emitters, if colour is off */
 	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */
 	struct effect_line lines[RENDER_EFFECTS_MAX];

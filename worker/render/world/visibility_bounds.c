@@ -60,8 +60,10 @@ static double farthest(const struct geom_shape *g, vec3 from)
 /* Convex, closed and opaque. An ellipsoid is, too, but as a mesh it is checked triangle by triangle. */
 static bool is_container(const struct world *w, const struct scene_node *node, uint32_t shape)
 {
-	bool convex = strcmp(node->type, "cube") == 0 || w->shapes[shape].is_sphere;
-	return convex && !displacement_of(node) && !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
+	const struct geom_shape *g = &w->shapes[shape];
+	bool convex = strcmp(node->type, "cube") == 0 || g->is_sphere;
+	return convex && !surface_moves(g) && !displacement_of(node) &&
+	       !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
 }
 
 /* Whether no path from the camera starts inside: all of it is beyond the near plane, or behind the camera and its
@@ -134,8 +136,8 @@ static void find_enclosed(const struct world *w, const struct effects_source *sr
 			continue;
 		for (uint32_t k = first_from(by_x, n, outer->low.x); k < n && by_x[k].at <= outer->high.x; k++) {
 			uint32_t i = (uint32_t)by_x[k].weight;
-			if (i != o && shape[i] == VISIBILITY_YES && box_holds(outer, &src->box[i]) &&
-			    contains(&w->shapes[o], &w->shapes[i]))
+			if (i != o && shape[i] == VISIBILITY_YES && !surface_moves(&w->shapes[i]) &&
+			    box_holds(outer, &src->box[i]) && contains(&w->shapes[o], &w->shapes[i]))
 				shape[i] = VISIBILITY_ENCLOSED;
 		}
 	}
@@ -184,7 +186,7 @@ uint32_t visibility_bounds_depth(const struct world *w, const enum visibility_bo
 		const struct geom_shape *g = &w->shapes[i];
 		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
 			continue;
-		if (g->is_sphere)
+		if (g->is_sphere || surface_moves(g))
 			return UINT32_MAX;
 		if (!any)
 			plane = triangle_at(g, 0);

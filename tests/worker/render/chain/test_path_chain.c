@@ -261,6 +261,7 @@ static void check_same_path(const struct full_path *x, const struct full_path *y
 		assert_memory_equal(&v->x.p, &w->x.p, sizeof v->x.p);
 		assert_memory_equal(&v->x.ng, &w->x.ng, sizeof v->x.ng);
 		assert_memory_equal(&v->x.sh, &w->x.sh, sizeof v->x.sh);
+		assert_true(v->x.prim.time == w->x.prim.time);
 	}
 }
 

@@ -392,7 +392,7 @@ static void test_texture_coordinates(void **state)
 		assert_true(em->ops->sample_point(em, u, &x[0], &pdf));
 		assert_true(emitter_sample_toward(em, (vec3){0.9, 0.3, -0.2}, u, &x[1], &pdf));
 		for (int k = 0; k < 2; k++) {
-			surface_on_sphere(s, (struct prim_ref){0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)),
+			surface_on_sphere(s, (struct prim_ref){0, 0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)),
 					  &there);
 			assert_true(fabs(there.u - x[k].where.u) < 1e-9 && fabs(there.v - x[k].where.v) < 1e-9);
 		}

@@ -373,7 +373,7 @@ static void test_sheets(void **state)
 		const vec3 up = {0, 0, 1};
 		for (size_t i = 0; i < dice_count(20000); i++) {
 			struct ray_end from = {
-				{dice_between(&d, -0.5, 0.5), dice_between(&d, -0.5, 0.5), 0}, up, {0, 0}};
+				{dice_between(&d, -0.5, 0.5), dice_between(&d, -0.5, 0.5), 0}, up, {0, 0, 0}};
 			from.prim.prim = from.p.y > from.p.x;
 			vec3 w = grazing(&d, up, exp(dice_between(&d, log(1.0 / 32), log(8))));
 			struct ray_end above = free_end(vec3_madd(from.p, 0.2, w));

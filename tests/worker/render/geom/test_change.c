@@ -186,9 +186,9 @@ static void test_differences(void **state)
 			s = bent(s, &d, relief - 1);
 		struct surface_point x;
 		if (s.is_sphere)
-			surface_on_sphere(&s, (struct prim_ref){0, 0}, dice_direction(&d), &x);
+			surface_on_sphere(&s, (struct prim_ref){0, 0, 0}, dice_direction(&d), &x);
 		else
-			surface_on_triangle(&s, (struct prim_ref){0, 0}, dice_between(&d, 0.2, 0.4),
+			surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, dice_between(&d, 0.2, 0.4),
 					    dice_between(&d, 0.2, 0.4), &x);
 		if (!s.is_sphere && vec3_dot(x.sh.n, x.ng) < 0.1)
 			continue;
@@ -227,9 +227,9 @@ static void test_bent_normal_is_that_of_the_surface(void **state)
 		struct surface_point x;
 		if (round) {
 			wave[0] *= 1e-5;
-			surface_on_sphere(&s, (struct prim_ref){0, 0}, dice_direction(&d), &x);
+			surface_on_sphere(&s, (struct prim_ref){0, 0, 0}, dice_direction(&d), &x);
 		} else {
-			surface_on_triangle(&s, (struct prim_ref){0, 0}, dice_between(&d, 0.2, 0.4),
+			surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, dice_between(&d, 0.2, 0.4),
 					    dice_between(&d, 0.2, 0.4), &x);
 		}
 		struct geom_shape flat = s;
@@ -291,7 +291,7 @@ static void test_mirrored_pictures(void **state)
 					     .relief = &r,
 					     .unit = 1};
 		struct surface_point p;
-		surface_on_triangle(&s, (struct prim_ref){0, 0}, 0.3, 0.3, &p);
+		surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, 0.3, 0.3, &p);
 		vec3 want = vec3_normalize((vec3){cases[k].right * x.x, cases[k].top * x.y, x.z});
 		assert_true(vec3_length(vec3_sub(p.sh.n, want)) < 1e-15);
 	}
@@ -321,7 +321,8 @@ static void test_degenerate(void **state)
 		if (i % 3)
 			s = bent(s, &d, i % 3 - 1);
 		double off_axis = i < 4 ? 0 : exp(dice_between(&d, -740, 0));
-		surface_on_sphere(&s, (struct prim_ref){0, 0}, vec3_normalize((vec3){off_axis, 0, i & 2 ? 1 : -1}), &x);
+		surface_on_sphere(&s, (struct prim_ref){0, 0, 0}, vec3_normalize((vec3){off_axis, 0, i & 2 ? 1 : -1}),
+				  &x);
 		assert_finite(&s, &x);
 	}
 	for (int i = 0; i < 400; i++) {
@@ -337,7 +338,7 @@ static void test_degenerate(void **state)
 			memset(normal, 0, sizeof normal);
 		if (i % 2)
 			s = bent(s, &d, i / 2 % 2);
-		surface_on_triangle(&s, (struct prim_ref){0, 0}, 0.3, 0.3, &x);
+		surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, 0.3, 0.3, &x);
 		if (!vec3_is_finite(x.ng))
 			continue; /* no area: no such triangle is kept */
 		assert_finite(&s, &x);
@@ -347,7 +348,7 @@ static void test_degenerate(void **state)
 	for (int m = 0; m < 3; m++)
 		for (int i = 0; i < 3; i++)
 			normal[m][i] = -normal[m][i];
-	surface_on_triangle(&s, (struct prim_ref){0, 0}, 0.3, 0.3, &x);
+	surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, 0.3, 0.3, &x);
 	surface_change_of(&s, &x, &c);
 	assert_true(vec3_length(c.dn[0]) == 0 && vec3_length(c.dn[1]) == 0);
 }

@@ -178,7 +178,7 @@ static struct prim_ref rule(const struct accel_shape *s, uint32_t count, struct 
 				double unused;
 				bool wholly;
 				if (triangle_meets(&u, p, t.n, &unused) && coincide_triangles(&t, &u, 0, &wholly))
-					return (struct prim_ref){i, k};
+					return (struct prim_ref){i, k, 0};
 			}
 	return at;
 }
@@ -226,7 +226,7 @@ static void test_search(void **state)
 	assert_non_null(c);
 	assert_false(c->incomplete);
 	for (size_t n = dice_count(20000); n > 0; n--) {
-		struct prim_ref at = {dice_below(&d, 5), dice_below(&d, 150)};
+		struct prim_ref at = {dice_below(&d, 5), dice_below(&d, 150), 0};
 		vec3 p = point_on(&shape[at.shape], at.prim, &d);
 		struct prim_ref there = coincide_there(c, shape, at, p), right = rule(shape, 5, at, p);
 		if (there.shape != right.shape || there.prim != right.prim)
@@ -275,8 +275,8 @@ static void test_bounds(void **state)
 	ball[2].radius *= 1 + 1e-5;
 	assert_int_equal(coincide_find(&c, ball, 3, &e), 0);
 	assert_int_equal(c->pair_count, 1);
-	assert_int_equal(coincide_there(c, ball, (struct prim_ref){1, 0}, ball[1].center).shape, 0);
-	assert_int_equal(coincide_there(c, ball, (struct prim_ref){2, 0}, ball[2].center).shape, 2);
+	assert_int_equal(coincide_there(c, ball, (struct prim_ref){1, 0, 0}, ball[1].center).shape, 0);
+	assert_int_equal(coincide_there(c, ball, (struct prim_ref){2, 0, 0}, ball[2].center).shape, 2);
 	coincide_free(c);
 	s.count = other.count = 0;
 	add(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
@@ -358,7 +358,7 @@ static void test_rays(void **state)
 			/* The pane's own point there. */
 			struct triangle t = triangle_from(shape[0].position, shape[0].index[0]);
 			double unused;
-			struct prim_ref prim = {0, triangle_meets(&t, p, f.n, &unused) ? 0 : 1};
+			struct prim_ref prim = {0, triangle_meets(&t, p, f.n, &unused) ? 0 : 1, 0};
 			struct ray_end hidden = {p, f.n, prim};
 			assert_false(accel_closest(a, &hidden, w, 0, INFINITY, &hit));
 			assert_true(accel_occluded(a, &hidden, &far) && accel_occluded(a, &eye, &hidden) &&

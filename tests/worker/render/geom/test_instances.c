@@ -170,7 +170,7 @@ static struct met search(const struct scene *s, wide o, wide d, const struct pri
 			wide from = wide_sub(o, v[0]), q = wide_cross(from, e1);
 			long double u = wide_dot(from, h) / det, w = wide_dot(d, q) / det, t = wide_dot(e2, q) / det;
 			if (u >= 0 && w >= 0 && u + w <= 1 && t > 1e-15L && t < best.t)
-				best = (struct met){{k, i}, t, fminl(u, fminl(w, 1 - u - w))};
+				best = (struct met){{k, i, 0}, t, fminl(u, fminl(w, 1 - u - w))};
 		}
 	return best;
 }
@@ -340,8 +340,8 @@ static void test_coincident(void **state)
 	assert_non_null(c);
 	for (uint32_t k = 0; k < 4; k++)
 		for (uint32_t i = 0; i < top.triangle_count; i++) {
-			const struct prim_ref prim = {k, i};
-			const struct triangle t = accel_triangle(&a[k], i);
+			const struct prim_ref prim = {k, i, 0};
+			const struct triangle t = accel_triangle(&a[k], i, 0);
 			vec3 p = vec3_scale(1.0 / 3, vec3_add(t.v[0], vec3_add(t.v[1], t.v[2])));
 			assert_int_equal(coincide_there(c, a, prim, p).shape, k < 2 ? 4 : k);
 		}
@@ -376,7 +376,7 @@ static void check_sheets(struct dice *d, const mat4 *m, double gap)
 	const vec3 up = placement_normal(&place[0], (vec3){0, 0, 1});
 	for (size_t i = 0; i < dice_count(2000); i++) {
 		const vec3 p = {dice_between(d, -0.5, 0.5), dice_between(d, -0.5, 0.5), 0};
-		const struct ray_end from = {placement_point(&place[0], p), up, {0, p.y > p.x}};
+		const struct ray_end from = {placement_point(&place[0], p), up, {0, p.y > p.x, 0}};
 		vec3 w = grazing(d, up, exp(dice_between(d, log(1.0 / 32), log(8))));
 		const struct ray_end beyond = {.p = vec3_madd(from.p, 0.03, w), .prim = PRIM_NONE};
 		struct ray_hit hit;

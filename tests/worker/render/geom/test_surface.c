@@ -146,7 +146,7 @@ static void test_beside_a_sliver(void **state)
 	for (int i = 0; i < 1000; i++) {
 		vec3 aim = {dice_between(&d, -0x1p-20, 0x1p-19), dice_between(&d, -1, 1), 0};
 		vec3 o = {aim.x + dice_between(&d, -1, 1), aim.y + dice_between(&d, -1, 1), 1};
-		struct ray_hit hit = {{0, 0}, vec3_length(vec3_sub(aim, o)), 0.3, 0.3};
+		struct ray_hit hit = {{0, 0, 0}, vec3_length(vec3_sub(aim, o)), 0.3, 0.3};
 		struct surface_point x;
 		surface_from_hit(&s, o, vec3_normalize(vec3_sub(aim, o)), &hit, &x);
 		assert_true(vec3_length(vec3_sub(x.p, aim)) < 0x1p-18);
@@ -170,7 +170,7 @@ static void test_parameters(void **state)
 		for (int k = 0; k < 3; k++) {
 			double phi = 2 * M_PI * (u + (k - 1) * h), theta = M_PI * v;
 			vec3 l = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
-			surface_on_sphere(&s, (struct prim_ref){0, 0}, frame_to_world(&s.sphere_axes, l), &x[k]);
+			surface_on_sphere(&s, (struct prim_ref){0, 0, 0}, frame_to_world(&s.sphere_axes, l), &x[k]);
 		}
 		assert_true(fabs(x[1].u - u) < 1e-12 && fabs(x[1].v - v) < 1e-12);
 		vec3 difference = vec3_scale(1 / (2 * h), vec3_sub(x[2].p, x[0].p));
@@ -189,8 +189,8 @@ static void test_parameters(void **state)
 			       .uv = uv,
 			       .normal = normal};
 	struct surface_point a, b;
-	surface_on_triangle(&t, (struct prim_ref){0, 0}, 0.25, 0.25, &a);
-	surface_on_triangle(&t, (struct prim_ref){0, 0}, 0.35, 0.45, &b);
+	surface_on_triangle(&t, (struct prim_ref){0, 0, 0}, 0.25, 0.25, &a);
+	surface_on_triangle(&t, (struct prim_ref){0, 0, 0}, 0.35, 0.45, &b);
 	/* The position is linear in (u,v): along a line of constant v it moves by dpdu. */
 	double det = (double)(uv[1][0] - uv[0][0]) * (double)(uv[2][1] - uv[0][1]) -
 		     (double)(uv[1][1] - uv[0][1]) * (double)(uv[2][0] - uv[0][0]);

@@ -99,7 +99,7 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 		}
 		s->tangent = h->tangent[j];
 	}
-	surface_on_triangle(s, (struct prim_ref){j, 0}, w[1] / sum, w[2] / sum, &h->x.v[j].x);
+	surface_on_triangle(s, (struct prim_ref){j, 0, 0}, w[1] / sum, w[2] / sum, &h->x.v[j].x);
 	h->x.v[j].kind = VERTEX_SURFACE;
 }
 
@@ -112,7 +112,7 @@ static inline void hand_sphere(struct hand *h, unsigned j, vec3 p, vec3 n, doubl
 	*s = (struct geom_shape){
 		.is_sphere = true, .center = vec3_madd(p, -radius, w), .radius = radius, .normal_sign = sign};
 	s->sphere_axes = frame_around(vec3_normalize(vec3_madd(vec3_scale(cos(polar), w), sin(polar), side)));
-	surface_on_sphere(s, (struct prim_ref){j, 0}, w, &h->x.v[j].x);
+	surface_on_sphere(s, (struct prim_ref){j, 0, 0}, w, &h->x.v[j].x);
 	h->x.v[j].kind = VERTEX_SURFACE;
 }
 

@@ -380,7 +380,7 @@ static void test_degenerate(void **state)
 	/* At the pole itself everything is finite. */
 	hand_sphere(&h, 1, (vec3){0, 0, 0}, (vec3){0, 0, 1}, 0.5, 1, 0, &d);
 	h.shape[1].sphere_axes = frame_around((vec3){0, 0, 1});
-	surface_on_sphere(&h.shape[1], (struct prim_ref){1, 0}, (vec3){0, 0, 1}, &h.x.v[1].x);
+	surface_on_sphere(&h.shape[1], (struct prim_ref){1, 0, 0}, (vec3){0, 0, 1}, &h.x.v[1].x);
 	assert_true(vec3_length(h.x.v[1].x.axis) == 0);
 	hand_camera(&h, 2, (vec3){-0.5, 0.1, 0.25});
 	hand_join(&h);

@@ -269,7 +269,7 @@ static void test_emitters(void **state)
 		double pdf;
 		const double u[] = {0.3, 0.6};
 		assert_true(w->emitters[i].ops->sample_point(&w->emitters[i], u, &p, &pdf));
-		struct path_vertex v = path_emitter_vertex(w, i, &p);
+		struct path_vertex v = path_emitter_vertex(w, i, &p, 0);
 		assert_int_equal(path_medium_of_emitter(w, &v, p.n), around[i]);
 	}
 	world_free(w);

@@ -44,9 +44,9 @@ static struct path_vertex vertex_on(const struct world *w, uint64_t i)
 	rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 	struct path_vertex v = {.kind = VERTEX_SURFACE, .emitter = -1, .bsdf = &w->bsdfs[w->parts[0].bsdf]};
 	if (w->shapes[0].is_sphere)
-		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, direction_of_square(u), &v.x);
+		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0, 0}, direction_of_square(u), &v.x);
 	else
-		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0}, u[0] * (1 - u[1]), u[1] * u[0], &v.x);
+		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 0, 0}, u[0] * (1 - u[1]), u[1] * u[0], &v.x);
 	return v;
 }
 

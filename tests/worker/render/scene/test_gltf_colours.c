@@ -121,7 +121,7 @@ static void test_twin(void **state)
 		for (uint32_t k = 0; k < 16 * mesh->triangle_count; k++) {
 			struct surface_point x;
 			double b1 = (k % 4) / 3.0, b2 = (k / 4 % 4) / 3.0 * (1 - b1);
-			surface_on_triangle(mesh, (struct prim_ref){s, k / 16}, b1, b2, &x);
+			surface_on_triangle(mesh, (struct prim_ref){s, k / 16, 0}, b1, b2, &x);
 			struct bsdf_point at = world_bsdf_point(&x, &colour, TRANSPORT_RADIANCE);
 			const struct bsdf *of_a = &a->bsdfs[a->parts[s].bsdf], *of_b = &b->bsdfs[b->parts[s].bsdf];
 			spectrum fa = of_a->ops->eval(of_a, &at, wo, wi), fb = of_b->ops->eval(of_b, &at, wo, wi);

@@ -65,7 +65,7 @@ static void finish(const char *json)
 static vec3 corner(const struct world *w, uint32_t shape, uint32_t triangle, int k)
 {
 	struct surface_point x;
-	surface_on_triangle(&w->shapes[shape], (struct prim_ref){shape, triangle}, k == 1, k == 2, &x);
+	surface_on_triangle(&w->shapes[shape], (struct prim_ref){shape, triangle, 0}, k == 1, k == 2, &x);
 	return vec3_add(vec3_scale(1 / w->scale, x.p), w->center);
 }
 

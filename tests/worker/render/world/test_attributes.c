@@ -131,7 +131,7 @@ static void assert_linear(const struct world *w, uint32_t shape, bool mirrored)
 	for (uint32_t t = 0; t < s->triangle_count; t++) {
 		struct surface_point x;
 		double rgb[3];
-		surface_on_triangle(s, (struct prim_ref){shape, t}, 0.2, 0.1 + (t % 7) / 10.0, &x);
+		surface_on_triangle(s, (struct prim_ref){shape, t, 0}, 0.2, 0.1 + (t % 7) / 10.0, &x);
 		vec3 p = x.p;
 		if (mirrored)
 			p.x = -p.x;
@@ -184,8 +184,8 @@ static void assert_alike(const struct world *w)
 		for (int k = 0; k < 8; k++) {
 			struct surface_point a, b;
 			double b1 = k / 10.0, b2 = (7 - k) / 9.0 * (t % 5) / 4;
-			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, t}, b1, b2, &a);
-			surface_on_triangle(&w->shapes[1], (struct prim_ref){1, t}, b1, b2, &b);
+			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, t, 0}, b1, b2, &a);
+			surface_on_triangle(&w->shapes[1], (struct prim_ref){1, t, 0}, b1, b2, &b);
 			assert_close(albedo(w, &a), albedo(w, &b), 1e-5);
 		}
 }
@@ -259,7 +259,7 @@ static void test_light(void **state)
 		struct surface_point met;
 		double pdf, rgb[3];
 		assert_true(em->ops->sample_point(em, u, &drawn, &pdf));
-		assert_true(surface_near(&w->shapes[0], (struct prim_ref){0, drawn.where.prim}, drawn.p, &met));
+		assert_true(surface_near(&w->shapes[0], (struct prim_ref){0, drawn.where.prim, 0}, drawn.p, &met));
 		struct emitter_point as_met = world_emitter_point(&met);
 		linear_colour(w, drawn.p, rgb);
 		spectrum expected = color_eval_rgb_illuminant(rgb, &colour);
@@ -309,7 +309,7 @@ static void test_vertexcolors(void **state)
 	for (uint32_t i = 0; i < 2; i++) {
 		struct surface_point x;
 		double rgb[3];
-		surface_on_triangle(&w->shapes[i], (struct prim_ref){i, 0}, 0, 0, &x);
+		surface_on_triangle(&w->shapes[i], (struct prim_ref){i, 0, 0}, 0, 0, &x);
 		node_colour(0, 0, rgb);
 		for (int k = 0; k < 3 && i == 0; k++)
 			rgb[k] = pow((rgb[k] + 0.055) / 1.055, 2.4) * (rgb[k] > 0.04045);

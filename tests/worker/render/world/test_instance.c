@@ -125,7 +125,7 @@ static void compare_surfaces(const char *shape, bool tangents, double turn)
 		for (int i = 0; i < 200; i++) {
 			struct surface_point x, y;
 			struct surface_change c, e;
-			const struct prim_ref prim = {k, dice_below(&d, s->triangle_count)};
+			const struct prim_ref prim = {k, dice_below(&d, s->triangle_count), 0};
 			double root = sqrt(dice_throw(&d)), b1 = 1 - root, b2 = root * dice_throw(&d);
 			surface_on_triangle(s, prim, b1, b2, &x);
 			surface_on_triangle(t, prim, b1, b2, &y);
@@ -193,8 +193,8 @@ static void test_displaced(void **state)
 	assert_int_equal(a->instance_count, 1); /* of the four one is merely moved */
 	for (uint32_t k = 0; k < PLACES; k++) {
 		struct surface_point x, y;
-		surface_on_triangle(&a->shapes[k], (struct prim_ref){k, 77}, 0.3, 0.3, &x);
-		surface_on_triangle(&b->shapes[k], (struct prim_ref){k, 77}, 0.3, 0.3, &y);
+		surface_on_triangle(&a->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &x);
+		surface_on_triangle(&b->shapes[k], (struct prim_ref){k, 77, 0}, 0.3, 0.3, &y);
 		assert_true(apart(vec3_madd(a->center, 1 / a->scale, x.p), vec3_madd(b->center, 1 / b->scale, y.p)) <
 			    1e-6);
 	}

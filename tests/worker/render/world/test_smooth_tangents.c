@@ -70,7 +70,7 @@ static double worst_turn(const struct world *w, bool smooth, int n)
 	for (int i = 0; i < 4000; i++) {
 		struct surface_point x;
 		double root = sqrt(dice_throw(&d));
-		surface_on_triangle(&s, (struct prim_ref){0, dice_below(&d, s.triangle_count)}, 1 - root,
+		surface_on_triangle(&s, (struct prim_ref){0, dice_below(&d, s.triangle_count), 0}, 1 - root,
 				    root * dice_throw(&d), &x);
 		vec3 east = vec3_normalize((vec3){-x.sh.n.y, x.sh.n.x, 0});
 		if (fabs(x.sh.n.z) < 0.5 && fabs(atan2(x.sh.n.y, x.sh.n.x)) > 4 * M_PI / n)
@@ -144,7 +144,7 @@ static void test_mirrored(void **state)
 	struct surface_point x;
 	for (int k = 0; k < 3; k++)
 		assert_memory_equal(s->tangent[6][k], ((float[3]){0, 0, 0}), sizeof(float[3]));
-	surface_on_triangle(s, (struct prim_ref){0, 6}, 0.3, 0.3, &x);
+	surface_on_triangle(s, (struct prim_ref){0, 6, 0}, 0.3, 0.3, &x);
 	assert_true(vec3_is_finite(x.sh.s) && vec3_length(x.sh.s) > 0.999);
 	world_free(w);
 }

@@ -66,9 +66,9 @@ static void point_on(const struct world *w, uint64_t i, struct surface_point *x)
 	double u[4];
 	rng_uniform4(stats_seed(__func__), RNG_TEST, i, 0, 0, u);
 	if (w->shapes[0].is_sphere)
-		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, direction_of_square(u), x);
+		surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0, 0}, direction_of_square(u), x);
 	else
-		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, i % 2}, u[0] * (1 - u[1]), u[1] * u[0], x);
+		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, i % 2, 0}, u[0] * (1 - u[1]), u[1] * u[0], x);
 }
 
 /* f |cos| of light from wi that goes to wo, both in the world; *side: whether the shading normal sees both as the

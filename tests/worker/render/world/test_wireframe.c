@@ -119,7 +119,7 @@ static struct counted compare(const struct world *w, uint32_t shape, mat4 from_f
 		for (int i = 0; i < 400; i++) {
 			double b1 = (i % 20 + 0.5) / 20, b2 = (1 - b1) * (i / 20 + 0.3) / 20;
 			struct surface_point x;
-			surface_on_triangle(&w->shapes[shape], (struct prim_ref){shape, f}, b1, b2, &x);
+			surface_on_triangle(&w->shapes[shape], (struct prim_ref){shape, f, 0}, b1, b2, &x);
 			vec3 p = vec3_madd(w->center, 1 / w->scale, x.p), in_file = {0, 0, 0};
 			/* The transforms are orthogonal but for the scale. */
 			p = vec3_sub(p, (vec3){from_file.m[0][3], from_file.m[1][3], from_file.m[2][3]});
@@ -200,8 +200,8 @@ static void test_covered_part(void **state)
 		for (int j = 0; i + j < SIDE; j++) {
 			/* Points are the middles of equal parts; those on the long side are cut in half. */
 			struct surface_point x;
-			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 5}, (i + 0.5) / SIDE, (j + 0.5) / SIDE,
-					    &x);
+			surface_on_triangle(&w->shapes[0], (struct prim_ref){0, 5, 0}, (i + 0.5) / SIDE,
+					    (j + 0.5) / SIDE, &x);
 			covered += albedo(w, &x) * (i + j + 1 < SIDE ? 2 : 1) / (SIDE * SIDE);
 		}
 	double part = 1 - (1 - 0.2 / radius) * (1 - 0.2 / radius);
@@ -220,9 +220,9 @@ static void test_other_shapes(void **state)
 		       "<shape type='sphere'><ref id='m'/></shape><shape type='rectangle'><ref id='m'/></shape>" PLY(
 			       "<ref id='m'/>"));
 	struct surface_point x;
-	surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0}, (vec3){0, 0, 1}, &x);
+	surface_on_sphere(&w->shapes[0], (struct prim_ref){0, 0, 0}, (vec3){0, 0, 1}, &x);
 	assert_true(albedo(w, &x) == 0.25);
-	surface_on_triangle(&w->shapes[1], (struct prim_ref){1, 0}, 0.5, 0.5, &x);
+	surface_on_triangle(&w->shapes[1], (struct prim_ref){1, 0, 0}, 0.5, 0.5, &x);
 	assert_true(albedo(w, &x) == 0.25);
 	compare(w, 2, unmoved, 1, 0.125, 0.75, 0.75, 0.25);
 	world_free(w);
