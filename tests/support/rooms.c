@@ -204,11 +204,35 @@ static struct world *misfit(void)
 			     "<shape type='sphere'><point name='center' value='0.2,-0.6,-0.2'/><float name='radius' value='0.7'/>" GLASS "</shape>");
 }
 
+#define FROM(t, inner) "<transform time='" t "'>" inner "</transform>"
+#define MOVES(a, b) "<animation name='to_world'>" FROM("0", a) FROM("1", b) "</animation>"
+
+/* While the shutter is open a ball of metal rolls and shrinks, cloudy glass turns, and a group slides. */
+static struct world *moving(void)
+{
+	static const char scene[] = "<scene version='3.0.0'>"
+		"<sensor type='perspective'><float name='fov' value='40'/><float name='shutter_open' value='0.2'/>"
+		"<float name='shutter_close' value='0.9'/>" AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+		"<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
+		BOX("0.5,0.45,0.35") LAMP
+		"<shape type='sphere'>" MOVES("<scale value='0.7'/><translate x='-0.6' y='-1' z='-0.6'/>",
+			"<scale value='0.5'/><rotate z='1' angle='-100'/><translate x='0.5' y='-1.2' z='-0.5'/>") METAL("0.2") "</shape>"
+		"<shape type='cube'>" MOVES("<scale x='0.5' y='0.4' z='0.15'/><translate x='0.5' y='0.3' z='-0.4'/>",
+			"<scale x='0.5' y='0.4' z='0.15'/><rotate y='1' angle='70'/><translate x='0.5' y='0.3' z='-0.4'/>") CLOUDY("0.3") "</shape>"
+		"<shape type='shapegroup' id='g'>" OBJ(AT("<scale value='.3'/><rotate x='1' angle='80'/>") METAL("0.3"))
+		"<shape type='sphere'><float name='radius' value='0.25'/>" GLASS "</shape></shape>"
+		"<shape type='instance'><ref id='g'/>" MOVES("<translate x='-0.9' y='-0.6' z='-0.9'/>",
+			"<scale x='1' y='1' z='1'/><translate x='-0.3' y='-0.1' z='-0.9'/>") "</shape></scene>";
+	const struct memory_file files[] = {{"moving.xml", scene, sizeof scene - 1}, {"bent.obj", bent_obj, sizeof bent_obj - 1}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
 const struct room rooms[] = {
 	{"rough glass", cloudy}, {"glass", glass}, {"gold", gold}, {"mirror", mirror}, {"bent normals", bent}, {"sky", sky},
 	{"picture", picture}, {"prism", prism}, {"lens", lens}, {"point and spot", deltas}, {"sun", sun}, {"dents", dents},
 	{"coloured glass", coloured_glass}, {"tilted parts", tilted_parts},
 	{"turned normals", turned_normals}, {"clouds", clouds}, {"fog", fog}, {"misfit", misfit},
+	{"moving", moving},
 	{NULL, NULL},
 };
 

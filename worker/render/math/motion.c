@@ -117,6 +117,9 @@ static bool same_place(const struct keyframe *a, const struct keyframe *b)
 	return memcmp(&a->place, &b->place, sizeof a->place) == 0;
 }
 
+/* The shutter is not open if it is for less: times in units of that would not be finite. */
+#define LEAST_OPEN 1e-30
+
 bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *room)
 {
 	uint32_t first = 0, last = a->count - 1;
@@ -124,8 +127,8 @@ bool motion_make(struct motion *m, const struct animation *a, double open, doubl
 		first++;
 	while (last > first && a->key[last - 1].time >= close)
 		last--;
-	double unit = close > open ? close - open : 1;
-	bool moves = false;
+	bool is_open = close - open > LEAST_OPEN, moves = false;
+	double unit = is_open ? close - open : 1;
 	*m = (struct motion){.count = last - first + 1, .key = room, .before = mat4_identity()};
 	for (uint32_t i = 0; i < m->count; i++) {
 		const struct keyframe *from = &a->key[first + i];
@@ -136,7 +139,7 @@ bool motion_make(struct motion *m, const struct animation *a, double open, doubl
 		moves |=
 			i > 0 && !same_place(from - 1, from) && a->key[first + i - 1].time < close && from->time > open;
 	}
-	return moves && close > open;
+	return moves && is_open;
 }
 
 void motion_rescale(struct motion *m, vec3 center, double scale)
@@ -272,6 +275,10 @@ void motion_bounds(const struct motion *m, vec3 low, vec3 high, vec3 *all_low, v
 	for (uint32_t i = 0; i + 1 < m->count; i++) {
 		const struct motion_key *a = &m->key[i], *b = a + 1;
 		double length = b->time - a->time;
+		if (!(length > 0)) { /* their times round to the same */
+			sweep_between(&w, a, b, 0, 1);
+			continue;
+		}
 		sweep_between(&w, a, b, fmin(fmax(-a->time / length, 0), 1), fmin(fmax((1 - a->time) / length, 0), 1));
 	}
 	*all_low = w.low;

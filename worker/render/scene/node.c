@@ -61,6 +61,17 @@ const struct scene_node *node_ref(const struct scene_node *n, const char *name)
 	return p && p->value.type == VALUE_NODE ? p->value.as.node : NULL;
 }
 
+const struct animation *node_animation(const struct scene_node *n, const char *name)
+{
+	const struct property *p = node_find(n, name);
+	return p ? p->value.animation : NULL;
+}
+
+static bool same_animations(const struct animation *a, const struct animation *b)
+{
+	return a == b || (a && b && a->count == b->count && memcmp(a->key, b->key, a->count * sizeof *a->key) == 0);
+}
+
 static bool same_objects(const struct scene_node *a, const struct scene_node *b, uint32_t *left);
 
 static bool same_values(const struct value *a, const struct value *b, uint32_t *left)
@@ -86,7 +97,8 @@ static bool same_values(const struct value *a, const struct value *b, uint32_t *
 		       (a->as.spectrum.count == 1 ||
 			memcmp(a->as.spectrum.nm, b->as.spectrum.nm, a->as.spectrum.count * sizeof(double)) == 0);
 	case VALUE_TRANSFORM:
-		return memcmp(&a->as.transform, &b->as.transform, sizeof a->as.transform) == 0;
+		return memcmp(&a->as.transform, &b->as.transform, sizeof a->as.transform) == 0 &&
+		       same_animations(a->animation, b->animation);
 	case VALUE_NODE:
 		return same_objects(a->as.node, b->as.node, left);
 	}

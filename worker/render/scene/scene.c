@@ -15,6 +15,7 @@
  */
 #include "worker/render/scene/scene.h"
 
+#include "worker/render/scene/animation.h"
 #include "worker/render/scene/asset_list.h"
 #include "worker/render/scene/batch.h"
 #include "worker/render/scene/default_light.h"
@@ -165,23 +166,15 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	return 0;
 }
 
-static int stand_still(struct maker *m, const struct xml_element *owner, const struct xml_element **el)
-{
-	bool moves;
-	int r = transform_still(el, m->lenient, &moves, m->error);
-	return r || !moves ? r
-			   : leave_out(&m->notes, (*el)->parent, xml_attribute(owner, "type"), "motion",
-				       "all but the start of the");
-}
-
 static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
 			 const struct xml_element *el)
 {
 	const char *written = xml_attribute(el, "name");
+	const struct animation *animation = NULL;
 	if (!written)
 		return xml_error(el, m->error, EINVAL, "needs an attribute `name`");
 	if (strcmp(el->name, "animation") == 0) {
-		int r = stand_still(m, owner, &el);
+		int r = animation_read(&el, &m->scene->arena, &animation, m->error);
 		if (r)
 			return r;
 		written = strcmp(written, "animation") == 0 ? "to_world" : written;
@@ -197,6 +190,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	r = value_read(el, m->assets_from, &m->scene->arena, &v, m->error);
 	if (!r && el->snake)
 		r = old_value(&m->notes, owner, el, p, d->node->cls, &m->scene->arena, &v);
+	if (!r && v.type == VALUE_TRANSFORM)
+		v.animation = animation;
 	if (!r)
 		r = add_property(m, d, el, p, v);
 	if (r == -EINVAL && m->lenient && p->choices)
@@ -301,6 +296,24 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	return r ? r : read_object(m, d, owner, el, target);
 }
 
+/* What cannot move stands still, where the scene has it first: an error, unless the reader is lenient. */
+static int hold_still(struct maker *m, struct draft *d, const struct xml_element *el)
+{
+	const char *what = animation_refused(d->node, el);
+	for (uint32_t i = 0; what && i < d->node->property_count; i++) {
+		struct value *v = &d->properties[i].value;
+		if (!v->animation)
+			continue;
+		v->animation = NULL;
+		return m->lenient ? leave_out(&m->notes, el, d->node->type, "motion", "all but the start of the")
+				  : xml_error(el, m->error, ENOTSUP,
+					      "motion of %s is not supported (line %d); --lenient keeps the first "
+					      "transform",
+					      what, d->properties[i].line);
+	}
+	return 0;
+}
+
 static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 {
 	size_t n = 0;
@@ -392,6 +405,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	el->busy = true;
 	m->depth++;
 	r = fill_node(m, &d, el);
+	if (!r)
+		r = report_problem(&m->report, hold_still(m, &d, el), m->error);
 	m->depth--;
 	el->busy = false;
 	el->nesting = d.nesting;

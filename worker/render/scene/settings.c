@@ -25,11 +25,12 @@ enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
 
-/* No effect, because nothing moves. */
-#define SHUTTER_PARAMS                                                                            \
-	{"shutter_open", IGNORED}, {"shutter_close", IGNORED}, {"rolling_shutter_type", IGNORED}, \
-	{                                                                                         \
-		"rolling_shutter_duration", IGNORED                                               \
+/* Times, if something moves. */
+#define SHUTTER_PARAMS                                                                                         \
+	{"shutter_open", RANGE(VALUE_FLOAT, -1e30, 1e30)}, {"shutter_close", RANGE(VALUE_FLOAT, -1e30, 1e30)}, \
+		{"rolling_shutter_type", UNDERSTOOD(VALUE_STRING)},                                            \
+	{                                                                                                      \
+		"rolling_shutter_duration", RANGE(VALUE_FLOAT, -1e30, 1e30)                                    \
 	}
 /* For both cameras. Pixels are sampled all over, and textures are not filtered, whatever jitter and cone_scale say. */
 #define CAMERA_PARAMS                                                                                   \
@@ -96,7 +97,13 @@ static const struct param spherical_params[] = {
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
-static const struct param batch_params[] = {SHUTTER_PARAMS, {"srf", REFUSED}, {NULL, 0, 0, 0, 0, NULL}};
+/* Its cameras have shutters of their own. */
+static const struct param batch_params[] = {{"shutter_open", IGNORED},
+					    {"shutter_close", IGNORED},
+					    {"rolling_shutter_type", IGNORED},
+					    {"rolling_shutter_duration", IGNORED},
+					    {"srf", REFUSED},
+					    {NULL, 0, 0, 0, 0, NULL}};
 
 static const struct param film_params[] = {
 	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
@@ -353,6 +360,12 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	out->principal_y = node_float(sensor, "principal_point_offset_y", 0);
 	out->near_clip = node_float(sensor, "near_clip", 1e-2);
 	out->far_clip = node_float(sensor, "far_clip", 1e4);
+	out->shutter_open = node_float(sensor, "shutter_open", 0);
+	out->shutter_close = node_float(sensor, "shutter_close", 0);
+	out->rolling_shutter = strcmp(node_string(sensor, "rolling_shutter_type", "none"), "none") != 0;
+	if (!(out->shutter_open <= out->shutter_close))
+		return node_error(sensor, e, EINVAL, "shutter_open=%g is after shutter_close=%g", out->shutter_open,
+				  out->shutter_close);
 	if (!(out->near_clip < out->far_clip))
 		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip,
 				  out->far_clip);

@@ -35,6 +35,8 @@ struct scene_settings {
 	enum scene_projection projection;
 	double kc[2]; /* of PROJECTION_DISTORTED */
 	double near_clip, far_clip;
+	double shutter_open, shutter_close;	/* if both are equal, nothing moves */
+	bool rolling_shutter;			/* lines of the film are exposed one after the other */
 	double aperture_radius, focus_distance; /* thinlens, telecentric; radius 0: a pinhole, whatever the distance */
 	bool unplaced; /* the scene has no sensor: scene_settings_place says where the camera is */
 };

@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Reads <transform>, <animation> and vectors given as attributes.
+ * Reads <transform> and vectors given as attributes.
  *
  * Happy path: transform_read goes through the elements in order, finds each in the table `steps`, and multiplies its
- * matrix from the left, so that it applies to the result of those before. transform_still replaces an <animation> by
- * its first transform.
+ * matrix from the left, so that it applies to the result of those before.
  *
  * Failures are errors with file and line: an unknown element (with the nearest name), a missing or malformed
- * attribute, a matrix that is not affine, a lookat without a direction, a number outside PARAM_LENGTH_MAX, a moving
- * <animation> unless the reader is lenient.
+ * attribute, a matrix that is not affine, a lookat without a direction, a number outside PARAM_LENGTH_MAX.
  */
 #include "worker/render/scene/transform.h"
 
@@ -220,24 +218,4 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 	}
 	*out = m;
 	return 0;
-}
-
-int transform_still(const struct xml_element **el, bool lenient, bool *moves, struct error *e)
-{
-	const struct xml_element *animation = *el, *first = animation->first;
-	int r = element_check(animation, "name", true, e);
-	mat4 start, now;
-	*moves = false;
-	for (const struct xml_element *c = first; c && !r; c = c->next) {
-		if (strcmp(c->name, "transform") != 0)
-			return xml_error(c, e, EINVAL, "has no place in <animation>, which holds transforms");
-		r = transform_read(c, c == first ? &start : &now, e);
-		*moves |= !r && c != first && memcmp(&start, &now, sizeof now) != 0;
-	}
-	if (!r && !first)
-		return xml_error(animation, e, EINVAL, "holds no transform");
-	if (!r && *moves && !lenient)
-		return xml_error(animation, e, ENOTSUP, "motion is not supported; --lenient keeps the first transform");
-	*el = first;
-	return r;
 }

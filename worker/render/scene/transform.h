@@ -11,8 +11,4 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e);
 /* x=, y=, z= (default `missing`) or value="x, y, z"; one_for_all: value="s" stands for three equal ones. */
 int transform_read_vec3(const struct xml_element *el, double missing, bool one_for_all, vec3 *out, struct error *e);
 
-/* Replaces *el, an <animation>, by the first of its transforms, because nothing moves. *moves: it has others, which
- * is an error unless lenient. */
-int transform_still(const struct xml_element **el, bool lenient, bool *moves, struct error *e);
-
 #endif

@@ -21,6 +21,8 @@ struct listing {
 	struct arena *arena;
 	struct listed_shape *shapes;
 	uint32_t count, room;
+	double open, close;	       /* the shutter */
+	const struct animation *moves; /* of the instance that is being listed */
 	struct error *e;
 };
 
@@ -29,8 +31,50 @@ static int out_of_memory(struct listing *l)
 	return error_set(l->e, ENOMEM, "out of memory while listing shapes");
 }
 
+/* A copy of a node, with another to_world. */
+static const struct scene_node *placed_at(const struct scene_node *n, mat4 place, struct arena *arena)
+{
+	struct scene_node *copy = arena_alloc(arena, 1, sizeof *copy);
+	struct property *properties = arena_alloc(arena, (size_t)n->property_count + 1, sizeof *properties);
+	if (!copy || !properties)
+		return NULL;
+	*copy = *n;
+	copy->properties = properties;
+	copy->property_count = 0;
+	for (uint32_t i = 0; i < n->property_count; i++)
+		if (strcmp(n->properties[i].name, "to_world") != 0)
+			properties[copy->property_count++] = n->properties[i];
+	properties[copy->property_count++] =
+		(struct property){"to_world", n->line, {.type = VALUE_TRANSFORM, .as.transform = place}};
+	return copy;
+}
+
+/* Replaces a node that moves by one that stands where it is when the shutter opens. *moves: how it goes on while the
+ * shutter is open; NULL: it does not. */
+static int stop(struct listing *l, const struct scene_node **n, const struct animation **moves)
+{
+	const struct animation *a = node_animation(*n, "to_world");
+	struct motion m;
+	*moves = NULL;
+	if (!a)
+		return 0;
+	struct motion_key *room = arena_alloc(l->arena, a->count, sizeof *room);
+	if (!room)
+		return out_of_memory(l);
+	if (motion_make(&m, a, l->open, l->close, room))
+		*moves = a;
+	*n = placed_at(*n, motion_at(&m, 0), l->arena);
+	return *n ? 0 : out_of_memory(l);
+}
+
 static int append(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
 {
+	const struct animation *moves = l->moves;
+	if (instance && node_animation(n, "to_world"))
+		return node_error(n, l->e, ENOTSUP, "motion of a shape in a shapegroup is not supported");
+	int rc = instance ? 0 : stop(l, &n, &moves);
+	if (rc)
+		return rc;
 	if (l->count == SHAPES_MAX)
 		return node_error(n, l->e, E2BIG, "with its instances the scene has more than %d shapes", SHAPES_MAX);
 	if (l->count == l->room) {
@@ -43,7 +87,7 @@ static int append(struct listing *l, const struct scene_node *n, const struct sc
 		l->shapes = more;
 		l->room = room;
 	}
-	l->shapes[l->count] = (struct listed_shape){n, instance, l->count, 1};
+	l->shapes[l->count] = (struct listed_shape){n, instance, moves, l->count, 1};
 	l->count++;
 	return 0;
 }
@@ -68,7 +112,11 @@ static int list_instance(struct listing *l, const struct scene_node *n, const st
 	mat4 inverse;
 	if (!mat4_invert(node_transform(n, "to_world"), &inverse))
 		return node_error(n, l->e, EINVAL, "to_world flattens the shapegroup (it has no inverse)");
-	return list_inside(l, group, n);
+	int rc = stop(l, &n, &l->moves);
+	if (!rc)
+		rc = list_inside(l, group, n);
+	l->moves = NULL;
+	return rc;
 }
 
 static int list(struct listing *l, const struct scene_node *n, const struct scene_node *instance)
@@ -119,10 +167,10 @@ static int find_uses(struct listing *l)
 	return 0;
 }
 
-int shape_list(const struct scene *s, struct arena *arena, struct listed_shape **shapes, uint32_t *count,
-	       struct error *e)
+int shape_list(const struct scene *s, double open, double close, struct arena *arena, struct listed_shape **shapes,
+	       uint32_t *count, struct error *e)
 {
-	struct listing l = {.arena = arena, .e = e};
+	struct listing l = {.arena = arena, .open = open, .close = close, .e = e};
 	int rc = 0;
 	for (uint32_t i = 0; i < s->object_count && !rc; i++)
 		if (s->objects[i]->cls == PLUGIN_SHAPE && strcmp(s->objects[i]->type, "shapegroup") != 0)
@@ -140,19 +188,5 @@ const struct scene_node *shape_placed(const struct listed_shape *s, struct arena
 	if (!s->instance)
 		return n;
 	mat4 place = node_transform(s->instance, "to_world");
-	struct scene_node *copy = arena_alloc(arena, 1, sizeof *copy);
-	struct property *properties = arena_alloc(arena, (size_t)n->property_count + 1, sizeof *properties);
-	if (!copy || !properties)
-		return NULL;
-	*copy = *n;
-	copy->properties = properties;
-	copy->property_count = 0;
-	for (uint32_t i = 0; i < n->property_count; i++)
-		if (strcmp(n->properties[i].name, "to_world") != 0)
-			properties[copy->property_count++] = n->properties[i];
-	properties[copy->property_count++] = (struct property){
-		"to_world",
-		n->line,
-		{.type = VALUE_TRANSFORM, .as.transform = mat4_mul(place, node_transform(n, "to_world"))}};
-	return copy;
+	return placed_at(n, mat4_mul(place, node_transform(n, "to_world")), arena);
 }

@@ -12,14 +12,16 @@
 enum { SHAPES_MAX = 1 << 20 };
 
 struct listed_shape {
-	const struct scene_node *node;	   /* as in the file */
+	const struct scene_node *node;	   /* as in the file, but still */
 	const struct scene_node *instance; /* whose to_world is applied after the node's; NULL: none */
+	const struct animation *moves;	   /* of the instance, or the node if there is none; NULL: it is still */
 	uint32_t first, uses;		   /* the first in the list of those that instantiate the same node; how many */
 };
 
-/* In the file's order, in the arena. -EINVAL, -ENOTSUP, -E2BIG with a sentence, -ENOMEM. */
-int shape_list(const struct scene *s, struct arena *arena, struct listed_shape **shapes, uint32_t *count,
-	       struct error *e);
+/* In the file's order, in the arena. What moves stands where it is at the time `open`; it moves on if the shutter is
+ * open until a later one. -EINVAL, -ENOTSUP, -E2BIG with a sentence, -ENOMEM. */
+int shape_list(const struct scene *s, double open, double close, struct arena *arena, struct listed_shape **shapes,
+	       uint32_t *count, struct error *e);
 
 /* The node itself, or a copy in the arena with the instance's to_world after its own; NULL: out of memory. */
 const struct scene_node *shape_placed(const struct listed_shape *s, struct arena *arena);

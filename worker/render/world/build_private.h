@@ -25,7 +25,8 @@ struct builder {
 	struct shape_geometry *geometry;
 	struct shared_mesh **shared;
 	const struct scene_node **instances;
-	uint64_t triangles; /* over all meshes, shared ones once */
+	struct motion **motions; /* in scene units, applied after what has been built; NULL: still */
+	uint64_t triangles;	 /* over all meshes, shared ones once */
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct attribute_pool attributes;

@@ -379,6 +379,18 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		     w->shared_mesh_count);
 	else
 		line(r, EFFECT_INSTANCING, false, "no mesh stands in several places");
+	struct tally moving = {0};
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (surface_moves(&w->shapes[i]))
+			count(&moving, src->shape[i], "");
+	if (moving.count)
+		fx->motion = line(r, EFFECT_MOTION, true, "%s move%s while the shutter is open",
+				  names_of(&moving, text), verb(&moving, "s", ""));
+	else
+		fx->motion = line(r, EFFECT_MOTION, false, "%s",
+				  w->settings.shutter_open < w->settings.shutter_close
+					  ? "nothing moves while the shutter is open"
+					  : "the shutter is open for no time");
 	const struct render_coincident *k = &w->coincident;
 	if (k->total > 1)
 		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide visibly", k->total);

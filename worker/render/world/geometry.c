@@ -13,6 +13,7 @@
 #include "worker/render/shape/mesh.h"
 #include "worker/render/shape/shape.h"
 #include "worker/render/world/displacement.h"
+#include "worker/render/world/moving.h"
 #include "worker/render/world/place_mesh.h"
 #include "worker/render/world/shared_mesh.h"
 
@@ -111,9 +112,13 @@ static int find_shared(struct builder *b, const struct listed_shape *l, struct s
 			return build_out_of_memory(b->e);
 		rc = read_shape(b, l->node, &m->geometry, &dropped);
 		if (!rc)
-			shared_mesh_read(m);
+			shared_mesh_read(m, l->moves != NULL);
 		if (!rc && m->shared)
 			rc = take_geometry(b, l->node, &m->geometry, dropped, counted);
+	} else if (l->moves && !m->shared) { /* the instances before it stood still */
+		shared_mesh_read(m, true);
+		if (m->shared)
+			rc = take_geometry(b, l->node, &m->geometry, 0, counted);
 	}
 	*out = m->shared ? m : NULL;
 	return rc;
@@ -129,7 +134,7 @@ static int read_listed(struct builder *b, const struct listed_shape *l, struct s
 	int rc = find_shared(b, l, meshes, counted, &b->shared[id]);
 	if (!rc && b->shared[id]) {
 		*g = b->shared[id]->geometry;
-		rc = shared_mesh_box(b->shared[id], l->instance, &b->boxes[id], b->e);
+		rc = l->moves ? 0 : shared_mesh_box(b->shared[id], l->instance, &b->boxes[id], b->e);
 	} else if (!rc) {
 		uint64_t dropped = 0;
 		n = shape_placed(l, &b->scratch);
@@ -140,6 +145,8 @@ static int read_listed(struct builder *b, const struct listed_shape *l, struct s
 			return rc;
 		b->boxes[id] = build_box_of(g);
 	}
+	if (!rc && l->moves)
+		rc = moving_begin(b, l, id);
 	if (rc)
 		return rc;
 	b->shape_nodes[id] = n;
@@ -155,7 +162,8 @@ int build_read_shapes(struct builder *b)
 	struct listed_shape *list;
 	uint32_t listed;
 	struct arena *a = &b->scratch;
-	int rc = shape_list(b->scene, a, &list, &listed, b->e);
+	int rc = shape_list(b->scene, b->w->settings.shutter_open, b->w->settings.shutter_close, a, &list, &listed,
+			    b->e);
 	if (rc)
 		return rc;
 	struct shared_mesh **meshes = arena_alloc(a, listed, sizeof(void *));
@@ -164,7 +172,8 @@ int build_read_shapes(struct builder *b)
 	b->shape_nodes = arena_alloc(a, listed, sizeof(void *));
 	b->shared = arena_alloc(a, listed, sizeof(void *));
 	b->instances = arena_alloc(a, listed, sizeof(void *));
-	if (!meshes || !b->geometry || !b->boxes || !b->shape_nodes || !b->shared || !b->instances)
+	b->motions = arena_alloc(a, listed, sizeof(void *));
+	if (!meshes || !b->geometry || !b->boxes || !b->shape_nodes || !b->shared || !b->instances || !b->motions)
 		return build_out_of_memory(b->e);
 	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 	struct counted counted = {0};
@@ -262,6 +271,9 @@ int build_place_shapes(struct builder *b)
 			g->sphere_axes.s = vec3_normalize(mat4_vector(&s->to_world, (vec3){1, 0, 0}));
 			g->sphere_axes.t = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 1, 0}));
 			g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
+			int rc = b->motions[i] ? moving_place_sphere(b, i) : 0;
+			if (rc)
+				return rc;
 			continue;
 		}
 		int rc = build_place_mesh(b, g, &from->mesh, b->shape_nodes[i], w->center, w->scale);

@@ -4,6 +4,7 @@
 #include "worker/render/shape/mesh.h"
 #include "worker/render/shape/shape.h"
 #include "worker/render/world/displacement.h"
+#include "worker/render/world/moving.h"
 #include "worker/render/world/place_mesh.h"
 
 #include <string.h>
@@ -28,15 +29,18 @@ static bool is_rigid(const mat4 *m)
 
 bool shared_mesh_may(const struct builder *b, const struct listed_shape *s)
 {
+	if (s->moves)
+		return true;
 	if (!s->instance || s->uses < 2 || node_child(s->node, PLUGIN_EMITTER, 0))
 		return false;
 	mat4 m = node_transform(s->instance, "to_world");
 	return placement_is_even(&m) && (!build_is_displaced(b, s->node) || is_rigid(&m));
 }
 
-void shared_mesh_read(struct shared_mesh *m)
+void shared_mesh_read(struct shared_mesh *m, bool moves)
 {
-	m->shared = m->geometry.kind == SHAPE_MESH && m->geometry.mesh.triangle_count >= SHARED_TRIANGLES_MIN;
+	m->shared =
+		m->geometry.kind == SHAPE_MESH && m->geometry.mesh.triangle_count >= (moves ? 1 : SHARED_TRIANGLES_MIN);
 	if (m->shared)
 		m->box = build_box_of(&m->geometry);
 }
@@ -103,6 +107,13 @@ static struct box float_box(const struct geom_shape *g)
 	return b;
 }
 
+static int place_still(const struct builder *b, const struct shared_mesh *m, const struct scene_node *instance,
+		       struct placement *p)
+{
+	mat4 place = node_transform(instance, "to_world"), all = to_world(b->w, m, &place);
+	return placement_make(p, &all, m->box.low, m->box.high) ? 0 : -EINVAL;
+}
+
 int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct scene_node *instance, uint32_t id)
 {
 	struct world *w = b->w;
@@ -117,11 +128,14 @@ int shared_mesh_place(struct builder *b, struct shared_mesh *m, const struct sce
 	struct placement *p = arena_alloc(&w->arena, 1, sizeof *p);
 	if (!p)
 		return build_out_of_memory(b->e);
+	int rc = b->motions[id] ? moving_place(b, id, m->center, m->scale, &m->box, p) : place_still(b, m, instance, p);
 	char of[NODE_PLACE_MAX];
-	mat4 place = node_transform(instance, "to_world"), all = to_world(w, m, &place);
-	if (!placement_make(p, &all, m->box.low, m->box.high))
-		return node_error(instance, b->e, EINVAL, "no triangle of the %.24s in %s has an area there",
-				  b->shape_nodes[id]->type, node_place(b->shape_nodes[id], of));
+	if (rc == -EINVAL)
+		return node_error(instance ? instance : b->shape_nodes[id], b->e, EINVAL,
+				  "no triangle of the %.24s in %s has an area there", b->shape_nodes[id]->type,
+				  node_place(b->shape_nodes[id], of));
+	if (rc)
+		return build_out_of_memory(b->e);
 	p->first = m->first;
 	w->instance_count++;
 	if (p->mirrored && !turn_triangles(m, &w->arena))

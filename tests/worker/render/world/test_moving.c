@@ -1,0 +1,329 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A world that moves, at a time, against one that stands where the first one then is, by transforms that this test
+ * writes itself: surfaces, their derivatives, and what rays and segments meet. Times when nothing moves, motions that
+ * are refused, and very many keyframes.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/worlds.h"
+#include "worker/render/world/build.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define TO(inner) "<transform name='to_world'>" inner "</transform>"
+#define OPEN(a, b) "<float name='shutter_open' value='" a "'/><float name='shutter_close' value='" b "'/>"
+#define VIEW(shutter)                                                                                  \
+	"<sensor type='perspective'><float name='fov' value='40'/>" shutter TO(                        \
+		"<lookat origin='0,0,8' target='0,0,0' up='0,1,0'/>") "<film type='hdrfilm'><rfilter " \
+								      "type='box'/></film></sensor>"
+#define SKY "<emitter type='constant'/>"
+
+static const char ball_obj[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
+			       "vn 1 0 0\nvn -1 0 0\nvn 0 1 0\nvn 0 -1 0\nvn 0 0 1\nvn 0 0 -1\n"
+			       "f 1//1 3//3 5//5\nf 3//3 2//2 5//5\nf 2//2 4//4 5//5\nf 4//4 1//1 5//5\n"
+			       "f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6\n";
+
+/* Of shape k at time t: scaled, turned and moved at constant rates. */
+struct course {
+	const char *axis;
+	double turn[2]; /* degrees */
+	double scale[2], at[2][3];
+};
+static const struct course courses[] = {
+	{"x='0' y='1' z='0'", {10, 150}, {0.5, 0.8}, {{-2, 0, 0}, {-1, 1, 0.5}}},
+	{"x='1' y='1' z='0.5'", {0, 90}, {0.6, 0.6}, {{1, 1, 0}, {1, 1, 0}}},
+	{"x='0.3' y='0' z='1'", {-40, 60}, {0.7, 0.4}, {{2, -1, 1}, {0, -1.5, -1}}},
+	{"x='0' y='0' z='1'", {0, 0}, {0.3, 0.3}, {{0, 0, 2}, {0, 2, 2}}},
+};
+enum { COURSES = sizeof courses / sizeof *courses };
+
+static double between(const double v[2], double t)
+{
+	return (1 - t) * v[0] + t * v[1];
+}
+
+static size_t put_steps(char *out, size_t size, const struct course *c, double t)
+{
+	double at[3];
+	for (int i = 0; i < 3; i++)
+		at[i] = (1 - t) * c->at[0][i] + t * c->at[1][i];
+	return (size_t)snprintf(
+		out, size, "<scale value='%.17g'/><rotate %s angle='%.17g'/><translate x='%.17g' y='%.17g' z='%.17g'/>",
+		between(c->scale, t), c->axis, between(c->turn, t), at[0], at[1], at[2]);
+}
+
+/* As shape k is at time t; below 0: as it moves. */
+static size_t put_place(char *out, size_t size, int k, double t)
+{
+	size_t at = (size_t)snprintf(out, size, "%s", t < 0 ? "<animation name='to_world'>" : "");
+	for (int i = 0; i < (t < 0 ? 2 : 1); i++) {
+		at += (size_t)snprintf(out + at, size - at,
+				       t < 0 ? "<transform time='%d'>" : "<transform name='to_world'>", i);
+		at += put_steps(out + at, size - at, &courses[k], t < 0 ? i : t);
+		at += (size_t)snprintf(out + at, size - at, "</transform>");
+	}
+	return at + (size_t)snprintf(out + at, size - at, "%s", t < 0 ? "</animation>" : "");
+}
+
+/* A mesh, a card, a sphere, and a group with both; a floor that stands still. */
+static struct world *world_at(double t)
+{
+	static char xml[1 << 14];
+	static const char *const begin[] = {
+		"<shape type='obj'><string name='filename' value='m.obj'/>", "<shape type='rectangle'>",
+		"<shape type='sphere'><point name='center' value='0.1,0.2,-0.1'/><float name='radius' value='0.9'/>",
+		"<shape type='shapegroup' id='g'><shape type='obj'><string name='filename' value='m.obj'/></shape>"
+		"<shape type='sphere'>" TO(
+			"<translate x='1.5'/>") "</shape></shape><shape type='instance'><ref id='g'/>"};
+	size_t at = (size_t)snprintf(xml, sizeof xml,
+				     "<scene version='3.0.0'>" VIEW(OPEN("0", "1")) SKY
+				     "<shape type='rectangle'>" TO("<scale value='5'/><translate z='-3'/>") "</shape>");
+	for (int k = 0; k < COURSES; k++) {
+		at += (size_t)snprintf(xml + at, sizeof xml - at, "%s", begin[k]);
+		at += put_place(xml + at, sizeof xml - at, k, t);
+		at += (size_t)snprintf(xml + at, sizeof xml - at, "</shape>");
+	}
+	at += (size_t)snprintf(xml + at, sizeof xml - at, "</scene>");
+	assert_true(at + 1 < sizeof xml);
+	const struct memory_file files[] = {
+		{"s.xml", xml, at}, {"m.obj", ball_obj, sizeof ball_obj - 1}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
+static vec3 in_scene(const struct world *w, vec3 p)
+{
+	return vec3_madd(w->center, 1 / w->scale, p);
+}
+
+static vec3 in_world(const struct world *w, vec3 p)
+{
+	return vec3_scale(w->scale, vec3_sub(p, w->center));
+}
+
+static void near(vec3 a, vec3 b, double off)
+{
+	if (!(vec3_length(vec3_sub(a, b)) <= off))
+		fail_msg("(%g, %g, %g) is not (%g, %g, %g)", a.x, a.y, a.z, b.x, b.y, b.z);
+}
+
+static struct surface_point point_on(const struct world *w, uint32_t shape, double t, const double u[2])
+{
+	const struct geom_shape *s = &w->shapes[shape];
+	struct surface_point x;
+	struct prim_ref prim = {shape, 0, t};
+	if (s->is_sphere) {
+		double z = 2 * u[0] - 1, r = sqrt(1 - z * z);
+		const struct geom_shape *still = s;
+		struct placement now;
+		vec3 d = {r * cos(6 * u[1]), r * sin(6 * u[1]), z}; /* of the sphere's own frame */
+		vec3 a = still->sphere_axes.s, b = still->sphere_axes.t, c = still->sphere_axes.n;
+		if (s->place) {
+			placement_move(s->place, t, &now);
+			a = vec3_normalize(placement_vector(&now, a));
+			b = vec3_normalize(placement_vector(&now, b));
+			c = vec3_normalize(placement_vector(&now, c));
+		}
+		surface_on_sphere(s, prim, vec3_madd(vec3_madd(vec3_scale(d.x, a), d.y, b), d.z, c), &x);
+	} else {
+		prim.prim = (uint32_t)(u[0] * s->triangle_count);
+		surface_on_triangle(s, prim, u[1] * 0.5, (1 - u[1]) * 0.7, &x);
+	}
+	return x;
+}
+
+/* Vertices are rounded in another frame. */
+#define OFF 1e-5
+
+static void check_point(const struct world *moving, const struct world *still, uint32_t shape, double t, struct dice *d)
+{
+	const double u[2] = {dice_throw(d), dice_throw(d)};
+	struct surface_point x = point_on(moving, shape, t, u), y = point_on(still, shape, 0, u), z;
+	struct surface_change a, b;
+	near(in_scene(moving, x.p), in_scene(still, y.p), OFF);
+	near(x.ng, y.ng, OFF);
+	near(x.sh.n, y.sh.n, OFF);
+	assert_true(x.shape == &moving->shapes[shape] && x.prim.time == t);
+	assert_true(fabs(x.u - y.u) <= OFF && fabs(x.v - y.v) <= OFF);
+	surface_change_of(&moving->shapes[shape], &x, &a);
+	surface_change_of(&still->shapes[shape], &y, &b);
+	for (int k = 0; k < 2; k++)
+		near(vec3_scale(moving->scale, a.dn[k]), vec3_scale(still->scale, b.dn[k]), 10 * OFF);
+	assert_true(surface_near(&moving->shapes[shape], x.prim, x.p, &z));
+	near(x.p, z.p, 1e-12);
+	const vec3 o = vec3_madd(x.p, 1, x.ng);
+	if (surface_reproject(&moving->shapes[shape], x.prim, prim_none_at(t), o, vec3_neg(x.ng), 1, &z))
+		near(x.p, z.p, 1e-9);
+}
+
+static void check_ray(const struct world *moving, const struct world *still, double t, struct dice *d)
+{
+	vec3 o = vec3_scale(dice_between(d, 0, 4), dice_direction(d)), w = dice_direction(d),
+	     far = vec3_scale(3, dice_direction(d));
+	struct ray_end from = {in_world(moving, o), {0, 0, 0}, prim_none_at(t)}, to = from;
+	struct ray_end from2 = {in_world(still, o), {0, 0, 0}, PRIM_NONE}, to2 = from2;
+	struct ray_hit hit, hit2;
+	to.p = in_world(moving, far);
+	to2.p = in_world(still, far);
+	bool met = accel_closest(moving->accel, &from, w, 0, INFINITY, &hit),
+	     met2 = accel_closest(still->accel, &from2, w, 0, INFINITY, &hit2);
+	assert_int_equal(met, met2);
+	assert_int_equal(accel_occluded(moving->accel, &from, &to), accel_occluded(still->accel, &from2, &to2));
+	assert_int_equal(accel_occluded_to_infinity(moving->accel, &from, w), met2);
+	if (!met)
+		return;
+	struct surface_point x, y;
+	assert_int_equal(hit.prim.shape, hit2.prim.shape);
+	assert_true(hit.prim.time == t);
+	surface_from_hit(&moving->shapes[hit.prim.shape], from.p, w, &hit, &x);
+	surface_from_hit(&still->shapes[hit2.prim.shape], from2.p, w, &hit2, &y);
+	near(in_scene(moving, x.p), in_scene(still, y.p), 100 * OFF);
+	near(x.sh.n, y.sh.n, 100 * OFF);
+	/* From there on: not at once into itself again. */
+	from = (struct ray_end){x.p, x.ng, x.prim};
+	vec3 away = vec3_scale(vec3_dot(x.ng, w) < 0 ? 1 : -1, x.ng);
+	if (accel_closest(moving->accel, &from, away, 0, INFINITY, &hit))
+		assert_true(hit.t > 1e-9);
+}
+
+static void test_at_a_time(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("a world at a time");
+	struct world *moving = world_at(-1);
+	assert_true(moving->effects.motion);
+	for (int i = 0; i <= 10; i++) {
+		double t = i == 10 ? 1 - 0x1p-53 : i == 0 ? 0 : dice_throw(&d);
+		struct world *still = world_at(t);
+		assert_false(still->effects.motion);
+		assert_int_equal(moving->shape_count, still->shape_count);
+		for (uint32_t s = 0; s < moving->shape_count; s++)
+			for (size_t n = dice_count(100); n > 0; n--)
+				check_point(moving, still, s, t, &d);
+		for (size_t n = dice_count(5000); n > 0; n--)
+			check_ray(moving, still, t, &d);
+		world_free(still);
+	}
+	world_free(moving);
+}
+
+#define SLIDES(type, inside)                                                                          \
+	"<shape type='" type "'><animation name='to_world'><transform time='0'/><transform time='2'>" \
+	"<translate x='4'/></transform></animation>" inside "</shape>"
+#define CUBE SLIDES("cube", "")
+
+static void check_still(const char *shutter, double x)
+{
+	struct world *w = world_of_text(32, 32, "%s" SKY CUBE, shutter);
+	assert_false(w->effects.motion);
+	assert_null(w->shapes[0].place);
+	double low = INFINITY, high = -INFINITY;
+	for (uint32_t i = 0; i < w->shapes[0].vertex_count; i++) {
+		const float *p = w->shapes[0].position[i];
+		vec3 at = in_scene(w, (vec3){(double)p[0], (double)p[1], (double)p[2]});
+		low = fmin(low, at.x);
+		high = fmax(high, at.x);
+	}
+	assert_true(fabs(low - (x - 1)) < OFF && fabs(high - (x + 1)) < OFF);
+	world_free(w);
+}
+
+/* The shutter's times are 0 where the scene has none, and a shutter that is open for no time sees one place. */
+static void test_still(void **state)
+{
+	(void)state;
+	check_still(VIEW(""), 0);
+	check_still(VIEW(OPEN("0.5", "0.5")), 1);
+	check_still(VIEW(OPEN("-3", "0")), 0);
+	check_still(VIEW(OPEN("2", "1e30")), 4);
+	check_still(VIEW(OPEN("7", "7")), 4);
+	worlds_effects = "-motion";
+	struct world *w = world_of_text(32, 32, VIEW(OPEN("1", "2")) SKY CUBE);
+	worlds_effects = NULL;
+	assert_false(w->effects.motion);
+	world_free(w);
+	w = world_of_text(32, 32, VIEW(OPEN("1.999", "3")) SKY CUBE);
+	assert_true(w->effects.motion);
+	assert_int_equal(w->instance_count, 1);
+	world_free(w);
+}
+
+static void refused(const char *body, const char *sentence)
+{
+	char xml[2048];
+	size_t n = (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", body);
+	const struct memory_file files[] = {{"s.xml", xml, n}, {NULL, NULL, 0}};
+	world_of_files_refused(files, sentence);
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+	refused(VIEW(OPEN("1", "0.5")) CUBE, "shutter_open=1 is after shutter_close=0.5");
+	refused(VIEW(OPEN("0", "nan")) CUBE, "is not a (finite) number");
+	refused(VIEW(OPEN("0", "1") "<string name='rolling_shutter_type' value='row'/>") CUBE,
+		"it moves, and a rolling shutter is not supported");
+	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
+				     "<transform time='1'><scale x='2'/></transform></animation></shape>",
+		"a sphere that moves may not be stretched in one direction");
+	refused(VIEW(OPEN("0", "1")) "<emitter type='point'><animation name='to_world'><transform time='0'/>"
+				     "<transform time='1'><translate x='2'/></transform></animation></emitter>",
+		"motion of emitter is not supported");
+	refused(VIEW(OPEN("0", "1")) SLIDES("rectangle", "<emitter type='area'/>"), "motion of what shines");
+	refused(VIEW(OPEN("0", "1")) "<shape type='cube' id='c'><animation name='to_world'><transform time='0'/>"
+				     "<transform time='1'><translate x='2'/></transform></animation></shape>"
+				     "<shape type='shapegroup' id='g'><ref id='c'/></shape>"
+				     "<shape type='instance'><ref id='g'/></shape>",
+		"motion of a shape in a shapegroup is not supported");
+	refused(VIEW(OPEN(
+			"0",
+			"1")) "<shape type='cube'><animation name='to_world'><transform time='0'/>"
+			      "<transform time='1'><scale value='5e59'/><translate x='9e59'/></transform></animation></shape>",
+		"it moves beyond");
+	refused(VIEW(OPEN(
+			"0",
+			"1")) "<shape type='cube'><texture name='displacement' type='checkerboard'/><integer name='displacement_level' value='1'/>"
+			      "<animation name='to_world'><transform time='0'/>"
+			      "<transform time='1'><scale value='2'/></transform></animation></shape>",
+		"a displaced shape that moves may not change its size");
+}
+
+/* As many as a file may have are read in a moment, and only those that matter stay. */
+static void test_many_keyframes(void **state)
+{
+	(void)state;
+	enum { KEYS = 100000 };
+	size_t room = 200 * (size_t)KEYS, at = 0;
+	char *xml = malloc(room);
+	assert_non_null(xml);
+	at += (size_t)snprintf(xml, room,
+			       "<scene version='3.0.0'>" VIEW(OPEN("10", "99000")) SKY
+			       "<shape type='cube'><animation name='to_world'>");
+	for (int i = 0; i < KEYS; i++)
+		at += (size_t)snprintf(xml + at, room - at,
+				       "<transform time='%d'><rotate y='1' angle='%d'/><translate x='%g'/></transform>",
+				       i, i * 50 % 360, i / 50000.0);
+	at += (size_t)snprintf(xml + at, room - at, "</animation></shape></scene>");
+	const struct memory_file files[] = {{"s.xml", xml, at}, {NULL, NULL, 0}};
+	struct world *w = world_of_files(32, 32, files);
+	assert_int_equal(w->shapes[0].place->moves->motion.count, 99000 - 10 + 1);
+	world_free(w);
+	free(xml);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_at_a_time),
+		cmocka_unit_test(test_still),
+		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_many_keyframes),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* <animation>: a transform for each of several times (math/motion.h). One thread; allocates in the given arena. */
+#ifndef WORKER_RENDER_SCENE_ANIMATION_H
+#define WORKER_RENDER_SCENE_ANIMATION_H
+
+#include "common/base/arena.h"
+#include "worker/render/scene/node.h"
+#include "worker/render/scene/xml.h"
+
+/* Replaces *el, an <animation>, by the first of its transforms. *out: all of them; NULL: they are the same. Errors:
+ * times that do not ascend; transforms between which something would be flat. */
+int animation_read(const struct xml_element **el, struct arena *arena, const struct animation **out, struct error *e);
+
+/* What a node is that cannot move, of that element: "what shines"; NULL: it can. */
+const char *animation_refused(const struct scene_node *n, const struct xml_element *el);
+
+#endif

@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/moving.h"
+
+#include "worker/render/world/place_mesh.h"
+#include "worker/render/world/shared_mesh.h"
+
+/* Matrices in files have six digits. */
+#define TOLERANCE 1e-5
+
+/* Only translation, rotation, reflection and, with *scale, one scale for all directions. */
+static bool is_similar(const mat4 *m, double *scale)
+{
+	const vec3 x = {m->m[0][0], m->m[1][0], m->m[2][0]}, y = {m->m[0][1], m->m[1][1], m->m[2][1]},
+		   z = {m->m[0][2], m->m[1][2], m->m[2][2]};
+	double s2 = vec3_dot(x, x), off = TOLERANCE * s2;
+	*scale = sqrt(s2);
+	return fabs(vec3_dot(y, y) - s2) <= off && fabs(vec3_dot(z, z) - s2) <= off && fabs(vec3_dot(x, y)) <= off &&
+	       fabs(vec3_dot(y, z)) <= off && fabs(vec3_dot(z, x)) <= off;
+}
+
+/* Spheres stay spheres, and displaced shapes, whose displacement is in scene units, keep their size. */
+static int check(const struct builder *b, const struct listed_shape *l, uint32_t id, const struct motion *m)
+{
+	bool sphere = b->geometry[id].kind == SHAPE_SPHERE;
+	if (!sphere && !build_is_displaced(b, l->node))
+		return 0;
+	for (uint32_t i = 0; i < m->count; i++) {
+		double scale;
+		mat4 at = motion_at(m, m->key[i].time);
+		if (!is_similar(&at, &scale) || (!sphere && !(fabs(scale - 1) <= TOLERANCE)))
+			return node_error(l->node, b->e, ENOTSUP,
+					  sphere ? "a sphere that moves may not be stretched in one direction"
+						 : "a displaced shape that moves may not change its size");
+	}
+	return 0;
+}
+
+int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id)
+{
+	const struct scene_settings *s = &b->w->settings;
+	const struct scene_node *outer = l->instance ? l->instance : l->node;
+	struct motion *m = b->motions[id] = arena_alloc(&b->w->arena, 1, sizeof *m);
+	struct motion_key *keys = arena_alloc(&b->w->arena, l->moves->count, sizeof *keys);
+	if (!m || !keys)
+		return build_out_of_memory(b->e);
+	if (s->rolling_shutter)
+		return node_error(outer, b->e, ENOTSUP, "it moves, and a rolling shutter is not supported");
+	motion_make(m, l->moves, s->shutter_open, s->shutter_close, keys);
+	bool in_group = l->instance && b->shared[id];
+	if (!in_group && !mat4_invert(node_transform(outer, "to_world"), &m->before))
+		return node_error(outer, b->e, EINVAL, "to_world flattens it (it has no inverse)");
+	int rc = check(b, l, id, m);
+	if (rc)
+		return rc;
+	const struct box from = b->shared[id] ? b->shared[id]->box : b->boxes[id];
+	struct box *all = &b->boxes[id];
+	motion_bounds(m, from.low, from.high, &all->low, &all->high);
+	double most = fmax(triangle_norm_max(all->low), triangle_norm_max(all->high));
+	return most <= MESH_COORDINATE_MAX ? 0
+					   : node_error(outer, b->e, ERANGE, "it moves beyond %g", MESH_COORDINATE_MAX);
+}
+
+int moving_place(struct builder *b, uint32_t id, vec3 center, double scale, const struct box *box, struct placement *p)
+{
+	const struct world *w = b->w;
+	struct movement *v = arena_alloc(&b->w->arena, 1, sizeof *v);
+	if (!v)
+		return -ENOMEM;
+	const vec3 back = {1 / scale, 1 / scale, 1 / scale};
+	*v = (struct movement){*b->motions[id], box->low, box->high};
+	v->motion.before = mat4_mul(v->motion.before, mat4_mul(mat4_translate(center), mat4_scale(back)));
+	motion_rescale(&v->motion, w->center, w->scale);
+	return placement_make_moving(p, v) ? 0 : -EINVAL;
+}
+
+int moving_place_sphere(struct builder *b, uint32_t id)
+{
+	struct geom_shape *g = &b->w->shapes[id];
+	const vec3 r = {g->radius, g->radius, g->radius};
+	const struct box box = {vec3_sub(g->center, r), vec3_add(g->center, r)};
+	struct placement *p = arena_alloc(&b->w->arena, 1, sizeof *p);
+	int rc = p ? moving_place(b, id, b->w->center, b->w->scale, &box, p) : -ENOMEM;
+	if (rc == -ENOMEM)
+		return build_out_of_memory(b->e);
+	if (rc)
+		return node_error(b->shape_nodes[id], b->e, EINVAL, "it is too small somewhere on its way");
+	p->first = id;
+	g->place = p;
+	return 0;
+}
