@@ -96,8 +96,9 @@ static spectrum depth_between(const struct path_context *c, const struct path_ve
 	const struct path_vertex *eye = b->kind == VERTEX_CAMERA ? b : a, *other = eye == a ? b : a;
 	double t_min = 0, t_max, length = vec3_length(vec3_sub(a->x.p, b->x.p));
 	spectrum depth = spectrum_of(0);
+	struct camera now;
 	if (eye->kind == VERTEX_CAMERA)
-		camera_clip(&c->w->camera, towards(eye, other), &t_min, &t_max);
+		camera_clip(world_camera(c->w, &eye->x, &now), towards(eye, other), &t_min, &t_max);
 	const struct grid_ray r = {eye->x.p, towards(eye, other), t_min, length};
 	for (int k = 0; k < (g ? g->channels : 1); k++) {
 		double along = g ? slow_grid_integral(g, &r, k) : length - t_min;
@@ -459,7 +460,8 @@ static bool joins(struct path_context *c, unsigned s, unsigned t)
 	const struct path_vertex *y = &c->light[s - 1];
 	vec3 w = towards(z, y);
 	double film[2];
-	if (t == 1 && !camera_project(&c->w->camera, z->x.p, w, 1, &film[0], &film[1]))
+	struct camera now;
+	if (t == 1 && !camera_project(world_camera(c->w, &z->x, &now), z->x.p, w, 1, &film[0], &film[1]))
 		return false;
 	if (t > 1 && spectrum_is_zero(path_scatter(c, z, z->to_prev, w)))
 		return false;
@@ -496,7 +498,8 @@ static void check_landing(struct path_context *c, unsigned s)
 	double film[2];
 	if (spectrum_is_zero(path_connect(c, s, 1, PATH_MAX_EDGES, film)))
 		return;
-	vec3 w = camera_direction(&c->w->camera, c->camera[0].x.p, film[0], film[1]);
+	struct camera now;
+	vec3 w = camera_direction(world_camera(c->w, &c->camera[0].x, &now), c->camera[0].x.p, film[0], film[1]);
 	assert_true(vec3_length(vec3_sub(w, towards(&c->camera[0], &c->light[s - 1]))) < 1e-12);
 }
 

@@ -207,12 +207,13 @@ static struct world *misfit(void)
 #define FROM(t, inner) "<transform time='" t "'>" inner "</transform>"
 #define MOVES(a, b) "<animation name='to_world'>" FROM("0", a) FROM("1", b) "</animation>"
 
-/* While the shutter is open a ball of metal rolls and shrinks, cloudy glass turns, and a group slides. */
+/* While the shutter is open the camera follows a little, a ball of metal rolls and shrinks, cloudy glass turns, and a group slides. */
 static struct world *moving(void)
 {
 	static const char scene[] = "<scene version='3.0.0'>"
 		"<sensor type='perspective'><float name='fov' value='40'/><float name='shutter_open' value='0.2'/>"
-		"<float name='shutter_close' value='0.9'/>" AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+		"<float name='shutter_close' value='0.9'/>" MOVES("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>",
+			"<lookat origin='0.2,0.3,1.8' target='0.1,-0.5,-1' up='0.1,1,0'/>")
 		"<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
 		BOX("0.5,0.45,0.35") LAMP
 		"<shape type='sphere'>" MOVES("<scale value='0.7'/><translate x='-0.6' y='-1' z='-0.6'/>",

@@ -32,22 +32,26 @@ static void step_back(struct camera *c, double half_width)
 	}
 }
 
+/* A mirrored transform gives a mirrored image, as in Mitsuba: the axes are used unchanged. */
+static struct frame axes_of(const mat4 *m)
+{
+	return (struct frame){vec3_neg(vec3_normalize(mat4_vector(m, (vec3){1, 0, 0}))),
+			      vec3_neg(vec3_normalize(mat4_vector(m, (vec3){0, 1, 0}))),
+			      vec3_normalize(mat4_vector(m, (vec3){0, 0, 1}))};
+}
+
 int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
 		struct error *e)
 {
 	if (!(s->half_width > 0) && s->projection != PROJECTION_SPHERE && !(s->fov > 0 && s->fov < 180))
 		return error_set(e, EINVAL, "the sensor's field of view of %g degrees is not between 0 and 180",
 				 s->fov);
-	vec3 forward = mat4_vector(&s->to_world, (vec3){0, 0, 1});
-	vec3 up = mat4_vector(&s->to_world, (vec3){0, 1, 0});
-	vec3 left = mat4_vector(&s->to_world, (vec3){1, 0, 0});
+	const vec3 forward = mat4_vector(&s->to_world, (vec3){0, 0, 1}),
+		   up = mat4_vector(&s->to_world, (vec3){0, 1, 0}), left = mat4_vector(&s->to_world, (vec3){1, 0, 0});
 	double volume = fabs(vec3_dot(left, vec3_cross(up, forward)));
 	if (!(volume > 0) || !isfinite(volume))
 		return error_set(e, EINVAL, "the sensor's to_world transform is singular");
-	/* A mirrored transform gives a mirrored image, as in Mitsuba: the axes are used unchanged. */
-	c->axes.n = vec3_normalize(forward);
-	c->axes.s = vec3_neg(vec3_normalize(left));
-	c->axes.t = vec3_neg(vec3_normalize(up));
+	c->axes = axes_of(&s->to_world);
 	c->position = vec3_scale(world_scale, vec3_sub(mat4_point(&s->to_world, (vec3){0, 0, 0}), world_center));
 	c->width = s->width;
 	c->height = s->height;
@@ -72,6 +76,14 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius,
 				 s->focus_distance);
 	return c->projection && c->projection->init ? c->projection->init(c, s, e) : 0;
+}
+
+void camera_move(const struct camera *c, double time, struct camera *out)
+{
+	mat4 now = motion_at(c->moves, time);
+	*out = *c;
+	out->axes = axes_of(&now);
+	out->position = mat4_point(&now, (vec3){0, 0, 0});
 }
 
 bool camera_has_aperture(const struct camera *c)

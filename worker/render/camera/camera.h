@@ -20,6 +20,7 @@
 #define WORKER_RENDER_CAMERA_CAMERA_H
 
 #include "worker/render/math/frame.h"
+#include "worker/render/math/motion.h"
 #include "worker/render/scene/settings.h"
 
 struct camera_projection;
@@ -34,13 +35,25 @@ struct camera {
 	bool lens;		    /* x_k is drawn and mutated: the radius is above 0, or this was forced */
 	double aperture, focus;	    /* radius; distance of the plane of focus along the axis */
 	const struct camera_projection *projection; /* NULL: that of a plane */
-	double kc[2], fold; /* of perspective_rdist; the squared slope at which its image ends */
+	double kc[2], fold;	    /* of perspective_rdist; the squared slope at which its image ends */
+	const struct motion *moves; /* to the rescaled world; NULL: it is still. Otherwise position and axes are those
+				       when the shutter opens */
 };
 
 /* -EINVAL with a sentence if the field of view is not within (0,180) degrees, the transform is singular, or a lens
  * is focused behind it. */
 int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
 		struct error *e);
+
+void camera_move(const struct camera *c, double time, struct camera *out);
+/* The camera at that time; room: for one that moves. */
+static inline const struct camera *camera_at(const struct camera *c, double time, struct camera *room)
+{
+	if (!c->moves)
+		return c;
+	camera_move(c, time, room);
+	return room;
+}
 
 bool camera_has_aperture(const struct camera *c);
 /* Forces drawing and mutating x_k even if the radius is 0; or makes any camera a pinhole. */

@@ -121,14 +121,15 @@ static struct path_vertex pinhole(const struct world *w, double time)
 	const double middle[2] = {0.5, 0.5};
 	struct path_vertex v = {.kind = VERTEX_CAMERA, .emitter = -1};
 	v.x.prim = prim_none_at(time);
-	v.x.p = camera_point(&w->camera, middle);
+	struct camera room;
+	v.x.p = camera_point(world_camera(w, &v.x, &room), middle);
 	return v;
 }
 
 /* Far beyond anything that belongs to the scene: squares of such numbers would overflow. */
-static bool is_huge(const struct world *w, vec3 p)
+static bool is_huge(const struct world *w, vec3 p, double time)
 {
-	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w, 0).x.p) + w->camera.aperture;
+	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w, time).x.p) + w->camera.aperture;
 	return !(fabs(p.x) <= most && fabs(p.y) <= most && fabs(p.z) <= most);
 }
 
@@ -139,7 +140,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	struct prim_ref prim = {get32(at + 8), get32(at + 12), time};
 	vec3 place = {get_double(at + 16), get_double(at + 24), get_double(at + 32)};
 	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
-	if (is_huge(w, place) || at[0] > VERTEX_MEDIUM || at[2] > 1 || at[3] != 0 ||
+	if (is_huge(w, place, time) || at[0] > VERTEX_MEDIUM || at[2] > 1 || at[3] != 0 ||
 	    (v->kind == VERTEX_CAMERA) != (i == edges) ||
 	    (v->kind == VERTEX_SURFACE || v->kind == VERTEX_MEDIUM) != (i > 0 && i < edges) ||
 	    (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT)))
@@ -150,9 +151,11 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	}
 	if (v->kind == VERTEX_CAMERA) {
 		double u[2];
+		struct camera room;
 		v->x.prim = prim_none_at(time);
-		camera_point_inverse(&w->camera, place, u);
-		v->x.p = camera_point(&w->camera, u);
+		const struct camera *camera = world_camera(w, &v->x, &room);
+		camera_point_inverse(camera, place, u);
+		v->x.p = camera_point(camera, u);
 		return near(v->x.p, place, fmax(w->radius, w->camera.aperture));
 	}
 	if (i == 0 && (emitter < 0 || (uint32_t)emitter >= w->emitter_count))

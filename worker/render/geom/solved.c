@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Embree asks for the bounds of a primitive, and whether a ray meets it. A sphere is met at the roots of a quadratic, a
+ * triangle where the ray crosses its plane, both in double; what surfaces coincide with, and on which primitives the
+ * ray starts and ends, is asked as for the triangles that Embree intersects itself. One that moves is where it is at
+ * the query's time, in bounds that hold for all times.
+ */
 #include "worker/render/geom/solved.h"
 
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim)

@@ -90,12 +90,13 @@ static inline vec2 by_itself(const struct frame *f, const struct half *r, const 
 static void end_tangents(const struct world *w, const struct path_vertex *v, vec3 direction, struct neighbour *n)
 {
 	struct frame f;
+	struct camera room;
 	if (v->kind == VERTEX_SURFACE) {
 		surface_tangents(&v->x, &n->du, &n->dv);
 		return;
 	}
 	if (v->kind == VERTEX_CAMERA)
-		f = w->camera.axes;
+		f = world_camera(w, &v->x, &room)->axes;
 	else if (v->kind == VERTEX_EMITTER && vec3_dot(v->x.ng, v->x.ng) > 0)
 		f = frame_around(v->x.ng);
 	else

@@ -87,7 +87,8 @@ struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit)
 void halfvec_steps(const struct path_context *c, const struct full_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step)
 {
-	const struct camera *camera = &c->w->camera;
+	struct camera room;
+	const struct camera *camera = world_camera(c->w, &x->v[x->edges].x, &room);
 	double sum = 0, pixels = halfvec_film_step(camera);
 	mat2 d[FULL_PATH_MAX_VERTICES], footprint = {0, 0, 0, 0};
 	for (unsigned j = c_end + 1; j < b; j++)

@@ -60,8 +60,9 @@ static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 	bool camera = from->kind == VERTEX_CAMERA;
 	struct ray_end start = {from->x.p, camera ? (vec3){0, 0, 0} : from->x.ng, from->x.prim};
 	double t_min = 0, t_max = INFINITY;
+	struct camera room;
 	if (camera)
-		camera_clip(&w->camera, d, &t_min, &t_max);
+		camera_clip(world_camera(w, &from->x, &room), d, &t_min, &t_max);
 	struct ray_hit hit;
 	const struct world_shape *part;
 	for (unsigned faces = 0;; faces++) {

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * motion_make takes the keyframes that matter and decomposes each: the orthogonal factor by Newton's iteration, as a
+ * quaternion, and what is left, which is symmetric. motion_at finds the two keys around a time and puts them together
+ * again. motion_bounds divides the way between two keys into parts and bounds what a point does within one.
+ */
 #include "worker/render/math/motion.h"
 
 #include <math.h>

@@ -314,8 +314,9 @@ static double log_geometry(const struct path_context *c, const struct full_path 
 	if (c_end > 0 && full_path_turned(x, c_end)) /* it stays, but its normal is that of x or of y alone */
 		log_g += log(full_path_cosine_to_light(x, c_end) /
 			     fabs(vec3_dot(x->v[c_end].x.sh.n, x->edge[c_end - 1].w)));
+	struct camera room;
 	if (b == x->edges)
-		return log_g + log(camera_jac_film_from_solid(&c->w->camera, vec3_neg(e->w)));
+		return log_g + log(camera_jac_film_from_solid(world_camera(c->w, &x->v[b].x, &room), vec3_neg(e->w)));
 	return log_g + log(full_path_cosine_to_light(x, b));
 }
 

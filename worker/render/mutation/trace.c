@@ -15,7 +15,8 @@
 
 bool trace_move_aperture(struct mutation_ctx *m, const struct full_path *x, struct full_path *y)
 {
-	const struct camera *camera = &m->path->w->camera;
+	struct camera room;
+	const struct camera *camera = world_camera(m->path->w, &x->v[x->edges].x, &room);
 	double u[2], r[4];
 	mutation_random(m, BLOCK_ENDS, r);
 	camera_point_inverse(camera, x->v[x->edges].x.p, u);
@@ -161,8 +162,9 @@ static bool go_on(struct mutation_ctx *m, unsigned j, vec3 d, const struct full_
 	struct path_context *c = m->path;
 	struct path_vertex *to = &y->v[j - 1];
 	double t_min = 0, t_max = INFINITY;
+	struct camera room;
 	if (j == x->edges)
-		camera_clip(&c->w->camera, d, &t_min, &t_max);
+		camera_clip(world_camera(c->w, &y->v[j].x, &room), d, &t_min, &t_max);
 	if (!EFFECT_IS_ON(c->w, scattering))
 		return path_extend(c, &y->v[j], d, t_min, t_max, to) && full_path_join(y, j - 1);
 	if (x->v[j - 1].kind == VERTEX_MEDIUM)
@@ -181,7 +183,8 @@ enum proposal_end trace_chain(struct mutation_ctx *m, unsigned b, bool aperture,
 		return PROPOSAL_OUTSIDE;
 	if (!move_film(m, x, y, move))
 		return PROPOSAL_OUTSIDE;
-	vec3 d = camera_direction(&c->w->camera, y->v[k].x.p, y->film[0], y->film[1]);
+	struct camera room;
+	vec3 d = camera_direction(world_camera(c->w, &y->v[k].x, &room), y->v[k].x.p, y->film[0], y->film[1]);
 	for (unsigned j = k; j > b; j--) {
 		if (j < k && !scatter_on(m, j, x, y, move, &d))
 			return PROPOSAL_MODE;

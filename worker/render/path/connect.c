@@ -305,14 +305,15 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 {
 	const struct path_vertex *y = &c->light[s - 1], *eye = &c->camera[0];
 	double distance2, x[2];
+	struct camera room;
+	const struct camera *camera = world_camera(c->w, &eye->x, &room);
 	vec3 d = path_direction(eye, y, &distance2); /* camera to y */
-	if (!(distance2 > 0) || !camera_project(&c->w->camera, eye->x.p, d, sqrt(distance2), &x[0], &x[1]))
+	if (!(distance2 > 0) || !camera_project(camera, eye->x.p, d, sqrt(distance2), &x[0], &x[1]))
 		return spectrum_of(0);
 	if (!film_window_holds(&c->window, x))
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
-	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * path_jac_solid_from_vertex(y, d, distance2),
-			   l);
+	l = spectrum_scale(camera_jac_film_from_solid(camera, d) * path_jac_solid_from_vertex(y, d, distance2), l);
 	if (only_absorbs(c))
 		l = spectrum_mul(l, absorbed(c, eye, d, y, s));
 	struct path_edge joint;

@@ -207,7 +207,8 @@ static unsigned walk_camera(struct path_context *c, struct sampler *s, const str
 	struct pinned_sampler pinned = {
 		.base = {pinned_block}, .under = s, .wavelength = x->wavelength, .time = full_path_time(x)};
 	double film[2];
-	camera_point_inverse(&c->w->camera, x->v[x->edges].x.p, pinned.aperture);
+	struct camera room;
+	camera_point_inverse(world_camera(c->w, &x->v[x->edges].x, &room), x->v[x->edges].x.p, pinned.aperture);
 	return path_walk_camera(c, &pinned.base, most, film);
 }
 

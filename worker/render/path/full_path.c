@@ -259,15 +259,17 @@ bool full_path_see_media(struct path_context *c, struct full_path *x)
 bool whole_film(const struct path_context *c, struct full_path *x)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];
+	struct camera room;
+	const struct camera *camera = world_camera(c->w, &x->v[x->edges].x, &room);
 	vec3 d = vec3_neg(e->w);
 	double distance = sqrt(e->distance2);
 	if (x->v[x->edges - 1].kind == VERTEX_INFINITE) {
 		/* What lies at infinity is seen between the clipping planes. */
 		double t_min, t_max;
-		camera_clip(&c->w->camera, d, &t_min, &t_max);
+		camera_clip(camera, d, &t_min, &t_max);
 		distance = 0.5 * (t_min + t_max);
 	}
-	if (!camera_project(&c->w->camera, x->v[x->edges].x.p, d, distance, &x->film[0], &x->film[1]))
+	if (!camera_project(camera, x->v[x->edges].x.p, d, distance, &x->film[0], &x->film[1]))
 		return false;
 	return film_window_holds(&c->window, x->film);
 }

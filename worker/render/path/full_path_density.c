@@ -25,7 +25,9 @@ double full_path_log_f(const struct path_context *c, struct full_path *x)
 		const struct full_path_edge *g = &x->edge[e];
 		log_geometry += log(path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2);
 	}
-	log_geometry += log(camera_jac_film_from_solid(&c->w->camera, vec3_neg(x->edge[k - 1].w)));
+	struct camera room;
+	log_geometry +=
+		log(camera_jac_film_from_solid(world_camera(c->w, &x->v[k].x, &room), vec3_neg(x->edge[k - 1].w)));
 	return product_log_intensity(c, x, &p) + log_geometry;
 }
 

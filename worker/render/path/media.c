@@ -37,8 +37,9 @@ uint32_t path_medium_of_emitter(const struct world *w, const struct path_vertex 
 static double near_plane(const struct world *w, const struct path_vertex *from, vec3 d)
 {
 	double t_min = 0, t_max;
+	struct camera room;
 	if (from->kind == VERTEX_CAMERA)
-		camera_clip(&w->camera, d, &t_min, &t_max);
+		camera_clip(world_camera(w, &from->x, &room), d, &t_min, &t_max);
 	return t_min;
 }
 

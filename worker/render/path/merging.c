@@ -173,9 +173,10 @@ bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed
 		if (is_rough(v))
 			break;
 	}
+	struct camera room;
 	vec3 d = path_direction(&c->camera[0], &c->camera[1], &unused);
 	double solid = samples_wide * c->window.width * c->window.height /
-		       (camera_jac_film_from_solid(&c->w->camera, d) * (double)m->paths);
+		       (camera_jac_film_from_solid(world_camera(c->w, &c->camera[0].x, &room), d) * (double)m->paths);
 	out->radius = distance * sqrt(solid / M_PI);
 	return true;
 }

@@ -100,7 +100,9 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 	if (at->kind == VERTEX_INFINITE)
 		return disk_pdf(c->w) * (next->kind == VERTEX_MEDIUM ? 1 : jac_disk_from_area(next->x.ng, omega));
 	if (at->kind == VERTEX_CAMERA) {
-		solid = camera_jac_film_from_solid(&c->w->camera, omega) / (c->window.width * c->window.height);
+		struct camera room;
+		solid = camera_jac_film_from_solid(world_camera(c->w, &at->x, &room), omega) /
+			(c->window.width * c->window.height);
 	} else if (at->kind == VERTEX_EMITTER || !prev) {
 		struct emitter_point p = world_emitter_point(&at->x);
 		const struct emitter *em = &c->w->emitters[at->emitter];
@@ -264,14 +266,16 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	c->wl = world_wavelengths(w, u[DIM_WAVELENGTH]);
 	c->time = EFFECT_IS_ON(w, motion) ? s->block(s, SIDE_LIGHT, 0)[DIM_TIME] : 0;
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};
-	v[0].x.p = camera_point(&w->camera, u + DIM_APERTURE_U);
 	v[0].x.prim = prim_none_at(c->time);
+	struct camera room;
+	const struct camera *camera = world_camera(w, &v[0].x, &room);
+	v[0].x.p = camera_point(camera, u + DIM_APERTURE_U);
 	v[0].edge.medium = w->camera_medium;
 	if (max_vertices < 2 || !camera_has(&w->camera, film[0], film[1]))
 		return 1;
-	vec3 d = camera_direction(&w->camera, v[0].x.p, film[0], film[1]);
+	vec3 d = camera_direction(camera, v[0].x.p, film[0], film[1]);
 	double t_min, t_max, area = c->window.width * c->window.height;
-	camera_clip(&w->camera, d, &t_min, &t_max);
+	camera_clip(camera, d, &t_min, &t_max);
 	spectrum left = spectrum_of(1);
 	if (!go_on(c, &v[0], d, t_min, t_max, u[DIM_CAMERA_DISTANCE], &v[1], &left))
 		return 1;

@@ -10,7 +10,8 @@ static struct ray_end end_of(const struct path_vertex *v)
  * b that is behind the far one. */
 static bool seen_by_camera(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *b)
 {
-	const struct camera *camera = &c->w->camera;
+	struct camera room;
+	const struct camera *camera = world_camera(c->w, &eye->x, &room);
 	bool endless = b->kind == VERTEX_INFINITE;
 	vec3 d = endless ? b->x.p : vec3_sub(b->x.p, eye->x.p);
 	if (!camera_looks(camera, d))

@@ -82,6 +82,10 @@ static bool is_in_group(const struct xml_element *el)
 
 const char *animation_refused(const struct scene_node *n, const struct xml_element *el)
 {
+	if (n->cls == PLUGIN_SENSOR)
+		return strcmp(n->type, "orthographic") == 0 || strcmp(n->type, "telecentric") == 0
+			       ? "an orthographic or telecentric camera"
+			       : NULL;
 	if (n->cls != PLUGIN_SHAPE)
 		return plugin_class_name(n->cls);
 	return n->shines ? "what shines" : is_in_group(el) ? "a shape in a shapegroup" : NULL;

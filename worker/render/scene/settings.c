@@ -9,6 +9,7 @@
 #include "worker/render/scene/settings.h"
 #include "worker/render/scene/fov.h"
 
+#include "common/base/mem.h"
 #include "common/plan/plan.h"
 #include "worker/render/scene/depth.h"
 #include "worker/render/scene/film.h"
@@ -339,10 +340,8 @@ static int read_projection(const struct scene_node *sensor, struct scene_setting
 	return 0;
 }
 
-/* Orthonormalises the columns around the view; mirrored ones stay mirrored. */
-static int read_camera(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+bool scene_settings_upright(mat4 m, mat4 *out)
 {
-	mat4 m = node_transform(sensor, "to_world");
 	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]},
 	     z = {m.m[0][2], m.m[1][2], m.m[2][2]};
 	x = vec3_normalize(x);
@@ -350,12 +349,37 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	z = vec3_normalize(z);
 	double skew = fmax(fabs(vec3_dot(x, y)), fmax(fabs(vec3_dot(y, z)), fabs(vec3_dot(z, x))));
 	if (!vec3_is_finite(x) || !vec3_is_finite(y) || !vec3_is_finite(z) || !(skew < 1e-3))
-		return node_error(sensor, e, EINVAL, "to_world may only rotate, translate, mirror and scale a camera");
+		return false;
 	double hand = vec3_dot(vec3_cross(x, y), z) < 0 ? -1 : 1;
 	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));
 	y = vec3_scale(hand, vec3_cross(z, x));
-	out->to_world = (mat4){
+	*out = (mat4){
 		{{x.x, y.x, z.x, m.m[0][3]}, {x.y, y.y, z.y, m.m[1][3]}, {x.z, y.z, z.z, m.m[2][3]}, {0, 0, 0, 1}}};
+	return true;
+}
+
+/* Where the camera is when the shutter opens. */
+static int read_place(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	const struct animation *a = node_animation(sensor, "to_world");
+	mat4 m = node_transform(sensor, "to_world");
+	if (a) {
+		struct motion motion;
+		struct motion_key *room = mem_alloc(a->count, sizeof *room);
+		if (!room)
+			return error_set(e, ENOMEM, "out of memory");
+		out->moves = motion_make(&motion, a, out->shutter_open, out->shutter_close, room);
+		m = motion_at(&motion, 0);
+		mem_free(room);
+	}
+	return scene_settings_upright(m, &out->to_world)
+		       ? 0
+		       : node_error(sensor, e, EINVAL,
+				    "to_world may only rotate, translate, mirror and scale a camera");
+}
+
+static int read_camera(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
 	out->principal_x = node_float(sensor, "principal_point_offset_x", 0);
 	out->principal_y = node_float(sensor, "principal_point_offset_y", 0);
 	out->near_clip = node_float(sensor, "near_clip", 1e-2);
@@ -366,6 +390,9 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	if (!(out->shutter_open <= out->shutter_close))
 		return node_error(sensor, e, EINVAL, "shutter_open=%g is after shutter_close=%g", out->shutter_open,
 				  out->shutter_close);
+	int r = read_place(sensor, out, e);
+	if (r)
+		return r;
 	if (!(out->near_clip < out->far_clip))
 		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip,
 				  out->far_clip);

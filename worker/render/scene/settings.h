@@ -26,10 +26,11 @@ struct scene_settings {
 	uint32_t roulette_depth; /* scattering events before Russian roulette begins, rr_depth; from 1 on, default 5 */
 	bool hide_emitters;	 /* hides paths of one edge, emitters seen directly */
 	char integrator[32];	 /* the scene's own ("": none): ignored except for its depths and media */
-	mat4 to_world;		 /* camera: +z forward, +x LEFT on the image, +y up; without scale */
-	double half_width;	 /* above 0: orthographic or telecentric, half of the film's width in scene units */
-	double fov;		 /* degrees, along fov_axis */
-	char fov_axis[16];	 /* x, y, diagonal, smaller, larger: the camera resolves it by the film's size */
+	mat4 to_world;	   /* camera: +z forward, +x LEFT on the image, +y up; without scale. When the shutter opens */
+	bool moves;	   /* the camera, while the shutter is open */
+	double half_width; /* above 0: orthographic or telecentric, half of the film's width in scene units */
+	double fov;	   /* degrees, along fov_axis */
+	char fov_axis[16]; /* x, y, diagonal, smaller, larger: the camera resolves it by the film's size */
 	double principal_x, principal_y; /* offset of the principal point from the middle, relative to the film's size,
 					    as in Mitsuba 3 */
 	enum scene_projection projection;
@@ -44,6 +45,10 @@ struct scene_settings {
 /* width, height: override the film's size (0: keep) and its crop window. sensor: which of several, from 1 on. */
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
 			struct scene_settings *out, struct error *e);
+
+/* A camera's transform with its columns orthonormal around the view; mirrored ones stay mirrored. false: it does more
+ * than rotate, translate, mirror and scale. */
+bool scene_settings_upright(mat4 m, mat4 *out);
 
 /* The sensor of that number; NULL: there is none. */
 const struct scene_node *scene_sensor(const struct scene *s, uint32_t which);

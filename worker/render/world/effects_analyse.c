@@ -383,6 +383,8 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (surface_moves(&w->shapes[i]))
 			count(&moving, src->shape[i], "");
+	if (w->camera.moves)
+		count(&moving, src->sensor, "");
 	if (moving.count)
 		fx->motion = line(r, EFFECT_MOTION, true, "%s move%s while the shutter is open",
 				  names_of(&moving, text), verb(&moving, "s", ""));

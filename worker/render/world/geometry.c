@@ -146,7 +146,7 @@ static int read_listed(struct builder *b, const struct listed_shape *l, struct s
 		b->boxes[id] = build_box_of(g);
 	}
 	if (!rc && l->moves)
-		rc = moving_begin(b, l, id);
+		rc = moving_begin(b, l, id, b->shared[id] ? b->shared[id]->box : b->boxes[id]);
 	if (rc)
 		return rc;
 	b->shape_nodes[id] = n;
@@ -240,7 +240,7 @@ int build_rescale(struct builder *b)
 		if (n->cls == PLUGIN_SENSOR)
 			return error_prefix(b->e, rc, "%s:%d: <sensor>", n->file, n->line);
 	}
-	return rc;
+	return rc ? rc : moving_camera(b);
 }
 
 int build_place_shapes(struct builder *b)

@@ -2,7 +2,6 @@
 #include "worker/render/world/moving.h"
 
 #include "worker/render/world/place_mesh.h"
-#include "worker/render/world/shared_mesh.h"
 
 /* Matrices in files have six digits. */
 #define TOLERANCE 1e-5
@@ -35,7 +34,12 @@ static int check(const struct builder *b, const struct listed_shape *l, uint32_t
 	return 0;
 }
 
-int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id)
+static int refuse_rolling(const struct scene_node *n, struct error *e)
+{
+	return node_error(n, e, ENOTSUP, "it moves, and a rolling shutter is not supported");
+}
+
+int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box from)
 {
 	const struct scene_settings *s = &b->w->settings;
 	const struct scene_node *outer = l->instance ? l->instance : l->node;
@@ -44,7 +48,7 @@ int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id)
 	if (!m || !keys)
 		return build_out_of_memory(b->e);
 	if (s->rolling_shutter)
-		return node_error(outer, b->e, ENOTSUP, "it moves, and a rolling shutter is not supported");
+		return refuse_rolling(outer, b->e);
 	motion_make(m, l->moves, s->shutter_open, s->shutter_close, keys);
 	bool in_group = l->instance && b->shared[id];
 	if (!in_group && !mat4_invert(node_transform(outer, "to_world"), &m->before))
@@ -52,7 +56,6 @@ int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id)
 	int rc = check(b, l, id, m);
 	if (rc)
 		return rc;
-	const struct box from = b->shared[id] ? b->shared[id]->box : b->boxes[id];
 	struct box *all = &b->boxes[id];
 	motion_bounds(m, from.low, from.high, &all->low, &all->high);
 	double most = fmax(triangle_norm_max(all->low), triangle_norm_max(all->high));
@@ -86,5 +89,36 @@ int moving_place_sphere(struct builder *b, uint32_t id)
 		return node_error(b->shape_nodes[id], b->e, EINVAL, "it is too small somewhere on its way");
 	p->first = id;
 	g->place = p;
+	return 0;
+}
+
+int moving_camera(struct builder *b)
+{
+	struct world *w = b->w;
+	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor);
+	if (!w->settings.moves)
+		return 0;
+	const struct animation *a = node_animation(sensor, "to_world");
+	struct motion *m = arena_alloc(&w->arena, 1, sizeof *m);
+	struct motion_key *keys = arena_alloc(&w->arena, a->count, sizeof *keys);
+	struct keyframe *upright = arena_alloc(&b->scratch, a->count, sizeof *upright);
+	if (!m || !keys || !upright)
+		return build_out_of_memory(b->e);
+	if (w->settings.rolling_shutter)
+		return refuse_rolling(sensor, b->e);
+	for (uint32_t i = 0; i < a->count; i++) {
+		upright[i].time = a->key[i].time;
+		if (!scene_settings_upright(a->key[i].place, &upright[i].place))
+			return node_error(sensor, b->e, EINVAL,
+					  "to_world may only rotate, translate, mirror and scale a camera");
+	}
+	motion_make(m, &(struct animation){a->count, upright}, w->settings.shutter_open, w->settings.shutter_close,
+		    keys);
+	motion_rescale(m, w->center, w->scale);
+	for (uint32_t i = 0; i < m->count; i++)
+		if (!(vec3_length(m->key[i].at) <= PARAM_REACH_MAX))
+			return node_error(sensor, b->e, ERANGE, "it moves more than %g scene radii away from the scene",
+					  PARAM_REACH_MAX);
+	w->camera.moves = m;
 	return 0;
 }

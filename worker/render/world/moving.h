@@ -10,13 +10,16 @@
 #include "worker/render/shape/group.h"
 #include "worker/render/world/build_private.h"
 
-/* Of shape `id`, which has been read: its motion, and the box in which it stays. -ENOTSUP: it cannot move like that;
- * -ERANGE: it leaves the range of coordinates. */
-int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id);
+/* Of shape `id`, which has been read and has the box `from`: its motion, and the box in which it stays. -ENOTSUP: it
+ * cannot move like that; -ERANGE: it leaves the range of coordinates. */
+int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box from);
 /* After the world has been rescaled: its placement, from a frame of that centre and scale in which it has this box.
  * -EINVAL as placement_make; -ENOMEM. */
 int moving_place(struct builder *b, uint32_t id, vec3 center, double scale, const struct box *box, struct placement *p);
 /* The same for a sphere of the world. */
 int moving_place_sphere(struct builder *b, uint32_t id);
+
+/* The camera, after the world has been rescaled. -EINVAL, -ERANGE: it cannot move like that. */
+int moving_camera(struct builder *b);
 
 #endif

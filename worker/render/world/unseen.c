@@ -68,6 +68,8 @@ void unseen_note(struct world *w, const struct box *boxes)
 		return;
 	const struct view v = view_of(w);
 	unsigned all = (1U << SIDES) - 1;
+	if (w->camera.moves)
+		return;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		unsigned beyond = sides_of(w, &v, &boxes[i]);
 		if (!beyond)

@@ -72,6 +72,8 @@ static bool camera_is_outside(const struct world *w, const struct geom_shape *g)
 {
 	const struct camera *c = &w->camera;
 	double low, high, at = vec3_dot(c->axes.n, c->position);
+	if (c->moves)
+		return false;
 	extent(g, c->axes.n, &low, &high);
 	return low > at + c->near_clip + MARGIN || high < at - MARGIN;
 }

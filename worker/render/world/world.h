@@ -75,6 +75,13 @@ static inline struct wavelengths world_wavelengths(const struct world *w, double
 	return wavelengths_sample_few(u, (unsigned)w->accuracy.wavelengths);
 }
 
+/* The camera at the time of a path's vertex; room: for one that moves. */
+static inline const struct camera *world_camera(const struct world *w, const struct surface_point *x,
+						struct camera *room)
+{
+	return camera_at(&w->camera, x->prim.time, room);
+}
+
 /* The emitter selected by a number in [0,1); -1 if there is none. */
 int32_t world_pick_emitter(const struct world *w, double u);
 

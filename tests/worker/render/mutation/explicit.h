@@ -83,7 +83,8 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 					 const struct full_path *y, unsigned b, double *log_choices)
 {
 	unsigned k = y->edges;
-	const struct camera *camera = &c->w->camera;
+	struct camera now;
+	const struct camera *camera = world_camera(c->w, &y->v[k].x, &now);
 	*log_choices = 0;
 	if (b == k)
 		return 0;

@@ -42,10 +42,6 @@ static void refuses(const char *xml, const char *text)
 #define SIXTY "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"
 #define S "<scene version='3.0.0'>"
 #define END "</scene>"
-/* A shape that moves on from where it is at time 0. */
-#define MOVING(type, later, inside) \
-	"<shape type='" type "'><animation name='to_world'><transform time='0'/>" later "</animation>" inside "</shape>"
-#define LATER(time, scale) "<transform time='" time "'><scale value='" scale "'/></transform>"
 #define BSDF(x) S "<bsdf type='roughconductor'>" x "</bsdf>" END
 #define SHAPE(x) S "<shape type='cube'><transform name='to_world'>" x "</transform></shape>" END
 
@@ -260,27 +256,6 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<blackbody name='eta' temperature='hot'/>"), "temperature=\"hot\" is not a number");
 	refuses(BSDF("<blackbody name='eta' temperature='1'/>"), "a temperature of 1 K is outside [100, 1e+06]");
 	refuses(BSDF("<color name='eta'/>"), "is not supported; supported: boolean");
-	refuses(S "<shape type='sphere'><animation name='toWorld'/></shape>" END, "holds no transform");
-	refuses(S "<shape type='sphere'><animation name='toWorld'><scale value='2'/></animation></shape>" END,
-		"has no place in <animation>");
-	refuses(S MOVING("sphere", LATER("1", "2"), "<emitter type='area'/>") END,
-		"motion of what shines is not supported (line 1); --lenient keeps the first transform");
-	refuses(S "<shape type='shapegroup'>" MOVING("cube", LATER("1", "2"), "") "</shape>" END,
-		"motion of a shape in a shapegroup is not supported");
-	refuses(S MOVING("cube", "<transform/>", "") END, "<transform>: needs a time, a (finite) number");
-	refuses(S MOVING("cube", "<transform time='soon'/>", "") END, "needs a time, a (finite) number");
-	refuses(S MOVING("cube", LATER("nan", "2"), "") END, "needs a time, a (finite) number");
-	refuses(S MOVING("cube", LATER("inf", "2"), "") END, "needs a time, a (finite) number");
-	refuses(S MOVING("cube", LATER("1e31", "2"), "") END, "time=1e+31 is outside [-1e+30, 1e+30]");
-	refuses(S MOVING("cube", LATER("0", "2"), "") END, "time=0 is not after the time of the transform before, 0");
-	refuses(S MOVING("cube", LATER("2", "2") LATER("1", "3"), "") END,
-		"time=1 is not after the time of the transform before, 2");
-	refuses(S MOVING("cube", LATER("1", "0"), "") END, "flattens what moves (it has no inverse)");
-	refuses(S MOVING("cube", LATER("1", "-1"), "") END, "of it and the transform before, one mirrors what moves");
-	refuses(S MOVING("cube", LATER("1", "2") "<scale value='2'/>", "") END, "has no place in <animation>");
-	refuses(S MOVING("cube", "<transform time='1' tiem='2'/>", "") END, "has no attribute `tiem`");
-	refuses(S "<shape type='sphere'><animation name='toWorld' tiem='1'><transform/></animation></shape>" END,
-		"has no attribute `tiem`");
 	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value, a folder");
 	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END,
 		"neither true nor false");

@@ -286,50 +286,6 @@ static void test_lenient_numbers(void **state)
 	scene_fini(&s);
 }
 
-/* What does not move is where it stands; what does is there for the lenient, at its first place. */
-static void test_animations(void **state)
-{
-	(void)state;
-#define SPHERE(x) "<scene version='3.0.0'><shape type='sphere'>" x "</shape></scene>"
-#define AT(t, x) "<transform time='" t "'><translate x='" x "'/></transform>"
-	static const char *const still[] = {
-		SPHERE("<animation name='to_world'>" AT("0.5", "3") "</animation>"),
-		SPHERE("<animation name='animation'>" AT("0", "3") "</animation>"),
-		SPHERE("<animation name='to_world'>" AT("0", "3") AT("1", "3") AT("2", "3.0") "</animation>"),
-		"<scene version='0.6.0'><shape type='sphere'><animation name='toWorld'>" AT(
-			"0", "3") "</animation></shape></scene>",
-	};
-	for (size_t i = 0; i < sizeof still / sizeof *still; i++) {
-		struct scene s = read_ok(still[i]);
-		mat4 m = node_transform(s.objects[0], "to_world");
-		assert_true(m.m[0][3] == 3 && s.note_count == 0);
-		scene_fini(&s);
-	}
-#define TWO(x) "<animation name='animation'>" AT("-0.5", "4") AT("1", x) "</animation>"
-	struct scene s =
-		read_ok("<scene version='3.0.0'><shape type='sphere'>" TWO("5") "</shape><shape type='sphere'>" TWO(
-			"6") "</shape><shape type='sphere'>" TWO("5") "</shape></scene>");
-	const struct animation *a = node_animation(s.objects[0], "to_world");
-	mat4 m = node_transform(s.objects[0], "to_world");
-	assert_true(m.m[0][3] == 4 && s.note_count == 0);
-	assert_non_null(a);
-	assert_int_equal(a->count, 2);
-	assert_true(a->key[0].time == -0.5 && a->key[1].time == 1 && a->key[1].place.m[0][3] == 5);
-	assert_false(node_same(s.objects[0], s.objects[1]));
-	assert_true(node_same(s.objects[0], s.objects[2]));
-	scene_fini(&s);
-
-	struct error e;
-	struct asset_source assets = memory_assets(files);
-	assert_int_equal(read_with(&s, SPHERE(TWO("5") "<emitter type='area'/>"), NULL, 0, &e), -ENOTSUP);
-	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
-	m = node_transform(s.objects[0], "to_world");
-	assert_true(m.m[0][3] == 4 && s.note_count == 1 && !node_animation(s.objects[0], "to_world"));
-	assert_non_null(
-		strstr(s.notes[0], "all but the start of the `motion` is not supported and left out (lenient)"));
-	scene_fini(&s);
-}
-
 static void test_nesting_and_references(void **state)
 {
 	(void)state;
@@ -614,7 +570,6 @@ int main(void)
 		cmocka_unit_test(test_parameters_of_forks),
 		cmocka_unit_test(test_numbers_given_as_colours),
 		cmocka_unit_test(test_lenient_numbers),
-		cmocka_unit_test(test_animations),
 		cmocka_unit_test(test_nesting_and_references),
 		cmocka_unit_test(test_forward_references_and_aliases),
 		cmocka_unit_test(test_parameters),
