@@ -10,6 +10,8 @@
 
 /* Distances between times, and times in units of the shutter's, are finite. */
 #define TIME_MAX 1e30
+#define LEAST_SIZE 1e-60
+#define UNEVEN 1e12
 
 static int read_keyframe(const struct xml_element *el, bool timed, struct keyframe *out, struct error *e)
 {
@@ -26,16 +28,35 @@ static int read_keyframe(const struct xml_element *el, bool timed, struct keyfra
 	return r;
 }
 
+static double largest(const mat4 *m)
+{
+	double most = 0;
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			most = fmax(most, fabs(m->m[i][k]));
+	return most;
+}
+
+/* Whether it can be decomposed into a rotation and what is left: squares and determinants have a range. */
+static int check_even(const struct xml_element *el, const struct keyframe *key, struct error *e)
+{
+	mat4 inverse;
+	double size = largest(&key->place);
+	if (!mat4_invert(key->place, &inverse))
+		return xml_error(el, e, EINVAL, "flattens what moves (it has no inverse)");
+	if (!(size >= LEAST_SIZE) || !(size * largest(&inverse) <= UNEVEN))
+		return xml_error(el, e, ERANGE, "makes what moves too small, or longer one way than another by %g",
+				 UNEVEN);
+	return 0;
+}
+
 /* Whether there is a motion from one keyframe to the next. */
 static int check_step(const struct xml_element *el, const struct keyframe *from, const struct keyframe *to,
 		      struct error *e)
 {
-	mat4 inverse;
 	if (!(to->time > from->time))
 		return xml_error(el, e, EINVAL, "time=%g is not after the time of the transform before, %g", to->time,
 				 from->time);
-	if (!mat4_invert(from->place, &inverse) || !mat4_invert(to->place, &inverse))
-		return xml_error(el, e, EINVAL, "it or the transform before flattens what moves (it has no inverse)");
 	if ((mat4_det3(from->place) < 0) != (mat4_det3(to->place) < 0))
 		return xml_error(el, e, EINVAL, "of it and the transform before, one mirrors what moves");
 	return 0;
@@ -61,6 +82,8 @@ int animation_read(const struct xml_element **el, struct arena *arena, const str
 	*a = (struct animation){count, key};
 	for (const struct xml_element *c = animation->first; c && !r; c = c->next, key++) {
 		r = read_keyframe(c, count > 1, key, e);
+		if (!r && count > 1)
+			r = check_even(c, key, e);
 		if (!r && key > a->key)
 			r = check_step(c, key - 1, key, e);
 		moves |= key > a->key && memcmp(&key->place, &key[-1].place, sizeof key->place) != 0;
