@@ -250,7 +250,7 @@ static void test_shapes(void **state)
 						  {"bdpt", 8192, 32, 0, 0},
 						  {"pssmlt", 65536, 32, 0, 0},
 						  {"hslt", 98304, 32, 0, 0},
-						  {"erpt", 8192, 32, 0, 0}};
+						  {"erpt", 12288, 32, 0, 0}};
 	check_integrators(false, sides, sizeof sides / sizeof *sides);
 }
 
@@ -260,7 +260,7 @@ static void test_camera(void **state)
 	static const struct agree_side sides[] = {{"path", 16384, 32, 0, 0},
 						  {"bdpt", 8192, 32, 0, 0},
 						  {"hslt", 98304, 32, 0, 0},
-						  {"erpt", 8192, 32, 0, 0}};
+						  {"erpt", 12288, 32, 0, 0}};
 	check_integrators(true, sides, sizeof sides / sizeof *sides);
 }
 

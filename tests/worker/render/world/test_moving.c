@@ -213,6 +213,57 @@ static void test_at_a_time(void **state)
 	world_free(moving);
 }
 
+/* It turns and moves, and mirrors what it sees. */
+static struct world *camera_world(double t)
+{
+#define STEPS "<scale x='-2' y='2' z='2'/><rotate y='1' angle='%.17g'/><translate x='%.17g' y='0.5' z='%.17g'/>"
+	char place[1024], first[256], last[256];
+	snprintf(first, sizeof first, STEPS, 160.0, -1.0, 8.0);
+	snprintf(last, sizeof last, STEPS, 200.0, 1.0, 6.0);
+	if (t < 0)
+		snprintf(
+			place, sizeof place,
+			"<animation name='to_world'><transform time='0'>%s</transform><transform time='1'>%s</transform>"
+			"</animation>",
+			first, last);
+	else {
+		snprintf(first, sizeof first, STEPS, 160 + 40 * t, -1 + 2 * t, 8 - 2 * t);
+		snprintf(place, sizeof place, TO("%s"), first);
+	}
+	return world_of_text(
+		32, 32,
+		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='0.2'/>"
+		"<float name='focus_distance' value='7'/>" OPEN("0", "1") "%s</sensor>" SKY "<shape type='cube'/>",
+		place);
+}
+
+static void test_camera(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("a camera at a time");
+	struct world *moving = camera_world(-1);
+	assert_true(moving->effects.motion && moving->camera.moves);
+	for (int i = 0; i < 20; i++) {
+		double t = dice_throw(&d), u[2] = {dice_throw(&d), dice_throw(&d)}, film[2] = {32 * u[1], 32 * u[0]}, x,
+		       y;
+		struct world *still = camera_world(t);
+		struct camera room;
+		const struct camera *a = camera_at(&moving->camera, t, &room), *b = &still->camera;
+		near(in_scene(moving, a->position), in_scene(still, b->position), 1e-12);
+		near(a->axes.s, b->axes.s, 1e-12);
+		near(a->axes.t, b->axes.t, 1e-12);
+		near(a->axes.n, b->axes.n, 1e-12);
+		vec3 p = camera_point(a, u);
+		near(in_scene(moving, p), in_scene(still, camera_point(b, u)), 1e-12);
+		vec3 w = camera_direction(a, p, film[0], film[1]);
+		near(w, camera_direction(b, camera_point(b, u), film[0], film[1]), 1e-12);
+		assert_true(camera_project(a, p, w, 1, &x, &y));
+		assert_true(fabs(x - film[0]) < 1e-9 && fabs(y - film[1]) < 1e-9);
+		world_free(still);
+	}
+	world_free(moving);
+}
+
 #define SLIDES(type, inside)                                                                          \
 	"<shape type='" type "'><animation name='to_world'><transform time='0'/><transform time='2'>" \
 	"<translate x='4'/></transform></animation>" inside "</shape>"
@@ -320,10 +371,8 @@ static void test_many_keyframes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_at_a_time),
-		cmocka_unit_test(test_still),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_many_keyframes),
+		cmocka_unit_test(test_at_a_time), cmocka_unit_test(test_camera),	 cmocka_unit_test(test_still),
+		cmocka_unit_test(test_refused),	  cmocka_unit_test(test_many_keyframes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
