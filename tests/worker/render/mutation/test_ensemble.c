@@ -80,6 +80,8 @@ static unsigned check_candidates(const char *name)
 		if (own || a->intensity < 1e-6 * around.total ||
 		    !ensemble_choose(&c, &around, (before + 0.5 * a->intensity) / around.total, &y))
 			continue;
+		for (unsigned i = 0; i <= y.edges; i++)
+			assert_true(y.v[i].x.prim.time == full_path_time(&x));
 		full_path_log_techniques(&c, &y, log_pdf);
 		double chances = chance(y.edges + 1 - a->s) * chance(a->s),
 		       want = exp(full_path_log_f(&c, &y) - log_sum_exp(log_pdf, y.edges + 1)) / chances;
@@ -112,6 +114,7 @@ static void check_own_candidate(const char *name)
 		if (own.intensity < 1e-6 * drawn.total || !choose(k))
 			continue;
 		sampler_random_init(&s, seed, RNG_TEST, i, 1);
+		c.time = (double)i / TRIALS; /* of whatever was drawn last */
 		ensemble_around(&c, &s.base, &x, u, &around);
 		if (!has(&around, own.edges, own.intensity, false))
 			fail_msg("%s: pair %llu: a path of %u edges found by technique %u with %.9g is not there", name,
@@ -134,6 +137,7 @@ static void test_own_candidate(void **state)
 	check_own_candidate("bent normals");
 	check_own_candidate("clouds");
 	check_own_candidate("fog");
+	check_own_candidate("moving");
 }
 
 /* Where lengths are drawn, each candidate weighs one over the chance that both sub-paths are as long as it needs. */

@@ -258,7 +258,7 @@ static void test_camera(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {{"path", 16384, 32, 0, 0},
-						  {"bdpt", 8192, 32, 0, 0},
+
 						  {"hslt", 98304, 32, 0, 0},
 						  {"erpt", 12288, 32, 0, 0}};
 	check_integrators(true, sides, sizeof sides / sizeof *sides);
