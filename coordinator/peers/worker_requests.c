@@ -11,14 +11,16 @@
 enum {
 	CHUNK_LEAST = 1 << 16,
 	CHUNK_MOST = 1 << 20,
-	AHEAD = 1 << 22,     /* bytes that may be unsent when the next answer is made */
-	REQUESTS_MOST = 512, /* twice what a worker can need that has leases of as many jobs as it may hold */
+	AHEAD = 1 << 22,	/* bytes that may be unsent when the next answer is made */
+	AHEAD_OF_ALL = 1 << 30, /* shared by all connections: thousands of workers may begin a job at the same time */
+	REQUESTS_MOST = 512,	/* twice what a worker can need that has leases of as many jobs as it may hold */
 };
 
-/* All connections share half of what may wait: thousands of workers may begin a job at the same time. */
+/* Of what may wait at all, half is left to other answers. */
 static size_t ahead(const struct session *p)
 {
-	size_t share = p->peers->sending.limit / 2 / (p->peers->session_count + 1);
+	uint64_t half = p->peers->sending.limit / 2, all = half < AHEAD_OF_ALL ? half : AHEAD_OF_ALL;
+	size_t share = all / (p->peers->session_count + 1);
 	return share < AHEAD ? share : AHEAD;
 }
 
