@@ -100,7 +100,8 @@ static bool read_surface(const struct world *w, struct prim_ref prim, vec3 place
 /* An emitter that has no surface. */
 static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, double time, struct path_vertex *v)
 {
-	const struct emitter *em = &w->emitters[emitter];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(w, emitter, time, &room);
 	const double half[2] = {0.5, 0.5};
 	struct emitter_point point = {.infinite = em->infinite};
 	double pdf;

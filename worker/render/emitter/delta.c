@@ -32,7 +32,7 @@ int delta_place(struct emitter *em, const struct scene_node *n, double factor, s
 	return 0;
 }
 
-int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e)
+bool delta_axes_of(const mat4 *to_world, vec3 axes[3])
 {
 	vec3 x = mat4_vector(to_world, (vec3){1, 0, 0}), y = mat4_vector(to_world, (vec3){0, 1, 0});
 	vec3 z = vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1}));
@@ -42,9 +42,12 @@ int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], s
 	double side = vec3_dot(x, axes[0]);
 	if (side < 0)
 		axes[0] = vec3_neg(axes[0]);
-	if (!vec3_is_finite(z) || !vec3_is_finite(axes[1]) || !(fabs(side) > 0))
-		return node_error(n, e, EINVAL, "the to_world transform is singular");
-	return 0;
+	return vec3_is_finite(z) && vec3_is_finite(axes[1]) && fabs(side) > 0;
+}
+
+int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e)
+{
+	return delta_axes_of(to_world, axes) ? 0 : node_error(n, e, EINVAL, "the to_world transform is singular");
 }
 
 double delta_strength(const struct delta_light *l)

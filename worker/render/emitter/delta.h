@@ -29,8 +29,10 @@ int delta_create(struct emitter *em, const struct scene_node *n, const char *nam
 		 const struct emitter_build *build, struct error *e);
 /* The same without the colour: the caller sets shape, brightest and power. */
 int delta_place(struct emitter *em, const struct scene_node *n, double factor, struct error *e);
-/* Unit axes of to_world: +z as it is, +y made perpendicular to it; a mirrored transform stays mirrored. -EINVAL with
- * a sentence if it is singular. */
+/* Unit axes of to_world: +z as it is, +y made perpendicular to it; a mirrored transform stays mirrored.
+ * false: it is singular. */
+bool delta_axes_of(const mat4 *to_world, vec3 axes[3]);
+/* The same for a node; -EINVAL with a sentence. */
 int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e);
 double delta_strength(const struct delta_light *l);
 /* -EINVAL with a sentence if the node gives both. */

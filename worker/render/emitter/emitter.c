@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/emitter/emitter.h"
 
+#include <assert.h>
 #include <string.h>
 
 #define EMITTER(name) extern const struct emitter_ops emitter_ops_##name;
@@ -44,6 +45,17 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 			return node_error(n, e, ENOMEM, "out of memory");
 	}
 	return ops->create(em, n, build, e);
+}
+
+void emitter_move(const struct emitter *em, double time, struct emitter_room *room)
+{
+	mat4 now = motion_at(em->moves, time);
+	assert(em->ops->data_size <= sizeof room->data);
+	memcpy(room->data, em->data, em->ops->data_size);
+	room->em = *em;
+	room->em.data = room->data;
+	room->em.moves = NULL;
+	em->ops->place(&room->em, &now);
 }
 
 int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,

@@ -13,6 +13,7 @@
 #define WORKER_RENDER_EMITTER_EMITTER_H
 
 #include "worker/render/math/frame.h"
+#include "worker/render/math/motion.h"
 #include "worker/render/texture/texture.h"
 
 struct emitter_point {
@@ -69,6 +70,8 @@ struct emitter_ops {
 	bool (*sample_toward)(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 			      double *pdf_toward);
 	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
+	/* Puts it where a transform to the rescaled world leads; of delta emitters. NULL: it cannot move. */
+	void (*place)(struct emitter *em, const mat4 *to_world);
 };
 
 struct emitter {
@@ -80,8 +83,26 @@ struct emitter {
 			 irradiance, which the caller multiplies by the scene's cross section pi R^2 */
 	double brightest; /* upper bound of the radiance over places, directions and wavelengths; for delta emitters a
 			     bound that pixels are expected to stay below, see delta.h */
+	const struct motion *moves; /* to the rescaled world; NULL: it is still. Otherwise `data` is that when the
+				       shutter opens */
 	void *data;
 };
+
+/* For an emitter that moves, as it is at one time. */
+enum { EMITTER_ROOM = 1024 };
+struct emitter_room {
+	struct emitter em;
+	_Alignas(16) unsigned char data[EMITTER_ROOM];
+};
+
+void emitter_move(const struct emitter *em, double time, struct emitter_room *room);
+static inline const struct emitter *emitter_at(const struct emitter *em, double time, struct emitter_room *room)
+{
+	if (!em->moves)
+		return em;
+	emitter_move(em, time, room);
+	return &room->em;
+}
 
 static inline bool emitter_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 					 double *pdf_toward)

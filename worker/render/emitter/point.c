@@ -41,6 +41,12 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	return code;
 }
 
+static void place(struct emitter *em, const mat4 *to_world)
+{
+	struct delta_light *l = em->data;
+	l->x.p = mat4_point(to_world, (vec3){0, 0, 0});
+}
+
 static const struct param params[] = {
 	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 	{.name = "position", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
@@ -57,4 +63,5 @@ const struct emitter_ops emitter_ops_point = {
 	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
+	.place = place,
 };

@@ -105,6 +105,16 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	return read_texture(em, s, n, &to_world, build, e);
 }
 
+/* A moving transform has an inverse and keeps its side, so what create accepted has axes at every time. */
+static void place(struct emitter *em, const mat4 *to_world)
+{
+	struct spot *s = em->data;
+	s->light.x.p = mat4_point(to_world, (vec3){0, 0, 0});
+	s->axes = frame_around(vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1})));
+	if (s->textured)
+		delta_axes_of(to_world, s->local);
+}
+
 static const struct param params[] = {
 	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 	{.name = "to_world", .types = VALUE_TRANSFORM},
@@ -123,4 +133,5 @@ const struct emitter_ops emitter_ops_spot = {
 	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
+	.place = place,
 };

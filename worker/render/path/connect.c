@@ -232,7 +232,8 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 	int32_t chosen = world_pick_emitter(w, z->next_event[2]);
 	if (chosen < 0)
 		return false;
-	const struct emitter *em = &w->emitters[chosen];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(w, chosen, z->x.prim.time, &room);
 	struct emitter_point p;
 	if (!emitter_sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
 		return false;

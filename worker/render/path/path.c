@@ -105,7 +105,8 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 			(c->window.width * c->window.height);
 	} else if (at->kind == VERTEX_EMITTER || !prev) {
 		struct emitter_point p = world_emitter_point(&at->x);
-		const struct emitter *em = &c->w->emitters[at->emitter];
+		struct emitter_room room;
+		const struct emitter *em = world_emitter(c->w, at->emitter, at->x.prim.time, &room);
 		solid = em->ops->pdf_direction(em, &p, omega);
 	} else {
 		double unused;
@@ -315,7 +316,8 @@ static bool leave_infinity(struct path_context *c, struct path_vertex *v, const 
 static bool leave_surface(struct path_context *c, struct path_vertex *v, const double u[2], double distance,
 			  spectrum *left)
 {
-	const struct emitter *em = &c->w->emitters[v[0].emitter];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(c->w, v[0].emitter, v[0].x.prim.time, &room);
 	struct emitter_point p = world_emitter_point(&v[0].x);
 	vec3 d;
 	double solid;
@@ -336,7 +338,8 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	int32_t chosen = world_pick_emitter(w, u[DIM_EMITTER_CHOICE]);
 	if (chosen < 0 || max_vertices == 0)
 		return 0;
-	const struct emitter *em = &w->emitters[chosen];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(w, chosen, c->time, &room);
 	struct emitter_point p;
 	double pdf;
 	if (!em->ops->sample_point(em, u + DIM_EMITTER_POINT, &p, &pdf) || !(pdf > 0))

@@ -3,7 +3,8 @@
 
 spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl)
 {
-	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
 	struct emitter_point p = world_emitter_point(&v->x);
 	p.infinite = v->kind == VERTEX_INFINITE;
 	return em->ops->radiance(em, &p, w, wl);

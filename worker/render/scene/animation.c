@@ -109,6 +109,8 @@ const char *animation_refused(const struct scene_node *n, const struct xml_eleme
 		return strcmp(n->type, "orthographic") == 0 || strcmp(n->type, "telecentric") == 0
 			       ? "an orthographic or telecentric camera"
 			       : NULL;
+	if (n->cls == PLUGIN_EMITTER)
+		return strcmp(n->type, "point") == 0 || strcmp(n->type, "spot") == 0 ? NULL : "such an emitter";
 	if (n->cls != PLUGIN_SHAPE)
 		return plugin_class_name(n->cls);
 	return n->shines ? "what shines" : is_in_group(el) ? "a shape in a shapegroup" : NULL;

@@ -22,6 +22,7 @@
 #include "worker/render/world/effects_apply.h"
 #include "worker/render/world/effects_text.h"
 #include "worker/render/world/geometry.h"
+#include "worker/render/world/moving.h"
 #include "worker/render/world/node_table.h"
 #include "worker/render/world/smooth_tangents.h"
 #include "worker/render/world/unseen.h"
@@ -194,6 +195,8 @@ static int create_emitters(struct builder *b)
 		if (!rc && environment && w->environment >= 0)
 			rc = node_error(n, b->e, EINVAL,
 					"a scene may have one environment only; remove this one or the one before");
+		if (!rc)
+			rc = moving_emitter(b, em, n);
 		if (em->infinite)
 			em->power *= M_PI * w->radius * w->radius;
 		if (!rc && !isfinite(em->power))

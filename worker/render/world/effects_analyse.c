@@ -383,6 +383,9 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (surface_moves(&w->shapes[i]))
 			count(&moving, src->shape[i], "");
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (w->emitters[i].moves)
+			count(&moving, src->emitter[i], "");
 	if (w->camera.moves)
 		count(&moving, src->sensor, "");
 	if (moving.count)

@@ -92,6 +92,39 @@ int moving_place_sphere(struct builder *b, uint32_t id)
 	return 0;
 }
 
+/* A place at each of m's times. */
+static int check_reach(const struct builder *b, const struct scene_node *n, const struct motion *m)
+{
+	for (uint32_t i = 0; i < m->count; i++)
+		if (!(vec3_length(m->key[i].at) <= PARAM_REACH_MAX))
+			return node_error(n, b->e, ERANGE, "it moves more than %g scene radii away from the scene",
+					  PARAM_REACH_MAX);
+	return 0;
+}
+
+int moving_emitter(struct builder *b, struct emitter *em, const struct scene_node *n)
+{
+	struct world *w = b->w;
+	const struct animation *a = node_animation(n, "to_world");
+	if (!a)
+		return 0;
+	struct motion *m = arena_alloc(&w->arena, 1, sizeof *m);
+	struct motion_key *keys = arena_alloc(&w->arena, a->count, sizeof *keys);
+	if (!m || !keys)
+		return build_out_of_memory(b->e);
+	bool moves = motion_make(m, a, w->settings.shutter_open, w->settings.shutter_close, keys);
+	if (moves && w->settings.rolling_shutter)
+		return refuse_rolling(n, b->e);
+	motion_rescale(m, w->center, w->scale);
+	int rc = check_reach(b, n, m);
+	if (rc)
+		return rc;
+	mat4 open = motion_at(m, 0);
+	em->ops->place(em, &open);
+	em->moves = moves ? m : NULL;
+	return 0;
+}
+
 int moving_camera(struct builder *b)
 {
 	struct world *w = b->w;
@@ -115,10 +148,6 @@ int moving_camera(struct builder *b)
 	motion_make(m, &(struct animation){a->count, upright}, w->settings.shutter_open, w->settings.shutter_close,
 		    keys);
 	motion_rescale(m, w->center, w->scale);
-	for (uint32_t i = 0; i < m->count; i++)
-		if (!(vec3_length(m->key[i].at) <= PARAM_REACH_MAX))
-			return node_error(sensor, b->e, ERANGE, "it moves more than %g scene radii away from the scene",
-					  PARAM_REACH_MAX);
 	w->camera.moves = m;
-	return 0;
+	return check_reach(b, sensor, m);
 }

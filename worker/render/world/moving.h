@@ -19,6 +19,9 @@ int moving_place(struct builder *b, uint32_t id, vec3 center, double scale, cons
 /* The same for a sphere of the world. */
 int moving_place_sphere(struct builder *b, uint32_t id);
 
+/* An emitter without a surface, after that; it has been made where it is first. -EINVAL, -ERANGE: it cannot move so. */
+int moving_emitter(struct builder *b, struct emitter *em, const struct scene_node *n);
+
 /* The camera, after the world has been rescaled. -EINVAL, -ERANGE: it cannot move like that. */
 int moving_camera(struct builder *b);
 

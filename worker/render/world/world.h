@@ -82,6 +82,13 @@ static inline const struct camera *world_camera(const struct world *w, const str
 	return camera_at(&w->camera, x->prim.time, room);
 }
 
+/* An emitter at the time of a path's vertex; room: for one that moves. */
+static inline const struct emitter *world_emitter(const struct world *w, int32_t emitter, double time,
+						  struct emitter_room *room)
+{
+	return emitter_at(&w->emitters[emitter], time, room);
+}
+
 /* The emitter selected by a number in [0,1); -1 if there is none. */
 int32_t world_pick_emitter(const struct world *w, double u);
 

@@ -121,26 +121,28 @@ static void test_seen(void **state)
 enum { PARTS = 32 };
 
 #define SHUTTER "<float name='shutter_open' value='1'/><float name='shutter_close' value='3'/>"
-#define SENSOR_OF                                                                                            \
+#define EYE                                                                                                  \
 	"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='0.05'/>" \
 	"<float name='focus_distance' value='5'/>" SHUTTER "%s" BOX_FILM "</sensor>"
-#define ROOM                                                                                                                                                                                                                                                       \
-	"<integrator type='path'><integer name='max_depth' value='6'/></integrator>"                                                                                                                                                                               \
-	"<shape type='rectangle'>" TO(                                                                                                                                                                                                                             \
-		"<scale value='4'/><rotate x='1' angle='-90'/><translate y='-1'/>") "<bsdf "                                                                                                                                                                       \
-										    "type='diffuse'><float name='reflectance' value='0.6'/></bsdf></shape>"                                                                                                        \
-										    "<shape type='rectangle'>" TO(                                                                                                                                                 \
-											    "<scale value='1.5'/><rotate x='1' angle='90'/><translate y='3'/>") "<emitter "                                                                                        \
-																				"type='area'><float name='radiance' value='3'/></emitter></shape><emitter type='constant'><float " \
-																				"name='radiance' value='0.2'/></emitter>"
-/* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns. */
+#define FLOOR                                                                                              \
+	"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>" \
+	"<translate y='-1'/></transform><bsdf type='diffuse'><float name='reflectance' value='0.6'/></bsdf></shape>"
+#define LAMP                                                                                                \
+	"<shape type='rectangle'><transform name='to_world'><scale value='1.5'/><rotate x='1' angle='90'/>" \
+	"<translate y='3'/></transform><emitter type='area'><float name='radiance' value='3'/></emitter>"   \
+	"</shape><emitter type='constant'><float name='radiance' value='0.2'/></emitter>"
+#define DEPTH "<integrator type='path'><integer name='max_depth' value='6'/></integrator>"
+#define STAGE DEPTH EYE FLOOR LAMP
+/* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns, a swinging spot. */
 #define CARD "<shape type='rectangle'>%s<bsdf type='diffuse'><float name='reflectance' value='0.3'/></bsdf></shape>"
 #define GLASS "<shape type='sphere'>%s<bsdf type='dielectric'/></shape>"
-#define GROUP                                                                                                                                              \
-	"<shape type='shapegroup' id='g'><shape type='cube'>" TO(                                                                                          \
-		"<scale x='0.8' y='0.3' z='0.3'/>") "<bsdf "                                                                                               \
-						    "type='roughconductor'><string name='material' value='none'/><float name='alpha' value='0.2'/></bsdf>" \
-						    "</shape></shape><shape type='instance'><ref id='g'/>%s</shape>"
+#define GROUP                                                                                            \
+	"<shape type='shapegroup' id='g'><shape type='cube'><transform name='to_world'>"                 \
+	"<scale x='0.8' y='0.3' z='0.3'/></transform><bsdf type='roughconductor'>"                       \
+	"<string name='material' value='none'/><float name='alpha' value='0.2'/></bsdf></shape></shape>" \
+	"<shape type='instance'><ref id='g'/>%s</shape>"
+#define SPOT \
+	"<emitter type='spot'>%s<float name='intensity' value='15'/><float name='cutoff_angle' value='30'/></emitter>"
 
 static void put_card(char *out, size_t size, double t)
 {
@@ -156,6 +158,13 @@ static void put_glass(char *out, size_t size, double t)
 static void put_group(char *out, size_t size, double t)
 {
 	snprintf(out, size, "<rotate y='1' angle='%.17g'/><translate x='-0.8' y='-0.5'/>", 100 * t);
+}
+
+static void put_spot(char *out, size_t size, double t)
+{
+	snprintf(out, size,
+		 "<rotate x='1' angle='90'/><rotate z='1' angle='%.17g'/><translate x='%.17g' y='2.5' z='1'/>",
+		 -30 + 60 * t, -0.3 - 0.5 * t);
 }
 
 static void put_camera(char *out, size_t size, double t)
@@ -182,8 +191,8 @@ static void put_moving(char *out, size_t size, put_fn *put)
 	snprintf(out, size, KEYS("%s", "%s"), begin, end);
 }
 
-static put_fn *const puts_of[] = {put_camera, put_card, put_glass, put_group};
-enum { THINGS = 4 };
+static put_fn *const puts_of[] = {put_camera, put_card, put_glass, put_group, put_spot};
+enum { THINGS = 5 };
 
 /* Whether the camera or all else moves; what does not stands where it is at STILL. */
 #define STILL 0.4
@@ -199,7 +208,7 @@ static struct world *world_at(bool camera, double t)
 			put_moving(place[i], sizeof place[i], puts_of[i]);
 		else
 			put_still(place[i], sizeof place[i], puts_of[i], t);
-	return world_of_text(16, 16, SENSOR_OF ROOM CARD GLASS GROUP, place[0], place[1], place[2], place[3]);
+	return world_of_text(16, 16, STAGE CARD GLASS GROUP SPOT, place[0], place[1], place[2], place[3], place[4]);
 }
 
 static void mean_of_stills(bool camera, struct agree_image *out)

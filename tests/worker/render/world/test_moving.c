@@ -323,9 +323,13 @@ static void test_refused(void **state)
 	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><scale x='2'/></transform></animation></shape>",
 		"a sphere that moves may not be stretched in one direction");
+	refused(VIEW(OPEN("0", "1")) "<emitter type='directional'><animation name='to_world'>"
+				     "<transform time='0'/><transform time='1'><rotate x='1' angle='9'/></transform>"
+				     "</animation></emitter>",
+		"motion of such an emitter is not supported");
 	refused(VIEW(OPEN("0", "1")) "<emitter type='point'><animation name='to_world'><transform time='0'/>"
-				     "<transform time='1'><translate x='2'/></transform></animation></emitter>",
-		"motion of emitter is not supported");
+				     "<transform time='1'><translate x='1e30'/></transform></animation></emitter>",
+		"it moves more than");
 	refused(VIEW(OPEN("0", "1")) SLIDES("rectangle", "<emitter type='area'/>"), "motion of what shines");
 	refused(VIEW(OPEN("0", "1")) "<shape type='cube' id='c'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><translate x='2'/></transform></animation></shape>"
