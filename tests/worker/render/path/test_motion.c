@@ -129,11 +129,10 @@ enum { PARTS = 32 };
 	"<translate y='-1'/></transform><bsdf type='diffuse'><float name='reflectance' value='0.6'/></bsdf></shape>"
 #define LAMP                                                                                                \
 	"<shape type='rectangle'><transform name='to_world'><scale value='1.5'/><rotate x='1' angle='90'/>" \
-	"<translate y='3'/></transform><emitter type='area'><float name='radiance' value='3'/></emitter>"   \
-	"</shape><emitter type='constant'><float name='radiance' value='0.2'/></emitter>"
+	"<translate y='3'/></transform><emitter type='area'><float name='radiance' value='3'/></emitter></shape>"
+#define SKY "<emitter type='constant'><float name='radiance' value='0.2'/></emitter>"
 #define DEPTH "<integrator type='path'><integer name='max_depth' value='6'/></integrator>"
-#define STAGE DEPTH EYE FLOOR LAMP
-/* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns, a swinging spot. */
+/* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns, two lights. */
 #define CARD "<shape type='rectangle'>%s<bsdf type='diffuse'><float name='reflectance' value='0.3'/></bsdf></shape>"
 #define GLASS "<shape type='sphere'>%s<bsdf type='dielectric'/></shape>"
 #define GROUP                                                                                            \
@@ -142,7 +141,8 @@ enum { PARTS = 32 };
 	"<string name='material' value='none'/><float name='alpha' value='0.2'/></bsdf></shape></shape>" \
 	"<shape type='instance'><ref id='g'/>%s</shape>"
 #define SPOT \
-	"<emitter type='spot'>%s<float name='intensity' value='15'/><float name='cutoff_angle' value='30'/></emitter>"
+	"<emitter type='spot'>%s<float name='intensity' value='2'/><float name='cutoff_angle' value='40'/></emitter>"
+#define POINT "<emitter type='point'>%s<float name='intensity' value='0.6'/></emitter>"
 
 static void put_card(char *out, size_t size, double t)
 {
@@ -165,6 +165,11 @@ static void put_spot(char *out, size_t size, double t)
 	snprintf(out, size,
 		 "<rotate x='1' angle='90'/><rotate z='1' angle='%.17g'/><translate x='%.17g' y='2.5' z='1'/>",
 		 -30 + 60 * t, -0.3 - 0.5 * t);
+}
+
+static void put_point(char *out, size_t size, double t)
+{
+	snprintf(out, size, "<translate x='%.17g' y='1' z='0.5'/>", 1 - 2 * t);
 }
 
 static void put_camera(char *out, size_t size, double t)
@@ -191,36 +196,47 @@ static void put_moving(char *out, size_t size, put_fn *put)
 	snprintf(out, size, KEYS("%s", "%s"), begin, end);
 }
 
-static put_fn *const puts_of[] = {put_camera, put_card, put_glass, put_group, put_spot};
-enum { THINGS = 5 };
+enum thing { EYES, CARDS, GLASSES, GROUPS, SPOTS, POINTS, THINGS };
+static put_fn *const puts_of[THINGS] = {put_camera, put_card, put_glass, put_group, put_spot, put_point};
 
-/* Whether the camera or all else moves; what does not stands where it is at STILL. */
+/* What moves; all else stands where it is at STILL. No integrator but those with light sub-paths finds light that
+ * points and spots send through glass, so there is none beside them. */
+enum stage { SHAPES, CAMERA, LIGHTS };
+static const char *const names[] = {"motion", "moving camera", "moving lights"};
 #define STILL 0.4
 
+static bool moves(enum stage s, enum thing i)
+{
+	return s == CAMERA ? i == EYES : s == SHAPES ? i >= CARDS && i <= GROUPS : i == SPOTS || i == POINTS;
+}
+
 /* At time t, or, below 0, as it moves. */
-static struct world *world_at(bool camera, double t)
+static struct world *world_at(enum stage s, double t)
 {
 	char place[THINGS][768];
-	for (int i = 0; i < THINGS; i++)
-		if ((i == 0) != camera)
+	for (enum thing i = 0; i < THINGS; i++)
+		if (!moves(s, i))
 			put_still(place[i], sizeof place[i], puts_of[i], STILL);
 		else if (t < 0)
 			put_moving(place[i], sizeof place[i], puts_of[i]);
 		else
 			put_still(place[i], sizeof place[i], puts_of[i], t);
-	return world_of_text(16, 16, STAGE CARD GLASS GROUP SPOT, place[0], place[1], place[2], place[3], place[4]);
+	return s == LIGHTS ? world_of_text(16, 16, DEPTH EYE FLOOR SKY CARD SPOT POINT, place[EYES], place[CARDS],
+					   place[SPOTS], place[POINTS])
+			   : world_of_text(16, 16, DEPTH EYE FLOOR LAMP SKY CARD GLASS GROUP, place[EYES], place[CARDS],
+					   place[GLASSES], place[GROUPS]);
 }
 
-static void mean_of_stills(bool camera, struct agree_image *out)
+static void mean_of_stills(enum stage s, struct agree_image *out)
 {
 	static struct agree_image part;
 	memset(out, 0, sizeof *out);
 	for (int i = 0; i < PARTS; i++) {
 		char side[32];
-		struct world *w = world_at(camera, (i + 0.5) / PARTS);
+		struct world *w = world_at(s, (i + 0.5) / PARTS);
 		const struct agree_side how = {"bdpt", 320, 32, 0, 0};
 		snprintf(side, sizeof side, "still %d", i);
-		agree_render(w, camera ? "moving camera" : "motion", side, &how, &part);
+		agree_render(w, names[s], side, &how, &part);
 		out->groups = part.groups;
 		for (uint32_t g = 0; g < part.groups; g++)
 			for (int c = 0; c <= AGREE_CELLS; c++)
@@ -229,15 +245,15 @@ static void mean_of_stills(bool camera, struct agree_image *out)
 	}
 }
 
-static void check_integrators(bool camera, const struct agree_side *sides, size_t count)
+static void check_integrators(enum stage s, const struct agree_side *sides, size_t count)
 {
 	static struct agree_image stills, image;
-	mean_of_stills(camera, &stills);
-	struct world *w = world_at(camera, -1);
+	mean_of_stills(s, &stills);
+	struct world *w = world_at(s, -1);
 	assert_true(w->effects.motion && !w->effects.colour);
 	for (size_t i = 0; i < count; i++) {
 		char test[64];
-		snprintf(test, sizeof test, "%s, %s", camera ? "moving camera" : "motion", sides[i].integrator);
+		snprintf(test, sizeof test, "%s, %s", names[s], sides[i].integrator);
 		agree_render(w, test, "moving", &sides[i], &image);
 		agree_check(test, &image, &stills);
 	}
@@ -245,7 +261,7 @@ static void check_integrators(bool camera, const struct agree_side *sides, size_
 	/* Where everything is when the shutter opens, it is another image: the comparison can tell. */
 	struct agree_difference d;
 	const struct agree_side how = {"bdpt", 8192, 32, 0, 0};
-	w = world_at(camera, 0);
+	w = world_at(s, 0);
 	agree_render(w, "motion", "when it opens", &how, &image);
 	agree_measure(&image, &stills, &d);
 	assert_false(d.holds);
@@ -260,14 +276,22 @@ static void test_shapes(void **state)
 						  {"pssmlt", 65536, 32, 0, 0},
 						  {"hslt", 98304, 32, 0, 0},
 						  {"erpt", 12288, 32, 0, 0}};
-	check_integrators(false, sides, sizeof sides / sizeof *sides);
+	check_integrators(SHAPES, sides, sizeof sides / sizeof *sides);
 }
 
 static void test_camera(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {{"path", 16384, 32, 0, 0}, {"hslt", 98304, 32, 0, 0}};
-	check_integrators(true, sides, sizeof sides / sizeof *sides);
+	check_integrators(CAMERA, sides, sizeof sides / sizeof *sides);
+}
+
+static void test_lights(void **state)
+{
+	(void)state;
+	static const struct agree_side sides[] = {
+		{"path", 8192, 32, 0, 0}, {"bdpt", 4096, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
+	check_integrators(LIGHTS, sides, sizeof sides / sizeof *sides);
 }
 
 int main(void)
@@ -276,6 +300,7 @@ int main(void)
 		cmocka_unit_test(test_seen),
 		cmocka_unit_test(test_shapes),
 		cmocka_unit_test(test_camera),
+		cmocka_unit_test(test_lights),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
