@@ -52,7 +52,8 @@ static int compare(const void *first, const void *second)
 void room_share(struct room_claim *claims, size_t count, uint64_t available)
 {
 	bool any = false;
-	qsort(claims, count, sizeof *claims, compare);
+	if (count)
+		qsort(claims, count, sizeof *claims, compare);
 	for (size_t i = 0; i < count; i++) {
 		claims[i].goes = claims[i].bytes <= available;
 		available -= claims[i].goes ? claims[i].bytes : 0;
