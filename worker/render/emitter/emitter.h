@@ -70,7 +70,8 @@ struct emitter_ops {
 	bool (*sample_toward)(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 			      double *pdf_toward);
 	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
-	/* Puts it where a transform to the rescaled world leads; of delta emitters. NULL: it cannot move. */
+	/* Puts it where a transform to the rescaled world leads; of delta emitters whose to_world is a VALUE_PLACE.
+	 * NULL: it cannot move. */
 	void (*place)(struct emitter *em, const mat4 *to_world);
 };
 

@@ -50,7 +50,7 @@ static void place(struct emitter *em, const mat4 *to_world)
 static const struct param params[] = {
 	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 	{.name = "position", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
-	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "to_world", .types = VALUE_PLACE},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = NULL},
 };

@@ -117,7 +117,7 @@ static void place(struct emitter *em, const mat4 *to_world)
 
 static const struct param params[] = {
 	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "to_world", .types = VALUE_PLACE},
 	{.name = "cutoff_angle", .types = VALUE_FLOAT | VALUE_INT, .min = 0.01, .max = 180},
 	{.name = "beam_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 180},
 	{.name = "texture", .types = VALUE_TEXTURE, .max = 1},

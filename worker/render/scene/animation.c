@@ -3,7 +3,6 @@
 
 #include "worker/render/scene/element.h"
 #include "worker/render/scene/number.h"
-#include "worker/render/scene/plugin.h"
 #include "worker/render/scene/transform.h"
 
 #include <string.h>
@@ -105,13 +104,5 @@ static bool is_in_group(const struct xml_element *el)
 
 const char *animation_refused(const struct scene_node *n, const struct xml_element *el)
 {
-	if (n->cls == PLUGIN_SENSOR)
-		return strcmp(n->type, "orthographic") == 0 || strcmp(n->type, "telecentric") == 0
-			       ? "an orthographic or telecentric camera"
-			       : NULL;
-	if (n->cls == PLUGIN_EMITTER)
-		return strcmp(n->type, "point") == 0 || strcmp(n->type, "spot") == 0 ? NULL : "such an emitter";
-	if (n->cls != PLUGIN_SHAPE)
-		return plugin_class_name(n->cls);
 	return n->shines ? "what shines" : is_in_group(el) ? "a shape in a shapegroup" : NULL;
 }

@@ -21,6 +21,9 @@ enum value_type {
 /* The forms of a colour: a number, rgb, a spectrum, a texture. */
 #define VALUE_COLOR (VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_SPECTRUM)
 #define VALUE_TEXTURE (VALUE_COLOR | VALUE_NODE)
+/* A transform that may be an <animation>. */
+#define VALUE_MOTION (1 << 9)
+#define VALUE_PLACE (VALUE_TRANSFORM | VALUE_MOTION)
 
 /* Common ranges. Lengths and matrices: what squares of areas can represent. How far apart things may be, relative to
  * the scene's size, is checked when that is known (PARAM_REACH_MAX). */

@@ -299,10 +299,11 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 /* What cannot move stands still, where the scene has it first: an error, unless the reader is lenient. */
 static int hold_still(struct maker *m, struct draft *d, const struct xml_element *el)
 {
-	const char *what = animation_refused(d->node, el);
-	for (uint32_t i = 0; what && i < d->node->property_count; i++) {
+	for (uint32_t i = 0; i < d->node->property_count; i++) {
 		struct value *v = &d->properties[i].value;
-		if (!v->animation)
+		const struct param *p = v->animation ? plugin_param(d->decl, d->properties[i].name) : NULL;
+		const char *what = p && (p->types & VALUE_MOTION) ? animation_refused(d->node, el) : "this plug-in";
+		if (!v->animation || !what)
 			continue;
 		v->animation = NULL;
 		return m->lenient ? leave_out(&m->notes, el, d->node->type, "motion", "all but the start of the")

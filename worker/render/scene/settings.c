@@ -35,7 +35,7 @@ enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 	}
 /* For both cameras. Pixels are sampled all over, and textures are not filtered, whatever jitter and cone_scale say. */
 #define CAMERA_PARAMS                                                                                   \
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},            \
+	{"to_world", UNDERSTOOD(VALUE_PLACE)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                \
 		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},      \
 		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, \
 		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS,                              \
@@ -89,7 +89,7 @@ static const struct param telecentric_params[] = {
 
 /* Exporters write planes and a focus for all cameras; this one has none. */
 static const struct param spherical_params[] = {
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
+	{"to_world", UNDERSTOOD(VALUE_PLACE)},
 	{"near_clip", IGNORED},
 	{"far_clip", IGNORED},
 	{"focus_distance", IGNORED},

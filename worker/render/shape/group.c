@@ -9,7 +9,7 @@
 #include <string.h>
 
 static const struct param none[] = {{.name = NULL}};
-static const struct param instance_params[] = {{.name = "to_world", .types = VALUE_TRANSFORM}, {.name = NULL}};
+static const struct param instance_params[] = {{.name = "to_world", .types = VALUE_PLACE}, {.name = NULL}};
 
 const struct shape_ops shape_ops_merge = {{PLUGIN_SHAPE, "merge", none, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD}, NULL};
 const struct shape_ops shape_ops_shapegroup = {{PLUGIN_SHAPE, "shapegroup", none, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD},

@@ -326,7 +326,7 @@ static void test_refused(void **state)
 	refused(VIEW(OPEN("0", "1")) "<emitter type='directional'><animation name='to_world'>"
 				     "<transform time='0'/><transform time='1'><rotate x='1' angle='9'/></transform>"
 				     "</animation></emitter>",
-		"motion of such an emitter is not supported");
+		"motion of this plug-in is not supported");
 	refused(VIEW(OPEN("0", "1")) "<emitter type='point'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><translate x='1e30'/></transform></animation></emitter>",
 		"it moves more than");
