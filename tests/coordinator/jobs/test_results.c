@@ -527,7 +527,7 @@ static void a_failure_counts_whatever_its_text(void **state)
 		peer_attend(worker, &d);
 	say_failed(worker, &d.keys[0], "half a letter \xc3\nof a file");
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	while (!strstr(list_job(client, d.keys[0].job)->why, "scripted: half a letter ? of a file"))
+	while (!strstr(list_job(client, d.keys[0].job)->why, "scripted failed last: half a letter ? of a file"))
 		usleep(1000);
 	struct pollfd ready = {worker->fd, POLLIN, 0};
 	while (poll(&ready, 1, 200) == 1) /* neither a fault nor the end */
