@@ -7,6 +7,7 @@
  * Level: five standard errors of 32 groups (t), 2e-5 a comparison, 19 of them. Power: errors are below 0.5 %.
  */
 #include "tests/support/agree.h"
+#include "tests/support/length.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/base/options.h"
