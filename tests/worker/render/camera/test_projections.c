@@ -104,7 +104,7 @@ static void test_panorama(void **state)
 	assert_false(camera_has(&c, -0.1, 3) || camera_has(&c, WIDTH, 3) || camera_has(&c, 3, -0.1) ||
 		     camera_has(&c, 3, HEIGHT));
 	/* Nothing is too near or too far. */
-	double low, high, x, y;
+	double low, high, x = 0, y = 0;
 	camera_clip(&c, (vec3){0, 0, -1}, &low, &high);
 	assert_true(low == 0 && high == INFINITY && camera_project(&c, c.position, (vec3){0, 0.6, -0.8}, 1e-9, &x, &y));
 	assert_true(x == 0 && y > 0 && y < 0.5 * HEIGHT);

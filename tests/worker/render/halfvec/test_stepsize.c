@@ -122,7 +122,7 @@ static vec2 seen_half(double x, double y)
 	s->normal = moved.normal[1];
 	s->uv = moved.uv[1];
 	s->index = moved.index[1];
-	struct ray_hit hit = {.prim = {1, 0}, .t = distance};
+	struct ray_hit hit = {.prim = {1, 0, 0}, .t = distance};
 	surface_from_hit(s, from, w, &hit, &moved.x.v[1].x);
 	hand_join(&moved);
 	return halfvec_of(&moved.x, 1);
