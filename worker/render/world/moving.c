@@ -34,26 +34,33 @@ static int check(const struct builder *b, const struct listed_shape *l, uint32_t
 	return 0;
 }
 
-static int refuse_rolling(const struct scene_node *n, struct error *e)
+/* How it moves while the shutter is open; *moves: it does. */
+static int make_motion(struct builder *b, const struct scene_node *n, const struct animation *a, struct motion **out,
+		       bool *moves)
 {
-	return node_error(n, e, ENOTSUP, "it moves, and a rolling shutter is not supported");
+	const struct scene_settings *s = &b->w->settings;
+	struct motion *m = *out = arena_alloc(&b->w->arena, 1, sizeof *m);
+	struct motion_key *keys = arena_alloc(&b->w->arena, a->count, sizeof *keys);
+	if (!m || !keys)
+		return build_out_of_memory(b->e);
+	*moves = motion_make(m, a, s->shutter_open, s->shutter_close, keys);
+	return *moves && s->rolling_shutter
+		       ? node_error(n, b->e, ENOTSUP, "it moves, and a rolling shutter is not supported")
+		       : 0;
 }
 
 int moving_begin(struct builder *b, const struct listed_shape *l, uint32_t id, struct box from)
 {
-	const struct scene_settings *s = &b->w->settings;
 	const struct scene_node *outer = l->instance ? l->instance : l->node;
-	struct motion *m = b->motions[id] = arena_alloc(&b->w->arena, 1, sizeof *m);
-	struct motion_key *keys = arena_alloc(&b->w->arena, l->moves->count, sizeof *keys);
-	if (!m || !keys)
-		return build_out_of_memory(b->e);
-	if (s->rolling_shutter)
-		return refuse_rolling(outer, b->e);
-	motion_make(m, l->moves, s->shutter_open, s->shutter_close, keys);
+	bool moves;
+	int rc = make_motion(b, outer, l->moves, &b->motions[id], &moves);
+	if (rc)
+		return rc;
+	struct motion *m = b->motions[id];
 	bool in_group = l->instance && b->shared[id];
 	if (!in_group && !mat4_invert(node_transform(outer, "to_world"), &m->before))
 		return node_error(outer, b->e, EINVAL, "to_world flattens it (it has no inverse)");
-	int rc = check(b, l, id, m);
+	rc = check(b, l, id, m);
 	if (rc)
 		return rc;
 	struct box *all = &b->boxes[id];
@@ -108,15 +115,13 @@ int moving_emitter(struct builder *b, struct emitter *em, const struct scene_nod
 	const struct animation *a = node_animation(n, "to_world");
 	if (!a)
 		return 0;
-	struct motion *m = arena_alloc(&w->arena, 1, sizeof *m);
-	struct motion_key *keys = arena_alloc(&w->arena, a->count, sizeof *keys);
-	if (!m || !keys)
-		return build_out_of_memory(b->e);
-	bool moves = motion_make(m, a, w->settings.shutter_open, w->settings.shutter_close, keys);
-	if (moves && w->settings.rolling_shutter)
-		return refuse_rolling(n, b->e);
+	struct motion *m;
+	bool moves;
+	int rc = make_motion(b, n, a, &m, &moves);
+	if (rc)
+		return rc;
 	motion_rescale(m, w->center, w->scale);
-	int rc = check_reach(b, n, m);
+	rc = check_reach(b, n, m);
 	if (rc)
 		return rc;
 	mat4 open = motion_at(m, 0);
@@ -132,21 +137,20 @@ int moving_camera(struct builder *b)
 	if (!w->settings.moves)
 		return 0;
 	const struct animation *a = node_animation(sensor, "to_world");
-	struct motion *m = arena_alloc(&w->arena, 1, sizeof *m);
-	struct motion_key *keys = arena_alloc(&w->arena, a->count, sizeof *keys);
+	struct motion *m;
+	bool moves;
 	struct keyframe *upright = arena_alloc(&b->scratch, a->count, sizeof *upright);
-	if (!m || !keys || !upright)
+	if (!upright)
 		return build_out_of_memory(b->e);
-	if (w->settings.rolling_shutter)
-		return refuse_rolling(sensor, b->e);
 	for (uint32_t i = 0; i < a->count; i++) {
 		upright[i].time = a->key[i].time;
 		if (!scene_settings_upright(a->key[i].place, &upright[i].place))
 			return node_error(sensor, b->e, EINVAL,
 					  "to_world may only rotate, translate, mirror and scale a camera");
 	}
-	motion_make(m, &(struct animation){a->count, upright}, w->settings.shutter_open, w->settings.shutter_close,
-		    keys);
+	int rc = make_motion(b, sensor, &(struct animation){a->count, upright}, &m, &moves);
+	if (rc)
+		return rc;
 	motion_rescale(m, w->center, w->scale);
 	w->camera.moves = m;
 	return check_reach(b, sensor, m);
