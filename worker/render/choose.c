@@ -6,7 +6,7 @@
  * this map. If a lobe of the scene is narrow, it merges light with sub-paths of the camera. If that leaves the choice
  * open, it takes samples of `bdpt`: a quarter of them first, the rest unless the quarter is clear. render_choice_of
  * then compares the figures with the thresholds below. They were set from pilots of 16,384 samples, 40 in each scene
- * of tests/bench/README.md.
+ * of tests/bench/choices.md.
  *
  * If `path` finds no light, the map is made again by `bdpt`. -ENOMEM: no memory for the pilot. -EINVAL: the request
  * has no valid film.
