@@ -20,7 +20,7 @@
 #include "worker/render/path/full_path_density.h"
 #include "worker/render/world/build.h"
 
-/* Relative MSE times CPU time for other values: README of tests/bench, "Energy redistribution". */
+/* Relative MSE times CPU time for other values: tests/bench/choices.md, "Energy redistribution". */
 const struct redistribution_rule redistribution_usual = {.threshold = 4, .mutations = 2, .length = 256};
 
 struct spread_place {
