@@ -27,7 +27,7 @@
 
 enum {
 	SAMPLES_LEAST = 1 << 12,
-	SAMPLES_USUAL = 1 << 14, /* fewer estimate the tail worse: README of tests/bench, "What the pilot chooses" */
+	SAMPLES_USUAL = 1 << 14, /* fewer estimate the tail worse: tests/bench/choices.md, "What the pilot chooses" */
 	SAMPLES_LONG = 1 << 18,
 	SAMPLES_MOST = 1 << 20,
 	SHARE_SHORT = 32,  /* a pilot has 1/32 of the samples of the render, of each kind, up to SAMPLES_USUAL */

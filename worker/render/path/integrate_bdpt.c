@@ -13,7 +13,8 @@
 #include "worker/render/path/integrator.h"
 
 /* Of the light that the camera sub-path finds alone. In closed rooms 0.1 saves a quarter of the time and adds 1 % to
- * the relMSE, 0.3 hardly saves more and adds 5 %; elsewhere neither changes anything (README of tests/bench). */
+ * the relMSE, 0.3 hardly saves more and adds 5 %; elsewhere neither changes anything (tests/bench/choices.md, "Faint
+ * connections"). */
 static const double faint_share = 0.1;
 
 /* Exactly one of so many consecutive samples of a pixel, where these are low-discrepancy. */
