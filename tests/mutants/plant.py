@@ -38,9 +38,11 @@ def check(path):
     return wrong
 
 
-if sys.argv[1] == "--check":
+if len(sys.argv) == 3 and sys.argv[1] == "--check":
     sys.exit(check(sys.argv[2]))
-result = plant(*sys.argv[1:4])
+if len(sys.argv) != 4:
+    sys.exit(__doc__)
+result = plant(*sys.argv[1:])
 if result is None:
     sys.exit(1)
 sys.stdout.write(result)
