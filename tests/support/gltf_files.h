@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A glTF scene made in memory, in the three forms that files have: a floor that is a strip, two octahedra below a node,
- * a lamp that is a fan, a point light and a camera. Its XML twin is in tests/worker/render/scene/test_gltf.c. One
- * thread.
+ * a lamp that is a fan, a point light and a camera. Its XML twin is tests/scenes/gltf/twin.xml. One thread.
  */
 #ifndef TESTS_SUPPORT_GLTF_FILES_H
 #define TESTS_SUPPORT_GLTF_FILES_H

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * glTF against its XML twin: the same picture, bit for bit, in each form that files have. What is malformed or not
- * supported is answered by a sentence; no damaged byte does anything else.
+ * glTF against its XML twin (tests/scenes/gltf): the same picture, bit for bit, in each form that files have. What is
+ * malformed or not supported is answered by a sentence; no damaged byte does anything else.
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
 #include "tests/support/gltf_files.h"
-#include "tests/support/pictures.h"
 #include "tests/support/render_picture.h"
 #include "tests/support/scene_parts.h"
 #include "tests/support/worlds.h"
@@ -23,99 +22,30 @@
 #include <cmocka.h>
 
 enum { SIDE = 32 };
-#define MATRIX(values) "<transform name='to_world'><matrix value='" values "'/></transform>"
-#define OBJ(name, inner) "<shape type='obj'><string name='filename' value='" name "'/>" inner "</shape>"
-#define BITMAP(name, file)                                                                       \
-	"<texture name='" name "' type='bitmap'><string name='filename' value='" file "'/>"      \
-	"<string name='filter_type' value='nearest'/><string name='wrap_mode_u' value='clamp'/>" \
-	"<string name='wrap_mode_v' value='mirror'/>"
-#define RAW "<boolean name='raw' value='true'/></texture>"
-#define FLOAT(name, value) "<float name='" name "' value='" value "'/>"
 
-static const char solid_obj[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
-				"vn 1 0 0\nvn -1 0 0\nvn 0 1 0\nvn 0 -1 0\nvn 0 0 1\nvn 0 0 -1\n"
-				"vt 0 1\nvt 0.25 0.5\nvt 0.5 0\nvt 0.75 0.875\nvt 1 0.75\nvt -2 -2\n"
-				"f 1/1/1 3/3/3 5/5/5\nf 3/3/3 2/2/2 5/5/5\nf 2/2/2 4/4/4 5/5/5\nf 4/4/4 1/1/1 5/5/5\n"
-				"f 3/3/3 1/1/1 6/6/6\nf 2/2/2 3/3/3 6/6/6\nf 4/4/4 2/2/2 6/6/6\nf 1/1/1 4/4/4 6/6/6\n";
-static const char strip_obj[] = "v -1 0 -1\nv -1 0 1\nv 1 0 -1\nv 1 0 1\nvt 0 1\nvt 0 0\nvt 1 1\nvt 1 0\n"
-				"f 1/1 2/2 3/3\nf 3/3 2/2 4/4\n";
-static const char fan_obj[] = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nvt 0 1\nvt 0 0\nvt 1 0\nvt 1 1\n"
-			      "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
-
-/* b.hdr and g.hdr hold what rgb.hdr has of these. */
-static const char twin[] = "<scene version='3.0.0'>" OBJ(
-	"strip.obj",
-	"<boolean name='face_normals' value='true'/>" MATRIX("4 0 0 0 0 1 0 -1 0 0 4 0 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/><rgb name='base_color' value='0.8 0.4 0.2'/>" FLOAT(
-		"metallic", "0") FLOAT("roughness", "1") FLOAT("eta", "1.5") "</bsdf>")
-	OBJ("solid.obj",
-	    MATRIX("2.2204460492503131e-16 0 1 -1 0 1 0 0.5 -1 0 2.2204460492503131e-16 0 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/>"
-												    "<texture name='base_color' type='scale'><rgb name='scale' value='0.5 1 0.25'/>" BITMAP(
-													    "x",
-													    "rgb.hdr") "</texture></texture><texture name='metallic' type='scale'>" FLOAT("scale",
-																							  "0.5")
-													    BITMAP("x",
-														   "b.hdr")
-														    RAW
-	    "</texture>" BITMAP("roughness", "g.hdr") RAW FLOAT(
-		    "eta",
-		    "1.5") "</bsdf>") OBJ("solid.obj",
-					  MATRIX("0.5 0 0 1 0 0.5 0 0 0 0 0.5 0.5 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/><rgb name='base_color' value='1 1 1'/>" FLOAT(
-						  "metallic", "0") FLOAT("roughness", "0.5") FLOAT("eta", "1.75")
-						  FLOAT("spec_trans", "1") "</bsdf>")
-		OBJ("fan.obj",
-		    "<boolean name='face_normals' value='true'/>" MATRIX("1 0 0 0 0 -1 0 3 0 0 -1 0 0 0 0 1") "<bsdf type='principled'><boolean name='lambertian' value='true'/><rgb name='base_color' value='1 1 1'/>" FLOAT(
-			    "metallic",
-			    "0") FLOAT("roughness", "1")
-			    FLOAT("eta",
-				  "1.5") "</bsdf><emitter type='area'><rgb name='radiance' value='8 4 4'/></emitter>") "<sensor type='perspective'><float name='fov' value='42.971834634811742'/><string name='fov_axis' value='y'/>" MATRIX("-1 0 0 0 0 1 0 0.5 0 0 -1 6 0 0 0 1") "<film type='hdrfilm'><integer name='width' value='768'/>"
-																																		    "<integer name='height' value='768'/></film></sensor>"
-																																		    "<emitter type='point'><rgb name='intensity' value='4 2 1'/><point name='position' x='2' y='2' z='2'/></emitter>"
-																																		    "</scene>";
-
-static struct picture render(const struct memory_file *files)
+static struct picture render(struct world *w)
 {
 	struct picture out;
-	struct world *w = world_of_files(SIDE, SIDE, files);
 	const struct render_picture_how how = {"path", "gltf", 8, 6};
 	render_picture_xyz(w, &how, &out);
 	world_free(w);
 	return out;
 }
 
-static void add_pictures(struct pictures *p)
-{
-	static const double rgb[12] = {0.5, 0.25, 0.75, 0.125, 0.5, 0.25, 0.75, 0.75, 0.5, 0.25, 0.75, 0.875};
-	double green[12], blue[12];
-	for (int i = 0; i < 12; i++) {
-		green[i] = rgb[i / 3 * 3 + 1];
-		blue[i] = rgb[i / 3 * 3 + 2];
-	}
-	*p = (struct pictures){0};
-	pictures_add(p, 2, 2, rgb);
-	pictures_add(p, 2, 2, green);
-	pictures_add(p, 2, 2, blue);
-}
-
 static void test_twin(void **state)
 {
 	(void)state;
-	struct pictures p;
 	static struct gltf_files f;
-	add_pictures(&p);
-	const struct memory_file files[] = {{"twin.xml", twin, sizeof twin - 1},
-					    {"solid.obj", solid_obj, sizeof solid_obj - 1},
-					    {"strip.obj", strip_obj, sizeof strip_obj - 1},
-					    {"fan.obj", fan_obj, sizeof fan_obj - 1},
-					    {"rgb.hdr", p.file[0].bytes, p.file[0].size},
-					    {"g.hdr", p.file[1].bytes, p.file[1].size},
-					    {"b.hdr", p.file[2].bytes, p.file[2].size},
-					    {0}};
-	struct picture want = render(files);
+	struct asset_source folder = asset_folder("tests/scenes/gltf");
+	struct asset texture;
+	struct error e;
+	assert_int_equal(folder.open(folder.user, "rgb.hdr", &texture, &e), 0);
+	struct picture want = render(world_of_own_scene("gltf", "twin.xml", SIDE, SIDE));
 	gltf_files_make(&f);
 	for (int form = 0; form < GLTF_FORMS; form++) {
 		gltf_files_pack(&f, (enum gltf_form)form);
-		f.list[2] = files[4];
-		struct picture got = render(f.list);
+		f.list[2] = (struct memory_file){"rgb.hdr", texture.bytes, texture.size};
+		struct picture got = render(world_of_files(SIDE, SIDE, f.list));
 		double bright = 0;
 		for (int k = 0; k < 3; k++)
 			for (size_t i = 0; i < SIDE * SIDE; i++) {
@@ -128,7 +58,7 @@ static void test_twin(void **state)
 		picture_fini(&got);
 	}
 	picture_fini(&want);
-	pictures_fini(&p);
+	folder.close(folder.user, &texture);
 }
 
 /* ---- one change each */
