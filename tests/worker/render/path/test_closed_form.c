@@ -141,7 +141,8 @@ static void test_invisible(void **state)
 		world_of_text(
 			16, 16,
 			DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL(
-				"<bsdf type='dielectric'/>") "<shape type='sphere'><float name='radius' value='.5'/><bsdf type='dielectric'><float name='int_ior' value='1'/>"
+				"<bsdf type='dielectric'/>") "<shape type='sphere'><float name='radius' value='.5'/>"
+							     "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
 							     "<float name='ext_ior' value='1.5046'/></bsdf></shape>"),
 		0.7, (struct effort){320, 0, 0});
 	/* Rough, but so little that what a model of single scattering loses (0.065 % +- 0.007 % of this image at alpha
@@ -151,13 +152,12 @@ static void test_invisible(void **state)
 				     DEPTH("64") SENSOR("0,0,4", "0,0,0") SKY BALL(
 					     "<bsdf type='roughdielectric'><float name='alpha' value='.001'/></bsdf>")),
 		       0.7, (struct effort){256, 256, 0});
-	check_constant(
-		"invisible rough metal",
-		world_of_text(
-			16, 16,
-			DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
-				"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.001'/></bsdf>")),
-		0.7, (struct effort){128, 64, 0});
+	check_constant("invisible rough metal",
+		       world_of_text(16, 16,
+				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					     "<bsdf type='roughconductor'><string name='material' value='none'/>"
+					     "<float name='alpha' value='.001'/></bsdf>")),
+		       0.7, (struct effort){128, 64, 0});
 	/* White diffuse: every path ends in the sky. */
 	check_constant("invisible white ball",
 		       world_of_text(16, 16,
@@ -407,7 +407,8 @@ static void check_lit_floor(const char *name, struct lamp lamp, const char *xml,
 		16, 16,
 		"%s<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='-90'/></transform>"
 		"<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
-		"<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'><lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>"
+		"<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'>"
+		"<lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>"
 		"</transform><film type='hdrfilm'><rfilter type='box'/></film></sensor>%s",
 		DEPTH("2"), xml);
 	for (size_t i = 0; i < 3; i++) {
@@ -430,13 +431,14 @@ static void test_lit_floor(void **state)
 		"<shape type='rectangle'><transform name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>"
 		"<translate x='3' y='2' z='1'/></transform><emitter type='area'/></shape>",
 		(struct effort){3072, 6144, 32768});
-	check_lit_floor(
-		"floor under a sphere", (struct lamp){0, 0.4, 2},
-		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='.4'/><emitter type='area'/></shape>",
-		(struct effort){1024, 2048, 0});
+	check_lit_floor("floor under a sphere", (struct lamp){0, 0.4, 2},
+			"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='.4'/>"
+			"<emitter type='area'/></shape>",
+			(struct effort){1024, 2048, 0});
 	check_lit_floor(
 		"floor under a tiny sphere", (struct lamp){0, 1e-5, 2},
-		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='1e-5'/><emitter type='area'/></shape>",
+		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='1e-5'/>"
+		"<emitter type='area'/></shape>",
 		(struct effort){512, 0, 0});
 }
 
@@ -444,17 +446,8 @@ static void test_lit_floor(void **state)
 static void test_beam(void **state)
 {
 	(void)state;
-	check_constant(
-		"floor under a beam",
-		world_of_text(
-			16, 16,
-			DEPTH("3") SENSOR(
-				"0,4,0.01",
-				"0,0,0") "<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='-90'/></transform>"
-					 "<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
-					 "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='6'/></transform>"
-					 "<emitter type='directionalarea'><float name='radiance' value='1.5'/></emitter></shape>"),
-		1.5 * 0.5 / M_PI, (struct effort){128, 832, 0});
+	struct world *w = world_of_own_scene("beam", "floor.xml", 16, 16);
+	check_constant("floor under a beam", w, 1.5 * 0.5 / M_PI, (struct effort){128, 832, 0});
 }
 
 /* Two plates of reflectance rho, the lower shines with 1. Between infinite plates every ray from one meets the other.
@@ -467,7 +460,8 @@ static void test_plates(void **state)
 	static const char plates[] =
 		"<shape type='rectangle'><transform name='to_world'><scale value='4000'/><rotate x='1' angle='-90'/></transform>"
 		"<bsdf type='diffuse'><float name='reflectance' value='.6'/></bsdf><emitter type='area'/></shape>"
-		"<shape type='rectangle'><transform name='to_world'><scale value='4000'/><rotate x='1' angle='90'/><translate y='1'/></transform>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='4000'/><rotate x='1' angle='90'/>"
+		"<translate y='1'/></transform>"
 		"<bsdf type='diffuse'><float name='reflectance' value='.6'/></bsdf></shape>";
 	check_constant("lower plate", world_of_text(16, 16, DEPTH("6") SENSOR("0,0.5,0", "0.2,0,0.1") "%s", plates),
 		       1 + pow(rho, 2) + pow(rho, 4), (struct effort){512, 0, 0});

@@ -47,34 +47,15 @@ static void check_convergence(const char *name, struct world *w, struct effort e
 	world_free(w);
 }
 
-#define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
 #define DIFFUSE(x) "<bsdf type='diffuse'><float name='reflectance' value='" x "'/></bsdf>"
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
-#define BALL(center, radius, bsdf)                                                                                     \
-	"<shape type='sphere'><point name='center' value='" center "'/><float name='radius' value='" radius "'/>" bsdf \
-	"</shape>"
-/* clang-format off */
-#define LENS(radius, focus, filter, o, t)                                                                                      \
-	"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='" radius                      \
-	"'/><float name='focus_distance' value='" focus "'/><transform name='to_world'><lookat origin='" o "' target='" t         \
-	"' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='" filter "'/></film></sensor>"
-/* clang-format on */
 
 /* Everything out of focus by up to a third of the picture's width; a border of two pixels. */
 static void test_defocus(void **state)
 {
 	(void)state;
-	check_convergence(
-		"defocus",
-		world_of_text(
-			16, 16, "%s%s", DEPTH("3") LENS("0.3", "1.5", "gaussian", "0,0.6,1.9", "0,-0.2,-1"),
-			"<shape type='rectangle'>" AT("<scale value='5'/><rotate x='1' angle='-90'/><translate y='-1'/>") DIFFUSE(
-				"0.5") "</shape><emitter type='constant'><float name='radiance' value='.5'/></emitter>"
-				       "<shape type='rectangle'>" AT("<scale value='.8'/><translate z='-2'/>") "<emitter type='area'><float name='radiance' value='1'/></emitter></shape>" BALL(
-					       "0.5,-0.8,-0.2", "0.5",
-					       "<bsdf type='roughconductor'><float name='alpha' value='.2'/></bsdf>")
-					       BALL("-0.5,0.1,0.9", "0.3", DIFFUSE("0.9"))),
-		(struct effort){3072, 2048, 65536});
+	struct world *w = world_of_own_scene("ends", "defocus.xml", 16, 16);
+	check_convergence("defocus", w, (struct effort){3072, 2048, 65536});
 }
 
 struct span {
@@ -95,10 +76,7 @@ static void test_blurred_rectangle(void **state)
 	const double focus = 2, z = 5, radius = 0.5, half = tan(20 * M_PI / 180);
 	const struct span x = {-0.3 / z, 3 / z}, y = {-1.5 / z, 1 / z};
 	static struct agree_image image;
-	struct world *w = world_of_text(
-		16, 16, "%s%s", DEPTH("1") LENS("0.5", "2", "box", "0,0,5", "0,0,0"),
-		"<shape type='rectangle'>" AT(
-			"<scale x='1.65' y='1.25'/><translate x='1.35' y='-.25'/>") "<emitter type='area'/></shape>");
+	struct world *w = world_of_own_scene("ends", "blurred-rectangle.xml", 16, 16);
 	const struct agree_side side = {"path", 12288, 32, 0, 0};
 	agree_render(w, __func__, "path", &side, &image);
 	double expected[AGREE_CELLS + 1] = {0};
@@ -161,25 +139,43 @@ static void check_floor(const char *name, const struct lamps *l, struct effort e
 	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0},
 					   {"bdpt", e.bdpt, 32, 0, 0},
 					   {"pssmlt", test_full() ? e.pssmlt : 0, 32, 0, 0}};
-	const char *mirror =
-		l->mirror
-			? "<shape type='rectangle'>" AT(
-				  "<scale value='1.6'/><rotate y='1' angle='90'/><translate x='-1.5'/>") "<bsdf type='conductor'><string name='material' value='none'/></bsdf></shape>"
-			: "";
-	struct world *w = world_of_text(
-		16, 16,
-		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator><sensor type='perspective'><float name='fov' value='40'/>" AT(
-			"<lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>") "<film type='hdrfilm'><rfilter type='box'/></film></sensor>%s<shape type='rectangle'>" AT("<scale value='1.5'/><rotate x='1' angle='-90'/>")
-			DIFFUSE("0.5") "</shape>"
-				       "<emitter type='point'><point name='position' x='%g' y='%g' z='%g'/><float name='intensity' value='%g'/></emitter>"
-				       "<emitter type='directional'><vector name='direction' x='%g' y='%g' z='%g'/><float name='irradiance' value='%g'/></emitter>"
-				       "<emitter type='spot'><float name='cutoff_angle' value='40'/><float name='beam_width' value='25'/>"
-				       "<float name='intensity' value='%g'/>" AT(
-					       "<lookat origin='%g,%g,%g' target='%g,%g,%g' up='0,0,1'/>") "</emitter>"
-													   "<emitter type='constant'><float name='radiance' value='%g'/></emitter>",
-		l->mirror ? 3 : 2, mirror, l->point.x, l->point.y, l->point.z, l->intensity, l->direction.x,
+	/* clang-format off */
+	static const char mirror[] =
+		"<shape type='rectangle'>"
+			AT("<scale value='1.6'/><rotate y='1' angle='90'/><translate x='-1.5'/>")
+			"<bsdf type='conductor'><string name='material' value='none'/></bsdf>"
+		"</shape>";
+	struct world *w = world_of_text(16, 16,
+		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>"
+		"<sensor type='perspective'>"
+			"<float name='fov' value='40'/>"
+			AT("<lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>")
+			"<film type='hdrfilm'><rfilter type='box'/></film>"
+		"</sensor>"
+		"%s"
+		"<shape type='rectangle'>"
+			AT("<scale value='1.5'/><rotate x='1' angle='-90'/>")
+			DIFFUSE("0.5")
+		"</shape>"
+		"<emitter type='point'>"
+			"<point name='position' x='%g' y='%g' z='%g'/>"
+			"<float name='intensity' value='%g'/>"
+		"</emitter>"
+		"<emitter type='directional'>"
+			"<vector name='direction' x='%g' y='%g' z='%g'/>"
+			"<float name='irradiance' value='%g'/>"
+		"</emitter>"
+		"<emitter type='spot'>"
+			"<float name='cutoff_angle' value='40'/>"
+			"<float name='beam_width' value='25'/>"
+			"<float name='intensity' value='%g'/>"
+			AT("<lookat origin='%g,%g,%g' target='%g,%g,%g' up='0,0,1'/>")
+		"</emitter>"
+		"<emitter type='constant'><float name='radiance' value='%g'/></emitter>",
+		l->mirror ? 3 : 2, l->mirror ? mirror : "", l->point.x, l->point.y, l->point.z, l->intensity, l->direction.x,
 		l->direction.y, l->direction.z, l->irradiance, l->spot_intensity, l->spot.x, l->spot.y, l->spot.z,
 		l->aim.x, l->aim.y, l->aim.z, l->sky);
+	/* clang-format on */
 	assert_true(w->effects.delta_light && !w->effects.colour && (w->environment >= 0) == (l->sky > 0));
 	double half = 4 * tan(20 * M_PI / 180), sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2],
 	       expected[AGREE_CELLS + 1] = {0};
@@ -240,19 +236,8 @@ static void test_lit_by_a_mirror(void **state)
 static void test_rough_in_delta_light(void **state)
 {
 	(void)state;
-	check_convergence(
-		"rough bodies in delta light",
-		world_of_text(
-			16, 16, "%s%s", DEPTH("4") SENSOR("0,2.4,1.8", "0,-1,-0.1"),
-			"<shape type='rectangle'>" AT("<scale value='2.4'/><rotate x='1' angle='-90'/><translate y='-1'/>") DIFFUSE(
-				"0.5") "</shape>"
-				       "<emitter type='point'><point name='position' x='1' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
-				       "<emitter type='directional'><vector name='direction' x='.4' y='-1' z='-.3'/></emitter>" BALL(
-					       "-0.5,-0.4,0", "0.6",
-					       "<bsdf type='roughdielectric'><float name='alpha' value='.5'/></bsdf>")
-					       BALL("0.7,-0.6,-0.3", "0.4",
-						    "<bsdf type='roughconductor'><float name='alpha' value='.4'/></bsdf>")),
-		(struct effort){8192, 8192, 0});
+	struct world *w = world_of_own_scene("ends", "rough-bodies.xml", 16, 16);
+	check_convergence("rough bodies in delta light", w, (struct effort){8192, 8192, 0});
 }
 
 /* In a room of perfect mirrors a path ends by roulette alone: after as many scattering events as the scene says no path
@@ -271,13 +256,15 @@ static void test_roulette(void **state)
 		    {"<integer name='rr_depth' value='40'/>", 40},
 		    {"<integer name='rr_depth' value='64'/>", EDGES}};
 	for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
-		struct world *w = world_of_text(
-			8, 8, "<integrator type='path'>%s</integrator>%s", rows[k].asks,
-			SENSOR("0,0.2,0.9",
-			       "0.1,-0.1,-1") "<shape type='cube'><bsdf type='conductor'><string name='material' "
-					      "value='none'/></bsdf></shape>"
-					      "<shape type='sphere'><point name='center' x='0' y='0' z='5'/>"
-					      "<emitter type='area'/></shape>");
+		/* clang-format off */
+		struct world *w = world_of_text(8, 8, "<integrator type='path'>%s</integrator>%s",
+			rows[k].asks,
+			SENSOR("0,0.2,0.9", "0.1,-0.1,-1")
+			"<shape type='cube'>"
+				"<bsdf type='conductor'><string name='material' value='none'/></bsdf>"
+			"</shape>"
+			"<shape type='sphere'><point name='center' x='0' y='0' z='5'/><emitter type='area'/></shape>");
+		/* clang-format on */
 		uint64_t counters[BATCH_COUNTERS] = {0};
 		unsigned there = 0;
 		c = (struct path_context){.w = w,

@@ -26,13 +26,16 @@ enum { SIDE = 8, SPP = 64 };
 static double shown(const char *accuracy, const char *material, bool back)
 {
 	worlds_accuracy = accuracy;
-	struct world *w = world_of_text(
-		SIDE, SIDE,
-		SKY SENSOR(
-			"0,0,1",
-			"0,0,0") "<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate y='1' angle='%d'/>"
-				 "</transform>%s</shape>",
+	/* clang-format off */
+	struct world *w = world_of_text(SIDE, SIDE,
+		SKY
+		SENSOR("0,0,1", "0,0,0")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'><scale value='9'/><rotate y='1' angle='%d'/></transform>"
+			"%s"
+		"</shape>",
 		back ? 180 : 0, material);
+	/* clang-format on */
 	worlds_accuracy = NULL;
 	return lease_brightness(w, SIDE, SPP, 2);
 }
@@ -85,15 +88,20 @@ static void note(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		worlds_accuracy = cases[i].accuracy;
-		struct world *w = world_of_text(
-			32, 32,
-			SKY SENSOR(
-				"0,0,1",
-				"0,0,0") "<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-1'/>"
-					 "</transform>" GREY
-					 "</shape><shape type='rectangle'><transform name='to_world'><scale value='%g'/>"
-					 "<rotate y='1' angle='%d'/></transform>%s</shape>",
+		/* clang-format off */
+		struct world *w = world_of_text(32, 32,
+			SKY
+			SENSOR("0,0,1", "0,0,0")
+			"<shape type='rectangle'>"
+				"<transform name='to_world'><scale value='9'/><translate z='-1'/></transform>"
+				GREY
+			"</shape>"
+			"<shape type='rectangle'>"
+				"<transform name='to_world'><scale value='%g'/><rotate y='1' angle='%d'/></transform>"
+				"%s"
+			"</shape>",
 			cases[i].half, cases[i].back ? 180 : 0, cases[i].material);
+		/* clang-format on */
 		worlds_accuracy = NULL;
 		struct render_summary s;
 		char sentence[1024];
@@ -115,20 +123,7 @@ static void integrators_agree(void **state)
 	static struct agree_image a, b;
 	struct agree_side path = {"path", 1024, 32, 0, 0}, bdpt = {"bdpt", 1024, 32, 0, 0};
 	worlds_accuracy = "backs=black";
-	struct world *w = world_of_text(
-		32, 32,
-		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR(
-			"0,0.2,1.9",
-			"0,-0.3,-1") "<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/><translate y='-1'/></transform>" GREY
-				     "</shape>"
-				     "<shape type='rectangle'><transform name='to_world'><scale value='2'/><translate z='-1.5'/></transform>" GREY
-				     "</shape>"
-				     "<shape type='rectangle'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='150'/><translate x='0.5' z='-0.5'/></transform>" GREY
-				     "</shape>"
-				     "<shape type='rectangle'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='30'/><translate x='-0.6' z='-0.5'/></transform>" TWO_SIDES
-				     "</shape>"
-				     "<shape type='rectangle'><transform name='to_world'><scale value='1'/><rotate x='1' angle='90'/><translate y='1.5'/></transform>"
-				     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
+	struct world *w = world_of_own_scene("backs", "room.xml", 32, 32);
 	agree_render(w, "backs", "path", &path, &a);
 	agree_render(w, "backs", "bdpt", &bdpt, &b);
 	agree_check("backs, bdpt and path", &b, &a);
