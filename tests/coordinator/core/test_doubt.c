@@ -40,8 +40,8 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 				   WORKER(2, "b"),
 				   WORKER(3, "c"),
 				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-				   "[4] w2 denies j1 g0 p0 e1 not mine -> -", /* neither it nor who made them, though
-										 that one would */
+				   /* Neither it nor who made them, though that one would. */
+				   "[4] w2 denies j1 g0 p0 e1 not mine -> -",
 				   "[4] w1 wants 1 -> -",
 				   NULL,
 			   });
@@ -50,15 +50,14 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 	assert_non_null(strstr(
 		j.waiting,
 		"a third worker will decide whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b refused"));
-	transcript_play(
-		f,
-		(const char *const[]){
-			"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
-			"[6] w3 denies j1 g0 p0 e1 not mine either -> anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
-			"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2", /* from states
-													 again */
-			NULL,
-		});
+	transcript_play(f, (const char *const[]){
+				   "[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
+				   "[6] w3 denies j1 g0 p0 e1 not mine either -> anew, "
+				   "#1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
+				   /* From states again. */
+				   "[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
+				   NULL,
+			   });
 	struct peer_status p;
 	assert_int_equal(wrong(f, 1), 1);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
@@ -87,7 +86,8 @@ static void a_third_that_goes_on_is_right(void **state)
 			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 			"[3] w3 wants 1 -> -",
 			"[4] w2 denies j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-			"[5] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
+			"[5] w3 batch j1 g0 p0 e1 -> merge, merged, "
+			"#2 refused good chain states: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
 			NULL,
 		});
 	assert_int_equal(wrong(f, 2), 1);
@@ -161,19 +161,18 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(
-		f,
-		(const char *const[]){
-			START,
-			WORKER(2, "b"),
-			WORKER(3, "c"),
-			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-			"[4] w2 refuses j1 g0 p0 e1 no -> -",
-			"[5] w1 wants 1 -> -",
-			"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
-			"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
-			NULL,
-		});
+	transcript_play(f, (const char *const[]){
+				   START,
+				   WORKER(2, "b"),
+				   WORKER(3, "c"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   "[4] w2 refuses j1 g0 p0 e1 no -> -",
+				   "[5] w1 wants 1 -> -",
+				   "[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
+				   "[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, "
+				   "#1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+				   NULL,
+			   });
 	struct job_status j;
 	assert_true(farm_job(f, 1, 6, &j));
 	assert_int_equal(j.rounds, 0);
@@ -182,8 +181,8 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 	transcript_play(f, (const char *const[]){
 				   "[6] w1 batch j1 g0 p0 e1 -> refused: the epoch is not open",
 				   "[7] w2 wants 0 -> -",
-				   "[7] w2 returns j1 g0 p0 e0 -> w3 gets j1 g0 p0 e0", /* not who made them, while
-											   there is another */
+				   /* Not who made them, while there is another. */
+				   "[7] w2 returns j1 g0 p0 e0 -> w3 gets j1 g0 p0 e0",
 				   "[7] w2 wants 1 -> -",
 				   "[7] w3 wants 0 -> -",
 				   "[7] w3 returns j1 g0 p0 e0 -> w2 gets j1 g0 p0 e0",
@@ -201,22 +200,21 @@ static void a_late_refusal_is_of_no_consequence(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(
-		f,
-		(const char *const[]){
-			START,
-			WORKER(2, "b"),
-			WORKER(3, "c"),
-			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-			"[3] w3 wants 1 -> -",
-			"[4] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-			"[5] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
-			"[6] w2 wants 0 -> -",
-			"[6] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
-			"[7] w3 recalls j1 g0 p0 e1 no -> -",
-			"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
-			NULL,
-		});
+	transcript_play(f, (const char *const[]){
+				   START,
+				   WORKER(2, "b"),
+				   WORKER(3, "c"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   "[3] w3 wants 1 -> -",
+				   "[4] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+				   "[5] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, "
+				   "#1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+				   "[6] w2 wants 0 -> -",
+				   "[6] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
+				   "[7] w3 recalls j1 g0 p0 e1 no -> -",
+				   "[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
+				   NULL,
+			   });
 	assert_int_equal(wrong(f, 1), 1);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	farm_free(f);
@@ -228,26 +226,25 @@ static void who_has_states_that_are_given_up_loses_them(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(
-		f,
-		(const char *const[]){
-			START,
-			WORKER(2, "b"),
-			WORKER(3, "c"),
-			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-			"[4] w3 wants 1 -> -",
-			"[6] w2 heartbeat -> w3 gets j1 g0 p0 e1",
-			"[6] w4 joins A threads=1 name=d -> -",
-			"[7] w2 wants 0 -> -",
-			"[7] w2 refuses j1 g0 p0 e1 no -> -",
-			"[7] w4 wants 1 -> -",
-			"[12] w3 heartbeat -> w4 gets j1 g0 p0 e1",
-			"[13] w4 denies j1 g0 p0 e1 no -> w3 loses j1 g0 p0 e1, anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w4 gets j1 g0 p0 e1 anew",
-			"[13] w3 refuses j1 g0 p0 e1 no -> -", /* what it had before */
-			"[13] w4 refuses j1 g0 p0 e1 no -> -", /* the same */
-			"[14] w4 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
-			NULL,
-		});
+	transcript_play(f, (const char *const[]){
+				   START,
+				   WORKER(2, "b"),
+				   WORKER(3, "c"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   "[4] w3 wants 1 -> -",
+				   "[6] w2 heartbeat -> w3 gets j1 g0 p0 e1",
+				   "[6] w4 joins A threads=1 name=d -> -",
+				   "[7] w2 wants 0 -> -",
+				   "[7] w2 refuses j1 g0 p0 e1 no -> -",
+				   "[7] w4 wants 1 -> -",
+				   "[12] w3 heartbeat -> w4 gets j1 g0 p0 e1",
+				   "[13] w4 denies j1 g0 p0 e1 no -> w3 loses j1 g0 p0 e1, anew, "
+				   "#1 wrong chain states: j1 render group 0 part 0 epoch 0, w4 gets j1 g0 p0 e1 anew",
+				   "[13] w3 refuses j1 g0 p0 e1 no -> -", /* what it had before */
+				   "[13] w4 refuses j1 g0 p0 e1 no -> -", /* the same */
+				   "[14] w4 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
+				   NULL,
+			   });
 	farm_free(f);
 }
 
@@ -263,22 +260,19 @@ static void after_four_times_the_chains_begin_anew(void **state)
 				   NULL,
 			   });
 	for (int i = 0; i < 4; i++)
-		transcript_play(
-			f,
-			(const char *const[]){
-				"[4] w2 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, w2 gets j1 g0 p0 e0", /* made by the
-													     other one
-													   */
-				"[4] w2 wants 0 -> -",
-				"[4] w2 returns j1 g0 p0 e0 -> -",
-				"[4] w1 wants 1 -> -", /* whose epoch it is, while another is here */
-				"[4] w2 leaves -> w1 gets j1 g0 p0 e0",
-				"[5] w1 wants 0 -> -",
-				"[5] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1",
-				"[5] w2 joins A threads=1 name=b -> -",
-				"[5] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-				NULL,
-			});
+		transcript_play(f, (const char *const[]){
+					   /* Made by the other one. */
+					   "[4] w2 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, w2 gets j1 g0 p0 e0",
+					   "[4] w2 wants 0 -> -",
+					   "[4] w2 returns j1 g0 p0 e0 -> -",
+					   "[4] w1 wants 1 -> -", /* whose epoch it is, while another is here */
+					   "[4] w2 leaves -> w1 gets j1 g0 p0 e0",
+					   "[5] w1 wants 0 -> -",
+					   "[5] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1",
+					   "[5] w2 joins A threads=1 name=b -> -",
+					   "[5] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+					   NULL,
+				   });
 	transcript_play(f, (const char *const[]){
 				   "[6] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
 				   "[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
@@ -293,35 +287,35 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(
-		f,
-		(const char *const[]){
-			"[0] submit groups=2 rounds=4 -> j1 submitted, j1 is queued",
-			"[0] w1 joins A threads=2 name=a -> -",
-			"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
-			"[1] w1 batch j1 g0 p0 boot -> merge, merged",
-			"[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
-			"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
-			"[2] w2 joins A threads=2 name=b -> -",
-			"[2] w3 joins A threads=2 name=c -> -",
-			"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
-			"[2] w1 wants 1 -> -",
-			"[2] w1 batch j1 g0 p0 e1 -> merge, merged",
-			"[2] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g1 p0 e1",
-			"[2] w2 wants 1 -> w2 gets j1 g0 p0 e2",
-			"[2] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g1 p0 e2",
-			"[3] w2 refuses j1 g0 p0 e2 no -> -",
-			"[3] w3 wants 1 -> w3 gets j1 g0 p0 e2",
-			"[4] w3 refuses j1 g0 p0 e2 no -> back j1 g0 p0 e1, #1 wrong chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e1",
-			NULL,
-		});
+	transcript_play(f, (const char *const[]){
+				   "[0] submit groups=2 rounds=4 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=2 name=a -> -",
+				   "[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+				   "[1] w1 batch j1 g0 p0 boot -> merge, merged",
+				   "[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+				   "[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
+				   "[2] w2 joins A threads=2 name=b -> -",
+				   "[2] w3 joins A threads=2 name=c -> -",
+				   "[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+				   "[2] w1 wants 1 -> -",
+				   "[2] w1 batch j1 g0 p0 e1 -> merge, merged",
+				   "[2] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g1 p0 e1",
+				   "[2] w2 wants 1 -> w2 gets j1 g0 p0 e2",
+				   "[2] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g1 p0 e2",
+				   "[3] w2 refuses j1 g0 p0 e2 no -> -",
+				   "[3] w3 wants 1 -> w3 gets j1 g0 p0 e2",
+				   "[4] w3 refuses j1 g0 p0 e2 no -> back j1 g0 p0 e1, "
+				   "#1 wrong chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e1",
+				   NULL,
+			   });
 	transcript_play(
 		f,
 		(const char *const[]){
 			"[5] w1 wants 0 -> -",
 			"[5] w1 batch j1 g1 p0 e2 -> merge, merged", /* one round ahead */
 			"[5] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-			"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+			"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, "
+			"#1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
 			"[7] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
 			"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2, w3 gets j1 g1 p0 e3",
 			"[9] w2 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w2 gets j1 g0 p0 e3",
@@ -361,17 +355,18 @@ static void a_liar_is_set_aside(void **state)
 			"[4] w2 denies j1 g2 p0 e1 no -> -",
 			"[5] w3 wants 3 -> w3 gets j1 g0 p0 e1, w3 gets j1 g1 p0 e1, w3 gets j1 g2 p0 e1",
 			"[6] w3 wants 0 -> -",
-			"[6] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
-			"[6] w3 batch j1 g1 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 1 part 0 epoch 1, w2 gets j1 g1 p0 e2",
+			"[6] w3 batch j1 g0 p0 e1 -> merge, merged, "
+			"#2 refused good chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
+			"[6] w3 batch j1 g1 p0 e1 -> merge, merged, "
+			"#2 refused good chain states: j1 render group 1 part 0 epoch 1, w2 gets j1 g1 p0 e2",
 			NULL,
 		});
-	transcript_play(
-		f,
-		(const char *const[]){
-			"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 2 part 0 epoch 1, #2 quarantined, "
-			"w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
-			NULL,
-		});
+	transcript_play(f, (const char *const[]){
+				   "[6] w3 batch j1 g2 p0 e1 -> merge, merged, "
+				   "#2 refused good chain states: j1 render group 2 part 0 epoch 1, #2 quarantined, "
+				   "w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
+				   NULL,
+			   });
 	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
 	farm_free(f);
 }

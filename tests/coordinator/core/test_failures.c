@@ -55,7 +55,8 @@ static void out_of_order(void **state)
 		"[0] submit groups=5 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=3 -> -",
 		"[0] w2 joins A threads=1 -> -",
-		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w1 gets j1 g3 p0 boot",
+		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, "
+		"w1 gets j1 g3 p0 boot",
 		"[0] w2 wants 1 -> w2 gets j1 g4 p0 boot",
 		"[1] w1 fails j1 g0 p0 boot no disk -> -",
 		"[1] w1 fails j1 g1 p0 boot no disk -> -",
@@ -204,7 +205,8 @@ static void full_disks_and_a_bad_scene(void **state)
 		"[11] w1 lacks j1 g2 p0 boot disk full -> -",
 		"[11] w1 fails j1 g4 p0 boot no mesh -> -", /* a second reason: a second try */
 		"[12] w2 fails j1 g3 p0 boot no mesh -> j1 is failed (failed: w2: no mesh)",
-		"[13] submit groups=5 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot, w2 gets j2 g1 p0 boot, w1 gets j2 g2 p0 boot",
+		"[13] submit groups=5 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot, "
+		"w2 gets j2 g1 p0 boot, w1 gets j2 g2 p0 boot",
 		"[13] w1 wants 0 -> -",
 		"[13] w1 lacks j2 g0 p0 boot disk full -> -",
 		"[13] w1 lacks j2 g2 p0 boot disk full -> -",

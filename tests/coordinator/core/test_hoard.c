@@ -41,7 +41,8 @@ static void what_is_held_grows_with_what_is_given(void **state)
 		"[0] w1 joins A threads=64 -> -",
 		"[0] w1 wants 65 -> j1 is bootstrap, " EIGHT,
 		"[5] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g8 p0 boot, w1 gets j1 g9 p0 boot, w1 gets j1 g10 p0 boot, "
-		"w1 gets j1 g11 p0 boot, w1 gets j1 g12 p0 boot, w1 gets j1 g13 p0 boot, w1 gets j1 g14 p0 boot, w1 gets j1 g15 p0 boot, w1 gets j1 g16 p0 boot",
+		"w1 gets j1 g11 p0 boot, w1 gets j1 g12 p0 boot, w1 gets j1 g13 p0 boot, w1 gets j1 g14 p0 boot, "
+		"w1 gets j1 g15 p0 boot, w1 gets j1 g16 p0 boot",
 		/* it comes again under its name, and has not lost it */
 		"[6] w1 leaves -> -",
 		NULL,
@@ -126,7 +127,8 @@ static void who_is_overtaken_holds_less(void **state)
 		"[32] w2 batch j1 g5 p0 boot -> merge, merged, w1 loses j1 g5 p0 boot",
 		"[32] w2 batch j1 g6 p0 boot -> merge, merged, w1 loses j1 g6 p0 boot",
 		"[32] w2 batch j1 g7 p0 boot -> merge, merged, w1 loses j1 g7 p0 boot, j1 prepare",
-		"[33] prepared j1 -> j1 is running, w2 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w2 gets j1 g2 p0 e0, w2 gets j1 g3 p0 e0, w2 gets j1 g4 p0 e0",
+		"[33] prepared j1 -> j1 is running, w2 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w2 gets j1 g2 p0 e0, "
+		"w2 gets j1 g3 p0 e0, w2 gets j1 g4 p0 e0",
 		"[34] w1 batch j1 g1 p0 e0 -> merge, merged, w1 gets j1 g5 p0 e0, w1 gets j1 g6 p0 e0",
 		NULL,
 	});

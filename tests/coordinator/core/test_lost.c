@@ -54,7 +54,8 @@ static void told_by_the_next_life(void **state)
 			"[3] w6 wants 1 -> -",
 			"[3] w5 wants 1 -> -",
 			/* whose jobs ended nobody has all */
-			"[3] submit groups=2 parts=1 owner=bob -> j3 submitted, j3 is queued, j3 is bootstrap, w6 gets j3 g0 p0 boot, w5 gets j3 g1 p0 boot",
+			"[3] submit groups=2 parts=1 owner=bob -> j3 submitted, j3 is queued, j3 is bootstrap, "
+			"w6 gets j3 g0 p0 boot, w5 gets j3 g1 p0 boot",
 			"[4] w5 batch j3 g1 p0 boot -> merge, merged",
 			NULL,
 		});
@@ -118,11 +119,10 @@ static void never_heard_again(void **state)
 		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i,
 			 i == 1 ? "j1 is bootstrap, " : "", i);
 		play(f, line);
-		snprintf(
-			line, sizeof line, "[%d] w%d leaves -> %s", i, i,
-			i < 8 ? "-"
-			      : "j1 is failed (failed: job: 8 of 8 workers that were lost in a row while they held bootstrap group 0 part 0 epoch 0; "
-				"the last one: w8)");
+		snprintf(line, sizeof line, "[%d] w%d leaves -> %s", i, i,
+			 i < 8 ? "-"
+			       : "j1 is failed (failed: job: 8 of 8 workers that were lost in a row while they held "
+				 "bootstrap group 0 part 0 epoch 0; the last one: w8)");
 		play(f, line);
 	}
 	farm_free(f);

@@ -151,20 +151,20 @@ static void priority(void **state)
 			"[1] priority j3 1 -> -", /* the lease that is out stays */
 			"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
 			"[2] priority j2 1 -> -",
-			"[2] w1 batch j3 g0 p0 boot -> merge, merged, j2 is bootstrap, w1 gets j2 g0 p0 boot", /* the
-														  older
-														  one */
+			/* The older one. */
+			"[2] w1 batch j3 g0 p0 boot -> merge, merged, j2 is bootstrap, w1 gets j2 g0 p0 boot",
 			"[3] priority j2 -100 -> -",
 			"[3] priority j3 0 -> -",
-			"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot", /* as if it had never been
-											       */
+			/* As if it had never been. */
+			"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
 			"[4] priority j3 100 -> -",
 			"[4] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j3 g1 p0 boot",
 			"[5] priority j3 101 -> rejected: a priority is from -100 to 100",
 			"[5] priority j4 1 -> rejected: no such job",
 			"[5] cancel j1 -> j1 cancelled, j1 is cancelled (cancelled: cancelled)",
 			"[5] priority j1 1 -> rejected: the job is over",
-			"[6] cancel j3 -> j3 cancelled, w1 loses j3 g1 p0 boot, j3 is cancelled (cancelled: cancelled), w1 gets j2 g1 p0 boot",
+			"[6] cancel j3 -> j3 cancelled, w1 loses j3 g1 p0 boot, j3 is cancelled (cancelled: cancelled), "
+			"w1 gets j2 g1 p0 boot",
 			NULL,
 		});
 	assert_int_equal(status(f, 3, 5).priority, 100);
@@ -272,7 +272,8 @@ static void extend_when_it_has_ended(void **state)
 		f,
 		(const char *const[]){
 			"[10] w1 batch j1 g0 p0 e1 -> merge, merged, w1 gets j1 g1 p0 e1", /* the older one */
-			"[11] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations), j3 is bootstrap, w1 gets j3 g0 p0 boot",
+			"[11] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations), "
+			"j3 is bootstrap, w1 gets j3 g0 p0 boot",
 			NULL,
 		});
 	farm_free(f);

@@ -283,7 +283,8 @@ static void bounded_wish(void **state)
 	transcript((const char *const[]){
 		"[0] submit groups=8 parts=4 -> j1 submitted, j1 is queued",
 		"[0] w1 joins A threads=1 -> -",
-		"[0] w1 wants 1000 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g0 p1 boot, w1 gets j1 g0 p2 boot, w1 gets j1 g0 p3 boot",
+		"[0] w1 wants 1000 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g0 p1 boot, "
+		"w1 gets j1 g0 p2 boot, w1 gets j1 g0 p3 boot",
 		"[0] w1 wants 1 -> -",
 		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
 		NULL,

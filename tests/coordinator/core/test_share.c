@@ -48,9 +48,9 @@ static void by_priority_and_owner(void **state)
 	(void)state;
 	struct farm *f = eight();
 	play(f, "[0] hold order j1 x -> rejected: no such job");
-	play(f,
-	     "[0] restore j1 boot 1,1,1,1,1,1,1,1,1,1,1,1,0,0,0,0 fingerprint=A groups=16 owner=ann -> j1 is bootstrap, w1 gets j1 g12 p0 boot, "
-	     "w2 gets j1 g13 p0 boot, w3 gets j1 g14 p0 boot, w4 gets j1 g15 p0 boot");
+	play(f, "[0] restore j1 boot 1,1,1,1,1,1,1,1,1,1,1,1,0,0,0,0 fingerprint=A groups=16 owner=ann -> "
+		"j1 is bootstrap, w1 gets j1 g12 p0 boot, "
+		"w2 gets j1 g13 p0 boot, w3 gets j1 g14 p0 boot, w4 gets j1 g15 p0 boot");
 	has_share(f, 1, 2); /* it has a use for four leases */
 	assert_int_equal(status(f, 1).workers, 4);
 	assert_string_equal(status(f, 1).place, "4 of 8 machines");

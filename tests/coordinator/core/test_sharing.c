@@ -96,7 +96,8 @@ static void fair_sharing(void **state)
 		"[0] submit groups=9 -> j1 submitted, j1 is queued",
 		"[0] submit groups=9 -> j2 submitted, j2 is queued",
 		"[0] w1 joins A threads=4 -> -",
-		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j2 g1 p0 boot",
+		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j2 is bootstrap, w1 gets j2 g0 p0 boot, "
+		"w1 gets j1 g1 p0 boot, w1 gets j2 g1 p0 boot",
 		"[1] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j2 g2 p0 boot",
 		"[2] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g2 p0 boot",
 		NULL,
@@ -184,7 +185,8 @@ static void workers_take_turns(void **state)
 		"[0] w2 joins A threads=2 -> -",
 		"[0] w1 wants 2 -> -",
 		"[0] w2 wants 2 -> -",
-		"[0] submit groups=4 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot, w2 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot",
+		"[0] submit groups=4 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot, "
+		"w2 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot",
 		NULL,
 	});
 }

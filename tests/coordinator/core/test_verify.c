@@ -207,7 +207,8 @@ static void set_aside(void **state)
 			"[0] w2 wants 1 -> -",
 			"[1] w3 batch j1 g0 p0 boot says 1 -> noted",
 			"[1] w1 batch j1 g0 p0 boot says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 boot",
-			"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, #3 wrong result: j1 bootstrap group 0 part 0 epoch 0, j1 prepare",
+			"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, "
+			"#3 wrong result: j1 bootstrap group 0 part 0 epoch 0, j1 prepare",
 			"[1] prepared j1 -> j1 is running, w3 gets j1 g0 p0 e0, w1 gets j1 g0 p0 e0",
 			"[2] w3 batch j1 g0 p0 e0 says 1 -> noted",
 			"[2] w1 batch j1 g0 p0 e0 says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 e0",
@@ -215,7 +216,8 @@ static void set_aside(void **state)
 			"w3 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
 			"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* it straggles at w1 */
 			"[3] w1 batch j1 g0 p0 e1 says x -> noted: it differs from another worker's",
-			"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 1, #3 quarantined, j1 round 2, "
+			"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, "
+			"#3 wrong result: j1 render group 0 part 0 epoch 1, #3 quarantined, j1 round 2, "
 			"w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
 			/* nothing of it counts, here or when it calls again, under whatever name */
 			"[4] w3 batch j1 g0 p0 e2 says x -> refused: the worker is quarantined: its results do not count",

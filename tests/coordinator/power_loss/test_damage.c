@@ -229,17 +229,16 @@ static void damaged_database(void **state)
 			in_root(command);
 			break;
 		case 6: /* the wal goes into the database first */
-			change_rows(
-				file,
-				"UPDATE jobs SET plan = CAST(substr(plan, 1, length(plan) - 1) || x'07' AS BLOB) WHERE ended IS NULL AND " IN_BOTH);
+			change_rows(file,
+				    "UPDATE jobs SET plan = CAST(substr(plan, 1, length(plan) - 1) || x'07' AS BLOB) "
+				    "WHERE ended IS NULL AND " IN_BOTH);
 			break;
 		case 7:
 			change_rows(file, "DELETE FROM jobs");
 			break;
 		case 8:
-			change_rows(
-				file,
-				"UPDATE jobs SET ended = 5, state = 'done', submission = NULL, plan = NULL WHERE ended IS NULL AND " IN_BOTH);
+			change_rows(file, "UPDATE jobs SET ended = 5, state = 'done', submission = NULL, plan = NULL "
+					  "WHERE ended IS NULL AND " IN_BOTH);
 			break;
 		case 9:
 			change_rows(file, "UPDATE jobs SET owner = 'ann' WHERE " IN_BOTH);
