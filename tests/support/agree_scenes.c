@@ -21,9 +21,11 @@
 #define TURN "<rotate x='1' z='0.3' angle='20'/>"
 #define SCALED "<scale value='%.17g'/>" TURN
 #define SMALL_THINGS                                                                                                            \
-	"<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='%.17g'/><float name='far_clip' value='%.17g'/>" \
+	"<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='%.17g'/>" \
+		"<float name='far_clip' value='%.17g'/>" \
 	AT("<lookat origin='0,2.5,6' target='0,0.6,0' up='0,1,0'/>" SCALED) FILM "</sensor>"                                            \
-	"<shape type='cube'>" AT("<scale value='0.5'/><rotate y='1' angle='25'/><translate x='-0.9' y='0.5'/>" SCALED) GREY("0.5") "</shape>" \
+	"<shape type='cube'>" AT("<scale value='0.5'/><rotate y='1' angle='25'/><translate x='-0.9' y='0.5'/>" SCALED) \
+		GREY("0.5") "</shape>" \
 	"<shape type='sphere'>" AT("<scale value='0.6'/><translate x='0.8' y='0.6' z='0.3'/>" SCALED)                                   \
 	"<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf></shape>"                                                 \
 	"<shape type='rectangle'>" AT("<scale value='0.7'/><rotate x='1' angle='90'/><translate y='3'/>" SCALED)                        \
@@ -32,15 +34,18 @@
 
 static struct world *on_a_floor(const struct agree_case *k)
 {
-	return world_of_text(32, 32, SMALL_THINGS "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>" SCALED) GREY("0.7") "</shape>",
+	return world_of_text(32, 32, SMALL_THINGS "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>" SCALED)
+			     GREY("0.7") "</shape>",
 			     SMALL_VALUES(k->a), k->b);
 }
 
-/* The floor is turned about an axis that it does not lie along, and its middle is elsewhere: each of its vertices is rounded in another way. */
+/* The floor is turned about an axis that it does not lie along, and its middle is elsewhere: each of its vertices is rounded in
+ * another way. */
 static struct world *on_a_tilted_floor(const struct agree_case *k)
 {
 	return world_of_text(32, 32, SMALL_THINGS
-			     "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/><translate x='0.3' z='-0.41'/>" SCALED) GREY("0.7") "</shape>",
+			     "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/><translate x='0.3' z='-0.41'/>" SCALED)
+				GREY("0.7") "</shape>",
 			     SMALL_VALUES(k->a), k->b);
 }
 
@@ -49,7 +54,8 @@ static struct world *beside_a_floor(const struct agree_case *k)
 {
 	double b = k->b;
 	return world_of_text(32, 32, SMALL_THINGS
-			     "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/><translate x='0.9' z='-0.77'/>" SCALED) GREY("0.7") "</shape>"
+			     "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/><translate x='0.9' z='-0.77'/>" SCALED)
+				GREY("0.7") "</shape>"
 			     "<shape type='rectangle'>" AT("<rotate x='1' angle='90'/><translate y='1.5'/>" SCALED) GREY("0.7") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='0.5' y='1' z='0.5'/>" SCALED)
 			     "<emitter type='area'><rgb name='radiance' value='40'/></emitter></shape>",
@@ -67,7 +73,8 @@ static struct world *on_a_table(const struct agree_case *k)
 {
 	return world_of_text(32, 32, SMALL_THINGS
 			     "<shape type='cube'>" AT("<translate y='-1'/>" SCALED) GREY("0.7") "</shape>"
-			     "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/><translate y='-2e-6'/>" SCALED) GREY("0.7") "</shape>",
+			     "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/><translate y='-2e-6'/>" SCALED)
+				GREY("0.7") "</shape>",
 			     SMALL_VALUES(k->a), sqrt(k->a * k->b), k->b);
 }
 
@@ -99,7 +106,12 @@ static struct world *fibre(const struct agree_case *k)
 #define GLASS(ior) "<bsdf type='dielectric'><float name='int_ior' value='" ior "'/></bsdf>"
 #define SKY "<emitter type='constant'><rgb name='radiance' value='0.3'/></emitter>"
 #define GROUND "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/>" TURN) GREY("0.6") "</shape>"
-#define LOOK_AT_IT "<sensor type='perspective'><float name='fov' value='35'/>" AT("<lookat origin='0.4,2.2,5' target='0,0.7,0' up='0,1,0'/>" TURN) FILM "</sensor>"
+#define LOOK_AT_IT \
+	"<sensor type='perspective'>" \
+		"<float name='fov' value='35'/>" \
+		AT("<lookat origin='0.4,2.2,5' target='0,0.7,0' up='0,1,0'/>" TURN) \
+		FILM \
+	"</sensor>"
 
 /* A lamp that shines down lies in the lower side of a slab of glass and across its rim; another, which shines up, in the upper side, a
  * times as wide as the slab. */
@@ -107,9 +119,11 @@ static struct world *lamp_in_glass(const struct agree_case *k)
 {
 	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
 			     "<shape type='cube'>" AT("<scale x='0.8' y='0.2' z='0.8'/><translate y='1.2'/>" TURN) GLASS("1.5") "</shape>"
-			     "<shape type='rectangle'>" AT("<scale value='%.17g'/><rotate x='1' angle='90'/><translate x='0.3' y='1'/>" TURN)
+			     "<shape type='rectangle'>"
+				AT("<scale value='%.17g'/><rotate x='1' angle='90'/><translate x='0.3' y='1'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='2'/></emitter></shape>"
-			     "<shape type='rectangle'>" AT("<scale value='%.17g'/><rotate x='1' angle='-90'/><translate x='0.3' y='1.4'/>" TURN)
+			     "<shape type='rectangle'>"
+				AT("<scale value='%.17g'/><rotate x='1' angle='-90'/><translate x='0.3' y='1.4'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='2'/></emitter></shape>",
 			     0.8 * k->a, 0.8 * k->a);
 }
@@ -120,14 +134,24 @@ static struct world *glass_and_water(const struct agree_case *k)
 	(void)k;
 	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
 			     "<shape type='cube'>" AT("<scale value='0.5'/><translate x='-0.5' y='0.5'/>" TURN) GLASS("1.5") "</shape>"
-			     "<shape type='cube'>" AT("<scale x='0.5' y='0.4' z='0.7'/><translate x='0.5' y='0.4'/>" TURN) GLASS("1.33") "</shape>");
+			     "<shape type='cube'>" AT("<scale x='0.5' y='0.4' z='0.7'/><translate x='0.5' y='0.4'/>" TURN)
+				GLASS("1.33") "</shape>");
 }
 
 /* A ball of glass holds one of water, that one of air, and there is another ball of glass in the same place. */
 static struct world *balls_in_balls(const struct agree_case *k)
 {
-#define BALL(radius, bsdf) "<shape type='sphere'><point name='center' x='0' y='0.8' z='0'/><float name='radius' value='" radius "'/>" bsdf "</shape>"
-#define BETWEEN(inner, outer) "<bsdf type='dielectric'><float name='int_ior' value='" inner "'/><float name='ext_ior' value='" outer "'/></bsdf>"
+#define BALL(radius, bsdf) \
+	"<shape type='sphere'>" \
+		"<point name='center' x='0' y='0.8' z='0'/>" \
+		"<float name='radius' value='" radius "'/>" \
+		bsdf \
+	"</shape>"
+#define BETWEEN(inner, outer) \
+	"<bsdf type='dielectric'>" \
+		"<float name='int_ior' value='" inner "'/>" \
+		"<float name='ext_ior' value='" outer "'/>" \
+	"</bsdf>"
 	(void)k;
 	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY BALL("0.8", GLASS("1.5")) BALL("0.7", BETWEEN("1.33", "1.5"))
 			     BALL("0.4", BETWEEN("1", "1.33")) BALL("0.8", GLASS("2.4")));
@@ -137,7 +161,8 @@ static struct world *balls_in_balls(const struct agree_case *k)
 static struct world *balls_in_a_shell(const struct agree_case *k)
 {
 	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY BALL("0.8", GLASS("1.5"))
-			     "<shape type='sphere'><point name='center' x='0' y='0.8' z='0'/><float name='radius' value='%.17g'/>" BETWEEN("1.33", "1.5") "</shape>",
+			     "<shape type='sphere'><point name='center' x='0' y='0.8' z='0'/>"
+				"<float name='radius' value='%.17g'/>" BETWEEN("1.33", "1.5") "</shape>",
 			     0.8 * (1 - k->a));
 }
 
@@ -155,12 +180,15 @@ static struct world *lamp_pasted(const struct agree_case *k)
  * (b = 0) or glass. */
 static struct world *displaced_pole(const struct agree_case *k)
 {
-	static const char *const matter[] = {"<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='0.2'/></bsdf>",
+	static const char *const matter[] = {"<bsdf type='roughconductor'><string name='material' value='Au'/>"
+					     "<float name='alpha' value='0.2'/></bsdf>",
 					     "<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>"};
 	return world_of_text(32, 32,
-			     "<sensor type='perspective'><float name='fov' value='12'/>" AT("<lookat origin='0.3,1.2,2.5' target='0,0,0.75' up='0,1,0'/>" TURN) FILM
+			     "<sensor type='perspective'><float name='fov' value='12'/>"
+				AT("<lookat origin='0.3,1.2,2.5' target='0,0,0.75' up='0,1,0'/>" TURN) FILM
 			     "</sensor><emitter type='constant'><rgb name='radiance' value='0.3'/></emitter>"
-			     "<shape type='sphere'>" AT("<scale value='0.8'/>" TURN) "<texture name='displacement' type='checkerboard'><float name='color0' value='0'/>"
+			     "<shape type='sphere'>" AT("<scale value='0.8'/>" TURN)
+				"<texture name='displacement' type='checkerboard'><float name='color0' value='0'/>"
 			     "<float name='color1' value='1'/><transform name='to_uv'><scale x='12' y='12'/></transform></texture>"
 			     "<float name='displacement_scale' value='%.17g'/><integer name='displacement_level' value='6'/>%s</shape>"
 			     "<shape type='rectangle'>" AT("<scale value='3'/><translate z='-1.5'/>" TURN) GREY("0.5") "</shape>"
@@ -177,23 +205,28 @@ static struct world *lamp_on_glass(const struct agree_case *k)
 			     "<shape type='cube'>" AT("<scale value='0.5'/><translate y='0.7'/>" TURN) GLASS("1.5") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.2' y='1.4'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>"
-			     "<shape type='rectangle'>" AT("<scale value='0.2'/><rotate y='1' angle='-60'/><translate x='0.25' y='1.4'/>" TURN)
+			     "<shape type='rectangle'>"
+				AT("<scale value='0.2'/><rotate y='1' angle='-60'/><translate x='0.25' y='1.4'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
 }
 
-/* A sheet that shines on both sides, between balls; and a half transparent box around a ball that does, so that light from its inside comes out. */
+/* A sheet that shines on both sides, between balls; and a half transparent box around a ball that does, so that light from its
+ * inside comes out. */
 static struct world *two_sided_lamps(const struct agree_case *k)
 {
 	(void)k;
 	return world_of_text(32, 32, LOOK_AT_IT GROUND
 			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate y='1' angle='80'/><translate y='0.5'/>" TURN)
-			     "<emitter type='area'><rgb name='radiance' value='4'/><boolean name='two_sided' value='true'/></emitter></shape>"
-			     "<shape type='sphere'>" AT("<scale value='0.3'/><translate x='-0.6' y='0.3' z='0.3'/>" TURN) GREY("0.7") "</shape>"
+			     "<emitter type='area'><rgb name='radiance' value='4'/>"
+				"<boolean name='two_sided' value='true'/></emitter></shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.3'/><translate x='-0.6' y='0.3' z='0.3'/>" TURN)
+				GREY("0.7") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.3'/><translate x='0.6' y='0.3' z='0.2'/>" TURN)
 			     "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf></shape>"
 			     "<shape type='cube'>" AT("<scale value='0.3'/><translate y='0.5' z='-1'/>" TURN)
 			     "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='diffuse'/></bsdf>"
-			     "<emitter type='area'><rgb name='radiance' value='1'/><boolean name='two_sided' value='true'/></emitter></shape>"
+			     "<emitter type='area'><rgb name='radiance' value='1'/>"
+				"<boolean name='two_sided' value='true'/></emitter></shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate y='0.5' z='-1'/>" TURN) GREY("0.7") "</shape>");
 }
 
@@ -241,7 +274,8 @@ static struct world *bright_texel(const struct agree_case *k)
 	for (size_t i = 0; i < WIDTH * HEIGHT; i++)
 		memcpy(hdr + sizeof head - 1 + 4 * i, (unsigned char[]){0x80, 0x80, 0x80, i == 2 * WIDTH + 5 ? 0x9c : 0x81}, 4);
 	int n = snprintf(xml, sizeof xml,
-			 "<scene version='3.0.0'>" LOOK_AT_IT GROUND "<emitter type='envmap'><string name='filename' value='sky.hdr'/></emitter>"
+			 "<scene version='3.0.0'>" LOOK_AT_IT GROUND
+				"<emitter type='envmap'><string name='filename' value='sky.hdr'/></emitter>"
 			 "<shape type='sphere'>" AT("<scale value='0.5'/><translate x='-0.6' y='0.6'/>" TURN)
 			 "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf></shape>"
 			 "<shape type='cube'>" AT("<scale value='0.4'/><translate x='0.6' y='0.4'/>" TURN) GREY("0.5") "</shape></scene>");
@@ -256,7 +290,8 @@ static size_t coarse_sphere(char *out, size_t size)
 	for (int j = 0; j <= 4; j++)
 		for (int i = 0; i <= 8; i++) {
 			double a = M_PI * j / 4, b = M_PI * i / 4, x = sin(a) * cos(b), y = sin(a) * sin(b), z = cos(a);
-			at += (size_t)snprintf(out + at, size - at, "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %g %g\n", x, y, z, x, y, z, i / 8., j / 4.);
+			at += (size_t)snprintf(out + at, size - at, "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %g %g\n", x, y, z,
+				x, y, z, i / 8., j / 4.);
 		}
 	for (int k = 0; k < 32; k++) {
 		int a = k / 8 * 9 + k % 8 + 1, b = a + 1, c = a + 9, d = c + 1;
@@ -280,12 +315,16 @@ static struct world *smooth_tangents(const struct agree_case *k)
 	int n = snprintf(xml, sizeof xml,
 			 "<scene version='3.0.0'>" LOOK_AT_IT SKY GROUND
 			 COARSE("<scale value='0.5'/><translate x='-0.9' y='0.6'/>", ALONG("roughconductor"))
-			 COARSE("<scale value='0.5'/><rotate x='1' angle='70'/><translate x='0.1' y='0.6' z='0.6'/>", ALONG("roughdielectric"))
+			 COARSE("<scale value='0.5'/><rotate x='1' angle='70'/><translate x='0.1' y='0.6' z='0.6'/>",
+				ALONG("roughdielectric"))
 			 "<shape type='shapegroup' id='g'><shape type='obj'><string name='filename' value='m.obj'/>"
-			 "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.65,0.45,0.9'/><rgb name='color1' value='0.4,0.55,0.9'/></texture>"
+			 "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.65,0.45,0.9'/>"
+				"<rgb name='color1' value='0.4,0.55,0.9'/></texture>"
 			 ALONG("roughconductor") "</bsdf></shape></shape>"
-			 "<shape type='instance'><ref id='g'/>" AT("<scale x='-0.4' y='0.5' z='0.6'/><translate x='1.1' y='0.6'/>" TURN) "</shape>"
-			 "<shape type='instance'><ref id='g'/>" AT("<scale value='0.3'/><translate x='0.5' y='0.4' z='1.5'/>" TURN) "</shape>"
+			 "<shape type='instance'><ref id='g'/>"
+				AT("<scale x='-0.4' y='0.5' z='0.6'/><translate x='1.1' y='0.6'/>" TURN) "</shape>"
+			 "<shape type='instance'><ref id='g'/>" AT("<scale value='0.3'/><translate x='0.5' y='0.4' z='1.5'/>"
+				TURN) "</shape>"
 			 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
 			 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape></scene>");
 	const struct memory_file files[] = {{"test.xml", xml, (size_t)n}, {"m.obj", obj, size}, {NULL, NULL, 0}};
@@ -304,16 +343,31 @@ static struct world *tilted_parts(const struct agree_case *k)
 		unsigned char grey = (unsigned char)(16 + 40 * ((i * i + 3 * i) % 5));
 		memcpy(hdr + sizeof head - 1 + 4 * i, (unsigned char[]){grey, grey, grey, 0x80}, 4);
 	}
-#define DENTED(scale, inner) "<bsdf type='bumpmap'><float name='scale' value='" scale "'/><texture type='bitmap'><string name='filename' value='dents.hdr'/></texture>" inner "</bsdf>"
-#define SLANTED(inner) "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.4,0.9'/><rgb name='color1' value='0.35,0.6,0.9'/></texture>" inner "</bsdf>"
+#define DENTED(scale, inner) \
+	"<bsdf type='bumpmap'>" \
+		"<float name='scale' value='" scale "'/>" \
+		"<texture type='bitmap'><string name='filename' value='dents.hdr'/></texture>" \
+		inner \
+	"</bsdf>"
+#define SLANTED(inner) \
+	"<bsdf type='normalmap'>" \
+		"<texture type='checkerboard'>" \
+			"<rgb name='color0' value='0.7,0.4,0.9'/>" \
+			"<rgb name='color1' value='0.35,0.6,0.9'/>" \
+		"</texture>" \
+		inner \
+	"</bsdf>"
 #define HALVES(a, b) "<bsdf type='blendbsdf'><float name='weight' value='0.5'/>" a b "</bsdf>"
 #define METAL(alpha) "<bsdf type='roughconductor'><float name='alpha' value='" alpha "'/></bsdf>"
 	int n = snprintf(xml, sizeof xml,
 			 "<scene version='3.0.0'>" LOOK_AT_IT SKY
-			 "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/>" TURN) HALVES(DENTED("0.3", GREY("0.7")), SLANTED(METAL("0.3"))) "</shape>"
-			 "<shape type='sphere'>" AT("<scale value='0.5'/><translate x='-0.6' y='0.6'/>" TURN) HALVES("%s", DENTED("0.2", "<bsdf type='%s'/>")) "</shape>"
+			 "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/>" TURN)
+				HALVES(DENTED("0.3", GREY("0.7")), SLANTED(METAL("0.3"))) "</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.5'/><translate x='-0.6' y='0.6'/>" TURN)
+				HALVES("%s", DENTED("0.2", "<bsdf type='%s'/>")) "</shape>"
 			 "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='30'/><translate x='0.6' y='0.4'/>" TURN)
-			 "<bsdf type='twosided'>" HALVES(METAL("0.15"), SLANTED("<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>")) "</bsdf></shape>"
+			 "<bsdf type='twosided'>" HALVES(METAL("0.15"),
+				SLANTED("<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>")) "</bsdf></shape>"
 			 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
 			 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape></scene>",
 			 k->a > 0 ? GLASS("1.5") : METAL("0.1"), k->a > 0 ? "diffuse" : "difftrans");
@@ -324,7 +378,15 @@ static struct world *tilted_parts(const struct agree_case *k)
 /* Normals bent so far that many face away from the camera. a = 1: rough glass among them. */
 static struct world *turned_normals(const struct agree_case *k)
 {
-#define STEEP(inner) "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.9,0.4,0.8'/><rgb name='color1' value='0.2,0.8,0.75'/><transform name='to_uv'><scale value='4'/></transform></texture>" inner "</bsdf>"
+#define STEEP(inner) \
+	"<bsdf type='normalmap'>" \
+		"<texture type='checkerboard'>" \
+			"<rgb name='color0' value='0.9,0.4,0.8'/>" \
+			"<rgb name='color1' value='0.2,0.8,0.75'/>" \
+			"<transform name='to_uv'><scale value='4'/></transform>" \
+		"</texture>" \
+		inner \
+	"</bsdf>"
 	static char xml[1 << 12];
 	snprintf(xml, sizeof xml, LOOK_AT_IT SKY
 		 "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/>" TURN) STEEP(GREY("0.7")) "</shape>"
@@ -339,19 +401,39 @@ static struct world *turned_normals(const struct agree_case *k)
 
 /* A ball of coloured glass around a stone, which states no medium, and a bubble; beside it water with a lamp in it. All
  * in haze of that density, in which the camera stands. */
-#define WITHIN(side, sigma) "<medium type='homogeneous' name='" side "'><rgb name='sigma_a' value='" sigma "'/><spectrum name='sigma_s' value='0'/></medium>"
+#define WITHIN(side, sigma) \
+	"<medium type='homogeneous' name='" side "'>" \
+		"<rgb name='sigma_a' value='" sigma "'/>" \
+		"<spectrum name='sigma_s' value='0'/>" \
+	"</medium>"
 #define ROUGH(eta) "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/><float name='int_ior' value='" eta "'/></bsdf>"
-#define FOG(albedo, phase) "<medium type='homogeneous' id='fog'><float name='sigma_t' value='%g'/><float name='albedo' value='" albedo "'/>" phase "</medium>"
+#define FOG(albedo, phase) \
+	"<medium type='homogeneous' id='fog'>" \
+		"<float name='sigma_t' value='%g'/>" \
+		"<float name='albedo' value='" albedo "'/>" \
+		phase \
+	"</medium>"
 #define OUTSIDE "<ref name='exterior' id='fog'/>"
-#define LOOK_FROM_FOG "<sensor type='perspective'><float name='fov' value='35'/>" AT("<lookat origin='0.4,2.2,5' target='0,0.7,0' up='0,1,0'/>" TURN) FILM "<ref name='medium' id='fog'/></sensor>"
+#define LOOK_FROM_FOG \
+	"<sensor type='perspective'>" \
+		"<float name='fov' value='35'/>" \
+		AT("<lookat origin='0.4,2.2,5' target='0,0.7,0' up='0,1,0'/>" TURN) \
+		FILM \
+		"<ref name='medium' id='fog'/>" \
+	"</sensor>"
 static struct world *absorbing_media(const struct agree_case *k)
 {
 	return world_of_text(32, 32, FOG("0", "") LOOK_FROM_FOG GROUND SKY
-			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) ROUGH("1.5") OUTSIDE WITHIN("interior", "0.5,1.5,3") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) ROUGH("1.5")
+				OUTSIDE WITHIN("interior", "0.5,1.5,3") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
-			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.5' y='1.1'/>" TURN) ROUGH("0.8") WITHIN("exterior", "0.5,1.5,3") "</shape>"
-			     "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) GLASS("1.33") OUTSIDE WITHIN("interior", "2,0.8,0.4") "</shape>"
-			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='0.7' y='0.5'/>" TURN) "<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.5' y='1.1'/>" TURN) ROUGH("0.8")
+				WITHIN("exterior", "0.5,1.5,3") "</shape>"
+			     "<shape type='cube'>"
+				AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN)
+				GLASS("1.33") OUTSIDE WITHIN("interior", "2,0.8,0.4") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='0.7' y='0.5'/>" TURN)
+				"<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
 			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
 }
@@ -360,12 +442,22 @@ static struct world *absorbing_media(const struct agree_case *k)
  * which the camera stands. */
 static struct world *scattering_media(const struct agree_case *k)
 {
-#define SCATTERS(side, sigma, albedo, phase) "<medium type='homogeneous' name='" side "'><rgb name='sigma_t' value='" sigma "'/><rgb name='albedo' value='" albedo "'/>" phase "</medium>"
+#define SCATTERS(side, sigma, albedo, phase) \
+	"<medium type='homogeneous' name='" side "'>" \
+		"<rgb name='sigma_t' value='" sigma "'/>" \
+		"<rgb name='albedo' value='" albedo "'/>" \
+		phase \
+	"</medium>"
 	return world_of_text(32, 32, FOG("0.8", "<phase type='rayleigh'/>") LOOK_FROM_FOG GROUND SKY
-			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) "<bsdf type='null'/>" OUTSIDE SCATTERS("interior", "0.5,1.5,3", "0.9,0.8,0.7", "<phase type='hg'><float name='g' value='0.6'/></phase>") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN)
+				"<bsdf type='null'/>" OUTSIDE SCATTERS("interior", "0.5,1.5,3", "0.9,0.8,0.7",
+				"<phase type='hg'><float name='g' value='0.6'/></phase>") "</shape>"
 			     "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
-			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='-0.5' y='1.1'/>" TURN) "<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
-			     "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) ROUGH("1.33") OUTSIDE SCATTERS("interior", "1,2,4", "1,0.95,0.9", "") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='-0.5' y='1.1'/>" TURN)
+				"<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
+			     "<shape type='cube'>"
+				AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN)
+				ROUGH("1.33") OUTSIDE SCATTERS("interior", "1,2,4", "1,0.95,0.9", "") "</shape>"
 			     "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>", k->a);
 }
@@ -380,7 +472,11 @@ static double puffs(double x, double y, double z, uint32_t channel)
 static struct world *uneven_media(const struct agree_case *k)
 {
 #define GRID(name, params) "<volume type='gridvolume' name='" name "'><string name='filename' value='puffs.vol'/>" params "</volume>"
-#define UNEVEN(scale, sigma_t, albedo) "<medium type='heterogeneous' name='interior'>" sigma_t albedo "<float name='scale' value='" scale "'/></medium>"
+#define UNEVEN(scale, sigma_t, albedo) \
+	"<medium type='heterogeneous' name='interior'>" \
+		sigma_t albedo \
+		"<float name='scale' value='" scale "'/>" \
+	"</medium>"
 #define SIZED AT("<translate x='-.5' y='-.4' z='-.5'/><scale value='2.6'/>")
 #define BLACK "<float name='albedo' value='0'/>"
 #define CLOUD(albedo) UNEVEN("3", GRID("sigma_t", SIZED), albedo)
@@ -393,13 +489,17 @@ static struct world *uneven_media(const struct agree_case *k)
 		grid.value[i] = fminf(grid.value[i], 1);
 	vol_write(&grid);
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>" LOOK_AT_IT GROUND SKY
-			 "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN) "<bsdf type='null'/>%s</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.7'/><translate x='-0.6' y='0.8'/>" TURN)
+				"<bsdf type='null'/>%s</shape>"
 			 "<shape type='sphere'>" AT("<scale value='0.25'/><translate x='-0.6' y='0.6'/>" TURN) GREY("0.7") "</shape>"
-			 "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='-0.5' y='1.1'/>" TURN) "<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
-			 "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>" TURN) ROUGH("1.33") "%s</shape>"
+			 "<shape type='sphere'>" AT("<scale value='0.1'/><translate x='-0.5' y='1.1'/>" TURN)
+				"<emitter type='area'><rgb name='radiance' value='20'/></emitter></shape>"
+			 "<shape type='cube'>" AT("<scale value='0.4'/><rotate y='1' angle='20'/><translate x='0.7' y='0.5'/>"
+				TURN) ROUGH("1.33") "%s</shape>"
 			 "<shape type='rectangle'>" AT("<scale value='0.4'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
 			 "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape></scene>",
-			 black ? CLOUD(BLACK) : CLOUD(GRID("albedo", SIZED)), black ? CLOUDED(BLACK) : CLOUDED("<rgb name='albedo' value='1,0.95,0.9'/>"));
+			 black ? CLOUD(BLACK) : CLOUD(GRID("albedo", SIZED)),
+			 black ? CLOUDED(BLACK) : CLOUDED("<rgb name='albedo' value='1,0.95,0.9'/>"));
 	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"puffs.vol", grid.bytes, grid.size}, {NULL, NULL, 0}};
 	return world_of_files(32, 32, files);
 }
@@ -410,9 +510,13 @@ static struct world *media_that_do_not_fit(const struct agree_case *k)
 {
 	(void)k;
 	return world_of_text(32, 32, LOOK_AT_IT GROUND
-			     "<medium type='homogeneous' id='haze'><float name='sigma_t' value='0.8'/><float name='albedo' value='0.6'/></medium>"
-			     "<shape type='sphere'>" AT("<scale value='0.8'/><translate y='0.85'/>" TURN) "<bsdf type='null'/><ref name='exterior' id='haze'/>" SCATTERS("interior", "1.5,1,0.5", "0.9,0.9,0.9", "") "</shape>"
-			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.2' y='0.8'/>" TURN) "<emitter type='area'><rgb name='radiance' value='9'/></emitter><ref name='exterior' id='haze'/></shape>"
+			     "<medium type='homogeneous' id='haze'><float name='sigma_t' value='0.8'/>"
+				"<float name='albedo' value='0.6'/></medium>"
+			     "<shape type='sphere'>" AT("<scale value='0.8'/><translate y='0.85'/>" TURN)
+				"<bsdf type='null'/><ref name='exterior' id='haze'/>"
+				SCATTERS("interior", "1.5,1,0.5", "0.9,0.9,0.9", "") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.2' y='0.8'/>" TURN)
+				"<emitter type='area'><rgb name='radiance' value='9'/></emitter><ref name='exterior' id='haze'/></shape>"
 			     "<shape type='rectangle'>" AT("<scale value='0.5'/><rotate x='1' angle='90'/><translate y='2.4'/>" TURN)
 			     "<emitter type='area'><rgb name='radiance' value='5'/></emitter></shape>");
 }
@@ -447,7 +551,8 @@ const struct agree_case agree_cases[] = {
 	{"scattering media", "that vary", uneven_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.03},
 	{"scattering media", "a cloud and milk", scattering_media, 0, 0, 10, 1024, 512, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.03},
 	{"scattering media", "a cloud and milk in fog", scattering_media, 0.2, 0, 10, 4096, 2048, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.04},
-	{"scattering media", "that do not fit together", media_that_do_not_fit, 0, 0, 6, 1024, 1024, {"bdpt", "pssmlt", "hslt", "erpt"}, 0.02},
+	{"scattering media", "that do not fit together", media_that_do_not_fit, 0, 0, 6, 1024, 1024,
+		{"bdpt", "pssmlt", "hslt", "erpt"}, 0.02},
 	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.02},
 	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 512, 512, ALL, 0.02},
 	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 1024, 1024, ALL, 0.02},

@@ -23,7 +23,11 @@
 #define LAMP                                                                                                                    \
 	"<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>")                       \
 	"<emitter type='area'><rgb name='radiance' value='3,2.5,2'/></emitter></shape>"
-#define PLATE(y, bsdf) "<shape type='rectangle'>" AT("<scale value='1.9'/><rotate x='1' angle='-90'/><translate y='" y "'/>") bsdf "</shape>"
+#define PLATE(y, bsdf) \
+	"<shape type='rectangle'>" \
+		AT("<scale value='1.9'/><rotate x='1' angle='-90'/><translate y='" y "'/>") \
+		bsdf \
+	"</shape>"
 #define BALL(bsdf) "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf "</shape>"
 /* Looks at the ball's centre through a field of view of so many degrees. */
 #define NEAR(o, t)                                                                                                              \
@@ -63,16 +67,18 @@ static struct world *bubble(double outside)
 static struct world *critical(double alpha)
 {
 	return world_of_text(32, 32, SENSOR("0,-1.5,1.7", "0,0,0.0") WALLS LAMP
-			     "<shape type='rectangle'>" AT("<scale value='2'/><rotate x='1' angle='-90'/>") ROUGH_GLASS "</shape>", 1.333, 1.0, alpha);
+			     "<shape type='rectangle'>" AT("<scale value='2'/><rotate x='1' angle='-90'/>")
+				ROUGH_GLASS "</shape>", 1.333, 1.0, alpha);
 }
 
 /* Along a rough plate that is seen at so many radians, with the light low behind it. */
 static struct world *grazing(double angle)
 {
 	return world_of_text(32, 32,
-			     "<sensor type='perspective'><float name='fov' value='%.9g'/><transform name='to_world'><lookat origin='0,%.9g,5' "
-			     "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/><integer "
-			     "name='height' value='32'/><rfilter type='box'/></film></sensor>"
+			     "<sensor type='perspective'><float name='fov' value='%.9g'/><transform name='to_world'>"
+				"<lookat origin='0,%.9g,5' target='0,0,0' up='0,1,0'/></transform>"
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+			     "<rfilter type='box'/></film></sensor>"
 			     "<shape type='rectangle'>" AT("<scale value='20'/><rotate x='1' angle='-90'/>") METAL "</shape>"
 			     "<shape type='rectangle'>" AT("<scale value='2'/><translate z='-15'/>")
 			     "<emitter type='area'><rgb name='radiance' value='3,2.5,2'/></emitter></shape>",
@@ -95,8 +101,10 @@ static struct world *plates(double count)
 static struct world *mirrors(double alpha)
 {
 	return world_of_text(32, 32, VIEW WALLS LAMP
-			     "<shape type='rectangle'>" AT("<scale value='1.95'/><rotate y='1' angle='90'/><translate x='-1.9'/>") METAL "</shape>"
-			     "<shape type='rectangle'>" AT("<scale value='1.95'/><rotate y='1' angle='-90'/><translate x='1.9'/>") METAL "</shape>",
+			     "<shape type='rectangle'>"
+				AT("<scale value='1.95'/><rotate y='1' angle='90'/><translate x='-1.9'/>") METAL "</shape>"
+			     "<shape type='rectangle'>"
+				AT("<scale value='1.95'/><rotate y='1' angle='-90'/><translate x='1.9'/>") METAL "</shape>",
 			     alpha, alpha);
 }
 
@@ -104,10 +112,12 @@ static struct world *mirrors(double alpha)
 static struct world *focus(double off)
 {
 	return world_of_text(32, 32,
-			     "<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'><lookat origin='%.9g,0,0' "
-			     "target='0,0,-3' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/><integer "
-			     "name='height' value='32'/><rfilter type='box'/></film></sensor>"
-			     "<shape type='sphere'><float name='radius' value='2'/><boolean name='flip_normals' value='true'/>" METAL "</shape>"
+			     "<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'>"
+				"<lookat origin='%.9g,0,0' target='0,0,-3' up='0,1,0'/></transform>"
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+			     "<rfilter type='box'/></film></sensor>"
+			     "<shape type='sphere'><float name='radius' value='2'/><boolean name='flip_normals' value='true'/>"
+				METAL "</shape>"
 			     "<shape type='sphere'><point name='center' value='0.3,0.3,0.2'/><float name='radius' value='0.2'/>"
 			     "<emitter type='area'><rgb name='radiance' value='3,2.5,2'/></emitter></shape>",
 			     off, 0.05);
@@ -118,13 +128,17 @@ static struct world *curved(double radius)
 {
 	double distance = fmax(2.2, 1.2 * radius);
 	return world_of_text(32, 32,
-			     "<sensor type='perspective'><float name='fov' value='%.9g'/><transform name='to_world'><lookat origin='0,0,%.9g' "
-			     "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/><integer "
-			     "name='height' value='32'/><rfilter type='box'/></film></sensor>"
-			     "<shape type='sphere'><point name='center' x='0' y='0' z='%.9g'/><float name='radius' value='%.9g'/>" METAL "</shape>"
+			     "<sensor type='perspective'><float name='fov' value='%.9g'/><transform name='to_world'>"
+				"<lookat origin='0,0,%.9g' target='0,0,0' up='0,1,0'/></transform>"
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+			     "<rfilter type='box'/></film></sensor>"
+			     "<shape type='sphere'><point name='center' x='0' y='0' z='%.9g'/>"
+				"<float name='radius' value='%.9g'/>" METAL "</shape>"
 			     "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"
-			     "<shape type='rectangle'>" AT("<scale value='3'/><translate z='4'/><rotate y='1' angle='180'/>") DIFFUSE "</shape>",
-			     radius > 1 ? 40.0 : 2 * atan(0.9 * radius / distance) * DEGREES, distance, radius > 1 ? -radius : 0.0, radius, 0.2);
+			     "<shape type='rectangle'>" AT("<scale value='3'/><translate z='4'/><rotate y='1' angle='180'/>")
+				DIFFUSE "</shape>",
+			     radius > 1 ? 40.0 : 2 * atan(0.9 * radius / distance) * DEGREES, distance,
+			     radius > 1 ? -radius : 0.0, radius, 0.2);
 }
 
 /* The image holds the pole, so many radii across. */
@@ -145,20 +159,23 @@ static struct world *mesh(double uv, double thin, const char *bsdf)
 			/* Every other circle of latitude lies near the one before it. */
 			double t = M_PI * (i % 2 && i < UP ? i - 1 + thin : i) / UP, p = 2 * M_PI * (j % AROUND) / AROUND;
 			double x = sin(t) * cos(p), y = cos(t), z = sin(t) * sin(p), shared = uv == 2;
-			n += (size_t)snprintf(obj + n, SIZE - n, "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %.9g %.9g\n", 0.8 * x, 0.8 * y - 0.6,
-					      0.8 * z - 0.3, x, y, z, shared > 0 ? 0.5 : (double)j / AROUND, shared > 0 ? 0.5 : (double)i / UP);
+			n += (size_t)snprintf(obj + n, SIZE - n, "v %.9g %.9g %.9g\nvn %.9g %.9g %.9g\nvt %.9g %.9g\n",
+					      0.8 * x, 0.8 * y - 0.6, 0.8 * z - 0.3, x, y, z,
+					      shared > 0 ? 0.5 : (double)j / AROUND, shared > 0 ? 0.5 : (double)i / UP);
 		}
 	for (int i = 0; i < UP; i++)
 		for (int j = 0; j < AROUND; j++) {
 			int a = i * (AROUND + 1) + j + 1, b = a + 1, c = b + AROUND + 1, d = a + AROUND + 1;
 			for (int half = 0; half < 2; half++) {
 				int q[3] = {a, half ? c : b, half ? d : c};
-				n += (size_t)(uv == 1 ? snprintf(obj + n, SIZE - n, "f %d//%d %d//%d %d//%d\n", q[0], q[0], q[1], q[1], q[2], q[2])
-						      : snprintf(obj + n, SIZE - n, "f %d/%d/%d %d/%d/%d %d/%d/%d\n", q[0], q[0], q[0], q[1], q[1], q[1], q[2], q[2],
-									 q[2]));
+				n += (size_t)(uv == 1 ? snprintf(obj + n, SIZE - n, "f %d//%d %d//%d %d//%d\n",
+								 q[0], q[0], q[1], q[1], q[2], q[2])
+						      : snprintf(obj + n, SIZE - n, "f %d/%d/%d %d/%d/%d %d/%d/%d\n",
+								 q[0], q[0], q[0], q[1], q[1], q[1], q[2], q[2], q[2]));
 			}
 		}
-	int m = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s<shape type='obj'><string name='filename' value='ball.obj'/>%s</shape></scene>",
+	int m = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s<shape type='obj'>"
+			 "<string name='filename' value='ball.obj'/>%s</shape></scene>",
 			 VIEW WALLS LAMP, bsdf);
 	const struct memory_file files[] = {{"test.xml", xml, (size_t)m}, {"ball.obj", obj, n}, {NULL, NULL, 0}};
 	return world_of_files(32, 32, files);
@@ -187,7 +204,8 @@ static struct world *displaced(double level)
 			 "<scene version='3.0.0'>" VIEW WALLS LAMP
 			 "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>"
 			 "<texture name='displacement' type='bitmap'><string name='filename' value='h.png'/></texture><float "
-			 "name='displacement_scale' value='0.02'/><integer name='displacement_level' value='%d'/>" ROUGH_GLASS "</shape></scene>",
+			 "name='displacement_scale' value='0.02'/><integer name='displacement_level' value='%d'/>"
+				ROUGH_GLASS "</shape></scene>",
 			 (int)level, 1.5, 1.0, 0.1);
 	const struct memory_file files[] = {{"test.xml", xml, (size_t)m}, {"h.png", png, size}, {NULL, NULL, 0}};
 	struct world *w = world_of_files(32, 32, files);
@@ -198,10 +216,14 @@ static struct world *displaced(double level)
 /* A plate of the floor's own material stands in the light's way. */
 static struct world *occluder(double side)
 {
-	return world_of_text(32, 32, VIEW "<bsdf type='roughconductor' id='m'><string name='material' value='Au'/><float name='alpha' value='0.2'/></bsdf>"
+	return world_of_text(32, 32, VIEW "<bsdf type='roughconductor' id='m'><string name='material' value='Au'/>"
+			     "<float name='alpha' value='0.2'/></bsdf>"
 			     "<shape type='cube'>" AT("<scale value='2'/>") "<ref id='m'/></shape>" LAMP
-			     "<shape type='rectangle'>" AT("<scale value='%.9g'/><rotate x='1' angle='-90'/><translate y='-1.2' z='-0.6'/>") "<ref id='m'/></shape>"
-			     "<shape type='rectangle'>" AT("<scale value='%.9g'/><rotate x='1' angle='-90'/><translate y='-0.4' z='-0.9'/>") "<ref id='m'/></shape>",
+			     "<shape type='rectangle'>"
+				AT("<scale value='%.9g'/><rotate x='1' angle='-90'/><translate y='-1.2' z='-0.6'/>") "<ref id='m'/></shape>"
+			     "<shape type='rectangle'>"
+				AT("<scale value='%.9g'/><rotate x='1' angle='-90'/><translate y='-0.4' z='-0.9'/>")
+				"<ref id='m'/></shape>",
 			     side, side);
 }
 
@@ -216,7 +238,8 @@ static struct world *small_light(double size)
 /* As large as the sun seen from the ground, in a sky of 1. */
 static struct world *sun(double radiance)
 {
-	return world_of_text(32, 32, SENSOR("0,1,5", "0,0,0") "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>")
+	return world_of_text(32, 32, SENSOR("0,1,5", "0,0,0") "<shape type='rectangle'>"
+			     AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>")
 			     DIFFUSE "</shape><shape type='sphere'>" ROUGH_GLASS "</shape>"
 			     "<shape type='sphere'><point name='center' value='300,500,200'/><float name='radius' value='2.9'/>"
 			     "<emitter type='area'><float name='radiance' value='%.9g'/></emitter></shape>"
@@ -227,15 +250,18 @@ static struct world *sun(double radiance)
 /* Into the corner of the room, so narrowly: edges from wall to wall as short as one likes. */
 static struct world *corner(double degrees)
 {
-	return world_of_text(32, 32, NEAR("0,0.2,1.5", "-2,-2,-2") LAMP "<shape type='cube'>" AT("<scale value='2'/>") METAL "</shape>", degrees, 0.3);
+	return world_of_text(32, 32, NEAR("0,0.2,1.5", "-2,-2,-2") LAMP "<shape type='cube'>" AT("<scale value='2'/>")
+		METAL "</shape>", degrees, 0.3);
 }
 
 /* Two balls that nearly touch, looked at between them. */
 static struct world *gap(double width)
 {
 	return world_of_text(32, 32, NEAR("0,0.2,1.9", "0,-0.6,-0.3") WALLS LAMP
-			     "<shape type='sphere'><point name='center' x='%.9g' y='-0.6' z='-0.3'/><float name='radius' value='0.6'/>" METAL "</shape>"
-			     "<shape type='sphere'><point name='center' x='%.9g' y='-0.6' z='-0.3'/><float name='radius' value='0.6'/>" METAL "</shape>",
+			     "<shape type='sphere'><point name='center' x='%.9g' y='-0.6' z='-0.3'/>"
+				"<float name='radius' value='0.6'/>" METAL "</shape>"
+			     "<shape type='sphere'><point name='center' x='%.9g' y='-0.6' z='-0.3'/>"
+				"<float name='radius' value='0.6'/>" METAL "</shape>",
 			     3.0, -0.6 - width / 2, 0.2, 0.6 + width / 2, 0.2);
 }
 
@@ -250,7 +276,8 @@ static struct world *aperture(double radius)
 	return world_of_text(32, 32,
 			     "<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='%.9g'/><float "
 			     "name='focus_distance' value='2.4'/><transform name='to_world'><lookat origin='0,0.2,1.3' target='0,-0.3,-1' "
-			     "up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+			     "up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/>"
+				"<integer name='height' value='32'/>"
 			     "<rfilter type='box'/></film></sensor>" WALLS LAMP BALL(ROUGH_GLASS),
 			     radius, 1.5, 1.0, 0.2);
 }

@@ -52,7 +52,8 @@ static struct world *gold(void)
 static struct world *mirror(void)
 {
 	return world_of_text(32, 32, VIEW BOX("0.5,0.5,0.5")
-			     "<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>") SHINES("3,3,3")
+			     "<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>")
+				SHINES("3,3,3")
 			     "</shape>" BALL(MIRROR)
 			     "<shape type='rectangle'>" AT("<rotate y='1' angle='60'/><translate x='-1.5' z='-0.6'/>")
 			     "<bsdf type='phong'><float name='exponent' value='60'/></bsdf></shape>");
@@ -70,7 +71,8 @@ static struct world *bent(void)
 		OBJ(AT("<scale value='.3'/><rotate x='1' angle='80'/><translate x='-.5' y='-.6' z='-.9'/>") CLOUDY("0.4"))
 		OBJ(AT("<scale value='.3'/><rotate z='1' angle='15'/><translate x='.8' y='-.5' z='-.5'/>") GLASS)
 		OBJ(AT("<scale value='.4'/><rotate z='1' angle='-70'/><translate x='-1.2' y='-.4' z='-.8'/>") METAL("0.2")) "</scene>";
-	const struct memory_file files[] = {{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent_obj, sizeof bent_obj - 1}, {NULL, NULL, 0}};
+	const struct memory_file files[] = {{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent_obj, sizeof bent_obj - 1},
+		{NULL, NULL, 0}};
 	return world_of_files(32, 32, files);
 }
 
@@ -86,7 +88,8 @@ static struct world *sky(void)
 static struct world *picture(void)
 {
 	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,1,5", "0,0,0")
-		"<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.4'/>") "</shape>" BALL(METAL("0.2"))
+		"<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.4'/>") "</shape>"
+			BALL(METAL("0.2"))
 		"<emitter type='envmap'><string name='filename' value='sky.png'/></emitter></scene>";
 	size_t size;
 	unsigned char *png = sample_png(16, 8, SAMPLE_RGB, 8, 0, &size);
@@ -98,7 +101,8 @@ static struct world *picture(void)
 
 static struct world *prism(void)
 {
-	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='dielectric'><float name='int_ior' value='1.6'/><float name='ext_ior' value='1'/>"
+	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='dielectric'><float name='int_ior' value='1.6'/>"
+						     "<float name='ext_ior' value='1'/>"
 						     "<float name='int_cauchy_b' value='0.05'/></bsdf>")
 			     "<shape type='sphere'><point name='center' value='1.1,-1.3,-0.2'/><float name='radius' value='0.6'/>"
 			     "<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/>"
@@ -110,15 +114,18 @@ static struct world *lens(void)
 	return world_of_text(32, 32,
 			     "<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='0.25'/>"
 			     "<float name='focus_distance' value='2.2'/>" AT("<lookat origin='0,0.2,1.6' target='0,-0.3,-1' up='0,1,0'/>")
-			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film>"
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+				"<rfilter type='box'/></film>"
 			     "</sensor>" BOX("0.5,0.45,0.35") LAMP BALL(METAL("0.2")));
 }
 
 static struct world *deltas(void)
 {
 	return world_of_text(32, 32, ROOM BALL(CLOUDY("0.3"))
-			     "<shape type='rectangle'>" AT("<scale value='0.9'/><rotate y='1' angle='70'/><translate x='-1.7' z='-0.6'/>") METAL("0.15") "</shape>"
-			     "<emitter type='point'><point name='position' value='0.5,1.5,0.6'/><rgb name='intensity' value='4,4,3'/></emitter>"
+			     "<shape type='rectangle'>"
+				AT("<scale value='0.9'/><rotate y='1' angle='70'/><translate x='-1.7' z='-0.6'/>") METAL("0.15") "</shape>"
+			     "<emitter type='point'><point name='position' value='0.5,1.5,0.6'/>"
+				"<rgb name='intensity' value='4,4,3'/></emitter>"
 			     "<emitter type='spot'><rgb name='intensity' value='9,8,8'/><float name='cutoff_angle' value='50'/>"
 			     AT("<lookat origin='-1,1.5,1' target='0,-1,-0.3' up='0,1,0'/>") "</emitter>");
 }
@@ -128,12 +135,14 @@ static struct world *sun(void)
 	return world_of_text(32, 32, SENSOR("0,1,5", "0,0,0")
 			     "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.4'/>")
 			     "</shape>" BALL(CLOUDY("0.3"))
-			     "<emitter type='directional'><vector name='direction' value='0.3,-1,-0.4'/><rgb name='irradiance' value='3,3,2'/></emitter>");
+			     "<emitter type='directional'><vector name='direction' value='0.3,-1,-0.4'/>"
+				"<rgb name='irradiance' value='3,3,2'/></emitter>");
 }
 
 static struct world *dents(void)
 {
-	return world_of_text(32, 32, ROOM LAMP "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>"
+	return world_of_text(32, 32, ROOM LAMP "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/>"
+			     "<float name='radius' value='0.8'/>"
 			     CLOUDY("0.15") "<texture name='displacement' type='checkerboard'><float name='color0' value='0'/>"
 			     "<float name='color1' value='1'/>" "<transform name='to_uv'><scale x='6' y='4'/></transform></texture>"
 			     "<float name='displacement_scale' value='0.06'/><integer name='displacement_level' value='3'/></shape>");
@@ -142,16 +151,19 @@ static struct world *dents(void)
 /* In it a stone, which states no medium. */
 static struct world *coloured_glass(void)
 {
-	return world_of_text(32, 32, ROOM LAMP BALL(CLOUDY("0.25") "<medium type='homogeneous' name='interior'><float name='albedo' value='0'/>"
+	return world_of_text(32, 32, ROOM LAMP BALL(CLOUDY("0.25") "<medium type='homogeneous' name='interior'>"
+						    "<float name='albedo' value='0'/>"
 						    "<rgb name='sigma_t' value='0.3,0.8,1.5'/></medium>")
-			     "<shape type='sphere'><point name='center' value='0.2,-0.8,-0.3'/><float name='radius' value='0.3'/>" METAL("0.2") "</shape>");
+			     "<shape type='sphere'><point name='center' value='0.2,-0.8,-0.3'/>"
+				"<float name='radius' value='0.3'/>" METAL("0.2") "</shape>");
 }
 
 /* Each part of a material has a normal of its own. */
 static struct world *tilted_parts(void)
 {
 	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='blendbsdf'><float name='weight' value='0.5'/>" METAL("0.15")
-						    "<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.45,0.9'/>"
+						    "<bsdf type='normalmap'><texture type='checkerboard'>"
+							"<rgb name='color0' value='0.7,0.45,0.9'/>"
 						    "<rgb name='color1' value='0.4,0.6,0.85'/></texture><bsdf type='roughplastic'>"
 						    "<float name='alpha' value='0.3'/></bsdf></bsdf></bsdf>"));
 }
@@ -159,7 +171,8 @@ static struct world *tilted_parts(void)
 /* Steep enough that many face away from the camera. */
 static struct world *turned_normals(void)
 {
-	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.9,0.35,0.8'/>"
+	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='normalmap'><texture type='checkerboard'>"
+						    "<rgb name='color0' value='0.9,0.35,0.8'/>"
 						    "<rgb name='color1' value='0.15,0.8,0.75'/></texture>" METAL("0.3") "</bsdf>"));
 }
 
@@ -178,12 +191,15 @@ static struct world *clouds(void)
 static struct world *fog(void)
 {
 	return world_of_text(32, 32,
-			     "<medium type='homogeneous' id='fog'><float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/></medium>"
-			     "<sensor type='perspective'><float name='fov' value='40'/>" AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+			     "<medium type='homogeneous' id='fog'><float name='sigma_t' value='0.3'/>"
+				"<float name='albedo' value='0.8'/></medium>"
+			     "<sensor type='perspective'><float name='fov' value='40'/>"
+				AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
 			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
 			     "<rfilter type='box'/></film><ref name='medium' id='fog'/></sensor>" BOX("0.5,0.45,0.35") LAMP
 			     "<shape type='sphere'><point name='center' value='0.2,-0.6,-0.2'/><float name='radius' value='0.7'/>" GLASS
-			     INSIDE("<float name='sigma_t' value='2'/><float name='albedo' value='0.9'/>") "<ref name='exterior' id='fog'/></shape>");
+			     INSIDE("<float name='sigma_t' value='2'/><float name='albedo' value='0.9'/>")
+				"<ref name='exterior' id='fog'/></shape>");
 }
 
 /* Fog of which only the camera knows: the light's own sub-paths begin outside of it, and many paths that the camera could have are
@@ -195,13 +211,19 @@ static struct world *fog(void)
 static struct world *misfit(void)
 {
 	return world_of_text(32, 32,
-			     "<sensor type='perspective'><float name='fov' value='40'/>" AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
-			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film>"
-			     "<medium type='homogeneous'><float name='sigma_t' value='0.3'/><float name='albedo' value='0.8'/></medium></sensor>"
-			     BOX("0.5,0.45,0.35") "<emitter type='point'><point name='position' value='0,1.5,0'/><rgb name='intensity' value='3,2.5,2'/></emitter>"
-			     "<shape type='rectangle'>" AT("<scale value='1.9'/><rotate y='1' angle='90'/><translate x='-1.8'/>") MIRROR "</shape>"
+			     "<sensor type='perspective'><float name='fov' value='40'/>"
+				AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+				"<rfilter type='box'/></film>"
+			     "<medium type='homogeneous'><float name='sigma_t' value='0.3'/>"
+				"<float name='albedo' value='0.8'/></medium></sensor>"
+			     BOX("0.5,0.45,0.35") "<emitter type='point'><point name='position' value='0,1.5,0'/>"
+				"<rgb name='intensity' value='3,2.5,2'/></emitter>"
+			     "<shape type='rectangle'>"
+				AT("<scale value='1.9'/><rotate y='1' angle='90'/><translate x='-1.8'/>") MIRROR "</shape>"
 			     STRIP("-0.9") STRIP("0") STRIP("0.9")
-			     "<shape type='sphere'><point name='center' value='0.2,-0.6,-0.2'/><float name='radius' value='0.7'/>" GLASS "</shape>");
+			     "<shape type='sphere'><point name='center' value='0.2,-0.6,-0.2'/>"
+				"<float name='radius' value='0.7'/>" GLASS "</shape>");
 }
 
 #define FROM(t, inner) "<transform time='" t "'>" inner "</transform>"
@@ -214,17 +236,20 @@ static struct world *moving(void)
 		"<sensor type='perspective'><float name='fov' value='40'/><float name='shutter_open' value='0.2'/>"
 		"<float name='shutter_close' value='0.9'/>" MOVES("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>",
 			"<lookat origin='0.2,0.3,1.8' target='0.1,-0.5,-1' up='0.1,1,0'/>")
-		"<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
+		"<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
+			"<rfilter type='box'/></film></sensor>"
 		BOX("0.5,0.45,0.35") LAMP
 		"<shape type='sphere'>" MOVES("<scale value='0.7'/><translate x='-0.6' y='-1' z='-0.6'/>",
 			"<scale value='0.5'/><rotate z='1' angle='-100'/><translate x='0.5' y='-1.2' z='-0.5'/>") METAL("0.2") "</shape>"
 		"<shape type='cube'>" MOVES("<scale x='0.5' y='0.4' z='0.15'/><translate x='0.5' y='0.3' z='-0.4'/>",
-			"<scale x='0.5' y='0.4' z='0.15'/><rotate y='1' angle='70'/><translate x='0.5' y='0.3' z='-0.4'/>") CLOUDY("0.3") "</shape>"
+			"<scale x='0.5' y='0.4' z='0.15'/><rotate y='1' angle='70'/><translate x='0.5' y='0.3' z='-0.4'/>")
+				CLOUDY("0.3") "</shape>"
 		"<shape type='shapegroup' id='g'>" OBJ(AT("<scale value='.3'/><rotate x='1' angle='80'/>") METAL("0.3"))
 		"<shape type='sphere'><float name='radius' value='0.25'/>" GLASS "</shape></shape>"
 		"<shape type='instance'><ref id='g'/>" MOVES("<translate x='-0.9' y='-0.6' z='-0.9'/>",
 			"<scale x='1' y='1' z='1'/><translate x='-0.3' y='-0.1' z='-0.9'/>") "</shape></scene>";
-	const struct memory_file files[] = {{"moving.xml", scene, sizeof scene - 1}, {"bent.obj", bent_obj, sizeof bent_obj - 1}, {NULL, NULL, 0}};
+	const struct memory_file files[] = {{"moving.xml", scene, sizeof scene - 1},
+		{"bent.obj", bent_obj, sizeof bent_obj - 1}, {NULL, NULL, 0}};
 	return world_of_files(32, 32, files);
 }
 
