@@ -25,8 +25,8 @@ static double instructions(const char *bin, const char *how, unsigned steps)
 	const char *folder = getenv("TMPDIR");
 	snprintf(
 		line, sizeof line,
-		"valgrind --tool=callgrind --callgrind-out-file=/dev/null %s/hslt-render -o %s/hslt-bench-effects-%d.exr --quiet --threads 1 "
-		"--chains %d --groups %d --bootstrap 1024 --epoch %d --mutations %u %s 2>&1",
+		"valgrind --tool=callgrind --callgrind-out-file=/dev/null %s/hslt-render -o %s/hslt-bench-effects-%d.exr "
+		"--quiet --threads 1 --chains %d --groups %d --bootstrap 1024 --epoch %d --mutations %u %s 2>&1",
 		bin, folder ? folder : "/tmp", (int)getpid(), CHAINS, CHAINS, SHORT, CHAINS * steps, how);
 	FILE *out = popen(line, "r");
 	double count = NAN;

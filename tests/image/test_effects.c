@@ -118,17 +118,30 @@ static void test_bits(void **state)
 	check_bits(VIEW WALLS POINT, "emitter-move");
 	check_bits(VIEW BALL("<bsdf type='conductor'><string name='material' value='none'/></bsdf>") LAMP, "diffuse");
 	/* Glass in a closed box is left out of the world, unless something is forced on. */
+	/* clang-format off */
 	check_bits(
 		VIEW WALLS LAMP
-		"<shape type='cube'><transform name='to_world'><scale value='0.4'/><translate y='-0.6'/></transform></shape>"
-		"<shape type='sphere'><point name='center' value='0,-0.6,0'/><float name='radius' value='0.3'/><bsdf type='dielectric'/></shape>",
+		"<shape type='cube'>"
+			"<transform name='to_world'><scale value='0.4'/><translate y='-0.6'/></transform>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' value='0,-0.6,0'/>"
+			"<float name='radius' value='0.3'/>"
+			"<bsdf type='dielectric'/>"
+		"</shape>",
 		"textures");
+	/* clang-format on */
 	/* The floor alone scatters: longer paths than two edges carry nothing, but are tried. */
+	/* clang-format off */
 	check_bits(
-		DEPTH SENSOR(
-			"0,1,5",
-			"0,-0.2,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>" POINT,
+		DEPTH
+		SENSOR("0,1,5", "0,-0.2,0")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform>"
+		"</shape>"
+		POINT,
 		"depth");
+	/* clang-format on */
 }
 
 /* ---- statistics ---- */

@@ -411,7 +411,8 @@ static int report(double wrong, double peak)
 	row_times("heartbeat -> answer", &load.beat);
 	row_times("result to the kernel", &load.send);
 	row_times("generator's timer late", &load.late);
-	printf("leases: %llu granted, %llu merged, %llu of bootstraps, %llu given back at the end, %llu copies taken back, %llu again to the same, %llu repeats\n",
+	printf("leases: %llu granted, %llu merged, %llu of bootstraps, %llu given back at the end, %llu copies taken "
+	       "back, %llu again to the same, %llu repeats\n",
 	       (unsigned long long)load.grants, (unsigned long long)load.merged,
 	       (unsigned long long)load.bootstrap_merged, (unsigned long long)load.given_back,
 	       (unsigned long long)load.revoked, (unsigned long long)load.again, (unsigned long long)load.repeated);

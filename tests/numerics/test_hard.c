@@ -49,7 +49,8 @@ static void run_case(const struct hard_case *h)
 				 s.strategy[STRATEGY_FAIL_ITERATIONS]);
 	snprintf(
 		measured, sizeof measured,
-		"%s: accepts %.1f %%, %.1f %% of walks do not converge, reverse fails %.2f %%, p %.2g by %s (%+.2g %% +- %.2g %%), finds %.1f %%; mixture: accepts %.1f %%, b %.3g, caught %llu, longest stuck %llu%s%s",
+		"%s: accepts %.1f %%, %.1f %% of walks do not converge, reverse fails %.2f %%, p %.2g by %s (%+.2g %% +- "
+		"%.2g %%), finds %.1f %%; mixture: accepts %.1f %%, b %.3g, caught %llu, longest stuck %llu%s%s",
 		h->mutation, 100 * (double)s.accepted / proposals, walks > 0 ? 100 * failed / walks : 0,
 		100 * (double)s.strategy[STRATEGY_FAIL_REVERSE] / proposals, s.p,
 		s.worst >= 0 ? stationary_function(s.worst) : "nothing", s.worst >= 0 ? 100 * s.bias[s.worst] : 0,

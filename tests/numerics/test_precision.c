@@ -142,8 +142,8 @@ static void test_precision(void **state)
 		qsort(of_float, e.count, sizeof *of_float, by_size);
 		snprintf(
 			measured, sizeof measured,
-			"%u proposals: log acceptance is off by at most %.1e (these formulas in double %.1e); in float by %.1e in the median, at "
-			"most %.1e, acceptance wrong by more than 1 %% in %.1f %%",
+			"%u proposals: log acceptance is off by at most %.1e (these formulas in double %.1e); in float "
+			"by %.1e in the median, at most %.1e, acceptance wrong by more than 1 %% in %.1f %%",
 			e.count, e.program, e.in_double, e.count ? of_float[e.count / 2] : 0,
 			e.count ? of_float[e.count - 1] : 0, 100.0 * e.wrong / (e.count ? e.count : 1));
 		snprintf(bound, sizeof bound, "%.0e", cases[i].allowed);

@@ -144,8 +144,8 @@ static void refused(const char *line, const char *why)
 static void test_kinds(void **state)
 {
 	(void)state;
-	accepted(
-		"list -o x --name gr\xc3\xbc\xc3\x9f\x65. --trim 0.25 --share 5% --threads 1k --time 2m --spp +2k --blobs 0.5 --kind bdpt -e -2");
+	accepted("list -o x --name gr\xc3\xbc\xc3\x9f\x65. --trim 0.25 --share 5% --threads 1k --time 2m --spp +2k "
+		 "--blobs 0.5 --kind bdpt -e -2");
 	assert_string_equal(a.output, "x");
 	assert_string_equal(a.name, "gr\xc3\xbc\xc3\x9f\x65.");
 	assert_true(a.trim == 0.25 && a.share == 0.05 && a.stops == -2 && a.part.seconds == 120);

@@ -360,7 +360,8 @@ static void words(void **state)
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(
 		text,
-		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose brightness is not known well enough; no chain came to 7 of 100 pixels");
+		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose "
+		"brightness is not known well enough; no chain came to 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
 	img.unvisited = 0;
 	/* Rare light may leave the interval unknown for ever: five times the estimate count, once that is small. */

@@ -198,11 +198,15 @@ static void test_tessellation(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct render_summary summary;
 		worlds_accuracy = cases[i].accuracy;
-		struct world *w = world_of_text(
-			8, 8,
-			SENSOR("0,0,3",
-			       "0,0,0") "<shape type='sphere'><texture type='checkerboard' name='displacement'/><integer name='displacement_level' "
-					"value='3'/><float name='displacement_scale' value='0.01'/></shape>");
+		/* clang-format off */
+		struct world *w = world_of_text(8, 8,
+			SENSOR("0,0,3", "0,0,0")
+			"<shape type='sphere'>"
+				"<texture type='checkerboard' name='displacement'/>"
+				"<integer name='displacement_level' value='3'/>"
+				"<float name='displacement_scale' value='0.01'/>"
+			"</shape>");
+		/* clang-format on */
 		worlds_accuracy = NULL;
 		world_summary(w, &summary);
 		assert_int_equal(summary.triangles, cases[i].triangles);

@@ -116,15 +116,21 @@ static bool merging_finds_rare_light(struct world *w, uint64_t seed)
 static void a_lamp_in_view_is_not_rare_light(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
-		48, 48,
-		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>" SENSOR(
-			"0,0,4",
-			"0,0,0") "<shape type='cube'><transform name='to_world'><scale value='5'/></transform>"
-				 "<bsdf type='diffuse'><rgb name='reflectance' value='0.3,0.3,0.3'/></bsdf></shape>"
-				 "<shape type='sphere'><point name='center' x='0.3' y='0.2' z='0'/><float name='radius' value='0.08'/>"
-				 "<emitter type='area'><rgb name='radiance' value='%d,%d,%d'/></emitter></shape>",
+	/* clang-format off */
+	struct world *w = world_of_text(48, 48,
+		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>"
+		SENSOR("0,0,4", "0,0,0")
+		"<shape type='cube'>"
+			"<transform name='to_world'><scale value='5'/></transform>"
+			"<bsdf type='diffuse'><rgb name='reflectance' value='0.3,0.3,0.3'/></bsdf>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='0.3' y='0.2' z='0'/>"
+			"<float name='radius' value='0.08'/>"
+			"<emitter type='area'><rgb name='radiance' value='%d,%d,%d'/></emitter>"
+		"</shape>",
 		5000, 5000, 5000);
+	/* clang-format on */
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_false(chooses_chains(w, seed));
 	world_free(w);
@@ -136,19 +142,33 @@ static void a_small_lamp_in_a_mirror_is_not_rare_light(void **state)
 {
 	(void)state;
 	double rare = 0;
-	struct world *w = world_of_text(
-		160, 90,
-		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>" SENSOR(
-			"0,0,4",
-			"0,0,0") "<shape type='cube'><transform name='to_world'><scale value='5'/></transform>"
-				 "<bsdf type='diffuse'><rgb name='reflectance' value='0.3,0.3,0.3'/></bsdf></shape>"
-				 "<shape type='rectangle'><transform name='to_world'><scale value='1.5'/></transform>"
-				 "<bsdf type='roughconductor'><float name='alpha' value='0.02'/></bsdf></shape>"
-				 "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='4.9'/></transform>"
-				 "<emitter type='area'><rgb name='radiance' value='100,100,100'/></emitter></shape>"
-				 "<shape type='sphere'><point name='center' x='1.2' y='0.1' z='0.07'/><float name='radius' value='0.003'/>"
-				 "<emitter type='area'><rgb name='radiance' value='%d,%d,%d'/></emitter></shape>",
+	/* clang-format off */
+	struct world *w = world_of_text(160, 90,
+		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>"
+		SENSOR("0,0,4", "0,0,0")
+		"<shape type='cube'>"
+			"<transform name='to_world'><scale value='5'/></transform>"
+			"<bsdf type='diffuse'><rgb name='reflectance' value='0.3,0.3,0.3'/></bsdf>"
+		"</shape>"
+		"<shape type='rectangle'>"
+			"<transform name='to_world'><scale value='1.5'/></transform>"
+			"<bsdf type='roughconductor'><float name='alpha' value='0.02'/></bsdf>"
+		"</shape>"
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='3'/>"
+				"<rotate x='1' angle='90'/>"
+				"<translate y='4.9'/>"
+			"</transform>"
+			"<emitter type='area'><rgb name='radiance' value='100,100,100'/></emitter>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='1.2' y='0.1' z='0.07'/>"
+			"<float name='radius' value='0.003'/>"
+			"<emitter type='area'><rgb name='radiance' value='%d,%d,%d'/></emitter>"
+		"</shape>",
 		1000000, 1000000, 1000000);
+	/* clang-format on */
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
@@ -219,15 +239,25 @@ static void light_that_no_sample_meets_is_known_by_merging(void **state)
 static void path_is_not_chosen_where_it_misses_light(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
-		48, 48,
-		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
-			"0,2,6",
-			"0,0,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/></transform>"
-				 "<bsdf type='diffuse'/></shape>"
-				 "<shape type='sphere'><float name='radius' value='0.4'/><bsdf type='dielectric'/></shape>"
-				 "<emitter type='point'><point name='position' x='1' y='6' z='0'/><rgb name='intensity' value='30,30,30'/></emitter>",
+	/* clang-format off */
+	struct world *w = world_of_text(48, 48,
+		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>"
+		SENSOR("0,2,6", "0,0,0")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='3'/>"
+				"<rotate x='1' angle='-90'/>"
+				"<translate y='-1'/>"
+			"</transform>"
+			"<bsdf type='diffuse'/>"
+		"</shape>"
+		"<shape type='sphere'><float name='radius' value='0.4'/><bsdf type='dielectric'/></shape>"
+		"<emitter type='point'>"
+			"<point name='position' x='1' y='6' z='0'/>"
+			"<rgb name='intensity' value='30,30,30'/>"
+		"</emitter>",
 		6);
+	/* clang-format on */
 	int would = 0;
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;

@@ -93,13 +93,23 @@ static int by_number(const void *a, const void *b)
 /* About half of the paths find light. */
 static struct world *lit_world(void)
 {
-	return world_of_text(
-		24, 24,
-		SENSOR("0,1,5",
-		       "0,0.5,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>"
-				  "<shape type='sphere'><point name='center' x='0' y='.6' z='0'/><float name='radius' value='.6'/>"
-				  "<bsdf type='roughdielectric'/></shape><shape type='sphere'><point name='center' x='1' y='2' z='1'/><float name='radius' value='.3'/>"
-				  "<emitter type='area'/></shape>");
+	/* clang-format off */
+	return world_of_text(24, 24,
+		SENSOR("0,1,5", "0,0.5,0")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='0' y='.6' z='0'/>"
+			"<float name='radius' value='.6'/>"
+			"<bsdf type='roughdielectric'/>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='1' y='2' z='1'/>"
+			"<float name='radius' value='.3'/>"
+			"<emitter type='area'/>"
+		"</shape>");
+	/* clang-format on */
 }
 
 static struct plan plan_of(const struct world *w, const struct render_integrator *i)

@@ -24,15 +24,28 @@ enum { PARTS = 2, GROUPS = 2, CHAINS = 8 };
 
 static struct world *small_world(const char *filter)
 {
-	return world_of_text(
-		80, 70,
-		"<sensor type='perspective'><float name='fov' value='50'/><transform name='to_world'>"
-		"<lookat origin='0,1,5' target='0,0.5,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='%s'/></film></sensor>"
-		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>"
-		"<shape type='sphere'><point name='center' x='0' y='.6' z='0'/><float name='radius' value='.6'/><bsdf type='dielectric'/></shape>"
-		"<shape type='sphere'><point name='center' x='1' y='2' z='1'/><float name='radius' value='.3'/>"
-		"<emitter type='area'><rgb name='radiance' value='4,3,2'/></emitter></shape>",
+	/* clang-format off */
+	return world_of_text(80, 70,
+		"<sensor type='perspective'>"
+			"<float name='fov' value='50'/>"
+			"<transform name='to_world'><lookat origin='0,1,5' target='0,0.5,0' up='0,1,0'/></transform>"
+			"<film type='hdrfilm'><rfilter type='%s'/></film>"
+		"</sensor>"
+		"<shape type='rectangle'>"
+			"<transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='0' y='.6' z='0'/>"
+			"<float name='radius' value='.6'/>"
+			"<bsdf type='dielectric'/>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='1' y='2' z='1'/>"
+			"<float name='radius' value='.3'/>"
+			"<emitter type='area'><rgb name='radiance' value='4,3,2'/></emitter>"
+		"</shape>",
 		filter);
+	/* clang-format on */
 }
 
 static struct plan plan_of(const struct world *w, const char *integrator)
@@ -161,14 +174,20 @@ static void test_extreme_light(void **state)
 	(void)state;
 	const char *radiance[] = {"1e-320", "1e-306", "1e-293", "1e-290", "1e-160", "1e30"};
 	for (size_t n = 0; n < sizeof radiance / sizeof *radiance; n++) {
-		struct world *w = world_of_text(
-			16, 16,
-			SENSOR("0,0,5",
-			       "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape><shape type='cube'><transform name='to_world'>"
-					"<scale value='7'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
-					"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='180'/><translate z='6'/></transform>"
-					"<emitter type='area'><rgb name='radiance' value='%s'/></emitter></shape>",
+		/* clang-format off */
+		struct world *w = world_of_text(16, 16,
+			SENSOR("0,0,5", "0,0,0")
+			"<shape type='sphere'><bsdf type='diffuse'/></shape>"
+			"<shape type='cube'>"
+				"<transform name='to_world'><scale value='7'/></transform>"
+				"<bsdf type='twosided'><bsdf type='diffuse'/></bsdf>"
+			"</shape>"
+			"<shape type='rectangle'>"
+				"<transform name='to_world'><rotate y='1' angle='180'/><translate z='6'/></transform>"
+				"<emitter type='area'><rgb name='radiance' value='%s'/></emitter>"
+			"</shape>",
 			radiance[n]);
+		/* clang-format on */
 		for (size_t i = 0; render_integrator_at(i); i++) {
 			struct plan p = plan_of(w, render_integrator_at(i)->name);
 			uint64_t seeds[2] = {UINT64_MAX, UINT64_MAX};

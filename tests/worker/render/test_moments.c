@@ -342,13 +342,24 @@ static void moments_are_the_films(void **state)
 {
 	(void)state;
 	static const char *const integrators[] = {"pssmlt", "hslt"};
-	struct world *w = world_of_text(
-		200, 150,
-		SENSOR("0,0.2,1.9",
-		       "0,-0.3,-1") "<shape type='cube'><transform name='to_world'><scale value='2'/></transform></shape>"
-				    "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/><bsdf type='dielectric'/></shape>"
-				    "<shape type='rectangle'><transform name='to_world'><scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/></transform>"
-				    "<emitter type='area'/></shape>");
+	/* clang-format off */
+	struct world *w = world_of_text(200, 150,
+		SENSOR("0,0.2,1.9", "0,-0.3,-1")
+		"<shape type='cube'><transform name='to_world'><scale value='2'/></transform></shape>"
+		"<shape type='sphere'>"
+			"<point name='center' value='0,-0.6,-0.3'/>"
+			"<float name='radius' value='0.8'/>"
+			"<bsdf type='dielectric'/>"
+		"</shape>"
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='1.6'/>"
+				"<rotate x='1' angle='90'/>"
+				"<translate y='1.9'/>"
+			"</transform>"
+			"<emitter type='area'/>"
+		"</shape>");
+	/* clang-format on */
 	for (size_t i = 0; i < 2; i++) {
 		struct canvas_image img;
 		struct plan p = make_plan(w, integrators[i], "moments and film");

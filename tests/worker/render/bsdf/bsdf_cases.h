@@ -84,7 +84,8 @@ static const char *const bsdf_cases[] = {
 	"principledthin",
 	"principledthin base_color=rgb(0.8,0.3,0.1) roughness=0.4 spec_trans=0.6 diff_trans=1.2 anisotropic=0.3",
 	"principledthin base_color=0.9 roughness=0.5 spec_trans=1 eta=1.8",
-	"principledthin base_color=rgb(0.8,0.3,0.1) | @spec_trans checkerboard color0=0 color1=0.7 | @diff_trans checkerboard color0=0.2 color1=1.8",
+	"principledthin base_color=rgb(0.8,0.3,0.1) | @spec_trans checkerboard color0=0 color1=0.7 "
+	"| @diff_trans checkerboard color0=0.2 color1=1.8",
 	"principledthin base_color=rgb(0.8,0.3,0.1) sheen=0.5 sheen_tint=0.7 flatness=0.5 diff_trans=2 spec_tint=0.5",
 	"principled base_color=rgb(0.9,0.8,0.7) roughness=0.4 | @spec_trans checkerboard color0=0 color1=0.6",
 	"null",

@@ -235,20 +235,41 @@ static void test_black(void **state)
 /* Glass of size 1 on a floor of half-size `floor`. */
 static struct world *on_floor(double floor)
 {
-	return world_of_text(
-		SIDE, SIDE,
-		SENSOR("0,3,8",
-		       "0,0.7,0") "<shape type='rectangle'><transform name='to_world'><scale value='%g'/><rotate x='1' angle='-90'/></transform>"
-				  "<bsdf type='diffuse'/></shape>"
-				  "<shape type='sphere'><point name='center' x='-1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
-				  "<bsdf type='dielectric'/></shape>"
-				  "<shape type='sphere'><point name='center' x='1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
-				  "<bsdf type='roughdielectric'><float name='alpha' value='0.02'/></bsdf></shape>"
-				  "<shape type='cube'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='30'/>"
-				  "<translate x='0' y='0.45' z='1.5'/></transform><bsdf type='dielectric'/></shape>"
-				  "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='90'/>"
-				  "<translate x='0' y='4' z='0'/></transform><emitter type='area'/></shape>",
+	/* clang-format off */
+	return world_of_text(SIDE, SIDE,
+		SENSOR("0,3,8", "0,0.7,0")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'><scale value='%g'/><rotate x='1' angle='-90'/></transform>"
+			"<bsdf type='diffuse'/>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='-1.2' y='0.8' z='0'/>"
+			"<float name='radius' value='0.8'/>"
+			"<bsdf type='dielectric'/>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='1.2' y='0.8' z='0'/>"
+			"<float name='radius' value='0.8'/>"
+			"<bsdf type='roughdielectric'><float name='alpha' value='0.02'/></bsdf>"
+		"</shape>"
+		"<shape type='cube'>"
+			"<transform name='to_world'>"
+				"<scale value='0.4'/>"
+				"<rotate y='1' angle='30'/>"
+				"<translate x='0' y='0.45' z='1.5'/>"
+			"</transform>"
+			"<bsdf type='dielectric'/>"
+		"</shape>"
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='0.5'/>"
+				"<rotate x='1' angle='90'/>"
+				"<translate x='0' y='4' z='0'/>"
+			"</transform>"
+			"<emitter type='area'/>"
+		"</shape>",
 		floor);
+	/* clang-format on */
 }
 
 /* Read back: the same path, point for point. */

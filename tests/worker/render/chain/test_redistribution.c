@@ -281,13 +281,13 @@ static void what_is_seen_directly_is_not_spread(void **state)
 	(void)state;
 	const struct redistribution_rule all = {.threshold = 1e-6, .mutations = 1, .length = 1};
 	static struct trial t;
-	struct world *w = world_of_text(
-		SIDE, SIDE,
-		DEPTH SENSOR(
-			"0,0,5",
-			"0,0,0") "<emitter type='constant'><rgb name='radiance' value='1'/></emitter>" BALL("0,0,0",
-													    "1",
-													    GLASS));
+	/* clang-format off */
+	struct world *w = world_of_text(SIDE, SIDE,
+		DEPTH
+		SENSOR("0,0,5", "0,0,0")
+		"<emitter type='constant'><rgb name='radiance' value='1'/></emitter>"
+		BALL("0,0,0", "1", GLASS));
+	/* clang-format on */
 	trial_begin(&t, w, &all, 1, stats_seed(__func__));
 	for (uint64_t i = 0; i < 4096; i++)
 		trial_sample(&t, stats_seed(__func__), i);

@@ -207,9 +207,14 @@ static void test_world(void **state)
 static void test_refusals(void **state)
 {
 	(void)state;
+	/* clang-format off */
 	world_refused(
-		"<emitter type='point'><point name='position' x='1' y='0' z='0'/><transform name='to_world'><translate x='1'/></transform></emitter>",
+		"<emitter type='point'>"
+			"<point name='position' x='1' y='0' z='0'/>"
+			"<transform name='to_world'><translate x='1'/></transform>"
+		"</emitter>",
 		"position and to_world are both given");
+	/* clang-format on */
 	world_refused(
 		"<emitter type='directional'><vector name='direction' x='1' y='0' z='0'/><transform name='to_world'/></emitter>",
 		"direction and to_world are both given");

@@ -176,7 +176,8 @@ static void test_mixed(void **state)
 		       far = check_closest(&s, &d, true, n, met);
 		size_t segments = check_segments(&s, &d, n, &blocked), floor = check_from_the_floor(&s, &d, n);
 		print_message(
-			"%.0e: of %zu each, %zu from near, %zu from far, %zu segments, %zu from the floor differ; met %zu %zu %zu, blocked %zu\n",
+			"%.0e: of %zu each, %zu from near, %zu from far, %zu segments, %zu from the floor differ; met "
+			"%zu %zu %zu, blocked %zu\n",
 			sizes[i].size, n, close, far, segments, floor, met[0], met[1], met[2], blocked);
 		double expected = (double)n * (double)sizes[i].wrong * 1e-6;
 		size_t most = (size_t)(expected + 4 * sqrt(expected) + 1); /* of a small sample, too */

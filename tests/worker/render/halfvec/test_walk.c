@@ -369,10 +369,10 @@ static void print_row(const char *name, const struct tally *t, double arrive, do
 	if (!rows || rows[0] != '1')
 		return;
 	double n = (double)t->walks, ok = (double)t->arrived;
-	printf("walk\t%s\t%zu walks: %.1f %% arrive, %.1f %% of them come back (each vertex %.1f %%); %.2f iterations, %.2f rays; worst residual "
-	       "%.3f tolerances; from where it is %zu of %zu leave, by %.1e at most; by half the tolerance %zu of %zu come elsewhere; missed %zu, "
-	       "blocked %zu, mode %zu, singular %zu, diverged %zu, iterations %zu; back: %zu %zu %zu %zu %zu %zu; seams %llu\t"
-	       "%.1f %%, %.1f %%, 1.01\tok\n",
+	printf("walk\t%s\t%zu walks: %.1f %% arrive, %.1f %% of them come back (each vertex %.1f %%); %.2f iterations, "
+	       "%.2f rays; worst residual %.3f tolerances; from where it is %zu of %zu leave, by %.1e at most; by half "
+	       "the tolerance %zu of %zu come elsewhere; missed %zu, blocked %zu, mode %zu, singular %zu, "
+	       "diverged %zu, iterations %zu; back: %zu %zu %zu %zu %zu %zu; seams %llu\t%.1f %%, %.1f %%, 1.01\tok\n",
 	       name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->strict / ok,
 	       (double)t->iterations / n, (double)t->rays / n, t->worst, t->left, t->stays, t->worst_stay, t->elsewhere,
 	       t->again, t->ends[1], t->ends[2], t->ends[3], t->ends[4], t->ends[5], t->ends[6], t->back_ends[1],

@@ -61,23 +61,33 @@ static const struct test_scene test_scenes[] = {
 	{"bent normals",
 	 VIEW WALLS LAMP "<shape type='obj'><string name='filename' value='ball.obj'/>" ROUGH_GLASS("0.25") "</shape>",
 	 true},
+	/* clang-format off */
 	{"environment",
-	 SENSOR("0,1,5", "0,0,0") PLATE("-1", DIFFUSE("0.5,0.5,0.6"))
-		 BALL("0,0,0", "1",
-		      ROUGH_GLASS("0.3")) "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>",
+	 SENSOR("0,1,5", "0,0,0")
+	 PLATE("-1", DIFFUSE("0.5,0.5,0.6"))
+	 BALL("0,0,0", "1", ROUGH_GLASS("0.3"))
+	 "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>",
 	 false},
 	{"delta emitters",
-	 VIEW WALLS BALL(
-		 "0.2,-0.7,-0.3", "0.7",
-		 METAL("0.3")) "<emitter type='point'><point name='position' value='0.5,1.5,0.5'/><rgb name='intensity' value='3,2,1'/></emitter>"
-			       "<emitter type='spot'><float name='cutoff_angle' value='50'/><rgb name='intensity' value='1,2,3'/>" AT(
-				       "<lookat origin='-1,1.6,0' target='0,-1,-0.5' up='1,0,0'/>") "</emitter>",
+	 VIEW WALLS
+	 BALL("0.2,-0.7,-0.3", "0.7", METAL("0.3"))
+	 "<emitter type='point'><point name='position' value='0.5,1.5,0.5'/><rgb name='intensity' value='3,2,1'/></emitter>"
+	 "<emitter type='spot'>"
+		"<float name='cutoff_angle' value='50'/>"
+		"<rgb name='intensity' value='1,2,3'/>"
+		AT("<lookat origin='-1,1.6,0' target='0,-1,-0.5' up='1,0,0'/>")
+	 "</emitter>",
 	 false},
 	{"sun",
-	 SENSOR("0,1,5", "0,0,0") PLATE("-1", DIFFUSE("0.5,0.5,0.6")) BALL(
-		 "0,0,0", "1",
-		 METAL("0.3")) "<emitter type='directional'><vector name='direction' value='0.5,-1,-0.4'/><rgb name='irradiance' value='3,2.5,2'/></emitter>",
+	 SENSOR("0,1,5", "0,0,0")
+	 PLATE("-1", DIFFUSE("0.5,0.5,0.6"))
+	 BALL("0,0,0", "1", METAL("0.3"))
+	 "<emitter type='directional'>"
+		"<vector name='direction' value='0.5,-1,-0.4'/>"
+		"<rgb name='irradiance' value='3,2.5,2'/>"
+	 "</emitter>",
 	 false},
+	/* clang-format on */
 	{"dispersion",
 	 VIEW WALLS LAMP BALL("0,-0.6,-0.3", "0.8",
 			      "<bsdf type='roughdielectric'><string name='int_ior' value='sf11'/>"

@@ -62,7 +62,8 @@ static void print(const char *scene, const struct stationary_how *how, const str
 	if (r->worst >= 0)
 		snprintf(worst, sizeof worst, "%s %+.2f %% +- %.2f %%", stationary_function(r->worst),
 			 100 * r->bias[r->worst], 100 * r->error[r->worst]);
-	printf("%-18s k%u %-11s accepts %4.1f %%, %4.1f %% of all; finds %.2f %% on a quarter, %.1f %% of colours, %.1f %% of vertices; %s (p %.1g); %s\n",
+	printf("%-18s k%u %-11s accepts %4.1f %%, %4.1f %% of all; finds %.2f %% on a quarter, %.1f %% of colours, "
+	       "%.1f %% of vertices; %s (p %.1g); %s\n",
 	       scene, how->max_edges, how->mutation, 100 * (double)r->accepted / (double)r->proposals, 100 * r->share,
 	       100 * r->least_block, 100 * r->least_colour, 100 * r->least_other, worst, r->p, verdict);
 	if (!getenv("HSLT_TEST_ROWS"))

@@ -122,17 +122,27 @@ static void test_lit_from_there(void **state)
 static void test_fog(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
-		SIDE, SIDE,
-		"<medium type='homogeneous' id='fog'><float name='sigma_t' value='0.4'/>"
-		"<float name='albedo' value='0.75'/></medium>" DEPTH(
-			"2") "<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='1e-5'/>"
-			     "<transform name='to_world'><lookat "
-			     "origin='0,0,3' target='0,0,0' up='0,1,0'/></transform><ref id='fog'/><film type='hdrfilm'>"
-			     "<rfilter type='box'/></film></sensor>" BEAM(
-				     "-3,-0.4,0.2",
-				     "3,0.5,-0.2") "<shape type='cube'><transform name='to_world'><scale value='5'/></transform><bsdf type='null'/>"
-						   "<ref name='interior' id='fog'/></shape>");
+	/* clang-format off */
+	struct world *w = world_of_text(SIDE, SIDE,
+		"<medium type='homogeneous' id='fog'>"
+			"<float name='sigma_t' value='0.4'/>"
+			"<float name='albedo' value='0.75'/>"
+		"</medium>"
+		DEPTH("2")
+		"<sensor type='perspective'>"
+			"<float name='fov' value='40'/>"
+			"<float name='near_clip' value='1e-5'/>"
+			"<transform name='to_world'><lookat origin='0,0,3' target='0,0,0' up='0,1,0'/></transform>"
+			"<ref id='fog'/>"
+			"<film type='hdrfilm'><rfilter type='box'/></film>"
+		"</sensor>"
+		BEAM("-3,-0.4,0.2", "3,0.5,-0.2")
+		"<shape type='cube'>"
+			"<transform name='to_world'><scale value='5'/></transform>"
+			"<bsdf type='null'/>"
+			"<ref name='interior' id='fog'/>"
+		"</shape>");
+	/* clang-format on */
 	enum { PIECES = 100000 };
 	const double length = 9, sigma = 0.4;
 	vec3 o = {-3, -0.4, 0.2}, d = vec3_normalize((vec3){6, 0.9, -0.4}), eye = {0, 0, 3};

@@ -14,116 +14,160 @@
 #include <cmocka.h>
 
 /* clang-format off */
-#define BOX                                                                                                                    \
-	"<shape type='cube'><transform name='to_world'><scale value='3'/></transform><bsdf type='diffuse'>"                       \
-	"<float name='reflectance' value='.7'/></bsdf></shape>"
-#define LAMPS                                                                                                                  \
-	"<shape type='sphere'><point name='center' x='-1' y='1.5' z='.5'/><float name='radius' value='.4'/>"                      \
-	"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>"                                               \
-	"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/><translate y='2.5'/></transform>"           \
-	"<bsdf type='diffuse'/><emitter type='area'><float name='radiance' value='3'/></emitter></shape>"
+#define BOX \
+	"<shape type='cube'>" \
+		"<transform name='to_world'><scale value='3'/></transform>" \
+		"<bsdf type='diffuse'><float name='reflectance' value='.7'/></bsdf>" \
+	"</shape>"
+#define LAMPS \
+	"<shape type='sphere'>" \
+		"<point name='center' x='-1' y='1.5' z='.5'/>" \
+		"<float name='radius' value='.4'/>" \
+		"<emitter type='area'><float name='radiance' value='5'/></emitter>" \
+	"</shape>" \
+	"<shape type='rectangle'>" \
+		"<transform name='to_world'><rotate x='1' angle='90'/><translate y='2.5'/></transform>" \
+		"<bsdf type='diffuse'/>" \
+		"<emitter type='area'><float name='radiance' value='3'/></emitter>" \
+	"</shape>"
+#define BALL(x, y, z, bsdf) \
+	"<shape type='sphere'>" \
+		"<point name='center' x='" x "' y='" y "' z='" z "'/>" \
+		"<float name='radius' value='.6'/>" \
+		bsdf \
+	"</shape>"
 /* clang-format on */
-#define BALL(x, y, z, bsdf)                                                   \
-	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z \
-	"'/><float name='radius' value='.6'/>" bsdf "</shape>"
 
 static void test_diffuse_and_rough(void **state)
 {
 	(void)state;
-	density_check(
-		"diffuse and rough",
-		world_of_text(
-			32, 24,
-			SENSOR("0,0,2.9", "0,0,0") BOX LAMPS BALL(
-				"0", "0", "0",
-				"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
-				BALL("1.4", "-.5", "0",
-				     "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>")
-					BALL("-1.4", "-.7", "0",
-					     "<bsdf type='phong'><float name='exponent' value='12'/></bsdf>")),
-		12000);
+	/* clang-format off */
+	density_check("diffuse and rough", world_of_text(32, 24,
+		SENSOR("0,0,2.9", "0,0,0")
+		BOX LAMPS
+		BALL("0", "0", "0",
+			"<bsdf type='roughconductor'>"
+				"<string name='material' value='none'/>"
+				"<float name='alpha' value='.3'/>"
+			"</bsdf>")
+		BALL("1.4", "-.5", "0", "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>")
+		BALL("-1.4", "-.7", "0", "<bsdf type='phong'><float name='exponent' value='12'/></bsdf>")), 12000);
+	/* clang-format on */
 }
 
 static void test_specular(void **state)
 {
 	(void)state;
-	struct density_tally t = density_check(
-		"specular",
-		world_of_text(
-			32, 24,
-			SENSOR("0,0,2.9", "0,0,0") BOX LAMPS BALL(
-				"0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
-				BALL("1.2", "-.5", "0",
-				     "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")
-					BALL("-1.3", "-.7", "0",
-					     "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
-					     "<float name='ext_ior' value='1.4'/></bsdf>")
-						BALL("1.3", "-1.2", "1",
-						     "<bsdf type='dielectric'><string name='int_ior' value='sf11'/>"
-						     "<boolean name='dispersion' value='true'/></bsdf>")
-							BALL("-.2", "-1.2", "1",
-							     "<bsdf type='roughdielectric'><float name='alpha' value='.1'/>"
-							     "<float name='int_cauchy_b' value='.02'/></bsdf>")),
-		20000);
+	/* clang-format off */
+	struct density_tally t = density_check("specular", world_of_text(32, 24,
+		SENSOR("0,0,2.9", "0,0,0")
+		BOX LAMPS
+		BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+		BALL("1.2", "-.5", "0", "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")
+		BALL("-1.3", "-.7", "0",
+			"<bsdf type='dielectric'>"
+				"<float name='int_ior' value='1'/>"
+				"<float name='ext_ior' value='1.4'/>"
+			"</bsdf>")
+		BALL("1.3", "-1.2", "1",
+			"<bsdf type='dielectric'>"
+				"<string name='int_ior' value='sf11'/>"
+				"<boolean name='dispersion' value='true'/>"
+			"</bsdf>")
+		BALL("-.2", "-1.2", "1",
+			"<bsdf type='roughdielectric'>"
+				"<float name='alpha' value='.1'/>"
+				"<float name='int_cauchy_b' value='.02'/>"
+			"</bsdf>")), 20000);
+	/* clang-format on */
 	assert_true(t.with_delta > t.routes / 20);
 }
 
 static void test_infinity(void **state)
 {
 	(void)state;
-	struct density_tally t = density_check(
-		"infinity",
-		world_of_text(
-			32, 24,
-			SENSOR("0,1,4.9", "0,0,0") LAMPS
-			"<emitter type='constant'><float name='radiance' value='.4'/></emitter>" BALL(
-				"0", "0", "0",
-				"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
-				BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>") BALL(
-					"-1.3", "-.7", "0",
-					"<bsdf type='diffuse'/>") "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
-								  "<translate y='-1.5'/></transform><bsdf type='phong'/></shape>"),
-		20000);
+	/* clang-format off */
+	struct density_tally t = density_check("infinity", world_of_text(32, 24,
+		SENSOR("0,1,4.9", "0,0,0")
+		LAMPS
+		"<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
+		BALL("0", "0", "0",
+			"<bsdf type='roughconductor'>"
+				"<string name='material' value='none'/>"
+				"<float name='alpha' value='.3'/>"
+			"</bsdf>")
+		BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>")
+		BALL("-1.3", "-.7", "0", "<bsdf type='diffuse'/>")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='4'/>"
+				"<rotate x='1' angle='-90'/>"
+				"<translate y='-1.5'/>"
+			"</transform>"
+			"<bsdf type='phong'/>"
+		"</shape>"), 20000);
+	/* clang-format on */
 	assert_true(t.infinite > t.routes / 10);
 }
 
 /* clang-format off */
-#define DELTA_LIGHTS                                                                                                                   \
-	"<emitter type='point'><point name='position' x='.5' y='2' z='1'/><float name='intensity' value='40'/></emitter>"         \
-	"<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/><float name='irradiance' value='2'/></emitter>" \
-	"<emitter type='spot'><float name='cutoff_angle' value='50'/><float name='intensity' value='100'/>"                       \
-	"<transform name='to_world'><lookat origin='-1,2,1.5' target='0,0,0' up='1,0,0'/></transform></emitter>"
+#define DELTA_LIGHTS \
+	"<emitter type='point'>" \
+		"<point name='position' x='.5' y='2' z='1'/>" \
+		"<float name='intensity' value='40'/>" \
+	"</emitter>" \
+	"<emitter type='directional'>" \
+		"<vector name='direction' x='.3' y='-1' z='-.2'/>" \
+		"<float name='irradiance' value='2'/>" \
+	"</emitter>" \
+	"<emitter type='spot'>" \
+		"<float name='cutoff_angle' value='50'/>" \
+		"<float name='intensity' value='100'/>" \
+		"<transform name='to_world'><lookat origin='-1,2,1.5' target='0,0,0' up='1,0,0'/></transform>" \
+	"</emitter>"
 /* clang-format on */
 
 /* Lights that no path hits by chance, beside some that can be hit. */
 static void test_delta_lights(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
-		32, 24,
-		SENSOR("0,1,4.9", "0,0,0") DELTA_LIGHTS
-		"%s<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
-		"<shape type='sphere'><point name='center' x='-1' y='1.5' z='.5'/><float name='radius' value='.4'/>"
-		"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>",
+	/* clang-format off */
+	struct world *w = world_of_text(32, 24,
+		SENSOR("0,1,4.9", "0,0,0")
+		DELTA_LIGHTS
+		"%s"
+		"<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
+		"<shape type='sphere'>"
+			"<point name='center' x='-1' y='1.5' z='.5'/>"
+			"<float name='radius' value='.4'/>"
+			"<emitter type='area'><float name='radiance' value='5'/></emitter>"
+		"</shape>",
 		BALL("0", "0", "0",
-		     "<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
-			BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>") BALL(
-				"-1.3", "-.7", "0",
-				"<bsdf type='diffuse'/>") "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
-							  "<translate y='-1.5'/></transform><bsdf type='phong'/></shape>");
+			"<bsdf type='roughconductor'>"
+				"<string name='material' value='none'/>"
+				"<float name='alpha' value='.3'/>"
+			"</bsdf>")
+		BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>")
+		BALL("-1.3", "-.7", "0", "<bsdf type='diffuse'/>")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='4'/>"
+				"<rotate x='1' angle='-90'/>"
+				"<translate y='-1.5'/>"
+			"</transform>"
+			"<bsdf type='phong'/>"
+		"</shape>");
+	/* clang-format on */
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		assert_true(w->emitter_pdf[i] > 0.01);
 	struct density_tally t = density_check("delta lights", w, 30000);
 	assert_true(t.with_delta > t.routes / 100);
 	/* Nothing but such lights. */
-	t = density_check(
-		"delta lights in a box",
-		world_of_text(
-			32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
-			BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
-				BALL("1.2", "-.5", "0",
-				     "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")),
-		6000);
+	/* clang-format off */
+	t = density_check("delta lights in a box", world_of_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
+		BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+		BALL("1.2", "-.5", "0", "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")), 6000);
+	/* clang-format on */
 	assert_true(t.with_delta > t.routes / 20);
 }
 
@@ -131,15 +175,26 @@ static void test_delta_lights(void **state)
 static void check_fog(const char *name, const char *medium, const struct vol *grid, size_t walks)
 {
 	char xml[4096];
-	snprintf(
-		xml, sizeof xml, "<scene version='3.0.0'>%s%s%s</scene>", medium,
-		"<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='.4'/><transform name='to_world'>"
-		"<lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/></transform><ref id='fog'/></sensor>",
+	/* clang-format off */
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s%s%s</scene>",
+		medium,
+		"<sensor type='perspective'>"
+			"<float name='fov' value='40'/>"
+			"<float name='near_clip' value='.4'/>"
+			"<transform name='to_world'><lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/></transform>"
+			"<ref id='fog'/>"
+		"</sensor>",
 		BOX LAMPS
-		"<emitter type='point'><point name='position' x='.5' y='2' z='1'/><float name='intensity' value='40'/></emitter>" BALL(
-			"0", "0", "0.5",
-			"<bsdf type='dielectric'/><ref id='fog' name='interior'/><ref id='fog' name='exterior'/>")
-			BALL("1.4", "-.5", "0", "<bsdf type='diffuse'/>"));
+		"<emitter type='point'>"
+			"<point name='position' x='.5' y='2' z='1'/>"
+			"<float name='intensity' value='40'/>"
+		"</emitter>"
+		BALL("0", "0", "0.5",
+			"<bsdf type='dielectric'/>"
+			"<ref id='fog' name='interior'/>"
+			"<ref id='fog' name='exterior'/>")
+		BALL("1.4", "-.5", "0", "<bsdf type='diffuse'/>"));
+	/* clang-format on */
 	const struct memory_file files[] = {{"fog.xml", xml, strlen(xml)},
 					    {"fog.vol", grid ? grid->bytes : NULL, grid ? grid->size : 0},
 					    {NULL, NULL, 0}};
@@ -155,10 +210,14 @@ static void check_fog(const char *name, const char *medium, const struct vol *gr
 static void test_fog(void **state)
 {
 	(void)state;
+	/* clang-format off */
 	check_fog("fog",
-		  "<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='.2,.5,.9'/>"
-		  "<rgb name='albedo' value='.9,.8,.7'/>" FORWARDS,
-		  NULL, 12000);
+		"<medium type='homogeneous' id='fog'>"
+			"<rgb name='sigma_t' value='.2,.5,.9'/>"
+			"<rgb name='albedo' value='.9,.8,.7'/>"
+			FORWARDS,
+		NULL, 12000);
+	/* clang-format on */
 }
 
 static double puffs(double x, double y, double z, uint32_t channel)
@@ -176,13 +235,21 @@ static void test_puffs(void **state)
 	for (uint32_t channels = 1; channels <= 3; channels += 2) {
 		char medium[1024];
 		vol_make(&grid, (const uint32_t[3]){4, 3, 5}, channels, puffs);
-		snprintf(
-			medium, sizeof medium,
-			"<medium type='heterogeneous' id='fog'><volume type='gridvolume' name='sigma_t'>"
-			"<string name='filename' value='fog.vol'/><transform name='to_world'>"
-			"<rotate x='1' y='1' angle='20'/><translate x='-.5' y='-.5' z='-.5'/><scale value='4'/></transform>"
-			"</volume>%s" FORWARDS,
+		/* clang-format off */
+		snprintf(medium, sizeof medium,
+			"<medium type='heterogeneous' id='fog'>"
+				"<volume type='gridvolume' name='sigma_t'>"
+					"<string name='filename' value='fog.vol'/>"
+					"<transform name='to_world'>"
+						"<rotate x='1' y='1' angle='20'/>"
+						"<translate x='-.5' y='-.5' z='-.5'/>"
+						"<scale value='4'/>"
+					"</transform>"
+				"</volume>"
+				"%s"
+				FORWARDS,
 			media[channels / 2]);
+		/* clang-format on */
 		check_fog(channels == 1 ? "grey puffs" : "coloured puffs", medium, &grid, 300);
 	}
 }
@@ -191,15 +258,19 @@ static void test_puffs(void **state)
 static void test_lens(void **state)
 {
 	(void)state;
+	/* clang-format off */
 	static const char lens[] =
-		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='.7'/>"
-		"<float name='focus_distance' value='1.5'/><transform name='to_world'><lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/>"
-		"</transform></sensor>";
-	struct world *w = world_of_text(
-		32, 24, "%s%s", lens,
-		BOX LAMPS BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
-			BALL("1.4", "-.5", "0",
-			     "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>"));
+		"<sensor type='thinlens'>"
+			"<float name='fov' value='40'/>"
+			"<float name='aperture_radius' value='.7'/>"
+			"<float name='focus_distance' value='1.5'/>"
+			"<transform name='to_world'><lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/></transform>"
+		"</sensor>";
+	struct world *w = world_of_text(32, 24, "%s%s", lens,
+		BOX LAMPS
+		BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+		BALL("1.4", "-.5", "0", "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>"));
+	/* clang-format on */
 	assert_true(w->effects.aperture);
 	density_check("lens", w, 8000);
 }
@@ -208,15 +279,40 @@ static void test_lens(void **state)
 static void test_bent_normals(void **state)
 {
 	(void)state;
-	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,1,2.9", "0,-1,0") LAMPS
-		"<shape type='obj'><string name='filename' value='bent.obj'/><bsdf type='diffuse'/></shape>"
-		"<shape type='obj'><string name='filename' value='bent.obj'/><transform name='to_world'><scale value='.4'/><rotate x='1' angle='80'/>"
-		"<translate y='-.5'/></transform><bsdf type='roughdielectric'><float name='alpha' value='.4'/></bsdf></shape>"
-		"<shape type='obj'><string name='filename' value='bent.obj'/><transform name='to_world'><scale value='.4'/><translate x='1' y='.6'/>"
-		"</transform><bsdf type='dielectric'/></shape>"
-		"<shape type='obj'><string name='filename' value='bent.obj'/><transform name='to_world'><scale value='.7'/><rotate z='1' angle='70'/>"
-		"<translate x='-1' y='0'/></transform><bsdf type='roughconductor'><string name='material' value='none'/>"
-		"<float name='alpha' value='.3'/></bsdf></shape></scene>";
+	/* clang-format off */
+	static const char scene[] =
+		"<scene version='3.0.0'>"
+			SENSOR("0,1,2.9", "0,-1,0")
+			LAMPS
+			"<shape type='obj'><string name='filename' value='bent.obj'/><bsdf type='diffuse'/></shape>"
+			"<shape type='obj'>"
+				"<string name='filename' value='bent.obj'/>"
+				"<transform name='to_world'>"
+					"<scale value='.4'/>"
+					"<rotate x='1' angle='80'/>"
+					"<translate y='-.5'/>"
+				"</transform>"
+				"<bsdf type='roughdielectric'><float name='alpha' value='.4'/></bsdf>"
+			"</shape>"
+			"<shape type='obj'>"
+				"<string name='filename' value='bent.obj'/>"
+				"<transform name='to_world'><scale value='.4'/><translate x='1' y='.6'/></transform>"
+				"<bsdf type='dielectric'/>"
+			"</shape>"
+			"<shape type='obj'>"
+				"<string name='filename' value='bent.obj'/>"
+				"<transform name='to_world'>"
+					"<scale value='.7'/>"
+					"<rotate z='1' angle='70'/>"
+					"<translate x='-1' y='0'/>"
+				"</transform>"
+				"<bsdf type='roughconductor'>"
+					"<string name='material' value='none'/>"
+					"<float name='alpha' value='.3'/>"
+				"</bsdf>"
+			"</shape>"
+		"</scene>";
+	/* clang-format on */
 	static const char bent[] = "v -3 -1 -3\nv 3 -1.2 -3\nv 3 -1 3\nv -3 -1.1 3\nv 0 -.7 0\n"
 				   "vn -.5 1 .3\nvn .4 1 -.4\nvn .6 1 .2\nvn -.2 1 .7\nvn .3 1 -.5\n"
 				   "f 1//1 5//5 2//2\nf 2//2 5//5 3//3\nf 3//3 5//5 4//4\nf 4//4 5//5 1//1\n";

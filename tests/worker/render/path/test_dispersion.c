@@ -20,15 +20,26 @@
 /* A ball on a floor under a sky: little noise but that of drawing one wavelength. */
 static struct world *sky_over(const char *bsdf)
 {
-	return world_of_text(
-		32, 32,
-		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR(
-			"0,1,5",
-			"0,-0.2,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/>"
-				    "<translate y='-1'/></transform><bsdf type='diffuse'><rgb name='reflectance' value='0.4,0.6,0.7'/></bsdf></shape>"
-				    "<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>"
-				    "<shape type='sphere'><point name='center' value='0,-0.2,0'/><float name='radius' value='0.8'/>%s</shape>",
+	/* clang-format off */
+	return world_of_text(32, 32,
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
+		SENSOR("0,1,5", "0,-0.2,0")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='3'/>"
+				"<rotate x='1' angle='-90'/>"
+				"<translate y='-1'/>"
+			"</transform>"
+			"<bsdf type='diffuse'><rgb name='reflectance' value='0.4,0.6,0.7'/></bsdf>"
+		"</shape>"
+		"<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>"
+		"<shape type='sphere'>"
+			"<point name='center' value='0,-0.2,0'/>"
+			"<float name='radius' value='0.8'/>"
+			"%s"
+		"</shape>",
 		bsdf);
+	/* clang-format on */
 }
 
 #define SMOOTH(inner) "<bsdf type='dielectric'>" inner "</bsdf>"

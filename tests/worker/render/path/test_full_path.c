@@ -126,13 +126,18 @@ static void test_surfaces(void **state)
 			    ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
 	      1500);
 	check("mirror", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
-	check("turned normals",
-	      world_of_text(
-		      32, 32,
-		      ROOM LAMP BALL("<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' "
-				     "value='.9,.35,.8'/><rgb name='color1' value='.15,.8,.75'/></texture>"
-				     "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf></bsdf>")),
-	      1500);
+	/* clang-format off */
+	check("turned normals", world_of_text(32, 32,
+		ROOM LAMP
+		BALL(
+			"<bsdf type='normalmap'>"
+				"<texture type='checkerboard'>"
+					"<rgb name='color0' value='.9,.35,.8'/>"
+					"<rgb name='color1' value='.15,.8,.75'/>"
+				"</texture>"
+				"<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>"
+			"</bsdf>")), 1500);
+	/* clang-format on */
 	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
 }
 
@@ -141,37 +146,54 @@ static void test_surfaces(void **state)
 static void test_media(void **state)
 {
 	(void)state;
-#define MEDIUM(side, sigma)                                                                                           \
-	"<medium type='homogeneous' name='" side "'><rgb name='sigma_a' value='" sigma "'/><spectrum name='sigma_s' " \
-	"value='0'/></medium>"
-#define INSIDE(radius, x, inner)                                                                                 \
-	"<shape type='sphere'><point name='center' value='" x ",-0.6,-0.3'/><float name='radius' value='" radius \
-	"'/>" inner "</shape>"
-	struct world *w = world_of_text(
-		32, 32,
-		ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>" MEDIUM(
-			"interior", "0.3,1,2")) INSIDE("0.3", "-0.3", "<bsdf type='diffuse'/>")
-			INSIDE("0.2", "0.3",
-			       "<bsdf type='roughdielectric'><float name='int_ior' value='1.2'/><float name='ext_ior' "
-			       "value='1.5'/><float name='alpha' value='0.3'/></bsdf>" MEDIUM("exterior", "0.3,1,2")));
+/* clang-format off */
+#define MEDIUM(side, sigma) \
+	"<medium type='homogeneous' name='" side "'>" \
+		"<rgb name='sigma_a' value='" sigma "'/>" \
+		"<spectrum name='sigma_s' value='0'/>" \
+	"</medium>"
+#define INSIDE(radius, x, inner) \
+	"<shape type='sphere'>" \
+		"<point name='center' value='" x ",-0.6,-0.3'/>" \
+		"<float name='radius' value='" radius "'/>" \
+		inner \
+	"</shape>"
+	struct world *w = world_of_text(32, 32,
+		ROOM LAMP
+		BALL(
+			"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>"
+			MEDIUM("interior", "0.3,1,2"))
+		INSIDE("0.3", "-0.3", "<bsdf type='diffuse'/>")
+		INSIDE("0.2", "0.3",
+			"<bsdf type='roughdielectric'>"
+				"<float name='int_ior' value='1.2'/>"
+				"<float name='ext_ior' value='1.5'/>"
+				"<float name='alpha' value='0.3'/>"
+			"</bsdf>"
+			MEDIUM("exterior", "0.3,1,2")));
+	/* clang-format on */
 	assert_true(w->effects.absorption && w->media_count == 2);
 	check("coloured glass", w, 4000);
-	check("from haze",
-	      world_of_text(
-		      32, 32,
-		      "<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='0.5'/>" AT(
-			      "<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
-			      MEDIUM("medium", "0.4,0.2,0.1") "</sensor><shape type='cube'>" AT(
-				      "<scale value='2'/>") "</shape>" LAMP
-				      BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")),
-	      1500);
-	check("a layer of water",
-	      world_of_text(
-		      32, 32,
-		      ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>") "<shape type='cube'>" AT(
-			      "<scale x='1.9' y='0.5' z='1.9'/><translate y='-1.4'/>") "<bsdf type='dielectric'><float name='int_ior' value='1.33'/></bsdf>" MEDIUM("interior",
-																				    "0.9,0.4,0.2") "</shape>"),
-	      4000);
+	/* clang-format off */
+	check("from haze", world_of_text(32, 32,
+		"<sensor type='perspective'>"
+			"<float name='fov' value='40'/>"
+			"<float name='near_clip' value='0.5'/>"
+			AT("<lookat origin='0,0.2,1.9' target='0,-0.3,-1' up='0,1,0'/>")
+			MEDIUM("medium", "0.4,0.2,0.1")
+		"</sensor>"
+		"<shape type='cube'>" AT("<scale value='2'/>") "</shape>"
+		LAMP
+		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")), 1500);
+	check("a layer of water", world_of_text(32, 32,
+		ROOM LAMP
+		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")
+		"<shape type='cube'>"
+			AT("<scale x='1.9' y='0.5' z='1.9'/><translate y='-1.4'/>")
+			"<bsdf type='dielectric'><float name='int_ior' value='1.33'/></bsdf>"
+			MEDIUM("interior", "0.9,0.4,0.2")
+		"</shape>"), 4000);
+	/* clang-format on */
 }
 
 /* A sphere is drawn towards a vertex within the cone in which it is seen, and on all of its area for a light sub-path.
@@ -179,49 +201,63 @@ static void test_media(void **state)
 static void test_round_lamp(void **state)
 {
 	(void)state;
-	check("round lamp, gold",
-	      world_of_text(
-		      32, 32,
-		      ROOM
-		      "<shape type='sphere'><point name='center' value='0.8,1,-0.5'/><float name='radius' value='0.3'/>"
-		      "<emitter type='area'><rgb name='radiance' value='9,8,7'/></emitter></shape>" BALL(
-			      "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")),
-	      1500);
+	/* clang-format off */
+	check("round lamp, gold", world_of_text(32, 32,
+		ROOM
+		"<shape type='sphere'>"
+			"<point name='center' value='0.8,1,-0.5'/>"
+			"<float name='radius' value='0.3'/>"
+			"<emitter type='area'><rgb name='radiance' value='9,8,7'/></emitter>"
+		"</shape>"
+		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")), 1500);
+	/* clang-format on */
 }
 
 static void test_environment(void **state)
 {
 	(void)state;
-	check("environment",
-	      world_of_text(
-		      32, 32,
-		      SENSOR("0,1,5", "0,0,0") "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>" BALL(
-			      "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
-	      3000);
+	/* clang-format off */
+	check("environment", world_of_text(32, 32,
+		SENSOR("0,1,5", "0,0,0")
+		"<shape type='rectangle'>"
+			AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>")
+		"</shape>"
+		BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
+		"<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"), 3000);
+	/* clang-format on */
 }
 
 /* A lens, and lights that no path hits beside one environment. */
 static void test_ends(void **state)
 {
 	(void)state;
+	/* clang-format off */
 	static const char lens[] =
-		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='.4'/>"
-		"<float name='focus_distance' value='3'/>" AT(
-			"<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>") "</sensor>";
+		"<sensor type='thinlens'>"
+			"<float name='fov' value='40'/>"
+			"<float name='aperture_radius' value='.4'/>"
+			"<float name='focus_distance' value='3'/>"
+			AT("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>")
+		"</sensor>";
 	static const char lights[] =
-		"<emitter type='point'><point name='position' x='1.5' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
-		"<emitter type='spot'><float name='cutoff_angle' value='40'/>" AT(
-			"<lookat origin='-1,3,1' target='0,0,0' up='1,0,0'/>") "</emitter>"
-									       "<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/></emitter>";
-	static const char floor[] = "<shape type='rectangle'>" AT(
-		"<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>"
-										    "<shape type='rectangle'>" AT(
-											    "<scale value='3'/><translate z='-2'/>") "</shape>";
-	check("lens and lamps, rough",
-	      world_of_text(
-		      32, 32, "%s%s%s%s", lens, lights, floor,
-		      BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><float name='radiance' value='.2'/></emitter>"),
-	      3000);
+		"<emitter type='point'>"
+			"<point name='position' x='1.5' y='2' z='1'/>"
+			"<float name='intensity' value='3'/>"
+		"</emitter>"
+		"<emitter type='spot'>"
+			"<float name='cutoff_angle' value='40'/>"
+			AT("<lookat origin='-1,3,1' target='0,0,0' up='1,0,0'/>")
+		"</emitter>"
+		"<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/></emitter>";
+	static const char floor[] =
+		"<shape type='rectangle'>"
+			AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>")
+		"</shape>"
+		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='-2'/>") "</shape>";
+	check("lens and lamps, rough", world_of_text(32, 32, "%s%s%s%s", lens, lights, floor,
+		BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
+		"<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
+	/* clang-format on */
 	check("lens and lamps, glass",
 	      world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
@@ -231,19 +267,21 @@ static void test_ends(void **state)
 static void test_clipped(void **state)
 {
 	(void)state;
+	/* clang-format off */
 	static const char sensor[] =
-		"<sensor type='perspective'><float name='fov' value='40'/><float name='near_clip' value='2'/>"
-		"<float name='far_clip' value='7'/>" AT(
-			"<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>") "</sensor>";
-	static const char walls[] = "<shape type='rectangle'>" AT(
-		"<scale value='3'/><translate z='4'/>") "</shape>"
-							"<shape type='rectangle'>" AT(
-								"<scale value='3'/><translate z='-3'/>") "</shape>";
-	check("clipped",
-	      world_of_text(
-		      32, 32, "%s%s%s", sensor, walls,
-		      BALL("<bsdf type='diffuse'/>") "<emitter type='constant'><float name='radiance' value='.2'/></emitter>"),
-	      3000);
+		"<sensor type='perspective'>"
+			"<float name='fov' value='40'/>"
+			"<float name='near_clip' value='2'/>"
+			"<float name='far_clip' value='7'/>"
+			AT("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>")
+		"</sensor>";
+	static const char walls[] =
+		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='4'/>") "</shape>"
+		"<shape type='rectangle'>" AT("<scale value='3'/><translate z='-3'/>") "</shape>";
+	check("clipped", world_of_text(32, 32, "%s%s%s", sensor, walls,
+		BALL("<bsdf type='diffuse'/>")
+		"<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
+	/* clang-format on */
 }
 
 /* Both directions lie on the same side of the shading and of the geometric normal, each, or nothing scatters: the eight

@@ -248,20 +248,22 @@ static void test_both_ends(void **state)
 static void test_emitters(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(
-		8, 8,
-		"%s" LAYER(
-			"0", "2",
-			FOG("interior", "1,1,1",
-			    "0.5,0.5,0.5")) "<shape type='sphere'><float name='radius' value='0.2'/><emitter type='area'/></shape>"
-					    "<shape type='sphere'><point name='center' x='1' y='0' z='0'/><float name='radius' value='0.2'/>"
-					    "<emitter type='area'/>" FOG(
-						    "exterior", "2,2,2",
-						    "0.5,0.5,0.5") "</shape>"
-								   "<emitter type='point'><point name='position' x='0' y='1' z='3'/></emitter>"
-								   "<emitter type='point'><point name='position' x='0' y='1' z='1'/></emitter>"
-								   "<emitter type='constant'/>",
+	/* clang-format off */
+	struct world *w = world_of_text(8, 8,
+		"%s"
+		LAYER("0", "2", FOG("interior", "1,1,1", "0.5,0.5,0.5"))
+		"<shape type='sphere'><float name='radius' value='0.2'/><emitter type='area'/></shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='1' y='0' z='0'/>"
+			"<float name='radius' value='0.2'/>"
+			"<emitter type='area'/>"
+			FOG("exterior", "2,2,2", "0.5,0.5,0.5")
+		"</shape>"
+		"<emitter type='point'><point name='position' x='0' y='1' z='3'/></emitter>"
+		"<emitter type='point'><point name='position' x='0' y='1' z='1'/></emitter>"
+		"<emitter type='constant'/>",
 		SENSOR("0,0,5", "0,0,0"));
+	/* clang-format on */
 	assert_int_equal(w->emitter_count, 5);
 	static const uint32_t around[] = {1, 2, 0, 1, 0};
 	for (int32_t i = 0; i < 5; i++) {

@@ -39,20 +39,47 @@ static const char strip_ply[] =
 	"<string name='wrap_mode_v' value='mirror'/>" more "</texture>"
 #define RAW(channel) "<boolean name='raw' value='true'/><string name='channel' value='" channel "'/>"
 
-static const char twin[] = "<scene version='3.0.0'>" SENSOR("0,3,9", "0,0,0") "<emitter type='constant'/>" SHAPE(
-	"strip.ply",
-	"<bsdf type='mask'><texture type='scale' name='opacity'>" FLOAT("scale", "0.5")
-		FIELD("", "vertex_alpha") "</texture><bsdf type='principled'><boolean name='lambertian' value='true'/>"
-					  "<texture type='scale' name='base_color'>"
-					  "<rgb name='scale' value='0.8 0.4 0.2'/>" FIELD(
-						  "", "vertex_color") "</texture>" FLOAT("metallic", "0")
-						  FLOAT("roughness", "1") FLOAT("eta", "1.5") "</bsdf></bsdf>")
-	SHAPE("solid.ply",
-	      "<bsdf type='principled'><boolean name='lambertian' value='true'/><texture type='scale' name='base_color'>" FIELD(" name='scale'", "vertex_color") "<texture type='scale'><rgb name='scale' value='0.5 1 0.25'/>" BITMAP(
-		      "x", "") "</texture></texture>"
-			       "<texture name='metallic' type='scale'>" FLOAT("scale", "0.5")
-				       BITMAP("x", RAW("b")) "</texture>" BITMAP("roughness", RAW("g"))
-					       FLOAT("eta", "1.5") "</bsdf>") "</scene>";
+/* clang-format off */
+static const char twin[] =
+	"<scene version='3.0.0'>"
+		SENSOR("0,3,9", "0,0,0")
+		"<emitter type='constant'/>"
+		SHAPE("strip.ply",
+			"<bsdf type='mask'>"
+				"<texture type='scale' name='opacity'>"
+					FLOAT("scale", "0.5")
+					FIELD("", "vertex_alpha")
+				"</texture>"
+				"<bsdf type='principled'>"
+					"<boolean name='lambertian' value='true'/>"
+					"<texture type='scale' name='base_color'>"
+						"<rgb name='scale' value='0.8 0.4 0.2'/>"
+						FIELD("", "vertex_color")
+					"</texture>"
+					FLOAT("metallic", "0")
+					FLOAT("roughness", "1")
+					FLOAT("eta", "1.5")
+				"</bsdf>"
+			"</bsdf>")
+		SHAPE("solid.ply",
+			"<bsdf type='principled'>"
+				"<boolean name='lambertian' value='true'/>"
+				"<texture type='scale' name='base_color'>"
+					FIELD(" name='scale'", "vertex_color")
+					"<texture type='scale'>"
+						"<rgb name='scale' value='0.5 1 0.25'/>"
+						BITMAP("x", "")
+					"</texture>"
+				"</texture>"
+				"<texture name='metallic' type='scale'>"
+					FLOAT("scale", "0.5")
+					BITMAP("x", RAW("b"))
+				"</texture>"
+				BITMAP("roughness", RAW("g"))
+				FLOAT("eta", "1.5")
+			"</bsdf>")
+	"</scene>";
+/* clang-format on */
 
 static size_t write_solid(char *text, size_t size)
 {

@@ -226,10 +226,16 @@ static void test_given_twice(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[512];
-		snprintf(
-			xml, sizeof xml,
-			"<sensor type='perspective'><float name='fov' value='45'/><string name='%s'/><string name='%s'/></sensor><emitter type='constant'/>",
+		/* clang-format off */
+		snprintf(xml, sizeof xml,
+			"<sensor type='perspective'>"
+				"<float name='fov' value='45'/>"
+				"<string name='%s'/>"
+				"<string name='%s'/>"
+			"</sensor>"
+			"<emitter type='constant'/>",
 			cases[i].first, cases[i].second);
+		/* clang-format on */
 		struct scene s = read_old(xml, cases[i].note);
 		assert_int_equal(s.objects[0]->property_count, 2);
 		assert_string_equal(node_string(s.objects[0], "fov_axis", ""), cases[i].axis);

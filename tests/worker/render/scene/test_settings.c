@@ -378,11 +378,18 @@ static void test_thin_lens(void **state)
 	(void)state;
 	struct scene_settings s;
 	struct error e;
+	/* clang-format off */
 	if (read_scene(
-		    "<scene version='0.5.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='apertureRadius' value='.25'/>"
-		    "<float name='focusDistance' value='7'/></sensor></scene>",
-		    0, 0, &s, &e))
+		"<scene version='0.5.0'>"
+			"<sensor type='thinlens'>"
+				"<float name='fov' value='30'/>"
+				"<float name='apertureRadius' value='.25'/>"
+				"<float name='focusDistance' value='7'/>"
+			"</sensor>"
+		"</scene>",
+		0, 0, &s, &e))
 		fail_msg("%s", e.text);
+	/* clang-format on */
 	assert_true(s.aperture_radius == 0.25 && s.focus_distance == 7 && s.fov == 30);
 	/* Focused at the far plane, where nothing is said. */
 	if (read_scene(

@@ -321,10 +321,23 @@ static void test_obj_material(void **state)
 static void test_obj_is_kept(void **state)
 {
 	(void)state;
+	/* clang-format off */
 	static const char xml[] =
-		"<scene version='3.0.0'><shape type='obj'><string name='filename' value='m.obj'/><string name='material' value='blue'/></shape>"
-		"<shape type='obj'><string name='filename' value='m.obj'/><string name='material' value=''/></shape>"
-		"<shape type='obj'><string name='filename' value='n.obj'/><string name='material' value=''/></shape></scene>";
+		"<scene version='3.0.0'>"
+			"<shape type='obj'>"
+				"<string name='filename' value='m.obj'/>"
+				"<string name='material' value='blue'/>"
+			"</shape>"
+			"<shape type='obj'>"
+				"<string name='filename' value='m.obj'/>"
+				"<string name='material' value=''/>"
+			"</shape>"
+			"<shape type='obj'>"
+				"<string name='filename' value='n.obj'/>"
+				"<string name='material' value=''/>"
+			"</shape>"
+		"</scene>";
+	/* clang-format on */
 	struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1},
 				      {"m.obj", PARTS, sizeof PARTS - 1},
 				      {"n.obj", SQUARE "f 1 2 3 4\n", sizeof SQUARE "f 1 2 3 4\n" - 1},

@@ -16,12 +16,20 @@
 #define GREY "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>"
 #define GLASS "<bsdf type='dielectric'/>"
 #define HOLES(in) "<bsdf type='mask'>" in "</bsdf>"
+/* clang-format off */
 #define FLOOR(inside) \
 	"<shape type='rectangle' id='floor'>" AT("<rotate x='1' angle='-90'/><scale value='4'/>") inside "</shape>\n"
 #define CUBE(id, x, y, inside) \
-	"<shape type='cube' id='" id "'>" AT("<scale value='0.5'/><translate x='" x "' y='" y "'/>") inside "</shape>\n"
+	"<shape type='cube' id='" id "'>" \
+		AT("<scale value='0.5'/><translate x='" x "' y='" y "'/>") \
+		inside \
+	"</shape>\n"
 #define LAMP \
-	"<shape type='rectangle' id='lamp'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>") SHINES "</shape>\n"
+	"<shape type='rectangle' id='lamp'>" \
+		AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>") \
+		SHINES \
+	"</shape>\n"
+/* clang-format on */
 #define VIEW SENSOR("0,3,8", "0,0,0") "\n"
 
 /* NULL: nothing is said. on: whether rays have to ask. */
@@ -52,36 +60,44 @@ static void test_notes(void **state)
 	       "`glass` (test.xml:2) and `lamp` (test.xml:3) coincide: where they overlap, only the latter is present, because it shines",
 	       NULL, true);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) FLOOR(GREY),
-	       "`glass` (test.xml:2) and `floor` (test.xml:3) coincide: where they overlap, only the latter is present, because it is opaque",
+	       "`glass` (test.xml:2) and `floor` (test.xml:3) coincide: where they overlap, only the latter is present, "
+	       "because it is opaque",
 	       NULL, true);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS)
 		       CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
-	       "`ice` (test.xml:3) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file"
-	       "; where two media touch, use one surface with the int_ior and ext_ior of both",
-	       "`hole` (test.xml:4) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, because it refracts or scatters",
+	       "`ice` (test.xml:3) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, "
+	       "because it comes first in the file; where two media touch, use one surface with the int_ior and ext_ior "
+	       "of both",
+	       "`hole` (test.xml:4) and `glass` (test.xml:2) coincide: where they overlap, only the latter is present, "
+	       "because it refracts or scatters",
 	       true);
 	/* Glass with holes is glass, which a sheet with holes is not. */
 	expect(VIEW CUBE("lace", "0", "0.5", HOLES(GLASS)) CUBE("glass", "1", "0.5", GLASS)
 		       CUBE("net", "-1", "0.5", HOLES(GREY)),
-	       "`glass` (test.xml:3) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file"
-	       "; where two media touch, use one surface with the int_ior and ext_ior of both",
-	       "`net` (test.xml:4) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, because it refracts or scatters",
+	       "`glass` (test.xml:3) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, "
+	       "because it comes first in the file; where two media touch, use one surface with the int_ior and ext_ior "
+	       "of both",
+	       "`net` (test.xml:4) and `lace` (test.xml:2) coincide: where they overlap, only the latter is present, "
+	       "because it refracts or scatters",
 	       true);
 	/* Two lamps back to back are one, which shines to its own side; a lamp that is there twice loses nothing. */
 	expect(VIEW LAMP "<shape type='rectangle' id='back'>" AT(
 		       "<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
 	       "</shape>\n",
-	       "`back` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file"
-	       "; light to the other side is lost: for a lamp with two sides use two, slightly apart",
+	       "`back` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, "
+	       "because it comes first in the file; light to the other side is lost: for a lamp with two sides use two, "
+	       "slightly apart",
 	       NULL, true);
 	expect(VIEW LAMP "<shape type='rectangle' id='twin'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>")
 		       SHINES "</shape>\n",
-	       "`twin` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file",
+	       "`twin` (test.xml:3) and `lamp` (test.xml:2) coincide: where they overlap, only the latter is present, "
+	       "because it comes first in the file",
 	       NULL, true);
 	/* A block on a floor shows nothing of it; a picture on the wall that is the wall does. */
 	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
 	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
-	       "the rectangle in test.xml:3 and `floor` (test.xml:2) coincide: where they overlap, only the latter is present, because it comes first in the file",
+	       "the rectangle in test.xml:3 and `floor` (test.xml:2) coincide: where they overlap, only the latter is "
+	       "present, because it comes first in the file",
 	       NULL, true);
 }
 

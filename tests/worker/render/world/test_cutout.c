@@ -124,14 +124,20 @@ static void test_bent_panes(void **state)
 	static struct agree_image path, bdpt, hslt;
 	static const struct agree_side how[] = {
 		{"path", 2048, 32, 1, 6}, {"bdpt", 2048, 32, 1, 6}, {"hslt", 8192, 32, 1, 6}};
-	struct world *w = world_of_text(
-		16, 16,
-		SENSOR("0,-3,1", "0,0,0") LIGHT_AND_FLOOR BENT("0.5", "0.03") "<shape type='rectangle'><transform "
-									      "name='to_world'><scale value='0.7'/>"
-									      "<rotate x='1' angle='180'/>"
-									      "<translate z='2'/></transform><emitter "
-									      "type='area'><rgb name='radiance' "
-									      "value='8'/></emitter></shape>");
+	/* clang-format off */
+	struct world *w = world_of_text(16, 16,
+		SENSOR("0,-3,1", "0,0,0")
+		LIGHT_AND_FLOOR
+		BENT("0.5", "0.03")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='0.7'/>"
+				"<rotate x='1' angle='180'/>"
+				"<translate z='2'/>"
+			"</transform>"
+			"<emitter type='area'><rgb name='radiance' value='8'/></emitter>"
+		"</shape>");
+	/* clang-format on */
 	agree_render(w, "bent panes", "path", &how[0], &path);
 	agree_render(w, "bent panes", "bdpt", &how[1], &bdpt);
 	agree_render(w, "bent panes", "hslt", &how[2], &hslt);

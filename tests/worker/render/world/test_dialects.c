@@ -159,11 +159,15 @@ static void test_boundaries_of_media(void **state)
 {
 	(void)state;
 #define MEDIUM(side) "<medium name='" side "' type='homogeneous'/>"
+	/* clang-format off */
 	static const char body[] =
-		"<emitter type='constant'/><shape type='sphere'/><shape type='sphere'>" MEDIUM("interior") "</shape><shape type='sphere'>" MEDIUM(
-			"exterior") "</shape><shape "
-				    "type='sphere'><emitter type='area'/>" MEDIUM("interior") "</shape><shape type='sphere'>" MEDIUM(
-					    "interior") "<bsdf type='dielectric'/></shape>";
+		"<emitter type='constant'/>"
+		"<shape type='sphere'/>"
+		"<shape type='sphere'>" MEDIUM("interior") "</shape>"
+		"<shape type='sphere'>" MEDIUM("exterior") "</shape>"
+		"<shape type='sphere'><emitter type='area'/>" MEDIUM("interior") "</shape>"
+		"<shape type='sphere'>" MEDIUM("interior") "<bsdf type='dielectric'/></shape>";
+	/* clang-format on */
 	static const char *const types[2][5] = {{"twosided", "null", "null", "black", "dielectric"},
 						{"twosided", "twosided", "twosided", "black", "dielectric"}};
 	for (int i = 0; i < 2; i++) {

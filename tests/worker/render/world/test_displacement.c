@@ -203,19 +203,42 @@ static void test_integrators_agree(void **state)
 	char xml[4096];
 	size_t size;
 	unsigned char *png = sample_png(8, 8, SAMPLE_GREY, 8, 0, &size);
-	snprintf(
-		xml, sizeof xml,
-		"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR(
-			"0,4.5,3", "0,0.5,0") "<shape type='rectangle'>" GROUND BITMAP("") SCALE("0.2")
-			LEVEL("4") "</shape>"
-				   "<shape type='sphere'><point name='center' x='0' y='1.2' z='0'/>" BITMAP("")
-					   SCALE("0.1") LEVEL("4") GLOSSY
-		"</shape>"
-		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='5'/></transform>" BITMAP(
-			"") SCALE("0.2")
-			LEVEL("3") "<emitter type='area'><texture name='radiance' type='bitmap'><string name='filename' "
-				   "value='h.png'/></texture></emitter></shape>"
-				   "<emitter type='constant'><float name='radiance' value='0.5'/></emitter></scene>");
+	/* clang-format off */
+	snprintf(xml, sizeof xml,
+		"<scene version='3.0.0'>"
+			"<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
+			SENSOR("0,4.5,3", "0,0.5,0")
+			"<shape type='rectangle'>"
+				GROUND
+				BITMAP("")
+				SCALE("0.2")
+				LEVEL("4")
+			"</shape>"
+			"<shape type='sphere'>"
+				"<point name='center' x='0' y='1.2' z='0'/>"
+				BITMAP("")
+				SCALE("0.1")
+				LEVEL("4")
+				GLOSSY
+			"</shape>"
+			"<shape type='rectangle'>"
+				"<transform name='to_world'>"
+					"<scale value='3'/>"
+					"<rotate x='1' angle='90'/>"
+					"<translate y='5'/>"
+				"</transform>"
+				BITMAP("")
+				SCALE("0.2")
+				LEVEL("3")
+				"<emitter type='area'>"
+					"<texture name='radiance' type='bitmap'>"
+						"<string name='filename' value='h.png'/>"
+					"</texture>"
+				"</emitter>"
+			"</shape>"
+			"<emitter type='constant'><float name='radiance' value='0.5'/></emitter>"
+		"</scene>");
+	/* clang-format on */
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"h.png", png, size}, {NULL, NULL, 0}};
 	struct world *w = world_of_files(32, 32, files);
 	static struct agree_image path, bdpt;

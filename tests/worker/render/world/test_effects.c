@@ -15,9 +15,15 @@
 #define LAMP                                                                                                                    \
 	"<shape type='rectangle' id='lamp'><transform name='to_world'><rotate x='1' angle='90'/><translate y='4'/></transform>"  \
 	"<emitter type='area' id='tube'><float name='radiance' value='3'/></emitter></shape>"
-/* clang-format on */
 #define FLOOR \
-	"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/><translate y='-3'/></transform></shape>"
+	"<shape type='rectangle'>" \
+		"<transform name='to_world'>" \
+			"<scale value='4'/>" \
+			"<rotate x='1' angle='-90'/>" \
+			"<translate y='-3'/>" \
+		"</transform>" \
+	"</shape>"
+/* clang-format on */
 #define SF11(id)                          \
 	"<bsdf type='dielectric' id='" id \
 	"'><string name='int_ior' value='sf11'/><boolean name='dispersion' value='true'/></bsdf>"
@@ -84,11 +90,16 @@ static void test_what_does_not_enclose(void **state)
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BOX("0.9", ""),
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BOX("20", ""),
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("1", ""),
-		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("8.999", ""), /* the near plane lies within */
-		VIEW LAMP SF11("sf") BALL(
-			"1",
-			USES("sf")) "<shape type='cube'><transform name='to_world'><scale value='1.5'/></transform><float name='displacement' value='0.1'/>"
-				    "<integer name='displacement_level' value='2'/></shape>",
+		/* The near plane lies within. */
+		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("8.999", ""),
+		/* clang-format off */
+		VIEW LAMP SF11("sf") BALL("1", USES("sf"))
+		"<shape type='cube'>"
+			"<transform name='to_world'><scale value='1.5'/></transform>"
+			"<float name='displacement' value='0.1'/>"
+			"<integer name='displacement_level' value='2'/>"
+		"</shape>",
+		/* clang-format on */
 	};
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		struct world *w = forced(NULL, scenes[i]);

@@ -42,16 +42,19 @@ static void assert_same_shape(const struct geom_shape *a, const struct geom_shap
 static void test_copies(void **state)
 {
 	(void)state;
-	struct world *a = world_of_text(
-		8, 8,
-		VIEW SKY RED "<shape type='shapegroup' id='g'><shape type='cube'>" TO(
-			SQUEEZE) "<ref id='red'/></shape>"
-				 "<shape type='sphere'><point name='center' x='3' y='0' z='0'/>" LAMP "</shape></shape>"
-				 "<shape type='instance'><ref id='g'/>" TO(
-					 TURN) "</shape>"
-					       "<shape type='instance'><ref id='g'/></shape>"
-					       "<shape type='merge'><shape type='rectangle'/><shape type='cube'><ref id='red'/></shape></shape>%s",
+	/* clang-format off */
+	struct world *a = world_of_text(8, 8,
+		VIEW SKY RED
+		"<shape type='shapegroup' id='g'>"
+			"<shape type='cube'>" TO(SQUEEZE) "<ref id='red'/></shape>"
+			"<shape type='sphere'><point name='center' x='3' y='0' z='0'/>" LAMP "</shape>"
+		"</shape>"
+		"<shape type='instance'><ref id='g'/>" TO(TURN) "</shape>"
+		"<shape type='instance'><ref id='g'/></shape>"
+		"<shape type='merge'><shape type='rectangle'/><shape type='cube'><ref id='red'/></shape></shape>"
+		"%s",
 		"");
+	/* clang-format on */
 	struct world *b = world_of_text(
 		8, 8,
 		VIEW SKY RED "<shape type='cube'>" TO(

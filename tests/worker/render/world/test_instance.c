@@ -20,13 +20,18 @@
 #define SKY "<emitter type='constant'/>"
 #define TO(inner) "<transform name='to_world'>" inner "</transform>"
 #define FILE_OF(inner) "<shape type='obj'><string name='filename' value='m.obj'/>" inner "</shape>"
-#define FLOOR                                                                                                          \
-	"<shape type='rectangle'>" TO("<scale value='5'/><rotate x='1' angle='-90'/>") "<bsdf type='diffuse' id='f'/>" \
-										       "</shape>"
-#define LAMP                                                                                  \
-	"<shape type='rectangle'>" TO(                                                        \
-		"<scale value='2'/><rotate x='1' angle='90'/><translate y='4'/>") "<emitter " \
-										  "type='area'><float name='radiance' value='3'/></emitter></shape>"
+/* clang-format off */
+#define FLOOR \
+	"<shape type='rectangle'>" \
+		TO("<scale value='5'/><rotate x='1' angle='-90'/>") \
+		"<bsdf type='diffuse' id='f'/>" \
+	"</shape>"
+#define LAMP \
+	"<shape type='rectangle'>" \
+		TO("<scale value='2'/><rotate x='1' angle='90'/><translate y='4'/>") \
+		"<emitter type='area'><float name='radiance' value='3'/></emitter>" \
+	"</shape>"
+/* clang-format on */
 
 /* What instances do: turn; stretch; mirror; and all of it. */
 static const char *const places[] = {
@@ -226,8 +231,15 @@ static void test_images(void **state)
 	(void)state;
 	const char *room =
 		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" VIEW SKY FLOOR LAMP;
-	const char *inside = FILE_OF(BUMPS) "<shape type='obj'><string name='filename' value='m.obj'/>" TO(
-		"<scale value='0.5'/><translate x='0.5' z='0.7'/>") "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf></shape>";
+	/* clang-format off */
+	const char *inside =
+		FILE_OF(BUMPS)
+		"<shape type='obj'>"
+			"<string name='filename' value='m.obj'/>"
+			TO("<scale value='0.5'/><translate x='0.5' z='0.7'/>")
+			"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>"
+		"</shape>";
+	/* clang-format on */
 	struct world *a = pots(true, room, inside, 24, 16), *b = pots(false, room, inside, 24, 16);
 	assert_int_equal(a->instance_count, 2 * PLACES);
 	static struct agree_image shared, written, chains;

@@ -341,12 +341,19 @@ static void test_refused(void **state)
 			"1")) "<shape type='cube'><animation name='to_world'><transform time='0'/>"
 			      "<transform time='1'><scale value='5e59'/><translate x='9e59'/></transform></animation></shape>",
 		"it moves beyond");
-	refused(VIEW(OPEN(
-			"0",
-			"1")) "<shape type='cube'><texture name='displacement' type='checkerboard'/><integer name='displacement_level' value='1'/>"
-			      "<animation name='to_world'><transform time='0'/>"
-			      "<transform time='1'><scale value='2'/></transform></animation></shape>",
+	/* clang-format off */
+	refused(
+		VIEW(OPEN("0", "1"))
+		"<shape type='cube'>"
+			"<texture name='displacement' type='checkerboard'/>"
+			"<integer name='displacement_level' value='1'/>"
+			"<animation name='to_world'>"
+				"<transform time='0'/>"
+				"<transform time='1'><scale value='2'/></transform>"
+			"</animation>"
+		"</shape>",
 		"a displaced shape that moves may not change its size");
+	/* clang-format on */
 }
 
 /* As many as a file may have are read in a moment, and only those that matter stay. */

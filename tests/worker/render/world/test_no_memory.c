@@ -15,11 +15,22 @@
 static void no_memory_for_a_world(void **state)
 {
 	(void)state;
-	static const char text[] = "<scene version='3.0.0'>" SENSOR(
-		"0,0,5",
-		"0,0,0") "<shape type='cube'><bsdf type='twosided'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/></bsdf></bsdf></shape>"
-			 "<shape type='sphere'><bsdf type='roughdielectric'/></shape><shape type='rectangle'><emitter type='area'/></shape>"
-			 "<emitter type='constant'/></scene>";
+	/* clang-format off */
+	static const char text[] =
+		"<scene version='3.0.0'>"
+			SENSOR("0,0,5", "0,0,0")
+			"<shape type='cube'>"
+				"<bsdf type='twosided'>"
+					"<bsdf type='diffuse'>"
+						"<texture name='reflectance' type='checkerboard'/>"
+					"</bsdf>"
+				"</bsdf>"
+			"</shape>"
+			"<shape type='sphere'><bsdf type='roughdielectric'/></shape>"
+			"<shape type='rectangle'><emitter type='area'/></shape>"
+			"<emitter type='constant'/>"
+		"</scene>";
+	/* clang-format on */
 	const struct memory_file files[] = {{"a.xml", text, sizeof text - 1}, {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
 	struct error e = {""};

@@ -62,22 +62,33 @@ static void test_bump_against_geometry(void **state)
 	(void)state;
 	static double flat[SIDE * SIDE], bump[SIDE * SIDE], real[SIDE * SIDE], back[SIDE * SIDE];
 	image_of(world_with_picture(VIEW SUN "<shape type='rectangle'/>"), flat);
-	image_of(world_with_picture(VIEW SUN
-				    "<shape type='rectangle'><bsdf type='bumpmap'><float name='scale' value='0.02'/>"
-				    "<texture type='bitmap' name='any'>" PICTURE
-				    "</texture><bsdf type='diffuse'/></bsdf></shape>"),
-		 bump);
-	image_of(world_with_picture(VIEW SUN
-				    "<shape type='rectangle'><bsdf type='bumpmap'><float name='scale' value='-0.02'/>"
-				    "<texture type='bitmap' name='any'>" PICTURE
-				    "</texture><bsdf type='diffuse'/></bsdf></shape>"),
-		 back);
-	image_of(
-		world_with_picture(
-			VIEW SUN
-			"<shape type='rectangle'><texture name='displacement' type='bitmap'>" PICTURE "</texture>"
-			"<float name='displacement_scale' value='0.02'/><integer name='displacement_level' value='8'/></shape>"),
-		real);
+	/* clang-format off */
+	image_of(world_with_picture(
+		VIEW SUN
+		"<shape type='rectangle'>"
+			"<bsdf type='bumpmap'>"
+				"<float name='scale' value='0.02'/>"
+				"<texture type='bitmap' name='any'>" PICTURE "</texture>"
+				"<bsdf type='diffuse'/>"
+			"</bsdf>"
+		"</shape>"), bump);
+	image_of(world_with_picture(
+		VIEW SUN
+		"<shape type='rectangle'>"
+			"<bsdf type='bumpmap'>"
+				"<float name='scale' value='-0.02'/>"
+				"<texture type='bitmap' name='any'>" PICTURE "</texture>"
+				"<bsdf type='diffuse'/>"
+			"</bsdf>"
+		"</shape>"), back);
+	image_of(world_with_picture(
+		VIEW SUN
+		"<shape type='rectangle'>"
+			"<texture name='displacement' type='bitmap'>" PICTURE "</texture>"
+			"<float name='displacement_scale' value='0.02'/>"
+			"<integer name='displacement_level' value='8'/>"
+		"</shape>"), real);
+	/* clang-format on */
 	print_message("apart from displaced geometry: flat %.3g, bump %.3g, dents %.3g\n", apart(flat, real),
 		      apart(bump, real), apart(back, real));
 	assert_true(apart(flat, real) > 0.01);
@@ -89,16 +100,40 @@ static void test_bump_against_geometry(void **state)
 static void test_integrators_agree(void **state)
 {
 	(void)state;
-#define BUMP(scale, inner)                                                                            \
-	"<bsdf type='bumpmap'><float name='scale' value='" scale "'/><texture type='bitmap'>" PICTURE \
-	"</texture>" inner "</bsdf>"
+/* clang-format off */
+#define BUMP(scale, inner) \
+	"<bsdf type='bumpmap'>" \
+		"<float name='scale' value='" scale "'/>" \
+		"<texture type='bitmap'>" PICTURE "</texture>" \
+		inner \
+	"</bsdf>"
 	struct world *w = world_with_picture(
-		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR("0,3.5,4", "0,0.5,0") "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>" BUMP("0.2", "<bsdf type='diffuse'/>") "</shape><shape type='sphere'><point name='center' x='-0.9' y='0.9' z='0'/><float name='radius' value='0.8'/>" BUMP(
-			"0.05",
-			"<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>") "</shape><shape type='sphere'><point name='center' x='0.9' y='0.9' z='0'/><float name='radius' value='0.8'/>" BUMP("0.02",
-																										   "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "</shape><shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='5'/></transform>"
-																																			    "<emitter type='area'><float name='radiance' value='2'/></emitter></shape>"
-																																			    "<emitter type='constant'><float name='radiance' value='0.5'/></emitter>");
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
+		SENSOR("0,3.5,4", "0,0.5,0")
+		"<shape type='rectangle'>"
+			"<transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>"
+			BUMP("0.2", "<bsdf type='diffuse'/>")
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='-0.9' y='0.9' z='0'/>"
+			"<float name='radius' value='0.8'/>"
+			BUMP("0.05", "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>")
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='0.9' y='0.9' z='0'/>"
+			"<float name='radius' value='0.8'/>"
+			BUMP("0.02", "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
+		"</shape>"
+		"<shape type='rectangle'>"
+			"<transform name='to_world'>"
+				"<scale value='3'/>"
+				"<rotate x='1' angle='90'/>"
+				"<translate y='5'/>"
+			"</transform>"
+			"<emitter type='area'><float name='radiance' value='2'/></emitter>"
+		"</shape>"
+		"<emitter type='constant'><float name='radiance' value='0.5'/></emitter>");
+	/* clang-format on */
 	static struct agree_image path, other;
 	agree_render(w, __func__, "path", &(struct agree_side){"path", 1280, 32, 0, 0}, &path);
 	agree_render(w, __func__, "bdpt", &(struct agree_side){"bdpt", 1280, 32, 0, 0}, &other);

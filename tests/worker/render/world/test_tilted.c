@@ -26,9 +26,16 @@
 	"up='0,1,0'/></transform><film type='hdrfilm'/></sensor><emitter type='constant'/>"
 #define DENTS(inner) \
 	"<bsdf type='bumpmap'><texture type='bitmap'><string name='filename' value='p0'/></texture>" inner "</bsdf>"
-#define SLOPE(inner)                                                                                                                                             \
-	"<bsdf type='normalmap'><texture type='checkerboard'><rgb name='color0' value='0.7,0.45,0.9'/><rgb name='color1' value='0.4,0.6,0.85'/></texture>" inner \
+/* clang-format off */
+#define SLOPE(inner) \
+	"<bsdf type='normalmap'>" \
+		"<texture type='checkerboard'>" \
+			"<rgb name='color0' value='0.7,0.45,0.9'/>" \
+			"<rgb name='color1' value='0.4,0.6,0.85'/>" \
+		"</texture>" \
+		inner \
 	"</bsdf>"
+/* clang-format on */
 #define LIT "<boolean name='use_shadowing_function' value='false'/>"
 #define METAL "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>"
 #define PLASTIC "<bsdf type='roughplastic'><float name='alpha' value='0.4'/></bsdf>"
