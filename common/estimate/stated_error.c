@@ -73,11 +73,10 @@ void stated_b_doubt(const struct canvas_image *img, char *text, size_t size)
 	if (img->rel_mse_doubt == ERROR_NO_SPREAD)
 		text_put(&t, "%s", no_spread);
 	else if (img->b_tail > 0 && img->b_tail < finite_variance)
-		text_put(
-			&t,
-			"independent samples that find light are too few or too unequal: their tail index is %.2f, and below %g their variance is "
-			"infinite",
-			img->b_tail, finite_variance);
+		text_put(&t,
+			 "independent samples that find light are too few or too unequal: their tail index is %.2f, "
+			 "and below %g their variance is infinite",
+			 img->b_tail, finite_variance);
 }
 
 void stated_error(const struct canvas_image *img, char *text, size_t size)

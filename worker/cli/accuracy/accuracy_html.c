@@ -19,12 +19,19 @@
 #include <time.h>
 
 static const char style[] =
-	"body{font:16px/1.5 system-ui,'DejaVu Sans',Helvetica,Arial,sans-serif;color:#222;background:#fff;max-width:62em;margin:2em auto;"
-	"padding:0 1em}h1,h2,h3{line-height:1.2;font-weight:600}h2{margin-top:2.2em;border-bottom:1px solid #ccc}"
-	"table{border-collapse:collapse;margin:1em 0;font-size:14px}th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #e4e4e4}"
-	"th{background:#f4f4f4;vertical-align:bottom}td.t,th.t{text-align:left}tr.front{background:#e8f3fa}tr.default td.t{font-weight:600}"
-	"td.seen{color:#b04a00}.note{color:#555}.plots svg{max-width:49%;height:auto}.wide svg{max-width:100%;height:auto}"
-	"img{image-rendering:auto;max-width:100%;border:1px solid #ccc}.answer{background:#f4f4f4;padding:.6em 1em;border-left:4px solid #0072b2}"
+	"body{font:16px/1.5 system-ui,'DejaVu Sans',Helvetica,Arial,sans-serif;color:#222;background:#fff;"
+	"max-width:62em;margin:2em auto;padding:0 1em}"
+	"h1,h2,h3{line-height:1.2;font-weight:600}"
+	"h2{margin-top:2.2em;border-bottom:1px solid #ccc}"
+	"table{border-collapse:collapse;margin:1em 0;font-size:14px}"
+	"th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #e4e4e4}"
+	"th{background:#f4f4f4;vertical-align:bottom}"
+	"td.t,th.t{text-align:left}tr.front{background:#e8f3fa}"
+	"tr.default td.t{font-weight:600}td.seen{color:#b04a00}"
+	".note{color:#555}.plots svg{max-width:49%;height:auto}"
+	".wide svg{max-width:100%;height:auto}"
+	"img{image-rendering:auto;max-width:100%;border:1px solid #ccc}"
+	".answer{background:#f4f4f4;padding:.6em 1em;border-left:4px solid #0072b2}"
 	"code{font-size:13px;overflow-wrap:anywhere}";
 
 static void paragraph(struct text_file *p, const char *text)
@@ -70,15 +77,15 @@ static void put_answer(struct text_file *p, const struct accuracy_context *x)
 	if (x->judgement->thin)
 		text_file_put(
 			p,
-			"<p><b>Too little was rendered for this scene and size</b>: errors above 50 %%, or fewer than four rounds of a setting. "
-			"Groups of chains that missed the rare light then look exact, and what follows may be chance. Give it more minutes "
-			"(--budget), a smaller film (--size) or fewer parameters (--parameters).</p>");
+			"<p><b>Too little was rendered for this scene and size</b>: errors above 50 %%, or fewer than "
+			"four rounds of a setting. Groups of chains that missed the rare light then look exact, and "
+			"what follows may be chance. Give it more minutes (--budget), a smaller film (--size) or fewer "
+			"parameters (--parameters).</p>");
 	text_file_put(p, "<p>");
 	if (d->beaten_by == ACCURACY_DEFAULT) {
 		text_file_put(
-			p,
-			"<b>The default lies on the front</b>: no other setting has surely less error at equal time without a sign of more bias, or "
-			"surely less bias without surely more error.");
+			p, "<b>The default lies on the front</b>: no other setting has surely less error at equal time "
+			   "without a sign of more bias, or surely less bias without surely more error.");
 	} else {
 		const struct accuracy_figures *b = &f[d->beaten_by];
 		accuracy_name(&x->design->settings[d->beaten_by], name, sizeof name);
@@ -86,8 +93,8 @@ static void put_answer(struct text_file *p, const struct accuracy_context *x)
 		text_file_escaped(p, name);
 		text_file_put(
 			p,
-			"</b> has a relative error of %.3g %% (%.3g to %.3g) in the time in which the default has %.3g %% (%.3g to %.3g), "
-			"that is %.2f times the speed; its bias is at most %.2g %%%s.",
+			"</b> has a relative error of %.3g %% (%.3g to %.3g) in the time in which the default has "
+			"%.3g %% (%.3g to %.3g), that is %.2f times the speed; its bias is at most %.2g %%%s.",
 			100 * b->equal_time.value, 100 * b->equal_time.low, 100 * b->equal_time.high,
 			100 * d->equal_time.value, 100 * d->equal_time.low, 100 * d->equal_time.high,
 			d->equal_time.value * d->equal_time.value / (b->equal_time.value * b->equal_time.value),
@@ -107,8 +114,8 @@ static void put_answer(struct text_file *p, const struct accuracy_context *x)
 	if (isfinite(d->bias_mean.value))
 		text_file_put(
 			p,
-			"<p>Against the reference the default's mean differs by %+.2g %% (%+.2g to %+.2g); its bias, of the mean or of any "
-			"block, is at most %.2g %%.</p>",
+			"<p>Against the reference the default's mean differs by %+.2g %% (%+.2g to %+.2g); its bias, of "
+			"the mean or of any block, is at most %.2g %%.</p>",
 			100 * d->bias_mean.value, 100 * d->bias_mean.low, 100 * d->bias_mean.high, 100 * d->bias_bound);
 	text_file_put(p, "</div>\n");
 }
@@ -191,33 +198,37 @@ static void put_guide(struct text_file *p, const struct accuracy_context *x)
 	text_file_put(p, "<h2>How to read this</h2>\n");
 	paragraph(
 		p,
-		"Each setting differs from the default in one parameter (presets: in several). All were rendered in turns, a round of each after "
-		"the other, so that whatever else the machine did meets all of them alike.");
+		"Each setting differs from the default in one parameter (presets: in several). All were rendered in "
+		"turns, a round of each after the other, so that whatever else the machine did meets all of them alike.");
 	text_file_put(
 		p,
-		"<p><b>Error at equal time</b> is the relative error that the setting reaches in the CPU time that the default had (%.3g s), and "
-		"<b>error at equal mutations</b> that after as many mutations (%llu). Both are noise: the square root of the mean, over pixels and "
-		"colours, of the squared standard error over the squared brightness, from the spread between independent groups of chains; the "
-		"%g %% of the pixels with the greatest errors are left out, because a single one can be most of the whole and say nothing about "
-		"the setting. Half the error takes four times the time.</p>\n",
+		"<p><b>Error at equal time</b> is the relative error that the setting reaches in the CPU time that the "
+		"default had (%.3g s), and <b>error at equal mutations</b> that after as many mutations (%llu). Both "
+		"are noise: the square root of the mean, over pixels and colours, of the squared standard error over "
+		"the squared brightness, from the spread between independent groups of chains; the %g %% of the pixels "
+		"with the greatest errors are left out, because a single one can be most of the whole and say nothing "
+		"about the setting. Half the error takes four times the time.</p>\n",
 		x->judgement->at_cpu_seconds, (unsigned long long)x->judgement->at_mutations, 100 * ACCURACY_TRIM);
 	text_file_put(
 		p,
-		"<p><b>Bias</b> is what no amount of time removes: the mean of the image against that of the reference, and the block of the image "
-		"(of %u x %u) that differs most surely. Figures in parentheses are 95 %% intervals. A bias is called seen when it is beyond "
-		"chance even though all blocks of all settings were asked.</p>\n",
+		"<p><b>Bias</b> is what no amount of time removes: the mean of the image against that of the reference, "
+		"and the block of the image (of %u x %u) that differs most surely. Figures in parentheses are 95 %% "
+		"intervals. A bias is called seen when it is beyond chance even though all blocks of all settings were "
+		"asked.</p>\n",
 		x->judgement->across, x->judgement->down);
 	paragraph(
 		p,
-		"A setting lies on the front (shaded) when no other one beats it: none has surely less error at equal time without a sign of more "
-		"bias, and none is free of a bias that was seen in it without surely more error. \"Surely\" is beyond the intervals, shared among all "
-		"settings; a setting whose bias is known much less well, or whose own interval of the bias leaves out 0, beats nobody by speed. max-depth, roughness and tessellation make "
-		"another image by what they are: they beat nobody, and may lie on the front as trades.");
+		"A setting lies on the front (shaded) when no other one beats it: none has surely less error at equal "
+		"time without a sign of more bias, and none is free of a bias that was seen in it without surely more "
+		"error. \"Surely\" is beyond the intervals, shared among all settings; a setting whose bias is known "
+		"much less well, or whose own interval of the bias leaves out 0, beats nobody by speed. max-depth, "
+		"roughness and tessellation make another image by what they are: they beat nobody, and may lie on the "
+		"front as trades.");
 	if (!x->judgement->file)
 		paragraph(
 			p,
-			"The reference is the careful preset, rendered longer, so that a bias which it has too cannot be seen here; --reference FILE takes an "
-			"image of another integrator instead.");
+			"The reference is the careful preset, rendered longer, so that a bias which it has too cannot "
+			"be seen here; --reference FILE takes an image of another integrator instead.");
 }
 
 static void put_summary(struct text_file *p, const struct accuracy_context *x)
@@ -226,7 +237,8 @@ static void put_summary(struct text_file *p, const struct accuracy_context *x)
 	char name[96];
 	text_file_put(
 		p,
-		"<table>\n<tr><th class=\"t\">setting</th><th>error at equal time, %%</th><th>time for equal error</th><th>bias of the mean, %%</th>"
+		"<table>\n<tr><th class=\"t\">setting</th><th>error at equal time, %%</th><th>time for equal error</th>"
+		"<th>bias of the mean, %%</th>"
 		"<th>bias of the worst block, %%</th><th class=\"t\">verdict</th></tr>\n");
 	for (size_t i = 0; i < x->design->count; i++) {
 		const struct accuracy_figures *f = &j->figures[i];
@@ -278,8 +290,8 @@ static void put_mutations(struct text_file *p, const struct accuracy_context *x)
 	}
 	text_file_put(
 		p,
-		"</table>\n<p class=\"note\">Failed walks: those that did not converge or whose way back did not lead to where they began, of all "
-		"walks on the manifold.</p>\n");
+		"</table>\n<p class=\"note\">Failed walks: those that did not converge or whose way back did not lead "
+		"to where they began, of all walks on the manifold.</p>\n");
 }
 
 static void put_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
@@ -321,9 +333,8 @@ static void put_rest(struct text_file *p, const struct accuracy_context *x)
 {
 	const struct accuracy_design *d = x->design;
 	if (d->left_out_count)
-		text_file_put(
-			p,
-			"<h2>Left out</h2>\n<table>\n<tr><th class=\"t\">parameter</th><th class=\"t\">why it does nothing here</th></tr>\n");
+		text_file_put(p, "<h2>Left out</h2>\n<table>\n<tr><th class=\"t\">parameter</th>"
+				 "<th class=\"t\">why it does nothing here</th></tr>\n");
 	for (size_t i = 0; i < d->left_out_count; i++)
 		fact(p, d->left_out[i].parameter, d->left_out[i].why);
 	text_file_put(p, "%s<h2>The CSV's columns</h2>\n<table>\n", d->left_out_count ? "</table>\n" : "");
@@ -335,9 +346,8 @@ static void put_rest(struct text_file *p, const struct accuracy_context *x)
 
 static int put_all(struct text_file *p, const struct accuracy_context *x, struct error *e)
 {
-	text_file_put(
-		p,
-		"<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\"><head><meta charset=\"utf-8\"/><title>What accuracy costs: ");
+	text_file_put(p, "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\"><head>"
+			 "<meta charset=\"utf-8\"/><title>What accuracy costs: ");
 	text_file_escaped(p, x->scene);
 	text_file_put(p, "</title><style>%s</style></head>\n<body>\n<h1>What accuracy costs in time: ", style);
 	text_file_escaped(p, x->scene);

@@ -81,9 +81,9 @@ static const struct program program = {
 		    "hslt-compare --exact one.exr other.exr",
 	.details =
 		"relMSE is the mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its "
-		"square root; PSNR takes the 99.5th percentile of B as peak. --trim omits the worst pixels from relMSE, RMSE and PSNR, not from the means.\n--exact compares "
-		"every channel and the header, except for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end, "
-		"hslt:sceneHash and hslt:date. - is stdin.",
+		"square root; PSNR takes the 99.5th percentile of B as peak. --trim omits the worst pixels from relMSE, "
+		"RMSE and PSNR, not from the means.\n--exact compares every channel and the header, except for "
+		"hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end, hslt:sceneHash and hslt:date. - is stdin.",
 	.exits = "0 done, 1 failed, different, or above --max-relmse, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,

@@ -98,7 +98,8 @@ static void put_style(struct text_file *s, bool png, uint64_t name)
 	text_file_put(
 		s,
 		"set encoding utf8\nset border 3 lw 1 lc rgb '#555555'\nset tics out nomirror scale 0.6 textcolor rgb '#222222'\n"
-		"set xzeroaxis lt 1 lw 1 lc rgb '#777777'\nset grid lc rgb '#dddddd' lt 1 lw 0.8\nset key tmargin center horizontal reverse Left noautotitle samplen 2 width 2 textcolor rgb '#222222'\n"
+		"set xzeroaxis lt 1 lw 1 lc rgb '#777777'\nset grid lc rgb '#dddddd' lt 1 lw 0.8\n"
+		"set key tmargin center horizontal reverse Left noautotitle samplen 2 width 2 textcolor rgb '#222222'\n"
 		"set style fill transparent solid 0.2 noborder\nset bars 0.6\nset format '%%.6g'\n");
 }
 

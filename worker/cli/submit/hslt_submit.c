@@ -112,14 +112,15 @@ static const struct program program = {
 		"hslt-submit --estimate room.xml --plot room.svg\n"
 		"hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun",
 	.details =
-		"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is the default name for hslt-job fetch. --estimate makes "
-		"no image: a pilot of a minute on the farm predicts what errors of 10, 5, 2 and 1 % (and --target-error) "
-		"will cost there. For long jobs without --epoch, a pilot of a second on this machine measures "
-		"how many mutations a thread makes in the 20 s that a lease should take. --wait reconnects when "
-		"the coordinator restarts.",
+		"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is the default "
+		"name for hslt-job fetch. --estimate makes no image: a pilot of a minute on the farm predicts what errors of "
+		"10, 5, 2 and 1 % (and --target-error) will cost there. For long jobs without --epoch, a pilot of a second on "
+		"this machine measures how many mutations a thread makes in the 20 s that a lease should take. --wait "
+		"reconnects when the coordinator restarts.",
 	.exits =
 		"0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
-		"there, and its note says where), 6 refused, 75 coordinator not reachable, 130 interrupted while it waited (the job continues)",
+		"there, and its note says where), 6 refused, 75 coordinator not reachable, 130 interrupted while it waited "
+		"(the job continues)",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
 	.shared_offset = offsetof(struct arguments, render),
