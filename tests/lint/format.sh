@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Each source is laid out as .clang-format says (`make format` does it) and names its licence. Other versions of clang-format lay out
-# otherwise, so only one counts.
+# Each source is laid out as .clang-format says (`make format` does it), no line of it is too long to be read, and it names its
+# licence. Other versions of clang-format lay out otherwise, so only one counts. clang-format never breaks a string, and moves what
+# follows a macro among strings to the right: such scenes are files (tests/scenes), or laid out by hand.
 cd "$(dirname "$0")/../.." || exit 1
 sources=$(git ls-files '*.[ch]' '*.inc' 2> /dev/null || find common coordinator worker tests -name '*.[ch]' -o -name '*.inc')
 sources=$(echo "$sources" | grep -v /data/)
@@ -20,6 +21,22 @@ if [ -n "$silent" ]; then
 	exit 1
 fi
 echo "ok: each source above 200 lines opens with a comment"
+wide=$(echo "$sources" | LC_ALL=C xargs awk -v most=140 '
+	{
+		line = $0
+		if (length(line) + 7 * gsub(/\t/, "\t", line) <= most)
+			next
+		while ((at = index(line, "\t")) > 0)
+			line = substr(line, 1, at - 1) substr("        ", (at - 1) % 8 + 1) substr(line, at + 1)
+		if (length(line) > most)
+			print FILENAME ":" FNR ": " length(line) " columns"
+	}')
+if [ -n "$wide" ]; then
+	echo "WRONG: lines of more than 140 columns, with tabs of 8 (a scene without parameters can be a file in tests/scenes)"
+	echo "$wide" | sed 's/^/	/'
+	exit 1
+fi
+echo "ok: no line has more than 140 columns"
 format=$(command -v clang-format-14 || command -v clang-format)
 if ! "${format:-false}" --version 2> /dev/null | grep -q 'version 14\.'; then
 	echo "clang-format 14 is not installed"
