@@ -41,8 +41,8 @@ static uint64_t system_available(const char *path)
 {
 	struct statvfs st;
 	uint64_t bytes;
-	return statvfs(path, &st) || __builtin_mul_overflow((uint64_t)st.f_bavail, st.f_frsize, &bytes) ? UINT64_MAX
-													: bytes;
+	bool unknown = statvfs(path, &st) || __builtin_mul_overflow((uint64_t)st.f_bavail, st.f_frsize, &bytes);
+	return unknown ? UINT64_MAX : bytes;
 }
 
 const struct disk disk_system = {

@@ -54,8 +54,8 @@ static int make_tiles(const struct moments *m, double n, struct canvas_image *im
 	img->tile_error = mem_alloc(m->tiles, sizeof *img->tile_error);
 	img->tile_share = mem_alloc(m->tiles, sizeof *img->tile_share);
 	double *mean = mem_alloc(m->tiles, sizeof *mean), all = 0;
-	int rc = img->r_hat && img->tile_error && img->tile_share && mean ? 0
-									  : error_set(e, ENOMEM, "no memory for tiles");
+	bool there = img->r_hat && img->tile_error && img->tile_share && mean;
+	int rc = there ? 0 : error_set(e, ENOMEM, "no memory for tiles");
 	for (uint32_t t = 0; t < m->tiles && rc == 0; t++) {
 		struct spread s;
 		find_spread(m, t, n, &s);

@@ -37,9 +37,10 @@ struct replay {
 
 enum replay_place replay_place(const struct live_job *job, const struct lease_key *k)
 {
-	if (k->kind == LEASE_BOOTSTRAP)
-		return job->bootstrap && !bootstrap_has(job->bootstrap, k->group, k->part) ? REPLAY_FITS
-											   : REPLAY_MERGED;
+	if (k->kind == LEASE_BOOTSTRAP) {
+		bool merged = !job->bootstrap || bootstrap_has(job->bootstrap, k->group, k->part);
+		return merged ? REPLAY_MERGED : REPLAY_FITS;
+	}
 	if (job->bootstrap)
 		return REPLAY_LATE;
 	if (canvas_has(job->canvas, k))
@@ -166,8 +167,8 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		return 0;
 	case JOURNAL_COUNTS:
 	case JOURNAL_OLD_COUNTS:
-		rc = (item->kind == JOURNAL_COUNTS ? stored_unpack_counts : stored_old_counts)(body, size, &job->counts,
-											       e);
+		rc = item->kind == JOURNAL_COUNTS ? stored_unpack_counts(body, size, &job->counts, e)
+						  : stored_old_counts(body, size, &job->counts, e);
 		return rc ? strange_note(r, rc, e) : 0;
 	default:
 		return strange(r, "a record", size, e);

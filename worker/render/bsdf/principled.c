@@ -280,8 +280,8 @@ static spectrum reflected_value(const struct stuff *s, vec3 wo, vec3 wi, vec3 h,
 		f = spectrum_add(f, spectrum_of(clearcoat_of(s, wo, wi, h, cos_d)));
 	if (s->share[COAT] > 0) {
 		double through = (1 - coat_reflects(s, wo.z)) * (1 - coat_reflects(s, wi.z));
-		f = spectrum_add(spectrum_scale(through, f), spectrum_of(coat_reflects(s, cos_d) * coat_lobe(s, wo, h) *
-									 microfacet_g1_over_cos(&s->coat, wi)));
+		double coat = coat_reflects(s, cos_d) * coat_lobe(s, wo, h) * microfacet_g1_over_cos(&s->coat, wi);
+		f = spectrum_add(spectrum_scale(through, f), spectrum_of(coat));
 	}
 	return f;
 }

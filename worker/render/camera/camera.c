@@ -118,10 +118,8 @@ static void disk_from_square(const double u[2], double *x, double *y)
 static void square_from_disk(double x, double y, double u[2])
 {
 	bool wide = fabs(x) > fabs(y);
-	double r = copysign(hypot(x, y), wide ? x : y), other = r * (4 / M_PI) *
-								(wide	  ? atan(y / x)
-								 : y == 0 ? 0
-									  : atan(x / y));
+	double r = copysign(hypot(x, y), wide ? x : y), turn = wide ? atan(y / x) : y == 0 ? 0 : atan(x / y);
+	double other = r * (4 / M_PI) * turn;
 	double a[2] = {wide ? r : other, wide ? other : r};
 	for (int i = 0; i < 2; i++)
 		u[i] = fmin(fmax(0.5 * (a[i] + 1), 0), 1 - 0x1p-53);

@@ -473,8 +473,8 @@ static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, 
 	size_t n = 0;
 	for (unsigned rank = 0; rank < SURFACE_RANKS; rank++)
 		for (uint32_t i = 0; i < count; i++) {
-			uint32_t prims = shapes[i].is_sphere || shapes[i].place ? !accel_moves(&shapes[i])
-										: shapes[i].triangle_count;
+			bool whole = shapes[i].is_sphere || shapes[i].place;
+			uint32_t prims = whole ? !accel_moves(&shapes[i]) : shapes[i].triangle_count;
 			for (uint32_t k = 0; shapes[i].rank == rank && k < prims; k++, n++)
 				if (items)
 					items[n] = (struct prim_ref){i, shapes[i].place ? WHOLE : k, 0};
