@@ -41,10 +41,9 @@ static void speak(struct farm_world *w, const struct step *s)
 	}
 	if (w->peers[who].fd < 0) {
 		farm_call(w, who, who == READER);
-		if (who <= CLIENT_TWO || who == WORKER_THREE)
-			farm_hello(w, who,
-				   who <= WORKER_TWO || who == WORKER_THREE ? FARM__ROLE__ROLE_WORKER
-									    : FARM__ROLE__ROLE_CLIENT);
+		bool works = who <= WORKER_TWO || who == WORKER_THREE;
+		if (works || who <= CLIENT_TWO)
+			farm_hello(w, who, works ? FARM__ROLE__ROLE_WORKER : FARM__ROLE__ROLE_CLIENT);
 	}
 	if (who == READER) {
 		farm_say(w, who, s->header, s->header_size);

@@ -176,13 +176,13 @@ static void racks(void **state)
 			for (uint32_t g = 0; g < 4; g++)
 				for (uint64_t i = 1; i <= 4; i++) {
 					struct lease_status l;
-					if (farm_lease(f, (uint64_t)peer + i, 0, &l) && l.key.group == g)
-						farm_step(f,
-							  &(struct event){.kind = EVENT_BATCH,
-									  .time = rack,
-									  .peer = (uint64_t)peer + i,
-									  .lease = {.key = l.key, .valid = true}},
-							  &u);
+					if (!farm_lease(f, (uint64_t)peer + i, 0, &l) || l.key.group != g)
+						continue;
+					struct event batch = {
+						.kind = EVENT_BATCH, .time = rack, .peer = (uint64_t)peer + i};
+					batch.lease.key = l.key;
+					batch.lease.valid = true;
+					farm_step(f, &batch, &u);
 				}
 		for (int i = 1; i <= 4; i++)
 			farm_step(f, &(struct event){.kind = EVENT_LEFT, .time = rack, .peer = (uint64_t)(peer + i)},

@@ -327,8 +327,10 @@ static void extremes_of(const struct constraint_solver *solver_, const double *v
 			solver_->solve(k, &system_, dh, dx);
 			assert_true(isfinite(system_.log_det) && !isnan(system_.log_transfer));
 			for (unsigned j = 1; j < b; j++)
-				assert_true(solver_ == &constraint_single ? !isnan(dx[j].x + fabs(dx[j].y))
-									  : isfinite(dx[j].x) && isfinite(dx[j].y));
+				if (solver_ == &constraint_single)
+					assert_true(!isnan(dx[j].x + fabs(dx[j].y)));
+				else
+					assert_true(isfinite(dx[j].x) && isfinite(dx[j].y));
 		}
 		if (solver_->differentials(k, b, 0, dj) == CONSTRAINT_OK)
 			for (unsigned j = 1; j < b; j++)

@@ -56,10 +56,8 @@ static void test_lossless(void **state)
 			assert_true(img.width == WIDTH && img.height == HEIGHT && img.channels == (part ? 1 : 3));
 			for (int i = 0; i < WIDTH * HEIGHT; i++)
 				for (uint32_t k = 0; k < img.channels; k++) {
-					double x = rgba[4 * i + (part == 0   ? (int)k
-								 : part == 1 ? 1
-									     : 3)] /
-						   255.0,
+					int channel = part == 0 ? (int)k : part == 1 ? 1 : 3;
+					double x = rgba[4 * i + channel] / 255.0,
 					       want = raw || part == 2 ? x : srgb_to_linear(x);
 					assert_true(fabs((double)img.pixels[(uint32_t)i * img.channels + k] - want) <
 						    1e-6);

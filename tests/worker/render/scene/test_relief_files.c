@@ -41,8 +41,8 @@ static struct scene read_ok(const char *version, const char *type, const char *p
 static void test_a_file_is_a_raw_texture(void **state)
 {
 	(void)state;
-	static const char *const versions[] = {"0.6.0", "2.0.0", "3.0.0"}, *const types[] = {"normalmap", "bumpmap",
-											     "NormalMap"};
+	static const char *const versions[] = {"0.6.0", "2.0.0", "3.0.0"};
+	static const char *const types[] = {"normalmap", "bumpmap", "NormalMap"};
 	for (size_t v = 0; v < 3; v++)
 		for (size_t t = 0; t < 3; t++) {
 			struct scene a = read_ok(versions[v], types[t], FILENAME("a/./n.png")),
