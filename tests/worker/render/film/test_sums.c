@@ -56,6 +56,35 @@ static void kernels_have_integral_1(void **state)
 	}
 }
 
+/* Values of Mitsuba 3's tests, whose kernels are 1 in the middle, or like Mitchell and Netravali's have integral 1. */
+static void kernels_have_their_shapes(void **state)
+{
+	(void)state;
+	static const struct {
+		struct scene_settings s;
+		double distance, value, slack;
+	} cases[] = {
+		{{.filter = FILTER_GAUSSIAN, .filter_radius = 2, .filter_stddev = 0.5}, 0.2, 0.9227, 1e-3},
+		{{.filter = FILTER_LANCZOS, .filter_radius = 3}, 1.4, -0.14668, 1e-5},
+		{{.filter = FILTER_CUBIC, .filter_radius = 2, .filter_b = 1.0 / 3, .filter_c = 1.0 / 3},
+		 0,
+		 0.8888,
+		 1e-4},
+		{{.filter = FILTER_TENT, .filter_radius = 1}, 0.1, 0.9, 1e-12},
+		{{.filter = FILTER_BOX, .filter_radius = 0.5}, 0.49, 1, 0},
+	};
+	struct plan p = {.width = 8, .height = 8, .crop_width = 8, .crop_height = 8};
+	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+		struct film_sums f;
+		assert_int_equal(film_sums_init(&f, &p, &cases[i].s, NULL), 0);
+		double middle = cases[i].s.filter == FILTER_CUBIC ? 1 : film_kernel(&f, 0),
+		       value = film_kernel(&f, cases[i].distance) / middle;
+		if (!(fabs(value - cases[i].value) <= cases[i].slack))
+			fail_msg("kernel %zu is %g at %g, not %g", i, value, cases[i].distance, cases[i].value);
+		film_sums_fini(&f);
+	}
+}
+
 /* A panorama's kernel reaches around: nothing of a splat is lost, and what is beyond an edge is where that place is. */
 static void kernels_reach_around(void **state)
 {
@@ -110,6 +139,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(kernels_have_integral_1),
+		cmocka_unit_test(kernels_have_their_shapes),
 		cmocka_unit_test(kernels_reach_around),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -136,7 +136,8 @@ static void test_references(void **state)
 
 /* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: with today's c2 at 2855.5 K;
  * relative to 560 nm its table says 14.708 at 400 nm and 198.261 at 700 nm. And against Stefan and Boltzmann's law in
- * order of magnitude: 5000 K radiate 1.29e4 W / (m^2 sr nm) at 550 nm. */
+ * order of magnitude: 5000 K radiate 1.29e4 W / (m^2 sr nm) at 550 nm. The values at 456 and 700 nm are those of
+ * Mitsuba 3's tests. */
 static void test_blackbody(void **state)
 {
 	(void)state;
@@ -148,6 +149,8 @@ static void test_blackbody(void **state)
 		   "<spectrum name='eta' type='blackbody'><float name='temperature' value='5000'/></spectrum>");
 	double full = at(v, 550);
 	assert_true(fabs(full / 1.2703e4 - 1) < 2e-2);
+	assert_true(fabs((0.8 * at(v, 455) + 0.2 * at(v, 460)) / 10997.9 - 1) < 1e-4);
+	assert_true(fabs(at(v, 700) / 11812 - 1) < 1e-5);
 	scene_fini(&scene);
 	v = eta_of("0.6.0", "<blackbody name='eta' temperature='5000k' scale='0.5'/>");
 	assert_true(fabs(at(v, 550) / full - 0.5) < 1e-15);

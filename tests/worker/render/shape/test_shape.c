@@ -134,7 +134,7 @@ static void test_cube(void **state)
 	}
 }
 
-/* Mitsuba's parametrisation of two of the faces. */
+/* Mitsuba's parametrisation of three of the faces. */
 static void test_cube_uv(void **state)
 {
 	(void)state;
@@ -144,6 +144,8 @@ static void test_cube_uv(void **state)
 		const double *p = m->position[i], *n = m->normal[i], *uv = m->uv[i];
 		if (n[2] == 1)
 			assert_true(uv[0] == (p[1] + 1) / 2 && uv[1] == (p[0] + 1) / 2);
+		if (n[2] == -1)
+			assert_true(uv[0] == (1 - p[1]) / 2 && uv[1] == (p[0] + 1) / 2);
 		if (n[1] == 1)
 			assert_true(uv[0] == (1 - p[0]) / 2 && uv[1] == (1 - p[2]) / 2);
 	}
