@@ -205,7 +205,7 @@ static void set_rgb(struct color *c, bool under_d65)
 	c->tinted = true;
 }
 
-struct color color_of_table(uint32_t n, const double *nm, const double *value, bool is_light, bool under_d65)
+struct color color_of_table(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65)
 {
 	struct color c = {.shape = COLOR_SHAPE_OTHER,
 			  .scale = 1,
@@ -213,7 +213,7 @@ struct color color_of_table(uint32_t n, const double *nm, const double *value, b
 			  .per_nm = (n - 1) / (nm[n - 1] - nm[0]),
 			  .nm = nm,
 			  .value = value,
-			  .zero_outside = is_light};
+			  .zero_outside = zero_outside};
 	set_rgb(&c, under_d65);
 	return c;
 }
@@ -234,7 +234,7 @@ static int color_from_table(const struct value *v, enum color_role role, struct 
 		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
 	memcpy(copy, v->as.spectrum.nm, n * sizeof *copy);
 	memcpy(copy + n, v->as.spectrum.value, n * sizeof *copy);
-	*out = color_of_table(n, copy, copy + n, role == COLOR_ILLUMINANT, role != COLOR_ILLUMINANT);
+	*out = color_of_table(n, copy, copy + n, role != COLOR_UNBOUNDED, role != COLOR_ILLUMINANT);
 	for (int k = 0; k < 3 && role == COLOR_REFLECTANCE; k++)
 		out->rgb[k] = fmin(out->rgb[k], 1);
 	return 0;

@@ -29,8 +29,7 @@ struct color {
 	bool d65;     /* times D65 / its normalisation */
 	bool sigmoid; /* times S(c0 x^2 + c1 x + c2), x = nm */
 	double coefficient[3];
-	uint32_t count; /* > 0: piecewise linear table instead; extended by 0 for emitters and by the end values
-			   otherwise */
+	uint32_t count; /* > 0: piecewise linear table instead; beyond it 0 if zero_outside, or the end values */
 	double per_nm;	/* pieces, on average */
 	const double *nm, *value; /* in the arena */
 	bool zero_outside;
@@ -42,9 +41,10 @@ struct color {
 int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
 		     struct error *e);
 int color_from_rgb(const double rgb[3], enum color_role role, struct color *out);
-/* Linear between n >= 2 values at ascending nm, which must outlive it. Beyond the ends, light is 0 and everything else
- * has the value at the end. Where colours are rgb it is that of light with these values, times D65's if under_d65. */
-struct color color_of_table(uint32_t n, const double *nm, const double *value, bool is_light, bool under_d65);
+/* Linear between n >= 2 values at ascending nm, which must outlive it. Beyond the ends it is 0 if zero_outside, as
+ * Mitsuba has all tables, or has the value at the end: indices and coefficients of media, whose 0 nobody means. Where
+ * colours are rgb it is that of light with these values, times D65's if under_d65. */
+struct color color_of_table(uint32_t n, const double *nm, const double *value, bool zero_outside, bool under_d65);
 struct color color_constant(double x);
 spectrum color_eval(const struct color *c, const struct wavelengths *w);
 /* color_eval of both; one search where their tables have the same wavelengths, such as those of a metal's n and k. */

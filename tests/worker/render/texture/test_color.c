@@ -289,14 +289,24 @@ static void test_tables(void **state)
 	const double nm[] = {400, 410, 500, 700}, x[] = {0.1, 0.3, 0.2, 0.8};
 	struct value v = table_of(nm, x, 4);
 	struct color c;
-	assert_int_equal(color_from_value(&v, COLOR_REFLECTANCE, &arena, &c, &e), 0);
-	struct wavelengths w = {.nm = {360, 405, 600, 830}};
-	spectrum s = color_eval(&c, &w);
-	assert_true(s.v[0] == 0.1 && fabs(s.v[1] - 0.2) < 1e-15 && fabs(s.v[2] - 0.5) < 1e-15 && s.v[3] == 0.8);
+	/* Beyond the table there is nothing, as in Mitsuba, but for what is no share of light. */
+	for (int role = COLOR_REFLECTANCE; role <= COLOR_UNBOUNDED; role++) {
+		assert_int_equal(color_from_value(&v, (enum color_role)role, &arena, &c, &e), 0);
+		struct wavelengths w = {.nm = {360, 405, 600, 830}};
+		spectrum s = color_eval(&c, &w);
+		bool ends = role == COLOR_UNBOUNDED;
+		assert_true(fabs(s.v[1] - 0.2) < 1e-15 && fabs(s.v[2] - 0.5) < 1e-15);
+		assert_true(s.v[0] == (ends ? 0.1 : 0) && s.v[3] == (ends ? 0.8 : 0));
+		assert_true(color_max(&c) == 0.8);
+	}
+	/* Mitsuba 3's tests of `irregular`, from 450 nm by 50. */
+	const double three[] = {500, 600, 650}, value[] = {1, 2, 0.5}, known[] = {0, 1, 1.5, 2, 0.5, 0};
+	v = table_of(three, value, 3);
 	assert_int_equal(color_from_value(&v, COLOR_ILLUMINANT, &arena, &c, &e), 0);
-	s = color_eval(&c, &w);
-	assert_true(s.v[0] == 0 && fabs(s.v[1] - 0.2) < 1e-15 && s.v[3] == 0);
-	assert_true(color_max(&c) == 0.8);
+	for (int i = 0; i < 6; i++) {
+		double at = 450 + 50 * i;
+		assert_true(color_eval(&c, &(struct wavelengths){.nm = {at, at, at, at}}).v[0] == known[i]);
+	}
 
 	const double even[] = {0.25};
 	v = table_of(NULL, even, 1);
