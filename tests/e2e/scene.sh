@@ -198,4 +198,10 @@ code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"
 sed 's/"perspective"/"fisheye"/' "$DIR/strange.xml" >"$DIR/wrong.xml"
 code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"
 grep -q fisheye "$DIR/out" || fail "of a sensor without a stand-in it says: $(cat "$DIR/out")"
+# Emitters alone, and these hidden: no options of the author's are blamed.
+echo "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='1'/><boolean name='hide_emitters' value='true'/></integrator>$(
+	camera one 0)$rest" >"$DIR/hidden.xml"
+code 2 "$BIN/hslt-render" "$DIR/hidden.xml" -o "$DIR/hidden.exr" --size 16 --spp 16
+grep -q 'nothing is left to render.*hide_emitters.*--max-depth 2' "$DIR/err.log" || fail "of nothing to render it says: $(cat "$DIR/err.log")"
+code 0 "$BIN/hslt-render" "$DIR/hidden.xml" -o "$DIR/hidden.exr" --size 16 --spp 16 --max-depth 2
 echo "check and show: all problems with their places, and what a good scene holds"

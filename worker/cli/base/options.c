@@ -412,10 +412,15 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	}
 	memcpy(p->accuracy, a->render.accuracy, sizeof p->accuracy);
 	memcpy(p->effects, a->render.effects, sizeof p->effects);
-	if (!p->min_depth)
-		p->min_depth = s->hide_emitters ? 2 : 1;
 	if (!p->max_depth)
 		p->max_depth = s->max_depth;
+	if (!p->min_depth && s->hide_emitters && p->max_depth == 1)
+		return error_set(
+			e, EINVAL,
+			"nothing is left to render: paths of one edge show emitters alone, and the scene hides "
+			"these (hide_emitters); --max-depth 2 shows what they light");
+	if (!p->min_depth)
+		p->min_depth = s->hide_emitters ? 2 : 1;
 	/* Longer paths carry no light; but the requested minimum must be measured against something. */
 	if (p->max_depth > summary->useful_depth && summary->useful_depth >= p->min_depth)
 		p->max_depth = summary->useful_depth;
