@@ -291,7 +291,7 @@ static void test_lights(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {
-		{"path", 8192, 32, 0, 0}, {"erpt", 32768, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
+		{"path", 8192, 32, 0, 0}, {"bdpt", 8192, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
 	check_integrators(LIGHTS, sides, test_full() ? 3 : 2);
 }
 
