@@ -58,17 +58,20 @@ mkdir -p "$DIR/place/sub" "$DIR/library"
 cp "${BOX%/*}"/meshes/* "$DIR/library"
 sed 's:"meshes/:"../library/none/../:' "$BOX" >"$DIR/place/box.xml"
 sed 's:"meshes/:"sub/../../library/:' "$BOX" >"$DIR/place/odd.xml"
+sed "s:\"meshes/:\"$DIR/library/:" "$BOX" >"$DIR/place/absolute.xml"
 code 1 "$BIN/hslt-submit" "$DIR/place/box.xml" -o "$DIR/none.exr" --integrator path --spp 1
 grep -q -- "--path $DIR\$" "$DIR/err.log" || fail "names outside: $(cat "$DIR/err.log")"
 "$BIN/hslt-render" "$DIR/place/box.xml" --path "$DIR/library" -o "$DIR/place.exr" --integrator path --spp 1 2>>"$DIR/render.log" ||
 	fail "hslt-render with names outside"
-for scene in box odd; do
+for scene in box odd absolute; do
 	submit "$DIR/place/$scene.xml" --path "$DIR/library" -o "$DIR/place-$scene.exr" --integrator path --spp 1 --wait >"$DIR/placed" ||
 		fail "names outside: $?"
 done
 same "$DIR/place.exr" "$DIR/place-box.exr"
-code 0 "$BIN/hslt-compare" "$DIR/place.exr" "$DIR/place-odd.exr"
-grep -q "^relMSE  *0 " "$DIR/out" || fail "the same file by another name is another image: $(cat "$DIR/out")"
+for scene in odd absolute; do
+	code 0 "$BIN/hslt-compare" "$DIR/place.exr" "$DIR/place-$scene.exr"
+	grep -q "^relMSE  *0 " "$DIR/out" || fail "the same file by another name is another image: $(cat "$DIR/out")"
+done
 
 # The header has all options that make the image again, and the hash of its scene; both alike on the farm.
 GIVEN="-D light=3 --path $DIR/library --integrator path --spp 2 --size 16x12"

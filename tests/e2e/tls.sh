@@ -142,7 +142,7 @@ asks_for() {
 	sed "s|meshes/wedge.obj|$1|" "$BOX" >"$DIR/scene/box.xml"
 	refused "path tricks: a scene asks for $2" 1 "$3" "$BIN/hslt-submit" "$DIR/scene/box.xml" -o "$DIR/no.exr" --integrator path --spp 1
 }
-asks_for "$DIR/secret.obj" "an absolute path" "must lie below"
+asks_for "$DIR/secret.obj" "an absolute path" "leads out of the scene.s folder"
 asks_for ../secret.obj "../secret.obj" "leads out of the scene.s folder"
 asks_for link.obj "a link that leads out" "must lie below\|outside\|link"
 asks_for device.obj "a device" "."

@@ -5,11 +5,12 @@
  *
  * Happy path: search_open tries the folders in order. open_below opens the folder and lets the kernel resolve the name
  * beneath it (openat2, RESOLVE_BENEATH); read_all then reads the file into memory. A name that leads out of the
- * scene's folder (asset_name_up) is resolved by its text alone, and opened if it ends below one of the other folders.
+ * scene's folder or is absolute (asset_name_up) is resolved by its text alone, and opened if it ends below one of the
+ * folders.
  *
- * Failures are one sentence in struct error: an absolute name or one that leads out (-EINVAL, with the --path that
- * would allow it), one that is not there (-ENOENT, with the --path that would find it), anything but a regular file, a
- * file above 4 GB or one that shrinks while it is read. Kernels without openat2 do not follow symbolic links at all.
+ * Failures are one sentence in struct error: a name that leads out (-EINVAL, with the --path that would allow it), one
+ * that is not there (-ENOENT, with the --path that would find it), anything but a regular file, a file above 4 GB or
+ * one that shrinks while it is read. Kernels without openat2 do not follow symbolic links at all.
  */
 #include "worker/render/scene/asset.h"
 
@@ -124,9 +125,7 @@ static int open_in(const char *folder, const char *name, const char *shown, stru
 {
 	*out = (struct asset){0};
 	if (!is_below(name))
-		return error_set(e, EINVAL,
-				 "%.256s: files must lie below the scene's folder, or one given with --path, and be "
-				 "named relative to it",
+		return error_set(e, EINVAL, "%.256s: files must lie below the scene's folder, or one given with --path",
 				 shown);
 	int fd = open_below(folder, name);
 	if (fd < 0)
@@ -137,31 +136,37 @@ static int open_in(const char *folder, const char *name, const char *shown, stru
 	return r;
 }
 
-/* What follows the folder in an absolute path that lies below it; NULL: it does not. */
+static const char *after(const char *folder, const char *path)
+{
+	size_t n = strlen(folder);
+	while (n > 0 && folder[n - 1] == '/')
+		n--;
+	return strncmp(path, folder, n) == 0 && path[n] == '/' ? path + n + 1 : NULL;
+}
+
+/* What follows the folder in an absolute path that lies below it, as its user called it or as it is; NULL: it does
+ * not. */
 static const char *below(const char *folder, const char *path)
 {
 	char real[PATH_MAX];
-	if (!realpath(*folder ? folder : ".", real))
-		return NULL;
-	size_t n = strcmp(real, "/") == 0 ? 0 : strlen(real);
-	return strncmp(path, real, n) == 0 && path[n] == '/' ? path + n + 1 : NULL;
+	const char *name = *folder == '/' ? after(folder, path) : NULL;
+	return name || !realpath(*folder ? folder : ".", real) ? name : after(real, path);
 }
 
-/* A name that leads `up` folders out of the scene's own and then to `rest`. */
-static int open_outside(const struct asset_folders *f, size_t up, const char *rest, struct asset *out, struct error *e)
+/* A name that leads `up` folders out of the scene's own, or to the top of all, and then to `rest`. */
+static int open_outside(const struct asset_folders *f, const char *canonical, struct asset *out, struct error *e)
 {
 	char path[PATH_MAX + NAME_MAX_BYTES], shown[NAME_MAX_BYTES];
+	const char *rest;
+	size_t up = asset_name_up(canonical, &rest);
 	*out = (struct asset){0};
-	if (strlen(rest) + 3 * up >= sizeof shown || !realpath(*f->folder[0] ? f->folder[0] : ".", path))
+	if (strlen(canonical) >= sizeof shown || !realpath(*f->folder[0] ? f->folder[0] : ".", path))
 		return error_set(e, ENAMETOOLONG, "%.256s: the name is too long", rest);
-	size_t used = 0, end = strlen(path);
-	for (size_t i = 0; i < up; i++) {
-		memcpy(shown + used, "../", 3);
-		used += 3;
+	asset_name_shown(canonical, shown, sizeof shown);
+	size_t end = up == ASSET_NAME_ABSOLUTE ? 0 : strlen(path);
+	for (size_t i = 0; i < up && end > 0; i++)
 		while (end > 0 && path[--end] != '/')
 			;
-	}
-	strcpy(shown + used, rest);
 	size_t top = end; /* the folder to which ".." leads: it has all that is named by as many */
 	snprintf(path + end, sizeof path - end, "/%s", rest);
 	int rc = 0;
@@ -172,6 +177,8 @@ static int open_outside(const struct asset_folders *f, size_t up, const char *re
 	}
 	if (rc)
 		return rc;
+	if (up == ASSET_NAME_ABSOLUTE && access(path, F_OK) != 0)
+		return error_set(e, ENOENT, "%.256s: no such file on this machine", shown);
 	*(top > 0 ? path + top : strrchr(path, '/')) = 0;
 	return error_set(e, EINVAL, "%.256s: leads out of the scene's folder; to allow that, give --path %.400s", shown,
 			 *path ? path : "/");
@@ -180,10 +187,9 @@ static int open_outside(const struct asset_folders *f, size_t up, const char *re
 static int open_any(const struct asset_folders *f, const char *name, struct asset *out, struct error *e)
 {
 	const char *rest;
-	size_t up = asset_name_up(name, &rest);
 	int rc = -ENOENT;
-	if (up > 0 && is_below(rest))
-		return open_outside(f, up, rest, out, e);
+	if (asset_name_up(name, &rest) > 0 && is_below(rest))
+		return open_outside(f, name, out, e);
 	for (size_t i = 0; i < f->count && (rc == -ENOENT || rc == -ENOTDIR); i++)
 		rc = open_in(f->folder[i], name, name, out, e);
 	return rc;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where a scene's files come from: a folder (hslt-render, hslt-submit) or a content-addressed store (workers).
- * Names are those in the scene file, with '/' between parts.
+ * Names are those in the scene file, in their canonical form (asset_name.h).
  */
 #ifndef WORKER_RENDER_SCENE_ASSET_H
 #define WORKER_RENDER_SCENE_ASSET_H
@@ -30,7 +30,7 @@ struct asset_source {
 	struct obj_cache *parsed;      /* NULL: each shape reads its file for itself */
 };
 
-/* A folder: names must stay below it (no absolute paths, no "..", no symbolic links that
+/* A folder: names must stay below it (no "..", no absolute paths to elsewhere, no symbolic links that
  * lead out of it, regular files only, at most 4 GB). `folder` must outlive it. */
 struct asset_source asset_folder(const char *folder);
 

@@ -4,11 +4,16 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { UP = sizeof ASSET_NAME_UP - 1 };
+enum { UP = sizeof ASSET_NAME_UP - 1, TOP = sizeof ASSET_NAME_TOP - 1 };
 
 static bool is_up(const char *part, size_t n)
 {
 	return (n == 2 && memcmp(part, "..", 2) == 0) || (n == UP && memcmp(part, ASSET_NAME_UP, UP) == 0);
+}
+
+static bool is_top(const char *name, size_t n)
+{
+	return n == TOP && memcmp(name, ASSET_NAME_TOP, TOP) == 0;
 }
 
 /* Where the last part of out[0..n) begins. */
@@ -21,12 +26,13 @@ static size_t last_part(const char *out, size_t n)
 
 void asset_name_canonical(const char *written, char *out)
 {
-	size_t used = 0;
-	for (const char *part = written; *written != '/' && *part; part += strspn(part, "/")) {
+	size_t used = *written == '/' ? TOP : 0;
+	memcpy(out, ASSET_NAME_TOP, used);
+	for (const char *part = written + strspn(written, "/"); *part; part += strspn(part, "/")) {
 		size_t n = strcspn(part, "/"), before = last_part(out, used);
 		bool up = is_up(part, n);
 		if (up && used > 0 && !is_up(out + before, used - before)) {
-			used = before > 0 ? before - 1 : 0;
+			used = is_top(out, used) ? used : before > 0 ? before - 1 : 0;
 		} else if (n > 1 || *part != '.') {
 			if (used > 0)
 				out[used++] = '/';
@@ -36,13 +42,17 @@ void asset_name_canonical(const char *written, char *out)
 		part += n;
 	}
 	out[used] = 0;
-	if (used == 0)
+	if (used == 0 || is_top(out, used))
 		strcpy(out, written);
 }
 
 size_t asset_name_up(const char *canonical, const char **rest)
 {
 	size_t count = 0;
+	if (strncmp(canonical, ASSET_NAME_TOP "/", TOP + 1) == 0) {
+		*rest = canonical + TOP + 1;
+		return ASSET_NAME_ABSOLUTE;
+	}
 	while (strncmp(canonical, ASSET_NAME_UP "/", UP + 1) == 0) {
 		canonical += UP + 1;
 		count++;
@@ -54,9 +64,10 @@ size_t asset_name_up(const char *canonical, const char **rest)
 const char *asset_name_shown(const char *canonical, char *out, size_t size)
 {
 	const char *rest;
-	size_t used = 0;
-	for (size_t up = asset_name_up(canonical, &rest); up > 0 && used < size; up--)
-		used += (size_t)snprintf(out + used, size - used, "../");
+	size_t used = 0, up = asset_name_up(canonical, &rest);
+	bool absolute = up == ASSET_NAME_ABSOLUTE;
+	for (up = absolute ? 1 : up; up > 0 && used < size; up--)
+		used += (size_t)snprintf(out + used, size - used, "%s", absolute ? "/" : "../");
 	if (used < size)
 		snprintf(out + used, size - used, "%s", rest);
 	return out;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/lenient.h"
 
+#include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/plugin.h"
 
 #include <string.h>
@@ -115,7 +116,7 @@ const char *lenient_missing(const struct asset_source *assets, const struct xml_
 	if (strcmp(el->name, "texture") != 0)
 		return NULL;
 	for (const struct xml_element *c = el->first; c; c = c->next) {
-		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value");
+		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value"), *rest;
 		struct asset there;
 		struct error e;
 		if (strcmp(c->name, "string") != 0 || !name || strcmp(name, "filename") != 0 || !file)
@@ -123,7 +124,7 @@ const char *lenient_missing(const struct asset_source *assets, const struct xml_
 		int r = assets->open(assets->user, file, &there, &e);
 		if (!r)
 			assets->close(assets->user, &there);
-		return r == -ENOENT || (r && *file == '/') ? file : NULL;
+		return r == -ENOENT || (r && asset_name_up(file, &rest) == ASSET_NAME_ABSOLUTE) ? file : NULL;
 	}
 	return NULL;
 }

@@ -33,7 +33,7 @@ static bool opens(const struct asset_source *assets, const char *name)
 
 static const char *beside(const char *other, const char *name, struct arena *arena)
 {
-	const char *slash = strrchr(other, '/');
+	const char *slash = *name != '/' ? strrchr(other, '/') : NULL;
 	size_t folder = slash ? (size_t)(slash - other) + 1 : 0, size = folder + strlen(name);
 	char *joined = arena_alloc(arena, size + 1, 1), *out = arena_alloc(arena, ASSET_NAME_ROOM(size), 1);
 	if (!joined || !out)

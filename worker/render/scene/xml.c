@@ -330,7 +330,7 @@ static int search(struct reader *r, const char *written, bool nested, const char
 		*name = own;
 		*found = true;
 	}
-	for (uint32_t i = 0; i < r->tree->path_count && !*found; i++) {
+	for (uint32_t i = 0; *written != '/' && i < r->tree->path_count && !*found; i++) {
 		const char *there = look_in(r, r->tree->paths[i], written, found);
 		if (!there)
 			return out_of_memory(r);

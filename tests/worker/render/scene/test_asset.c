@@ -115,7 +115,9 @@ static void test_files_elsewhere(void **state)
 	refuses("sub/../../secret", "must lie below");
 	refuses("sub/..", "must lie below");
 	refuses("..", "must lie below");
-	refuses("/etc/passwd", "must lie below");
+	refuses("/etc/passwd", "must lie below"); /* no canonical name */
+	refuses("%2f/etc/passwd", "/etc/passwd: leads out of the scene's folder; to allow that, give --path /etc");
+	refuses("%2f/etc/../passwd", "%2f/etc/../passwd: files must lie below");
 	refuses("out", "out: ");
 	refuses("up/secret", "up/secret: ");
 	refuses("absolute", "absolute: ");
@@ -140,7 +142,11 @@ static void test_canonical_names(void **state)
 		{"../a/../b", "%2e%2e/b"},
 		{"..dots/...", "..dots/..."},
 		{"a/.hidden", "a/.hidden"},
-		{"/etc/../passwd", "/etc/../passwd"},
+		{"/etc/../passwd", "%2f/passwd"},
+		{"/../a//b", "%2f/a/b"},
+		{"//a", "%2f/a"},
+		{"/a/..", "/a/.."},
+		{"/", "/"},
 		{"a/..", "a/.."},
 		{"", ""},
 		{".", "."},
@@ -157,7 +163,12 @@ static void test_canonical_names(void **state)
 	assert_int_equal(asset_name_up("%2e%2e/%2e%2e/b/%2e%2e", &rest), 2);
 	assert_string_equal(rest, "b/%2e%2e");
 	assert_int_equal(asset_name_up("%2e%2e", &rest), 0);
+	assert_int_equal(asset_name_up("%2f/b", &rest), ASSET_NAME_ABSOLUTE);
+	assert_string_equal(rest, "b");
+	assert_int_equal(asset_name_up("%2f", &rest), 0);
 	char shown[16], little[8];
+	assert_string_equal(asset_name_shown("%2f/a/b", shown, sizeof shown), "/a/b");
+	assert_string_equal(asset_name_shown("%2f/a/b/c.png", little, sizeof little), "/a/b/c.");
 	assert_string_equal(asset_name_shown("a/b", shown, sizeof shown), "a/b");
 	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/b", shown, sizeof shown), "../../b");
 	assert_string_equal(asset_name_shown("%2e%2e/%2e%2e/b.png", little, sizeof little), "../../b");
@@ -295,6 +306,37 @@ static void test_outside_is_said(void **state)
 	refuses(deep, "give --path /");
 }
 
+/* By its whole name, a file is found below the scene's folder and the others, whether these are called as they are or
+ * by a link, and nowhere else. */
+static void test_absolute_names(void **state)
+{
+	(void)state;
+	char link[64], name[400];
+	snprintf(link, sizeof link, "%s-link", root);
+	assert_int_equal(symlink(root, link), 0);
+	snprintf(name, sizeof name, "%%2f%s/scene/sub/b.png", root);
+	reads(name, "deeper");
+	snprintf(name, sizeof name, "%%2f%s/scene/up/secret", root);
+	refuses(name, "up/secret: ");
+	snprintf(name, sizeof name, "%%2f%s/scene/none", root);
+	refuses(name, "/scene/none: No such file");
+	snprintf(name, sizeof name, "%%2f%s/scene2/none", root);
+	refuses(name, "/scene2/none: no such file on this machine");
+	snprintf(name, sizeof name, "%%2f%s/secret", root);
+	refuses(name, "/secret: leads out of the scene's folder; to allow that, give --path /");
+	const struct asset_folders linked = asset_folders_of(folder, (const char *const[]){link}, 1);
+	struct asset_source s = asset_search(&linked);
+	struct asset a;
+	struct error e;
+	snprintf(name, sizeof name, "%%2f%s/secret", link);
+	assert_int_equal(s.open(s.user, name, &a, &e), 0);
+	s.close(s.user, &a);
+	snprintf(name, sizeof name, "%%2f%s/secret", root);
+	assert_int_equal(s.open(s.user, name, &a, &e), 0);
+	s.close(s.user, &a);
+	assert_int_equal(unlink(link), 0);
+}
+
 /* A file that is asked for again and again is opened once, and in the end all that was opened is closed. */
 static void test_keeper(void **state)
 {
@@ -349,7 +391,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_files_below),	cmocka_unit_test(test_files_elsewhere),
 		cmocka_unit_test(test_canonical_names), cmocka_unit_test(test_search),
-		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_keeper),
-		cmocka_unit_test(test_keeper_ends)};
+		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_absolute_names),
+		cmocka_unit_test(test_keeper),		cmocka_unit_test(test_keeper_ends)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
