@@ -184,8 +184,8 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		return code;
 	b.towards = (vec3){vec3_dot(axis[0], towards), vec3_dot(axis[1], towards), vec3_dot(axis[2], towards)};
 	double sun = angle_between(b.towards, (vec3){0, 1, 0});
-	if (!(sun < 0.5 * M_PI - 1e-3))
-		return node_error(n, e, EINVAL, "the sun is not above the horizon (%.1f degrees)", 90 - sun / RADIANS);
+	if (!(sun <= 0.5 * M_PI + 1e-6))
+		return node_error(n, e, EINVAL, "the sun is below the horizon (%.1f degrees)", 90 - sun / RADIANS);
 	double albedo[3];
 	if ((code = read_albedo(n, build, albedo, e)))
 		return code;

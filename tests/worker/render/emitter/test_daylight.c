@@ -250,13 +250,45 @@ static void test_below_the_horizon(void **state)
 	arena_fini(&a);
 }
 
+/* With the sun in that direction. */
+static int make_under(struct arena *a, const char *type, vec3 sun, struct emitter *em, struct error *e)
+{
+	struct scene_node *n = node_make(a, PLUGIN_EMITTER, type);
+	struct property direction = {.name = "sun_direction", .value = {.type = VALUE_POINT, .as.point = sun}};
+	n->properties = &direction;
+	n->property_count = 1;
+	return emitter_create(em, n, &(struct emitter_build){.arena = a, .scale = 1}, e);
+}
+
+/* As in Mitsuba, the sun may stand on the horizon: the sky is light, and the sun's upper half is there. */
+static void test_on_the_horizon(void **state)
+{
+	(void)state;
+	static const char *const types[] = {"sunsky", "sky"};
+	double light[2][2];
+	for (int i = 0; i < 2; i++) {
+		struct arena a = {0};
+		struct emitter em;
+		struct error e = {""};
+		assert_true(make_under(&a, types[i], (vec3){1, -0.001, 0}, &em, &e) < 0);
+		assert_non_null(strstr(e.text, "below the horizon (-0.1 degrees)"));
+		if (make_under(&a, types[i], (vec3){1, 0, 0}, &em, &e))
+			fail_msg("%s", e.text);
+		light[i][0] = seen(&em, 0.5 * PI - 1e-3, 0.5 * PI);
+		light[i][1] = seen(&em, 0.3 * PI, 2);
+		arena_fini(&a);
+	}
+	assert_true(light[0][0] > 2 * light[1][0] && light[1][0] > 0);
+	assert_true(light[1][1] > 0 && fabs(light[0][1] / light[1][1] - 1) < 0.02);
+}
+
 static void test_refused(void **state)
 {
 	(void)state;
 	static const struct {
 		const char *text, *word;
 	} bad[] = {
-		{"sky hour=2", "not above the horizon"},
+		{"sky hour=2", "below the horizon"},
 		{"sky month=2 day=30", "has no day 30"},
 	};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -286,6 +318,7 @@ int main(void)
 		cmocka_unit_test(test_picture),
 		cmocka_unit_test(test_ground),
 		cmocka_unit_test(test_below_the_horizon),
+		cmocka_unit_test(test_on_the_horizon),
 		cmocka_unit_test(test_refused),
 	};
 	return cmocka_run_group_tests_name("daylight", tests, NULL, NULL);
