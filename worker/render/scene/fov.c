@@ -22,7 +22,7 @@ int fov_read(const struct scene_node *n, double *degrees, char axis[FOV_AXIS_MAX
 	const char *text = focal_length ? focal_length : "50mm";
 	double mm;
 	const char *rest = number_scan(text, text + strlen(text), &mm);
-	if (!rest || strcmp(rest, "mm") != 0 || !(mm >= 0.1) || !(mm <= 1e6))
+	if (!rest || (*rest && strcmp(rest, "mm") != 0) || !(mm >= 0.1) || !(mm <= 1e6))
 		return node_error(n, e, EINVAL, "focal_length=\"%.64s\" is not a length like \"50mm\"", text);
 	*degrees = 2 * atan(0.5 * DIAGONAL_35MM / mm) * 57.295779513082320877;
 	snprintf(axis, FOV_AXIS_MAX, "diagonal");

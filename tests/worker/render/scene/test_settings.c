@@ -163,8 +163,11 @@ static void test_camera(void **state)
 			assert_true(fabs(s.to_world.m[i][j] - want[i][j]) < 1e-15);
 	s = read_ok("", "<transform name='toWorld'><scale x='-2' y='2' z='2'/></transform>");
 	assert_true(s.to_world.m[0][0] == -1 && s.to_world.m[1][1] == 1); /* a mirror stays one */
-	s = read_ok("", "<string name='focalLength' value='24mm'/>");
-	assert_true(fabs(s.fov - 2 * atan(43.266615305567875 / 48) * 180 / 3.14159265358979323846) < 1e-12);
+	for (int unit = 0; unit < 2; unit++) {
+		s = read_ok("", unit ? "<string name='focalLength' value='24mm'/>"
+				     : "<string name='focalLength' value='24'/>");
+		assert_true(fabs(s.fov - 2 * atan(43.266615305567875 / 48) * 180 / 3.14159265358979323846) < 1e-12);
+	}
 }
 
 /* The first sensor counts; a note says so. */
@@ -363,7 +366,7 @@ static void test_refused(void **state)
 	refuses(SENSOR("") "<integrator type='path'/><integrator type='path'/>", "a second integrator");
 	refuses(SENSOR("<float name='fov' value='40'/><string name='focal_length' value='50mm'/>"),
 		"only one is allowed");
-	refuses(SENSOR("<string name='focal_length' value='50'/>"), "is not a length");
+	refuses(SENSOR("<string name='focal_length' value='50cm'/>"), "is not a length");
 	refuses(SENSOR("<string name='focal_length' value='-1mm'/>"), "is not a length");
 	refuses(SENSOR("<float name='near_clip' value='5'/><float name='far_clip' value='5'/>"),
 		"is not below far_clip");
