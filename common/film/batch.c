@@ -125,6 +125,14 @@ uint64_t chain_states_max(const struct plan *p)
 	return (uint64_t)p->chains * (chain_state_max(p) + STATE_COST);
 }
 
+uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count)
+{
+	uint64_t sum = 0;
+	for (uint32_t i = 0; s && i < count; i++)
+		sum += s[i].size + STATE_COST;
+	return sum;
+}
+
 static int check_states(const struct batch *b, const struct plan *p, uint64_t *live, struct error *e)
 {
 	struct plan_range chains = plan_chain_range(p, b->key.part);

@@ -44,6 +44,7 @@ enum { CHAIN_STATE_MAX = 5376 }; /* of any plan */
 uint32_t chain_state_max(const struct plan *p);
 /* Memory that the states of all its chains need at most. */
 uint64_t chain_states_max(const struct plan *p);
+uint64_t chain_states_bytes(const struct chain_state *s, uint32_t count); /* memory that these need; NULL: 0 */
 
 enum { BATCH_COUNTERS = 16 };
 enum batch_counter {

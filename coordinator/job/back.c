@@ -109,8 +109,7 @@ void back_take(struct live_job *job, struct back *b)
 	assert(i != SIZE_MAX);
 	memmove(&job->merged[i], &job->merged[i + 1], (--job->merged_count - i) * sizeof *job->merged);
 	canvas_take_back(job->canvas, &b->batch);
-	states_fini(job->states[slot], job->chains_per_lease);
-	job->states[slot] = b->states;
+	live_job_set_states(job, slot, b->states);
 	b->states = NULL;
 	job->makers[slot] = b->maker;
 	job->again[slot] = true;

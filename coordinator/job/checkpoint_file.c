@@ -100,6 +100,7 @@ static int read_states(struct live_job *job, struct checked_file *in, struct err
 				rc = checked_file_read(in, c->bytes, size, e);
 			}
 		}
+		job->state_bytes += chain_states_bytes(job->states[i], job->chains_per_lease);
 	}
 	return rc;
 }

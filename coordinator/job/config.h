@@ -34,7 +34,8 @@ struct server_config {
 				   spool */
 	uint64_t waiting_bytes; /* limit of results waiting for films that are being read */
 	uint64_t receive_bytes; /* limit of messages that are being received; further ones wait */
-	uint64_t state_bytes;	/* limit of one job's chain states in memory, if each is as long as it can be */
+	uint64_t state_bytes;	/* limit of one job's chain states in memory, if each is as long as it can be; those of
+				   all jobs: jobs/room.h */
 	uint64_t send_bytes;	/* limit of what waits to be sent; peers that do not read are disconnected */
 	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for the epochs of new
 				    jobs; 0: unlimited */

@@ -152,6 +152,14 @@ static struct chain_state **states_at(const struct live_job *job, const struct l
 	return &job->states[(size_t)k->group * job->plan.parts + k->part];
 }
 
+void live_job_set_states(struct live_job *job, uint32_t slot, struct chain_state *states)
+{
+	job->state_bytes += chain_states_bytes(states, job->chains_per_lease);
+	job->state_bytes -= chain_states_bytes(job->states[slot], job->chains_per_lease);
+	states_fini(job->states[slot], job->chains_per_lease);
+	job->states[slot] = states;
+}
+
 int live_job_merge(struct live_job *job, struct batch *b, struct error *e)
 {
 	job->cpu_seconds += b->cpu_seconds;
@@ -162,12 +170,11 @@ int live_job_merge(struct live_job *job, struct batch *b, struct error *e)
 		return bootstrap_add(job->bootstrap, b, e);
 	int rc = canvas_add(job->canvas, b, e);
 	if (!rc && job->plan.kind == PLAN_CHAINS) {
-		struct chain_state **at = states_at(job, &b->key);
-		states_fini(*at, job->chains_per_lease);
-		*at = b->states;
+		uint32_t slot = b->key.group * job->plan.parts + b->key.part;
+		live_job_set_states(job, slot, b->states);
 		b->states = NULL;
 		b->state_count = 0;
-		job->again[at - job->states] = false;
+		job->again[slot] = false;
 	}
 	return rc;
 }

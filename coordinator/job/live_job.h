@@ -98,6 +98,7 @@ struct live_job {
 	struct bootstrap_result lit;
 	uint64_t *seeds;	       /* [groups][chains / groups]; NULL for samples */
 	struct chain_state **states;   /* [groups x parts]; NULL entries: no epoch merged yet */
+	uint64_t state_bytes;	       /* memory of those */
 	struct live_job_maker *makers; /* [groups x parts]: of those */
 	bool *again;		       /* [groups x parts]: the next batch replaces one that was taken back */
 	struct merged_record *merged;  /* in order of merging */
@@ -117,7 +118,8 @@ struct live_job {
 	bool lacks_file;	   /* files of its scene, for which it is held */
 	bool unread;		   /* one of them could not be read, or was wrong, when they were last read */
 	bool held;		   /* its results cannot be stored */
-	size_t held_bytes;	   /* of the result that the disk had no room for */
+	size_t held_bytes;	   /* of the result that there was no room for */
+	bool held_states;	   /* its chain states had none */
 	double try_again;	   /* s of the loop's clock: what the disk refused */
 	bool unsure; /* whether the last checkpoint was renamed is unknown: nothing is stored before the next one */
 	uint64_t generation_least; /* of that one */
@@ -155,6 +157,8 @@ __attribute__((format(printf, 3, 4))) void live_job_log(struct live_job *job, en
 
 /* Merges a batch that the core accepted. Takes its states. */
 int live_job_merge(struct live_job *job, struct batch *b, struct error *e);
+/* Takes the chain states of a group and part. */
+void live_job_set_states(struct live_job *job, uint32_t slot, struct chain_state *states);
 /* Call after a batch was merged, this many seconds after the first lease. rounds: complete before. */
 void live_job_note_times(struct live_job *job, double elapsed, uint64_t rounds);
 uint64_t live_job_rounds(const struct live_job *job); /* complete */

@@ -209,6 +209,40 @@ void durable_hold(struct jobs *jobs, struct live_job *job, const char *what, con
 	hold(jobs, job, text);
 }
 
+/* Whether its chain states need more memory than those that they replace. */
+static bool states_grow(const struct live_job *job, const struct batch *b)
+{
+	const struct chain_state *now = job->states[(size_t)b->key.group * job->plan.parts + b->key.part];
+	return chain_states_bytes(b->states, b->state_count) > chain_states_bytes(now, job->chains_per_lease);
+}
+
+static int reserve_memory(const struct jobs *jobs, struct live_job *job, const struct batch *b, struct error *e)
+{
+	uint64_t first = states_grow(job, b) ? room_for_states(jobs, job) : 0;
+	job->held_states = first != 0;
+	return first ? error_set(e, ENOMEM, "memory has no room for its chain states beside those of j%llu",
+				 (unsigned long long)first)
+		     : 0;
+}
+
+static int reserve_disk(struct jobs *jobs, struct live_job *job, const struct incoming *in, size_t size,
+			struct error *e)
+{
+	int rc;
+	do {
+		uint64_t first = room_first(jobs, job);
+		rc = first ? error_set(e, ENOSPC, "the disk has no room for it besides j%llu, which goes first",
+				       (unsigned long long)first)
+		     : room_is_left(jobs, job, size)
+			     ? journal_reserve(job->journal, size + PINNED_ROOM, e)
+			     : error_set(e, ENOSPC,
+					 "No space left on the disk but what a checkpoint of its results needs");
+		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
+			rc = canvas_reserve(job->canvas, in->batch, e);
+	} while (rc == -ENOSPC && room_make(jobs));
+	return rc;
+}
+
 int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in, struct error *e)
 {
 	union {
@@ -223,17 +257,9 @@ int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in
 		return rc;
 	size_t size = in->frame_size + in->payload->size;
 	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
-	do {
-		uint64_t first = room_first(jobs, job);
-		rc = first ? error_set(e, ENOSPC, "the disk has no room for it besides j%llu, which goes first",
-				       (unsigned long long)first)
-		     : room_is_left(jobs, job, size)
-			     ? journal_reserve(job->journal, size + PINNED_ROOM, e)
-			     : error_set(e, ENOSPC,
-					 "No space left on the disk but what a checkpoint of its results needs");
-		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
-			rc = canvas_reserve(job->canvas, in->batch, e);
-	} while (rc == -ENOSPC && room_make(jobs));
+	rc = reserve_memory(jobs, job, in->batch, e);
+	if (!rc)
+		rc = reserve_disk(jobs, job, in, size, e);
 	if (!rc)
 		return 0;
 	job->held_bytes = size;
@@ -425,7 +451,7 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
 	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
-	if (job->unsure || room_first(jobs, job))
+	if (job->unsure || (job->held_states && room_for_states(jobs, job)) || room_first(jobs, job))
 		return -EAGAIN;
 	int rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
 	if (rc && rc != -EAGAIN)

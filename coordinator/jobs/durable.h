@@ -27,8 +27,8 @@ int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e);
 /* An extension has failed, and the job is over as before: writes that now, or as soon as it can be written. */
 void durable_end_again(struct jobs *jobs, const struct job_record *r);
 
-/* Before the core sees a batch: prepares the frame for the journal, in `in`, and room on the disk. -ENOSPC, -EFBIG:
- * the disk is full, and the job is held until there is room. */
+/* Before the core sees a batch: prepares the frame for the journal, in `in`, and room in memory and on the disk.
+ * -ENOMEM, -ENOSPC, -EFBIG: there is none, and the job is held until there is. */
 int durable_reserve(struct jobs *jobs, struct live_job *job, struct incoming *in, struct error *e);
 /* The core merges the batch: appends it. -ENOMEM: the journal does not have it, and it must not be acknowledged. */
 int durable_merged(struct jobs *jobs, struct live_job *job, const struct incoming *in, uint64_t *at, struct error *e);

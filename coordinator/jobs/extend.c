@@ -16,6 +16,7 @@
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/listing.h"
 #include "coordinator/jobs/restore.h"
+#include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
@@ -189,6 +190,12 @@ static int extend_read(struct jobs *jobs, const struct requester *by, struct liv
 	struct plan plan;
 	if (live_job_rounds(job) == 0)
 		return error_set(e, ENOENT, "its films have been deleted: %s", again);
+	uint64_t other = job->state_bytes ? room_for_states(jobs, job) : 0;
+	if (other)
+		return error_set(
+			e, EAGAIN,
+			"memory has no room for its chain states beside those of j%llu: extend it when that has ended",
+			(unsigned long long)other);
 	struct extension_from from = where(job, isnan(job->times.completed) ? 0 : job->times.completed, r);
 	int rc = plan_of(jobs, by, job, x, &from, &asked, &plan, e);
 	if (rc)

@@ -106,6 +106,19 @@ uint64_t room_first(const struct jobs *jobs, const struct live_job *job)
 	return first == job->id ? 0 : first;
 }
 
+uint64_t room_for_states(const struct jobs *jobs, const struct live_job *job)
+{
+	const struct live_job *most = NULL;
+	uint64_t others = 0;
+	for (const struct live_job *j = jobs->live; j; j = j->next) {
+		if (j == job)
+			continue;
+		others += j->state_bytes;
+		most = !most || j->state_bytes > most->state_bytes ? j : most;
+	}
+	return others > jobs->config.state_bytes / 2 ? most->id : 0;
+}
+
 uint64_t room_for_journal(const struct jobs *jobs, const struct live_job *job, bool ample)
 {
 	uint64_t usual = usual_limit(jobs, job), size = checkpoint_size(job);

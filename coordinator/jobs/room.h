@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Room on the spool's disk for what running jobs have to store. The loop's thread. */
+/* Room on the spool's disk, and in memory, for what running jobs have to store. The loop's thread. */
 #ifndef COORDINATOR_JOBS_ROOM_H
 #define COORDINATOR_JOBS_ROOM_H
 
@@ -23,6 +23,11 @@ struct room_claim {
 void room_share(struct room_claim *claims, size_t count, uint64_t available);
 /* The job for which this one must wait by that rule, among all from which results may come; 0: it may write. */
 uint64_t room_first(const struct jobs *jobs, const struct live_job *job);
+/* Chain states are in memory until their job ends, and one job may need up to state_bytes for them. So a job's states
+ * may grow only while those of all others together have at most half of that: however many jobs there are, they never
+ * have more than 3/2 of it, and the job whose states grew last can go on. Returns the job that has most of those which
+ * leave no room; 0: they may grow. */
+uint64_t room_for_states(const struct jobs *jobs, const struct live_job *job);
 /* Bytes of a job's journal beyond which a checkpoint replaces it: the limit that was set, or as many as the checkpoint
  * has; where room is not ample, as many as the checkpoint has. */
 uint64_t room_for_journal(const struct jobs *jobs, const struct live_job *job, bool ample);

@@ -130,6 +130,7 @@ static void serve(void)
 	c.port_file = port_file;
 	c.journal_bytes = staged.journal_bytes;
 	c.keep_bytes = staged.keep_bytes;
+	c.state_bytes = staged.state_bytes;
 	c.retry_seconds = 0.05;
 	log_set_level(LOG_LEVEL_ERROR);
 	_exit(server_run(&c, &e) ? 1 : 0);
@@ -178,6 +179,13 @@ static const Farm__Done *ask(const Farm__Envelope *m)
 void staged_order(const Farm__Envelope *m)
 {
 	assert_true(ask(m)->ok);
+}
+
+const char *staged_refusal(const Farm__Envelope *m)
+{
+	const Farm__Done *answer = ask(m);
+	assert_false(answer->ok);
+	return answer->text;
 }
 
 static const Farm__Done *cancel(uint64_t job)
@@ -325,5 +333,6 @@ int staged_set_up(void **state)
 	memset(staged_disk, 0, sizeof *staged_disk);
 	staged.journal_bytes = 2000;
 	staged.keep_bytes = 0;
+	staged.state_bytes = 1 << 20;
 	return rc ? rc : plan_make(&scripted_request, &staged.plan, &e);
 }

@@ -36,7 +36,7 @@ extern struct staged_disk *staged_disk;
 /* What the test sets before staged_start, and the peers. */
 extern struct staged {
 	struct plan plan; /* of scripted_request */
-	uint64_t journal_bytes, keep_bytes;
+	uint64_t journal_bytes, keep_bytes, state_bytes;
 	char spool[100];
 	struct scripted *client, *worker;
 	unsigned acknowledged; /* results */
@@ -48,7 +48,8 @@ void staged_start(void);		/* the coordinator; both peers say hello */
 void staged_end(int signal, bool well); /* well: its exit code has to be 0 */
 
 uint64_t staged_submit(void);
-void staged_order(const Farm__Envelope *m); /* to the client; the answer has to be yes */
+void staged_order(const Farm__Envelope *m);	     /* to the client; the answer has to be yes */
+const char *staged_refusal(const Farm__Envelope *m); /* the answer has to be no: why */
 void staged_cancel(uint64_t job);
 void staged_cancel_unstored(uint64_t job);     /* the answer has to be that it cannot be stored */
 void staged_fail(const struct lease_key *k);   /* the worker could not compute it */

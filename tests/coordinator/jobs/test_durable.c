@@ -21,7 +21,8 @@
 
 #include <cmocka.h>
 
-static void extend(uint64_t job, uint64_t mutations)
+/* refusal: words of the answer; NULL: it is yes. */
+static void extend(uint64_t job, uint64_t mutations, const char *refusal)
 {
 	Farm__Control c;
 	Farm__Envelope m;
@@ -33,11 +34,17 @@ static void extend(uint64_t job, uint64_t mutations)
 	c.more_mutations = mutations;
 	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
 	m.control = &c;
+	if (refusal) {
+		assert_non_null(strstr(staged_refusal(&m), refusal));
+		return;
+	}
 	staged_order(&m);
 	struct plan_request longer = scripted_request;
 	longer.mutations += mutations;
 	assert_int_equal(plan_make(&longer, &staged.plan, &e), 0);
 }
+
+enum { BOOTSTRAP_AND_ROUND = 16 }; /* leases */
 
 static unsigned sent, open_count;
 static struct lease_key open_leases[8]; /* not answered yet */
@@ -208,7 +215,7 @@ static void extended_during_a_flush(bool fails)
 	work_until(first, 0);
 	staged_await_state(job, "done");
 	assert_true(staged_disk->held_flush && staged.acknowledged == 0);
-	extend(job, 6400);
+	extend(job, 6400, NULL);
 	assert_true(scripted_want(staged.worker, 3));
 	work_until(more, 0);
 	staged_disk->end_flush = true;
@@ -251,11 +258,35 @@ static void extended_after_its_end_was_written_late(void **state)
 	staged_await_state(job, "running");
 	staged_disk->fail_ledger = false;
 	staged_await_state(job, "done");
-	extend(job, 6400);
+	extend(job, 6400, NULL);
 	staged_end(SIGKILL, false);
 	staged_start();
 	staged_await_state(job, "running");
 	staged_end(SIGKILL, false);
+}
+
+/* What was kept of a job has chain states, for which another one leaves no room in memory. */
+static void extended_when_memory_has_room(void **state)
+{
+	(void)state;
+	staged.keep_bytes = 1 << 30;
+	sent = staged.acknowledged = open_count = 0;
+	staged_start();
+	uint64_t job = staged_submit(), all = leases_of_the_job();
+	work_until((unsigned)all, 0);
+	staged_await_state(job, "done");
+	uint64_t other = staged_submit();
+	assert_true(scripted_want(staged.worker, 3));
+	work_until((unsigned)all + BOOTSTRAP_AND_ROUND, (unsigned)all + BOOTSTRAP_AND_ROUND);
+	staged_end(SIGTERM, true);
+	staged.state_bytes = chain_states_max(&staged.plan);
+	staged_start();
+	staged_await_state(other, "running");
+	extend(job, 6400, "memory has no room for its chain states beside those of j2");
+	staged_cancel(other);
+	staged_await_state(other, "cancelled");
+	extend(job, 6400, NULL);
+	staged_end(SIGTERM, true);
 }
 
 /* Without a result its end waits in a list. */
@@ -295,6 +326,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(extended_during_a_flush_that_fails, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_after_its_end_was_written_late, staged_set_up,
 						folder_tear_down),
+		cmocka_unit_test_setup_teardown(extended_when_memory_has_room, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_row_ends_later, staged_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);

@@ -1,8 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which jobs go on where the disk has not room for all: some job always does, and those that do have room together. */
+/*
+ * Which jobs go on where the disk, or memory, has not room for all: some job always does, and those that do have room
+ * together.
+ */
 #include "coordinator/jobs/room.h"
+#include "tests/support/folder.h"
+#include "tests/support/staged.h"
 
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -91,8 +97,117 @@ static void all_end(void **state)
 	}
 }
 
+static uint64_t next_draw(uint64_t *draw)
+{
+	*draw = *draw * 6364136223846793005 + 1442695040888963407;
+	return *draw >> 33;
+}
+
+/* Jobs whose chain states grow as far as they may, end and are followed by others: memory is bounded, and there is
+ * always one whose states may grow. */
+static void states_are_bounded(void **state)
+{
+	(void)state;
+	enum { MOST = 100 };
+	uint64_t draw = 1, largest = 0, waited = 0;
+	for (int trial = 0; trial < 1000; trial++) {
+		struct live_job live[JOBS] = {{.id = 0}};
+		struct jobs jobs = {.live = live, .config.state_bytes = MOST};
+		uint64_t final[JOBS], ended = 0;
+		for (int k = 0; k < JOBS; k++) {
+			live[k] = (struct live_job){.next = k + 1 < JOBS ? &live[k + 1] : NULL, .id = (uint64_t)k + 1};
+			final[k] = 1 + next_draw(&draw) % MOST;
+		}
+		for (int blocked = 0; ended < 20 && blocked < 1000;) {
+			int k = (int)(next_draw(&draw) % JOBS);
+			uint64_t step = 1 + next_draw(&draw) % 10, total = 0, other = room_for_states(&jobs, &live[k]);
+			assert_true(other <= JOBS && other != live[k].id);
+			waited += other != 0;
+			blocked = other ? blocked + 1 : 0;
+			if (!other)
+				live[k].state_bytes += step;
+			if (live[k].state_bytes >= final[k]) {
+				live[k].state_bytes = 0;
+				final[k] = 1 + next_draw(&draw) % MOST;
+				ended++;
+			}
+			for (int i = 0; i < JOBS; i++)
+				total += live[i].state_bytes;
+			largest = total > largest ? total : largest;
+		}
+		assert_int_equal(ended, 20);
+	}
+	assert_true(largest > MOST && largest <= MOST + MOST / 2 && waited);
+}
+
+static unsigned sent, refused, ended; /* results, those refused since memory had no room, and jobs */
+
+static void work_until(const unsigned *count, unsigned most)
+{
+	while (*count < most) {
+		struct lease_key k;
+		struct error e;
+		const Farm__Envelope *m = scripted_hear(staged.worker);
+		assert_non_null(m);
+		ended += m->body_case == FARM__ENVELOPE__BODY_JOB_END;
+		assert_true(!ended || count == &ended);
+		if (m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK &&
+		    m->lease_ack->verdict == FARM__VERDICT__VERDICT_REFUSED) {
+			assert_non_null(strstr(m->lease_ack->text, "memory has no room for its chain states beside"));
+			refused++;
+		}
+		if (m->body_case == FARM__ENVELOPE__BODY_LEASE_GRANT) {
+			assert_int_equal(lease_key_from_wire(m->lease_grant->key, &k, &e), 0);
+			assert_true(staged_answer(&k));
+			sent++;
+		}
+	}
+}
+
+static void order(uint64_t job, Farm__Verb verb)
+{
+	Farm__Control c;
+	Farm__Envelope m;
+	farm__control__init(&c);
+	farm__envelope__init(&m);
+	c.job = job;
+	c.verb = verb;
+	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
+	m.control = &c;
+	staged_order(&m);
+}
+
+/* The bootstrap and the first round of one job are done, then one comes that has the worker to itself. Each may have
+ * all that there is, so together they may not: the second waits until the first has ended. */
+static void jobs_with_many_chains_take_turns(void **state)
+{
+	(void)state;
+	const unsigned round = staged.plan.groups * staged.plan.parts, jobs = 2;
+	for (unsigned times = 1; times <= 4; times += 3) {
+		sent = refused = ended = 0;
+		staged.state_bytes = times * chain_states_max(&staged.plan);
+		staged_start();
+		uint64_t first = staged_submit();
+		work_until(&sent, 2 * round);
+		order(first, FARM__VERB__VERB_HOLD);
+		staged_submit();
+		if (times == 1)
+			work_until(&refused, 1);
+		order(first, FARM__VERB__VERB_RELEASE);
+		work_until(&ended, jobs);
+		assert_true((refused > 0) == (times == 1));
+		staged_end(SIGTERM, true);
+	}
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(some_go_on), cmocka_unit_test(all_end)};
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(some_go_on),
+		cmocka_unit_test(all_end),
+		cmocka_unit_test(states_are_bounded),
+		cmocka_unit_test_setup_teardown(jobs_with_many_chains_take_turns, staged_set_up, folder_tear_down),
+	};
+	log_set_level(LOG_LEVEL_ERROR);
+	return staged_open() ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
 }
