@@ -52,7 +52,7 @@ struct end {
 	struct conn *conn;
 	int messages, closed, drained, partial;
 	size_t payload;
-	bool distrust, garbled;
+	bool distrust, garbled, gave_way;
 	struct tls_peer peer; /* who the other one was when a message came */
 	char why[128];
 };
@@ -61,6 +61,7 @@ static uv_loop_t loop;
 static uv_tcp_t listener;
 static struct end here, there;
 static struct conn_config config;
+static struct send_pool *sending; /* NULL: no limit of all connections */
 static char folder[64];
 static struct tls *calling, *listening; /* NULL: plaintext */
 
@@ -92,6 +93,7 @@ static void on_closed(void *user, const char *why)
 	x->closed++;
 	x->distrust = conn_distrust(x->conn);
 	x->garbled = conn_garbled(x->conn);
+	x->gave_way = conn_gave_way(x->conn);
 	x->conn = NULL;
 	snprintf(x->why, sizeof x->why, "%s", why);
 }
@@ -131,8 +133,9 @@ static void connect_ends(void)
 	memset(&here, 0, sizeof here);
 	memset(&there, 0, sizeof there);
 	memset(&bound, 0, sizeof bound);
-	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, listening, NULL, NULL};
+	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, listening, NULL, sending};
 	caller = config;
+	caller.sending = NULL;
 	caller.tls = calling;
 	assert_int_equal(uv_loop_init(&loop), 0);
 	uv_tcp_init(&loop, &listener);
@@ -212,6 +215,35 @@ static void who_does_not_read_is_cut_off(void **state)
 	while (!here.closed)
 		uv_run(&loop, UV_RUN_ONCE);
 	assert_non_null(strstr(here.why, "does not read"));
+	close_ends();
+}
+
+/* Among all connections, too: what one that reads has taken counts no more, and one that does not read is cut off. */
+static void all_are_cut_off_together(void **state)
+{
+	(void)state;
+	struct send_pool pool = {.limit = 2 << 20};
+	int unread = 0;
+	sending = &pool;
+	connect_ends();
+	sending = NULL;
+	for (int i = 1; i <= 8; i++) {
+		send_bye(&there, 1 << 20);
+		assert_true(pool.used > 1 << 20);
+		while (here.messages < i)
+			uv_run(&loop, UV_RUN_ONCE);
+		for (int k = 0; k < 100 && pool.used; k++)
+			uv_run(&loop, UV_RUN_NOWAIT);
+		assert_true(pool.used == 0 && there.closed == 0);
+	}
+	for (; !pool.leaving && unread < 32; unread++)
+		send_bye(&there, 1 << 20);
+	assert_true(unread > 1 && unread < 32 && pool.used == 0 && pool.leaving > 1 << 20 &&
+		    pool.leaving <= pool.limit);
+	while (!there.closed || !here.closed)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_true(there.gave_way && pool.used == 0 && pool.leaving == 0 && LIST_EMPTY(&pool.waiting));
+	assert_string_equal(there.why, "too much waits to be sent to all peers, and this one does not read its part");
 	close_ends();
 }
 
@@ -463,12 +495,13 @@ static void a_live_connection_is_checked_again(void **state)
 	assert_int_equal(remove(list), 0);
 }
 
-#define EITHER_WAY                                                                                                \
-	cmocka_unit_test(many_frames_keep_nobody_waiting), cmocka_unit_test(frames_go_both_ways),                 \
-		cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close),                          \
-		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(half_a_frame_is_not_waited_for), \
-		cmocka_unit_test(changed_bytes_close), cmocka_unit_test(silence_is_not_waited_for),               \
-		cmocka_unit_test(a_slow_frame_is_heard), cmocka_unit_test(a_late_reader_waits)
+#define EITHER_WAY                                                                                          \
+	cmocka_unit_test(many_frames_keep_nobody_waiting), cmocka_unit_test(frames_go_both_ways),           \
+		cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close),                    \
+		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(all_are_cut_off_together), \
+		cmocka_unit_test(half_a_frame_is_not_waited_for), cmocka_unit_test(changed_bytes_close),    \
+		cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard),       \
+		cmocka_unit_test(a_late_reader_waits)
 
 int main(void)
 {
