@@ -7,9 +7,11 @@
  * subscribed. At the end the socket's file is removed if it is still the same.
  *
  * A reader that has not read all lines when something changes gets no more of them, but one snapshot once it has read:
- * the newest. So at most the lines of one moment wait for it. A line that is neither a subscription nor a question is
- * answered by an error. A reader is dropped if its line is too long, or if it asks and does not read the answers. A
- * path where somebody answers is -EADDRINUSE; a file that is not a socket is never removed.
+ * the newest. So at most the lines of one moment wait for it. What waits for all readers counts with what waits for all
+ * connections (common/net/send_pool.h): beyond the limit those are dropped that do not read. A line that is neither a
+ * subscription nor a question is answered by an error. A reader is dropped if its line is too long, or if it asks and
+ * does not read the answers. A path where somebody answers is -EADDRINUSE; a file that is not a socket is never
+ * removed.
  */
 #include "coordinator/status/status.h"
 
@@ -22,6 +24,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <grp.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -44,16 +47,17 @@ struct reader {
 	bool closing;
 	bool behind;   /* something changed while it had not read all lines: it gets a snapshot when it has */
 	size_t unread; /* bytes of answers that wait for it */
+	struct send_share share;
 	size_t line_size;
 	char line[LINE_BYTES];
 };
 
 struct status_socket {
-	const struct peers *peers;
+	struct peers *peers;
 	struct jobs *jobs;
 	uv_pipe_t listener;
-	LIST_HEAD(, reader) readers;
-	unsigned reader_count;
+	LIST_HEAD(, reader) readers; /* with those that are being closed */
+	unsigned reader_count;	     /* without */
 	bool caller_waits;
 	struct job_view *shown; /* the jobs as last sent to subscribers */
 	size_t shown_count;
@@ -138,13 +142,16 @@ static json_t *snapshot(const struct peers *s)
 
 struct sending {
 	uv_write_t request;
-	char *text;    /* allocated by jansson */
-	size_t answer; /* its bytes, if it answers a line of the reader's */
+	char *text; /* allocated by jansson */
+	size_t size;
+	bool answer; /* to a line of the reader's */
 };
 
 static void on_reader_closed(uv_handle_t *h)
 {
 	struct reader *r = h->data;
+	if (r->socket)
+		LIST_REMOVE(r, next);
 	mem_free(r);
 }
 
@@ -153,8 +160,8 @@ static void drop(struct reader *r)
 	if (r->closing)
 		return;
 	r->closing = true;
-	LIST_REMOVE(r, next);
 	r->socket->reader_count--;
+	send_pool_leave(&r->share);
 	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
 }
 
@@ -163,13 +170,29 @@ static size_t waiting(const struct reader *r)
 	return uv_stream_get_write_queue_size((const uv_stream_t *)&r->pipe);
 }
 
+static uint64_t left(const struct send_share *s)
+{
+	return waiting((const struct reader *)((const char *)s - offsetof(struct reader, share)));
+}
+
+static void give_way(struct send_share *s)
+{
+	drop((struct reader *)((char *)s - offsetof(struct reader, share)));
+}
+
+static uint64_t now(const struct reader *r)
+{
+	return uv_now(r->pipe.loop);
+}
+
 static void send_object(struct reader *r, json_t *o, bool answer);
 
 static void on_written(uv_write_t *w, int status)
 {
 	struct sending *s = w->data;
 	struct reader *r = w->handle->data;
-	r->unread -= s->answer;
+	r->unread -= s->answer ? s->size : 0;
+	send_pool_sub(&r->share, s->size, now(r));
 	free(s->text);
 	mem_free(s);
 	if (status) {
@@ -188,23 +211,25 @@ static void send_object(struct reader *r, json_t *o, bool answer)
 	struct sending *s = text ? mem_alloc(1, sizeof *s) : NULL;
 	json_decref(o);
 	size_t size = text ? strlen(text) : 0;
-	if (!s || (answer && r->unread > UNREAD_MAX)) {
+	if (!s || (answer && r->unread > UNREAD_MAX))
+		drop(r);
+	if (r->closing || !send_pool_add(&r->share, size, now(r))) {
 		mem_free(s);
 		free(text);
-		drop(r);
 		return;
 	}
-	s->text = text;
-	s->answer = answer ? size : 0;
-	r->unread += s->answer;
+	*s = (struct sending){.text = text, .size = size, .answer = answer};
+	r->unread += answer ? size : 0;
 	s->request.data = s;
 	static char newline[] = "\n";
 	uv_buf_t parts[2] = {uv_buf_init(text, (unsigned)size), uv_buf_init(newline, 1)};
 	if (uv_write(&s->request, (uv_stream_t *)&r->pipe, parts, 2, on_written)) {
+		send_pool_sub(&r->share, size, now(r));
 		free(text);
 		mem_free(s);
 		drop(r);
 	}
+	send_pool_look(&r->share, now(r));
 }
 
 static void send_answer(struct reader *r, json_t *o)
@@ -291,6 +316,7 @@ static void on_connection(uv_stream_t *listener, int status)
 	uv_pipe_init(listener->loop, &r->pipe, 0);
 	r->pipe.data = r;
 	r->socket = t;
+	r->share = (struct send_share){.pool = &t->peers->sending, .left = left, .give_way = give_way};
 	LIST_INSERT_HEAD(&t->readers, r, next);
 	t->reader_count++;
 	if (uv_accept(listener, (uv_stream_t *)&r->pipe)) {
@@ -321,11 +347,9 @@ static const struct job_view *shown_before(const struct status_socket *t, uint64
 
 static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 {
-	for (struct reader *r = LIST_FIRST(&t->readers), *next; r; r = next) {
-		next = LIST_NEXT(r, next);
+	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		if ((r->topics & topic) && !r->behind)
 			send_object(r, json_incref(o), false);
-	}
 	json_decref(o);
 }
 
@@ -454,7 +478,7 @@ static int open_socket(struct status_socket *t, const char *group, struct error 
 	return rc;
 }
 
-int status_open(struct status_socket **out, const struct peers *s, int inherited, const char *path, const char *group,
+int status_open(struct status_socket **out, struct peers *s, int inherited, const char *path, const char *group,
 		struct error *e)
 {
 	if (inherited >= 0 && group)
@@ -494,8 +518,11 @@ void status_close(struct status_socket *t)
 {
 	if (!t)
 		return;
-	while (!LIST_EMPTY(&t->readers))
-		drop(LIST_FIRST(&t->readers));
+	for (struct reader *r; (r = LIST_FIRST(&t->readers));) {
+		drop(r);
+		LIST_REMOVE(r, next);
+		r->socket = NULL;
+	}
 	struct stat st;
 	if (t->path && t->inode && lstat(t->path, &st) == 0 && st.st_dev == t->device && st.st_ino == t->inode)
 		unlink(t->path);

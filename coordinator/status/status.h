@@ -18,7 +18,7 @@ struct status_socket;
  * connect besides our own user; NULL: nobody. -EADDRINUSE: somebody answers there already, -EEXIST: something else is
  * there (including a link, wherever it leads), -EINVAL: no such group.
  */
-int status_open(struct status_socket **out, const struct peers *s, int inherited, const char *path, const char *group,
+int status_open(struct status_socket **out, struct peers *s, int inherited, const char *path, const char *group,
 		struct error *e);
 void status_close(struct status_socket *t); /* s may be NULL; asynchronous */
 void status_tick(struct status_socket *t);  /* s may be NULL */

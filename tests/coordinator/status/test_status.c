@@ -221,6 +221,46 @@ static void a_slow_reader_gets_the_newest(void **state)
 	scripted_hang_up(client);
 }
 
+/* How many lines there are, at most so many. */
+static int lines_left(FILE *f, int most)
+{
+	static char *line;
+	static size_t room;
+	int n = 0;
+	while (n < most && getline(&line, &room, f) > 0)
+		n++;
+	return n;
+}
+
+/* Each within what may wait for one reader, they ask and do not read: some are cut off, since no more may wait for all
+ * peers and readers than 16 MB. */
+static void what_waits_for_all_readers_is_bounded(void **state)
+{
+	(void)state;
+	enum { READERS = 30, PAGES = 20 };
+	FILE *quick = call_status(), *slow[READERS];
+	size_t size = 0, all = 0;
+	int whole = 0;
+	json_decref(hear(quick, NULL));
+	for (int i = 0; i < READERS; i++) {
+		slow[i] = call_status();
+		for (int k = 0; k < PAGES; k++)
+			say(slow[i], "{\"endedBefore\":null}\n");
+		say(quick, "{\"endedBefore\":null}\n");
+		json_decref(hear(quick, &size));
+		all += PAGES * size;
+	}
+	assert_true(all > 24 << 20 && PAGES * size < 1 << 20);
+	for (int i = 0; i < READERS; i++) {
+		whole += lines_left(slow[i], 1 + PAGES) == 1 + PAGES;
+		fclose(slow[i]);
+	}
+	assert_true(whole > 0 && whole < READERS);
+	say(quick, "{\"job\":\"j7\"}\n");
+	json_decref(hear(quick, NULL));
+	fclose(quick);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -228,6 +268,7 @@ int main(void)
 		cmocka_unit_test(one_job_has_its_details),
 		cmocka_unit_test(pages_list_all_that_ended),
 		cmocka_unit_test(a_slow_reader_gets_the_newest),
+		cmocka_unit_test(what_waits_for_all_readers_is_bounded),
 	};
 	return cmocka_run_group_tests(tests, set_up, served_stop);
 }
