@@ -35,9 +35,10 @@ static const struct {
 #undef LOG_ROW
 };
 
-/* Events that anyone who reaches the port can cause. */
-static const enum log_event limited[] = {LOG_PEER_ACCEPT, LOG_PEER_HELLO, LOG_PEER_REFUSED,
-					 LOG_PEER_CLOSED, LOG_PEER_FAULT, LOG_PEER_GARBLED};
+/* Events that anyone who reaches the port can cause, or a worker by a message. */
+static const enum log_event limited[] = {LOG_PEER_ACCEPT,  LOG_PEER_HELLO,     LOG_PEER_REFUSED,
+					 LOG_PEER_CLOSED,  LOG_PEER_FAULT,     LOG_PEER_GARBLED,
+					 LOG_LEASE_FAILED, LOG_BATCH_REPEATED, LOG_BATCH_REFUSED};
 enum { LIMITED = sizeof limited / sizeof *limited };
 static struct log_bucket buckets[LIMITED];
 static pthread_mutex_t bucket_lock = PTHREAD_MUTEX_INITIALIZER;
@@ -80,6 +81,11 @@ size_t log_format(char *line, size_t size, enum log_event event, const char *fie
 	if (n < 0)
 		return 0;
 	return (size_t)n < size ? (size_t)n : size - 1;
+}
+
+static bool is_shown(enum log_event event)
+{
+	return (int)events[event].level >= atomic_load(&least_level);
 }
 
 static bool may_say(enum log_event event)
@@ -161,15 +167,17 @@ void log_tick(void)
 		pthread_mutex_lock(&bucket_lock);
 		uint64_t n = log_bucket_withheld(&buckets[i], clock_seconds());
 		pthread_mutex_unlock(&bucket_lock);
-		if (n)
+		if (n && is_shown(limited[i]))
 			log_event(LOG_LOG_WITHHELD, "of=%s more=%llu", events[limited[i]].name, (unsigned long long)n);
 	}
 }
 
-void log_event(enum log_event event, const char *fields, ...)
+bool log_event(enum log_event event, const char *fields, ...)
 {
-	if ((int)events[event].level < atomic_load(&least_level) || !may_say(event))
-		return;
+	if (!may_say(event))
+		return false;
+	if (!is_shown(event))
+		return true;
 	char text[LINE_MAX_BYTES], line[LINE_MAX_BYTES];
 	va_list ap;
 	va_start(ap, fields);
@@ -179,4 +187,5 @@ void log_event(enum log_event event, const char *fields, ...)
 	size_t n = log_format(line, sizeof line - 1, event, text);
 	line[n++] = '\n';
 	write_line(line, n);
+	return true;
 }

@@ -7,6 +7,7 @@
 #ifndef COMMON_BASE_LOG_H
 #define COMMON_BASE_LOG_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -68,8 +69,9 @@ enum log_level { LOG_LEVEL_DEBUG, LOG_LEVEL_INFO, LOG_LEVEL_WARN, LOG_LEVEL_ERRO
 
 void log_set_level(enum log_level least); /* default: INFO */
 
-/* fields: "job=j%llu name=%s"; text from outside must go through log_quote. A line has at most 2,047 bytes. */
-__attribute__((format(printf, 2, 3))) void log_event(enum log_event event, const char *fields, ...);
+/* fields: "job=j%llu name=%s"; text from outside must go through log_quote. A line has at most 2,047 bytes.
+ * false: it was left out, for too many of its kind come. */
+__attribute__((format(printf, 2, 3))) bool log_event(enum log_event event, const char *fields, ...);
 
 enum { LOG_VALUE_MAX = 512 };
 struct log_value {

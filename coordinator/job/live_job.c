@@ -131,7 +131,8 @@ void live_job_log(struct live_job *job, enum log_event event, const char *fields
 	vsnprintf(text, sizeof text, fields, ap);
 	va_end(ap);
 	text_clean(text);
-	log_event(event, "job=j%llu %s", (unsigned long long)job->id, text);
+	if (!log_event(event, "job=j%llu %s", (unsigned long long)job->id, text))
+		return;
 	log_format(line, sizeof line - 1, event, text);
 	size_t size = strlen(line);
 	line[size++] = '\n';

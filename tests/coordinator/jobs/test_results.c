@@ -21,6 +21,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -537,6 +538,34 @@ static void a_failure_counts_whatever_its_text(void **state)
 	scripted_hang_up(worker);
 }
 
+static off_t size_of_log(uint64_t job)
+{
+	char path[128];
+	struct stat st;
+	snprintf(path, sizeof path, "%s/spool/jobs/j%llu/log", served_folder(), (unsigned long long)job);
+	assert_int_equal(stat(path, &st), 0);
+	return st.st_size;
+}
+
+/* A worker complains about a lease that it does not hold, as fast as it can. */
+static void complaints_do_not_fill_the_log(void **state)
+{
+	(void)state;
+	enum { COMPLAINTS = 4000, MOST = 100000 /* bytes */ };
+	const struct lease_key k = {.job = 3, .kind = LEASE_BOOTSTRAP};
+	struct scripted *worker = peer_call();
+	struct lease_queue d = {.count = 0};
+	off_t before = size_of_log(k.job);
+	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	for (int i = 0; i < COMPLAINTS; i++)
+		say_failed(worker, &k, "I do not like it");
+	peer_say_job_get(worker, 1000); /* answered when all were read */
+	while (!d.job_ended)
+		peer_attend(worker, &d);
+	assert_in_range(size_of_log(k.job) - before, 1, MOST);
+	scripted_hang_up(worker);
+}
+
 /* A client whose extension of job 2 has come. */
 static void send_extension(struct scripted *p)
 {
@@ -581,6 +610,7 @@ int main(void)
 		cmocka_unit_test(extensions_wait_for_films), /* the job of strategies_are_counted_once lives again */
 		cmocka_unit_test(extensions_are_served_as_they_came),
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
+		cmocka_unit_test(complaints_do_not_fill_the_log), /* of that job */
 	};
 	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts),
 					  cmocka_unit_test(half_a_result_is_no_word)};
