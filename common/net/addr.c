@@ -3,6 +3,7 @@
 
 #include <arpa/inet.h>
 #include <netdb.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,9 +32,8 @@ int net_addr_split(const char *host_port, char host[NET_HOST_MAX], const char **
 
 void net_addrs_take(struct net_addrs *l, const struct addrinfo *found)
 {
-	enum { MOST = sizeof l->all / sizeof *l->all };
 	memset(l, 0, sizeof *l);
-	for (; found && l->count < MOST; found = found->ai_next)
+	for (; found && l->count < NET_ADDRS_MOST; found = found->ai_next)
 		memcpy(&l->all[l->count++].storage, found->ai_addr, found->ai_addrlen);
 }
 
@@ -103,17 +103,21 @@ int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, s
 		host_port);
 }
 
+/* Both kinds of addresses have it at the same place. */
 unsigned net_addr_port(const struct net_addr *a)
 {
-	if (a->storage.ss_family == AF_INET6) {
-		struct sockaddr_in6 v6;
-		memcpy(&v6, &a->storage, sizeof v6);
-		return ntohs(v6.sin6_port);
-	}
 	struct sockaddr_in v4;
 	memcpy(&v4, &a->storage, sizeof v4);
 	return ntohs(v4.sin_port);
 }
+
+void net_addr_set_port(struct net_addr *a, unsigned port)
+{
+	in_port_t there = htons((uint16_t)port);
+	memcpy((char *)&a->storage + offsetof(struct sockaddr_in, sin_port), &there, sizeof there);
+}
+
+_Static_assert(offsetof(struct sockaddr_in, sin_port) == offsetof(struct sockaddr_in6, sin6_port), "ports differ");
 
 void net_addr_format(const struct net_addr *a, char *text, size_t size)
 {

@@ -17,9 +17,11 @@ struct net_addr {
 	struct sockaddr_storage storage;
 };
 
+enum { NET_ADDRS_MOST = 8 };
+
 /* What a name stands for, in the order in which the addresses are to be tried. */
 struct net_addrs {
-	struct net_addr all[8]; /* more are ignored */
+	struct net_addr all[NET_ADDRS_MOST]; /* more are ignored */
 	unsigned count;
 };
 
@@ -36,6 +38,7 @@ bool net_addr_is_loopback(const struct net_addr *a);
 /* -EPERM, with what to do about it, unless the address is loopback or `safe` (TLS, or --insecure). */
 int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, struct error *e);
 unsigned net_addr_port(const struct net_addr *a);
+void net_addr_set_port(struct net_addr *a, unsigned port);
 void net_addr_format(const struct net_addr *a, char *text, size_t size); /* numeric HOST:PORT */
 
 #endif

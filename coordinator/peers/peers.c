@@ -42,7 +42,7 @@ static bool make_room(struct peers *s)
 	return true;
 }
 
-void peers_accept(struct peers *s)
+void peers_accept(struct peers *s, struct listener *at)
 {
 	struct conn_config config = {{SESSION_HELLO_HEADER, 0},
 				     SESSION_HELLO_SEND,
@@ -55,13 +55,13 @@ void peers_accept(struct peers *s)
 	bool room = s->session_count < s->jobs->config.max_connections || make_room(s);
 	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
 	struct conn *c;
-	s->caller_waits = false;
+	at->caller_waits = false;
 	if (!p) {
 		log_event(LOG_PEER_REFUSED, "text=\"too many connections\"");
-		if (conn_accept(&c, (uv_stream_t *)&s->listener, &config, &refused_events, NULL, &e) == 0)
+		if (conn_accept(&c, (uv_stream_t *)&at->tcp, &config, &refused_events, NULL, &e) == 0)
 			conn_close(c, "too many connections");
 		else
-			s->caller_waits = true;
+			at->caller_waits = true;
 		return;
 	}
 	p->peers = s;
@@ -69,9 +69,9 @@ void peers_accept(struct peers *s)
 	p->id = ++s->last_peer;
 	STAILQ_INIT(&p->requests);
 	STAILQ_INIT(&p->held);
-	if (conn_accept(&p->conn, (uv_stream_t *)&s->listener, &config, &conversation_events, p, &e)) {
+	if (conn_accept(&p->conn, (uv_stream_t *)&at->tcp, &config, &conversation_events, p, &e)) {
 		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
-		s->caller_waits = true;
+		at->caller_waits = true;
 		mem_free(p);
 		return;
 	}
@@ -82,8 +82,9 @@ void peers_accept(struct peers *s)
 
 void peers_tick(struct peers *s)
 {
-	if (s->caller_waits)
-		peers_accept(s);
+	for (unsigned i = 0; i < s->listener_count; i++)
+		if (s->listeners[i].caller_waits)
+			peers_accept(s, &s->listeners[i]);
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		client_tick(p);
 		held_tick(p);
@@ -92,7 +93,8 @@ void peers_tick(struct peers *s)
 
 void peers_stop(struct peers *s)
 {
-	uv_close((uv_handle_t *)&s->listener, NULL);
+	for (unsigned i = 0; i < s->listener_count; i++)
+		uv_close((uv_handle_t *)&s->listeners[i].tcp, NULL);
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		conn_close(p->conn, "the coordinator stops");
 }
@@ -167,7 +169,6 @@ static uint64_t uploading(struct peers *s, uint64_t peer)
 
 void peers_init(struct peers *s)
 {
-	uv_tcp_init(s->jobs->loop, &s->listener);
 	s->receiving.limit = s->jobs->config.receive_bytes;
 	s->sending.limit = s->jobs->config.send_bytes;
 	s->jobs->peers = (struct peer_calls){.user = s,

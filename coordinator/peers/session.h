@@ -67,8 +67,12 @@ struct session {
 /* All sessions, and their common limits. */
 struct peers {
 	struct jobs *jobs;
-	struct tls *tls;   /* NULL: plaintext */
-	uv_tcp_t listener; /* its loop is that of the jobs */
+	struct tls *tls;  /* NULL: plaintext */
+	struct listener { /* their loop is that of the jobs */
+		uv_tcp_t tcp;
+		bool caller_waits; /* a connection could not be accepted: try again */
+	} listeners[NET_ADDRS_MOST];
+	unsigned listener_count;
 	LIST_HEAD(, session) sessions;
 	LIST_HEAD(, session) by_id[SESSION_BUCKETS];
 	unsigned session_count, fetches;
@@ -77,8 +81,7 @@ struct peers {
 	struct receive_pool receiving;
 	struct send_pool sending;
 	uint64_t last_peer;
-	uint64_t garbled;  /* connections closed because of a wrong checksum */
-	bool caller_waits; /* a connection could not be accepted: try again */
+	uint64_t garbled; /* connections closed because of a wrong checksum */
 };
 
 struct session *peers_find(const struct peers *s, uint64_t id); /* NULL: it is gone */

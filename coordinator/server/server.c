@@ -34,7 +34,7 @@ static void on_connection(uv_stream_t *listener, int status)
 {
 	struct server *s = listener->data;
 	if (status == 0 && !s->jobs.stopping)
-		peers_accept(&s->peers);
+		peers_accept(&s->peers, (struct listener *)listener);
 }
 
 static int write_port(const char *path, unsigned port, struct error *e)
@@ -44,27 +44,52 @@ static int write_port(const char *path, unsigned port, struct error *e)
 	return disk_replace(path, text, (size_t)n, 0644, e);
 }
 
-static int start_listening(struct server *s, struct error *e)
+/* Port 0: bound to a free one, which `a` has afterwards. Not 0: a code of libuv. */
+static int listen_at(struct server *s, struct net_addr *a)
 {
-	struct net_addr a, bound;
+	uv_tcp_t *l = &s->peers.listeners[s->peers.listener_count++].tcp;
 	char text[80];
-	int length = sizeof bound.storage;
-	int rc = net_addr_resolve(&a, s->jobs.config.listen, e);
+	int length = sizeof a->storage;
+	uv_tcp_init(&s->loop, l);
+	l->data = s;
+	int rc = uv_tcp_bind(l, (const struct sockaddr *)&a->storage, 0);
 	if (!rc)
-		rc = net_addr_allow(&a, s->jobs.config.listen, s->jobs.config.insecure || s->peers.tls, e);
+		rc = uv_listen((uv_stream_t *)l, BACKLOG, on_connection);
+	if (!rc)
+		rc = uv_tcp_getsockname(l, (struct sockaddr *)&a->storage, &length);
 	if (rc)
 		return rc;
-	memset(&bound, 0, sizeof bound);
-	rc = uv_tcp_bind(&s->peers.listener, (const struct sockaddr *)&a.storage, 0);
-	if (!rc)
-		rc = uv_listen((uv_stream_t *)&s->peers.listener, BACKLOG, on_connection);
-	if (!rc)
-		rc = uv_tcp_getsockname(&s->peers.listener, (struct sockaddr *)&bound.storage, &length);
-	if (rc)
-		return error_set(e, -rc, "cannot listen at %s: %s", s->jobs.config.listen, uv_strerror(rc));
-	net_addr_format(&bound, text, sizeof text);
+	net_addr_format(a, text, sizeof text);
 	log_event(LOG_LISTEN, "address=%s tls=%s", text, s->peers.tls ? "yes" : "no");
-	return s->jobs.config.port_file ? write_port(s->jobs.config.port_file, net_addr_port(&bound), e) : 0;
+	return 0;
+}
+
+/* At all addresses of the name, with one port. Those that this machine does not have (::1 without IPv6) are left out if
+ * it has others. */
+static int start_listening(struct server *s, struct error *e)
+{
+	const char *where = s->jobs.config.listen;
+	struct net_addrs l;
+	unsigned port = 0;
+	int rc = net_addrs_resolve(&l, where, e), fault = UV_EADDRNOTAVAIL;
+	for (unsigned i = 0; !rc && i < l.count; i++)
+		rc = net_addr_allow(&l.all[i], where, s->jobs.config.insecure || s->peers.tls, e);
+	if (rc)
+		return rc;
+	for (unsigned i = 0; i < l.count; i++) {
+		if (port)
+			net_addr_set_port(&l.all[i], port);
+		rc = listen_at(s, &l.all[i]);
+		if (!rc)
+			port = net_addr_port(&l.all[i]);
+		else if (rc != UV_EADDRNOTAVAIL && rc != UV_EAFNOSUPPORT)
+			return error_set(e, -rc, "cannot listen at %s: %s", where, uv_strerror(rc));
+		else
+			fault = rc;
+	}
+	if (!port)
+		return error_set(e, -fault, "cannot listen at %s: %s", where, uv_strerror(fault));
+	return s->jobs.config.port_file ? write_port(s->jobs.config.port_file, port, e) : 0;
 }
 
 static int open_tls(struct server *s, struct error *e)
@@ -158,7 +183,7 @@ static void init_handles(struct server *s)
 	uv_check_init(&s->loop, &s->check);
 	uv_signal_init(&s->loop, &s->on_term);
 	uv_signal_init(&s->loop, &s->on_int);
-	s->peers.listener.data = s->tick.data = s->look.data = s->check.data = s->on_term.data = s->on_int.data = s;
+	s->tick.data = s->look.data = s->check.data = s->on_term.data = s->on_int.data = s;
 	uv_signal_start(&s->on_term, on_signal, SIGTERM);
 	uv_signal_start(&s->on_int, on_signal, SIGINT);
 	uv_timer_start(&s->tick, on_tick, TICK_MS, TICK_MS);

@@ -17,7 +17,7 @@ static int take_verbose(void *target, char *arg, struct error *e)
 #define CONFIG struct server_config
 
 static const struct option_row rows[] = {
-	{"listen", 'l', "HOST:PORT", "Address for workers and clients; port 0: any free port",
+	{"listen", 'l', "HOST:PORT", "Address for workers and clients; of a name: all; port 0: any free port",
 	 OPTION_TEXT(CONFIG, listen), .standard = "127.0.0.1:7700"},
 	{"spool", 0, "DIR", "Folder for scene files, jobs and results", OPTION_TEXT(CONFIG, spool), .needed = true},
 	{"status-socket", 0, "PATH", "Unix socket for hslt-status", OPTION_TEXT(CONFIG, status_socket),

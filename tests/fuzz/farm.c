@@ -150,7 +150,7 @@ static uint16_t port_of(const struct server *s)
 {
 	struct sockaddr_in a;
 	int size = sizeof a;
-	uv_tcp_getsockname(&s->peers.listener, (struct sockaddr *)&a, &size);
+	uv_tcp_getsockname(&s->peers.listeners[0].tcp, (struct sockaddr *)&a, &size);
 	return a.sin_port;
 }
 
