@@ -29,7 +29,8 @@ struct blob_writer {
 	struct blob_store *store;
 	struct blob_hash hash;
 	uint64_t size, at;
-	int fd;
+	int fd; /* -1: not open */
+	bool made;
 	uint64_t number;	   /* of the temporary file */
 	char path[BLOB_PATH_MOST]; /* the same file's */
 	EVP_MD_CTX *md;
@@ -322,7 +323,8 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	if (w->fd < 0 && errno == ENOENT && disk_make_folder(s->folder, e) == 0) /* somebody removed it */
 		w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-	if (w->fd < 0)
+	w->made = w->fd >= 0;
+	if (!w->made)
 		rc = error_file(e, errno, s->folder);
 	else if (!w->md || EVP_DigestInit_ex(w->md, EVP_sha256(), NULL) != 1)
 		rc = error_set(e, ENOMEM, "SHA-256 cannot start");
@@ -338,10 +340,27 @@ uint64_t blob_write_at(const struct blob_writer *w)
 	return w->at;
 }
 
+void blob_write_pause(struct blob_writer *w)
+{
+	if (w->fd >= 0)
+		disk_close(w->fd);
+	w->fd = -1;
+}
+
+static int go_on(struct blob_writer *w, struct error *e)
+{
+	if (w->fd < 0)
+		w->fd = disk_open(w->path, O_WRONLY | O_CLOEXEC | O_NOFOLLOW, 0);
+	return w->fd < 0 ? error_file(e, errno, w->store->folder) : 0;
+}
+
 int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e)
 {
 	if (size > w->size - w->at)
 		return error_set(e, EFBIG, "more bytes than were announced");
+	int rc = go_on(w, e);
+	if (rc)
+		return rc;
 	if (EVP_DigestUpdate(w->md, bytes, size) != 1)
 		return error_set(e, EIO, "SHA-256 failed");
 	while (size) {
@@ -388,6 +407,8 @@ static int finish(struct blob_writer *w, struct error *e)
 	struct blob_store *s = w->store;
 	char path[BLOB_PATH_MOST];
 	int rc = check_written(w, e);
+	if (!rc)
+		rc = go_on(w, e);
 	if (rc)
 		return rc;
 	if (blob_hold(s, &w->hash)) { /* another writer stored it meanwhile */
@@ -408,8 +429,7 @@ static int finish(struct blob_writer *w, struct error *e)
 static void writer_free(struct blob_writer *w)
 {
 	w->store->promised -= w->size;
-	if (w->fd >= 0)
-		disk_close(w->fd);
+	blob_write_pause(w);
 	EVP_MD_CTX_free(w->md);
 	mem_free(w);
 }
@@ -425,7 +445,7 @@ int blob_write_commit(struct blob_writer *w, struct error *e)
 
 void blob_write_abort(struct blob_writer *w)
 {
-	if (w->fd >= 0)
+	if (w->made)
 		disk_unlink(w->path);
 	writer_free(w);
 }

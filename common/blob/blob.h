@@ -50,6 +50,7 @@ struct blob_writer;
 int blob_write_begin(struct blob_writer **w, struct blob_store *s, const struct blob_hash *h, uint64_t size,
 		     struct error *e);
 uint64_t blob_write_at(const struct blob_writer *w); /* bytes written so far */
+void blob_write_pause(struct blob_writer *w);	     /* it has no descriptor until more is added */
 int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e);
 int blob_write_commit(struct blob_writer *w, struct error *e); /* frees the writer in any case */
 void blob_write_abort(struct blob_writer *w);

@@ -377,8 +377,12 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 		rc = error_set(e, EINVAL, "blobs must be sent one after the other and in order");
 	if (!rc && size)
 		rc = blob_write_add(u->writer, payload, size, e);
-	if (rc || blob_write_at(u->writer) < c->size)
+	if (rc)
 		return rc;
+	if (blob_write_at(u->writer) < c->size) {
+		blob_write_pause(u->writer); /* thousands of clients may stop midway */
+		return 0;
+	}
 	rc = keep_blob(u, e);
 	return rc ? rc : 1;
 }

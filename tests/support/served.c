@@ -21,6 +21,7 @@
 
 #include <arpa/inet.h>
 #include <poll.h>
+#include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -154,6 +155,23 @@ long served_kilobytes(void)
 			break;
 	fclose(f);
 	return kilobytes;
+}
+
+unsigned served_open_files(const char *name)
+{
+	char path[300], target[300];
+	unsigned count = 0;
+	snprintf(path, sizeof path, "/proc/%d/fd", (int)server);
+	DIR *all = opendir(path);
+	assert_non_null(all);
+	for (const struct dirent *d; (d = readdir(all));) {
+		snprintf(path, sizeof path, "/proc/%d/fd/%.20s", (int)server, d->d_name);
+		ssize_t n = readlink(path, target, sizeof target - 1);
+		target[n > 0 ? n : 0] = 0;
+		count += strstr(target, name) != NULL;
+	}
+	closedir(all);
+	return count;
 }
 
 /* ---- a peer of our own ---- */

@@ -19,8 +19,9 @@ int served_stop(void **state);			      /* a teardown: fails when it did not end 
 void served_prepare(void (*spool)(const char *path)); /* what makes the spool of the next start; NULL: nothing */
 /* Holds its spool and its status socket, `status`; a file `nomem` there: its next connection gets no memory. */
 const char *served_folder(void);
-void served_set_busy(bool busy); /* nobody may look at the films of its jobs */
-long served_kilobytes(void);	 /* of memory */
+void served_set_busy(bool busy);	      /* nobody may look at the films of its jobs */
+long served_kilobytes(void);		      /* of memory */
+unsigned served_open_files(const char *name); /* descriptors of files that have this in their path */
 void served_still_works(void);
 void served_works_again(void); /* when it has noticed that others hung up */
 

@@ -197,12 +197,54 @@ static void a_file_that_was_sent_is_not_taken_again(void **state)
 	scripted_hang_up(client);
 }
 
+static void send_part(struct scripted *p, const char *text, size_t from, size_t to)
+{
+	Farm__BlobChunk c;
+	Farm__Envelope m;
+	struct blob_hash hash;
+	struct error e;
+	assert_int_equal(blob_hash_bytes(text, strlen(text), &hash, &e), 0);
+	farm__blob_chunk__init(&c);
+	farm__envelope__init(&m);
+	c.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	c.size = strlen(text);
+	c.offset = from;
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &c;
+	peer_say(p, &m, text + from, to - from);
+	peer_say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
+}
+
+/* However many clients stop midway, they hold no descriptors. */
+static void half_a_file_is_not_open(void **state)
+{
+	(void)state;
+	static const char text[] = "<scene version='3.0.0'/>";
+	struct scripted *client = peer_call();
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_submit(client, NULL, text, "s.xml", "s.xml");
+	assert_int_equal(peer_submit_answer(client)->n_missing, 1);
+	for (size_t i = 0; i < 5; i++) { /* the first has no bytes */
+		send_part(client, text, i ? i - 1 : 0, i);
+		assert_int_equal(scripted_hear(client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+		assert_int_equal(served_open_files("/blobs/"), 0);
+	}
+	send_part(client, text, 4, strlen(text));
+	const Farm__Envelope *m = scripted_hear(client);
+	while (m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER)
+		m = scripted_hear(client);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
+	assert_true(m->submit_answer->job);
+	scripted_hang_up(client);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(the_loop_flushes_no_file, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(who_goes_midway_leaves_nothing, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_file_that_was_sent_is_not_taken_again, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(half_a_file_is_not_open, set_up, tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
