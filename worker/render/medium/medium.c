@@ -7,7 +7,7 @@
 #include <string.h>
 
 #define COEFFICIENT VALUE_COLOR, PARAM_UNDERSTOOD, 0, 1e30, NULL
-#define VARIES VALUE_TEXTURE, PARAM_UNDERSTOOD, 0
+#define VARIES VALUE_VOLUME, PARAM_UNDERSTOOD, 0
 
 /* Ways of sampling distances are not the scene's choice here. */
 #define SAMPLING_PARAMS                                                                            \

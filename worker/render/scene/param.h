@@ -21,6 +21,9 @@ enum value_type {
 /* The forms of a colour: a number, rgb, a spectrum, a texture. */
 #define VALUE_COLOR (VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_SPECTRUM)
 #define VALUE_TEXTURE (VALUE_COLOR | VALUE_NODE)
+/* The same in space: a number, rgb, a spectrum, a volume. */
+#define VALUE_IN_SPACE (1 << 10)
+#define VALUE_VOLUME (VALUE_TEXTURE | VALUE_IN_SPACE)
 /* A transform that may be an <animation>. */
 #define VALUE_MOTION (1 << 9)
 #define VALUE_PLACE (VALUE_TRANSFORM | VALUE_MOTION)

@@ -241,7 +241,7 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",
 				 plugin_class_name(cls), written ? "" : " without a name", owner->name, d->node->type);
 	}
-	enum plugin_class colours = d->node->cls == PLUGIN_MEDIUM ? PLUGIN_VOLUME : PLUGIN_TEXTURE;
+	enum plugin_class colours = p && (p->types & VALUE_IN_SPACE) ? PLUGIN_VOLUME : PLUGIN_TEXTURE;
 	if (p && (p->types & VALUE_COLOR) && (p->types & VALUE_NODE) && cls != colours)
 		return xml_error(el, m->error, EINVAL, "`%s` may be a %s, but not a %s", element_spelling(el, p->name),
 				 plugin_class_name(colours), plugin_class_name(cls));
