@@ -146,7 +146,9 @@ static int design(struct session *s, struct error *e)
 	struct render_arguments *r = &s->a->render;
 	if (integrator_is_open(&r->plan)) /* most settings concern chains */
 		snprintf(r->plan.integrator, sizeof r->plan.integrator, "%s",
-			 render_effect_on(&s->summary, "scattering") ? "pssmlt" : RENDER_INTEGRATOR_CHAINS);
+			 render_effect_on(&s->summary, "scattering") || render_effect_on(&s->summary, "medium-light")
+				 ? "pssmlt"
+				 : RENDER_INTEGRATOR_CHAINS);
 	int rc = render_plan_from_scene(r, &s->summary, e);
 	if (!rc)
 		rc = accuracy_design(&s->design, &r->plan, &s->summary, s->a->accuracy, e);

@@ -400,6 +400,8 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 		render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
 	if (integrator->from_camera && summary->beams)
 		return error_set(e, EINVAL, RENDER_NO_BEAMS, integrator->name);
+	if (integrator->to_emitters && (!open || chains) && render_effect_on(summary, "medium-light"))
+		return error_set(e, EINVAL, RENDER_NO_GLOW, integrator->name);
 	p->kind = integrator->kind;
 	p->width = s->width;
 	p->height = s->height;

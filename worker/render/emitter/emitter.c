@@ -29,6 +29,12 @@ bool emitter_needs_surface(const struct scene_node *n)
 	return ops && ops->needs_surface;
 }
 
+bool emitter_is_in_medium(const struct scene_node *n)
+{
+	const struct emitter_ops *ops = find_ops(n);
+	return ops && ops->in_medium;
+}
+
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	const struct emitter_ops *ops = find_ops(n);

@@ -52,6 +52,7 @@ struct emitter_ops {
 	struct plugin_decl decl;
 	size_t data_size;   /* of em->data, which is zeroed memory before `create`; 0: it has none yet */
 	bool needs_surface; /* area: belongs to a shape */
+	bool in_medium;	    /* what is inside its shape shines: no struct emitter is made of it */
 	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
 		      struct error *e);
 	/* Radiance leaving x in direction w (unit, away from the emitter, into the scene). */
@@ -119,6 +120,8 @@ static inline double emitter_pdf_toward(const struct emitter *em, vec3 ref, cons
 
 /* Whether it belongs to a shape. */
 bool emitter_needs_surface(const struct scene_node *n);
+/* Whether the medium inside a shape shines. */
+bool emitter_is_in_medium(const struct scene_node *n);
 
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
 

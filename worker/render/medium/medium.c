@@ -12,7 +12,7 @@
 /* Ways of sampling distances are not the scene's choice here. */
 #define SAMPLING_PARAMS                                                                            \
 	{"has_spectral_extinction", IGNORED}, {"sample_emitters", IGNORED}, {"strategy", IGNORED}, \
-		{"sampling_density", IGNORED},                                                     \
+		{"sampling_density", IGNORED}, {"sigma_n", IGNORED},                               \
 	{                                                                                          \
 		"medium_sampling_mode", IGNORED                                                    \
 	}
@@ -101,6 +101,13 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct vol
 	if (volume_varies(&m->second))
 		m->absorbs = m->scatters = m->absorbs || m->scatters;
 	return 0;
+}
+
+int medium_light(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e)
+{
+	int rc = glow_create(&m->glow, n, &m->first, build, e);
+	m->shines = !rc && glow_max(&m->glow) > 0;
+	return rc;
 }
 
 bool medium_is_coloured(const struct medium *m)

@@ -36,6 +36,7 @@ void classes_begin(struct classes *k, const struct path_context *c, unsigned cam
 		k->camera[i + 1] = (unsigned char)path_class_kind_next(kind, smooth);
 		kind = path_class_kind_next(kind, v->delta || smooth);
 	}
+	k->emitter[camera + 1] = (unsigned char)kind;
 	kind = PATH_NO_VERTEX;
 	for (unsigned i = 1; i < light; i++) {
 		const struct path_vertex *v = &c->light[i];

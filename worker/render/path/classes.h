@@ -16,7 +16,7 @@ unsigned path_class_whole(const struct full_path *x);
 struct classes {
 	/* Kinds of the parts that meet in a connection, the two that it joins included: the camera's first t vertices,
 	 * the light's first s. Joined ends scatter there by what is not delta. emitter: the camera's, where the last of
-	 * the t is an emitter that was hit and does not scatter. */
+	 * the t is an emitter that was hit and does not scatter, or in a medium that shines. */
 	unsigned char camera[PATH_MAX_EDGES + 3], emitter[PATH_MAX_EDGES + 3], light[PATH_MAX_EDGES + 3];
 	spectrum weights; /* X + Y + Z of a contribution */
 	struct path_sample *out;

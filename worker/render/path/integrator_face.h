@@ -11,11 +11,17 @@ struct render_integrator {
 	uint32_t max_depth; /* edges its state holds */
 	bool has_mutations; /* its chains draw proposals from a mixture of strategies */
 	bool from_camera;   /* it has no light sub-paths: no light of beams */
+	bool to_emitters;   /* its paths end on emitters: no light of media */
 };
 /* What is said where one that is from_camera, by name, meets a beam. */
 #define RENDER_NO_BEAMS                                                                                                \
 	"the integrator %s finds no light of `collimated`, a beam without width: paths must begin there, as those of " \
 	"bdpt, erpt, pssmlt and hslt do"
+
+/* And one that is to_emitters, a medium that shines. */
+#define RENDER_NO_GLOW                                                                                            \
+	"the integrator %s finds no light of `volumelight`, that of media: its chains move the ends of paths on " \
+	"surfaces; path, bdpt, bdpt8, erpt, erpt4 and pssmlt find it"
 
 /* NULL when there is none of that name; index from 0, NULL at the end. */
 const struct render_integrator *render_integrator_find(const char *name);

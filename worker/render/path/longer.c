@@ -9,6 +9,7 @@
 #include "worker/render/path/longer.h"
 
 #include "worker/render/path/connect.h"
+#include "worker/render/path/glow.h"
 
 #include <string.h>
 
@@ -19,6 +20,8 @@ static spectrum gather(struct path_context *c, unsigned first, unsigned n, unsig
 		       uint32_t most, double film[2])
 {
 	spectrum sum = spectrum_of(0);
+	if (EFFECT_IS_ON(c->w, medium_light))
+		sum = glow_gather(c, least > before + first - 1 ? least - before : first - 1, most - before, NULL);
 	for (unsigned t = first; t <= n; t++)
 		for (unsigned j = 0; j <= 1; j++) {
 			unsigned edges = before + t + j - 1;

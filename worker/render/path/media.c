@@ -66,28 +66,36 @@ void path_absorb(const struct path_context *c, const struct path_vertex *at, vec
 
 /* A ray on its way. */
 struct walk {
-	struct path_edge *edge;	   /* medium: where the ray is; free: unused until the end */
-	vec3 d;			   /* its direction */
-	spectrum all, events;	   /* optical depths so far: of all media, of those that scatter */
-	struct medium_lanes lanes; /* of the medium where the ray is, if there is one */
-	bool scatters;		   /* that medium does */
+	struct path_edge *edge;	     /* medium: where the ray is; free: unused until the end */
+	vec3 d;			     /* its direction */
+	spectrum all, events;	     /* optical depths so far: of all media, of those that scatter */
+	struct medium_lanes lanes;   /* of the medium where the ray is, if there is one */
+	bool scatters;		     /* that medium does */
+	const struct medium *shines; /* that medium, if it does and somebody asks */
+	struct path_glow *glow;	     /* NULL: nobody does */
+	const struct wavelengths *wl;
 };
 
 static void walk_enter(const struct path_context *c, struct walk *k, uint32_t medium)
 {
 	k->edge->medium = medium;
 	k->scatters = medium && path_medium(c->w, medium)->scatters;
-	if (medium)
-		k->lanes = medium_at(path_medium(c->w, medium), &c->wl);
+	k->shines = NULL;
+	if (!medium)
+		return;
+	const struct medium *m = path_medium(c->w, medium);
+	k->lanes = medium_at(m, &c->wl);
+	k->shines = k->glow && m->shines ? m : NULL;
 }
 
 static struct walk walk_begin(const struct path_context *c, const struct path_vertex *at, vec3 d,
-			      struct path_edge *edge)
+			      struct path_edge *edge, struct path_glow *glow)
 {
 	bool emitter = at->kind == VERTEX_EMITTER || at->kind == VERTEX_INFINITE;
 	uint32_t medium =
 		emitter ? path_medium_of_emitter(c->w, at, d) : path_medium_after(c->w, at, at->edge.medium, d);
-	struct walk k = {.edge = edge, .d = d, .all = spectrum_of(0), .events = spectrum_of(0)};
+	struct walk k = {
+		.edge = edge, .d = d, .all = spectrum_of(0), .events = spectrum_of(0), .glow = glow, .wl = &c->wl};
 	*edge = (struct path_edge){.before = medium, .fits = true};
 	walk_enter(c, &k, medium);
 	return k;
@@ -106,16 +114,52 @@ static void walk_on(struct walk *k, vec3 o, double t0, double t1)
 		walk_add(k, medium_depth(&k->lanes, &(struct grid_ray){o, k->d, t0, t1}));
 }
 
+/* Of light that is emitted with l per length all along a way: what is left at its beginning. */
+static spectrum even_glow(const struct medium_lanes *m, spectrum l, double length)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double sigma = m->sigma_t[0].v[i];
+		if (l.v[i] > 0) /* not 0 times infinity */
+			l.v[i] *= sigma > 0 ? -expm1(-sigma * length) / sigma : length;
+	}
+	return l;
+}
+
+/* What the medium emits from t0 to t1 behind o, all of which the edge passes. Without events on the way it is known, if
+ * everything is the same everywhere; otherwise it is that of one place. Where the edge passes with the mean over the
+ * wavelengths of what events leave, light counts as many times more often. */
+static void walk_shine(struct walk *k, vec3 o, double t0, double t1)
+{
+	const struct glow *g = &k->shines->glow;
+	spectrum l, passed = spectrum_of(0), all, events = k->events;
+	if (!g->radiance.grid && !k->lanes.grid && !k->scatters) {
+		l = even_glow(&k->lanes, glow_even(g, k->wl), t1 - t0);
+	} else {
+		double t;
+		if (!glow_sample(g, &(struct grid_ray){o, k->d, t0, t1}, k->glow->u, k->wl, &t, &l))
+			return;
+		passed = medium_depth(&k->lanes, &(struct grid_ray){o, k->d, t0, t});
+	}
+	all = spectrum_attenuation(spectrum_add(k->all, passed));
+	events = spectrum_attenuation(k->scatters ? spectrum_add(events, passed) : events);
+	l = spectrum_scale(1 / spectrum_mean(events), spectrum_mul(l, all));
+	k->glow->sum = spectrum_add(k->glow->sum, l);
+}
+
 /* The same, but at most to an event, which is where the depth at one wavelength is `depth`; INFINITY: there is none. */
 static double walk_to_event(struct walk *k, vec3 o, double t0, double t1, int lane, double depth)
 {
 	spectrum passed;
 	if (!k->scatters || depth == INFINITY) {
+		if (k->shines && t1 > t0)
+			walk_shine(k, o, t0, t1);
 		walk_on(k, o, t0, t1);
 		return INFINITY;
 	}
 	double t = medium_reach(&k->lanes, &(struct grid_ray){o, k->d, t0, t1}, lane,
 				fmax(depth - k->events.v[lane], 0), &passed);
+	if (k->shines && fmin(t, t1) > t0)
+		walk_shine(k, o, t0, fmin(t, t1));
 	walk_add(k, passed);
 	return t;
 }
@@ -151,10 +195,10 @@ void path_stop_in_medium(struct path_vertex *to, const struct path_vertex *from,
 
 /* To the event where the depth at one wavelength is `depth`; INFINITY: to none. */
 static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, int lane,
-		   double depth, struct path_vertex *to, spectrum *left)
+		   double depth, struct path_glow *glow, struct path_vertex *to, spectrum *left)
 {
 	struct path_edge edge;
-	struct walk k = walk_begin(c, at, d, &edge);
+	struct walk k = walk_begin(c, at, d, &edge, glow);
 	struct path_vertex from = *at;
 	for (int i = 0; i < PATH_FACES_MOST; i++) {
 		bool met = path_extend(c, &from, d, t_min, t_max, to);
@@ -180,16 +224,16 @@ static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d,
 }
 
 bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
-			  double u, struct path_vertex *to, spectrum *left)
+			  double u, struct path_glow *glow, struct path_vertex *to, spectrum *left)
 {
 	double place = u * SPECTRUM_LANES, lane = floor(place);
-	return extend(c, at, d, t_min, t_max, (int)lane, -log1p(lane - place), to, left);
+	return extend(c, at, d, t_min, t_max, (int)lane, -log1p(lane - place), glow, to, left);
 }
 
 bool path_extend_past_events(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
 			     struct path_vertex *to, spectrum *left)
 {
-	return extend(c, at, d, t_min, t_max, 0, INFINITY, to, left);
+	return extend(c, at, d, t_min, t_max, 0, INFINITY, NULL, to, left);
 }
 
 bool path_see_in_media(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
@@ -197,7 +241,7 @@ bool path_see_in_media(struct path_context *c, const struct path_vertex *z, cons
 {
 	double distance2;
 	vec3 d = path_direction(z, y, &distance2);
-	struct walk k = walk_begin(c, z, d, edge);
+	struct walk k = walk_begin(c, z, d, edge, NULL);
 	struct path_vertex from = *z, face;
 	double begin = near_plane(c->w, z, d);
 	for (int i = 0; i < PATH_FACES_MOST; i++) {

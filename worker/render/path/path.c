@@ -121,8 +121,21 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 static bool go_on(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, double u,
 		  struct path_vertex *to, spectrum *left)
 {
-	return EFFECT_IS_ON(c->w, scattering) ? path_extend_in_media(c, at, d, t_min, t_max, u, to, left)
+	return EFFECT_IS_ON(c->w, scattering) ? path_extend_in_media(c, at, d, t_min, t_max, u, NULL, to, left)
 					      : path_extend(c, at, d, t_min, t_max, to);
+}
+
+/* The same for edge e of the camera's sub-path, whose throughput is beta there, where media shine. Keeps what they emit
+ * on the way. */
+static bool go_on_shining(struct path_context *c, struct sampler *s, unsigned e, spectrum beta, vec3 d, double t_min,
+			  double t_max, double u, spectrum *left)
+{
+	struct path_vertex *at = &c->camera[e - 1];
+	struct path_glow glow = {s->block(s, SIDE_LIGHT, e - 1)[DIM_GLOW], spectrum_of(0)};
+	bool met = path_extend_in_media(c, at, d, t_min, t_max, u, &glow, at + 1, left);
+	c->glow[e] = spectrum_is_zero(glow.sum) ? glow.sum : spectrum_mul(beta, glow.sum);
+	c->glow_edges = e;
+	return met;
 }
 
 /* How a sub-path leaves a vertex by its BSDF. */
@@ -229,8 +242,10 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		if (!survives(c, n - 1, start, u[DIM_ROULETTE], &out.beta) || spectrum_is_zero(out.beta))
 			return n;
 		spectrum left = spectrum_of(1);
-		if (!go_on(c, at, out.wi, 0, INFINITY, u[DIM_DISTANCE], to, &left) ||
-		    (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
+		bool met = EFFECT_IS_ON(c->w, medium_light) && side == SIDE_CAMERA
+				   ? go_on_shining(c, s, n, out.beta, out.wi, 0, INFINITY, u[DIM_DISTANCE], &left)
+				   : go_on(c, at, out.wi, 0, INFINITY, u[DIM_DISTANCE], to, &left);
+		if (!met || (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
 			return n;
 		double ahead = 1, back = 1;
 		if (out.delta && side == SIDE_CAMERA)
@@ -272,13 +287,16 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	const struct camera *camera = world_camera(w, &v[0].x, &room);
 	v[0].x.p = camera_point(camera, u + DIM_APERTURE_U);
 	v[0].edge.medium = w->camera_medium;
+	c->glow_edges = 0;
 	if (max_vertices < 2 || !camera_has(&w->camera, film[0], film[1]))
 		return 1;
 	vec3 d = camera_direction(camera, v[0].x.p, film[0], film[1]);
 	double t_min, t_max, area = c->window.width * c->window.height;
 	camera_clip(camera, d, &t_min, &t_max);
 	spectrum left = spectrum_of(1);
-	if (!go_on(c, &v[0], d, t_min, t_max, u[DIM_CAMERA_DISTANCE], &v[1], &left))
+	double along = u[DIM_CAMERA_DISTANCE];
+	if (!(EFFECT_IS_ON(w, medium_light) ? go_on_shining(c, s, 1, spectrum_of(area), d, t_min, t_max, along, &left)
+					    : go_on(c, &v[0], d, t_min, t_max, along, &v[1], &left)))
 		return 1;
 	v[1].beta = spectrum_of(area);
 	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_RADIANCE);
@@ -367,6 +385,8 @@ unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_si
 		      unsigned max_vertices)
 {
 	struct path_vertex *v = side == SIDE_CAMERA ? c->camera : c->light;
+	if (side == SIDE_CAMERA)
+		c->glow_edges = n - 1;
 	return scatter_on(c, s, side, v, n, max_vertices, spectrum_max(v[1].beta));
 }
 

@@ -15,11 +15,12 @@ enum { SAMPLER_BLOCK = 8 };
 /* What the numbers of a block are for. Block 0 of the camera: film x, y, wavelength, point of the aperture, whether
  * there is a light sub-path (path_context.light_every), which faint connections are made (path_context.faint). Block 0
  * of the light: point, direction and choice of the emitter, and the time of both sub-paths. All others: a vertex. The
- * distance is that to the next vertex, where media scatter. What is used together lies in one half of the block:
- * low-discrepancy samplers (sobol.h) stratify the four numbers of a half together. */
+ * distance is that to the next vertex, where media scatter. Block e - 1 of the light also has the place on edge e of
+ * the camera's sub-path where media shine. What is used together lies in one half of the block: low-discrepancy
+ * samplers (sobol.h) stratify the four numbers of a half together. */
 enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_CAMERA_DISTANCE = 3 };
 enum { DIM_APERTURE_U = 4, DIM_APERTURE_V = 5, DIM_HAS_LIGHT = 6, DIM_FAINT = 7 };
-enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4, DIM_TIME = 5 };
+enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4, DIM_TIME = 5, DIM_GLOW = 6 };
 enum { DIM_BSDF = 0, DIM_ROULETTE = 3, DIM_NEXT_EVENT = 4, DIM_DISTANCE = 7 };
 
 struct sampler {

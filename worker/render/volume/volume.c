@@ -62,30 +62,37 @@ static void box_of(const struct scene_node *n, const struct grid_file *f, bool d
 	memcpy(box, corner, sizeof corner);
 }
 
-/* Mitsuba 3 limits a medium by the box around its volume that is parallel to the world's axes. */
-static bool find_box(struct grid *g, const mat4 *to_cells)
+/* Around its cells, parallel to the world's axes. */
+static bool box_in_world(const struct grid *g, vec3 *least, vec3 *most)
 {
 	mat4 to_world;
-	if (!mat4_invert(*to_cells, &to_world))
+	if (!mat4_invert(g->to_cells, &to_world))
 		return false;
-	g->least = (vec3){INFINITY, INFINITY, INFINITY};
-	g->most = vec3_neg(g->least);
+	*least = (vec3){INFINITY, INFINITY, INFINITY};
+	*most = vec3_neg(*least);
 	for (int k = 0; k < 8; k++) {
 		vec3 p = mat4_point(&to_world, (vec3){k & 1 ? g->high[0] : g->low[0], k & 2 ? g->high[1] : g->low[1],
 						      k & 4 ? g->high[2] : g->low[2]});
-		g->least = (vec3){fmin(g->least.x, p.x), fmin(g->least.y, p.y), fmin(g->least.z, p.z)};
-		g->most = (vec3){fmax(g->most.x, p.x), fmax(g->most.y, p.y), fmax(g->most.z, p.z)};
+		*least = (vec3){fmin(least->x, p.x), fmin(least->y, p.y), fmin(least->z, p.z)};
+		*most = (vec3){fmax(most->x, p.x), fmax(most->y, p.y), fmax(most->z, p.z)};
 	}
+	return true;
+}
+
+static void set_box(struct grid *g, vec3 least, vec3 most)
+{
+	g->turned = true;
+	g->least = least;
+	g->most = most;
 	for (int k = 0; k < 8; k++) {
-		vec3 p = mat4_point(to_cells, (vec3){k & 1 ? g->most.x : g->least.x, k & 2 ? g->most.y : g->least.y,
-						     k & 4 ? g->most.z : g->least.z});
+		vec3 p = mat4_point(&g->to_cells, (vec3){k & 1 ? most.x : least.x, k & 2 ? most.y : least.y,
+							 k & 4 ? most.z : least.z});
 		const double x[3] = {p.x, p.y, p.z};
 		for (int i = 0; i < 3; i++) {
 			g->low[i] = fmax(fmin(g->low[i], x[i]), -GRID_CELL_MAX);
 			g->high[i] = fmin(fmax(g->high[i], x[i]), GRID_CELL_MAX);
 		}
 	}
-	return true;
 }
 
 /* Whether an axis of the volume is not along one of the world's, by more than the sine of 180 degrees is off. */
@@ -123,8 +130,14 @@ static int place(struct grid *g, const struct scene_node *n, double box[2][3], c
 	mat4 to_scene =
 		mat4_mul(mat4_translate(b->center), mat4_scale((vec3){1 / b->scale, 1 / b->scale, 1 / b->scale}));
 	g->to_cells = mat4_mul(to_cells, to_scene);
-	g->turned = b->dialect_3 && is_turned(&g->to_cells);
-	return !g->turned || find_box(g, &g->to_cells) ? 0 : node_error(n, e, EINVAL, FLATTENED);
+	if (!b->dialect_3 || !is_turned(&g->to_cells))
+		return 0;
+	/* Mitsuba 3 limits a medium by the box around its volume that is parallel to the world's axes. */
+	vec3 least, most;
+	if (!box_in_world(g, &least, &most))
+		return node_error(n, e, EINVAL, FLATTENED);
+	set_box(g, least, most);
+	return 0;
 }
 
 /* ---- reading ---- */
@@ -168,7 +181,7 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 		rc = check_values(n, &f, role, e);
 	if (rc)
 		return rc;
-	v->color = color_constant(1);
+	rc = color_from_rgb((const double[3]){1, 1, 1}, role, &v->color);
 	v->least = f.least;
 	v->largest = f.largest;
 	for (int k = 0; k < GRID_CHANNELS_MAX && f.channels > 1 && !rc; k++) {
@@ -189,16 +202,22 @@ static int read_grid(struct volume *v, const struct scene_node *n, enum color_ro
 	return rc;
 }
 
+static const float one = 1;
+static const unsigned char full = 1;
+static const struct grid one_cell = {.size = {1, 1, 1},
+				     .channels = 1,
+				     .value = &one,
+				     .full = &full,
+				     .high = {1, 1, 1},
+				     .nearest = true,
+				     .outside = GRID_CLAMP};
+
 /* The same colour in the unit cube, and nothing outside. */
 static int add_cube(struct volume *v, const struct scene_node *n, const struct volume_build *b, struct error *e)
 {
-	static const float one = 1;
-	static const unsigned char full = 1;
 	double unit[2][3] = {{0, 0, 0}, {1, 1, 1}};
-	const struct grid made = {
-		.size = {1, 1, 1}, .channels = 1, .value = &one, .full = &full, .nearest = true, .outside = GRID_CLAMP};
 	v->largest = 1;
-	return add_grid(v, &made, n, unit, b, e);
+	return add_grid(v, &one_cell, n, unit, b, e);
 }
 
 int volume_from_node(struct volume *v, const struct scene_node *n, const char *name, double fallback,
@@ -221,6 +240,45 @@ int volume_from_node(struct volume *v, const struct scene_node *n, const char *n
 	if (code)
 		return node_error(n, e, -code, "%s: %s", nested ? "value" : name, reason.text);
 	return in_cube ? add_cube(v, n, b, e) : 0;
+}
+
+/* One cell of value 1 that is the box. */
+static int add_cell(struct volume *v, vec3 least, vec3 most, const struct volume_build *b)
+{
+	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	vec3 size = vec3_sub(most, least);
+	if (!g)
+		return -ENOMEM;
+	*g = one_cell;
+	g->to_cells = mat4_mul(mat4_scale((vec3){1 / size.x, 1 / size.y, 1 / size.z}), mat4_translate(vec3_neg(least)));
+	v->largest = 1;
+	v->grid = g;
+	set_box(g, least, most);
+	return 0;
+}
+
+int volume_cover(struct volume *v, const struct volume *other, const struct scene_node *n, const struct volume_build *b,
+		 struct error *e)
+{
+	/* The scene's radius is 1. */
+	vec3 least = {-2, -2, -2}, most = {2, 2, 2};
+	if (other->grid && !box_in_world(other->grid, &least, &most))
+		return node_error(n, e, EINVAL, FLATTENED);
+	if (other->grid && other->grid->turned) {
+		least = other->grid->least;
+		most = other->grid->most;
+	}
+	if (!v->grid)
+		return other->grid && add_cell(v, least, most, b) ? node_error(n, e, ENOMEM, "out of memory") : 0;
+	if (v->grid->outside != GRID_CLAMP)
+		return node_error(n, e, ENOTSUP, "its grid cannot repeat itself (wrap_mode)");
+	struct grid *g = arena_alloc(b->arena, 1, sizeof *g);
+	if (!g)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*g = *v->grid;
+	v->grid = g;
+	set_box(g, least, most);
+	return 0;
 }
 
 /* ---- evaluation ---- */

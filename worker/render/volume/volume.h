@@ -36,6 +36,12 @@ struct volume_build {
 int volume_from_node(struct volume *v, const struct scene_node *n, const char *name, double fallback,
 		     enum color_role role, bool in_cube, const struct volume_build *build, struct error *e);
 
+/* Gives v the bounds of another volume, beyond which it counts 0: the box of its grid, in which v goes on as at its own
+ * border. Where the other one has no grid and is the same everywhere, the whole scene. n: what is to blame. -ENOTSUP: v
+ * repeats itself. */
+int volume_cover(struct volume *v, const struct volume *other, const struct scene_node *n,
+		 const struct volume_build *build, struct error *e);
+
 static inline bool volume_varies(const struct volume *v)
 {
 	return v->grid;

@@ -166,7 +166,7 @@ static int create_emitters(struct builder *b)
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0);
 		w->parts[i].emitter = -1;
-		if (!n)
+		if (!n || emitter_is_in_medium(n))
 			continue;
 		struct emitter_surface surface = emitter_surface_of(&w->shapes[i]);
 		struct attribute_table attributes = attributes_of(b, i);
@@ -417,6 +417,9 @@ double world_brightest(const struct world *w)
 	double most = 0;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		most = fmax(most, w->emitters[i].brightest);
+	for (uint32_t i = 0; i < w->media_count; i++) /* along the scene's diameter */
+		if (w->media[i].shines)
+			most = fmax(most, 2 * glow_max(&w->media[i].glow));
 	return 3 * most; /* X + Y + Z */
 }
 

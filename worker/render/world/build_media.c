@@ -27,6 +27,29 @@ static int number_medium(struct builder *b, const struct scene_node *n, struct m
 	return rc ? build_go_on(b, rc) : 0;
 }
 
+/* Those inside of shapes with a `volumelight`. lights: the emitter of each medium so far. */
+static int light_media(struct builder *b, const struct media_build *media, const struct scene_node **lights)
+{
+	struct world *w = b->w;
+	int rc = 0;
+	for (uint32_t i = 0; i < w->shape_count && !rc; i++) {
+		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0);
+		uint32_t medium = w->parts[i].interior;
+		if (!n || !emitter_is_in_medium(n) || (medium && lights[medium - 1] == n))
+			continue;
+		if (!medium)
+			rc = node_error(n, b->e, EINVAL, "\"%s\" must stand in a shape with a medium inside", n->type);
+		else if (lights[medium - 1])
+			rc = node_error(n, b->e, EINVAL, "a medium may shine by one \"%s\" only", n->type);
+		else
+			rc = medium_light(&w->media[medium - 1], n, &media->volumes, b->e);
+		if (medium)
+			lights[medium - 1] = n;
+		rc = rc ? build_go_on(b, rc) : 0;
+	}
+	return rc;
+}
+
 static bool are_left_out(const struct builder *b)
 {
 	double media = b->w->accuracy.media;
@@ -51,8 +74,11 @@ int build_media(struct builder *b)
 		uses += node_ref(b->shape_nodes[i], "interior") ? 1 : 0;
 		uses += node_ref(b->shape_nodes[i], "exterior") ? 1 : 0;
 	}
+	const struct scene_node **lights = arena_alloc(&b->scratch, uses, sizeof(void *));
+	if (!lights)
+		return build_out_of_memory(b->e);
 	if (!uses)
-		return 0;
+		return light_media(b, &media, lights);
 	w->media = arena_alloc(&w->arena, uses, sizeof *w->media);
 	if (!w->media || node_table_init(&media.numbers, uses, &b->scratch))
 		return build_out_of_memory(b->e);
@@ -63,7 +89,9 @@ int build_media(struct builder *b)
 		if (!rc)
 			rc = number_medium(b, node_ref(n, "exterior"), &media, &w->parts[i].exterior);
 	}
-	return rc ? rc : number_medium(b, camera, &media, &w->camera_medium);
+	if (!rc)
+		rc = number_medium(b, camera, &media, &w->camera_medium);
+	return rc ? rc : light_media(b, &media, lights);
 }
 
 /* Whether some shape ends it, or it ends by itself. */

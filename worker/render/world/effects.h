@@ -36,6 +36,7 @@ enum effect {
 	EFFECT_ENVIRONMENT,
 	EFFECT_AREA_LIGHT,
 	EFFECT_DELTA_LIGHT,
+	EFFECT_MEDIUM_LIGHT,
 	EFFECT_DEPTH,
 	EFFECTS
 };
@@ -66,7 +67,9 @@ struct effects {
 	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light,
 		delta_light;
 	bool displacement, half_vectors, emitter_move;
-	bool absorption, scattering; /* some medium does */
+	bool absorption;	     /* some medium does */
+	bool scattering;	     /* some medium scatters or shines: edges are walked through all of them */
+	bool medium_light;	     /* some medium shines */
 	bool motion;		     /* paths have a time */
 	enum color_shape illuminant; /* of all emitters, if colour is off */
 	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */

@@ -55,7 +55,7 @@ struct census {
 	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
 	struct tally hidden_specular, hidden_dispersive,
 		unused_dispersive; /* materials that no path meets; that no shape uses */
-	struct tally absorbing, scattering;
+	struct tally absorbing, scattering, shining;
 	struct tally environment, area, delta, textured_light, coloured_light;
 	enum visibility_bounds why_hidden;
 	size_t shape[3];
@@ -150,6 +150,12 @@ static void add_medium(struct census *c, const struct world *w, uint32_t number,
 		count(&c->scattering, owner, "");
 	if ((m->absorbs || m->scatters) && medium_is_coloured(m))
 		count(&c->coloured, medium, "");
+	if (!m->shines)
+		return;
+	count(&c->shining, owner, "");
+	if (glow_shape(&m->glow) == COLOR_SHAPE_OTHER)
+		count(&c->coloured_light, medium, "");
+	c->shape[glow_shape(&m->glow)]++;
 }
 
 static struct census take_census(const struct world *w, const struct effects_source *src,
@@ -416,9 +422,10 @@ static void emitter_moves(struct report *r, const struct census *c)
 					   names_of(c->area.count ? &c->area : &c->environment, text),
 					   verb(c->area.count ? &c->area : &c->environment, "has", "have"));
 	else
-		r->fx->emitter_move =
-			line(r, EFFECT_EMITTER_MOVE, false,
-			     c->delta.count ? "all emitters are single points or directions" : "nothing shines");
+		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, false,
+					   c->delta.count     ? "all emitters are single points or directions"
+					   : c->shining.count ? "only media shine"
+							      : "nothing shines");
 }
 
 static void depth(struct report *r, const struct world *w, const struct effects_source *src,
@@ -461,5 +468,8 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 		tallied(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
 			"are points or parallel light, which no path hits by chance",
 			"no emitter is a point or parallel light");
+	fx->medium_light = tallied(&r, EFFECT_MEDIUM_LIGHT, &c.shining, "borders on a medium that shines",
+				   "border on a medium that shines", "no medium shines");
+	fx->scattering = fx->scattering || fx->medium_light;
 	depth(&r, w, src, shape);
 }

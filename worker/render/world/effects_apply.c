@@ -51,7 +51,8 @@ static int apply_to_medium(struct medium *m, const struct effects *fx, const str
 			   struct error *e)
 {
 	m->absorbs = m->absorbs && fx->absorption;
-	m->scatters = m->scatters && fx->scattering;
+	m->scatters = m->scatters && fx->scattering && forced->of[EFFECT_SCATTERING] >= 0;
+	m->shines = m->shines && fx->medium_light;
 	if (!volume_varies(&m->second) || m->absorbs == m->scatters)
 		return 0;
 	m->absorbs = m->scatters = false; /* no path reaches it, unless: */

@@ -51,6 +51,9 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_ENVIRONMENT] = {"environment", ON | SCENE, "rays that escape end there", NULL},
 	[EFFECT_AREA_LIGHT] = {"area-light", ON | SCENE, "nothing: it costs only paths that end on one", NULL},
 	[EFFECT_DELTA_LIGHT] = {"delta-light", ON | SCENE, "nothing: it costs only paths that end on one", NULL},
+	[EFFECT_MEDIUM_LIGHT] = {"medium-light", OFF | EFFECT_OF_THE_SCENE,
+				 "no light is collected along edges, and chains on half vectors can be chosen",
+				 "what a medium emits is the scene's"},
 	[EFFECT_DEPTH] = {"depth", ON, "longer paths are not tried", "--max-depth shortens paths"},
 };
 

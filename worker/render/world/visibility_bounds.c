@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Finds shapes inside of closed opaque ones by their boxes first, then by planes; and scenes in which nothing shines.
+ */
 #include "worker/render/world/visibility_bounds.h"
 
 #include "worker/render/geom/triangle.h"
@@ -160,6 +162,9 @@ void visibility_bounds_shapes(const struct world *w, const struct effects_source
 	bool dark = true;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		dark &= !visibility_bounds_emitter(w, shape, i);
+	for (uint32_t i = 0; i < w->media_count; i++)
+		if (w->media[i].shines)
+			return; /* through faces that are no vertices, too */
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (shape[i] == VISIBILITY_YES && (dark || max_depth <= 1))
 			shape[i] = dark ? VISIBILITY_DARK : VISIBILITY_DEPTH;

@@ -76,7 +76,7 @@ static void test_events(void **state)
 	spectrum left, carried = spectrum_of(0);
 	double pdf_free = 0;
 	for (int i = 0; i < NUMBERS; i++) {
-		assert_true(path_extend_in_media(&c, &at, down, 0, INFINITY, (i + 0.5) / NUMBERS, &to, &left));
+		assert_true(path_extend_in_media(&c, &at, down, 0, INFINITY, (i + 0.5) / NUMBERS, NULL, &to, &left));
 		if (to.kind == VERTEX_INFINITE) {
 			free_ones++;
 			pdf_free = path_edge_pdf(&c, &to.edge, to.edge.medium, &to);
@@ -171,7 +171,7 @@ static void test_grid_as_layers(void **state)
 			struct path_context c = context_of(w[i], counters);
 			c.wl = (struct wavelengths){.rgb = true};
 			struct path_vertex at = start_at(w[i], 0.5);
-			assert_true(path_extend_in_media(&c, &at, along, 0, INFINITY, (n + 0.5) / NUMBERS, &to[i],
+			assert_true(path_extend_in_media(&c, &at, along, 0, INFINITY, (n + 0.5) / NUMBERS, NULL, &to[i],
 							 &left[i]));
 			pdf[i] = path_edge_pdf(&c, &to[i].edge, to[i].edge.medium, &to[i]);
 		}

@@ -413,7 +413,7 @@ static void test_refused(void **state)
 	refused("3.0.0", "<texture type='bitmap' name='sigma_t'/>", "`sigma_t` may be a volume, but not a texture");
 	refused("3.0.0", "<volume type='hgridvolume' name='sigma_t'/>",
 		"this volume of Mitsuba's is not supported; --lenient leaves it out (supported: constvolume, gridvolume)");
-	refused("3.0.0", GRID("sigma_n", ""), "`sigma_n`");
+	refused("3.0.0", GRID("sigma_x", ""), "`sigma_x`");
 	refused("3.0.0", "<volume type='constvolume' name='albedo'><float name='value' value='1.5'/></volume>", "1.5");
 	vol_make(&grid, (const uint32_t[3]){4, 1, 5}, 1, numbers);
 	refused("0.6.0", GRID("density", "") EVEN, "its box, or its grid, is flat along y");

@@ -235,6 +235,33 @@ static void test_scattering(void **state)
 	assert_non_null(strstr(e.text, "scattering cannot be forced on"));
 }
 
+/* A medium that shines is walked through like one that scatters, and is what lights a scene. */
+static void test_medium_light(void **state)
+{
+	(void)state;
+#define GLOW(radiance) "<emitter type='volumelight'><rgb name='radiance' value='" radiance "'/></emitter>"
+	struct world *w = forced("", VIEW BALL("1", CLOUD("0") GLOW("2,2,2")));
+	assert_true(w->effects.medium_light && w->effects.scattering && w->parts[0].passable && w->emitter_count == 0);
+	assert_true(!w->effects.colour && w->effects.max_depth == 128 && !w->media[0].scatters);
+	assert_string_equal(line_of(w, "scattering")->why, "no medium scatters");
+	assert_non_null(strstr(line_of(w, "medium-light")->why, "borders on a medium that shines"));
+	world_free(w);
+	w = forced("", VIEW BALL("1", CLOUD("0") GLOW("2,1,2")));
+	assert_true(w->effects.colour);
+	world_free(w);
+	w = forced("", VIEW LAMP BALL("1", CLOUD("0") GLOW("0,0,0")));
+	assert_true(!w->effects.medium_light && !w->effects.scattering);
+	assert_string_equal(line_of(w, "medium-light")->why, "no medium shines");
+	world_free(w);
+	w = forced("-medium-light", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
+	assert_true(!w->effects.medium_light && w->effects.scattering && !w->media[0].shines && w->media[0].scatters);
+	assert_true(line_of(w, "medium-light")->other_scene);
+	world_free(w);
+	w = forced("-scattering", VIEW LAMP BALL("1", CLOUD("2") GLOW("2,2,2")));
+	assert_true(w->effects.medium_light && w->media[0].shines && !w->media[0].scatters && w->media[0].absorbs);
+	world_free(w);
+}
+
 static void test_texts(void **state)
 {
 	(void)state;
@@ -294,6 +321,7 @@ int main(void)
 		cmocka_unit_test(test_surfaces),
 		cmocka_unit_test(test_forced),
 		cmocka_unit_test(test_scattering),
+		cmocka_unit_test(test_medium_light),
 		cmocka_unit_test(test_texts),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

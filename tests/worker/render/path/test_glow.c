@@ -1,0 +1,504 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Media that shine. Layers and balls whose radiance is known in closed form; furnaces, in which a medium emits sigma_a
+ * L and everything around it shines with L, so that nothing can be seen of it, whatever its coefficients, shape,
+ * boundary and grid (Kirchhoff's law); and a ball that scatters, against a random walk of its own. By all integrators
+ * that find such light. Statistics as in tests/support/agree.h.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/dice.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/vol.h"
+#include "tests/support/worlds.h"
+#include "worker/cli/base/options.h"
+#include "worker/render/bsdf/ior.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const char *const integrators[] = {"path", "bdpt", "bdpt8", "erpt", "erpt4"};
+enum { INTEGRATORS = sizeof integrators / sizeof *integrators, GROUPS = 32, SIDE = 8 };
+
+static double sum3(const double v[3])
+{
+	return v[0] + v[1] + v[2];
+}
+
+/* Values that are the same in every sample have no statistics. */
+static void forgive_rounding(struct agree_image *image, double expected)
+{
+	for (uint32_t g = 0; g < image->groups; g++)
+		for (int c = 0; c <= AGREE_CELLS; c++)
+			if (fabs(image->mean[g][c] / expected - 1) < 1e-5)
+				image->mean[g][c] = expected;
+}
+
+/* Samples per pixel. all: also by the integrators that are made of others. */
+struct effort {
+	uint64_t spp;
+	bool all;
+};
+
+static uint64_t spp_of(size_t i, struct effort e)
+{
+	return i < 2 || e.all ? e.spp : 0;
+}
+
+/* Every block of the image has X + Y + Z = `sum`, by paths of `least` edges or more. Takes the world. */
+static void expect_sum(const char *name, struct world *w, uint32_t least, double sum, struct effort e)
+{
+	static struct agree_image image;
+	for (size_t i = 0; i < INTEGRATORS; i++) {
+		char test[96];
+		const struct agree_side side = {integrators[i], spp_of(i, e), GROUPS, least, 0};
+		if (!side.spp)
+			continue;
+		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
+		agree_render(w, test, integrators[i], &side, &image);
+		forgive_rounding(&image, sum);
+		agree_expect(test, &image, sum);
+	}
+	world_free(w);
+}
+
+static void expect(const char *name, struct world *w, double radiance, struct effort e)
+{
+	assert_false(w->effects.colour);
+	expect_sum(name, w, 0, radiance * sum3(w->grey_xyz), e);
+}
+
+#define DEPTH(k)                                                         \
+	"<integrator type='volpath'><integer name='max_depth' value='" k \
+	"'/><integer name='rr_depth' value='8'/></integrator>"
+#define FROM_ABOVE(near_clip, medium)                                                                               \
+	"<sensor type='orthographic'><float name='near_clip' value='" near_clip                                     \
+	"'/><float name='far_clip' value='1000'/><transform name='to_world'><lookat "                               \
+	"origin='0.2,0.1,90' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>" \
+	"</film>" medium "</sensor>"
+#define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
+#define GLOW(radiance) "<emitter type='volumelight'><float name='radiance' value='" radiance "'/></emitter>"
+#define FOG(sigma_t, albedo)                                                                                        \
+	"<medium type='homogeneous' name='interior' id='fog'><float name='sigma_t' value='" sigma_t "'/><spectrum " \
+	"name='albedo' value='" albedo "'/></medium>"
+#define NULL_FACES "<bsdf type='null'/>"
+/* Between z = 0 and -2. */
+#define LAYER(inner)                                                                                                \
+	"<shape type='cube'><transform name='to_world'><translate z='-1'/><scale x='40' y='40'/></transform>" inner \
+	"</shape>"
+
+/* Seen from above: what a layer of thickness 2 emits, and what it leaves of the sky behind it. Lengths are the scene's;
+ * the medium's scale is that of its coefficients alone. */
+static void test_layer(void **state)
+{
+	(void)state;
+	const struct effort e = {16, false};
+	double left = exp(-0.6 * 2);
+	expect("absorbing layer",
+	       world_of_text(
+		       SIDE, SIDE,
+		       DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(
+			       "<medium type='homogeneous' name='interior'><float name='sigma_t' value='0.3'/>"
+			       "<float name='albedo' value='0'/><float name='scale' value='2'/></medium>" NULL_FACES
+				       GLOW("0.4"))),
+	       0.4 / 0.6 * (1 - left) + 0.7 * left, e);
+	expect("clear layer",
+	       world_of_text(SIDE, SIDE,
+			     DEPTH("1") FROM_ABOVE("1", "") SKY LAYER(FOG("0", "0.5") NULL_FACES GLOW("0.4"))),
+	       0.4 * 2 + 0.7, e);
+	expect("clear layer and nothing else",
+	       world_of_text(SIDE, SIDE, DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES GLOW("0.4"))),
+	       0.4 * 2, e);
+	/* The camera's near plane lies in the middle. */
+	left = exp(-1);
+	expect("inside of a layer",
+	       world_of_text(SIDE, SIDE,
+			     DEPTH("8") FROM_ABOVE("91", "<ref name='medium' id='fog'/>")
+				     SKY LAYER(FOG("1", "0") NULL_FACES GLOW("0.4"))),
+	       0.4 * (1 - left) + 0.7 * left, e);
+	/* Of a layer that scatters, what does not scatter: one edge. */
+	left = exp(-2 * 1.5);
+	expect("one edge in a layer that scatters",
+	       world_of_text(SIDE, SIDE,
+			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("1.5", "0.8") NULL_FACES GLOW("0.4"))),
+	       0.4 / 1.5 * (1 - left), (struct effort){1024, true});
+	/* Two edges or more of a layer that does not: none. */
+	struct world *w = world_of_text(SIDE, SIDE,
+					DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(FOG("1", "0") NULL_FACES GLOW("0.4")));
+	static struct agree_image image;
+	const struct agree_side side = {"bdpt", 16, GROUPS, 2, 0};
+	agree_render(w, "no second edge", "bdpt", &side, &image);
+	for (uint32_t g = 0; g < GROUPS; g++)
+		assert_true(image.mean[g][AGREE_CELLS] == 0);
+	world_free(w);
+}
+
+#define VIEW                                                                                                          \
+	"<sensor type='perspective'><float name='fov' value='25'/><transform name='to_world'><lookat origin='0,0,4' " \
+	"target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/></film></sensor>"
+#define BALL(inner) "<shape type='sphere'>" inner "</shape>"
+
+/* A camera in fog, in a room that reflects 0.4 and emits the rest. The fog is the inside of a ball, and around the
+ * rest: edges pass from it into others that shine. */
+/* clang-format off */
+#define ROOM                                                                                                           \
+	DEPTH("128") "<sensor type='perspective'><float name='fov' value='70'/><transform name='to_world'><lookat "    \
+	"origin='0,0,2.5' target='0.3,0.2,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/></film>" \
+	"<ref name='medium' id='fog'/></sensor><shape type='sphere'><float name='radius' value='3'/><boolean "         \
+	"name='flip_normals' value='true'/><bsdf type='diffuse'><float name='reflectance' value='.4'/></bsdf>"         \
+	"<emitter type='area'><float name='radiance' value='.42'/></emitter><ref name='exterior' id='fog'/></shape>"
+#define FOG_BALL                                                                                               \
+	"<shape type='sphere'><point name='center' x='-1' y='-0.3' z='1.2'/><float name='radius' value='0.3'/>"   \
+	"<ref name='exterior' id='fog'/>" NULL_FACES FOG("0.2", "0.5") GLOW("0.07") "</shape>"
+#define SMOKE_CUBE                                                                                                     \
+	"<shape type='cube'><transform name='to_world'><scale value='0.3'/><translate x='0.2' y='0.1' z='1.7'/>"      \
+	"</transform><ref name='exterior' id='fog'/><medium type='homogeneous' name='interior'><float name='sigma_a' " \
+	"value='0.5'/></medium>" NULL_FACES GLOW("0.35") "</shape>"
+#define GLASS_BALL                                                                                                 \
+	BALL(GLASS("dielectric", "") "<medium type='homogeneous' name='interior'><float name='sigma_a' value='1'/>" \
+	"<float name='sigma_s' value='2'/></medium><ref name='exterior' id='fog'/>" GLOW("1.575"))
+/* clang-format on */
+
+/* Emission of sigma_a times the sky's radiance, 0.7. Within glass radiance is its squared index as large. */
+#define GLASS(type, more) \
+	"<bsdf type='" type "'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/>" more "</bsdf>"
+
+static void test_furnace(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *name, *inner;
+		struct effort e;
+	} balls[] = {
+		{"smoke", NULL_FACES FOG("2", "0") GLOW("1.4"), {16, true}},
+		{"fog", NULL_FACES FOG("2", "0.3") GLOW("0.98"), {2048, true}},
+		{"glass with smoke", GLASS("dielectric", "") FOG("2", "0") GLOW("3.15"), {2048, false}},
+		{"glass with fog", GLASS("dielectric", "") FOG("2", "0.3") GLOW("2.205"), {4096, false}},
+		{"thin glass with fog", "<bsdf type='thindielectric'/>" FOG("2", "0.3") GLOW("0.98"), {4096, false}},
+		{"frosted glass with fog",
+		 GLASS("roughdielectric", "<float name='alpha' value='0.001'/>") FOG("2", "0.3") GLOW("2.205"),
+		 {4096, false}},
+	};
+	for (size_t i = 0; i < sizeof balls / sizeof *balls; i++)
+		expect(balls[i].name, world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL("%s"), balls[i].inner), 0.7,
+		       balls[i].e);
+	expect("room in fog", world_of_text(SIDE, SIDE, ROOM FOG_BALL SMOKE_CUBE GLASS_BALL), 0.7,
+	       (struct effort){8192, false});
+}
+
+/* Chains that share the fog's light among many pixels cannot tell half a percent in a test, but what they find of it
+ * all. */
+static void test_chains(void **state)
+{
+	(void)state;
+	static struct agree_image chains, sky;
+	struct world *w = world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL(NULL_FACES FOG("2", "0.3") GLOW("0.98")));
+	const struct agree_side side = {"pssmlt", 2048, GROUPS, 0, 0}, alone = {"path", 16, GROUPS, 0, 0};
+	agree_render(w, "fog", "pssmlt", &side, &chains);
+	world_free(w);
+	w = world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY);
+	agree_render(w, "fog", "sky", &alone, &sky);
+	assert_true(fabs(agree_within_errors("fog, pssmlt", &chains, &sky)) < 0.01);
+	world_free(w);
+}
+
+/* ---- grids ---- */
+
+/* Linear between its points, and 0 in most of one half. */
+static double cloud(double x, double y, double z, uint32_t channel)
+{
+	return (x < 0.5 ? 0 : 2 + 3 * y) + (z > 0.9 ? 4 : 0) + 0.3 * channel * (y + z);
+}
+
+#define GRID(name, file)                                                                                  \
+	"<volume name='" name "' type='gridvolume'><string name='filename' value='" file "'/><transform " \
+	"name='to_world'><translate x='-.5' y='-.5' z='-.5'/><scale value='2'/></transform></volume>"
+#define CUBE(inner) "<shape type='cube'>" inner "</shape>"
+
+static struct world *in_files(const char *xml, const struct vol *extinction, const struct vol *light)
+{
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)},
+					    {"t.vol", extinction->bytes, extinction->size},
+					    {"l.vol", light->bytes, light->size},
+					    {NULL, NULL, 0}};
+	return world_of_files(SIDE, SIDE, files);
+}
+
+/* Twice its values, as the emission where the albedo leaves so much. */
+static void make_cloud(struct vol *extinction, struct vol *light, uint32_t channels, double factor)
+{
+	const uint32_t side[3] = {5, 4, 6};
+	vol_make(extinction, side, channels, cloud);
+	vol_make(light, side, channels, cloud);
+	for (uint32_t i = 0; i < side[0] * side[1] * side[2] * channels; i++)
+		light->value[i] *= (float)factor;
+	vol_write(light);
+}
+
+#define CLOUD(albedo)                                         \
+	"<medium type='heterogeneous' name='interior'>" GRID( \
+		"sigma_t", "t.vol") "<spectrum name='albedo' value='" albedo "'/></medium>" NULL_FACES
+#define GRID_GLOW "<emitter type='volumelight'>" GRID("radiance", "l.vol") "</emitter>"
+
+static void test_grid_furnace(void **state)
+{
+	(void)state;
+	static struct vol extinction, light;
+	static const char turned[] =
+		"<scene version='3.0.0'>" DEPTH("64") VIEW SKY CUBE(CLOUD("0") GRID_GLOW) "</scene>",
+			  fog[] = "<scene version='3.0.0'>" DEPTH("128")
+				  VIEW SKY CUBE(CLOUD("0.5") GRID_GLOW) "</scene>";
+	make_cloud(&extinction, &light, 1, 0.7);
+	expect("smoke on a grid", in_files(turned, &extinction, &light), 0.7, (struct effort){2048, false});
+	make_cloud(&extinction, &light, 1, 0.35);
+	expect("fog on a grid", in_files(fog, &extinction, &light), 0.7, (struct effort){2048, false});
+}
+
+/* Grids of light where the medium is the same everywhere, and the other way round; what is beyond a grid's box. */
+static double ramp(double x, double y, double z, uint32_t channel)
+{
+	(void)x;
+	(void)y;
+	return (1 + 2 * z) * (channel + 1);
+}
+
+static void test_grid_layer(void **state)
+{
+	(void)state;
+	static struct vol box, light;
+	vol_make(&box, (const uint32_t[3]){1, 1, 1}, 1, ramp);
+	vol_make(&light, (const uint32_t[3]){1, 1, 2}, 1, ramp);
+	/* Points lie at z = -0.75 and -0.25, 1 below and 3 above; the light goes on evenly beyond the box, from z = -1
+	 * to 0, in which the grid is, down to -2. */
+#define RAMP                                                                                                  \
+	"<emitter type='volumelight'><volume name='radiance' type='gridvolume'><string name='filename' "      \
+	"value='l.vol'/><transform name='to_world'><translate x='-.5' y='-.5' z='-1'/><scale x='80' y='80'/>" \
+	"</transform></volume></emitter>"
+	const struct effort e = {16, false};
+	expect("grid of light in a clear layer",
+	       in_files("<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "")
+				LAYER(FOG("0", "0") NULL_FACES RAMP) "</scene>",
+			&box, &light),
+	       3 * 0.25 + 2 * 0.5 + 1 * 1.25, e);
+	double sum = 0;
+	enum { STEPS = 4000 };
+	for (int i = 0; i < STEPS; i++) {
+		double z = (i + 0.5) * 2 / STEPS;
+		sum += exp(-1.5 * z) * fmin(fmax(3 - (z - 0.25) * 4, 1), 3) * 2 / STEPS;
+	}
+	expect("grid of light in a layer",
+	       in_files("<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "")
+				LAYER(FOG("1.5", "0") NULL_FACES RAMP) "</scene>",
+			&box, &light),
+	       sum, (struct effort){512, false});
+	/* The medium's own box is half of the layer. */
+	expect("light in a box",
+	       in_files(
+		       "<scene version='3.0.0'>" DEPTH("8") FROM_ABOVE("1", "") LAYER(
+			       "<medium type='heterogeneous' name='interior'><volume name='sigma_t' type='constvolume'>"
+			       "<float name='value' value='0'/><transform name='to_world'><translate x='-.5' y='-.5' z='-1.5'/>"
+			       "<scale x='80' y='80'/></transform></volume><volume name='sigma_n' type='constvolume'>"
+			       "<float name='value' value='1'/></volume></medium>" NULL_FACES GLOW("0.4")) "</scene>",
+		       &box, &light),
+	       0.4, e);
+}
+
+/* ---- colours ---- */
+
+#define WHITE "<emitter type='constant'><spectrum name='radiance' value='%s'/></emitter>"
+
+/* The same image as that of the sky alone. */
+static void expect_unseen(const char *name, struct world *w, struct world *sky, struct effort e)
+{
+	static struct agree_image image, of_sky;
+	const struct agree_side alone = {"path", 4096, GROUPS, 0, 0};
+	assert_true(w->effects.colour && sky->effects.colour);
+	agree_render(sky, name, "sky", &alone, &of_sky);
+	for (size_t i = 0; i < INTEGRATORS; i++) {
+		char test[96];
+		const struct agree_side side = {integrators[i], spp_of(i, e), GROUPS, 0, 0};
+		if (!side.spp)
+			continue;
+		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
+		agree_render(w, test, integrators[i], &side, &image);
+		agree_check(test, &image, &of_sky);
+	}
+	world_free(w);
+	world_free(sky);
+}
+
+/* clang-format off */
+#define COLOURED(albedo, light)                                                                                     \
+	"<medium type='homogeneous' name='interior'><spectrum name='sigma_t' value='" RISING "'/><spectrum name='albedo' " \
+	"value='" albedo "'/></medium><emitter type='volumelight'><spectrum name='radiance' value='" light "'/></emitter>"
+/* clang-format on */
+#define RISING "360:1,595:2,830:4"
+#define HALF_RISING "360:0.5,595:1,830:2"
+#define FLAT "360:1,595:1.000001,830:1"
+
+static void test_colours(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *name, *inner;
+		struct effort e;
+	} balls[] = {
+		{"coloured smoke", NULL_FACES COLOURED("0", RISING), {1024, false}},
+		{"coloured fog", NULL_FACES COLOURED("0.5", HALF_RISING), {4096, false}},
+	};
+	for (size_t i = 0; i < sizeof balls / sizeof *balls; i++)
+		expect_unseen(balls[i].name,
+			      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL("%s"), FLAT, balls[i].inner),
+			      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), balls[i].e);
+	/* In glass that disperses: half of sigma_t times its squared index. */
+	char light_in_glass[4096], *to = light_in_glass;
+	for (int nm = 360; nm <= 830; nm += 5) {
+		double sigma_t = nm <= 595 ? 1 + (nm - 360) / 235.0 : 2 + 2 * (nm - 595) / 235.0,
+		       index = 1.5 + 0.02e6 * (1 / ((double)nm * nm) - 1 / (IOR_NM * IOR_NM));
+		to += sprintf(to, "%s%d:%.9g", nm == 360 ? "" : ",", nm, 0.5 * sigma_t * index * index);
+	}
+#define PRISM GLASS("dielectric", "<float name='int_cauchy_b' value='0.02'/>")
+	expect_unseen("coloured fog in glass that disperses",
+		      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")), FLAT,
+				    light_in_glass),
+		      world_of_text(SIDE, SIDE, DEPTH("64") VIEW WHITE, FLAT), (struct effort){16384, false});
+	/* R, G and B on a grid. */
+	static struct vol extinction, light;
+	static const char fog[] = "<scene version='3.0.0'>" DEPTH("64") VIEW
+		"<emitter type='constant'><rgb name='radiance' value='0.7'/></emitter>" CUBE(
+			CLOUD("0.5") GRID_GLOW) "</scene>",
+			  sky[] = "<scene version='3.0.0'>" DEPTH("64") VIEW
+			  "<emitter type='constant'><rgb name='radiance' value='0.7,0.7,0.70001'/></emitter></scene>";
+	make_cloud(&extinction, &light, 3, 0.35);
+	worlds_accuracy = "colour=rgb";
+	expect_unseen("fog on a grid of R, G and B", in_files(fog, &extinction, &light),
+		      in_files(sky, &extinction, &light), (struct effort){4096, false});
+	worlds_accuracy = NULL;
+}
+
+/* ---- another walk ---- */
+
+/* From the surface of a ball of radius 1 at height y straight down z, light of 1 per length, by a walk whose events
+ * have all of the extinction, and whose weight is the albedo: what is emitted until the first event, and so on. */
+static double walk(struct dice *d, double y, double sigma, double albedo)
+{
+	vec3 at = {0, y, sqrt(1 - y * y)}, w = {0, 0, -1};
+	double weight = 1, sum = 0;
+	for (;;) {
+		double along = vec3_dot(at, w), end = -along + sqrt(fmax(along * along - vec3_dot(at, at) + 1, 0)),
+		       free = -log1p(-dice_throw(d)) / sigma;
+		sum += weight * -expm1(-sigma * end) / sigma; /* expected up to the surface */
+		if (free >= end)
+			return sum;
+		at = vec3_madd(at, free, w);
+		w = dice_direction(d);
+		weight *= albedo;
+	}
+}
+
+static void test_ball(void **state)
+{
+	(void)state;
+	enum { WALKS = 1 << 21 };
+	static struct agree_image image;
+	const double y = 0.4, sigma = 3, albedo = 0.85;
+	struct dice d = dice_of("test_glow, ball");
+	double sums[GROUPS] = {0};
+	static struct agree_image walked;
+	walked.groups = GROUPS;
+	struct world *w = world_of_text(
+		SIDE, SIDE,
+		DEPTH("128") "<sensor type='orthographic'><float name='far_clip' value='9'/><transform name='to_world'>"
+			     "<scale x='0.0001' y='0.0001'/><lookat origin='0,0.4,4' target='0,0.4,0' up='0,1,0'/></transform>"
+			     "<film type='hdrfilm'><rfilter type='box'/></film></sensor>" BALL(
+				     NULL_FACES FOG("3", "0.85") GLOW("1")));
+	for (int i = 0; i < WALKS; i++)
+		sums[i % GROUPS] += walk(&d, y, sigma, albedo);
+	for (int g = 0; g < GROUPS; g++)
+		for (int c = 0; c <= AGREE_CELLS; c++)
+			walked.mean[g][c] = sums[g] / (WALKS / GROUPS) * sum3(w->grey_xyz);
+	for (size_t i = 0; i < 2; i++) {
+		char test[64];
+		const struct agree_side side = {integrators[i], 16384, GROUPS, 0, 0};
+		snprintf(test, sizeof test, "ball that scatters, %s", integrators[i]);
+		agree_render(w, test, integrators[i], &side, &image);
+		agree_check(test, &image, &walked);
+	}
+	world_free(w);
+}
+
+/* ---- descriptions ---- */
+
+static void test_refused(void **state)
+{
+	(void)state;
+	world_refused("<emitter type='volumelight'/>", "\"volumelight\" must stand in a shape");
+	world_refused(BALL(GLOW("1")), "\"volumelight\" must stand in a shape with a medium inside");
+	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" GLOW("1")), "with a medium inside");
+	world_refused(BALL(FOG("1", "0") GLOW("1")) BALL("<ref name='interior' id='fog'/>" GLOW("2")),
+		      "a medium may shine by one \"volumelight\" only");
+	world_refused(BALL(FOG("1", "0") GLOW("-1")), "radiance");
+	world_refused(BALL(FOG("1", "0") "<emitter type='volumelight'><texture name='radiance' type='checkerboard'/>"
+					 "</emitter>"),
+		      "`radiance` may be a volume, but not a texture");
+	world_refused(BALL("<emitter type='area'><volume name='radiance' type='constvolume'/></emitter>"),
+		      "`radiance` may be a texture, but not a volume");
+}
+
+/* One emitter that two shapes of one medium refer to, and which the medium around the camera is, too. */
+static void test_shared(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(
+		SIDE, SIDE,
+		VIEW BALL("<medium type='homogeneous' name='interior' id='fog'/><emitter type='volumelight' id='l'>"
+			  "<float name='radiance' value='3'/></emitter>")
+			BALL("<ref name='interior' id='fog'/><ref id='l'/><point name='center' x='5'/>"));
+	assert_true(w->media_count == 1 && w->media[0].shines && w->emitter_count == 0);
+	assert_true(w->effects.medium_light && w->effects.scattering && w->effects.max_depth == 128);
+	assert_true(fabs(w->media[0].glow.per_length * w->scale - 1) < 1e-15);
+	struct render_summary summary;
+	world_summary(w, &summary);
+	assert_true(summary.brightest > 0);
+	world_free(w);
+}
+
+/* Chains of whole paths would leave it out. */
+static void test_who_finds_it(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(SIDE, SIDE, VIEW BALL(FOG("1", "0.5") NULL_FACES GLOW("1")));
+	struct render_summary summary;
+	world_summary(w, &summary);
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		const char *name = render_integrator_at(i)->name;
+		struct render_arguments a = {.plan = {.spp = 4}};
+		struct error e = {""};
+		snprintf(a.plan.integrator, sizeof a.plan.integrator, "%s", name);
+		bool hslt = strcmp(name, "hslt") == 0;
+		assert_int_equal(render_plan_from_scene(&a, &summary, &e), hslt ? -EINVAL : 0);
+		if (hslt)
+			assert_non_null(strstr(e.text, "the integrator hslt finds no light of `volumelight`"));
+	}
+	world_free(w);
+	worlds_effects = "-medium-light";
+	w = world_of_text(SIDE, SIDE, VIEW SKY BALL(FOG("1", "0") NULL_FACES GLOW("1")));
+	worlds_effects = NULL;
+	assert_true(!w->effects.medium_light && !w->effects.scattering && !w->media[0].shines);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_layer),	     cmocka_unit_test(test_furnace),	cmocka_unit_test(test_chains),
+		cmocka_unit_test(test_grid_furnace), cmocka_unit_test(test_grid_layer), cmocka_unit_test(test_colours),
+		cmocka_unit_test(test_ball),	     cmocka_unit_test(test_refused),	cmocka_unit_test(test_shared),
+		cmocka_unit_test(test_who_finds_it),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

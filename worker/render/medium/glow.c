@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/medium/glow.h"
+
+int glow_create(struct glow *g, const struct scene_node *n, const struct volume *extinction,
+		const struct volume_build *build, struct error *e)
+{
+	if (!build->dialect_3)
+		return node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"volumelight\"");
+	g->per_length = 1 / build->scale;
+	int rc = volume_from_node(&g->radiance, n, "radiance", 0, COLOR_ILLUMINANT, false, build, e);
+	return rc ? rc : volume_cover(&g->radiance, extinction, n, build, e);
+}
+
+double glow_max(const struct glow *g)
+{
+	return volume_max(&g->radiance) * g->per_length;
+}
+
+enum color_shape glow_shape(const struct glow *g)
+{
+	const struct grid *grid = g->radiance.grid;
+	return grid && grid->channels > 1 ? COLOR_SHAPE_OTHER : g->radiance.color.shape;
+}
+
+spectrum glow_even(const struct glow *g, const struct wavelengths *w)
+{
+	return spectrum_scale(g->per_length, color_eval(&g->radiance.color, w));
+}
+
+/* In proportion to the mean of the channels. */
+static bool sample_grid(const struct glow *g, const struct grid_ray *r, double u, const struct wavelengths *w,
+			double *t, spectrum *l)
+{
+	const struct grid *grid = g->radiance.grid;
+	double weight[GRID_CHANNELS_MAX] = {0}, value[GRID_CHANNELS_MAX], unused[GRID_CHANNELS_MAX], sum = 0, here = 0;
+	grid_integrate(grid, r, value);
+	for (int k = 0; k < grid->channels; k++) {
+		weight[k] = 1.0 / grid->channels;
+		sum += weight[k] * value[k];
+	}
+	*t = sum > 0 ? grid_reach(grid, r, weight, u * sum, unused) : INFINITY;
+	if (*t == INFINITY)
+		return false;
+	grid_at(grid, vec3_madd(r->o, *t, r->d), value);
+	for (int k = 0; k < grid->channels; k++)
+		here += weight[k] * value[k];
+	if (!(here > 0))
+		return false;
+	*l = grid->channels > 1 ? color_eval_rgb_illuminant(value, w)
+				: spectrum_scale(value[0], color_eval(&g->radiance.color, w));
+	*l = spectrum_scale(g->per_length * sum / here, *l);
+	return true;
+}
+
+bool glow_sample(const struct glow *g, const struct grid_ray *r, double u, const struct wavelengths *w, double *t,
+		 spectrum *l)
+{
+	if (g->radiance.grid)
+		return sample_grid(g, r, u, w, t, l);
+	double length = r->t1 - r->t0;
+	*t = r->t0 + u * length;
+	*l = spectrum_scale(length, glow_even(g, w));
+	return length > 0 && isfinite(length);
+}
