@@ -189,7 +189,7 @@ static bool is_seen(const struct render_choice *c)
 static bool wants_chains(const struct render_choice *c)
 {
 	const struct render_found *b = &c->bdpt, *p = c->misses ? b : &c->path;
-	if (c->glows)
+	if (c->media_shine)
 		return false;
 	if (c->dark && !is_seen(c))
 		return true; /* a mistake costs 1,300 times the error in bulb, 2.5 times in kitchen */
@@ -543,7 +543,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 		p->samples = pilot_samples(r, (uint64_t)film.crop_width * film.crop_height);
 		out->brief = p->samples < SAMPLES_USUAL;
 		out->misses = path_misses(w);
-		out->glows = w->effects.medium_light;
+		out->media_shine = w->effects.medium_light;
 		rc = run_pilot(p, &film, out, e);
 	}
 	mem_free(p);

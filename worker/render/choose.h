@@ -52,7 +52,7 @@ struct render_choice {
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe, or
 			     none at all */
 	bool dark;	  /* path finds next to nothing */
-	bool glows;	  /* media shine, which the chains of hslt do not find */
+	bool media_shine; /* media shine, which the chains of hslt do not find */
 	bool focuses;	  /* lobes that are narrow: what they throw a pilot may have missed */
 	bool refracts;	  /* and surfaces let light through: a pilot may have missed the lamps behind them */
 	bool brief;	  /* too few samples to trust a tail index where lobes are narrow */

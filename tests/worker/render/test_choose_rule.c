@@ -85,7 +85,7 @@ static void the_rule(void **state)
 					  .focuses = cases[i].scene != FLAT};
 		assert_string_equal(render_choice_of(&c), cases[i].name);
 		assert_int_equal(render_choice_is_settled(&c), cases[i].settled);
-		c.glows = true; /* the next best */
+		c.media_shine = true; /* the next best */
 		assert_string_equal(render_choice_of(&c), strcmp(cases[i].name, "hslt") ? cases[i].name : "erpt");
 	}
 }

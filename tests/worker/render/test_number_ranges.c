@@ -87,7 +87,7 @@ static void print_scene(char *text, const struct plugin_decl *d, const char *com
 {
 	char own[2048], sensor[2600], ball[2600] = "", light[2600] = "";
 	bool medium = d->cls == PLUGIN_MEDIUM, volume = d->cls == PLUGIN_VOLUME,
-	     in_medium = volume || d->cls == PLUGIN_PHASE, glow = strcmp(d->type, "volumelight") == 0;
+	     in_medium = volume || d->cls == PLUGIN_PHASE, emission = strcmp(d->type, "volumelight") == 0;
 	snprintf(own, sizeof own, "\n%s<%s type='%s'%s>" PROPERTY "</%s>%s%s\n",
 		 volume	     ? "<medium type='heterogeneous' name='interior'>"
 		 : in_medium ? "<medium type='homogeneous' name='interior'>"
@@ -98,7 +98,7 @@ static void print_scene(char *text, const struct plugin_decl *d, const char *com
 			  : "",
 		 file_of(d), companion, property, plugin_class_name(d->cls), in_medium ? "</medium>" : "",
 		 medium || in_medium ? "<bsdf type='null'/>"
-		 : glow		     ? "<bsdf type='null'/><medium type='homogeneous' name='interior'/>"
+		 : emission	     ? "<bsdf type='null'/><medium type='homogeneous' name='interior'/>"
 				     : "");
 	bool nested = d->cls == PLUGIN_FILM || d->cls == PLUGIN_RFILTER || d->cls == PLUGIN_SAMPLER;
 	if (d->cls == PLUGIN_SENSOR)
@@ -115,7 +115,7 @@ static void print_scene(char *text, const struct plugin_decl *d, const char *com
 			 "<shape type='cube'><bsdf type='diffuse'>\n<texture name='reflectance' type='%s'>" PROPERTY
 			 "</texture></bsdf></shape>",
 			 d->type, file_of(d), companion, property);
-	else if (d->cls == PLUGIN_EMITTER && (glow || strcmp(d->type, "area") == 0))
+	else if (d->cls == PLUGIN_EMITTER && (emission || strcmp(d->type, "area") == 0))
 		snprintf(light, sizeof light, BALL, own);
 	else if (d->cls == PLUGIN_EMITTER || d->cls == PLUGIN_SHAPE || d->cls == PLUGIN_INTEGRATOR)
 		snprintf(light, sizeof light, "%s", own);

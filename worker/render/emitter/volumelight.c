@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The medium inside its shape shines: worker/render/medium/glow.h. */
+/* The medium inside its shape shines: worker/render/medium/emission.h. */
 #include "worker/render/emitter/emitter.h"
 
 static const struct param params[] = {

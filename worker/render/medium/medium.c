@@ -105,8 +105,8 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct vol
 
 int medium_light(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
-	int rc = glow_create(&m->glow, n, &m->first, build, e);
-	m->shines = !rc && glow_max(&m->glow) > 0;
+	int rc = emission_create(&m->emission, n, &m->first, build, e);
+	m->shines = !rc && emission_max(&m->emission) > 0;
 	return rc;
 }
 

@@ -9,7 +9,7 @@
 #ifndef WORKER_RENDER_MEDIUM_MEDIUM_H
 #define WORKER_RENDER_MEDIUM_MEDIUM_H
 
-#include "worker/render/medium/glow.h"
+#include "worker/render/medium/emission.h"
 #include "worker/render/medium/phase.h"
 #include "worker/render/volume/volume.h"
 
@@ -20,14 +20,14 @@ struct medium {
 	double per_length;	     /* times the coefficients: 1 / length */
 	struct phase phase;
 	bool shines;
-	struct glow glow;
+	struct emission emission;
 };
 
 extern const struct plugin_decl medium_decls[]; /* ends with a NULL type */
 
 int medium_create(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
-/* Lets it shine by the emitter n. -EINVAL, -ENOTSUP: see glow.h. */
+/* Lets it shine by the emitter n. -EINVAL, -ENOTSUP: see emission.h. */
 int medium_light(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e);
 
 bool medium_is_coloured(const struct medium *m); /* its coefficients vary with wavelength */

@@ -7,7 +7,7 @@
 
 #include "worker/render/path/classes.h"
 #include "worker/render/path/connect.h"
-#include "worker/render/path/glow.h"
+#include "worker/render/path/volume_emission.h"
 #include "worker/render/path/integrator.h"
 
 void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out)
@@ -23,7 +23,7 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 	if (!c->unclassed)
 		classes_begin(&classes, c, n, 0, out);
 	if (EFFECT_IS_ON(c->w, medium_light))
-		sum = glow_gather(c, c->min_depth, c->max_depth, c->unclassed ? NULL : &classes);
+		sum = volume_emission(c, c->min_depth, c->max_depth, c->unclassed ? NULL : &classes);
 	for (unsigned t = 2; t <= n; t++) {
 		for (unsigned j = 0; j <= 1; j++) {
 			unsigned edges = t + j - 1;

@@ -9,7 +9,7 @@
 #include "worker/render/path/longer.h"
 
 #include "worker/render/path/connect.h"
-#include "worker/render/path/glow.h"
+#include "worker/render/path/volume_emission.h"
 
 #include <string.h>
 
@@ -21,7 +21,7 @@ static spectrum gather(struct path_context *c, unsigned first, unsigned n, unsig
 {
 	spectrum sum = spectrum_of(0);
 	if (EFFECT_IS_ON(c->w, medium_light))
-		sum = glow_gather(c, least > before + first - 1 ? least - before : first - 1, most - before, NULL);
+		sum = volume_emission(c, least > before + first - 1 ? least - before : first - 1, most - before, NULL);
 	for (unsigned t = first; t <= n; t++)
 		for (unsigned j = 0; j <= 1; j++) {
 			unsigned edges = before + t + j - 1;

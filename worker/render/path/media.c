@@ -66,13 +66,13 @@ void path_absorb(const struct path_context *c, const struct path_vertex *at, vec
 
 /* A ray on its way. */
 struct walk {
-	struct path_edge *edge;	     /* medium: where the ray is; free: unused until the end */
-	vec3 d;			     /* its direction */
-	spectrum all, events;	     /* optical depths so far: of all media, of those that scatter */
-	struct medium_lanes lanes;   /* of the medium where the ray is, if there is one */
-	bool scatters;		     /* that medium does */
-	const struct medium *shines; /* that medium, if it does and somebody asks */
-	struct path_glow *glow;	     /* NULL: nobody does */
+	struct path_edge *edge;		/* medium: where the ray is; free: unused until the end */
+	vec3 d;				/* its direction */
+	spectrum all, events;		/* optical depths so far: of all media, of those that scatter */
+	struct medium_lanes lanes;	/* of the medium where the ray is, if there is one */
+	bool scatters;			/* that medium does */
+	const struct medium *shines;	/* that medium, if it does and somebody asks */
+	struct path_emission *emission; /* NULL: nobody does */
 	const struct wavelengths *wl;
 };
 
@@ -85,17 +85,21 @@ static void walk_enter(const struct path_context *c, struct walk *k, uint32_t me
 		return;
 	const struct medium *m = path_medium(c->w, medium);
 	k->lanes = medium_at(m, &c->wl);
-	k->shines = k->glow && m->shines ? m : NULL;
+	k->shines = k->emission && m->shines ? m : NULL;
 }
 
 static struct walk walk_begin(const struct path_context *c, const struct path_vertex *at, vec3 d,
-			      struct path_edge *edge, struct path_glow *glow)
+			      struct path_edge *edge, struct path_emission *emission)
 {
 	bool emitter = at->kind == VERTEX_EMITTER || at->kind == VERTEX_INFINITE;
 	uint32_t medium =
 		emitter ? path_medium_of_emitter(c->w, at, d) : path_medium_after(c->w, at, at->edge.medium, d);
-	struct walk k = {
-		.edge = edge, .d = d, .all = spectrum_of(0), .events = spectrum_of(0), .glow = glow, .wl = &c->wl};
+	struct walk k = {.edge = edge,
+			 .d = d,
+			 .all = spectrum_of(0),
+			 .events = spectrum_of(0),
+			 .emission = emission,
+			 .wl = &c->wl};
 	*edge = (struct path_edge){.before = medium, .fits = true};
 	walk_enter(c, &k, medium);
 	return k;
@@ -115,7 +119,7 @@ static void walk_on(struct walk *k, vec3 o, double t0, double t1)
 }
 
 /* Of light that is emitted with l per length all along a way: what is left at its beginning. */
-static spectrum even_glow(const struct medium_lanes *m, spectrum l, double length)
+static spectrum even_emission(const struct medium_lanes *m, spectrum l, double length)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double sigma = m->sigma_t[0].v[i];
@@ -130,20 +134,20 @@ static spectrum even_glow(const struct medium_lanes *m, spectrum l, double lengt
  * wavelengths of what events leave, light counts as many times more often. */
 static void walk_shine(struct walk *k, vec3 o, double t0, double t1)
 {
-	const struct glow *g = &k->shines->glow;
+	const struct emission *g = &k->shines->emission;
 	spectrum l, passed = spectrum_of(0), all, events = k->events;
 	if (!g->radiance.grid && !k->lanes.grid && !k->scatters) {
-		l = even_glow(&k->lanes, glow_even(g, k->wl), t1 - t0);
+		l = even_emission(&k->lanes, emission_even(g, k->wl), t1 - t0);
 	} else {
 		double t;
-		if (!glow_sample(g, &(struct grid_ray){o, k->d, t0, t1}, k->glow->u, k->wl, &t, &l))
+		if (!emission_sample(g, &(struct grid_ray){o, k->d, t0, t1}, k->emission->u, k->wl, &t, &l))
 			return;
 		passed = medium_depth(&k->lanes, &(struct grid_ray){o, k->d, t0, t});
 	}
 	all = spectrum_attenuation(spectrum_add(k->all, passed));
 	events = spectrum_attenuation(k->scatters ? spectrum_add(events, passed) : events);
 	l = spectrum_scale(1 / spectrum_mean(events), spectrum_mul(l, all));
-	k->glow->sum = spectrum_add(k->glow->sum, l);
+	k->emission->sum = spectrum_add(k->emission->sum, l);
 }
 
 /* The same, but at most to an event, which is where the depth at one wavelength is `depth`; INFINITY: there is none. */
@@ -195,10 +199,10 @@ void path_stop_in_medium(struct path_vertex *to, const struct path_vertex *from,
 
 /* To the event where the depth at one wavelength is `depth`; INFINITY: to none. */
 static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max, int lane,
-		   double depth, struct path_glow *glow, struct path_vertex *to, spectrum *left)
+		   double depth, struct path_emission *emission, struct path_vertex *to, spectrum *left)
 {
 	struct path_edge edge;
-	struct walk k = walk_begin(c, at, d, &edge, glow);
+	struct walk k = walk_begin(c, at, d, &edge, emission);
 	struct path_vertex from = *at;
 	for (int i = 0; i < PATH_FACES_MOST; i++) {
 		bool met = path_extend(c, &from, d, t_min, t_max, to);
@@ -224,10 +228,10 @@ static bool extend(struct path_context *c, const struct path_vertex *at, vec3 d,
 }
 
 bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
-			  double u, struct path_glow *glow, struct path_vertex *to, spectrum *left)
+			  double u, struct path_emission *emission, struct path_vertex *to, spectrum *left)
 {
 	double place = u * SPECTRUM_LANES, lane = floor(place);
-	return extend(c, at, d, t_min, t_max, (int)lane, -log1p(lane - place), glow, to, left);
+	return extend(c, at, d, t_min, t_max, (int)lane, -log1p(lane - place), emission, to, left);
 }
 
 bool path_extend_past_events(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,

@@ -50,15 +50,16 @@ void path_absorb(const struct path_context *c, const struct path_vertex *at, vec
 uint32_t path_medium_of_emitter(const struct world *w, const struct path_vertex *v, vec3 away);
 
 /* What media emit towards the beginning of an edge. */
-struct path_glow {
+struct path_emission {
 	double u;     /* in [0,1): where */
 	spectrum sum; /* for the edge as a sub-path draws it: where it passes with probability P, light counts 1/P times
 		       */
 };
 /* path_extend to the next event in a medium, for u in [0,1), or to what is behind the faces of `null`. *left: the share
- * of light that the edge lets through. glow: NULL, or what shines on the way is added to its sum, whatever is found. */
+ * of light that the edge lets through. emission: NULL, or what shines on the way is added to its sum, whatever is
+ * found. */
 bool path_extend_in_media(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
-			  double u, struct path_glow *glow, struct path_vertex *to, spectrum *left);
+			  double u, struct path_emission *emission, struct path_vertex *to, spectrum *left);
 /* The same without events. */
 bool path_extend_past_events(struct path_context *c, const struct path_vertex *at, vec3 d, double t_min, double t_max,
 			     struct path_vertex *to, spectrum *left);

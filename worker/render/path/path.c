@@ -131,10 +131,10 @@ static bool go_on_shining(struct path_context *c, struct sampler *s, unsigned e,
 			  double t_max, double u, spectrum *left)
 {
 	struct path_vertex *at = &c->camera[e - 1];
-	struct path_glow glow = {s->block(s, SIDE_LIGHT, e - 1)[DIM_GLOW], spectrum_of(0)};
-	bool met = path_extend_in_media(c, at, d, t_min, t_max, u, &glow, at + 1, left);
-	c->glow[e] = spectrum_is_zero(glow.sum) ? glow.sum : spectrum_mul(beta, glow.sum);
-	c->glow_edges = e;
+	struct path_emission emission = {s->block(s, SIDE_LIGHT, e - 1)[DIM_EMISSION], spectrum_of(0)};
+	bool met = path_extend_in_media(c, at, d, t_min, t_max, u, &emission, at + 1, left);
+	c->emission[e] = spectrum_is_zero(emission.sum) ? emission.sum : spectrum_mul(beta, emission.sum);
+	c->emission_edges = e;
 	return met;
 }
 
@@ -287,7 +287,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	const struct camera *camera = world_camera(w, &v[0].x, &room);
 	v[0].x.p = camera_point(camera, u + DIM_APERTURE_U);
 	v[0].edge.medium = w->camera_medium;
-	c->glow_edges = 0;
+	c->emission_edges = 0;
 	if (max_vertices < 2 || !camera_has(&w->camera, film[0], film[1]))
 		return 1;
 	vec3 d = camera_direction(camera, v[0].x.p, film[0], film[1]);
@@ -386,7 +386,7 @@ unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_si
 {
 	struct path_vertex *v = side == SIDE_CAMERA ? c->camera : c->light;
 	if (side == SIDE_CAMERA)
-		c->glow_edges = n - 1;
+		c->emission_edges = n - 1;
 	return scatter_on(c, s, side, v, n, max_vertices, spectrum_max(v[1].beta));
 }
 

@@ -82,9 +82,9 @@ struct path_context {
 	struct path_split *split; /* NULL: the film gets all */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
 	/* Where media shine: what they bring the film along edge e of the camera's sub-path, whether a vertex ends it
-	 * or not, for e from 1 to glow_edges (glow.h). */
-	unsigned glow_edges;
-	spectrum glow[PATH_MAX_EDGES + 1];
+	 * or not, for e from 1 to emission_edges (volume_emission.h). */
+	unsigned emission_edges;
+	spectrum emission[PATH_MAX_EDGES + 1];
 };
 
 /* false: x_0 on a delta emitter, which no path from the camera finds. */

@@ -419,7 +419,7 @@ double world_brightest(const struct world *w)
 		most = fmax(most, w->emitters[i].brightest);
 	for (uint32_t i = 0; i < w->media_count; i++) /* along the scene's diameter */
 		if (w->media[i].shines)
-			most = fmax(most, 2 * glow_max(&w->media[i].glow));
+			most = fmax(most, 2 * emission_max(&w->media[i].emission));
 	return 3 * most; /* X + Y + Z */
 }
 

@@ -153,9 +153,9 @@ static void add_medium(struct census *c, const struct world *w, uint32_t number,
 	if (!m->shines)
 		return;
 	count(&c->shining, owner, "");
-	if (glow_shape(&m->glow) == COLOR_SHAPE_OTHER)
+	if (emission_shape(&m->emission) == COLOR_SHAPE_OTHER)
 		count(&c->coloured_light, medium, "");
-	c->shape[glow_shape(&m->glow)]++;
+	c->shape[emission_shape(&m->emission)]++;
 }
 
 static struct census take_census(const struct world *w, const struct effects_source *src,

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/medium/glow.h"
+#include "worker/render/medium/emission.h"
 
-int glow_create(struct glow *g, const struct scene_node *n, const struct volume *extinction,
-		const struct volume_build *build, struct error *e)
+int emission_create(struct emission *g, const struct scene_node *n, const struct volume *extinction,
+		    const struct volume_build *build, struct error *e)
 {
 	if (!build->dialect_3)
 		return node_error(n, e, ENOTSUP, "a scene of 0.6 has no \"volumelight\"");
@@ -11,24 +11,24 @@ int glow_create(struct glow *g, const struct scene_node *n, const struct volume 
 	return rc ? rc : volume_cover(&g->radiance, extinction, n, build, e);
 }
 
-double glow_max(const struct glow *g)
+double emission_max(const struct emission *g)
 {
 	return volume_max(&g->radiance) * g->per_length;
 }
 
-enum color_shape glow_shape(const struct glow *g)
+enum color_shape emission_shape(const struct emission *g)
 {
 	const struct grid *grid = g->radiance.grid;
 	return grid && grid->channels > 1 ? COLOR_SHAPE_OTHER : g->radiance.color.shape;
 }
 
-spectrum glow_even(const struct glow *g, const struct wavelengths *w)
+spectrum emission_even(const struct emission *g, const struct wavelengths *w)
 {
 	return spectrum_scale(g->per_length, color_eval(&g->radiance.color, w));
 }
 
 /* In proportion to the mean of the channels. */
-static bool sample_grid(const struct glow *g, const struct grid_ray *r, double u, const struct wavelengths *w,
+static bool sample_grid(const struct emission *g, const struct grid_ray *r, double u, const struct wavelengths *w,
 			double *t, spectrum *l)
 {
 	const struct grid *grid = g->radiance.grid;
@@ -52,13 +52,13 @@ static bool sample_grid(const struct glow *g, const struct grid_ray *r, double u
 	return true;
 }
 
-bool glow_sample(const struct glow *g, const struct grid_ray *r, double u, const struct wavelengths *w, double *t,
-		 spectrum *l)
+bool emission_sample(const struct emission *g, const struct grid_ray *r, double u, const struct wavelengths *w,
+		     double *t, spectrum *l)
 {
 	if (g->radiance.grid)
 		return sample_grid(g, r, u, w, t, l);
 	double length = r->t1 - r->t0;
 	*t = r->t0 + u * length;
-	*l = spectrum_scale(length, glow_even(g, w));
+	*l = spectrum_scale(length, emission_even(g, w));
 	return length > 0 && isfinite(length);
 }

@@ -406,7 +406,7 @@ static void test_ball(void **state)
 	enum { WALKS = 1 << 21 };
 	static struct agree_image image;
 	const double y = 0.4, sigma = 3, albedo = 0.85;
-	struct dice d = dice_of("test_glow, ball");
+	struct dice d = dice_of("test_volume_emission, ball");
 	double sums[GROUPS] = {0};
 	static struct agree_image walked;
 	walked.groups = GROUPS;
@@ -460,7 +460,7 @@ static void test_shared(void **state)
 			BALL("<ref name='interior' id='fog'/><ref id='l'/><point name='center' x='5'/>"));
 	assert_true(w->media_count == 1 && w->media[0].shines && w->emitter_count == 0);
 	assert_true(w->effects.medium_light && w->effects.scattering && w->effects.max_depth == 128);
-	assert_true(fabs(w->media[0].glow.per_length * w->scale - 1) < 1e-15);
+	assert_true(fabs(w->media[0].emission.per_length * w->scale - 1) < 1e-15);
 	struct render_summary summary;
 	world_summary(w, &summary);
 	assert_true(summary.brightest > 0);

@@ -5,29 +5,29 @@
  * that grid's box. A grid of three channels holds R, G and B, which become a spectrum as those of a texture do.
  * Immutable after creation; any thread; allocates nothing.
  */
-#ifndef WORKER_RENDER_MEDIUM_GLOW_H
-#define WORKER_RENDER_MEDIUM_GLOW_H
+#ifndef WORKER_RENDER_MEDIUM_EMISSION_H
+#define WORKER_RENDER_MEDIUM_EMISSION_H
 
 #include "worker/render/volume/volume.h"
 
-struct glow {
+struct emission {
 	struct volume radiance;
 	double per_length; /* times the radiance, of the rescaled world */
 };
 
 /* Of the emitter n, in a medium of that extinction. -ENOTSUP: 0.6 has none; or its grid repeats itself. */
-int glow_create(struct glow *g, const struct scene_node *n, const struct volume *extinction,
-		const struct volume_build *build, struct error *e);
+int emission_create(struct emission *g, const struct scene_node *n, const struct volume *extinction,
+		    const struct volume_build *build, struct error *e);
 
-double glow_max(const struct glow *g); /* upper bound over places and wavelengths; radiance / length */
-enum color_shape glow_shape(const struct glow *g);
+double emission_max(const struct emission *g); /* upper bound over places and wavelengths; radiance / length */
+enum color_shape emission_shape(const struct emission *g);
 
 /* The same everywhere: radiance / length. Only where the radiance has no grid. */
-spectrum glow_even(const struct glow *g, const struct wavelengths *w);
+spectrum emission_even(const struct emission *g, const struct wavelengths *w);
 
 /* Draws a place on a part of a ray for u in [0,1), where there is more light with higher density. *l: the radiance per
  * length there over the density per length. false: nothing shines on that part, or it has no end. */
-bool glow_sample(const struct glow *g, const struct grid_ray *r, double u, const struct wavelengths *w, double *t,
-		 spectrum *l);
+bool emission_sample(const struct emission *g, const struct grid_ray *r, double u, const struct wavelengths *w,
+		     double *t, spectrum *l);
 
 #endif

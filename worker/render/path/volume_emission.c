@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/path/glow.h"
+#include "worker/render/path/volume_emission.h"
 
-spectrum glow_gather(struct path_context *c, unsigned first, unsigned last, struct classes *classes)
+spectrum volume_emission(struct path_context *c, unsigned first, unsigned last, struct classes *classes)
 {
 	spectrum sum = spectrum_of(0);
 	bool dispersed = false;
-	for (unsigned e = 1; e <= c->glow_edges && e <= last; e++) {
+	for (unsigned e = 1; e <= c->emission_edges && e <= last; e++) {
 		dispersed = dispersed || (e > 1 && EFFECT_IS_ON(c->w, dispersion) && path_disperses(&c->camera[e - 1]));
 		if (e < first)
 			continue;
-		spectrum l = path_collapse(c->glow[e], dispersed);
+		spectrum l = path_collapse(c->emission[e], dispersed);
 		if (!path_accept(c, l))
 			continue;
 		sum = spectrum_add(sum, l);
