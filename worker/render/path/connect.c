@@ -160,10 +160,10 @@ static bool disperses(const struct path_context *c, const struct joined_path *p)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
-	for (unsigned i = 1; i < p->edges; i++)
-		if (path_disperses(p->v[i]))
-			return true;
-	return false;
+	bool any = c->dispersed;
+	for (unsigned i = 1; i < p->edges && !any; i++)
+		any = path_disperses(p->v[i]);
+	return any;
 }
 
 /* Whether edge i is in the medium that its end has, for a sub-path that comes from there. */

@@ -42,7 +42,6 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 	uint32_t least = c->max_depth + 1 > c->min_depth ? c->max_depth + 1 : c->min_depth;
 	unsigned first = 2, before = 0, most = longest + 1 < FULL ? longest + 1 : FULL;
 	double film[2];
-	bool dispersed = false; /* by a vertex that is not carried any more */
 	struct sampler_random s;
 	c->roulette = 1;
 	c->one_way = true;
@@ -52,14 +51,14 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 	for (uint64_t stretch = 1; n == FULL && c->camera[n - 1].kind != VERTEX_INFINITE && before + n - 1 < longest;
 	     stretch++) {
 		for (unsigned i = 1; i + CARRIED < n; i++)
-			dispersed = dispersed || path_disperses(&c->camera[i]);
+			c->dispersed = c->dispersed || path_disperses(&c->camera[i]);
 		memmove(&c->camera[CARRIED_END - CARRIED], &c->camera[n - CARRIED], CARRIED * sizeof *c->camera);
 		before += n - CARRIED_END;
 		sampler_random_init(&s, seed, RNG_BEYOND, index, stretch);
 		n = path_walk_on(c, &s.base, SIDE_CAMERA, CARRIED_END, FULL);
-		spectrum l = gather(c, CARRIED_END + 1, n, before, least, longest, film);
-		sum = spectrum_add(sum, path_collapse(l, dispersed));
+		sum = spectrum_add(sum, gather(c, CARRIED_END + 1, n, before, least, longest, film));
 	}
+	c->dispersed = false;
 	c->roulette = roulette;
 	c->one_way = one_way;
 	scratch->count = 0;

@@ -4,7 +4,7 @@
 spectrum volume_emission(struct path_context *c, unsigned first, unsigned last, struct classes *classes)
 {
 	spectrum sum = spectrum_of(0);
-	bool dispersed = false;
+	bool dispersed = c->dispersed;
 	for (unsigned e = 1; e <= c->emission_edges && e <= last; e++) {
 		dispersed = dispersed || (e > 1 && EFFECT_IS_ON(c->w, dispersion) && path_disperses(&c->camera[e - 1]));
 		if (e < first)

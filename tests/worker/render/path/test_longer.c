@@ -136,9 +136,37 @@ static void test_a_corridor(void **state)
 	world_free(w);
 }
 
+/* The same in a slab of glass that disperses, which reflects all of it. One wavelength travels on, which counts for
+ * four once, however many stretches know of it. */
+static void test_a_slab(void **state)
+{
+	(void)state;
+	static const char glass[] = "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
+				    "<float name='int_cauchy_b' value='0.01'/></bsdf>";
+	struct world *w = world_of_text(
+		SIZE, SIZE,
+		"<sensor type='perspective'><float name='fov' value='0.001'/><transform name='to_world'>"
+		"<lookat origin='0,0.5,0' target='1,1.5,0' up='0,0,1'/></transform><film type='hdrfilm'>"
+		"<rfilter type='box'/></film></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/><scale value='400'/>"
+		"</transform>%s</shape>"
+		"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='-90'/><scale value='400'/>"
+		"<translate y='1'/></transform>%s</shape>"
+		"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='-90'/><translate x='300'/>"
+		"</transform><emitter type='area'><spectrum name='radiance' value='1'/></emitter></shape>",
+		glass, glass);
+	assert_true(w->effects.dispersion);
+	expect(w, 128, 301, 1, 0.05);
+	world_free(w);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_a_shining_sphere), cmocka_unit_test(test_a_mirror),
-					   cmocka_unit_test(test_a_corridor)};
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_a_shining_sphere),
+		cmocka_unit_test(test_a_mirror),
+		cmocka_unit_test(test_a_corridor),
+		cmocka_unit_test(test_a_slab),
+	};
 	return cmocka_run_group_tests_name("worker/render/path/longer", tests, NULL, NULL);
 }
