@@ -159,14 +159,16 @@ void visibility_bounds_shapes(const struct world *w, const struct effects_source
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		shape[i] = VISIBILITY_YES;
 	find_enclosed(w, src, shape);
-	bool dark = true;
+	bool dark = true, passable = false; /* faces that are no vertices let light through, whatever the depth */
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		dark &= !visibility_bounds_emitter(w, shape, i);
-	for (uint32_t i = 0; i < w->media_count; i++)
+	for (uint32_t i = 0; i < w->media_count; i++) {
 		if (w->media[i].shines)
-			return; /* through faces that are no vertices, too */
+			return;
+		passable |= w->media[i].scatters;
+	}
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (shape[i] == VISIBILITY_YES && (dark || max_depth <= 1))
+		if (shape[i] == VISIBILITY_YES && (dark || (max_depth <= 1 && !passable)))
 			shape[i] = dark ? VISIBILITY_DARK : VISIBILITY_DEPTH;
 }
 

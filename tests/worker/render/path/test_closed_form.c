@@ -248,6 +248,15 @@ static void test_white_media(void **state)
 			0.7, i ? (struct effort){320, 0, 0} : (struct effort){3072, 0, 0});
 }
 
+/* Paths of one edge pass faces that are no vertices: the sky through a layer, without what the layer scatters. */
+static void test_seen_through_layer(void **state)
+{
+	(void)state;
+	check_constant("seen through a layer",
+		       world_of_text(16, 16, WITHOUT_ROULETTE("1") SKY FROM_ABOVE("0.01", "") LAYER("0.5", "0.5", "")),
+		       0.7 * exp(-1), (struct effort){1024, 1024, 0});
+}
+
 /* E_2(x) / 2: what reaches a depth of x through a plane, of light from all directions of one half. By the midpoint rule
  * over the cosine. */
 static double half_exponential_integral(double x)
@@ -472,12 +481,19 @@ static void test_plates(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_furnace),		 cmocka_unit_test(test_furnace_all_around),
-		cmocka_unit_test(test_furnace_far_lens), cmocka_unit_test(test_invisible),
-		cmocka_unit_test(test_absorbing),	 cmocka_unit_test(test_camera_in_medium),
-		cmocka_unit_test(test_white_media),	 cmocka_unit_test(test_scattered_once),
-		cmocka_unit_test(test_half_space),	 cmocka_unit_test(test_beam_in_layer),
-		cmocka_unit_test(test_lit_floor),	 cmocka_unit_test(test_beam),
+		cmocka_unit_test(test_furnace),
+		cmocka_unit_test(test_furnace_all_around),
+		cmocka_unit_test(test_furnace_far_lens),
+		cmocka_unit_test(test_invisible),
+		cmocka_unit_test(test_absorbing),
+		cmocka_unit_test(test_camera_in_medium),
+		cmocka_unit_test(test_white_media),
+		cmocka_unit_test(test_scattered_once),
+		cmocka_unit_test(test_seen_through_layer),
+		cmocka_unit_test(test_half_space),
+		cmocka_unit_test(test_beam_in_layer),
+		cmocka_unit_test(test_lit_floor),
+		cmocka_unit_test(test_beam),
 		cmocka_unit_test(test_plates),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
