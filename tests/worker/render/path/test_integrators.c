@@ -90,7 +90,7 @@ static void test_glass(void **state)
 	(void)state;
 	check_all("glass", "glass.xml",
 		  &(struct lengths){.path = 3072,
-				    .bdpt = 3072,
+				    .bdpt = at_length(3072), /* what erpt begins with */
 				    .rare = at_length(2048),
 				    .spread = 4000,
 				    .rare_spread = at_length(5760)});
@@ -112,7 +112,8 @@ static void test_environment(void **state)
 	(void)state;
 	check_all(
 		"environment", "environment.xml",
-		&(struct lengths){.path = 512, .bdpt = 512, .spread = 900, .chain = at_length(6144), .single = 12600});
+		&(struct lengths){
+			.path = 512, .bdpt = 512, .spread = 900, .chain = at_length(6144), .single = at_length(12600)});
 }
 
 int main(void)

@@ -81,7 +81,7 @@ static void expect(const char *name, struct world *w, double radiance, struct ef
 	"origin='0.2,0.1,90' target='0.2,0.1,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='box'/>" \
 	"</film>" medium "</sensor>"
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
-#define GLOW(radiance) "<emitter type='volumelight'><float name='radiance' value='" radiance "'/></emitter>"
+#define SHINES(radiance) "<emitter type='volumelight'><float name='radiance' value='" radiance "'/></emitter>"
 #define FOG(sigma_t, albedo)                                                                                        \
 	"<medium type='homogeneous' name='interior' id='fog'><float name='sigma_t' value='" sigma_t "'/><spectrum " \
 	"name='albedo' value='" albedo "'/></medium>"
@@ -104,31 +104,32 @@ static void test_layer(void **state)
 		       DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(
 			       "<medium type='homogeneous' name='interior'><float name='sigma_t' value='0.3'/>"
 			       "<float name='albedo' value='0'/><float name='scale' value='2'/></medium>" NULL_FACES
-				       GLOW("0.4"))),
+				       SHINES("0.4"))),
 	       0.4 / 0.6 * (1 - left) + 0.7 * left, e);
 	expect("clear layer",
 	       world_of_text(SIDE, SIDE,
-			     DEPTH("1") FROM_ABOVE("1", "") SKY LAYER(FOG("0", "0.5") NULL_FACES GLOW("0.4"))),
+			     DEPTH("1") FROM_ABOVE("1", "") SKY LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
 	       0.4 * 2 + 0.7, e);
 	expect("clear layer and nothing else",
-	       world_of_text(SIDE, SIDE, DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES GLOW("0.4"))),
+	       world_of_text(SIDE, SIDE,
+			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("0", "0.5") NULL_FACES SHINES("0.4"))),
 	       0.4 * 2, e);
 	/* The camera's near plane lies in the middle. */
 	left = exp(-1);
 	expect("inside of a layer",
 	       world_of_text(SIDE, SIDE,
 			     DEPTH("8") FROM_ABOVE("91", "<ref name='medium' id='fog'/>")
-				     SKY LAYER(FOG("1", "0") NULL_FACES GLOW("0.4"))),
+				     SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4"))),
 	       0.4 * (1 - left) + 0.7 * left, e);
 	/* Of a layer that scatters, what does not scatter: one edge. */
 	left = exp(-2 * 1.5);
 	expect("one edge in a layer that scatters",
 	       world_of_text(SIDE, SIDE,
-			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("1.5", "0.8") NULL_FACES GLOW("0.4"))),
+			     DEPTH("1") FROM_ABOVE("1", "") LAYER(FOG("1.5", "0.8") NULL_FACES SHINES("0.4"))),
 	       0.4 / 1.5 * (1 - left), (struct effort){1024, true});
 	/* Two edges or more of a layer that does not: none. */
-	struct world *w = world_of_text(SIDE, SIDE,
-					DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(FOG("1", "0") NULL_FACES GLOW("0.4")));
+	struct world *w = world_of_text(
+		SIDE, SIDE, DEPTH("8") FROM_ABOVE("1", "") SKY LAYER(FOG("1", "0") NULL_FACES SHINES("0.4")));
 	static struct agree_image image;
 	const struct agree_side side = {"bdpt", 16, GROUPS, 2, 0};
 	agree_render(w, "no second edge", "bdpt", &side, &image);
@@ -153,14 +154,14 @@ static void test_layer(void **state)
 	"<emitter type='area'><float name='radiance' value='.42'/></emitter><ref name='exterior' id='fog'/></shape>"
 #define FOG_BALL                                                                                               \
 	"<shape type='sphere'><point name='center' x='-1' y='-0.3' z='1.2'/><float name='radius' value='0.3'/>"   \
-	"<ref name='exterior' id='fog'/>" NULL_FACES FOG("0.2", "0.5") GLOW("0.07") "</shape>"
+	"<ref name='exterior' id='fog'/>" NULL_FACES FOG("0.2", "0.5") SHINES("0.07") "</shape>"
 #define SMOKE_CUBE                                                                                                     \
 	"<shape type='cube'><transform name='to_world'><scale value='0.3'/><translate x='0.2' y='0.1' z='1.7'/>"      \
 	"</transform><ref name='exterior' id='fog'/><medium type='homogeneous' name='interior'><float name='sigma_a' " \
-	"value='0.5'/></medium>" NULL_FACES GLOW("0.35") "</shape>"
+	"value='0.5'/></medium>" NULL_FACES SHINES("0.35") "</shape>"
 #define GLASS_BALL                                                                                                 \
 	BALL(GLASS("dielectric", "") "<medium type='homogeneous' name='interior'><float name='sigma_a' value='1'/>" \
-	"<float name='sigma_s' value='2'/></medium><ref name='exterior' id='fog'/>" GLOW("1.575"))
+	"<float name='sigma_s' value='2'/></medium><ref name='exterior' id='fog'/>" SHINES("1.575"))
 /* clang-format on */
 
 /* Emission of sigma_a times the sky's radiance, 0.7. Within glass radiance is its squared index as large. */
@@ -174,13 +175,13 @@ static void test_furnace(void **state)
 		const char *name, *inner;
 		struct effort e;
 	} balls[] = {
-		{"smoke", NULL_FACES FOG("2", "0") GLOW("1.4"), {16, true}},
-		{"fog", NULL_FACES FOG("2", "0.3") GLOW("0.98"), {2048, true}},
-		{"glass with smoke", GLASS("dielectric", "") FOG("2", "0") GLOW("3.15"), {2048, false}},
-		{"glass with fog", GLASS("dielectric", "") FOG("2", "0.3") GLOW("2.205"), {4096, false}},
-		{"thin glass with fog", "<bsdf type='thindielectric'/>" FOG("2", "0.3") GLOW("0.98"), {4096, false}},
+		{"smoke", NULL_FACES FOG("2", "0") SHINES("1.4"), {16, true}},
+		{"fog", NULL_FACES FOG("2", "0.3") SHINES("0.98"), {2048, true}},
+		{"glass with smoke", GLASS("dielectric", "") FOG("2", "0") SHINES("3.15"), {2048, false}},
+		{"glass with fog", GLASS("dielectric", "") FOG("2", "0.3") SHINES("2.205"), {4096, false}},
+		{"thin glass with fog", "<bsdf type='thindielectric'/>" FOG("2", "0.3") SHINES("0.98"), {4096, false}},
 		{"frosted glass with fog",
-		 GLASS("roughdielectric", "<float name='alpha' value='0.001'/>") FOG("2", "0.3") GLOW("2.205"),
+		 GLASS("roughdielectric", "<float name='alpha' value='0.001'/>") FOG("2", "0.3") SHINES("2.205"),
 		 {4096, false}},
 	};
 	for (size_t i = 0; i < sizeof balls / sizeof *balls; i++)
@@ -196,7 +197,8 @@ static void test_chains(void **state)
 {
 	(void)state;
 	static struct agree_image chains, sky;
-	struct world *w = world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL(NULL_FACES FOG("2", "0.3") GLOW("0.98")));
+	struct world *w =
+		world_of_text(SIDE, SIDE, DEPTH("64") VIEW SKY BALL(NULL_FACES FOG("2", "0.3") SHINES("0.98")));
 	const struct agree_side side = {"pssmlt", 2048, GROUPS, 0, 0}, alone = {"path", 16, GROUPS, 0, 0};
 	agree_render(w, "fog", "pssmlt", &side, &chains);
 	world_free(w);
@@ -302,7 +304,7 @@ static void test_grid_layer(void **state)
 			       "<medium type='heterogeneous' name='interior'><volume name='sigma_t' type='constvolume'>"
 			       "<float name='value' value='0'/><transform name='to_world'><translate x='-.5' y='-.5' z='-1.5'/>"
 			       "<scale x='80' y='80'/></transform></volume><volume name='sigma_n' type='constvolume'>"
-			       "<float name='value' value='1'/></volume></medium>" NULL_FACES GLOW("0.4")) "</scene>",
+			       "<float name='value' value='1'/></volume></medium>" NULL_FACES SHINES("0.4")) "</scene>",
 		       &box, &light),
 	       0.4, e);
 }
@@ -415,7 +417,7 @@ static void test_ball(void **state)
 		DEPTH("128") "<sensor type='orthographic'><float name='far_clip' value='9'/><transform name='to_world'>"
 			     "<scale x='0.0001' y='0.0001'/><lookat origin='0,0.4,4' target='0,0.4,0' up='0,1,0'/></transform>"
 			     "<film type='hdrfilm'><rfilter type='box'/></film></sensor>" BALL(
-				     NULL_FACES FOG("3", "0.85") GLOW("1")));
+				     NULL_FACES FOG("3", "0.85") SHINES("1")));
 	for (int i = 0; i < WALKS; i++)
 		sums[i % GROUPS] += walk(&d, y, sigma, albedo);
 	for (int g = 0; g < GROUPS; g++)
@@ -437,11 +439,11 @@ static void test_refused(void **state)
 {
 	(void)state;
 	world_refused("<emitter type='volumelight'/>", "\"volumelight\" must stand in a shape");
-	world_refused(BALL(GLOW("1")), "\"volumelight\" must stand in a shape with a medium inside");
-	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" GLOW("1")), "with a medium inside");
-	world_refused(BALL(FOG("1", "0") GLOW("1")) BALL("<ref name='interior' id='fog'/>" GLOW("2")),
+	world_refused(BALL(SHINES("1")), "\"volumelight\" must stand in a shape with a medium inside");
+	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" SHINES("1")), "with a medium inside");
+	world_refused(BALL(FOG("1", "0") SHINES("1")) BALL("<ref name='interior' id='fog'/>" SHINES("2")),
 		      "a medium may shine by one \"volumelight\" only");
-	world_refused(BALL(FOG("1", "0") GLOW("-1")), "radiance");
+	world_refused(BALL(FOG("1", "0") SHINES("-1")), "radiance");
 	world_refused(BALL(FOG("1", "0") "<emitter type='volumelight'><texture name='radiance' type='checkerboard'/>"
 					 "</emitter>"),
 		      "`radiance` may be a volume, but not a texture");
@@ -471,7 +473,7 @@ static void test_shared(void **state)
 static void test_who_finds_it(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(SIDE, SIDE, VIEW BALL(FOG("1", "0.5") NULL_FACES GLOW("1")));
+	struct world *w = world_of_text(SIDE, SIDE, VIEW BALL(FOG("1", "0.5") NULL_FACES SHINES("1")));
 	struct render_summary summary;
 	world_summary(w, &summary);
 	for (size_t i = 0; render_integrator_at(i); i++) {
@@ -486,7 +488,7 @@ static void test_who_finds_it(void **state)
 	}
 	world_free(w);
 	worlds_effects = "-medium-light";
-	w = world_of_text(SIDE, SIDE, VIEW SKY BALL(FOG("1", "0") NULL_FACES GLOW("1")));
+	w = world_of_text(SIDE, SIDE, VIEW SKY BALL(FOG("1", "0") NULL_FACES SHINES("1")));
 	worlds_effects = NULL;
 	assert_true(!w->effects.medium_light && !w->effects.scattering && !w->media[0].shines);
 	world_free(w);
