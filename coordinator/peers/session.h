@@ -67,9 +67,9 @@ struct session {
 /* All sessions, and their common limits. */
 struct peers {
 	struct jobs *jobs;
-	struct tls *tls;  /* NULL: plaintext */
-	struct listener { /* their loop is that of the jobs */
-		uv_tcp_t tcp;
+	struct tls *tls;	   /* NULL: plaintext */
+	struct listener {	   /* their loop is that of the jobs */
+		uv_tcp_t tcp;	   /* first: libuv's pointer to it is one to this */
 		bool caller_waits; /* a connection could not be accepted: try again */
 	} listeners[NET_ADDRS_MOST];
 	unsigned listener_count;
