@@ -14,6 +14,9 @@
 #include "worker/render/bsdf/ior.h"
 
 #include <math.h>
+#include "worker/render/path/path.h"
+#include "worker/render/path/volume_emission.h"
+
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -494,13 +497,40 @@ static void test_who_finds_it(void **state)
 	world_free(w);
 }
 
+/* Behind a vertex that disperses one wavelength travels on, for all four. */
+static void test_dispersed(void **state)
+{
+	(void)state;
+	static struct path_context c;
+	static uint64_t counters[BATCH_COUNTERS];
+	const struct plan p = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE, .max_depth = 8};
+	struct world *w = world_of_text(SIDE, SIDE, VIEW WHITE BALL(PRISM COLOURED("0.5", "%s")), FLAT, FLAT);
+	unsigned met = 0;
+	path_context_for_samples(&c, w, &p, counters);
+	for (uint64_t i = 0; i < 64; i++) {
+		struct sampler_random s;
+		double film[2];
+		sampler_random_init(&s, 5, RNG_TEST, i, 0);
+		path_walk_camera(&c, &s.base, 8, film);
+		bool glass = c.camera[1].kind == VERTEX_SURFACE && path_disperses(&c.camera[1]);
+		c.emission_edges = 2;
+		c.emission[1] = (spectrum){{1, 2, 3, 4}};
+		c.emission[2] = (spectrum){{5, 6, 7, 8}};
+		spectrum l = volume_emission(&c, 1, 2, NULL);
+		assert_true(l.v[0] == (glass ? 21 : 6) && l.v[1] == (glass ? 2 : 8) && l.v[3] == (glass ? 4 : 12));
+		met += glass;
+	}
+	assert_true(met > 0);
+	world_free(w);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_layer),	     cmocka_unit_test(test_furnace),	cmocka_unit_test(test_chains),
 		cmocka_unit_test(test_grid_furnace), cmocka_unit_test(test_grid_layer), cmocka_unit_test(test_colours),
 		cmocka_unit_test(test_ball),	     cmocka_unit_test(test_refused),	cmocka_unit_test(test_shared),
-		cmocka_unit_test(test_who_finds_it),
+		cmocka_unit_test(test_who_finds_it), cmocka_unit_test(test_dispersed),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
