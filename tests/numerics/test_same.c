@@ -8,8 +8,8 @@
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
+#include "tests/support/placed_scene.h"
 #include "tests/support/stats.h"
-#include "tests/support/worlds.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -17,51 +17,12 @@
 
 #include <cmocka.h>
 
-enum { SIDE = 32 };
+enum { SIDE = PLACED_SIDE };
 
-/* Scaled by s, then moved by m along all axes. */
 static struct world *world_at(double s, double m)
 {
-#define P(x) (s * (x) + m)
-	/* clang-format off */
-	return world_of_text(SIDE, SIDE,
-		"<sensor type='perspective'>"
-			"<float name='fov' value='45'/>"
-			"<float name='near_clip' value='%.17g'/>"
-			"<float name='far_clip' value='%.17g'/>"
-			"<transform name='to_world'>"
-				"<lookat origin='%.17g,%.17g,%.17g' target='%.17g,%.17g,%.17g' up='0,1,0'/>"
-			"</transform>"
-			"<film type='hdrfilm'><rfilter type='box'/></film>"
-		"</sensor>"
-		"<shape type='rectangle'>"
-			"<transform name='to_world'>"
-				"<scale value='%.17g'/>"
-				"<rotate x='1' angle='-90'/>"
-				"<translate x='%.17g' y='%.17g' z='%.17g'/>"
-			"</transform>"
-		"</shape>"
-		"<shape type='sphere'>"
-			"<point name='center' x='%.17g' y='%.17g' z='%.17g'/>"
-			"<float name='radius' value='%.17g'/>"
-			"<bsdf type='roughdielectric'><float name='alpha' value='0.1'/></bsdf>"
-		"</shape>"
-		"<shape type='cube'>"
-			"<transform name='to_world'>"
-				"<scale value='%.17g'/>"
-				"<translate x='%.17g' y='%.17g' z='%.17g'/>"
-			"</transform>"
-			"<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>"
-		"</shape>"
-		"<shape type='sphere'>"
-			"<point name='center' x='%.17g' y='%.17g' z='%.17g'/>"
-			"<float name='radius' value='%.17g'/>"
-			"<emitter type='area'><float name='radiance' value='5'/></emitter>"
-		"</shape>",
-		s * 0x1p-7, s * 1000, P(0), P(2), P(5), P(0), P(0.5), P(0), 4 * s, P(0), P(0), P(0), P(-0.75),
-		P(0.75), P(0.5), 0.75 * s, 0.5 * s, P(1), P(0.5), P(-0.25), P(1), P(3), P(1), 0.5 * s);
-	/* clang-format on */
-#undef P
+	return placed_scene(s, m, "<bsdf type='roughdielectric'><float name='alpha' value='0.1'/></bsdf>",
+			    "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>");
 }
 
 static void render(struct world *w, uint64_t seed, struct chains_result *out)

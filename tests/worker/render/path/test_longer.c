@@ -112,38 +112,10 @@ static void test_a_mirror(void **state)
 	world_free(w);
 }
 
-/* Between two mirrors, each meeting a step further on, to a lamp behind 300 of them: a stretch goes on from where the
- * one before it ended, with its throughput. */
-static void test_a_corridor(void **state)
+/* Light goes on by the diagonal between two plates, meeting each a step further on, to a lamp behind 300 of them. */
+static struct world *corridor(const char *bsdf)
 {
-	(void)state;
-	static const char mirror[] = "<bsdf type='conductor'><string name='material' value='none'/>"
-				     "<spectrum name='specular_reflectance' value='0.995'/></bsdf>";
-	struct world *w = world_of_text(
-		SIZE, SIZE,
-		"<sensor type='perspective'><float name='fov' value='0.001'/><transform name='to_world'>"
-		"<lookat origin='0,0.5,0' target='1,1.5,0' up='0,0,1'/></transform><film type='hdrfilm'>"
-		"<rfilter type='box'/></film></sensor>"
-		"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/><scale value='400'/>"
-		"</transform><bsdf type='twosided'>%s</bsdf></shape>"
-		"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/><scale value='400'/>"
-		"<translate y='1'/></transform><bsdf type='twosided'>%s</bsdf></shape>"
-		"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='-90'/><translate x='300'/>"
-		"</transform><emitter type='area'><spectrum name='radiance' value='1'/></emitter></shape>",
-		mirror, mirror);
-	expect(w, 128, 300, 0, 0);
-	expect(w, 128, 301, pow(0.995, 300), 0.05);
-	world_free(w);
-}
-
-/* The same in a slab of glass that disperses, which reflects all of it. One wavelength travels on, which counts for
- * four once, however many stretches know of it. */
-static void test_a_slab(void **state)
-{
-	(void)state;
-	static const char glass[] = "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
-				    "<float name='int_cauchy_b' value='0.01'/></bsdf>";
-	struct world *w = world_of_text(
+	return world_of_text(
 		SIZE, SIZE,
 		"<sensor type='perspective'><float name='fov' value='0.001'/><transform name='to_world'>"
 		"<lookat origin='0,0.5,0' target='1,1.5,0' up='0,0,1'/></transform><film type='hdrfilm'>"
@@ -154,7 +126,27 @@ static void test_a_slab(void **state)
 		"<translate y='1'/></transform>%s</shape>"
 		"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='-90'/><translate x='300'/>"
 		"</transform><emitter type='area'><spectrum name='radiance' value='1'/></emitter></shape>",
-		glass, glass);
+		bsdf, bsdf);
+}
+
+/* Mirrors: a stretch goes on from where the one before it ended, with its throughput. */
+static void test_a_corridor(void **state)
+{
+	(void)state;
+	struct world *w = corridor("<bsdf type='twosided'><bsdf type='conductor'><string name='material' value='none'/>"
+				   "<spectrum name='specular_reflectance' value='0.995'/></bsdf></bsdf>");
+	expect(w, 128, 300, 0, 0);
+	expect(w, 128, 301, pow(0.995, 300), 0.05);
+	world_free(w);
+}
+
+/* A slab of glass that disperses, which reflects all of it. One wavelength travels on, which counts for four once,
+ * however many stretches know of it. */
+static void test_a_slab(void **state)
+{
+	(void)state;
+	struct world *w = corridor("<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
+				   "<float name='int_cauchy_b' value='0.01'/></bsdf>");
 	assert_true(w->effects.dispersion);
 	expect(w, 128, 301, 1, 0.05);
 	world_free(w);
