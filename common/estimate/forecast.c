@@ -20,6 +20,7 @@ enum {
 	PLAYS = 1024,
 	PRIOR_WEIGHT = 6, /* weight of the degrees of freedom that looks report, against their scatter, in looks */
 	STEPS_MOST = 256, /* more than 2^60 rounds have */
+	TRIES_MOST = 64,
 };
 static const double used_share = 1.0 / 16; /* looks at less than this share of the work say little about the future */
 static const double burst = 0.15;	   /* spread of a look beyond chi-square: rare bursts of light */
@@ -101,7 +102,8 @@ struct fit {
 	double spread, shift;		   /* of one look's logarithm around the fit: standard deviation, mean */
 	double seen;			   /* e-folds of work covered by the looks: the trend is extrapolated as far */
 	double now;			   /* the last look's deviation in spreads */
-	double margin, margin_sd;	   /* log of upper end over estimate */
+	double margin, margin_sd;	   /* log of upper end over estimate, where the interval is known */
+	double doubt;			   /* probability that a look's error is in doubt */
 	double cpu, cpu_sd, wall, wall_sd; /* seconds a sample; relative spread */
 };
 
@@ -161,17 +163,42 @@ static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t 
 	f->correlation = -q.lt / sqrt(q.ll * q.tt);
 }
 
+static double rare_factor(const struct forecast_look *l)
+{
+	return l->doubtful ? 0 : stated_error_rare_factor(sqrt(l->rel_mse), sqrt(l->rel_mse_upper));
+}
+
+static bool in_doubt(const struct forecast_look *l)
+{
+	return l->doubtful || rare_factor(l) > 0;
+}
+
+/* Looks `first` .. of h, but for those whose upper end is only a multiple of the estimate: without any other, that of
+ * chi-square. */
 static void fit_margin(struct fit *f, const struct forecast_history *h, uint32_t first)
 {
-	double sum = 0, square = 0, n = (double)(h->count - first);
-	for (uint32_t i = first; i < h->count; i++)
-		sum += log(h->looks[i].rel_mse_upper / h->looks[i].rel_mse);
-	f->margin = sum / n;
+	double sum = 0, square = 0, n = 0;
 	for (uint32_t i = first; i < h->count; i++) {
-		double d = log(h->looks[i].rel_mse_upper / h->looks[i].rel_mse) - f->margin;
-		square += d * d;
+		if (rare_factor(&h->looks[i]) > 0)
+			continue;
+		double margin = log(h->looks[i].rel_mse_upper / h->looks[i].rel_mse);
+		sum += margin;
+		square += margin * margin;
+		n++;
 	}
-	f->margin_sd = n > 1 ? sqrt(square / (n - 1)) : f->margin / 2;
+	f->margin = n > 0 ? sum / n : -log(chi_square_share(fmax(last(h)->degrees, 1), -1.6448536269514722));
+	f->margin_sd = n > 1 ? sqrt(fmax(0, square - n * f->margin * f->margin) / (n - 1)) : f->margin / 2;
+}
+
+/* How many of the looks are in doubt, with half a look for each of both (Jeffreys' prior). */
+static void fit_doubt(struct fit *f, const struct forecast_history *h, uint32_t first)
+{
+	double sum = 0.5, n = 1;
+	for (uint32_t i = first; i < h->count; i++) {
+		sum += in_doubt(&h->looks[i]);
+		n++;
+	}
+	f->doubt = sum / n;
 }
 
 static double spent(const struct forecast_look *l, bool wall)
@@ -210,6 +237,7 @@ static struct fit fit(const struct forecast_history *h)
 	fit_level(&f, h, first);
 	f.now = (log(end->rel_mse * end->work) - f.shift - f.level) / f.spread;
 	fit_margin(&f, h, first);
+	fit_doubt(&f, h, first);
 	fit_price(h, false, &f.cpu, &f.cpu_sd);
 	fit_price(h, true, &f.wall, &f.wall_sd);
 	return f;
@@ -237,6 +265,7 @@ static double normal(struct dice *d)
 
 struct play { /* one possible state of affairs */
 	double level, trend, memory, drift, margin, now, cpu, wall;
+	double rare, seen; /* standard normal: how rare its light is; by the last look, apart from that */
 };
 
 static struct play play_of(const struct fit *f, struct dice *d)
@@ -245,10 +274,31 @@ static struct play play_of(const struct fit *f, struct dice *d)
 	double trend = f->trend + f->trend_sd * a;
 	double level =
 		f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
-	double now = f->now + (f->level - level) / f->spread;
-	double margin = fmax(0, f->margin + f->margin_sd * normal(d));
-	return (struct play){level,  trend, memory * exp(memory_sd * normal(d)), drift * normal(d),
-			     margin, now,   f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
+	struct play y = {.level = level, .trend = trend, .now = f->now + (f->level - level) / f->spread};
+	/* One after the other: the order in which an initializer is evaluated is the compiler's. */
+	y.margin = fmax(0, f->margin + f->margin_sd * normal(d));
+	y.memory = memory * exp(memory_sd * normal(d));
+	y.drift = drift * normal(d);
+	y.cpu = f->cpu * exp(f->cpu_sd * normal(d));
+	y.wall = f->wall * exp(f->wall_sd * normal(d));
+	y.rare = normal(d);
+	y.seen = normal(d);
+	return y;
+}
+
+/* A look is in doubt where half of what decides lasts, and the other half changes as fast as its deviation does. */
+static bool is_in_doubt(const struct fit *f, const struct play *y)
+{
+	return 0.5 * erfc(0.5 * (y->rare + y->seen)) < f->doubt;
+}
+
+/* Of a render whose last look was in doubt, or not. */
+static void condition(const struct fit *f, struct play *y, bool doubt, struct dice *d)
+{
+	for (int i = 0; i < TRIES_MOST && is_in_doubt(f, y) != doubt; i++) {
+		y->rare = normal(d);
+		y->seen = normal(d);
+	}
 }
 
 /* How much log(relMSE x work) changes over t e-folds of work. */
@@ -265,8 +315,9 @@ static double expected(const struct fit *f, const struct play *y, double work)
 	return y->level + change(f, y, log(work / f->work)) - log(work);
 }
 
-/* The number of rounds at which it stops. */
-static double play_target(const struct fit *f, const struct play *y, const struct plan *p, double target,
+/* The number of rounds at which it stops. rare_stop: the estimate at which it does in doubt, too; 0: no doubt counts.
+ */
+static double play_target(const struct fit *f, struct play *y, const struct plan *p, double target, double rare_stop,
 			  enum forecast_run run, struct dice *d)
 {
 	double round = (double)plan_round_mutations(p);
@@ -274,11 +325,14 @@ static double play_target(const struct fit *f, const struct play *y, const struc
 	uint64_t rounds = (uint64_t)fmin(before / round + 0.5, 0x1p62);
 	for (int i = 0; i < STEPS_MOST; i++) {
 		rounds = merge_error_next(p, rounds);
-		double work = (double)rounds * round, r = before / work;
-		deviation = r * deviation + sqrt(fmax(0, 1 - r * r)) * normal(d);
+		double work = (double)rounds * round, r = before / work, news = sqrt(fmax(0, 1 - r * r));
+		deviation = r * deviation + news * normal(d);
 		before = work;
-		double seen = expected(f, y, work) + f->shift + f->spread * deviation + y->margin;
-		if (seen <= 2 * log(target))
+		double estimate = expected(f, y, work) + f->shift + f->spread * deviation;
+		if (rare_stop > 0)
+			y->seen = r * y->seen + news * normal(d);
+		if (rare_stop > 0 && is_in_doubt(f, y) ? estimate <= 2 * log(rare_stop)
+						       : estimate + y->margin <= 2 * log(target))
 			return (double)rounds;
 		if (rounds >= UINT64_MAX / 4)
 			break;
@@ -325,13 +379,21 @@ static void costs(struct plays *s, struct forecast_cost *c)
 	c->seconds = range_of(s->wall);
 }
 
+/* By which the doubt of the latest look that has one ends; 0: none has. */
+static double last_factor(const struct forecast_history *h)
+{
+	double factor = 0;
+	for (uint32_t i = 0; i < h->count; i++)
+		factor = rare_factor(&h->looks[i]) > 0 ? rare_factor(&h->looks[i]) : factor;
+	return factor;
+}
+
 double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target)
 {
 	const struct forecast_look *end = last(h);
 	if (!end || p->kind != PLAN_SAMPLES || !(target > 0))
 		return 0;
-	bool rare = end->doubtful || stated_error_is_rare(sqrt(end->rel_mse), sqrt(end->rel_mse_upper));
-	return rare ? stated_error_rare_stop(target) : 0;
+	return in_doubt(end) ? stated_error_rare_stop(target, last_factor(h)) : 0;
 }
 
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
@@ -344,15 +406,13 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	struct dice d = {1};
 	struct plays s;
 	double round = (double)plan_round_mutations(p);
-	bool same = run == FORECAST_SAME;
-	double stop = same ? forecast_stop_in_doubt(h, p, target) : 0;
-	if (stop > 0) { /* the estimate itself is compared */
-		target = stop;
-		f.margin = f.margin_sd = 0;
-	}
+	bool same = run == FORECAST_SAME, samples = p->kind == PLAN_SAMPLES && target > 0;
+	double rare_stop = samples ? stated_error_rare_stop(target, last_factor(h)) : 0;
 	for (int i = 0; i < PLAYS; i++) {
 		struct play y = play_of(&f, &d);
-		s.rounds[i] = play_target(&f, &y, p, target, run, &d);
+		if (same)
+			condition(&f, &y, in_doubt(end), &d);
+		s.rounds[i] = play_target(&f, &y, p, target, rare_stop, run, &d);
 		s.work[i] = s.rounds[i] * round;
 		double more = s.work[i] - (same ? end->work : 0);
 		s.cpu[i] = (same ? end->cpu_seconds : 0) + more * y.cpu;

@@ -10,8 +10,10 @@
  * deviations of two looks correlate by the root of the ratio of their work. Level and trend are fitted by generalized
  * least squares to the looks of about the last decade, the trend with a prior around 0; after the last look it decays.
  * Then renders are simulated: a level, a trend, the time per sample, and a deviation at each look, until the upper end
- * of the interval meets the target. The quantiles of their costs are the result, which therefore includes the margin,
- * the schedule of looks and the luck of the stopping rule.
+ * of the interval meets the target. Samples whose light is rare leave that interval unknown, and a render then goes on
+ * until a multiple of the estimate meets the target (stated_error_upper): simulated renders are in doubt as often as
+ * the looks, half of it for good. The quantiles of their costs are the result, which therefore includes the margin, the
+ * schedule of looks and the luck of the stopping rule.
  */
 #ifndef COMMON_ESTIMATE_FORECAST_H
 #define COMMON_ESTIMATE_FORECAST_H
@@ -68,7 +70,7 @@ bool forecast_error_at(const struct forecast_history *h, double work, struct for
  * target (stated_error_rare_stop). 0: it is not in doubt, or made of chains, whose doubt ends. */
 double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target);
 /* When a render of plan p (its rounds; its bounds are ignored) will reach this target. The looks of the same render
- * also tell whether it has to go on until forecast_stop_in_doubt. */
+ * also tell whether it is in doubt now. */
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
 		     struct forecast_cost *c);
 /* The cost of halving the error, counted from the last look; rounds are those of p. */

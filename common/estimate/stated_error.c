@@ -6,8 +6,13 @@
 #include <math.h>
 
 /* Of renders whose light is rare: the estimate up to which they have met most of it, and how far they may be from the
- * truth then. Above, a lamp in a glass shell stated 44 % where 544 % was true. */
-static const double small_error = 0.1, rare_factor = 5;
+ * truth then (tests/image/README.md, "Where the render stops"). Single groups that outweigh all others may be all that
+ * has come of it: a lamp in a glass shell stated 44 % where 544 % was true. */
+static const struct rare_rule {
+	enum error_doubt doubt;
+	double small, factor;
+} rare_rules[] = {{ERROR_ONE_GROUP, 0.1, 5}, {ERROR_TAIL, 0.2, 2.5}};
+enum { RARE_RULES = sizeof rare_rules / sizeof *rare_rules };
 
 static const char no_spread[] = "one group of samples has no error; --spp 2 or more, without --groups 1, gives it one";
 
@@ -104,20 +109,32 @@ void stated_error(const struct canvas_image *img, char *text, size_t size)
 double stated_error_upper(const struct canvas_image *img, bool *doubtful)
 {
 	double error = sqrt(img->rel_mse), upper = sqrt(img->rel_mse_upper);
-	bool samples = !img->r_hat, rare = img->rel_mse_doubt == ERROR_ONE_GROUP || img->rel_mse_doubt == ERROR_TAIL;
-	bool small = samples && rare && error <= small_error;
-	*doubtful = img->rel_mse_doubt != ERROR_KNOWN && !small;
-	return small ? fmax(upper, rare_factor * error) : upper;
+	bool samples = !img->r_hat;
+	*doubtful = img->rel_mse_doubt != ERROR_KNOWN;
+	for (size_t i = 0; i < RARE_RULES && samples; i++) {
+		const struct rare_rule *r = &rare_rules[i];
+		if (img->rel_mse_doubt != r->doubt || !(error <= r->small))
+			continue;
+		*doubtful = false;
+		return fmax(upper, r->factor * error);
+	}
+	return upper;
 }
 
-double stated_error_rare_stop(double target)
+double stated_error_rare_factor(double error, double upper)
 {
-	return fmin(target / rare_factor, small_error);
+	for (size_t i = 0; i < RARE_RULES; i++)
+		if (fabs(upper / (rare_rules[i].factor * error) - 1) < 1e-4) /* but for rounding */
+			return rare_rules[i].factor;
+	return 0;
 }
 
-bool stated_error_is_rare(double error, double upper)
+double stated_error_rare_stop(double target, double factor)
 {
-	return upper >= 0.9999 * rare_factor * error; /* but for rounding */
+	const struct rare_rule *r = rare_rules;
+	while (r < rare_rules + RARE_RULES - 1 && r->factor != factor)
+		r++;
+	return fmin(target / r->factor, r->small);
 }
 
 bool stated_error_meets(const struct canvas_image *img, double target)

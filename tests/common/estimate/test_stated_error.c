@@ -364,23 +364,34 @@ static void words(void **state)
 		"brightness is not known well enough; no chain came to 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
 	img.unvisited = 0;
-	/* Rare light may leave the interval unknown for ever: five times the estimate count, once that is small. */
-	static const enum error_doubt rare[] = {ERROR_ONE_GROUP, ERROR_TAIL};
+	/* Rare light may leave the interval unknown for ever: a multiple of the estimate counts, once that is small. */
+	static const struct {
+		enum error_doubt doubt;
+		double small, factor;
+	} rare[] = {{ERROR_ONE_GROUP, 0.1, 5}, {ERROR_TAIL, 0.2, 2.5}};
 	static const enum error_doubt others[] = {ERROR_DARK, ERROR_WIDE, ERROR_SHORT};
 	float chains = 1;
 	for (int i = 0; i < 2; i++) {
-		img.rel_mse_doubt = rare[i];
-		assert_true(stated_error_meets(&img, 0.501) && !stated_error_meets(&img, 0.499));
+		double small = rare[i].small, least = rare[i].factor * small;
+		img.rel_mse_doubt = rare[i].doubt;
+		img.rel_mse = small * small;
+		assert_true(stated_error_meets(&img, 1.001 * least) && !stated_error_meets(&img, 0.999 * least));
+		assert_true(stated_error_rare_factor(small, least * 1.00001) == rare[i].factor);
+		assert_true(fabs(stated_error_rare_stop(0.2, rare[i].factor) * rare[i].factor / 0.2 - 1) < 1e-12);
+		assert_true(stated_error_rare_stop(10, rare[i].factor) == small);
 		img.r_hat = &chains;
-		assert_false(stated_error_meets(&img, 0.501));
+		assert_false(stated_error_meets(&img, 1.001 * least));
 		img.r_hat = NULL;
-		img.rel_mse = 0.0101;
+		img.rel_mse = 1.01 * small * small;
 		assert_false(stated_error_meets(&img, 10));
-		img.rel_mse = 0.01;
+		img.rel_mse = small * small;
 		img.rel_mse_upper = 0.49; /* more than that */
 		assert_true(stated_error_meets(&img, 0.701) && !stated_error_meets(&img, 0.699));
 		img.rel_mse_upper = 0.0121;
 	}
+	assert_true(stated_error_rare_factor(0.1, 0.121) == 0 &&
+		    fabs(stated_error_rare_stop(0.2, 0) / 0.08 - 1) < 1e-12);
+	img.rel_mse = 0.01;
 	for (int i = 0; i < 3; i++) {
 		img.rel_mse_doubt = others[i];
 		assert_false(stated_error_meets(&img, 10));

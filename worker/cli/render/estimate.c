@@ -99,6 +99,9 @@ static void print_table(const struct estimate *s, FILE *f)
 		fprintf(f, "%-8s", text);
 		print_range(f, &row[i].cost.cpu_seconds);
 		print_range(f, &row[i].cost.seconds);
+		double doubt = forecast_stop_in_doubt(s->looks, s->plan, row[i].target);
+		if (doubt > 0)
+			fprintf(f, "  in doubt: stops at %.2g %%", 100 * doubt);
 		if (row[i].reached) {
 			progress_duration(row[i].reached->seconds + s->bootstrap_seconds, text, sizeof text);
 			fprintf(f, "  reached after %s by the pilot", text);
@@ -122,12 +125,15 @@ static json_t *targets_json(const struct estimate *s)
 	struct row row[TARGETS_MOST];
 	size_t count = rows_of(s, row);
 	json_t *list = json_array();
-	for (size_t i = 0; i < count; i++)
-		json_array_append_new(list, json_pack("{s:f s:o s:o s:o s:o}", "error", row[i].target, "mutations",
+	for (size_t i = 0; i < count; i++) {
+		double doubt = forecast_stop_in_doubt(s->looks, s->plan, row[i].target);
+		json_array_append_new(list, json_pack("{s:f s:o s:o s:o s:o s:o}", "error", row[i].target, "mutations",
 						      forecast_range_to_json(&row[i].cost.work), "cpuSeconds",
 						      forecast_range_to_json(&row[i].cost.cpu_seconds), "wallSeconds",
 						      forecast_range_to_json(&row[i].cost.seconds), "reached",
-						      reached_json(s, row[i].reached)));
+						      reached_json(s, row[i].reached), "stopInDoubt",
+						      doubt > 0 ? json_real(doubt) : json_null()));
+	}
 	return list;
 }
 
