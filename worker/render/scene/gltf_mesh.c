@@ -119,6 +119,9 @@ static void grow_box(struct gltf *g, const struct gltf_at *a, const mat4 *to_wor
 	double bound[2][3] = {{0, 0, 0}, {0, 0, 0}};
 	gltf_numbers(g, a, a->json, "min", bound[0], 3);
 	gltf_numbers(g, a, a->json, "max", bound[1], 3);
+	for (int i = 0; i < 6 && json_is_true(json_object_get(a->json, "normalized")); i++)
+		bound[i / 3][i % 3] =
+			gltf_normalized(bound[i / 3][i % 3], gltf_whole(g, a, a->json, "componentType", 0));
 	for (int i = 0; i < 8; i++) {
 		gltf_grow_box(
 			g, mat4_point(to_world, (vec3){bound[i & 1][0], bound[i >> 1 & 1][1], bound[i >> 2 & 1][2]}));

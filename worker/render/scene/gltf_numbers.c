@@ -132,25 +132,36 @@ static unsigned size_of(uint64_t component)
 									     : 0;
 }
 
+double gltf_normalized(double x, uint64_t component)
+{
+	switch (component) {
+	case GLTF_BYTE:
+		return fmax(x / 127, -1);
+	case GLTF_UNSIGNED_BYTE:
+		return x / 255;
+	case GLTF_SHORT:
+		return fmax(x / 32767, -1);
+	case GLTF_UNSIGNED_SHORT:
+		return x / 65535;
+	default:
+		return x;
+	}
+}
+
 static double read_number(const unsigned char *p, uint64_t component, bool normalized)
 {
 	uint32_t bits = (uint32_t)get_bytes(p, (int)size_of(component));
+	double x = bits;
 	float f;
-	switch (component) {
-	case GLTF_BYTE:
-		return normalized ? fmax((int8_t)bits / 127.0, -1) : (int8_t)bits;
-	case GLTF_UNSIGNED_BYTE:
-		return normalized ? bits / 255.0 : bits;
-	case GLTF_SHORT:
-		return normalized ? fmax((int16_t)bits / 32767.0, -1) : (int16_t)bits;
-	case GLTF_UNSIGNED_SHORT:
-		return normalized ? bits / 65535.0 : bits;
-	case GLTF_UNSIGNED_INT:
-		return bits;
-	default:
+	if (component == GLTF_BYTE)
+		x = (int8_t)bits;
+	if (component == GLTF_SHORT)
+		x = (int16_t)bits;
+	if (component == GLTF_FLOAT) {
 		memcpy(&f, &bits, sizeof f);
-		return (double)f;
+		x = (double)f;
 	}
+	return normalized ? gltf_normalized(x, component) : x;
 }
 
 static unsigned components_of(const char *type)

@@ -18,6 +18,8 @@ struct gltf_vectors {
  * as the accessor says. use: what for, in messages. */
 bool gltf_vectors_read(struct gltf *g, const struct gltf_at *accessor, const char *use, unsigned components,
 		       struct gltf_vectors *out);
+/* What a whole number x of that type represents then; others are as they are. */
+double gltf_normalized(double x, uint64_t component);
 void gltf_vectors_fini(struct gltf_vectors *v);
 void gltf_numbers_close(struct gltf *g);
 

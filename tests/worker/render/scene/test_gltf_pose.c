@@ -290,31 +290,52 @@ static void of_a_list(void **state)
 	refuses("nodes[0]: attributes of instances with different numbers of entries");
 }
 
-/* A large mesh of several nodes is in memory once. */
+enum { SIDE = 300, CORNERS = SIDE * SIDE * 6 };
+
+/* Three nodes with a grid of that many units a side, as numbers of that type. */
+static void write_grid(char *json, size_t room, int type, int stride, double scale)
+{
+	snprintf(
+		json, room,
+		"{\"asset\": {\"version\": \"2.0\"}, \"scenes\": [{\"nodes\": [0, 1, 2]}], \"nodes\": [{\"mesh\": 0, "
+		"\"scale\": [%g, %g, 1]}, {\"mesh\": 0, \"translation\": [0, 0, 5], \"scale\": [%g, %g, 1]}, {\"mesh\": 0, "
+		"\"scale\": [%g, %g, -1]}], \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}], "
+		"\"accessors\": [{\"bufferView\": 0, \"componentType\": %d, \"normalized\": %s, \"count\": %d, \"type\": "
+		"\"VEC3\", \"min\": [0, 0, 0], \"max\": [%d, %d, 0]}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": %d, "
+		"\"byteStride\": %d}], \"buffers\": [{\"byteLength\": %d, \"uri\": \"grid.bin\"}]}",
+		scale, scale, scale, scale, scale, scale, type, type == 5126 ? "false" : "true", CORNERS, SIDE, SIDE,
+		CORNERS * stride, stride, CORNERS * stride);
+}
+
+/* A large mesh of several nodes is in memory once; the camera that stands in sees as much of one of whole numbers that
+ * represent -1 to 1. */
 static void of_several_nodes(void **state)
 {
 	(void)state;
-	enum { SIDE = 300, CORNERS = SIDE * SIDE * 6 };
 	static float grid[CORNERS][3];
-	char json[2000];
+	static int16_t whole[CORNERS][4];
+	char json[2][2000];
+	vec3 eye[2];
 	for (int i = 0; i < CORNERS; i++) {
 		static const int x[6] = {0, 1, 0, 1, 1, 0}, y[6] = {0, 0, 1, 0, 1, 1};
-		grid[i][0] = (float)(i / 6 % SIDE + x[i % 6]);
-		grid[i][1] = (float)(i / 6 / SIDE + y[i % 6]);
+		whole[i][0] = (int16_t)(i / 6 % SIDE + x[i % 6]);
+		whole[i][1] = (int16_t)(i / 6 / SIDE + y[i % 6]);
+		grid[i][0] = whole[i][0];
+		grid[i][1] = whole[i][1];
 	}
-	snprintf(json, sizeof json,
-		 "{\"asset\": {\"version\": \"2.0\"}, \"scenes\": [{\"nodes\": [0, 1, 2]}], \"nodes\": [{\"mesh\": 0}, "
-		 "{\"mesh\": 0, \"translation\": [0, 0, 5]}, {\"mesh\": 0, \"scale\": [1, 1, -1]}], \"meshes\": "
-		 "[{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}], \"accessors\": [{\"bufferView\": 0, "
-		 "\"componentType\": 5126, \"count\": %d, \"type\": \"VEC3\", \"min\": [0, 0, 0], \"max\": [%d, %d, "
-		 "0]}], \"bufferViews\": [{\"buffer\": 0, \"byteLength\": %zu}], \"buffers\": [{\"byteLength\": %zu, "
-		 "\"uri\": \"grid.bin\"}]}",
-		 CORNERS, SIDE, SIDE, sizeof grid, sizeof grid);
-	const struct memory_file list[] = {
-		{"s.gltf", json, strlen(json)}, {"grid.bin", (const char *)grid, sizeof grid}, {0}};
-	struct world *w = world_of_files(4, 4, list);
-	assert_int_equal(w->instance_count, 3);
-	world_free(w);
+	write_grid(json[0], sizeof json[0], 5126, sizeof grid[0], 1);
+	write_grid(json[1], sizeof json[1], 5122, sizeof whole[0], 32767);
+	for (int i = 0; i < 2; i++) {
+		const struct memory_file list[] = {
+			{"s.gltf", json[i], strlen(json[i])},
+			{"grid.bin", i ? (const void *)whole : grid, i ? sizeof whole : sizeof grid},
+			{0}};
+		struct world *w = world_of_files(4, 4, list);
+		assert_int_equal(w->instance_count, 3);
+		eye[i] = vec3_add(vec3_scale(1 / w->scale, w->camera.position), w->center);
+		world_free(w);
+	}
+	assert_true(eye[0].z > SIDE && vec3_length(vec3_sub(eye[0], eye[1])) < 1e-6 * eye[0].z);
 }
 
 /* ---- animations */
