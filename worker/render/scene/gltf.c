@@ -176,22 +176,30 @@ struct walk {
 	size_t nodes, visited;
 };
 
-static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world)
+static bool is_hidden(struct gltf *g, const struct gltf_at *node)
+{
+	return json_is_false(json_object_get(gltf_extension(g, node, node->json, "KHR_node_visibility"), "visible"));
+}
+
+/* hidden: it and all below, except for cameras. */
+static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world, bool hidden)
 {
 	struct gltf_at what;
+	if (gltf_follow(g, node, node->json, "camera", GLTF_CAMERAS, &what) > 0)
+		gltf_camera(g, &what, to_world);
+	if (hidden)
+		return;
 	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
 	if (gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && instances)
 		gltf_mesh_instances(g, &what, node, instances, to_world);
 	else if (!g->failed && json_object_get(node->json, "mesh"))
 		gltf_mesh(g, &what, node, to_world);
-	if (gltf_follow(g, node, node->json, "camera", GLTF_CAMERAS, &what) > 0)
-		gltf_camera(g, &what, to_world);
 	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
 	if (light && gltf_follow(g, node, light, "light", GLTF_LIGHTS, &what) > 0)
 		gltf_light(g, &what, to_world);
 }
 
-static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth)
+static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, bool hidden)
 {
 	struct gltf *g = w->g;
 	struct gltf_at node;
@@ -207,7 +215,8 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth)
 		return;
 	}
 	mat4 own = gltf_node_matrix(g, &node), to_world = mat4_mul(*above, own);
-	visit_lists(g, &node, &to_world);
+	hidden |= is_hidden(g, &node);
+	visit_lists(g, &node, &to_world, hidden);
 	const json_t *children = json_object_get(node.json, "children");
 	w->above[index] = true;
 	for (size_t i = 0; i < json_array_size(children) && !g->failed; i++) {
@@ -215,7 +224,7 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth)
 		if (!json_is_integer(child) || json_integer_value(child) < 0)
 			gltf_fail(g, &node, EINVAL, "its children are not indices");
 		else
-			visit(w, (uint64_t)json_integer_value(child), &to_world, depth + 1);
+			visit(w, (uint64_t)json_integer_value(child), &to_world, depth + 1, hidden);
 	}
 	w->above[index] = false;
 }
@@ -239,7 +248,7 @@ static void read_scene(struct gltf *g)
 		if (!json_is_integer(root) || json_integer_value(root) < 0)
 			gltf_fail(g, &scene, EINVAL, "its nodes are not indices");
 		else
-			visit(&w, (uint64_t)json_integer_value(root), &world, 0);
+			visit(&w, (uint64_t)json_integer_value(root), &world, 0, false);
 	}
 }
 

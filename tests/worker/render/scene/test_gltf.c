@@ -333,6 +333,42 @@ static void test_no_camera_no_light(void **state)
 	scene_fini(&s);
 }
 
+static unsigned count_of(const struct scene *s, enum plugin_class cls)
+{
+	unsigned n = 0;
+	for (uint32_t i = 0; i < s->object_count; i++)
+		n += s->objects[i]->cls == cls;
+	return n;
+}
+
+#define HIDDEN(value) "\"extensions\": {\"KHR_node_visibility\": {" value "}"
+
+/* Neither shapes nor lights of a hidden node and those below are there, but its camera is. */
+static void test_hidden(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *from, *to;
+		unsigned shapes, points;
+	} cases[] = {
+		{"\"children\": [2, 3]", "\"children\": [2, 3], " HIDDEN("\"visible\": false") "}", 2, 1},
+		{"\"children\": [2, 3]", "\"children\": [2, 3], " HIDDEN("") "}", 4, 1},
+		{"{\"camera\": 0", "{" HIDDEN("\"visible\": false") "}, \"camera\": 0", 4, 1},
+		{"{\"translation\": [2, 2, 2], \"extensions\": {",
+		 "{\"translation\": [2, 2, 2], " HIDDEN("\"visible\": false") ", ", 4, 0},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct scene s = gltf_files_scene(cases[i].from, cases[i].to, false);
+		unsigned points = 0;
+		for (uint32_t k = 0; k < s.object_count; k++)
+			points += strcmp(s.objects[k]->type, "point") == 0;
+		assert_int_equal(count_of(&s, PLUGIN_SHAPE), cases[i].shapes);
+		assert_int_equal(points, cases[i].points);
+		assert_false(scene_has_note(&s, "no camera") || scene_has_note(&s, "not supported"));
+		scene_fini(&s);
+	}
+}
+
 /* Nothing is left out in silence. */
 static void test_notes(void **state)
 {
@@ -358,6 +394,7 @@ int main(void)
 		cmocka_unit_test(test_lights_and_cameras),
 		cmocka_unit_test(test_no_camera_no_light),
 		cmocka_unit_test(test_versions_of_blender),
+		cmocka_unit_test(test_hidden),
 		cmocka_unit_test(test_notes),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);
