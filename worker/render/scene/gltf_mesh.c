@@ -174,15 +174,26 @@ static void find_sources(struct gltf *g, struct gltf_primitive *p, const json_t 
 		gltf_fail(g, p->mesh, EINVAL, "a primitive has no POSITION");
 }
 
+/* Of what Draco compressed, the accessors may have the numbers besides, for those who cannot decompress them. */
+static void check_draco(struct gltf *g, const struct gltf_primitive *p)
+{
+	if (!gltf_extension(g, p->mesh, p->json, "KHR_draco_mesh_compression"))
+		return;
+	for (int i = 0; i < GLTF_SOURCES; i++) {
+		const json_t *a = p->sources[i].json;
+		if (a && !json_object_get(a, "bufferView") && !json_object_get(a, "sparse"))
+			gltf_fail(
+				g, p->mesh, ENOTSUP,
+				"compressed by Draco (KHR_draco_mesh_compression), which is not supported; export without "
+				"compression (Blender: switch Compression off), or compress with EXT_meshopt_compression");
+	}
+}
+
 static void put_primitive(struct gltf *g, struct xml_element *parent, const struct gltf_at *mesh,
 			  const struct gltf_at *node, const json_t *primitive, mat4 to_world)
 {
 	uint64_t mode = gltf_whole(g, mesh, primitive, "mode", MODE_TRIANGLES);
 	const json_t *attributes = gltf_object(g, mesh, primitive, "attributes");
-	if (gltf_extension(g, mesh, primitive, "KHR_draco_mesh_compression")) {
-		gltf_fail(g, mesh, ENOTSUP, "KHR_draco_mesh_compression is not supported; export without compression");
-		return;
-	}
 	if (mode < MODE_TRIANGLES) {
 		gltf_note(g, "points and lines have no area and are left out");
 		return;
@@ -196,6 +207,7 @@ static void put_primitive(struct gltf *g, struct xml_element *parent, const stru
 	/* All of a .glb stands in one line: messages name shapes by this. */
 	gltf_attribute(g, p.shape, "id", "shape %u, of meshes[%zu]", g->primitives, mesh->index);
 	find_sources(g, &from, attributes);
+	check_draco(g, &from);
 	if (g->failed)
 		return;
 	if (gltf_is_posed(g, &from))

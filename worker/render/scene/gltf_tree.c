@@ -258,6 +258,7 @@ bool gltf_knows(const char *extension)
 	static const char *const known[] = {
 		"EXT_mesh_gpu_instancing",
 		"EXT_texture_webp",
+		"KHR_draco_mesh_compression",
 		"KHR_lights_punctual",
 		"KHR_materials_anisotropy",
 		"KHR_materials_clearcoat",
