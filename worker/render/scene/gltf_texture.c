@@ -2,8 +2,9 @@
 /*
  * A texture becomes a `bitmap` with the sampler's wrap modes and the transform of KHR_texture_transform, inside a
  * `scale` if it has a factor. Of a material's sets of texture coordinates one is the shape's, by which normal maps
- * bend, and another its attribute vertex_texcoord. Failures: indices of nothing, images of formats without a source. A
- * third set becomes a property that no table knows: refused with its name, or left out with --lenient.
+ * bend, and another its attribute vertex_texcoord. Failures: indices of nothing, textures without a source. A third set
+ * becomes a property that no table knows, and an image of a format that is not read a texture of such a type: refused
+ * with its name, or left out with --lenient.
  */
 #include "worker/render/scene/gltf_texture.h"
 #include "worker/render/scene/gltf_buffer.h"
@@ -81,6 +82,16 @@ struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 	return sets;
 }
 
+/* Images that are not read, of textures without another: refused by this name, or left out. NULL: none is known. */
+static const char *foreign_format(const struct gltf_at *texture)
+{
+	static const char *const formats[] = {"KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds"};
+	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++)
+		if (json_object_get(json_object_get(texture->json, "extensions"), formats[i]))
+			return formats[i];
+	return NULL;
+}
+
 void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
 		      const json_t *info, const struct gltf_channel *c)
 {
@@ -92,7 +103,12 @@ void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_
 	}
 	/* Where there are two, the other is for those who cannot read WebP. */
 	const json_t *webp = gltf_extension(g, &texture, texture.json, "EXT_texture_webp");
-	if (gltf_follow(g, &texture, webp ? webp : texture.json, "source", GLTF_IMAGES, &image) <= 0) {
+	int found = gltf_follow(g, &texture, webp ? webp : texture.json, "source", GLTF_IMAGES, &image);
+	if (found == 0 && foreign_format(&texture)) {
+		gltf_plugin(g, el, &texture, "texture", foreign_format(&texture), name);
+		return;
+	}
+	if (found <= 0) {
 		gltf_fail(g, &texture, ENOTSUP, "it has no source that is PNG, JPEG or WebP");
 		return;
 	}

@@ -77,6 +77,9 @@ int refuse_type(const struct plugin_decl *decls, const struct xml_element *el, e
 {
 	char hint[128], near[128] = "", list[512];
 	struct spelling s = {.wanted = type};
+	if (cls == PLUGIN_TEXTURE && gltf_is(el->file)) /* an extension, which names the format of an image */
+		return xml_error(el, e, ENOTSUP, "images of %.64s are not supported; export PNG, JPEG or WebP%s", type,
+				 LENIENT_TEXTURE_HINT);
 	plugin_offer_types(decls, cls, &s);
 	plugin_list_types(decls, cls, list, sizeof list);
 	if (plugin_is_mitsubas(cls, type))

@@ -227,6 +227,48 @@ static void test_webp(void **state)
 	scene_fini(&s);
 }
 
+/* Of an image that is not read the one for those who cannot read it is taken; without that it has to be converted. */
+static void test_foreign_images(void **state)
+{
+	(void)state;
+	static const char *const formats[] = {"KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds"};
+	static struct gltf_files f;
+	for (int i = 0; i < 3; i++)
+		for (int both = 0; both < 2; both++) {
+			char to[256], want[256];
+			struct scene s;
+			struct error e = {""};
+			gltf_files_make(&f);
+			snprintf(to, sizeof to, "{%s\"extensions\": {\"%s\": {\"source\": 1}}, ",
+				 both ? "\"source\": 0, " : "", formats[i]);
+			gltf_files_replace(&f, "{\"source\": 0, ", to);
+			gltf_files_replace(&f, "{\"uri\": \"rgb.hdr\"}",
+					   "{\"uri\": \"rgb.hdr\"}, {\"uri\": \"b.ktx2\"}");
+			snprintf(to, sizeof to, "\"extensionsRequired\": [\"%s\"], \"extensionsUsed\"", formats[i]);
+			gltf_files_replace(&f, "\"extensionsUsed\"", to);
+			gltf_files_pack(&f, GLTF_EXTERNAL);
+			int rc = gltf_files_read(f.list, false, &s, &e);
+			if (both) {
+				assert_int_equal(rc, 0);
+				const struct scene_node *scale =
+					node_ref(scene_named(&s, "bsdf of materials[1]"), "base_color");
+				assert_string_equal(node_string(node_child(scale, PLUGIN_TEXTURE, 0), "filename", ""),
+						    "rgb.hdr");
+				scene_fini(&s);
+				continue;
+			}
+			snprintf(
+				want, sizeof want,
+				"images of %s are not supported; export PNG, JPEG or WebP; --lenient leaves the texture out",
+				formats[i]);
+			assert_true(rc == -ENOTSUP && strstr(e.text, want));
+			assert_int_equal(gltf_files_read(f.list, true, &s, &e), 0);
+			assert_null(node_find(scene_named(&s, "bsdf of materials[1]"), "base_color"));
+			assert_true(scene_has_note(&s, formats[i]));
+			scene_fini(&s);
+		}
+}
+
 /* Without a material: the format's default, which is metal, or Blender's, which is grey. */
 static void test_no_material(void **state)
 {
@@ -314,6 +356,7 @@ int main(void)
 		cmocka_unit_test(test_images_in_buffers),
 		cmocka_unit_test(test_no_material),
 		cmocka_unit_test(test_webp),
+		cmocka_unit_test(test_foreign_images),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
 }
