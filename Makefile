@@ -39,7 +39,7 @@ CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen $(OPENEXR) -MMD -MP
 LDFLAGS  := $(if $(SAN),-fsanitize=$(SAN)) $(EXTRA_LDFLAGS)
 
 LIBS_COMMON := -lOpenEXRCore -lprotobuf-c -luv -lssl -lcrypto -ljansson -lsqlite3 -lm -lpthread
-LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lwebp -lz -lOpenEXR
+LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lwebp -lmeshoptimizer -lz -lOpenEXR
 
 COMMON_SRC := $(wildcard common/*/*.c)
 RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/render/*.c worker/render/*/*.c))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A glTF scene with files beside it, embedded and as .glb: one picture, which is that of its twin in XML, here and on a farm; a
-# normal map is a tilted surface.
+# A glTF scene with files beside it, embedded and as .glb: one picture, which is that of its twin in XML, here and on a farm, and nearly
+# that of what gltfpack makes of it; a normal map is a tilted surface.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare hslt-scene
 
@@ -32,10 +32,24 @@ picture map map.glb --integrator path --spp 16
 picture normals normals.glb --integrator path --spp 16
 near map normals 0.01
 
+# put on a grid of 2^16 points by another program, which moves edges by a little; compressed, without and with filters
+command -v gltfpack >/dev/null || lacks "gltfpack"
+for form in grid packed:-c filtered:-cc; do
+	name=${form%:*} how=${form#"$name"}
+	gltfpack -vp 16 -vt 16 -vn 16 ${how#:} -i "$DIR/one.glb" -o "$DIR/$name.gltf" >/dev/null
+	picture "$name" "$name.gltf" --integrator path --spp 64 --set backs=lit
+done
+for word in EXT_meshopt_compression KHR_mesh_quantization KHR_texture_transform OCTAHEDRAL; do
+	grep -q "$word" "$DIR/filtered.gltf" || fail "gltfpack wrote no $word"
+done
+near grid one.glb 10
+near packed grid 0.01
+near filtered grid 2
+
 # on a farm, whose workers have nothing but what they were sent
 start_coordinator -v
 start_worker one --threads 1
-for form in files.gltf one.glb; do
+for form in files.gltf one.glb packed.gltf; do
 	picture quiet "$form" --integrator bdpt --spp 8
 	"$BIN/hslt-submit" "$DIR/$form" -o "$DIR/farm.exr" --size 72x48 --integrator bdpt --spp 8 --wait >/dev/null
 	same "$DIR/farm.exr" "$DIR/quiet.exr"

@@ -18,12 +18,15 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	(void)argc, (void)argv;
 	if (!seeds_wanted())
 		return 0;
-	gltf_files_make(&f);
-	for (int form = 0; form < GLTF_FORMS; form++) {
-		gltf_files_pack(&f, (enum gltf_form)form);
+	for (int i = 0; i < 2 * GLTF_FORMS; i++) {
+		enum gltf_form form = (enum gltf_form)(i % GLTF_FORMS);
+		gltf_files_make(&f);
+		if (i >= GLTF_FORMS)
+			gltf_files_compress(&f, "EXT_meshopt_compression");
+		gltf_files_pack(&f, form);
 		bytes[0] = (unsigned char)(form == GLTF_BINARY);
 		memcpy(bytes + 1, f.file, f.file_size);
-		seed_file("gltf", (uint64_t)form, bytes, 1 + f.file_size);
+		seed_file("gltf", (uint64_t)i, bytes, 1 + f.file_size);
 	}
 	exit(0);
 }

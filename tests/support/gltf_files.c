@@ -18,6 +18,7 @@
 #include <string.h>
 
 #include <cmocka.h>
+#include <meshoptimizer.h>
 
 /* BUFFER stands for what names the buffer's bytes. One entry a line, as messages name lines. */
 static const char template[] =
@@ -133,6 +134,57 @@ void gltf_files_make(struct gltf_files *f)
 		put_bits(f, strip_uv[i / 2][i % 2] ? 65535 : 0, 2);
 	for (int i = 0; i < 8; i++)
 		put_bits(f, fan_uv[i / 2][i % 2] ? 255 : 0, 1);
+}
+
+/* Into `out`: its size. Indices of two bytes as a sequence, of four as triangles. */
+static size_t compress(unsigned char *out, size_t room, const unsigned char *from, size_t count, size_t stride,
+		       char mode)
+{
+	unsigned index[32] = {0};
+	float vertices[64]; /* aligned */
+	assert(count * stride <= sizeof vertices && (mode == 'A' || count <= 32));
+	memcpy(vertices, from, count * stride);
+	for (size_t i = 0; mode != 'A' && i < count; i++)
+		memcpy(&index[i], from + i * stride, stride);
+	meshopt_encodeVertexVersion(0);
+	return mode == 'A'   ? meshopt_encodeVertexBuffer(out, room, vertices, count, stride)
+	       : mode == 'T' ? meshopt_encodeIndexBuffer(out, room, index, count)
+			     : meshopt_encodeIndexSequence(out, room, index, count);
+}
+
+void gltf_files_compress(struct gltf_files *f, const char *extension)
+{
+	static const struct {
+		unsigned first, stride, count;
+		const char *mode;
+	} views[] = {{1, 12, 6, "ATTRIBUTES"},	 {73, 8, 6, "ATTRIBUTES"},   {121, 2, 24, "INDICES"},
+		     {169, 4, 24, "TRIANGLES"},	 {289, 32, 6, "ATTRIBUTES"}, {481, 12, 4, "ATTRIBUTES"},
+		     {529, 12, 4, "ATTRIBUTES"}, {577, 4, 4, "ATTRIBUTES"}};
+	char from[256], to[512];
+	assert(f->buffer_size == GLTF_FILES_PLAIN);
+	for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
+		unsigned char packed[512], *bytes = f->buffer + views[i].first;
+		unsigned length = views[i].count * views[i].stride;
+		size_t size = compress(packed, sizeof packed, bytes, views[i].count, views[i].stride, *views[i].mode);
+		assert(size > 0);
+		memset(bytes, 0xff, length);
+		snprintf(from, sizeof from, "{\"buffer\": 0, \"byteOffset\": %u, \"byteLength\": %u", views[i].first,
+			 length);
+		snprintf(
+			to, sizeof to,
+			"{\"buffer\": 1, \"byteOffset\": 0, \"byteLength\": %u, \"extensions\": {\"%s\": {\"buffer\": 0, "
+			"\"byteOffset\": %zu, \"byteLength\": %zu, \"byteStride\": %u, \"mode\": \"%s\", \"count\": %u}}",
+			length, extension, f->buffer_size, size, views[i].stride, views[i].mode, views[i].count);
+		gltf_files_replace(f, from, to);
+		append(f, packed, size);
+	}
+	snprintf(from, sizeof from, "\"byteLength\": %d}]}", GLTF_FILES_PLAIN);
+	snprintf(to, sizeof to,
+		 "\"byteLength\": %zu},\n{\"byteLength\": %d, \"extensions\": {\"%s\": {\"fallback\": true}}}]}",
+		 f->buffer_size, GLTF_FILES_PLAIN, extension);
+	gltf_files_replace(f, from, to);
+	snprintf(to, sizeof to, "\"extensionsRequired\": [\"%s\"], \"extensionsUsed\"", extension);
+	gltf_files_replace(f, "\"extensionsUsed\"", to);
 }
 
 void gltf_files_replace(struct gltf_files *f, const char *from, const char *to)

@@ -13,7 +13,7 @@ enum gltf_form { GLTF_EXTERNAL, GLTF_EMBEDDED, GLTF_BINARY, GLTF_FORMS };
 
 struct gltf_files {
 	char json[1 << 15];
-	unsigned char buffer[1 << 10], file[1 << 16];
+	unsigned char buffer[1 << 11], file[1 << 16];
 	size_t buffer_size, file_size;
 	struct memory_file list[8]; /* the scene first */
 };
@@ -22,6 +22,11 @@ struct gltf_files {
  * pictures "rgb.hdr"; the caller adds them to the list. */
 void gltf_files_make(struct gltf_files *f);
 void gltf_files_pack(struct gltf_files *f, enum gltf_form form);
+/* After gltf_files_make: the numbers of all meshes but the lamp's coordinates, compressed by the library's encoder;
+ * what they were is not in the buffer any more. */
+void gltf_files_compress(struct gltf_files *f, const char *extension);
+/* Where the compressed bytes begin in the buffer. */
+enum { GLTF_FILES_PLAIN = 601 };
 /* Every `from` in the JSON becomes `to`; fails the test where there is none. */
 void gltf_files_replace(struct gltf_files *f, const char *from, const char *to);
 

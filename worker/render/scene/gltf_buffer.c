@@ -6,6 +6,7 @@
  */
 #include "worker/render/scene/gltf_buffer.h"
 #include "worker/render/scene/asset_name.h"
+#include "worker/render/scene/gltf_meshopt.h"
 #include "worker/render/scene/gltf_tree.h"
 
 #include <string.h>
@@ -98,8 +99,8 @@ int gltf_buffer_view(struct gltf *g, const struct gltf_at *view, struct gltf_ran
 		     uint64_t *count)
 {
 	struct gltf_at at;
-	if (gltf_extension(g, view, view->json, "EXT_meshopt_compression"))
-		return gltf_fail(g, view, ENOTSUP, "EXT_meshopt_compression is not supported");
+	if (gltf_meshopt(g, view))
+		return gltf_fail(g, view, EINVAL, "it is compressed, as only numbers may be");
 	int rc = gltf_follow(g, view, view->json, "buffer", GLTF_BUFFERS, &at);
 	if (rc <= 0)
 		return rc ? rc : gltf_fail(g, view, EINVAL, "it has no buffer");

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The buffer of the last accessor stays open, because neighbours share it, and so does every buffer in base64, because
- * decoding one for each of many accessors could take hours. Its file joins those that the scene consists of (the tree's
- * includes), as no shape names it. Failures: as the accessor says it, views that are too short, more numbers than a
- * mesh may have.
+ * decoding one for each of many accessors could take hours. So does what was compressed. Its file joins those that the
+ * scene consists of (the tree's includes), as no shape names it. Failures: as the accessor says it, views that are too
+ * short, more numbers than a mesh may have.
  */
 #include "worker/render/scene/gltf_numbers.h"
 
@@ -13,6 +13,7 @@
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/scene/asset_range.h"
 #include "worker/render/scene/gltf_buffer.h"
+#include "worker/render/scene/gltf_meshopt.h"
 
 #include <math.h>
 #include <string.h>
@@ -35,8 +36,15 @@ static void close_open(struct gltf *g, struct gltf_open *o)
 		asset_range_close(&o->part, g->assets);
 }
 
+static size_t views_of(const struct gltf *g)
+{
+	return json_array_size(json_object_get(g->root, gltf_array_name(GLTF_BUFFER_VIEWS)));
+}
+
 void gltf_numbers_close(struct gltf *g)
 {
+	for (size_t i = 0; g->unpacked && i < views_of(g); i++)
+		mem_free(g->unpacked[i].bytes);
 	close_open(g, g->plain);
 	for (; g->decoded; g->decoded = g->decoded->next)
 		close_open(g, g->decoded);
@@ -108,8 +116,8 @@ static const struct gltf_open *open_buffer(struct gltf *g, const struct gltf_ran
 	return !g->failed && list_file(g, r->file) ? o : NULL;
 }
 
-/* The bytes of a view, valid until those of another buffer are wanted. NULL after a failure. */
-static const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
+/* The bytes of a view as it stands, valid until those of another buffer are wanted. NULL after a failure. */
+static const unsigned char *stored_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
 {
 	struct gltf_range buffer;
 	uint64_t first;
@@ -120,6 +128,29 @@ static const unsigned char *gltf_view_bytes(struct gltf *g, const struct gltf_at
 		return o->part.bytes + first;
 	gltf_fail(g, view, EINVAL, "it exceeds its buffer of %zu bytes", o->part.size);
 	return NULL;
+}
+
+/* Each is decompressed once: files may have one view for the numbers of all meshes. */
+static const unsigned char *view_bytes(struct gltf *g, const struct gltf_at *view, uint64_t *count)
+{
+	const json_t *packed = gltf_meshopt(g, view);
+	uint64_t size;
+	if (!packed)
+		return stored_bytes(g, view, count);
+	if (!g->unpacked)
+		g->unpacked = arena_alloc(g->arena, views_of(g), sizeof *g->unpacked);
+	if (!g->unpacked) {
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+		return NULL;
+	}
+	struct gltf_unpacked *u = &g->unpacked[view->index];
+	if (!u->bytes) {
+		const unsigned char *bytes =
+			stored_bytes(g, &(struct gltf_at){view->array, view->index, packed}, &size);
+		u->bytes = bytes ? gltf_meshopt_decode(g, view, packed, bytes, size, &u->count) : NULL;
+	}
+	*count = u->count;
+	return u->bytes;
 }
 
 /* ---- numbers ---- */
@@ -187,7 +218,7 @@ static void unpack(struct gltf *g, const struct gltf_at *a, const struct gltf_at
 		   uint64_t count, const double *to, struct gltf_vectors *out)
 {
 	uint64_t size, width = size_of(p->component), used = width * out->components;
-	const unsigned char *bytes = gltf_view_bytes(g, view, &size);
+	const unsigned char *bytes = view_bytes(g, view, &size);
 	if (!bytes)
 		return;
 	if (p->stride < used || p->offset > size ||

@@ -11,6 +11,7 @@
 #include "common/base/mem.h"
 #include "worker/render/scene/asset_range.h"
 #include "worker/render/scene/gltf_buffer.h"
+#include "worker/render/scene/gltf_meshopt.h"
 #include "worker/render/scene/gltf_node.h"
 #include "worker/render/scene/gltf_numbers.h"
 
@@ -36,9 +37,12 @@ static bool is_in_place(struct gltf *g, const struct gltf_at *a, enum gltf_sourc
 		return false;
 	if (json_object_get(a->json, "sparse") || !json_object_get(a->json, "bufferView"))
 		return false;
-	if (gltf_follow(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) <= 0 ||
-	    gltf_buffer_view(g, &view, &own, &first, &count))
+	if (gltf_follow(g, a, a->json, "bufferView", GLTF_BUFFER_VIEWS, &view) <= 0)
 		return true; /* an error, which is said already */
+	if (gltf_meshopt(g, &view))
+		return false;
+	if (gltf_buffer_view(g, &view, &own, &first, &count))
+		return true;
 	if (!buffer->file)
 		*buffer = own;
 	return strcmp(own.file, buffer->file) == 0 && own.first == buffer->first;
@@ -254,7 +258,7 @@ static void put_bytes(struct gltf *g, struct xml_element *shape, const struct gl
 	for (int i = 0; i < GLTF_SOURCES; i++)
 		size += v[i].x ? bytes_of(&v[i]) : 0;
 	if (size > EMBEDDED_MAX || (g->embedded_bytes += size) > EMBEDDED_MAX) {
-		gltf_fail(g, p->mesh, E2BIG, "more than %llu MB of vertices are quantized, sparse or moved",
+		gltf_fail(g, p->mesh, E2BIG, "more than %llu MB of vertices are compressed, quantized, sparse or moved",
 			  (unsigned long long)EMBEDDED_MAX >> 20);
 		return;
 	}

@@ -52,6 +52,12 @@ struct gltf_at {
 	const json_t *json; /* an object */
 };
 
+/* A compressed view's numbers. */
+struct gltf_unpacked {
+	unsigned char *bytes; /* mem_alloc'd; NULL: not wanted so far */
+	uint64_t count;
+};
+
 /* Where the bytes of a buffer, a view or an image are. */
 struct gltf_range {
 	const char *file;
@@ -79,6 +85,8 @@ struct gltf {
 	unsigned embedded, primitives;
 	unsigned char *material_made;	   /* bits 1 << enum gltf_colours */
 	struct gltf_open *plain, *decoded; /* open buffers: the last that is a file; a list of those in base64 */
+	struct gltf_unpacked *unpacked;	   /* of each view; NULL: no compressed one was wanted so far */
+	uint64_t unpacked_bytes;	   /* of them all */
 	size_t *parents;		   /* of each node (gltf_node.h); NULL: not needed so far */
 	uint64_t embedded_bytes;	   /* of vertices that are computed */
 	uint64_t read;			   /* bytes of files with buffers, so far */
