@@ -270,6 +270,55 @@ static void test_filters(void **state)
 	}
 }
 
+/* Five colours as meshoptimizer 1.3 writes them with 8, 6 and 12 bits, the last into components of two bytes. */
+static void test_colours(void **state)
+{
+	(void)state;
+	enum { COLOURS = 5 };
+	static const double colours[COLOURS][4] = {
+		{1, 0, 0, 1}, {0.25, 0.5, 0.75, 0.5}, {0, 0, 0, 0}, {1, 1, 1, 1}, {0.1, 0.9, 0.3, 0.2}};
+	static const int8_t eight[] = {64, 127,	 -63, -1, -128, -63, 0,	   -64, 0,  0,
+				       0,  -128, -1,  0,  0,	-1,  -115, -25, 89, -103},
+			    six[] = {16, 31, -15, 63, 32, -15, 0, 48, 0, 0, 0, 32, 63, 0, 0, 63, 35, -6, 22, 38};
+	static const int16_t twelve[] = {1024, 2047, -1023, 4095, 2048, -1023, 0,    3072, 0,	 0,
+					 0,    2048, 4095,  0,	  0,	4095,  2253, -409, 1433, 2457};
+	static const struct {
+		const void *numbers;
+		int stride, bits;
+	} cases[] = {{eight, 4, 8}, {six, 4, 6}, {twelve, 8, 12}};
+	static const float position[3 * COLOURS] = {0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 1, 0, 2, 0, 0};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct built b;
+		own.size = 0;
+		*own.views = 0;
+		meshopt_encodeVertexVersion(0);
+		put_view(position, COLOURS, 12, "NONE");
+		put_view(cases[i].numbers, COLOURS, (size_t)cases[i].stride, "COLOR");
+		int n = snprintf(
+			own.json, sizeof own.json,
+			"{\"asset\": {\"version\": \"2.0\"}, \"scenes\": [{\"nodes\": [0]}], \"nodes\": [{\"mesh\": 0}], \"meshes\": "
+			"[{\"primitives\": [{\"mode\": 5, \"attributes\": {\"POSITION\": 0, \"COLOR_0\": 1}}]}], \"accessors\": "
+			"[{\"bufferView\": 0, \"componentType\": 5126, \"type\": \"VEC3\", \"count\": 5}, {\"bufferView\": 1, "
+			"\"componentType\": %d, \"normalized\": true, \"type\": \"VEC4\", \"count\": 5}], \"bufferViews\": [%s], "
+			"\"buffers\": [{\"uri\": \"b\", \"byteLength\": %zu}, {\"byteLength\": 9999}]}",
+			cases[i].stride == 4 ? 5121 : 5123, own.views, own.size);
+		assert_true(n > 0 && (size_t)n < sizeof own.json);
+		const struct memory_file files[] = {{"s.gltf", own.json, (size_t)n}, {"b", own.bytes, own.size}, {0}};
+		build_sound(files, &b);
+		const struct mesh *m = &b.shapes[0].mesh;
+		assert_int_equal(m->attribute_count, 2);
+		assert_string_equal(m->attributes[0].name, "vertex_color");
+		for (int k = 0; k < 4 * COLOURS; k++) {
+			double got = (double)(k % 4 < 3 ? m->attributes[0].value[k / 4 * 3 + k % 4]
+							: m->attributes[1].value[k / 4]),
+			       step = 1.0 / ((1 << cases[i].bits) - 1);
+			if (!(fabs(got - colours[k / 4][k % 4]) < (k % 4 < 3 ? 2 : 3) * step))
+				fail_msg("%d bits, number %d: %g", cases[i].bits, k, got);
+		}
+		fini(&b);
+	}
+}
+
 /* ---- one change each */
 
 static void refuses(const struct memory_file *files, const char *text)
@@ -289,7 +338,8 @@ static const struct {
 	{{"\"ATTRIBUTES\""},
 	 {"\"POINTS\""},
 	 "bufferViews[6]: compressed by meshopt's mode \"POINTS\", which is not supp"},
-	{{WIDE}, {WIDE ", \"filter\": \"COLOR\""}, "meshopt's filter \"COLOR\", which is not supported"},
+	{{WIDE}, {WIDE ", \"filter\": \"GREY\""}, "meshopt's filter \"GREY\", which is not supported"},
+	{{WIDE}, {WIDE ", \"filter\": \"COLOR\""}, "meshopt's ATTRIBUTES cannot have"},
 	{{WIDE},
 	 {WIDE ", \"filter\": \"QUATERNION\""},
 	 "a byteStride, filter or count that meshopt's ATTRIBUTES cannot have"},
@@ -416,9 +466,9 @@ static void test_memory(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_twin),	cmocka_unit_test(test_filters),	 cmocka_unit_test(test_malformed),
-		cmocka_unit_test(test_codings), cmocka_unit_test(test_too_much), cmocka_unit_test(test_damaged),
-		cmocka_unit_test(test_memory),
+		cmocka_unit_test(test_twin),	  cmocka_unit_test(test_filters), cmocka_unit_test(test_colours),
+		cmocka_unit_test(test_malformed), cmocka_unit_test(test_codings), cmocka_unit_test(test_too_much),
+		cmocka_unit_test(test_damaged),	  cmocka_unit_test(test_memory),
 	};
 	return cmocka_run_group_tests_name("gltf_meshopt", tests, NULL, NULL);
 }
