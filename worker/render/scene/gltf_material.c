@@ -157,18 +157,50 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 	return true;
 }
 
+/* What passes diffusely has a share of the light that no metal takes. It is that of a second BSDF, put behind the
+ * material's by put_through, so that the boundary reflects less by this share than in the format. */
+static struct xml_element *put_sheet(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
+				     const json_t *through, double metallic)
+{
+	const json_t *t = gltf_extension(g, at, at->json, "KHR_materials_transmission");
+	double factor = through ? gltf_number(g, at, through, "diffuseTransmissionFactor", 0) * (1 - metallic) : 0;
+	if (!(factor > 0))
+		return parent;
+	if (t && gltf_number(g, at, t, "transmissionFactor", 0) > 0) {
+		gltf_note(g, "KHR_materials_diffuse_transmission of what transmits light otherwise is left out");
+		return parent;
+	}
+	struct xml_element *blend = gltf_plugin(g, parent, at, "bsdf", "blendbsdf", NULL);
+	gltf_put_share(g, blend, at, "weight", factor, gltf_object(g, at, through, "diffuseTransmissionTexture"), "a");
+	return blend;
+}
+
+static void put_through(struct gltf *g, struct xml_element *blend, const struct gltf_at *at, const json_t *through)
+{
+	double rgb[3] = {1, 1, 1};
+	struct xml_element *sheet = gltf_plugin(g, blend, at, "bsdf", "difftrans", NULL);
+	gltf_numbers(g, at, through, "diffuseTransmissionColorFactor", rgb, 3);
+	gltf_put_colour(g, sheet, at, "transmittance", rgb,
+			gltf_object(g, at, through, "diffuseTransmissionColorTexture"));
+}
+
 static void put_principled(struct gltf *g, const struct gltf_at *at, enum gltf_colours colours)
 {
 	const struct gltf_surface s = gltf_surface_read(g, at);
 	if (!colours && put_dispersive(g, at, &s))
 		return;
+	const json_t *through = gltf_extension(g, at, at->json, "KHR_materials_diffuse_transmission");
 	struct xml_element *mask = put_mask(g, g->scene, at, s.colour, s.base[3], colours == GLTF_COLOURS_AND_ALPHA),
-			   *bsdf = gltf_plugin(g, put_normal_map(g, mask, at), at, "bsdf", "principled", NULL);
+			   *map = put_normal_map(g, mask, at),
+			   *sheet = put_sheet(g, map, at, through, s.both ? 0 : s.metallic),
+			   *bsdf = gltf_plugin(g, sheet, at, "bsdf", "principled", NULL);
 	put_base_colour(g, bsdf, at, s.base, s.colour, colours);
 	gltf_put_share(g, bsdf, at, "metallic", s.metallic, s.metallic > 0 ? s.both : NULL, "b");
 	gltf_put_layers(g, bsdf, at, s.roughness, s.both);
 	if (!g->is_burleys)
 		gltf_put_bool(g, bsdf, at, "lambertian", true);
+	if (sheet != map)
+		put_through(g, sheet, at, through);
 	if (g->failed)
 		return;
 	while (bsdf->parent != g->scene)

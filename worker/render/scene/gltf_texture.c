@@ -62,6 +62,7 @@ struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 {
 	const json_t *metal = json_object_get(at->json, "pbrMetallicRoughness");
 	const json_t *gloss = gltf_extension(g, at, at->json, "KHR_materials_pbrSpecularGlossiness");
+	const json_t *through = gltf_extension(g, at, at->json, "KHR_materials_diffuse_transmission");
 	const json_t *coat = gltf_extension(g, at, at->json, "KHR_materials_clearcoat");
 	const json_t *infos[] = {
 		json_object_get(at->json, "normalTexture"),
@@ -70,6 +71,8 @@ struct gltf_sets gltf_texture_sets(struct gltf *g, const struct gltf_at *at)
 		json_object_get(metal, "metallicRoughnessTexture"),
 		json_object_get(at->json, "emissiveTexture"),
 		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_transmission"), "transmissionTexture"),
+		json_object_get(through, "diffuseTransmissionTexture"),
+		json_object_get(through, "diffuseTransmissionColorTexture"),
 		json_object_get(coat, "clearcoatTexture"),
 		json_object_get(coat, "clearcoatRoughnessTexture"),
 		json_object_get(gltf_extension(g, at, at->json, "KHR_materials_specular"), "specularColorTexture")};

@@ -258,11 +258,12 @@ bool gltf_knows(const char *extension)
 	static const char *const known[] = {
 		"EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "EXT_texture_avif", "EXT_texture_webp",
 		"KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy",
-		"KHR_materials_clearcoat", "KHR_materials_dispersion", "KHR_materials_emissive_strength",
-		"KHR_materials_ior", "KHR_materials_iridescence", "KHR_materials_pbrSpecularGlossiness",
-		"KHR_materials_sheen", "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
-		"KHR_materials_volume", "KHR_mesh_quantization", "KHR_meshopt_compression", "KHR_node_visibility",
-		"KHR_texture_basisu", "KHR_texture_transform", "MSFT_texture_dds",
+		"KHR_materials_clearcoat", "KHR_materials_diffuse_transmission", "KHR_materials_dispersion",
+		"KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_iridescence",
+		"KHR_materials_pbrSpecularGlossiness", "KHR_materials_sheen", "KHR_materials_specular",
+		"KHR_materials_transmission", "KHR_materials_unlit", "KHR_materials_volume", "KHR_mesh_quantization",
+		"KHR_meshopt_compression", "KHR_node_visibility", "KHR_texture_basisu", "KHR_texture_transform",
+		"MSFT_texture_dds",
 		/* They change no light: order of triangles, other looks, who made it. */
 		"FB_ngon_encoding", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld"};
 	for (size_t i = 0; i < sizeof known / sizeof *known; i++)

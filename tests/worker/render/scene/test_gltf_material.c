@@ -78,6 +78,44 @@ static void test_volume(void **state)
 	scene_fini(&s);
 }
 
+/* A share of the light passes diffusely, with a colour of its own; a metal lets less of it pass, and glass none. */
+static void test_diffuse_transmission(void **state)
+{
+	(void)state;
+#define FIRST "{\"pbrMetallicRoughness\": {\"metallicFactor\": 0, \"baseColorFactor\": [0.8, 0.4, 0.2, 1]}"
+#define THROUGH(more)                                                                   \
+	"\"KHR_materials_diffuse_transmission\": {\"diffuseTransmissionFactor\": 0.5, " \
+	"\"diffuseTransmissionColorFactor\": [0.25, 0.5, 1]" more "}"
+	static const char first[] = "bsdf of materials[0]";
+	struct scene s = gltf_files_scene(FIRST, FIRST ", \"extensions\": {" THROUGH("") "}", false);
+	const struct scene_node *blend = scene_named(&s, first), *sheet = node_child(blend, PLUGIN_BSDF, 1);
+	assert_string_equal(blend->type, "blendbsdf");
+	assert_near(node_float(blend, "weight", 0), 0.5);
+	assert_string_equal(node_child(blend, PLUGIN_BSDF, 0)->type, "principled");
+	assert_string_equal(sheet->type, "difftrans");
+	assert_near(node_find(sheet, "transmittance")->value.as.rgb[0], 0.25);
+	assert_false(scene_has_note(&s, "diffuse_transmission"));
+	scene_fini(&s);
+	s = gltf_files_scene(FIRST,
+			     "{\"pbrMetallicRoughness\": {\"metallicFactor\": 0.75}, \"extensions\": {" THROUGH(
+				     ", \"diffuseTransmissionTexture\": {\"index\": 0}, "
+				     "\"diffuseTransmissionColorTexture\": {\"index\": 0}") "}",
+			     false);
+	blend = scene_named(&s, first);
+	const struct scene_node *weight = node_ref(blend, "weight"),
+				*colour = node_ref(node_child(blend, PLUGIN_BSDF, 1), "transmittance");
+	assert_near(node_float(weight, "scale", 0), 0.125);
+	assert_string_equal(node_string(node_child(weight, PLUGIN_TEXTURE, 0), "channel", ""), "a");
+	assert_near(node_find(colour, "scale")->value.as.rgb[1], 0.5);
+	scene_fini(&s);
+	s = gltf_files_scene(IOR, THROUGH("") ", " IOR, false); /* which transmits */
+	assert_string_equal(scene_named(&s, "bsdf of materials[2]")->type, "principled");
+	assert_true(scene_has_note(&s, "of what transmits light otherwise is left out"));
+	scene_fini(&s);
+#undef FIRST
+#undef THROUGH
+}
+
 /* The two roughnesses of `principled` are those of the format. */
 static void test_anisotropy(void **state)
 {
@@ -347,15 +385,11 @@ static void test_images_in_buffers(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_materials),
-		cmocka_unit_test(test_layers),
-		cmocka_unit_test(test_volume),
-		cmocka_unit_test(test_anisotropy),
-		cmocka_unit_test(test_reflection),
-		cmocka_unit_test(test_both_sides_shine),
-		cmocka_unit_test(test_images_in_buffers),
-		cmocka_unit_test(test_no_material),
-		cmocka_unit_test(test_webp),
+		cmocka_unit_test(test_materials),	 cmocka_unit_test(test_layers),
+		cmocka_unit_test(test_volume),		 cmocka_unit_test(test_diffuse_transmission),
+		cmocka_unit_test(test_anisotropy),	 cmocka_unit_test(test_reflection),
+		cmocka_unit_test(test_both_sides_shine), cmocka_unit_test(test_images_in_buffers),
+		cmocka_unit_test(test_no_material),	 cmocka_unit_test(test_webp),
 		cmocka_unit_test(test_foreign_images),
 	};
 	return cmocka_run_group_tests_name("gltf_material", tests, NULL, NULL);
