@@ -19,6 +19,8 @@ SAN      ?=
 BUILD    ?= build$(if $(SAN),/san)
 PREFIX   ?= /usr/local
 PYTHON   ?= python3
+# Some an awk reads and writes numbers as the locale has them, and makes tables of them.
+export LC_ALL := C
 
 EMBREE   := $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
 # A later compiler or library may warn of what is no fault: only the project's own tests insist (deploy/test.sh --ci).

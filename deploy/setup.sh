@@ -11,7 +11,7 @@ set -eu
 build="make gcc libc6-dev pkg-config libembree-dev libopenexr-dev libuv1-dev libprotobuf-c-dev protobuf-c-compiler
 protobuf-compiler libssl-dev libexpat1-dev zlib1g-dev libpng-dev libjpeg62-turbo-dev libwebp-dev libmeshoptimizer-dev gltfpack libjansson-dev libsqlite3-dev librandom123-dev libcmocka-dev python3
 gnuplot-nox"
-full="clang clang-format-14 cppcheck libclang-rt-dev valgrind socat strace slurm-wlm munge systemd systemd-container python3-kubernetes debootstrap"
+full="clang clang-format-14 cppcheck libclang-rt-dev valgrind socat strace slurm-wlm munge systemd systemd-container python3-kubernetes debootstrap locales"
 
 case "${1:-}" in
 "") wanted=$build ;;

@@ -12,6 +12,7 @@ PIDS=
 COORDINATOR=
 COORDINATOR_PID=
 export HSLT_STATUS_SOCKET="$DIR/status"
+export LC_ALL=C.UTF-8 # numbers of awk and sleep have points
 
 finish() {
 	code=$?
