@@ -35,7 +35,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, BACKLOG = 16 };
+enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, KERNEL_BYTES = 100000, BACKLOG = 16 };
 
 enum topic { TOPIC_JOBS = 1, TOPIC_WORKERS = 2, TOPIC_SNAPSHOT = 4 };
 
@@ -323,6 +323,8 @@ static void on_connection(uv_stream_t *listener, int status)
 		drop(r);
 		return;
 	}
+	int room = KERNEL_BYTES; /* some systems would hold hundreds of snapshots that are old when they are read */
+	uv_send_buffer_size((uv_handle_t *)&r->pipe, &room);
 	if (t->reader_count > READERS_MAX) { /* the kernel takes the line at once */
 		send_answer(r, line_error("the status has too many readers: 64 others are connected to its socket"));
 		drop(r);
