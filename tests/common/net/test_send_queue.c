@@ -21,7 +21,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { LIMIT = 1 << 20, LARGE = 4 << 20 /* more than the kernel takes at once */ };
+enum {
+	LIMIT = 1 << 20,
+	KERNEL = 1 << 16,
+	LARGE = 4 << 20 /* more than the kernel takes at once, which is twice KERNEL */
+};
 
 static uv_loop_t loop;
 static struct send_pool pool;
@@ -54,6 +58,7 @@ static void begin_one(struct fixture *x, size_t limit)
 	int ends[2];
 	memset(x, 0, sizeof *x);
 	assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
+	assert_int_equal(setsockopt(ends[0], SOL_SOCKET, SO_SNDBUF, &(int){KERNEL}, sizeof(int)), 0);
 	x->far = ends[1];
 	assert_int_equal(uv_pipe_init(&loop, &x->pipe, 0), 0);
 	assert_int_equal(uv_pipe_open(&x->pipe, ends[0]), 0);
