@@ -42,6 +42,7 @@ static atomic_bool is_film[FILES]; /* by descriptor */
 
 static struct plan plan;
 static uint64_t journal_most;
+static double heartbeat; /* s; a peer that is silent for six of them is hung up on */
 static pid_t pid;
 static uint16_t port;
 static char spool[100], port_file[100];
@@ -81,7 +82,7 @@ static void serve(void)
 	c.spool = spool;
 	c.port_file = port_file;
 	c.journal_bytes = journal_most;
-	c.heartbeat_seconds = 0.2;
+	c.heartbeat_seconds = heartbeat;
 	log_set_level(LOG_LEVEL_ERROR);
 	_exit(server_run(&c, &e) ? 1 : 0);
 }
@@ -221,12 +222,14 @@ static int set_up(void **state)
 	snprintf(port_file, sizeof port_file, "%s/port", folder);
 	memset(disk, 0, sizeof *disk);
 	journal_most = 1 << 20;
+	heartbeat = 60;
 	return rc ? rc : plan_make(&scripted_request, &plan, &e);
 }
 
 static void answers_while_it_reads(uint64_t job)
 {
 	int seen = 0, last = 0;
+	heartbeat = 2; /* no less: a busy machine keeps us from a word for seconds */
 	start(0);
 	call_while_it_reads(&client, FARM__ROLE__ROLE_CLIENT);
 	call_while_it_reads(&worker, FARM__ROLE__ROLE_WORKER);
@@ -237,6 +240,7 @@ static void answers_while_it_reads(uint64_t job)
 		disk->allowed++;
 		while (disk->asked <= disk->allowed)
 			usleep(1000);
+		assert_true(scripted_say(worker, ENVELOPE(HEARTBEAT, heartbeat), NULL, 0));
 		int n = percent();
 		assert_true(n >= last && n <= 100);
 		seen = n > 0 && n < 100;
@@ -303,7 +307,7 @@ static void too_much_is_asked(void **state)
 	while (asked < 1000000 && scripted_want(worker, 3))
 		asked++;
 	assert_true(asked > 1000 && asked < 1000000);
-	call_while_it_reads(&client, FARM__ROLE__ROLE_CLIENT); /* only now: who says nothing for long is hung up on */
+	call_while_it_reads(&client, FARM__ROLE__ROLE_CLIENT);
 	say_watch(job);
 	disk->allowed = ALL;
 	const Farm__Envelope *m;
