@@ -26,6 +26,15 @@ code 1 "$A" "$DIR/none.xml" -o "$DIR/a.html"
 code 1 "$A" "$BOX" -o "$DIR/none/a.html"
 [ ! -e "$DIR/a.html" ] || fail "a report of nothing"
 
+# What caches of files hold can be had. Where there is too little in all it says so before it renders.
+if unshare -rm true 2>/dev/null; then
+	printf 'MemTotal: 16000000 kB\nMemFree: 15000000 kB\nMemAvailable: 1000 kB\n' >"$DIR/meminfo"
+	code 1 unshare -rm sh -c 'mount --bind "$0" /proc/meminfo && exec "$@"' "$DIR/meminfo" "$A" "$BOX" -o "$DIR/a.html" --size 16x12
+	grep -q 'GB of memory, and 0.0 are available: choose a smaller' "$DIR/run.log" || fail "without memory: $(cat "$DIR/run.log")"
+else
+	skip_part "too little memory: no name spaces for mounts here"
+fi
+
 # So counted every run has the same images: what is asserted of them is not left to chance.
 COUNT="--chains 64 --epoch 512 --bootstrap 32768"
 

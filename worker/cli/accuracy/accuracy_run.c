@@ -15,7 +15,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
 
@@ -38,13 +37,27 @@ static double expected_seconds(const struct accuracy_run *r, const struct pilot 
 	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / shares(r->design);
 }
 
+/* What caches of files hold counts: of a machine that has been up for a while little else is free. Where it is not
+ * known nothing is refused, and an allocation that fails says so. */
+static double available_memory(void)
+{
+	char line[128];
+	double kilobytes = INFINITY;
+	FILE *f = fopen("/proc/meminfo", "re");
+	while (f && fgets(line, sizeof line, f) && sscanf(line, "MemAvailable: %lf", &kilobytes) != 1)
+		continue;
+	if (f)
+		fclose(f);
+	return 1024 * kilobytes;
+}
+
 /* All films stay in memory until the end, because the settings alternate. */
 static int check_memory(const struct accuracy_run *r, const struct plan *p, struct error *e)
 {
 	double tiles = ceil(p->crop_width / (double)TILE_SIZE) * ceil(p->crop_height / (double)TILE_SIZE);
 	double wanted = (double)r->design->count * p->groups * 3 * tiles * TILE_SIZE * TILE_SIZE * TILE_CHANNELS *
 			sizeof(int64_t);
-	double there = (double)sysconf(_SC_AVPHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+	double there = available_memory();
 	if (wanted < 0.75 * there)
 		return 0;
 	return error_set(
