@@ -28,6 +28,7 @@ for seed in ${SEEDS:-1}; do
 	for integrator in hslt pssmlt; do
 		start_faulty_worker liar-$seed-$integrator spoil=1 --cache "$DIR/liar-$seed-$integrator"
 		liar=$WORKER
+		until_true 10 grep -q "event=peer_hello.*name=\"liar-$seed-$integrator\"" "$DIR/coordinator.log" || fail "the liar does not come"
 		id=$(submit "$BOX" -o "$DIR/all.exr" $JOB --integrator $integrator --seed $seed)
 		"$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB --integrator $integrator --seed $seed 2>"$DIR/render.log"
 		until_true 120 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" why)"

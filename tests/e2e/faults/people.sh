@@ -21,6 +21,7 @@ liar() {
 	worker w0
 	worker w1
 	faulty_worker w2 lie=2
+	says w2 event=connect\ 
 	job --verify 100%
 	finish_job
 	[ "$(value "$ID" mismatched)" -gt 0 ] || fail "$NAME: nobody has lied"

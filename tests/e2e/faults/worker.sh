@@ -66,6 +66,7 @@ stop_worker() {
 	farm
 	worker w0
 	worker w1
+	says w1 event=connect\ 
 	job
 	each_time one_worker_sleeps
 	finish_job
@@ -93,6 +94,7 @@ fault repeat_worker 1 1 "a worker sends every result twice"
 repeat_worker() {
 	farm
 	faulty_worker w0 repeat
+	says w0 event=connect\ 
 	worker w1
 	job
 	finish_job
@@ -152,6 +154,7 @@ kill_renderer() {
 	farm
 	worker w0
 	worker w1
+	says w1 event=connect\ 
 	job
 	each_time one_renderer_killed
 	finish_job
