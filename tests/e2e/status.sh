@@ -62,7 +62,11 @@ c.close()' "$DIR/half" &
 	grep -q "the coordinator closed the connection" "$DIR/err.log" || fail "half a line: $(cat "$DIR/err.log")"
 fi
 if command -v socat >/dev/null; then
-	echo '{"subscribe":["jobs"]}' | socat -t 1 - "UNIX-CONNECT:$DIR/status" | head -n 1 | grep -q '"type":"snapshot"' ||
-		fail "socat reads no snapshot"
+	cat >"$DIR/ask" <<-'TEXT'
+		echo '{"subscribe":["jobs"]}'
+		head -n 1 >"$HEARD"
+	TEXT
+	HEARD=$DIR/heard socat "UNIX-CONNECT:$DIR/status" "EXEC:sh $DIR/ask" || fail "socat ended with $?"
+	grep -q '"type":"snapshot"' "$DIR/heard" || fail "socat reads no snapshot: $(cat "$DIR/heard")"
 fi
 echo "status: $(wc -l <"$DIR/lines") lines, progress grows"
