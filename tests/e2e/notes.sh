@@ -21,7 +21,7 @@ stop $pilot
 	fail "ended in its pilot: $CODE, $(cat "$DIR/pilot.log")"
 
 # Ended in its first round: no image is written, and nothing is said of one; the bootstrap is there for the same command.
-EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536"
+EARLY="--integrator path --size 64x64 --epoch 512 --spp 65536 --threads 1" # of many threads all leases of a round end at once
 "$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" $EARLY 2>"$DIR/early.log" &
 early=$!
 PIDS="$PIDS $early"
@@ -40,13 +40,20 @@ stop $early
 [ $CODE = 1 ] || fail "the second time it ended with $CODE"
 
 # The end of a terminal, which may tell twice, is an end as by SIGTERM; not where SIGHUP is ignored.
+ticks() { # of processor time that $hup has used
+	sed 's/.*) //' "/proc/$hup/stat" | awk '{ print $12 + $13 }'
+}
+has_used() {
+	[ "$(ticks)" -ge "$1" ]
+}
 hang_up() { # HOW: env --default-signal or --ignore-signal
 	rm -f "$DIR/hup.exr"
 	env "$1=HUP" "$BIN/hslt-render" "$BOX" -o "$DIR/hup.exr" --integrator path --size 16x16 --epoch 1 --time 1h 2>"$DIR/hup.log" &
 	hup=$!
 	PIDS="$PIDS $hup"
 	until_true 60 grep -q '^running' "$DIR/hup.log" || fail "it does not run: $(cat "$DIR/hup.log")"
-	sleep 1
+	enough=$(($(ticks) + $(getconf CLK_TCK) / 2)) # for several rounds
+	until_true 60 has_used $enough || fail "it stands still"
 	kill -HUP $hup
 	kill -HUP $hup 2>/dev/null || :
 }
