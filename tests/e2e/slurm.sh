@@ -201,14 +201,16 @@ until_true 60 is_state "$id" done || fail "$id is $(value "$id" state)"
 "$BIN/hslt-job" fetch "$id" -o "$DIR/elastic.exr" || fail "no image of $id"
 same "$DIR/long.exr" "$DIR/elastic.exr"
 
-# Three were lost: told to leave, preempted, and the worker that Slurm gave up but that went on. On a busy machine a lease that takes long
-# is also given to whoever has nothing to do: some more of a chain's 30 epochs, not most of them.
+# Three were lost: told to leave, preempted, and the worker that Slurm gave up but that went on. For each of them one epoch of a chain is
+# computed again at most; how many are given to two at once, while one of them takes long, depends on how busy the machine is.
 grep 'event=lease_granted job=j1 ' "$DIR/coordinator.log" | sed 's/.*peer=[0-9]* //' |
-	awk '{ chain = $1 $2 $3; if (seen[chain, $4]++) { sum++; if (++again[chain] > most) most = again[chain] } }
-		END { print NR, sum + 0, most + 0 }' >"$DIR/repeats"
-read -r leases repeats most <"$DIR/repeats"
+	awk '{ if (seen[$1, $2, $3, $4]++) sum++ } END { print NR, sum + 0 }' >"$DIR/repeats"
+read -r leases repeats <"$DIR/repeats"
 [ "$leases" -gt 1000 ] && [ "$repeats" -ge 1 ] || fail "$leases leases, $repeats repeated: this tests nothing"
-[ "$most" -le 8 ] || fail "$most epochs of a chain were repeated: $(cat "$DIR/repeats")"
+read -r _ _ _ most <<TEXT
+$(awk -v job=j1 -f "$HERE/faults/count.awk" "$DIR/coordinator.log")
+TEXT
+[ "$most" -le 1 ] || fail "$most epochs of a chain were computed again for one worker that was lost"
 grep -c 'event=batch_merged job=j1 ' "$DIR/coordinator.log" >"$DIR/merged"
 [ "$(grep 'event=batch_merged job=j1 ' "$DIR/coordinator.log" | sed 's/.*peer=[0-9]* //' | sort -u | wc -l)" = "$(cat "$DIR/merged")" ] ||
 	fail "an epoch was counted twice"
