@@ -119,6 +119,7 @@ for kind in unit script; do
 done
 jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)} beside=0
 [ ! -s "$run/script.list" ] || [ "$jobs" -lt 2 ] || beside=1
+trap '' USR1 # until xargs takes it
 one script $((1 + beside)) &
 scripts=$!
 one unit $((jobs - beside)) &
