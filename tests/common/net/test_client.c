@@ -296,11 +296,15 @@ static void a_file_of_another_size_is_another_file(void **state)
 static void own_files_are_own_faults(void **state)
 {
 	(void)state;
+	bool root = geteuid() == 0;
+	if (root && (seteuid(65534) || seteuid(0))) {
+		print_message("skipped: there is no other user in this name space\n");
+		skip();
+	}
 	struct coordinator c = {.name = "room.exr"};
 	struct client *cl = meet(&c);
 	struct error e;
 	assert_int_equal(mkdir("closed", 0500), 0);
-	bool root = geteuid() == 0;
 	assert_true(!root || seteuid(65534) == 0);
 	int rc = client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "closed/room.exr", &e);
 	assert_true(!root || seteuid(0) == 0);

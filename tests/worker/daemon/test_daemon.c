@@ -13,6 +13,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -138,9 +139,8 @@ static void a_cache_of_others_is_not_used(void **state)
 	assert_int_equal(symlink("elsewhere", lock), 0);
 	assert_true(cache_open(&c, base, 1000, &e) < 0);
 	unlink(lock);
-	if (geteuid() != 0)
+	if (geteuid() != 0 || (chown(slot, 65534, 65534) && errno == EINVAL)) /* no other user in this name space */
 		return;
-	assert_int_equal(chown(slot, 65534, 65534), 0);
 	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
 	assert_non_null(strstr(e.text, "another user"));
 	assert_int_equal(chown(slot, 0, 0), 0);
