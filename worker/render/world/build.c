@@ -68,6 +68,16 @@ static const struct scene_node *add_null(struct builder *b, const struct scene_n
 	return n;
 }
 
+static void set_volumes(struct builder *b)
+{
+	b->volumes = (struct volume_build){.assets = b->assets,
+					   .arena = &b->w->arena,
+					   .cache = &b->grids,
+					   .dialect_3 = b->scene->dialect_3,
+					   .center = b->w->center,
+					   .scale = b->w->scale};
+}
+
 /* One BSDF per node, however many shapes refer to it, unless it uses the shape's attributes: then one per mesh,
  * which instances share, or one per shape if it shows edges. The default is grey, or black for emitters, or in 0.6 none
  * for media. */
@@ -307,6 +317,7 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = build_rescale(b);
 	if (!rc)
 		rc = build_place_shapes(b);
+	set_volumes(b);
 	if (!rc)
 		rc = create_bsdfs(b);
 	if (!rc)

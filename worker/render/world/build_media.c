@@ -2,33 +2,25 @@
 #include "worker/render/world/build_media.h"
 
 #include "worker/render/geom/accel.h"
-#include "worker/render/volume/grid_file.h"
 #include "worker/render/world/node_table.h"
 
 #include <stdio.h>
 
-struct media_build {
-	struct node_table numbers;
-	struct grid_cache grids;
-	struct volume_build volumes;
-};
-
 /* Gives a medium its number, 1 + its index in the order of first use; 0: there is none. It is made at first use. */
-static int number_medium(struct builder *b, const struct scene_node *n, struct media_build *media, uint32_t *number)
+static int number_medium(struct builder *b, const struct scene_node *n, struct node_table *numbers, uint32_t *number)
 {
 	struct world *w = b->w;
-	struct node_table *numbers = &media->numbers;
 	*number = 0;
 	if (!n || node_table_find(numbers, n, NULL, number))
 		return 0;
 	*number = ++w->media_count;
 	node_table_add(numbers, n, NULL, *number);
-	int rc = medium_create(&w->media[*number - 1], n, &media->volumes, b->e);
+	int rc = medium_create(&w->media[*number - 1], n, &b->volumes, b->e);
 	return rc ? build_go_on(b, rc) : 0;
 }
 
 /* Those inside of shapes with a `volumelight`. lights: the emitter of each medium so far. */
-static int light_media(struct builder *b, const struct media_build *media, const struct scene_node **lights)
+static int light_media(struct builder *b, const struct scene_node **lights)
 {
 	struct world *w = b->w;
 	int rc = 0;
@@ -42,7 +34,7 @@ static int light_media(struct builder *b, const struct media_build *media, const
 		else if (lights[medium - 1])
 			rc = node_error(n, b->e, EINVAL, "a medium may shine by one \"%s\" only", n->type);
 		else
-			rc = medium_light(&w->media[medium - 1], n, &media->volumes, b->e);
+			rc = medium_light(&w->media[medium - 1], n, &b->volumes, b->e);
 		if (medium)
 			lights[medium - 1] = n;
 		rc = rc ? build_go_on(b, rc) : 0;
@@ -61,12 +53,7 @@ int build_media(struct builder *b)
 	struct world *w = b->w;
 	if (are_left_out(b))
 		return 0;
-	struct media_build media = {.volumes = {.assets = b->assets,
-						.arena = &w->arena,
-						.cache = &media.grids,
-						.dialect_3 = b->scene->dialect_3,
-						.center = w->center,
-						.scale = w->scale}};
+	struct node_table numbers;
 	const struct scene_node *sensor = scene_sensor(b->scene, (uint32_t)w->accuracy.sensor),
 				*camera = sensor ? node_child(sensor, PLUGIN_MEDIUM, 0) : NULL;
 	uint32_t uses = camera ? 1 : 0;
@@ -78,20 +65,20 @@ int build_media(struct builder *b)
 	if (!lights)
 		return build_out_of_memory(b->e);
 	if (!uses)
-		return light_media(b, &media, lights);
+		return light_media(b, lights);
 	w->media = arena_alloc(&w->arena, uses, sizeof *w->media);
-	if (!w->media || node_table_init(&media.numbers, uses, &b->scratch))
+	if (!w->media || node_table_init(&numbers, uses, &b->scratch))
 		return build_out_of_memory(b->e);
 	int rc = 0;
 	for (uint32_t i = 0; i < w->shape_count && !rc; i++) {
 		const struct scene_node *n = b->shape_nodes[i];
-		rc = number_medium(b, node_ref(n, "interior"), &media, &w->parts[i].interior);
+		rc = number_medium(b, node_ref(n, "interior"), &numbers, &w->parts[i].interior);
 		if (!rc)
-			rc = number_medium(b, node_ref(n, "exterior"), &media, &w->parts[i].exterior);
+			rc = number_medium(b, node_ref(n, "exterior"), &numbers, &w->parts[i].exterior);
 	}
 	if (!rc)
-		rc = number_medium(b, camera, &media, &w->camera_medium);
-	return rc ? rc : light_media(b, &media, lights);
+		rc = number_medium(b, camera, &numbers, &w->camera_medium);
+	return rc ? rc : light_media(b, lights);
 }
 
 /* Whether some shape ends it, or it ends by itself. */

@@ -9,6 +9,8 @@
 #include "worker/render/scene/report.h"
 #include "worker/render/shape/shape.h"
 #include "worker/render/texture/attribute_table.h"
+#include "worker/render/volume/grid_file.h"
+#include "worker/render/volume/volume.h"
 #include "worker/render/world/origin.h"
 #include "worker/render/world/world.h"
 
@@ -30,6 +32,8 @@ struct builder {
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct attribute_pool attributes;
+	struct grid_cache grids;
+	struct volume_build volumes; /* with `grids` */
 	struct emitter_surface *surfaces;
 	struct box all, *boxes; /* boxes: one a shape */
 	struct report *found;	/* the problems after which building goes on; NULL: the first ends it */
