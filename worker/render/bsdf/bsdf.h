@@ -57,11 +57,12 @@ struct bsdf_build {
 	bool black_backs;		    /* of opaque materials without twosided */
 	struct boundary_table **boundaries; /* tables that materials of the scene share; NULL: each has its own */
 	struct bend **bends;		    /* likewise bump and normal maps of one material */
+	const struct volume_build *volumes; /* NULL: none */
 };
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)
 {
-	return (struct texture_build){b->assets, b->arena, b->dialect_3, b->attributes};
+	return (struct texture_build){b->assets, b->arena, b->dialect_3, b->attributes, b->volumes};
 }
 
 struct bsdf_ops {

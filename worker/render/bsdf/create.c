@@ -102,7 +102,8 @@ struct bsdf_point bsdf_probe(const struct bsdf_probes *p, uint32_t i)
 {
 	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
 	uint32_t row = i / PROBE_SIDE % PROBE_SIDE, column = i % PROBE_SIDE;
-	struct bsdf_point at = {.where = {.u = (row + 0.5) / PROBE_SIDE, .v = (column + 0.5) / PROBE_SIDE}, .w = &w};
+	struct bsdf_point at = {
+		.where = {.u = (row + 0.5) / PROBE_SIDE, .v = (column + 0.5) / PROBE_SIDE, .probe = true}, .w = &w};
 	if (p->points > 0) {
 		uint64_t point = p->points > p->count ? i * p->points / p->count : i % p->points;
 		unsigned which = (unsigned)(point % p->mesh->asked);

@@ -44,6 +44,7 @@ struct emitter_build {
 	struct attribute_table *attributes;    /* of the mesh; NULL: none */
 	vec3 center;			       /* a scene point p is at scale (p - center) in the rescaled world */
 	double scale;
+	const struct volume_build *volumes; /* NULL: none */
 };
 
 struct emitter;

@@ -70,7 +70,7 @@ void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitt
 {
 	x->p = vec3_madd(l->surface.center, l->surface.radius, w);
 	x->n = vec3_scale(l->surface.normal_sign, w);
-	x->where = (struct texture_point){0};
+	x->where = (struct texture_point){.p = x->p};
 	sphere_uv(&l->surface.sphere_axes, w, &x->where.u, &x->where.v);
 }
 
@@ -81,7 +81,7 @@ void surface_light_on_triangle(const struct surface_light *l, uint32_t i, double
 	     e2 = vec3_sub(surface_light_corner(l, i, 2), v0);
 	x->p = vec3_madd(vec3_madd(v0, b1, e1), b2, e2);
 	x->n = vec3_normalize(vec3_cross(e1, e2));
-	x->where = (struct texture_point){b1, b2, b1, b2, i};
+	x->where = (struct texture_point){b1, b2, b1, b2, i, .p = x->p};
 	if (s->uv) {
 		const float *t0 = s->uv[s->index[i][0]], *t1 = s->uv[s->index[i][1]], *t2 = s->uv[s->index[i][2]];
 		double b0 = 1 - b1 - b2;

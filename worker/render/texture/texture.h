@@ -11,12 +11,15 @@
 
 struct texture;
 struct attribute_table;
+struct volume_build;
 
 /* Where on a surface a texture is evaluated. */
 struct texture_point {
 	double u, v;   /* texture coordinates */
 	double b1, b2; /* barycentrics on the triangle `prim`; 0 on a sphere and without a surface */
 	uint32_t prim;
+	bool probe; /* of a material by itself: p is not known */
+	vec3 p;	    /* in the world */
 };
 
 /* Channel k of numbers at the vertices of a mesh, interpolated linearly: `channels` a vertex, by the mesh's indices. */
@@ -35,6 +38,7 @@ struct texture_build {
 	struct arena *arena;
 	bool dialect_3;
 	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: there is no mesh */
+	const struct volume_build *volumes; /* NULL: what has the texture is not a surface in the world */
 };
 
 /* Three numbers as a function of (u,v), with their first and second derivatives. */

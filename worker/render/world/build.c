@@ -97,6 +97,7 @@ static int create_bsdfs(struct builder *b)
 				   .dialect_3 = b->scene->dialect_3,
 				   .least_roughness = w->accuracy.roughness,
 				   .black_backs = backs_are_black(b),
+				   .volumes = &b->volumes,
 				   .boundaries = &boundaries};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *shape = b->shape_nodes[i], *n = node_child(shape, PLUGIN_BSDF, 0),
@@ -172,7 +173,7 @@ static int create_emitters(struct builder *b)
 	b->emitter_nodes = arena_alloc(&b->scratch, limit, sizeof(void *));
 	if (!w->emitters || !w->emitter_shape || !b->emitter_nodes)
 		return build_out_of_memory(b->e);
-	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL, NULL, w->center, w->scale};
+	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL, NULL, w->center, w->scale, &b->volumes};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0);
 		w->parts[i].emitter = -1;

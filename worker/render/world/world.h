@@ -92,17 +92,23 @@ static inline const struct emitter *world_emitter(const struct world *w, int32_t
 /* The emitter selected by a number in [0,1); -1 if there is none. */
 int32_t world_pick_emitter(const struct world *w, double u);
 
-/* A hit on a shape as a point of its emitter. */
-static inline struct emitter_point world_emitter_point(const struct surface_point *x)
+/* A hit on a shape as a point of its textures. */
+static inline struct texture_point world_texture_point(const struct surface_point *x)
 {
-	return (struct emitter_point){x->p, x->ng, {x->u, x->v, x->b1, x->b2, x->prim.prim}, false};
+	return (struct texture_point){x->u, x->v, x->b1, x->b2, x->prim.prim, .p = x->p};
 }
 
-/* The same as a point of its BSDF. */
+/* The same as a point of its emitter. */
+static inline struct emitter_point world_emitter_point(const struct surface_point *x)
+{
+	return (struct emitter_point){x->p, x->ng, world_texture_point(x), false};
+}
+
+/* And of its BSDF. */
 static inline struct bsdf_point world_bsdf_point(const struct surface_point *x, const struct wavelengths *w,
 						 enum transport transport)
 {
-	return (struct bsdf_point){{x->u, x->v, x->b1, x->b2, x->prim.prim}, w, transport, {x, surface_frame_with}};
+	return (struct bsdf_point){world_texture_point(x), w, transport, {x, surface_frame_with}};
 }
 
 #endif

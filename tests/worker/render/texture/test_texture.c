@@ -40,7 +40,7 @@ static int setup(void **state)
 	pictures_add(&f.pictures, 2, 1, (double[]){0.5, 0.125, 0.0625, 0.5, 0.5, 0.5});
 	pictures_add(&f.pictures, 1, 1, bright);
 	f.source = pictures_source(&f.pictures);
-	f.build = (struct texture_build){&f.source, &f.arena, true, NULL};
+	f.build = (struct texture_build){&f.source, &f.arena, true, NULL, NULL};
 	*state = &f;
 	return 0;
 }

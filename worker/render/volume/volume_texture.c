@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The texture `volume`: what a volume is at the surface's place in the world. Three channels are interpolated as rgb
+ * and then upsampled, as those of meshes and images are. A probe has no place: u and v stand for three numbers that
+ * fill the grid's box.
+ */
+#include "worker/render/volume/volume.h"
+
+#include "worker/render/texture/texture.h"
+
+struct volume_texture {
+	struct volume volume;
+	mat4 to_world; /* of a grid: from its cells */
+	enum color_role role;
+};
+
+static int create(struct texture *t, const struct scene_node *n, enum color_role role,
+		  const struct texture_build *build, struct error *e)
+{
+	struct volume_texture *x = t->data;
+	x->role = role;
+	if (color_role_is_number(role))
+		return node_error(n, e, ENOTSUP, "a volume cannot displace a surface or bend its normals");
+	if (!build->volumes)
+		return node_error(n, e, ENOTSUP, "a volume is a texture for surfaces only");
+	int rc = volume_from_node(&x->volume, n, "volume", 0.75, role, false, build->volumes, e);
+	if (!rc && x->volume.grid && !mat4_invert(x->volume.grid->to_cells, &x->to_world))
+		rc = node_error(n, e, EINVAL, "its volume is too thin");
+	return rc;
+}
+
+static bool is_rgb(const struct volume_texture *x)
+{
+	return x->volume.grid && x->volume.grid->channels > 1;
+}
+
+/* The third number goes through its range once for each step of the second. */
+static vec3 place_of(const struct volume_texture *x, const struct texture_point *at)
+{
+	const struct grid *g = x->volume.grid;
+	if (!at->probe || !g)
+		return at->p;
+	const double part[3] = {at->u, at->v, fmod(at->u * 64 * 0.618 + at->v * 64, 1)};
+	double cell[3];
+	for (int i = 0; i < 3; i++)
+		cell[i] = g->low[i] + part[i] * (g->high[i] - g->low[i]);
+	return mat4_point(&x->to_world, (vec3){cell[0], cell[1], cell[2]});
+}
+
+static spectrum eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
+{
+	const struct volume_texture *x = t->data;
+	vec3 p = place_of(x, at);
+	if (!is_rgb(x))
+		return volume_at(&x->volume, p, false, w);
+	double rgb[GRID_CHANNELS_MAX];
+	grid_at(x->volume.grid, p, rgb);
+	return x->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
+}
+
+/* The spectrum of a reflectance is not bounded by its components. */
+static double max(const struct texture *t)
+{
+	const struct volume_texture *x = t->data;
+	return is_rgb(x) && x->role == COLOR_REFLECTANCE ? 1 : volume_max(&x->volume);
+}
+
+static enum color_shape shape(const struct texture *t)
+{
+	const struct volume_texture *x = t->data;
+	return is_rgb(x) ? COLOR_SHAPE_OTHER : x->volume.color.shape;
+}
+
+static const struct param params[] = {
+	{.name = "volume", .types = VALUE_VOLUME, .max = PARAM_LIGHT_MAX},
+	{.name = NULL},
+};
+
+const struct texture_ops texture_ops_volume = {
+	.decl = {PLUGIN_TEXTURE, "volume", params, 0, PARAM_UNDERSTOOD},
+	.data_size = sizeof(struct volume_texture),
+	.create = create,
+	.eval = eval,
+	.max = max,
+	.shape = shape,
+};
