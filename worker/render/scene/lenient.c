@@ -3,6 +3,7 @@
 
 #include "worker/render/scene/asset_name.h"
 #include "worker/render/scene/plugin.h"
+#include "worker/render/scene/snake_case.h"
 
 #include <string.h>
 
@@ -76,6 +77,31 @@ const char *lenient_param(const char *stand_in, const char *name)
 	if (strcmp(stand_in, "sunsky") == 0 && is_one_of(name, days))
 		return name + strlen("start_");
 	return name;
+}
+
+/* By its own name anywhere in the object, or by the same old one before. */
+static bool is_given(const struct xml_element *el, const char *own, const char *old)
+{
+	bool before = true;
+	for (const struct xml_element *c = el->parent->first; c; c = c->next) {
+		const char *name = xml_attribute(c, "name");
+		before &= c != el;
+		if (name && (strcmp(name, own) == 0 || (before && strcmp(name, old) == 0)))
+			return true;
+	}
+	return false;
+}
+
+const struct param *lenient_old_param(const struct plugin_decl *d, bool stands_in, const struct xml_element *el,
+				      const char *name)
+{
+	char snake[128];
+	if (strlen(name) >= sizeof snake / 2)
+		return NULL;
+	snake_case(name, snake);
+	const char *here = plugin_new_name(d, snake);
+	const struct param *p = plugin_param(d, stands_in ? lenient_param(d->type, here) : here);
+	return p && !is_given(el, p->name, name) ? p : NULL;
 }
 
 /* Light passes it, or something in it. */

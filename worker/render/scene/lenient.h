@@ -30,6 +30,11 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 /* The replacement's parameter that corresponds to `name` of the plug-in replaced; `name` itself if there is none. */
 const char *lenient_param(const char *stand_in, const char *name);
 
+/* The parameter that `name` is in 0.6, for files of 3.x; stands_in: d replaces the plug-in that has it. NULL: none, or
+ * the object of the element `el` has it by its own name too, or by this one before. */
+const struct param *lenient_old_param(const struct plugin_decl *d, bool stands_in, const struct xml_element *el,
+				      const char *name);
+
 /* The BSDF inside `n` if `n` may only hold opaque ones and holds one that transmits light; NULL: nothing is wrong. */
 const struct scene_node *lenient_uncovered(const struct scene_node *n);
 

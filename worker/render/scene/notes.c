@@ -63,6 +63,14 @@ int note_foreign_parameter(const struct notes *t, const struct xml_element *owne
 		    el->file, el->line, owner->name, type, name);
 }
 
+int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		  const char *name)
+{
+	const char *type = xml_attribute(owner, "type"), *written = xml_attribute(el, "name");
+	return note(t, owner, type, written, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` is read as `%.64s` (lenient)",
+		    el->file, el->line, owner->name, type, written, name);
+}
+
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl)
 {
 	char list[256];

@@ -144,11 +144,14 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
 	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
 	const char *written = element_spelling(el, name);
+	int r = 0;
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
 		return 0;
 	}
+	if (!found && m->lenient && !el->snake && (found = lenient_old_param(d->decl, d->stands_in, el, name)))
+		r = note_old_name(&m->notes, owner, el, found->name);
 	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
 		return note_property(&m->notes, owner, el, written);
@@ -163,7 +166,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	if (found->status == PARAM_DIFFERS)
 		return note_difference(&m->notes, owner, el, written);
 	*p = found;
-	return 0;
+	return r;
 }
 
 static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
@@ -194,7 +197,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		v.animation = animation;
 	if (!r)
 		r = add_property(m, d, el, p, v);
-	if (r == -EINVAL && m->lenient && p->choices)
+	bool strange = d->stands_in && (r == -EINVAL || r == -ERANGE);
+	if (strange || (r == -EINVAL && m->lenient && p->choices))
 		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? add_asset(m, v.as.string, owner)
