@@ -18,6 +18,9 @@
 
 #include <string.h>
 
+/* Inverses of float, as scripts write them, have such errors in their last row. */
+#define AFFINE_SLACK 1e-6
+
 /* Range of any number in a transform: what squares of areas can represent. */
 static int check_number(const struct xml_element *el, const char *attribute, double x, struct error *e)
 {
@@ -167,7 +170,12 @@ static int read_matrix(const struct xml_element *el, mat4 *m, struct error *e)
 			return r;
 		m->m[i / side][i % side] = v[i];
 	}
-	if (m->m[3][0] != 0 || m->m[3][1] != 0 || m->m[3][2] != 0 || m->m[3][3] != 1)
+	bool affine = true;
+	for (int i = 0; i < 4; i++) {
+		affine &= fabs(m->m[3][i] - (i == 3)) <= AFFINE_SLACK;
+		m->m[3][i] = i == 3;
+	}
+	if (!affine)
 		return xml_error(el, e, EINVAL, "the last row must be 0 0 0 1: only affine transforms are supported");
 	return 0;
 }

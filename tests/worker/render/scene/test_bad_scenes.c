@@ -269,6 +269,7 @@ static void test_bad_transforms(void **state)
 	(void)state;
 	refuses(SHAPE("<matrix value='1 2 3'/>"), "with 16 or 9 numbers");
 	refuses(SHAPE("<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2'/>"), "the last row must be 0 0 0 1");
+	refuses(SHAPE("<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0.0001 0 1'/>"), "the last row must be 0 0 0 1");
 	refuses(SHAPE("<rotate angle='90' x='0'/>"), "has no axis");
 	refuses(SHAPE("<rotate x='1'/>"), "needs an angle");
 	refuses(SHAPE("<translate/>"), "needs either x, y, z or value");

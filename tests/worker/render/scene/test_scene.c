@@ -120,6 +120,8 @@ static void check_transform_of(const char *version, const char *content, vec3 p,
 	vec3 d = vec3_sub(mat4_point(&m, p), want);
 	if (!(vec3_length(d) < 1e-12))
 		fail_msg("%s is off by (%g, %g, %g)", content, d.x, d.y, d.z);
+	for (int i = 0; i < 4; i++)
+		assert_true(m.m[3][i] == (i == 3));
 	scene_fini(&s);
 }
 
@@ -143,6 +145,8 @@ static void test_transforms(void **state)
 	check_transform("<rotate value='0, 0, 1' angle='90'/>", p, (vec3){-2, 1, 3});
 	check_transform("<rotate x='0' y='0' z='0' angle='0'/>", p, p);
 	check_transform("<matrix value='1 0 0 10 0 0 1 20 0 -1 0 30 0 0 0 1'/>", p, (vec3){11, 23, 28});
+	check_transform("<matrix value='1 0 0 10 0 0 1 20 0 -1 0 30 -0 1e-9 0 1.000000238418579'/>", p,
+			(vec3){11, 23, 28});
 	check_transform("<matrix value='0 1 0, 0 0 1, 1 0 0'/>", p, (vec3){2, 3, 1});
 	/* In the order in which they stand. */
 	check_transform("<scale value='2'/><translate x='1'/>", p, (vec3){3, 4, 6});
