@@ -35,7 +35,12 @@ static int on_depth(struct report *r, const struct scene_node *n, struct error *
 /* A scene that asks for a part of the light, or for something other than light, gets another image, which is noted. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
-	int rc = integrators_show_other(n) ? remark(r, n, e, "the image shows all light, on surfaces and in media") : 0;
+	const struct scene_node *inner = integrators_inner(n);
+	int rc = 0;
+	if (integrators_show_other(n) && inner && !integrators_show_other(inner))
+		rc = remark(r, n, e, "the image shows the light that the `%s` inside it asks for", inner->type);
+	else if (integrators_show_other(n))
+		rc = remark(r, n, e, "the image shows all light, on surfaces and in media");
 	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
 	return rc ? rc : on_depth(r, n, e);

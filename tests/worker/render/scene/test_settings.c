@@ -213,6 +213,11 @@ static void test_notes_on_the_whole(void **state)
 		 "Mitsuba's `path` leaves media out"},
 		{"<shape type='sphere'><medium type='homogeneous' name='interior'/></shape>",
 		 "s.xml:1: <shape type=\"sphere\">: without a BSDF it is grey and opaque, as in Mitsuba 3"},
+		{"<integrator type='moment'><integrator type='path'><integer name='max_depth' value='2'/></integrator>"
+		 "</integrator>",
+		 "s.xml:1: <integrator type=\"moment\">: the image shows the light that the `path` inside it asks for"},
+		{"<integrator type='stokes'><integrator type='aov'/></integrator>",
+		 "<integrator type=\"stokes\">: the image shows all light, on surfaces and"},
 		{"<integrator type='multichannel'/>", "the image shows all light, on surfaces and"},
 		{"<integrator type='volprim_rf_basic'/>", "the image shows all light, on surfaces and"},
 	};
