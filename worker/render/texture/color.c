@@ -358,9 +358,14 @@ double color_max_d65(void)
 	return largest;
 }
 
+static bool is_invisible(const struct color *c)
+{
+	return c->zero_outside && (c->nm[0] > WAVELENGTH_MAX || c->nm[c->count - 1] < WAVELENGTH_MIN);
+}
+
 double color_max(const struct color *c)
 {
-	double m = c->scale;
+	double m = is_invisible(c) ? 0 : c->scale;
 	if (c->sigmoid)
 		m *= sigmoid_max(c->coefficient);
 	if (c->count) {

@@ -41,6 +41,7 @@ struct world_notes {
 	char flat[384];	     /* how many triangles without area were left out */
 	char materials[384]; /* how many files of shapes have materials that are not read */
 	char unseen[192];    /* that the camera sees no shape */
+	char dark[128];	     /* that the emitters give no light */
 	char backs[192];     /* that it sees backs that are black */
 	char endless[256];   /* that it stands in a medium that no light from infinity gets through */
 };

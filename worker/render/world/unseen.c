@@ -83,3 +83,16 @@ void unseen_note(struct world *w, const struct box *boxes)
 			 : all >> FAR & 1 ? "all are beyond its far plane"
 					  : "all are beside the image or behind it");
 }
+
+void dark_note(struct world *w)
+{
+	bool light = false;
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		light |= w->emitters[i].power > 0;
+	for (uint32_t i = 0; i < w->media_count; i++)
+		light |= w->media[i].shines;
+	if (w->emitter_count > 0 && !light)
+		snprintf(w->notes.dark, sizeof w->notes.dark,
+			 "no emitter gives light from %g to %g nm, which is what is rendered: the image is black",
+			 WAVELENGTH_MIN, WAVELENGTH_MAX);
+}

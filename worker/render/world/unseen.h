@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A camera that sees nothing: the first thing to know of an image that is empty. Pure; any thread; allocates nothing.
- */
+/* A camera that sees nothing, and emitters without light: the first things to know of an image that is empty. Pure; any
+ * thread; allocates nothing. */
 #ifndef WORKER_RENDER_WORLD_UNSEEN_H
 #define WORKER_RENDER_WORLD_UNSEEN_H
 
@@ -10,5 +10,10 @@
 /* Sets w->notes.unseen if no shape's box (one a shape, in the scene's coordinates) lies in what the camera sees, and
  * there are shapes. Sound: then no ray of the camera meets one. Boxes beside the image's corners may go unnoticed. */
 void unseen_note(struct world *w, const struct box *boxes);
+
+/* Sets w->notes.dark if there are emitters, and none of them and no medium gives light at wavelengths that are
+ * rendered.
+ */
+void dark_note(struct world *w);
 
 #endif

@@ -298,6 +298,14 @@ static void test_tables(void **state)
 		assert_true(fabs(s.v[1] - 0.2) < 1e-15 && fabs(s.v[2] - 0.5) < 1e-15);
 		assert_true(s.v[0] == (ends ? 0.1 : 0) && s.v[3] == (ends ? 0.8 : 0));
 		assert_true(color_max(&c) == 0.8);
+		const double infrared[] = {830.5, 1000}, ultraviolet[] = {200, 359.5};
+		v = table_of(infrared, x, 2);
+		assert_int_equal(color_from_value(&v, (enum color_role)role, &arena, &c, &e), 0);
+		assert_true(color_max(&c) == (ends ? 0.3 : 0));
+		v = table_of(ultraviolet, x, 2);
+		assert_int_equal(color_from_value(&v, (enum color_role)role, &arena, &c, &e), 0);
+		assert_true(color_max(&c) == (ends ? 0.3 : 0));
+		v = table_of(nm, x, 4);
 	}
 	/* Mitsuba 3's tests of `irregular`, from 450 nm by 50. */
 	const double three[] = {500, 600, 650}, value[] = {1, 2, 0.5}, known[] = {0, 1, 1.5, 2, 0.5, 0};

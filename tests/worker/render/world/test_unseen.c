@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Cameras that see nothing, against rays: where the note stands, no ray of the camera's meets a shape; and of random
- * cameras that none of 4,096 rays leads from to a shape, it stands for most.
+ * cameras that none of 4,096 rays leads from to a shape, it stands for most. Emitters of which none gives light that is
+ * rendered.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -22,14 +23,14 @@
 	"' up='0,1,0'/></transform>" more "</sensor>"
 
 /* What the world says of it; "": nothing. */
-static void note_of(const struct world *w, char note[1024])
+static void note_of(const struct world *w, const char *subject, char note[1024])
 {
 	struct render_summary s;
 	char sentence[1024];
 	world_summary(w, &s);
 	*note = 0;
 	for (size_t i = 0; render_scene_note(&s, i, sentence, sizeof sentence); i++)
-		if (strstr(sentence, NOTE))
+		if (strstr(sentence, subject))
 			strcpy(note, sentence);
 }
 
@@ -38,7 +39,7 @@ static void assert_note(const char *text, const char *why)
 {
 	struct world *w = world_of_text(32, 32, "%s", text);
 	char note[1024];
-	note_of(w, note);
+	note_of(w, NOTE, note);
 	if (*why ? !strstr(note, why) : *note)
 		fail_msg("of %s: '%s', not '%s'", text, note, why);
 	world_free(w);
@@ -102,7 +103,7 @@ static void test_against_rays(void **state)
 			kinds[i % 3], x[0], x[1], 2 * x[2] + copysign(2, x[2]), x[3], x[4], x[5], x[6], x[7], x[8],
 			-x[4]);
 		char note[1024];
-		note_of(w, note);
+		note_of(w, NOTE, note);
 		bool seen = meets(w, 64);
 		if (*note && seen)
 			fail_msg("case %zu: a ray meets a shape, but '%s'", i, note);
@@ -114,11 +115,41 @@ static void test_against_rays(void **state)
 	assert_true(blind > 60 && noted > blind * 3 / 4 && blind < 240);
 }
 
+static void test_dark(void **state)
+{
+	(void)state;
+#define BALL(radiance) \
+	"<shape type='sphere'><emitter type='area'><spectrum name='radiance' value='" radiance "'/></emitter></shape>"
+	static const struct {
+		const char *emitters;
+		bool dark;
+	} cases[] = {
+		{"", false},
+		{BALL("0"), true},
+		{BALL("1"), false},
+		{BALL("900:0.06, 1000:0.2"), true},
+		{BALL("800:0.06, 1000:0.2"), false},
+		{BALL("0") "<emitter type='constant'><spectrum name='radiance' value='100:1, 350:2'/></emitter>", true},
+		{BALL("0") "<emitter type='constant'><rgb name='radiance' value='0, 0, 0.1'/></emitter>", false},
+		{"<emitter type='point'><spectrum name='intensity' value='0'/></emitter>", true},
+		{"<emitter type='directional'><spectrum name='irradiance' value='1e-9'/></emitter>", false},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct world *w = world_of_text(32, 32, SENSOR("0,0,9", "0,0,0") "%s", cases[i].emitters);
+		char note[1024];
+		note_of(w, "no emitter gives light from 360 to 830 nm", note);
+		if ((*note != 0) != cases[i].dark)
+			fail_msg("%s: '%s'", cases[i].emitters, note);
+		world_free(w);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_sentences),
 		cmocka_unit_test(test_against_rays),
+		cmocka_unit_test(test_dark),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
