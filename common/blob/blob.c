@@ -3,7 +3,7 @@
  * A store is a sorted array of entries (hash, size, holds, last use) that mirrors a folder: opening reads the folder,
  * looking up is a binary search, and only contents are read from the disk.
  *
- * Writing: blob_write_begin makes room and a temporary file, blob_write_add appends and hashes, blob_write_commit
+ * Writing: blob_write_begin makes a temporary file, blob_write_add makes room, appends and hashes, blob_write_commit
  * compares the hash, flushes, renames and adds the entry. Until then the blob does not exist. blob_write_keep leaves
  * flushing and renaming to a batch; the entry is there from then on, but counts as missing until blob_enter.
  *
@@ -184,13 +184,29 @@ bool blob_store_evict(struct blob_store *s)
 	return true;
 }
 
+static int exceeds(const struct blob_store *s, uint64_t need, struct error *e)
+{
+	return error_set(e, EFBIG, "%s: %llu more bytes exceed its limit of %llu, given what is in use", s->folder,
+			 (unsigned long long)need, (unsigned long long)s->limit);
+}
+
+/* Whether `need` more bytes would fit into the limit if all were evicted that nobody holds. */
+static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
+{
+	uint64_t used = s->bytes + s->promised;
+	if (!s->limit || (need <= s->limit && used <= s->limit - need))
+		return 0;
+	for (size_t i = 0; i < s->count; i++)
+		used -= s->entries[i].holds ? 0 : s->entries[i].size;
+	return need > s->limit || used > s->limit - need ? exceeds(s, need, e) : 0;
+}
+
 /* Evicts blobs until `need` more bytes fit into the limit. */
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
-	while (s->limit && (need > s->limit || s->bytes + s->promised > s->limit - need))
+	while (s->limit && (need > s->limit || s->bytes + s->arrived > s->limit - need))
 		if (!blob_store_evict(s))
-			return error_set(e, EFBIG, "%s: %llu more bytes exceed its limit of %llu, given what is in use",
-					 s->folder, (unsigned long long)need, (unsigned long long)s->limit);
+			return exceeds(s, need, e);
 	return 0;
 }
 
@@ -307,7 +323,7 @@ int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e
 int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struct blob_hash *h, uint64_t size,
 		     struct error *e)
 {
-	int rc = make_room(s, size, e);
+	int rc = could_fit(s, size, e);
 	if (rc)
 		return rc;
 	struct blob_writer *w = mem_alloc(1, sizeof *w);
@@ -358,7 +374,9 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 {
 	if (size > w->size - w->at)
 		return error_set(e, EFBIG, "more bytes than were announced");
-	int rc = go_on(w, e);
+	int rc = make_room(w->store, size, e);
+	if (!rc)
+		rc = go_on(w, e);
 	if (rc)
 		return rc;
 	if (EVP_DigestUpdate(w->md, bytes, size) != 1)
@@ -371,6 +389,7 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 		if (n < 0)
 			return error_file(e, errno, w->store->folder);
 		w->at += (uint64_t)n;
+		w->store->arrived += (uint64_t)n;
 		bytes = (const char *)bytes + n;
 		size -= (size_t)n;
 	}
@@ -429,6 +448,7 @@ static int finish(struct blob_writer *w, struct error *e)
 static void writer_free(struct blob_writer *w)
 {
 	w->store->promised -= w->size;
+	w->store->arrived -= w->at;
 	blob_write_pause(w);
 	EVP_MD_CTX_free(w->md);
 	mem_free(w);
@@ -472,7 +492,7 @@ int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error 
 		return rc;
 	}
 	*kept = (struct blob_kept){w->hash, w->size, w->number};
-	w->size = 0; /* what was promised for it stays so */
+	w->size = w->at = 0; /* what was promised for it, and has arrived, stays so */
 	writer_free(w);
 	return 0;
 }
@@ -487,6 +507,7 @@ void blob_enter(struct blob_store *s, const struct blob_kept *kept)
 void blob_let_go(struct blob_store *s, const struct blob_kept *kept)
 {
 	s->promised -= kept->size;
+	s->arrived -= kept->size;
 	blob_release(s, &kept->hash);
 	struct blob_entry *n = blob_find(s, &kept->hash);
 	if (n->gone && !n->holds)

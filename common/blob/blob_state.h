@@ -23,7 +23,8 @@ struct blob_entry {
 struct blob_store {
 	char *folder;
 	uint64_t limit, bytes, clock;
-	uint64_t promised;	    /* reserved for open writers */
+	uint64_t promised;	    /* to open writers: all that was announced */
+	uint64_t arrived;	    /* of that */
 	uint64_t temporary;	    /* number of the last temporary file */
 	struct blob_entry *entries; /* sorted by hash */
 	size_t count, capacity;

@@ -189,6 +189,37 @@ static void room_is_promised_once(void **state)
 	blob_store_close(s);
 }
 
+/* Whoever announces much and sends little costs others no more than what was sent. */
+static void evicts_as_bytes_arrive(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_writer *w, *other;
+	struct blob_hash large = hash_of("a large file"), small = hash_of("small");
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	struct blob_hash a = store_text(s, "0123456789"), b = store_text(s, "abcdefghij");
+	blob_release(s, &a);
+	blob_release(s, &b);
+	assert_int_equal(blob_write_begin(&w, s, &large, 28, &e), 0);
+	assert_true(blob_has(s, &a, NULL) && blob_has(s, &b, NULL));
+	assert_int_equal(blob_write_begin(&other, s, &small, 5, &e), -EFBIG); /* it is promised all the same */
+	assert_int_equal(blob_write_add(w, "0123456789", 10, &e), 0);
+	assert_true(blob_has(s, &a, NULL) && blob_has(s, &b, NULL));
+	assert_int_equal(blob_write_add(w, "0", 1, &e), 0);
+	assert_false(blob_has(s, &a, NULL));
+	assert_true(blob_has(s, &b, NULL));
+	assert_true(blob_hold(s, &b)); /* which is what is left to evict */
+	assert_int_equal(blob_write_add(w, "123456789", 9, &e), 0);
+	assert_int_equal(blob_write_add(w, "0", 1, &e), -EFBIG);
+	assert_int_equal(bytes_of_folder(), 30);
+	blob_write_abort(w);
+	assert_int_equal(blob_write_begin(&w, s, &large, 20, &e), 0);
+	blob_write_abort(w);
+	assert_true(blob_has(s, &b, NULL));
+	blob_store_close(s);
+}
+
 /* A smaller limit in the next life: what is held by then stays, though it is the oldest. */
 static void held_before_it_is_trimmed(void **state)
 {
@@ -448,6 +479,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(refuses_false_bytes, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(room_is_promised_once, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(evicts_as_bytes_arrive, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(held_before_it_is_trimmed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(damaged_at_rest, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_folder_that_is_removed, folder_set_up, folder_tear_down),
