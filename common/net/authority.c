@@ -26,7 +26,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH_SIZE = 4096, SERIAL_BYTES = 16, EARLIER = 3600, ENTRIES_MAX = 1 << 20 };
+enum { PATH_SIZE = 4096, SERIAL_BYTES = 16, ENTRIES_MAX = 1 << 20 };
+/* What is signed is valid from so many seconds before: clocks of other machines are behind, or are set back. */
+enum { EARLIER = 86400 };
 
 struct authority {
 	const char *folder;
@@ -259,13 +261,13 @@ static bool sign_other(const struct authority *a, X509 *cert, enum tls_role role
 /* Dates and signs it. It is valid as long as the authority: an expired list would lock everybody out. */
 static int sign_list(struct authority *a, struct error *e)
 {
-	ASN1_TIME *now = ASN1_TIME_set(NULL, time(NULL));
-	bool ok = now && X509_CRL_set_version(a->list, X509_CRL_VERSION_2) &&
+	ASN1_TIME *from = ASN1_TIME_set(NULL, time(NULL) - EARLIER);
+	bool ok = from && X509_CRL_set_version(a->list, X509_CRL_VERSION_2) &&
 		  X509_CRL_set_issuer_name(a->list, X509_get_subject_name(a->cert)) &&
-		  X509_CRL_set1_lastUpdate(a->list, now) &&
+		  X509_CRL_set1_lastUpdate(a->list, from) &&
 		  X509_CRL_set1_nextUpdate(a->list, X509_get0_notAfter(a->cert)) && X509_CRL_sort(a->list) &&
 		  X509_CRL_sign(a->list, a->key, EVP_sha256());
-	ASN1_TIME_free(now);
+	ASN1_TIME_free(from);
 	return ok ? 0 : crypto_error(e, "the revocation list");
 }
 
