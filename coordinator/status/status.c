@@ -6,12 +6,12 @@
  * compares each job with what was last sent about it and sends only changes; nothing is done while nobody is
  * subscribed. At the end the socket's file is removed if it is still the same.
  *
- * A reader that has not read all lines when something changes gets no more of them, but one snapshot once it has read:
- * the newest. So at most the lines of one moment wait for it. What waits for all readers counts with what waits for all
- * connections (common/net/send_pool.h): beyond the limit those are dropped that do not read. A line that is neither a
- * subscription nor a question is answered by an error. A reader is dropped if its line is too long, or if it asks and
- * does not read the answers. A path where somebody answers is -EADDRINUSE; a file that is not a socket is never
- * removed.
+ * A reader that has not read all lines when something changes gets no more of them, but one snapshot at the first tick
+ * after it has read: the newest. So at most the lines of one moment wait for it. What waits for all readers counts with
+ * what waits for all connections (common/net/send_pool.h): beyond the limit those are dropped that do not read. A line
+ * that is neither a subscription nor a question is answered by an error. A reader is dropped if its line is too long,
+ * or if it asks and does not read the answers. A path where somebody answers is -EADDRINUSE; a file that is not a
+ * socket is never removed.
  */
 #include "coordinator/status/status.h"
 
@@ -140,11 +140,38 @@ static json_t *snapshot(const struct peers *s)
 
 /* ---- writing ---- */
 
+/* A line for several readers: its text is made once. */
+struct shared {
+	unsigned holders;
+	size_t size;
+	char *text; /* allocated by jansson */
+};
+
+/* Takes the object. NULL: no memory. */
+static struct shared *share_text(json_t *o)
+{
+	char *text = json_dumps(o, JSON_COMPACT);
+	struct shared *l = text ? mem_alloc(1, sizeof *l) : NULL;
+	json_decref(o);
+	if (l)
+		*l = (struct shared){1, strlen(text), text};
+	else
+		free(text);
+	return l;
+}
+
+static void release(struct shared *l)
+{
+	if (!l || --l->holders)
+		return;
+	free(l->text);
+	mem_free(l);
+}
+
 struct sending {
 	uv_write_t request;
-	char *text; /* allocated by jansson */
-	size_t size;
-	bool answer; /* to a line of the reader's */
+	struct shared *line; /* held */
+	bool answer;	     /* to a line of the reader's */
 };
 
 static void on_reader_closed(uv_handle_t *h)
@@ -185,51 +212,50 @@ static uint64_t now(const struct reader *r)
 	return uv_now(r->pipe.loop);
 }
 
-static void send_object(struct reader *r, json_t *o, bool answer);
-
 static void on_written(uv_write_t *w, int status)
 {
 	struct sending *s = w->data;
 	struct reader *r = w->handle->data;
-	r->unread -= s->answer ? s->size : 0;
-	send_pool_sub(&r->share, s->size, now(r));
-	free(s->text);
+	r->unread -= s->answer ? s->line->size : 0;
+	send_pool_sub(&r->share, s->line->size, now(r));
+	release(s->line);
 	mem_free(s);
-	if (status) {
+	if (status)
 		drop(r);
-	} else if (r->behind && !r->closing && waiting(r) == 0) {
-		r->behind = false;
-		send_object(r, snapshot(r->socket->peers), false);
-	}
 }
 
-/* Takes the object. Of what changes at most one tick's lines wait for a reader (publish_object); answers are bounded
- * here. */
-static void send_object(struct reader *r, json_t *o, bool answer)
+/* Of what changes at most one tick's lines wait for a reader (status_tick); answers are bounded here. */
+static void send_line(struct reader *r, struct shared *l, bool answer)
 {
-	char *text = json_dumps(o, JSON_COMPACT);
-	struct sending *s = text ? mem_alloc(1, sizeof *s) : NULL;
-	json_decref(o);
-	size_t size = text ? strlen(text) : 0;
+	struct sending *s = l ? mem_alloc(1, sizeof *s) : NULL;
+	size_t size = l ? l->size : 0;
 	if (!s || (answer && r->unread > UNREAD_MAX))
 		drop(r);
 	if (r->closing || !send_pool_add(&r->share, size, now(r))) {
 		mem_free(s);
-		free(text);
 		return;
 	}
-	*s = (struct sending){.text = text, .size = size, .answer = answer};
+	*s = (struct sending){.line = l, .answer = answer};
+	l->holders++;
 	r->unread += answer ? size : 0;
 	s->request.data = s;
 	static char newline[] = "\n";
-	uv_buf_t parts[2] = {uv_buf_init(text, (unsigned)size), uv_buf_init(newline, 1)};
+	uv_buf_t parts[2] = {uv_buf_init(l->text, (unsigned)size), uv_buf_init(newline, 1)};
 	if (uv_write(&s->request, (uv_stream_t *)&r->pipe, parts, 2, on_written)) {
 		send_pool_sub(&r->share, size, now(r));
-		free(text);
+		release(l);
 		mem_free(s);
 		drop(r);
 	}
 	send_pool_look(&r->share, now(r));
+}
+
+/* Takes the object. */
+static void send_object(struct reader *r, json_t *o, bool answer)
+{
+	struct shared *l = share_text(o);
+	send_line(r, l, answer);
+	release(l);
 }
 
 static void send_answer(struct reader *r, json_t *o)
@@ -349,26 +375,31 @@ static const struct job_view *shown_before(const struct status_socket *t, uint64
 
 static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 {
+	struct shared *l = share_text(o);
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		if ((r->topics & topic) && !r->behind)
-			send_object(r, json_incref(o), false);
-	json_decref(o);
+			send_line(r, l, false);
+	release(l);
 }
 
-void status_tick(struct status_socket *t)
+/* To those who subscribed to it, if something changed, and those who were behind and have read: one for all, because it
+ * takes tens of milliseconds to make where there are a thousand workers. */
+static void publish_snapshot(struct status_socket *t, bool changed)
 {
-	unsigned topics = 0;
-	if (!t)
-		return;
-	if (t->caller_waits)
-		on_connection((uv_stream_t *)&t->listener, 0);
-	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
-		topics |= r->topics;
-	if (!topics || t->shown_changes == t->jobs->changes)
-		return;
-	t->shown_changes = t->jobs->changes;
-	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
-		r->behind = r->behind || (r->topics && waiting(r));
+	struct shared *l = NULL;
+	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next)) {
+		if (r->closing || (r->behind ? waiting(r) > 0 : !changed || !(r->topics & TOPIC_SNAPSHOT)))
+			continue;
+		if (!l)
+			l = share_text(snapshot(t->peers));
+		r->behind = false;
+		send_line(r, l, false);
+	}
+	release(l);
+}
+
+static void publish_changes(struct status_socket *t, unsigned topics)
+{
 	struct job_view *views;
 	size_t count = jobs_views(t->jobs, LINES_ENDED, &views);
 	for (size_t i = 0; i < count && (topics & TOPIC_JOBS); i++) {
@@ -388,8 +419,25 @@ void status_tick(struct status_socket *t)
 		add_workers(t->peers, o);
 		publish_object(t, TOPIC_WORKERS, o);
 	}
-	if (topics & TOPIC_SNAPSHOT)
-		publish_object(t, TOPIC_SNAPSHOT, snapshot(t->peers));
+}
+
+void status_tick(struct status_socket *t)
+{
+	unsigned topics = 0;
+	if (!t)
+		return;
+	if (t->caller_waits)
+		on_connection((uv_stream_t *)&t->listener, 0);
+	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
+		topics |= r->topics;
+	bool changed = topics && t->shown_changes != t->jobs->changes;
+	for (struct reader *r = LIST_FIRST(&t->readers); changed && r; r = LIST_NEXT(r, next))
+		r->behind = r->behind || (r->topics && waiting(r));
+	if (changed) {
+		t->shown_changes = t->jobs->changes;
+		publish_changes(t, topics);
+	}
+	publish_snapshot(t, changed);
 }
 
 /* ---- start and end ---- */

@@ -221,6 +221,49 @@ static void a_slow_reader_gets_the_newest(void **state)
 	scripted_hang_up(client);
 }
 
+/* Two that were behind get the same snapshot: it is made once for all. A tick may come between the two, so some times
+ * are tried; so often the clock would never show two the same nanosecond. */
+static void what_is_sent_to_many_is_made_once(void **state)
+{
+	(void)state;
+	enum { TRIES = 5, EACH = 20 };
+	FILE *quick = call_status(), *slow[2] = {call_status(), call_status()};
+	struct scripted *client = peer_call();
+	uint64_t last = ENDED + SUBMITTED, seen = 0;
+	bool same = false;
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	json_decref(hear(quick, NULL));
+	say(quick, "{\"subscribe\":[\"snapshot\"]}\n");
+	for (int i = 0; i < 2; i++)
+		say(slow[i], "{\"subscribe\":[\"snapshot\"]}\n");
+	for (int try = 0; try < TRIES && !same; try++) {
+		uint64_t newest[2] = {0, 0}, lines = 0;
+		double time[2] = {0, 0};
+		for (int k = 0; k < EACH; k++)
+			for (submit(client, ++last); seen < last;) {
+				json_t *o = hear(quick, NULL);
+				seen = newest_of(o);
+				json_decref(o);
+			}
+		for (int i = 0; newest[0] < last || newest[1] < last; i = !i) {
+			if (newest[i] == last)
+				continue;
+			json_t *o = hear(slow[i], NULL);
+			newest[i] = newest_of(o);
+			time[i] = json_real_value(json_object_get(o, "time"));
+			json_decref(o);
+			lines++;
+		}
+		assert_true(lines < EACH); /* of both: they were behind */
+		same = time[0] == time[1];
+	}
+	assert_true(same);
+	fclose(quick);
+	fclose(slow[0]);
+	fclose(slow[1]);
+	scripted_hang_up(client);
+}
+
 /* How many lines there are, at most so many. */
 static int lines_left(FILE *f, int most)
 {
@@ -268,6 +311,7 @@ int main(void)
 		cmocka_unit_test(one_job_has_its_details),
 		cmocka_unit_test(pages_list_all_that_ended),
 		cmocka_unit_test(a_slow_reader_gets_the_newest),
+		cmocka_unit_test(what_is_sent_to_many_is_made_once),
 		cmocka_unit_test(what_waits_for_all_readers_is_bounded),
 	};
 	return cmocka_run_group_tests(tests, set_up, served_stop);
