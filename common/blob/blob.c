@@ -8,7 +8,8 @@
  * flushing and renaming to a batch; the entry is there from then on, but counts as missing until blob_enter.
  *
  * Failures: a wrong hash or more bytes than announced are -EBADMSG, and the temporary file is removed. A full disk is
- * -ENOSPC, after every blob that is not held has been evicted. blob_check drops a blob whose file is gone or changed.
+ * -ENOSPC, after every blob that is not held has been evicted and nobody has more room. blob_check drops a blob whose
+ * file is gone or changed.
  */
 #include "common/blob/blob.h"
 
@@ -239,6 +240,18 @@ void blob_store_close(struct blob_store *s)
 	mem_free(s);
 }
 
+void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user)
+{
+	s->more_room = more_room;
+	s->user = user;
+}
+
+/* The disk is full. */
+static bool make_disk_room(struct blob_store *s)
+{
+	return (s->limit && blob_store_evict(s)) || (s->more_room && s->more_room(s->user));
+}
+
 void blob_store_trim(struct blob_store *s)
 {
 	make_room(s, 0, NULL);
@@ -384,7 +397,7 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 	while (size) {
 		struct iovec part = {(void *)(uintptr_t)bytes, size};
 		ssize_t n = disk_pwritev(w->fd, &part, 1, (off_t)w->at);
-		if (n < 0 && (errno == EINTR || (errno == ENOSPC && w->store->limit && blob_store_evict(w->store))))
+		if (n < 0 && (errno == EINTR || (errno == ENOSPC && make_disk_room(w->store))))
 			continue;
 		if (n < 0)
 			return error_file(e, errno, w->store->folder);

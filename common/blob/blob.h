@@ -23,6 +23,8 @@ int blob_store_open(struct blob_store **s, const char *folder, uint64_t limit, s
 void blob_store_close(struct blob_store *s);
 /* Evicts the least recently used blob that is not held, to make room on the disk; false: there is none. */
 bool blob_store_evict(struct blob_store *s);
+/* Whoever may make room on the disk when nothing is left to evict; false: there is none. */
+void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user);
 /* Evicts what exceeds the limit. Call once everything needed is held. */
 void blob_store_trim(struct blob_store *s);
 

@@ -22,6 +22,7 @@
 #include "coordinator/job/late.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/publish.h"
+#include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 
@@ -32,24 +33,36 @@
 
 /* ---- jobs ---- */
 
+/* After an error nothing is left of it, and the submission is still `from`'s. */
+static int store_submission(struct jobs *jobs, uint64_t id, const struct submission *from, struct live_job **job,
+			    struct error *e)
+{
+	int rc = ledger_skip_ids(jobs->ledger, id, e); /* before there is a folder: reconcile.c */
+	if (!rc)
+		rc = spool_make_job(jobs->spool, id, e);
+	if (!rc)
+		rc = live_job_new(job, id, from->submit, from->plan, from->owner, 0, jobs->spool, e);
+	if (!rc && (rc = durable_begin(jobs, *job, e))) {
+		*from->submit = (*job)->submit;
+		memset(&(*job)->submit, 0, sizeof(*job)->submit);
+		live_job_free(*job);
+	}
+	if (rc)
+		spool_drop_job(jobs->spool, id);
+	return rc;
+}
+
 static void submitted(struct jobs *jobs, const struct action *a, struct submission *from)
 {
 	struct live_job *job;
 	struct error e;
 	const Farm__Submit *m = from->submit->message->submit;
+	int rc;
 	from->job = a->job;
-	int rc = ledger_skip_ids(jobs->ledger, a->job, &e); /* before there is a folder: reconcile.c */
-	if (!rc)
-		rc = spool_make_job(jobs->spool, a->job, &e);
-	if (!rc)
-		rc = live_job_new(&job, a->job, from->submit, from->plan, from->owner, 0, jobs->spool, &e);
-	if (!rc && (rc = durable_begin(jobs, job, &e))) {
-		*from->submit = job->submit;
-		memset(&job->submit, 0, sizeof job->submit);
-		live_job_free(job);
-	}
+	do
+		rc = store_submission(jobs, a->job, from, &job, &e);
+	while (rc == -ENOSPC && room_make(jobs));
 	if (rc) {
-		spool_drop_job(jobs->spool, a->job);
 		text_copy(from->refusal, sizeof from->refusal, e.text);
 		jobs_break(jobs, a->job, e.text);
 		return;

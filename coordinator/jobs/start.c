@@ -26,8 +26,14 @@
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
 #include "coordinator/retention/ended_jobs.h"
+#include "coordinator/retention/keep.h"
 
 #include <string.h>
+
+static bool drop_films(void *jobs)
+{
+	return keep_drop_all(jobs);
+}
 
 int jobs_open(struct jobs *jobs, struct error *e)
 {
@@ -35,8 +41,10 @@ int jobs_open(struct jobs *jobs, struct error *e)
 	int rc = spool_open(&jobs->spool, jobs->config.spool, e);
 	if (!rc)
 		rc = blob_store_open(&jobs->blobs, spool_blobs(jobs->spool), jobs->config.blob_bytes, e);
-	if (!rc)
+	if (!rc) {
+		blob_store_ask(jobs->blobs, drop_films, jobs);
 		rc = reconcile(jobs, e);
+	}
 	if (!rc)
 		ages_open(jobs);
 	if (!rc)

@@ -33,7 +33,8 @@ value "$id" waiting | grep -q 'No space left' || fail "it does not say why: $(va
 grep -q "level=warn event=job_held job=$id state=held" "$DIR/coordinator.log" || fail "the log does not warn"
 [ -z "$(value "$id" eta | grep -v null)" ] || fail "it states when it will be done: $(value "$id" eta)"
 before=$(value "$id" merged)
-[ "$before" -lt "$quiet" ] || fail "there was room for all"
+first=$before
+[ "$first" -lt "$quiet" ] || fail "there was room for all"
 head -c 20000000 /dev/zero >"$DIR/spool/filler" 2>/dev/null && fail "there is room"
 if submit "$BOX" -o "$DIR/none.exr" $JOB >/dev/null; then
 	fail "another job was taken"
@@ -56,4 +57,21 @@ kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 LISTEN=$COORDINATOR start_coordinator -v --keep-films 0
 is_state "$id" cancelled || fail "$id is $(value "$id" state) after it was cancelled"
-echo "held at $before of $quiet leases, went on, bits equal"
+
+# What no job needs is given up for a new one: the films of the first job, which are kept for hslt-job extend.
+stop $COORDINATOR_PID
+mount -o remount,size=64m "$DIR/spool"
+LISTEN=$COORDINATOR start_coordinator -v
+kept=$(submit "$BOX" -o "$DIR/kept.exr" $JOB)
+until_true 30 is_state "$kept" done || fail "$kept is $(value "$kept" state)"
+[ -n "$(find "$DIR/spool/jobs/$kept" -name 'journal.*' -size +1000k -o -name checkpoint -size +1000k)" ] || fail "no films are kept"
+{
+	cat "$BOX"
+	awk 'BEGIN { for (i = 0; i < 20000; i++) printf "<!-- line %06d: what nobody reads -->\n", i }'
+} >"$DIR/long.xml"
+head -c 99000000 /dev/zero >"$DIR/spool/filler" 2>/dev/null && fail "there is room"
+id=$(submit "$DIR/long.xml" --path "$(dirname "$BOX")" -o "$DIR/long.exr" --integrator path --spp 1) ||
+	fail "refused while films could be deleted: $(tail -n 1 "$DIR/submit.log")"
+until_true 30 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" waiting)"
+rm "$DIR/spool/filler"
+echo "held at $first of $quiet leases, went on, bits equal"
