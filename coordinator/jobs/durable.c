@@ -453,11 +453,14 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
 	if (job->unsure || (job->held_states && room_for_states(jobs, job)) || room_first(jobs, job))
 		return -EAGAIN;
-	int rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
-	if (rc && rc != -EAGAIN)
-		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	if (!rc)
-		rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
+	int rc;
+	do {
+		rc = journal_is_bad(job->journal) ? journal_renew(job->journal, &e) : 0;
+		if (rc && rc != -EAGAIN)
+			live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+		if (!rc)
+			rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
+	} while (rc == -ENOSPC && room_make(jobs)); /* of what has been of use until now */
 	if (!rc)
 		hold(jobs, job, "");
 	return rc;

@@ -11,6 +11,11 @@ fi
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 
+# is_merged JOB N: more than that
+is_merged() {
+	[ "$(value "$1" merged)" -gt "$2" ]
+}
+
 JOB="--integrator hslt --bootstrap 20000 --mutations 2000000"
 mkdir "$DIR/spool"
 mount -t tmpfs -o size=32m none "$DIR/spool" || skip "no tmpfs"
@@ -74,4 +79,17 @@ id=$(submit "$DIR/long.xml" --path "$(dirname "$BOX")" -o "$DIR/long.exr" --inte
 	fail "refused while films could be deleted: $(tail -n 1 "$DIR/submit.log")"
 until_true 30 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" waiting)"
 rm "$DIR/spool/filler"
+
+# A job that waits for room gets that of a scene that no job needs any more.
+head -c 3000000 /dev/zero >>"$DIR/spool/ballast"
+holder=$(submit "$DIR/long.xml" --path "$(dirname "$BOX")" -o "$DIR/long.exr" $JOB)
+"$BIN/hslt-job" hold "$holder" 2>/dev/null
+mount -o remount,size=$(($(df --output=used -k "$DIR/spool" | tail -n 1) + 3000))k "$DIR/spool"
+id=$(submit "$BOX" -o "$DIR/gone.exr" $JOB)
+until_true 20 is_state "$id" held || fail "$id is $(value "$id" state)"
+head -c 20000000 /dev/zero >"$DIR/spool/filler" 2>/dev/null && fail "there is room"
+sleep 3
+before=$(value "$id" merged)
+"$BIN/hslt-job" cancel "$holder" 2>>"$DIR/cancel.log" || : # it says when the disk has not taken it yet
+until_true 20 is_merged "$id" "$before" || fail "$id stays at $before results: $(value "$id" waiting)"
 echo "held at $first of $quiet leases, went on, bits equal"
