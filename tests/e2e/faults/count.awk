@@ -68,7 +68,7 @@ function add(k, fresh) {
 			unstored[key(get("kind"), get("epoch"))]++
 		if (event == "batch_merged")
 			add(key(get("kind"), get("epoch")), get("late") == "") # late: from the journal
-		for (e = 0; event == "batch_restored" && e < get("epochs"); e++)
+		for (e = 0; event == "batch_restored" && e < get("epochs") + 0; e++)
 			add(key(get("kind"), e))
 		if (event == "batch_restored" && get("kind") == "render") # after the bootstrap
 			add(key("bootstrap", 0))
