@@ -15,6 +15,7 @@
 
 #include <dirent.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <sys/stat.h>
@@ -64,6 +65,12 @@ extern const struct disk disk_system;
 	}
 DISK_CALLS(DISK_WRAPPER)
 #undef DISK_WRAPPER
+
+/* Whether an error, -errno, says that there is no room on the disk, or none left of its quota. */
+static inline bool disk_is_full(int code)
+{
+	return code == -ENOSPC || code == -EDQUOT;
+}
 
 /* The data need not stay in the page cache: it is read again only after a crash. */
 static inline void disk_forget(int fd)

@@ -397,7 +397,7 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 	while (size) {
 		struct iovec part = {(void *)(uintptr_t)bytes, size};
 		ssize_t n = disk_pwritev(w->fd, &part, 1, (off_t)w->at);
-		if (n < 0 && (errno == EINTR || (errno == ENOSPC && make_disk_room(w->store))))
+		if (n < 0 && (errno == EINTR || (disk_is_full(-errno) && make_disk_room(w->store))))
 			continue;
 		if (n < 0)
 			return error_file(e, errno, w->store->folder);

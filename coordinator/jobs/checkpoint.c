@@ -130,7 +130,7 @@ static void checkpoint_written(uv_work_t *work, int status)
 		job->checkpoint_after = jobs_now(jobs) + jobs->config.retry_seconds;
 	} else if (w->rc) { /* the old pair stays in use */
 		live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-		bool room = w->rc == -ENOSPC && room_make(jobs);
+		bool room = disk_is_full(w->rc) && room_make(jobs);
 		job->checkpoint_after = jobs_now(jobs) + (room ? jobs->config.retry_seconds : pause_seconds);
 		journal_clear(w->folder, journal_generation(job->journal));
 	} else {

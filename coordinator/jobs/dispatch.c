@@ -61,7 +61,7 @@ static void submitted(struct jobs *jobs, const struct action *a, struct submissi
 	from->job = a->job;
 	do
 		rc = store_submission(jobs, a->job, from, &job, &e);
-	while (rc == -ENOSPC && room_make(jobs));
+	while (disk_is_full(rc) && room_make(jobs));
 	if (rc) {
 		text_copy(from->refusal, sizeof from->refusal, e.text);
 		jobs_break(jobs, a->job, e.text);

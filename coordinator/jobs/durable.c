@@ -110,7 +110,7 @@ static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, s
 	int rc = ledger_end(jobs->ledger, r, kept, e);
 	if (rc && !r->has_result) /* its merged data is useless now, and may be what fills the disk */
 		keep_drop(jobs, r->id);
-	if (rc == -ENOSPC)
+	if (disk_is_full(rc))
 		keep_drop_all(jobs);
 	if (rc)
 		rc = ledger_end(jobs->ledger, r, kept, e);
@@ -239,7 +239,7 @@ static int reserve_disk(struct jobs *jobs, struct live_job *job, const struct in
 					 "No space left on the disk but what a checkpoint of its results needs");
 		if (!rc && job->canvas && in->batch->key.kind == LEASE_RENDER)
 			rc = canvas_reserve(job->canvas, in->batch, e);
-	} while (rc == -ENOSPC && room_make(jobs));
+	} while (disk_is_full(rc) && room_make(jobs));
 	return rc;
 }
 
@@ -460,7 +460,7 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 			live_job_log(job, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 		if (!rc)
 			rc = journal_reserve(job->journal, 2 * job->held_bytes, &e);
-	} while (rc == -ENOSPC && room_make(jobs)); /* of what has been of use until now */
+	} while (disk_is_full(rc) && room_make(jobs)); /* of what has been of use until now */
 	if (!rc)
 		hold(jobs, job, "");
 	return rc;

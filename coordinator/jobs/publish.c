@@ -1,6 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Images and errors of live jobs. publish_start gives the films to the thread pool, which makes the image of their
+ * complete rounds, judges it, and writes it into the job's folder; until then the job is busy. Then the core is told.
+ * An image that the disk refuses is tried again, and its job counts as running until it is written.
+ */
 #include "coordinator/jobs/publish.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/blob/blob.h"
@@ -126,7 +132,7 @@ static void cannot_write(struct publishing *w)
 	struct live_job *job = w->job;
 	job->unpublished = true;
 	job->unpublished_rounds = w->rounds;
-	if (w->rc == -ENOSPC)
+	if (disk_is_full(w->rc))
 		room_make(w->jobs);
 	job->try_again = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
 	if (strcmp(job->record.why, w->error.text) != 0)

@@ -471,6 +471,54 @@ static void not_flushed(void **state)
 	blob_store_close(s);
 }
 
+static int full_with; /* errno of writes, as long as some file is there */
+static char full_while[256];
+
+static ssize_t write_where_room_is(int fd, const struct iovec *parts, int count, off_t at)
+{
+	struct stat st;
+	if (lstat(full_while, &st) == 0) {
+		errno = full_with;
+		return -1;
+	}
+	return pwritev(fd, parts, count, at);
+}
+
+static bool remove_that_file(void *user)
+{
+	++*(int *)user;
+	return unlink(full_while) == 0;
+}
+
+/* A full disk, or a quota that is used up: what nobody holds goes first, then whoever has more is asked. */
+static void a_disk_that_is_full(void **state)
+{
+	(void)state;
+	static const int codes[] = {ENOSPC, EDQUOT};
+	struct disk full = disk_system;
+	full.pwritev = write_where_room_is;
+	for (size_t i = 0; i < sizeof codes / sizeof *codes; i++) {
+		struct blob_store *s;
+		struct error e;
+		int asked = 0;
+		full_with = codes[i];
+		assert_int_equal(blob_store_open(&s, folder, 1000, &e), 0);
+		struct blob_hash a = store_text(s, "nobody holds this");
+		blob_release(s, &a);
+		blob_path(s, &a, full_while, sizeof full_while);
+		disk_use(&full);
+		store_text(s, i ? "one" : "two");
+		assert_false(blob_has(s, &a, NULL));
+		blob_store_ask(s, remove_that_file, &asked);
+		snprintf(full_while, sizeof full_while, "%s/films", folder);
+		fclose(fopen(full_while, "w"));
+		store_text(s, i ? "three" : "four");
+		assert_int_equal(asked, 1);
+		disk_use(NULL);
+		blob_store_close(s);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -485,6 +533,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_folder_that_is_removed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_disk_that_is_full, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(flushed_together, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(stored_meanwhile, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(not_flushed, folder_set_up, folder_tear_down),
