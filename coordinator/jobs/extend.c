@@ -11,6 +11,7 @@
  */
 #include "coordinator/jobs/extend.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/durable.h"
@@ -183,6 +184,13 @@ static int begin_again(struct jobs *jobs, const struct requester *by, struct liv
 	return rc;
 }
 
+/* A full disk may have room again; otherwise its films are of no more use. */
+static int cannot_continue(int rc, struct error *e)
+{
+	return error_prefix(e, rc, "it cannot continue: %s",
+			    disk_is_full(rc) ? "extend it when the disk has room" : again);
+}
+
 static int extend_read(struct jobs *jobs, const struct requester *by, struct live_job *job, const struct extension *x,
 		       const struct job_record *r, char *text, size_t size, struct error *e)
 {
@@ -248,7 +256,7 @@ static void ended_job_read(uv_work_t *work, int status)
 	jobs->reading_for = 0;
 	if (w->rc)
 		live_job_log(w->job, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot continue: %s", again) : here ? 0 : -ECANCELED;
+	int rc = w->rc ? cannot_continue(w->rc, &w->error) : here ? 0 : -ECANCELED;
 	if (!rc)
 		rc = extend_read(jobs, &w->by, w->job, &w->what, &w->record, text, sizeof text, &w->error);
 	if (rc)
@@ -282,7 +290,7 @@ static int start_reading(struct jobs *jobs, const struct extension_request *q, c
 	rc = w ? restore_live_job(jobs, &j, &w->job, e) : error_set(e, ENOMEM, "no memory for a job");
 	if (rc) {
 		mem_free(w);
-		return error_prefix(e, rc, "it cannot continue: %s", again);
+		return cannot_continue(rc, e);
 	}
 	rc = ask_beforehand(jobs, &q->by, w->job, &q->what, r, e);
 	if (rc) {

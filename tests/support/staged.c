@@ -61,6 +61,10 @@ static int own_open(const char *path, int flags, mode_t mode)
 		errno = EIO;
 		return -1;
 	}
+	if (staged_disk->no_room && ends_with(path, ".new")) {
+		errno = ENOSPC;
+		return -1;
+	}
 	int fd = disk_system.open(path, flags, mode);
 	if (strstr(path, "/blobs/") && !(flags & O_CREAT))
 		scene_fd = fd;

@@ -21,6 +21,7 @@ struct staged_disk {
 	_Atomic bool fail_folder; /* then the flush of its folder fails */
 	_Atomic bool fail_ledger; /* nothing can be written to it */
 	_Atomic unsigned refused; /* so often was it tried */
+	_Atomic bool no_room;	  /* for the copy of a journal */
 	/* hold_flush: the next flush of a journal waits until end_flush. */
 	_Atomic bool hold_flush, held_flush, end_flush;
 	_Atomic bool fail_flush; /* then it fails */

@@ -289,6 +289,23 @@ static void extended_when_memory_has_room(void **state)
 	staged_end(SIGTERM, true);
 }
 
+/* Its films stay, and once there is room it is extended. */
+static void extended_when_the_disk_has_room(void **state)
+{
+	(void)state;
+	staged.keep_bytes = 1 << 30;
+	sent = staged.acknowledged = open_count = 0;
+	staged_start();
+	uint64_t job = staged_submit();
+	work_until(leases_of_the_job(), 0);
+	staged_await_state(job, "done");
+	staged_disk->no_room = true;
+	extend(job, 6400, "it cannot continue: extend it when the disk has room: ");
+	staged_disk->no_room = false;
+	extend(job, 6400, NULL);
+	staged_end(SIGKILL, false);
+}
+
 /* Without a result its end waits in a list. */
 static void a_row_ends_later(void **state)
 {
@@ -327,6 +344,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(extended_after_its_end_was_written_late, staged_set_up,
 						folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_when_memory_has_room, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(extended_when_the_disk_has_room, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_row_ends_later, staged_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
