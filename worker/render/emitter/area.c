@@ -133,7 +133,7 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 	vec3 axis;
 	double distance, sin2;
 	if (!sphere_cone(l, ref, &axis, &distance, &sin2))
-		return 1 / l->area;
+		return surface_light_pdf_point(em, x);
 	return sphere_pdf_area(ref, sin2, x);
 }
 
@@ -147,4 +147,5 @@ const struct emitter_ops emitter_ops_area = {
 	.pdf_direction = pdf_direction,
 	.sample_toward = sample_toward,
 	.pdf_toward = pdf_toward,
+	.place = surface_light_place,
 };

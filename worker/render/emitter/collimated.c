@@ -76,9 +76,16 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	return 0;
 }
 
+static void place(struct emitter *em, const mat4 *to_world)
+{
+	struct beam *b = em->data;
+	b->light.x.p = mat4_point(to_world, (vec3){0, 0, 0});
+	b->axis = vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1}));
+}
+
 static const struct param params[] = {
 	{.name = "power", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "to_world", .types = VALUE_PLACE},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = NULL},
 };
@@ -93,4 +100,5 @@ const struct emitter_ops emitter_ops_collimated = {
 	.pdf_direction = pdf_direction,
 	.sample_toward = sample_toward,
 	.pdf_toward = pdf_toward,
+	.place = place,
 };

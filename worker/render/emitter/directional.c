@@ -30,10 +30,16 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	return code;
 }
 
+static void place(struct emitter *em, const mat4 *to_world)
+{
+	struct delta_light *l = em->data;
+	l->x.p = vec3_neg(vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1})));
+}
+
 static const struct param params[] = {
 	{.name = "irradiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 	{.name = "direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
-	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "to_world", .types = VALUE_PLACE},
 	{.name = "angle", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_DIFFERS}, /* of the cone */
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = NULL},
@@ -45,4 +51,5 @@ const struct emitter_ops emitter_ops_directional = {
 	.create = create,
 	.radiance = radiance,
 	DELTA_OPS,
+	.place = place,
 };

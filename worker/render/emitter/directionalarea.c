@@ -34,6 +34,7 @@ struct beam {
 	bool is_plane;
 	vec3 origin, n; /* of the plane */
 	double offset;	/* the most that a corner is off it */
+	vec3 own[3];	/* of a mesh that moves: what is, when the shutter opens, a right-handed frame around n */
 };
 
 static const struct param params[] = {
@@ -69,6 +70,31 @@ static void find_plane(struct beam *b)
 	b->is_plane = b->offset <= PLANE_OFFSET * extent;
 }
 
+static void keep_own(struct beam *b)
+{
+	const struct frame f = frame_around(b->n);
+	mat4 back;
+	b->is_plane = mat4_invert(b->light.to_world, &back);
+	if (!b->is_plane)
+		return;
+	b->own[0] = mat4_vector(&back, f.s);
+	b->own[1] = mat4_vector(&back, f.t);
+	b->own[2] = mat4_vector(&back, f.n);
+}
+
+/* The plane goes along: two vectors in it span its normal, and heights over it grow as that of a third one does. */
+static void place(struct emitter *em, const mat4 *to_world)
+{
+	struct beam *b = em->data;
+	surface_light_place(em, to_world);
+	if (!b->is_plane)
+		return;
+	vec3 n = vec3_cross(mat4_vector(to_world, b->own[0]), mat4_vector(to_world, b->own[1]));
+	b->n = vec3_normalize(n);
+	b->offset *= vec3_dot(b->n, mat4_vector(to_world, b->own[2]));
+	b->origin = surface_light_corner(&b->light, 0, 0);
+}
+
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	struct beam *b = em->data;
@@ -76,6 +102,8 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (rc)
 		return rc;
 	find_plane(b);
+	if (b->is_plane && b->light.placed)
+		keep_own(b);
 	em->power = b->light.area * em->brightest;
 	em->brightest *= 2 / (M_PI * sin(SPREAD) * sin(SPREAD));
 	return 0;
@@ -230,7 +258,7 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 		return disc_pdf(&s, vec3_dot(c, c) / (s.radius * s.radius));
 	}
 	if (!is_outward_sphere(&b->light))
-		return 1 / b->light.area;
+		return surface_light_pdf_point(em, x);
 	if (!spot_of_sphere(&b->light, ref, &s))
 		return 0;
 	/* From the chord, which has all digits. */
@@ -249,4 +277,5 @@ const struct emitter_ops emitter_ops_directionalarea = {
 	.pdf_direction = pdf_direction,
 	.sample_toward = sample_toward,
 	.pdf_toward = pdf_toward,
+	.place = place,
 };

@@ -33,7 +33,8 @@ struct emitter_surface {
 	const float (*position)[3];
 	const double (*unrounded)[3]; /* NULL: position; see worker/render/geom/primitive.h */
 	const uint32_t (*index)[3];
-	const float (*uv)[2]; /* NULL: none */
+	const float (*uv)[2];	    /* NULL: none */
+	const struct motion *moves; /* to the rescaled world, for a sphere from where it is here; NULL: it is still */
 };
 
 struct emitter_build {
@@ -72,8 +73,8 @@ struct emitter_ops {
 	bool (*sample_toward)(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
 			      double *pdf_toward);
 	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
-	/* Puts it where a transform to the rescaled world leads; of delta emitters whose to_world is a VALUE_PLACE.
-	 * NULL: it cannot move. */
+	/* Puts it where a transform to the rescaled world leads: the motion of its surface, or what its to_world, a
+	 * VALUE_PLACE, is at a time. NULL: it cannot move. */
 	void (*place)(struct emitter *em, const mat4 *to_world);
 };
 
@@ -98,7 +99,7 @@ struct emitter_room {
 	_Alignas(16) unsigned char data[EMITTER_ROOM];
 };
 
-void emitter_move(const struct emitter *em, double time, struct emitter_room *room);
+void emitter_move(const struct emitter *em, double time, struct emitter_room *room) __attribute__((cold));
 static inline const struct emitter *emitter_at(const struct emitter *em, double time, struct emitter_room *room)
 {
 	if (!em->moves)

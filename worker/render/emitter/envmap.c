@@ -24,17 +24,6 @@
 /* Of to_world's columns, the longest being 1; below it, few pixels would fill the sphere. */
 #define ENVMAP_VOLUME_MIN 1e-6
 
-struct envmap {
-	struct raster raster;
-	double scale;
-	struct envmap_axes at;
-	bool to_poles;	    /* the outer rows are the poles */
-	uint32_t rows;	    /* of cells: height + 1, to_poles: height - 1 */
-	uint32_t columns;   /* width */
-	double *row_cdf;    /* rows + 1; the last is 1; all 0 when black */
-	uint32_t *cell_cdf; /* [rows][columns + 1] */
-};
-
 static vec3 to_local(const struct envmap *m, vec3 d)
 {
 	return (vec3){vec3_dot(m->at.back[0], d), vec3_dot(m->at.back[1], d), vec3_dot(m->at.back[2], d)};
@@ -226,19 +215,25 @@ static int stretched_axes(const struct scene_node *n, const mat4 *to_world, stru
 	return 0;
 }
 
-int envmap_axes_read(const struct scene_node *n, struct envmap_axes *a, struct error *e)
+/* Of a to_world that keeps angles. */
+static void turned_axes(const mat4 *to_world, struct envmap_axes *a)
 {
-	mat4 t = node_transform(n, "to_world");
-	if (!mat4_keeps_angles(&t))
-		return stretched_axes(n, &t, a, e);
 	for (int c = 0; c < 3; c++)
-		a->axis[c] = vec3_normalize((vec3){t.m[0][c], t.m[1][c], t.m[2][c]});
+		a->axis[c] = vec3_normalize((vec3){to_world->m[0][c], to_world->m[1][c], to_world->m[2][c]});
 	/* Files give few digits: orthonormalised. */
 	double sign = vec3_dot(vec3_cross(a->axis[0], a->axis[1]), a->axis[2]) < 0 ? -1 : 1;
 	a->axis[1] = vec3_normalize(vec3_madd(a->axis[1], -vec3_dot(a->axis[0], a->axis[1]), a->axis[0]));
 	a->axis[2] = vec3_scale(sign, vec3_cross(a->axis[0], a->axis[1]));
 	memcpy(a->back, a->axis, sizeof a->back);
 	a->stretched = false;
+}
+
+int envmap_axes_read(const struct scene_node *n, struct envmap_axes *a, struct error *e)
+{
+	mat4 t = node_transform(n, "to_world");
+	if (!mat4_keeps_angles(&t))
+		return stretched_axes(n, &t, a, e);
+	turned_axes(&t, a);
 	return 0;
 }
 
@@ -246,9 +241,7 @@ int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles,
 		const struct envmap_axes *axes, const struct scene_node *n, const struct emitter_build *build,
 		struct error *e)
 {
-	struct envmap *m = arena_alloc(build->arena, 1, sizeof *m);
-	if (!m)
-		return node_error(n, e, ENOMEM, "out of memory");
+	struct envmap *m = em->data;
 	m->raster = *picture;
 	m->at = *axes;
 	m->raster.wrap_u = RASTER_REPEAT;
@@ -262,7 +255,6 @@ int envmap_make(struct emitter *em, const struct raster *picture, bool to_poles,
 	if (!m->row_cdf || !m->cell_cdf)
 		return node_error(n, e, ENOMEM, "out of memory for the density of %u x %u cells", m->columns, m->rows);
 	const struct color white = {.shape = COLOR_SHAPE_D65, .scale = m->scale, .d65 = true};
-	em->data = m;
 	em->infinite = true;
 	em->textured = true;
 	em->shape = raster_is_grey(&m->raster) ? COLOR_SHAPE_D65 : COLOR_SHAPE_OTHER;
@@ -283,10 +275,16 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	return code ? code : envmap_make(em, &picture, build->dialect_3, node_float(n, "scale", 1), &axes, n, build, e);
 }
 
+static void place(struct emitter *em, const mat4 *to_world)
+{
+	struct envmap *m = em->data;
+	turned_axes(to_world, &m->at);
+}
+
 static const struct param envmap_params[] = {
 	RASTER_PARAMS,
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "to_world", .types = VALUE_PLACE},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = "mis_compensation", .types = VALUE_BOOL, .status = PARAM_IGNORED},
 	{.name = NULL},
@@ -296,4 +294,5 @@ const struct emitter_ops emitter_ops_envmap = {
 	.decl = {PLUGIN_EMITTER, "envmap", envmap_params, 0, PARAM_UNDERSTOOD},
 	.create = envmap_create,
 	ENVMAP_OPS,
+	.place = place,
 };

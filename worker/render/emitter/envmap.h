@@ -13,6 +13,18 @@ struct envmap_axes {
 	bool stretched;
 };
 
+/* `data` of such an emitter. */
+struct envmap {
+	struct raster raster;
+	double scale;
+	struct envmap_axes at;
+	bool to_poles;	    /* the outer rows are the poles */
+	uint32_t rows;	    /* of cells: height + 1, to_poles: height - 1 */
+	uint32_t columns;   /* width */
+	double *row_cdf;    /* rows + 1; the last is 1; all 0 when black */
+	uint32_t *cell_cdf; /* [rows][columns + 1] */
+};
+
 /* -EINVAL: to_world is singular. */
 int envmap_axes_read(const struct scene_node *n, struct envmap_axes *a, struct error *e);
 /* Makes em from the image, times scale. to_poles: its first and last rows are the poles. The image is kept. */
@@ -27,6 +39,6 @@ void envmap_point_inverse(const struct emitter *em, const struct emitter_point *
 
 #define ENVMAP_OPS                                                                                       \
 	.radiance = envmap_radiance, .sample_point = envmap_sample_point, .pdf_point = envmap_pdf_point, \
-	.point_inverse = envmap_point_inverse
+	.point_inverse = envmap_point_inverse, .data_size = sizeof(struct envmap)
 
 #endif

@@ -96,10 +96,17 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	return 0;
 }
 
+static void place(struct emitter *em, const mat4 *to_world)
+{
+	struct projector *p = em->data;
+	p->light.x.p = mat4_point(to_world, (vec3){0, 0, 0});
+	delta_axes_of(to_world, p->axes);
+}
+
 static const struct param params[] = {
 	{.name = "irradiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-30, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "to_world", .types = VALUE_PLACE},
 	{.name = "fov", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-4, .max = 179.9},
 	{.name = "fov_axis", .types = VALUE_STRING, .choices = "x|y|diagonal|smaller|larger"},
 	{.name = "focal_length", .types = VALUE_STRING},
@@ -115,4 +122,5 @@ const struct emitter_ops emitter_ops_projector = {
 	DELTA_OPS,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
+	.place = place,
 };

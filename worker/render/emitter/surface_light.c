@@ -1,35 +1,79 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Points on a sphere or on triangles that are drawn by their areas, where the surface is now. Most lamps stand still:
+ * what those that move need is kept out of their way, in calls of its own.
+ */
 #include "worker/render/emitter/surface_light.h"
 
 #include "worker/render/emitter/uniform.h"
 #include "worker/render/math/search.h"
 #include "worker/render/math/sphere.h"
 
+static vec3 vertex_of(const struct surface_light *l, uint32_t i)
+{
+	const float *p = l->surface.position[i];
+	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
+}
+
 vec3 surface_light_corner(const struct surface_light *l, uint32_t triangle, int k)
 {
-	const struct emitter_surface *s = &l->surface;
-	uint32_t i = s->index[triangle][k];
-	if (s->unrounded)
-		return (vec3){s->unrounded[i][0], s->unrounded[i][1], s->unrounded[i][2]};
-	const float *p = s->position[i];
-	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
+	uint32_t i = l->surface.index[triangle][k];
+	const double(*u)[3] = l->surface.unrounded;
+	if (u)
+		return (vec3){u[i][0], u[i][1], u[i][2]};
+	return l->placed ? mat4_point(&l->to_world, vertex_of(l, i)) : vertex_of(l, i);
+}
+
+/* A triangle's first corner, and its edges from there. */
+struct wedge {
+	vec3 v0, e1, e2;
+};
+
+/* Not inline: most lamps stand still, and are neither very large nor very small. */
+__attribute__((noinline)) static void other_wedge(const struct surface_light *l, uint32_t i, struct wedge *t)
+{
+	t->v0 = surface_light_corner(l, i, 0);
+	t->e1 = vec3_sub(surface_light_corner(l, i, 1), t->v0);
+	t->e2 = vec3_sub(surface_light_corner(l, i, 2), t->v0);
+}
+
+static inline struct wedge wedge_of(const struct surface_light *l, uint32_t i)
+{
+	struct wedge t;
+	if (l->other) {
+		other_wedge(l, i, &t);
+		return t;
+	}
+	const uint32_t *k = l->surface.index[i];
+	t.v0 = vertex_of(l, k[0]);
+	t.e1 = vec3_sub(vertex_of(l, k[1]), t.v0);
+	t.e2 = vec3_sub(vertex_of(l, k[2]), t.v0);
+	return t;
 }
 
 vec3 surface_light_normal(const struct surface_light *l, uint32_t triangle)
 {
-	vec3 v0 = surface_light_corner(l, triangle, 0);
-	return vec3_cross(vec3_sub(surface_light_corner(l, triangle, 1), v0),
-			  vec3_sub(surface_light_corner(l, triangle, 2), v0));
+	const struct wedge t = wedge_of(l, triangle);
+	return vec3_cross(t.e1, t.e2);
 }
 
 void surface_light_weights(const struct surface_light *l, uint32_t triangle, vec3 p, double b[2])
 {
-	vec3 v0 = surface_light_corner(l, triangle, 0), e1 = vec3_sub(surface_light_corner(l, triangle, 1), v0),
-	     e2 = vec3_sub(surface_light_corner(l, triangle, 2), v0);
-	vec3 r = vec3_sub(p, v0), n = vec3_cross(e1, e2);
+	const struct wedge t = wedge_of(l, triangle);
+	vec3 r = vec3_sub(p, t.v0), n = vec3_cross(t.e1, t.e2);
 	double n2 = vec3_dot(n, n);
-	b[0] = vec3_dot(vec3_cross(r, e2), n) / n2;
-	b[1] = vec3_dot(vec3_cross(e1, r), n) / n2;
+	b[0] = vec3_dot(vec3_cross(r, t.e2), n) / n2;
+	b[1] = vec3_dot(vec3_cross(t.e1, r), n) / n2;
+}
+
+static double triangle_area(const struct surface_light *l, uint32_t triangle)
+{
+	return 0.5 * vec3_length(surface_light_normal(l, triangle));
+}
+
+static double sphere_area(const struct surface_light *l)
+{
+	return 4 * M_PI * l->surface.radius * l->surface.radius;
 }
 
 static int build_cdf(struct surface_light *l, struct arena *arena)
@@ -39,11 +83,47 @@ static int build_cdf(struct surface_light *l, struct arena *arena)
 	if (!l->cdf)
 		return -ENOMEM;
 	for (uint32_t i = 0; i < n; i++)
-		l->cdf[i + 1] = l->cdf[i] + 0.5 * vec3_length(surface_light_normal(l, i));
+		l->cdf[i + 1] = l->cdf[i] + triangle_area(l, i);
 	l->area = l->cdf[n];
 	for (uint32_t i = 1; i <= n; i++)
 		l->cdf[i] /= l->area;
 	return 0;
+}
+
+static void move(struct surface_light *l, const mat4 *to_world)
+{
+	struct emitter_surface *s = &l->surface;
+	if (!s->is_sphere) {
+		l->to_world = *to_world;
+		return;
+	}
+	s->center = mat4_point(to_world, s->center);
+	s->radius *= vec3_length(mat4_vector(to_world, (vec3){1, 0, 0}));
+	s->sphere_axes = (struct frame){vec3_normalize(mat4_vector(to_world, s->sphere_axes.s)),
+					vec3_normalize(mat4_vector(to_world, s->sphere_axes.t)),
+					vec3_normalize(mat4_vector(to_world, s->sphere_axes.n))};
+	l->area = sphere_area(l);
+}
+
+void surface_light_place(struct emitter *em, const mat4 *to_world)
+{
+	move(em->data, to_world);
+}
+
+/* Of what moves, for choosing among emitters. */
+static double mean_area(const struct surface_light *l)
+{
+	enum { TIMES = 8 };
+	double sum = 0;
+	for (int k = 0; k < TIMES; k++) {
+		struct surface_light at = *l;
+		mat4 now = motion_at(l->surface.moves, (k + 0.5) / TIMES);
+		move(&at, &now);
+		sum += l->surface.is_sphere ? at.area : 0;
+		for (uint32_t i = 0; i < l->surface.triangle_count; i++)
+			sum += triangle_area(&at, i);
+	}
+	return sum / TIMES;
 }
 
 int surface_light_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
@@ -54,10 +134,17 @@ int surface_light_create(struct emitter *em, const struct scene_node *n, const s
 	int rc = emitter_texture(&l->radiance, n, "radiance", COLOR_ILLUMINANT, build, e);
 	if (rc)
 		return rc;
+	em->moves = l->surface.moves;
+	l->placed = em->moves && !l->surface.is_sphere;
+	l->other = l->placed || l->surface.unrounded;
+	if (l->placed)
+		l->to_world = motion_at(em->moves, 0);
 	if (l->surface.is_sphere)
-		l->area = 4 * M_PI * l->surface.radius * l->surface.radius;
+		l->area = sphere_area(l);
 	else if (build_cdf(l, build->arena))
 		return error_set(e, ENOMEM, "out of memory");
+	if (em->moves)
+		l->area = mean_area(l);
 	if (!(l->area > 0))
 		return node_error(n, e, EINVAL, "an area emitter needs a shape of area above 0");
 	em->textured = !texture_is_constant(&l->radiance);
@@ -77,10 +164,9 @@ void surface_light_on_sphere(const struct surface_light *l, vec3 w, struct emitt
 void surface_light_on_triangle(const struct surface_light *l, uint32_t i, double b1, double b2, struct emitter_point *x)
 {
 	const struct emitter_surface *s = &l->surface;
-	vec3 v0 = surface_light_corner(l, i, 0), e1 = vec3_sub(surface_light_corner(l, i, 1), v0),
-	     e2 = vec3_sub(surface_light_corner(l, i, 2), v0);
-	x->p = vec3_madd(vec3_madd(v0, b1, e1), b2, e2);
-	x->n = vec3_normalize(vec3_cross(e1, e2));
+	const struct wedge t = wedge_of(l, i);
+	x->p = vec3_madd(vec3_madd(t.v0, b1, t.e1), b2, t.e2);
+	x->n = vec3_normalize(vec3_cross(t.e1, t.e2));
 	x->where = (struct texture_point){b1, b2, b1, b2, i, .p = x->p};
 	if (s->uv) {
 		const float *t0 = s->uv[s->index[i][0]], *t1 = s->uv[s->index[i][1]], *t2 = s->uv[s->index[i][2]];
@@ -98,26 +184,36 @@ static uint32_t find_triangle(const struct surface_light *l, double u, double *r
 	return i;
 }
 
+__attribute__((noinline)) static double placed_density(const struct surface_light *l, uint32_t i)
+{
+	return (l->cdf[i + 1] - l->cdf[i]) / triangle_area(l, i);
+}
+
+static inline double density(const struct surface_light *l, uint32_t i)
+{
+	return l->placed ? placed_density(l, i) : 1 / l->area;
+}
+
 bool surface_light_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf)
 {
 	const struct surface_light *l = em->data;
 	x->infinite = false;
-	*pdf = 1 / l->area;
 	if (l->surface.is_sphere) {
+		*pdf = 1 / l->area;
 		surface_light_on_sphere(l, direction_of_square(u), x);
 		return true;
 	}
 	double v;
 	uint32_t i = find_triangle(l, u[0], &v);
 	double root = sqrt(v);
+	*pdf = density(l, i);
 	surface_light_on_triangle(l, i, 1 - root, root * u[1], x);
 	return true;
 }
 
 double surface_light_pdf_point(const struct emitter *em, const struct emitter_point *x)
 {
-	(void)x;
-	return 1 / ((const struct surface_light *)em->data)->area;
+	return density(em->data, x->where.prim);
 }
 
 static double below_1(double x)

@@ -72,7 +72,8 @@ static bool move_emitter(struct mutation_ctx *m, const struct full_path *x, stru
 {
 	const struct path_context *c = m->path;
 	const struct path_vertex *v = &x->v[0];
-	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
 	struct emitter_point p = world_emitter_point(&v->x);
 	double u[2], r[4], pdf;
 	p.infinite = v->kind == VERTEX_INFINITE;

@@ -23,7 +23,8 @@
 
 double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v)
 {
-	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
 	struct emitter_point p = world_emitter_point(&v->x);
 	p.infinite = v->kind == VERTEX_INFINITE;
 	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_point(em, &p);
@@ -31,7 +32,8 @@ double path_pdf_emitter(const struct path_context *c, const struct path_vertex *
 
 double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref)
 {
-	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
 	struct emitter_point p = world_emitter_point(&v->x);
 	p.infinite = v->kind == VERTEX_INFINITE;
 	return c->w->emitter_pdf[v->emitter] * emitter_pdf_toward(em, ref, &p);

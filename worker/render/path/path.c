@@ -322,7 +322,8 @@ static bool leave_infinity(struct path_context *c, struct path_vertex *v, const 
 	struct path_vertex start = {.kind = VERTEX_CAMERA};
 	start.x.p = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), -2 * w->radius});
 	start.x.prim = prim_none_at(v[0].x.prim.time);
-	const struct emitter *em = &w->emitters[v[0].emitter];
+	struct emitter_room room;
+	const struct emitter *em = world_emitter(w, v[0].emitter, v[0].x.prim.time, &room);
 	struct emitter_point p = {.p = v[0].x.p, .infinite = true};
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
 	if (!go_on(c, &start, d, 0, INFINITY, distance, &v[1], left) || v[1].kind == VERTEX_INFINITE)

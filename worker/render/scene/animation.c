@@ -104,7 +104,5 @@ static bool is_in_group(const struct xml_element *el)
 
 const char *animation_refused(const struct scene_node *n, const struct xml_element *el)
 {
-	if (n->cls != PLUGIN_SHAPE)
-		return NULL;
-	return n->shines ? "what shines" : is_in_group(el) ? "a shape in a shapegroup" : NULL;
+	return n->cls == PLUGIN_SHAPE && is_in_group(el) ? "a shape in a shapegroup" : NULL;
 }

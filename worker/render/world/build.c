@@ -155,6 +155,7 @@ static struct emitter_surface emitter_surface_of(const struct geom_shape *g)
 		.unrounded = (const double(*)[3])g->unrounded,
 		.index = (const uint32_t(*)[3])g->index,
 		.uv = (const float(*)[2])g->uv,
+		.moves = surface_moves(g) ? &g->place->moves->motion : NULL,
 	};
 }
 

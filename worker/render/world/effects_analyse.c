@@ -390,7 +390,7 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		if (surface_moves(&w->shapes[i]))
 			count(&moving, src->shape[i], "");
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (w->emitters[i].moves)
+		if (w->emitters[i].moves && w->emitter_shape[i] == UINT32_MAX)
 			count(&moving, src->emitter[i], "");
 	if (w->camera.moves)
 		count(&moving, src->sensor, "");

@@ -109,6 +109,20 @@ static int check_reach(const struct builder *b, const struct scene_node *n, cons
 	return 0;
 }
 
+/* A place or, of an environment, a direction at each of m's times. */
+static int check_emitter(const struct builder *b, const struct emitter *em, const struct scene_node *n,
+			 const struct motion *m)
+{
+	if (!em->infinite)
+		return check_reach(b, n, m);
+	for (uint32_t i = 0; i < m->count && !em->delta; i++) {
+		mat4 at = motion_at(m, m->key[i].time);
+		if (!mat4_keeps_angles(&at))
+			return node_error(n, b->e, ENOTSUP, "an environment that moves may only be turned");
+	}
+	return 0;
+}
+
 int moving_emitter(struct builder *b, struct emitter *em, const struct scene_node *n)
 {
 	struct world *w = b->w;
@@ -121,7 +135,7 @@ int moving_emitter(struct builder *b, struct emitter *em, const struct scene_nod
 	if (rc)
 		return rc;
 	motion_rescale(m, w->center, w->scale);
-	rc = check_reach(b, n, m);
+	rc = check_emitter(b, em, n, m);
 	if (rc)
 		return rc;
 	mat4 open = motion_at(m, 0);

@@ -6,10 +6,14 @@
  * writes itself; the rule of midpoints leaves 32^-2 of what changes. The integrators make it; bdpt is what erpt begins
  * with (tests/support/agree.h: level 1e-4 over the suite, power printed and bounded). Chains take a minute each: of
  * those, only hslt with a moving camera runs without FULL=1; test_balance has a room in which all of this moves.
+ *
+ * What a light brings a plane while it moves is an integral over the time: of the irradiance of a ball, which falls
+ * with the square of the distance, of a polygon (Lambert 1760), of a beam, and of a projector.
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
 #include "tests/support/length.h"
+#include "tests/support/memory_assets.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/render/path/path.h"
@@ -129,9 +133,10 @@ enum { PARTS = 32 };
 #define FLOOR                                                                                              \
 	"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>" \
 	"<translate y='-1'/></transform><bsdf type='diffuse'><float name='reflectance' value='0.6'/></bsdf></shape>"
+#define SHINES(radiance) "<emitter type='area'><float name='radiance' value='" radiance "'/></emitter>"
 #define LAMP                                                                                                \
 	"<shape type='rectangle'><transform name='to_world'><scale value='1.5'/><rotate x='1' angle='90'/>" \
-	"<translate y='3'/></transform><emitter type='area'><float name='radiance' value='3'/></emitter></shape>"
+	"<translate y='3'/></transform>" SHINES("3") "</shape>"
 #define SKY "<emitter type='constant'><float name='radiance' value='0.2'/></emitter>"
 #define DEPTH "<integrator type='path'><integer name='max_depth' value='6'/></integrator>"
 /* A card in front of the camera, a ball of glass that grows, a group of rough metal that turns, two lights. */
@@ -145,6 +150,22 @@ enum { PARTS = 32 };
 #define SPOT \
 	"<emitter type='spot'>%s<float name='intensity' value='2'/><float name='cutoff_angle' value='40'/></emitter>"
 #define POINT "<emitter type='point'>%s<float name='intensity' value='0.6'/></emitter>"
+
+/* Lamps: a card, a ball, and a group with a cube. The first and the last are stretched as well. */
+#define CARD_LAMP "<shape type='rectangle'>%s" SHINES("2") "</shape>"
+#define BALL_LAMP "<shape type='sphere'>%s" SHINES("2") "</shape>"
+#define GROUP_LAMP                                                                                           \
+	"<shape type='shapegroup' id='l'><shape type='cube'><transform name='to_world'><scale value='0.3'/>" \
+	"<rotate x='1' y='1' angle='50'/></transform>" SHINES("1") "</shape></shape>"                        \
+								   "<shape type='instance'><ref id='l'/>%s</shape>"
+/* Lights from afar. */
+#define SUN "<emitter type='directional'>%s<float name='irradiance' value='0.5'/></emitter>"
+#define PICTURE "<emitter type='envmap'>%s<string name='filename' value='e.pgm'/></emitter>"
+/* A ball of a medium that shines. */
+#define GLOW                                                                                    \
+	"<shape type='sphere'>%s<bsdf type='null'/><medium type='homogeneous' name='interior'>" \
+	"<float name='sigma_t' value='0.5'/><spectrum name='albedo' value='0.3'/></medium>"     \
+	"<emitter type='volumelight'><float name='radiance' value='2'/></emitter></shape>"
 
 static void put_card(char *out, size_t size, double t)
 {
@@ -174,6 +195,42 @@ static void put_point(char *out, size_t size, double t)
 	snprintf(out, size, "<translate x='%.17g' y='1' z='0.5'/>", 1 - 2 * t);
 }
 
+static void put_card_lamp(char *out, size_t size, double t)
+{
+	snprintf(out, size,
+		 "<scale x='%.17g' y='%.17g'/><rotate x='1' angle='90'/><rotate z='1' angle='%.17g'/>"
+		 "<translate x='%.17g' y='1.6' z='0.3'/>",
+		 0.2 + 0.6 * t, 0.5 - 0.3 * t, -40 + 60 * t, -1 + 1.6 * t);
+}
+
+static void put_ball_lamp(char *out, size_t size, double t)
+{
+	snprintf(out, size, "<scale value='%.17g'/><translate x='0.9' y='%.17g' z='0.6'/>", 0.15 + 0.25 * t,
+		 -0.3 + 0.9 * t);
+}
+
+static void put_group_lamp(char *out, size_t size, double t)
+{
+	snprintf(out, size,
+		 "<scale x='%.17g' z='%.17g'/><rotate y='1' angle='%.17g'/><translate x='-0.9' y='-0.3' z='%.17g'/>",
+		 0.5 + t, 1.5 - t, 80 * t, -0.5 + t);
+}
+
+static void put_sun(char *out, size_t size, double t)
+{
+	snprintf(out, size, "<rotate x='1' angle='90'/><rotate z='1' angle='%.17g'/>", -50 + 90 * t);
+}
+
+static void put_picture(char *out, size_t size, double t)
+{
+	snprintf(out, size, "<rotate y='1' angle='%.17g'/><rotate x='1' angle='20'/>", 120 * t);
+}
+
+static void put_glow(char *out, size_t size, double t)
+{
+	snprintf(out, size, "<scale value='%.17g'/><translate x='%.17g' y='-0.2' z='0.3'/>", 0.5 + 0.2 * t, -0.6 + t);
+}
+
 static void put_camera(char *out, size_t size, double t)
 {
 	snprintf(out, size,
@@ -198,18 +255,47 @@ static void put_moving(char *out, size_t size, put_fn *put)
 	snprintf(out, size, KEYS("%s", "%s"), begin, end);
 }
 
-enum thing { EYES, CARDS, GLASSES, GROUPS, SPOTS, POINTS, THINGS };
-static put_fn *const puts_of[THINGS] = {put_camera, put_card, put_glass, put_group, put_spot, put_point};
+enum thing {
+	EYES,
+	CARDS,
+	GLASSES,
+	GROUPS,
+	SPOTS,
+	POINTS,
+	CARD_LAMPS,
+	BALL_LAMPS,
+	GROUP_LAMPS,
+	SUNS,
+	PICTURES,
+	GLOWS,
+	THINGS
+};
+static put_fn *const puts_of[THINGS] = {put_camera,    put_card,      put_glass,      put_group, put_spot,    put_point,
+					put_card_lamp, put_ball_lamp, put_group_lamp, put_sun,	 put_picture, put_glow};
 
-/* What moves; all else stands where it is at STILL. No integrator but those with light sub-paths finds light that
- * points and spots send through glass, so there is none beside them. */
-enum stage { SHAPES, CAMERA, LIGHTS };
-static const char *const names[] = {"motion", "moving camera", "moving lights"};
+/* What moves, from the first to the last; all else stands where it is at STILL. No integrator but those with light
+ * sub-paths finds light that points and spots send through glass, so there is none beside them. */
+enum stage { SHAPES, CAMERA, LIGHTS, LAMPS, SKIES, MEDIA };
+static const struct {
+	const char *name;
+	enum thing first, last;
+} stages[] = {{"motion", CARDS, GROUPS},	{"moving camera", EYES, EYES},
+	      {"moving lights", SPOTS, POINTS}, {"moving lamps", CARD_LAMPS, GROUP_LAMPS},
+	      {"moving skies", SUNS, PICTURES}, {"moving glow", GLOWS, GLOWS}};
 #define STILL 0.4
 
-static bool moves(enum stage s, enum thing i)
+/* With a picture of the sky. */
+__attribute__((format(printf, 1, 2))) static struct world *world_of(const char *format, ...)
 {
-	return s == CAMERA ? i == EYES : s == SHAPES ? i >= CARDS && i <= GROUPS : i == SPOTS || i == POINTS;
+	static char xml[1 << 14];
+	static const char sky[] = "P5 4 2 255\n\x90\xff\x40\x20\x60\x30\x50\x40";
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(xml, sizeof xml, format, ap);
+	va_end(ap);
+	assert_true(n > 0 && (size_t)n < sizeof xml);
+	const struct memory_file files[] = {{"s.xml", xml, (size_t)n}, {"e.pgm", sky, sizeof sky - 1}, {NULL, NULL, 0}};
+	return world_of_files(16, 16, files);
 }
 
 /* At time t, or, below 0, as it moves. */
@@ -217,16 +303,29 @@ static struct world *world_at(enum stage s, double t)
 {
 	char place[THINGS][768];
 	for (enum thing i = 0; i < THINGS; i++)
-		if (!moves(s, i))
+		if (i < stages[s].first || i > stages[s].last)
 			put_still(place[i], sizeof place[i], puts_of[i], STILL);
 		else if (t < 0)
 			put_moving(place[i], sizeof place[i], puts_of[i]);
 		else
 			put_still(place[i], sizeof place[i], puts_of[i], t);
-	return s == LIGHTS ? world_of_text(16, 16, DEPTH EYE FLOOR SKY CARD SPOT POINT, place[EYES], place[CARDS],
-					   place[SPOTS], place[POINTS])
-			   : world_of_text(16, 16, DEPTH EYE FLOOR LAMP SKY CARD GLASS GROUP, place[EYES], place[CARDS],
-					   place[GLASSES], place[GROUPS]);
+#define SCENE(inner) "<scene version='3.0.0'>" DEPTH EYE FLOOR inner "</scene>", place[EYES]
+	switch (s) {
+	case LIGHTS:
+		return world_of(SCENE(SKY CARD SPOT POINT), place[CARDS], place[SPOTS], place[POINTS]);
+	case LAMPS:
+		return world_of(SCENE(SKY CARD CARD_LAMP BALL_LAMP GROUP_LAMP), place[CARDS], place[CARD_LAMPS],
+				place[BALL_LAMPS], place[GROUP_LAMPS]);
+	case SKIES:
+		return world_of(SCENE(CARD SUN PICTURE), place[CARDS], place[SUNS], place[PICTURES]);
+	case MEDIA:
+		return world_of(
+			"<scene version='3.0.0'><integrator type='volpath'><integer name='max_depth' value='6'/>"
+			"</integrator>" EYE FLOOR SKY CARD GLOW "</scene>",
+			place[EYES], place[CARDS], place[GLOWS]);
+	default:
+		return world_of(SCENE(LAMP SKY CARD GLASS GROUP), place[CARDS], place[GLASSES], place[GROUPS]);
+	}
 }
 
 static void mean_of_stills(enum stage s, struct agree_image *out)
@@ -238,7 +337,7 @@ static void mean_of_stills(enum stage s, struct agree_image *out)
 		struct world *w = world_at(s, (i + 0.5) / PARTS);
 		const struct agree_side how = {"bdpt", 320, 32, 0, 0};
 		snprintf(side, sizeof side, "still %d", i);
-		agree_render(w, names[s], side, &how, &part);
+		agree_render(w, stages[s].name, side, &how, &part);
 		out->groups = part.groups;
 		for (uint32_t g = 0; g < part.groups; g++)
 			for (int c = 0; c <= AGREE_CELLS; c++)
@@ -255,7 +354,7 @@ static void check_integrators(enum stage s, const struct agree_side *sides, size
 	assert_true(w->effects.motion && !w->effects.colour);
 	for (size_t i = 0; i < count; i++) {
 		char test[64];
-		snprintf(test, sizeof test, "%s, %s", names[s], sides[i].integrator);
+		snprintf(test, sizeof test, "%s, %s", stages[s].name, sides[i].integrator);
 		agree_render(w, test, "moving", &sides[i], &image);
 		agree_check(test, &image, &stills);
 	}
@@ -295,13 +394,189 @@ static void test_lights(void **state)
 	check_integrators(LIGHTS, sides, test_full() ? 3 : 2);
 }
 
+static void test_lamps(void **state)
+{
+	(void)state;
+	static const struct agree_side sides[] = {
+		{"path", 16384, 32, 0, 0},  {"bdpt", 8192, 32, 0, 0},	{"erpt", 8192, 32, 0, 0},
+		{"bdpt8", 12288, 32, 0, 0}, {"erpt4", 12288, 32, 0, 0}, {"pssmlt", 65536, 32, 0, 0},
+		{"hslt", 458752, 32, 0, 0},
+	};
+	check_integrators(LAMPS, sides, test_full() ? 7 : 2);
+}
+
+static void test_skies(void **state)
+{
+	(void)state;
+	static const struct agree_side sides[] = {
+		{"path", 8192, 32, 0, 0}, {"bdpt", 8192, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
+	check_integrators(SKIES, sides, test_full() ? 3 : 2);
+}
+
+static void test_glow(void **state)
+{
+	(void)state;
+	static const struct agree_side sides[] = {{"path", 16384, 32, 0, 0}, {"bdpt", 16384, 32, 0, 0}};
+	check_integrators(MEDIA, sides, 2);
+}
+
+/* ---- lights over a plane */
+
+/* Half of the sides, or the radius, and the place at a time. */
+struct light_at {
+	double a, b, x, height;
+};
+typedef struct light_at light_fn(double t);
+
+static struct light_at moves_by(double t)
+{
+	return (struct light_at){.a = 0.2, .b = 0.2, .x = -1.5 + 3 * t, .height = 1.5};
+}
+
+static struct light_at rises(double t)
+{
+	return (struct light_at){.a = 0.1 + 0.3 * t, .b = 0.1 + 0.3 * t, .height = 1.5 + t};
+}
+
+static struct light_at is_stretched(double t)
+{
+	return (struct light_at){.a = 0.1 + 0.8 * t, .b = 0.6 - 0.4 * t, .height = 1.5 + 0.5 * t};
+}
+
+/* What each kind of light, of strength 1, brings a point (x, y, 0), which looks up. */
+typedef double irradiance_fn(const struct light_at *l, double x, double y);
+
+static double of_ball(const struct light_at *l, double x, double y)
+{
+	double d2 = (x - l->x) * (x - l->x) + y * y + l->height * l->height;
+	return M_PI * l->a * l->a * l->height / (d2 * sqrt(d2));
+}
+
+static double of_card(const struct light_at *l, double x, double y)
+{
+	const double side[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+	double sum = 0;
+	for (int i = 0; i < 4; i++) {
+		const double *p = side[i], *q = side[(i + 1) % 4];
+		vec3 u = {l->x + p[0] * l->a - x, p[1] * l->b - y, l->height},
+		     v = {l->x + q[0] * l->a - x, q[1] * l->b - y, l->height}, w = vec3_cross(u, v);
+		sum += 0.5 * atan2(vec3_length(w), vec3_dot(u, v)) * w.z / vec3_length(w);
+	}
+	return sum;
+}
+
+/* Its edge is blurred evenly. */
+static double of_beam(const struct light_at *l, double x, double y)
+{
+	return fabs(x - l->x) < l->a && fabs(y) < l->b;
+}
+
+static double of_projector(const struct light_at *l, double x, double y)
+{
+	(void)x, (void)y;
+	return M_PI / (l->height * l->height);
+}
+
+static const struct over_plane {
+	const char *name;
+	light_fn *light;
+	irradiance_fn *irradiance;
+	const char *type, *inside;
+} over_plane[] = {
+	{"a ball slides", moves_by, of_ball, "sphere", SHINES("1")},
+	{"a ball rises and grows", rises, of_ball, "sphere", SHINES("1")},
+	{"a card is stretched", is_stretched, of_card, "rectangle", SHINES("1")},
+	{"a beam is stretched", is_stretched, of_beam, "rectangle",
+	 "<emitter type='directionalarea'><float name='radiance' value='1'/></emitter>"},
+	{"a projector rises", rises, of_projector, "projector", "<float name='fov' value='60'/>"},
+};
+
+/* The mean over the image of a plane of reflectance 1 that the camera sees from a height of 1, and over the time. */
+static double mean_radiance(const struct over_plane *o)
+{
+	enum { STEPS = 48, TIMES = 512 };
+	double sum = 0, half = tan(M_PI / 9);
+	for (int k = 0; k < TIMES; k++) {
+		struct light_at l = o->light((k + 0.5) / TIMES);
+		for (int i = 0; i < STEPS * STEPS; i++)
+			sum += o->irradiance(&l, half * (2 * (i % STEPS + 0.5) / STEPS - 1),
+					     half * (2 * (i / STEPS + 0.5) / STEPS - 1));
+	}
+	return sum / (M_PI * STEPS * STEPS * TIMES);
+}
+
+static void put_light(char *out, size_t size, const struct over_plane *o, double t)
+{
+	const struct light_at l = o->light(t);
+	snprintf(out, size,
+		 "<scale x='%.17g' y='%.17g' z='%.17g'/><rotate x='1' angle='180'/><translate x='%.17g' z='%.17g'/>",
+		 l.a, l.b, l.a, l.x, l.height);
+}
+
+static struct world *world_over_plane(const struct over_plane *o)
+{
+	char begin[256], end[256];
+	const char *element = o->irradiance == of_projector ? "emitter" : "shape";
+	put_light(begin, sizeof begin, o, 0);
+	put_light(end, sizeof end, o, 1);
+	return world_of(
+		"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='2'/></integrator>"
+		"<sensor type='perspective'><float name='fov' value='40'/>" SHUTTER TO(
+			"<lookat origin='0,0,1' target='0,0,0' up='0,1,0'/>") BOX_FILM
+		"</sensor>"
+		"<shape type='rectangle'>" TO(
+			"<scale value='4'/>") "<bsdf type='diffuse'>"
+					      "<float name='reflectance' value='1'/></bsdf></shape>"
+					      "<%s type='%s'>" KEYS("%s", "%s") "%s</%s></scene>",
+		element, o->type, begin, end, o->inside, element);
+}
+
+static void test_over_a_plane(void **state)
+{
+	(void)state;
+	static const struct agree_side sides[] = {{"path", 4096, 32, 0, 0}, {"bdpt", 4096, 32, 0, 0}};
+	static struct agree_image image;
+	for (size_t k = 0; k < sizeof over_plane / sizeof *over_plane; k++) {
+		struct world *w = world_over_plane(&over_plane[k]);
+		double xyz = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
+		for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
+			char test[64];
+			snprintf(test, sizeof test, "%s, %s", over_plane[k].name, sides[i].integrator);
+			agree_render(w, test, "moving", &sides[i], &image);
+			agree_expect(test, &image, xyz * mean_radiance(&over_plane[k]));
+		}
+		world_free(w);
+	}
+}
+
+/* A lamp of which all transforms are the same, and one that would move while the shutter is closed, are those that
+ * stand there: equal bits. */
+static void test_at_rest(void **state)
+{
+	(void)state;
+	static struct agree_image still, image;
+	static const char *const places[] = {
+		TO("<translate x='0.25' z='1.5'/>"),
+		KEYS("<translate x='0.25' z='1.5'/>", "<translate x='0.25' z='1.5'/>"),
+		"<animation name='to_world'><transform time='3'><translate x='0.25' z='1.5'/></transform>"
+		"<transform time='4'><translate x='2'/></transform></animation>"};
+	for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+		struct world *w = world_of("<scene version='3.0.0'>" DEPTH EYE FLOOR CARD_LAMP "</scene>",
+					   TO("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>"), places[i]);
+		const struct agree_side how = {"bdpt", 16, 16, 0, 0};
+		assert_false(w->effects.motion);
+		agree_render(w, "at rest", "a lamp", &how, i ? &image : &still);
+		assert_true(i == 0 || memcmp(image.mean, still.mean, sizeof still.mean) == 0);
+		world_free(w);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_seen),
-		cmocka_unit_test(test_shapes),
-		cmocka_unit_test(test_camera),
-		cmocka_unit_test(test_lights),
+		cmocka_unit_test(test_seen),   cmocka_unit_test(test_shapes),	    cmocka_unit_test(test_camera),
+		cmocka_unit_test(test_lights), cmocka_unit_test(test_lamps),	    cmocka_unit_test(test_skies),
+		cmocka_unit_test(test_glow),   cmocka_unit_test(test_over_a_plane), cmocka_unit_test(test_at_rest),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

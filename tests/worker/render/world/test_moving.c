@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A world that moves, at a time, against one that stands where the first one then is, by transforms that this test
- * writes itself: surfaces, their derivatives, and what rays and segments meet. Times when nothing moves, motions that
- * are refused, and very many keyframes.
+ * writes itself: surfaces, their derivatives, what rays and segments meet, and lights. Times when nothing moves,
+ * motions that are refused, and very many keyframes.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -24,6 +24,9 @@
 		"<lookat origin='0,0,8' target='0,0,0' up='0,1,0'/>") "<film type='hdrfilm'><rfilter " \
 								      "type='box'/></film></sensor>"
 #define SKY "<emitter type='constant'/>"
+#define FLOOR "<shape type='rectangle'>" TO("<scale value='5'/><translate z='-3'/>") "</shape>"
+#define AREA "<emitter type='area'><float name='radiance' value='2'/></emitter>"
+#define BEAM "<emitter type='directionalarea'><float name='radiance' value='2'/></emitter>"
 
 static const char ball_obj[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
 			       "vn 1 0 0\nvn -1 0 0\nvn 0 1 0\nvn 0 -1 0\nvn 0 0 1\nvn 0 0 -1\n"
@@ -82,9 +85,7 @@ static struct world *world_at(double t)
 		"<shape type='shapegroup' id='g'><shape type='obj'><string name='filename' value='m.obj'/></shape>"
 		"<shape type='sphere'>" TO(
 			"<translate x='1.5'/>") "</shape></shape><shape type='instance'><ref id='g'/>"};
-	size_t at = (size_t)snprintf(xml, sizeof xml,
-				     "<scene version='3.0.0'>" VIEW(OPEN("0", "1")) SKY
-				     "<shape type='rectangle'>" TO("<scale value='5'/><translate z='-3'/>") "</shape>");
+	size_t at = (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW(OPEN("0", "1")) SKY FLOOR);
 	for (int k = 0; k < COURSES; k++) {
 		at += (size_t)snprintf(xml + at, sizeof xml - at, "%s", begin[k]);
 		at += put_place(xml + at, sizeof xml - at, k, t);
@@ -264,6 +265,202 @@ static void test_camera(void **state)
 	world_free(moving);
 }
 
+/* ---- lights */
+
+/* The shapes shine, and there are lights without a surface. */
+static struct world *lights_at(double t)
+{
+	static char xml[1 << 14];
+	static const char *const begin[] = {
+		"<shape type='obj'><string name='filename' value='m.obj'/>" AREA,
+		"<shape type='disk'>" BEAM,
+		"<shape type='sphere'><point name='center' value='0.1,0.2,-0.1'/><float name='radius' value='0.9'/>" AREA,
+		"<shape type='shapegroup' id='g'><shape type='cube'>" AREA "</shape><shape type='sphere'>" BEAM TO(
+			"<translate x='1.5'/>") "</shape></shape><shape type='instance'><ref id='g'/>",
+		"<emitter type='directional'>",
+		"<emitter type='projector'>",
+		"<emitter type='point'>",
+		"<emitter type='spot'>",
+		"<emitter type='collimated'>"};
+	enum { ITEMS = sizeof begin / sizeof *begin };
+	size_t at = (size_t)snprintf(xml, sizeof xml, "<scene version='3.0.0'>" VIEW(OPEN("0", "1")) FLOOR);
+	for (int k = 0; k < ITEMS; k++) {
+		at += (size_t)snprintf(xml + at, sizeof xml - at, "%s", begin[k]);
+		at += put_place(xml + at, sizeof xml - at, k % COURSES, t);
+		at += (size_t)snprintf(xml + at, sizeof xml - at, k < 4 ? "</shape>" : "</emitter>");
+	}
+	at += (size_t)snprintf(xml + at, sizeof xml - at, "</scene>");
+	assert_true(at + 1 < sizeof xml);
+	const struct memory_file files[] = {
+		{"s.xml", xml, at}, {"m.obj", ball_obj, sizeof ball_obj - 1}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
+static void same(double a, double b, double tolerance)
+{
+	if (!(fabs(a - b) <= tolerance * fabs(b)))
+		fail_msg("%.17g is not %.17g", a, b);
+}
+
+/* Densities per area of the rescaled world, and intensities, which are per square of its lengths, in scene units. */
+static double per_area(const struct world *w, const struct emitter *em, double value)
+{
+	return em->delta || em->infinite ? value : value * w->scale * w->scale;
+}
+
+static void near_point(const struct world *moving, const struct world *still, const struct emitter_point *x,
+		       const struct emitter_point *y, double off)
+{
+	assert_int_equal(x->infinite, y->infinite);
+	if (x->infinite)
+		near(x->p, y->p, off);
+	else
+		near(in_scene(moving, x->p), in_scene(still, y->p), off);
+	near(x->n, y->n, off);
+}
+
+static void check_light(const struct world *moving, const struct world *still, uint32_t id, double t, struct dice *d)
+{
+	static const struct wavelengths grey = {.grey = true};
+	struct emitter_room room;
+	const struct emitter *a = emitter_at(&moving->emitters[id], t, &room), *b = &still->emitters[id];
+	const double u[2] = {dice_throw(d), dice_throw(d)}, v[2] = {dice_throw(d), dice_throw(d)};
+	struct emitter_point x, y;
+	double p, q, back[2];
+	vec3 from, to;
+	assert_true(moving->emitters[id].moves && !b->moves);
+	assert_true(a->ops->sample_point(a, u, &x, &p) && b->ops->sample_point(b, u, &y, &q));
+	near_point(moving, still, &x, &y, 100 * OFF); /* of a narrow triangle's cell */
+	same(per_area(moving, a, p), per_area(still, b, q), OFF);
+	same(a->ops->pdf_point(a, &x), p, 1e-9);
+	if (moving->emitter_shape[id] != UINT32_MAX) {
+		const struct prim_ref prim = {moving->emitter_shape[id], x.where.prim, t};
+		struct surface_point on;
+		assert_true(surface_near(&moving->shapes[prim.shape], prim, x.p, &on));
+		near(on.p, x.p, 1e-12);
+		near(on.ng, x.n, 1e-9);
+		assert_true(fabs(on.u - x.where.u) < 1e-9 && fabs(on.v - x.where.v) < 1e-9);
+		a->ops->point_inverse(a, &x, back);
+		assert_true(fabs(back[0] - u[0]) < 1e-9 && fabs(back[1] - u[1]) < 1e-9);
+	}
+	if (!a->infinite) {
+		assert_true(a->ops->sample_direction(a, &x, v, &from, &p) &&
+			    b->ops->sample_direction(b, &y, v, &to, &q));
+		near(from, to, 1e-4);
+		same(p, q, 2e-2);
+		double l = a->ops->radiance(a, &x, from, &grey).v[0], m = b->ops->radiance(b, &y, to, &grey).v[0];
+		same(a->delta ? l / (moving->scale * moving->scale) : l,
+		     a->delta ? m / (still->scale * still->scale) : m, 2e-2);
+		same(a->ops->pdf_direction(a, &x, from), p, 1e-9);
+	}
+	vec3 ref = vec3_scale(dice_between(d, 0, 4), dice_direction(d));
+	bool met = emitter_sample_toward(a, in_world(moving, ref), u, &x, &p),
+	     met2 = emitter_sample_toward(b, in_world(still, ref), u, &y, &q);
+	if (!met || !met2)
+		return;
+	near_point(moving, still, &x, &y, 100 * OFF); /* at the edge of a cone */
+	same(per_area(moving, a, p), per_area(still, b, q), 1e-3);
+	same(emitter_pdf_toward(a, in_world(moving, ref), &x), p, 1e-6);
+}
+
+static void test_lights(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("lights at a time");
+	struct world *moving = lights_at(-1);
+	assert_true(moving->effects.motion && moving->emitter_count == 10);
+	for (int i = 0; i <= 10; i++) {
+		double t = i == 10 ? 1 - 0x1p-53 : i == 0 ? 0 : dice_throw(&d);
+		struct world *still = lights_at(t);
+		assert_int_equal(moving->emitter_count, still->emitter_count);
+		for (uint32_t e = 0; e < moving->emitter_count; e++)
+			for (size_t n = dice_count(300); n > 0; n--)
+				check_light(moving, still, e, t, &d);
+		world_free(still);
+	}
+	world_free(moving);
+}
+
+static double area_at(const struct world *w, uint32_t triangle, double t)
+{
+	vec3 p[3];
+	for (int k = 0; k < 3; k++) {
+		struct surface_point x;
+		surface_on_triangle(&w->shapes[0], (struct prim_ref){0, triangle, t}, k == 1, k == 2, &x);
+		p[k] = x.p;
+	}
+	return 0.5 * vec3_length(vec3_cross(vec3_sub(p[1], p[0]), vec3_sub(p[2], p[0])));
+}
+
+/* A cube of which one side grows and another shrinks: as many points on each triangle as its density says at every
+ * time, by Pearson's chi^2 with 11 degrees of freedom (50: level 6e-7), and uniform within. */
+static void test_stretched(void **state)
+{
+	(void)state;
+	enum { TRIANGLES = 12 };
+	struct dice d = dice_of("a stretched lamp");
+	struct world *w = world_of_text(
+		32, 32,
+		VIEW(OPEN("0",
+			  "1")) "<shape type='cube'><animation name='to_world'><transform time='0'><scale x='0.2'/>"
+				"</transform><transform time='1'><scale y='0.1' z='3'/><rotate x='1' angle='50'/>"
+				"</transform></animation>" AREA "</shape>");
+	const double times[] = {0, 0.3, 0.999};
+	for (int k = 0; k < 3; k++) {
+		struct emitter_room room;
+		const struct emitter *em = emitter_at(&w->emitters[0], times[k], &room);
+		double share[TRIANGLES], sum = 0, chi2 = 0, middle[2] = {0, 0};
+		size_t found[TRIANGLES] = {0}, n = dice_count(100000);
+		for (uint32_t i = 0; i < TRIANGLES; i++) {
+			const struct emitter_point x = {.where.prim = i};
+			share[i] = em->ops->pdf_point(em, &x) * area_at(w, i, times[k]);
+			sum += share[i];
+		}
+		same(sum, 1, 1e-12);
+		for (size_t i = 0; i < n; i++) {
+			const double u[2] = {dice_throw(&d), dice_throw(&d)};
+			struct emitter_point x;
+			double pdf;
+			assert_true(em->ops->sample_point(em, u, &x, &pdf));
+			found[x.where.prim]++;
+			middle[0] += x.where.b1 / (double)n;
+			middle[1] += x.where.b2 / (double)n;
+		}
+		for (uint32_t i = 0; i < TRIANGLES; i++)
+			chi2 += pow((double)found[i] - share[i] * (double)n, 2) / (share[i] * (double)n);
+		assert_true(chi2 < 50);
+		/* A third, within six standard deviations: the variance of a barycentric is 1/18. */
+		for (int i = 0; i < 2; i++)
+			assert_true(fabs(middle[i] - 1.0 / 3) < 6 * sqrt(1.0 / 18 / (double)n));
+	}
+	world_free(w);
+}
+
+/* Emitters are chosen by their mean power: of one that grows from 1 to 2, the area of 1 times (1 + 2 + 4) / 3. */
+static void check_power(const char *shape, double area)
+{
+	struct world *w = world_of_text(
+		32, 32,
+		VIEW(OPEN("0",
+			  "1")) "<shape type='%s'><animation name='to_world'><transform time='0'/><transform time='1'>"
+				"<scale value='2'/></transform></animation>" AREA "</shape>",
+		shape);
+	const struct emitter *em = &w->emitters[0];
+	bool said = false;
+	for (size_t i = 0; i < w->effects.line_count; i++)
+		said |= strstr(w->effects.lines[i].why, "moves while the shutter is open") != NULL;
+	assert_true(said); /* one thing, not a shape and an emitter */
+	same(em->power / (M_PI * em->brightest * w->scale * w->scale), area * 7 / 3, 1e-3);
+	world_free(w);
+}
+
+static void test_power(void **state)
+{
+	(void)state;
+	check_power("rectangle", 4);
+	check_power("sphere", 4 * M_PI);
+}
+
 #define SLIDES(type, inside)                                                                          \
 	"<shape type='" type "'><animation name='to_world'><transform time='0'/><transform time='2'>" \
 	"<translate x='4'/></transform></animation>" inside "</shape>"
@@ -313,6 +510,18 @@ static void refused(const char *body, const char *sentence)
 	world_of_files_refused(files, sentence);
 }
 
+/* It would look as if it were not stretched. */
+static void refused_picture(void)
+{
+	static const char xml[] = "<scene version='3.0.0'>" VIEW(OPEN(
+		"0",
+		"1")) "<emitter type='envmap'><string name='filename' value='e.pgm'/><animation name='to_world'>"
+		      "<transform time='0'/><transform time='1'><scale x='2'/></transform></animation></emitter></scene>";
+	const struct memory_file files[] = {
+		{"s.xml", xml, sizeof xml - 1}, {"e.pgm", "P5 2 1 255\nab", 13}, {NULL, NULL, 0}};
+	world_of_files_refused(files, "an environment that moves may only be turned");
+}
+
 static void test_refused(void **state)
 {
 	(void)state;
@@ -323,14 +532,18 @@ static void test_refused(void **state)
 	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><scale x='2'/></transform></animation></shape>",
 		"a sphere that moves may not be stretched in one direction");
-	refused(VIEW(OPEN("0", "1")) "<emitter type='directional'><animation name='to_world'>"
+	refused(VIEW(OPEN("0", "1")) "<emitter type='sky'><animation name='to_world'>"
 				     "<transform time='0'/><transform time='1'><rotate x='1' angle='9'/></transform>"
 				     "</animation></emitter>",
 		"motion of this plug-in is not supported");
+	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
+				     "<transform time='1'><scale y='2'/></transform></animation>"
+				     "<emitter type='area'/></shape>",
+		"a sphere that moves may not be stretched in one direction");
+	refused_picture();
 	refused(VIEW(OPEN("0", "1")) "<emitter type='point'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><translate x='1e30'/></transform></animation></emitter>",
 		"it moves more than");
-	refused(VIEW(OPEN("0", "1")) SLIDES("rectangle", "<emitter type='area'/>"), "motion of what shines");
 	refused(VIEW(OPEN("0", "1")) "<shape type='cube' id='c'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><translate x='2'/></transform></animation></shape>"
 				     "<shape type='shapegroup' id='g'><ref id='c'/></shape>"
@@ -382,7 +595,9 @@ static void test_many_keyframes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_at_a_time), cmocka_unit_test(test_camera),	 cmocka_unit_test(test_still),
+		cmocka_unit_test(test_at_a_time), cmocka_unit_test(test_lights),
+		cmocka_unit_test(test_stretched), cmocka_unit_test(test_power),
+		cmocka_unit_test(test_camera),	  cmocka_unit_test(test_still),
 		cmocka_unit_test(test_refused),	  cmocka_unit_test(test_many_keyframes),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
