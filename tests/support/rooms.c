@@ -229,7 +229,8 @@ static struct world *misfit(void)
 #define FROM(t, inner) "<transform time='" t "'>" inner "</transform>"
 #define MOVES(a, b) "<animation name='to_world'>" FROM("0", a) FROM("1", b) "</animation>"
 
-/* While the shutter is open the camera follows a little, a ball of metal rolls and shrinks, cloudy glass turns, and a group slides. */
+/* While the shutter is open the camera follows a little, a ball of metal rolls and shrinks, cloudy glass turns, a group slides, and the
+ * lamp swings and is stretched. */
 static struct world *moving(void)
 {
 	static const char scene[] = "<scene version='3.0.0'>"
@@ -238,7 +239,10 @@ static struct world *moving(void)
 			"<lookat origin='0.2,0.3,1.8' target='0.1,-0.5,-1' up='0.1,1,0'/>")
 		"<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/>"
 			"<rfilter type='box'/></film></sensor>"
-		BOX("0.5,0.45,0.35") LAMP
+		BOX("0.5,0.45,0.35")
+		"<shape type='rectangle'>" MOVES("<scale x='1.7' y='1.3'/><rotate x='1' angle='90'/><translate x='-0.1' y='1.9'/>",
+			"<scale x='1.2' y='1.7'/><rotate x='1' angle='90'/><rotate z='1' angle='10'/><translate x='0.2' y='1.6'/>")
+				SHINES("3,2.5,2") "</shape>"
 		"<shape type='sphere'>" MOVES("<scale value='0.7'/><translate x='-0.6' y='-1' z='-0.6'/>",
 			"<scale value='0.5'/><rotate z='1' angle='-100'/><translate x='0.5' y='-1.2' z='-0.5'/>") METAL("0.2") "</shape>"
 		"<shape type='cube'>" MOVES("<scale x='0.5' y='0.4' z='0.15'/><translate x='0.5' y='0.3' z='-0.4'/>",
