@@ -286,7 +286,7 @@ static struct play play_of(const struct fit *f, struct dice *d)
 	return y;
 }
 
-/* A look is in doubt where half of what decides lasts, and the other half changes as fast as its deviation does. */
+/* Half of what decides whether a look is in doubt lasts, and half changes as fast as the look's deviation does. */
 static bool is_in_doubt(const struct fit *f, const struct play *y)
 {
 	return 0.5 * erfc(0.5 * (y->rare + y->seen)) < f->doubt;
@@ -315,7 +315,7 @@ static double expected(const struct fit *f, const struct play *y, double work)
 	return y->level + change(f, y, log(work / f->work)) - log(work);
 }
 
-/* The number of rounds at which it stops. rare_stop: the estimate at which it does in doubt, too; 0: no doubt counts.
+/* The number of rounds at which it stops. rare_stop: the estimate at which it does in doubt; 0: it is never in doubt.
  */
 static double play_target(const struct fit *f, struct play *y, const struct plan *p, double target, double rare_stop,
 			  enum forecast_run run, struct dice *d)
