@@ -36,7 +36,7 @@ static bool read_group(struct stream *s, unsigned bits, unsigned char out[GROUP]
 		return false;
 	for (unsigned i = 0; i < GROUP; i++) {
 		unsigned bit = i * bits, place = bits == 1 ? bit % 8 : 8 - bits - bit % 8,
-			 x = bits ? from[bit / 8] >> place & sentinel : 0;
+			 x = bits ? (unsigned)from[bit / 8] >> place & sentinel : 0;
 		if (bits && bits < 8 && x == sentinel) {
 			if (!(whole = take(s, 1)))
 				return false;
