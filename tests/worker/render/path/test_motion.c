@@ -558,8 +558,8 @@ static void test_at_rest(void **state)
 	static const char *const places[] = {
 		TO("<translate x='0.25' z='1.5'/>"),
 		KEYS("<translate x='0.25' z='1.5'/>", "<translate x='0.25' z='1.5'/>"),
-		"<animation name='to_world'><transform time='3'><translate x='0.25' z='1.5'/></transform>"
-		"<transform time='4'><translate x='2'/></transform></animation>"};
+		("<animation name='to_world'><transform time='3'><translate x='0.25' z='1.5'/></transform>"
+		 "<transform time='4'><translate x='2'/></transform></animation>")};
 	for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
 		struct world *w = world_of("<scene version='3.0.0'>" DEPTH EYE FLOOR CARD_LAMP "</scene>",
 					   TO("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>"), places[i]);
