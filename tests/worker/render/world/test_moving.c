@@ -329,7 +329,8 @@ static void check_light(const struct world *moving, const struct world *still, u
 	double p, q, back[2];
 	vec3 from, to;
 	assert_true(moving->emitters[id].moves && !b->moves);
-	assert_true(a->ops->sample_point(a, u, &x, &p) && b->ops->sample_point(b, u, &y, &q));
+	assert_true(a->ops->sample_point(a, u, &x, &p));
+	assert_true(b->ops->sample_point(b, u, &y, &q));
 	near_point(moving, still, &x, &y, 100 * OFF); /* of a narrow triangle's cell */
 	same(per_area(moving, a, p), per_area(still, b, q), OFF);
 	same(a->ops->pdf_point(a, &x), p, 1e-9);
@@ -344,8 +345,8 @@ static void check_light(const struct world *moving, const struct world *still, u
 		assert_true(fabs(back[0] - u[0]) < 1e-9 && fabs(back[1] - u[1]) < 1e-9);
 	}
 	if (!a->infinite) {
-		assert_true(a->ops->sample_direction(a, &x, v, &from, &p) &&
-			    b->ops->sample_direction(b, &y, v, &to, &q));
+		assert_true(a->ops->sample_direction(a, &x, v, &from, &p));
+		assert_true(b->ops->sample_direction(b, &y, v, &to, &q));
 		near(from, to, 1e-4);
 		same(p, q, 2e-2);
 		double l = a->ops->radiance(a, &x, from, &grey).v[0], m = b->ops->radiance(b, &y, to, &grey).v[0];
