@@ -19,7 +19,7 @@ SAN      ?=
 BUILD    ?= build$(if $(SAN),/san)
 PREFIX   ?= /usr/local
 PYTHON   ?= python3
-# Some an awk reads and writes numbers as the locale has them, and makes tables of them.
+# Debian's awk, which makes tables here, reads and writes numbers as the locale has them, some with commas.
 export LC_ALL := C
 
 EMBREE   := $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)

@@ -379,21 +379,20 @@ static void costs(struct plays *s, struct forecast_cost *c)
 	c->seconds = range_of(s->wall);
 }
 
-/* By which the doubt of the latest look that has one ends; 0: none has. */
-static double last_factor(const struct forecast_history *h)
+/* The estimate at which a render stops in doubt, by the rule of the latest look that has one. 0: it cannot. */
+static double rare_stop_of(const struct forecast_history *h, const struct plan *p, double target)
 {
 	double factor = 0;
-	for (uint32_t i = 0; i < h->count; i++)
-		factor = rare_factor(&h->looks[i]) > 0 ? rare_factor(&h->looks[i]) : factor;
-	return factor;
+	if (p->kind != PLAN_SAMPLES || !(target > 0))
+		return 0;
+	for (uint32_t i = h->count; i > 0 && !(factor > 0); i--)
+		factor = rare_factor(&h->looks[i - 1]);
+	return stated_error_rare_stop(target, factor);
 }
 
 double forecast_stop_in_doubt(const struct forecast_history *h, const struct plan *p, double target)
 {
-	const struct forecast_look *end = last(h);
-	if (!end || p->kind != PLAN_SAMPLES || !(target > 0))
-		return 0;
-	return in_doubt(end) ? stated_error_rare_stop(target, last_factor(h)) : 0;
+	return h->count && in_doubt(last(h)) ? rare_stop_of(h, p, target) : 0;
 }
 
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
@@ -406,8 +405,8 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	struct dice d = {1};
 	struct plays s;
 	double round = (double)plan_round_mutations(p);
-	bool same = run == FORECAST_SAME, samples = p->kind == PLAN_SAMPLES && target > 0;
-	double rare_stop = samples ? stated_error_rare_stop(target, last_factor(h)) : 0;
+	bool same = run == FORECAST_SAME;
+	double rare_stop = rare_stop_of(h, p, target);
 	for (int i = 0; i < PLAYS; i++) {
 		struct play y = play_of(&f, &d);
 		if (same)
