@@ -171,7 +171,7 @@ static void put_tiles(struct text *t, const struct convergence *a)
 		 a->tiles_flagged, a->tiles, 100 * a->energy_flagged, a->r_hat_worst, a->worst_x, a->worst_y);
 }
 
-static void put_classes(struct text *t, const struct canvas_image *img, uint32_t which, bool apart, const char *then)
+static void put_classes(struct text *t, const struct canvas_image *img, uint32_t which, bool apart)
 {
 	enum { SHOWN = 2 };
 	unsigned shown = 0, more = 0;
@@ -184,14 +184,14 @@ static void put_classes(struct text *t, const struct canvas_image *img, uint32_t
 			continue;
 		}
 		double chains = 100 * c->chains / img->b;
+		text_put(t, "%s", shown ? ", " : apart ? "groups of them differ in paths " : "to paths ");
 		if (apart)
-			text_put(t, "%sgroups of them differ in paths (%s): %.3g +- %.2g %% of b", then,
-				 path_class_name(k), chains, 100 * c->chains_error / img->b);
+			text_put(t, "(%s): %.3g +- %.2g %% of the light", path_class_name(k), chains,
+				 100 * c->chains_error / img->b);
 		else
-			text_put(t, "%sto paths (%s) they give %.3g %% of b, the bootstrap %.3g %%", then,
-				 path_class_name(k), chains, 100 * c->bootstrap / img->b);
+			text_put(t, "(%s) they give %.3g %% of the light, the bootstrap %.3g %%", path_class_name(k),
+				 chains, 100 * c->bootstrap / img->b);
 		shown++;
-		then = ", ";
 	}
 	if (more)
 		text_put(t, ", and %u classes more", more);
@@ -212,11 +212,13 @@ static void put_words(const struct plan *p, const struct canvas_image *img, stru
 		then = "; ";
 	}
 	if (a->classes_flagged) {
-		put_classes(&t, img, a->classes_flagged, false, then);
+		text_put(&t, "%s", then);
+		put_classes(&t, img, a->classes_flagged, false);
 		then = "; ";
 	}
 	if (a->classes_apart) {
-		put_classes(&t, img, a->classes_apart, true, then);
+		text_put(&t, "%s", then);
+		put_classes(&t, img, a->classes_apart, true);
 		then = "; ";
 	}
 	if (stuck)
@@ -272,7 +274,7 @@ void convergence_table(const struct path_class_energy classes[PATH_CLASSES], dou
 		if (!(c->chains > 0) && !(c->bootstrap > 0))
 			continue;
 		if (!any)
-			text_put(&t, "%-36s %21s %21s %9s\n", "paths, % of b", "bootstrap", "chains", "t");
+			text_put(&t, "%-36s %21s %21s %9s\n", "paths, % of the light", "bootstrap", "chains", "t");
 		any = true;
 		text_put(&t, "%-36s", path_class_name(k));
 		put_energy(&t, 100 * c->bootstrap / b, 100 * c->bootstrap_error / b);

@@ -53,7 +53,7 @@ ROW(R_HAT_MEDIAN, "hslt:rHatMedian", DOUBLE, false,
     "potential scale reduction of chains, median over tiles with light; the layer rhat has it by tile")
 ROW(R_HAT_WORST, "hslt:rHatWorst", DOUBLE, false, "its largest")
 ROW(CLASSES, "hslt:classes", STRING, false,
-    "energy of each class of paths in % of b, in the bootstrap and in the chains")
+    "energy of each class of paths in % of the light, in the bootstrap and in the chains")
 ROW(EFFECTS, "hslt:effects", STRING, false, "each effect, on or off, and why; one a line")
 ROW(MIXED, "hslt:mixed", INT, false, "1: workers with different arithmetic took part, the bits cannot be reproduced")
 ROW(WALL, "hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge")

@@ -60,7 +60,7 @@ cmp -s "$DIR/by-render" "$DIR/by-farm" || fail "other counters: $(diff "$DIR/by-
 # Samples that leave some of their light to chains: each part's share of light, variance and rays; a farm has them from batches.
 GLASS="$(dirname "$0")/../scenes/displaced/water.xml --integrator erpt --size 64x36 --spp 32"
 "$BIN/hslt-render" $GLASS -o "$DIR/parts.exr" --stats "$DIR/parts.json" 2>"$DIR/parts.log" || fail "erpt ended with $?"
-grep -q '^chains that spread .* % of the light, .* % of the variance of b, .* % of the rays' "$DIR/parts.log" || fail "no parts"
+grep -q '^chains that spread .* % of the light, .* % of the variance of the mean, .* % of the rays' "$DIR/parts.log" || fail "no parts"
 "${PYTHON:-python3}" - "$DIR/parts.json" <<-'END' || fail "$(grep -A 16 '"parts"' "$DIR/parts.json")"
 	import json, sys
 

@@ -175,7 +175,7 @@ static void classes_that_differ(void **state)
 	rough->difference_t = -7;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_flagged, 1U << path_class(4, PATH_ROUGH));
-	says(&a, "to paths (rough, 3-4 edges) they give 70 % of b, the bootstrap 75 %");
+	says(&a, "to paths (rough, 3-4 edges) they give 70 % of the light, the bootstrap 75 %");
 	/* As significant, but small. */
 	*rough = (struct path_class_energy){1.5, 0.001, 1.47, 0.001, -20};
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
@@ -210,7 +210,7 @@ static void groups_that_are_apart(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_apart, 1U << path_class(4, PATH_BOTH));
 	assert_int_equal(a.classes_flagged, 0);
-	says(&a, "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of b");
+	says(&a, "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of the light");
 	f.plan.groups = 7;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.plan.groups = 16;
@@ -263,7 +263,7 @@ static void words_fit(void **state)
 	f.img.counts.counters[COUNT_STUCK] = 1234;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	says(&a, "in 20 of 20 tiles");
-	says(&a, "and 18 classes more; groups of them differ in paths (rough, 1-2 edges): 4.94 +- 6.2 % of b");
+	says(&a, "and 18 classes more; groups of them differ in paths (rough, 1-2 edges): 4.94 +- 6.2 % of the light");
 	says(&a, "they accepted nothing");
 	convergence_table(f.img.classes, f.img.b, &a, table, sizeof table);
 	int lines = 0;

@@ -364,7 +364,7 @@ static void print_summary(const struct session *s)
 	if (s->a->stats && i->counts.counters[COUNT_SPREAD])
 		fprintf(stderr,
 			"chains that spread what is too bright for a sample: %.3g %% of the light, %.3g %% of the variance "
-			"of b, %.3g %% of the rays\n",
+			"of the mean, %.3g %% of the rays\n",
 			100 * i->chains_energy, 100 * i->chains_variance, 100 * stats_chains_rays(i));
 	strategy_note(p, &i->counts, i->black, text, sizeof text);
 	strategy_add_beyond(i->beyond_share, text, sizeof text);
