@@ -275,3 +275,12 @@ const char *merge_end_name(enum merge_end end, bool black)
 					    [MERGE_ERROR] = "target-error"};
 	return black ? "black" : names[end];
 }
+
+double merge_seconds_left(const struct plan *p, double seconds, double rounds, double rounds_per_second)
+{
+	double left = p->seconds - seconds;
+	if (!(rounds_per_second > 0))
+		return left > 0 ? left : NAN;
+	double last = fmax(ceil(rounds + fmax(0, left) * rounds_per_second), floor(rounds) + 1);
+	return (fmax(1, last) - rounds) / rounds_per_second;
+}

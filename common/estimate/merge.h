@@ -57,5 +57,9 @@ bool merge_error_due(const struct plan *p, uint64_t rounds);
 uint64_t merge_error_next(const struct plan *p, uint64_t rounds);
 /* img: the image of the complete rounds, or NULL if the error is not due. */
 enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img);
+/* Seconds until the plan's time ends the job, at the first complete round after it: after `seconds`, with this many
+ * rounds done, parts of rounds included (negative during the bootstrap), at this speed. A speed of 0 is unknown; what
+ * is returned then does not include the last round, or is NAN when the time is over. */
+double merge_seconds_left(const struct plan *p, double seconds, double rounds, double rounds_per_second);
 
 #endif

@@ -2,6 +2,8 @@
 /* Progress and remaining time of a job, by whichever bound seems to come first. */
 #include "coordinator/core/forecast.h"
 
+#include "common/estimate/merge.h"
+
 #include <math.h>
 
 static double bootstrap_total(const struct job *j)
@@ -52,13 +54,29 @@ static struct forecast_range work_total(const struct job *j)
 	return total;
 }
 
+static bool has_time(const struct job *j)
+{
+	return j->plan.seconds > 0 && !isnan(j->started);
+}
+
+/* Until its time ends it; NAN: its time is over, and nothing is known of the round that has to be completed. The rate
+ * of the bootstrap does not tell that of rounds. */
+static double time_left(const struct job *j, double rate, double now)
+{
+	double round = (double)plan_round_mutations(&j->plan);
+	return merge_seconds_left(&j->plan, job_elapsed(j, now), (work_done(j) - bootstrap_total(j)) / round,
+				  j->leases_merged ? rate / round : 0);
+}
+
 double job_progress(const struct job *j, double now)
 {
 	if (j->state == JOB_DONE)
 		return 1;
 	double p = work_done(j) / work_total(j).middle;
-	if (j->plan.seconds > 0 && !isnan(j->started) && job_is_live(j))
-		p = fmax(p, job_elapsed(j, now) / j->plan.seconds);
+	if (has_time(j) && job_is_live(j)) {
+		double left = time_left(j, rate_value(&j->rate, now), now), elapsed = job_elapsed(j, now);
+		p = fmax(p, isnan(left) ? 1 : elapsed / (elapsed + left));
+	}
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
@@ -67,8 +85,8 @@ static double seconds_left(const struct job *j, double total, bool idle, double 
 	double left = INFINITY, rate = idle ? 0 : rate_value(&j->rate, now);
 	if (rate > 0)
 		left = fmax(0, total - work_done(j)) / rate;
-	if (j->plan.seconds > 0 && !isnan(j->started))
-		left = fmin(left, fmax(0, j->plan.seconds - job_elapsed(j, now)));
+	if (has_time(j))
+		left = fmin(left, time_left(j, rate, now)); /* fmin ignores a NAN */
 	return isfinite(left) ? left : NAN;
 }
 

@@ -184,12 +184,39 @@ static void stops_are_not_lucky_dips(void **state)
 	}
 }
 
+/* Against a clock that completes rounds one by one: the render ends at the first of them after its time. */
+static void time_ends_with_a_round(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("time left");
+	for (int i = 0; i < 20000; i++) {
+		struct plan p = {.seconds = 100 * dice_throw(&d)};
+		double round = exp(8 * dice_throw(&d) - 4), bootstrap = 20 * dice_throw(&d), now = 150 * dice_throw(&d);
+		double end = bootstrap + round;
+		while (end < p.seconds || end < now)
+			end += round;
+		double left = merge_seconds_left(&p, now, (now - bootstrap) / round, 1 / round);
+		/* the clock adds up rounding errors, and at its beats one round more or less is as true */
+		double wrong = fabs(left - (end - now)) / round;
+		assert_true(wrong < 1e-6 || fabs(wrong - 1) < 1e-6);
+		if (wrong > 0.5)
+			assert_true(fabs(end - p.seconds) < 1e-6 * round ||
+				    fabs(end - round - p.seconds) < 1e-6 * round || fabs(end - now) < 1e-6 * round ||
+				    fabs(end - round - now) < 1e-6 * round);
+	}
+	struct plan p = {.seconds = 10};
+	assert_true(merge_seconds_left(&p, 4, 0.5, 0) == 6);
+	assert_true(isnan(merge_seconds_left(&p, 11, 0.5, 0)));
+	assert_true(merge_seconds_left(&p, 11, 0.5, 0.25) == 2);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(looks_are_geometric),
 		cmocka_unit_test(looks_are_worth_their_cost),
 		cmocka_unit_test(stops_are_not_lucky_dips),
+		cmocka_unit_test(time_ends_with_a_round),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

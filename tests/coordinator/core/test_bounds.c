@@ -370,6 +370,18 @@ static void progress_of_time(void **state)
 	near(job_status_of(f, 15).eta, 15);
 	near(job_status_of(f, 100).progress, 1);
 	farm_free(f);
+	/* 400 mutations, a round, take two seconds: the tenth is complete a second after the time. */
+	f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   START("rounds=inf seconds=20"),
+				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+				   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
+				   NULL,
+			   });
+	near(job_status_of(f, 15).eta, 16);
+	near(job_status_of(f, 15).progress, 5.0 / 21);
+	farm_free(f);
 }
 
 int main(void)

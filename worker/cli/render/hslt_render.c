@@ -15,6 +15,7 @@
 #include "common/base/progress.h"
 #include "common/blob/blob.h"
 #include "common/exr/image_file.h"
+#include "common/estimate/merge.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
 #include "common/plan/plan_text.h"
@@ -215,6 +216,14 @@ static int make_plan(struct session *s, struct error *e)
 	return 0;
 }
 
+/* Of the time until the round is complete at which the plan's time ends the render. */
+static double fraction_of_time(const struct plan *plan, const struct local_progress *p)
+{
+	double speed = p->round_seconds > 0 ? p->rounds / p->round_seconds : 0;
+	double left = merge_seconds_left(plan, p->seconds, p->rounds, speed);
+	return isnan(left) ? 0.99 : p->seconds / (p->seconds + left);
+}
+
 static void show(void *user, const struct local_progress *p)
 {
 	struct session *s = user;
@@ -225,7 +234,7 @@ static void show(void *user, const struct local_progress *p)
 	if (s->forecast_seconds > 0)
 		fraction = fmax(fraction, fmin(p->seconds / s->forecast_seconds, 0.99));
 	if (s->plan.seconds > 0)
-		fraction = fmax(fraction, fmin(p->seconds / s->plan.seconds, 0.99));
+		fraction = fmax(fraction, fraction_of_time(&s->plan, p));
 	progress_time(fraction > 0 ? p->seconds * (1 / fraction - 1) : 0, eta, sizeof eta);
 	snprintf(detail, sizeof detail, "%s%s%s", fraction > 0 ? eta : "", fraction > 0 ? " left" : "", s->forecast);
 	progress_show(&s->progress, fraction, p->state, detail);

@@ -74,6 +74,10 @@ static void show(struct thread_pool *c)
 				   .done = c->finished,
 				   .seconds = since(&c->begin)};
 	p.total = r->plan->rounds == UINT64_MAX ? UINT64_MAX : (r->plan->rounds + 1) * per_round;
+	if (c->kind == LEASE_RENDER) {
+		p.rounds = (double)c->finished / (double)per_round - 1;
+		p.round_seconds = p.seconds - r->bootstrap_seconds;
+	}
 	r->progress(r->user, &p);
 }
 

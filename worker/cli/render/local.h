@@ -13,6 +13,7 @@ struct local_progress {	      /* between leases, from the calling thread's point
 	const char *state;    /* bootstrap, running */
 	uint64_t done, total; /* leases of the current phase; total UINT64_MAX: not known */
 	double seconds;
+	double rounds, round_seconds; /* done, parts of one included, and the time they took; 0: still the bootstrap */
 };
 
 struct local_round {		     /* State after a complete round. */
