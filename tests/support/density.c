@@ -344,7 +344,9 @@ static bool exists(const struct path_context *c, const struct route *r, unsigned
 {
 	if (j == 0)
 		return !on_delta(c, &r->x[0]);
-	return (r->k >= 2 && !r->delta[j - 1] && !r->delta[j]);
+	if (r->k == 1)
+		return c->joins_lens && r->x[0].kind != VERTEX_INFINITE && !on_delta(c, &r->x[0]);
+	return !r->delta[j - 1] && !r->delta[j];
 }
 
 /* Logarithm of the density of the whole path by technique j. */
@@ -398,12 +400,13 @@ static void relabel(const struct path_context *c, struct route *r, unsigned s, s
 		r->x[0].kind = s ? VERTEX_EMITTER : VERTEX_SURFACE;
 }
 
-/* Where only one in eight samples has a light sub-path, techniques with two light vertices or more count an eighth. */
+/* Where only one in eight samples has a light sub-path, techniques with two light vertices or more count an eighth, and
+ * so does the one that joins an emitter to the lens. */
 static void check_rare_light(struct path_context *c, const struct joined_path *p, const double *ratio)
 {
 	double sum = 0;
 	for (unsigned j = 0; j <= p->edges; j++)
-		sum += j < 2 ? ratio[j] : 0.125 * ratio[j];
+		sum += j < (p->edges == 1 ? 1 : 2) ? ratio[j] : 0.125 * ratio[j];
 	c->light_every = 8;
 	double weight = path_balance_weight(c, p, PATH_MAX_EDGES);
 	c->light_every = 1;
@@ -517,6 +520,7 @@ struct density_tally density_check(const char *name, struct world *w, size_t wal
 		struct sampler_random s;
 		double film[2];
 		sampler_random_init(&s, stats_seed(name), RNG_TEST, i, 0);
+		c.joins_lens = i % 2;
 		unsigned camera = path_walk_camera(&c, &s.base, DEPTH + 1, film);
 		unsigned light = path_walk_light(&c, &s.base, DEPTH);
 		struct route whole;

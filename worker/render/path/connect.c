@@ -47,13 +47,21 @@ static bool is_delta(const struct joined_path *p, unsigned i)
 	return p->v[i]->delta;
 }
 
-static bool technique_exists(const struct joined_path *p, unsigned j)
+/* Whether emitters are sampled for a path of one edge, from v[1] on the lens to v[0]. */
+static bool lens_joins(const struct path_context *c, const struct path_vertex *emitter)
+{
+	return c->joins_lens && emitter->kind != VERTEX_INFINITE;
+}
+
+static bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
 	if (j == 0)
 		return true;
 	if (p->other_medium && j > p->other_medium)
 		return false;
-	return p->edges >= 2 && j <= p->edges && !is_delta(p, j - 1) && !is_delta(p, j);
+	if (p->edges == 1)
+		return j == 1 && lens_joins(c, p->v[0]);
+	return j <= p->edges && !is_delta(p, j - 1) && !is_delta(p, j);
 }
 
 /* Edge i, and its media at x_i-1 and at x_i. Where media scatter. */
@@ -107,23 +115,23 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 		ratio[j] = 0;
 	/* Technique 1 draws x_0 as seen from x_1, the longer ones as light sub-paths do. */
 	double toward = 1, point = 1;
-	if (k >= 2 && (s <= 1 || technique_exists(p, 1))) {
+	if ((k >= 2 || lens_joins(c, p->v[0])) && (s <= 1 || technique_exists(c, p, 1))) {
 		toward = path_pdf_toward(c, p->v[0], p->v[1]->x.p);
 		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}
 	double first = s == 1 ? point / toward : 1, r = first;
 	for (unsigned j = s; j < last && r > 0 && r < RATIO_LIMIT; j++) {
-		if (j == 0 && technique_exists(p, 1))
+		if (j == 0 && technique_exists(c, p, 1))
 			ratio[1] = r * toward / p->v[0]->pdf;
 		r *= (j == 0 ? point : light_pdf(c, p, j)) / p->v[j]->pdf;
-		if (j > 0 && technique_exists(p, j + 1))
+		if (j > 0 && technique_exists(c, p, j + 1))
 			ratio[j + 1] = r;
 	}
 	bool beyond = r >= RATIO_LIMIT;
 	r = first;
 	for (unsigned j = s; j > 0 && r > 0 && r < RATIO_LIMIT; j--) {
 		r *= camera_pdf(c, p, j - 1) / p->v[j - 1]->pdf;
-		if (technique_exists(p, j - 1))
+		if (technique_exists(c, p, j - 1))
 			ratio[j - 1] = j - 1 == 1 ? r * toward / point : r;
 	}
 	ratio[s] = 1;
@@ -134,9 +142,11 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s)
 {
 	double ratio[PATH_MAX_EDGES + 2], sum = 0;
+	unsigned with_light =
+		p->edges == 1 ? 1 : 2; /* the first technique that only samples with a light sub-path have */
 	path_technique_ratios(c, p, max_s, ratio);
 	for (unsigned j = 0; j <= p->edges; j++)
-		sum += j >= 2 && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
+		sum += j >= with_light && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
 	return 1 / sum;
 }
 
@@ -213,7 +223,7 @@ static spectrum weighted(const struct path_context *c, const struct path_vertex 
 	p.other_medium = 0;
 	if (EFFECT_IS_ON(c->w, scattering)) {
 		p.other_medium = path_other_medium(c, &p);
-		if (!technique_exists(&p, s) || !camera_agrees(c, &p))
+		if (!technique_exists(c, &p, s) || !camera_agrees(c, &p))
 			return spectrum_of(0);
 	}
 	return path_collapse(spectrum_scale(path_balance_weight(c, &p, max_s), l), disperses(c, &p));
@@ -304,27 +314,58 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	return weighted(c, &y, 1, t, max_s, &joint, l);
 }
 
-static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, double film[2])
+/* The unit direction from the lens to y, where the film sees it, and the film point's density per area there. */
+static bool project(const struct path_context *c, const struct path_vertex *y, double film[2], vec3 *d, double *jac)
 {
-	const struct path_vertex *y = &c->light[s - 1], *eye = &c->camera[0];
-	double distance2, x[2];
+	const struct path_vertex *eye = &c->camera[0];
+	double distance2;
 	struct camera room;
 	const struct camera *camera = world_camera(c->w, &eye->x, &room);
-	vec3 d = path_direction(eye, y, &distance2); /* camera to y */
-	if (!(distance2 > 0) || !camera_project(camera, eye->x.p, d, sqrt(distance2), &x[0], &x[1]))
-		return spectrum_of(0);
-	if (!film_window_holds(&c->window, x))
-		return spectrum_of(0);
-	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
-	l = spectrum_scale(camera_jac_film_from_solid(camera, d) * path_jac_solid_from_vertex(y, d, distance2), l);
+	*d = path_direction(eye, y, &distance2);
+	if (!(distance2 > 0) || !camera_project(camera, eye->x.p, *d, sqrt(distance2), &film[0], &film[1]))
+		return false;
+	if (!film_window_holds(&c->window, film))
+		return false;
+	*jac = camera_jac_film_from_solid(camera, *d) * path_jac_solid_from_vertex(y, *d, distance2);
+	return true;
+}
+
+/* s vertices from `light` on with the lens, of what the last of them sends there. */
+static spectrum join_lens(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned max_s, vec3 d,
+			  spectrum l)
+{
+	const struct path_vertex *y = &light[s - 1], *eye = &c->camera[0];
 	if (only_absorbs(c))
 		l = spectrum_mul(l, absorbed(c, eye, d, y, s));
 	struct path_edge joint;
 	if (spectrum_is_zero(l) || !is_seen(c, eye, y, &joint, &l))
 		return spectrum_of(0);
-	film[0] = x[0];
-	film[1] = x[1];
-	return weighted(c, c->light, s, 1, max_s, &joint, l);
+	return weighted(c, light, s, 1, max_s, &joint, l);
+}
+
+static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, double film[2])
+{
+	const struct path_vertex *y = &c->light[s - 1];
+	vec3 d;
+	double jac;
+	if (!project(c, y, film, &d, &jac))
+		return spectrum_of(0);
+	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
+	return join_lens(c, c->light, s, max_s, d, spectrum_scale(jac, l));
+}
+
+/* An emitter's point as the lens sees it: what is small or far is met by few of the film's points, or by none. */
+static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, double film[2])
+{
+	struct path_vertex y;
+	double pdf, jac;
+	vec3 d;
+	if (!path_next_event(c, &c->camera[0], &y, &pdf) || !path_can_be_hit(c, &y) || !lens_joins(c, &y))
+		return spectrum_of(0);
+	if (!project(c, &y, film, &d, &jac))
+		return spectrum_of(0);
+	spectrum l = spectrum_scale(jac / pdf, path_emitted(c, &y, vec3_neg(d), &c->wl));
+	return join_lens(c, &y, 1, max_s, d, l);
 }
 
 /* false: left to chance, and not made. The weight is not known yet; light_every / edges stands for it, as if all
@@ -369,6 +410,6 @@ spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned m
 	if (t > 1 && c->camera[t - 1].kind == VERTEX_INFINITE)
 		return spectrum_of(0);
 	if (t == 1)
-		return join_camera(c, s, max_s, film);
+		return s == 1 ? join_emitter_to_lens(c, max_s, film) : join_camera(c, s, max_s, film);
 	return s == 1 ? join_emitter(c, t, max_s) : join_surfaces(c, s, t, max_s);
 }

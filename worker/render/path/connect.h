@@ -24,7 +24,7 @@ struct joined_path {
  * Fills ratio[0..edges]; techniques with more than max_s light vertices are left out (0). */
 void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);
 /* Weight of the balance heuristic over the share of the samples that tries the technique: 1 / sum of the ratios, those
- * of techniques with two light vertices or more divided by light_every. */
+ * of techniques that only samples with a light sub-path try divided by light_every. */
 double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
 
 /* What other_medium is. Only where media scatter. */

@@ -44,6 +44,27 @@ static spectrum join(struct path_context *c, unsigned j, unsigned t, struct clas
 	return l;
 }
 
+/* The film gets what each vertex of the light sub-path sends to the lens. Instead of its first vertex, a point of an
+ * emitter is drawn for the lens, with the same numbers. */
+static void join_lens(struct path_context *c, struct sampler *s, unsigned light, struct classes *classes,
+		      struct path_sample *out)
+{
+	const double *u = s->block(s, SIDE_LIGHT, 0);
+	c->camera[0].next_event[0] = u[DIM_EMITTER_POINT];
+	c->camera[0].next_event[1] = u[DIM_EMITTER_POINT + 1];
+	c->camera[0].next_event[2] = u[DIM_EMITTER_CHOICE];
+	for (unsigned j = 1; j <= c->max_depth && (j == 1 || j <= light); j++) {
+		double at[2];
+		if (j < c->min_depth)
+			continue;
+		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
+		if (path_accept(c, l) && j > 1)
+			l = kept(c, j, 1, at, l);
+		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l) && !c->unclassed)
+			classes_add(classes, j, 1, l);
+	}
+}
+
 /* Light found by the camera sub-path alone is what connections are measured against: it does not depend on which of
  * them are made. Where it finds none, all are. */
 static double faint_beside(const struct path_context *c, spectrum found)
@@ -59,8 +80,10 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 	out->classes = 0;
 	out->intensity = 0;
 	c->one_way = false;
+	c->joins_lens = true;
 	unsigned camera = path_walk_camera(c, s, c->max_depth + 1, film);
-	unsigned light = has_light(c, s) ? path_walk_light(c, s, c->max_depth) : 0;
+	bool lit = has_light(c, s);
+	unsigned light = lit ? path_walk_light(c, s, c->max_depth) : 0;
 	spectrum sum = spectrum_of(0), found = spectrum_of(0);
 	if (!c->unclassed)
 		classes_begin(&classes, c, camera, light, out);
@@ -81,16 +104,9 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 	c->faint = 0;
 	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
 		classes_clear(out);
-	for (unsigned j = 2; j <= light && j <= c->max_depth; j++) {
-		double at[2];
-		if (j < c->min_depth)
-			continue;
-		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
-		if (path_accept(c, l))
-			l = kept(c, j, 1, at, l);
-		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l) && !c->unclassed)
-			classes_add(&classes, j, 1, l);
-	}
+	if (lit)
+		join_lens(c, s, light, &classes, out);
+	c->joins_lens = false;
 }
 
 const struct integrator integrator_bdpt8 = {

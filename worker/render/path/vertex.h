@@ -74,7 +74,8 @@ struct path_context {
 	double roulette;	       /* the most that a sub-path goes on with; 0: no roulette */
 	bool unclassed;		       /* nobody asks for path_sample.classes */
 	bool one_way;		       /* nobody asks for pdf_rev: no technique has more than one light vertex */
-	bool dispersed;		       /* by a vertex of the camera's sub-path that is not in it any more */
+	bool joins_lens;      /* points of emitters are joined to the camera: paths of one edge are found so, too */
+	bool dispersed;	      /* by a vertex of the camera's sub-path that is not in it any more */
 	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
 				 all have */
 	double faint;	      /* what a connection of two surfaces must bring to be made for certain; 0: anything */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images that are known without rendering: furnaces, directly lit planes, two plates, layers that scatter. Statistics
- * as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
+ * Images that are known without rendering: furnaces, directly lit planes, two plates, lamps smaller than a pixel,
+ * layers that scatter. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
  */
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
@@ -32,11 +32,11 @@ struct effort {
 
 /* Where every sample is the same the groups are, too, but for the rounding of tiles to float and what a hair of
  * roughness loses: no statistics of that. */
-static void forgive_rounding(struct agree_image *image, double expected)
+static void forgive(struct agree_image *image, double expected, double tolerance)
 {
 	for (uint32_t g = 0; g < image->groups; g++)
 		for (int c = 0; c <= AGREE_CELLS; c++)
-			if (fabs(image->mean[g][c] / expected - 1) < 1e-5)
+			if (fabs(image->mean[g][c] / expected - 1) < tolerance)
 				image->mean[g][c] = expected;
 }
 
@@ -56,7 +56,7 @@ static void check_depths(const char *name, struct world *w, uint32_t least, doub
 		snprintf(test, sizeof test, "%s, %s", name, runs[i].integrator);
 		struct agree_side side = {runs[i].integrator, runs[i].spp, 32, least, 0};
 		agree_render(w, test, runs[i].integrator, &side, &image);
-		forgive_rounding(&image, radiance * sum3(w->grey_xyz));
+		forgive(&image, radiance * sum3(w->grey_xyz), 1e-5);
 		agree_expect(test, &image, radiance * sum3(w->grey_xyz));
 	}
 	world_free(w);
@@ -478,6 +478,42 @@ static void test_plates(void **state)
 		       rho + pow(rho, 3) + pow(rho, 5), (struct effort){1024, 0, 0});
 }
 
+/* A lamp on the axis, some 400 times smaller than a pixel: `share` of the film shows its radiance 1. A sample of the
+ * film meets it once in 100,000 times, so points of the lamp have to be joined to the lens. */
+static void check_small_lamp(const char *name, const char *lamp, double share)
+{
+	static struct agree_image image;
+	const char *const integrators[] = {"bdpt", "bdpt8", "erpt4", "pssmlt"};
+	const uint64_t spp[] = {64, 256, 256, 4096};
+	struct world *w = world_of_text(16, 16, DEPTH("3") SENSOR("0,0,4", "0,0,0") "%s", lamp);
+	for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
+		char test[64];
+		snprintf(test, sizeof test, "%s, %s", name, integrators[i]);
+		struct agree_side side = {integrators[i], spp[i], 32, 0, 0};
+		agree_render(w, test, integrators[i], &side, &image);
+		for (uint32_t g = 0; g < image.groups; g++)
+			for (int c = 0; c <= AGREE_CELLS; c++)
+				image.mean[g][c] = image.mean[g][AGREE_CELLS] / (share * sum3(w->grey_xyz));
+		forgive(&image, 1, 1e-4); /* what samples of the film would add, if one met the lamp */
+		agree_expect(test, &image, 1);
+	}
+	world_free(w);
+}
+
+static void test_small_lamp(void **state)
+{
+	(void)state;
+	double slope = tan(20 * M_PI / 180); /* of the film's edge */
+	check_small_lamp("square in a pixel",
+			 "<shape type='rectangle'><transform name='to_world'><scale value='0.005'/></transform>"
+			 "<emitter type='area'/></shape>",
+			 pow(0.005 / 4 / slope, 2));
+	double tangent = tan(asin(0.005 / 4));
+	check_small_lamp("ball in a pixel",
+			 "<shape type='sphere'><float name='radius' value='0.005'/><emitter type='area'/></shape>",
+			 M_PI * pow(tangent / slope, 2) / 4);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -495,6 +531,7 @@ int main(void)
 		cmocka_unit_test(test_lit_floor),
 		cmocka_unit_test(test_beam),
 		cmocka_unit_test(test_plates),
+		cmocka_unit_test(test_small_lamp),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
