@@ -210,7 +210,8 @@ static void groups_that_are_apart(void **state)
 	assert_int_equal(verdict_of(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_apart, 1U << path_class(4, PATH_BOTH));
 	assert_int_equal(a.classes_flagged, 0);
-	says(&a, "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of the light");
+	says(&a,
+	     "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of the light");
 	f.plan.groups = 7;
 	assert_int_equal(verdict_of(&f, &a), CHAINS_AGREE);
 	f.plan.groups = 16;
