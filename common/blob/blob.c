@@ -191,21 +191,24 @@ static int exceeds(const struct blob_store *s, uint64_t need, struct error *e)
 			 (unsigned long long)need, (unsigned long long)s->limit);
 }
 
-/* Whether `need` more bytes would fit into the limit if all were evicted that nobody holds. */
+/* Whether `need` more bytes would fit into the limit beside the blobs that somebody holds. */
 static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
 {
-	uint64_t used = s->bytes + s->promised;
-	if (!s->limit || (need <= s->limit && used <= s->limit - need))
+	uint64_t used = s->bytes;
+	if (!s->limit)
 		return 0;
-	for (size_t i = 0; i < s->count; i++)
+	if (need > s->limit)
+		return error_set(e, EMSGSIZE, "%s: a file of %llu bytes exceeds its limit of %llu", s->folder,
+				 (unsigned long long)need, (unsigned long long)s->limit);
+	for (size_t i = 0; i < s->count && used > s->limit - need; i++)
 		used -= s->entries[i].holds ? 0 : s->entries[i].size;
-	return need > s->limit || used > s->limit - need ? exceeds(s, need, e) : 0;
+	return used > s->limit - need ? exceeds(s, need, e) : 0;
 }
 
 /* Evicts blobs until `need` more bytes fit into the limit. */
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
-	while (s->limit && (need > s->limit || s->bytes + s->arrived > s->limit - need))
+	while (s->limit && s->bytes + s->arrived + need > s->limit)
 		if (!blob_store_evict(s))
 			return exceeds(s, need, e);
 	return 0;
@@ -345,7 +348,6 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	w->store = s;
 	w->hash = *h;
 	w->size = size;
-	s->promised += size;
 	w->md = EVP_MD_CTX_new();
 	w->number = ++s->temporary;
 	blob_temporary_path(s, w->number, w->path, sizeof w->path);
@@ -386,7 +388,7 @@ static int go_on(struct blob_writer *w, struct error *e)
 int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e)
 {
 	if (size > w->size - w->at)
-		return error_set(e, EFBIG, "more bytes than were announced");
+		return error_set(e, EMSGSIZE, "more bytes than were announced");
 	int rc = make_room(w->store, size, e);
 	if (!rc)
 		rc = go_on(w, e);
@@ -460,7 +462,6 @@ static int finish(struct blob_writer *w, struct error *e)
 
 static void writer_free(struct blob_writer *w)
 {
-	w->store->promised -= w->size;
 	w->store->arrived -= w->at;
 	blob_write_pause(w);
 	EVP_MD_CTX_free(w->md);
@@ -505,7 +506,7 @@ int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error 
 		return rc;
 	}
 	*kept = (struct blob_kept){w->hash, w->size, w->number};
-	w->size = w->at = 0; /* what was promised for it, and has arrived, stays so */
+	w->at = 0; /* what has arrived of it stays so */
 	writer_free(w);
 	return 0;
 }
@@ -519,7 +520,6 @@ void blob_enter(struct blob_store *s, const struct blob_kept *kept)
 
 void blob_let_go(struct blob_store *s, const struct blob_kept *kept)
 {
-	s->promised -= kept->size;
 	s->arrived -= kept->size;
 	blob_release(s, &kept->hash);
 	struct blob_entry *n = blob_find(s, &kept->hash);

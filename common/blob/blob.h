@@ -45,9 +45,10 @@ struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h);
 /* The path of a held blob, for callers that map it. */
 void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size);
 
-/* Writing: begin, add in order, commit. The announced size is reserved at once, among the blobs that could be evicted;
- * they are evicted as bytes arrive, so that whoever announces much and sends nothing costs others nothing. -EFBIG: more
- * than announced, or more than the limit; -EBADMSG: the hash does not match the name. End a writer with commit or
+/* Writing: begin, add in order, commit. Room is made as bytes arrive, so that whoever announces much and sends nothing
+ * costs others nothing; begin looks whether the announced size fits beside the blobs that are held. -EFBIG: it does
+ * not, or what was to be added does not fit now: nothing was, and the caller may try again. -EINVAL: more than
+ * announced, or announced more than the limit; -EBADMSG: the hash does not match the name. End a writer with commit or
  * abort. A committed blob is held once. */
 struct blob_writer;
 int blob_write_begin(struct blob_writer **w, struct blob_store *s, const struct blob_hash *h, uint64_t size,

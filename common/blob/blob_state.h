@@ -23,8 +23,7 @@ struct blob_entry {
 struct blob_store {
 	char *folder;
 	uint64_t limit, bytes, clock;
-	uint64_t promised;	       /* to open writers: all that was announced */
-	uint64_t arrived;	       /* of that */
+	uint64_t arrived;	       /* of blobs that are being written */
 	uint64_t temporary;	       /* number of the last temporary file */
 	struct blob_entry *entries;    /* sorted by hash */
 	bool (*more_room)(void *user); /* NULL: nobody has any */

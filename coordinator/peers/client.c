@@ -8,7 +8,8 @@
  * been read.
  *
  * A submission that is refused, or exceeds its owner's quota, is answered with a sentence, and the client may submit
- * another. An invalid message is answered by Fault, and the connection ends.
+ * another. Where there is no room for files, submissions give way whose clients send nothing. An invalid message is
+ * answered by Fault, and the connection ends.
  */
 #include "coordinator/peers/client.h"
 
@@ -25,10 +26,11 @@
 #include "coordinator/peers/fetch.h"
 #include "coordinator/peers/upload.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-enum { CHUNK = 1 << 20, UPLOADS_MOST = 1 << 28 /* bytes of all submissions that wait for files */ };
+enum { CHUNK = 1 << 20, PACE = CHUNK, UPLOADS_MOST = 1 << 28 /* bytes of all submissions that wait for files */ };
 
 /* ---- submit ---- */
 
@@ -150,7 +152,44 @@ static void look_for_files(struct session *p)
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
+	p->upload->pace.paced = jobs_now(p->jobs);
 	answer_submit(p, 0, "", p->upload);
+}
+
+/* Less than PACE bytes came of it in a time in which a frame of twice as many must be complete. */
+static bool stands_still(const struct session *p)
+{
+	return !p->upload->flush && jobs_now(p->jobs) - p->upload->pace.paced > 2 * p->jobs->config.stall_seconds;
+}
+
+/* There is no room for what somebody sends whose submission was begun then. The one that has stood still for longest
+ * gives way, or if there is none, the latest of those that were begun later and have sent something. So nobody holds
+ * room by waiting, and who comes later takes none from those who are halfway. INFINITY: before anything of it is there,
+ * for which only the first do. false: there is none. */
+static bool other_gives_way(struct peers *s, const struct session *sender, double begun)
+{
+	struct session *still = NULL, *latest = NULL;
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
+		const struct upload *u = p == sender ? NULL : p->upload;
+		if (!u)
+			continue;
+		if (stands_still(p) && (!still || u->pace.paced < still->upload->pace.paced))
+			still = p;
+		if (u->received && !u->flush && u->pace.begun > begun) {
+			latest = p;
+			begun = u->pace.begun;
+		}
+	}
+	struct error e;
+	if (still) {
+		error_set(&e, EBUSY, "its files came too slowly, and others need their room: try again later");
+		refuse_upload(still, &e);
+	} else if (latest) {
+		error_set(&e, EBUSY,
+			  "a submission that was begun earlier needs the room of its files: try again later");
+		refuse_upload(latest, &e);
+	}
+	return still || latest;
 }
 
 static void take_submit(struct session *p, struct envelope *env)
@@ -161,6 +200,8 @@ static void take_submit(struct session *p, struct envelope *env)
 		return;
 	}
 	size_t bytes = env->used;
+	while (bytes > UPLOADS_MOST - p->peers->upload_bytes && other_gives_way(p->peers, p, INFINITY))
+		continue;
 	if (bytes > UPLOADS_MOST - p->peers->upload_bytes) {
 		answer_submit(p, 0, "too many submissions are being sent to the coordinator: try again later", NULL);
 		return;
@@ -170,6 +211,8 @@ static void take_submit(struct session *p, struct envelope *env)
 		answer_submit(p, 0, e.text, NULL);
 		return;
 	}
+	p->upload->pace.begun = jobs_now(p->jobs);
+	p->upload->pace.paced = INFINITY;
 	p->upload_bytes = bytes;
 	p->peers->upload_bytes += bytes;
 	if (fits(p, &e)) {
@@ -198,6 +241,15 @@ static void on_flushed(void *user, int rc, const struct error *why)
 		refuse_upload(p, &e);
 }
 
+static void keep_pace(const struct session *p)
+{
+	struct upload *u = p->upload;
+	if (u->received - u->pace.bytes < PACE)
+		return;
+	u->pace.bytes = u->received;
+	u->pace.paced = jobs_now(p->jobs);
+}
+
 static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
@@ -205,7 +257,12 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 		session_fault(p, "a blob without a submission");
 		return;
 	}
-	int rc = upload_add(p->upload, c, payload, size, &e);
+	int rc;
+	do
+		rc = upload_add(p->upload, c, payload, size, &e);
+	while (rc == -EFBIG && other_gives_way(p->peers, p, p->upload->writer ? p->upload->pace.begun : INFINITY));
+	if (rc >= 0)
+		keep_pace(p);
 	if (rc > 0) {
 		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id,
 			  (unsigned long long)c->size);

@@ -379,6 +379,7 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 		rc = blob_write_add(u->writer, payload, size, e);
 	if (rc)
 		return rc;
+	u->received += size;
 	if (blob_write_at(u->writer) < c->size) {
 		blob_write_pause(u->writer); /* thousands of clients may stop midway */
 		return 0;

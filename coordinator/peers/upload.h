@@ -27,6 +27,12 @@ struct upload {
 	size_t missing_count; /* of these, not held */
 	struct blob_writer *writer;
 	struct blob_hash writing;
+	uint64_t received; /* bytes of files */
+	struct {
+		double begun;	    /* s of the loop's clock: when its message came */
+		double paced;	    /* and when it last had enough new bytes; INFINITY: none are expected yet */
+		uint64_t bytes;	    /* `received` then */
+	} pace;			    /* the session's */
 	struct blob_batch *batch;   /* blobs that arrived and wait for the next flush; NULL: none */
 	struct upload_flush *flush; /* is running; NULL: none */
 };
@@ -40,7 +46,8 @@ bool upload_is_looking(const struct upload *u);
 bool upload_file_read(struct upload *u, const struct blob_hash *h, bool right);
 void upload_free(struct upload *u); /* releases the blobs that it holds */
 
-/* One chunk from the client. 1: a blob is complete, and waits for upload_flush. */
+/* One chunk from the client. 1: a blob is complete, and waits for upload_flush. -EFBIG: there is no room for it now,
+ * and the same call may succeed once there is. */
 int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e);
 /* The pool flushes what has arrived, unless it is doing so already. Then `done` is called, unless the upload was freed
  * meanwhile; what was flushed is no longer missing, but more may have arrived. */

@@ -121,6 +121,7 @@ int served_start(double hello_seconds, double heartbeat_seconds, double stall_se
 		c.status_socket = status;
 		c.max_connections = 8;
 		c.state_bytes = c.send_bytes = 1 << 24;
+		c.blob_bytes = 1 << 20;
 		c.max_fetches = 2;
 		c.hello_seconds = hello_seconds;
 		c.heartbeat_seconds = heartbeat_seconds;

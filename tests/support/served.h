@@ -12,8 +12,8 @@
 
 /* ---- the server ---- */
 
-/* Eight connections at most, two of them with a fetch under way; 0: it listens. What a test does not wait for is to
- * last longer than a busy machine stands still. */
+/* Eight connections at most, two of them with a fetch under way, and scene files of 1 MiB; 0: it listens. What a test
+ * does not wait for is to last longer than a busy machine stands still. */
 int served_start(double hello_seconds, double heartbeat_seconds, double stall_seconds);
 int served_stop(void **state);			      /* a teardown: fails when it did not end well */
 void served_prepare(void (*spool)(const char *path)); /* what makes the spool of the next start; NULL: nothing */

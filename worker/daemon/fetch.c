@@ -57,7 +57,7 @@ struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c)
 /* What exceeds the limit is too large for this worker's settings; wrong bytes are the coordinator's fault. */
 static enum fetch_end failed(int rc)
 {
-	return rc == -EFBIG || rc == -EBADMSG ? FETCH_FAILED : FETCH_UNSTORED;
+	return rc == -EFBIG || rc == -EMSGSIZE || rc == -EBADMSG ? FETCH_FAILED : FETCH_UNSTORED;
 }
 
 enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c, const unsigned char *payload,

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A scene of many small files: the loop's thread flushes none of them, the job is acknowledged when all are flushed,
- * and what a client leaves behind that goes midway is removed.
+ * and what a client leaves behind that goes midway is removed. Room for files is had by those who send them: neither an
+ * announcement nor a part of a file keeps others out for long.
  */
 #include "common/base/disk.h"
 #include "tests/support/served.h"
@@ -43,13 +44,18 @@ static void count_flushes(const char *spool)
 	disk_use(&counted);
 }
 
-static int set_up(void **state)
+static int set_up_for(double stall_seconds)
 {
-	(void)state;
 	flushes = mmap(NULL, sizeof *flushes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	assert_true(flushes != MAP_FAILED);
 	served_prepare(count_flushes);
-	return served_start(60, 60, 60);
+	return served_start(60, 60, stall_seconds);
+}
+
+static int set_up(void **state)
+{
+	(void)state;
+	return set_up_for(60);
 }
 
 static int tear_down(void **state)
@@ -212,7 +218,6 @@ static void send_part(struct scripted *p, const char *text, size_t from, size_t 
 	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
 	m.blob_chunk = &c;
 	peer_say(p, &m, text + from, to - from);
-	peer_say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
 }
 
 /* However many clients stop midway, they hold no descriptors. */
@@ -226,16 +231,98 @@ static void half_a_file_is_not_open(void **state)
 	assert_int_equal(peer_submit_answer(client)->n_missing, 1);
 	for (size_t i = 0; i < 5; i++) { /* the first has no bytes */
 		send_part(client, text, i ? i - 1 : 0, i);
+		peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
 		assert_int_equal(scripted_hear(client)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
 		assert_int_equal(served_open_files("/blobs/"), 0);
 	}
 	send_part(client, text, 4, strlen(text));
-	const Farm__Envelope *m = scripted_hear(client);
-	while (m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER)
-		m = scripted_hear(client);
-	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
-	assert_true(m->submit_answer->job);
+	assert_true(peer_submit_answer(client)->job);
 	scripted_hang_up(client);
+}
+
+/* A file of more than half of what there is room for; its first bytes are another for each letter. */
+static const char *large_file(char letter)
+{
+	static char text[(600 << 10) + 1];
+	memset(text, letter, sizeof text - 1);
+	return text;
+}
+
+static const size_t LARGE = 600 << 10;
+
+static struct scripted *announce(char letter)
+{
+	struct scripted *client = call_client();
+	peer_submit(client, NULL, large_file(letter), "s.xml", "s.xml");
+	assert_int_equal(peer_submit_answer(client)->n_missing, 1);
+	return client;
+}
+
+static void is_refused(struct scripted *client, const char *why)
+{
+	const Farm__SubmitAnswer *a = peer_submit_answer(client);
+	assert_int_equal(a->job, 0);
+	assert_non_null(strstr(a->refusal, why));
+}
+
+static void announcements_take_no_room(void **state)
+{
+	(void)state;
+	struct scripted *idle = announce('a'), *client = announce('b');
+	send_part(idle, large_file('a'), 0, 0);
+	peer_say_empty(idle, FARM__ENVELOPE__BODY_JOB_LIST);
+	assert_int_equal(scripted_hear(idle)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	send_part(client, large_file('b'), 0, LARGE);
+	assert_int_equal(peer_submit_answer(client)->job, 1);
+	scripted_hang_up(client);
+	scripted_hang_up(idle);
+}
+
+/* Both are halfway, and only one has room to go on. */
+static void who_came_first_has_room(void **state)
+{
+	(void)state;
+	struct scripted *first = announce('a');
+	usleep(20000);
+	struct scripted *second = announce('b');
+	send_part(first, large_file('a'), 0, LARGE / 2);
+	send_part(second, large_file('b'), 0, LARGE - 1);
+	peer_say_empty(second, FARM__ENVELOPE__BODY_JOB_LIST);
+	assert_int_equal(scripted_hear(second)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	send_part(first, large_file('a'), LARGE / 2, LARGE);
+	is_refused(second, "begun earlier");
+	assert_int_equal(peer_submit_answer(first)->job, 1);
+	peer_submit(second, NULL, large_file('b'), "s.xml", "s.xml"); /* the job has its file now */
+	assert_int_equal(peer_submit_answer(second)->n_missing, 1);
+	send_part(second, large_file('b'), 0, LARGE);
+	is_refused(second, "limit");
+	scripted_hang_up(second);
+	scripted_hang_up(first);
+}
+
+static int set_up_impatient(void **state)
+{
+	(void)state;
+	return set_up_for(0.5);
+}
+
+static void who_stands_still_has_none(void **state)
+{
+	(void)state;
+	struct scripted *idle = announce('a'), *client = call_client();
+	const Farm__SubmitAnswer *a = NULL;
+	send_part(idle, large_file('a'), 0, LARGE - 1);
+	for (int i = 0; i < 600 && !(a && a->job); i++) {
+		usleep(100000);
+		peer_submit(client, NULL, large_file('b'), "s.xml", "s.xml");
+		assert_int_equal(peer_submit_answer(client)->n_missing, 1);
+		send_part(client, large_file('b'), 0, LARGE);
+		a = peer_submit_answer(client);
+	}
+	assert_int_equal(a->job, 1);
+	is_refused(idle, "too slowly");
+	scripted_hang_up(client);
+	scripted_hang_up(idle);
 }
 
 int main(void)
@@ -245,6 +332,9 @@ int main(void)
 		cmocka_unit_test_setup_teardown(who_goes_midway_leaves_nothing, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_file_that_was_sent_is_not_taken_again, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(half_a_file_is_not_open, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(announcements_take_no_room, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(who_came_first_has_room, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(who_stands_still_has_none, set_up_impatient, tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
