@@ -38,22 +38,6 @@ static uint64_t id_of(const char *name)
 	return *end || errno ? 0 : id;
 }
 
-void line_add_jobs(json_t *o, struct jobs *jobs)
-{
-	struct job_view *views;
-	size_t count = jobs_views(jobs, LINES_ENDED, &views);
-	uint64_t ended = ledger_ended_count(jobs->ledger), shown = 0;
-	json_t *list = json_array();
-	for (size_t i = 0; i < count; i++) {
-		bool live = !record_is_ended(&views[i].record);
-		shown += !live;
-		json_array_append_new(list, view_to_json(&views[i], live));
-	}
-	mem_free(views);
-	json_object_set_new(o, "jobs", list);
-	json_object_set_new(o, "endedOthers", json_integer(ended > shown ? (json_int_t)(ended - shown) : 0));
-}
-
 json_t *line_job(struct jobs *jobs, const char *name)
 {
 	char text[64];

@@ -11,9 +11,6 @@ enum { LINES_ENDED = 50 /* ended jobs in a snapshot, or on a page of them */ };
 
 json_t *line_object(const char *type); /* with schema, type and time */
 json_t *line_error(const char *text);
-/* Sets "jobs" (live ones, and the last LINES_ENDED that ended, without details) and "endedOthers", the number of those
- * that ended before. */
-void line_add_jobs(json_t *o, struct jobs *jobs);
 json_t *line_job(struct jobs *jobs, const char *name); /* one job with its details, or an error; name: "j12" */
 /* A page: the last LINES_ENDED ended jobs whose ids are below that of the name, without details; NULL: of all. */
 json_t *line_ended(struct jobs *jobs, const char *before);

@@ -2,9 +2,10 @@
 /*
  * The status socket: lines of JSON for every reader.
  *
- * A reader gets a snapshot at once, and then what it subscribes to: jobs, workers, or the snapshot. status_tick
- * compares each job with what was last sent about it and sends only changes; nothing is done while nobody is
- * subscribed. At the end the socket's file is removed if it is still the same.
+ * A reader gets a snapshot first, and then what it subscribes to: jobs, workers, or the snapshot. status_tick compares
+ * each job with what was last sent about it and sends only changes; nothing is done while nobody is subscribed. The
+ * pool makes the text of snapshots, one at a time, and until it is sent nothing else is. At the end the socket's file
+ * is removed if it is still the same.
  *
  * A reader that has not read all lines when something changes gets no more of them, but one snapshot at the first tick
  * after it has read: the newest. So at most the lines of one moment wait for it. What waits for all readers counts with
@@ -20,6 +21,7 @@
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/peers/session.h"
 #include "coordinator/status/lines.h"
+#include "coordinator/status/snapshot.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -45,11 +47,25 @@ struct reader {
 	uv_pipe_t pipe;
 	unsigned topics;
 	bool closing;
+	bool heard;    /* it has got its first snapshot, and what it says is read */
 	bool behind;   /* something changed while it had not read all lines: it gets a snapshot when it has */
 	size_t unread; /* bytes of answers that wait for it */
 	struct send_share share;
 	size_t line_size;
 	char line[LINE_BYTES];
+};
+
+/* A snapshot that another thread makes, and the workers' line. Not one of the pool's: those may all wait for a disk,
+ * and the status has to say so. */
+struct making {
+	uv_thread_t thread;
+	uv_async_t done;
+	bool threaded;
+	struct status_socket *socket; /* NULL: it has been closed */
+	struct snapshot *snapshot;
+	unsigned changed;		/* topics */
+	bool for_some;			/* somebody gets a snapshot */
+	struct shared *whole, *workers; /* NULL: not made */
 };
 
 struct status_socket {
@@ -59,6 +75,7 @@ struct status_socket {
 	LIST_HEAD(, reader) readers; /* with those that are being closed */
 	unsigned reader_count;	     /* without */
 	bool caller_waits;
+	struct making *making;	/* NULL: none; meanwhile nothing else is published */
 	struct job_view *shown; /* the jobs as last sent to subscribers */
 	size_t shown_count;
 	uint64_t shown_changes; /* state of the jobs at the last tick */
@@ -66,77 +83,6 @@ struct status_socket {
 	dev_t device;		/* the socket's file; inode 0: none */
 	ino_t inode;
 };
-
-/* ---- lines ---- */
-
-/* The state of a worker's certificate, and whether it must be renewed. */
-static void add_certificate(const struct peers *s, uint64_t peer, json_t *worker)
-{
-	char text[192];
-	const struct session *p = s->tls ? peers_find(s, peer) : NULL;
-	if (!p || !*p->who.name)
-		return;
-	json_object_set_new(worker, "certificate", json_string(p->who.name));
-	json_object_set_new(worker, "certificateUntil", json_integer(p->who.until));
-	if (tls_expiry(&p->who, time(NULL), text, sizeof text))
-		json_object_set_new(worker, "warning", json_string(text));
-}
-
-static void add_tls(const struct peers *s, json_t *o)
-{
-	char text[384];
-	if (!s->tls)
-		return;
-	json_t *tls = json_pack("{s:s s:I s:I}", "certificate", tls_self(s->tls)->name, "certificateUntil",
-				(json_int_t)tls_self(s->tls)->until, "authorityUntil",
-				(json_int_t)tls_authority_until(s->tls));
-	if (tls_warning(s->tls, time(NULL), text, sizeof text))
-		json_object_set_new(tls, "warning", json_string(text));
-	json_object_set_new(o, "tls", tls);
-}
-
-/* Connected or not. */
-static json_t *quarantined_json(const struct peers *s)
-{
-	json_t *list = json_array();
-	struct worker_status w;
-	for (uint64_t who = 0;
-	     (who = farm_next_quarantined(s->jobs->farm, who)) && farm_worker(s->jobs->farm, who, &w);)
-		json_array_append_new(list, view_quarantined_to_json(&w));
-	return list;
-}
-
-static void add_workers(const struct peers *s, json_t *o)
-{
-	json_t *workers = json_array(), *leases = json_array();
-	struct peer_status p;
-	struct lease_status l;
-	double now = jobs_now(s->jobs);
-	for (uint64_t id = 0; (id = farm_next_peer(s->jobs->farm, id));) {
-		if (!farm_peer(s->jobs->farm, id, &p))
-			continue;
-		json_t *worker = view_peer_to_json(&p, now);
-		add_certificate(s, id, worker);
-		json_array_append_new(workers, worker);
-		for (uint32_t i = 0; farm_lease(s->jobs->farm, id, i, &l); i++)
-			json_array_append_new(leases, view_lease_to_json(&l, p.name, now));
-	}
-	json_object_set_new(o, "workers", workers);
-	json_object_set_new(o, "quarantined", quarantined_json(s));
-	json_object_set_new(o, "leases", leases);
-}
-
-static json_t *snapshot(const struct peers *s)
-{
-	json_t *o = line_object("snapshot");
-	line_add_jobs(o, s->jobs);
-	add_workers(s, o);
-	add_tls(s, o);
-	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)s->garbled));
-	if (recovery_is_on(s->jobs))
-		json_object_set_new(o, "reading", json_real(recovery_share(s->jobs)));
-	return o;
-}
 
 /* ---- writing ---- */
 
@@ -332,6 +278,8 @@ static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
 		drop(r);
 }
 
+static void begin_making(struct status_socket *t, unsigned changed);
+
 static void on_connection(uv_stream_t *listener, int status)
 {
 	struct status_socket *t = listener->data;
@@ -356,11 +304,8 @@ static void on_connection(uv_stream_t *listener, int status)
 		drop(r);
 		return;
 	}
-	if (uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read)) {
-		drop(r);
-		return;
-	}
-	send_object(r, snapshot(t->peers), false);
+	r->behind = true;
+	begin_making(t, 0);
 }
 
 /* ---- changes ---- */
@@ -382,27 +327,86 @@ static void publish_object(struct status_socket *t, enum topic topic, json_t *o)
 	release(l);
 }
 
-/* To those who subscribed to it, if something changed, and those who were behind and have read: one for all, because it
- * takes tens of milliseconds to make where there are a thousand workers. */
-static void publish_snapshot(struct status_socket *t, bool changed)
+static bool wants_snapshot(const struct reader *r, unsigned changed)
 {
-	struct shared *l = NULL;
-	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next)) {
-		if (r->closing || (r->behind ? waiting(r) > 0 : !changed || !(r->topics & TOPIC_SNAPSHOT)))
-			continue;
-		if (!l)
-			l = share_text(snapshot(t->peers));
-		r->behind = false;
-		send_line(r, l, false);
-	}
-	release(l);
+	return !r->closing && (r->behind ? waiting(r) == 0 : changed & r->topics & TOPIC_SNAPSHOT);
 }
 
-static void publish_changes(struct status_socket *t, unsigned topics)
+static void run_making(void *making)
+{
+	struct making *m = making;
+	if (m->for_some)
+		m->whole = share_text(snapshot_to_json(m->snapshot));
+	if (m->changed & TOPIC_WORKERS)
+		m->workers = share_text(snapshot_workers_to_json(m->snapshot));
+	uv_async_send(&m->done);
+}
+
+static void on_making_closed(uv_handle_t *h)
+{
+	mem_free(h->data);
+}
+
+static void making_done(uv_async_t *done)
+{
+	struct making *m = done->data;
+	struct status_socket *t = m->socket;
+	if (m->threaded)
+		uv_thread_join(&m->thread);
+	for (struct reader *r = t ? LIST_FIRST(&t->readers) : NULL; r; r = LIST_NEXT(r, next)) {
+		if ((m->changed & r->topics & TOPIC_WORKERS) && !r->behind)
+			send_line(r, m->workers, false);
+		if (!m->for_some || !wants_snapshot(r, m->changed))
+			continue;
+		r->behind = false;
+		send_line(r, m->whole, false);
+		if (!r->heard && !r->closing && uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read))
+			drop(r);
+		r->heard = true;
+	}
+	if (t)
+		t->making = NULL;
+	snapshot_free(m->snapshot);
+	release(m->whole);
+	release(m->workers);
+	uv_close((uv_handle_t *)done, on_making_closed);
+}
+
+/* A snapshot goes to those who subscribed to it, if something changed, and those who were behind and have read: one for
+ * all, because it takes tens of milliseconds to make where there are a thousand workers. changed: the topics of which
+ * there is news. */
+static void begin_making(struct status_socket *t, unsigned changed)
+{
+	bool some = false, workers = false;
+	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next)) {
+		some = some || wants_snapshot(r, changed);
+		workers = workers || (!r->behind && changed & r->topics & TOPIC_WORKERS);
+	}
+	if (t->making || !(some || workers))
+		return;
+	struct making *m = mem_alloc(1, sizeof *m);
+	struct snapshot *n = m ? snapshot_take(t->peers) : NULL;
+	if (!n) { /* those that are behind stay so, and the others become so */
+		for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
+			r->behind = r->behind || changed & r->topics;
+		mem_free(m);
+		return;
+	}
+	*m = (struct making){.socket = t, .snapshot = n, .changed = changed, .for_some = some};
+	t->making = m;
+	m->done.data = m;
+	uv_async_init(t->jobs->loop, &m->done, making_done);
+	m->threaded = uv_thread_create(&m->thread, run_making, m) == 0;
+	if (!m->threaded)
+		run_making(m);
+}
+
+/* Jobs that have changed. */
+static void publish_changes(struct status_socket *t)
 {
 	struct job_view *views;
 	size_t count = jobs_views(t->jobs, LINES_ENDED, &views);
-	for (size_t i = 0; i < count && (topics & TOPIC_JOBS); i++) {
+	for (size_t i = 0; i < count; i++) {
 		const struct job_view *before = shown_before(t, views[i].record.id);
 		if (before && memcmp(before, &views[i], sizeof *before) == 0)
 			continue;
@@ -414,11 +418,6 @@ static void publish_changes(struct status_socket *t, unsigned topics)
 	mem_free(t->shown);
 	t->shown = views;
 	t->shown_count = count;
-	if (topics & TOPIC_WORKERS) {
-		json_t *o = line_object("workers");
-		add_workers(t->peers, o);
-		publish_object(t, TOPIC_WORKERS, o);
-	}
 }
 
 void status_tick(struct status_socket *t)
@@ -428,16 +427,18 @@ void status_tick(struct status_socket *t)
 		return;
 	if (t->caller_waits)
 		on_connection((uv_stream_t *)&t->listener, 0);
+	if (t->making) /* what has changed is seen after it has been sent: lines that are newer do not come before it */
+		return;
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
 		topics |= r->topics;
 	bool changed = topics && t->shown_changes != t->jobs->changes;
 	for (struct reader *r = LIST_FIRST(&t->readers); changed && r; r = LIST_NEXT(r, next))
 		r->behind = r->behind || (r->topics && waiting(r));
-	if (changed) {
+	if (changed)
 		t->shown_changes = t->jobs->changes;
-		publish_changes(t, topics);
-	}
-	publish_snapshot(t, changed);
+	if (changed && (topics & TOPIC_JOBS))
+		publish_changes(t);
+	begin_making(t, changed ? topics : 0);
 }
 
 /* ---- start and end ---- */
@@ -573,6 +574,8 @@ void status_close(struct status_socket *t)
 		LIST_REMOVE(r, next);
 		r->socket = NULL;
 	}
+	if (t->making)
+		t->making->socket = NULL;
 	struct stat st;
 	if (t->path && t->inode && lstat(t->path, &st) == 0 && st.st_dev == t->device && st.st_ino == t->inode)
 		unlink(t->path);

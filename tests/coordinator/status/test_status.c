@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The status of a farm that keeps many jobs that have ended: snapshots stay small, what they leave out can be asked
- * for, and a reader that is slow misses snapshots but is not cut off. One server for all tests.
+ * for, a reader that is slow misses snapshots but is not cut off, and the loop does not wait while they are made. One
+ * server for all tests.
  */
 #include "coordinator/store/ledger.h"
 #include "tests/support/served.h"
@@ -15,6 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -55,11 +57,30 @@ static void make_spool(const char *path)
 	free(r);
 }
 
+/* Shared with the server: values of JSON that its loop's thread has made, and others. */
+static struct made {
+	_Atomic unsigned on_loop, elsewhere;
+} * made;
+
+static void *counted_malloc(size_t size)
+{
+	if (gettid() == getpid())
+		made->on_loop++;
+	else
+		made->elsewhere++;
+	return malloc(size);
+}
+
 static int set_up(void **state)
 {
 	(void)state;
+	made = mmap(NULL, sizeof *made, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	assert_true(made != MAP_FAILED);
 	served_prepare(make_spool);
-	return served_start(60, 60, 60);
+	json_set_alloc_funcs(counted_malloc, free);
+	int rc = served_start(60, 60, 60);
+	json_set_alloc_funcs(malloc, free);
+	return rc;
 }
 
 static FILE *call_status(void)
@@ -121,6 +142,24 @@ static void a_snapshot_is_small(void **state)
 	assert_true(size < LISTED * 2000);
 	json_decref(o);
 	fclose(f);
+}
+
+/* Also for who asks before it has heard it. */
+static void the_loop_makes_no_snapshot(void **state)
+{
+	(void)state;
+	unsigned on_loop = made->on_loop, elsewhere = made->elsewhere;
+	FILE *f = call_status();
+	say(f, "{\"job\":\"j301\"}\n");
+	json_t *o = hear(f, NULL);
+	assert_string_equal(text_of(o, "type"), "snapshot");
+	json_decref(o);
+	o = hear(f, NULL);
+	assert_string_equal(text_of(o, "type"), "error");
+	json_decref(o);
+	fclose(f);
+	assert_in_range(made->on_loop - on_loop, 1, 20 * LISTED); /* and the answer */
+	assert_in_range(made->elsewhere - elsewhere, 40 * LISTED, UINT32_MAX);
 }
 
 static void one_job_has_its_details(void **state)
@@ -308,6 +347,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_snapshot_is_small),
+		cmocka_unit_test(the_loop_makes_no_snapshot),
 		cmocka_unit_test(one_job_has_its_details),
 		cmocka_unit_test(pages_list_all_that_ended),
 		cmocka_unit_test(a_slow_reader_gets_the_newest),
