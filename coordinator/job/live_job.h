@@ -119,7 +119,7 @@ struct live_job {
 	bool unread;		   /* one of them could not be read, or was wrong, when they were last read */
 	bool held;		   /* its results cannot be stored */
 	size_t held_bytes;	   /* of the result that there was no room for */
-	bool held_states;	   /* its chain states had none */
+	uint64_t held_states;	   /* its chain states had none; bytes that they would have; 0: they had */
 	double try_again;	   /* s of the loop's clock: what the disk refused */
 	bool unsure; /* whether the last checkpoint was renamed is unknown: nothing is stored before the next one */
 	uint64_t generation_least; /* of that one */

@@ -209,17 +209,14 @@ void durable_hold(struct jobs *jobs, struct live_job *job, const char *what, con
 	hold(jobs, job, text);
 }
 
-/* Whether its chain states need more memory than those that they replace. */
-static bool states_grow(const struct live_job *job, const struct batch *b)
-{
-	const struct chain_state *now = job->states[(size_t)b->key.group * job->plan.parts + b->key.part];
-	return chain_states_bytes(b->states, b->state_count) > chain_states_bytes(now, job->chains_per_lease);
-}
-
+/* Where its chain states need more memory than those that they replace. */
 static int reserve_memory(const struct jobs *jobs, struct live_job *job, const struct batch *b, struct error *e)
 {
-	uint64_t first = states_grow(job, b) ? room_for_states(jobs, job) : 0;
-	job->held_states = first != 0;
+	const struct chain_state *now = job->states[(size_t)b->key.group * job->plan.parts + b->key.part];
+	uint64_t before = chain_states_bytes(now, job->chains_per_lease);
+	uint64_t after = chain_states_bytes(b->states, b->state_count);
+	uint64_t all = job->state_bytes - before + after, first = after > before ? room_for_states(jobs, job, all) : 0;
+	job->held_states = first ? all : 0;
 	return first ? error_set(e, ENOMEM, "memory has no room for its chain states beside those of j%llu",
 				 (unsigned long long)first)
 		     : 0;
@@ -451,7 +448,7 @@ int durable_mend(struct jobs *jobs, struct live_job *job)
 {
 	struct error e;
 	job->try_again = jobs_now(jobs) + jobs->config.retry_seconds;
-	if (job->unsure || (job->held_states && room_for_states(jobs, job)) || room_first(jobs, job))
+	if (job->unsure || (job->held_states && room_for_states(jobs, job, job->held_states)) || room_first(jobs, job))
 		return -EAGAIN;
 	int rc;
 	do {

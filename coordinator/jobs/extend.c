@@ -198,7 +198,7 @@ static int extend_read(struct jobs *jobs, const struct requester *by, struct liv
 	struct plan plan;
 	if (live_job_rounds(job) == 0)
 		return error_set(e, ENOENT, "its films have been deleted: %s", again);
-	uint64_t other = job->state_bytes ? room_for_states(jobs, job) : 0;
+	uint64_t other = job->state_bytes ? room_for_states(jobs, job, job->state_bytes) : 0;
 	if (other)
 		return error_set(
 			e, EAGAIN,

@@ -106,17 +106,20 @@ uint64_t room_first(const struct jobs *jobs, const struct live_job *job)
 	return first == job->id ? 0 : first;
 }
 
-uint64_t room_for_states(const struct jobs *jobs, const struct live_job *job)
+uint64_t room_for_states(const struct jobs *jobs, const struct live_job *job, uint64_t after)
 {
 	const struct live_job *most = NULL;
-	uint64_t others = 0;
+	uint64_t large = 0, small = 0, all = jobs->config.state_bytes;
+	uint64_t one = all / ROOM_SMALL_JOB, apart = all / ROOM_SMALL_JOBS;
 	for (const struct live_job *j = jobs->live; j; j = j->next) {
 		if (j == job)
 			continue;
-		others += j->state_bytes;
+		*(j->state_bytes <= one ? &small : &large) += j->state_bytes;
 		most = !most || j->state_bytes > most->state_bytes ? j : most;
 	}
-	return others > jobs->config.state_bytes / 2 ? most->id : 0;
+	bool is_small = after <= one;
+	uint64_t others = large + (is_small ? small : small > apart ? small - apart : 0);
+	return others <= all / 2 || (is_small && small + after <= apart) ? 0 : most->id;
 }
 
 uint64_t room_for_journal(const struct jobs *jobs, const struct live_job *job, bool ample)

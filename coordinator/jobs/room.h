@@ -23,11 +23,14 @@ struct room_claim {
 void room_share(struct room_claim *claims, size_t count, uint64_t available);
 /* The job for which this one must wait by that rule, among all from which results may come; 0: it may write. */
 uint64_t room_first(const struct jobs *jobs, const struct live_job *job);
-/* Chain states are in memory until their job ends, and one job may need up to state_bytes for them. So a job's states
- * may grow only while those of all others together have at most half of that: however many jobs there are, they never
- * have more than 3/2 of it, and the job whose states grew last can go on. Returns the job that has most of those which
- * leave no room; 0: they may grow. */
-uint64_t room_for_states(const struct jobs *jobs, const struct live_job *job);
+/* Chain states are in memory until their job ends, also while it is held, and one job may need up to state_bytes for
+ * them. So a job's states may grow only while those of all others together have at most half of that. Jobs that need
+ * little, at most 1/32, do not wait for those that need much: a quarter is theirs apart, and counts for nobody else.
+ * However many jobs there are, they never have more than 7/4 of state_bytes, and there is always one that can go on:
+ * the last whose states grew by the first rule. `after`: bytes of the job's states once they have grown. Returns the
+ * job that has most of those which leave no room; 0: they may grow. */
+enum { ROOM_SMALL_JOB = 32, ROOM_SMALL_JOBS = 4 };
+uint64_t room_for_states(const struct jobs *jobs, const struct live_job *job, uint64_t after);
 /* Bytes of a job's journal beyond which a checkpoint replaces it: the limit that was set, or as many as the checkpoint
  * has; where room is not ample, as many as the checkpoint has. */
 uint64_t room_for_journal(const struct jobs *jobs, const struct live_job *job, bool ample);

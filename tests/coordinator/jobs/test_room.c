@@ -108,36 +108,61 @@ static uint64_t next_draw(uint64_t *draw)
 static void states_are_bounded(void **state)
 {
 	(void)state;
-	enum { MOST = 100 };
+	enum { MOST = 320, COUNT = 24 };
 	uint64_t draw = 1, largest = 0, waited = 0;
 	for (int trial = 0; trial < 1000; trial++) {
-		struct live_job live[JOBS] = {{.id = 0}};
+		struct live_job live[COUNT] = {{.id = 0}};
 		struct jobs jobs = {.live = live, .config.state_bytes = MOST};
-		uint64_t final[JOBS], ended = 0;
-		for (int k = 0; k < JOBS; k++) {
-			live[k] = (struct live_job){.next = k + 1 < JOBS ? &live[k + 1] : NULL, .id = (uint64_t)k + 1};
-			final[k] = 1 + next_draw(&draw) % MOST;
+		uint64_t final[COUNT], ended = 0, small = next_draw(&draw) % 100;
+		for (int k = 0; k < COUNT; k++) {
+			live[k] = (struct live_job){.next = k + 1 < COUNT ? &live[k + 1] : NULL, .id = (uint64_t)k + 1};
+			final[k] = 1 + next_draw(&draw) % (next_draw(&draw) % 100 < small ? MOST / 32 : MOST);
 		}
 		for (int blocked = 0; ended < 20 && blocked < 1000;) {
-			int k = (int)(next_draw(&draw) % JOBS);
-			uint64_t step = 1 + next_draw(&draw) % 10, total = 0, other = room_for_states(&jobs, &live[k]);
-			assert_true(other <= JOBS && other != live[k].id);
+			int k = (int)(next_draw(&draw) % COUNT);
+			uint64_t room = final[k] - live[k].state_bytes, step = 1 + next_draw(&draw) % 10, total = 0;
+			step = step < room ? step : room;
+			uint64_t other = room_for_states(&jobs, &live[k], live[k].state_bytes + step);
+			assert_true(other <= COUNT && other != live[k].id);
 			waited += other != 0;
 			blocked = other ? blocked + 1 : 0;
 			if (!other)
 				live[k].state_bytes += step;
-			if (live[k].state_bytes >= final[k]) {
-				live[k].state_bytes = 0;
-				final[k] = 1 + next_draw(&draw) % MOST;
-				ended++;
-			}
-			for (int i = 0; i < JOBS; i++)
+			for (int i = 0; i < COUNT; i++)
 				total += live[i].state_bytes;
 			largest = total > largest ? total : largest;
+			if (live[k].state_bytes >= final[k]) {
+				live[k].state_bytes = 0;
+				ended++;
+			}
 		}
 		assert_int_equal(ended, 20);
 	}
-	assert_true(largest > MOST && largest <= MOST + MOST / 2 && waited);
+	assert_true(largest > MOST && largest <= MOST + MOST / 2 + MOST / 4 && waited);
+}
+
+/* One job has all that it may have, and is held: others that need little go on, and if they are too many, memory is
+ * bounded all the same. Who needs more waits for it. */
+static void small_jobs_pass_a_large_one(void **state)
+{
+	(void)state;
+	enum { MOST = 3200, SMALL = MOST / ROOM_SMALL_JOB, COUNT = 20 };
+	struct live_job live[1 + COUNT] = {{.id = 1, .state_bytes = MOST}};
+	struct jobs jobs = {.live = live, .config.state_bytes = MOST};
+	uint64_t total = MOST;
+	for (int k = 1; k <= COUNT; k++) {
+		live[k].id = (uint64_t)k + 1;
+		live[k - 1].next = &live[k];
+	}
+	assert_int_equal(room_for_states(&jobs, &live[1], SMALL + 1), 1);
+	for (int k = 1; k <= COUNT; k++)
+		while (live[k].state_bytes < SMALL && room_for_states(&jobs, &live[k], live[k].state_bytes + 1) == 0) {
+			live[k].state_bytes++;
+			total++;
+		}
+	assert_int_equal(total, MOST + MOST / ROOM_SMALL_JOBS);
+	assert_int_equal(room_for_states(&jobs, &live[COUNT], 1), 1);
+	assert_int_equal(room_for_states(&jobs, &live[0], MOST), 0); /* and it can end */
 }
 
 static unsigned sent, refused, ended; /* results, those refused since memory had no room, and jobs */
@@ -206,6 +231,7 @@ int main(void)
 		cmocka_unit_test(some_go_on),
 		cmocka_unit_test(all_end),
 		cmocka_unit_test(states_are_bounded),
+		cmocka_unit_test(small_jobs_pass_a_large_one),
 		cmocka_unit_test_setup_teardown(jobs_with_many_chains_take_turns, staged_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
