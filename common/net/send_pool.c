@@ -65,6 +65,14 @@ void send_pool_sub(struct send_share *s, uint64_t bytes, uint64_t now)
 		LIST_REMOVE(s, next);
 }
 
+void send_pool_adjust(struct send_share *s, int64_t bytes)
+{
+	if (!s->pool)
+		return;
+	s->bytes += (uint64_t)bytes;
+	*(s->leaves ? &s->pool->leaving : &s->pool->used) += (uint64_t)bytes;
+}
+
 void send_pool_leave(struct send_share *s)
 {
 	struct send_pool *p = s->pool;

@@ -35,6 +35,9 @@ struct send_pool {
 bool send_pool_add(struct send_share *s, uint64_t bytes, uint64_t now);
 /* The kernel has taken them, or they were dropped. */
 void send_pool_sub(struct send_share *s, uint64_t bytes, uint64_t now);
+/* It holds so much more (or less) in memory than was added, which is no sign of its peer, and nobody gives way before
+ * something is added. Only while something else of it is held. */
+void send_pool_adjust(struct send_share *s, int64_t bytes);
 /* Notes whether its peer has taken something. */
 void send_pool_look(struct send_share *s, uint64_t now);
 /* Its connection is being closed: it may only give back. */

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * In plaintext a frame goes to libuv at once, as two buffers: its checked prefix and its bytes. With TLS it waits in a
- * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write, so that memory holds one copy
- * of what a slow peer has not taken. `on_written` encrypts more, and says when nothing is left.
+ * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write. A frame's memory is freed with
+ * its last piece, so until then the pool counts the pieces before that, too, which
+ * may exceed its limit until something else is to be sent. `on_written` encrypts more, and says when
+ * nothing is left.
  *
  * Failures are told once to the owner, who closes the stream: no memory, an error of the stream or of TLS, a peer that
  * does not read what is sent to it, here or while all queues together hold too much.
@@ -80,9 +82,16 @@ void send_queue_init(struct send_queue *q, uv_stream_t *stream, struct tls_link 
 	STAILQ_INIT(&q->frames);
 }
 
+static void count_copied(struct send_queue *q, size_t bytes)
+{
+	send_pool_adjust(&q->share, (int64_t)bytes - (int64_t)q->copied);
+	q->copied = bytes;
+}
+
 static void drop_first(struct send_queue *q)
 {
 	struct send_frame *f = STAILQ_FIRST(&q->frames);
+	count_copied(q, 0);
 	STAILQ_REMOVE_HEAD(&q->frames, next);
 	mem_free(f->bytes);
 	mem_free(f);
@@ -215,6 +224,7 @@ static int encrypt_piece(struct send_queue *q)
 	bool last = f->at == f->size;
 	size_t plain = last ? f->plain : size;
 	f->plain -= plain;
+	count_copied(q, q->copied + plain);
 	flush(q, plain);
 	return last;
 }

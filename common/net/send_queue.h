@@ -38,7 +38,8 @@ struct send_queue {
 	enum send_state state;
 	STAILQ_HEAD(, send_frame) frames; /* waiting to be encrypted */
 	size_t unsent;			  /* bytes of frames that the kernel has not taken, and their overhead */
-	struct send_share share;	  /* the same in the pool of all queues */
+	size_t copied;			  /* bytes of the first frame that are also in what libuv has to write */
+	struct send_share share;	  /* unsent and copied, in the pool of all queues */
 	size_t in_flight;		  /* what libuv has to write; with TLS including its overhead */
 	bool sent;			  /* the first frame has been taken */
 	bool gave_way;			  /* it failed because all queues together held too much */

@@ -238,8 +238,9 @@ static void all_are_cut_off_together(void **state)
 	}
 	for (; !pool.leaving && unread < 32; unread++)
 		send_bye(&there, 1 << 20);
+	const uint64_t copied = calling ? 1 << 20 : 0; /* of a frame that had room, once TLS encrypts it */
 	assert_true(unread > 1 && unread < 32 && pool.used == 0 && pool.leaving > 1 << 20 &&
-		    pool.leaving <= pool.limit);
+		    pool.leaving <= pool.limit + copied);
 	while (!there.closed || !here.closed)
 		uv_run(&loop, UV_RUN_ONCE);
 	assert_true(there.gave_way && pool.used == 0 && pool.leaving == 0 && LIST_EMPTY(&pool.waiting));
