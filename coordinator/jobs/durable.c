@@ -8,8 +8,8 @@
  *
  * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements are
  * parked, and durable_mend tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job
- * whose end cannot be recorded stays in a list of endings until it can. Only running out of memory for these lists
- * (some 200 bytes) ends the process.
+ * whose end cannot be recorded stays in a list of endings until it can; room for that is kept (spool_reserve). Only
+ * running out of memory for these lists (some 200 bytes) ends the process.
  */
 #include "coordinator/jobs/durable.h"
 
@@ -104,6 +104,15 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 	return rc;
 }
 
+/* Also on a full disk, if it ends without a result: that must not need room that only its end makes. */
+static int ledger_end_at_last(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
+{
+	int rc = ledger_end(jobs->ledger, r, kept, e);
+	return disk_is_full(rc) && !r->has_result && spool_use_reserve(jobs->spool)
+		       ? ledger_end(jobs->ledger, r, kept, e)
+		       : rc;
+}
+
 /* Deletes its films only once the ledger durably says that it has ended. kept: they stay (keep.h). */
 static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
@@ -113,7 +122,7 @@ static int write_end(struct jobs *jobs, const struct job_record *r, bool kept, s
 	if (disk_is_full(rc))
 		keep_drop_all(jobs);
 	if (rc)
-		rc = ledger_end(jobs->ledger, r, kept, e);
+		rc = ledger_end_at_last(jobs, r, kept, e);
 	if (!rc && !kept)
 		keep_drop(jobs, r->id);
 	return rc;
@@ -163,7 +172,7 @@ int durable_end(struct jobs *jobs, struct live_job *job)
 
 int durable_end_soon(struct jobs *jobs, const struct live_job *job, const struct job_record *r, struct error *e)
 {
-	return ledger_end(jobs->ledger, r, keep_films(jobs, job, r), e);
+	return ledger_end_at_last(jobs, r, keep_films(jobs, job, r), e);
 }
 
 int durable_ended(const struct jobs *jobs, uint64_t job, struct error *e)
@@ -471,6 +480,7 @@ static void mend_ledger(struct jobs *jobs)
 	jobs->ledger_again = jobs_now(jobs) + jobs->config.retry_seconds;
 	if (ledger_mend(jobs->ledger, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+	spool_reserve(jobs->spool);
 }
 
 void durable_tick(struct jobs *jobs)

@@ -146,6 +146,29 @@ void spool_close(struct spool *s)
 	mem_free(s);
 }
 
+void spool_reserve(const struct spool *s)
+{
+	char path[SPOOL_PATH_MAX];
+	struct stat st;
+	spool_path(s, "reserve", path);
+	if (disk_stat(path, &st) == 0 ? st.st_size == SPOOL_RESERVE : disk_available(s->folder) < 4 * SPOOL_RESERVE)
+		return;
+	int fd = disk_open(path, O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+	if (fd < 0)
+		return;
+	bool made = disk_posix_fallocate(fd, 0, SPOOL_RESERVE) == 0;
+	disk_close(fd);
+	if (!made)
+		disk_unlink(path);
+}
+
+bool spool_use_reserve(const struct spool *s)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_path(s, "reserve", path);
+	return disk_unlink(path) == 0;
+}
+
 int spool_make_job(const struct spool *s, uint64_t id, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];

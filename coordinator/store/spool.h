@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator's folder: lock, jobs.db and jobs-copy.db (ledger.h), blobs/, canvas/, jobs/jN/{journal.G, checkpoint,
- * result.exr, preview.exr, log}. Names are flushed with their folders (common/base/disk.h). One coordinator per spool
- * (a lock that the kernel drops when its holder dies). Files are written atomically: temporary file, fsync, rename,
- * fsync of the folder. spool_write from any thread (for different files); everything else from one.
+ * The coordinator's folder: lock, reserve, jobs.db and jobs-copy.db (ledger.h), blobs/, canvas/, jobs/jN/{journal.G,
+ * checkpoint, result.exr, preview.exr, log}. Names are flushed with their folders (common/base/disk.h). One coordinator
+ * per spool (a lock that the kernel drops when its holder dies). Files are written atomically: temporary file, fsync,
+ * rename, fsync of the folder. spool_write from any thread (for different files); everything else from one.
  */
 #ifndef COORDINATOR_STORE_SPOOL_H
 #define COORDINATOR_STORE_SPOOL_H
 
 #include "common/base/error.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -18,6 +19,12 @@ struct spool;
 /* Creates the folder if necessary. -EBUSY: another coordinator uses it. */
 int spool_open(struct spool **s, const char *folder, struct error *e);
 void spool_close(struct spool *s);
+
+/* A file that holds room on the disk: SPOOL_RESERVE bytes, made by spool_reserve while four times as many are free. A
+ * job that is cancelled because the disk is full needs some of them to be recorded. false: there is none. */
+enum { SPOOL_RESERVE = 1 << 18 };
+void spool_reserve(const struct spool *s);
+bool spool_use_reserve(const struct spool *s);
 
 /* -ENOSPC: the spool's file system is smaller, however much of it is free. */
 int spool_holds(const struct spool *s, uint64_t bytes, struct error *e);

@@ -90,6 +90,10 @@ until_true 20 is_state "$id" held || fail "$id is $(value "$id" state)"
 head -c 20000000 /dev/zero >"$DIR/spool/filler" 2>/dev/null && fail "there is room"
 sleep 3
 before=$(value "$id" merged)
-"$BIN/hslt-job" cancel "$holder" 2>>"$DIR/cancel.log" || : # it says when the disk has not taken it yet
+"$BIN/hslt-job" cancel "$holder" || fail "$holder cannot be cancelled: it has no results that could be deleted"
 until_true 20 is_merged "$id" "$before" || fail "$id stays at $before results: $(value "$id" waiting)"
+kill -9 $COORDINATOR_PID
+wait $COORDINATOR_PID 2>/dev/null || :
+LISTEN=$COORDINATOR start_coordinator -v
+is_state "$holder" cancelled || fail "$holder is $(value "$holder" state) after it was cancelled"
 echo "held at $first of $quiet leases, went on, bits equal"

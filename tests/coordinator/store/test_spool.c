@@ -84,11 +84,46 @@ static void what_is_larger_than_the_disk(void **state)
 	spool_close(s);
 }
 
+static uint64_t little(const char *path)
+{
+	(void)path;
+	return 4 * SPOOL_RESERVE - 1;
+}
+
+/* Not where a job that waits for room needs it more. */
+static void room_is_kept(void **state)
+{
+	(void)state;
+	struct spool *s;
+	struct error e;
+	struct stat st;
+	char path[SPOOL_PATH_MAX];
+	struct disk small = disk_system;
+	small.available = little;
+	assert_int_equal(spool_open(&s, folder, &e), 0);
+	spool_path(s, "reserve", path);
+	for (int i = 0; i < 2; i++) {
+		disk_use(&small);
+		spool_reserve(s);
+		assert_false(spool_use_reserve(s));
+		disk_use(NULL);
+		spool_reserve(s);
+		spool_reserve(s);
+		assert_int_equal(stat(path, &st), 0);
+		assert_int_equal(st.st_size, SPOOL_RESERVE);
+		assert_true((uint64_t)st.st_blocks * 512 >= SPOOL_RESERVE);
+		assert_true(spool_use_reserve(s));
+		assert_int_equal(access(path, F_OK), -1);
+	}
+	spool_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(one_master, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_larger_than_the_disk, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(room_is_kept, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(jobs_have_folders, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
