@@ -27,11 +27,16 @@ uint32_t states_payload_max(const struct plan *p)
 	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
 }
 
-uint32_t batch_payload_max(const struct plan *p)
+static uint64_t tiles_most(const struct plan *p)
 {
 	uint64_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE,
 		 down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
-	uint64_t tiles = across * down * exr_tile_size_max(TILE_SIZE, TILE_SIZE);
+	return across * down;
+}
+
+uint32_t batch_payload_max(const struct plan *p)
+{
+	uint64_t tiles = tiles_most(p) * exr_tile_size_max(TILE_SIZE, TILE_SIZE);
 	uint64_t moments = batch_moment_count(p, LEASE_RENDER) * sizeof(float);
 	uint64_t render = tiles + states_payload_max(p) + moments;
 	uint64_t weights = p->bootstrap / ((uint64_t)p->groups * p->parts) * sizeof(float);
@@ -274,7 +279,10 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		rc = error_set(e, EBADMSG, "a batch with %zu counters of strategies", m->n_strategies);
 	if (!rc && m->n_classes != PATH_CLASSES)
 		rc = error_set(e, EBADMSG, "a batch with %zu path classes", m->n_classes);
-	/* Checks the count against the plan before memory is allocated. */
+	/* Checks the counts against the plan before memory is allocated, and before thousands of tiles of a pixel are
+	 * read. */
+	if (!rc && m->n_tile_sizes > tiles_most(p))
+		rc = error_set(e, EBADMSG, "a batch with %zu tiles", m->n_tile_sizes);
 	if (!rc && m->n_state_sizes > chains_per_lease(p))
 		rc = error_set(e, EBADMSG, "a batch with %zu chain states", m->n_state_sizes);
 	if (!rc) {

@@ -187,6 +187,32 @@ static void strategies_are_the_plans(void **state)
 	batch_fini(&b);
 }
 
+/* The film has four tiles; whether there are more is known before any is read. */
+static void tiles_are_counted_first(void **state)
+{
+	(void)state;
+	struct plan p = chain_plan();
+	struct batch b = chain_batch(&p), back;
+	struct envelope env;
+	struct frame_reader r;
+	struct error e;
+	travel(&b, &p, &env, &r);
+	Farm__LeaseResult *m = env.message->lease_result;
+	uint32_t sizes[5] = {m->tile_sizes[0], m->tile_sizes[1]}, *own = m->tile_sizes;
+	m->tile_sizes = sizes;
+	m->n_tile_sizes = 4;
+	assert_int_equal(batch_unpack(&back, &p, m, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	assert_non_null(strstr(e.text, "tile 2"));
+	m->n_tile_sizes = 5;
+	assert_int_equal(batch_unpack(&back, &p, m, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	assert_string_equal(e.text, "a batch with 5 tiles");
+	m->tile_sizes = own;
+	m->n_tile_sizes = 2;
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	batch_fini(&b);
+}
+
 static void memory_may_end_anywhere(void **state)
 {
 	(void)state;
@@ -484,6 +510,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_batch_travels),
+		cmocka_unit_test(tiles_are_counted_first),
 		cmocka_unit_test(memory_may_end_anywhere),
 		cmocka_unit_test(moments_are_the_plans),
 		cmocka_unit_test(states_are_as_long_as_paths),
