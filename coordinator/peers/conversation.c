@@ -177,15 +177,41 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 {
 	struct session *p = user;
 	bool known = p->state == SESSION_WORKER || p->state == SESSION_CLIENT;
-	if (!known || !held_take(p, env))
-		take_message(p, env, payload, size);
+	Farm__Envelope__BodyCase what = env->message->body_case; /* which may be taken */
+	double begun = held_begin(p);
+	if (known && held_take(p, env))
+		return;
+	take_message(p, env, payload, size);
+	held_end(p, what, begun);
+}
+
+static void take_held(struct session *p)
+{
+	struct envelope env;
+	if (!held_next(p, &env))
+		return;
+	Farm__Envelope__BodyCase what = env.message->body_case;
+	double begun = held_begin(p);
+	take_message(p, &env, NULL, 0);
+	held_end(p, what, begun);
+	envelope_fini(&env);
 }
 
 void conversations_go_on(struct peers *s)
 {
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
-		for (struct envelope env; held_next(p, &env); envelope_fini(&env))
-			take_message(p, &env, NULL, 0);
+		while (p->state == SESSION_WORKER && !STAILQ_EMPTY(&p->held))
+			take_held(p);
+	conversations_tick(s);
+}
+
+void conversations_tick(struct peers *s)
+{
+	s->order_ms = 0;
+	if (recovery_is_on(s->jobs))
+		return;
+	for (struct session *p; (p = held_turn(s));)
+		take_held(p);
 }
 
 static void on_closed(void *user, const char *why)

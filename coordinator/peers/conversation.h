@@ -9,6 +9,8 @@
 
 extern const struct conn_events conversation_events; /* user: the session */
 
+/* Handles requests that waited for others, as many as there is time for. */
+void conversations_tick(struct peers *s);
 /* The jobs have been read: handles the requests that waited for that (held.h). */
 void conversations_go_on(struct peers *s);
 

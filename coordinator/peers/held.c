@@ -27,18 +27,56 @@ static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 	       (first && what == FARM__ENVELOPE__BODY_JOB_LIST);
 }
 
+/* What is flushed on the loop's thread. */
+static bool is_order(Farm__Envelope__BodyCase what)
+{
+	return what == FARM__ENVELOPE__BODY_SUBMIT || what == FARM__ENVELOPE__BODY_CANCEL ||
+	       what == FARM__ENVELOPE__BODY_CONTROL;
+}
+
+/* Messages with a payload do not wait; a client sends them when it has an answer. */
+static bool waits(const struct session *p, Farm__Envelope__BodyCase what)
+{
+	bool first = STAILQ_EMPTY(&p->held);
+	if (recovery_is_on(p->jobs))
+		return !is_answered_at_once(what, first);
+	if (p->state != SESSION_CLIENT || what == FARM__ENVELOPE__BODY_BLOB_CHUNK)
+		return false;
+	return first ? is_order(what) && p->peers->order_ms > HELD_ORDERS_MS : !is_answered_at_once(what, first);
+}
+
+double held_begin(const struct session *p)
+{
+	return jobs_now(p->jobs);
+}
+
+void held_end(struct session *p, Farm__Envelope__BodyCase what, double begun)
+{
+	if (!is_order(what))
+		return;
+	p->peers->order_ms += 1000 * (jobs_now(p->jobs) - begun);
+	p->turn = ++p->peers->orders;
+}
+
+struct session *held_turn(const struct peers *s)
+{
+	struct session *next = NULL;
+	for (struct session *p = LIST_FIRST(&s->sessions); p && s->order_ms <= HELD_ORDERS_MS; p = LIST_NEXT(p, next))
+		if (!STAILQ_EMPTY(&p->held) && (!next || p->turn < next->turn))
+			next = p;
+	return next;
+}
+
 bool held_take(struct session *p, struct envelope *env)
 {
 	struct peers *s = p->peers;
-	if (!recovery_is_on(p->jobs) || is_answered_at_once(env->message->body_case, STAILQ_EMPTY(&p->held)))
+	if (!waits(p, env->message->body_case))
 		return false;
 	size_t cost = cost_of(env);
 	struct held *h =
 		p->held_bytes + cost <= PEER_MOST && s->held_bytes + cost <= HELD_MOST ? mem_alloc(1, sizeof *h) : NULL;
 	if (!h) {
-		session_fault(
-			p,
-			"the coordinator is still reading its jobs, and too many requests wait for that: try again later");
+		session_fault(p, "too many requests wait for the coordinator: try again later");
 		return true;
 	}
 	if (STAILQ_EMPTY(&p->held))

@@ -85,6 +85,7 @@ void peers_tick(struct peers *s)
 	for (unsigned i = 0; i < s->listener_count; i++)
 		if (s->listeners[i].caller_waits)
 			peers_accept(s, &s->listeners[i]);
+	conversations_tick(s);
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next)) {
 		client_tick(p);
 		held_tick(p);

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Orders whose records are flushed slowly, sent as fast as a client can: others are answered meanwhile, and the orders
+ * are carried out in their order.
+ */
+#include "tests/support/served.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <sqlite3.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+enum { ORDERS = 100, COMMIT_US = 10000 };
+
+static _Atomic unsigned *commits; /* shared with the server */
+
+static int slow_commit(void *unused)
+{
+	(void)unused;
+	++*commits;
+	usleep(COMMIT_US);
+	return 0;
+}
+
+static int hook_commits(sqlite3 *db, char **text, const struct sqlite3_api_routines *api)
+{
+	(void)text, (void)api;
+	sqlite3_commit_hook(db, slow_commit, NULL);
+	return SQLITE_OK;
+}
+
+static void slow_down(const char *spool)
+{
+	(void)spool;
+	sqlite3_auto_extension((void (*)(void))hook_commits);
+}
+
+static int set_up(void **state)
+{
+	(void)state;
+	commits = mmap(NULL, sizeof *commits, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	assert_true(commits != MAP_FAILED);
+	served_prepare(slow_down);
+	return served_start(60, 60, 60);
+}
+
+static struct scripted *call_client(void)
+{
+	struct scripted *client = peer_call();
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	return client;
+}
+
+static void order(struct scripted *client, Farm__Verb verb, int priority)
+{
+	Farm__Control c;
+	Farm__Envelope m;
+	farm__control__init(&c);
+	farm__envelope__init(&m);
+	c.job = 1;
+	c.verb = verb;
+	c.priority = priority;
+	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
+	m.control = &c;
+	peer_say(client, &m, NULL, 0);
+}
+
+static const Farm__JobStatus *ask(struct scripted *client)
+{
+	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = scripted_hear(client);
+	assert_non_null(m);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	assert_int_equal(m->job_list_answer->n_jobs, 1);
+	return m->job_list_answer->jobs[0];
+}
+
+static void who_gives_orders_stops_nobody(void **state)
+{
+	(void)state;
+	struct scripted *master = call_client(), *other = call_client();
+	peer_submit(master, NULL, "<scene/>", "s.xml", "s.xml");
+	assert_int_equal(peer_submit_answer(master)->n_missing, 1);
+	peer_send_blob(master, "<scene/>", "<scene/>");
+	assert_int_equal(peer_submit_answer(master)->job, 1);
+	unsigned before = *commits, looks = 0;
+	for (int i = 1; i <= ORDERS; i++)
+		order(master, FARM__VERB__VERB_PRIORITY, i);
+	peer_say_empty(master, FARM__ENVELOPE__BODY_JOB_LIST);
+	for (int last = 0; last < ORDERS; looks++) { /* some of which are in the middle */
+		int now = ask(other)->priority;
+		assert_in_range(now, last, ORDERS);
+		last = now;
+	}
+	assert_true(looks > 3);
+	assert_in_range(*commits - before, ORDERS, 3 * ORDERS);
+	for (int i = 0; i < ORDERS; i++) {
+		const Farm__Envelope *m = scripted_hear(master);
+		assert_non_null(m);
+		assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_DONE);
+		assert_true(m->done->ok);
+	}
+	assert_int_equal(scripted_hear(master)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	scripted_hang_up(master);
+	scripted_hang_up(other);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(who_gives_orders_stops_nobody)};
+	return cmocka_run_group_tests(tests, set_up, served_stop);
+}
