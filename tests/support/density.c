@@ -174,7 +174,8 @@ static double scattered(const struct path_context *c, const struct path_vertex *
 {
 	struct surface_point x;
 	if (at->kind == VERTEX_MEDIUM)
-		return phase_eval(&c->w->media[0].phase, towards(at, from), towards(at, to)) * per_area(at, to);
+		return phase_eval(&c->w->media[0].phase, at->x.p, towards(at, from), towards(at, to)) *
+		       per_area(at, to);
 	bool from_light = transport == TRANSPORT_IMPORTANCE, turned = turned_from(at, from_light ? to : from, &x);
 	if (from_light && turned)
 		return 0;
@@ -299,7 +300,7 @@ static double scatter(const struct path_context *c, const struct path_vertex *ca
 {
 	if (at->kind == VERTEX_MEDIUM)
 		return medium_scattering(&c->w->media[0], at->x.p, &c->wl).v[0] *
-		       phase_eval(&c->w->media[0].phase, towards(at, camera), towards(at, light));
+		       phase_eval(&c->w->media[0].phase, at->x.p, towards(at, camera), towards(at, light));
 	if (at->delta) {
 		struct bsdf_sample s = specular_lobe(c, camera, at, light, TRANSPORT_RADIANCE);
 		return s.f.v[0] * fabs(s.wi.z);

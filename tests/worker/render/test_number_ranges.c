@@ -60,6 +60,8 @@ static const char *companions(const struct plugin_decl *d, const struct param *p
 		return "<float name='displacement' value='0.1'/><integer name='displacement_level' value='1'/>";
 	if (strcmp(p->name, "displacement_level") == 0)
 		return "<float name='displacement' value='0.1'/>";
+	if (strcmp(d->type, "blendphase") == 0)
+		return "<phase type='isotropic'/><phase type='hg'/>";
 	if (strcmp(d->type, "thinlens") == 0 && strcmp(p->name, "aperture_radius") != 0)
 		return "<float name='aperture_radius' value='0.01'/>";
 	return "";

@@ -93,7 +93,9 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct vol
 	int rc = material ? read_measured(m, n, material, e) : read_coefficients(m, n, build, e);
 	if (rc)
 		return rc;
-	phase_create(&m->phase, node_child(n, PLUGIN_PHASE, 0));
+	rc = phase_create(&m->phase, node_child(n, PLUGIN_PHASE, 0), build, e);
+	if (rc)
+		return rc;
 	bool first = volume_max(&m->first) > 0, second = volume_max(&m->second) > 0,
 	     all = volume_least(&m->second) == 1;
 	m->absorbs = m->per_length > 0 && first && !(m->by_albedo && all);
@@ -138,8 +140,9 @@ static spectrum extinction(const struct medium *m, spectrum first, const struct 
 
 spectrum medium_scattering(const struct medium *m, vec3 p, const struct wavelengths *w)
 {
-	spectrum unused;
-	return coefficients(m, volume_at(&m->first, p, true, w), volume_at(&m->second, p, false, w), &unused);
+	spectrum unused, sigma_s = coefficients(m, volume_at(&m->first, p, true, w), volume_at(&m->second, p, false, w),
+						&unused);
+	return spectrum_scale(1 - m->phase.absorbed, sigma_s);
 }
 
 spectrum medium_extinction(const struct medium *m, vec3 p, const struct wavelengths *w)

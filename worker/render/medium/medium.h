@@ -32,7 +32,7 @@ int medium_light(struct medium *m, const struct scene_node *n, const struct volu
 
 bool medium_is_coloured(const struct medium *m); /* its coefficients vary with wavelength */
 
-/* Sigma_s at p. 1 / length */
+/* Sigma_s at p, without what the phase function absorbs of it. 1 / length */
 spectrum medium_scattering(const struct medium *m, vec3 p, const struct wavelengths *w);
 spectrum medium_extinction(const struct medium *m, vec3 p, const struct wavelengths *w); /* sigma_t */
 

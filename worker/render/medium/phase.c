@@ -17,26 +17,25 @@ const struct phase_ops *const phase_registry[] = {
 	NULL,
 };
 
-void phase_create(struct phase *p, const struct scene_node *n)
+int phase_create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	*p = (struct phase){.ops = phase_registry[0]};
 	for (size_t i = 0; n && phase_registry[i]; i++)
 		if (strcmp(phase_registry[i]->decl.type, n->type) == 0)
 			p->ops = phase_registry[i];
-	if (p->ops->create)
-		p->ops->create(p, n);
+	return p->ops->create ? p->ops->create(p, n, build, e) : 0;
 }
 
-double phase_eval(const struct phase *p, vec3 wo, vec3 wi)
+double phase_eval(const struct phase *p, vec3 at, vec3 wo, vec3 wi)
 {
-	return p->ops->eval(p, -vec3_dot(wo, wi));
+	return p->ops->eval(p, at, -vec3_dot(wo, wi));
 }
 
-vec3 phase_sample(const struct phase *p, vec3 wo, const double u[2], double *pdf)
+vec3 phase_sample(const struct phase *p, vec3 at, vec3 wo, const double u[2], double *pdf)
 {
 	struct frame straight = frame_around(vec3_neg(wo));
-	double cosine = fmin(fmax(p->ops->sample(p, u[0]), -1), 1), phi = 2 * M_PI * u[1];
+	double cosine = fmin(fmax(p->ops->sample(p, at, u[0]), -1), 1), phi = 2 * M_PI * u[1];
 	double sine = sqrt((1 - cosine) * (1 + cosine));
-	*pdf = p->ops->eval(p, cosine);
+	*pdf = p->ops->eval(p, at, cosine);
 	return frame_to_world(&straight, (vec3){sine * cos(phi), sine * sin(phi), cosine});
 }

@@ -6,16 +6,15 @@
 
 static const struct param params[] = {{NULL, 0, 0, 0, 0, NULL}};
 
-static double eval(const struct phase *p, double cosine)
+static double eval(const struct phase *p, vec3 at, double cosine)
 {
-	(void)p;
-	(void)cosine;
+	(void)p, (void)at, (void)cosine;
 	return 1 / (4 * M_PI);
 }
 
-static double sample(const struct phase *p, double u)
+static double sample(const struct phase *p, vec3 at, double u)
 {
-	(void)p;
+	(void)p, (void)at;
 	return 2 * u - 1;
 }
 

@@ -3,3 +3,6 @@
 PHASE(isotropic)
 PHASE(hg)
 PHASE(rayleigh)
+PHASE(blendphase)
+PHASE(mixturephase)
+PHASE(tabphase)

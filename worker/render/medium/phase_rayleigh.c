@@ -9,15 +9,15 @@
 
 static const struct param params[] = {{NULL, 0, 0, 0, 0, NULL}};
 
-static double eval(const struct phase *p, double cosine)
+static double eval(const struct phase *p, vec3 at, double cosine)
 {
-	(void)p;
+	(void)p, (void)at;
 	return 3 / (16 * M_PI) * (1 + cosine * cosine);
 }
 
-static double sample(const struct phase *p, double u)
+static double sample(const struct phase *p, vec3 at, double u)
 {
-	(void)p;
+	(void)p, (void)at;
 	return 2 * sinh(asinh(4 * u - 2) / 3);
 }
 

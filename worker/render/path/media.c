@@ -285,5 +285,5 @@ spectrum path_scatter_in_medium(const struct world *w, const struct wavelengths 
 				vec3 wo, vec3 wi)
 {
 	const struct medium *m = path_medium(w, v->edge.medium);
-	return spectrum_scale(phase_eval(&m->phase, wo, wi), medium_scattering(m, v->x.p, wl));
+	return spectrum_scale(phase_eval(&m->phase, v->x.p, wo, wi), medium_scattering(m, v->x.p, wl));
 }

@@ -111,8 +111,9 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 	} else {
 		double unused;
 		vec3 back = path_direction(at, prev, &unused);
-		solid = at->kind == VERTEX_MEDIUM ? phase_eval(&path_medium(c->w, at->edge.medium)->phase, back, omega)
-						  : surface_pdf(c, at, back, omega, transport);
+		solid = at->kind == VERTEX_MEDIUM
+				? phase_eval(&path_medium(c->w, at->edge.medium)->phase, at->x.p, back, omega)
+				: surface_pdf(c, at, back, omega, transport);
 	}
 	return next->kind == VERTEX_INFINITE ? solid : solid * path_jac_solid_from_vertex(next, omega, distance2);
 }
@@ -148,24 +149,23 @@ struct departure {
 	bool delta;
 };
 
-static void depart_in_medium(const struct path_context *c, const struct path_vertex *v, const double u[2],
+static bool depart_in_medium(const struct path_context *c, const struct path_vertex *v, const double u[2],
 			     struct departure *out)
 {
 	const struct medium *m = path_medium(c->w, v->edge.medium);
 	*out = (struct departure){.eta = 1};
-	out->wi = phase_sample(&m->phase, v->to_prev, u, &out->pdf);
+	out->wi = phase_sample(&m->phase, v->x.p, v->to_prev, u, &out->pdf);
 	out->pdf_rev = out->pdf;
 	out->beta = spectrum_mul(v->beta, medium_scattering(m, v->x.p, &c->wl));
+	return out->pdf > 0;
 }
 
 static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
 		   enum transport transport, struct departure *out)
 {
 	struct surface_point turned;
-	if (v->kind == VERTEX_MEDIUM) {
-		depart_in_medium(c, v, u, out);
-		return true;
-	}
+	if (v->kind == VERTEX_MEDIUM)
+		return depart_in_medium(c, v, u, out);
 	const struct surface_point *x = sampled_at(v, v->to_prev, transport, &turned);
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
 	struct bsdf_sample s;

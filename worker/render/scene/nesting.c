@@ -6,7 +6,7 @@
 int nesting_take(struct xml_nesting *owner, enum plugin_class cls, const struct xml_element *el,
 		 const struct xml_element *taken, bool once, struct error *e)
 {
-	bool evaluated = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE;
+	bool evaluated = cls == PLUGIN_BSDF || cls == PLUGIN_TEXTURE || cls == PLUGIN_PHASE;
 	uint64_t limit = evaluated ? NESTING_PARTS_MAX : NESTING_OBJECTS_MAX;
 	/* Cannot overflow: the operand is within the limit, too. */
 	uint64_t objects = owner->objects + (once ? 0 : taken->nesting.objects);

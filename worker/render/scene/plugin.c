@@ -105,12 +105,9 @@ static const struct {
 	{PLUGIN_FILM, "specfilm"},
 	{PLUGIN_MEDIUM, "heterogeneous"},
 	{PLUGIN_MEDIUM, "homogeneous"},
-	{PLUGIN_PHASE, "blendphase"},
 	{PLUGIN_PHASE, "kkay"},
 	{PLUGIN_PHASE, "microflake"},
-	{PLUGIN_PHASE, "mixturephase"},
 	{PLUGIN_PHASE, "sggx"},
-	{PLUGIN_PHASE, "tabphase"},
 	{PLUGIN_VOLUME, "hgridvolume"},
 	{PLUGIN_VOLUME, "volcache"},
 };

@@ -263,8 +263,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return r;
 	if (p)
 		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
-	bool many = d->node->cls == cls &&
-		    (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR || cls == PLUGIN_INTEGRATOR);
+	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR ||
+					    cls == PLUGIN_INTEGRATOR || cls == PLUGIN_PHASE);
 	if (!many && node_child(d->node, cls, 0))
 		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">, which may have one",
 				 plugin_class_name(cls), owner->name, d->node->type);

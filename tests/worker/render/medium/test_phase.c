@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Every phase function of the list, over its range of parameters: the integral over the sphere is 1 and that of the
- * cosine g (0 for Rayleigh's), by quadrature; the cosine drawn for a number is where the distribution function, again
- * by quadrature, has that number; directions lie at that angle to the one that light came in, all around it, and have
- * the density that they claim.
+ * cosine g (0 for Rayleigh's; of a table by Simpson's rule, which is exact there; of several their mean), by
+ * quadrature; the cosine drawn for a number is where the distribution function, again by quadrature, has that number;
+ * directions lie at that angle to the one that light came in, all around it, and have the density that they claim.
+ *
+ * Of several functions, for equidistant numbers: the share of cosines below each of some bounds is the distribution
+ * function there, but for one number in each part.
  */
 #include "worker/render/medium/phase.h"
 #include "worker/render/math/frame.h"
@@ -19,11 +22,13 @@
 static const double gs[] = {-0.999, -0.9, -0.3, -1e-9, 0, 1e-9, 0.5, 0.8, 0.999};
 enum { GS = sizeof gs / sizeof *gs };
 
+static const vec3 nowhere = {0, 0, 0};
+
 typedef double integrand(const struct phase *p, double cosine);
 
 static double density(const struct phase *p, double cosine)
 {
-	return 2 * M_PI * p->ops->eval(p, cosine);
+	return 2 * M_PI * p->ops->eval(p, nowhere, cosine);
 }
 
 static double density_times_cosine(const struct phase *p, double cosine)
@@ -50,47 +55,182 @@ static void check_directions(const struct phase *p)
 	struct frame straight = frame_around(vec3_neg(wo));
 	for (int i = 0; i < NUMBERS; i++) {
 		vec3 sum = {0, 0, 0};
-		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, u), pdf;
+		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, nowhere, u), pdf;
 		for (int k = 0; k < NUMBERS; k++) {
 			const double numbers[] = {u, (k + 0.5) / NUMBERS};
-			vec3 wi = phase_sample(p, wo, numbers, &pdf), local = frame_to_local(&straight, wi);
+			vec3 wi = phase_sample(p, nowhere, wo, numbers, &pdf), local = frame_to_local(&straight, wi);
 			assert_true(fabs(vec3_length(wi) - 1) < 1e-12);
 			assert_true(fabs(local.z - cosine) < 1e-12);
 			sum = vec3_madd(sum, 1, local);
 			/* of a cosine that is rounded, near 1 */
-			assert_true(fabs(phase_eval(p, wo, wi) / pdf - 1) < 1e-8);
-			assert_true(phase_eval(p, wi, wo) == phase_eval(p, wo, wi));
+			assert_true(fabs(phase_eval(p, nowhere, wo, wi) / pdf - 1) < 1e-8);
+			assert_true(phase_eval(p, nowhere, wi, wo) == phase_eval(p, nowhere, wo, wi));
 		}
 		assert_true(fabs(sum.x) + fabs(sum.y) < 1e-9);
 	}
 }
 
-static void check(const struct phase *p, double mean)
+static void check_share(const struct phase *p, double bound, unsigned parts)
+{
+	enum { NUMBERS = 1 << 12 };
+	unsigned below = 0;
+	for (int i = 0; i < NUMBERS; i++)
+		below += p->ops->sample(p, nowhere, (i + 0.5) / NUMBERS) < bound;
+	assert_true(fabs(integral(p, density, bound) - (double)below / NUMBERS) < 1e-6 + (double)parts / NUMBERS);
+}
+
+/* parts: between which u chooses first; 0: there are none. */
+static void check(const struct phase *p, double mean, unsigned parts)
 {
 	enum { NUMBERS = 20 };
 	assert_true(fabs(integral(p, density, 1) - 1) < 1e-6);
 	assert_true(fabs(integral(p, density_times_cosine, 1) - mean) < 1e-6);
 	for (int i = 0; i < NUMBERS; i++) {
-		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, u);
+		double u = (i + 0.5) / NUMBERS, cosine = p->ops->sample(p, nowhere, u);
 		assert_true(cosine >= -1 && cosine <= 1);
-		assert_true(fabs(integral(p, density, cosine) - u) < 1e-6);
+		if (parts)
+			check_share(p, 2 * u - 1, parts);
+		else
+			assert_true(fabs(integral(p, density, cosine) - u) < 1e-6);
 	}
 	for (int end = -1; end <= 1; end += 2)
-		assert_true(isfinite(p->ops->eval(p, end)) && p->ops->eval(p, end) > 0);
+		assert_true(isfinite(p->ops->eval(p, nowhere, end)) && p->ops->eval(p, nowhere, end) >= 0);
 	/* terms of 1 cancel down to (1 - g)^2 on the side without the peak */
-	assert_true(fabs(p->ops->sample(p, 0)) <= 1 + 1e-9 && fabs(p->ops->sample(p, 1 - 0x1p-53)) <= 1 + 1e-9);
+	assert_true(fabs(p->ops->sample(p, nowhere, 0)) <= 1 + 1e-9 &&
+		    fabs(p->ops->sample(p, nowhere, 1 - 0x1p-53)) <= 1 + 1e-9);
 	check_directions(p);
 }
 
-static void test_phases(void **state)
+/* ---- the list ---- */
+
+static void make(struct phase *p, const struct scene_node *n)
+{
+	static struct arena arena;
+	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .scale = 1};
+	struct error e;
+	if (phase_create(p, n, &build, &e))
+		fail_msg("%s", e.text);
+}
+
+/* Of one property, and of functions inside. */
+#define NODE(name_of_type, ...)                                        \
+	(struct scene_node)                                            \
+	{                                                              \
+		.cls = PLUGIN_PHASE, .type = name_of_type, __VA_ARGS__ \
+	}
+#define WITH(...)                                                    \
+	.property_count = 1, .properties = (const struct property[]) \
+	{                                                            \
+		__VA_ARGS__                                          \
+	}
+#define NUMBER(name, x) WITH({name, 1, {.type = VALUE_FLOAT, .as.number = x}})
+#define TEXT(name, x) WITH({name, 1, {.type = VALUE_STRING, .as.string = x}})
+#define INSIDE(count, ...)                                                   \
+	.child_count = count, .children = (const struct scene_node *const[]) \
+	{                                                                    \
+		__VA_ARGS__                                                  \
+	}
+
+static void test_simple(void **state)
 {
 	(void)state;
-	for (size_t i = 0; phase_registry[i]; i++)
-		for (int k = 0; k < GS; k++) {
-			bool takes_g = phase_registry[i]->decl.params->name != NULL;
-			struct phase p = {phase_registry[i], takes_g ? gs[k] : 0};
-			check(&p, p.g);
-		}
+	struct phase p;
+	make(&p, &NODE("isotropic"));
+	check(&p, 0, 0);
+	make(&p, &NODE("rayleigh"));
+	check(&p, 0, 0);
+	for (int k = 0; k < GS; k++) {
+		make(&p, &NODE("hg", NUMBER("g", gs[k])));
+		check(&p, gs[k], 0);
+	}
+}
+
+/* Of values at equal distances. */
+static double mean_of_table(const double *value, int count)
+{
+	double h = 2.0 / (count - 1), sum = 0, moment = 0;
+	for (int i = 0; i + 1 < count; i++) {
+		double from = -1 + i * h, middle = from + h / 2, between = (value[i] + value[i + 1]) / 2;
+		sum += between;
+		moment += (from * value[i] + 4 * middle * between + (from + h) * value[i + 1]) / 6;
+	}
+	return moment / sum;
+}
+
+static void test_tables(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		double value[5];
+		int count;
+	} tables[] = {{"1,1", {1, 1}, 2},
+		      {"0 1", {0, 1}, 2},
+		      {"3, 0", {3, 0}, 2},
+		      {"2,5,.25,1e-9,7", {2, 5, 0.25, 1e-9, 7}, 5},
+		      {"0,0,1e-20,3e-20,0", {0, 0, 1, 3, 0}, 5},
+		      {"1e30,0,0,0,1e30", {1, 0, 0, 0, 1}, 5}};
+	struct phase p;
+	for (size_t i = 0; i < sizeof tables / sizeof *tables; i++) {
+		make(&p, &NODE("tabphase", TEXT("values", tables[i].text)));
+		check(&p, mean_of_table(tables[i].value, tables[i].count), 0);
+	}
+	/* Where they are: 1 is forwards. */
+	make(&p, &NODE("tabphase", TEXT("values", "1,2,5")));
+	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, -1}, (vec3){0, 0, 1}) * 2 * M_PI - 1) < 1e-15);
+	assert_true(fabs(phase_eval(&p, nowhere, (vec3){0, 0, 1}, (vec3){0, 0, 1}) * 2 * M_PI - 0.2) < 1e-15);
+	assert_true(fabs(p.ops->eval(&p, nowhere, -0.5) * 2 * M_PI - 0.3) < 1e-15);
+}
+
+/* Henyey and Greenstein's function by a fine table. */
+static void test_fine_table(void **state)
+{
+	(void)state;
+	enum { VALUES = 4097 };
+	static char text[VALUES * 26];
+	size_t length = 0;
+	struct phase hg, table;
+	make(&hg, &NODE("hg", NUMBER("g", 0.6)));
+	for (int i = 0; i < VALUES; i++)
+		length += (size_t)snprintf(text + length, sizeof text - length, "%.17g ",
+					   hg.ops->eval(&hg, nowhere, -1 + i * (2.0 / (VALUES - 1))));
+	make(&table, &NODE("tabphase", TEXT("values", text)));
+	for (int i = 0; i < 1000; i++) {
+		double u = (i + 0.5) / 1000, cosine = 2 * u - 1;
+		double wanted = hg.ops->eval(&hg, nowhere, cosine), drawn = hg.ops->sample(&hg, nowhere, u);
+		/* An eighth of the squared width, times the second derivative over the value: 211 at most. */
+		assert_true(fabs(table.ops->eval(&table, nowhere, cosine) / wanted - 1) < 8e-6);
+		assert_true(fabs(table.ops->sample(&table, nowhere, u) - drawn) < 2e-6);
+	}
+}
+
+static void test_parts(void **state)
+{
+	(void)state;
+	struct phase p;
+	const struct scene_node forwards = NODE("hg", NUMBER("g", 0.8)), backwards = NODE("hg", NUMBER("g", -0.5)),
+				table = NODE("tabphase", TEXT("values", "0,1,0")), even = NODE("isotropic");
+	for (int k = 0; k <= 4; k++) {
+		make(&p, &NODE("blendphase", NUMBER("weight", k / 4.0), INSIDE(2, &forwards, &backwards)));
+		check(&p, 0.8 * (1 - k / 4.0) - 0.5 * k / 4.0, 2);
+		assert_true(p.absorbed == 0);
+	}
+	const struct scene_node blend = NODE("blendphase", INSIDE(2, &forwards, &table));
+	make(&p, &blend);
+	check(&p, 0.4, 2);
+	static const struct {
+		const char *weights;
+		double mean, absorbed;
+	} mixtures[] = {{".1,.2,.7", 0.7 * 0.4 - 0.1 * 0.5, 0},
+			{"0,.1,.4", 0.8 * 0.4, 0.5},
+			{".25,.25 0", -0.25, 0.5},
+			{"1,1,2", 0.5 * 0.4 - 0.25 * 0.5, 0}};
+	for (size_t i = 0; i < sizeof mixtures / sizeof *mixtures; i++) {
+		make(&p,
+		     &NODE("mixturephase", TEXT("weights", mixtures[i].weights), INSIDE(3, &backwards, &even, &blend)));
+		check(&p, mixtures[i].mean, 4);
+		assert_true(fabs(p.absorbed - mixtures[i].absorbed) < 1e-15);
+	}
 }
 
 /* Of a node that says nothing, and of none. */
@@ -98,20 +238,20 @@ static void test_defaults(void **state)
 {
 	(void)state;
 	struct phase p;
-	phase_create(&p, NULL);
+	make(&p, NULL);
 	assert_string_equal(p.ops->decl.type, "isotropic");
-	phase_create(&p, &(struct scene_node){.cls = PLUGIN_PHASE, .type = "hg"});
+	make(&p, &NODE("hg"));
 	assert_string_equal(p.ops->decl.type, "hg");
 	assert_true(p.g == 0.8);
-	phase_create(&p, &(struct scene_node){.cls = PLUGIN_PHASE, .type = "rayleigh"});
-	assert_true(fabs(p.ops->eval(&p, 1) / p.ops->eval(&p, 0) - 2) < 1e-15);
+	make(&p, &NODE("rayleigh"));
+	assert_true(fabs(p.ops->eval(&p, nowhere, 1) / p.ops->eval(&p, nowhere, 0) - 2) < 1e-15);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_phases),
-		cmocka_unit_test(test_defaults),
+		cmocka_unit_test(test_simple), cmocka_unit_test(test_tables),	cmocka_unit_test(test_fine_table),
+		cmocka_unit_test(test_parts),  cmocka_unit_test(test_defaults),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -347,15 +347,22 @@ static void test_beam_in_layer(void **state)
 	static const char even[] = BEAM_IN(LAYER("1", "0.6", "<phase type='rayleigh'/>")),
 			  layered[] =
 				  BEAM_IN(LAYER_OF("heterogeneous", "1", STRATA, "0.6", "<phase type='rayleigh'/>"));
+	/* Light goes on by -0.6; there the table has 1.2 / (6 * 2 pi). */
+	static const char mixed[] = BEAM_IN(
+		LAYER("1", "0.6",
+		      "<phase type='mixturephase'><string name='weights' value='.2,.5'/><phase type='rayleigh'/><phase "
+		      "type='tabphase'><string name='values' value='0,3,6'/></phase></phase>"));
 	static struct vol grid;
 	vol_make(&grid, (const uint32_t[3]){1, 1, 4}, 1, strata);
 	double cosine = 0.6, along = 1 + 1 / cosine, phase = 3 / (16 * M_PI) * (1 + cosine * cosine);
-	for (int i = 0; i < 2; i++) {
-		const struct memory_file files[] = {{"beam.xml", i ? layered : even, strlen(i ? layered : even)},
-						    {"strata.vol", grid.bytes, grid.size},
-						    {NULL, NULL, 0}};
-		check_depths(i ? "beam in strata" : "beam in a layer", world_of_files(16, 16, files), 2,
-			     5 * 0.6 * phase * (1 - exp(-2 * along)) / along, (struct effort){512, 512, 0});
+	for (int i = 0; i < 3; i++) {
+		const char *xml = i == 0 ? even : i == 1 ? layered : mixed;
+		double value = i == 2 ? 0.2 * phase + 0.5 * 1.2 / (6 * 2 * M_PI) : phase;
+		const struct memory_file files[] = {
+			{"beam.xml", xml, strlen(xml)}, {"strata.vol", grid.bytes, grid.size}, {NULL, NULL, 0}};
+		static const char *const names[] = {"beam in a layer", "beam in strata", "beam in a mixture"};
+		check_depths(names[i], world_of_files(16, 16, files), 2,
+			     5 * 0.6 * value * (1 - exp(-2 * along)) / along, (struct effort){512, 512, 0});
 	}
 }
 

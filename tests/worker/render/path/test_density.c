@@ -225,6 +225,33 @@ static double puffs(double x, double y, double z, uint32_t channel)
 	return 0.5 + 0.5 * sin(3 * x + channel) * cos(2 * y - channel) * sin(1 + 5 * z);
 }
 
+/* More forwards here than there, with a table that is 0 straight on. */
+static void test_blended_fog(void **state)
+{
+	(void)state;
+	static struct vol grid;
+	vol_make(&grid, (const uint32_t[3]){4, 3, 5}, 1, puffs);
+	/* clang-format off */
+	check_fog("fog of two phase functions",
+		"<medium type='homogeneous' id='fog'>"
+			"<rgb name='sigma_t' value='.2,.5,.9'/>"
+			"<rgb name='albedo' value='.9,.8,.7'/>"
+			"<phase type='blendphase'>"
+				"<phase name='phase_0' type='hg'><float name='g' value='.5'/></phase>"
+				"<phase name='phase_1' type='tabphase'><string name='values' value='3,1,2,0'/></phase>"
+				"<volume type='gridvolume' name='weight'>"
+					"<string name='filename' value='fog.vol'/>"
+					"<transform name='to_world'>"
+						"<translate x='-.5' y='-.5' z='-.5'/>"
+						"<scale value='4'/>"
+					"</transform>"
+				"</volume>"
+			"</phase>"
+		"</medium>",
+		&grid, 4000);
+	/* clang-format on */
+}
+
 /* Denser here than there, of one colour and of three, in a box that does not fill the room. */
 static void test_puffs(void **state)
 {
@@ -328,6 +355,7 @@ int main(void)
 		cmocka_unit_test(test_diffuse_and_rough),
 		cmocka_unit_test(test_specular),
 		cmocka_unit_test(test_infinity),
+		cmocka_unit_test(test_blended_fog),
 		cmocka_unit_test(test_fog),
 		cmocka_unit_test(test_puffs),
 		cmocka_unit_test(test_lens),

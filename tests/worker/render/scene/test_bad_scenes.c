@@ -169,7 +169,7 @@ static void test_unknown_names(void **state)
 		"homogeneous, heterogeneous)");
 	refuses(S "<medium type='homogeneous'>\n<phase type='sggx'/></medium>" END,
 		"s.xml:2: <phase type=\"sggx\">: this phase of Mitsuba's is not supported; --lenient uses `isotropic` "
-		"instead (supported: isotropic, hg, rayleigh)");
+		"instead (supported: isotropic, hg, rayleigh, blendphase, mixturephase, tabphase)");
 	refuses(S "<medium type='homogeneous'>\n<volume type='volcache' name='albedo'/></medium>" END,
 		"s.xml:2: <volume type=\"volcache\">: this volume of Mitsuba's is not supported; --lenient leaves it out "
 		"(supported: constvolume, gridvolume)");

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Any number of phase functions by fixed weights; what these leave of 1 is absorbed, and they are scaled if they exceed
+ * it.
+ *
+ * Failures: not as many weights as phase functions; negative ones; all 0.
+ */
+#include "worker/render/medium/phase_parts.h"
+#include "worker/render/scene/number.h"
+
+#include <float.h>
+
+static const struct param params[] = {
+	{"weights", UNDERSTOOD(VALUE_STRING)},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+static int create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
+{
+	struct phase_parts *m;
+	int rc = phase_parts_create(p, &m, n, build, e);
+	if (rc)
+		return rc;
+	const char *text = node_string(n, "weights", "");
+	double sum = 0;
+	if (number_list(text, m->weight, PHASE_PARTS_MAX) != (int)m->count)
+		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weights, one for each phase function", text,
+				  m->count);
+	for (uint32_t k = 0; k < m->count; k++) {
+		if (!(m->weight[k] >= 0 && m->weight[k] <= 1e6))
+			return node_error(n, e, ERANGE, "weights=\"%s\": must be within [0, 1e6]", text);
+		sum += m->weight[k];
+	}
+	if (!(sum > 0))
+		return node_error(n, e, EINVAL, "weights=\"%s\": all are 0", text);
+	for (uint32_t k = 0; k < m->count; k++)
+		m->weight[k] /= sum;
+	p->absorbed = 1 - sum > m->count * DBL_EPSILON ? 1 - sum : 0; /* not for rounding errors */
+	return 0;
+}
+
+const struct phase_ops phase_ops_mixturephase = {
+	.decl = {PLUGIN_PHASE, "mixturephase", params, 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
+	.create = create,
+	.eval = phase_parts_eval,
+	.sample = phase_parts_sample,
+};

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/medium/phase_parts.h"
+
+#include <math.h>
+
+int phase_parts_create(struct phase *p, struct phase_parts **parts, const struct scene_node *n,
+		       const struct volume_build *build, struct error *e)
+{
+	uint32_t count = 0;
+	while (node_child(n, PLUGIN_PHASE, count))
+		if (count++ == PHASE_PARTS_MAX)
+			return node_error(n, e, ERANGE, "more than %d phase functions inside", PHASE_PARTS_MAX);
+	if (count == 0)
+		return node_error(n, e, EINVAL, "needs phase functions inside");
+	struct phase_parts *made = arena_alloc(build->arena, 1, sizeof *made);
+	if (!made)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*made = (struct phase_parts){.count = count};
+	for (uint32_t k = 0; k < count; k++) {
+		const struct scene_node *inner = node_child(n, PLUGIN_PHASE, k);
+		int rc = phase_create(&made->part[k], inner, build, e);
+		if (!rc && made->part[k].absorbed > 0)
+			rc = node_error(inner, e, ENOTSUP,
+					"its weights must add up to 1 inside of another phase function");
+		if (rc)
+			return rc;
+	}
+	p->data = *parts = made;
+	return 0;
+}
+
+/* Of the parts at a place; those that are fixed, or `room`. */
+static const double *weights_at(const struct phase_parts *m, vec3 at, double room[2])
+{
+	double value[GRID_CHANNELS_MAX];
+	if (!m->second)
+		return m->weight;
+	grid_at(m->second, at, value);
+	room[1] = fmin(fmax(value[0], 0), 1); /* interpolated values may exceed 1 by a rounding error */
+	room[0] = 1 - room[1];
+	return room;
+}
+
+double phase_parts_eval(const struct phase *p, vec3 at, double cosine)
+{
+	const struct phase_parts *m = p->data;
+	double room[2], sum = 0;
+	const double *weight = weights_at(m, at, room);
+	for (uint32_t k = 0; k < m->count; k++)
+		sum += weight[k] * m->part[k].ops->eval(&m->part[k], at, cosine);
+	return sum;
+}
+
+/* u chooses the part, and what is left of it is the number for that part. */
+double phase_parts_sample(const struct phase *p, vec3 at, double u)
+{
+	const struct phase_parts *m = p->data;
+	double room[2];
+	const double *weight = weights_at(m, at, room);
+	uint32_t k = 0, last = m->count - 1;
+	while (last > 0 && !(weight[last] > 0)) /* rounding may leave u without a part: never one of weight 0 */
+		last--;
+	while (k < last && u >= weight[k])
+		u -= weight[k++];
+	return m->part[k].ops->sample(&m->part[k], at, fmin(u / weight[k], 1 - 0x1p-53));
+}

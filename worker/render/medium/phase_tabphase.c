@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A table of values at cosines with equal distances from -1 to 1, linear in between and scaled to an integral of 1. Its
+ * distribution function is the sum of the intervals before and, in one of values a and b and width h,
+ * h (a t + (b - a) t^2 / 2), a quadratic equation for t in [0,1], solved without cancellation.
+ *
+ * Failures: fewer than two values, or more than TABLE_MOST; negative ones; all 0.
+ */
+#include "worker/render/math/search.h"
+#include "worker/render/medium/phase.h"
+#include "worker/render/scene/number.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { TABLE_MOST = 1 << 16 };
+#define LARGEST 1e30
+
+static const struct param params[] = {
+	{"values", UNDERSTOOD(VALUE_STRING)},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+struct table {
+	uint32_t intervals;
+	double width;	 /* of each, as a cosine */
+	double *density; /* per cosine, at the ends of intervals */
+	double *before;	 /* the distribution function there */
+};
+
+/* value[i]: of `count` numbers, some of them above 0. */
+static void make_table(struct table *t, const double *value, uint32_t count)
+{
+	double most = 0, sum = 0;
+	for (uint32_t i = 0; i < count; i++)
+		most = fmax(most, value[i]);
+	t->intervals = count - 1;
+	t->width = 2.0 / t->intervals;
+	for (uint32_t i = 0; i < count; i++) {
+		t->density[i] = value[i] / most;
+		sum += i > 0 ? t->width * (t->density[i - 1] + t->density[i]) / 2 : 0;
+		t->before[i] = sum;
+	}
+	for (uint32_t i = 0; i < count; i++) {
+		t->density[i] /= sum;
+		t->before[i] /= sum;
+	}
+}
+
+static int read_values(const struct scene_node *n, double *value, uint32_t *count, size_t most, struct error *e)
+{
+	double largest = 0;
+	int found = number_list(node_string(n, "values", ""), value, most);
+	if (found < 2)
+		return node_error(n, e, EINVAL, "values: needs a list of 2 to %d numbers", TABLE_MOST);
+	for (int i = 0; i < found; i++) {
+		if (!(value[i] >= 0 && value[i] <= LARGEST))
+			return node_error(n, e, ERANGE, "values: %g is outside [0, %g]", value[i], LARGEST);
+		largest = fmax(largest, value[i]);
+	}
+	*count = (uint32_t)found;
+	return largest > 0 ? 0 : node_error(n, e, EINVAL, "values: all are 0");
+}
+
+static int create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
+{
+	size_t length = strlen(node_string(n, "values", "")), most = length / 2 + 1; /* a digit and what separates */
+	most = most < TABLE_MOST ? most : TABLE_MOST;
+	struct table *t = arena_alloc(build->arena, 1, sizeof *t);
+	double *room = arena_alloc(build->arena, most, 3 * sizeof *room);
+	uint32_t count = 0;
+	if (!t || !room)
+		return node_error(n, e, ENOMEM, "out of memory");
+	int rc = read_values(n, room, &count, most, e);
+	if (rc)
+		return rc;
+	*t = (struct table){.density = room + count, .before = room + 2 * count};
+	make_table(t, room, count);
+	p->data = t;
+	return 0;
+}
+
+static double eval(const struct phase *p, vec3 at, double cosine)
+{
+	(void)at;
+	const struct table *t = p->data;
+	double place = fmin(fmax((cosine + 1) / t->width, 0), t->intervals);
+	uint32_t i = place < t->intervals ? (uint32_t)place : t->intervals - 1;
+	double along = place - i;
+	return ((1 - along) * t->density[i] + along * t->density[i + 1]) / (2 * M_PI);
+}
+
+static double sample(const struct phase *p, vec3 at, double u)
+{
+	(void)at;
+	const struct table *t = p->data;
+	uint32_t i = search_cell(t->before, t->intervals, u);
+	double a = t->density[i], b = t->density[i + 1], rest = (u - t->before[i]) / t->width;
+	double root = sqrt(fmax(a * a + 2 * (b - a) * rest, 0));
+	return -1 + t->width * (i + (a + root > 0 ? fmin(2 * rest / (a + root), 1) : 0));
+}
+
+const struct phase_ops phase_ops_tabphase = {
+	.decl = {PLUGIN_PHASE, "tabphase", params, 0, PARAM_UNDERSTOOD},
+	.create = create,
+	.eval = eval,
+	.sample = sample,
+};
