@@ -103,7 +103,7 @@ static int child(const struct memory_file *files)
 	world_summary(w, &summary);
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct render_integrator *integrator = render_integrator_at(i);
-		bool refuses = (integrator->from_camera && summary.beams) ||
+		bool refuses = (integrator->from_camera ? summary.beams : summary.rolls) ||
 			       (integrator->to_emitters && render_effect_on(&summary, "medium-light"));
 		if (!refuses && render(w, &summary, integrator, &e))
 			return end_with(TRIAL_FAILED, e.text);

@@ -234,6 +234,8 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 			p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
 	if (i->face.from_camera && world_has_beam(w))
 		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->face.name);
+	if (!i->face.from_camera && world_rolls(w))
+		return error_set(e, EINVAL, RENDER_NO_ROLL, i->face.name);
 	if (i->face.to_emitters && w->effects.medium_light)
 		return error_set(e, EINVAL, RENDER_NO_GLOW, i->face.name);
 	struct mixture unused;

@@ -388,6 +388,19 @@ static int check(void *target, struct error *e)
 
 const struct option_table render_table = {groups, check};
 
+/* Whether it renders what the scene has. open: it is not settled yet. */
+static int check_finds(const struct render_integrator *i, const struct render_summary *summary, bool open,
+		       struct error *e)
+{
+	if (i->from_camera && summary->beams)
+		return error_set(e, EINVAL, RENDER_NO_BEAMS, i->name);
+	if (!i->from_camera && summary->rolls)
+		return error_set(e, EINVAL, RENDER_NO_ROLL, i->name);
+	if (i->to_emitters && !open && render_effect_on(summary, "medium-light"))
+		return error_set(e, EINVAL, RENDER_NO_GLOW, i->name);
+	return 0;
+}
+
 int render_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
 {
 	struct plan_request *p = &a->plan;
@@ -396,12 +409,15 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	if (open)
 		text_copy(p->integrator, sizeof p->integrator,
 			  chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
+	if (open && !chains && summary->rolls) { /* nothing is left to choose */
+		text_copy(p->integrator, sizeof p->integrator, "path");
+		open = false;
+	}
 	const struct render_integrator *integrator =
 		render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
-	if (integrator->from_camera && summary->beams)
-		return error_set(e, EINVAL, RENDER_NO_BEAMS, integrator->name);
-	if (integrator->to_emitters && (!open || chains) && render_effect_on(summary, "medium-light"))
-		return error_set(e, EINVAL, RENDER_NO_GLOW, integrator->name);
+	int rc = check_finds(integrator, summary, open && !chains, e);
+	if (rc)
+		return rc;
 	p->kind = integrator->kind;
 	p->width = s->width;
 	p->height = s->height;

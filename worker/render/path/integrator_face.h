@@ -10,13 +10,18 @@ struct render_integrator {
 	enum plan_kind kind;
 	uint32_t max_depth; /* edges its state holds */
 	bool has_mutations; /* its chains draw proposals from a mixture of strategies */
-	bool from_camera;   /* it has no light sub-paths: no light of beams */
+	bool from_camera;   /* it has no light sub-paths: no light of beams, and only it knows when a shutter rolls */
 	bool to_emitters;   /* its paths end on emitters: no light of media */
 };
 /* What is said where one that is from_camera, by name, meets a beam. */
 #define RENDER_NO_BEAMS                                                                                                \
 	"the integrator %s finds no light of `collimated`, a beam without width: paths must begin there, as those of " \
 	"bdpt, erpt, pssmlt and hslt do"
+
+/* And one that is not, a rolling shutter. */
+#define RENDER_NO_ROLL                                                                                                \
+	"the integrator %s cannot render a rolling shutter while something moves: the time of a path depends on its " \
+	"place on the film, which only path draws first"
 
 /* And one that is to_emitters, a medium that shines. */
 #define RENDER_NO_GLOW                                                                                            \

@@ -272,6 +272,21 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 	}
 }
 
+/* Of the sub-paths, for u in [0,1). A rolling shutter exposes a line for a share of the time, the first from the
+ * beginning on and the last up to the end; points beyond the film's edge belong to the line there. */
+static double time_of(const struct world *w, const double film[2], double u)
+{
+	const struct scene_settings *s = &w->settings;
+	if (s->roll == ROLL_NONE)
+		return u;
+	bool rows = s->roll == ROLL_TOP || s->roll == ROLL_BOTTOM;
+	double line = rows ? film[1] / w->camera.height : film[0] / w->camera.width;
+	line = fmin(fmax(line, 0), 1);
+	if (s->roll == ROLL_BOTTOM || s->roll == ROLL_RIGHT)
+		line = 1 - line;
+	return fmin((1 - s->roll_exposure) * line + s->roll_exposure * u, 1 - 0x1p-53);
+}
+
 unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2])
 {
 	const struct world *w = c->w;
@@ -280,7 +295,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	film[0] = c->window.x + u[DIM_FILM_X] * c->window.width;
 	film[1] = c->window.y + u[DIM_FILM_Y] * c->window.height;
 	c->wl = world_wavelengths(w, u[DIM_WAVELENGTH]);
-	c->time = EFFECT_IS_ON(w, motion) ? s->block(s, SIDE_LIGHT, 0)[DIM_TIME] : 0;
+	c->time = EFFECT_IS_ON(w, motion) ? time_of(w, film, s->block(s, SIDE_LIGHT, 0)[DIM_TIME]) : 0;
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};
 	v[0].x.prim = prim_none_at(c->time);
 	struct camera room;

@@ -121,9 +121,21 @@ static int on_metal(struct report *r, const struct scene_node *n, struct error *
 	return 0;
 }
 
+/* Where the shutter is open for some time. */
+static int on_sensor(struct report *r, const struct scene_node *n, struct error *e)
+{
+	if (strcmp(node_string(n, "rolling_shutter_type", "none"), "none") == 0 ||
+	    !(node_float(n, "shutter_open", 0) < node_float(n, "shutter_close", 0)))
+		return 0;
+	return remark(
+		r, n, e,
+		"lines of the film are exposed one after the other, each for rolling_shutter_duration, as Blender "
+		"does by these names; it was not compared with Mitsuba");
+}
+
 int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e)
 {
-	return n->cls == PLUGIN_BSDF ? on_metal(r, n, e) : 0;
+	return n->cls == PLUGIN_BSDF ? on_metal(r, n, e) : n->cls == PLUGIN_SENSOR ? on_sensor(r, n, e) : 0;
 }
 
 int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,

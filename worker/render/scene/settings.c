@@ -26,10 +26,10 @@ enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
 
-/* Times, if something moves. */
+/* Times, if something moves. The duration matters with a rolling shutter only, and is checked there. */
 #define SHUTTER_PARAMS                                                                                         \
 	{"shutter_open", RANGE(VALUE_FLOAT, -1e30, 1e30)}, {"shutter_close", RANGE(VALUE_FLOAT, -1e30, 1e30)}, \
-		{"rolling_shutter_type", UNDERSTOOD(VALUE_STRING)},                                            \
+		{"rolling_shutter_type", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "none|top|bottom|left|right"},  \
 	{                                                                                                      \
 		"rolling_shutter_duration", RANGE(VALUE_FLOAT, -1e30, 1e30)                                    \
 	}
@@ -378,6 +378,28 @@ static int read_place(const struct scene_node *sensor, struct scene_settings *ou
 				    "to_world may only rotate, translate, mirror and scale a camera");
 }
 
+static int read_roll(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	static const char *const types[] = {[ROLL_NONE] = "none",
+					    [ROLL_TOP] = "top",
+					    [ROLL_BOTTOM] = "bottom",
+					    [ROLL_LEFT] = "left",
+					    [ROLL_RIGHT] = "right"};
+	const char *type = node_string(sensor, "rolling_shutter_type", types[ROLL_NONE]);
+	out->roll = ROLL_NONE;
+	while (strcmp(types[out->roll], type) != 0)
+		out->roll++;
+	if (out->roll == ROLL_NONE)
+		return 0;
+	if (!node_find(sensor, "rolling_shutter_duration"))
+		return node_error(sensor, e, EINVAL, "a rolling shutter needs a rolling_shutter_duration");
+	out->roll_exposure = node_float(sensor, "rolling_shutter_duration", 0);
+	return out->roll_exposure >= 0 && out->roll_exposure <= 1
+		       ? 0
+		       : node_error(sensor, e, ERANGE, "rolling_shutter_duration=%g is outside [0, 1]",
+				    out->roll_exposure);
+}
+
 static int read_camera(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	out->principal_x = node_float(sensor, "principal_point_offset_x", 0);
@@ -386,11 +408,12 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	out->far_clip = node_float(sensor, "far_clip", 1e4);
 	out->shutter_open = node_float(sensor, "shutter_open", 0);
 	out->shutter_close = node_float(sensor, "shutter_close", 0);
-	out->rolling_shutter = strcmp(node_string(sensor, "rolling_shutter_type", "none"), "none") != 0;
 	if (!(out->shutter_open <= out->shutter_close))
 		return node_error(sensor, e, EINVAL, "shutter_open=%g is after shutter_close=%g", out->shutter_open,
 				  out->shutter_close);
-	int r = read_place(sensor, out, e);
+	int r = read_roll(sensor, out, e);
+	if (!r)
+		r = read_place(sensor, out, e);
 	if (r)
 		return r;
 	if (!(out->near_clip < out->far_clip))

@@ -13,6 +13,9 @@ enum filter_kind { FILTER_BOX, FILTER_TENT, FILTER_GAUSSIAN, FILTER_CUBIC, FILTE
 /* How directions become film points: by a plane, by longitude and latitude, by a plane that kc distorts. */
 enum scene_projection { PROJECTION_PLANE, PROJECTION_SPHERE, PROJECTION_DISTORTED };
 
+/* A rolling shutter exposes rows or columns of the film one after the other, beginning at this side. */
+enum scene_roll { ROLL_NONE, ROLL_TOP, ROLL_BOTTOM, ROLL_LEFT, ROLL_RIGHT };
+
 struct scene_settings {
 	uint32_t width, height; /* film, 1..PLAN_MAX_SIZE each */
 	enum filter_kind filter;
@@ -36,8 +39,9 @@ struct scene_settings {
 	enum scene_projection projection;
 	double kc[2]; /* of PROJECTION_DISTORTED */
 	double near_clip, far_clip;
-	double shutter_open, shutter_close;	/* if both are equal, nothing moves */
-	bool rolling_shutter;			/* lines of the film are exposed one after the other */
+	double shutter_open, shutter_close; /* if both are equal, nothing moves */
+	enum scene_roll roll;
+	double roll_exposure; /* of a line, as a share of the time from the first's beginning to the last's end */
 	double aperture_radius, focus_distance; /* thinlens, telecentric; radius 0: a pinhole, whatever the distance */
 	bool unplaced; /* the scene has no sensor: scene_settings_place says where the camera is */
 };

@@ -455,6 +455,7 @@ void world_summary(const struct world *w, struct render_summary *out)
 				       .shared_meshes = w->shared_mesh_count,
 				       .brightest = world_brightest(w),
 				       .beams = world_has_beam(w),
+				       .rolls = world_rolls(w),
 				       .coincident = w->coincident,
 				       .notes = w->notes};
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);

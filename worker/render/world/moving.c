@@ -44,8 +44,12 @@ static int make_motion(struct builder *b, const struct scene_node *n, const stru
 	if (!m || !keys)
 		return build_out_of_memory(b->e);
 	*moves = motion_make(m, a, s->shutter_open, s->shutter_close, keys);
-	return *moves && s->rolling_shutter
-		       ? node_error(n, b->e, ENOTSUP, "it moves, and a rolling shutter is not supported")
+	/* Then it does not matter whether the duration of a line is a time or a share of the shutter's. */
+	bool one = fabs(s->shutter_close - s->shutter_open - 1) < 1e-9;
+	return *moves && s->roll != ROLL_NONE && !one
+		       ? node_error(n, b->e, ENOTSUP,
+				    "it moves, and a rolling shutter is only supported where shutter_close is 1 after "
+				    "shutter_open")
 		       : 0;
 }
 

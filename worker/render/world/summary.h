@@ -57,6 +57,7 @@ struct render_summary {
 	uint64_t memory;	  /* bytes of the world, approximately; Embree's part is estimated per triangle */
 	double brightest;	  /* see world_brightest */
 	bool beams;		  /* see world_has_beam */
+	bool rolls;		  /* see world_rolls */
 	struct render_coincident coincident;
 	struct world_notes notes;
 };

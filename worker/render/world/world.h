@@ -75,6 +75,12 @@ static inline struct wavelengths world_wavelengths(const struct world *w, double
 	return wavelengths_sample_few(u, (unsigned)w->accuracy.wavelengths);
 }
 
+/* The time of a path depends on its place on the film. */
+static inline bool world_rolls(const struct world *w)
+{
+	return EFFECT_IS_ON(w, motion) && w->settings.roll != ROLL_NONE;
+}
+
 /* The camera at the time of a path's vertex; room: for one that moves. */
 static inline const struct camera *world_camera(const struct world *w, const struct surface_point *x,
 						struct camera *room)

@@ -201,6 +201,9 @@ static void test_notes_on_the_whole(void **state)
 	} cases[] = {
 		{"<sensor type='perspective'/>",
 		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the image is black"},
+		{"<sensor type='perspective'><string name='rolling_shutter_type' value='left'/><float name='shutter_close' "
+		 "value='1'/></sensor>",
+		 "s.xml:1: <sensor type=\"perspective\">: lines of the film are exposed one after the other"},
 		{"<integrator type='photonmapper'/>",
 		 "s.xml:1: <integrator type=\"photonmapper\">: the image shows all light, on surfaces and in media"},
 		{"<integrator type='direct'/>",

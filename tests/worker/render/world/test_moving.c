@@ -528,8 +528,16 @@ static void test_refused(void **state)
 	(void)state;
 	refused(VIEW(OPEN("1", "0.5")) CUBE, "shutter_open=1 is after shutter_close=0.5");
 	refused(VIEW(OPEN("0", "nan")) CUBE, "is not a (finite) number");
-	refused(VIEW(OPEN("0", "1") "<string name='rolling_shutter_type' value='row'/>") CUBE,
-		"it moves, and a rolling shutter is not supported");
+#define ROLL(type, duration)                                     \
+	"<string name='rolling_shutter_type' value='" type "'/>" \
+	"<float name='rolling_shutter_duration' value='" duration "'/>"
+	refused(VIEW(OPEN("0", "1") ROLL("row", "0.5")) CUBE, "(supported: none, top, bottom, left, right)");
+	refused(VIEW(OPEN("0", "1") "<string name='rolling_shutter_type' value='top'/>") CUBE,
+		"a rolling shutter needs a rolling_shutter_duration");
+	refused(VIEW(OPEN("0", "1") ROLL("top", "1.5")) CUBE, "rolling_shutter_duration=1.5 is outside [0, 1]");
+	refused(VIEW(OPEN("0", "1") ROLL("top", "-1")) CUBE, "rolling_shutter_duration=-1 is outside [0, 1]");
+	refused(VIEW(OPEN("0", "0.5") ROLL("top", "0.2")) CUBE,
+		"it moves, and a rolling shutter is only supported where shutter_close is 1 after shutter_open");
 	refused(VIEW(OPEN("0", "1")) "<shape type='sphere'><animation name='to_world'><transform time='0'/>"
 				     "<transform time='1'><scale x='2'/></transform></animation></shape>",
 		"a sphere that moves may not be stretched in one direction");

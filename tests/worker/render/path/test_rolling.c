@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A rolling shutter. The time of a path is what its place on the film says: a share e of the time for each line, the
+ * first from the beginning on and the last up to the end. Samples of `path` are those of the same world with a shutter
+ * that opens for all lines at once, whose number of the time is that time, bit by bit; of a card that slides each cell
+ * of the film sees the share of its own time that the card is there. Integrators that do not draw the place first are
+ * refused, by the command line and by a lease.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/worlds.h"
+#include "worker/cli/base/options.h"
+#include "worker/render/path/integrate_path.h"
+#include "worker/render/path/path.h"
+#include "worker/render/render.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 12, HEIGHT = 8 };
+
+/* 2 x 4/3 around the origin. */
+#define SCENE                                                                                                       \
+	"<integrator type='path'><integer name='max_depth' value='4'/></integrator>"                                \
+	"<sensor type='orthographic'><float name='shutter_open' value='2'/><float name='shutter_close' value='3'/>" \
+	"%s<transform name='to_world'><lookat origin='0,0,5' target='0,0,0' up='0,1,0'/></transform>"               \
+	"<film type='hdrfilm'>%s</film></sensor>"                                                                   \
+	"<shape type='rectangle'><animation name='to_world'>"                                                       \
+	"<transform time='2'><scale x='0.2' y='0.9'/><translate x='-0.6'/></transform>"                             \
+	"<transform time='3'><scale x='0.2' y='0.9'/><translate x='0.4'/></transform></animation></shape>"
+#define LIT                                                                                                 \
+	"<shape type='sphere'><point name='center' x='0.3' y='1' z='1'/><float name='radius' value='0.2'/>" \
+	"<emitter type='area'/></shape><emitter type='constant'><float name='radiance' value='0.3'/></emitter>"
+#define ROLL(type, duration)                                     \
+	"<string name='rolling_shutter_type' value='" type "'/>" \
+	"<float name='rolling_shutter_duration' value='" duration "'/>"
+#define BOX_FILTER "<rfilter type='box'/>"
+
+static struct world *world_of(const char *roll, const char *filter)
+{
+	return world_of_text(WIDTH, HEIGHT, SCENE LIT, roll, filter);
+}
+
+/* Where the line is: 0 for the first. */
+typedef double line_fn(double x, double y);
+
+static double none(double x, double y)
+{
+	(void)x, (void)y;
+	return 0;
+}
+
+static double top(double x, double y)
+{
+	(void)x;
+	return y / HEIGHT;
+}
+
+static double bottom(double x, double y)
+{
+	(void)x;
+	return 1 - y / HEIGHT;
+}
+
+static double left(double x, double y)
+{
+	(void)y;
+	return x / WIDTH;
+}
+
+static double right(double x, double y)
+{
+	(void)y;
+	return 1 - x / WIDTH;
+}
+
+static const struct roll {
+	const char *xml;
+	line_fn *line;
+	double exposure;
+} rolls[] = {
+	{"", none, 1},
+	{ROLL("none", "0.2"), none, 1},
+	{ROLL("top", "0.5"), top, 0.5},
+	{ROLL("top", "0"), top, 0},
+	{ROLL("top", "1"), top, 1},
+	{ROLL("bottom", "0.25"), bottom, 0.25},
+	{ROLL("left", "0.125"), left, 0.125},
+	{ROLL("right", "0.7"), right, 0.7},
+};
+enum { ROLLS = sizeof rolls / sizeof *rolls };
+
+static double time_of(const struct roll *r, const double film[2], double u)
+{
+	double line = fmin(fmax(r->line(film[0], film[1]), 0), 1);
+	return fmin((1 - r->exposure) * line + r->exposure * u, 1 - 0x1p-53);
+}
+
+/* ---- samples ---- */
+
+/* Random numbers, but for a time. */
+struct timed {
+	struct sampler base;
+	struct sampler_random random;
+	double time;
+};
+
+static const double *timed_block(struct sampler *base, enum sampler_side side, unsigned vertex)
+{
+	static double block[SAMPLER_BLOCK];
+	struct timed *s = (struct timed *)base;
+	const double *u = s->random.base.block(&s->random.base, side, vertex);
+	if (side != SIDE_LIGHT || vertex != 0)
+		return u;
+	memcpy(block, u, sizeof block);
+	block[DIM_TIME] = s->time;
+	return block;
+}
+
+static void begin(struct path_context *c, struct world *w)
+{
+	static uint64_t counters[BATCH_COUNTERS];
+	const struct plan p = {.width = WIDTH,
+			       .height = HEIGHT,
+			       .border = w->settings.border,
+			       .crop_width = WIDTH,
+			       .crop_height = HEIGHT,
+			       .max_depth = 4};
+	path_context_for_samples(c, w, &p, counters);
+}
+
+static void check_samples(const struct roll *r, const char *filter)
+{
+	static struct path_context rolling, still;
+	static struct path_sample a, b;
+	struct world *w = world_of(r->xml, filter), *open = world_of("", filter);
+	unsigned lit = 0, beyond = 0;
+	assert_true(w->effects.motion && world_rolls(w) == (r->line != none));
+	begin(&rolling, w);
+	begin(&still, open);
+	for (uint64_t i = 0; i < 4000; i++) {
+		struct sampler_random s;
+		struct timed t = {{timed_block}, .time = 0};
+		double film[2];
+		sampler_random_init(&s, 5, RNG_TEST, i, 0);
+		sampler_random_init(&t.random, 5, RNG_TEST, i, 0);
+		path_walk_camera(&rolling, &s.base, 2, film);
+		t.time = time_of(r, film, s.base.block(&s.base, SIDE_LIGHT, 0)[DIM_TIME]);
+		assert_true(fabs(rolling.time - t.time) < 1e-15);
+		t.time = rolling.time;
+		beyond += film[0] < 0 || film[0] > WIDTH || film[1] < 0 || film[1] > HEIGHT;
+		path_trace(&rolling, &s.base, &a);
+		path_trace(&still, &t.base, &b);
+		assert_true(a.count == b.count && memcmp(a.splats, b.splats, a.count * sizeof *a.splats) == 0);
+		lit += a.count > 0;
+	}
+	assert_true(lit > 500 && (beyond > 0) == (w->settings.border > 0));
+	world_free(w);
+	world_free(open);
+}
+
+static void test_samples(void **state)
+{
+	(void)state;
+	for (int i = 0; i < ROLLS; i++) {
+		check_samples(&rolls[i], BOX_FILTER);
+		check_samples(&rolls[i], "<rfilter type='gaussian'/>");
+	}
+}
+
+/* ---- what the camera sees ---- */
+
+/* Pearson's chi^2 of the 96 cells, fewer where all or none of the samples meet the card: level 1e-6. */
+static void check_seen(const struct roll *r)
+{
+	enum { FINE = 32 };
+	static double seen[HEIGHT][WIDTH], drawn[HEIGHT][WIDTH];
+	static struct path_context c;
+	struct world *w = world_of_text(WIDTH, HEIGHT, SCENE, r->xml, BOX_FILTER);
+	size_t n = dice_count(200000), cells = 0;
+	double chi2 = 0;
+	begin(&c, w);
+	memset(seen, 0, sizeof seen);
+	memset(drawn, 0, sizeof drawn);
+	for (size_t i = 0; i < n; i++) {
+		struct sampler_random s;
+		double film[2];
+		sampler_random_init(&s, 11, RNG_TEST, i, 0);
+		path_walk_camera(&c, &s.base, 2, film);
+		drawn[(int)film[1]][(int)film[0]]++;
+		seen[(int)film[1]][(int)film[0]] += c.camera[1].kind == VERTEX_SURFACE;
+	}
+	for (int k = 0; k < WIDTH * HEIGHT; k++) {
+		double share = 0, found = seen[k / WIDTH][k % WIDTH], all = drawn[k / WIDTH][k % WIDTH];
+		for (int i = 0; i < FINE * FINE * FINE; i++) {
+			const double film[2] = {k % WIDTH + (i % FINE + 0.5) / FINE,
+						k / WIDTH + (i / FINE % FINE + 0.5) / FINE};
+			double t = time_of(r, film, (i / FINE / FINE + 0.5) / FINE), x = 2 * film[0] / WIDTH - 1,
+			       y = 2 * (0.5 - film[1] / HEIGHT) * HEIGHT / WIDTH;
+			share += fabs(x - (t - 0.6)) < 0.2 && fabs(y) < 0.9;
+		}
+		share /= FINE * FINE * FINE;
+		double variance = all * (share * (1 - share) + 1e-3); /* and what the quadrature leaves */
+		chi2 += (found - all * share) * (found - all * share) / variance;
+		cells += share > 0 && share < 1;
+	}
+	print_message("%s: chi^2 %.1f of %zu cells\n", *r->xml ? r->xml : "all at once", chi2, cells);
+	assert_true(cells > 20 && chi2 < (double)cells + 6 * sqrt(2 * (double)cells) + 12);
+	world_free(w);
+}
+
+static void test_seen(void **state)
+{
+	(void)state;
+	for (int i = 0; i < ROLLS; i++)
+		check_seen(&rolls[i]);
+}
+
+/* ---- who renders it ---- */
+
+static int lease_of(const struct world *w, const char *integrator, struct error *e)
+{
+	struct plan p;
+	struct batch b;
+	struct plan_request r = {
+		.width = WIDTH, .height = HEIGHT, .border = w->settings.border, .spp = 4, .max_depth = 4};
+	const struct lease_key key = {.kind = LEASE_RENDER};
+	enum lease_end end;
+	snprintf(r.integrator, sizeof r.integrator, "%s", integrator);
+	r.kind = render_integrator_find(integrator)->kind;
+	accuracy_settings_print(&w->accuracy, r.accuracy);
+	assert_int_equal(plan_make(&r, &p, e), 0);
+	return render_lease(w, &p, &key, NULL, NULL, &end, &b, e);
+}
+
+static void test_who_renders_it(void **state)
+{
+	(void)state;
+	struct world *w = world_of(ROLL("top", "0.5"), BOX_FILTER);
+	struct render_summary summary;
+	world_summary(w, &summary);
+	assert_true(summary.rolls);
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		const char *name = render_integrator_at(i)->name;
+		struct render_arguments a = {.plan = {.spp = 4}};
+		struct error e = {""};
+		bool path = strcmp(name, "path") == 0;
+		snprintf(a.plan.integrator, sizeof a.plan.integrator, "%s", name);
+		assert_int_equal(render_plan_from_scene(&a, &summary, &e), path ? 0 : -EINVAL);
+		if (path)
+			continue;
+		assert_non_null(strstr(e.text, name));
+		assert_non_null(strstr(e.text, "cannot render a rolling shutter"));
+		e = (struct error){""};
+		assert_int_equal(lease_of(w, name, &e), -EINVAL);
+		assert_non_null(strstr(e.text, "cannot render a rolling shutter"));
+	}
+	struct render_arguments open = {.plan = {.spp = 4}}, chains = {.plan = {.spp = 4, .chains = 8}};
+	struct error e = {""};
+	assert_int_equal(render_plan_from_scene(&open, &summary, &e), 0);
+	assert_string_equal(open.plan.integrator, "path");
+	assert_int_equal(render_plan_from_scene(&chains, &summary, &e), -EINVAL);
+	world_free(w);
+	/* Where nothing moves, all can. */
+	worlds_effects = "-motion";
+	w = world_of(ROLL("top", "0.5"), BOX_FILTER);
+	worlds_effects = NULL;
+	world_summary(w, &summary);
+	assert_false(summary.rolls);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_samples),
+		cmocka_unit_test(test_seen),
+		cmocka_unit_test(test_who_renders_it),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
