@@ -13,7 +13,7 @@ cat >"$DIR/bad.xml" <<'XML'
 <scene version="3.0.0">
 <integrator type="volpath"><integer name="rr_depth" value="5"/></integrator>
 <sensor type="perspectiv"/>
-<bsdf type="hair" id="fur"/>
+<bsdf type="irawan" id="fur"/>
 <shape type="sphere">
 	<ref id="fur"/>
 	<float name="radios" value="1"/>
@@ -28,7 +28,7 @@ cut -d: -f1,2 "$DIR/out" | tr '\n' ' ' >"$DIR/places"
 for line in 3 4 7 8 10 11; do
 	grep -q "bad.xml:$line " "$DIR/places" || fail "nothing is said of line $line: $(cat "$DIR/out")"
 done
-[ "$(grep -c 'type="hair"' "$DIR/out")" = 1 ] || fail "one unknown material is complained of more than once: $(cat "$DIR/out")"
+[ "$(grep -c 'type="irawan"' "$DIR/out")" = 1 ] || fail "one unknown material is complained of more than once: $(cat "$DIR/out")"
 grep -q "^bad.xml: 6 problems" "$DIR/out" || fail "it does not sum up: $(tail -n 1 "$DIR/out")"
 code 1 "$BIN/hslt-render" "$DIR/bad.xml" -o "$DIR/bad.exr"
 grep -q "bad.xml:3.*and 5 more: hslt-scene check lists them" "$DIR/err.log" || fail "a render says: $(cat "$DIR/err.log")"
@@ -156,13 +156,13 @@ $4
 XML
 }
 scene strange.xml wiener '<emitter type="aurora"><float name="power" value="3"/></emitter>' \
-	'<bsdf type="bark" id="stuff"><texture type="perlin" name="knots"/><bsdf type="hair"><rgb name="base_color" value="0.8 0.2 0.1"/><float name="melanin" value="0.3"/></bsdf></bsdf>' \
+	'<bsdf type="bark" id="stuff"><texture type="perlin" name="knots"/><bsdf type="irawan"><rgb name="base_color" value="0.8 0.2 0.1"/><float name="melanin" value="0.3"/></bsdf></bsdf>' \
 	'<medium name="interior" type="heterogeneous"><volume type="volcache" name="sigma_t"/><float name="albedo" value="0.5"/></medium>' \
 	'<shape type="ellipsoids"><string name="filename" value="h.hair"/></shape><volume type="grid"/>'
 scene plain.xml gaussian '' '<bsdf type="diffuse" id="stuff"><rgb name="reflectance" value="0.8 0.2 0.1"/></bsdf>' '' ''
 code 1 "$BIN/hslt-scene" check "$DIR/strange.xml"
 code 0 "$BIN/hslt-scene" check --lenient "$DIR/strange.xml"
-for word in wiener aurora bark melanin '`volcache`' 'type="heterogeneous"' '`ellipsoids`' '<bsdf type="hair">' volume; do
+for word in wiener aurora bark melanin '`volcache`' 'type="heterogeneous"' '`ellipsoids`' '<bsdf type="irawan">' volume; do
 	grep "^note: .*(lenient)" "$DIR/out" | grep -q "$word" || fail "nothing is noted of $word: $(cat "$DIR/out")"
 done
 code 1 "$BIN/hslt-render" -i path --spp 4 "$DIR/strange.xml" -o "$DIR/strange.exr"

@@ -142,6 +142,7 @@ int blend_join(struct bsdf *b, const struct bsdf *part, const char *type, const 
 	b->has_delta |= part->has_delta;
 	b->textured |= part->textured;
 	b->uses_tangents |= part->uses_tangents;
+	b->directed |= part->directed;
 	b->black &= part->black;
 	if (part->has_smooth)
 		b->alpha = fmin(b->alpha, part->alpha);

@@ -7,6 +7,8 @@
  * `eval` is f (1/sr), without a cosine; delta lobes contribute nothing to eval and pdf.
  * Transport: radiance travelling along wi -> wo is scaled by (n_wo/n_wi)^2 when refracted (n_x: index on the side of
  * x; Walter 2007 eq. 21 with Veach 1997 sec. 5.2), importance is not: f_radiance(wo,wi) / f_importance(wo,wi) is that.
+ * Where a BSDF is not reciprocal (struct bsdf.directed), importance is radiance the other way round all the same:
+ * f_importance(wo,wi) = f_radiance(wi,wo).
  * Measure of densities: solid angle; for delta lobes the probability of choosing the lobe.
  * Immutable after creation; any thread; nothing here allocates after create.
  */
@@ -98,6 +100,8 @@ struct bsdf {
 	const struct ior *ior; /* for both sides (enum ior_side); NULL: only eta is known */
 	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
+	bool directed;		     /* not reciprocal, and specular lobes are chosen with other probabilities by
+					paths from a light than by those from the camera */
 	bool uses_place;	     /* some part looks at other shading frames of the surface: bsdf_point.place */
 	bool passes;		     /* a mask, or nothing at all: what lies behind shows through */
 	bool uses_tangents;	     /* differs along the two axes of the frame, or bends normals by a normal map */

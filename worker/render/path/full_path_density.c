@@ -39,9 +39,14 @@ static void delta_densities(const struct full_path *x, unsigned j, double *to_li
 	double chance = 0, light, camera;
 	if (spectrum_is_zero(full_path_specular(x, j, &wi, &chance)))
 		chance = 0;
+	double from_light = chance;
+	if (v->bsdf->directed) {
+		struct bsdf_point p = world_bsdf_point(&v->x, &x->wl, TRANSPORT_IMPORTANCE);
+		from_light = path_delta_chance(v->bsdf, &p, frame_to_local(&v->x.sh, i), v->mode);
+	}
 	path_delta_per_solid(&v->x, i, o, full_path_eta(x, j), &light, &camera);
 	*to_light = chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2;
-	*to_camera = chance * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2;
+	*to_camera = from_light * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2;
 }
 
 /* Of events, or of none, along edge e: for v[e] from the camera's side, for v[e + 1] from the light's. */

@@ -160,6 +160,13 @@ static bool depart_in_medium(const struct path_context *c, const struct path_ver
 	return out->pdf > 0;
 }
 
+double path_delta_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode)
+{
+	vec3 wi;
+	double chance;
+	return spectrum_is_zero(bsdf_eval_delta(b, p, wo, mode, &wi, &chance)) ? 0 : chance;
+}
+
 static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
 		   enum transport transport, struct departure *out)
 {
@@ -190,7 +197,12 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 		return true;
 	struct bsdf_point back = world_bsdf_point(
 		x, &c->wl, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
-	out->pdf_rev = out->delta ? s.pdf : v->bsdf->ops->pdf_solid(v->bsdf, &back, s.wi, wo);
+	if (!out->delta)
+		out->pdf_rev = v->bsdf->ops->pdf_solid(v->bsdf, &back, s.wi, wo);
+	else if (v->bsdf->directed)
+		out->pdf_rev = path_delta_chance(v->bsdf, &back, s.wi, s.mode);
+	else
+		out->pdf_rev = s.pdf;
 	return true;
 }
 

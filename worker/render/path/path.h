@@ -74,6 +74,9 @@ static inline const struct surface_point *path_facing(const struct path_vertex *
 /* F of the head comment at a surface vertex for unit directions towards camera and light. */
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
 
+/* The probability with which a path that comes from wo chooses the specular lobe `mode`; p->transport: whose path. */
+double path_delta_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode);
+
 /* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that
  * measure is the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid
  * angles, the squared indices and the cosines about which light is bent, those with the shading normal. eta_camera: the

@@ -88,7 +88,6 @@ static const struct {
 	{PLUGIN_SHAPE, "deformable"},
 	{PLUGIN_SHAPE, "ellipsoids"},
 	{PLUGIN_SHAPE, "ellipsoidsmesh"},
-	{PLUGIN_BSDF, "hair"},
 	{PLUGIN_BSDF, "hk"},
 	{PLUGIN_BSDF, "irawan"},
 	{PLUGIN_BSDF, "measured"},

@@ -137,6 +137,13 @@ static const char *const bsdf_cases[] = {
 	"bumpmap scale=0.1 | roughconductor alpha=0.2 | texture checkerboard",
 	"normalmap | texture scale scale=0.5 texture checkerboard | roughdielectric alpha=0.3",
 	"normalmap normalmap=rgb(0.7,0.45,0.9) | roughconductor alpha=0.2",
+	"hair",
+	"hair longitudinal_roughness=0.7 azimuthal_roughness=0.9 eumelanin=0.3 pheomelanin=1",
+	"hair sigma_a=0 longitudinal_roughness=0.2 azimuthal_roughness=0.6 scale_tilt=-5 int_ior=1.8 ext_ior=1",
+	"hair int_ior=1 ext_ior=1.3 longitudinal_roughness=0.4 sigma_a=rgb(0.1,0.4,0.9)",
+	"hair scale=3 scale_tilt=20 | @sigma_a checkerboard color0=0.1 color1=rgb(0.5,0.2,0.1)",
+	"mask opacity=0.7 | hair sigma_a=0.3",
+	"blendbsdf weight=0.4 | hair azimuthal_roughness=0.5 | difftrans",
 	/* Parts with other normals: they tilt on a surface alone. */
 	"blendbsdf weight=0.4 | normalmap / roughplastic alpha=0.2 / texture checkerboard color0=rgb(0.7,0.5,0.9) "
 	"color1=rgb(0.4,0.35,0.9) | roughconductor alpha=0.1",

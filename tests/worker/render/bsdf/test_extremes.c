@@ -41,6 +41,13 @@ static const char *const extremes[] = {
 	"ward variant=balanced alpha=",
 	"ward variant=ward alpha=",
 	"ward variant=ward-duer alpha=",
+	"hair longitudinal_roughness=0 azimuthal_roughness=0 scale_tilt=90",
+	"hair longitudinal_roughness=0.01 azimuthal_roughness=0.01 sigma_a=0",
+	"hair longitudinal_roughness=1 azimuthal_roughness=1 sigma_a=1e9 scale=1e9",
+	"hair int_ior=1.000000001 ext_ior=1 longitudinal_roughness=1 azimuthal_roughness=0 sigma_a=0",
+	"hair int_ior=1 ext_ior=1.000000001 longitudinal_roughness=0.01 eumelanin=1e9",
+	"hair int_ior=1000 ext_ior=1 sigma_a=1e-9",
+	"hair int_ior=1 ext_ior=1000 longitudinal_roughness=0 azimuthal_roughness=1 sigma_a=0",
 };
 /* Where a text ends in "=", each of these follows. */
 static const double alphas[] = {0, 1e-5, 1e-3, 0.1, 1, 2};

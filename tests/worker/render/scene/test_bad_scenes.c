@@ -157,7 +157,7 @@ static void test_unknown_names(void **state)
 	refuses(S "<sensor type='perspectiv'/>" END, "did you mean `perspective`? (supported: perspective");
 	refuses(S "<probe type='x'/>" END,
 		"<probe type=\"x\">: there is no element of this name; --lenient leaves it out");
-	refuses(S "<bsdf type='hair'/>" END,
+	refuses(S "<bsdf type='irawan'/>" END,
 		"this bsdf of Mitsuba's is not supported; --lenient uses the bsdf inside it, or `diffuse`, instead "
 		"(supported: diffuse, roughconductor");
 	refuses(S "<bsdf type='roughgrating'/>" END, "there is no bsdf of this type; --lenient uses the bsdf inside");

@@ -25,7 +25,7 @@ static void test_stand_ins(void **state)
 		enum lenient_way way;
 		const char *stand_in;
 	} expected[] = {
-		{PLUGIN_BSDF, "hair", LENIENT_INNER, "diffuse"},
+		{PLUGIN_BSDF, "irawan", LENIENT_INNER, "diffuse"},
 		{PLUGIN_BSDF, "measured", LENIENT_REPLACE, "roughplastic"},
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "sunsky"},
 		{PLUGIN_EMITTER, "laser", LENIENT_LEAVE_OUT, NULL},

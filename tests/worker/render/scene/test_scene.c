@@ -462,9 +462,9 @@ static void test_every_problem_is_told(void **state)
 {
 	(void)state;
 	const char *xml =
-		"<scene version='3.0.0'>\n<bsdf type='hair' id='fur'/>\n<shape type='cube'><ref id='fur'/>\n"
+		"<scene version='3.0.0'>\n<bsdf type='irawan' id='fur'/>\n<shape type='cube'><ref id='fur'/>\n"
 		"<float name='radius' value='1'/></shape>\n<shape type='cube'><ref id='fur'/></shape>\n<shape type='cone'/>\n</scene>";
-	static const char *const want[] = {"s.xml:2: <bsdf type=\"hair\">", "s.xml:4: <float>",
+	static const char *const want[] = {"s.xml:2: <bsdf type=\"irawan\">", "s.xml:4: <float>",
 					   "s.xml:6: <shape type=\"cone\">"};
 	const struct memory_file memory[] = {{"s.xml", xml, strlen(xml)}, {0}};
 	struct asset_source assets = memory_assets(memory);

@@ -1,0 +1,339 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Hair and fur: a dielectric fibre that absorbs, by Chiang et al. 2016 (hair_lobes.c); parameters, defaults and
+ * conventions are those of Mitsuba 3's plug-in. One scattering stands for all that light does inside, and ends where it
+ * began. For light from wi to a camera in direction wo,
+ *
+ *   f |wi.z| = sum_p M_p(theta_wo, theta_wi) A_p(theta_wo, h) N_p(phi_wi - phi_wo)
+ *
+ * where y, n x dp/du, runs along the fibre, theta is the angle of a direction to the xz plane, phi is the angle in it,
+ * and wo passes the axis at h = sin gamma = -wo.x / cos theta radii. So the place on the fibre follows from the normal,
+ * whatever the shape is; one that is no fibre scatters as if there were a thin one in each of its points. A_p depends
+ * on absorption, in units of one over the fibre's radius. Melanin's coefficients are Rec. 709 colours and are made
+ * spectra like those of media: divided by twice the maximum, upsampled as reflectances are, and multiplied again.
+ *
+ * Lobes go to both sides. What goes into the fibre has to get out: seen from inside, the surface is not there. Mitsuba
+ * tells its curves to ignore such rays, and its plug-in has a null component for the back; here it is a specular lobe
+ * that goes straight on, on any shape, of which a path counts an edge and through which next event estimation does not
+ * look. A path that comes from a light cannot know whether the surface at which it arrives from outside is the one that
+ * the camera sees, or lies behind it: half of them go straight through, to scatter where the light leaves.
+ *
+ * f is not reciprocal: h is the camera's. Importance is radiance the other way round, as everywhere (bsdf.h). Its
+ * directions are drawn along the fibre from M, which is symmetric, and around it in proportion to the cosine, half of
+ * lobe 0 by N around the mirror image; there the density ignores absorption. That of radiance is the mean of A_p over
+ * some wavelengths, always the same ones, and a little of what it is without absorption, so that no lobe that has
+ * light at some wavelength is missed.
+ *
+ * Failures: pigments and sigma_a together, equal indices, values out of range.
+ */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/hair_lobes.h"
+#include "worker/render/bsdf/ior.h"
+#include "worker/render/bsdf/warp.h"
+#include "worker/render/math/minmax.h"
+
+#include <float.h>
+
+#define DEGREE (WARP_PI / 180)
+#define IOR_AMBER 1.55
+
+/* One over a cosine times the narrowest lobe is finite. */
+#define LEAST_COSINE 0x1p-900
+
+/* Of the white share in the choice of a lobe. */
+#define WHITE 0x1p-6
+
+/* Of importance that arrives from outside: the probability of going straight through, and those of the lobes. */
+#define PASSING 0.5
+static const double adjoint_chance[HAIR_LOBES] = {0.3, 0.4, 0.2, 0.1};
+
+struct hair {
+	struct hair_fibre fibre;
+	bool pigments;			     /* sigma_a is theirs */
+	struct color eumelanin, pheomelanin; /* times their concentrations */
+	struct texture sigma_a;
+	double scale;	 /* of sigma_a */
+	spectrum probes; /* absorption at `probed`, unless sigma_a is textured */
+};
+
+/* At which lobes are weighed: a density that changed with the wavelengths of a path would tie them together. */
+static const struct wavelengths probed = {.nm = {450, 520, 580, 640}};
+
+static spectrum absorption(const struct hair *h, const struct texture_point *where, const struct wavelengths *w)
+{
+	if (h->pigments)
+		return spectrum_add(color_eval(&h->eumelanin, w), color_eval(&h->pheomelanin, w));
+	return spectrum_scale(h->scale, texture_eval(&h->sigma_a, where, w));
+}
+
+static spectrum absorption_for_choice(const struct hair *h, const struct bsdf_point *p)
+{
+	if (WAVELENGTHS_GREY(p->w) || p->w->rgb)
+		return absorption(h, &p->where, p->w);
+	return h->pigments || texture_is_constant(&h->sigma_a) ? h->probes : absorption(h, &p->where, &probed);
+}
+
+/* A direction, by its angles. */
+struct angles {
+	struct hair_angle theta;
+	double phi;
+};
+
+static struct angles angles_of(vec3 w)
+{
+	return (struct angles){{w.y, hypot(w.x, w.z)}, atan2(w.z, w.x)};
+}
+
+static vec3 direction_of(struct hair_angle theta, double cos_phi, double sin_phi)
+{
+	return vec3_normalize((vec3){theta.cos * cos_phi, theta.sin, theta.cos * sin_phi});
+}
+
+/* A camera's direction, which enters the fibre. */
+struct seen {
+	struct angles from;
+	double gamma;
+	struct hair_entry entry;
+};
+
+static struct seen seen_from(const struct hair *h, vec3 camera)
+{
+	struct seen s = {.gamma = -atan2(camera.x, camera.z), .entry = hair_enter(&h->fibre, camera.x, camera.z)};
+	s.from = (struct angles){{camera.y, hypot(camera.x, camera.z)}, s.gamma + WARP_PI / 2};
+	return s;
+}
+
+/* M_p N_p of each lobe. */
+static void find_lobes(const struct hair *h, const struct seen *s, vec3 light, double lobe[HAIR_LOBES])
+{
+	struct angles to = angles_of(light);
+	for (int p = 0; p < HAIR_LOBES; p++) {
+		double turn = to.phi - s->from.phi - hair_turn(p, s->gamma, s->entry.gamma_t);
+		double around = p < HAIR_LOBES - 1 ? hair_around(&h->fibre, turn) : 1 / (2 * WARP_PI);
+		lobe[p] = hair_along(&h->fibre, p, s->from.theta, to.theta) * around;
+	}
+}
+
+/* f |light.z| for a camera outside. */
+static spectrum scattered(const struct hair *h, const struct bsdf_point *p, vec3 camera, vec3 light)
+{
+	struct seen s = seen_from(h, camera);
+	spectrum sigma = absorption(h, &p->where, p->w), sum = spectrum_of(0);
+	double lobe[HAIR_LOBES], share[HAIR_LOBES];
+	find_lobes(h, &s, light, lobe);
+	for (int l = 0; l < SPECTRUM_LANES; l++) {
+		hair_shares(&s.entry, exp(-sigma.v[l] * s.entry.length), share);
+		for (int k = 0; k < HAIR_LOBES; k++)
+			sum.v[l] += share[k] * lobe[k];
+	}
+	return sum;
+}
+
+static spectrum hair_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	bool radiance = p->transport == TRANSPORT_RADIANCE;
+	vec3 camera = radiance ? wo : wi, light = radiance ? wi : wo;
+	if (!(camera.z > 0 && fabs(light.z) >= LEAST_COSINE))
+		return spectrum_of(0);
+	return spectrum_scale(1 / fabs(light.z), scattered(b->data, p, camera, light));
+}
+
+static void find_chances(const struct hair *h, const struct bsdf_point *p, const struct seen *s,
+			 double chance[HAIR_LOBES])
+{
+	spectrum sigma = absorption_for_choice(h, p);
+	double share[HAIR_LOBES], sum = 0;
+	hair_shares(&s->entry, 1, chance);
+	for (int k = 0; k < HAIR_LOBES; k++)
+		chance[k] *= WHITE;
+	for (int l = 0; l < SPECTRUM_LANES; l++) {
+		hair_shares(&s->entry, exp(-sigma.v[l] * s->entry.length), share);
+		for (int k = 0; k < HAIR_LOBES; k++)
+			chance[k] += share[k];
+	}
+	for (int k = 0; k < HAIR_LOBES; k++)
+		sum += chance[k];
+	for (int k = 0; k < HAIR_LOBES; k++)
+		chance[k] /= sum;
+}
+
+/* The density of a path from a light, which leaves to a camera. */
+static double adjoint_pdf(const struct hair *h, vec3 light, vec3 camera)
+{
+	struct angles from = angles_of(light), to = angles_of(camera);
+	double sum = 0, cosine = 0.5 * camera.z / to.theta.cos;
+	for (int p = 0; p < HAIR_LOBES; p++) {
+		double around = cosine;
+		if (p == 0 && light.z > 0)
+			around = 0.5 * (cosine + hair_around(&h->fibre, to.phi + from.phi - WARP_PI));
+		sum += adjoint_chance[p] * hair_along(&h->fibre, p, from.theta, to.theta) * around;
+	}
+	return light.z > 0 ? (1 - PASSING) * sum : sum;
+}
+
+static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct hair *h = b->data;
+	double chance[HAIR_LOBES], lobe[HAIR_LOBES], sum = 0;
+	if (p->transport == TRANSPORT_IMPORTANCE)
+		return wi.z > 0 && fabs(wo.z) >= LEAST_COSINE ? adjoint_pdf(h, wo, wi) : 0;
+	if (!(wo.z > 0 && fabs(wi.z) >= LEAST_COSINE))
+		return 0;
+	struct seen s = seen_from(h, wo);
+	find_chances(h, p, &s, chance);
+	find_lobes(h, &s, wi, lobe);
+	for (int k = 0; k < HAIR_LOBES; k++)
+		sum += chance[k] * lobe[k];
+	return sum;
+}
+
+/* Which of these probabilities u falls in; *u is then uniform again. */
+static int pick(const double *chance, int count, double *u)
+{
+	int k = 0;
+	while (k + 1 < count && *u >= chance[k])
+		*u -= chance[k++];
+	*u = chance[k] > 0 ? min_of(*u / chance[k], 1 - 0x1p-53) : 0;
+	return k;
+}
+
+static vec3 sample_radiance(const struct hair *h, const struct bsdf_point *p, vec3 wo, const double u[3])
+{
+	struct seen s = seen_from(h, wo);
+	double chance[HAIR_LOBES], rest = u[2];
+	find_chances(h, p, &s, chance);
+	int k = pick(chance, HAIR_LOBES, &rest);
+	double turn = k < HAIR_LOBES - 1 ? hair_turn(k, s.gamma, s.entry.gamma_t) + hair_around_sample(&h->fibre, rest)
+					 : 2 * WARP_PI * rest;
+	double phi = s.from.phi + turn;
+	return direction_of(hair_along_sample(&h->fibre, k, s.from.theta, u[0], u[1]), cos(phi), sin(phi));
+}
+
+static vec3 sample_importance(const struct hair *h, vec3 wo, const double u[2], double rest)
+{
+	static const double halves[2] = {0.5, 0.5};
+	struct angles from = angles_of(wo);
+	int k = pick(adjoint_chance, HAIR_LOBES, &rest);
+	struct hair_angle theta = hair_along_sample(&h->fibre, k, from.theta, u[0], u[1]);
+	if (k == 0 && wo.z > 0 && pick(halves, 2, &rest) == 0) {
+		double phi = WARP_PI - from.phi + hair_around_sample(&h->fibre, rest);
+		return direction_of(theta, cos(phi), sin(phi));
+	}
+	return direction_of(theta, 1 - 2 * rest, 2 * sqrt(rest * (1 - rest)));
+}
+
+static bool passes(const struct bsdf_point *p, vec3 wo)
+{
+	return p->transport == TRANSPORT_RADIANCE ? wo.z <= -DBL_MIN : wo.z >= DBL_MIN;
+}
+
+static spectrum hair_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				double *chance)
+{
+	(void)b;
+	if (!(mode & BSDF_STRAIGHT) || !passes(p, wo))
+		return spectrum_of(0);
+	*wi = vec3_neg(wo);
+	*chance = p->transport == TRANSPORT_RADIANCE ? 1 : PASSING;
+	return spectrum_of(1);
+}
+
+static bool hair_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			struct bsdf_sample *out)
+{
+	const struct hair *h = b->data;
+	bool radiance = p->transport == TRANSPORT_RADIANCE;
+	double rest = u[2];
+	if (passes(p, wo)) {
+		static const double ways[2] = {PASSING, 1 - PASSING};
+		if (radiance || pick(ways, 2, &rest) == 0)
+			return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
+	} else if (!(radiance ? wo.z > 0 : wo.z < 0)) {
+		return false;
+	}
+	return bsdf_sample_smooth(b, p, wo, radiance ? sample_radiance(h, p, wo, u) : sample_importance(h, wo, u, rest),
+				  out);
+}
+
+/* d'Eon 2011, sec. 6.1: per unit of concentration. */
+static int pigment(struct color *c, const double rgb[3], double concentration)
+{
+	int code = color_from_rgb(rgb, COLOR_UNBOUNDED, c);
+	c->scale *= concentration;
+	return code;
+}
+
+static int read_absorption(struct hair *h, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			   struct error *e)
+{
+	static const double eumelanin[3] = {0.419, 0.697, 1.37}, pheomelanin[3] = {0.187, 0.4, 1.05};
+	h->pigments = !node_find(n, "sigma_a");
+	h->scale = node_float(n, "scale", 1);
+	if (!h->pigments) {
+		const struct texture_build inner = bsdf_texture_build(build);
+		if (node_find(n, "eumelanin") || node_find(n, "pheomelanin"))
+			return node_error(n, e, EINVAL,
+					  "sigma_a and eumelanin or pheomelanin say the same thing; give one");
+		int code = texture_from_node(&h->sigma_a, n, "sigma_a", 0, COLOR_UNBOUNDED, &inner, e);
+		if (code)
+			return code;
+		b->textured = !texture_is_constant(&h->sigma_a);
+		bsdf_add_shape(b, texture_shape(&h->sigma_a));
+	} else {
+		int code = pigment(&h->eumelanin, eumelanin, node_float(n, "eumelanin", 1.3));
+		if (!code)
+			code = pigment(&h->pheomelanin, pheomelanin, node_float(n, "pheomelanin", 0.2));
+		if (code)
+			return node_error(n, e, -code, "pigments");
+		bsdf_add_shape(b, COLOR_SHAPE_OTHER);
+	}
+	const struct texture_point nowhere = {.probe = true};
+	if (h->pigments || texture_is_constant(&h->sigma_a))
+		h->probes = absorption(h, &nowhere, &probed);
+	return 0;
+}
+
+static int hair_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct hair *h = b->data;
+	double inside, outside;
+	int code = ior_read(n, "int_ior", IOR_AMBER, &inside, e);
+	if (!code)
+		code = ior_read(n, "ext_ior", IOR_AIR_DEFAULT, &outside, e);
+	if (code)
+		return code;
+	if (inside == outside)
+		return node_error(n, e, EINVAL, "int_ior and ext_ior must differ");
+	hair_fibre_set(&h->fibre, inside / outside, node_float(n, "longitudinal_roughness", 0.3),
+		       node_float(n, "azimuthal_roughness", 0.3), DEGREE * node_float(n, "scale_tilt", 2));
+	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
+	b->has_smooth = b->has_delta = true;
+	b->two_sided = true;
+	b->directed = true;
+	b->uses_tangents = true;
+	b->alpha_mean = 1;
+	return read_absorption(h, b, n, build, e);
+}
+
+static const struct param hair_params[] = {
+	{.name = "longitudinal_roughness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+	{.name = "azimuthal_roughness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+	{.name = "scale_tilt", .types = VALUE_FLOAT | VALUE_INT, .min = -90, .max = 90},
+	IOR_NUMBER("int_ior"),
+	IOR_NUMBER("ext_ior"),
+	{.name = "eumelanin", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
+	{.name = "pheomelanin", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
+	{.name = "sigma_a", .types = VALUE_TEXTURE, .min = 0, .max = 1e9},
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_hair = {
+	.decl = {PLUGIN_BSDF, "hair", hair_params, 0, PARAM_UNDERSTOOD},
+	.data_size = sizeof(struct hair),
+	.create = hair_create,
+	.eval = hair_eval,
+	.pdf_solid = hair_pdf,
+	.eval_delta = hair_eval_delta,
+	.sample = hair_sample,
+};

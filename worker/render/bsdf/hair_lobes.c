@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Chiang, Bitterli, Tappan, Burley 2016, A Practical and Controllable Hair and Fur Model for Production Path Tracing,
+ * which took the form of Marschner et al. 2003, and its M from d'Eon et al. 2011, An Energy-Conserving Hair Reflectance
+ * Model. Each function is a density, and what Fresnel's law and absorption leave in the lobes adds up to all, so the
+ * model neither gains nor loses light from any direction at any distance from the axis.
+ *
+ * All are written such that no two large numbers cancel: fibres with a roughness of 0.001, light along the axis, and
+ * light that only just touches the fibre are as exact as others. Nothing here fails.
+ */
+#include "worker/render/bsdf/hair_lobes.h"
+
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/warp.h"
+
+#include <float.h>
+
+/* Where the asymptotic series takes over: it is exact to about exp(-2 x). */
+#define BESSEL_FAR 15
+enum { BESSEL_TERMS = 40 };
+
+/* I0(x) = sum (x^2 / 4)^k / k!^2, and for large x exp(x) / sqrt(2 pi x) sum ((2k - 1)!!)^2 / (k! (8x)^k) (Abramowitz
+ * and Stegun 1964, 9.6.12 and 9.7.1). Terms of the first are positive and fall off after k = x / 2; of the second, the
+ * sum ends where they are below rounding. */
+double hair_bessel(double x)
+{
+	double sum = 1, term = 1;
+	if (x < BESSEL_FAR) {
+		double y = 0.25 * x * x;
+		for (int k = 1; k < BESSEL_TERMS && term > DBL_EPSILON * 0x1p-3 * sum; k++)
+			sum += term *= y / (k * k);
+		return exp(-x) * sum;
+	}
+	for (int k = 1; k < BESSEL_TERMS && term > DBL_EPSILON * 0x1p-3; k++) {
+		double odd = 2 * k - 1, next = term * odd * odd / (8 * k * x);
+		if (next > term)
+			break;
+		sum += term = next;
+	}
+	return sum / sqrt(2 * WARP_PI * x);
+}
+
+/* Chiang 2016, eqs. 7 and 8: the variance along and the width around that look like a roughness. */
+static double variance_of(double roughness)
+{
+	double b2 = roughness * roughness, x = 0.726 * roughness + 0.812 * b2 + 3.7 * pow(roughness, 20);
+	return x * x;
+}
+
+static double width_of(double roughness)
+{
+	return sqrt(WARP_PI / 8) * (0.265 * roughness + 1.194 * roughness * roughness + 5.372 * pow(roughness, 22));
+}
+
+void hair_fibre_set(struct hair_fibre *f, double eta, double along, double around, double tilt)
+{
+	/* Passing through narrows a lobe, reflection inside widens it (Marschner 2003, table 1, and sec. 4.1 of Chiang
+	 * 2016 for the tilts). */
+	static const double times[HAIR_LOBES] = {1, 0.25, 4, 4}, turns[HAIR_LOBES] = {-2, 1, 4, 0};
+	double v = variance_of(max_of(along, HAIR_ROUGHNESS_MIN));
+	f->eta = eta;
+	for (int p = 0; p < HAIR_LOBES; p++) {
+		struct hair_lobe_width *w = &f->along[p];
+		w->v = times[p] * v;
+		w->from = exp(-2 / w->v);
+		w->scale = -1 / (w->v * expm1(-2 / w->v));
+		f->tilt[p] = (struct hair_angle){sin(turns[p] * tilt), cos(turns[p] * tilt)};
+	}
+	f->s = width_of(max_of(around, HAIR_ROUGHNESS_MIN));
+	f->end = exp(-WARP_PI / f->s);
+}
+
+/*
+ * In the plane across, the fibre acts as one with the index eta' = sqrt(eta^2 - sin^2 theta) / cos theta (Marschner
+ * 2003, appendix B): sin gamma_t = h / eta' with h = sin gamma_i, and a passage is 2 cos gamma_t / cos theta_t long.
+ * With cos theta sin gamma_i = x and cos theta cos gamma_i = z neither quotient is needed.
+ */
+struct hair_entry hair_enter(const struct hair_fibre *f, double x, double z)
+{
+	struct fresnel at = fresnel_dielectric(min_of(z, 1), f->eta);
+	struct hair_entry e = {at.reflected, at.transmitted, 0, 0};
+	double e2 = (f->eta - 1) * (f->eta + 1), across = e2 + x * x + z * z, beyond = e2 + z * z;
+	if (!(e.transmitted > 0 && across > 0 && beyond >= 0))
+		return (struct hair_entry){1, 0, 0, 0};
+	e.gamma_t = -atan2(x, sqrt(beyond));
+	e.length = 2 * f->eta * sqrt(beyond) / across;
+	return e;
+}
+
+/* Chiang 2016, sec. 3.2; the last share is the sum of the geometric series of all longer ways (eq. 6). */
+void hair_shares(const struct hair_entry *e, double t, double share[HAIR_LOBES])
+{
+	share[0] = e->reflected;
+	for (int p = 1; p < HAIR_LOBES; p++)
+		share[p] = 0;
+	if (!(e->transmitted > 0))
+		return;
+	share[1] = e->transmitted * e->transmitted * t;
+	for (int p = 2; p < HAIR_LOBES; p++)
+		share[p] = share[p - 1] * t * e->reflected;
+	share[HAIR_LOBES - 1] /= (1 - t) + t * e->transmitted; /* 1 - t reflected */
+}
+
+/* Scales turn theta (Chiang 2016, sec. 4.1). Beyond the axis it comes down on the other side. */
+static struct hair_angle tilted(const struct hair_fibre *f, int p, struct hair_angle a)
+{
+	const struct hair_angle *t = &f->tilt[p];
+	return (struct hair_angle){a.sin * t->cos + a.cos * t->sin, fabs(a.cos * t->cos - a.sin * t->sin)};
+}
+
+/*
+ * d'Eon 2011, eq. 7: M = exp(-sin sin / v) I0(cos cos / v) / (2 v sinh(1 / v)). The exponents of the three factors add
+ * up to (cos(theta_i + theta_o) - 1) / v, half the squared distance between two points of the unit circle.
+ */
+double hair_along(const struct hair_fibre *f, int p, struct hair_angle from, struct hair_angle to)
+{
+	const struct hair_lobe_width *w = &f->along[p];
+	from = tilted(f, p, from);
+	double ds = from.sin + to.sin, dc = from.cos - to.cos;
+	return exp(-0.5 * (ds * ds + dc * dc) / w->v) * hair_bessel(from.cos * to.cos / w->v) * w->scale;
+}
+
+/* d'Eon 2013, A Fiber Scattering Model with Non-Separable Lobes, sec. 3: a direction around that of the cone, of which
+ * theta is kept. */
+struct hair_angle hair_along_sample(const struct hair_fibre *f, int p, struct hair_angle from, double u0, double u1)
+{
+	const struct hair_lobe_width *w = &f->along[p];
+	from = tilted(f, p, from);
+	/* 1 - cos of the angle to the cone, within [0, 2]. */
+	double down = min_of(-w->v * log(max_of(u0 + (1 - u0) * w->from, DBL_MIN)), 2), c = 1 - down,
+	       s = sqrt(max_of(down * (2 - down), 0));
+	double sine = -c * from.sin + s * cos(2 * WARP_PI * u1) * from.cos;
+	sine = min_of(max_of(sine, -1), 1);
+	return (struct hair_angle){sine, sqrt((1 - sine) * (1 + sine))};
+}
+
+/* Chiang 2016, eqs. 11 and 12: the logistic distribution, cut off at half a turn to each side. */
+double hair_around(const struct hair_fibre *f, double turn)
+{
+	double x = exp(-fabs(remainder(turn, 2 * WARP_PI)) / f->s), sum = 1 + x;
+	return x / (f->s * sum * sum) * ((1 + f->end) / (1 - f->end));
+}
+
+double hair_around_sample(const struct hair_fibre *f, double u)
+{
+	double below = f->end + u * (1 - f->end), above = 1 - u * (1 - f->end);
+	double x = f->s * log(max_of(below, DBL_MIN) / max_of(above, DBL_MIN));
+	return min_of(max_of(x, -WARP_PI), WARP_PI);
+}
+
+double hair_turn(int p, double gamma_i, double gamma_t)
+{
+	return 2 * p * gamma_t - 2 * gamma_i + p * WARP_PI;
+}
