@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Paths through hair, which is not reciprocal, and whose way out of the fibre is chosen with other probabilities by
+ * paths from a light than by those from the camera: integrators that start at both ends, and chains, agree with the
+ * path tracer on three thick hairs in front of a lamp. Chains need FULL=1.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/length.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
+static void compare(const char *name, uint64_t spp)
+{
+	static struct agree_image reference, other;
+	struct world *w = world_of_own_scene("integrators", "hair.xml", 32, 32);
+	struct agree_side path = {"path", 1024, 32, 0, 0}, side = {name, spp, 32, 0, 0};
+	agree_render(w, "hair", "path", &path, &reference);
+	agree_render(w, "hair", name, &side, &other);
+	agree_check(name, &other, &reference);
+	world_free(w);
+}
+
+static void test_from_both_ends(void **state)
+{
+	(void)state;
+	compare("bdpt", 1024);
+}
+
+static void test_chains(void **state)
+{
+	(void)state;
+	if (!test_full())
+		skip();
+	compare("pssmlt", 12800);
+	compare("hslt", 12800);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_from_both_ends), cmocka_unit_test(test_chains)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
