@@ -13,21 +13,24 @@
 
 #include <cmocka.h>
 
-static void compare(const char *name, uint64_t spp)
+static void compare(const char *name, uint64_t spp, bool demanding)
 {
 	static struct agree_image reference, other;
 	struct world *w = world_of_own_scene("integrators", "hair.xml", 32, 32);
 	struct agree_side path = {"path", 1024, 32, 0, 0}, side = {name, spp, 32, 0, 0};
 	agree_render(w, "hair", "path", &path, &reference);
 	agree_render(w, "hair", name, &side, &other);
-	agree_check(name, &other, &reference);
+	if (demanding)
+		agree_check(name, &other, &reference);
+	else
+		agree_within_errors(name, &other, &reference);
 	world_free(w);
 }
 
 static void test_from_both_ends(void **state)
 {
 	(void)state;
-	compare("bdpt", 1024);
+	compare("bdpt", 1024, true);
 }
 
 static void test_chains(void **state)
@@ -35,8 +38,8 @@ static void test_chains(void **state)
 	(void)state;
 	if (!test_full())
 		skip();
-	compare("pssmlt", 12800);
-	compare("hslt", 12800);
+	compare("pssmlt", 5000, false);
+	compare("hslt", 5000, false);
 }
 
 int main(void)
