@@ -107,7 +107,8 @@ struct accel *body_accel(const struct geom_shape *shapes, uint32_t count)
 					    (const uint32_t(*)[3])g->index,
 					    SURFACE_OPAQUE,
 					    g->place,
-					    (const double(*)[3])g->unrounded};
+					    (const double(*)[3])g->unrounded,
+					    g->curves};
 	}
 	struct accel *accel;
 	struct error e = {""};

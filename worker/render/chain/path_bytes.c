@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Paths as bytes. A vertex on a surface is written as what its point was made of (the primitive, and barycentrics or
- * the direction from a sphere's centre), so that reading makes the same point bit by bit, however small the primitive
- * is next to the scene, and bytes from elsewhere cannot name a point that does not lie on its primitive. With the path
- * goes log f as reading it gives: a path that somebody changed has another one.
+ * Paths as bytes. A vertex on a surface is written as what its point was made of (the primitive, and barycentrics, the
+ * direction from a sphere's centre, or a curve's coordinates), so that reading makes the same point bit by bit, however
+ * small the primitive is next to the scene, and bytes from elsewhere cannot name a point that does not lie on its
+ * primitive. With the path goes log f as reading it gives: a path that somebody changed has another one.
  *
  * What is refused: numbers that are not finite, indices of what the scene does not have, points outside their
  * primitives, vertices that do not scatter as they say, paths that leave the window or carry no light, another
@@ -90,6 +90,8 @@ static bool read_surface(const struct world *w, struct prim_ref prim, vec3 place
 		surface_on_sphere(s, prim, place, x);
 		return true;
 	}
+	if (s->curves)
+		return surface_on_curve(s, prim, place.x, place.y, x);
 	if (prim.prim >= s->triangle_count || !(place.x >= 0) || !(place.y >= 0) ||
 	    !(place.x + place.y <= 1 + ROUNDING))
 		return false;

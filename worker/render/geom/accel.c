@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Building: triangles and spheres become Embree geometries, with filters where a hit must be checked in double; large
- * triangles of a scene of mixed scales are a user geometry that is intersected in double. Tracing: the ray enters the
- * scene's box in double, Embree proposes hits in float, the filter decides, and the caller computes the hit again
+ * Building: triangles, spheres and curves become Embree geometries, with filters where a hit must be checked in double;
+ * large triangles of a scene of mixed scales are a user geometry that is intersected in double. Tracing: the ray enters
+ * the scene's box in double, Embree proposes hits in float, the filter decides, and the caller computes the hit again
  * (surface.h).
  *
  * Only building can fail: out of memory, and errors that Embree reports. Rays never fail; a ray that is not finite hits
@@ -27,13 +27,15 @@ struct accel {
 	struct sphere_prim *spheres;
 	struct accel_shape *shapes;
 	const struct coincidence *coincidence;
-	struct wide_prims *wide; /* one per shape */
+	struct wide_prims *wide;    /* one per shape */
+	struct curve_prims *curves; /* one per shape */
 	struct instances instances;
 	atomic_size_t bytes, peak;
 	vec3 low, high;
-	double size;   /* sum of the sides */
-	double reach;  /* the error bound of Embree's floats, see below */
-	double detail; /* in a scene of mixed scales: the extent of its smallest shape; otherwise 0 */
+	double size;	     /* sum of the sides */
+	double reach;	     /* the error bound of Embree's floats, see below */
+	double off, off_far; /* the same before the size of the scene is known: off + off_far |p| at p */
+	double detail;	     /* in a scene of mixed scales: the extent of its smallest shape; otherwise 0 */
 };
 
 static bool memory_monitor(void *user, ssize_t bytes, bool post)
@@ -133,13 +135,24 @@ static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t 
 	return 0;
 }
 
+static int attach_curves(struct accel *a, const struct accel_shape *s, uint32_t id)
+{
+	a->curves[id] = (struct curve_prims){s->curves, id, a->off, a->off_far};
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
+	if (!g)
+		return -ENOMEM;
+	solved_curves(g, &a->curves[id]);
+	attach(a, g, id);
+	return 0;
+}
+
 /* The shape's triangles with an extent of at least `least`, as a user geometry with a number after those of the
  * shapes. */
 static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double least)
 {
 	struct wide_prims *w = &a->wide[id];
 	*w = (struct wide_prims){&a->shapes[id], id, 0, NULL};
-	if (a->shapes[id].is_sphere || a->shapes[id].place)
+	if (a->shapes[id].is_sphere || a->shapes[id].place || a->shapes[id].curves)
 		return 0;
 	for (int pass = 0; pass < 2; pass++) {
 		w->count = 0;
@@ -209,6 +222,11 @@ static double extent_of(const struct accel_shape *s)
 	struct placement room;
 	if (accel_is_instance(s))
 		return 2 * triangle_norm_max(placement_at(s->place, 0, &room)->half);
+	if (s->curves) {
+		vec3 low, high;
+		curves_box_of_all(s->curves, &low, &high);
+		return triangle_norm_max(vec3_sub(high, low));
+	}
 	float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, most = 0;
 	for (uint32_t i = 0; i < s->triangle_count; i++)
 		for (int j = 0; j < 3; j++)
@@ -221,27 +239,39 @@ static double extent_of(const struct accel_shape *s)
 	return (double)most;
 }
 
-/* Adds everything; returns the error bound of floats. */
-static double find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
+/* rounding_reach of a shape. */
+static double reach_of(const struct accel_shape *s)
+{
+	double reach = 0;
+	vec3 low, high, r = {s->radius, s->radius, s->radius};
+	if (s->place)
+		return rounding_reach(vec3_sub(s->place->center, s->place->half),
+				      vec3_add(s->place->center, s->place->half));
+	if (s->is_sphere)
+		return rounding_reach(vec3_sub(s->center, r), vec3_add(s->center, r));
+	if (s->curves) {
+		curves_box_of_all(s->curves, &low, &high);
+		return rounding_reach(low, high);
+	}
+	for (uint32_t k = 0; k < s->vertex_count; k++) {
+		vec3 p = triangle_vertex(s->position, k);
+		reach = fmax(reach, rounding_reach(p, p));
+	}
+	return reach;
+}
+
+/* Whether scales are mixed, and the error bound of floats before anything is built. */
+static void find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
 {
 	double least = INFINITY, reach = 0;
 	for (uint32_t i = 0; i < count; i++) {
-		const struct accel_shape *s = &shapes[i];
-		vec3 r = {s->radius, s->radius, s->radius};
-		least = fmin(least, extent_of(s));
-		if (s->is_sphere && !s->place)
-			reach = fmax(reach, rounding_reach(vec3_sub(s->center, r), vec3_add(s->center, r)));
-		else if (s->place)
-			reach = fmax(reach, rounding_reach(vec3_sub(s->place->center, s->place->half),
-							   vec3_add(s->place->center, s->place->half)));
-		else
-			for (uint32_t k = 0; k < s->vertex_count; k++) {
-				vec3 p = triangle_vertex(s->position, k);
-				reach = fmax(reach, rounding_reach(p, p));
-			}
+		least = fmin(least, extent_of(&shapes[i]));
+		reach = fmax(reach, reach_of(&shapes[i]));
 	}
 	a->detail = MIXED * least < 0x1p21 * reach ? least : 0;
-	return reach;
+	/* The same as reach_at. */
+	a->off = a->detail == 0 ? reach : 0x1p-21 * MIXED * a->detail + 0x1p-26 * reach;
+	a->off_far = a->detail == 0 ? 0 : 0x1p-21;
 }
 
 /* A sphere is hidden entirely or not at all. */
@@ -252,21 +282,22 @@ static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 	if (a->shapes[id].is_sphere && !a->shapes[id].place &&
 	    coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0, 0}, a->shapes[id].center).shape != id)
 		return 0;
-	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id)
-					 : attach_triangles(a, &a->shapes[id], id);
+	struct accel_shape *s = &a->shapes[id];
+	int rc = s->curves	? attach_curves(a, s, id)
+		 : s->is_sphere ? attach_sphere(a, s, id)
+				: attach_triangles(a, s, id);
 	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
 }
 
 /* Its number follows those of the shapes and of their user geometries. */
-static int attach_instances(struct accel *a, uint32_t count, double reach)
+static int attach_instances(struct accel *a, uint32_t count)
 {
 	struct instances *s = &a->instances;
 	int rc = instances_init(s, a->device, a->shapes, count);
 	if (rc || s->count == 0)
 		return rc;
-	/* The same as reach_at, before the size of the scene is known. */
-	s->off = a->detail == 0 ? reach : 0x1p-21 * MIXED * a->detail + 0x1p-26 * reach;
-	s->off_far = a->detail == 0 ? 0 : 0x1p-21;
+	s->off = a->off;
+	s->off_far = a->off_far;
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
 	if (!g)
 		return -ENOMEM;
@@ -286,7 +317,7 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 		return error_set(e, ENOMEM, "Embree's scene cannot be created");
 	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
 	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
-	double reach = find_detail(a, shapes, count);
+	find_detail(a, shapes, count);
 	for (uint32_t i = 0; i < count; i++)
 		a->shapes[i] = shapes[i];
 	for (uint32_t i = 0; i < count; i++) {
@@ -294,7 +325,7 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 		if (rc)
 			return error_set(e, -rc, "Embree's geometry cannot be created");
 	}
-	int rc = attach_instances(a, count, reach);
+	int rc = attach_instances(a, count);
 	if (rc)
 		return error_set(e, -rc, "Embree's tree of a mesh cannot be created");
 	rtcSetSceneProgressMonitorFunction(a->scene, progress_monitor, tick_counter);
@@ -321,11 +352,12 @@ int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t cou
 	a->spheres = mem_alloc(count, sizeof *a->spheres);
 	a->shapes = mem_alloc(count, sizeof *a->shapes);
 	a->wide = mem_alloc(count, sizeof *a->wide);
+	a->curves = mem_alloc(count, sizeof *a->curves);
 	a->count = count;
 	a->coincidence = c;
 	unsigned trap = fptrap_leave();
-	int rc =
-		a->spheres && a->shapes && a->wide ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
+	bool room = a->spheres && a->shapes && a->wide && a->curves;
+	int rc = room ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
 	fptrap_return(trap);
 	if (rc)
 		accel_free(a);
@@ -348,6 +380,7 @@ void accel_free(struct accel *a)
 	for (uint32_t i = 0; a->wide && i < a->count; i++)
 		mem_free(a->wide[i].prim);
 	mem_free(a->wide);
+	mem_free(a->curves);
 	mem_free(a->spheres);
 	mem_free(a->shapes);
 	mem_free(a);
@@ -430,7 +463,8 @@ static struct query query_of(const struct accel *a, vec3 o, vec3 d)
 			      .beyond = 1,
 			      .wide_from = a->detail == 0 ? INFINITY : MIXED * a->detail,
 			      .coincidence = a->coincidence,
-			      .shapes = a->shapes};
+			      .shapes = a->shapes,
+			      .nearest_far = -1};
 }
 
 /* The point is on a surface where another one is present. */

@@ -4,10 +4,10 @@
  * the hit again in double.
  *
  * Self-intersection: a ray names the primitive it starts on (and, for a segment, the one it ends on). A plane triangle
- * cannot be hit again from itself, so it is filtered; on a sphere, the root of the start (or end) is divided out of the
- * quadratic. For every other triangle that Embree proposes, it is checked in double whether the ray crosses its plane
- * between the ends: that of a coplanar neighbour is not, however grazing the ray. So the float ray given to Embree may
- * deviate from the true one by the rounding errors of a scene of that extent, never by an absolute length.
+ * cannot be hit again from itself, so it is filtered; on a sphere or a curve, the root of the start (or end) is divided
+ * out of the quadratic. For every other triangle that Embree proposes, it is checked in double whether the ray crosses
+ * its plane between the ends: that of a coplanar neighbour is not, however grazing the ray. So the float ray given to
+ * Embree may deviate from the true one by the rounding errors of a scene of that extent, never by an absolute length.
  *
  * In a scene whose smallest shape is less than 2^-11 of it, that would be too much. There a ray deviates by the
  * rounding errors at its position: floats are more precise near the origin (worker/render/world/origin.h puts small

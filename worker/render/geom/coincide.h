@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Surfaces that coincide: triangles that overlap in one plane as far as float vertices can tell, and equal spheres. It
+ * Surfaces that coincide: triangles that overlap in one plane as far as float vertices can tell, and equal spheres
+ * (curves are not compared, which no scene is known to have twice). It
  * would be chance which of them a ray hits, and sampling a point on one of them would not ask. So one rule applies to
  * everything: where several coincide, only the one of the lowest rank is present; of equals, the first. The others are
  * hidden there.

@@ -30,9 +30,10 @@ struct accel_shape {
 					  in world space */
 	const double (*unrounded)[3];  /* vertices in double, for a shape too large for floats relative to small ones;
 					  NULL: position */
+	const struct curves *curves;   /* it is these, without triangles; NULL: it is none */
 };
 
-/* time: see struct prim_ref. */
+/* Of a triangle; time: see struct prim_ref. */
 static inline struct triangle accel_triangle(const struct accel_shape *s, uint32_t prim, double time)
 {
 	const uint32_t *i = s->index[prim];

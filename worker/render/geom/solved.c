@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Embree asks for the bounds of a primitive, and whether a ray meets it. A sphere is met at the roots of a quadratic, a
- * triangle where the ray crosses its plane, both in double; what surfaces coincide with, and on which primitives the
- * ray starts and ends, is asked as for the triangles that Embree intersects itself. One that moves is where it is at
- * the query's time, in bounds that hold for all times.
+ * triangle where the ray crosses its plane, a curve as in curves.h, all in double; what surfaces coincide with, and on
+ * which primitives the ray starts and ends, is asked as for the triangles that Embree intersects itself. One that moves
+ * is where it is at the query's time, in bounds that hold for all times.
  */
 #include "worker/render/geom/solved.h"
 
@@ -44,17 +44,21 @@ bool query_crosses_there(const struct query *q, struct prim_ref prim)
 	return !query_is_end(q, there) && query_crosses(q, &q->shapes[there.shape], there.prim);
 }
 
-/* Enlarged as those of a sphere that is still. */
-static void bounds_of_moving(const struct placement *p, struct RTCBounds *b)
+static void put_bounds(vec3 c, vec3 h, double r, struct RTCBounds *b)
 {
-	vec3 c = p->center, h = p->half;
-	double r = 0x1p-20 * (fmax(h.x, fmax(h.y, h.z)) + fabs(c.x) + fabs(c.y) + fabs(c.z));
 	b->lower_x = (float)(c.x - h.x - r);
 	b->lower_y = (float)(c.y - h.y - r);
 	b->lower_z = (float)(c.z - h.z - r);
 	b->upper_x = (float)(c.x + h.x + r);
 	b->upper_y = (float)(c.y + h.y + r);
 	b->upper_z = (float)(c.z + h.z + r);
+}
+
+/* Enlarged as those of a sphere that is still. */
+static void bounds_of_moving(const struct placement *p, struct RTCBounds *b)
+{
+	vec3 c = p->center, h = p->half;
+	put_bounds(c, h, 0x1p-20 * (fmax(h.x, fmax(h.y, h.z)) + fabs(c.x) + fabs(c.y) + fabs(c.z)), b);
 }
 
 /* Not inline: spheres that stand still go by it. */
@@ -200,6 +204,64 @@ static void wide_occluded(const struct RTCOccludedFunctionNArguments *args)
 		((struct RTCRay *)(void *)args->ray)->tfar = -INFINITY;
 }
 
+static void curve_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+	const struct curve_prims *c = args->geometryUserPtr;
+	vec3 low, high;
+	curves_box(c->curves, args->primID, &low, &high);
+	vec3 half = vec3_scale(0.5, vec3_sub(high, low)), center = vec3_add(low, half);
+	double far = triangle_norm_max(center);
+	put_bounds(center, half, 2 * (c->off + c->off_far * far) + 0x1p-20 * (triangle_norm_max(half) + far),
+		   args->bounds_o);
+}
+
+static struct curve_ray curve_ray_of(const struct curve_prims *c, const struct query *q, double t_max)
+{
+	return (struct curve_ray){.o = q->o,
+				  .d = q->d,
+				  .end = q->end,
+				  .starts = q->start && q->from.shape == c->shape,
+				  .ends = q->finish && q->to.shape == c->shape,
+				  .from = q->from.prim,
+				  .to = q->to.prim,
+				  .t_min = q->t_min,
+				  .t_max = t_max};
+}
+
+/* Hairs are so thin that two crossings may have the same float tfar, which is compared in double. u and v: what
+ * surface.h needs to find it again. */
+static void curve_intersect(const struct RTCIntersectFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	struct query *q = (struct query *)(void *)args->context;
+	const struct curve_prims *c = args->geometryUserPtr;
+	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
+	bool exact = rh->hit.geomID != RTC_INVALID_GEOMETRY_ID && rh->ray.tfar == q->nearest_far;
+	struct curve_ray r = curve_ray_of(c, q, exact ? q->nearest : (double)rh->ray.tfar - q->back);
+	struct curve_crossing x;
+	if (!curves_meet(c->curves, args->primID, &r, &x))
+		return;
+	q->nearest = x.t;
+	q->nearest_far = rh->ray.tfar = (float)(x.t + q->back);
+	rh->hit.geomID = c->shape;
+	rh->hit.primID = args->primID;
+	rh->hit.u = (float)x.part;
+	rh->hit.v = (float)x.root;
+}
+
+static void curve_occluded(const struct RTCOccludedFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct curve_prims *c = args->geometryUserPtr;
+	struct curve_ray r = curve_ray_of(c, q, q->segment ? 1 : INFINITY);
+	struct curve_crossing x;
+	if (curves_meet(c->curves, args->primID, &r, &x))
+		((struct RTCRay *)(void *)args->ray)->tfar = -INFINITY;
+}
+
 void solved_sphere(RTCGeometry g, struct sphere_prim *s)
 {
 	rtcSetGeometryUserPrimitiveCount(g, 1);
@@ -216,4 +278,13 @@ void solved_triangles(RTCGeometry g, struct wide_prims *w)
 	rtcSetGeometryBoundsFunction(g, wide_bounds, NULL);
 	rtcSetGeometryIntersectFunction(g, wide_intersect);
 	rtcSetGeometryOccludedFunction(g, wide_occluded);
+}
+
+void solved_curves(RTCGeometry g, struct curve_prims *c)
+{
+	rtcSetGeometryUserPrimitiveCount(g, c->curves->count);
+	rtcSetGeometryUserData(g, c);
+	rtcSetGeometryBoundsFunction(g, curve_bounds, NULL);
+	rtcSetGeometryIntersectFunction(g, curve_intersect);
+	rtcSetGeometryOccludedFunction(g, curve_occluded);
 }

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Primitives that are intersected in double by our own callbacks: spheres, and triangles too large for floats relative
- * to small things in a scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.
+ * Primitives that are intersected in double by our own callbacks: spheres, curves, and triangles too large for floats
+ * relative to small things in a scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_GEOM_SOLVED_H
 #define WORKER_RENDER_GEOM_SOLVED_H
 
 #include "worker/render/geom/coincide.h"
+#include "worker/render/geom/curves.h"
 #include "worker/render/geom/embree.h"
 
 /* What a query passes to Embree's callbacks. */
@@ -25,6 +26,8 @@ struct query {
 	const struct ray_end *start, *finish;  /* the surfaces that o and end are on; NULL: none, or far from o */
 	const struct coincidence *coincidence; /* NULL: no surfaces coincide */
 	const struct accel_shape *shapes;
+	double nearest; /* of a closest hit on a curve, in double, while Embree's tfar is nearest_far */
+	float nearest_far;
 };
 
 struct sphere_prim {
@@ -39,6 +42,13 @@ struct wide_prims {
 	const struct accel_shape *shape;
 	uint32_t id, count;
 	uint32_t *prim;
+};
+
+struct curve_prims {
+	const struct curves *curves;
+	uint32_t shape;
+	double off, off_far; /* a ray given to Embree may pass a point p at this distance from the true one: off +
+				off_far |p| */
 };
 
 /* Whether the plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in
@@ -69,5 +79,6 @@ bool query_crosses_there(const struct query *q, struct prim_ref prim);
 /* The data of a user geometry; both must outlive it. */
 void solved_sphere(RTCGeometry g, struct sphere_prim *s);
 void solved_triangles(RTCGeometry g, struct wide_prims *w);
+void solved_curves(RTCGeometry g, struct curve_prims *c);
 
 #endif

@@ -9,6 +9,7 @@
  */
 #include "worker/render/geom/surface.h"
 
+#include "worker/render/geom/surface_curve.h"
 #include "worker/render/math/sphere.h"
 
 static vec3 vertex_at(const float (*a)[3], uint32_t i)
@@ -233,6 +234,16 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 	fill_triangle(now, i, &c, b1, b2, x);
 }
 
+bool surface_on_curve(const struct geom_shape *s, struct prim_ref prim, double along, double around,
+		      struct surface_point *x)
+{
+	struct curve_site at = {along, around};
+	if (!curves_have(s->curves, prim.prim, at))
+		return false;
+	curve_fill(s, prim, at, x);
+	return true;
+}
+
 void surface_uv(const struct geom_shape *s, struct surface_point *x)
 {
 	struct posed room;
@@ -286,6 +297,8 @@ static struct relief_site site_of(const struct surface_point *x)
 {
 	struct posed room;
 	const struct geom_shape *s = pose(x->shape, x->prim.time, &room);
+	if (s->curves)
+		return curve_relief_site(s, x);
 	if (s->is_sphere) {
 		struct surface_point y = *x;
 		surface_uv(s, &y);
@@ -301,6 +314,8 @@ static vec3 normal_with(const struct surface_point *x, const struct relief *r)
 {
 	struct posed room;
 	const struct geom_shape *s = pose(x->shape, x->prim.time, &room);
+	if (!r && s->curves)
+		return curve_smooth_normal(s, x);
 	if (!r)
 		return s->is_sphere ? x->ng : smooth_normal(s, s->index[x->prim.prim], x);
 	struct relief_site site = site_of(x);
@@ -340,6 +355,10 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 	if (s->is_sphere) {
 		surface_on_sphere(now, hit->prim, sphere_direction(now, o, d, hit->t), x);
 		x->shape = s;
+		return;
+	}
+	if (s->curves) {
+		curve_from_hit(s, o, d, hit, x);
 		return;
 	}
 	const uint32_t *i = s->index[hit->prim.prim];
@@ -491,7 +510,9 @@ void surface_change_of(const struct geom_shape *s, const struct surface_point *x
 	surface_tangents(x, &c->du, &c->dv);
 	c->axis = c->du;
 	s = pose(s, x->prim.time, &room);
-	if (s->is_sphere) {
+	if (s->curves) {
+		curve_change(s, x, c);
+	} else if (s->is_sphere) {
 		change_on_sphere(s, x, c);
 		if (s->relief)
 			bend_on_sphere(s, x, c);
@@ -549,6 +570,8 @@ bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct 
 	x->shape = s;
 	if (s->is_sphere)
 		return reproject_sphere(now, prim, same, o, d, t_near, x);
+	if (s->curves)
+		return curve_reproject(s, prim, from, o, d, t_near, x);
 	return !same && reproject_triangle(now, prim, o, d, x);
 }
 
@@ -563,6 +586,8 @@ bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, stru
 		surface_on_sphere(s, prim, vec3_normalize(d), x);
 		return true;
 	}
+	if (s->curves)
+		return curve_near(s, prim, p, x);
 	if (prim.prim >= s->triangle_count)
 		return false;
 	const uint32_t *i = s->index[prim.prim];

@@ -32,6 +32,7 @@ struct accel_shape *coincident_shapes(const struct world *w, struct arena *arena
 			.rank = rank_of(w, &w->parts[i]),
 			.place = g->place,
 			.unrounded = (const double(*)[3])g->unrounded,
+			.curves = g->curves,
 		};
 	}
 	return s;

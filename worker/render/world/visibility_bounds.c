@@ -3,6 +3,7 @@
  */
 #include "worker/render/world/visibility_bounds.h"
 
+#include "worker/render/geom/curves.h"
 #include "worker/render/geom/triangle.h"
 #include "worker/render/world/displacement.h"
 #include "worker/render/world/origin.h"
@@ -28,6 +29,11 @@ static vec3 plane_of(const struct geom_shape *g, uint32_t triangle, double *heig
 	return n;
 }
 
+static vec3 curve_point(const struct curves *c, uint32_t i)
+{
+	return (vec3){(double)c->point[i][0], (double)c->point[i][1], (double)c->point[i][2]};
+}
+
 /* Smallest and largest n.p over a shape. */
 static void extent(const struct geom_shape *g, vec3 n, double *low, double *high)
 {
@@ -38,6 +44,11 @@ static void extent(const struct geom_shape *g, vec3 n, double *low, double *high
 	}
 	*low = INFINITY;
 	*high = -INFINITY;
+	for (uint32_t i = 0; g->curves && i < g->curves->point_count; i++) {
+		double h = vec3_dot(n, curve_point(g->curves, i)), r = (double)g->curves->point[i][3];
+		*low = fmin(*low, h - r);
+		*high = fmax(*high, h + r);
+	}
 	for (uint32_t i = 0; i < g->triangle_count; i++)
 		for (int k = 0; k < 3; k++) {
 			double h = vec3_dot(n, vertex_of(g, g->index[i][k]));
@@ -50,13 +61,16 @@ static double farthest(const struct geom_shape *g, vec3 from)
 {
 	if (g->is_sphere)
 		return vec3_length(vec3_sub(g->center, from)) + g->radius;
-	double far2 = 0;
+	double far2 = 0, far = 0;
+	for (uint32_t i = 0; g->curves && i < g->curves->point_count; i++)
+		far = fmax(far,
+			   vec3_length(vec3_sub(curve_point(g->curves, i), from)) + (double)g->curves->point[i][3]);
 	for (uint32_t i = 0; i < g->triangle_count; i++)
 		for (int k = 0; k < 3; k++) {
 			vec3 d = vec3_sub(vertex_of(g, g->index[i][k]), from);
 			far2 = fmax(far2, vec3_dot(d, d));
 		}
-	return sqrt(far2);
+	return fmax(far, sqrt(far2));
 }
 
 /* Convex, closed and opaque. An ellipsoid is, too, but as a mesh it is checked triangle by triangle. */
@@ -195,7 +209,7 @@ uint32_t visibility_bounds_depth(const struct world *w, const enum visibility_bo
 		const struct geom_shape *g = &w->shapes[i];
 		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
 			continue;
-		if (g->is_sphere || surface_moves(g))
+		if (g->is_sphere || g->curves || surface_moves(g))
 			return UINT32_MAX;
 		if (!any)
 			plane = triangle_at(g, 0);

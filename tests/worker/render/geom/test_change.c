@@ -4,6 +4,7 @@
  * extrapolated once, leave less than 1e-7 of what is small beside nothing nearby.
  */
 #include "tests/support/bodies.h"
+#include "tests/support/strands.h"
 
 #include <fenv.h>
 #include <float.h>
@@ -119,6 +120,28 @@ static struct geom_shape sphere(struct dice *d)
 	return s;
 }
 
+/* A cone with its spheres, off by up to half a radian from smooth tangents. */
+static struct geom_shape curve(struct dice *d, bool smooth)
+{
+	static struct strand strand;
+	strand_random(&strand, 2, 0, (const double[]){0.5, 1}, (const double[]){0.1, 0.6}, d);
+	strand.v[1] = (float)dice_between(d, 0.1, 1);
+	if (smooth)
+		strand_smooth(&strand, 0.5, d);
+	return (struct geom_shape){.curves = &strand.c, .normal_sign = dice_throw(d) < 0.5 ? -1 : 1};
+}
+
+/* Anywhere on it, but not so near the poles that the meridians turn within the steps of differences, nor where they
+ * would cross from one part to another. */
+static bool curve_point(const struct geom_shape *s, struct dice *d, struct surface_point *x)
+{
+	double along = dice_between(d, -1.5, 2.5), around = dice_between(d, -M_PI, M_PI);
+	if (fabs(along) < 0.01 || fabs(along - 1) < 0.01)
+		return false;
+	return surface_on_curve(s, (struct prim_ref){0, 0, 0}, along, around, x) &&
+	       vec3_length(vec3_cross(x->ng, curves_cone(s->curves, 0).axis)) > 0.1;
+}
+
 /* The point that lies h further along t, as the surface itself makes it. */
 static struct surface_point moved(const struct geom_shape *s, const struct surface_point *x, vec3 t, double h)
 {
@@ -126,6 +149,13 @@ static struct surface_point moved(const struct geom_shape *s, const struct surfa
 	vec3 p = vec3_madd(x->p, h, t);
 	if (s->is_sphere) {
 		surface_on_sphere(s, x->prim, vec3_normalize(vec3_sub(p, s->center)), &y);
+		return y;
+	}
+	if (s->curves) {
+		enum cone_part part = x->b1 < 0 ? CONE_START : x->b1 > 1 ? CONE_END : CONE_SIDE;
+		struct cone c = curves_cone(s->curves, 0);
+		struct curve_site at = curves_site(&c, part, p);
+		assert_true(surface_on_curve(s, x->prim, at.along, at.around, &y));
 		return y;
 	}
 	vec3 o = vec3_add(p, x->ng);
@@ -172,46 +202,54 @@ static void test_differences(void **state)
 	(void)state;
 	struct dice d = dice_of("changes of surface points");
 	/* Triangles: flat, without and with uv; smooth, without and with uv, with tangents. Sphere. */
-	enum { TANGENTS = 4, SPHERE, KINDS };
+	/* A curve, as its cones are and smooth. */
+	enum { TANGENTS = 4, SPHERE, CURVE, SMOOTH_CURVE, KINDS };
 	double worst[1 + RELIEFS][KINDS] = {{0}};
-	for (size_t i = 0; i < dice_count(24000); i++) {
+	uint32_t counts[KINDS] = {0};
+	for (size_t i = 0; i < dice_count(32000); i++) {
 		int kind = (int)(i % KINDS), relief = (int)(i / KINDS % (1 + RELIEFS));
-		struct geom_shape s =
-			kind == SPHERE ? sphere(&d) : triangle(&d, kind >= 2, kind % 2 || kind == TANGENTS);
+		bool curved = kind >= CURVE;
+		struct geom_shape s = kind == SPHERE ? sphere(&d)
+				      : curved	     ? curve(&d, kind == SMOOTH_CURVE)
+						     : triangle(&d, kind >= 2, kind % 2 || kind == TANGENTS);
 		if (kind == TANGENTS)
 			s = with_tangents(s, &d);
-		if (kind != SPHERE && i / (KINDS * (1 + RELIEFS)) % 2)
+		if (kind < SPHERE && i / (KINDS * (1 + RELIEFS)) % 2)
 			s = placed(s, &d);
 		if (relief)
 			s = bent(s, &d, relief - 1);
 		struct surface_point x;
+		if (curved && !curve_point(&s, &d, &x))
+			continue;
 		if (s.is_sphere)
 			surface_on_sphere(&s, (struct prim_ref){0, 0, 0}, dice_direction(&d), &x);
-		else
+		else if (!curved)
 			surface_on_triangle(&s, (struct prim_ref){0, 0, 0}, dice_between(&d, 0.2, 0.4),
 					    dice_between(&d, 0.2, 0.4), &x);
 		if (!s.is_sphere && vec3_dot(x.sh.n, x.ng) < 0.1)
 			continue;
+		counts[kind] += curved;
 		/* Slivers: the points further on would lie outside. */
 		vec3 e1 = {(double)(position[1][0] - position[0][0]), (double)(position[1][1] - position[0][1]),
 			   (double)(position[1][2] - position[0][2])};
 		vec3 e2 = {(double)(position[2][0] - position[0][0]), (double)(position[2][1] - position[0][1]),
 			   (double)(position[2][2] - position[0][2])};
-		if (!s.is_sphere && vec3_length(vec3_cross(e1, e2)) < 0.05)
+		if (kind < SPHERE && vec3_length(vec3_cross(e1, e2)) < 0.05)
 			continue;
 		worst[relief][kind] = fmax(worst[relief][kind], compare(&s, &x));
 	}
 	for (int relief = 0; relief <= RELIEFS; relief++) {
 		const double *at = worst[relief];
-		print_message("%s: flat %.1e %.1e, smooth %.1e %.1e, tangents %.1e, sphere %.1e\n",
+		print_message("%s: flat %.1e %.1e, smooth %.1e %.1e, tangents %.1e, sphere %.1e, curve %.1e %.1e\n",
 			      relief == 0   ? "plain"
 			      : relief == 1 ? "bump"
 			      : relief == 2 ? "normals"
 					    : "normals with handedness",
-			      at[0], at[1], at[2], at[3], at[TANGENTS], at[SPHERE]);
+			      at[0], at[1], at[2], at[3], at[TANGENTS], at[SPHERE], at[CURVE], at[SMOOTH_CURVE]);
 		for (int kind = 0; kind < KINDS; kind++)
 			assert_true(at[kind] < 1e-7);
 	}
+	assert_true(counts[CURVE] > dice_count(32000) / 40 && counts[SMOOTH_CURVE] > dice_count(32000) / 40);
 }
 
 /* The normal of p + h n itself, by differences of its points: to first order in the height where n turns, else exactly.

@@ -1,0 +1,205 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Round cones: distances against a search along the axis, rays against the sign of that distance, areas against closed
+ * forms, and rays that start on the surface.
+ */
+#include "tests/support/strands.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+static const struct kind {
+	const char *name;
+	double length, r0, r1;
+} kinds[] = {
+	{"cylinder", 1, 0.3, 0.3},
+	{"cone", 1, 0.5, 0.2},
+	{"wider", 1, 0.1, 0.4},
+	{"tip", 1, 0.3, 0},
+	{"thin", 1, 1e-4, 1e-4},
+	{"thin tip", 1, 2e-4, 0},
+	{"almost within", 0.3, 0.5, 0.2000001},
+	{"first contains", 0.2, 0.5, 0.1},
+	{"second contains", 0.2, 0.1, 0.5},
+	{"one point", 0, 0.4, 0.4},
+	{"one center", 0, 0.1, 0.3},
+	{"short", 1e-6, 0.5, 0.5},
+};
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+static struct cone cone_of(const struct kind *k, vec3 *p0, vec3 *p1, struct dice *d)
+{
+	*p0 = vec3_scale(0.5, dice_direction(d));
+	*p1 = vec3_madd(*p0, k->length, dice_direction(d));
+	return cone_between(*p0, k->r0, *p1, k->r1);
+}
+
+/* By searching, of the unrounded cone. */
+static double searched(vec3 p0, double r0, vec3 p1, double r1, vec3 p)
+{
+	double low = 0, high = 1;
+	vec3 way = vec3_sub(p1, p0);
+	for (int i = 0; i < 120; i++) {
+		double x = low + (high - low) / 3, y = high - (high - low) / 3;
+		double f = vec3_length(vec3_sub(p, vec3_madd(p0, x, way))) - r0 - x * (r1 - r0),
+		       g = vec3_length(vec3_sub(p, vec3_madd(p0, y, way))) - r0 - y * (r1 - r0);
+		if (f <= g)
+			high = y;
+		else
+			low = x;
+	}
+	return vec3_length(vec3_sub(p, vec3_madd(p0, low, way))) - r0 - low * (r1 - r0);
+}
+
+static void test_distance(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("distances from cones");
+	for (size_t i = 0; i < dice_count(20000); i++) {
+		const struct kind *k = &kinds[i % KINDS];
+		vec3 p0, p1;
+		struct cone c = cone_of(k, &p0, &p1, &d);
+		vec3 p = vec3_madd(p0, dice_between(&d, 0, 2) * (k->r0 + k->r1 + k->length), dice_direction(&d));
+		double want = searched(p0, k->r0, p1, k->r1, p), have = cone_distance(&c, p, false, false);
+		if (!(fabs(have - want) <= 1e-12))
+			fail_msg("%s: a distance of %.17g, not %.17g", k->name, have, want);
+	}
+}
+
+/* All roots in their parts, sorted. */
+static int roots_of(const struct cone *c, vec3 o, vec3 d, double slack, double t[6])
+{
+	int n = 0;
+	for (enum cone_part part = 0; part < CONE_PARTS; part++) {
+		double root[2];
+		for (int k = 0; cone_roots(c, part, o, d, root) && k < 2; k++)
+			if (isfinite(root[k]) && cone_has(c, part, vec3_madd(o, root[k], d), slack))
+				t[n++] = root[k];
+	}
+	for (int i = 0; i < n; i++)
+		for (int j = i + 1; j < n; j++)
+			if (t[j] < t[i]) {
+				double swap = t[i];
+				t[i] = t[j];
+				t[j] = swap;
+			}
+	return n;
+}
+
+/* A line meets the convex body twice or not at all: at both the distance is 0, between them less, and with none it is
+ * nowhere less. Rays from near and far, in all directions, at the axis and past it. */
+static void test_rays(void **state)
+{
+	(void)state;
+	struct dice dice = dice_of("rays at cones");
+	uint32_t hits[KINDS] = {0};
+	for (size_t i = 0; i < dice_count(60000); i++) {
+		const struct kind *k = &kinds[i % KINDS];
+		vec3 p0, p1;
+		struct cone c = cone_of(k, &p0, &p1, &dice);
+		double wide = fmax(k->r0, k->r1), away = i % 3 ? 2 : 1000;
+		vec3 to = vec3_madd(vec3_madd(p0, dice_between(&dice, -0.1, 1.1), vec3_sub(p1, p0)),
+				    dice_between(&dice, 0, 1.3) * wide, dice_direction(&dice));
+		vec3 w = i % 5 ? dice_direction(&dice) : c.axis, o = vec3_madd(to, -away, w);
+		double t[6], tolerance = 1e-13 * away;
+		int n = roots_of(&c, o, w, 1e-14, t);
+		for (int j = 0; j < n; j++) {
+			double off = cone_distance(&c, vec3_madd(o, t[j], w), false, false);
+			if (!(fabs(off) <= tolerance))
+				fail_msg("%s: root %.17g is off by %g", k->name, t[j], off);
+		}
+		double least = INFINITY; /* where the line is nearest */
+		double low = away - 3, high = away + 3;
+		for (int j = 0; j < 200; j++) {
+			double x = low + (high - low) / 3, y = high - (high - low) / 3;
+			double f = cone_distance(&c, vec3_madd(o, x, w), false, false),
+			       g = cone_distance(&c, vec3_madd(o, y, w), false, false);
+			least = fmin(least, fmin(f, g));
+			if (f <= g)
+				high = y;
+			else
+				low = x;
+		}
+		if (least < -1e-11 && !(n >= 2 && t[0] < low + 1e-9 && t[n - 1] > low - 1e-9))
+			fail_msg("%s: goes %g deep, %d roots", k->name, -least, n);
+		if (least > 1e-11 && n > 0)
+			fail_msg("%s: passes at %g, %d roots", k->name, least, n);
+		hits[i % KINDS] += n > 0;
+	}
+	for (size_t i = 0; i < KINDS; i++)
+		assert_true(hits[i] > 100 * dice_count(60000) / 60000);
+}
+
+/* Of a line with an end on the surface, the other root, against all roots; outwards there is none in front. */
+static void test_other_root(void **state)
+{
+	(void)state;
+	struct dice dice = dice_of("rays from cones");
+	for (size_t i = 0; i < dice_count(30000); i++) {
+		const struct kind *k = &kinds[i % KINDS];
+		vec3 p0, p1;
+		struct cone c = cone_of(k, &p0, &p1, &dice);
+		vec3 w = dice_direction(&dice), o = vec3_madd(vec3_madd(p0, 0.5, vec3_sub(p1, p0)), -3, w);
+		for (enum cone_part part = 0; part < CONE_PARTS; part++) {
+			double root[2];
+			if (!cone_roots(&c, part, o, w, root) || !(fabs(root[0]) < 100) || !(fabs(root[1]) < 100))
+				continue;
+			vec3 p = vec3_madd(o, root[0], w);
+			double other = cone_other_root(&c, part, p, w), want = root[1] - root[0];
+			double scale = fmax(k->r0, k->r1) / fmax(want, 1e-300);
+			if (!(fabs(other - want) <= 1e-9 * want * fmax(scale, 1)))
+				fail_msg("%s, part %d: %.17g, not %.17g", k->name, part, other, want);
+			if (cone_has(&c, part, p, 0))
+				assert_true(other > 0 && fabs(cone_height(&c, part, p)) < 1e-13);
+		}
+	}
+}
+
+/* Lines of all directions through a ball of radius R meet a convex body of surface S with probability S / (4 pi R^2)
+ * (Cauchy); N = 200000 lines, so that a deviation of 5 standard errors has a level below 1e-6, and one of 2 % of S, at
+ * a probability above 0.1, is found with a power above 0.99. */
+static void test_areas(void **state)
+{
+	(void)state;
+	static const struct kind bodies[] = {{"cylinder with ends", 1, 0.3, 0.3},
+					     {"cone", 1, 0.5, 0.2},
+					     {"tip", 1, 0.4, 0},
+					     {"sphere", 0.2, 0.5, 0.1}};
+	struct dice dice = dice_of("areas of cones");
+	for (size_t b = 0; b < sizeof bodies / sizeof *bodies; b++) {
+		const struct kind *k = &bodies[b];
+		vec3 p0 = {-0.5 * k->length, 0, 0}, p1 = {0.5 * k->length, 0, 0};
+		struct cone c = cone_between(p0, k->r0, p1, k->r1);
+		double s = fmin((k->r0 - k->r1) / k->length, 1),
+		       side = sqrt(k->length * k->length - pow(k->r0 - k->r1, 2) * (s < 1)), cosine = sqrt(1 - s * s),
+		       r = 1.1;
+		double area = 2 * M_PI * (k->r0 * k->r0 * (1 + s) + k->r1 * k->r1 * (1 - s)) +
+			      (s < 1 ? M_PI * side * cosine * (k->r0 + k->r1) : 0);
+		size_t n = 200000, met = 0;
+		for (size_t i = 0; i < n; i++) {
+			vec3 w = dice_direction(&dice), a = dice_direction(&dice), across;
+			across = vec3_normalize(vec3_madd(a, -vec3_dot(a, w), w));
+			vec3 o = vec3_madd(vec3_scale(-3, w), r * sqrt(dice_throw(&dice)), across);
+			double t[6];
+			met += roots_of(&c, o, w, 1e-14, t) > 0;
+		}
+		double p = area / (4 * M_PI * r * r), have = (double)met / (double)n;
+		print_message("%s: %.4f of %.4f\n", k->name, have / p, 1.0);
+		if (!(fabs(have - p) <= 5 * sqrt(p * (1 - p) / (double)n)))
+			fail_msg("%s: %g lines of all, not %g", k->name, have, p);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_distance),
+		cmocka_unit_test(test_rays),
+		cmocka_unit_test(test_other_root),
+		cmocka_unit_test(test_areas),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

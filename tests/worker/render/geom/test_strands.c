@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Chains of cones: what rays meet is the border of the union, found by searching along the axes; rays enter and leave
+ * it in turn, at joints, too, and from the surface itself; points are where their coordinates say.
+ */
+#include "tests/support/strands.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+static const struct kind {
+	const char *name;
+	uint32_t count;
+	double turn, length[2], radius[2];
+} kinds[] = {
+	{"straight", 5, 0, {0.3, 0.5}, {0.1, 0.1}},	{"bent", 6, 1, {0.3, 0.5}, {0.05, 0.15}},
+	{"hair", 8, 0.2, {0.2, 0.2}, {1e-4, 2e-4}},	{"fat", 8, 0.3, {0.05, 0.1}, {0.3, 0.4}},
+	{"corners", 3, 3, {0.4, 0.6}, {0.02, 0.1}},	{"beads", 5, 0.5, {0.2, 0.4}, {0.05, 0.5}},
+	{"smooth", 20, 0.05, {0.05, 0.05}, {0.1, 0.1}},
+};
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+static void make(struct strand *s, const struct kind *k, struct dice *d)
+{
+	strand_random(s, k->count, k->turn, k->length, k->radius, d);
+}
+
+/* The nearest primitive that the ray meets; false: none. */
+static bool nearest(const struct strand *s, struct curve_ray *r, uint32_t *prim, struct curve_crossing *x)
+{
+	bool any = false;
+	double t_max = r->t_max;
+	for (uint32_t i = 0; i < s->c.count; i++)
+		if (curves_meet(&s->c, i, r, x)) {
+			*prim = i;
+			r->t_max = x->t;
+			any = true;
+		}
+	r->t_max = t_max;
+	return any;
+}
+
+static vec3 aimed_at(const struct strand *s, struct dice *d)
+{
+	const float *p = s->point[dice_below(d, s->c.point_count)];
+	double off = dice_below(d, 2) ? 1 : dice_between(d, 0, 1.2);
+	return vec3_madd((vec3){(double)p[0], (double)p[1], (double)p[2]}, off * (double)p[3], dice_direction(d));
+}
+
+/* From outside through the chain until nothing is met: it is entered and left in turn, and at each crossing the
+ * distance is 0. A crossing that is left out, or met twice, breaks the turn. */
+static void test_crossings(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("crossings of strands");
+	for (size_t i = 0; i < dice_count(28000); i++) {
+		const struct kind *k = &kinds[i % KINDS];
+		struct strand s;
+		make(&s, k, &d);
+		vec3 w = dice_direction(&d), o = vec3_madd(aimed_at(&s, &d), -20, w);
+		struct curve_ray r = {.o = o, .d = w, .t_max = INFINITY};
+		int depth = 0, met = 0;
+		uint32_t prim;
+		struct curve_crossing x;
+		while (nearest(&s, &r, &prim, &x)) {
+			struct cone c = curves_cone(&s.c, prim);
+			struct curve_site at = curves_site(&c, x.part, vec3_madd(r.o, x.t, w));
+			struct curve_place p;
+			assert_true(curves_have(&s.c, prim, at));
+			curves_place(&s.c, prim, at, &p);
+			double off = strand_distance(&s, p.p), beside = vec3_length(vec3_cross(vec3_sub(p.p, o), w));
+			if (!(fabs(off) < 1e-9 && beside < 2e-7))
+				fail_msg("%s, ray %zu: distance %g, %g beside the ray", k->name, i, off, beside);
+			depth += vec3_dot(p.n, w) < 0 ? 1 : -1;
+			if (depth < 0 || depth > 1)
+				fail_msg("%s, ray %zu: crossing %d makes it %d deep", k->name, i, met, depth);
+			r = (struct curve_ray){.o = p.p, .d = w, .t_max = INFINITY, .starts = true, .from = prim};
+			assert_true(++met < 100);
+		}
+		if (depth != 0)
+			fail_msg("%s, ray %zu: it ends inside", k->name, i);
+		if (met == 0) { /* it passes */
+			double least = INFINITY;
+			for (int j = -200; j <= 200; j++)
+				least = fmin(least, strand_distance(&s, vec3_madd(o, 20 + 0.01 * j, w)));
+			assert_true(least > -1e-9);
+		}
+	}
+}
+
+/* A segment between two points of the surface meets nothing at its ends. */
+static void test_segments(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("segments of strands");
+	size_t inner = 0;
+	for (size_t i = 0; i < dice_count(20000); i++) {
+		struct strand s;
+		make(&s, &kinds[i % 2], &d); /* straight and bent */
+		vec3 w = dice_direction(&d);
+		struct curve_ray r = {.o = vec3_madd(aimed_at(&s, &d), -20, w), .d = w, .t_max = INFINITY};
+		uint32_t first, second, between;
+		struct curve_crossing x, y;
+		struct curve_place a, b;
+		if (!nearest(&s, &r, &first, &x))
+			continue;
+		struct cone c = curves_cone(&s.c, first);
+		curves_place(&s.c, first, curves_site(&c, x.part, vec3_madd(r.o, x.t, w)), &a);
+		r = (struct curve_ray){.o = a.p, .d = w, .t_max = INFINITY, .starts = true, .from = first};
+		assert_true(nearest(&s, &r, &second, &y));
+		c = curves_cone(&s.c, second);
+		curves_place(&s.c, second, curves_site(&c, y.part, vec3_madd(r.o, y.t, w)), &b);
+		r = (struct curve_ray){.o = a.p,
+				       .d = vec3_sub(b.p, a.p),
+				       .end = b.p,
+				       .starts = true,
+				       .ends = true,
+				       .from = first,
+				       .to = second,
+				       .t_max = 1};
+		for (between = 0; between < s.c.count; between++)
+			assert_false(curves_meet(&s.c, between, &r, &x));
+		r = (struct curve_ray){.o = b.p,
+				       .d = vec3_sub(a.p, b.p),
+				       .end = a.p,
+				       .starts = true,
+				       .ends = true,
+				       .from = second,
+				       .to = first,
+				       .t_max = 1};
+		for (between = 0; between < s.c.count; between++)
+			assert_false(curves_meet(&s.c, between, &r, &x));
+		inner++;
+	}
+	assert_true(inner > dice_count(20000) / 4);
+}
+
+/* Open ends: a ray along the axis of a straight chain meets nothing, and one from the side two walls. */
+static void test_open(void **state)
+{
+	(void)state;
+	struct strand s;
+	strand_begin(&s);
+	for (int i = 0; i < 4; i++)
+		strand_add(&s, (vec3){i, 0, 0}, 0.25);
+	strand_end(&s);
+	for (int open = 0; open < 2; open++) {
+		s.c.open = open;
+		struct curve_ray along = {.o = {-2, 0.1, 0}, .d = {1, 0, 0}, .t_max = INFINITY},
+				 across = {.o = {1, 0.1, -2}, .d = {0, 0, 1}, .t_max = INFINITY},
+				 cap = {.o = {-0.1, 0.1, -2}, .d = {0, 0, 1}, .t_max = INFINITY};
+		uint32_t prim;
+		struct curve_crossing x;
+		assert_true(nearest(&s, &along, &prim, &x) == !open && nearest(&s, &across, &prim, &x));
+		assert_true(nearest(&s, &cap, &prim, &x) == !open);
+	}
+}
+
+/* Coordinates: the point nearest to one of the surface is that one; tangents are those of differences; v is that of
+ * the points, and u goes around once. */
+static void test_places(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("places on strands");
+	for (size_t i = 0; i < dice_count(20000); i++) {
+		struct strand s;
+		make(&s, &kinds[1], &d);
+		uint32_t prim = dice_below(&d, s.c.count);
+		struct curve_site at = {dice_between(&d, 0, 1), dice_between(&d, -M_PI, M_PI)};
+		struct curve_place p, q;
+		curves_place(&s.c, prim, at, &p);
+		struct curve_site again = curves_nearest(&s.c, prim, vec3_madd(p.p, 0.01, p.n));
+		assert_true(fabs(again.along - at.along) < 1e-12 && fabs(again.around - at.around) < 1e-12);
+		double h = 1e-6;
+		curves_place(&s.c, prim, (struct curve_site){at.along + (at.along < 0.5 ? h : -h), at.around}, &q);
+		vec3 up = vec3_normalize(vec3_scale(at.along < 0.5 ? 1 : -1, vec3_sub(q.p, p.p)));
+		assert_true(vec3_length(vec3_sub(up, p.up)) < 1e-8 && fabs(vec3_dot(p.up, p.n)) < 1e-14);
+		curves_place(&s.c, prim, (struct curve_site){at.along, at.around + h}, &q);
+		vec3 side = vec3_scale(1 / (h * p.x), vec3_sub(q.p, p.p));
+		assert_true(vec3_length(vec3_sub(side, p.side)) < 1e-5);
+		double turn = q.u - p.u;
+		assert_true(fabs((turn < 0 ? turn + 1 : turn) - h / (2 * M_PI)) < 1e-12);
+		assert_true(fabs(p.v - (prim + at.along) / 8) < 1e-7);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_crossings),
+		cmocka_unit_test(test_segments),
+		cmocka_unit_test(test_open),
+		cmocka_unit_test(test_places),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

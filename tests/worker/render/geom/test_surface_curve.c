@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Curves as they are traced: Embree's hits against a search through all cones in double, from far, from inside and from
+ * the surface itself; points of the surface, put back along rays; memory and bits.
+ */
+#include "common/base/mem.h"
+#include "tests/support/bodies.h"
+#include "tests/support/strands.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { STRANDS = 3 };
+
+/* Several strands around each other, all within the unit sphere; of ordinary thickness, or thin as hair. */
+static void make(struct strand *s, struct geom_shape *g, double radius, struct dice *d)
+{
+	for (int i = 0; i < STRANDS; i++) {
+		strand_random(&s[i], 12, 0.8, (const double[]){0.05, 0.1}, (const double[]){radius, 1.5 * radius}, d);
+		if (i == 1)
+			strand_smooth(&s[i], 0.1, d);
+		g[i] = (struct geom_shape){.curves = &s[i].c, .normal_sign = i == 2 ? -1 : 1};
+	}
+}
+
+static bool search(const struct strand *s, const struct ray_end *from, vec3 w, double t_max, struct curve_crossing *at,
+		   struct prim_ref *prim)
+{
+	bool any = false;
+	for (uint32_t k = 0; k < STRANDS; k++)
+		for (uint32_t i = 0; i < s[k].c.count; i++) {
+			struct curve_ray r = {.o = from->p,
+					      .d = w,
+					      .starts = from->prim.shape == k,
+					      .from = from->prim.prim,
+					      .t_max = any ? at->t : t_max};
+			if (!curves_meet(&s[k].c, i, &r, at))
+				continue;
+			any = true;
+			*prim = (struct prim_ref){k, i, 0};
+		}
+	return any;
+}
+
+static vec3 aim(const struct strand *s, struct dice *d)
+{
+	const struct strand *k = &s[dice_below(d, STRANDS)];
+	const float *p = k->point[dice_below(d, k->c.point_count)], *q = p == k->point[0] ? p : p - 4;
+	double x = dice_throw(d);
+	vec3 a = {(double)p[0], (double)p[1], (double)p[2]}, b = {(double)q[0], (double)q[1], (double)q[2]};
+	return vec3_madd(vec3_madd(vec3_scale(x, a), 1 - x, b), 1.1 * dice_throw(d) * (double)p[3], dice_direction(d));
+}
+
+/* A ray from somewhere, and on from each point that it meets. */
+static void follow(const struct strand *s, const struct geom_shape *g, const struct accel *a, struct dice *d,
+		   double away, size_t *met)
+{
+	vec3 w = dice_direction(d);
+	struct ray_end from = {vec3_madd(aim(s, d), -away, w), {0, 0, 0}, PRIM_NONE};
+	for (int i = 0; i < 20; i++) {
+		struct ray_hit hit;
+		struct prim_ref prim;
+		struct curve_crossing at;
+		bool any = accel_closest(a, &from, w, 0, INFINITY, &hit);
+		assert_true(any == search(s, &from, w, INFINITY, &at, &prim));
+		assert_true((away > 10 && i == 0) || any == accel_occluded_to_infinity(a, &from, w));
+		if (!any)
+			return;
+		assert_true(fabs(hit.t - at.t) < 1e-6 * (1 + away));
+		struct surface_point x, y;
+		surface_from_hit(&g[hit.prim.shape], from.p, w, &hit, &x);
+		if (vec3_length(vec3_cross(vec3_sub(x.p, from.p), w)) > 4e-8)
+			return; /* the roots of a ray that only touches are off by the square root of rounding */
+		/* Nothing lies before it, and something does behind it. */
+		struct ray_end to = body_end(&x), beyond = {vec3_madd(x.p, 1e-4, w), {0, 0, 0}, PRIM_NONE};
+		assert_false(accel_occluded(a, &from, &to));
+		assert_false(accel_occluded(a, &to, &from));
+		assert_true(accel_occluded(a, &from, &beyond));
+		assert_true(surface_reproject(&g[hit.prim.shape], hit.prim, from.prim, from.p, w, hit.t, &y));
+		assert_true(vec3_length(vec3_sub(x.p, y.p)) < 4e-8);
+		assert_true(surface_on_curve(&g[hit.prim.shape], x.prim, x.b1, x.b2, &y));
+		assert_memory_equal(&x.p, &y.p, sizeof x.p);
+		++*met;
+		from = to;
+		w = i % 2 ? w : dice_direction(d);
+	}
+}
+
+static void test_rays(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("rays at strands");
+	static const double radii[] = {0.02, 1e-3, 2e-5};
+	for (size_t i = 0; i < dice_count(300); i++) {
+		struct strand s[STRANDS];
+		struct geom_shape g[STRANDS];
+		make(s, g, radii[i % 3], &d);
+		struct accel *a = body_accel(g, STRANDS);
+		size_t met = 0;
+		for (int k = 0; k < 100; k++)
+			follow(s, g, a, &d, k % 3 == 0 ? 0 : k % 3 == 1 ? 2 : 1000, &met);
+		assert_true(met > 30);
+		accel_free(a);
+	}
+}
+
+/* The frame: dp/du around, so that t runs along the strand; smooth normals are perpendicular to the tangents at the
+ * points, from both sides. */
+static void test_frames(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("frames of strands");
+	for (size_t i = 0; i < dice_count(2000); i++) {
+		struct strand s;
+		strand_random(&s, 4, 0.3, (const double[]){0.3, 0.4}, (const double[]){0.1, 0.1}, &d);
+		struct geom_shape g = {.curves = &s.c, .normal_sign = 1};
+		uint32_t prim = 1 + dice_below(&d, 2);
+		double around = dice_between(&d, -M_PI, M_PI);
+		struct surface_point x;
+		assert_true(surface_on_curve(&g, (struct prim_ref){0, prim, 0}, 0.5, around, &x));
+		struct cone c = curves_cone(&s.c, prim);
+		assert_true(vec3_dot(x.sh.t, c.axis) > 1 - 1e-6 && fabs(vec3_dot(x.sh.s, c.axis)) < 1e-7);
+		strand_smooth(&s, 0.1, &d);
+		for (int end = 0; end < 2; end++) {
+			assert_true(surface_on_curve(&g, (struct prim_ref){0, prim, 0}, end, around, &x));
+			const float *t = s.tangent[prim + (uint32_t)end];
+			vec3 along = {(double)t[0], (double)t[1], (double)t[2]};
+			assert_true(fabs(vec3_dot(x.sh.n, along)) < 1e-6 && vec3_dot(x.sh.t, along) > 1 - 1e-6);
+			assert_true(vec3_dot(x.sh.n, x.ng) > 0.9);
+		}
+	}
+}
+
+enum { HAIRS = 4000, PIECES = 25 };
+
+struct hairs {
+	struct curves c;
+	float point[HAIRS * (PIECES + 1)][4], start[HAIRS * PIECES], v[HAIRS * (PIECES + 1)];
+	uint32_t cone[HAIRS * PIECES];
+};
+
+static void make_hairs(struct hairs *h, struct dice *d)
+{
+	h->c = (struct curves){.point = h->point, .cone = h->cone, .start = h->start, .v = h->v, .thickest = 1e-4f};
+	for (uint32_t i = 0; i < HAIRS; i++) {
+		vec3 p = vec3_scale(0.5, dice_direction(d)), w = vec3_normalize(p);
+		for (uint32_t k = 0; k <= PIECES; k++) {
+			memcpy(h->point[h->c.point_count++], (float[4]){(float)p.x, (float)p.y, (float)p.z, 1e-4f},
+			       sizeof h->point[0]);
+			w = vec3_normalize(vec3_madd(w, 0.1, dice_direction(d)));
+			p = vec3_madd(p, 0.4 / PIECES, w);
+			if (k < PIECES)
+				h->cone[h->c.count++] = (i * (PIECES + 1) + k) << CURVE_SHIFT |
+							(k == 0 ? (uint32_t)CURVE_BEGINS : 0) |
+							(k == PIECES - 1 ? (uint32_t)CURVE_ENDS : 0);
+		}
+	}
+}
+
+/* What a segment takes, and that two trees give the same bits. */
+static void test_memory_and_bits(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("many hairs");
+	struct hairs *h = mem_alloc(1, sizeof *h);
+	assert_non_null(h);
+	make_hairs(h, &d);
+	struct geom_shape g = {.curves = &h->c, .normal_sign = 1};
+	struct accel *a = body_accel(&g, 1), *b = body_accel(&g, 1);
+	double arrays = (double)(sizeof *h - sizeof h->c) / (double)h->c.count,
+	       tree = (double)accel_bytes(a) / (double)h->c.count;
+	print_message("%u segments: %.1f bytes each, and %.1f in Embree (at most %.1f)\n", h->c.count, arrays, tree,
+		      (double)accel_peak_bytes(a) / (double)h->c.count);
+	assert_true(arrays + tree <= 150);
+	for (size_t i = 0; i < dice_count(20000); i++) {
+		vec3 w = dice_direction(&d);
+		struct ray_end from = {vec3_scale(-2, dice_direction(&d)), {0, 0, 0}, PRIM_NONE};
+		w = vec3_normalize(vec3_sub(vec3_scale(0.7, w), from.p));
+		struct ray_hit x = {.t = 0}, y = {.t = 0};
+		assert_true(accel_closest(a, &from, w, 0, INFINITY, &x) == accel_closest(b, &from, w, 0, INFINITY, &y));
+		assert_true(x.t == y.t && x.prim.prim == y.prim.prim && x.u == y.u && x.v == y.v);
+	}
+	accel_free(a);
+	accel_free(b);
+	mem_free(h);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_rays),
+		cmocka_unit_test(test_frames),
+		cmocka_unit_test(test_memory_and_bits),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

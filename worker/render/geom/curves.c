@@ -1,0 +1,285 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A ray meets a primitive where it meets the sphere or cone of a part, in the part, and not inside a neighbour. In
+ * double both of the last are uncertain by rounding: each part reaches a little beyond its border, and what is inside
+ * by less than that is not hidden. So at a joint the parts of two cones overlap in a strip, at distances of the order
+ * of that rounding; a ray from a point there is on both, and both roots are divided out.
+ *
+ * Nothing fails.
+ */
+#include "worker/render/geom/curves.h"
+
+#include "worker/render/geom/triangle.h"
+
+/* Bounds errors of a dozen operations on coordinates of that sum. */
+#define ROUNDING 0x1p-44
+enum { NEIGHBOURS = 32 };
+
+static vec3 center_at(const struct curves *c, uint32_t i)
+{
+	return (vec3){(double)c->point[i][0], (double)c->point[i][1], (double)c->point[i][2]};
+}
+
+struct cone curves_cone(const struct curves *c, uint32_t prim)
+{
+	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
+	return cone_between(center_at(c, i), (double)c->point[i][3], center_at(c, i + 1), (double)c->point[i + 1][3]);
+}
+
+void curves_box(const struct curves *c, uint32_t prim, vec3 *low, vec3 *high)
+{
+	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
+	vec3 a = center_at(c, i), b = center_at(c, i + 1);
+	double r = (double)c->point[i][3], s = (double)c->point[i + 1][3];
+	*low = (vec3){fmin(a.x - r, b.x - s), fmin(a.y - r, b.y - s), fmin(a.z - r, b.z - s)};
+	*high = (vec3){fmax(a.x + r, b.x + s), fmax(a.y + r, b.y + s), fmax(a.z + r, b.z + s)};
+}
+
+void curves_box_of_all(const struct curves *c, vec3 *low, vec3 *high)
+{
+	*low = (vec3){INFINITY, INFINITY, INFINITY};
+	*high = vec3_neg(*low);
+	for (uint32_t i = 0; i < c->point_count; i++) {
+		vec3 p = center_at(c, i);
+		double r = (double)c->point[i][3];
+		*low = (vec3){fmin(low->x, p.x - r), fmin(low->y, p.y - r), fmin(low->z, p.z - r)};
+		*high = (vec3){fmax(high->x, p.x + r), fmax(high->y, p.y + r), fmax(high->z, p.z + r)};
+	}
+}
+
+static bool opens(const struct curves *c, uint32_t prim, uint32_t end)
+{
+	return c->open && (c->cone[prim] & end);
+}
+
+static bool has_part(const struct curves *c, uint32_t prim, enum cone_part part)
+{
+	if (part == CONE_START)
+		return !opens(c, prim, CURVE_BEGINS);
+	return part == CONE_SIDE || (!c->open && (c->cone[prim] & CURVE_ENDS));
+}
+
+/* ---- neighbours ---- */
+
+static bool inside(const struct curves *c, uint32_t prim, const struct cone *k, vec3 p, double slack)
+{
+	return cone_distance(k, p, opens(c, prim, CURVE_BEGINS), opens(c, prim, CURVE_ENDS)) < -slack;
+}
+
+/* Whether p, of this primitive, lies inside one that follows (step 1) or precedes it (step -1). */
+static bool hidden_along(const struct curves *c, uint32_t prim, double radius, vec3 p, double slack, int step)
+{
+	double gap = 0;
+	uint32_t last = step > 0 ? CURVE_ENDS : CURVE_BEGINS;
+	for (int i = 0; i < NEIGHBOURS && !(c->cone[prim] & last); i++) {
+		prim += (uint32_t)step;
+		struct cone k = curves_cone(c, prim);
+		if (gap > 2 * (radius + (double)c->thickest))
+			return false;
+		if (gap <= 2 * (radius + fmax(k.r0, k.r1)) && inside(c, prim, &k, p, slack))
+			return true;
+		gap += k.length;
+	}
+	return false;
+}
+
+static bool hidden(const struct curves *c, uint32_t prim, const struct cone *k, vec3 p, double slack)
+{
+	double radius = fmax(k->r0, k->r1);
+	return hidden_along(c, prim, radius, p, slack, 1) || hidden_along(c, prim, radius, p, slack, -1);
+}
+
+/* ---- rays ---- */
+
+enum { CANDIDATES = 2 * CONE_PARTS };
+
+struct meeting {
+	const struct curves *curves;
+	const struct curve_ray *ray;
+	uint32_t prim;
+	struct cone cone;
+	double slack;
+	int count;
+	struct curve_crossing at[CANDIDATES];
+};
+
+static void add(struct meeting *m, enum cone_part part, int root, double t)
+{
+	if (t > m->ray->t_min && t < m->ray->t_max && isfinite(t))
+		m->at[m->count++] = (struct curve_crossing){t, part, root};
+}
+
+/* Which of the parts p is on, as one bit each. on: the primitive that it was computed on, which it is on whatever the
+ * rounding. */
+static unsigned parts_at(const struct meeting *m, vec3 p, uint32_t on)
+{
+	unsigned parts = 0, nearest = 0;
+	double least = INFINITY;
+	for (enum cone_part part = 0; part < CONE_PARTS; part++) {
+		if (!has_part(m->curves, m->prim, part) || (part == CONE_SIDE && !(m->cone.cos > 0)))
+			continue;
+		double off = fabs(cone_height(&m->cone, part, p));
+		if (off <= m->slack)
+			parts |= 1u << part;
+		if (off < least) {
+			least = off;
+			nearest = 1u << part;
+		}
+	}
+	return on == m->prim ? parts | nearest : parts;
+}
+
+static void find_candidates(struct meeting *m)
+{
+	const struct curve_ray *r = m->ray;
+	unsigned starts = r->starts ? parts_at(m, r->o, r->from) : 0, ends = r->ends ? parts_at(m, r->end, r->to) : 0;
+	for (enum cone_part part = 0; part < CONE_PARTS; part++) {
+		unsigned bit = 1u << part;
+		double root[2];
+		if (!has_part(m->curves, m->prim, part) || (starts & ends & bit))
+			continue;
+		if (starts & bit) {
+			double t = cone_other_root(&m->cone, part, r->o, r->d);
+			add(m, part, t > 0, t);
+		} else if (ends & bit) {
+			double t = cone_other_root(&m->cone, part, r->end, r->d);
+			add(m, part, t > 0, 1 + t);
+		} else if (cone_roots(&m->cone, part, r->o, r->d, root)) {
+			add(m, part, 0, root[0]);
+			add(m, part, 1, root[1]);
+		}
+	}
+}
+
+static void begin(struct meeting *m, const struct curves *c, uint32_t prim, const struct curve_ray *r)
+{
+	m->curves = c;
+	m->ray = r;
+	m->prim = prim;
+	m->cone = curves_cone(c, prim);
+	m->count = 0;
+	m->slack = ROUNDING *
+		   (triangle_norm1(r->o) + triangle_norm1(m->cone.p0) + m->cone.length + m->cone.r0 + m->cone.r1);
+	find_candidates(m);
+}
+
+/* It is in its part and not hidden. */
+static bool is_there(const struct meeting *m, const struct curve_crossing *x)
+{
+	vec3 p = vec3_madd(m->ray->o, x->t, m->ray->d);
+	return cone_has(&m->cone, x->part, p, m->slack) && !hidden(m->curves, m->prim, &m->cone, p, m->slack);
+}
+
+bool curves_meet_near(const struct curves *c, uint32_t prim, const struct curve_ray *r, double t_near,
+		      struct curve_crossing *x)
+{
+	struct meeting m;
+	begin(&m, c, prim, r);
+	while (m.count > 0) {
+		int best = 0;
+		for (int i = 1; i < m.count; i++)
+			if (fabs(m.at[i].t - t_near) < fabs(m.at[best].t - t_near))
+				best = i;
+		if (is_there(&m, &m.at[best])) {
+			*x = m.at[best];
+			return true;
+		}
+		m.at[best] = m.at[--m.count];
+	}
+	return false;
+}
+
+bool curves_meet(const struct curves *c, uint32_t prim, const struct curve_ray *r, struct curve_crossing *x)
+{
+	return curves_meet_near(c, prim, r, r->t_min, x);
+}
+
+/* ---- points ---- */
+
+/* Mitsuba's directions across the axis: u is counted from `from` towards `to`. */
+static void directions(vec3 axis, vec3 *from, vec3 *to)
+{
+	vec3 up = {-axis.z * axis.x, -axis.z * axis.y, 1 - axis.z * axis.z};
+	double length = vec3_length(up);
+	*to = length > 0 ? vec3_scale(1 / length, up) : (vec3){0, 1, 0};
+	*from = vec3_cross(*to, axis);
+}
+
+static double lean_of(const struct cone *c)
+{
+	return atan2(c->sin, c->cos);
+}
+
+struct curve_site curves_site(const struct cone *c, enum cone_part part, vec3 p)
+{
+	vec3 q = vec3_sub(p, c->p0), from, to;
+	directions(c->axis, &from, &to);
+	double y = vec3_dot(q, c->axis), x = vec3_length(vec3_madd(q, -y, c->axis));
+	struct curve_site at = {0, atan2(vec3_dot(q, to), vec3_dot(q, from))};
+	if (part == CONE_START)
+		at.along = fmin(atan2(y, x) - lean_of(c), 0);
+	else if (part == CONE_END)
+		at.along = 1 + fmax(atan2(y - c->length, x) - lean_of(c), 0);
+	else
+		at.along = fmin(fmax((c->cos * y - c->sin * x) / (c->cos * c->length), 0), 1);
+	return at;
+}
+
+struct curve_site curves_nearest(const struct curves *c, uint32_t prim, vec3 p)
+{
+	struct cone k = curves_cone(c, prim);
+	vec3 q = vec3_sub(p, k.p0);
+	double y = vec3_dot(q, k.axis), x = vec3_length(vec3_madd(q, -y, k.axis)), slope = k.cos * y - k.sin * x;
+	enum cone_part part = CONE_SIDE;
+	if (!(k.cos > 0))
+		part = k.sin > 0 ? CONE_START : CONE_END;
+	else if (slope < 0 && has_part(c, prim, CONE_START))
+		part = CONE_START;
+	else if (slope > k.cos * k.length && has_part(c, prim, CONE_END))
+		part = CONE_END;
+	return curves_site(&k, part, p);
+}
+
+bool curves_have(const struct curves *c, uint32_t prim, struct curve_site at)
+{
+	if (prim >= c->count || !(fabs(at.around) <= M_PI))
+		return false;
+	struct cone k = curves_cone(c, prim);
+	double slack = 0x1p-50, lean = lean_of(&k);
+	if (at.along < 0)
+		return has_part(c, prim, CONE_START) && lean + at.along >= -M_PI / 2 - slack;
+	if (at.along > 1)
+		return has_part(c, prim, CONE_END) && lean + at.along - 1 <= M_PI / 2 + slack;
+	return k.cos > 0 && at.along >= 0;
+}
+
+static void texture_of(const struct curves *c, uint32_t prim, double around, struct curve_place *p)
+{
+	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
+	double u = around / (2 * M_PI) - (double)c->start[prim];
+	p->u = u - floor(u);
+	p->v = (1 - p->s) * (double)c->v[i] + p->s * (double)c->v[i + 1];
+}
+
+void curves_place(const struct curves *c, uint32_t prim, struct curve_site at, struct curve_place *p)
+{
+	const struct cone k = curves_cone(c, prim);
+	vec3 from, to;
+	directions(k.axis, &from, &to);
+	p->cone = k;
+	p->part = at.along < 0 ? CONE_START : at.along > 1 ? CONE_END : CONE_SIDE;
+	p->s = fmin(fmax(at.along, 0), 1);
+	p->e = vec3_madd(vec3_scale(cos(at.around), from), sin(at.around), to);
+	p->side = vec3_cross(k.axis, p->e);
+	double cosine = k.cos, sine = k.sin, radius = (1 - p->s) * k.r0 + p->s * k.r1;
+	if (p->part != CONE_SIDE) {
+		double angle = lean_of(&k) + (at.along - p->s);
+		cosine = fmax(cos(angle), 0);
+		sine = sin(angle);
+	}
+	p->n = vec3_normalize(vec3_madd(vec3_scale(cosine, p->e), sine, k.axis));
+	p->up = vec3_madd(vec3_scale(cosine, k.axis), -sine, p->e);
+	p->x = radius * cosine;
+	p->p = vec3_madd(vec3_madd(k.p0, p->s * k.length, k.axis), radius, p->n);
+	texture_of(c, prim, at.around, p);
+}
