@@ -78,7 +78,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	struct arena arena = {.limit = 256 << 20};
 	struct shape_geometry g;
 	uint64_t dropped;
-	shape_build(scene.objects[0], &assets, &arena, &g, &dropped, &e);
+	if (!shape_build(scene.objects[0], &assets, &arena, &g, &dropped, &e) && g.kind == SHAPE_CURVE)
+		shape_curve_mesh(&g, scene.objects[0], &arena, &dropped, &e);
 	arena_fini(&arena);
 	scene_fini(&scene);
 	return 0;

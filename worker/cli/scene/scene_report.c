@@ -153,6 +153,15 @@ static uint32_t print_deeper(const struct scene *s, const struct asset_source *a
 	return problems + (rc != 0);
 }
 
+/* ", N segments of curves"; nothing without any. */
+static const char *segments_text(uint64_t n, char *text, size_t size)
+{
+	text[0] = '\0';
+	if (n)
+		snprintf(text, size, ", %llu segment%s of curves", (unsigned long long)n, plural(n));
+	return text;
+}
+
 /* That is looked at when all else is right. */
 static int print_check(const struct scene *s, const struct asset_source *assets, const char *name, bool *bad)
 {
@@ -174,9 +183,10 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	if (*bad)
 		printf("%s: %u problem%s, %u note%s\n", name, problems, plural(problems), notes, plural(notes));
 	else
-		printf("%s: can be rendered: %llu shape%s, %llu triangle%s, %u file%s, %u note%s\n", name,
+		printf("%s: can be rendered: %llu shape%s, %llu triangle%s%s, %u file%s, %u note%s\n", name,
 		       (unsigned long long)m.shapes, plural(m.shapes), (unsigned long long)m.triangles,
-		       plural(m.triangles), s->asset_count + 1, plural(s->asset_count + 1), notes, plural(notes));
+		       plural(m.triangles), segments_text(m.segments, text, sizeof text), s->asset_count + 1,
+		       plural(s->asset_count + 1), notes, plural(notes));
 	return 0;
 }
 
@@ -254,17 +264,17 @@ static json_t *describe(const struct scene *s, const struct opened *o, struct er
 	for (size_t i = 0; render_scene_note(&m, i, text, sizeof text); i++)
 		json_array_append_new(notes, json_string(text));
 	const struct scene_settings *f = &m.settings;
-	json_t *all =
-		json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:o s:o s:o}", "schema", 1,
-			  "scene", o->name, "dialect",
-			  gltf_is(o->name) ? "glTF 2.0"
-			  : s->dialect_3   ? "3.x"
-					   : "0.6",
-			  "width", (int)f->width, "height", (int)f->height, "sampleCount", (json_int_t)f->spp, "fov",
-			  f->fov, "fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes,
-			  "triangles", (json_int_t)m.triangles, "instances", (json_int_t)m.instances, "sharedMeshes",
-			  (json_int_t)m.shared_meshes, "storedTriangles", (json_int_t)m.stored_triangles, "memoryBytes",
-			  (json_int_t)m.memory, "effects", effects_of(&m), "notes", notes, "files", files);
+	json_t *all = json_pack(
+		"{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:I s:o s:o s:o}", "schema", 1, "scene",
+		o->name, "dialect",
+		gltf_is(o->name) ? "glTF 2.0"
+		: s->dialect_3	 ? "3.x"
+				 : "0.6",
+		"width", (int)f->width, "height", (int)f->height, "sampleCount", (json_int_t)f->spp, "fov", f->fov,
+		"fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes, "triangles",
+		(json_int_t)m.triangles, "segments", (json_int_t)m.segments, "instances", (json_int_t)m.instances,
+		"sharedMeshes", (json_int_t)m.shared_meshes, "storedTriangles", (json_int_t)m.stored_triangles,
+		"memoryBytes", (json_int_t)m.memory, "effects", effects_of(&m), "notes", notes, "files", files);
 	if (!all)
 		error_set(e, ENOMEM, "no memory for the description");
 	return all;
@@ -275,14 +285,15 @@ static void print_text(json_t *all)
 	size_t i;
 	json_t *one;
 	const char *text;
-	long long shapes, triangles, spp, instances, meshes, stored, memory;
+	long long shapes, triangles, segments, spp, instances, meshes, stored, memory;
 	int width, height, depth;
 	double fov;
 	const char *name, *dialect, *axis;
-	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I}", "scene", &name, "dialect",
+	char text_of_segments[64];
+	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:I s:I s:I s:I s:I}", "scene", &name, "dialect",
 		    &dialect, "width", &width, "height", &height, "sampleCount", &spp, "fov", &fov, "fovAxis", &axis,
-		    "maxDepth", &depth, "shapes", &shapes, "triangles", &triangles, "instances", &instances,
-		    "sharedMeshes", &meshes, "storedTriangles", &stored, "memoryBytes", &memory);
+		    "maxDepth", &depth, "shapes", &shapes, "triangles", &triangles, "segments", &segments, "instances",
+		    &instances, "sharedMeshes", &meshes, "storedTriangles", &stored, "memoryBytes", &memory);
 	bool gltf = strncmp(dialect, "glTF", 4) == 0;
 	printf("%s: %s%s, film %d x %d, field of view %.4g degrees (%s), ", name, gltf ? "" : "Mitsuba ", dialect,
 	       width, height, fov, axis);
@@ -294,6 +305,7 @@ static void print_text(json_t *all)
 	printf(", %lld triangle%s", triangles, triangles == 1 ? "" : "s");
 	if (instances)
 		printf(" (%lld in memory)", stored);
+	printf("%s", segments_text((uint64_t)segments, text_of_segments, sizeof text_of_segments));
 	printf(", about %.0f MB; calls for", ceil((double)memory * 0x1p-20));
 	json_array_foreach(json_object_get(all, "effects"), i, one)
 		printf("%s %s", i ? "," : "", json_string_value(one));

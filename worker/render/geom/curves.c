@@ -151,6 +151,18 @@ static void find_candidates(struct meeting *m)
 	}
 }
 
+/* Whether the ray's line passes the axis' line at more than the larger radius. Most of the boxes that a ray enters are
+ * left here. */
+static bool passes(const struct curves *c, uint32_t prim, const struct curve_ray *r)
+{
+	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
+	vec3 p = center_at(c, i), away = vec3_sub(p, r->o), across = vec3_cross(r->d, vec3_sub(center_at(c, i + 1), p));
+	double radius = fmax((double)c->point[i][3], (double)c->point[i + 1][3]),
+	       slack = radius + ROUNDING * (triangle_norm1(r->o) + triangle_norm1(p) + radius),
+	       miss = vec3_dot(away, across);
+	return miss * miss > slack * slack * vec3_dot(across, across);
+}
+
 static void begin(struct meeting *m, const struct curves *c, uint32_t prim, const struct curve_ray *r)
 {
 	m->curves = c;
@@ -174,6 +186,8 @@ bool curves_meet_near(const struct curves *c, uint32_t prim, const struct curve_
 		      struct curve_crossing *x)
 {
 	struct meeting m;
+	if (passes(c, prim, r))
+		return false;
 	begin(&m, c, prim, r);
 	while (m.count > 0) {
 		int best = 0;
@@ -203,6 +217,27 @@ static void directions(vec3 axis, vec3 *from, vec3 *to)
 	double length = vec3_length(up);
 	*to = length > 0 ? vec3_scale(1 / length, up) : (vec3){0, 1, 0};
 	*from = vec3_cross(*to, axis);
+}
+
+/* By the smallest rotation that turns one axis into the other. */
+static vec3 carry(vec3 direction, vec3 from, vec3 to)
+{
+	double sum = 1 + vec3_dot(from, to);
+	if (!(sum > 0x1p-40)) /* turned around: it stays perpendicular */
+		return direction;
+	return vec3_madd(direction, -vec3_dot(to, direction) / sum, vec3_add(from, to));
+}
+
+void curves_lay(struct curves *c)
+{
+	vec3 u = {0, 0, 0}, axis = {0, 0, 1}, from, to;
+	for (uint32_t i = 0; i < c->count; i++) {
+		struct cone k = curves_cone(c, i);
+		directions(k.axis, &from, &to);
+		u = c->cone[i] & CURVE_BEGINS ? from : carry(u, axis, k.axis);
+		axis = k.axis;
+		c->start[i] = (float)(atan2(vec3_dot(u, to), vec3_dot(u, from)) / (2 * M_PI));
+	}
 }
 
 static double lean_of(const struct cone *c)

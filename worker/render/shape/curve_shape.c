@@ -1,29 +1,26 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/shape/curve_shape.h"
 
-int curve_shape_finish(const struct scene_node *n, struct curve_points *points, struct list *rings, int rc,
-		       struct arena *arena, struct shape_geometry *out, struct error *e)
-{
-	out->placed = out->made_here = true;
-	if (!rc)
-		rc = tube_mesh(rings, arena, &out->mesh);
-	list_free(rings);
-	curve_points_free(points);
-	if (rc == -EFBIG)
-		return node_error(n, e, EFBIG, "its curves make more than %d triangles", MESH_TRIANGLES_MAX);
-	return rc ? node_error(n, e, -rc, "out of memory") : 0;
-}
+#include <string.h>
 
-int curve_shape_chains(const struct scene_node *n, struct curve_points *points, struct arena *arena,
-		       struct shape_geometry *out, struct error *e)
+int curve_shape_take(const struct scene_node *n, struct curve_points *points, bool spline, struct arena *arena,
+		     struct shape_geometry *out, struct error *e)
 {
-	struct list rings = {.size = sizeof(struct tube_ring)};
-	double step = 1.0 / (points->count - points->curves); /* pieces */
-	int rc = 0;
-	for (uint32_t i = 0; i < points->curves && !rc; i++) {
-		uint32_t first = points->first[i];
-		rc = tube_add_chain(&rings, points->point + first, points->first[i + 1] - first, step * (first - i),
-				    step);
+	double(*p)[4] = arena_alloc(arena, points->count, sizeof *p);
+	uint32_t *first = arena_alloc(arena, (size_t)points->curves + 1, sizeof *first);
+	out->kind = SHAPE_CURVE;
+	out->curve = (struct curve){.point = (const double(*)[4])p,
+				    .first = first,
+				    .count = points->count,
+				    .curves = points->curves,
+				    .spline = spline};
+	if (p && first) {
+		memcpy(p, points->point, points->count * sizeof *p);
+		memcpy(first, points->first, ((size_t)points->curves + 1) * sizeof *first);
 	}
-	return curve_shape_finish(n, points, &rings, rc, arena, out, e);
+	curve_points_free(points);
+	int rc = p && first ? curve_measure(&out->curve) : -ENOMEM;
+	if (rc == -EFBIG)
+		return node_error(n, e, EFBIG, "its curves have too many segments");
+	return rc ? node_error(n, e, -rc, "out of memory") : 0;
 }

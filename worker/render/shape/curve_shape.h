@@ -5,13 +5,9 @@
 
 #include "worker/render/shape/curve_file.h"
 #include "worker/render/shape/shape.h"
-#include "worker/render/shape/tube.h"
 
-/* Makes the mesh of the tubes, and frees both; rc: an error of tube_add, or 0. */
-int curve_shape_finish(const struct scene_node *n, struct curve_points *points, struct list *rings, int rc,
-		       struct arena *arena, struct shape_geometry *out, struct error *e);
-/* Chains of cones; frees the points. */
-int curve_shape_chains(const struct scene_node *n, struct curve_points *points, struct arena *arena,
-		       struct shape_geometry *out, struct error *e);
+/* Makes them the shape's geometry; frees the points. */
+int curve_shape_take(const struct scene_node *n, struct curve_points *points, bool spline, struct arena *arena,
+		     struct shape_geometry *out, struct error *e);
 
 #endif

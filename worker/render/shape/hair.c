@@ -23,7 +23,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	if (node_float(n, "reduction", 0) > 0)
 		return node_error(n, e, ENOTSUP, "\"reduction\" is only supported as 0: all hair is rendered");
 	int rc = curve_file_read_hair(n, assets, node_float(n, "radius", 0.025), &points, e);
-	return rc ? rc : curve_shape_chains(n, &points, arena, out, e);
+	return rc ? rc : curve_shape_take(n, &points, false, arena, out, e);
 }
 
 SHAPE_OPS(hair);

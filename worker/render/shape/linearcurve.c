@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Curves of straight pieces: cones with spheres as joints and ends (tube.h), as in Mitsuba. to_world moves the control
+ * Curves of straight pieces: cones with spheres as joints and ends, as in Mitsuba. to_world moves the control
  * points and does not change their radii. u is once around, v from 0 to 1 over all pieces of the file.
  */
 #include "worker/render/shape/curve_file.h"
@@ -14,7 +14,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 {
 	struct curve_points points;
 	int rc = curve_file_read(n, assets, 2, &points, e);
-	return rc ? rc : curve_shape_chains(n, &points, arena, out, e);
+	return rc ? rc : curve_shape_take(n, &points, false, arena, out, e);
 }
 
 SHAPE_OPS(linearcurve);

@@ -16,6 +16,31 @@ const struct shape_ops *const shape_registry[] = {
 	NULL,
 };
 
+static int finish(struct shape_geometry *out, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
+		  struct error *e)
+{
+	struct mesh_finish f = {
+		out->placed ? mat4_identity() : node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
+		out->face_normals || node_bool(n, "face_normals", false), node_float(n, "max_smooth_angle", -1)};
+	int r = mesh_finish(&out->mesh, &f, arena, dropped, n, e);
+	if (out->made_here && out->mesh.triangle_count > 0)
+		*dropped = 0;
+	return r;
+}
+
+int shape_curve_mesh(struct shape_geometry *g, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
+		     struct error *e)
+{
+	struct mesh mesh;
+	int rc = curve_mesh(&g->curve, arena, &mesh);
+	if (rc == -EFBIG)
+		return node_error(n, e, EFBIG, "its curves make more than %d triangles", MESH_TRIANGLES_MAX);
+	if (rc)
+		return node_error(n, e, -rc, "out of memory");
+	*g = (struct shape_geometry){.kind = SHAPE_MESH, .mesh = mesh, .placed = true, .made_here = true};
+	return finish(g, n, arena, dropped, e);
+}
+
 int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		struct shape_geometry *out, uint64_t *dropped, struct error *e)
 {
@@ -27,13 +52,5 @@ int shape_build(const struct scene_node *n, const struct asset_source *assets, s
 	if (!*ops || !(*ops)->build)
 		return node_error(n, e, ENOTSUP, "\"%s\" is not a shape that is supported", n->type);
 	int r = (*ops)->build(n, assets, arena, out, e);
-	if (r || out->kind != SHAPE_MESH)
-		return r;
-	struct mesh_finish f = {
-		out->placed ? mat4_identity() : node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
-		out->face_normals || node_bool(n, "face_normals", false), node_float(n, "max_smooth_angle", -1)};
-	r = mesh_finish(&out->mesh, &f, arena, dropped, n, e);
-	if (out->made_here && out->mesh.triangle_count > 0)
-		*dropped = 0;
-	return r;
+	return r || out->kind != SHAPE_MESH ? r : finish(out, n, arena, dropped, e);
 }

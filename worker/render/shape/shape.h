@@ -3,14 +3,15 @@
  * Shapes. One file per plug-in and one line in shape_list.h: the scene reader knows it, and the generic tests include
  * it.
  *
- * A shape becomes triangles or a sphere in world space (to_world applied, not yet rescaled), in double. Triangles are
- * wound counter-clockwise as seen from outside. v = 0 is the top row of an image, as in both Mitsubas (OBJ files count
- * from the bottom and are converted unless flip_tex_coords is false).
+ * A shape becomes triangles, a sphere or curves in world space (to_world applied, not yet rescaled), in double.
+ * Triangles are wound counter-clockwise as seen from outside. v = 0 is the top row of an image, as in both Mitsubas
+ * (OBJ files count from the bottom and are converted unless flip_tex_coords is false).
  */
 #ifndef WORKER_RENDER_SHAPE_SHAPE_H
 #define WORKER_RENDER_SHAPE_SHAPE_H
 
 #include "worker/render/scene/scene.h"
+#include "worker/render/shape/curve.h"
 #include "worker/render/shape/mesh.h"
 
 struct sphere {
@@ -20,7 +21,7 @@ struct sphere {
 	mat4 to_world;	   /* rotation of the parametrisation only (uv), orthonormal */
 };
 
-enum shape_kind { SHAPE_MESH, SHAPE_SPHERE };
+enum shape_kind { SHAPE_MESH, SHAPE_SPHERE, SHAPE_CURVE };
 
 struct shape_geometry {
 	enum shape_kind kind;
@@ -30,13 +31,14 @@ struct shape_geometry {
 	bool face_normals; /* its file wants flat shading */
 	bool materials;	   /* its file assigns materials to faces, which are not read */
 	struct sphere sphere;
+	struct curve curve;
 };
 
 struct shape_ops {
 	struct plugin_decl decl;
 	/* NULL: it holds other shapes (group.h), and is not built itself. */
-	/* Fills in *out: the sphere in world space, or the mesh, in object space unless it is `placed` (shape_build
-	 * places and checks it). */
+	/* Fills in *out: the sphere or the curves in world space, or the mesh, in object space unless it is `placed`
+	 * (shape_build places and checks it). */
 	int (*build)(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		     struct shape_geometry *out, struct error *e);
 };
@@ -51,5 +53,8 @@ extern const struct shape_ops *const shape_registry[]; /* ends with NULL */
  * and counted in *dropped; a mesh may have none left. One thread; allocates in the arena. */
 int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		struct shape_geometry *out, uint64_t *dropped, struct error *e);
+/* Makes the curves of a SHAPE_CURVE node a mesh of tubes. */
+int shape_curve_mesh(struct shape_geometry *g, const struct scene_node *n, struct arena *arena, uint64_t *dropped,
+		     struct error *e);
 
 #endif

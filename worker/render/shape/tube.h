@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Tubes as meshes, for curves: rings of TUBE_SIDES vertices around an axis, strung together. Radii are enlarged so that
- * the area of a straight tube, and its width averaged over all directions, are those of the round one; its silhouette
- * is off by at most 2.3 % of the radius. Texture coordinates: u once around, v as given. Around the axis they begin at
- * Mitsuba's direction at the start of a tube, and are carried along without twist.
+ * Tubes as meshes, for curves of which something needs triangles (curve.h): rings of TUBE_SIDES vertices around an
+ * axis, strung together. Radii are enlarged so that the area of a straight tube, and its width averaged over all
+ * directions, are those of the round one; its silhouette is off by at most 2.3 % of the radius. Texture coordinates: u
+ * once around, v as given. Around the axis they begin at Mitsuba's direction at the start of a tube, and are carried
+ * along without twist.
  *
  * One thread; the mesh is in the arena.
  */

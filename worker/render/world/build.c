@@ -12,6 +12,7 @@
 #include "common/base/mem.h"
 #include "worker/render/bsdf/diffuse.h"
 #include "worker/render/bsdf/twosided.h"
+#include "worker/render/geom/curves.h"
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/shape/obj_read.h"
 #include "worker/render/texture/picture_cache.h"
@@ -30,8 +31,8 @@
 
 #include <string.h>
 
-/* Bytes that Embree needs per triangle, and per shape with the data of accel.c. */
-enum { EMBREE_TRIANGLE = 150, EMBREE_SHAPE = 320 };
+/* Bytes that Embree needs per triangle, per segment of a curve, and per shape with the data of accel.c. */
+enum { EMBREE_TRIANGLE = 150, EMBREE_SEGMENT = 140, EMBREE_SHAPE = 320 };
 
 static struct attribute_table attributes_of(struct builder *b, uint32_t shape)
 {
@@ -352,13 +353,18 @@ static bool backs_may_surprise(const struct builder *b)
 	return b->w->accuracy.backs <= SETTING_BACKS_AUTO && backs_are_black(b);
 }
 
+static uint32_t segments_of(const struct geom_shape *g)
+{
+	return g->curves ? g->curves->count : 0;
+}
+
 /* A check needs no tree, but what it can say of black backs is worth a fraction of a second. */
 static bool is_quick_to_build(const struct world *w)
 {
 	enum { QUICK = 1 << 18 };
 	uint64_t triangles = 0;
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		triangles += w->shapes[i].triangle_count;
+		triangles += w->shapes[i].triangle_count + segments_of(&w->shapes[i]);
 	return triangles <= QUICK;
 }
 
@@ -462,10 +468,12 @@ void world_summary(const struct world *w, struct render_summary *out)
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];
 		out->triangles += g->triangle_count;
+		out->segments += segments_of(g);
 		if (!g->place || g->place->first == i)
 			out->stored_triangles += g->triangle_count;
 	}
-	out->memory = w->arena.used + EMBREE_TRIANGLE * out->stored_triangles + EMBREE_SHAPE * w->shape_count;
+	out->memory = w->arena.used + EMBREE_TRIANGLE * out->stored_triangles + EMBREE_SEGMENT * out->segments +
+		      EMBREE_SHAPE * w->shape_count;
 }
 
 int world_set_accuracy(struct world *w, const char *text, bool *fits, struct error *e)

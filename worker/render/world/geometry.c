@@ -14,6 +14,7 @@
 #include "worker/render/shape/shape.h"
 #include "worker/render/world/displacement.h"
 #include "worker/render/world/moving.h"
+#include "worker/render/world/place_curves.h"
 #include "worker/render/world/place_mesh.h"
 #include "worker/render/world/shared_mesh.h"
 
@@ -74,12 +75,25 @@ static void note_materials(struct world *w, const struct counted *c)
 			 c->materials, c->materials == 1 ? "" : "es", node_title(c->first_material, first));
 }
 
-static int read_shape(struct builder *b, const struct scene_node *n, struct shape_geometry *g, uint64_t *dropped)
+/* Curves are tubes of triangles where something needs these: displacement, an emitter, from which points are drawn by
+ * area, and instances and motion, which a placement moves. Without any radius they are triangles without area. */
+static bool needs_triangles(const struct builder *b, const struct scene_node *n, const struct shape_geometry *g,
+			    bool placed)
+{
+	return placed || build_is_displaced(b, n) || node_child(n, PLUGIN_EMITTER, 0) || !(g->curve.thickest > 0);
+}
+
+/* placed: instances or motion place what is read. */
+static int read_shape(struct builder *b, const struct scene_node *n, bool placed, struct shape_geometry *g,
+		      uint64_t *dropped)
 {
 	tick();
 	crash_place("building the scene", n->file, n->line);
 	int rc = shape_build(n, b->assets, &b->scratch, g, dropped, b->e);
-	if (rc || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0) || b->forced.of[EFFECT_DISPLACEMENT] < 0)
+	if (!rc && g->kind == SHAPE_CURVE && needs_triangles(b, n, g, placed))
+		rc = shape_curve_mesh(g, n, &b->scratch, dropped, b->e);
+	if (rc || g->kind == SHAPE_CURVE || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0) ||
+	    b->forced.of[EFFECT_DISPLACEMENT] < 0)
 		return rc;
 	return displacement_apply(g, n, b->assets, b->scene->dialect_3, b->w->accuracy.tessellation, &b->scratch, b->e);
 }
@@ -90,7 +104,7 @@ static int take_geometry(struct builder *b, const struct scene_node *n, const st
 {
 	count_flat(counted, n, dropped, g->kind == SHAPE_MESH && g->mesh.triangle_count == 0);
 	count_materials(counted, b, n, g);
-	b->triangles += g->mesh.triangle_count;
+	b->triangles += g->mesh.triangle_count + g->curve.chain_points;
 	return b->triangles <= TRIANGLES_MAX
 		       ? 0
 		       : node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it", TRIANGLES_MAX);
@@ -110,7 +124,7 @@ static int find_shared(struct builder *b, const struct listed_shape *l, struct s
 		m = meshes[l->first] = arena_alloc(&b->scratch, 1, sizeof *m);
 		if (!m)
 			return build_out_of_memory(b->e);
-		rc = read_shape(b, l->node, &m->geometry, &dropped);
+		rc = read_shape(b, l->node, true, &m->geometry, &dropped);
 		if (!rc)
 			shared_mesh_read(m, l->moves != NULL);
 		if (!rc && m->shared)
@@ -138,7 +152,7 @@ static int read_listed(struct builder *b, const struct listed_shape *l, struct s
 	} else if (!rc) {
 		uint64_t dropped = 0;
 		n = shape_placed(l, &b->scratch);
-		rc = n ? read_shape(b, n, g, &dropped) : build_out_of_memory(b->e);
+		rc = n ? read_shape(b, n, l->moves != NULL, g, &dropped) : build_out_of_memory(b->e);
 		if (!rc)
 			rc = take_geometry(b, n, g, dropped, counted);
 		if (rc || (g->kind == SHAPE_MESH && g->mesh.triangle_count == 0))
@@ -272,6 +286,12 @@ int build_place_shapes(struct builder *b)
 			g->sphere_axes.t = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 1, 0}));
 			g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
 			int rc = b->motions[i] ? moving_place_sphere(b, i) : 0;
+			if (rc)
+				return rc;
+			continue;
+		}
+		if (from->kind == SHAPE_CURVE) {
+			int rc = build_place_curves(b, g, &from->curve, b->shape_nodes[i]);
 			if (rc)
 				return rc;
 			continue;

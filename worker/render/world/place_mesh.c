@@ -12,6 +12,8 @@ struct box build_box_of(const struct shape_geometry *g)
 		vec3 r = {g->sphere.radius, g->sphere.radius, g->sphere.radius};
 		return (struct box){vec3_sub(g->sphere.center, r), vec3_add(g->sphere.center, r)};
 	}
+	if (g->kind == SHAPE_CURVE)
+		return (struct box){g->curve.low, g->curve.high};
 	for (uint32_t i = 0; i < g->mesh.vertex_count; i++)
 		box_grow(&b, (vec3){g->mesh.position[i][0], g->mesh.position[i][1], g->mesh.position[i][2]});
 	return b;

@@ -54,6 +54,7 @@ struct render_summary {
 	uint64_t shapes, triangles; /* instances, with everything they show */
 	uint64_t instances, shared_meshes,
 		stored_triangles; /* shapes that share meshes; number of these meshes; their memory */
+	uint64_t segments;	  /* round cones of curves */
 	uint64_t memory;	  /* bytes of the world, approximately; Embree's part is estimated per triangle */
 	double brightest;	  /* see world_brightest */
 	bool beams;		  /* see world_has_beam */

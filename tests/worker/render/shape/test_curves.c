@@ -27,7 +27,12 @@ static struct built_shape built(const char *type, const char *content, const voi
 		 "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
 		 type, content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes, size}, {0}};
-	return built_shape(files, scene_tables());
+	struct built_shape b = built_shape(files, scene_tables());
+	if (!b.result) {
+		assert_int_equal(b.g.kind, SHAPE_CURVE);
+		b.result = shape_curve_mesh(&b.g, b.scene.objects[0], &b.arena, &b.dropped, &b.error);
+	}
+	return b;
 }
 
 static struct built_shape built_ok(const char *type, const char *content, const char *text)
@@ -201,6 +206,42 @@ static void test_areas_and_volumes(void **state)
 			fail_msg("spheres %zu: a volume of %g", i, volume);
 		built_shape_release(&b);
 	}
+}
+
+/* Cones between the points of a chain against the spline that v names: off by at most a twentieth of the largest radius
+ * around, in position and radius together. */
+static void test_chain_of_spline(void **state)
+{
+	(void)state;
+	char text[1024];
+	print_points(text, sizeof text, 4);
+	static const char scene[] =
+		"<scene version='3.0.0'><shape type='bsplinecurve'><string name='filename' value='m'/></shape></scene>";
+	const struct memory_file files[] = {{"s.xml", scene, sizeof scene - 1}, {"m", text, strlen(text)}, {0}};
+	struct built_shape b = built_shape(files, scene_tables());
+	struct list chain = {.size = sizeof(struct chain_point)};
+	assert_int_equal(b.result, 0);
+	assert_true(b.g.kind == SHAPE_CURVE && curve_chain(&b.g.curve, 0, &chain) == 0);
+	assert_int_equal(chain.count, b.g.curve.chain_points);
+	const struct chain_point *p = chain.items;
+	double worst = 0;
+	for (size_t i = 0; i + 1 < chain.count; i++)
+		for (int k = 0; k <= 8; k++) {
+			double x = k / 8.0, r, widest = 0;
+			vec3 c, q = vec3_madd(vec3_scale(1 - x, p[i].center), x, p[i + 1].center);
+			double v = (1 - x) * p[i].v + x * p[i + 1].v;
+			spline_at(points, POINTS, v, &c, &r);
+			int first = (int)fmin(POINTS - 4, floor(v * (POINTS - 3)));
+			for (int j = first; j < first + 4; j++)
+				widest = fmax(widest, points[j][3]);
+			double off =
+				hypot(vec3_length(vec3_sub(c, q)), r - (1 - x) * p[i].radius - x * p[i + 1].radius);
+			worst = fmax(worst, off / widest);
+		}
+	print_message("%zu points for 3 pieces, off by %.4f radii\n", chain.count, worst);
+	assert_true(worst <= 0.05 && worst > 0.01 && chain.count < 40);
+	list_free(&chain);
+	built_shape_release(&b);
 }
 
 /* v grows over all pieces of all curves, the same for each piece. */
@@ -386,6 +427,7 @@ int main(void)
 		cmocka_unit_test(test_areas_and_volumes),
 		cmocka_unit_test(test_placed),
 		cmocka_unit_test(test_v),
+		cmocka_unit_test(test_chain_of_spline),
 		cmocka_unit_test(test_hair),
 		cmocka_unit_test(test_bad_files),
 		cmocka_unit_test(test_extremes),

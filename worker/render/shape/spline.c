@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * To each four control points in a row belongs a part of the curve,
+ *
+ *   c(u) = ((1-u)^3 p0 + (3u^3 - 6u^2 + 4) p1 + (-3u^3 + 3u^2 + 3u + 1) p2 + u^3 p3) / 6,  0 <= u <= 1.
+ *
+ * With n pieces, chords are off by at most max |c''| / (8 n^2), and c'' is linear in u, between p0 - 2 p1 + p2 and
+ * p1 - 2 p2 + p3; the radius is a fourth coordinate. Normals at rings are exact.
+ *
+ * Failures: those of tube_add.
+ */
+#include "worker/render/shape/spline.h"
+
+#include "common/base/liveness.h"
+
+enum { PIECES_MAX = 64 };
+
+/* Weighted sums of the control points, of position and radius. */
+static void combine(const double (*p)[4], const double w[SPLINE_POINTS], vec3 *c, double *r)
+{
+	*c = (vec3){0, 0, 0};
+	*r = 0;
+	for (int i = 0; i < SPLINE_POINTS; i++) {
+		*c = vec3_madd(*c, w[i], mesh_load(p[i]));
+		*r += w[i] * p[i][3];
+	}
+}
+
+/* tolerance: in radii. */
+static unsigned pieces_of(const double (*p)[4], double tolerance)
+{
+	double most = 0, widest = 0;
+	for (int k = 0; k < 2; k++) {
+		double sum = 0;
+		for (int i = 0; i < 4; i++) {
+			double d = p[k][i] - 2 * p[k + 1][i] + p[k + 2][i];
+			sum += d * d;
+		}
+		most = fmax(most, sqrt(sum));
+	}
+	for (int i = 0; i < SPLINE_POINTS; i++)
+		widest = fmax(widest, p[i][3]);
+	double n = most > 0 ? ceil(sqrt(most / (8 * tolerance * widest))) : 1;
+	return n >= 1 && n <= PIECES_MAX ? (unsigned)n : n < 1 ? 1 : PIECES_MAX;
+}
+
+/* At u on the piece; axis: the last ring's, for where the curve stands still. */
+static struct tube_ring ring_at(const double (*p)[4], double u, vec3 axis)
+{
+	double t = 1 - u;
+	const double w[SPLINE_POINTS] = {t * t * t / 6, (3 * u * u * u - 6 * u * u + 4) / 6,
+					 (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6, u * u * u / 6},
+		     first[SPLINE_POINTS] = {-t * t / 2, (3 * u * u - 4 * u) / 2, (-3 * u * u + 2 * u + 1) / 2,
+					     u * u / 2},
+		     second[SPLINE_POINTS] = {t, 3 * u - 2, 1 - 3 * u, u};
+	struct tube_ring r = {.cos = 1};
+	vec3 d, dd;
+	double dr, unused;
+	combine(p, w, &r.center, &r.radius);
+	combine(p, first, &d, &dr);
+	combine(p, second, &dd, &unused);
+	double speed = vec3_length(d);
+	r.axis = speed > 0 ? mesh_unit(d) : axis;
+	if (speed > 0 && speed * speed > 0) {
+		double slope = -dr / speed, length = hypot(1, slope);
+		r.cos = 1 / length;
+		r.sin = slope / length;
+		r.bend = vec3_scale(1 / (speed * speed), dd);
+	}
+	return r;
+}
+
+/* Where the curve stands still at its start: the direction that it takes. */
+static vec3 first_axis(const double (*p)[4], uint32_t count)
+{
+	for (uint32_t i = 1; i < count; i++) {
+		vec3 d = mesh_unit(vec3_sub(mesh_load(p[i]), mesh_load(p[0])));
+		if (vec3_length(d) > 0)
+			return d;
+	}
+	return (vec3){0, 0, 1};
+}
+
+int spline_add(struct list *rings, const double (*points)[4], uint32_t count, double tolerance, double v, double v_step)
+{
+	vec3 axis = first_axis(points, count);
+	int rc = 0;
+	for (uint32_t i = 0; i + SPLINE_POINTS <= count && !rc; i++) {
+		unsigned n = pieces_of(points + i, tolerance);
+		tick();
+		for (unsigned k = i > 0; k <= n && !rc; k++) {
+			struct tube_ring r = ring_at(points + i, (double)k / n, axis);
+			r.first = i == 0 && k == 0;
+			r.v = v + v_step * (i + (double)k / n);
+			axis = r.axis;
+			rc = tube_add(rings, &r);
+		}
+	}
+	return rc;
+}
