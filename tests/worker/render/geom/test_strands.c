@@ -138,6 +138,33 @@ static void test_segments(void **state)
 	assert_true(inner > dice_count(20000) / 4);
 }
 
+/* From points so near to a joint that they are on two cones as far as double can tell: outwards a straight chain is not
+ * met again, inwards once. Straight in float, too; of one radius, and tapered. */
+static void test_joints(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("joints of strands");
+	for (size_t i = 0; i < dice_count(40000); i++) {
+		struct strand s;
+		strand_begin(&s);
+		for (int k = 0; k < 5; k++)
+			strand_add(&s, (vec3){0.5 * k - 1, 0.375, 0.125}, i % 2 ? 0.25 : 0.5 - 0.0625 * k);
+		strand_end(&s);
+		uint32_t from = 1 + dice_below(&d, 2), prim;
+		double near = exp(dice_between(&d, log(1e-17), log(1e-3)));
+		struct curve_place p;
+		curves_place(&s.c, from, (struct curve_site){i / 2 % 2 ? near : 1 - near, dice_between(&d, -3, 3)}, &p);
+		vec3 w = dice_direction(&d);
+		struct curve_ray r = {.o = p.p, .d = w, .t_max = INFINITY, .starts = true, .from = from};
+		struct curve_crossing x;
+		bool any = nearest(&s, &r, &prim, &x);
+		if (fabs(vec3_dot(w, p.n)) < 1e-6)
+			continue;
+		if (any != (vec3_dot(w, p.n) < 0) || (any && !(x.t > 0.1 * fabs(vec3_dot(w, p.n)))))
+			fail_msg("ray %zu, %g from a joint: %smet, at %g", i, near, any ? "" : "not ", any ? x.t : 0);
+	}
+}
+
 /* Open ends: a ray along the axis of a straight chain meets nothing, and one from the side two walls. */
 static void test_open(void **state)
 {
@@ -190,10 +217,8 @@ static void test_places(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_crossings),
-		cmocka_unit_test(test_segments),
-		cmocka_unit_test(test_open),
-		cmocka_unit_test(test_places),
+		cmocka_unit_test(test_crossings), cmocka_unit_test(test_segments), cmocka_unit_test(test_joints),
+		cmocka_unit_test(test_open),	  cmocka_unit_test(test_places),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -84,6 +84,12 @@ static void test_kinds(void **state)
 				 g->triangle_count);
 		if (i == 1)
 			assert_true(g->normal_sign < 0);
+		uint32_t begun = 0, ended = 0;
+		for (uint32_t k = 0; g->curves && k < g->curves->count; k++) {
+			begun += (g->curves->cone[k] & CURVE_BEGINS) != 0;
+			ended += (g->curves->cone[k] & CURVE_ENDS) != 0;
+		}
+		assert_true(begun == (cases[i].cones ? 2 : 0) && ended == begun);
 		world_free(w);
 	}
 	/* A bent piece of a spline has more than one, and fewer than a hundred. */
