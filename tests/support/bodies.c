@@ -108,7 +108,8 @@ struct accel *body_accel(const struct geom_shape *shapes, uint32_t count)
 					    SURFACE_OPAQUE,
 					    g->place,
 					    (const double(*)[3])g->unrounded,
-					    g->curves};
+					    g->curves,
+					    g->culled};
 	}
 	struct accel *accel;
 	struct error e = {""};

@@ -33,6 +33,7 @@ struct bsdf_point {
 	struct texture_point where;
 	const struct wavelengths *w;
 	enum transport transport;
+	bool culled;		   /* no ray meets the surface from below its normal: struct bsdf.culls */
 	struct relief_place place; /* for parts that look at other shading frames: tilted.h, bump_shadow.h */
 };
 
@@ -100,13 +101,14 @@ struct bsdf {
 	const struct ior *ior; /* for both sides (enum ior_side); NULL: only eta is known */
 	bool two_sided;	       /* scatters light that arrives from below the normal */
 	bool textured;
-	bool directed;		     /* not reciprocal, and specular lobes are chosen with other probabilities by
-					paths from a light than by those from the camera */
-	bool uses_place;	     /* some part looks at other shading frames of the surface: bsdf_point.place */
-	bool passes;		     /* a mask, or nothing at all: what lies behind shows through */
-	bool uses_tangents;	     /* differs along the two axes of the frame, or bends normals by a normal map */
-	bool black;		     /* neither reflects nor transmits */
-	enum color_shape shape;	     /* CONSTANT: carries no colour */
+	bool directed;		/* not reciprocal, and specular lobes are chosen with other probabilities by
+				   paths from a light than by those from the camera */
+	bool culls;		/* what goes through a curve of it leaves without a vertex: struct geom_shape.culled */
+	bool uses_place;	/* some part looks at other shading frames of the surface: bsdf_point.place */
+	bool passes;		/* a mask, or nothing at all: what lies behind shows through */
+	bool uses_tangents;	/* differs along the two axes of the frame, or bends normals by a normal map */
+	bool black;		/* neither reflects nor transmits */
+	enum color_shape shape; /* CONSTANT: carries no colour */
 	const struct relief *relief; /* bends the shading normals of the surface; NULL: none */
 	void *data;
 };

@@ -12,11 +12,14 @@
  * on absorption, in units of one over the fibre's radius. Melanin's coefficients are Rec. 709 colours and are made
  * spectra like those of media: divided by twice the maximum, upsampled as reflectances are, and multiplied again.
  *
- * Lobes go to both sides. What goes into the fibre has to get out: seen from inside, the surface is not there. Mitsuba
- * tells its curves to ignore such rays, and its plug-in has a null component for the back; here it is a specular lobe
- * that goes straight on, on any shape, of which a path counts an edge and through which next event estimation does not
- * look. A path that comes from a light cannot know whether the surface at which it arrives from outside is the one that
- * the camera sees, or lies behind it: half of them go straight through, to scatter where the light leaves.
+ * Lobes go to both sides. What goes into the fibre has to get out: seen from inside, the surface is not there. Curves
+ * ignore such rays (bsdf.culls), as Mitsuba's do: on the way from a vertex to a lamp the fibre around it is no
+ * obstacle. Only vertices that the camera's side of the path meets from outside scatter, so paths from a light find
+ * what is reflected, and those from the camera and connections the rest. Other shapes, and curves that are meshes, have
+ * a specular lobe for the back that goes straight on, of which a path counts an edge and through which next event
+ * estimation does not look. There a path that comes from a light cannot know whether the surface at which it arrives
+ * from outside is the one that the camera sees, or lies behind it: half of them go straight through, to scatter where
+ * the light leaves.
  *
  * f is not reciprocal: h is the camera's. Importance is radiance the other way round, as everywhere (bsdf.h). Its
  * directions are drawn along the fibre from M, which is symmetric, and around it in proportion to the cosine, half of
@@ -158,7 +161,7 @@ static void find_chances(const struct hair *h, const struct bsdf_point *p, const
 }
 
 /* The density of a path from a light, which leaves to a camera. */
-static double adjoint_pdf(const struct hair *h, vec3 light, vec3 camera)
+static double adjoint_pdf(const struct hair *h, bool culled, vec3 light, vec3 camera)
 {
 	struct angles from = angles_of(light), to = angles_of(camera);
 	double sum = 0, cosine = 0.5 * camera.z / to.theta.cos;
@@ -168,7 +171,7 @@ static double adjoint_pdf(const struct hair *h, vec3 light, vec3 camera)
 			around = 0.5 * (cosine + hair_around(&h->fibre, to.phi + from.phi - WARP_PI));
 		sum += adjoint_chance[p] * hair_along(&h->fibre, p, from.theta, to.theta) * around;
 	}
-	return light.z > 0 ? (1 - PASSING) * sum : sum;
+	return light.z > 0 && !culled ? (1 - PASSING) * sum : sum;
 }
 
 static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -176,7 +179,7 @@ static double hair_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	const struct hair *h = b->data;
 	double chance[HAIR_LOBES], lobe[HAIR_LOBES], sum = 0;
 	if (p->transport == TRANSPORT_IMPORTANCE)
-		return wi.z > 0 && fabs(wo.z) >= LEAST_COSINE ? adjoint_pdf(h, wo, wi) : 0;
+		return wi.z > 0 && fabs(wo.z) >= LEAST_COSINE ? adjoint_pdf(h, p->culled, wo, wi) : 0;
 	if (!(wo.z > 0 && fabs(wi.z) >= LEAST_COSINE))
 		return 0;
 	struct seen s = seen_from(h, wo);
@@ -224,7 +227,7 @@ static vec3 sample_importance(const struct hair *h, vec3 wo, const double u[2], 
 
 static bool passes(const struct bsdf_point *p, vec3 wo)
 {
-	return p->transport == TRANSPORT_RADIANCE ? wo.z <= -DBL_MIN : wo.z >= DBL_MIN;
+	return !p->culled && (p->transport == TRANSPORT_RADIANCE ? wo.z <= -DBL_MIN : wo.z >= DBL_MIN);
 }
 
 static spectrum hair_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
@@ -248,7 +251,7 @@ static bool hair_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 		static const double ways[2] = {PASSING, 1 - PASSING};
 		if (radiance || pick(ways, 2, &rest) == 0)
 			return bsdf_sample_delta(b, p, wo, BSDF_TRANSMIT | BSDF_STRAIGHT, out);
-	} else if (!(radiance ? wo.z > 0 : wo.z < 0)) {
+	} else if (!(radiance || p->culled ? wo.z >= LEAST_COSINE : wo.z < 0)) {
 		return false;
 	}
 	return bsdf_sample_smooth(b, p, wo, radiance ? sample_radiance(h, p, wo, u) : sample_importance(h, wo, u, rest),
@@ -310,6 +313,7 @@ static int hair_create(struct bsdf *b, const struct scene_node *n, const struct 
 	b->has_smooth = b->has_delta = true;
 	b->two_sided = true;
 	b->directed = true;
+	b->culls = true;
 	b->uses_tangents = true;
 	b->alpha_mean = 1;
 	return read_absorption(h, b, n, build, e);

@@ -137,7 +137,7 @@ static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t 
 
 static int attach_curves(struct accel *a, const struct accel_shape *s, uint32_t id)
 {
-	a->curves[id] = (struct curve_prims){s->curves, id, a->off, a->off_far};
+	a->curves[id] = (struct curve_prims){s->curves, s->culled, id, a->off, a->off_far};
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
 	if (!g)
 		return -ENOMEM;

@@ -175,11 +175,26 @@ static void begin(struct meeting *m, const struct curves *c, uint32_t prim, cons
 	find_candidates(m);
 }
 
+/* Whether the ray goes along the outward normal at a point of that part. */
+static bool leaves(const struct meeting *m, enum cone_part part, vec3 p)
+{
+	const struct cone *k = &m->cone;
+	vec3 q = vec3_sub(p, k->p0), d = m->ray->d;
+	double y = vec3_dot(q, k->axis);
+	vec3 away = vec3_madd(q, -y, k->axis);
+	if (part == CONE_START)
+		return vec3_dot(q, d) > 0;
+	if (part == CONE_END)
+		return vec3_dot(vec3_madd(q, -k->length, k->axis), d) > 0;
+	return k->cos * vec3_dot(away, d) + k->sin * vec3_length(away) * vec3_dot(k->axis, d) > 0;
+}
+
 /* It is in its part and not hidden. */
 static bool is_there(const struct meeting *m, const struct curve_crossing *x)
 {
 	vec3 p = vec3_madd(m->ray->o, x->t, m->ray->d);
-	return cone_has(&m->cone, x->part, p, m->slack) && !hidden(m->curves, m->prim, &m->cone, p, m->slack);
+	return cone_has(&m->cone, x->part, p, m->slack) && !(m->ray->culled && leaves(m, x->part, p)) &&
+	       !hidden(m->curves, m->prim, &m->cone, p, m->slack);
 }
 
 bool curves_meet_near(const struct curves *c, uint32_t prim, const struct curve_ray *r, double t_near,

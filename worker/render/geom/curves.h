@@ -45,6 +45,7 @@ struct curve_ray {
 	bool starts, ends; /* o is on a primitive of these curves; end is */
 	uint32_t from, to; /* on which */
 	double t_min, t_max;
+	bool culled; /* it leaves the curves without meeting them */
 };
 
 /* Which part of a cone is met, at which of the two roots. */

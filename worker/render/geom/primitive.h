@@ -31,6 +31,7 @@ struct accel_shape {
 	const double (*unrounded)[3];  /* vertices in double, for a shape too large for floats relative to small ones;
 					  NULL: position */
 	const struct curves *curves;   /* it is these, without triangles; NULL: it is none */
+	bool culled;		       /* curves: no ray meets them from inside */
 };
 
 /* Of a triangle; time: see struct prim_ref. */

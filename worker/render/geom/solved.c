@@ -225,7 +225,8 @@ static struct curve_ray curve_ray_of(const struct curve_prims *c, const struct q
 				  .from = q->from.prim,
 				  .to = q->to.prim,
 				  .t_min = q->t_min,
-				  .t_max = t_max};
+				  .t_max = t_max,
+				  .culled = c->culled};
 }
 
 /* Hairs are so thin that two crossings may have the same float tfar, which is compared in double. u and v: what

@@ -46,6 +46,7 @@ struct wide_prims {
 
 struct curve_prims {
 	const struct curves *curves;
+	bool culled;
 	uint32_t shape;
 	double off, off_far; /* a ray given to Embree may pass a point p at this distance from the true one: off +
 				off_far |p| */

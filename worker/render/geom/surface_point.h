@@ -23,6 +23,7 @@ struct geom_shape {
 					  is used */
 	const struct relief *relief;   /* bends shading normals; NULL: none */
 	const struct curves *curves;   /* it is these, with normal_sign; NULL: it is none */
+	bool culled;		       /* curves: no ray meets them from inside, where normals do not point */
 	const struct placement *place; /* for instances, and spheres that move; NULL: positions and normals are in world
 					  space */
 	double unit;		       /* the scene's unit of length in world units: for relief */

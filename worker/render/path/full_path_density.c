@@ -45,8 +45,12 @@ static void delta_densities(const struct full_path *x, unsigned j, double *to_li
 		from_light = path_delta_chance(v->bsdf, &p, frame_to_local(&v->x.sh, i), v->mode);
 	}
 	path_delta_per_solid(&v->x, i, o, full_path_eta(x, j), &light, &camera);
-	*to_light = chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2;
-	*to_camera = from_light * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2;
+	*to_light = path_meets(i, &x->v[j - 1])
+			    ? chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2
+			    : 0;
+	*to_camera = path_meets(o, &x->v[j + 1])
+			     ? from_light * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2
+			     : 0;
 }
 
 /* Of events, or of none, along edge e: for v[e] from the camera's side, for v[e + 1] from the light's. */

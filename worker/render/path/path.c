@@ -95,7 +95,7 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 {
 	double distance2, solid = 0;
 	vec3 omega = path_direction(at, next, &distance2);
-	if (!(distance2 > 0) || !path_can_be_hit(c, next))
+	if (!(distance2 > 0) || !path_can_be_hit(c, next) || !path_meets(omega, next))
 		return 0;
 	if (at->kind == VERTEX_INFINITE)
 		return disk_pdf(c->w) * (next->kind == VERTEX_MEDIUM ? 1 : jac_disk_from_area(next->x.ng, omega));
@@ -213,7 +213,7 @@ static double reach_pdf(const struct path_context *c, const struct path_vertex *
 {
 	double distance2;
 	vec3 omega = path_direction(at, to, &distance2);
-	if (!(distance2 > 0) || !path_can_be_hit(c, to))
+	if (!(distance2 > 0) || !path_can_be_hit(c, to) || !path_meets(omega, to))
 		return 0;
 	double lobe = solid * per_solid;
 	return to->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(to, omega, distance2);

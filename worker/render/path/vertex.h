@@ -122,6 +122,12 @@ static inline double path_cosine(const struct path_vertex *v, vec3 w)
 	return fabs(vec3_dot(n, w));
 }
 
+/* Whether a ray along w meets the vertex: on culled curves only from outside. */
+static inline bool path_meets(vec3 w, const struct path_vertex *v)
+{
+	return v->kind != VERTEX_SURFACE || !v->x.shape->culled || vec3_dot(v->x.ng, w) < 0;
+}
+
 /* Density per solid angle at x -> per area at y, or per volume in a medium. omega: the unit direction between them. */
 static inline double path_jac_solid_from_vertex(const struct path_vertex *y, vec3 omega, double distance2)
 {

@@ -82,6 +82,14 @@ static void set_volumes(struct builder *b)
 /* One BSDF per node, however many shapes refer to it, unless it uses the shape's attributes: then one per mesh,
  * which instances share, or one per shape if it shows edges. The default is grey, or black for emitters, or in 0.6 none
  * for media. */
+static void set_bsdf(struct world *w, uint32_t shape, uint32_t bsdf)
+{
+	struct geom_shape *g = &w->shapes[shape];
+	w->parts[shape].bsdf = bsdf;
+	g->relief = w->bsdfs[bsdf].relief;
+	g->culled = g->curves && g->normal_sign > 0 && w->bsdfs[bsdf].culls;
+}
+
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
@@ -114,12 +122,10 @@ static int create_bsdfs(struct builder *b)
 		uint32_t k;
 		if (node_table_find(&made, key, NULL, &k) ||
 		    (w->shapes[i].index && node_table_find(&made, key, w->shapes[i].index, &k))) {
-			w->parts[i].bsdf = k;
-			w->shapes[i].relief = w->bsdfs[k].relief;
+			set_bsdf(w, i, k);
 			continue;
 		}
 		k = w->bsdf_count++;
-		w->parts[i].bsdf = k;
 		b->bsdf_nodes[k] = key;
 		struct attribute_table attributes = attributes_of(b, i);
 		struct bend *bends = NULL;
@@ -138,7 +144,7 @@ static int create_bsdfs(struct builder *b)
 			return rc;
 		if (attributes.asked != ASKED_EDGES)
 			node_table_add(&made, key, attributes.asked ? w->shapes[i].index : NULL, k);
-		w->shapes[i].relief = w->bsdfs[k].relief;
+		set_bsdf(w, i, k);
 	}
 	return 0;
 }

@@ -33,6 +33,7 @@ struct accel_shape *coincident_shapes(const struct world *w, struct arena *arena
 			.place = g->place,
 			.unrounded = (const double(*)[3])g->unrounded,
 			.curves = g->curves,
+			.culled = g->culled,
 		};
 	}
 	return s;

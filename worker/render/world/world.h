@@ -114,7 +114,8 @@ static inline struct emitter_point world_emitter_point(const struct surface_poin
 static inline struct bsdf_point world_bsdf_point(const struct surface_point *x, const struct wavelengths *w,
 						 enum transport transport)
 {
-	return (struct bsdf_point){world_texture_point(x), w, transport, {x, surface_frame_with}};
+	return (struct bsdf_point){
+		world_texture_point(x), w, transport, x->shape && x->shape->culled, {x, surface_frame_with}};
 }
 
 #endif

@@ -348,7 +348,8 @@ static void test_furnace_by_quadrature(void **state)
 	arena_fini(&a);
 }
 
-/* Importance: drawn as its density says, straight on with half the probability from outside, never to the inside. */
+/* Importance: drawn as its density says, never to the inside, and from outside straight on with half the probability,
+ * unless the back is culled: then nothing goes straight on, and no light comes from inside. */
 static void test_importance(void **state)
 {
 	(void)state;
@@ -356,10 +357,13 @@ static void test_importance(void **state)
 	struct arena a = {0};
 	struct bsdf b;
 	struct dice d = dice_of(__func__);
-	const struct bsdf_point at = point_of(TRANSPORT_IMPORTANCE), to_camera = point_of(TRANSPORT_RADIANCE);
+	struct bsdf_point at = point_of(TRANSPORT_IMPORTANCE), to_camera = point_of(TRANSPORT_RADIANCE);
 	bsdf_make(&a, "hair longitudinal_roughness=0.5 azimuthal_roughness=0.6", &b);
-	for (int i = 0; i < 8; i++) {
+	for (int i = 0; i < 12; i++) {
 		vec3 light = dice_direction(&d), wi;
+		at.culled = to_camera.culled = i >= 8;
+		if (at.culled)
+			light.z = fabs(light.z);
 		uint64_t seen[CELLS + 1] = {0}, n = dice_count(40000);
 		double expected[CELLS + 1] = {0}, inside = 0, chance = 0;
 		for (int c = 0; c < CELLS * INNER * INNER; c++) {
@@ -391,9 +395,9 @@ static void test_importance(void **state)
 		if (!(p > LEVEL))
 			fail_msg("importance from z = %g: p = %g", light.z, p);
 		spectrum w = bsdf_eval_delta(&b, &at, light, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi, &chance);
-		assert_true(light.z > 0 ? w.v[0] == 1 && chance == 0.5 && wi.z == -light.z : w.v[0] == 0);
+		assert_true(light.z > 0 && !at.culled ? w.v[0] == 1 && chance == 0.5 && wi.z == -light.z : w.v[0] == 0);
 		w = bsdf_eval_delta(&b, &to_camera, light, BSDF_TRANSMIT | BSDF_STRAIGHT, &wi, &chance);
-		assert_true(light.z < 0 ? w.v[0] == 1 && chance == 1 : w.v[0] == 0);
+		assert_true(light.z < 0 && !at.culled ? w.v[0] == 1 && chance == 1 : w.v[0] == 0);
 	}
 	arena_fini(&a);
 }

@@ -91,6 +91,45 @@ static void test_crossings(void **state)
 	}
 }
 
+/* A culled chain is met where a ray enters it, and nowhere else: of the crossings of one that is not, every second. */
+static void test_culled(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("culled strands");
+	size_t entered = 0;
+	for (size_t i = 0; i < dice_count(14000); i++) {
+		const struct kind *k = &kinds[i % KINDS];
+		struct strand s;
+		make(&s, k, &d);
+		vec3 w = dice_direction(&d);
+		struct curve_ray r = {.o = vec3_madd(aimed_at(&s, &d), -20, w), .d = w, .t_max = INFINITY}, culled = r;
+		culled.culled = true;
+		uint32_t prim, culled_prim;
+		struct curve_crossing x, y;
+		while (nearest(&s, &r, &prim, &x)) {
+			struct cone c = curves_cone(&s.c, prim);
+			struct curve_place p;
+			curves_place(&s.c, prim, curves_site(&c, x.part, vec3_madd(r.o, x.t, w)), &p);
+			if (vec3_dot(p.n, w) < 0) {
+				if (!(nearest(&s, &culled, &culled_prim, &y) && culled_prim == prim &&
+				      y.part == x.part))
+					fail_msg("%s, ray %zu: the chain is not entered", k->name, i);
+				culled = (struct curve_ray){.o = p.p,
+							    .d = w,
+							    .t_max = INFINITY,
+							    .starts = true,
+							    .from = prim,
+							    .culled = true};
+				entered++;
+			}
+			r = (struct curve_ray){.o = p.p, .d = w, .t_max = INFINITY, .starts = true, .from = prim};
+		}
+		if (nearest(&s, &culled, &culled_prim, &y))
+			fail_msg("%s, ray %zu: it is met from inside", k->name, i);
+	}
+	assert_true(entered > dice_count(7000));
+}
+
 /* A segment between two points of the surface meets nothing at its ends. */
 static void test_segments(void **state)
 {
@@ -217,8 +256,8 @@ static void test_places(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_crossings), cmocka_unit_test(test_segments), cmocka_unit_test(test_joints),
-		cmocka_unit_test(test_open),	  cmocka_unit_test(test_places),
+		cmocka_unit_test(test_crossings), cmocka_unit_test(test_segments), cmocka_unit_test(test_culled),
+		cmocka_unit_test(test_joints),	  cmocka_unit_test(test_open),	   cmocka_unit_test(test_places),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

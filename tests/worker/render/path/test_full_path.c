@@ -141,6 +141,8 @@ static void test_surfaces(void **state)
 	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
 	/* Its way straight on has another probability for a path from the lamp than for one from the camera. */
 	check("hair", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='hair'/>")), 3000);
+	/* The backs of curves are culled. */
+	check("hairs", world_of_own_scene("integrators", "hair.xml", 32, 32), 3000);
 }
 
 /* Coloured glass around a stone that states no medium, and around a bubble that states what is outside of it; water up
