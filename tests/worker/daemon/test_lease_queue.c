@@ -422,10 +422,10 @@ static void a_store_without_room_fails_each_once(void **state)
 	start(MESH - 1);
 	begin_jobs(2);
 	serve_mesh(0, 1);
-	const uint64_t first = hear_failed("more bytes exceed its limit");
+	const uint64_t first = hear_failed("exceeds its limit");
 	assert_false(t.own); /* it was set up so: no worker may have room for such a file */
 	serve_mesh(0, 1);
-	assert_int_equal(hear_failed("more bytes exceed its limit"), 3 - first);
+	assert_int_equal(hear_failed("exceeds its limit"), 3 - first);
 	hear_silence();
 	finish();
 }

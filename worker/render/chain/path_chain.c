@@ -196,6 +196,6 @@ const struct integrator integrator_hslt = {
 	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, FULL_PATH_MAX_EDGES,
 		 .has_mutations = true, .to_emitters = true},
 	.stream = RNG_BOOTSTRAP,
-	.evaluate = path_trace_both_ways,
+	.evaluate = path_trace_candidates,
 	.chain = &chain_path,
 };

@@ -53,7 +53,7 @@ static void join_lens(struct path_context *c, struct sampler *s, unsigned light,
 	c->camera[0].next_event[0] = u[DIM_EMITTER_POINT];
 	c->camera[0].next_event[1] = u[DIM_EMITTER_POINT + 1];
 	c->camera[0].next_event[2] = u[DIM_EMITTER_CHOICE];
-	for (unsigned j = 1; j <= c->max_depth && (j == 1 || j <= light); j++) {
+	for (unsigned j = c->joins_lens ? 1 : 2; j <= c->max_depth && (j == 1 || j <= light); j++) {
 		double at[2];
 		if (j < c->min_depth)
 			continue;
@@ -72,7 +72,7 @@ static double faint_beside(const struct path_context *c, spectrum found)
 	return c->roulette > 0 ? faint_share * spectrum_mean(found) : 0;
 }
 
-void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
+static void trace(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
 	struct classes classes;
@@ -80,7 +80,6 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 	out->classes = 0;
 	out->intensity = 0;
 	c->one_way = false;
-	c->joins_lens = true;
 	unsigned camera = path_walk_camera(c, s, c->max_depth + 1, film);
 	bool lit = has_light(c, s);
 	unsigned light = lit ? path_walk_light(c, s, c->max_depth) : 0;
@@ -106,7 +105,18 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 		classes_clear(out);
 	if (lit)
 		join_lens(c, s, light, &classes, out);
+}
+
+void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	c->joins_lens = true;
+	trace(c, s, out);
 	c->joins_lens = false;
+}
+
+void path_trace_candidates(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	trace(c, s, out);
 }
 
 const struct integrator integrator_bdpt8 = {

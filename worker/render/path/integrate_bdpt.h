@@ -7,5 +7,8 @@
 #include "worker/render/path/path.h"
 
 void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
+/* The same by the techniques of ensemble_draw: what it brings is the sum of those candidates for a chain's seed. Points
+ * of emitters are not joined to the lens. */
+void path_trace_candidates(struct path_context *c, struct sampler *s, struct path_sample *out);
 
 #endif

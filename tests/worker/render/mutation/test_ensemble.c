@@ -8,11 +8,13 @@
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
+#include "tests/support/worlds.h"
 #include "worker/render/mutation/mutation.h"
 #include "worker/render/mutation/trace.h"
 #include "worker/render/math/logsum.h"
 #include "worker/render/path/ensemble.h"
 #include "worker/render/path/full_path_density.h"
+#include "worker/render/path/integrator.h"
 #include "worker/render/world/build.h"
 
 #include <setjmp.h>
@@ -240,6 +242,34 @@ static void test_streams_of_a_proposal(void **state)
 	world_free(w);
 }
 
+/* A sample of hslt's bootstrap is worth what the candidates for its seed are: a chain starts at one of them. */
+static void test_bootstrap_is_of_candidates(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(
+		32, 32,
+		SENSOR("0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>"
+					 "<shape type='sphere'><point name='center' x='1.2' y='0' z='1'/>"
+					 "<float name='radius' value='.1'/><emitter type='area'/></shape>");
+	const struct integrator *hslt = integrator_find("hslt");
+	const uint64_t seed = stats_seed("bootstrap of candidates");
+	unsigned lit = 0;
+	begin(w);
+	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	for (uint64_t i = 0; i < TRIALS; i++) {
+		static struct path_sample sample;
+		struct sampler_random s;
+		sampler_random_init(&s, seed, RNG_TEST, i, 0);
+		hslt->evaluate(&c, &s.base, &sample);
+		draw(seed, i, &all, &drawn);
+		if (!(fabs(sample.intensity - drawn.total) <= 1e-9 * drawn.total))
+			fail_msg("sample %u: worth %g, its candidates %g", (unsigned)i, sample.intensity, drawn.total);
+		lit += drawn.total > 0;
+	}
+	assert_true(lit > TRIALS / 10);
+	world_free(w);
+}
+
 /* From a point next to the aperture's rim half of the steps lead out, and these are refused: clamped to the rim they
  * would gather there. 1,000 steps; outside 0.42 to 0.58 with probability below 1e-6. */
 static void test_aperture_is_left(void **state)
@@ -269,8 +299,11 @@ static void test_aperture_is_left(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_own_candidate),	  cmocka_unit_test(test_drawn_lengths),
-		cmocka_unit_test(test_chance_of_lengths), cmocka_unit_test(test_streams_of_a_proposal),
+		cmocka_unit_test(test_own_candidate),
+		cmocka_unit_test(test_drawn_lengths),
+		cmocka_unit_test(test_chance_of_lengths),
+		cmocka_unit_test(test_streams_of_a_proposal),
+		cmocka_unit_test(test_bootstrap_is_of_candidates),
 		cmocka_unit_test(test_aperture_is_left),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
