@@ -73,10 +73,8 @@ double job_progress(const struct job *j, double now)
 	if (j->state == JOB_DONE)
 		return 1;
 	double p = work_done(j) / work_total(j).middle;
-	if (has_time(j) && job_is_live(j)) {
-		double left = time_left(j, rate_value(&j->rate, now), now), elapsed = job_elapsed(j, now);
-		p = fmax(p, isnan(left) ? 1 : elapsed / (elapsed + left));
-	}
+	if (has_time(j) && job_is_live(j)) /* never less than before, unlike what follows from a rate */
+		p = fmax(p, fmin(0.99, job_elapsed(j, now) / j->plan.seconds));
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
