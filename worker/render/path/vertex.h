@@ -125,7 +125,8 @@ static inline double path_cosine(const struct path_vertex *v, vec3 w)
 /* Whether a ray along w meets the vertex: on culled curves only from outside. */
 static inline bool path_meets(vec3 w, const struct path_vertex *v)
 {
-	return v->kind != VERTEX_SURFACE || !v->x.shape->culled || vec3_dot(v->x.ng, w) < 0;
+	const struct geom_shape *s = v->kind == VERTEX_SURFACE ? v->x.shape : NULL; /* photons (merging.h) have none */
+	return !s || !s->culled || vec3_dot(v->x.ng, w) < 0;
 }
 
 /* Density per solid angle at x -> per area at y, or per volume in a medium. omega: the unit direction between them. */
