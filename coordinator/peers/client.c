@@ -156,7 +156,7 @@ static void look_for_files(struct session *p)
 	answer_submit(p, 0, "", p->upload);
 }
 
-/* Less than PACE bytes came of it in a time in which a frame of twice as many must be complete. */
+/* It has sent less than PACE bytes for twice the time within which a frame must be complete. */
 static bool stands_still(const struct session *p)
 {
 	return !p->upload->flush && jobs_now(p->jobs) - p->upload->pace.paced > 2 * p->jobs->config.stall_seconds;

@@ -3,8 +3,8 @@
  * The status socket: lines of JSON for every reader.
  *
  * A reader gets a snapshot first, and then what it subscribes to: jobs, workers, or the snapshot. status_tick compares
- * each job with what was last sent about it and sends only changes; nothing is done while nobody is subscribed. The
- * pool makes the text of snapshots, one at a time, and until it is sent nothing else is. At the end the socket's file
+ * each job with what was last sent about it and sends only changes; nothing is done while nobody is subscribed. A
+ * thread makes the text of snapshots, one at a time, and until it is sent nothing else is. At the end the socket's file
  * is removed if it is still the same.
  *
  * A reader that has not read all lines when something changes gets no more of them, but one snapshot at the first tick
