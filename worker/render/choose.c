@@ -290,7 +290,7 @@ static const double *pixel_block(struct sampler *base, enum sampler_side side, u
 /* By `path`, which is cheaper, unless it misses some light. */
 static int make_map(struct pilot *p, bool misses, struct error *e)
 {
-	return brightness_of_samples(&p->map, &p->context, misses ? path_trace_both_ways : path_trace, p->seed,
+	return brightness_of_samples(&p->map, &p->context, misses ? path_trace_candidates : path_trace, p->seed,
 				     RNG_CHOICE, STREAM_MAP, p->samples, e);
 }
 
@@ -390,11 +390,11 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 {
 	struct tally t = begin_look(p);
 	uint64_t few = p->samples / SHORTER;
-	out->bdpt = look_on(p, STREAM_BDPT, 0, few, path_trace_both_ways, &t);
+	out->bdpt = look_on(p, STREAM_BDPT, 0, few, path_trace_candidates, &t);
 	out->samples += few;
 	if (is_clear(out))
 		return;
-	out->bdpt = look_on(p, STREAM_BDPT, few, p->samples, path_trace_both_ways, &t);
+	out->bdpt = look_on(p, STREAM_BDPT, few, p->samples, path_trace_candidates, &t);
 	out->found = t.energy > 0 ? p->path_mean / (t.energy / t.samples) : 0;
 	out->samples += p->samples - few;
 }

@@ -320,9 +320,9 @@ static void count(void *user, const struct batch *b)
 		c->proposed += b->strategy[c->strategy][STRATEGY_PROPOSED];
 }
 
-/* Half of what is sampled is dark, and counted: by the bootstrap and by samples all of it, by strategies all that they
- * propose, by pssmlt 0.3 of the steps within five standard errors (without the dark ones it would be 20 of them less).
- */
+/* Half of what is sampled is dark, less where emitters are joined to the lens, and counted: by the bootstrap and by
+ * samples all of it, by strategies all that they propose, by pssmlt 0.3 of the steps within five standard errors
+ * (without the dark ones it would be 9 of them less). */
 static void zeros_are_counted(void **state)
 {
 	(void)state;
@@ -340,7 +340,7 @@ static void zeros_are_counted(void **state)
 		print_message("%s: %llu of %llu bootstrap samples dark, %.3f of %llu samples independent\n",
 			      p.integrator, (unsigned long long)c.dark, (unsigned long long)c.weights, share,
 			      (unsigned long long)c.samples);
-		assert_true(c.weights == BOOTSTRAP && c.dark > BOOTSTRAP / 3 && c.dark < BOOTSTRAP);
+		assert_true(c.weights == BOOTSTRAP && c.dark > BOOTSTRAP / 8 && c.dark < BOOTSTRAP);
 		assert_true(c.bootstrap == c.weights);
 		if (p.kind == PLAN_SAMPLES)
 			assert_true(c.independent == c.samples &&

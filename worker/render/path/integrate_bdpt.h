@@ -8,7 +8,8 @@
 
 void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
 /* The same by the techniques of ensemble_draw: what it brings is the sum of those candidates for a chain's seed. Points
- * of emitters are not joined to the lens. */
+ * of emitters are not joined to the lens. The pilot looks at these, too: a splat of each sample in the pixel of a small
+ * lamp would look like rare light to it. */
 void path_trace_candidates(struct path_context *c, struct sampler *s, struct path_sample *out);
 
 #endif
