@@ -322,7 +322,7 @@ static void count(void *user, const struct batch *b)
 
 /* Half of what is sampled is dark, less where emitters are joined to the lens, and counted: by the bootstrap and by
  * samples all of it, by strategies all that they propose, by pssmlt 0.3 of the steps within five standard errors
- * (without the dark ones it would be 9 of them less). */
+ * (without the dark ones it would be 6 of them less). */
 static void zeros_are_counted(void **state)
 {
 	(void)state;

@@ -47,10 +47,14 @@ static bool is_delta(const struct joined_path *p, unsigned i)
 	return p->v[i]->delta;
 }
 
-/* Whether emitters are sampled for a path of one edge, from v[1] on the lens to v[0]. */
-static bool lens_joins(const struct path_context *c, const struct path_vertex *emitter)
+/* Whether emitters are sampled for the path from the lens straight to this point of one. Where that is hardly denser
+ * than the film's own samples, whose light there has no variance, it would only add some. */
+static bool lens_joins(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *emitter)
 {
-	return c->joins_lens && emitter->kind != VERTEX_INFINITE;
+	if (!c->joins_lens || emitter->kind == VERTEX_INFINITE)
+		return false;
+	double film = path_pdf(c, NULL, eye, emitter, TRANSPORT_RADIANCE) * (c->light_every > 1 ? c->light_every : 1);
+	return path_pdf_toward(c, emitter, eye->x.p) >= PATH_LENS_DENSER * film;
 }
 
 static bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j)
@@ -60,7 +64,7 @@ static bool technique_exists(const struct path_context *c, const struct joined_p
 	if (p->other_medium && j > p->other_medium)
 		return false;
 	if (p->edges == 1)
-		return j == 1 && lens_joins(c, p->v[0]);
+		return j == 1 && lens_joins(c, p->v[1], p->v[0]);
 	return j <= p->edges && !is_delta(p, j - 1) && !is_delta(p, j);
 }
 
@@ -115,7 +119,7 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 		ratio[j] = 0;
 	/* Technique 1 draws x_0 as seen from x_1, the longer ones as light sub-paths do. */
 	double toward = 1, point = 1;
-	if ((k >= 2 || lens_joins(c, p->v[0])) && (s <= 1 || technique_exists(c, p, 1))) {
+	if ((k >= 2 || c->joins_lens) && (s <= 1 || technique_exists(c, p, 1))) {
 		toward = path_pdf_toward(c, p->v[0], p->v[1]->x.p);
 		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}
@@ -360,7 +364,8 @@ static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, dou
 	struct path_vertex y;
 	double pdf, jac;
 	vec3 d;
-	if (!path_next_event(c, &c->camera[0], &y, &pdf) || !path_can_be_hit(c, &y) || !lens_joins(c, &y))
+	if (!path_next_event(c, &c->camera[0], &y, &pdf) || !path_can_be_hit(c, &y) ||
+	    !lens_joins(c, &c->camera[0], &y))
 		return spectrum_of(0);
 	if (!project(c, &y, film, &d, &jac))
 		return spectrum_of(0);

@@ -20,6 +20,10 @@ struct joined_path {
 	unsigned other_medium;	       /* the first edge about which a light sub-path does not agree; 0: none */
 };
 
+/* Emitters are joined to the lens where the density of their points, times the share of samples that do so, is so many
+ * times that of the film's samples: where they cover less than a hundredth of it. */
+#define PATH_LENS_DENSER 100.0
+
 /* Density of technique j for this path over the density of the technique s that made it: 0 where j cannot make it.
  * Fills ratio[0..edges]; techniques with more than max_s light vertices are left out (0). */
 void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);

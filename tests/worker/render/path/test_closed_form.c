@@ -491,7 +491,7 @@ static void check_small_lamp(const char *name, const char *lamp, double share)
 {
 	static struct agree_image image;
 	const char *const integrators[] = {"bdpt", "bdpt8", "erpt4", "pssmlt"};
-	const uint64_t spp[] = {64, 256, 256, 4096};
+	const uint64_t spp[] = {64, 256, 256, 512};
 	struct world *w = world_of_text(16, 16, DEPTH("3") SENSOR("0,0,4", "0,0,0") "%s", lamp);
 	for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
 		char test[64];
