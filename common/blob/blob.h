@@ -47,7 +47,7 @@ void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path
 
 /* Writing: begin, add in order, commit. Room is made as bytes arrive, so that whoever announces much and sends nothing
  * costs others nothing; begin looks whether the announced size fits beside the blobs that are held. -EFBIG: it does
- * not, or what was to be added does not fit now: nothing was, and the caller may try again. -EINVAL: more than
+ * not, or what was to be added does not fit now: nothing was, and the caller may try again. -EMSGSIZE: more than
  * announced, or announced more than the limit; -EBADMSG: the hash does not match the name. End a writer with commit or
  * abort. A committed blob is held once. */
 struct blob_writer;

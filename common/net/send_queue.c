@@ -2,9 +2,8 @@
 /*
  * In plaintext a frame goes to libuv at once, as two buffers: its checked prefix and its bytes. With TLS it waits in a
  * list and is encrypted piece by piece while libuv has less than WINDOW bytes to write. A frame's memory is freed with
- * its last piece, so until then the pool counts the pieces before that, too, which
- * may exceed its limit until something else is to be sent. `on_written` encrypts more, and says when
- * nothing is left.
+ * its last piece, so until then the pool counts the pieces before that, too, which may exceed its limit until something
+ * else is to be sent. `on_written` encrypts more, and says when nothing is left.
  *
  * Failures are told once to the owner, who closes the stream: no memory, an error of the stream or of TLS, a peer that
  * does not read what is sent to it, here or while all queues together hold too much.

@@ -119,7 +119,7 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 		ratio[j] = 0;
 	/* Technique 1 draws x_0 as seen from x_1, the longer ones as light sub-paths do. */
 	double toward = 1, point = 1;
-	if ((k >= 2 || c->joins_lens) && (s <= 1 || technique_exists(c, p, 1))) {
+	if ((k >= 2 && s <= 1) || technique_exists(c, p, 1)) {
 		toward = path_pdf_toward(c, p->v[0], p->v[1]->x.p);
 		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}

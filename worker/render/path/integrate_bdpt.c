@@ -46,8 +46,8 @@ static spectrum join(struct path_context *c, unsigned j, unsigned t, struct clas
 
 /* The film gets what each vertex of the light sub-path sends to the lens. Instead of its first vertex, a point of an
  * emitter is drawn for the lens, with the same numbers. */
-static void join_lens(struct path_context *c, struct sampler *s, unsigned light, struct classes *classes,
-		      struct path_sample *out)
+static void join_light_to_lens(struct path_context *c, struct sampler *s, unsigned light, struct classes *classes,
+			       struct path_sample *out)
 {
 	const double *u = s->block(s, SIDE_LIGHT, 0);
 	c->camera[0].next_event[0] = u[DIM_EMITTER_POINT];
@@ -72,7 +72,7 @@ static double faint_beside(const struct path_context *c, spectrum found)
 	return c->roulette > 0 ? faint_share * spectrum_mean(found) : 0;
 }
 
-static void trace(struct path_context *c, struct sampler *s, struct path_sample *out)
+void path_trace_candidates(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
 	struct classes classes;
@@ -104,19 +104,14 @@ static void trace(struct path_context *c, struct sampler *s, struct path_sample 
 	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
 		classes_clear(out);
 	if (lit)
-		join_lens(c, s, light, &classes, out);
+		join_light_to_lens(c, s, light, &classes, out);
 }
 
 void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	c->joins_lens = true;
-	trace(c, s, out);
+	path_trace_candidates(c, s, out);
 	c->joins_lens = false;
-}
-
-void path_trace_candidates(struct path_context *c, struct sampler *s, struct path_sample *out)
-{
-	trace(c, s, out);
 }
 
 const struct integrator integrator_bdpt8 = {
