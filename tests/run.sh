@@ -5,7 +5,7 @@
 # Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and
 # tests/e2e/*.sh (one test each; exit 77: skipped; a line `skipped in part: WHY`: one skipped beside the one that passed). The output
 # of what fails is shown; that of what passes, its figures, is left in BUILD/tests/said (and shown with HSLT_TEST_VERBOSE=1). The last
-# lines name what failed, as `failed: NAME`, what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`;
+# lines name what failed, as `failed: NAME: WHY`, what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`;
 # the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 #
 # As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts wait for half of
@@ -27,8 +27,8 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its 
 	took=$(($(date +%s) - begin))
 	echo "$took $file" >"$log.took"
 
-	count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s)."
-		sed -n "s/^\[ *$1 *\] \([0-9][0-9]*\) test(s).*/\1/p" "$log" | tail -n 1
+	count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s).", of later versions "[  SKIPPED ] tests: 1 test(s), listed below:"
+		sed -n "s/^\[ *$1 *\] \([^ ]*: \)*\([0-9][0-9]*\) test(s).*/\2/p" "$log" | tail -n 1
 	}
 	if [ "$kind" = unit ]; then
 		ok=$(count PASSED) bad=$(count FAILED) out=$(count SKIPPED)
@@ -62,7 +62,16 @@ if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its 
 		grep -v '^\[\|^$' "$log" >"$said/$name.txt"
 		[ "${HSLT_TEST_VERBOSE:-0}" = 0 ] || [ $code -ne 0 ] || sed 's/^/   /' "$said/$name.txt" >>"$log.shown"
 	fi
-	[ "${bad:-0}" = 0 ] || echo "$name" >"$log.bad"
+	# Why: what a script's `fail` says, or the tests of a program that failed; else the last line.
+	if [ "${bad:-0}" != 0 ]; then
+		why=$(if [ "$kind" = unit ]; then
+			sed -n 's/^\[ *FAILED *\] \([^ ]*\)$/\1/p' "$log" | sort -u | paste -sd ' ' -
+		else
+			sed -n 's/^FAILED: //p' "$log" | head -n 1
+		fi)
+		[ -n "$why" ] || why=$(grep . "$log" | tail -n 1)
+		echo "$name${why:+: $(echo "$why" | cut -c1-300)}" >"$log.bad"
+	fi
 	echo "${ok:-0} ${bad:-0} ${out:-0}" >"$log.counts"
 	# In one piece, however many end at the same time.
 	flock "$run/settings" cat "$log.shown"

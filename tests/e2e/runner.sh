@@ -33,6 +33,11 @@ echo '[  SKIPPED ] wet'
 echo '[  PASSED  ] 1 test(s).'
 echo '[  SKIPPED ] 1 test(s), listed below:'
 echo '[  SKIPPED ] wet'
+[ -n "${HSLT_FLOOD:-}" ] || exit 0
+echo '[  FAILED  ] tests: 2 test(s), listed below:'
+echo '[  FAILED  ] deep'
+echo '[  FAILED  ] deeper'
+exit 2
 TEXT
 chmod +x "$DIR/build/tests/one/test_one"
 run() {
@@ -54,7 +59,7 @@ grep -q dry "$DIR/said" && fail "what passed was shown: $(cat "$DIR/said")"
 grep -qx 'it is dry' "$DIR/build/tests/said/one/test_one.txt" || fail "what passed was not kept"
 export HSLT_TEST_ALL=1 HSLT_TEST_VERBOSE=1
 run 5 <<'TEXT'
-failed: e2e/bare.sh
+failed: e2e/bare.sh: no umbrella
 skipped: e2e/part.sh: the roof: it rains
 skipped: e2e/whole.sh: it rains
 skipped: one/test_one: wet: no rain
@@ -62,6 +67,15 @@ skipped: one/test_one: wet: no rain
 TEXT
 grep -qx '   it is dry' "$DIR/said" || fail "what passed was not shown: $(cat "$DIR/said")"
 [ $CODE -eq 1 ] || fail "a test that lacks something where all is installed: $CODE"
+HSLT_FLOOD=1 HSLT_TEST_VERBOSE=0 run 6 <<'TEXT'
+failed: e2e/bare.sh: no umbrella
+failed: one/test_one: deep deeper
+skipped: e2e/part.sh: the roof: it rains
+skipped: e2e/whole.sh: it rains
+skipped: one/test_one: wet: no rain
+2 passed, 3 failed, 3 skipped
+TEXT
+[ $CODE -eq 1 ] || fail "two tests of a program failed: $CODE"
 
 # limited CPU IDLE CODE SAID SCRIPT [ARGUMENT...]: how it ends, and that nothing of it is left: its processes hold the other end of a pipe
 limited() {
