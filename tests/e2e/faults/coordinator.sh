@@ -12,7 +12,7 @@ kill_coordinator() {
 	[ "$(grep -c 'state=restored' "$DIR/coordinator.log")" -ge "$TIMES" ] || fail "$NAME: it did not go on $TIMES times"
 }
 coordinator_dies() {
-	kill -9 "$COORDINATOR_PID"
+	kill_running
 	again
 }
 
@@ -27,7 +27,7 @@ checkpoint_coordinator() {
 	grep -q 'state=restored .*checkpoint=[1-9]' "$DIR/coordinator.log" || fail "$NAME: never from a checkpoint"
 }
 coordinator_dies_early() {
-	kill -9 "$COORDINATOR_PID"
+	kill_running --journal 0.05
 	again --journal 0.05
 }
 
@@ -55,11 +55,12 @@ patient_client() {
 	PIDS="$PIDS $waiting"
 	ID=j1
 	until_true 60 test -s "$DIR/id" || fail "$NAME: no job: $(cat "$DIR/wait.log")"
-	coordinator_dies # the first time before there is a worker: later ones may come when the image has been fetched
+	kill_now # the first time before there is a worker: later ones may come when the image has been fetched
+	again
 	says wait 'trying again'
 	worker w0
 	worker w1
-	each_time coordinator_dies
+	each_time coordinator_is_killed
 	wait $waiting || fail "$NAME: hslt-submit --wait ended with $?"
 	[ -s "$DIR/image.exr" ] || fail "$NAME: no image"
 	finish_job
@@ -76,6 +77,12 @@ patient_client() {
 	grep -q "hslt-job fetch j2 -o $DIR/late.exr" "$DIR/give-up.log" || fail "$NAME: it says: $(tail -n 1 "$DIR/give-up.log")"
 	"$BIN/hslt-status" >"$DIR/status.log" 2>&1 && fail "$NAME: somebody is there"
 	grep -q 'no coordinator\|not there\|refused' "$DIR/status.log" || fail "$NAME: hslt-status says: $(cat "$DIR/status.log")"
+}
+
+# Whether or not its job has ended by then: it is the job of hslt-submit, there is no other.
+coordinator_is_killed() {
+	kill_now
+	again
 }
 
 fault long_journal 3 1 "a journal takes long to read at a restart of the coordinator: it listens and reports its progress, peers wait"
@@ -95,8 +102,7 @@ long_journal() {
 }
 # two shares that are not the same, a list, and an order that is carried out when the journal has been read
 journal_is_read_slowly() {
-	kill -9 "$COORDINATOR_PID"
-	wait "$COORDINATOR_PID" 2>/dev/null || :
+	kill_running
 	export LD_PRELOAD="$DIR/slow.so"
 	LISTEN=$COORDINATOR listen -v --heartbeat 0.2
 	unset LD_PRELOAD

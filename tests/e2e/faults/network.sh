@@ -153,7 +153,7 @@ crowd() {
 		crowd_comes
 	done
 	again # which tells what it finds
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	release
 	finish_job
 	blameless
 }
@@ -164,15 +164,25 @@ crowd_comes() {
 	"$PYTHON" "$HERE/faults/crowd.py" "${COORDINATOR#*:}" >"$DIR/crowd.log" 2>&1 &
 	PIDS="$PIDS $!"
 	says crowd idle
-	[ "$i" -gt 1 ] && "$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || job
-	until_true 60 is_beyond "$ID" "$(awk -v i="$i" -v n="$TIMES" 'BEGIN { print i / (n + 2) }')" || fail "$NAME: $ID is at $(value "$ID" progress)"
-	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	[ "$i" -eq 1 ] && job || release
+	AT=$(awk -v i="$i" -v n="$TIMES" 'BEGIN { print i / (n + 2) }')
+	reach_share
+	attempt=1
+	until "$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log"; do
+		attempt=$((attempt + 1))
+		[ $attempt -le 6 ] || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+		job
+		reach_share
+	done
 	says crowd done 60
 	until_true 30 all_told || fail "$NAME: of 1,000 connections that were refused $(told) are told of"
 	said=$(($(grep -c . "$DIR/coordinator.log") - lines))
 	most=$((2 * (100 + 5 * ($(date +%s) - before + 1)) + 50)) # of two kinds
 	[ $said -le $most ] || fail "$NAME: $said lines, at most $most"
 	[ "$i" -lt "$TIMES" ] || kill -9 "$COORDINATOR_PID"
+}
+reach_share() {
+	until_true 60 is_beyond "$ID" "$AT" || fail "$NAME: $ID is at $(value "$ID" progress)"
 }
 # how many refusals the log tells of since then, and how many it counts
 told() {

@@ -11,8 +11,8 @@ held() {
 	finish_job
 }
 somebody_holds() {
-	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	hold_running
+	release
 }
 
 fault liar 1 1 "a worker returns wrong results, and every lease is verified"
@@ -44,15 +44,16 @@ while_chains_go_on() {
 	i=0
 	while [ $i -lt "$TIMES" ]; do
 		i=$((i + 1))
-		until_true 60 is_merged $((RESULTS * (2 + i) / (2 * (TIMES + 3)))) || fail "$NAME: $(merged) of $RESULTS results at time $i"
+		AT=$((RESULTS * (2 + i) / (2 * (TIMES + 3))))
+		reach
 		"$@"
 	done
 }
 somebody_spoils() {
-	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	hold_running
 	faulty_worker "liar$i" spoil=1,lie=1,hang=3 --cache "$DIR/cache$i" # of no life of another
 	says coordinator "event=peer_hello .*name=\"liar$i\""
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	release
 	says "liar$i" 'event=batch_acknowledged .*kind=render'
 	kill -9 "$WORKER"
 }

@@ -60,8 +60,7 @@ journal_bit() {
 	blameless
 }
 journal_is_damaged() {
-	kill -9 "$COORDINATOR_PID"
-	wait "$COORDINATOR_PID" 2>/dev/null || :
+	kill_running
 	for journal in "$DIR/spool/jobs/$ID"/journal.*; do # two when a new one is just made: either may be the one that counts
 		flip_result "$journal" "0.$((20 + 10 * i))" >>"$DIR/flipped"
 	done
@@ -109,8 +108,7 @@ jobs_database() {
 	[ "$(grep -c 'level=error event=spool_fault' "$DIR/coordinator.log")" -gt 0 ] || fail "$NAME: it does not say what was lost"
 }
 database_is_damaged() {
-	kill -9 "$COORDINATOR_PID"
-	wait "$COORDINATOR_PID" 2>/dev/null || :
+	kill_running
 	db=$DIR/spool/jobs$([ "$i" -le 4 ] || echo -copy).db
 	[ -s "$db-wal" ] || : >>"$db-wal"
 	case $((i % 4)) in
@@ -134,8 +132,7 @@ plan_changed() {
 	[ "$(grep -c 'its row in jobs.db was damaged: restored from jobs-copy.db' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
 }
 plan_is_changed() {
-	kill -9 "$COORDINATOR_PID"
-	wait "$COORDINATOR_PID" 2>/dev/null || :
+	kill_running
 	"$PYTHON" - "$DIR/spool/jobs.db" <<'TEXT' || fail "$NAME: no row"
 import sqlite3, sys
 db = sqlite3.connect(sys.argv[1])
@@ -152,17 +149,17 @@ row_lost() {
 	worker w0
 	worker w1
 	job
+	AT=3
+	reach
+	hold_running
 	other=$ID
-	until_true 60 is_merged 3 || fail "$NAME: nothing is merged"
-	"$BIN/hslt-job" hold "$other" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	job
 	each_time row_is_lost
 	finish_job
 	[ -s "$DIR/spool/lost/$other/why" ] && [ -s "$DIR/spool/lost/$other/journal.0" ] || fail "$NAME: what was left of $other is gone"
 }
 row_is_lost() {
-	kill -9 "$COORDINATOR_PID"
-	wait "$COORDINATOR_PID" 2>/dev/null || :
+	kill_now
 	"$PYTHON" - "$DIR/spool" "${other#j}" <<'TEXT' || fail "$NAME: no row"
 import sqlite3, sys
 for name in "jobs.db", "jobs-copy.db":
@@ -185,7 +182,8 @@ folder_gone() {
 	i=0
 	while [ $i -lt "$TIMES" ]; do # in the first half of the job: the folder of one that is over would be gone, image and all
 		i=$((i + 1))
-		until_true 60 is_merged $((RESULTS * i / (2 * TIMES))) || fail "$NAME: $(merged) of $RESULTS results at time $i"
+		AT=$((RESULTS * i / (2 * TIMES)))
+		reach
 		folder_goes
 	done
 	finish_job
@@ -193,7 +191,7 @@ folder_gone() {
 }
 # The job is held meanwhile, lest it end before it is noticed.
 folder_goes() {
-	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	hold_running
 	seen=$(times_noticed)
 	case $((i % 3)) in
 	1) mv "$DIR/spool/jobs/$ID" "$DIR/moved.$i" ;;
@@ -203,7 +201,7 @@ folder_goes() {
 	until_true 30 is_noticed || fail "$NAME: it does not notice"
 	until_true 30 is_mended || fail "$NAME: it is not mended: $(tail -n 3 "$DIR/coordinator.log")"
 	[ "$i" -ne 2 ] || { kill -9 "$COORDINATOR_PID" && again --journal 0.2; } # all is in the new folder
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	release
 }
 # The coordinator may put a file into the folder while rm walks through it.
 remove_folder() {
@@ -230,12 +228,10 @@ file_damaged() {
 	finish_job
 	blameless
 }
-# Held meanwhile, lest the worker ends the job before it stops; of another job where this one is done already.
+# Held meanwhile, lest the worker ends the job before it stops.
 file_is_damaged() {
-	until "$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log"; do
-		job
-		until_true 60 is_merged 3 || fail "$NAME: nothing is merged"
-	done
+	AT=3
+	hold_running
 	for f in "$DIR/spool/blobs"/[0-9a-f]*; do
 		flip "$f" 0.5
 	done
@@ -246,7 +242,7 @@ file_is_damaged() {
 	[ $((i % 2)) -eq 0 ] || { kill -9 "$COORDINATOR_PID" && again; }
 	sleep 0.1
 	start_worker "w$i" -v --cache "$DIR/own"
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	release
 	until_true 60 waits_for_file || fail "$NAME: it does not wait: $(value "$ID" waiting)"
 	# shellcheck disable=SC2086
 	again_id=$("$BIN/hslt-submit" "$BOX" -o "$DIR/again.exr" $JOB 2>>"$DIR/submit.log") || fail "$NAME: $(tail -n 1 "$DIR/submit.log")"

@@ -36,7 +36,9 @@ TEXT
 	return 0
 }
 another_comes() {
+	hold_running
 	stop "$WORKER"
+	release
 	"$other" --threads 1 --name o1 --cache "$DIR/cache" -v 2>>"$DIR/o1.log" &
 	odd=$!
 	PIDS="$PIDS $odd"

@@ -110,12 +110,12 @@ hang_worker() {
 	each_time one_thread_hangs
 	finish_job
 }
-# The job is held until it has come, lest the others have nothing left for it; if it has ended there is nothing to hang in.
+# The job is held until it has come, lest the others have nothing left for it.
 one_thread_hangs() {
-	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || { [ $i -gt 1 ] && return 0; } || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	hold_running
 	faulty_worker "h$i" hang=1 --threads 2 --stall 0.5
 	says "h$i" event=connect
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	release
 	CODE=0
 	wait "$WORKER" || CODE=$?
 	[ "$CODE" -eq 75 ] || fail "$NAME: it ended with $CODE"
@@ -136,11 +136,11 @@ crash_worker() {
 }
 # The worker stays: it says what ended the process, and pauses. The other one stands still meanwhile, lest it computes that lease.
 one_process_crashes() {
-	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	hold_running
 	faulty_worker "h$i" crash=1
 	says "h$i" event=connect
 	kill -STOP "$(renders "$OTHER")"
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	release
 	says "h$i" "event=process_lost signal=11 .*leases=1"
 	says coordinator "event=lease_failed job=$ID worker=\"h$i\" own=0 text=\"box.xml: .*ended by SIGSEGV .*($ID, "
 	kill -CONT "$(renders "$OTHER")"

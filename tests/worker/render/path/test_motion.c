@@ -361,7 +361,7 @@ static void check_integrators(enum stage s, const struct agree_side *sides, size
 	world_free(w);
 	/* Where everything is when the shutter opens, it is another image: the comparison can tell. */
 	struct agree_difference d;
-	const struct agree_side how = {"bdpt", 8192, 32, 0, 0};
+	const struct agree_side how = {"bdpt", 1024, 32, 0, 0};
 	w = world_at(s, 0);
 	agree_render(w, "motion", "when it opens", &how, &image);
 	agree_measure(&image, &stills, &d);
@@ -409,7 +409,7 @@ static void test_skies(void **state)
 {
 	(void)state;
 	static const struct agree_side sides[] = {
-		{"path", 8192, 32, 0, 0}, {"bdpt", 8192, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
+		{"path", 4096, 32, 0, 0}, {"bdpt", 6144, 32, 0, 0}, {"hslt", 163840, 32, 0, 0}};
 	check_integrators(SKIES, sides, test_full() ? 3 : 2);
 }
 
@@ -534,7 +534,7 @@ static struct world *world_over_plane(const struct over_plane *o)
 static void test_over_a_plane(void **state)
 {
 	(void)state;
-	static const struct agree_side sides[] = {{"path", 4096, 32, 0, 0}, {"bdpt", 4096, 32, 0, 0}};
+	static const struct agree_side sides[] = {{"path", 1024, 32, 0, 0}, {"bdpt", 1536, 32, 0, 0}};
 	static struct agree_image image;
 	for (size_t k = 0; k < sizeof over_plane / sizeof *over_plane; k++) {
 		struct world *w = world_over_plane(&over_plane[k]);
