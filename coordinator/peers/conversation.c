@@ -207,7 +207,7 @@ void conversations_go_on(struct peers *s)
 
 void conversations_tick(struct peers *s)
 {
-	s->order_ms = 0;
+	s->request_ms = 0;
 	if (recovery_is_on(s->jobs))
 		return;
 	for (struct session *p; (p = held_turn(s));)

@@ -27,22 +27,20 @@ static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 	       (first && what == FARM__ENVELOPE__BODY_JOB_LIST);
 }
 
-/* What is flushed on the loop's thread. */
-static bool is_order(Farm__Envelope__BodyCase what)
+/* Of a client: an order is flushed on the loop's thread, and a list of hundreds of jobs takes milliseconds. Messages
+ * with a payload are none; a client sends them when it has an answer. */
+static bool is_request(const struct session *p, Farm__Envelope__BodyCase what)
 {
-	return what == FARM__ENVELOPE__BODY_SUBMIT || what == FARM__ENVELOPE__BODY_CANCEL ||
-	       what == FARM__ENVELOPE__BODY_CONTROL;
+	return p->state == SESSION_CLIENT && what != FARM__ENVELOPE__BODY_BLOB_CHUNK &&
+	       !is_answered_at_once(what, false);
 }
 
-/* Messages with a payload do not wait; a client sends them when it has an answer. */
 static bool waits(const struct session *p, Farm__Envelope__BodyCase what)
 {
 	bool first = STAILQ_EMPTY(&p->held);
 	if (recovery_is_on(p->jobs))
 		return !is_answered_at_once(what, first);
-	if (p->state != SESSION_CLIENT || what == FARM__ENVELOPE__BODY_BLOB_CHUNK)
-		return false;
-	return first ? is_order(what) && p->peers->order_ms > HELD_ORDERS_MS : !is_answered_at_once(what, first);
+	return is_request(p, what) && (!first || p->peers->request_ms > HELD_REQUESTS_MS);
 }
 
 double held_begin(const struct session *p)
@@ -52,16 +50,17 @@ double held_begin(const struct session *p)
 
 void held_end(struct session *p, Farm__Envelope__BodyCase what, double begun)
 {
-	if (!is_order(what))
+	if (!is_request(p, what))
 		return;
-	p->peers->order_ms += 1000 * (jobs_now(p->jobs) - begun);
-	p->turn = ++p->peers->orders;
+	p->peers->request_ms += 1000 * (jobs_now(p->jobs) - begun);
+	p->turn = ++p->peers->requests;
 }
 
 struct session *held_turn(const struct peers *s)
 {
 	struct session *next = NULL;
-	for (struct session *p = LIST_FIRST(&s->sessions); p && s->order_ms <= HELD_ORDERS_MS; p = LIST_NEXT(p, next))
+	for (struct session *p = LIST_FIRST(&s->sessions); p && s->request_ms <= HELD_REQUESTS_MS;
+	     p = LIST_NEXT(p, next))
 		if (!STAILQ_EMPTY(&p->held) && (!next || p->turn < next->turn))
 			next = p;
 	return next;

@@ -1,17 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Requests that wait, and are answered in order afterwards. While the jobs of an earlier run are read (recovery.h), all
- * do but hello, heartbeats and lists of jobs. At any time the orders of clients do whose records must be flushed, once
- * those since the last tick have taken HELD_ORDERS_MS together, and what follows them on the same connection: the loop
- * has others to answer. Then connections take turns. Peers that wait, also for the files of a submission to be read,
- * get heartbeats, as often as workers must send them. The loop's thread.
+ * do but hello, heartbeats and lists of jobs. At any time the requests of clients do, once those since the last tick
+ * have taken HELD_REQUESTS_MS together: the loop has others to answer. Then connections take turns. Peers that wait,
+ * also for the files of a submission to be read, get heartbeats, as often as workers must send them. The loop's thread.
  */
 #ifndef COORDINATOR_PEERS_HELD_H
 #define COORDINATOR_PEERS_HELD_H
 
 #include "coordinator/peers/session.h"
 
-enum { HELD_ORDERS_MS = 50 /* of TICK_MS */ };
+enum { HELD_REQUESTS_MS = 50 /* of TICK_MS */ };
 
 /* true: the request waits and the envelope is taken; or too much is waiting, and the peer was told so. */
 bool held_take(struct session *p, struct envelope *env);
@@ -21,7 +20,7 @@ void held_drop(struct session *p); /* the peer is gone */
 bool held_next(struct session *p, struct envelope *env);
 /* Whose first request is next; NULL: none waits, or none may be handled before the next tick. */
 struct session *held_turn(const struct peers *s);
-/* Around the handling of a message: what orders take counts. */
+/* Around the handling of a message: what requests of clients take counts. */
 double held_begin(const struct session *p);
 void held_end(struct session *p, Farm__Envelope__BodyCase what, double begun);
 

@@ -60,7 +60,7 @@ struct session {
 	struct job_view *shown;	  /* what was last sent to the watcher */
 	STAILQ_HEAD(, held) held; /* requests that wait until the jobs are read */
 	size_t held_bytes;
-	uint64_t turn;	    /* number of its last order, of those of all */
+	uint64_t turn;	    /* number of its last request, of those of all */
 	double told;	    /* s of the loop's clock: the last heartbeat sent meanwhile */
 	char rejected[256]; /* why the core refused; "": it did not */
 };
@@ -78,8 +78,8 @@ struct peers {
 	LIST_HEAD(, session) by_id[SESSION_BUCKETS];
 	unsigned session_count, fetches;
 	size_t held_bytes;   /* bytes of waiting requests */
-	uint64_t orders;     /* number of the last one */
-	double order_ms;     /* which they have taken since the last tick */
+	uint64_t requests;   /* of clients: number of the last one */
+	double request_ms;   /* which they have taken since the last tick */
 	size_t upload_bytes; /* of all submissions that wait for blobs */
 	struct receive_pool receiving;
 	struct send_pool sending;

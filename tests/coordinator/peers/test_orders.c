@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Orders whose records are flushed slowly, sent as fast as a client can: others are answered meanwhile, and the orders
- * are carried out in their order.
+ * Orders whose records are flushed slowly, and lists of many jobs, asked for as fast as a client can: others are
+ * answered meanwhile, and the requests of one client in their order.
  */
 #include "tests/support/served.h"
 
@@ -18,13 +18,15 @@
 
 enum { ORDERS = 100, COMMIT_US = 10000 };
 
-static _Atomic unsigned *commits; /* shared with the server */
+static struct {
+	_Atomic unsigned count, microseconds;
+} * commits; /* shared with the server */
 
 static int slow_commit(void *unused)
 {
 	(void)unused;
-	++*commits;
-	usleep(COMMIT_US);
+	++commits->count;
+	usleep(commits->microseconds);
 	return 0;
 }
 
@@ -46,6 +48,7 @@ static int set_up(void **state)
 	(void)state;
 	commits = mmap(NULL, sizeof *commits, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	assert_true(commits != MAP_FAILED);
+	commits->microseconds = COMMIT_US;
 	served_prepare(slow_down);
 	return served_start(60, 60, 60);
 }
@@ -71,14 +74,32 @@ static void order(struct scripted *client, Farm__Verb verb, int priority)
 	peer_say(client, &m, NULL, 0);
 }
 
-static const Farm__JobStatus *ask(struct scripted *client)
+/* The priority of the first job, if there are so many. */
+static int hear_list(struct scripted *client, unsigned jobs)
 {
-	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
 	const Farm__Envelope *m = scripted_hear(client);
 	assert_non_null(m);
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
-	assert_int_equal(m->job_list_answer->n_jobs, 1);
-	return m->job_list_answer->jobs[0];
+	assert_int_equal(m->job_list_answer->n_jobs, jobs);
+	for (unsigned i = 0; i < jobs; i++)
+		if (m->job_list_answer->jobs[i]->job == 1)
+			return m->job_list_answer->jobs[i]->priority;
+	fail();
+	return 0;
+}
+
+static int ask(struct scripted *client, unsigned jobs)
+{
+	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	return hear_list(client, jobs);
+}
+
+static void hear_done(struct scripted *client)
+{
+	const Farm__Envelope *m = scripted_hear(client);
+	assert_non_null(m);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_DONE);
+	assert_true(m->done->ok);
 }
 
 static void who_gives_orders_stops_nobody(void **state)
@@ -89,30 +110,54 @@ static void who_gives_orders_stops_nobody(void **state)
 	assert_int_equal(peer_submit_answer(master)->n_missing, 1);
 	peer_send_blob(master, "<scene/>", "<scene/>");
 	assert_int_equal(peer_submit_answer(master)->job, 1);
-	unsigned before = *commits, looks = 0;
+	unsigned before = commits->count, looks = 0;
 	for (int i = 1; i <= ORDERS; i++)
 		order(master, FARM__VERB__VERB_PRIORITY, i);
 	peer_say_empty(master, FARM__ENVELOPE__BODY_JOB_LIST);
 	for (int last = 0; last < ORDERS; looks++) { /* some of which are in the middle */
-		int now = ask(other)->priority;
+		int now = ask(other, 1);
 		assert_in_range(now, last, ORDERS);
 		last = now;
 	}
 	assert_true(looks > 3);
-	assert_in_range(*commits - before, ORDERS, 3 * ORDERS);
-	for (int i = 0; i < ORDERS; i++) {
-		const Farm__Envelope *m = scripted_hear(master);
-		assert_non_null(m);
-		assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_DONE);
-		assert_true(m->done->ok);
+	assert_in_range(commits->count - before, ORDERS, 3 * ORDERS);
+	for (int i = 0; i < ORDERS; i++)
+		hear_done(master);
+	hear_list(master, 1);
+	scripted_hang_up(master);
+	scripted_hang_up(other);
+}
+
+/* The lists take some hundred milliseconds together, in fewer bytes than may wait for a client. */
+static void who_asks_for_lists_stops_nobody(void **state)
+{
+	(void)state;
+	enum { JOBS = 240, LISTS = 45, PRIORITY = 7 };
+	struct scripted *master = call_client(), *other = call_client();
+	commits->microseconds = 0;
+	for (int i = 2; i <= JOBS; i++) {
+		peer_submit(master, NULL, "<scene/>", "s.xml", "s.xml");
+		assert_int_equal(peer_submit_answer(master)->job, i);
 	}
-	assert_int_equal(scripted_hear(master)->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	ask(other, JOBS);
+	for (int i = 0; i < LISTS; i++)
+		peer_say_empty(master, FARM__ENVELOPE__BODY_JOB_LIST);
+	order(master, FARM__VERB__VERB_PRIORITY, PRIORITY);
+	unsigned looks = 0;
+	while (ask(other, JOBS) != PRIORITY)
+		looks++;
+	print_message("%u lists for another client during %d\n", looks, LISTS);
+	assert_true(looks > 3);
+	for (int i = 0; i < LISTS; i++)
+		assert_true(hear_list(master, JOBS) != PRIORITY);
+	hear_done(master);
 	scripted_hang_up(master);
 	scripted_hang_up(other);
 }
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(who_gives_orders_stops_nobody)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(who_gives_orders_stops_nobody),
+					   cmocka_unit_test(who_asks_for_lists_stops_nobody)};
 	return cmocka_run_group_tests(tests, set_up, served_stop);
 }
