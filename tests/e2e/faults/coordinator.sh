@@ -9,20 +9,20 @@ kill_coordinator() {
 	job
 	each_time coordinator_dies
 	finish_job
-	[ "$(times_restored)" -gt 0 ] || fail "$NAME: it never went on"
 }
 # and goes on with the job, unless that ended unsaid
 coordinator_dies() {
-	seen=$(times_restored)
-	kill_running
-	again
-	until_true 30 is_restored || fail "$NAME: it does not go on: $ID is $(value "$ID" state)"
+	lives=$(times_restored)
+	kill -9 "$COORDINATOR_PID"
+	again "$@"
+	is_restored || LATE=yes
 }
 times_restored() {
-	grep -c 'state=restored' "$DIR/coordinator.log" || :
+	times_said coordinator "event=job_state job=$ID state=restored"
 }
+# since `lives` was counted: otherwise it had ended
 is_restored() {
-	[ "$(times_restored)" -gt "$seen" ] || is_state "$ID" done
+	[ "$(times_restored)" -gt "$lives" ]
 }
 
 fault checkpoint_coordinator 20 1 "the same, with a checkpoint after every few results"
@@ -35,9 +35,13 @@ checkpoint_coordinator() {
 	finish_job
 	grep -q 'state=restored .*checkpoint=[1-9]' "$DIR/coordinator.log" || fail "$NAME: never from a checkpoint"
 }
+# Not before there is one: the disk may be slow.
 coordinator_dies_early() {
-	kill_running --journal 0.05
-	again --journal 0.05
+	until_true 30 has_checkpoint_or_ended || fail "$NAME: no checkpoint is made"
+	coordinator_dies --journal 0.05
+}
+has_checkpoint_or_ended() {
+	grep -q "event=checkpoint job=$ID " "$DIR/coordinator.log" || is_state "$ID" done
 }
 
 fault leave_coordinator 10 1 "the coordinator gets SIGTERM and is started again"
@@ -68,12 +72,14 @@ patient_client() {
 	again
 	says wait 'trying again'
 	worker w0
+	first=$WORKER
 	worker w1
-	each_time coordinator_is_killed
+	each_time patient_coordinator_dies
 	wait $waiting || fail "$NAME: hslt-submit --wait ended with $?"
 	[ -s "$DIR/image.exr" ] || fail "$NAME: no image"
 	finish_job
-	# nobody comes back: it says how to get the image, and the status says that nobody is there
+	# nobody comes back: it says how to get the image, and the status says that nobody is there. Without workers the job cannot end before.
+	stop "$first" "$WORKER"
 	# shellcheck disable=SC2086
 	"$BIN/hslt-submit" "$BOX" -o "$DIR/late.exr" $JOB --wait --patience 0.5 >"$DIR/id2" 2>>"$DIR/give-up.log" &
 	waiting=$!
@@ -86,6 +92,11 @@ patient_client() {
 	grep -q "hslt-job fetch j2 -o $DIR/late.exr" "$DIR/give-up.log" || fail "$NAME: it says: $(tail -n 1 "$DIR/give-up.log")"
 	"$BIN/hslt-status" >"$DIR/status.log" 2>&1 && fail "$NAME: somebody is there"
 	grep -q 'no coordinator\|not there\|refused' "$DIR/status.log" || fail "$NAME: hslt-status says: $(cat "$DIR/status.log")"
+}
+# Also when the image has been fetched: hslt-submit waits for this job alone.
+patient_coordinator_dies() {
+	coordinator_dies
+	LATE=
 }
 
 # Whether or not its job has ended by then: it is the job of hslt-submit, there is no other.
@@ -109,9 +120,11 @@ long_journal() {
 		fail "$NAME: no worker called meanwhile"
 	blameless
 }
-# two shares that are not the same, a list, and an order that is carried out when the journal has been read
+# two shares that are not the same, a list, and an order that is carried out when the journal has been read; held, lest it end before
 journal_is_read_slowly() {
-	kill_running
+	hold_job
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
 	export LD_PRELOAD="$DIR/slow.so"
 	LISTEN=$COORDINATOR listen -v --heartbeat 0.2
 	unset LD_PRELOAD
@@ -121,7 +134,7 @@ journal_is_read_slowly() {
 	"$BIN/hslt-job" list >"$DIR/list" 2>>"$DIR/list.log"
 	grep -q "^$ID  *reading " "$DIR/list" || fail "$NAME: the list says: $(cat "$DIR/list")"
 	until_true 30 is_further || fail "$NAME: it stays at $share %"
-	somebody_holds
+	release_job
 	has_read || fail "$NAME: an order was carried out before the job was there"
 }
 share_read() {

@@ -112,13 +112,51 @@ kill_now() {
 	wait "$COORDINATOR_PID" 2>/dev/null || :
 }
 
-# each_time COMMAND...: TIMES times, while the job runs
+# each_time COMMAND...: TIMES times, while the job runs. The job takes less than a second, and goes on when this script stands still: a
+# COMMAND that finds it ended sets LATE, and is called again while another job runs.
 each_time() {
 	i=0
+	attempts=0
 	while [ $i -lt "$TIMES" ]; do
 		i=$((i + 1))
 		moment $i
+		LATE=
 		"$@"
+		[ -n "$LATE" ] || continue
+		attempts=$((attempts + 1))
+		[ $attempts -lt 9 ] || fail "$NAME: nine jobs ended too early"
+		i=$((i - 1))
+		job
+	done
+}
+
+# hold_job [FROM [MOST]]: the job is held when it has FROM results, and at most MOST, so that enough of it is left when it is released;
+# another one if this one has more, or has ended
+hold_job() {
+	attempts=0
+	until "$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" && ! is_merged $((${2:-$((RESULTS - 32))} + 1)); do
+		attempts=$((attempts + 1))
+		[ $attempts -lt 9 ] || fail "$NAME: cannot be held: $(tail -n 1 "$DIR/hold.log")"
+		is_state "$ID" done || "$BIN/hslt-job" cancel "$ID" 2>>"$DIR/hold.log" || :
+		job
+		until_true 60 is_merged "${1:-3}" || fail "$NAME: only $(merged) results"
+	done
+}
+
+# Results that were under way may have ended it.
+release_job() {
+	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || is_state "$ID" done || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+}
+
+# Workers, by their process ids, that stand still until they go on, lest they do what another one is to do.
+stand_still() {
+	for p in "$@"; do
+		kill -STOP "$(renders "$p")"
+	done
+}
+go_on() {
+	for p in "$@"; do
+		kill -CONT "$(renders "$p")"
 	done
 }
 
@@ -127,9 +165,14 @@ says() {
 	until_true "${3:-30}" grep -qs -e "$2" "$DIR/$1.log" || fail "$NAME: $1 never says: $2"
 }
 
+# times_said LOG TEXT
+times_said() {
+	grep -cs -e "$2" "$DIR/$1.log" || :
+}
+
 # has_said LOG TEXT TIMES
 has_said() {
-	[ "$(grep -cs -e "$2" "$DIR/$1.log")" -ge "$3" ]
+	[ "$(times_said "$1" "$2")" -ge "$3" ]
 }
 
 # the job ends, its image is compared, its results are counted

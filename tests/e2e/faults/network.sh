@@ -34,8 +34,9 @@ is_taken_or_late() {
 
 # and the worker comes back
 is_cut() {
+	calls=$(times_said w1 event=connect\ )
 	happens "$@"
-	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: the worker does not come back"
+	until_true 30 has_said w1 event=connect\  $((calls + 1)) || fail "$NAME: the worker does not come back"
 }
 
 fault cut_result 10 1 "a connection is cut in the middle of a result"
@@ -54,9 +55,9 @@ stall_result() {
 }
 # The other worker stands still meanwhile, lest it does the job alone.
 is_stalled() {
-	kill -STOP "$(renders "$OTHER")"
+	stand_still "$OTHER"
 	is_cut stall 22
-	kill -CONT "$(renders "$OTHER")"
+	go_on "$OTHER"
 }
 
 fault slow_result 3 1 "results take longer to arrive than a worker may be silent"
@@ -65,17 +66,23 @@ slow_result() {
 }
 # The other worker stands still until the result is there, lest the job is done by it alone meanwhile.
 is_slow() {
-	kill -STOP "$(renders "$OTHER")"
+	stand_still "$OTHER"
 	for try in 1 2 3 4 5; do # a machine that stands still for a second cuts it off, too
-		calls=$(grep -c event=connect\  "$DIR/w1.log")
-		before=$(merged)
+		calls=$(times_said w1 event=connect\ )
+		rm -f "$DIR/order.done"
 		happens slow 22
-		until_true 30 is_merged $((before + 2)) || fail "$NAME: the result does not come"
-		! has_said w1 event=connect\  $((calls + 1)) || continue
-		kill -CONT "$(renders "$OTHER")"
+		until_true 30 is_through_or_cut || fail "$NAME: the result does not come"
+		! is_called_again || continue
+		go_on "$OTHER"
 		return 0
 	done
 	fail "$NAME: the worker is cut off"
+}
+is_called_again() {
+	has_said w1 event=connect\  $((calls + 1))
+}
+is_through_or_cut() {
+	[ -e "$DIR/order.done" ] || is_called_again
 }
 
 fault late_result 3 1 "results arrive after their worker was given up"
@@ -84,7 +91,7 @@ late_result() {
 }
 # The other worker stands still until the last is late and was missed, lest it does the job alone.
 is_late() {
-	kill -STOP "$(renders "$OTHER")"
+	stand_still "$OTHER"
 	happens late 22
 	[ "$i" -eq "$TIMES" ] || return 0
 	for try in 1 2 3 4 5; do # by a coordinator that stands still nobody is missed
@@ -92,7 +99,7 @@ is_late() {
 		happens late 22
 	done
 	is_missed || fail "$NAME: the late worker is not missed"
-	kill -CONT "$(renders "$OTHER")"
+	go_on "$OTHER"
 }
 is_missed() {
 	grep -q 'name="w1" text="silent' "$DIR/coordinator.log"
@@ -100,8 +107,23 @@ is_missed() {
 
 fault twice_result 10 1 "the network delivers results twice"
 twice_result() {
-	through_proxy happens twice 22
-	grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "$NAME: nothing was repeated"
+	through_proxy is_twice
+}
+# The other worker stands still meanwhile. Of the last result of a job the second copy is refused, since the job is over.
+is_twice() {
+	stand_still "$OTHER"
+	repeats=$(times_said coordinator event=batch_repeated)
+	for try in 1 2 3 4 5; do
+		happens twice 22
+		until_true 30 is_repeated_or_ended || fail "$NAME: nothing is repeated"
+		has_said coordinator event=batch_repeated $((repeats + 1)) || continue
+		go_on "$OTHER"
+		return 0
+	done
+	fail "$NAME: nothing was repeated"
+}
+is_repeated_or_ended() {
+	has_said coordinator event=batch_repeated $((repeats + 1)) || is_state "$ID" done
 }
 
 fault flip_bits 12 3 "the network flips a bit of a result, of a grant, of a heartbeat"
@@ -112,7 +134,7 @@ flip_bits() {
 }
 # Messages both ways, with a payload and without. The other worker stands still meanwhile, lest it does the job alone.
 is_flipped() {
-	kill -STOP "$(renders "$OTHER")"
+	stand_still "$OTHER"
 	flipped=$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled) || :
 	case $((i % 3)) in
 	1) is_cut flip 22 ;;
@@ -120,7 +142,7 @@ is_flipped() {
 	0) is_cut flip 3 ;;
 	esac
 	until_true 30 is_told $((flipped + 1)) || fail "$NAME: nobody noticed"
-	kill -CONT "$(renders "$OTHER")"
+	go_on "$OTHER"
 }
 is_told() {
 	[ "$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled)" -ge "$1" ]
@@ -153,7 +175,7 @@ crowd() {
 		crowd_comes
 	done
 	again # which tells what it finds
-	release
+	release_job
 	finish_job
 	blameless
 }
@@ -164,15 +186,16 @@ crowd_comes() {
 	"$PYTHON" "$HERE/faults/crowd.py" "${COORDINATOR#*:}" >"$DIR/crowd.log" 2>&1 &
 	PIDS="$PIDS $!"
 	says crowd idle
-	[ "$i" -eq 1 ] && job || release
-	AT=$(awk -v i="$i" -v n="$TIMES" 'BEGIN { print i / (n + 2) }')
-	reach_share
-	attempt=1
-	until "$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log"; do
-		attempt=$((attempt + 1))
-		[ $attempt -le 6 ] || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	[ "$i" -gt 1 ] && release_job || job
+	share=$(awk -v i="$i" -v n="$TIMES" 'BEGIN { print i / (n + 2) }')
+	until_true 60 is_beyond "$ID" "$share" || fail "$NAME: $ID is at $(value "$ID" progress)"
+	attempts=0
+	until "$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" && ! is_beyond "$ID" 0.9; do
+		attempts=$((attempts + 1))
+		[ $attempts -lt 9 ] || fail "$NAME: nine jobs ended too early: $(tail -n 1 "$DIR/hold.log")"
+		is_state "$ID" done || release_job
 		job
-		reach_share
+		until_true 60 is_beyond "$ID" "$share" || fail "$NAME: $ID is at $(value "$ID" progress)"
 	done
 	says crowd done 60
 	until_true 30 all_told || fail "$NAME: of 1,000 connections that were refused $(told) are told of"

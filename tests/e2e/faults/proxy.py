@@ -6,7 +6,7 @@ way, and the file goes:
   cut    half of it, then the connection is closed on both sides
   stall  half of it, then nothing more, either way, until one side hangs up
   twice  it is sent twice
-  slow   it takes two seconds, piece by piece
+  slow   it takes two seconds, piece by piece; then there is a file ORDER-FILE.done
   late   it, and what is behind it, two and a half seconds later
   flip   one of its bits is another one: of the first such message one in the middle, then any, also of its lengths and checksums"""
 import asyncio, os, random, sys
@@ -85,6 +85,8 @@ async def one_way(pair, source, sink):
                 await asyncio.sleep(2.5)
             sink.write(frame * (2 if action == "twice" else 1))
             await sink.drain()
+            if action == "slow":
+                open(order_file + ".done", "w").close()
     except (asyncio.IncompleteReadError, OSError):
         pass
     sink.close()

@@ -13,36 +13,26 @@ full_disk() {
 	small_spool || return 0
 	farm
 	worker w0
+	first=$WORKER
 	worker w1
 	job
 	each_time disk_is_full
 	finish_job
 }
+# The workers stand still until there is no room for what they send, lest the job ends before.
 disk_is_full() {
-	attempt=1
-	fill_disk
-	while is_over; do
-		rm "$DIR/spool/filler"
-		try_again
-		fill_disk
-	done
-	is_state "$ID" held || fail "$NAME: $ID is $(value "$ID" state)"
-	value "$ID" waiting | grep -q 'No space left' || fail "$NAME: it does not say why: $(value "$ID" waiting)"
-	attempt=1
-	while submit "$BOX" -o "$DIR/none.exr" --integrator path --spp 1 >/dev/null; do # a checkpoint has made room since
-		attempt=$((attempt + 1))
-		[ $attempt -le 6 ] || fail "$NAME: other jobs were taken"
-		fill_disk
-	done
+	hold_job
+	stand_still "$first" "$WORKER"
+	release_job
+	cat /dev/zero >"$DIR/spool/filler" 2>/dev/null || :
+	go_on "$first" "$WORKER"
+	until_true 30 waits_for_space || fail "$NAME: $ID is $(value "$ID" state): $(value "$ID" waiting)"
+	submit "$BOX" -o "$DIR/none.exr" --integrator path --spp 1 >/dev/null && fail "$NAME: another job was taken"
 	grep -q 'No space left\|full' "$DIR/submit.log" || fail "$NAME: the refusal does not say why: $(tail -n 1 "$DIR/submit.log")"
 	rm "$DIR/spool/filler"
 }
-fill_disk() {
-	cat /dev/zero >>"$DIR/spool/filler" 2>/dev/null || :
-	until_true 30 is_held_or_over || fail "$NAME: $ID is $(value "$ID" state)"
-}
-is_held_or_over() {
-	is_state "$ID" held || is_over
+waits_for_space() {
+	value "$ID" waiting | grep -q 'No space left'
 }
 
 fault readonly_spool 2 1 "the spool is not writable at a restart of the coordinator"
@@ -100,13 +90,14 @@ no_descriptors_worker() {
 	finish_job
 }
 worker_without_descriptors() {
-	says w1 event=connect
+	says w1 event=connect\ 
+	calls=$(times_said w1 event=connect\ )
 	prlimit --pid "$(renders "$WORKER")" --nofile=3:20000
 	kill -9 "$COORDINATOR_PID"
 	again
 	until_true 30 grep -q 'event=connect_failed .*too many' "$DIR/w1.log" || fail "$NAME: it does not say why"
 	prlimit --pid "$(renders "$WORKER")" --nofile=20000:20000
-	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: w1 does not come back"
+	until_true 30 has_said w1 event=connect\  $((calls + 1)) || fail "$NAME: w1 does not come back"
 }
 
 fault no_memory 5 1 "the coordinator gets no memory for a while"
@@ -153,7 +144,7 @@ small_worker() {
 	"$BIN/hslt-render" "$BOX" -o "$QUIET" $JOB 2>>"$DIR/render.log"
 	farm
 	worker w1
-	says w1 event=connect
+	says w1 event=connect\ 
 	size=$(awk '/^VmSize/ { print $2 }' "/proc/$(renders "$WORKER")/status")
 	prlimit --pid "$(renders "$WORKER")" --as=$((size * 1024 + 20000000))
 	job

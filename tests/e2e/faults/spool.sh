@@ -59,12 +59,16 @@ journal_bit() {
 	[ "$TIMES" -lt 3 ] || grep -q 'batch_merged .*late=1' "$DIR/coordinator.log" || fail "$NAME: nothing waited for what was damaged"
 	blameless
 }
+# Held, lest it has ended and has no journal.
 journal_is_damaged() {
-	kill_running
+	hold_job
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
 	for journal in "$DIR/spool/jobs/$ID"/journal.*; do # two when a new one is just made: either may be the one that counts
 		flip_result "$journal" "0.$((20 + 10 * i))" >>"$DIR/flipped"
 	done
 	again
+	release_job
 }
 
 fault clock_ahead 3 1 "the wall clock is 40 days ahead for a while, with a restart of the coordinator: results are kept"
@@ -108,7 +112,9 @@ jobs_database() {
 	[ "$(grep -c 'level=error event=spool_fault' "$DIR/coordinator.log")" -gt 0 ] || fail "$NAME: it does not say what was lost"
 }
 database_is_damaged() {
-	kill_running
+	lives=$(times_restored)
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
 	db=$DIR/spool/jobs$([ "$i" -le 4 ] || echo -copy).db
 	[ -s "$db-wal" ] || : >>"$db-wal"
 	case $((i % 4)) in
@@ -118,7 +124,8 @@ database_is_damaged() {
 	0) truncate -s 3000 "$db" ;;
 	esac
 	again
-	[ -d "$DIR/spool/jobs/$ID" ] || fail "$NAME: the job's folder is gone"
+	is_restored || LATE=yes
+	[ -n "$LATE" ] || [ -d "$DIR/spool/jobs/$ID" ] || is_state "$ID" done || fail "$NAME: the job's folder is gone"
 }
 
 fault plan_changed 2 1 "a number in the plan in a job's row has changed when the coordinator starts"
@@ -131,8 +138,11 @@ plan_changed() {
 	finish_job
 	[ "$(grep -c 'its row in jobs.db was damaged: restored from jobs-copy.db' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
 }
+# Held, lest it has ended.
 plan_is_changed() {
-	kill_running
+	hold_job
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
 	"$PYTHON" - "$DIR/spool/jobs.db" <<'TEXT' || fail "$NAME: no row"
 import sqlite3, sys
 db = sqlite3.connect(sys.argv[1])
@@ -141,6 +151,7 @@ db.execute("UPDATE jobs SET plan = ? WHERE ended IS NULL", (plan[:-1] + bytes([p
 db.commit()
 TEXT
 	again
+	release_job
 }
 
 fault row_lost 1 1 "a job's row is missing in jobs.db and in jobs-copy.db: the coordinator starts only with --accept-loss"
@@ -149,9 +160,8 @@ row_lost() {
 	worker w0
 	worker w1
 	job
-	AT=3
-	reach
-	hold_running
+	until_true 60 is_merged 3 || fail "$NAME: nothing is merged"
+	hold_job
 	other=$ID
 	job
 	each_time row_is_lost
@@ -191,7 +201,7 @@ folder_gone() {
 }
 # The job is held meanwhile, lest it end before it is noticed.
 folder_goes() {
-	hold_running
+	hold_job
 	seen=$(times_noticed)
 	case $((i % 3)) in
 	1) mv "$DIR/spool/jobs/$ID" "$DIR/moved.$i" ;;
@@ -201,7 +211,7 @@ folder_goes() {
 	until_true 30 is_noticed || fail "$NAME: it does not notice"
 	until_true 30 is_mended || fail "$NAME: it is not mended: $(tail -n 3 "$DIR/coordinator.log")"
 	[ "$i" -ne 2 ] || { kill -9 "$COORDINATOR_PID" && again --journal 0.2; } # all is in the new folder
-	release
+	release_job
 }
 # The coordinator may put a file into the folder while rm walks through it.
 remove_folder() {
@@ -230,8 +240,7 @@ file_damaged() {
 }
 # Held meanwhile, lest the worker ends the job before it stops.
 file_is_damaged() {
-	AT=3
-	hold_running
+	hold_job
 	for f in "$DIR/spool/blobs"/[0-9a-f]*; do
 		flip "$f" 0.5
 	done
@@ -242,7 +251,7 @@ file_is_damaged() {
 	[ $((i % 2)) -eq 0 ] || { kill -9 "$COORDINATOR_PID" && again; }
 	sleep 0.1
 	start_worker "w$i" -v --cache "$DIR/own"
-	release
+	release_job
 	until_true 60 waits_for_file || fail "$NAME: it does not wait: $(value "$ID" waiting)"
 	# shellcheck disable=SC2086
 	again_id=$("$BIN/hslt-submit" "$BOX" -o "$DIR/again.exr" $JOB 2>>"$DIR/submit.log") || fail "$NAME: $(tail -n 1 "$DIR/submit.log")"

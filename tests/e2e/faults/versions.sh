@@ -35,10 +35,11 @@ TEXT
 	grep -q event=batch_acknowledged "$DIR/o1.log" && fail "$NAME: the other build has worked on it"
 	return 0
 }
+# The job is held until the other worker has gone, lest that one ends it.
 another_comes() {
-	hold_running
+	hold_job
 	stop "$WORKER"
-	release
+	release_job
 	"$other" --threads 1 --name o1 --cache "$DIR/cache" -v 2>>"$DIR/o1.log" &
 	odd=$!
 	PIDS="$PIDS $odd"
