@@ -9,6 +9,37 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include <malloc.h>
+#include <openssl/crypto.h>
+#include <stdlib.h>
+
+static size_t held; /* bytes that OpenSSL has allocated */
+
+static void *count_malloc(size_t size, const char *file, int line)
+{
+	(void)file, (void)line;
+	void *p = malloc(size);
+	held += p ? malloc_usable_size(p) : 0;
+	return p;
+}
+
+static void count_free(void *p, const char *file, int line)
+{
+	(void)file, (void)line;
+	held -= p ? malloc_usable_size(p) : 0;
+	free(p);
+}
+
+static void *count_realloc(void *p, size_t size, const char *file, int line)
+{
+	(void)file, (void)line;
+	size_t before = p ? malloc_usable_size(p) : 0;
+	void *q = realloc(p, size);
+	if (q || !size)
+		held += (q ? malloc_usable_size(q) : 0) - before;
+	return q;
+}
+
 static void write_bytes(struct pair_end *x, size_t size)
 {
 	static unsigned char bytes[1 << 16];
@@ -29,6 +60,27 @@ static void what_is_said_arrives(void **state)
 	assert_int_equal(pair_caller.got_size, 1);
 	for (size_t i = 0; i < 60000; i++)
 		assert_int_equal(pair_listener.got[i], (unsigned char)(i * 7));
+	pair_hang_up();
+}
+
+/* A worker has said much at once, and then waits. */
+static void bursts_leave_no_memory(void **state)
+{
+	(void)state;
+	pair_shake(pair_at(pair_ours, "node"), pair_at(pair_ours, "farm"), 100000);
+	write_bytes(&pair_caller, 100);
+	pair_carry(&pair_caller, &pair_listener, 100000);
+	size_t before = held;
+	write_bytes(&pair_caller, 60000);
+	assert_true(held > before + 60000);
+	pair_carry(&pair_caller, &pair_listener, 100000);
+	print_message("%zd bytes left of 60,000 sent\n", (ssize_t)(held - before));
+	assert_true(held < before + 8192);
+	write_bytes(&pair_listener, 60000);
+	pair_carry(&pair_listener, &pair_caller, 20000); /* in the middle of records */
+	assert_true(held < before + 8192);
+	assert_int_equal(pair_listener.got_size, 60100);
+	assert_int_equal(pair_caller.got_size, 60000);
 	pair_hang_up();
 }
 
@@ -150,11 +202,13 @@ static void plaintext_is_known(void **state)
 
 int main(void)
 {
+	if (CRYPTO_set_mem_functions(count_malloc, count_realloc, count_free) != 1)
+		return 1;
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_is_said_arrives),	 cmocka_unit_test(half_a_record_says_nothing),
-		cmocka_unit_test(a_changed_bit_ends_it), cmocka_unit_test(a_replayed_record_ends_it),
-		cmocka_unit_test(nonsense_ends_it),	 cmocka_unit_test(a_handshake_does_not_grow),
-		cmocka_unit_test(plaintext_is_known),
+		cmocka_unit_test(what_is_said_arrives),	      cmocka_unit_test(bursts_leave_no_memory),
+		cmocka_unit_test(half_a_record_says_nothing), cmocka_unit_test(a_changed_bit_ends_it),
+		cmocka_unit_test(a_replayed_record_ends_it),  cmocka_unit_test(nonsense_ends_it),
+		cmocka_unit_test(a_handshake_does_not_grow),  cmocka_unit_test(plaintext_is_known),
 	};
 	return cmocka_run_group_tests(tests, pair_make_folders, pair_remove_folders);
 }
