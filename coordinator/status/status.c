@@ -76,6 +76,7 @@ struct status_socket {
 	unsigned reader_count;	     /* without */
 	bool caller_waits;
 	struct making *making;	/* NULL: none; meanwhile nothing else is published */
+	bool tick_waits;	/* a tick found one: it is the next one's turn, before those who have just come */
 	struct job_view *shown; /* the jobs as last sent to subscribers */
 	size_t shown_count;
 	uint64_t shown_changes; /* state of the jobs at the last tick */
@@ -305,7 +306,8 @@ static void on_connection(uv_stream_t *listener, int status)
 		return;
 	}
 	r->behind = true;
-	begin_making(t, 0);
+	if (!t->tick_waits)
+		begin_making(t, 0);
 }
 
 /* ---- changes ---- */
@@ -427,6 +429,7 @@ void status_tick(struct status_socket *t)
 		return;
 	if (t->caller_waits)
 		on_connection((uv_stream_t *)&t->listener, 0);
+	t->tick_waits = t->making;
 	if (t->making) /* what has changed is seen after it has been sent: lines that are newer do not come before it */
 		return;
 	for (struct reader *r = LIST_FIRST(&t->readers); r; r = LIST_NEXT(r, next))
