@@ -119,12 +119,20 @@ targets() {
 	worker w0
 	worker w1
 	job
-	each_time fetches_into fetch --preview "$ID"
+	each_time fetches_preview_into
 	finish_job
 	for i in 1 2 3 4; do
 		fetches_into fetch "$ID"
 		[ $i -eq 2 ] || same "$QUIET" "$DIR/real.exr"
 	done
+}
+# Before the first round is complete there is none.
+fetches_preview_into() {
+	until_true 30 has_round || fail "$NAME: no round of $ID is complete"
+	fetches_into fetch --preview "$ID"
+}
+has_round() {
+	[ "$(value "$ID" rounds)" -gt 0 ] 2>/dev/null
 }
 # fetches_into ARGUMENT...: of hslt-job; what it writes is in real.exr but for the device, which is a mount: nobody could replace it
 fetches_into() {
@@ -133,6 +141,7 @@ fetches_into() {
 	1)
 		mkfifo "$DIR/target.exr"
 		cat "$DIR/target.exr" >"$DIR/real.exr" &
+		PIDS="$PIDS $!" # it would wait for ever if nobody writes
 		code 0 timeout 100 "$BIN/hslt-job" "$@" -o "$DIR/target.exr"
 		[ -p "$DIR/target.exr" ] || fail "$NAME: the FIFO is replaced"
 		wait $!
