@@ -10,7 +10,6 @@ kill_coordinator() {
 	each_time coordinator_dies
 	finish_job
 }
-# and goes on with the job, unless that ended unsaid
 coordinator_dies() {
 	lives=$(times_restored)
 	kill -9 "$COORDINATOR_PID"
@@ -68,8 +67,7 @@ patient_client() {
 	PIDS="$PIDS $waiting"
 	ID=j1
 	until_true 60 test -s "$DIR/id" || fail "$NAME: no job: $(cat "$DIR/wait.log")"
-	kill_now # the first time before there is a worker: later ones may come when the image has been fetched
-	again
+	coordinator_dies # the first time before there is a worker: later ones may come when the image has been fetched
 	says wait 'trying again'
 	worker w0
 	first=$WORKER
@@ -97,12 +95,6 @@ patient_client() {
 patient_coordinator_dies() {
 	coordinator_dies
 	LATE=
-}
-
-# Whether or not its job has ended by then: it is the job of hslt-submit, there is no other.
-coordinator_is_killed() {
-	kill_now
-	again
 }
 
 fault long_journal 3 1 "a journal takes long to read at a restart of the coordinator: it listens and reports its progress, peers wait"

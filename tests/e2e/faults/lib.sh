@@ -60,56 +60,9 @@ is_merged() {
 	[ "$(merged)" -ge "$1" ]
 }
 
-# Whether the job has ended. It takes less than a second: on a busy machine it may do so between two looks at it. What must meet
-# a job that is not done tries again with another one.
-is_over() {
-	grep -q "event=job_state job=$ID state=done " "$DIR/coordinator.log"
-}
-
-# moment I: the I-th of TIMES, spread over the job. The number of results is left in AT.
+# moment I: the I-th of TIMES, spread over the job
 moment() {
-	AT=$((RESULTS * $1 / (TIMES + 1)))
-	reach
-}
-
-# reach: until AT results are merged
-reach() {
-	until_true 60 is_merged "$AT" || fail "$NAME: $(merged) results, not $AT of $RESULTS"
-}
-
-# try_again: another job, at the same moment; `attempt` counts
-try_again() {
-	attempt=$((attempt + 1))
-	[ $attempt -le 6 ] || fail "$NAME: six jobs ended before it was done to them"
-	job
-	reach
-}
-
-# hold_running: holds the job
-hold_running() {
-	attempt=1
-	until "$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log"; do
-		try_again
-	done
-}
-
-release() {
-	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
-}
-
-# kill_running [OPTION...]: kills the coordinator before the job is done, for good; OPTION is for its next life where it was
-kill_running() {
-	attempt=1
-	kill_now
-	while is_over; do
-		again "$@"
-		try_again
-		kill_now
-	done
-}
-kill_now() {
-	kill -9 "$COORDINATOR_PID"
-	wait "$COORDINATOR_PID" 2>/dev/null || :
+	until_true 60 is_merged $((RESULTS * $1 / (TIMES + 1))) || fail "$NAME: $(merged) of $RESULTS results at time $1"
 }
 
 # each_time COMMAND...: TIMES times, while the job runs. The job takes less than a second, and goes on when this script stands still: a

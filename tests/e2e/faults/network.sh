@@ -204,9 +204,6 @@ crowd_comes() {
 	[ $said -le $most ] || fail "$NAME: $said lines, at most $most"
 	[ "$i" -lt "$TIMES" ] || kill -9 "$COORDINATOR_PID"
 }
-reach_share() {
-	until_true 60 is_beyond "$ID" "$AT" || fail "$NAME: $ID is at $(value "$ID" progress)"
-}
 # how many refusals the log tells of since then, and how many it counts
 told() {
 	tail -n +$((lines + 1)) "$DIR/coordinator.log" |

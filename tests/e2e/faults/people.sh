@@ -45,8 +45,7 @@ while_chains_go_on() {
 	i=0
 	while [ $i -lt "$TIMES" ]; do
 		i=$((i + 1))
-		AT=$((RESULTS * (2 + i) / (2 * (TIMES + 3))))
-		reach
+		until_true 60 is_merged $((RESULTS * (2 + i) / (2 * (TIMES + 3)))) || fail "$NAME: $(merged) of $RESULTS results at time $i"
 		"$@"
 	done
 }

@@ -56,7 +56,8 @@ readonly_spool() {
 	finish_job
 }
 spool_is_readonly() {
-	kill_now
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
 	mount -o remount,ro "$DIR/spool"
 	CODE=0
 	timeout 100 "$BIN/hslt-coordinator" --listen "$COORDINATOR" --spool "$DIR/spool" --status-socket "$DIR/status" 2>"$DIR/readonly.log" || CODE=$?

@@ -170,7 +170,8 @@ row_lost() {
 	[ -s "$DIR/spool/lost/$other/why" ] && [ -s "$DIR/spool/lost/$other/journal.0" ] || fail "$NAME: what was left of $other is gone"
 }
 row_is_lost() {
-	kill_now
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
 	"$PYTHON" - "$DIR/spool" "${other#j}" <<'TEXT' || fail "$NAME: no row"
 import sqlite3, sys
 for name in "jobs.db", "jobs-copy.db":
@@ -193,8 +194,7 @@ folder_gone() {
 	i=0
 	while [ $i -lt "$TIMES" ]; do # in the first half of the job: the folder of one that is over would be gone, image and all
 		i=$((i + 1))
-		AT=$((RESULTS * i / (2 * TIMES)))
-		reach
+		until_true 60 is_merged $((RESULTS * i / (2 * TIMES))) || fail "$NAME: $(merged) of $RESULTS results at time $i"
 		folder_goes
 	done
 	finish_job
