@@ -104,8 +104,10 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 			"vectors, shows it distorted otherwise");
 	if (!dialect_3 || (strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0))
 		return 0;
-	return remark(r, n, e,
-		      "the sun is that of Mitsuba 0.6 (Preetham 1999): Mitsuba 3's differs a little in colour");
+	return remark(
+		r, n, e,
+		"the sun is that of Mitsuba 0.6 (Preetham 1999), which haze dims more: about as bright as Mitsuba 3's "
+		"in clear air, half as bright at a turbidity of 8 when it is low; `sun_scale` makes up for it");
 }
 
 /* Mitsuba has two tables for most metals, and those of which here is one, the first, are listed. Of Na, Ni and V it has

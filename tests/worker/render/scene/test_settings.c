@@ -269,6 +269,31 @@ static void test_note_on_a_stretched_environment(void **state)
 	}
 }
 
+/* A sun of another model than Mitsuba 3's is less bright in haze; Mitsuba 0.6 has the same. */
+static void test_notes_on_suns(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *version, *type;
+		bool differs;
+	} cases[] = {
+		{"3.0.0", "sunsky", true}, {"3.0.0", "sun", true}, {"3.0.0", "sky", false}, {"0.6.0", "sunsky", false}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[128];
+		snprintf(xml, sizeof xml, "<scene version='%s'><emitter type='%s'/></scene>", cases[i].version,
+			 cases[i].type);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e;
+		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%s", e.text);
+		if (scene_has_note(&s, "half as bright at a turbidity of 8") != cases[i].differs)
+			fail_msg("%s", xml);
+		scene_fini(&s);
+	}
+}
+
 #define ONE_EDGE "<integrator type='path'><integer name='max_depth' value='1'/></integrator>"
 
 /* A path of one edge ends at an emitter, which a point is not. */
@@ -425,6 +450,7 @@ int main(void)
 		cmocka_unit_test(test_several_sensors),
 		cmocka_unit_test(test_notes_on_the_whole),
 		cmocka_unit_test(test_note_on_a_stretched_environment),
+		cmocka_unit_test(test_notes_on_suns),
 		cmocka_unit_test(test_notes_on_one_edge),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_size_is_overridden),
