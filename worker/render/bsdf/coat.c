@@ -221,6 +221,7 @@ static int read_inner(struct coat *c, struct bsdf *b, const struct scene_node *n
 	b->two_sided = c->inner.two_sided;
 	b->textured |= c->inner.textured;
 	b->uses_tangents = c->inner.uses_tangents;
+	b->directed = c->inner.directed;
 	b->alpha = c->inner.has_smooth ? c->inner.alpha : INFINITY;
 	b->alpha_mean = c->inner.alpha_mean;
 	bsdf_add_shape(b, c->inner.shape);

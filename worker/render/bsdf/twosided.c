@@ -132,6 +132,7 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 		b->has_delta |= t->side[i].has_delta;
 		b->textured |= t->side[i].textured;
 		b->uses_tangents |= t->side[i].uses_tangents;
+		b->directed |= t->side[i].directed;
 		bsdf_add_shape(b, t->side[i].shape);
 	}
 	if (!b->has_smooth)

@@ -6,6 +6,7 @@
 #include "worker/render/scene/snake_case.h"
 
 #include <string.h>
+#include <strings.h>
 
 static bool is_one_of(const char *name, const char *const *list)
 {
@@ -20,7 +21,7 @@ static const struct {
 	enum plugin_class cls;
 	const char *type, *stand_in;
 } likes[] = {
-	{PLUGIN_BSDF, "measured", "roughplastic"},
+	{PLUGIN_BSDF, "measured", "roughplastic"}, /* where its file is missing */
 	/* 3 p.m. of the first day, instead of all times together */
 	{PLUGIN_EMITTER, "timed_sunsky", "sunsky"},
 	{PLUGIN_EMITTER, "avg_sunsky", "sunsky"},
@@ -139,7 +140,9 @@ bool lenient_needs_texture(const char *type)
 
 const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el)
 {
-	if (strcmp(el->name, "texture") != 0)
+	const char *type = xml_attribute(el, "type");
+	if (strcmp(el->name, "texture") != 0 &&
+	    (strcmp(el->name, "bsdf") != 0 || !type || strcasecmp(type, "measured") != 0))
 		return NULL;
 	for (const struct xml_element *c = el->first; c; c = c->next) {
 		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value"), *rest;

@@ -44,9 +44,10 @@ bool lenient_needs_texture(const char *type);
 /* After a sentence that says that a texture's file is missing. */
 #define LENIENT_TEXTURE_HINT "; --lenient leaves the texture out"
 
-/* The file of a texture that the scene does not come with: it is missing, or its name begins at the root, from which
- * nothing is read. NULL: it is there, or outside the folders that may be read, or it is another kind of object, or it
- * needs no file. Textures of old scenes are often lost; a mesh, or an environment, has no replacement. */
+/* The file of a texture or a `measured` material that the scene does not come with: it is missing, or its name begins
+ * at the root, from which nothing is read. NULL: it is there, or outside the folders that may be read, or it is another
+ * kind of object, or it needs no file. Textures of old scenes are often lost; a mesh, or an environment, has no
+ * replacement. */
 const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el);
 
 /* The BSDF inside one that is not supported; NULL: none. */

@@ -392,11 +392,12 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		type = decl->type;
 	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(&m->notes, el, decl)))
 		return r;
-	if (m->lenient && (r = substitute_texture(&m->notes, m->assets_from, el, type)))
+	const struct plugin_decl *named = decl;
+	if (m->lenient && (r = substitute_lost(&m->notes, m->assets_from, m->decls, el, &type, &decl)))
 		return r;
 	struct draft d = {.node = allocate(m, 1, sizeof *d.node),
 			  .decl = decl,
-			  .stands_in = stands_in,
+			  .stands_in = stands_in || decl != named,
 			  .nesting = {.height = 1, .objects = 1}};
 	if (!d.node)
 		return out_of_memory(m);

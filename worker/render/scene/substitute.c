@@ -31,17 +31,24 @@ int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, st
 	return *decl ? 0 : refuse_type(decls, el, cls, *type, t->error);
 }
 
-int substitute_texture(const struct notes *t, const struct asset_source *assets, const struct xml_element *el,
-		       const char *type)
+int substitute_lost(const struct notes *t, const struct asset_source *assets, const struct plugin_decl *decls,
+		    const struct xml_element *el, const char **type, const struct plugin_decl **decl)
 {
-	const char *file = lenient_missing(assets, el);
+	const char *file = lenient_missing(assets, el), *other = NULL;
 	if (!file)
 		return 0;
+	if ((*decl)->cls == PLUGIN_BSDF)
+		lenient_plugin(PLUGIN_BSDF, *type, &other);
 	char shown[257];
-	int r = note(t, el, type, file,
-		     "%s:%d: <texture type=\"%.64s\">: %s is not among the scene's files; left out (lenient)", el->file,
-		     el->line, type, asset_name_shown(file, shown, sizeof shown));
-	return r ? r : REPORT_TOLD;
+	int r = note(t, el, *type, file,
+		     "%s:%d: <%.64s type=\"%.64s\">: %s is not among the scene's files; %s%s%s (lenient)", el->file,
+		     el->line, el->name, *type, asset_name_shown(file, shown, sizeof shown),
+		     other ? "a standard " : "left out", other ? other : "", other ? " stands in for it" : "");
+	if (r || !other)
+		return r ? r : REPORT_TOLD;
+	*type = other;
+	*decl = plugin_find(decls, PLUGIN_BSDF, other);
+	return 0;
 }
 
 int substitute_cover(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node **node)

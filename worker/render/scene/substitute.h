@@ -15,9 +15,10 @@ int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, st
 		      const struct xml_element *el, enum plugin_class cls, const char **type,
 		      const struct plugin_decl **decl, struct xml_element **inner);
 
-/* A texture whose file is missing is left out. */
-int substitute_texture(const struct notes *t, const struct asset_source *assets, const struct xml_element *el,
-		       const char *type);
+/* What needs a file that the scene does not come with: a texture is left out (REPORT_TOLD), and a material becomes
+ * another one. */
+int substitute_lost(const struct notes *t, const struct asset_source *assets, const struct plugin_decl *decls,
+		    const struct xml_element *el, const char **type, const struct plugin_decl **decl);
 
 /* *node becomes the BSDF inside it if it does not allow that, or if it `lacks` the texture that it needs. */
 int substitute_cover(const struct notes *t, const struct xml_element *el, bool lacks, const struct scene_node **node);

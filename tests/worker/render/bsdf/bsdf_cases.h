@@ -6,6 +6,7 @@
 #ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
 #define TESTS_WORKER_BSDF_BSDF_CASES_H
 
+#include "tests/support/measured_file.h"
 #include "tests/support/nodes.h"
 #include "worker/render/bsdf/bsdf.h"
 
@@ -142,6 +143,12 @@ static const char *const bsdf_cases[] = {
 	"hair sigma_a=0 longitudinal_roughness=0.2 azimuthal_roughness=0.6 scale_tilt=-5 int_ior=1.8 ext_ior=1",
 	"hair int_ior=1 ext_ior=1.3 longitudinal_roughness=0.4 sigma_a=rgb(0.1,0.4,0.9)",
 	"hair scale=3 scale_tilt=20 | @sigma_a checkerboard color0=0.1 color1=rgb(0.5,0.2,0.1)",
+	"measured filename=isotropic.bsdf",
+	"measured filename=anisotropic.bsdf",
+	"measured filename=rgb.bsdf",
+	"twosided | measured filename=isotropic.bsdf",
+	"coating | measured filename=rgb.bsdf",
+	"blendbsdf weight=0.4 | measured filename=anisotropic.bsdf | roughconductor alpha=0.2",
 	"mask opacity=0.7 | hair sigma_a=0.3",
 	"blendbsdf weight=0.4 | hair azimuthal_roughness=0.5 | difftrans",
 	/* Parts with other normals: they tilt on a surface alone. */
@@ -157,7 +164,8 @@ enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
 
 static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
 {
-	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3};
+	const struct asset_source assets = memory_assets(measured_files());
+	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3, .assets = &assets};
 	return bsdf_create(b, node_bsdf(a, text), &build, e);
 }
 

@@ -480,12 +480,13 @@ static void test_out_of_memory_is_an_answer(void **state)
 {
 	(void)state;
 	struct arena nodes = {0};
+	const struct asset_source assets = memory_assets(measured_files());
 	for (int k = 0; k < BSDF_CASES; k++) {
 		const struct scene_node *n = node_bsdf(&nodes, bsdf_cases[k]);
 		int code = -ENOMEM;
-		for (size_t limit = 1; code; limit += 64) {
+		for (size_t limit = 1; code; limit += 64 + limit / 64) {
 			struct arena a = {.limit = limit};
-			const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+			const struct bsdf_build build = {.arena = &a, .dialect_3 = true, .assets = &assets};
 			struct bsdf b;
 			struct error e;
 			code = bsdf_create(&b, n, &build, &e);

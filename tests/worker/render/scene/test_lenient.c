@@ -26,7 +26,7 @@ static void test_stand_ins(void **state)
 		const char *stand_in;
 	} expected[] = {
 		{PLUGIN_BSDF, "irawan", LENIENT_INNER, "diffuse"},
-		{PLUGIN_BSDF, "measured", LENIENT_REPLACE, "roughplastic"},
+		{PLUGIN_BSDF, "neuralbsdf", LENIENT_INNER, "diffuse"},
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "sunsky"},
 		{PLUGIN_EMITTER, "laser", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
@@ -95,6 +95,30 @@ static void test_covers(void **state)
 				 goes ? "goes" : "stays");
 		arena_fini(&a);
 	}
+}
+
+/* A measured material whose file is missing, and one whose file is there. */
+static void test_lost_measurements(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='3.0.0'>\n"
+		"<bsdf type='measured' id='lost'><string name='filename' value='lost.bsdf'/></bsdf>\n"
+		"<bsdf type='Measured' id='there'><string name='filename' value='a.bsdf'/></bsdf></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {"a.bsdf", "", 0}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_string_equal(scene_named(&s, "lost")->type, "measured");
+	scene_fini(&s);
+	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_string_equal(scene_named(&s, "lost")->type, "roughplastic");
+	assert_null(node_find(scene_named(&s, "lost"), "filename"));
+	assert_string_equal(scene_named(&s, "there")->type, "measured");
+	assert_true(scene_has_note(&s, "s.xml:2: <bsdf type=\"measured\">: lost.bsdf is not among the scene's files; a "
+				       "standard roughplastic stands in for it (lenient)"));
+	scene_fini(&s);
 }
 
 /* Textures whose file is missing, or whose plug-in is unknown: what holds one and is nothing without it goes, too. */
@@ -256,6 +280,7 @@ int main(void)
 		cmocka_unit_test(test_stand_ins),
 		cmocka_unit_test(test_colours_are_kept),
 		cmocka_unit_test(test_covers),
+		cmocka_unit_test(test_lost_measurements),
 		cmocka_unit_test(test_lost_textures),
 		cmocka_unit_test(test_lights_in_shapes),
 		cmocka_unit_test(test_volumes_without_a_value),

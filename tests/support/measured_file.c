@@ -1,0 +1,301 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The formulas, then the warp of a table of normals, then each array of the file, then the file. Warps are inverted by
+ * bisection of sums over the nodes: slow, and nothing that could be wrong the same way as the renderer's.
+ *
+ * Failures: out of memory aborts.
+ */
+#include "tests/support/measured_file.h"
+
+#include "common/base/bytes.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+enum { WAVELENGTHS = 7, ARRAYS_MAX = 12, BYTES = 1, FLOATS = 10 };
+
+double measured_tint(double nm)
+{
+	return 0.4 + 0.3 * (nm - 550) / 250;
+}
+
+double measured_kind_theta(const struct measured_kind *k, int i)
+{
+	double x = (double)i / (k->elevations - 1);
+	return x * x * MEASURED_THETA_MAX;
+}
+
+static double phi_of(const struct measured_kind *k, int i)
+{
+	return k->azimuths == 1 ? 0 : -PI + 2 * PI / k->symmetry * i / (k->azimuths - 1);
+}
+
+/* ---- the formulas ---- */
+
+static double facets(const struct measured_kind *k, vec3 m)
+{
+	double x = m.x / k->alpha_u, y = m.y / k->alpha_v, r = x * x + y * y + m.z * m.z;
+	return 1 / (PI * k->alpha_u * k->alpha_v * r * r);
+}
+
+/* cos(theta) / G1 */
+static double shown(const struct measured_kind *k, vec3 w)
+{
+	return 0.5 *
+	       (w.z + sqrt(w.z * w.z + k->alpha_u * k->alpha_u * w.x * w.x + k->alpha_v * k->alpha_v * w.y * w.y));
+}
+
+/* What the file has for light from wi. */
+static double color_of(const struct measured_kind *k, double tint, vec3 wo, vec3 wi)
+{
+	vec3 h = vec3_normalize(vec3_add(wo, wi));
+	double fresnel = k->white ? 1 : tint + (1 - tint) * pow(1 - fmin(vec3_dot(wo, h), 1), 5);
+	double s = wi.z > 0 ? fresnel * wi.z / shown(k, wi) : 0;
+	return k->absolute ? s * facets(k, h) / (4 * shown(k, wo)) : s;
+}
+
+double measured_kind_reflected(const struct measured_kind *k, double tint, vec3 wo, vec3 wi)
+{
+	vec3 h = vec3_normalize(vec3_add(wo, wi));
+	double s = color_of(k, tint, wo, wi);
+	return k->absolute ? s : s * facets(k, h) / (4 * shown(k, wo));
+}
+
+static vec3 direction(double x, double y)
+{
+	double theta = 0.5 * PI * x * x, phi = (2 * y - 1) * PI;
+	return (vec3){sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
+}
+
+/* ---- the warp of a grid of n x n values ---- */
+
+/* The integral from 0 to x of what is linear between n values. */
+static double integral(const double *value, int n, double x)
+{
+	double sum = 0, step = 1.0 / (n - 1);
+	for (int i = 0; i + 1 < n && i * step < x; i++) {
+		double part = fmin((x - i * step) / step, 1);
+		sum += step * part * (value[i] + 0.5 * part * (value[i + 1] - value[i]));
+	}
+	return sum;
+}
+
+static double inverse(const double *value, int n, double share)
+{
+	double wanted = share * integral(value, n, 1), low = 0, high = 1;
+	for (int i = 0; i < 50; i++) {
+		double middle = 0.5 * (low + high);
+		if (integral(value, n, middle) < wanted)
+			low = middle;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+static void warp(const double *grid, int n, double u, double v, double *x, double *y)
+{
+	double line[256];
+	for (int i = 0; i < n; i++)
+		line[i] = integral(grid + (size_t)i * (size_t)n, n, 1);
+	*y = inverse(line, n, v);
+	int row = (int)fmin(*y * (n - 1), n - 2);
+	double part = *y * (n - 1) - row;
+	for (int i = 0; i < n; i++)
+		line[i] = (1 - part) * grid[row * n + i] + part * grid[(row + 1) * n + i];
+	*x = inverse(line, n, u);
+}
+
+/* ---- the arrays ---- */
+
+struct array {
+	const char *name;
+	unsigned type, dimensions;
+	uint64_t shape[5];
+	unsigned char *bytes;
+	size_t size;
+};
+
+struct file {
+	struct array array[ARRAYS_MAX];
+	size_t count;
+};
+
+static unsigned char *add(struct file *f, const char *name, unsigned type, unsigned dimensions, const int *shape)
+{
+	struct array *a = &f->array[f->count++];
+	*a = (struct array){.name = name, .type = type, .dimensions = dimensions, .size = type == FLOATS ? 4 : 1};
+	for (unsigned i = 0; i < dimensions; i++) {
+		a->shape[i] = (uint64_t)shape[i];
+		a->size *= (size_t)shape[i];
+	}
+	a->bytes = calloc(1, a->size);
+	if (!a->bytes)
+		abort();
+	return a->bytes;
+}
+
+static void put(unsigned char **at, double x)
+{
+	put_float(*at, (float)x);
+	*at += 4;
+}
+
+static double wavelength(const struct measured_kind *k, int i)
+{
+	static const double rgb[3] = {600, 550, 450};
+	return k->rgb ? rgb[i] : 340 + 90 * i;
+}
+
+static void add_axes(struct file *f, const struct measured_kind *k)
+{
+	unsigned char *at = add(f, "phi_i", FLOATS, 1, &k->azimuths);
+	for (int i = 0; i < k->azimuths; i++)
+		put(&at, phi_of(k, i));
+	at = add(f, "theta_i", FLOATS, 1, &k->elevations);
+	for (int i = 0; i < k->elevations; i++)
+		put(&at, measured_kind_theta(k, i));
+	add(f, "jacobian", BYTES, 1, (const int[]){1})[0] = !k->absolute;
+	add(f, "description", BYTES, 1, (const int[]){4});
+	if (k->rgb)
+		return;
+	at = add(f, "wavelengths", FLOATS, 1, (const int[]){WAVELENGTHS});
+	for (int i = 0; i < WAVELENGTHS; i++)
+		put(&at, wavelength(k, i));
+}
+
+static void add_planes(struct file *f, const struct measured_kind *k)
+{
+	int n = k->fine;
+	unsigned char *ndf = add(f, "ndf", FLOATS, 2, (const int[]){n, n}),
+		      *sigma = add(f, "sigma", FLOATS, 2, (const int[]){n, n});
+	for (int y = 0; y < n; y++)
+		for (int x = 0; x < n; x++) {
+			vec3 w = direction((double)x / (n - 1), (double)y / (n - 1));
+			put(&ndf, facets(k, w));
+			put(&sigma, shown(k, w));
+		}
+}
+
+static void find_visible(const struct measured_kind *k, vec3 wo, double *grid)
+{
+	int n = k->fine;
+	for (int y = 0; y < n; y++)
+		for (int x = 0; x < n; x++) {
+			double u = (double)x / (n - 1);
+			vec3 m = direction(u, (double)y / (n - 1));
+			double d = facets(k, m) * fmax(vec3_dot(wo, m), 0) * u * sin(0.5 * PI * u * u);
+			grid[y * n + x] = (double)(float)d;
+		}
+}
+
+/* Luminance differs from the colours, which it may: it is what samples follow. */
+static void add_slices(struct file *f, const struct measured_kind *k)
+{
+	int n = k->fine, side = k->side, channels = k->rgb ? 3 : WAVELENGTHS;
+	int p = k->azimuths, t = k->elevations;
+	unsigned char *vndf = add(f, "vndf", FLOATS, 4, (const int[]){p, t, n, n}),
+		      *luminance = add(f, "luminance", FLOATS, 4, (const int[]){p, t, side, side}),
+		      *color = add(f, k->rgb ? "rgb" : "spectra", FLOATS, 5, (const int[]){p, t, channels, side, side});
+	double *grid = calloc((size_t)n * (size_t)n, sizeof *grid);
+	if (!grid || n > 256)
+		abort();
+	for (int slice = 0; slice < p * t; slice++) {
+		double theta = measured_kind_theta(k, slice % t), phi = phi_of(k, slice / t);
+		vec3 wo = {sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)};
+		find_visible(k, wo, grid);
+		for (int i = 0; i < n * n; i++)
+			put(&vndf, grid[i]);
+		for (int i = 0; i < side * side; i++) {
+			double u = (double)(i % side) / (side - 1), v = (double)(i / side) / (side - 1), x, y;
+			warp(grid, n, u, v, &x, &y);
+			vec3 m = direction(x, y), wi = vec3_sub(vec3_scale(2 * vec3_dot(wo, m), m), wo);
+			put(&luminance, 0.2 + u * v);
+			for (int c = 0; c < channels; c++) {
+				unsigned char *at = color + 4 * ((slice * channels + c) * side * side + i);
+				put(&at, color_of(k, measured_tint(wavelength(k, c)), wo, wi));
+			}
+		}
+	}
+	free(grid);
+}
+
+unsigned char *measured_file_make(const struct measured_kind *k, size_t *size)
+{
+	struct file f = {.count = 0};
+	add_axes(&f, k);
+	add_planes(&f, k);
+	add_slices(&f, k);
+	size_t head = 18, at, data;
+	for (size_t i = 0; i < f.count; i++)
+		head += 2 + strlen(f.array[i].name) + 11 + 8 * f.array[i].dimensions;
+	*size = head;
+	for (size_t i = 0; i < f.count; i++)
+		*size += f.array[i].size;
+	unsigned char *out = calloc(1, *size);
+	if (!out)
+		abort();
+	memcpy(out, "tensor_file\0\1", 13);
+	put32(out + 14, (uint32_t)f.count);
+	at = 18;
+	data = head;
+	for (size_t i = 0; i < f.count; i++) {
+		struct array *a = &f.array[i];
+		size_t length = strlen(a->name);
+		put_bytes(out + at, length, 2);
+		memcpy(out + at + 2, a->name, length);
+		at += 2 + length;
+		put_bytes(out + at, a->dimensions, 2);
+		out[at + 2] = (unsigned char)a->type;
+		put64(out + at + 3, data);
+		at += 11;
+		for (unsigned d = 0; d < a->dimensions; d++, at += 8)
+			put64(out + at, a->shape[d]);
+		memcpy(out + data, a->bytes, a->size);
+		data += a->size;
+		free(a->bytes);
+	}
+	return out;
+}
+
+const struct memory_file *measured_files(void)
+{
+	static const struct measured_kind kinds[] = {
+		{.name = "isotropic.bsdf",
+		 .alpha_u = 0.4,
+		 .alpha_v = 0.4,
+		 .azimuths = 1,
+		 .symmetry = 1,
+		 .elevations = 6,
+		 .fine = 24,
+		 .side = 8},
+		{.name = "anisotropic.bsdf",
+		 .alpha_u = 0.6,
+		 .alpha_v = 0.3,
+		 .azimuths = 5,
+		 .symmetry = 2,
+		 .elevations = 5,
+		 .fine = 24,
+		 .side = 6},
+		{.name = "rgb.bsdf",
+		 .alpha_u = 0.7,
+		 .alpha_v = 0.7,
+		 .azimuths = 1,
+		 .symmetry = 1,
+		 .elevations = 5,
+		 .fine = 16,
+		 .side = 6,
+		 .rgb = true,
+		 .absolute = true},
+	};
+	enum { KINDS = sizeof kinds / sizeof *kinds };
+	static struct memory_file files[KINDS + 1];
+	for (size_t i = 0; i < KINDS && !files[i].name; i++) {
+		size_t size;
+		unsigned char *bytes = measured_file_make(&kinds[i], &size);
+		files[i] = (struct memory_file){kinds[i].name, bytes, size};
+	}
+	return files;
+}

@@ -1,0 +1,258 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Materials as they were measured, on the side of the normal: Dupuy and Jakob 2018, An Adaptive Parameterization for
+ * Efficient Material Acquisition and Rendering. Half vectors h lie in a square, x = sqrt(2 theta / pi), y = phi / 2 pi
+ * + 1/2. A warp takes numbers u to the h that are visible from the camera, and the file has what is left of the
+ * reflected light by u (its equations 5 to 7):
+ *
+ *   f(wo, wi) wi.z = S(u) D(h) / (4 sigma(wo)),   wo towards the camera
+ *
+ * Samples are two warps, the first by the mean of S over wavelengths. Between measurements the numbers are linear.
+ * Measured light is not exactly reciprocal: paths from a light use f with the roles of the directions exchanged, and
+ * sample as if they came from the camera.
+ *
+ * Failures: see measured_read.h.
+ */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/measured_read.h"
+#include "worker/render/bsdf/microfacet.h"
+#include "worker/render/bsdf/warp.h"
+#include "worker/render/math/search.h"
+
+/* Directions nearer to the horizon carry no light: f is bounded by what the formats of numbers hold. */
+#define LEAST_COSINE 0x1p-500
+/* The square root of a double's precision: unit vectors do not tell smaller angles to the normal apart. */
+#define LEAST_X 0x1p-26
+
+/* Signs of x and y that turn w to where the azimuths of the file are. Mitsuba's. */
+struct turn {
+	double x, y;
+};
+
+static struct turn turn_of(const struct measured *m, vec3 w)
+{
+	struct turn t = {1, 1};
+	if (m->symmetry > 1) {
+		t.y = w.y < 0 ? 1 : -1;
+		t.x = m->symmetry == 4 ? (w.x < 0 ? 1 : -1) : t.y;
+	}
+	return t;
+}
+
+static vec3 turned(struct turn t, vec3 w)
+{
+	return (vec3){t.x * w.x, t.y * w.y, w.z};
+}
+
+struct angles {
+	double theta, phi;
+};
+
+static struct angles angles_of(vec3 w)
+{
+	return (struct angles){atan2(hypot(w.x, w.y), w.z), atan2(w.y, w.x)};
+}
+
+static void place_of(struct angles a, double place[2])
+{
+	double y = (a.phi + WARP_PI) / (2 * WARP_PI);
+	place[0] = min_of(sqrt(a.theta * (2 / WARP_PI)), 1);
+	place[1] = y - floor(y);
+}
+
+/* What is asked of the tables about a direction to the camera. */
+struct view {
+	const struct measured *m;
+	struct turn turn;
+	struct angles angles;
+	struct warp_mix mix;
+};
+
+static struct view view_from(const struct measured *m, vec3 camera)
+{
+	struct view v = {.m = m, .turn = turn_of(m, camera)};
+	v.angles = angles_of(turned(v.turn, camera));
+	v.mix = warp_mix_at(&m->axes, (const double[2]){v.angles.phi, v.angles.theta});
+	return v;
+}
+
+/* Where h is in the square, and the solid angle of directions to the light per area there. */
+static double half_place(const struct view *v, vec3 h, double cosine, double place[2])
+{
+	struct angles a = angles_of(turned(v->turn, h));
+	if (v->m->isotropic)
+		a.phi -= v->angles.phi;
+	place_of(a, place);
+	double x = max_of(place[0], LEAST_X);
+	return 2 * WARP_PI * WARP_PI * x * sin(0.5 * WARP_PI * x * x) * 4 * cosine;
+}
+
+static double plane_at(const struct measured_plane *p, const double place[2])
+{
+	struct warp_cell x = warp_cell_at(p->width, place[0]), y = warp_cell_at(p->height, place[1]);
+	const double *near = p->value + (size_t)y.i * p->width + x.i, *far = near + p->width;
+	double a = near[0] + x.part * (near[1] - near[0]), b = far[0] + x.part * (far[1] - far[0]);
+	return a + y.part * (b - a);
+}
+
+/* The nodes around u, and the share of each. */
+struct nodes {
+	int count;
+	size_t at[16];
+	double weight[16];
+};
+
+static struct nodes nodes_at(const struct view *v, const double u[2])
+{
+	struct nodes n = {.count = 0};
+	const struct measured *m = v->m;
+	struct warp_cell x = warp_cell_at(m->side, u[0]), y = warp_cell_at(m->side, u[1]);
+	for (int k = 0; k < v->mix.count; k++)
+		for (unsigned corner = 0; corner < 4; corner++) {
+			unsigned right = corner % 2, up = corner / 2;
+			n.at[n.count] = ((size_t)v->mix.slice[k] * m->side + y.i + up) * m->side + x.i + right;
+			n.weight[n.count++] =
+				v->mix.weight[k] * (right ? x.part : 1 - x.part) * (up ? y.part : 1 - y.part);
+		}
+	return n;
+}
+
+static double nodes_sum(const struct nodes *n, const float *table, size_t stride, size_t channel)
+{
+	double sum = 0;
+	for (int i = 0; i < n->count; i++)
+		sum += n->weight[i] * (double)table[n->at[i] * stride + channel];
+	return sum;
+}
+
+static double at_wavelength(const struct measured *m, const struct nodes *n, double nm)
+{
+	if (m->count < 2 || !(nm > m->nm[0]))
+		return nodes_sum(n, m->spectrum, m->count, 0);
+	if (!(nm < m->nm[m->count - 1]))
+		return nodes_sum(n, m->spectrum, m->count, m->count - 1);
+	uint32_t i = search_cell(m->nm, m->count - 1, nm);
+	double part = (nm - m->nm[i]) / (m->nm[i + 1] - m->nm[i]);
+	return (1 - part) * nodes_sum(n, m->spectrum, m->count, i) + part * nodes_sum(n, m->spectrum, m->count, i + 1);
+}
+
+/* The file's colours may be outside of the gamut, and light is never negative. */
+static spectrum color_at(const struct view *v, const double u[2], const struct wavelengths *w)
+{
+	const struct measured *m = v->m;
+	struct nodes n = nodes_at(v, u);
+	spectrum s;
+	if (m->nm && !w->rgb) {
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			s.v[i] = max_of(at_wavelength(m, &n, w->nm[i]), 0);
+		return s;
+	}
+	double rgb[3], scale = 1;
+	for (size_t c = 0; c < 3; c++) {
+		rgb[c] = max_of(nodes_sum(&n, m->rgb, 3, c), 0);
+		scale = max_of(scale, rgb[c]);
+	}
+	if (w->rgb)
+		return spectrum_of_rgb(rgb);
+	for (int c = 0; c < 3; c++)
+		rgb[c] /= scale;
+	return spectrum_scale(scale, color_eval_rgb_reflectance(rgb, w));
+}
+
+/* f light.z for light that goes to the camera. */
+static spectrum reflected(const struct measured *m, const struct wavelengths *w, vec3 camera, vec3 light)
+{
+	vec3 h;
+	double length, place[2], u[2], factor = 1;
+	if (!microfacet_half(camera, 1, light, &h, &length))
+		return spectrum_of(0);
+	struct view v = view_from(m, camera);
+	half_place(&v, h, 0.5 * length, place);
+	if (m->microfacets) {
+		double from[2];
+		place_of(v.angles, from);
+		double area = plane_at(&m->area, from);
+		factor = area > 0 ? plane_at(&m->normals, place) / (4 * area) : 0;
+		if (factor == 0)
+			return spectrum_of(0);
+	}
+	warp_table_invert(&m->visible, &v.mix, place, u);
+	return spectrum_scale(factor, color_at(&v, u, w));
+}
+
+static bool both_above(vec3 wo, vec3 wi)
+{
+	return wo.z >= LEAST_COSINE && wi.z >= LEAST_COSINE;
+}
+
+static spectrum measured_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	if (!both_above(wo, wi))
+		return spectrum_of(0);
+	if (p->transport == TRANSPORT_IMPORTANCE)
+		return spectrum_scale(1 / wo.z, reflected(b->data, p->w, wi, wo));
+	return spectrum_scale(1 / wi.z, reflected(b->data, p->w, wo, wi));
+}
+
+static double measured_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct measured *m = b->data;
+	vec3 h;
+	double length, place[2], u[2];
+	(void)p;
+	if (!both_above(wo, wi) || !microfacet_half(wo, 1, wi, &h, &length))
+		return 0;
+	struct view v = view_from(m, wo);
+	double solid = half_place(&v, h, 0.5 * length, place);
+	double seen = warp_table_invert(&m->visible, &v.mix, place, u);
+	return seen * warp_table_density(&m->luminance, &v.mix, u) / solid;
+}
+
+static bool measured_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			    struct bsdf_sample *out)
+{
+	const struct measured *m = b->data;
+	double inner[2], place[2];
+	if (!(wo.z >= LEAST_COSINE))
+		return false;
+	struct view v = view_from(m, wo);
+	warp_table_sample(&m->luminance, &v.mix, u, inner);
+	warp_table_sample(&m->visible, &v.mix, inner, place);
+	double theta = 0.5 * WARP_PI * place[0] * place[0],
+	       phi = (2 * place[1] - 1) * WARP_PI + (m->isotropic ? v.angles.phi : 0);
+	vec3 h = turned(v.turn, (vec3){sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta)});
+	if (!(vec3_dot(wo, h) > 0))
+		return false;
+	return bsdf_sample_smooth(b, p, wo, microfacet_mirror(wo, h), out);
+}
+
+static int measured_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct measured *m = b->data;
+	int code = measured_read(m, n, build, e);
+	if (code)
+		return code;
+	double alpha = measured_alpha(m);
+	b->modes = BSDF_REFLECT;
+	b->has_smooth = true;
+	b->directed = true;
+	b->uses_tangents = m->axes.count[0] > 1;
+	b->alpha = alpha < 1 ? alpha : INFINITY;
+	b->alpha_mean = min_of(alpha, 1);
+	bsdf_add_shape(b, COLOR_SHAPE_OTHER);
+	return 0;
+}
+
+static const struct param measured_params[] = {
+	{.name = "filename", .types = VALUE_STRING},
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_measured = {
+	.decl = {PLUGIN_BSDF, "measured", measured_params, 0, PARAM_UNDERSTOOD},
+	.data_size = sizeof(struct measured),
+	.create = measured_create,
+	.eval = measured_eval,
+	.pdf_solid = measured_pdf,
+	.sample = measured_sample,
+};
