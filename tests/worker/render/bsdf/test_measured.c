@@ -333,6 +333,68 @@ static void test_numbers(void **state)
 	replace("wavelengths", 3, minus, "ascend");
 }
 
+/* One less along a side: the arrays disagree, which is said. All of them are still within the file. */
+static void test_sizes(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *array;
+		unsigned side;
+		const char *what;
+	} cases[] = {
+		{"theta_i", 0, "vndf has other sizes than phi_i and theta_i"},
+		{"vndf", 1, "vndf has other sizes"},
+		{"luminance", 1, "luminance has other sizes"},
+		{"luminance", 3, "spectra has other sizes than luminance"},
+		{"luminance", 2, "spectra has other sizes than luminance"},
+		{"spectra", 1, "spectra has other sizes"},
+		{"spectra", 2, "another number of wavelengths"},
+		{"spectra", 4, "no square"},
+		{"wavelengths", 0, "another number of wavelengths"},
+		{"jacobian", 0, "a side of 0"},
+	};
+	const struct memory_file *f = measured_files();
+	unsigned char *copy = malloc(f->size);
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct made m;
+		memcpy(copy, f->bytes, f->size);
+		size_t at = 18, length = strlen(cases[i].array);
+		while (memcmp(copy + at, cases[i].array, length) != 0)
+			at++;
+		copy[at + length + 11 + 8 * (size_t)cases[i].side]--;
+		assert_int_equal(try_bytes(&m, copy, f->size), -EINVAL);
+		if (!strstr(m.e.text, cases[i].what))
+			fail_msg("%s, side %u: %s", cases[i].array, cases[i].side, m.e.text);
+		arena_fini(&m.arena);
+	}
+	free(copy);
+}
+
+/* Not a file of arrays, one of another version, and one without an array. */
+static void test_other_files(void **state)
+{
+	(void)state;
+	const struct memory_file *f = measured_files();
+	unsigned char *copy = malloc(f->size);
+	struct made m;
+	assert_int_equal(try_bytes(&m, "ply\n", 4), -EINVAL);
+	assert_non_null(strstr(m.e.text, "this is no file of arrays (.bsdf)"));
+	arena_fini(&m.arena);
+	memcpy(copy, f->bytes, f->size);
+	copy[12] = 2;
+	assert_int_equal(try_bytes(&m, copy, f->size), -ENOTSUP);
+	arena_fini(&m.arena);
+	copy[12] = 1;
+	size_t at = 18;
+	while (memcmp(copy + at, "sigma", 5) != 0)
+		at++;
+	copy[at] = 'S';
+	assert_int_equal(try_bytes(&m, copy, f->size), -EINVAL);
+	assert_non_null(strstr(m.e.text, "sigma is missing"));
+	arena_fini(&m.arena);
+	free(copy);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -346,6 +408,8 @@ int main(void)
 		cmocka_unit_test(test_truncated),
 		cmocka_unit_test(test_mangled),
 		cmocka_unit_test(test_numbers),
+		cmocka_unit_test(test_sizes),
+		cmocka_unit_test(test_other_files),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
