@@ -37,7 +37,9 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 {
 	const struct scene_node *inner = integrators_inner(n);
 	int rc = 0;
-	if (integrators_show_other(n) && inner && !integrators_show_other(inner))
+	while (inner && integrators_show_other(inner))
+		inner = integrators_inner(inner);
+	if (integrators_show_other(n) && inner)
 		rc = remark(r, n, e, "the image shows the light that the `%s` inside it asks for", inner->type);
 	else if (integrators_show_other(n))
 		rc = remark(r, n, e, "the image shows all light, on surfaces and in media");

@@ -127,7 +127,9 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 	enum plugin_class cls = d->node->cls;
 	struct spelling s = {.wanted = name};
 	bool hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
-	if (!value_is_element(el->name) || !(el->snake || hidden))
+	/* Shapes of Mitsuba 3 may hold textures of any name, for whoever asks for attributes. */
+	bool attribute = cls == PLUGIN_SHAPE && (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
+	if (!(value_is_element(el->name) || (attribute && !el->snake)) || !(el->snake || hidden))
 		return false;
 	plugin_offer_params(d->decl, &s);
 	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !el->snake; other++)

@@ -412,7 +412,9 @@ static void test_misplaced_parameters(void **state)
 	refuses(S "<sensor type='perspective'><float name='fovv' value='1'/></sensor>" END, "did you mean `fov`?");
 	refuses(S "<shape type='cube'><float name='radius' value='1'/></shape>" END, "has no `radius`");
 	refuses(BSDF("<float name='num_parameters' value='1'/>"), "has no `num_parameters`");
-	refuses(S "<shape type='cube'><texture name='num_parameters' type='checkerboard'/></shape>" END,
+	refuses(S "<shape type='cube'><texture name='displacment' type='checkerboard'/></shape>" END,
+		"did you mean `displacement`?");
+	refuses(S "<emitter type='area'><texture name='num_parameters' type='checkerboard'/></emitter>" END,
 		"has no `num_parameters`");
 	refuses(BSDF("<rgb name='alpha' value='.1 .1 .2'/>"), "`alpha` cannot have this type");
 	refuses(BSDF("<spectrum name='alpha' value='400:.1, 700:.2'/>"), "`alpha` cannot have this type");

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What the reader makes of each feature of the language. */
 #include "tests/support/memory_assets.h"
+#include "tests/support/scene_parts.h"
 #include "tests/support/scene_tables.h"
 
 #include <setjmp.h>
@@ -254,6 +255,18 @@ static void test_parameters_of_forks(void **state)
 			    "s.xml:4: <shape type=\"sphere\">: `num_parameters` is not known and is ignored");
 	for (uint32_t i = 0; i < s.object_count; i++)
 		assert_int_equal(s.objects[i]->property_count, 0);
+	scene_fini(&s);
+}
+
+/* Textures of any name are attributes of a shape in Mitsuba 3, which nobody asks for here. */
+static void test_textures_of_shapes(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='3.0.0'><texture type='checkerboard' id='t'/>\n<shape type='sphere'>"
+				 "<texture type='checkerboard' name='heat'/></shape>\n"
+				 "<shape type='cube'><ref name='vertex_wear' id='t'/></shape></scene>");
+	assert_true(scene_has_note(&s, "s.xml:2: <shape type=\"sphere\">: `heat` is not known and is ignored"));
+	assert_true(scene_has_note(&s, "s.xml:3: <shape type=\"cube\">: `vertex_wear` is not known and is ignored"));
 	scene_fini(&s);
 }
 
@@ -572,6 +585,7 @@ int main(void)
 		cmocka_unit_test(test_one_object_in_a_file),
 		cmocka_unit_test(test_capitals_of_types),
 		cmocka_unit_test(test_parameters_of_forks),
+		cmocka_unit_test(test_textures_of_shapes),
 		cmocka_unit_test(test_numbers_given_as_colours),
 		cmocka_unit_test(test_lenient_numbers),
 		cmocka_unit_test(test_nesting_and_references),

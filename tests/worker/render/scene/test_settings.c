@@ -219,6 +219,8 @@ static void test_notes_on_the_whole(void **state)
 		{"<integrator type='moment'><integrator type='path'><integer name='max_depth' value='2'/></integrator>"
 		 "</integrator>",
 		 "s.xml:1: <integrator type=\"moment\">: the image shows the light that the `path` inside it asks for"},
+		{"<integrator type='moment'><integrator type='aov'><integrator type='direct'/></integrator></integrator>",
+		 "s.xml:1: <integrator type=\"moment\">: the image shows the light that the `direct` inside it asks for"},
 		{"<integrator type='stokes'><integrator type='aov'/></integrator>",
 		 "<integrator type=\"stokes\">: the image shows all light, on surfaces and"},
 		{"<integrator type='multichannel'/>", "the image shows all light, on surfaces and"},
