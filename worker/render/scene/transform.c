@@ -63,11 +63,12 @@ int transform_read_vec3(const struct xml_element *el, double missing, bool one_f
 		return xml_error(el, e, EINVAL, "needs either x, y, z or value");
 	if (text) {
 		int n = number_list(text, v, 3);
-		if (n == 1 && one_for_all)
+		bool one = one_for_all || !el->snake; /* of 3.x: for places and directions, too */
+		if (n == 1 && one)
 			v[1] = v[2] = v[0];
 		else if (n != 3)
 			return xml_error(el, e, EINVAL, "value=\"%.64s\" is not three numbers%s", text,
-					 one_for_all ? " or one" : "");
+					 one ? " or one" : "");
 	}
 	for (int i = 0; i < 3; i++) {
 		int r = check_number(el, text ? "value" : axes[i], v[i], e);

@@ -109,6 +109,10 @@ static void test_plain_values(void **state)
 	assert_true(node_find(s.objects[0], "center")->value.as.point.z == 3);
 	assert_int_equal(node_find(s.objects[0], "radius")->value.type, VALUE_FLOAT);
 	scene_fini(&s);
+	s = read_inside("3.0.0", "<shape type='sphere'>", "<point name='center' value='0.5'/>", "</shape>");
+	c = node_find(s.objects[0], "center")->value.as.point;
+	assert_true(c.x == 0.5 && c.y == 0.5 && c.z == 0.5);
+	scene_fini(&s);
 }
 
 static void check_transform_of(const char *version, const char *content, vec3 p, vec3 want)
@@ -138,6 +142,7 @@ static void test_transforms(void **state)
 	check_transform("", p, p);
 	check_transform("<translate x='1' z='-1'/>", p, (vec3){2, 2, 2});
 	check_transform("<translate value='1 2 3'/>", p, (vec3){2, 4, 6});
+	check_transform_of("3.0.0", "<translate value='2'/>", p, (vec3){3, 4, 5});
 	check_transform("<scale value='2'/>", p, (vec3){2, 4, 6});
 	check_transform("<scale x='151' z='60' y='1'/>", p, (vec3){151, 2, 180});
 	check_transform("<scale x='3'/>", p, (vec3){3, 2, 3});
