@@ -34,17 +34,26 @@ static double phi_of(const struct measured_kind *k, int i)
 
 /* ---- the formulas ---- */
 
-static double facets(const struct measured_kind *k, vec3 m)
+/* By the axes of the facets. */
+static vec3 unturned(const struct measured_kind *k, vec3 w)
 {
+	double c = cos(k->turn), s = sin(k->turn);
+	return (vec3){c * w.x + s * w.y, c * w.y - s * w.x, w.z};
+}
+
+static double facets(const struct measured_kind *k, vec3 h)
+{
+	vec3 m = unturned(k, h);
 	double x = m.x / k->alpha_u, y = m.y / k->alpha_v, r = x * x + y * y + m.z * m.z;
 	return 1 / (PI * k->alpha_u * k->alpha_v * r * r);
 }
 
 /* cos(theta) / G1 */
-static double shown(const struct measured_kind *k, vec3 w)
+static double shown(const struct measured_kind *k, vec3 v)
 {
-	return 0.5 *
-	       (w.z + sqrt(w.z * w.z + k->alpha_u * k->alpha_u * w.x * w.x + k->alpha_v * k->alpha_v * w.y * w.y));
+	vec3 w = unturned(k, v);
+	double x = k->alpha_u * w.x, y = k->alpha_v * w.y;
+	return 0.5 * (w.z + sqrt(w.z * w.z + x * x + y * y));
 }
 
 /* What the file has for light from wi. */

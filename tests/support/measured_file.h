@@ -14,6 +14,7 @@
 struct measured_kind {
 	const char *name;
 	double alpha_u, alpha_v;
+	double turn;	/* of the axes that these are along; 0 where symmetry is 4 */
 	int azimuths;	/* 1: isotropic */
 	int symmetry;	/* 1, 2 or 4: the azimuths span the circle, or a part of it */
 	int elevations; /* from 0 to MEASURED_THETA_MAX, their squares roots evenly */

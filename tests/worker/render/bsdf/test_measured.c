@@ -29,7 +29,7 @@ static const struct measured_kind fine = {.name = "fine.bsdf",
 					  .fine = 96,
 					  .side = 24};
 
-static const struct wavelengths nm = {.nm = {450, 550, 600, 700}};
+static const struct wavelengths nm = {.nm = {380, 550, 600, 790}};
 static const struct wavelengths rgb = {.rgb = true};
 
 struct made {
@@ -125,6 +125,7 @@ static void test_anisotropic_symmetries(void **state)
 		k.alpha_v = 0.5;
 		k.azimuths = ways[i].azimuths;
 		k.symmetry = ways[i].symmetry;
+		k.turn = k.symmetry == 4 ? 0 : 0.4; /* so that a half is no mirror image of the other */
 		k.elevations = 4;
 		k.fine = 64;
 		k.side = 16;
@@ -270,6 +271,8 @@ static void test_truncated(void **state)
 		struct made m;
 		unsigned char *copy = malloc(size ? size : 1); /* so that a sanitizer sees its end */
 		memcpy(copy, f->bytes, size);
+		struct tensor t; /* the last one */
+		assert_int_equal(tensor_find(copy, size, "spectra", &t), -EINVAL);
 		assert_int_equal(try_bytes(&m, copy, size), -EINVAL);
 		arena_fini(&m.arena);
 		free(copy);
