@@ -119,7 +119,7 @@ static void run_case(const struct precision_case *p, unsigned most, struct error
 			continue;
 		full_path_copy(&y, &x, 0, x.edges);
 		m.chain = i;
-		if (ops->propose(&m, &how, &x, &y, &move))
+		if (ops->propose(ops, &m, &how, &x, &y, &move))
 			continue;
 		double to_y = ops->log_weight(&m, &y, &move, X_TO_Y), to_x = ops->log_weight(&m, &x, &move, Y_TO_X);
 		double program = to_y - to_x + move.log_density[X_TO_Y] - move.log_density[Y_TO_X];

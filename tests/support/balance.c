@@ -162,7 +162,7 @@ static bool is_sound(const struct balance_trial *t, double log_weight)
 /* As the chain does it. */
 static double acceptance(struct run *r, struct balance_trial *t, struct move *move)
 {
-	enum proposal_end end = t->ops->propose(r->m, &t->how, r->x, r->y, move);
+	enum proposal_end end = t->ops->propose(t->ops, r->m, &t->how, r->x, r->y, move);
 	double to_y = end ? -INFINITY : t->ops->log_weight(r->m, r->y, move, X_TO_Y);
 	if (!end && !is_sound(t, to_y))
 		end = PROPOSAL_DARK;

@@ -187,7 +187,7 @@ static void count_unsound(struct group *g, double log_weight, bool state)
 static double propose(struct group *g, struct full_path *x, struct full_path *y, struct move *move)
 {
 	const struct mutation_ops *ops = g->entry->ops;
-	enum proposal_end end = ops->propose(&g->mutation, &g->entry->how, x, y, move);
+	enum proposal_end end = ops->propose(ops, &g->mutation, &g->entry->how, x, y, move);
 	double to_y = end ? -INFINITY : ops->log_weight(&g->mutation, y, move, X_TO_Y);
 	if (!end && !(to_y > -INFINITY))
 		end = PROPOSAL_DARK;

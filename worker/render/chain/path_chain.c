@@ -128,7 +128,7 @@ static double propose(struct path_chain *c, const struct mixture_entry *entry, s
 {
 	struct mutation_ctx *m = &c->mutation;
 	struct full_path *x = &c->current->path, *y = &c->proposal->path;
-	enum proposal_end end = entry->ops->propose(m, &entry->how, x, y, move);
+	enum proposal_end end = entry->ops->propose(entry->ops, m, &entry->how, x, y, move);
 	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
 	if (!end && !(to_y > -INFINITY && path_place_is_sound(m->path, to_y, entry->ops->independent)))
 		end = PROPOSAL_DARK;

@@ -85,7 +85,7 @@ static double propose(struct redistribution *r, const struct mixture_entry *entr
 		      struct spread_place *x, struct spread_place *y)
 {
 	struct mutation_ctx *m = &r->mutation;
-	if (entry->ops->propose(m, &entry->how, &x->place.path, &y->place.path, move))
+	if (entry->ops->propose(entry->ops, m, &entry->how, &x->place.path, &y->place.path, move))
 		return 0;
 	double to_y = entry->ops->log_weight(m, &y->place.path, move, X_TO_Y);
 	if (!(to_y > -INFINITY && path_place_is_sound(m->path, to_y, false)))

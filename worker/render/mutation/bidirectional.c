@@ -14,10 +14,11 @@
 
 enum { BLOCK_LENGTHS = BLOCK_VERTEX, BLOCK_AROUND };
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				 struct full_path *y, struct move *move)
+static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				 struct move *move)
 {
-	(void)how;
+	(void)self, (void)how;
 	struct path_context *c = m->path;
 	struct ensemble candidates;
 	struct sampler_random s;

@@ -7,12 +7,6 @@
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_DRAWN,	   STRATEGY_DRAWN,
 					 .halfvecs = true,     .wavelength = true, .aperture = true};
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				 struct full_path *y, struct move *move)
-{
-	return strategy_propose(&strategy, m, how, x, y, move);
-}
-
 static double useful(const struct render_summary *scene)
 {
 	return render_effect_on(scene, "half-vectors") ? 0.8 : 0;
@@ -22,6 +16,7 @@ const struct mutation_ops mutation_hslt = {
 	.name = "hslt",
 	.summary = "traced to x_b, half vectors to x_c, both drawn by roughness",
 	.useful = useful,
-	.propose = propose,
+	.strategy = &strategy,
+	.propose = strategy_propose,
 	.log_weight = breakup_log_weight,
 };

@@ -14,12 +14,13 @@ static void weigh_c(const struct path_context *c, const struct full_path *x, uns
 static const struct heuristic any_end = {"any", NULL, weigh_c};
 static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRAWN, .aperture = true};
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				 struct full_path *y, struct move *move)
+static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				 struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, aperture))
 		return PROPOSAL_INAPPLICABLE;
-	return strategy_propose(&strategy, m, how, x, y, move);
+	return strategy_propose(self, m, how, x, y, move);
 }
 
 static double useful(const struct render_summary *scene)
@@ -31,6 +32,7 @@ const struct mutation_ops mutation_lens = {
 	.name = "lens",
 	.summary = "moves the point on the aperture",
 	.useful = useful,
+	.strategy = &strategy,
 	.propose = propose,
 	.log_weight = breakup_log_weight,
 };

@@ -5,12 +5,6 @@
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_DRAWN, 0, .emitter = true};
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				 struct full_path *y, struct move *move)
-{
-	return strategy_propose(&strategy, m, how, x, y, move);
-}
-
 static double useful(const struct render_summary *scene)
 {
 	return render_effect_on(scene, "emitter-move") && render_effect_on(scene, "half-vectors") ? 0.1 : 0;
@@ -20,6 +14,7 @@ const struct mutation_ops mutation_light = {
 	.name = "light",
 	.summary = "moves the point on the emitter",
 	.useful = useful,
-	.propose = propose,
+	.strategy = &strategy,
+	.propose = strategy_propose,
 	.log_weight = breakup_log_weight,
 };

@@ -127,9 +127,10 @@ void mixture_default(const struct render_summary *scene, struct mixture *out)
 {
 	*out = (struct mixture){.count = 0};
 	for (size_t i = 0; mutation_registry[i]; i++) {
-		double weight = mutation_registry[i]->useful(scene);
+		const struct mutation_ops *ops = mutation_registry[i];
+		double weight = ops->useful ? ops->useful(scene) : 0;
 		if (weight > 0 && out->count < BATCH_STRATEGIES)
-			out->entry[out->count++] = (struct mixture_entry){mutation_registry[i], {-1, -1}, weight};
+			out->entry[out->count++] = (struct mixture_entry){ops, {-1, -1}, weight};
 	}
 	finish(out);
 }

@@ -74,13 +74,15 @@ enum strategy_counter proposal_counter(enum proposal_end reason);
 
 struct mutation_ops {
 	const char *name, *summary;
-	bool independent; /* independent of x: also estimates b by f / T */
-	/* Weight in the default mixture of a scene with these effects; 0: not part of it. */
+	bool independent;		 /* independent of x: also estimates b by f / T */
+	const struct strategy *strategy; /* of a breakup (strategy.h) */
+	/* Weight in the default mixture of a scene with these effects; 0: not part of it. NULL: of none. */
 	double (*useful)(const struct render_summary *scene);
 	/* PROPOSAL_MADE: y is complete, and all its rays have been cast. Otherwise the reason, and y's vertices
 	 * first..last are undefined. */
-	enum proposal_end (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move);
+	enum proposal_end (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
+				     const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				     struct move *move);
 	/* The weight of y for X_TO_Y, of x for Y_TO_X. -INFINITY: black. */
 	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);

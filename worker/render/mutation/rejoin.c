@@ -30,12 +30,6 @@ static const struct heuristic join = {"join", weigh_b, weigh_c};
 static const struct strategy strategy = {
 	&join, STRATEGY_DRAWN, STRATEGY_DRAWN, .wavelength = true, .aperture = true, .emitter = true};
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				 struct full_path *y, struct move *move)
-{
-	return strategy_propose(&strategy, m, how, x, y, move);
-}
-
 static double useful(const struct render_summary *scene)
 {
 	/* cornell-box: relMSE x time 30 % below hslt's. Beside hslt, a fifth of it: error at equal time 27 % lower
@@ -47,6 +41,7 @@ const struct mutation_ops mutation_rejoin = {
 	.name = "rejoin",
 	.summary = "traced to x_b, joined to x_{b-1}",
 	.useful = useful,
-	.propose = propose,
+	.strategy = &strategy,
+	.propose = strategy_propose,
 	.log_weight = breakup_log_weight,
 };

@@ -78,9 +78,11 @@ static bool choose(const struct strategy *s, const struct choice *forced, struct
 	return out->log_choice > -INFINITY;
 }
 
-enum proposal_end strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
-				   struct full_path *x, struct full_path *y, struct move *move)
+enum proposal_end strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				   struct move *move)
 {
+	const struct strategy *s = self->strategy;
 	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
 	if (EFFECT_IS_ON(m->path->w, scattering))

@@ -14,8 +14,9 @@ struct strategy {
 	bool wavelength_in_media; /* even where each edge then lets through another share of light */
 };
 
-/* A breakup by this strategy; `how` takes precedence. */
-enum proposal_end strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
-				   struct full_path *x, struct full_path *y, struct move *move);
+/* A breakup by self's strategy; `how` takes precedence. */
+enum proposal_end strategy_propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				   struct move *move);
 
 #endif

@@ -17,14 +17,15 @@ static bool must_move(const struct full_path *x)
 	return false;
 }
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				 struct full_path *y, struct move *move)
+static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				 struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, colour))
 		return PROPOSAL_INAPPLICABLE;
 	if (must_move(x)) {
 		const struct mutation_setting all = {(int)x->edges, 0};
-		return strategy_propose(&strategy, m, how->b >= 0 || how->c >= 0 ? how : &all, x, y, move);
+		return strategy_propose(self, m, how->b >= 0 || how->c >= 0 ? how : &all, x, y, move);
 	}
 	const struct breakup stay = {.b = x->edges, .c = x->edges, .wavelength = true};
 	return breakup_propose(m, &stay, x, y, move);
@@ -39,6 +40,7 @@ const struct mutation_ops mutation_wavelength = {
 	.name = "wavelength",
 	.summary = "another wavelength; the path moves where it must",
 	.useful = useful,
+	.strategy = &strategy,
 	.propose = propose,
 	.log_weight = breakup_log_weight,
 };

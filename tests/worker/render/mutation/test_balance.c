@@ -34,7 +34,7 @@ static bool is_default(const struct world *w, const struct mutation_ops *ops)
 {
 	struct render_summary summary;
 	world_summary(w, &summary);
-	return ops->useful(&summary) > 0;
+	return ops->useful && ops->useful(&summary) > 0;
 }
 
 static unsigned repeats(const struct world *w, const struct mutation_ops *ops)

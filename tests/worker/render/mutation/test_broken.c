@@ -20,11 +20,13 @@
 static const struct mutation_ops *real;
 static struct full_path *from; /* x of the proposal at hand */
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				 struct full_path *y, struct move *move)
+static enum proposal_end propose(const struct mutation_ops *self, struct mutation_ctx *m,
+				 const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				 struct move *move)
 {
+	(void)self;
 	from = x;
-	return real->propose(m, how, x, y, move);
+	return real->propose(real, m, how, x, y, move);
 }
 
 static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
@@ -71,12 +73,13 @@ static double denser_above(struct mutation_ctx *m, struct full_path *into, const
 	return log_weight(m, into, move, direction) - (into->wavelength > 0.5 ? log(1.1) : 0);
 }
 
-static enum proposal_end drift(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-			       struct full_path *y, struct move *move)
+static enum proposal_end drift(const struct mutation_ops *self, struct mutation_ctx *m,
+			       const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+			       struct move *move)
 {
 	const double mean = 0.1; /* pixels; the deviation is 0.64 */
 	x->film[0] += mean;
-	enum proposal_end end = propose(m, how, x, y, move);
+	enum proposal_end end = propose(self, m, how, x, y, move);
 	x->film[0] -= mean;
 	return end;
 }
@@ -118,10 +121,11 @@ static double no_transfer(struct mutation_ctx *m, struct full_path *into, const 
 }
 
 /* Steps of x back from y, too. */
-static enum proposal_end one_sigma(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				   struct full_path *y, struct move *move)
+static enum proposal_end one_sigma(const struct mutation_ops *self, struct mutation_ctx *m,
+				   const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				   struct move *move)
 {
-	enum proposal_end end = propose(m, how, x, y, move);
+	enum proposal_end end = propose(self, m, how, x, y, move);
 	for (unsigned j = move->c + 1; !end && j < move->b; j++) {
 		vec2 back = vec2_scale(-1, m->scratch.dh[j]);
 		if (!x->v[j].delta)
@@ -132,10 +136,11 @@ static enum proposal_end one_sigma(struct mutation_ctx *m, const struct mutation
 }
 
 /* What the way back refused is proposed all the same; forced b and c only, whose choice has no density. */
-static enum proposal_end no_way_back(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
+static enum proposal_end no_way_back(const struct mutation_ops *self, struct mutation_ctx *m,
+				     const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				     struct move *move)
 {
-	enum proposal_end end = propose(m, how, x, y, move);
+	enum proposal_end end = propose(self, m, how, x, y, move);
 	if (end != PROPOSAL_REVERSE)
 		return end;
 	unsigned ends[2] = {move->b, move->c};
@@ -167,8 +172,9 @@ struct fault {
 	struct mutation_setting how;
 	enum balance_side side;
 	unsigned starts, repeat;
-	enum proposal_end (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move);
+	enum proposal_end (*propose)(const struct mutation_ops *self, struct mutation_ctx *m,
+				     const struct mutation_setting *how, struct full_path *x, struct full_path *y,
+				     struct move *move);
 	double (*log_weight)(struct mutation_ctx *m, struct full_path *into, const struct move *move,
 			     enum mutation_direction direction);
 };

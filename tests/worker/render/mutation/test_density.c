@@ -70,7 +70,7 @@ static void compare(struct trial *t, struct full_path *x, struct full_path *y)
 	struct move move = {0};
 	m.step++;
 	m.count = strategy_counters;
-	enum proposal_end end = t->ops->propose(&m, &t->how, x, y, &move);
+	enum proposal_end end = t->ops->propose(t->ops, &m, &t->how, x, y, &move);
 	double to_y = end ? -INFINITY : t->ops->log_weight(&m, y, &move, X_TO_Y);
 	if (to_y > -INFINITY) {
 		double to_x = t->ops->log_weight(&m, x, &move, Y_TO_X), choices, back;

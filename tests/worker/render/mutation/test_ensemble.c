@@ -217,7 +217,7 @@ static void test_streams_of_a_proposal(void **state)
 			continue;
 		struct move move = {0};
 		m.step = i;
-		if (ops->propose(&m, &(struct mutation_setting){-1, -1}, &x, &y, &move) != PROPOSAL_MADE)
+		if (ops->propose(ops, &m, &(struct mutation_setting){-1, -1}, &x, &y, &move) != PROPOSAL_MADE)
 			continue;
 		double total[2], v[4], r[4];
 		const enum rng_stream stream[2] = {RNG_AROUND, RNG_CHAIN};

@@ -38,7 +38,7 @@ static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, siz
 		struct move move = {0};
 		x.edges = 0;
 		m->step++;
-		if (ops->propose(m, &(struct mutation_setting){-1, -1}, &x, &y, &move) == PROPOSAL_MADE)
+		if (ops->propose(ops, m, &(struct mutation_setting){-1, -1}, &x, &y, &move) == PROPOSAL_MADE)
 			mean[y.edges] += exp(ops->log_weight(m, &y, &move, X_TO_Y)) / (double)n;
 	}
 }

@@ -133,7 +133,7 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 	double log_plane, unused;
 	m.step++;
 	m.count = strategy_counters;
-	enum proposal_end end = s->ops->propose(&m, &e->how, s->x, s->y, &move);
+	enum proposal_end end = s->ops->propose(s->ops, &m, &e->how, s->x, s->y, &move);
 	enum outcome out = move.b != e->b || move.c != e->c ? OTHER : end ? FAILED : ELSEWHERE;
 	if (out == ELSEWHERE && coordinates(s, z, &log_plane)) {
 		out = ARRIVED;

@@ -47,7 +47,7 @@ static double propose(const struct mutation_ops *ops, double scale, struct full_
 	full_path_copy(into, &x, 0, x.edges);
 	mutation.limits = walk_limits_of(&accuracy_settings_default);
 	mutation.limits.scale = scale;
-	if (ops->propose(&mutation, &how, &x, into, &move))
+	if (ops->propose(ops, &mutation, &how, &x, into, &move))
 		return 0;
 	double to_y = ops->log_weight(&mutation, into, &move, X_TO_Y);
 	return exp(fmin(to_y - ops->log_weight(&mutation, &x, &move, Y_TO_X), 0));
