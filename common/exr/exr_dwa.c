@@ -9,6 +9,7 @@
  */
 #include "common/exr/exr_dwa.h"
 
+#include "common/base/io.h"
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "common/exr/exr_check.h"
@@ -179,18 +180,11 @@ static int check_and_rewrite(const unsigned char *foreign, size_t foreign_size, 
 static int memory_file(const unsigned char *bytes, size_t size, struct error *e)
 {
 	int fd = memfd_create("image.exr", MFD_CLOEXEC);
-	for (size_t done = 0; fd >= 0 && done < size;) {
-		ssize_t n = write(fd, bytes + done, size - done);
-		if (n > 0) {
-			done += (size_t)n;
-			continue;
-		}
-		if (n < 0 && errno == EINTR)
-			continue;
+	if (fd >= 0 && io_write_all(fd, bytes, size) == 0)
+		return fd;
+	if (fd >= 0)
 		close(fd);
-		fd = -1;
-	}
-	return fd >= 0 ? fd : error_set(e, ENOMEM, "no memory for an EXR file");
+	return error_set(e, ENOMEM, "no memory for an EXR file");
 }
 
 /* rows: room for up to ROWS rows. The interface wants the address that pixel (0, 0) would have. */

@@ -9,7 +9,6 @@
 #include "common/base/version.h"
 #include "common/exr/exr_stream.h"
 
-#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -26,6 +25,14 @@ void exr_image_fini(struct exr_image *img)
 	}
 	mem_free(img->attributes);
 	*img = (struct exr_image){0};
+}
+
+const struct exr_attribute *exr_attribute_find(const struct exr_image *img, const char *name)
+{
+	for (size_t i = 0; i < img->attribute_count; i++)
+		if (strcmp(img->attributes[i].name, name) == 0)
+			return &img->attributes[i];
+	return NULL;
 }
 
 static exr_result_t write_attributes(exr_context_t x, const struct exr_image *img)

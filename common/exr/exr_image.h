@@ -35,7 +35,8 @@ struct exr_image {
 
 /* The number of the channel of that name; EXR_CHANNELS_MOST: there is none. */
 uint32_t exr_channel(const struct exr_image *img, const char *name);
-const float *exr_plane(const struct exr_image *img, const char *name); /* NULL: there is none */
+const float *exr_plane(const struct exr_image *img, const char *name);			       /* NULL: there is none */
+const struct exr_attribute *exr_attribute_find(const struct exr_image *img, const char *name); /* likewise */
 
 /* bytes are mem_alloc'd; free them with mem_free. */
 int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e);

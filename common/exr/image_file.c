@@ -8,6 +8,7 @@
  */
 #include "common/exr/image_file.h"
 
+#include "common/base/io.h"
 #include "common/base/mem.h"
 #include "common/base/target.h"
 
@@ -87,18 +88,6 @@ static int failed(struct error *e, const char *path, const char *what)
 	return error_set(e, code, "%s: cannot %s: %s", path, what, strerror(code));
 }
 
-static int write_all(int fd, const unsigned char *bytes, size_t size)
-{
-	while (size) {
-		ssize_t n = write(fd, bytes, size);
-		if (n < 0 && errno != EINTR)
-			return -1;
-		bytes += n < 0 ? 0 : n;
-		size -= n < 0 ? 0 : (size_t)n;
-	}
-	return 0;
-}
-
 /* Makes the new name survive a crash. Failing to open the folder is not worth an error. */
 static void sync_folder(const char *path)
 {
@@ -146,7 +135,7 @@ static int write_through(const struct target *t, const char *path, const unsigne
 	int fd = target_open(t, e);
 	if (fd < 0)
 		return fd;
-	int rc = write_all(fd, bytes, size) ? failed(e, path, "write") : 0;
+	int rc = io_write_all(fd, bytes, size) ? failed(e, path, "write") : 0;
 	if (close(fd) && !rc)
 		rc = failed(e, path, "write");
 	return rc;
@@ -160,7 +149,7 @@ static int replace(const char *path, const unsigned char *bytes, size_t size, st
 		return fd;
 	mode_t mask = umask(0);
 	umask(mask);
-	int rc = write_all(fd, bytes, size) != 0 || fsync(fd) != 0 || fchmod(fd, 0666 & ~mask) != 0
+	int rc = io_write_all(fd, bytes, size) != 0 || fsync(fd) != 0 || fchmod(fd, 0666 & ~mask) != 0
 			 ? failed(e, path, "write")
 			 : 0;
 	if (close(fd) != 0 && rc == 0)
@@ -183,7 +172,7 @@ int image_file_write(const char *path, const unsigned char *bytes, size_t size, 
 	return t.through ? write_through(&t, path, bytes, size, e) : replace(t.path, bytes, size, e);
 }
 
-/* Of a pipe, whose length is not known. *bytes and *size: what came, also after a failure. */
+/* Of a pipe, whose length is not known. *bytes: also after a failure. */
 static int read_stream(int fd, const char *path, unsigned char **bytes, size_t *size, struct error *e)
 {
 	size_t room = 0;
@@ -198,30 +187,25 @@ static int read_stream(int fd, const char *path, unsigned char **bytes, size_t *
 			*bytes = all;
 			room = more;
 		}
-		ssize_t n = read(fd, *bytes + *size, room - *size);
-		if (n < 0 && errno != EINTR)
+		ssize_t n = io_read_all(fd, *bytes + *size, room - *size);
+		if (n < 0)
 			return failed(e, path, "read");
-		if (n == 0)
+		*size += (size_t)n;
+		if (*size < room)
 			return 0;
-		*size += n < 0 ? 0 : (size_t)n;
 	}
 }
 
 static int read_regular(int fd, const struct stat *st, const char *path, unsigned char **bytes, size_t *size,
 			struct error *e)
 {
-	*size = 0;
 	*bytes = mem_alloc((size_t)st->st_size, 1);
 	if (!*bytes)
 		return error_set(e, ENOMEM, "%s: no memory for it", path);
-	while (*size < (size_t)st->st_size) {
-		ssize_t n = read(fd, *bytes + *size, (size_t)st->st_size - *size);
-		if (n < 0 && errno != EINTR)
-			return failed(e, path, "read");
-		if (n == 0)
-			break;
-		*size += n < 0 ? 0 : (size_t)n;
-	}
+	ssize_t n = io_read_all(fd, *bytes, (size_t)st->st_size);
+	if (n < 0)
+		return failed(e, path, "read");
+	*size = (size_t)n;
 	return 0;
 }
 

@@ -9,6 +9,7 @@
  */
 #include "common/net/client.h"
 
+#include "common/base/io.h"
 #include "common/base/mem.h"
 #include "common/base/target.h"
 #include "common/base/text.h"
@@ -332,16 +333,8 @@ static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_
 /* path: what it is called in a message. */
 static int write_all(int fd, const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
-	while (size) {
-		ssize_t n = write(fd, bytes, size);
-		if (n < 0 && errno != EINTR)
-			return error_set(e, EIO, "%s: %s", path, strerror(errno));
-		if (n > 0) {
-			bytes += n;
-			size -= (size_t)n;
-		}
-	}
-	return 0;
+	int rc = io_write_all(fd, bytes, size);
+	return rc ? error_set(e, EIO, "%s: %s", path, strerror(-rc)) : 0;
 }
 
 static int fetch_rest(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,

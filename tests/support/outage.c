@@ -157,9 +157,9 @@ static uint64_t results_in(const struct exr_image *img, const struct plan *p)
 	struct batch b = scripted_batch(&k, p, STATE_BYTES);
 	uint64_t one = b.counters[COUNT_ACCEPTED], all = 0;
 	batch_fini(&b);
-	for (size_t i = 0; i < img->attribute_count; i++)
-		if (strcmp(img->attributes[i].name, "hslt:accepted") == 0)
-			all = strtoull(img->attributes[i].string, NULL, 10);
+	const struct exr_attribute *accepted = exr_attribute_find(img, "hslt:accepted");
+	if (accepted)
+		all = strtoull(accepted->string, NULL, 10);
 	assert_true(one && all % one == 0);
 	return all / one;
 }

@@ -287,14 +287,6 @@ static void words_fit(void **state)
 	assert_true(strlen(small) < sizeof small);
 }
 
-static const struct exr_attribute *attribute(const struct exr_image *x, const char *name)
-{
-	for (size_t i = 0; i < x->attribute_count; i++)
-		if (strcmp(x->attributes[i].name, name) == 0)
-			return &x->attributes[i];
-	return NULL;
-}
-
 /* What a reader of the file finds: the words, and in each pixel the R-hat of its tile, 0 where no chain came. */
 static void image_says_it(void **state)
 {
@@ -321,11 +313,11 @@ static void image_says_it(void **state)
 			uint32_t tile = y / 64 * ACROSS + c / 64;
 			close_to((double)x.planes[plane][y * x.width + c], tile == 5 ? 0 : (double)f.r_hat[tile], 0);
 		}
-	assert_string_equal(attribute(&x, "hslt:agreement")->string, "disagree");
-	assert_non_null(strstr(attribute(&x, "hslt:disagreement")->string, "in 1 of 20 tiles"));
-	assert_non_null(strstr(attribute(&x, "hslt:note")->string, "chains disagree"));
-	assert_non_null(strstr(attribute(&x, "hslt:classes")->string, "reflected caustic, 3-4 edges"));
-	close_to(attribute(&x, "hslt:rHatWorst")->number, 1.3, 1e-6);
+	assert_string_equal(exr_attribute_find(&x, "hslt:agreement")->string, "disagree");
+	assert_non_null(strstr(exr_attribute_find(&x, "hslt:disagreement")->string, "in 1 of 20 tiles"));
+	assert_non_null(strstr(exr_attribute_find(&x, "hslt:note")->string, "chains disagree"));
+	assert_non_null(strstr(exr_attribute_find(&x, "hslt:classes")->string, "reflected caustic, 3-4 edges"));
+	close_to(exr_attribute_find(&x, "hslt:rHatWorst")->number, 1.3, 1e-6);
 	exr_image_fini(&x);
 	mem_free(bytes);
 	f.plan.kind = PLAN_SAMPLES;
@@ -334,7 +326,7 @@ static void image_says_it(void **state)
 		image_file_encode(&f.img, &f.plan, &(struct header_extra){.scene = "a.xml"}, &bytes, &size, &e), 0);
 	assert_int_equal(exr_read(bytes, size, &x, &e), 0);
 	assert_int_equal(x.channel_count, 3);
-	assert_null(attribute(&x, "hslt:agreement"));
+	assert_null(exr_attribute_find(&x, "hslt:agreement"));
 	exr_image_fini(&x);
 	mem_free(bytes);
 	mem_free(f.img.rgb);

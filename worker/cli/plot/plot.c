@@ -10,6 +10,7 @@
 #include "worker/cli/plot/plot.h"
 
 #include "common/base/fnv.h"
+#include "common/base/io.h"
 #include "common/base/mem.h"
 #include "common/exr/image_file.h"
 #include "worker/cli/base/text_file.h"
@@ -228,24 +229,16 @@ static int read_whole(int fd, char **bytes, size_t *size, struct error *e)
 	struct stat st;
 	if (fstat(fd, &st) != 0 || st.st_size < 1 || st.st_size > OUTPUT_MAX)
 		return error_set(e, EIO, "gnuplot wrote nothing, or too much");
-	size_t done = 0;
 	*size = (size_t)st.st_size;
 	*bytes = mem_alloc(*size + 1, 1);
 	if (!*bytes)
 		return error_set(e, ENOMEM, "no memory for a plot of %zu bytes", *size);
-	while (done < *size) {
-		ssize_t n = pread(fd, *bytes + done, *size - done, (off_t)done);
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n <= 0) {
-			mem_free(*bytes);
-			*bytes = NULL;
-			return error_set(e, EIO, "reading gnuplot's output: %s",
-					 n < 0 ? strerror(errno) : "it became shorter");
-		}
-		done += (size_t)n;
-	}
-	return 0;
+	ssize_t n = lseek(fd, 0, SEEK_SET) ? -errno : io_read_all(fd, *bytes, *size);
+	if (n == st.st_size)
+		return 0;
+	mem_free(*bytes);
+	*bytes = NULL;
+	return error_set(e, EIO, "reading gnuplot's output: %s", n < 0 ? strerror((int)-n) : "it became shorter");
 }
 
 static void complain(int fd, const struct plot *p, struct error *e)
@@ -256,19 +249,6 @@ static void complain(int fd, const struct plot *p, struct error *e)
 	for (char *c = text; *c; c++)
 		*c = (unsigned char)*c < 0x20 ? ' ' : *c;
 	error_set(e, EIO, "gnuplot failed at the plot '%.80s': %s", p->title, text);
-}
-
-static bool feed(int fd, const struct buf *b)
-{
-	for (size_t done = 0; done < b->size;) {
-		ssize_t n = write(fd, b->bytes + done, b->size - done);
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n <= 0)
-			return false;
-		done += (size_t)n;
-	}
-	return lseek(fd, 0, SEEK_SET) == 0;
 }
 
 static int draw(const struct plot *p, bool png, char **bytes, size_t *size, struct error *e)
@@ -282,7 +262,7 @@ static int draw(const struct plot *p, bool png, char **bytes, size_t *size, stru
 		if (fd[i] < 0)
 			rc = error_set(e, errno, "no room for a plot: %s", strerror(errno));
 	}
-	if (!rc && !feed(fd[0], &s.text))
+	if (!rc && (io_write_all(fd[0], s.text.bytes, s.text.size) || lseek(fd[0], 0, SEEK_SET)))
 		rc = error_set(e, EIO, "no room for a plot's data");
 	if (!rc) {
 		rc = spawn(fd, e);

@@ -14,6 +14,7 @@
  */
 #include "worker/render/scene/asset.h"
 
+#include "common/base/io.h"
 #include "common/base/mem.h"
 #include "worker/render/scene/asset_name.h"
 
@@ -21,7 +22,6 @@
 #include <limits.h>
 #include <linux/openat2.h>
 #include <stdbool.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -100,21 +100,15 @@ static int read_all(int fd, const char *name, struct asset *out, struct error *e
 		return error_set(e, EINVAL, "%s: not a regular file", name);
 	if (st.st_size > ASSET_SIZE_MAX)
 		return error_set(e, EFBIG, "%s: larger than %lld MB", name, (long long)(ASSET_SIZE_MAX >> 20));
-	size_t size = (size_t)st.st_size, used = 0;
+	size_t size = (size_t)st.st_size;
 	unsigned char *bytes = mem_alloc(size, 1);
 	if (!bytes)
 		return error_set(e, ENOMEM, "%s: out of memory", name);
-	while (used < size) {
-		ssize_t n = read(fd, bytes + used, size - used);
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n <= 0) {
-			int code = n < 0 ? errno : EIO;
-			mem_free(bytes);
-			return error_set(e, code, "%s: %s", name,
-					 n < 0 ? strerror(code) : "became shorter while it was read");
-		}
-		used += (size_t)n;
+	ssize_t n = io_read_all(fd, bytes, size);
+	if (n != st.st_size) {
+		int code = n < 0 ? (int)-n : EIO;
+		mem_free(bytes);
+		return error_set(e, code, "%s: %s", name, n < 0 ? strerror(code) : "became shorter while it was read");
 	}
 	*out = (struct asset){.bytes = bytes, .size = size, .handle = bytes, .device = st.st_dev, .inode = st.st_ino};
 	return 0;
