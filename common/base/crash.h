@@ -6,8 +6,6 @@
 #ifndef COMMON_BASE_CRASH_H
 #define COMMON_BASE_CRASH_H
 
-#include <stddef.h>
-
 enum { CRASH_TEXT = 256 };
 
 /* Sets what the calling thread is doing, and for which line of which file (NULL: none). The texts are not copied and

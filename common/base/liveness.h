@@ -8,7 +8,6 @@
 #define COMMON_BASE_LIVENESS_H
 
 #include <stdatomic.h>
-#include <stddef.h>
 
 extern _Thread_local atomic_ullong *tick_counter; /* NULL: this thread is not watched */
 

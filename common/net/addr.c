@@ -2,7 +2,6 @@
 #include "common/net/addr.h"
 
 #include <arpa/inet.h>
-#include <netdb.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>

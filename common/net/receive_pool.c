@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/net/receive_pool.h"
 
-#include <stddef.h>
-
 static bool fits(const struct receive_pool *p, uint64_t bytes)
 {
 	return p->used == 0 || (p->used <= p->limit && bytes <= p->limit - p->used);

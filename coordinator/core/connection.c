@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Workers join and leave. */
 #include "coordinator/core/connection.h"
 
 #include "common/base/mem.h"

@@ -6,8 +6,6 @@
 #include "common/film/batch.h"
 #include "coordinator/core/slot.h"
 
-#include <stdbool.h>
-
 struct farm;
 struct job;
 struct peer;

@@ -14,12 +14,10 @@
 #include "coordinator/core/slot.h"
 
 #include <stdbool.h>
-#include <stdint.h>
 
 struct farm;
 struct identity;
 struct lease;
-struct peer;
 
 /* Adds the worker of this lease, which has disappeared or is silent: the lease is dropped, and the job ends if it
  * was one too many. */

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What users do to existing jobs: hold, release, prioritise, extend. */
 #include "coordinator/core/orders.h"
 
 #include "common/base/text.h"

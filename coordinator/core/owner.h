@@ -5,7 +5,6 @@
 
 #include "coordinator/core/list.h"
 
-#include <stdbool.h>
 #include <stdint.h>
 
 enum { OWNER_NAME = 72 };

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/peer.h"
 
-#include "common/base/mem.h"
-#include "common/base/text.h"
 #include "coordinator/core/find.h"
 #include "coordinator/core/job.h"
 

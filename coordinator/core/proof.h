@@ -16,7 +16,6 @@ struct proof {
 
 struct job;
 struct peer;
-struct peer_class;
 struct slot;
 
 bool proof_chosen(const struct job *j, const struct lease_key *k);

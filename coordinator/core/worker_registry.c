@@ -4,7 +4,6 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* By its home, otherwise by its name. */

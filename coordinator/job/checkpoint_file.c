@@ -10,7 +10,6 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
-#include "coordinator/job/stored.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -13,9 +13,7 @@
 #include "coordinator/jobs/dispatch.h"
 
 #include "common/base/disk.h"
-#include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/exr/exr_image.h"
 #include "common/plan/plan_text.h"
 #include "coordinator/job/back.h"
 #include "coordinator/job/incoming.h"

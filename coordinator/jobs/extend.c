@@ -20,7 +20,6 @@
 #include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/retention/ended_jobs.h"
-#include "coordinator/retention/keep.h"
 
 #include <assert.h>
 #include <math.h>

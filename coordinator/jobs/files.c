@@ -37,8 +37,7 @@ static const Farm__File *lacking(const struct jobs *jobs, const struct live_job 
 	return NULL;
 }
 
-/* Holds or releases it for its files. true: a step was made, after which any job may be gone. */
-static bool look(struct jobs *jobs, struct live_job *job)
+bool files_look(struct jobs *jobs, struct live_job *job)
 {
 	char text[256];
 	const Farm__File *f = job->ended ? NULL : lacking(jobs, job);
@@ -54,15 +53,10 @@ static bool look(struct jobs *jobs, struct live_job *job)
 	return true;
 }
 
-void files_look(struct jobs *jobs, struct live_job *job)
-{
-	look(jobs, job);
-}
-
 static void look_at_all(struct jobs *jobs)
 {
 	for (struct live_job *job = jobs->live; job;)
-		job = look(jobs, job) ? jobs->live : job->next;
+		job = files_look(jobs, job) ? jobs->live : job->next;
 }
 
 /* ---- reading: some megabytes at a time, so that a large scene keeps no thread of the pool from others ---- */
@@ -223,6 +217,6 @@ bool files_are_right(const struct jobs *jobs, const struct live_job *job)
 void files_tick(struct jobs *jobs)
 {
 	for (struct live_job *job = jobs->live; job; job = job->next)
-		if (job->lacks_file && look(jobs, job))
+		if (job->lacks_file && files_look(jobs, job))
 			return; /* the list may have changed; continue next time */
 }

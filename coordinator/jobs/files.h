@@ -14,8 +14,9 @@ enum { FILES_CHECKED = 60 /* s: a file checked so recently is not read again bef
 /* Checks a file that is requested or submitted. -EINPROGRESS: it is being read, and the answer is file_read of
  * peer_calls.h. Other errors: it cannot be sent; the jobs that lack it wait. */
 int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e);
-/* Checks whether the store has all of a job's files; it waits or continues. Any job may be gone afterwards. */
-void files_look(struct jobs *jobs, struct live_job *job);
+/* Checks whether the store has all of a job's files; it waits or continues. true: a step was made, after which any job
+ * may be gone. */
+bool files_look(struct jobs *jobs, struct live_job *job);
 /* A worker complains: reads all of a job's files again, except for those that were read after their last chunk was
  * sent. The job may be gone afterwards. */
 void files_read(struct jobs *jobs, struct live_job *job);

@@ -3,8 +3,10 @@
  * Opens and closes the jobs, and does from time to time what nobody asks for.
  *
  * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and starts to read those
- * that had not (recovery.c). An error of the spool ends the start with a sentence; jobs_close then closes what was
- * opened.
+ * that had not (recovery.c). After each step of the core: finishes jobs that have ended, merges results that waited for
+ * others, and starts a checkpoint if one is due. When films are free again: the same without checkpoints; then results
+ * that arrived while the films were read follow, one at a time, by the timer `drain`. An error of the spool ends the
+ * start with a sentence; jobs_close then closes what was opened.
  */
 #include "coordinator/jobs/start.h"
 
@@ -16,11 +18,12 @@
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/finish.h"
 #include "coordinator/jobs/folder.h"
-#include "coordinator/jobs/follow_up.h"
+#include "coordinator/jobs/late_feed.h"
 #include "coordinator/jobs/publish.h"
 #include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/recovery.h"
 #include "coordinator/jobs/restore.h"
+#include "coordinator/jobs/results.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
 #include "coordinator/retention/ages.h"
@@ -29,6 +32,39 @@
 #include "coordinator/retention/keep.h"
 
 #include <string.h>
+
+/* One at a time, so that nobody else waits for all of them. */
+static void on_drain(uv_timer_t *t)
+{
+	struct jobs *jobs = t->data;
+	struct live_job *job = jobs->live;
+	while (job && (job->busy || STAILQ_EMPTY(&job->waiting) || files_are_read(jobs, job)))
+		job = job->next;
+	if (!job)
+		return;
+	struct waiting_batch *w = live_job_take_waiting(job);
+	results_take_waiting(jobs, w);
+	waiting_batch_free(w);
+	if (!jobs->stopping)
+		uv_timer_start(&jobs->drain, on_drain, 0, 0);
+}
+
+static void stepped(struct jobs *jobs)
+{
+	finish_ended(jobs);
+	late_feed(jobs);
+	checkpoint_where_due(jobs);
+}
+
+static void films_free(struct jobs *jobs)
+{
+	if (!jobs->stopping)
+		uv_timer_start(&jobs->drain, on_drain, 0, 0);
+	finish_ended(jobs);
+	late_feed(jobs);
+}
+
+static const struct follow_up follow_up = {.carry_out = dispatch_update, .stepped = stepped, .films_free = films_free};
 
 static bool drop_films(void *jobs)
 {

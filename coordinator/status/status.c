@@ -18,7 +18,6 @@
 
 #include "common/base/mem.h"
 #include "coordinator/jobs/listing.h"
-#include "coordinator/jobs/recovery.h"
 #include "coordinator/peers/session.h"
 #include "coordinator/status/lines.h"
 #include "coordinator/status/snapshot.h"
@@ -34,7 +33,6 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, KERNEL_BYTES = 100000, BACKLOG = 16 };

@@ -11,7 +11,6 @@
  */
 #include "coordinator/store/journal.h"
 
-#include "common/base/buf.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "coordinator/store/journal_file.h"
@@ -19,7 +18,6 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -319,7 +317,7 @@ static int read_all(struct journal *j, journal_visit *visit, void *user, struct 
 {
 	struct stat st;
 	unsigned char head[JOURNAL_HEAD];
-	struct journal_gaps gaps = {NULL, 0, 0};
+	struct journal_gaps gaps = {NULL, 0};
 	bool anew = false;
 	if (disk_fstat(j->fd, &st))
 		return fault(j, errno, e);

@@ -14,6 +14,7 @@
 #include "common/base/bytes.h"
 #include "common/base/crc.h"
 #include "common/base/disk.h"
+#include "common/base/list.h"
 #include "common/base/mem.h"
 #include "coordinator/store/spool.h"
 
@@ -259,14 +260,10 @@ int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct
 
 int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e)
 {
-	if (g->count == g->capacity) {
-		size_t want = g->capacity ? 2 * g->capacity : 16;
-		struct journal_gap *more = mem_grow(g->first, g->capacity * sizeof *more, want * sizeof *more);
-		if (!more)
-			return error_set(e, ENOMEM, "no memory for a journal");
-		g->first = more;
-		g->capacity = want;
-	}
+	struct journal_gap *first = list_room(g->first, g->count, sizeof *first);
+	if (!first)
+		return error_set(e, ENOMEM, "no memory for a journal");
+	g->first = first;
 	g->first[g->count++] = (struct journal_gap){number, count};
 	return 0;
 }

@@ -99,12 +99,12 @@ int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct
 /* The salt of a file whose head is damaged, from its first record. -EBADMSG */
 int journal_scan_salt(int fd, uint64_t end, uint64_t *salt);
 
-/* Damaged records, until it is known whether they were durable. {NULL, 0, 0} is empty; free with mem_free(first). */
+/* Damaged records, until it is known whether they were durable. {NULL, 0} is empty; free with mem_free(first). */
 struct journal_gaps {
 	struct journal_gap {
 		uint64_t number, count;
 	} * first;
-	size_t count, capacity;
+	size_t count;
 };
 int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e);
 /* stored: this many records of the file were durable. */

@@ -13,7 +13,6 @@
 #include "common/base/mem.h"
 
 #include <fcntl.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
