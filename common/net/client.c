@@ -77,7 +77,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		return;
 	}
 	w->message.payload.limit = size;
-	cl->waiting_bytes += env->used + size;
+	cl->waiting_bytes += env->bytes + size;
 	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES ||
 	    !buf_append(&w->message.payload, payload, size)) {
 		mem_free(w);
@@ -142,7 +142,7 @@ int client_wait(struct client *cl, double seconds, struct client_message *m, str
 	*m = w->message;
 	STAILQ_REMOVE_HEAD(&cl->received, next);
 	cl->waiting_count--;
-	cl->waiting_bytes -= m->envelope.used + m->payload.size;
+	cl->waiting_bytes -= m->envelope.bytes + m->payload.size;
 	mem_free(w);
 	if (m->envelope.message->body_case != FARM__ENVELOPE__BODY_FAULT)
 		return 0;

@@ -23,6 +23,9 @@
 
 enum {
 	BLOCK_BYTES = 1 << 14,
+	FIRST_BYTES =
+		512, /* and FIRST_TIMES the message's length, at most BLOCK_BYTES: thousands of small ones may wait */
+	FIRST_TIMES = 4,
 	AMPLIFICATION =
 		16, /* memory allowed per byte of a message; valid ones need at most 8 (packed varints of one byte) */
 	LEAST_BYTES = 1 << 16,
@@ -43,7 +46,8 @@ static void *allocate_bounded(void *user, size_t size)
 		return NULL;
 	struct envelope_block *b = env->blocks;
 	if (!b || b->size - b->used < need) {
-		size_t room = need > BLOCK_BYTES ? need : BLOCK_BYTES;
+		size_t first = FIRST_BYTES + FIRST_TIMES * ((env->limit - LEAST_BYTES) / AMPLIFICATION),
+		       usual = b || first > BLOCK_BYTES ? BLOCK_BYTES : first, room = need > usual ? need : usual;
 		b = mem_alloc(1, sizeof *b + room);
 		env->memory_out = !b;
 		if (!b)
@@ -51,6 +55,7 @@ static void *allocate_bounded(void *user, size_t size)
 		b->size = room;
 		b->next = env->blocks;
 		env->blocks = b;
+		env->bytes += sizeof *b + room;
 	}
 	void *p = b->bytes + b->used;
 	b->used += need;

@@ -35,7 +35,8 @@ struct envelope_block;
 struct envelope {
 	Farm__Envelope *message;
 	struct envelope_block *blocks;
-	size_t used, limit;
+	size_t bytes;	    /* of memory that it holds */
+	size_t used, limit; /* of it, while it is unpacked */
 	bool memory_out;
 };
 

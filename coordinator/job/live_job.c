@@ -249,7 +249,7 @@ void live_job_count_worker(struct live_job *job, uint64_t peer)
 
 static size_t waiting_size(const struct waiting_batch *w)
 {
-	return sizeof *w + w->envelope.used + w->payload.capacity;
+	return sizeof *w + w->envelope.bytes + w->payload.capacity;
 }
 
 bool live_job_put_off(struct live_job *job, uint64_t peer, const struct lease_key *k, struct envelope *env,

@@ -199,7 +199,7 @@ static void take_submit(struct session *p, struct envelope *env)
 		session_fault(p, "one submission at a time");
 		return;
 	}
-	size_t bytes = env->used;
+	size_t bytes = env->bytes;
 	while (bytes > UPLOADS_MOST - p->peers->upload_bytes && other_gives_way(p->peers, p, INFINITY))
 		continue;
 	if (bytes > UPLOADS_MOST - p->peers->upload_bytes) {

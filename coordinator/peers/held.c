@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* Limits of memory, in total and per peer: a worker asks once for each job that it knows, and reports lost leases. */
-enum { HELD_MOST = 1 << 28, PEER_MOST = 1 << 23, MESSAGE_COST = 256 };
+enum { HELD_MOST = 1 << 28, PEER_MOST = 1 << 23 };
 
 struct held {
 	STAILQ_ENTRY(held) next;
@@ -17,7 +17,7 @@ struct held {
 
 static size_t cost_of(const struct envelope *env)
 {
-	return env->used + MESSAGE_COST;
+	return env->bytes + sizeof(struct held);
 }
 
 /* first: nothing of this peer is waiting yet. */

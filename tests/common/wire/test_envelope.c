@@ -201,6 +201,32 @@ static void a_bomb_is_defused(void **state)
 	free(bytes);
 }
 
+/* Thousands of small messages may wait, and are counted by what they hold. */
+static void memory_is_counted(void **state)
+{
+	(void)state;
+	enum { NAME = 100000 };
+	struct envelope small, large;
+	struct error e;
+	unsigned char *bytes;
+	const unsigned char *payload;
+	char *name = calloc(1, NAME + 1);
+	size_t size, payload_size;
+	assert_non_null(name);
+	memset(name, 'n', NAME);
+	assert_int_equal(envelope_unpack(&small, (const unsigned char *)"\x1a\x00", 2, &e), 0);
+	assert_in_range(small.bytes, small.used, 1000);
+	assert_int_equal(envelope_pack(ENVELOPE(SUBMIT, submit, .name = name), NULL, 0, &bytes, &size, &e), 0);
+	assert_int_equal(
+		envelope_unpack_frame(&large, FARM__ENVELOPE__BODY_SUBMIT, bytes, size, &payload, &payload_size, &e),
+		0);
+	assert_in_range(large.bytes, NAME + 1, 2 * NAME);
+	envelope_fini(&small);
+	envelope_fini(&large);
+	mem_free(bytes);
+	free(name);
+}
+
 static void text_is_checked(void **state)
 {
 	(void)state;
@@ -226,6 +252,7 @@ int main(void)
 		cmocka_unit_test(memory_is_out),
 		cmocka_unit_test(what_is_not_known_is_refused),
 		cmocka_unit_test(a_bomb_is_defused),
+		cmocka_unit_test(memory_is_counted),
 		cmocka_unit_test(text_is_checked),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
