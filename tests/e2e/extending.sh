@@ -107,23 +107,11 @@ cat >"$TREE/worker/render/mutation/again.c" <<'TEXT'
 
 static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, STRATEGY_DRAWN, .halfvecs = false};
 
-static enum proposal_end propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path *x,
-				     struct full_path *y, struct move *move)
-{
-	return strategy_propose(&strategy, m, how, x, y, move);
-}
-
-static double useful(const struct render_summary *scene)
-{
-	(void)scene;
-	return 0;
-}
-
 const struct mutation_ops mutation_again = {
 	.name = "again",
 	.summary = "traces a part of the path anew",
-	.useful = useful,
-	.propose = propose,
+	.strategy = &strategy,
+	.propose = strategy_propose,
 	.log_weight = breakup_log_weight,
 };
 TEXT
