@@ -7,6 +7,7 @@
 
 #include "tests/support/append.h"
 #include "tests/support/dice.h"
+#include "tests/support/measured_file.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/nodes.h"
 #include "tests/support/worlds.h"
@@ -380,18 +381,19 @@ void random_scene_make(struct random_scene *s, uint64_t number, const char *cons
 
 struct world *random_scene_world(const struct random_scene *s, uint32_t width, uint32_t height)
 {
-	enum { SIDE = 8 };
+	enum { SIDE = 8, OWN = 4, MEASURED = 3 };
 	static char xml[sizeof s->body + 64];
 	static unsigned char picture[16 + 3 * SIDE * SIDE];
 	int n = snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", s->body);
 	int head = sprintf((char *)picture, "P6 %d %d 255\n", SIDE, SIDE);
 	for (int i = 0; i < 3 * SIDE * SIDE; i++)
 		picture[head + i] = (unsigned char)(40 + (i * 37 + i / SIDE * 91) % 200);
-	const struct memory_file files[] = {{"test.xml", xml, (size_t)n},
-					    {"picture.ppm", picture, (size_t)head + 3 * SIDE * SIDE},
-					    {"wedge.obj", wedge, sizeof wedge - 1},
-					    {"curve.txt", curve, sizeof curve - 1},
-					    {NULL, NULL, 0}};
+	struct memory_file files[OWN + MEASURED + 1] = {{"test.xml", xml, (size_t)n},
+							{"picture.ppm", picture, (size_t)head + 3 * SIDE * SIDE},
+							{"wedge.obj", wedge, sizeof wedge - 1},
+							{"curve.txt", curve, sizeof curve - 1}};
+	assert_null(measured_files()[MEASURED].name);
+	memcpy(files + OWN, measured_files(), MEASURED * sizeof *files);
 	return world_of_files(width, height, files);
 }
 
