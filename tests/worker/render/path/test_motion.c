@@ -361,7 +361,7 @@ static void check_integrators(enum stage s, const struct agree_side *sides, size
 	world_free(w);
 	/* Where everything is when the shutter opens, it is another image: the comparison can tell. */
 	struct agree_difference d;
-	const struct agree_side how = {"bdpt", 1024, 32, 0, 0};
+	const struct agree_side how = {"bdpt", test_scaled() ? 8192 : 1024, 32, 0, 0};
 	w = world_at(s, 0);
 	agree_render(w, "motion", "when it opens", &how, &image);
 	agree_measure(&image, &stills, &d);
