@@ -502,35 +502,18 @@ static int explain(struct tls_link *l, struct error *e)
 }
 
 /* OpenSSL's buffers stay as large as they ever were: 87 KB after 64 KiB came at once, for each of thousands of peers.
- */
-static BIO *smaller(BIO *b)
+ * Once *b, which `set` gives to the link, is empty, a new one takes its place. */
+static void shrink(struct tls_link *l, BIO **b, void (*set)(SSL *, BIO *))
 {
 	enum { KEPT = 4096 };
 	BUF_MEM *m = NULL;
-	BIO_get_mem_ptr(b, &m);
-	BIO *fresh = BIO_pending(b) == 0 && m && m->max > KEPT ? BIO_new(BIO_s_mem()) : NULL;
-	if (fresh)
-		BIO_set_mem_eof_return(fresh, -1);
-	return fresh;
-}
-
-/* Once all input has been consumed. */
-static void shrink_input(struct tls_link *l)
-{
-	BIO *fresh = l->open ? smaller(l->in) : NULL;
+	BIO_get_mem_ptr(*b, &m);
+	BIO *fresh = l->open && BIO_pending(*b) == 0 && m && m->max > KEPT ? BIO_new(BIO_s_mem()) : NULL;
 	if (!fresh)
 		return;
-	SSL_set0_rbio(l->ssl, fresh);
-	l->in = fresh;
-}
-
-static void shrink_output(struct tls_link *l)
-{
-	BIO *fresh = l->open ? smaller(l->out) : NULL;
-	if (!fresh)
-		return;
-	SSL_set0_wbio(l->ssl, fresh);
-	l->out = fresh;
+	BIO_set_mem_eof_return(fresh, -1);
+	set(l->ssl, fresh);
+	*b = fresh;
 }
 
 ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *e)
@@ -548,7 +531,7 @@ ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *
 				     limit */
 		if (!l->open && l->taken > BEFORE_OPEN_MAX)
 			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
-		shrink_input(l);
+		shrink(l, &l->in, SSL_set0_rbio);
 		return 0;
 	case SSL_ERROR_ZERO_RETURN:
 		return error_set(e, ECONNRESET, "the peer hung up");
@@ -581,7 +564,7 @@ size_t tls_link_output(struct tls_link *l, const unsigned char **bytes)
 void tls_link_output_taken(struct tls_link *l)
 {
 	(void)BIO_reset(l->out);
-	shrink_output(l);
+	shrink(l, &l->out, SSL_set0_wbio);
 }
 
 bool tls_link_is_open(const struct tls_link *l)
