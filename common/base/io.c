@@ -8,8 +8,10 @@ int io_write_all(int fd, const void *bytes, size_t size)
 {
 	for (size_t done = 0; done < size;) {
 		ssize_t n = write(fd, (const char *)bytes + done, size - done);
+		if (n == 0)
+			errno = ENOSPC;
 		if (n == 0 || (n < 0 && errno != EINTR))
-			return n ? -errno : -ENOSPC;
+			return -errno;
 		done += n > 0 ? (size_t)n : 0;
 	}
 	return 0;
