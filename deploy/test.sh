@@ -106,14 +106,12 @@ if [ $mode = plain ]; then
 	skip "sanitizers: make test SAN=address,undefined, or --full"
 	skip "clang, fuzzers: --full"
 else
-	HSLT_TEST_KINDS=unit
-	export HSLT_TEST_KINDS
 	step "build with address and undefined sanitizers" make -s -j"$jobs" SAN=address,undefined programs tests
 	# Half an hour has no room for those that compare images for minutes, by code that others sanitize.
-	[ $mode != ci ] || export HSLT_TEST_WITHOUT='path/test_(motion|volume_emission|closed_form|integrators|merging|longer)$|test_infinite$|bsdf/test_sampling$|test_redistribution$|test_many$|render/test_rays$'
-	kind "tests with sanitizers, 1/20 of the samples" make -s SAN=address,undefined test
-	unset HSLT_TEST_WITHOUT
-	unset HSLT_TEST_KINDS
+	without=${HSLT_TEST_WITHOUT:-}
+	[ $mode != ci ] || without='path/test_(motion|volume_emission|closed_form|integrators|merging|longer)$|test_infinite$|bsdf/test_sampling$|test_redistribution$|test_many$|render/test_rays$'
+	kind "tests with sanitizers, 1/20 of the samples" env HSLT_TEST_KINDS=unit HSLT_TEST_WITHOUT="$without" \
+		make -s SAN=address,undefined test
 	step "build with clang" sh tests/fuzz/run.sh --build programs fuzzers test-syntax
 	step "the same bits as by clang's build" sh tests/numerics/compilers.sh build build/fuzz
 	if [ $mode = full ]; then
