@@ -29,7 +29,7 @@ python3 - "$DIR/explained.json" "$DIR/stats.json" <<-'END' || fail "$(cat "$DIR/
 	    assert o["integrator"] == "path" and c["considered"] == ["path", "bdpt8", "erpt4", "erpt", "hslt"] and c["why"].startswith("path, by a pilot:"), c
 	    assert c["pilotSamples"] >= 8192 and not c["pathMissesLight"] and not c["surfacesFocusLight"], c
 	    assert 0 < c["path"]["largestShare"] < 0.03, c
-	    assert c["path"]["tailIndex"] > 2.1 and 0 < c["path"]["secondMomentTimesRays"] < 0.75 * c["bdpt"]["secondMomentTimesRays"], c
+	    assert c["path"]["tailIndex"] > 2.1 and 0 < c["path"]["varianceTimesRays"] < 0.75 * c["bdpt"]["varianceTimesRays"], c
 END
 "$BIN/hslt-render" --explain "$SCENE" --spp 32 | grep -q '^path, by a pilot' || fail "--explain does not say why"
 "$BIN/hslt-render" --explain "$SCENE" -i bdpt | grep -q '^as requested; otherwise a pilot' || fail "--explain -i bdpt"

@@ -40,7 +40,7 @@ enum {
 	MERGED_LEAST = 1 << 12,
 	MERGED_MOST = 1 << 16, /* photons take memory */
 	BESIDE = 128,	       /* at most 1/128 as many splats as samples are compared with their pixels */
-	DROPPED = 1 << 12,     /* the second moment leaves out the largest terms, one for 4,096 samples */
+	DROPPED = 1 << 12,     /* the variance leaves out the largest terms, one for 4,096 samples */
 	STREAM_MAP = 0,
 	STREAM_PATH,
 	STREAM_BDPT,
@@ -89,10 +89,6 @@ static const double bright = 8;
  * in effects-glass, where the tail index is 1.0 to 1.3 because the contributions have a broad but bounded range, and
  * where erpt4 needs 0.7 of the time of erpt. */
 static const double evi_most = 0.5;
-/* The second moment of path times its rays, over that of bdpt, must be less than this. It is 0.68 to 0.95 in
- * cornell-box and 0.5 to 0.9 in veach-mis, where path and bdpt8 win, 2.1 or more in glossy-room, where erpt4 needs 1.8
- * times the time of erpt. */
-static const double path_cost = 0.9;
 /* Where path cannot find all light it must find more of it than this share. It is 0.97 and 0.98 in random scenes where
  * erpt4 needs 0.50 and 0.90 of the time of erpt, and 0.90 in one where it needs 1.2 times that. */
 static const double missed_little = 0.9;
@@ -102,7 +98,8 @@ static const double missed_little = 0.9;
 /* Sums over samples of one kind, relative to the brightness of their places. */
 struct tally {
 	double samples, rays;
-	double square, energy, rare;
+	size_t lit;		       /* terms that bring light */
+	double variance, energy, rare; /* the variance: summed over pixels, and of what lands anywhere the squares */
 	struct tail *tail;
 };
 
@@ -115,40 +112,48 @@ struct parts {
 
 static void add_term(struct tally *t, double y)
 {
+	t->lit += y > 0;
 	t->energy += y;
 	t->rare += fmax(y - RENDER_RARE, 0);
-	t->square += y * y;
 	tail_add(t->tail, y);
 }
 
 /* A pixel may be brighter than the map says, such as one of a small lamp. Then all of its samples are: each is divided
- * by the mean of the others if that exceeds 1. */
+ * by the mean of the others if that exceeds 1. What these samples bring their own pixel varies around its mean; what
+ * they bring other places falls there as rain does, and varies by its square. */
 static void add_pixel(struct tally *t, const struct parts *of)
 {
-	double all = 0;
+	double all = 0, sum = 0, squares = 0;
 	for (int i = 0; i < IN_PIXEL; i++)
 		all += of[i].here;
 	for (int i = 0; i < IN_PIXEL; i++) {
-		add_term(t, of[i].here / fmax(1, (all - of[i].here) / (IN_PIXEL - 1)));
-		for (uint32_t k = 0; k < of[i].count; k++)
+		double y = of[i].here / fmax(1, (all - of[i].here) / (IN_PIXEL - 1));
+		sum += y;
+		squares += y * y;
+		add_term(t, y);
+		for (uint32_t k = 0; k < of[i].count; k++) {
+			t->variance += of[i].elsewhere[k] * of[i].elsewhere[k];
 			add_term(t, of[i].elsewhere[k]);
+		}
 	}
+	t->variance += fmax(squares - sum * sum / IN_PIXEL, 0) * IN_PIXEL / (IN_PIXEL - 1);
 }
 
-static const struct render_found render_found_none = {0, 0, 1, 1, 1, 0};
+static const struct render_found render_found_none = {INFINITY, 0, 1, 1, 1, 0};
 
 static struct render_found found(const struct tally *t)
 {
 	struct render_found f = render_found_none;
 	const struct tail *tail = t->tail;
-	double square = t->square;
+	double variance = t->variance, mean = t->energy / t->samples;
 	if (!(t->energy > 0))
 		return f;
 	tail_settle(t->tail);
 	size_t dropped = t->samples > DROPPED ? (size_t)t->samples / DROPPED : 1;
 	for (size_t i = 0; i < dropped && i < tail->held; i++)
-		square -= tail->y[i] * tail->y[i];
-	f.cost = fmax(square, 0) / t->samples * t->rays / t->samples;
+		variance -= (tail->y[i] - mean) * (tail->y[i] - mean);
+	if (t->lit > dropped)
+		f.cost = fmax(variance, 0) / t->samples * t->rays / t->samples;
 	f.tail = tail_index(tail, (size_t)t->samples / RENDER_TAIL);
 	f.extreme = tail_index(tail, (size_t)t->samples / RENDER_EXTREME);
 	f.evi = tail_evi(tail, (size_t)t->samples / RENDER_EVI);
@@ -197,7 +202,7 @@ static bool wants_chains(const struct render_choice *c)
 		return c->misses || p->extreme < lucky_extreme;
 	if (render_choice_is_settled(c))
 		return false;
-	if (!(p->cost > 0))
+	if (isinf(p->cost))
 		return true; /* where there is no light at all the bootstrap of chains looks for it much longer */
 	return p->extreme < lucky_extreme && b->rare > rare_some && fmin(b->tail, b->extreme) < heavy_most;
 }
@@ -208,7 +213,7 @@ static bool is_clear(const struct render_choice *c)
 	const struct render_found *b = &c->bdpt, *p = &c->path;
 	if (b->rare > rare_clear && b->tail < tail_mean)
 		return true;
-	return !c->misses && p->cost > 0 && b->cost > 0 && b->rare <= rare_none && p->rare <= rare_some &&
+	return !c->misses && isfinite(p->cost + b->cost) && b->rare <= rare_none && p->rare <= rare_some &&
 	       fmax(p->most, b->most) <= most_clear && fmin(p->extreme, b->extreme) >= extreme_clear;
 }
 
@@ -232,7 +237,7 @@ static bool misses_little(const struct render_choice *c)
 
 static bool path_is_cheaper(const struct render_choice *c)
 {
-	return !render_choice_is_settled(c) && is_tame(&c->path) && c->path.cost < path_cost * c->bdpt.cost;
+	return !render_choice_is_settled(c) && is_tame(&c->path) && c->path.cost <= c->bdpt.cost;
 }
 
 static bool is_short(const struct render_found *path)
@@ -473,7 +478,7 @@ static int run_pilot(struct pilot *p, const struct plan *film, struct render_cho
 	if (!rc) {
 		out->samples = p->samples;
 		look_at_path(p, out);
-		if (!(out->path.cost > 0) && !out->misses)
+		if (isinf(out->path.cost) && !out->misses)
 			rc = see_what_path_misses(p, out, e);
 		if (!rc && look_at_merged(p, out))
 			rc = error_set(e, ENOMEM, "no memory for a pilot");
@@ -560,7 +565,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 static const char *reason(const char *integrator, const struct render_choice *c)
 {
 	if (strcmp(integrator, "hslt") == 0)
-		return !(c->path.cost > 0) ? "paths from the camera find next to no light; chains search for it longest"
+		return isinf(c->path.cost) ? "paths from the camera find next to no light; chains search for it longest"
 					   : "much of the light arrives by few, very bright paths, such as caustics; "
 					     "chains stay with those that they find";
 	if (strcmp(integrator, "path") == 0)

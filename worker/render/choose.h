@@ -13,7 +13,7 @@
  * `erpt` is the usual answer: samples of bdpt, of which short chains spread what is too bright. `hslt` is called for
  * where such samples are too rare to begin a chain wherever one is wanted: merging or bdpt finds much rare light, and
  * even what the camera's sub-paths find has extremes without a mean; or nothing finds any light. The others do where
- * path's tail is that of a finite variance and its second moment times rays is the smaller one. If a tail index of 2 or
+ * path's tail is that of a finite variance and its variance times rays is the smaller one. If a tail index of 2 or
  * more says so, and no sample has a share in the light that such a law does not allow, this is `path` where no lobe of
  * the scene is so narrow that it focuses light, else `bdpt8`, whose light sub-paths, one in eight samples, bound
  * fireflies of reflected light. If only an extreme-value index below 1/2 says so, which sees an end of a broad range of
@@ -35,8 +35,8 @@
 
 /* What was found of one of them. */
 struct render_found {
-	double cost;	/* second moment of a sample's relative contribution, the few largest left out, times rays a
-			   sample; 0: no light */
+	double cost;	/* variance of a sample's relative contribution, the few largest left out, times rays a
+			   sample; infinite: no light but theirs */
 	double rare;	/* share of the energy beyond RENDER_RARE times the brightness there */
 	double tail;	/* tail index of the largest, one in RENDER_TAIL samples, */
 	double extreme; /* and one in RENDER_EXTREME; 1 where fewer carry light */

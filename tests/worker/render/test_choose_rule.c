@@ -3,6 +3,7 @@
 #include "worker/render/choose.h"
 #include "worker/render/render.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -25,9 +26,14 @@ static void the_rule(void **state)
 		{{1, 0, 2.2, 2.2, 1, 0.02}, {2, 0, 3, 3, 1, 0}, FLAT, "path", false},
 		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt4", false}, /* a firefly among the few */
 		{{1, 0, 4, 4, 1, 0.04}, {2, 0, 3, 3, 1, 0}, FOCUSES, "erpt4", false},
-		{{1.9, 0, 3, 3, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt", false},  /* not much better, and less sure */
-		{{1, 0, 1.9, 1.5, 1, 0}, {0, 0, 1, 1, 1, 0}, FLAT, "erpt", true}, /* better but for its tail */
-		{{1, 0, 1.9, 1.5, 1, 0.5}, {0, 0, 1, 1, 1, 0}, FLAT, "erpt", true},
+		{{2.1, 0, 3, 3, 1, 0}, {2, 0, 3, 3, 1, 0}, FLAT, "erpt", false},
+		{{0, 0, 4, 4, 1, 0},
+		 {0, 0, 3, 3, 1, 0},
+		 FLAT,
+		 "path",
+		 false}, /* the same in every sample, as in a furnace */
+		{{1, 0, 1.9, 1.5, 1, 0}, {INFINITY, 0, 1, 1, 1, 0}, FLAT, "erpt", true}, /* better but for its tail */
+		{{1, 0, 1.9, 1.5, 1, 0.5}, {INFINITY, 0, 1, 1, 1, 0}, FLAT, "erpt", true},
 		{{1, 0, 4, 4, 1, 0}, {2, 0, 1.5, 1.5, 1, 0}, FLAT, "path", false},
 		{{1, 0.9, 0.5, 0.5, 1, 0},
 		 {2, 0, 3, 3, 1, 0},
@@ -65,17 +71,21 @@ static void the_rule(void **state)
 		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FOCUSES, "erpt4", false}, /* a range with an end */
 		{{1, 0, 2, 4, 0.3, 0}, {2, 0, 3, 3, 0.1, 0}, FLAT, "erpt4", false},	   /* never path by that */
 		{{1, 0, 1.1, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", true},
-		{{1.85, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt", false},
+		{{2.1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt", false},
 		{{1, 0, 0.9, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "erpt4", false},
 		{{1, 0, 2.2, 1.9, 0.6, 0}, {2, 0, 1.9, 2, 1, 0}, FLAT, "path", false}, /* one of the two is enough */
 		{{1, 0, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 1, 0}, MISSES, "erpt", false},
-		{{0, 0, 1, 1, 1, 0}, {0, 0, 1, 1, 1, 0}, MISSES, "hslt", false},
+		{{INFINITY, 0, 1, 1, 1, 0}, {INFINITY, 0, 1, 1, 1, 0}, MISSES, "hslt", false},
 		{{1, 0.05, 1.1, 1.9, 0.3, 0}, {2, 0, 1.9, 2, 0.1, 0}, FLAT, "erpt", false}, /* rare light is no end */
 		{{1, 0, 4, 4, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "erpt", false}, /* what is missed has no part in it */
 		{{1, 0, 1.9, 1.5, 1, 0}, {2, 0, 3, 3, 1, 0}, MISSES, "erpt", false},
 		{{1, 0, 3, 3, 1, 0}, {2, 0.9, 0.5, 0.9, 1, 0}, MISSES, "hslt", false}, /* what path says is nothing */
 		{{1, 0, 0.3, 0.3, 1, 0}, {2, 0.9, 0.5, 3, 1, 0}, MISSES, "erpt", false},
-		{{0, 0, 1, 1, 1, 0}, {1, 0, 3, 3, 1, 0}, MISSES, "erpt", false}, /* all of it, and bdpt does not */
+		{{INFINITY, 0, 1, 1, 1, 0},
+		 {1, 0, 3, 3, 1, 0},
+		 MISSES,
+		 "erpt",
+		 false}, /* all of it, and bdpt does not */
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const double *p = cases[i].path, *b = cases[i].bdpt;
@@ -123,7 +133,7 @@ static void little_that_path_misses_needs_few_light_paths(void **state)
 	c.bdpt.most = 0.04; /* or a sample of it is a firefly, */
 	assert_string_equal(render_choice_of(&c), "erpt");
 	c = easy;
-	c.path.cost = 1.9; /* or all of it costs as much. */
+	c.path.cost = 2.1; /* or all of it costs as much. */
 	assert_string_equal(render_choice_of(&c), "erpt");
 }
 
@@ -177,7 +187,7 @@ static void light_that_photons_see_is_not_rare(void **state)
 static void what_is_settled_is_the_same_with_bdpt(void **state)
 {
 	(void)state;
-	static const double costs[] = {0, 1, 1000}, shares[] = {0, 0.1, 0.9}, tails[] = {0.3, 1.5, 4};
+	static const double costs[] = {0, 1, INFINITY}, shares[] = {0, 0.1, 0.9}, tails[] = {0.3, 1.5, 4};
 	for (int i = 0; i < 81; i++) {
 		struct render_choice c = {
 			.path = {1, 0.02, 1.9, 0.9, 1, 0},
@@ -203,7 +213,7 @@ static void the_reason_is_a_sentence_without_figures(void **state)
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}}, "less noise in the same time"},
 		{"erpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .settled = true}, "leave fireflies"},
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "cannot find all light"},
-		{"hslt", {.path = {0, 0, 1, 1, 1, 0}}, "next to no light"},
+		{"hslt", {.path = {INFINITY, 0, 1, 1, 1, 0}}, "next to no light"},
 		{"hslt", {.path = {1, 0.9, 0.5, 0.5, 1, 0}}, "few, very bright paths"},
 	};
 	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {

@@ -58,7 +58,7 @@ static json_t *found_to_json(const struct render_found *f)
 {
 	return json_pack("{s:o s:o s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex",
 			 forecast_real(f->tail), "extremeTailIndex", forecast_real(f->extreme), "extremeValueIndex",
-			 forecast_real(f->evi), "largestShare", forecast_real(f->most), "secondMomentTimesRays",
+			 forecast_real(f->evi), "largestShare", forecast_real(f->most), "varianceTimesRays",
 			 forecast_real(f->cost));
 }
 
