@@ -4,6 +4,7 @@
 #include "common/base/option_print.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -17,11 +18,19 @@ static void open_standard(void)
 			exit(1); /* nobody can be told why */
 }
 
+/* A write beyond the limit of a file's size (ulimit -f, LimitFSIZE, queues of clusters) would end the program without a
+ * word, and a coordinator again after each restart. It fails with EFBIG instead, as on any disk that refuses. */
+static void survive_file_limit(void)
+{
+	signal(SIGXFSZ, SIG_IGN);
+}
+
 void program_options(const struct program *p, int argc, char **argv, void *target)
 {
 	enum option_kind asked;
 	struct error e;
 	open_standard();
+	survive_file_limit();
 	if (options_parse(p, argc, argv, target, &asked, &e)) {
 		fprintf(stderr, "%s: %s\nTry '%s --help' for more information.\n", p->name, e.text, p->name);
 		exit(2);

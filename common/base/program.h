@@ -6,7 +6,8 @@
 #include "common/base/option.h"
 
 /* options_parse for main: an error exits with 2, --help and the like with 0. Before that, standard descriptors that are
- * closed are opened, so that no file gets their numbers. */
+ * closed are opened, so that no file gets their numbers, and SIGXFSZ is ignored: a write beyond the limit of a file's
+ * size is an error of that write. */
 void program_options(const struct program *p, int argc, char **argv, void *target);
 
 #endif

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What main may rely on once its options have been read. */
+#include "common/base/program.h"
+
+#include <errno.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static const struct option_row rows[] = {{0}};
+static const struct program nothing = {
+	.name = "nothing", .summary = "Does nothing.", .own = {(const struct option_group[]){{NULL, rows}, {0}}, NULL}};
+
+/* The exit code of `run` in a process of its own, or 128 and the signal that ended it. */
+static int code_of(int (*run)(void))
+{
+	int status;
+	pid_t child = fork();
+	assert_true(child >= 0);
+	if (child == 0) {
+		char name[] = "nothing", *argv[] = {name, NULL};
+		program_options(&nothing, 1, argv, NULL);
+		_exit(run());
+	}
+	assert_int_equal(waitpid(child, &status, 0), child);
+	return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+}
+
+static int write_too_much(void)
+{
+	static const struct rlimit limit = {1000, RLIM_INFINITY};
+	static const char bytes[2000];
+	FILE *f = tmpfile();
+	if (!f || setrlimit(RLIMIT_FSIZE, &limit))
+		return 1;
+	if (write(fileno(f), bytes, sizeof bytes) != 1000)
+		return 2;
+	return write(fileno(f), bytes, sizeof bytes) == -1 && errno == EFBIG ? 0 : 3;
+}
+
+static void limit_of_files_is_an_error(void **state)
+{
+	(void)state;
+	assert_int_equal(code_of(write_too_much), 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(limit_of_files_is_an_error)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
