@@ -5,22 +5,15 @@
 #include "coordinator/core/actions.h"
 #include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
+#include "coordinator/core/identity_index.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/quarantine.h"
 
 #include <assert.h>
 
-static struct identity *known(const struct farm *f, uint64_t who)
-{
-	for (uint32_t i = 0; i < f->known_count; i++)
-		if (f->known[i]->id == who)
-			return f->known[i];
-	return NULL;
-}
-
 static const char *name_of(const struct farm *f, uint64_t who)
 {
-	const struct identity *k = who ? known(f, who) : NULL;
+	const struct identity *k = who ? identity_index_id(&f->index, who) : NULL;
 	return k ? k->name : who ? "a worker that is forgotten" : "a worker before the coordinator's start";
 }
 
@@ -130,7 +123,8 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 		text_copy(refusers, sizeof refusers, p->name);
 	else
 		text_print(refusers, sizeof refusers, "%s and %s", name_of(f, d->refuser), p->name);
-	struct identity *maker = second && !j->mixed && d->maker != d->refuser ? known(f, d->maker) : NULL;
+	struct identity *maker =
+		second && !j->mixed && d->maker != d->refuser ? identity_index_id(&f->index, d->maker) : NULL;
 	if (can && d->again < AGAIN_MOST)
 		take_back(f, j, s, refusers);
 	else
@@ -145,7 +139,7 @@ void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const str
 {
 	struct doubt *d = &s->doubt;
 	bool went_on = doubt_waits(s) && !is_party(s, who->id) && !j->mixed;
-	struct identity *refuser = went_on ? known(f, d->refuser) : NULL;
+	struct identity *refuser = went_on ? identity_index_id(&f->index, d->refuser) : NULL;
 	bool behind = s->next < d->reach;
 	*d = (struct doubt){.maker = who->id,
 			    .before = d->anew ? 0 : d->maker,

@@ -6,6 +6,7 @@
 #include "coordinator/core/answer.h"
 #include "coordinator/core/connection.h"
 #include "coordinator/core/find.h"
+#include "coordinator/core/identity_index.h"
 #include "coordinator/core/job.h"
 #include "coordinator/core/orders.h"
 #include "coordinator/core/restore.h"
@@ -38,7 +39,8 @@ int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 	f->peers = mem_alloc(c->max_peers, sizeof(struct peer *));
 	f->known_limit = KNOWN_PER_PEER * c->max_peers;
 	f->known = mem_alloc(f->known_limit, sizeof(struct identity *));
-	if (!f->jobs || !f->live || !f->peers || !f->known || update_reserve(f, 0) < 0) {
+	if (!f->jobs || !f->live || !f->peers || !f->known || identity_index_init(&f->index, f->known_limit) < 0 ||
+	    update_reserve(f, 0) < 0) {
 		farm_free(f);
 		return error_set(e, ENOMEM, "no memory for the farm");
 	}

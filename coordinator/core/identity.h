@@ -23,9 +23,13 @@ struct avoid {
 	bool own; /* each failure since the last pause was its own machine's fault */
 };
 
+enum identity_key { IDENTITY_BY_ID, IDENTITY_BY_HOME, IDENTITY_BY_NAME, IDENTITY_KEYS };
+
 struct identity {
-	uint64_t id;		 /* never used twice */
-	uint64_t certificate_id; /* equal for all with the same certificate */
+	struct identity *next[IDENTITY_KEYS]; /* identity_index.h */
+	uint32_t place;			      /* its index among those that are known */
+	uint64_t id;			      /* never used twice */
+	uint64_t certificate_id;	      /* equal for all with the same certificate */
 	char certificate[IDENTITY_CERTIFICATE], name[IDENTITY_NAME], home[IDENTITY_HOME];
 	uint64_t restarts; /* restarts of the home, as last reported */
 	uint64_t calls;	   /* connections so far, and how often it came back after silence */
@@ -36,6 +40,12 @@ struct identity {
 	double seen;
 	struct avoid avoid[IDENTITY_AVOIDED];
 	char text[256]; /* its last fault */
+};
+
+/* See identity_index.h. */
+struct identity_index {
+	struct identity **first[IDENTITY_KEYS];
+	uint32_t buckets;
 };
 
 #endif

@@ -109,7 +109,8 @@ struct farm {
 	uint32_t peer_count;
 	struct identity **known; /* workers that are or were connected */
 	uint32_t known_count, known_limit;
-	uint64_t identities; /* last id given */
+	struct identity_index index; /* of them */
+	uint64_t identities;	     /* last id given */
 	struct link classes, owners;
 	uint32_t waiting;   /* workers that want a lease */
 	uint64_t queued;    /* last place in the order of waiting */

@@ -15,6 +15,7 @@
 #include "coordinator/core/doubt.h"
 #include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
+#include "coordinator/core/identity_index.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/owner.h"
 #include "coordinator/core/peer.h"
@@ -346,21 +347,18 @@ uint64_t farm_next_quarantined(const struct farm *f, uint64_t after)
 
 bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s)
 {
-	for (uint32_t i = 0; i < f->known_count; i++) {
-		const struct identity *k = f->known[i];
-		if (k->id != who)
-			continue;
-		*s = (struct worker_status){.who = k->id,
-					    .restarts = k->restarts,
-					    .certificate = k->certificate,
-					    .name = k->name,
-					    .home = k->home,
-					    .text = k->text,
-					    .wrong = k->wrong,
-					    .quarantined = k->quarantined};
-		return true;
-	}
-	return false;
+	const struct identity *k = identity_index_id(&f->index, who);
+	if (!k)
+		return false;
+	*s = (struct worker_status){.who = k->id,
+				    .restarts = k->restarts,
+				    .certificate = k->certificate,
+				    .name = k->name,
+				    .home = k->home,
+				    .text = k->text,
+				    .wrong = k->wrong,
+				    .quarantined = k->quarantined};
+	return true;
 }
 
 bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s)

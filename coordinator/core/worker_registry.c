@@ -3,23 +3,15 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/core/identity_index.h"
 
 #include <string.h>
 
 /* By its home, otherwise by its name. */
 struct identity *worker_registry_find(const struct farm *f, const struct event_join *e)
 {
-	struct identity *named = NULL;
-	for (uint32_t i = 0; i < f->known_count; i++) {
-		struct identity *k = f->known[i];
-		if (strcmp(k->certificate, e->certificate) != 0)
-			continue;
-		if (*e->home && strcmp(k->home, e->home) == 0)
-			return k;
-		if (strcmp(k->name, e->name) == 0)
-			named = k;
-	}
-	return named;
+	struct identity *k = *e->home ? identity_index_home(&f->index, e->certificate, e->home) : NULL;
+	return k ? k : identity_index_name(&f->index, e->certificate, e->name);
 }
 
 /* Whom to forget for a newcomer with this certificate: entries with the same certificate first, quarantined ones
@@ -30,19 +22,23 @@ static bool goes_before(const struct identity *a, const struct identity *b, cons
 	return a->quarantined != b->quarantined ? b->quarantined : a_own != b_own ? a_own : a->seen < b->seen;
 }
 
-/* NULL: all of them are needed. */
+/* Not in the index. NULL: all of them are needed. */
 static struct identity *room_for_one(struct farm *f, const char *certificate)
 {
 	struct identity *oldest = NULL;
 	if (f->known_count < f->known_limit) {
 		struct identity *k = mem_alloc(1, sizeof *k);
-		if (k)
-			f->known[f->known_count++] = k;
+		if (k) {
+			k->place = f->known_count++;
+			f->known[k->place] = k;
+		}
 		return k;
 	}
 	for (uint32_t i = 0; i < f->known_count; i++)
 		if (f->known[i]->uses == 0 && (!oldest || goes_before(f->known[i], oldest, certificate)))
 			oldest = f->known[i];
+	if (oldest)
+		identity_index_remove(&f->index, oldest);
 	return oldest;
 }
 
@@ -61,11 +57,16 @@ static struct identity *find_or_add(struct farm *f, const struct event_join *e)
 	struct identity *k = worker_registry_find(f, e);
 	if (k || !(k = room_for_one(f, e->certificate)))
 		return k;
-	*k = (struct identity){.id = ++f->identities, .window = PEER_WINDOW, .restarts = e->restarts, .seen = f->now};
+	*k = (struct identity){.place = k->place,
+			       .id = ++f->identities,
+			       .window = PEER_WINDOW,
+			       .restarts = e->restarts,
+			       .seen = f->now};
 	k->certificate_id = certificate_id(f, e->certificate, k->id);
 	text_copy(k->certificate, sizeof k->certificate, e->certificate);
 	text_copy(k->name, sizeof k->name, e->name);
 	text_copy(k->home, sizeof k->home, e->home);
+	identity_index_add(&f->index, k);
 	return k;
 }
 
@@ -88,8 +89,10 @@ struct identity *worker_registry_use(struct farm *f, const struct event_join *e,
 	if (!k->quarantined || strcmp(k->home, e->home) == 0)
 		k->restarts = e->restarts;
 	if (!k->quarantined) {
+		identity_index_remove(&f->index, k);
 		text_copy(k->name, sizeof k->name, e->name);
 		text_copy(k->home, sizeof k->home, e->home);
+		identity_index_add(&f->index, k);
 	}
 	k->seen = f->now;
 	k->calls++;
@@ -108,6 +111,7 @@ void worker_registry_free(struct farm *f)
 	for (uint32_t i = 0; i < f->known_count; i++)
 		mem_free(f->known[i]);
 	mem_free(f->known);
+	identity_index_fini(&f->index);
 }
 
 /* Names cost nothing: at most this many quarantined entries are kept per certificate, and the one that has been away

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The index against a list that is searched from end to end, and the length of its chains. */
+#include "coordinator/core/identity_index.h"
+
+#include "common/base/mem.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { ENTRIES = 400, STEPS = 20000 };
+
+struct both {
+	struct identity_index index;
+	struct identity all[ENTRIES];
+	bool used[ENTRIES];
+	uint64_t last_id;
+};
+
+static struct identity *find(struct both *b, enum identity_key by, uint64_t id, const char *certificate,
+			     const char *text)
+{
+	struct identity *found = NULL;
+	for (int i = 0; i < ENTRIES; i++) {
+		struct identity *k = &b->all[i];
+		if (!b->used[i] || (by == IDENTITY_BY_ID ? k->id != id : strcmp(k->certificate, certificate) != 0))
+			continue;
+		if (by == IDENTITY_BY_ID || strcmp(by == IDENTITY_BY_HOME ? k->home : k->name, text) == 0)
+			found = k; /* the last one */
+	}
+	return found;
+}
+
+/* Few names, so that many entries have the same one, and what is one's certificate and name may be, put together, what
+ * is another's. */
+static void begin(struct both *b, uint32_t i)
+{
+	struct identity *k = &b->all[i];
+	*k = (struct identity){.place = i, .id = ++b->last_id};
+	snprintf(k->certificate, sizeof k->certificate, "%.*s", rand() % 3, "ab");
+	snprintf(k->name, sizeof k->name, "%s%d", rand() % 2 ? "b" : "", rand() % 40);
+	snprintf(k->home, sizeof k->home, "%llu", (unsigned long long)b->last_id); /* homes are never alike */
+	identity_index_add(&b->index, k);
+	b->used[i] = true;
+}
+
+static void finds_what_a_search_finds(void **state)
+{
+	(void)state;
+	struct both *b = mem_alloc(1, sizeof *b);
+	assert_non_null(b);
+	assert_int_equal(identity_index_init(&b->index, 64), 0);
+	srand(1);
+	for (int step = 0; step < STEPS; step++) {
+		uint32_t i = (uint32_t)rand() % ENTRIES;
+		struct identity *k = &b->all[i];
+		if (b->used[i]) {
+			identity_index_remove(&b->index, k);
+			b->used[i] = false;
+		} else {
+			begin(b, i);
+		}
+		const struct identity *like = &b->all[rand() % ENTRIES]; /* there, gone, or never there */
+		if (!like->id)
+			continue;
+		assert_ptr_equal(identity_index_id(&b->index, like->id), find(b, IDENTITY_BY_ID, like->id, NULL, NULL));
+		assert_ptr_equal(identity_index_home(&b->index, like->certificate, like->home),
+				 find(b, IDENTITY_BY_HOME, 0, like->certificate, like->home));
+		assert_ptr_equal(identity_index_name(&b->index, like->certificate, like->name),
+				 find(b, IDENTITY_BY_NAME, 0, like->certificate, like->name));
+	}
+	identity_index_fini(&b->index);
+	mem_free(b);
+}
+
+/* After a restart each group and part of each job is looked up. */
+static void chains_are_short(void **state)
+{
+	(void)state;
+	enum { MANY = 16384, LONGEST = 12 }; /* of as many at random more than 10 in 1e5 runs */
+	struct identity_index x;
+	struct identity *all = mem_alloc(MANY, sizeof *all);
+	assert_non_null(all);
+	assert_int_equal(identity_index_init(&x, MANY), 0);
+	for (uint32_t i = 0; i < MANY; i++) {
+		struct identity *k = &all[i];
+		k->id = i + 1;
+		snprintf(k->certificate, sizeof k->certificate, "workers");
+		snprintf(k->name, sizeof k->name, "node%u.cluster", i);
+		snprintf(k->home, sizeof k->home, "%032x", i);
+		identity_index_add(&x, k);
+	}
+	for (int by = 0; by < IDENTITY_KEYS; by++)
+		for (uint32_t i = 0; i < MANY; i++) {
+			int length = 0;
+			for (const struct identity *k = x.first[by][i]; k; k = k->next[by])
+				length++;
+			assert_true(length <= LONGEST);
+		}
+	identity_index_fini(&x);
+	mem_free(all);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(finds_what_a_search_finds),
+		cmocka_unit_test(chains_are_short),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
