@@ -8,12 +8,14 @@
  * result meanwhile is told when it was deleted.
  *
  * A job that runs again, or whose result a client fetches, is skipped. If a record cannot be written, the job waits for
- * the next round; if memory runs out or the ledger cannot be read, the round ends and the next one tries again.
+ * the next round, and so does one that there is no memory for; where the ledger cannot be read, the round ends with the
+ * jobs that it knows, which are the older ones.
  */
 #include "coordinator/retention/clear.h"
 
 #include "common/base/clock.h"
 #include "common/base/disk.h"
+#include "common/base/list.h"
 #include "common/base/mem.h"
 #include "coordinator/retention/age.h"
 #include "coordinator/retention/ages.h"
@@ -27,14 +29,17 @@ static const double every_seconds = 3600, soon_seconds = 2, fresh_seconds = 60, 
 static const char *const results[] = {"result.exr", "preview.exr", "log"};
 enum { RESULTS = sizeof results / sizeof *results };
 
+enum { PIECE = 64 /* rows read or dropped at once */ };
+
 /* The phases: look at all, choose among them, clear the chosen ones. */
 struct clearing {
-	uint64_t *ids;
+	uint64_t ids[PIECE]; /* the next to be looked at; later of records that are to be dropped */
 	size_t id_count, looked;
-	struct age_job *jobs; /* those that have ended */
-	size_t job_count, cleared;
-	size_t records;		  /* to be dropped: their ids overwrite those already looked at */
+	uint64_t last;	  /* id that was looked at */
+	struct list jobs; /* struct age_job: those that have ended */
+	size_t cleared, records;
 	double now;		  /* s since 1970, when it was chosen; 0: not yet */
+	bool whole;		  /* all have been looked at */
 	bool again;		  /* a job that has just ended is being fetched: soon once more */
 	struct job_record record; /* of the current one */
 };
@@ -70,11 +75,42 @@ static void clear_if_unneeded(const struct jobs *jobs, struct clearing *c, uint6
 	}
 	bool busy = jobs->peers.uses_result(jobs->peers.user, id);
 	c->again |= busy && now - c->record.ended_seen < fresh_seconds;
-	c->jobs[c->job_count++] = (struct age_job){.id = id,
-						   .ended = c->record.ended_seen,
-						   .films = spool_film_bytes(jobs->spool, id, 1),
-						   .result = result_bytes(jobs, id),
-						   .busy = busy};
+	struct age_job *j = list_push(&c->jobs);
+	if (!j) /* the next round may have memory for it */
+		return;
+	*j = (struct age_job){.id = id,
+			      .ended = c->record.ended_seen,
+			      .films = spool_film_bytes(jobs->spool, id, 1),
+			      .result = result_bytes(jobs, id),
+			      .busy = busy};
+}
+
+/* Of large tables each piece is read when it is needed: reading them as a whole takes seconds. */
+static void look_at_next(const struct jobs *jobs, struct clearing *c)
+{
+	struct error e;
+	if (c->looked == c->id_count) {
+		c->looked = 0;
+		if (ledger_ended(jobs->ledger, LEDGER_ABOVE, c->last, c->ids, PIECE, &c->id_count, &e)) {
+			log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+			c->id_count = 0; /* what is known so far is older than what is missing */
+		}
+	}
+	if (c->id_count == 0) {
+		c->whole = true;
+		return;
+	}
+	c->last = c->ids[c->looked++];
+	clear_if_unneeded(jobs, c, c->last);
+}
+
+/* Many at once, because each change of the database is flushed. */
+static void drop_rows(struct jobs *jobs, struct clearing *c)
+{
+	struct error e;
+	if (c->records && ledger_drop(jobs->ledger, c->ids, c->records, &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	c->records = 0;
 }
 
 static void drop_result(struct jobs *jobs, const struct age_job *j, struct job_record *r, double now)
@@ -127,6 +163,8 @@ static void clear_job(struct jobs *jobs, struct clearing *c, const struct age_jo
 	if (j->no_record) {
 		drop_record(jobs, j);
 		c->ids[c->records++] = j->id;
+		if (c->records == PIECE)
+			drop_rows(jobs, c);
 	}
 	jobs->changes++;
 }
@@ -135,29 +173,21 @@ static void choose(const struct jobs *jobs, struct clearing *c)
 {
 	struct age_limits limits = {jobs->config.clear_seconds, jobs->config.clear_bytes};
 	c->now = clock_wall_seconds();
-	age_choose(c->jobs, c->job_count, &limits, ages_now(jobs));
+	age_choose(c->jobs.items, c->jobs.count, &limits, ages_now(jobs));
 }
 
 /* false: there are no more. */
 static bool step(struct jobs *jobs, struct clearing *c)
 {
-	if (c->looked < c->id_count)
-		clear_if_unneeded(jobs, c, c->ids[c->looked++]);
+	if (!c->whole)
+		look_at_next(jobs, c);
 	else if (!(c->now > 0))
 		choose(jobs, c);
-	else if (c->cleared < c->job_count)
-		clear_job(jobs, c, &c->jobs[c->cleared++]);
+	else if (c->cleared < c->jobs.count)
+		clear_job(jobs, c, (const struct age_job *)c->jobs.items + c->cleared++);
 	else
 		return false;
 	return true;
-}
-
-/* All at once, because each change of the database is flushed. */
-static void drop_rows(struct jobs *jobs, struct clearing *c)
-{
-	struct error e;
-	if (c->records && ledger_drop(jobs->ledger, c->ids, c->records, &e))
-		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 
 void clear_close(struct jobs *jobs)
@@ -165,24 +195,17 @@ void clear_close(struct jobs *jobs)
 	struct clearing *c = jobs->clearing;
 	if (!c)
 		return;
-	mem_free(c->ids);
-	mem_free(c->jobs);
+	list_free(&c->jobs);
 	mem_free(c);
 	jobs->clearing = NULL;
 }
 
 static bool begin_round(struct jobs *jobs)
 {
-	struct error e;
 	struct clearing *c = jobs->clearing = mem_alloc(1, sizeof *c);
-	if (!c)
-		return false;
-	if (ledger_ids(jobs->ledger, LEDGER_ENDED, &c->ids, &c->id_count, &e))
-		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	c->jobs = c->id_count ? mem_alloc(c->id_count, sizeof *c->jobs) : NULL;
-	if (!c->jobs)
-		clear_close(jobs);
-	return jobs->clearing != NULL;
+	if (c)
+		c->jobs.size = sizeof(struct age_job);
+	return c != NULL;
 }
 
 void clear_soon(struct jobs *jobs)

@@ -32,26 +32,23 @@ void ended_jobs_remove(struct jobs *jobs, uint64_t job)
 
 int ended_jobs_open(struct jobs *jobs, struct error *e)
 {
-	uint64_t *ids;
+	uint64_t ids[ENDED_MAX]; /* the latest first */
 	size_t count;
-	int rc = ledger_ids(jobs->ledger, LEDGER_ENDED, &ids, &count, e);
+	int rc = ledger_ended(jobs->ledger, LEDGER_BELOW, UINT64_MAX, ids, ENDED_MAX, &count, e);
 	if (rc)
 		return rc;
 	jobs->ended = mem_alloc(ENDED_MAX, sizeof *jobs->ended);
-	if (!jobs->ended) {
-		mem_free(ids);
+	if (!jobs->ended)
 		return error_set(e, ENOMEM, "no memory for the list of jobs");
-	}
-	for (size_t i = count > ENDED_MAX ? count - ENDED_MAX : 0; i < count; i++) {
+	while (count-- > 0) {
 		struct error fault;
-		rc = ledger_read_record(jobs->ledger, ids[i], &jobs->ended[jobs->ended_count], &fault);
+		rc = ledger_read_record(jobs->ledger, ids[count], &jobs->ended[jobs->ended_count], &fault);
 		if (rc)
-			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[i],
+			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[count],
 				  log_quote(fault.text).text);
 		else
 			jobs->ended_count++;
 	}
-	mem_free(ids);
 	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(jobs->config.spool).text, jobs->ended_count,
 		  (unsigned long long)ledger_next_id(jobs->ledger));
 	return 0;

@@ -7,7 +7,6 @@
 #include "coordinator/status/lines.h"
 
 #include "common/base/clock.h"
-#include "common/base/mem.h"
 #include "coordinator/jobs/listing.h"
 
 #include <errno.h>
@@ -54,21 +53,21 @@ json_t *line_job(struct jobs *jobs, const char *name)
 
 json_t *line_ended(struct jobs *jobs, const char *before)
 {
+	enum { ONE_MORE = LINES_ENDED + 1 }; /* which says that there is another page */
 	struct error e;
 	struct job_view v;
-	uint64_t *ids, below = before ? id_of(before) : UINT64_MAX;
-	size_t count, end = 0;
-	if (ledger_ids(jobs->ledger, LEDGER_ENDED, &ids, &count, &e))
+	uint64_t ids[ONE_MORE]; /* the latest first */
+	size_t count;
+	if (ledger_ended(jobs->ledger, LEDGER_BELOW, before ? id_of(before) : UINT64_MAX, ids, ONE_MORE, &count, &e))
 		return line_error(e.text);
-	while (end < count && ids[end] < below)
-		end++;
-	size_t first = end > LINES_ENDED ? end - LINES_ENDED : 0;
+	bool more = count == ONE_MORE;
+	count -= more;
 	json_t *o = line_object("ended"), *list = json_array();
-	for (size_t i = first; i < end; i++)
+	for (size_t i = count; i-- > 0;)
 		if (jobs_view(jobs, ids[i], &v))
 			json_array_append_new(list, view_to_json(&v, false));
 	json_object_set_new(o, "jobs", list);
-	json_object_set_new(o, "before", first ? json_sprintf("j%llu", (unsigned long long)ids[first]) : json_null());
-	mem_free(ids);
+	json_object_set_new(o, "before",
+			    more ? json_sprintf("j%llu", (unsigned long long)ids[count - 1]) : json_null());
 	return o;
 }

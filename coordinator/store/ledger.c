@@ -474,9 +474,7 @@ int ledger_extend(struct ledger *l, const struct ledger_job *more, struct error 
 int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t *count, struct error *e)
 {
 	static const char *const sql[] = {[LEDGER_ALL] = "SELECT id FROM main.jobs ORDER BY id",
-					  [LEDGER_LIVE] = "SELECT id FROM main.jobs WHERE ended IS NULL ORDER BY id",
-					  [LEDGER_ENDED] =
-						  "SELECT id FROM main.jobs WHERE ended IS NOT NULL ORDER BY id"};
+					  [LEDGER_LIVE] = "SELECT id FROM main.jobs WHERE ended IS NULL ORDER BY id"};
 	sqlite3_stmt *s = NULL;
 	int rc = sqlite3_prepare_v2(l->db, sql[which], -1, &s, NULL) == SQLITE_OK ? 0 : ledger_file_error(l->db, e),
 	    step = SQLITE_DONE;
@@ -497,6 +495,29 @@ int ledger_ids(struct ledger *l, enum ledger_which which, uint64_t **ids, size_t
 		*ids = NULL;
 		*count = 0;
 	}
+	return rc;
+}
+
+int ledger_ended(struct ledger *l, enum ledger_from from, uint64_t id, uint64_t *ids, size_t most, size_t *count,
+		 struct error *e)
+{
+	static const char *const sql[] = {
+		[LEDGER_ABOVE] = "SELECT id FROM main.jobs WHERE id > ? AND ended IS NOT NULL ORDER BY id LIMIT ?",
+		[LEDGER_BELOW] =
+			"SELECT id FROM main.jobs WHERE id < ? AND ended IS NOT NULL ORDER BY id DESC LIMIT ?"};
+	sqlite3_stmt *s = NULL;
+	int rc = sqlite3_prepare_v2(l->db, sql[from], -1, &s, NULL) == SQLITE_OK ? 0 : ledger_file_error(l->db, e),
+	    step = SQLITE_DONE;
+	*count = 0;
+	if (!rc) {
+		sqlite3_bind_int64(s, 1, id < INT64_MAX ? (sqlite3_int64)id : INT64_MAX);
+		sqlite3_bind_int64(s, 2, (sqlite3_int64)most);
+	}
+	while (!rc && (step = sqlite3_step(s)) == SQLITE_ROW && *count < most)
+		ids[(*count)++] = (uint64_t)sqlite3_column_int64(s, 0);
+	if (!rc && step != SQLITE_DONE)
+		rc = ledger_file_error(l->db, e);
+	sqlite3_finalize(s);
 	return rc;
 }
 

@@ -3,7 +3,9 @@
 #include "common/base/disk.h"
 #include "common/base/log.h"
 #include "coordinator/retention/clear.h"
+#include "tests/support/bytes_read.h"
 #include "tests/support/folder.h"
+#include "tests/support/ledger_files.h"
 
 #include <fcntl.h>
 #include <setjmp.h>
@@ -121,6 +123,41 @@ static void old_jobs_go_bit_by_bit(void **state)
 		assert_int_equal(ledger_get(jobs.ledger, id, &j, &e), stays);
 	}
 	assert_true(!has(YOUNG, "result.exr") && has(LIVING, "result.exr"));
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
+/* With rows as large as those of real jobs: nobody waits until all of them are read, nor until all are dropped. */
+static void many_rows_are_read_bit_by_bit(void **state)
+{
+	(void)state;
+	enum { ROWS = 4000, MB = 1 << 20 };
+	uint64_t before, after, longest = 0;
+	char sql[600];
+	open_jobs();
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+	snprintf(
+		sql, sizeof sql,
+		"WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < %d)"
+		" INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, ended, record, checksum)"
+		" SELECT i, '', '', '', 0, 0, 'done', 0, 1, printf('%%.3800c', 'x'), -1 FROM n",
+		ROWS);
+	ledger_files_change("spool/jobs.db", sql);
+	open_jobs();
+	if (!bytes_read(&before))
+		skip();
+	const uint64_t begin = before;
+	do {
+		clear_tick(&jobs);
+		assert_true(bytes_read(&after));
+		longest = after - before > longest ? after - before : longest;
+		before = after;
+	} while (jobs.clearing);
+	print_message("   %d rows: %d KB, of which %d in one tick\n", ROWS, (int)((before - begin) >> 10),
+		      (int)(longest >> 10));
+	assert_true(before - begin > 12 * MB); /* all were looked at */
+	assert_true(longest < 8 * MB);
 	ledger_close(jobs.ledger);
 	spool_close(jobs.spool);
 }
@@ -248,6 +285,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(old_jobs_go_bit_by_bit, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(many_rows_are_read_bit_by_bit, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(of_unknown_age, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_has_changed_stays, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_read_stays, folder_set_up, folder_tear_down),

@@ -4,6 +4,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "tests/support/bytes_read.h"
 #include "tests/support/folder.h"
 #include "tests/support/ledger_files.h"
 
@@ -377,9 +378,60 @@ static void stays_small(void **state)
 	ledger_close(l);
 }
 
+/* Rows as large as those of real jobs, every third of which lives. */
+static void fill(int rows)
+{
+	char sql[600];
+	struct ledger *l = open_ledger(); /* makes the tables */
+	ledger_close(l);
+	snprintf(
+		sql, sizeof sql,
+		"WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < %d)"
+		" INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, ended, record, checksum)"
+		" SELECT i, '', '', '', 0, 0, 'done', 0, CASE WHEN i %% 3 THEN 1 END, printf('%%.3800c', 'x'), -1 FROM n",
+		rows);
+	ledger_files_change("jobs.db", sql);
+}
+
+static void those_that_ended_by_pieces(void **state)
+{
+	(void)state;
+	enum { ROWS = 4000, MOST = 7 };
+	uint64_t found[MOST], id = 0, before, after, next = 1;
+	size_t count;
+	fill(ROWS);
+	struct ledger *l = open_ledger();
+	if (!bytes_read(&before)) {
+		ledger_close(l);
+		skip();
+	}
+	for (int page = 0; page < 3; page++) {
+		assert_int_equal(ledger_ended(l, LEDGER_ABOVE, id, found, MOST, &count, &e), 0);
+		assert_int_equal(count, MOST);
+		for (size_t i = 0; i < count; i++, next++) {
+			next += next % 3 == 0;
+			assert_int_equal(found[i], next);
+		}
+		id = found[count - 1];
+	}
+	assert_int_equal(ledger_ended(l, LEDGER_BELOW, UINT64_MAX, found, MOST, &count, &e), 0);
+	assert_true(count == MOST && found[0] == ROWS && found[1] == ROWS - 2 && found[2] == ROWS - 3);
+	assert_int_equal(ledger_ended(l, LEDGER_BELOW, 5, found, MOST, &count, &e), 0);
+	assert_true(count == 3 && found[0] == 4 && found[1] == 2 && found[2] == 1);
+	assert_int_equal(ledger_ended(l, LEDGER_BELOW, 1, found, MOST, &count, &e), 0);
+	assert_int_equal(count, 0);
+	assert_int_equal(ledger_ended(l, LEDGER_ABOVE, ROWS, found, MOST, &count, &e), 0);
+	assert_int_equal(count, 0);
+	assert_true(bytes_read(&after));
+	print_message("   %d KB read of %d\n", (int)((after - before) >> 10), ROWS * 4);
+	assert_true(after - before < 2 << 20); /* the table has 16 MB */
+	ledger_close(l);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(those_that_ended_by_pieces, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(living_jobs, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(no_memory, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(earlier_versions, folder_set_up, folder_tear_down),
