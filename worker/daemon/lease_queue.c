@@ -12,7 +12,9 @@
  * sentence. A lease that is revoked, or whose job has ended, is dropped; what a thread is working on is dropped when
  * the thread returns. A message that makes no sense closes the connection. lease_queue_watch finds threads that no
  * longer make progress and fails their leases. When too many results wait to be sent, no more leases are asked for
- * (pace).
+ * (pace). Once SIGKILL has ended a rendering process, which the system sends where memory is not enough, leases of one
+ * job at a time are accepted: two jobs that fit only one after the other would end each new process, and neither would
+ * ever be done.
  */
 #include "worker/daemon/lease_queue.h"
 
@@ -84,6 +86,22 @@ static void drop_unused_job_caches(struct agent *a)
 			break;
 	}
 	tidy_fetches(a);
+}
+
+/* Where memory has not been enough, scenes are in it one at a time: those that no lease uses are dropped. The job that
+ * is left; NULL: none. */
+static const struct job_cache *keep_one(struct agent *a)
+{
+	struct job_cache *left = NULL;
+	for (struct job_cache *b = a->job_caches, *next; b; b = next) {
+		next = b->next;
+		if (b->users || b->state == JOB_CACHE_BUILDING || b->reading.check)
+			left = b;
+		else
+			drop_job_cache(a, b);
+	}
+	tidy_fetches(a);
+	return left;
 }
 
 static void drop_lease(struct agent *a, struct lease_task *l)
@@ -254,6 +272,21 @@ static bool is_stuffed(const struct agent *a)
 	return answered >= ANSWERS_MOST;
 }
 
+static int begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
+{
+	const struct job_cache *other = work_was_killed() ? keep_one(a) : NULL;
+	if (other)
+		return error_set(e, ENOMEM, "memory has no room for its scene beside that of j%llu",
+				 log_u64(other->job));
+	int rc = job_cache_new(b, job, a->cache.blobs, e);
+	if (rc)
+		return rc;
+	(*b)->next = a->job_caches;
+	a->job_caches = *b;
+	send_job_get(a, job);
+	return 0;
+}
+
 static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
 {
 	struct grant g;
@@ -286,15 +319,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		grant_fini(&g);
 		return;
 	}
-	int rc = 0;
-	bool fresh = !b;
-	if (fresh)
-		rc = job_cache_new(&b, g.key.job, a->cache.blobs, &e);
-	if (!rc && fresh) {
-		b->next = a->job_caches;
-		a->job_caches = b;
-		send_job_get(a, b->job);
-	}
+	int rc = b ? 0 : begin_job(a, &b, g.key.job, &e);
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {

@@ -4,6 +4,7 @@
 #include "common/base/crash.h"
 #include "common/base/text.h"
 
+#include <signal.h>
 #include <stdatomic.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -21,6 +22,7 @@ struct shared {
 	atomic_int number;   /* of the signal that ended the process; 0: none */
 	atomic_int hit;	     /* the entry of the thread that received it; -1: none of these */
 	char text[CRASH_TEXT];
+	bool killed; /* an earlier process, by SIGKILL */
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
 	struct work of[WORK_THREADS];
@@ -105,6 +107,7 @@ unsigned work_lose(int number)
 	int said = atomic_load(&shared->number), hit = said ? atomic_load(&shared->hit) : -1;
 	unsigned before;
 	drop_reported();
+	shared->killed |= number == SIGKILL;
 	before = shared->lost_count;
 	if (said || number)
 		for (unsigned i = 0; i < WORK_THREADS; i++) {
@@ -119,6 +122,11 @@ unsigned work_lose(int number)
 	atomic_store(&shared->hit, -1);
 	atomic_store(&shared->claimed, false);
 	return shared->lost_count - before;
+}
+
+bool work_was_killed(void)
+{
+	return shared && shared->killed;
 }
 
 struct lost_lease *work_lost(unsigned index)

@@ -9,6 +9,7 @@
 #include "common/base/mem.h"
 #include "worker/daemon/agent.h"
 #include "worker/daemon/agent_state.h"
+#include "worker/daemon/work.h"
 #include "tests/support/folder.h"
 #include "tests/support/scripted.h"
 #include "tests/support/checksummed_frame.h"
@@ -21,6 +22,7 @@
 
 #include <arpa/inet.h>
 #include <errno.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -479,6 +481,53 @@ static void a_lost_file_is_its_own_fault(void **state)
 
 #define TEST(f) cmocka_unit_test_setup_teardown(f, folder_set_up, folder_tear_down)
 
+static void say_revoke(uint64_t job)
+{
+	const struct lease_key k = {.job = job, .kind = LEASE_RENDER};
+	Farm__LeaseRevoke revoked;
+	Farm__LeaseKey key;
+	Farm__Envelope m;
+	farm__lease_revoke__init(&revoked);
+	farm__envelope__init(&m);
+	lease_key_to_wire(&k, &key);
+	revoked.key = &key;
+	m.lease_revoke = &revoked;
+	send_message(&m, FARM__ENVELOPE__BODY_LEASE_REVOKE, NULL, 0);
+}
+
+/* Two scenes that fit into memory only one after the other would end each rendering process, and neither job would ever
+ * be done. */
+static void one_scene_at_a_time_where_memory_was_short(void **state)
+{
+	struct error e;
+	(void)state;
+	assert_int_equal(work_share(1, &e), 0);
+	start(0);
+	grant(1);
+	grant(2);
+	finish();
+
+	work_lose(SIGSEGV); /* a fault of a scene */
+	start(0);
+	grant(1);
+	grant(2);
+	finish();
+
+	work_lose(SIGKILL);
+	start(0);
+	grant(1);
+	say_grant(2);
+	assert_int_equal(hear_failed("memory has no room for its scene beside that of j1"), 2);
+	assert_true(t.own); /* which counts against no job */
+	say_revoke(1);
+	grant(2); /* the scene of j1 may be wanted again, but it is used by nobody */
+	say_grant(1);
+	assert_int_equal(hear_failed("beside that of j2"), 1);
+	end_job(2);
+	grant(1);
+	finish();
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -492,6 +541,7 @@ int main(void)
 		TEST(a_store_without_room_fails_each_once),
 		TEST(a_full_disk_is_its_own_fault),
 		TEST(a_lost_file_is_its_own_fault),
+		TEST(one_scene_at_a_time_where_memory_was_short), /* last: the processes that ended stay known */
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
