@@ -111,22 +111,29 @@ void daylight_sun(double turbidity, double sun, double rgb[3])
 	rgb_from_xyz(xyz, rgb);
 }
 
-static int day_of_year(const struct daylight_time *t)
+/* Days from noon (UT) of January 1, 2000; of the Gregorian calendar, whose leap days come last if years begin in March.
+ */
+static double days_of(const struct daylight_time *t)
 {
-	static const int before[12] = {0, 31, 59, 90, 120, 151, 181, 212, 243, 273, 304, 334};
-	bool leap = (t->year % 4 == 0 && t->year % 100 != 0) || t->year % 400 == 0;
-	return before[t->month - 1] + t->day + (leap && t->month > 2);
+	int y = t->month > 2 ? t->year : t->year - 1, m = (t->month + 9) % 12;
+	int day = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + t->day - 1;
+	const int first = 730425; /* of January 1, 2000 */
+	return day - first - 0.5 + (t->hour - t->zone) / 24;
 }
 
+/* Section 3 of the paper: the ecliptic, right ascension and declination, then hour angle, azimuth from north and angle
+ * from the zenith, with the parallax of the earth's surface. */
 vec3 daylight_position(const struct daylight_time *t)
 {
-	double day = day_of_year(t), l = t->latitude * M_PI / 180;
-	double solar = t->hour + 0.170 * sin(4 * M_PI * (day - 80) / 373) - 0.129 * sin(2 * M_PI * (day - 8) / 355) +
-		       (t->longitude - 15 * t->zone) / 15;
-	double declination = 0.4093 * sin(2 * M_PI * (day - 81) / 368), turn = M_PI * solar / 12;
-	double up = sin(l) * sin(declination) - cos(l) * cos(declination) * cos(turn);
-	/* From south, towards the west. */
-	double west = -cos(declination) * sin(turn),
-	       south = -(cos(l) * sin(declination) + sin(l) * cos(declination) * cos(turn));
-	return vec3_normalize((vec3){-west, up, south});
+	double n = days_of(t), omega = 2.1429 - 0.0010394594 * n, anomaly = 6.2400600 + 0.0172019699 * n;
+	double along = 4.8950630 + 0.017202791698 * n + 0.03341607 * sin(anomaly) + 0.00034894 * sin(2 * anomaly) -
+		       0.0001134 - 0.0000203 * sin(omega);
+	double tilt = 0.4090928 - 6.2140e-9 * n + 0.0000396 * cos(omega);
+	double ascension = atan2(cos(tilt) * sin(along), cos(along)), declination = asin(sin(tilt) * sin(along));
+	double sidereal = 6.6974243242 + 0.0657098283 * n + t->hour - t->zone; /* of Greenwich, hours */
+	double turn = (sidereal * 15 + t->longitude) * M_PI / 180 - ascension, l = t->latitude * M_PI / 180;
+	double zenith = acos(fmax(fmin(cos(l) * cos(turn) * cos(declination) + sin(declination) * sin(l), 1), -1));
+	double azimuth = atan2(-sin(turn), tan(declination) * cos(l) - sin(l) * cos(turn));
+	zenith += 6371.01 / 149597890 * sin(zenith);
+	return (vec3){sin(zenith) * sin(azimuth), cos(zenith), -sin(zenith) * cos(azimuth)};
 }

@@ -2,8 +2,8 @@
 /*
  * Daylight (daylight.h) as an environment map: `sky`, `sun`, `sunsky`. A sky has 512 x 256 pixels, one with a sun 2048
  * x 1024: its disk is three pixels wide, and its total power is preserved. Below the horizon it is black, unless
- * `stretch` or `extend` of 0.6 are given. Up is +y in 0.5/0.6 and +z in 3.x; if time and place determine the sun, north
- * is -z and +y.
+ * `stretch` or `extend` of 0.6 are given. Up is +y in 0.5/0.6 and +z in 3.x. If time and place determine the sun, south
+ * is +z and west -x in 0.5/0.6, and south +x and west +y in 3.x, as in Mitsuba, which so mirrors the compass there.
  */
 #include "worker/render/emitter/daylight.h"
 #include "worker/render/emitter/envmap.h"
@@ -12,11 +12,13 @@
 #include <string.h>
 
 #define RADIANS (M_PI / 180)
+#define SUN_SCALE_MIN 0.1
 
 struct baking {
 	struct daylight sky;
 	struct image image;
 	vec3 towards;  /* the sun, local */
+	vec3 disk;     /* where it is seen: `stretch` moves it down with the sky */
 	double radius; /* of its disk, an angle */
 };
 
@@ -71,12 +73,12 @@ static double covered(const struct baking *b, uint32_t x, uint32_t y)
 {
 	enum { PARTS = 8 };
 	double reach = b->radius + 2 * M_PI / b->image.height;
-	if (angle_between(direction(&b->image, x + 0.5, y + 0.5), b->towards) > reach)
+	if (angle_between(direction(&b->image, x + 0.5, y + 0.5), b->disk) > reach)
 		return 0;
 	int inside = 0;
 	for (int i = 0; i < PARTS * PARTS; i++) {
 		vec3 d = direction(&b->image, x + (i % PARTS + 0.5) / PARTS, y + (i / PARTS + 0.5) / PARTS);
-		inside += angle_between(d, b->towards) <= b->radius;
+		inside += angle_between(d, b->disk) <= b->radius;
 	}
 	return (double)inside / (PARTS * PARTS);
 }
@@ -86,7 +88,7 @@ static void bake_sun(const struct baking *b, const double rgb[3])
 {
 	const struct image *m = &b->image;
 	double solid = 0, pixel_row = 2 * M_PI / m->width * M_PI / m->height;
-	double row = angle_between(b->towards, (vec3){0, 1, 0}) * m->height / M_PI,
+	double row = angle_between(b->disk, (vec3){0, 1, 0}) * m->height / M_PI,
 	       reach = b->radius * m->height / M_PI + 2;
 	uint32_t first = (uint32_t)fmax(row - reach, 0), last = (uint32_t)fmin(row + reach, m->height - 1.0);
 	for (uint32_t y = first; y <= last; y++)
@@ -106,8 +108,8 @@ static int days_of(int month, int year)
 	return days[month - 1] + (month == 2 && year % 4 == 0 && (year % 100 != 0 || year % 400 == 0));
 }
 
-/* In the world. */
-static int read_sun(const struct scene_node *n, const vec3 axis[3], vec3 *towards, struct error *e)
+/* In the world. axis: of the map, whose second is up. */
+static int read_sun(const struct scene_node *n, const vec3 axis[3], bool dialect_3, vec3 *towards, struct error *e)
 {
 	static const char *const clock[] = {"latitude", "longitude", "timezone", "year",  "month",
 					    "day",	"hour",	     "minute",	 "second"};
@@ -134,6 +136,8 @@ static int read_sun(const struct scene_node *n, const vec3 axis[3], vec3 *toward
 	if (t.day > days_of(t.month, t.year))
 		return node_error(n, e, ERANGE, "month %d of %d has no day %d", t.month, t.year, t.day);
 	vec3 d = daylight_position(&t);
+	if (dialect_3) /* axis[2] is -y */
+		d = (vec3){d.z, d.y, d.x};
 	*towards = vec3_madd(vec3_madd(vec3_scale(d.x, axis[0]), d.y, axis[1]), d.z, axis[2]);
 	return 0;
 }
@@ -162,11 +166,36 @@ static int read_albedo(const struct scene_node *n, const struct emitter_build *b
 	return 0;
 }
 
+/* Down from the zenith to so many times the angle. */
+static vec3 stretched(vec3 d, double by)
+{
+	double angle = by * angle_between(d, (vec3){0, 1, 0}), across = hypot(d.x, d.z);
+	double part = across > 0 ? sin(angle) / across : 0;
+	return (vec3){part * d.x, across > 0 ? cos(angle) : 1, part * d.z};
+}
+
+/* In 0.6 `scale` is what `sunScale` and `skyScale` of sunsky are without their own values, and all that sky and sun
+ * have. In 3.x, which has no `scale`, it multiplies both. */
+static double scale_of(const struct scene_node *n, const char *name, bool dialect_3)
+{
+	double both = node_float(n, "scale", 1);
+	if (dialect_3)
+		return both * node_float(n, name, 1);
+	return strcmp(n->type, "sunsky") == 0 ? node_float(n, name, both) : both;
+}
+
+/* A sun without width, 0 in 0.6, is as wide as a third of a pixel. */
+static double disk_radius(const struct scene_node *n)
+{
+	double radius = DAYLIGHT_SUN_RADIUS * fmax(node_float(n, "sun_radius_scale", 1), SUN_SCALE_MIN);
+	return node_float(n, "sun_aperture", 2 * radius / RADIANS) * RADIANS / 2;
+}
+
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	bool has_sky = strcmp(n->type, "sun") != 0, has_sun = strcmp(n->type, "sky") != 0;
 	struct baking b = {.image = {.width = has_sun ? 2048 : 512, .height = has_sun ? 1024 : 256, .channels = 3}};
-	double turbidity = node_float(n, "turbidity", 3), scale = node_float(n, "scale", 1);
+	double turbidity = node_float(n, "turbidity", 3), stretch = node_float(n, "stretch", 1);
 	struct envmap_axes axes;
 	vec3 *axis = axes.axis, towards = {0, 1, 0};
 	int code = envmap_axes_read(n, &axes, e);
@@ -180,7 +209,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 		axis[2] = vec3_neg(y);
 		memcpy(axes.back, axis, sizeof axes.back);
 	}
-	if ((code = read_sun(n, axis, &towards, e)))
+	if ((code = read_sun(n, axis, build->dialect_3, &towards, e)))
 		return code;
 	b.towards = (vec3){vec3_dot(axis[0], towards), vec3_dot(axis[1], towards), vec3_dot(axis[2], towards)};
 	double sun = angle_between(b.towards, (vec3){0, 1, 0});
@@ -190,20 +219,20 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if ((code = read_albedo(n, build, albedo, e)))
 		return code;
 	b.sky = daylight_of(turbidity, albedo, sun);
-	b.radius = DAYLIGHT_SUN_RADIUS * node_float(n, "sun_radius_scale", 1);
-	b.radius = node_float(n, "sun_aperture", 2 * b.radius / RADIANS) * RADIANS / 2;
+	b.radius = disk_radius(n);
+	b.disk = stretched(b.towards, stretch);
 	b.image.pixels = arena_alloc(build->arena, (size_t)b.image.width * b.image.height, 3 * sizeof *b.image.pixels);
 	if (!b.image.pixels)
 		return node_error(n, e, ENOMEM, "out of memory");
 	double rgb[3];
 	if (has_sky)
-		bake_sky(&b, node_float(n, "sky_scale", 1), node_float(n, "stretch", 1), node_bool(n, "extend", false));
+		bake_sky(&b, scale_of(n, "sky_scale", build->dialect_3), stretch, node_bool(n, "extend", false));
 	daylight_sun(turbidity, sun, rgb);
 	for (int k = 0; k < 3; k++)
-		rgb[k] *= node_float(n, "sun_scale", 1);
+		rgb[k] *= scale_of(n, "sun_scale", build->dialect_3);
 	if (has_sun)
 		bake_sun(&b, rgb);
-	return envmap_make(em, &(struct raster){.image = b.image}, false, scale, &axes, n, build, e);
+	return envmap_make(em, &(struct raster){.image = b.image}, false, 1, &axes, n, build, e);
 }
 
 #define NUMBER(name_, min_, max_)                                                         \
@@ -221,7 +250,7 @@ static const struct param params[] = {
 	NUMBER("sky_scale", 0, 1e9),
 	NUMBER("sun_scale", 0, 1e9),
 	{.name = "sun_direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
-	NUMBER("sun_radius_scale", 0.1, 50),
+	NUMBER("sun_radius_scale", 0, 50),
 	NUMBER("sun_aperture", 0.05, 30),
 	NUMBER("latitude", -90, 90),
 	NUMBER("longitude", -180, 180),

@@ -104,7 +104,12 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 			r, n, e,
 			"its to_world stretches the image; Mitsuba, which takes the vectors that come of it for unit "
 			"vectors, shows it distorted otherwise");
-	if (!dialect_3 || (strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0))
+	bool sun = strcmp(n->type, "sun") == 0;
+	if (!dialect_3 && (sun || strcmp(n->type, "sky") == 0) &&
+	    (node_find(n, "sun_scale") || node_find(n, "sky_scale")))
+		return remark(r, n, e,
+			      "only `scale` counts here, as in Mitsuba 0.6: `sunScale` and `skyScale` are of `sunsky`");
+	if (!dialect_3 || (!sun && strcmp(n->type, "sunsky") != 0))
 		return 0;
 	return remark(
 		r, n, e,

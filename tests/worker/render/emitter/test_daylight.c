@@ -60,6 +60,39 @@ static void test_where_the_sun_stands(void **state)
 	assert_true(fabs(daylight_position(&t).x) < 0.02);
 }
 
+/* By the Astronomical Almanac's approximate formulas (section C, "Low precision formulas for the Sun"), whose numbers
+ * are others: hour angle from mean longitude, anomaly and Greenwich's sidereal time, all in degrees. */
+static vec3 by_the_almanac(const struct daylight_time *t, double days)
+{
+	double d = days + (t->hour - t->zone) / 24, r = PI / 180;
+	double g = (357.529 + 0.98560028 * d) * r, q = 280.459 + 0.98564736 * d;
+	double along = (q + 1.915 * sin(g) + 0.020 * sin(2 * g)) * r, tilt = (23.439 - 0.00000036 * d) * r;
+	double ascension = atan2(cos(tilt) * sin(along), cos(along)), declination = asin(sin(tilt) * sin(along));
+	double turn = (15 * (18.697374558 + 24.06570982441908 * d) + t->longitude) * r - ascension, l = t->latitude * r;
+	/* Eastward, up and southward parts of the direction, by turning about the poles' axis. */
+	return (vec3){-cos(declination) * sin(turn), sin(declination) * sin(l) + cos(declination) * cos(l) * cos(turn),
+		      cos(declination) * sin(l) * cos(turn) - sin(declination) * cos(l)};
+}
+
+static void test_the_almanac(void **state)
+{
+	(void)state;
+	static const struct {
+		struct daylight_time t;
+		int days; /* from January 1, 2000 */
+	} cases[] = {
+		{{35.6894, 139.6917, 9, 15, 2010, 7, 10}, 3843}, {{50, 0, 0, 9.5, 2000, 1, 1}, 0},
+		{{-33.9, 151.2, 10, 8, 2023, 12, 21}, 8755},	 {{69.6, 18.9, 1, 23, 2024, 6, 21}, 8938},
+		{{0, -78.5, -5, 17, 2004, 2, 29}, 1520},	 {{-54.8, -68.3, -3, 12.25, 2049, 3, 1}, 17957},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		vec3 here = daylight_position(&cases[i].t), there = by_the_almanac(&cases[i].t, cases[i].days - 0.5);
+		double off = vec3_length(vec3_sub(here, there)) * 180 / PI;
+		print_message("row %zu: %.4f degrees apart, %.1f above the horizon\n", i, off, asin(here.y) * 180 / PI);
+		assert_true(off < 0.02);
+	}
+}
+
 /* In the open, from the sun and from the sky. */
 static void test_how_bright_it_is(void **state)
 {
@@ -149,7 +182,8 @@ static int make_emitter(struct arena *a, const char *text, bool dialect_3, struc
 static void test_picture(void **state)
 {
 	(void)state;
-	static const char *const texts[] = {"sun", "sun sun_radius_scale=4", "sun sun_scale=2 scale=0.5"};
+	static const char *const texts[] = {"sun", "sun sun_radius_scale=4", "sun sun_radius_scale=0",
+					    "sunsky sun_scale=1 sky_scale=0 scale=7"};
 	const struct wavelengths grey = {.grey = true};
 	double expected[3];
 	struct daylight_time t = {35.6894, 139.6917, 9, 15, 2010, 7, 10};
@@ -250,6 +284,77 @@ static void test_below_the_horizon(void **state)
 	arena_fini(&a);
 }
 
+/* What scales which part: 0.6's `scale` is a default, and all that sky and sun have; 3.x's multiplies. */
+static void test_scales(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		bool dialect_3;
+		double factor;
+	} skies[] = {
+		{"sky scale=3", false, 3},
+		{"sky scale=3 sky_scale=5", false, 3},
+		{"sunsky scale=3", false, 3},
+		{"sunsky scale=3 sky_scale=5", false, 5},
+		{"sunsky scale=3 sun_scale=5", false, 3},
+		{"sunsky sky_scale=5", true, 5},
+		{"sunsky scale=3 sky_scale=5", true, 15},
+	};
+	for (size_t i = 0; i < sizeof skies / sizeof *skies; i++) {
+		struct arena a = {0};
+		struct emitter one, em;
+		struct error e = {""};
+		assert_int_equal(make_emitter(&a, "sky", skies[i].dialect_3, &one, &e), 0);
+		assert_int_equal(make_emitter(&a, skies[i].text, skies[i].dialect_3, &em, &e), 0);
+		vec3 at = skies[i].dialect_3 ? (vec3){0.3, -0.5, 0.8} : (vec3){0.3, 0.8, 0.5};
+		const struct emitter_point x = {.p = vec3_normalize(at), .infinite = true};
+		const struct wavelengths grey = {.grey = true};
+		double l = one.ops->radiance(&one, &x, vec3_neg(x.p), &grey).v[0];
+		double due = skies[i].factor * l, is = em.ops->radiance(&em, &x, vec3_neg(x.p), &grey).v[0];
+		if (!(l > 0 && fabs(is - due) <= 0.03 * due)) /* the maps have different sizes */
+			fail_msg("%s: %g, not %g", skies[i].text, is, due);
+		arena_fini(&a);
+	}
+}
+
+/* The middle of the light. */
+static vec3 middle_of(const struct emitter *em)
+{
+	enum { N = 200 };
+	const struct wavelengths grey = {.grey = true};
+	vec3 mean = {0, 0, 0};
+	for (int k = 0; k < N * N; k++) {
+		double u[2] = {(k % N + 0.5) / N, (k / N + 0.5) / N}, pdf;
+		struct emitter_point x;
+		if (em->ops->sample_point(em, u, &x, &pdf))
+			mean = vec3_madd(mean, em->ops->radiance(em, &x, vec3_neg(x.p), &grey).v[0] / pdf, x.p);
+	}
+	return vec3_normalize(mean);
+}
+
+/* By time and place: south and west are +z and -x in 0.6, +x and +y in 3.x. `stretch` takes the disk down along its
+ * meridian. */
+static void test_which_way_is_north(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct emitter old, recent, low;
+	struct error e = {""};
+	struct daylight_time t = {35.6894, 139.6917, 9, 15, 2010, 7, 10};
+	vec3 d = daylight_position(&t);
+	assert_true(d.x < -0.6 && d.z > 0.02); /* in the west, a little to the south */
+	assert_int_equal(make_emitter(&a, "sun", false, &old, &e), 0);
+	assert_int_equal(make_emitter(&a, "sun", true, &recent, &e), 0);
+	assert_int_equal(make_emitter(&a, "sun stretch=1.75", false, &low, &e), 0);
+	assert_true(vec3_length(vec3_sub(middle_of(&old), d)) < 2e-3);
+	assert_true(vec3_length(vec3_sub(middle_of(&recent), (vec3){d.z, -d.x, d.y})) < 2e-3);
+	double angle = 1.75 * acos(d.y), across = sqrt(1 - d.y * d.y);
+	vec3 down = {d.x * sin(angle) / across, cos(angle), d.z * sin(angle) / across};
+	assert_true(vec3_length(vec3_sub(middle_of(&low), down)) < 2e-3);
+	arena_fini(&a);
+}
+
 /* With the sun in that direction. */
 static int make_under(struct arena *a, const char *type, vec3 sun, struct emitter *em, struct error *e)
 {
@@ -313,11 +418,14 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_where_the_sun_stands),
+		cmocka_unit_test(test_the_almanac),
 		cmocka_unit_test(test_how_bright_it_is),
 		cmocka_unit_test(test_the_model),
 		cmocka_unit_test(test_picture),
 		cmocka_unit_test(test_ground),
 		cmocka_unit_test(test_below_the_horizon),
+		cmocka_unit_test(test_scales),
+		cmocka_unit_test(test_which_way_is_north),
 		cmocka_unit_test(test_on_the_horizon),
 		cmocka_unit_test(test_refused),
 	};
