@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Reads a medium in any of the ways of both dialects into two volumes of coefficients, and answers for a place, a
+ * wavelength or a part of a ray from these.
+ *
+ * Failures have the node's place: parameters of two ways, a name of no material, a `g` where it means nothing.
+ */
 #include "worker/render/medium/medium.h"
 
 #include "worker/render/medium/measured.h"
@@ -23,7 +29,8 @@ static const struct param homogeneous_params[] = {
 	{"sigma_t", VARIES, 1e30, NULL},
 	{"albedo", VARIES, 1, NULL},
 	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
-	{"material", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, NULL}, /* of 0.6: measured.h */
+	{"material", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, NULL},	       /* of 0.6: measured.h */
+	{"g", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -0.999, 0.999, NULL}, /* of 0.6 */
 	SAMPLING_PARAMS,
 	{NULL, 0, 0, 0, 0, NULL},
 };
@@ -50,6 +57,25 @@ const struct plugin_decl medium_decls[] = {
 /* Mitsuba 3's defaults. */
 static const double default_sigma_t = 1, default_albedo = 0.75;
 
+/* A coefficient or a share of 0.6's that the file does not state: that of skin1. */
+static int fill_in(struct volume *v, const struct scene_node *n, const char *name, enum color_role role)
+{
+	char list[2];
+	const struct measured_medium *skin = measured_find(MEASURED_DEFAULT, list, sizeof list);
+	double rgb[3];
+	if (node_find(n, name))
+		return 0;
+	for (int k = 0; k < 3; k++) {
+		double s = MEASURED_SCALE * skin->sigma_s[k], a = MEASURED_SCALE * skin->sigma_a[k];
+		rgb[k] = strcmp(name, "sigma_s") == 0	? s
+			 : strcmp(name, "sigma_a") == 0 ? a
+			 : strcmp(name, "sigma_t") == 0 ? s + a
+							: s / (s + a);
+	}
+	*v = (struct volume){.grid = NULL};
+	return color_from_rgb(rgb, role, &v->color);
+}
+
 /* -EINVAL: no such material. */
 static int read_measured(struct medium *m, const struct scene_node *n, const char *name, struct error *e)
 {
@@ -57,23 +83,54 @@ static int read_measured(struct medium *m, const struct scene_node *n, const cha
 	const struct measured_medium *found = measured_find(name, list, sizeof list);
 	if (!found)
 		return node_error(n, e, EINVAL, "there is no material '%.64s' (supported: %s)", name, list);
-	int rc = color_from_rgb(found->sigma_a, COLOR_UNBOUNDED, &m->first.color);
-	return rc ? rc : color_from_rgb(found->sigma_s, COLOR_UNBOUNDED, &m->second.color);
+	double s[3], a[3];
+	bool own = node_find(n, "g");
+	for (int k = 0; k < 3; k++) {
+		s[k] = MEASURED_SCALE * found->sigma_s[k] * (own ? 1 : 1 - found->g[k]);
+		a[k] = MEASURED_SCALE * found->sigma_a[k];
+	}
+	int rc = color_from_rgb(a, COLOR_UNBOUNDED, &m->first.color);
+	return rc ? rc : color_from_rgb(s, COLOR_UNBOUNDED, &m->second.color);
 }
 
-static int read_coefficients(struct medium *m, const struct scene_node *n, const struct volume_build *build,
-			     struct error *e)
+static int read_apart(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
-	if (!m->by_albedo) {
-		int rc = volume_from_node(&m->first, n, "sigma_a", 0, COLOR_UNBOUNDED, false, build, e);
-		return rc ? rc : volume_from_node(&m->second, n, "sigma_s", 0, COLOR_UNBOUNDED, false, build, e);
-	}
+	int rc = volume_from_node(&m->first, n, "sigma_a", 0, COLOR_UNBOUNDED, false, build, e);
+	if (!rc)
+		rc = volume_from_node(&m->second, n, "sigma_s", 0, COLOR_UNBOUNDED, false, build, e);
+	if (!rc && !build->dialect_3)
+		rc = fill_in(&m->first, n, "sigma_a", COLOR_UNBOUNDED);
+	return rc || build->dialect_3 ? rc : fill_in(&m->second, n, "sigma_s", COLOR_UNBOUNDED);
+}
+
+static int read_together(struct medium *m, const struct scene_node *n, const struct volume_build *build,
+			 struct error *e)
+{
 	bool uneven = strcmp(n->type, "heterogeneous") == 0;
 	int rc = volume_from_node(&m->first, n, "sigma_t", default_sigma_t, COLOR_UNBOUNDED, uneven && build->dialect_3,
 				  build, e);
 	if (!rc && !uneven && volume_varies(&m->first))
 		rc = node_error(n, e, EINVAL, "sigma_t is the same everywhere in a homogeneous medium");
-	return rc ? rc : volume_from_node(&m->second, n, "albedo", default_albedo, COLOR_REFLECTANCE, false, build, e);
+	if (!rc)
+		rc = volume_from_node(&m->second, n, "albedo", default_albedo, COLOR_REFLECTANCE, false, build, e);
+	if (!rc && !uneven && !build->dialect_3)
+		rc = fill_in(&m->first, n, "sigma_t", COLOR_UNBOUNDED);
+	if (!rc && !uneven && !build->dialect_3)
+		rc = fill_in(&m->second, n, "albedo", COLOR_REFLECTANCE);
+	return rc;
+}
+
+/* Light that goes on nearly straight is not followed: sigma_s is less by the mean cosine. */
+static int read_forward(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e)
+{
+	if (!node_find(n, "g"))
+		return 0;
+	if (build->dialect_3)
+		return node_error(n, e, EINVAL, "g is a parameter of the phase function in 3.x");
+	if (volume_varies(&m->second))
+		return node_error(n, e, ENOTSUP, "g with an albedo that varies from place to place");
+	m->forward = node_float(n, "g", 0);
+	return 0;
 }
 
 int medium_create(struct medium *m, const struct scene_node *n, const struct volume_build *build, struct error *e)
@@ -90,7 +147,11 @@ int medium_create(struct medium *m, const struct scene_node *n, const struct vol
 	if (!material && !apart && !together && !build->dialect_3)
 		material = MEASURED_DEFAULT;
 	*m = (struct medium){.by_albedo = !apart && !material, .per_length = node_float(n, "scale", 1) / build->scale};
-	int rc = material ? read_measured(m, n, material, e) : read_coefficients(m, n, build, e);
+	int rc = material ? read_measured(m, n, material, e)
+		 : apart  ? read_apart(m, n, build, e)
+			  : read_together(m, n, build, e);
+	if (!rc)
+		rc = read_forward(m, n, build, e);
 	if (rc)
 		return rc;
 	rc = phase_create(&m->phase, node_child(n, PLUGIN_PHASE, 0), build, e);
@@ -124,7 +185,7 @@ static spectrum coefficients(const struct medium *m, spectrum first, spectrum se
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double scattered = m->by_albedo ? first.v[i] * second.v[i] : second.v[i];
 		double absorbed = m->by_albedo ? first.v[i] - scattered : first.v[i];
-		sigma_s.v[i] = m->scatters ? scattered * m->per_length : 0;
+		sigma_s.v[i] = m->scatters ? scattered * (1 - m->forward) * m->per_length : 0;
 		sigma_t->v[i] = sigma_s.v[i] + (m->absorbs ? absorbed * m->per_length : 0);
 	}
 	return sigma_s;

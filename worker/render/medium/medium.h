@@ -17,6 +17,7 @@ struct medium {
 	struct volume first, second; /* sigma_a and sigma_s, or if by_albedo sigma_t and its scattered share */
 	bool by_albedo;		     /* otherwise neither varies from place to place */
 	bool absorbs, scatters;	     /* false: that coefficient counts as 0; not where `second` varies */
+	double forward;		     /* 0.6's `g`: the share of sigma_s that counts as not scattered at all */
 	double per_length;	     /* times the coefficients: 1 / length */
 	struct phase phase;
 	bool shines;

@@ -131,8 +131,25 @@ static void test_descriptions(void **state)
 {
 	(void)state;
 	check_rgb("3.0.0", "", 0.75, 1);
-	check_rgb("0.6.0", "", 0.74, 0.74 + 0.032);
-	check_rgb("0.6.0", "<string name='material' value='Ketchup'/><float name='scale' value='10'/>", 1.8, 2.41);
+	check_rgb("0.6.0", "", 74, 74 + 3.2);
+	check_rgb("0.6.0", "<string name='material' value='Ketchup'/><float name='scale' value='10'/>", 180, 241);
+	check_rgb("0.6.0", "<string name='material' value='Chicken1'/>", 15, 15.15);
+	/* 0.6's mean cosine takes part of what is scattered away, whether the file states it or the material has one.
+	 */
+	check_rgb("0.6.0", "<string name='material' value='Regular Milk'/>", 455.13, 455.13 + 0.153);
+	check_rgb("0.6.0", "<string name='material' value='Regular Milk'/><float name='g' value='0.5'/>", 910.26,
+		  910.26 + 0.153);
+	check_rgb("0.6.0",
+		  "<rgb name='sigmaS' value='1,2,3'/><rgb name='sigmaA' value='3,2,1'/><float name='g' value='0.75'/>",
+		  0.25, 3.25);
+	check_rgb("0.6.0",
+		  "<rgb name='sigmaT' value='4,2,1'/><float name='albedo' value='0.5'/><float name='g' value='-1e-1'/>",
+		  2.2, 4.2);
+	/* What a file of 0.6 leaves out is skin1's. */
+	check_rgb("0.6.0", "<rgb name='sigmaA' value='3,2,1'/>", 74, 77);
+	check_rgb("0.6.0", "<rgb name='sigmaS' value='3,2,1'/><float name='scale' value='2'/>", 6, 12.4);
+	check_rgb("0.6.0", "<rgb name='sigmaT' value='4,2,1'/>", 4 * 74 / 77.2, 4);
+	check_rgb("0.6.0", "<float name='albedo' value='0.5'/>", 38.6, 77.2);
 	check_rgb("0.6.0", "<rgb name='sigmaS' value='1,2,3'/><rgb name='sigmaA' value='3,2,1'/>", 1, 4);
 	check_rgb("3.0.0", "<rgb name='sigma_t' value='4,2,1'/><rgb name='albedo' value='0.5,0.1,0'/>", 2, 4);
 	check_rgb("3.0.0", "<rgb name='sigma_t' value='4,2,1'/>", 3, 4);
@@ -140,6 +157,8 @@ static void test_descriptions(void **state)
 #define INSIDE(inner) "<shape type='sphere'><medium type='homogeneous' name='interior'>" inner "</medium></shape>"
 	world_refused(INSIDE("<string name='material' value='tea'/>"),
 		      "there is no material 'tea' (supported: apple, chicken1, ");
+	world_refused(INSIDE("<float name='sigma_a' value='2'/><float name='g' value='0.5'/>"),
+		      "g is a parameter of the phase function in 3.x");
 	world_refused(INSIDE("<float name='sigma_a' value='2'/><float name='albedo' value='0.5'/>"),
 		      "either sigma_a and sigma_s, or sigma_t and albedo, or a material of 0.6");
 	world_refused(INSIDE("<float name='sigma_t' value='2'/><string name='material' value='apple'/>"),
