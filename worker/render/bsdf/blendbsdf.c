@@ -11,7 +11,7 @@ static int blendbsdf_create(struct bsdf *b, const struct scene_node *n, const st
 	if (code)
 		return code;
 	b->alpha_mean = 0.5 * m->part[0].alpha_mean + 0.5 * m->part[1].alpha_mean;
-	return bsdf_texture(b, &m->weight, n, "weight", 0.5, build, e);
+	return bsdf_number(b, &m->weight, n, "weight", 0.5, build, e);
 }
 
 static const struct param blendbsdf_params[] = {{.name = "weight", .types = VALUE_TEXTURE, .min = 0, .max = 1},

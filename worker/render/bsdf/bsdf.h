@@ -65,7 +65,7 @@ struct bsdf_build {
 
 static inline struct texture_build bsdf_texture_build(const struct bsdf_build *b)
 {
-	return (struct texture_build){b->assets, b->arena, b->dialect_3, b->attributes, b->volumes};
+	return (struct texture_build){b->assets, b->arena, b->dialect_3, b->attributes, b->volumes, false};
 }
 
 struct bsdf_ops {

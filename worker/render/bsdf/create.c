@@ -65,16 +65,30 @@ void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
 		b->shape = COLOR_SHAPE_OTHER;
 }
 
-int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
-		 const struct bsdf_build *build, struct error *e)
+static int read_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name,
+			double fallback, const struct texture_build *build, struct error *e)
 {
-	const struct texture_build inner = bsdf_texture_build(build);
-	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, &inner, e);
+	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, build, e);
 	if (code)
 		return code;
 	bsdf_add_shape(b, texture_shape(t));
 	b->textured |= !texture_is_constant(t);
 	return 0;
+}
+
+int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		 const struct bsdf_build *build, struct error *e)
+{
+	const struct texture_build inner = bsdf_texture_build(build);
+	return read_texture(b, t, n, name, fallback, &inner, e);
+}
+
+int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		const struct bsdf_build *build, struct error *e)
+{
+	struct texture_build inner = bsdf_texture_build(build);
+	inner.number = true;
+	return read_texture(b, t, n, name, fallback, &inner, e);
 }
 
 enum { PROBE_SIDE = 64 };

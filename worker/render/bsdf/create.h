@@ -13,6 +13,10 @@ int bsdf_wrap(struct bsdf *b, const struct bsdf_ops *ops, const struct scene_nod
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		 const struct bsdf_build *build, struct error *e);
 
+/* Likewise a number from 0 to 1 (texture_build). */
+int bsdf_number(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		const struct bsdf_build *build, struct error *e);
+
 /*
  * Points at which textures are evaluated to find their range: a grid over (u,v), and points of the mesh's triangles in
  * turn. An attribute has its extremes at corners, and what depends on the distance to the edges has them there and

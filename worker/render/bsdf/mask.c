@@ -25,7 +25,7 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	if (!code)
 		code = blend_join(b, &m->part[1], "null", n, e);
 	if (!code)
-		code = bsdf_texture(b, &m->weight, n, "opacity", 0.5, build, e);
+		code = (build->dialect_3 ? bsdf_number : bsdf_texture)(b, &m->weight, n, "opacity", 0.5, build, e);
 	if (code)
 		return code;
 	b->relief = m->part[0].relief;

@@ -420,7 +420,7 @@ int principled_shares(struct principled *p, struct bsdf *b, const struct scene_n
 			p->most[i] = node_float(n, names[i], 0);
 			continue;
 		}
-		int code = bsdf_texture(b, &p->share[i], n, names[i], 0, build, e);
+		int code = bsdf_number(b, &p->share[i], n, names[i], 0, build, e);
 		if (code)
 			return code;
 		p->most[i] = range_of(&p->share[i], build, true);
@@ -447,9 +447,9 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	struct principled *p = b->data;
 	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
 	if (!code)
-		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
+		code = bsdf_number(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
-		code = bsdf_texture(b, &p->metallic, n, "metallic", 0, build, e);
+		code = bsdf_number(b, &p->metallic, n, "metallic", 0, build, e);
 	if (!code)
 		code = principled_shares(p, b, n, build, e);
 	p->has_specular = node_find(n, "specular_color") != NULL;

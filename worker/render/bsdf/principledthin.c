@@ -153,8 +153,9 @@ static int read_through(struct bsdf *b, struct thin *t, const struct scene_node 
 	if (!texture)
 		return 0;
 	if (strcmp(texture->type, "checkerboard") != 0)
-		return bsdf_texture(b, &t->diff_trans, n, "diff_trans", 0, build, e);
-	const struct texture_build inner = bsdf_texture_build(build);
+		return bsdf_number(b, &t->diff_trans, n, "diff_trans", 0, build, e);
+	struct texture_build inner = bsdf_texture_build(build);
+	inner.number = true;
 	int code = texture_create(&t->diff_trans, texture, COLOR_UNBOUNDED, &inner, e);
 	if (code)
 		return code;
@@ -170,7 +171,7 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 	struct principled *p = &t->p;
 	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
 	if (!code)
-		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
+		code = bsdf_number(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
 		code = principled_shares(p, b, n, build, e);
 	if (!code)

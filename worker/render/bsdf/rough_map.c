@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/rough_map.h"
 
-/* Textures of roughness are grey: the mean over the lanes. */
+/* The mean over the lanes: only colours that are no images differ in them. */
 static double alpha_of(const struct texture *t, const struct bsdf_point *p)
 {
 	return t->ops ? spectrum_mean(texture_eval(t, &p->where, p->w)) : t->color.scale;
@@ -21,7 +21,7 @@ static int read_one(struct texture *t, struct bsdf *b, const struct scene_node *
 {
 	const char *where = node_find(n, name) ? name : "alpha";
 	if (node_ref(n, where))
-		return bsdf_texture(b, t, n, where, 0.1, build, e);
+		return bsdf_number(b, t, n, where, 0.1, build, e);
 	*t = (struct texture){.color = color_constant(node_float(n, where, 0.1))};
 	return 0;
 }

@@ -67,7 +67,11 @@ void emitter_move(const struct emitter *em, double time, struct emitter_room *ro
 int emitter_texture(struct texture *t, const struct scene_node *n, const char *name, enum color_role role,
 		    const struct emitter_build *build, struct error *e)
 {
-	const struct texture_build inner = {build->assets, build->arena, build->dialect_3, build->attributes,
-					    build->surface ? build->volumes : NULL};
+	const struct texture_build inner = {build->assets,
+					    build->arena,
+					    build->dialect_3,
+					    build->attributes,
+					    build->surface ? build->volumes : NULL,
+					    false};
 	return texture_from_node(t, n, name, 1, role, &inner, e);
 }

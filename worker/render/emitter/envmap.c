@@ -270,8 +270,8 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	struct envmap_axes axes;
 	int code = envmap_axes_read(n, &axes, e);
 	if (!code)
-		code = raster_read(&picture, n, build->assets, &(struct raster_range){0, HUGE_VAL, false}, build->arena,
-				   e);
+		code = raster_read(&picture, n, build->assets, &(struct raster_range){0, HUGE_VAL, false, IMAGE_ALL},
+				   build->arena, e);
 	return code ? code : envmap_make(em, &picture, build->dialect_3, node_float(n, "scale", 1), &axes, n, build, e);
 }
 

@@ -145,7 +145,7 @@ static int read_sun(const struct scene_node *n, const vec3 axis[3], bool dialect
 /* Of the ground, seen by X, Y and Z. */
 static int read_albedo(const struct scene_node *n, const struct emitter_build *build, double albedo[3], struct error *e)
 {
-	const struct texture_build inner = {build->assets, build->arena, build->dialect_3, NULL, NULL};
+	const struct texture_build inner = {build->assets, build->arena, build->dialect_3, NULL, NULL, false};
 	struct texture t;
 	int code = texture_from_node(&t, n, "albedo", build->dialect_3 ? 0.3 : 0.2, COLOR_REFLECTANCE, &inner, e);
 	if (code)

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/image.h"
 
+#include "common/base/color.h"
+
 #include "worker/render/scene/image_decode.h"
 
 #include <float.h>
@@ -35,6 +37,22 @@ static void keep_channel(struct image *img, enum image_channel channel)
 	for (size_t i = 0; i < count; i++)
 		img->pixels[i] = img->pixels[3 * i + (size_t)(channel - IMAGE_RED)];
 	img->channels = 1;
+}
+
+void image_grey(struct image *i, enum image_channel as)
+{
+	size_t count = (size_t)i->width * i->height;
+	if (i->channels != 3)
+		return;
+	for (size_t k = 0; k < count; k++) {
+		const float *p = i->pixels + 3 * k;
+		const double rgb[3] = {(double)p[0], (double)p[1], (double)p[2]};
+		bool same = p[0] == p[1] && p[0] == p[2]; /* and stays so */
+		i->pixels[k] = same		  ? p[0]
+			       : as == IMAGE_MEAN ? (float)((rgb[0] + rgb[1] + rgb[2]) / 3)
+						  : (float)rec709_luminance(rgb);
+	}
+	i->channels = 1;
 }
 
 static int decode(const struct image_input *in, struct image *out)

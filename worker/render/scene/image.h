@@ -20,6 +20,8 @@ enum image_channel {
 	IMAGE_GREEN,
 	IMAGE_BLUE,
 	IMAGE_ALPHA, /* of PNG, WebP and TGA; 1 if an image has none, -ENOTSUP for formats whose alpha is not read */
+	IMAGE_LUMINANCE, /* these two: image_grey */
+	IMAGE_MEAN,
 };
 
 /* "r", "g", "b" or "a"; all of each pixel for any other name. */
@@ -28,6 +30,9 @@ enum image_channel image_channel_named(const char *name);
  * arena holds: -EFBIG, with the file and its size, before it is decoded. name: for messages, and for TGA. */
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
 		 struct arena *arena, struct image *out, struct error *e);
+/* One number of each pixel, its luminance or the mean of red, green and blue. */
+void image_grey(struct image *i, enum image_channel as);
+
 /* Raises each number to a positive power (1: nothing changes), negative ones by their size. -ERANGE: one gets too large
  * for a float. */
 int image_power(struct image *i, double power, struct error *e);

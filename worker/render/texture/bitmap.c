@@ -102,7 +102,10 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	if (role == COLOR_UNBOUNDED)
 		return node_error(n, e, ENOTSUP, "a bitmap cannot be used for this quantity");
 	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
-					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT};
+					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT,
+					   !build->number     ? IMAGE_ALL
+					   : build->dialect_3 ? IMAGE_LUMINANCE
+							      : IMAGE_MEAN};
 	int code = raster_read(&b->raster, n, build->assets, &range, build->arena, e);
 	if (code)
 		return code;

@@ -2,9 +2,9 @@
 /*
  * Textures that are one of two others, depending on (u,v).
  *
- * `checkerboard`: a 2 x 2 pattern on the unit square; color0 where both halves agree.
- * `gridtexture` (0.5/0.6): lines of color1 on color0, along the edges of the unit squares. A line is twice line_width
- * wide, as in Mitsuba.
+ * `checkerboard`: a 2 x 2 pattern on the unit square; color0 where both halves agree, or, as in Mitsuba 3, where they
+ * do not, if the pattern is of numbers (roughness, opacity, weights). `gridtexture` (0.5/0.6): lines of color1 on
+ * color0, along the edges of the unit squares. A line is twice line_width wide, as in Mitsuba.
  */
 #include "worker/render/texture/texture.h"
 #include "worker/render/texture/uv.h"
@@ -34,21 +34,22 @@ static unsigned line_at(const struct pattern *p, double u, double v)
 	return distance(u) < p->line_width || distance(v) < p->line_width;
 }
 
-/* The defaults are those of color0 and color1. */
-static int create(struct texture *t, const struct scene_node *n, const double defaults[2], enum color_role role,
-		  const struct texture_build *build, struct error *e)
+/* The defaults are those of color0 and color1; exchange: each takes the other's place. */
+static int create(struct texture *t, const struct scene_node *n, const double defaults[2], bool exchange,
+		  enum color_role role, const struct texture_build *build, struct error *e)
 {
 	struct pattern *p = t->data;
 	p->map = uv_map_read(n);
-	int code = texture_from_node(&p->color[0], n, "color0", defaults[0], role, build, e);
-	return code ? code : texture_from_node(&p->color[1], n, "color1", defaults[1], role, build, e);
+	int first = exchange ? 1 : 0;
+	int code = texture_from_node(&p->color[first], n, "color0", defaults[0], role, build, e);
+	return code ? code : texture_from_node(&p->color[1 - first], n, "color1", defaults[1], role, build, e);
 }
 
 static int checkerboard_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			       const struct texture_build *build, struct error *e)
 {
 	((struct pattern *)t->data)->which = square_at;
-	return create(t, n, (const double[2]){0.4, 0.2}, role, build, e);
+	return create(t, n, (const double[2]){0.4, 0.2}, build->number && build->dialect_3, role, build, e);
 }
 
 static int gridtexture_create(struct texture *t, const struct scene_node *n, enum color_role role,
@@ -57,7 +58,7 @@ static int gridtexture_create(struct texture *t, const struct scene_node *n, enu
 	struct pattern *p = t->data;
 	p->which = line_at;
 	p->line_width = node_float(n, "line_width", 0.01);
-	return create(t, n, (const double[2]){0.2, 0.4}, role, build, e);
+	return create(t, n, (const double[2]){0.2, 0.4}, false, role, build, e);
 }
 
 static const struct texture *texture_at(const struct pattern *p, double u, double v)

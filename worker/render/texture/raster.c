@@ -15,10 +15,14 @@ static int decode(struct raster *r, const struct scene_node *n, const struct ass
 	int code = asset_part_open(&part, n, assets, e);
 	if (code)
 		return code;
-	code = image_decode(part.bytes, part.size, k->name, k->linear, k->channel, arena, &r->image, &reason);
+	bool grey = k->channel == IMAGE_LUMINANCE || k->channel == IMAGE_MEAN;
+	code = image_decode(part.bytes, part.size, k->name, k->linear, grey ? IMAGE_ALL : k->channel, arena, &r->image,
+			    &reason);
 	asset_range_close(&part, assets);
 	if (!code)
 		code = image_power(&r->image, k->power, &reason);
+	if (!code && grey)
+		image_grey(&r->image, k->channel);
 	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
 }
 
@@ -44,6 +48,7 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 		const struct raster_range *range, struct arena *arena, struct error *e)
 {
 	const char *name = node_string(n, "filename", NULL), *channel = node_string(n, "channel", "all");
+	enum image_channel kept = image_channel_named(channel);
 	double gamma = node_float(n, "gamma", 0);
 	if (!name)
 		return node_error(n, e, EINVAL, "\"%s\" needs a filename", n->type);
@@ -57,7 +62,7 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 		.skip_bytes = node_int(n, "skip_bytes", 0),
 		.base64 = node_bool(n, "base64", false),
 		.linear = gamma > 0 || node_bool(n, "raw", range->raw && gamma != -1),
-		.channel = image_channel_named(channel),
+		.channel = kept == IMAGE_ALL ? range->all : kept,
 		.threshold = node_float(n, "threshold", -1),
 		.power = gamma > 0 ? gamma : 1,
 	};

@@ -24,6 +24,8 @@ struct raster {
 struct raster_range {
 	double least, largest; /* pixels outside are clamped */
 	bool raw;	       /* default of raw, unless the parameters raw or gamma are given */
+	enum image_channel
+		all; /* what is kept of a pixel unless `channel` says: IMAGE_ALL, IMAGE_LUMINANCE or IMAGE_MEAN */
 };
 
 /* Reads the image that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: only that one, as

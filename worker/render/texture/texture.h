@@ -39,6 +39,9 @@ struct texture_build {
 	bool dialect_3;
 	struct attribute_table *attributes; /* of the mesh (attribute_table.h); NULL: there is no mesh */
 	const struct volume_build *volumes; /* NULL: what has the texture is not a surface in the world */
+	/* The texture stands for a number, a roughness or a weight, not for a spectrum: of coloured images Mitsuba 3
+	 * then takes the luminance and 0.6 the mean, and Mitsuba 3 exchanges the colours of a checkerboard. */
+	bool number;
 };
 
 /* Three numbers as a function of (u,v), with their first and second derivatives. */

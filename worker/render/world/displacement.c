@@ -30,7 +30,7 @@ int displacement_apply(struct shape_geometry *g, const struct scene_node *shape,
 				  DISPLACE_LEVEL_MAX);
 	struct arena picture = {0};
 	struct texture t;
-	const struct texture_build build = {assets, &picture, dialect_3, NULL, NULL};
+	const struct texture_build build = {assets, &picture, dialect_3, NULL, NULL, false};
 	int rc = texture_from_node(&t, shape, "displacement", 0, COLOR_HEIGHT, &build, e);
 	struct displacement d = {height,
 				 &t,

@@ -220,12 +220,13 @@ static void test_textured_coatings(void **state)
 			struct bsdf map, number;
 			struct bsdf_point p = point;
 			char text[192];
-			snprintf(text, sizeof text, "%s@alpha checkerboard color0=0.05 color1=0.6", kind[k]);
+			snprintf(text, sizeof text, "%s@alpha checkerboard color0=0.6 color1=0.05", kind[k]);
 			bsdf_make(&a, text, &map);
 			snprintf(text, sizeof text, "%s@alpha checkerboard color0=%g color1=%g", kind[k], rough[place],
 				 rough[place]);
 			bsdf_make(&a, text, &number);
-			p.where.u = place ? 0.75 : 0.25; /* color1 where u and v differ in their halves */
+			p.where.u = place ? 0.75
+					  : 0.25; /* color0 where u and v differ in their halves, of numbers in 3.x */
 			p.where.v = 0.25;
 			assert_true(map.textured && map.alpha == 0.05);
 			double m = map.ops->eval(&map, &p, wo, wi).v[0], n = number.ops->eval(&number, &p, wo, wi).v[0];

@@ -196,12 +196,43 @@ static void test_more_than_all_is_refused(void **state)
 	arena_fini(&a);
 }
 
+/* (0.3, 0.7) is on a square of color1, which Mitsuba 3's numbers begin with. What stands for a colour does not change
+ * with the dialect: 0.6's opacity, which may have one, and reflectances. */
+static void test_checkerboards_of_numbers(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		bool dialect_3;
+		double expected; /* of a reflectance of 1: the share of the diffuse part */
+	} cases[] = {
+		{"mask | diffuse reflectance=1 | @opacity checkerboard color0=0.2 color1=0.9", true, 0.2},
+		{"mask | diffuse reflectance=1 | @opacity checkerboard color0=0.2 color1=0.9", false, 0.9},
+		{"blendbsdf | null | diffuse reflectance=1 | @weight checkerboard color0=0.2 color1=0.9", true, 0.2},
+		{"blendbsdf | null | diffuse reflectance=1 | @weight checkerboard color0=0.2 color1=0.9", false, 0.9},
+		{"diffuse | @reflectance checkerboard color0=0.2 color1=0.9", true, 0.9},
+	};
+	const vec3 wo = vec3_normalize((vec3){0.3, 0.2, 0.8}), wi = vec3_normalize((vec3){-0.1, -0.3, 0.7});
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct arena a = {0};
+		struct bsdf b;
+		struct error e;
+		if (bsdf_try(&a, cases[i].text, cases[i].dialect_3, &b, &e))
+			fail_msg("%s: %s", cases[i].text, e.text);
+		double share = value(&b, wo, wi) * PI;
+		if (fabs(share - cases[i].expected) > 1e-9)
+			fail_msg("row %zu: %g, not %g", i, share, cases[i].expected);
+		arena_fini(&a);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_ward_is_its_formula),	 cmocka_unit_test(test_ward_defaults_and_scale),
 		cmocka_unit_test(test_a_mixture_is_a_sum),	 cmocka_unit_test(test_parts_that_let_light_through),
 		cmocka_unit_test(test_more_than_all_is_refused), cmocka_unit_test(test_two_sides_of_two_sides),
+		cmocka_unit_test(test_checkerboards_of_numbers),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

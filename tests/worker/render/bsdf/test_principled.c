@@ -238,13 +238,13 @@ static void test_metallic_texture(void **state)
 				   : strcmp(shares[i], "coat_roughness") == 0  ? "coat=0.5"
 									       : "";
 		char map[256], number[256];
-		snprintf(map, sizeof map, "principled %s %s | @%s checkerboard color0=1 color1=0.25", base, with,
+		snprintf(map, sizeof map, "principled %s %s | @%s checkerboard color0=0.25 color1=1", base, with,
 			 shares[i]);
 		snprintf(number, sizeof number, "principled %s %s %s=0.25", base, with, shares[i]);
 		same(map, number, i == 0, 1);
 	}
-	/* (0.3, 0.7) lies on a square of color1 */
-	same("principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 | @metallic checkerboard color0=1 color1=0.25",
+	/* (0.3, 0.7) lies on a square of color0 where the colours are numbers */
+	same("principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 | @metallic checkerboard color0=0.25 color1=1",
 	     "principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);
 }
 

@@ -450,7 +450,7 @@ static void test_textured_roughness(void **state)
 		{"roughconductor material=Au alpha=0.3",
 		 "roughconductor material=Au | @alpha checkerboard color0=0.3 color1=0.3"},
 		{"roughdielectric alpha_u=0.2 alpha_v=0.4",
-		 "roughdielectric alpha_u=0.2 | @alpha_v checkerboard color0=0.9 color1=0.4"},
+		 "roughdielectric alpha_u=0.2 | @alpha_v checkerboard color0=0.4 color1=0.9"},
 	};
 	const vec3 wo = vec3_normalize((vec3){0.3, 0.2, 0.8}), wi = vec3_normalize((vec3){-0.1, -0.3, 0.7});
 	for (size_t k = 0; k < sizeof same / sizeof *same; k++) {

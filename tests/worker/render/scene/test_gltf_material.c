@@ -343,7 +343,7 @@ static void test_images_in_buffers(void **state)
 			struct scene s;
 			struct error e;
 			struct raster r = {0};
-			const struct raster_range range = {0, 1, false};
+			const struct raster_range range = {0, 1, false, IMAGE_ALL};
 			struct arena arena = {.limit = 1 << 20};
 			gltf_files_make(&f);
 			size_t at = f.buffer_size + offset, size = p.file[0].size;

@@ -11,7 +11,8 @@
 
 #include <cmocka.h>
 
-static const struct raster_range reflectance = {0, 1, false}, light = {0, 1e30, false}, height = {-1e30, 1e30, true};
+static const struct raster_range reflectance = {0, 1, false, IMAGE_ALL}, light = {0, 1e30, false, IMAGE_ALL},
+				 height = {-1e30, 1e30, true, IMAGE_ALL};
 
 struct counted {
 	struct asset_source inner;

@@ -6,6 +6,7 @@
  */
 #include "tests/support/nodes.h"
 #include "tests/support/pictures.h"
+#include "worker/render/texture/picture_cache.h"
 #include "worker/render/texture/texture.h"
 
 #include <setjmp.h>
@@ -40,7 +41,7 @@ static int setup(void **state)
 	pictures_add(&f.pictures, 2, 1, (double[]){0.5, 0.125, 0.0625, 0.5, 0.5, 0.5});
 	pictures_add(&f.pictures, 1, 1, bright);
 	f.source = pictures_source(&f.pictures);
-	f.build = (struct texture_build){&f.source, &f.arena, true, NULL, NULL};
+	f.build = (struct texture_build){&f.source, &f.arena, true, NULL, NULL, false};
 	*state = &f;
 	return 0;
 }
@@ -340,6 +341,46 @@ static void test_coloured_height(void **state)
 	assert_true(texture_height(&t, 0.75, 0.25) == -3);
 }
 
+/* Of a coloured image that stands for a number Mitsuba 3 takes the luminance and 0.6 the mean, at all wavelengths, and
+ * Mitsuba 3's checkerboards of numbers begin with color1. */
+static void test_numbers(void **state)
+{
+	struct fixture *f = *state;
+	static const struct {
+		const char *text;
+		bool dialect_3;
+		double u, expected;
+	} cases[] = {
+		{"bitmap filename=p1 filter_type=nearest", true, 0.25, 0.2126 * 0.5 + 0.7152 * 0.125 + 0.0722 * 0.0625},
+		{"bitmap filename=p1 filter_type=nearest", false, 0.25, (0.5 + 0.125 + 0.0625) / 3},
+		{"bitmap filename=p1 filter_type=nearest", true, 0.75, 0.5},
+		{"bitmap filename=p1 filter_type=nearest channel=g", true, 0.25, 0.125},
+		{"bitmap filename=p1 filter_type=nearest gamma=2", false, 0.25, (0.25 + 1.0 / 64 + 1.0 / 256) / 3},
+		{"checkerboard color0=0.1 color1=0.7", true, 0.25, 0.7},
+		{"checkerboard color0=0.1 color1=0.7", true, 0.75, 0.1},
+		{"checkerboard color0=0.1 color1=0.7", false, 0.25, 0.1},
+		{"gridtexture color0=0.1 color1=0.7", false, 0.25, 0.1},
+	};
+	const struct texture_build build = f->build;
+	struct picture_cache cache = {.arena = &f->arena};
+	f->source.decoded = &cache;
+	struct texture red = make_texture(f, "bitmap filename=p1 filter_type=nearest", COLOR_REFLECTANCE);
+	f->build.number = true;
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		f->build.dialect_3 = cases[i].dialect_3;
+		struct texture t = make_texture(f, cases[i].text, COLOR_REFLECTANCE);
+		spectrum x = look_up(&t, cases[i].u, 0.25, &colour);
+		for (int k = 0; k < SPECTRUM_LANES; k++)
+			if (fabs(x.v[k] - cases[i].expected) > 1e-7) /* of floats */
+				fail_msg("row %zu: %.9g is not %.9g", i, x.v[k], cases[i].expected);
+	}
+	f->build = build;
+	f->source.decoded = NULL;
+	/* The colour is still one, whatever the pixels of the same file became. */
+	spectrum x = look_up(&red, 0.25, 0.25, &colour);
+	assert_true(x.v[2] > 2 * x.v[1]);
+}
+
 static struct texture tinted(struct fixture *f, const char *scale, const char *inner, enum color_role role)
 {
 	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, scale);
@@ -441,6 +482,7 @@ int main(void)
 		cmocka_unit_test(test_derivatives),
 		cmocka_unit_test(test_scale),
 		cmocka_unit_test(test_coloured_height),
+		cmocka_unit_test(test_numbers),
 		cmocka_unit_test(test_tint),
 		cmocka_unit_test(test_product),
 		cmocka_unit_test(test_channel_and_threshold),
