@@ -434,6 +434,8 @@ static int read_index(struct principled *p, const struct scene_node *n, struct e
 	double specular = node_float(n, "specular", 0.5);
 	if (node_find(n, "eta") && node_find(n, "specular"))
 		return node_error(n, e, EINVAL, "eta and specular say the same thing; give one");
+	if (p->most[TRANSMISSION] > 0 && specular == 0)
+		specular = 1e-3; /* Mitsuba's, for the same reason as below */
 	/* Burley 2012, section 5.5: 0.08 times `specular` is reflected at normal incidence. */
 	p->eta = node_find(n, "eta") ? node_float(n, "eta", 1.5) : 2 / (1 - sqrt(0.08 * specular)) - 1;
 	p->eta = fmax(p->eta,

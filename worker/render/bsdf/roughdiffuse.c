@@ -7,10 +7,27 @@
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/warp.h"
 
-struct roughdiffuse {
-	struct texture reflectance;
+struct grooves {
 	double a, b, c, d; /* C1, C2, C3 and the factor of light that bounces twice */
 };
+
+struct roughdiffuse {
+	struct texture reflectance, alpha;
+	bool fast;
+	struct grooves known; /* unless alpha is a texture */
+};
+
+static struct grooves grooves_of(double alpha, bool fast)
+{
+	double s2 = 0.5 * alpha * alpha;
+	return (struct grooves){1 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09),
+				fast ? 0 : 0.125 * s2 / (s2 + 0.09), fast ? 0 : 0.17 * s2 / (s2 + 0.13)};
+}
+
+static struct grooves grooves_at(const struct roughdiffuse *r, const struct bsdf_point *p)
+{
+	return r->alpha.ops ? grooves_of(spectrum_mean(texture_eval(&r->alpha, &p->where, p->w)), r->fast) : r->known;
+}
 
 static double cube(double x)
 {
@@ -18,7 +35,7 @@ static double cube(double x)
 }
 
 /* Factors of the reflectance and of its square, times pi. */
-static void factors(const struct roughdiffuse *r, vec3 wo, vec3 wi, double *once, double *twice)
+static void factors(const struct grooves *r, vec3 wo, vec3 wi, double *once, double *twice)
 {
 	double so = sqrt(fmax(1 - wo.z * wo.z, 0)), si = sqrt(fmax(1 - wi.z * wi.z, 0)), s = so * si;
 	double across =
@@ -44,7 +61,8 @@ static spectrum roughdiffuse_eval(const struct bsdf *b, const struct bsdf_point 
 	double once, twice;
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
-	factors(r, wo, wi, &once, &twice);
+	struct grooves g = grooves_at(r, p);
+	factors(&g, wo, wi, &once, &twice);
 	spectrum rho = texture_eval(&r->reflectance, &p->where, p->w);
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		rho.v[i] = fmax(rho.v[i] * (once + twice * rho.v[i]), 0) / WARP_PI;
@@ -67,23 +85,22 @@ static int roughdiffuse_create(struct bsdf *b, const struct scene_node *n, const
 			       struct error *e)
 {
 	struct roughdiffuse *r = b->data;
-	double alpha = node_float(n, "alpha", 0.2), s2 = 0.5 * alpha * alpha;
-	bool fast = node_bool(n, "use_fast_approx", false);
-	r->a = 1 - 0.5 * s2 / (s2 + 0.33);
-	r->b = 0.45 * s2 / (s2 + 0.09);
-	r->c = fast ? 0 : 0.125 * s2 / (s2 + 0.09);
-	r->d = fast ? 0 : 0.17 * s2 / (s2 + 0.13);
+	int code = node_ref(n, "alpha") ? bsdf_number(b, &r->alpha, n, "alpha", 0.2, build, e) : 0;
+	if (code)
+		return code;
+	r->fast = node_bool(n, "use_fast_approx", false);
+	r->known = grooves_of(node_ref(n, "alpha") ? 0 : node_float(n, "alpha", 0.2), r->fast);
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
 	b->alpha_mean = 1;
-	int code = bsdf_texture(b, &r->reflectance, n, "reflectance", 0.5, build, e);
+	code = bsdf_texture(b, &r->reflectance, n, "reflectance", 0.5, build, e);
 	b->black = !code && texture_max(&r->reflectance) == 0;
 	return code;
 }
 
 static const struct param roughdiffuse_params[] = {
 	{.name = "reflectance", .types = VALUE_TEXTURE, .max = 1},
-	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 1},
 	{.name = "use_fast_approx", .types = VALUE_BOOL},
 	{.name = NULL},
 };

@@ -34,11 +34,19 @@ const struct scene_node *integrators_inner(const struct scene_node *n)
 	return node_child(n, PLUGIN_INTEGRATOR, 0);
 }
 
+/* What an integrator has that does not state it; -1: no limit. */
+static int64_t default_depth(const char *type, int64_t around)
+{
+	if (depth_is_direct(type))
+		return SCENE_DIRECT_DEPTH;
+	return depth_is_prb(type) ? SCENE_PRB_DEPTH : around;
+}
+
 int64_t integrators_depth(const struct scene_node *n)
 {
 	int64_t depth = -1;
 	for (; n; n = integrators_inner(n))
-		depth = node_int(n, "max_depth", depth_is_direct(n->type) ? SCENE_DIRECT_DEPTH : depth);
+		depth = node_int(n, "max_depth", default_depth(n->type, depth));
 	return depth;
 }
 

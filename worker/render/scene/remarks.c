@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Looks at each object, or at all of a scene, for what is known to differ, and adds a sentence about it to the report.
+ *
+ * Failures: -ENOMEM only.
+ */
 #include "worker/render/scene/remarks.h"
 
 #include "worker/render/scene/depth.h"
@@ -45,6 +50,9 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 		rc = remark(r, n, e, "the image shows all light, on surfaces and in media");
 	if (!rc && depth_is_direct(n->type) && !node_find(n, "max_depth"))
 		rc = remark(r, n, e, "the image shows light that is scattered once; --max-depth shows more");
+	if (!rc && depth_is_prb(n->type) && !node_find(n, "max_depth"))
+		rc = remark(r, n, e, "max_depth is %d, its default in Mitsuba; --max-depth shows more",
+			    SCENE_PRB_DEPTH);
 	return rc ? rc : on_depth(r, n, e);
 }
 
@@ -65,6 +73,19 @@ static int on_one_edge(struct report *r, const struct scene_node *integrator, st
 	return remark(r, integrator, e,
 		      "max_depth 1 shows emitters themselves, and the scene has none that can be seen: the image is "
 		      "black; --max-depth 2 shows surfaces that they light");
+}
+
+static int on_hidden(struct report *r, const struct scene_node *integrator, const struct scene_node *lamp,
+		     struct error *e)
+{
+	bool hides = false;
+	for (const struct scene_node *n = integrator; n; n = integrators_inner(n))
+		hides |= node_bool(n, "hide_emitters", false);
+	if (!hides || !lamp)
+		return 0;
+	return remark(r, lamp, e,
+		      "hide_emitters hides its light from the camera but not the shape itself; newer versions of "
+		      "Mitsuba 3 show what is behind");
 }
 
 static bool has_medium(const struct scene_node *n)
@@ -150,7 +171,7 @@ int remarks_on_object(const struct scene_node *n, struct report *r, struct error
 int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,
 		     struct error *e)
 {
-	const struct scene_node *camera = NULL, *integrator = NULL;
+	const struct scene_node *camera = NULL, *integrator = NULL, *lamp = NULL;
 	bool light = false, seen = false, media = false;
 	uint32_t sensors = 0;
 	int rc = 0;
@@ -160,6 +181,7 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bo
 		light |= n->shines;
 		seen |= is_seen(n);
 		media |= has_medium(n);
+		lamp = !lamp && n->cls == PLUGIN_SHAPE && n->shines ? n : lamp;
 		integrator = n->cls == PLUGIN_INTEGRATOR ? n : integrator;
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
@@ -178,6 +200,8 @@ int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bo
 	}
 	if (!rc && media)
 		rc = on_media(r, integrator, e);
+	if (!rc && dialect_3)
+		rc = on_hidden(r, integrator, lamp, e);
 	if (!rc && light && !seen)
 		rc = on_one_edge(r, integrator, e);
 	if (!rc && !light && camera && r->problem_count == 0)

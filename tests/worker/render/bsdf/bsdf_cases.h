@@ -53,6 +53,7 @@ static const char *const bsdf_cases[] = {
 	"roughdiffuse reflectance=0.9",
 	"roughdiffuse alpha=1 reflectance=rgb(1,0.3,0.1)",
 	"roughdiffuse alpha=0.7 use_fast_approx=true",
+	"roughdiffuse reflectance=0.9 | @alpha checkerboard color0=0.6 color1=0.6",
 	"phong",
 	"phong exponent=0 specular_reflectance=0.9 diffuse_reflectance=0.4",
 	"phong exponent=300 diffuse_reflectance=0 specular_reflectance=1",

@@ -243,6 +243,7 @@ static void test_metallic_texture(void **state)
 		snprintf(number, sizeof number, "principled %s %s %s=0.25", base, with, shares[i]);
 		same(map, number, i == 0, 1);
 	}
+	same("principled spec_trans=0.5 specular=0", "principled spec_trans=0.5 specular=0.001", 1, 1);
 	/* (0.3, 0.7) lies on a square of color0 where the colours are numbers */
 	same("principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 | @metallic checkerboard color0=0.25 color1=1",
 	     "principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);

@@ -449,6 +449,8 @@ static void test_textured_roughness(void **state)
 	static const char *const same[][2] = {
 		{"roughconductor material=Au alpha=0.3",
 		 "roughconductor material=Au | @alpha checkerboard color0=0.3 color1=0.3"},
+		{"roughdiffuse reflectance=0.9 alpha=0.4",
+		 "roughdiffuse reflectance=0.9 | @alpha checkerboard color0=0.4 color1=0.9"},
 		{"roughdielectric alpha_u=0.2 alpha_v=0.4",
 		 "roughdielectric alpha_u=0.2 | @alpha_v checkerboard color0=0.4 color1=0.9"},
 	};
@@ -466,7 +468,7 @@ static void test_textured_roughness(void **state)
 			    same[k][0]);
 		assert_near(map.ops->pdf_solid(&map, &p, wo, wi), number.ops->pdf_solid(&number, &p, wo, wi), 1e-12,
 			    same[k][0]);
-		if (k == 1) {
+		if (k == 2) {
 			p.where.u = 0.25;
 			assert_true(
 				fabs(map.ops->pdf_solid(&map, &p, wo, wi) / number.ops->pdf_solid(&number, &p, wo, wi) -

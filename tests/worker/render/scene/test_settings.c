@@ -140,6 +140,13 @@ static void test_sampler_and_integrator(void **state)
 		assert_true(s.max_depth == 7 && s.roulette_depth == 4);
 	}
 	assert_int_equal(read_ok("<integrator type='direct'/>", "").max_depth, 2);
+	assert_int_equal(read_ok("<integrator type='prb'/>", "").max_depth, 6);
+	assert_int_equal(
+		read_ok("<integrator type='aov'><integrator type='prb_projective'/></integrator>", "").max_depth, 6);
+	assert_int_equal(read_ok("<integrator type='prbvolpath'/>", "").max_depth, 128);
+	assert_int_equal(
+		read_ok("<integrator type='prb'><integer name='max_depth' value='-1'/></integrator>", "").max_depth,
+		128);
 	assert_int_equal(
 		read_ok("<integrator type='moment'><integrator type='direct_projective'/></integrator>", "").max_depth,
 		2);
@@ -291,6 +298,37 @@ static void test_notes_on_suns(void **state)
 		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 			fail_msg("%s", e.text);
 		if (scene_has_note(&s, "half as bright at a turbidity of 8") != cases[i].differs)
+			fail_msg("%s", xml);
+		scene_fini(&s);
+	}
+}
+
+/* Where Mitsubas differ about what hidden lamps hide, and only there. */
+static void test_notes_on_hidden_lamps(void **state)
+{
+	(void)state;
+#define HIDE "<integrator type='path'><boolean name='hide_emitters' value='true'/></integrator>"
+#define LAMP "<shape type='sphere'><emitter type='area'/></shape>"
+	static const struct {
+		const char *version, *xml;
+		bool noted;
+	} cases[] = {
+		{"3.0.0", HIDE LAMP, true},
+		{"3.0.0", "<integrator type='aov'>" HIDE "</integrator>" LAMP, true},
+		{"0.6.0", HIDE LAMP, false},
+		{"3.0.0", LAMP, false},
+		{"3.0.0", HIDE "<emitter type='constant'/><shape type='sphere'/>", false},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[512];
+		snprintf(xml, sizeof xml, "<scene version='%s'>%s</scene>", cases[i].version, cases[i].xml);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e;
+		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%s: %s", xml, e.text);
+		if (scene_has_note(&s, "hide_emitters hides its light") != cases[i].noted)
 			fail_msg("%s", xml);
 		scene_fini(&s);
 	}
@@ -453,6 +491,7 @@ int main(void)
 		cmocka_unit_test(test_notes_on_the_whole),
 		cmocka_unit_test(test_note_on_a_stretched_environment),
 		cmocka_unit_test(test_notes_on_suns),
+		cmocka_unit_test(test_notes_on_hidden_lamps),
 		cmocka_unit_test(test_notes_on_one_edge),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_size_is_overridden),
