@@ -45,6 +45,9 @@ const char *xml_attribute(const struct xml_element *el, const char *name); /* NU
  * own. */
 const char *element_spelling(const struct xml_element *el, const char *name);
 
+/* Whether it is a value that Mitsuba 3 takes directly in <scene>. All are about how it computes, not about light. */
+bool element_is_of_scene(const struct xml_element *el);
+
 /* error_set with "file:line: <element>: " before the text. */
 __attribute__((format(printf, 4, 5))) int xml_error(const struct xml_element *el, struct error *e, int errno_value,
 						    const char *format, ...);

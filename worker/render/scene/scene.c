@@ -465,7 +465,7 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 		return element_check(el, "name|value", false, m->error);
 	if (strcmp(el->name, "path") == 0)
 		return element_check(el, "value", false, m->error);
-	if (value_is_element(el->name) && el->snake) /* a property of the scene: 0.6 has none */
+	if (value_is_element(el->name) && (el->snake || element_is_of_scene(el))) /* 0.6 has none and ignores all */
 		return note_foreign(&m->notes, el);
 	struct value unused;
 	if (id_table_names(el)) /* a spectrum; those who refer to it hold it */

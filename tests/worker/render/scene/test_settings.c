@@ -303,6 +303,36 @@ static void test_notes_on_suns(void **state)
 	}
 }
 
+/* What Mitsuba 3 takes in <scene> changes no light; other values there are mistakes. */
+static void test_values_of_the_scene(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *value;
+		bool known;
+	} cases[] = {
+		{"<boolean name='embree_use_robust_intersection' value='true'/>", true},
+		{"<boolean name='allow_thread_reordering' value='false'/>", true},
+		{"<boolean name='spectral' value='true'/>", false},
+		{"<string name='compact_accel' value='true'/>", false},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[128];
+		snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n%s</scene>", cases[i].value);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e = {""};
+		bool read = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e) == 0;
+		if (read != cases[i].known || (!read && !strstr(e.text, "has no place in <scene>")))
+			fail_msg("%s: %s", xml, e.text);
+		if (!read)
+			continue;
+		assert_true(scene_has_note(&s, "s.xml:2: <boolean> is ignored"));
+		scene_fini(&s);
+	}
+}
+
 /* Where Mitsubas differ about what hidden lamps hide, and only there. */
 static void test_notes_on_hidden_lamps(void **state)
 {
@@ -491,6 +521,7 @@ int main(void)
 		cmocka_unit_test(test_notes_on_the_whole),
 		cmocka_unit_test(test_note_on_a_stretched_environment),
 		cmocka_unit_test(test_notes_on_suns),
+		cmocka_unit_test(test_values_of_the_scene),
 		cmocka_unit_test(test_notes_on_hidden_lamps),
 		cmocka_unit_test(test_notes_on_one_edge),
 		cmocka_unit_test(test_crop),
