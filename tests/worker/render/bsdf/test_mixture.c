@@ -226,13 +226,36 @@ static void test_checkerboards_of_numbers(void **state)
 	}
 }
 
+/* A red image as opacity: a colour in 0.6, its luminance in 3.x. */
+static void test_a_coloured_opacity(void **state)
+{
+	(void)state;
+	static const unsigned char red[] = "P6 1 1 255\n\xff\0\0";
+	const struct memory_file files[] = {{"red.ppm", (const char *)red, sizeof red - 1}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	for (int dialect_3 = 0; dialect_3 <= 1; dialect_3++) {
+		struct arena a = {0};
+		const struct bsdf_build build = {.arena = &a, .dialect_3 = dialect_3, .assets = &assets};
+		struct bsdf b;
+		struct error e;
+		if (bsdf_create(&b, node_bsdf(&a, "mask | diffuse reflectance=1 | @opacity bitmap filename=red.ppm"),
+				&build, &e))
+			fail_msg("%s", e.text);
+		spectrum f = b.ops->eval(&b, &point, (vec3){0, 0, 1}, (vec3){0, 0, 1});
+		for (int i = 0; i < SPECTRUM_LANES && dialect_3; i++)
+			assert_true(fabs(f.v[i] * PI - 0.2126) < 1e-6);
+		assert_true(dialect_3 || f.v[3] > 2 * f.v[1]);
+		arena_fini(&a);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_ward_is_its_formula),	 cmocka_unit_test(test_ward_defaults_and_scale),
 		cmocka_unit_test(test_a_mixture_is_a_sum),	 cmocka_unit_test(test_parts_that_let_light_through),
 		cmocka_unit_test(test_more_than_all_is_refused), cmocka_unit_test(test_two_sides_of_two_sides),
-		cmocka_unit_test(test_checkerboards_of_numbers),
+		cmocka_unit_test(test_checkerboards_of_numbers), cmocka_unit_test(test_a_coloured_opacity),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
