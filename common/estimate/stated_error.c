@@ -14,7 +14,7 @@ static const struct rare_rule {
 } rare_rules[] = {{ERROR_ONE_GROUP, 0.1, 5}, {ERROR_TAIL, 0.2, 2.5}};
 enum { RARE_RULES = sizeof rare_rules / sizeof *rare_rules };
 
-static const char no_spread[] = "one group of samples has no error; --spp 2 or more, without --groups 1, gives it one";
+static const char no_spread[] = "a single group of samples gives no error; use --spp 2 or more, and not --groups 1";
 
 /* The error that the image has if the pixels that came out bright really are, where that is less than half of the
  * stated one. A lamp smaller than a pixel looks like a firefly in short renders: 395 % was stated where 22 % was true.
@@ -102,7 +102,7 @@ void stated_error(const struct canvas_image *img, char *text, size_t size)
 		text_put(&t, "relative error %.2f %% (95 %%: %.2f to %.2f %%)", 100 * sqrt(img->rel_mse),
 			 100 * sqrt(img->rel_mse_95[0]), 100 * sqrt(img->rel_mse_95[1]));
 	if (img->unvisited)
-		text_put(&t, "; no chain came to %llu of %llu pixels", (unsigned long long)img->unvisited,
+		text_put(&t, "; no chain reached %llu of %llu pixels", (unsigned long long)img->unvisited,
 			 (unsigned long long)img->width * img->height);
 }
 

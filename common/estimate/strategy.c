@@ -145,24 +145,22 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 	if (black)
 		then = "; ";
 	if (bad) {
-		text_put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then,
+		text_put(&t, "%s%s contributions were NaN, infinite or negative, and were left out", then,
 			 thousands(bad, number[0]));
 		then = "; ";
 	}
 	uint64_t lost = n->counters[COUNT_STATES_LOST];
 	if (lost) {
 		text_put(&t,
-			 "%s%s of %s times a chain's state could not be read back, and the chain returned to the start "
-			 "of the epoch",
+			 "%s%s of %s chain epochs ended in a state that could not be read back; the chain returned to "
+			 "the start of the epoch",
 			 then, thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
 		then = "; ";
 	}
 	if (stuck)
-		text_put(
-			&t,
-			"%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections",
-			then, thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]),
-			thousands(p->chains, number[2]), thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
+		text_put(&t, "%s%s of %s chain epochs accepted nothing (%s chains); longest run: %s rejections", then,
+			 thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]),
+			 thousands(p->chains, number[2]), thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
 }
 
 void strategy_add_beyond(double share, char *note, size_t size)

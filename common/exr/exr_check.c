@@ -61,7 +61,7 @@ int exr_check(exr_context_t x, const struct exr_stream *s, const struct exr_limi
 	if (exr_get_storage(x, 0, &storage) || (storage != EXR_STORAGE_TILED && storage != EXR_STORAGE_SCANLINE))
 		return error_set(e, EBADMSG, "a deep EXR file; only flat images are supported");
 	if (exr_get_compression(x, 0, &compression) || compression < 0 || compression > EXR_COMPRESSION_DWAB)
-		return error_set(e, EBADMSG, "the EXR file is compressed in a way that is not known");
+		return error_set(e, EBADMSG, "the EXR file has an unknown compression");
 	if (exr_get_data_window(x, 0, &data) || exr_get_display_window(x, 0, &display) ||
 	    exr_get_channels(x, 0, &channels))
 		return error_set(e, EBADMSG, "the EXR file's header is not complete");

@@ -220,7 +220,7 @@ static void add_extra(struct header *h, const struct header_extra *x)
 	for (size_t i = 0; i < x->effect_count; i++)
 		append(h, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name, x->effects[i].on ? "on" : "off",
 		       x->effects[i].forced ? " (forced)" : "", x->effects[i].why,
-		       x->effects[i].on ? "without it" : "saves", x->effects[i].saves);
+		       x->effects[i].on ? "omitting it would save" : "saves", x->effects[i].saves);
 	end_string(h);
 	add_double(h, H_WALL, x->wall_seconds);
 	add_double(h, H_CPU, x->cpu_seconds);

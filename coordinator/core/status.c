@@ -186,10 +186,9 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 	else if (verify_why(f, j, text, size) || doubt_why(f, j, text, size))
 		return NULL;
 	else if (share_is_limited(f, j) && share_unproven(f, j->owner))
-		snprintf(
-			text, size,
-			"a job of its owner ended workers: one lease at a time until something is computed (for %.0f s)",
-			j->owner->limited_until - f->now);
+		snprintf(text, size,
+			 "a job of its owner crashed workers: one lease at a time until a result arrives (for %.0f s)",
+			 j->owner->limited_until - f->now);
 	else if (answer_all_failed(f, j))
 		put_failing(f, j, text, size);
 	else if (someone_avoids(f, j))

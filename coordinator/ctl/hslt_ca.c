@@ -65,11 +65,11 @@ static const struct program program = {
 		"hslt-ca operator root             a client who sees and cancels everybody's jobs\n"
 		"hslt-ca coordinator spare         one more coordinator\n"
 		"hslt-ca worker node1 --renew      a new certificate and key in place of the old\n"
-		"hslt-ca revoke node1              by name or serial number; crl.pem to where coordinators read it\n"
+		"hslt-ca revoke node1              by name or serial number; then copy crl.pem to every coordinator\n"
 		"hslt-ca list",
 	.details =
-		"DIR is --ca, $HSLT_CA or ~/.hslt-ca. DIR/ca.key signs everything: keep it away from the farm. What belongs to a "
-		"machine is its own folder alone (copy it with its modes). Running programs notice new files by themselves.",
+		"DIR is --ca, $HSLT_CA or ~/.hslt-ca. DIR/ca.key signs everything: keep it away from the farm. A "
+		"machine needs only its own folder (copy it with its file modes). Running programs notice new files by themselves.",
 	.exits = "0 done, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.verbs = verb_at,

@@ -40,7 +40,7 @@ static const struct option_row rows[] = {
 	{"socket", 0, "PATH", "The coordinator's status socket", OPTION_TEXT(struct arguments, socket),
 	 .environment = "HSLT_STATUS_SOCKET", .needed = true},
 	{"all", 0, NULL, "Also list jobs that ended before the last 50", OPTION_FLAG(struct arguments, all)},
-	{"json", 0, NULL, "Print JSON, one object a line", OPTION_FLAG(struct arguments, json)},
+	{"json", 0, NULL, "Print JSON, one object per line", OPTION_FLAG(struct arguments, json)},
 	{"watch", 0, NULL, "Print again on every change, until the job has ended",
 	 OPTION_FLAG(struct arguments, watch)},
 	{0},
@@ -73,8 +73,9 @@ static const struct program program = {
 		    "hslt-status --watch j12\n"
 		    "hslt-status --json | jq '.jobs[] | {id, state, progress}'",
 	.details =
-		"Of the jobs that ended it lists the last 50. What is long, such as the effects that a scene needs, "
-		"is shown for one JOB only once it has ended. --json prints the socket's objects, one a line; with JOB only that job's.",
+		"Of the jobs that have ended it lists the last 50. Long details, such as the effects that a scene "
+		"needs, are shown for live jobs, and for one that has ended if it is given as JOB. --json prints the "
+		"socket's objects, one per line; with JOB only that job's.",
 	.exits = "0 done, 1 no such job, 2 usage, 75 coordinator not reachable",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.word = take_word,
@@ -228,7 +229,8 @@ static void print_effects(const json_t *job)
 	json_array_foreach(json_object_get(job, "effects"), i, effect)
 		printf("       %-3s%-9s %-13s %s; %s: %s\n", json_is_true(json_object_get(effect, "on")) ? "on" : "off",
 		       json_is_true(json_object_get(effect, "forced")) ? " (forced)" : "", text_of(effect, "name"),
-		       text_of(effect, "why"), json_is_true(json_object_get(effect, "on")) ? "without it" : "saves",
+		       text_of(effect, "why"),
+		       json_is_true(json_object_get(effect, "on")) ? "omitting it would save" : "saves",
 		       text_of(effect, "saves"));
 }
 
@@ -375,7 +377,7 @@ static json_t *next_line(struct reading *r)
 			n <= 0 ? "the coordinator is gone"
 			: r->line[n - 1] != '\n'
 				? "the coordinator closed the connection: it has ended, or this program reads too slowly"
-				: "what answers is no coordinator");
+				: "what answers there is not a coordinator");
 	return o;
 }
 

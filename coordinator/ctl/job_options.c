@@ -40,8 +40,7 @@ static const struct option_row rows[] = {
 	{"time", 0, "+SECONDS", "extend: additional time (90, 5m, 2h)",
 	 OPTION_SECONDS(struct job_options, more_seconds, 0, 1e9), .above = true},
 	{"target-error", 0, "E",
-	 "extend: until the estimated relative error is 0.02 or 2%; bounds that are met and not named no "
-	 "longer apply",
+	 "extend: until the estimated relative error is 0.02 or 2%; bounds already reached and not named here no longer apply",
 	 OPTION_RATIO(struct job_options, target_error, 0, 1e3), .above = true, .below = true},
 	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(struct job_options, tls), .environment = "HSLT_TLS"},
@@ -122,7 +121,7 @@ static const struct program program = {
 	.examples = "hslt-job --coordinator 127.0.0.1:7700 list\n"
 		    "hslt-job fetch j12 -o room.exr\n"
 		    "hslt-job fetch j12 --preview -o so-far.exr\n"
-		    "hslt-job hold j12             no more of its leases go out; those that are out count\n"
+		    "hslt-job hold j12             hands out no more of its leases; those already out still count\n"
 		    "hslt-job release j12\n"
 		    "hslt-job priority j12 -5      -100 to 100; from the next lease on\n"
 		    "hslt-job extend j12 --spp +8  continues it, whether running or finished\n"

@@ -19,10 +19,9 @@ int quota_check(const struct quota *q, const struct quota_use *has, const struct
 	if (q->jobs && has->jobs >= q->jobs)
 		return error_set(e, EDQUOT, "quota: at most %" PRIu64 " live jobs", q->jobs);
 	if (q->asset_bytes && (has->asset_bytes > q->asset_bytes || asset_bytes > q->asset_bytes - has->asset_bytes))
-		return error_set(e, EDQUOT,
-				 "quota: its files have %.3f MB, those of other jobs %.3f MB, and %.3f MB is the most",
-				 1e-6 * (double)asset_bytes, 1e-6 * (double)has->asset_bytes,
-				 1e-6 * (double)q->asset_bytes);
+		return error_set(
+			e, EDQUOT, "quota: its files have %.3f MB, those of other jobs %.3f MB; the limit is %.3f MB",
+			1e-6 * (double)asset_bytes, 1e-6 * (double)has->asset_bytes, 1e-6 * (double)q->asset_bytes);
 	if (q->film_bytes && films > q->film_bytes)
 		return error_set(
 			e, EDQUOT,
@@ -30,11 +29,10 @@ int quota_check(const struct quota *q, const struct quota_use *has, const struct
 			1e-6 * (double)films, 1e-6 * (double)q->film_bytes);
 	if (q->mutations && p->rounds == UINT64_MAX)
 		return error_set(e, EDQUOT,
-				 "quota: at most %" PRIu64
-				 " mutations or samples a job; --spp or --mutations must say so",
+				 "quota: at most %" PRIu64 " mutations or samples per job; set --spp or --mutations",
 				 q->mutations);
 	if (q->mutations && mutations > q->mutations)
-		return error_set(e, EDQUOT, "quota: %" PRIu64 " mutations or samples, and %" PRIu64 " is the most",
-				 mutations, q->mutations);
+		return error_set(e, EDQUOT, "quota: %" PRIu64 " mutations or samples; the limit is %" PRIu64, mutations,
+				 q->mutations);
 	return 0;
 }

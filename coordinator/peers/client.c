@@ -95,8 +95,8 @@ static int fits(const struct session *p, struct error *e)
 	uint64_t bytes = canvas_bytes(&p->upload->plan), states = chain_states_max(&p->upload->plan);
 	if (states > p->jobs->config.state_bytes)
 		return error_set(e, ENOMEM,
-				 "the states of its %u chains could need %.3g MB of the coordinator's memory, and "
-				 "%.3g MB is the most: fewer --chains, or a smaller --max-depth",
+				 "the states of its %u chains could need %.3g MB of the coordinator's memory; the "
+				 "limit is %.3g MB: fewer --chains, or a smaller --max-depth",
 				 p->upload->plan.chains, 1e-6 * (double)states,
 				 1e-6 * (double)p->jobs->config.state_bytes);
 	for (size_t i = 0; i < m->n_files; i++)

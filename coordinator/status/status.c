@@ -230,7 +230,7 @@ static void subscribe(struct reader *r, const json_t *list)
 	if (known)
 		r->topics |= wanted;
 	else
-		send_answer(r, line_error("what can be subscribed to is jobs, workers, snapshot"));
+		send_answer(r, line_error("only jobs, workers and snapshot can be subscribed to"));
 }
 
 static void take_line(struct reader *r, size_t size)

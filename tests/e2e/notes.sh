@@ -79,8 +79,8 @@ grep -q -- '--json requires --estimate or --explain' "$DIR/err.log" || fail "--j
 # One group has no error: that is said, and nothing prints a number that is none.
 for one in "--integrator path --spp 1" "--integrator pssmlt --spp 16 --groups 1"; do
 	"$BIN/hslt-render" "$BOX" -o "$DIR/one.exr" --size 16x16 $one --stats "$DIR/one.json" 2>"$DIR/one.log" || fail "$one: ended with $?"
-	grep -q 'warning: relative error not known: one group of samples has no error; --spp 2' "$DIR/one.log" || fail "$one: $(cat "$DIR/one.log")"
-	grep -q '"relMSEDoubt": "one group of samples' "$DIR/one.json" || fail "$one: --stats gives no reason"
+	grep -q 'warning: relative error not known: a single group of samples gives no error; use --spp 2' "$DIR/one.log" || fail "$one: $(cat "$DIR/one.log")"
+	grep -q '"relMSEDoubt": "a single group of samples' "$DIR/one.json" || fail "$one: --stats gives no reason"
 	! grep -E '[^a-z]-?nan[^a-z"]' "$DIR/one.log" "$DIR/one.json" || fail "$one: prints nan"
 	grep -aq 'hslt:relMSEDoubt' "$DIR/one.exr" && ! grep -aqE 'hslt:(relMSE|relMSEUpper|bError).double' "$DIR/one.exr" ||
 		fail "$one: the header has an error, or no reason for none"
@@ -116,7 +116,7 @@ start_worker w1
 noted "$DIR/back.log" "$words"
 for kind in black stuck; do
 	[ $kind = black ] && options=$BLACK words='image is black: none of the 16,384 bootstrap samples' ||
-		options=$STUCK words='of 320 times a chain accepted nothing .*16 chains.*longest run: [0-9,]* rejections'
+		options=$STUCK words='of 320 chain epochs accepted nothing .*16 chains.*longest run: [0-9,]* rejections'
 	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $options --stats "$DIR/$kind.json" 2>"$DIR/render-$kind.log" ||
 		fail "hslt-render: $kind ended with $?"
 	noted "$DIR/render-$kind.log" "$words"

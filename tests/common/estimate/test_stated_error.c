@@ -361,7 +361,7 @@ static void words(void **state)
 	assert_string_equal(
 		text,
 		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose "
-		"brightness is not known well enough; no chain came to 7 of 100 pixels");
+		"brightness is not known well enough; no chain reached 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
 	img.unvisited = 0;
 	/* Rare light may leave the interval unknown for ever: a multiple of the estimate counts, once that is small. */
@@ -403,10 +403,10 @@ static void words(void **state)
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(
 		text,
-		"relative error not known: one group of samples has no error; --spp 2 or more, without --groups 1, gives it one");
+		"relative error not known: a single group of samples gives no error; use --spp 2 or more, and not --groups 1");
 	assert_false(stated_error_meets(&img, 10));
 	stated_b_doubt(&img, text, sizeof text);
-	assert_true(strncmp(text, "one group of samples has no error;", 34) == 0);
+	assert_true(strncmp(text, "a single group of samples gives no error;", 41) == 0);
 }
 
 /* ---- the floor */

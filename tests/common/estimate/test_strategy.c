@@ -211,8 +211,8 @@ static void tables_are_readable(void **state)
 	strategy_note(&p, &n, true, text, sizeof text);
 	assert_string_equal(
 		text,
-		"the image is black: no sample found light; 2,000 contributions were not numbers, infinite or negative, "
-		"and left out; 1 of 8 times a chain accepted nothing during a whole epoch (4 chains); longest run: "
+		"the image is black: no sample found light; 2,000 contributions were NaN, infinite or negative, and "
+		"were left out; 1 of 8 chain epochs accepted nothing (4 chains); longest run: "
 		"911 rejections");
 	strategy_add_beyond(0.0009, text, sizeof text); /* not worth a word */
 	assert_null(strstr(text, "missing"));
@@ -292,10 +292,11 @@ static void headers_say_it(void **state)
 	assert_non_null(strstr(attribute(&h, "hslt:strategies"), "hslt: proposed 900 accepted 460 "));
 	assert_string_equal(attribute(&h, "hslt:stuck"), "1");
 	assert_string_equal(attribute(&h, "hslt:longestStuck"), "911");
-	assert_non_null(strstr(attribute(&h, "hslt:note"), "1 of 1 times a chain accepted nothing"));
+	assert_non_null(strstr(attribute(&h, "hslt:note"), "1 of 1 chain epochs accepted nothing"));
 	img.counts.counters[COUNT_STATES_LOST] = 3;
 	header_fill(&h, &img, &p, &x);
-	assert_non_null(strstr(attribute(&h, "hslt:note"), "3 of 1 times a chain's state could not be read back"));
+	assert_non_null(
+		strstr(attribute(&h, "hslt:note"), "3 of 1 chain epochs ended in a state that could not be read back"));
 	img.counts.counters[COUNT_STUCK] = img.counts.counters[COUNT_STATES_LOST] = 0;
 	memset(p.mutations, 0, sizeof p.mutations);
 	header_fill(&h, &img, &p, &x);

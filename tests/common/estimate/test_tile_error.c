@@ -122,7 +122,7 @@ static void unvisited_pixels_are_counted(void **state)
 	for (uint32_t i = 0; i < 3 * PIXELS; i++)
 		assert_true(img.error[i] > 0);
 	stated_error(&img, text, sizeof text);
-	assert_non_null(strstr(text, "no chain came to 56 of 128 pixels"));
+	assert_non_null(strstr(text, "no chain reached 56 of 128 pixels"));
 	static struct header h;
 	header_fill(&h, &img, &p, &(struct header_extra){.scene = "test.xml", .date = ""});
 	bool counted = false, defined = false;

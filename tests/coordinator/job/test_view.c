@@ -51,7 +51,7 @@ static void json_shows_the_strategies(void **state)
 	assert_int_equal(whole(counts, "stuck"), 3);
 	assert_int_equal(whole(counts, "longestStuck"), 5210);
 	static const char note[] =
-		"3 of 2,048 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections; "
+		"3 of 2,048 chain epochs accepted nothing (1,024 chains); longest run: 5,210 rejections; "
 		"25 % of the light is missing: it comes by paths of more edges than are simulated (128; pssmlt: 32)";
 	assert_string_equal(json_string_value(json_object_get(o, "note")), note);
 	assert_string_equal(json_string_value(json_object_get(o, "mixture")), "independent=0.1,hslt=0.9");

@@ -183,7 +183,7 @@ static void chains_need_memory(void **state)
 	const Farm__SubmitAnswer *a = peer_submit_answer(p);
 	assert_true(a->job == 0 && a->n_missing == 0);
 	assert_non_null(strstr(a->refusal, "the states of its 8192 chains could need 44.4 MB"));
-	assert_non_null(strstr(a->refusal, "and 16.8 MB is the most: fewer --chains, or a smaller --max-depth"));
+	assert_non_null(strstr(a->refusal, "the limit is 16.8 MB: fewer --chains, or a smaller --max-depth"));
 	r.max_depth = 12; /* 1,776 bytes */
 	assert_true(scripted_submit(p, &r, "<scene/>"));
 	assert_string_equal(peer_submit_answer(p)->refusal, "");
