@@ -28,9 +28,9 @@ static const struct option_row rows[] = {
 	{"cache-size", 0, "GB", "Limit of the cache", OPTION_SCALED(CONFIG, cache_bytes, 0.001, 1e6, 1e9),
 	 .standard = "20"},
 	{"grace", 0, "SECONDS", "After SIGTERM", OPTION_SECONDS(CONFIG, grace_seconds, 0, 86400), .standard = "20"},
-	{"idle-exit", 0, "SECONDS", "Exit after so long without a lease; 0: never",
+	{"idle-exit", 0, "SECONDS", "Exit after this long without a lease; 0: never",
 	 OPTION_SECONDS(CONFIG, idle_seconds, 0, 1e7), .standard = "0"},
-	{"stall", 0, "SECONDS", "How long a lease or the building of a scene may make no progress; 0: forever",
+	{"stall", 0, "SECONDS", "How long a lease, or building a scene, may go without progress; 0: forever",
 	 OPTION_SECONDS(CONFIG, stall_seconds, 0, 86400), .standard = "120"},
 	{"tls", 0, "DIR", "ca.pem, cert.pem, key.pem, made by hslt-ca: encryption and authentication",
 	 OPTION_TEXT(CONFIG, tls), .environment = "HSLT_TLS"},
@@ -49,9 +49,9 @@ static const struct program program = {
 		   "results and exits; a second SIGTERM ends it at once. It reconnects forever, unless it is refused "
 		   "permanently; with --idle-exit it exits when there is no work. A lease without progress for --stall "
 		   "is returned as failed, as are leases that wait for a scene whose building makes no progress, "
-		   "and the worker exits, to be restarted. It renders in a process of its own: if a signal ends that "
-		   "(a fault caused by a scene, lack of memory), the lease is returned as failed and the process "
-		   "is restarted. Under systemd it reports when it is ready and feeds the watchdog.",
+		   "and the worker exits, to be restarted. Rendering runs in a separate process: if a signal ends it "
+		   "(a fault caused by a scene, lack of memory), the lease is returned as failed and the process is "
+		   "restarted. Under systemd it reports when it is ready and feeds the watchdog.",
 	.exits =
 		"0 stopped, 1 failed, 2 usage, 6 refused permanently (a certificate of another role, another version), "
 		"75 a thread hung",

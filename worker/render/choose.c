@@ -566,19 +566,19 @@ static const char *reason(const char *integrator, const struct render_choice *c)
 {
 	if (strcmp(integrator, "hslt") == 0)
 		return isinf(c->path.cost) ? "paths from the camera find next to no light; chains search for it longest"
-					   : "much of the light arrives by few, very bright paths, such as caustics; "
+					   : "much of the light, such as caustics, arrives by few, very bright paths; "
 					     "chains stay with those that they find";
 	if (strcmp(integrator, "path") == 0)
 		return "paths from the camera find the light evenly, and no surface focuses it";
 	if (strcmp(integrator, "bdpt8") == 0)
-		return "paths from the camera find the light evenly; as some surfaces may focus it, one sample in eight "
-		       "starts at the lamps, too, which keeps out most fireflies";
+		return "paths from the camera find the light evenly; as some surfaces may focus it, one sample in "
+		       "eight also starts at the lamps, which avoids most fireflies";
 	if (strcmp(integrator, "erpt4") == 0)
 		return c->misses
-			       ? "paths from the camera find the light evenly, but for a little that they cannot find; one "
-				 "sample in four starts at the lamps, too, and short chains spread what is too bright"
-			       : "paths from the camera find the light evenly; as some may be bright nevertheless, one "
-				 "sample in four starts at the lamps, too, and what is too bright for a sample is "
+			       ? "paths from the camera find the light evenly, except for a little that they cannot "
+				 "find; one sample in four also starts at the lamps, and short chains spread what is too bright"
+			       : "paths from the camera find the light evenly; as some contributions may still be "
+				 "very bright, one sample in four also starts at the lamps, and what is too bright for a sample is "
 				 "spread by short chains";
 	if (c->misses)
 		return "paths from the camera cannot find all light, such as that of a point light through glass";

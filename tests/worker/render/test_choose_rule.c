@@ -207,8 +207,10 @@ static void the_reason_is_a_sentence_without_figures(void **state)
 		const char *says;
 	} of[] = {
 		{"path", {.path = {1, 0, 4, 4, 0, 0}}, "find the light evenly, and no surface focuses it"},
-		{"bdpt8", {.path = {1, 0, 4, 4, 0, 0}, .focuses = true}, "one sample in eight starts at the lamps"},
-		{"erpt4", {.path = {1, 0, 1.2, 2, 0.3, 0}}, "one sample in four starts at the lamps"},
+		{"bdpt8",
+		 {.path = {1, 0, 4, 4, 0, 0}, .focuses = true},
+		 "one sample in eight also starts at the lamps"},
+		{"erpt4", {.path = {1, 0, 1.2, 2, 0.3, 0}}, "one sample in four also starts at the lamps"},
 		{"erpt4", {.path = {1, 0, 4, 4, 0, 0}, .misses = true}, "a little that they cannot find"},
 		{"erpt", {.path = {1, 0, 4, 4, 0, 0}}, "less noise in the same time"},
 		{"erpt", {.path = {1, 0, 1.5, 1.5, 1, 0}, .settled = true}, "leave fireflies"},

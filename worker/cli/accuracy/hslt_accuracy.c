@@ -42,7 +42,7 @@ static const struct option_row rows[] = {
 	 OPTION_COUNT(struct arguments, rounds, 2, ACCURACY_COSTS)},
 	{"threads", 0, "N", "Threads (one per processor)", OPTION_COUNT(struct arguments, threads, 1, 1024)},
 	{"parameters", 0, "LIST",
-	 "Only these, separated by commas: settings of --set (see --set help), max-depth, independent, "
+	 "Parameters to vary, separated by commas: settings of --set (see --set help), max-depth, independent, "
 	 "mixture, preset",
 	 OPTION_TEXT(struct arguments, accuracy)},
 	{"knobs", 0, "LIST", "The old name of --parameters", OPTION_TEXT(struct arguments, accuracy), .hidden = true},
@@ -76,11 +76,10 @@ static const struct program program = {
 	.examples = "hslt-accuracy room.xml -o room.html --size 160x90\n"
 		    "hslt-accuracy room.xml -o room.html --csv room.csv --size 160x90 --budget 60 --threads 8\n"
 		    "hslt-accuracy room.xml -o depth.html --parameters max-depth,tolerance --seconds 30",
-	.details =
-		"The report is one HTML file: error at equal time and at equal mutations, time a mutation, failed walks and bias of "
-		"every setting, and which of them lie on the Pareto front. Small films say as much as large ones and take less "
-		"memory.\n"
-		"If interrupted after each setting had a round, it reports what was rendered and exits with 1.",
+	.details = "The report is one HTML file: error at equal time and at equal mutations, time per mutation, failed "
+		   "walks and bias of every setting, and which settings lie on the Pareto front. A small film tells as "
+		   "much as a large one and takes less memory.\n"
+		   "If interrupted once every setting has had a round, it reports what was rendered and exits with 1.",
 	.exits = "0 done, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,

@@ -37,9 +37,9 @@ int option_image(const char *arg, const char **image, struct error *e)
 	*image = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
 	if (!format || strcmp(format, ".exr") == 0)
 		return 0;
-	return error_set(
-		e, EINVAL,
-		"images are OpenEXR, and '%s' would not be what its name says; hslt-tonemap makes a PNG of one", arg);
+	return error_set(e, EINVAL,
+			 "images are written as OpenEXR, which '%s' does not say; hslt-tonemap converts one to PNG",
+			 arg);
 }
 
 int option_path(const char *arg, const char **paths, size_t *count, struct error *e)
@@ -309,29 +309,30 @@ static const struct option_row what_rows[] = {
 	 "(" RENDER_INTEGRATOR_DEFAULT ": " RENDER_CHOICES_TEXT " or " RENDER_INTEGRATOR_CHAINS
 	 ", chosen by a short pilot); the scene's own is ignored",
 	 OPTION_TAKE(take_integrator), .values = integrator_name},
-	{"size", 0, "W[xH]", "Size of the film; keeps the angle of view. Without H it keeps the aspect",
+	{"size", 0, "W[xH]",
+	 "Size of the film in pixels, with the scene's field of view; without H also with its aspect ratio",
 	 OPTION_TAKE(take_size)},
 	{"crop", 0, "X,Y,W,H", "Render only this part of the film, in pixels", OPTION_TAKE(take_crop)},
 	{"seed", 0, "S", "Seed of all random numbers", OPTION_COUNT(RENDER, plan.seed, 0, DBL_MAX), .standard = "0"},
-	{"min-depth", 0, "K", "Shortest paths, in edges (1: emitters seen directly)",
+	{"min-depth", 0, "K", "Length of the shortest paths, in edges (1: emitters seen directly)",
 	 OPTION_COUNT(RENDER, plan.min_depth, 0, UINT32_MAX)},
-	{"max-depth", 0, "K", "Longest paths, in edges (the scene's)",
+	{"max-depth", 0, "K", "Length of the longest paths, in edges (the scene's)",
 	 OPTION_COUNT(RENDER, plan.max_depth, 0, UINT32_MAX)},
 	{"set", 0, "NAME=VALUE",
-	 "Settings that trade accuracy for time, separated by commas; may be repeated. help: lists them",
+	 "Settings that trade accuracy for time, separated by commas; may be repeated; --set help describes them",
 	 OPTION_TAKE(take_set), .more = more_settings},
 	{"effects", 0, "LIST",
 	 "Effects to simulate or omit, whether or not the scene needs them: all, or a list such as -dispersion,+aperture "
 	 "(hslt-render --explain shows them)",
 	 OPTION_TAKE(take_effects)},
-	{"define", 'D', "NAME=VALUE", "For $NAME in the scene", OPTION_TAKE(take_define)},
+	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(take_define)},
 	{"path", 0, "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
 	 OPTION_TAKE(take_path)},
 	{"sensor", 0, "N|ID",
-	 "Which of the scene's sensors: its number, from 1 on (1), or its id; the same as --set sensor=N",
+	 "Sensor of the scene to use: its number, counted from 1 (1), or its id; the same as --set sensor=N",
 	 OPTION_TAKE(take_sensor)},
 	{"lenient", 0, NULL,
-	 "Leave out or replace what is not supported, with a note each; the same as --set lenient=yes",
+	 "Leave out or replace what is not supported, with a note for each; the same as --set lenient=yes",
 	 OPTION_TAKE(take_lenient)},
 	{0},
 };
@@ -341,7 +342,7 @@ static const struct option_row when_rows[] = {
 	 OPTION_COUNT(RENDER, plan.spp, 1, DBL_MAX)},
 	{"mutations", 0, "N|LIST",
 	 "N: total number of mutations or samples. LIST: the strategies that propose mutations, with weights "
-	 "(1), such as hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once for each",
+	 "(1), such as hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once as each",
 	 OPTION_TAKE(take_mutations), .more = more_strategies},
 	{"time", 0, "SECONDS", "Wall-clock time (90, 5m, 2h), checked after complete rounds",
 	 OPTION_SECONDS(RENDER, plan.seconds, 0, 1e9), .above = true, .below = true},
@@ -353,7 +354,7 @@ static const struct option_row when_rows[] = {
 static const struct option_row plan_rows[] = {
 	{"chains", 0, "N", "Markov chains (1024, fewer for short jobs)",
 	 OPTION_COUNT(RENDER, plan.chains, 0, UINT32_MAX)},
-	{"groups", 0, "N", "Independent replicates, whose spread is the error (16)",
+	{"groups", 0, "N", "Independent replicates; their spread gives the error (16)",
 	 OPTION_COUNT(RENDER, plan.groups, 0, UINT32_MAX)},
 	{"parts", 0, "N", "Leases of a group in a round: at most groups times parts threads work on the job (4)",
 	 OPTION_COUNT(RENDER, plan.parts, 0, UINT32_MAX)},
@@ -367,7 +368,7 @@ static const struct option_row plan_rows[] = {
 
 static const struct option_group groups[] = {
 	{"What to render:", what_rows},
-	{"When to stop (the first bound met; without any, the scene's sampleCount):", when_rows},
+	{"When to stop (at the first bound reached; without any, at the scene's sampleCount):", when_rows},
 	{"The plan (affects the bits):", plan_rows},
 	{0},
 };

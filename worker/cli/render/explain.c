@@ -33,7 +33,7 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 	for (size_t i = 0; i < m->line_count; i++) {
 		const struct effect_line *l = &m->lines[i];
 		printf("%-13s %-12s  %s\n%27s %s: %s\n", l->name, state_of(l), l->why, "",
-		       l->on ? "without it" : "saves", l->saves);
+		       l->on ? "omitting it would save" : "saves", l->saves);
 	}
 	printf("\n%s, paths of at most %u edges", p->integrator, p->max_depth);
 	if (held_depth(p) < p->max_depth)

@@ -103,9 +103,9 @@ static const struct program program = {
 		"--estimate makes no image: a pilot of a minute predicts what errors of 10, 5, 2 and 1 % (and "
 		"--target-error) will cost.\nThe image contains linear Rec. 709 (R G B), one standard error of each "
 		"(error.R error.G error.B), and for chains the potential scale reduction of each pixel's tile (rhat.Y).",
-	.exits =
-		"0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
-		"note says where)",
+	.exits = "0 done, 1 failed, 2 usage, 4 another bound was reached before the target error, 5 chains disagree "
+		 "(the image is there, and its "
+		 "note says where)",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
 	.shared_offset = offsetof(struct arguments, render),

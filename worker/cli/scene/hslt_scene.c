@@ -28,12 +28,11 @@ static int take_path(void *target, char *arg, struct error *e)
 }
 
 static const struct option_row rows[] = {
-	{"define", 'D', "NAME=VALUE", "For $NAME in the scene", OPTION_TAKE(take_define)},
+	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(take_define)},
 	{"path", 'p', "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
 	 OPTION_TAKE(take_path)},
 	{"lenient", 'l', NULL,
-	 "As --lenient of hslt-render: what is not supported is left out or replaced, with a note instead "
-	 "of a problem",
+	 "Like --lenient of hslt-render: leave out or replace what is not supported, with a note instead of a problem",
 	 OPTION_FLAG(struct arguments, request.lenient)},
 	{"json", 'j', NULL, "show: one JSON object", OPTION_FLAG(struct arguments, json)},
 	{0},
@@ -74,10 +73,11 @@ static const struct program program = {
 	.examples = "hslt-scene check room.xml\n"
 		    "hslt-scene check -D light=sun room.xml\n"
 		    "hslt-scene show --json room.xml",
-	.details = "check: everything that is wrong or not supported, one line each with file, line and element, "
-		   "and as `note:` what is ignored.\nshow: film, camera, counts, the effects that the scene needs, "
-		   "and its files with the beginning of their SHA-256.\ncompatibility: what is supported of Mitsuba's "
-		   "scenes, all plug-ins and parameters, as in docs/compatibility.md.",
+	.details =
+		"check: a line with file, line and element for everything that is wrong or not supported, and a "
+		"`note:` for what is ignored.\nshow: film, camera, counts, the effects that the scene needs, "
+		"and its files with the first digits of their SHA-256.\ncompatibility: what is supported of Mitsuba's "
+		"scenes, all plug-ins and parameters, as in docs/compatibility.md.",
 	.exits = "0 the scene can be rendered, 1 it cannot, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.verbs = verb_at,

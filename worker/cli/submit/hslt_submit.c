@@ -118,7 +118,8 @@ static const struct program program = {
 		"this machine measures how many mutations a thread makes in the 20 s that a lease should take. --wait "
 		"reconnects when the coordinator restarts.",
 	.exits =
-		"0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
+		"0 done, 1 failed, 2 usage, 3 job failed, 4 another bound was reached before the target error, 5 "
+		"chains disagree (the image is "
 		"there, and its note says where), 6 refused, 75 coordinator not reachable, 130 interrupted while it waited "
 		"(the job continues)",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
@@ -240,7 +241,7 @@ static void measure(struct arguments *a, const struct scene_bundle *b)
 		return;
 	}
 	a->render.plan.speed = speed;
-	fprintf(stderr, "pilot: %.3g %s a second of one thread here\n", speed,
+	fprintf(stderr, "pilot: %.3g %s per second on one thread here\n", speed,
 		plan.kind == PLAN_CHAINS ? "mutations" : "samples");
 }
 

@@ -41,7 +41,7 @@ int emitter_create(struct emitter *em, const struct scene_node *n, const struct 
 	if (!ops)
 		return node_error(n, e, ENOTSUP, "\"%s\" is not an emitter that is supported", n->type);
 	if (ops->needs_surface && !build->surface)
-		return node_error(n, e, EINVAL, "\"%s\" must stand in a shape", n->type);
+		return node_error(n, e, EINVAL, "\"%s\" must be inside a shape", n->type);
 	if (!ops->needs_surface && build->surface)
 		return node_error(n, e, EINVAL, "\"%s\" cannot be inside a shape", n->type);
 	*em = (struct emitter){.ops = ops};

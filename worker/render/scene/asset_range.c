@@ -57,7 +57,7 @@ int asset_range_decode(struct asset_range *p, const char *name, struct error *e)
 	int64_t size = decode(p->bytes, p->size, p->decoded);
 	if (size < 0) {
 		mem_free(p->decoded);
-		return error_set(e, EINVAL, "%s: what is embedded there is not base64", name);
+		return error_set(e, EINVAL, "%s: the embedded data is not base64", name);
 	}
 	p->bytes = p->decoded;
 	p->size = (size_t)size;

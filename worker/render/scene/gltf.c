@@ -92,7 +92,7 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 	if (get32(p + 4) != 2)
 		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", get32(p + 4));
 	if (get32(p + 8) > g->size)
-		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, it has %zu", get32(p + 8), g->size);
+		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, but it has %zu", get32(p + 8), g->size);
 	size_t end = get32(p + 8), at = GLB_HEADER;
 	*size = 0;
 	for (int i = 0; at + GLB_CHUNK <= end; i++) {

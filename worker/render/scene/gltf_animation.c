@@ -57,8 +57,7 @@ static bool read_channel(struct animation *a, const json_t *json, struct channel
 	    json_object_get(c->output.json, "sparse")) {
 		gltf_note(
 			g,
-			"what an animation changes besides places and weights of nodes, or has in sparse accessors, is as "
-			"it stands in the file");
+			"animations of anything but the placement and weights of nodes, and those in sparse accessors, are ignored");
 		return false;
 	}
 	bool cubic = strcmp(gltf_text(g, NULL, sampler, "interpolation", ""), "CUBICSPLINE") == 0;
@@ -83,7 +82,7 @@ static json_t *first_values(struct gltf *g, const struct channel *c)
 	if (!copy || !values || json_object_set_new(copy, "count", json_integer((json_int_t)c->vectors)))
 		gltf_fail(g, &c->output, ENOMEM, "out of memory");
 	else if (gltf_whole(g, &c->output, c->output.json, "count", 0) < c->vectors)
-		gltf_fail(g, &c->output, EINVAL, "fewer values than its animation needs");
+		gltf_fail(g, &c->output, EINVAL, "fewer values than the animation needs");
 	else if (gltf_vectors_read(g, &part, "animation", c->components, &v)) {
 		for (uint64_t i = 0; i < c->count; i++)
 			if (json_array_append_new(values, json_real(v.x[c->skip + i])))
@@ -111,8 +110,8 @@ void gltf_animation_begin(struct gltf *g)
 			gltf_fail(g, &c.node, ENOMEM, "out of memory");
 	}
 	const char *name = json_string_value(json_object_get(first, "name"));
-	snprintf(text, sizeof text, "nothing moves: all is as the first animation%s%.64s%s begins", name ? ", `" : "",
-		 name ? name : "", name ? "`," : "");
+	snprintf(text, sizeof text, "nothing moves: everything is placed as the first animation%s%.64s%s begins",
+		 name ? ", `" : "", name ? name : "", name ? "`," : "");
 	if (json_array_size(channels))
 		gltf_note(g, text);
 }

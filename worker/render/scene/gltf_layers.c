@@ -53,16 +53,15 @@ static void put_index(struct gltf *g, struct xml_element *el, const struct gltf_
 	if (specular) {
 		factor = gltf_number(g, at, specular, "specularFactor", 1);
 		gltf_numbers(g, at, specular, "specularColorFactor", rgb, 3);
-		note_members(
-			g, specular, (const char *const[]){"specularTexture", NULL},
-			"the reflection of what is no metal is equally strong everywhere: specularTexture is left out");
+		note_members(g, specular, (const char *const[]){"specularTexture", NULL},
+			     "the specular strength of non-metals is the same everywhere: specularTexture is left out");
 	}
 	double most = fmax(fmax(rgb[0], fmax(rgb[1], rgb[2])), 0);
 	const json_t *texture = specular ? gltf_object(g, at, specular, "specularColorTexture") : NULL;
 	bool coloured = most > 0 && (texture || rgb[0] != rgb[1] || rgb[1] != rgb[2]);
 	if (transmission && gltf_number(g, at, transmission, "transmissionFactor", 0) > 0 &&
 	    (factor * most != 1 || coloured)) {
-		gltf_note(g, "KHR_materials_specular does not change what reflects from materials that transmit light");
+		gltf_note(g, "KHR_materials_specular is ignored for materials that transmit light");
 		factor = most = 1;
 		coloured = false;
 	}
@@ -88,7 +87,7 @@ static void put_coat(struct gltf *g, struct xml_element *el, const struct gltf_a
 	gltf_put_share(g, el, at, "coat_roughness", roughness,
 		       roughness > 0 ? gltf_object(g, at, coat, "clearcoatRoughnessTexture") : NULL, "g");
 	note_members(g, coat, (const char *const[]){"clearcoatNormalTexture", NULL},
-		     "the normals of clear coats are those of the surface: their textures are left out");
+		     "clear coats use the normals of the surface: their own normal maps are left out");
 }
 
 /* The format's sheen is of cloth (Estevez and Kulla 2017), Burley's of its edges. */
@@ -167,9 +166,10 @@ void gltf_note_foreign(struct gltf *g, const struct gltf_at *at)
 		char text[160];
 		if (gltf_knows(name) || is_listed(g, "extensionsUsed", name))
 			continue;
-		snprintf(text, sizeof text,
-			 "the extension %.64s of a material is not supported and ignored; `extensionsUsed` lacks it",
-			 name);
+		snprintf(
+			text, sizeof text,
+			"the extension %.64s of a material is not supported and ignored; it is not listed in `extensionsUsed`",
+			name);
 		gltf_note(g, text);
 	}
 }

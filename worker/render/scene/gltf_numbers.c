@@ -111,7 +111,7 @@ static const struct gltf_open *open_buffer(struct gltf *g, const struct gltf_ran
 	o->count = r->count;
 	g->read += o->part.file.size;
 	if (g->read > ASSET_KEEPER_BYTES_MAX)
-		gltf_fail(g, NULL, E2BIG, "its files are wanted again and again; %llu GB were read so far",
+		gltf_fail(g, NULL, E2BIG, "its files are requested again and again; %llu GB were read so far",
 			  (unsigned long long)g->read >> 30);
 	return !g->failed && list_file(g, r->file) ? o : NULL;
 }

@@ -121,10 +121,9 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 {
 	mat4 to_world = node_transform(n, "to_world");
 	if (strcmp(n->type, "envmap") == 0 && !mat4_keeps_angles(&to_world))
-		return remark(
-			r, n, e,
-			"its to_world stretches the image; Mitsuba, which takes the vectors that come of it for unit "
-			"vectors, shows it distorted otherwise");
+		return remark(r, n, e,
+			      "its to_world stretches the image; Mitsuba distorts it differently, because it does not "
+			      "normalize the transformed directions");
 	bool sun = strcmp(n->type, "sun") == 0;
 	if (!dialect_3 && (sun || strcmp(n->type, "sky") == 0) &&
 	    (node_find(n, "sun_scale") || node_find(n, "sky_scale")))
@@ -147,7 +146,7 @@ static int on_metal(struct report *r, const struct scene_node *n, struct error *
 	const char *name = node_string(n, "material", ""), *end = strstr(name, "_palik");
 	for (size_t i = 0; i < sizeof doubled / sizeof *doubled && end; i++)
 		if (strlen(doubled[i]) == (size_t)(end - name) && strncmp(doubled[i], name, (size_t)(end - name)) == 0)
-			return remark(r, n, e, "the indices of %s stand for those of %.32s", doubled[i], name);
+			return remark(r, n, e, "the indices of %s are used for %.32s", doubled[i], name);
 	return 0;
 }
 

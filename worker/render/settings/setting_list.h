@@ -13,28 +13,27 @@ SETTING(reverse_tolerance, "reverse-tolerance", SETTING_REAL, SETTING_CHAINS, 1e
 	"How close to its start the reverse walk must end, relative to the largest step of a vertex", "0.1", "0.01",
 	"0.001", "0.0001", "1e-06")
 SETTING(precision, "precision", SETTING_CHOICE, SETTING_CHAINS, SETTING_DOUBLE, SETTING_DOUBLE, SETTING_SINGLE,
-	"double single", "Of the matrices that walks and densities of half vectors solve; positions are double",
-	"double", "single")
+	"double single",
+	"Precision of the matrices that walks and densities of half vectors solve; positions are double", "double",
+	"single")
 SETTING(step_scale, "step-scale", SETTING_REAL, SETTING_CHAINS, 1, 1e-3, 1000, NULL,
-	"Factor of the largest step of a half vector, which is a lobe's mean slope", "0.1", "0.25", "0.5", "1", "2",
-	"4")
+	"Scales the largest step of a half vector; 1: a lobe's mean slope", "0.1", "0.25", "0.5", "1", "2", "4")
 SETTING(wavelengths, "wavelengths", SETTING_CHOICE, SETTING_PATHS, 4, 1, 4, "1 2 4",
-	"Wavelengths that travel together along a path where nothing disperses", "1", "2", "4")
+	"Wavelengths carried along each path where nothing disperses", "1", "2", "4")
 SETTING(roughness, "roughness", SETTING_REAL, SETTING_WORLD, 0, 0, 1, NULL,
-	"Rough metal and glass of less roughness is taken for smooth", "0", "0.001", "0.003", "0.01", "0.03", "0.1")
+	"Rough metal and glass below this roughness become smooth", "0", "0.001", "0.003", "0.01", "0.03", "0.1")
 SETTING(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, NULL,
-	"Factor of the parts into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
+	"Scales the number of pieces into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
 SETTING(colour, "colour", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "spectral rgb",
 	"Light and colours are spectra, or R, G and B as in most renderers: then nothing disperses", NULL)
 SETTING(backs, "backs", SETTING_CHOICE, SETTING_WORLD, SETTING_BACKS_AUTO, SETTING_BACKS_AUTO, SETTING_BACKS_BLACK,
 	"auto lit black",
-	"Backs of opaque materials without twosided scatter light as their fronts do, or none; auto: none in files of 3.x",
+	"Whether backs of opaque materials without twosided scatter light as fronts do, or are black; auto: black in files of 3.x",
 	NULL)
 SETTING(media, "media", SETTING_CHOICE, SETTING_WORLD, SETTING_MEDIA_AUTO, SETTING_MEDIA_AUTO, SETTING_MEDIA_NONE,
 	"auto shown none",
-	"Media are shown, or left out; auto: left out where the scene's own integrator leaves them out, such as path",
-	NULL)
+	"Whether media are shown; auto: not where the scene's own integrator leaves them out, such as path", NULL)
 SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
-	"What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)
+	"Whether unsupported features are left out or replaced by what is nearest, with a note for each", NULL)
 SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000, NULL,
-	"Which of the scene's sensors is rendered, from 1 on", NULL)
+	"Which of the scene's sensors is used, counted from 1", NULL)

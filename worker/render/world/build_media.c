@@ -30,7 +30,8 @@ static int light_media(struct builder *b, const struct scene_node **lights)
 		if (!n || !emitter_is_in_medium(n) || (medium && lights[medium - 1] == n))
 			continue;
 		if (!medium)
-			rc = node_error(n, b->e, EINVAL, "\"%s\" must stand in a shape with a medium inside", n->type);
+			rc = node_error(n, b->e, EINVAL, "\"%s\" must be inside a shape that has a medium inside",
+					n->type);
 		else if (lights[medium - 1])
 			rc = node_error(n, b->e, EINVAL, "a medium may shine by one \"%s\" only", n->type);
 		else
@@ -100,11 +101,10 @@ void build_media_note(struct builder *b)
 		return;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		if (w->emitters[i].infinite) {
-			snprintf(
-				w->notes.endless, sizeof w->notes.endless,
-				"the medium around the camera ends nowhere, so that no light of the `%s` emitter, or of "
-				"any other at infinity, gets through; a shape that has it inside would end it",
-				w->emitters[i].ops->decl.type);
+			snprintf(w->notes.endless, sizeof w->notes.endless,
+				 "the medium around the camera has no end, so no light from the `%s` emitter, or any "
+				 "other at infinity, gets through; put it inside a shape to end it",
+				 w->emitters[i].ops->decl.type);
 			return;
 		}
 }

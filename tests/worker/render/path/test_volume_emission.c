@@ -444,9 +444,9 @@ static void test_ball(void **state)
 static void test_refused(void **state)
 {
 	(void)state;
-	world_refused("<emitter type='volumelight'/>", "\"volumelight\" must stand in a shape");
-	world_refused(BALL(SHINES("1")), "\"volumelight\" must stand in a shape with a medium inside");
-	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" SHINES("1")), "with a medium inside");
+	world_refused("<emitter type='volumelight'/>", "\"volumelight\" must be inside a shape");
+	world_refused(BALL(SHINES("1")), "\"volumelight\" must be inside a shape that has a medium inside");
+	world_refused(BALL("<medium type='homogeneous' name='exterior'/>" SHINES("1")), "that has a medium inside");
 	world_refused(BALL(FOG("1", "0") SHINES("1")) BALL("<ref name='interior' id='fog'/>" SHINES("2")),
 		      "a medium may shine by one \"volumelight\" only");
 	world_refused(BALL(FOG("1", "0") SHINES("-1")), "radiance");

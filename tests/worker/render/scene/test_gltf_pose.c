@@ -399,7 +399,7 @@ static void animation(void **state)
 	assert_triangle(w, 0, (vec3){7, 7, 8}, 2);
 	world_free(w);
 	finish(ANIMATED(ALL_CHANNELS, PLACE TURN_OF("") SIZE WEIGHTS_OF("1")));
-	refuses("accessors[6]: fewer values than its animation needs");
+	refuses("accessors[6]: fewer values than the animation needs");
 	finish(ANIMATED(CHANNEL("0", "rotation"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
 	refuses("accessors[3]: of a type that animation cannot have");
 	finish(ANIMATED(CHANNEL("9", "scale"), PLACE TURN_OF("") SIZE WEIGHTS_OF("4")));
@@ -494,7 +494,7 @@ static void by_turns_for_ever(void **state)
 	inner = memory_assets(list);
 	opened = 0;
 	assert_int_equal(scene_read(&s, &assets, "s.gltf", render_plugins(), NULL, 0, &e), -E2BIG);
-	assert_non_null(strstr(e.text, "its files are wanted again and again; 300 GB were read so far"));
+	assert_non_null(strstr(e.text, "its files are requested again and again; 300 GB were read so far"));
 	assert_int_equal(opened, 6);
 }
 

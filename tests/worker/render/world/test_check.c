@@ -103,7 +103,7 @@ static void test_second_tables(void **state)
 	assert_int_equal(c.found.problem_count, 0);
 	assert_int_equal(c.scene.note_count, 1);
 	assert_string_equal(c.scene.notes[0],
-			    "s.xml:2: <bsdf type=\"conductor\">: the indices of Cu stand for those of Cu_palik");
+			    "s.xml:2: <bsdf type=\"conductor\">: the indices of Cu are used for Cu_palik");
 	finish(&c);
 }
 

@@ -70,7 +70,7 @@ static bool is_noted(const struct world *w)
 	bool noted = false;
 	world_summary(w, &summary);
 	for (size_t i = 0; render_scene_note(&summary, i, sentence, sizeof sentence); i++)
-		noted |= strstr(sentence, "the medium around the camera ends nowhere") != NULL;
+		noted |= strstr(sentence, "the medium around the camera has no end") != NULL;
 	return noted;
 }
 
