@@ -120,7 +120,7 @@ static int open_output(void)
 }
 
 /* false: dropped. *before: lines that were dropped before this one was written. */
-static bool put(const char *line, size_t size, uint64_t *before)
+static bool write_out(const char *line, size_t size, uint64_t *before)
 {
 	pthread_mutex_lock(&output_lock);
 	if (output < 0)
@@ -154,10 +154,10 @@ static void write_line(const char *line, size_t size)
 {
 	char more[160];
 	uint64_t before, none;
-	if (!put(line, size, &before) || !before)
+	if (!write_out(line, size, &before) || !before)
 		return;
 	size_t n = print_dropped(more, sizeof more, before);
-	if (!put(more, n, &none))
+	if (!write_out(more, n, &none))
 		put_back(before - 1); /* this line was counted, and is not one that anybody misses */
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * fit() fits a level, a trend and their uncertainty to the estimates of the error so far (looks) by generalized least
- * squares. play_of() and play_target() draw possible renders from that fit and simulate each until it would stop;
+ * squares. scenario_of() and simulate() draw possible renders from that fit and simulate each until it would stop;
  * costs() sorts their costs. The random numbers have constant seeds, so equal looks give equal forecasts everywhere.
  *
  * Without looks, or without one whose interval is known, there is no forecast (false). Costs that no simulated render
@@ -263,18 +263,18 @@ static double normal(struct dice *d)
 	return r * cos(6.283185307179586 * uniform(d));
 }
 
-struct play { /* one possible state of affairs */
+struct scenario { /* one possible state of affairs */
 	double level, trend, memory, drift, margin, now, cpu, wall;
 	double rare, seen; /* standard normal: how rare its light is; by the last look, apart from that */
 };
 
-static struct play play_of(const struct fit *f, struct dice *d)
+static struct scenario scenario_of(const struct fit *f, struct dice *d)
 {
 	double a = normal(d), b = normal(d);
 	double trend = f->trend + f->trend_sd * a;
 	double level =
 		f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
-	struct play y = {.level = level, .trend = trend, .now = f->now + (f->level - level) / f->spread};
+	struct scenario y = {.level = level, .trend = trend, .now = f->now + (f->level - level) / f->spread};
 	/* One after the other: the order in which an initializer is evaluated is the compiler's. */
 	y.margin = fmax(0, f->margin + f->margin_sd * normal(d));
 	y.memory = memory * exp(memory_sd * normal(d));
@@ -287,13 +287,13 @@ static struct play play_of(const struct fit *f, struct dice *d)
 }
 
 /* Half of what decides whether a look is in doubt lasts, and half changes as fast as the look's deviation does. */
-static bool is_in_doubt(const struct fit *f, const struct play *y)
+static bool is_in_doubt(const struct fit *f, const struct scenario *y)
 {
 	return 0.5 * erfc(0.5 * (y->rare + y->seen)) < f->doubt;
 }
 
 /* Of a render whose last look was in doubt, or not. */
-static void condition(const struct fit *f, struct play *y, bool doubt, struct dice *d)
+static void condition(const struct fit *f, struct scenario *y, bool doubt, struct dice *d)
 {
 	for (int i = 0; i < TRIES_MOST && is_in_doubt(f, y) != doubt; i++) {
 		y->rare = normal(d);
@@ -302,7 +302,7 @@ static void condition(const struct fit *f, struct play *y, bool doubt, struct di
 }
 
 /* How much log(relMSE x work) changes over t e-folds of work. */
-static double change(const struct fit *f, const struct play *y, double t)
+static double change(const struct fit *f, const struct scenario *y, double t)
 {
 	if (t < 0)
 		return y->trend * fmax(-f->seen, t);
@@ -310,15 +310,15 @@ static double change(const struct fit *f, const struct play *y, double t)
 }
 
 /* The expected log(relMSE) at some work. */
-static double expected(const struct fit *f, const struct play *y, double work)
+static double expected(const struct fit *f, const struct scenario *y, double work)
 {
 	return y->level + change(f, y, log(work / f->work)) - log(work);
 }
 
 /* The number of rounds at which it stops. rare_stop: the estimate at which it does in doubt; 0: it is never in doubt.
  */
-static double play_target(const struct fit *f, struct play *y, const struct plan *p, double target, double rare_stop,
-			  enum forecast_run run, struct dice *d)
+static double simulate(const struct fit *f, struct scenario *y, const struct plan *p, double target, double rare_stop,
+		       enum forecast_run run, struct dice *d)
 {
 	double round = (double)plan_round_mutations(p);
 	double before = run == FORECAST_SAME ? f->work : 0, deviation = run == FORECAST_SAME ? y->now : 0;
@@ -360,7 +360,7 @@ bool forecast_error_at(const struct forecast_history *h, double work, struct for
 	struct dice d = {3};
 	double x[PLAYS];
 	for (int i = 0; i < PLAYS; i++) {
-		struct play y = play_of(&f, &d);
+		struct scenario y = scenario_of(&f, &d);
 		x[i] = exp(0.5 * expected(&f, &y, work));
 	}
 	*error = range_of(x);
@@ -408,10 +408,10 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	bool same = run == FORECAST_SAME;
 	double rare_stop = rare_stop_of(h, p, target);
 	for (int i = 0; i < PLAYS; i++) {
-		struct play y = play_of(&f, &d);
+		struct scenario y = scenario_of(&f, &d);
 		if (same)
 			condition(&f, &y, in_doubt(end), &d);
-		s.rounds[i] = play_target(&f, &y, p, target, rare_stop, run, &d);
+		s.rounds[i] = simulate(&f, &y, p, target, rare_stop, run, &d);
 		s.work[i] = s.rounds[i] * round;
 		double more = s.work[i] - (same ? end->work : 0);
 		s.cpu[i] = (same ? end->cpu_seconds : 0) + more * y.cpu;
@@ -422,7 +422,7 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 }
 
 /* e-folds of work that quarter relMSE. */
-static double quartering(const struct fit *f, const struct play *y)
+static double quartering(const struct fit *f, const struct scenario *y)
 {
 	double low = 0, high = 16;
 	for (int i = 0; i < 40; i++) {
@@ -440,7 +440,7 @@ bool forecast_halving(const struct forecast_history *h, const struct plan *p, st
 	struct dice d = {2};
 	struct plays s;
 	for (int i = 0; i < PLAYS; i++) {
-		struct play y = play_of(&f, &d);
+		struct scenario y = scenario_of(&f, &d);
 		s.work[i] = f.work * (exp(quartering(&f, &y)) - 1);
 		s.rounds[i] = s.work[i] / (double)plan_round_mutations(p);
 		s.cpu[i] = s.work[i] * y.cpu;

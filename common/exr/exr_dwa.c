@@ -36,7 +36,7 @@ static int refused(struct error *e)
 	return error_set(e, EBADMSG, "OpenEXR: %.200s", ImfErrorMessage());
 }
 
-static bool has(const struct exr_image *img, const char *name)
+static bool has_channel(const struct exr_image *img, const char *name)
 {
 	return exr_channel(img, name) < EXR_CHANNELS_MOST;
 }
@@ -45,8 +45,8 @@ static bool has(const struct exr_image *img, const char *name)
 static int choose_channels(struct exr_image *img, struct error *e)
 {
 	static const char *const rgb[3] = {"R", "G", "B"};
-	bool colour = has(img, "R") && has(img, "G") && has(img, "B");
-	if (!colour && !has(img, "Y"))
+	bool colour = has_channel(img, "R") && has_channel(img, "G") && has_channel(img, "B");
+	if (!colour && !has_channel(img, "Y"))
 		return error_set(e, ENOTSUP, "compressed by DWA, without channels R, G and B, or Y");
 	img->channel_count = colour ? 3 : 1;
 	for (uint32_t c = 0; c < img->channel_count; c++) {

@@ -8,7 +8,7 @@ static int64_t bucket_at(double now)
 	return (int64_t)floor(now / RATE_WIDTH);
 }
 
-static int place(int64_t index)
+static int slot_of(int64_t index)
 {
 	return (int)((index % RATE_BUCKETS + RATE_BUCKETS) % RATE_BUCKETS);
 }
@@ -25,7 +25,7 @@ void rate_init(struct rate *r, double now)
 void rate_add(struct rate *r, double now, double amount)
 {
 	int64_t index = bucket_at(now);
-	int i = place(index);
+	int i = slot_of(index);
 	if (r->index[i] != index) {
 		r->index[i] = index;
 		r->sum[i] = 0;
@@ -38,7 +38,7 @@ double rate_value(const struct rate *r, double now)
 	int64_t last = bucket_at(now);
 	double sum = 0;
 	for (int64_t index = last - RATE_BUCKETS + 1; index <= last; index++) {
-		int i = place(index);
+		int i = slot_of(index);
 		if (r->index[i] == index)
 			sum += r->sum[i];
 	}

@@ -276,7 +276,7 @@ const struct waiting_batch *live_job_waits_for(const struct live_job *job, const
 	return w;
 }
 
-static struct waiting_batch *take(struct live_job *job, struct waiting_batch *w)
+static struct waiting_batch *remove_waiting(struct live_job *job, struct waiting_batch *w)
 {
 	if (!w)
 		return NULL;
@@ -291,13 +291,13 @@ void live_jobs_drop_waiting(struct live_job *first, uint64_t peer)
 		for (struct waiting_batch *w = STAILQ_FIRST(&job->waiting), *next; w; w = next) {
 			next = STAILQ_NEXT(w, next);
 			if (w->peer == peer)
-				waiting_batch_free(take(job, w));
+				waiting_batch_free(remove_waiting(job, w));
 		}
 }
 
 struct waiting_batch *live_job_take_waiting(struct live_job *job)
 {
-	return take(job, STAILQ_FIRST(&job->waiting));
+	return remove_waiting(job, STAILQ_FIRST(&job->waiting));
 }
 
 static bool is_failure(const struct waiting_batch *w)
@@ -311,7 +311,7 @@ struct waiting_batch *live_job_take_failure(struct live_job *job, uint64_t peer)
 	struct waiting_batch *w = STAILQ_FIRST(&job->waiting);
 	while (w && (w->peer != peer || !is_failure(w)))
 		w = STAILQ_NEXT(w, next);
-	return take(job, w);
+	return remove_waiting(job, w);
 }
 
 void waiting_batch_free(struct waiting_batch *w)

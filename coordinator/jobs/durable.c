@@ -4,7 +4,7 @@
  *
  * Results: durable_reserve makes room in the journal and the films before the core sees a result, so merging it cannot
  * fail for lack of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next syncs the
- * journals of all queued ones in the thread pool (group commit), and done() sends them.
+ * journals of all queued ones in the thread pool (group commit), and journals_flushed sends them.
  *
  * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements are
  * parked, and durable_mend tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job

@@ -169,7 +169,7 @@ static void add_workers(const struct snapshot *n, json_t *o)
 	json_object_set_new(o, "leases", leases);
 }
 
-static json_t *begin(const struct snapshot *n, const char *type)
+static json_t *begin_object(const struct snapshot *n, const char *type)
 {
 	json_t *o = line_object(type);
 	json_object_set_new(o, "time", json_real(n->wall));
@@ -178,14 +178,14 @@ static json_t *begin(const struct snapshot *n, const char *type)
 
 json_t *snapshot_workers_to_json(const struct snapshot *n)
 {
-	json_t *o = begin(n, "workers");
+	json_t *o = begin_object(n, "workers");
 	add_workers(n, o);
 	return o;
 }
 
 json_t *snapshot_to_json(const struct snapshot *n)
 {
-	json_t *o = begin(n, "snapshot"), *list = json_array();
+	json_t *o = begin_object(n, "snapshot"), *list = json_array();
 	for (size_t i = 0; i < n->job_count; i++)
 		json_array_append_new(list, view_to_json(&n->jobs[i], !record_is_ended(&n->jobs[i].record)));
 	json_object_set_new(o, "jobs", list);

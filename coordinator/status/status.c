@@ -467,7 +467,7 @@ static int remove_stale(const char *path, const struct sockaddr_un *a, struct er
 }
 
 /* Through a descriptor of the file that we created: the name may refer to another one by now. */
-static int share(const char *path, gid_t group, struct error *e)
+static int give_to_group(const char *path, gid_t group, struct error *e)
 {
 	char itself[64];
 	struct stat st;
@@ -521,7 +521,7 @@ static int open_socket(struct status_socket *t, const char *group, struct error 
 		t->inode = st.st_ino;
 	}
 	if (!rc && group)
-		rc = share(t->path, gid, e);
+		rc = give_to_group(t->path, gid, e);
 	int fault = rc ? 0 : uv_pipe_open(&t->listener, fd);
 	if (fault)
 		rc = error_set(e, -fault, "%s: %s", t->path, uv_strerror(fault));

@@ -63,7 +63,7 @@ static void log_repair(const struct ledger_job *j, const char *what)
 	log_event(LOG_SPOOL_FAULT, "job=j%llu text=\"its row in %s\"", (unsigned long long)j->id, what);
 }
 
-static int put(struct ledger_side *s, const struct ledger_job *j, struct error *e)
+static int write_row(struct ledger_side *s, const struct ledger_job *j, struct error *e)
 {
 	int rc = ledger_side_bind(s, j, e);
 	return rc ? rc : ledger_side_put(s, e);
@@ -77,13 +77,13 @@ static int merge_row(struct ledger *l, const struct ledger_job *a, const struct 
 		log_repair(b, !a      ? "jobs.db was lost: restored from jobs-copy.db"
 			      : use_a ? "jobs.db was older than in jobs-copy.db: restored from there"
 				      : "jobs.db was damaged: restored from jobs-copy.db");
-		return put(&l->jobs, b, e);
+		return write_row(&l->jobs, b, e);
 	}
 	if (!use_a || (use_b && a->revision == b->revision))
 		return 0;
 	if (b && !use_b)
 		log_repair(a, "jobs-copy.db was damaged: restored from jobs.db");
-	return put(&l->copy, a, e);
+	return write_row(&l->copy, a, e);
 }
 
 static int merge_rows(struct ledger *l, struct error *e)
@@ -354,7 +354,7 @@ static int add_to(struct ledger *l, struct ledger_side *s, const struct ledger_j
 	if (!rc)
 		rc = ledger_side_set(s, next_job, next, e);
 	if (!rc)
-		rc = put(s, j, e);
+		rc = write_row(s, j, e);
 	return conclude(l, rc, e);
 }
 

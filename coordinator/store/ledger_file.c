@@ -67,7 +67,7 @@ int ledger_file_attach(sqlite3 *db, const char *path, const char *schema, struct
 }
 
 /* The first column of the first row, as text. */
-static int ask(sqlite3 *db, const char *sql, char *text, size_t size, struct error *e)
+static int query_text(sqlite3 *db, const char *sql, char *text, size_t size, struct error *e)
 {
 	sqlite3_stmt *s = NULL;
 	int rc = sqlite3_prepare_v2(db, sql, -1, &s, NULL) == SQLITE_OK && sqlite3_step(s) == SQLITE_ROW
@@ -83,7 +83,7 @@ static int migrate(sqlite3 *db, struct error *e)
 {
 	char text[32], done[64];
 	long version = 0;
-	int rc = ask(db, "PRAGMA user_version", text, sizeof text, e);
+	int rc = query_text(db, "PRAGMA user_version", text, sizeof text, e);
 	if (!rc)
 		version = strtol(text, NULL, 10);
 	if (rc || version == VERSION)
@@ -111,7 +111,7 @@ int ledger_file_prepare(const char *path, struct error *e)
 	if (!rc)
 		rc = migrate(db, e);
 	if (!rc)
-		rc = ask(db, "PRAGMA integrity_check(1)", text, sizeof text, e);
+		rc = query_text(db, "PRAGMA integrity_check(1)", text, sizeof text, e);
 	if (!rc && strcmp(text, "ok") != 0)
 		rc = error_set(e, EBADMSG, "the database of jobs is damaged: %s", text);
 	sqlite3_close(db);

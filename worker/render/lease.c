@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * check() asks whether plan, key and input fit, prepare() takes all memory that the lease needs, run() draws samples or
+ * check asks whether plan, key and input fit, prepare takes all memory that the lease needs, run_job draws samples or
  * walks chains into the film of the lease (film/sums.h), whose touched tiles are the batch. Samples are numbered by
  * pixel and round, chains by their index, so that any thread on any machine draws the same random numbers.
  *

@@ -142,7 +142,7 @@ static int start(struct accuracy_run *r, size_t i, struct error *e)
 }
 
 /* A round of job i. Its cost is the CPU time of its leases. */
-static int step(struct accuracy_run *r, size_t i, struct error *e)
+static int run_round(struct accuracy_run *r, size_t i, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[i];
 	bool fits;
@@ -195,7 +195,7 @@ static int rounds(struct accuracy_run *r, double begin, struct error *e)
 			return 0;
 		show(r, fmin(wanted > 0 ? had(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1), 1),
 		     "rendering");
-		int rc = step(r, i, e);
+		int rc = run_round(r, i, e);
 		if (rc)
 			return rc;
 	}
@@ -223,7 +223,7 @@ static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 	if (!rc)
 		rc = start(r, ACCURACY_DEFAULT, e);
 	if (!rc && !stopped(r))
-		rc = step(r, ACCURACY_DEFAULT, e);
+		rc = run_round(r, ACCURACY_DEFAULT, e);
 	if (!rc && j->cost_count > 0) {
 		pilot->bootstrap_sample = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
 		pilot->mutation = fmax(j->cost[0], 1e-9);

@@ -283,7 +283,7 @@ static int resume(void *user, struct bootstrap *b, struct error *e)
 	return 0;
 }
 
-static void keep(void *user, const struct bootstrap *b)
+static void keep_bootstrap(void *user, const struct bootstrap *b)
 {
 	struct session *s = user;
 	kept_bootstrap_write(&s->kept, b);
@@ -298,7 +298,7 @@ static int render(struct session *s, struct error *e)
 				    .progress = s->a->quiet ? NULL : show,
 				    .round = on_round,
 				    .resume = resume,
-				    .keep = keep,
+				    .keep = keep_bootstrap,
 				    .user = s};
 	if (!s->a->quiet)
 		progress_start(&s->progress);

@@ -57,7 +57,7 @@ static int find(const struct input *in, const char *name, enum tensor_type type,
 	return 0;
 }
 
-static double number(const struct tensor *t, uint64_t i)
+static double value_at(const struct tensor *t, uint64_t i)
 {
 	return (double)get_float(t->bytes + 4 * i);
 }
@@ -66,7 +66,7 @@ static int check_finite(const struct input *in, const struct tensor *t, const ch
 {
 	for (uint64_t i = 0; i < t->count; i++) {
 		/* By its bits: NaNs that signal must not be compared. */
-		if ((get32(t->bytes + 4 * i) & EXPONENT) == EXPONENT || fabs(number(t, i)) > NUMBER_MAX)
+		if ((get32(t->bytes + 4 * i) & EXPONENT) == EXPONENT || fabs(value_at(t, i)) > NUMBER_MAX)
 			return fault(in, EINVAL, name, "has a number beyond 1e30, or one that is not finite");
 		if (i % SIDE_MAX == 0)
 			tick();
@@ -82,7 +82,7 @@ static int numbers(const struct input *in, const struct tensor *t, const char *n
 	if (rc || !*out)
 		return rc ? rc : fault(in, ENOMEM, name, "does not fit into memory");
 	for (uint64_t i = 0; i < t->count; i++)
-		(*out)[i] = number(t, i);
+		(*out)[i] = value_at(t, i);
 	return 0;
 }
 
@@ -207,7 +207,7 @@ static int read_rgb(const struct input *in, struct measured *m, const struct ten
 	for (size_t s = 0; s < slices; s++)
 		for (size_t i = 0; i < nodes; i++)
 			for (size_t c = 0; c < 3; c++)
-				rgb[3 * (s * nodes + i) + c] = (float)number(t, (3 * s + c) * nodes + i);
+				rgb[3 * (s * nodes + i) + c] = (float)value_at(t, (3 * s + c) * nodes + i);
 	m->rgb = rgb;
 	return 0;
 }
@@ -234,7 +234,7 @@ static int read_spectra(const struct input *in, struct measured *m, const struct
 		for (size_t i = 0; i < nodes; i++) {
 			double sum[3] = {0, 0, 0};
 			for (size_t k = 0; k < all; k++) {
-				double x = number(t, (s * all + k) * nodes + i);
+				double x = value_at(t, (s * all + k) * nodes + i);
 				for (int c = 0; c < 3; c++)
 					sum[c] += weight[k][c] * x;
 				if (k >= first && k < first + m->count)

@@ -69,7 +69,7 @@ static double principled_share_at(const struct texture *t, const struct bsdf_poi
 }
 
 /* All but colours. */
-static void read_numbers(const struct principled *p, const struct bsdf_point *at, struct stuff *s)
+static void read_numbers(const struct principled *p, const struct bsdf_point *at, struct principled_point *s)
 {
 	s->roughness = principled_share_at(&p->roughness, at);
 	s->metallic = principled_share_at(&p->metallic, at);
@@ -94,13 +94,13 @@ void principled_know(struct principled *p, const struct bsdf_build *build)
 	p->varies = !is_number(&p->roughness) || !is_number(&p->metallic);
 	for (int i = 0; i < SHARES; i++)
 		p->varies |= p->share[i].ops != NULL;
-	p->known = (struct stuff){.p = p};
+	p->known = (struct principled_point){.p = p};
 	read_numbers(p, &at, &p->known);
 }
 
-struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at)
+struct principled_point principled_at(const struct principled *p, const struct bsdf_point *at)
 {
-	struct stuff s = p->known;
+	struct principled_point s = p->known;
 	s.base = texture_eval(&p->base, &at->where, at->w);
 	if (p->varies)
 		read_numbers(p, at, &s);
@@ -116,7 +116,7 @@ static double schlick(double cosine)
 	return x * x * x * x * x;
 }
 
-spectrum principled_boundary(const struct stuff *s, double cosine)
+spectrum principled_boundary(const struct principled_point *s, double cosine)
 {
 	const struct principled *p = s->p;
 	double rest = schlick(cosine), root = (p->eta - 1) / (p->eta + 1), tint = s->share[SPEC_TINT];
@@ -130,7 +130,7 @@ spectrum principled_boundary(const struct stuff *s, double cosine)
 }
 
 /* F of the header comment. */
-spectrum principled_fresnel(const struct stuff *s, spectrum boundary, double cosine)
+spectrum principled_fresnel(const struct principled_point *s, spectrum boundary, double cosine)
 {
 	double rest = schlick(cosine);
 	spectrum f;
@@ -141,7 +141,7 @@ spectrum principled_fresnel(const struct stuff *s, spectrum boundary, double cos
 
 /* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. The
  * caller excludes wi below the surface. */
-spectrum principled_diffuse(const struct stuff *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d)
+spectrum principled_diffuse(const struct principled_point *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d)
 {
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
 	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
@@ -164,14 +164,14 @@ static double clearcoat_alpha(double gloss)
 }
 
 /* GTR1: Burley 2012, appendix B.2. */
-static double clearcoat_d(const struct stuff *s, double cos_h)
+static double clearcoat_d(const struct principled_point *s, double cos_h)
 {
 	double alpha = clearcoat_alpha(s->share[CLEARCOAT_GLOSS]), a2 = alpha * alpha;
 	return (a2 - 1) / (WARP_PI * log(a2) * (a2 * cos_h * cos_h + (1 - cos_h) * (1 + cos_h)));
 }
 
 /* Without the 1 / (4 cos cos) of facets, as Mitsuba has it: four times as bright as Burley's from straight above. */
-static double clearcoat_of(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, double cos_d)
+static double clearcoat_of(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d)
 {
 	struct microfacet shadow;
 	microfacet_set(&shadow, true, 0.25, 0.25);
@@ -181,13 +181,13 @@ static double clearcoat_of(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, doub
 }
 
 /* What the coat reflects of light at an angle. */
-static double coat_reflects(const struct stuff *s, double cosine)
+static double coat_reflects(const struct principled_point *s, double cosine)
 {
 	return s->share[COAT] * (CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cosine));
 }
 
 /* Probabilities of the lobes for light from wo. */
-static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
+static void chances(const struct principled_point *s, vec3 wo, double chance[LOBES])
 {
 	const struct principled *p = s->p;
 	bool below = wo.z < 0;
@@ -221,8 +221,8 @@ struct pair {
 };
 
 /* Refracted light: Walter et al. 2007, eq. 21, as in roughdielectric; wo above, eta: index beyond over index here. */
-static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, double chance, enum transport transport,
-			  struct pair *out)
+static void add_refracted(const struct principled_point *s, vec3 wo, vec3 wi, double eta, double chance,
+			  enum transport transport, struct pair *out)
 {
 	vec3 h;
 	double length;
@@ -247,14 +247,14 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 }
 
 /* What the coat's facets reflect, without its Fresnel factor: also the density of sampling it. */
-static double coat_lobe(const struct stuff *s, vec3 wo, vec3 h)
+static double coat_lobe(const struct principled_point *s, vec3 wo, vec3 h)
 {
 	return 0.25 * microfacet_d(&s->coat, h) * microfacet_g1_over_cos(&s->coat, wo);
 }
 
 /* seen: the density of sampling the boundary's facets; cos_d: the cosine to the half vector h. */
-static double reflected_pdf(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen, bool below,
-			    const double chance[LOBES])
+static double reflected_pdf(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen,
+			    bool below, const double chance[LOBES])
 {
 	double pdf = chance[LOBE_SPECULAR] * seen;
 	if (below)
@@ -267,7 +267,8 @@ static double reflected_pdf(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, dou
 	return pdf;
 }
 
-static spectrum reflected_value(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen, bool below)
+static spectrum reflected_value(const struct principled_point *s, vec3 wo, vec3 wi, vec3 h, double cos_d, double seen,
+				bool below)
 {
 	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
 	if (below)
@@ -287,7 +288,7 @@ static spectrum reflected_value(const struct stuff *s, vec3 wo, vec3 wi, vec3 h,
 }
 
 /* Only what is asked for: `value`, or the density if the chances of sampling the lobes are given. */
-static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transport transport, bool value,
+static struct pair pair_of(const struct principled_point *s, vec3 wo, vec3 wi, enum transport transport, bool value,
 			   const double *chance)
 {
 	struct pair out = {spectrum_of(0), 0};
@@ -317,20 +318,20 @@ static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transpo
 
 static spectrum principled_eval(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
 {
-	struct stuff s = principled_stuff(b->data, at);
+	struct principled_point s = principled_at(b->data, at);
 	return pair_of(&s, wo, wi, at->transport, true, NULL).f;
 }
 
 static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
 {
-	struct stuff s = principled_stuff(b->data, at);
+	struct principled_point s = principled_at(b->data, at);
 	double chance[LOBES];
 	chances(&s, wo, chance);
 	return pair_of(&s, wo, wi, at->transport, false, chance).pdf;
 }
 
 /* A half vector of GTR1, exactly: the inverse of its cumulative density. */
-static vec3 clearcoat_normal(const struct stuff *s, double u0, double u1)
+static vec3 clearcoat_normal(const struct principled_point *s, double u0, double u1)
 {
 	double alpha = clearcoat_alpha(s->share[CLEARCOAT_GLOSS]), a2 = alpha * alpha;
 	double cos2 = fmin(fmax((1 - pow(a2, 1 - u0)) / (1 - a2), 0), 1), sine = sqrt(1 - cos2), phi = 2 * WARP_PI * u1;
@@ -338,7 +339,7 @@ static vec3 clearcoat_normal(const struct stuff *s, double u0, double u1)
 }
 
 /* From above. false: this facet transmits nothing. */
-static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const double u[3], vec3 *wi)
+static bool follow(const struct principled_point *s, int lobe, vec3 wo, double eta, const double u[3], vec3 *wi)
 {
 	if (lobe == LOBE_DIFFUSE) {
 		*wi = warp_cosine_hemisphere(u[0], u[1]);
@@ -362,7 +363,7 @@ static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const d
 static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, const double u[3],
 			      struct bsdf_sample *out)
 {
-	struct stuff s = principled_stuff(b->data, at);
+	struct principled_point s = principled_at(b->data, at);
 	bool below = wo.z < 0;
 	double chance[LOBES], rest = u[2], eta = below ? 1 / s.p->eta : s.p->eta;
 	vec3 wi;

@@ -23,7 +23,7 @@ enum {
 };
 
 /* The parameters at a point of the surface. */
-struct stuff {
+struct principled_point {
 	spectrum base, tint, specular; /* specular: what SPEC_TINT mixes in */
 	double roughness, metallic, share[SHARES];
 	struct microfacet facets, coat; /* coat: only where there is one */
@@ -37,21 +37,21 @@ struct principled {
 	double eta, base_max;
 	bool varies; /* some parameter but base and specular does, over the surface or with the wavelength */
 	bool has_specular;
-	bool lambertian;    /* the diffuse lobe */
-	struct stuff known; /* without colours; all of it unless `varies` */
+	bool lambertian;	       /* the diffuse lobe */
+	struct principled_point known; /* without colours; all of it unless `varies` */
 };
 
-struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at);
+struct principled_point principled_at(const struct principled *p, const struct bsdf_point *at);
 /* Makes `known`, once everything else is. */
 void principled_know(struct principled *p, const struct bsdf_build *build);
 struct microfacet principled_facets(double anisotropic, double roughness);
 
 /* Fresnel's factor of the boundary alone, and with it that of boundary and metal, for light from above. */
-spectrum principled_boundary(const struct stuff *s, double cosine);
-spectrum principled_fresnel(const struct stuff *s, spectrum boundary, double cosine);
+spectrum principled_boundary(const struct principled_point *s, double cosine);
+spectrum principled_fresnel(const struct principled_point *s, spectrum boundary, double cosine);
 /* The diffuse lobe with sheen; cos_d: cosine of either direction to the half vector, at which the boundary reflects
  * that much. Both directions are above. */
-spectrum principled_diffuse(const struct stuff *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d);
+spectrum principled_diffuse(const struct principled_point *s, spectrum boundary, vec3 wo, vec3 wi, double cos_d);
 
 /* Reads those of the parameters that the plug-in has; the others are 0. */
 int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,

@@ -32,7 +32,7 @@ static double through_at(const struct thin *t, const struct bsdf_point *p)
 /* A point of the surface, and a direction from it, whose side counts as the upper one. */
 struct thin_point {
 	const struct thin *t;
-	struct stuff s;
+	struct principled_point s;
 	double spec_trans, through; /* t and d of the header comment */
 	struct microfacet passing;  /* D' */
 	double chance[THIN_LOBES];  /* of sampling */
@@ -57,7 +57,7 @@ static void find_chances(struct thin_point *x, double cosine)
 static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
 {
 	const struct thin *t = b->data;
-	struct thin_point x = {.t = t, .s = principled_stuff(&t->p, p)};
+	struct thin_point x = {.t = t, .s = principled_at(&t->p, p)};
 	x.through = t->diff_trans.ops ? through_at(t, p) : t->through;
 	/* Specular transmission is not what principled_diffuse leaves. */
 	x.spec_trans = x.s.share[TRANSMISSION];

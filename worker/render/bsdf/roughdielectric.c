@@ -63,8 +63,8 @@ static vec3 mirror(vec3 v, bool below)
 }
 
 /* The factor from Fresnel and from the transport mode. */
-static spectrum share(const struct roughdielectric *r, const struct bsdf_point *p, const struct facet *f, bool reflect,
-		      enum transport transport)
+static spectrum fresnel_factor(const struct roughdielectric *r, const struct bsdf_point *p, const struct facet *f,
+			       bool reflect, enum transport transport)
 {
 	if (reflect)
 		return spectrum_scale(f->fresnel.reflected, texture_eval(&r->glass.reflectance, &p->where, p->w));
@@ -82,7 +82,7 @@ static spectrum facet_f(const struct roughdielectric *r, const struct microfacet
 			const struct facet *f, vec3 wi)
 {
 	double common = f->d * g1_over_cos(m, wi) * facet_spread(f, wi.z > 0);
-	return spectrum_scale(common, share(r, p, f, wi.z > 0, p->transport));
+	return spectrum_scale(common, fresnel_factor(r, p, f, wi.z > 0, p->transport));
 }
 
 static double facet_pdf(const struct facet *f, vec3 wi)
@@ -117,7 +117,7 @@ static spectrum roughdielectric_eval_halfvec(const struct bsdf *b, const struct 
 	if (!facet_between(b, &m, p, wo, &wi, &f))
 		return spectrum_of(0);
 	double common = f.d * f.h.z * f.h.z * f.h.z * f.cos_o * g1_over_cos(&m, wi) * fabs(wi.z);
-	return spectrum_scale(common, share(r, p, &f, wi.z > 0, TRANSPORT_RADIANCE));
+	return spectrum_scale(common, fresnel_factor(r, p, &f, wi.z > 0, TRANSPORT_RADIANCE));
 }
 
 static double roughdielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)

@@ -159,7 +159,7 @@ static bool coincide(const struct search *f, struct coincide_pair *p)
 	return coincide_triangles(&t, &u, off, &p->wholly);
 }
 
-static int keep(struct search *f, const struct coincide_pair *p)
+static int add_pair(struct search *f, const struct coincide_pair *p)
 {
 	if (f->pair_count == f->pair_limit) {
 		f->incomplete = true;
@@ -199,7 +199,7 @@ static int compare_all(struct search *f, struct member *m, size_t n)
 			f->work++;
 			if (!may_meet(f, &m[i], &m[j]) || !coincide(f, &p))
 				continue;
-			int rc = keep(f, &p);
+			int rc = add_pair(f, &p);
 			if (rc)
 				return rc;
 			gone = p.wholly;

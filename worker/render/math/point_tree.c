@@ -18,7 +18,7 @@ static void exchange(node *a, node *b)
 
 /* Makes nodes[middle] what it would be if all were sorted, with none before it above and none after it below (Hoare
  * 1961, Algorithm 65). */
-static void part(node *nodes, size_t count, size_t middle, unsigned axis)
+static void partition(node *nodes, size_t count, size_t middle, unsigned axis)
 {
 	size_t low = 0, high = count - 1;
 	while (low < high) {
@@ -44,7 +44,7 @@ static void build(node *nodes, size_t count, unsigned axis)
 {
 	while (count > 1) {
 		size_t middle = count / 2;
-		part(nodes, count, middle, axis);
+		partition(nodes, count, middle, axis);
 		axis = (axis + 1) % 3;
 		build(nodes, middle, axis);
 		nodes += middle + 1;

@@ -39,7 +39,7 @@ static bool move_film(struct mutation_ctx *m, const struct full_path *x, struct 
 
 /* The rotation that maps half vectors from x_j's frame into y_j's, by the line between the two as seen in both
  * frames (sec. 4). It is its own inverse: from y to x both angles gain pi. */
-static void turn(const struct path_vertex *from, const struct path_vertex *to, vec2 *h)
+static void rotate_half_vector(const struct path_vertex *from, const struct path_vertex *to, vec2 *h)
 {
 	vec3 d = vec3_sub(to->x.p, from->x.p);
 	vec3 a = frame_to_local(&from->x.sh, d), b = frame_to_local(&to->x.sh, d);
@@ -115,7 +115,7 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_pat
 		mutation_random(m, BLOCK_VERTEX + j, r);
 		mutation_normals(r, g);
 		vec2 h = halfvec_of(x, j);
-		turn(from, v, &h);
+		rotate_half_vector(from, v, &h);
 		h = vec2_add(h, (vec2){sigma * g[0], sigma * g[1]});
 		move->log_symmetric -= 0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * sigma * sigma);
 		if (!follow(o, h, v->mode & BSDF_TRANSMIT, full_path_eta(y, j), &i))

@@ -189,7 +189,7 @@ static int open_any(const struct asset_folders *f, const char *name, struct asse
 	return rc;
 }
 
-static bool has(const char *folder, const char *name)
+static bool has_file(const char *folder, const char *name)
 {
 	int fd = open_below(folder, name);
 	if (fd >= 0)
@@ -204,12 +204,12 @@ static const char *find_elsewhere(const char *scene_folder, const char *name, ch
 	enum { UP = 8 };
 	if (!is_below(name))
 		return NULL;
-	if (has(".", name))
+	if (has_file(".", name))
 		return strcpy(path, ".");
 	char *end = realpath(*scene_folder ? scene_folder : ".", path) ? strrchr(path, '/') : NULL;
 	for (int i = 0; i < UP && end && end > path; i++, end = strrchr(path, '/')) {
 		*end = 0;
-		if (has(path, name))
+		if (has_file(path, name))
 			return path;
 	}
 	return NULL;

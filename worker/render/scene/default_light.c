@@ -6,15 +6,16 @@
 
 #include <string.h>
 
-static bool has(const struct xml_element *around, const char *name)
+static bool has_child(const struct xml_element *around, const char *name)
 {
 	for (const struct xml_element *el = around->first; el; el = el->next)
-		if (!el->ignored && (strcmp(el->name, name) == 0 || has(el, name)))
+		if (!el->ignored && (strcmp(el->name, name) == 0 || has_child(el, name)))
 			return true;
 	return false;
 }
 
-static bool put(struct xml_element *in, const char *element, const char *name, const char *value, struct arena *arena)
+static bool add_value(struct xml_element *in, const char *element, const char *name, const char *value,
+		      struct arena *arena)
 {
 	struct xml_element *el = element_make(in, element, in->file, in->line, arena);
 	if (!el)
@@ -32,8 +33,8 @@ static bool make_daylight(struct xml_element *scene, struct arena *arena)
 	if (!light)
 		return false;
 	element_put(light, "type", "sunsky");
-	if (!put(light, "float", "scale", "2", arena) || !put(light, "boolean", "extend", "true", arena) ||
-	    !put(light, "float", "sun_radius_scale", "15", arena) ||
+	if (!add_value(light, "float", "scale", "2", arena) || !add_value(light, "boolean", "extend", "true", arena) ||
+	    !add_value(light, "float", "sun_radius_scale", "15", arena) ||
 	    !(place = element_make(light, "transform", scene->file, scene->line, arena)) ||
 	    !(turn = element_make(place, "rotate", scene->file, scene->line, arena)))
 		return false;
@@ -45,8 +46,8 @@ static bool make_daylight(struct xml_element *scene, struct arena *arena)
 
 bool default_light_add(struct xml_tree *t, const struct plugin_decl *decls, struct arena *arena)
 {
-	if (t->dialect_3 || has(t->root, "emitter") || !has(t->root, "shape") || t->note_count >= XML_NOTES_MAX ||
-	    !plugin_find(decls, PLUGIN_EMITTER, "sunsky"))
+	if (t->dialect_3 || has_child(t->root, "emitter") || !has_child(t->root, "shape") ||
+	    t->note_count >= XML_NOTES_MAX || !plugin_find(decls, PLUGIN_EMITTER, "sunsky"))
 		return true;
 	t->notes[t->note_count++] = "has no emitter: sun and sky are added, as by Mitsuba 0.6";
 	t->element_count++;

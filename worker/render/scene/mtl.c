@@ -170,7 +170,7 @@ struct making {
 	int count; /* of elements; negative: out of memory */
 };
 
-static struct xml_element *make(struct making *k, struct xml_element *in, const char *element, int line)
+static struct xml_element *make_element(struct making *k, struct xml_element *in, const char *element, int line)
 {
 	struct xml_element *el = k->count < 0 ? NULL : element_make(in, element, k->m->file, line, k->arena);
 	k->count = el ? k->count + 1 : -ENOMEM;
@@ -180,7 +180,7 @@ static struct xml_element *make(struct making *k, struct xml_element *in, const 
 static struct xml_element *plugin(struct making *k, struct xml_element *in, const char *cls, const char *type,
 				  const char *name, int line)
 {
-	struct xml_element *el = make(k, in, cls, line);
+	struct xml_element *el = make_element(k, in, cls, line);
 	if (el)
 		element_put(el, "type", type);
 	if (el && name)
@@ -191,7 +191,7 @@ static struct xml_element *plugin(struct making *k, struct xml_element *in, cons
 static void property(struct making *k, struct xml_element *in, const char *element, const char *name,
 		     const struct mtl_value *v)
 {
-	struct xml_element *el = make(k, in, element, v->line);
+	struct xml_element *el = make_element(k, in, element, v->line);
 	if (el) {
 		element_put(el, "name", name);
 		element_put(el, "value", v->text);

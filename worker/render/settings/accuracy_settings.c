@@ -48,7 +48,7 @@ const struct render_setting *render_setting_at(size_t index)
 	return index < SETTING_COUNT ? &list[index] : NULL;
 }
 
-static double get(const struct accuracy_settings *k, size_t index)
+static double value_of(const struct accuracy_settings *k, size_t index)
 {
 	double value;
 	memcpy(&value, (const char *)k + offset[index], sizeof value);
@@ -80,7 +80,7 @@ static bool choice_at(const char *choices, int place, double value, char *text, 
 void accuracy_settings_value(const struct accuracy_settings *k, size_t index, char *text, size_t size)
 {
 	struct text t = {text, size};
-	double value = get(k, index);
+	double value = value_of(k, index);
 	if (list[index].kind != SETTING_CHOICE || !choice_at(list[index].choices, -1, value, text, size))
 		text_put(&t, "%.6g", value);
 }
@@ -190,7 +190,7 @@ void accuracy_settings_print(const struct accuracy_settings *k, char text[PLAN_A
 	memset(text, 0, PLAN_ACCURACY_MAX);
 	for (size_t i = 0; i < SETTING_COUNT; i++) {
 		char value[VALUE_BYTES];
-		if (get(k, i) == list[i].standard)
+		if (value_of(k, i) == list[i].standard)
 			continue;
 		accuracy_settings_value(k, i, value, sizeof value);
 		text_put(&t, "%s%s=%s", *text ? "," : "", list[i].name, value);

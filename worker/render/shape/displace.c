@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * run() divides every triangle by the grid (displace_grid.h): each point is sampled with position, normal and height,
- * moved, and given the displaced surface's normal by differences. Points on edges and corners are accumulated at their
- * place first and finalised afterwards, so that neighbours agree to the bit.
+ * displace_triangles divides every triangle by the grid (displace_grid.h): each point is sampled with position, normal
+ * and height, moved, and given the displaced surface's normal by differences. Points on edges and corners are
+ * accumulated at their place first and finalised afterwards, so that neighbours agree to the bit.
  *
  * Failures: more triangles than a mesh may have (before memory is allocated), heights that are not finite, no memory.
  */
@@ -32,7 +32,7 @@ struct turn {
 	double weight;
 };
 
-struct work {
+struct displacer {
 	const struct displacement *d;
 	const struct sphere *sphere; /* NULL: the surface is the base mesh */
 	struct mesh base, out;
@@ -72,7 +72,7 @@ static void sphere_sample(const struct sphere *ball, uint32_t octant, vec3 out, 
 	s->v = acos(fmin(fmax(z, -1), 1)) / M_PI;
 }
 
-static void sample_at(const struct work *w, uint32_t triangle, double b1, double b2, struct sample *s)
+static void sample_at(const struct displacer *w, uint32_t triangle, double b1, double b2, struct sample *s)
 {
 	const struct mesh *m = &w->base;
 	const uint32_t *t = m->index[triangle];
@@ -105,7 +105,8 @@ static vec3 normal_or(vec3 v, vec3 otherwise)
 }
 
 /* Differences over two steps, which may leave the triangle: its plane, normals and (u,v) are continued there. */
-static vec3 displaced_normal(const struct work *w, uint32_t triangle, double b1, double b2, const struct sample *at)
+static vec3 displaced_normal(const struct displacer *w, uint32_t triangle, double b1, double b2,
+			     const struct sample *at)
 {
 	double step = 1.0 / w->grid.parts;
 	vec3 flat[2], moved[2];
@@ -143,7 +144,7 @@ static void add_to_place(struct place *c, double weight, const struct sample *s,
 }
 
 /* Of the finer mesh's vertex, for its texture coordinates. */
-static void mix_attributes(const struct work *w, uint32_t triangle, double b1, double b2, uint32_t vertex)
+static void mix_attributes(const struct displacer *w, uint32_t triangle, double b1, double b2, uint32_t vertex)
 {
 	const uint32_t *t = w->base.index[triangle];
 	for (uint32_t i = 0; i < w->out.attribute_count; i++) {
@@ -156,7 +157,7 @@ static void mix_attributes(const struct work *w, uint32_t triangle, double b1, d
 	}
 }
 
-static void copy_face(const struct work *w, uint32_t triangle, uint32_t to)
+static void copy_face(const struct displacer *w, uint32_t triangle, uint32_t to)
 {
 	for (uint32_t i = 0; i < w->out.attribute_count; i++) {
 		const struct attribute *a = &w->base.attributes[i];
@@ -166,7 +167,7 @@ static void copy_face(const struct work *w, uint32_t triangle, uint32_t to)
 	}
 }
 
-static void put_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_t j)
+static void put_vertex(struct displacer *w, uint32_t triangle, uint32_t i, uint32_t j)
 {
 	uint32_t parts = w->grid.parts;
 	struct displace_point at = displace_grid_at(&w->grid, triangle, i, j);
@@ -193,7 +194,7 @@ static void put_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_t j
 }
 
 /* Opposite sheets that touch have no common direction: their places do not move. */
-static void settle_place(const struct work *w, struct place *c)
+static void settle_place(const struct displacer *w, struct place *c)
 {
 	double length = vec3_length(c->direction), height = c->height / c->weight;
 	bool agree = length >= CREASE_COSINE * c->weight && c->most - c->least <= SEAM_HEIGHT * w->highest;
@@ -202,7 +203,7 @@ static void settle_place(const struct work *w, struct place *c)
 		c->p = vec3_madd(c->p, height / length, c->direction);
 }
 
-static void settle_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_t j)
+static void settle_vertex(struct displacer *w, uint32_t triangle, uint32_t i, uint32_t j)
 {
 	struct displace_point at = displace_grid_at(&w->grid, triangle, i, j);
 	if (at.inside)
@@ -214,7 +215,7 @@ static void settle_vertex(struct work *w, uint32_t triangle, uint32_t i, uint32_
 }
 
 /* Calls `what` for every point of the border of every triangle, or for all points. */
-static void each_point(struct work *w, bool all, void (*what)(struct work *, uint32_t, uint32_t, uint32_t))
+static void each_point(struct displacer *w, bool all, void (*what)(struct displacer *, uint32_t, uint32_t, uint32_t))
 {
 	uint32_t n = w->grid.parts;
 	for (uint32_t t = 0; t < w->base.triangle_count; t++)
@@ -233,7 +234,8 @@ static vec3 unit_area(const vec3 p[3])
 	return normal_or(vec3_cross(vec3_sub(p[1], p[0]), vec3_sub(p[2], p[0])), (vec3){0, 0, 0});
 }
 
-static void add_turns(struct work *w, uint32_t triangle, const uint32_t ij[3][2], const struct displace_point at[3])
+static void add_turns(struct displacer *w, uint32_t triangle, const uint32_t ij[3][2],
+		      const struct displace_point at[3])
 {
 	vec3 before[3], after[3];
 	for (int k = 0; k < 3; k++) {
@@ -254,7 +256,7 @@ static void add_turns(struct work *w, uint32_t triangle, const uint32_t ij[3][2]
 	}
 }
 
-static void put_triangle(struct work *w, uint32_t triangle, const uint32_t ij[3][2], uint32_t *index)
+static void put_triangle(struct displacer *w, uint32_t triangle, const uint32_t ij[3][2], uint32_t *index)
 {
 	struct displace_point at[3];
 	bool bent = false;
@@ -267,7 +269,7 @@ static void put_triangle(struct work *w, uint32_t triangle, const uint32_t ij[3]
 		add_turns(w, triangle, ij, at);
 }
 
-static void put_triangles(struct work *w)
+static void put_triangles(struct displacer *w)
 {
 	uint32_t n = w->grid.parts, count = 0;
 	for (uint32_t t = 0; t < w->base.triangle_count; t++)
@@ -364,7 +366,7 @@ static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena
 }
 
 /* Vertices that no triangle uses stay where they are. */
-static int settle_places(struct work *w, const struct scene_node *n, struct error *e)
+static int settle_places(struct displacer *w, const struct scene_node *n, struct error *e)
 {
 	for (uint32_t i = 0; i < w->base.vertex_count; i++) {
 		memcpy(w->out.position[i], w->base.position[i], sizeof w->out.position[i]);
@@ -389,7 +391,7 @@ static uint32_t parts_of(const struct displacement *d)
 	return (uint32_t)fmin(fmax(round(ldexp(d->tessellation, (int)d->level)), 1), 1 << DISPLACE_LEVEL_MAX);
 }
 
-static int displace_triangles(struct work *w, struct shape_geometry *g, struct arena *arena, struct arena *scratch,
+static int displace_triangles(struct displacer *w, struct shape_geometry *g, struct arena *arena, struct arena *scratch,
 			      const struct scene_node *n, struct error *e)
 {
 	uint32_t parts = parts_of(w->d);
@@ -424,7 +426,7 @@ int displace(struct shape_geometry *g, const struct displacement *d, struct aren
 	if (g->kind == SHAPE_MESH && !g->mesh.uv && !d->is_constant)
 		return node_error(n, e, EINVAL,
 				  "displacement by a texture needs texture coordinates, and the mesh has none");
-	struct work w = {.d = d};
+	struct displacer w = {.d = d};
 	struct arena scratch = {0};
 	int rc = displace_triangles(&w, g, arena, &scratch, n, e);
 	arena_fini(&scratch);

@@ -131,14 +131,14 @@ static int list(struct listing *l, const struct scene_node *n, const struct scen
 }
 
 /* A node, and its position in the list. */
-struct use {
+struct node_use {
 	uintptr_t node;
 	uint32_t at;
 };
 
 static int compare_uses(const void *x, const void *y)
 {
-	const struct use *a = x, *b = y;
+	const struct node_use *a = x, *b = y;
 	if (a->node != b->node)
 		return a->node < b->node ? -1 : 1;
 	return a->at < b->at ? -1 : a->at > b->at;
@@ -148,12 +148,12 @@ static int compare_uses(const void *x, const void *y)
 static int find_uses(struct listing *l)
 {
 	uint32_t n = 0;
-	struct use *uses = arena_alloc(l->arena, l->count, sizeof *uses);
+	struct node_use *uses = arena_alloc(l->arena, l->count, sizeof *uses);
 	if (!uses)
 		return out_of_memory(l);
 	for (uint32_t i = 0; i < l->count; i++)
 		if (l->shapes[i].instance)
-			uses[n++] = (struct use){(uintptr_t)l->shapes[i].node, i};
+			uses[n++] = (struct node_use){(uintptr_t)l->shapes[i].node, i};
 	if (n > 0)
 		qsort(uses, n, sizeof *uses, compare_uses);
 	for (uint32_t i = 0, end; i < n; i = end) {

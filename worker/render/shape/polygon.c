@@ -77,7 +77,7 @@ static double area(struct flat a, struct flat b, struct flat c)
 	return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-static bool same(struct flat a, struct flat b)
+static bool same_point(struct flat a, struct flat b)
 {
 	return a.x == b.x && a.y == b.y;
 }
@@ -90,8 +90,8 @@ static bool is_ear(struct outline *o, uint32_t i)
 	for (uint32_t k = o->after[o->after[i]]; k != o->before[i]; k = o->after[k]) {
 		struct flat q = o->p[k];
 		o->checks -= o->checks > 0;
-		if (area(a, b, q) >= 0 && area(b, c, q) >= 0 && area(c, a, q) >= 0 && !same(q, a) && !same(q, b) &&
-		    !same(q, c))
+		if (area(a, b, q) >= 0 && area(b, c, q) >= 0 && area(c, a, q) >= 0 && !same_point(q, a) &&
+		    !same_point(q, b) && !same_point(q, c))
 			return false;
 	}
 	return true;

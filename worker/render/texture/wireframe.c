@@ -73,7 +73,7 @@ static int create(struct texture *t, const struct scene_node *n, enum color_role
 }
 
 /* How much of the interior's colour is at a point. */
-static double share(const struct wireframe *f, const struct texture_point *at)
+static double interior_share(const struct wireframe *f, const struct texture_point *at)
 {
 	if (!f->lines)
 		return 1;
@@ -94,7 +94,7 @@ static double share(const struct wireframe *f, const struct texture_point *at)
 static spectrum eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
 {
 	const struct wireframe *f = t->data;
-	double a = share(f, at);
+	double a = interior_share(f, at);
 	spectrum edge = a < 1 ? spectrum_scale(1 - a, texture_eval(&f->edge, at, w)) : spectrum_of(0);
 	return a > 0 ? spectrum_add(edge, spectrum_scale(a, texture_eval(&f->interior, at, w))) : edge;
 }

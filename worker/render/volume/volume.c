@@ -108,8 +108,8 @@ static bool is_turned(const mat4 *m)
 
 #define FLATTENED "to_world flattens the volume (it has no inverse)"
 
-static int place(struct grid *g, const struct scene_node *n, double box[2][3], const struct volume_build *b,
-		 struct error *e)
+static int place_grid(struct grid *g, const struct scene_node *n, double box[2][3], const struct volume_build *b,
+		      struct error *e)
 {
 	double per[3], offset = b->dialect_3 && !g->nearest ? -0.5 : 0;
 	mat4 to_world = node_transform(n, "to_world"), to_volume;
@@ -168,7 +168,7 @@ static int add_grid(struct volume *v, const struct grid *made, const struct scen
 		return node_error(n, e, ENOMEM, "out of memory");
 	*g = *made;
 	v->grid = g;
-	return place(g, n, box, b, e);
+	return place_grid(g, n, box, b, e);
 }
 
 static int read_grid(struct volume *v, const struct scene_node *n, enum color_role role, const struct volume_build *b,
