@@ -24,7 +24,8 @@ size_t text_utf8_length(const unsigned char *p)
 	return n;
 }
 
-/* Those of ASCII, and U+0080 to U+009F: a terminal takes U+009B for the beginning of a command as it does escape. */
+/* Control characters: those of ASCII, and U+0080 to U+009F, since a terminal takes U+009B for the start of a command,
+ * like escape. */
 static bool is_control(const unsigned char *p)
 {
 	return p[0] < 32 || p[0] == 127 || (p[0] == 0xC2 && p[1] < 0xA0);

@@ -93,7 +93,7 @@ static double chains_time(const struct moments *m, uint32_t group, size_t class,
 	return exact_sum_value(&sum);
 }
 
-/* What the unit of a class's sums carries: chains count time, samples what they leave to chains. */
+/* The energy of one unit of a class's sums: chains count time, samples the energy that they leave to chains. */
 static double unit_of(const struct moments *m, const struct moments_group *of)
 {
 	return m->plan.kind == PLAN_CHAINS ? of->b : 1;

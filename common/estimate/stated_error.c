@@ -5,9 +5,9 @@
 
 #include <math.h>
 
-/* Of renders whose light is rare: the estimate up to which they have met most of it, and how far they may be from the
- * truth then (tests/image/README.md, "Where the render stops"). Single groups that outweigh all others may be all that
- * has come of it: a lamp in a glass shell stated 44 % where 544 % was true. */
+/* For renders whose light is rare: the estimate below which most of that light has been found, and the factor by which
+ * the true error may then still be larger (tests/image/README.md, "Where the render stops"). Above it, single groups
+ * that outweigh all others may be all that has been found: a lamp in a glass shell stated 44 % where 544 % was true. */
 static const struct rare_rule {
 	enum error_doubt doubt;
 	double small, factor;

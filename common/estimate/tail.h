@@ -35,9 +35,8 @@ void tail_settle(struct tail *t);
 /* Hill's estimate from the k largest, k < most. 1 if no more than k were added or k is 0; INFINITY if they are all
  * equal. */
 double tail_index(const struct tail *t, size_t k);
-/* What an estimate from the k largest must exceed to rule out a distribution of this index: for many numbers, one in
- * twenty does. Based on the estimate's standard error; since its distribution is skewed, it is one in eleven at k =
- * 32. INFINITY if k is 0. */
+/* What an estimate from the k largest must exceed to rule out this index at the 5 % level. Based on the estimate's
+ * standard error; since its distribution is skewed, the level is one in eleven at k = 32. INFINITY if k is 0. */
 double tail_index_least(double index, size_t k);
 /* The extreme-value index from the k largest, k < most. 1 if no more than k were added or k is 0; -INFINITY if they
  * are all equal. */

@@ -27,7 +27,8 @@
 #include <unistd.h>
 
 enum { PATH_SIZE = 4096, SERIAL_BYTES = 16, ENTRIES_MAX = 1 << 20 };
-/* What is signed is valid from so many seconds before: clocks of other machines are behind, or are set back. */
+/* Certificates and lists are valid from this many seconds before they are signed, since clocks of other machines may be
+ * behind or be set back. */
 enum { EARLIER = 86400 };
 
 struct authority {

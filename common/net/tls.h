@@ -53,7 +53,8 @@ int tls_refresh(struct tls *t, struct error *e);
 const struct tls_peer *tls_self(const struct tls *t);
 /* When the certificate of our authority expires; 0: there is none. */
 time_t tls_authority_until(const struct tls *t);
-/* What expires within TLS_WARN_DAYS, our own certificate or the authority's; false: neither, text is "". */
+/* Whether our own certificate or the authority's expires within TLS_WARN_DAYS, and which, in text; false: neither, text
+ * is "". */
 bool tls_warning(const struct tls *t, time_t now, char *text, size_t size);
 /* The same, but true only once a day, or after the files were read again. */
 bool tls_warning_due(struct tls *t, time_t now, char *text, size_t size);

@@ -12,8 +12,8 @@
 
 #include <jansson.h>
 
-/* What only a live job has, beside its record; the columns are those of record_fields.h. A share counts machines by
- * priority; `reading` is the share of its stored data that has been read after a restart. */
+/* Fields that only a live job has, besides its record; the columns are those of record_fields.h. A share counts
+ * machines by priority; `reading` is the fraction of its stored data that has been read after a restart. */
 #define VIEW_FIELDS(TEXT, NUMBER)                                                                 \
 	NUMBER(real, rate, NULL, "rate", AT(rate), LIVE)                                          \
 	NUMBER(known, eta, NULL, "eta", AT(eta), LIVE)                                            \

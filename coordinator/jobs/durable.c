@@ -104,7 +104,7 @@ int durable_begin(struct jobs *jobs, struct live_job *job, struct error *e)
 	return rc;
 }
 
-/* Also on a full disk, if it ends without a result: that must not need room that only its end makes. */
+/* Must also work on a full disk if the job ends without a result, since only its end may free the space. */
 static int ledger_end_at_last(struct jobs *jobs, const struct job_record *r, bool kept, struct error *e)
 {
 	int rc = ledger_end(jobs->ledger, r, kept, e);

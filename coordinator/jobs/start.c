@@ -120,7 +120,7 @@ void jobs_init(struct jobs *jobs)
 	jobs->read = jobs_now(jobs);
 }
 
-/* What the disk refused, of each live job whose time has come: its image, record, films, and the journal for its
+/* Retries, for each live job whose time has come, what the disk refused: image, record, films, and the journal for its
  * results. */
 static void retry(struct jobs *jobs)
 {

@@ -5,7 +5,7 @@
 
 #include "coordinator/job/jobs.h"
 
-/* What follows from the core's answers. A table, because its functions make steps themselves (start.c). */
+/* Functions that carry out the core's answers. A table, because they make steps themselves (start.c). */
 struct follow_up {
 	/* Carries out the actions of an update, in order. in: what came with the event. */
 	void (*carry_out)(struct jobs *jobs, const struct update *u, const struct incoming *in);

@@ -27,8 +27,9 @@ static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 	       (first && what == FARM__ENVELOPE__BODY_JOB_LIST);
 }
 
-/* Of a client: an order is flushed on the loop's thread, and a list of hundreds of jobs takes milliseconds. Messages
- * with a payload are none; a client sends them when it has an answer. */
+/* A client's messages that are requests, to be answered in turn: an order is flushed on the loop's thread, and a list
+ * of hundreds of jobs takes milliseconds. Messages with a payload are not, since a client sends them only when it has
+ * an answer. */
 static bool is_request(const struct session *p, Farm__Envelope__BodyCase what)
 {
 	return p->state == SESSION_CLIENT && what != FARM__ENVELOPE__BODY_BLOB_CHUNK &&

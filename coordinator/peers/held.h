@@ -18,7 +18,7 @@ void held_tick(struct session *p);
 void held_drop(struct session *p); /* the peer is gone */
 /* Takes the first waiting request, which the caller then owns; false: there is none. */
 bool held_next(struct session *p, struct envelope *env);
-/* Whose first request is next; NULL: none waits, or none may be handled before the next tick. */
+/* The session whose first request is next; NULL: none waits, or none may be handled before the next tick. */
 struct session *held_turn(const struct peers *s);
 /* Around the handling of a message: what requests of clients take counts. */
 double held_begin(const struct session *p);

@@ -169,7 +169,7 @@ static void on_written(uv_write_t *w, int status)
 		drop(r);
 }
 
-/* Of what changes at most one tick's lines wait for a reader (status_tick); answers are bounded here. */
+/* At most one tick's lines about changes wait for a reader (status_tick); answers are bounded here. */
 static void send_line(struct reader *r, struct shared *l, bool answer)
 {
 	struct sending *s = l ? mem_alloc(1, sizeof *s) : NULL;

@@ -129,7 +129,7 @@ static int merge_notes(struct ledger *l, const char *from, const char *to, struc
 	return ledger_file_run(l->db, sql, e);
 }
 
-/* In one transaction. At the start both files may be written, later only the copy, which is behind. */
+/* Runs in one transaction. At the start both files may be written, later only the copy, if it is behind. */
 static int merge(struct ledger *l, struct error *e)
 {
 	ledger_side_release(&l->jobs);

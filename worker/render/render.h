@@ -40,8 +40,8 @@ const char *render_mutation_at(size_t index, const char **summary);
 int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX],
 		     struct error *e);
 
-/* What all leases of a plan share beside the world: the map of brightness, where the integrator redistributes, and else
- * NULL. It is made of the plan's seed, film and depths: every machine has the same. render_map_free takes NULL. Ticks.
+/* What all leases of a plan share besides the world: the map of brightness if the integrator redistributes, else NULL.
+ * It follows from the plan's seed, film and depths, so every machine makes the same. render_map_free takes NULL. Ticks.
  * -ENOMEM, -EINVAL, -EDOM */
 struct brightness;
 int render_map_new(const struct world *w, const struct plan *p, struct brightness **out, struct error *e);

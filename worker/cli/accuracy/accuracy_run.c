@@ -37,8 +37,8 @@ static double expected_seconds(const struct accuracy_run *r, const struct pilot 
 	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / shares(r->design);
 }
 
-/* What caches of files hold counts: of a machine that has been up for a while little else is free. Where it is not
- * known nothing is refused, and an allocation that fails says so. */
+/* Memory in file caches counts as available: on a machine that has been up for a while little else is free. If the
+ * amount is not known, nothing is refused here, and an allocation that fails is reported. */
 static double available_memory(void)
 {
 	char line[128];
@@ -85,7 +85,8 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	bool chains = q.kind == PLAN_CHAINS;
 	if (chains && !q.bootstrap)
 		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
-	/* As many chains as a render of that length has: many short chains err in ways that groups do not show. */
+	/* Gives it as many chains as a render of that length has: many short chains are wrong in ways that groups do
+	 * not show. */
 	q.mutations = chains && !q.chains ? (uint64_t)fmin(fmax(each / pilot->mutation, 1), 1e15) : 0;
 	int rc = plan_make(&q, p, e);
 	q.chains = p->chains;

@@ -77,8 +77,7 @@ static json_t *part_json(const char *name, double energy, double variance, doubl
 			 forecast_real(variance), "rays", forecast_real(rays));
 }
 
-/* Of a render whose samples leave some light to chains: what each part has of the light, of the noise and of the work.
- */
+/* For a render whose samples leave some light to chains: the shares of samples and chains in light, noise and work. */
 static json_t *parts_json(const struct canvas_image *i)
 {
 	json_t *parts = json_array();

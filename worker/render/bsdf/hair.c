@@ -46,7 +46,7 @@
 /* Of the white share in the choice of a lobe. */
 #define WHITE 0x1p-6
 
-/* Of importance that arrives from outside: the probability of going straight through, and those of the lobes. */
+/* For importance that arrives from outside: the probability of passing straight through, and those of the lobes. */
 #define PASSING 0.5
 static const double adjoint_chance[HAIR_LOBES] = {0.3, 0.4, 0.2, 0.1};
 
@@ -59,7 +59,7 @@ struct hair {
 	spectrum probes; /* absorption at `probed`, unless sigma_a is textured */
 };
 
-/* At which lobes are weighed: a density that changed with the wavelengths of a path would tie them together. */
+/* The wavelengths at which lobes are weighted: a density that used those of the path would couple them. */
 static const struct wavelengths probed = {.nm = {450, 520, 580, 640}};
 
 static spectrum absorption(const struct hair *h, const struct texture_point *where, const struct wavelengths *w)

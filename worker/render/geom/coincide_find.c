@@ -92,8 +92,8 @@ static int compare_numbers(const void *a, const void *b)
 	return x < y ? -1 : x > y;
 }
 
-/* Where to cut such that the halves are smallest, judged by a sample; false: the halves would be hardly smaller than
- * the whole. */
+/* Finds the cut with the smallest halves, judged by a sample; false: the halves would be hardly smaller than the whole.
+ * */
 static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, int *axis, double *at)
 {
 	struct member m[SAMPLE];
@@ -238,8 +238,8 @@ static uint32_t commonest(const struct prim_ref *items, size_t n)
 	return shape;
 }
 
-/* Of a large mesh among few others, keeps only what meets the box of one of those: most of a statue does not touch
- * its room. Returns how many are left, at the front. */
+/* Keeps only those primitives of a large mesh that meet the box of one of the few others: most of a statue does not
+ * touch its room. Returns how many are left, at the front. */
 static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n)
 {
 	struct member others[OTHERS];

@@ -51,7 +51,8 @@ static bool mode_holds(const struct full_path *y, unsigned j)
 	return full_path_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
 }
 
-/* By a ray: onto another primitive of the same material, past faces that are no vertices (path/media.h). */
+/* Moves the vertex by a ray, onto another primitive of the same material, through surfaces that are no vertices
+ * (path/media.h). */
 static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
 {
 	const struct world *w = m->c->w;

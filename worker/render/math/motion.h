@@ -13,7 +13,7 @@
 
 #include <stdint.h>
 
-/* As a scene has it: times ascend, all transforms have an inverse, and all or none of them mirror. */
+/* An animation as in a scene: times ascend, all transforms have an inverse, and all or none of them mirror. */
 struct keyframe {
 	double time;
 	mat4 place;
@@ -37,8 +37,8 @@ struct motion {
 	mat4 before;		/* is applied before them */
 };
 
-/* Of the keyframes that matter from `open` to `close`; if both are equal, of those around that time. The keys are
- * written to `room`, which has place for all. false: nothing moves. */
+/* The motion from `open` to `close`, made of the keyframes that matter there (if both are equal, those around that
+ * time). The keys are written to `room`, which has space for all. false: nothing moves. */
 bool motion_make(struct motion *m, const struct animation *a, double open, double close, struct motion_key *room);
 /* Lengths are multiplied by scale after `center` has been subtracted. */
 void motion_rescale(struct motion *m, vec3 center, double scale);

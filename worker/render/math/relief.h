@@ -29,8 +29,8 @@ struct relief {
 };
 
 /*
- * Where a part of a material finds the shading frame that a point would have with the part's relief instead of the
- * surface's: in the coordinates of the frame that it has. r: NULL for none.
+ * The shading frame that a point would have with the relief of one part of a material instead of the surface's, in the
+ * coordinates of the frame that the point has. r: NULL for none.
  */
 struct relief_place {
 	const void *point;						  /* for frame */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a medium emits, by `volumelight`: along a length ds the radiance grows by `radiance` ds, whatever the medium
- * absorbs and scatters there. It reaches as far as the medium does: where the extinction is on a grid, to the end of
- * that grid's box. A grid of three channels holds R, G and B, which become a spectrum as those of a texture do.
- * Immutable after creation; any thread; allocates nothing.
+ * The emission of a medium, by `volumelight`: over a length ds the radiance grows by `radiance` ds, whatever the medium
+ * absorbs and scatters there. It reaches as far as the medium does: if the extinction is on a grid, to the end of that
+ * grid's box. A grid of three channels holds R, G and B, which become a spectrum as those of a texture do. Immutable
+ * after creation; any thread; allocates nothing.
  */
 #ifndef WORKER_RENDER_MEDIUM_EMISSION_H
 #define WORKER_RENDER_MEDIUM_EMISSION_H
@@ -15,7 +15,7 @@ struct emission {
 	double per_length; /* times the radiance, of the rescaled world */
 };
 
-/* Of the emitter n, in a medium of that extinction. -ENOTSUP: 0.6 has none; or its grid repeats itself. */
+/* Makes the emission of emitter n in a medium of that extinction. -ENOTSUP: a scene of 0.6, or a grid that repeats. */
 int emission_create(struct emission *g, const struct scene_node *n, const struct volume *extinction,
 		    const struct volume_build *build, struct error *e);
 

@@ -259,7 +259,7 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 	return true;
 }
 
-/* What the edges of the light's sub-path before its vertex s - 1, which was reached through `medium`, let through. */
+/* The transmittance of the light sub-path's edges before its vertex s - 1, which was reached through `medium`. */
 static spectrum absorption_of_light(const struct path_context *c, unsigned s, uint32_t medium)
 {
 	spectrum t = spectrum_of(1);

@@ -40,9 +40,9 @@ double path_pdf_emitter(const struct path_context *c, const struct path_vertex *
 double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
 /* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
 bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf);
-/* What a whole path brings, whose contribution is l. Where it scatters at a dispersive BSDF, however it does so there,
- * its directions and densities are those of nm[0], and only that one travels on: four times its share, unbiased because
- * nm[0] is uniform. A property of the path, so that all techniques that make it agree. */
+/* The contribution of a whole path, l before dispersion. If the path scatters at a dispersive BSDF, in whatever way,
+ * its directions and densities are those of nm[0], and only that wavelength counts, four times: unbiased, because nm[0]
+ * is uniform. This is a property of the path, so all techniques that make it agree. */
 spectrum path_collapse(spectrum l, bool dispersive);
 
 /* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among

@@ -21,7 +21,7 @@
  * between mirrors and in fibres, where it hardly does: rare samples would hold most of the light. */
 enum { SURE_VERTICES = 5 };
 
-/* Of at least `least` vertices how many, up to `most`: n or more with probability survival(n) / survival(least). */
+/* Draws a number of vertices from `least` to `most`: n or more with probability survival(n) / survival(least). */
 static unsigned longer(double u, unsigned least, unsigned most)
 {
 	unsigned from = least > SURE_VERTICES ? least : SURE_VERTICES;

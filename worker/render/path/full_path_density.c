@@ -53,7 +53,8 @@ static void delta_densities(const struct full_path *x, unsigned j, double *to_li
 			     : 0;
 }
 
-/* Of events, or of none, along edge e: for v[e] from the camera's side, for v[e + 1] from the light's. */
+/* The density of the event that ends edge e, or the probability of none: of v[e] as made from the camera's side, of v[e
+ * + 1] as made from the light's. */
 static void multiply_by_media(const struct path_context *c, struct path_vertex *v, unsigned edges)
 {
 	for (unsigned e = 0; e < edges; e++) {

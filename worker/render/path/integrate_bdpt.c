@@ -13,9 +13,9 @@
 #include "worker/render/path/volume_emission.h"
 #include "worker/render/path/integrator.h"
 
-/* Of the light that the camera sub-path finds alone. In closed rooms 0.1 saves a quarter of the time and adds 1 % to
- * the relMSE, 0.3 hardly saves more and adds 5 %; elsewhere neither changes anything (tests/bench/choices.md, "Faint
- * connections"). */
+/* Connections that bring less than this share of the light that the camera's sub-path finds alone are faint. In closed
+ * rooms 0.1 saves a quarter of the time and adds 1 % to the relMSE, 0.3 hardly saves more and adds 5 %; elsewhere
+ * neither changes anything (tests/bench/choices.md, "Faint connections"). */
 static const double faint_share = 0.1;
 
 /* Exactly one of so many consecutive samples of a pixel, where these are low-discrepancy. */

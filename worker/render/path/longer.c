@@ -15,7 +15,7 @@
 
 enum { FULL = PATH_MAX_EDGES + 1, CARRIED = 3, CARRIED_END = 2 + CARRIED };
 
-/* Of paths that end at the camera sub-path's vertices first - 1 ... n - 1, `before` of whose edges are not in it. */
+/* The paths that end at the camera sub-path's vertices first - 1 ... n - 1; `before` of their edges are not in it. */
 static spectrum gather(struct path_context *c, unsigned first, unsigned n, unsigned before, uint32_t least,
 		       uint32_t most, double film[2])
 {

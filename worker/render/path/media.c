@@ -118,7 +118,7 @@ static void walk_on(struct walk *k, vec3 o, double t0, double t1)
 		walk_add(k, medium_depth(&k->lanes, &(struct grid_ray){o, k->d, t0, t1}));
 }
 
-/* Of light that is emitted with l per length all along a way: what is left at its beginning. */
+/* What reaches the start of a segment of constant emission l per length. */
 static spectrum even_emission(const struct medium_lanes *m, spectrum l, double length)
 {
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
@@ -129,9 +129,9 @@ static spectrum even_emission(const struct medium_lanes *m, spectrum l, double l
 	return l;
 }
 
-/* What the medium emits from t0 to t1 behind o, all of which the edge passes. Without events on the way it is known, if
- * everything is the same everywhere; otherwise it is that of one place. Where the edge passes with the mean over the
- * wavelengths of what events leave, light counts as many times more often. */
+/* Adds what the medium emits between t0 and t1 along the ray, a segment that the edge crosses entirely. Without events
+ * and in a homogeneous medium it is known in closed form; otherwise it is estimated at one point. The edge gets this
+ * far with a probability, the mean over the wavelengths of what events leave, so the light is divided by it. */
 static void walk_shine(struct walk *k, vec3 o, double t0, double t1)
 {
 	const struct emission *g = &k->shines->emission;

@@ -74,7 +74,7 @@ bool path_see_in_media(struct path_context *c, const struct path_vertex *z, cons
  * in `medium`, which is the one there, or the probability that there is none on the way. */
 double path_edge_pdf(const struct path_context *c, const struct path_edge *edge, uint32_t medium,
 		     const struct path_vertex *to);
-/* That for the last edge of a sub-path, into its density, and with what is left into its beta. */
+/* Multiplies that of a sub-path's last edge into its density, and with the transmittance into its beta. */
 void path_travel(const struct path_context *c, struct path_vertex *to, spectrum left);
 
 /* sigma_s times the phase function, of VERTEX_MEDIUM. 1 / length / solid angle */

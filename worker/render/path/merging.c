@@ -181,7 +181,7 @@ bool merging_walk(const struct merging *m, struct path_context *c, uint64_t seed
 	return true;
 }
 
-/* Of the techniques with more than s light vertices the sum of q; y: the photon's vertex before z. */
+/* The sum of q over the techniques with more than s light vertices. y: the photon's vertex before z. */
 static double sum_more(const struct path_context *c, const struct path_vertex *y, unsigned t)
 {
 	const struct path_vertex *v = c->camera, *z = &v[t];

@@ -11,7 +11,7 @@
 #include "worker/render/math/point_tree.h"
 #include "worker/render/path/path.h"
 
-/* Where a light sub-path met a rough surface: its vertex s, s >= 2, for what is lit directly is easily found. */
+/* Where a light sub-path hit a rough surface: its vertex s, s >= 2, since direct light is easily found otherwise. */
 struct photon {
 	vec3 p, ng;
 	spectrum beta;

@@ -284,8 +284,8 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 	}
 }
 
-/* Of the sub-paths, for u in [0,1). A rolling shutter exposes a line for a share of the time, the first from the
- * beginning on and the last up to the end; points beyond the film's edge belong to the line there. */
+/* The sub-paths' time, for u in [0,1). A rolling shutter exposes each line for a fraction of the time, the first line
+ * from the beginning and the last until the end; points beyond the film's edge belong to the nearest line. */
 static double time_of(const struct world *w, const double film[2], double u)
 {
 	const struct scene_settings *s = &w->settings;

@@ -83,8 +83,8 @@ struct path_context {
 	uint64_t *counters;   /* of enum batch_counter */
 	struct path_split *split; /* NULL: the film gets all */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
-	/* Where media shine: what they bring the film along edge e of the camera's sub-path, whether a vertex ends it
-	 * or not, for e from 1 to emission_edges (volume_emission.h). */
+	/* The emission of media along edge e of the camera's sub-path, as it reaches the film, whether or not a vertex
+	 * ends the edge; e from 1 to emission_edges (volume_emission.h). */
 	unsigned emission_edges;
 	spectrum emission[PATH_MAX_EDGES + 1];
 };

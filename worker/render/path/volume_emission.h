@@ -8,8 +8,8 @@
 
 #include "worker/render/path/classes.h"
 
-/* What the film gets of it by paths that end on the edges first ... last of the camera's sub-path. classes: NULL, or
- * told of each. */
+/* What paths that end on the edges first ... last of the camera's sub-path contribute to the film. classes: NULL, or
+ * told of each path. */
 spectrum volume_emission(struct path_context *c, unsigned first, unsigned last, struct classes *classes);
 
 #endif

@@ -197,8 +197,8 @@ static bool has_file(const char *folder, const char *name)
 	return fd >= 0;
 }
 
-/* Where else the file is, as --path would take it: below the current folder, from which the scene was perhaps
- * written, or below one around the scene's. NULL: in none of them. */
+/* The folder, to be given with --path, in which the file is: the current one, from which the scene was perhaps written,
+ * or one around the scene's. NULL: none. */
 static const char *find_elsewhere(const char *scene_folder, const char *name, char path[PATH_MAX])
 {
 	enum { UP = 8 };

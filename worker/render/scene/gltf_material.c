@@ -157,8 +157,8 @@ static bool put_dispersive(struct gltf *g, const struct gltf_at *at, const struc
 	return true;
 }
 
-/* What passes diffusely has a share of the light that no metal takes. It is that of a second BSDF, put behind the
- * material's by put_through, so that the boundary reflects less by this share than in the format. */
+/* Diffuse transmission gets a share of the light that is not reflected by metal. It is a second BSDF, blended with the
+ * material's by put_through, so the boundary reflects less than in the format, by that share. */
 static struct xml_element *put_sheet(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
 				     const json_t *through, double metallic)
 {
@@ -223,8 +223,8 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 	g->has_light |= rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
 }
 
-/* Of what is left of white light after `distance` this is the colour: the coefficient of Beer's law. Without thickness
- * a volume is a sheet, which absorbs nothing. */
+/* The coefficient of Beer's law by which white light has this colour after `distance`. Without thickness a volume is a
+ * thin sheet, which absorbs nothing. */
 static bool absorbs(struct gltf *g, const struct gltf_at *at, double sigma_a[3])
 {
 	const json_t *volume = gltf_extension(g, at, at->json, "KHR_materials_volume"),

@@ -139,7 +139,7 @@ static bool is_foreign_parameter(const struct maker *m, const struct draft *d, c
 	return !s.best || (meant && meant->status == PARAM_IGNORED);
 }
 
-/* What the table says of a name: *p understood, or NULL with the matter settled (ignored, or an error). */
+/* Looks up a name in the table: *p is its parameter, or NULL if it was dealt with here (ignored, or an error). */
 static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
 		   const struct xml_element *el, const char *name, const struct param **p)
 {
@@ -302,7 +302,7 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	return r ? r : read_object(m, d, owner, el, target);
 }
 
-/* What cannot move stands still, where the scene has it first: an error, unless the reader is lenient. */
+/* Motion of what cannot move is an error; a lenient reader keeps the first transform. */
 static int hold_still(struct maker *m, struct draft *d, const struct xml_element *el)
 {
 	for (uint32_t i = 0; i < d->node->property_count; i++) {
