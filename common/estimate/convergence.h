@@ -47,7 +47,7 @@ enum { CONVERGENCE_TABLE = 4096 };
 void convergence_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct convergence *a,
 		       char *text, size_t size);
 
-/* P(|T| > |t|) of Student's t with so many degrees of freedom (at least 1). */
+/* P(|T| > |t|) of Student's t with that number of degrees of freedom (at least 1). */
 double convergence_student_tail(double t, uint32_t degrees);
 
 #endif

@@ -57,7 +57,7 @@ enum forecast_run {
 
 /* Ignores a look that is invalid (no finite error above 0, impossible numbers) or has no more work than the last. */
 void forecast_add_look(struct forecast_history *h, const struct forecast_look *l);
-/* The look that an image stands for, after these seconds. */
+/* The look that an image gives after these seconds. */
 void forecast_add(struct forecast_history *h, const struct plan *p, const struct canvas_image *img, double cpu_seconds,
 		  double seconds);
 /* The first look at which a render would have stopped; NULL: none yet. */

@@ -11,7 +11,7 @@ void send_pool_look(struct send_share *s, uint64_t now)
 	s->seen = left;
 }
 
-/* Somebody holds something, and somebody at least the average. */
+/* There is one: some queue holds something, and some queue at least the average. */
 static struct send_share *slowest_reader(const struct send_pool *p, uint64_t now)
 {
 	struct send_share *found = NULL;

@@ -168,7 +168,7 @@ bool plan_wants_rays(const struct plan_request *r)
 	return !asked && (!counted || r->seconds > 0 || r->target_error > 0);
 }
 
-/* Bootstrap samples of one thread in so many seconds; 2^62: no rays were counted. */
+/* Bootstrap samples that one thread draws in that many seconds; 2^62: no rays were counted. */
 static uint64_t bootstrap_room(const struct plan_request *r, double seconds)
 {
 	return r->rays.bootstrap > 0 ? (uint64_t)fmin(seconds * RAYS_A_SECOND / r->rays.bootstrap, 0x1p62) : 1ull << 62;

@@ -124,7 +124,7 @@ bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
  * on these are shorter in proportion. Without a time, no lease of the bootstrap takes more than about 20 s.
  */
 bool plan_wants_rays(const struct plan_request *r);
-/* Bootstrap samples in so many seconds of one thread, at least 256; the maximum if no rays were counted. */
+/* Bootstrap samples that one thread draws in that many seconds, at least 256; the maximum if no rays were counted. */
 uint64_t plan_bootstrap_room(const struct plan_request *r, double seconds);
 /* Every plan from the wire must pass this check. */
 int plan_check(const struct plan *p, struct error *e);

@@ -29,8 +29,7 @@ struct slot;
 
 enum { AGAIN_MOST = 4 };
 
-/* The worker's lease has been dropped already. can: the caller has what is needed to compute the previous epoch
- * again. */
+/* The worker's lease has already been dropped. can: the caller can have the previous epoch computed again. */
 void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text);
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
 /* Call when a result of the slot's next epoch is merged, before job_merge: its sender accepted the states. */

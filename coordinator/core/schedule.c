@@ -103,8 +103,7 @@ static bool comes_first(const struct job *a, const struct job *b)
 	return a->owner == b->owner ? a->leases_out <= b->leases_out : true;
 }
 
-/* If a job of its owner ended workers, all jobs of the owner of which nothing was computed yet share one lease at a
- * time. */
+/* If a job of its owner crashed workers, all jobs of that owner without a result so far share one lease at a time. */
 static bool must_wait(struct farm *f, const struct job *j)
 {
 	bool waits = share_is_limited(f, j) && share_unproven(f, j->owner) > 0;

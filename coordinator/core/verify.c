@@ -48,7 +48,7 @@ void verify_forget_worker(struct farm *f, const struct identity *who)
 			forget_answers(f, f->live[i], who);
 }
 
-/* Whether another class has more than so many. */
+/* Whether another class has more than that many. */
 static bool more_elsewhere(const struct farm *f, const struct peer_class *than, uint32_t workers)
 {
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {

@@ -34,7 +34,7 @@ void back_fini(struct back *b);
 /* While replaying: a batch of that lease replaces one that was merged; the old one and all after it are dropped. */
 int back_replay(struct live_job *job, struct journal *j, const struct lease_key *k, struct error *e);
 
-/* Copies them into another journal, up to so many bytes. *list, of *count, gets their places there (mem_alloc'd).
+/* Copies them into another journal, up to that many bytes. *list, of *count, gets their places there (mem_alloc'd).
  * What does not fit is left out. */
 void back_copy(const struct live_job *job, struct journal *to, uint64_t most, struct merged_record **list,
 	       size_t *count);

@@ -10,8 +10,8 @@
 void results_take(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload);
 /* One that was put off; the caller frees it. */
 void results_take_waiting(struct jobs *jobs, struct waiting_batch *w);
-/* A worker leaves. Its failures count by what is known of the files so far, because a worker that hangs says so and
- * leaves; its results are dropped. */
+/* A worker leaves. Its failures count now, by what is known of the files so far, since a worker that hangs reports that
+ * and leaves; its results are dropped. */
 void results_let_go(struct jobs *jobs, uint64_t peer);
 
 #endif

@@ -34,8 +34,8 @@ uint64_t room_for_states(const struct jobs *jobs, const struct live_job *job, ui
 /* Bytes of a job's journal beyond which a checkpoint replaces it: the limit that was set, or as many as the checkpoint
  * has; where room is not ample, as many as the checkpoint has. */
 uint64_t room_for_journal(const struct jobs *jobs, const struct live_job *job, bool ample);
-/* Whether a checkpoint can still be written after so many bytes: it is what makes room again, once the journal is
- * longer than the checkpoint. */
+/* Whether a checkpoint can still be written after that many more bytes: once the journal is longer than the checkpoint,
+ * only that makes room again. */
 bool room_is_left(const struct jobs *jobs, const struct live_job *job, uint64_t bytes);
 
 #endif

@@ -162,10 +162,10 @@ static bool stands_still(const struct session *p)
 	return !p->upload->flush && jobs_now(p->jobs) - p->upload->pace.paced > 2 * p->jobs->config.stall_seconds;
 }
 
-/* There is no room for what somebody sends whose submission was begun then. The one that has stood still for longest
- * gives way, or if there is none, the latest of those that were begun later and have sent something. So nobody holds
- * room by waiting, and who comes later takes none from those who are halfway. INFINITY: before anything of it is there,
- * for which only the first do. false: there is none. */
+/* There is no room for the files of a submission that began then. The submission that has been idle longest gives way;
+ * if none is idle, the latest of those that began later and have sent something. So no submission keeps room by
+ * waiting, and later ones take none from those that are halfway. INFINITY: before anything of it is there, for which
+ * only the first do. false: there is none. */
 static bool other_gives_way(struct peers *s, const struct session *sender, double begun)
 {
 	struct session *still = NULL, *latest = NULL;

@@ -444,7 +444,7 @@ void status_tick(struct status_socket *t)
 
 /* ---- start and end ---- */
 
-/* A socket on which nobody listens is left from an earlier run; anything else belongs to somebody. */
+/* A socket on which nobody listens is left over from an earlier run; anything else is in use. */
 static int remove_stale(const char *path, const struct sockaddr_un *a, struct error *e)
 {
 	struct stat st;

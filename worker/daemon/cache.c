@@ -28,8 +28,8 @@ static int make_folders(char *path, struct error *e)
 	}
 }
 
-/* In a folder that somebody else made or can write to, somebody else would choose what we render, because only names
- * are checked when a worker starts. The parent folder may be root's. */
+/* Whoever made the folder or can write to it could choose what we render, because only names are checked when a worker
+ * starts. So it must be ours; its parent may be root's. */
 static int check_owner(const char *path, bool or_root, struct error *e)
 {
 	struct stat st;

@@ -576,7 +576,7 @@ bool lease_queue_watch(struct agent *a)
 	return watch_builds(a) || lease;
 }
 
-/* Except for hanging threads, and scenes being built for nobody. */
+/* Whether nothing runs, apart from hanging threads and scenes that are being built for jobs that are over. */
 bool lease_queue_is_idle(const struct agent *a)
 {
 	unsigned left = 0;

@@ -245,8 +245,8 @@ static void measure(struct arguments *a, const struct scene_bundle *b)
 		plan.kind == PLAN_CHAINS ? "mutations" : "samples");
 }
 
-/* Whether there is a coordinator that accepts us, before the work of a pilot. The connection is closed again: meanwhile
- * nobody would keep it alive. */
+/* Checks that a coordinator accepts us before a pilot is rendered. The connection is closed again, since nothing would
+ * keep it alive during the pilot. */
 static int knock(const struct arguments *a, struct error *e)
 {
 	struct client *cl;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Energy redistribution: what is too bright for one sample is spread by a short Markov chain that begins there
- * (Cline, Talbot and Egbert 2005, Energy Redistribution Path Tracing; which paths it pays for, by what all techniques
- * together make of them: Bitterli and Jarosz 2019, Selectively Metropolised Monte Carlo Light Transport Simulation).
+ * Energy redistribution: what is too bright for one sample is spread by a short Markov chain that begins there (Cline,
+ * Talbot and Egbert 2005, Energy Redistribution Path Tracing). Which paths are spread follows from the density of all
+ * techniques together (Bitterli and Jarosz 2019, Selectively Metropolised Monte Carlo Light Transport Simulation).
  *
  * Every path x has C(x) = I(x) / sum of the densities of all techniques of bdpt (of those that need a light sub-path
  * over light_every, if only one sample in so many has one), I = X+Y+Z of its contribution, and

@@ -45,7 +45,7 @@ static double extended(double angle)
 	return t * t * (3 - 2 * t);
 }
 
-/* stretch: the horizon goes down to so many times its angle from the zenith, and all above with it. */
+/* stretch: the factor by which all angles from the zenith grow, so that the horizon goes down. */
 static void bake_sky(const struct baking *b, double scale, double stretch, bool extend)
 {
 	const struct image *m = &b->image;

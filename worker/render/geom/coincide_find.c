@@ -92,8 +92,7 @@ static int compare_numbers(const void *a, const void *b)
 	return x < y ? -1 : x > y;
 }
 
-/* Finds the cut with the smallest halves, judged by a sample; false: the halves would be hardly smaller than the whole.
- * */
+/* Finds the cut with the smallest halves, judged by a sample; false: they are hardly smaller than the whole. */
 static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, int *axis, double *at)
 {
 	struct member m[SAMPLE];

@@ -15,7 +15,7 @@ bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t 
 	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
 }
 
-/* More grazing rays lose what is closer to the surface that they leave than the error of floats. */
+/* Rays more grazing than this lose hits that are closer to the surface they leave than the error of floats. */
 #define LOWEST 64.0
 
 double query_lowness(vec3 n, vec3 d)

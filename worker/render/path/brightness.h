@@ -24,12 +24,12 @@ struct brightness {
 	size_t touched_count;
 };
 
-/* The map of so many samples of the whole window by `trace`, with the numbers of a stream and step; brightness_fini
- * frees it. Ticks. -ENOMEM */
+/* Makes the map from that many samples of the whole window by `trace`, with the numbers of a stream and step;
+ * brightness_fini frees it. Ticks. -ENOMEM */
 int brightness_of_samples(struct brightness *b, struct path_context *c, path_tracer *trace, uint64_t seed,
 			  enum rng_stream stream, uint64_t step, uint64_t samples, struct error *e);
 
-/* The same in steps. Of so many samples, at least so many to a cell; brightness_fini frees it. -ENOMEM */
+/* The same in steps: for a map of that many samples, at least `a_cell` to a cell; brightness_fini frees it. -ENOMEM */
 int brightness_init(struct brightness *b, const struct film_window *window, uint64_t samples, unsigned a_cell,
 		    struct error *e);
 void brightness_fini(struct brightness *b);

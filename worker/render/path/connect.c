@@ -358,7 +358,7 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	return join_lens(c, c->light, s, max_s, d, spectrum_scale(jac, l));
 }
 
-/* An emitter's point as the lens sees it: what is small or far is met by few of the film's points, or by none. */
+/* Connects a point of an emitter to the lens: few points of the film, or none, hit a small or distant emitter. */
 static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, double film[2])
 {
 	struct path_vertex y;

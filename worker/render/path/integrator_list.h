@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line an integrator: INTEGRATOR(name) stands for `const struct integrator integrator_<name>`. */
+/* One line per integrator: INTEGRATOR(name) stands for `const struct integrator integrator_<name>`. */
 INTEGRATOR(path)
 INTEGRATOR(bdpt)
 INTEGRATOR(bdpt8)

@@ -150,7 +150,7 @@ static void walk_shine(struct walk *k, vec3 o, double t0, double t1)
 	k->emission->sum = spectrum_add(k->emission->sum, l);
 }
 
-/* The same, but at most to an event, which is where the depth at one wavelength is `depth`; INFINITY: there is none. */
+/* The same, but no further than the event where the depth at one wavelength is `depth`; INFINITY: no event. */
 static double walk_to_event(struct walk *k, vec3 o, double t0, double t1, int lane, double depth)
 {
 	spectrum passed;

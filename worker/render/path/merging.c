@@ -30,7 +30,7 @@
 
 enum { PHOTONS = 4 /* places for so many a path */, TICKS = 16 };
 
-/* Photons of a disk as wide as so many samples of the camera. */
+/* A photon's disk is as wide as this many samples of the camera. */
 static const double samples_wide = 16;
 static const double same_normal = 0.9, same_plane = 0.25;
 

@@ -48,7 +48,7 @@ struct merged {
 	double bdpt, path; /* what a sample brings that finds it; INFINITY: none ever does */
 };
 
-/* Follows so many light sub-paths, with numbers of RNG_CHOICE. Ticks. -ENOMEM; merging_fini frees either way. */
+/* Traces that many light sub-paths, with numbers of RNG_CHOICE. Ticks. -ENOMEM; merging_fini frees either way. */
 int merging_photons(struct merging *m, struct path_context *c, uint64_t seed, uint64_t step, uint64_t paths);
 void merging_fini(struct merging *m);
 /* A sample of the camera, one of as many as there are sub-paths of light. false: it meets no rough surface. */

@@ -21,7 +21,7 @@ struct asset_list {
 /* 0 or -ENOMEM. */
 int asset_list_add(struct asset_list *l, const char *name, const struct xml_element *by, struct arena *arena);
 
-/* Sorts them, and leaves each once, with the first place that names it, and `but` not at all. 0 or -ENOMEM. */
+/* Sorts them, removes duplicates (the first place that names a file is kept), and removes `but`. 0 or -ENOMEM. */
 int asset_list_finish(struct asset_list *l, const char *but, struct arena *arena);
 
 #endif

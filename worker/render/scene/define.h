@@ -31,9 +31,9 @@ int define_init(struct define_table *t, const struct scene_define *given, size_t
 		struct error *e);
 int define_default(struct define_table *t, const char *name, const char *value, struct error *e);
 
-/* Replaces every $name in text, once: what is put in is not looked at again. The text itself where it has none.
- * The longest run of letters, digits and '_' after '$' must be a name, or stays as it is if `keep_unknown` is set.
- * -ENOENT: there is none of that name, and it is asked for the first time; -EEXIST: that has been said. */
+/* Replaces every $name in text; values are not expanded again. Returns text itself if it has no $. The longest run of
+ * letters, digits and '_' after '$' must be a name, or is kept if `keep_unknown` is set. -ENOENT: no such name, asked
+ * for the first time; -EEXIST: the same, already reported. */
 int define_substitute(struct define_table *t, const char *text, bool keep_unknown, size_t size_max, const char **out,
 		      struct error *e);
 

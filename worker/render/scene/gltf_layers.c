@@ -27,7 +27,7 @@ static void note_members(struct gltf *g, const json_t *extension, const char *co
 		}
 }
 
-/* Only so many entries are looked at for each material; one further behind is told of twice. */
+/* Only this many entries are checked for each material; one after those may be reported twice. */
 enum { LISTED_MOST = 64 };
 
 static bool is_listed(const struct gltf *g, const char *list, const char *extension)

@@ -218,8 +218,7 @@ static void put_emitter(struct gltf *g, const struct gltf_at *at)
 	if (json_is_true(json_object_get(at->json, "doubleSided")))
 		gltf_put_bool(g, emitter, at, "two_sided", true);
 	put_id(g, emitter, at, "emitter", GLTF_NO_COLOURS);
-	/* Emission of at most 1 is that of a screen, which does not light a room: viewers show such files in
-	 * surroundings that do. */
+	/* Emission of at most 1 is like a screen's and does not light a room: viewers add an environment. */
 	g->has_light |= rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
 }
 

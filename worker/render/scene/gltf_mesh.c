@@ -174,8 +174,7 @@ static void find_sources(struct gltf *g, struct gltf_primitive *p, const json_t 
 		gltf_fail(g, p->mesh, EINVAL, "a primitive has no POSITION");
 }
 
-/* A primitive that Draco compressed may also have its numbers in the accessors, for readers that cannot decompress it.
- * */
+/* A primitive compressed by Draco may also have its numbers in accessors, for readers that cannot decompress it. */
 static void check_draco(struct gltf *g, const struct gltf_primitive *p)
 {
 	if (!gltf_extension(g, p->mesh, p->json, "KHR_draco_mesh_compression"))

@@ -201,7 +201,7 @@ static void move(struct gltf_vectors *v, mat4 *sums, const double *weights)
 	}
 }
 
-/* The vertices are where the joints bring them; the node's own place says nothing. */
+/* The joints place the vertices; the node's own transform is ignored. */
 static void apply_skin(struct gltf *g, const struct gltf_primitive *p, struct gltf_vectors *v)
 {
 	struct gltf_at skin;

@@ -138,7 +138,7 @@ void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_a
 void gltf_grow_box(struct gltf *g, vec3 p); /* of all vertices, for a camera that sees everything */
 /* A note that the file gets once. */
 void gltf_note(struct gltf *g, const char *text);
-/* Whether the reader knows what it means, whatever becomes of it. */
+/* Whether the reader knows the extension, supported or not. */
 bool gltf_knows(const char *extension);
 
 #endif

@@ -105,7 +105,7 @@ static bool same_values(const struct value *a, const struct value *b, uint32_t *
 	return false;
 }
 
-/* left: so many more are looked at, because a few lines can hold an object in another over and over. */
+/* left: how many more are visited, because a few lines can nest objects in each other over and over. */
 static bool same_objects(const struct scene_node *a, const struct scene_node *b, uint32_t *left)
 {
 	if (a == b)

@@ -199,7 +199,7 @@ static const struct scene_node *find_object(const struct scene *s, enum plugin_c
 	return found;
 }
 
-/* A window that covers the film is none. */
+/* A window that covers the whole film is no window. */
 static int read_crop(const struct scene_node *film, struct scene_settings *out, struct error *e)
 {
 	uint64_t x = (uint64_t)node_int(film, "crop_offset_x", 0), y = (uint64_t)node_int(film, "crop_offset_y", 0);

@@ -50,8 +50,8 @@ extern const struct accuracy_settings accuracy_settings_default;
  * that names the range, or the nearest name. */
 int accuracy_settings_read(const char *text, struct accuracy_settings *out, struct error *e);
 
-/* The spelling that a plan holds: what differs from the default, in the order of the list; zeros behind the text. A
- * canonical text comes back as it is. */
+/* The canonical text, as in a plan: what differs from the default, in the order of the list, padded with zeros. A
+ * canonical text is returned unchanged. */
 void accuracy_settings_print(const struct accuracy_settings *k, char text[PLAN_ACCURACY_MAX]);
 int render_settings_canonical(const char *text, char canonical[PLAN_ACCURACY_MAX], struct error *e);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One line a setting: field of struct accuracy_settings, name, kind, where it acts; the default, the least and the
+/* One line per setting: field of struct accuracy_settings, name, kind, where it acts; the default, the least and the
  * greatest value; choices, the first of them worth 0 unless they are numbers; what it does, in one sentence; values
  * worth a sweep. */
 SETTING(tolerance, "tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 1, NULL,

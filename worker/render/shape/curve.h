@@ -30,7 +30,7 @@ struct chain_point {
 /* The chain of curve i, in `points`, a list of struct chain_point; its items before are removed. A chain of a spline is
  * off by at most a twentieth of the largest radius around. v: 0 to 1 over all curves. -ENOMEM. */
 int curve_chain(const struct curve *c, uint32_t i, struct list *points);
-/* Sets what is of the chains. -EFBIG: too many points; -ENOMEM. */
+/* Sets the members that describe the chains. -EFBIG: too many points; -ENOMEM. */
 int curve_measure(struct curve *c);
 
 /* -EFBIG: more triangles than a mesh may have; -ENOMEM. */

@@ -182,7 +182,7 @@ static int check_end(struct stream *s)
 	return inflate(&s->z, Z_SYNC_FLUSH) == Z_DATA_ERROR ? file_error(s, "the compressed mesh is damaged") : 0;
 }
 
-/* For so many vertices and triangles, if the stream can hold that many of their sizes in bytes. */
+/* Allocates that many vertices and triangles, if the stream can hold so many of their sizes in bytes. */
 static int make_room(const struct stream *s, const uint64_t count[2], uint64_t vertex_size, uint64_t triangle_size,
 		     bool normals, bool uv, struct arena *arena, struct mesh *m)
 {
@@ -196,7 +196,7 @@ static int make_room(const struct stream *s, const uint64_t count[2], uint64_t v
 	return 0;
 }
 
-/* A length and so many bytes, ended by 0 in out. */
+/* Reads a length and that many bytes, terminated by 0 in out. */
 static int take_text(struct stream *s, char *out, size_t room)
 {
 	uint64_t length = 0;

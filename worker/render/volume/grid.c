@@ -18,7 +18,7 @@
 
 /* ---- values ---- */
 
-/* Which point stands for the i-th, which may not exist. */
+/* The point used as the i-th, which may lie outside the grid. */
 static int point_of(enum grid_outside outside, int i, int n)
 {
 	if (i >= 0 && i < n)

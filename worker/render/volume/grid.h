@@ -36,11 +36,11 @@ struct grid {
 
 #define GRID_CELL_MAX 1e9
 
-/* Bricks are cubes of so many cells along a side. Cells are numbered from -1 on, for those half outside of the points.
- */
+/* Bricks are cubes of that many cells along a side. Cells are numbered from -1 on, as some lie half outside. */
 enum { GRID_BRICK = 8 };
 size_t grid_bricks(const struct grid *g);
-/* Sets what is full of so many zeros, whatever is outside. Of the grid it needs sizes, channels and values. */
+/* Marks in `full`, grid_bricks zeros, the bricks that are not empty, whatever is outside. Of the grid it needs sizes,
+ * channels and values. */
 void grid_find_full(const struct grid *g, unsigned char *full);
 
 /* The values at p, three if there is one channel, too. false: p is outside of the box, where integrals count 0. */

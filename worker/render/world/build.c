@@ -364,7 +364,7 @@ static uint32_t segments_of(const struct geom_shape *g)
 	return g->curves ? g->curves->count : 0;
 }
 
-/* A check needs no tree, but what it can say of black backs is worth a fraction of a second. */
+/* A check needs no tree, but building one to report black backs is worth a fraction of a second. */
 static bool is_quick_to_build(const struct world *w)
 {
 	enum { QUICK = 1 << 18 };

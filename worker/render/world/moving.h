@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * For building worlds: what moves. A shape is built where it is when the shutter opens, and then moves as an instance
- * of its own mesh does, by its transforms after the inverse of the first; a mesh in a shapegroup is built as it is
+ * Moving shapes, while a world is built. A shape is built where it is when the shutter opens, and then moves like an
+ * instance of its own mesh, by its transforms after the inverse of the first; a mesh in a shapegroup is built as it is
  * there. One thread.
  */
 #ifndef WORKER_RENDER_WORLD_MOVING_H

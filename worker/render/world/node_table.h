@@ -23,7 +23,7 @@ struct node_table {
 	uint64_t compared; /* entries probed so far */
 };
 
-/* For at most so many entries. 0 or -ENOMEM. */
+/* Makes a table for at most that many entries. 0 or -ENOMEM. */
 int node_table_init(struct node_table *t, uint32_t most, struct arena *arena);
 
 /* false: not found. */
