@@ -102,7 +102,7 @@ touch "$took"
 # Of a first run: what takes minutes of a core begins first.
 longest="worker/render/path/test_integrators image/test_reference worker/render/mutation/test_forced image/test_calibration worker/render/mutation/test_balance image/test_effects image/test_scenes numerics/test_hard"
 
-# The tests of a kind, one a line; programs that took long the last time first, new ones before them.
+# The tests of a kind, one per line; programs that took long the last time first, new ones before them.
 list() {
 	case $1 in
 	unit) find "$build/tests" -type f -name 'test_*' -perm -u+x | sort ;;

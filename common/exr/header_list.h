@@ -44,7 +44,7 @@ ROW(RAYS_CLOSEST, "hslt:raysClosest", STRING, false, "rays traced to the closest
 ROW(RAYS_SHADOW, "hslt:raysShadow", STRING, false, "rays traced between two points")
 ROW(STUCK, "hslt:stuck", STRING, false, "times that a chain accepted nothing during a whole epoch")
 ROW(LONGEST_STUCK, "hslt:longestStuck", STRING, false, "most rejections in a row")
-ROW(STRATEGIES, "hslt:strategies", STRING, false, "what each strategy of the mixture did; one a line")
+ROW(STRATEGIES, "hslt:strategies", STRING, false, "what each strategy of the mixture did; one per line")
 ROW(NOTE, "hslt:note", STRING, false, "notes on the image")
 ROW(AGREEMENT, "hslt:agreement", STRING, false,
     "whether the chains agree: agree, too short, disagree (Metropolis only)")
@@ -54,7 +54,7 @@ ROW(R_HAT_MEDIAN, "hslt:rHatMedian", DOUBLE, false,
 ROW(R_HAT_WORST, "hslt:rHatWorst", DOUBLE, false, "its largest")
 ROW(CLASSES, "hslt:classes", STRING, false,
     "energy of each class of paths in % of the light, in the bootstrap and in the chains")
-ROW(EFFECTS, "hslt:effects", STRING, false, "each effect, on or off, and why; one a line")
+ROW(EFFECTS, "hslt:effects", STRING, false, "each effect, on or off, and why; one per line")
 ROW(MIXED, "hslt:mixed", INT, false, "1: workers with different arithmetic took part, the bits cannot be reproduced")
 ROW(WALL, "hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge")
 ROW(CPU, "hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads")

@@ -297,11 +297,11 @@ void plan_describe_epoch(const struct plan_request *r, const struct plan *p, cha
 	else if (rule == RULE_MOST)
 		snprintf(text, size, "epochs: the maximum of %s in a lease without a pilot", thing);
 	else if (rule == RULE_SECONDS)
-		snprintf(text, size, "epochs: leases of about %d s for a thread that makes %.3g %s a second",
+		snprintf(text, size, "epochs: leases of about %d s for a thread that makes %.3g %s per second",
 			 LEASE_SECONDS, r->speed, thing);
 	else if (rule == RULE_BANDWIDTH)
 		snprintf(text, size,
-			 "epochs: %.3g MB of tiles per lease at %.3g MB/s for a thread that makes %.3g %s a second",
+			 "epochs: %.3g MB of tiles per lease at %.3g MB/s for a thread that makes %.3g %s per second",
 			 1e-6 * (double)lease_bytes(p), 1e-6 * r->bandwidth, r->speed > 0 ? r->speed : SPEED_UNKNOWN,
 			 thing);
 	else if (size)

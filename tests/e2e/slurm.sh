@@ -122,7 +122,7 @@ job_field() {
 	scontrol show job "$1" | sed -n "s/.* *$2=\([^ ]*\).*/\1/p" | head -n 1
 }
 
-# Names of the workers at the coordinator, one a line.
+# Names of the workers at the coordinator, one per line.
 workers() {
 	"$BIN/hslt-status" --json 2>/dev/null | sed 's/.*"workers":\[//; s/\],"leases":\[.*//' | grep -o '"name":"[^"]*"' | sed 's/.*:"//; s/"//'
 }

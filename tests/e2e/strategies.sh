@@ -7,7 +7,7 @@ INTEGRATOR=${INTEGRATOR:-hslt}
 LIST="--mutations hslt=0.75,independent=0.25"
 COUNT="--bootstrap 16384 --mutations 40000"
 
-# counters FILE: whole numbers of all strategies, in order, one a line
+# counters FILE: whole numbers of all strategies, in order, one per line
 counters() {
 	"${PYTHON:-python3}" - "$1" <<-'END'
 		import json, sys

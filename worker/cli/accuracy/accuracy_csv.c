@@ -20,7 +20,7 @@ const struct accuracy_column accuracy_columns[] = {
 	{"us_low", "95 % interval of that"},
 	{"us_high", ""},
 	{"acceptance", "share of accepted mutations"},
-	{"failed_walks", "share of walks that did not converge or did not lead back; empty: no walks"},
+	{"failed_walks", "share of walks that did not converge or whose reverse walk did not return; empty: no walks"},
 	{"rays", "a mutation"},
 	{"error_mutations", "relative error after as many mutations as the default"},
 	{"error_mutations_low", "95 % interval of that"},
@@ -38,7 +38,7 @@ const struct accuracy_column accuracy_columns[] = {
 	{"block_y", "and from the top"},
 	{"bias_seen", "lower bound of the bias, for all settings and blocks tested together; 0: none was seen"},
 	{"bias_bound", "upper bound of the bias, of the mean or of any block"},
-	{"front", "1: on the Pareto front; empty: the reference, which takes no part"},
+	{"front", "1: on the Pareto front; empty: the reference, which is not ranked"},
 	{"beaten_by", "the setting that beats it; empty: it is on the front"},
 	{0},
 };

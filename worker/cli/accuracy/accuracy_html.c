@@ -133,10 +133,11 @@ static int put_picture(struct text_file *p, const struct accuracy_context *x, st
 	mem_free(bytes);
 	if (rc)
 		return rc;
-	text_file_put(p, "<p><img alt=\"the scene, as the reference has it\" width=\"%u\" src=\"data:image/png;base64,",
+	text_file_put(p,
+		      "<p><img alt=\"the scene, from the reference image\" width=\"%u\" src=\"data:image/png;base64,",
 		      j->width < 480 ? j->width * (480 / j->width) : j->width);
 	text_file_base64(p, png, size);
-	text_file_put(p, "\"/><br/><span class=\"note\">The scene, as the reference has it.</span></p>\n");
+	text_file_put(p, "\"/><br/><span class=\"note\">The scene, from the reference image.</span></p>\n");
 	mem_free(png);
 	return 0;
 }
@@ -178,7 +179,7 @@ static void put_facts(struct text_file *p, const struct accuracy_context *x)
 	fact(p, "Plan of the default", text);
 	snprintf(text, sizeof text,
 		 "%zu settings in turns, %.0f s in all%s; each %.3g s of CPU, the reference %g times that",
-		 x->design->count, r->wall_seconds, r->interrupted ? " (interrupted: what was there by then)" : "",
+		 x->design->count, r->wall_seconds, r->interrupted ? " (interrupted: the figures so far)" : "",
 		 x->judgement->figures[ACCURACY_DEFAULT].cpu_seconds, ACCURACY_REFERENCE_SHARE);
 	fact(p, "Run", text);
 	snprintf(text, sizeof text, "rendered carefully: %s",
@@ -199,36 +200,32 @@ static void put_guide(struct text_file *p, const struct accuracy_context *x)
 	paragraph(
 		p,
 		"Each setting differs from the default in one parameter (presets: in several). All were rendered in "
-		"turns, a round of each after the other, so that whatever else the machine did meets all of them alike.");
+		"turns, a round of each after the other, so that whatever else the machine did affects all of them alike.");
 	text_file_put(
 		p,
 		"<p><b>Error at equal time</b> is the relative error that the setting reaches in the CPU time that the "
 		"default had (%.3g s), and <b>error at equal mutations</b> that after as many mutations (%llu). Both "
 		"are noise: the square root of the mean, over pixels and colours, of the squared standard error over "
 		"the squared brightness, from the spread between independent groups of chains; the %g %% of the pixels "
-		"with the greatest errors are left out, because a single one can be most of the whole and say nothing "
+		"with the greatest errors are left out, because a single pixel can dominate the error and say nothing "
 		"about the setting. Half the error takes four times the time.</p>\n",
 		x->judgement->at_cpu_seconds, (unsigned long long)x->judgement->at_mutations, 100 * ACCURACY_TRIM);
 	text_file_put(
 		p,
 		"<p><b>Bias</b> is what no amount of time removes: the mean of the image against that of the reference, "
 		"and the block of the image (of %u x %u) that differs most surely. Figures in parentheses are 95 %% "
-		"intervals. A bias is called seen when it is beyond chance even though all blocks of all settings were "
-		"asked.</p>\n",
+		"intervals. A bias counts as seen when chance cannot explain it, although all blocks of all settings were tested.</p>\n",
 		x->judgement->across, x->judgement->down);
 	paragraph(
 		p,
 		"A setting lies on the front (shaded) when no other one beats it: none has surely less error at equal "
 		"time without a sign of more bias, and none is free of a bias that was seen in it without surely more "
-		"error. \"Surely\" is beyond the intervals, shared among all settings; a setting whose bias is known "
-		"much less well, or whose own interval of the bias leaves out 0, beats nobody by speed. max-depth, "
-		"roughness and tessellation make another image by what they are: they beat nobody, and may lie on the "
-		"front as trades.");
+		"error. \"Surely\" means beyond the intervals, which are widened for the number of settings; a setting whose bias is known "
+		"much less well, or whose own interval of the bias excludes 0, beats nothing by speed. max-depth, "
+		"roughness and tessellation change the image by design: they beat nothing, but may lie on the front as trade-offs.");
 	if (!x->judgement->file)
-		paragraph(
-			p,
-			"The reference is the careful preset, rendered longer, so that a bias which it has too cannot "
-			"be seen here; --reference FILE takes an image of another integrator instead.");
+		paragraph(p, "The reference is the careful preset, rendered longer, so a bias that it shares cannot be "
+			     "seen here; --reference FILE takes an image of another integrator instead.");
 }
 
 static void put_summary(struct text_file *p, const struct accuracy_context *x)
@@ -270,7 +267,7 @@ static void put_mutations(struct text_file *p, const struct accuracy_context *x)
 	text_file_put(
 		p,
 		"<h2>At equal mutations, and what a mutation costs</h2>\n<table>\n<tr><th class=\"t\">setting</th><th>mutations</th>"
-		"<th>&#181;s CPU a mutation</th><th>accepted, %%</th><th>failed walks, %%</th><th>rays a mutation</th>"
+		"<th>&#181;s CPU per mutation</th><th>accepted, %%</th><th>failed walks, %%</th><th>rays per mutation</th>"
 		"<th>error at equal mutations, %%</th></tr>\n");
 	for (size_t i = 0; i < x->design->count; i++) {
 		const struct accuracy_figures *f = &x->judgement->figures[i];
@@ -288,10 +285,9 @@ static void put_mutations(struct text_file *p, const struct accuracy_context *x)
 		cell(p, i == ACCURACY_REFERENCE ? none : f->equal_mutations, false, false);
 		text_file_put(p, "</tr>\n");
 	}
-	text_file_put(
-		p,
-		"</table>\n<p class=\"note\">Failed walks: those that did not converge or whose way back did not lead "
-		"to where they began, of all walks on the manifold.</p>\n");
+	text_file_put(p,
+		      "</table>\n<p class=\"note\">Failed walks: the share of all walks on the manifold that did not "
+		      "converge or whose reverse walk did not return to their start.</p>\n");
 }
 
 static void put_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
@@ -305,7 +301,7 @@ static void put_sweep(struct text_file *p, const struct accuracy_context *x, con
 	accuracy_plot_sweep(p, x, s);
 	text_file_put(
 		p,
-		"<table>\n<tr><th class=\"t\">value</th><th>&#181;s a mutation</th><th>accepted, %%</th><th>failed walks, %%</th>"
+		"<table>\n<tr><th class=\"t\">value</th><th>&#181;s per mutation</th><th>accepted, %%</th><th>failed walks, %%</th>"
 		"<th>error at equal time, %%</th><th>bias of the mean, %%</th><th>of the worst block, %%</th></tr>\n");
 	for (size_t k = 0; k < s->count; k++) {
 		size_t i = s->setting[k];

@@ -237,7 +237,7 @@ static int run_session(struct session *s, struct error *e)
 	if (!rc && !s->a->quiet)
 		print_summary(s);
 	if (!rc && s->run.interrupted)
-		rc = error_set(e, EINTR, "interrupted: %s holds what there was by then", s->a->output);
+		rc = error_set(e, EINTR, "interrupted: %s holds the figures so far", s->a->output);
 	return rc;
 }
 
