@@ -8,11 +8,12 @@
 # lines name what failed, as `failed: NAME: WHY`, what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`;
 # the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 #
-# As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts wait for half of
-# their time, so two of them share one processor; when they have ended, programs have that one too.
-# HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: an extended regular expression for those that are left out. No test has a limit of wall clock, which a busy machine would reach: it is ended when
-# its processes have used HSLT_TEST_CPU seconds of processor time (default 1800; with FULL=1 28800), or have been idle without output for
-# HSLT_TEST_IDLE seconds (900; 3600), see tests/limit/limit.c.
+# As many programs run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts wait for most of
+# their time, so three of them share one processor; when they have ended, programs have that one too.
+# HSLT_TEST_KINDS: "unit script" (default both). HSLT_TEST_WITHOUT: an extended regular expression for those that are left out. No test
+# has a limit of wall clock, which a busy machine would reach: it is ended when its processes have used HSLT_TEST_CPU seconds of processor
+# time (default 1800; with FULL=1 28800), or have been idle without output for HSLT_TEST_IDLE seconds (900; 3600), see
+# tests/limit/limit.c.
 set -u
 if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its file
 	run=$2 kind=$3 file=$4
@@ -129,7 +130,7 @@ done
 jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)} beside=0
 [ ! -s "$run/script.list" ] || [ "$jobs" -lt 2 ] || beside=1
 trap '' USR1 # until xargs takes it
-one script $((1 + beside)) &
+one script $((1 + 2 * beside)) &
 scripts=$!
 one unit $((jobs - beside)) &
 units=$!

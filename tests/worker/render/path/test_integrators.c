@@ -90,9 +90,9 @@ static void test_glass(void **state)
 	(void)state;
 	check_all("glass", "glass.xml",
 		  &(struct lengths){.path = 3072,
-				    .bdpt = at_length(3072), /* what erpt begins with */
+				    .bdpt = 3072,
 				    .rare = at_length(2048),
-				    .spread = 4000,
+				    .spread = at_length(4000),
 				    .rare_spread = at_length(5760)});
 }
 

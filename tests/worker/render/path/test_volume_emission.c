@@ -42,17 +42,19 @@ static void forgive_rounding(struct agree_image *image, double expected)
 				image->mean[g][c] = expected;
 }
 
-/* Samples per pixel. all: also by the integrators that are made of others; if that takes long, with FULL=1. */
+/* Samples per pixel. all: also by the integrators that are made of others. What takes long is for FULL=1: the others
+ * from LONG samples on, and bdpt from LONGER on. */
 struct effort {
 	uint64_t spp;
 	bool all;
 };
 
-enum { LONG = 1000 };
+enum { LONG = 1000, LONGER = 8000 };
 
 static uint64_t spp_of(size_t i, struct effort e)
 {
-	return i < 2 || (e.all && (e.spp < LONG || test_full())) ? e.spp : 0;
+	static const uint64_t most[INTEGRATORS] = {UINT64_MAX, LONGER, LONG, LONG, LONG};
+	return (i < 2 || e.all) && (e.spp < most[i] || test_full()) ? e.spp : 0;
 }
 
 /* Every block of the image has X + Y + Z = `sum`, by paths of `least` edges or more. Takes the world. */
