@@ -278,7 +278,19 @@ static void moments_are_the_plans(void **state)
 	assert_int_equal(batch_check(&b, &p, &e), 0);
 	b.moments[0] *= 1.01f;
 	assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
+	/* A proposal of which hardly anything was left: its moments are rounded to multiples of 2^-149, or to 0. */
+	float *second = &b.moments[sequences * tiles];
+	for (uint64_t s = 0; s < sequences; s++)
+		b.moments[s * tiles] = 0;
+	b.moments[0] = 0x1.fp-140f;
+	*second = b.moments[0] + 0x1p-149f;
+	assert_int_equal(batch_check(&b, &p, &e), 0);
 	b.moments[0] = 0;
+	*second = 0x1p-149f;
+	assert_int_equal(batch_check(&b, &p, &e), 0);
+	*second = 0x1p-130f;
+	assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
+	*second = 0;
 	const double time = (double)b.counters[COUNT_SAMPLES], classes_bad[] = {-1e-300, NAN, INFINITY, time};
 	for (size_t i = 0; i < sizeof classes_bad / sizeof *classes_bad; i++) {
 		b.classes[3] = classes_bad[i];
