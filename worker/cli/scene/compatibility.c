@@ -67,7 +67,10 @@ static void print_stand_in(FILE *out, enum plugin_class cls, const char *type)
 		fprintf(out, "`%s` |\n", stand_in);
 		break;
 	case LENIENT_INNER:
-		fprintf(out, "the BSDF inside, else `%s` |\n", stand_in);
+		if (stand_in)
+			fprintf(out, "the BSDF inside, else `%s` |\n", stand_in);
+		else
+			fprintf(out, "the %s inside |\n", plugin_class_name(cls));
 		break;
 	}
 }

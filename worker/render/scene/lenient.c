@@ -22,14 +22,22 @@ static const struct {
 	const char *type, *stand_in;
 } likes[] = {
 	{PLUGIN_BSDF, "measured", "roughplastic"}, /* where its file is missing */
+	{PLUGIN_BSDF, "dielectric_disp", "dielectric"},
+	{PLUGIN_BSDF, "disney", "principled"},
+	{PLUGIN_BSDF, "openpbr", "principled"},
 	/* 3 p.m. of the first day, instead of all times together */
 	{PLUGIN_EMITTER, "timed_sunsky", "sunsky"},
 	{PLUGIN_EMITTER, "avg_sunsky", "sunsky"},
 };
 
+/* Textures that change the one inside. */
+static const char *const around_texture[] = {"lut", "math", "uv_set_selector", NULL};
+
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)
 {
 	*stand_in = NULL;
+	if (cls == PLUGIN_TEXTURE && is_one_of(type, around_texture))
+		return LENIENT_INNER;
 	for (size_t i = 0; i < sizeof likes / sizeof *likes; i++)
 		if (likes[i].cls == cls && strcmp(likes[i].type, type) == 0) {
 			*stand_in = likes[i].stand_in;
@@ -73,8 +81,22 @@ const char *lenient_param(const char *stand_in, const char *name)
 {
 	static const char *const colors[] = {"base_color", "diffuse_reflectance", "color", "diffuse", "albedo", NULL};
 	static const char *const days[] = {"start_year", "start_month", "start_day", NULL};
+	static const struct {
+		const char *other, *principled;
+	} shares[] = {
+		{"base_metalness", "metallic"},
+		{"specular_roughness", "roughness"},
+		{"specular_roughness_anisotropy", "anisotropic"},
+		{"specular_ior", "eta"},
+		{"transmission_weight", "spec_trans"},
+		{"coat_weight", "coat"},
+		{"fuzz_weight", "sheen"},
+	};
 	if (strcmp(stand_in, "diffuse") == 0 && is_one_of(name, colors))
 		return "reflectance";
+	for (size_t i = 0; i < sizeof shares / sizeof *shares && strcmp(stand_in, "principled") == 0; i++)
+		if (strcmp(shares[i].other, name) == 0)
+			return shares[i].principled;
 	if (strcmp(stand_in, "sunsky") == 0 && is_one_of(name, days))
 		return name + strlen("start_");
 	return name;
@@ -158,7 +180,7 @@ const char *lenient_missing(const struct asset_source *assets, const struct xml_
 	return NULL;
 }
 
-struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el)
+struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el, enum plugin_class wanted)
 {
 	struct error unused;
 	enum plugin_class cls;
@@ -166,7 +188,7 @@ struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element
 		struct xml_element *target = c;
 		if (strcmp(c->name, "ref") == 0 && id_table_find(ids, c, "id", &target, &unused))
 			continue;
-		if (plugin_class_find(target->name, &cls) && cls == PLUGIN_BSDF)
+		if (plugin_class_find(target->name, &cls) && cls == wanted)
 			return target;
 	}
 	return NULL;

@@ -17,7 +17,8 @@ enum lenient_way {
 	LENIENT_REFUSE,	   /* no replacement: a sensor */
 	LENIENT_LEAVE_OUT, /* a medium, a shape, an emitter, a texture (the parameter keeps its default) */
 	LENIENT_REPLACE,   /* by *stand_in of the same class */
-	LENIENT_INNER,	   /* by the BSDF inside, if there is one; otherwise as LENIENT_REPLACE */
+	/* By the one of its class inside; otherwise as LENIENT_REPLACE or, without a stand-in, LENIENT_LEAVE_OUT. */
+	LENIENT_INNER,
 };
 
 /* For a plug-in that no table has. */
@@ -50,7 +51,7 @@ bool lenient_needs_texture(const char *type);
  * replacement. */
 const char *lenient_missing(const struct asset_source *assets, const struct xml_element *el);
 
-/* The BSDF inside one that is not supported; NULL: none. */
-struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el);
+/* The first object of the class `wanted` inside one of it that is not supported; NULL: none. */
+struct xml_element *lenient_inner(struct id_table *ids, const struct xml_element *el, enum plugin_class wanted);
 
 #endif

@@ -42,6 +42,13 @@ int note_difference(const struct notes *t, const struct xml_element *owner, cons
 		el->file, el->line, owner->name, type, name);
 }
 
+int note_guide(const struct notes *t, const struct xml_element *el)
+{
+	const char *type = xml_attribute(el, "type");
+	return note(t, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> only guides Mitsuba's sampling and is ignored",
+		    el->file, el->line, el->name, type);
+}
+
 int note_foreign(const struct notes *t, const struct xml_element *el)
 {
 	return note(t, el, "", "", "%s:%d: <%.64s> is ignored with its contents", el->file, el->line, el->name);

@@ -28,6 +28,7 @@ int note_foreign_parameter(const struct notes *t, const struct xml_element *owne
 /* A name of 0.6 in a file of 3.x. */
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);
+int note_guide(const struct notes *t, const struct xml_element *el); /* plugin_is_guide */
 /* An element that is ignored with all inside; an object of which its table keeps something. */
 int note_foreign(const struct notes *t, const struct xml_element *el);
 int note_ignored_plugin(const struct notes *t, const struct xml_element *el, const struct plugin_decl *decl);

@@ -81,33 +81,35 @@ const char *plugin_new_name(const struct plugin_decl *d, const char *name)
 	return name;
 }
 
+bool plugin_is_guide(const char *element, const char *type)
+{
+	return strcmp(element, class_names[PLUGIN_EMITTER]) == 0 && type && strcasecmp(type, "portal") == 0;
+}
+
 static const struct {
 	enum plugin_class cls;
 	const char *type;
 } mitsubas[] = {
-	{PLUGIN_SHAPE, "deformable"},
-	{PLUGIN_SHAPE, "ellipsoids"},
-	{PLUGIN_SHAPE, "ellipsoidsmesh"},
-	{PLUGIN_BSDF, "hk"},
-	{PLUGIN_BSDF, "irawan"},
-	{PLUGIN_BSDF, "measured_polarized"},
-	{PLUGIN_BSDF, "neuralbsdf"},
-	{PLUGIN_TEXTURE, "curvature"},
-	{PLUGIN_TEXTURE, "mesh_attribute"},
-	{PLUGIN_TEXTURE, "vertexcolors"},
-	{PLUGIN_TEXTURE, "volume"},
-	{PLUGIN_EMITTER, "timed_sunsky"},
-	{PLUGIN_SENSOR, "distant"},
-	{PLUGIN_SENSOR, "fluxmeter"},
-	{PLUGIN_SENSOR, "irradiancemeter"},
-	{PLUGIN_SENSOR, "radiancemeter"},
-	{PLUGIN_FILM, "specfilm"},
-	{PLUGIN_MEDIUM, "heterogeneous"},
-	{PLUGIN_MEDIUM, "homogeneous"},
-	{PLUGIN_PHASE, "kkay"},
-	{PLUGIN_PHASE, "microflake"},
-	{PLUGIN_PHASE, "sggx"},
-	{PLUGIN_VOLUME, "hgridvolume"},
+	{PLUGIN_SHAPE, "deformable"},	  {PLUGIN_SHAPE, "displace"},
+	{PLUGIN_SHAPE, "ellipsoids"},	  {PLUGIN_SHAPE, "ellipsoidsmesh"},
+	{PLUGIN_SHAPE, "mergeinstance"},  {PLUGIN_SHAPE, "packed"},
+	{PLUGIN_BSDF, "acousticbsdf"},	  {PLUGIN_BSDF, "dielectric_disp"},
+	{PLUGIN_BSDF, "disney"},	  {PLUGIN_BSDF, "hk"},
+	{PLUGIN_BSDF, "irawan"},	  {PLUGIN_BSDF, "measured_polarized"},
+	{PLUGIN_BSDF, "neuralbsdf"},	  {PLUGIN_BSDF, "openpbr"},
+	{PLUGIN_TEXTURE, "color_ramp"},	  {PLUGIN_TEXTURE, "curvature"},
+	{PLUGIN_TEXTURE, "fieldtexture"}, {PLUGIN_TEXTURE, "lut"},
+	{PLUGIN_TEXTURE, "math"},	  {PLUGIN_TEXTURE, "mesh_attribute"},
+	{PLUGIN_TEXTURE, "mix_rgb"},	  {PLUGIN_TEXTURE, "uv_set_selector"},
+	{PLUGIN_TEXTURE, "vertexcolors"}, {PLUGIN_TEXTURE, "volume"},
+	{PLUGIN_EMITTER, "astroobject"},  {PLUGIN_EMITTER, "timed_sunsky"},
+	{PLUGIN_SENSOR, "distant"},	  {PLUGIN_SENSOR, "fluxmeter"},
+	{PLUGIN_SENSOR, "hdistant"},	  {PLUGIN_SENSOR, "irradiancemeter"},
+	{PLUGIN_SENSOR, "microphone"},	  {PLUGIN_SENSOR, "radiancemeter"},
+	{PLUGIN_FILM, "specfilm"},	  {PLUGIN_FILM, "tape"},
+	{PLUGIN_MEDIUM, "heterogeneous"}, {PLUGIN_MEDIUM, "homogeneous"},
+	{PLUGIN_PHASE, "kkay"},		  {PLUGIN_PHASE, "microflake"},
+	{PLUGIN_PHASE, "sggx"},		  {PLUGIN_VOLUME, "hgridvolume"},
 	{PLUGIN_VOLUME, "volcache"},
 };
 

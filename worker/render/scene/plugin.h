@@ -20,6 +20,9 @@ const struct param *plugin_param(const struct plugin_decl *d, const char *name);
 /* The 3.x name of what 0.5/0.6 names differently, beyond the spelling; otherwise the name itself. */
 const char *plugin_new_name(const struct plugin_decl *d, const char *name);
 
+/* An object in the scene that only tells Mitsuba where light comes from, and changes no image. type: NULL: none. */
+bool plugin_is_guide(const char *element, const char *type);
+
 /* Whether it is one of Mitsuba's own plug-ins, of either dialect, that are not or were not supported. */
 bool plugin_is_mitsubas(enum plugin_class cls, const char *type);
 /* The index-th of these, with its class; NULL: no more. */

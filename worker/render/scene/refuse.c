@@ -23,8 +23,8 @@ static const char *lenient_hint(const struct xml_element *el, enum plugin_class 
 		snprintf(text, size, "; --lenient uses `%s` instead", other);
 		break;
 	case LENIENT_INNER:
-		snprintf(text, size, "; --lenient uses the %s inside it, or `%s`, instead", plugin_class_name(cls),
-			 other);
+		snprintf(text, size, "; --lenient uses the %s inside it%s%s%s instead", plugin_class_name(cls),
+			 other ? ", or `" : "", other ? other : "", other ? "`," : "");
 		break;
 	default:
 		*text = 0;
@@ -55,6 +55,8 @@ int refuse_element(const struct xml_element *el, struct error *e)
 	char hint[128];
 	if (strcmp(el->name, "subsurface") == 0)
 		return xml_error(el, e, EINVAL, "subsurface scattering is not supported; --lenient leaves it out");
+	if (strcmp(el->name, "field") == 0)
+		return xml_error(el, e, EINVAL, "fields are not supported; --lenient leaves them out");
 	struct spelling s = {.wanted = el->name};
 	plugin_offer_classes(&s);
 	value_offer_elements(&s);

@@ -457,6 +457,8 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 	enum plugin_class cls;
 	if (el->ignored)
 		return note_foreign(&m->notes, el);
+	if (plugin_is_guide(el->name, xml_attribute(el, "type")))
+		return note_guide(&m->notes, el);
 	if (plugin_class_find(el->name, &cls))
 		return make_object(m, el, &objects[m->scene->object_count]);
 	if (strcmp(el->name, "include") == 0)

@@ -15,12 +15,17 @@ int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, st
 	enum lenient_way way = lenient_element(el, cls, *type, &other);
 	if (way == LENIENT_REFUSE)
 		return refuse_type(decls, el, cls, *type, t->error);
-	*inner = way == LENIENT_INNER ? lenient_inner(ids, el) : NULL;
+	*inner = way == LENIENT_INNER ? lenient_inner(ids, el, cls) : NULL;
+	if (way == LENIENT_INNER && !*inner && !other)
+		way = LENIENT_LEAVE_OUT;
 	int r = way == LENIENT_LEAVE_OUT
 			? leave_out(t, el, *type, "", "the plug-in")
 			: note(t, el, *type, "",
 			       "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)",
-			       el->file, el->line, el->name, *type, *inner ? "the BSDF inside" : "a standard ",
+			       el->file, el->line, el->name, *type,
+			       !*inner		    ? "a standard "
+			       : cls == PLUGIN_BSDF ? "the BSDF inside"
+						    : "the texture inside",
 			       *inner ? "" : other);
 	if (r || way == LENIENT_LEAVE_OUT)
 		return r ? r : REPORT_TOLD;

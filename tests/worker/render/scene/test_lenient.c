@@ -27,6 +27,11 @@ static void test_stand_ins(void **state)
 	} expected[] = {
 		{PLUGIN_BSDF, "irawan", LENIENT_INNER, "diffuse"},
 		{PLUGIN_BSDF, "neuralbsdf", LENIENT_INNER, "diffuse"},
+		{PLUGIN_BSDF, "openpbr", LENIENT_REPLACE, "principled"},
+		{PLUGIN_BSDF, "dielectric_disp", LENIENT_REPLACE, "dielectric"},
+		{PLUGIN_TEXTURE, "math", LENIENT_INNER, NULL},
+		{PLUGIN_TEXTURE, "color_ramp", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_FILM, "tape", LENIENT_REPLACE, "hdrfilm"},
 		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "sunsky"},
 		{PLUGIN_EMITTER, "laser", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
@@ -61,6 +66,94 @@ static void test_colours_are_kept(void **state)
 	assert_string_equal(lenient_param("sunsky", "start_month"), "month");
 	assert_string_equal(lenient_param("sunsky", "turbidity"), "turbidity");
 	assert_string_equal(lenient_param("roughplastic", "diffuse_reflectance"), "diffuse_reflectance");
+}
+
+static struct scene read_leniently(const char *xml)
+{
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	if (scene_read_lenient(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	return s;
+}
+
+/* OpenPBR's shares by the names that `principled` has for them; what it has no name for goes. */
+static void test_openpbr(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='3.0.0'>\n<bsdf type='openpbr' id='b'><rgb name='base_color' value='0.2 0.4 0.6'/>"
+		"<float name='base_metalness' value='0.25'/><float name='specular_roughness' value='0.35'/>"
+		"<float name='specular_roughness_anisotropy' value='0.45'/><float name='specular_ior' value='1.7'/>"
+		"<float name='transmission_weight' value='0.1'/><float name='coat_weight' value='0.15'/>"
+		"<float name='coat_roughness' value='0.05'/><float name='fuzz_weight' value='0.65'/>"
+		"<float name='thin_film_weight' value='0.5'/></bsdf></scene>";
+	static const struct {
+		const char *name;
+		double value;
+	} expected[] = {{"metallic", 0.25},  {"roughness", 0.35}, {"anisotropic", 0.45},    {"eta", 1.7},
+			{"spec_trans", 0.1}, {"coat", 0.15},	  {"coat_roughness", 0.05}, {"sheen", 0.65}};
+	struct scene s = read_leniently(xml);
+	const struct scene_node *b = scene_named(&s, "b");
+	assert_string_equal(b->type, "principled");
+	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
+		assert_true(node_float(b, expected[i].name, -1) == expected[i].value);
+	assert_non_null(node_find(b, "base_color"));
+	assert_int_equal(b->property_count, 1 + sizeof expected / sizeof *expected);
+	assert_true(scene_has_note(&s, "`thin_film_weight` is not supported and left out (lenient)"));
+	scene_fini(&s);
+}
+
+/* Textures around others give way to the first inside; without one they are left out, as fields are. */
+static void test_textures_around_others(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'>\n"
+				  "<bsdf type='diffuse' id='computed'><texture type='math' name='reflectance'>"
+				  "<string name='expr' value='in[0] * in[1]'/><texture type='checkerboard'/>"
+				  "<texture type='gridtexture'/></texture></bsdf>\n"
+				  "<bsdf type='diffuse' id='bare'><texture type='lut' name='reflectance'/></bsdf>\n"
+				  "<bsdf type='diffuse' id='field'><texture type='fieldtexture' name='reflectance'>"
+				  "<field name='field' type='bitmap'/></texture></bsdf>\n"
+				  "<field type='bitmap'/></scene>";
+	struct scene s = read_leniently(xml), strict;
+	assert_string_equal(node_ref(scene_named(&s, "computed"), "reflectance")->type, "checkerboard");
+	assert_null(node_find(scene_named(&s, "bare"), "reflectance"));
+	assert_null(node_find(scene_named(&s, "field"), "reflectance"));
+	assert_true(scene_has_note(&s,
+				   "s.xml:2: <texture type=\"math\"> is not supported; the texture inside stands in "
+				   "for it (lenient)"));
+	assert_true(scene_has_note(&s, "s.xml:3: <texture>: the plug-in `lut` is not supported and left out"));
+	scene_fini(&s);
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct error e;
+	assert_int_equal(scene_read_all(&strict, &assets, "s.xml", render_plugins(), NULL, 0, false, &e), 0);
+	assert_int_equal(strict.problem_count, 4);
+	assert_non_null(strstr(strict.problems[0], "this texture of Mitsuba's is not supported; --lenient uses the "
+						   "texture inside it instead (supported: "));
+	assert_non_null(strstr(strict.problems[3], "fields are not supported; --lenient leaves them out"));
+	scene_fini(&strict);
+}
+
+/* A portal is no emitter that the scene has, and nobody needs to be lenient. */
+static void test_portals(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='3.0.0'>\n<emitter type='portal'><transform name='to_world'>"
+				  "<scale x='2'/></transform></emitter><emitter type='constant'/></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_int_equal(s.object_count, 1);
+	assert_string_equal(s.objects[0]->type, "constant");
+	assert_true(scene_has_note(&s, "s.xml:2: <emitter type=\"portal\"> only guides Mitsuba's sampling and is "
+				       "ignored"));
+	scene_fini(&s);
 }
 
 /* Covers go where they are not supported, and only there: what bsdf_create says of the same node. */
@@ -278,6 +371,9 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_stand_ins),
+		cmocka_unit_test(test_openpbr),
+		cmocka_unit_test(test_textures_around_others),
+		cmocka_unit_test(test_portals),
 		cmocka_unit_test(test_colours_are_kept),
 		cmocka_unit_test(test_covers),
 		cmocka_unit_test(test_lost_measurements),
