@@ -42,8 +42,8 @@ static int refuse_name(const char *name, const struct scene_node *n, struct erro
 static int named(struct metal *m, const char *name, const struct scene_node *n, struct arena *arena, struct error *e)
 {
 	if (strcasecmp(name, "none") == 0) {
-		m->eta = color_constant(0);
-		m->k = color_constant(1);
+		m->eta.color = color_constant(0);
+		m->k.color = color_constant(1);
 		return 0;
 	}
 	for (size_t i = 0; i < sizeof metals / sizeof *metals; i++) {
@@ -56,21 +56,27 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 			for (size_t r = 0; r < METAL_ROWS; r++)
 				room[c * METAL_ROWS + r] = metals[i].row[r][c];
 		/* Where colours are rgb, Mitsuba converts n and k as if they were light, without D65. */
-		m->eta = color_of_table(METAL_ROWS, room, room + METAL_ROWS, false, false);
-		m->k = color_of_table(METAL_ROWS, room, room + 2 * METAL_ROWS, false, false);
+		m->eta.color = color_of_table(METAL_ROWS, room, room + METAL_ROWS, false, false);
+		m->k.color = color_of_table(METAL_ROWS, room, room + 2 * METAL_ROWS, false, false);
 		return 0;
 	}
 	return refuse_name(name, n, e);
 }
 
-static int given(struct color *c, const struct scene_node *n, const char *name, struct arena *arena, struct error *e)
+static int given(struct texture *t, const struct scene_node *n, const char *name, const struct bsdf_build *build,
+		 struct error *e)
 {
-	const struct property *p = node_find(n, name);
-	if (!p)
-		return 0;
-	struct error reason;
-	int code = color_from_value(&p->value, COLOR_UNBOUNDED, arena, c, &reason);
-	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
+	const struct texture_build inner = bsdf_texture_build(build);
+	return node_find(n, name) ? texture_from_node(t, n, name, 0, COLOR_UNBOUNDED, &inner, e) : 0;
+}
+
+/* What is left to divide by. */
+static double set_outside(struct texture *t, double outside)
+{
+	if (!texture_is_constant(t))
+		return outside;
+	t->color.scale /= outside;
+	return 1;
 }
 
 int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
@@ -79,9 +85,9 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 	double outside;
 	int code = named(m, node_string(n, "material", build->dialect_3 ? "none" : "Cu"), n, build->arena, e);
 	if (!code)
-		code = given(&m->eta, n, "eta", build->arena, e);
+		code = given(&m->eta, n, "eta", build, e);
 	if (!code)
-		code = given(&m->k, n, "k", build->arena, e);
+		code = given(&m->k, n, "k", build, e);
 	if (!code)
 		code = ior_read(n, "ext_eta", build->dialect_3 ? 1 : IOR_AIR_DEFAULT, &outside, e);
 	if (!code)
@@ -89,12 +95,14 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 	if (code)
 		return code;
 	b->black = texture_max(&m->reflectance) == 0;
-	m->eta.scale /= outside;
-	m->k.scale /= outside;
-	m->perfect = color_max(&m->eta) == 0 && color_max(&m->k) > 0;
+	m->eta_over = set_outside(&m->eta, outside);
+	m->k_over = set_outside(&m->k, outside);
+	m->varies = !texture_is_constant(&m->eta) || !texture_is_constant(&m->k);
+	b->textured |= m->varies;
+	m->perfect = !m->varies && texture_max(&m->eta) == 0 && texture_max(&m->k) > 0;
 	if (!m->perfect) {
-		bsdf_add_shape(b, m->eta.shape);
-		bsdf_add_shape(b, m->k.shape);
+		bsdf_add_shape(b, texture_shape(&m->eta));
+		bsdf_add_shape(b, texture_shape(&m->k));
 	}
 	return 0;
 }
@@ -104,7 +112,12 @@ spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double
 	spectrum r = texture_eval(&m->reflectance, &p->where, p->w), index[2], f;
 	if (m->perfect)
 		return r;
-	color_eval_both(&m->eta, &m->k, p->w, index);
+	if (m->varies) {
+		index[0] = spectrum_scale(1 / m->eta_over, texture_eval(&m->eta, &p->where, p->w));
+		index[1] = spectrum_scale(1 / m->k_over, texture_eval(&m->k, &p->where, p->w));
+	} else {
+		color_eval_both(&m->eta.color, &m->k.color, p->w, index);
+	}
 	double c = !(cosine > 0) ? 0 : cosine < 1 ? cosine : 1;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		f.v[i] = fresnel_conductor(c, index[0].v[i], index[1].v[i]);

@@ -7,7 +7,9 @@
 #include "worker/render/bsdf/ior.h"
 
 struct metal {
-	struct color eta, k;
+	struct texture eta, k;
+	bool varies;		 /* eta or k is an image or a pattern; these are not yet divided by the index outside */
+	double eta_over, k_over; /* that index for what varies, otherwise 1 */
 	struct texture reflectance; /* factor */
 	bool perfect;		    /* reflects everything: the Fresnel factor is 1 */
 };
@@ -16,11 +18,11 @@ struct metal {
  * 0.5/0.6 dialect and none (a perfect mirror) in 3.x. Sets b's colour and texture flags. */
 int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
-#define METAL_PARAMS                                                                                                \
-	{.name = "material", .types = VALUE_STRING}, {.name = "eta", .types = VALUE_COLOR, .max = PARAM_METAL_MAX}, \
-		{.name = "k", .types = VALUE_COLOR, .max = PARAM_METAL_MAX}, IOR_NUMBER("ext_eta"),                 \
-	{                                                                                                           \
-		.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1                                    \
+#define METAL_PARAMS                                                                                                  \
+	{.name = "material", .types = VALUE_STRING}, {.name = "eta", .types = VALUE_TEXTURE, .max = PARAM_METAL_MAX}, \
+		{.name = "k", .types = VALUE_TEXTURE, .max = PARAM_METAL_MAX}, IOR_NUMBER("ext_eta"),                 \
+	{                                                                                                             \
+		.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1                                      \
 	}
 
 /* Reflectance for the cosine to the (micro)surface normal. */

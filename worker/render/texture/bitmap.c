@@ -99,8 +99,8 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 			 const struct texture_build *build, struct error *e)
 {
 	struct bitmap *b = t->data;
-	if (role == COLOR_UNBOUNDED)
-		return node_error(n, e, ENOTSUP, "a bitmap cannot be used for this quantity");
+	if (role == COLOR_UNBOUNDED) /* as in Mitsuba, whose images have values up to 1 unless they are emitters' */
+		role = COLOR_REFLECTANCE;
 	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
 					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT,
 					   !build->number     ? IMAGE_ALL

@@ -30,6 +30,8 @@ static const char *const bsdf_cases[] = {
 	"roughconductor material=Ag alpha=0.05 distribution=ggx specular_reflectance=rgb(0.5,0.6,0.7)",
 	"roughconductor alpha=1 eta=rgb(0.2,0.9,1.1) k=rgb(3.9,2.4,2.1)",
 	"roughconductor alpha=1 eta=0.2 k=3 distribution=ggx",
+	"roughconductor alpha=0.4 k=3 | @eta checkerboard color0=0.3 color1=rgb(0.2,0.9,1.4)",
+	"conductor eta=0.2 ext_eta=1.3 | @k checkerboard color0=rgb(2,2.5,3) color1=4",
 	"roughconductor material=none alpha_u=0.1 alpha_v=0.4",
 	"roughconductor material=Au alpha_u=0.6 alpha_v=0.05 distribution=ggx",
 	"roughconductor material=Au | @alpha checkerboard color0=0.3 color1=0.3",

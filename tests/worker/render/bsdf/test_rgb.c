@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What is not said of each lane alone where the lanes are R, G and B: the indices of metals, and tints. */
+#include "tests/support/memory_assets.h"
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/texture/color.h"
@@ -44,6 +45,52 @@ static void test_two_tables(void **state)
 	assert_memory_equal(&both[1], &sb, sizeof sb);
 }
 
+/* Indices that vary over the surface: of a pattern, beyond 1 as well, and of an image, whose values end at 1. What
+ * varies is relative to the outside as what does not. */
+static void test_indices_that_vary(void **state)
+{
+	(void)state;
+	static const unsigned char pink[] = "P6 1 1 255\n\xff\0\xff";
+	const struct memory_file files[] = {{"pink.ppm", (const char *)pink, sizeof pink - 1}, {0}};
+	const struct asset_source assets = memory_assets(files);
+	static const struct {
+		const char *text;
+		double u, eta[3], k[3];
+	} cases[] = {
+		{"conductor ext_eta=1.25 k=3 | @eta checkerboard color0=2 color1=rgb(0.5,1,1.5)",
+		 0.3,
+		 {1.6, 1.6, 1.6},
+		 {2.4, 2.4, 2.4}},
+		{"conductor ext_eta=1.25 k=3 | @eta checkerboard color0=2 color1=rgb(0.5,1,1.5)",
+		 0.8,
+		 {0.4, 0.8, 1.2},
+		 {2.4, 2.4, 2.4}},
+		{"conductor eta=0.25 | @k checkerboard color0=3 color1=6", 0.8, {0.25, 0.25, 0.25}, {6, 6, 6}},
+		{"conductor k=2 | @eta bitmap filename=pink.ppm", 0.3, {1, 0, 1}, {2, 2, 2}},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct arena a = {0};
+		const struct bsdf_build build = {.arena = &a, .dialect_3 = true, .assets = &assets};
+		struct bsdf_point at = point;
+		struct bsdf b;
+		struct error e;
+		if (bsdf_create(&b, node_bsdf(&a, cases[i].text), &build, &e))
+			fail_msg("%s: %s", cases[i].text, e.text);
+		assert_true(b.textured);
+		at.where.u = cases[i].u;
+		at.where.v = 0.3;
+		vec3 wi;
+		double chance;
+		spectrum f = bsdf_eval_delta(&b, &at, (vec3){0.6, 0, 0.8}, BSDF_REFLECT, &wi, &chance);
+		for (int c = 0; c < 3; c++) {
+			double want = fresnel_conductor(0.8, cases[i].eta[c], cases[i].k[c]);
+			if (!(fabs(f.v[c] - want) < 1e-6))
+				fail_msg("row %zu, channel %d: %.9f, expected %.9f", i, c, f.v[c], want);
+		}
+		arena_fini(&a);
+	}
+}
+
 /* A tint is the base colour over its luminance, here 0.39186. It scales the 0.04 that an index of 1.5 reflects, as a
  * quarter of it does the 0.16 of an index of 7/3. */
 static void test_tint(void **state)
@@ -67,6 +114,6 @@ static void test_tint(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(test_silver), cmocka_unit_test(test_two_tables),
-					   cmocka_unit_test(test_tint)};
+					   cmocka_unit_test(test_tint), cmocka_unit_test(test_indices_that_vary)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
