@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Mitsuba 0.6's hair: straight pieces of one radius, which to_world does not change. Joints are rounded, where Mitsuba
- * has mitres, and ends are closed. angle_threshold, which merges pieces that are almost straight to save time, has no
- * effect.
+ * Mitsuba 0.6's hair: straight pieces of one radius, which to_world scales as it scales its z axis. Joints are rounded,
+ * where Mitsuba has mitres, and ends are closed. angle_threshold, which merges pieces that are almost straight to save
+ * time, has no effect.
  */
 #include "worker/render/shape/curve_file.h"
 #include "worker/render/shape/curve_shape.h"
@@ -20,9 +20,11 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 		 struct shape_geometry *out, struct error *e)
 {
 	struct curve_points points;
+	mat4 to_world = node_transform(n, "to_world");
 	if (node_float(n, "reduction", 0) > 0)
 		return node_error(n, e, ENOTSUP, "\"reduction\" is only supported as 0: all hair is rendered");
-	int rc = curve_file_read_hair(n, assets, node_float(n, "radius", 0.025), &points, e);
+	double scale = vec3_length(mat4_vector(&to_world, (vec3){0, 0, 1}));
+	int rc = curve_file_read_hair(n, assets, scale * node_float(n, "radius", 0.025), &points, e);
 	return rc ? rc : curve_shape_take(n, &points, false, arena, out, e);
 }
 

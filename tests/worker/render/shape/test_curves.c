@@ -321,7 +321,13 @@ static void test_hair(void **state)
 	const char *radius = "<float name='radius' value='0.1'/>";
 	struct built_shape a = built_ok("hair", radius, text), b = built("hair", radius, bytes, binary_hair(bytes)),
 			   c = built_ok("linearcurve", "", "0 0 0 0.1\n1 0 0 0.1\n2 1 0 0.1\n\n0 2 0 0.1\n0 3 0 0.1\n"),
-			   d = built_ok("hair", "", text);
+			   d = built_ok("hair", "", text),
+			   s = built_ok("hair",
+					"<float name='radius' value='0.05'/><transform name='to_world'>"
+					"<scale x='7' y='7' z='2'/><rotate y='1' angle='30'/></transform>",
+					"0 0 0\n0 1 0\n");
+	/* to_world scales radii as it scales z. A tube of 12 sides has the area of the cylinder, without its ends. */
+	assert_true(near(built_area(&s.g.mesh), 2 * M_PI * 0.1 * 7, 0.03));
 	if (b.result)
 		fail_msg("%s", b.error.text);
 	assert_int_equal(a.g.mesh.vertex_count, b.g.mesh.vertex_count);
@@ -333,6 +339,7 @@ static void test_hair(void **state)
 	built_shape_release(&b);
 	built_shape_release(&c);
 	built_shape_release(&d);
+	built_shape_release(&s);
 }
 
 static void test_bad_files(void **state)
