@@ -14,6 +14,7 @@
 static const struct param params[] = {
 	{"radiance", VALUE_TEXTURE, PARAM_UNDERSTOOD, 0, PARAM_LIGHT_MAX, NULL},
 	{"two_sided", VALUE_BOOL, PARAM_UNDERSTOOD, 0, 0, NULL},
+	{"twosided", VALUE_BOOL, PARAM_UNDERSTOOD, 0, 0, NULL}, /* the same, by Mitsuba 3's name */
 	{"sampling_weight", VALUE_FLOAT, PARAM_IGNORED, 0, 0, NULL},
 	{NULL, 0, PARAM_UNDERSTOOD, 0, 0, NULL},
 };
@@ -40,7 +41,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	int rc = surface_light_create(em, n, build, e);
 	if (rc)
 		return rc;
-	bool both = node_bool(n, "two_sided", false);
+	bool both = node_bool(n, "two_sided", node_bool(n, "twosided", false));
 	/* The scene's radius is 1: a ball of half of that has an area of pi. */
 	l->back = !both ? 0 : is_closed(&l->light) && l->light.area < M_PI ? 0.0625 : 0.5;
 	em->power = l->light.area * M_PI * em->brightest * (both ? 2 : 1);

@@ -286,7 +286,7 @@ static void test_direction(void **state)
 			8, 8,
 			SENSOR("0,0,3",
 			       "0,0,0") "<shape type='sphere'><float name='radius' value='4'/><emitter type='area'>"
-					"<boolean name='two_sided' value='true'/></emitter></shape>"),
+					"<boolean name='twosided' value='true'/></emitter></shape>"),
 		0.5);
 	struct world *w[2] = {
 		world_of_text(8, 8, TWO_SIDED("cube")),
