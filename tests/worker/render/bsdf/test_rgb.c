@@ -65,6 +65,7 @@ static void test_indices_that_vary(void **state)
 		 0.8,
 		 {0.4, 0.8, 1.2},
 		 {2.4, 2.4, 2.4}},
+		{"conductor ext_eta=1.25 eta=2 k=3", 0.3, {1.6, 1.6, 1.6}, {2.4, 2.4, 2.4}},
 		{"conductor eta=0.25 | @k checkerboard color0=3 color1=6", 0.8, {0.25, 0.25, 0.25}, {6, 6, 6}},
 		{"conductor k=2 | @eta bitmap filename=pink.ppm", 0.3, {1, 0, 1}, {2, 2, 2}},
 	};
@@ -76,7 +77,7 @@ static void test_indices_that_vary(void **state)
 		struct error e;
 		if (bsdf_create(&b, node_bsdf(&a, cases[i].text), &build, &e))
 			fail_msg("%s: %s", cases[i].text, e.text);
-		assert_true(b.textured);
+		assert_true(b.textured == (strchr(cases[i].text, '@') != NULL));
 		at.where.u = cases[i].u;
 		at.where.v = 0.3;
 		vec3 wi;

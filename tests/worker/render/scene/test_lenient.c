@@ -110,17 +110,20 @@ static void test_openpbr(void **state)
 static void test_textures_around_others(void **state)
 {
 	(void)state;
-	static const char xml[] = "<scene version='3.0.0'>\n"
-				  "<bsdf type='diffuse' id='computed'><texture type='math' name='reflectance'>"
-				  "<string name='expr' value='in[0] * in[1]'/><texture type='checkerboard'/>"
-				  "<texture type='gridtexture'/></texture></bsdf>\n"
-				  "<bsdf type='diffuse' id='bare'><texture type='lut' name='reflectance'/></bsdf>\n"
-				  "<bsdf type='diffuse' id='field'><texture type='fieldtexture' name='reflectance'>"
-				  "<field name='field' type='bitmap'/></texture></bsdf>\n"
-				  "<field type='bitmap'/></scene>";
+	static const char xml[] =
+		"<scene version='3.0.0'>\n"
+		"<bsdf type='diffuse' id='computed'><texture type='math' name='reflectance'>"
+		"<string name='expr' value='in[0] * in[1]'/><texture type='checkerboard'/>"
+		"<texture type='gridtexture'/></texture></bsdf>\n"
+		"<bsdf type='diffuse' id='bare'><texture type='lut' name='reflectance'/></bsdf>\n"
+		"<bsdf type='diffuse' id='field'><texture type='fieldtexture' name='reflectance'>"
+		"<field name='field' type='bitmap'/></texture></bsdf>\n"
+		"<bsdf type='irawan'><texture name='t' type='checkerboard'/><bsdf type='conductor'/></bsdf>"
+		"<field type='bitmap'/></scene>";
 	struct scene s = read_leniently(xml), strict;
 	assert_string_equal(node_ref(scene_named(&s, "computed"), "reflectance")->type, "checkerboard");
 	assert_null(node_find(scene_named(&s, "bare"), "reflectance"));
+	assert_string_equal(s.objects[3]->type, "conductor"); /* not the texture */
 	assert_null(node_find(scene_named(&s, "field"), "reflectance"));
 	assert_true(scene_has_note(&s,
 				   "s.xml:2: <texture type=\"math\"> is not supported; the texture inside stands in "
@@ -131,10 +134,10 @@ static void test_textures_around_others(void **state)
 	const struct asset_source assets = memory_assets(files);
 	struct error e;
 	assert_int_equal(scene_read_all(&strict, &assets, "s.xml", render_plugins(), NULL, 0, false, &e), 0);
-	assert_int_equal(strict.problem_count, 4);
+	assert_int_equal(strict.problem_count, 5);
 	assert_non_null(strstr(strict.problems[0], "this texture of Mitsuba's is not supported; --lenient uses the "
 						   "texture inside it instead (supported: "));
-	assert_non_null(strstr(strict.problems[3], "fields are not supported; --lenient leaves them out"));
+	assert_non_null(strstr(strict.problems[4], "fields are not supported; --lenient leaves them out"));
 	scene_fini(&strict);
 }
 
