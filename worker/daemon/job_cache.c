@@ -315,8 +315,10 @@ static void run_build(struct task *t)
 	uint64_t begun = uv_hrtime();
 	if (b->waits.job)
 		work_begin(&b->waits, info_of(b)->scene);
-	if (build(b, &b->error))
+	int rc = build(b, &b->error);
+	if (rc)
 		b->world = NULL;
+	b->no_memory = rc == -ENOMEM;
 	work_end();
 	b->build_seconds = (double)(uv_hrtime() - begun) * 1e-9;
 }
@@ -344,4 +346,27 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 	b->task.done = on_world_built;
 	thread_pool_add(c, &b->task);
 	return 0;
+}
+
+static bool takes_memory(const struct job_cache *b)
+{
+	return b->state == JOB_CACHE_BUILDING || b->world; /* which its thread writes while BUILDING */
+}
+
+void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool building)
+{
+	b->beside = false;
+	for (struct job_cache *o = all; o; o = o->next)
+		if (o != b && takes_memory(o)) {
+			b->beside = true;
+			o->beside |= building;
+		}
+}
+
+bool job_cache_lacked_room(const struct job_cache *b, bool no_memory)
+{
+	if (!no_memory || !b->beside)
+		return false;
+	work_memory_short();
+	return true;
 }

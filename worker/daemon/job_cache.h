@@ -58,7 +58,9 @@ struct job_cache {
 	void *owner;
 	void (*built)(struct job_cache *); /* called on the loop's thread: READY or FAILED */
 	struct error error;
-	bool own; /* FAILED: because of this machine, not the job */
+	bool own;	/* FAILED: because of this machine, not the job */
+	bool no_memory; /* FAILED: there was not enough for its world */
+	bool beside;	/* other worlds have been in memory since its build, or since its last lease, began */
 };
 
 int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, struct error *e);
@@ -75,5 +77,11 @@ bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info);
 enum job_cache_files job_cache_look(struct job_cache *b, uv_loop_t *loop);
 /* All files are there: builds the world in the thread pool. */
 int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e);
+
+/* A lease of b begins, or building its world does: notes which of all the worlds are in memory beside that of b. */
+void job_cache_note_company(struct job_cache *b, struct job_cache *all, bool building);
+/* Whether it failed for want of the memory that other worlds had, which is the machine's fault, and is noted for the
+ * worker (work.h). no_memory: what failed was an allocation. */
+bool job_cache_lacked_room(const struct job_cache *b, bool no_memory);
 
 #endif

@@ -12,9 +12,9 @@
  * sentence. A lease that is revoked, or whose job has ended, is dropped; what a thread is working on is dropped when
  * the thread returns. A message that makes no sense closes the connection. lease_queue_watch finds threads that no
  * longer make progress and fails their leases. When too many results wait to be sent, no more leases are asked for
- * (pace). Once SIGKILL has ended a rendering process, which the system sends where memory is not enough, leases of one
- * job at a time are accepted: two jobs that fit only one after the other would end each new process, and neither would
- * ever be done.
+ * (pace). Once SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an
+ * allocation has failed while several scenes were in memory, leases of one job at a time are accepted: two jobs that
+ * fit only one after the other would fail each other again and again.
  */
 #include "worker/daemon/lease_queue.h"
 
@@ -63,6 +63,11 @@ static void tidy_fetches(struct agent *a)
 	}
 }
 
+static bool is_in_use(const struct job_cache *b)
+{
+	return b->users || b->state == JOB_CACHE_BUILDING || b->reading.check;
+}
+
 /* Drops unused job_caches of jobs that have ended, and the least recently used ones beyond WORLDS_KEPT. */
 static void drop_unused_job_caches(struct agent *a)
 {
@@ -70,7 +75,7 @@ static void drop_unused_job_caches(struct agent *a)
 		struct job_cache *oldest = NULL, *ended = NULL;
 		unsigned idle = 0;
 		for (struct job_cache *b = a->job_caches; b; b = b->next) {
-			if (b->users || b->state == JOB_CACHE_BUILDING || b->reading.check)
+			if (is_in_use(b))
 				continue;
 			idle++;
 			if (b->ended || b->state == JOB_CACHE_FAILED)
@@ -88,16 +93,17 @@ static void drop_unused_job_caches(struct agent *a)
 	tidy_fetches(a);
 }
 
-/* Where memory has not been enough, scenes are in it one at a time: those that no lease uses are dropped. The job that
- * is left; NULL: none. */
-static const struct job_cache *keep_one(struct agent *a)
+/* Where memory has not been enough, scenes are in it one at a time: the others that no lease uses are dropped. The job
+ * that stays, of several in use the first; next: if none is in use; may be NULL. */
+static struct job_cache *keep_one(struct agent *a, struct job_cache *next)
 {
 	struct job_cache *left = NULL;
-	for (struct job_cache *b = a->job_caches, *next; b; b = next) {
-		next = b->next;
-		if (b->users || b->state == JOB_CACHE_BUILDING || b->reading.check)
-			left = b;
-		else
+	for (struct job_cache *b = a->job_caches; b; b = b->next)
+		left = is_in_use(b) ? b : left;
+	left = left ? left : next;
+	for (struct job_cache *b = a->job_caches, *after; b; b = after) {
+		after = b->next;
+		if (b != left && !is_in_use(b))
 			drop_job_cache(a, b);
 	}
 	tidy_fetches(a);
@@ -138,6 +144,7 @@ static void start_lease(struct agent *a, struct lease_task *l)
 {
 	l->owner = a;
 	l->finished = on_rendered;
+	job_cache_note_company(l->job_cache, a->job_caches, false);
 	lease_task_start(l, a->thread_pool);
 }
 
@@ -145,6 +152,7 @@ static void on_built(struct job_cache *b)
 {
 	struct agent *a = b->owner;
 	if (b->state == JOB_CACHE_FAILED) {
+		b->own |= job_cache_lacked_room(b, b->no_memory);
 		fail_job_cache(a, b, &b->error);
 	} else {
 		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_u64(b->job), b->build_seconds,
@@ -177,6 +185,7 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 		for (const struct lease_task *l = a->leases; l; l = l->next)
 			if (l->job_cache == b)
 				b->waits = l->grant.key;
+		job_cache_note_company(b, a->job_caches, true);
 		rc = job_cache_build(b, a->thread_pool, &e);
 	}
 	if (rc) {
@@ -242,7 +251,8 @@ static void on_rendered(struct lease_task *l)
 		if (l->rc == -EILSEQ)
 			send_bad_states(a, &l->grant, l->error.text);
 		else
-			send_failed(a, &l->grant.key, l->rc ? l->error.text : "", false);
+			send_failed(a, &l->grant.key, l->rc ? l->error.text : "",
+				    job_cache_lacked_room(l->job_cache, l->rc == -ENOMEM));
 		drop_lease(a, l);
 	} else {
 		send_result(a, l);
@@ -272,12 +282,15 @@ static bool is_stuffed(const struct agent *a)
 	return answered >= ANSWERS_MOST;
 }
 
-static int begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
+static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
 {
-	const struct job_cache *other = work_was_killed() ? keep_one(a) : NULL;
-	if (other)
+	*b = find_job_cache(a, job);
+	const struct job_cache *first = work_memory_was_short() ? keep_one(a, *b) : NULL;
+	if (first && first != *b)
 		return error_set(e, ENOMEM, "memory has no room for its scene beside that of j%llu",
-				 log_u64(other->job));
+				 log_u64(first->job));
+	if (*b)
+		return 0;
 	int rc = job_cache_new(b, job, a->cache.blobs, e);
 	if (rc)
 		return rc;
@@ -296,7 +309,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		conn_close(a->conn, e.text);
 		return;
 	}
-	struct job_cache *b = find_job_cache(a, g.key.job);
+	struct job_cache *b;
 	l = find_lease(a, &g.key);
 	if (l && !blob_hash_equal(&l->grant.digest,
 				  &g.digest)) { /* the previous epoch was computed again: this is another lease */
@@ -319,7 +332,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		grant_fini(&g);
 		return;
 	}
-	int rc = b ? 0 : begin_job(a, &b, g.key.job, &e);
+	int rc = find_or_begin_job(a, &b, g.key.job, &e);
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {

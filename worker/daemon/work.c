@@ -22,7 +22,7 @@ struct shared {
 	atomic_int number;   /* of the signal that ended the process; 0: none */
 	atomic_int hit;	     /* the entry of the thread that received it; -1: none of these */
 	char text[CRASH_TEXT];
-	bool killed; /* an earlier process, by SIGKILL */
+	bool memory_short; /* see work_memory_was_short */
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
 	struct work of[WORK_THREADS];
@@ -107,7 +107,7 @@ unsigned work_lose(int number)
 	int said = atomic_load(&shared->number), hit = said ? atomic_load(&shared->hit) : -1;
 	unsigned before;
 	drop_reported();
-	shared->killed |= number == SIGKILL;
+	shared->memory_short |= number == SIGKILL;
 	before = shared->lost_count;
 	if (said || number)
 		for (unsigned i = 0; i < WORK_THREADS; i++) {
@@ -124,9 +124,15 @@ unsigned work_lose(int number)
 	return shared->lost_count - before;
 }
 
-bool work_was_killed(void)
+bool work_memory_was_short(void)
 {
-	return shared && shared->killed;
+	return shared && shared->memory_short;
+}
+
+void work_memory_short(void)
+{
+	if (shared)
+		shared->memory_short = true;
 }
 
 struct lost_lease *work_lost(unsigned index)

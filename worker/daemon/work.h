@@ -35,8 +35,10 @@ void work_end(void);
  * are lost from now on. Returns their number; also 0 if it ended without a signal. */
 unsigned work_lose(int number);
 
-/* SIGKILL has ended a rendering process since the supervisor started: the machine is probably short of memory. */
-bool work_was_killed(void);
+/* The machine is short of memory: since the supervisor started, SIGKILL has ended a rendering process, or one has
+ * called work_memory_short. */
+bool work_memory_was_short(void);
+void work_memory_short(void);
 
 /* Of earlier processes: the index-th lost lease; NULL: no more. */
 struct lost_lease *work_lost(unsigned index);

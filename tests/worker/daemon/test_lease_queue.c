@@ -10,9 +10,11 @@
 #include "worker/daemon/agent.h"
 #include "worker/daemon/agent_state.h"
 #include "worker/daemon/work.h"
+#include "tests/support/failing_memory.h"
 #include "tests/support/folder.h"
 #include "tests/support/scripted.h"
 #include "tests/support/checksummed_frame.h"
+#include "tests/support/worlds.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -23,6 +25,7 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -150,6 +153,7 @@ static void describe(uint64_t job)
 	}
 	info.job = job;
 	info.scene = names[0];
+	info.render_width = info.render_height = 8;
 	info.plan = &plan;
 	info.n_files = 2;
 	info.files = list;
@@ -528,6 +532,74 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 	finish();
 }
 
+/* Keeps the pool's only thread busy. */
+struct gate {
+	struct task task;
+	atomic_bool open;
+};
+
+static void wait_at_gate(struct task *task)
+{
+	struct gate *g = (struct gate *)task;
+	while (!atomic_load(&g->open))
+		usleep(100);
+}
+
+static void pass_gate(struct task *task)
+{
+	(void)task;
+}
+
+/* The job's world is being built, and one of its first allocations fails. The job is the latest. */
+static void run_out_of_memory(uint64_t job)
+{
+	enum { SOME = 20 };
+	struct gate g = {.task = {.run = wait_at_gate, .done = pass_gate}};
+	thread_pool_add(t.agent->thread_pool, &g.task);
+	describe(job);
+	if (!blob_has(t.agent->cache.blobs, &t.scenes[job - 1].hash, NULL)) {
+		hear_blob_get(&t.scenes[job - 1], 0);
+		send_piece(&t.scenes[job - 1], 0);
+	}
+	while (t.agent->job_caches->job != job || t.agent->job_caches->state != JOB_CACHE_BUILDING)
+		uv_run(&t.agent->loop, UV_RUN_NOWAIT);
+	mem_fail_after(SOME);
+	atomic_store(&g.open, true);
+	hear_failed("memory");
+	mem_fail_after(-1);
+}
+
+/* As above, where the system refuses memory instead: the job whose scene found none beside another's is not at fault,
+ * and one whose scene found none alone is. */
+static void memory_that_others_had_is_its_own_fault(void **state)
+{
+	static const char text[] = "<scene version='3.0.0'>" SENSOR(
+		"0,0,5", "0,0,0") "<shape type='sphere'/><emitter type='constant'/></scene>\n";
+	struct error e;
+	(void)state;
+	assert_int_equal(work_share(1, &e), 0);
+	start(0);
+	make_file(&t.scenes[0], text, sizeof text - 1);
+	make_file(&t.scenes[1], text, sizeof text - 2);
+	grant(1);
+	describe(1);
+	hear_blob_get(&t.scenes[0], 0);
+	send_piece(&t.scenes[0], 0);
+	serve_mesh(0, PIECES);
+	assert_int_equal(hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	grant(2);
+	run_out_of_memory(2);
+	assert_true(t.own);
+	say_grant(3);
+	assert_int_equal(hear_failed("memory has no room for its scene beside that of j1"), 3);
+	assert_true(t.own);
+	end_job(1);
+	grant(2);
+	run_out_of_memory(2);
+	assert_false(t.own);
+	finish();
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -541,7 +613,8 @@ int main(void)
 		TEST(a_store_without_room_fails_each_once),
 		TEST(a_full_disk_is_its_own_fault),
 		TEST(a_lost_file_is_its_own_fault),
-		TEST(one_scene_at_a_time_where_memory_was_short), /* last: the processes that ended stay known */
+		TEST(one_scene_at_a_time_where_memory_was_short), /* from here on: what work_share knows stays known */
+		TEST(memory_that_others_had_is_its_own_fault),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
