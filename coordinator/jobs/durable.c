@@ -42,7 +42,7 @@ struct durable_ack {
 	uint64_t peer; /* NOBODY: nobody waits for the answer */
 	struct lease_key key;
 	enum ack ack;
-	bool failed;
+	int failed;		 /* -errno; 0: it has not */
 	struct journal *journal; /* held */
 };
 
@@ -307,7 +307,7 @@ static void flush_journals(uv_work_t *work)
 	struct durable_ack *a;
 	STAILQ_FOREACH(a, &w->acks, next) {
 		struct error e;
-		a->failed = journal_sync(a->journal, &e) != 0;
+		a->failed = journal_sync(a->journal, &e);
 		if (a->failed)
 			log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	}
@@ -333,7 +333,7 @@ static void park(struct jobs *jobs, struct durable_ack *a)
 	}
 	STAILQ_INSERT_HEAD(&jobs->parked, a, next);
 	if (!job->held)
-		durable_hold(jobs, job, "its results cannot be stored", "its journal failed to be written");
+		durable_hold(jobs, job, "its results cannot be stored", strerror(-a->failed));
 }
 
 static void answer(struct jobs *jobs, struct durable_ack *a)

@@ -49,7 +49,7 @@ struct journal {
 	_Atomic uint64_t written, synced; /* in the file */
 	_Atomic uint64_t room;		  /* reserved up to this offset */
 	_Atomic uint64_t record;	  /* size of the last reservation */
-	atomic_bool bad;     /* an operation on the file failed: it is neither written nor trusted any more */
+	atomic_int bad; /* why an operation on the file failed, an errno: it is neither written nor trusted any more */
 	atomic_bool settled; /* everything in it is stored elsewhere */
 	atomic_uint flushes; /* being renewed */
 	char path[PATH_MOST];
@@ -186,7 +186,7 @@ static int write_waiting(struct journal *j)
 		int cut = cut_off(j); /* a torn record that could not be cut off would be cut off by the next reader,
 					 together with what follows */
 		(void)cut;
-		j->bad = true;
+		j->bad = -rc;
 	}
 	pthread_mutex_unlock(&j->writer);
 	return rc;
@@ -381,8 +381,10 @@ static bool reserve(struct journal *j, uint64_t from, uint64_t size)
 static int room_for(struct journal *j, uint64_t size, struct error *e)
 {
 	uint64_t end = journal_bytes(j);
-	if (j->bad)
-		return fault(j, EIO, e);
+	if (j->bad) {
+		fault(j, j->bad, e);
+		return -EIO;
+	}
 	if (end + size <= j->room || (AHEAD * size <= AHEAD_MOST && reserve(j, end, AHEAD * size)) ||
 	    reserve(j, end, size) || errno == EOPNOTSUPP || errno == ENOSYS)
 		return 0;
@@ -477,7 +479,7 @@ bool journal_is_gone(const struct journal *j)
 
 void journal_distrust(struct journal *j)
 {
-	j->bad = true;
+	j->bad = ENOENT;
 }
 
 void journal_settle(struct journal *j)
@@ -558,7 +560,7 @@ int journal_renew(struct journal *j, struct error *e)
 	j->synced = j->written;
 	j->stored = atomic_load(&j->in_file);
 	j->room = 0;
-	j->bad = false;
+	j->bad = 0;
 	return 0;
 }
 
@@ -569,7 +571,7 @@ uint64_t journal_generation(const struct journal *j)
 
 int journal_write(struct journal *j, struct error *e)
 {
-	int rc = j->settled ? 0 : j->bad ? -EIO : write_waiting(j);
+	int rc = j->settled ? 0 : j->bad ? -j->bad : write_waiting(j);
 	return rc ? fault(j, -rc, e) : 0;
 }
 
@@ -578,14 +580,14 @@ int journal_sync(struct journal *j, struct error *e)
 	if (j->settled)
 		return 0;
 	atomic_fetch_add(&j->flushes, 1); /* set before the check for bad: a bad journal may be renewed at any time */
-	int rc = j->bad ? -EIO : write_waiting(j);
+	int rc = j->bad ? -j->bad : write_waiting(j);
 	uint64_t written = j->written, in_file = j->in_file;
 	if (!rc && j->bad) {
-		rc = -EIO;
+		rc = -j->bad;
 	} else if (!rc && written != j->synced) {
 		if (disk_fdatasync(j->fd)) {
 			rc = -errno;
-			j->bad = true;
+			j->bad = -rc;
 		} else {
 			j->synced = written;
 			j->stored = in_file;

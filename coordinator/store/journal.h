@@ -74,7 +74,7 @@ void journal_hold(struct journal *j);
 void journal_release(struct journal *j); /* j may be NULL */
 
 /* Reserves room on the disk for a record with a body of this size, so that appending it cannot fail for lack of
- * space. -ENOSPC */
+ * space. -ENOSPC; -EIO if the journal is bad, since freeing space does not help: the sentence says what made it so. */
 int journal_reserve(struct journal *j, size_t body, struct error *e);
 /* lease: NULL: none. The body is a, copied, followed by b (may be NULL), taken on success. -ENOMEM, -EFBIG. Records
  * that are not results (estimates, counters) are refused if the disk has no room: -ENOSPC. A bad journal accepts
@@ -85,8 +85,8 @@ uint64_t journal_bytes(struct journal *j); /* bytes appended or read */
 uint64_t journal_generation(const struct journal *j);
 /* Everything appended before the call is in the file when it returns, for readers. A crash may still lose it. */
 int journal_write(struct journal *j, struct error *e);
-/* Everything appended before the call is durable when it returns; free of cost if it was already. Any thread, one at
- * a time. */
+/* Everything appended before the call is durable when it returns; free of cost if it was already. If the journal is
+ * bad, the error is the one that made it so. Any thread, one at a time. */
 int journal_sync(struct journal *j, struct error *e);
 
 /* Copies a whole journal into a new file, flushed, that replaces the old one. Then the journal is good, whatever

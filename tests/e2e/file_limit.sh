@@ -16,6 +16,10 @@ start_worker w
 id=$(submit "$BOX" -o "$DIR/box.exr" $JOB)
 until_true 60 is_refused || fail "no limit was met: $(value "$id" state)"
 until_true 10 is_state "$id" held || fail "$id is $(value "$id" state)"
+case $(value "$id" why) in
+*"File too large"*) ;;
+*) fail "it is held because: $(value "$id" why)" ;;
+esac
 "$BIN/hslt-submit" "$BOX" -o "$DIR/small.exr" --integrator path --spp 1 --size 16x12 --wait >"$DIR/small.log" 2>&1 ||
 	fail "another job cannot be done: $(cat "$DIR/small.log")"
 kill -0 "$COORDINATOR_PID" || fail "the coordinator is gone"

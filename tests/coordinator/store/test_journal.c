@@ -450,7 +450,10 @@ static void no_room(void **state)
 	assert_true(journal_is_bad(j));
 	assert_int_equal(journal_renew(j, &e), -EFBIG);
 	assert_int_equal(setrlimit(RLIMIT_FSIZE, &old), 0);
-	assert_true(journal_sync(j, &e) != 0 && journal_reserve(j, 1, &e) != 0);
+	assert_int_equal(journal_sync(j, &e), -EFBIG); /* no longer the case, but the cause */
+	assert_int_equal(journal_write(j, &e), -EFBIG);
+	assert_int_equal(journal_reserve(j, 1, &e), -EIO); /* which no free space helps against */
+	assert_non_null(strstr(e.text, "File too large"));
 	struct journal *other;
 	assert_int_equal(open_again(&other, &s, &found), 0);
 	assert_int_equal(s.count, RECORDS);
