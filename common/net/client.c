@@ -2,7 +2,7 @@
 /*
  * client_open connects and says hello. client_call sends a message and runs the loop until the answer with its number
  * arrives, a deadline passes, or the connection is lost. Fetching reads chunk by chunk into a temporary file that is
- * renamed when complete.
+ * renamed when complete. A fetch that the coordinator drops on the way begins again, a few times.
  *
  * Failures: -ECONNREFUSED, -ECONNRESET and -ETIMEDOUT may be retried (client_exit_code has the exit code of each); a
  * refusal carries the coordinator's sentence.
@@ -31,7 +31,9 @@ enum {
 	WAITING_BYTES = 1 << 26, /* of them */
 	ANSWER_SECONDS = 60,
 	HELLO_SECONDS = 10,
+	FETCH_TRIES = 5,
 };
+static const double first_fetch_pause = 0.5; /* s; twice as long each time, with jitter */
 
 struct waiting {
 	STAILQ_ENTRY(waiting) next;
@@ -48,7 +50,7 @@ struct client {
 	size_t waiting_bytes;
 	struct tls *tls; /* NULL: plaintext */
 	bool opened, timed_out, distrust;
-	char why[256], warning[384], note[256];
+	char name[128], why[256], warning[384], note[256];
 };
 
 static void on_opened(void *user)
@@ -176,14 +178,12 @@ static int unwelcome(const struct client *cl, const char *host_port, struct erro
 	return error_set(e, EACCES, "%s: %s", host_port, cl->why);
 }
 
-static int say_hello(struct client *cl, const char *host_port, const char *name, struct error *e)
+static int say_hello(struct client *cl, const char *host_port, struct error *e)
 {
-	char own[128];
 	struct client_message answer;
-	text_copy(own, sizeof own, name);
 	int rc = client_send(
-		cl, ENVELOPE(HELLO, hello, .version = FARM_VERSION, .role = FARM__ROLE__ROLE_CLIENT, .name = own), NULL,
-		0, e);
+		cl, ENVELOPE(HELLO, hello, .version = FARM_VERSION, .role = FARM__ROLE__ROLE_CLIENT, .name = cl->name),
+		NULL, 0, e);
 	if (!rc)
 		rc = client_wait(cl, HELLO_SECONDS, &answer, e);
 	if (rc && cl->distrust)
@@ -234,6 +234,7 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 		return error_set(e, ENOMEM, "no memory for a connection");
 	signal(SIGPIPE, SIG_IGN);
 	STAILQ_INIT(&cl->received);
+	text_copy(cl->name, sizeof cl->name, name);
 	if (tls && *tls)
 		rc = tls_open(&cl->tls, tls, e);
 	if (rc) {
@@ -259,7 +260,7 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 		rc = error_set(e, ECONNREFUSED, "no coordinator at %s: %s", host_port,
 			       cl->timed_out ? "no answer in time" : cl->why);
 	if (!rc)
-		rc = say_hello(cl, host_port, name, e);
+		rc = say_hello(cl, host_port, e);
 	if (rc)
 		client_close(cl);
 	else
@@ -320,8 +321,8 @@ static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_
 	if (rc)
 		return rc;
 	const Farm__FetchChunk *c = answer->envelope.message->fetch_chunk;
-	if (*c->error)
-		rc = error_set(e, ENOENT, "%s", c->error);
+	if (*c->error) /* -EAGAIN: what was there before, so it may be again */
+		rc = error_set(e, offset ? EAGAIN : ENOENT, "%s", c->error);
 	else if (c->offset != offset || (answer->payload.size == 0 && offset < c->size) ||
 		 answer->payload.size > c->size - offset)
 		rc = error_set(e, EPROTO, "the coordinator sends other bytes than requested");
@@ -355,6 +356,45 @@ static int fetch_rest(struct client *cl, struct client_message *first, uint64_t 
 		client_message_fini(&more);
 	}
 	return rc;
+}
+
+/* Without leaving the coordinator's heartbeats unanswered. */
+static void rest(struct client *cl, double seconds)
+{
+	unsigned char random = 128;
+	uv_random(NULL, NULL, &random, 1, 0, NULL);
+	seconds *= 0.5 + (double)random / 255;
+	uint64_t end = uv_hrtime() + (uint64_t)(1e9 * seconds);
+	start_clock(cl, seconds);
+	while (cl->conn && !cl->timed_out && uv_hrtime() < end)
+		uv_run(&cl->loop, UV_RUN_ONCE);
+}
+
+static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
+{
+	struct client_message first;
+	if (ftruncate(fd, 0) || lseek(fd, 0, SEEK_SET))
+		return error_set(e, EIO, "%s: %s", path, strerror(errno));
+	int rc = fetch_chunk(cl, job, what, 0, &first, e);
+	if (rc)
+		return rc;
+	rc = fetch_rest(cl, &first, job, what, fd, path, e);
+	client_message_fini(&first);
+	return rc;
+}
+
+/* Into a file, where it may begin again. Not from where it was: there may be another image by now. */
+static int fetch_whole(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
+		       const char *path, struct error *e)
+{
+	double pause = first_fetch_pause;
+	int rc = fetch_rest(cl, first, job, what, fd, path, e);
+	for (int i = 2; rc == -EAGAIN && i <= FETCH_TRIES; i++, pause *= 2) {
+		fprintf(stderr, "%s: %s; fetching it again (%d of %d)\n", cl->name, e->text, i, FETCH_TRIES);
+		rest(cl, pause);
+		rc = begin_again(cl, job, what, fd, path, e);
+	}
+	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_TRIES) : rc;
 }
 
 int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e)
@@ -413,7 +453,7 @@ static int fetch_through(struct client *cl, struct client_message *first, uint64
 	FILE *whole = tmpfile();
 	if (!whole)
 		return error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
-	int rc = fetch_rest(cl, first, job, what, fileno(whole), "a temporary file", e);
+	int rc = fetch_whole(cl, first, job, what, fileno(whole), "a temporary file", e);
 	int fd = rc ? -1 : target_open(t, e);
 	if (!rc && fd < 0)
 		rc = client_local(fd);
@@ -444,7 +484,7 @@ static int fetch_file(struct client *cl, struct client_message *first, uint64_t 
 		return error_set(e, EIO, "%s: cannot make a file there: %s", path, strerror(errno));
 	mode_t mask = umask(0);
 	umask(mask);
-	int rc = fetch_rest(cl, first, job, what, fd, path, e);
+	int rc = fetch_whole(cl, first, job, what, fd, path, e);
 	if (!rc && (fchmod(fd, 0666 & ~mask) || fsync(fd)))
 		rc = error_set(e, EIO, "%s: %s", path, strerror(errno));
 	if (close(fd) && !rc)

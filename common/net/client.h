@@ -37,13 +37,14 @@ int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__Body
 		struct client_message *answer, struct error *e);
 void client_message_fini(struct client_message *m);
 
-/* Fetches a job's result or log chunk by chunk into a temporary file, then renames it. -EIO: an error of the local
- * file. */
+/* Fetches a job's result or log chunk by chunk into a temporary file, then renames it. If the coordinator drops the
+ * fetch on the way, in favour of others, it begins again up to four times, and says so on stderr. -EIO: an error of the
+ * local file; -EAGAIN: it was dropped each time. */
 int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, struct error *e);
 /* The same into the current folder, under the last part of the name that hslt-submit was given. Because that name
  * came over the wire, -EEXIST if a file of that name exists, or if the name is unsafe (hidden, or like an option). */
 int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e);
-/* The same, to a stream. */
+/* The same, to a stream, which cannot begin again. */
 int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e);
 
 /* The exit code for an error of the functions above: 75 unreachable, 6 refused, otherwise 1. */

@@ -106,10 +106,9 @@ static int read_piece(const struct fetching *t, const Farm__Fetch *f, unsigned c
 		      struct error *e)
 {
 	if (t->job != f->job || t->what != f->what)
-		return error_set(
-			e, ESTALE,
-			"j%llu: the fetch did not start at the beginning, or was dropped in favour of others: fetch it again",
-			(unsigned long long)f->job);
+		return error_set(e, ESTALE,
+				 "j%llu: the fetch was dropped in favour of others, or did not start at the beginning",
+				 (unsigned long long)f->job);
 	if (f->offset > t->size)
 		return error_set(e, EINVAL, "the file ends before that");
 	uint64_t left = t->size - f->offset;

@@ -39,6 +39,7 @@ struct coordinator {
 	const char *host;      /* by which the client calls it; NULL: 127.0.0.1 */
 	const char *name;      /* answers one Fetch, and calls the result so */
 	uint64_t sizes[2];     /* or two, and says that the file is so long */
+	int drops;	       /* or drops the fetch so often */
 	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
 	atomic_bool hold;      /* but not yet */
 	atomic_bool deaf;      /* and does not read on while this is so */
@@ -109,6 +110,20 @@ static void say_hello(int fd)
 	send_message(fd, &m, NULL, 0);
 }
 
+static void say_dropped(int fd)
+{
+	Farm__FetchChunk chunk;
+	Farm__Envelope m;
+	char text[] = "dropped";
+	farm__fetch_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	chunk.offset = sizeof image;
+	chunk.error = text;
+	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
+	m.fetch_chunk = &chunk;
+	send_message(fd, &m, NULL, 0);
+}
+
 static void say_chunk(int fd, const char *name, uint64_t offset, uint64_t file_size)
 {
 	Farm__FetchChunk chunk;
@@ -148,6 +163,11 @@ static void *coordinate(void *user)
 		usleep(1000);
 	if (c->name && recv(fd, bytes, sizeof bytes, 0) > 0)
 		say_chunk(fd, c->name, 0, sizeof image);
+	for (int i = 0; i < 2 * c->drops && recv(fd, bytes, sizeof bytes, 0) > 0; i++)
+		if (i % 2)
+			say_dropped(fd);
+		else
+			say_chunk(fd, "", 0, 3 * sizeof image); /* of another image than at last */
 	for (int i = 0; i < 2 && c->sizes[0] && recv(fd, bytes, sizeof bytes, 0) > 0; i++)
 		say_chunk(fd, "", (uint64_t)i * sizeof image, c->sizes[i]);
 	while (recv(fd, bytes, sizeof bytes, 0) > 0)
@@ -292,6 +312,26 @@ static void a_file_of_another_size_is_another_file(void **state)
 	}
 }
 
+static void a_dropped_fetch_begins_again(void **state)
+{
+	(void)state;
+	static const char twice[] = "the image\0the image";
+	for (int drops = 1; drops <= 5; drops += 2) {
+		struct coordinator c = {.drops = drops, .sizes = {2 * sizeof image, 2 * sizeof image}};
+		struct client *cl = meet(&c);
+		struct error e;
+		int rc = client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "dropped.exr", &e);
+		part(&c, cl);
+		assert_int_equal(rc, drops < 5 ? 0 : -EAGAIN);
+		if (rc)
+			assert_string_equal(e.text, "given up after 5 attempts: dropped");
+		else
+			assert_true(holds("dropped.exr", twice, sizeof twice));
+		assert_int_equal(unlink("dropped.exr"), rc ? -1 : 0);
+	}
+	assert_int_equal(client_exit_code(-EAGAIN), 1);
+}
+
 /* Neither the coordinator's refusal nor its absence, whatever the system calls it. */
 static void own_files_are_own_faults(void **state)
 {
@@ -406,6 +446,7 @@ int main(void)
 		cmocka_unit_test(names_lead_nowhere),
 		cmocka_unit_test(who_names_a_file_gets_it),
 		cmocka_unit_test(a_file_of_another_size_is_another_file),
+		cmocka_unit_test(a_dropped_fetch_begins_again),
 		cmocka_unit_test(own_files_are_own_faults),
 		cmocka_unit_test(floods_are_dammed),
 		cmocka_unit_test(no_memory_for_a_message),

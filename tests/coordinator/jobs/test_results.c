@@ -148,7 +148,7 @@ static void what_is_fetched_is_one_file(void **state)
 	expect_piece(client[1], PIECE, 'b');
 	expect_piece(client[2], 0, 'b');
 	expect_piece(client[1], 2 * PIECE, 'b');
-	assert_non_null(strstr(piece(client[0], PIECE)->error, "fetch it again"));
+	assert_non_null(strstr(piece(client[0], PIECE)->error, "in favour of others"));
 	expect_piece(client[0], 0, 'b');
 	expect_piece(client[2], PIECE, 'b');
 	for (int i = 0; i < 3; i++)
