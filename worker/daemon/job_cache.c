@@ -40,6 +40,14 @@ static struct blob_hash hash_of(const Farm__File *f)
 	return h;
 }
 
+struct job_cache *job_cache_find(struct job_cache *all, uint64_t job)
+{
+	for (struct job_cache *b = all; b; b = b->next)
+		if (b->job == job)
+			return b;
+	return NULL;
+}
+
 int job_cache_new(struct job_cache **out, uint64_t job, struct blob_store *blobs, struct error *e)
 {
 	struct job_cache *b = mem_alloc(1, sizeof *b);

@@ -63,6 +63,7 @@ struct job_cache {
 	bool beside;	/* other worlds have been in memory since its build, or since its last lease, began */
 };
 
+struct job_cache *job_cache_find(struct job_cache *all, uint64_t job); /* NULL: none has this number */
 int job_cache_new(struct job_cache **b, uint64_t job, struct blob_store *blobs, struct error *e);
 /* Not while BUILDING, nor while a file is being read. */
 void job_cache_free(struct job_cache *b);

@@ -11,10 +11,10 @@
  * Failures: a job whose files cannot be fetched or whose scene cannot be built fails all its waiting leases with a
  * sentence. A lease that is revoked, or whose job has ended, is dropped; what a thread is working on is dropped when
  * the thread returns. A message that makes no sense closes the connection. lease_queue_watch finds threads that no
- * longer make progress and fails their leases. When too many results wait to be sent, no more leases are asked for
- * (pace). Once SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an
- * allocation has failed while several scenes were in memory, leases of one job at a time are accepted: two jobs that
- * fit only one after the other would fail each other again and again.
+ * longer make progress and fails their leases. When too many results wait to be sent, no more leases are asked for.
+ * Once SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an allocation has
+ * failed while several scenes were in memory, leases of one job at a time are accepted: two jobs that fit only one
+ * after the other would fail each other again and again.
  */
 #include "worker/daemon/lease_queue.h"
 
@@ -27,14 +27,6 @@
 #include <stdio.h>
 
 /* ---- job_caches ---- */
-
-static struct job_cache *find_job_cache(const struct agent *a, uint64_t job)
-{
-	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		if (b->job == job)
-			return b;
-	return NULL;
-}
 
 static void drop_job_cache(struct agent *a, struct job_cache *b)
 {
@@ -284,7 +276,7 @@ static bool is_stuffed(const struct agent *a)
 
 static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
 {
-	*b = find_job_cache(a, job);
+	*b = job_cache_find(a->job_caches, job);
 	const struct job_cache *first = work_memory_was_short() ? keep_one(a, *b) : NULL;
 	if (first && first != *b)
 		return error_set(e, ENOMEM, "memory has no room for its scene beside that of j%llu",
@@ -303,14 +295,13 @@ static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job
 static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
 {
 	struct grant g;
-	struct lease_task *l = NULL;
 	struct error e;
 	if (grant_unpack(&g, m, payload, size, &e)) {
 		conn_close(a->conn, e.text);
 		return;
 	}
 	struct job_cache *b;
-	l = find_lease(a, &g.key);
+	struct lease_task *l = find_lease(a, &g.key);
 	if (l && !blob_hash_equal(&l->grant.digest,
 				  &g.digest)) { /* the previous epoch was computed again: this is another lease */
 		forget_lease(a, l);
@@ -384,7 +375,7 @@ static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 
 static void take_job_end(struct agent *a, uint64_t job)
 {
-	struct job_cache *b = find_job_cache(a, job);
+	struct job_cache *b = job_cache_find(a->job_caches, job);
 	if (!b)
 		return;
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
@@ -417,7 +408,7 @@ static void disown(struct agent *a, struct job_cache *b)
 
 static void take_job_info(struct agent *a, struct envelope *env)
 {
-	struct job_cache *b = find_job_cache(a, env->message->job_info->job);
+	struct job_cache *b = job_cache_find(a->job_caches, env->message->job_info->job);
 	struct error e;
 	if (!b)
 		return;
@@ -509,8 +500,22 @@ static void tell_lost(struct agent *a)
 		}
 }
 
+/* The coordinator grants anew what it had granted: of what has not begun, no more stays than it would grant. */
+static void drop_old_leases(struct agent *a)
+{
+	unsigned open = 0;
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->state != LEASE_RENDERED && ++open > a->config.threads + 1 &&
+		    (l->state == LEASE_WAITING || thread_pool_take_back(a->thread_pool, &l->task)))
+			drop_lease(a, l);
+	}
+	drop_unused_job_caches(a);
+}
+
 void lease_queue_welcome(struct agent *a)
 {
+	drop_old_leases(a);
 	for (struct lease_task *l = a->leases; l; l = l->next)
 		l->sent = false;
 	tell_lost(a);
