@@ -454,15 +454,19 @@ static int for_each_issued(const char *folder,
 struct revocation {
 	struct authority *a;
 	const char *what;
-	unsigned count;
+	unsigned count, before; /* certificates: that it revokes, and that were revoked already */
 };
 
 static int revoke_one(void *user, X509 *cert, const struct tls_peer *who, struct error *e)
 {
 	struct revocation *r = user;
-	if ((strcmp(who->name, r->what) != 0 && strcasecmp(who->serial, r->what) != 0) || is_revoked(r->a, cert) ||
+	if ((strcmp(who->name, r->what) != 0 && strcasecmp(who->serial, r->what) != 0) ||
 	    X509_cmp_current_time(X509_get0_notAfter(cert)) < 0)
 		return 0;
+	if (is_revoked(r->a, cert)) {
+		r->before++;
+		return 0;
+	}
 	r->count++;
 	return add_revoked(r->a, cert) ? 0 : crypto_error(e, "the revocation list");
 }
@@ -484,14 +488,17 @@ int authority_revoke(const char *folder, const char *what, unsigned *count, stru
 		return rc;
 	struct revocation r = {.a = &a, .what = what};
 	rc = for_each_issued(folder, revoke_one, &r, e);
-	if (!rc && !r.count)
+	if (!rc && !r.count && !r.before)
 		rc = error_set(e, ENOENT, "no valid certificate has the name or serial number '%s'", what);
-	if (!rc)
+	if (!rc && r.count)
 		rc = sign_list(&a, e);
 	if (!rc)
 		rc = write_list(&a, "", e);
 	if (!rc)
 		rc = for_each_issued(folder, tell_coordinator, &a, e);
+	if (!rc && !r.count) /* perhaps the coordinators were not told then: that was interrupted */
+		rc = error_set(e, ENOENT, "'%s' was revoked before; crl.pem has been copied to the coordinators again",
+			       what);
 	*count = r.count;
 	authority_close(&a);
 	return rc;

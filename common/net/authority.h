@@ -21,7 +21,7 @@ int authority_init(const char *folder, const char *name, double days, struct err
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e);
 
 /* Revokes whatever has this name or serial number. Writes crl.pem, also into the coordinators' folders. -ENOENT: no
- * valid certificate has it. */
+ * valid certificate has it, or it was revoked before; then the coordinators' folders get crl.pem again. */
 int authority_revoke(const char *folder, const char *name_or_serial, unsigned *count, struct error *e);
 
 struct authority_entry {

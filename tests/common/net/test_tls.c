@@ -260,6 +260,25 @@ static void who_has_expired_is_not(void **state)
 	refuses(pair_at(pair_ours, "brief"), pair_at(pair_ours, "farm"), "does not accept this certificate", "expired");
 }
 
+/* hslt-ca was killed, or its disk was full, after the authority's own list was written. */
+static void an_interrupted_revocation_is_repeated(void **state)
+{
+	(void)state;
+	unsigned count;
+	struct error e;
+	pair_issue(pair_ours, "half", TLS_WORKER, 5);
+	copy(pair_at(pair_ours, "farm/crl.pem"), pair_at(pair_ours, "before.pem"));
+	assert_int_equal(authority_revoke(pair_ours, "half", &count, &e), 0);
+	copy(pair_at(pair_ours, "before.pem"), pair_at(pair_ours, "farm/crl.pem"));
+	accepts("half", "half", TLS_WORKER);
+	assert_int_equal(authority_revoke(pair_ours, "half", &count, &e), -ENOENT);
+	assert_non_null(strstr(e.text, "'half' was revoked before"));
+	assert_int_equal(count, 0);
+	refuses(pair_at(pair_ours, "half"), pair_at(pair_ours, "farm"), "revoked", "revoked");
+	assert_int_equal(authority_revoke(pair_ours, "nobody", &count, &e), -ENOENT);
+	assert_non_null(strstr(e.text, "no valid certificate"));
+}
+
 static void who_is_revoked_is_not(void **state)
 {
 	(void)state;
@@ -415,6 +434,7 @@ int main(void)
 		cmocka_unit_test(a_foreign_certificate_with_our_authority_beside_it),
 		cmocka_unit_test(certificates_need_one_role_and_a_name),
 		cmocka_unit_test(who_is_revoked_is_not),
+		cmocka_unit_test(an_interrupted_revocation_is_repeated),
 		cmocka_unit_test(clocks_may_be_behind),
 		cmocka_unit_test(one_authority_replaces_another),
 		cmocka_unit_test(names_are_strict),
