@@ -358,8 +358,8 @@ static int fetch_rest(struct client *cl, struct client_message *first, uint64_t 
 	return rc;
 }
 
-/* Without leaving the coordinator's heartbeats unanswered. */
-static void rest(struct client *cl, double seconds)
+/* Between half and one and a half of that time. The coordinator's heartbeats are answered meanwhile. */
+static void wait_connected(struct client *cl, double seconds)
 {
 	unsigned char random = 128;
 	uv_random(NULL, NULL, &random, 1, 0, NULL);
@@ -391,7 +391,7 @@ static int fetch_whole(struct client *cl, struct client_message *first, uint64_t
 	int rc = fetch_rest(cl, first, job, what, fd, path, e);
 	for (int i = 2; rc == -EAGAIN && i <= FETCH_TRIES; i++, pause *= 2) {
 		fprintf(stderr, "%s: %s; fetching it again (%d of %d)\n", cl->name, e->text, i, FETCH_TRIES);
-		rest(cl, pause);
+		wait_connected(cl, pause);
 		rc = begin_again(cl, job, what, fd, path, e);
 	}
 	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_TRIES) : rc;
