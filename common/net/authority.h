@@ -20,8 +20,9 @@ int authority_init(const char *folder, const char *name, double days, struct err
  * not longer than the authority. */
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e);
 
-/* Revokes whatever has this name or serial number. Writes crl.pem, also into the coordinators' folders. -ENOENT: no
- * valid certificate has it, or it was revoked before; then the coordinators' folders get crl.pem again. */
+/* Revokes whatever has this name or serial number. Writes crl.pem, also into the coordinators' folders. *count: of
+ * certificates that were not revoked before; if there are none, crl.pem is copied again. -ENOENT: no valid certificate
+ * has it. */
 int authority_revoke(const char *folder, const char *name_or_serial, unsigned *count, struct error *e);
 
 struct authority_entry {

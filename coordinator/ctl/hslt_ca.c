@@ -98,8 +98,12 @@ static int revoke(const struct arguments *a, struct error *e)
 {
 	unsigned count = 0;
 	int rc = authority_revoke(a->ca, a->what, &count, e);
+	if (!rc && !count)
+		printf("'%s' was revoked before; ", a->what);
+	else if (!rc)
+		printf("revoked %u; ", count);
 	if (!rc)
-		printf("revoked %u; %s/crl.pem must reach every coordinator\n", count, a->ca);
+		printf("%s/crl.pem must reach every coordinator\n", a->ca);
 	return rc;
 }
 
