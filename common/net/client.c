@@ -13,6 +13,7 @@
 #include "common/base/mem.h"
 #include "common/base/target.h"
 #include "common/base/text.h"
+#include "common/net/jitter.h"
 
 #include <assert.h>
 #include <fcntl.h>
@@ -358,29 +359,32 @@ static int fetch_rest(struct client *cl, struct client_message *first, uint64_t 
 	return rc;
 }
 
-/* Between half and one and a half of that time. The coordinator's heartbeats are answered meanwhile. */
+/* The coordinator's heartbeats are answered meanwhile. */
 static void wait_connected(struct client *cl, double seconds)
 {
-	unsigned char random = 128;
-	uv_random(NULL, NULL, &random, 1, 0, NULL);
-	seconds *= 0.5 + (double)random / 255;
 	uint64_t end = uv_hrtime() + (uint64_t)(1e9 * seconds);
 	start_clock(cl, seconds);
 	while (cl->conn && !cl->timed_out && uv_hrtime() < end)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 }
 
-static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
+/* From the beginning to the end. path: for messages. */
+static int fetch_to(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
 {
 	struct client_message first;
-	if (ftruncate(fd, 0) || lseek(fd, 0, SEEK_SET))
-		return error_set(e, EIO, "%s: %s", path, strerror(errno));
 	int rc = fetch_chunk(cl, job, what, 0, &first, e);
 	if (rc)
 		return rc;
 	rc = fetch_rest(cl, &first, job, what, fd, path, e);
 	client_message_fini(&first);
 	return rc;
+}
+
+static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
+{
+	if (ftruncate(fd, 0) || lseek(fd, 0, SEEK_SET))
+		return error_set(e, EIO, "%s: %s", path, strerror(errno));
+	return fetch_to(cl, job, what, fd, path, e);
 }
 
 /* Into a file, where it may begin again. Not from where it was: there may be another image by now. */
@@ -391,7 +395,7 @@ static int fetch_whole(struct client *cl, struct client_message *first, uint64_t
 	int rc = fetch_rest(cl, first, job, what, fd, path, e);
 	for (int i = 2; rc == -EAGAIN && i <= FETCH_TRIES; i++, pause *= 2) {
 		fprintf(stderr, "%s: %s; fetching it again (%d of %d)\n", cl->name, e->text, i, FETCH_TRIES);
-		wait_connected(cl, pause);
+		wait_connected(cl, jitter(pause));
 		rc = begin_again(cl, job, what, fd, path, e);
 	}
 	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_TRIES) : rc;
@@ -399,13 +403,7 @@ static int fetch_whole(struct client *cl, struct client_message *first, uint64_t
 
 int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e)
 {
-	struct client_message first;
-	int rc = fetch_chunk(cl, job, what, 0, &first, e);
-	if (rc)
-		return rc;
-	rc = fetch_rest(cl, &first, job, what, fd, "stdout", e);
-	client_message_fini(&first);
-	return rc;
+	return fetch_to(cl, job, what, fd, "stdout", e);
 }
 
 /* Unless there is a file of that name. Not every file system can tell while it renames, and not every one has hard

@@ -12,6 +12,7 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/net/jitter.h"
 #include "common/net/notify.h"
 #include "worker/daemon/lease_queue.h"
 #include "worker/daemon/outgoing.h"
@@ -38,9 +39,7 @@ static void on_retry(uv_timer_t *t)
 /* Twice as long each time, with jitter, so that a hundred workers do not reconnect at once. */
 static void try_later(struct agent *a)
 {
-	unsigned char random = 128;
-	uv_random(NULL, NULL, &random, 1, 0, NULL);
-	double wait = a->back_off * (0.5 + (double)random / 255);
+	double wait = jitter(a->back_off);
 	a->back_off = a->back_off * 2 < longest_back_off ? a->back_off * 2 : longest_back_off;
 	uv_timer_start(&a->retry, on_retry, (uint64_t)(1000 * wait), 0);
 }

@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/net/jitter.h"
+
+#include <uv.h>
+
+double jitter(double seconds)
+{
+	unsigned char random = 128; /* stays so where the system has none */
+	uv_random(NULL, NULL, &random, 1, 0, NULL);
+	return seconds * (0.5 + (double)random / 255);
+}
