@@ -33,16 +33,6 @@ uint32_t path_medium_of_emitter(const struct world *w, const struct path_vertex 
 	return medium;
 }
 
-/* What is before a camera's near plane is not there. */
-static double near_plane(const struct world *w, const struct path_vertex *from, vec3 d)
-{
-	double t_min = 0, t_max;
-	struct camera room;
-	if (from->kind == VERTEX_CAMERA)
-		camera_clip(world_camera(w, &from->x, &room), d, &t_min, &t_max);
-	return t_min;
-}
-
 spectrum path_transmittance(const struct world *w, const struct wavelengths *wl, uint32_t medium,
 			    const struct path_vertex *a, const struct path_vertex *b)
 {
@@ -54,7 +44,7 @@ spectrum path_transmittance(const struct world *w, const struct wavelengths *wl,
 	vec3 d = path_direction(from, to, &distance2);
 	bool endless = to->kind == VERTEX_INFINITE;
 	const struct medium_lanes m = medium_at(path_medium(w, medium), wl);
-	const struct grid_ray r = {from->x.p, d, near_plane(w, from, d), endless ? INFINITY : sqrt(distance2)};
+	const struct grid_ray r = {from->x.p, d, path_ray_begin(w, from, d), endless ? INFINITY : sqrt(distance2)};
 	return spectrum_attenuation(medium_depth(&m, &r));
 }
 
@@ -247,7 +237,7 @@ bool path_see_in_media(struct path_context *c, const struct path_vertex *z, cons
 	vec3 d = path_direction(z, y, &distance2);
 	struct walk k = walk_begin(c, z, d, edge, NULL);
 	struct path_vertex from = *z, face;
-	double begin = near_plane(c->w, z, d);
+	double begin = path_ray_begin(c->w, z, d);
 	for (int i = 0; i < PATH_FACES_MOST; i++) {
 		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from.x.p));
 		bool met = c->w->has_passable && path_extend(c, &from, d, begin, end, &face);

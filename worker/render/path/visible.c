@@ -39,3 +39,12 @@ bool path_visible(struct path_context *c, const struct path_vertex *a, const str
 	struct ray_end to = end_of(b);
 	return !accel_occluded(c->w->accel, &from, &to);
 }
+
+double path_ray_begin(const struct world *w, const struct path_vertex *from, vec3 d)
+{
+	double t_min = 0, t_max;
+	struct camera room;
+	if (from->kind == VERTEX_CAMERA)
+		camera_clip(world_camera(w, &from->x, &room), d, &t_min, &t_max);
+	return t_min;
+}
