@@ -15,7 +15,7 @@
 #include "worker/render/world/world.h"
 
 struct density_tally {
-	size_t betas, routes, with_delta, infinite, relabelled, skipped, off;
+	size_t betas, routes, with_delta, infinite, relabelled, passed, skipped, off;
 	double worst, worst_ratio;
 };
 

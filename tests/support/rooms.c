@@ -56,7 +56,11 @@ static struct world *mirror(void)
 				SHINES("3,3,3")
 			     "</shape>" BALL(MIRROR)
 			     "<shape type='rectangle'>" AT("<rotate y='1' angle='60'/><translate x='-1.5' z='-0.6'/>")
-			     "<bsdf type='phong'><float name='exponent' value='60'/></bsdf></shape>");
+			     "<bsdf type='phong'><float name='exponent' value='60'/></bsdf></shape>"
+			     "<shape type='rectangle'>" AT("<scale value='1.2'/><rotate x='1' angle='80'/><translate y='1.2'/>")
+			     "<bsdf type='thindielectric'/></shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.5'/><translate x='0.5' y='0.5' z='0.9'/>")
+			     "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='diffuse'/></bsdf></shape>");
 }
 
 /* Normals of vertices up to 40 degrees off the triangles'. */

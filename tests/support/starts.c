@@ -36,15 +36,16 @@ static double contribution(struct path_context *c, unsigned s, unsigned edges, u
 	return one.intensity;
 }
 
-static void add(struct starts *s, unsigned edges, uint64_t index, unsigned technique, double intensity)
+static void add(struct starts *s, uint64_t index, unsigned technique, unsigned joined, double intensity)
 {
+	unsigned passed = s->c->passed_count, edges = joined + passed;
 	size_t n = s->of[edges].count++;
 	if (n == s->of[edges].room) {
 		s->of[edges].room = 2 * n + 64;
 		s->of[edges].at = realloc(s->of[edges].at, s->of[edges].room * sizeof *s->of[edges].at);
 		assert(s->of[edges].at);
 	}
-	s->of[edges].at[n] = (struct start){index, technique, intensity + (n ? s->of[edges].at[n - 1].sum : 0)};
+	s->of[edges].at[n] = (struct start){index, technique, passed, intensity + (n ? s->of[edges].at[n - 1].sum : 0)};
 }
 
 void starts_init(struct starts *s, struct path_context *c, uint64_t seed, uint64_t group, uint64_t pairs)
@@ -57,7 +58,7 @@ void starts_init(struct starts *s, struct path_context *c, uint64_t seed, uint64
 			for (unsigned j = 0; j <= edges; j++) {
 				double f = contribution(c, j, edges, camera, light);
 				if (f > 0)
-					add(s, edges, i, j, f);
+					add(s, i, j, edges, f);
 			}
 	}
 }
@@ -90,5 +91,5 @@ bool starts_path(struct starts *s, unsigned edges, double u, struct full_path *x
 	unsigned camera, light;
 	const struct start *chosen = &s->of[edges].at[low];
 	walk(s, chosen->index, &camera, &light);
-	return full_path_from_subpaths(s->c, chosen->s, edges, x);
+	return full_path_from_subpaths(s->c, chosen->s, chosen->passed, edges, x);
 }

@@ -13,7 +13,7 @@ enum { STARTS_MAX_EDGES = 8 };
 
 struct start { /* technique s of that pair of sub-paths */
 	uint64_t index;
-	unsigned s;
+	unsigned s, passed;
 	double sum; /* of the contributions up to here */
 };
 

@@ -79,10 +79,11 @@ static void check_around(struct path_context *c, struct full_path *x, unsigned f
 	static struct path_sample unused;
 	for (uint32_t i = 0; i < around.count; i++) {
 		const struct candidate *a = &around.of[i];
-		if (a->edges != x->edges || a->s == from || !is_made(c, x, a->s))
+		unsigned passed = a->s > 0 ? full_path_passed(c, x, a->s) : 0;
+		if (a->edges != x->edges || a->passed != passed || a->s == from || !is_made(c, x, a->s))
 			continue;
 		classes_begin(&classes, c, x->edges + 1 - a->s, a->s, &unused);
-		assert_int_equal(classes_joined(&classes, a->s, x->edges + 1 - a->s), class);
+		assert_int_equal(classes_joined(&classes, a->s, x->edges + 1 - a->s - a->passed, a->passed), class);
 		seen->again++;
 		seen->techniques |= 1u << (a->s < 31 ? a->s : 31);
 	}
@@ -112,15 +113,16 @@ static void check_techniques(const struct world *w, const char *name)
 		ensemble_draw(&c, &s.base, &all, &e);
 		unsigned camera = 1, light = 0;
 		for (uint32_t i = 0; i < e.count; i++) {
-			camera = e.of[i].edges + 1 - e.of[i].s > camera ? e.of[i].edges + 1 - e.of[i].s : camera;
+			unsigned t = e.of[i].edges + 1 - e.of[i].s - e.of[i].passed;
+			camera = t > camera ? t : camera;
 			light = e.of[i].s > light ? e.of[i].s : light;
 		}
 		classes_begin(&classes, &c, camera, light > 1 ? light : 0, &unused);
 		for (uint32_t i = 0; i < e.count; i++) {
 			const struct candidate *a = &e.of[i];
-			unsigned class = classes_joined(&classes, a->s, a->edges + 1 - a->s);
+			unsigned class = classes_joined(&classes, a->s, a->edges + 1 - a->s - a->passed, a->passed);
 			by_class[class] += a->intensity;
-			if (!full_path_from_subpaths(&c, a->s, a->edges, &x))
+			if (!full_path_from_subpaths(&c, a->s, a->passed, a->edges, &x))
 				continue; /* on the film's very border */
 			assert_int_equal(path_class_whole(&x), class);
 			seen.paths++;
@@ -131,7 +133,7 @@ static void check_techniques(const struct world *w, const char *name)
 				    1e-12 * sum);
 		if (e.count > 0) {
 			const struct candidate *a = &e.of[dice_below(&d, e.count)];
-			if (full_path_from_subpaths(&c, a->s, a->edges, &x))
+			if (full_path_from_subpaths(&c, a->s, a->passed, a->edges, &x))
 				check_around(&c, &x, a->s, index, &d, &seen);
 		}
 	}

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A BSDF with holes: it scatters the share `opacity` of the light, the rest passes straight through. The latter is a
- * specular lobe, so a path counts one more edge for it, and next event estimation does not look through.
+ * specular lobe, so a path counts one more edge for it. Connections look through (path/transparent.h).
  */
 #include "worker/render/bsdf/blend.h"
 #include "worker/render/bsdf/twosided.h"

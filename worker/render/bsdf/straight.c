@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A specular lobe that lets light through without bending it, all that a filter does not absorb: the only lobe of
- * `null`, `polarizer`, `circular` and `retarder`, and the holes of a `mask`. A path counts one more edge for it, and
- * next event estimation does not look through it.
+ * `null`, `polarizer`, `circular` and `retarder`, and the holes of a `mask`. A path counts one more edge for it.
+ * Connections look through (path/transparent.h).
  *
  * Light is unpolarised here. As in the unpolarised modes of Mitsuba, both polarizers then let half of it through, at
  * any angle to each other, and a retarder all of it.

@@ -151,7 +151,7 @@ static spectrum keep(struct path_split *split, struct path_context *c, unsigned 
 	struct spread_place *x = &r->start;
 	double intensity = path_intensity(c, l), relative = intensity * brightness_scale(r->map, film[0], film[1]);
 	if (!isgreater(relative, r->rule.threshold) || !isfinite(relative) ||
-	    !full_path_from_subpaths(c, s, s + t - 1, &x->place.path))
+	    !full_path_from_subpaths(c, s, c->passed_count, s + t - 1 + c->passed_count, &x->place.path))
 		return l;
 	weigh(r, x);
 	if (!(x->share > 0))

@@ -47,7 +47,7 @@ static enum proposal_end propose(const struct mutation_ops *self, struct mutatio
 	c->one_way = true;
 	if (path_walk_camera(c, &sampler.base, t, film) < t || (s >= 2 && path_walk_light(c, &sampler.base, s) < s))
 		return PROPOSAL_MISSED;
-	return full_path_from_subpaths(c, s, k, y) ? PROPOSAL_MADE : PROPOSAL_DARK;
+	return full_path_from_subpaths(c, s, 0, k, y) ? PROPOSAL_MADE : PROPOSAL_DARK;
 }
 
 static double log_weight(struct mutation_ctx *m, struct full_path *into, const struct move *move,
@@ -56,7 +56,10 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 	(void)move, (void)direction;
 	unsigned k = into->edges;
 	double log_pdf[FULL_PATH_MAX_VERTICES];
+	const bool opaque = m->path->opaque;
+	m->path->opaque = true; /* a joint that passes surfaces makes a path of another length than was drawn */
 	full_path_log_techniques(m->path, into, log_pdf);
+	m->path->opaque = opaque;
 	double log_t = log_edges(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);
 	return full_path_log_f(m->path, into) - log_t;
 }

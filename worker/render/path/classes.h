@@ -26,11 +26,13 @@ struct classes {
 void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light,
 		   struct path_sample *out);
 
-/* Of what path_connect makes of s vertices of c->light and t of c->camera. */
-static inline unsigned classes_joined(const struct classes *k, unsigned s, unsigned t)
+/* Of what path_connect made of s vertices of c->light and t of c->camera, passing so many surfaces. */
+static inline unsigned classes_joined(const struct classes *k, unsigned s, unsigned t, unsigned passed)
 {
-	enum path_class_kind camera = (enum path_class_kind)(s > 0 ? k->camera[t] : k->emitter[t]);
-	return path_class(s + t - 1, path_class_kind_join(camera, (enum path_class_kind)k->light[s]));
+	enum path_class_kind kind = (enum path_class_kind)(s > 0 ? k->camera[t] : k->emitter[t]);
+	for (unsigned i = 0; i < passed; i++)
+		kind = path_class_kind_next(kind, true);
+	return path_class(s + t - 1 + passed, path_class_kind_join(kind, (enum path_class_kind)k->light[s]));
 }
 
 /* What was added until now did not reach the film. */
@@ -40,10 +42,10 @@ static inline void classes_clear(struct path_sample *out)
 	memset(out->of_class, 0, sizeof out->of_class);
 }
 
-/* Technique s contributes l. */
-static inline void classes_add(struct classes *k, unsigned s, unsigned t, spectrum l)
+/* Technique s contributes l: right after path_connect. */
+static inline void classes_add(struct classes *k, const struct path_context *c, unsigned s, unsigned t, spectrum l)
 {
-	unsigned class = classes_joined(k, s, t);
+	unsigned class = classes_joined(k, s, t, c->passed_count);
 	double sum = 0;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		sum += l.v[i] * k->weights.v[i];

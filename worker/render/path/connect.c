@@ -42,7 +42,7 @@ double path_pdf_toward(const struct path_context *c, const struct path_vertex *v
 /* The ends that a technique joins scatter there by connection: their sub-path's delta flag says nothing. */
 static bool is_delta(const struct joined_path *p, unsigned i)
 {
-	if (i + 1 == p->s || i == p->s || i == 0 || i == p->edges)
+	if (i + 1 == p->s || i == p->s + p->passed || i == 0 || i == p->edges)
 		return false;
 	return p->v[i]->delta;
 }
@@ -57,15 +57,24 @@ static bool lens_joins(const struct path_context *c, const struct path_vertex *e
 	return path_pdf_toward(c, emitter, eye->x.p) >= PATH_LENS_DENSER * film;
 }
 
+/* The first vertex from x_i on that is not passed, where connections look through surfaces. */
+static unsigned behind_passed(const struct path_context *c, const struct joined_path *p, unsigned i)
+{
+	while (path_sees_through(c) && path_joint_passes(p, i))
+		i++;
+	return i;
+}
+
 static bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
 	if (j == 0)
 		return true;
-	if (p->other_medium && j > p->other_medium)
+	if ((p->other_medium && j > p->other_medium) || j > p->edges)
 		return false;
-	if (p->edges == 1)
-		return j == 1 && lens_joins(c, p->v[1], p->v[0]);
-	return j <= p->edges && !is_delta(p, j - 1) && !is_delta(p, j);
+	unsigned end = behind_passed(c, p, j);
+	if (j == 1 && end == p->edges)
+		return lens_joins(c, p->v[end], p->v[0]);
+	return !is_delta(p, j - 1) && !is_delta(p, end) && end - j <= PATH_PASSED_MOST;
 }
 
 /* Edge i, and its media at x_i-1 and at x_i. Where media scatter. */
@@ -96,8 +105,10 @@ static double light_pdf(const struct path_context *c, const struct joined_path *
 	unsigned s = p->s;
 	if (i == 0)
 		return path_pdf_emitter(c, p->v[0]);
-	if (i >= s + 2)
+	if (i >= s + p->passed + 2)
 		return p->v[i]->pdf_rev;
+	if (i > s && i <= s + p->passed)
+		return path_pdf_passed(c, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE);
 	const struct path_vertex *prev = i >= 2 ? p->v[i - 2] : NULL;
 	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) * edge_pdf(c, p, i, false);
 }
@@ -108,35 +119,71 @@ static double camera_pdf(const struct path_context *c, const struct joined_path 
 	unsigned s = p->s, k = p->edges;
 	if (i + 3 <= s)
 		return p->v[i]->pdf_rev;
+	if (i + 1 == s && p->passed)
+		return path_pdf_passed(c, p->v[s], p->v[i], TRANSPORT_RADIANCE);
 	const struct path_vertex *prev = i + 2 <= k ? p->v[i + 2] : NULL;
 	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true);
 }
 
+/* The density of joining x_first-1 to what is behind the passed x_first..x_end-1 over that of drawing these with their
+ * sub-path's densities; 1 where none is passed. */
+static double over_drawn(const struct path_context *c, const struct joined_path *p, unsigned first, unsigned end)
+{
+	double pdf[PATH_PASSED_MOST];
+	if (!path_sees_through(c) || first == end)
+		return 1;
+	for (unsigned i = first; i < end; i++)
+		pdf[i - first] = p->v[i]->pdf;
+	return path_passed_ratio(p->v, first, end - 1, pdf);
+}
+
+/* The density of drawing what the joint passes, from the light's side or the camera's, over that of the technique that
+ * joined it. */
+static double drawn_instead(const struct path_context *c, const struct joined_path *p, bool from_light)
+{
+	double pdf[PATH_PASSED_MOST];
+	if (!p->passed)
+		return 1;
+	for (unsigned i = 0; i < p->passed; i++)
+		pdf[i] = from_light ? light_pdf(c, p, p->s + i) : p->v[p->s + i]->pdf;
+	return 1 / path_passed_ratio(p->v, p->s, p->s + p->passed - 1, pdf);
+}
+
+/* r carries densities as if all vertices were drawn. Those of techniques that pass some differ by over_drawn. */
 void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
 {
-	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k;
+	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k, joint_end = s + p->passed;
 	for (unsigned j = 0; j <= k; j++)
 		ratio[j] = 0;
-	/* Technique 1 draws x_0 as seen from x_1, the longer ones as light sub-paths do. */
+	/* Technique 1 draws x_0 as seen from what it is joined to, the longer ones as light sub-paths do. */
 	double toward = 1, point = 1;
 	if ((k >= 2 && s <= 1) || technique_exists(c, p, 1)) {
-		toward = path_pdf_toward(c, p->v[0], p->v[1]->x.p);
+		toward = path_pdf_toward(c, p->v[0], p->v[behind_passed(c, p, 1)]->x.p);
 		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}
-	double first = s == 1 ? point / toward : 1, r = first;
-	for (unsigned j = s; j < last && r > 0 && r < RATIO_LIMIT; j++) {
+	double first = s == 1 ? point / toward : 1;
+	double r = joint_end < last ? first * drawn_instead(c, p, true) : first;
+	for (unsigned j = joint_end; j < last && r > 0 && r < RATIO_LIMIT; j++) {
 		if (j == 0 && technique_exists(c, p, 1))
-			ratio[1] = r * toward / p->v[0]->pdf;
+			ratio[1] = r * toward / p->v[0]->pdf * over_drawn(c, p, 1, behind_passed(c, p, 1));
 		r *= (j == 0 ? point : light_pdf(c, p, j)) / p->v[j]->pdf;
 		if (j > 0 && technique_exists(c, p, j + 1))
-			ratio[j + 1] = r;
+			ratio[j + 1] = r * over_drawn(c, p, j + 1, behind_passed(c, p, j + 1));
 	}
 	bool beyond = r >= RATIO_LIMIT;
-	r = first;
-	for (unsigned j = s; j > 0 && r > 0 && r < RATIO_LIMIT; j--) {
+	r = first * drawn_instead(c, p, false);
+	double r_end = r; /* r, before the passed vertices that x_j may be one of */
+	for (unsigned j = s, end = s; j > 0 && r_end > 0 && r < RATIO_LIMIT; j--) {
 		r *= camera_pdf(c, p, j - 1) / p->v[j - 1]->pdf;
-		if (technique_exists(c, p, j - 1))
-			ratio[j - 1] = j - 1 == 1 ? r * toward / point : r;
+		bool passed = path_sees_through(c) && path_joint_passes(p, j - 1);
+		if (!passed) {
+			r_end = r;
+			end = j - 1;
+		}
+		if (technique_exists(c, p, j - 1)) {
+			double here = passed ? r_end * over_drawn(c, p, j - 1, end) : r;
+			ratio[j - 1] = j - 1 == 1 ? here * toward / point : here;
+		}
 	}
 	ratio[s] = 1;
 	if (beyond || r >= RATIO_LIMIT)
@@ -146,8 +193,8 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s)
 {
 	double ratio[PATH_MAX_EDGES + 2], sum = 0;
-	unsigned with_light =
-		p->edges == 1 ? 1 : 2; /* the first technique that only samples with a light sub-path have */
+	/* The first technique that only samples with a light sub-path have. */
+	unsigned with_light = behind_passed(c, p, 1) == p->edges ? 1 : 2;
 	path_technique_ratios(c, p, max_s, ratio);
 	for (unsigned j = 0; j <= p->edges; j++)
 		sum += j >= with_light && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
@@ -158,9 +205,12 @@ static void join(const struct path_context *c, const struct path_vertex *light, 
 		 struct joined_path *p)
 {
 	p->s = s;
-	p->edges = s + t - 1;
+	p->passed = c->passed_count;
+	p->edges = s + t - 1 + p->passed;
 	for (unsigned i = 0; i < s; i++)
 		p->v[i] = &light[i];
+	for (unsigned i = 0; i < p->passed; i++)
+		p->v[s + i] = &c->passed[p->passed - 1 - i];
 	for (unsigned i = 0; i < t; i++)
 		p->v[p->edges - i] = &c->camera[i];
 }
@@ -279,6 +329,17 @@ static spectrum absorbed(const struct path_context *c, const struct path_vertex 
 	return spectrum_mul(path_transmittance(c->w, &c->wl, medium, z, y), absorption_of_light(c, s, medium));
 }
 
+static bool only_absorbs(const struct path_context *c)
+{
+	return EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering);
+}
+
+static spectrum after_absorption(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
+				 const struct path_vertex *y, unsigned s, spectrum l)
+{
+	return only_absorbs(c) ? spectrum_mul(l, absorbed(c, z, to_light, y, s)) : l;
+}
+
 /* Whether z and y see each other; where media scatter, the edge between them and what is left of l. */
 static bool is_seen(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		    struct path_edge *joint, spectrum *l)
@@ -292,9 +353,25 @@ static bool is_seen(struct path_context *c, const struct path_vertex *z, const s
 	return !spectrum_is_zero(*l);
 }
 
-static bool only_absorbs(const struct path_context *c)
+/* What is left of l on its way from y, vertex s - 1 of the light's sub-path, to the camera's vertex t - 1; zero: they
+ * do not see each other. direct: l after what media absorb of it if nothing is passed. */
+static spectrum seen(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t, vec3 to_light,
+		     spectrum l, spectrum direct, struct path_edge *joint)
 {
-	return EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering);
+	const struct path_vertex *z = &c->camera[t - 1];
+	spectrum left;
+	if (!spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
+		return direct;
+	if (!path_sees_through(c) || spectrum_is_zero(l))
+		return spectrum_of(0);
+	bool open = path_see_through(c, t > 1 ? z - 1 : NULL, z, y, &left);
+	unsigned edges = s + t - 1 + c->passed_count;
+	if (!open || edges < c->min_depth || edges > c->max_depth) {
+		c->passed_count = 0;
+		return spectrum_of(0);
+	}
+	l = spectrum_mul(l, left);
+	return after_absorption(c, &c->passed[c->passed_count - 1], to_light, y, s, l);
 }
 
 static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
@@ -310,12 +387,9 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	spectrum f = path_scatter(c, z, z->to_prev, to_light);
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
 	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
-	if (only_absorbs(c))
-		l = spectrum_mul(l, absorbed(c, z, to_light, &y, 1));
 	struct path_edge joint;
-	if (spectrum_is_zero(l) || !is_seen(c, z, &y, &joint, &l))
-		return spectrum_of(0);
-	return weighted(c, &y, 1, t, max_s, &joint, l);
+	l = seen(c, &y, 1, t, to_light, l, after_absorption(c, z, to_light, &y, 1, l), &joint);
+	return spectrum_is_zero(l) ? l : weighted(c, &y, 1, t, max_s, &joint, l);
 }
 
 /* The unit direction from the lens to y, where the film sees it, and the film point's density per area there. */
@@ -338,13 +412,10 @@ static bool project(const struct path_context *c, const struct path_vertex *y, d
 static spectrum join_lens(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned max_s, vec3 d,
 			  spectrum l)
 {
-	const struct path_vertex *y = &light[s - 1], *eye = &c->camera[0];
-	if (only_absorbs(c))
-		l = spectrum_mul(l, absorbed(c, eye, d, y, s));
+	const struct path_vertex *y = &light[s - 1];
 	struct path_edge joint;
-	if (spectrum_is_zero(l) || !is_seen(c, eye, y, &joint, &l))
-		return spectrum_of(0);
-	return weighted(c, light, s, 1, max_s, &joint, l);
+	l = seen(c, y, s, 1, d, l, after_absorption(c, &c->camera[0], d, y, s, l), &joint);
+	return spectrum_is_zero(l) ? l : weighted(c, light, s, 1, max_s, &joint, l);
 }
 
 static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, double film[2])
@@ -373,19 +444,17 @@ static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, dou
 	return join_lens(c, &y, 1, max_s, d, l);
 }
 
-/* false: left to chance, and not made. The weight is not known yet; light_every / edges stands for it, as if all
- * techniques were alike: what is made brings at most `edges` times `faint`, whatever its weight turns out to be. */
-static bool is_made(struct path_context *c, unsigned edges, spectrum *l)
+/* How often a connection that brings l counts; 0: it is left to chance, and not made. The weight is not known yet;
+ * light_every / edges stands for it, as if all techniques were alike: what is made brings at most `edges` times
+ * `faint`, whatever its weight turns out to be. */
+static double times_made(struct path_context *c, unsigned edges, spectrum l)
 {
-	double brings = spectrum_mean(*l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);
+	double brings = spectrum_mean(l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);
 	if (!isgreater(brings, 0) || !isless(brings, c->faint))
-		return true;
+		return 1;
 	double q = brings / c->faint, from = c->faint_place;
 	c->faint_place += q;
-	if (!(floor(c->faint_place) > floor(from)))
-		return false;
-	*l = spectrum_scale(1 / q, *l);
-	return true;
+	return floor(c->faint_place) > floor(from) ? 1 / q : 0;
 }
 
 static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, unsigned max_s)
@@ -400,16 +469,20 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 		return l;
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
 	l = spectrum_scale(path_geometry_term(z, y, to_light, distance2), l);
-	if (only_absorbs(c))
-		l = spectrum_mul(l, absorbed(c, z, to_light, y, s));
-	struct path_edge joint;
-	if (spectrum_is_zero(l) || !is_made(c, s + t - 1, &l) || !is_seen(c, z, y, &joint, &l))
+	spectrum direct = after_absorption(c, z, to_light, y, s, l);
+	if (spectrum_is_zero(l))
+		return l;
+	double times = times_made(c, s + t - 1, direct);
+	if (times == 0)
 		return spectrum_of(0);
-	return weighted(c, c->light, s, t, max_s, &joint, l);
+	struct path_edge joint;
+	l = seen(c, y, s, t, to_light, spectrum_scale(times, l), spectrum_scale(times, direct), &joint);
+	return spectrum_is_zero(l) ? l : weighted(c, c->light, s, t, max_s, &joint, l);
 }
 
 spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2])
 {
+	c->passed_count = 0;
 	if (s == 0)
 		return hit_emitter(c, t, max_s);
 	if (t > 1 && c->camera[t - 1].kind == VERTEX_INFINITE)

@@ -48,14 +48,14 @@ static double survival(unsigned n)
 	return n > SURE_VERTICES ? (double)(SURE_VERTICES * SURE_VERTICES) / ((double)n * n) : 1;
 }
 
-/* What technique s contributes to paths of that many edges. */
-static double contribution(struct path_context *c, unsigned s, unsigned edges)
+/* What joining s vertices of the light's with t of the camera's contributes. */
+static double contribution(struct path_context *c, unsigned s, unsigned t)
 {
 	double film[2];
 	struct path_sample one; /* its many splats are not read: nothing sets them */
 	one.count = 0;
 	one.intensity = 0;
-	spectrum l = path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film);
+	spectrum l = path_connect(c, s, t, PATH_MAX_EDGES, film);
 	if (!spectrum_is_zero(l))
 		path_splat(c, &one, 0, 0, l);
 	return one.intensity;
@@ -68,18 +68,19 @@ static void gather(struct path_context *c, unsigned camera, unsigned light, bool
 	out->total = 0;
 	out->count = 0;
 	unsigned most_light = light > 1 ? light : 1, most = camera + most_light - 1;
-	for (unsigned edges = c->min_depth; edges <= c->max_depth && edges <= most; edges++)
-		for (unsigned s = edges + 1 > camera ? edges + 1 - camera : 0; s <= edges && s <= most_light; s++) {
-			unsigned t = edges + 1 - s;
-			if (t == 1 && s < 2)
+	for (unsigned n = path_sees_through(c) ? 2 : c->min_depth + 1; n <= c->max_depth + 1 && n <= most + 1; n++)
+		for (unsigned s = n > camera ? n - camera : 0; s < n && s <= most_light; s++) {
+			unsigned t = n - s;
+			if ((t == 1 && s < 2) || !path_may_connect(c, s, t))
 				continue;
-			bool is_known = known && known->s == s && known->edges == edges;
-			double i = is_known ? known->intensity : contribution(c, s, edges);
+			bool is_known = known && known->s == s && known->edges + 1 - known->passed == n;
+			double i = is_known ? known->intensity : contribution(c, s, t);
+			unsigned passed = is_known ? known->passed : c->passed_count;
 			if (capped)
 				i /= survival(t) * survival(s);
 			if (!(i > 0))
 				continue;
-			out->of[out->count++] = (struct candidate){i, s, edges};
+			out->of[out->count++] = (struct candidate){i, s, passed, n - 1 + passed};
 			out->total += i;
 		}
 }
@@ -100,7 +101,7 @@ bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u,
 	unsigned i = 0;
 	while (i + 1 < e->count && rest >= e->of[i].intensity)
 		rest -= e->of[i++].intensity;
-	return full_path_from_subpaths(c, e->of[i].s, e->of[i].edges, x);
+	return full_path_from_subpaths(c, e->of[i].s, e->of[i].passed, e->of[i].edges, x);
 }
 
 /* Contribution over density of going on from beta across edge e to a vertex of density pdf, by scattering f at `at`. */
@@ -247,8 +248,9 @@ void ensemble_around(struct path_context *c, struct sampler *sampler, struct ful
 	double log_pdf[FULL_PATH_MAX_VERTICES];
 	full_path_log_techniques(c, x, log_pdf);
 	double log_sum = log_sum_exp(log_pdf, k + 1);
-	unsigned s = choose_technique(log_pdf, k, log_sum, u[0]), t = k + 1 - s;
-	const struct candidate known = {exp(full_path_log_f(c, x) - log_sum), s, k};
+	unsigned s = choose_technique(log_pdf, k, log_sum, u[0]), passed = s > 0 ? full_path_passed(c, x, s) : 0,
+		 t = k + 1 - s - passed;
+	const struct candidate known = {exp(full_path_log_f(c, x) - log_sum), s, passed, k};
 	struct ensemble_lengths n = ensemble_lengths_of(c, u + 1, t, s);
 	c->one_way = false;
 	c->wl = x->wl;

@@ -14,7 +14,7 @@
 
 struct candidate {
 	double intensity;
-	unsigned s, edges;
+	unsigned s, passed, edges; /* passed: by the joint (transparent.h), of the edges' vertices */
 };
 
 struct ensemble {

@@ -303,9 +303,20 @@ unsigned full_path_most_light(const struct path_context *c, const struct full_pa
 	return other ? other : x->edges;
 }
 
-bool full_path_joins(const struct full_path *x, unsigned s)
+unsigned full_path_passed(const struct path_context *c, const struct full_path *x, unsigned s)
 {
-	return x->edges >= 2 && !(s > 1 && x->v[s - 1].delta) && !(s < x->edges && x->v[s].delta);
+	unsigned end = s;
+	while (path_sees_through(c) && end < x->edges && path_is_passed(&x->v[end]))
+		end++;
+	return end - s;
+}
+
+bool full_path_joins(const struct path_context *c, const struct full_path *x, unsigned s)
+{
+	unsigned passed = full_path_passed(c, x, s), end = s + passed;
+	if (s == 1 && end == x->edges) /* the lens with the emitter: only samples do */
+		return false;
+	return passed <= PATH_PASSED_MOST && !(s > 1 && x->v[s - 1].delta) && !(end < x->edges && x->v[end].delta);
 }
 
 bool full_path_is_made(const struct path_context *c, const struct full_path *x)
@@ -313,7 +324,7 @@ bool full_path_is_made(const struct path_context *c, const struct full_path *x)
 	if (path_can_be_hit(c, &x->v[0]))
 		return true;
 	for (unsigned s = full_path_most_light(c, x); s > 0; s--)
-		if (full_path_joins(x, s) && !(s == 1 && c->w->emitters[x->v[0].emitter].beam))
+		if (full_path_joins(c, x, s) && !(s == 1 && c->w->emitters[x->v[0].emitter].beam))
 			return true;
 	return false;
 }
@@ -341,9 +352,30 @@ bool full_path_finish(struct path_context *c, struct full_path *x)
 	return true;
 }
 
-bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path *x)
+/* Nothing lies between the vertices that the joint is made of. */
+static bool joint_is_open(struct path_context *c, struct full_path *x, unsigned s, unsigned passed)
 {
-	unsigned t = edges + 1 - s;
+	for (unsigned e = s - 1; e < s + passed; e++)
+		if (!full_path_visible(c, x, e))
+			return false;
+	return true;
+}
+
+/* The vertices that the joint between z, the camera's last, and y passes. */
+static bool take_passed(struct path_context *c, const struct path_vertex *z, bool from_lens,
+			const struct path_vertex *y, unsigned s, unsigned passed, struct full_path *x)
+{
+	spectrum left;
+	if (!path_see_through(c, from_lens ? NULL : z - 1, z, y, &left) || c->passed_count != passed)
+		return false;
+	for (unsigned i = 0; i < passed; i++)
+		take_vertex(x, s + i, &c->passed[passed - 1 - i], true);
+	return true;
+}
+
+bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed, unsigned edges, struct full_path *x)
+{
+	unsigned t = edges + 1 - s - passed;
 	assert(edges <= FULL_PATH_MAX_EDGES && t >= 1);
 	const struct path_vertex *z = &c->camera[t - 1];
 	struct path_vertex drawn;
@@ -368,9 +400,11 @@ bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges,
 		for (unsigned i = 1; i < s; i++)
 			take_vertex(x, i, &c->light[i], i + 1 < s);
 	}
-	for (unsigned i = s > 0 ? s : 1; i <= edges; i++)
-		take_vertex(x, i, &c->camera[edges - i], s == 0 || i > s);
-	return full_path_finish(c, x) && (s == 0 || EFFECT_IS_ON(c->w, scattering) || full_path_visible(c, x, s - 1));
+	if (passed && !take_passed(c, z, t == 1, s == 1 ? &drawn : &c->light[s - 1], s, passed, x))
+		return false;
+	for (unsigned i = s > 0 ? s + passed : 1; i <= edges; i++)
+		take_vertex(x, i, &c->camera[edges - i], s == 0 || i > s + passed);
+	return full_path_finish(c, x) && (s == 0 || EFFECT_IS_ON(c->w, scattering) || joint_is_open(c, x, s, passed));
 }
 
 void full_path_attenuate(const struct world *w, const struct full_path *x, struct product *p)

@@ -99,17 +99,20 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	const struct path_vertex *v = x->v;
 	fill_densities(c, x);
 	unsigned most = full_path_most_light(c, x);
-	double camera = 0; /* of v[s .. k] from the camera's side */
-	for (unsigned s = k; s > 0; s--) {
-		log_pdf[s] = camera;
-		camera += log(v[s - 1].pdf);
-	}
-	log_pdf[0] = camera;
+	double from_camera[FULL_PATH_MAX_VERTICES]; /* of v[s .. k] */
+	from_camera[k] = 0;
+	for (unsigned s = k; s > 0; s--)
+		from_camera[s - 1] = from_camera[s] + log(v[s - 1].pdf);
+	log_pdf[0] = from_camera[0];
 	double light = 0; /* of v[0 .. s - 1] from the light's */
 	for (unsigned s = 1; s <= k; s++) {
 		light += log(v[s - 1].pdf_rev);
-		bool exists = s <= most && full_path_joins(x, s);
-		double from_light = s == 1 && exists ? log(path_pdf_toward(c, &v[0], v[1].x.p)) : light;
-		log_pdf[s] = exists ? log_pdf[s] + from_light : -INFINITY;
+		log_pdf[s] = -INFINITY;
+		if (s > most || !full_path_joins(c, x, s))
+			continue;
+		unsigned end = s + full_path_passed(c, x, s);
+		log_pdf[s] = from_camera[end] + (s == 1 ? log(path_pdf_toward(c, &v[0], v[end].x.p)) : light);
+		if (end > s)
+			log_pdf[s] += log(path_passed_ratio_in(v, s, end - 1, NULL));
 	}
 }

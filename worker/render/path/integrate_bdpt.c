@@ -34,13 +34,13 @@ static spectrum kept(struct path_context *c, unsigned j, unsigned t, const doubl
 static spectrum join(struct path_context *c, unsigned j, unsigned t, struct classes *classes)
 {
 	double film[2];
-	if (t + j - 1 < c->min_depth || t + j - 1 > c->max_depth)
+	if (!path_may_connect(c, j, t))
 		return spectrum_of(0);
 	spectrum l = path_connect(c, j, t, PATH_MAX_EDGES, film);
 	if (!path_accept(c, l))
 		return spectrum_of(0);
 	if (!c->unclassed)
-		classes_add(classes, j, t, l);
+		classes_add(classes, c, j, t, l);
 	return l;
 }
 
@@ -55,13 +55,13 @@ static void join_light_to_lens(struct path_context *c, struct sampler *s, unsign
 	c->camera[0].next_event[2] = u[DIM_EMITTER_CHOICE];
 	for (unsigned j = c->joins_lens ? 1 : 2; j <= c->max_depth && (j == 1 || j <= light); j++) {
 		double at[2];
-		if (j < c->min_depth)
+		if (!path_may_connect(c, j, 1))
 			continue;
 		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
 		if (path_accept(c, l) && j > 1)
 			l = kept(c, j, 1, at, l);
 		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l) && !c->unclassed)
-			classes_add(classes, j, 1, l);
+			classes_add(classes, c, j, 1, l);
 	}
 }
 

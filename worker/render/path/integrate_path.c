@@ -26,15 +26,14 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 		sum = volume_emission(c, c->min_depth, c->max_depth, c->unclassed ? NULL : &classes);
 	for (unsigned t = 2; t <= n; t++) {
 		for (unsigned j = 0; j <= 1; j++) {
-			unsigned edges = t + j - 1;
-			if (edges < c->min_depth || edges > c->max_depth)
+			if (!path_may_connect(c, j, t))
 				continue;
 			spectrum l = path_connect(c, j, t, 1, film);
 			if (!path_accept(c, l))
 				continue;
 			sum = spectrum_add(sum, l);
 			if (!c->unclassed)
-				classes_add(&classes, j, t, l);
+				classes_add(&classes, c, j, t, l);
 		}
 	}
 	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)

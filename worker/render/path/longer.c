@@ -38,13 +38,14 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 		    struct path_sample *scratch)
 {
 	const double roulette = c->roulette;
-	const bool one_way = c->one_way;
+	const bool one_way = c->one_way, opaque = c->opaque;
 	uint32_t least = c->max_depth + 1 > c->min_depth ? c->max_depth + 1 : c->min_depth;
 	unsigned first = 2, before = 0, most = longest + 1 < FULL ? longest + 1 : FULL;
 	double film[2];
 	struct sampler_random s;
 	c->roulette = 1;
 	c->one_way = true;
+	c->opaque = true; /* surfaces that a connection passes lengthen its path */
 	sampler_random_init(&s, seed, RNG_BEYOND, index, 0);
 	unsigned n = path_walk_camera(c, &s.base, most, film);
 	spectrum sum = gather(c, first, n, before, least, longest, film);
@@ -61,6 +62,7 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 	c->dispersed = false;
 	c->roulette = roulette;
 	c->one_way = one_way;
+	c->opaque = opaque;
 	scratch->count = 0;
 	scratch->classes = 0;
 	scratch->intensity = 0;

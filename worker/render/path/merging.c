@@ -77,16 +77,38 @@ static double intensity_of(struct path_context *c, spectrum l)
 
 /* ---- photons */
 
+static bool is_passed(const struct path_context *c, const struct path_vertex *v)
+{
+	return path_sees_through(c) && path_is_passed(v);
+}
+
+/* The density of passing v[first .. end - 1] over that of drawing them. */
+static double over_drawn(const struct path_vertex *v, unsigned first, unsigned end)
+{
+	double pdf[PATH_PASSED_MOST];
+	if (first == end)
+		return 1;
+	for (unsigned i = first; i < end; i++)
+		pdf[i - first] = v[i].pdf;
+	return path_passed_ratio_in(v, first, end - 1, pdf);
+}
+
 /* Densities of techniques with fewer than s light vertices over that of s - 1, be there such a technique or not. */
 static void sum_fewer(const struct path_context *c, unsigned s, struct photon *out)
 {
 	const struct path_vertex *y = c->light;
-	double ratio = 1, toward = path_pdf_toward(c, &y[0], y[1].x.p) / y[0].pdf;
-	for (unsigned j = s - 1; j > 0; j--) {
-		double q = j == 1 ? ratio * toward : ratio;
-		if (!y[j].delta && !(j > 1 && y[j - 1].delta)) {
-			out->fewer += q;
-			out->path += j == 1 ? q : 0;
+	double ratio = 1, ratio_end = 1;
+	for (unsigned j = s - 1, end = s; j > 0; j--) { /* joins y[j - 1] to y[end] */
+		if (!is_passed(c, &y[j])) {
+			ratio_end = ratio;
+			end = j;
+		}
+		bool near = end == s;
+		if (!(j > 1 && y[j - 1].delta) && (near || !y[end].delta) && end - j <= PATH_PASSED_MOST) {
+			double toward = j == 1 ? path_pdf_toward(c, &y[0], y[end].x.p) / y[0].pdf : 1,
+			       q = (near ? 1 : ratio_end) * toward * over_drawn(y, j, end);
+			*(near ? &out->fewer_through : &out->fewer) += q;
+			*(near ? &out->path_through : &out->path) += j == 1 ? q : 0;
 		}
 		ratio *= y[j - 1].pdf_rev / y[j - 1].pdf;
 	}
@@ -188,8 +210,11 @@ static double sum_more(const struct path_context *c, const struct path_vertex *y
 	double q = 1 / z->pdf, sum = 0;
 	for (unsigned i = t; i > 0; i--) { /* joins v[i], of the light, to v[i - 1], of the camera */
 		const struct path_vertex *next = &v[i - 1];
-		if (!(i < t && v[i].delta) && !(i > 1 && next->delta))
-			sum += q;
+		unsigned end = i - 1;
+		while (end > 0 && is_passed(c, &v[end]))
+			end--;
+		if (!(i < t && v[i].delta) && !(end > 0 && v[end].delta) && i - 1 - end <= PATH_PASSED_MOST)
+			sum += q * over_drawn(v, end + 1, i);
 		q *= (i == t ? path_pdf(c, y, z, next, TRANSPORT_IMPORTANCE) : next->pdf_rev) / next->pdf;
 	}
 	return sum;
@@ -209,9 +234,9 @@ bool merged_of(struct path_context *c, const struct photon *p, unsigned t, struc
 	out->brings = intensity_of(c, l);
 	/* q_{s-1}, be there such a technique or not */
 	double q = path_pdf(c, z - 1, z, &y, TRANSPORT_RADIANCE) / (p->pdf * p->prev.pdf),
-	       joined = p->prev.delta ? 0 : 1 / p->pdf;
-	out->bdpt = out->brings / (q * p->fewer + joined + sum_more(c, &y, t));
-	out->path = out->brings / (q * p->path);
+	       joined = (p->prev.delta ? 0 : 1) + p->fewer_through;
+	out->bdpt = out->brings / (q * p->fewer + joined / p->pdf + sum_more(c, &y, t));
+	out->path = out->brings / (q * p->path + p->path_through / p->pdf);
 	return out->brings > 0;
 }
 

@@ -26,6 +26,8 @@ struct photon {
 	} prev;
 	double fewer; /* densities of the techniques of fewer than s light vertices, their sum over that of s - 1, */
 	double path;  /* and of those of 0 and 1 alone, which `path` has */
+	double fewer_through, path_through; /* the same over that of s, of techniques that join z to a vertex before
+					       surfaces that they pass (transparent.h) */
 };
 
 struct merging {

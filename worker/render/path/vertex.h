@@ -14,7 +14,10 @@
 #include "common/film/batch.h"
 #include "worker/render/world/world.h"
 
-enum { PATH_MAX_EDGES = 128 };
+enum {
+	PATH_MAX_EDGES = 128,
+	PATH_PASSED_MOST = 16, /* surfaces that one connection passes */
+};
 
 enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE, VERTEX_MEDIUM };
 
@@ -75,6 +78,7 @@ struct path_context {
 	bool unclassed;		       /* nobody asks for path_sample.classes */
 	bool one_way;		       /* nobody asks for pdf_rev: no technique has more than one light vertex */
 	bool joins_lens;      /* points of emitters are joined to the camera: paths of one edge are found so, too */
+	bool opaque;	      /* connections do not look through surfaces, even if they do in this world */
 	bool dispersed;	      /* by a vertex of the camera's sub-path that is not in it any more */
 	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
 				 all have */
@@ -83,6 +87,9 @@ struct path_context {
 	uint64_t *counters;   /* of enum batch_counter */
 	struct path_split *split; /* NULL: the film gets all */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
+	/* What the last connection passed (transparent.h), from the camera on; their pdf is known. */
+	unsigned passed_count;
+	struct path_vertex passed[PATH_PASSED_MOST];
 	/* The emission of media along edge e of the camera's sub-path, as it reaches the film, whether or not a vertex
 	 * ends the edge; e from 1 to emission_edges (volume_emission.h). */
 	unsigned emission_edges;

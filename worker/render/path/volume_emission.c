@@ -14,7 +14,7 @@ spectrum volume_emission(struct path_context *c, unsigned first, unsigned last, 
 			continue;
 		sum = spectrum_add(sum, l);
 		if (classes)
-			classes_add(classes, 0, e + 1, l);
+			classes_add(classes, c, 0, e + 1, l);
 	}
 	return sum;
 }

@@ -37,6 +37,7 @@ enum effect {
 	EFFECT_AREA_LIGHT,
 	EFFECT_DELTA_LIGHT,
 	EFFECT_MEDIUM_LIGHT,
+	EFFECT_TRANSPARENT_SHADOWS,
 	EFFECT_DEPTH,
 	EFFECTS
 };
@@ -70,6 +71,7 @@ struct effects {
 	bool absorption;	     /* some medium does */
 	bool scattering;	     /* some medium scatters or shines: edges are walked through all of them */
 	bool medium_light;	     /* some medium shines */
+	bool transparent_shadows;    /* connections look through what lets light straight through */
 	bool motion;		     /* paths have a time */
 	enum color_shape illuminant; /* of all emitters, if colour is off */
 	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */

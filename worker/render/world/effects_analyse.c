@@ -56,6 +56,7 @@ struct census {
 	struct tally hidden_specular, hidden_dispersive,
 		unused_dispersive; /* materials that no path meets; that no shape uses */
 	struct tally absorbing, scattering, shining;
+	struct tally straight;
 	struct tally environment, area, delta, textured_light, coloured_light;
 	enum visibility_bounds why_hidden;
 	size_t shape[3];
@@ -73,6 +74,8 @@ static void add_material(struct census *c, const struct bsdf *b, const struct sc
 		count(isfinite(b->alpha) ? &c->glossy : &c->diffuse, n, nameless);
 	if (b->modes & BSDF_TRANSMIT)
 		count(&c->transmission, n, nameless);
+	if ((b->modes & BSDF_STRAIGHT) && !b->culls)
+		count(&c->straight, n, nameless);
 	if (b->textured)
 		count(&c->textured, n, nameless);
 	if (b->shape != COLOR_SHAPE_CONSTANT)
@@ -428,6 +431,20 @@ static void emitter_moves(struct report *r, const struct census *c)
 							      : "nothing shines");
 }
 
+/* Where media scatter, edges pass faces of `null` anyway, and connections end at all other surfaces. */
+static void transparent_shadows(struct report *r, const struct census *c)
+{
+	static const struct effects_choice nothing;
+	struct report unforced = {r->fx, &nothing};
+	if (r->fx->scattering)
+		line(&unforced, EFFECT_TRANSPARENT_SHADOWS, false,
+		     "where media scatter or shine, connections look through `null` alone");
+	else
+		r->fx->transparent_shadows =
+			materials(r, EFFECT_TRANSPARENT_SHADOWS, &c->straight, "lets light straight through",
+				  "let light straight through", "lets light straight through");
+}
+
 static void depth(struct report *r, const struct world *w, const struct effects_source *src,
 		  const enum visibility_bounds *shape)
 {
@@ -471,5 +488,6 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	fx->medium_light = tallied(&r, EFFECT_MEDIUM_LIGHT, &c.shining, "borders on a medium that shines",
 				   "border on a medium that shines", "no medium shines");
 	fx->scattering = fx->scattering || fx->medium_light;
+	transparent_shadows(&r, &c);
 	depth(&r, w, src, shape);
 }

@@ -62,7 +62,7 @@ static bool has(const struct ensemble *e, unsigned edges, double intensity, bool
 {
 	for (unsigned i = 0; i < e->count; i++) {
 		const struct candidate *a = &e->of[i];
-		double want = whole ? intensity : intensity / (chance(edges + 1 - a->s) * chance(a->s));
+		double want = whole ? intensity : intensity / (chance(edges + 1 - a->s - a->passed) * chance(a->s));
 		if (a->edges == edges && fabs(a->intensity / want - 1) < 1e-6)
 			return true;
 	}
@@ -85,7 +85,7 @@ static unsigned check_candidates(const char *name)
 		for (unsigned i = 0; i <= y.edges; i++)
 			assert_true(y.v[i].x.prim.time == full_path_time(&x));
 		full_path_log_techniques(&c, &y, log_pdf);
-		double chances = chance(y.edges + 1 - a->s) * chance(a->s),
+		double chances = chance(y.edges + 1 - a->s - a->passed) * chance(a->s),
 		       want = exp(full_path_log_f(&c, &y) - log_sum_exp(log_pdf, y.edges + 1)) / chances;
 		if (!(fabs(a->intensity / want - 1) < 1e-6))
 			fail_msg("%s: %u edges by technique %u: %.9g, not %.9g", name, y.edges, a->s, a->intensity,
@@ -137,6 +137,7 @@ static void test_own_candidate(void **state)
 	check_own_candidate("rough glass");
 	check_own_candidate("coloured glass");
 	check_own_candidate("bent normals");
+	check_own_candidate("mirror");
 	check_own_candidate("clouds");
 	check_own_candidate("fog");
 	check_own_candidate("moving");

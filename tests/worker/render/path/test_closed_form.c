@@ -466,6 +466,31 @@ static void test_beam(void **state)
 	check_constant("floor under a beam", w, 1.5 * 0.5 / M_PI, (struct effort){128, 832, 0});
 }
 
+/* The sun straight down through thin glass and a filter, which is between the camera and the floor, too. Glass reflects
+ * r = 2 R / (1 + R), R = ((n - 1) / (n + 1))^2, and the filter lets half through each time: (1 - r) / 4 of M rho / pi.
+ * No sub-path from either side alone gets to the floor without passing something, and neither end can be hit. */
+static void test_seen_through(void **state)
+{
+	(void)state;
+	const double n = 1.5, R = (n - 1) * (n - 1) / ((n + 1) * (n + 1));
+	struct world *w = world_of_text(
+		16, 16,
+		"%s<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'>"
+		"<lookat origin='0,2,0' target='0,0,0' up='0,0,-1'/></transform></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/></transform>"
+		"<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='90'/>"
+		"<translate y='1'/></transform><bsdf type='polarizer'/></shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/>"
+		"<translate y='3'/></transform><bsdf type='thindielectric'><float name='int_ior' value='1.5'/>"
+		"<float name='ext_ior' value='1'/></bsdf></shape>"
+		"<emitter type='directional'><vector name='direction' value='0,-1,0'/>"
+		"<float name='irradiance' value='3'/></emitter>",
+		DEPTH("5"));
+	check_constant("floor seen through a filter", w, 3 * 0.5 / M_PI * (1 - 2 * R / (1 + R)) / 4,
+		       (struct effort){128, 832, 0});
+}
+
 /* Two plates of reflectance rho, the lower shines with 1. Between infinite plates every ray from one meets the other.
  * Radiance of the lower: 1 + rho^2 + rho^4 ..., of the upper rho + rho^3 ... The plates are 4000 gaps wide, which
  * leaves out some 1e-6 of the light that the camera in the middle sees. */
@@ -536,6 +561,7 @@ int main(void)
 		cmocka_unit_test(test_beam_in_layer),
 		cmocka_unit_test(test_lit_floor),
 		cmocka_unit_test(test_beam),
+		cmocka_unit_test(test_seen_through),
 		cmocka_unit_test(test_plates),
 		cmocka_unit_test(test_small_lamp),
 	};

@@ -127,6 +127,49 @@ static void test_infinity(void **state)
 	"</emitter>"
 /* clang-format on */
 
+/* clang-format off */
+#define PANE(x, y, z, angle, inner) \
+	"<shape type='rectangle'>" \
+		"<transform name='to_world'>" \
+			"<scale value='1.1'/>" \
+			"<rotate x='1' angle='" angle "'/>" \
+			"<translate x='" x "' y='" y "' z='" z "'/>" \
+		"</transform>" \
+		inner \
+	"</shape>"
+#define PANES \
+	PANE("0", "1", "0", "-80", "<bsdf type='thindielectric'/>") \
+	PANE("0", ".8", "0", "-95", "<bsdf type='thindielectric'/>") \
+	PANE("0", "0", "1.7", "10", "<bsdf type='thindielectric'/>") \
+	PANE("-1", ".2", ".6", "-60", "<bsdf type='mask'><float name='opacity' value='.3'/><bsdf type='diffuse'/></bsdf>")
+/* clang-format on */
+
+/* Light that goes straight through surfaces is joined through them, too: from lamps, points, the sky and to the lens.
+ */
+static void test_passed(void **state)
+{
+	(void)state;
+	/* clang-format off */
+	struct density_tally t = density_check("panes in a box", world_of_text(32, 24,
+		SENSOR("0,0,2.9", "0,0,0")
+		BOX LAMPS PANES "%s",
+		BALL("0", "-.3", "0", "<bsdf type='roughconductor'><float name='alpha' value='.3'/></bsdf>")
+		BALL("1.4", "-1", "0", "<bsdf type='dielectric'/>")), 8000);
+	assert_true(t.passed > t.routes / 5);
+	t = density_check("panes under the sky", world_of_text(32, 24,
+		SENSOR("0,0,2.9", "0,0,0")
+		PANES DELTA_LIGHTS "%s",
+		BALL("0", "-.3", "0", "<bsdf type='diffuse'/>")
+		"<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
+		"<shape type='sphere'>"
+			"<point name='center' x='-1' y='1.5' z='.5'/>"
+			"<float name='radius' value='.1'/>"
+			"<emitter type='area'><float name='radiance' value='5'/></emitter>"
+		"</shape>"), 20000);
+	/* clang-format on */
+	assert_true(t.passed > t.routes / 5 && t.infinite > t.routes / 10);
+}
+
 /* Lights that no path hits by chance, beside some that can be hit. */
 static void test_delta_lights(void **state)
 {
@@ -355,6 +398,7 @@ int main(void)
 		cmocka_unit_test(test_diffuse_and_rough),
 		cmocka_unit_test(test_specular),
 		cmocka_unit_test(test_infinity),
+		cmocka_unit_test(test_passed),
 		cmocka_unit_test(test_blended_fog),
 		cmocka_unit_test(test_fog),
 		cmocka_unit_test(test_puffs),

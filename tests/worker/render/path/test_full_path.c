@@ -61,7 +61,7 @@ static void compare(struct path_context *c, unsigned s, unsigned edges, struct t
 	static struct full_path x;
 	double film[2], share[3], colour[3];
 	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film), share);
-	bool there = full_path_from_subpaths(c, s, edges, &x);
+	bool there = full_path_from_subpaths(c, s, c->passed_count, edges + c->passed_count, &x);
 	if (!there || want == 0) {
 		/* A film point that is drawn on the border may be computed on its other side. */
 		t->black++;
@@ -266,6 +266,38 @@ static void test_ends(void **state)
 	      world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
 
+/* Joined through panes, holes, and a block that absorbs what its faces let straight through. */
+static void test_passed(void **state)
+{
+	(void)state;
+	/* clang-format off */
+	struct world *w = world_of_text(32, 32,
+		ROOM LAMP
+		BALL("<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")
+		"<emitter type='point'>"
+			"<point name='position' x='-.5' y='1.5' z='.5'/>"
+			"<float name='intensity' value='3'/>"
+		"</emitter>"
+		"<shape type='cube'>"
+			AT("<scale x='1.5' y='.2' z='1.5'/><rotate z='1' angle='10'/><translate y='1'/>")
+			"<bsdf type='thindielectric'/>"
+			MEDIUM("interior", "0.9,2,0.2")
+		"</shape>"
+		"<shape type='rectangle'>"
+			AT("<scale value='.3'/><translate y='.1' z='1.2'/>")
+			"<bsdf type='mask'>"
+				"<texture name='opacity' type='checkerboard'>"
+					"<float name='color0' value='.2'/>"
+					"<float name='color1' value='.7'/>"
+				"</texture>"
+				"<bsdf type='diffuse'/>"
+			"</bsdf>"
+		"</shape>");
+	/* clang-format on */
+	assert_true(w->effects.transparent_shadows && w->effects.absorption);
+	check("panes", w, 3000);
+}
+
 /* A wall before the near plane, another behind the far one, and the sky: all that a camera path finds between the
  * planes is visible. */
 static void test_clipped(void **state)
@@ -317,7 +349,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_surfaces),    cmocka_unit_test(test_media), cmocka_unit_test(test_round_lamp),
 		cmocka_unit_test(test_environment), cmocka_unit_test(test_ends),  cmocka_unit_test(test_clipped),
-		cmocka_unit_test(test_sides),
+		cmocka_unit_test(test_passed),	    cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

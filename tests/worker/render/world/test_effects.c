@@ -262,6 +262,33 @@ static void test_medium_light(void **state)
 	world_free(w);
 }
 
+/* Not through hair, and not where media scatter: there edges pass faces of `null` anyway. */
+static void test_transparent_shadows(void **state)
+{
+	(void)state;
+#define PANE "<shape type='rectangle'><bsdf type='thindielectric' id='pane'/></shape>"
+	struct world *w = forced("", VIEW LAMP PANE);
+	assert_true(w->effects.transparent_shadows);
+	assert_string_equal(line_of(w, "transparent-shadows")->why, "`pane` lets light straight through");
+	world_free(w);
+	w = forced("-transparent-shadows", VIEW LAMP PANE);
+	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->other_scene);
+	world_free(w);
+	static const char *const without[] = {VIEW LAMP "<shape type='sphere'><bsdf type='dielectric'/></shape>",
+					      VIEW LAMP "<shape type='sphere'><bsdf type='hair'/></shape>"};
+	for (int i = 0; i < 2; i++) {
+		w = forced("", without[i]);
+		assert_true(!w->effects.transparent_shadows);
+		assert_string_equal(line_of(w, "transparent-shadows")->why,
+				    "no material that light meets lets light straight through");
+		world_free(w);
+	}
+	w = forced("+transparent-shadows", VIEW LAMP BALL("1", CLOUD("2")) PANE);
+	assert_true(!w->effects.transparent_shadows && !line_of(w, "transparent-shadows")->on);
+	assert_non_null(strstr(line_of(w, "transparent-shadows")->why, "`null` alone"));
+	world_free(w);
+}
+
 static void test_texts(void **state)
 {
 	(void)state;
@@ -322,6 +349,7 @@ int main(void)
 		cmocka_unit_test(test_forced),
 		cmocka_unit_test(test_scattering),
 		cmocka_unit_test(test_medium_light),
+		cmocka_unit_test(test_transparent_shadows),
 		cmocka_unit_test(test_texts),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * path_see_through follows the ray from z to y from one surface to the next, as long as each has a straight lobe, and
+ * ends where nothing else is in the way. What is opaque, or more than PATH_PASSED_MOST surfaces, blocks the view; no
+ * such path is lost, since sub-paths that pass the surfaces one by one still find it.
+ */
+#include "worker/render/path/transparent.h"
+
+#include "worker/render/path/media.h"
+#include "worker/render/path/path.h"
+#include "worker/render/path/visible.h"
+
+/* The share of light that goes straight through v, which a ray along d met. Zero: none, or a sub-path never chooses to;
+ * otherwise v is left so. */
+static spectrum pass(const struct path_context *c, struct path_vertex *v, vec3 d)
+{
+	double chance;
+	vec3 wi;
+	if (!(v->bsdf->modes & BSDF_STRAIGHT) || v->bsdf->culls || !path_meets(d, v))
+		return spectrum_of(0);
+	v->delta = true;
+	v->mode = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
+	struct bsdf_point p = world_bsdf_point(&v->x, &c->wl, TRANSPORT_RADIANCE);
+	spectrum share = bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, v->to_prev), v->mode, &wi, &chance);
+	return spectrum_is_zero(share) || !(chance > 0) ? spectrum_of(0) : share;
+}
+
+/* Whether densities of v as reached from there along d are not degenerate. */
+static bool are_apart(const struct path_vertex *from, const struct path_vertex *v, vec3 d)
+{
+	double distance2;
+	path_direction(from, v, &distance2);
+	return distance2 > 0 && fabs(vec3_dot(v->x.ng, d)) > 0;
+}
+
+bool path_see_through(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+		      const struct path_vertex *y, spectrum *left)
+{
+	double distance2;
+	const vec3 d = path_direction(z, y, &distance2);
+	const struct path_vertex *from = z;
+	double begin = path_ray_begin(c->w, z, d);
+	*left = spectrum_of(1);
+	for (unsigned n = 0; n < PATH_PASSED_MOST; n++) {
+		struct path_vertex *v = &c->passed[n];
+		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from->x.p));
+		if (!path_extend(c, from, d, begin, end, v) || v->kind != VERTEX_SURFACE || !are_apart(from, v, d))
+			return false;
+		*left = spectrum_mul(*left, pass(c, v, d));
+		if (spectrum_is_zero(*left))
+			return false;
+		v->pdf = n == 0 ? path_pdf(c, before, z, v, TRANSPORT_RADIANCE)
+				: path_pdf_passed(c, from, v, TRANSPORT_RADIANCE);
+		if (EFFECT_IS_ON(c->w, absorption)) {
+			v->beta = *left;
+			path_absorb(c, from, d, v);
+			*left = v->beta;
+		}
+		c->passed_count = n + 1;
+		if (path_visible(c, v, y)) {
+			path_direction(v, y, &distance2);
+			return distance2 > 0;
+		}
+		from = v;
+		begin = 0;
+	}
+	return false;
+}
+
+double path_pdf_passed(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *next,
+		       enum transport transport)
+{
+	double distance2;
+	vec3 omega = path_direction(at, next, &distance2);
+	if (!(distance2 > 0) || !path_can_be_hit(c, next) || !path_meets(omega, next))
+		return 0;
+	struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, transport);
+	double chance = path_delta_chance(at->bsdf, &p, frame_to_local(&at->x.sh, vec3_neg(omega)), at->mode);
+	/* Straight on, both of path_delta_per_solid are the cosine. */
+	double lobe = chance * fabs(vec3_dot(at->x.ng, omega));
+	return next->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(next, omega, distance2);
+}
+
+double path_passed_ratio(const struct path_vertex *const *v, unsigned first, unsigned last, const double *pdf)
+{
+	double whole, part;
+	path_direction(v[last + 1], v[first - 1], &whole);
+	double ratio = whole;
+	for (unsigned i = first; i <= last; i++) {
+		vec3 w = path_direction(v[i], v[i - 1], &part);
+		double cosine = vec3_dot(v[i]->x.ng, w);
+		ratio *= cosine * cosine / (part * pdf[i - first]);
+	}
+	path_direction(v[last + 1], v[last], &part);
+	return ratio / part;
+}
+
+double path_passed_ratio_in(const struct path_vertex *v, unsigned first, unsigned last, const double *pdf)
+{
+	const struct path_vertex *around[PATH_PASSED_MOST + 2];
+	double one[PATH_PASSED_MOST];
+	unsigned n = last - first + 1;
+	for (unsigned i = 0; i < n + 2; i++)
+		around[i] = &v[first - 1 + i];
+	for (unsigned i = 0; i < n; i++)
+		one[i] = 1;
+	return path_passed_ratio(around, 1, n, pdf ? pdf : one);
+}
