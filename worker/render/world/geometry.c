@@ -189,7 +189,7 @@ int build_read_shapes(struct builder *b)
 	b->motions = arena_alloc(a, listed, sizeof(void *));
 	if (!meshes || !b->geometry || !b->boxes || !b->shape_nodes || !b->shared || !b->instances || !b->motions)
 		return build_out_of_memory(b->e);
-	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+	b->all = box_empty();
 	struct counted counted = {0};
 	for (uint32_t i = 0; i < listed && !rc; i++)
 		if ((rc = read_listed(b, &list[i], meshes, &counted)))

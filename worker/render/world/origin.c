@@ -7,17 +7,6 @@
 #define MIXED 0x1p-12
 #define WIDE 0x1p11
 
-void box_grow(struct box *b, vec3 p)
-{
-	b->low = (vec3){fmin(b->low.x, p.x), fmin(b->low.y, p.y), fmin(b->low.z, p.z)};
-	b->high = (vec3){fmax(b->high.x, p.x), fmax(b->high.y, p.y), fmax(b->high.z, p.z)};
-}
-
-double box_extent(const struct box *b)
-{
-	return fmax(b->high.x - b->low.x, fmax(b->high.y - b->low.y, b->high.z - b->low.z));
-}
-
 static double along(vec3 v, int axis)
 {
 	return axis == 0 ? v.x : axis == 1 ? v.y : v.z;

@@ -6,20 +6,13 @@
 #ifndef WORKER_RENDER_WORLD_ORIGIN_H
 #define WORKER_RENDER_WORLD_ORIGIN_H
 
-#include "worker/render/math/vec3.h"
+#include "worker/render/world/box.h"
 
 #include <stdint.h>
-
-struct box {
-	vec3 low, high;
-};
 
 struct weighed { /* a number, and its weight */
 	double at, weight;
 };
-
-void box_grow(struct box *b, vec3 p);
-double box_extent(const struct box *b); /* its largest side */
 
 /* The centre of the bounding box; in a scene of mixed scales, whose smallest shape is less than 2^-12 of it, the
  * median along each axis of the shapes' centres, weighted by 1 / extent: among small things. `room` is for `count`. */

@@ -7,7 +7,7 @@
 
 struct box build_box_of(const struct shape_geometry *g)
 {
-	struct box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+	struct box b = box_empty();
 	if (g->kind == SHAPE_SPHERE) {
 		vec3 r = {g->sphere.radius, g->sphere.radius, g->sphere.radius};
 		return (struct box){vec3_sub(g->sphere.center, r), vec3_add(g->sphere.center, r)};

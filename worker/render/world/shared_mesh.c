@@ -101,7 +101,7 @@ static mat4 to_world(const struct world *w, const struct shared_mesh *m, const m
 /* Of the mesh after rounding. */
 static struct box float_box(const struct geom_shape *g)
 {
-	struct box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+	struct box b = box_empty();
 	for (uint32_t i = 0; i < g->vertex_count; i++)
 		box_grow(&b, triangle_vertex((const float(*)[3])g->position, i));
 	return b;

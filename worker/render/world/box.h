@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Boxes along the axes. Pure. */
+#ifndef WORKER_RENDER_WORLD_BOX_H
+#define WORKER_RENDER_WORLD_BOX_H
+
+#include "worker/render/math/vec3.h"
+
+#include <stdbool.h>
+
+struct box {
+	vec3 low, high;
+};
+
+/* Of no points: low above high. */
+struct box box_empty(void);
+void box_grow(struct box *b, vec3 p);
+double box_extent(const struct box *b); /* its largest side */
+
+#endif
