@@ -113,6 +113,12 @@ struct bsdf {
 	void *data;
 };
 
+/* Whether connections may look through surfaces of it (path/transparent.h). */
+static inline bool bsdf_is_passed(const struct bsdf *b)
+{
+	return (b->modes & BSDF_STRAIGHT) && !b->culls;
+}
+
 /* Index below the surface over the one above, at the hero wavelength nm[0] where dispersive. */
 double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
 

@@ -16,7 +16,7 @@ static spectrum pass(const struct path_context *c, struct path_vertex *v, vec3 d
 {
 	double chance;
 	vec3 wi;
-	if (!(v->bsdf->modes & BSDF_STRAIGHT) || v->bsdf->culls || !path_meets(d, v))
+	if (!bsdf_is_passed(v->bsdf) || !path_meets(d, v))
 		return spectrum_of(0);
 	v->delta = true;
 	v->mode = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
@@ -40,6 +40,8 @@ bool path_see_through(struct path_context *c, const struct path_vertex *before, 
 	const vec3 d = path_direction(z, y, &distance2);
 	const struct path_vertex *from = z;
 	double begin = path_ray_begin(c->w, z, d);
+	if (!box_is_met(&c->w->passed, z->x.p, d, y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2)))
+		return false;
 	*left = spectrum_of(1);
 	for (unsigned n = 0; n < PATH_PASSED_MOST; n++) {
 		struct path_vertex *v = &c->passed[n];

@@ -18,3 +18,21 @@ double box_extent(const struct box *b)
 {
 	return fmax(b->high.x - b->low.x, fmax(b->high.y - b->low.y, b->high.z - b->low.z));
 }
+
+/* Between two planes across an axis: narrows [t[0], t[1]]. */
+static bool between(double low, double high, double p, double d, double t[2])
+{
+	if (d == 0)
+		return p >= low && p <= high;
+	double a = (low - p) / d, b = (high - p) / d;
+	t[0] = fmax(t[0], fmin(a, b));
+	t[1] = fmin(t[1], fmax(a, b));
+	return t[0] <= t[1];
+}
+
+bool box_is_met(const struct box *b, vec3 p, vec3 d, double t_max)
+{
+	double t[2] = {0, t_max};
+	return b->low.x <= b->high.x && between(b->low.x, b->high.x, p.x, d.x, t) &&
+	       between(b->low.y, b->high.y, p.y, d.y, t) && between(b->low.z, b->high.z, p.z, d.z, t);
+}

@@ -15,5 +15,7 @@ struct box {
 struct box box_empty(void);
 void box_grow(struct box *b, vec3 p);
 double box_extent(const struct box *b); /* its largest side */
+/* Whether the ray from p along d meets it no further than at t_max. */
+bool box_is_met(const struct box *b, vec3 p, vec3 d, double t_max);
 
 #endif

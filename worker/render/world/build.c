@@ -286,6 +286,24 @@ static int find_coincidence(struct builder *b)
 	return s ? coincident_find(b->w, b->shape_nodes, s, b->e) : build_out_of_memory(b->e);
 }
 
+/* In the world's lengths, and a little larger than its shapes: they were rounded to floats. */
+static void bound_passed(struct builder *b)
+{
+	struct world *w = b->w;
+	const double slack = 0x1p-16 * w->radius;
+	w->passed = box_empty();
+	for (uint32_t i = 0; i < w->shape_count && w->effects.transparent_shadows; i++) {
+		if (!bsdf_is_passed(&w->bsdfs[w->parts[i].bsdf]))
+			continue;
+		for (int side = 0; side < 2; side++) {
+			double out = side ? slack : -slack;
+			vec3 p = side ? b->boxes[i].high : b->boxes[i].low;
+			box_grow(&w->passed,
+				 vec3_add(vec3_scale(w->scale, vec3_sub(p, w->center)), (vec3){out, out, out}));
+		}
+	}
+}
+
 static int find_effects(struct builder *b, uint32_t max_depth)
 {
 	struct world *w = b->w;
@@ -304,7 +322,10 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 					   .room = room,
 					   .reach = of_bsdf};
 	effects_analyse(w, &src, &b->forced, reached);
-	return effects_apply(w, &b->forced, reached, b->e);
+	int rc = effects_apply(w, &b->forced, reached, b->e);
+	if (!rc)
+		bound_passed(b);
+	return rc;
 }
 
 /* Everything but Embree: all effects are known before that is built. */

@@ -74,7 +74,7 @@ static void add_material(struct census *c, const struct bsdf *b, const struct sc
 		count(isfinite(b->alpha) ? &c->glossy : &c->diffuse, n, nameless);
 	if (b->modes & BSDF_TRANSMIT)
 		count(&c->transmission, n, nameless);
-	if ((b->modes & BSDF_STRAIGHT) && !b->culls)
+	if (bsdf_is_passed(b))
 		count(&c->straight, n, nameless);
 	if (b->textured)
 		count(&c->textured, n, nameless);
