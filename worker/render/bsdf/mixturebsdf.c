@@ -8,7 +8,7 @@ static int read_weights(struct blend *m, const struct scene_node *n, struct erro
 {
 	const char *text = node_string(n, "weights", "");
 	double sum = 0;
-	if (number_list(text, m->fixed, BLEND_PARTS_MAX) != (int)m->count)
+	if (number_weights(text, m->fixed, BLEND_PARTS_MAX) != (int)m->count)
 		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weights, one for each BSDF", text, m->count);
 	for (uint32_t k = 0; k < m->count; k++) {
 		if (!(m->fixed[k] >= 0 && m->fixed[k] <= 1e6))

@@ -23,7 +23,7 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 		return rc;
 	const char *text = node_string(n, "weights", "");
 	double sum = 0;
-	if (number_list(text, m->weight, PHASE_PARTS_MAX) != (int)m->count)
+	if (number_weights(text, m->weight, PHASE_PARTS_MAX) != (int)m->count)
 		return node_error(n, e, EINVAL, "weights=\"%s\": needs %u weights, one for each phase function", text,
 				  m->count);
 	for (uint32_t k = 0; k < m->count; k++) {

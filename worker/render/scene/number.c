@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A number is found by hand, so that its end is known, and converted by strtod in the C locale. Lists are read number
+ * by number, with what may stand between two of them.
+ *
+ * Failures: NULL, false or -1, as the header says; errors are worded by callers.
+ */
 #include "worker/render/scene/number.h"
 
 #include <locale.h>
@@ -188,6 +194,29 @@ int number_list(const char *text, double *out, size_t max)
 		} else if (p == rest && p < end) {
 			return -1;
 		}
+	}
+	return (int)n;
+}
+
+static const char *skip_separators(const char *p)
+{
+	while (number_is_blank(*p) || *p == ',' || *p == ';')
+		p++;
+	return p;
+}
+
+int number_weights(const char *text, double *out, size_t max)
+{
+	const char *end = text + strlen(text), *p = skip_separators(text);
+	size_t n = 0;
+	while (p < end) {
+		const char *rest = n < max ? scan_value(p, end, &out[n]) : NULL;
+		if (!rest)
+			return -1;
+		n++;
+		p = skip_separators(rest);
+		if (p == rest && p < end)
+			return -1;
 	}
 	return (int)n;
 }

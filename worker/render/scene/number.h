@@ -26,6 +26,9 @@ bool number_parse_int(const char *text, int64_t *out);
  * than max. */
 int number_list(const char *text, double *out, size_t max);
 
+/* The same for weights of 0.6: separated by any of " ,;", one or more. */
+int number_weights(const char *text, double *out, size_t max);
+
 /* The rest of a line from p on, without the blanks around it. */
 const char *number_line_rest(const char *p, const char *end, size_t *length);
 

@@ -89,7 +89,7 @@ static void test_a_mixture_is_a_sum(void **state)
 	} cases[] = {
 		{"mixturebsdf weights=0.2,0.3,0.1 | diffuse reflectance=0.9 | phong | roughconductor alpha=0.3",
 		 {0.2, 0.3, 0.1}},
-		{"mixturebsdf weights=1_2_5 | diffuse reflectance=0.9 | phong | roughconductor alpha=0.3",
+		{"mixturebsdf weights=1;2;5 | diffuse reflectance=0.9 | phong | roughconductor alpha=0.3",
 		 {0.125, 0.25, 0.625}},
 		{"mixturebsdf weights=0.4,0.6 | diffuse reflectance=0.9 | phong", {0.4, 0.6, 0}},
 		{"mixturebsdf weights=1,3 ensure_energy_conservation=true | diffuse reflectance=0.9 | phong",

@@ -88,6 +88,12 @@ static void test_lists(void **state)
 	assert_int_equal(number_list("1,2,", v, 3), -1);
 	assert_int_equal(number_list("1;2", v, 3), -1);
 	assert_int_equal(number_list("1-2", v, 3), -1);
+	assert_int_equal(number_weights("0.5; .25,,0.125f ;", v, 3), 3);
+	assert_true(v[0] == 0.5 && v[1] == 0.25 && v[2] == 0.125);
+	assert_int_equal(number_weights(" ,", v, 3), 0);
+	assert_int_equal(number_weights("1 2 3 4", v, 3), -1);
+	assert_int_equal(number_weights("1-2", v, 3), -1);
+	assert_int_equal(number_weights("1;x", v, 3), -1);
 }
 
 static void check_snake(const char *from, const char *to)
