@@ -62,7 +62,8 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 static int read_texture(struct emitter *em, struct spot *s, const struct scene_node *n, const mat4 *to_world,
 			const struct emitter_build *build, struct error *e)
 {
-	s->textured = node_find(n, "texture") != NULL;
+	const struct property *given = node_find(n, "texture");
+	s->textured = given && (build->dialect_3 || given->value.type == VALUE_NODE); /* 0.6 ignores one value */
 	if (!s->textured)
 		return 0;
 	if (s->cutoff > 89 * (M_PI / 180))

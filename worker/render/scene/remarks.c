@@ -124,6 +124,9 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 		return remark(r, n, e,
 			      "its to_world stretches the image; Mitsuba distorts it differently, because it does not "
 			      "normalize the transformed directions");
+	const struct property *texture = strcmp(n->type, "spot") == 0 ? node_find(n, "texture") : NULL;
+	if (!dialect_3 && texture && texture->value.type != VALUE_NODE)
+		return remark(r, n, e, "one value as `texture` has no effect, as in Mitsuba 0.6");
 	bool sun = strcmp(n->type, "sun") == 0;
 	if (!dialect_3 && (sun || strcmp(n->type, "sky") == 0) &&
 	    (node_find(n, "sun_scale") || node_find(n, "sky_scale")))

@@ -189,6 +189,21 @@ static void test_directions(void **state)
 	world_free(w);
 }
 
+/* One value in place of a picture: Mitsuba 0.6 ignores it. */
+static void test_even_texture(void **state)
+{
+	(void)state;
+	for (int old = 0; old <= 1; old++) {
+		struct world *w = world_of(old ? "0.6.0" : "3.0.0",
+					   "<emitter type='spot'><spectrum name='texture' value='0.25'/></emitter>");
+		const struct emitter *em = &w->emitters[0];
+		struct emitter_point x = only_point(em);
+		double unit = w->scale * w->scale, got = em->ops->radiance(em, &x, (vec3){0, 0, 1}, &grey).v[0] / unit;
+		assert_true(fabs(got - (old ? 1 : 0.25)) < 1e-9);
+		world_free(w);
+	}
+}
+
 static void test_world(void **state)
 {
 	(void)state;
@@ -231,10 +246,8 @@ static void test_refusals(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_places),
-		cmocka_unit_test(test_directions),
-		cmocka_unit_test(test_world),
-		cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_places), cmocka_unit_test(test_directions), cmocka_unit_test(test_even_texture),
+		cmocka_unit_test(test_world),  cmocka_unit_test(test_refusals),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
