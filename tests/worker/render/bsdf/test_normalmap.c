@@ -76,6 +76,11 @@ static void test_one_color(void **state)
 	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap handedness=false", even, "diffuse"), &build, &e),
 			 0);
 	assert_false(of_texture.relief->handed);
+	const struct bsdf_build old = {.arena = &a};
+	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap", even, "diffuse"), &old, &e), 0);
+	assert_false(of_texture.relief->handed);
+	assert_int_equal(bsdf_create(&of_texture, bent(&a, "normalmap handedness=true", even, "diffuse"), &old, &e), 0);
+	assert_true(of_texture.relief->handed);
 	arena_fini(&a);
 }
 
