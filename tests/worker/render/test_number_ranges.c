@@ -199,8 +199,11 @@ static void check_param(const struct plugin_decl *d, const struct param *p, stru
 			check_inside(d, p, t, p->max, c);
 		if (type == VALUE_FLOAT && p->min >= 0)
 			check_inside(d, p, t, sqrt(fmax(p->min, 1e-30)) * sqrt(p->max), c);
-		check_beyond(d, p, t, after(t, p->max, INFINITY), c);
-		check_beyond(d, p, t, after(t, p->min, -INFINITY), c);
+		void (*check)(const struct plugin_decl *, const struct param *, enum value_type, double,
+			      struct counts *) =
+			(p->types & VALUE_CLIPPED) && t != VALUE_SPECTRUM ? check_inside : check_beyond;
+		check(d, p, t, after(t, p->max, INFINITY), c);
+		check(d, p, t, after(t, p->min, -INFINITY), c);
 	}
 }
 

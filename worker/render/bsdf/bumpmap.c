@@ -137,14 +137,14 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 	}
 
 static const struct param bumpmap_params[] = {
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
 	OF_MITSUBA_3_7,
 	{.name = NULL},
 };
 /* scale: as in glTF. handedness (ours): false for the frames of Mitsuba before August 2026, n x t, which 0.6 has. */
 static const struct param normalmap_params[] = {
 	{.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
 	{.name = "handedness", .types = VALUE_BOOL},
 	OF_MITSUBA_3_7,
 	{.name = NULL},

@@ -37,7 +37,7 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return 0;
 }
 
-static const struct param mask_params[] = {{.name = "opacity", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-					   {.name = NULL}};
+static const struct param mask_params[] = {
+	{.name = "opacity", .types = VALUE_TEXTURE | VALUE_CLIPPED, .min = 0, .max = 1}, {.name = NULL}};
 
 BLEND_OPS(mask);

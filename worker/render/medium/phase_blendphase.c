@@ -7,7 +7,7 @@
 #include "worker/render/medium/phase_parts.h"
 
 static const struct param params[] = {
-	{"weight", VALUE_VOLUME, PARAM_UNDERSTOOD, 0, 1, NULL},
+	{"weight", VALUE_VOLUME | VALUE_CLIPPED, PARAM_UNDERSTOOD, 0, 1, NULL},
 	{NULL, 0, 0, 0, 0, NULL},
 };
 

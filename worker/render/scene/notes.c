@@ -70,6 +70,14 @@ int note_foreign_parameter(const struct notes *t, const struct xml_element *owne
 		    el->file, el->line, owner->name, type, name);
 }
 
+int note_newer(const struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name)
+{
+	const char *type = xml_attribute(owner, "type");
+	return note(t, owner, type, name,
+		    "%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not a parameter of Mitsuba 0.6 and is ignored, as there",
+		    el->file, el->line, owner->name, type, name);
+}
+
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name)
 {

@@ -96,15 +96,31 @@ static int replace_distribution(const struct notes *t, const struct xml_element 
 		el->file, el->line, owner->name, xml_attribute(owner, "type"), given);
 }
 
+/* Of those that a table lists. Mitsuba 0.6 does not care for the case of most. */
+static int to_lower(struct value *v, struct arena *arena)
+{
+	char *word = arena_strdup(arena, v->as.string);
+	if (!word)
+		return -ENOMEM;
+	for (char *c = word; *c; c++)
+		if (*c >= 'A' && *c <= 'Z')
+			*c = (char)(*c - 'A' + 'a');
+	v->as.string = word;
+	return 0;
+}
+
 int old_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 	      const struct param *p, enum plugin_class cls, struct arena *arena, struct value *v)
 {
+	if (v->type == VALUE_STRING && p->choices && to_lower(v, arena))
+		return error_set(t->error, ENOMEM, "out of memory");
 	if (cls != PLUGIN_BSDF)
 		return 0;
 	if (v->type == VALUE_STRING)
 		return strcmp(p->name, "distribution") == 0 ? replace_distribution(t, owner, el, v) : 0;
 	if ((strcmp(p->name, "eta") == 0 || strcmp(p->name, "k") == 0) && p->min == 0)
 		return drop_sign(t, owner, el, p, v);
-	bool reflects = strstr(p->name, "reflectance") || strstr(p->name, "transmittance");
+	bool reflects =
+		strstr(p->name, "reflectance") || strstr(p->name, "transmittance") || strcmp(p->name, "opacity") == 0;
 	return reflects && p->max == 1 ? scale_reflectance(t, owner, el, p, arena, v) : 0;
 }

@@ -18,6 +18,7 @@
 #include "worker/render/scene/animation.h"
 #include "worker/render/scene/asset_list.h"
 #include "worker/render/scene/batch.h"
+#include "worker/render/scene/clip_value.h"
 #include "worker/render/scene/default_light.h"
 #include "worker/render/scene/element.h"
 #include "worker/render/scene/given_twice.h"
@@ -165,6 +166,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
 		return note_property(&m->notes, owner, el, written);
+	if ((found->types & VALUE_OF_3) && !m->scene->dialect_3)
+		return note_newer(&m->notes, owner, el, written);
 	if (found->status == PARAM_DIFFERS)
 		return note_difference(&m->notes, owner, el, written);
 	*p = found;
@@ -195,6 +198,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	r = value_read(el, m->assets_from, &m->scene->arena, &v, m->error);
 	if (!r && el->snake)
 		r = old_value(&m->notes, owner, el, p, d->node->cls, &m->scene->arena, &v);
+	if (!r && (p->types & VALUE_CLIPPED))
+		r = clip_value(&m->notes, owner, el, p, &v);
 	if (!r && v.type == VALUE_TRANSFORM)
 		v.animation = animation;
 	if (!r)

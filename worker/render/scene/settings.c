@@ -134,11 +134,13 @@ static const struct param film_params[] = {
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
-static const struct param radius_params[] = {{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)},
-					     {NULL, 0, 0, 0, 0, NULL}};
+/* `radius` of `gaussian`, and in 3.x that of `box`, are ours. */
+static const struct param box_params[] = {{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)}, {NULL, 0, 0, 0, 0, NULL}};
+static const struct param tent_params[] = {{"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)},
+					   {NULL, 0, 0, 0, 0, NULL}};
 static const struct param gaussian_params[] = {
 	{"stddev", RANGE(VALUE_FLOAT, 0.01, RADIUS_MAX / 4)},
-	{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)},
+	{"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)},
 	{NULL, 0, 0, 0, 0, NULL},
 };
 static const struct param cubic_params[] = {
@@ -175,8 +177,8 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_FILM, "mfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "tiledhdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "box", radius_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "tent", radius_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "box", box_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "tent", tent_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "gaussian", gaussian_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "mitchell", cubic_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "catmullrom", no_params, 0, PARAM_UNDERSTOOD},
@@ -219,12 +221,19 @@ static int read_crop(const struct scene_node *film, struct scene_settings *out, 
 	return 0;
 }
 
+/* 0.6's for experiments: of one pixel with a box filter, unless it says otherwise. */
+static bool is_mfilm(const struct scene_node *film)
+{
+	return film && strcmp(film->type, "mfilm") == 0;
+}
+
 static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t height, struct scene_settings *out,
 		     struct error *e)
 {
 	const struct scene_node *film = node_child(sensor, PLUGIN_FILM, 0);
-	out->width = film ? (uint32_t)node_int(film, "width", SCENE_FILM_WIDTH) : SCENE_FILM_WIDTH;
-	out->height = film ? (uint32_t)node_int(film, "height", SCENE_FILM_HEIGHT) : SCENE_FILM_HEIGHT;
+	bool one = is_mfilm(film);
+	out->width = film ? (uint32_t)node_int(film, "width", one ? 1 : SCENE_FILM_WIDTH) : SCENE_FILM_WIDTH;
+	out->height = film ? (uint32_t)node_int(film, "height", one ? 1 : SCENE_FILM_HEIGHT) : SCENE_FILM_HEIGHT;
 	if (width && !height) /* the film keeps its aspect */
 		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1),
 					     PLAN_MAX_SIZE + 1.0);
@@ -246,9 +255,9 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 	const struct scene_node *filter = film ? node_child(film, PLUGIN_RFILTER, 0) : NULL;
 	out->filter = FILTER_GAUSSIAN;
 	out->filter_stddev = 0.5;
-	if (filter && strcmp(filter->type, "box") == 0) {
+	if (filter ? strcmp(filter->type, "box") == 0 : is_mfilm(film)) {
 		out->filter = FILTER_BOX;
-		out->filter_radius = node_float(filter, "radius", 0.5);
+		out->filter_radius = filter ? node_float(filter, "radius", 0.5) : 0.5;
 	} else if (filter && strcmp(filter->type, "tent") == 0) {
 		out->filter = FILTER_TENT;
 		out->filter_radius = node_float(filter, "radius", 1.0);

@@ -26,9 +26,9 @@ static const struct param constvolume_params[] = {
 static const struct param gridvolume_params[] = {
 	{"filename", UNDERSTOOD(VALUE_STRING)},
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
-	{"use_grid_bbox", UNDERSTOOD(VALUE_BOOL)},
-	{"filter_type", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "trilinear|nearest"},
-	{"wrap_mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "clamp|repeat|mirror"},
+	{"use_grid_bbox", UNDERSTOOD(VALUE_BOOL | VALUE_OF_3)},
+	{"filter_type", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "trilinear|nearest"},
+	{"wrap_mode", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "clamp|repeat|mirror"},
 	{"min", PLACE}, /* of 0.6 */
 	{"max", PLACE},
 	{"raw", IGNORED}, /* numbers are never decoded */

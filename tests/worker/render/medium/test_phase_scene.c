@@ -79,7 +79,7 @@ static void test_what_weights_leave(void **state)
 {
 	(void)state;
 	const struct wavelengths wl = wavelengths_sample(0.3);
-	struct world *w = world_of_files(8, 8, scene_of(MIXTURE(".2,.5", FORWARDS TABLE)));
+	struct world *w = world_of_files(8, 8, scene_of(MIXTURE(".2; .5", FORWARDS TABLE)));
 	const struct medium *m = &w->media[0];
 	const vec3 o = {0, 0, 0};
 	assert_true(fabs(medium_scattering(m, o, &wl).v[0] * w->scale - 0.7 * 2) < 1e-12);
@@ -87,6 +87,17 @@ static void test_what_weights_leave(void **state)
 	double table = 1.8 / (2.5 * 2 * M_PI), forwards = 0.75 / (4 * M_PI * pow(0.85, 1.5)); /* of 0.4 */
 	double found = m->phase.ops->eval(&m->phase, o, 0.4);
 	assert_true(fabs(found - (0.2 * forwards + 0.5 * table) / 0.7) < 1e-12);
+	world_free(w);
+}
+
+/* Beyond 1 all is the second. */
+static void test_weight_above_one(void **state)
+{
+	(void)state;
+	struct world *w = world_of_files(8, 8, scene_of(BLEND("<float name='weight' value='1.5'/>")));
+	const struct phase *p = &w->media[0].phase;
+	const vec3 o = {0, 0, 0};
+	assert_true(fabs(p->ops->eval(p, o, 0.4) - 0.75 / (4 * M_PI * pow(0.85, 1.5))) < 1e-12);
 	world_free(w);
 }
 
@@ -99,7 +110,7 @@ static void test_refused(void **state)
 		{"<phase type='blendphase'>" FORWARDS "</phase>", "needs exactly two phase functions inside"},
 		{"<phase type='blendphase'>" FORWARDS FORWARDS FORWARDS "</phase>",
 		 "needs exactly two phase functions"},
-		{BLEND("<float name='weight' value='1.5'/>"), "weight=1.5 is outside [0, 1]"},
+		{BLEND("<spectrum name='weight' value='400:1.5, 500:1'/>"), "weight=1.5 is outside [0, 1]"},
 		{BLEND("<rgb name='weight' value='.2,.3,.4'/>"), "weight: is a colour; it must be the same at all"},
 		{BLEND("<texture name='weight' type='checkerboard'/>"), "`weight` may be a volume, but not a texture"},
 		{BLEND(ON_GRID), "weight: is a colour"},
@@ -132,6 +143,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_weight_on_grid),
 		cmocka_unit_test(test_what_weights_leave),
+		cmocka_unit_test(test_weight_above_one),
 		cmocka_unit_test(test_refused),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -77,12 +77,111 @@ static void test_reflectances_are_scaled(void **state)
 
 	refuses("3.0.0", "<bsdf type='diffuse'><rgb name='reflectance' value='2 1 0.5'/></bsdf>", "outside [0, 1]");
 	refuses("0.6.0", "<bsdf type='diffuse'><rgb name='reflectance' value='-1 2 0.5'/></bsdf>", "outside [0, 1]");
-	refuses("0.6.0", "<bsdf type='mask'><spectrum name='opacity' value='2'/><bsdf type='diffuse'/></bsdf>",
-		"outside [0, 1]");
+	s = read_old("<bsdf type='mask'><rgb name='opacity' value='2 1 0.5'/><bsdf type='diffuse'/></bsdf>",
+		     "opacity=2 is above 1: scaled by 0.495");
+	v = &node_find(s.objects[0], "opacity")->value;
+	assert_true(near(v->as.rgb[0], 0.99) && near(v->as.rgb[1], 0.495) && near(v->as.rgb[2], 0.2475));
+	scene_fini(&s);
 	refuses("0.6.0",
 		"<bsdf type='phong'><rgb name='specularReflectance' value='2 2 2'/>"
 		"<boolean name='ensureEnergyConservation' value='false'/></bsdf>",
 		"outside [0, 1]");
+}
+
+/* Mitsuba limits these where it uses them; in 0.6 only weights. */
+static void test_clipped(void **state)
+{
+	(void)state;
+#define MIX(weight) "<bsdf type='blendbsdf'>" weight "<bsdf type='diffuse'/><bsdf type='diffuse'/></bsdf>"
+#define MASK(opacity) "<bsdf type='mask'>" opacity "<bsdf type='diffuse'/></bsdf>"
+	static const struct {
+		const char *version, *bsdf, *note;
+		double wanted;
+	} cases[] = {
+		{"0.6.0", MIX("<float name='weight' value='1.5'/>"), "weight=1.5 is outside [0, 1] and counts as 1", 1},
+		{"3.0.0", MIX("<float name='weight' value='-2'/>"), "weight=-2 is outside [0, 1] and counts as 0", 0},
+		{"3.0.0", MIX("<integer name='weight' value='3'/>"), "weight=3 is outside [0, 1] and counts as 1", 1},
+		{"3.0.0", MIX("<float name='weight' value='0.75'/>"), NULL, 0.75},
+		{"3.0.0", MASK("<float name='opacity' value='1.0001'/>"), "opacity=1.0001 is outside", 1},
+		{"3.0.0", MASK("<rgb name='opacity' value='1 2 1'/>"), "opacity=2 is outside", 1},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct scene s;
+		struct error e;
+		if (read_scene(&s, cases[i].version, cases[i].bsdf, &e))
+			fail_msg("%s: %s", cases[i].bsdf, e.text);
+		assert_int_equal(s.note_count, cases[i].note != NULL);
+		assert_true(!cases[i].note || strstr(s.notes[0], cases[i].note));
+		const struct property *p = node_find(s.objects[0], "weight");
+		const struct value *v = &(p ? p : node_find(s.objects[0], "opacity"))->value;
+		double got = v->type == VALUE_RGB ? v->as.rgb[1] : v->as.number;
+		assert_true(got == cases[i].wanted);
+		scene_fini(&s);
+	}
+	refuses("3.0.0", MIX("<spectrum name='weight' value='400:0.5, 500:1.5'/>"), "weight=1.5 is outside [0, 1]");
+}
+
+/* What plug-ins of 3.x have and those of 0.6 by the same name have not. */
+static void test_newer_names(void **state)
+{
+	(void)state;
+#define BENT(type, scale)                                                                            \
+	"<bsdf type='" type                                                                          \
+	"'><texture name='normalmap' type='checkerboard'/><bsdf type='diffuse'/><float name='" scale \
+	"' value='2'/></bsdf>"
+#define GRID(value) "<volume type='gridvolume'><string name='filename' value='g'/>" value "</volume>"
+#define FILTER(type, name) "<rfilter type='" type "'><float name='" name "' value='2'/></rfilter>"
+	static const struct {
+		const char *content, *name, *written;
+		bool kept; /* in 0.6 as well */
+	} cases[] = {
+		{BENT("bumpmap", "scale"), "scale", "scale", false},
+		{BENT("normalmap", "scale"), "scale", "scale", false},
+		{GRID("<string name='filter_type' value='nearest'/>"), "filter_type", "filter_type", false},
+		{GRID("<string name='wrap_mode' value='repeat'/>"), "wrap_mode", "wrap_mode", false},
+		{GRID("<boolean name='use_grid_bbox' value='true'/>"), "use_grid_bbox", "use_grid_bbox", false},
+		{FILTER("tent", "radius"), "radius", "radius", false},
+		{FILTER("gaussian", "radius"), "radius", "radius", false},
+		{FILTER("gaussian", "stddev"), "stddev", "stddev", true},
+		{FILTER("box", "radius"), "radius", "radius", true},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char note[128];
+		snprintf(note, sizeof note, "`%s` is not a parameter of Mitsuba 0.6 and is ignored, as there",
+			 cases[i].written);
+		struct scene s = read_old(cases[i].content, cases[i].kept ? NULL : note);
+		assert_true((node_find(s.objects[0], cases[i].name) != NULL) == cases[i].kept);
+		scene_fini(&s);
+		struct error e;
+		if (read_scene(&s, "3.0.0", cases[i].content, &e))
+			fail_msg("%s: %s", cases[i].content, e.text);
+		assert_true(s.note_count == 0 && node_find(s.objects[0], cases[i].name));
+		scene_fini(&s);
+	}
+#undef BENT
+#undef GRID
+#undef FILTER
+}
+
+static void test_capitals(void **state)
+{
+	(void)state;
+#define IMAGE(name, value)                                                                                          \
+	"<texture type='bitmap'><string name='filename' value='A.png'/><string name='" name "' value='" value "'/>" \
+	"</texture>"
+	struct scene s = read_old(IMAGE("filterType", "EWA"), NULL);
+	assert_string_equal(node_string(s.objects[0], "filter_type", ""), "ewa");
+	assert_string_equal(node_string(s.objects[0], "filename", ""), "A.png");
+	scene_fini(&s);
+	s = read_old(IMAGE("channel", "R"), NULL);
+	assert_string_equal(node_string(s.objects[0], "channel", ""), "r");
+	scene_fini(&s);
+	s = read_old("<bsdf type='roughconductor'><string name='distribution' value='GGX'/></bsdf>", NULL);
+	assert_string_equal(node_string(s.objects[0], "distribution", ""), "ggx");
+	scene_fini(&s);
+	refuses("3.0.0", IMAGE("filter_type", "Nearest"), "did you mean `nearest`?");
+	refuses("0.6.0", IMAGE("filterType", "Nearer"), "is not supported");
+#undef IMAGE
 }
 
 static void test_distributions(void **state)
@@ -292,6 +391,9 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_reflectances_are_scaled),
+		cmocka_unit_test(test_clipped),
+		cmocka_unit_test(test_newer_names),
+		cmocka_unit_test(test_capitals),
 		cmocka_unit_test(test_distributions),
 		cmocka_unit_test(test_metals_lose_their_signs),
 		cmocka_unit_test(test_unknown_names),

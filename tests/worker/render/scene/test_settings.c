@@ -82,9 +82,11 @@ static void test_filters(void **state)
 	} cases[] = {
 		{"<rfilter type='box'/>", FILTER_BOX, 0.5, 0},
 		{"<rfilter type='tent'/>", FILTER_TENT, 1, 1},
-		{"<rfilter type='tent'><float name='radius' value='2.5'/></rfilter>", FILTER_TENT, 2.5, 2},
+		{"<rfilter type='box'><float name='radius' value='2.5'/></rfilter>", FILTER_BOX, 2.5, 2},
 		{"<rfilter type='gaussian'><float name='stddev' value='1'/></rfilter>", FILTER_GAUSSIAN, 4, 4},
-		{"<rfilter type='gaussian'><float name='radius' value='1.5'/></rfilter>", FILTER_GAUSSIAN, 1.5, 1},
+		/* In 0.6 these have no radius. */
+		{"<rfilter type='tent'><float name='radius' value='2.5'/></rfilter>", FILTER_TENT, 1, 1},
+		{"<rfilter type='gaussian'><float name='radius' value='1.5'/></rfilter>", FILTER_GAUSSIAN, 2, 2},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char film[512];
@@ -94,6 +96,34 @@ static void test_filters(void **state)
 		assert_true(s.filter_radius == cases[i].radius);
 		assert_int_equal(s.border, cases[i].border);
 	}
+	static const struct {
+		const char *filter;
+		double radius;
+	} newer[] = {{"<rfilter type='tent'><float name='radius' value='2.5'/></rfilter>", 2.5},
+		     {"<rfilter type='gaussian'><float name='radius' value='1.5'/></rfilter>", 1.5}};
+	for (size_t i = 0; i < sizeof newer / sizeof *newer; i++) {
+		char xml[512];
+		struct scene_settings s;
+		struct error e;
+		snprintf(
+			xml, sizeof xml,
+			"<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>%s</film></sensor></scene>",
+			newer[i].filter);
+		assert_int_equal(read_scene(xml, 0, 0, &s, &e), 0);
+		assert_true(s.filter_radius == newer[i].radius);
+	}
+}
+
+/* 0.6's film for experiments, whose defaults are one pixel and a box. */
+static void test_mfilm(void **state)
+{
+	(void)state;
+	struct scene_settings s = read_ok("", "<film type='mfilm'/>");
+	assert_true(s.width == 1 && s.height == 1 && s.filter == FILTER_BOX && s.filter_radius == 0.5 && s.border == 0);
+	s = read_ok("", "<film type='mfilm'><integer name='width' value='20'/><rfilter type='tent'/></film>");
+	assert_true(s.width == 20 && s.height == 1 && s.filter == FILTER_TENT);
+	s = read_ok("", "<film type='tiledhdrfilm'/>");
+	assert_true(s.width == 768 && s.height == 576 && s.filter == FILTER_GAUSSIAN);
 }
 
 static void test_sampler_and_integrator(void **state)
@@ -515,6 +545,7 @@ int main(void)
 		cmocka_unit_test(test_thin_lens),
 		cmocka_unit_test(test_defaults),
 		cmocka_unit_test(test_filters),
+		cmocka_unit_test(test_mfilm),
 		cmocka_unit_test(test_sampler_and_integrator),
 		cmocka_unit_test(test_camera),
 		cmocka_unit_test(test_several_sensors),
