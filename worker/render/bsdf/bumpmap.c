@@ -73,7 +73,7 @@ static int bend_of(const struct scene_node *n, const struct scene_node *texture,
 	struct bend wanted = {.relief = {.kind = kind,
 					 .at = kind == RELIEF_HEIGHT ? height_at : normal_at,
 					 .turns = node_bool(n, "flip_invalid_normals", build->dialect_3),
-					 .handed = node_bool(n, "handedness", build->dialect_3)},
+					 .handed = node_bool(n, "handedness", false)},
 			      .node = texture,
 			      .scale = node_float(n, "scale", 1),
 			      .next = build->bends ? *build->bends : NULL};
@@ -141,7 +141,8 @@ static const struct param bumpmap_params[] = {
 	OF_MITSUBA_3_7,
 	{.name = NULL},
 };
-/* scale: as in glTF. handedness (ours): false for the frames of Mitsuba before August 2026, n x t, which 0.6 has. */
+/* scale: as in glTF. handedness (ours, for glTF): y towards the top of the image, also where n x t, Mitsuba's y, is
+ * not. */
 static const struct param normalmap_params[] = {
 	{.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},

@@ -90,6 +90,7 @@ static struct xml_element *put_normal_map(struct gltf *g, struct xml_element *pa
 	/* What Mitsuba's maps do besides, and the format does not. */
 	gltf_put_bool(g, map, at, "flip_invalid_normals", false);
 	gltf_put_bool(g, map, at, "use_shadowing_function", false);
+	gltf_put_bool(g, map, at, "handedness", true);
 	gltf_put_texture(g, map, at, NULL, info, &c);
 	double scale = gltf_number(g, at, info, "scale", 1);
 	if (scale != 1)

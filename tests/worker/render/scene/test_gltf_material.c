@@ -154,6 +154,7 @@ static void test_materials(void **state)
 	assert_string_equal(node_string(opacity, "channel", ""), "a");
 	assert_near(node_float(opacity, "threshold", 0), 0.25);
 	assert_string_equal(map->type, "normalmap");
+	assert_true(node_bool(map, "handedness", false));
 	assert_true(node_float(map, "scale", 0) == 2);
 	assert_false(node_bool(map, "use_shadowing_function", true));
 	assert_false(node_bool(map, "flip_invalid_normals", true));

@@ -96,6 +96,59 @@ static void test_bump_against_geometry(void **state)
 	assert_true(apart(back, real) > apart(flat, real));
 }
 
+/* A square whose normals lean by 45 degrees along the map's y, in light that falls along that direction or across it:
+ * it is as bright as a level one in light from the front, or black. obj: seen from outside, u runs to the right or the
+ * left, and v up, or down where the file's is flipped. */
+static void test_y_of_normal_maps(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *us, *flip, *handed;
+		bool up;
+	} cases[] = {
+		{"0110", "true", "", true},
+		{"0110", "false", "", true},
+		{"1001", "true", "", false},
+		{"1001", "false", "", false},
+		{"0110", "true", "<boolean name='handedness' value='true'/>", true},
+		{"0110", "false", "<boolean name='handedness' value='true'/>", false},
+		{"1001", "true", "<boolean name='handedness' value='true'/>", true},
+		{"1001", "false", "<boolean name='handedness' value='true'/>", false},
+	};
+	for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++)
+		for (int up = 0; up < 2; up++) {
+			const char *u = cases[k].us;
+			char xml[2048], obj[512];
+			snprintf(obj, sizeof obj,
+				 "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt %c 0\nvt %c 0\nvt %c 1\nvt %c 1\n"
+				 "vn 0 0 1\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1\n",
+				 u[0], u[1], u[2], u[3]);
+			int n = snprintf(
+				xml, sizeof xml,
+				"<scene version='3.0.0'>" VIEW
+				"<emitter type='directional'><vector name='direction' x='0' y='%d' z='-1'/>"
+				"</emitter><shape type='obj'><string name='filename' value='m.obj'/>"
+				"<boolean name='flip_tex_coords' value='%s'/><bsdf type='normalmap'>%s"
+				"<boolean name='use_shadowing_function' value='false'/><boolean "
+				"name='flip_invalid_normals' value='false'/><rgb name='normalmap' "
+				"value='0.5,0.853553391,0.853553391'/><bsdf type='diffuse'/></bsdf></shape></scene>",
+				up ? -1 : 1, cases[k].flip, cases[k].handed);
+			assert_true(n < (int)sizeof xml);
+			const struct memory_file files[] = {
+				{"s.xml", xml, (size_t)n}, {"m.obj", obj, strlen(obj)}, {NULL, NULL, 0}};
+			static double got[SIDE * SIDE], level[SIDE * SIDE];
+			image_of(world_of_files(SIDE, SIDE, files), got);
+			image_of(world_with_picture(
+					 VIEW
+					 "<emitter type='directional'><vector name='direction' x='0' y='0' z='-1'/>"
+					 "</emitter><shape type='rectangle'/>"),
+				 level);
+			int at = SIDE / 2 * SIDE + SIDE / 2;
+			double share = got[at] / level[at];
+			assert_true(fabs(share - (cases[k].up == (up == 1))) < 1e-3);
+		}
+}
+
 /* Glass, metal and a matt ground, all bent, in the light of a lamp and a sky. */
 static void test_integrators_agree(void **state)
 {
@@ -147,6 +200,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_bump_against_geometry),
+		cmocka_unit_test(test_y_of_normal_maps),
 		cmocka_unit_test(test_integrators_agree),
 	};
 	return cmocka_run_group_tests_name("relief", tests, NULL, NULL);
