@@ -14,6 +14,7 @@
 #include "common/base/text.h"
 #include "common/net/jitter.h"
 #include "common/net/notify.h"
+#include "worker/daemon/hang_watch.h"
 #include "worker/daemon/lease_queue.h"
 #include "worker/daemon/outgoing.h"
 
@@ -230,7 +231,7 @@ static void leave(struct agent *a)
 static void on_watch(uv_timer_t *t)
 {
 	struct agent *a = t->data;
-	if (!lease_queue_watch(a))
+	if (!hang_watch_look(a))
 		return;
 	log_event(LOG_STOP, "text=\"a thread hangs: the others finish, then the worker exits to be restarted\"");
 	a->hung = true;

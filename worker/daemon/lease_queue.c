@@ -10,8 +10,8 @@
  *
  * Failures: a job whose files cannot be fetched or whose scene cannot be built fails all its waiting leases with a
  * sentence. A lease that is revoked, or whose job has ended, is dropped; what a thread is working on is dropped when
- * the thread returns. A message that makes no sense closes the connection. lease_queue_watch finds threads that no
- * longer make progress and fails their leases. When too many results wait to be sent, no more leases are asked for.
+ * the thread returns. A message that makes no sense closes the connection. When too many results wait to be sent, no
+ * more leases are asked for.
  * Once SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an allocation has
  * failed while several scenes were in memory, leases of one job at a time are accepted: two jobs that fit only one
  * after the other would fail each other again and again.
@@ -21,114 +21,18 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "worker/daemon/fetch.h"
+#include "worker/daemon/lease_list.h"
 #include "worker/daemon/outgoing.h"
+#include "worker/daemon/scenes_kept.h"
 #include "worker/daemon/work.h"
 
-#include <stdio.h>
+/* ---- scenes ---- */
 
-/* ---- job_caches ---- */
-
-static void drop_job_cache(struct agent *a, struct job_cache *b)
-{
-	struct job_cache **at = &a->job_caches;
-	while (*at != b)
-		at = &(*at)->next;
-	*at = b->next;
-	job_cache_free(b);
-}
-
-static struct job_cache *who_wants(const struct agent *a, const struct blob_hash *h)
-{
-	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		if (b->state == JOB_CACHE_FETCHING && blob_hash_equal(&b->wanted, h))
-			return b;
-	return NULL;
-}
-
-/* A requested file is kept until it is answered, so that the answer is not taken for another's. */
-static void tidy_fetches(struct agent *a)
-{
-	for (struct fetch *f = a->fetches, *next; f; f = next) {
-		next = f->next;
-		if (!f->asked && !who_wants(a, &f->hash))
-			fetch_drop(a, f);
-	}
-}
-
-static bool is_in_use(const struct job_cache *b)
-{
-	return b->users || b->state == JOB_CACHE_BUILDING || b->reading.check;
-}
-
-/* Drops unused job_caches of jobs that have ended, and the least recently used ones beyond WORLDS_KEPT. */
-static void drop_unused_job_caches(struct agent *a)
-{
-	for (;;) {
-		struct job_cache *oldest = NULL, *ended = NULL;
-		unsigned idle = 0;
-		for (struct job_cache *b = a->job_caches; b; b = b->next) {
-			if (is_in_use(b))
-				continue;
-			idle++;
-			if (b->ended || b->state == JOB_CACHE_FAILED)
-				ended = b;
-			if (!oldest || b->last_used < oldest->last_used)
-				oldest = b;
-		}
-		if (ended)
-			drop_job_cache(a, ended);
-		else if (idle > WORLDS_KEPT)
-			drop_job_cache(a, oldest);
-		else
-			break;
-	}
-	tidy_fetches(a);
-}
-
-/* Where memory has not been enough, scenes are in it one at a time: the others that no lease uses are dropped. The job
- * that stays, of several in use the first; next: if none is in use; may be NULL. */
-static struct job_cache *keep_one(struct agent *a, struct job_cache *next)
-{
-	struct job_cache *left = NULL;
-	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		left = is_in_use(b) ? b : left;
-	left = left ? left : next;
-	for (struct job_cache *b = a->job_caches, *after; b; b = after) {
-		after = b->next;
-		if (b != left && !is_in_use(b))
-			drop_job_cache(a, b);
-	}
-	tidy_fetches(a);
-	return left;
-}
-
-static void drop_lease(struct agent *a, struct lease_task *l)
-{
-	struct lease_task **at = &a->leases;
-	while (*at != l)
-		at = &(*at)->next;
-	*at = l->next;
-	a->busy_at = uv_now(&a->loop);
-	lease_task_free(l);
-}
-
-static void fail_leases_of(struct agent *a, struct job_cache *b, const struct error *e)
-{
-	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_u64(b->job), log_quote(e->text).text);
-	for (struct lease_task *l = a->leases, *next; l; l = next) {
-		next = l->next;
-		if (l->job_cache != b || l->state != LEASE_WAITING)
-			continue;
-		send_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
-		drop_lease(a, l);
-	}
-}
-
-/* The next drop_unused_job_caches drops it. */
+/* The next scenes_kept_tidy drops it. */
 static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
 {
 	b->state = JOB_CACHE_FAILED;
-	fail_leases_of(a, b, e);
+	lease_list_fail(a, b, e);
 }
 
 static void on_rendered(struct lease_task *l);
@@ -153,7 +57,7 @@ static void on_built(struct job_cache *b)
 			if (l->job_cache == b && l->state == LEASE_WAITING)
 				start_lease(a, l);
 	}
-	drop_unused_job_caches(a);
+	scenes_kept_tidy(a);
 	a->settle(a);
 }
 
@@ -193,91 +97,37 @@ static void on_file_read(struct job_cache *b)
 		return;
 	if (!b->ended)
 		fetch_or_build(a, b);
-	drop_unused_job_caches(a);
+	scenes_kept_tidy(a);
 	a->settle(a);
 }
 
 /* ---- leases ---- */
-
-/* If leases are short and the coordinator's disk is slow, results pile up: no more leases are requested until they
- * have been acknowledged. */
-static void limit_backlog(struct agent *a)
-{
-	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
-	unsigned results = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next)
-		results += l->state == LEASE_RENDERED;
-	bool backlog = a->backlog ? results > RESULTS_FEW : results >= RESULTS_MANY;
-	if (backlog == a->backlog)
-		return;
-	a->backlog = backlog;
-	send_request(a);
-}
-
-static struct lease_task *find_lease(const struct agent *a, const struct lease_key *k)
-{
-	for (struct lease_task *l = a->leases; l; l = l->next)
-		if (!l->unwanted && lease_key_equal(&l->grant.key, k))
-			return l;
-	return NULL;
-}
-
-/* Nobody wants it any more. If a thread has it, it is dropped when the thread returns. */
-static void forget_lease(struct agent *a, struct lease_task *l)
-{
-	if (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)) {
-		l->unwanted = true;
-		atomic_store(&l->stop, true);
-		return;
-	}
-	drop_lease(a, l);
-}
 
 static void on_rendered(struct lease_task *l)
 {
 	struct agent *a = l->owner;
 	l->state = LEASE_RENDERED;
 	if (l->unwanted) {
-		drop_lease(a, l);
+		lease_list_drop(a, l);
 	} else if (l->rc || l->end == LEASE_STOPPED) {
 		if (l->rc == -EILSEQ)
 			send_bad_states(a, &l->grant, l->error.text);
 		else
 			send_failed(a, &l->grant.key, l->rc ? l->error.text : "",
 				    job_cache_lacked_room(l->job_cache, l->rc == -ENOMEM));
-		drop_lease(a, l);
+		lease_list_drop(a, l);
 	} else {
 		send_result(a, l);
 	}
-	limit_backlog(a);
-	drop_unused_job_caches(a);
+	lease_list_limit_backlog(a);
+	scenes_kept_tidy(a);
 	a->settle(a);
-}
-
-/* Far more than requested: no correct coordinator does that. */
-static bool is_flood(const struct agent *a)
-{
-	unsigned open = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next)
-		open += l->state != LEASE_RENDERED;
-	return open >= 4 * (a->config.threads + 1) + 16;
-}
-
-/* Many unacknowledged results are normal if leases are short and the coordinator's disk is slow. Disconnecting would
- * only send them all again. */
-static bool is_stuffed(const struct agent *a)
-{
-	enum { ANSWERS_MOST = 1024 };
-	unsigned answered = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next)
-		answered += l->state == LEASE_RENDERED;
-	return answered >= ANSWERS_MOST;
 }
 
 static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
 {
 	*b = job_cache_find(a->job_caches, job);
-	const struct job_cache *first = work_memory_was_short() ? keep_one(a, *b) : NULL;
+	const struct job_cache *first = work_memory_was_short() ? scenes_kept_one(a, *b) : NULL;
 	if (first && first != *b)
 		return error_set(e, ENOMEM, "memory has no room for its scene beside that of j%llu",
 				 log_u64(first->job));
@@ -301,10 +151,10 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		return;
 	}
 	struct job_cache *b;
-	struct lease_task *l = find_lease(a, &g.key);
+	struct lease_task *l = lease_list_find(a, &g.key);
 	if (l && !blob_hash_equal(&l->grant.digest,
 				  &g.digest)) { /* the previous epoch was computed again: this is another lease */
-		forget_lease(a, l);
+		lease_list_forget(a, l);
 		l = NULL;
 	}
 	if (l) { /* it is being rendered already, from an earlier connection */
@@ -313,12 +163,12 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		grant_fini(&g);
 		return;
 	}
-	if (is_flood(a)) {
+	if (lease_list_is_flood(a)) {
 		grant_fini(&g);
 		conn_close(a->conn, "the coordinator grants more leases than were requested");
 		return;
 	}
-	if (a->leaving || is_stuffed(a)) {
+	if (a->leaving || lease_list_is_stuffed(a)) {
 		send_failed(a, &g.key, "", false);
 		grant_fini(&g);
 		return;
@@ -338,7 +188,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	*end = l;
 	if (b->state == JOB_CACHE_READY)
 		start_lease(a, l);
-	drop_unused_job_caches(a);
+	scenes_kept_tidy(a);
 }
 
 static void take_ack(struct agent *a, const Farm__LeaseAck *m)
@@ -349,7 +199,7 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 		conn_close(a->conn, e.text);
 		return;
 	}
-	struct lease_task *l = find_lease(a, &k);
+	struct lease_task *l = lease_list_find(a, &k);
 	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
 		log_event(LOG_BATCH_REFUSED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64(k.job), LEASE_VALUES(&k),
 			  log_quote(m->text).text);
@@ -357,9 +207,9 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu " LEASE_FORMAT " repeat=%d", log_u64(k.job),
 			  LEASE_VALUES(&k), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
-		drop_lease(a, l);
-		limit_backlog(a);
-		drop_unused_job_caches(a);
+		lease_list_drop(a, l);
+		lease_list_limit_backlog(a);
+		scenes_kept_tidy(a);
 	}
 }
 
@@ -367,10 +217,10 @@ static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
 {
 	struct lease_key k;
 	struct error e;
-	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : find_lease(a, &k);
+	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : lease_list_find(a, &k);
 	if (l && l->state != LEASE_RENDERED) /* a result that was sent is acknowledged all the same */
-		forget_lease(a, l);
-	drop_unused_job_caches(a);
+		lease_list_forget(a, l);
+	scenes_kept_tidy(a);
 }
 
 static void take_job_end(struct agent *a, uint64_t job)
@@ -381,11 +231,11 @@ static void take_job_end(struct agent *a, uint64_t job)
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->job_cache == b && !l->unwanted)
-			forget_lease(a, l);
+			lease_list_forget(a, l);
 	}
 	b->ended = true;
-	limit_backlog(a);
-	drop_unused_job_caches(a);
+	lease_list_limit_backlog(a);
+	scenes_kept_tidy(a);
 }
 
 /* The coordinator has started over, and the job's number is now another job's: the results of the old one are
@@ -398,12 +248,12 @@ static void disown(struct agent *a, struct job_cache *b)
 		if (l->job_cache != b || l->unwanted)
 			continue;
 		send_failed(a, &l->grant.key, "", false);
-		forget_lease(a, l);
+		lease_list_forget(a, l);
 	}
-	limit_backlog(a);
+	lease_list_limit_backlog(a);
 	b->ended = true;
 	b->job = 0;
-	drop_unused_job_caches(a);
+	scenes_kept_tidy(a);
 }
 
 static void take_job_info(struct agent *a, struct envelope *env)
@@ -423,7 +273,7 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: earlier results are welcome */
 		if (l->job_cache == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
-	drop_unused_job_caches(a);
+	scenes_kept_tidy(a);
 }
 
 /* If it cannot be fetched for one job, the others that want it try for themselves: what the first one held is
@@ -437,7 +287,7 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 		return;
 	}
 	const struct blob_hash hash = f->hash;
-	struct job_cache *first = who_wants(a, &hash);
+	struct job_cache *first = scenes_kept_who_wants(a, &hash);
 	enum fetch_end end = FETCH_MORE;
 	if (first && !f->writer && cache_mend(&a->cache, &e))
 		end = FETCH_UNSTORED;
@@ -448,13 +298,13 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 	if (end == FETCH_FAILED || end == FETCH_UNSTORED) {
 		first->own = end == FETCH_UNSTORED;
 		fail_job_cache(a, first, &e);
-		drop_unused_job_caches(a);
+		scenes_kept_tidy(a);
 	}
 	for (struct job_cache *b = a->job_caches; b; b = b->next)
 		fetch_or_build(a, b);
 	if (end == FETCH_WHOLE)
 		blob_release(a->cache.blobs, &hash);
-	drop_unused_job_caches(a);
+	scenes_kept_tidy(a);
 }
 
 void lease_queue_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
@@ -508,9 +358,9 @@ static void drop_old_leases(struct agent *a)
 		next = l->next;
 		if (l->state != LEASE_RENDERED && ++open > a->config.threads + 1 &&
 		    (l->state == LEASE_WAITING || thread_pool_take_back(a->thread_pool, &l->task)))
-			drop_lease(a, l);
+			lease_list_drop(a, l);
 	}
-	drop_unused_job_caches(a);
+	scenes_kept_tidy(a);
 }
 
 void lease_queue_welcome(struct agent *a)
@@ -538,7 +388,7 @@ void lease_queue_leave(struct agent *a)
 		    (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)))
 			continue;
 		send_failed(a, &l->grant.key, "", false);
-		drop_lease(a, l);
+		lease_list_drop(a, l);
 	}
 }
 
@@ -546,52 +396,6 @@ void lease_queue_stop_all(struct agent *a)
 {
 	for (struct lease_task *l = a->leases; l; l = l->next)
 		atomic_store(&l->stop, true);
-}
-
-/* Counts checks, not seconds: a worker that was stopped as a whole has not hung. */
-static bool has_hung(struct task *t)
-{
-	unsigned long long now = atomic_load(&t->ticks);
-	t->still = now && now == t->seen ? t->still + 1 : 0;
-	t->seen = now;
-	return t->still >= STALL_LOOKS;
-}
-
-static bool watch_leases(struct agent *a)
-{
-	char text[128];
-	bool found = false;
-	snprintf(text, sizeof text, "no progress for %g s: its thread hangs", a->config.stall_seconds);
-	for (struct lease_task *l = a->leases; l; l = l->next) {
-		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
-			continue;
-		if (!l->unwanted)
-			send_failed(a, &l->grant.key, text, false);
-		l->unwanted = l->task.hung = found = true;
-		atomic_store(&l->stop, true);
-	}
-	return found;
-}
-
-static bool watch_builds(struct agent *a)
-{
-	bool found = false;
-	for (struct job_cache *b = a->job_caches; b; b = b->next) {
-		struct error e;
-		if (b->state != JOB_CACHE_BUILDING || b->task.hung || !has_hung(&b->task))
-			continue;
-		error_set(&e, ETIMEDOUT, "no progress for %g s in building the scene: its thread hangs",
-			  a->config.stall_seconds);
-		fail_leases_of(a, b, &e);
-		b->task.hung = found = true;
-	}
-	return found;
-}
-
-bool lease_queue_watch(struct agent *a)
-{
-	bool lease = watch_leases(a);
-	return watch_builds(a) || lease;
 }
 
 /* Whether nothing runs, apart from hanging threads and scenes that are being built for jobs that are over. */
@@ -611,10 +415,10 @@ void lease_queue_close(struct agent *a)
 	while (a->fetches)
 		fetch_drop(a, a->fetches);
 	while (a->leases)
-		drop_lease(a, a->leases);
+		lease_list_drop(a, a->leases);
 	while (a->job_caches) {
 		if (a->job_caches->state == JOB_CACHE_BUILDING) /* its thread is gone */
 			a->job_caches->state = a->job_caches->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
-		drop_job_cache(a, a->job_caches);
+		scenes_kept_drop(a, a->job_caches);
 	}
 }

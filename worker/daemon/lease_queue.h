@@ -10,8 +10,6 @@ void lease_queue_welcome(struct agent *a); /* (re)connected: asks for work, send
 void lease_queue_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size);
 void lease_queue_leave(struct agent *a);	 /* returns what has not started */
 void lease_queue_stop_all(struct agent *a);	 /* gives up what is running */
-enum { STALL_LOOKS = 8 };			 /* checks without progress until a thread counts as hung */
-bool lease_queue_watch(struct agent *a);	 /* true: a thread hangs that did not at the last check */
 bool lease_queue_is_idle(const struct agent *a); /* nothing is being rendered, and nothing waits to be acknowledged */
 void lease_queue_close(struct agent *a);	 /* call after the thread pool has been closed */
 

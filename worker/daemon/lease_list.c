@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/daemon/lease_list.h"
+
+#include "common/base/log.h"
+#include "worker/daemon/outgoing.h"
+
+void lease_list_drop(struct agent *a, struct lease_task *l)
+{
+	struct lease_task **at = &a->leases;
+	while (*at != l)
+		at = &(*at)->next;
+	*at = l->next;
+	a->busy_at = uv_now(&a->loop);
+	lease_task_free(l);
+}
+
+void lease_list_fail(struct agent *a, struct job_cache *b, const struct error *e)
+{
+	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_u64(b->job), log_quote(e->text).text);
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->job_cache != b || l->state != LEASE_WAITING)
+			continue;
+		send_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
+		lease_list_drop(a, l);
+	}
+}
+
+void lease_list_limit_backlog(struct agent *a)
+{
+	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
+	unsigned results = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		results += l->state == LEASE_RENDERED;
+	bool backlog = a->backlog ? results > RESULTS_FEW : results >= RESULTS_MANY;
+	if (backlog == a->backlog)
+		return;
+	a->backlog = backlog;
+	send_request(a);
+}
+
+struct lease_task *lease_list_find(const struct agent *a, const struct lease_key *k)
+{
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		if (!l->unwanted && lease_key_equal(&l->grant.key, k))
+			return l;
+	return NULL;
+}
+
+void lease_list_forget(struct agent *a, struct lease_task *l)
+{
+	if (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)) {
+		l->unwanted = true;
+		atomic_store(&l->stop, true);
+		return;
+	}
+	lease_list_drop(a, l);
+}
+
+bool lease_list_is_flood(const struct agent *a)
+{
+	unsigned open = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		open += l->state != LEASE_RENDERED;
+	return open >= 4 * (a->config.threads + 1) + 16;
+}
+
+bool lease_list_is_stuffed(const struct agent *a)
+{
+	enum { ANSWERS_MOST = 1024 };
+	unsigned answered = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		answered += l->state == LEASE_RENDERED;
+	return answered >= ANSWERS_MOST;
+}
