@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 11 };
+enum { FARM_VERSION = 12 };
 
 struct envelope_block;
 

@@ -245,7 +245,7 @@ bool answer_all_failed(const struct farm *f, const struct job *j)
 		const struct peer *p = f->peers[i];
 		if (p->state != PEER_ACTIVE || !job_takes(j, p->class))
 			continue;
-		if (isinf(peer_avoids_until(p, j->id)))
+		if (isinf(peer_avoids_until(p, j->id)) || peer_waits_for_room(p, j->id))
 			return false;
 		here++;
 	}
@@ -288,6 +288,14 @@ static bool is_files_fault(const struct lease *l, const struct event *ev)
 	return l && !ev->lease.own && !ev->lease.bad_states && l->sent < l->job->files_changed;
 }
 
+/* For the status. */
+static void note_failure(struct farm *f, struct peer *p, struct job *j, const struct event *ev)
+{
+	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
+	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
+	text_copy(j->text, sizeof j->text, f->text);
+}
+
 void answer_failed(struct farm *f, const struct event *ev)
 {
 	struct slot *s = next_slot(f, ev);
@@ -311,11 +319,14 @@ void answer_failed(struct farm *f, const struct event *ev)
 		doubt_refused(f, j, s, p, ev->lease.can_take_back, ev->text ? ev->text : "");
 		return;
 	}
+	if (ev->lease.own && ev->lease.later) {
+		peer_has_no_room(f, p, j->id);
+		note_failure(f, p, j, ev);
+		return;
+	}
 	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once count as one */
 	peer_failed(f, p, j->id, ev->lease.own);
-	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
-	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
-	text_copy(j->text, sizeof j->text, f->text);
+	note_failure(f, p, j, ev);
 	j->counts.failures++;
 	if (ev->lease.own) /* says nothing about the job */
 		return;

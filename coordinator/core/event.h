@@ -111,6 +111,7 @@ struct event {
 				       wrong */
 			struct batch_digest digest; /* BATCH, STORED: for leases of which farm_verifies is true */
 			bool own;	    /* LEASE_FAILED: the worker's own machine is at fault, not the job */
+			bool later;	    /* own: only for now, its memory is in use */
 			bool bad_states;    /* LEASE_FAILED: the worker refuses the chain states of the grant */
 			bool other_states;  /* ... and these are not the lease's current states, but those of an earlier
 					       grant */

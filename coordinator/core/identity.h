@@ -20,7 +20,8 @@ struct avoid {
 	uint64_t job; /* 0: free */
 	uint32_t failures;
 	double until;
-	bool own; /* each failure since the last pause was its own machine's fault */
+	bool own;   /* each failure since the last pause was its own machine's fault */
+	bool later; /* it did not fail at all: another scene is in its memory */
 };
 
 enum identity_key { IDENTITY_BY_ID, IDENTITY_BY_HOME, IDENTITY_BY_NAME, IDENTITY_KEYS };
@@ -38,6 +39,7 @@ struct identity {
 	uint32_t window; /* leases that it may hold: see peer_succeeded */
 	bool quarantined;
 	double seen;
+	double full_until; /* has one scene in memory and takes no other: only jobs of which it holds leases */
 	struct avoid avoid[IDENTITY_AVOIDED];
 	char text[256]; /* its last fault */
 };

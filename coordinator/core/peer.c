@@ -69,21 +69,40 @@ static struct avoid *room_to_avoid(const struct farm *f, struct identity *who)
 	return first;
 }
 
+static struct avoid *begin_to_avoid(const struct farm *f, struct peer *p, uint64_t job)
+{
+	struct avoid *a = room_to_avoid(f, p->who);
+	*a = (struct avoid){.job = job};
+	return a;
+}
+
+/* Not a failure: the pause is as short as the first one, and does not grow. Other jobs are not tried meanwhile: however
+ * many wait, the worker is asked once. */
+void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
+{
+	struct avoid *a = avoid_of(p, job);
+	p->who->full_until = f->now + f->config.first_pause;
+	if (a && a->until > f->now)
+		return;
+	a = a ? a : begin_to_avoid(f, p, job);
+	a->own = a->later = true;
+	a->until = f->now + f->config.first_pause;
+}
+
 void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 {
 	struct avoid *a = avoid_of(p, job);
 	p->failures++;
 	if (a && a->until > f->now) {
 		a->own = a->own && own;
+		a->later = false;
 		return;
 	}
-	if (!a) {
-		a = room_to_avoid(f, p->who);
-		*a = (struct avoid){.job = job};
-	}
+	a = a ? a : begin_to_avoid(f, p, job);
 	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
 	a->failures++;
 	a->own = own;
+	a->later = false;
 	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
 }
 
@@ -114,14 +133,34 @@ void peer_succeeded(struct farm *f, struct peer *p, uint64_t job)
 		set_window(f, p, 2 * p->who->window);
 }
 
+static bool holds_lease_of(const struct peer *p, const struct job *j)
+{
+	for (uint32_t i = 0; i < p->lease_limit; i++)
+		if (p->leases[i].used && p->leases[i].job == j)
+			return true;
+	return false;
+}
+
 double peer_avoids_until(const struct peer *p, uint64_t job)
 {
 	const struct avoid *a = avoid_of(p, job);
 	return a ? a->until : -INFINITY;
 }
 
+double peer_pauses_until(const struct peer *p, const struct job *j)
+{
+	double until = peer_avoids_until(p, j->id), full = p->who->full_until;
+	return full > until && !holds_lease_of(p, j) ? full : until;
+}
+
 bool peer_lacks(const struct peer *p, uint64_t job)
 {
 	const struct avoid *a = avoid_of(p, job);
 	return a && a->own;
+}
+
+bool peer_waits_for_room(const struct peer *p, uint64_t job)
+{
+	const struct avoid *a = avoid_of(p, job);
+	return a && a->later;
 }

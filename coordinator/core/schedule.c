@@ -41,7 +41,7 @@ static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const
 		struct peer *p = list_entry(k, struct peer, waiting);
 		if (proof_bars(j, s, p) || doubt_bars(f, j, s, p))
 			continue;
-		double until = peer_avoids_until(p, j->id);
+		double until = peer_pauses_until(p, j);
 		if (until > f->now) {
 			call_again(f, until);
 			continue;

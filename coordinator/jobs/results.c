@@ -139,6 +139,7 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	ev.job = ev.lease.key.job;
 	struct live_job *job = jobs_find(jobs, ev.job);
 	ev.lease.own = f->own;
+	ev.lease.later = f->later;
 	ev.lease.bad_states = f->bad_states;
 	ev.lease.other_states = f->bad_states && !(job && live_job_gives_states(job, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
@@ -149,7 +150,7 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	struct back back = {0};
 	bool holds = answer_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
 		     !ev.lease.other_states; /* otherwise nothing is read for it */
-	if (job && *text)
+	if (job && *text && !f->later)	     /* which may be said every few seconds; the status shows it */
 		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);
 	if (job && *text && f->bad_states && holds && !job->busy && !jobs->stepping &&
 	    journal_write(job->journal, &e) == 0)

@@ -63,6 +63,7 @@ void sim_finish(struct world *w, const struct message *m)
 	if (!sim_is_calm(w) && sim_chance(w, k->failure_rate)) {
 		ev.kind = EVENT_LEASE_FAILED;
 		ev.lease.own = w->draws % 3 == 0;
+		ev.lease.later = ev.lease.own && w->draws % 2 == 0;
 	} else if (!sim_is_calm(w) && sim_chance(w, k->fault_rate))
 		ev.lease.valid = false;
 	else if (!sim_is_calm(w) && sim_chance(w, 0.01))

@@ -262,9 +262,10 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->want = (uint32_t)take_count(at);
 	} else {
 		bool lacks = skip_word(at, "lacks"), lost = !lacks && skip_word(at, "denies"),
-		     late = !lacks && !lost && skip_word(at, "recalls");
-		bool refuses = lost || late || (!lacks && skip_word(at, "refuses"));
-		ev->kind = lacks || refuses	       ? EVENT_LEASE_FAILED
+		     late = !lacks && !lost && skip_word(at, "recalls"),
+		     later = !lacks && !lost && !late && skip_word(at, "postpones");
+		bool refuses = lost || late || (!lacks && !later && skip_word(at, "refuses"));
+		ev->kind = lacks || refuses || later   ? EVENT_LEASE_FAILED
 			   : skip_word(at, "batch")    ? EVENT_BATCH
 			   : skip_word(at, "stored")   ? EVENT_STORED
 			   : skip_word(at, "delivers") ? EVENT_DELIVERED
@@ -273,7 +274,8 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		if (ev->kind == EVENT_LEASE_RETURNED && !skip_word(at, "returns"))
 			fail_msg("no such event: %s", *at);
 		ev->lease.key = take_key(at);
-		ev->lease.own = lacks;
+		ev->lease.own = lacks || later;
+		ev->lease.later = later;
 		ev->lease.bad_states = refuses;
 		ev->lease.can_take_back = refuses && !lost;
 		ev->lease.other_states = late;

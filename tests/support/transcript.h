@@ -20,6 +20,7 @@
  *   wN returns KEY                   gives the lease back
  *   wN fails KEY TEXT                could not compute it
  *   wN lacks KEY TEXT                ... because of the worker's own machine
+ *   wN postpones KEY TEXT            ... because of another scene in its memory
  *   wN refuses KEY TEXT              ... because of the lease's chain states; their predecessors are still known
  *   wN denies KEY TEXT               ... because of the lease's chain states; their predecessors are not known
  *   wN recalls KEY TEXT              could not use chain states that have been replaced since

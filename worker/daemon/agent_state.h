@@ -11,6 +11,13 @@
 
 enum { WORLDS_KEPT = 2 /* worlds kept of jobs without leases here */ };
 
+/* Whose scene is in memory while only one may be there: see scenes_kept_admit. Times are of clock_seconds. */
+struct turn {
+	uint64_t job;
+	bool waits;	     /* another job does */
+	double since, asked; /* since when; when one was last refused */
+};
+
 struct fetch;
 
 struct agent {
@@ -31,6 +38,7 @@ struct agent {
 	struct job_cache *job_caches;
 	struct fetch *fetches;
 	struct lease_task *leases;
+	struct turn turn;
 	uint64_t clock;	  /* counter of uses of job_caches */
 	bool backlog;	  /* too many results wait to be acknowledged: no new leases */
 	uint64_t busy_at; /* ms of the loop: when it last had a lease */

@@ -9,6 +9,7 @@
  */
 #include "worker/daemon/job_cache.h"
 
+#include "common/base/clock.h"
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "worker/daemon/work.h"
@@ -375,6 +376,6 @@ bool job_cache_lacked_room(const struct job_cache *b, bool no_memory)
 {
 	if (!no_memory || !b->beside)
 		return false;
-	work_memory_short();
+	work_memory_short(clock_seconds());
 	return true;
 }

@@ -12,9 +12,9 @@
  * sentence. A lease that is revoked, or whose job has ended, is dropped; what a thread is working on is dropped when
  * the thread returns. A message that makes no sense closes the connection. When too many results wait to be sent, no
  * more leases are asked for.
- * Once SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an allocation has
- * failed while several scenes were in memory, leases of one job at a time are accepted: two jobs that fit only one
- * after the other would fail each other again and again.
+ * After SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an allocation has
+ * failed while several scenes were in memory, leases of one job at a time are accepted for a while (scenes_kept_admit):
+ * two jobs that fit only one after the other would fail each other again and again.
  */
 #include "worker/daemon/lease_queue.h"
 
@@ -126,14 +126,11 @@ static void on_rendered(struct lease_task *l)
 
 static int find_or_begin_job(struct agent *a, struct job_cache **b, uint64_t job, struct error *e)
 {
-	*b = job_cache_find(a->job_caches, job);
-	const struct job_cache *first = work_memory_was_short() ? scenes_kept_one(a, *b) : NULL;
-	if (first && first != *b)
-		return error_set(e, ENOMEM, "memory has no room for its scene beside that of j%llu",
-				 log_u64(first->job));
-	if (*b)
-		return 0;
-	int rc = job_cache_new(b, job, a->cache.blobs, e);
+	int rc = scenes_kept_admit(a, job, e);
+	*b = rc ? NULL : job_cache_find(a->job_caches, job);
+	if (rc || *b)
+		return rc;
+	rc = job_cache_new(b, job, a->cache.blobs, e);
 	if (rc)
 		return rc;
 	(*b)->next = a->job_caches;
@@ -177,7 +174,10 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {
-		send_failed(a, &g.key, e.text, true);
+		if (rc == -EAGAIN)
+			send_later(a, &g.key, e.text);
+		else
+			send_failed(a, &g.key, e.text, true);
 		grant_fini(&g);
 		return;
 	}

@@ -25,7 +25,9 @@ void send_job_get(struct agent *a, uint64_t job)
 }
 
 /* states: their digest; NULL: they are not at fault. */
-static void send_failure(struct agent *a, const struct lease_key *k, const char *text, bool own,
+enum fault { FAULT_JOB, FAULT_OWN, FAULT_LATER };
+
+static void send_failure(struct agent *a, const struct lease_key *k, const char *text, enum fault fault,
 			 const struct blob_hash *states)
 {
 	char copy[1024];
@@ -34,26 +36,31 @@ static void send_failure(struct agent *a, const struct lease_key *k, const char 
 	lease_key_to_wire(k, &key);
 	text_copy(copy, sizeof copy, text);
 	text_clean(copy);
-	Farm__LeaseFailed failed =
-		MESSAGE(lease_failed, .key = &key, .text = copy, .own = own, .bad_states = states != NULL);
+	Farm__LeaseFailed failed = MESSAGE(lease_failed, .key = &key, .text = copy, .own = fault != FAULT_JOB,
+					   .later = fault == FAULT_LATER, .bad_states = states != NULL);
 	if (states) {
 		digest = *states;
 		failed.states_digest = (ProtobufCBinaryData){sizeof digest.bytes, digest.bytes};
 	}
 	send_message(a, ENVELOPE_OF(LEASE_FAILED, lease_failed, &failed));
-	if (*text)
+	if (*text && fault != FAULT_LATER)
 		log_event(LOG_LEASE_FAILED, "job=j%llu " LEASE_FORMAT " text=%s", log_u64(k->job), LEASE_VALUES(k),
 			  log_quote(text).text);
 }
 
 void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
 {
-	send_failure(a, k, text, own, NULL);
+	send_failure(a, k, text, own ? FAULT_OWN : FAULT_JOB, NULL);
+}
+
+void send_later(struct agent *a, const struct lease_key *k, const char *text)
+{
+	send_failure(a, k, text, FAULT_LATER, NULL);
 }
 
 void send_bad_states(struct agent *a, const struct grant *g, const char *text)
 {
-	send_failure(a, &g->key, text, false, &g->digest);
+	send_failure(a, &g->key, text, FAULT_JOB, &g->digest);
 }
 
 void send_result(struct agent *a, struct lease_task *l)

@@ -11,8 +11,8 @@ struct job_cache *scenes_kept_who_wants(const struct agent *a,
 /* Drops unused scenes of jobs that have ended, the least recently used ones beyond WORLDS_KEPT, and files that nobody
  * waits for. */
 void scenes_kept_tidy(struct agent *a);
-/* Where memory has not been enough, scenes are in it one at a time: the others that no lease uses are dropped. The job
- * that stays, of several in use the first; next: if none is in use; may be NULL. */
-struct job_cache *scenes_kept_one(struct agent *a, struct job_cache *next);
+/* Whether the job's scene may be in memory now. Where that has not been enough (work.h) one scene is in it at a time,
+ * and the others that no lease uses are dropped; if other jobs wait, it makes way after a while. -EAGAIN: not now. */
+int scenes_kept_admit(struct agent *a, uint64_t job, struct error *e);
 
 #endif

@@ -101,7 +101,7 @@ int supervise(unsigned threads, int (*run)(void *), void *user)
 			return 1;
 		}
 		int status = wait_for_end(&s), number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-		unsigned lost = work_lose(number);
+		unsigned lost = work_lose(number, clock_seconds());
 		if (!number && !lost)
 			return WEXITSTATUS(status);
 		if (s.asked)

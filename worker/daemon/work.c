@@ -22,7 +22,7 @@ struct shared {
 	atomic_int number;   /* of the signal that ended the process; 0: none */
 	atomic_int hit;	     /* the entry of the thread that received it; -1: none of these */
 	char text[CRASH_TEXT];
-	bool memory_short; /* see work_memory_was_short */
+	double short_seconds, short_until; /* see work_memory_was_short; 0: it never was */
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
 	struct work of[WORK_THREADS];
@@ -102,12 +102,13 @@ static void drop_reported(void)
 	shared->lost_count = kept;
 }
 
-unsigned work_lose(int number)
+unsigned work_lose(int number, double now)
 {
 	int said = atomic_load(&shared->number), hit = said ? atomic_load(&shared->hit) : -1;
 	unsigned before;
 	drop_reported();
-	shared->memory_short |= number == SIGKILL;
+	if (number == SIGKILL)
+		work_memory_short(now);
 	before = shared->lost_count;
 	if (said || number)
 		for (unsigned i = 0; i < WORK_THREADS; i++) {
@@ -124,15 +125,22 @@ unsigned work_lose(int number)
 	return shared->lost_count - before;
 }
 
-bool work_memory_was_short(void)
+bool work_memory_was_short(double now)
 {
-	return shared && shared->memory_short;
+	return shared && now < shared->short_until;
 }
 
-void work_memory_short(void)
+void work_memory_short(double now)
 {
-	if (shared)
-		shared->memory_short = true;
+	static const double first = 600, longest = 19200;
+	if (!shared)
+		return;
+	bool again = shared->short_seconds > 0 && now < shared->short_until + shared->short_seconds;
+	if (!again)
+		shared->short_seconds = first;
+	else if (now >= shared->short_until && shared->short_seconds < longest)
+		shared->short_seconds *= 2;
+	shared->short_until = now + shared->short_seconds;
 }
 
 struct lost_lease *work_lost(unsigned index)

@@ -255,6 +255,35 @@ static void made_up_names(void **state)
 	});
 }
 
+/* Another scene is in its memory: no failure, however often, and no longer pause. Meanwhile it gets what it has leases
+ * of, and no third job is tried. */
+static void no_room_now(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f,
+			(const char *const[]){
+				"[0] submit groups=5 -> j1 submitted, j1 is queued",
+				"[0] w1 joins A threads=3 -> -",
+				"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+				"[1] submit -> j2 submitted, j2 is queued",
+				"[1] submit -> j3 submitted, j3 is queued",
+				"[2] w1 batch j1 g0 p0 boot -> merge, merged, j2 is bootstrap, w1 gets j2 g0 p0 boot",
+				"[2] w1 postpones j2 g0 p0 boot full -> w1 gets j1 g2 p0 boot",
+				"[11] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j1 g3 p0 boot",
+				"[12] w1 batch j1 g2 p0 boot -> merge, merged, w1 gets j2 g1 p0 boot",
+				"[12] w1 postpones j2 g1 p0 boot full -> w1 gets j1 g4 p0 boot",
+				"[13] w1 batch j1 g3 p0 boot -> merge, merged",
+				"[14] w1 batch j1 g4 p0 boot -> merge, merged, j1 prepare",
+				"[21.9] tick -> -",
+				"[22] tick -> w1 gets j2 g0 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot",
+				"[23] w1 postpones j3 g0 p0 boot full -> w1 gets j2 g1 p0 boot",
+				"[24] w1 batch j2 g0 p0 boot -> merge, merged",
+				NULL,
+			});
+	farm_free(f);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -266,6 +295,7 @@ int main(void)
 		cmocka_unit_test(three_full_disks),
 		cmocka_unit_test(full_disks_and_a_bad_scene),
 		cmocka_unit_test(made_up_names),
+		cmocka_unit_test(no_room_now),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

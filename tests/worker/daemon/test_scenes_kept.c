@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Which scenes a worker holds at the same time where memory has not been enough, with a scripted coordinator. */
+#include "common/base/clock.h"
 #include "common/base/mem.h"
 #include "worker/daemon/work.h"
 #include "tests/support/failing_memory.h"
@@ -17,6 +18,22 @@
 #include <stdatomic.h>
 #include <unistd.h>
 
+/* An earlier process was killed for memory, now. */
+static void begin_short(void)
+{
+	struct error e;
+	assert_int_equal(work_share(1, &e), 0);
+	work_lose(SIGKILL, clock_seconds());
+	coord_start(0);
+}
+
+static void hear_later(uint64_t job, const char *why)
+{
+	assert_int_equal(coord_hear_failed(why), job);
+	assert_true(coord.own); /* which counts against no job */
+	assert_true(coord.at->env.message->lease_failed->later);
+}
+
 /* Two scenes that fit into memory only one after the other would end each rendering process, and neither job would ever
  * be done. */
 static void one_scene_at_a_time_where_memory_was_short(void **state)
@@ -24,24 +41,95 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 	struct error e;
 	(void)state;
 	assert_int_equal(work_share(1, &e), 0);
-	for (int i = 0; i < 2; i++) {
-		coord_start(0);
-		coord_grant(1);
-		coord_grant(2);
-		coord_finish();
-		work_lose(i == 0 ? SIGSEGV : SIGKILL); /* a fault of a scene; of the machine */
-	}
 	coord_start(0);
 	coord_grant(1);
+	coord_grant(2);
+	coord_finish();
+	work_lose(SIGSEGV, clock_seconds()); /* a fault of a scene, not of the machine */
+	coord_start(0);
+	coord_grant(1);
+	coord_grant(2);
+	coord_finish();
+	begin_short();
+	coord_grant(1);
 	coord_say_grant(2);
-	assert_int_equal(coord_hear_failed("memory has no room for its scene beside that of j1"), 2);
-	assert_true(coord.own); /* which counts against no job */
+	hear_later(2, "memory was short, and the scene of j1 is in it");
 	coord_say_revoke(1);
 	coord_grant(2); /* the scene of j1 may be wanted again, but it is used by nobody */
 	coord_say_grant(1);
-	assert_int_equal(coord_hear_failed("beside that of j2"), 1);
+	hear_later(1, "the scene of j2 is in it");
 	coord_end_job(2);
 	coord_grant(1);
+	coord_finish();
+}
+
+/* However many leases of it there are: it takes none, and once nobody uses the scene the other job is next. */
+static void a_scene_makes_way_for_one_that_waits(void **state)
+{
+	(void)state;
+	begin_short();
+	coord_grant(1);
+	coord_say_grant(2);
+	hear_later(2, "the scene of j1 is in it");
+	coord.agent->turn.since -= 299; /* as if so long had passed */
+	coord_say_revoke(1);
+	coord_say_grant(1);
+	coord_say_grant(2);
+	hear_later(2, "the scene of j1 is in it");
+	coord.agent->turn.since -= 2;
+	coord_say_revoke(1);
+	coord_say_grant(1);
+	hear_later(1, "its scene makes way");
+	coord_grant(2);
+	coord_say_grant(1);
+	hear_later(1, "the scene of j2 is in it");
+	coord.agent->turn.since -= 301;
+	coord.agent->turn.asked -= 61; /* j1 has not been granted for so long */
+	coord_say_revoke(2);
+	coord_say_grant(2);
+	coord_say_grant(1);
+	hear_later(1, "the scene of j2 is in it");
+	coord_finish();
+}
+
+/* Ten minutes; twice as long each time it comes back within as long a time. */
+static void the_restriction_ends(void **state)
+{
+	struct error e;
+	(void)state;
+	assert_int_equal(work_share(1, &e), 0);
+	assert_false(work_memory_was_short(0));
+	work_lose(SIGKILL, 1000);
+	assert_true(work_memory_was_short(1599));
+	assert_false(work_memory_was_short(1601));
+	work_memory_short(1700);
+	assert_true(work_memory_was_short(2899));
+	assert_false(work_memory_was_short(2901));
+	work_memory_short(4101); /* it did without for as long */
+	assert_true(work_memory_was_short(4700));
+	work_lose(SIGKILL, 4700); /* one scene alone: shortening nothing, longer by nothing */
+	assert_true(work_memory_was_short(5299));
+	assert_false(work_memory_was_short(5301));
+	double at = 5300, lasts = 600; /* the last one began at 4700 */
+	for (int i = 0; i < 8; i++) {
+		lasts = 2 * lasts < 19200 ? 2 * lasts : 19200;
+		work_memory_short(at);
+		at += lasts;
+	}
+	assert_true(work_memory_was_short(at - 1));
+	assert_false(work_memory_was_short(at + 1));
+}
+
+/* Then both jobs are welcome again. */
+static void then_it_takes_any(void **state)
+{
+	struct error e;
+	(void)state;
+	assert_int_equal(work_share(1, &e), 0);
+	work_lose(SIGKILL, clock_seconds() - 601);
+	coord_start(0);
+	coord_grant(1);
+	coord_grant(2);
 	coord_finish();
 }
 
@@ -95,7 +183,7 @@ static void memory_that_others_had_is_its_own_fault(void **state)
 	run_out_of_memory(2);
 	assert_true(coord.own);
 	coord_say_grant(3);
-	assert_int_equal(coord_hear_failed("memory has no room for its scene beside that of j1"), 3);
+	hear_later(3, "the scene of j1 is in it");
 	coord_end_job(1);
 	coord_grant(2);
 	run_out_of_memory(2);
@@ -109,6 +197,9 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		TEST(one_scene_at_a_time_where_memory_was_short),
+		TEST(a_scene_makes_way_for_one_that_waits),
+		TEST(the_restriction_ends),
+		TEST(then_it_takes_any),
 		TEST(memory_that_others_had_is_its_own_fault),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
