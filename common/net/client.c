@@ -401,11 +401,6 @@ static int fetch_whole(struct client *cl, struct client_message *first, uint64_t
 	return rc == -EAGAIN ? error_prefix(e, rc, "given up after %d attempts", FETCH_TRIES) : rc;
 }
 
-int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e)
-{
-	return fetch_to(cl, job, what, fd, "stdout", e);
-}
-
 /* Unless there is a file of that name. Not every file system can tell while it renames, and not every one has hard
  * links: then an empty file takes the name first. */
 static int rename_to_new(const char *temporary, const char *path)
@@ -460,6 +455,29 @@ static int fetch_through(struct client *cl, struct client_message *first, uint64
 	if (fd >= 0 && close(fd) && !rc)
 		rc = error_set(e, EIO, "%s: %s", t->path, strerror(errno));
 	fclose(whole);
+	return rc;
+}
+
+/* What comes in one piece needs no file: that may be where a disk is full. */
+int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e)
+{
+	static const char name[] = "stdout";
+	struct client_message first;
+	int rc = fetch_chunk(cl, job, what, 0, &first, e);
+	if (rc)
+		return rc;
+	const Farm__FetchChunk *c = first.envelope.message->fetch_chunk;
+	FILE *whole = first.payload.size < c->size ? tmpfile() : NULL;
+	if (first.payload.size == c->size) {
+		rc = write_all(fd, name, first.payload.bytes, first.payload.size, e);
+	} else if (!whole) {
+		rc = error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
+	} else {
+		rc = fetch_whole(cl, &first, job, what, fileno(whole), "a temporary file", e);
+		rc = rc ? rc : copy(fileno(whole), fd, name, e);
+		fclose(whole);
+	}
+	client_message_fini(&first);
 	return rc;
 }
 

@@ -17,6 +17,7 @@
 
 #include <arpa/inet.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <netdb.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -332,6 +333,25 @@ static void a_dropped_fetch_begins_again(void **state)
 	assert_int_equal(client_exit_code(-EAGAIN), 1);
 }
 
+/* So does a log, of which nothing is printed twice, or in part. */
+static void a_dropped_stream_begins_again(void **state)
+{
+	(void)state;
+	static const char twice[] = "the image\0the image";
+	for (int drops = 0; drops < 2; drops++) {
+		struct coordinator c = {.drops = drops, .sizes = {2 * sizeof image, 2 * sizeof image}};
+		struct client *cl = meet(&c);
+		struct error e;
+		int fd = open("stream", O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+		int rc = client_fetch_stream(cl, 1, FARM__WHAT__WHAT_LOG, fd, &e);
+		part(&c, cl);
+		close(fd);
+		assert_int_equal(rc, 0);
+		assert_true(holds("stream", twice, sizeof twice));
+	}
+	assert_int_equal(unlink("stream"), 0);
+}
+
 /* Neither the coordinator's refusal nor its absence, whatever the system calls it. */
 static void own_files_are_own_faults(void **state)
 {
@@ -447,6 +467,7 @@ int main(void)
 		cmocka_unit_test(who_names_a_file_gets_it),
 		cmocka_unit_test(a_file_of_another_size_is_another_file),
 		cmocka_unit_test(a_dropped_fetch_begins_again),
+		cmocka_unit_test(a_dropped_stream_begins_again),
 		cmocka_unit_test(own_files_are_own_faults),
 		cmocka_unit_test(floods_are_dammed),
 		cmocka_unit_test(no_memory_for_a_message),
