@@ -86,6 +86,13 @@ static int write_pem(const char *folder, const char *middle, const char *name, B
 	return rc;
 }
 
+static bool has(const struct authority *a, const char *middle, const char *name)
+{
+	char path[PATH_SIZE];
+	struct error e;
+	return path_in(path, &e, a->folder, middle, name) == 0 && access(path, F_OK) == 0;
+}
+
 static BIO *pem_cert(X509 *cert)
 {
 	BIO *b = BIO_new(BIO_s_mem());
@@ -332,7 +339,10 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	if (!rc)
 		rc = path_in(path, e, folder, "", "ca.pem");
 	if (!rc && access(path, F_OK) == 0)
-		rc = error_set(e, EEXIST, "%s exists: a farm has one authority", path);
+		rc = error_set(e, EEXIST, "%s exists: a farm has one authority%s", path,
+			       has(&a, "coordinator", "cert.pem")
+				       ? ""
+				       : " (hslt-ca coordinator coordinator makes the certificate that it lacks)");
 	if (!rc) {
 		char unique[TLS_NAME_MAX + 16];
 		unsigned char random[4] = {0};
@@ -352,20 +362,44 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	return rc;
 }
 
-/* Key first: a program that reads in between finds that key and certificate do not match, and keeps its old pair. */
+/* The certificate is on the disk before the key replaces the old one: on a full disk the old pair stays. Key first: a
+ * program that reads in between finds that key and certificate do not match, and keeps its old pair. */
+static int write_pair(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
+{
+	char next[PATH_SIZE], path[PATH_SIZE];
+	int rc = path_in(next, e, a->folder, name, "cert.pem.next");
+	if (!rc)
+		rc = path_in(path, e, a->folder, name, "cert.pem");
+	if (!rc)
+		rc = write_pem(a->folder, name, "cert.pem.next", pem_cert(cert), 0644, e);
+	if (rc)
+		return rc;
+	rc = write_pem(a->folder, name, "key.pem", pem_key(key), 0600, e);
+	if (!rc && rename(next, path))
+		rc = error_file(e, errno, path);
+	if (rc)
+		unlink(next);
+	return rc;
+}
+
 static int write_issued(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
 {
-	char file[80];
+	char file[80], path[PATH_SIZE];
 	struct tls_peer who;
 	int rc = tls_read_peer(cert, &who, e);
+	if (rc)
+		return rc;
 	snprintf(file, sizeof file, "%s.pem", who.serial);
-	if (!rc) /* before anybody can use it: a certificate that is not recorded cannot be revoked by name */
-		rc = write_pem(a->folder, "issued", file, pem_cert(cert), 0644, e);
-	if (!rc)
-		rc = write_pem(a->folder, name, "key.pem", pem_key(key), 0600, e);
+	/* Before anybody can use it: a certificate that is not recorded cannot be revoked by name. */
+	rc = write_pem(a->folder, "issued", file, pem_cert(cert), 0644, e);
 	if (!rc)
 		rc = write_pem(a->folder, name, "ca.pem", pem_cert(a->cert), 0644, e);
-	return rc ? rc : write_pem(a->folder, name, "cert.pem", pem_cert(cert), 0644, e);
+	if (!rc)
+		rc = write_pair(a, name, cert, key, e);
+	struct error ignored;
+	if (rc && path_in(path, &ignored, a->folder, "issued", file) == 0) /* nobody has its key */
+		unlink(path);
+	return rc;
 }
 
 /* A folder may only be renewed with a certificate of the same name and role. */
@@ -375,7 +409,7 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 	X509 *cert;
 	struct tls_peer who;
 	int rc = path_in(path, e, a->folder, name, "cert.pem");
-	if (rc || access(path, F_OK))
+	if (rc || !has(a, name, "cert.pem"))
 		return rc;
 	rc = read_cert(path, &cert, e);
 	if (rc)
@@ -386,6 +420,13 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 		rc = error_set(e, EEXIST, "%s belongs to the %s %s: --renew cannot change the role to %s", path,
 			       tls_role_name(who.role), who.name, tls_role_name(role));
 	return rc;
+}
+
+/* A folder that is there was made by a call that did not get to its end: the list is written first, and the
+ * certificate last. */
+static bool is_incomplete(const struct authority *a, const char *name, const char *path)
+{
+	return !has(a, name, "cert.pem") && (has(a, name, "crl.pem") || rmdir(path) == 0);
 }
 
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e)
@@ -400,12 +441,13 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	if (rc)
 		return rc;
 	rc = path_in(path, e, folder, "", name);
-	if (!rc && !renew && access(path, F_OK) == 0)
+	bool incomplete = !rc && access(path, F_OK) == 0 && is_incomplete(&a, name, path);
+	if (!rc && !renew && !incomplete && access(path, F_OK) == 0)
 		rc = error_set(e, EEXIST, "%s exists: --renew replaces its certificate and key", path);
 	if (!rc && renew)
 		rc = may_renew(&a, name, role, e);
 	if (!rc)
-		rc = make_folder(path, renew, e);
+		rc = make_folder(path, renew || incomplete, e);
 	EVP_PKEY *key = rc ? NULL : EVP_EC_gen("P-256");
 	X509 *cert = key ? begin_cert(name, key, a.cert, days) : NULL;
 	if (!rc && (!cert || !sign_other(&a, cert, role)))

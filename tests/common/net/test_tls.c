@@ -2,6 +2,7 @@
 /*
  * Handshakes in memory, between folders that an authority of the test has made: who is let in, and who is not and why.
  */
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/net/authority.h"
 #include "common/net/conn.h"
@@ -13,6 +14,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <errno.h>
 #include <fcntl.h>
 #include <openssl/pem.h>
 #include <openssl/ssl.h>
@@ -278,6 +280,60 @@ static void an_interrupted_revocation_is_repeated(void **state)
 	assert_non_null(strstr(e.text, "no valid certificate"));
 }
 
+static unsigned writes_left;
+
+static ssize_t write_until_full(int fd, const void *bytes, size_t size)
+{
+	if (writes_left) {
+		writes_left--;
+		return disk_system.write(fd, bytes, size);
+	}
+	errno = ENOSPC;
+	return -1;
+}
+
+static size_t certificates(void)
+{
+	struct authority_entry *list;
+	struct error e;
+	size_t n = 0;
+	assert_int_equal(authority_list(pair_ours, &list, &n, &e), 0);
+	mem_free(list);
+	return n;
+}
+
+/* Wherever it is full, who had a certificate has one, whoever gets none needs not say so the next time, and nothing is
+ * listed that nobody has. */
+static void a_full_disk_takes_no_certificate_away(void **state)
+{
+	(void)state;
+	struct disk full = disk_system;
+	struct error e;
+	full.write = write_until_full;
+	pair_issue(pair_ours, "steady", TLS_WORKER, 5);
+	for (int renew = 1; renew >= 0; renew--) {
+		unsigned room = 0;
+		const char *name = renew ? "steady" : "late";
+		const size_t before = certificates();
+		for (int rc = -1; rc; room++) {
+			writes_left = room;
+			disk_use(&full);
+			rc = authority_issue(pair_ours, name, TLS_WORKER, 5, renew, &e);
+			disk_use(NULL);
+			assert_true(rc == 0 || rc == -ENOSPC);
+			assert_int_equal(certificates(), before + (rc == 0));
+			if (renew || !rc)
+				accepts(name, name, TLS_WORKER);
+		}
+		assert_int_equal(room, 6);
+	}
+	assert_int_equal(authority_issue(pair_ours, "late", TLS_WORKER, 5, false, &e), -EEXIST);
+	/* A folder that is not a certificate's is left alone. */
+	assert_int_equal(mkdir(pair_at(pair_ours, "mine"), 0700), 0);
+	copy(pair_at(pair_ours, "ca.pem"), pair_at(pair_ours, "mine/letter"));
+	assert_int_equal(authority_issue(pair_ours, "mine", TLS_WORKER, 5, false, &e), -EEXIST);
+}
+
 static void who_is_revoked_is_not(void **state)
 {
 	(void)state;
@@ -435,6 +491,7 @@ int main(void)
 		cmocka_unit_test(certificates_need_one_role_and_a_name),
 		cmocka_unit_test(who_is_revoked_is_not),
 		cmocka_unit_test(an_interrupted_revocation_is_repeated),
+		cmocka_unit_test(a_full_disk_takes_no_certificate_away),
 		cmocka_unit_test(clocks_may_be_behind),
 		cmocka_unit_test(one_authority_replaces_another),
 		cmocka_unit_test(names_are_strict),
