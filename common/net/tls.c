@@ -479,6 +479,18 @@ int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct err
 	return 0;
 }
 
+/* A certificate that is valid at another time says that this machine's clock may be wrong. */
+static int refuse(struct error *e, const char *what, int verdict)
+{
+	char clock[64] = "";
+	time_t now = time(NULL);
+	struct tm tm;
+	if (verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED ||
+	    verdict == X509_V_ERR_CRL_NOT_YET_VALID || verdict == X509_V_ERR_CRL_HAS_EXPIRED)
+		strftime(clock, sizeof clock, " by the clock of this machine, %Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
+	return error_set(e, EACCES, "%s: %s%s", what, X509_verify_cert_error_string(verdict), clock);
+}
+
 /* OpenSSL's error, worded for the person who has to fix it. */
 static int explain(struct tls_link *l, struct error *e)
 {
@@ -496,8 +508,7 @@ static int explain(struct tls_link *l, struct error *e)
 		return error_set(e, EACCES, "the peer does not accept this certificate: %s",
 				 SSL_alert_desc_string_long(alert));
 	if (verdict != X509_V_OK)
-		return error_set(e, EACCES, "the peer's certificate is not accepted: %s",
-				 X509_verify_cert_error_string(verdict));
+		return refuse(e, "the peer's certificate is not accepted", (int)verdict);
 	return error_set(e, EPROTO, "TLS: %s", text ? text : "invalid data on the wire");
 }
 
@@ -588,8 +599,7 @@ int tls_link_recheck(struct tls_link *l, struct error *e)
 	    X509_STORE_CTX_set_default(sc, l->listening ? "ssl_client" : "ssl_server") != 1)
 		rc = error_set(e, ENOMEM, "the peer's certificate cannot be checked again");
 	else if (X509_verify_cert(sc) != 1)
-		rc = error_set(e, EACCES, "the peer's certificate is no longer accepted: %s",
-			       X509_verify_cert_error_string(X509_STORE_CTX_get_error(sc)));
+		rc = refuse(e, "the peer's certificate is no longer accepted", X509_STORE_CTX_get_error(sc));
 	X509_STORE_CTX_free(sc);
 	ERR_clear_error();
 	return rc;

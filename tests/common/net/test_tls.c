@@ -262,6 +262,26 @@ static void who_has_expired_is_not(void **state)
 	refuses(pair_at(pair_ours, "brief"), pair_at(pair_ours, "farm"), "does not accept this certificate", "expired");
 }
 
+/* A clock that is years wrong: whoever reads the sentence sees which. */
+static void a_wrong_clock_is_named(void **state)
+{
+	(void)state;
+	static const time_t off[] = {(time_t)20 * 365 * 86400, -(time_t)20 * 365 * 86400};
+	for (size_t i = 0; i < 2; i++) {
+		char year[64];
+		struct tm tm;
+		behind = off[i];
+		time_t now = time(NULL);
+		strftime(year, sizeof year, "by the clock of this machine, %Y-", gmtime_r(&now, &tm));
+		pair_shake(pair_at(pair_ours, "node"), pair_at(pair_ours, "farm"), 100000);
+		behind = 0;
+		assert_int_equal(pair_caller.rc, -EACCES);
+		assert_non_null(strstr(pair_caller.e.text, year));
+		assert_non_null(strstr(pair_caller.e.text, i ? "expired" : "not yet valid"));
+		pair_hang_up();
+	}
+}
+
 /* hslt-ca was killed, or its disk was full, after the authority's own list was written. */
 static void an_interrupted_revocation_is_repeated(void **state)
 {
@@ -490,6 +510,7 @@ int main(void)
 		cmocka_unit_test(a_foreign_certificate_with_our_authority_beside_it),
 		cmocka_unit_test(certificates_need_one_role_and_a_name),
 		cmocka_unit_test(who_is_revoked_is_not),
+		cmocka_unit_test(a_wrong_clock_is_named),
 		cmocka_unit_test(an_interrupted_revocation_is_repeated),
 		cmocka_unit_test(a_full_disk_takes_no_certificate_away),
 		cmocka_unit_test(clocks_may_be_behind),
