@@ -25,6 +25,9 @@ void blob_store_close(struct blob_store *s);
 bool blob_store_evict(struct blob_store *s);
 /* Whoever may make room on the disk when nothing is left to evict; false: there is none. */
 void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user);
+/* What a loss of power takes can be had again: names need not be durable, and thousands of small files are written in
+ * half the time. */
+void blob_store_is_cache(struct blob_store *s);
 /* Evicts what exceeds the limit. Call once everything needed is held. */
 void blob_store_trim(struct blob_store *s);
 

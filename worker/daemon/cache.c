@@ -121,11 +121,13 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 		rc = make_slot(path, e);
 		if (!rc)
 			rc = blob_store_open(&c->blobs, path, limit, e);
-		if (rc)
+		if (rc) {
 			cache_close(c);
-		else
-			blob_store_trim(c->blobs);
-		return rc;
+			return rc;
+		}
+		blob_store_is_cache(c->blobs);
+		blob_store_trim(c->blobs);
+		return 0;
 	}
 	return error_set(e, EBUSY, "%s: %d workers use this cache already", base, SLOTS);
 }

@@ -268,6 +268,34 @@ static void a_disk_that_fails(void **state)
 	assert_int_equal(rc, -EIO);
 }
 
+static unsigned flushes;
+
+static int count_fsync(int fd)
+{
+	flushes++;
+	return disk_system.fsync(fd);
+}
+
+/* A cache flushes its files, as what it holds is believed while it runs, but not their names. */
+static void flushed_as_needed(void **state)
+{
+	(void)state;
+	struct disk counting = disk_system;
+	struct blob_store *s;
+	struct error e;
+	counting.fsync = count_fsync;
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	disk_use(&counting);
+	flushes = 0;
+	store_text(s, "kept");
+	assert_int_equal(flushes, 2);
+	blob_store_is_cache(s);
+	store_text(s, "cached");
+	assert_int_equal(flushes, 3);
+	disk_use(NULL);
+	blob_store_close(s);
+}
+
 /* Any byte of it: it is noticed, kept beside, no more given out; writing it again mends it, and who held it holds it
  * still. */
 static void damaged_at_rest(void **state)
@@ -536,6 +564,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_folder_that_is_removed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(flushed_as_needed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_is_full, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(flushed_together, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(stored_meanwhile, folder_set_up, folder_tear_down),
