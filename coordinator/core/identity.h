@@ -22,6 +22,7 @@ struct avoid {
 	double until;
 	bool own;   /* each failure since the last pause was its own machine's fault */
 	bool later; /* it did not fail at all: another scene is in its memory */
+	bool held;  /* later: and it held leases of that one, so that the pause ends with the last of them */
 };
 
 enum identity_key { IDENTITY_BY_ID, IDENTITY_BY_HOME, IDENTITY_BY_NAME, IDENTITY_KEYS };
@@ -39,6 +40,7 @@ struct identity {
 	uint32_t window; /* leases that it may hold: see peer_succeeded */
 	bool quarantined;
 	double seen;
+	bool full_held;	   /* full_until: as avoid.held */
 	double full_until; /* has one scene in memory and takes no other: only jobs of which it holds leases */
 	struct avoid avoid[IDENTITY_AVOIDED];
 	char text[256]; /* its last fault */

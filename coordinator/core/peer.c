@@ -76,16 +76,32 @@ static struct avoid *begin_to_avoid(const struct farm *f, struct peer *p, uint64
 	return a;
 }
 
+static bool is_holding(const struct peer *p)
+{
+	return p->held + p->delivered > 0;
+}
+
+static bool holds_lease_of(const struct peer *p, uint64_t job)
+{
+	for (uint32_t i = 0; i < p->lease_limit; i++)
+		if (p->leases[i].used && p->leases[i].job->id == job)
+			return true;
+	return false;
+}
+
 /* Not a failure: the pause is as short as the first one, and does not grow. Other jobs are not tried meanwhile: however
  * many wait, the worker is asked once. */
 void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
 {
 	struct avoid *a = avoid_of(p, job);
+	bool held = is_holding(p);
 	p->who->full_until = f->now + f->config.first_pause;
-	if (a && a->until > f->now)
+	p->who->full_held = held;
+	if (a && a->until > f->now && !a->later)
 		return;
 	a = a ? a : begin_to_avoid(f, p, job);
 	a->own = a->later = true;
+	a->held = held && !holds_lease_of(p, job); /* otherwise it makes way itself */
 	a->until = f->now + f->config.first_pause;
 }
 
@@ -133,14 +149,6 @@ void peer_succeeded(struct farm *f, struct peer *p, uint64_t job)
 		set_window(f, p, 2 * p->who->window);
 }
 
-static bool holds_lease_of(const struct peer *p, const struct job *j)
-{
-	for (uint32_t i = 0; i < p->lease_limit; i++)
-		if (p->leases[i].used && p->leases[i].job == j)
-			return true;
-	return false;
-}
-
 double peer_avoids_until(const struct peer *p, uint64_t job)
 {
 	const struct avoid *a = avoid_of(p, job);
@@ -149,8 +157,10 @@ double peer_avoids_until(const struct peer *p, uint64_t job)
 
 double peer_pauses_until(const struct peer *p, const struct job *j)
 {
-	double until = peer_avoids_until(p, j->id), full = p->who->full_until;
-	return full > until && !holds_lease_of(p, j) ? full : until;
+	const struct avoid *a = avoid_of(p, j->id);
+	bool free = !is_holding(p), in = holds_lease_of(p, j->id);
+	double until = a && !(a->later && a->held && (free || in)) ? a->until : -INFINITY, full = p->who->full_until;
+	return full > until && !(free && p->who->full_held) && !in ? full : until;
 }
 
 bool peer_lacks(const struct peer *p, uint64_t job)

@@ -256,7 +256,7 @@ static void made_up_names(void **state)
 }
 
 /* Another scene is in its memory: no failure, however often, and no longer pause. Meanwhile it gets what it has leases
- * of, and no third job is tried. */
+ * of, and no third job is tried; once it has none of that, there is room. */
 static void no_room_now(void **state)
 {
 	(void)state;
@@ -274,11 +274,14 @@ static void no_room_now(void **state)
 				"[12] w1 batch j1 g2 p0 boot -> merge, merged, w1 gets j2 g1 p0 boot",
 				"[12] w1 postpones j2 g1 p0 boot full -> w1 gets j1 g4 p0 boot",
 				"[13] w1 batch j1 g3 p0 boot -> merge, merged",
-				"[14] w1 batch j1 g4 p0 boot -> merge, merged, j1 prepare",
-				"[21.9] tick -> -",
-				"[22] tick -> w1 gets j2 g0 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot",
-				"[23] w1 postpones j3 g0 p0 boot full -> w1 gets j2 g1 p0 boot",
-				"[24] w1 batch j2 g0 p0 boot -> merge, merged",
+				/* the last of them: there is room at once */
+				"[14] w1 batch j1 g4 p0 boot -> merge, merged, j1 prepare, w1 gets j2 g0 p0 boot, "
+				"w1 gets j2 g1 p0 boot",
+				"[16] w1 batch j2 g0 p0 boot -> merge, merged",
+				/* it makes way itself, or has what is not known here */
+				"[17] w1 postpones j2 g1 p0 boot full -> -",
+				"[26.9] tick -> -",
+				"[27] tick -> w1 gets j2 g1 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot",
 				NULL,
 			});
 	farm_free(f);
