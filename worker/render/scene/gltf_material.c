@@ -245,7 +245,7 @@ static void put_medium(struct gltf *g, const struct gltf_at *at)
 	if (!absorbs(g, at, sigma_a))
 		return;
 	struct xml_element *medium = gltf_plugin(g, g->scene, at, "medium", "homogeneous", NULL);
-	gltf_put_rgb(g, medium, at, "sigma_a", sigma_a);
+	gltf_put_rgb(g, medium, at, "sigma_t", sigma_a);
 	gltf_put_number(g, medium, at, "albedo", 0);
 	put_id(g, medium, at, "medium", GLTF_NO_COLOURS);
 }

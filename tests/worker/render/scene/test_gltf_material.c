@@ -3,6 +3,7 @@
 #include "tests/support/gltf_files.h"
 #include "tests/support/pictures.h"
 #include "tests/support/scene_parts.h"
+#include "worker/render/medium/medium.h"
 #include "worker/render/texture/raster.h"
 
 #include <math.h>
@@ -50,6 +51,19 @@ static void test_layers(void **state)
 	scene_fini(&s);
 }
 
+/* It is what a medium accepts, too. */
+static void assert_absorbs_only(const struct scene_node *node)
+{
+	struct arena arena = {0};
+	struct error e;
+	struct medium m;
+	const struct volume_build build = {.arena = &arena, .dialect_3 = true, .scale = 1};
+	if (medium_create(&m, node, &build, &e))
+		fail_msg("%s", e.text);
+	assert_true(m.absorbs && !m.scatters);
+	arena_fini(&arena);
+}
+
 /* Of white light a quarter of the red, half of the green and nearly nothing of the blue is left after 2. */
 static void test_volume(void **state)
 {
@@ -62,10 +76,11 @@ static void test_volume(void **state)
 	snprintf(thin, sizeof thin, "%s}, " IOR, volume);
 	struct scene s = gltf_files_scene(IOR, with, false);
 	const struct scene_node *medium = scene_named(&s, third);
-	const double *sigma_a = node_find(medium, "sigma_a")->value.as.rgb;
+	const double *sigma_a = node_find(medium, "sigma_t")->value.as.rgb;
 	assert_near(exp(-2 * sigma_a[0]), 0.25);
 	assert_near(exp(-2 * sigma_a[1]), 0.5);
 	assert_true(exp(-2 * sigma_a[2]) < 2e-6);
+	assert_absorbs_only(medium);
 	uint32_t inside = 0;
 	for (uint32_t i = 0; i < s.object_count; i++)
 		if (s.objects[i]->cls == PLUGIN_SHAPE && node_ref(s.objects[i], "interior") == medium)
