@@ -14,6 +14,7 @@
 #include "worker/render/scene/element_make.h"
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/upgrade.h"
+#include "worker/render/scene/xml_files.h"
 
 #include <expat.h>
 
@@ -232,24 +233,6 @@ static int read_default(struct reader *r, const struct xml_element *el)
 	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
 }
 
-/* FOLDER/NAME, or NAME alone, as the file is called from here on. NULL: out of memory. */
-static const char *canonical(const struct reader *r, const char *folder, const char *name)
-{
-	size_t n = strlen(folder), size = n + 1 + strlen(name);
-	char *joined = arena_alloc(r->arena, size + 1, 1), *out = arena_alloc(r->arena, ASSET_NAME_ROOM(size), 1);
-	if (!joined || !out)
-		return NULL;
-	snprintf(joined, size + 1, "%s%s%s", folder, n ? "/" : "", name);
-	asset_name_canonical(joined, out);
-	return out;
-}
-
-static bool leads_out(const char *canonical_name)
-{
-	const char *rest;
-	return asset_name_up(canonical_name, &rest) > 0;
-}
-
 /* Adds a folder in which files named after it are searched, after the scene's own. */
 static int read_path(struct reader *r, const struct xml_element *el)
 {
@@ -259,10 +242,10 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	if (r->tree->path_count == XML_PATHS_MAX)
 		return xml_error(el, r->error, E2BIG, "more than %d search paths", XML_PATHS_MAX);
 	r->tree->paths[r->tree->path_count++] = value;
-	const char *name = canonical(r, "", value);
+	const char *name = xml_files_canonical(r->arena, "", value);
 	if (!name)
 		return out_of_memory(r);
-	bool outside = *name == '/' || strcmp(name, ASSET_NAME_UP) == 0 || leads_out(name);
+	bool outside = *name == '/' || strcmp(name, ASSET_NAME_UP) == 0 || xml_files_leads_out(name);
 	if (!outside || r->tree->note_count == XML_NOTES_MAX)
 		return 0;
 	enum { TEXT = 256 };
@@ -275,105 +258,22 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	return 0;
 }
 
-static bool is_there(const struct reader *r, const char *name)
-{
-	struct asset a;
-	struct error ignored;
-	if (r->assets->open(r->assets->user, name, &a, &ignored))
-		return false;
-	r->assets->close(r->assets->user, &a);
-	return true;
-}
-
-/* What the file is called in that folder; *found: whether it is there. NULL: out of memory. */
-static const char *look_in(const struct reader *r, const char *folder, const char *written, bool *found)
-{
-	const char *there = canonical(r, folder, written);
-	*found = there && is_there(r, there);
-	return there;
-}
-
-/* As in Mitsuba 3: in the folder of the file that names it, in that of the one which includes this, and so on; the
- * scene's own folder comes after them. A name that leads out of the scene's folder is complained of as it is in the
- * first of them. */
-static int look_around(const struct reader *r, const char *written, const char **name, bool *found)
-{
-	const char *file = r->file;
-	bool instead = leads_out(*name);
-	for (const struct xml_element *by = r->hook; by && !*found;) {
-		const char *end = strrchr(file, '/');
-		char *folder = arena_strdup(r->arena, end ? file : "");
-		if (folder && end)
-			folder[end - file] = 0;
-		const char *there = folder ? look_in(r, folder, written, found) : NULL;
-		if (!there)
-			return -ENOMEM;
-		if (*found || instead)
-			*name = there;
-		instead = false;
-		file = by->file;
-		do
-			by = by->parent;
-		while (by && strcmp(by->name, "include") != 0);
-	}
-	return 0;
-}
-
-/* The first of the folders that has the file; *found: whether one has. */
-static int search(struct reader *r, const char *written, bool nested, const char **name, bool *found)
-{
-	*found = false;
-	const char *own = *name = canonical(r, "", written);
-	if (!own || (nested && *written != '/' && look_around(r, written, name, found)))
-		return out_of_memory(r);
-	if (!*found && is_there(r, own)) {
-		*name = own;
-		*found = true;
-	}
-	for (uint32_t i = 0; *written != '/' && i < r->tree->path_count && !*found; i++) {
-		const char *there = look_in(r, r->tree->paths[i], written, found);
-		if (!there)
-			return out_of_memory(r);
-		*name = *found ? there : *name;
-	}
-	return 0;
-}
-
-/* A name that no folder has is kept, and reported by whoever opens it. One written on Windows is tried with '/' for
- * '\\'. nested: files around the one that names it have a say. */
-static int find_file(struct reader *r, const char **name, bool nested)
-{
-	bool found = false, windows = strchr(*name, '\\') != NULL;
-	const char *written = *name;
-	if (r->tree->path_count == 0 && !windows && !(nested && r->hook))
-		return (*name = canonical(r, "", written)) ? 0 : out_of_memory(r);
-	int c = search(r, written, nested, name, &found);
-	if (c || found || !windows)
-		return c;
-	char *turned = arena_strdup(r->arena, written);
-	if (!turned)
-		return out_of_memory(r);
-	for (char *p = turned; *p; p++)
-		*p = *p == '\\' ? '/' : *p;
-	const char *other;
-	c = search(r, turned, nested, &other, &found);
-	if (!c && found)
-		*name = other;
-	return c;
-}
-
 /* <include filename>, <spectrum filename> and <string name="filename" value>. Plug-ins open the last, and Mitsuba's do
  * not know which file names it. */
 static int find_files(struct reader *r, struct xml_element *el)
 {
 	const char *named = xml_attribute(el, "name");
 	bool string = strcmp(el->name, "string") == 0 && named && strcmp(named, "filename") == 0;
+	const struct xml_files files = {.assets = r->assets,
+					.arena = r->arena,
+					.file = r->file,
+					.hook = r->hook,
+					.paths = r->tree->paths,
+					.path_count = r->tree->path_count};
 	for (uint32_t i = 0; i < el->attribute_count; i++)
-		if (strcmp(el->attributes[i].name, string ? "value" : "filename") == 0) {
-			int c = find_file(r, &el->attributes[i].value, !string);
-			if (c)
-				return c;
-		}
+		if (strcmp(el->attributes[i].name, string ? "value" : "filename") == 0 &&
+		    xml_files_find(&files, &el->attributes[i].value, !string))
+			return out_of_memory(r);
 	return 0;
 }
 

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What the files are called that a scene file names: their canonical names (asset_name.h), once it is known which of
+ * the scene's folders has them. Names are put into the arena. Pure but for the files that are opened; any thread.
+ */
+#ifndef WORKER_RENDER_SCENE_XML_FILES_H
+#define WORKER_RENDER_SCENE_XML_FILES_H
+
+#include "common/base/mem.h"
+#include "worker/render/scene/asset.h"
+#include "worker/render/scene/xml.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct xml_files {
+	const struct asset_source *assets;
+	struct arena *arena;
+	const char *file;		/* which names them */
+	const struct xml_element *hook; /* the <include> by which it is read; NULL: it is the scene */
+	const char *const *paths;	/* values of <path> */
+	uint32_t path_count;
+};
+
+/* FOLDER/NAME, or NAME alone. NULL: out of memory. */
+const char *xml_files_canonical(struct arena *arena, const char *folder, const char *name);
+
+bool xml_files_leads_out(const char *canonical_name);
+
+/* A name that no folder has is kept, and reported by whoever opens it. One written on Windows is tried with '/' for
+ * '\\'. nested: files around the one that names it have a say. */
+int xml_files_find(const struct xml_files *f, const char **name, bool nested);
+
+#endif
