@@ -32,6 +32,7 @@ struct reader {
 	size_t bytes;  /* total bytes of files so far */
 	bool mixed;    /* noted that files have both dialects */
 	bool upgraded; /* noted that a file is from before 0.4 */
+	bool by_end;   /* noted that a file was found by the end of its path */
 	/* the current file */
 	XML_Parser parser;
 	const char *file;
@@ -242,19 +243,25 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	if (r->tree->path_count == XML_PATHS_MAX)
 		return xml_error(el, r->error, E2BIG, "more than %d search paths", XML_PATHS_MAX);
 	r->tree->paths[r->tree->path_count++] = value;
-	const char *name = xml_files_canonical(r->arena, "", value);
-	if (!name)
-		return out_of_memory(r);
-	bool outside = *name == '/' || strcmp(name, ASSET_NAME_UP) == 0 || xml_files_leads_out(name);
-	if (!outside || r->tree->note_count == XML_NOTES_MAX)
+	return 0;
+}
+
+/* Once for all of the file: there are often hundreds. */
+static int note_end(struct reader *r, const char *written, const char *name)
+{
+	if (!name || r->by_end || r->tree->note_count == XML_NOTES_MAX)
 		return 0;
-	enum { TEXT = 256 };
-	char *text = arena_alloc(r->arena, TEXT, 1);
+	enum { TEXT = 512 };
+	char *text = arena_alloc(r->arena, TEXT, 1), shown[160];
 	if (!text)
 		return out_of_memory(r);
-	snprintf(text, TEXT, "<path value=\"%.128s\"> leads out of the scene's folder; --path FOLDER searches there",
-		 value);
+	snprintf(
+		text, TEXT,
+		"paths of files that are not on this machine are looked for by their ends in the scene's folder: %.160s "
+		"for %.160s",
+		asset_name_shown(name, shown, sizeof shown), written);
 	r->tree->notes[r->tree->note_count++] = text;
+	r->by_end = true;
 	return 0;
 }
 
@@ -264,16 +271,22 @@ static int find_files(struct reader *r, struct xml_element *el)
 {
 	const char *named = xml_attribute(el, "name");
 	bool string = strcmp(el->name, "string") == 0 && named && strcmp(named, "filename") == 0;
-	const struct xml_files files = {.assets = r->assets,
-					.arena = r->arena,
-					.file = r->file,
-					.hook = r->hook,
-					.paths = r->tree->paths,
-					.path_count = r->tree->path_count};
-	for (uint32_t i = 0; i < el->attribute_count; i++)
-		if (strcmp(el->attributes[i].name, string ? "value" : "filename") == 0 &&
-		    xml_files_find(&files, &el->attributes[i].value, !string))
+	struct xml_files files = {.assets = r->assets,
+				  .arena = r->arena,
+				  .file = r->file,
+				  .hook = r->hook,
+				  .paths = r->tree->paths,
+				  .path_count = r->tree->path_count};
+	for (uint32_t i = 0; i < el->attribute_count; i++) {
+		const char *written = el->attributes[i].value;
+		if (strcmp(el->attributes[i].name, string ? "value" : "filename") != 0)
+			continue;
+		if (xml_files_find(&files, &el->attributes[i].value, !string))
 			return out_of_memory(r);
+		int c = note_end(r, written, files.by_end);
+		if (c)
+			return c;
+	}
 	return 0;
 }
 
@@ -370,6 +383,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	outer.failed = r->failed;
 	outer.mixed = r->mixed;
 	outer.upgraded = r->upgraded;
+	outer.by_end = r->by_end;
 	outer.bytes = r->bytes;
 	outer.defines = r->defines;
 	*r = outer;

@@ -30,21 +30,22 @@ bool xml_files_leads_out(const char *canonical_name)
 	return asset_name_up(canonical_name, &rest) > 0;
 }
 
-static bool is_there(const struct xml_files *f, const char *name)
+/* 0, or why it cannot be opened: -EINVAL where it leads out of the folders that may be read. */
+static int try_open(const struct xml_files *f, const char *name)
 {
 	struct asset a;
 	struct error ignored;
-	if (f->assets->open(f->assets->user, name, &a, &ignored))
-		return false;
-	f->assets->close(f->assets->user, &a);
-	return true;
+	int rc = f->assets->open(f->assets->user, name, &a, &ignored);
+	if (!rc)
+		f->assets->close(f->assets->user, &a);
+	return rc;
 }
 
 /* What the file is called in that folder; *found: whether it is there. NULL: out of memory. */
 static const char *look_in(const struct xml_files *f, const char *folder, const char *written, bool *found)
 {
 	const char *there = xml_files_canonical(f->arena, folder, written);
-	*found = there && is_there(f, there);
+	*found = there && try_open(f, there) == 0;
 	return there;
 }
 
@@ -74,19 +75,31 @@ static int look_around(const struct xml_files *f, const char *written, const cha
 	return 0;
 }
 
-/* The first of the folders that has the file; *found: whether one has. */
-static int search(const struct xml_files *f, const char *written, bool nested, const char **name, bool *found)
+/* In those of <path>, the last one first, as in Mitsuba 3. A file in one that may not be read becomes the *name, whose
+ * opener says what would allow it. */
+static int look_along_paths(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
-	*found = false;
-	const char *own = *name = xml_files_canonical(f->arena, "", written);
-	if (!own || (nested && *written != '/' && look_around(f, written, name, found)))
-		return -ENOMEM;
-	if (!*found && is_there(f, own)) {
-		*name = own;
-		*found = true;
+	const char *outside = NULL;
+	for (uint32_t i = f->path_count; i-- > 0 && !*found;) {
+		const char *there = xml_files_canonical(f->arena, f->paths[i], written);
+		if (!there)
+			return -ENOMEM;
+		int rc = try_open(f, there);
+		*found = rc == 0;
+		*name = *found ? there : *name;
+		outside = !outside && rc == -EINVAL && xml_files_leads_out(there) ? there : outside;
 	}
-	for (uint32_t i = 0; *written != '/' && i < f->path_count && !*found; i++) {
-		const char *there = look_in(f, f->paths[i], written, found);
+	if (!*found && outside && try_open(f, *name) != 0)
+		*name = outside;
+	return 0;
+}
+
+/* The path of a file on another machine: the longest end of it that is a name in the scene's folder. */
+static int look_by_end(const struct xml_files *f, const char *written, const char **name, bool *found)
+{
+	for (const char *end = strchr(written, '/'); end && !*found; end = strchr(end, '/')) {
+		end += strspn(end, "/");
+		const char *there = *end ? look_in(f, "", end, found) : written;
 		if (!there)
 			return -ENOMEM;
 		*name = *found ? there : *name;
@@ -94,11 +107,40 @@ static int search(const struct xml_files *f, const char *written, bool nested, c
 	return 0;
 }
 
-int xml_files_find(const struct xml_files *f, const char **name, bool nested)
+static bool is_absolute(const char *written)
+{
+	bool letter = (*written >= 'a' && *written <= 'z') || (*written >= 'A' && *written <= 'Z');
+	return *written == '/' || (letter && written[1] == ':' && written[2] == '/');
+}
+
+/* The first of the folders that has the file; *found: whether one has. */
+static int search(struct xml_files *f, const char *written, bool nested, const char **name, bool *found)
+{
+	*found = false;
+	const char *own = *name = xml_files_canonical(f->arena, "", written);
+	bool relative = !is_absolute(written);
+	if (!own || (nested && relative && look_around(f, written, name, found)) ||
+	    (relative && !*found && look_along_paths(f, written, name, found)))
+		return -ENOMEM;
+	if (*found)
+		return 0;
+	int rc = try_open(f, own);
+	*found = rc == 0;
+	*name = *found ? own : *name;
+	if (rc == 0 || rc == -EINVAL || relative)
+		return 0;
+	if (look_by_end(f, written, name, found))
+		return -ENOMEM;
+	f->by_end = *found ? *name : f->by_end;
+	return 0;
+}
+
+int xml_files_find(struct xml_files *f, const char **name, bool nested)
 {
 	bool found = false, windows = strchr(*name, '\\') != NULL;
 	const char *written = *name;
-	if (f->path_count == 0 && !windows && !(nested && f->hook))
+	f->by_end = NULL;
+	if (f->path_count == 0 && !windows && !is_absolute(written) && !(nested && f->hook))
 		return (*name = xml_files_canonical(f->arena, "", written)) ? 0 : -ENOMEM;
 	int c = search(f, written, nested, name, &found);
 	if (c || found || !windows)

@@ -20,6 +20,7 @@ struct xml_files {
 	const struct xml_element *hook; /* the <include> by which it is read; NULL: it is the scene */
 	const char *const *paths;	/* values of <path> */
 	uint32_t path_count;
+	const char *by_end; /* result: the name of the file, where only the end of the path of another one led to it */
 };
 
 /* FOLDER/NAME, or NAME alone. NULL: out of memory. */
@@ -28,7 +29,8 @@ const char *xml_files_canonical(struct arena *arena, const char *folder, const c
 bool xml_files_leads_out(const char *canonical_name);
 
 /* A name that no folder has is kept, and reported by whoever opens it. One written on Windows is tried with '/' for
- * '\\'. nested: files around the one that names it have a say. */
-int xml_files_find(const struct xml_files *f, const char **name, bool nested);
+ * '\\'. The path of a file that is not on this machine is looked for by its end: "/home/me/a/b.obj" as
+ * "home/me/a/b.obj", "me/a/b.obj" and so on. nested: files around the one that names it have a say. */
+int xml_files_find(struct xml_files *f, const char **name, bool nested);
 
 #endif

@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Where a scene's files are looked for: the folders of <path>, in Mitsuba's order, those that may not be read, and
+ * paths from another machine. Files are their own names here, so what is read says which one it was.
+ */
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_parts.h"
+#include "worker/render/render.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* The names that exist, and those that lead out of the folders that may be read. */
+struct disk {
+	const char *scene, *there[4], *outside[4];
+};
+
+static bool has(const char *const *list, const char *name)
+{
+	for (int i = 0; i < 4 && list[i]; i++)
+		if (strcmp(list[i], name) == 0)
+			return true;
+	return false;
+}
+
+static int disk_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	const struct disk *d = user;
+	bool scene = strcmp(name, "s.xml") == 0;
+	if (has(d->outside, name))
+		return error_set(e, EINVAL, "%s: leads out", name);
+	if (!scene && !has(d->there, name))
+		return error_set(e, ENOENT, "%s: not there", name);
+	const char *bytes = scene ? d->scene : name;
+	*out = (struct asset){.bytes = (const unsigned char *)bytes, .size = strlen(bytes)};
+	return 0;
+}
+
+static void disk_close(void *user, struct asset *a)
+{
+	(void)user, (void)a;
+}
+
+/* The name under which a mesh called `written` is read, and how many notes there are. */
+static void finds(struct disk d, const char *paths, const char *written, const char *name, uint32_t notes)
+{
+	char text[512];
+	snprintf(text, sizeof text,
+		 "<scene version='3.0.0'>%s<shape type='ply'><string name='filename' value='%s'/></shape></scene>",
+		 paths, written);
+	d.scene = text;
+	struct asset_source assets = {.user = &d, .open = disk_open, .close = disk_close};
+	struct scene s;
+	struct error e;
+	if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s: %s", written, e.text);
+	assert_string_equal(node_string(s.objects[0], "filename", ""), name);
+	assert_int_equal(s.note_count, notes);
+	assert_int_equal(notes, scene_has_note(&s, "looked for by their ends in the scene's folder"));
+	scene_fini(&s);
+}
+
+#define PATHS "<path value='a'/><path value='../b'/>"
+
+/* Mitsuba 3 puts each folder before those that it searches already, the scene's among them. */
+static void test_paths_in_order(void **state)
+{
+	(void)state;
+	finds((struct disk){.there = {"m.ply"}}, PATHS, "m.ply", "m.ply", 0);
+	finds((struct disk){.there = {"m.ply", "a/m.ply"}}, PATHS, "m.ply", "a/m.ply", 0);
+	finds((struct disk){.there = {"m.ply", "a/m.ply", "%2e%2e/b/m.ply"}}, PATHS, "m.ply", "%2e%2e/b/m.ply", 0);
+	finds((struct disk){.there = {"m.ply"}}, PATHS, "none.ply", "none.ply", 0);
+}
+
+/* One that may not be read is named if no other has the file, so that its opener can say what would allow it. */
+static void test_path_outside(void **state)
+{
+	(void)state;
+	static const char outside[] = "%2e%2e/b/m.ply";
+	finds((struct disk){.outside = {outside}}, PATHS, "m.ply", outside, 0);
+	finds((struct disk){.there = {"m.ply"}, .outside = {outside}}, PATHS, "m.ply", "m.ply", 0);
+	finds((struct disk){.there = {"a/m.ply"}, .outside = {outside}}, PATHS, "m.ply", "a/m.ply", 0);
+}
+
+/* The longest end that is there; not if the whole path is, or is but may not be read. */
+static void test_ends_of_paths(void **state)
+{
+	(void)state;
+	finds((struct disk){.there = {"x/m.ply", "m.ply"}}, "", "/home/me/x/m.ply", "x/m.ply", 1);
+	finds((struct disk){.there = {"m.ply"}}, "", "/home/me/x/m.ply", "m.ply", 1);
+	finds((struct disk){.there = {"m.ply"}}, "", "C:\\me\\x\\m.ply", "m.ply", 1);
+	finds((struct disk){.there = {"%2f/x/m.ply", "m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
+	finds((struct disk){.there = {"m.ply"}, .outside = {"%2f/x/m.ply"}}, "", "/x/m.ply", "%2f/x/m.ply", 0);
+	finds((struct disk){.there = {"m.ply"}}, "", "/x/none.ply", "%2f/x/none.ply", 0);
+	finds((struct disk){.there = {"m.ply"}}, "", "x/m.ply", "x/m.ply", 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_paths_in_order),
+		cmocka_unit_test(test_path_outside),
+		cmocka_unit_test(test_ends_of_paths),
+	};
+	return cmocka_run_group_tests_name("xml_files", tests, NULL, NULL);
+}
