@@ -91,7 +91,7 @@ int element_check(const struct xml_element *el, const char *known, bool children
 	for (uint32_t i = 0; i < el->attribute_count; i++)
 		if (!is_listed(known, el->attributes[i].name, NULL))
 			return refuse_attribute(el, known, el->attributes[i].name, e);
-	if (el->text)
+	if (el->text && !el->first && !xml_attribute(el, "value"))
 		return xml_error(el, e, EINVAL, "text is not allowed here; values are given by attributes");
 	if (el->first && !children)
 		return xml_error(el->first, e, EINVAL, "has no place in <%.64s>", el->name);

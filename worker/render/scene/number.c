@@ -175,25 +175,26 @@ bool number_parse_int(const char *text, int64_t *out)
 	return rest && *skip_blanks(rest) == 0;
 }
 
+/* Behind blanks and commas, of which Mitsuba takes any number for one. */
+static const char *skip_separators(const char *p)
+{
+	while (number_is_blank(*p) || *p == ',')
+		p++;
+	return p;
+}
+
 int number_list(const char *text, double *out, size_t max)
 {
-	const char *end = text + strlen(text), *p = skip_blanks(text);
+	const char *end = text + strlen(text), *p = skip_separators(text);
 	size_t n = 0;
 	while (p < end) {
-		if (n == max)
-			return -1;
-		const char *rest = scan_value(p, end, &out[n]);
+		const char *rest = n < max ? scan_value(p, end, &out[n]) : NULL;
 		if (!rest)
 			return -1;
 		n++;
-		p = skip_blanks(rest);
-		if (*p == ',') {
-			p = skip_blanks(p + 1);
-			if (p == end)
-				return -1;
-		} else if (p == rest && p < end) {
+		p = skip_separators(rest);
+		if (p == rest && p < end)
 			return -1;
-		}
 	}
 	return (int)n;
 }

@@ -15,6 +15,7 @@
 #include "worker/render/scene/number.h"
 #include "worker/render/scene/upgrade.h"
 #include "worker/render/scene/xml_files.h"
+#include "worker/render/scene/xml_tidy.h"
 
 #include <expat.h>
 
@@ -32,6 +33,7 @@ struct reader {
 	size_t bytes;  /* total bytes of files so far */
 	bool mixed;    /* noted that files have both dialects */
 	bool upgraded; /* noted that a file is from before 0.4 */
+	bool worded;   /* noted that there is text */
 	bool by_end;   /* noted that a file was found by the end of its path */
 	/* the current file */
 	XML_Parser parser;
@@ -384,6 +386,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	outer.mixed = r->mixed;
 	outer.upgraded = r->upgraded;
 	outer.by_end = r->by_end;
+	outer.worded = r->worded;
 	outer.bytes = r->bytes;
 	outer.defines = r->defines;
 	*r = outer;
@@ -400,14 +403,29 @@ static void on_start(void *user, const char *name, const char **attributes)
 		stop(r, c);
 }
 
+/* A letter too many, most often. Once: Mitsuba says nothing. */
+static int note_text(struct reader *r, const struct xml_element *el)
+{
+	if (!el->text || el->ignored || r->worded || r->tree->note_count == XML_NOTES_MAX)
+		return 0;
+	enum { TEXT = 160 };
+	char *text = arena_alloc(r->arena, TEXT, 1);
+	if (!text)
+		return out_of_memory(r);
+	snprintf(text, TEXT, "text in <%.64s> of line %d is ignored, as by Mitsuba", el->name, el->line);
+	r->tree->notes[r->tree->note_count++] = text;
+	r->worded = true;
+	return 0;
+}
+
 static void on_end(void *user, const char *name)
 {
 	struct reader *r = user;
 	if (r->failed)
 		return;
 	struct xml_element *el = r->current;
-	int c = 0;
-	if (!el->ignored && strcmp(name, "include") == 0)
+	int c = note_text(r, el);
+	if (!c && !el->ignored && strcmp(name, "include") == 0)
 		c = el->first ? xml_error(el, r->error, EINVAL, "must be empty") : read_include(r, el);
 	if (!c && el == r->top && !r->hook && !xml_attribute(el, "version") && !upgrade_is_unmarked(el))
 		c = needs_version(r, el);
@@ -453,7 +471,14 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 	XML_SetCharacterDataHandler(r->parser, on_text);
 	XML_SetStartDoctypeDeclHandler(r->parser, on_doctype);
 	XML_Parser parser = r->parser;
-	enum XML_Status status = XML_Parse(parser, a->size ? (const char *)a->bytes : "", (int)a->size, XML_TRUE);
+	size_t size = a->size;
+	char *text = xml_tidy(a->bytes, &size);
+	if (!text) {
+		XML_ParserFree(parser);
+		return error_set(r->error, ENOMEM, "%s: out of memory", r->file);
+	}
+	enum XML_Status status = XML_Parse(parser, text, (int)size, XML_TRUE);
+	mem_free(text);
 	int c = r->failed;
 	enum XML_Error code = XML_GetErrorCode(parser);
 	if (!c && status != XML_STATUS_OK && code == XML_ERROR_NO_ELEMENTS) {

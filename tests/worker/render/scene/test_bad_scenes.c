@@ -55,7 +55,8 @@ static void test_broken_xml(void **state)
 	refuses(S "<shape type='cube' type='obj'/>" END, "duplicate attribute");
 	refuses(S "<shape type='cube'/>" END "<x/>", "junk after document element");
 	refuses(S "\xff\xfe" END, "not well-formed");
-	refuses(S "&unknown;" END, "undefined entity");
+	refuses(S "&unknown;" END, "text is not allowed here");
+	refuses(S "<shape type='sphere'><float name='radius'>2</float></shape>" END, "values are given by attributes");
 	refuses(S "words" END, "text is not allowed here");
 	refuses("<scenes version='3.0.0'/>", "a scene file must begin with <scene");
 	refuses("<scene/>", "needs version=");

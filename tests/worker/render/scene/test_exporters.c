@@ -61,8 +61,36 @@ static void test_roots(void **state)
 	}
 }
 
+/* What Mitsuba 3's reader of XML lets pass, and a letter too many, which gets a note. */
+static void test_loose_xml(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		uint32_t notes;
+	} cases[] = {
+		{"\n\n <?xml version='1.0'?>\n<scene version='3.0.0'><bsdf type='diffuse' id='a &  b'/></scene>", 0},
+		{"<!-- -- x -- --><scene version='3.0.0'><bsdf type='diffuse' id='a'/></scene>", 0},
+		{"<scene version='3.0.0'><bsdf type='diffuse' id='a'/>/> x</scene>", 1},
+		{"<scene version='3.0.0'><bsdf type='diffuse' id='a'><rgb name='reflectance' value=', .1,.2, .3 , '/></bsdf></scene>",
+		 0},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		const struct memory_file files[] = {{"s.xml", cases[i].text, strlen(cases[i].text)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e;
+		if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
+			fail_msg("%zu: %s", i, e.text);
+		assert_int_equal(s.object_count, 1);
+		assert_int_equal(s.note_count, cases[i].notes);
+		scene_fini(&s);
+	}
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_are_read), cmocka_unit_test(test_roots)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_are_read), cmocka_unit_test(test_roots),
+					   cmocka_unit_test(test_loose_xml)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

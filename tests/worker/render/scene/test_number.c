@@ -84,8 +84,9 @@ static void test_lists(void **state)
 	assert_int_equal(number_list("1f2", v, 3), -1);
 	assert_int_equal(number_list("", v, 3), 0);
 	assert_int_equal(number_list("1 2 3 4", v, 3), -1);
-	assert_int_equal(number_list("1,,2", v, 3), -1);
-	assert_int_equal(number_list("1,2,", v, 3), -1);
+	assert_int_equal(number_list("1,,2", v, 3), 2);
+	assert_int_equal(number_list(", 1 ,2, ", v, 3), 2);
+	assert_int_equal(number_list(" , ", v, 3), 0);
 	assert_int_equal(number_list("1;2", v, 3), -1);
 	assert_int_equal(number_list("1-2", v, 3), -1);
 	assert_int_equal(number_weights("0.5; .25,,0.125f ;", v, 3), 3);
