@@ -21,7 +21,8 @@ bool id_table_names(const struct xml_element *el)
 	enum plugin_class cls;
 	if (el->ignored || !xml_attribute(el, "id"))
 		return false;
-	return plugin_class_find(el->name, &cls) || (strcmp(el->name, "spectrum") == 0 && xml_attribute(el, "type"));
+	return plugin_class_find(el->name, &cls) || (strcmp(el->name, "spectrum") == 0 && xml_attribute(el, "type")) ||
+	       strcmp(el->name, "subsurface") == 0;
 }
 
 struct xml_element *id_table_look(const struct id_table *t, const char *id)

@@ -67,14 +67,81 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 	}
 }
 
+/* The plug-in for the file that a shape names; NULL: it names none. */
+static const char *mesh_of(const struct xml_element *el)
+{
+	static const char *const formats[] = {"obj", "ply", "serialized"};
+	for (const struct xml_element *c = el->first; c; c = c->next) {
+		const char *name = xml_attribute(c, "name"), *file = xml_attribute(c, "value"),
+			   *end = file ? strrchr(file, '.') : NULL;
+		for (size_t i = 0; end && i < sizeof formats / sizeof *formats; i++)
+			if (name && strcmp(name, "filename") == 0 && strcasecmp(end + 1, formats[i]) == 0)
+				return formats[i];
+	}
+	return NULL;
+}
+
+/* The camera that a name says it is one of: "codedOrthographic", "thinlens_srf". */
+static const char *camera_of(const char *type)
+{
+	static const char *const cameras[] = {"perspective", "thinlens", "orthographic", "telecentric", "spherical"};
+	for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++)
+		if (strcasestr(type, cameras[i]))
+			return cameras[i];
+	return NULL;
+}
+
+static bool has_parameter(const struct xml_element *el, const char *const *list)
+{
+	for (const struct xml_element *c = el->first; c; c = c->next)
+		if (xml_attribute(c, "name") && is_one_of(xml_attribute(c, "name"), list))
+			return true;
+	return false;
+}
+
+/* Materials are told by their parameters, whose names most branches of Mitsuba keep. */
+static const char *material_of(const struct xml_element *el, const char *fallback)
+{
+	static const char *const base[] = {"base_color", "baseColor", NULL},
+				 *const disney[] = {"metallic", "roughness", NULL},
+				 *const metal[] = {"material", "eta", "k", NULL}, *const rough[] = {"alpha", NULL},
+				 *const diffuse[] = {"diffuse_reflectance", "diffuseReflectance", NULL},
+				 *const specular[] = {"specular_reflectance", "specularReflectance", NULL};
+	if (has_parameter(el, base) && has_parameter(el, disney))
+		return "principled";
+	if (has_parameter(el, metal) && has_parameter(el, rough) && !has_parameter(el, diffuse))
+		return "roughconductor";
+	if (has_parameter(el, diffuse) && has_parameter(el, specular) && has_parameter(el, rough))
+		return "roughplastic";
+	return fallback;
+}
+
 enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class cls, const char *type,
 				 const char **stand_in)
 {
 	enum lenient_way way = lenient_plugin(cls, type, stand_in);
-	if (way != LENIENT_LEAVE_OUT || cls != PLUGIN_EMITTER || !el->parent || strcmp(el->parent->name, "shape") != 0)
+	const char *mesh = NULL;
+	switch (cls) {
+	case PLUGIN_BSDF:
+		if (way == LENIENT_INNER)
+			*stand_in = material_of(el, *stand_in);
 		return way;
-	*stand_in = "area";
-	return LENIENT_REPLACE;
+	case PLUGIN_SENSOR:
+		*stand_in = camera_of(type);
+		return *stand_in ? LENIENT_REPLACE : way;
+	case PLUGIN_SHAPE:
+		if (plugin_is_mitsubas(cls, type) || !(mesh = mesh_of(el))) /* `ellipsoids` come from points */
+			return way;
+		*stand_in = mesh;
+		return LENIENT_REPLACE;
+	case PLUGIN_EMITTER:
+		if (way != LENIENT_LEAVE_OUT || !el->parent || strcmp(el->parent->name, "shape") != 0)
+			return way;
+		*stand_in = "area";
+		return LENIENT_REPLACE;
+	default:
+		return way;
+	}
 }
 
 const char *lenient_param(const char *stand_in, const char *name)
@@ -91,6 +158,8 @@ const char *lenient_param(const char *stand_in, const char *name)
 		{"transmission_weight", "spec_trans"},
 		{"coat_weight", "coat"},
 		{"fuzz_weight", "sheen"},
+		{"specular_transmission", "spec_trans"},
+		{"specular_tint", "spec_tint"},
 	};
 	if (strcmp(stand_in, "diffuse") == 0 && is_one_of(name, colors))
 		return "reflectance";

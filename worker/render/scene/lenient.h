@@ -14,7 +14,7 @@
 #include <stdbool.h>
 
 enum lenient_way {
-	LENIENT_REFUSE,	   /* no replacement: a sensor */
+	LENIENT_REFUSE,	   /* no replacement: most sensors */
 	LENIENT_LEAVE_OUT, /* a medium, a shape, an emitter, a texture (the parameter keeps its default) */
 	LENIENT_REPLACE,   /* by *stand_in of the same class */
 	/* By the one of its class inside; otherwise as LENIENT_REPLACE or, without a stand-in, LENIENT_LEAVE_OUT. */
@@ -24,7 +24,8 @@ enum lenient_way {
 /* For a plug-in that no table has. */
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in);
 
-/* For such an element: a light in a shape becomes an `area`. */
+/* For such an element: a light in a shape becomes an `area`, a shape with a mesh file what reads this, a sensor the one
+ * that its name names, and a material one with parameters like its own. */
 enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class cls, const char *type,
 				 const char **stand_in);
 

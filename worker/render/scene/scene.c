@@ -304,6 +304,8 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	int r = element_check(el, "id|name", false, m->error);
 	if (!r)
 		r = id_table_find(&m->ids, el, "id", &target, m->error);
+	if (!r && strcmp(target->name, "subsurface") == 0) /* of which is told where it stands */
+		return REPORT_TOLD;
 	return r ? r : read_object(m, d, owner, el, target);
 }
 
@@ -475,7 +477,7 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 	if (value_is_element(el->name) && (el->snake || element_is_of_scene(el))) /* 0.6 has none and ignores all */
 		return note_foreign(&m->notes, el);
 	struct value unused;
-	if (id_table_names(el)) /* a spectrum; those who refer to it hold it */
+	if (id_table_names(el) && value_is_element(el->name)) /* a spectrum; those who refer to it hold it */
 		return value_read(el, m->assets_from, &m->scene->arena, &unused, m->error);
 	return strcmp(el->name, "alias") == 0 ? 0 : foreign_element(m, el);
 }

@@ -13,7 +13,8 @@
 #include <stdio.h>
 #include <string.h>
 
-const char *xml_files_canonical(struct arena *arena, const char *folder, const char *name)
+/* FOLDER/NAME, or NAME alone. NULL: out of memory. */
+static const char *canonical(struct arena *arena, const char *folder, const char *name)
 {
 	size_t n = strlen(folder), size = n + 1 + strlen(name);
 	char *joined = arena_alloc(arena, size + 1, 1), *out = arena_alloc(arena, ASSET_NAME_ROOM(size), 1);
@@ -24,7 +25,7 @@ const char *xml_files_canonical(struct arena *arena, const char *folder, const c
 	return out;
 }
 
-bool xml_files_leads_out(const char *canonical_name)
+static bool leads_out(const char *canonical_name)
 {
 	const char *rest;
 	return asset_name_up(canonical_name, &rest) > 0;
@@ -44,7 +45,7 @@ static int try_open(const struct xml_files *f, const char *name)
 /* What the file is called in that folder; *found: whether it is there. NULL: out of memory. */
 static const char *look_in(const struct xml_files *f, const char *folder, const char *written, bool *found)
 {
-	const char *there = xml_files_canonical(f->arena, folder, written);
+	const char *there = canonical(f->arena, folder, written);
 	*found = there && try_open(f, there) == 0;
 	return there;
 }
@@ -55,7 +56,7 @@ static const char *look_in(const struct xml_files *f, const char *folder, const 
 static int look_around(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
 	const char *file = f->file;
-	bool instead = xml_files_leads_out(*name);
+	bool instead = leads_out(*name);
 	for (const struct xml_element *by = f->hook; by && !*found;) {
 		const char *end = strrchr(file, '/');
 		char *folder = arena_strdup(f->arena, end ? file : "");
@@ -81,13 +82,13 @@ static int look_along_paths(const struct xml_files *f, const char *written, cons
 {
 	const char *outside = NULL;
 	for (uint32_t i = f->path_count; i-- > 0 && !*found;) {
-		const char *there = xml_files_canonical(f->arena, f->paths[i], written);
+		const char *there = canonical(f->arena, f->paths[i], written);
 		if (!there)
 			return -ENOMEM;
 		int rc = try_open(f, there);
 		*found = rc == 0;
 		*name = *found ? there : *name;
-		outside = !outside && rc == -EINVAL && xml_files_leads_out(there) ? there : outside;
+		outside = !outside && rc == -EINVAL && leads_out(there) ? there : outside;
 	}
 	if (!*found && outside && try_open(f, *name) != 0)
 		*name = outside;
@@ -117,7 +118,7 @@ static bool is_absolute(const char *written)
 static int search(struct xml_files *f, const char *written, bool nested, const char **name, bool *found)
 {
 	*found = false;
-	const char *own = *name = xml_files_canonical(f->arena, "", written);
+	const char *own = *name = canonical(f->arena, "", written);
 	bool relative = !is_absolute(written);
 	if (!own || (nested && relative && look_around(f, written, name, found)) ||
 	    (relative && !*found && look_along_paths(f, written, name, found)))
@@ -141,7 +142,7 @@ int xml_files_find(struct xml_files *f, const char **name, bool nested)
 	const char *written = *name;
 	f->by_end = NULL;
 	if (f->path_count == 0 && !windows && !is_absolute(written) && !(nested && f->hook))
-		return (*name = xml_files_canonical(f->arena, "", written)) ? 0 : -ENOMEM;
+		return (*name = canonical(f->arena, "", written)) ? 0 : -ENOMEM;
 	int c = search(f, written, nested, name, &found);
 	if (c || found || !windows)
 		return c;

@@ -6,9 +6,9 @@
 #ifndef WORKER_RENDER_SCENE_XML_FILES_H
 #define WORKER_RENDER_SCENE_XML_FILES_H
 
-#include "common/base/mem.h"
+#include "common/base/arena.h"
 #include "worker/render/scene/asset.h"
-#include "worker/render/scene/xml.h"
+#include "worker/render/scene/element.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -22,11 +22,6 @@ struct xml_files {
 	uint32_t path_count;
 	const char *by_end; /* result: the name of the file, where only the end of the path of another one led to it */
 };
-
-/* FOLDER/NAME, or NAME alone. NULL: out of memory. */
-const char *xml_files_canonical(struct arena *arena, const char *folder, const char *name);
-
-bool xml_files_leads_out(const char *canonical_name);
 
 /* A name that no folder has is kept, and reported by whoever opens it. One written on Windows is tried with '/' for
  * '\\'. The path of a file that is not on this machine is looked for by its end: "/home/me/a/b.obj" as

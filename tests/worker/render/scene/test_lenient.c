@@ -106,6 +106,46 @@ static void test_openpbr(void **state)
 	scene_fini(&s);
 }
 
+/* By what the element says: the format of a shape's file, the camera in a sensor's name, a material's parameters. */
+static void test_likely_stand_ins(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='0.6.0'><sensor type='codedOrthographic' id='camera'/>"
+		"<shape type='shapenet' id='mesh'><string name='filename' value='a.PLY'/></shape>"
+		"<bsdf type='disneybsdf' id='disney'><rgb name='baseColor' value='0.2'/><float name='metallic' value='0.5'/>"
+		"<float name='specularTransmission' value='0.25'/></bsdf>"
+		"<bsdf type='grating' id='metal'><string name='material' value='Au'/><float name='alpha' value='0.2'/></bsdf>"
+		"<bsdf type='microfacet2' id='plastic'><rgb name='diffuseReflectance' value='0.2'/>"
+		"<rgb name='specularReflectance' value='0.5'/><float name='alpha' value='0.2'/></bsdf>"
+		"<bsdf type='rpv' id='other'><float name='k' value='0.2'/></bsdf></scene>";
+	static const char *const expected[][2] = {{"camera", "orthographic"},  {"mesh", "ply"},
+						  {"disney", "principled"},    {"metal", "roughconductor"},
+						  {"plastic", "roughplastic"}, {"other", "diffuse"}};
+	struct scene s = read_leniently(xml);
+	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
+		assert_string_equal(scene_named(&s, expected[i][0])->type, expected[i][1]);
+	assert_true(node_float(scene_named(&s, "disney"), "spec_trans", 0) == 0.25);
+	scene_fini(&s);
+	s = read_leniently(
+		"<scene version='3.0.0'><shape type='ellipsoids'><string name='filename' value='a.ply'/></shape>"
+		"<bsdf type='diffuse'/></scene>");
+	assert_int_equal(s.object_count, 1); /* points are no mesh */
+	scene_fini(&s);
+}
+
+/* What refers to a subsurface that is left out goes without it. */
+static void test_subsurface_by_reference(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='0.6.0'><emitter type='constant'/><subsurface type='dipole' id='d'/>"
+				  "<shape type='sphere' id='s'><ref id='d'/><bsdf type='plastic'/></shape></scene>";
+	struct scene s = read_leniently(xml);
+	assert_string_equal(node_child(scene_named(&s, "s"), PLUGIN_BSDF, 0)->type, "plastic");
+	assert_int_equal(s.note_count, 1);
+	scene_fini(&s);
+}
+
 /* Textures around others give way to the first inside; without one they are left out, as fields are. */
 static void test_textures_around_others(void **state)
 {
@@ -375,6 +415,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_stand_ins),
 		cmocka_unit_test(test_openpbr),
+		cmocka_unit_test(test_likely_stand_ins),
+		cmocka_unit_test(test_subsurface_by_reference),
 		cmocka_unit_test(test_textures_around_others),
 		cmocka_unit_test(test_portals),
 		cmocka_unit_test(test_colours_are_kept),
