@@ -181,6 +181,16 @@ static bool is_hidden(struct gltf *g, const struct gltf_at *node)
 	return json_is_false(json_object_get(gltf_extension(g, node, node->json, "KHR_node_visibility"), "visible"));
 }
 
+/* A scale of 0 in two directions or all, by which animations hide things: nothing of a surface is left. A skinned mesh
+ * is where its joints are. */
+static bool vanishes(const struct gltf_at *node, const mat4 *to_world)
+{
+	int flat = 0;
+	for (int k = 0; k < 3; k++)
+		flat += to_world->m[0][k] == 0 && to_world->m[1][k] == 0 && to_world->m[2][k] == 0;
+	return flat > 1 && !json_object_get(node->json, "skin");
+}
+
 /* hidden: it and all below, except for cameras. */
 static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world, bool hidden)
 {
@@ -190,9 +200,10 @@ static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *
 	if (hidden)
 		return;
 	const json_t *instances = gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing");
-	if (gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && instances)
+	bool mesh = gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0 && !vanishes(node, to_world);
+	if (mesh && instances)
 		gltf_mesh_instances(g, &what, node, instances, to_world);
-	else if (!g->failed && json_object_get(node->json, "mesh"))
+	else if (mesh)
 		gltf_mesh(g, &what, node, to_world);
 	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
 	if (light && gltf_follow(g, node, light, "light", GLTF_LIGHTS, &what) > 0)
@@ -229,12 +240,22 @@ static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth, 
 	w->above[index] = false;
 }
 
+/* A file without scenes is a library of meshes, which most viewers show with all of its nodes. */
+static void visit_all(struct gltf *g, struct walk *w, const mat4 *world)
+{
+	gltf_note(g, "it has no scenes: all of its nodes are shown");
+	for (size_t i = 0; i < w->nodes && !g->failed; i++)
+		if (gltf_node_is_root(g, i))
+			visit(w, i, world, 0, false);
+}
+
 static void read_scene(struct gltf *g)
 {
 	struct gltf_at scene;
 	struct walk w = {.g = g, .nodes = json_array_size(json_object_get(g->root, "nodes"))};
 	mat4 world = mat4_identity();
-	if (!gltf_entry(g, GLTF_SCENES, gltf_whole(g, NULL, g->root, "scene", 0), &scene))
+	bool none = !json_object_get(g->root, "scene") && json_array_size(json_object_get(g->root, "scenes")) == 0;
+	if (!none && !gltf_entry(g, GLTF_SCENES, gltf_whole(g, NULL, g->root, "scene", 0), &scene))
 		return;
 	w.above = arena_alloc(g->arena, w.nodes ? w.nodes : 1, sizeof *w.above);
 	if (!w.above) {
@@ -242,6 +263,10 @@ static void read_scene(struct gltf *g)
 		return;
 	}
 	memset(w.above, 0, w.nodes * sizeof *w.above);
+	if (none) {
+		visit_all(g, &w, &world);
+		return;
+	}
 	const json_t *roots = json_object_get(scene.json, "nodes");
 	for (size_t i = 0; i < json_array_size(roots) && !g->failed; i++) {
 		const json_t *root = json_array_get(roots, i);
@@ -276,6 +301,11 @@ static int read_json(struct gltf *g)
 	int rc = find_json(g, &text, &size);
 	if (rc)
 		return rc;
+	static const char bom[] = "\xef\xbb\xbf"; /* forbidden, and ignored by most readers */
+	if (size >= sizeof bom - 1 && memcmp(text, bom, sizeof bom - 1) == 0) {
+		text += sizeof bom - 1;
+		size -= sizeof bom - 1;
+	}
 	if (size > GLTF_JSON_MAX)
 		return gltf_fail(g, NULL, EFBIG, "more than %d MB of JSON", GLTF_JSON_MAX >> 20);
 	if (!is_moderate(text, size))

@@ -69,7 +69,10 @@ static int range_of_uri(struct gltf *g, const struct gltf_at *at, const char *ur
 {
 	if (strncmp(uri, "data:", 5) == 0)
 		return embedded(g, at, uri, out);
-	if (strstr(uri, "://"))
+	static const char local[] = "file://";
+	if (strncmp(uri, local, sizeof local - 1) == 0 && uri[sizeof local - 1] == '/')
+		uri += sizeof local - 1;
+	else if (strstr(uri, "://"))
 		return gltf_fail(g, at, ENOTSUP, "\"%.64s\": files come from the scene's folder, not from a network",
 				 uri);
 	*out = (struct gltf_range){.file = file_name(g, at, uri), .count = UINT64_MAX, .size = UINT64_MAX};

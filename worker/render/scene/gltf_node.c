@@ -81,6 +81,11 @@ static bool find_parents(struct gltf *g)
 	return true;
 }
 
+bool gltf_node_is_root(struct gltf *g, size_t index)
+{
+	return (g->parents || find_parents(g)) && g->parents[index] == SIZE_MAX;
+}
+
 bool gltf_node_to_world(struct gltf *g, uint64_t index, mat4 *to_world)
 {
 	struct gltf_at node;

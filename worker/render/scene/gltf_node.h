@@ -14,5 +14,7 @@ mat4 gltf_columns(const double m[16]); /* from columns, as files have them */
 
 mat4 gltf_node_matrix(struct gltf *g, const struct gltf_at *node); /* to its parent */
 bool gltf_node_to_world(struct gltf *g, uint64_t index, mat4 *to_world);
+/* No node has it as a child. After failures: false. */
+bool gltf_node_is_root(struct gltf *g, size_t index);
 
 #endif

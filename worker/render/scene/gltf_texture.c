@@ -111,8 +111,8 @@ void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_
 		gltf_plugin(g, el, &texture, "texture", foreign_format(&texture), name);
 		return;
 	}
-	if (found <= 0) {
-		gltf_fail(g, &texture, ENOTSUP, "it has no source that is PNG, JPEG or WebP");
+	if (found <= 0) { /* the exporter lost the image, or meant one of an extension that nobody knows */
+		gltf_plugin(g, el, &texture, "texture", "unknown_format", name);
 		return;
 	}
 	if (gltf_image_range(g, &image, &range))

@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Tables say what stands in for the plug-ins that are known. Of others the element is looked at: a shape's file, a
+ * sensor's name, a material's parameters, a texture's file. What nothing stands in for is left out, or refused.
+ */
 #include "worker/render/scene/lenient.h"
 
 #include "worker/render/scene/asset_name.h"

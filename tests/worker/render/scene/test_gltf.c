@@ -131,6 +131,7 @@ static const struct {
 	{"\"byteOffset\": 593", "\"byteOffset\": 594", "bufferViews[9]: it exceeds buffers[0] of 601 bytes"},
 	{"593, \"byteLength\": 8}],\n\"buffers\": [\n{BUFFER \"byteLength\": 601",
 	 "690, \"byteLength\": 8}],\n\"buffers\": [\n{BUFFER \"byteLength\": 700", "the mesh.bin has 601 bytes"},
+	{"BUFFER", "\"uri\": \"file://host/y.bin\",", "not from a network"},
 	{"BUFFER", "\"uri\": \"http://x/y.bin\",", "not from a network"},
 	{"BUFFER", "\"uri\": \"../y.bin\",", "%2e%2e/y.bin"},
 	{"BUFFER", "\"uri\": \"x%20y/%2E%2e/.%2e/y%25.bin\",", "%2e%2e/y%.bin"},
@@ -139,7 +140,7 @@ static const struct {
 	{"BUFFER", "\"uri\": \"data:text/plain,abc\",", "buffers[0]: its embedded data is not base64"},
 	{"BUFFER", "\"uri\": \"data:;base64,AAAA\",", "buffers[0]: it states 601 bytes and has 3"},
 	{"\"index\": 0},", "\"index\": 3},", "there is no textures[3]"},
-	{"{\"source\": 0, ", "{", "textures[0]: it has no source"},
+	{"{\"source\": 0, ", "{", "images of unknown_format are not supported"},
 	{"\"roughnessFactor\": 0.5", "\"roughnessFactor\": 1.5", "s.gltf:25: <float>: roughness=1.5 is outside [0, 1]"},
 	/* known, and not supported */
 	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 11, \"COLOR_0\": 11", "of a type that color cannot have"},
@@ -404,6 +405,57 @@ static void test_notes(void **state)
 	scene_fini(&s);
 }
 
+/* What the format forbids or leaves open, and readers of it let pass. */
+static void test_loose_files(void **state)
+{
+	(void)state;
+	struct gltf_files f;
+	struct scene s, whole = gltf_files_scene(NULL, NULL, false);
+	gltf_files_make(&f); /* a byte order mark */
+	memmove(f.json + 3, f.json, strlen(f.json) + 1);
+	memcpy(f.json, "\xef\xbb\xbf", 3);
+	s = gltf_files_packed(&f, GLTF_BINARY);
+	assert_int_equal(s.object_count, whole.object_count);
+	scene_fini(&s);
+	gltf_files_make(&f); /* no scenes: the same nodes are roots */
+	gltf_files_replace(&f, "\"scene\": 0", "\"extras\": 0");
+	gltf_files_replace(&f, "\"scenes\"", "\"other\"");
+	s = gltf_files_packed(&f, GLTF_BINARY);
+	assert_int_equal(s.object_count, whole.object_count);
+	assert_true(scene_has_note(&s, "it has no scenes: all of its nodes are shown"));
+	scene_fini(&s);
+	scene_fini(&whole);
+	/* a picture by its whole path, and one that the exporter lost */
+	struct error e;
+	const struct memory_file *files = gltf_files_change(&f, "\"rgb.hdr\"", "\"file:///x/rgb.hdr\"");
+	assert_int_equal(gltf_files_read(files, false, &s, &e), 0);
+	assert_string_equal(s.assets[s.asset_count - 1], "the mesh.bin");
+	assert_string_equal(s.assets[0], "%2f/x/rgb.hdr");
+	scene_fini(&s);
+	s = gltf_files_scene("{\"source\": 0, ", "{", true);
+	assert_true(scene_has_note(&s, "unknown_format"));
+	scene_fini(&s);
+}
+
+/* What a scale of 0 leaves as a point or a line is not there; a sheet still is, and is refused. */
+static void test_no_area(void **state)
+{
+	(void)state;
+	static const char scale[] = "\"scale\": [4, 1, 4]";
+	struct scene whole = gltf_files_scene(NULL, NULL, false),
+		     s = gltf_files_scene(scale, "\"scale\": [0, 0, 0]", false);
+	assert_true(s.object_count < whole.object_count);
+	scene_fini(&s);
+	s = gltf_files_scene(scale, "\"scale\": [0, 1, 0]", false);
+	assert_true(s.object_count < whole.object_count);
+	scene_fini(&s);
+	scene_fini(&whole);
+	struct gltf_files f;
+	struct error e;
+	assert_true(gltf_files_read(gltf_files_change(&f, scale, "\"scale\": [4, 0, 4]"), false, &s, &e));
+	assert_non_null(strstr(e.text, "flattens the shape"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -418,6 +470,8 @@ int main(void)
 		cmocka_unit_test(test_draco),
 		cmocka_unit_test(test_hidden),
 		cmocka_unit_test(test_notes),
+		cmocka_unit_test(test_loose_files),
+		cmocka_unit_test(test_no_area),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);
 }
