@@ -44,10 +44,19 @@ static double rounded_along(const struct triangle *t, vec3 n)
 			      fabs(n.z) * largest(t->v[0].z, t->v[1].z, t->v[2].z));
 }
 
-/* Wider than about eight roundings of its coordinates. */
-static bool has_width(const struct polygon *a, vec3 n)
+static double farthest(const struct triangle *t)
 {
-	double area2 = 0, around = 0, far = 0;
+	double far = 0;
+	for (int i = 0; i < 3; i++)
+		far = fmax(far, largest(t->v[i].x, t->v[i].y, t->v[i].z));
+	return far;
+}
+
+/* Wider than about eight roundings of its coordinates, and than those of the cuts in double, which are by lines between
+ * corners up to `cuts` away: around a corner at the origin that triangles share, the former are nearly 0. */
+static bool has_width(const struct polygon *a, vec3 n, double cuts)
+{
+	double area2 = 0, around = 0, far = 0x1p-27 * cuts;
 	for (unsigned i = 0; i < a->n; i++) {
 		vec3 from = vec3_sub(a->p[i], a->p[0]), to = vec3_sub(a->p[(i + 1) % a->n], a->p[0]);
 		area2 += vec3_dot(n, vec3_cross(from, to));
@@ -72,7 +81,7 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, doub
 			return false;
 	*wholly = over.n == 3 && vec3_length(vec3_sub(over.p[0], a->v[0])) == 0 &&
 		  vec3_length(vec3_sub(over.p[1], a->v[1])) == 0 && vec3_length(vec3_sub(over.p[2], a->v[2])) == 0;
-	return over.n >= 3 && has_width(&over, n);
+	return over.n >= 3 && has_width(&over, n, fmax(farthest(a), farthest(b)));
 }
 
 /* As seen along n. */

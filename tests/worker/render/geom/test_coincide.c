@@ -372,10 +372,39 @@ static void test_rays(void **state)
 	assert_true(lamp > 0 && pane > 0);
 }
 
+/* The parts of a disk meet in its middle, where coordinates are 0 and so is what they are rounded by. */
+static void test_fan(void **state)
+{
+	(void)state;
+	enum { PARTS = 256 };
+	static struct soup s;
+	struct dice d = dice_of("fan");
+	for (size_t n = dice_count(200); n > 0; n--) {
+		struct frame f = frame_around(dice_direction(&d));
+		vec3 rim[PARTS + 1];
+		double size = exp2(dice_between(&d, -12, 0)), wide = size * dice_between(&d, 0.01, 1);
+		for (int i = 0; i < PARTS; i++) {
+			double angle = 2 * M_PI * i / PARTS;
+			rim[i] = vec3_madd(vec3_scale(size * cos(angle), f.s), wide * sin(angle), f.t);
+		}
+		rim[PARTS] = rim[0];
+		s.count = 0;
+		for (int i = 0; i < PARTS; i++)
+			add(&s, (vec3){0, 0, 0}, rim[i], rim[i + 1]);
+		for (uint32_t i = 0; i < PARTS; i++)
+			for (uint32_t k = 0; k < i; k++) {
+				const struct triangle a = triangle_at(&s, i), b = triangle_at(&s, k);
+				bool unused;
+				if (coincide_triangles(&a, &b, 0, &unused) || coincide_triangles(&b, &a, 0, &unused))
+					fail_msg("parts %u and %u of a disk of %g by %g coincide", i, k, size, wide);
+			}
+	}
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two), cmocka_unit_test(test_neighbours),
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two),	  cmocka_unit_test(test_neighbours),
 					   cmocka_unit_test(test_search), cmocka_unit_test(test_bounds),
-					   cmocka_unit_test(test_rays)};
+					   cmocka_unit_test(test_rays),	  cmocka_unit_test(test_fan)};
 	return cmocka_run_group_tests_name("coinciding surfaces", tests, NULL, NULL);
 }
