@@ -119,7 +119,7 @@ static void who_gives_orders_stops_nobody(void **state)
 		assert_in_range(now, last, ORDERS);
 		last = now;
 	}
-	assert_true(looks > 3);
+	assert_true(looks > 1); /* a server that first answers all of one client: 0, or 1 */
 	assert_in_range(commits->count - before, ORDERS, 3 * ORDERS);
 	for (int i = 0; i < ORDERS; i++)
 		hear_done(master);
@@ -147,7 +147,7 @@ static void who_asks_for_lists_stops_nobody(void **state)
 	while (ask(other, JOBS) != PRIORITY)
 		looks++;
 	print_message("%u lists for another client during %d\n", looks, LISTS);
-	assert_true(looks > 3);
+	assert_true(looks > 1); /* a server that first answers all of one client: 0, or 1 */
 	for (int i = 0; i < LISTS; i++)
 		assert_true(hear_list(master, JOBS) != PRIORITY);
 	hear_done(master);

@@ -175,49 +175,36 @@ bool number_parse_int(const char *text, int64_t *out)
 	return rest && *skip_blanks(rest) == 0;
 }
 
-/* Behind blanks and commas, of which Mitsuba takes any number for one. */
-static const char *skip_separators(const char *p)
+/* Behind blanks and separators, of which Mitsuba takes any number for one. */
+static const char *skip_separators(const char *p, const char *separators)
 {
-	while (number_is_blank(*p) || *p == ',')
+	while (number_is_blank(*p) || (*p && strchr(separators, *p)))
 		p++;
 	return p;
+}
+
+static int list(const char *text, const char *separators, double *out, size_t max)
+{
+	const char *end = text + strlen(text), *p = skip_separators(text, separators);
+	size_t n = 0;
+	while (p < end) {
+		const char *rest = n < max ? scan_value(p, end, &out[n]) : NULL;
+		if (!rest)
+			return -1;
+		n++;
+		p = skip_separators(rest, separators);
+		if (p == rest && p < end)
+			return -1;
+	}
+	return (int)n;
 }
 
 int number_list(const char *text, double *out, size_t max)
 {
-	const char *end = text + strlen(text), *p = skip_separators(text);
-	size_t n = 0;
-	while (p < end) {
-		const char *rest = n < max ? scan_value(p, end, &out[n]) : NULL;
-		if (!rest)
-			return -1;
-		n++;
-		p = skip_separators(rest);
-		if (p == rest && p < end)
-			return -1;
-	}
-	return (int)n;
-}
-
-static const char *skip_separators(const char *p)
-{
-	while (number_is_blank(*p) || *p == ',' || *p == ';')
-		p++;
-	return p;
+	return list(text, ",", out, max);
 }
 
 int number_weights(const char *text, double *out, size_t max)
 {
-	const char *end = text + strlen(text), *p = skip_separators(text);
-	size_t n = 0;
-	while (p < end) {
-		const char *rest = n < max ? scan_value(p, end, &out[n]) : NULL;
-		if (!rest)
-			return -1;
-		n++;
-		p = skip_separators(rest);
-		if (p == rest && p < end)
-			return -1;
-	}
-	return (int)n;
+	return list(text, ",;", out, max);
 }

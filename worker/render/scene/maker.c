@@ -1,0 +1,405 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * maker_node makes one node for each object: its plug-in is found, then fill_node reads the contents, parameters by
+ * read_property and objects, nested or referred to, by read_object. An element is made once; later references share
+ * its node.
+ *
+ * Failures: a problem is reported and reading goes on. With `lenient`, what is not supported is left out or replaced,
+ * with a note. References in a circle are an error, and depth and number of objects are bounded (nesting.h).
+ */
+#include "worker/render/scene/maker.h"
+
+#include "worker/render/scene/animation.h"
+#include "worker/render/scene/asset_list.h"
+#include "worker/render/scene/clip_value.h"
+#include "worker/render/scene/element.h"
+#include "worker/render/scene/given_twice.h"
+#include "worker/render/scene/id_table.h"
+#include "worker/render/scene/lenient.h"
+#include "worker/render/scene/nesting.h"
+#include "worker/render/scene/notes.h"
+#include "worker/render/scene/old_values.h"
+#include "worker/render/scene/param_check.h"
+#include "worker/render/scene/plugin.h"
+#include "worker/render/scene/refuse.h"
+#include "worker/render/scene/remarks.h"
+#include "worker/render/scene/report.h"
+#include "worker/render/scene/snake_case.h"
+#include "worker/render/scene/substitute.h"
+#include "worker/render/scene/value.h"
+#include "worker/render/scene/xml.h"
+
+#include <assert.h>
+#include <string.h>
+#include <strings.h>
+
+/* A node being made. */
+struct draft {
+	struct scene_node *node;
+	const struct plugin_decl *decl;
+	bool stands_in; /* replaces a plug-in that is not supported */
+	bool lacks;	/* something inside it was left out, or is wrong */
+	struct property *properties;
+	const struct scene_node **children;
+	struct xml_nesting nesting;
+};
+
+int maker_out_of_memory(struct maker *m)
+{
+	return error_set(m->error, ENOMEM, "out of memory, or the scene files take more than %d MB of it",
+			 XML_MEMORY_MAX >> 20);
+}
+
+void *maker_allocate(struct maker *m, size_t count, size_t size)
+{
+	return arena_alloc(m->arena, count, size);
+}
+
+int maker_add_asset(struct maker *m, const char *name, const struct xml_element *by)
+{
+	return asset_list_add(&m->assets, name, by, m->arena) ? maker_out_of_memory(m) : 0;
+}
+
+static const char *property_name(struct maker *m, const struct xml_element *el, const char *name)
+{
+	if (!el->snake)
+		return name;
+	char *snake = maker_allocate(m, 2 * strlen(name) + 1, 1);
+	if (snake)
+		snake_case(name, snake);
+	return snake;
+}
+
+static int add_property(struct maker *m, struct draft *d, const struct xml_element *el, const struct param *p,
+			struct value v)
+{
+	int r = param_check(el, p, &v, m->error);
+	if (r)
+		return r;
+	const struct property *before = node_find(d->node, p->name);
+	if (before && el->snake)
+		return given_again(&m->notes, d->decl, el, &d->properties[before - d->node->properties], v);
+	if (before)
+		return given_twice(el, before, m->error);
+	d->properties[d->node->property_count++] = (struct property){p->name, el->line, v};
+	return 0;
+}
+
+/* Forks of Mitsuba add parameters. A name that resembles none in the table with an effect, and that no other plug-in of
+ * the class has, is taken for one of these; other unknown names are mistakes. In 3.x sensors, films, shapes and
+ * emitters alone allow it: elsewhere parameters are visible in the image, and Mitsuba 3 refuses them. 0.6 ignores
+ * unknown names of all classes, and in its files an object may have the parameter of another, left there when its type
+ * was changed. */
+static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
+				 const char *name)
+{
+	enum plugin_class cls = d->node->cls;
+	struct spelling s = {.wanted = name};
+	bool hidden = cls == PLUGIN_SENSOR || cls == PLUGIN_FILM || cls == PLUGIN_SHAPE || cls == PLUGIN_EMITTER;
+	/* Shapes of Mitsuba 3 may hold textures of any name, for whoever asks for attributes. */
+	bool attribute = cls == PLUGIN_SHAPE && (strcmp(el->name, "texture") == 0 || strcmp(el->name, "ref") == 0);
+	if (!(value_is_element(el->name) || (attribute && !el->snake)) || !(el->snake || hidden))
+		return false;
+	plugin_offer_params(d->decl, &s);
+	for (const struct plugin_decl *other = m->decls; other->type && !s.best && !el->snake; other++)
+		if (other->cls == cls && plugin_param(other, name))
+			return false;
+	const struct param *meant = s.best ? plugin_param(d->decl, s.best) : NULL;
+	return !s.best || (meant && meant->status == PARAM_IGNORED);
+}
+
+/* Looks up a name in the table: *p is its parameter, or NULL if it was dealt with here (ignored, or an error). */
+static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
+		   const struct xml_element *el, const char *name, const struct param **p)
+{
+	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
+	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
+	const char *written = element_spelling(el, name);
+	int r = 0;
+	*p = NULL;
+	if (d->decl->status == PARAM_IGNORED) {
+		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
+		return 0;
+	}
+	if (!found && m->lenient && !el->snake && (found = lenient_old_param(d->decl, d->stands_in, el, name)))
+		r = note_old_name(&m->notes, owner, el, found->name);
+	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
+	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
+		return note_property(&m->notes, owner, el, written);
+	if (!found && is_foreign_parameter(m, d, el, name))
+		return note_foreign_parameter(&m->notes, owner, el, written);
+	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
+		return leave_out(&m->notes, el, xml_attribute(owner, "type"), written, "the parameter");
+	if (!found || found->status == PARAM_REFUSED)
+		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
+	if (found->status == PARAM_IGNORED)
+		return note_property(&m->notes, owner, el, written);
+	if ((found->types & VALUE_OF_3) && !m->tree->dialect_3)
+		return note_newer(&m->notes, owner, el, written);
+	if (found->status == PARAM_DIFFERS)
+		return note_difference(&m->notes, owner, el, written);
+	*p = found;
+	return r;
+}
+
+static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
+			 const struct xml_element *el)
+{
+	const char *written = xml_attribute(el, "name");
+	const struct animation *animation = NULL;
+	if (!written)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `name`");
+	if (strcmp(el->name, "animation") == 0) {
+		int r = animation_read(&el, m->arena, &animation, m->error);
+		if (r)
+			return r;
+		written = strcmp(written, "animation") == 0 ? "to_world" : written;
+	}
+	const char *name = property_name(m, el, written);
+	if (!name)
+		return maker_out_of_memory(m);
+	const struct param *p;
+	int r = look_up(m, d, owner, el, name, &p);
+	if (r || !p)
+		return r;
+	struct value v;
+	r = value_read(el, m->assets_from, m->arena, &v, m->error);
+	if (!r && el->snake)
+		r = old_value(&m->notes, owner, el, p, d->node->cls, m->arena, &v);
+	if (!r && (p->types & VALUE_CLIPPED))
+		r = clip_value(&m->notes, owner, el, p, &v);
+	if (!r && v.type == VALUE_TRANSFORM)
+		v.animation = animation;
+	if (!r)
+		r = add_property(m, d, el, p, v);
+	bool strange = d->stands_in && (r == -EINVAL || r == -ERANGE);
+	if (strange || (r == -EINVAL && m->lenient && p->choices))
+		return leave_out(&m->notes, el, written, xml_attribute(el, "value"), "the value");
+	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
+		r = *v.as.string ? maker_add_asset(m, v.as.string, owner)
+				 : xml_error(el, m->error, EINVAL, "an empty file name");
+	mat4 inverse;
+	if (!r && v.type == VALUE_TRANSFORM && d->node->cls == PLUGIN_SHAPE && !mat4_invert(v.as.transform, &inverse))
+		r = xml_error(owner, m->error, EINVAL, "%s flattens the shape (it has no inverse): line %d", written,
+			      el->line);
+	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
+	return r || !file ? r : maker_add_asset(m, file, el);
+}
+
+/* An object nested in another, or referred to there: by its name if the table has it, otherwise by its class. */
+static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
+		       struct xml_element *target)
+{
+	enum plugin_class cls;
+	bool is_class = plugin_class_find(target->name, &cls);
+	assert(is_class);
+	if (cls == PLUGIN_MEDIUM && d->node->cls == PLUGIN_EMITTER) /* the world finds out where it stands */
+		return 0;
+	const char *written = xml_attribute(el, "name");
+	const struct param *p = NULL;
+	bool nested = d->decl->nested_classes >> cls & 1;
+	if (written) {
+		const char *name = property_name(m, el, written);
+		if (!name)
+			return maker_out_of_memory(m);
+		const struct param *found = plugin_param(d->decl, name);
+		if (found || !nested) {
+			int r = look_up(m, d, owner, el, name, &p);
+			if (r || !p)
+				return r;
+			nested = false;
+		}
+	}
+	if (!p && !nested) {
+		if (d->decl->status == PARAM_IGNORED)
+			return 0;
+		if (m->lenient)
+			return leave_out(&m->notes, el, plugin_class_name(cls), d->node->type, "its use in");
+		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",
+				 plugin_class_name(cls), written ? "" : " without a name", owner->name, d->node->type);
+	}
+	enum plugin_class colours = p && (p->types & VALUE_IN_SPACE) ? PLUGIN_VOLUME : PLUGIN_TEXTURE;
+	if (p && (p->types & VALUE_COLOR) && (p->types & VALUE_NODE) && cls != colours)
+		return xml_error(el, m->error, EINVAL, "`%s` may be a %s, but not a %s", element_spelling(el, p->name),
+				 plugin_class_name(colours), plugin_class_name(cls));
+	if (p && m->lenient && !(p->types & VALUE_NODE))
+		return leave_out(&m->notes, el, xml_attribute(owner, "type"), element_spelling(el, p->name),
+				 "an object for the parameter");
+	const struct scene_node *child;
+	int r = maker_node(m, target, &child);
+	bool once = d->node->cls == PLUGIN_SHAPE && cls == PLUGIN_BSDF;
+	if (!r && once)
+		r = nesting_count(&m->objects, target, m->error);
+	if (!r)
+		r = nesting_take(&d->nesting, d->node->cls, el, target, once, m->error);
+	if (r)
+		return r;
+	if (p)
+		return add_property(m, d, el, p, (struct value){.type = VALUE_NODE, .as.node = child});
+	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE || cls == PLUGIN_SENSOR ||
+					    cls == PLUGIN_INTEGRATOR || cls == PLUGIN_PHASE);
+	if (!many && node_child(d->node, cls, 0))
+		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">, which may have one",
+				 plugin_class_name(cls), owner->name, d->node->type);
+	d->children[d->node->child_count++] = child;
+	d->node->shines |= child->shines;
+	return 0;
+}
+
+int maker_foreign(struct maker *m, const struct xml_element *el)
+{
+	return m->lenient ? leave_out(&m->notes, el, el->name, "", "the element") : refuse_element(el, m->error);
+}
+
+static int read_content(struct maker *m, struct draft *d, const struct xml_element *owner, struct xml_element *el)
+{
+	enum plugin_class cls;
+	if (el->ignored)
+		return note_foreign(&m->notes, el);
+	if (value_is_element(el->name))
+		return read_property(m, d, owner, el);
+	if (plugin_class_find(el->name, &cls))
+		return read_object(m, d, owner, el, el);
+	if (strcmp(el->name, "default") == 0)
+		return 0;
+	if (strcmp(el->name, "ref") != 0)
+		return d->decl->status == PARAM_IGNORED ? 0 : maker_foreign(m, el);
+	if (d->decl->status == PARAM_IGNORED && !d->decl->nested_classes)
+		return 0;
+	struct xml_element *target;
+	int r = element_check(el, "id|name", false, m->error);
+	if (!r)
+		r = id_table_find(&m->ids, el, "id", &target, m->error);
+	if (!r && strcmp(target->name, "subsurface") == 0) /* of which is told where it stands */
+		return REPORT_TOLD;
+	return r ? r : read_object(m, d, owner, el, target);
+}
+
+/* Motion of what cannot move is an error; a lenient reader keeps the first transform. */
+static int hold_still(struct maker *m, struct draft *d, const struct xml_element *el)
+{
+	for (uint32_t i = 0; i < d->node->property_count; i++) {
+		struct value *v = &d->properties[i].value;
+		const struct param *p = v->animation ? plugin_param(d->decl, d->properties[i].name) : NULL;
+		const char *what = p && (p->types & VALUE_MOTION) ? animation_refused(d->node, el) : "this plug-in";
+		if (!v->animation || !what)
+			continue;
+		v->animation = NULL;
+		return m->lenient ? leave_out(&m->notes, el, d->node->type, "motion", "all but the start of the")
+				  : xml_error(el, m->error, ENOTSUP,
+					      "motion of %s is not supported (line %d); --lenient keeps the first "
+					      "transform",
+					      what, d->properties[i].line);
+	}
+	return 0;
+}
+
+static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
+{
+	size_t n = 0;
+	for (const struct xml_element *c = el->first; c; c = c->next)
+		n++;
+	d->properties = maker_allocate(m, n, sizeof *d->properties);
+	d->children = maker_allocate(m, n, sizeof *d->children);
+	if (!d->properties || !d->children)
+		return maker_out_of_memory(m);
+	d->node->properties = d->properties;
+	d->node->children = d->children;
+	for (struct xml_element *c = el->first; c; c = c->next) {
+		int r = read_content(m, d, el, c);
+		d->lacks |= r == REPORT_TOLD;
+		r = report_problem(&m->report, r, m->error);
+		if (r)
+			return r;
+	}
+	return 0;
+}
+
+/* The node of `inner`, which stands in for el. */
+static int make_inner(struct maker *m, struct xml_element *el, struct xml_element *inner, const struct scene_node **out)
+{
+	el->busy = true;
+	m->depth++;
+	int r = maker_node(m, inner, out);
+	m->depth--;
+	el->busy = false;
+	el->nesting = inner->nesting;
+	return r;
+}
+
+/* An object with errors inside still becomes a node, so that all errors are found. One that is not an object of any
+ * kind does not, and is reported once. */
+int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
+{
+	if (el->node) {
+		*out = el->node;
+		return 0;
+	}
+	if (el->busy)
+		return xml_error(el, m->error, ELOOP, "refers to itself");
+	if (el->told)
+		return REPORT_TOLD;
+	if (m->depth >= XML_DEPTH_MAX)
+		return xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep", XML_DEPTH_MAX);
+	el->told = true; /* reset on success */
+	enum plugin_class cls;
+	plugin_class_find(el->name, &cls);
+	bool file = el->parent && strcmp(el->parent->name, "include") == 0;
+	int r = element_check(el, file ? "type|id|name|version" : "type|id|name", true, m->error);
+	if (r)
+		return r;
+	const char *type = xml_attribute(el, "type");
+	if (!type)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");
+	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);
+	bool stands_in = !decl;
+	struct xml_element *inner = NULL;
+	if (!decl && !m->lenient)
+		return refuse_type(m->decls, el, cls, type, m->error);
+	if (!decl && (r = substitute_plugin(&m->notes, m->decls, &m->ids, el, cls, &type, &decl, &inner)))
+		return r;
+	if (inner) {
+		r = make_inner(m, el, inner, out);
+		el->node = r ? NULL : *out;
+		return r;
+	}
+	if (strcasecmp(type, decl->type) == 0)
+		type = decl->type;
+	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(&m->notes, el, decl)))
+		return r;
+	const struct plugin_decl *named = decl;
+	if (m->lenient && (r = substitute_lost(&m->notes, m->assets_from, m->decls, el, &type, &decl)))
+		return r;
+	struct draft d = {.node = maker_allocate(m, 1, sizeof *d.node),
+			  .decl = decl,
+			  .stands_in = stands_in || decl != named,
+			  .nesting = {.height = 1, .objects = 1}};
+	if (!d.node)
+		return maker_out_of_memory(m);
+	*d.node = (struct scene_node){.cls = cls,
+				      .type = type,
+				      .id = xml_attribute(el, "id"),
+				      .file = el->file,
+				      .line = el->line,
+				      .decl = decl,
+				      .shines = cls == PLUGIN_EMITTER};
+	el->busy = true;
+	m->depth++;
+	r = fill_node(m, &d, el);
+	if (!r)
+		r = report_problem(&m->report, hold_still(m, &d, el), m->error);
+	m->depth--;
+	el->busy = false;
+	el->nesting = d.nesting;
+	*out = d.node;
+	if (!r)
+		r = remarks_on_object(d.node, &m->report, m->error);
+	if (!r && m->lenient && (r = substitute_medium(&m->notes, el, d.lacks, d.node)))
+		return r;
+	if (!r && m->lenient && !m->tree->dialect_3 && (r = substitute_volume(&m->notes, el, d.node)))
+		return r;
+	if (!r && m->lenient && (r = substitute_cover(&m->notes, el, d.lacks, out)) == REPORT_TOLD)
+		return r;
+	el->node = *out;
+	return r;
+}
