@@ -154,7 +154,7 @@ static void test_passed(void **state)
 		SENSOR("0,0,2.9", "0,0,0")
 		BOX LAMPS PANES "%s",
 		BALL("0", "-.3", "0", "<bsdf type='roughconductor'><float name='alpha' value='.3'/></bsdf>")
-		BALL("1.4", "-1", "0", "<bsdf type='dielectric'/>")), 8000);
+		BALL("1.4", "-1", "0", "<bsdf type='dielectric'/>")), 3000);
 	assert_true(t.passed > t.routes / 5);
 	t = density_check("panes under the sky", world_of_text(32, 24,
 		SENSOR("0,0,2.9", "0,0,0")
@@ -165,7 +165,7 @@ static void test_passed(void **state)
 			"<point name='center' x='-1' y='1.5' z='.5'/>"
 			"<float name='radius' value='.1'/>"
 			"<emitter type='area'><float name='radiance' value='5'/></emitter>"
-		"</shape>"), 20000);
+		"</shape>"), 8000);
 	/* clang-format on */
 	assert_true(t.passed > t.routes / 5 && t.infinite > t.routes / 10);
 }
@@ -342,7 +342,7 @@ static void test_lens(void **state)
 		BALL("1.4", "-.5", "0", "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>"));
 	/* clang-format on */
 	assert_true(w->effects.aperture);
-	density_check("lens", w, 8000);
+	density_check("lens", w, 3000);
 }
 
 /* Normals of vertices up to 40 degrees off the triangles'. */
