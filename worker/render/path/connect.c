@@ -65,16 +65,26 @@ static unsigned behind_passed(const struct path_context *c, const struct joined_
 	return i;
 }
 
-static bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j)
+/* For j > 0 and a vertex x_j that is specular: light that goes straight through it may be joined nonetheless. */
+static bool joins_through(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
-	if (j == 0)
-		return true;
-	if ((p->other_medium && j > p->other_medium) || j > p->edges)
-		return false;
 	unsigned end = behind_passed(c, p, j);
 	if (j == 1 && end == p->edges)
 		return lens_joins(c, p->v[end], p->v[0]);
-	return !is_delta(p, j - 1) && !is_delta(p, end) && end - j <= PATH_PASSED_MOST;
+	return !is_delta(p, end) && end - j <= PATH_PASSED_MOST;
+}
+
+static inline bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j)
+{
+	if (j == 0)
+		return true;
+	if (p->other_medium && j > p->other_medium)
+		return false;
+	if (p->edges == 1)
+		return j == 1 && lens_joins(c, p->v[1], p->v[0]);
+	if (j > p->edges || is_delta(p, j - 1))
+		return false;
+	return !is_delta(p, j) || (path_sees_through(c) && joins_through(c, p, j));
 }
 
 /* Edge i, and its media at x_i-1 and at x_i. Where media scatter. */
@@ -100,7 +110,7 @@ static double edge_pdf(const struct path_context *c, const struct joined_path *p
 }
 
 /* Density of x_i as generated from the light, for i >= s. */
-static double light_pdf(const struct path_context *c, const struct joined_path *p, unsigned i)
+static inline double light_pdf(const struct path_context *c, const struct joined_path *p, unsigned i)
 {
 	unsigned s = p->s;
 	if (i == 0)
@@ -152,6 +162,7 @@ static double drawn_instead(const struct path_context *c, const struct joined_pa
 /* r carries densities as if all vertices were drawn. Those of techniques that pass some differ by over_drawn. */
 void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
 {
+	const bool sees_through = path_sees_through(c);
 	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k, joint_end = s + p->passed;
 	for (unsigned j = 0; j <= k; j++)
 		ratio[j] = 0;
@@ -175,7 +186,7 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 	double r_end = r; /* r, before the passed vertices that x_j may be one of */
 	for (unsigned j = s, end = s; j > 0 && r_end > 0 && r < RATIO_LIMIT; j--) {
 		r *= camera_pdf(c, p, j - 1) / p->v[j - 1]->pdf;
-		bool passed = path_sees_through(c) && path_joint_passes(p, j - 1);
+		bool passed = sees_through && path_joint_passes(p, j - 1);
 		if (!passed) {
 			r_end = r;
 			end = j - 1;
@@ -334,8 +345,8 @@ static bool only_absorbs(const struct path_context *c)
 	return EFFECT_IS_ON(c->w, absorption) && !EFFECT_IS_ON(c->w, scattering);
 }
 
-static spectrum after_absorption(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
-				 const struct path_vertex *y, unsigned s, spectrum l)
+static inline spectrum after_absorption(const struct path_context *c, const struct path_vertex *z, vec3 to_light,
+					const struct path_vertex *y, unsigned s, spectrum l)
 {
 	return only_absorbs(c) ? spectrum_mul(l, absorbed(c, z, to_light, y, s)) : l;
 }

@@ -31,7 +31,7 @@ static spectrum kept(struct path_context *c, unsigned j, unsigned t, const doubl
 }
 
 /* Technique j of paths whose camera sub-path has t vertices. */
-static spectrum join(struct path_context *c, unsigned j, unsigned t, struct classes *classes)
+static inline spectrum join(struct path_context *c, unsigned j, unsigned t, struct classes *classes)
 {
 	double film[2];
 	if (!path_may_connect(c, j, t))
