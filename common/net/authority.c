@@ -339,10 +339,11 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	if (!rc)
 		rc = path_in(path, e, folder, "", "ca.pem");
 	if (!rc && access(path, F_OK) == 0)
-		rc = error_set(e, EEXIST, "%s exists: a farm has one authority%s", path,
-			       has(&a, "coordinator", "cert.pem")
-				       ? ""
-				       : " (hslt-ca coordinator coordinator makes the certificate that it lacks)");
+		rc = error_set(
+			e, EEXIST, "%s exists: a farm has one authority%s", path,
+			has(&a, "coordinator", "cert.pem")
+				? ""
+				: ", and its coordinator lacks a certificate, which `hslt-ca coordinator coordinator` makes");
 	if (!rc) {
 		char unique[TLS_NAME_MAX + 16];
 		unsigned char random[4] = {0};
@@ -422,8 +423,8 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 	return rc;
 }
 
-/* A folder that is there was made by a call that did not get to its end: the list is written first, and the
- * certificate last. */
+/* Whether a folder was left by an interrupted call: it lacks the certificate, which is written last, and it has the
+ * list of revocations, which is written first, or nothing. An empty folder is removed. */
 static bool is_incomplete(const struct authority *a, const char *name, const char *path)
 {
 	return !has(a, name, "cert.pem") && (has(a, name, "crl.pem") || rmdir(path) == 0);

@@ -15,10 +15,10 @@
 /* -EEXIST: the folder has one already. */
 int authority_init(const char *folder, const char *name, double days, struct error *e);
 
-/* Writes FOLDER/NAME/, also where an earlier call did not get to its end. renew: replaces the existing certificate and
- * key of this name and role (otherwise -EEXIST); the old ones stay valid until they expire or are revoked, and in place
- * after an error. Valid from an hour ago (clocks differ) for `days`, but
- * not longer than the authority. */
+/* Writes FOLDER/NAME/, and completes one that an interrupted call has left. renew: replaces the existing certificate
+ * and key of this name and role (otherwise -EEXIST). The old ones stay valid until they expire or are revoked; after an
+ * error they are still in place. Valid from an hour ago (clocks differ) for `days`, but not longer than the authority.
+ */
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e);
 
 /* Revokes whatever has this name or serial number. Writes crl.pem, also into the coordinators' folders. *count: of

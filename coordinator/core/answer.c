@@ -288,7 +288,7 @@ static bool is_files_fault(const struct lease *l, const struct event *ev)
 	return l && !ev->lease.own && !ev->lease.bad_states && l->sent < l->job->files_changed;
 }
 
-/* For the status. */
+/* Keeps its text, which the status shows. */
 static void note_failure(struct farm *f, struct peer *p, struct job *j, const struct event *ev)
 {
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");

@@ -21,8 +21,8 @@ struct avoid {
 	uint32_t failures;
 	double until;
 	bool own;   /* each failure since the last pause was its own machine's fault */
-	bool later; /* it did not fail at all: another scene is in its memory */
-	bool held;  /* later: and it held leases of that one, so that the pause ends with the last of them */
+	bool later; /* it did not fail: its memory has room for one scene and holds another */
+	bool held;  /* with later: it held leases then. When it has none any more, the pause ends at once */
 };
 
 enum identity_key { IDENTITY_BY_ID, IDENTITY_BY_HOME, IDENTITY_BY_NAME, IDENTITY_KEYS };
@@ -40,8 +40,8 @@ struct identity {
 	uint32_t window; /* leases that it may hold: see peer_succeeded */
 	bool quarantined;
 	double seen;
-	bool full_held;	   /* full_until: as avoid.held */
-	double full_until; /* has one scene in memory and takes no other: only jobs of which it holds leases */
+	double full_until; /* its memory is full: till then it gets only leases of jobs of which it holds some */
+	bool full_held;	   /* it held leases then: when it has none any more, full_until counts no longer */
 	struct avoid avoid[IDENTITY_AVOIDED];
 	char text[256]; /* its last fault */
 };

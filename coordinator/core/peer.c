@@ -89,8 +89,8 @@ static bool holds_lease_of(const struct peer *p, uint64_t job)
 	return false;
 }
 
-/* Not a failure: the pause is as short as the first one, and does not grow. Other jobs are not tried meanwhile: however
- * many wait, the worker is asked once. */
+/* Not a failure, so the pause does not grow with each one. Nor are other jobs tried during it: however many wait, the
+ * worker is asked once in a pause. */
 void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
 {
 	struct avoid *a = avoid_of(p, job);
@@ -101,7 +101,7 @@ void peer_has_no_room(const struct farm *f, struct peer *p, uint64_t job)
 		return;
 	a = a ? a : begin_to_avoid(f, p, job);
 	a->own = a->later = true;
-	a->held = held && !holds_lease_of(p, job); /* otherwise it makes way itself */
+	a->held = held && !holds_lease_of(p, job); /* if it holds some, this job itself has to make way for another */
 	a->until = f->now + f->config.first_pause;
 }
 

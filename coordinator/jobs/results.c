@@ -150,7 +150,8 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	struct back back = {0};
 	bool holds = answer_awaits(jobs->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
 		     !ev.lease.other_states; /* otherwise nothing is read for it */
-	if (job && *text && !f->later)	     /* which may be said every few seconds; the status shows it */
+	/* `later` may come every few seconds: the status shows it, and the log stays short. */
+	if (job && *text && !f->later)
 		log_failure(jobs, jobs->peers.name(jobs->peers.user, peer), job, f, &ev.lease.key, text, holds);
 	if (job && *text && f->bad_states && holds && !job->busy && !jobs->stepping &&
 	    journal_write(job->journal, &e) == 0)

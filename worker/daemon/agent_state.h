@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The daemon's state: agent.c has connection and shutdown, lease_queue.c jobs and leases, fetch.c files, outgoing.c
- * messages. */
+/* The daemon's state. agent.c has connection and shutdown, lease_queue.c what the coordinator says of jobs and leases,
+ * lease_list.c the leases, scenes_kept.c the scenes in memory, fetch.c files, outgoing.c messages, hang_watch.c threads
+ * that make no progress. */
 #ifndef WORKER_DAEMON_AGENT_STATE_H
 #define WORKER_DAEMON_AGENT_STATE_H
 
@@ -11,11 +12,12 @@
 
 enum { WORLDS_KEPT = 2 /* worlds kept of jobs without leases here */ };
 
-/* Whose scene is in memory while only one may be there: see scenes_kept_admit. Times are of clock_seconds. */
+/* Whose scene is in memory while only one may be there: see scenes_kept_admit. Times are those of clock_seconds. */
 struct turn {
 	uint64_t job;
-	bool waits;	     /* another job does */
-	double since, asked; /* since when; when one was last refused */
+	bool waits;   /* another job waits for its turn */
+	double since; /* when that began */
+	double asked; /* when a lease of another job was last refused */
 };
 
 struct fetch;

@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Threads count ticks while they work (task.ticks). Each look compares the count of every lease and scene in work with
+ * that of the last look; after STALL_LOOKS looks without a difference the thread counts as hung. Its lease fails, or
+ * the leases that wait for its scene do. The thread itself cannot be ended: agent.c lets the others finish, and the
+ * worker exits.
+ */
 #include "worker/daemon/hang_watch.h"
 
 #include "worker/daemon/lease_list.h"
@@ -6,7 +12,7 @@
 
 #include <stdio.h>
 
-/* Counts checks, not seconds: a worker that was stopped as a whole has not hung. */
+/* Counts looks, not seconds: in a worker that was stopped as a whole (SIGSTOP) no thread hangs. */
 static bool has_hung(struct task *t)
 {
 	unsigned long long now = atomic_load(&t->ticks);

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A linked list, in the order of grants, that is searched from the front: a worker holds a few leases for each thread.
+ * Nothing here fails. A lease that a thread works on cannot be freed, so it is marked as unwanted, and whoever gets it
+ * back from the thread drops it.
+ */
 #include "worker/daemon/lease_list.h"
 
 #include "common/base/log.h"

@@ -14,7 +14,7 @@
  * more leases are asked for.
  * After SIGKILL has ended a rendering process, which the system sends where memory is not enough, or an allocation has
  * failed while several scenes were in memory, leases of one job at a time are accepted for a while (scenes_kept_admit):
- * two jobs that fit only one after the other would fail each other again and again.
+ * otherwise two jobs whose scenes do not fit together would end each other again and again.
  */
 #include "worker/daemon/lease_queue.h"
 

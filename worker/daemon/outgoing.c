@@ -24,9 +24,10 @@ void send_job_get(struct agent *a, uint64_t job)
 	send_message(a, ENVELOPE(JOB_GET, job_get, .job = job));
 }
 
-/* states: their digest; NULL: they are not at fault. */
+/* Whose: the job's; this machine's; nobody's, since another scene is in memory. */
 enum fault { FAULT_JOB, FAULT_OWN, FAULT_LATER };
 
+/* states: digest of the chain states that are at fault; NULL: none are. */
 static void send_failure(struct agent *a, const struct lease_key *k, const char *text, enum fault fault,
 			 const struct blob_hash *states)
 {

@@ -13,7 +13,8 @@ void send_request(struct agent *a);			     /* how many leases it wants to hold *
 void send_job_get(struct agent *a, uint64_t job);
 /* An empty text returns the lease without blame; own: this machine is at fault, not the job. */
 void send_failed(struct agent *a, const struct lease_key *k, const char *text, bool own);
-/* The scene of another job is in memory: it may be asked again soon. */
+/* Returns a lease because the scene of another job is in memory (LeaseFailed.later): the coordinator asks again soon.
+ */
 void send_later(struct agent *a, const struct lease_key *k, const char *text);
 /* The maker of the chain states in the grant is at fault. */
 void send_bad_states(struct agent *a, const struct grant *g, const char *text);

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A scene is in use while leases of its job are here or a thread builds it or reads for it; only others are dropped.
+ *
+ * While one scene at a time is kept, the first job that gets a lease has the turn. Leases of other jobs are refused,
+ * and so, after turn_seconds, are new leases of the job that has the turn: its last lease ends, its scene is dropped,
+ * and the next job to be granted a lease has the turn. So neither job waits for the whole of the other.
+ */
 #include "worker/daemon/scenes_kept.h"
 
 #include "common/base/clock.h"
@@ -62,7 +69,8 @@ void scenes_kept_tidy(struct agent *a)
 	tidy_fetches(a);
 }
 
-/* The job that stays, of several in use the first; next: if none is in use; may be NULL. */
+/* Drops all unused scenes but one. Returns the job whose scene stays: the first of those in use, otherwise `next`,
+ * which may be NULL. */
 static struct job_cache *keep_one(struct agent *a, struct job_cache *next)
 {
 	struct job_cache *left = NULL;
@@ -78,20 +86,23 @@ static struct job_cache *keep_one(struct agent *a, struct job_cache *next)
 	return left;
 }
 
-/* How long a scene stays while others wait; what counts as waiting no more: that job has ended, or others compute it.
- */
+/* How long a scene stays while another job waits. A job that has not been granted for asked_seconds counts as waiting
+ * no more: it has ended, or other workers compute it. */
 static const double turn_seconds = 300, asked_seconds = 60;
 
 static int wait_for(struct agent *a, uint64_t job, double now, struct error *e)
 {
 	struct turn *t = &a->turn;
 	if (!t->waits)
-		log_event(LOG_JOB_NOTE, "job=j%llu text=\"waits: memory was short, and the scene of j%llu is in it\"",
-			  log_u64(job), log_u64(t->job));
+		log_event(
+			LOG_JOB_NOTE,
+			"job=j%llu text=\"waits: memory ran short, so this worker holds one scene at a time, now that of j%llu\"",
+			log_u64(job), log_u64(t->job));
 	t->since = t->waits ? t->since : now;
 	t->waits = true;
 	t->asked = now;
-	return error_set(e, EAGAIN, "memory was short, and the scene of j%llu is in it", log_u64(t->job));
+	return error_set(e, EAGAIN, "memory ran short, so it holds one scene at a time, now that of j%llu",
+			 log_u64(t->job));
 }
 
 int scenes_kept_admit(struct agent *a, uint64_t job, struct error *e)
@@ -109,6 +120,8 @@ int scenes_kept_admit(struct agent *a, uint64_t job, struct error *e)
 		*t = (struct turn){.job = job};
 	t->waits = t->waits && now - t->asked < asked_seconds;
 	if (t->waits && now - t->since >= turn_seconds)
-		return error_set(e, EAGAIN, "memory was short, and its scene makes way for that of a job that waits");
+		return error_set(
+			e, EAGAIN,
+			"memory ran short, so it holds one scene at a time, and this one makes way for another job's");
 	return 0;
 }

@@ -22,7 +22,7 @@ struct shared {
 	atomic_int number;   /* of the signal that ended the process; 0: none */
 	atomic_int hit;	     /* the entry of the thread that received it; -1: none of these */
 	char text[CRASH_TEXT];
-	double short_seconds, short_until; /* see work_memory_was_short; 0: it never was */
+	double short_seconds, short_until; /* the period of work_memory_was_short, and its end; 0: it never was */
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
 	struct work of[WORK_THREADS];

@@ -31,15 +31,17 @@ void work_catch(void);
 void work_begin(const struct lease_key *k, const char *scene);
 void work_end(void);
 
-/* In the supervisor: the rendering process has ended, by this signal according to the kernel (0: none). now: s of the
- * monotonic clock, here and below. Its leases are lost from now on. Returns their number; also 0 if it ended without a
- * signal. */
+/* In the supervisor: the rendering process has ended, by this signal according to the kernel (0: none). Its leases are
+ * lost from now on. Returns their number, which is 0 if it ended without a signal. now: here and below, that of
+ * clock_seconds. */
 unsigned work_lose(int number, double now);
 
-/* The machine is short of memory: SIGKILL has ended a rendering process within the last ten minutes, or one has called
- * work_memory_short. If that comes back soon after the ten minutes, the next time is twice as long, and so on. */
-bool work_memory_was_short(double now);
+/* Memory has run short: SIGKILL has ended a rendering process, or an allocation has failed in one that held several
+ * scenes. */
 void work_memory_short(double now);
+/* Whether that was in the last ten minutes. If it recurs after these ten minutes, but within twenty, the next period is
+ * of twenty minutes, then of forty, and so on up to 320: what runs short again so soon needs the limit. */
+bool work_memory_was_short(double now);
 
 /* Of earlier processes: the index-th lost lease; NULL: no more. */
 struct lost_lease *work_lost(unsigned index);

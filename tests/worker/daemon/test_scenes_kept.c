@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which scenes a worker holds at the same time where memory has not been enough, with a scripted coordinator. */
+/* Which scenes a worker holds at the same time after memory has run short, with a scripted coordinator. */
 #include "common/base/clock.h"
 #include "common/base/mem.h"
 #include "worker/daemon/work.h"
@@ -18,7 +18,7 @@
 #include <stdatomic.h>
 #include <unistd.h>
 
-/* An earlier process was killed for memory, now. */
+/* A worker starts whose rendering process has just been ended by SIGKILL. */
 static void begin_short(void)
 {
 	struct error e;
@@ -53,46 +53,47 @@ static void one_scene_at_a_time_where_memory_was_short(void **state)
 	begin_short();
 	coord_grant(1);
 	coord_say_grant(2);
-	hear_later(2, "memory was short, and the scene of j1 is in it");
+	hear_later(2, "memory ran short, so it holds one scene at a time, now that of j1");
 	coord_say_revoke(1);
 	coord_grant(2); /* the scene of j1 may be wanted again, but it is used by nobody */
 	coord_say_grant(1);
-	hear_later(1, "the scene of j2 is in it");
+	hear_later(1, "now that of j2");
 	coord_end_job(2);
 	coord_grant(1);
 	coord_finish();
 }
 
-/* However many leases of it there are: it takes none, and once nobody uses the scene the other job is next. */
+/* However many leases its job is granted: it takes no new ones, and once nobody uses the scene the other job is next.
+ */
 static void a_scene_makes_way_for_one_that_waits(void **state)
 {
 	(void)state;
 	begin_short();
 	coord_grant(1);
 	coord_say_grant(2);
-	hear_later(2, "the scene of j1 is in it");
+	hear_later(2, "now that of j1");
 	coord.agent->turn.since -= 299; /* as if so long had passed */
 	coord_say_revoke(1);
 	coord_say_grant(1);
 	coord_say_grant(2);
-	hear_later(2, "the scene of j1 is in it");
+	hear_later(2, "now that of j1");
 	coord.agent->turn.since -= 2;
 	coord_say_revoke(1);
 	coord_say_grant(1);
-	hear_later(1, "its scene makes way");
+	hear_later(1, "this one makes way for another job's");
 	coord_grant(2);
 	coord_say_grant(1);
-	hear_later(1, "the scene of j2 is in it");
+	hear_later(1, "now that of j2");
 	coord.agent->turn.since -= 301;
 	coord.agent->turn.asked -= 61; /* j1 has not been granted for so long */
 	coord_say_revoke(2);
 	coord_say_grant(2);
 	coord_say_grant(1);
-	hear_later(1, "the scene of j2 is in it");
+	hear_later(1, "now that of j2");
 	coord_finish();
 }
 
-/* Ten minutes; twice as long each time it comes back within as long a time. */
+/* After ten minutes; each time memory runs short again within as long, the next period is twice as long. */
 static void the_restriction_ends(void **state)
 {
 	struct error e;
@@ -105,9 +106,9 @@ static void the_restriction_ends(void **state)
 	work_memory_short(1700);
 	assert_true(work_memory_was_short(2899));
 	assert_false(work_memory_was_short(2901));
-	work_memory_short(4101); /* it did without for as long */
+	work_memory_short(4101); /* as long again has passed without: ten minutes */
 	assert_true(work_memory_was_short(4700));
-	work_lose(SIGKILL, 4700); /* one scene alone: shortening nothing, longer by nothing */
+	work_lose(SIGKILL, 4700); /* within the period: it begins anew, as long as before */
 	assert_true(work_memory_was_short(5299));
 	assert_false(work_memory_was_short(5301));
 	double at = 5300, lasts = 600; /* the last one began at 4700 */
@@ -120,7 +121,7 @@ static void the_restriction_ends(void **state)
 	assert_false(work_memory_was_short(at + 1));
 }
 
-/* Then both jobs are welcome again. */
+/* After the period both jobs are accepted again. */
 static void then_it_takes_any(void **state)
 {
 	struct error e;
@@ -183,7 +184,7 @@ static void memory_that_others_had_is_its_own_fault(void **state)
 	run_out_of_memory(2);
 	assert_true(coord.own);
 	coord_say_grant(3);
-	hear_later(3, "the scene of j1 is in it");
+	hear_later(3, "now that of j1");
 	coord_end_job(1);
 	coord_grant(2);
 	run_out_of_memory(2);

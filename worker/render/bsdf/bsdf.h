@@ -113,7 +113,7 @@ struct bsdf {
 	void *data;
 };
 
-/* Whether connections may look through surfaces of it (path/transparent.h). */
+/* Whether connections may look through surfaces that have it (path/transparent.h). Not through hair, which culls. */
 static inline bool bsdf_is_passed(const struct bsdf *b)
 {
 	return (b->modes & BSDF_STRAIGHT) && !b->culls;

@@ -141,8 +141,8 @@ static const struct param bumpmap_params[] = {
 	OF_MITSUBA_3_7,
 	{.name = NULL},
 };
-/* scale: as in glTF. handedness (ours, for glTF): y towards the top of the image, also where n x t, Mitsuba's y, is
- * not. */
+/* scale: as in glTF. handedness (ours, for glTF): y points towards the top of the image everywhere; Mitsuba's y is
+ * n x t, which may point to its bottom. */
 static const struct param normalmap_params[] = {
 	{.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},

@@ -63,7 +63,8 @@ static int read_texture(struct emitter *em, struct spot *s, const struct scene_n
 			const struct emitter_build *build, struct error *e)
 {
 	const struct property *given = node_find(n, "texture");
-	s->textured = given && (build->dialect_3 || given->value.type == VALUE_NODE); /* 0.6 ignores one value */
+	s->textured =
+		given && (build->dialect_3 || given->value.type == VALUE_NODE); /* 0.6 ignores a colour or number */
 	if (!s->textured)
 		return 0;
 	if (s->cutoff > 89 * (M_PI / 180))

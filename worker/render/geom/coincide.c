@@ -52,8 +52,9 @@ static double farthest(const struct triangle *t)
 	return far;
 }
 
-/* Wider than about eight roundings of its coordinates, and than those of the cuts in double, which are by lines between
- * corners up to `cuts` away: around a corner at the origin that triangles share, the former are nearly 0. */
+/* Whether the overlap is more than rounding: wider than about eight roundings of its own coordinates to float, and than
+ * the error of the cuts that made it, which is in double but relative to the triangles' corners, up to `cuts` away. The
+ * latter counts where triangles share a corner at the origin: roundings of coordinates there are nearly 0. */
 static bool has_width(const struct polygon *a, vec3 n, double cuts)
 {
 	double area2 = 0, around = 0, far = 0x1p-27 * cuts;

@@ -57,7 +57,7 @@ static double log_weight(struct mutation_ctx *m, struct full_path *into, const s
 	unsigned k = into->edges;
 	double log_pdf[FULL_PATH_MAX_VERTICES];
 	const bool opaque = m->path->opaque;
-	m->path->opaque = true; /* a joint that passes surfaces makes a path of another length than was drawn */
+	m->path->opaque = true; /* propose draws the length first; a joint that passes surfaces would change it */
 	full_path_log_techniques(m->path, into, log_pdf);
 	m->path->opaque = opaque;
 	double log_t = log_edges(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);

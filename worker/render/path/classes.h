@@ -26,7 +26,8 @@ struct classes {
 void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light,
 		   struct path_sample *out);
 
-/* Of what path_connect made of s vertices of c->light and t of c->camera, passing so many surfaces. */
+/* The class of the path that path_connect made of s vertices of c->light and t of c->camera. passed: how many surfaces
+ * their joint passes. */
 static inline unsigned classes_joined(const struct classes *k, unsigned s, unsigned t, unsigned passed)
 {
 	enum path_class_kind kind = (enum path_class_kind)(s > 0 ? k->camera[t] : k->emitter[t]);
@@ -42,7 +43,7 @@ static inline void classes_clear(struct path_sample *out)
 	memset(out->of_class, 0, sizeof out->of_class);
 }
 
-/* Technique s contributes l: right after path_connect. */
+/* Technique s contributes l. Call right after path_connect, which leaves in c how many surfaces the joint passes. */
 static inline void classes_add(struct classes *k, const struct path_context *c, unsigned s, unsigned t, spectrum l)
 {
 	unsigned class = classes_joined(k, s, t, c->passed_count);

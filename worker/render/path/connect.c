@@ -57,7 +57,7 @@ static bool lens_joins(const struct path_context *c, const struct path_vertex *e
 	return path_pdf_toward(c, emitter, eye->x.p) >= PATH_LENS_DENSER * film;
 }
 
-/* The first vertex from x_i on that is not passed, where connections look through surfaces. */
+/* The first vertex from x_i on that is not passed: what x_i-1 is joined to. */
 static unsigned behind_passed(const struct path_context *c, const struct joined_path *p, unsigned i)
 {
 	while (path_sees_through(c) && path_joint_passes(p, i))
@@ -135,8 +135,8 @@ static double camera_pdf(const struct path_context *c, const struct joined_path 
 	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true);
 }
 
-/* The density of joining x_first-1 to what is behind the passed x_first..x_end-1 over that of drawing these with their
- * sub-path's densities; 1 where none is passed. */
+/* The density of joining x_first-1 to x_end, which passes x_first..x_end-1, over that of drawing those as their
+ * sub-path did; 1 if there are none. */
 static double over_drawn(const struct path_context *c, const struct joined_path *p, unsigned first, unsigned end)
 {
 	double pdf[PATH_PASSED_MOST];
@@ -147,8 +147,8 @@ static double over_drawn(const struct path_context *c, const struct joined_path 
 	return path_passed_ratio(p->v, first, end - 1, pdf);
 }
 
-/* The density of drawing what the joint passes, from the light's side or the camera's, over that of the technique that
- * joined it. */
+/* For the technique that made the path: the density of drawing what its joint passes, from the light's side or the
+ * camera's, over that of joining; 1 if it passes nothing. */
 static double drawn_instead(const struct path_context *c, const struct joined_path *p, bool from_light)
 {
 	double pdf[PATH_PASSED_MOST];
@@ -159,7 +159,9 @@ static double drawn_instead(const struct path_context *c, const struct joined_pa
 	return 1 / path_passed_ratio(p->v, p->s, p->s + p->passed - 1, pdf);
 }
 
-/* r carries densities as if all vertices were drawn. Those of techniques that pass some differ by over_drawn. */
+/* r is the density of technique j over that of technique s, computed as if j drew every vertex. In fact joints pass
+ * vertices without drawing them. drawn_instead corrects r for the joint of s, once towards either side; over_drawn
+ * corrects the ratio that is stored for the joint of j. */
 void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
 {
 	const bool sees_through = path_sees_through(c);
@@ -183,7 +185,7 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 	}
 	bool beyond = r >= RATIO_LIMIT;
 	r = first * drawn_instead(c, p, false);
-	double r_end = r; /* r, before the passed vertices that x_j may be one of */
+	double r_end = r; /* r at x_end, the nearest vertex behind x_j that is not passed */
 	for (unsigned j = s, end = s; j > 0 && r_end > 0 && r < RATIO_LIMIT; j--) {
 		r *= camera_pdf(c, p, j - 1) / p->v[j - 1]->pdf;
 		bool passed = sees_through && path_joint_passes(p, j - 1);
@@ -364,8 +366,8 @@ static bool is_seen(struct path_context *c, const struct path_vertex *z, const s
 	return !spectrum_is_zero(*l);
 }
 
-/* What is left of l on its way from y, vertex s - 1 of the light's sub-path, to the camera's vertex t - 1; zero: they
- * do not see each other. direct: l after what media absorb of it if nothing is passed. */
+/* What is left of l on its way from y, vertex s - 1 of the light's sub-path, to the camera's vertex t - 1, directly or
+ * through surfaces; zero: they do not see each other. direct: l after what media absorb of it if nothing is passed. */
 static spectrum seen(struct path_context *c, const struct path_vertex *y, unsigned s, unsigned t, vec3 to_light,
 		     spectrum l, spectrum direct, struct path_edge *joint)
 {
@@ -455,9 +457,10 @@ static spectrum join_emitter_to_lens(struct path_context *c, unsigned max_s, dou
 	return join_lens(c, &y, 1, max_s, d, l);
 }
 
-/* How often a connection that brings l counts; 0: it is left to chance, and not made. The weight is not known yet;
- * light_every / edges stands for it, as if all techniques were alike: what is made brings at most `edges` times
- * `faint`, whatever its weight turns out to be. */
+/* How often a connection that brings l counts: once, or, if it is faint, 1 / q times in a share q of all cases and
+ * otherwise 0 times, which saves its rays. Its weight, on which q should depend, is not known yet; light_every / edges
+ * stands for it, as if all techniques were alike. So what is made brings at most `edges` times `faint`, whatever its
+ * weight turns out to be. */
 static double times_made(struct path_context *c, unsigned edges, spectrum l)
 {
 	double brings = spectrum_mean(l) * ((c->light_every > 1 ? c->light_every : 1) / (double)edges);

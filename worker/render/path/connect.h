@@ -15,8 +15,7 @@
 /* A path put together from sub-paths, light to camera. */
 struct joined_path {
 	unsigned edges, s;
-	unsigned passed; /* x_s .. x_s+passed-1 are not of the sub-paths: what joins them passes these (transparent.h)
-			  */
+	unsigned passed; /* x_s .. x_s+passed-1 belong to neither sub-path: the joint passes them (transparent.h) */
 	const struct path_vertex *v[PATH_MAX_EDGES + 2];
 	/* Where media scatter; otherwise unused and 0. Edge i joins x_i-1 and x_i. */
 	const struct path_edge *joint; /* edge s, of which x_s is the vertex before */
@@ -48,14 +47,15 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
  * is uniform. This is a property of the path, so all techniques that make it agree. */
 spectrum path_collapse(spectrum l, bool dispersive);
 
-/* Whether a connection of so many vertices can make a path of a length that is asked for: more edges than these, where
- * it passes surfaces. */
+/* Whether joining s vertices to t can make a path of a length that is asked for. Passed surfaces add edges, so
+ * min_depth rules out nothing where a connection may look through some. */
 static inline bool path_may_connect(const struct path_context *c, unsigned s, unsigned t)
 {
 	return s + t <= c->max_depth + 1 && (s + t > c->min_depth || (s > 0 && path_sees_through(c)));
 }
 
-/* Whether vertex i is passed by all techniques that join what is around it: see transparent.h. */
+/* Whether vertex i is one that a joint across it passes (transparent.h). The ends of the joint that made p are not:
+ * they scatter there. */
 static inline bool path_joint_passes(const struct joined_path *p, unsigned i)
 {
 	return i > 0 && i < p->edges && i + 1 != p->s && i != p->s + p->passed && path_is_passed(p->v[i]);
@@ -63,7 +63,8 @@ static inline bool path_joint_passes(const struct joined_path *p, unsigned i)
 
 /* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among
  * the techniques up to max_s. s <= 1 needs no light sub-path. film: where it lands when t = 1 (else unchanged). The
- * path has s + t - 1 + c->passed_count edges; where any is passed, as many as are asked for. */
+ * path has s + t - 1 + c->passed_count edges. If that is more than s + t - 1, it has been checked against min_depth and
+ * max_depth; otherwise the caller has (path_may_connect). */
 spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2]);
 
 #endif

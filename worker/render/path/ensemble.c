@@ -48,7 +48,7 @@ static double survival(unsigned n)
 	return n > SURE_VERTICES ? (double)(SURE_VERTICES * SURE_VERTICES) / ((double)n * n) : 1;
 }
 
-/* What joining s vertices of the light's with t of the camera's contributes. */
+/* What joining s vertices of the light's sub-path to t of the camera's contributes. */
 static double contribution(struct path_context *c, unsigned s, unsigned t)
 {
 	double film[2];

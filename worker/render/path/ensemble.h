@@ -14,7 +14,7 @@
 
 struct candidate {
 	double intensity;
-	unsigned s, passed, edges; /* passed: by the joint (transparent.h), of the edges' vertices */
+	unsigned s, passed, edges; /* passed: vertices that the joint passes (transparent.h); `edges` counts theirs */
 };
 
 struct ensemble {

@@ -361,7 +361,8 @@ static bool joint_is_open(struct path_context *c, struct full_path *x, unsigned 
 	return true;
 }
 
-/* The vertices that the joint between z, the camera's last, and y passes. */
+/* Puts the vertices that the joint between y and z, the camera's last vertex, passes into x. false: it passes another
+ * number of them. */
 static bool take_passed(struct path_context *c, const struct path_vertex *z, bool from_lens,
 			const struct path_vertex *y, unsigned s, unsigned passed, struct full_path *x)
 {

@@ -114,7 +114,7 @@ bool whole_film(const struct path_context *c, struct full_path *x);
 
 /* The technique with the most light vertices: fewer than all where media do not fit together (path/media.h). */
 unsigned full_path_most_light(const struct path_context *c, const struct full_path *x);
-/* How many vertices from v[s] on technique s passes (transparent.h). */
+/* How many vertices, from v[s] on, the joint of technique s passes (transparent.h). */
 unsigned full_path_passed(const struct path_context *c, const struct full_path *x, unsigned s);
 /* Whether technique s > 0 can make it, as far as specular vertices go. */
 bool full_path_joins(const struct path_context *c, const struct full_path *x, unsigned s);
@@ -126,8 +126,8 @@ bool full_path_is_made(const struct path_context *c, const struct full_path *x);
  * unless media scatter: then it is also false where an edge is occluded. */
 bool full_path_finish(struct path_context *c, struct full_path *x);
 
-/* The path that technique s makes of the sub-paths in c (s vertices of c->light, so many that the joint passes, the
- * others of c->camera), with everything cached. Casts the connecting rays. false: there is none, or it is black. */
+/* The path that technique s makes of the sub-paths in c, with everything cached: s vertices of c->light, `passed` that
+ * the joint passes, the others of c->camera. Casts the connecting rays. false: there is none, or it is black. */
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned passed, unsigned edges, struct full_path *x);
 
 /* Multiplies p by what the media along the path let through, if there are any. */

@@ -99,7 +99,7 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	const struct path_vertex *v = x->v;
 	fill_densities(c, x);
 	unsigned most = full_path_most_light(c, x);
-	double from_camera[FULL_PATH_MAX_VERTICES]; /* of v[s .. k] */
+	double from_camera[FULL_PATH_MAX_VERTICES]; /* of v[s .. k], from the camera's side */
 	from_camera[k] = 0;
 	for (unsigned s = k; s > 0; s--)
 		from_camera[s - 1] = from_camera[s] + log(v[s - 1].pdf);

@@ -45,7 +45,7 @@ double longer_paths(struct path_context *c, uint64_t seed, uint64_t index, uint3
 	struct sampler_random s;
 	c->roulette = 1;
 	c->one_way = true;
-	c->opaque = true; /* surfaces that a connection passes lengthen its path */
+	c->opaque = true; /* surfaces that a connection passes would make its path longer than was asked for */
 	sampler_random_init(&s, seed, RNG_BEYOND, index, 0);
 	unsigned n = path_walk_camera(c, &s.base, most, film);
 	spectrum sum = gather(c, first, n, before, least, longest, film);

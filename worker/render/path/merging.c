@@ -82,7 +82,7 @@ static bool is_passed(const struct path_context *c, const struct path_vertex *v)
 	return path_sees_through(c) && path_is_passed(v);
 }
 
-/* The density of passing v[first .. end - 1] over that of drawing them. */
+/* The density of a joint that passes v[first .. end - 1] over that of drawing them; 1 if there are none. */
 static double over_drawn(const struct path_vertex *v, unsigned first, unsigned end)
 {
 	double pdf[PATH_PASSED_MOST];
@@ -93,7 +93,7 @@ static double over_drawn(const struct path_vertex *v, unsigned first, unsigned e
 	return path_passed_ratio_in(v, first, end - 1, pdf);
 }
 
-/* Densities of techniques with fewer than s light vertices over that of s - 1, be there such a technique or not. */
+/* Fills in the sums of struct photon. The techniques by which densities are divided need not exist. */
 static void sum_fewer(const struct path_context *c, unsigned s, struct photon *out)
 {
 	const struct path_vertex *y = c->light;

@@ -24,10 +24,11 @@ struct photon {
 		double pdf;
 		bool delta;
 	} prev;
-	double fewer; /* densities of the techniques of fewer than s light vertices, their sum over that of s - 1, */
-	double path;  /* and of those of 0 and 1 alone, which `path` has */
-	double fewer_through, path_through; /* the same over that of s, of techniques that join z to a vertex before
-					       surfaces that they pass (transparent.h) */
+	/* Sums of the densities of techniques with fewer than s light vertices, over the density of technique s - 1:
+	 * fewer: of all of them; path: of those with at most one, which are all that `path` has. Techniques whose joint
+	 * passes all surfaces up to the photon (transparent.h) are summed apart, over the density of technique s. */
+	double fewer, path;
+	double fewer_through, path_through;
 };
 
 struct merging {

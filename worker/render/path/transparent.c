@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * path_see_through follows the ray from z to y from one surface to the next, as long as each has a straight lobe, and
- * ends where nothing else is in the way. What is opaque, or more than PATH_PASSED_MOST surfaces, blocks the view; no
- * such path is lost, since sub-paths that pass the surfaces one by one still find it.
+ * path_see_through follows the ray from z to y from one surface to the next, as long as each has a straight lobe. It
+ * ends when nothing is left between the last surface and y. An opaque surface blocks the view, and so do more than
+ * PATH_PASSED_MOST surfaces, which bounds the work: paths through more are left to sub-paths that pass the surfaces one
+ * by one.
  */
 #include "worker/render/path/transparent.h"
 
@@ -10,8 +11,9 @@
 #include "worker/render/path/path.h"
 #include "worker/render/path/visible.h"
 
-/* The share of light that goes straight through v, which a ray along d met. Zero: none, or a sub-path never chooses to;
- * otherwise v is left so. */
+/* The share of light that goes straight through v, which a ray along d met. If there is any, v is made a vertex that
+ * the path leaves straight on. Zero also if no sub-path goes straight on there: densities are divided by
+ * that of doing so. */
 static spectrum pass(const struct path_context *c, struct path_vertex *v, vec3 d)
 {
 	double chance;
@@ -25,7 +27,7 @@ static spectrum pass(const struct path_context *c, struct path_vertex *v, vec3 d
 	return spectrum_is_zero(share) || !(chance > 0) ? spectrum_of(0) : share;
 }
 
-/* Whether densities of v as reached from there along d are not degenerate. */
+/* False where densities of v, as reached from there along d, would be 0 or infinite. */
 static bool are_apart(const struct path_vertex *from, const struct path_vertex *v, vec3 d)
 {
 	double distance2;

@@ -87,7 +87,8 @@ struct path_context {
 	uint64_t *counters;   /* of enum batch_counter */
 	struct path_split *split; /* NULL: the film gets all */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
-	/* What the last connection passed (transparent.h), from the camera on; their pdf is known. */
+	/* The vertices that the last connection passed (transparent.h), the one nearest to the camera first. pdf: for a
+	 * sub-path from the camera that meets them one by one. */
 	unsigned passed_count;
 	struct path_vertex passed[PATH_PASSED_MOST];
 	/* The emission of media along edge e of the camera's sub-path, as it reaches the film, whether or not a vertex

@@ -8,7 +8,7 @@
  * behind its far one is not there. Counts a ray. */
 bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b);
 
-/* Where rays from there along d begin: what is before a camera's near plane is not there. */
+/* The distance at which a ray from there along d begins: 0, or a camera's near plane, before which nothing is seen. */
 double path_ray_begin(const struct world *w, const struct path_vertex *from, vec3 d);
 
 #endif

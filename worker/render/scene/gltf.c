@@ -181,8 +181,8 @@ static bool is_hidden(struct gltf *g, const struct gltf_at *node)
 	return json_is_false(json_object_get(gltf_extension(g, node, node->json, "KHR_node_visibility"), "visible"));
 }
 
-/* A scale of 0 in two directions or all, by which animations hide things: nothing of a surface is left. A skinned mesh
- * is where its joints are. */
+/* Whether a scale of 0 in two or three directions leaves a line or a point of its mesh: animations hide things so. Not
+ * of a skinned mesh, which is where its joints are. */
 static bool vanishes(const struct gltf_at *node, const mat4 *to_world)
 {
 	int flat = 0;

@@ -111,7 +111,8 @@ void gltf_put_texture(struct gltf *g, struct xml_element *el, const struct gltf_
 		gltf_plugin(g, el, &texture, "texture", foreign_format(&texture), name);
 		return;
 	}
-	if (found <= 0) { /* the exporter lost the image, or meant one of an extension that nobody knows */
+	/* The exporter lost the image, or it is of an unknown extension: refused, or left out with `lenient`. */
+	if (found <= 0) {
 		gltf_plugin(g, el, &texture, "texture", "unknown_format", name);
 		return;
 	}

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Tables say what stands in for the plug-ins that are known. Of others the element is looked at: a shape's file, a
- * sensor's name, a material's parameters, a texture's file. What nothing stands in for is left out, or refused.
+ * Tables say what stands in for plug-ins of other versions and branches that are known by name. For other names it is
+ * guessed from the element: a shape's file, a sensor's name, a material's parameters. What nothing stands in for is
+ * left out, or refused.
  */
 #include "worker/render/scene/lenient.h"
 
@@ -85,7 +86,7 @@ static const char *mesh_of(const struct xml_element *el)
 	return NULL;
 }
 
-/* The camera that a name says it is one of: "codedOrthographic", "thinlens_srf". */
+/* The camera whose name is part of this one, as in "codedOrthographic" and "thinlens_srf"; NULL: none. */
 static const char *camera_of(const char *type)
 {
 	static const char *const cameras[] = {"perspective", "thinlens", "orthographic", "telecentric", "spherical"};
@@ -134,7 +135,8 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 		*stand_in = camera_of(type);
 		return *stand_in ? LENIENT_REPLACE : way;
 	case PLUGIN_SHAPE:
-		if (plugin_is_mitsubas(cls, type) || !(mesh = mesh_of(el))) /* `ellipsoids` come from points */
+		/* Of Mitsuba's own, `ellipsoids` have a PLY file too, but of points. */
+		if (plugin_is_mitsubas(cls, type) || !(mesh = mesh_of(el)))
 			return way;
 		*stand_in = mesh;
 		return LENIENT_REPLACE;

@@ -24,8 +24,8 @@ enum lenient_way {
 /* For a plug-in that no table has. */
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in);
 
-/* For such an element: a light in a shape becomes an `area`, a shape with a mesh file what reads this, a sensor the one
- * that its name names, and a material one with parameters like its own. */
+/* The same for such an element, by what is inside it: a light in a shape becomes an `area`, a shape with the file of a
+ * mesh that mesh, a sensor the one whose name is part of its own, and a material one that has such parameters. */
 enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class cls, const char *type,
 				 const char **stand_in);
 

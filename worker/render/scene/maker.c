@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * maker_node makes one node for each object: its plug-in is found, then fill_node reads the contents, parameters by
- * read_property and objects, nested or referred to, by read_object. An element is made once; later references share
- * its node.
+ * maker_node finds the plug-in of an object by its type, makes the node, and has fill_node read what is inside:
+ * read_property reads parameters, read_object reads objects, nested or referred to, which calls maker_node in turn. An
+ * element is made once; later references share its node.
  *
  * Failures: a problem is reported and reading goes on. With `lenient`, what is not supported is left out or replaced,
  * with a note. References in a circle are an error, and depth and number of objects are bounded (nesting.h).
@@ -33,7 +33,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* A node being made. */
+/* A node while it is being made: its lists grow, which are constant afterwards. */
 struct draft {
 	struct scene_node *node;
 	const struct plugin_decl *decl;
@@ -270,7 +270,7 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	int r = element_check(el, "id|name", false, m->error);
 	if (!r)
 		r = id_table_find(&m->ids, el, "id", &target, m->error);
-	if (!r && strcmp(target->name, "subsurface") == 0) /* of which is told where it stands */
+	if (!r && strcmp(target->name, "subsurface") == 0) /* which is reported where it stands */
 		return REPORT_TOLD;
 	return r ? r : read_object(m, d, owner, el, target);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One scene being read: what all objects of the file share, and the node of one object with all that is inside it. A
- * problem is reported with file and line, and an object with problems inside still becomes a node (report.h). -ENOMEM
- * ends the reading. One thread.
+ * The state of reading one scene, which all its objects share, and the making of nodes: that of an object, with all
+ * that is inside it. A problem is reported with file and line, and an object with problems inside still becomes a node
+ * (report.h), so that one run finds all of them. -ENOMEM ends the reading. One thread.
  */
 #ifndef WORKER_RENDER_SCENE_MAKER_H
 #define WORKER_RENDER_SCENE_MAKER_H
@@ -17,7 +17,7 @@ struct scene;
 
 /* All pointers lead into the arena, which is the scene's. */
 struct maker {
-	struct scene *scene; /* what scene.c makes of it all */
+	struct scene *scene; /* the result, filled in by scene.c */
 	struct arena *arena;
 	const char *name; /* of the scene file */
 	const struct asset_source *assets_from;
@@ -28,18 +28,19 @@ struct maker {
 	struct report report;
 	struct notes notes;
 	struct asset_list assets;
-	uint64_t objects; /* with all references followed */
+	uint64_t objects; /* made so far, counted once for each reference: bounded by nesting.h */
 	int depth;
 	bool lenient;
 };
 
-int maker_out_of_memory(struct maker *m);
+int maker_out_of_memory(struct maker *m); /* -ENOMEM, with its text */
 void *maker_allocate(struct maker *m, size_t count, size_t size);
+/* by: the element that names the file; NULL: an included file. */
 int maker_add_asset(struct maker *m, const char *name, const struct xml_element *by);
 
-/* The node of an element, made once: references share it. */
+/* The node of an element that is an object. It is made at the first call; references to the element share it. */
 int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
-/* An element that means nothing here: a problem, or with `lenient` a note. */
+/* Refuses an element that means nothing where it stands; with `lenient`, leaves it out with a note. */
 int maker_foreign(struct maker *m, const struct xml_element *el);
 
 #endif

@@ -25,8 +25,9 @@ int note_difference(const struct notes *t, const struct xml_element *owner, cons
 		    const char *name);
 int note_foreign_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 			   const char *name);
-/* One of 3.x in a file of 0.6. A name of 0.6 in a file of 3.x. */
+/* A parameter that only 3.x has, in a file of 0.6. */
 int note_newer(const struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name);
+/* A name of 0.6 in a file of 3.x. */
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);
 int note_guide(const struct notes *t, const struct xml_element *el); /* plugin_is_guide */

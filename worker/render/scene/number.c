@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A number is found by hand, so that its end is known, and converted by strtod in the C locale. Lists are read number
- * by number, with what may stand between two of them.
+ * The end of a number is found first, by hand: strtod would accept more, and where it stops depends on the locale. Then
+ * strtod converts it in the C locale. Lists are read number by number, each with the separators behind it.
  *
  * Failures: NULL, false or -1, as the header says; errors are worded by callers.
  */
@@ -175,7 +175,7 @@ bool number_parse_int(const char *text, int64_t *out)
 	return rest && *skip_blanks(rest) == 0;
 }
 
-/* Behind blanks and separators, of which Mitsuba takes any number for one. */
+/* The place behind blanks and separators. Mitsuba takes any number of them for one. */
 static const char *skip_separators(const char *p, const char *separators)
 {
 	while (number_is_blank(*p) || (*p && strchr(separators, *p)))

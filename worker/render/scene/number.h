@@ -26,7 +26,7 @@ bool number_parse_int(const char *text, int64_t *out);
  * than max. */
 int number_list(const char *text, double *out, size_t max);
 
-/* The same for weights of 0.6: separated by any of " ,;", one or more. */
+/* The same for weights of mixtures, which Mitsuba 0.6 also separates by ";". */
 int number_weights(const char *text, double *out, size_t max);
 
 /* The rest of a line from p on, without the blanks around it. */

@@ -96,7 +96,7 @@ static int replace_distribution(const struct notes *t, const struct xml_element 
 		el->file, el->line, owner->name, xml_attribute(owner, "type"), given);
 }
 
-/* Of those that a table lists. Mitsuba 0.6 does not care for the case of most. */
+/* For words of which a table lists the choices: Mitsuba 0.6 ignores the case of most of them. */
 static int to_lower(struct value *v, struct arena *arena)
 {
 	char *word = arena_strdup(arena, v->as.string);

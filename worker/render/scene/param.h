@@ -24,9 +24,10 @@ enum value_type {
 /* The same in space: a number, rgb, a spectrum, a volume. */
 #define VALUE_IN_SPACE (1 << 10)
 #define VALUE_VOLUME (VALUE_TEXTURE | VALUE_IN_SPACE)
-/* With other types. Of 3.x alone: in scenes of 0.5/0.6 it is ignored with a note, as in Mitsuba 0.6, whose plug-in does
- * not have it. And numbers outside of the range count as its nearest end, with a note. */
+/* The next two are combined with types. Only the plug-in of 3.x has the parameter: in scenes of 0.5/0.6 it is ignored
+ * with a note, as in Mitsuba 0.6. */
 #define VALUE_OF_3 (1 << 11)
+/* Numbers outside of the range are not refused: each counts as the nearer end of the range, with a note. */
 #define VALUE_CLIPPED (1 << 12)
 /* A transform that may be an <animation>. */
 #define VALUE_MOTION (1 << 9)

@@ -126,7 +126,7 @@ static int on_emitter(struct report *r, const struct scene_node *n, bool dialect
 			      "normalize the transformed directions");
 	const struct property *texture = strcmp(n->type, "spot") == 0 ? node_find(n, "texture") : NULL;
 	if (!dialect_3 && texture && texture->value.type != VALUE_NODE)
-		return remark(r, n, e, "one value as `texture` has no effect, as in Mitsuba 0.6");
+		return remark(r, n, e, "`texture` has no effect unless it is a texture, as in Mitsuba 0.6");
 	bool sun = strcmp(n->type, "sun") == 0;
 	if (!dialect_3 && (sun || strcmp(n->type, "sky") == 0) &&
 	    (node_find(n, "sun_scale") || node_find(n, "sky_scale")))

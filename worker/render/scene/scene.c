@@ -2,8 +2,8 @@
 /*
  * Turns the tree of XML elements (or glTF read as such) into a tree of typed nodes, by the tables of the plug-ins.
  *
- * Happy path: read_all parses the file, make_scene lists all ids and walks the top level, where maker.c makes a node of
- * each object. List_assets collects the names of all files.
+ * Happy path: read_all parses the file. make_scene lists all ids and walks the top level, and maker.c makes a node of
+ * each object there with all that is inside it. list_assets collects the names of all files.
  *
  * Failures: a problem is reported with file and line and reading goes on, so that one run lists all problems
  * (report.h). scene_read fails with the first problem, scene_read_all returns the list. -ENOMEM ends the reading.

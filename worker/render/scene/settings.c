@@ -221,7 +221,7 @@ static int read_crop(const struct scene_node *film, struct scene_settings *out, 
 	return 0;
 }
 
-/* 0.6's for experiments: of one pixel with a box filter, unless it says otherwise. */
+/* Mitsuba 0.6's film for experiments: unless it says otherwise, it has one pixel and a box filter. */
 static bool is_mfilm(const struct scene_node *film)
 {
 	return film && strcmp(film->type, "mfilm") == 0;

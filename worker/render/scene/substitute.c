@@ -23,7 +23,7 @@ int substitute_plugin(const struct notes *t, const struct plugin_decl *decls, st
 			: note(t, el, *type, "",
 			       "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)",
 			       el->file, el->line, el->name, *type,
-			       !*inner		    ? "a standard "
+			       !*inner		    ? "the plug-in "
 			       : cls == PLUGIN_BSDF ? "the BSDF inside"
 						    : "the texture inside",
 			       *inner ? "" : other);

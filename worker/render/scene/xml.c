@@ -236,7 +236,7 @@ static int read_default(struct reader *r, const struct xml_element *el)
 	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
 }
 
-/* Adds a folder in which files named after it are searched, after the scene's own. */
+/* Adds a folder. Files that are named after this element are searched there, before the scene's own folder. */
 static int read_path(struct reader *r, const struct xml_element *el)
 {
 	const char *value = xml_attribute(el, "value");
@@ -248,7 +248,7 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	return 0;
 }
 
-/* Once for all of the file: there are often hundreds. */
+/* Once for the whole scene, which often has hundreds of such paths. */
 static int note_end(struct reader *r, const char *written, const char *name)
 {
 	if (!name || r->by_end || r->tree->note_count == XML_NOTES_MAX)
@@ -259,8 +259,8 @@ static int note_end(struct reader *r, const char *written, const char *name)
 		return out_of_memory(r);
 	snprintf(
 		text, TEXT,
-		"paths of files that are not on this machine are looked for by their ends in the scene's folder: %.160s "
-		"for %.160s",
+		"paths of files that are not on this machine are looked for by their ends in the scene's folder and those of "
+		"--path: for example, %.160s is used for %.160s",
 		asset_name_shown(name, shown, sizeof shown), written);
 	r->tree->notes[r->tree->note_count++] = text;
 	r->by_end = true;
@@ -403,7 +403,7 @@ static void on_start(void *user, const char *name, const char **attributes)
 		stop(r, c);
 }
 
-/* A letter too many, most often. Once: Mitsuba says nothing. */
+/* Most often a letter too many. Mitsuba says nothing, so one note for the whole scene is enough. */
 static int note_text(struct reader *r, const struct xml_element *el)
 {
 	if (!el->text || el->ignored || r->worded || r->tree->note_count == XML_NOTES_MAX)

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Looks for a file where Mitsuba does: around the files that include the one which names it, in the scene's folder, and
- * in those of <path>. Files are opened to see whether they are there, and closed again.
+ * Looks for a file where Mitsuba does: in the folders of the file that names it and of those that include this one, in
+ * those of <path>, in the scene's folder. At last, only here, it is looked for by the end of its path. Files are opened
+ * to see whether they are there, and closed again.
  *
  * Failure: -ENOMEM only. A file that is nowhere is reported by whoever opens it.
  */
@@ -76,8 +77,8 @@ static int look_around(const struct xml_files *f, const char *written, const cha
 	return 0;
 }
 
-/* In those of <path>, the last one first, as in Mitsuba 3. A file in one that may not be read becomes the *name, whose
- * opener says what would allow it. */
+/* In those of <path>, the last one first, as in Mitsuba 3. If the file is nowhere else, and one of these folders may
+ * not be read, *name is what the file would be called there: whoever opens it says which --path would allow that. */
 static int look_along_paths(const struct xml_files *f, const char *written, const char **name, bool *found)
 {
 	const char *outside = NULL;

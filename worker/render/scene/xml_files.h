@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the files are called that a scene file names: their canonical names (asset_name.h), once it is known which of
- * the scene's folders has them. Names are put into the arena. Pure but for the files that are opened; any thread.
+ * Finds the files that a scene file names: in which of its folders each is, and so its canonical name (asset_name.h).
+ * Names are put into the arena. Pure but for the files that are opened; any thread.
  */
 #ifndef WORKER_RENDER_SCENE_XML_FILES_H
 #define WORKER_RENDER_SCENE_XML_FILES_H
@@ -20,12 +20,14 @@ struct xml_files {
 	const struct xml_element *hook; /* the <include> by which it is read; NULL: it is the scene */
 	const char *const *paths;	/* values of <path> */
 	uint32_t path_count;
-	const char *by_end; /* result: the name of the file, where only the end of the path of another one led to it */
+	/* Result: the name of the file if it was found by the end of its path alone; otherwise NULL. */
+	const char *by_end;
 };
 
-/* A name that no folder has is kept, and reported by whoever opens it. One written on Windows is tried with '/' for
- * '\\'. The path of a file that is not on this machine is looked for by its end: "/home/me/a/b.obj" as
- * "home/me/a/b.obj", "me/a/b.obj" and so on. nested: files around the one that names it have a say. */
+/* Replaces *name by the file's canonical name; 0 or -ENOMEM. A file that is in no folder is reported by whoever opens
+ * it. A name that was written on Windows is tried with '/' for '\\'. The absolute path of a file that is not on this
+ * machine is looked for by its end: "/home/me/a/b.obj" as "home/me/a/b.obj", "me/a/b.obj" and so on. nested: the
+ * folders of the file that names it, and of those that include it, are searched, too. */
 int xml_files_find(struct xml_files *f, const char **name, bool nested);
 
 #endif

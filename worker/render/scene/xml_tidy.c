@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * One pass over the text copies it, and on the way empties comments, which may then have "--" in them, writes "&amp;"
- * for an "&" that begins no entity, and leaves out a declaration <?xml ...?> that comments or blanks precede. Its
- * encoding is lost there; without one it is UTF-8. What is in <![CDATA[...]]> and <?...?> stays as it is.
+ * One pass copies the text. It blanks out comments, since "--" may stand in them, writes "&amp;" for an "&" that begins
+ * no entity, and blanks out a declaration <?xml ...?> that does not stand at the beginning. The encoding that such a
+ * declaration states is lost: the file is taken for UTF-8. What is in <![CDATA[...]]> and <?...?> stays as it is.
  *
  * Failures: NULL when out of memory. A comment without an end is copied, for expat to complain of.
  */
@@ -20,8 +20,8 @@ enum { LONGER = sizeof amp - 2 };
 struct pass {
 	const char *at, *end;
 	char *out;
-	bool begun; /* with anything but comments and blanks */
-	/* By kind of markup: no end of one is left, which is found out once. */
+	bool begun; /* something other than comments and blanks has been copied */
+	/* By kind of markup: its closing is not in the rest of the text, which is searched for it only once. */
 	bool endless[4];
 };
 
@@ -37,7 +37,7 @@ static bool starts(const struct pass *p, const char *with)
 	return (size_t)(p->end - p->at) >= n && memcmp(p->at, with, n) == 0;
 }
 
-/* Behind the markup of this kind that begins here; NULL: none does, or it has no end. */
+/* The place behind the markup of this kind that begins here; NULL: none does, or it has no end. */
 static const char *behind(struct pass *p, enum kind kind)
 {
 	const char *closing = markup[kind].closing;
@@ -100,7 +100,8 @@ char *xml_tidy(const void *text, size_t *size)
 	if (!bytes)
 		return NULL;
 	p.out = bytes;
-	/* At its proper place the declaration may state an encoding. UTF-16 has a zero in every other byte. */
+	/* At its proper place the declaration stays: it may state an encoding. UTF-16 has a zero in every other byte,
+	 * and is copied as it is. */
 	bool wide = *size > 1 && (!p.at[0] || !p.at[1] || (unsigned char)p.at[0] >= 0xfe);
 	p.begun = starts(&p, "<?xml") || starts(&p, "\xef\xbb\xbf");
 	while (p.at < p.end && !wide)

@@ -286,7 +286,7 @@ static int find_coincidence(struct builder *b)
 	return s ? coincident_find(b->w, b->shape_nodes, s, b->e) : build_out_of_memory(b->e);
 }
 
-/* In the world's lengths, and a little larger than its shapes: they were rounded to floats. */
+/* Makes w->passed, in the world's lengths. It is a little larger than the shapes, which were rounded to floats. */
 static void bound_passed(struct builder *b)
 {
 	struct world *w = b->w;

@@ -431,7 +431,8 @@ static void emitter_moves(struct report *r, const struct census *c)
 							      : "nothing shines");
 }
 
-/* Where media scatter, edges pass faces of `null` anyway, and connections end at all other surfaces. */
+/* Where media scatter it cannot be forced: edges cross the faces of `null` anyway, and connections end at all other
+ * surfaces. */
 static void transparent_shadows(struct report *r, const struct census *c)
 {
 	static const struct effects_choice nothing;

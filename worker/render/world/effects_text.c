@@ -52,9 +52,9 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_MEDIUM_LIGHT] = {"medium-light", OFF | EFFECT_OF_THE_SCENE,
 				 "collecting light along edges; chains on half vectors can be chosen",
 				 "what media emit is part of the scene"},
-	[EFFECT_TRANSPARENT_SHADOWS] = {"transparent-shadows", ON | OFF,
-					"a second ray where a connection is blocked; none looks through a surface",
-					NULL},
+	[EFFECT_TRANSPARENT_SHADOWS] =
+		{"transparent-shadows", ON | OFF,
+		 "the second ray of blocked connections; chance alone finds light behind such surfaces", NULL},
 	[EFFECT_DEPTH] = {"depth", ON, "trying longer paths", "--max-depth shortens paths"},
 };
 

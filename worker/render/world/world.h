@@ -47,7 +47,7 @@ struct world {
 	uint32_t media_count, camera_medium; /* the latter a number as those of shapes */
 	struct medium *media;
 	bool has_passable;		     /* some shape is */
-	struct box passed;		     /* around all that connections may look through; may be empty */
+	struct box passed;		     /* around all surfaces that connections may look through; may be empty */
 	uint32_t *emitter_medium;	     /* around emitters whose shapes state none; only where media scatter */
 	uint32_t *emitter_shape;	     /* that it belongs to; UINT32_MAX: none */
 	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */

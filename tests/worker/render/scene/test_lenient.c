@@ -337,7 +337,7 @@ static void test_lights_in_shapes(void **state)
 	assert_true(node_find(light, "radiance")->value.as.rgb[0] == 3);
 	assert_true(scene_has_note(
 		&s,
-		"s.xml:4: <emitter type=\"angulararea\"> is not supported; a standard area stands in for it (lenient)"));
+		"s.xml:4: <emitter type=\"angulararea\"> is not supported; the plug-in area stands in for it (lenient)"));
 	scene_fini(&s);
 }
 
