@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator of a few lines for one worker, whose loop it runs: both are in this thread, so nothing happens at once
- * by chance. Its jobs 1 to 4 have a scene file of their own, which is no scene, and a mesh that all have. What it does
- * not hear as expected fails the test.
+ * A coordinator of a few lines for one worker. Both are in this thread, and the coordinator runs the worker's loop, so
+ * the order of messages does not depend on chance. Jobs 1 to 4 have a scene file each, which holds no scene, so that
+ * leases fail as soon as all files are there; and they share the file of a mesh. A message that is not the expected one
+ * fails the test.
  */
 #ifndef TESTS_SUPPORT_SCRIPTED_COORDINATOR_H
 #define TESTS_SUPPORT_SCRIPTED_COORDINATOR_H
@@ -25,34 +26,35 @@ struct coord_test {
 	struct scripted *at; /* the connection, from the coordinator's side */
 	struct coord_file mesh, scenes[4];
 	unsigned char mesh_bytes[MESH];
-	bool own; /* what the last failure said */
+	bool own; /* of the last LeaseFailed */
 };
 extern struct coord_test coord;
 
 void coord_make_file(struct coord_file *f, const void *bytes, size_t size);
 
-/* The worker, whose cache is in `folder` (folder.h), and the end of both. */
+/* Starts both; the worker's cache is in `folder` (folder.h). */
 void coord_start(uint64_t cache_bytes);
 void coord_finish(void);
-void coord_welcome(void); /* a connection of the worker */
+void coord_welcome(void); /* accepts a connection of the worker */
 void coord_hang_up(void);
 
 const Farm__Envelope *coord_hear(void); /* NULL: it hung up */
 void coord_hear_job_get(uint64_t job);
 void coord_hear_blob_get(const struct coord_file *f, uint64_t offset);
-uint64_t coord_hear_failed(const char *why); /* the job */
-void coord_hear_built(int count);	     /* leases of so many jobs fail with their scenes, which are none */
-void coord_hear_silence(void);		     /* it says nothing more: the answer to something else comes next */
+uint64_t coord_hear_failed(const char *why); /* with `why` in its text; returns the job */
+void coord_hear_built(int count); /* so many jobs had all files: their leases fail, as their scenes cannot be read */
+void coord_hear_silence(void);	  /* nothing is on its way: the answer to another message comes first */
 
 void coord_say_grant(uint64_t job);
-void coord_grant(uint64_t job); /* of a job that the worker asks for */
+void coord_grant(uint64_t job); /* of a job that the worker does not know: it must ask for it */
 void coord_say_revoke(uint64_t job);
 void coord_describe(uint64_t job);
 void coord_end_job(uint64_t job);
 void coord_send_piece(struct coord_file *f, uint64_t offset);
-/* Each piece is asked for once, from the given one on. */
+/* Sends pieces from .. to - 1 of the mesh, each after the worker has asked for it. */
 void coord_serve_mesh(int from, int to);
-/* Jobs 1 to count, with their own files; whoever asked first has asked for the mesh. */
+/* Grants a lease of each of jobs 1 to count, and sends their scene files. The worker then asks for the mesh, once for
+ * all. */
 void coord_begin_jobs(uint64_t count);
 
 #endif
