@@ -373,9 +373,10 @@ static spectrum seen(struct path_context *c, const struct path_vertex *y, unsign
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	spectrum left;
-	if (!spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
+	const bool through = path_sees_through(c), too_short = through && s + t <= c->min_depth;
+	if (!too_short && !spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
 		return direct;
-	if (!path_sees_through(c) || spectrum_is_zero(l))
+	if (!through || spectrum_is_zero(l))
 		return spectrum_of(0);
 	bool open = path_see_through(c, t > 1 ? z - 1 : NULL, z, y, &left);
 	unsigned edges = s + t - 1 + c->passed_count;

@@ -298,6 +298,44 @@ static void test_passed(void **state)
 	check("panes", w, 3000);
 }
 
+/* What is passed counts as edges: no path is shorter or longer than asked for, and some are as long only thereby. */
+static void test_passed_lengths(void **state)
+{
+	(void)state;
+	enum { LEAST = 4, MOST = 6 };
+	static struct path_context c;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	unsigned joined = 0, lengthened = 0;
+	struct world *w = world_of_text(
+		32, 32, "%s",
+		ROOM LAMP BALL("<bsdf type='diffuse'/>") "<shape type='rectangle'>" AT(
+			"<rotate x='1' angle='80'/><translate y='.5'/>") "<bsdf type='thindielectric'/></shape>"
+									 "<shape type='rectangle'>" AT(
+										 "<rotate x='1' angle='70'/><translate y='1'/>") "<bsdf type='thindielectric'/></shape>");
+	c = (struct path_context){
+		.w = w, .window = {0, 0, 32, 32}, .min_depth = LEAST, .max_depth = MOST, .counters = counters};
+	for (uint64_t i = 0; i < 2000; i++) {
+		struct sampler_random s;
+		double film[2];
+		sampler_random_init(&s, 0x6c656e677468, RNG_TEST, i, 0);
+		unsigned camera = path_walk_camera(&c, &s.base, MOST + 1, film),
+			 light = path_walk_light(&c, &s.base, MOST);
+		for (unsigned t = 1; t <= camera; t++)
+			for (unsigned k = t > 1 ? 0 : 2; k <= (light > 1 ? light : 1); k++) {
+				if (!path_may_connect(&c, k, t) ||
+				    spectrum_is_zero(path_connect(&c, k, t, PATH_MAX_EDGES, film)))
+					continue;
+				unsigned edges = k + t - 1 + c.passed_count;
+				assert_in_range(edges, LEAST, MOST);
+				joined++;
+				lengthened += k + t - 1 < LEAST;
+			}
+	}
+	print_message("%u paths, %u of them long enough by what is passed\n", joined, lengthened);
+	assert_true(joined > 1000 && lengthened > 100);
+	world_free(w);
+}
+
 /* A wall before the near plane, another behind the far one, and the sky: all that a camera path finds between the
  * planes is visible. */
 static void test_clipped(void **state)
@@ -347,9 +385,11 @@ static void test_sides(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces),    cmocka_unit_test(test_media), cmocka_unit_test(test_round_lamp),
-		cmocka_unit_test(test_environment), cmocka_unit_test(test_ends),  cmocka_unit_test(test_clipped),
-		cmocka_unit_test(test_passed),	    cmocka_unit_test(test_sides),
+		cmocka_unit_test(test_surfaces),   cmocka_unit_test(test_media),
+		cmocka_unit_test(test_round_lamp), cmocka_unit_test(test_environment),
+		cmocka_unit_test(test_ends),	   cmocka_unit_test(test_clipped),
+		cmocka_unit_test(test_passed),	   cmocka_unit_test(test_passed_lengths),
+		cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
