@@ -306,12 +306,19 @@ static void test_passed_lengths(void **state)
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	unsigned joined = 0, lengthened = 0;
-	struct world *w = world_of_text(
-		32, 32, "%s",
-		ROOM LAMP BALL("<bsdf type='diffuse'/>") "<shape type='rectangle'>" AT(
-			"<rotate x='1' angle='80'/><translate y='.5'/>") "<bsdf type='thindielectric'/></shape>"
-									 "<shape type='rectangle'>" AT(
-										 "<rotate x='1' angle='70'/><translate y='1'/>") "<bsdf type='thindielectric'/></shape>");
+	/* clang-format off */
+	struct world *w = world_of_text(32, 32, "%s",
+		ROOM LAMP
+		BALL("<bsdf type='diffuse'/>")
+		"<shape type='rectangle'>"
+			AT("<rotate x='1' angle='80'/><translate y='.5'/>")
+			"<bsdf type='thindielectric'/>"
+		"</shape>"
+		"<shape type='rectangle'>"
+			AT("<rotate x='1' angle='70'/><translate y='1'/>")
+			"<bsdf type='thindielectric'/>"
+		"</shape>");
+	/* clang-format on */
 	c = (struct path_context){
 		.w = w, .window = {0, 0, 32, 32}, .min_depth = LEAST, .max_depth = MOST, .counters = counters};
 	for (uint64_t i = 0; i < 2000; i++) {
