@@ -52,14 +52,6 @@ struct assembly {
 	struct sums sums;
 };
 
-static const struct exr_attribute *attribute(const struct exr_image *img, const char *name)
-{
-	for (size_t i = 0; i < img->attribute_count; i++)
-		if (strcmp(img->attributes[i].name, name) == 0)
-			return &img->attributes[i];
-	return NULL;
-}
-
 static bool equal(const struct exr_attribute *a, const struct exr_attribute *b)
 {
 	if (!a || !b || a->type != b->type)
@@ -71,13 +63,13 @@ static bool equal(const struct exr_attribute *a, const struct exr_attribute *b)
 
 static const char *string_of(const struct exr_image *img, const char *name)
 {
-	const struct exr_attribute *a = attribute(img, name);
+	const struct exr_attribute *a = exr_attribute_find(img, name);
 	return a && a->type == EXR_ATTRIBUTE_STRING ? a->string : "";
 }
 
 static double number_of(const struct exr_image *img, const char *name)
 {
-	const struct exr_attribute *a = attribute(img, name);
+	const struct exr_attribute *a = exr_attribute_find(img, name);
 	return a && a->type == EXR_ATTRIBUTE_DOUBLE ? a->number : NAN;
 }
 
@@ -105,7 +97,7 @@ static int check_render(const struct exr_image *first, const struct exr_image *i
 	if (!layers)
 		return error_set(e, EINVAL, "it has other layers than the first crop");
 	for (size_t i = 0; i < ALIKE; i++)
-		if (!equal(attribute(first, alike[i]), attribute(img, alike[i])))
+		if (!equal(exr_attribute_find(first, alike[i]), exr_attribute_find(img, alike[i])))
 			return error_set(e, EINVAL, "it is not of the same render as the first crop: %s differs",
 					 alike[i]);
 	for (size_t i = 0; i < sizeof options_alike / sizeof *options_alike; i++)
@@ -186,11 +178,11 @@ static void add_header(struct assembly *a, const struct exr_image *img)
 	s->pixels += pixels;
 	s->cpu += number_of(img, "hslt:cpuSeconds");
 	s->wall = fmax(s->wall, number_of(img, "hslt:wallSeconds"));
-	const struct exr_attribute *mixed = attribute(img, "hslt:mixed");
+	const struct exr_attribute *mixed = exr_attribute_find(img, "hslt:mixed");
 	s->mixed |= mixed && mixed->type == EXR_ATTRIBUTE_INT && mixed->integer;
 	add_convergence(s, img);
 	for (size_t i = 0; i < a->first.attribute_count; i++)
-		a->kept[i] &= equal(&a->first.attributes[i], attribute(img, a->first.attributes[i].name));
+		a->kept[i] &= equal(&a->first.attributes[i], exr_attribute_find(img, a->first.attributes[i].name));
 }
 
 static int add_crop(struct assembly *a, const char *path, struct error *e)

@@ -52,14 +52,6 @@ static bool same_plane(const struct exr_image *a, const struct exr_image *b, uin
 		      pixels);
 }
 
-static const struct exr_attribute *find(const struct exr_image *img, const char *name)
-{
-	for (size_t i = 0; i < img->attribute_count; i++)
-		if (strcmp(img->attributes[i].name, name) == 0)
-			return &img->attributes[i];
-	return NULL;
-}
-
 static bool same_attribute(const struct exr_attribute *a, const struct exr_attribute *b, const struct answer *to)
 {
 	if (a->type != b->type)
@@ -77,7 +69,7 @@ static bool same_header(const struct exr_image *a, const struct exr_image *b, co
 {
 	for (size_t i = 0; i < a->attribute_count; i++) {
 		const char *name = a->attributes[i].name;
-		const struct exr_attribute *other = find(b, name);
+		const struct exr_attribute *other = exr_attribute_find(b, name);
 		if (header_excluded(name))
 			continue;
 		if (!other)
@@ -86,7 +78,7 @@ static bool same_header(const struct exr_image *a, const struct exr_image *b, co
 			return false;
 	}
 	for (size_t i = 0; i < b->attribute_count; i++)
-		if (!header_excluded(b->attributes[i].name) && !find(a, b->attributes[i].name))
+		if (!header_excluded(b->attributes[i].name) && !exr_attribute_find(a, b->attributes[i].name))
 			return differ(to, "only the second has %s", b->attributes[i].name);
 	return true;
 }
