@@ -20,11 +20,10 @@
 #include <math.h>
 #include <string.h>
 
-static void add_tally(struct tally *to, const struct tally *from, uint32_t groups, bool all)
+/* Of the bootstrap, whose samples are in no film: what b is made of, and what was refused. */
+static void add_bootstrap(struct tally *to, const struct tally *from, uint32_t groups)
 {
 	for (uint32_t g = 0; g < groups; g++) {
-		if (all)
-			to->group[g].samples += from->group[g].samples;
 		to->group[g].independent += from->group[g].independent;
 		exact_sum_merge(&to->group[g].sum, &from->group[g].sum);
 		exact_sum_merge(&to->group[g].beyond, &from->group[g].beyond);
@@ -32,7 +31,7 @@ static void add_tally(struct tally *to, const struct tally *from, uint32_t group
 	struct canvas_counts refused = {{0}, {{0}}};
 	for (int i = COUNT_NAN; i <= COUNT_NEGATIVE; i++)
 		refused.counters[i] = from->counts.counters[i];
-	canvas_counts_add(&to->counts, all ? &from->counts : &refused);
+	canvas_counts_add(&to->counts, &refused);
 }
 
 static double ratio(double a, double b)
@@ -177,10 +176,10 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 		mem_free(m.all);
 		return error_set(e, ENOMEM, "no memory for an image of %ux%u", p->crop_width, p->crop_height);
 	}
-	add_tally(m.all, &c->bootstrap, p->groups, false);
-	add_tally(m.all, &c->prefix, p->groups, true);
+	add_bootstrap(m.all, &c->bootstrap, p->groups);
+	tally_merge(m.all, &c->prefix, p->groups);
 	for (uint32_t i = 0; open_rounds && i < OPEN_ROUNDS; i++)
-		add_tally(m.all, &c->open[i], p->groups, true);
+		tally_merge(m.all, &c->open[i], p->groups);
 	find_b(&m);
 	find_factors(&m);
 	img->counts = m.all->counts;
