@@ -11,7 +11,6 @@
 #include "worker/render/geom/accel.h"
 
 #include "common/base/mem.h"
-#include "common/base/liveness.h"
 #include "worker/render/geom/instances.h"
 #include "worker/render/math/fptrap.h"
 
@@ -45,14 +44,6 @@ static bool memory_monitor(void *user, ssize_t bytes, bool post)
 	size_t now = atomic_fetch_add(&a->bytes, (size_t)bytes) + (size_t)bytes;
 	if (now > atomic_load(&a->peak))
 		atomic_store(&a->peak, now); /* one thread builds */
-	return true;
-}
-
-/* Called once per thousand primitives or so, on a thread of Embree's choice. */
-static bool progress_monitor(void *counter, double done)
-{
-	(void)done;
-	tick_on(counter);
 	return true;
 }
 
@@ -99,27 +90,30 @@ static void filter_closest(const struct RTCFilterFunctionNArguments *args)
 	filter_triangle(args);
 }
 
-static void attach(struct accel *a, RTCGeometry g, uint32_t id)
-{
-	rtcSetGeometryMask(g, 0xFFFFFFFFu);
-	rtcCommitGeometry(g);
-	rtcAttachGeometryByID(a->scene, g, id);
-	rtcReleaseGeometry(g);
-}
-
 static int attach_triangles(struct accel *a, struct accel_shape *s, uint32_t id)
 {
-	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+	RTCGeometry g = embree_triangles(a->device, s);
 	if (!g)
 		return -ENOMEM;
-	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0,
-				   sizeof s->position[0], s->vertex_count);
-	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
-				   s->triangle_count);
 	rtcSetGeometryUserData(g, s);
 	rtcSetGeometryIntersectFilterFunction(g, filter_closest);
 	rtcSetGeometryOccludedFilterFunction(g, filter_triangle);
-	attach(a, g, id);
+	embree_attach(a->scene, g, id);
+	return 0;
+}
+
+/* Primitives of our own. */
+static int attach_own(struct accel *a, uint32_t id, uint32_t count, void *data, const struct embree_ops *ops)
+{
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
+	if (!g)
+		return -ENOMEM;
+	rtcSetGeometryUserPrimitiveCount(g, count);
+	rtcSetGeometryUserData(g, data);
+	rtcSetGeometryBoundsFunction(g, ops->bounds, NULL);
+	rtcSetGeometryIntersectFunction(g, ops->intersect);
+	rtcSetGeometryOccludedFunction(g, ops->occluded);
+	embree_attach(a->scene, g, id);
 	return 0;
 }
 
@@ -127,23 +121,13 @@ static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t 
 {
 	struct sphere_prim *prim = &a->spheres[a->sphere_count++];
 	*prim = (struct sphere_prim){s->center, s->radius, s->place, id};
-	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
-	if (!g)
-		return -ENOMEM;
-	solved_sphere(g, prim);
-	attach(a, g, id);
-	return 0;
+	return attach_own(a, id, 1, prim, &solved_sphere);
 }
 
 static int attach_curves(struct accel *a, const struct accel_shape *s, uint32_t id)
 {
 	a->curves[id] = (struct curve_prims){s->curves, s->culled, id, a->off, a->off_far};
-	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
-	if (!g)
-		return -ENOMEM;
-	solved_curves(g, &a->curves[id]);
-	attach(a, g, id);
-	return 0;
+	return attach_own(a, id, s->curves->count, &a->curves[id], &solved_curves);
 }
 
 /* The shape's triangles with an extent of at least `least`, as a user geometry with a number after those of the
@@ -168,12 +152,7 @@ static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, doubl
 		if (!pass && !(w->prim = mem_alloc(w->count, sizeof *w->prim)))
 			return -ENOMEM;
 	}
-	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
-	if (!g)
-		return -ENOMEM;
-	solved_triangles(g, w);
-	attach(a, g, shape_count + id);
-	return 0;
+	return attach_own(a, shape_count + id, w->count, w, &solved_triangles);
 }
 
 /* The same instruction set on all machines that have it, so that mixed farms agree on bits. */
@@ -298,12 +277,7 @@ static int attach_instances(struct accel *a, uint32_t count)
 		return rc;
 	s->off = a->off;
 	s->off_far = a->off_far;
-	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
-	if (!g)
-		return -ENOMEM;
-	instances_geometry(g, s);
-	attach(a, g, 2 * count);
-	return 0;
+	return attach_own(a, 2 * count, s->count, s, &instances_ops);
 }
 
 static int build(struct accel *a, const struct accel_shape *shapes, uint32_t count, struct error *e)
@@ -312,11 +286,9 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	if (!a->device)
 		return error_set(e, EIO, "Embree's device cannot be created");
 	rtcSetDeviceMemoryMonitorFunction(a->device, memory_monitor, a);
-	a->scene = rtcNewScene(a->device);
+	a->scene = embree_scene(a->device);
 	if (!a->scene)
 		return error_set(e, ENOMEM, "Embree's scene cannot be created");
-	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
-	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
 	find_detail(a, shapes, count);
 	for (uint32_t i = 0; i < count; i++)
 		a->shapes[i] = shapes[i];
@@ -328,15 +300,11 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	int rc = attach_instances(a, count);
 	if (rc)
 		return error_set(e, -rc, "Embree's tree of a mesh cannot be created");
-	rtcSetSceneProgressMonitorFunction(a->scene, progress_monitor, tick_counter);
-	rtcCommitScene(a->scene);
+	embree_build(a->scene);
 	rc = embree_failure(a->device, e);
 	if (rc || count == 0)
 		return rc;
-	struct RTCBounds b;
-	rtcGetSceneBounds(a->scene, &b);
-	a->low = (vec3){(double)b.lower_x, (double)b.lower_y, (double)b.lower_z};
-	a->high = (vec3){(double)b.upper_x, (double)b.upper_y, (double)b.upper_z};
+	embree_bounds(a->scene, &a->low, &a->high);
 	a->size = a->high.x - a->low.x + a->high.y - a->low.y + a->high.z - a->low.z;
 	a->reach = rounding_reach(a->low, a->high);
 	return 0;

@@ -6,17 +6,9 @@
  */
 #include "worker/render/geom/instances.h"
 
-#include "common/base/liveness.h"
 #include "common/base/mem.h"
 
 /* ---- building */
-
-static bool progress_monitor(void *counter, double done)
-{
-	(void)done;
-	tick_on(counter);
-	return true;
-}
 
 /* A query within one instance. */
 struct within {
@@ -58,28 +50,15 @@ static void filter(const struct RTCFilterFunctionNArguments *args)
 static int build_tree(struct instance_tree *t, RTCDevice device, const struct accel_shape *s)
 {
 	t->mirrored = s->place->mirrored;
-	t->scene = rtcNewScene(device);
-	RTCGeometry g = t->scene ? rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE) : NULL;
+	t->scene = embree_scene(device);
+	RTCGeometry g = t->scene ? embree_triangles(device, s) : NULL;
 	if (!g)
 		return -ENOMEM;
-	rtcSetSceneFlags(t->scene, RTC_SCENE_FLAG_ROBUST);
-	rtcSetSceneBuildQuality(t->scene, RTC_BUILD_QUALITY_MEDIUM);
-	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0,
-				   sizeof s->position[0], s->vertex_count);
-	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
-				   s->triangle_count);
-	rtcSetGeometryMask(g, 0xFFFFFFFFu);
 	rtcSetGeometryIntersectFilterFunction(g, filter);
 	rtcSetGeometryOccludedFilterFunction(g, filter);
-	rtcCommitGeometry(g);
-	rtcAttachGeometryByID(t->scene, g, 0);
-	rtcReleaseGeometry(g);
-	rtcSetSceneProgressMonitorFunction(t->scene, progress_monitor, tick_counter);
-	rtcCommitScene(t->scene);
-	struct RTCBounds b;
-	rtcGetSceneBounds(t->scene, &b);
-	t->low = (vec3){(double)b.lower_x, (double)b.lower_y, (double)b.lower_z};
-	t->high = (vec3){(double)b.upper_x, (double)b.upper_y, (double)b.upper_z};
+	embree_attach(t->scene, g, 0);
+	embree_build(t->scene);
+	embree_bounds(t->scene, &t->low, &t->high);
 	t->reach = 0x1p-21 * fmax(triangle_norm_max(t->low), triangle_norm_max(t->high));
 	return 0;
 }
@@ -272,11 +251,4 @@ static void occluded(const struct RTCOccludedFunctionNArguments *args)
 		((struct RTCRay *)(void *)args->ray)->tfar = -INFINITY;
 }
 
-void instances_geometry(RTCGeometry g, struct instances *s)
-{
-	rtcSetGeometryUserPrimitiveCount(g, s->count);
-	rtcSetGeometryUserData(g, s);
-	rtcSetGeometryBoundsFunction(g, bounds, NULL);
-	rtcSetGeometryIntersectFunction(g, intersect);
-	rtcSetGeometryOccludedFunction(g, occluded);
-}
+const struct embree_ops instances_ops = {bounds, intersect, occluded};

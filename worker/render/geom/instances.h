@@ -36,7 +36,7 @@ struct instances {
 int instances_init(struct instances *s, RTCDevice device, const struct accel_shape *shapes, uint32_t count);
 void instances_fini(struct instances *s);
 
-/* The data of the user geometry; s must outlive it, with off and off_far set when it is committed. */
-void instances_geometry(RTCGeometry g, struct instances *s);
+/* Their data is a struct instances, which must outlive the geometry, with off and off_far set when it is committed. */
+extern const struct embree_ops instances_ops;
 
 #endif

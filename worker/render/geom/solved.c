@@ -263,29 +263,6 @@ static void curve_occluded(const struct RTCOccludedFunctionNArguments *args)
 		((struct RTCRay *)(void *)args->ray)->tfar = -INFINITY;
 }
 
-void solved_sphere(RTCGeometry g, struct sphere_prim *s)
-{
-	rtcSetGeometryUserPrimitiveCount(g, 1);
-	rtcSetGeometryUserData(g, s);
-	rtcSetGeometryBoundsFunction(g, sphere_bounds, NULL);
-	rtcSetGeometryIntersectFunction(g, sphere_intersect);
-	rtcSetGeometryOccludedFunction(g, sphere_occluded);
-}
-
-void solved_triangles(RTCGeometry g, struct wide_prims *w)
-{
-	rtcSetGeometryUserPrimitiveCount(g, w->count);
-	rtcSetGeometryUserData(g, w);
-	rtcSetGeometryBoundsFunction(g, wide_bounds, NULL);
-	rtcSetGeometryIntersectFunction(g, wide_intersect);
-	rtcSetGeometryOccludedFunction(g, wide_occluded);
-}
-
-void solved_curves(RTCGeometry g, struct curve_prims *c)
-{
-	rtcSetGeometryUserPrimitiveCount(g, c->curves->count);
-	rtcSetGeometryUserData(g, c);
-	rtcSetGeometryBoundsFunction(g, curve_bounds, NULL);
-	rtcSetGeometryIntersectFunction(g, curve_intersect);
-	rtcSetGeometryOccludedFunction(g, curve_occluded);
-}
+const struct embree_ops solved_sphere = {sphere_bounds, sphere_intersect, sphere_occluded};
+const struct embree_ops solved_triangles = {wide_bounds, wide_intersect, wide_occluded};
+const struct embree_ops solved_curves = {curve_bounds, curve_intersect, curve_occluded};

@@ -77,9 +77,7 @@ static inline bool query_hides(const struct query *q, uint32_t shape)
 /* As query_crosses, for the primitive that is present; no end of the ray is on it. */
 bool query_crosses_there(const struct query *q, struct prim_ref prim);
 
-/* The data of a user geometry; both must outlive it. */
-void solved_sphere(RTCGeometry g, struct sphere_prim *s);
-void solved_triangles(RTCGeometry g, struct wide_prims *w);
-void solved_curves(RTCGeometry g, struct curve_prims *c);
+/* Their data, which must outlive the geometry: struct sphere_prim, wide_prims, curve_prims. */
+extern const struct embree_ops solved_sphere, solved_triangles, solved_curves;
 
 #endif
