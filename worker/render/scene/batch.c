@@ -36,24 +36,6 @@ static int check(const struct scene_node *batch, const struct scene_node *film, 
 	return 0;
 }
 
-/* The batch's film, as wide as one sensor's share. */
-static const struct scene_node *share_of(const struct scene_node *film, uint32_t sensors, struct arena *arena)
-{
-	struct scene_node *share = arena_alloc(arena, 1, sizeof *share);
-	struct property *p = arena_alloc(arena, (size_t)film->property_count + 1, sizeof *p);
-	if (!share || !p)
-		return NULL;
-	*share = *film;
-	share->properties = p;
-	share->property_count = 0;
-	for (uint32_t i = 0; i < film->property_count; i++)
-		if (strcmp(film->properties[i].name, "width") != 0)
-			p[share->property_count++] = film->properties[i];
-	int64_t width = node_int(film, "width", SCENE_FILM_WIDTH) / sensors;
-	p[share->property_count++] = (struct property){"width", film->line, {.type = VALUE_INT, .as.integer = width}};
-	return share;
-}
-
 int batch_spread(const struct scene_node *batch, struct arena *arena, const struct scene_node **out, uint32_t *count,
 		 struct error *e)
 {
@@ -68,7 +50,8 @@ int batch_spread(const struct scene_node *batch, struct arena *arena, const stru
 		return r;
 	const struct scene_node **children = arena_alloc(arena, 2, sizeof *children);
 	struct scene_node *sensors = arena_alloc(arena, n, sizeof *sensors);
-	if (!children || !sensors || !(children[0] = share_of(film, n, arena)))
+	const struct value width = {.type = VALUE_INT, .as.integer = node_int(film, "width", SCENE_FILM_WIDTH) / n};
+	if (!children || !sensors || !(children[0] = node_with(film, "width", width, arena)))
 		return node_error(batch, e, ENOMEM, "out of memory");
 	children[1] = sampler;
 	for (uint32_t i = 0; i < n; i++) {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/node.h"
 
+#include "common/base/arena.h"
 #include "worker/render/scene/plugin.h"
 
 #include <stdarg.h>
@@ -13,6 +14,22 @@ const struct property *node_find(const struct scene_node *n, const char *name)
 		if (strcmp(n->properties[i].name, name) == 0)
 			return &n->properties[i];
 	return NULL;
+}
+
+const struct scene_node *node_with(const struct scene_node *n, const char *name, struct value v, struct arena *arena)
+{
+	struct scene_node *copy = arena_alloc(arena, 1, sizeof *copy);
+	struct property *p = arena_alloc(arena, (size_t)n->property_count + 1, sizeof *p);
+	if (!copy || !p)
+		return NULL;
+	*copy = *n;
+	copy->properties = p;
+	copy->property_count = 0;
+	for (uint32_t i = 0; i < n->property_count; i++)
+		if (strcmp(n->properties[i].name, name) != 0)
+			p[copy->property_count++] = n->properties[i];
+	p[copy->property_count++] = (struct property){name, n->line, v};
+	return copy;
 }
 
 double node_float(const struct scene_node *n, const char *name, double fallback)

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+struct arena;
 struct scene_node;
 
 struct value {
@@ -60,6 +61,9 @@ mat4 node_transform(const struct scene_node *n, const char *name); /* identity i
 const struct animation *node_animation(const struct scene_node *n, const char *name); /* NULL: it is still */
 const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index); /* NULL: none */
 const struct scene_node *node_ref(const struct scene_node *n, const char *name); /* VALUE_NODE or NULL */
+
+/* A copy in which the property has this value, whether n has it or not. NULL: no memory. */
+const struct scene_node *node_with(const struct scene_node *n, const char *name, struct value v, struct arena *arena);
 
 /* Whether both say the same: type, parameters and what they hold, wherever they stand. Of more than NODE_SAME_MOST
  * objects it is not found out: false. */

@@ -31,22 +31,9 @@ static int out_of_memory(struct listing *l)
 	return error_set(l->e, ENOMEM, "out of memory while listing shapes");
 }
 
-/* A copy of a node, with another to_world. */
 static const struct scene_node *placed_at(const struct scene_node *n, mat4 place, struct arena *arena)
 {
-	struct scene_node *copy = arena_alloc(arena, 1, sizeof *copy);
-	struct property *properties = arena_alloc(arena, (size_t)n->property_count + 1, sizeof *properties);
-	if (!copy || !properties)
-		return NULL;
-	*copy = *n;
-	copy->properties = properties;
-	copy->property_count = 0;
-	for (uint32_t i = 0; i < n->property_count; i++)
-		if (strcmp(n->properties[i].name, "to_world") != 0)
-			properties[copy->property_count++] = n->properties[i];
-	properties[copy->property_count++] =
-		(struct property){"to_world", n->line, {.type = VALUE_TRANSFORM, .as.transform = place}};
-	return copy;
+	return node_with(n, "to_world", (struct value){.type = VALUE_TRANSFORM, .as.transform = place}, arena);
 }
 
 /* Replaces a node that moves by one that stands where it is when the shutter opens. *moves: how it goes on while the
