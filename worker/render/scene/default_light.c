@@ -14,17 +14,6 @@ static bool has_child(const struct xml_element *around, const char *name)
 	return false;
 }
 
-static bool add_value(struct xml_element *in, const char *element, const char *name, const char *value,
-		      struct arena *arena)
-{
-	struct xml_element *el = element_make(in, element, in->file, in->line, arena);
-	if (!el)
-		return false;
-	element_put(el, "name", name);
-	element_put(el, "value", value);
-	return true;
-}
-
 /* Neither realistic nor meant to be: the sun is large and the sky goes on below the horizon, so that any model can be
  * seen. */
 static bool make_daylight(struct xml_element *scene, struct arena *arena)
@@ -33,8 +22,9 @@ static bool make_daylight(struct xml_element *scene, struct arena *arena)
 	if (!light)
 		return false;
 	element_put(light, "type", "sunsky");
-	if (!add_value(light, "float", "scale", "2", arena) || !add_value(light, "boolean", "extend", "true", arena) ||
-	    !add_value(light, "float", "sun_radius_scale", "15", arena) ||
+	if (!element_value(light, "float", "scale", "2", arena) ||
+	    !element_value(light, "boolean", "extend", "true", arena) ||
+	    !element_value(light, "float", "sun_radius_scale", "15", arena) ||
 	    !(place = element_make(light, "transform", scene->file, scene->line, arena)) ||
 	    !(turn = element_make(place, "rotate", scene->file, scene->line, arena)))
 		return false;

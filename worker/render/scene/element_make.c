@@ -31,3 +31,14 @@ void element_put(struct xml_element *el, const char *name, const char *value)
 	assert(el->attribute_count < ELEMENT_MAKE_ATTRIBUTES);
 	el->attributes[el->attribute_count++] = (struct xml_attribute){name, value};
 }
+
+bool element_value(struct xml_element *in, const char *kind, const char *name, const char *value, struct arena *arena)
+{
+	struct xml_element *el = element_make(in, kind, in->file, in->line, arena);
+	if (!el)
+		return false;
+	el->snake = in->snake;
+	element_put(el, "name", name);
+	element_put(el, "value", value);
+	return true;
+}

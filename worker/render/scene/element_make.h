@@ -19,4 +19,7 @@ struct xml_element *element_make(struct xml_element *parent, const char *name, c
 /* Adds an attribute to an element of element_make, at most ELEMENT_MAKE_ATTRIBUTES. */
 void element_put(struct xml_element *el, const char *name, const char *value);
 
+/* A parameter: a new element of `in` with `name` and `value`. false: out of memory. */
+bool element_value(struct xml_element *in, const char *kind, const char *name, const char *value, struct arena *arena);
+
 #endif

@@ -19,18 +19,6 @@ static bool is_filename(const struct xml_element *el)
 	return name && strcmp(name, "filename") == 0;
 }
 
-static bool put_value(struct xml_element *in, const char *kind, const char *name, const char *value,
-		      struct arena *arena)
-{
-	struct xml_element *el = element_make(in, kind, in->file, in->line, arena);
-	if (!el)
-		return false;
-	el->snake = in->snake;
-	element_put(el, "name", name);
-	element_put(el, "value", value);
-	return true;
-}
-
 /* Normals and heights are numbers, not colours: raw. */
 static int become_texture(struct xml_element *el, struct arena *arena, struct error *e)
 {
@@ -44,7 +32,8 @@ static int become_texture(struct xml_element *el, struct arena *arena, struct er
 	el->name = "texture";
 	el->attributes = type;
 	el->attribute_count = 1;
-	bool made = put_value(el, "string", "filename", file, arena) && put_value(el, "boolean", "raw", "true", arena);
+	bool made = element_value(el, "string", "filename", file, arena) &&
+		    element_value(el, "boolean", "raw", "true", arena);
 	return made ? 0 : xml_error(el, e, ENOMEM, "out of memory");
 }
 
