@@ -20,26 +20,28 @@ int note(const struct notes *t, const struct xml_element *el, const char *type, 
 	return r;
 }
 
+static int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+			  const char *name, const char *what)
+{
+	const char *type = xml_attribute(owner, "type");
+	return note(t, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` %s", el->file, el->line, owner->name,
+		    type, name, what);
+}
+
 int note_property(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name)
 {
-	const char *type = xml_attribute(owner, "type");
-	return note(t, owner, type, name,
-		    "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file, el->line,
-		    owner->name, type, name);
+	return note_parameter(t, owner, el, name, "has no effect on light and is ignored");
 }
 
 int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		    const char *name)
 {
-	const char *type = xml_attribute(owner, "type"), *value = xml_attribute(el, "value");
+	const char *value = xml_attribute(el, "value");
 	char *end;
 	if (value && strtod(value, &end) == 0 && end != value && !*end)
 		return 0;
-	return note(
-		t, owner, type, name,
-		"%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not supported: the image differs a little from Mitsuba's",
-		el->file, el->line, owner->name, type, name);
+	return note_parameter(t, owner, el, name, "is not supported: the image differs a little from Mitsuba's");
 }
 
 int note_guide(const struct notes *t, const struct xml_element *el)
@@ -65,17 +67,12 @@ int leave_out(const struct notes *t, const struct xml_element *el, const char *t
 int note_foreign_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 			   const char *name)
 {
-	const char *type = xml_attribute(owner, "type");
-	return note(t, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not known and is ignored",
-		    el->file, el->line, owner->name, type, name);
+	return note_parameter(t, owner, el, name, "is not known and is ignored");
 }
 
 int note_newer(const struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name)
 {
-	const char *type = xml_attribute(owner, "type");
-	return note(t, owner, type, name,
-		    "%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not a parameter of Mitsuba 0.6 and is ignored, as there",
-		    el->file, el->line, owner->name, type, name);
+	return note_parameter(t, owner, el, name, "is not a parameter of Mitsuba 0.6 and is ignored, as there");
 }
 
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
