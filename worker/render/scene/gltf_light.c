@@ -88,24 +88,19 @@ void gltf_light(struct gltf *g, const struct gltf_at *at, const mat4 *to_world)
 			"files that it writes in another mode are too dark");
 	if (json_object_get(at->json, "range"))
 		gltf_note(g, "ranges of lights are ignored: intensity falls off with the square of the distance");
-	if (strcmp(type, "directional") == 0) {
-		struct xml_element *el = gltf_plugin(g, g->scene, at, "emitter", "directional", NULL);
-		gltf_put_rgb(g, el, at, "irradiance", rgb);
-		gltf_put_matrix(g, el, at, "to_world", &m);
-	} else if (strcmp(type, "point") == 0) {
-		struct xml_element *el = gltf_plugin(g, g->scene, at, "emitter", "point", NULL);
-		gltf_put_rgb(g, el, at, "intensity", rgb);
-		gltf_put_matrix(g, el, at, "to_world", &m);
-	} else if (strcmp(type, "spot") == 0) {
-		const json_t *spot = gltf_object(g, at, at->json, "spot");
-		struct xml_element *el = gltf_plugin(g, g->scene, at, "emitter", "spot", NULL);
-		gltf_put_rgb(g, el, at, "intensity", rgb);
-		gltf_put_matrix(g, el, at, "to_world", &m);
-		gltf_put_number(g, el, at, "beam_width", degrees * gltf_number(g, at, spot, "innerConeAngle", 0));
-		gltf_put_number(g, el, at, "cutoff_angle",
-				degrees * gltf_number(g, at, spot, "outerConeAngle", M_PI / 4));
-	} else {
+	bool parallel = strcmp(type, "directional") == 0, spot = strcmp(type, "spot") == 0;
+	if (!parallel && !spot && strcmp(type, "point") != 0) {
 		gltf_fail(g, at, EINVAL, "a light of type \"%.32s\"", type);
+		return;
+	}
+	const json_t *cone = spot ? gltf_object(g, at, at->json, "spot") : NULL;
+	struct xml_element *el = gltf_plugin(g, g->scene, at, "emitter", type, NULL);
+	gltf_put_rgb(g, el, at, parallel ? "irradiance" : "intensity", rgb);
+	gltf_put_matrix(g, el, at, "to_world", &m);
+	if (spot) {
+		gltf_put_number(g, el, at, "beam_width", degrees * gltf_number(g, at, cone, "innerConeAngle", 0));
+		gltf_put_number(g, el, at, "cutoff_angle",
+				degrees * gltf_number(g, at, cone, "outerConeAngle", M_PI / 4));
 	}
 }
 
