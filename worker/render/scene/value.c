@@ -55,16 +55,6 @@ static int read_float(const struct xml_element *el, struct value *out, struct er
 	return r;
 }
 
-static int read_string(const struct xml_element *el, struct value *out, struct error *e)
-{
-	return need_value(el, &out->as.string, e);
-}
-
-static int read_point(const struct xml_element *el, struct value *out, struct error *e)
-{
-	return transform_read_vec3(el, 0, false, &out->as.point, e);
-}
-
 static bool parse_hex(const char *text, double rgb[3])
 {
 	if (strlen(text) != 7 || text[0] != '#' || strspn(text + 1, "0123456789abcdefABCDEF") != 6)
@@ -175,9 +165,9 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 	case VALUE_FLOAT:
 		return read_float(el, out, e);
 	case VALUE_STRING:
-		return read_string(el, out, e);
+		return need_value(el, &out->as.string, e);
 	case VALUE_POINT:
-		return read_point(el, out, e);
+		return transform_read_vec3(el, 0, false, &out->as.point, e);
 	case VALUE_RGB:
 		return read_rgb(el, out, e);
 	case VALUE_SPECTRUM:
