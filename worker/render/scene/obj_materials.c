@@ -12,6 +12,7 @@
  */
 #include "worker/render/scene/obj_materials.h"
 
+#include "common/base/fnv.h"
 #include "common/base/liveness.h"
 #include "worker/render/scene/element_make.h"
 #include "worker/render/scene/mtl.h"
@@ -117,18 +118,10 @@ static int read_children(const struct spread *s, struct obj_shape *o)
 
 /* ---- what the file says */
 
-static uint32_t hash_of(const char *name, size_t length)
-{
-	uint32_t h = 2166136261u;
-	for (size_t i = 0; i < length; i++)
-		h = (h ^ (unsigned char)name[i]) * 16777619u;
-	return h;
-}
-
 /* NULL: too many. */
 static struct material *material_of(struct obj_shape *o, const char *name, size_t length)
 {
-	uint32_t at = hash_of(name, length) % PLACES;
+	uint32_t at = (uint32_t)(fnv_add(FNV_BEGIN, name, length) % PLACES);
 	for (; o->places[at]; at = (at + 1) % PLACES) {
 		struct material *m = &o->materials[o->places[at] - 1];
 		if (m->length == length && memcmp(m->name, name, length) == 0)
