@@ -11,14 +11,14 @@ static spectrum diffuse_eval(const struct bsdf *b, const struct bsdf_point *p, v
 	return spectrum_scale(1 / WARP_PI, texture_eval(b->data, &p->where, p->w));
 }
 
-static double diffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+double diffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)b, (void)p;
 	return wo.z > 0 && wi.z > 0 ? wi.z / WARP_PI : 0;
 }
 
-static bool diffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
-			   struct bsdf_sample *out)
+bool diffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+		    struct bsdf_sample *out)
 {
 	return bsdf_sample_smooth(b, p, wo, warp_cosine_hemisphere(u[0], u[1]), out);
 }

@@ -5,6 +5,7 @@
  * alpha means the same as for Beckmann facets.
  */
 #include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/diffuse.h"
 #include "worker/render/bsdf/warp.h"
 
 struct grooves {
@@ -69,18 +70,6 @@ static spectrum roughdiffuse_eval(const struct bsdf *b, const struct bsdf_point 
 	return rho;
 }
 
-static double roughdiffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
-{
-	(void)b, (void)p;
-	return wo.z > 0 && wi.z > 0 ? wi.z / WARP_PI : 0;
-}
-
-static bool roughdiffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
-				struct bsdf_sample *out)
-{
-	return bsdf_sample_smooth(b, p, wo, warp_cosine_hemisphere(u[0], u[1]), out);
-}
-
 static int roughdiffuse_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 			       struct error *e)
 {
@@ -110,6 +99,6 @@ const struct bsdf_ops bsdf_ops_roughdiffuse = {
 	.data_size = sizeof(struct roughdiffuse),
 	.create = roughdiffuse_create,
 	.eval = roughdiffuse_eval,
-	.pdf_solid = roughdiffuse_pdf,
-	.sample = roughdiffuse_sample,
+	.pdf_solid = diffuse_pdf,
+	.sample = diffuse_sample,
 };
