@@ -10,15 +10,6 @@ static bool varies(const struct ior side[2], double eta)
 	return false;
 }
 
-static bool has_coefficients(const struct scene_node *n)
-{
-	static const char *const names[] = {"int_cauchy_b", "ext_cauchy_b", "int_sellmeier", "ext_sellmeier"};
-	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (node_find(n, names[i]))
-			return true;
-	return false;
-}
-
 static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *n, struct error *e)
 {
 	int code = ior_read_law(n, IOR_INT, &g->side[IOR_INT], e);
@@ -26,7 +17,7 @@ static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *
 		code = ior_read_law(n, IOR_EXT, &g->side[IOR_EXT], e);
 	if (code)
 		return code;
-	if (node_bool(n, "dispersion", false) && !has_coefficients(n) && !g->side[IOR_INT].terms &&
+	if (node_bool(n, "dispersion", false) && !ior_has_coefficients(n) && !g->side[IOR_INT].terms &&
 	    !g->side[IOR_EXT].terms) {
 		char known[128];
 		return node_error(

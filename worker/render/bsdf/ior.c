@@ -140,6 +140,15 @@ static int look_up_law(struct ior *out, const struct scene_node *n, const char *
 			  property, material, ior_dispersive_names(known, sizeof known));
 }
 
+bool ior_has_coefficients(const struct scene_node *n)
+{
+	static const char *const names[] = {"int_cauchy_b", "ext_cauchy_b", "int_sellmeier", "ext_sellmeier"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (node_find(n, names[i]))
+			return true;
+	return false;
+}
+
 int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out, struct error *e)
 {
 	const struct names *name = &side_names[side];

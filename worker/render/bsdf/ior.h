@@ -28,6 +28,7 @@ int ior_read(const struct scene_node *n, const char *name, double fallback, doub
 /* int_ior, int_cauchy_b, int_sellmeier, or the three for ext; with `dispersion`, names stand for the material's own
  * law. Defaults are Mitsuba's. The result is within [PARAM_IOR_MIN, PARAM_IOR_MAX] at all wavelengths. */
 int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out, struct error *e);
+bool ior_has_coefficients(const struct scene_node *n); /* a law of the node's own */
 #define IOR_NUMBER(name_)                                                                             \
 	{                                                                                             \
 		.name = name_, .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING, .min = PARAM_IOR_MIN, \

@@ -7,6 +7,7 @@
 #include "worker/render/world/effects_analyse.h"
 
 #include "common/base/text.h"
+#include "worker/render/bsdf/ior.h"
 #include "worker/render/world/displacement.h"
 #include "worker/render/world/visibility_bounds.h"
 
@@ -108,21 +109,12 @@ static void find_reach(const struct world *w, const enum visibility_bounds *shap
 	}
 }
 
-static bool asks_for_dispersion(const struct scene_node *n)
-{
-	static const char *const names[] = {"int_cauchy_b", "ext_cauchy_b", "int_sellmeier", "ext_sellmeier"};
-	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (node_find(n, names[i]))
-			return true;
-	return node_bool(n, "dispersion", false);
-}
-
 static void add_unused(struct census *c, const struct world *w, const struct effects_source *src)
 {
 	for (uint32_t i = 0; i < src->scene->object_count; i++) {
 		const struct scene_node *n = src->scene->objects[i];
 		uint32_t k = 0;
-		if (n->cls != PLUGIN_BSDF || !asks_for_dispersion(n))
+		if (n->cls != PLUGIN_BSDF || !(ior_has_coefficients(n) || node_bool(n, "dispersion", false)))
 			continue;
 		while (k < w->bsdf_count && src->bsdf[k] != n)
 			k++;
