@@ -57,23 +57,27 @@ const struct plugin_decl medium_decls[] = {
 /* Mitsuba 3's defaults. */
 static const double default_sigma_t = 1, default_albedo = 0.75;
 
-/* A coefficient or a share of 0.6's that the file does not state: that of skin1. */
-static int fill_in(struct volume *v, const struct scene_node *n, const char *name, enum color_role role)
+/* What the file does not state of 0.6's two coefficients, or coefficient and share: that of skin1. */
+static int fill_in(struct medium *m, const struct scene_node *n)
 {
 	char list[2];
 	const struct measured_medium *skin = measured_find(MEASURED_DEFAULT, list, sizeof list);
-	double rgb[3];
-	if (node_find(n, name))
-		return 0;
+	double first[3], second[3];
+	int rc = 0;
 	for (int k = 0; k < 3; k++) {
 		double s = MEASURED_SCALE * skin->sigma_s[k], a = MEASURED_SCALE * skin->sigma_a[k];
-		rgb[k] = strcmp(name, "sigma_s") == 0	? s
-			 : strcmp(name, "sigma_a") == 0 ? a
-			 : strcmp(name, "sigma_t") == 0 ? s + a
-							: s / (s + a);
+		first[k] = m->by_albedo ? s + a : a;
+		second[k] = m->by_albedo ? s / (s + a) : s;
 	}
-	*v = (struct volume){.grid = NULL};
-	return color_from_rgb(rgb, role, &v->color);
+	if (!node_find(n, m->by_albedo ? "sigma_t" : "sigma_a")) {
+		m->first = (struct volume){.grid = NULL};
+		rc = color_from_rgb(first, COLOR_UNBOUNDED, &m->first.color);
+	}
+	if (!rc && !node_find(n, m->by_albedo ? "albedo" : "sigma_s")) {
+		m->second = (struct volume){.grid = NULL};
+		rc = color_from_rgb(second, m->by_albedo ? COLOR_REFLECTANCE : COLOR_UNBOUNDED, &m->second.color);
+	}
+	return rc;
 }
 
 /* -EINVAL: no such material. */
@@ -98,9 +102,7 @@ static int read_apart(struct medium *m, const struct scene_node *n, const struct
 	int rc = volume_from_node(&m->first, n, "sigma_a", 0, COLOR_UNBOUNDED, false, build, e);
 	if (!rc)
 		rc = volume_from_node(&m->second, n, "sigma_s", 0, COLOR_UNBOUNDED, false, build, e);
-	if (!rc && !build->dialect_3)
-		rc = fill_in(&m->first, n, "sigma_a", COLOR_UNBOUNDED);
-	return rc || build->dialect_3 ? rc : fill_in(&m->second, n, "sigma_s", COLOR_UNBOUNDED);
+	return rc || build->dialect_3 ? rc : fill_in(m, n);
 }
 
 static int read_together(struct medium *m, const struct scene_node *n, const struct volume_build *build,
@@ -113,11 +115,7 @@ static int read_together(struct medium *m, const struct scene_node *n, const str
 		rc = node_error(n, e, EINVAL, "sigma_t is the same everywhere in a homogeneous medium");
 	if (!rc)
 		rc = volume_from_node(&m->second, n, "albedo", default_albedo, COLOR_REFLECTANCE, false, build, e);
-	if (!rc && !uneven && !build->dialect_3)
-		rc = fill_in(&m->first, n, "sigma_t", COLOR_UNBOUNDED);
-	if (!rc && !uneven && !build->dialect_3)
-		rc = fill_in(&m->second, n, "albedo", COLOR_REFLECTANCE);
-	return rc;
+	return rc || uneven || build->dialect_3 ? rc : fill_in(m, n);
 }
 
 /* Light that goes on nearly straight is not followed: sigma_s is less by the mean cosine. */
