@@ -15,7 +15,7 @@
 #define ROUNDING 0x1p-44
 enum { NEIGHBOURS = 32 };
 
-static vec3 center_at(const struct curves *c, uint32_t i)
+vec3 curves_center(const struct curves *c, uint32_t i)
 {
 	return (vec3){(double)c->point[i][0], (double)c->point[i][1], (double)c->point[i][2]};
 }
@@ -23,13 +23,14 @@ static vec3 center_at(const struct curves *c, uint32_t i)
 struct cone curves_cone(const struct curves *c, uint32_t prim)
 {
 	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
-	return cone_between(center_at(c, i), (double)c->point[i][3], center_at(c, i + 1), (double)c->point[i + 1][3]);
+	return cone_between(curves_center(c, i), (double)c->point[i][3], curves_center(c, i + 1),
+			    (double)c->point[i + 1][3]);
 }
 
 void curves_box(const struct curves *c, uint32_t prim, vec3 *low, vec3 *high)
 {
 	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
-	vec3 a = center_at(c, i), b = center_at(c, i + 1);
+	vec3 a = curves_center(c, i), b = curves_center(c, i + 1);
 	double r = (double)c->point[i][3], s = (double)c->point[i + 1][3];
 	*low = (vec3){fmin(a.x - r, b.x - s), fmin(a.y - r, b.y - s), fmin(a.z - r, b.z - s)};
 	*high = (vec3){fmax(a.x + r, b.x + s), fmax(a.y + r, b.y + s), fmax(a.z + r, b.z + s)};
@@ -40,7 +41,7 @@ void curves_box_of_all(const struct curves *c, vec3 *low, vec3 *high)
 	*low = (vec3){INFINITY, INFINITY, INFINITY};
 	*high = vec3_neg(*low);
 	for (uint32_t i = 0; i < c->point_count; i++) {
-		vec3 p = center_at(c, i);
+		vec3 p = curves_center(c, i);
 		double r = (double)c->point[i][3];
 		*low = (vec3){fmin(low->x, p.x - r), fmin(low->y, p.y - r), fmin(low->z, p.z - r)};
 		*high = (vec3){fmax(high->x, p.x + r), fmax(high->y, p.y + r), fmax(high->z, p.z + r)};
@@ -156,7 +157,8 @@ static void find_candidates(struct meeting *m)
 static bool passes(const struct curves *c, uint32_t prim, const struct curve_ray *r)
 {
 	uint32_t i = c->cone[prim] >> CURVE_SHIFT;
-	vec3 p = center_at(c, i), away = vec3_sub(p, r->o), across = vec3_cross(r->d, vec3_sub(center_at(c, i + 1), p));
+	vec3 p = curves_center(c, i), away = vec3_sub(p, r->o),
+	     across = vec3_cross(r->d, vec3_sub(curves_center(c, i + 1), p));
 	double radius = fmax((double)c->point[i][3], (double)c->point[i + 1][3]),
 	       slack = radius + ROUNDING * (triangle_norm1(r->o) + triangle_norm1(p) + radius),
 	       miss = vec3_dot(away, across);

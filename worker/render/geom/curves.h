@@ -34,6 +34,7 @@ struct curves {
 /* Sets `start`: at the beginning of a chain u begins where Mitsuba's does, and is carried along without twist. */
 void curves_lay(struct curves *c);
 
+vec3 curves_center(const struct curves *c, uint32_t i); /* of the i-th point */
 struct cone curves_cone(const struct curves *c, uint32_t prim);
 /* The box of a primitive, and of all. */
 void curves_box(const struct curves *c, uint32_t prim, vec3 *low, vec3 *high);

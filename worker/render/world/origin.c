@@ -17,7 +17,7 @@ static double middle(const struct box *b, int axis)
 	return 0.5 * (along(b->low, axis) + along(b->high, axis));
 }
 
-static int by_place(const void *a, const void *b)
+int weighed_compare(const void *a, const void *b)
 {
 	const struct weighed *x = a, *y = b;
 	return (x->at > y->at) - (x->at < y->at);
@@ -26,7 +26,7 @@ static int by_place(const void *a, const void *b)
 static double median(struct weighed *w, uint32_t count)
 {
 	double total = 0, passed = 0;
-	qsort(w, count, sizeof *w, by_place);
+	qsort(w, count, sizeof *w, weighed_compare);
 	for (uint32_t i = 0; i < count; i++)
 		total += w[i].weight;
 	for (uint32_t i = 0; i < count; i++) {

@@ -13,6 +13,7 @@
 struct weighed { /* a number, and its weight */
 	double at, weight;
 };
+int weighed_compare(const void *a, const void *b); /* for qsort, by the number */
 
 /* The centre of the bounding box; in a scene of mixed scales, whose smallest shape is less than 2^-12 of it, the
  * median along each axis of the shapes' centres, weighted by 1 / extent: among small things. `room` is for `count`. */

@@ -29,11 +29,6 @@ static vec3 plane_of(const struct geom_shape *g, uint32_t triangle, double *heig
 	return n;
 }
 
-static vec3 curve_point(const struct curves *c, uint32_t i)
-{
-	return (vec3){(double)c->point[i][0], (double)c->point[i][1], (double)c->point[i][2]};
-}
-
 /* Smallest and largest n.p over a shape. */
 static void extent(const struct geom_shape *g, vec3 n, double *low, double *high)
 {
@@ -45,7 +40,7 @@ static void extent(const struct geom_shape *g, vec3 n, double *low, double *high
 	*low = INFINITY;
 	*high = -INFINITY;
 	for (uint32_t i = 0; g->curves && i < g->curves->point_count; i++) {
-		double h = vec3_dot(n, curve_point(g->curves, i)), r = (double)g->curves->point[i][3];
+		double h = vec3_dot(n, curves_center(g->curves, i)), r = (double)g->curves->point[i][3];
 		*low = fmin(*low, h - r);
 		*high = fmax(*high, h + r);
 	}
@@ -64,7 +59,7 @@ static double farthest(const struct geom_shape *g, vec3 from)
 	double far2 = 0, far = 0;
 	for (uint32_t i = 0; g->curves && i < g->curves->point_count; i++)
 		far = fmax(far,
-			   vec3_length(vec3_sub(curve_point(g->curves, i), from)) + (double)g->curves->point[i][3]);
+			   vec3_length(vec3_sub(curves_center(g->curves, i), from)) + (double)g->curves->point[i][3]);
 	for (uint32_t i = 0; i < g->triangle_count; i++)
 		for (int k = 0; k < 3; k++) {
 			vec3 d = vec3_sub(vertex_of(g, g->index[i][k]), from);
@@ -119,12 +114,6 @@ static bool box_holds(const struct box *outer, const struct box *inner)
 	       inner->high.y <= outer->high.y && inner->low.z >= outer->low.z && inner->high.z <= outer->high.z;
 }
 
-static int compare_places(const void *a, const void *b)
-{
-	const struct weighed *x = a, *y = b;
-	return (x->at > y->at) - (x->at < y->at);
-}
-
 /* The first of n sorted numbers that is not below x. */
 static uint32_t first_from(const struct weighed *sorted, uint32_t n, double x)
 {
@@ -147,7 +136,7 @@ static void find_enclosed(const struct world *w, const struct effects_source *sr
 	for (uint32_t i = 0; i < n; i++)
 		by_x[i] = (struct weighed){src->box[i].low.x, i};
 	if (n > 0)
-		qsort(by_x, n, sizeof *by_x, compare_places);
+		qsort(by_x, n, sizeof *by_x, weighed_compare);
 	for (uint32_t o = 0; o < n; o++) {
 		const struct box *outer = &src->box[o];
 		if (!is_container(w, src->shape[o], o) || !camera_is_outside(w, &w->shapes[o]))
