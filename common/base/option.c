@@ -66,16 +66,19 @@ const struct option_row *option_at(const struct program *p, size_t i, const stru
 
 /* ---- arguments ---- */
 
-/* "at least 0 and below 1", "from 1 to 1024" */
-static void range_text(const struct option_row *r, char *text, size_t size)
+/* what: "a number"; more: what else may be given, after the range: "of at least 0 and below 1", "from 1 to 1024". */
+static int out_of_range(const struct option_row *r, const char *what, const char *more, const char *arg,
+			struct error *e)
 {
+	char range[80];
 	if (r->most >= DBL_MAX)
-		text_print(text, size, "%s %.10g", r->above ? "above" : "of at least", r->least);
+		text_print(range, sizeof range, "%s %.10g", r->above ? "above" : "of at least", r->least);
 	else if (r->above || r->below)
-		text_print(text, size, "%s %.10g and %s %.10g", r->above ? "above" : "of at least", r->least,
+		text_print(range, sizeof range, "%s %.10g and %s %.10g", r->above ? "above" : "of at least", r->least,
 			   r->below ? "below" : "at most", r->most);
 	else
-		text_print(text, size, "from %.10g to %.10g", r->least, r->most);
+		text_print(range, sizeof range, "from %.10g to %.10g", r->least, r->most);
+	return error_set(e, EINVAL, "--%s takes %s %s%s, not '%s'", r->name, what, range, more, arg);
 }
 
 static bool is_within(const struct option_row *r, double x)
@@ -111,24 +114,19 @@ static int take_name(const struct option_row *r, const char **field, const char 
 
 static int take_number(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
-	char *end, range[80];
+	char *end;
 	double x = strtod(arg, &end);
-	if (end == arg || *end || !is_within(r, x)) {
-		range_text(r, range, sizeof range);
-		return error_set(e, EINVAL, "--%s takes a number %s, not '%s'", r->name, range, arg);
-	}
+	if (end == arg || *end || !is_within(r, x))
+		return out_of_range(r, "a number", "", arg, e);
 	store_number(r, field, x * r->unit);
 	return 0;
 }
 
 static int take_count(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
-	char range[80];
 	uint64_t n = 0;
-	if (!text_count(arg, &n) || !is_within(r, (double)n)) {
-		range_text(r, range, sizeof range);
-		return error_set(e, EINVAL, "--%s takes a whole number %s, not '%s'", r->name, range, arg);
-	}
+	if (!text_count(arg, &n) || !is_within(r, (double)n))
+		return out_of_range(r, "a whole number", "", arg, e);
 	if (r->store == OPTION_UINT64)
 		*(uint64_t *)field = n;
 	else
@@ -138,14 +136,11 @@ static int take_count(const struct option_row *r, void *field, const char *arg, 
 
 static int take_seconds(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
-	char range[80];
 	double x = 0;
 	if (!text_seconds(arg, &x))
 		return error_set(e, EINVAL, "--%s takes a time such as 90, 90s, 5m or 2h, not '%s'", r->name, arg);
-	if (!is_within(r, x)) {
-		range_text(r, range, sizeof range);
-		return error_set(e, EINVAL, "--%s takes a number of seconds %s, not '%s'", r->name, range, arg);
-	}
+	if (!is_within(r, x))
+		return out_of_range(r, "a number of seconds", "", arg, e);
 	*(double *)field = x;
 	return 0;
 }
@@ -153,17 +148,14 @@ static int take_seconds(const struct option_row *r, void *field, const char *arg
 /* A plain number above 1, such as 5, means percent. */
 static int take_ratio(const struct option_row *r, void *field, const char *arg, struct error *e)
 {
-	char range[80];
 	double x = 0;
 	if (!text_ratio(arg, &x))
 		return error_set(e, EINVAL, "--%s takes something like 0.02 or 2%%, not '%s'", r->name, arg);
 	if (x > 1 && !strchr(arg, '%'))
 		return error_set(e, EINVAL, "--%s %s is %g %%; for %s percent write %s%%", r->name, arg, 100 * x, arg,
 				 arg);
-	if (!is_within(r, x)) {
-		range_text(r, range, sizeof range);
-		return error_set(e, EINVAL, "--%s takes a number %s, or percent, not '%s'", r->name, range, arg);
-	}
+	if (!is_within(r, x))
+		return out_of_range(r, "a number", ", or percent", arg, e);
 	*(double *)field = x;
 	return 0;
 }
