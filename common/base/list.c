@@ -26,3 +26,9 @@ void *list_room(void *items, size_t count, size_t size)
 {
 	return count & (count - 1) ? items : mem_grow(items, count * size, (count ? 2 * count : 1) * size);
 }
+
+int double_compare(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}

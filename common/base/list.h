@@ -21,4 +21,6 @@ void list_free(struct list *l); /* leaves it empty */
  * as before. */
 void *list_room(void *items, size_t count, size_t size);
 
+int double_compare(const void *a, const void *b); /* for qsort: ascending */
+
 #endif

@@ -9,6 +9,7 @@
  */
 #include "common/estimate/forecast.h"
 
+#include "common/base/list.h"
 #include "common/estimate/merge.h"
 #include "common/estimate/stated_error.h"
 
@@ -340,15 +341,9 @@ static double simulate(const struct fit *f, struct scenario *y, const struct pla
 	return INFINITY;
 }
 
-static int by_size(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-	return (x > y) - (x < y);
-}
-
 static struct forecast_range range_of(double *x)
 {
-	qsort(x, PLAYS, sizeof *x, by_size);
+	qsort(x, PLAYS, sizeof *x, double_compare);
 	return (struct forecast_range){x[PLAYS / 20], x[PLAYS / 2], x[PLAYS - 1 - PLAYS / 20]};
 }
 

@@ -5,6 +5,7 @@
  */
 #include "worker/cli/accuracy/accuracy_judge.h"
 
+#include "common/base/list.h"
 #include "common/base/mem.h"
 #include "common/estimate/canvas_blocks.h"
 
@@ -69,12 +70,6 @@ static void take_counts(struct accuracy_figures *f, const struct canvas_counts *
 	f->failed_walks = walks ? (double)failed / (double)walks : NAN;
 }
 
-static int order(const void *pa, const void *pb)
-{
-	const double *a = pa, *b = pb;
-	return (*a > *b) - (*a < *b);
-}
-
 /* 1 over B^2 + (0.01 m)^2, B the settings' mean image; 0 for the pixels with the largest errors. */
 static void weigh(struct judge *j, const float *error)
 {
@@ -92,7 +87,7 @@ static void weigh(struct judge *j, const float *error)
 	}
 	double *sorted = j->worst + pixels;
 	memcpy(sorted, j->worst, pixels * sizeof *sorted);
-	qsort(sorted, pixels, sizeof *sorted, order);
+	qsort(sorted, pixels, sizeof *sorted, double_compare);
 	double most = sorted[left < pixels ? pixels - 1 - left : 0];
 	for (size_t k = 0; k < 3 * pixels; k++)
 		j->weight[k] = j->worst[k / 3] > most ? 0 : j->weight[k] / (double)(3 * pixels);

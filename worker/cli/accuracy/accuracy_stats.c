@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/accuracy/accuracy_stats.h"
 
+#include "common/base/list.h"
 #include "common/estimate/quantile.h"
 
 #include <math.h>
@@ -46,17 +47,11 @@ struct interval stats_difference(const double *a, size_t a_count, const double *
 	return (struct interval){ratio - 1, ratio - 1 - half, ratio - 1 + half};
 }
 
-static int order(const void *pa, const void *pb)
-{
-	const double *a = pa, *b = pb;
-	return (*a > *b) - (*a < *b);
-}
-
 struct interval stats_median(double *x, size_t count)
 {
 	if (count == 0)
 		return (struct interval){NAN, NAN, NAN};
-	qsort(x, count, sizeof *x, order);
+	qsort(x, count, sizeof *x, double_compare);
 	double middle = 0.5 * (x[(count - 1) / 2] + x[count / 2]), n = (double)count;
 	/* Binomial with probability 1/2: the rank below which 2.5 % lie, by the normal approximation. */
 	double rank = floor(0.5 * n - 0.5 - 0.98 * sqrt(n));

@@ -12,6 +12,7 @@
 #include "worker/render/geom/coincide_find.h"
 #include "worker/render/geom/coincide.h"
 
+#include "common/base/list.h"
 #include "common/base/liveness.h"
 #include "common/base/mem.h"
 #include "worker/render/geom/flat_parts.h"
@@ -86,12 +87,6 @@ static struct member member_of(const struct search *f, struct prim_ref p)
 	return m;
 }
 
-static int compare_numbers(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-	return x < y ? -1 : x > y;
-}
-
 /* Finds the cut with the smallest halves, judged by a sample; false: they are hardly smaller than the whole. */
 static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, int *axis, double *at)
 {
@@ -104,7 +99,7 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 		size_t below = 0, above = 0;
 		for (size_t i = 0; i < count; i++)
 			middle[i] = m[i].low[k] + (m[i].high[k] - m[i].low[k]) / 2;
-		qsort(middle, count, sizeof *middle, compare_numbers);
+		qsort(middle, count, sizeof *middle, double_compare);
 		double cut = middle[count / 2];
 		for (size_t i = 0; i < count; i++) {
 			below += m[i].low[k] <= cut;
