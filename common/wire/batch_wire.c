@@ -12,6 +12,7 @@
 #include "common/base/mem.h"
 #include "common/exr/exr_tile.h"
 
+#include <assert.h>
 #include <string.h>
 
 enum { PAYLOAD_MOST = 1 << 30 };
@@ -405,4 +406,12 @@ void states_fini(struct chain_state *states, uint32_t count)
 	for (uint32_t i = 0; states && i < count; i++)
 		mem_free(states[i].bytes);
 	mem_free(states);
+}
+
+struct blob_hash file_hash_from_wire(const Farm__File *f)
+{
+	struct blob_hash h;
+	assert(f->hash.len == BLOB_HASH_SIZE);
+	memcpy(h.bytes, f->hash.data, BLOB_HASH_SIZE);
+	return h;
 }

@@ -18,6 +18,8 @@ uint32_t states_payload_max(const struct plan *p);
 int states_digest(const struct chain_state *states, uint32_t count, struct blob_hash *out, struct error *e);
 /* Reads a digest from a message. -EBADMSG: wrong length. */
 int states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e);
+/* The hash of a scene's file, from a message whose lengths were checked. */
+struct blob_hash file_hash_from_wire(const Farm__File *f);
 
 /* The whole frame, mem_alloc'd. -EMSGSIZE: it does not fit. */
 int batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e);

@@ -323,18 +323,10 @@ void waiting_batch_free(struct waiting_batch *w)
 
 /* ---- bundle ---- */
 
-struct blob_hash live_job_file_hash(const Farm__File *f)
-{
-	struct blob_hash h;
-	assert(f->hash.len == BLOB_HASH_SIZE);
-	memcpy(h.bytes, f->hash.data, BLOB_HASH_SIZE);
-	return h;
-}
-
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s)
 {
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = live_job_file_hash(m->files[i]);
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		blob_release(s, &h);
 	}
 }

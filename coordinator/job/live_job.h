@@ -187,7 +187,5 @@ void waiting_batch_free(struct waiting_batch *w);
 /* Releases the bundle's blobs. */
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s);
 uint64_t live_job_asset_bytes(const Farm__Submit *m); /* total size of its files, as submitted */
-/* A file's hash from a message whose lengths were checked. */
-struct blob_hash live_job_file_hash(const Farm__File *f);
 
 #endif

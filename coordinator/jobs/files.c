@@ -30,7 +30,7 @@ static const Farm__File *lacking(const struct jobs *jobs, const struct live_job 
 {
 	const Farm__Submit *m = live_job_submit(job);
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = live_job_file_hash(m->files[i]);
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		if (!blob_has(jobs->blobs, &h, NULL))
 			return m->files[i];
 	}
@@ -200,7 +200,7 @@ void files_read(struct jobs *jobs, struct live_job *job)
 	bool missing = false;
 	job->unread = false;
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = live_job_file_hash(m->files[i]);
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		int rc = reread(jobs, &h, &at_once);
 		missing |= rc == -ENOENT || rc == -EBADMSG;
 		job->unread |= rc && rc != -EINPROGRESS;

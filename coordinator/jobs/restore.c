@@ -103,12 +103,12 @@ int restore_tell(struct jobs *jobs, const struct live_job *job, const char *held
 static int hold_blobs(struct jobs *jobs, const Farm__Submit *m, struct error *e)
 {
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = live_job_file_hash(m->files[i]);
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		int rc = blob_expect(jobs->blobs, &h, e);
 		if (!rc)
 			continue;
 		while (i-- > 0) {
-			h = live_job_file_hash(m->files[i]);
+			h = file_hash_from_wire(m->files[i]);
 			blob_release(jobs->blobs, &h);
 		}
 		return rc;

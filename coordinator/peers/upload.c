@@ -249,7 +249,7 @@ static int check_sizes(const struct upload *u, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = live_job_file_hash(m->files[i]);
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		uint64_t size;
 		if (u->held[i] && (!blob_has(u->blobs, &h, &size) || size != m->files[i]->size))
 			return error_set(e, EINVAL, "%s: its size does not match its content", m->files[i]->name);
@@ -296,7 +296,7 @@ int upload_look(struct upload *u, struct jobs *jobs, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
 	while (upload_is_looking(u)) {
-		struct blob_hash h = live_job_file_hash(m->files[u->looked]);
+		struct blob_hash h = file_hash_from_wire(m->files[u->looked]);
 		int rc = blob_has(u->blobs, &h, NULL) ? files_check(jobs, &h, NULL) : -ENOENT;
 		if (rc == -EINPROGRESS)
 			return rc;
@@ -309,7 +309,7 @@ bool upload_file_read(struct upload *u, const struct blob_hash *h, bool right)
 {
 	if (!upload_is_looking(u))
 		return false;
-	struct blob_hash next = live_job_file_hash(u->submit.message->submit->files[u->looked]);
+	struct blob_hash next = file_hash_from_wire(u->submit.message->submit->files[u->looked]);
 	if (!blob_hash_equal(&next, h))
 		return false;
 	take_look(u, h, right);
@@ -325,7 +325,7 @@ void upload_free(struct upload *u)
 	blob_batch_free(u->batch);
 	const Farm__Submit *m = u->submit.message ? u->submit.message->submit : NULL;
 	for (size_t i = 0; m && i < m->n_files; i++) {
-		struct blob_hash h = live_job_file_hash(m->files[i]);
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		if (u->held[i])
 			blob_release(u->blobs, &h);
 	}
@@ -436,7 +436,7 @@ size_t upload_missing(const struct upload *u, struct blob_hash *hashes)
 	const Farm__Submit *m = u->submit.message->submit;
 	size_t count = 0;
 	for (size_t at = 0; at < m->n_files; at++) {
-		struct blob_hash h = live_job_file_hash(m->files[u->by_hash[at]]);
+		struct blob_hash h = file_hash_from_wire(m->files[u->by_hash[at]]);
 		if (!u->held[u->by_hash[at]] && (count == 0 || !blob_hash_equal(&hashes[count - 1], &h)))
 			hashes[count++] = h;
 	}

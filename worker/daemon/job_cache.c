@@ -12,6 +12,7 @@
 #include "common/base/clock.h"
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
+#include "common/wire/batch_wire.h"
 #include "worker/daemon/work.h"
 #include "worker/render/settings/accuracy_settings.h"
 
@@ -31,14 +32,6 @@ enum {
 static const Farm__JobInfo *info_of(const struct job_cache *b)
 {
 	return b->info.message->job_info;
-}
-
-static struct blob_hash hash_of(const Farm__File *f)
-{
-	struct blob_hash h;
-	assert(f->hash.len == BLOB_HASH_SIZE);
-	memcpy(h.bytes, f->hash.data, BLOB_HASH_SIZE);
-	return h;
 }
 
 struct job_cache *job_cache_find(struct job_cache *all, uint64_t job)
@@ -64,7 +57,7 @@ void job_cache_free(struct job_cache *b)
 {
 	assert(b->state != JOB_CACHE_BUILDING && !b->reading.check);
 	for (size_t i = 0; b->info.message && b->held && i < info_of(b)->n_files; i++) {
-		struct blob_hash h = hash_of(info_of(b)->files[i]);
+		struct blob_hash h = file_hash_from_wire(info_of(b)->files[i]);
 		if (b->held[i])
 			blob_release(b->blobs, &h);
 		if (b->paths)
@@ -162,7 +155,7 @@ static void on_read(uv_work_t *work, int status)
 /* Files in the cache may have been damaged since they arrived: those are fetched again. */
 static enum job_cache_files look_for(struct job_cache *b, size_t i, uv_loop_t *loop)
 {
-	b->wanted = hash_of(info_of(b)->files[i]);
+	b->wanted = file_hash_from_wire(info_of(b)->files[i]);
 	bool failed = b->reading.failed && b->reading.file == i;
 	b->reading.failed = false;
 	int rc = failed ? -EBADMSG : blob_check_begin(&b->reading.check, b->blobs, &b->wanted, CHECKED_SECONDS, NULL);
@@ -343,7 +336,7 @@ int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
 {
 	const Farm__JobInfo *m = info_of(b);
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = hash_of(m->files[i]);
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		if (!b->paths[i])
 			b->paths[i] = mem_alloc(PATH_BYTES, 1);
 		if (!b->paths[i])
