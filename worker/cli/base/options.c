@@ -25,9 +25,9 @@ unsigned option_threads_default(void)
 	return processors > 0 ? (unsigned)processors : 1;
 }
 
-int option_scene(void *target, size_t index, char *word, struct error *e)
+int option_scene(size_t index, const char *word, const char **scene, struct error *e)
 {
-	*(const char **)target = word;
+	*scene = word;
 	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
 }
 

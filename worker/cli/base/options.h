@@ -40,8 +40,8 @@ unsigned option_threads_default(void); /* number of processors */
  * its name has another ending. "-" is /dev/stdout. */
 int option_image(const char *arg, const char **image, struct error *e);
 
-/* Takes the words of a program with one scene, whose struct begins with it: const char *scene. */
-int option_scene(void *target, size_t index, char *word, struct error *e);
+/* For a program with one scene: the index-th word that is not an option. */
+int option_scene(size_t index, const char *word, const char **scene, struct error *e);
 
 /* A folder of --path, which must exist, appended to OPTION_PATHS_MAX paths. */
 int option_path(const char *arg, const char **paths, size_t *count, struct error *e);

@@ -66,6 +66,11 @@ static const struct option_row rows[] = {
 	{0},
 };
 
+static int take_word(void *target, size_t index, char *word, struct error *e)
+{
+	return option_scene(index, word, &((struct arguments *)target)->scene, e);
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
@@ -104,7 +109,7 @@ static const struct program program = {
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
 	.shared_offset = offsetof(struct arguments, render),
-	.word = option_scene,
+	.word = take_word,
 };
 
 struct session {

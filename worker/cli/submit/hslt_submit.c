@@ -25,7 +25,7 @@
 #include <string.h>
 
 struct arguments {
-	const char *scene, *coordinator, *tls, *output, *name;
+	const char *coordinator, *tls, *scene, *output, *name;
 	struct submit_request request;
 	struct render_arguments render;
 	const char *plot;
@@ -80,6 +80,11 @@ static const struct option_row rows[] = {
 	{0},
 };
 
+static int take_word(void *target, size_t index, char *word, struct error *e)
+{
+	return option_scene(index, word, &((struct arguments *)target)->scene, e);
+}
+
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
@@ -120,7 +125,7 @@ static const struct program program = {
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
 	.shared_offset = offsetof(struct arguments, render),
-	.word = option_scene,
+	.word = take_word,
 };
 
 /* The default name for a later fetch. The farm does not need the folder. */
