@@ -69,9 +69,9 @@ static unsigned behind_passed(const struct path_context *c, const struct joined_
 static bool joins_through(const struct path_context *c, const struct joined_path *p, unsigned j)
 {
 	unsigned end = behind_passed(c, p, j);
-	if (j == 1 && end == p->edges)
-		return lens_joins(c, p->v[end], p->v[0]);
-	return !is_delta(p, end) && end - j <= PATH_PASSED_MOST;
+	if (end - j > PATH_PASSED_MOST)
+		return false;
+	return j == 1 && end == p->edges ? lens_joins(c, p->v[end], p->v[0]) : !is_delta(p, end);
 }
 
 static inline bool technique_exists(const struct path_context *c, const struct joined_path *p, unsigned j)

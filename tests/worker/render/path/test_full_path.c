@@ -343,6 +343,53 @@ static void test_passed_lengths(void **state)
 	world_free(w);
 }
 
+/* A lamp straight behind more panes than a connection passes: no technique but a sub-path that passes them one by one
+ * finds it, so its weight is 1. One pane less, and the lamp is joined to the lens, too, which is denser. */
+static void test_passed_most(void **state)
+{
+	(void)state;
+	static struct path_context c;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	for (unsigned panes = PATH_PASSED_MOST; panes <= PATH_PASSED_MOST + 4; panes++) {
+		char xml[16384];
+		size_t used = 0;
+		unsigned hits = 0;
+		for (unsigned i = 0; i < panes; i++)
+			used += (size_t)snprintf(
+				xml + used, sizeof xml - used,
+				"<shape type='rectangle'>" AT("<translate z='%g'/>") "<bsdf type='null'/></shape>",
+				0.1 * i);
+		struct world *w = world_of_text(
+			32, 32, "%s%s",
+			SENSOR("0,0,4", "0,0,0") "<shape type='sphere'><point name='center' value='0,0,-1'/>"
+						 "<float name='radius' value='.02'/><emitter type='area'/></shape>",
+			xml);
+		c = (struct path_context){.w = w,
+					  .window = {14, 14, 4, 4},
+					  .min_depth = 1,
+					  .max_depth = 40,
+					  .counters = counters,
+					  .joins_lens = true,
+					  .light_every = 1};
+		for (uint64_t i = 0; i < 8000; i++) {
+			struct sampler_random s;
+			double film[2];
+			sampler_random_init(&s, 0x6d6f7374, RNG_TEST, i, 0);
+			unsigned camera = path_walk_camera(&c, &s.base, 40, film);
+			const struct path_vertex *z = &c.camera[camera - 1];
+			if (camera < panes + 2 || z->emitter < 0)
+				continue;
+			spectrum l = path_connect(&c, 0, camera, PATH_MAX_EDGES, film),
+				 whole = spectrum_mul(z->beta, path_emitted(&c, z, z->to_prev, &c.wl));
+			double weight = l.v[0] / whole.v[0];
+			assert_true(panes > PATH_PASSED_MOST ? fabs(weight - 1) < 1e-12 : weight < 0.1);
+			hits++;
+		}
+		assert_true(hits > 10);
+		world_free(w);
+	}
+}
+
 /* A wall before the near plane, another behind the far one, and the sky: all that a camera path finds between the
  * planes is visible. */
 static void test_clipped(void **state)
@@ -392,11 +439,11 @@ static void test_sides(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces),   cmocka_unit_test(test_media),
-		cmocka_unit_test(test_round_lamp), cmocka_unit_test(test_environment),
-		cmocka_unit_test(test_ends),	   cmocka_unit_test(test_clipped),
-		cmocka_unit_test(test_passed),	   cmocka_unit_test(test_passed_lengths),
-		cmocka_unit_test(test_sides),
+		cmocka_unit_test(test_surfaces),    cmocka_unit_test(test_media),
+		cmocka_unit_test(test_round_lamp),  cmocka_unit_test(test_environment),
+		cmocka_unit_test(test_ends),	    cmocka_unit_test(test_clipped),
+		cmocka_unit_test(test_passed),	    cmocka_unit_test(test_passed_lengths),
+		cmocka_unit_test(test_passed_most), cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
