@@ -112,7 +112,8 @@ static bool choose_cut(const struct search *f, const struct prim_ref *items, siz
 			*at = cut;
 		}
 	}
-	return least < SIZE_MAX && least * 3 <= count * 5;
+	/* Few can as well be compared: cutting them must at least pay for that. */
+	return least < SIZE_MAX && (n < MANY ? least * 5 <= count * 7 : least * 3 <= count * 5);
 }
 
 static bool shines(const struct search *f, struct prim_ref p)
@@ -504,7 +505,7 @@ static int find(struct search *f, uint32_t count, size_t n)
 	/* Enough for complete sorting and for each primitive to meet dozens of others; not for all triangles of very
 	 * many instances. */
 	size_t most = moved < INSTANCED_MAX ? moved : INSTANCED_MAX;
-	f->limit = 128 * (uint64_t)n + (1u << 22) + 16 * (uint64_t)most;
+	f->limit = 128 * (uint64_t)n + (1u << 25) + 16 * (uint64_t)most;
 	f->pair_limit = 4 * n + (1u << 16) + most;
 	list_primitives(f->shapes, count, items);
 	rc = look_into(f, items, n, MOST_CUTS);

@@ -240,6 +240,37 @@ static void test_search(void **state)
 	coincide_free(c);
 }
 
+/* A plant whose round leaves, fans of thin triangles, cross each other everywhere: no two coincide, and the search gets
+ * to its end. */
+static void test_crossing_leaves(void **state)
+{
+	(void)state;
+	enum { LEAVES = 36, FAN = 256 };
+	static struct soup soup[LEAVES];
+	struct accel_shape shape[LEAVES];
+	struct dice d = dice_of("leaves");
+	struct coincidence *c;
+	struct error e;
+	for (int i = 0; i < LEAVES; i++) {
+		vec3 center = {dice_between(&d, -0.3, 0.3), dice_between(&d, -0.4, 0.4), dice_between(&d, -0.3, 0.3)},
+		     n = vec3_normalize(
+			     (vec3){dice_between(&d, -1, 1), dice_between(&d, -1, 1), dice_between(&d, -1, 1)}),
+		     s = vec3_normalize(vec3_cross(n, (vec3){0.48, 0.6, 0.64})), t = vec3_cross(n, s);
+		soup[i].count = 0;
+		for (int k = 0; k < FAN; k++) {
+			vec3 rim[2];
+			for (int j = 0; j < 2; j++) {
+				double phi = 2 * M_PI * (k + j) / FAN;
+				rim[j] = vec3_madd(vec3_madd(center, 0.15 * cos(phi), s), 0.15 * sin(phi), t);
+			}
+			add(&soup[i], center, rim[0], rim[1]);
+		}
+		shape[i] = shape_of(&soup[i], SURFACE_PASSES);
+	}
+	assert_int_equal(coincide_find(&c, shape, LEAVES, &e), 0);
+	assert_null(c);
+}
+
 /* A stack of equal triangles is no square; a heap that is one ends with what the bounds allow. Where nothing coincides
  * nothing is kept, one sphere hides another, and without memory there is a sentence. */
 static void test_bounds(void **state)
@@ -403,8 +434,9 @@ static void test_fan(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two),	  cmocka_unit_test(test_neighbours),
-					   cmocka_unit_test(test_search), cmocka_unit_test(test_bounds),
-					   cmocka_unit_test(test_rays),	  cmocka_unit_test(test_fan)};
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_two),    cmocka_unit_test(test_neighbours),      cmocka_unit_test(test_search),
+		cmocka_unit_test(test_bounds), cmocka_unit_test(test_crossing_leaves), cmocka_unit_test(test_rays),
+		cmocka_unit_test(test_fan)};
 	return cmocka_run_group_tests_name("coinciding surfaces", tests, NULL, NULL);
 }
