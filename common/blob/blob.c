@@ -243,7 +243,7 @@ void blob_store_close(struct blob_store *s)
 	mem_free(s);
 }
 
-void blob_store_is_cache(struct blob_store *s)
+void blob_store_use_as_cache(struct blob_store *s)
 {
 	s->cache = true;
 }

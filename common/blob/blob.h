@@ -27,7 +27,7 @@ bool blob_store_evict(struct blob_store *s);
 void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user);
 /* Call if files that are lost with the power can be fetched again. Their names are then not flushed to the disk, which
  * halves the time that thousands of small files take. */
-void blob_store_is_cache(struct blob_store *s);
+void blob_store_use_as_cache(struct blob_store *s);
 /* Evicts what exceeds the limit. Call once everything needed is held. */
 void blob_store_trim(struct blob_store *s);
 

@@ -29,7 +29,7 @@ struct blob_store {
 	bool (*more_room)(void *user); /* NULL: nobody has any */
 	void *user;
 	size_t count, capacity;
-	bool cache; /* see blob_store_is_cache */
+	bool cache; /* see blob_store_use_as_cache */
 };
 
 #endif

@@ -125,7 +125,7 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 			cache_close(c);
 			return rc;
 		}
-		blob_store_is_cache(c->blobs);
+		blob_store_use_as_cache(c->blobs);
 		blob_store_trim(c->blobs);
 		return 0;
 	}

@@ -289,7 +289,7 @@ static void flushed_as_needed(void **state)
 	flushes = 0;
 	store_text(s, "kept");
 	assert_int_equal(flushes, 2);
-	blob_store_is_cache(s);
+	blob_store_use_as_cache(s);
 	store_text(s, "cached");
 	assert_int_equal(flushes, 3);
 	disk_use(NULL);

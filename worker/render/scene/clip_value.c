@@ -11,8 +11,9 @@ int clip_value(const struct notes *t, const struct xml_element *owner, const str
 		v->type = VALUE_FLOAT;
 		v->as.number = x;
 	}
-	double *x = v->type == VALUE_FLOAT ? &v->as.number : v->as.rgb, outside = p->min, end = p->min;
-	for (int i = 0; i < (v->type == VALUE_FLOAT ? 1 : v->type == VALUE_RGB ? 3 : 0); i++) {
+	double *x = v->type == VALUE_FLOAT ? &v->as.number : v->as.rgb, outside = 0, end = 0;
+	int count = v->type == VALUE_FLOAT ? 1 : v->type == VALUE_RGB ? 3 : 0;
+	for (int i = 0; i < count; i++) {
 		double within = fmin(fmax(x[i], p->min), p->max);
 		if (within != x[i]) {
 			outside = x[i];
@@ -20,10 +21,10 @@ int clip_value(const struct notes *t, const struct xml_element *owner, const str
 		}
 		x[i] = within;
 	}
+	if (outside == end)
+		return 0;
 	const char *type = xml_attribute(owner, "type");
-	return outside == end
-		       ? 0
-		       : note(t, owner, type, p->name,
-			      "%s:%d: <%.64s type=\"%.64s\">: %s=%g is outside [%g, %g] and counts as %g", el->file,
-			      el->line, owner->name, type, element_spelling(el, p->name), outside, p->min, p->max, end);
+	return note(t, owner, type, p->name,
+		    "%s:%d: <%.64s type=\"%.64s\">: %s=%g is outside [%g, %g] and counts as %g", el->file, el->line,
+		    owner->name, type, element_spelling(el, p->name), outside, p->min, p->max, end);
 }
