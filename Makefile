@@ -160,7 +160,7 @@ $(BUILD)/syntax/%: % | $(GEN_H) generated
 # Sanitized runs take 1/20 of the samples, and leave out what only draws more of them: other tests run the same code.
 SAN_WITHOUT := /tests/(image/|(numerics/test_(agree|random)|worker/render/(test_choose|mutation/test_(balance|forced|broken)))$$)
 test: programs tests $(BUILD)/load/load
-	$(if $(SAN),HSLT_TEST_WITHOUT='$(SAN_WITHOUT)' HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
+	$(if $(SAN),HSLT_TEST_WITHOUT="$${HSLT_TEST_WITHOUT:+$$HSLT_TEST_WITHOUT|}"'$(SAN_WITHOUT)' HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
 .SECONDARY:
 
 # The farm in virtual time: 10,000 schedules of faults; 200 are part of the tests. HSLT_SIM_SEED=N: that one, with all that is said.
