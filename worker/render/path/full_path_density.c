@@ -113,6 +113,6 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 		unsigned end = s + full_path_passed(c, x, s);
 		log_pdf[s] = from_camera[end] + (s == 1 ? log(path_pdf_toward(c, &v[0], v[end].x.p)) : light);
 		if (end > s)
-			log_pdf[s] += log(path_passed_ratio_in(v, s, end - 1, NULL));
+			log_pdf[s] += log(path_passed_ratio_in(v, s, end - 1, false));
 	}
 }

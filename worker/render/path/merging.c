@@ -85,12 +85,7 @@ static bool is_passed(const struct path_context *c, const struct path_vertex *v)
 /* The density of a joint that passes v[first .. end - 1] over that of drawing them; 1 if there are none. */
 static double over_drawn(const struct path_vertex *v, unsigned first, unsigned end)
 {
-	double pdf[PATH_PASSED_MOST];
-	if (first == end)
-		return 1;
-	for (unsigned i = first; i < end; i++)
-		pdf[i - first] = v[i].pdf;
-	return path_passed_ratio_in(v, first, end - 1, pdf);
+	return first == end ? 1 : path_passed_ratio_in(v, first, end - 1, true);
 }
 
 /* Fills in the sums of struct photon. The techniques by which densities are divided need not exist. */

@@ -99,14 +99,14 @@ double path_passed_ratio(const struct path_vertex *const *v, unsigned first, uns
 	return ratio / part;
 }
 
-double path_passed_ratio_in(const struct path_vertex *v, unsigned first, unsigned last, const double *pdf)
+double path_passed_ratio_in(const struct path_vertex *v, unsigned first, unsigned last, bool over_pdf)
 {
 	const struct path_vertex *around[PATH_PASSED_MOST + 2];
-	double one[PATH_PASSED_MOST];
+	double pdf[PATH_PASSED_MOST];
 	unsigned n = last - first + 1;
 	for (unsigned i = 0; i < n + 2; i++)
 		around[i] = &v[first - 1 + i];
 	for (unsigned i = 0; i < n; i++)
-		one[i] = 1;
-	return path_passed_ratio(around, 1, n, pdf ? pdf : one);
+		pdf[i] = over_pdf ? v[first + i].pdf : 1;
+	return path_passed_ratio(around, 1, n, pdf);
 }

@@ -48,7 +48,7 @@ double path_pdf_passed(const struct path_context *c, const struct path_vertex *a
 
 /* J for the passed vertices v[first..last], over the product of their densities pdf[0..last - first]. */
 double path_passed_ratio(const struct path_vertex *const *v, unsigned first, unsigned last, const double *pdf);
-/* The same for an array of vertices. pdf: NULL for J alone. */
-double path_passed_ratio_in(const struct path_vertex *v, unsigned first, unsigned last, const double *pdf);
+/* The same for an array of vertices, whose densities are their pdf; J alone, unless over_pdf. */
+double path_passed_ratio_in(const struct path_vertex *v, unsigned first, unsigned last, bool over_pdf);
 
 #endif
