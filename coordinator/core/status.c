@@ -86,13 +86,16 @@ static bool someone_avoids(const struct farm *f, const struct job *j)
 	return false;
 }
 
-static const struct peer *who_has_no_room(const struct farm *f, const struct job *j)
+static bool room_why(const struct farm *f, const struct job *j, char *text, size_t size)
 {
-	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (f->peers[i]->state == PEER_ACTIVE && job_takes(j, f->peers[i]->class) &&
-		    peer_waits_for_room(f->peers[i], j->id))
-			return f->peers[i];
-	return NULL;
+	for (uint32_t i = 0; i < f->peer_count; i++) {
+		const struct peer *p = f->peers[i];
+		if (p->state != PEER_ACTIVE || !job_takes(j, p->class) || !peer_waits_for_room(p, j->id))
+			continue;
+		text_print(text, size, "worker %s has no room for its scene now: %s", p->name, p->text);
+		return true;
+	}
+	return false;
 }
 
 /* The job's text is "worker: why". */
@@ -200,9 +203,8 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 			 j->owner->limited_until - f->now);
 	else if (answer_all_failed(f, j))
 		put_failing(f, j, text, size);
-	else if (who_has_no_room(f, j))
-		text_print(text, size, "worker %s has no room for its scene now: %s", who_has_no_room(f, j)->name,
-			   who_has_no_room(f, j)->text);
+	else if (room_why(f, j, text, size))
+		return NULL;
 	else if (someone_avoids(f, j))
 		text_print(text, size, "its workers failed and pause before they try again; the last one: %s", j->text);
 	else if (!other)
