@@ -32,7 +32,7 @@ static inline bool path_sees_through(const struct path_context *c)
 /* Whether a connection could have passed v: its path goes straight on there. */
 static inline bool path_is_passed(const struct path_vertex *v)
 {
-	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_STRAIGHT) && !v->bsdf->culls;
+	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_STRAIGHT) && bsdf_is_passed(v->bsdf);
 }
 
 /* Whether z, a vertex of the camera's sub-path, and y see each other through at least one surface and at most
