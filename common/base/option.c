@@ -44,23 +44,16 @@ static const struct option_row *row_of(const struct option_group *groups, size_t
 	return NULL;
 }
 
-const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group, size_t *offset)
+const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group)
 {
 	const struct option_group *g = NULL;
-	size_t shift = 0;
 	const struct option_row *r = row_of(p->own.groups, &i, &g);
-	if (!r && p->shared) {
+	if (!r && p->shared)
 		r = row_of(p->shared->groups, &i, &g);
-		shift = p->shared_offset;
-	}
-	if (!r) {
+	if (!r)
 		r = row_of(general_groups, &i, &g);
-		shift = 0;
-	}
 	if (group)
 		*group = g;
-	if (offset)
-		*offset = shift;
 	return r;
 }
 
@@ -234,18 +227,12 @@ struct reader {
 	struct error *e;
 };
 
-static void *target_of(const struct reader *x, size_t offset)
-{
-	return (char *)x->target + offset;
-}
-
 static int environment(const struct reader *x)
 {
 	const struct option_row *r;
-	size_t offset;
-	for (size_t i = 0; (r = option_at(x->program, i, NULL, &offset)) != NULL; i++) {
+	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++) {
 		char *value = r->environment ? getenv(r->environment) : NULL;
-		int rc = value ? store_argument(r, target_of(x, offset), value, x->e) : 0;
+		int rc = value ? store_argument(r, x->target, value, x->e) : 0;
 		if (rc)
 			return error_prefix(x->e, rc, "$%s", r->environment);
 	}
@@ -256,7 +243,7 @@ static int unknown(const struct reader *x, const char *dashes, const char *name)
 {
 	struct spelling s = {.wanted = name};
 	const struct option_row *r;
-	for (size_t i = 0; (r = option_at(x->program, i, NULL, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++)
 		if (!r->hidden)
 			spelling_offer(&s, r->name);
 	return error_set(x->e, EINVAL, "unknown option '%s%s'%s%s%s", dashes, name, s.best ? "; did you mean '--" : "",
@@ -264,17 +251,16 @@ static int unknown(const struct reader *x, const char *dashes, const char *name)
 }
 
 /* The row of a name or of an unambiguous prefix; NULL: an error. */
-static const struct option_row *find(const struct reader *x, const char *name, size_t *offset)
+static const struct option_row *find(const struct reader *x, const char *name)
 {
 	const struct option_row *r, *found = NULL;
 	char list[512] = "", shown[NAME_MOST + 2];
-	size_t n = strlen(name), shift, count = 0;
-	for (size_t i = 0; (r = option_at(x->program, i, NULL, &shift)) != NULL; i++) {
+	size_t n = strlen(name), count = 0;
+	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++) {
 		bool whole = strcmp(r->name, name) == 0;
 		if (!whole && (r->hidden || n == 0 || strncmp(r->name, name, n) != 0))
 			continue;
 		found = r;
-		*offset = shift;
 		if (whole)
 			return r;
 		count++;
@@ -288,7 +274,7 @@ static const struct option_row *find(const struct reader *x, const char *name, s
 	return count == 1 ? found : NULL;
 }
 
-static int apply(struct reader *x, const struct option_row *r, size_t offset, char *arg)
+static int apply(struct reader *x, const struct option_row *r, char *arg)
 {
 	if (r->kind >= OPTION_IS_HELP) {
 		x->asked = r->kind;
@@ -299,29 +285,28 @@ static int apply(struct reader *x, const struct option_row *r, size_t offset, ch
 			return error_set(x->e, EINVAL, "option '--%s' needs an argument: %s", r->name, r->arg);
 		arg = x->argv[++x->at];
 	}
-	return store_argument(r, target_of(x, offset), arg, x->e);
+	return store_argument(r, x->target, arg, x->e);
 }
 
 static int read_long(struct reader *x, char *text)
 {
 	char name[NAME_MOST];
 	char *equals = strchr(text, '=');
-	size_t offset = 0;
 	text_copy(name, sizeof name, text);
 	if (equals && (size_t)(equals - text) < sizeof name)
 		name[equals - text] = 0;
-	const struct option_row *r = find(x, name, &offset);
+	const struct option_row *r = find(x, name);
 	if (!r)
 		return -EINVAL;
 	if (equals && !r->arg)
 		return error_set(x->e, EINVAL, "option '--%s' takes no argument", r->name);
-	return apply(x, r, offset, equals ? equals + 1 : NULL);
+	return apply(x, r, equals ? equals + 1 : NULL);
 }
 
-static const struct option_row *find_key(const struct reader *x, char key, size_t *offset)
+static const struct option_row *find_key(const struct reader *x, char key)
 {
 	const struct option_row *r;
-	for (size_t i = 0; (r = option_at(x->program, i, NULL, offset)) != NULL; i++)
+	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++)
 		if (r->key == key)
 			return r;
 	return NULL;
@@ -331,11 +316,10 @@ static int read_short(struct reader *x, char *text)
 {
 	int rc = 0;
 	for (char *k = text; !rc && x->asked == OPTION_IS_END && *k; k++) {
-		size_t offset;
-		const struct option_row *r = find_key(x, *k, &offset);
+		const struct option_row *r = find_key(x, *k);
 		if (!r)
 			return unknown(x, "-", text);
-		rc = apply(x, r, offset, r->arg && k[1] ? k + 1 : NULL);
+		rc = apply(x, r, r->arg && k[1] ? k + 1 : NULL);
 		if (r->arg)
 			break;
 	}
@@ -354,9 +338,8 @@ static int read_word(struct reader *x, char *text)
 
 static bool is_option(const struct reader *x, const char *text)
 {
-	size_t offset;
 	bool negative = text[0] == '-' && text[1] >= '0' && text[1] <= '9';
-	return text[0] == '-' && text[1] && !(negative && !find_key(x, text[1], &offset));
+	return text[0] == '-' && text[1] && !(negative && !find_key(x, text[1]));
 }
 
 static int read_all(struct reader *x)
@@ -378,9 +361,8 @@ static int read_all(struct reader *x)
 static int needed(const struct reader *x)
 {
 	const struct option_row *r;
-	size_t offset;
-	for (size_t i = 0; (r = option_at(x->program, i, NULL, &offset)) != NULL; i++)
-		if (r->needed && !*(const char **)((char *)target_of(x, offset) + r->offset))
+	for (size_t i = 0; (r = option_at(x->program, i, NULL)) != NULL; i++)
+		if (r->needed && !*(const char **)((char *)x->target + r->offset))
 			return error_set(x->e, EINVAL, "--%s %s is needed%s%s%s", r->name, r->arg,
 					 r->environment ? " (or $" : "", r->environment ? r->environment : "",
 					 r->environment ? ")" : "");
@@ -399,7 +381,7 @@ static int check(const struct reader *x)
 		return error_set(x->e, EINVAL, "a verb is missing: %s", list);
 	}
 	if (p->shared && p->shared->check)
-		rc = p->shared->check(target_of(x, p->shared_offset), x->e);
+		rc = p->shared->check(x->target, x->e);
 	if (!rc && p->own.check)
 		rc = p->own.check(x->target, x->e);
 	return rc ? rc : needed(x);
@@ -411,7 +393,7 @@ int options_parse(const struct program *p, int argc, char **argv, void *target, 
 	struct reader x = {.program = p, .argc = argc, .argv = argv, .target = target, .e = e};
 	int rc = option_defaults(&p->own, target, e);
 	if (!rc && p->shared)
-		rc = option_defaults(p->shared, target_of(&x, p->shared_offset), e);
+		rc = option_defaults(p->shared, target, e);
 	if (!rc)
 		rc = environment(&x);
 	if (!rc)

@@ -105,8 +105,7 @@ struct program {
 	const char *details;  /* further text */
 	const char *exits;    /* "0 done, 1 failed, 2 usage" */
 	struct option_table own;
-	const struct option_table *shared; /* shared by several programs; NULL: none */
-	size_t shared_offset;		   /* offset of its struct in the one that `own` fills */
+	const struct option_table *shared; /* by several programs: fills the struct's first member; NULL: none */
 	option_values *verbs;		   /* accepted first words; NULL: any */
 	/* Takes the index-th word that is not an option; NULL: there must be none. */
 	int (*word)(void *target, size_t index, char *word, struct error *e);
@@ -121,9 +120,7 @@ int option_defaults(const struct option_table *t, void *target, struct error *e)
 int options_parse(const struct program *p, int argc, char **argv, void *target, enum option_kind *asked,
 		  struct error *e);
 
-/* All rows of a program, those that every program has at the end; NULL after the last. group and offset (into what
- * the table fills) may be NULL. */
-const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group,
-				   size_t *offset);
+/* All rows of a program, those that every program has at the end; NULL after the last. group may be NULL. */
+const struct option_row *option_at(const struct program *p, size_t i, const struct option_group **group);
 
 #endif

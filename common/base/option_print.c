@@ -118,7 +118,7 @@ static void print_help(FILE *out, const struct program *p)
 	const struct option_row *r;
 	print_forms(out, p);
 	fill_lines(out, p->summary);
-	for (size_t i = 0; (r = option_at(p, i, &group, NULL)) != NULL; i++) {
+	for (size_t i = 0; (r = option_at(p, i, &group)) != NULL; i++) {
 		if (r->hidden)
 			continue;
 		if (group != last)
@@ -146,7 +146,7 @@ static void print_usage(FILE *out, const struct program *p)
 		return;
 	t = (struct text){line, DESCRIPTION};
 	text_put(&t, "Usage: %s", p->name);
-	for (size_t i = 0; (r = option_at(p, i, NULL, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
 		if (!r->hidden)
 			text_put(&t, " [--%s%s%s]", r->name, r->arg ? "=" : "", r->arg ? r->arg : "");
 	if (p->words)
@@ -225,7 +225,7 @@ static void roff_environment(FILE *out, const struct program *p)
 {
 	const struct option_row *r;
 	bool first = true;
-	for (size_t i = 0; (r = option_at(p, i, NULL, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
 		if (r->environment) {
 			fprintf(out, "%s.TP\n\\fB%s\\fR\nStands in for \\fB\\-\\-", first ? ".SH ENVIRONMENT\n" : "",
 				r->environment);
@@ -253,7 +253,7 @@ static void print_man(FILE *out, const struct program *p)
 		roff_lines(out, p->details);
 	}
 	fputs(".SH OPTIONS\n", out);
-	for (size_t i = 0; (r = option_at(p, i, &group, NULL)) != NULL; i++) {
+	for (size_t i = 0; (r = option_at(p, i, &group)) != NULL; i++) {
 		if (r->hidden)
 			continue;
 		if (group != last && group->title) {
@@ -321,11 +321,11 @@ static void print_completion(FILE *out, const struct program *p)
 		"\telif [[ $option == = ]]; then\n\t\toption=${COMP_WORDS[COMP_CWORD - 2]}\n\tfi\n"
 		"\tcase $option in\n",
 		p->name, p->name, function);
-	for (size_t i = 0; (r = option_at(p, i, NULL, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
 		if (r->arg && !r->hidden)
 			print_case(out, r);
 	fputs("\t*)\n\t\tif [[ $word == -* ]]; then\n\t\t\tmapfile -t COMPREPLY < <(compgen -W \"", out);
-	for (size_t i = 0; (r = option_at(p, i, NULL, NULL)) != NULL; i++)
+	for (size_t i = 0; (r = option_at(p, i, NULL)) != NULL; i++)
 		if (!r->hidden)
 			fprintf(out, "%s--%s", i ? " " : "", r->name);
 	fputs("\" -- \"$word\")\n\t\telse\n\t\t\tmapfile -t COMPREPLY < <(compgen -W \"", out);

@@ -17,13 +17,13 @@ struct part {
 };
 
 struct arguments {
+	struct part part;
 	const char *output, *tls, *name, *word[2];
 	bool wait, quiet;
 	double stops, share, trim;
 	uint32_t threads;
 	uint64_t bytes;
 	char kind[16];
-	struct part part;
 };
 
 static const char *kinds(size_t i)
@@ -106,7 +106,6 @@ static const struct program program = {
 	.exits = "0 done, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &part,
-	.shared_offset = offsetof(struct arguments, part),
 	.verbs = verbs,
 	.word = take_word,
 };

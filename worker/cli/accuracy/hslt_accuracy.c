@@ -21,16 +21,16 @@
 #include <string.h>
 
 struct arguments {
-	const char *scene, *output, *csv, *accuracy, *reference;
+	struct render_arguments render;
+	const char *csv, *accuracy, *reference;
 	unsigned threads;
 	double budget, seconds;
 	uint64_t rounds;
 	bool quiet;
-	struct render_arguments render;
 };
 
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The report (HTML)", OPTION_TEXT(struct arguments, output)},
+	{"output", 'o', "FILE", "The report (HTML)", OPTION_TEXT(struct arguments, render.output)},
 	{"csv", 0, "FILE", "Also write the figures as comma-separated values", OPTION_TEXT(struct arguments, csv)},
 	{"budget", 0, "MINUTES", "Total time, divided equally; more makes the intervals narrower",
 	 OPTION_NUMBER(struct arguments, budget, 0, 1e6), .above = true, .below = true, .standard = "10"},
@@ -52,15 +52,10 @@ static const struct option_row rows[] = {
 	{0},
 };
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
-{
-	return option_scene(index, word, &((struct arguments *)target)->scene, e);
-}
-
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	if (!a->scene || !a->output)
+	if (!a->render.scene || !a->render.output)
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
 	if (plan_request_is_bounded(&a->render.plan))
 		return error_set(e, EINVAL,
@@ -83,8 +78,7 @@ static const struct program program = {
 	.exits = "0 done, 1 failed, 2 usage",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
-	.shared_offset = offsetof(struct arguments, render),
-	.word = take_word,
+	.word = option_scene,
 };
 
 struct session {
@@ -115,7 +109,7 @@ static void show(void *user, double fraction, const char *state)
 static int load(struct session *s, struct error *e)
 {
 	struct render_arguments *r = &s->a->render;
-	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
+	int rc = scene_path_split(s->a->render.scene, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
 	s->folders = option_folders(r, s->folder);
@@ -198,7 +192,7 @@ static int report(struct session *s, struct error *e)
 	if (!rc && s->a->csv)
 		rc = accuracy_csv(&x, s->a->csv, e);
 	if (!rc)
-		rc = accuracy_html(&x, s->a->output, e);
+		rc = accuracy_html(&x, s->a->render.output, e);
 	return rc;
 }
 
@@ -221,8 +215,9 @@ static void print_summary(const struct session *s)
 
 static int run_session(struct session *s, struct error *e)
 {
-	const char *inputs[] = {s->a->scene, s->a->reference};
-	s->outputs = (struct output_files){{{"-o", s->a->output, OUTPUT_HTML}, {"--csv", s->a->csv, OUTPUT_CSV}}};
+	const char *inputs[] = {s->a->render.scene, s->a->reference};
+	s->outputs =
+		(struct output_files){{{"-o", s->a->render.output, OUTPUT_HTML}, {"--csv", s->a->csv, OUTPUT_CSV}}};
 	int rc = output_files_check(&s->outputs, inputs, 2, e);
 	if (!rc && s->a->reference)
 		rc = picture_read(&s->reference, s->a->reference, e);
@@ -237,7 +232,7 @@ static int run_session(struct session *s, struct error *e)
 	if (!rc && !s->a->quiet)
 		print_summary(s);
 	if (!rc && s->run.interrupted)
-		rc = error_set(e, EINTR, "interrupted: %s holds the figures so far", s->a->output);
+		rc = error_set(e, EINTR, "interrupted: %s holds the figures so far", s->a->render.output);
 	return rc;
 }
 

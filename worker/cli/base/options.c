@@ -25,16 +25,16 @@ unsigned option_threads_default(void)
 	return processors > 0 ? (unsigned)processors : 1;
 }
 
-int option_scene(size_t index, const char *word, const char **scene, struct error *e)
+int option_scene(void *target, size_t index, char *word, struct error *e)
 {
-	*scene = word;
+	((struct render_arguments *)target)->scene = word;
 	return index == 0 ? 0 : error_set(e, EINVAL, "one scene at a time");
 }
 
-int option_image(const char *arg, const char **image, struct error *e)
+int option_image(void *target, char *arg, struct error *e)
 {
 	const char *format = picture_name_format(arg);
-	*image = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
+	((struct render_arguments *)target)->output = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
 	if (!format || strcmp(format, ".exr") == 0)
 		return 0;
 	return error_set(e, EINVAL,
@@ -42,26 +42,28 @@ int option_image(const char *arg, const char **image, struct error *e)
 			 arg);
 }
 
-int option_path(const char *arg, const char **paths, size_t *count, struct error *e)
+int option_path(void *target, char *arg, struct error *e)
 {
+	struct render_arguments *a = target;
 	struct stat st;
 	if (stat(arg, &st) || !S_ISDIR(st.st_mode))
 		return error_set(e, EINVAL, "--path: '%s' is not a folder", arg);
-	if (*count == OPTION_PATHS_MAX)
+	if (a->path_count == OPTION_PATHS_MAX)
 		return error_set(e, EINVAL, "at most %d times --path", OPTION_PATHS_MAX);
-	paths[(*count)++] = arg;
+	a->paths[a->path_count++] = arg;
 	return 0;
 }
 
-int option_define(char *arg, struct scene_define *defines, size_t *count, struct error *e)
+int option_define(void *target, char *arg, struct error *e)
 {
+	struct render_arguments *a = target;
 	char *equals = strchr(arg, '=');
 	if (!equals || equals == arg)
 		return error_set(e, EINVAL, "-D takes NAME=VALUE, not '%s'", arg);
-	if (*count == OPTION_DEFINES_MAX)
+	if (a->define_count == OPTION_DEFINES_MAX)
 		return error_set(e, EINVAL, "at most %d times -D", OPTION_DEFINES_MAX);
 	*equals = 0;
-	defines[(*count)++] = (struct scene_define){arg, equals + 1};
+	a->defines[a->define_count++] = (struct scene_define){arg, equals + 1};
 	return 0;
 }
 
@@ -93,18 +95,6 @@ static int take_integrator(void *target, char *arg, struct error *e)
 	(void)e;
 	text_copy(a->plan.integrator, sizeof a->plan.integrator, arg);
 	return 0;
-}
-
-static int take_define(void *target, char *arg, struct error *e)
-{
-	struct render_arguments *a = target;
-	return option_define(arg, a->defines, &a->define_count, e);
-}
-
-static int take_path(void *target, char *arg, struct error *e)
-{
-	struct render_arguments *a = target;
-	return option_path(arg, a->paths, &a->path_count, e);
 }
 
 /* Nonzero: they are not `count` numbers with these separators. */
@@ -325,9 +315,9 @@ static const struct option_row what_rows[] = {
 	 "Effects to simulate or omit, whether or not the scene needs them: all, or a list such as -dispersion,+aperture "
 	 "(hslt-render --explain shows them)",
 	 OPTION_TAKE(take_effects)},
-	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(take_define)},
+	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(option_define)},
 	{"path", 0, "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
-	 OPTION_TAKE(take_path)},
+	 OPTION_TAKE(option_path)},
 	{"sensor", 0, "N|ID",
 	 "Sensor of the scene to use: its number, counted from 1 (1), or its id; the same as --set sensor=N",
 	 OPTION_TAKE(take_sensor)},

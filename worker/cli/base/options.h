@@ -9,7 +9,9 @@
 
 enum { OPTION_DEFINES_MAX = PLAN_DEFINES_MAX, OPTION_PATHS_MAX = ASSET_FOLDERS_MAX - 1 };
 
+/* A program's arguments begin with it. */
 struct render_arguments {
+	const char *scene, *output;
 	struct plan_request plan;
 	struct render_options render;
 	struct scene_define defines[OPTION_DEFINES_MAX];
@@ -36,18 +38,14 @@ void option_depth_note(const char *integrator, uint32_t max_depth, char *text, s
 
 unsigned option_threads_default(void); /* number of processors */
 
-/* For rows of tables; -EINVAL with a sentence is a usage error. The file of an image, which is OpenEXR: an error if
- * its name has another ending. "-" is /dev/stdout. */
-int option_image(const char *arg, const char **image, struct error *e);
+/* For rows of tables: they fill a struct render_arguments; -EINVAL with a sentence is a usage error. The output, which
+ * is OpenEXR: an error if its name has another ending. "-" is /dev/stdout. */
+int option_image(void *target, char *arg, struct error *e);
+int option_path(void *target, char *arg, struct error *e);   /* a folder of --path, which must exist */
+int option_define(void *target, char *arg, struct error *e); /* NAME=VALUE of -D, split in place */
 
 /* For a program with one scene: the index-th word that is not an option. */
-int option_scene(size_t index, const char *word, const char **scene, struct error *e);
-
-/* A folder of --path, which must exist, appended to OPTION_PATHS_MAX paths. */
-int option_path(const char *arg, const char **paths, size_t *count, struct error *e);
-
-/* NAME=VALUE of -D, split in place, appended to OPTION_DEFINES_MAX defines. */
-int option_define(char *arg, struct scene_define *defines, size_t *count, struct error *e);
+int option_scene(void *target, size_t index, char *word, struct error *e);
 
 /* render_scene_read; a sensor given by id becomes a number in the settings. */
 int option_scene_read(struct scene *s, const struct asset_source *assets, const char *name, struct render_arguments *a,

@@ -36,21 +36,15 @@
 #include <string.h>
 
 struct arguments {
-	const char *scene, *output, *stats, *plot;
+	struct render_arguments render;
+	const char *stats, *plot;
 	unsigned threads;
 	double pilot; /* s; 0: not given */
 	bool quiet, estimate, explain, json;
-	struct render_arguments render;
 };
 
-static int take_output(void *target, char *arg, struct error *e)
-{
-	struct arguments *a = target;
-	return option_image(arg, &a->output, e);
-}
-
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The image (OpenEXR); -: stdout", OPTION_TAKE(take_output)},
+	{"output", 'o', "FILE", "The image (OpenEXR); -: stdout", OPTION_TAKE(option_image)},
 	{"threads", 0, "N", "Threads (one per processor); does not change the bits",
 	 OPTION_COUNT(struct arguments, threads, 1, 1024)},
 	{"stats", 0, "FILE",
@@ -66,19 +60,14 @@ static const struct option_row rows[] = {
 	{0},
 };
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
-{
-	return option_scene(index, word, &((struct arguments *)target)->scene, e);
-}
-
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	if (!a->scene || (!a->output && !a->estimate && !a->explain))
+	if (!a->render.scene || (!a->render.output && !a->estimate && !a->explain))
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
-	if (a->estimate && (a->output || a->stats))
+	if (a->estimate && (a->render.output || a->stats))
 		return error_set(e, EINVAL, "--estimate makes no image and cannot be combined with -o or --stats");
-	if (a->explain && (a->output || a->stats || a->estimate))
+	if (a->explain && (a->render.output || a->stats || a->estimate))
 		return error_set(e, EINVAL,
 				 "--explain renders nothing and cannot be combined with -o, --stats or --estimate");
 	if (!a->estimate && (a->pilot > 0 || a->plot))
@@ -108,8 +97,7 @@ static const struct program program = {
 		 "note says where)",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
-	.shared_offset = offsetof(struct arguments, render),
-	.word = take_word,
+	.word = option_scene,
 };
 
 struct session {
@@ -153,7 +141,7 @@ static int load(struct session *s, struct error *e)
 {
 	struct scene scene;
 	double begin = clock_seconds();
-	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
+	int rc = scene_path_split(s->a->render.scene, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
 	struct asset_folders folders = option_folders(&s->a->render, s->folder);
@@ -276,7 +264,7 @@ static int resume(void *user, struct bootstrap *b, struct error *e)
 	char text[512], fingerprint[FINGERPRINT_MAX];
 	(void)e;
 	fingerprint_make(fingerprint);
-	kept_bootstrap_begin(&s->kept, s->a->output, fingerprint, &s->plan, &s->a->render);
+	kept_bootstrap_begin(&s->kept, s->a->render.output, fingerprint, &s->plan, &s->a->render);
 	kept_bootstrap_resume(&s->kept, b, text, sizeof text);
 	if (*text && !s->a->quiet)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
@@ -340,7 +328,7 @@ static int write_image(const struct session *s, struct error *e)
 	int rc = image_file_encode(&s->image, &s->plan, &x, &bytes, &size, e);
 	if (rc)
 		return rc;
-	rc = image_file_write(s->a->output, bytes, size, e);
+	rc = image_file_write(s->a->render.output, bytes, size, e);
 	mem_free(bytes);
 	return rc;
 }
@@ -441,17 +429,17 @@ static int check_outputs(struct session *s, struct error *e)
 {
 	const struct arguments *a = s->a;
 	s->outputs = (struct output_files){{
-		{"-o", a->output, OUTPUT_EXR},
+		{"-o", a->render.output, OUTPUT_EXR},
 		{"--stats", a->stats, OUTPUT_JSON},
 		{"--plot", a->plot, output_format_of_plot(a->plot ? a->plot : "")},
 	}};
-	return output_files_check(&s->outputs, &a->scene, 1, e);
+	return output_files_check(&s->outputs, &a->render.scene, 1, e);
 }
 
 static int run_session(struct session *s, struct error *e)
 {
 	if (s->a->explain)
-		return explain(s->a->scene, &s->a->render, s->a->json, &s->usage, e);
+		return explain(s->a->render.scene, &s->a->render, s->a->json, &s->usage, e);
 	int rc = check_outputs(s, e);
 	if (rc || s->a->estimate)
 		return rc ? rc : estimate(s, e);
@@ -474,7 +462,7 @@ static int run_session(struct session *s, struct error *e)
 	if (!rc && s->image.rel_mse_doubt)
 		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
-		rc = error_set(e, EINTR, "interrupted: %s holds %llu complete round%s", s->a->output,
+		rc = error_set(e, EINTR, "interrupted: %s holds %llu complete round%s", s->a->render.output,
 			       (unsigned long long)s->image.rounds, s->image.rounds == 1 ? "" : "s");
 	return rc;
 }

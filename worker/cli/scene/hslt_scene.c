@@ -10,30 +10,18 @@
 #include <string.h>
 
 struct arguments {
+	struct render_arguments render;
 	const char *verb;
-	bool json;
-	struct scene_request request;
+	bool json, lenient;
 };
 
-static int take_define(void *target, char *arg, struct error *e)
-{
-	struct arguments *a = target;
-	return option_define(arg, a->request.defines, &a->request.define_count, e);
-}
-
-static int take_path(void *target, char *arg, struct error *e)
-{
-	struct arguments *a = target;
-	return option_path(arg, a->request.paths, &a->request.path_count, e);
-}
-
 static const struct option_row rows[] = {
-	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(take_define)},
+	{"define", 'D', "NAME=VALUE", "Value of $NAME in the scene", OPTION_TAKE(option_define)},
 	{"path", 'p', "FOLDER", "Search here for files that are not in the scene's folder; may be repeated",
-	 OPTION_TAKE(take_path)},
+	 OPTION_TAKE(option_path)},
 	{"lenient", 'l', NULL,
 	 "Like --lenient of hslt-render: leave out or replace what is not supported, with a note instead of a problem",
-	 OPTION_FLAG(struct arguments, request.lenient)},
+	 OPTION_FLAG(struct arguments, lenient)},
 	{"json", 'j', NULL, "show: one JSON object", OPTION_FLAG(struct arguments, json)},
 	{0},
 };
@@ -49,7 +37,7 @@ static int take_word(void *target, size_t index, char *word, struct error *e)
 	struct arguments *a = target;
 	if (index > 1)
 		return error_set(e, EINVAL, "only one scene is accepted");
-	*(index == 0 ? &a->verb : &a->request.path) = word;
+	*(index == 0 ? &a->verb : &a->render.scene) = word;
 	return 0;
 }
 
@@ -57,9 +45,9 @@ static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
 	bool reads = strcmp(a->verb, "compatibility") != 0;
-	if (reads && !a->request.path)
+	if (reads && !a->render.scene)
 		return error_set(e, EINVAL, "`%s SCENE.xml`: a scene is needed", a->verb);
-	if (!reads && a->request.path)
+	if (!reads && a->render.scene)
 		return error_set(e, EINVAL, "compatibility does not take a scene");
 	if (a->json && strcmp(a->verb, "show") != 0)
 		return error_set(e, EINVAL, "--json is only for show");
@@ -91,12 +79,12 @@ int main(int argc, char **argv)
 	bool bad = false;
 	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
-	if (!a.request.path) {
+	if (!a.render.scene) {
 		compatibility_print(stdout);
 		return 0;
 	}
-	int rc = strcmp(a.verb, "check") == 0 ? scene_report_check(&a.request, &bad, &e)
-					      : scene_report_show(&a.request, a.json, &e);
+	int rc = strcmp(a.verb, "check") == 0 ? scene_report_check(&a.render, a.lenient, &bad, &e)
+					      : scene_report_show(&a.render, a.lenient, a.json, &e);
 	if (rc)
 		fprintf(stderr, "hslt-scene: %s\n", e.text);
 	return rc || bad ? 1 : 0;

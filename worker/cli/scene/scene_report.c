@@ -27,12 +27,12 @@ struct opened {
 	struct asset_source assets;
 };
 
-static int open_scene(const struct scene_request *r, struct opened *o, struct error *e)
+static int open_scene(const struct render_arguments *a, struct opened *o, struct error *e)
 {
-	int rc = scene_path_split(r->path, &o->folder, &o->name, e);
+	int rc = scene_path_split(a->scene, &o->folder, &o->name, e);
 	if (rc)
 		return rc;
-	o->folders = asset_folders_of(o->folder, r->paths, r->path_count);
+	o->folders = option_folders(a, o->folder);
 	o->assets = asset_search(&o->folders);
 	return 0;
 }
@@ -190,14 +190,14 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	return 0;
 }
 
-int scene_report_check(const struct scene_request *r, bool *bad, struct error *e)
+int scene_report_check(const struct render_arguments *a, bool lenient, bool *bad, struct error *e)
 {
 	struct opened o;
 	struct scene s;
-	int rc = open_scene(r, &o, e);
+	int rc = open_scene(a, &o, e);
 	if (rc)
 		return rc;
-	rc = scene_read_all(&s, &o.assets, o.name, render_plugins(), r->defines, r->define_count, r->lenient, e);
+	rc = scene_read_all(&s, &o.assets, o.name, render_plugins(), a->defines, a->define_count, lenient, e);
 	if (!rc) {
 		rc = print_check(&s, &o.assets, o.name, bad);
 		scene_fini(&s);
@@ -320,15 +320,15 @@ static void print_text(json_t *all)
 	json_array_foreach(json_object_get(all, "notes"), i, one) printf("note: %s\n", json_string_value(one));
 }
 
-int scene_report_show(const struct scene_request *r, bool json, struct error *e)
+int scene_report_show(const struct render_arguments *a, bool lenient, bool json, struct error *e)
 {
 	struct opened o;
 	struct scene s;
-	int rc = open_scene(r, &o, e);
+	int rc = open_scene(a, &o, e);
 	if (rc)
 		return rc;
-	rc = (r->lenient ? scene_read_lenient : scene_read)(&s, &o.assets, o.name, render_plugins(), r->defines,
-							    r->define_count, e);
+	rc = (lenient ? scene_read_lenient : scene_read)(&s, &o.assets, o.name, render_plugins(), a->defines,
+							 a->define_count, e);
 	if (!rc) {
 		json_t *all = describe(&s, &o, e);
 		if (all && json)

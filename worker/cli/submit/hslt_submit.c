@@ -25,9 +25,9 @@
 #include <string.h>
 
 struct arguments {
-	const char *coordinator, *tls, *scene, *output, *name;
-	struct submit_request request;
 	struct render_arguments render;
+	const char *coordinator, *tls, *name;
+	struct submit_request request;
 	const char *plot;
 	double pilot;	 /* s; 0: not given */
 	double patience; /* s */
@@ -36,13 +36,7 @@ struct arguments {
 
 static bool to_stdout(const struct arguments *a)
 {
-	return a->output && strcmp(a->output, "/dev/stdout") == 0;
-}
-
-static int take_output(void *target, char *arg, struct error *e)
-{
-	struct arguments *a = target;
-	return option_image(arg, &a->output, e);
+	return a->render.output && strcmp(a->render.output, "/dev/stdout") == 0;
 }
 
 static int take_priority(void *target, char *arg, struct error *e)
@@ -59,7 +53,7 @@ static int take_priority(void *target, char *arg, struct error *e)
 static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct arguments, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
-	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_TAKE(take_output)},
+	{"output", 'o', "FILE", "The image; -: stdout, and the job's id goes to stderr", OPTION_TAKE(option_image)},
 	{"priority", 0, "P", "-100 to 100, higher first", OPTION_TAKE(take_priority), .standard = "0"},
 	{"name", 0, "NAME", "Displayed name of the job (the scene's file name)",
 	 OPTION_NAME(struct arguments, name, 127)},
@@ -80,19 +74,14 @@ static const struct option_row rows[] = {
 	{0},
 };
 
-static int take_word(void *target, size_t index, char *word, struct error *e)
-{
-	return option_scene(index, word, &((struct arguments *)target)->scene, e);
-}
-
 static int check(void *target, struct error *e)
 {
 	const struct arguments *a = target;
-	if (!a->scene || (!a->output && !a->estimate))
+	if (!a->render.scene || (!a->render.output && !a->estimate))
 		return error_set(e, EINVAL, "a scene and -o FILE are needed");
 	if (a->request.verify > 0 && a->request.mixed)
 		return error_set(e, EINVAL, "results of --mixed workers cannot be compared: no --verify");
-	if (a->estimate && (a->output || a->wait))
+	if (a->estimate && (a->render.output || a->wait))
 		return error_set(e, EINVAL, "--estimate makes no image and cannot be combined with -o or --wait");
 	if (!a->estimate && (a->pilot > 0 || a->plot))
 		return error_set(e, EINVAL, "--pilot and --plot require --estimate");
@@ -124,8 +113,7 @@ static const struct program program = {
 		"(the job continues)",
 	.own = {(const struct option_group[]){{NULL, rows}, {0}}, check},
 	.shared = &render_table,
-	.shared_offset = offsetof(struct arguments, render),
-	.word = take_word,
+	.word = option_scene,
 };
 
 /* The default name for a later fetch. The farm does not need the folder. */
@@ -141,7 +129,7 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
 	if (a->json) {
 		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name,
-				      "output", a->output, "plan", plan, "state", state);
+				      "output", a->render.output, "plan", plan, "state", state);
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
@@ -160,7 +148,8 @@ static void say_at_the_end(const struct arguments *a, uint64_t job)
 	static char text[512];
 	unsigned long long id = job;
 	char fetch[256], cancel[64];
-	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id, to_stdout(a) ? "-" : a->output);
+	int width = snprintf(fetch, sizeof fetch, "hslt-job fetch j%llu -o %.200s", id,
+			     to_stdout(a) ? "-" : a->render.output);
 	snprintf(cancel, sizeof cancel, "hslt-job cancel j%llu", id);
 	snprintf(
 		text, sizeof text,
@@ -187,7 +176,7 @@ static int submit_scene(struct arguments *a, struct client **cl, const struct sc
 		print_id(a, job.job, plan, "queued");
 	if (!a->wait)
 		return 0;
-	rc = reconnect_job(cl, &o, &job, a->output, &end, e);
+	rc = reconnect_job(cl, &o, &job, a->render.output, &end, e);
 	if (!rc && !end.has_result)
 		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job.job,
 			end.why);
@@ -269,11 +258,11 @@ int main(int argc, char **argv)
 	output_check_at_exit();
 	crash_exit("hslt-submit");
 	program_options(&program, argc, argv, &a);
-	struct output_files outputs = {{{"-o", a.wait ? a.output : NULL, OUTPUT_EXR},
+	struct output_files outputs = {{{"-o", a.wait ? a.render.output : NULL, OUTPUT_EXR},
 					{"--plot", a.plot, output_format_of_plot(a.plot ? a.plot : "")}}};
-	int rc = output_files_check(&outputs, &a.scene, 1, &e);
+	int rc = output_files_check(&outputs, &a.render.scene, 1, &e);
 	if (!rc)
-		rc = scene_bundle_read(&b, a.scene, &a.render, &outputs, &e);
+		rc = scene_bundle_read(&b, a.render.scene, &a.render, &outputs, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		return 1;
@@ -290,7 +279,7 @@ int main(int argc, char **argv)
 	char note[512];
 	for (size_t i = 0; render_scene_note(&b.summary, i, note, sizeof note); i++)
 		fprintf(stderr, "hslt-submit: note: %s\n", note);
-	a.request.output = a.estimate ? "" : last_part(a.output);
+	a.request.output = a.estimate ? "" : last_part(a.render.output);
 	a.request.name = a.name ? a.name : b.scene;
 	if ((rc = knock(&a, &e))) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
