@@ -9,8 +9,6 @@
 #include "common/base/list.h"
 #include "common/base/mem.h"
 
-#include <string.h>
-
 enum { PATH_MOST = 4096 };
 
 struct blob_batch {

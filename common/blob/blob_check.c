@@ -9,7 +9,6 @@
 #include <fcntl.h>
 #include <openssl/evp.h>
 #include <stdio.h>
-#include <string.h>
 
 struct blob_check {
 	struct blob_store *store;

@@ -9,7 +9,6 @@
 #include "common/base/version.h"
 #include "common/exr/exr_stream.h"
 
-#include <stdio.h>
 #include <string.h>
 
 void exr_image_fini(struct exr_image *img)

@@ -9,7 +9,6 @@
 #include "common/base/error.h"
 
 #include <netdb.h>
-#include <netinet/in.h>
 #include <stdbool.h>
 #include <sys/socket.h>
 

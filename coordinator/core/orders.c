@@ -8,7 +8,6 @@
 
 #include <assert.h>
 #include <math.h>
-#include <string.h>
 
 /* The live job that the event names; NULL: the event has been answered. */
 static struct job *meant(struct farm *f, const struct event *ev)

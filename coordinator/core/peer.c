@@ -5,7 +5,6 @@
 #include "coordinator/core/job.h"
 
 #include <math.h>
-#include <string.h>
 
 enum { PAUSE_DOUBLINGS = 6 };
 

@@ -6,7 +6,6 @@
 #include "coordinator/core/lease.h"
 
 #include <stdio.h>
-#include <string.h>
 
 void verify_forget(struct farm *f, struct job *j, const struct slot *s)
 {

@@ -8,7 +8,6 @@
 #ifndef COORDINATOR_CORE_VERIFY_H
 #define COORDINATOR_CORE_VERIFY_H
 
-#include "common/film/batch.h"
 #include "coordinator/core/proof.h"
 
 #include <stdbool.h>

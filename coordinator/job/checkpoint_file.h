@@ -17,7 +17,6 @@
 #define COORDINATOR_JOB_CHECKPOINT_FILE_H
 
 #include "common/base/checked_file.h"
-#include "coordinator/core/farm.h"
 #include "coordinator/job/stored.h"
 
 /* Writes the job's current state, to be followed by the next journal. */

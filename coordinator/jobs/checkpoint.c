@@ -25,7 +25,6 @@
 
 #include <assert.h>
 #include <stdio.h>
-#include <string.h>
 
 static const double pause_seconds = 30; /* after a failed attempt */
 

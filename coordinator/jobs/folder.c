@@ -6,7 +6,6 @@
 #include "coordinator/jobs/late_feed.h"
 
 #include <errno.h>
-#include <string.h>
 
 static const double every_seconds = 1;
 

@@ -18,7 +18,6 @@
 #include "coordinator/store/old_spool.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 enum { RECORD_MOST = 1 << 16, NOTE_MOST = 1 << 28 };
 static const char record_file[] = "job.json", row_file[] = "order";

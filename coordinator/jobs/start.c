@@ -31,8 +31,6 @@
 #include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 
-#include <string.h>
-
 /* One at a time, so that nobody else waits for all of them. */
 static void on_drain(uv_timer_t *t)
 {

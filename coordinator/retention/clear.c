@@ -23,7 +23,6 @@
 #include "coordinator/retention/keep.h"
 
 #include <math.h>
-#include <string.h>
 
 static const double every_seconds = 3600, soon_seconds = 2, fresh_seconds = 60, tick_seconds = 0.005;
 static const char *const results[] = {"result.exr", "preview.exr", "log"};

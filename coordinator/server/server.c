@@ -24,7 +24,6 @@
 
 #include <assert.h>
 #include <signal.h>
-#include <string.h>
 
 enum { BACKLOG = 4096 };
 

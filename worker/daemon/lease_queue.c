@@ -19,7 +19,6 @@
 #include "worker/daemon/lease_queue.h"
 
 #include "common/base/log.h"
-#include "common/base/mem.h"
 #include "worker/daemon/fetch.h"
 #include "worker/daemon/lease_list.h"
 #include "worker/daemon/outgoing.h"

@@ -7,7 +7,6 @@
 #include "worker/daemon/supervise.h"
 
 #include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 #define CONFIG struct agent_config

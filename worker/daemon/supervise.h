@@ -8,8 +8,6 @@
 #ifndef WORKER_DAEMON_SUPERVISE_H
 #define WORKER_DAEMON_SUPERVISE_H
 
-#include "common/base/error.h"
-
 /* Calls run in a process of its own, again after each signal that ends it. Returns the program's exit code in the
  * supervisor, and never in the other. Call before there are threads. */
 int supervise(unsigned threads, int (*run)(void *user), void *user);

@@ -6,7 +6,6 @@
 #ifndef WORKER_RENDER_FINGERPRINT_H
 #define WORKER_RENDER_FINGERPRINT_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 enum { FINGERPRINT_MAX = 256 };

@@ -10,8 +10,6 @@
 
 #include "common/plan/resample.h"
 
-#include <string.h>
-
 enum {
 	GROUPS = PLAN_MAX_GROUPS,
 	SAMPLES = 16, /* of a group's bootstrap; one of them also looks for paths that are too long */

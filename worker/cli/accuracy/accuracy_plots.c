@@ -4,7 +4,6 @@
 #include "common/base/mem.h"
 #include "worker/cli/plot/plot.h"
 
-#include <math.h>
 #include <string.h>
 
 static void put_plot(struct text_file *p, const struct plot *plot)

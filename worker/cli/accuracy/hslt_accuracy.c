@@ -15,10 +15,7 @@
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/base/options.h"
 
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 struct arguments {
 	struct render_arguments render;

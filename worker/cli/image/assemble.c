@@ -9,7 +9,6 @@
 #include "worker/cli/image/assemble.h"
 
 #include "common/base/mem.h"
-#include "common/exr/header.h"
 #include "common/exr/image_file.h"
 #include "common/exr/exr_read.h"
 

@@ -7,8 +7,6 @@
 
 #include "worker/cli/image/picture.h"
 
-#include <stdbool.h>
-
 /*
  * relMSE = mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B over pixels and channels.
  * Errors omit the worst pixels by relMSE; means, m and the peak are over all pixels. Values of A that are not finite

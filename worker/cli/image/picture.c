@@ -7,7 +7,6 @@
 
 #include <png.h>
 #include <stdio.h>
-#include <string.h>
 
 static const char *const rgb_names[3] = {"R", "G", "B"};
 

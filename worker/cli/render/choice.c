@@ -7,7 +7,6 @@
 #include "worker/render/scene/scene.h"
 
 #include <stdio.h>
-#include <string.h>
 
 static int choose(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
 {

@@ -6,7 +6,6 @@
 
 #include <jansson.h>
 #include <stdio.h>
-#include <string.h>
 
 enum { USUAL_SPP = 64 }; /* nothing is rendered, so none need be asked for */
 

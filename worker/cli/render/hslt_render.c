@@ -33,7 +33,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 struct arguments {
 	struct render_arguments render;

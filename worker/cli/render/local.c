@@ -14,7 +14,6 @@
 #include "common/base/mem.h"
 
 #include <pthread.h>
-#include <string.h>
 #include <time.h>
 
 struct thread_pool {

@@ -10,7 +10,6 @@
 #include "common/plan/plan_text.h"
 
 #include <jansson.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -10,7 +10,6 @@
 #include "common/blob/blob.h"
 #include "common/net/client.h"
 #include "common/exr/output_files.h"
-#include "common/plan/plan.h"
 #include "worker/cli/base/options.h"
 
 /* A scene and its files, as read here. */

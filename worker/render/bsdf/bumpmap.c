@@ -7,7 +7,6 @@
  */
 #include "common/base/color.h"
 #include "worker/render/bsdf/bump_shadow.h"
-#include "worker/render/bsdf/create.h"
 
 #include <string.h>
 

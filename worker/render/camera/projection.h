@@ -6,7 +6,6 @@
 #ifndef WORKER_RENDER_CAMERA_PROJECTION_H
 #define WORKER_RENDER_CAMERA_PROJECTION_H
 
-#include "worker/render/math/vec3.h"
 #include "worker/render/scene/settings.h"
 
 struct camera;

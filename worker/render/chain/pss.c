@@ -5,7 +5,6 @@
 
 #include <assert.h>
 #include <math.h>
-#include <string.h>
 
 /* Step sizes of Kelemen et al. 2002, sec. 5: between 1/1024 and 1/64, density proportional to 1/size. */
 #define STEP_SMALL (1.0 / 1024)

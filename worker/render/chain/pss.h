@@ -10,7 +10,6 @@
 
 #include "worker/render/path/sampler.h"
 
-#include <stdbool.h>
 #include <stddef.h>
 
 enum {

@@ -24,7 +24,6 @@
 #ifndef WORKER_RENDER_CHAIN_REDISTRIBUTION_H
 #define WORKER_RENDER_CHAIN_REDISTRIBUTION_H
 
-#include "common/plan/plan.h"
 #include "worker/render/path/brightness.h"
 
 struct redistribution;

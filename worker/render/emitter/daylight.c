@@ -3,8 +3,6 @@
 
 #include "worker/render/math/cie.h"
 
-#include <stdbool.h>
-
 /* By albedo 0 and 1, turbidity 1 to 10 and control point: A to G, I, H, and the mean radiance. */
 enum { TURBIDITIES = 10, POINTS = 6, NUMBERS = 10 };
 static const double table[3][2][TURBIDITIES][POINTS][NUMBERS] = {

@@ -13,7 +13,6 @@
 #define WORKER_RENDER_EMITTER_DELTA_H
 
 #include "worker/render/emitter/emitter.h"
-#include "worker/render/math/mat4.h"
 
 #define DELTA_HEADROOM 1024.0
 

@@ -7,7 +7,6 @@
 #ifndef WORKER_RENDER_FILM_MOMENTS_H
 #define WORKER_RENDER_FILM_MOMENTS_H
 
-#include "common/film/batch.h"
 #include "worker/render/path/path.h"
 
 struct chain_moments {

@@ -16,7 +16,6 @@
 
 #include <float.h>
 #include <stdatomic.h>
-#include <stdio.h>
 #include <sys/types.h>
 
 struct accel {

@@ -8,7 +8,6 @@
 #ifndef WORKER_RENDER_GEOM_RELIEF_H
 #define WORKER_RENDER_GEOM_RELIEF_H
 
-#include "worker/render/math/frame.h"
 #include "worker/render/math/relief.h"
 
 /* A surface point before its normal is bent. */

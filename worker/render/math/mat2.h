@@ -7,7 +7,6 @@
 #define WORKER_RENDER_MATH_MAT2_H
 
 #include <math.h>
-#include <stdbool.h>
 
 #define REAL double
 #define N(name) name

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* An open cylinder from p0 to p1, facing outwards. u is the angle over 2 pi, v the position between p0 and p1. */
 #include "worker/render/shape/declare.h"
-#include "worker/render/shape/quad.h"
 #include "worker/render/shape/round.h"
 
 #include "worker/render/math/frame.h"

@@ -17,7 +17,6 @@
 #include "worker/render/scene/srgb.h"
 #include "worker/render/shape/polygon.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 struct reader {

@@ -19,7 +19,6 @@
 #include "worker/render/shape/mesh.h"
 #include "worker/render/shape/polygon.h"
 
-#include <stdio.h>
 #include <string.h>
 
 enum { PROPERTIES_MAX = 64, ELEMENTS_MAX = 16, WORD_MAX = 64, TICK_INTERVAL = 4096 };

@@ -9,7 +9,6 @@
 
 #include "common/base/arena.h"
 #include "worker/render/math/attribute.h"
-#include "worker/render/math/vec3.h"
 #include "worker/render/scene/scene.h"
 
 /* Decoded numbers of an attribute, shared by all that use them. */

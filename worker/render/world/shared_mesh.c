@@ -3,7 +3,6 @@
 
 #include "worker/render/shape/mesh.h"
 #include "worker/render/shape/shape.h"
-#include "worker/render/world/displacement.h"
 #include "worker/render/world/moving.h"
 #include "worker/render/world/place_mesh.h"
 
