@@ -80,7 +80,7 @@ static struct reference *reference_of(int scene)
 		    &(struct repeats_how){.integrator = scene == GLASS ? "bdpt" : "path",
 					  .test = "calibration reference",
 					  .count = PARTS,
-					  .spp = scene == GLASS ? 10000 : 6000},
+					  .spp = scene == GLASS ? 3000 : 2000},
 		    NULL, NULL, &parts);
 	double mean = 0;
 	for (uint32_t p = 0; p < PARTS; p++) {

@@ -4,7 +4,7 @@
  * them gets wrong the others seldom do. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at
  * the level of tests/support/agree.h. The smallest bias that is found with 95 % probability stands in the row: at most
  * 2 % of the mean for the table (HSLT_TEST_ROWS=1) where the case does not say otherwise, a third of that with FULL=1,
- * which takes 16 times the samples; a plain run, with a thirty-second, is there for what breaks altogether.
+ * which takes 16 times the samples; a plain run, with a sixty-fourth, is there for what breaks altogether.
  */
 #include "worker/render/render.h"
 #include "tests/numerics/rows.h"
@@ -24,7 +24,7 @@ static struct rows rows;
 /* Samples in units of what a case names, and the least bias that has to be found. */
 static uint64_t samples(uint64_t spp)
 {
-	uint64_t n = test_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 8;
+	uint64_t n = test_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 16;
 	return n < 32 ? 32 : n;
 }
 
