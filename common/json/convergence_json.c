@@ -2,15 +2,11 @@
 #include "common/json/convergence_json.h"
 
 #include "common/base/text.h"
+#include "common/json/forecast_json.h"
 #include "common/json/whole.h"
 
 #include <math.h>
 #include <string.h>
-
-static json_t *real_or_null(double x)
-{
-	return isfinite(x) ? json_real(x) : json_null();
-}
 
 static double real_or_nan(const json_t *o, const char *key)
 {
@@ -37,11 +33,11 @@ json_t *convergence_to_json(const struct convergence *a)
 {
 	return json_pack(
 		"{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", convergence_name(a->verdict), "text",
-		a->text,											/* */
-		"rHatMedian", real_or_null(a->r_hat_median), "rHatWorst", real_or_null(a->r_hat_worst),		/* */
-		"worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles,		/* */
-		"tilesFlagged", (json_int_t)a->tiles_flagged, "energyFlagged", real_or_null(a->energy_flagged), /* */
-		"stuckShare", real_or_null(a->stuck_share), "classesFlagged", names_of(a->classes_flagged),	/* */
+		a->text,											 /* */
+		"rHatMedian", forecast_real(a->r_hat_median), "rHatWorst", forecast_real(a->r_hat_worst),	 /* */
+		"worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles,		 /* */
+		"tilesFlagged", (json_int_t)a->tiles_flagged, "energyFlagged", forecast_real(a->energy_flagged), /* */
+		"stuckShare", forecast_real(a->stuck_share), "classesFlagged", names_of(a->classes_flagged),	 /* */
 		"classesApart", names_of(a->classes_apart));
 }
 
@@ -93,10 +89,10 @@ json_t *classes_to_json(const struct path_class_energy classes[PATH_CLASSES])
 		if (!(c->bootstrap > 0) && !(c->chains > 0))
 			continue;
 		list = json_and(list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k), "bootstrap",
-						real_or_null(c->bootstrap), "bootstrapError",
-						real_or_null(c->bootstrap_error), "chains", real_or_null(c->chains),
-						"chainsError", real_or_null(c->chains_error), "t",
-						real_or_null(c->difference_t)));
+						forecast_real(c->bootstrap), "bootstrapError",
+						forecast_real(c->bootstrap_error), "chains", forecast_real(c->chains),
+						"chainsError", forecast_real(c->chains_error), "t",
+						forecast_real(c->difference_t)));
 	}
 	return list;
 }

@@ -368,23 +368,17 @@ static void wait_connected(struct client *cl, double seconds)
 		uv_run(&cl->loop, UV_RUN_ONCE);
 }
 
-/* From the beginning to the end. path: for messages. */
-static int fetch_to(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
+static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
 {
 	struct client_message first;
+	if (ftruncate(fd, 0) || lseek(fd, 0, SEEK_SET))
+		return error_set(e, EIO, "%s: %s", path, strerror(errno));
 	int rc = fetch_chunk(cl, job, what, 0, &first, e);
 	if (rc)
 		return rc;
 	rc = fetch_rest(cl, &first, job, what, fd, path, e);
 	client_message_fini(&first);
 	return rc;
-}
-
-static int begin_again(struct client *cl, uint64_t job, Farm__What what, int fd, const char *path, struct error *e)
-{
-	if (ftruncate(fd, 0) || lseek(fd, 0, SEEK_SET))
-		return error_set(e, EIO, "%s: %s", path, strerror(errno));
-	return fetch_to(cl, job, what, fd, path, e);
 }
 
 /* Into a file, where it may begin again. Not from where it was: there may be another image by now. */

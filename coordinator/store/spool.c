@@ -66,9 +66,7 @@ static bool is_job_folder(const char *name, uint64_t *id)
 
 static int by_id(const void *a, const void *b)
 {
-	uint64_t x, y;
-	memcpy(&x, a, sizeof x);
-	memcpy(&y, b, sizeof y);
+	uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
 	return (x > y) - (x < y);
 }
 
