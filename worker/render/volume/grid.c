@@ -358,28 +358,6 @@ static void integrate_cell(const struct cells *c, const float *const corner[8], 
 	}
 }
 
-void grid_integrate(const struct grid *g, const struct grid_ray *r, double sum[GRID_CHANNELS_MAX])
-{
-	struct cells c;
-	int axis;
-	for (int k = 0; k < GRID_CHANNELS_MAX; k++)
-		sum[k] = 0;
-	if (!begin(&c, g, r))
-		return;
-	do {
-		axis = way_out(&c);
-		double end = fmin(c.leave[axis], c.end);
-		if (end > c.t && !c.block.empty) {
-			const float *corner[8];
-			double part[GRID_CHANNELS_MAX];
-			corners_of(g, c.cell, corner);
-			integrate_cell(&c, corner, end, part);
-			for (int k = 0; k < g->channels; k++)
-				sum[k] += part[k];
-		}
-	} while (go_on(&c, axis));
-}
-
 /* The t in [a,b] where the integral from a on is `least`, which is at most that up to b. */
 static double reach_in_cell(const struct cells *c, const double corner[8], double a, double b, double least)
 {
@@ -434,4 +412,10 @@ double grid_reach(const struct grid *g, const struct grid_ray *r, const double w
 		least -= here;
 	} while (go_on(&c, axis));
 	return INFINITY;
+}
+
+void grid_integrate(const struct grid *g, const struct grid_ray *r, double sum[GRID_CHANNELS_MAX])
+{
+	static const double nothing[GRID_CHANNELS_MAX];
+	grid_reach(g, r, nothing, INFINITY, sum);
 }
