@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Each command locks the folder, reads what it needs, makes the certificate or list in memory, and replaces files in an
- * order in which a crash leaves a usable folder: keys before certificates, the record in issued/ before the certificate
- * is handed out.
+ * order in which a crash or a loss of power leaves a usable folder: keys before certificates, the record in issued/
+ * before the certificate is handed out. Each file and its name are flushed before the next is written.
  *
  * Failures: a folder that is not an authority's or is locked, a name that belongs to another role, errors of OpenSSL
  * (with its reason). Nothing is half issued.
@@ -14,7 +14,6 @@
 #include "common/base/mem.h"
 
 #include <dirent.h>
-#include <fcntl.h>
 #include <openssl/err.h>
 #include <openssl/pem.h>
 #include <openssl/rand.h>
@@ -23,8 +22,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 enum { PATH_SIZE = 4096, SERIAL_BYTES = 16, ENTRIES_MAX = 1 << 20 };
 /* Certificates and lists are valid from this many seconds before they are signed, since clocks of other machines may be
@@ -56,41 +53,33 @@ static int crypto_error(struct error *e, const char *what)
 	return -EBADMSG;
 }
 
-/* Writes the bytes of b, atomically, into a file of the folder. Frees b. */
+/* Writes the bytes of b, atomically and durably, into a file of the folder. Frees b. */
 static int write_pem(const char *folder, const char *middle, const char *name, BIO *b, mode_t mode, struct error *e)
 {
-	char path[PATH_SIZE], temporary[PATH_SIZE + 8], *bytes = NULL;
+	char path[PATH_SIZE], *bytes = NULL;
 	long size = b ? BIO_get_mem_data(b, &bytes) : 0;
 	int rc = path_in(path, e, folder, middle, name);
-	if (!rc && size <= 0)
-		rc = crypto_error(e, path);
-	if (rc) {
-		BIO_free(b);
-		return rc;
-	}
-	snprintf(temporary, sizeof temporary, "%s.tmp", path);
-	unlink(temporary);
-	int fd = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-	rc = fd < 0 || fchmod(fd, mode) ? -errno : disk_write_all(fd, bytes, (size_t)size);
-	if (!rc && fsync(fd))
-		rc = -errno;
-	if (fd >= 0 && close(fd) && !rc)
-		rc = -errno;
-	if (!rc && rename(temporary, path))
-		rc = -errno;
-	if (rc) {
-		error_file(e, -rc, path);
-		unlink(temporary);
+	if (!rc)
+		rc = size > 0 ? disk_replace(path, bytes, (size_t)size, mode, e) : crypto_error(e, path);
+	if (!rc) {
+		*strrchr(path, '/') = 0;
+		rc = disk_sync_folder(path, e);
 	}
 	BIO_free(b);
 	return rc;
+}
+
+static bool is_there(const char *path)
+{
+	struct stat st;
+	return disk_stat(path, &st) == 0;
 }
 
 static bool has(const struct authority *a, const char *middle, const char *name)
 {
 	char path[PATH_SIZE];
 	struct error e;
-	return path_in(path, &e, a->folder, middle, name) == 0 && access(path, F_OK) == 0;
+	return path_in(path, &e, a->folder, middle, name) == 0 && is_there(path);
 }
 
 static BIO *pem_cert(X509 *cert)
@@ -133,16 +122,16 @@ static void authority_close(struct authority *a)
 	EVP_PKEY_free(a->key);
 	X509_CRL_free(a->list);
 	if (a->lock >= 0)
-		close(a->lock);
+		disk_close(a->lock);
 }
 
 static int lock_folder(struct authority *a, const char *folder, struct error *e)
 {
 	*a = (struct authority){.folder = folder};
-	a->lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	a->lock = disk_open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);
 	if (a->lock < 0 && errno == ENOENT)
 		return error_set(e, ENOENT, "%s: there is no authority here (hslt-ca init creates one)", folder);
-	if (a->lock < 0 || flock(a->lock, LOCK_EX))
+	if (a->lock < 0 || disk_flock(a->lock, LOCK_EX))
 		return error_file(e, errno, folder);
 	return 0;
 }
@@ -163,7 +152,7 @@ static int authority_open(struct authority *a, const char *folder, bool with_key
 	int rc = lock_folder(a, folder, e);
 	if (!rc)
 		rc = path_in(path, e, folder, "", "ca.pem");
-	if (!rc && access(path, R_OK))
+	if (!rc && !is_there(path))
 		rc = error_set(e, errno, "%s: there is no authority here (hslt-ca init creates one): %s", path,
 			       strerror(errno));
 	if (!rc)
@@ -304,13 +293,6 @@ static int write_list(struct authority *a, const char *middle, struct error *e)
 
 /* ---- commands ---- */
 
-static int make_folder(const char *path, bool may_be, struct error *e)
-{
-	if (mkdir(path, 0700) == 0 || (may_be && errno == EEXIST))
-		return 0;
-	return error_file(e, errno, path);
-}
-
 static int write_authority(struct authority *a, struct error *e)
 {
 	char path[PATH_SIZE];
@@ -319,7 +301,7 @@ static int write_authority(struct authority *a, struct error *e)
 	if (!rc)
 		rc = path_in(path, e, a->folder, "", "issued");
 	if (!rc)
-		rc = make_folder(path, true, e);
+		rc = disk_make_folder(path, e);
 	if (!rc)
 		rc = write_pem(a->folder, "", "ca.key", pem_key(a->key), 0600, e);
 	if (!rc)
@@ -333,12 +315,12 @@ int authority_init(const char *folder, const char *name, double days, struct err
 {
 	char path[PATH_SIZE];
 	struct authority a = {.lock = -1};
-	int rc = make_folder(folder, true, e);
+	int rc = disk_make_folder(folder, e);
 	if (!rc)
 		rc = lock_folder(&a, folder, e);
 	if (!rc)
 		rc = path_in(path, e, folder, "", "ca.pem");
-	if (!rc && access(path, F_OK) == 0)
+	if (!rc && is_there(path))
 		rc = error_set(
 			e, EEXIST, "%s exists: a farm has one authority%s", path,
 			has(&a, "coordinator", "cert.pem")
@@ -363,24 +345,26 @@ int authority_init(const char *folder, const char *name, double days, struct err
 	return rc;
 }
 
-/* The certificate is on the disk before the key replaces the old one: on a full disk the old pair stays. Key first: a
- * program that reads in between finds that key and certificate do not match, and keeps its old pair. */
-static int write_pair(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
+/* Gives a file that was written under another name its own. */
+static int put_in_place(const struct authority *a, const char *name, const char *from, const char *to, struct error *e)
 {
 	char next[PATH_SIZE], path[PATH_SIZE];
-	int rc = path_in(next, e, a->folder, name, "cert.pem.next");
+	int rc = path_in(next, e, a->folder, name, from);
 	if (!rc)
-		rc = path_in(path, e, a->folder, name, "cert.pem");
+		rc = path_in(path, e, a->folder, name, to);
+	return !rc && disk_rename(next, path) ? error_file(e, errno, path) : rc;
+}
+
+/* Both are on the disk before either replaces the old one: on a full disk the old pair stays. Key first: a program that
+ * reads in between finds that key and certificate do not match, and keeps its old pair. */
+static int write_pair(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
+{
+	int rc = write_pem(a->folder, name, "cert.pem.next", pem_cert(cert), 0644, e);
 	if (!rc)
-		rc = write_pem(a->folder, name, "cert.pem.next", pem_cert(cert), 0644, e);
-	if (rc)
-		return rc;
-	rc = write_pem(a->folder, name, "key.pem", pem_key(key), 0600, e);
-	if (!rc && rename(next, path))
-		rc = error_file(e, errno, path);
-	if (rc)
-		unlink(next);
-	return rc;
+		rc = write_pem(a->folder, name, "key.pem.next", pem_key(key), 0600, e);
+	if (!rc)
+		rc = put_in_place(a, name, "key.pem.next", "key.pem", e);
+	return rc ? rc : put_in_place(a, name, "cert.pem.next", "cert.pem", e);
 }
 
 static int write_issued(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
@@ -399,7 +383,7 @@ static int write_issued(const struct authority *a, const char *name, X509 *cert,
 		rc = write_pair(a, name, cert, key, e);
 	struct error ignored;
 	if (rc && path_in(path, &ignored, a->folder, "issued", file) == 0) /* nobody has its key */
-		unlink(path);
+		disk_unlink(path);
 	return rc;
 }
 
@@ -424,10 +408,11 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 }
 
 /* Whether a folder was left by an interrupted call: it lacks the certificate, which is written last, and it has the
- * list of revocations, which is written first, or nothing. An empty folder is removed. */
+ * list of revocations, which is written first, or a part of it, or nothing. An empty folder is removed. */
 static bool is_incomplete(const struct authority *a, const char *name, const char *path)
 {
-	return !has(a, name, "cert.pem") && (has(a, name, "crl.pem") || rmdir(path) == 0);
+	return !has(a, name, "cert.pem") &&
+	       (has(a, name, "crl.pem") || has(a, name, "crl.pem.tmp") || disk_rmdir(path) == 0);
 }
 
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e)
@@ -442,13 +427,12 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	if (rc)
 		return rc;
 	rc = path_in(path, e, folder, "", name);
-	bool incomplete = !rc && access(path, F_OK) == 0 && is_incomplete(&a, name, path);
-	if (!rc && !renew && !incomplete && access(path, F_OK) == 0)
+	if (!rc && !renew && is_there(path) && !is_incomplete(&a, name, path))
 		rc = error_set(e, EEXIST, "%s exists: --renew replaces its certificate and key", path);
 	if (!rc && renew)
 		rc = may_renew(&a, name, role, e);
 	if (!rc)
-		rc = make_folder(path, renew || incomplete, e);
+		rc = disk_make_folder(path, e);
 	EVP_PKEY *key = rc ? NULL : EVP_EC_gen("P-256");
 	X509 *cert = key ? begin_cert(name, key, a.cert, days) : NULL;
 	if (!rc && (!cert || !sign_other(&a, cert, role)))
@@ -457,6 +441,8 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 		rc = write_list(&a, name, e);
 	if (!rc)
 		rc = write_issued(&a, name, cert, key, e);
+	if (!rc)
+		rc = disk_sync_folder(path, e);
 	X509_free(cert);
 	EVP_PKEY_free(key);
 	authority_close(&a);
@@ -470,7 +456,7 @@ static int for_each_issued(const char *folder,
 {
 	char path[PATH_SIZE];
 	int rc = path_in(path, e, folder, "", "issued");
-	DIR *d = rc ? NULL : opendir(path);
+	DIR *d = rc ? NULL : disk_opendir(path);
 	if (!rc && !d)
 		return error_file(e, errno, path);
 	for (struct dirent *x; !rc && (x = readdir(d));) {
@@ -520,7 +506,7 @@ static int tell_coordinator(void *user, X509 *cert, const struct tls_peer *who, 
 	char path[PATH_SIZE];
 	(void)cert;
 	int rc = path_in(path, e, a->folder, "", who->name);
-	return rc || who->role != TLS_COORDINATOR || access(path, F_OK) ? rc : write_list(a, who->name, e);
+	return rc || who->role != TLS_COORDINATOR || !is_there(path) ? rc : write_list(a, who->name, e);
 }
 
 int authority_revoke(const char *folder, const char *what, unsigned *count, struct error *e)

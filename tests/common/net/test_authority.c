@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The power goes before each call of hslt-ca that changes the disk, several times with other parts of what was not
+ * flushed: what a command reported as done is there afterwards (a certificate with its key and its record, a revocation
+ * in every list), and a command that was interrupted can be repeated.
+ */
+#include "common/base/mem.h"
+#include "common/net/authority.h"
+#include "tests/support/faulty_disk.h"
+#include "tests/support/folder.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { SEEDS = 2, CALLS_MOST = 1000 };
+
+/* The commands, in order. */
+enum step { INIT, FARM, NODE, RENEWED, REVOKED, STEPS };
+
+static struct shared {
+	_Atomic uint64_t counts[FAULTY_DISK_COUNTS];
+	_Atomic int done; /* commands that have ended without an error */
+} * shared;
+
+static int run_step(const char *ca, enum step s, struct error *e)
+{
+	unsigned count;
+	switch (s) {
+	case INIT:
+		return authority_init(ca, "test", 100, e);
+	case FARM:
+		return authority_issue(ca, "farm", TLS_COORDINATOR, 50, false, e);
+	case NODE:
+		return authority_issue(ca, "node", TLS_WORKER, 50, false, e);
+	case RENEWED:
+		return authority_issue(ca, "node", TLS_WORKER, 60, true, e);
+	default:
+		return authority_revoke(ca, "node", &count, e);
+	}
+}
+
+/* The exit code of a process whose disk loses power at that call. */
+static int run_until(const char *ca, const char *root, const char *after, uint64_t lose_at, uint64_t seed)
+{
+	int status;
+	*shared = (struct shared){.done = 0};
+	pid_t pid = fork();
+	if (pid == 0) {
+		struct faulty_disk d = {
+			.root = root, .after = after, .seed = seed, .lose_at = lose_at, .counts = shared->counts};
+		struct error e;
+		faulty_disk_begin(&d);
+		for (int s = 0; s < STEPS; s++, shared->done++)
+			if (run_step(ca, (enum step)s, &e))
+				_exit(1);
+		_exit(0);
+	}
+	assert_true(waitpid(pid, &status, 0) == pid && WIFEXITED(status));
+	return WEXITSTATUS(status);
+}
+
+static void opens(const char *ca, const char *name)
+{
+	char path[200];
+	struct tls *t;
+	struct error e;
+	snprintf(path, sizeof path, "%s/%s", ca, name);
+	if (tls_open(&t, path, &e))
+		fail_msg("%s", e.text);
+	tls_close(t);
+}
+
+static void same_file(const char *ca, const char *one, const char *other)
+{
+	char command[600];
+	snprintf(command, sizeof command, "cmp -s '%s/%s' '%s/%s'", ca, one, ca, other);
+	assert_int_equal(system(command), 0);
+}
+
+/* Certificates of that name, and how many of them are revoked. */
+static size_t listed(const char *ca, const char *name, size_t *revoked)
+{
+	struct authority_entry *list;
+	struct error e;
+	size_t n, found = 0;
+	*revoked = 0;
+	if (authority_list(ca, &list, &n, &e))
+		fail_msg("%s", e.text);
+	for (size_t i = 0; i < n; i++)
+		if (strcmp(list[i].who.name, name) == 0) {
+			found++;
+			*revoked += list[i].revoked;
+		}
+	mem_free(list);
+	return found;
+}
+
+static void what_was_reported_is_there(const char *ca, int done)
+{
+	size_t revoked;
+	if (done > INIT)
+		listed(ca, "nobody", &revoked);
+	if (done > FARM)
+		opens(ca, "farm");
+	if (done > NODE)
+		assert_true(listed(ca, "node", &revoked) >= 1);
+	/* Not before: while it is renewed its key may be the new one and its certificate the old one. */
+	if (done > RENEWED) {
+		assert_int_equal(listed(ca, "node", &revoked), 2);
+		opens(ca, "node");
+	}
+	if (done > REVOKED) {
+		assert_true(listed(ca, "node", &revoked) == 2 && revoked == 2);
+		same_file(ca, "crl.pem", "farm/crl.pem");
+	}
+}
+
+static void the_rest_can_be_done(const char *ca, int done)
+{
+	struct error e;
+	size_t revoked;
+	for (int s = done; s < STEPS; s++) {
+		int rc = run_step(ca, (enum step)s, &e);
+		/* It was interrupted when all of it was on the disk. */
+		if (rc && !(s == done && rc == -EEXIST && s < RENEWED))
+			fail_msg("command %d: %s", s, e.text);
+	}
+	opens(ca, "farm");
+	opens(ca, "node");
+	size_t all = listed(ca, "node", &revoked);
+	assert_true(all >= 2 && all == revoked);
+	same_file(ca, "crl.pem", "farm/crl.pem");
+}
+
+static void a_loss_of_power_undoes_nothing_that_was_reported(void **state)
+{
+	(void)state;
+	char root[100], after[100], ca[120], ca_after[120], command[400];
+	int code = FAULTY_DISK_EXIT;
+	uint64_t lost = 0;
+	snprintf(root, sizeof root, "%s/disk", folder);
+	snprintf(after, sizeof after, "%s/after", folder);
+	snprintf(ca, sizeof ca, "%s/ca", root);
+	snprintf(ca_after, sizeof ca_after, "%s/ca", after);
+	snprintf(command, sizeof command, "rm -rf '%s' '%s' && mkdir '%s'", root, after, root);
+	for (uint64_t at = 1; code == FAULTY_DISK_EXIT; at++)
+		for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+			assert_int_equal(system(command), 0);
+			code = run_until(ca, root, after, at, 1000 * at + seed);
+			if (code == 0) /* the power stays until the end */
+				break;
+			assert_int_equal(code, FAULTY_DISK_EXIT);
+			assert_true(at < CALLS_MOST);
+			lost += shared->counts[3];
+			what_was_reported_is_there(ca_after, shared->done);
+			the_rest_can_be_done(ca_after, shared->done);
+		}
+	assert_true(lost > 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_loss_of_power_undoes_nothing_that_was_reported),
+	};
+	shared = mmap(NULL, sizeof *shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	if (shared == MAP_FAILED)
+		return 1;
+	return cmocka_run_group_tests(tests, folder_set_up, folder_tear_down);
+}
