@@ -4,8 +4,9 @@
  * looking up is a binary search, and only contents are read from the disk.
  *
  * Writing: blob_write_begin makes a temporary file, blob_write_add makes room, appends and hashes, blob_write_commit
- * compares the hash, flushes, renames and adds the entry. Until then the blob does not exist. blob_write_keep leaves
- * flushing and renaming to a batch; the entry is there from then on, but counts as missing until blob_enter.
+ * compares the hash, flushes unless the store is a cache, renames and adds the entry. Until then the blob does not
+ * exist. blob_write_keep leaves flushing and renaming to a batch; the entry is there from then on, but counts as
+ * missing until blob_enter.
  *
  * Failures: a wrong hash or more bytes than announced are -EBADMSG, and the temporary file is removed. A full disk is
  * -ENOSPC, after every blob that is not held has been evicted and nobody has more room. blob_check drops a blob whose
@@ -441,6 +442,17 @@ static void come_back(struct blob_store *s, struct blob_entry *n, uint64_t size)
 	n->checked = clock_seconds();
 }
 
+/* A cache's file is not flushed: a restart after a loss of power hashes it before use. Closing it tells whether a file
+ * system that stores elsewhere took all of it; others reserve the room when it is written. */
+static int make_safe(struct blob_writer *w)
+{
+	int fd = w->fd;
+	if (!w->store->cache)
+		return disk_fsync(fd);
+	w->fd = -1;
+	return disk_close(fd);
+}
+
 static int finish(struct blob_writer *w, struct error *e)
 {
 	struct blob_store *s = w->store;
@@ -455,7 +467,7 @@ static int finish(struct blob_writer *w, struct error *e)
 		return 0;
 	}
 	blob_path(s, &w->hash, path, sizeof path);
-	if (disk_fsync(w->fd) || disk_rename(w->path, path))
+	if (make_safe(w) || disk_rename(w->path, path))
 		return error_file(e, errno, s->folder);
 	rc = s->cache ? 0 : disk_sync_folder(s->folder, e);
 	if (!rc)

@@ -25,8 +25,8 @@ void blob_store_close(struct blob_store *s);
 bool blob_store_evict(struct blob_store *s);
 /* Whoever may make room on the disk when nothing is left to evict; false: there is none. */
 void blob_store_ask(struct blob_store *s, bool (*more_room)(void *user), void *user);
-/* Call if files that are lost with the power can be fetched again. Their names are then not flushed to the disk, which
- * halves the time that thousands of small files take. */
+/* Call if files that are lost with the power can be fetched again. They are then not flushed to the disk: after a
+ * restart no file is used before blob_check has read it. */
 void blob_store_use_as_cache(struct blob_store *s);
 /* Evicts what exceeds the limit. Call once everything needed is held. */
 void blob_store_trim(struct blob_store *s);

@@ -276,23 +276,61 @@ static int count_fsync(int fd)
 	return disk_system.fsync(fd);
 }
 
-/* A cache flushes its files, as what it holds is believed while it runs, but not their names. */
+static int failing_close(int fd)
+{
+	disk_system.close(fd);
+	errno = EDQUOT;
+	return -1;
+}
+
+/* A cache flushes nothing: after a loss of power a name may be there without its bytes, and is read before it is used.
+ */
 static void flushed_as_needed(void **state)
 {
 	(void)state;
 	struct disk counting = disk_system;
 	struct blob_store *s;
 	struct error e;
-	counting.fsync = count_fsync;
+	char path[4096];
+	counting.fsync = counting.fdatasync = count_fsync;
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
 	disk_use(&counting);
 	flushes = 0;
 	store_text(s, "kept");
 	assert_int_equal(flushes, 2);
 	blob_store_use_as_cache(s);
-	store_text(s, "cached");
-	assert_int_equal(flushes, 3);
+	struct blob_hash h = store_text(s, "cached");
+	assert_int_equal(flushes, 2);
 	disk_use(NULL);
+	assert_int_equal(blob_check(s, &h, 60, &e), 0);
+	blob_path(s, &h, path, sizeof path);
+	blob_store_close(s);
+	assert_int_equal(truncate(path, 3), 0);
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_int_equal(blob_check(s, &h, 60, &e), -EBADMSG);
+	blob_store_close(s);
+}
+
+/* As on a file system that sends what was written when the file is closed. */
+static void a_cached_file_that_cannot_be_closed(void **state)
+{
+	(void)state;
+	struct disk failing = disk_system;
+	struct blob_store *s;
+	struct blob_writer *w;
+	struct blob_hash h;
+	struct error e;
+	failing.close = failing_close;
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	blob_store_use_as_cache(s);
+	assert_int_equal(blob_hash_bytes("lost", 4, &h, &e), 0);
+	assert_int_equal(blob_write_begin(&w, s, &h, 4, &e), 0);
+	assert_int_equal(blob_write_add(w, "lost", 4, &e), 0);
+	disk_use(&failing);
+	int rc = blob_write_commit(w, &e);
+	disk_use(NULL);
+	assert_int_equal(rc, -EDQUOT);
+	assert_false(blob_has(s, &h, NULL));
 	blob_store_close(s);
 }
 
@@ -564,6 +602,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_folder_that_is_removed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(checked_in_parts, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_cached_file_that_cannot_be_closed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(flushed_as_needed, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_is_full, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(flushed_together, folder_set_up, folder_tear_down),
