@@ -75,7 +75,7 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 	enum job_cache_files files = job_cache_look(b, &a->loop);
 	if (files == JOB_CACHE_LACKS) {
 		rc = fetch_want(a, &b->wanted, &e);
-	} else if (files == JOB_CACHE_HAS) {
+	} else if (files == JOB_CACHE_HAS && !scenes_kept_must_wait(a, b)) {
 		b->built = on_built;
 		for (const struct lease_task *l = a->leases; l; l = l->next)
 			if (l->job_cache == b)
@@ -87,6 +87,12 @@ static void fetch_or_build(struct agent *a, struct job_cache *b)
 		b->own = rc == -ENOMEM;
 		fail_job_cache(a, b, &e);
 	}
+}
+
+static void fetch_or_build_all(struct agent *a)
+{
+	for (struct job_cache *b = a->job_caches; b; b = b->next)
+		fetch_or_build(a, b);
 }
 
 static void on_file_read(struct job_cache *b)
@@ -119,6 +125,8 @@ static void on_rendered(struct lease_task *l)
 		send_result(a, l);
 	}
 	lease_list_limit_backlog(a);
+	scenes_kept_tidy(a);
+	fetch_or_build_all(a); /* it may have waited for this thread to stop */
 	scenes_kept_tidy(a);
 	a->settle(a);
 }
@@ -299,8 +307,7 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 		fail_job_cache(a, first, &e);
 		scenes_kept_tidy(a);
 	}
-	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		fetch_or_build(a, b);
+	fetch_or_build_all(a);
 	if (end == FETCH_WHOLE)
 		blob_release(a->cache.blobs, &hash);
 	scenes_kept_tidy(a);

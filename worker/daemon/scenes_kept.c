@@ -4,7 +4,8 @@
  *
  * While one scene at a time is kept, the first job that gets a lease has the turn. Leases of other jobs are refused,
  * and so, after turn_seconds, are new leases of the job that has the turn: its last lease ends, its scene is dropped,
- * and the next job to be granted a lease has the turn. So neither job waits for the whole of the other.
+ * and the next job to be granted a lease has the turn. So neither job waits for the whole of the other. A scene whose
+ * threads only have yet to stop is not waited for at the coordinator: the next one is built once they have.
  */
 #include "worker/daemon/scenes_kept.h"
 
@@ -69,13 +70,30 @@ void scenes_kept_tidy(struct agent *a)
 	tidy_fetches(a);
 }
 
+/* In use only by threads that were told to stop: its leases were revoked, or its job has ended. */
+static bool is_ending(const struct agent *a, const struct job_cache *b)
+{
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		if (l->job_cache == b && !l->unwanted)
+			return false;
+	return b->users && b->state != JOB_CACHE_BUILDING && !b->reading.check;
+}
+
+bool scenes_kept_must_wait(const struct agent *a, const struct job_cache *b)
+{
+	for (const struct job_cache *o = a->job_caches; o; o = o->next)
+		if (o != b && is_ending(a, o))
+			return work_memory_was_short(clock_seconds());
+	return false;
+}
+
 /* Drops all unused scenes but one. Returns the job whose scene stays: the first of those in use, otherwise `next`,
  * which may be NULL. */
 static struct job_cache *keep_one(struct agent *a, struct job_cache *next)
 {
 	struct job_cache *left = NULL;
 	for (struct job_cache *b = a->job_caches; b; b = b->next)
-		left = is_in_use(b) ? b : left;
+		left = is_in_use(b) && !is_ending(a, b) ? b : left;
 	left = left ? left : next;
 	for (struct job_cache *b = a->job_caches, *after; b; b = after) {
 		after = b->next;

@@ -18,5 +18,8 @@ void scenes_kept_tidy(struct agent *a);
  * this one has had it for turn_seconds while others waited. If memory has run short, scenes that no lease uses are
  * dropped first. Call for each lease that is granted. */
 int scenes_kept_admit(struct agent *a, uint64_t job, struct error *e);
+/* Whether an admitted job's scene is not to be built yet: memory has run short, and threads that were told to stop
+ * still use another one. */
+bool scenes_kept_must_wait(const struct agent *a, const struct job_cache *b);
 
 #endif

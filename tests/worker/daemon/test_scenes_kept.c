@@ -162,18 +162,51 @@ static void run_out_of_memory(uint64_t job)
 	mem_fail_after(-1);
 }
 
+static const char small_scene[] =
+	"<scene version='3.0.0'>" SENSOR("0,0,5", "0,0,0") "<shape type='sphere'/><emitter type='constant'/></scene>\n";
+
+/* The lease of a job that has ended is still on its thread: another job is not refused, which would be asked for again
+ * after 10 s only. Its files are fetched, and its scene is built when the other one is gone. */
+static void a_thread_that_has_yet_to_stop(void **state)
+{
+	struct job_cache *next;
+	(void)state;
+	begin_short();
+	coord_make_file(&coord.scenes[0], small_scene, sizeof small_scene - 1);
+	coord_make_file(&coord.scenes[1], small_scene, sizeof small_scene - 2);
+	coord_grant(1);
+	coord_describe(1);
+	coord_hear_blob_get(&coord.scenes[0], 0);
+	coord_send_piece(&coord.scenes[0], 0);
+	coord_serve_mesh(0, PIECES);
+	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	struct lease_task *l = coord.agent->leases;
+	l->state = LEASE_QUEUED; /* as if its thread still computed it */
+	coord_end_job(1);
+	coord_grant(2);
+	assert_true(l->unwanted);
+	coord_describe(2);
+	coord_hear_blob_get(&coord.scenes[1], 0);
+	coord_send_piece(&coord.scenes[1], 0);
+	while (!(next = job_cache_find(coord.agent->job_caches, 2))->held || !next->held[0])
+		uv_run(&coord.agent->loop, UV_RUN_NOWAIT);
+	assert_int_equal(next->state, JOB_CACHE_FETCHING);
+	l->task.done(&l->task);
+	assert_null(job_cache_find(coord.agent->job_caches, 1));
+	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	coord_finish();
+}
+
 /* As above, where the system refuses memory instead: the job whose scene found none beside another's is not at fault,
  * and one whose scene found none alone is. */
 static void memory_that_others_had_is_its_own_fault(void **state)
 {
-	static const char text[] = "<scene version='3.0.0'>" SENSOR(
-		"0,0,5", "0,0,0") "<shape type='sphere'/><emitter type='constant'/></scene>\n";
 	struct error e;
 	(void)state;
 	assert_int_equal(work_share(1, &e), 0);
 	coord_start(0);
-	coord_make_file(&coord.scenes[0], text, sizeof text - 1);
-	coord_make_file(&coord.scenes[1], text, sizeof text - 2);
+	coord_make_file(&coord.scenes[0], small_scene, sizeof small_scene - 1);
+	coord_make_file(&coord.scenes[1], small_scene, sizeof small_scene - 2);
 	coord_grant(1);
 	coord_describe(1);
 	coord_hear_blob_get(&coord.scenes[0], 0);
@@ -201,6 +234,7 @@ int main(void)
 		TEST(a_scene_makes_way_for_one_that_waits),
 		TEST(the_restriction_ends),
 		TEST(then_it_takes_any),
+		TEST(a_thread_that_has_yet_to_stop),
 		TEST(memory_that_others_had_is_its_own_fault),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
