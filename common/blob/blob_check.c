@@ -40,8 +40,15 @@ int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct
 		.store = s, .hash = *h, .begun = clock_seconds(), .was_given = n->given, .fd = -1, .rc = 0};
 	n->given = false; /* what is given from now on may be read too late for this check */
 	n->holds++;
+	n->checks++;
 	*out = c;
 	return 1;
+}
+
+bool blob_is_being_checked(struct blob_store *s, const struct blob_hash *h)
+{
+	const struct blob_entry *n = blob_find(s, h);
+	return n && n->checks;
 }
 
 /* The store's path does not change: no lock. */
@@ -132,6 +139,7 @@ int blob_check_end(struct blob_check *c, struct error *e)
 		n->checked = clock_seconds();
 	}
 	n->holds--;
+	n->checks--;
 	if (c->fd >= 0)
 		disk_close(c->fd);
 	EVP_MD_CTX_free(c->md);

@@ -17,6 +17,7 @@ int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, 
 struct blob_check;
 int blob_check_begin(struct blob_check **c, struct blob_store *s, const struct blob_hash *h, double seconds,
 		     struct error *e);
+bool blob_is_being_checked(struct blob_store *s, const struct blob_hash *h); /* begun, and not ended */
 bool blob_check_read(struct blob_check *c);
 int blob_check_end(struct blob_check *c, struct error *e);
 

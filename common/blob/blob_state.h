@@ -15,9 +15,10 @@ struct blob_entry {
 	struct blob_hash hash;
 	uint64_t size, used; /* used: a counter that increases with every use */
 	unsigned holds;
-	double checked; /* when its contents were last verified, in s of a monotonic clock; 0: not since the start */
-	bool given;	/* opened since then */
-	bool gone;	/* or damaged: treated as missing, except for its holds */
+	unsigned checks; /* that have begun and not ended */
+	double checked;	 /* when its contents were last verified, in s of a monotonic clock; 0: not since the start */
+	bool given;	 /* opened since then */
+	bool gone;	 /* or damaged: treated as missing, except for its holds */
 };
 
 struct blob_store {

@@ -354,6 +354,14 @@ void answer_returned(struct farm *f, const struct event *ev)
 		lease_drop(f, l);
 }
 
+bool answer_counts(const struct farm *f, uint64_t peer, const struct lease_key *k)
+{
+	const struct event ev = {.peer = peer, .lease = {.key = *k}};
+	const struct slot *s = next_slot(f, &ev);
+	const struct peer *p = farm_find_peer(f, peer);
+	return s && (lease_of(s, p) || lost_has(&s->lost, p->who));
+}
+
 enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)
 {
 	const struct event ev = {.peer = peer, .lease = {.key = *k}};

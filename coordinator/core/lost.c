@@ -46,14 +46,27 @@ static void add_worker(struct lost *l, const struct identity *who)
 	l->of[place] = (struct lost_worker){who, who->id, who->certificate_id, who->calls};
 }
 
+/* The list's length: it is not in it. */
+static uint32_t place_of(const struct lost *l, const struct identity *who)
+{
+	uint32_t i = 0;
+	while (i < l->count && l->of[i].id != who->id)
+		i++;
+	return i;
+}
+
+bool lost_has(const struct lost *l, const struct identity *who)
+{
+	return place_of(l, who) < l->count;
+}
+
 bool lost_take(struct lost *l, const struct identity *who)
 {
-	for (uint32_t i = 0; i < l->count; i++)
-		if (l->of[i].id == who->id) {
-			l->of[i] = l->of[--l->count];
-			return true;
-		}
-	return false;
+	uint32_t place = place_of(l, who);
+	if (place == l->count)
+		return false;
+	l->of[place] = l->of[--l->count];
+	return true;
 }
 
 void lost_lease(struct farm *f, struct lease *l)

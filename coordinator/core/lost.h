@@ -22,6 +22,7 @@ struct lease;
 /* Adds the worker of this lease, which has disappeared or is silent: the lease is dropped, and the job ends if it
  * was one too many. */
 void lost_lease(struct farm *f, struct lease *l);
+bool lost_has(const struct lost *l, const struct identity *who);
 /* Removes a worker; true if it was in the list. */
 bool lost_take(struct lost *l, const struct identity *who);
 

@@ -135,17 +135,9 @@ static void on_read(uv_work_t *work, int status)
 		finish_first(jobs);
 }
 
-static bool is_read(const struct jobs *jobs, const struct blob_hash *h)
-{
-	const struct file_check *c = STAILQ_FIRST(&jobs->checks);
-	while (c && !blob_hash_equal(&c->hash, h))
-		c = STAILQ_NEXT(c, next);
-	return c != NULL;
-}
-
 static int check(struct jobs *jobs, const struct blob_hash *h, double seconds, struct error *e)
 {
-	if (is_read(jobs, h))
+	if (blob_is_being_checked(jobs->blobs, h))
 		return -EINPROGRESS;
 	struct file_check *c = mem_alloc(1, sizeof *c);
 	if (!c)
@@ -173,36 +165,25 @@ int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
 
 bool files_are_read(const struct jobs *jobs, const struct live_job *job)
 {
-	const struct file_check *c = STAILQ_FIRST(&jobs->checks);
-	while (c && !needs(job, &c->hash))
-		c = STAILQ_NEXT(c, next);
-	return c != NULL;
-}
-
-/* Within *at_once it is read here. */
-static int reread(struct jobs *jobs, const struct blob_hash *h, uint64_t *at_once)
-{
-	uint64_t size;
-	struct error e;
-	if (!blob_has(jobs->blobs, h, &size) || size > *at_once)
-		return check(jobs, h, BLOB_SINCE_GIVEN, &e);
-	*at_once -= size;
-	int rc = blob_check(jobs->blobs, h, BLOB_SINCE_GIVEN, &e);
-	if (rc == -EBADMSG)
-		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	return rc;
+	const Farm__Submit *m = live_job_submit(job);
+	for (size_t i = 0; !STAILQ_EMPTY(&jobs->checks) && i < m->n_files; i++) {
+		struct blob_hash h = file_hash_from_wire(m->files[i]);
+		if (blob_is_being_checked(jobs->blobs, &h))
+			return true;
+	}
+	return false;
 }
 
 void files_read(struct jobs *jobs, struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
-	uint64_t at_once = 1 << 16; /* bytes: a small scene's failure need not wait */
+	struct error e;
 	bool missing = false;
 	job->unread = false;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
-		int rc = reread(jobs, &h, &at_once);
-		missing |= rc == -ENOENT || rc == -EBADMSG;
+		int rc = check(jobs, &h, BLOB_SINCE_GIVEN, &e);
+		missing |= rc == -ENOENT;
 		job->unread |= rc && rc != -EINPROGRESS;
 	}
 	if (missing) /* last: the job may be gone afterwards */

@@ -143,7 +143,8 @@ static void fail_lease(struct jobs *jobs, uint64_t peer, const Farm__LeaseFailed
 	ev.lease.bad_states = f->bad_states;
 	ev.lease.other_states = f->bad_states && !(job && live_job_gives_states(job, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
-	if (job && *f->text && !blamed && !files_are_right(jobs, job)) { /* the spool's fault, not the worker's */
+	if (job && *f->text && !blamed && answer_counts(jobs->farm, peer, &ev.lease.key) &&
+	    !files_are_right(jobs, job)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
@@ -177,7 +178,8 @@ static bool awaits_files(struct jobs *jobs, struct live_job *job, bool *checked)
 	return job && files_are_read(jobs, job);
 }
 
-/* Refused states are handled when nobody reads the film. checked: as in struct waiting_batch. */
+/* Refused states are handled when nobody reads the film. Nothing is read for a failure that does not count: anybody can
+ * send many of them. checked: as in struct waiting_batch. */
 static void take_failure(struct jobs *jobs, uint64_t peer, struct envelope *env, struct buf *payload, bool checked)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;
@@ -185,7 +187,7 @@ static void take_failure(struct jobs *jobs, uint64_t peer, struct envelope *env,
 	struct lease_key k;
 	struct error e;
 	bool waits = false;
-	if (job && lease_key_from_wire(m->key, &k, &e) == 0)
+	if (job && lease_key_from_wire(m->key, &k, &e) == 0 && answer_counts(jobs->farm, peer, &k))
 		waits = m->bad_states ? job->busy : *m->text && !m->own && awaits_files(jobs, job, &checked);
 	if (!waits) {
 		if (jobs->peers.name(jobs->peers.user, peer))

@@ -438,6 +438,7 @@ static void checked_in_parts(void **state)
 	assert_int_equal(blob_check_end(c, &e), -ECANCELED);
 	/* it is held, and given again before its check has ended */
 	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
+	assert_true(blob_is_being_checked(s, &h));
 	struct blob_hash more = hash_of("other bytes, too many of them");
 	struct blob_writer *w;
 	assert_int_equal(blob_write_begin(&w, s, &more, 29, &e), -EFBIG);
@@ -445,6 +446,7 @@ static void checked_in_parts(void **state)
 	while (blob_check_read(c))
 		continue;
 	assert_int_equal(blob_check_end(c, &e), 0);
+	assert_false(blob_is_being_checked(s, &h));
 	assert_int_equal(blob_check_begin(&c, s, &h, BLOB_SINCE_GIVEN, &e), 1);
 	/* two at once find the damage, and it is written again before the second says so */
 	assert_int_equal(truncate(path, 3), 0);
