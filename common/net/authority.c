@@ -359,12 +359,18 @@ static int put_in_place(const struct authority *a, const char *name, const char 
  * reads in between finds that key and certificate do not match, and keeps its old pair. */
 static int write_pair(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
 {
+	char path[PATH_SIZE];
+	struct error ignored;
 	int rc = write_pem(a->folder, name, "cert.pem.next", pem_cert(cert), 0644, e);
 	if (!rc)
 		rc = write_pem(a->folder, name, "key.pem.next", pem_key(key), 0600, e);
 	if (!rc)
 		rc = put_in_place(a, name, "key.pem.next", "key.pem", e);
-	return rc ? rc : put_in_place(a, name, "cert.pem.next", "cert.pem", e);
+	if (!rc)
+		rc = put_in_place(a, name, "cert.pem.next", "cert.pem", e);
+	if (rc && path_in(path, &ignored, a->folder, name, "cert.pem.next") == 0) /* it will not be recorded */
+		disk_unlink(path);
+	return rc;
 }
 
 static int write_issued(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)

@@ -342,6 +342,7 @@ static void a_full_disk_takes_no_certificate_away(void **state)
 			disk_use(NULL);
 			assert_true(rc == 0 || rc == -ENOSPC);
 			assert_int_equal(certificates(), before + (rc == 0));
+			assert_int_equal(access(pair_at(pair_ours, "steady/cert.pem.next"), F_OK), -1);
 			if (renew || !rc)
 				accepts(name, name, TLS_WORKER);
 		}
