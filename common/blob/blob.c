@@ -51,7 +51,7 @@ static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
 	size_t low = 0, high = s->count;
 	while (low < high) {
 		size_t mid = low + (high - low) / 2;
-		if (memcmp(s->entries[mid].hash.bytes, h->bytes, BLOB_HASH_SIZE) < 0)
+		if (memcmp(s->entries[mid]->hash.bytes, h->bytes, BLOB_HASH_SIZE) < 0)
 			low = mid + 1;
 		else
 			high = mid;
@@ -62,7 +62,7 @@ static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
 struct blob_entry *blob_find(struct blob_store *s, const struct blob_hash *h)
 {
 	size_t i = place_of(s, h);
-	return i < s->count && blob_hash_equal(&s->entries[i].hash, h) ? &s->entries[i] : NULL;
+	return i < s->count && blob_hash_equal(&s->entries[i]->hash, h) ? s->entries[i] : NULL;
 }
 
 /* NULL also if it is missing. */
@@ -77,7 +77,7 @@ static int reserve(struct blob_store *s, size_t count, struct error *e)
 	if (count <= s->capacity)
 		return 0;
 	size_t want = count > 2 * s->capacity ? count : 2 * s->capacity;
-	struct blob_entry *grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
+	struct blob_entry **grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
 	if (!grown)
 		return error_set(e, ENOMEM, "no memory for the list of blobs");
 	s->entries = grown;
@@ -85,28 +85,31 @@ static int reserve(struct blob_store *s, size_t count, struct error *e)
 	return 0;
 }
 
-static int add_entry(struct blob_store *s, const struct blob_hash *h, uint64_t size, unsigned holds, struct error *e)
+/* Puts it at this index. NULL: no memory. */
+static struct blob_entry *add_entry(struct blob_store *s, size_t i, const struct blob_hash *h, struct error *e)
 {
-	int rc = reserve(s, s->count + 1, e);
-	if (rc)
-		return rc;
-	size_t i = place_of(s, h);
+	struct blob_entry *n = reserve(s, s->count + 1, e) ? NULL : mem_alloc(1, sizeof *n);
+	if (!n) {
+		error_set(e, ENOMEM, "no memory for the list of blobs");
+		return NULL;
+	}
 	memmove(&s->entries[i + 1], &s->entries[i], (s->count++ - i) * sizeof *s->entries);
-	s->entries[i] = (struct blob_entry){.hash = *h, .size = size, .used = ++s->clock, .holds = holds};
-	s->bytes += size;
-	return 0;
+	s->entries[i] = n;
+	*n = (struct blob_entry){.hash = *h, .used = ++s->clock};
+	return n;
 }
 
-static void remove_entry(struct blob_store *s, struct blob_entry *n)
+static void remove_entry(struct blob_store *s, size_t i)
 {
-	s->bytes -= n->size;
-	memmove(n, n + 1, (size_t)(&s->entries[--s->count] - n) * sizeof *n);
+	s->bytes -= s->entries[i]->size;
+	mem_free(s->entries[i]);
+	memmove(&s->entries[i], &s->entries[i + 1], (--s->count - i) * sizeof *s->entries);
 }
 
 static int by_hash(const void *a, const void *b)
 {
-	const struct blob_entry *x = a, *y = b;
-	return memcmp(x->hash.bytes, y->hash.bytes, BLOB_HASH_SIZE);
+	const struct blob_entry *const *x = a, *const *y = b;
+	return memcmp((*x)->hash.bytes, (*y)->hash.bytes, BLOB_HASH_SIZE);
 }
 
 struct found {
@@ -161,9 +164,10 @@ static int read_folder(struct blob_store *s, struct error *e)
 	if (!rc)
 		rc = reserve(s, count, e);
 	for (size_t i = 0; !rc && i < count; i++) {
-		s->entries[s->count++] =
-			(struct blob_entry){.hash = all[i].hash, .size = all[i].size, .used = ++s->clock};
-		s->bytes += all[i].size;
+		struct blob_entry *n = add_entry(s, i, &all[i].hash, e);
+		rc = n ? 0 : -ENOMEM;
+		if (n)
+			s->bytes += n->size = all[i].size;
 	}
 	if (s->count)
 		qsort(s->entries, s->count, sizeof *s->entries, by_hash);
@@ -173,14 +177,14 @@ static int read_folder(struct blob_store *s, struct error *e)
 
 bool blob_store_evict(struct blob_store *s)
 {
-	struct blob_entry *oldest = NULL;
+	size_t oldest = s->count;
 	char path[BLOB_PATH_MOST];
 	for (size_t i = 0; i < s->count; i++)
-		if (!s->entries[i].holds && (!oldest || s->entries[i].used < oldest->used))
-			oldest = &s->entries[i];
-	if (!oldest)
+		if (!s->entries[i]->holds && (oldest == s->count || s->entries[i]->used < s->entries[oldest]->used))
+			oldest = i;
+	if (oldest == s->count)
 		return false;
-	blob_path(s, &oldest->hash, path, sizeof path);
+	blob_path(s, &s->entries[oldest]->hash, path, sizeof path);
 	disk_unlink(path);
 	remove_entry(s, oldest);
 	return true;
@@ -202,7 +206,7 @@ static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
 		return error_set(e, EMSGSIZE, "%s: a file of %llu bytes exceeds its limit of %llu", s->folder,
 				 (unsigned long long)need, (unsigned long long)s->limit);
 	for (size_t i = 0; i < s->count && used > s->limit - need; i++)
-		used -= s->entries[i].holds ? 0 : s->entries[i].size;
+		used -= s->entries[i]->holds ? 0 : s->entries[i]->size;
 	return used > s->limit - need ? exceeds(s, need, e) : 0;
 }
 
@@ -239,6 +243,8 @@ void blob_store_close(struct blob_store *s)
 {
 	if (!s)
 		return;
+	for (size_t i = 0; i < s->count; i++)
+		mem_free(s->entries[i]);
 	mem_free(s->entries);
 	mem_free(s->folder);
 	mem_free(s);
@@ -330,14 +336,14 @@ int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e
 	if (blob_hold(s, h))
 		return 0;
 	struct blob_entry *n = blob_find(s, h);
-	if (n) {
-		n->holds++;
-		return 0;
+	if (!n) {
+		n = add_entry(s, place_of(s, h), h, e);
+		if (!n)
+			return -ENOMEM;
+		n->gone = true;
 	}
-	int rc = add_entry(s, h, 0, 1, e);
-	if (!rc)
-		blob_find(s, h)->gone = true;
-	return rc;
+	n->holds++;
+	return 0;
 }
 
 /* ---- writing ---- */
@@ -539,7 +545,17 @@ void blob_let_go(struct blob_store *s, const struct blob_kept *kept)
 {
 	s->arrived -= kept->size;
 	blob_release(s, &kept->hash);
-	struct blob_entry *n = blob_find(s, &kept->hash);
-	if (n->gone && !n->holds)
-		remove_entry(s, n);
+}
+
+void blob_store_sweep(struct blob_store *s)
+{
+	size_t left = 0;
+	for (size_t i = 0; i < s->count; i++) {
+		struct blob_entry *n = s->entries[i];
+		if (n->gone && !n->holds)
+			mem_free(n);
+		else
+			s->entries[left++] = n;
+	}
+	s->count = left;
 }

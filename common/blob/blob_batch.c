@@ -97,6 +97,7 @@ void blob_batch_free(struct blob_batch *b)
 		}
 		blob_let_go(b->store, kept_of(b, i));
 	}
+	blob_store_sweep(b->store);
 	list_free(&b->kept);
 	mem_free(b);
 }

@@ -26,7 +26,7 @@ struct blob_store {
 	uint64_t limit, bytes, clock;
 	uint64_t arrived;	       /* of blobs that are being written */
 	uint64_t temporary;	       /* number of the last temporary file */
-	struct blob_entry *entries;    /* sorted by hash */
+	struct blob_entry **entries;   /* sorted by hash; there may be a million, and room is made between them */
 	bool (*more_room)(void *user); /* NULL: nobody has any */
 	void *user;
 	size_t count, capacity;

@@ -3,6 +3,7 @@
 #include "common/base/disk.h"
 #include "common/blob/blob_batch.h"
 #include "common/blob/blob_check.h"
+#include "common/blob/blob_state.h"
 #include "tests/support/folder.h"
 
 #include <stdarg.h>
@@ -526,9 +527,10 @@ static void not_flushed(void **state)
 {
 	(void)state;
 	struct blob_store *s;
-	struct blob_hash h;
+	struct blob_hash h, awaited = hash_of("awaited");
 	struct error e;
 	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_int_equal(blob_expect(s, &awaited, &e), 0);
 	struct blob_batch *b = blob_batch_new(s);
 	assert_int_equal(blob_batch_add(b, write_text(s, "0123456789", &h), &e), 0);
 	struct blob_store *next;
@@ -539,6 +541,7 @@ static void not_flushed(void **state)
 	assert_int_equal(blob_batch_flush(b, &e), -ENOENT);
 	blob_batch_free(b);
 	assert_false(blob_has(s, &h, NULL));
+	assert_int_equal(s->count, 1);
 	blob_store_close(s);
 }
 
