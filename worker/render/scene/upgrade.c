@@ -3,11 +3,17 @@
  * upgrade() walks over the file's elements, inner ones last, so that rules see the enclosing elements under their new
  * names. Rules are rows of tables, like Mitsuba's own; those that need more than a new name are functions.
  *
- * Some materials had other parameters and defaults before 0.3: they are refused by name.
+ * What differs in more than names before 0.3: `phong`, `ward` and `microfacet` had two factors besides their colours,
+ * and other defaults; `mirror` was smooth chrome; and <lookAt ox="..." ...> was mirrored.
+ *
+ * Failure: out of memory.
  */
 #include "worker/render/scene/upgrade.h"
 
+#include "worker/render/scene/number.h"
+
 #include <errno.h>
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
@@ -27,6 +33,8 @@ static const struct new_name types[] = {
 	{3, "bsdf", NULL, "composite", "mixturebsdf"},
 	{3, "texture", NULL, "exrtexture", "bitmap"},
 	{3, "texture", NULL, "ldrtexture", "bitmap"},
+	{3, "bsdf", NULL, "mirror", "conductor"},
+	{3, "bsdf", NULL, "microfacet", "roughplastic"},
 };
 
 /* For elements inside one of that name and type. */
@@ -41,7 +49,13 @@ static const struct new_name parameters[] = {
 	{3, "shape", "cylinder", "p2", "p1"},
 	{3, "texture", "checkerboard", "brightColor", "color0"},
 	{3, "texture", "checkerboard", "darkColor", "color1"},
+	{3, "texture", "gridtexture", "brightColor", "color0"},
+	{3, "texture", "gridtexture", "darkColor", "color1"},
 	{3, "bsdf", "roughconductor", "alphaB", "alpha"},
+	{3, "bsdf", "roughconductor", "ior", "eta"},
+	{3, "bsdf", "roughplastic", "alphaB", "alpha"},
+	{3, "bsdf", "ward", "alphaX", "alphaU"},
+	{3, "bsdf", "ward", "alphaY", "alphaV"},
 	{3, "bsdf", "roughdielectric", "alphaB", "alpha"},
 };
 
@@ -118,21 +132,130 @@ static bool turn_camera(struct xml_element *camera, struct arena *arena)
 	       put_first(camera, "string", "name", "fovAxis", "value", axis, arena);
 }
 
-static int check_material(const struct xml_element *el, struct error *e)
+static struct xml_element *named_child(const struct xml_element *in, const char *name)
 {
-	static const char *const others[] = {"microfacet", "phong", "ward", "mirror"};
-	for (size_t i = 0; is_named(el, "bsdf") && i < sizeof others / sizeof *others; i++)
-		if (is_of_type(el, others[i]) && xml_attribute(el, "type"))
-			return xml_error(el, e, ENOTSUP,
-					 "is not supported in files before version 0.3; Mitsuba 0.6 can convert them");
-	return 0;
+	for (struct xml_element *c = in->first; c; c = c->next) {
+		const char *own = xml_attribute(c, "name");
+		if (own && strcmp(own, name) == 0)
+			return c;
+	}
+	return NULL;
+}
+
+/* Materials of diffuse and specular light, and their colours by default. */
+static const struct lobes {
+	const char *type, *diffuse, *specular;
+} lobes[] = {{"phong", "0.5", "0.2"}, {"ward", "0.5", "0.2"}, {"microfacet", "0", "1"}};
+
+/* A texture `scale` in the place of a colour, which moves into it. */
+static bool wrap(struct xml_element *colour, const char *factor, struct arena *arena)
+{
+	struct xml_element *inner = arena_alloc(arena, 1, sizeof *inner);
+	struct xml_attribute *outside = arena_alloc(arena, 2, sizeof *outside),
+			     *inside = arena_alloc(arena, colour->attribute_count, sizeof *inside);
+	if (!inner || !outside || !inside)
+		return false;
+	for (uint32_t i = 0; i < colour->attribute_count; i++) {
+		inside[i] = colour->attributes[i];
+		if (strcmp(inside[i].name, "name") == 0) {
+			outside[0] = inside[i];
+			inside[i].value = "value";
+		}
+	}
+	outside[1] = (struct xml_attribute){"type", "scale"};
+	*inner = *colour;
+	inner->attributes = inside;
+	inner->parent = colour;
+	inner->next = NULL;
+	for (struct xml_element *c = inner->first; c; c = c->next)
+		c->parent = inner;
+	colour->name = "texture";
+	colour->attributes = outside;
+	colour->attribute_count = 2;
+	colour->first = colour->last = inner;
+	return put_first(colour, "float", "name", "scale", "value", factor, arena);
+}
+
+/* One colour and its factor, which is 1 if it is not given. */
+static bool scale_colour(struct xml_element *bsdf, const char *name, const char *factor_name, const char *fallback,
+			 struct arena *arena)
+{
+	struct xml_element *colour = named_child(bsdf, name), *given = named_child(bsdf, factor_name);
+	const char *factor = given ? xml_attribute(given, "value") : NULL;
+	double x;
+	bool scaled = factor && (!number_parse(factor, &x) || x != 1);
+	if (given)
+		given->ignored = true;
+	if (!colour)
+		colour = put_first(bsdf, "spectrum", "name", name, "value", fallback, arena);
+	return colour && (!scaled || wrap(colour, factor, arena));
+}
+
+static bool upgrade_material(struct xml_element *bsdf, struct arena *arena)
+{
+	if (!xml_attribute(bsdf, "type"))
+		return true;
+	for (size_t i = 0; i < sizeof lobes / sizeof *lobes; i++)
+		if (is_of_type(bsdf, lobes[i].type))
+			return scale_colour(bsdf, "specularReflectance", "specularAmount", lobes[i].specular, arena) &&
+			       scale_colour(bsdf, "diffuseReflectance", "diffuseAmount", lobes[i].diffuse, arena);
+	return !is_of_type(bsdf, "mirror") || put_first(bsdf, "string", "name", "material", "value", "Cr", arena);
+}
+
+/* origin, target and up had an attribute for each number; x is that of the first of them, such as `ox`. */
+static bool join(const struct xml_element *el, const char *x, const char *name, struct xml_attribute *out,
+		 struct arena *arena)
+{
+	const char *part[3];
+	size_t size = 1;
+	for (int i = 0; i < 3; i++) {
+		part[i] = xml_attribute(el, (char[]){*x, (char)('x' + i), 0});
+		part[i] = part[i] ? part[i] : "";
+		size += strlen(part[i]) + 2;
+	}
+	char *text = arena_alloc(arena, size, 1);
+	if (!text)
+		return false;
+	snprintf(text, size, "%s, %s, %s", part[0], part[1], part[2]);
+	*out = (struct xml_attribute){name, text};
+	return true;
+}
+
+/* el: a lookAt with such attributes, which comes after a scale that mirrors x. */
+static bool turn_lookat(struct xml_element *el, struct arena *arena)
+{
+	struct xml_element *look = arena_alloc(arena, 1, sizeof *look);
+	struct xml_attribute *a = arena_alloc(arena, 3, sizeof *a), *mirror = arena_alloc(arena, 1, sizeof *mirror);
+	bool up = xml_attribute(el, "ux") != NULL;
+	if (!look || !a || !mirror || !join(el, "o", "origin", &a[0], arena) ||
+	    !join(el, "t", "target", &a[1], arena) || (up && !join(el, "u", "up", &a[2], arena)))
+		return false;
+	*look = *el;
+	look->attributes = a;
+	look->attribute_count = up ? 3 : 2;
+	*mirror = (struct xml_attribute){"x", "-1"};
+	el->name = "scale";
+	el->attributes = mirror;
+	el->attribute_count = 1;
+	el->next = look;
+	if (el->parent->last == el)
+		el->parent->last = look;
+	return true;
+}
+
+/* What needs more than a new name in files from before 0.3. */
+static bool upgrade_oldest(struct xml_element *el, struct arena *arena)
+{
+	if (is_named(el, "bsdf"))
+		return upgrade_material(el, arena);
+	return !is_named(el, "lookAt") || !xml_attribute(el, "ox") || turn_lookat(el, arena);
 }
 
 static int upgrade(struct xml_element *el, int minor, struct arena *arena, struct error *e)
 {
-	int r = minor < 3 ? check_material(el, e) : 0;
-	if (r)
-		return r;
+	int r = 0;
+	if (minor < 3 && !upgrade_oldest(el, arena))
+		return xml_error(el, e, ENOMEM, "out of memory");
 	if (minor < 4 && is_named(el, "luminaire"))
 		el->name = "emitter";
 	if (minor < 4 && is_named(el, "camera")) {

@@ -3,8 +3,8 @@
  * expat calls open_element and on_end. Each element is put into the arena with its attributes, with $names replaced and
  * files searched along the paths. <include> reads the named file in its place. Nothing is interpreted here.
  *
- * Failures stop the parser at once, with file and line: errors of expat, a document type, and depth, counts and sizes
- * beyond the limits in xml.h.
+ * Failures stop the parser at once, with file and line: errors of expat, a document type with declarations, and depth,
+ * counts and sizes beyond the limits in xml.h.
  */
 #include "worker/render/scene/xml.h"
 
@@ -445,14 +445,26 @@ static void on_text(void *user, const char *text, int length)
 			r->current->text = true;
 }
 
+/* Without declarations of its own it means nothing: the file that it names is never opened. */
 static void on_doctype(void *user, const char *name, const char *system, const char *public_id, int has_subset)
 {
-	(void)name, (void)system, (void)public_id, (void)has_subset;
+	(void)name, (void)system, (void)public_id;
 	struct reader *r = user;
-	if (!r->failed)
-		stop(r, error_set(r->error, EINVAL,
-				  "%s:%d: <!DOCTYPE>: scene files must not declare document types or entities", r->file,
-				  line_now(r)));
+	if (!r->failed && has_subset)
+		stop(r,
+		     error_set(r->error, EINVAL, "%s:%d: <!DOCTYPE>: scene files must not declare elements or entities",
+			       r->file, line_now(r)));
+}
+
+/* Mitsuba 3 reads the first element of a file and nothing after it. */
+static bool ends_early(struct reader *r, enum XML_Error code)
+{
+	if (code != XML_ERROR_JUNK_AFTER_DOC_ELEMENT || r->snake)
+		return false;
+	if (r->tree->note_count < XML_NOTES_MAX)
+		r->tree->notes[r->tree->note_count++] =
+			"goes on after its first element: the rest is ignored, as by Mitsuba 3";
+	return true;
 }
 
 static int parse_bytes(struct reader *r, const struct asset *a)
@@ -481,11 +493,12 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 	mem_free(text);
 	int c = r->failed;
 	enum XML_Error code = XML_GetErrorCode(parser);
-	if (!c && status != XML_STATUS_OK && code == XML_ERROR_NO_ELEMENTS) {
+	bool whole = status == XML_STATUS_OK || (!c && ends_early(r, code));
+	if (!c && !whole && code == XML_ERROR_NO_ELEMENTS) {
 		c = r->current ? error_set(r->error, EINVAL, "%s:%d: the file ends before </%.64s>", r->file,
 					   line_now(r), r->current->name)
 			       : error_set(r->error, EINVAL, "%s: the file is empty", r->file);
-	} else if (!c && status != XML_STATUS_OK) {
+	} else if (!c && !whole) {
 		c = error_set(r->error, code == XML_ERROR_NO_MEMORY ? ENOMEM : EINVAL, "%s:%d: %s%s%.64s%s", r->file,
 			      line_now(r), XML_ErrorString(code), r->current ? " in <" : "",
 			      r->current ? r->current->name : "", r->current ? ">" : "");

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Another texture times a number or, for colours, a colour or (ours) a texture: 0.5/0.6. Reflectances are limited to
- * 1. */
+/* Another texture, or a colour, times a number or, for colours, a colour or (ours) a texture: 0.5/0.6. Reflectances are
+ * limited to 1. */
 #include "worker/render/texture/texture.h"
 
 struct scale {
@@ -50,11 +50,12 @@ static int scale_create(struct texture *t, const struct scene_node *n, enum colo
 	if (!s->tinted)
 		s->factor = node_ref(n, "scale") ? 1 : node_float(n, "scale", 1);
 	const struct scene_node *inner = node_child(n, PLUGIN_TEXTURE, 0);
-	if (!inner)
-		return node_error(n, e, EINVAL, "needs a texture inside");
+	if (!inner && !node_find(n, "value"))
+		return node_error(n, e, EINVAL, "needs a texture inside, or a colour, `value`");
 	if (s->factor < 0 && !color_role_is_number(role))
 		return node_error(n, e, ERANGE, "scale=%g makes negative colours", s->factor);
-	return texture_create(&s->inner, inner, role, build, e);
+	return inner ? texture_create(&s->inner, inner, role, build, e)
+		     : texture_from_node(&s->inner, n, "value", 0, role, build, e);
 }
 
 static spectrum scale_eval(const struct texture *t, const struct texture_point *at, const struct wavelengths *w)
@@ -116,6 +117,7 @@ static const struct param scale_params[] = {
 	 .types = VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_NODE,
 	 .min = -PARAM_LIGHT_MAX,
 	 .max = PARAM_LIGHT_MAX},
+	{.name = "value", .types = VALUE_TEXTURE, .min = -PARAM_LIGHT_MAX, .max = PARAM_LIGHT_MAX},
 	{.name = NULL},
 };
 

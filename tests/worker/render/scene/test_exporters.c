@@ -74,6 +74,12 @@ static void test_loose_xml(void **state)
 		{"<scene version='3.0.0'><bsdf type='diffuse' id='a'/>/> x</scene>", 1},
 		{"<scene version='3.0.0'><bsdf type='diffuse' id='a'><rgb name='reflectance' value=', .1,.2, .3 , '/></bsdf></scene>",
 		 0},
+		{"<?xml version='1.0'?><!DOCTYPE scene SYSTEM '/there/is/none.dtd'>"
+		 "<scene version='0.6.0'><bsdf type='diffuse' id='a'/></scene>",
+		 0},
+		{"<scene version='3.0.0'><bsdf type='diffuse' id='a'/></scene>\n<scene version='3.0.0'>"
+		 "<bsdf type='unheard'/>",
+		 1},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const struct memory_file files[] = {{"s.xml", cases[i].text, strlen(cases[i].text)}, {0}};

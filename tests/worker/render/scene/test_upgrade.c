@@ -144,6 +144,62 @@ static void test_version_2(void **state)
 		     "");
 }
 
+/* Colours whose factor is not 1 move into a texture `scale`, and those that are missing had other values than now. */
+static void test_materials_of_version_2(void **state)
+{
+	(void)state;
+	assert_twins(
+		"0.2.0",
+		"<bsdf type='phong'><float name='diffuseAmount' value='.5'/><float name='exponent' value='9'/>"
+		"<rgb name='diffuseReflectance' value='.8 .4 .2'/></bsdf>"
+		"<bsdf type='ward'><float name='specularAmount' value='1.0'/><float name='alphaX' value='.1'/>"
+		"<float name='alphaY' value='.3'/><texture name='specularReflectance' type='checkerboard'/></bsdf>"
+		"<bsdf type='microfacet'><float name='alphaB' value='.2'/><float name='specularAmount' value='.3'/>"
+		"<texture name='specularReflectance' type='checkerboard'><float name='uscale' value='2'/></texture>"
+		"</bsdf>"
+		"<shape type='sphere'><bsdf type='mirror'><spectrum name='specularReflectance' value='.9'/></bsdf>"
+		"</shape><bsdf type='roughmetal'><float name='ior' value='2'/></bsdf>"
+		"<bsdf type='diffuse'><texture name='reflectance' type='gridtexture'>"
+		"<spectrum name='brightColor' value='.8'/><spectrum name='darkColor' value='.3'/></texture></bsdf>",
+		"",
+		"<bsdf type='phong'><texture name='diffuseReflectance' type='scale'><float name='scale' value='.5'/>"
+		"<rgb name='value' value='.8 .4 .2'/></texture><spectrum name='specularReflectance' value='.2'/>"
+		"<float name='exponent' value='9'/></bsdf>"
+		"<bsdf type='ward'><spectrum name='diffuseReflectance' value='.5'/><float name='alphaU' value='.1'/>"
+		"<float name='alphaV' value='.3'/><texture name='specularReflectance' type='checkerboard'/></bsdf>"
+		"<bsdf type='roughplastic'><float name='alpha' value='.2'/>"
+		"<spectrum name='diffuseReflectance' value='0'/>"
+		"<texture name='specularReflectance' type='scale'><float name='scale' value='.3'/>"
+		"<texture name='value' type='checkerboard'><float name='uscale' value='2'/></texture></texture></bsdf>"
+		"<shape type='sphere'><bsdf type='conductor'><spectrum name='specularReflectance' value='.9'/>"
+		"<string name='material' value='Cr'/></bsdf></shape>"
+		"<bsdf type='roughconductor'><float name='eta' value='2'/></bsdf>"
+		"<bsdf type='diffuse'><texture name='reflectance' type='gridtexture'>"
+		"<spectrum name='color0' value='.8'/><spectrum name='color1' value='.3'/></texture></bsdf>",
+		"");
+}
+
+/* It was mirrored, and so were cameras: twice is as now. */
+static void test_first_lookat(void **state)
+{
+	(void)state;
+	static const char first[] = "<lookAt ox='1' oy='2' oz='3' tx='0' ty='0' tz='0' ux='0' uy='1' uz='0'/>";
+	char old[1024];
+	snprintf(old, sizeof old,
+		 "<camera type='orthographic'>" TO("%s<translate x='5'/>") PART
+		 "</camera>"
+		 "<luminaire type='spot'>" TO("%s") "</luminaire>",
+		 first, first);
+	assert_twins("0.2.0", old, "",
+		     "<sensor type='orthographic'>" TO(LOOK "<translate x='5'/>") PART
+		     "</sensor><emitter type='spot'>" TO("<scale x='-1'/>" LOOK) "</emitter>",
+		     "");
+	assert_twins(
+		"0.2.0",
+		"<luminaire type='spot'>" TO("<lookAt ox='1' oy='2' oz='3' tx='0' ty='0' tz='0'/>") "</luminaire>", "",
+		"<emitter type='spot'>" TO("<scale x='-1'/><lookAt origin='1 2 3' target='0 0 0'/>") "</emitter>", "");
+}
+
 /* What includes a file of another version keeps its own, and the angle of view is the smaller side's. */
 static void test_each_file_for_itself(void **state)
 {
@@ -187,8 +243,11 @@ static void test_refused(void **state)
 	static const struct {
 		const char *version, *body, *sentence;
 	} cases[] = {
-		{"0.2.0", "<bsdf type='phong'/>", "is not supported in files before version 0.3"},
-		{"0.2.0", "<shape type='sphere'><bsdf type='mirror'/></shape>", "before version 0.3"},
+		{"0.2.0", "<bsdf type='phong'><float name='diffuseAmount' value='x'/></bsdf>",
+		 "`x` is not a (finite) number"},
+		{"0.2.0", "<camera type='perspective'>" TO("<lookAt ox='1' tx='2'/>") "</camera>",
+		 "is not three numbers"},
+		{"0.3.0", "<bsdf type='mirror'/>", "there is no bsdf of this type"},
 		{"0.3.0", "<bsdf type='lambertian'/>", "there is no bsdf of this type"},
 		{"0.4.0", "<luminaire type='constant'/>", "there is no element of this name; did you mean `emitter`?"},
 		{"0.5.0", "<bsdf type='bump'/>", "there is no bsdf of this type"},
@@ -255,6 +314,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_version_3),
 		cmocka_unit_test(test_version_2),
+		cmocka_unit_test(test_materials_of_version_2),
+		cmocka_unit_test(test_first_lookat),
 		cmocka_unit_test(test_each_file_for_itself),
 		cmocka_unit_test(test_left_is_right),
 		cmocka_unit_test(test_refused),

@@ -330,6 +330,11 @@ static void test_scale(void **state)
 	assert_value(&t, 1.5 / 3, 0.25, 0.5);
 	assert_value(&t, 0.5 / 3, 0.75, 1);
 	assert_true(texture_max(&t) == 1 && texture_shape(&t) == COLOR_SHAPE_CONSTANT);
+	n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=0.5 value=rgb(0.8,0.8,0.8)");
+	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->build, &e), 0);
+	assert_value(&t, 0.2, 0.7, 0.4);
+	n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=0.5");
+	assert_true(texture_create(&t, n, COLOR_REFLECTANCE, &f->build, &e) < 0 && strstr(e.text, "a texture inside"));
 	n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=-2");
 	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
 	assert_true(texture_create(&t, n, COLOR_ILLUMINANT, &f->build, &e) < 0 && strstr(e.text, "negative colours"));
