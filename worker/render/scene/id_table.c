@@ -16,13 +16,18 @@ static int compare_ids(const void *a, const void *b)
 	return strcmp(x->id, y->id);
 }
 
+bool id_table_is_absent(const struct xml_element *el)
+{
+	return strcmp(el->name, "subsurface") == 0 || strcmp(el->name, "field") == 0;
+}
+
 bool id_table_names(const struct xml_element *el)
 {
 	enum plugin_class cls;
 	if (el->ignored || !xml_attribute(el, "id"))
 		return false;
 	return plugin_class_find(el->name, &cls) || (strcmp(el->name, "spectrum") == 0 && xml_attribute(el, "type")) ||
-	       strcmp(el->name, "subsurface") == 0;
+	       id_table_is_absent(el);
 }
 
 struct xml_element *id_table_look(const struct id_table *t, const char *id)

@@ -23,6 +23,9 @@ int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena 
 /* Whether it is an element that an id may name: an object, or a spectrum with a type. */
 bool id_table_names(const struct xml_element *el);
 
+/* One of those that is never made, subsurface or field: reported where it stands, not where it is referred to. */
+bool id_table_is_absent(const struct xml_element *el);
+
 /* The object of that id. NULL: none. */
 struct xml_element *id_table_look(const struct id_table *t, const char *id);
 

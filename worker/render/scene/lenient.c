@@ -86,16 +86,6 @@ static const char *mesh_of(const struct xml_element *el)
 	return NULL;
 }
 
-/* The camera whose name is part of this one, as in "codedOrthographic" and "thinlens_srf"; NULL: none. */
-static const char *camera_of(const char *type)
-{
-	static const char *const cameras[] = {"perspective", "thinlens", "orthographic", "telecentric", "spherical"};
-	for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++)
-		if (strcasestr(type, cameras[i]))
-			return cameras[i];
-	return NULL;
-}
-
 static bool has_parameter(const struct xml_element *el, const char *const *list)
 {
 	for (const struct xml_element *c = el->first; c; c = c->next)
@@ -104,12 +94,26 @@ static bool has_parameter(const struct xml_element *el, const char *const *list)
 	return false;
 }
 
+/* The camera whose name is part of this one, as in "codedOrthographic" and "thinlens_srf". Others that are cameras by
+ * what they are called or have are taken for one without a lens. NULL: what measures light in some other way. */
+static const char *camera_of(const struct xml_element *el, const char *type)
+{
+	static const char *const angle[] = {"fov", "focal_length", "focalLength", NULL};
+	static const char *const cameras[] = {"perspective", "thinlens", "orthographic", "telecentric", "spherical"};
+	for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++)
+		if (strcasestr(type, cameras[i]))
+			return cameras[i];
+	return strcasestr(type, "lens") || strcasestr(type, "camera") || has_parameter(el, angle) ? "perspective"
+												  : NULL;
+}
+
 /* Materials are told by their parameters, whose names most branches of Mitsuba keep. */
 static const char *material_of(const struct xml_element *el, const char *fallback)
 {
 	static const char *const base[] = {"base_color", "baseColor", NULL},
 				 *const disney[] = {"metallic", "roughness", NULL},
-				 *const metal[] = {"material", "eta", "k", NULL}, *const rough[] = {"alpha", NULL},
+				 *const metal[] = {"material", "eta", "k", NULL},
+				 *const rough[] = {"alpha", "roughness", NULL},
 				 *const diffuse[] = {"diffuse_reflectance", "diffuseReflectance", NULL},
 				 *const specular[] = {"specular_reflectance", "specularReflectance", NULL};
 	if (has_parameter(el, base) && has_parameter(el, disney))
@@ -132,7 +136,7 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 			*stand_in = material_of(el, *stand_in);
 		return way;
 	case PLUGIN_SENSOR:
-		*stand_in = camera_of(type);
+		*stand_in = camera_of(el, type);
 		return *stand_in ? LENIENT_REPLACE : way;
 	case PLUGIN_SHAPE:
 		/* Of Mitsuba's own, `ellipsoids` have a PLY file too, but of points. */
@@ -169,6 +173,8 @@ const char *lenient_param(const char *stand_in, const char *name)
 	};
 	if (strcmp(stand_in, "diffuse") == 0 && is_one_of(name, colors))
 		return "reflectance";
+	if (strncmp(stand_in, "rough", strlen("rough")) == 0 && strcmp(name, "roughness") == 0)
+		return "alpha";
 	for (size_t i = 0; i < sizeof shares / sizeof *shares && strcmp(stand_in, "principled") == 0; i++)
 		if (strcmp(shares[i].other, name) == 0)
 			return shares[i].principled;

@@ -270,7 +270,7 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	int r = element_check(el, "id|name", false, m->error);
 	if (!r)
 		r = id_table_find(&m->ids, el, "id", &target, m->error);
-	if (!r && strcmp(target->name, "subsurface") == 0) /* which is reported where it stands */
+	if (!r && id_table_is_absent(target)) /* which is reported where it stands */
 		return REPORT_TOLD;
 	return r ? r : read_object(m, d, owner, el, target);
 }

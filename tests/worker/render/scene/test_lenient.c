@@ -112,6 +112,9 @@ static void test_likely_stand_ins(void **state)
 	(void)state;
 	static const char xml[] =
 		"<scene version='0.6.0'><sensor type='codedOrthographic' id='camera'/>"
+		"<sensor type='realisticlens' id='lens'/><sensor type='cmos' id='angle'><float name='fov' value='30'/></sensor>"
+		"<bsdf type='cooktorrance' id='torrance'><rgb name='diffuseReflectance' value='0.2'/>"
+		"<rgb name='specularReflectance' value='0.5'/><float name='roughness' value='0.3'/></bsdf>"
 		"<shape type='shapenet' id='mesh'><string name='filename' value='a.PLY'/></shape>"
 		"<bsdf type='disneybsdf' id='disney'><rgb name='baseColor' value='0.2'/><float name='metallic' value='0.5'/>"
 		"<float name='specularTransmission' value='0.25'/></bsdf>"
@@ -121,11 +124,14 @@ static void test_likely_stand_ins(void **state)
 		"<bsdf type='rpv' id='other'><float name='k' value='0.2'/></bsdf></scene>";
 	static const char *const expected[][2] = {{"camera", "orthographic"},  {"mesh", "ply"},
 						  {"disney", "principled"},    {"metal", "roughconductor"},
-						  {"plastic", "roughplastic"}, {"other", "diffuse"}};
+						  {"plastic", "roughplastic"}, {"other", "diffuse"},
+						  {"lens", "perspective"},     {"angle", "perspective"},
+						  {"torrance", "roughplastic"}};
 	struct scene s = read_leniently(xml);
 	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
 		assert_string_equal(scene_named(&s, expected[i][0])->type, expected[i][1]);
 	assert_true(node_float(scene_named(&s, "disney"), "spec_trans", 0) == 0.25);
+	assert_true(node_float(scene_named(&s, "torrance"), "alpha", 0) == 0.3);
 	scene_fini(&s);
 	s = read_leniently(
 		"<scene version='3.0.0'><shape type='ellipsoids'><string name='filename' value='a.ply'/></shape>"
@@ -134,8 +140,8 @@ static void test_likely_stand_ins(void **state)
 	scene_fini(&s);
 }
 
-/* What refers to a subsurface that is left out goes without it. */
-static void test_subsurface_by_reference(void **state)
+/* What refers to a subsurface or a field that is left out goes without it. */
+static void test_absent_by_reference(void **state)
 {
 	(void)state;
 	static const char xml[] = "<scene version='0.6.0'><emitter type='constant'/><subsurface type='dipole' id='d'/>"
@@ -143,6 +149,10 @@ static void test_subsurface_by_reference(void **state)
 	struct scene s = read_leniently(xml);
 	assert_string_equal(node_child(scene_named(&s, "s"), PLUGIN_BSDF, 0)->type, "plastic");
 	assert_int_equal(s.note_count, 1);
+	scene_fini(&s);
+	s = read_leniently("<scene version='3.0.0'><field type='bitmap' id='f'/><bsdf type='neuralbsdf' id='b'>"
+			   "<ref name='reflectance' id='f'/></bsdf></scene>");
+	assert_null(node_find(scene_named(&s, "b"), "reflectance"));
 	scene_fini(&s);
 }
 
@@ -416,7 +426,7 @@ int main(void)
 		cmocka_unit_test(test_stand_ins),
 		cmocka_unit_test(test_openpbr),
 		cmocka_unit_test(test_likely_stand_ins),
-		cmocka_unit_test(test_subsurface_by_reference),
+		cmocka_unit_test(test_absent_by_reference),
 		cmocka_unit_test(test_textures_around_others),
 		cmocka_unit_test(test_portals),
 		cmocka_unit_test(test_colours_are_kept),
