@@ -104,6 +104,8 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 		if (i == 0 && type == GLB_JSON) {
 			*text = (const char *)p + at;
 			*size = length;
+			while (*size && !(*text)[*size - 1]) /* some fill it up with zeros instead of blanks */
+				--*size;
 		} else if (i == 1 && type == GLB_BINARY) {
 			g->binary_first = at;
 			g->binary_count = length;

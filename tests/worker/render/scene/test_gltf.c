@@ -417,6 +417,14 @@ static void test_loose_files(void **state)
 	s = gltf_files_packed(&f, GLTF_BINARY);
 	assert_int_equal(s.object_count, whole.object_count);
 	scene_fini(&s);
+	gltf_files_make(&f); /* JSON with zeros behind it */
+	strcat(f.json, "  ");
+	gltf_files_pack(&f, GLTF_BINARY);
+	for (size_t at = 19 + f.file[12] + 256u * f.file[13]; f.file[at] != '}'; at--)
+		f.file[at] = 0;
+	assert_int_equal(gltf_files_read(f.list, false, &s, &(struct error){""}), 0);
+	assert_int_equal(s.object_count, whole.object_count);
+	scene_fini(&s);
 	gltf_files_make(&f); /* no scenes: the same nodes are roots */
 	gltf_files_replace(&f, "\"scene\": 0", "\"extras\": 0");
 	gltf_files_replace(&f, "\"scenes\"", "\"other\"");
