@@ -239,6 +239,16 @@ static void test_closed_forms(void **state)
 	/* The data's own check: Au at 550 nm. */
 	struct bsdf_sample s = sample_of("conductor material=Au", true, up, 0);
 	assert_near(s.f.v[0], fresnel_at_normal(0.350, 2.714), 1e-3, "Au");
+	/* Others there by laws of their own: diamond's (Peter 1923), rutile's for the extraordinary ray (Devore 1951).
+	 */
+	const double l2 = 0.55 * 0.55;
+	double diamond = sqrt(1 + 0.3306 * l2 / (l2 - 0.030625) + 4.3356 * l2 / (l2 - 0.011236));
+	s = sample_of("conductor material=d-C", true, up, 0);
+	assert_near(s.f.v[0], fresnel_at_normal(diamond, 0), 2e-4, "d-C");
+	s = sample_of("conductor material=TiO2", true, up, 0);
+	assert_near(s.f.v[0], fresnel_at_normal(sqrt(7.197 + 0.3322 / (l2 - 0.0843)), 0), 2e-3, "TiO2");
+	s = sample_of("conductor material=MgO", true, up, 0);
+	assert_near(s.f.v[0], fresnel_at_normal(1.7405, 0), 2e-4, "MgO");
 	/* Copper is what 0.6 takes where nothing is said, 3.x a perfect mirror. */
 	s = sample_of("conductor", false, up, 0);
 	assert_true(s.f.v[0] < 0.7 && s.f.v[3] > 0.9);

@@ -112,13 +112,13 @@ static void test_unknown_metals(void **state)
 {
 	(void)state;
 	static const char xml[] =
-		"<scene version='3.0.0'>" SPHERE(METAL("TiO2_palik")) ENVIRONMENT "\n" SPHERE(METAL("Agg")) "</scene>";
+		"<scene version='3.0.0'>" SPHERE(METAL("TiO3_palik")) ENVIRONMENT "\n" SPHERE(METAL("Agg")) "</scene>";
 	struct checked c;
 	check(xml, &c);
 	assert_int_equal(c.scene.note_count, 0);
 	assert_int_equal(c.found.problem_count, 2);
 	assert_non_null(strstr(c.found.problems[0],
-			       "unknown conductor \"TiO2_palik\"; eta and k are accepted, too (known: "
+			       "unknown conductor \"TiO3_palik\"; eta and k are accepted, too (known: "
 			       "a-C, Ag, "));
 	assert_non_null(strstr(c.found.problems[0], ", W, none)"));
 	assert_non_null(strstr(c.found.problems[1], "unknown conductor \"Agg\"; did you mean `Ag`?"));
