@@ -86,25 +86,23 @@ static const char *mesh_of(const struct xml_element *el)
 	return NULL;
 }
 
+/* The camera whose name is part of this one, as in "codedOrthographic" and "thinlens_srf". Others that are called a
+ * lens or a camera are taken for one without a lens. NULL: what projects, or measures light, in some other way. */
+static const char *camera_of(const char *type)
+{
+	static const char *const cameras[] = {"perspective", "thinlens", "orthographic", "telecentric", "spherical"};
+	for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++)
+		if (strcasestr(type, cameras[i]))
+			return cameras[i];
+	return strcasestr(type, "lens") || strcasestr(type, "camera") ? "perspective" : NULL;
+}
+
 static bool has_parameter(const struct xml_element *el, const char *const *list)
 {
 	for (const struct xml_element *c = el->first; c; c = c->next)
 		if (xml_attribute(c, "name") && is_one_of(xml_attribute(c, "name"), list))
 			return true;
 	return false;
-}
-
-/* The camera whose name is part of this one, as in "codedOrthographic" and "thinlens_srf". Others that are cameras by
- * what they are called or have are taken for one without a lens. NULL: what measures light in some other way. */
-static const char *camera_of(const struct xml_element *el, const char *type)
-{
-	static const char *const angle[] = {"fov", "focal_length", "focalLength", NULL};
-	static const char *const cameras[] = {"perspective", "thinlens", "orthographic", "telecentric", "spherical"};
-	for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++)
-		if (strcasestr(type, cameras[i]))
-			return cameras[i];
-	return strcasestr(type, "lens") || strcasestr(type, "camera") || has_parameter(el, angle) ? "perspective"
-												  : NULL;
 }
 
 /* Materials are told by their parameters, whose names most branches of Mitsuba keep. */
@@ -136,7 +134,7 @@ enum lenient_way lenient_element(const struct xml_element *el, enum plugin_class
 			*stand_in = material_of(el, *stand_in);
 		return way;
 	case PLUGIN_SENSOR:
-		*stand_in = camera_of(el, type);
+		*stand_in = camera_of(type);
 		return *stand_in ? LENIENT_REPLACE : way;
 	case PLUGIN_SHAPE:
 		/* Of Mitsuba's own, `ellipsoids` have a PLY file too, but of points. */

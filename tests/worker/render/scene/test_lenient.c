@@ -112,7 +112,7 @@ static void test_likely_stand_ins(void **state)
 	(void)state;
 	static const char xml[] =
 		"<scene version='0.6.0'><sensor type='codedOrthographic' id='camera'/>"
-		"<sensor type='realisticlens' id='lens'/><sensor type='cmos' id='angle'><float name='fov' value='30'/></sensor>"
+		"<sensor type='realisticlens' id='lens'/><sensor type='cmosCamera' id='cmos'/>"
 		"<bsdf type='cooktorrance' id='torrance'><rgb name='diffuseReflectance' value='0.2'/>"
 		"<rgb name='specularReflectance' value='0.5'/><float name='roughness' value='0.3'/></bsdf>"
 		"<shape type='shapenet' id='mesh'><string name='filename' value='a.PLY'/></shape>"
@@ -125,7 +125,7 @@ static void test_likely_stand_ins(void **state)
 	static const char *const expected[][2] = {{"camera", "orthographic"},  {"mesh", "ply"},
 						  {"disney", "principled"},    {"metal", "roughconductor"},
 						  {"plastic", "roughplastic"}, {"other", "diffuse"},
-						  {"lens", "perspective"},     {"angle", "perspective"},
+						  {"lens", "perspective"},     {"cmos", "perspective"},
 						  {"torrance", "roughplastic"}};
 	struct scene s = read_leniently(xml);
 	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
