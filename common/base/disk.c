@@ -91,13 +91,29 @@ int disk_write_all(int fd, const void *bytes, size_t size)
 	return 0;
 }
 
+/* Removes what has the name: it may be a link to a file of somebody else's, or be open to more readers. */
+static int open_new(const char *path, mode_t mode)
+{
+	int fd = disk_open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+	if (fd < 0 && errno == EEXIST && disk_unlink(path) == 0)
+		fd = disk_open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+	if (fd >= 0 && (mode & 077) && fchmod(fd, mode)) { /* the umask may have left others out */
+		int code = errno;
+		disk_close(fd);
+		disk_unlink(path);
+		errno = code;
+		return -1;
+	}
+	return fd;
+}
+
 int disk_replace(const char *path, const void *bytes, size_t size, mode_t mode, struct error *e)
 {
 	char temporary[4096];
 	int n = snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	if (n < 0 || (size_t)n >= sizeof temporary)
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
-	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode);
+	int fd = open_new(temporary, mode);
 	int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
 	if (!rc && disk_fsync(fd))
 		rc = -errno;

@@ -87,8 +87,9 @@ static inline void disk_read_through(int fd)
 
 /* Writes all of it; 0 or -errno. */
 int disk_write_all(int fd, const void *bytes, size_t size);
-/* Writes a file atomically: under the name PATH.tmp, flushed, then renamed. Its name is durable once its folder is
- * flushed. After an error the old file is unchanged. */
+/* Writes a file atomically: a new one under the name PATH.tmp, flushed, then renamed. Others may read it if the
+ * mode says so, whatever the umask. Its name is durable once its folder is flushed. After an error the old file is
+ * unchanged. */
 int disk_replace(const char *path, const void *bytes, size_t size, mode_t mode, struct error *e);
 /* Makes the names in a folder durable. */
 int disk_sync_folder(const char *path, struct error *e);

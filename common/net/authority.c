@@ -368,8 +368,10 @@ static int write_pair(const struct authority *a, const char *name, X509 *cert, E
 		rc = put_in_place(a, name, "key.pem.next", "key.pem", e);
 	if (!rc)
 		rc = put_in_place(a, name, "cert.pem.next", "cert.pem", e);
-	if (rc && path_in(path, &ignored, a->folder, name, "cert.pem.next") == 0) /* it will not be recorded */
-		disk_unlink(path);
+	static const char *const files[] = {"cert.pem.next", "key.pem.next"};
+	for (size_t i = 0; i < 2; i++)
+		if (rc && path_in(path, &ignored, a->folder, name, files[i]) == 0) /* it will not be recorded */
+			disk_unlink(path);
 	return rc;
 }
 

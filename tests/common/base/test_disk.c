@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A file that cannot be replaced stays as it was, whichever call fails, and the error is that call's. */
+/* A file that cannot be replaced stays as it was, whichever call fails, and the error is that call's. What has the name
+ * of its temporary file already is neither written to nor gives it its mode. */
 #include "common/base/disk.h"
 #include "tests/support/folder.h"
 
@@ -9,6 +10,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -86,10 +88,39 @@ static void replaced_or_unchanged(void **state)
 	check(disk_system, 0);
 }
 
+static void replace_with_mode(mode_t mode)
+{
+	struct stat st;
+	assert_int_equal(disk_replace(path, "new", 3, mode, &e), 0);
+	assert_int_equal(lstat(path, &st), 0);
+	assert_int_equal(st.st_mode, S_IFREG | mode);
+}
+
+static void another_file_in_its_way(void **state)
+{
+	(void)state;
+	char other[200];
+	struct stat st;
+	snprintf(path, sizeof path, "%s/file", folder);
+	snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	snprintf(other, sizeof other, "%s/other", folder);
+	const mode_t before = umask(077);
+	replace_with_mode(0644); /* others read it, as was asked for */
+	umask(before);
+	fclose(fopen(temporary, "w"));
+	assert_int_equal(chmod(temporary, 0666), 0);
+	replace_with_mode(0600);
+	fclose(fopen(other, "w"));
+	assert_int_equal(symlink(other, temporary), 0);
+	replace_with_mode(0600);
+	assert_true(stat(other, &st) == 0 && st.st_size == 0);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(replaced_or_unchanged, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(another_file_in_its_way, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

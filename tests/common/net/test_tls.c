@@ -355,6 +355,42 @@ static void a_full_disk_takes_no_certificate_away(void **state)
 	assert_int_equal(authority_issue(pair_ours, "mine", TLS_WORKER, 5, false, &e), -EEXIST);
 }
 
+static unsigned renames_left;
+
+static int rename_until(const char *from, const char *to)
+{
+	if (renames_left) {
+		renames_left--;
+		return disk_system.rename(from, to);
+	}
+	errno = EIO;
+	return -1;
+}
+
+/* Wherever it ends: neither a key nor a certificate that is not recorded. */
+static void an_error_leaves_nothing_behind(void **state)
+{
+	(void)state;
+	struct disk bad = disk_system;
+	struct error e;
+	bad.rename = rename_until;
+	pair_issue(pair_ours, "tidy", TLS_WORKER, 5);
+	const size_t before = certificates();
+	unsigned most = 0;
+	for (int rc = -1; rc; most++) {
+		renames_left = most;
+		disk_use(&bad);
+		rc = authority_issue(pair_ours, "tidy", TLS_WORKER, 5, true, &e);
+		disk_use(NULL);
+		assert_true(rc == 0 || rc == -EIO);
+		assert_int_equal(certificates(), before + (rc == 0));
+		assert_int_equal(access(pair_at(pair_ours, "tidy/cert.pem.next"), F_OK), -1);
+		assert_int_equal(access(pair_at(pair_ours, "tidy/key.pem.next"), F_OK), -1);
+	}
+	assert_int_equal(most, 8);
+	accepts("tidy", "tidy", TLS_WORKER);
+}
+
 static void who_is_revoked_is_not(void **state)
 {
 	(void)state;
@@ -514,6 +550,7 @@ int main(void)
 		cmocka_unit_test(a_wrong_clock_is_named),
 		cmocka_unit_test(an_interrupted_revocation_is_repeated),
 		cmocka_unit_test(a_full_disk_takes_no_certificate_away),
+		cmocka_unit_test(an_error_leaves_nothing_behind),
 		cmocka_unit_test(clocks_may_be_behind),
 		cmocka_unit_test(one_authority_replaces_another),
 		cmocka_unit_test(names_are_strict),
