@@ -541,10 +541,11 @@ void blob_enter(struct blob_store *s, const struct blob_kept *kept)
 		come_back(s, n, kept->size);
 }
 
-void blob_let_go(struct blob_store *s, const struct blob_kept *kept)
+bool blob_let_go(struct blob_store *s, const struct blob_kept *kept)
 {
 	s->arrived -= kept->size;
-	blob_release(s, &kept->hash);
+	struct blob_entry *n = blob_find(s, &kept->hash); /* it is held */
+	return --n->holds == 0 && n->gone;
 }
 
 void blob_store_sweep(struct blob_store *s)

@@ -72,8 +72,9 @@ struct blob_kept {
 void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path, size_t size);
 int blob_sync_folder(const struct blob_store *s, struct error *e);
 int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e); /* frees the writer in any case */
-void blob_enter(struct blob_store *s, const struct blob_kept *kept);  /* its file has its name and is flushed */
-void blob_let_go(struct blob_store *s, const struct blob_kept *kept); /* once for each that was kept, then sweep */
+void blob_enter(struct blob_store *s, const struct blob_kept *kept); /* its file has its name and is flushed */
+/* Once for each that was kept. true: it is missing and nobody holds it: sweep when all are let go. */
+bool blob_let_go(struct blob_store *s, const struct blob_kept *kept);
 void blob_store_sweep(struct blob_store *s); /* forgets those that are missing and not held, all in one pass */
 
 #endif

@@ -88,6 +88,7 @@ void blob_batch_enter(struct blob_batch *b)
 void blob_batch_free(struct blob_batch *b)
 {
 	char path[PATH_MOST];
+	bool missing = false;
 	if (!b)
 		return;
 	for (size_t i = 0; i < b->kept.count; i++) {
@@ -95,9 +96,10 @@ void blob_batch_free(struct blob_batch *b)
 			blob_temporary_path(b->store, kept_of(b, i)->number, path, sizeof path);
 			disk_unlink(path);
 		}
-		blob_let_go(b->store, kept_of(b, i));
+		missing |= blob_let_go(b->store, kept_of(b, i));
 	}
-	blob_store_sweep(b->store);
+	if (missing)
+		blob_store_sweep(b->store);
 	list_free(&b->kept);
 	mem_free(b);
 }
