@@ -62,12 +62,13 @@ static void on_built(struct job_cache *b)
 
 static void on_file_read(struct job_cache *b);
 
-/* Requests the next missing chunk, unless another job has done so, or builds, once the files of the cache are read. */
+/* Requests the next missing chunk, unless another job has done so, or builds, once the files of the cache are read. Not
+ * for a worker that leaves: it has given back what has not begun. */
 static void fetch_or_build(struct agent *a, struct job_cache *b)
 {
 	struct error e;
 	int rc = 0;
-	if (b->state != JOB_CACHE_FETCHING)
+	if (b->state != JOB_CACHE_FETCHING || a->leaving)
 		return;
 	b->owner = a;
 	b->reading.stop = &a->gone;

@@ -2,6 +2,7 @@
 /* Which scenes a worker holds at the same time after memory has run short, with a scripted coordinator. */
 #include "common/base/clock.h"
 #include "common/base/mem.h"
+#include "worker/daemon/lease_queue.h"
 #include "worker/daemon/work.h"
 #include "tests/support/failing_memory.h"
 #include "tests/support/folder.h"
@@ -166,11 +167,9 @@ static const char small_scene[] =
 	"<scene version='3.0.0'>" SENSOR("0,0,5", "0,0,0") "<shape type='sphere'/><emitter type='constant'/></scene>\n";
 
 /* The lease of a job that has ended is still on its thread: another job is not refused, which would be asked for again
- * after 10 s only. Its files are fetched, and its scene is built when the other one is gone. */
-static void a_thread_that_has_yet_to_stop(void **state)
+ * after 10 s only. Its files are fetched, and its scene waits. Returns the lease, whose thread then stops. */
+static struct lease_task *begin_beside_a_thread(struct job_cache **next)
 {
-	struct job_cache *next;
-	(void)state;
 	begin_short();
 	coord_make_file(&coord.scenes[0], small_scene, sizeof small_scene - 1);
 	coord_make_file(&coord.scenes[1], small_scene, sizeof small_scene - 2);
@@ -188,12 +187,34 @@ static void a_thread_that_has_yet_to_stop(void **state)
 	coord_describe(2);
 	coord_hear_blob_get(&coord.scenes[1], 0);
 	coord_send_piece(&coord.scenes[1], 0);
-	while (!(next = job_cache_find(coord.agent->job_caches, 2))->held || !next->held[0])
+	while (!(*next = job_cache_find(coord.agent->job_caches, 2))->held || !(*next)->held[0])
 		uv_run(&coord.agent->loop, UV_RUN_NOWAIT);
-	assert_int_equal(next->state, JOB_CACHE_FETCHING);
+	assert_int_equal((*next)->state, JOB_CACHE_FETCHING);
+	return l;
+}
+
+static void a_thread_that_has_yet_to_stop(void **state)
+{
+	struct job_cache *next;
+	(void)state;
+	struct lease_task *l = begin_beside_a_thread(&next);
 	l->task.done(&l->task);
 	assert_null(job_cache_find(coord.agent->job_caches, 1));
 	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	coord_finish();
+}
+
+/* It has given back the leases of the scene that waits. */
+static void who_leaves_builds_no_more(void **state)
+{
+	struct job_cache *next;
+	(void)state;
+	struct lease_task *l = begin_beside_a_thread(&next);
+	coord.agent->leaving = true;
+	lease_queue_leave(coord.agent);
+	l->task.done(&l->task);
+	assert_null(coord.agent->leases);
+	assert_int_equal(next->state, JOB_CACHE_FETCHING);
 	coord_finish();
 }
 
@@ -235,6 +256,7 @@ int main(void)
 		TEST(the_restriction_ends),
 		TEST(then_it_takes_any),
 		TEST(a_thread_that_has_yet_to_stop),
+		TEST(who_leaves_builds_no_more),
 		TEST(memory_that_others_had_is_its_own_fault),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
