@@ -34,6 +34,7 @@ struct reader {
 	bool mixed;    /* noted that files have both dialects */
 	bool upgraded; /* noted that a file is from before 0.4 */
 	bool worded;   /* noted that there is text */
+	bool cut;      /* noted that a file goes on after its first element */
 	bool by_end;   /* noted that a file was found by the end of its path */
 	/* the current file */
 	XML_Parser parser;
@@ -387,6 +388,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	outer.upgraded = r->upgraded;
 	outer.by_end = r->by_end;
 	outer.worded = r->worded;
+	outer.cut = r->cut;
 	outer.bytes = r->bytes;
 	outer.defines = r->defines;
 	*r = outer;
@@ -461,9 +463,13 @@ static bool ends_early(struct reader *r, enum XML_Error code)
 {
 	if (code != XML_ERROR_JUNK_AFTER_DOC_ELEMENT || r->snake)
 		return false;
-	if (r->tree->note_count < XML_NOTES_MAX)
-		r->tree->notes[r->tree->note_count++] =
-			"goes on after its first element: the rest is ignored, as by Mitsuba 3";
+	enum { TEXT = 256 };
+	char *text = r->cut || r->tree->note_count == XML_NOTES_MAX ? NULL : arena_alloc(r->arena, TEXT, 1);
+	if (text) {
+		snprintf(text, TEXT, "what follows the first element of %.160s is ignored, as by Mitsuba 3", r->file);
+		r->tree->notes[r->tree->note_count++] = text;
+		r->cut = true;
+	}
 	return true;
 }
 

@@ -94,9 +94,31 @@ static void test_loose_xml(void **state)
 	}
 }
 
+/* The note names the file, which may be an included one, once. */
+static void test_more_than_one_element(void **state)
+{
+	(void)state;
+	static const char outer[] =
+		"<scene version='3.0.0'><include filename='i.xml'/><include filename='j.xml'/></scene>",
+			  inner[] = "<bsdf type='diffuse' version='3.0.0'/><x/>";
+	static const struct memory_file files[] = {{"s.xml", outer, sizeof outer - 1},
+						   {"i.xml", inner, sizeof inner - 1},
+						   {"j.xml", inner, sizeof inner - 1},
+						   {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e), 0);
+	assert_int_equal(s.object_count, 2);
+	assert_int_equal(s.note_count, 1);
+	assert_string_equal(s.notes[0], "s.xml: what follows the first element of i.xml is ignored, as by Mitsuba 3");
+	scene_fini(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(test_are_read), cmocka_unit_test(test_roots),
-					   cmocka_unit_test(test_loose_xml)};
+					   cmocka_unit_test(test_loose_xml),
+					   cmocka_unit_test(test_more_than_one_element)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
