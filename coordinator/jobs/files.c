@@ -166,7 +166,7 @@ int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
 bool files_are_read(const struct jobs *jobs, const struct live_job *job)
 {
 	const Farm__Submit *m = live_job_submit(job);
-	for (size_t i = 0; !STAILQ_EMPTY(&jobs->checks) && i < m->n_files; i++) {
+	for (size_t i = m->n_files; !STAILQ_EMPTY(&jobs->checks) && i-- > 0;) { /* the last one is read last */
 		struct blob_hash h = file_hash_from_wire(m->files[i]);
 		if (blob_is_being_checked(jobs->blobs, &h))
 			return true;
