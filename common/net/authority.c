@@ -2,7 +2,8 @@
 /*
  * Each command locks the folder, reads what it needs, makes the certificate or list in memory, and replaces files in an
  * order in which a crash or a loss of power leaves a usable folder: keys before certificates, the record in issued/
- * before the certificate is handed out. Each file and its name are flushed before the next is written.
+ * before the certificate is handed out. Each file and its name are flushed before the next is written; key and
+ * certificate get their names together.
  *
  * Failures: a folder that is not an authority's or is locked, a name that belongs to another role, errors of OpenSSL
  * (with its reason). Nothing is half issued.

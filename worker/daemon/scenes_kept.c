@@ -4,8 +4,9 @@
  *
  * While one scene at a time is kept, the first job that gets a lease has the turn. Leases of other jobs are refused,
  * and so, after turn_seconds, are new leases of the job that has the turn: its last lease ends, its scene is dropped,
- * and the next job to be granted a lease has the turn. So neither job waits for the whole of the other. A scene whose
- * threads only have yet to stop is not waited for at the coordinator: the next one is built once they have.
+ * and the next job to be granted a lease has the turn. So neither job waits for the whole of the other. A scene
+ * whose threads have been told to stop no longer has the turn: leases of the next job are accepted, and its scene is
+ * built when they have stopped.
  */
 #include "worker/daemon/scenes_kept.h"
 
