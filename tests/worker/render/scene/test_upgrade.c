@@ -255,6 +255,8 @@ static void test_refused(void **state)
 		 "`x` is not a (finite) number"},
 		{"0.2.0", "<camera type='perspective'>" TO("<lookAt ox='1' tx='2'/>") "</camera>",
 		 "is not three numbers"},
+		{"0.2.0", "<camera type='perspective'>" TO("<lookAt ox='1'><x/></lookAt>") "</camera>",
+		 "has no place in <lookAt>"},
 		{"0.3.0", "<bsdf type='mirror'/>", "there is no bsdf of this type"},
 		{"0.3.0", "<bsdf type='lambertian'/>", "there is no bsdf of this type"},
 		{"0.4.0", "<luminaire type='constant'/>", "there is no element of this name; did you mean `emitter`?"},
