@@ -21,24 +21,6 @@
 /* Beyond this a weight is zero in double anyway; infinities would breed NaN. */
 #define RATIO_LIMIT 1e200
 
-double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v)
-{
-	struct emitter_room room;
-	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
-	struct emitter_point p = world_emitter_point(&v->x);
-	p.infinite = v->kind == VERTEX_INFINITE;
-	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_point(em, &p);
-}
-
-double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref)
-{
-	struct emitter_room room;
-	const struct emitter *em = world_emitter(c->w, v->emitter, v->x.prim.time, &room);
-	struct emitter_point p = world_emitter_point(&v->x);
-	p.infinite = v->kind == VERTEX_INFINITE;
-	return c->w->emitter_pdf[v->emitter] * emitter_pdf_toward(em, ref, &p);
-}
-
 /* The ends that a technique joins scatter there by connection: their sub-path's delta flag says nothing. */
 static bool is_delta(const struct joined_path *p, unsigned i)
 {
@@ -303,23 +285,6 @@ static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(z->beta, path_emitted(c, z, z->to_prev, &c->wl));
 	return spectrum_is_zero(l) ? l : weighted(c, NULL, 0, t, max_s, NULL, l);
-}
-
-bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf)
-{
-	const struct world *w = c->w;
-	int32_t chosen = world_pick_emitter(w, z->next_event[2]);
-	if (chosen < 0)
-		return false;
-	struct emitter_room room;
-	const struct emitter *em = world_emitter(w, chosen, z->x.prim.time, &room);
-	struct emitter_point p;
-	if (!emitter_sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
-		return false;
-	*pdf *= w->emitter_pdf[chosen];
-	*y = path_emitter_vertex(w, chosen, &p, z->x.prim.time);
-	y->pdf = w->emitter_pdf[chosen] * em->ops->pdf_point(em, &p);
-	return true;
 }
 
 /* The transmittance of the light sub-path's edges before its vertex s - 1, which was reached through `medium`. */

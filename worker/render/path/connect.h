@@ -9,6 +9,7 @@
 #ifndef WORKER_RENDER_PATH_CONNECT_H
 #define WORKER_RENDER_PATH_CONNECT_H
 
+#include "worker/render/path/next_event.h"
 #include "worker/render/path/path.h"
 #include "worker/render/path/transparent.h"
 
@@ -36,12 +37,6 @@ double path_balance_weight(const struct path_context *c, const struct joined_pat
 /* What other_medium is. Only where media scatter. */
 unsigned path_other_medium(const struct path_context *c, const struct joined_path *p);
 
-/* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards
- * ref. */
-double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v);
-double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
-/* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
-bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf);
 /* The contribution of a whole path, l before dispersion. If the path scatters at a dispersive BSDF, in whatever way,
  * its directions and densities are those of nm[0], and only that wavelength counts, four times: unbiased, because nm[0]
  * is uniform. This is a property of the path, so all techniques that make it agree. */
