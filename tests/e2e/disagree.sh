@@ -2,10 +2,11 @@
 # Chains that disagree: a lamp in glass, seen in a mirror. Independent samples find such a path once in 100,000 times, chains that
 # began there never leave: images without noise that differ from seed to seed. Said by exit code 5, note, header, statistics,
 # status, list and the spool's record; not with a filament that samples find, nor by path; nor of chains too short to be judged.
+# Refracted connections, which find the lamp, are off.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
 SCENE=$HERE/../scenes/bulb/scene.xml
-SMALL="-D radius=0.02 -D radiance=15000"
+SMALL="-D radius=0.02 -D radiance=15000 --effects -refracted-shadows"
 LARGE="-D radius=0.15 -D radiance=267"
 CHAINS="--size 160x120 --chains 64 --bootstrap 200000 --epoch 2000"
 WORDS='groups of them differ in paths (reflected caustic, 3-4 edges)'

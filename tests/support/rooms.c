@@ -152,14 +152,17 @@ static struct world *dents(void)
 			     "<float name='displacement_scale' value='0.06'/><integer name='displacement_level' value='3'/></shape>");
 }
 
-/* In it a stone, which states no medium. */
+/* In it a stone, which states no medium; beside it a lamp in clear glass. */
 static struct world *coloured_glass(void)
 {
 	return world_of_text(32, 32, ROOM LAMP BALL(CLOUDY("0.25") "<medium type='homogeneous' name='interior'>"
 						    "<float name='albedo' value='0'/>"
 						    "<rgb name='sigma_t' value='0.3,0.8,1.5'/></medium>")
 			     "<shape type='sphere'><point name='center' value='0.2,-0.8,-0.3'/>"
-				"<float name='radius' value='0.3'/>" METAL("0.2") "</shape>");
+				"<float name='radius' value='0.3'/>" METAL("0.2") "</shape>"
+			     "<shape type='sphere'><point name='center' value='1.1,-1.2,-0.2'/><float name='radius' value='0.6'/>" GLASS
+				"</shape><shape type='sphere'><point name='center' value='1.2,-1.1,-0.2'/>"
+				"<float name='radius' value='0.1'/>" SHINES("30,20,30") "</shape>");
 }
 
 /* Each part of a material has a normal of its own. */

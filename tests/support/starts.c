@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/starts.h"
 
+#include "worker/render/halfvec/refract.h"
+
 #include <assert.h>
 #include <stdlib.h>
 
@@ -8,8 +10,12 @@ void starts_context(struct path_context *c, const struct world *w, unsigned min_
 		    uint64_t *counters)
 {
 	assert(max_depth <= STARTS_MAX_EDGES);
-	*c = (struct path_context){
-		.w = w, .window = {0, 0, 32, 32}, .min_depth = min_depth, .max_depth = max_depth, .counters = counters};
+	*c = (struct path_context){.w = w,
+				   .window = {0, 0, 32, 32},
+				   .min_depth = min_depth,
+				   .max_depth = max_depth,
+				   .counters = counters,
+				   .refract = halfvec_refract};
 }
 
 static void walk(struct starts *s, uint64_t index, unsigned *camera, unsigned *light)

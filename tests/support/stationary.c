@@ -14,6 +14,7 @@
 #include "tests/support/stats.h"
 #include "worker/render/chain/path_place.h"
 #include "tests/support/path_check.h"
+#include "worker/render/halfvec/refract.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/render.h"
 #include "worker/render/math/fptrap.h"
@@ -253,7 +254,8 @@ static void run_group(struct group *g)
 					   .window = {0, 0, s->width, s->height},
 					   .min_depth = g->how->min_edges,
 					   .max_depth = g->how->max_edges,
-					   .counters = g->counters};
+					   .counters = g->counters,
+					   .refract = halfvec_refract};
 	g->mutation = (struct mutation_ctx){
 		.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&g->w->accuracy)};
 	bool watched = fptrap_watch();

@@ -16,6 +16,7 @@
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "common/estimate/tail.h"
+#include "worker/render/halfvec/refract.h"
 #include "worker/render/path/brightness.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrate_path.h"
@@ -473,6 +474,7 @@ static int see_what_path_misses(struct pilot *p, struct render_choice *out, stru
 static int run_pilot(struct pilot *p, const struct plan *film, struct render_choice *out, struct error *e)
 {
 	path_context_for_samples(&p->context, p->w, film, p->counters);
+	p->context.refract = halfvec_refract;
 	int rc = tail_init(&p->tail, p->samples / RENDER_TAIL + 1);
 	rc = rc ? error_set(e, ENOMEM, "no memory for a pilot") : make_map(p, out->misses, e);
 	if (!rc) {

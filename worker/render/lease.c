@@ -7,6 +7,7 @@
  * Failures: -EINVAL where things do not fit, -EILSEQ for states that are none, -EDOM where an invalid operation was
  * trapped (the place in the sentence); nothing of the batch is kept.
  */
+#include "worker/render/halfvec/refract.h"
 #include "worker/render/path/longer.h"
 #include "worker/render/render.h"
 
@@ -272,6 +273,7 @@ static int prepare(struct job *j, const struct world *w, const struct lease_inpu
 	j->context.roulette = p->kind == PLAN_SAMPLES ? PATH_ROULETTE : 0;
 	j->context.unclassed = p->kind == PLAN_SAMPLES && j->key->kind == LEASE_RENDER;
 	j->context.counters = j->out->counters;
+	j->context.refract = halfvec_refract;
 	j->out->strategy_count = j->key->kind == LEASE_RENDER ? (uint32_t)plan_strategy_count(p->mutations) : 0;
 	if (j->key->kind == LEASE_BOOTSTRAP) {
 		struct plan_range r = plan_bootstrap_range(p, j->key->group, j->key->part);

@@ -8,6 +8,7 @@
  * -ENOMEM; -EDOM after an invalid floating-point operation. Nothing is left allocated then.
  */
 #include "worker/render/chain/redistribution.h"
+#include "worker/render/halfvec/refract.h"
 #include "worker/render/path/brightness.h"
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrator.h"
@@ -114,6 +115,7 @@ int render_map_new(const struct world *w, const struct plan *p, struct brightnes
 	int rc = map && m ? 0 : error_set(e, ENOMEM, "no memory for a map of brightness");
 	if (!rc) {
 		path_context_for_samples(&m->context, w, p, m->counters);
+		m->context.refract = halfvec_refract;
 		rc = make_maps(m, map, p, i->light_every, e);
 		brightness_fini(&m->first);
 		redistribution_free(m->redistribution);

@@ -119,6 +119,13 @@ static inline bool bsdf_is_passed(const struct bsdf *b)
 	return (b->modes & BSDF_STRAIGHT) && !b->culls;
 }
 
+/* Whether connections to emitters may be refracted by it (path/refracted.h). Not by what they look through: from one
+ * point of an emitter there is one connection. */
+static inline bool bsdf_refracts(const struct bsdf *b)
+{
+	return b->has_delta && (b->modes & BSDF_TRANSMIT) && !(b->modes & BSDF_STRAIGHT) && !b->culls;
+}
+
 /* Index below the surface over the one above, at the hero wavelength nm[0] where dispersive. */
 double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
 

@@ -29,6 +29,12 @@ static bool is_delta(const struct joined_path *p, unsigned i)
 	return p->v[i]->delta;
 }
 
+/* Whether the joint that made the path is refracted. */
+static bool is_refracted(const struct joined_path *p)
+{
+	return p->passed > 0 && path_is_refracted(p->v[p->s]);
+}
+
 /* Whether emitters are sampled for the path from the lens straight to this point of one. Where that is hardly denser
  * than the film's own samples, whose light there has no variance, it would only add some. */
 static bool lens_joins(const struct path_context *c, const struct path_vertex *eye, const struct path_vertex *emitter)
@@ -100,7 +106,8 @@ static inline double light_pdf(const struct path_context *c, const struct joined
 	if (i >= s + p->passed + 2)
 		return p->v[i]->pdf_rev;
 	if (i > s && i <= s + p->passed)
-		return path_pdf_passed(c, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE);
+		return is_refracted(p) ? path_pdf_refracted(c, p->v[i - 2], p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE)
+				       : path_pdf_passed(c, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE);
 	const struct path_vertex *prev = i >= 2 ? p->v[i - 2] : NULL;
 	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE) * edge_pdf(c, p, i, false);
 }
@@ -112,7 +119,8 @@ static double camera_pdf(const struct path_context *c, const struct joined_path 
 	if (i + 3 <= s)
 		return p->v[i]->pdf_rev;
 	if (i + 1 == s && p->passed)
-		return path_pdf_passed(c, p->v[s], p->v[i], TRANSPORT_RADIANCE);
+		return is_refracted(p) ? path_pdf_refracted(c, p->v[s + 1], p->v[s], p->v[i], TRANSPORT_RADIANCE)
+				       : path_pdf_passed(c, p->v[s], p->v[i], TRANSPORT_RADIANCE);
 	const struct path_vertex *prev = i + 2 <= k ? p->v[i + 2] : NULL;
 	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE) * edge_pdf(c, p, i + 1, true);
 }
@@ -138,13 +146,38 @@ static double drawn_instead(const struct path_context *c, const struct joined_pa
 		return 1;
 	for (unsigned i = 0; i < p->passed; i++)
 		pdf[i] = from_light ? light_pdf(c, p, p->s + i) : p->v[p->s + i]->pdf;
-	return 1 / path_passed_ratio(p->v, p->s, p->s + p->passed - 1, pdf);
+	return 1 / (is_refracted(p) ? path_refracted_ratio(p->v, p->passed, p->log_transfer, pdf)
+				    : path_passed_ratio(p->v, p->s, p->s + p->passed - 1, pdf));
+}
+
+/* How technique 1 makes the path if it is refracted. */
+struct refracted_joint {
+	unsigned end; /* it joins x_0 to x_end; 0: it is not */
+	double ratio; /* its density over that of drawing x_1 .. x_end-1 as their sub-path did */
+};
+
+static struct refracted_joint refracted_joint_of(struct path_context *c, const struct joined_path *p)
+{
+	struct refracted_joint r = {0, 0};
+	double pdf[PATH_REFRACTED_MOST], log_transfer;
+	unsigned count;
+	if (!path_refracts(c))
+		return r;
+	if (is_refracted(p)) {
+		r.end = p->passed + 1;
+	} else if (path_is_made_by_refraction(c, p->v, p->edges, &count, &log_transfer)) {
+		r.end = count + 1;
+		for (unsigned i = 0; i < count; i++)
+			pdf[i] = p->v[1 + i]->pdf;
+		r.ratio = path_refracted_ratio(p->v, count, log_transfer, pdf);
+	}
+	return r;
 }
 
 /* r is the density of technique j over that of technique s, computed as if j drew every vertex. In fact joints pass
  * vertices without drawing them. drawn_instead corrects r for the joint of s, once towards either side; over_drawn
  * corrects the ratio that is stored for the joint of j. */
-void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
+void path_technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
 {
 	const bool sees_through = path_sees_through(c);
 	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k, joint_end = s + p->passed;
@@ -152,15 +185,18 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 		ratio[j] = 0;
 	/* Technique 1 draws x_0 as seen from what it is joined to, the longer ones as light sub-paths do. */
 	double toward = 1, point = 1;
-	if ((k >= 2 && s <= 1) || technique_exists(c, p, 1)) {
-		toward = path_pdf_toward(c, p->v[0], p->v[behind_passed(c, p, 1)]->x.p);
+	const struct refracted_joint refracted = refracted_joint_of(c, p);
+	const bool first_exists = refracted.end || technique_exists(c, p, 1);
+	if ((k >= 2 && s <= 1) || first_exists) {
+		toward = path_pdf_toward(c, p->v[0], p->v[refracted.end ? refracted.end : behind_passed(c, p, 1)]->x.p);
 		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}
 	double first = s == 1 ? point / toward : 1;
 	double r = joint_end < last ? first * drawn_instead(c, p, true) : first;
 	for (unsigned j = joint_end; j < last && r > 0 && r < RATIO_LIMIT; j++) {
-		if (j == 0 && technique_exists(c, p, 1))
-			ratio[1] = r * toward / p->v[0]->pdf * over_drawn(c, p, 1, behind_passed(c, p, 1));
+		if (j == 0 && first_exists)
+			ratio[1] = r * toward / p->v[0]->pdf *
+				   (refracted.end ? refracted.ratio : over_drawn(c, p, 1, behind_passed(c, p, 1)));
 		r *= (j == 0 ? point : light_pdf(c, p, j)) / p->v[j]->pdf;
 		if (j > 0 && technique_exists(c, p, j + 1))
 			ratio[j + 1] = r * over_drawn(c, p, j + 1, behind_passed(c, p, j + 1));
@@ -168,6 +204,7 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 	bool beyond = r >= RATIO_LIMIT;
 	r = first * drawn_instead(c, p, false);
 	double r_end = r; /* r at x_end, the nearest vertex behind x_j that is not passed */
+	double r_refracted = 0;
 	for (unsigned j = s, end = s; j > 0 && r_end > 0 && r < RATIO_LIMIT; j--) {
 		r *= camera_pdf(c, p, j - 1) / p->v[j - 1]->pdf;
 		bool passed = sees_through && path_joint_passes(p, j - 1);
@@ -175,7 +212,11 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 			r_end = r;
 			end = j - 1;
 		}
-		if (technique_exists(c, p, j - 1)) {
+		if (j - 1 == refracted.end)
+			r_refracted = r;
+		if (j - 1 == 1 && refracted.end) {
+			ratio[1] = r_refracted * refracted.ratio * toward / point;
+		} else if (technique_exists(c, p, j - 1)) {
 			double here = passed ? r_end * over_drawn(c, p, j - 1, end) : r;
 			ratio[j - 1] = j - 1 == 1 ? here * toward / point : here;
 		}
@@ -185,7 +226,7 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 		ratio[s == 0 ? k : 0] = RATIO_LIMIT;
 }
 
-double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s)
+double path_balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s)
 {
 	double ratio[PATH_MAX_EDGES + 2], sum = 0;
 	/* The first technique that only samples with a light sub-path have. */
@@ -201,6 +242,7 @@ static void join(const struct path_context *c, const struct path_vertex *light, 
 {
 	p->s = s;
 	p->passed = c->passed_count;
+	p->log_transfer = c->log_transfer;
 	p->edges = s + t - 1 + p->passed;
 	for (unsigned i = 0; i < s; i++)
 		p->v[i] = &light[i];
@@ -263,7 +305,7 @@ unsigned path_other_medium(const struct path_context *c, const struct joined_pat
 }
 
 /* The end of every contribution. joint: of edge s, where media scatter and s > 0. */
-static spectrum weighted(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
+static spectrum weighted(struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
 			 unsigned max_s, const struct path_edge *joint, spectrum l)
 {
 	struct joined_path p;
@@ -338,8 +380,8 @@ static spectrum seen(struct path_context *c, const struct path_vertex *y, unsign
 {
 	const struct path_vertex *z = &c->camera[t - 1];
 	spectrum left;
-	const bool through = path_sees_through(c), too_short = through && s + t <= c->min_depth;
-	if (!too_short && !spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
+	const bool through = path_sees_through(c);
+	if (s + t > c->min_depth && !spectrum_is_zero(direct) && is_seen(c, z, y, joint, &direct))
 		return direct;
 	if (!through || spectrum_is_zero(l))
 		return spectrum_of(0);
@@ -351,6 +393,26 @@ static spectrum seen(struct path_context *c, const struct path_vertex *y, unsign
 	}
 	l = spectrum_mul(l, left);
 	return after_absorption(c, &c->passed[c->passed_count - 1], to_light, y, s, l);
+}
+
+/* The contribution of the refracted path from y, drawn with this density, to the camera's vertex t - 1; zero: none was
+ * found. */
+static spectrum refracted(struct path_context *c, const struct path_vertex *y, unsigned t, double pdf)
+{
+	const struct path_vertex *z = &c->camera[t - 1];
+	spectrum left;
+	double distance2, unused;
+	if (!path_refract_to(c, z - 1, z, y, &left) || t + c->passed_count < c->min_depth ||
+	    t + c->passed_count > c->max_depth) {
+		c->passed_count = 0;
+		return spectrum_of(0);
+	}
+	const struct path_vertex *first = &c->passed[0], *last = &c->passed[c->passed_count - 1];
+	vec3 d = path_direction(z, first, &distance2), to_light = path_direction(last, y, &unused);
+	spectrum l = spectrum_mul(spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, d)),
+				  path_emitted(c, y, vec3_neg(to_light), &c->wl));
+	l = spectrum_scale(path_geometry_term(z, first, d, distance2) * exp(c->log_transfer) / pdf, l);
+	return after_absorption(c, last, to_light, y, 1, spectrum_mul(l, left));
 }
 
 static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
@@ -368,6 +430,8 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
 	struct path_edge joint;
 	l = seen(c, &y, 1, t, to_light, l, after_absorption(c, z, to_light, &y, 1, l), &joint);
+	if (spectrum_is_zero(l) && path_refracts(c) && path_tries_to_refract(c, z - 1, z, &y, pdf, f))
+		l = refracted(c, &y, t, pdf);
 	return spectrum_is_zero(l) ? l : weighted(c, &y, 1, t, max_s, &joint, l);
 }
 

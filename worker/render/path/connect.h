@@ -11,12 +11,14 @@
 
 #include "worker/render/path/next_event.h"
 #include "worker/render/path/path.h"
+#include "worker/render/path/refracted.h"
 #include "worker/render/path/transparent.h"
 
 /* A path put together from sub-paths, light to camera. */
 struct joined_path {
 	unsigned edges, s;
-	unsigned passed; /* x_s .. x_s+passed-1 belong to neither sub-path: the joint passes them (transparent.h) */
+	unsigned passed;     /* x_s .. x_s+passed-1 belong to neither sub-path: the joint passes them (transparent.h) */
+	double log_transfer; /* where they refract instead, which needs s = 1: of refracted.h */
 	const struct path_vertex *v[PATH_MAX_EDGES + 2];
 	/* Where media scatter; otherwise unused and 0. Edge i joins x_i-1 and x_i. */
 	const struct path_edge *joint; /* edge s, of which x_s is the vertex before */
@@ -29,10 +31,10 @@ struct joined_path {
 
 /* Density of technique j for this path over the density of the technique s that made it: 0 where j cannot make it.
  * Fills ratio[0..edges]; techniques with more than max_s light vertices are left out (0). */
-void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);
+void path_technique_ratios(struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);
 /* Weight of the balance heuristic over the share of the samples that tries the technique: 1 / sum of the ratios, those
  * of techniques that only samples with a light sub-path try divided by light_every. */
-double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
+double path_balance_weight(struct path_context *c, const struct joined_path *p, unsigned max_s);
 
 /* What other_medium is. Only where media scatter. */
 unsigned path_other_medium(const struct path_context *c, const struct joined_path *p);
@@ -42,11 +44,17 @@ unsigned path_other_medium(const struct path_context *c, const struct joined_pat
  * is uniform. This is a property of the path, so all techniques that make it agree. */
 spectrum path_collapse(spectrum l, bool dispersive);
 
+/* Whether connections can have vertices of their own. */
+static inline bool path_joints_have_vertices(const struct path_context *c)
+{
+	return path_sees_through(c) || path_refracts(c);
+}
+
 /* Whether joining s vertices to t can make a path of a length that is asked for. Passed surfaces add edges, so
  * min_depth rules out nothing where a connection may look through some. */
 static inline bool path_may_connect(const struct path_context *c, unsigned s, unsigned t)
 {
-	return s + t <= c->max_depth + 1 && (s + t > c->min_depth || (s > 0 && path_sees_through(c)));
+	return s + t <= c->max_depth + 1 && (s + t > c->min_depth || (s > 0 && path_joints_have_vertices(c)));
 }
 
 /* Whether vertex i is one that a joint across it passes (transparent.h). The ends of the joint that made p are not:

@@ -68,7 +68,8 @@ static void gather(struct path_context *c, unsigned camera, unsigned light, bool
 	out->total = 0;
 	out->count = 0;
 	unsigned most_light = light > 1 ? light : 1, most = camera + most_light - 1;
-	for (unsigned n = path_sees_through(c) ? 2 : c->min_depth + 1; n <= c->max_depth + 1 && n <= most + 1; n++)
+	for (unsigned n = path_joints_have_vertices(c) ? 2 : c->min_depth + 1; n <= c->max_depth + 1 && n <= most + 1;
+	     n++)
 		for (unsigned s = n > camera ? n - camera : 0; s < n && s <= most_light; s++) {
 			unsigned t = n - s;
 			if ((t == 1 && s < 2) || !path_may_connect(c, s, t))
@@ -248,8 +249,8 @@ void ensemble_around(struct path_context *c, struct sampler *sampler, struct ful
 	double log_pdf[FULL_PATH_MAX_VERTICES];
 	full_path_log_techniques(c, x, log_pdf);
 	double log_sum = log_sum_exp(log_pdf, k + 1);
-	unsigned s = choose_technique(log_pdf, k, log_sum, u[0]), passed = s > 0 ? full_path_passed(c, x, s) : 0,
-		 t = k + 1 - s - passed;
+	unsigned s = choose_technique(log_pdf, k, log_sum, u[0]),
+		 passed = s > 0 ? full_path_joint_vertices(c, x, s) : 0, t = k + 1 - s - passed;
 	const struct candidate known = {exp(full_path_log_f(c, x) - log_sum), s, passed, k};
 	struct ensemble_lengths n = ensemble_lengths_of(c, u + 1, t, s);
 	c->one_way = false;

@@ -311,6 +311,14 @@ unsigned full_path_passed(const struct path_context *c, const struct full_path *
 	return end - s;
 }
 
+unsigned full_path_joint_vertices(const struct path_context *c, const struct full_path *x, unsigned s)
+{
+	unsigned passed = full_path_passed(c, x, s), refracted = 0;
+	while (s == 1 && passed == 0 && path_is_refracted(&x->v[1 + refracted]))
+		refracted++;
+	return passed + refracted;
+}
+
 bool full_path_joins(const struct path_context *c, const struct full_path *x, unsigned s)
 {
 	unsigned passed = full_path_passed(c, x, s), end = s + passed;
@@ -361,13 +369,16 @@ static bool joint_is_open(struct path_context *c, struct full_path *x, unsigned 
 	return true;
 }
 
-/* Puts the vertices that the joint between y and z, the camera's last vertex, passes into x. false: it passes another
- * number of them. */
+/* Puts the vertices of the joint between y and z, the camera's last vertex, into x. false: it has another number of
+ * them. */
 static bool take_passed(struct path_context *c, const struct path_vertex *z, bool from_lens,
 			const struct path_vertex *y, unsigned s, unsigned passed, struct full_path *x)
 {
 	spectrum left;
-	if (!path_see_through(c, from_lens ? NULL : z - 1, z, y, &left) || c->passed_count != passed)
+	const struct path_vertex *before = from_lens ? NULL : z - 1;
+	bool open = (path_sees_through(c) && path_see_through(c, before, z, y, &left)) ||
+		    (s == 1 && !from_lens && path_refracts(c) && path_refract_to(c, before, z, y, &left));
+	if (!open || c->passed_count != passed)
 		return false;
 	for (unsigned i = 0; i < passed; i++)
 		take_vertex(x, s + i, &c->passed[passed - 1 - i], true);

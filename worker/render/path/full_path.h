@@ -116,7 +116,9 @@ bool whole_film(const struct path_context *c, struct full_path *x);
 unsigned full_path_most_light(const struct path_context *c, const struct full_path *x);
 /* How many vertices, from v[s] on, the joint of technique s passes (transparent.h). */
 unsigned full_path_passed(const struct path_context *c, const struct full_path *x, unsigned s);
-/* Whether technique s > 0 can make it, as far as specular vertices go. */
+/* How many vertices the joint of technique s > 0, which can make x, has of its own: passed ones, or refracted ones. */
+unsigned full_path_joint_vertices(const struct path_context *c, const struct full_path *x, unsigned s);
+/* Whether technique s > 0 can make it, as far as specular vertices go and nothing is refracted. */
 bool full_path_joins(const struct path_context *c, const struct full_path *x, unsigned s);
 /* Whether any technique makes it: where media do not fit together, there are paths that none does. */
 bool full_path_is_made(const struct path_context *c, const struct full_path *x);

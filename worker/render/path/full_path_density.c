@@ -93,6 +93,25 @@ static void fill_densities(struct path_context *c, struct full_path *x)
 		v[0].pdf = 0;
 }
 
+/* The density of technique 1 where it is refracted, over that of the camera's vertices; -INFINITY: it does not make x.
+ */
+static double log_refracted(struct path_context *c, const struct full_path *x, const double *from_camera)
+{
+	const struct path_vertex *v[FULL_PATH_MAX_VERTICES];
+	double pdf[PATH_REFRACTED_MOST], log_transfer;
+	unsigned count;
+	if (!path_refracts(c) || !path_is_refracted(&x->v[1]))
+		return -INFINITY;
+	for (unsigned i = 0; i <= x->edges; i++)
+		v[i] = &x->v[i];
+	if (!path_is_made_by_refraction(c, v, x->edges, &count, &log_transfer))
+		return -INFINITY;
+	for (unsigned i = 0; i < count; i++)
+		pdf[i] = 1;
+	return from_camera[count + 1] + log(path_pdf_toward(c, v[0], v[count + 1]->x.p)) +
+	       log(path_refracted_ratio(v, count, log_transfer, pdf));
+}
+
 void full_path_log_techniques(struct path_context *c, struct full_path *x, double *log_pdf)
 {
 	unsigned k = x->edges;
@@ -107,7 +126,7 @@ void full_path_log_techniques(struct path_context *c, struct full_path *x, doubl
 	double light = 0; /* of v[0 .. s - 1] from the light's */
 	for (unsigned s = 1; s <= k; s++) {
 		light += log(v[s - 1].pdf_rev);
-		log_pdf[s] = -INFINITY;
+		log_pdf[s] = s == 1 ? log_refracted(c, x, from_camera) : -INFINITY;
 		if (s > most || !full_path_joins(c, x, s))
 			continue;
 		unsigned end = s + full_path_passed(c, x, s);

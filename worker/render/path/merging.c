@@ -88,18 +88,48 @@ static double over_drawn(const struct path_vertex *v, unsigned first, unsigned e
 	return first == end ? 1 : path_passed_ratio_in(v, first, end - 1, true);
 }
 
+/* For the photon y[s]: technique 1, refracted at y[1] .. *end - 1, over the density of drawing those as the light did;
+ * 0: there is none. How the camera sees the photon is not known yet: from above. */
+static double refracted_over_drawn(struct path_context *c, unsigned s, unsigned *end)
+{
+	const struct path_vertex *v[PATH_MAX_EDGES + 2], *y = c->light;
+	struct path_vertex above = y[s];
+	double pdf[PATH_REFRACTED_MOST], log_transfer;
+	unsigned count;
+	if (!path_refracts(c) || !path_is_refracted(&y[1]))
+		return 0;
+	for (unsigned i = 0; i <= s; i++)
+		v[i] = &y[i];
+	v[s + 1] = &above;
+	above.x.p = vec3_madd(y[s].x.p, vec3_dot(y[s].x.ng, y[s].to_prev) > 0 ? 1 : -1, y[s].x.ng);
+	if (!path_is_made_by_refraction(c, v, s + 1, &count, &log_transfer))
+		return 0;
+	for (unsigned i = 0; i < count; i++)
+		pdf[i] = y[1 + i].pdf;
+	*end = count + 1;
+	return path_refracted_ratio(v, count, log_transfer, pdf);
+}
+
 /* Fills in the sums of struct photon. The techniques by which densities are divided need not exist. */
-static void sum_fewer(const struct path_context *c, unsigned s, struct photon *out)
+static void sum_fewer(struct path_context *c, unsigned s, struct photon *out)
 {
 	const struct path_vertex *y = c->light;
-	double ratio = 1, ratio_end = 1;
+	unsigned refracted_end = 0;
+	double ratio = 1, ratio_end = 1, ratio_refracted = 1, refracted = refracted_over_drawn(c, s, &refracted_end);
 	for (unsigned j = s - 1, end = s; j > 0; j--) { /* joins y[j - 1] to y[end] */
 		if (!is_passed(c, &y[j])) {
 			ratio_end = ratio;
 			end = j;
 		}
+		if (j == refracted_end)
+			ratio_refracted = ratio;
 		bool near = end == s;
-		if (!(j > 1 && y[j - 1].delta) && (near || !y[end].delta) && end - j <= PATH_PASSED_MOST) {
+		if (j == 1 && refracted > 0) {
+			double q = ratio_refracted * path_pdf_toward(c, &y[0], y[refracted_end].x.p) / y[0].pdf *
+				   refracted;
+			*(refracted_end == s ? &out->fewer_through : &out->fewer) += q;
+			*(refracted_end == s ? &out->path_through : &out->path) += q;
+		} else if (!(j > 1 && y[j - 1].delta) && (near || !y[end].delta) && end - j <= PATH_PASSED_MOST) {
 			double toward = j == 1 ? path_pdf_toward(c, &y[0], y[end].x.p) / y[0].pdf : 1,
 			       q = (near ? 1 : ratio_end) * toward * over_drawn(y, j, end);
 			*(near ? &out->fewer_through : &out->fewer) += q;
@@ -113,7 +143,7 @@ static void sum_fewer(const struct path_context *c, unsigned s, struct photon *o
 	}
 }
 
-struct photon photon_of(const struct path_context *c, unsigned s)
+struct photon photon_of(struct path_context *c, unsigned s)
 {
 	const struct path_vertex *at = &c->light[s], *prev = at - 1;
 	struct photon p = {.p = at->x.p, .ng = at->x.ng, .beta = at->beta, .pdf = at->pdf, .s = s};
@@ -127,7 +157,7 @@ struct photon photon_of(const struct path_context *c, unsigned s)
 	return p;
 }
 
-static void store(struct merging *m, const struct path_context *c, unsigned s)
+static void store(struct merging *m, struct path_context *c, unsigned s)
 {
 	m->photons[m->count] = photon_of(c, s);
 	m->tree.nodes[m->count] = (struct point_tree_node){c->light[s].x.p, (uint32_t)m->count};

@@ -63,7 +63,7 @@ void merging_each(const struct merging *m, struct path_context *c, const struct 
 
 /* The parts of it: c->light's vertex s as a photon, and the path that it makes with c->camera's vertex t, as of one
  * photon and a disk of area 1. false: black. */
-struct photon photon_of(const struct path_context *c, unsigned s);
+struct photon photon_of(struct path_context *c, unsigned s);
 bool merged_of(struct path_context *c, const struct photon *p, unsigned t, struct merged *out);
 
 #endif

@@ -16,7 +16,8 @@
 
 enum {
 	PATH_MAX_EDGES = 128,
-	PATH_PASSED_MOST = 16, /* surfaces that one connection passes */
+	PATH_PASSED_MOST = 16,	 /* surfaces that one connection passes */
+	PATH_REFRACTED_MOST = 8, /* surfaces at which one connection is refracted */
 };
 
 enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE, VERTEX_MEDIUM };
@@ -67,6 +68,24 @@ struct path_split {
 			 spectrum l);
 };
 
+/* The path by which light is refracted from a point of an emitter: path/refracted.h. */
+struct path_refraction {
+	unsigned count;
+	struct path_vertex v[PATH_REFRACTED_MOST]; /* the one nearest to the camera first */
+	double log_transfer;			   /* log T */
+};
+/* The last one that a path of another technique was compared with: all joints of one light sub-path ask for the same.
+ */
+struct path_refraction_known {
+	bool any, found;
+	vec3 z, y;
+	double time, nm;
+	struct path_refraction of;
+};
+/* Finds that between y, on an emitter, and z; false: none was found. */
+typedef bool path_refract(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+			  struct path_refraction *out);
+
 /* One evaluation's surroundings; one a thread. */
 struct path_context {
 	const struct world *w;
@@ -86,11 +105,14 @@ struct path_context {
 	double faint_place;   /* of the next such connection in systematic sampling: see connect.c */
 	uint64_t *counters;   /* of enum batch_counter */
 	struct path_split *split; /* NULL: the film gets all */
+	path_refract *refract;	  /* NULL: connections are not refracted */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
-	/* The vertices that the last connection passed (transparent.h), the one nearest to the camera first. pdf: for a
-	 * sub-path from the camera that meets them one by one. */
+	/* The vertices that the last connection passed (transparent.h) or at which it was refracted (refracted.h), the
+	 * one nearest to the camera first. pdf: for a sub-path from the camera that meets them one by one. */
 	unsigned passed_count;
 	struct path_vertex passed[PATH_PASSED_MOST];
+	double log_transfer; /* of refracted.h, if it was refracted */
+	struct path_refraction_known refraction;
 	/* The emission of media along edge e of the camera's sub-path, as it reaches the film, whether or not a vertex
 	 * ends the edge; e from 1 to emission_edges (volume_emission.h). */
 	unsigned emission_edges;

@@ -286,21 +286,29 @@ static int find_coincidence(struct builder *b)
 	return s ? coincident_find(b->w, b->shape_nodes, s, b->e) : build_out_of_memory(b->e);
 }
 
-/* Makes w->passed, in the world's lengths. It is a little larger than the shapes, which were rounded to floats. */
-static void bound_passed(struct builder *b)
+/* Adds shape i, in the world's lengths. The box is a little larger than the shape, which was rounded to floats. */
+static void add_to_box(const struct builder *b, uint32_t i, struct box *box)
+{
+	const struct world *w = b->w;
+	const double slack = 0x1p-16 * w->radius;
+	for (int side = 0; side < 2; side++) {
+		double out = side ? slack : -slack;
+		vec3 p = side ? b->boxes[i].high : b->boxes[i].low;
+		box_grow(box, vec3_add(vec3_scale(w->scale, vec3_sub(p, w->center)), (vec3){out, out, out}));
+	}
+}
+
+/* Makes w->passed and w->refracting. */
+static void bound_shadows(struct builder *b)
 {
 	struct world *w = b->w;
-	const double slack = 0x1p-16 * w->radius;
-	w->passed = box_empty();
-	for (uint32_t i = 0; i < w->shape_count && w->effects.transparent_shadows; i++) {
-		if (!bsdf_is_passed(&w->bsdfs[w->parts[i].bsdf]))
-			continue;
-		for (int side = 0; side < 2; side++) {
-			double out = side ? slack : -slack;
-			vec3 p = side ? b->boxes[i].high : b->boxes[i].low;
-			box_grow(&w->passed,
-				 vec3_add(vec3_scale(w->scale, vec3_sub(p, w->center)), (vec3){out, out, out}));
-		}
+	w->passed = w->refracting = box_empty();
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct bsdf *bsdf = &w->bsdfs[w->parts[i].bsdf];
+		if (w->effects.transparent_shadows && bsdf_is_passed(bsdf))
+			add_to_box(b, i, &w->passed);
+		if (w->effects.refracted_shadows && bsdf_refracts(bsdf))
+			add_to_box(b, i, &w->refracting);
 	}
 }
 
@@ -324,7 +332,7 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 	effects_analyse(w, &src, &b->forced, reached);
 	int rc = effects_apply(w, &b->forced, reached, b->e);
 	if (!rc)
-		bound_passed(b);
+		bound_shadows(b);
 	return rc;
 }
 

@@ -38,6 +38,7 @@ enum effect {
 	EFFECT_DELTA_LIGHT,
 	EFFECT_MEDIUM_LIGHT,
 	EFFECT_TRANSPARENT_SHADOWS,
+	EFFECT_REFRACTED_SHADOWS,
 	EFFECT_DEPTH,
 	EFFECTS
 };
@@ -72,12 +73,14 @@ struct effects {
 	bool scattering;	     /* some medium scatters or shines: edges are walked through all of them */
 	bool medium_light;	     /* some medium shines */
 	bool transparent_shadows;    /* connections look through what lets light straight through */
+	bool refracted_shadows;	     /* connections to emitters are refracted by what refracts exactly */
 	bool motion;		     /* paths have a time */
 	enum color_shape illuminant; /* of all emitters, if colour is off */
 	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 };
+_Static_assert((int)EFFECTS <= (int)RENDER_EFFECTS_MAX, "each has its line");
 
 /* Whether a path between camera and light can meet a shape, or why not. */
 enum visibility_bounds {

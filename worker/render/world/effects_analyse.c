@@ -57,7 +57,7 @@ struct census {
 	struct tally hidden_specular, hidden_dispersive,
 		unused_dispersive; /* materials that no path meets; that no shape uses */
 	struct tally absorbing, scattering, shining;
-	struct tally straight;
+	struct tally straight, refracting;
 	struct tally environment, area, delta, textured_light, coloured_light;
 	enum visibility_bounds why_hidden;
 	size_t shape[3];
@@ -77,6 +77,8 @@ static void add_material(struct census *c, const struct bsdf *b, const struct sc
 		count(&c->transmission, n, nameless);
 	if (bsdf_is_passed(b))
 		count(&c->straight, n, nameless);
+	if (bsdf_refracts(b))
+		count(&c->refracting, n, nameless);
 	if (b->textured)
 		count(&c->textured, n, nameless);
 	if (b->shape != COLOR_SHAPE_CONSTANT)
@@ -438,6 +440,20 @@ static void transparent_shadows(struct report *r, const struct census *c)
 				  "let light straight through", "lets light straight through");
 }
 
+/* Where media scatter, light bends between surfaces as well. */
+static void refracted_shadows(struct report *r, const struct census *c)
+{
+	static const struct effects_choice nothing;
+	struct report unforced = {r->fx, &nothing};
+	if (r->fx->scattering)
+		line(&unforced, EFFECT_REFRACTED_SHADOWS, false,
+		     "where media scatter or shine, connections are not refracted");
+	else
+		r->fx->refracted_shadows =
+			materials(r, EFFECT_REFRACTED_SHADOWS, &c->refracting, "refracts light exactly",
+				  "refract light exactly", "refracts light exactly");
+}
+
 static void depth(struct report *r, const struct world *w, const struct effects_source *src,
 		  const enum visibility_bounds *shape)
 {
@@ -482,5 +498,6 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 				   "border on a medium that shines", "no medium shines");
 	fx->scattering = fx->scattering || fx->medium_light;
 	transparent_shadows(&r, &c);
+	refracted_shadows(&r, &c);
 	depth(&r, w, src, shape);
 }

@@ -55,6 +55,9 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_TRANSPARENT_SHADOWS] =
 		{"transparent-shadows", ON | OFF,
 		 "the second ray of blocked connections; chance alone finds light behind such surfaces", NULL},
+	[EFFECT_REFRACTED_SHADOWS] = {"refracted-shadows", ON | OFF,
+				      "the walks of blocked connections; chance alone finds light behind such surfaces",
+				      NULL},
 	[EFFECT_DEPTH] = {"depth", ON, "trying longer paths", "--max-depth shortens paths"},
 };
 

@@ -18,7 +18,7 @@ struct effect_line {
 	char why[240];
 	const char *saves; /* what omitting it saves */
 };
-enum { RENDER_EFFECTS_MAX = 25 };
+enum { RENDER_EFFECTS_MAX = 26 };
 
 /* The overrides of hslt-submit and hslt-render; all zero: as the scene requires. The texts are those of a plan. */
 struct render_options {

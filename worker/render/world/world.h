@@ -48,6 +48,7 @@ struct world {
 	struct medium *media;
 	bool has_passable;		     /* some shape is */
 	struct box passed;		     /* around all surfaces that connections may look through; may be empty */
+	struct box refracting;		     /* around all that may refract them; may be empty */
 	uint32_t *emitter_medium;	     /* around emitters whose shapes state none; only where media scatter */
 	uint32_t *emitter_shape;	     /* that it belongs to; UINT32_MAX: none */
 	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */

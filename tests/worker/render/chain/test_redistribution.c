@@ -11,6 +11,7 @@
 #include "tests/support/length.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
+#include "worker/render/halfvec/refract.h"
 #include "worker/render/path/integrate_bdpt.h"
 
 #include <setjmp.h>
@@ -82,7 +83,8 @@ static void trial_begin(struct trial *t, const struct world *w, const struct red
 					   .max_depth = w->settings.max_depth,
 					   .roulette = PATH_ROULETTE,
 					   .unclassed = true,
-					   .counters = t->counters};
+					   .counters = t->counters,
+					   .refract = halfvec_refract};
 	assert_int_equal(brightness_of_samples(&t->map, &t->context, path_trace_both_ways, seed, RNG_BRIGHTNESS, 0,
 					       MAP_SAMPLES, &e),
 			 0);

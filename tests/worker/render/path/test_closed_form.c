@@ -367,15 +367,41 @@ static void test_beam_in_layer(void **state)
 }
 
 /* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r,
- * all of it above the horizon: pi r^2 / d^2 times the cosine. Irradiance at (x, z) from its foot, radiance 1. */
+ * all of it above the horizon: pi r^2 / d^2 times the cosine. Irradiance at (x, z) from its foot, radiance 1. glass:
+ * the thickness of a pane of index 1.5 between a tiny sphere and the floor, which reflects nothing back. */
 struct lamp {
-	double a, r, h;
+	double a, r, h, glass;
 };
+
+/* Unpolarised light that comes at this angle through one face of the pane. */
+static double transmitted(double cosine, double inner)
+{
+	double s = (cosine - 1.5 * inner) / (cosine + 1.5 * inner), p = (1.5 * cosine - inner) / (1.5 * cosine + inner);
+	return 1 - 0.5 * (s * s + p * p);
+}
+
+/* Light that leaves at the angle t from the vertical arrives at a distance rho(t) from the lamp's foot; the intensity
+ * pi r^2 sin t dt falls on rho drho. */
+static double irradiance_behind_glass(const struct lamp *l, double rho)
+{
+	double low = 0, high = M_PI / 2, air = l->h - l->glass;
+	for (;;) {
+		double t = 0.5 * (low + high), c = cos(t), inner = sqrt(1 - pow(sin(t) / 1.5, 2));
+		if (t <= low || t >= high) {
+			double through = transmitted(c, inner), bent = l->glass * c / (1.5 * inner);
+			return M_PI * l->r * l->r * through * through * (c / (air + bent)) /
+			       (air / (c * c) + bent / (inner * inner));
+		}
+		*(tan(t) * (air + l->glass * c / (1.5 * inner)) < rho ? &low : &high) = t;
+	}
+}
 
 static double irradiance(const struct lamp *l, double x, double z)
 {
 	enum { N = 32 };
 	double sum = 0, h = l->h, a = l->a;
+	if (l->glass > 0)
+		return irradiance_behind_glass(l, sqrt(x * x + z * z));
 	if (l->r > 0)
 		return M_PI * l->r * l->r * h / pow(x * x + z * z + h * h, 1.5);
 	for (int i = 0; i < N * N; i++) {
@@ -426,7 +452,7 @@ static void check_lit_floor(const char *name, struct lamp lamp, const char *xml,
 		"<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'>"
 		"<lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>"
 		"</transform><film type='hdrfilm'><rfilter type='box'/></film></sensor>%s",
-		DEPTH("2"), xml);
+		lamp.glass > 0 ? DEPTH("4") : DEPTH("2"), xml);
 	for (size_t i = 0; i < 3; i++) {
 		if (!runs[i].spp)
 			continue;
@@ -443,19 +469,29 @@ static void test_lit_floor(void **state)
 {
 	(void)state;
 	check_lit_floor(
-		"floor under a square", (struct lamp){1, 0, 2},
+		"floor under a square", (struct lamp){1, 0, 2, 0},
 		"<shape type='rectangle'><transform name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>"
 		"<translate x='3' y='2' z='1'/></transform><emitter type='area'/></shape>",
 		(struct effort){3072, 6144, test_full() ? 32768 : 0});
-	check_lit_floor("floor under a sphere", (struct lamp){0, 0.4, 2},
+	check_lit_floor("floor under a sphere", (struct lamp){0, 0.4, 2, 0},
 			"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='.4'/>"
 			"<emitter type='area'/></shape>",
 			(struct effort){1024, 2048, 0});
 	check_lit_floor(
-		"floor under a tiny sphere", (struct lamp){0, 1e-5, 2},
+		"floor under a tiny sphere", (struct lamp){0, 1e-5, 2, 0},
 		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='1e-5'/>"
 		"<emitter type='area'/></shape>",
 		(struct effort){512, 0, 0});
+#define GLASS                                                                                                       \
+	"<shape type='cube'><transform name='to_world'><scale x='90' y='.5' z='90'/><translate y='5'/></transform>" \
+	"<bsdf type='dielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/></bsdf></shape>"
+	check_lit_floor("floor behind glass, under a tiny sphere", (struct lamp){0, 1e-5, 7, 1},
+			GLASS "<shape type='sphere'><point name='center' x='3' y='7' z='1'/>"
+			      "<float name='radius' value='1e-5'/><emitter type='area'/></shape>",
+			(struct effort){64, 512, 0});
+	check_lit_floor("floor behind glass, under a point", (struct lamp){0, 1 / sqrt(M_PI), 7, 1},
+			GLASS "<emitter type='point'><point name='position' x='3' y='7' z='1'/></emitter>",
+			(struct effort){64, 512, 0});
 }
 
 /* A beam straight down, wider than what the camera sees of the floor: M rho / pi. */

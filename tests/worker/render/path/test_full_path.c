@@ -4,6 +4,7 @@
  * connections of bdpt and the other way vertex by vertex, and every cached quantity.
  */
 #include "tests/support/worlds.h"
+#include "worker/render/halfvec/refract.h"
 #include "worker/render/path/full_path.h"
 #include "tests/support/path_check.h"
 #include "worker/render/path/full_path_density.h"
@@ -52,7 +53,7 @@ static double f_over_p(struct path_context *c, struct full_path *x)
 }
 
 struct tally {
-	unsigned long compared, disagree, black;
+	unsigned long compared, disagree, black, refracted;
 	double worst;
 };
 
@@ -76,16 +77,24 @@ static void compare(struct path_context *c, unsigned s, unsigned edges, struct t
 	for (int k = 0; k < 3; k++)
 		off = fmax(off, fabs(colour[k] - share[k]));
 	t->compared++;
+	t->refracted += s == 1 && path_is_refracted(&x.v[1]);
 	if (off > t->worst)
 		t->worst = off;
 }
 
-static void check(const char *name, struct world *w, unsigned long samples)
+/* Returns how many of the paths had their connection refracted. */
+static unsigned long check(const char *name, struct world *w, unsigned long samples)
 {
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	c = (struct path_context){
-		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = EDGES, .counters = counters};
+		.w = w,
+		.window = {0, 0, 32, 32},
+		.min_depth = 1,
+		.max_depth = EDGES,
+		.counters = counters,
+		.refract = halfvec_refract,
+	};
 	struct tally t = {0};
 	for (unsigned long i = 0; i < samples; i++) {
 		struct sampler_random s;
@@ -107,6 +116,7 @@ static void check(const char *name, struct world *w, unsigned long samples)
 	assert_true(t.worst < 1e-7);
 	assert_true(t.disagree * 10000 <= t.compared);
 	world_free(w);
+	return t.refracted;
 }
 
 static void test_surfaces(void **state)
@@ -298,6 +308,37 @@ static void test_passed(void **state)
 	check("panes", w, 3000);
 }
 
+/* Small lamps in, under and behind glass of several kinds; some of it absorbs, disperses or bends its normals. */
+static void test_refracted(void **state)
+{
+	(void)state;
+	/* clang-format off */
+	assert_true(check("lamps behind glass", world_of_text(32, 32, "%s",
+		ROOM
+		BALL("<bsdf type='dielectric'/>")
+		"<shape type='sphere'>"
+			"<point name='center' x='0' y='1' z='-1'/><float name='radius' value='.4'/>"
+			"<bsdf type='dielectric'><float name='int_ior' value='1.2'/></bsdf>"
+			"<medium name='interior' type='homogeneous'><float name='albedo' value='0'/>"
+				"<rgb name='sigma_t' value='.5,1,2'/></medium>"
+		"</shape>"
+		"<shape type='sphere'>"
+			"<point name='center' x='.1' y='1' z='-1'/><float name='radius' value='.02'/>"
+			"<emitter type='area'><float name='radiance' value='90'/></emitter>"
+		"</shape>"
+		"<emitter type='point'><point name='position' x='-.5' y='-1' z='-1.9'/></emitter>"), 3000) > 300);
+	assert_true(check("a prism and the sun", world_of_text(32, 32, "%s",
+		SENSOR("0,-1,2.8", "0,-1.4,0")
+		"<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1.5'/>")
+			"<bsdf type='phong'/></shape>"
+		"<shape type='cube'>" AT("<scale x='4' y='.1' z='4'/><rotate z='1' angle='20'/>")
+			"<bsdf type='dielectric'><float name='int_ior' value='1.5'/><float name='int_cauchy_b' value='.02'/>"
+		"</bsdf></shape>"
+		"<emitter type='directional'><vector name='direction' value='.2,-1,.1'/></emitter>"
+		"<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000) > 300);
+	/* clang-format on */
+}
+
 /* What is passed counts as edges: no path is shorter or longer than asked for, and some are as long only thereby. */
 static void test_passed_lengths(void **state)
 {
@@ -439,11 +480,12 @@ static void test_sides(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces),    cmocka_unit_test(test_media),
-		cmocka_unit_test(test_round_lamp),  cmocka_unit_test(test_environment),
-		cmocka_unit_test(test_ends),	    cmocka_unit_test(test_clipped),
-		cmocka_unit_test(test_passed),	    cmocka_unit_test(test_passed_lengths),
-		cmocka_unit_test(test_passed_most), cmocka_unit_test(test_sides),
+		cmocka_unit_test(test_surfaces),       cmocka_unit_test(test_media),
+		cmocka_unit_test(test_round_lamp),     cmocka_unit_test(test_environment),
+		cmocka_unit_test(test_ends),	       cmocka_unit_test(test_clipped),
+		cmocka_unit_test(test_passed),	       cmocka_unit_test(test_refracted),
+		cmocka_unit_test(test_passed_lengths), cmocka_unit_test(test_passed_most),
+		cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,6 +5,7 @@
  */
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
+#include "worker/render/halfvec/refract.h"
 #include "worker/render/path/full_path_density.h"
 #include "worker/render/path/integrate_path.h"
 #include "worker/render/path/measure.h"
@@ -39,8 +40,12 @@ enum { EDGES = 8 };
 
 static struct path_context context_of(struct world *w, uint64_t *counters)
 {
-	return (struct path_context){
-		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = EDGES, .counters = counters};
+	return (struct path_context){.w = w,
+				     .window = {0, 0, 32, 32},
+				     .min_depth = 1,
+				     .max_depth = EDGES,
+				     .counters = counters,
+				     .refract = halfvec_refract};
 }
 
 static double f_over(const double *log_pdf, unsigned last, double log_f)
@@ -121,6 +126,14 @@ static void test_densities(void **state)
 	assert_true(check_densities("diffuse", world_of_text(32, 32, ROOM LAMP "%s", ""), 1000) > 1000);
 	assert_true(check_densities("glass",
 				    world_of_text(32, 32, ROOM ROUND_LAMP BALL("<bsdf type='dielectric'/>") "%s", ""),
+				    3000) > 3000);
+	/* All that `path` finds of the point behind the ball it finds refracted. */
+	assert_true(check_densities("glass and a point",
+				    world_of_text(32, 32,
+						  ROOM "<emitter type='point'><point name='position' value='0.5,1,0'/>"
+						       "<rgb name='intensity' value='1,1,1'/></emitter>" BALL(
+							       "<bsdf type='dielectric'/>") "%s",
+						  ""),
 				    3000) > 3000);
 	assert_true(check_densities("rough glass and a point",
 				    world_of_text(32, 32,

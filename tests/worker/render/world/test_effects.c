@@ -289,6 +289,37 @@ static void test_transparent_shadows(void **state)
 	world_free(w);
 }
 
+/* By what refracts exactly and lets nothing straight through; not where media scatter. */
+static void test_refracted_shadows(void **state)
+{
+	(void)state;
+#define POOL "<shape type='rectangle'><bsdf type='dielectric' id='water'/></shape>"
+	struct world *w = forced("", VIEW LAMP POOL);
+	assert_true(w->effects.refracted_shadows);
+	assert_string_equal(line_of(w, "refracted-shadows")->why, "`water` refracts light exactly");
+	assert_true(w->refracting.low.x < w->refracting.high.x);
+	world_free(w);
+	w = forced("-refracted-shadows", VIEW LAMP POOL);
+	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->other_scene);
+	assert_true(w->refracting.low.x > w->refracting.high.x);
+	world_free(w);
+	static const char *const without[] = {
+		VIEW LAMP PANE, VIEW LAMP "<shape type='sphere'><bsdf type='roughdielectric'/></shape>",
+		VIEW LAMP "<shape type='sphere'><bsdf type='conductor'/></shape>",
+		VIEW LAMP "<shape type='sphere'><bsdf type='mask'><float name='opacity' value='.5'/><bsdf "
+			  "type='dielectric'/></bsdf></shape>"};
+	for (size_t i = 0; i < sizeof without / sizeof *without; i++) {
+		w = forced("", without[i]);
+		assert_true(!w->effects.refracted_shadows);
+		assert_string_equal(line_of(w, "refracted-shadows")->why,
+				    "no material that light meets refracts light exactly");
+		world_free(w);
+	}
+	w = forced("+refracted-shadows", VIEW LAMP BALL("1", CLOUD("2")) POOL);
+	assert_true(!w->effects.refracted_shadows && !line_of(w, "refracted-shadows")->on);
+	world_free(w);
+}
+
 static void test_texts(void **state)
 {
 	(void)state;
@@ -350,6 +381,7 @@ int main(void)
 		cmocka_unit_test(test_scattering),
 		cmocka_unit_test(test_medium_light),
 		cmocka_unit_test(test_transparent_shadows),
+		cmocka_unit_test(test_refracted_shadows),
 		cmocka_unit_test(test_texts),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

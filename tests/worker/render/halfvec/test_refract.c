@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Refracted connections against rays: each path that the walk finds is traced again from z by Snell's law alone, has to
+ * arrive at the emitter, and T follows from where rays beside it arrive. Deterministic.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/worlds.h"
+#include "worker/render/halfvec/refract.h"
+#include "worker/render/math/mat2.h"
+#include "worker/render/path/connect.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct path_context c;
+static uint64_t counters[BATCH_COUNTERS];
+
+static void begin(const struct world *w)
+{
+	memset(counters, 0, sizeof counters);
+	c = (struct path_context){.w = w, .counters = counters};
+	c.wl = world_wavelengths(w, 0.5);
+}
+
+static vec3 in_world(const struct world *w, vec3 p)
+{
+	return vec3_scale(w->scale, vec3_sub(p, w->center));
+}
+
+/* Snell's law for d, which comes from the side where the index is the larger by `eta`. */
+static bool snell(vec3 d, vec3 n, double eta, vec3 *out)
+{
+	if (vec3_dot(d, n) > 0)
+		n = vec3_neg(n);
+	double cosine = -vec3_dot(d, n), k = 1 - eta * eta * (1 - cosine * cosine);
+	if (!(k > 0))
+		return false;
+	*out = vec3_normalize(vec3_madd(vec3_scale(eta, d), eta * cosine - sqrt(k), n));
+	return true;
+}
+
+/* From z along d through `count` surfaces: the ray behind the last. */
+static bool shoot(const struct path_vertex *z, vec3 d, unsigned count, vec3 *p, vec3 *out)
+{
+	struct path_vertex v[2];
+	const struct path_vertex *from = z;
+	for (unsigned i = 0; i < count; i++) {
+		struct path_vertex *to = &v[i % 2];
+		if (!path_extend(&c, from, d, 0, INFINITY, to))
+			return false;
+		double eta = bsdf_eta(to->bsdf, &c.wl);
+		if (!snell(d, to->x.sh.n, vec3_dot(d, to->x.sh.n) < 0 ? 1 / eta : eta, &d))
+			return false;
+		from = to;
+	}
+	*p = from->x.p;
+	*out = d;
+	return true;
+}
+
+/* Where the ray meets the plane through y across its own direction `axis`, or, if y is at infinity, where it points:
+ * two coordinates. */
+static bool arrive(const struct path_vertex *z, vec3 d, unsigned count, const struct path_vertex *y,
+		   const struct frame *f, double at[2])
+{
+	vec3 p, w;
+	if (!shoot(z, d, count, &p, &w))
+		return false;
+	vec3 off = y->kind == VERTEX_INFINITE
+			   ? vec3_sub(w, y->x.p)
+			   : vec3_sub(vec3_madd(p, vec3_dot(vec3_sub(y->x.p, p), f->n) / vec3_dot(w, f->n), w), y->x.p);
+	at[0] = vec3_dot(off, f->s);
+	at[1] = vec3_dot(off, f->t);
+	return true;
+}
+
+struct tally {
+	unsigned found, several;
+	double miss, transfer;
+};
+
+/* Solid angle at z over area (or solid angle) at y, by central differences; then T by that of x_m. */
+static void check_one(const struct path_vertex *z, const struct path_vertex *y, const struct path_refraction *r,
+		      struct tally *t)
+{
+	const double step = 1e-5;
+	double distance2, unused, at[2], high[2], low[2];
+	vec3 d = path_direction(z, &r->v[0], &distance2), last = path_direction(&r->v[r->count - 1], y, &unused);
+	bool has_normal = vec3_dot(y->x.ng, y->x.ng) > 0 && y->kind != VERTEX_INFINITE;
+	struct frame here = frame_around(d), there = frame_around(has_normal ? y->x.ng : last);
+	mat2 m;
+	assert_true(arrive(z, d, r->count, y, &there, at));
+	t->miss = fmax(t->miss, fmax(fabs(at[0]), fabs(at[1])));
+	if (!arrive(z, vec3_normalize(vec3_madd(d, step, here.s)), r->count, y, &there, high) ||
+	    !arrive(z, vec3_normalize(vec3_madd(d, -step, here.s)), r->count, y, &there, low))
+		return;
+	m.xx = (high[0] - low[0]) / (2 * step);
+	m.yx = (high[1] - low[1]) / (2 * step);
+	if (!arrive(z, vec3_normalize(vec3_madd(d, step, here.t)), r->count, y, &there, high) ||
+	    !arrive(z, vec3_normalize(vec3_madd(d, -step, here.t)), r->count, y, &there, low))
+		return;
+	m.xy = (high[0] - low[0]) / (2 * step);
+	m.yy = (high[1] - low[1]) / (2 * step);
+	double transfer = distance2 / (path_cosine(&r->v[0], d) * fabs(m.xx * m.yy - m.xy * m.yx));
+	t->transfer = fmax(t->transfer, fabs(exp(r->log_transfer) / transfer - 1));
+	t->found++;
+	t->several += r->count > 2;
+}
+
+/* From points of the floor to points of each emitter. */
+static struct tally check(const char *name, struct world *w, unsigned tries)
+{
+	struct tally t = {0};
+	struct dice dice = dice_of(name);
+	begin(w);
+	for (unsigned i = 0; i < tries; i++) {
+		struct path_vertex from = {.kind = VERTEX_CAMERA,
+					   .x = {.p = in_world(w, (vec3){0, -1, 0}), .prim = PRIM_NONE}};
+		struct path_vertex z, y;
+		struct path_refraction r;
+		double pdf;
+		vec3 d = dice_direction(&dice);
+		d.y = -fabs(d.y) - 0.5;
+		from.x.ng = (vec3){0, 0, 0};
+		if (!path_extend(&c, &from, vec3_normalize(d), 0, INFINITY, &z) || z.kind != VERTEX_SURFACE ||
+		    !path_scatters_smoothly(&z))
+			continue;
+		for (int k = 0; k < 3; k++)
+			z.next_event[k] = dice_throw(&dice);
+		if (path_next_event(&c, &z, &y, &pdf) && halfvec_refract(&c, &z, &y, &r))
+			check_one(&z, &y, &r, &t);
+	}
+	print_message("%s: %u of %u found, largest miss %.3g, T off by %.3g\n", name, t.found, tries, t.miss,
+		      t.transfer);
+	assert_true(t.miss < 1e-7 && t.transfer < 1e-4);
+	world_free(w);
+	return t;
+}
+
+/* clang-format off */
+#define FLOOR                                                                                                   \
+	SENSOR("0,-1,4", "0,-1,0")                                                                                  \
+	"<shape type='rectangle'><transform name='to_world'><scale value='6'/><rotate x='1' angle='-90'/>"           \
+	"<translate y='-2'/></transform><bsdf type='diffuse'/></shape>"
+#define BALL(place, radius, bsdf)                                                                               \
+	"<shape type='sphere'><point name='center' " place "/><float name='radius' value='" radius "'/>" bsdf "</shape>"
+#define GLASS "<bsdf type='dielectric'/>"
+#define WEAK "<bsdf type='dielectric'><float name='int_ior' value='1.1'/><float name='ext_ior' value='1'/></bsdf>"
+#define LAMP "<emitter type='area'/>"
+/* clang-format on */
+
+static void test_lamps(void **state)
+{
+	(void)state;
+	struct tally t = check("a lamp in a ball",
+			       world_of_text(8, 8, "%s",
+					     FLOOR BALL("x='0' y='1' z='0'", "1", GLASS)
+						     BALL("x='.2' y='1.3' z='0'", ".1", LAMP)),
+			       400);
+	assert_true(t.found > 200);
+	t = check(
+		"a point behind a ball and a pane",
+		world_of_text(
+			8, 8, "%s",
+			FLOOR BALL(
+				"x='0' y='1' z='0'", ".6",
+				WEAK) "<shape type='cube'><transform name='to_world'><scale x='5' y='.1' z='5'/><rotate z='1' angle='10'/>"
+				      "</transform>" GLASS
+				      "</shape><emitter type='point'><point name='position' x='.1' y='2' z='0'/>"
+				      "</emitter>"),
+		400);
+	assert_true(t.found > 100 && t.several > 10);
+	t = check(
+		"the sun through a ball and a pane",
+		world_of_text(
+			8, 8, "%s",
+			FLOOR BALL(
+				"x='0' y='1' z='0'", ".6",
+				WEAK) "<shape type='cube'><transform name='to_world'><scale x='5' y='.1' z='5'/></transform>" GLASS
+				      "</shape><emitter type='directional'><vector name='direction' value='.3,-1,.2'/></emitter>"),
+		400);
+	assert_true(t.found > 200);
+}
+
+/* Light through a ball of glass that brings it to a focus above the floor: points there are joined to the lamp by more
+ * than one refracted path, of which technique 1 makes that where the walk ends. */
+static void test_one_of_several(void **state)
+{
+	(void)state;
+	unsigned made = 0, others = 0;
+	double film[2];
+	struct world *w = world_of_text(
+		8, 8, "%s",
+		FLOOR BALL("x='0' y='-.8' z='0'", ".5",
+			   GLASS) "<emitter type='point'><point name='position' x='.1' y='1' z='0'/></emitter>");
+	begin(w);
+	c.window = (struct film_window){0, 0, 8, 8};
+	c.max_depth = 8;
+	c.refract = halfvec_refract;
+	for (uint64_t i = 0; i < 20000; i++) {
+		struct sampler_random u;
+		const struct path_vertex *v[5];
+		struct path_refraction r;
+		unsigned count = 0;
+		double log_transfer = 0;
+		sampler_random_init(&u, 0x666f637573, RNG_TEST, i, 0);
+		path_walk_camera(&c, &u.base, 1, film); /* sets the wavelengths and the time */
+		unsigned n = path_walk_light(&c, &u.base, 4);
+		if (n < 4 || !path_is_refracted(&c.light[1]) || !path_is_refracted(&c.light[2]) ||
+		    !path_scatters_smoothly(&c.light[3]))
+			continue;
+		struct path_vertex above = c.light[3];
+		above.x.p = vec3_add(above.x.p, above.x.ng);
+		for (unsigned k = 0; k < 4; k++)
+			v[k] = &c.light[k];
+		v[4] = &above;
+		bool there = path_is_made_by_refraction(&c, v, 4, &count, &log_transfer);
+		assert_int_equal(count, 2);
+		bool found = halfvec_refract(&c, v[3], v[0], &r);
+		double apart = found ? vec3_length(vec3_sub(r.v[0].x.p, v[2]->x.p)) : INFINITY;
+		assert_true(there ? apart < 1e-4 : apart > 1e-9);
+		if (there)
+			assert_true(log_transfer == r.log_transfer);
+		made += there;
+		others += !there;
+	}
+	print_message("%u made by refraction, %u others\n", made, others);
+	assert_true(made > 10 && others > 100);
+	world_free(w);
+}
+
+/* Whether the floor's point below the origin is joined to a point light at a height of 3 by way of so many surfaces. */
+static unsigned joined_by(const char *between)
+{
+	struct world *w = world_of_text(8, 8, "%s%s%s", FLOOR, between,
+					"<emitter type='point'><point name='position' x='0' y='3' z='0'/></emitter>");
+	struct path_vertex from = {.kind = VERTEX_CAMERA,
+				   .x = {.p = in_world(w, (vec3){.1, -1.9, 0}), .prim = PRIM_NONE}},
+			   z, y;
+	struct path_refraction r;
+	double pdf;
+	begin(w);
+	assert_true(path_extend(&c, &from, (vec3){0, -1, 0}, 0, INFINITY, &z));
+	memset(z.next_event, 0, sizeof z.next_event);
+	assert_true(path_next_event(&c, &z, &y, &pdf));
+	unsigned count = halfvec_refract(&c, &z, &y, &r) ? r.count : 0;
+	world_free(w);
+	return count;
+}
+
+static void test_what_lies_between(void **state)
+{
+	(void)state;
+	char panes[4096] = "";
+#define PANE(bsdf)                                                                                                         \
+	"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='90'/></transform>" bsdf \
+	"</shape>"
+	assert_int_equal(joined_by(PANE(GLASS)), 1);
+	assert_int_equal(joined_by(""), 0);
+	assert_int_equal(joined_by(PANE("<bsdf type='thindielectric'/>")), 0);
+	assert_int_equal(joined_by(PANE("<bsdf type='roughdielectric'/>")), 0);
+	assert_int_equal(joined_by(PANE("<bsdf type='conductor'/>")), 0);
+	assert_int_equal(joined_by(PANE(GLASS) BALL("x='0' y='1' z='0'", ".5", "<bsdf type='diffuse'/>")), 0);
+	for (unsigned i = 0; i <= PATH_REFRACTED_MOST; i++) {
+		size_t used = strlen(panes);
+		snprintf(
+			panes + used, sizeof panes - used,
+			"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='90'/>"
+			"<translate y='%g'/></transform>" GLASS "</shape>",
+			0.1 * i);
+		assert_int_equal(joined_by(panes), i < PATH_REFRACTED_MOST ? i + 1 : 0);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_lamps),
+		cmocka_unit_test(test_one_of_several),
+		cmocka_unit_test(test_what_lies_between),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,168 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Refracted connections: which are tried, what they carry, and which paths of other techniques they make, too. The walk
+ * itself is path_context.refract's (halfvec/refract.c).
+ *
+ * path_refract_to asks for the refracted path between z and y and fills in its vertices as a camera sub-path would
+ * have. It fails where the straight line meets nothing that refracts, where the walk does not arrive, or where a lobe
+ * at one of its vertices carries nothing.
+ */
+#include "worker/render/path/refracted.h"
+
+#include "worker/render/path/media.h"
+#include "worker/render/path/next_event.h"
+#include "worker/render/path/path.h"
+
+/* Connections are refracted where emitters are drawn so many times as densely as a sub-path from z, going straight,
+ * would find them. */
+static const double denser = 8;
+/* Two walks end at the same path if each vertex lies this near, relative to its distance from the one before. */
+static const double same_place = 1e-5;
+
+static bool meets_box(const struct path_context *c, const struct path_vertex *z, const struct path_vertex *y)
+{
+	double distance2;
+	vec3 d = path_direction(z, y, &distance2);
+	return distance2 > 0 &&
+	       box_is_met(&c->w->refracting, z->x.p, d, y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2));
+}
+
+bool path_tries_to_refract(const struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+			   const struct path_vertex *y, double toward, spectrum f)
+{
+	return !spectrum_is_zero(f) && meets_box(c, z, y) &&
+	       toward >= denser * path_pdf(c, before, z, y, TRANSPORT_RADIANCE);
+}
+
+/* The index on the camera's side of v over that on the light's. */
+static double eta_of(const struct path_context *c, const struct path_vertex *v, vec3 to_camera)
+{
+	double eta = bsdf_eta(v->bsdf, &c->wl);
+	return vec3_dot(v->x.sh.n, to_camera) > 0 ? 1 / eta : eta;
+}
+
+double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
+			  const struct path_vertex *next, enum transport transport)
+{
+	double distance2, unused, to_light, to_camera;
+	vec3 back = path_direction(at, prev, &unused), omega = path_direction(at, next, &distance2);
+	if (!(distance2 > 0) || !path_can_be_hit(c, next) || !path_meets(omega, next))
+		return 0;
+	struct bsdf_point p = world_bsdf_point(&at->x, &c->wl, transport);
+	double chance = path_delta_chance(at->bsdf, &p, frame_to_local(&at->x.sh, back), at->mode);
+	bool from_camera = transport == TRANSPORT_RADIANCE;
+	vec3 camera = from_camera ? back : omega, light = from_camera ? omega : back;
+	path_delta_per_solid(&at->x, light, camera, eta_of(c, at, camera), &to_light, &to_camera);
+	double lobe = chance * (from_camera ? to_light : to_camera);
+	return next->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(next, omega, distance2);
+}
+
+double path_refracted_ratio(const struct path_vertex *const *v, unsigned count, double log_transfer, const double *pdf)
+{
+	double ratio = exp(-log_transfer), distance2;
+	for (unsigned i = 1; i <= count; i++) {
+		vec3 w = path_direction(v[i], v[i - 1], &distance2);
+		ratio *= path_geometry_term(v[i], v[i - 1], w, distance2) / pdf[i - 1];
+	}
+	return ratio;
+}
+
+/* Whether the vertices of the walk are those of v[count] .. v[1]. */
+static bool is_same_path(const struct path_refraction *r, const struct path_vertex *const *v, unsigned count)
+{
+	if (r->count != count)
+		return false;
+	for (unsigned i = 0; i < count; i++) {
+		const struct path_vertex *here = v[count - i];
+		vec3 apart = vec3_sub(r->v[i].x.p, here->x.p), edge = vec3_sub(here->x.p, v[count - i + 1]->x.p);
+		if (vec3_dot(apart, apart) > same_place * same_place * vec3_dot(edge, edge))
+			return false;
+	}
+	return true;
+}
+
+static bool same(vec3 a, vec3 b)
+{
+	return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+
+/* NULL: there is none. */
+static const struct path_refraction *look_up(struct path_context *c, const struct path_vertex *z,
+					     const struct path_vertex *y)
+{
+	struct path_refraction_known *k = &c->refraction;
+	if (!k->any || !same(k->z, z->x.p) || !same(k->y, y->x.p) || k->time != z->x.prim.time ||
+	    k->nm != c->wl.nm[0]) {
+		k->any = true;
+		k->z = z->x.p;
+		k->y = y->x.p;
+		k->time = z->x.prim.time;
+		k->nm = c->wl.nm[0];
+		k->found = c->refract(c, z, y, &k->of);
+	}
+	return k->found ? &k->of : NULL;
+}
+
+bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *count,
+				double *log_transfer)
+{
+	unsigned end = 1;
+	while (end < k && path_is_refracted(v[end]))
+		end++;
+	*count = end - 1;
+	if (*count == 0 || *count > PATH_REFRACTED_MOST || end == k || v[end]->kind != VERTEX_SURFACE)
+		return false;
+	const struct path_vertex *z = v[end];
+	double unused;
+	vec3 to_camera = path_direction(z, v[end + 1], &unused), straight = path_direction(z, v[0], &unused);
+	if (!path_scatters_smoothly(z) ||
+	    !path_tries_to_refract(c, v[end + 1], z, v[0], path_pdf_toward(c, v[0], z->x.p),
+				   path_scatter(c, z, to_camera, straight)))
+		return false;
+	const struct path_refraction *r = look_up(c, z, v[0]);
+	if (!r || !is_same_path(r, v, *count))
+		return false;
+	*log_transfer = r->log_transfer;
+	return true;
+}
+
+/* The weight of the lobe at v, which goes on to `next`; zero: none, or the shading normal disagrees. */
+static spectrum lobe(const struct path_context *c, const struct path_vertex *v, const struct path_vertex *next)
+{
+	double chance, unused;
+	vec3 wi, d = path_direction(v, next, &unused);
+	if (!(vec3_dot(v->x.ng, v->to_prev) * vec3_dot(v->x.sh.n, v->to_prev) > 0) ||
+	    !(vec3_dot(v->x.ng, d) * vec3_dot(v->x.sh.n, d) > 0))
+		return spectrum_of(0);
+	struct bsdf_point p = world_bsdf_point(&v->x, &c->wl, TRANSPORT_RADIANCE);
+	spectrum share = bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, v->to_prev), v->mode, &wi, &chance);
+	return spectrum_is_zero(share) || !(chance > 0) ? spectrum_of(0) : share;
+}
+
+bool path_refract_to(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+		     const struct path_vertex *y, spectrum *left)
+{
+	struct path_refraction r;
+	if (!c->refract(c, z, y, &r))
+		return false;
+	*left = spectrum_of(1);
+	for (unsigned i = 0; i < r.count; i++) {
+		struct path_vertex *v = &c->passed[i];
+		const struct path_vertex *prev = i > 0 ? v - 1 : z;
+		*v = r.v[i];
+		*left = spectrum_mul(*left, lobe(c, v, i + 1 < r.count ? &r.v[i + 1] : y));
+		if (spectrum_is_zero(*left))
+			return false;
+		v->pdf = i == 0 ? path_pdf(c, before, z, v, TRANSPORT_RADIANCE)
+				: path_pdf_refracted(c, i > 1 ? v - 2 : z, prev, v, TRANSPORT_RADIANCE);
+		if (EFFECT_IS_ON(c->w, absorption)) {
+			double unused;
+			v->beta = *left;
+			path_absorb(c, prev, path_direction(prev, v, &unused), v);
+			*left = v->beta;
+		}
+	}
+	c->passed_count = r.count;
+	c->log_transfer = r.log_transfer;
+	return true;
+}

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Connections to emitters through surfaces that refract light exactly: lamps behind glass, the sun under water (Hanika,
+ * Droske and Fascione 2015, Manifold Next Event Estimation). A point y of an emitter is drawn as seen from z, as for
+ * any connection. If only surfaces with a refracting specular lobe lie between them, a walk moves the points where the
+ * straight line crosses those surfaces until each refracts light to the next (halfvec/refract.h). These points become
+ * vertices of the path, with the same specular lobes as if a sub-path had met them, so a path has the same number of
+ * edges whichever technique makes it, and techniques can be weighted against each other.
+ *
+ * Let x_0 = y, x_m+1 = z, with x_1 .. x_m refracting. Technique 1 (path/connect.h) draws x_0 with density p and none of
+ * x_1 .. x_m. Techniques are compared in the measure of path.h, which has an area and a delta distribution for each of
+ * them. There the density is p J,
+ *
+ *     J = prod_{i = 1..m} G(x_i, x_i-1) / T,     T = |det d x_m / d x_0|,
+ *
+ * T with z and all half vectors held: the delta distributions, as functions of x_1 .. x_m, have a block tridiagonal
+ * Jacobian M = d c / d x whose blocks a_i = d c_i / d x_i-1 have determinants G(x_i, x_i-1), and T = prod |a_i| / |det
+ * M| does not depend on which functions vanish on the paths that refract (halfvec/constraint.h). Where nothing is bent
+ * this is J of transparent.h. So the contribution over the density is that of a connection whose geometry term is G(z,
+ * x_m) T.
+ *
+ * The walk finds one of the paths between z and y; which one depends on z, y and the wavelength alone. A path that
+ * another technique made is weighted as if technique 1 could make it where the walk, done again, ends at it.
+ */
+#ifndef WORKER_RENDER_PATH_REFRACTED_H
+#define WORKER_RENDER_PATH_REFRACTED_H
+
+#include "worker/render/path/vertex.h"
+
+/* Whether connections to emitters are refracted at all. */
+static inline bool path_refracts(const struct path_context *c)
+{
+	return c->refract && EFFECT_IS_ON(c->w, refracted_shadows) && !c->opaque;
+}
+
+/* Whether a refracted connection could have v: its path is bent there by an exactly specular lobe. */
+static inline bool path_is_refracted(const struct path_vertex *v)
+{
+	return v->kind == VERTEX_SURFACE && v->delta && (v->mode & BSDF_TRANSMIT) && !(v->mode & BSDF_STRAIGHT) &&
+	       bsdf_refracts(v->bsdf);
+}
+
+/* Whether a connection of z to y, drawn with density `toward`, is tried: emitters are drawn so much more densely than
+ * sub-paths from z find them. f: what z scatters from the straight direction; before: the vertex before z on the
+ * camera's side. */
+bool path_tries_to_refract(const struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+			   const struct path_vertex *y, double toward, spectrum f);
+
+/* Joins z, a vertex of the camera's sub-path, to y. Fills in c->passed and c->log_transfer, the logarithm of T. *left:
+ * the product of the weights of the lobes, times what media that only absorb let through between z and the last
+ * surface; the edge from there to y is the caller's. before: as above. Counts rays. */
+bool path_refract_to(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
+		     const struct path_vertex *y, spectrum *left);
+
+/* Whether technique 1 makes this path by refraction: x_1 .. *count are refracted, and its walk ends there. v: from the
+ * emitter on, k edges. */
+bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *count,
+				double *log_transfer);
+
+/* path_pdf from a refracting vertex: the density of `next` for a sub-path that comes from prev. */
+double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
+			  const struct path_vertex *next, enum transport transport);
+
+/* J for x_1 .. x_count over the product of their densities pdf[0 .. count - 1]. */
+double path_refracted_ratio(const struct path_vertex *const *v, unsigned count, double log_transfer, const double *pdf);
+
+#endif
