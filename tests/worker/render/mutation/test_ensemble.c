@@ -58,10 +58,13 @@ static void draw(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, st
 	ensemble_draw(&c, &s.base, n, out);
 }
 
+/* Where x is refracted at x_1, its joint by technique 1 has vertices. */
 static bool has(const struct ensemble *e, unsigned edges, double intensity, bool whole)
 {
 	for (unsigned i = 0; i < e->count; i++) {
 		const struct candidate *a = &e->of[i];
+		if (!whole && a->s == 1 && a->passed == 0 && path_is_refracted(&x.v[1]))
+			continue;
 		double want = whole ? intensity : intensity / (chance(edges + 1 - a->s - a->passed) * chance(a->s));
 		if (a->edges == edges && fabs(a->intensity / want - 1) < 1e-6)
 			return true;
