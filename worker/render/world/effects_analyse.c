@@ -425,33 +425,15 @@ static void emitter_moves(struct report *r, const struct census *c)
 							      : "nothing shines");
 }
 
-/* Where media scatter it cannot be forced: edges cross the faces of `null` anyway, and connections end at all other
- * surfaces. */
-static void transparent_shadows(struct report *r, const struct census *c)
+/* Connections through these materials. Where media scatter they cannot be forced: edges cross the faces of `null`
+ * anyway, and connections end at all other surfaces. */
+static bool shadows(struct report *r, enum effect effect, const struct tally *t, const char *scattered, const char *one,
+		    const char *many)
 {
 	static const struct effects_choice nothing;
 	struct report unforced = {r->fx, &nothing};
-	if (r->fx->scattering)
-		line(&unforced, EFFECT_TRANSPARENT_SHADOWS, false,
-		     "where media scatter or shine, connections look through `null` alone");
-	else
-		r->fx->transparent_shadows =
-			materials(r, EFFECT_TRANSPARENT_SHADOWS, &c->straight, "lets light straight through",
-				  "let light straight through", "lets light straight through");
-}
-
-/* Where media scatter, light bends between surfaces as well. */
-static void refracted_shadows(struct report *r, const struct census *c)
-{
-	static const struct effects_choice nothing;
-	struct report unforced = {r->fx, &nothing};
-	if (r->fx->scattering)
-		line(&unforced, EFFECT_REFRACTED_SHADOWS, false,
-		     "where media scatter or shine, connections are not refracted");
-	else
-		r->fx->refracted_shadows =
-			materials(r, EFFECT_REFRACTED_SHADOWS, &c->refracting, "refracts light exactly",
-				  "refract light exactly", "refracts light exactly");
+	return r->fx->scattering ? line(&unforced, effect, false, "%s", scattered)
+				 : materials(r, effect, t, one, many, one);
 }
 
 static void depth(struct report *r, const struct world *w, const struct effects_source *src,
@@ -497,7 +479,11 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	fx->medium_light = tallied(&r, EFFECT_MEDIUM_LIGHT, &c.shining, "borders on a medium that shines",
 				   "border on a medium that shines", "no medium shines");
 	fx->scattering = fx->scattering || fx->medium_light;
-	transparent_shadows(&r, &c);
-	refracted_shadows(&r, &c);
+	fx->transparent_shadows = shadows(&r, EFFECT_TRANSPARENT_SHADOWS, &c.straight,
+					  "where media scatter or shine, connections look through `null` alone",
+					  "lets light straight through", "let light straight through");
+	fx->refracted_shadows = shadows(&r, EFFECT_REFRACTED_SHADOWS, &c.refracting,
+					"where media scatter or shine, connections are not refracted",
+					"refracts light exactly", "refract light exactly");
 	depth(&r, w, src, shape);
 }
