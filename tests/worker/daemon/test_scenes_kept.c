@@ -166,11 +166,9 @@ static void run_out_of_memory(uint64_t job)
 static const char small_scene[] =
 	"<scene version='3.0.0'>" SENSOR("0,0,5", "0,0,0") "<shape type='sphere'/><emitter type='constant'/></scene>\n";
 
-/* The lease of a job that has ended is still on its thread: another job is not refused, which would be asked for again
- * after 10 s only. Its files are fetched, and its scene waits. Returns the lease, whose thread then stops. */
-static struct lease_task *begin_beside_a_thread(struct job_cache **next)
+/* Both scenes are files of the coordinator's, and the worker has computed a lease of the first. */
+static void compute_first_of_two(void)
 {
-	begin_short();
 	coord_make_file(&coord.scenes[0], small_scene, sizeof small_scene - 1);
 	coord_make_file(&coord.scenes[1], small_scene, sizeof small_scene - 2);
 	coord_grant(1);
@@ -179,6 +177,14 @@ static struct lease_task *begin_beside_a_thread(struct job_cache **next)
 	coord_send_piece(&coord.scenes[0], 0);
 	coord_serve_mesh(0, PIECES);
 	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+}
+
+/* The lease of a job that has ended is still on its thread: another job is not refused, which would be asked for again
+ * after 10 s only. Its files are fetched, and its scene waits. Returns the lease, whose thread then stops. */
+static struct lease_task *begin_beside_a_thread(struct job_cache **next)
+{
+	begin_short();
+	compute_first_of_two();
 	struct lease_task *l = coord.agent->leases;
 	l->state = LEASE_QUEUED; /* as if its thread still computed it */
 	coord_end_job(1);
@@ -226,14 +232,7 @@ static void memory_that_others_had_is_its_own_fault(void **state)
 	(void)state;
 	assert_int_equal(work_share(1, &e), 0);
 	coord_start(0);
-	coord_make_file(&coord.scenes[0], small_scene, sizeof small_scene - 1);
-	coord_make_file(&coord.scenes[1], small_scene, sizeof small_scene - 2);
-	coord_grant(1);
-	coord_describe(1);
-	coord_hear_blob_get(&coord.scenes[0], 0);
-	coord_send_piece(&coord.scenes[0], 0);
-	coord_serve_mesh(0, PIECES);
-	assert_int_equal(coord_hear()->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	compute_first_of_two();
 	coord_grant(2);
 	run_out_of_memory(2);
 	assert_true(coord.own);
