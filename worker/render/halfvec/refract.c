@@ -12,7 +12,6 @@
 #include "worker/render/halfvec/walk.h"
 #include "worker/render/path/visible.h"
 
-#define SPECULAR_TOLERANCE 1e-9
 /* Beyond e^300 to either side T would over- or underflow once multiplied by densities. */
 #define LOG_TRANSFER_MOST 300
 
@@ -57,7 +56,7 @@ bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const 
 	x.v[b] = *z;
 	for (unsigned j = 1; j <= m; j++) {
 		x.v[j] = out->v[m - j];
-		target[j] = (struct walk_target){{0, 0}, SPECULAR_TOLERANCE};
+		target[j] = (struct walk_target){{0, 0}, WALK_SPECULAR_TOLERANCE};
 	}
 	if (halfvec_walk(c, &x, b, 0, target, false, &limits, WALK_STALE, &s) != WALK_OK ||
 	    constraint_double.factor(s.k, b, 0, &s.system) != CONSTRAINT_OK)

@@ -24,6 +24,9 @@ enum walk_end {
 	WALK_ITERATIONS, /* too many iterations, although the residuals still shrank */
 };
 
+/* Of a half vector whose target is 0, at the end of a walk. */
+#define WALK_SPECULAR_TOLERANCE 1e-9
+
 struct walk_limits {
 	unsigned iterations;
 	double least_step; /* of a Newton step */

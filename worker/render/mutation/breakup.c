@@ -23,8 +23,6 @@
 
 #include <string.h>
 
-/* Tolerance at the end of a walk for a half vector whose target is 0. */
-#define SPECULAR_TOLERANCE 1e-9
 /* The reverse walk has a tighter tolerance by this factor: with the same one, 2 to 11 % of the reverse walks fail
  * only because of it. */
 #define BACK_SCALE 0.1
@@ -113,7 +111,7 @@ static enum proposal_end reason_of(enum walk_end end)
 static double tolerance_of(const struct mutation_ctx *m, const struct path_vertex *v, const struct halfvec_step *s)
 {
 	if (v->delta)
-		return SPECULAR_TOLERANCE;
+		return WALK_SPECULAR_TOLERANCE;
 	return m->limits.tolerance * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
 }
 

@@ -159,18 +159,10 @@ struct refracted_joint {
 static struct refracted_joint refracted_joint_of(struct path_context *c, const struct joined_path *p)
 {
 	struct refracted_joint r = {0, 0};
-	double pdf[PATH_REFRACTED_MOST], log_transfer;
-	unsigned count;
-	if (!path_refracts(c))
-		return r;
-	if (is_refracted(p)) {
+	if (path_refracts(c) && is_refracted(p))
 		r.end = p->passed + 1;
-	} else if (path_is_made_by_refraction(c, p->v, p->edges, &count, &log_transfer)) {
-		r.end = count + 1;
-		for (unsigned i = 0; i < count; i++)
-			pdf[i] = p->v[1 + i]->pdf;
-		r.ratio = path_refracted_ratio(p->v, count, log_transfer, pdf);
-	}
+	else if (path_refracts(c))
+		r.ratio = path_refracted_over_drawn(c, p->v, p->edges, &r.end);
 	return r;
 }
 

@@ -112,11 +112,7 @@ unsigned full_path_mode(const struct full_path *x, unsigned j)
 
 double full_path_eta(const struct full_path *x, unsigned j)
 {
-	const struct path_vertex *v = &x->v[j];
-	if (!(v->mode & BSDF_TRANSMIT) || (v->mode & BSDF_STRAIGHT))
-		return 1;
-	double eta = bsdf_eta(v->bsdf, &x->wl);
-	return vec3_dot(v->x.sh.n, x->edge[j].w) > 0 ? 1 / eta : eta;
+	return path_eta(&x->v[j], &x->wl, x->edge[j].w);
 }
 
 spectrum full_path_specular(const struct full_path *x, unsigned j, vec3 *wi, double *chance)

@@ -54,6 +54,16 @@ void path_absorb(const struct path_context *c, const struct path_vertex *at, vec
 	to->beta = spectrum_mul(to->beta, path_transmittance(c->w, &c->wl, to->edge.medium, at, to));
 }
 
+spectrum path_absorb_share(const struct path_context *c, const struct path_vertex *at, vec3 wi, spectrum share,
+			   struct path_vertex *to)
+{
+	if (!EFFECT_IS_ON(c->w, absorption))
+		return share;
+	to->beta = share;
+	path_absorb(c, at, wi, to);
+	return to->beta;
+}
+
 /* A ray on its way. */
 struct walk {
 	struct path_edge *edge;		/* medium: where the ray is; free: unused until the end */

@@ -43,6 +43,9 @@ spectrum path_transmittance(const struct world *w, const struct wavelengths *wl,
 /* Gives `to`, which the camera's sub-path reached from `at` along wi, its medium, and to its beta what that lets
  * through. */
 void path_absorb(const struct path_context *c, const struct path_vertex *at, vec3 wi, struct path_vertex *to);
+/* The same for a vertex of a joint, whose beta is the share of light that the joint lets through; returns that. */
+spectrum path_absorb_share(const struct path_context *c, const struct path_vertex *at, vec3 wi, spectrum share,
+			   struct path_vertex *to);
 
 /* ---- where media scatter ---- */
 

@@ -94,20 +94,13 @@ static double refracted_over_drawn(struct path_context *c, unsigned s, unsigned 
 {
 	const struct path_vertex *v[PATH_MAX_EDGES + 2], *y = c->light;
 	struct path_vertex above = y[s];
-	double pdf[PATH_REFRACTED_MOST], log_transfer;
-	unsigned count;
 	if (!path_refracts(c) || !path_is_refracted(&y[1]))
 		return 0;
 	for (unsigned i = 0; i <= s; i++)
 		v[i] = &y[i];
 	v[s + 1] = &above;
 	above.x.p = vec3_madd(y[s].x.p, vec3_dot(y[s].x.ng, y[s].to_prev) > 0 ? 1 : -1, y[s].x.ng);
-	if (!path_is_made_by_refraction(c, v, s + 1, &count, &log_transfer))
-		return 0;
-	for (unsigned i = 0; i < count; i++)
-		pdf[i] = y[1 + i].pdf;
-	*end = count + 1;
-	return path_refracted_ratio(v, count, log_transfer, pdf);
+	return path_refracted_over_drawn(c, v, s + 1, end);
 }
 
 /* Fills in the sums of struct photon. The techniques by which densities are divided need not exist. */

@@ -38,19 +38,13 @@ void path_context_for_samples(struct path_context *c, const struct world *w, con
 				   .counters = counters};
 }
 
-/* Both normals see w from the same side. */
-static bool same_side(const struct surface_point *x, vec3 w)
-{
-	return vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0;
-}
-
 const struct surface_point *path_facing_bent(const struct path_vertex *v, vec3 to_camera, struct surface_point *turned)
 {
-	if (v->bsdf->has_delta || same_side(&v->x, to_camera))
+	if (v->bsdf->has_delta || path_same_side(&v->x, to_camera))
 		return &v->x;
 	*turned = v->x;
 	surface_turn_relief(turned);
-	return same_side(turned, to_camera) ? turned : &v->x;
+	return path_same_side(turned, to_camera) ? turned : &v->x;
 }
 
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light)
@@ -59,7 +53,7 @@ spectrum path_scatter(const struct path_context *c, const struct path_vertex *v,
 	if (v->kind == VERTEX_MEDIUM)
 		return path_scatter_in_medium(c->w, &c->wl, v, to_camera, to_light);
 	const struct surface_point *x = path_facing(v, to_camera, &turned);
-	if (!v->bsdf->has_smooth || !same_side(x, to_camera) || !same_side(x, to_light))
+	if (!v->bsdf->has_smooth || !path_same_side(x, to_camera) || !path_same_side(x, to_light))
 		return spectrum_of(0);
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, TRANSPORT_RADIANCE);
 	vec3 wo = frame_to_local(&x->sh, to_camera), wi = frame_to_local(&x->sh, to_light);
@@ -79,7 +73,7 @@ static double surface_pdf(const struct path_context *c, const struct path_vertex
 {
 	struct surface_point turned;
 	const struct surface_point *x = sampled_at(v, wo, transport, &turned);
-	if (!v->bsdf->has_smooth || !same_side(x, wo) || !same_side(x, wi))
+	if (!v->bsdf->has_smooth || !path_same_side(x, wo) || !path_same_side(x, wi))
 		return 0;
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
 	return v->bsdf->ops->pdf_solid(v->bsdf, &p, frame_to_local(&x->sh, wo), frame_to_local(&x->sh, wi));
@@ -167,6 +161,15 @@ double path_delta_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return spectrum_is_zero(bsdf_eval_delta(b, p, wo, mode, &wi, &chance)) ? 0 : chance;
 }
 
+spectrum path_delta_share(const struct path_context *c, const struct path_vertex *v)
+{
+	double chance;
+	vec3 wi;
+	struct bsdf_point p = world_bsdf_point(&v->x, &c->wl, TRANSPORT_RADIANCE);
+	spectrum share = bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, v->to_prev), v->mode, &wi, &chance);
+	return spectrum_is_zero(share) || !(chance > 0) ? spectrum_of(0) : share;
+}
+
 static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
 		   enum transport transport, struct departure *out)
 {
@@ -177,12 +180,12 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 	struct bsdf_point p = world_bsdf_point(x, &c->wl, transport);
 	struct bsdf_sample s;
 	vec3 wo = frame_to_local(&x->sh, v->to_prev);
-	bool seen = same_side(x, v->to_prev);
+	bool seen = path_same_side(x, v->to_prev);
 	if (!(seen || (v->bsdf->modes & BSDF_STRAIGHT)) || !v->bsdf->ops->sample(v->bsdf, &p, wo, u, &s) ||
 	    !(s.pdf > 0))
 		return false;
 	out->wi = frame_to_world(&x->sh, s.wi);
-	if (!(s.mode & BSDF_STRAIGHT) && !(seen && same_side(x, out->wi)))
+	if (!(s.mode & BSDF_STRAIGHT) && !(seen && path_same_side(x, out->wi)))
 		return false;
 	out->mode = s.mode;
 	out->delta = (s.mode & BSDF_DELTA) != 0;

@@ -71,11 +71,30 @@ static inline const struct surface_point *path_facing(const struct path_vertex *
 	return s && s->relief && s->relief->turns ? path_facing_bent(v, to_camera, turned) : &v->x;
 }
 
+/* Both normals see w from the same side. */
+static inline bool path_same_side(const struct surface_point *x, vec3 w)
+{
+	return vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0;
+}
+
+/* The index on the camera's side of v over that on the light's; 1 where its mode does not refract. */
+static inline double path_eta(const struct path_vertex *v, const struct wavelengths *wl, vec3 to_camera)
+{
+	if (!(v->mode & BSDF_TRANSMIT) || (v->mode & BSDF_STRAIGHT))
+		return 1;
+	double eta = bsdf_eta(v->bsdf, wl);
+	return vec3_dot(v->x.sh.n, to_camera) > 0 ? 1 / eta : eta;
+}
+
 /* F of the head comment at a surface vertex for unit directions towards camera and light. */
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
 
 /* The probability with which a path that comes from wo chooses the specular lobe `mode`; p->transport: whose path. */
 double path_delta_chance(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode);
+
+/* The weight of the specular lobe by which v's path, which comes from v->to_prev on the camera's side, leaves it; zero
+ * also if no sub-path chooses that lobe: densities are divided by the probability of doing so. */
+spectrum path_delta_share(const struct path_context *c, const struct path_vertex *v);
 
 /* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that
  * measure is the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid

@@ -34,13 +34,6 @@ bool path_tries_to_refract(const struct path_context *c, const struct path_verte
 	       toward >= denser * path_pdf(c, before, z, y, TRANSPORT_RADIANCE);
 }
 
-/* The index on the camera's side of v over that on the light's. */
-static double eta_of(const struct path_context *c, const struct path_vertex *v, vec3 to_camera)
-{
-	double eta = bsdf_eta(v->bsdf, &c->wl);
-	return vec3_dot(v->x.sh.n, to_camera) > 0 ? 1 / eta : eta;
-}
-
 double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
 			  const struct path_vertex *next, enum transport transport)
 {
@@ -52,7 +45,7 @@ double path_pdf_refracted(const struct path_context *c, const struct path_vertex
 	double chance = path_delta_chance(at->bsdf, &p, frame_to_local(&at->x.sh, back), at->mode);
 	bool from_camera = transport == TRANSPORT_RADIANCE;
 	vec3 camera = from_camera ? back : omega, light = from_camera ? omega : back;
-	path_delta_per_solid(&at->x, light, camera, eta_of(c, at, camera), &to_light, &to_camera);
+	path_delta_per_solid(&at->x, light, camera, path_eta(at, &c->wl, camera), &to_light, &to_camera);
 	double lobe = chance * (from_camera ? to_light : to_camera);
 	return next->kind == VERTEX_INFINITE ? lobe : lobe * path_jac_solid_from_vertex(next, omega, distance2);
 }
@@ -126,23 +119,31 @@ bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex
 	return true;
 }
 
+double path_refracted_over_drawn(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *end)
+{
+	double pdf[PATH_REFRACTED_MOST], log_transfer;
+	unsigned count;
+	if (!path_is_made_by_refraction(c, v, k, &count, &log_transfer))
+		return 0;
+	for (unsigned i = 0; i < count; i++)
+		pdf[i] = v[1 + i]->pdf;
+	*end = count + 1;
+	return path_refracted_ratio(v, count, log_transfer, pdf);
+}
+
 /* The weight of the lobe at v, which goes on to `next`; zero: none, or the shading normal disagrees. */
 static spectrum lobe(const struct path_context *c, const struct path_vertex *v, const struct path_vertex *next)
 {
-	double chance, unused;
-	vec3 wi, d = path_direction(v, next, &unused);
-	if (!(vec3_dot(v->x.ng, v->to_prev) * vec3_dot(v->x.sh.n, v->to_prev) > 0) ||
-	    !(vec3_dot(v->x.ng, d) * vec3_dot(v->x.sh.n, d) > 0))
-		return spectrum_of(0);
-	struct bsdf_point p = world_bsdf_point(&v->x, &c->wl, TRANSPORT_RADIANCE);
-	spectrum share = bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, v->to_prev), v->mode, &wi, &chance);
-	return spectrum_is_zero(share) || !(chance > 0) ? spectrum_of(0) : share;
+	double unused;
+	bool agree = path_same_side(&v->x, v->to_prev) && path_same_side(&v->x, path_direction(v, next, &unused));
+	return agree ? path_delta_share(c, v) : spectrum_of(0);
 }
 
 bool path_refract_to(struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
 		     const struct path_vertex *y, spectrum *left)
 {
 	struct path_refraction r;
+	double unused;
 	if (!c->refract(c, z, y, &r))
 		return false;
 	*left = spectrum_of(1);
@@ -155,12 +156,7 @@ bool path_refract_to(struct path_context *c, const struct path_vertex *before, c
 			return false;
 		v->pdf = i == 0 ? path_pdf(c, before, z, v, TRANSPORT_RADIANCE)
 				: path_pdf_refracted(c, i > 1 ? v - 2 : z, prev, v, TRANSPORT_RADIANCE);
-		if (EFFECT_IS_ON(c->w, absorption)) {
-			double unused;
-			v->beta = *left;
-			path_absorb(c, prev, path_direction(prev, v, &unused), v);
-			*left = v->beta;
-		}
+		*left = path_absorb_share(c, prev, path_direction(prev, v, &unused), *left, v);
 	}
 	c->passed_count = r.count;
 	c->log_transfer = r.log_transfer;

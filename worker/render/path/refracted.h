@@ -57,6 +57,9 @@ bool path_refract_to(struct path_context *c, const struct path_vertex *before, c
 bool path_is_made_by_refraction(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *count,
 				double *log_transfer);
 
+/* Then the density of its joint over that of drawing x_1 .. x_end-1 as their sub-path did; 0: it does not make it. */
+double path_refracted_over_drawn(struct path_context *c, const struct path_vertex *const *v, unsigned k, unsigned *end);
+
 /* path_pdf from a refracting vertex: the density of `next` for a sub-path that comes from prev. */
 double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
 			  const struct path_vertex *next, enum transport transport);

@@ -12,19 +12,14 @@
 #include "worker/render/path/visible.h"
 
 /* The share of light that goes straight through v, which a ray along d met. If there is any, v is made a vertex that
- * the path leaves straight on. Zero also if no sub-path goes straight on there: densities are divided by
- * that of doing so. */
+ * the path leaves straight on. */
 static spectrum pass(const struct path_context *c, struct path_vertex *v, vec3 d)
 {
-	double chance;
-	vec3 wi;
 	if (!bsdf_is_passed(v->bsdf) || !path_meets(d, v))
 		return spectrum_of(0);
 	v->delta = true;
 	v->mode = BSDF_TRANSMIT | BSDF_DELTA | BSDF_STRAIGHT;
-	struct bsdf_point p = world_bsdf_point(&v->x, &c->wl, TRANSPORT_RADIANCE);
-	spectrum share = bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, v->to_prev), v->mode, &wi, &chance);
-	return spectrum_is_zero(share) || !(chance > 0) ? spectrum_of(0) : share;
+	return path_delta_share(c, v);
 }
 
 /* False where densities of v, as reached from there along d, would be 0 or infinite. */
@@ -55,11 +50,7 @@ bool path_see_through(struct path_context *c, const struct path_vertex *before, 
 			return false;
 		v->pdf = n == 0 ? path_pdf(c, before, z, v, TRANSPORT_RADIANCE)
 				: path_pdf_passed(c, from, v, TRANSPORT_RADIANCE);
-		if (EFFECT_IS_ON(c->w, absorption)) {
-			v->beta = *left;
-			path_absorb(c, from, d, v);
-			*left = v->beta;
-		}
+		*left = path_absorb_share(c, from, d, *left, v);
 		c->passed_count = n + 1;
 		if (path_visible(c, v, y)) {
 			path_direction(v, y, &distance2);
