@@ -61,6 +61,20 @@ code 1 "$BIN/hslt-scene" check "$DIR/gone2.xml"
 grep -q "^gone2.xml: 3 problems" "$DIR/out" && grep -q 'gone2.xml:2: <shape type="obj">: a.obj: no such file' "$DIR/out" ||
 	fail "not all missing files are said: $(cat "$DIR/out")"
 
+# A file to include that is not there, and a name without a value, do not hide what else is wrong.
+cat >"$DIR/hole.xml" <<'XML'
+<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/>
+<include filename="hole.part.xml"/>
+<shape type="sphere"><float name="radius" value="$r"/><ref id="of-the-part"/></shape>
+<shape type="obj"><string name="filename" value="a.obj"/></shape>
+<shape type="spher"/></scene>
+XML
+code 1 "$BIN/hslt-scene" check "$DIR/hole.xml"
+[ "$(sed -n 's/^hole.xml:\([0-9]*\): .*/\1/p' "$DIR/out" | tr '\n' ' ')" = "2 4 5 " ] && grep -q '^hole.xml: 3 problems' "$DIR/out" ||
+	fail "a hole hides or makes problems: $(cat "$DIR/out")"
+code 1 "$BIN/hslt-scene" check -D r=1 "$DIR/hole.xml"
+grep -q '^hole.xml: 3 problems' "$DIR/out" || fail "a hole with a value: $(cat "$DIR/out")"
+
 # Textures that are not there, or nowhere that may be read, are left out by --lenient.
 cat >"$DIR/lost.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><shape type="sphere"><bsdf type="mask">

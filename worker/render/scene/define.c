@@ -69,21 +69,41 @@ int define_default(struct define_table *t, const char *name, const char *value, 
 	return 0;
 }
 
+static bool is_missing(const struct define_table *t, const char *name)
+{
+	for (size_t i = 0; i < t->missing_count; i++)
+		if (strcmp(t->missing[i], name) == 0)
+			return true;
+	return false;
+}
+
+static int add_missing(struct define_table *t, const char *name, struct error *e)
+{
+	const char *kept = arena_strdup(t->arena, name);
+	if (!kept)
+		return error_set(e, ENOMEM, "out of memory");
+	t->missing[t->missing_count++] = kept;
+	return 0;
+}
+
+int define_without_value(struct define_table *t, const char *name, struct error *e)
+{
+	if (t->missing_count == DEFINE_MISSING_MAX || is_missing(t, name))
+		return 0;
+	return add_missing(t, name, e);
+}
+
 static int refuse_unknown(struct define_table *t, const char *name, size_t length, struct error *e)
 {
 	char wanted[65], hint[128];
 	size_t n = length < sizeof wanted - 1 ? length : sizeof wanted - 1;
 	memcpy(wanted, name, n);
 	wanted[n] = 0;
-	for (size_t i = 0; i < t->missing_count; i++)
-		if (strcmp(t->missing[i], wanted) == 0)
-			return -EEXIST;
-	if (t->missing_count == DEFINE_MISSING_MAX)
+	if (t->incomplete || t->missing_count == DEFINE_MISSING_MAX || is_missing(t, wanted))
 		return -EEXIST;
-	const char *kept = arena_strdup(t->arena, wanted);
-	if (!kept)
-		return error_set(e, ENOMEM, "out of memory");
-	t->missing[t->missing_count++] = kept;
+	int r = add_missing(t, wanted, e);
+	if (r)
+		return r;
 	struct spelling s = {.wanted = wanted};
 	for (size_t i = 0; i < t->count; i++)
 		spelling_offer(&s, t->entries[i].name);

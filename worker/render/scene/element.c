@@ -21,6 +21,14 @@ const char *element_spelling(const struct xml_element *el, const char *name)
 	return written ? written : name;
 }
 
+bool element_is_unset(const struct xml_element *el)
+{
+	bool unset = el->unset;
+	for (const struct xml_element *c = el->first; c && !unset; c = c->next)
+		unset = element_is_unset(c);
+	return unset;
+}
+
 bool element_is_of_scene(const struct xml_element *el)
 {
 	static const char *const names[] = {"embree_use_robust_intersection", "embree_use_robust_intersections",

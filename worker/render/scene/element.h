@@ -27,6 +27,7 @@ struct xml_element {
 	bool snake;   /* names are to be converted from camelCase (a file of version < 2) */
 	bool ignored; /* it or one of those around it has no meaning here */
 	bool text;    /* holds text other than blanks */
+	bool unset;   /* a $name in it has no value, or the file to include is not there: reported by xml.c */
 	uint32_t attribute_count;
 	struct xml_attribute *attributes;
 	struct xml_element *parent, *first, *last, *next;
@@ -44,6 +45,9 @@ const char *xml_attribute(const struct xml_element *el, const char *name); /* NU
 /* How the file spells the parameter that the element gives; `name`, the spelling of 3.x, where it has no name of its
  * own. */
 const char *element_spelling(const struct xml_element *el, const char *name);
+
+/* Whether a value in it, such as a step of a transform, is unset. */
+bool element_is_unset(const struct xml_element *el);
 
 /* Whether it is a value that Mitsuba 3 takes directly in <scene>. All are about how it computes, not about light. */
 bool element_is_of_scene(const struct xml_element *el);

@@ -45,6 +45,8 @@ int id_table_find(struct id_table *t, const struct xml_element *el, const char *
 		return xml_error(el, e, EINVAL, "needs an attribute `%s`", attribute);
 	if ((*out = id_table_look(t, id)))
 		return 0;
+	if (t->incomplete || el->unset)
+		return REPORT_TOLD;
 	char hint[128];
 	struct spelling s = {.wanted = id};
 	for (size_t i = 0; i < t->count && t->compared < COMPARED_MAX; i++, t->compared++)
@@ -62,18 +64,20 @@ static struct xml_element *next_element(struct xml_element *el)
 	return el ? el->next : NULL;
 }
 
-static int check_unique(const struct id_table *t, struct error *e)
+static int check_unique(const struct id_table *t, struct report *report, struct error *e)
 {
 	qsort(t->entries, t->count, sizeof *t->entries, compare_ids);
-	for (size_t i = 1; i < t->count; i++) {
+	int r = 0;
+	for (size_t i = 1; i < t->count && !r; i++) {
 		const struct xml_element *a = t->entries[i - 1].element, *b = t->entries[i].element;
 		if (strcmp(t->entries[i - 1].id, t->entries[i].id) == 0) {
 			bool b_later = b->line > a->line;
-			return xml_error(b_later ? b : a, e, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)",
-					 t->entries[i].id, a->file, b_later ? a->line : b->line);
+			r = xml_error(b_later ? b : a, e, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)",
+				      t->entries[i].id, a->file, b_later ? a->line : b->line);
+			r = report_problem(report, r, e);
 		}
 	}
-	return 0;
+	return r;
 }
 
 /* An alias may name an alias before it. */
@@ -81,6 +85,8 @@ static int read_alias(struct id_table *t, const struct xml_element *el, struct e
 {
 	const char *as = xml_attribute(el, "as");
 	struct xml_element *target;
+	if (el->unset)
+		return REPORT_TOLD;
 	if (!as)
 		return xml_error(el, e, EINVAL, "needs an attribute `as`");
 	int r = element_check(el, "id|as", false, e);
@@ -100,7 +106,8 @@ static int read_alias(struct id_table *t, const struct xml_element *el, struct e
 	return 0;
 }
 
-int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena *arena, struct error *e)
+int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena *arena, struct report *report,
+		  struct error *e)
 {
 	enum { ALIASES_MAX = 256 };
 	size_t n = 0, aliases = 0;
@@ -112,13 +119,16 @@ int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena 
 	for (struct xml_element *el = tree->root; el; el = next_element(el))
 		if (id_table_names(el))
 			t->entries[t->count++] = (struct id_entry){xml_attribute(el, "id"), el};
-	int r = check_unique(t, e);
+	t->incomplete = tree->holes;
+	int r = check_unique(t, report, e);
 	for (struct xml_element *el = tree->root; el && !r; el = next_element(el)) {
 		if (el->ignored || strcmp(el->name, "alias") != 0)
 			continue;
 		if (++aliases > ALIASES_MAX)
-			return xml_error(el, e, E2BIG, "more than %d aliases", ALIASES_MAX);
+			return report_problem(report, xml_error(el, e, E2BIG, "more than %d aliases", ALIASES_MAX), e);
 		r = read_alias(t, el, e);
+		t->incomplete |= r != 0;
+		r = report_problem(report, r, e);
 	}
 	return r;
 }

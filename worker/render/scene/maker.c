@@ -149,6 +149,9 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	const struct animation *animation = NULL;
 	if (!written)
 		return xml_error(el, m->error, EINVAL, "needs an attribute `name`");
+	bool unset = element_is_unset(el);
+	if (unset && (strchr(written, '$') || strcmp(el->name, "animation") == 0))
+		return REPORT_TOLD;
 	if (strcmp(el->name, "animation") == 0) {
 		int r = animation_read(&el, m->arena, &animation, m->error);
 		if (r)
@@ -160,8 +163,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 		return maker_out_of_memory(m);
 	const struct param *p;
 	int r = look_up(m, d, owner, el, name, &p);
-	if (r || !p)
-		return r;
+	if (r || !p || unset)
+		return r || !p ? r : REPORT_TOLD;
 	struct value v;
 	r = value_read(el, m->assets_from, m->arena, &v, m->error);
 	if (!r && el->snake)
@@ -262,6 +265,8 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 		return read_object(m, d, owner, el, el);
 	if (strcmp(el->name, "default") == 0)
 		return 0;
+	if (strcmp(el->name, "include") == 0 && el->unset)
+		return REPORT_TOLD;
 	if (strcmp(el->name, "ref") != 0)
 		return d->decl->status == PARAM_IGNORED ? 0 : maker_foreign(m, el);
 	if (d->decl->status == PARAM_IGNORED && !d->decl->nested_classes)
@@ -351,6 +356,8 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	const char *type = xml_attribute(el, "type");
 	if (!type)
 		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");
+	if (el->unset && strchr(type, '$'))
+		return REPORT_TOLD;
 	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);
 	bool stands_in = !decl;
 	struct xml_element *inner = NULL;

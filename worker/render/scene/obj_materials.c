@@ -361,7 +361,7 @@ static int spread_shape(struct spread *s, struct xml_element *el)
 	struct error missing;
 	int r = read_children(s, &o);
 	bool asks = o.named > 0 || (o.plain == 0 && o.load && !o.fixed);
-	if (r || !o.file || !asks)
+	if (r || !o.file || !asks || element_is_unset(el))
 		return r;
 	if (s->assets->open(s->assets->user, o.file, &o.bytes, &missing)) {
 		if (o.named + o.plain < 2)

@@ -34,6 +34,8 @@ static int become_texture(struct xml_element *el, struct arena *arena, struct er
 	el->attribute_count = 1;
 	bool made = element_value(el, "string", "filename", file, arena) &&
 		    element_value(el, "boolean", "raw", "true", arena);
+	if (made)
+		el->first->unset = el->unset;
 	return made ? 0 : xml_error(el, e, ENOMEM, "out of memory");
 }
 

@@ -47,7 +47,7 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 
 static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
 {
-	int r = element_check(el, "filename", true, m->error);
+	int r = el->unset ? REPORT_TOLD : element_check(el, "filename", true, m->error);
 	return r ? r : read_top(m, strcmp(el->first->name, "scene") == 0 ? el->first : el, objects);
 }
 
@@ -69,6 +69,8 @@ static int read_top_element(struct maker *m, struct xml_element *el, const struc
 		return element_check(el, "value", false, m->error);
 	if (value_is_element(el->name) && (el->snake || element_is_of_scene(el))) /* 0.6 has none and ignores all */
 		return note_foreign(&m->notes, el);
+	if (el->unset)
+		return 0;
 	struct value unused;
 	if (id_table_names(el) && value_is_element(el->name)) /* a spectrum; those who refer to it hold it */
 		return value_read(el, m->assets_from, m->arena, &unused, m->error);
@@ -113,7 +115,7 @@ static int make_scene(struct maker *m)
 	texture_names_settle(m->decls, m->tree->root);
 	int r = relief_files_settle(m->tree->root, m->arena, m->error);
 	if (!r)
-		r = report_problem(&m->report, id_table_make(&m->ids, m->tree, m->arena, m->error), m->error);
+		r = id_table_make(&m->ids, m->tree, m->arena, &m->report, m->error);
 	if (!r)
 		r = texture_names_follow(m->tree->root, &m->ids, m->arena, m->error);
 	if (!r)
@@ -125,7 +127,7 @@ static int make_scene(struct maker *m)
 			objects[i]->cls == PLUGIN_INTEGRATOR && integrators_without_media(objects[i]) != NULL;
 	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
 		r = note(&m->notes, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
-	if (!r)
+	if (!r && !m->tree->holes)
 		r = remarks_on_scene(objects, s->object_count, s->dialect_3, &m->report, m->error);
 	return r ? r : list_assets(m);
 }
@@ -154,11 +156,11 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 				 : gltf_read(m->tree, assets, name, &s->arena, m->error);
 	else
 		r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
-	for (uint32_t i = 0; i < m->tree->missing_count && !r; i++)
+	for (uint32_t i = 0; i < m->tree->missing_count && !r; i++) /* and all else that is wrong */
 		r = report_problem(&m->report, error_set(m->error, EINVAL, "%s", m->tree->missing[i]), m->error);
 	if (r)
 		r = report_problem(&m->report, r, m->error);
-	else if (m->tree->missing_count == 0 && (r = make_scene(m)) == REPORT_FULL)
+	else if (!m->tree->blind && (r = make_scene(m)) == REPORT_FULL)
 		r = 0;
 	s->notes = m->report.notes;
 	s->note_count = m->report.note_count;

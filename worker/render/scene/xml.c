@@ -115,10 +115,9 @@ static int out_of_memory(struct reader *r)
 			 r->file, line_now(r), XML_MEMORY_MAX >> 20);
 }
 
-/* All names without a value are reported, not only the first. */
-static int note_missing(struct reader *r, const struct xml_element *el, const char *attribute)
+/* All names without a value and all files that are not there are reported, not only the first. */
+static int note_missing(struct reader *r)
 {
-	error_prefix(r->error, -ENOENT, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line, el->name, attribute);
 	const char *text = arena_strdup(r->arena, r->error->text);
 	if (!text)
 		return out_of_memory(r);
@@ -150,7 +149,11 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 			c = define_substitute(&r->defines, value, r->snake && strchr(value, '['), XML_VALUE_MAX,
 					      &a[i].value, r->error);
 		if (c == -ENOENT || c == -EEXIST) {
-			c = c == -ENOENT ? note_missing(r, el, a[i].name) : 0;
+			if (c == -ENOENT)
+				error_prefix(r->error, c, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line,
+					     el->name, a[i].name);
+			c = c == -ENOENT ? note_missing(r) : 0;
+			el->unset = true;
 			a[i].value = arena_strdup(r->arena, value);
 		} else if (c) {
 			error_prefix(r->error, c, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line, el->name,
@@ -233,7 +236,10 @@ static int read_default(struct reader *r, const struct xml_element *el)
 	const char *name = xml_attribute(el, "name"), *value = xml_attribute(el, "value");
 	if (!name || !value)
 		return xml_error(el, r->error, EINVAL, "needs name and value");
-	int c = define_default(&r->defines, name, value, r->error);
+	if (el->unset && strchr(name, '$'))
+		return 0;
+	int c = el->unset ? define_without_value(&r->defines, name, r->error)
+			  : define_default(&r->defines, name, value, r->error);
 	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
 }
 
@@ -243,6 +249,9 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	const char *value = xml_attribute(el, "value");
 	if (!value)
 		return xml_error(el, r->error, EINVAL, "needs a value, a folder");
+	r->tree->blind |= el->unset;
+	if (el->unset)
+		return 0;
 	if (r->tree->path_count == XML_PATHS_MAX)
 		return xml_error(el, r->error, E2BIG, "more than %d search paths", XML_PATHS_MAX);
 	r->tree->paths[r->tree->path_count++] = value;
@@ -365,8 +374,10 @@ static int read_include(struct reader *r, struct xml_element *el)
 	int c = at_top ? 0 : element_check(el, "filename", false, r->error);
 	if (c)
 		return c;
-	if (r->tree->missing_count && strchr(name, '$')) /* which is the problem, and has been noted */
+	if (el->unset) { /* which has been noted */
+		r->tree->holes = r->defines.incomplete = true;
 		return 0;
+	}
 	if (r->includes >= XML_INCLUDE_MAX)
 		return xml_error(el, r->error, ELOOP, "files include each other more than %d deep", XML_INCLUDE_MAX);
 	if (r->tree->include_count >= XML_FILES_MAX)
@@ -381,7 +392,11 @@ static int read_include(struct reader *r, struct xml_element *el)
 	c = read_file(r, name);
 	if (c && r->file == outer.file)
 		c = error_prefix(r->error, c, "%s:%d: <include>", el->file, el->line);
-	if (!c && !at_top)
+	bool absent = c && c != -ENOMEM && r->file == outer.file && r->tree->missing_count < XML_MISSING_MAX;
+	if (absent)
+		c = note_missing(r);
+	el->unset = absent;
+	if (!c && !at_top && !absent)
 		c = become_included(el, r->error);
 	outer.failed = r->failed;
 	outer.mixed = r->mixed;
@@ -391,6 +406,9 @@ static int read_include(struct reader *r, struct xml_element *el)
 	outer.cut = r->cut;
 	outer.bytes = r->bytes;
 	outer.defines = r->defines;
+	outer.defines.incomplete |= absent;
+	outer.tree->holes |= absent;
+	outer.tree->include_count -= absent;
 	*r = outer;
 	return c;
 }

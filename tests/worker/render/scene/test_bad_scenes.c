@@ -338,7 +338,7 @@ static void test_names_without_values(void **state)
 	static const char xml[] =
 		S "\n<default name='there' value='1'/><shape type='$kind'><float name='radius' value='$r'/>\n"
 		  "<float name='x' value='$there'/><float name='y' value='$there$hte'/></shape><bsdf type='$r'/>\n"
-		  "<include filename='$part.xml'/><bsdf type='mask'><include filename='a/$part.xml'/></bsdf>" END;
+		  "<include filename='$part.xml'/><bsdf type='twosided'><include filename='a/$part.xml'/></bsdf>" END;
 	static const char *const said[] = {
 		"s.xml:2: <shape>: attribute `type`: $kind is not defined",
 		"s.xml:2: <float>: attribute `value`: $r is not defined by a <default> before this line; -D r=VALUE",
