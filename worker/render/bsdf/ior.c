@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/bsdf/ior.h"
 
+#include "common/base/spelling.h"
 #include "worker/render/math/spectrum.h"
 #include "worker/render/scene/number.h"
 
 #include <stdio.h>
+#include <string.h>
 #include <strings.h>
 
 /* Mitsuba's values; of sf11 and sapphire, which it does not know, those of the laws below at 587.6 nm. */
@@ -44,6 +46,20 @@ static const struct {
 /* Gases refract so little that a constant suffices even with dispersion. */
 #define NEARLY_VACUUM 1.001
 
+static int refuse_name(const struct scene_node *n, const char *property, const char *material, struct error *e)
+{
+	char hint[128], known[512] = "";
+	struct spelling s = {.wanted = material};
+	for (size_t i = 0; i < sizeof named / sizeof *named; i++) {
+		spelling_offer(&s, named[i].name);
+		spelling_list(known, sizeof known, named[i].name);
+	}
+	if (!s.best && strcasestr(material, "glas")) /* the usual crown glass */
+		s.best = "bk7";
+	return node_error(n, e, ENOTSUP, "%s: unknown material \"%.64s\"%s; a number is accepted, too (known: %s)",
+			  property, material, spelling_hint(&s, hint, sizeof hint), known);
+}
+
 int ior_read(const struct scene_node *n, const char *name, double fallback, double *out, struct error *e)
 {
 	const struct property *p = node_find(n, name);
@@ -53,8 +69,7 @@ int ior_read(const struct scene_node *n, const char *name, double fallback, doub
 				*out = named[i].n;
 				return 0;
 			}
-		return node_error(n, e, ENOTSUP, "%s: unknown material \"%s\"; a number is accepted, too", name,
-				  p->value.as.string);
+		return refuse_name(n, name, p->value.as.string, e);
 	}
 	*out = node_float(n, name, fallback);
 	return 0;

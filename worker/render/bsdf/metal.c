@@ -26,6 +26,23 @@ static bool is_named(const char *name, const char *metal)
 	return strncmp(name, metal, n) == 0 && (name[n] == 0 || strcmp(name + n, "_palik") == 0);
 }
 
+/* The symbol of a metal that is called by its name; NULL: not one of these. */
+static const char *symbol(const char *name)
+{
+	static const struct {
+		const char *word, *symbol;
+	} words[] = {
+		{"aluminium", "Al"}, {"aluminum", "Al"}, {"beryllium", "Be"}, {"chrome", "Cr"},	 {"chromium", "Cr"},
+		{"copper", "Cu"},    {"gold", "Au"},	 {"iridium", "Ir"},   {"lithium", "Li"}, {"mercury", "Hg"},
+		{"mirror", "none"},  {"nickel", "Ni"},	 {"rhodium", "Rh"},   {"silver", "Ag"},	 {"tungsten", "W"},
+		{"sodium", "Na"},    {"potassium", "K"}, {"vanadium", "V"},
+	};
+	for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+		if (strcasecmp(words[i].word, name) == 0)
+			return words[i].symbol;
+	return NULL;
+}
+
 static int refuse_name(const char *name, const struct scene_node *n, struct error *e)
 {
 	char hint[128], list[512] = "";
@@ -35,6 +52,7 @@ static int refuse_name(const char *name, const struct scene_node *n, struct erro
 		spelling_list(list, sizeof list, metals[i].name);
 	}
 	spelling_list(list, sizeof list, "none");
+	s.best = symbol(name) ? symbol(name) : s.best;
 	return node_error(n, e, ENOTSUP, "unknown conductor \"%.64s\"%s; eta and k are accepted, too (known: %s)", name,
 			  spelling_hint(&s, hint, sizeof hint), list);
 }

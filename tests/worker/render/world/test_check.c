@@ -111,17 +111,35 @@ static void test_second_tables(void **state)
 static void test_unknown_metals(void **state)
 {
 	(void)state;
-	static const char xml[] =
-		"<scene version='3.0.0'>" SPHERE(METAL("TiO3_palik")) ENVIRONMENT "\n" SPHERE(METAL("Agg")) "</scene>";
+	static const char xml[] = "<scene version='3.0.0'>" SPHERE(METAL("TiO3_palik")) ENVIRONMENT
+		"\n" SPHERE(METAL("Agg")) "\n" SPHERE(METAL("Gold")) "</scene>";
 	struct checked c;
 	check(xml, &c);
 	assert_int_equal(c.scene.note_count, 0);
-	assert_int_equal(c.found.problem_count, 2);
+	assert_int_equal(c.found.problem_count, 3);
 	assert_non_null(strstr(c.found.problems[0],
 			       "unknown conductor \"TiO3_palik\"; eta and k are accepted, too (known: "
 			       "a-C, Ag, "));
 	assert_non_null(strstr(c.found.problems[0], ", W, none)"));
 	assert_non_null(strstr(c.found.problems[1], "unknown conductor \"Agg\"; did you mean `Ag`?"));
+	assert_non_null(strstr(c.found.problems[2], "unknown conductor \"Gold\"; did you mean `Au`?"));
+	finish(&c);
+}
+
+static void test_unknown_indices(void **state)
+{
+	(void)state;
+#define GLASS(name) "<bsdf type='dielectric'><string name='int_ior' value='" name "'/></bsdf>"
+	static const char xml[] = "<scene version='3.0.0'>" SPHERE(GLASS("watter")) "\n" SPHERE(
+		GLASS("glass")) "\n" SPHERE(GLASS("Kryptonite")) ENVIRONMENT "</scene>";
+	struct checked c;
+	check(xml, &c);
+	assert_int_equal(c.found.problem_count, 3);
+	assert_non_null(strstr(c.found.problems[0], "int_ior: unknown material \"watter\"; did you mean `water`?"));
+	assert_non_null(strstr(c.found.problems[1], "int_ior: unknown material \"glass\"; did you mean `bk7`?"));
+	assert_non_null(
+		strstr(c.found.problems[2], "\"Kryptonite\"; a number is accepted, too (known: vacuum, helium, "));
+	assert_non_null(strstr(c.found.problems[2], ", sapphire (o))"));
 	finish(&c);
 }
 
@@ -147,9 +165,9 @@ static void test_too_many(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_all_problems),  cmocka_unit_test(test_good_scene),
-		cmocka_unit_test(test_second_tables), cmocka_unit_test(test_unknown_metals),
-		cmocka_unit_test(test_too_many),
+		cmocka_unit_test(test_all_problems),	cmocka_unit_test(test_good_scene),
+		cmocka_unit_test(test_second_tables),	cmocka_unit_test(test_unknown_metals),
+		cmocka_unit_test(test_unknown_indices), cmocka_unit_test(test_too_many),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
