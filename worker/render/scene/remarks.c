@@ -165,9 +165,26 @@ static int on_sensor(struct report *r, const struct scene_node *n, struct error 
 		"does by these names; it was not compared with Mitsuba");
 }
 
+/* Mitsuba 0.6 takes both for what is to be scaled, and the last one read is the texture inside. */
+static int on_texture(struct report *r, const struct scene_node *n, struct error *e)
+{
+	if (strcmp(n->type, "scale") != 0 || !node_find(n, "value") || !node_child(n, PLUGIN_TEXTURE, 0))
+		return 0;
+	return remark(r, n, e, "`value` has no effect: the texture inside is scaled, as in Mitsuba 0.6");
+}
+
 int remarks_on_object(const struct scene_node *n, struct report *r, struct error *e)
 {
-	return n->cls == PLUGIN_BSDF ? on_metal(r, n, e) : n->cls == PLUGIN_SENSOR ? on_sensor(r, n, e) : 0;
+	switch (n->cls) {
+	case PLUGIN_BSDF:
+		return on_metal(r, n, e);
+	case PLUGIN_SENSOR:
+		return on_sensor(r, n, e);
+	case PLUGIN_TEXTURE:
+		return on_texture(r, n, e);
+	default:
+		return 0;
+	}
 }
 
 int remarks_on_scene(const struct scene_node *const *objects, uint32_t count, bool dialect_3, struct report *r,

@@ -143,6 +143,26 @@ static void test_unknown_indices(void **state)
 	finish(&c);
 }
 
+/* The texture inside, which Mitsuba 0.6 takes; a value alone is no mistake. */
+static void test_values_beside_textures(void **state)
+{
+	(void)state;
+#define SCALED(inside)                                                                                         \
+	"<bsdf type='diffuse'><texture type='scale' name='reflectance'><rgb name='value' value='0.5'/>" inside \
+	"</texture></bsdf>"
+	static const char xml[] =
+		"<scene version='0.6.0'>" SPHERE(SCALED("")) "\n" SPHERE(SCALED("<texture type='checkerboard'/>"))
+			ENVIRONMENT "</scene>";
+	struct checked c;
+	check(xml, &c);
+	assert_int_equal(c.found.problem_count, 0);
+	assert_int_equal(c.scene.note_count, 1);
+	assert_string_equal(c.scene.notes[0],
+			    "s.xml:3: <texture type=\"scale\">: `value` has no effect: the texture inside is scaled, "
+			    "as in Mitsuba 0.6");
+	finish(&c);
+}
+
 /* No more than there is room for. */
 static void test_too_many(void **state)
 {
@@ -167,7 +187,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_all_problems),	cmocka_unit_test(test_good_scene),
 		cmocka_unit_test(test_second_tables),	cmocka_unit_test(test_unknown_metals),
-		cmocka_unit_test(test_unknown_indices), cmocka_unit_test(test_too_many),
+		cmocka_unit_test(test_unknown_indices), cmocka_unit_test(test_values_beside_textures),
+		cmocka_unit_test(test_too_many),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
