@@ -332,6 +332,28 @@ static int make_inner(struct maker *m, struct xml_element *el, struct xml_elemen
 	return r;
 }
 
+/* What is wrong inside an object that is refused: in its objects, such as the film of a sensor of an unknown type. What
+ * its parameters may be is not known. */
+static int read_inside(struct maker *m, struct xml_element *el, int refused)
+{
+	if (refused >= 0 || (refused = report_problem(&m->report, refused, m->error)))
+		return refused;
+	int r = 0;
+	m->depth++;
+	for (struct xml_element *c = el->first; c && !r; c = c->next) {
+		enum plugin_class cls;
+		const struct scene_node *unused;
+		struct xml_element *target;
+		if (!c->ignored && plugin_class_find(c->name, &cls))
+			r = maker_node(m, c, &unused);
+		else if (!c->ignored && strcmp(c->name, "ref") == 0)
+			r = id_table_find(&m->ids, c, "id", &target, m->error);
+		r = report_problem(&m->report, r, m->error);
+	}
+	m->depth--;
+	return r ? r : REPORT_TOLD;
+}
+
 /* An object with errors inside still becomes a node, so that all errors are found. One that is not an object of any
  * kind does not, and is reported once. */
 int maker_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
@@ -362,9 +384,9 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	bool stands_in = !decl;
 	struct xml_element *inner = NULL;
 	if (!decl && !m->lenient)
-		return refuse_type(m->decls, el, cls, type, m->error);
+		return read_inside(m, el, refuse_type(m->decls, el, cls, type, m->error));
 	if (!decl && (r = substitute_plugin(&m->notes, m->decls, &m->ids, el, cls, &type, &decl, &inner)))
-		return r;
+		return read_inside(m, el, r);
 	if (inner) {
 		r = make_inner(m, el, inner, out);
 		el->node = r ? NULL : *out;

@@ -100,13 +100,40 @@ static void test_ids(void **state)
 	lists_of(xml, said);
 }
 
+/* Objects are looked at also where the one around them is refused, once each. */
+static void test_inside_unknown_types(void **state)
+{
+	(void)state;
+	static const char xml[] = S
+		"<sensor type='distant'><float name='anything' value='x'/>\n<film type='hdrfilm'><integer name='widht' "
+		"value='9'/>\n<integer name='width' value='0'/><rfilter type='gauss'/></film><sampler type='any'/></sensor>\n"
+		"<shape type='rock'><ref id='nothing'/><ref id='dull'/>\n<bsdf type='mirorr'><bsdf "
+		"type='diffus'/></bsdf></shape>\n<shape type='rock'><bsdf id='dull' type='dul'/></shape>" END;
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {0}};
+	static const char *const strict[] = {"s.xml:1: <sensor type=\"distant\">: this sensor of Mitsuba's",
+					     "s.xml:2: <integer>: <film type=\"hdrfilm\"> has no `widht`",
+					     "s.xml:3: <integer>: width=0 is outside",
+					     "s.xml:3: <rfilter type=\"gauss\">: there is no rfilter",
+					     "s.xml:4: <shape type=\"rock\">: there is no shape of this type",
+					     "s.xml:4: <ref>: there is no object with id \"nothing\"",
+					     "s.xml:5: <bsdf type=\"mirorr\">: there is no bsdf of this type",
+					     "s.xml:5: <bsdf type=\"diffus\">: there is no bsdf of this type",
+					     "s.xml:6: <shape type=\"rock\">: there is no shape of this type",
+					     "s.xml:6: <bsdf type=\"dul\">: there is no bsdf of this type",
+					     NULL};
+	lists(files, false, strict);
+	/* What is left out may hold anything. */
+	static const char *const lenient[] = {"s.xml:1: <sensor type=\"distant\">: this sensor of Mitsuba's",
+					      "s.xml:3: <integer>: width=0 is outside", NULL};
+	lists(files, true, lenient);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_names_without_values),
-		cmocka_unit_test(test_paths_without_values),
-		cmocka_unit_test(test_files_that_are_not_there),
-		cmocka_unit_test(test_ids),
+		cmocka_unit_test(test_names_without_values),	 cmocka_unit_test(test_paths_without_values),
+		cmocka_unit_test(test_files_that_are_not_there), cmocka_unit_test(test_ids),
+		cmocka_unit_test(test_inside_unknown_types),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
