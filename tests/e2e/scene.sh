@@ -75,6 +75,16 @@ code 1 "$BIN/hslt-scene" check "$DIR/hole.xml"
 code 1 "$BIN/hslt-scene" check -D r=1 "$DIR/hole.xml"
 grep -q '^hole.xml: 3 problems' "$DIR/out" || fail "a hole with a value: $(cat "$DIR/out")"
 
+# Names of Windows differ in capitals.
+: >"$DIR/stone.png"
+cat >"$DIR/capitals.xml" <<'XML'
+<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><shape type="sphere"><bsdf type="diffuse">
+<texture type="bitmap" name="reflectance"><string name="filename" value="Stone.PNG"/></texture></bsdf></shape></scene>
+XML
+code 1 "$BIN/hslt-scene" check "$DIR/capitals.xml"
+grep -q '^capitals.xml:2: .*Stone.PNG: no such file in the scene.s folder; did you mean `stone.png`? --lenient leaves the texture out$' \
+	"$DIR/out" || fail "a name with other capitals: $(cat "$DIR/out")"
+
 # Textures that are not there, or nowhere that may be read, are left out by --lenient.
 cat >"$DIR/lost.xml" <<'XML'
 <scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/><shape type="sphere"><bsdf type="mask">

@@ -122,7 +122,7 @@ static uint32_t find_missing(const struct scene *s, const struct asset_source *a
 		if (rc) {
 			bool texture = rc == -ENOENT && strstr(place, ": <texture ");
 			snprintf(text, sizeof text, "%s%s%s%s", place, *place ? ": " : "", e.text,
-				 texture ? LENIENT_TEXTURE_HINT : "");
+				 texture ? lenient_texture_hint(e.text) : "");
 			add_problem(list, text);
 			missing++;
 		} else {

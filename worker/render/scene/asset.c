@@ -9,15 +9,17 @@
  * folders.
  *
  * Failures are one sentence in struct error: a name that leads out (-EINVAL, with the --path that would allow it), one
- * that is not there (-ENOENT, with the --path that would find it), anything but a regular file, a file above 4 GB or
- * one that shrinks while it is read. Kernels without openat2 do not follow symbolic links at all.
+ * that is not there (-ENOENT, with the --path that would find it, or a name like it), anything but a regular file, a
+ * file above 4 GB or one that shrinks while it is read. Kernels without openat2 do not follow symbolic links at all.
  */
 #include "worker/render/scene/asset.h"
 
 #include "common/base/io.h"
 #include "common/base/mem.h"
+#include "common/base/spelling.h"
 #include "worker/render/scene/asset_name.h"
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <linux/openat2.h>
@@ -215,6 +217,82 @@ static const char *find_elsewhere(const char *scene_folder, const char *name, ch
 	return NULL;
 }
 
+/* One of mesh_1.obj is not a mistyped mesh_2.obj. */
+static bool has_same_digits(const char *a, const char *b)
+{
+	for (;; a++, b++) {
+		a += strcspn(a, "0123456789");
+		b += strcspn(b, "0123456789");
+		if (*a != *b)
+			return false;
+		if (!*a)
+			return true;
+	}
+}
+
+/* The entry of that folder whose name is nearest; of large folders some are compared, since thousands of files may be
+ * missing. */
+static bool find_entry(const char *folder, const char *inside, const char *wanted, char best[NAME_MAX + 1])
+{
+	enum { COMPARED_MAX = 1024 };
+	int fd = open_below(folder, *inside ? inside : ".");
+	DIR *all = fd < 0 ? NULL : fdopendir(fd);
+	if (!all) {
+		if (fd >= 0)
+			close(fd);
+		return false;
+	}
+	struct spelling s = {.wanted = wanted};
+	const struct dirent *one;
+	for (int i = 0; i < COMPARED_MAX && (one = readdir(all)); i++) {
+		if (one->d_name[0] == '.' || !has_same_digits(one->d_name, wanted))
+			continue;
+		spelling_offer(&s, one->d_name);
+		if (s.best == one->d_name) { /* which the next one overwrites */
+			snprintf(best, NAME_MAX + 1, "%s", one->d_name);
+			s.best = best;
+		}
+	}
+	closedir(all);
+	return s.best != NULL;
+}
+
+static bool is_file(const char *folder, const char *name)
+{
+	struct stat st;
+	int fd = open_below(folder, name);
+	bool regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
+	if (fd >= 0)
+		close(fd);
+	return regular;
+}
+
+/* The file in that folder whose name is nearest: what is not there of each part of the path is replaced. Names of
+ * Windows often differ in capitals only. */
+static bool find_near(const char *folder, const char *name, char near[NAME_MAX_BYTES])
+{
+	size_t used = 0;
+	near[0] = 0;
+	for (const char *part = name + strspn(name, "/"); *part; part += strspn(part, "/")) {
+		char wanted[NAME_MAX + 1], best[NAME_MAX + 1];
+		size_t n = strcspn(part, "/");
+		if (n > NAME_MAX || used + NAME_MAX + 2 > NAME_MAX_BYTES)
+			return false;
+		memcpy(wanted, part, n);
+		wanted[n] = 0;
+		part += n;
+		snprintf(near + used, NAME_MAX_BYTES - used, "%s%s", used ? "/" : "", wanted);
+		if (!has_file(folder, near)) {
+			near[used] = 0;
+			if (!find_entry(folder, near, wanted, best))
+				return false;
+			snprintf(near + used, NAME_MAX_BYTES - used, "%s%s", used ? "/" : "", best);
+		}
+		used = strlen(near);
+	}
+	return is_file(folder, near);
+}
+
 /* For whoever may say --path. */
 static int search_open(void *user, const char *name, struct asset *out, struct error *e)
 {
@@ -225,6 +303,12 @@ static int search_open(void *user, const char *name, struct asset *out, struct e
 		return rc;
 	char path[PATH_MAX];
 	const char *there = find_elsewhere(f->folder[0], name, path);
+	char near[NAME_MAX_BYTES];
+	for (size_t i = 0; i < f->count && !there && is_below(name); i++)
+		if (find_near(f->folder[i], name, near))
+			return error_set(e, ENOENT,
+					 "%.256s: no such file in the scene's folder%s; did you mean `%.256s`?", name,
+					 f->count > 1 ? " or those of --path" : "", near);
 	return error_set(e, ENOENT, "%.256s: no such file in the scene's folder%s%s%.400s%s", name,
 			 f->count > 1 ? " or those of --path" : "", there ? "; --path " : "", there ? there : "",
 			 there		? " finds it"

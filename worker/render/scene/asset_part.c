@@ -21,7 +21,7 @@ int asset_part_open(struct asset_range *p, const struct scene_node *n, const str
 	}
 	if (rc)
 		return node_error(n, e, -rc, "%s%s", inner.text,
-				  rc == -ENOENT && n->cls == PLUGIN_TEXTURE ? LENIENT_TEXTURE_HINT : "");
+				  rc == -ENOENT && n->cls == PLUGIN_TEXTURE ? lenient_texture_hint(inner.text) : "");
 	size_t skip = (size_t)node_int(n, "skip_bytes", 0);
 	skip = skip < p->size ? skip : p->size;
 	p->bytes += skip;

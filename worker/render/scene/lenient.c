@@ -233,6 +233,12 @@ const struct scene_node *lenient_uncovered(const struct scene_node *n)
 	return inner && is_one_of(n->type, covers) && has_passage(inner) ? inner : NULL;
 }
 
+const char *lenient_texture_hint(const char *sentence)
+{
+	size_t n = strlen(sentence);
+	return n && sentence[n - 1] == '?' ? &LENIENT_TEXTURE_HINT[1] : LENIENT_TEXTURE_HINT;
+}
+
 bool lenient_needs_texture(const char *type)
 {
 	static const char *const types[] = {"bumpmap", "normalmap", "mask", "scale", NULL};

@@ -306,6 +306,40 @@ static void test_outside_is_said(void **state)
 	refuses(deep, "give --path /");
 }
 
+static void says(const char *name, const char *text)
+{
+	const char *const others[] = {root};
+	struct asset_folders f = asset_folders_of(folder, others, 1);
+	struct asset_source own = asset_search(&f);
+	struct asset a;
+	struct error e;
+	char wanted[400];
+	snprintf(wanted, sizeof wanted, "%s: no such file in the scene's folder or those of --path%s", name, text);
+	assert_int_equal(own.open(own.user, name, &a, &e), -ENOENT);
+	assert_string_equal(e.text, wanted);
+}
+
+/* A file of nearly that name, in folders of nearly that name. */
+static void test_names_that_are_near(void **state)
+{
+	(void)state;
+	write_file("scene/mesh_1.obj", "");
+	write_file("scene/sub/Wood Floor.png", "");
+	write_file("scene/empty2", "");
+	says("A.OBJ", "; did you mean `a.obj`?");
+	says("Sub/wood floor.PNG", "; did you mean `sub/Wood Floor.png`?");
+	says("sub/wood_floor.png", "; did you mean `sub/Wood Floor.png`?");
+	says("Mesh_1.obj", "; did you mean `mesh_1.obj`?");
+	says("common/./B.png", "");
+	says("mesh_2.obj", ""); /* another one of a series */
+	says("mesh_11.obj", "");
+	says("fifoo", ""); /* no file */
+	says("subs", "");
+	says("outt", ""); /* leads out of the folder */
+	says("absolut", "");
+	says("scene/EMPTY", "; did you mean `scene/empty`?"); /* of the second folder */
+}
+
 /* By its whole name, a file is found below the scene's folder and the others, whether these are called as they are or
  * by a link, and nowhere else. */
 static void test_absolute_names(void **state)
@@ -391,7 +425,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_files_below),	cmocka_unit_test(test_files_elsewhere),
 		cmocka_unit_test(test_canonical_names), cmocka_unit_test(test_search),
-		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_absolute_names),
-		cmocka_unit_test(test_keeper),		cmocka_unit_test(test_keeper_ends)};
+		cmocka_unit_test(test_outside_is_said), cmocka_unit_test(test_names_that_are_near),
+		cmocka_unit_test(test_absolute_names),	cmocka_unit_test(test_keeper),
+		cmocka_unit_test(test_keeper_ends)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
