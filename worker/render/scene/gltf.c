@@ -19,6 +19,7 @@
 #include "worker/render/scene/gltf_numbers.h"
 #include "worker/render/scene/gltf_tree.h"
 #include "common/base/bytes.h"
+#include "common/base/spelling.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -148,6 +149,26 @@ static void note_writer(struct gltf *g, const char *generator)
 		g->lamp_scale = 1.0 / 683;
 }
 
+/* All of them, so that one run says what to export otherwise. */
+static void check_required(struct gltf *g)
+{
+	const json_t *required = json_object_get(g->root, "extensionsRequired");
+	char unknown[384] = "";
+	size_t count = 0;
+	for (size_t i = 0; i < json_array_size(required); i++) {
+		char name[65];
+		const char *text = json_string_value(json_array_get(required, i));
+		snprintf(name, sizeof name, "%s", text ? text : "(no text)");
+		if (text && gltf_knows(text))
+			continue;
+		spelling_list(unknown, sizeof unknown, name);
+		count++;
+	}
+	if (count)
+		gltf_fail(g, NULL, ENOTSUP, "it requires the extension%s %s, which %s not supported",
+			  count == 1 ? "" : "s", unknown, count == 1 ? "is" : "are");
+}
+
 static void check_file(struct gltf *g)
 {
 	const json_t *asset = gltf_object(g, NULL, g->root, "asset");
@@ -160,13 +181,7 @@ static void check_file(struct gltf *g)
 	if (strncmp(version, "2.", 2) != 0)
 		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);
 	note_writer(g, json_string_value(json_object_get(asset, "generator")));
-	const json_t *required = json_object_get(g->root, "extensionsRequired");
-	for (size_t i = 0; i < json_array_size(required); i++) {
-		const char *name = json_string_value(json_array_get(required, i));
-		if (!name || !gltf_knows(name))
-			gltf_fail(g, NULL, ENOTSUP, "it requires the extension %.64s, which is not supported",
-				  name ? name : "(no text)");
-	}
+	check_required(g);
 	note_unknown(g);
 }
 
