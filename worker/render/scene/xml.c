@@ -491,6 +491,16 @@ static bool ends_early(struct reader *r, enum XML_Error code)
 	return true;
 }
 
+/* Another program's scene, a mesh, an image. */
+static bool is_something_else(const struct asset *a)
+{
+	const unsigned char *text = a->bytes;
+	size_t at = 0;
+	while (at < a->size && number_is_blank((char)text[at]))
+		at++;
+	return at < a->size && strchr("<\xef\xfe\xff", text[at]) == NULL;
+}
+
 static int parse_bytes(struct reader *r, const struct asset *a)
 {
 	if (a->size > XML_FILE_MAX)
@@ -522,6 +532,9 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 		c = r->current ? error_set(r->error, EINVAL, "%s:%d: the file ends before </%.64s>", r->file,
 					   line_now(r), r->current->name)
 			       : error_set(r->error, EINVAL, "%s: the file is empty", r->file);
+	} else if (!c && !whole && is_something_else(a)) {
+		c = error_set(r->error, EINVAL, "%s: this is neither Mitsuba's XML nor a glTF file (.gltf, .glb)",
+			      r->file);
 	} else if (!c && !whole) {
 		c = error_set(r->error, code == XML_ERROR_NO_MEMORY ? ENOMEM : EINVAL, "%s:%d: %s%s%.64s%s", r->file,
 			      line_now(r), XML_ErrorString(code), r->current ? " in <" : "",

@@ -49,7 +49,13 @@ static void test_broken_xml(void **state)
 {
 	(void)state;
 	refuses("", "s.xml: the file is empty");
-	refuses("hello", "s.xml:1: syntax error");
+	refuses("hello", "s.xml: this is neither Mitsuba's XML nor a glTF file");
+	refuses(" ply\nformat ascii 1.0\n", "s.xml: this is neither Mitsuba's XML nor a glTF file");
+	refuses("\x89PNG\r\n", "s.xml: this is neither Mitsuba's XML nor a glTF file");
+	refuses("\n <>", "s.xml:2: not well-formed");
+	refuses("\xef\xbb\xbf<>", "s.xml:1: not well-formed");
+	refuses("hello " S, "s.xml: this is neither");
+	refuses(" " S "\n</shape>\nhello<", "s.xml:2: mismatched tag");
 	refuses(S "\n<shape type='cube'>\n", "s.xml:3: the file ends before </shape>");
 	refuses(S "\n<shape type='cube'></bsdf>" END, "s.xml:2: mismatched tag in <shape>");
 	refuses(S "<shape type='cube' type='obj'/>" END, "duplicate attribute");
