@@ -7,7 +7,6 @@
  */
 #include "common/base/log.h"
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/base/version.h"
 #include "coordinator/server/server.h"
@@ -22,7 +21,6 @@ int main(int argc, char **argv)
 	struct error e;
 	mem_keep(128 << 20);
 	server_config_init(&c);
-	output_check_at_exit();
 	program_options(&server_program, argc, argv, &c);
 	log_event(LOG_START, "program=hslt-coordinator version=%s", HSLT_VERSION);
 	if (geteuid() == 0)

@@ -189,6 +189,9 @@ static int store_argument(const struct option_row *r, void *target, char *arg, s
 	case OPTION_IS_TEXT:
 		*(const char **)field = arg;
 		return 0;
+	case OPTION_IS_OUTPUT:
+		*(const char **)field = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
+		return 0;
 	case OPTION_IS_NAME:
 		return take_name(r, field, arg, e);
 	case OPTION_IS_NUMBER:

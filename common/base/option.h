@@ -21,6 +21,7 @@ enum option_kind {
 	OPTION_IS_END,	   /* no row: the table ends */
 	OPTION_IS_FLAG,	   /* takes none */
 	OPTION_IS_TEXT,	   /* borrowed from argv */
+	OPTION_IS_OUTPUT,  /* likewise, but "-" is /dev/stdout */
 	OPTION_IS_NAME,	   /* a text to be displayed: up to `most` bytes without control characters */
 	OPTION_IS_NUMBER,  /* from least to most, stored times unit */
 	OPTION_IS_COUNT,   /* a whole number: 4000, 1.5k */
@@ -71,6 +72,7 @@ struct option_row {
 /* The last part of a row: its kind, and the field that it fills. */
 #define OPTION_FLAG(type, field) .kind = OPTION_IS_FLAG, OPTION_STORE(type, field)
 #define OPTION_TEXT(type, field) .kind = OPTION_IS_TEXT, OPTION_STORE(type, field)
+#define OPTION_OUTPUT(type, field) .kind = OPTION_IS_OUTPUT, OPTION_STORE(type, field)
 #define OPTION_NAME(type, field, bytes) .kind = OPTION_IS_NAME, OPTION_STORE(type, field), .most = (bytes)
 #define OPTION_NUMBER(type, field, from, to) \
 	.kind = OPTION_IS_NUMBER, OPTION_STORE(type, field), .least = (from), .most = (to), .unit = 1

@@ -3,11 +3,26 @@
 
 #include "common/base/option_print.h"
 
+#include <assert.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
+
+/* Makes the program fail if its output on stdout was lost. */
+static void check_output(int code, void *user)
+{
+	(void)user;
+	errno = 0;
+	if (fflush(stdout) == 0 && !ferror(stdout))
+		return;
+	fprintf(stderr, "%s: stdout: %s\n", program_invocation_short_name,
+		errno ? strerror(errno) : "it could not take everything");
+	_exit(code ? code : 1);
+}
 
 /* A program may be started with some of these closed. The files that it opens would then get their numbers, and its
  * messages would be written into them. What was closed still fails: it is opened for the other direction. */
@@ -29,6 +44,9 @@ void program_options(const struct program *p, int argc, char **argv, void *targe
 {
 	enum option_kind asked;
 	struct error e;
+	int rc = on_exit(check_output, NULL);
+	assert(rc == 0);
+	(void)rc;
 	open_standard();
 	survive_file_limit();
 	if (options_parse(p, argc, argv, target, &asked, &e)) {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/net/authority.h"
 
@@ -151,7 +150,6 @@ int main(int argc, char **argv)
 	struct arguments a = {0};
 	struct error e = {""};
 	char home[4000];
-	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
 	if (!a.ca || !*a.ca) {
 		const char *where = getenv("HOME");

@@ -1,21 +1,201 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/ctl/job_verbs.h"
+/*
+ * hslt-job, what it asks and prints: list as a table or as JSON, cancel and the other orders, fetch, log.
+ *
+ * Each verb sends one message and waits for its answer; what the coordinator refuses is printed as it says it, and
+ * ends the program with an error.
+ */
+#include "common/base/progress.h"
+#include "common/exr/output_files.h"
+#include "common/net/client.h"
+#include "coordinator/ctl/job_options.h"
 
-#include "common/base/output.h"
-
+#include <jansson.h>
 #include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { EXIT_DISAGREE = 5 };
+
+/* ---- list ---- */
+
+static void put_error(const Farm__JobStatus *s, char *text, size_t size)
+{
+	snprintf(text, size, "-");
+	if (s->error >= 0)
+		snprintf(text, size, "%.2f %%", 100 * s->error);
+	else if (s->error_about >= 0)
+		snprintf(text, size, "~%.3g %%", 100 * s->error_about);
+}
+
+/* Its place is "3 of 8 machines; j4 comes first": the column has the numbers, what comes after them is a remark. */
+static const char *put_machines(const Farm__JobStatus *s, char *text, size_t size)
+{
+	const char *end = s->ended ? NULL : strstr(s->place, " machine"), *more = end ? strstr(end, "; ") : NULL;
+	snprintf(text, size, "%.*s", end ? (int)(end - s->place) : 1, end ? s->place : "-");
+	return more ? more + 2 : "";
+}
+
+static const char *remark_on(const Farm__JobStatus *s, const char *place)
+{
+	if (*s->why && strcmp(s->why, s->state) != 0)
+		return s->why;
+	if (s->ended)
+		return s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
+	return place;
+}
+
+static void print_row(const Farm__JobStatus *s, bool owners)
+{
+	char eta[32] = "-", machines[48], error[32], id[32];
+	if (!s->ended && s->eta >= 0)
+		progress_time(s->eta, eta, sizeof eta);
+	snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
+	const char *remark = remark_on(s, put_machines(s, machines, sizeof machines));
+	put_error(s, error, sizeof error);
+	printf("%-6s %-10s %4d %5.1f %% %-9s %-8s %8s ", id, s->state, s->priority, 100 * s->progress, eta, machines,
+	       error);
+	if (owners)
+		printf("%-12s ", *s->owner ? s->owner : "-");
+	printf("%s", s->name);
+	if (*remark)
+		printf("  # %s", remark);
+	else if (s->ended && s->target_error > 0 && strcmp(s->reason, s->state) != 0)
+		printf("  # ended by %s", s->reason);
+	printf("\n");
+}
+
+/* Owners are known by their certificates. */
+static void print_table(const Farm__JobListAnswer *a)
+{
+	bool owners = false;
+	for (size_t i = 0; i < a->n_jobs; i++)
+		owners = owners || *a->jobs[i]->owner;
+	printf("%-6s %-10s %4s %7s %-9s %-8s %8s %s%s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "MACHINES", "ERROR",
+	       owners ? "OWNER        " : "", "NAME");
+	for (size_t i = 0; i < a->n_jobs; i++)
+		print_row(a->jobs[i], owners);
+}
+
+static void print_json(const Farm__JobListAnswer *a)
+{
+	json_t *list = json_array();
+	for (size_t i = 0; i < a->n_jobs; i++) {
+		const Farm__JobStatus *s = a->jobs[i];
+		char id[32];
+		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
+		json_array_append_new(list,
+				      json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s s:s s:i s:f s:s}",
+						"schema", 1, "id", id, "name", s->name, "state", s->state, "progress",
+						s->progress, "priority", (int)s->priority, "why", s->why, "reason",
+						s->reason, "output", s->output, "result", (int)s->fetchable, "exitCode",
+						(int)s->exit_code, "note", s->note, "owner", s->owner, "workers",
+						(int)s->workers, "share", s->share, "place", s->place));
+	}
+	json_dumpf(list, stdout, JSON_INDENT(2));
+	putchar('\n');
+	json_decref(list);
+}
+
+static int list(struct client *cl, const struct job_options *o, struct error *e)
+{
+	struct client_message answer;
+	int rc = client_call(cl, ENVELOPE(JOB_LIST, job_list), FARM__ENVELOPE__BODY_JOB_LIST_ANSWER, &answer, e);
+	if (rc)
+		return rc;
+	(o->json ? print_json : print_table)(answer.envelope.message->job_list_answer);
+	client_message_fini(&answer);
+	return 0;
+}
+
+/* ---- the other verbs ---- */
+
+/* What was done, if the coordinator's answer does not say it. */
+static void print_done(const struct job_options *o)
+{
+	static const char *const became[] = {
+		[JOB_CANCEL] = "cancelled", [JOB_HOLD] = "on hold", [JOB_RELEASE] = "no longer on hold"};
+	if (o->verb == JOB_PRIORITY)
+		printf("j%llu has priority %d\n", (unsigned long long)o->job, o->priority);
+	else if (o->verb < sizeof became / sizeof *became && became[o->verb])
+		printf("j%llu is %s\n", (unsigned long long)o->job, became[o->verb]);
+}
+
+static int take_done(struct client *cl, const Farm__Envelope *m, const struct job_options *o, struct error *e)
+{
+	struct client_message answer;
+	int rc = client_call(cl, m, FARM__ENVELOPE__BODY_DONE, &answer, e);
+	if (rc)
+		return rc;
+	const Farm__Done *done = answer.envelope.message->done;
+	if (!done->ok)
+		rc = error_set(e, ENOENT, "j%llu: %s", (unsigned long long)o->job, done->text);
+	else if (*done->text)
+		printf("%s\n", done->text);
+	else
+		print_done(o);
+	client_message_fini(&answer);
+	return rc;
+}
+
+static int cancel(struct client *cl, const struct job_options *o, struct error *e)
+{
+	return take_done(cl, ENVELOPE(CANCEL, cancel, .job = o->job), o, e);
+}
+
+static int control(struct client *cl, const struct job_options *o, struct error *e)
+{
+	static const Farm__Verb verbs[] = {[JOB_HOLD] = FARM__VERB__VERB_HOLD,
+					   [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
+					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY,
+					   [JOB_EXTEND] = FARM__VERB__VERB_EXTEND};
+	return take_done(cl,
+			 ENVELOPE(CONTROL, control, .job = o->job, .verb = verbs[o->verb], .priority = o->priority,
+				  .more_spp = o->more_spp, .more_mutations = o->more_mutations,
+				  .more_seconds = o->more_seconds, .target_error = o->target_error),
+			 o, e);
+}
+
+static int fetch(struct client *cl, const struct job_options *o, struct error *e)
+{
+	Farm__What what = o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT;
+	char name[CLIENT_NAME_BYTES];
+	const struct output_files outputs = {{{"-o", o->output, OUTPUT_EXR}}};
+	int rc = client_local(output_files_check(&outputs, NULL, 0, e));
+	if (!rc)
+		rc = o->output ? client_fetch(cl, o->job, what, o->output, e)
+			       : client_fetch_here(cl, o->job, what, name, e);
+	if (!rc)
+		fprintf(stderr, "j%llu: %s in %s\n", (unsigned long long)o->job,
+			o->preview ? "preview, the image so far," : "image", o->output ? o->output : name);
+	return rc;
+}
+
+static int print_log(struct client *cl, const struct job_options *o, struct error *e)
+{
+	return client_fetch_stream(cl, o->job, FARM__WHAT__WHAT_LOG, STDOUT_FILENO, e);
+}
+
+/* -ENOENT: the coordinator refuses. */
+static int ask(struct client *cl, const struct job_options *o, struct error *e)
+{
+	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {
+		[JOB_LIST] = list,    [JOB_CANCEL] = cancel,   [JOB_FETCH] = fetch,	 [JOB_LOG] = print_log,
+		[JOB_HOLD] = control, [JOB_RELEASE] = control, [JOB_PRIORITY] = control, [JOB_EXTEND] = control,
+	};
+	return verbs[o->verb](cl, o, e);
+}
 
 int main(int argc, char **argv)
 {
 	struct job_options o;
 	struct client *cl;
 	struct error e;
-	output_check_at_exit();
 	job_options_parse(&o, argc, argv);
 	int rc = client_open(&cl, o.coordinator, o.tls, o.insecure, "hslt-job", &e);
 	if (!rc) {
 		client_print_notes(cl, "hslt-job");
-		rc = job_verb(cl, &o, &e);
+		rc = ask(cl, &o, &e);
 		client_close(cl);
 	}
 	if (rc)

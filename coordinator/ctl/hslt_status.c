@@ -12,7 +12,6 @@
 #include "common/base/progress.h"
 #include "common/base/terminal.h"
 #include "common/base/error.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/json/convergence_json.h"
 #include "common/estimate/strategy.h"
@@ -520,7 +519,6 @@ int main(int argc, char **argv)
 {
 	struct arguments a = {0};
 	struct error e;
-	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
 	FILE *f = reach(a.socket, &e);
 	if (!f) {

@@ -17,21 +17,13 @@
 
 enum { PRIORITY_MOST = 100 };
 
-static int take_output(void *target, char *arg, struct error *e)
-{
-	struct job_options *o = target;
-	(void)e;
-	o->output = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
-	return 0;
-}
-
 static const struct option_row rows[] = {
 	{"coordinator", 'c', "HOST:PORT", "The coordinator", OPTION_TEXT(struct job_options, coordinator),
 	 .environment = "HSLT_COORDINATOR", .needed = true},
 	{"output", 'o', "FILE",
 	 "fetch: the output file; only an image is replaced (without it: into the current folder, under the last "
 	 "part of the name given to hslt-submit, never replacing a file); -: stdout",
-	 OPTION_TAKE(take_output)},
+	 OPTION_OUTPUT(struct job_options, output)},
 	{"preview", 0, NULL, "fetch: the image so far, while the job runs", OPTION_FLAG(struct job_options, preview)},
 	{"json", 0, NULL, "list: one JSON array", OPTION_FLAG(struct job_options, json)},
 	{"spp", 0, "+N", "extend: additional samples per pixel", OPTION_COUNT(struct job_options, more_spp, 1, 1e15)},

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/log.h"
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "worker/daemon/agent.h"
 #include "worker/daemon/supervise.h"
@@ -74,7 +73,6 @@ int main(int argc, char **argv)
 	gethostname(host, sizeof host - 1);
 	snprintf(name, sizeof name, "%s-%ld", host, (long)getpid());
 	struct agent_config c = {.name = name, .threads = cores > 0 && cores <= 1024 ? (unsigned)cores : 1};
-	output_check_at_exit();
 	program_options(&program, argc, argv, &c);
 	if (geteuid() == 0)
 		log_event(LOG_ROOT, "text=\"a worker needs no privileges: scenes from others are read as root\"");

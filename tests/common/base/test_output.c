@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A program whose stdout is a full disk does not end as if all were well. */
-#include "common/base/output.h"
+#include "common/base/program.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,6 +14,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+static const struct program program = {.name = "ends", .summary = "Ends.", .exits = "0 done"};
+static char name[] = "ends", *argv[] = {name, NULL};
+
 /* Its exit code. */
 static int ends(const char *path, size_t lines, bool flush, int code)
 {
@@ -23,7 +26,7 @@ static int ends(const char *path, size_t lines, bool flush, int code)
 	if (pid == 0) {
 		if (!freopen(path, "w", stdout) || !freopen("/dev/null", "w", stderr))
 			_exit(99);
-		output_check_at_exit();
+		program_options(&program, 1, argv, NULL);
 		for (size_t i = 0; i < lines; i++)
 			puts("j1");
 		if (flush)

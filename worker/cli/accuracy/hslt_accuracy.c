@@ -5,7 +5,6 @@
  * what it will compare. A signal ends the rendering, and what is known is reported.
  */
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/base/progress.h"
 #include "common/exr/output_files.h"
@@ -240,7 +239,6 @@ int main(int argc, char **argv)
 	struct error e = {""};
 	mem_keep(1 << 20);
 	a.threads = option_threads_default();
-	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
 	interrupt_watch();
 	s.a = &a;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/exr/image_file.h"
 #include "common/exr/output_files.h"
@@ -16,16 +15,8 @@ struct arguments {
 	size_t count;
 };
 
-static int take_output(void *target, char *arg, struct error *e)
-{
-	struct arguments *a = target;
-	(void)e;
-	a->out = strcmp(arg, "-") == 0 ? "/dev/stdout" : arg;
-	return 0;
-}
-
 static const struct option_row rows[] = {
-	{"output", 'o', "FILE", "The image; -: stdout", OPTION_TAKE(take_output)},
+	{"output", 'o', "FILE", "The image; -: stdout", OPTION_OUTPUT(struct arguments, out)},
 	{0},
 };
 
@@ -66,7 +57,6 @@ int main(int argc, char **argv)
 	unsigned char *bytes = NULL;
 	size_t size;
 	bool disagree = false;
-	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
 	struct output_files outputs = {{{"-o", a.out, OUTPUT_EXR}}};
 	int rc = output_files_check(&outputs, a.crops, a.count, &e);

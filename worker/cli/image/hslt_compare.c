@@ -7,7 +7,6 @@
  * than --max-relmse.
  */
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/estimate/stated_error.h"
 #include "common/exr/output_files.h"
@@ -193,7 +192,6 @@ int main(int argc, char **argv)
 	struct picture p[2] = {0};
 	struct error e;
 	int code = 0;
-	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
 	struct output_files outputs = {{{"--heatmap", a.heatmap, OUTPUT_PNG}}};
 	int rc = output_files_check(&outputs, a.path, 2, &e);

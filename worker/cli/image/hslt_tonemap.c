@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/picture_name.h"
 #include "common/base/program.h"
 #include "common/exr/output_files.h"
@@ -88,7 +87,6 @@ int main(int argc, char **argv)
 {
 	struct arguments a = {0};
 	struct error e;
-	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
 	if (tonemap_file(&a, &e) == 0)
 		return 0;

@@ -10,7 +10,6 @@
 #include "common/base/clock.h"
 #include "common/base/crash.h"
 #include "common/base/mem.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "common/base/progress.h"
 #include "common/blob/blob.h"
@@ -473,7 +472,6 @@ int main(int argc, char **argv)
 	struct error e = {""};
 	mem_keep(1 << 20);
 	a.threads = option_threads_default();
-	output_check_at_exit();
 	crash_exit("hslt-render");
 	program_options(&program, argc, argv, &a);
 	interrupt_say("hslt-render: interrupted before rendering began: nothing is kept\n");

@@ -2,7 +2,6 @@
 #include "worker/cli/scene/compatibility.h"
 #include "worker/cli/scene/scene_report.h"
 
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "worker/cli/base/options.h"
 
@@ -77,7 +76,6 @@ int main(int argc, char **argv)
 	static struct arguments a;
 	struct error e;
 	bool bad = false;
-	output_check_at_exit();
 	program_options(&program, argc, argv, &a);
 	if (!a.render.scene) {
 		compatibility_print(stdout);

@@ -8,7 +8,6 @@
  * continue with the job.
  */
 #include "common/base/crash.h"
-#include "common/base/output.h"
 #include "common/base/program.h"
 #include "worker/cli/base/interrupt.h"
 #include "worker/cli/render/choice.h"
@@ -255,7 +254,6 @@ int main(int argc, char **argv)
 	struct error e;
 	int code = 0;
 	a.request.args = &a.render;
-	output_check_at_exit();
 	crash_exit("hslt-submit");
 	program_options(&program, argc, argv, &a);
 	struct output_files outputs = {{{"-o", a.wait ? a.render.output : NULL, OUTPUT_EXR},
