@@ -63,10 +63,8 @@ static int half_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return 0;
 }
 
-static const struct param half_params[] = {{.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_half = {
-	.decl = {PLUGIN_BSDF, "half", half_params, 0, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_BSDF, "half", NULL, 0, PARAM_UNDERSTOOD},
 	.create = half_create,
 	.eval = half_eval,
 	.pdf_solid = half_pdf,
@@ -79,8 +77,6 @@ cat >"$TREE/worker/render/shape/triangle.c" <<'TEXT'
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/mesh.h"
-
-static const struct param params[] = {SHAPE_PARAMS_END};
 
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
@@ -96,7 +92,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-SHAPE_OPS(triangle);
+SHAPE_OPS(triangle, SHAPE_PARAMS);
 TEXT
 echo 'SHAPE(triangle)' | added worker/render/shape/shape_list.h
 

@@ -38,17 +38,17 @@ spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3
 bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 		  struct bsdf_sample *out);
 
-/* The operations of a blend NAME, which defines NAME_params and NAME_create. */
-#define BLEND_OPS(NAME)                                                                          \
-	const struct bsdf_ops bsdf_ops_##NAME = {                                                \
-		.decl = {PLUGIN_BSDF, #NAME, NAME##_params, 1 << PLUGIN_BSDF, PARAM_UNDERSTOOD}, \
-		.data_size = sizeof(struct blend),                                               \
-		.create = NAME##_create,                                                         \
-		.eval = blend_eval,                                                              \
-		.pdf_solid = blend_pdf,                                                          \
-		.eval_halfvec = blend_eval_halfvec,                                              \
-		.eval_delta = blend_eval_delta,                                                  \
-		.sample = blend_sample,                                                          \
+/* The operations of a blend NAME, which defines NAME_create; then its parameters. */
+#define BLEND_OPS(NAME, ...)                                                                           \
+	const struct bsdf_ops bsdf_ops_##NAME = {                                                      \
+		.decl = {PLUGIN_BSDF, #NAME, PARAMS(__VA_ARGS__), 1 << PLUGIN_BSDF, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct blend),                                                     \
+		.create = NAME##_create,                                                               \
+		.eval = blend_eval,                                                                    \
+		.pdf_solid = blend_pdf,                                                                \
+		.eval_halfvec = blend_eval_halfvec,                                                    \
+		.eval_delta = blend_eval_delta,                                                        \
+		.sample = blend_sample,                                                                \
 	}
 
 #endif

@@ -14,7 +14,4 @@ static int blendbsdf_create(struct bsdf *b, const struct scene_node *n, const st
 	return bsdf_number(b, &m->weight, n, "weight", 0.5, build, e);
 }
 
-static const struct param blendbsdf_params[] = {
-	{.name = "weight", .types = VALUE_TEXTURE | VALUE_CLIPPED, .min = 0, .max = 1}, {.name = NULL}};
-
-BLEND_OPS(blendbsdf);
+BLEND_OPS(blendbsdf, {.name = "weight", .types = VALUE_TEXTURE | VALUE_CLIPPED, .min = 0, .max = 1});

@@ -135,27 +135,27 @@ static int normalmap_create(struct bsdf *b, const struct scene_node *n, const st
 		.name = "use_shadowing_function", .types = VALUE_BOOL \
 	}
 
-static const struct param bumpmap_params[] = {
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
-	OF_MITSUBA_3_7,
-	{.name = NULL},
-};
-/* scale: as in glTF. handedness (ours, for glTF): y points towards the top of the image everywhere; Mitsuba's y is
- * n x t, which may point to its bottom. */
-static const struct param normalmap_params[] = {
-	{.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
-	{.name = "handedness", .types = VALUE_BOOL},
-	OF_MITSUBA_3_7,
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_bumpmap = {
-	.decl = {PLUGIN_BSDF, "bumpmap", bumpmap_params, 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_BSDF, "bumpmap",
+		 PARAMS({.name = "scale",
+			 .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3,
+			 .min = -PARAM_UV_MAX,
+			 .max = PARAM_UV_MAX},
+			OF_MITSUBA_3_7),
+		 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.create = bumpmap_create,
 };
+
+/* scale: as in glTF. handedness (ours, for glTF): y points towards the top of the image everywhere; Mitsuba's y is
+ * n x t, which may point to its bottom. */
 const struct bsdf_ops bsdf_ops_normalmap = {
-	.decl = {PLUGIN_BSDF, "normalmap", normalmap_params, 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE,
-		 PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_BSDF, "normalmap",
+		 PARAMS({.name = "normalmap", .types = VALUE_RGB | VALUE_NODE, .max = 1},
+			{.name = "scale",
+			 .types = VALUE_FLOAT | VALUE_INT | VALUE_OF_3,
+			 .min = -PARAM_UV_MAX,
+			 .max = PARAM_UV_MAX},
+			{.name = "handedness", .types = VALUE_BOOL}, OF_MITSUBA_3_7),
+		 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.create = normalmap_create,
 };

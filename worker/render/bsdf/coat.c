@@ -301,18 +301,15 @@ static int roughcoating_create(struct bsdf *b, const struct scene_node *n, const
 	{                                                                                     \
 		.name = "thickness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9   \
 	}
-static const struct param coating_params[] = {COAT_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
-static const struct param roughcoating_params[] = {COAT_PARAMS, ROUGH_BOUNDARY_PARAMS, {.name = NULL}};
-
-#define COAT_OPS(NAME)                                                                            \
-	const struct bsdf_ops bsdf_ops_##NAME = {                                                 \
-		.decl = {PLUGIN_BSDF, #NAME, NAME##_params, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD}, \
-		.data_size = sizeof(struct coat),                                                 \
-		.create = NAME##_create,                                                          \
-		.eval = coat_eval,                                                                \
-		.pdf_solid = coat_pdf,                                                            \
-		.eval_delta = coat_eval_delta,                                                    \
-		.sample = coat_sample,                                                            \
+#define COAT_OPS(NAME, ...)                                                                                          \
+	const struct bsdf_ops bsdf_ops_##NAME = {                                                                    \
+		.decl = {PLUGIN_BSDF, #NAME, PARAMS(COAT_PARAMS, __VA_ARGS__), 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct coat),                                                                    \
+		.create = NAME##_create,                                                                             \
+		.eval = coat_eval,                                                                                   \
+		.pdf_solid = coat_pdf,                                                                               \
+		.eval_delta = coat_eval_delta,                                                                       \
+		.sample = coat_sample,                                                                               \
 	}
-COAT_OPS(coating);
-COAT_OPS(roughcoating);
+COAT_OPS(coating, MICROFACET_PARAMS_IGNORED);
+COAT_OPS(roughcoating, ROUGH_BOUNDARY_PARAMS);

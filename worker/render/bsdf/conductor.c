@@ -31,10 +31,8 @@ static int conductor_create(struct bsdf *b, const struct scene_node *n, const st
 	return metal_read(m, b, n, build, e);
 }
 
-static const struct param conductor_params[] = {METAL_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_conductor = {
-	.decl = {PLUGIN_BSDF, "conductor", conductor_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "conductor", METAL_PARAMS, MICROFACET_PARAMS_IGNORED),
 	.data_size = sizeof(struct metal),
 	.create = conductor_create,
 	.eval = bsdf_no_eval,

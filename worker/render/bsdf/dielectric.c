@@ -65,10 +65,8 @@ static int dielectric_create(struct bsdf *b, const struct scene_node *n, const s
 	return glass_read(g, b, n, build, e);
 }
 
-static const struct param dielectric_params[] = {GLASS_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_dielectric = {
-	.decl = {PLUGIN_BSDF, "dielectric", dielectric_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "dielectric", GLASS_PARAMS, MICROFACET_PARAMS_IGNORED),
 	.data_size = sizeof(struct glass),
 	.create = dielectric_create,
 	.eval = bsdf_no_eval,

@@ -43,11 +43,9 @@ static int difftrans_create(struct bsdf *b, const struct scene_node *n, const st
 	return code;
 }
 
-static const struct param difftrans_params[] = {{.name = "transmittance", .types = VALUE_TEXTURE, .max = 1},
-						{.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_difftrans = {
-	.decl = {PLUGIN_BSDF, "difftrans", difftrans_params, 0, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_BSDF, "difftrans", PARAMS({.name = "transmittance", .types = VALUE_TEXTURE, .max = 1}), 0,
+		 PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct difftrans),
 	.create = difftrans_create,
 	.eval = difftrans_eval,

@@ -34,13 +34,9 @@ static int diffuse_create(struct bsdf *b, const struct scene_node *n, const stru
 	return code;
 }
 
-static const struct param diffuse_params[] = {
-	{.name = "reflectance", .types = VALUE_TEXTURE, .max = 1},
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_diffuse = {
-	.decl = {PLUGIN_BSDF, "diffuse", diffuse_params, 0, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_BSDF, "diffuse", PARAMS({.name = "reflectance", .types = VALUE_TEXTURE, .max = 1}), 0,
+		 PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct texture),
 	.create = diffuse_create,
 	.eval = diffuse_eval,

@@ -319,21 +319,15 @@ static int hair_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return read_absorption(h, b, n, build, e);
 }
 
-static const struct param hair_params[] = {
-	{.name = "longitudinal_roughness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
-	{.name = "azimuthal_roughness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
-	{.name = "scale_tilt", .types = VALUE_FLOAT | VALUE_INT, .min = -90, .max = 90},
-	IOR_NUMBER("int_ior"),
-	IOR_NUMBER("ext_ior"),
-	{.name = "eumelanin", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
-	{.name = "pheomelanin", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
-	{.name = "sigma_a", .types = VALUE_TEXTURE, .min = 0, .max = 1e9},
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_hair = {
-	.decl = {PLUGIN_BSDF, "hair", hair_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(
+		BSDF, "hair", {.name = "longitudinal_roughness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+		{.name = "azimuthal_roughness", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+		{.name = "scale_tilt", .types = VALUE_FLOAT | VALUE_INT, .min = -90, .max = 90}, IOR_NUMBER("int_ior"),
+		IOR_NUMBER("ext_ior"), {.name = "eumelanin", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
+		{.name = "pheomelanin", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
+		{.name = "sigma_a", .types = VALUE_TEXTURE, .min = 0, .max = 1e9},
+		{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9}),
 	.data_size = sizeof(struct hair),
 	.create = hair_create,
 	.eval = hair_eval,

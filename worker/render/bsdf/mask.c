@@ -37,7 +37,4 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return 0;
 }
 
-static const struct param mask_params[] = {
-	{.name = "opacity", .types = VALUE_TEXTURE | VALUE_CLIPPED, .min = 0, .max = 1}, {.name = NULL}};
-
-BLEND_OPS(mask);
+BLEND_OPS(mask, {.name = "opacity", .types = VALUE_TEXTURE | VALUE_CLIPPED, .min = 0, .max = 1});

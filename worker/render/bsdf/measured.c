@@ -243,13 +243,8 @@ static int measured_create(struct bsdf *b, const struct scene_node *n, const str
 	return 0;
 }
 
-static const struct param measured_params[] = {
-	{.name = "filename", .types = VALUE_STRING},
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_measured = {
-	.decl = {PLUGIN_BSDF, "measured", measured_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "measured", {.name = "filename", .types = VALUE_STRING}),
 	.data_size = sizeof(struct measured),
 	.create = measured_create,
 	.eval = measured_eval,

@@ -45,10 +45,4 @@ static int mixturebsdf_create(struct bsdf *b, const struct scene_node *n, const 
 	return code;
 }
 
-static const struct param mixturebsdf_params[] = {
-	{.name = "weights", .types = VALUE_STRING},
-	BSDF_ENERGY_PARAM,
-	{.name = NULL},
-};
-
-BLEND_OPS(mixturebsdf);
+BLEND_OPS(mixturebsdf, {.name = "weights", .types = VALUE_STRING}, BSDF_ENERGY_PARAM);

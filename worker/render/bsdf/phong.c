@@ -82,16 +82,10 @@ static int phong_create(struct bsdf *b, const struct scene_node *n, const struct
 	return code;
 }
 
-static const struct param phong_params[] = {
-	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
-	{.name = "exponent", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
-	BSDF_ENERGY_PARAM,
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_phong = {
-	.decl = {PLUGIN_BSDF, "phong", phong_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "phong", {.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
+		       {.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
+		       {.name = "exponent", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9}, BSDF_ENERGY_PARAM),
 	.data_size = sizeof(struct phong),
 	.create = phong_create,
 	.eval = phong_eval,

@@ -82,10 +82,8 @@ static int plastic_create(struct bsdf *b, const struct scene_node *n, const stru
 	return 0;
 }
 
-static const struct param plastic_params[] = {COATING_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_plastic = {
-	.decl = {PLUGIN_BSDF, "plastic", plastic_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "plastic", COATING_PARAMS, MICROFACET_PARAMS_IGNORED),
 	.data_size = sizeof(struct plastic),
 	.create = plastic_create,
 	.eval = plastic_eval,

@@ -81,17 +81,10 @@ static int pplastic_create(struct bsdf *b, const struct scene_node *n, const str
 	return 0;
 }
 
-static const struct param pplastic_params[] = {
-	IOR_NUMBER("int_ior"),
-	IOR_NUMBER("ext_ior"),
-	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	ROUGH_MAP_PARAMS,
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_pplastic = {
-	.decl = {PLUGIN_BSDF, "pplastic", pplastic_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "pplastic", IOR_NUMBER("int_ior"), IOR_NUMBER("ext_ior"),
+		       {.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+		       {.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1}, ROUGH_MAP_PARAMS),
 	.data_size = sizeof(struct pplastic),
 	.create = pplastic_create,
 	.eval = pplastic_eval,

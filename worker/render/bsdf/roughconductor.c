@@ -89,10 +89,8 @@ static int roughconductor_create(struct bsdf *b, const struct scene_node *n, con
 	return metal_read(&r->metal, b, n, build, e);
 }
 
-static const struct param roughconductor_params[] = {METAL_PARAMS, ROUGH_MAP_PARAMS, {.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_roughconductor = {
-	.decl = {PLUGIN_BSDF, "roughconductor", roughconductor_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "roughconductor", METAL_PARAMS, ROUGH_MAP_PARAMS),
 	.data_size = sizeof(struct roughconductor),
 	.create = roughconductor_create,
 	.eval = roughconductor_eval,

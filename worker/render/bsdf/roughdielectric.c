@@ -182,10 +182,8 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 	return 0;
 }
 
-static const struct param roughdielectric_params[] = {GLASS_PARAMS, ROUGH_MAP_PARAMS, {.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_roughdielectric = {
-	.decl = {PLUGIN_BSDF, "roughdielectric", roughdielectric_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "roughdielectric", GLASS_PARAMS, ROUGH_MAP_PARAMS),
 	.data_size = sizeof(struct roughdielectric),
 	.create = roughdielectric_create,
 	.eval = roughdielectric_eval,

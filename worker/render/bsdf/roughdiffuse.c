@@ -87,15 +87,10 @@ static int roughdiffuse_create(struct bsdf *b, const struct scene_node *n, const
 	return code;
 }
 
-static const struct param roughdiffuse_params[] = {
-	{.name = "reflectance", .types = VALUE_TEXTURE, .max = 1},
-	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 1},
-	{.name = "use_fast_approx", .types = VALUE_BOOL},
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_roughdiffuse = {
-	.decl = {PLUGIN_BSDF, "roughdiffuse", roughdiffuse_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "roughdiffuse", {.name = "reflectance", .types = VALUE_TEXTURE, .max = 1},
+		       {.name = "alpha", .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 1},
+		       {.name = "use_fast_approx", .types = VALUE_BOOL}),
 	.data_size = sizeof(struct roughdiffuse),
 	.create = roughdiffuse_create,
 	.eval = roughdiffuse_eval,

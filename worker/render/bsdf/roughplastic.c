@@ -69,10 +69,8 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 	return 0;
 }
 
-static const struct param roughplastic_params[] = {COATING_PARAMS, ROUGH_BOUNDARY_PARAMS, {.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_roughplastic = {
-	.decl = {PLUGIN_BSDF, "roughplastic", roughplastic_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "roughplastic", COATING_PARAMS, ROUGH_BOUNDARY_PARAMS),
 	.data_size = sizeof(struct roughplastic),
 	.create = roughplastic_create,
 	.eval = roughplastic_eval,

@@ -73,37 +73,22 @@ static int null_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return create(b, n, build, 1, e);
 }
 
-static const struct param null_params[] = {
-	{.name = NULL},
-};
-static const struct param polarizer_params[] = {
-	{.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	{.name = "theta", .status = PARAM_IGNORED},
-	{.name = "polarizing", .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-static const struct param circular_params[] = {
-	{.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	{.name = "left_handed", .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-static const struct param retarder_params[] = {
-	{.name = "theta", .status = PARAM_IGNORED},
-	{.name = "delta", .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
-#define STRAIGHT_OPS(NAME, CREATE)                                                \
-	const struct bsdf_ops bsdf_ops_##NAME = {                                 \
-		.decl = {PLUGIN_BSDF, #NAME, NAME##_params, 0, PARAM_UNDERSTOOD}, \
-		.data_size = sizeof(struct filter),                               \
-		.create = CREATE,                                                 \
-		.eval = bsdf_no_eval,                                             \
-		.pdf_solid = bsdf_no_pdf,                                         \
-		.eval_delta = straight_eval_delta,                                \
-		.sample = straight_sample,                                        \
+#define STRAIGHT_OPS(NAME, CREATE, PARAMETERS)                                 \
+	const struct bsdf_ops bsdf_ops_##NAME = {                              \
+		.decl = {PLUGIN_BSDF, #NAME, PARAMETERS, 0, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct filter),                            \
+		.create = CREATE,                                              \
+		.eval = bsdf_no_eval,                                          \
+		.pdf_solid = bsdf_no_pdf,                                      \
+		.eval_delta = straight_eval_delta,                             \
+		.sample = straight_sample,                                     \
 	}
-STRAIGHT_OPS(null, null_create);
-STRAIGHT_OPS(polarizer, half_create);
-STRAIGHT_OPS(circular, half_create);
-STRAIGHT_OPS(retarder, whole_create);
+STRAIGHT_OPS(null, null_create, NULL);
+STRAIGHT_OPS(polarizer, half_create,
+	     PARAMS({.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+		    {.name = "theta", .status = PARAM_IGNORED}, {.name = "polarizing", .status = PARAM_IGNORED}));
+STRAIGHT_OPS(circular, half_create,
+	     PARAMS({.name = "transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+		    {.name = "left_handed", .status = PARAM_IGNORED}));
+STRAIGHT_OPS(retarder, whole_create,
+	     PARAMS({.name = "theta", .status = PARAM_IGNORED}, {.name = "delta", .status = PARAM_IGNORED}));

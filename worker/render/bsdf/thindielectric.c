@@ -69,17 +69,11 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return 0;
 }
 
-static const struct param thin_params[] = {
-	IOR_NUMBER("int_ior"),
-	IOR_NUMBER("ext_ior"),
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	{.name = "specular_transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	MICROFACET_PARAMS_IGNORED,
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_thindielectric = {
-	.decl = {PLUGIN_BSDF, "thindielectric", thin_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "thindielectric", IOR_NUMBER("int_ior"), IOR_NUMBER("ext_ior"),
+		       {.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+		       {.name = "specular_transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+		       MICROFACET_PARAMS_IGNORED),
 	.data_size = sizeof(struct thin),
 	.create = thin_create,
 	.eval = bsdf_no_eval,

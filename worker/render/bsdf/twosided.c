@@ -143,10 +143,8 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 	return 0;
 }
 
-static const struct param twosided_params[] = {{.name = NULL}};
-
 const struct bsdf_ops bsdf_ops_twosided = {
-	.decl = {PLUGIN_BSDF, "twosided", twosided_params, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_BSDF, "twosided", NULL, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct twosided),
 	.create = twosided_create,
 	.eval = twosided_eval,

@@ -128,19 +128,12 @@ static int ward_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return bsdf_check_energy(n, d + s, e);
 }
 
-static const struct param ward_params[] = {
-	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
-	{.name = "variant", .types = VALUE_STRING, .choices = "balanced|ward|ward-duer"},
-	ROUGH_MAP_NUMBER("alpha"),
-	ROUGH_MAP_NUMBER("alpha_u"),
-	ROUGH_MAP_NUMBER("alpha_v"),
-	BSDF_ENERGY_PARAM,
-	{.name = NULL},
-};
-
 const struct bsdf_ops bsdf_ops_ward = {
-	.decl = {PLUGIN_BSDF, "ward", ward_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(BSDF, "ward", {.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
+		       {.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
+		       {.name = "variant", .types = VALUE_STRING, .choices = "balanced|ward|ward-duer"},
+		       ROUGH_MAP_NUMBER("alpha"), ROUGH_MAP_NUMBER("alpha_u"), ROUGH_MAP_NUMBER("alpha_v"),
+		       BSDF_ENERGY_PARAM),
 	.data_size = sizeof(struct ward),
 	.create = ward_create,
 	.eval = ward_eval,

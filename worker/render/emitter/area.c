@@ -11,14 +11,6 @@
  */
 #include "worker/render/emitter/surface_light.h"
 
-static const struct param params[] = {
-	{"radiance", VALUE_TEXTURE, PARAM_UNDERSTOOD, 0, PARAM_LIGHT_MAX, NULL},
-	{"two_sided", VALUE_BOOL, PARAM_UNDERSTOOD, 0, 0, NULL},
-	{"twosided", VALUE_BOOL, PARAM_UNDERSTOOD, 0, 0, NULL}, /* the same, by Mitsuba 3's name */
-	{"sampling_weight", VALUE_FLOAT, PARAM_IGNORED, 0, 0, NULL},
-	{NULL, 0, PARAM_UNDERSTOOD, 0, 0, NULL},
-};
-
 struct area_light {
 	struct surface_light light; /* first: surface_light.h */
 	double back;		    /* probability that a sub-path leaves against the normal; 0: one side */
@@ -139,7 +131,10 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 }
 
 const struct emitter_ops emitter_ops_area = {
-	.decl = {PLUGIN_EMITTER, "area", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "area", {.name = "radiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
+		       {.name = "two_sided", .types = VALUE_BOOL},
+		       {.name = "twosided", .types = VALUE_BOOL}, /* the same, by Mitsuba 3's name */
+		       {.name = "sampling_weight", .types = VALUE_FLOAT, .status = PARAM_IGNORED}),
 	SURFACE_LIGHT_OPS,
 	.data_size = sizeof(struct area_light),
 	.create = create,

@@ -83,15 +83,10 @@ static void place(struct emitter *em, const mat4 *to_world)
 	b->axis = vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1}));
 }
 
-static const struct param params[] = {
-	{.name = "power", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_PLACE},
-	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct emitter_ops emitter_ops_collimated = {
-	.decl = {PLUGIN_EMITTER, "collimated", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "collimated", {.name = "power", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct beam),
 	.create = create,
 	.radiance = radiance,

@@ -49,14 +49,9 @@ static int constant_create(struct emitter *em, const struct scene_node *n, const
 	return 0;
 }
 
-static const struct param constant_params[] = {
-	{.name = "radiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct emitter_ops emitter_ops_constant = {
-	.decl = {PLUGIN_EMITTER, "constant", constant_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "constant", {.name = "radiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct color),
 	.create = constant_create,
 	.radiance = constant_radiance,

@@ -36,17 +36,12 @@ static void place(struct emitter *em, const mat4 *to_world)
 	l->x.p = vec3_neg(vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1})));
 }
 
-static const struct param params[] = {
-	{.name = "irradiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
-	{.name = "to_world", .types = VALUE_PLACE},
-	{.name = "angle", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_DIFFERS}, /* of the cone */
-	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct emitter_ops emitter_ops_directional = {
-	.decl = {PLUGIN_EMITTER, "directional", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "directional", {.name = "irradiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+		       {.name = "direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
+		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "angle", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_DIFFERS}, /* of the cone */
+		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct delta_light),
 	.create = create,
 	.radiance = radiance,

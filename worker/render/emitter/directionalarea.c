@@ -37,12 +37,6 @@ struct beam {
 	vec3 own[3];	/* of a mesh that moves: what is, when the shutter opens, a right-handed frame around n */
 };
 
-static const struct param params[] = {
-	{.name = "radiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
-	{.name = "sampling_weight", .types = VALUE_FLOAT, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 /* Whether all triangles lie in the plane of their sum, and face the same side. */
 static void find_plane(struct beam *b)
 {
@@ -268,7 +262,8 @@ static double pdf_toward(const struct emitter *em, vec3 ref, const struct emitte
 }
 
 const struct emitter_ops emitter_ops_directionalarea = {
-	.decl = {PLUGIN_EMITTER, "directionalarea", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "directionalarea", {.name = "radiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
+		       {.name = "sampling_weight", .types = VALUE_FLOAT, .status = PARAM_IGNORED}),
 	SURFACE_LIGHT_OPS,
 	.data_size = sizeof(struct beam),
 	.create = create,

@@ -281,17 +281,12 @@ static void place(struct emitter *em, const mat4 *to_world)
 	turned_axes(to_world, &m->at);
 }
 
-static const struct param envmap_params[] = {
-	RASTER_PARAMS,
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_PLACE},
-	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = "mis_compensation", .types = VALUE_BOOL, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct emitter_ops emitter_ops_envmap = {
-	.decl = {PLUGIN_EMITTER, "envmap", envmap_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "envmap", RASTER_PARAMS,
+		       {.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LIGHT_MAX},
+		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+		       {.name = "mis_compensation", .types = VALUE_BOOL, .status = PARAM_IGNORED}),
 	.create = envmap_create,
 	ENVMAP_OPS,
 	.place = place,

@@ -47,16 +47,11 @@ static void place(struct emitter *em, const mat4 *to_world)
 	l->x.p = mat4_point(to_world, (vec3){0, 0, 0});
 }
 
-static const struct param params[] = {
-	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "position", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
-	{.name = "to_world", .types = VALUE_PLACE},
-	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct emitter_ops emitter_ops_point = {
-	.decl = {PLUGIN_EMITTER, "point", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "point", {.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+		       {.name = "position", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
+		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct delta_light),
 	.create = create,
 	.radiance = radiance,

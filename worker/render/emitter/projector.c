@@ -103,19 +103,14 @@ static void place(struct emitter *em, const mat4 *to_world)
 	delta_axes_of(to_world, p->axes);
 }
 
-static const struct param params[] = {
-	{.name = "irradiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-30, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_PLACE},
-	{.name = "fov", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-4, .max = 179.9},
-	{.name = "fov_axis", .types = VALUE_STRING, .choices = "x|y|diagonal|smaller|larger"},
-	{.name = "focal_length", .types = VALUE_STRING},
-	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct emitter_ops emitter_ops_projector = {
-	.decl = {PLUGIN_EMITTER, "projector", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "projector", {.name = "irradiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
+		       {.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-30, .max = PARAM_LIGHT_MAX},
+		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "fov", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-4, .max = 179.9},
+		       {.name = "fov_axis", .types = VALUE_STRING, .choices = "x|y|diagonal|smaller|larger"},
+		       {.name = "focal_length", .types = VALUE_STRING},
+		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct projector),
 	.create = create,
 	.radiance = radiance,

@@ -117,18 +117,13 @@ static void place(struct emitter *em, const mat4 *to_world)
 		delta_axes_of(to_world, s->local);
 }
 
-static const struct param params[] = {
-	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "to_world", .types = VALUE_PLACE},
-	{.name = "cutoff_angle", .types = VALUE_FLOAT | VALUE_INT, .min = 0.01, .max = 180},
-	{.name = "beam_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 180},
-	{.name = "texture", .types = VALUE_TEXTURE, .max = 1},
-	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct emitter_ops emitter_ops_spot = {
-	.decl = {PLUGIN_EMITTER, "spot", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(EMITTER, "spot", {.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+		       {.name = "to_world", .types = VALUE_PLACE},
+		       {.name = "cutoff_angle", .types = VALUE_FLOAT | VALUE_INT, .min = 0.01, .max = 180},
+		       {.name = "beam_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 180},
+		       {.name = "texture", .types = VALUE_TEXTURE, .max = 1},
+		       {.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct spot),
 	.create = create,
 	.radiance = radiance,

@@ -23,34 +23,20 @@
 		"medium_sampling_mode", IGNORED                                                    \
 	}
 
-static const struct param homogeneous_params[] = {
-	{"sigma_a", COEFFICIENT},
-	{"sigma_s", COEFFICIENT},
-	{"sigma_t", VARIES, 1e30, NULL},
-	{"albedo", VARIES, 1, NULL},
-	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
-	{"material", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, NULL},	       /* of 0.6: measured.h */
-	{"g", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -0.999, 0.999, NULL}, /* of 0.6 */
-	SAMPLING_PARAMS,
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
-/* 0.6's name of sigma_t is density. */
-static const struct param heterogeneous_params[] = {
-	{"sigma_t", VARIES, 1e30, NULL},
-	{"albedo", VARIES, 1, NULL},
-	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
-	{"method", IGNORED},
-	{"step_size", IGNORED},
-	{"majorant_resolution_factor", IGNORED},
-	{"majorant_factor", IGNORED},
-	SAMPLING_PARAMS,
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 const struct plugin_decl medium_decls[] = {
-	{PLUGIN_MEDIUM, "homogeneous", homogeneous_params, 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
-	{PLUGIN_MEDIUM, "heterogeneous", heterogeneous_params, 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
+	{PLUGIN_MEDIUM, "homogeneous",
+	 PARAMS({"sigma_a", COEFFICIENT}, {"sigma_s", COEFFICIENT}, {"sigma_t", VARIES, 1e30, NULL},
+		{"albedo", VARIES, 1, NULL}, {"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
+		{"material", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, NULL},	       /* of 0.6: measured.h */
+		{"g", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -0.999, 0.999, NULL}, /* of 0.6 */
+		SAMPLING_PARAMS),
+	 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
+	{PLUGIN_MEDIUM, "heterogeneous",
+	 PARAMS({"sigma_t", VARIES, 1e30, NULL}, /* density in 0.6 */
+		{"albedo", VARIES, 1, NULL}, {"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1e30, NULL},
+		{"method", IGNORED}, {"step_size", IGNORED}, {"majorant_resolution_factor", IGNORED},
+		{"majorant_factor", IGNORED}, SAMPLING_PARAMS),
+	 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
 	{0, NULL, NULL, 0, 0},
 };
 

@@ -6,11 +6,6 @@
  */
 #include "worker/render/medium/phase_parts.h"
 
-static const struct param params[] = {
-	{"weight", VALUE_VOLUME | VALUE_CLIPPED, PARAM_UNDERSTOOD, 0, 1, NULL},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 static int create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	struct phase_parts *m;
@@ -31,7 +26,9 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 }
 
 const struct phase_ops phase_ops_blendphase = {
-	.decl = {PLUGIN_PHASE, "blendphase", params, 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_PHASE, "blendphase",
+		 PARAMS({"weight", VALUE_VOLUME | VALUE_CLIPPED, PARAM_UNDERSTOOD, 0, 1, NULL}), 1u << PLUGIN_PHASE,
+		 PARAM_UNDERSTOOD},
 	.create = create,
 	.eval = phase_parts_eval,
 	.sample = phase_parts_sample,

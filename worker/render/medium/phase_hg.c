@@ -8,12 +8,6 @@
 
 #include <math.h>
 
-/* At 0.999 half of the light goes on within 0.1 degrees. */
-static const struct param params[] = {
-	{"g", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -0.999, 0.999, NULL},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 static int create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	(void)build, (void)e;
@@ -36,7 +30,8 @@ static double sample(const struct phase *p, vec3 at, double u)
 }
 
 const struct phase_ops phase_ops_hg = {
-	.decl = {PLUGIN_PHASE, "hg", params, 0, PARAM_UNDERSTOOD},
+	/* At 0.999 half of the light goes on within 0.1 degrees. */
+	.decl = PLUGIN(PHASE, "hg", {.name = "g", .types = VALUE_FLOAT | VALUE_INT, .min = -0.999, .max = 0.999}),
 	.create = create,
 	.eval = eval,
 	.sample = sample,

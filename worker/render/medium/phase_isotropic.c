@@ -4,8 +4,6 @@
 
 #include <math.h>
 
-static const struct param params[] = {{NULL, 0, 0, 0, 0, NULL}};
-
 static double eval(const struct phase *p, vec3 at, double cosine)
 {
 	(void)p, (void)at, (void)cosine;
@@ -19,7 +17,7 @@ static double sample(const struct phase *p, vec3 at, double u)
 }
 
 const struct phase_ops phase_ops_isotropic = {
-	.decl = {PLUGIN_PHASE, "isotropic", params, 0, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_PHASE, "isotropic", NULL, 0, PARAM_UNDERSTOOD},
 	.eval = eval,
 	.sample = sample,
 };

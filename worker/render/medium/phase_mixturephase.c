@@ -10,11 +10,6 @@
 
 #include <float.h>
 
-static const struct param params[] = {
-	{"weights", UNDERSTOOD(VALUE_STRING)},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 static int create(struct phase *p, const struct scene_node *n, const struct volume_build *build, struct error *e)
 {
 	struct phase_parts *m;
@@ -40,7 +35,8 @@ static int create(struct phase *p, const struct scene_node *n, const struct volu
 }
 
 const struct phase_ops phase_ops_mixturephase = {
-	.decl = {PLUGIN_PHASE, "mixturephase", params, 1u << PLUGIN_PHASE, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_PHASE, "mixturephase", PARAMS({"weights", UNDERSTOOD(VALUE_STRING)}), 1u << PLUGIN_PHASE,
+		 PARAM_UNDERSTOOD},
 	.create = create,
 	.eval = phase_parts_eval,
 	.sample = phase_parts_sample,

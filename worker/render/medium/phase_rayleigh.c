@@ -7,8 +7,6 @@
 
 #include <math.h>
 
-static const struct param params[] = {{NULL, 0, 0, 0, 0, NULL}};
-
 static double eval(const struct phase *p, vec3 at, double cosine)
 {
 	(void)p, (void)at;
@@ -22,7 +20,7 @@ static double sample(const struct phase *p, vec3 at, double u)
 }
 
 const struct phase_ops phase_ops_rayleigh = {
-	.decl = {PLUGIN_PHASE, "rayleigh", params, 0, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_PHASE, "rayleigh", NULL, 0, PARAM_UNDERSTOOD},
 	.eval = eval,
 	.sample = sample,
 };

@@ -16,11 +16,6 @@
 enum { TABLE_MOST = 1 << 16 };
 #define LARGEST 1e30
 
-static const struct param params[] = {
-	{"values", UNDERSTOOD(VALUE_STRING)},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 struct table {
 	uint32_t intervals;
 	double width;	 /* of each, as a cosine */
@@ -101,7 +96,7 @@ static double sample(const struct phase *p, vec3 at, double u)
 }
 
 const struct phase_ops phase_ops_tabphase = {
-	.decl = {PLUGIN_PHASE, "tabphase", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(PHASE, "tabphase", {"values", UNDERSTOOD(VALUE_STRING)}),
 	.create = create,
 	.eval = eval,
 	.sample = sample,

@@ -85,10 +85,18 @@ enum plugin_class {
 struct plugin_decl {
 	enum plugin_class cls;
 	const char *type;	    /* as written in type="..." */
-	const struct param *params; /* ends with a NULL name */
+	const struct param *params; /* ends with a NULL name; NULL: none */
 	unsigned nested_classes;    /* bits 1 << enum plugin_class */
 	enum param_class status; /* IGNORED: has no effect except for its understood parameters (samplers), everything
 				    else in it is skipped; REFUSED is never listed: unknown plug-ins are refused */
 };
+
+/* The parameters of a plug-in, with the row that ends them. */
+#define PARAMS(...) ((const struct param[]){__VA_ARGS__, {.name = NULL}})
+/* A plug-in that is understood and has nothing nested in it but what its parameters name. */
+#define PLUGIN(class, name, ...)                                                   \
+	{                                                                          \
+		.cls = PLUGIN_##class, .type = name, .params = PARAMS(__VA_ARGS__) \
+	}
 
 #endif

@@ -46,27 +46,6 @@ enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 		"srf", REFUSED                                                                          \
 	}
 
-static const struct param perspective_params[] = {
-	CAMERA_PARAMS,
-	{"focus_distance", IGNORED},  /* a pinhole has none, but exporters write it */
-	{"aperture_radius", REFUSED}, /* thinlens has one */
-	{NULL, 0, 0, 0, 0, NULL},
-};
-static const struct param thinlens_params[] = {
-	CAMERA_PARAMS,
-	{"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
-	{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
-static const struct param rdist_params[] = {
-	CAMERA_PARAMS,
-	{"focus_distance", IGNORED},
-	{"aperture_radius", REFUSED},
-	{"kc", UNDERSTOOD(VALUE_STRING)},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 #define FAR_PARAMS                                                                              \
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},  \
 		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, SHUTTER_PARAMS, {"jitter", IGNORED}, \
@@ -74,37 +53,6 @@ static const struct param rdist_params[] = {
 	{                                                                                       \
 		"srf", REFUSED                                                                  \
 	}
-
-static const struct param orthographic_params[] = {
-	FAR_PARAMS,
-	{"focus_distance", IGNORED},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-static const struct param telecentric_params[] = {
-	FAR_PARAMS,
-	{"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
-	{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
-/* Exporters write planes and a focus for all cameras; this one has none. */
-static const struct param spherical_params[] = {
-	{"to_world", UNDERSTOOD(VALUE_PLACE)},
-	{"near_clip", IGNORED},
-	{"far_clip", IGNORED},
-	{"focus_distance", IGNORED},
-	SHUTTER_PARAMS,
-	{"srf", REFUSED},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
-/* Its cameras have shutters of their own. */
-static const struct param batch_params[] = {{"shutter_open", IGNORED},
-					    {"shutter_close", IGNORED},
-					    {"rolling_shutter_type", IGNORED},
-					    {"rolling_shutter_duration", IGNORED},
-					    {"srf", REFUSED},
-					    {NULL, 0, 0, 0, 0, NULL}};
 
 static const struct param film_params[] = {
 	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
@@ -134,59 +82,58 @@ static const struct param film_params[] = {
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
-/* `radius` of `gaussian`, and in 3.x that of `box`, are ours. */
-static const struct param box_params[] = {{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)}, {NULL, 0, 0, 0, 0, NULL}};
-static const struct param tent_params[] = {{"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)},
-					   {NULL, 0, 0, 0, 0, NULL}};
-static const struct param gaussian_params[] = {
-	{"stddev", RANGE(VALUE_FLOAT, 0.01, RADIUS_MAX / 4)},
-	{"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-static const struct param cubic_params[] = {
-	{"b", RANGE(VALUE_FLOAT, -1, 1)}, {"B", RANGE(VALUE_FLOAT, -1, 1)}, {"c", RANGE(VALUE_FLOAT, -1, 1)},
-	{"C", RANGE(VALUE_FLOAT, -1, 1)}, {NULL, 0, 0, 0, 0, NULL},
-};
-static const struct param no_params[] = {{NULL, 0, 0, 0, 0, NULL}};
-static const struct param lanczos_params[] = {{"lobes", RANGE(VALUE_INT, 1, 16)}, {NULL, 0, 0, 0, 0, NULL}};
-static const struct param sampler_params[] = {
-	{"sample_count", RANGE(VALUE_INT, 1, 1 << 30)},
-	{"*", IGNORED},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-static const struct param integrator_params[] = {
-	{"max_depth", RANGE(VALUE_INT, -1, 1 << 30)},
-	{"rr_depth", RANGE(VALUE_INT, 1, 1 << 30)},
-	{"hide_emitters", UNDERSTOOD(VALUE_BOOL)},
-	{"*", IGNORED},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 #define HOLDS(cls) (1u << (cls))
 #define CAMERA_HOLDS (HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER) | HOLDS(PLUGIN_MEDIUM))
 
 const struct plugin_decl setting_decls[] = {
-	{PLUGIN_SENSOR, "perspective", perspective_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "thinlens", thinlens_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "orthographic", orthographic_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "telecentric", telecentric_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "spherical", spherical_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "perspective_rdist", rdist_params, CAMERA_HOLDS, PARAM_UNDERSTOOD},
-	{PLUGIN_SENSOR, "batch", batch_params, CAMERA_HOLDS | HOLDS(PLUGIN_SENSOR), PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "perspective",
+	 /* a pinhole has no focus, but exporters write one; thinlens has an aperture */
+	 PARAMS(CAMERA_PARAMS, {"focus_distance", IGNORED}, {"aperture_radius", REFUSED}), CAMERA_HOLDS,
+	 PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "thinlens",
+	 PARAMS(CAMERA_PARAMS, {"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
+		{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)}),
+	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "orthographic", PARAMS(FAR_PARAMS, {"focus_distance", IGNORED}), CAMERA_HOLDS,
+	 PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "telecentric",
+	 PARAMS(FAR_PARAMS, {"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
+		{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)}),
+	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	/* Exporters write planes and a focus for all cameras; this one has none. */
+	{PLUGIN_SENSOR, "spherical",
+	 PARAMS({"to_world", UNDERSTOOD(VALUE_PLACE)}, {"near_clip", IGNORED}, {"far_clip", IGNORED},
+		{"focus_distance", IGNORED}, SHUTTER_PARAMS, {"srf", REFUSED}),
+	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "perspective_rdist",
+	 PARAMS(CAMERA_PARAMS, {"focus_distance", IGNORED}, {"aperture_radius", REFUSED},
+		{"kc", UNDERSTOOD(VALUE_STRING)}),
+	 CAMERA_HOLDS, PARAM_UNDERSTOOD},
+	/* Its cameras have shutters of their own. */
+	{PLUGIN_SENSOR, "batch",
+	 PARAMS({"shutter_open", IGNORED}, {"shutter_close", IGNORED}, {"rolling_shutter_type", IGNORED},
+		{"rolling_shutter_duration", IGNORED}, {"srf", REFUSED}),
+	 CAMERA_HOLDS | HOLDS(PLUGIN_SENSOR), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "mfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "tiledhdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "box", box_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "tent", tent_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "gaussian", gaussian_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "mitchell", cubic_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "catmullrom", no_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_RFILTER, "lanczos", lanczos_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_SAMPLER, "*", sampler_params, 0, PARAM_IGNORED},
+	/* `radius` of `gaussian`, and in 3.x that of `box`, are ours. */
+	PLUGIN(RFILTER, "box", {"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)}),
+	PLUGIN(RFILTER, "tent", {"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)}),
+	PLUGIN(RFILTER, "gaussian", {"stddev", RANGE(VALUE_FLOAT, 0.01, RADIUS_MAX / 4)},
+	       {"radius", RANGE(VALUE_FLOAT | VALUE_OF_3, 0.25, RADIUS_MAX)}),
+	PLUGIN(RFILTER, "mitchell", {"b", RANGE(VALUE_FLOAT, -1, 1)}, {"B", RANGE(VALUE_FLOAT, -1, 1)},
+	       {"c", RANGE(VALUE_FLOAT, -1, 1)}, {"C", RANGE(VALUE_FLOAT, -1, 1)}),
+	{PLUGIN_RFILTER, "catmullrom", NULL, 0, PARAM_UNDERSTOOD},
+	PLUGIN(RFILTER, "lanczos", {"lobes", RANGE(VALUE_INT, 1, 16)}),
+	{PLUGIN_SAMPLER, "*", PARAMS({"sample_count", RANGE(VALUE_INT, 1, 1 << 30)}, {"*", IGNORED}), 0, PARAM_IGNORED},
 	/* irrcache, adaptive, aov and others contain the integrator with the depth, multichannel and aov also several.
 	 */
-	{PLUGIN_INTEGRATOR, "*", integrator_params, HOLDS(PLUGIN_INTEGRATOR), PARAM_IGNORED},
+	{PLUGIN_INTEGRATOR, "*",
+	 PARAMS({"max_depth", RANGE(VALUE_INT, -1, 1 << 30)}, {"rr_depth", RANGE(VALUE_INT, 1, 1 << 30)},
+		{"hide_emitters", UNDERSTOOD(VALUE_BOOL)}, {"*", IGNORED}),
+	 HOLDS(PLUGIN_INTEGRATOR), PARAM_IGNORED},
 	{0, NULL, NULL, 0, 0},
 };
 

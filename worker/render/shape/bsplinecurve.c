@@ -9,8 +9,6 @@
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/spline.h"
 
-static const struct param params[] = {{"filename", UNDERSTOOD(VALUE_STRING)}, SHAPE_PARAMS_END};
-
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
@@ -19,4 +17,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return rc ? rc : curve_shape_take(n, &points, true, arena, out, e);
 }
 
-SHAPE_OPS(bsplinecurve);
+SHAPE_OPS(bsplinecurve, {"filename", UNDERSTOOD(VALUE_STRING)}, SHAPE_PARAMS);

@@ -3,8 +3,6 @@
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/quad.h"
 
-static const struct param params[] = {{"face_normals", IGNORED}, SHAPE_PARAMS_END};
-
 /* Each face with its normal and the directions of u and v, as on Mitsuba's cube. Some are left-handed: mesh_finish
  * winds the triangles by their normals. */
 static const struct face {
@@ -33,4 +31,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-SHAPE_OPS(cube);
+SHAPE_OPS(cube, {"face_normals", IGNORED}, SHAPE_PARAMS);

@@ -7,13 +7,6 @@
 
 #include <float.h>
 
-static const struct param params[] = {
-	{"p0", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
-	{"p1", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
-	{"radius", VALUE_FLOAT, PARAM_UNDERSTOOD, DBL_MIN, MESH_COORDINATE_MAX, NULL},
-	SHAPE_PARAMS_END,
-};
-
 static vec3 point_of(const struct scene_node *n, const char *name, vec3 fallback)
 {
 	const struct property *p = node_find(n, name);
@@ -47,4 +40,6 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-SHAPE_OPS(cylinder);
+SHAPE_OPS(cylinder, {"p0", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
+	  {"p1", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
+	  {"radius", VALUE_FLOAT, PARAM_UNDERSTOOD, DBL_MIN, MESH_COORDINATE_MAX, NULL}, SHAPE_PARAMS);

@@ -11,13 +11,10 @@
 	{                                                                                   \
 		"max_smooth_angle", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 180, NULL \
 	}
-/* The parameters of every shape, and the end of its table. */
-#define SHAPE_PARAMS_END                                                                    \
+/* The parameters of every shape. */
+#define SHAPE_PARAMS                                                                        \
 	{"to_world", UNDERSTOOD(VALUE_PLACE)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)},    \
 		{"interior", UNDERSTOOD(VALUE_NODE)}, {"exterior", UNDERSTOOD(VALUE_NODE)}, \
-		{"silhouette_sampling_weight", IGNORED}, DISPLACE_PARAMS,                   \
-	{                                                                                   \
-		NULL, 0, 0, 0, 0, NULL                                                      \
-	}
+		{"silhouette_sampling_weight", IGNORED}, DISPLACE_PARAMS
 
 #endif

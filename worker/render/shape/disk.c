@@ -3,8 +3,6 @@
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/round.h"
 
-static const struct param params[] = {SHAPE_PARAMS_END};
-
 /* The centre once per triangle, because each has another v there. */
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
@@ -27,4 +25,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-SHAPE_OPS(disk);
+SHAPE_OPS(disk, SHAPE_PARAMS);

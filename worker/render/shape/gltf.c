@@ -17,22 +17,6 @@
 
 #include <string.h>
 
-static const struct param params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	ASSET_PART_PARAMS,
-	{"embedded", UNDERSTOOD(VALUE_STRING)}, /* the buffer in base64, in place of a file */
-	{"position", UNDERSTOOD(VALUE_STRING)},
-	{"normal", UNDERSTOOD(VALUE_STRING)},
-	{"texcoord", UNDERSTOOD(VALUE_STRING)},
-	{"texcoord_other", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_texcoord */
-	{"index", UNDERSTOOD(VALUE_STRING)},
-	{"mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "triangles|strip|fan"},
-	{"color", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_color */
-	{"alpha", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_alpha */
-	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
-	SHAPE_PARAMS_END,
-};
-
 enum number_type { F32, U8, U16, U32, TYPES };
 static const struct {
 	const char *name;
@@ -205,4 +189,12 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return rc;
 }
 
-SHAPE_OPS(gltf);
+SHAPE_OPS(gltf, {"filename", UNDERSTOOD(VALUE_STRING)}, ASSET_PART_PARAMS,
+	  {"embedded", UNDERSTOOD(VALUE_STRING)}, /* the buffer in base64, in place of a file */
+	  {"position", UNDERSTOOD(VALUE_STRING)}, {"normal", UNDERSTOOD(VALUE_STRING)},
+	  {"texcoord", UNDERSTOOD(VALUE_STRING)},
+	  {"texcoord_other", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_texcoord */
+	  {"index", UNDERSTOOD(VALUE_STRING)}, {"mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "triangles|strip|fan"},
+	  {"color", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_color */
+	  {"alpha", UNDERSTOOD(VALUE_STRING)}, /* the attribute vertex_alpha */
+	  {"face_normals", UNDERSTOOD(VALUE_BOOL)}, SHAPE_PARAMS);

@@ -8,14 +8,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct param none[] = {{.name = NULL}};
-static const struct param instance_params[] = {{.name = "to_world", .types = VALUE_PLACE}, {.name = NULL}};
-
-const struct shape_ops shape_ops_merge = {{PLUGIN_SHAPE, "merge", none, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD}, NULL};
-const struct shape_ops shape_ops_shapegroup = {{PLUGIN_SHAPE, "shapegroup", none, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD},
+const struct shape_ops shape_ops_merge = {{PLUGIN_SHAPE, "merge", NULL, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD}, NULL};
+const struct shape_ops shape_ops_shapegroup = {{PLUGIN_SHAPE, "shapegroup", NULL, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD},
 					       NULL};
-const struct shape_ops shape_ops_instance = {
-	{PLUGIN_SHAPE, "instance", instance_params, 1u << PLUGIN_SHAPE, PARAM_UNDERSTOOD}, NULL};
+const struct shape_ops shape_ops_instance = {{PLUGIN_SHAPE, "instance",
+					      PARAMS({.name = "to_world", .types = VALUE_PLACE}), 1u << PLUGIN_SHAPE,
+					      PARAM_UNDERSTOOD},
+					     NULL};
 
 struct listing {
 	struct arena *arena;

@@ -8,14 +8,6 @@
 #include "worker/render/shape/curve_shape.h"
 #include "worker/render/shape/declare.h"
 
-static const struct param params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{"radius", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, MESH_COORDINATE_MAX, NULL},
-	{"reduction", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1, NULL},
-	{"angle_threshold", IGNORED},
-	SHAPE_PARAMS_END,
-};
-
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
@@ -28,4 +20,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return rc ? rc : curve_shape_take(n, &points, false, arena, out, e);
 }
 
-SHAPE_OPS(hair);
+SHAPE_OPS(hair, {"filename", UNDERSTOOD(VALUE_STRING)},
+	  {"radius", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, MESH_COORDINATE_MAX, NULL},
+	  {"reduction", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, 0, 1, NULL}, {"angle_threshold", IGNORED},
+	  SHAPE_PARAMS);

@@ -17,15 +17,6 @@
 
 #include <string.h>
 
-static const struct param params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL},
-	{"shading_normals", UNDERSTOOD(VALUE_BOOL)},
-	{"width", IGNORED}, /* of textures that are not images, which are refused */
-	{"height", IGNORED},
-	SHAPE_PARAMS_END,
-};
-
 struct field {
 	struct image picture;
 	double scale;
@@ -160,7 +151,12 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 }
 
 const struct shape_ops shape_ops_heightfield = {
-	.decl = {PLUGIN_SHAPE, "heightfield", params, 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER | 1u << PLUGIN_TEXTURE,
-		 PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_SHAPE, "heightfield",
+		 PARAMS({"filename", UNDERSTOOD(VALUE_STRING)},
+			{"scale", VALUE_FLOAT | VALUE_INT, PARAM_UNDERSTOOD, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX, NULL},
+			{"shading_normals", UNDERSTOOD(VALUE_BOOL)},
+			{"width", IGNORED}, /* of textures that are not images, which are refused */
+			{"height", IGNORED}, SHAPE_PARAMS),
+		 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER | 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.build = build,
 };

@@ -7,8 +7,6 @@
 #include "worker/render/shape/curve_shape.h"
 #include "worker/render/shape/declare.h"
 
-static const struct param params[] = {{"filename", UNDERSTOOD(VALUE_STRING)}, SHAPE_PARAMS_END};
-
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
@@ -17,4 +15,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return rc ? rc : curve_shape_take(n, &points, false, arena, out, e);
 }
 
-SHAPE_OPS(linearcurve);
+SHAPE_OPS(linearcurve, {"filename", UNDERSTOOD(VALUE_STRING)}, SHAPE_PARAMS);

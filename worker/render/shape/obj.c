@@ -8,18 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct param params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{"material", UNDERSTOOD(VALUE_STRING)}, /* only the faces after `usemtl` of that name; "": those before any */
-	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
-	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
-	{"collapse", IGNORED},
-	{"load_materials", UNDERSTOOD(VALUE_BOOL)}, /* .mtl files are never read: false says that none is wanted */
-	MESH_SMOOTH_PARAM,
-	{"shape_index", REFUSED},
-	SHAPE_PARAMS_END,
-};
-
 static int compare_corners(const void *a, const void *b)
 {
 	const struct obj_corner *x = a, *y = b;
@@ -179,4 +167,8 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return r;
 }
 
-SHAPE_OPS(obj);
+SHAPE_OPS(obj, {"filename", UNDERSTOOD(VALUE_STRING)},
+	  {"material", UNDERSTOOD(VALUE_STRING)}, /* only the faces after `usemtl` of that name; "": those before any */
+	  {"face_normals", UNDERSTOOD(VALUE_BOOL)}, {"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)}, {"collapse", IGNORED},
+	  {"load_materials", UNDERSTOOD(VALUE_BOOL)}, /* .mtl files are never read: false says that none is wanted */
+	  MESH_SMOOTH_PARAM, {"shape_index", REFUSED}, SHAPE_PARAMS);

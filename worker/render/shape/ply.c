@@ -70,16 +70,6 @@ struct ply {
 	const bool *srgb; /* the shape's `srgb`; NULL: not given */
 };
 
-static const struct param params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
-	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
-	{"collapse", IGNORED},
-	{"srgb", UNDERSTOOD(VALUE_BOOL)}, /* of colours */
-	MESH_SMOOTH_PARAM,
-	SHAPE_PARAMS_END,
-};
-
 /* A word of the header's line; false: end of the line. */
 static bool next_word(struct ply *f, char word[WORD_MAX])
 {
@@ -548,4 +538,7 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return r;
 }
 
-SHAPE_OPS(ply);
+SHAPE_OPS(ply, {"filename", UNDERSTOOD(VALUE_STRING)}, {"face_normals", UNDERSTOOD(VALUE_BOOL)},
+	  {"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)}, {"collapse", IGNORED},
+	  {"srgb", UNDERSTOOD(VALUE_BOOL)}, /* of colours */
+	  MESH_SMOOTH_PARAM, SHAPE_PARAMS);

@@ -3,8 +3,6 @@
 #include "worker/render/shape/declare.h"
 #include "worker/render/shape/quad.h"
 
-static const struct param params[] = {{"face_normals", IGNORED}, SHAPE_PARAMS_END};
-
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
@@ -20,4 +18,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return 0;
 }
 
-SHAPE_OPS(rectangle);
+SHAPE_OPS(rectangle, {"face_normals", IGNORED}, SHAPE_PARAMS);

@@ -27,12 +27,6 @@
 
 enum { SPLIT = 2, DIRECTIONS = 7, ROOT_STEPS = 24 };
 
-static const struct param params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{.name = "normals", .types = VALUE_STRING, .choices = "smooth|analytic"},
-	SHAPE_PARAMS_END,
-};
-
 struct surface {
 	struct grid_file grid;
 	uint32_t cells[3];
@@ -344,6 +338,9 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 }
 
 const struct shape_ops shape_ops_sdfgrid = {
-	.decl = {PLUGIN_SHAPE, "sdfgrid", params, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_SHAPE, "sdfgrid",
+		 PARAMS({"filename", UNDERSTOOD(VALUE_STRING)},
+			{.name = "normals", .types = VALUE_STRING, .choices = "smooth|analytic"}, SHAPE_PARAMS),
+		 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD},
 	.build = build,
 };

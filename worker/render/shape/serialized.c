@@ -37,15 +37,6 @@ struct stream {
 	uint64_t most; /* bytes that it can represent */
 };
 
-static const struct param params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{"shape_index", VALUE_INT, PARAM_UNDERSTOOD, 0, 1 << 24, NULL},
-	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
-	{"collapse", IGNORED},
-	MESH_SMOOTH_PARAM,
-	SHAPE_PARAMS_END,
-};
-
 static int file_error(const struct stream *s, const char *what)
 {
 	return node_error(s->node, s->error, EINVAL, "%s: %s", s->name, what);
@@ -387,4 +378,6 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return r;
 }
 
-SHAPE_OPS(serialized);
+SHAPE_OPS(serialized, {"filename", UNDERSTOOD(VALUE_STRING)},
+	  {"shape_index", VALUE_INT, PARAM_UNDERSTOOD, 0, 1 << 24, NULL}, {"face_normals", UNDERSTOOD(VALUE_BOOL)},
+	  {"collapse", IGNORED}, MESH_SMOOTH_PARAM, SHAPE_PARAMS);

@@ -44,10 +44,11 @@ struct shape_ops {
 };
 
 extern const struct shape_ops *const shape_registry[]; /* ends with NULL */
-/* The operations of a shape NAME that may hold a BSDF and an emitter, in a source with `params` and `build`. */
-#define SHAPE_OPS(NAME)                             \
-	const struct shape_ops shape_ops_##NAME = { \
-		{PLUGIN_SHAPE, #NAME, params, 1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER, PARAM_UNDERSTOOD}, build}
+/* The operations of a shape NAME that may hold a BSDF and an emitter, in a source with `build`; then its parameters. */
+#define SHAPE_OPS(NAME, ...)                                                                                     \
+	const struct shape_ops shape_ops_##NAME = {{PLUGIN_SHAPE, #NAME, PARAMS(__VA_ARGS__),                    \
+						    1u << PLUGIN_BSDF | 1u << PLUGIN_EMITTER, PARAM_UNDERSTOOD}, \
+						   build}
 
 /* Builds the geometry of a PLUGIN_SHAPE node. Checked: finite, indices in range. Triangles without area are dropped
  * and counted in *dropped; a mesh may have none left. One thread; allocates in the arena. */

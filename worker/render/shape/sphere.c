@@ -8,12 +8,6 @@
 
 #include <float.h>
 
-static const struct param params[] = {
-	{"center", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
-	{"radius", VALUE_FLOAT, PARAM_UNDERSTOOD, DBL_MIN, MESH_COORDINATE_MAX, NULL},
-	SHAPE_PARAMS_END,
-};
-
 /* Matrices in files have six digits: this much unevenness counts as a similarity. */
 #define SIMILARITY_TOLERANCE 1e-4
 
@@ -77,4 +71,5 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return make_sphere(n, &m, scale, x, z, &out->sphere, e);
 }
 
-SHAPE_OPS(sphere);
+SHAPE_OPS(sphere, {"center", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
+	  {"radius", VALUE_FLOAT, PARAM_UNDERSTOOD, DBL_MIN, MESH_COORDINATE_MAX, NULL}, SHAPE_PARAMS);

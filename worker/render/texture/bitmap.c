@@ -182,24 +182,17 @@ static enum color_shape bitmap_shape(const struct texture *t)
 	return ((const struct bitmap *)t->data)->shape;
 }
 
-static const struct param bitmap_params[] = {
-	RASTER_PARAMS,
-	UV_PARAMS,
-	{.name = "coordinates", .types = VALUE_STRING},
-	{.name = "filter_type",
-	 .types = VALUE_STRING,
-	 .choices = "bilinear|nearest|trilinear|anisotropic|ewa|isotropic|none"},
-	{.name = "wrap_mode", .types = VALUE_STRING, .choices = WRAP_MODES},
-	{.name = "wrap_mode_u", .types = VALUE_STRING, .choices = WRAP_MODES},
-	{.name = "wrap_mode_v", .types = VALUE_STRING, .choices = WRAP_MODES},
-	{.name = "max_anisotropy", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
-	{.name = "format", .types = VALUE_STRING, .status = PARAM_IGNORED},
-	{.name = "accel", .types = VALUE_BOOL, .status = PARAM_IGNORED},
-	{.name = NULL},
-};
-
 const struct texture_ops texture_ops_bitmap = {
-	.decl = {PLUGIN_TEXTURE, "bitmap", bitmap_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(TEXTURE, "bitmap", RASTER_PARAMS, UV_PARAMS, {.name = "coordinates", .types = VALUE_STRING},
+		       {.name = "filter_type",
+			.types = VALUE_STRING,
+			.choices = "bilinear|nearest|trilinear|anisotropic|ewa|isotropic|none"},
+		       {.name = "wrap_mode", .types = VALUE_STRING, .choices = WRAP_MODES},
+		       {.name = "wrap_mode_u", .types = VALUE_STRING, .choices = WRAP_MODES},
+		       {.name = "wrap_mode_v", .types = VALUE_STRING, .choices = WRAP_MODES},
+		       {.name = "max_anisotropy", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+		       {.name = "format", .types = VALUE_STRING, .status = PARAM_IGNORED},
+		       {.name = "accel", .types = VALUE_BOOL, .status = PARAM_IGNORED}),
 	.data_size = sizeof(struct bitmap),
 	.create = bitmap_create,
 	.eval = bitmap_eval,

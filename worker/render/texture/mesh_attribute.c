@@ -116,15 +116,10 @@ static enum color_shape mesh_attribute_shape(const struct texture *t)
 	return ((const struct mesh_attribute *)t->data)->shape;
 }
 
-static const struct param mesh_attribute_params[] = {
-	{.name = "name", .types = VALUE_STRING},
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
-	{.name = NULL},
-};
-
 /* They are only made in roles that need neither a height nor a derivative. */
 const struct texture_ops texture_ops_mesh_attribute = {
-	.decl = {PLUGIN_TEXTURE, "mesh_attribute", mesh_attribute_params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(TEXTURE, "mesh_attribute", {.name = "name", .types = VALUE_STRING},
+		       {.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX}),
 	.data_size = sizeof(struct mesh_attribute),
 	.create = attribute_create,
 	.eval = mesh_attribute_eval,
@@ -132,10 +127,8 @@ const struct texture_ops texture_ops_mesh_attribute = {
 	.shape = mesh_attribute_shape,
 };
 
-static const struct param no_params[] = {{.name = NULL}};
-
 const struct texture_ops texture_ops_vertexcolors = {
-	.decl = {PLUGIN_TEXTURE, "vertexcolors", no_params, 0, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_TEXTURE, "vertexcolors", NULL, 0, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct mesh_attribute),
 	.create = vertexcolors_create,
 	.eval = mesh_attribute_eval,

@@ -100,23 +100,16 @@ static enum color_shape pattern_shape(const struct texture *t)
 	{.name = "color0", .types = VALUE_TEXTURE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},         \
 		{.name = "color1", .types = VALUE_TEXTURE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX}, \
 		UV_PARAMS
-static const struct param checkerboard_params[] = {COLORS, {.name = NULL}};
-static const struct param gridtexture_params[] = {
-	COLORS,
-	{.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
-	{.name = NULL},
-};
-
-#define PATTERN_OPS(NAME)                                                            \
-	const struct texture_ops texture_ops_##NAME = {                              \
-		.decl = {PLUGIN_TEXTURE, #NAME, NAME##_params, 0, PARAM_UNDERSTOOD}, \
-		.data_size = sizeof(struct pattern),                                 \
-		.create = NAME##_create,                                             \
-		.eval = pattern_eval,                                                \
-		.height = pattern_height,                                            \
-		.jet = pattern_jet,                                                  \
-		.max = pattern_max,                                                  \
-		.shape = pattern_shape,                                              \
+#define PATTERN_OPS(NAME, ...)                                                             \
+	const struct texture_ops texture_ops_##NAME = {                                    \
+		.decl = {PLUGIN_TEXTURE, #NAME, PARAMS(__VA_ARGS__), 0, PARAM_UNDERSTOOD}, \
+		.data_size = sizeof(struct pattern),                                       \
+		.create = NAME##_create,                                                   \
+		.eval = pattern_eval,                                                      \
+		.height = pattern_height,                                                  \
+		.jet = pattern_jet,                                                        \
+		.max = pattern_max,                                                        \
+		.shape = pattern_shape,                                                    \
 	}
-PATTERN_OPS(checkerboard);
-PATTERN_OPS(gridtexture);
+PATTERN_OPS(checkerboard, COLORS);
+PATTERN_OPS(gridtexture, COLORS, {.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1});

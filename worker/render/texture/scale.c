@@ -112,17 +112,14 @@ static enum color_shape scale_shape(const struct texture *t)
 	return coloured ? COLOR_SHAPE_OTHER : texture_shape(&s->inner);
 }
 
-static const struct param scale_params[] = {
-	{.name = "scale",
-	 .types = VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_NODE,
-	 .min = -PARAM_LIGHT_MAX,
-	 .max = PARAM_LIGHT_MAX},
-	{.name = "value", .types = VALUE_TEXTURE, .min = -PARAM_LIGHT_MAX, .max = PARAM_LIGHT_MAX},
-	{.name = NULL},
-};
-
 const struct texture_ops texture_ops_scale = {
-	.decl = {PLUGIN_TEXTURE, "scale", scale_params, 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_TEXTURE, "scale",
+		 PARAMS({.name = "scale",
+			 .types = VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_NODE,
+			 .min = -PARAM_LIGHT_MAX,
+			 .max = PARAM_LIGHT_MAX},
+			{.name = "value", .types = VALUE_TEXTURE, .min = -PARAM_LIGHT_MAX, .max = PARAM_LIGHT_MAX}),
+		 1u << PLUGIN_TEXTURE, PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct scale),
 	.create = scale_create,
 	.eval = scale_eval,

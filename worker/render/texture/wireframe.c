@@ -112,17 +112,12 @@ static enum color_shape shape(const struct texture *t)
 	return first == texture_shape(&f->interior) ? first : COLOR_SHAPE_OTHER;
 }
 
-static const struct param params[] = {
-	{.name = "edge_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "interior_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
-	{.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LENGTH_MAX},
-	{.name = "step_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
-	{.name = NULL},
-};
-
 /* It is only made in roles that need neither a height nor a derivative. */
 const struct texture_ops texture_ops_wireframe = {
-	.decl = {PLUGIN_TEXTURE, "wireframe", params, 0, PARAM_UNDERSTOOD},
+	.decl = PLUGIN(TEXTURE, "wireframe", {.name = "edge_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+		       {.name = "interior_color", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+		       {.name = "line_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LENGTH_MAX},
+		       {.name = "step_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1}),
 	.data_size = sizeof(struct wireframe),
 	.create = create,
 	.eval = eval,

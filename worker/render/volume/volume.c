@@ -17,30 +17,16 @@
 /* Of numbers that are no reflectances. */
 #define LARGEST 1e30
 
-static const struct param constvolume_params[] = {
-	{"value", VALUE_COLOR, PARAM_UNDERSTOOD, 0, LARGEST, NULL},
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
-static const struct param gridvolume_params[] = {
-	{"filename", UNDERSTOOD(VALUE_STRING)},
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
-	{"use_grid_bbox", UNDERSTOOD(VALUE_BOOL | VALUE_OF_3)},
-	{"filter_type", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "trilinear|nearest"},
-	{"wrap_mode", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "clamp|repeat|mirror"},
-	{"min", PLACE}, /* of 0.6 */
-	{"max", PLACE},
-	{"raw", IGNORED}, /* numbers are never decoded */
-	{"max_value", IGNORED},
-	{"accel", IGNORED},
-	{"send_data", IGNORED},
-	{NULL, 0, 0, 0, 0, NULL},
-};
-
 const struct plugin_decl volume_decls[] = {
-	{PLUGIN_VOLUME, "constvolume", constvolume_params, 0, PARAM_UNDERSTOOD},
-	{PLUGIN_VOLUME, "gridvolume", gridvolume_params, 0, PARAM_UNDERSTOOD},
+	PLUGIN(VOLUME, "constvolume", {"value", VALUE_COLOR, PARAM_UNDERSTOOD, 0, LARGEST, NULL},
+	       {"to_world", UNDERSTOOD(VALUE_TRANSFORM)}),
+	PLUGIN(VOLUME, "gridvolume", {"filename", UNDERSTOOD(VALUE_STRING)}, {"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
+	       {"use_grid_bbox", UNDERSTOOD(VALUE_BOOL | VALUE_OF_3)},
+	       {"filter_type", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "trilinear|nearest"},
+	       {"wrap_mode", VALUE_STRING | VALUE_OF_3, PARAM_UNDERSTOOD, 0, 0, "clamp|repeat|mirror"},
+	       {"min", PLACE},			 /* of 0.6 */
+	       {"max", PLACE}, {"raw", IGNORED}, /* numbers are never decoded */
+	       {"max_value", IGNORED}, {"accel", IGNORED}, {"send_data", IGNORED}),
 	{0, NULL, NULL, 0, 0},
 };
 

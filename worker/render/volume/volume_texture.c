@@ -71,13 +71,9 @@ static enum color_shape shape(const struct texture *t)
 	return is_rgb(x) ? COLOR_SHAPE_OTHER : x->volume.color.shape;
 }
 
-static const struct param params[] = {
-	{.name = "volume", .types = VALUE_VOLUME, .max = PARAM_LIGHT_MAX},
-	{.name = NULL},
-};
-
 const struct texture_ops texture_ops_volume = {
-	.decl = {PLUGIN_TEXTURE, "volume", params, 0, PARAM_UNDERSTOOD},
+	.decl = {PLUGIN_TEXTURE, "volume", PARAMS({.name = "volume", .types = VALUE_VOLUME, .max = PARAM_LIGHT_MAX}), 0,
+		 PARAM_UNDERSTOOD},
 	.data_size = sizeof(struct volume_texture),
 	.create = create,
 	.eval = eval,
