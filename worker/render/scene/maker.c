@@ -11,9 +11,7 @@
 
 #include "worker/render/scene/animation.h"
 #include "worker/render/scene/asset_list.h"
-#include "worker/render/scene/clip_value.h"
 #include "worker/render/scene/element.h"
-#include "worker/render/scene/given_twice.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/nesting.h"

@@ -3,11 +3,23 @@
 
 #include "common/base/spelling.h"
 #include "worker/render/scene/element.h"
+#include "worker/render/scene/plugin.h"
+#include "worker/render/scene/snake_case.h"
 #include "worker/render/scene/value.h"
 
+#include <errno.h>
 #include <float.h>
+#include <math.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
+
+static void make_float(struct value *v)
+{
+	double x = (double)v->as.integer;
+	v->type = VALUE_FLOAT;
+	v->as.number = x;
+}
 
 static int refuse_choice(const struct xml_element *el, const struct param *p, const char *given, struct error *e)
 {
@@ -58,11 +70,8 @@ static void number_of_color(const struct param *p, struct value *v)
 int param_check(const struct xml_element *el, const struct param *p, struct value *v, struct error *e)
 {
 	int r;
-	if (v->type == VALUE_INT && !(p->types & VALUE_INT) && (p->types & VALUE_FLOAT)) {
-		double x = (double)v->as.integer;
-		v->type = VALUE_FLOAT;
-		v->as.number = x;
-	}
+	if (v->type == VALUE_INT && !(p->types & VALUE_INT) && (p->types & VALUE_FLOAT))
+		make_float(v);
 	number_of_color(p, v);
 	if (!(v->type & p->types)) {
 		char list[256];
@@ -80,4 +89,75 @@ int param_check(const struct xml_element *el, const struct param *p, struct valu
 		return refuse_choice(el, p, v->as.string, e);
 	}
 	return 0;
+}
+
+/* ---- out of range, but not refused ---- */
+
+int clip_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+	       const struct param *p, struct value *v)
+{
+	if (v->type == VALUE_INT)
+		make_float(v);
+	double *x = v->type == VALUE_FLOAT ? &v->as.number : v->as.rgb, outside = 0, end = 0;
+	int count = v->type == VALUE_FLOAT ? 1 : v->type == VALUE_RGB ? 3 : 0;
+	for (int i = 0; i < count; i++) {
+		double within = fmin(fmax(x[i], p->min), p->max);
+		if (within != x[i]) {
+			outside = x[i];
+			end = within;
+		}
+		x[i] = within;
+	}
+	if (outside == end)
+		return 0;
+	const char *type = xml_attribute(owner, "type");
+	return note(t, owner, type, p->name,
+		    "%s:%d: <%.64s type=\"%.64s\">: %s=%g is outside [%g, %g] and counts as %g", el->file, el->line,
+		    owner->name, type, element_spelling(el, p->name), outside, p->min, p->max, end);
+}
+
+/* ---- given a second time ---- */
+
+int given_twice(const struct xml_element *el, const struct property *before, struct error *e)
+{
+	return xml_error(el, e, EINVAL, "`%s` is given twice (first in line %d)", before->name, before->line);
+}
+
+/* The name under which an earlier element of the object gives the property. */
+static const char *earlier_name(const struct plugin_decl *decl, const struct xml_element *el, const char *property)
+{
+	char name[256];
+	for (const struct xml_element *c = el->parent->first; c && c != el; c = c->next) {
+		const char *written = xml_attribute(c, "name");
+		if (!written || 2 * strlen(written) + 1 > sizeof name)
+			continue;
+		snake_case(written, name);
+		if (strcmp(plugin_new_name(decl, name), property) == 0)
+			return written;
+	}
+	return property;
+}
+
+/* The last one counts, but a texture has the place of a value in whichever order, and names of 3.x mean nothing. */
+int given_again(const struct notes *t, const struct plugin_decl *decl, const struct xml_element *el,
+		struct property *before, struct value v)
+{
+	bool was = before->value.type == VALUE_NODE, is = v.type == VALUE_NODE;
+	if (was != is) {
+		before->value = is ? v : before->value;
+		return 0;
+	}
+	const char *first = earlier_name(decl, el, before->name), *second = element_spelling(el, before->name);
+	bool first_new = strchr(first, '_'), second_new = strchr(second, '_');
+	if (first_new == second_new && strcmp(first, second) != 0)
+		return given_twice(el, before, t->error);
+	bool last = !second_new || first_new;
+	char key[64];
+	snprintf(key, sizeof key, "twice %.48s", second);
+	int r = note(t, el, decl->type, key,
+		     "%s:%d: <%.64s>: `%.64s` is given twice (first in line %d); the %s counts, as in Mitsuba 0.6",
+		     el->file, el->line, el->name, second, before->line, last ? "last" : "first");
+	if (last)
+		*before = (struct property){before->name, el->line, v};
+	return r;
 }

@@ -1,15 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Checks a value against its parameter: type, range, choice. Any thread; allocates nothing. */
+/* Checks a value against its parameter: type, range, choice, and whether it is the first one. Any thread; allocates
+ * nothing but notes. */
 #ifndef WORKER_RENDER_SCENE_PARAM_CHECK_H
 #define WORKER_RENDER_SCENE_PARAM_CHECK_H
 
+#include "worker/render/scene/node.h"
+#include "worker/render/scene/notes.h"
 #include "worker/render/scene/param.h"
-#include "worker/render/scene/xml.h"
-
-struct value;
 
 /* Converts v to a number if p takes no colour and v is an integer or a colour without hue. Errors have the place of
  * el: EINVAL for a wrong type or choice, with what is supported; ERANGE. */
 int param_check(const struct xml_element *el, const struct param *p, struct value *v, struct error *e);
+
+/* Of VALUE_CLIPPED, which Mitsuba limits to its range: moves a number, or each component of a colour, that is outside
+ * the range of p to the nearer end, with a note. Spectra stay as they are. 0 or -ENOMEM. */
+int clip_value(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+	       const struct param *p, struct value *v);
+
+/* Refuses a property that an object is given a second time: -EINVAL. */
+int given_twice(const struct xml_element *el, const struct property *before, struct error *e);
+
+/* In files of 0.6: sets *before to the value that counts there, with a note. -EINVAL: two names of 0.6 for one thing.
+ */
+int given_again(const struct notes *t, const struct plugin_decl *decl, const struct xml_element *el,
+		struct property *before, struct value v);
 
 #endif

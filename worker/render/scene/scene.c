@@ -22,7 +22,6 @@
 #include "worker/render/scene/notes.h"
 #include "worker/render/scene/obj_materials.h"
 #include "worker/render/scene/plugin.h"
-#include "worker/render/scene/relief_files.h"
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
 #include "worker/render/scene/texture_names.h"

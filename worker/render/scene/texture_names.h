@@ -15,4 +15,8 @@ void texture_names_settle(const struct plugin_decl *decls, struct xml_element *r
  * -E2BIG: references make too much of it; -ENOMEM. */
 int texture_names_follow(struct xml_element *root, struct id_table *ids, struct arena *arena, struct error *e);
 
+/* As in forks of Mitsuba: <string name="filename" value="x.png"/> directly in a `bumpmap` or `normalmap` becomes a
+ * <texture type="bitmap"> of that file whose numbers are not decoded, in all of the tree. 0 or -ENOMEM. */
+int relief_files_settle(struct xml_element *root, struct arena *arena, struct error *e);
+
 #endif
