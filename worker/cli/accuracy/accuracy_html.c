@@ -53,6 +53,14 @@ static void cell(struct text_file *p, struct interval x, bool sign, bool seen)
 			      seen ? " class=\"seen\"" : "", 100 * x.value, 100 * x.low, 100 * x.high);
 }
 
+static void failed_cell(struct text_file *p, const struct accuracy_figures *f)
+{
+	if (isfinite(f->failed_walks))
+		text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walks);
+	else
+		text_file_put(p, "<td>&#8211;</td>");
+}
+
 static void name_cell(struct text_file *p, const struct accuracy_context *x, size_t i)
 {
 	char name[96];
@@ -276,10 +284,7 @@ static void put_mutations(struct text_file *p, const struct accuracy_context *x)
 		text_file_put(p, "<td>%llu</td><td>%.3g <span class=\"note\">(%.3g to %.3g)</span></td><td>%.3g</td>",
 			      (unsigned long long)f->mutations, f->cost.value, f->cost.low, f->cost.high,
 			      100 * f->acceptance);
-		if (isfinite(f->failed_walks))
-			text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walks);
-		else
-			text_file_put(p, "<td>&#8211;</td>");
+		failed_cell(p, f);
 		text_file_put(p, "<td>%.3g</td>", f->rays);
 		struct interval none = {NAN, NAN, NAN};
 		cell(p, i == ACCURACY_REFERENCE ? none : f->equal_mutations, false, false);
@@ -313,10 +318,7 @@ static void put_sweep(struct text_file *p, const struct accuracy_context *x, con
 		text_file_put(p, "%s</td><td>%.3g</td><td>%.3g</td>",
 			      i == ACCURACY_DEFAULT && strcmp(s->value[k], "default") != 0 ? " (default)" : "",
 			      f->cost.value, 100 * f->acceptance);
-		if (isfinite(f->failed_walks))
-			text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walks);
-		else
-			text_file_put(p, "<td>&#8211;</td>");
+		failed_cell(p, f);
 		cell(p, f->equal_time, false, false);
 		cell(p, f->bias_mean, true, f->bias_seen > 0);
 		cell(p, x->judgement->across == 1 ? none : f->bias_block, true, f->bias_seen > 0);

@@ -78,13 +78,7 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 	}
 	/* Enlarged by one part in 2^20: more than the float rounding of the box and of Embree's slab test. */
 	double r = s->radius * (1 + 0x1p-20) + 0x1p-20 * (fabs(s->center.x) + fabs(s->center.y) + fabs(s->center.z));
-	struct RTCBounds *b = args->bounds_o;
-	b->lower_x = (float)(s->center.x - r);
-	b->lower_y = (float)(s->center.y - r);
-	b->lower_z = (float)(s->center.z - r);
-	b->upper_x = (float)(s->center.x + r);
-	b->upper_y = (float)(s->center.y + r);
-	b->upper_z = (float)(s->center.z + r);
+	put_bounds(s->center, (vec3){0, 0, 0}, r, args->bounds_o);
 }
 
 /* The nearest valid root of |o + t d - c|^2 = r^2 in (t_min, t_max). If the ray starts on the sphere one root is 0,
