@@ -13,9 +13,8 @@
 #include "common/base/terminal.h"
 #include "common/base/error.h"
 #include "common/base/program.h"
-#include "common/json/convergence_json.h"
+#include "common/json/estimate_json.h"
 #include "common/estimate/strategy.h"
-#include "common/json/strategy_json.h"
 
 #include <jansson.h>
 #include <math.h>

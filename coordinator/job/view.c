@@ -9,8 +9,7 @@
 #include "coordinator/job/view.h"
 
 #include "common/base/text.h"
-#include "common/json/convergence_json.h"
-#include "common/json/forecast_json.h"
+#include "common/json/estimate_json.h"
 
 #include <math.h>
 #include <stdio.h>

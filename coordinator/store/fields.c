@@ -2,7 +2,7 @@
 #include "coordinator/store/fields.h"
 
 #include "common/base/text.h"
-#include "common/json/forecast_json.h"
+#include "common/json/estimate_json.h"
 
 static json_t *field_to_json(const struct field *f, const void *from)
 {

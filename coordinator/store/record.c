@@ -15,9 +15,7 @@
 #include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/json/convergence_json.h"
-#include "common/json/forecast_json.h"
-#include "common/json/strategy_json.h"
+#include "common/json/estimate_json.h"
 #include "common/json/whole.h"
 
 #include <math.h>

@@ -5,7 +5,7 @@
  * prior of the trend makes intervals wider than the noise alone); below 0.86 with less than 1e-6. Power: intervals of
  * half the width hold in 0.67 or less of the renders, a wrong law of work in none.
  */
-#include "common/json/forecast_json.h"
+#include "common/json/estimate_json.h"
 #include "common/estimate/merge.h"
 #include "common/estimate/quantile.h"
 #include "tests/support/dice.h"

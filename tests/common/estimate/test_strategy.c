@@ -4,7 +4,7 @@
 
 #include "common/base/mem.h"
 #include "common/exr/header.h"
-#include "common/json/strategy_json.h"
+#include "common/json/estimate_json.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -2,7 +2,7 @@
 #include "worker/cli/render/choice.h"
 
 #include "common/base/clock.h"
-#include "common/json/forecast_json.h"
+#include "common/json/estimate_json.h"
 #include "worker/render/rays.h"
 #include "worker/render/scene/scene.h"
 

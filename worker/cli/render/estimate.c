@@ -6,7 +6,7 @@
 #include "worker/cli/render/estimate.h"
 
 #include "common/base/progress.h"
-#include "common/json/forecast_json.h"
+#include "common/json/estimate_json.h"
 #include "common/plan/plan_text.h"
 #include "worker/cli/plot/plot.h"
 #include "worker/cli/render/pilot.h"

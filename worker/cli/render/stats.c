@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/render/stats.h"
 
-#include "common/json/convergence_json.h"
-#include "common/json/forecast_json.h"
+#include "common/json/estimate_json.h"
 #include "common/exr/image_file.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
-#include "common/json/strategy_json.h"
 #include "common/plan/plan_text.h"
 
 #include <jansson.h>

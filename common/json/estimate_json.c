@@ -1,12 +1,69 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/json/convergence_json.h"
+/*
+ * Writes each estimate as an object or a list, and reads it again. JSON has no infinities: such numbers are null. What
+ * is missing or of another type is read as 0, or as unknown. Writing fails only when memory is out: NULL.
+ */
+#include "common/json/estimate_json.h"
 
 #include "common/base/text.h"
-#include "common/json/forecast_json.h"
+#include "common/estimate/strategy.h"
 #include "common/json/whole.h"
 
 #include <math.h>
 #include <string.h>
+
+/* ---- errors and forecasts ---- */
+
+json_t *forecast_real(double x)
+{
+	return isfinite(x) ? json_real(x) : json_null();
+}
+
+json_t *forecast_range_to_json(const struct forecast_range *r)
+{
+	return json_pack("{s:o s:o s:o}", "low", forecast_real(r->low), "expected", forecast_real(r->middle), "high",
+			 forecast_real(r->high));
+}
+
+json_t *forecast_looks_to_json(const struct forecast_history *h)
+{
+	json_t *list = json_array();
+	for (uint32_t i = 0; i < h->count; i++) {
+		const struct forecast_look *l = &h->looks[i];
+		if (!isfinite(l->work + l->cpu_seconds + l->seconds + l->rel_mse + l->rel_mse_upper))
+			continue; /* JSON has no such numbers */
+		list = json_and(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work, "cpuSeconds",
+						l->cpu_seconds, "wallSeconds", l->seconds, "relMSE", l->rel_mse,
+						"relMSEUpper", l->rel_mse_upper, "degrees", forecast_real(l->degrees),
+						"doubtful", l->doubtful != 0));
+	}
+	return list;
+}
+
+static double read_number(const json_t *o, const char *key)
+{
+	return json_number_value(json_object_get(o, key));
+}
+
+void forecast_looks_from_json(const json_t *list, struct forecast_history *h)
+{
+	size_t i;
+	const json_t *o;
+	h->count = 0;
+	json_array_foreach(list, i, o)
+	{
+		struct forecast_look l = {.work = read_number(o, "mutations"),
+					  .cpu_seconds = read_number(o, "cpuSeconds"),
+					  .seconds = read_number(o, "wallSeconds"),
+					  .rel_mse = read_number(o, "relMSE"),
+					  .rel_mse_upper = read_number(o, "relMSEUpper"),
+					  .degrees = read_number(o, "degrees"),
+					  .doubtful = json_is_true(json_object_get(o, "doubtful"))};
+		forecast_add_look(h, &l);
+	}
+}
+
+/* ---- agreement of chains ---- */
 
 static double real_or_nan(const json_t *o, const char *key)
 {
@@ -110,5 +167,48 @@ void classes_from_json(const json_t *list, struct path_class_energy classes[PATH
 							real_or_nan(o, "bootstrapError"),
 							json_number_value(json_object_get(o, "chains")),
 							real_or_nan(o, "chainsError"), real_or_nan(o, "t")};
+	}
+}
+
+/* ---- counters of strategies ---- */
+
+static json_t *integer(uint64_t n)
+{
+	return json_integer(n > INT64_MAX ? INT64_MAX : (json_int_t)n);
+}
+
+static json_t *one_strategy(const char *name, const uint64_t counts[STRATEGY_COUNTERS])
+{
+	json_t *o = json_with(json_object(), "name", json_string(name)), *failures = json_object();
+	for (int k = 0; k < STRATEGY_COUNTERS; k++) {
+		json_t **at = k < STRATEGY_FAIL_FIRST ? &o : &failures;
+		*at = json_with(*at, strategy_counter_name((enum strategy_counter)k), integer(counts[k]));
+	}
+	return json_with(o, "failures", failures);
+}
+
+json_t *strategy_to_json(const char *mixture, const struct canvas_counts *n)
+{
+	json_t *list = json_array();
+	int count = plan_strategy_count(mixture);
+	for (int i = 0; i < count; i++) {
+		char name[PLAN_MUTATIONS_MAX];
+		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
+		list = json_and(list, one_strategy(name, n->strategy[i]));
+	}
+	return list;
+}
+
+void strategy_from_json(const json_t *list, struct canvas_counts *n)
+{
+	memset(n->strategy, 0, sizeof n->strategy);
+	for (size_t i = 0; i < json_array_size(list) && i < BATCH_STRATEGIES; i++) {
+		const json_t *o = json_array_get(list, i), *failures = json_object_get(o, "failures");
+		for (int k = 0; k < STRATEGY_COUNTERS; k++) {
+			json_int_t value =
+				json_integer_value(json_object_get(k < STRATEGY_FAIL_FIRST ? o : failures,
+								   strategy_counter_name((enum strategy_counter)k)));
+			n->strategy[i][k] = value > 0 ? (uint64_t)value : 0;
+		}
 	}
 }
