@@ -15,10 +15,8 @@
 #include "coordinator/core/answer.h"
 
 #include "common/base/text.h"
-#include "coordinator/core/actions.h"
 #include "coordinator/core/doubt.h"
 #include "coordinator/core/failure_quorum.h"
-#include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/lost.h"

@@ -3,7 +3,6 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/core/actions.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/lost.h"
 #include "coordinator/core/worker_registry.h"

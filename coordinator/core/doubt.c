@@ -2,8 +2,6 @@
 #include "coordinator/core/doubt.h"
 
 #include "common/base/text.h"
-#include "coordinator/core/actions.h"
-#include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
 #include "coordinator/core/identity_index.h"
 #include "coordinator/core/lease.h"

@@ -2,10 +2,8 @@
 #include "coordinator/core/farm.h"
 
 #include "common/base/mem.h"
-#include "coordinator/core/actions.h"
 #include "coordinator/core/answer.h"
 #include "coordinator/core/connection.h"
-#include "coordinator/core/find.h"
 #include "coordinator/core/identity_index.h"
 #include "coordinator/core/job.h"
 #include "coordinator/core/orders.h"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/lease.h"
 
-#include "coordinator/core/actions.h"
 #include "coordinator/core/job.h"
 #include "coordinator/core/owner.h"
 #include "coordinator/core/peer.h"

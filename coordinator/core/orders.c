@@ -2,7 +2,6 @@
 #include "coordinator/core/orders.h"
 
 #include "common/base/text.h"
-#include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
 #include "coordinator/core/rounds.h"
 

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/peer.h"
 
-#include "coordinator/core/find.h"
 #include "coordinator/core/job.h"
 
 #include <math.h>

@@ -2,7 +2,6 @@
 #include "coordinator/core/quarantine.h"
 
 #include "common/base/text.h"
-#include "coordinator/core/actions.h"
 #include "coordinator/core/connection.h"
 #include "coordinator/core/verify.h"
 

@@ -3,8 +3,6 @@
 #include "coordinator/core/restore.h"
 
 #include "common/base/mem.h"
-#include "coordinator/core/actions.h"
-#include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
 #include "coordinator/core/rounds.h"
 #include "coordinator/core/worker_registry.h"

@@ -17,8 +17,6 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/estimate/merge.h"
-#include "coordinator/core/actions.h"
-#include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/verify.h"

@@ -13,7 +13,6 @@
  */
 #include "coordinator/core/schedule.h"
 
-#include "coordinator/core/actions.h"
 #include "coordinator/core/connection.h"
 #include "coordinator/core/doubt.h"
 #include "coordinator/core/job.h"

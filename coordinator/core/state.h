@@ -134,4 +134,13 @@ static inline struct lease_key slot_key(const struct job *j, const struct slot *
 				  .epoch = s->next};
 }
 
+/* NULL: there is none. */
+struct job *farm_find_job(const struct farm *f, uint64_t id);
+struct peer *farm_find_peer(const struct farm *f, uint64_t id);
+uint32_t farm_peer_place(const struct farm *f, uint64_t id); /* index of the first one whose id is not below this */
+
+/* Room for the actions of an update is reserved when workers join and jobs are submitted, so adding one cannot fail. */
+int update_reserve(struct farm *f, size_t more_leases); /* -ENOMEM */
+struct action *update_add(struct farm *f, enum action_kind kind);
+
 #endif

@@ -13,7 +13,6 @@
 #include "common/base/text.h"
 #include "coordinator/core/answer.h"
 #include "coordinator/core/doubt.h"
-#include "coordinator/core/find.h"
 #include "coordinator/core/forecast.h"
 #include "coordinator/core/identity_index.h"
 #include "coordinator/core/lease.h"
