@@ -19,7 +19,7 @@
 #include "coordinator/jobs/restore.h"
 #include "coordinator/jobs/room.h"
 #include "coordinator/jobs/step.h"
-#include "coordinator/retention/ended_jobs.h"
+#include "coordinator/retention/keep.h"
 
 #include <assert.h>
 #include <math.h>

@@ -13,7 +13,6 @@
 #include "coordinator/jobs/results.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
-#include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 
 static struct job_record record_of(const struct jobs *jobs, const struct live_job *job)

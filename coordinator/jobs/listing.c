@@ -8,7 +8,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/jobs/recovery.h"
-#include "coordinator/retention/ended_jobs.h"
+#include "coordinator/retention/keep.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -18,7 +18,6 @@
 #include "coordinator/jobs/files.h"
 #include "coordinator/jobs/restore.h"
 #include "coordinator/retention/ages.h"
-#include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 #include "coordinator/store/journal_file.h"
 

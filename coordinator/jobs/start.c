@@ -28,7 +28,6 @@
 #include "coordinator/jobs/trust.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/clear.h"
-#include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 
 /* One at a time, so that nobody else waits for all of them. */

@@ -19,7 +19,6 @@
 #include "common/base/mem.h"
 #include "coordinator/retention/age.h"
 #include "coordinator/retention/ages.h"
-#include "coordinator/retention/ended_jobs.h"
 #include "coordinator/retention/keep.h"
 
 #include <math.h>

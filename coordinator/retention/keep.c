@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/retention/keep.h"
-#include "coordinator/store/journal_file.h"
 
 #include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "coordinator/store/journal_file.h"
 
 #include <string.h>
+
+/* ---- films ---- */
 
 bool keep_films(const struct jobs *jobs, const struct live_job *job, const struct job_record *r)
 {
@@ -47,4 +50,54 @@ void keep_trim(const struct jobs *jobs)
 		else
 			left -= bytes;
 	}
+}
+
+/* ---- records ---- */
+
+void ended_jobs_add(struct jobs *jobs, const struct job_record *r)
+{
+	if (jobs->ended_count == ENDED_MAX) {
+		keep_drop(jobs, jobs->ended[0].id); /* nobody would count its films any more */
+		memmove(jobs->ended, jobs->ended + 1, --jobs->ended_count * sizeof *jobs->ended);
+	}
+	jobs->ended[jobs->ended_count++] = *r;
+}
+
+struct job_record *ended_jobs_find(const struct jobs *jobs, uint64_t job)
+{
+	for (size_t i = 0; i < jobs->ended_count; i++)
+		if (jobs->ended[i].id == job)
+			return &jobs->ended[i];
+	return NULL;
+}
+
+void ended_jobs_remove(struct jobs *jobs, uint64_t job)
+{
+	struct job_record *r = ended_jobs_find(jobs, job);
+	if (r)
+		memmove(r, r + 1, (size_t)(jobs->ended + --jobs->ended_count - r) * sizeof *r);
+}
+
+int ended_jobs_open(struct jobs *jobs, struct error *e)
+{
+	uint64_t ids[ENDED_MAX]; /* the latest first */
+	size_t count;
+	int rc = ledger_ended(jobs->ledger, LEDGER_BELOW, UINT64_MAX, ids, ENDED_MAX, &count, e);
+	if (rc)
+		return rc;
+	jobs->ended = mem_alloc(ENDED_MAX, sizeof *jobs->ended);
+	if (!jobs->ended)
+		return error_set(e, ENOMEM, "no memory for the list of jobs");
+	while (count-- > 0) {
+		struct error fault;
+		rc = ledger_read_record(jobs->ledger, ids[count], &jobs->ended[jobs->ended_count], &fault);
+		if (rc)
+			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[count],
+				  log_quote(fault.text).text);
+		else
+			jobs->ended_count++;
+	}
+	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(jobs->config.spool).text, jobs->ended_count,
+		  (unsigned long long)ledger_next_id(jobs->ledger));
+	return 0;
 }
