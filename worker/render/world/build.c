@@ -16,7 +16,6 @@
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/shape/obj_read.h"
 #include "worker/render/texture/picture_cache.h"
-#include "worker/render/world/backs_note.h"
 #include "worker/render/world/build_media.h"
 #include "worker/render/world/coincident.h"
 #include "worker/render/world/effects_analyse.h"
