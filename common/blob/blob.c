@@ -514,11 +514,6 @@ void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path
 	snprintf(path, size, "%s/tmp.%ld.%llu", s->folder, (long)getpid(), (unsigned long long)number);
 }
 
-int blob_sync_folder(const struct blob_store *s, struct error *e)
-{
-	return disk_sync_folder(s->folder, e);
-}
-
 int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e)
 {
 	int rc = check_written(w, e);

@@ -63,14 +63,13 @@ int blob_write_commit(struct blob_writer *w, struct error *e); /* frees the writ
 void blob_write_abort(struct blob_writer *w);
 
 /* For blob_batch.c: a file that is complete and checked, but neither flushed nor renamed. Its entry is held and counts
- * as missing, so that nothing is evicted under its name. Any thread may ask for paths and for blob_sync_folder. */
+ * as missing, so that nothing is evicted under its name. Any thread may ask for paths. */
 struct blob_kept {
 	struct blob_hash hash;
 	uint64_t size, number; /* number: of the temporary file */
 };
 
 void blob_temporary_path(const struct blob_store *s, uint64_t number, char *path, size_t size);
-int blob_sync_folder(const struct blob_store *s, struct error *e);
 int blob_write_keep(struct blob_writer *w, struct blob_kept *kept, struct error *e); /* frees the writer in any case */
 void blob_enter(struct blob_store *s, const struct blob_kept *kept); /* its file has its name and is flushed */
 /* Once for each that was kept. true: it is missing and nobody holds it: sweep when all are let go. */

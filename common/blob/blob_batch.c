@@ -8,6 +8,7 @@
 #include "common/base/disk.h"
 #include "common/base/list.h"
 #include "common/base/mem.h"
+#include "common/blob/blob_state.h"
 
 enum { PATH_MOST = 4096 };
 
@@ -76,7 +77,7 @@ int blob_batch_flush(struct blob_batch *b, struct error *e)
 		if (disk_rename(from, to))
 			rc = error_file(e, errno, to);
 	}
-	return rc ? rc : blob_sync_folder(b->store, e);
+	return rc ? rc : disk_sync_folder(b->store->folder, e);
 }
 
 void blob_batch_enter(struct blob_batch *b)

@@ -2,9 +2,9 @@
 /*
  * Makes a job from its row in the ledger: submission, plan and record, then the core.
  *
- * restore_open lists the jobs that had not ended. restore_live_job unpacks one, holds the files of its scene and takes
- * from its record what the submission does not contain. Once its films are read, restore_tell tells the core which
- * epoch of each group and part comes next, and who made the states it starts from.
+ * restore_live_job unpacks it, holds the files of its scene and takes from its record what the submission does not
+ * contain. Once its films are read, restore_tell tells the core which epoch of each group and part comes next, and who
+ * made the states it starts from.
  *
  * A submission or plan that cannot be unpacked is -EPROTO if another version accepted the job, otherwise -EBADMSG; the
  * caller decides what happens to the job. Nothing is left behind: held files are released.
@@ -194,9 +194,4 @@ int restore_live_job(struct jobs *jobs, const struct ledger_job *j, struct live_
 	else
 		(*job)->film_folder = jobs_film_folder(jobs, &(*job)->plan);
 	return rc;
-}
-
-int restore_open(struct jobs *jobs, struct error *e)
-{
-	return ledger_ids(jobs->ledger, LEDGER_LIVE, &jobs->restored, &jobs->restored_count, e);
 }

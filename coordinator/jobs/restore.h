@@ -9,7 +9,6 @@
 
 #include "coordinator/job/jobs.h"
 
-int restore_open(struct jobs *jobs, struct error *e); /* lists them, from the ledger */
 /* 0: its record exists and is valid, or is missing; an error: it cannot be read at the moment. */
 int restore_record(const struct jobs *jobs, uint64_t id, struct job_record *r, bool *there, struct error *e);
 

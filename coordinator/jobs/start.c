@@ -22,7 +22,6 @@
 #include "coordinator/jobs/publish.h"
 #include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/recovery.h"
-#include "coordinator/jobs/restore.h"
 #include "coordinator/jobs/results.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
@@ -81,7 +80,7 @@ int jobs_open(struct jobs *jobs, struct error *e)
 	if (!rc)
 		ages_open(jobs);
 	if (!rc)
-		rc = restore_open(jobs, e);
+		rc = ledger_ids(jobs->ledger, LEDGER_LIVE, &jobs->restored, &jobs->restored_count, e);
 	if (!rc)
 		rc = ended_jobs_open(jobs, e);
 	if (rc)

@@ -178,7 +178,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	struct session *p = user;
 	bool known = p->state == SESSION_WORKER || p->state == SESSION_CLIENT;
 	Farm__Envelope__BodyCase what = env->message->body_case; /* which may be taken */
-	double begun = held_begin(p);
+	double begun = jobs_now(p->jobs);
 	if (known && held_take(p, env))
 		return;
 	take_message(p, env, payload, size);
@@ -191,7 +191,7 @@ static void take_held(struct session *p)
 	if (!held_next(p, &env))
 		return;
 	Farm__Envelope__BodyCase what = env.message->body_case;
-	double begun = held_begin(p);
+	double begun = jobs_now(p->jobs);
 	take_message(p, &env, NULL, 0);
 	held_end(p, what, begun);
 	envelope_fini(&env);

@@ -44,11 +44,6 @@ static bool waits(const struct session *p, Farm__Envelope__BodyCase what)
 	return is_request(p, what) && (!first || p->peers->request_ms > HELD_REQUESTS_MS);
 }
 
-double held_begin(const struct session *p)
-{
-	return jobs_now(p->jobs);
-}
-
 void held_end(struct session *p, Farm__Envelope__BodyCase what, double begun)
 {
 	if (!is_request(p, what))

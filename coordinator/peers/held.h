@@ -20,8 +20,7 @@ void held_drop(struct session *p); /* the peer is gone */
 bool held_next(struct session *p, struct envelope *env);
 /* The session whose first request is next; NULL: none waits, or none may be handled before the next tick. */
 struct session *held_turn(const struct peers *s);
-/* Around the handling of a message: what requests of clients take counts. */
-double held_begin(const struct session *p);
+/* After a message whose handling began then (jobs_now): what requests of clients take counts. */
 void held_end(struct session *p, Farm__Envelope__BodyCase what, double begun);
 
 #endif

@@ -48,11 +48,6 @@ int maker_out_of_memory(struct maker *m)
 			 XML_MEMORY_MAX >> 20);
 }
 
-void *maker_allocate(struct maker *m, size_t count, size_t size)
-{
-	return arena_alloc(m->arena, count, size);
-}
-
 int maker_add_asset(struct maker *m, const char *name, const struct xml_element *by)
 {
 	return asset_list_add(&m->assets, name, by, m->arena) ? maker_out_of_memory(m) : 0;
@@ -62,7 +57,7 @@ static const char *property_name(struct maker *m, const struct xml_element *el, 
 {
 	if (!el->snake)
 		return name;
-	char *snake = maker_allocate(m, 2 * strlen(name) + 1, 1);
+	char *snake = arena_alloc(m->arena, 2 * strlen(name) + 1, 1);
 	if (snake)
 		snake_case(name, snake);
 	return snake;
@@ -112,7 +107,7 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 {
 	const char *here = el->snake ? plugin_new_name(d->decl, name) : name;
 	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, here) : here);
-	const char *written = element_spelling(el, name);
+	const char *written = element_spelling(el, name), *no_effect = "has no effect on light and is ignored";
 	int r = 0;
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
@@ -123,17 +118,18 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		r = note_old_name(&m->notes, owner, el, found->name);
 	/* All BSDFs of 0.6 have it; those whose reflectances can add up to more than 1 have it in their tables. */
 	if (!found && el->snake && d->node->cls == PLUGIN_BSDF && strcmp(name, "ensure_energy_conservation") == 0)
-		return note_property(&m->notes, owner, el, written);
+		return note_parameter(&m->notes, owner, el, written, no_effect);
 	if (!found && is_foreign_parameter(m, d, el, name))
-		return note_foreign_parameter(&m->notes, owner, el, written);
+		return note_parameter(&m->notes, owner, el, written, "is not known and is ignored");
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
 		return leave_out(&m->notes, el, xml_attribute(owner, "type"), written, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
 		return refuse_property(d->decl, d->node->type, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
-		return note_property(&m->notes, owner, el, written);
+		return note_parameter(&m->notes, owner, el, written, no_effect);
 	if ((found->types & VALUE_OF_3) && !m->tree->dialect_3)
-		return note_newer(&m->notes, owner, el, written);
+		return note_parameter(&m->notes, owner, el, written,
+				      "is not a parameter of Mitsuba 0.6 and is ignored, as there");
 	if (found->status == PARAM_DIFFERS)
 		return note_difference(&m->notes, owner, el, written);
 	*p = found;
@@ -302,8 +298,8 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	size_t n = 0;
 	for (const struct xml_element *c = el->first; c; c = c->next)
 		n++;
-	d->properties = maker_allocate(m, n, sizeof *d->properties);
-	d->children = maker_allocate(m, n, sizeof *d->children);
+	d->properties = arena_alloc(m->arena, n, sizeof *d->properties);
+	d->children = arena_alloc(m->arena, n, sizeof *d->children);
 	if (!d->properties || !d->children)
 		return maker_out_of_memory(m);
 	d->node->properties = d->properties;
@@ -397,7 +393,7 @@ int maker_node(struct maker *m, struct xml_element *el, const struct scene_node 
 	const struct plugin_decl *named = decl;
 	if (m->lenient && (r = substitute_lost(&m->notes, m->assets_from, m->decls, el, &type, &decl)))
 		return r;
-	struct draft d = {.node = maker_allocate(m, 1, sizeof *d.node),
+	struct draft d = {.node = arena_alloc(m->arena, 1, sizeof *d.node),
 			  .decl = decl,
 			  .stands_in = stands_in || decl != named,
 			  .nesting = {.height = 1, .objects = 1}};

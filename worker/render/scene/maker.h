@@ -34,7 +34,6 @@ struct maker {
 };
 
 int maker_out_of_memory(struct maker *m); /* -ENOMEM, with its text */
-void *maker_allocate(struct maker *m, size_t count, size_t size);
 /* by: the element that names the file; NULL: an included file. */
 int maker_add_asset(struct maker *m, const char *name, const struct xml_element *by);
 

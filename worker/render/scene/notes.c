@@ -20,18 +20,12 @@ int note(const struct notes *t, const struct xml_element *el, const char *type, 
 	return r;
 }
 
-static int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-			  const char *name, const char *what)
+int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		   const char *name, const char *what)
 {
 	const char *type = xml_attribute(owner, "type");
 	return note(t, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` %s", el->file, el->line, owner->name,
 		    type, name, what);
-}
-
-int note_property(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		  const char *name)
-{
-	return note_parameter(t, owner, el, name, "has no effect on light and is ignored");
 }
 
 int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
@@ -62,17 +56,6 @@ int leave_out(const struct notes *t, const struct xml_element *el, const char *t
 {
 	return note(t, el, type, property, "%s:%d: <%.64s>: %s `%.64s` is not supported and left out (lenient)",
 		    el->file, el->line, el->name, what, *property ? property : type);
-}
-
-int note_foreign_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-			   const char *name)
-{
-	return note_parameter(t, owner, el, name, "is not known and is ignored");
-}
-
-int note_newer(const struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name)
-{
-	return note_parameter(t, owner, el, name, "is not a parameter of Mitsuba 0.6 and is ignored, as there");
 }
 
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,

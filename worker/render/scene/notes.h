@@ -18,15 +18,12 @@ struct notes {
 /* type, property: with the element's name the kind of thing. */
 __attribute__((format(printf, 5, 6))) int note(const struct notes *t, const struct xml_element *el, const char *type,
 					       const char *property, const char *format, ...);
-/* A parameter without effect on light; one that would change it a little; one that only a fork of Mitsuba has. */
-int note_property(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-		  const char *name);
+/* What becomes of a parameter: "is ignored". */
+int note_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
+		   const char *name, const char *what);
+/* One that would change light a little. */
 int note_difference(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		    const char *name);
-int note_foreign_parameter(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
-			   const char *name);
-/* A parameter that only 3.x has, in a file of 0.6. */
-int note_newer(const struct notes *t, const struct xml_element *owner, const struct xml_element *el, const char *name);
 /* A name of 0.6 in a file of 3.x. */
 int note_old_name(const struct notes *t, const struct xml_element *owner, const struct xml_element *el,
 		  const char *name);

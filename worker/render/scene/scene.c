@@ -104,7 +104,7 @@ static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
 	const struct scene_node **objects = default_light_add(m->tree, m->decls, &s->arena)
-						    ? maker_allocate(m, m->tree->element_count, sizeof *objects)
+						    ? arena_alloc(m->arena, m->tree->element_count, sizeof *objects)
 						    : NULL;
 	if (!objects)
 		return maker_out_of_memory(m);
@@ -144,7 +144,7 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 			    .error = m->error,
 			    .lenient = lenient};
 	m->notes = (struct notes){&m->report, m->error};
-	m->tree = maker_allocate(m, 1, sizeof *m->tree);
+	m->tree = arena_alloc(m->arena, 1, sizeof *m->tree);
 	s->file = arena_strdup(&s->arena, name);
 	int r = m->tree && s->file ? report_init(&m->report, &s->arena, m->error) : maker_out_of_memory(m);
 	if (r)

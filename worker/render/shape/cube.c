@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* From -1 to 1 in each direction. */
 #include "worker/render/shape/declare.h"
-#include "worker/render/shape/quad.h"
+#include "worker/render/shape/mesh.h"
 
 /* Each face with its normal and the directions of u and v, as on Mitsuba's cube. Some are left-handed: mesh_finish
  * winds the triangles by their normals. */

@@ -71,3 +71,11 @@ void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, doubl
 	m->uv[i][0] = u;
 	m->uv[i][1] = v;
 }
+
+const double quad_corner[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+
+void quad_set(struct mesh *m, uint32_t triangle, uint32_t first)
+{
+	memcpy(m->index[triangle], (uint32_t[3]){first, first + 1, first + 2}, sizeof m->index[0]);
+	memcpy(m->index[triangle + 1], (uint32_t[3]){first, first + 2, first + 3}, sizeof m->index[0]);
+}

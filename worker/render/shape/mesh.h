@@ -64,4 +64,9 @@ void mesh_move_face(struct mesh *m, uint32_t from, uint32_t to);
 /* Vertex i; n: a unit vector. */
 void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v);
 
+/* Parallelograms. Corners in order around one: (u, v) of each. */
+extern const double quad_corner[4][2];
+/* Two triangles, `triangle` and the next, with the vertices first .. first+3 in order around it. */
+void quad_set(struct mesh *m, uint32_t triangle, uint32_t first);
+
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A square from -1 to 1 in x and y, facing z. */
 #include "worker/render/shape/declare.h"
-#include "worker/render/shape/quad.h"
+#include "worker/render/shape/mesh.h"
 
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
