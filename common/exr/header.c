@@ -14,8 +14,6 @@
 #include <assert.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <string.h>
 #include <time.h>
 
@@ -69,43 +67,33 @@ static void add_double(struct header *h, enum header_name name, double value)
 	a->number = value;
 }
 
-/* Appends to the text being written. */
-__attribute__((format(printf, 2, 3))) static void append(struct header *h, const char *format, ...)
-{
-	va_list ap;
-	va_start(ap, format);
-	int n = vsnprintf(h->text + h->used, HEADER_TEXT - h->used, format, ap);
-	va_end(ap);
-	size_t room = HEADER_TEXT - h->used - 1;
-	h->used += n < 0 ? 0 : (size_t)n < room ? (size_t)n : room;
-}
-
 static void begin_string(struct header *h, enum header_name name)
 {
 	struct exr_attribute *a = add_attribute(h, name, STRING);
 	a->type = EXR_ATTRIBUTE_STRING;
-	a->string = h->text + h->used;
-	h->text[h->used] = 0;
+	a->string = h->rest.at;
+	*h->rest.at = 0;
 }
 
 static void end_string(struct header *h)
 {
-	if (h->used < HEADER_TEXT - 1)
-		h->used++;
-	h->text[h->used] = 0;
+	if (h->rest.left > 1) {
+		h->rest.at++;
+		h->rest.left--;
+	}
 }
 
 static void add_string(struct header *h, enum header_name name, const char *value)
 {
 	begin_string(h, name);
-	append(h, "%s", value);
+	text_put(&h->rest, "%s", value);
 	end_string(h);
 }
 
 static void add_count(struct header *h, enum header_name name, uint64_t value)
 {
 	begin_string(h, name);
-	append(h, "%" PRIu64, value);
+	text_put(&h->rest, "%" PRIu64, value);
 	end_string(h);
 }
 
@@ -218,9 +206,9 @@ static void add_extra(struct header *h, const struct header_extra *x)
 	add_int(h, H_MIXED, x->mixed);
 	begin_string(h, H_EFFECTS);
 	for (size_t i = 0; i < x->effect_count; i++)
-		append(h, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name, x->effects[i].on ? "on" : "off",
-		       x->effects[i].forced ? " (forced)" : "", x->effects[i].why,
-		       x->effects[i].on ? "omitting it would save" : "saves", x->effects[i].saves);
+		text_put(&h->rest, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name,
+			 x->effects[i].on ? "on" : "off", x->effects[i].forced ? " (forced)" : "", x->effects[i].why,
+			 x->effects[i].on ? "omitting it would save" : "saves", x->effects[i].saves);
 	end_string(h);
 	add_double(h, H_WALL, x->wall_seconds);
 	add_double(h, H_CPU, x->cpu_seconds);
@@ -237,7 +225,8 @@ static void add_extra(struct header *h, const struct header_extra *x)
 
 void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x)
 {
-	h->count = h->used = 0;
+	h->count = 0;
+	h->rest = (struct text){h->text, HEADER_TEXT};
 	add_string(h, H_VERSION, HSLT_VERSION);
 	add_plan(h, p, img->rounds, x->inputs);
 	add_result(h, img, p);

@@ -7,6 +7,7 @@
 #ifndef COMMON_EXR_HEADER_H
 #define COMMON_EXR_HEADER_H
 
+#include "common/base/text.h"
 #include "common/estimate/canvas_image.h"
 #include "common/exr/exr_image.h"
 #include "common/plan/plan_text.h"
@@ -46,7 +47,7 @@ struct header {
 	size_t count;
 	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* storage of the strings */
 	char text[HEADER_TEXT];
-	size_t used;
+	struct text rest; /* of the text */
 };
 /* Never fails: text that does not fit is cut. Allocates nothing; h must not be moved afterwards. */
 void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x);

@@ -2,10 +2,10 @@
 #include "worker/render/bsdf/ior.h"
 
 #include "common/base/spelling.h"
+#include "common/base/text.h"
 #include "worker/render/math/spectrum.h"
 #include "worker/render/scene/number.h"
 
-#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
@@ -94,9 +94,9 @@ double ior_eta(const struct ior side[2], double nm)
 
 const char *ior_dispersive_names(char *text, size_t size)
 {
-	size_t used = 0;
-	for (size_t i = 0; i < sizeof laws / sizeof *laws && used < size; i++)
-		used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", laws[i].name);
+	struct text t = {text, size};
+	for (size_t i = 0; i < sizeof laws / sizeof *laws; i++)
+		text_put(&t, "%s%s", i ? ", " : "", laws[i].name);
 	return text;
 }
 

@@ -2,6 +2,7 @@
 #include "worker/render/mutation/mixture.h"
 
 #include "common/base/spelling.h"
+#include "common/base/text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -106,20 +107,17 @@ int mixture_parse(const char *text, struct mixture *out, struct error *e)
 
 void mixture_print(const struct mixture *m, char text[PLAN_MUTATIONS_MAX])
 {
-	size_t used = 0;
+	struct text t = {text, PLAN_MUTATIONS_MAX};
 	memset(text, 0, PLAN_MUTATIONS_MAX);
-	for (unsigned i = 0; i < m->count && used < PLAN_MUTATIONS_MAX; i++) {
+	for (unsigned i = 0; i < m->count; i++) {
 		const struct mixture_entry *entry = &m->entry[i];
-		char forced[16] = "";
-		int n = 0;
-		if (entry->how.b >= 0 || entry->how.c >= 0)
-			n = snprintf(forced, sizeof forced, "@");
+		text_put(&t, "%s%s%s", i ? "," : "", entry->ops->name,
+			 entry->how.b >= 0 || entry->how.c >= 0 ? "@" : "");
 		if (entry->how.b >= 0)
-			n += snprintf(forced + n, sizeof forced - (size_t)n, "b%d", entry->how.b);
+			text_put(&t, "b%d", entry->how.b);
 		if (entry->how.c >= 0)
-			snprintf(forced + n, sizeof forced - (size_t)n, "c%d", entry->how.c);
-		used += (size_t)snprintf(text + used, PLAN_MUTATIONS_MAX - used, "%s%s%s=%.6g", i ? "," : "",
-					 entry->ops->name, forced, entry->weight);
+			text_put(&t, "c%d", entry->how.c);
+		text_put(&t, "=%.6g", entry->weight);
 	}
 }
 

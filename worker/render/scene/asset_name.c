@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/asset_name.h"
 
-#include <stdio.h>
+#include "common/base/text.h"
+
 #include <string.h>
 
 enum { UP = sizeof ASSET_NAME_UP - 1, TOP = sizeof ASSET_NAME_TOP - 1 };
@@ -64,11 +65,11 @@ size_t asset_name_up(const char *canonical, const char **rest)
 const char *asset_name_shown(const char *canonical, char *out, size_t size)
 {
 	const char *rest;
-	size_t used = 0, up = asset_name_up(canonical, &rest);
+	size_t up = asset_name_up(canonical, &rest);
 	bool absolute = up == ASSET_NAME_ABSOLUTE;
-	for (up = absolute ? 1 : up; up > 0 && used < size; up--)
-		used += (size_t)snprintf(out + used, size - used, "%s", absolute ? "/" : "../");
-	if (used < size)
-		snprintf(out + used, size - used, "%s", rest);
+	struct text t = {out, size};
+	for (up = absolute ? 1 : up; up > 0; up--)
+		text_put(&t, "%s", absolute ? "/" : "../");
+	text_put(&t, "%s", rest);
 	return out;
 }

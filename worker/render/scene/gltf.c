@@ -12,6 +12,8 @@
  * parameters has: there it is refused, or left out.
  */
 #include "worker/render/scene/gltf.h"
+
+#include "common/base/text.h"
 #include "worker/render/scene/gltf_animation.h"
 #include "worker/render/scene/gltf_light.h"
 #include "worker/render/scene/gltf_mesh.h"
@@ -120,17 +122,15 @@ static int find_json(struct gltf *g, const char **text, size_t *size)
 static void note_unknown(struct gltf *g)
 {
 	const json_t *used = json_object_get(g->root, "extensionsUsed");
-	char text[512];
-	size_t length = 0;
+	char text[512] = "";
+	struct text t = {text, sizeof text};
 	for (size_t i = 0; i < json_array_size(used); i++) {
 		const char *name = json_string_value(json_array_get(used, i));
-		if (!name || gltf_knows(name))
-			continue;
-		int n = snprintf(text + length, sizeof text - length, "%s%.64s",
-				 length ? ", " : "these extensions are not supported and ignored: ", name);
-		length = n < 0 || length + (size_t)n >= sizeof text ? sizeof text - 1 : length + (size_t)n;
+		if (name && !gltf_knows(name))
+			text_put(&t, "%s%.64s",
+				 *text ? ", " : "these extensions are not supported and ignored: ", name);
 	}
-	if (length)
+	if (*text)
 		gltf_note(g, text);
 }
 

@@ -4,6 +4,8 @@
  * added to the tree after it.
  */
 #include "worker/render/scene/gltf_tree.h"
+
+#include "common/base/text.h"
 #include "worker/render/scene/element_make.h"
 
 #include <math.h>
@@ -230,10 +232,10 @@ void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *
 
 void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m)
 {
-	char text[16 * 26] = "";
-	size_t used = 0;
+	char text[16 * 26];
+	struct text t = {text, sizeof text};
 	for (int i = 0; i < 16; i++)
-		used += (size_t)snprintf(text + used, sizeof text - used, "%s%.17g", i ? " " : "", m->m[i / 4][i % 4]);
+		text_put(&t, "%s%.17g", i ? " " : "", m->m[i / 4][i % 4]);
 	struct xml_element *transform = put_element(g, el, at, "transform", name),
 			   *matrix = transform ? gltf_element(g, transform, at, "matrix") : NULL;
 	gltf_attribute(g, matrix, "value", "%s", text);

@@ -3,6 +3,7 @@
 #include "worker/render/world/effects_text.h"
 
 #include "common/base/spelling.h"
+#include "common/base/text.h"
 #include "worker/render/world/effects.h"
 
 #include <stdio.h>
@@ -131,12 +132,12 @@ void effects_print(const struct effects_choice *c, char text[PLAN_EFFECTS_MAX])
 	for (int i = 0; i < EFFECTS; i++)
 		all &= c->of[i] != 0 || !(effect_table[i].may & EFFECT_MAY_FORCE_ON);
 	all &= c->any_on;
+	struct text t = {text, PLAN_EFFECTS_MAX};
 	memset(text, 0, PLAN_EFFECTS_MAX);
-	size_t used = (size_t)snprintf(text, PLAN_EFFECTS_MAX, "%s", all ? "all" : "");
-	for (int i = 0; i < EFFECTS && used < PLAN_EFFECTS_MAX; i++)
+	text_put(&t, "%s", all ? "all" : "");
+	for (int i = 0; i < EFFECTS; i++)
 		if (c->of[i] < 0 || (c->of[i] > 0 && !all))
-			used += (size_t)snprintf(text + used, PLAN_EFFECTS_MAX - used, "%s%c%s", used ? "," : "",
-						 c->of[i] < 0 ? '-' : '+', effect_table[i].name);
+			text_put(&t, "%s%c%s", *text ? "," : "", c->of[i] < 0 ? '-' : '+', effect_table[i].name);
 }
 
 int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e)
@@ -150,14 +151,12 @@ int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct er
 
 void render_effects_note(const struct render_summary *scene, char *text, size_t size)
 {
-	size_t used = 0;
+	struct text t = {text, size};
 	*text = 0;
-	for (size_t i = 0; i < scene->line_count && used < size; i++) {
-		const struct effect_line *l = &scene->lines[i];
-		if (l->other_scene)
-			used += (size_t)snprintf(text + used, size - used, "%s%s",
-						 used ? ", " : "the image is of another scene: without ", l->name);
-	}
+	for (size_t i = 0; i < scene->line_count; i++)
+		if (scene->lines[i].other_scene)
+			text_put(&t, "%s%s", *text ? ", " : "the image is of another scene: without ",
+				 scene->lines[i].name);
 }
 
 bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size)
