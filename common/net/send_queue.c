@@ -45,7 +45,7 @@ struct writing {
 	size_t size, plain; /* what it counts for in in_flight and in unsent */
 };
 
-static uint64_t now(const struct send_queue *q)
+static uint64_t loop_ms(const struct send_queue *q)
 {
 	return uv_now(q->stream->loop);
 }
@@ -53,7 +53,7 @@ static uint64_t now(const struct send_queue *q)
 /* Bytes of frames wait, or no longer do. */
 static bool count(struct send_queue *q, size_t bytes)
 {
-	if (!send_pool_add(&q->share, bytes, now(q)))
+	if (!send_pool_add(&q->share, bytes, loop_ms(q)))
 		return false;
 	q->unsent += bytes;
 	return true;
@@ -62,7 +62,7 @@ static bool count(struct send_queue *q, size_t bytes)
 static void count_off(struct send_queue *q, size_t bytes)
 {
 	q->unsent -= bytes;
-	send_pool_sub(&q->share, bytes, now(q));
+	send_pool_sub(&q->share, bytes, loop_ms(q));
 }
 
 static uint64_t left(const struct send_share *s)
@@ -280,7 +280,7 @@ static void send_all(struct send_queue *q, struct head head, unsigned char *byte
 	} else {
 		to_kernel(q, head, bytes, size, skip, size + FRAME_COST);
 	}
-	send_pool_look(&q->share, now(q));
+	send_pool_look(&q->share, loop_ms(q));
 }
 
 void send_queue_frame(struct send_queue *q, unsigned char *frame, size_t size)

@@ -152,7 +152,7 @@ static void give_way(struct send_share *s)
 	drop((struct reader *)((char *)s - offsetof(struct reader, share)));
 }
 
-static uint64_t now(const struct reader *r)
+static uint64_t loop_ms(const struct reader *r)
 {
 	return uv_now(r->pipe.loop);
 }
@@ -162,7 +162,7 @@ static void on_written(uv_write_t *w, int status)
 	struct sending *s = w->data;
 	struct reader *r = w->handle->data;
 	r->unread -= s->answer ? s->line->size : 0;
-	send_pool_sub(&r->share, s->line->size, now(r));
+	send_pool_sub(&r->share, s->line->size, loop_ms(r));
 	release(s->line);
 	mem_free(s);
 	if (status)
@@ -176,7 +176,7 @@ static void send_line(struct reader *r, struct shared *l, bool answer)
 	size_t size = l ? l->size : 0;
 	if (!s || (answer && r->unread > UNREAD_MAX))
 		drop(r);
-	if (r->closing || !send_pool_add(&r->share, size, now(r))) {
+	if (r->closing || !send_pool_add(&r->share, size, loop_ms(r))) {
 		mem_free(s);
 		return;
 	}
@@ -187,12 +187,12 @@ static void send_line(struct reader *r, struct shared *l, bool answer)
 	static char newline[] = "\n";
 	uv_buf_t parts[2] = {uv_buf_init(l->text, (unsigned)size), uv_buf_init(newline, 1)};
 	if (uv_write(&s->request, (uv_stream_t *)&r->pipe, parts, 2, on_written)) {
-		send_pool_sub(&r->share, size, now(r));
+		send_pool_sub(&r->share, size, loop_ms(r));
 		release(l);
 		mem_free(s);
 		drop(r);
 	}
-	send_pool_look(&r->share, now(r));
+	send_pool_look(&r->share, loop_ms(r));
 }
 
 /* Takes the object. */

@@ -18,7 +18,7 @@ struct stream {
 	const unsigned char *at, *end;
 };
 
-static const unsigned char *take(struct stream *s, size_t count)
+static const unsigned char *take_bytes(struct stream *s, size_t count)
 {
 	const unsigned char *from = s->at;
 	if ((size_t)(s->end - s->at) < count)
@@ -30,7 +30,7 @@ static const unsigned char *take(struct stream *s, size_t count)
 /* 16 numbers of `bits`; those whose bits are all ones stand behind, as bytes. */
 static bool read_group(struct stream *s, unsigned bits, unsigned char out[GROUP])
 {
-	const unsigned char *from = take(s, 2 * bits), *whole;
+	const unsigned char *from = take_bytes(s, 2 * bits), *whole;
 	unsigned sentinel = (1u << bits) - 1;
 	if (!from)
 		return false;
@@ -38,7 +38,7 @@ static bool read_group(struct stream *s, unsigned bits, unsigned char out[GROUP]
 		unsigned bit = i * bits, place = bits == 1 ? bit % 8 : 8 - bits - bit % 8,
 			 x = bits ? (unsigned)from[bit / 8] >> place & sentinel : 0;
 		if (bits && bits < 8 && x == sentinel) {
-			if (!(whole = take(s, 1)))
+			if (!(whole = take_bytes(s, 1)))
 				return false;
 			x = *whole;
 		}
@@ -57,13 +57,13 @@ static bool read_plane(struct stream *s, unsigned control, size_t count, unsigne
 		return true;
 	}
 	if (control == AS_THEY_ARE) {
-		const unsigned char *from = take(s, count);
+		const unsigned char *from = take_bytes(s, count);
 		if (from)
 			memcpy(out, from, count);
 		return from != NULL;
 	}
 	size_t groups = (count + GROUP - 1) / GROUP;
-	const unsigned char *header = take(s, (groups + 3) / 4);
+	const unsigned char *header = take_bytes(s, (groups + 3) / 4);
 	for (size_t g = 0; header && g < groups; g++)
 		if (!read_group(s, lengths[control][header[g / 4] >> g % 4 * 2 & 3], out + g * GROUP))
 			return false;
@@ -123,7 +123,7 @@ bool gltf_meshopt_v1(const unsigned char *bytes, size_t size, size_t count, size
 	}
 	for (size_t first = 0, n; first < count; first += n) {
 		n = count - first < most ? count - first : most;
-		const unsigned char *controls = take(&s, channels);
+		const unsigned char *controls = take_bytes(&s, channels);
 		for (size_t c = 0; c < channels; c++)
 			if (!controls ||
 			    !read_channel(&s, controls[c], kinds[c], n, stride, out + first * stride + 4 * c, &last[c]))
