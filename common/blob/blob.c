@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A store is a sorted array of entries (hash, size, holds, last use) that mirrors a folder: opening reads the folder,
- * looking up is a binary search, and only contents are read from the disk.
+ * A store is a sorted array of entries (hash, size, holds) that mirrors a folder: opening reads the folder, looking up
+ * is a binary search, and only contents are read from the disk. An entry that was evicted stays in the array as a
+ * missing one, until a quarter of all are such: a store of a million files loses thousands of them to a large one.
  *
  * Writing: blob_write_begin makes a temporary file, blob_write_add makes room, appends and hashes, blob_write_commit
  * compares the hash, flushes unless the store is a cache, renames and adds the entry. Until then the blob does not
@@ -26,6 +27,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+enum { BLOCK = 4096, EVICTIONS = 8 /* at once, whatever the size */ };
 
 struct blob_writer {
 	struct blob_store *store;
@@ -95,15 +98,8 @@ static struct blob_entry *add_entry(struct blob_store *s, size_t i, const struct
 	}
 	memmove(&s->entries[i + 1], &s->entries[i], (s->count++ - i) * sizeof *s->entries);
 	s->entries[i] = n;
-	*n = (struct blob_entry){.hash = *h, .used = ++s->clock};
+	*n = (struct blob_entry){.hash = *h, .gone = true};
 	return n;
-}
-
-static void remove_entry(struct blob_store *s, size_t i)
-{
-	s->bytes -= s->entries[i]->size;
-	mem_free(s->entries[i]);
-	memmove(&s->entries[i], &s->entries[i + 1], (--s->count - i) * sizeof *s->entries);
 }
 
 static int by_hash(const void *a, const void *b)
@@ -166,8 +162,11 @@ static int read_folder(struct blob_store *s, struct error *e)
 	for (size_t i = 0; !rc && i < count; i++) {
 		struct blob_entry *n = add_entry(s, i, &all[i].hash, e);
 		rc = n ? 0 : -ENOMEM;
-		if (n)
+		if (n) {
 			s->bytes += n->size = all[i].size;
+			n->gone = false;
+			blob_idle_enter(s, n);
+		}
 	}
 	if (s->count)
 		qsort(s->entries, s->count, sizeof *s->entries, by_hash);
@@ -177,16 +176,18 @@ static int read_folder(struct blob_store *s, struct error *e)
 
 bool blob_store_evict(struct blob_store *s)
 {
-	size_t oldest = s->count;
+	struct blob_entry *oldest = TAILQ_FIRST(&s->idle);
 	char path[BLOB_PATH_MOST];
-	for (size_t i = 0; i < s->count; i++)
-		if (!s->entries[i]->holds && (oldest == s->count || s->entries[i]->used < s->entries[oldest]->used))
-			oldest = i;
-	if (oldest == s->count)
+	if (!oldest)
 		return false;
-	blob_path(s, &s->entries[oldest]->hash, path, sizeof path);
+	blob_path(s, &oldest->hash, path, sizeof path);
 	disk_unlink(path);
-	remove_entry(s, oldest);
+	blob_idle_leave(s, oldest);
+	s->bytes -= oldest->size;
+	oldest->size = 0;
+	oldest->gone = true;
+	if (++s->evicted > s->count / 4)
+		blob_store_sweep(s);
 	return true;
 }
 
@@ -199,21 +200,22 @@ static int exceeds(const struct blob_store *s, uint64_t need, struct error *e)
 /* Whether `need` more bytes would fit into the limit beside the blobs that somebody holds. */
 static int could_fit(const struct blob_store *s, uint64_t need, struct error *e)
 {
-	uint64_t used = s->bytes;
+	uint64_t used = s->bytes - s->idle_bytes;
 	if (!s->limit)
 		return 0;
 	if (need > s->limit)
 		return error_set(e, EMSGSIZE, "%s: a file of %llu bytes exceeds its limit of %llu", s->folder,
 				 (unsigned long long)need, (unsigned long long)s->limit);
-	for (size_t i = 0; i < s->count && used > s->limit - need; i++)
-		used -= s->entries[i]->holds ? 0 : s->entries[i]->size;
 	return used > s->limit - need ? exceeds(s, need, e) : 0;
 }
 
-/* Evicts blobs until `need` more bytes fit into the limit. */
+/* Evicts blobs until `need` more bytes fit into the limit, but only as many as may have so much on the disk, where the
+ * smallest takes a block: of files of a few bytes, a megabyte would be tens of thousands, and seconds. What is left
+ * over the limit then goes with the next bytes. */
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
-	while (s->limit && s->bytes + s->arrived + need > s->limit)
+	uint64_t most = need / BLOCK + EVICTIONS;
+	while (s->limit && s->bytes + s->arrived + need > s->limit && most--)
 		if (!blob_store_evict(s))
 			return exceeds(s, need, e);
 	return 0;
@@ -227,6 +229,7 @@ int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit,
 		return error_set(e, ENOMEM, "no memory for a blob store");
 	}
 	s->limit = limit;
+	TAILQ_INIT(&s->idle);
 	int rc = strlen(folder) < BLOB_PATH_MOST - 2 * BLOB_HEX_SIZE
 			 ? disk_make_folder(folder, e)
 			 : error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
@@ -269,7 +272,8 @@ static bool make_disk_room(struct blob_store *s)
 
 void blob_store_trim(struct blob_store *s)
 {
-	make_room(s, 0, NULL);
+	while (s->limit && s->bytes + s->arrived > s->limit && blob_store_evict(s))
+		continue;
 }
 
 static struct blob_entry *touch(struct blob_store *s, const struct blob_hash *h)
@@ -279,7 +283,10 @@ static struct blob_entry *touch(struct blob_store *s, const struct blob_hash *h)
 		return NULL;
 	char path[BLOB_PATH_MOST];
 	blob_path(s, h, path, sizeof path);
-	n->used = ++s->clock;
+	if (!n->holds) {
+		blob_idle_leave(s, n);
+		blob_idle_enter(s, n);
+	}
 	if (s->limit)
 		disk_touch(path);
 	return n;
@@ -297,7 +304,7 @@ bool blob_hold(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = touch(s, h);
 	if (n)
-		n->holds++;
+		blob_take(s, n);
 	return n != NULL;
 }
 
@@ -305,7 +312,7 @@ void blob_release(struct blob_store *s, const struct blob_hash *h)
 {
 	struct blob_entry *n = blob_find(s, h);
 	if (n && n->holds)
-		n->holds--;
+		blob_put(s, n);
 }
 
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e)
@@ -336,13 +343,11 @@ int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e
 	if (blob_hold(s, h))
 		return 0;
 	struct blob_entry *n = blob_find(s, h);
-	if (!n) {
+	if (!n)
 		n = add_entry(s, place_of(s, h), h, e);
-		if (!n)
-			return -ENOMEM;
-		n->gone = true;
-	}
-	n->holds++;
+	if (!n)
+		return -ENOMEM;
+	blob_take(s, n);
 	return 0;
 }
 
@@ -438,13 +443,12 @@ static int check_written(struct blob_writer *w, struct error *e)
 	return 0;
 }
 
-/* Its file is there, and right. */
+/* Its file is there, and right. It is held. */
 static void come_back(struct blob_store *s, struct blob_entry *n, uint64_t size)
 {
 	n->gone = n->given = false;
 	n->size = size;
 	s->bytes += size;
-	n->used = ++s->clock;
 	n->checked = clock_seconds();
 }
 
@@ -540,7 +544,8 @@ bool blob_let_go(struct blob_store *s, const struct blob_kept *kept)
 {
 	s->arrived -= kept->size;
 	struct blob_entry *n = blob_find(s, &kept->hash); /* it is held */
-	return --n->holds == 0 && n->gone;
+	blob_put(s, n);
+	return n->holds == 0 && n->gone;
 }
 
 void blob_store_sweep(struct blob_store *s)
@@ -554,4 +559,5 @@ void blob_store_sweep(struct blob_store *s)
 			s->entries[left++] = n;
 	}
 	s->count = left;
+	s->evicted = 0;
 }

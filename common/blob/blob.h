@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Blobs named by their SHA-256: files in a folder, stored atomically (temporary file, check, fsync, rename, fsync of
- * the folder). A store with a limit evicts the least recently used blobs, but none that is held. One thread at a time
- * per store; the hashing functions from any thread. SHA-256 comes from OpenSSL's EVP.
+ * the folder). A store with a limit evicts the blobs that were least recently used or released, but none that is held.
+ * One thread at a time per store; the hashing functions from any thread. SHA-256 comes from OpenSSL's EVP.
  */
 #ifndef COMMON_BLOB_BLOB_H
 #define COMMON_BLOB_BLOB_H

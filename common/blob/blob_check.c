@@ -39,7 +39,7 @@ int blob_check_begin(struct blob_check **out, struct blob_store *s, const struct
 	*c = (struct blob_check){
 		.store = s, .hash = *h, .begun = clock_seconds(), .was_given = n->given, .fd = -1, .rc = 0};
 	n->given = false; /* what is given from now on may be read too late for this check */
-	n->holds++;
+	blob_take(s, n);
 	n->checks++;
 	*out = c;
 	return 1;
@@ -138,7 +138,7 @@ int blob_check_end(struct blob_check *c, struct error *e)
 	} else {
 		n->checked = clock_seconds();
 	}
-	n->holds--;
+	blob_put(s, n);
 	n->checks--;
 	if (c->fd >= 0)
 		disk_close(c->fd);

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A store of many small files makes room in steps whose time does not grow with the number of its files: as many files
+ * go for some bytes as those bytes have blocks on the disk, each without a look at the others. What was used or
+ * released last goes last.
+ */
+#include "common/base/disk.h"
+#include "common/blob/blob.h"
+#include "common/blob/blob_state.h"
+#include "tests/support/folder.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+enum { FEW = 4000, MANY = 60000, SIZE = 10, CHUNK = 1 << 20 };
+
+static double user_seconds(void)
+{
+	struct rusage u;
+	getrusage(RUSAGE_SELF, &u);
+	return (double)u.ru_utime.tv_sec + 1e-6 * (double)u.ru_utime.tv_usec;
+}
+
+static struct blob_hash hash_of_number(unsigned i)
+{
+	struct blob_hash h = {{0}};
+	uint32_t mixed = i * UINT32_C(2654435761); /* so that they do not lie in order */
+	memcpy(h.bytes, &mixed, sizeof mixed);
+	return h;
+}
+
+/* Files whose names nobody compares with their contents. */
+static struct blob_store *store_of(unsigned count, uint64_t limit)
+{
+	struct blob_store *s;
+	struct error e;
+	for (unsigned i = 0; i < count; i++) {
+		char hex[BLOB_HEX_SIZE], path[4096];
+		struct blob_hash h = hash_of_number(i);
+		blob_hex(&h, hex);
+		snprintf(path, sizeof path, "%s/%s", folder, hex);
+		int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+		assert_true(fd >= 0);
+		assert_int_equal(write(fd, "0123456789", SIZE), SIZE);
+		close(fd);
+	}
+	assert_int_equal(blob_store_open(&s, folder, limit, &e), 0);
+	return s;
+}
+
+/* For what is no file here nothing is to be removed. */
+static int no_unlink(const char *path)
+{
+	(void)path;
+	return 0;
+}
+
+/* User time of so many evictions of a store of `count` files. */
+static double time_of_evictions(unsigned count)
+{
+	struct disk none = disk_system;
+	struct blob_store *s = store_of(count, 0);
+	none.unlink = no_unlink;
+	disk_use(&none);
+	double begun = user_seconds();
+	for (unsigned i = 0; i < FEW; i++)
+		assert_true(blob_store_evict(s));
+	double took = user_seconds() - begun;
+	disk_use(NULL);
+	blob_store_close(s);
+	return took;
+}
+
+static void each_without_a_look_at_others(void **state)
+{
+	(void)state;
+	double few = time_of_evictions(FEW);
+	double many = time_of_evictions(MANY);
+	if (many > 8 * few + 0.05)
+		fail_msg("%d evictions of %d files took %g s, of %d files %g s", FEW, FEW, few, MANY, many);
+}
+
+/* A megabyte is 256 blocks. */
+static void as_many_as_blocks(void **state)
+{
+	(void)state;
+	static char chunk[CHUNK];
+	const uint64_t limit = FEW * SIZE + CHUNK;
+	struct blob_store *s = store_of(FEW, limit);
+	struct blob_writer *w;
+	struct blob_hash large = hash_of_number(FEW);
+	struct error e;
+	uint64_t left = FEW;
+	assert_int_equal(blob_write_begin(&w, s, &large, limit, &e), 0);
+	assert_int_equal(blob_write_add(w, chunk, CHUNK, &e), 0);
+	assert_int_equal(s->bytes, left * SIZE);
+	while (blob_write_at(w) < limit) {
+		uint64_t size = limit - blob_write_at(w), before = left;
+		assert_int_equal(blob_write_add(w, chunk, size > 8192 ? 8192 : size, &e), 0);
+		left = s->bytes / SIZE;
+		assert_in_range(before - left, 1, 2 + 8);
+	}
+	blob_write_abort(w);
+	blob_store_trim(s);
+	assert_true(s->bytes <= limit);
+	blob_store_close(s);
+}
+
+/* All go in the end, and none that is held: counted in bytes and in entries. */
+static void all_but_those_that_are_held(void **state)
+{
+	(void)state;
+	struct blob_store *s = store_of(FEW, 0);
+	struct blob_hash first = hash_of_number(0), used = hash_of_number(1), held = hash_of_number(2);
+	struct error e;
+	uint64_t size;
+	assert_true(blob_hold(s, &held) && blob_hold(s, &held));
+	blob_release(s, &held); /* one hold is left */
+	assert_true(blob_hold(s, &first));
+	int fd = blob_open(s, &used, &size, &e);
+	assert_true(fd >= 0);
+	close(fd);
+	blob_release(s, &first);
+	for (unsigned i = 0; i < FEW - 3; i++)
+		assert_true(blob_store_evict(s));
+	assert_true(blob_has(s, &used, NULL) && blob_has(s, &first, NULL));
+	assert_true(blob_store_evict(s));
+	assert_false(blob_has(s, &used, NULL));
+	assert_true(blob_store_evict(s));
+	assert_false(blob_has(s, &first, NULL));
+	assert_false(blob_store_evict(s));
+	assert_true(blob_has(s, &held, NULL));
+	assert_int_equal(s->bytes, SIZE);
+	assert_int_equal(s->idle_bytes, 0);
+	assert_in_range(s->count, 1, 2);
+	blob_release(s, &held);
+	assert_true(blob_store_evict(s));
+	blob_store_close(s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(each_without_a_look_at_others, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(as_many_as_blocks, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(all_but_those_that_are_held, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
