@@ -24,7 +24,7 @@
 
 enum {
 	READ_BYTES = 1 << 16,
-	FRAMES_AT_ONCE = 16, /* after a read with more of them, others are read first */
+	FRAMES_AT_ONCE = 16, /* after these, others are read first */
 	TICK_MS = 250,
 	TICK_MS_MOST = 1000, /* if nothing is due earlier */
 	LINGER_MS = 5000,
@@ -37,6 +37,7 @@ enum {
 struct conn {
 	uv_tcp_t tcp;
 	uv_timer_t timer;
+	uv_idle_t later; /* a timer of 0 ms would be called again and again before anything else */
 	uv_connect_t connecting;
 	struct conn_config config;
 	const struct conn_events *events;
@@ -53,7 +54,10 @@ struct conn {
 			    */
 	size_t paced;
 	int open_handles;
-	unsigned frames; /* in the last read */
+	struct buf rest; /* plaintext that was read, and waits for the loop to come round; from rest_at on */
+	size_t rest_at;
+	bool goes_on;	 /* the rest, or what the link has: until then nothing is read from the socket */
+	unsigned frames; /* delivered since others were read */
 	bool accepted, sniffed;
 	bool distrust, garbled;
 	char why[256];
@@ -76,6 +80,7 @@ static void on_handle_closed(uv_handle_t *h)
 		return;
 	c->events->closed(c->user, c->why);
 	frame_reader_fini(&c->reader);
+	buf_fini(&c->rest);
 	give_back(c);
 	tls_link_free(c->link);
 	send_queue_fini(&c->out);
@@ -90,6 +95,7 @@ void conn_close(struct conn *c, const char *why)
 	if (!c->linger_until)
 		text_copy(c->why, sizeof c->why, why);
 	uv_close((uv_handle_t *)&c->timer, on_handle_closed);
+	uv_close((uv_handle_t *)&c->later, on_handle_closed);
 	uv_close((uv_handle_t *)&c->tcp, on_handle_closed);
 }
 
@@ -116,14 +122,17 @@ static void tick_every(struct conn *c, uint64_t ms)
 /* ---- reading ---- */
 
 /* libuv reads a connection again and again while there is something to read, up to 32 times before any other. Without
- * room it goes on to the next connection. What closed connections hold is freed when the loop comes round; until then
- * no requests are read whose answers would need memory, too. */
+ * room it goes on to the next connection. Of a read with thousands of short frames the rest waits likewise
+ * (go_on_later): hundreds of connections may send as much at once, and others wait for all of them. What closed
+ * connections hold is freed when the loop comes round; until then no requests are read whose answers would need memory,
+ * too. */
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 {
 	(void)suggested;
 	struct conn *c = h->data;
-	bool pause = c->frames > FRAMES_AT_ONCE || (c->config.sending && c->config.sending->leaving);
-	c->frames = 0;
+	bool full = c->frames >= FRAMES_AT_ONCE, pause = full || (c->config.sending && c->config.sending->leaving);
+	if (full)
+		c->frames = 0;
 	*out = uv_buf_init(chunk, pause ? 0 : sizeof chunk);
 }
 
@@ -143,16 +152,22 @@ static void deliver(struct conn *c)
 
 static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b);
 
+/* Unless what was read before comes first, or the pool has no room. */
+static void read_socket(struct conn *c)
+{
+	if (c->goes_on || c->turn.waits || c->out.state == SEND_CLOSED)
+		return;
+	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
+	if (rc)
+		conn_close(c, uv_strerror(rc));
+}
+
 /* The pool has room for its frame. */
 static void read_on(struct receive_turn *t)
 {
 	struct conn *c = (struct conn *)((char *)t - offsetof(struct conn, turn));
-	if (c->out.state == SEND_CLOSED)
-		return;
 	c->last_read = c->frame_begun = c->paced_at = clock_of(c);
-	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
-	if (rc)
-		conn_close(c, uv_strerror(rc));
+	read_socket(c);
 }
 
 /* Whoever has the peer's certificate, or its address. */
@@ -199,12 +214,14 @@ static void keep_pace(struct conn *c)
 	c->paced_at = c->last_read;
 }
 
-/* Frames in plaintext, after decryption. */
-static void receive(struct conn *c, const unsigned char *bytes, size_t size)
+static void on_later(uv_idle_t *h);
+
+/* Some frames in plaintext: how many bytes were used. */
+static size_t take_frames(struct conn *c, const unsigned char *bytes, size_t size)
 {
 	size_t at = 0;
 	c->last_read = clock_of(c);
-	while (at < size && c->out.state == SEND_OPEN) {
+	while (at < size && c->out.state == SEND_OPEN && c->frames < FRAMES_AT_ONCE) {
 		struct error e;
 		size_t used;
 		bool was_midway = frame_reader_is_midway(&c->reader);
@@ -223,12 +240,36 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
 			give_back(c);
 		}
 	}
+	return at;
+}
+
+/* All that was read has been used. */
+static void wait_for_more(struct conn *c)
+{
 	if (!frame_reader_is_midway(&c->reader) || c->out.state != SEND_OPEN)
 		return;
 	take_turn(c);
 	keep_pace(c);
 	if (c->events->partial)
 		c->events->partial(c->user);
+}
+
+/* Frames in plaintext, after decryption. */
+static void receive(struct conn *c, const unsigned char *bytes, size_t size)
+{
+	size_t at = take_frames(c, bytes, size);
+	c->goes_on = at < size && c->out.state == SEND_OPEN;
+	if (!c->goes_on) {
+		wait_for_more(c);
+		return;
+	}
+	c->rest.limit = READ_BYTES;
+	if (!buf_append(&c->rest, bytes + at, size - at)) {
+		conn_close(c, "no memory for what it sent");
+		return;
+	}
+	uv_read_stop((uv_stream_t *)&c->tcp);
+	uv_idle_start(&c->later, on_later);
 }
 
 /* Tells the peer the reason, if there is one, and gives it time to read: the kernel would discard it if data arrived
@@ -245,12 +286,12 @@ static void refuse(struct conn *c, int rc, const char *why)
 		conn_close(c, why);
 }
 
-/* Encrypted bytes; with none, starts the handshake. */
-static void take_encrypted(struct conn *c, const void *bytes, size_t size)
+/* What the link has, until a rest of it has to wait. */
+static void decrypt(struct conn *c)
 {
 	struct error e;
-	ssize_t n = tls_link_take(c->link, bytes, size, &e);
-	while (n >= 0 && c->out.state != SEND_CLOSED) {
+	ssize_t n = 1;
+	while (n > 0 && c->out.state != SEND_CLOSED && !c->goes_on) {
 		bool was_open = tls_link_is_open(c->link);
 		n = tls_link_read(c->link, chunk, sizeof chunk, &e);
 		send_queue_flush(&c->out);
@@ -263,13 +304,42 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 		}
 		if (n > 0)
 			receive(c, (const unsigned char *)chunk, (size_t)n);
-		else if (n == 0)
-			return;
 	}
 	if (n < 0 && c->out.state != SEND_CLOSED) {
 		send_queue_flush(&c->out);
 		refuse(c, (int)n, e.text);
 	}
+}
+
+/* Encrypted bytes; with none, starts the handshake. */
+static void take_encrypted(struct conn *c, const void *bytes, size_t size)
+{
+	struct error e;
+	int rc = tls_link_take(c->link, bytes, size, &e);
+	if (!rc) {
+		decrypt(c);
+	} else if (c->out.state != SEND_CLOSED) {
+		send_queue_flush(&c->out);
+		refuse(c, rc, e.text);
+	}
+}
+
+/* The loop has come round. */
+static void on_later(uv_idle_t *h)
+{
+	struct conn *c = h->data;
+	c->frames = 0;
+	c->rest_at += take_frames(c, c->rest.bytes + c->rest_at, c->rest.size - c->rest_at);
+	c->goes_on = c->out.state == SEND_OPEN && c->rest_at < c->rest.size;
+	if (c->goes_on)
+		return;
+	uv_idle_stop(h);
+	buf_fini(&c->rest);
+	c->rest_at = 0;
+	wait_for_more(c);
+	if (c->link && c->out.state < SEND_REFUSED)
+		decrypt(c);
+	read_socket(c);
 }
 
 /* No frame begins like a TLS record. */
@@ -399,8 +469,9 @@ static int conn_new(struct conn **out, uv_loop_t *loop, bool accepted, const str
 		return error_set(e, -rc, "no socket: %s", uv_strerror(rc));
 	}
 	uv_timer_init(loop, &c->timer);
-	c->tcp.data = c->timer.data = c->connecting.data = c;
-	c->open_handles = 2;
+	uv_idle_init(loop, &c->later);
+	c->tcp.data = c->timer.data = c->later.data = c->connecting.data = c;
+	c->open_handles = 3;
 	c->ticked = uv_now(loop);
 	uv_timer_start(&c->timer, on_tick, TICK_MS, TICK_MS);
 	*out = c;
