@@ -55,8 +55,9 @@ struct jobs {
 	void (*stop)(void *user);	   /* the loop is to end, for the reason `fault` */
 	void *stop_user;
 	uv_loop_t *loop;
-	uv_timer_t wake, drain; /* drain: for results that waited for a canvas */
-	double read;		/* s: all messages that arrived before have been read from all sockets */
+	uv_timer_t wake;
+	uv_idle_t drain; /* while results are left that waited for a canvas */
+	double read;	 /* s: all messages that arrived before have been read from all sockets */
 	struct farm *farm;
 	struct spool *spool;
 	struct blob_store *blobs;

@@ -5,8 +5,8 @@
  * jobs_open opens the spool and the ledger, lists the jobs that have ended, makes the core and starts to read those
  * that had not (recovery.c). After each step of the core: finishes jobs that have ended, merges results that waited for
  * others, and starts a checkpoint if one is due. When films are free again: the same without checkpoints; then results
- * that arrived while the films were read follow, one at a time, by the timer `drain`. An error of the spool ends the
- * start with a sentence; jobs_close then closes what was opened.
+ * that arrived while the films were read follow, one in each turn of the loop, by `drain`. An error of the spool ends
+ * the start with a sentence; jobs_close then closes what was opened.
  */
 #include "coordinator/jobs/start.h"
 
@@ -30,19 +30,19 @@
 #include "coordinator/retention/keep.h"
 
 /* One at a time, so that nobody else waits for all of them. */
-static void on_drain(uv_timer_t *t)
+static void on_drain(uv_idle_t *h)
 {
-	struct jobs *jobs = t->data;
+	struct jobs *jobs = h->data;
 	struct live_job *job = jobs->live;
 	while (job && (job->busy || STAILQ_EMPTY(&job->waiting) || files_are_read(jobs, job)))
 		job = job->next;
-	if (!job)
+	if (!job) {
+		uv_idle_stop(h);
 		return;
+	}
 	struct waiting_batch *w = live_job_take_waiting(job);
 	results_take_waiting(jobs, w);
 	waiting_batch_free(w);
-	if (!jobs->stopping)
-		uv_timer_start(&jobs->drain, on_drain, 0, 0);
 }
 
 static void stepped(struct jobs *jobs)
@@ -55,7 +55,7 @@ static void stepped(struct jobs *jobs)
 static void films_free(struct jobs *jobs)
 {
 	if (!jobs->stopping)
-		uv_timer_start(&jobs->drain, on_drain, 0, 0);
+		uv_idle_start(&jobs->drain, on_drain);
 	finish_ended(jobs);
 	late_feed(jobs);
 }
@@ -111,7 +111,7 @@ void jobs_init(struct jobs *jobs)
 	STAILQ_INIT(&jobs->parked);
 	STAILQ_INIT(&jobs->checks);
 	uv_timer_init(jobs->loop, &jobs->wake);
-	uv_timer_init(jobs->loop, &jobs->drain);
+	uv_idle_init(jobs->loop, &jobs->drain);
 	jobs->wake.data = jobs->drain.data = jobs;
 	jobs->read = jobs_now(jobs);
 }

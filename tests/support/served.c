@@ -26,6 +26,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -35,6 +36,9 @@ static char folder[64];
 static pid_t server;
 static uint16_t port;
 static void (*prepare)(const char *path);
+static struct {
+	_Atomic unsigned count, at_once;
+} * turns; /* of its loop; shared with it */
 
 /* While the folder has a file `busy` nobody may look at the films of jobs. */
 static void on_look(uv_timer_t *t)
@@ -61,21 +65,52 @@ static void on_look(uv_timer_t *t)
 		abort();
 }
 
+static void on_turn(uv_prepare_t *h)
+{
+	static unsigned before;
+	struct server *s = h->data;
+	unsigned now = 0;
+	const struct waiting_batch *w;
+	for (struct live_job *job = s->jobs.live; job; job = job->next)
+		STAILQ_FOREACH(w, &job->waiting, next)
+			now++;
+	if (before > now && before - now > turns->at_once)
+		turns->at_once = before - now;
+	before = now;
+	turns->count++;
+}
+
 static int serve(const struct server_config *c)
 {
 	struct server *s;
 	struct error e;
 	uv_timer_t look;
+	uv_prepare_t turn;
 	if (server_open(&s, c, &e))
 		return 1;
 	look.data = s;
 	uv_timer_init(&s->loop, &look);
 	uv_timer_start(&look, on_look, 5, 5);
 	uv_unref((uv_handle_t *)&look);
+	turn.data = s;
+	uv_prepare_init(&s->loop, &turn);
+	uv_prepare_start(&turn, on_turn);
+	uv_unref((uv_handle_t *)&turn);
 	uv_run(&s->loop, UV_RUN_DEFAULT);
 	uv_close((uv_handle_t *)&look, NULL);
+	uv_close((uv_handle_t *)&turn, NULL);
 	server_close(s);
 	return 0;
+}
+
+unsigned served_turn(void)
+{
+	return turns->count;
+}
+
+unsigned served_at_once(void)
+{
+	return turns->at_once;
 }
 
 const char *served_folder(void)
@@ -110,6 +145,9 @@ int served_start(double hello_seconds, double heartbeat_seconds, double stall_se
 	snprintf(status, sizeof status, "%s/status", folder);
 	if (prepare)
 		prepare(spool);
+	turns = mmap(NULL, sizeof *turns, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	if (turns == MAP_FAILED)
+		return -1;
 	fflush(NULL);
 	server = fork();
 	if (server == 0) {
@@ -141,6 +179,7 @@ int served_stop(void **state)
 	kill(server, SIGTERM);
 	waitpid(server, &status, 0);
 	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	munmap(turns, sizeof *turns);
 	return system(command) || !WIFEXITED(status) || WEXITSTATUS(status);
 }
 
