@@ -136,12 +136,16 @@ static void submit(struct session *p)
 	client_upload_abort(p);
 }
 
+static void on_looks(uv_idle_t *h);
+
 /* Asks for the files that the store lacks; those that it has are read first. */
 static void look_for_files(struct session *p)
 {
 	struct error e;
 	int rc = upload_look(p->upload, p->jobs, &e);
-	if (rc == -EINPROGRESS)
+	if (rc == -EAGAIN)
+		uv_idle_start(&p->peers->looks, on_looks);
+	if (rc == -EAGAIN || rc == -EINPROGRESS)
 		return;
 	if (!rc && p->upload->missing_count == 0) {
 		submit(p);
@@ -154,6 +158,23 @@ static void look_for_files(struct session *p)
 	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
 	p->upload->pace.paced = jobs_now(p->jobs);
 	answer_submit(p, 0, "", p->upload);
+}
+
+/* In each turn of the loop one submission goes on, in turns with others. */
+static void on_looks(uv_idle_t *h)
+{
+	struct peers *s = h->data;
+	struct session *next = NULL;
+	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
+		if (p->state == SESSION_CLIENT && p->upload && p->upload->looks_later &&
+		    (!next || p->turn < next->turn))
+			next = p;
+	if (!next) {
+		uv_idle_stop(h);
+		return;
+	}
+	next->turn = ++s->requests;
+	look_for_files(next);
 }
 
 /* It has sent less than PACE bytes for twice the time within which a frame must be complete. */

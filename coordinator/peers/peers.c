@@ -96,6 +96,7 @@ void peers_stop(struct peers *s)
 {
 	for (unsigned i = 0; i < s->listener_count; i++)
 		uv_close((uv_handle_t *)&s->listeners[i].tcp, NULL);
+	uv_close((uv_handle_t *)&s->looks, NULL);
 	for (struct session *p = LIST_FIRST(&s->sessions); p; p = LIST_NEXT(p, next))
 		conn_close(p->conn, "the coordinator stops");
 }
@@ -170,6 +171,8 @@ static uint64_t uploading(struct peers *s, uint64_t peer)
 
 void peers_init(struct peers *s)
 {
+	uv_idle_init(s->jobs->loop, &s->looks);
+	s->looks.data = s;
 	s->receiving.limit = s->jobs->config.receive_bytes;
 	s->sending.limit = s->jobs->config.send_bytes;
 	s->jobs->peers = (struct peer_calls){.user = s,

@@ -76,6 +76,7 @@ struct peers {
 	unsigned listener_count;
 	LIST_HEAD(, session) sessions;
 	LIST_HEAD(, session) by_id[SESSION_BUCKETS];
+	uv_idle_t looks; /* while submissions look for their files */
 	unsigned session_count, fetches;
 	size_t held_bytes;   /* bytes of waiting requests */
 	uint64_t requests;   /* of clients: number of the last one */

@@ -22,6 +22,7 @@
 #include <string.h>
 
 enum { FILES_MAX = 10000, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
+enum { LOOKS_AT_ONCE = 64 /* a millisecond, on a disk that answers at once */ };
 /* Mutations or samples of a lease whose length was asked for: some minutes of a thread in usual scenes, an hour where
  * each is 30 us. Without that a mistyped --epoch takes a farm from all others for days. */
 enum { LEASE_MOST = 1 << 27 };
@@ -295,7 +296,12 @@ bool upload_is_looking(const struct upload *u)
 int upload_look(struct upload *u, struct jobs *jobs, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
-	while (upload_is_looking(u)) {
+	u->looks_later = false;
+	for (int i = 0; upload_is_looking(u); i++) {
+		if (i == LOOKS_AT_ONCE) {
+			u->looks_later = true;
+			return -EAGAIN;
+		}
 		struct blob_hash h = file_hash_from_wire(m->files[u->looked]);
 		int rc = blob_has(u->blobs, &h, NULL) ? files_check(jobs, &h, NULL) : -ENOENT;
 		if (rc == -EINPROGRESS)

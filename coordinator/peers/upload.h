@@ -24,6 +24,7 @@ struct upload {
 	uint32_t *by_hash;    /* the files, sorted by hash */
 	bool *arrived;	      /* by place in by_hash: its blob has arrived, and may not be flushed yet */
 	size_t looked;	      /* so many files have been looked for in the store */
+	bool looks_later;     /* for the others, once others have had a turn */
 	size_t missing_count; /* of these, not held */
 	struct blob_writer *writer;
 	struct blob_hash writing;
@@ -39,7 +40,8 @@ struct upload {
 
 /* Takes the envelope of a Submit. bandwidth: as in struct plan_request. -EINVAL with a sentence for the client. */
 int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e);
-/* Then its files are looked for in the store. -EINPROGRESS: one is being read; it goes on after upload_file_read has
+/* Then its files are looked for in the store, some at a time, each of which costs two calls of the system. -EAGAIN:
+ * call it again in another turn of the loop. -EINPROGRESS: one is being read; it goes on after upload_file_read has
  * said true. Otherwise all are known: 0, or -EINVAL with a sentence. */
 int upload_look(struct upload *u, struct jobs *jobs, struct error *e);
 bool upload_is_looking(const struct upload *u);

@@ -24,6 +24,7 @@ enum { FILES = 400 };
 /* Shared with the server. */
 static struct flushes {
 	_Atomic unsigned on_loop, elsewhere;
+	_Atomic unsigned looks_at_once; /* most looks at files in one turn of the loop */
 } * flushes;
 
 static int counted_fsync(int fd)
@@ -35,12 +36,23 @@ static int counted_fsync(int fd)
 	return fsync(fd);
 }
 
+static int counted_stat(const char *path, struct stat *st)
+{
+	static unsigned turn, looks;
+	looks = turn == served_turn() ? looks + 1 : 1;
+	turn = served_turn();
+	if (looks > flushes->looks_at_once)
+		flushes->looks_at_once = looks;
+	return disk_system.stat(path, st);
+}
+
 static void count_flushes(const char *spool)
 {
 	(void)spool;
 	static struct disk counted;
 	counted = disk_system;
 	counted.fsync = counted_fsync;
+	counted.stat = counted_stat;
 	disk_use(&counted);
 }
 
@@ -155,6 +167,12 @@ static void the_loop_flushes_no_file(void **state)
 	assert_in_range(flushes->elsewhere, FILES, 3 * FILES);
 	submit_many(client);
 	assert_int_equal(peer_submit_answer(client)->job, 2); /* none is missing */
+	assert_in_range(flushes->looks_at_once, 1, FILES / 2);
+	struct scripted *other = call_client(); /* and two at once, one of which gives up */
+	submit_many(client);
+	submit_many(other);
+	scripted_hang_up(other);
+	assert_int_equal(peer_submit_answer(client)->job >= 3, true);
 	scripted_hang_up(client);
 }
 
