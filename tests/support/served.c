@@ -23,6 +23,7 @@
 #include <poll.h>
 #include <dirent.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -110,7 +111,7 @@ unsigned served_turn(void)
 
 unsigned served_at_once(void)
 {
-	return turns->at_once;
+	return atomic_exchange(&turns->at_once, 0);
 }
 
 const char *served_folder(void)

@@ -22,7 +22,7 @@ const char *served_folder(void);
 void served_set_busy(bool busy);	      /* nobody may look at the films of its jobs */
 long served_kilobytes(void);		      /* of memory */
 unsigned served_turn(void);		      /* of its loop: a number, also for what a test has put into it */
-unsigned served_at_once(void);		      /* most results that waited and were taken, or left, in one of them */
+unsigned served_at_once(void);		      /* most waiting results taken in one, since the last call */
 unsigned served_open_files(const char *name); /* descriptors of files that have this in their path */
 void served_still_works(void);
 void served_works_again(void); /* when it has noticed that others hung up */

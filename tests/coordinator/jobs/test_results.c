@@ -320,6 +320,7 @@ static void what_is_useless_does_not_wait(void **state)
 	send_bootstrap(other, &d.keys[2]);
 	send_bootstrap(other, &d.keys[0]);
 	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
+	served_at_once(); /* of other tests */
 	served_set_busy(false);
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
