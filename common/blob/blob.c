@@ -315,6 +315,12 @@ void blob_release(struct blob_store *s, const struct blob_hash *h)
 		blob_put(s, n);
 }
 
+bool blob_is_held(struct blob_store *s, const struct blob_hash *h)
+{
+	const struct blob_entry *n = blob_find(s, h);
+	return n && n->holds;
+}
+
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e)
 {
 	char path[BLOB_PATH_MOST], hex[BLOB_HEX_SIZE];

@@ -35,6 +35,7 @@ bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size); 
 /* Held blobs are not evicted; holds are counted. false: not in the store. */
 bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
+bool blob_is_held(struct blob_store *s, const struct blob_hash *h); /* there or not */
 
 /* Holds a blob, present or not: one that is written later is held from the start. -ENOMEM */
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e);

@@ -158,7 +158,7 @@ static int check(struct jobs *jobs, const struct blob_hash *h, double seconds, s
 int files_check(struct jobs *jobs, const struct blob_hash *h, struct error *e)
 {
 	int rc = check(jobs, h, FILES_CHECKED, e);
-	if (rc == -ENOENT)
+	if (rc == -ENOENT && blob_is_held(jobs->blobs, h)) /* a worker may ask for any, thousands of times a second */
 		look_at_all(jobs);
 	return rc;
 }

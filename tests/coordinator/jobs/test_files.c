@@ -4,6 +4,7 @@
  * does.
  */
 #include "common/base/log.h"
+#include "coordinator/jobs/files.h"
 #include "coordinator/store/ledger.h"
 #include "tests/support/folder.h"
 #include "tests/support/staged.h"
@@ -128,6 +129,25 @@ static void complained_of_by_others(void **state)
 	staged_end(SIGTERM, true);
 }
 
+/* A worker asks for a file that no job has: no job's files are looked at. Who did would meet one without a submission.
+ */
+static void of_no_job(void **state)
+{
+	(void)state;
+	static struct live_job job;
+	static struct jobs jobs;
+	struct blob_hash unknown = {{1}};
+	struct error e;
+	STAILQ_INIT(&jobs.checks);
+	jobs.live = &job;
+	assert_int_equal(blob_store_open(&jobs.blobs, folder, 0, &e), 0);
+	assert_int_equal(files_check(&jobs, &unknown, &e), -ENOENT);
+	assert_false(blob_is_held(jobs.blobs, &unknown));
+	assert_int_equal(blob_expect(jobs.blobs, &unknown, &e), 0);
+	assert_true(blob_is_held(jobs.blobs, &unknown));
+	blob_store_close(jobs.blobs);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -135,6 +155,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(complained_of, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(failed_and_left, staged_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(complained_of_by_others, staged_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(of_no_job, folder_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
 	return staged_open() ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
