@@ -327,8 +327,7 @@ static void what_is_useless_does_not_wait(void **state)
 	assert_int_equal(served_at_once(), 1); /* others are read in between */
 	send_bootstrap(worker, &d.keys[0]);    /* nothing else was kept */
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
-	/* Who goes takes along what waits for it. */
-	assert_true(d.count >= 4);
+	assert_true(d.count >= 4); /* who goes takes along what waits for it */
 	served_set_busy(true);
 	send_bootstrap(worker, &d.keys[3]);
 	scripted_hang_up(worker);
