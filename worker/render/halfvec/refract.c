@@ -1,32 +1,44 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Manifold next event estimation's walk (Hanika, Droske and Fascione 2015, sec. 4): the straight line from z to y gives
- * the surfaces and a first guess, halfvec_walk moves the guess to where all half vectors are 0.
+ * the surfaces and a first guess, halfvec_walk moves the guess to where all half vectors are 0. Where that fails and z
+ * lies in a denser medium, as under water beside a wall, a few more lines out of it are tried: that along which light
+ * would arrive if the surface were a plane, and those to points of it (world/refracting.h).
  *
- * It fails where the line meets a surface that does not refract, or more than PATH_REFRACTED_MOST of them, where the
- * walk does not arrive (walk.h), and where the path is a caustic's edge, at which T is infinite. Paths that it does not
- * find are left to the other techniques.
+ * A guess fails where the line meets a surface that does not refract, or more than PATH_REFRACTED_MOST of them, where
+ * the walk does not arrive (walk.h), and where the path is a caustic's edge, at which T is infinite. Paths that are not
+ * found are left to the other techniques.
  */
 #include "worker/render/halfvec/refract.h"
 
 #include "worker/render/halfvec/walk.h"
 #include "worker/render/path/visible.h"
+#include "worker/render/world/refracting.h"
 
 /* Beyond e^300 to either side T would over- or underflow once multiplied by densities. */
 #define LOG_TRANSFER_MOST 300
 
-/* What lies between z and y, the nearest to z first. false: something that does not refract, or nothing. */
-static bool cross(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+/* Whether a ray along d passes v from the denser medium to the thinner. */
+static bool leaves_denser(const struct path_vertex *v, vec3 d)
+{
+	return (vec3_dot(d, v->x.ng) > 0) == (v->bsdf->eta > 1);
+}
+
+/* A first guess of what lies between z and y, the nearest to z first: surfaces on a line from z along d, or y at the
+ * end of it, and behind the first of them straight to y. inside: z is in the denser medium, so light leaves it at the
+ * first. false: something that does not refract, or nothing. */
+static bool cross(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d, bool inside,
 		  struct path_refraction *out)
 {
-	double distance2;
-	const vec3 d = path_direction(z, y, &distance2);
 	const struct path_vertex *from = z;
+	double distance2;
+	path_direction(z, y, &distance2);
 	out->count = 0;
 	while (out->count < PATH_REFRACTED_MOST) {
 		struct path_vertex *v = &out->v[out->count];
-		double end = y->kind == VERTEX_INFINITE ? INFINITY : vec3_length(vec3_sub(y->x.p, from->x.p));
-		if (!path_extend(c, from, d, 0, end, v) || v->kind != VERTEX_SURFACE || !bsdf_refracts(v->bsdf))
+		bool ends = y->kind != VERTEX_INFINITE && !(inside && from == z);
+		if (!path_extend(c, from, d, 0, ends ? sqrt(distance2) : INFINITY, v) || v->kind != VERTEX_SURFACE ||
+		    !bsdf_refracts(v->bsdf) || (inside && from == z && !leaves_denser(v, d)))
 			return false;
 		v->delta = true;
 		v->mode = BSDF_TRANSMIT | BSDF_DELTA;
@@ -34,19 +46,18 @@ static bool cross(struct path_context *c, const struct path_vertex *z, const str
 		if (path_visible(c, v, y))
 			return true;
 		from = v;
+		d = path_direction(v, y, &distance2);
 	}
 	return false;
 }
-
-bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
-		     struct path_refraction *out)
+/* Moves the guess to where light is refracted. */
+static bool walk(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+		 struct path_refraction *out)
 {
 	struct full_path x;
 	struct walk_scratch s;
 	struct walk_target target[PATH_REFRACTED_MOST + 2];
 	const struct walk_limits limits = walk_limits_of(&c->w->accuracy);
-	if (!cross(c, z, y, out))
-		return false;
 	const unsigned m = out->count, b = m + 1;
 	x.edges = b;
 	x.wl = c->wl;
@@ -65,4 +76,42 @@ bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const 
 		out->v[m - j] = x.v[j];
 	out->log_transfer = s.system.log_transfer;
 	return fabs(out->log_transfer) < LOG_TRANSFER_MOST;
+}
+
+static bool guess_straight(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+			   struct path_refraction *out)
+{
+	double distance2;
+	vec3 d = path_direction(z, y, &distance2);
+	return box_is_met(&c->w->refracting, z->x.p, d, y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2)) &&
+	       cross(c, z, y, d, false, out) && walk(c, z, y, out);
+}
+
+/* The direction from z in which light from y would arrive behind a plane through q: Snell's law. */
+static vec3 bent_at(const struct refracting_point *q, const struct path_vertex *y)
+{
+	vec3 in = y->kind == VERTEX_INFINITE ? y->x.p : vec3_normalize(vec3_sub(y->x.p, q->p));
+	double cosine = fmax(vec3_dot(in, q->n), 0), e = 1 / q->eta;
+	return vec3_normalize(vec3_madd(vec3_scale(e, in), sqrt(1 - e * e * (1 - cosine * cosine)) - e * cosine, q->n));
+}
+
+/* Where z is in a denser medium, light that was bent arrives from other directions. */
+static bool guess_bent(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+		       struct path_refraction *out)
+{
+	const struct refracting_end from = {y->x.p, y->kind == VERTEX_INFINITE};
+	const struct refracting_point *by[REFRACTING_RANKED];
+	const uint32_t count = refracting_points_rank(c->w, z->x.p, &from, by);
+	if (count > 0 && cross(c, z, y, bent_at(by[0], y), true, out) && walk(c, z, y, out))
+		return true;
+	for (uint32_t i = 0; i < count; i++)
+		if (cross(c, z, y, vec3_normalize(vec3_sub(by[i]->p, z->x.p)), true, out) && walk(c, z, y, out))
+			return true;
+	return false;
+}
+
+bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
+		     struct path_refraction *out)
+{
+	return guess_straight(c, z, y, out) || guess_bent(c, z, y, out);
 }

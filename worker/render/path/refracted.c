@@ -19,19 +19,10 @@ static const double denser = 8;
 /* Two walks end at the same path if each vertex lies this near, relative to its distance from the one before. */
 static const double same_place = 1e-5;
 
-static bool meets_box(const struct path_context *c, const struct path_vertex *z, const struct path_vertex *y)
-{
-	double distance2;
-	vec3 d = path_direction(z, y, &distance2);
-	return distance2 > 0 &&
-	       box_is_met(&c->w->refracting, z->x.p, d, y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2));
-}
-
 bool path_tries_to_refract(const struct path_context *c, const struct path_vertex *before, const struct path_vertex *z,
 			   const struct path_vertex *y, double toward, spectrum f)
 {
-	return !spectrum_is_zero(f) && meets_box(c, z, y) &&
-	       toward >= denser * path_pdf(c, before, z, y, TRANSPORT_RADIANCE);
+	return !spectrum_is_zero(f) && toward >= denser * path_pdf(c, before, z, y, TRANSPORT_RADIANCE);
 }
 
 double path_pdf_refracted(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,

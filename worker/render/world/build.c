@@ -24,6 +24,7 @@
 #include "worker/render/world/geometry.h"
 #include "worker/render/world/moving.h"
 #include "worker/render/world/node_table.h"
+#include "worker/render/world/refracting.h"
 #include "worker/render/world/smooth_tangents.h"
 #include "worker/render/world/unseen.h"
 #include "worker/render/world/visibility_bounds.h"
@@ -330,9 +331,10 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 					   .reach = of_bsdf};
 	effects_analyse(w, &src, &b->forced, reached);
 	int rc = effects_apply(w, &b->forced, reached, b->e);
-	if (!rc)
-		bound_shadows(b);
-	return rc;
+	if (rc)
+		return rc;
+	bound_shadows(b);
+	return w->effects.refracted_shadows && refracting_points_make(w) < 0 ? build_out_of_memory(b->e) : 0;
 }
 
 /* Everything but Embree: all effects are known before that is built. */

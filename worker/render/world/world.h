@@ -14,6 +14,8 @@
 #include "worker/render/world/box.h"
 #include "worker/render/world/effects.h"
 
+struct refracting_point;
+
 struct world_shape {
 	uint32_t bsdf;
 	int32_t emitter;	     /* -1: not an emitter */
@@ -46,9 +48,11 @@ struct world {
 	struct emitter *emitters;
 	uint32_t media_count, camera_medium; /* the latter a number as those of shapes */
 	struct medium *media;
-	bool has_passable;		     /* some shape is */
-	struct box passed;		     /* around all surfaces that connections may look through; may be empty */
-	struct box refracting;		     /* around all that may refract them; may be empty */
+	bool has_passable;     /* some shape is */
+	struct box passed;     /* around all surfaces that connections may look through; may be empty */
+	struct box refracting; /* around all that may refract them; may be empty */
+	struct refracting_point *refracting_points; /* on these: refracting.h */
+	uint32_t refracting_point_count;
 	uint32_t *emitter_medium;	     /* around emitters whose shapes state none; only where media scatter */
 	uint32_t *emitter_shape;	     /* that it belongs to; UINT32_MAX: none */
 	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */

@@ -151,6 +151,13 @@ static struct tally check(const char *name, struct world *w, unsigned tries)
 #define GLASS "<bsdf type='dielectric'/>"
 #define WEAK "<bsdf type='dielectric'><float name='int_ior' value='1.1'/><float name='ext_ior' value='1'/></bsdf>"
 #define LAMP "<emitter type='area'/>"
+#define SURFACE                                                                                                 \
+	"<shape type='rectangle'><transform name='to_world'><scale value='6'/><rotate x='1' angle='-90'/></transform>" \
+	"<bsdf type='dielectric'><float name='int_ior' value='1.33'/><float name='ext_ior' value='1'/></bsdf></shape>"
+#define WALL                                                                                                    \
+	"<shape type='rectangle'><transform name='to_world'><scale x='6' y='1'/><rotate y='1' angle='-90'/>"          \
+	"<translate x='1.5' y='-1'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
+#define SUN "<emitter type='directional'><vector name='direction' x='-.94' y='-.342' z='0'/></emitter>"
 /* clang-format on */
 
 static void test_lamps(void **state)
@@ -184,6 +191,24 @@ static void test_lamps(void **state)
 				      "</shape><emitter type='directional'><vector name='direction' value='.3,-1,.2'/></emitter>"),
 		400);
 	assert_true(t.found > 200);
+}
+
+/* Under water beside a wall, straight lines to a low sun meet the wall, and refracted ones to the
+ * left of -.5 do not: about a quarter of the points. */
+static void test_around_a_wall(void **state)
+{
+	(void)state;
+	static const char *const between[] = {SURFACE WALL, SURFACE WALL BALL("x='0' y='-1.9' z='0'", ".05", GLASS)};
+	for (size_t i = 0; i < sizeof between / sizeof *between; i++) {
+		struct tally t =
+			check("a pool under a low sun", world_of_text(8, 8, "%s%s%s", FLOOR, between[i], SUN), 400);
+		assert_true(t.found > 80);
+	}
+	/* A point in the air beside a ball of glass, behind a wall. */
+	struct tally t =
+		check("a ball in the air",
+		      world_of_text(8, 8, "%s", FLOOR WALL BALL("x='0' y='-1.5' z='0'", ".4", GLASS) SUN), 400);
+	assert_int_equal(t.found, 0);
 }
 
 /* Light through a ball of glass that brings it to a focus above the floor: points there are joined to the lamp by more
@@ -280,6 +305,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_lamps),
+		cmocka_unit_test(test_around_a_wall),
 		cmocka_unit_test(test_one_of_several),
 		cmocka_unit_test(test_what_lies_between),
 	};

@@ -3,6 +3,7 @@
  * Refracted connections change the noise of an image and not its mean, also where more than one refracted path joins
  * two points and where the walk finds none: the caustic of a ball. Statistics as in tests/support/agree.h, but finding
  * a bias of 3 % of the mean only; if all paths were weighted as those that the walk finds, nearly half would be lost.
+ * Where straight lines are blocked and light bent at a plane passes, it is that of Fresnel's formulas.
  */
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
@@ -32,7 +33,7 @@ static struct world *caustic(const char *effects)
 	return w;
 }
 
-static void test_mean_stays(void **state)
+static void test_caustic(void **state)
 {
 	(void)state;
 	static struct agree_image without, with;
@@ -51,8 +52,42 @@ static void test_mean_stays(void **state)
 	world_free(w);
 }
 
+/* The floor of a pool under a low sun, beside a wall that stands in the way of straight lines to it. Refracted light
+ * passes above it: E cos a T(a) arrives, with Fresnel's T. */
+static void test_pool(void **state)
+{
+	(void)state;
+	static struct agree_image seen;
+	static const char *const integrators[] = {"path", "bdpt"};
+	const double index = 1.33, cosine = 0.342 / hypot(0.94, 0.342),
+		     inside = sqrt(1 - (1 - cosine * cosine) / (index * index));
+	const double s = (cosine - index * inside) / (cosine + index * inside),
+		     p = (inside - index * cosine) / (inside + index * cosine);
+	const double through = 1 - (s * s + p * p) / 2, expected = 0.5 / M_PI * 3 * cosine * through;
+	/* clang-format off */
+	struct world *w = world_of_text(16, 16, "%s",
+		"<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
+		"<sensor type='orthographic'><transform name='to_world'><scale value='.3'/>"
+			"<lookat origin='-1,-.2,0' target='-1,-1,0' up='0,0,1'/></transform></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/>"
+			"<translate y='-1'/></transform><bsdf type='diffuse'/></shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale x='4' y='.45'/><rotate y='1' angle='-90'/>"
+			"<translate x='.5' y='-.55'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/></transform>"
+			"<bsdf type='dielectric'><float name='int_ior' value='1.33'/><float name='ext_ior' value='1'/></bsdf></shape>"
+		"<emitter type='directional'><vector name='direction' x='-.94' y='-.342' z='0'/>"
+			"<float name='irradiance' value='3'/></emitter>");
+	/* clang-format on */
+	const double white = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
+	for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
+		agree_render(w, "pool", integrators[i], &(struct agree_side){integrators[i], 64, 32, 0, 0}, &seen);
+		agree_expect(integrators[i], &seen, expected * white);
+	}
+	world_free(w);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_mean_stays)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_caustic), cmocka_unit_test(test_pool)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Points on refracting surfaces: where they lie, and which come first, against lengths of paths computed in another
+ * way. Deterministic.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/worlds.h"
+#include "worker/render/world/refracting.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
+/* clang-format off */
+#define WATER(eta) "<bsdf type='dielectric'><float name='int_ior' value='" eta "'/><float name='ext_ior' value='1'/></bsdf>"
+#define SURFACE(bsdf)                                                                                                 \
+	"<shape type='rectangle'><transform name='to_world'><scale x='4' y='2'/><rotate x='1' angle='-90'/></transform>"  \
+	bsdf "</shape>"
+#define FLOOR                                                                                                         \
+	"<shape type='rectangle'><transform name='to_world'><scale value='9'/><rotate x='1' angle='-90'/>"                \
+	"<translate y='-3'/></transform><bsdf type='diffuse'/></shape>"
+#define LAMP "<emitter type='point'><point name='position' x='5' y='4' z='3'/></emitter>"
+/* clang-format on */
+
+static struct world *world_with(const char *shapes)
+{
+	return world_of_text(8, 8, "%s%s%s%s", SENSOR("0,1,6", "0,0,0"), FLOOR, LAMP, shapes);
+}
+
+/* In the scene's lengths. */
+static vec3 place(const struct world *w, uint32_t i)
+{
+	return vec3_add(vec3_scale(1 / w->scale, w->refracting_points[i].p), w->center);
+}
+
+static vec3 in_world(const struct world *w, vec3 p)
+{
+	return vec3_scale(w->scale, vec3_sub(p, w->center));
+}
+
+/* The water has an area of 32, the ball one of 4 pi; of 128 points each has its share, and so has each half of the
+ * water and of the ball. */
+static void test_spread(void **state)
+{
+	(void)state;
+	struct world *w = world_with(SURFACE(
+		WATER("1.33")) "<shape type='sphere'><point name='center' x='0' y='4' z='0'/>" WATER("1.5") "</shape>");
+	uint32_t on_water = 0, left = 0, behind = 0, ball_low = 0;
+	assert_int_equal(w->refracting_point_count, 128);
+	for (uint32_t i = 0; i < 128; i++) {
+		const struct refracting_point *q = &w->refracting_points[i];
+		vec3 p = place(w, i), out = vec3_sub(p, (vec3){0, 4, 0});
+		if (fabs(p.y) < 1e-5) {
+			assert_true(fabs(p.x) <= 4 && fabs(p.z) <= 2 && q->n.y > 1 - 1e-6);
+			assert_true(fabs(q->eta - 1.33) < 1e-6);
+			on_water++;
+			left += p.x < 0;
+			behind += p.z < 0;
+		} else {
+			assert_true(fabs(vec3_length(out) - 1) < 1e-5 && vec3_dot(out, q->n) > 1 - 1e-5);
+			assert_true(fabs(q->eta - 1.5) < 1e-6);
+			ball_low += out.y < 0;
+		}
+	}
+	double share = 32 / (32 + 4 * M_PI) * 128;
+	assert_true(fabs(on_water - share) <= 1);
+	assert_true(fabs(left - share / 2) <= 4 && fabs(behind - share / 2) <= 4);
+	assert_true(fabs(ball_low - (128 - share) / 2) <= 3);
+	world_free(w);
+}
+
+/* Of two meshes, a fine one with a hundredth of the area has about a hundredth of the points. */
+static void test_by_area(void **state)
+{
+	(void)state;
+	struct world *w =
+		world_with(SURFACE(WATER("1.33")) "<shape type='sphere'><point name='center' x='0' y='4' "
+						  "z='0'/><float name='radius' value='.16'/>" WATER("1.5") "</shape>");
+	uint32_t on_ball = 0;
+	for (uint32_t i = 0; i < w->refracting_point_count; i++)
+		on_ball += place(w, i).y > 1;
+	assert_true(on_ball <= 2);
+	world_free(w);
+}
+
+static void test_none(void **state)
+{
+	(void)state;
+	struct refracting_end from = {{0, 1, 0}, true};
+	struct world *w = world_with("");
+	assert_int_equal(w->refracting_point_count, 0);
+	const struct refracting_point *by[REFRACTING_RANKED];
+	assert_int_equal(refracting_points_rank(w, (vec3){0, 0, 0}, &from, by), 0);
+	world_free(w);
+	worlds_effects = "-refracted-shadows";
+	w = world_with(SURFACE(WATER("1.33")));
+	worlds_effects = NULL;
+	assert_int_equal(w->refracting_point_count, 0);
+	world_free(w);
+}
+
+static double path_by(const struct refracting_point *q, vec3 z, vec3 from)
+{
+	return q->eta * vec3_length(vec3_sub(z, q->p)) + vec3_length(vec3_sub(from, q->p)) -
+	       vec3_length(vec3_sub(from, z));
+}
+
+/* An end at infinity is one so far away that the direction is the same from everywhere. */
+static void check_soonest(const struct world *w, vec3 z, const struct refracting_end *from)
+{
+	const struct refracting_point *found[REFRACTING_RANKED];
+	vec3 far = from->infinite ? vec3_scale(1e6, from->at) : from->at;
+	assert_int_equal(refracting_points_rank(w, z, from, found), REFRACTING_RANKED);
+	for (uint32_t k = 0; k < REFRACTING_RANKED; k++) {
+		uint32_t sooner = 0;
+		double here = path_by(found[k], z, far);
+		for (uint32_t i = 0; i < w->refracting_point_count; i++)
+			sooner += path_by(&w->refracting_points[i], z, far) < here - 1e-8;
+		assert_true(sooner <= k && (k == 0 || found[k] != found[k - 1]));
+	}
+}
+
+static void test_soonest(void **state)
+{
+	(void)state;
+	struct dice dice = dice_of("soonest");
+	const struct refracting_point *by[REFRACTING_RANKED];
+	/* The second has its normal downwards, and the water as its outside. */
+	static const char *const water[] = {
+		SURFACE(WATER("1.33")),
+		"<shape type='rectangle'><transform name='to_world'><scale x='4' y='2'/><rotate x='1' angle='90'/>"
+		"</transform><bsdf type='dielectric'><float name='int_ior' value='1'/><float name='ext_ior' value='1.33'/>"
+		"</bsdf></shape>"};
+	for (int k = 0; k < 2; k++) {
+		struct world *w = world_with(water[k]);
+		for (int i = 0; i < 200; i++) {
+			vec3 below = {6 * dice_throw(&dice) - 3, -3 * dice_throw(&dice) - 1e-3, dice_throw(&dice)};
+			vec3 lamp = {9 * dice_throw(&dice) - 4, 5 * dice_throw(&dice), 9 * dice_throw(&dice) - 4};
+			vec3 above = {below.x, -below.y, below.z};
+			struct refracting_end near = {in_world(w, lamp), false},
+					      far = {vec3_normalize((vec3){lamp.x, lamp.y + .1, lamp.z}), true};
+			check_soonest(w, in_world(w, below), &near);
+			check_soonest(w, in_world(w, below), &far);
+			assert_int_equal(refracting_points_rank(w, in_world(w, above), &near, by), 0);
+		}
+		world_free(w);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_spread),
+		cmocka_unit_test(test_by_area),
+		cmocka_unit_test(test_none),
+		cmocka_unit_test(test_soonest),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

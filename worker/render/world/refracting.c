@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Spreads points over refracting surfaces by systematic sampling: areas are put end to end, and a point falls on each
+ * multiple of a step. Where on its triangle or sphere it lies, a low-discrepancy sequence says, so that the points of a
+ * large triangle are spread, too. Of a mesh of many triangles, some stand for the others.
+ */
+#include "worker/render/world/refracting.h"
+
+#include "worker/render/world/world.h"
+
+#include <errno.h>
+
+enum {
+	POINTS = 128,
+	TRIANGLES = 1 << 12, /* that stand for a mesh */
+};
+
+/* Points are placed as the area that was passed grows. */
+struct spread {
+	struct world *w;
+	double area, step; /* passed so far; between two points. step 0: areas are only added up */
+};
+
+static double triangle_area(const struct geom_shape *s, struct prim_ref prim)
+{
+	struct surface_point corner[3];
+	for (int k = 0; k < 3; k++)
+		surface_on_triangle(s, prim, k == 1, k == 2, &corner[k]);
+	return vec3_length(vec3_cross(vec3_sub(corner[1].p, corner[0].p), vec3_sub(corner[2].p, corner[0].p))) / 2;
+}
+
+/* The k-th number of Weyl's sequence of that irrational. */
+static double weyl(uint32_t k, double irrational)
+{
+	double x = (k + 0.5) * irrational;
+	return x - floor(x);
+}
+
+/* A point on the primitive. Two irrationals after Roberts: powers of the plastic number. */
+static struct surface_point point_on(const struct geom_shape *s, struct prim_ref prim, uint32_t k)
+{
+	struct surface_point x;
+	double u = weyl(k, 0.7548776662466927), v = weyl(k, 0.5698402909980532);
+	if (s->is_sphere) {
+		double z = 1 - 2 * u, r = sqrt(fmax(0, 1 - z * z));
+		surface_on_sphere(s, prim, (vec3){r * cos(2 * M_PI * v), r * sin(2 * M_PI * v), z}, &x);
+	} else {
+		bool fold = u + v > 1;
+		surface_on_triangle(s, prim, fold ? 1 - u : u, fold ? 1 - v : v, &x);
+	}
+	return x;
+}
+
+static void pass(struct spread *s, double area, struct prim_ref prim)
+{
+	struct world *w = s->w;
+	s->area += area;
+	if (!(s->step > 0))
+		return;
+	while (w->refracting_point_count < POINTS && (w->refracting_point_count + 0.5) * s->step < s->area) {
+		struct refracting_point *to = &w->refracting_points[w->refracting_point_count];
+		struct surface_point x = point_on(&w->shapes[prim.shape], prim, w->refracting_point_count);
+		double eta = w->bsdfs[w->parts[prim.shape].bsdf].eta;
+		*to = (struct refracting_point){x.p, eta < 1 ? vec3_neg(x.ng) : x.ng, fmax(eta, 1 / eta)};
+		w->refracting_point_count++;
+	}
+}
+
+static void pass_shape(struct spread *s, uint32_t i)
+{
+	const struct geom_shape *g = &s->w->shapes[i];
+	struct prim_ref prim = {i, 0, 0.5};
+	if (g->is_sphere) {
+		pass(s, 4 * M_PI * g->radius * g->radius, prim);
+		return;
+	}
+	const uint32_t stride = 1 + (g->triangle_count > 0 ? (g->triangle_count - 1) / TRIANGLES : 0);
+	for (prim.prim = stride / 2; prim.prim < g->triangle_count; prim.prim += stride)
+		pass(s, stride * triangle_area(g, prim), prim);
+}
+
+static void pass_all(struct spread *s)
+{
+	const struct world *w = s->w;
+	s->area = 0;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (!w->shapes[i].curves && bsdf_refracts(&w->bsdfs[w->parts[i].bsdf]))
+			pass_shape(s, i);
+}
+
+int refracting_points_make(struct world *w)
+{
+	struct spread s = {.w = w, .step = 0};
+	w->refracting_point_count = 0;
+	pass_all(&s);
+	if (!(s.area > 0))
+		return 0;
+	w->refracting_points = arena_alloc(&w->arena, POINTS, sizeof *w->refracting_points);
+	if (!w->refracting_points)
+		return -ENOMEM;
+	s.step = s.area / POINTS;
+	pass_all(&s);
+	return 0;
+}
+
+/* Whether z lies in the denser medium behind q. */
+static inline bool is_behind(const struct refracting_point *q, vec3 z)
+{
+	return vec3_dot(vec3_sub(q->p, z), q->n) > 0;
+}
+
+static const struct refracting_point *nearest(const struct world *w, vec3 z)
+{
+	const struct refracting_point *best = NULL;
+	double least = INFINITY;
+	for (uint32_t i = 0; i < w->refracting_point_count; i++) {
+		vec3 d = vec3_sub(w->refracting_points[i].p, z);
+		double square = vec3_dot(d, d);
+		if (square < least) {
+			least = square;
+			best = &w->refracting_points[i];
+		}
+	}
+	return best;
+}
+
+/* The optical path from z by q to where light comes from; at infinity, but for a constant. */
+static double optical_path(const struct refracting_point *q, vec3 z, const struct refracting_end *from)
+{
+	vec3 d = vec3_sub(q->p, z);
+	double inside = q->eta * vec3_length(d);
+	return from->infinite ? inside - vec3_dot(d, from->at) : inside + vec3_length(vec3_sub(from->at, q->p));
+}
+
+uint32_t refracting_points_rank(const struct world *w, vec3 z, const struct refracting_end *from,
+				const struct refracting_point *out[REFRACTING_RANKED])
+{
+	double path[REFRACTING_RANKED];
+	uint32_t count = 0;
+	const struct refracting_point *near = nearest(w, z);
+	if (!near || !is_behind(near, z))
+		return 0;
+	for (uint32_t i = 0; i < w->refracting_point_count; i++) {
+		const struct refracting_point *q = &w->refracting_points[i];
+		double here = is_behind(q, z) ? optical_path(q, z, from) : INFINITY;
+		if (!(here < (count < REFRACTING_RANKED ? INFINITY : path[count - 1])))
+			continue;
+		uint32_t at = count < REFRACTING_RANKED ? count++ : count - 1;
+		for (; at > 0 && here < path[at - 1]; at--) {
+			path[at] = path[at - 1];
+			out[at] = out[at - 1];
+		}
+		path[at] = here;
+		out[at] = q;
+	}
+	return count;
+}
