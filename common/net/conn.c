@@ -50,9 +50,8 @@ struct conn {
 	uint64_t begun, last_read, frame_begun; /* ms of the connection's clock at that time */
 	uint64_t checked;			/* ms of the loop's clock: the next check of the peer's certificate */
 	uint64_t linger_until;			/* 0: not closing */
-	uint64_t paced_at; /* ms of the connection's clock: when the frame last had enough new bytes, and how many then
-			    */
-	size_t paced;
+	uint64_t paced_at; /* ms of the connection's clock: when the frame last had enough new bytes */
+	size_t paced;	   /* how many it had then */
 	int open_handles;
 	struct buf rest; /* plaintext that was read, and waits for the loop to come round; from rest_at on */
 	size_t rest_at;
@@ -122,10 +121,9 @@ static void tick_every(struct conn *c, uint64_t ms)
 /* ---- reading ---- */
 
 /* libuv reads a connection again and again while there is something to read, up to 32 times before any other. Without
- * room it goes on to the next connection. Of a read with thousands of short frames the rest waits likewise
- * (go_on_later): hundreds of connections may send as much at once, and others wait for all of them. What closed
- * connections hold is freed when the loop comes round; until then no requests are read whose answers would need memory,
- * too. */
+ * room it goes on to the next connection. Of a read with thousands of short frames the rest waits likewise (on_later):
+ * hundreds of connections may send as much at once, and others wait for all of them. What closed connections hold is
+ * freed when the loop comes round; until then no requests are taken whose answers would need memory, too. */
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 {
 	(void)suggested;
@@ -328,6 +326,8 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 static void on_later(uv_idle_t *h)
 {
 	struct conn *c = h->data;
+	if (c->config.sending && c->config.sending->leaving)
+		return;
 	c->frames = 0;
 	c->rest_at += take_frames(c, c->rest.bytes + c->rest_at, c->rest.size - c->rest_at);
 	c->goes_on = c->out.state == SEND_OPEN && c->rest_at < c->rest.size;

@@ -350,6 +350,31 @@ static void many_frames_keep_nobody_waiting(void **state)
 	close_ends();
 }
 
+/* While connections that gave way still hold memory, nothing is taken that may need more, read already or not. */
+static void frames_wait_for_memory(void **state)
+{
+	(void)state;
+	enum { FRAMES = 100 };
+	struct send_pool pool = {.limit = 1 << 20};
+	sending = &pool;
+	connect_ends();
+	sending = NULL;
+	for (int i = 0; i < FRAMES; i++)
+		send_bye(&here, 0);
+	while (!there.messages)
+		uv_run(&loop, UV_RUN_ONCE);
+	const int before = there.messages;
+	assert_in_range(before, 1, FRAMES - 1);
+	pool.leaving = 1;
+	for (int i = 0; i < FRAMES; i++)
+		uv_run(&loop, UV_RUN_NOWAIT);
+	assert_int_equal(there.messages, before);
+	pool.leaving = 0;
+	while (there.messages < FRAMES)
+		uv_run(&loop, UV_RUN_ONCE);
+	close_ends();
+}
+
 /* Its bytes are words, and after 0.8 s it is whole; its time is over after 16.5 s: half a second and one for each 64
  * KB. */
 static void a_slow_frame_is_heard(void **state)
@@ -501,13 +526,13 @@ static void a_live_connection_is_checked_again(void **state)
 	assert_int_equal(remove(list), 0);
 }
 
-#define EITHER_WAY                                                                                          \
-	cmocka_unit_test(many_frames_keep_nobody_waiting), cmocka_unit_test(frames_go_both_ways),           \
-		cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close),                    \
-		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(all_are_cut_off_together), \
-		cmocka_unit_test(half_a_frame_is_not_waited_for), cmocka_unit_test(changed_bytes_close),    \
-		cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard),       \
-		cmocka_unit_test(a_late_reader_waits)
+#define EITHER_WAY                                                                                            \
+	cmocka_unit_test(many_frames_keep_nobody_waiting), cmocka_unit_test(frames_wait_for_memory),          \
+		cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive),               \
+		cmocka_unit_test(limits_close), cmocka_unit_test(who_does_not_read_is_cut_off),               \
+		cmocka_unit_test(all_are_cut_off_together), cmocka_unit_test(half_a_frame_is_not_waited_for), \
+		cmocka_unit_test(changed_bytes_close), cmocka_unit_test(silence_is_not_waited_for),           \
+		cmocka_unit_test(a_slow_frame_is_heard), cmocka_unit_test(a_late_reader_waits)
 
 int main(void)
 {
