@@ -131,6 +131,18 @@ static int make_scene(struct maker *m)
 	return r ? r : list_assets(m);
 }
 
+/* Names without a value and files that are not there. */
+static int report_missing(struct maker *m)
+{
+	int r = 0;
+	struct error e;
+	for (uint32_t i = 0; i < m->tree->missing_count && !r; i++)
+		r = report_problem(&m->report, error_set(&e, EINVAL, "%s", m->tree->missing[i]), &e);
+	if (r)
+		*m->error = e;
+	return r;
+}
+
 /* Reads as much as possible; problems are collected in s->problems. */
 static int read_all(struct scene *s, const struct asset_source *assets, const char *name,
 		    const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
@@ -155,9 +167,10 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 				 : gltf_read(m->tree, assets, name, &s->arena, m->error);
 	else
 		r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
-	for (uint32_t i = 0; i < m->tree->missing_count && !r; i++) /* and all else that is wrong */
-		r = report_problem(&m->report, error_set(m->error, EINVAL, "%s", m->tree->missing[i]), m->error);
-	if (r)
+	int told = report_missing(m); /* also where the reading ended early */
+	if (told)
+		r = told;
+	else if (r)
 		r = report_problem(&m->report, r, m->error);
 	else if (!m->tree->blind && (r = make_scene(m)) == REPORT_FULL)
 		r = 0;

@@ -84,6 +84,17 @@ static void test_files_that_are_not_there(void **state)
 	lists(files, false, said);
 }
 
+/* A file that cannot be read to its end says nevertheless what it lacked until then. */
+static void test_files_that_break_off(void **state)
+{
+	(void)state;
+	static const char *const said[] = {"s.xml:1: <include>: gone.xml", "s.xml:2: mismatched tag in <shape>", NULL};
+	static const char *const unset[] = {"s.xml:1: <shape>: attribute `type`: $kind is not defined",
+					    "s.xml:2: the file ends before </scene>", NULL};
+	lists_of(S "<include filename='gone.xml'/>\n<shape type='cube'></scene>", said);
+	lists_of(S "<shape type='$kind'/>\n", unset);
+}
+
 /* Every duplicate and every alias; what an alias would name is not complained of. */
 static void test_ids(void **state)
 {
@@ -133,7 +144,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_names_without_values),	 cmocka_unit_test(test_paths_without_values),
 		cmocka_unit_test(test_files_that_are_not_there), cmocka_unit_test(test_ids),
-		cmocka_unit_test(test_inside_unknown_types),
+		cmocka_unit_test(test_inside_unknown_types),	 cmocka_unit_test(test_files_that_break_off),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
