@@ -50,7 +50,8 @@ struct client {
 	unsigned waiting_count;
 	size_t waiting_bytes;
 	struct tls *tls; /* NULL: plaintext */
-	bool opened, timed_out, distrust;
+	bool opened, timed_out;
+	int distrust; /* as conn_distrust */
 	char name[128], why[256], warning[384], note[256];
 };
 
@@ -176,7 +177,7 @@ void client_message_fini(struct client_message *m)
 
 static int unwelcome(const struct client *cl, const char *host_port, struct error *e)
 {
-	return error_set(e, EACCES, "%s: %s", host_port, cl->why);
+	return error_set(e, -cl->distrust, "%s: %s", host_port, cl->why);
 }
 
 static int say_hello(struct client *cl, const char *host_port, struct error *e)
@@ -304,7 +305,7 @@ int client_exit_code(int rc)
 		return 75;
 	if (rc == -EINVAL || rc == -EPERM)
 		return 2;
-	return rc == -EACCES || rc == -EPROTO ? 6 : 1;
+	return rc == -EACCES || rc == -EKEYEXPIRED || rc == -EPROTO ? 6 : 1;
 }
 
 int client_local(int rc)

@@ -20,7 +20,7 @@ struct client_message { /* fini with client_message_fini */
 
 /* Connects and exchanges hello. tls: a folder (tls.h); NULL or "" means plaintext. -ECONNREFUSED: nobody answers (or
  * not a coordinator), -EPROTO: hello is refused, -EACCES: one side does not accept the other's certificate, or only
- * one uses TLS, -EPERM or -EIO: our own folder is unusable. */
+ * one uses TLS, -EKEYEXPIRED: the same because of its date, -EPERM or -EIO: our own folder is unusable. */
 int client_open(struct client **cl, const char *host_port, const char *tls, bool insecure, const char *name,
 		struct error *e);
 void client_close(struct client *cl);

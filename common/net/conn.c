@@ -57,8 +57,8 @@ struct conn {
 	size_t rest_at;
 	bool goes_on;	 /* the rest, or what the link has: until then nothing is read from the socket */
 	unsigned frames; /* delivered since others were read */
-	bool accepted, sniffed;
-	bool distrust, garbled;
+	bool accepted, sniffed, garbled;
+	int distrust; /* as conn_distrust */
 	char why[256];
 };
 
@@ -274,7 +274,7 @@ static void receive(struct conn *c, const unsigned char *bytes, size_t size)
  * after the socket was closed. */
 static void refuse(struct conn *c, int rc, const char *why)
 {
-	c->distrust = rc == -EACCES;
+	c->distrust = rc == -EACCES || rc == -EKEYEXPIRED ? rc : 0;
 	if (!c->linger_until)
 		text_copy(c->why, sizeof c->why, why);
 	c->linger_until = uv_now(c->tcp.loop) + REFUSED_MS;
@@ -393,10 +393,10 @@ static void check_again(struct conn *c, uint64_t now)
 	    (double)(now - c->checked) < 1000 * tls_recheck_seconds(c->config.tls))
 		return;
 	c->checked = now;
-	if (tls_link_recheck(c->link, &e)) {
-		c->distrust = true;
+	int rc = tls_link_recheck(c->link, &e);
+	c->distrust = rc ? rc : c->distrust;
+	if (rc)
 		conn_close(c, e.text);
-	}
 }
 
 /* Its peer cannot send, and does not know why. */
@@ -564,7 +564,7 @@ const struct tls_peer *conn_peer(const struct conn *c)
 	return c->link && tls_link_is_open(c->link) ? tls_link_peer(c->link) : NULL;
 }
 
-bool conn_distrust(const struct conn *c)
+int conn_distrust(const struct conn *c)
 {
 	return c->distrust;
 }

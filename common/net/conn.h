@@ -55,9 +55,10 @@ void conn_set_quiet(struct conn *c, double seconds);
 void conn_peer_name(const struct conn *c, char *text, size_t size); /* numeric HOST:PORT */
 const struct tls_peer *
 conn_peer(const struct conn *c); /* from its certificate; NULL in plaintext and before the handshake */
-/* In `closed`: whether the connection ended because one side does not accept the other's certificate, or only one
- * uses TLS. A client may be `opened` first and refused afterwards, because the coordinator checks last. */
-bool conn_distrust(const struct conn *c);
+/* In `closed`: 0, or the connection ended because one side does not accept the other's certificate, or only one uses
+ * TLS: -EACCES; -EKEYEXPIRED: by the date, which a new certificate changes, or a clock that is set right. A client may
+ * be `opened` first and refused afterwards, because the coordinator checks last. */
+int conn_distrust(const struct conn *c);
 /* In `closed`: whether it ended because bytes from the peer did not match their checksum. */
 bool conn_garbled(const struct conn *c);
 /* In `closed`: whether it ended because too much waited to be sent to all peers, and this one did not read. */

@@ -26,6 +26,8 @@ enum {
 	ALERT_REASON = 1000, /* OpenSSL's number for the reason of a received alert */
 	ALERT_RECORD = 21,
 	HANDSHAKE_RECORD = 22,
+	BAD_CERTIFICATE = 42,
+	CERTIFICATE_EXPIRED = 45,
 	PROTOCOL_VERSION = 70,
 };
 
@@ -485,10 +487,21 @@ static int refuse(struct error *e, const char *what, int verdict)
 	char clock[64] = "";
 	time_t now = time(NULL);
 	struct tm tm;
-	if (verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED ||
-	    verdict == X509_V_ERR_CRL_NOT_YET_VALID || verdict == X509_V_ERR_CRL_HAS_EXPIRED)
+	bool dated = verdict == X509_V_ERR_CERT_NOT_YET_VALID || verdict == X509_V_ERR_CERT_HAS_EXPIRED ||
+		     verdict == X509_V_ERR_CRL_NOT_YET_VALID || verdict == X509_V_ERR_CRL_HAS_EXPIRED;
+	if (dated)
 		strftime(clock, sizeof clock, " by the clock of this machine, %Y-%m-%dT%H:%M:%SZ", gmtime_r(&now, &tm));
-	return error_set(e, EACCES, "%s: %s%s", what, X509_verify_cert_error_string(verdict), clock);
+	return error_set(e, dated ? EKEYEXPIRED : EACCES, "%s: %s%s", what, X509_verify_cert_error_string(verdict),
+			 clock);
+}
+
+/* The alert says why the peer refuses. OpenSSL sends a bad certificate for one that is not valid yet. */
+static int refused(struct error *e, int alert)
+{
+	bool dated = alert == CERTIFICATE_EXPIRED || alert == BAD_CERTIFICATE;
+	return error_set(e, dated ? EKEYEXPIRED : EACCES, "the peer does not accept this certificate: %s%s",
+			 SSL_alert_desc_string_long(alert),
+			 alert == CERTIFICATE_EXPIRED ? " by the clock of its machine" : "");
 }
 
 /* OpenSSL's error, worded for the person who has to fix it. */
@@ -505,8 +518,7 @@ static int explain(struct tls_link *l, struct error *e)
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert == PROTOCOL_VERSION)
 		return error_set(e, EACCES, "the peer does not speak TLS 1.3: was it started without --tls?");
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert >= 40 && alert < 256)
-		return error_set(e, EACCES, "the peer does not accept this certificate: %s",
-				 SSL_alert_desc_string_long(alert));
+		return refused(e, alert);
 	if (verdict != X509_V_OK)
 		return refuse(e, "the peer's certificate is not accepted", (int)verdict);
 	return error_set(e, EPROTO, "TLS: %s", text ? text : "invalid data on the wire");

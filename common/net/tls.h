@@ -70,7 +70,8 @@ int tls_link_new(struct tls_link **l, struct tls *t, bool listening, struct erro
 void tls_link_free(struct tls_link *l);
 /* Takes bytes from the socket; read until nothing is left before the next call. */
 int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct error *e);
-/* Decrypts: the number of bytes; 0: more are needed. Also performs the handshake; call it once to start. */
+/* Decrypts: the number of bytes; 0: more are needed. Also performs the handshake; call it once to start. -EACCES: one
+ * side does not accept the other's certificate; -EKEYEXPIRED: because of a date, by its clock. */
 ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *e);
 /* After the handshake. Takes all of it; the output grows by as much. */
 int tls_link_write(struct tls_link *l, const void *bytes, size_t size, struct error *e);
@@ -79,7 +80,7 @@ size_t tls_link_output(struct tls_link *l, const unsigned char **bytes);
 void tls_link_output_taken(struct tls_link *l);
 bool tls_link_is_open(const struct tls_link *l);
 const struct tls_peer *tls_link_peer(const struct tls_link *l); /* once the handshake is complete */
-/* Whether the peer's certificate is still valid, by the folder's current files and the clock. */
+/* Whether the peer's certificate is still valid, by the folder's current files and the clock; errors as above. */
 int tls_link_recheck(struct tls_link *l, struct error *e);
 
 /* The alert for a peer that uses TLS on a port without it. */

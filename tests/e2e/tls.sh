@@ -230,10 +230,33 @@ until_true 5 week_greets 2 || fail "the worker does not come back with the new o
 "$BIN/hslt-job" $week release j1 2>>"$DIR/submit.log" || fail "release: $?"
 until_true 60 "$BIN/hslt-job" $week fetch j1 -o "$DIR/rotated.exr" 2>>"$DIR/submit.log" || fail "the job does not end"
 same "$DIR/alone2.exr" "$DIR/rotated.exr"
+row "a certificate that was renewed in time" "let in" "no restart, equal bits"
+
+# Who waits for an image while the own certificate expires is refused until there is a new one, and then gets it.
+week_says() {
+	grep -q "$1" "$DIR/week.log"
+}
+week_is_refused() {
+	[ "$(grep -c 'event=peer_refused.*expired' "$DIR/week.log")" -ge $((refusals + 2)) ]
+}
+refusals=$(grep -c 'event=peer_refused.*expired' "$DIR/week.log")
+ca client slow --days 0.00012
+"$BIN/hslt-submit" ${week%ann}slow "$BOX" -o "$DIR/waited.exr" $chains --wait >>"$DIR/id" 2>"$DIR/waited.log" &
+waits=$!
+PIDS="$PIDS $waits"
+until_true 8 week_says 'event=job_state job=j2' || fail "the second job does not come"
+"$BIN/hslt-job" ${week%ann}slow hold j2 2>>"$DIR/submit.log" || fail "hold: $?"
+until_true 30 week_is_refused || fail "the expired client stays, or does not come again: $(cat "$DIR/waited.log")"
+ca client slow --renew
+"$BIN/hslt-job" ${week%ann}slow release j2 2>>"$DIR/submit.log" || fail "release: $?"
+CODE=0
+wait "$waits" || CODE=$?
+[ $CODE -eq 0 ] || fail "who waited ends with $CODE: $(cat "$DIR/waited.log")"
+same "$DIR/alone2.exr" "$DIR/waited.exr"
+row "a client whose certificate expires while it waits" "let in" "after it was renewed, equal bits"
 kill -9 "$WORKER"
 export HSLT_CA="$CA"
-row "a certificate that was renewed in time" "let in" "no restart, equal bits"
-ROWS=$((ROWS - 1))
+ROWS=$((ROWS - 2))
 
 # The other way round: TLS to a port without; and only a coordinator can be one.
 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port2" --spool "$DIR/spool2" --status-socket "$DIR/status2" --tls "" \

@@ -52,7 +52,8 @@ struct end {
 	struct conn *conn;
 	int messages, closed, drained, partial;
 	size_t payload;
-	bool distrust, garbled, gave_way;
+	bool garbled, gave_way;
+	int distrust;
 	struct tls_peer peer; /* who the other one was when a message came */
 	char why[128];
 };
@@ -473,7 +474,7 @@ static void one_sided(bool caller_speaks)
 	while (!here.closed || !there.closed)
 		uv_run(&loop, UV_RUN_ONCE);
 	assert_true(!strstr(here.why, "in time") && !strstr(there.why, "in time"));
-	assert_true(here.distrust && there.distrust && !here.messages && !there.messages);
+	assert_true(here.distrust == -EACCES && there.distrust == -EACCES && !here.messages && !there.messages);
 	assert_non_null(strstr(here.why, "TLS"));
 	assert_non_null(strstr(there.why, "TLS"));
 	close_ends();
@@ -519,11 +520,38 @@ static void a_live_connection_is_checked_again(void **state)
 	assert_int_equal(tls_refresh(listening, &e), 1);
 	while (!there.closed)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_true(there.distrust);
+	assert_int_equal(there.distrust, -EACCES);
 	assert_non_null(strstr(there.why, "revoked"));
 	close_ends();
 	snprintf(list, sizeof list, "%s/farm/crl.pem", folder);
 	assert_int_equal(remove(list), 0);
+}
+
+/* Who is refused because of a date is told apart from who is refused for good: at the handshake, and later. */
+static void a_date_is_told_apart(void **state)
+{
+	(void)state;
+	char path[128];
+	struct error e;
+	struct tls *t = calling;
+	snprintf(path, sizeof path, "%s/brief", folder);
+	assert_int_equal(authority_issue(folder, "brief", TLS_WORKER, 2.0 / 86400, false, &e), 0);
+	assert_int_equal(tls_open(&calling, path, &e), 0);
+	tls_set_recheck(listening, 0.3);
+	for (int i = 0; i < 2; i++) { /* connected while it expires, unless the machine stands still; then too late */
+		connect_ends();
+		send_bye(&here, 1);
+		while (!there.closed)
+			uv_run(&loop, UV_RUN_ONCE);
+		assert_int_equal(there.distrust, -EKEYEXPIRED);
+		assert_non_null(strstr(there.why, "expired"));
+		while (i && !here.closed)
+			uv_run(&loop, UV_RUN_ONCE);
+		assert_true(!i || here.distrust == -EKEYEXPIRED);
+		close_ends();
+	}
+	tls_close(calling);
+	calling = t;
 }
 
 #define EITHER_WAY                                                                                            \
@@ -537,9 +565,9 @@ static void a_live_connection_is_checked_again(void **state)
 int main(void)
 {
 	const struct CMUnitTest plain[] = {cmocka_unit_test(addresses), EITHER_WAY};
-	const struct CMUnitTest encrypted[] = {EITHER_WAY, cmocka_unit_test(only_one_speaks_it),
-					       cmocka_unit_test(silence_is_no_handshake),
-					       cmocka_unit_test(a_live_connection_is_checked_again)};
+	const struct CMUnitTest encrypted[] = {
+		EITHER_WAY, cmocka_unit_test(only_one_speaks_it), cmocka_unit_test(silence_is_no_handshake),
+		cmocka_unit_test(a_date_is_told_apart), cmocka_unit_test(a_live_connection_is_checked_again)};
 	int failed = cmocka_run_group_tests(plain, without_tls, NULL);
 	return failed + cmocka_run_group_tests(encrypted, with_tls, end_tls);
 }

@@ -28,7 +28,8 @@ static int try_once(struct client *cl, const struct submitted *job, const char *
 	return rc;
 }
 
-/* Connects again and again until somebody answers. */
+/* Connects again and again until somebody answers. Who was let in before may be so again when a certificate that has
+ * expired meanwhile is renewed, or a clock is set right. */
 static int call_again(struct client **cl, const struct reconnect *o, struct error *e)
 {
 	double gone = clock_seconds(), pause = first_pause;
@@ -38,7 +39,7 @@ static int call_again(struct client **cl, const struct reconnect *o, struct erro
 		rest(pause < left ? pause : left > 0 ? left : 0);
 		pause = 2 * pause < longest_pause ? 2 * pause : longest_pause;
 		rc = client_open(cl, o->coordinator, o->tls, o->insecure, "hslt-submit", e);
-	} while (is_gone(rc) && clock_seconds() - gone < o->patience);
+	} while ((is_gone(rc) || rc == -EKEYEXPIRED) && clock_seconds() - gone < o->patience);
 	return rc;
 }
 
@@ -57,6 +58,11 @@ int reconnect_job(struct client **cl, const struct reconnect *o, const struct su
 				"no coordinator at %s for %g s. The job is in its spool and continues when it is back: hslt-job "
 				"fetch j%llu -o %s",
 				o->coordinator, o->patience, (unsigned long long)job->job, output);
+		if (rc == -EKEYEXPIRED) {
+			struct error why = *e;
+			return error_set(e, EKEYEXPIRED, "%s. The job continues: hslt-job fetch j%llu -o %s", why.text,
+					 (unsigned long long)job->job, output);
+		}
 		if (rc)
 			break;
 	}

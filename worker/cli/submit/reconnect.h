@@ -15,8 +15,8 @@ struct reconnect {
 };
 
 /* Waits for the job's end and fetches its result, if there is one, into `output`. *cl may be another connection
- * afterwards, or NULL. -ECONNREFUSED: nobody answered for longer than `patience`; the sentence says how to get the
- * image later. -ESTALE: another job has its number. */
+ * afterwards, or NULL. -ECONNREFUSED: nobody answered for longer than `patience`; -EKEYEXPIRED: a certificate had
+ * expired for as long; the sentence says how to get the image later. -ESTALE: another job has its number. */
 int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted *job, const char *output,
 		  struct submit_end *end, struct error *e);
 
