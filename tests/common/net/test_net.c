@@ -567,7 +567,7 @@ int main(void)
 	const struct CMUnitTest plain[] = {cmocka_unit_test(addresses), EITHER_WAY};
 	const struct CMUnitTest encrypted[] = {
 		EITHER_WAY, cmocka_unit_test(only_one_speaks_it), cmocka_unit_test(silence_is_no_handshake),
-		cmocka_unit_test(a_date_is_told_apart), cmocka_unit_test(a_live_connection_is_checked_again)};
+		cmocka_unit_test(a_live_connection_is_checked_again), cmocka_unit_test(a_date_is_told_apart)};
 	int failed = cmocka_run_group_tests(plain, without_tls, NULL);
 	return failed + cmocka_run_group_tests(encrypted, with_tls, end_tls);
 }
