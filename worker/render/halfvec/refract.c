@@ -50,6 +50,7 @@ static bool cross(struct path_context *c, const struct path_vertex *z, const str
 	}
 	return false;
 }
+
 /* Moves the guess to where light is refracted. */
 static bool walk(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		 struct path_refraction *out)
@@ -90,7 +91,9 @@ static bool guess_straight(struct path_context *c, const struct path_vertex *z, 
 /* The direction from z in which light from y would arrive behind a plane through q: Snell's law. */
 static vec3 bent_at(const struct refracting_point *q, const struct path_vertex *y)
 {
-	vec3 in = y->kind == VERTEX_INFINITE ? y->x.p : vec3_normalize(vec3_sub(y->x.p, q->p));
+	vec3 in = y->kind == VERTEX_INFINITE ? y->x.p : vec3_sub(y->x.p, q->p);
+	double length = vec3_length(in);
+	in = length > 0 ? vec3_scale(1 / length, in) : q->n;
 	double cosine = fmax(vec3_dot(in, q->n), 0), e = 1 / q->eta;
 	return vec3_normalize(vec3_madd(vec3_scale(e, in), sqrt(1 - e * e * (1 - cosine * cosine)) - e * cosine, q->n));
 }
@@ -113,5 +116,7 @@ static bool guess_bent(struct path_context *c, const struct path_vertex *z, cons
 bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		     struct path_refraction *out)
 {
-	return guess_straight(c, z, y, out) || guess_bent(c, z, y, out);
+	double distance2;
+	path_direction(z, y, &distance2);
+	return distance2 > 0 && (guess_straight(c, z, y, out) || guess_bent(c, z, y, out));
 }

@@ -2,7 +2,7 @@
 /*
  * Spreads points over refracting surfaces by systematic sampling: areas are put end to end, and a point falls on each
  * multiple of a step. Where on its triangle or sphere it lies, a low-discrepancy sequence says, so that the points of a
- * large triangle are spread, too. Of a mesh of many triangles, some stand for the others.
+ * large triangle are spread, too. Of meshes with many triangles, some stand for the others.
  */
 #include "worker/render/world/refracting.h"
 
@@ -12,13 +12,15 @@
 
 enum {
 	POINTS = 128,
-	TRIANGLES = 1 << 12, /* that stand for a mesh */
+	TRIANGLES = 1 << 16,	  /* that stand for all meshes, */
+	TRIANGLES_LEAST = 1 << 4, /* and for one */
 };
 
 /* Points are placed as the area that was passed grows. */
 struct spread {
 	struct world *w;
-	double area, step; /* passed so far; between two points. step 0: areas are only added up */
+	double area, step;  /* passed so far; between two points. step 0: areas are only added up */
+	uint32_t triangles; /* that may stand for a mesh */
 };
 
 static double triangle_area(const struct geom_shape *s, struct prim_ref prim)
@@ -74,24 +76,33 @@ static void pass_shape(struct spread *s, uint32_t i)
 		pass(s, 4 * M_PI * g->radius * g->radius, prim);
 		return;
 	}
-	const uint32_t stride = 1 + (g->triangle_count > 0 ? (g->triangle_count - 1) / TRIANGLES : 0);
+	const uint32_t stride = 1 + (g->triangle_count > 0 ? (g->triangle_count - 1) / s->triangles : 0);
 	for (prim.prim = stride / 2; prim.prim < g->triangle_count; prim.prim += stride)
 		pass(s, stride * triangle_area(g, prim), prim);
 }
 
+static bool refracts(const struct world *w, uint32_t shape)
+{
+	return !w->shapes[shape].curves && bsdf_refracts(&w->bsdfs[w->parts[shape].bsdf]);
+}
+
 static void pass_all(struct spread *s)
 {
-	const struct world *w = s->w;
 	s->area = 0;
-	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (!w->shapes[i].curves && bsdf_refracts(&w->bsdfs[w->parts[i].bsdf]))
+	for (uint32_t i = 0; i < s->w->shape_count; i++)
+		if (refracts(s->w, i))
 			pass_shape(s, i);
 }
 
 int refracting_points_make(struct world *w)
 {
 	struct spread s = {.w = w, .step = 0};
-	w->refracting_point_count = 0;
+	uint32_t shapes = 0;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		shapes += refracts(w, i);
+	if (!shapes)
+		return 0;
+	s.triangles = TRIANGLES / shapes > TRIANGLES_LEAST ? TRIANGLES / shapes : TRIANGLES_LEAST;
 	pass_all(&s);
 	if (!(s.area > 0))
 		return 0;
