@@ -229,7 +229,7 @@ bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 # build/equal-time.png, the pictures of the README: eight processor seconds each, about seven minutes of one core.
 .PHONY: row
 row: programs
-	python3 tests/bench/row.py $(BUILD) $(BUILD)/equal-time.png 8 6
+	python3 tests/bench/row.py $(BUILD) $(BUILD)/equal-time.png 9 5
 
 # Stated errors against true ones: about an hour of one core. CALIBRATION="--renders 8 --lengths 2" for less.
 CALIBRATION_SRC := $(filter-out tests/image/test_%.c,$(wildcard tests/image/*.c))
