@@ -67,6 +67,11 @@ static void test_spread(void **state)
 	assert_true(fabs(on_water - share) <= 1);
 	assert_true(fabs(left - share / 2) <= 4 && fabs(behind - share / 2) <= 4);
 	assert_true(fabs(ball_low - (128 - share) / 2) <= 3);
+	/* In front of the ball, although its other side is turned away. */
+	const struct refracting_point *by[REFRACTING_RANKED];
+	const struct refracting_end from = {{0, 1, 0}, true};
+	assert_int_equal(refracting_points_rank(w, in_world(w, (vec3){0, 2.5, 0}), &from, by), 0);
+	assert_int_equal(refracting_points_rank(w, in_world(w, (vec3){0, 4, 0}), &from, by), REFRACTING_RANKED);
 	world_free(w);
 }
 
