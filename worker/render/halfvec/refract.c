@@ -24,21 +24,26 @@ static bool leaves_denser(const struct path_vertex *v, vec3 d)
 	return (vec3_dot(d, v->x.ng) > 0) == (v->bsdf->eta > 1);
 }
 
-/* A first guess of what lies between z and y, the nearest to z first: surfaces on a line from z along d, or y at the
- * end of it, and behind the first of them straight to y. inside: z is in the denser medium, so light leaves it at the
- * first. false: something that does not refract, or nothing. */
-static bool cross(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d, bool inside,
-		  struct path_refraction *out)
+/* The direction from `from` to y; returns the distance. */
+static double toward(const struct path_vertex *from, const struct path_vertex *y, vec3 *d)
+{
+	double distance2;
+	*d = path_direction(from, y, &distance2);
+	return y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2);
+}
+
+/* A first guess of what lies between z and y, the nearest to z first: surfaces on a line from z along d, no further
+ * than at `end`, and behind the first of them straight to y. inside: z is in the denser medium, so light leaves it at
+ * the first. false: something that does not refract, or nothing. */
+static bool cross(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d, double end,
+		  bool inside, struct path_refraction *out)
 {
 	const struct path_vertex *from = z;
-	double distance2;
-	path_direction(z, y, &distance2);
 	out->count = 0;
 	while (out->count < PATH_REFRACTED_MOST) {
 		struct path_vertex *v = &out->v[out->count];
-		bool ends = y->kind != VERTEX_INFINITE && !(inside && from == z);
-		if (!path_extend(c, from, d, 0, ends ? sqrt(distance2) : INFINITY, v) || v->kind != VERTEX_SURFACE ||
-		    !bsdf_refracts(v->bsdf) || (inside && from == z && !leaves_denser(v, d)))
+		if (!path_extend(c, from, d, 0, end, v) || v->kind != VERTEX_SURFACE || !bsdf_refracts(v->bsdf) ||
+		    (inside && from == z && !leaves_denser(v, d)))
 			return false;
 		v->delta = true;
 		v->mode = BSDF_TRANSMIT | BSDF_DELTA;
@@ -46,7 +51,7 @@ static bool cross(struct path_context *c, const struct path_vertex *z, const str
 		if (path_visible(c, v, y))
 			return true;
 		from = v;
-		d = path_direction(v, y, &distance2);
+		end = toward(v, y, &d);
 	}
 	return false;
 }
@@ -79,15 +84,6 @@ static bool walk(struct path_context *c, const struct path_vertex *z, const stru
 	return fabs(out->log_transfer) < LOG_TRANSFER_MOST;
 }
 
-static bool guess_straight(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
-			   struct path_refraction *out)
-{
-	double distance2;
-	vec3 d = path_direction(z, y, &distance2);
-	return box_is_met(&c->w->refracting, z->x.p, d, y->kind == VERTEX_INFINITE ? INFINITY : sqrt(distance2)) &&
-	       cross(c, z, y, d, false, out) && walk(c, z, y, out);
-}
-
 /* The direction from z in which light from y would arrive behind a plane through q: Snell's law. */
 static vec3 bent_at(const struct refracting_point *q, const struct path_vertex *y)
 {
@@ -98,6 +94,12 @@ static vec3 bent_at(const struct refracting_point *q, const struct path_vertex *
 	return vec3_normalize(vec3_madd(vec3_scale(e, in), sqrt(1 - e * e * (1 - cosine * cosine)) - e * cosine, q->n));
 }
 
+static bool guess(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y, vec3 d,
+		  struct path_refraction *out)
+{
+	return cross(c, z, y, d, INFINITY, true, out) && walk(c, z, y, out);
+}
+
 /* Where z is in a denser medium, light that was bent arrives from other directions. */
 static bool guess_bent(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		       struct path_refraction *out)
@@ -105,10 +107,10 @@ static bool guess_bent(struct path_context *c, const struct path_vertex *z, cons
 	const struct refracting_end from = {y->x.p, y->kind == VERTEX_INFINITE};
 	const struct refracting_point *by[REFRACTING_RANKED];
 	const uint32_t count = refracting_points_rank(c->w, z->x.p, &from, by);
-	if (count > 0 && cross(c, z, y, bent_at(by[0], y), true, out) && walk(c, z, y, out))
+	if (count > 0 && guess(c, z, y, bent_at(by[0], y), out))
 		return true;
 	for (uint32_t i = 0; i < count; i++)
-		if (cross(c, z, y, vec3_normalize(vec3_sub(by[i]->p, z->x.p)), true, out) && walk(c, z, y, out))
+		if (guess(c, z, y, vec3_normalize(vec3_sub(by[i]->p, z->x.p)), out))
 			return true;
 	return false;
 }
@@ -116,7 +118,11 @@ static bool guess_bent(struct path_context *c, const struct path_vertex *z, cons
 bool halfvec_refract(struct path_context *c, const struct path_vertex *z, const struct path_vertex *y,
 		     struct path_refraction *out)
 {
-	double distance2;
-	path_direction(z, y, &distance2);
-	return distance2 > 0 && (guess_straight(c, z, y, out) || guess_bent(c, z, y, out));
+	vec3 d;
+	const double end = toward(z, y, &d);
+	if (!(end > 0))
+		return false;
+	if (box_is_met(&c->w->refracting, z->x.p, d, end) && cross(c, z, y, d, end, false, out) && walk(c, z, y, out))
+		return true;
+	return guess_bent(c, z, y, out);
 }
