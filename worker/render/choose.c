@@ -21,33 +21,20 @@
 #include "worker/render/path/integrate_bdpt.h"
 #include "worker/render/path/integrate_path.h"
 #include "worker/render/path/integrator.h"
+#include "worker/render/pilot.h"
 #include "worker/render/rare_light.h"
 
 #include <stdio.h>
 #include <string.h>
 
 enum {
-	SAMPLES_LEAST = 1 << 12,
-	SAMPLES_USUAL = 1 << 14, /* fewer estimate the tail worse: tests/bench/choices.md, "What the pilot chooses" */
-	SAMPLES_LONG = 1 << 18,
-	SAMPLES_MOST = 1 << 20,
-	SHARE_SHORT = 32,  /* a pilot has 1/32 of the samples of the render, of each kind, up to SAMPLES_USUAL */
-	SHARE_LONG = 128,  /* 1/128 from there to SAMPLES_LONG: the pilot has one thread, the render may have many */
-	SHARE_HOURS = 512, /* 1/512 beyond */
-	A_SECOND = 100000, /* assumed samples a second, for a render bounded by time */
-	SHORTER = 4,	   /* bdpt takes 1/4 of its samples first */
-	IN_PIXEL = 16,	   /* consecutive samples in one pixel */
-	MERGED = 4,	   /* merging has 1/4 of the samples, within the two bounds below */
+	SHORTER = 4,   /* bdpt takes 1/4 of its samples first */
+	IN_PIXEL = 16, /* consecutive samples in one pixel */
+	MERGED = 4,    /* merging has 1/4 of the samples, within the two bounds below */
 	MERGED_LEAST = 1 << 12,
 	MERGED_MOST = 1 << 16, /* photons take memory */
 	BESIDE = 128,	       /* at most 1/128 as many splats as samples are compared with their pixels */
 	DROPPED = 1 << 12,     /* the variance leaves out the largest terms, one for 4,096 samples */
-	STREAM_MAP = 0,
-	STREAM_PATH,
-	STREAM_BDPT,
-	STREAM_PIXEL,
-	STREAM_BESIDE,
-	STREAM_MERGED, /* uses the next number, too; these are steps of RNG_CHOICE */
 };
 
 /* If path finds a larger share of rare light, or a smaller tail index (no finite mean), chains may be needed. */
@@ -297,7 +284,7 @@ static const double *pixel_block(struct sampler *base, enum sampler_side side, u
 static int make_map(struct pilot *p, bool misses, struct error *e)
 {
 	return brightness_of_samples(&p->map, &p->context, misses ? path_trace_candidates : path_trace, p->seed,
-				     RNG_CHOICE, STREAM_MAP, p->samples, e);
+				     RNG_CHOICE, PILOT_MAP, p->samples, e);
 }
 
 /* One sample of the pixel in that column and row of the window. */
@@ -327,7 +314,7 @@ static double held_against_its_pixel(struct pilot *p, const struct splat *s, dou
 	double mean = 0;
 	p->context.counters = p->uncounted;
 	for (unsigned k = 0; k < IN_PIXEL; k++) {
-		trace_pixel(p, at, p->besides * IN_PIXEL + k, STREAM_BESIDE, path_trace, &p->beside);
+		trace_pixel(p, at, p->besides * IN_PIXEL + k, PILOT_BESIDE, path_trace, &p->beside);
 		for (uint32_t i = 0; i < p->beside.count; i++)
 			mean += relative(p, &p->beside.splats[i]) / IN_PIXEL;
 	}
@@ -362,7 +349,7 @@ static struct render_found look_on(struct pilot *p, uint64_t stream, uint64_t fi
 	for (uint64_t i = first / IN_PIXEL; i < end / IN_PIXEL; i++) {
 		double u[4];
 		tick();
-		rng_uniform4(p->seed, RNG_CHOICE, i, STREAM_PIXEL, stream, u); /* pixels of its own */
+		rng_uniform4(p->seed, RNG_CHOICE, i, PILOT_PIXEL, stream, u); /* pixels of its own */
 		const double at[2] = {floor(u[0] * w->width), floor(u[1] * w->height)};
 		struct film_window pixel = {w->x + at[0], w->y + at[1], 1, 1};
 		for (unsigned k = 0; k < IN_PIXEL; k++) {
@@ -387,7 +374,7 @@ static struct tally begin_look(struct pilot *p)
 static void look_at_path(struct pilot *p, struct render_choice *out)
 {
 	struct tally t = begin_look(p);
-	out->path = look_on(p, STREAM_PATH, 0, p->samples, path_trace, &t);
+	out->path = look_on(p, PILOT_PATH, 0, p->samples, path_trace, &t);
 	p->path_mean = t.energy / t.samples;
 	out->samples += p->samples;
 }
@@ -396,11 +383,11 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 {
 	struct tally t = begin_look(p);
 	uint64_t few = p->samples / SHORTER;
-	out->bdpt = look_on(p, STREAM_BDPT, 0, few, path_trace_candidates, &t);
+	out->bdpt = look_on(p, PILOT_BDPT, 0, few, path_trace_candidates, &t);
 	out->samples += few;
 	if (is_clear(out))
 		return;
-	out->bdpt = look_on(p, STREAM_BDPT, few, p->samples, path_trace_candidates, &t);
+	out->bdpt = look_on(p, PILOT_BDPT, few, p->samples, path_trace_candidates, &t);
 	out->found = t.energy > 0 ? p->path_mean / (t.energy / t.samples) : 0;
 	out->samples += p->samples - few;
 }
@@ -414,49 +401,8 @@ static int look_at_merged(struct pilot *p, struct render_choice *out)
 		return 0;
 	out->samples += n;
 	p->context.counters = p->uncounted;
-	int rc = rare_light(&p->context, &p->map, p->seed, STREAM_MERGED, n, &out->merged);
+	int rc = rare_light(&p->context, &p->map, p->seed, PILOT_MERGED, n, &out->merged);
 	p->context.counters = p->counters;
-	return rc;
-}
-
-/* The nearest power of two, so that nearly equal renders have equal pilots. Of a render that is given in time, what
- * that would make on a usual machine, never a measurement: the choice is the same everywhere. The usual pilot where
- * only an error is asked for. */
-static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
-{
-	uint64_t total = UINT64_MAX, n = SAMPLES_LEAST;
-	if (r->spp && r->spp < UINT64_MAX / pixels)
-		total = r->spp * pixels;
-	if (r->mutations && r->mutations < total)
-		total = r->mutations;
-	if (r->seconds > 0)
-		total = (uint64_t)fmin((double)total, fmin(r->seconds * A_SECOND, 0x1p62));
-	else if (!r->spp && !r->mutations)
-		total = (uint64_t)SAMPLES_USUAL * SHARE_SHORT;
-	double share = fmax(fmin((double)(total / SHARE_SHORT), SAMPLES_USUAL),
-			    fmax(fmin((double)(total / SHARE_LONG), SAMPLES_LONG), (double)(total / SHARE_HOURS)));
-	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < share)
-		n *= 2;
-	return n;
-}
-
-/* The film and the random numbers of the render, checked as it will be; then all of the film, so that a crop is
- * rendered by what the whole is rendered by and has its pixels. */
-static int film_of(const struct plan_request *r, struct plan *p, struct error *e)
-{
-	struct plan_request of = *r;
-	memset(of.integrator, 0, sizeof of.integrator);
-	memset(of.mixture, 0, sizeof of.mixture);
-	snprintf(of.integrator, sizeof of.integrator, "path");
-	of.kind = PLAN_SAMPLES;
-	of.chains = 0;
-	of.groups = of.parts = 1;
-	if (!plan_request_is_bounded(&of)) /* estimates what errors will cost */
-		of.spp = 1;
-	int rc = plan_make(&of, p, e);
-	p->crop_x = p->crop_y = 0;
-	p->crop_width = p->width;
-	p->crop_height = p->height;
 	return rc;
 }
 
@@ -540,7 +486,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 	*out = (struct render_choice){.path = render_found_none, .bdpt = render_found_none};
 	world_summary(w, &summary);
 	find_lobes(w, &summary, out);
-	int rc = film_of(r, &film, e);
+	int rc = pilot_film(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
 	if (!rc && !p)
 		rc = error_set(e, ENOMEM, "no memory for a pilot");
@@ -548,7 +494,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 		p->w = w;
 		p->seed = r->seed;
 		p->samples = pilot_samples(r, (uint64_t)film.crop_width * film.crop_height);
-		out->brief = p->samples < SAMPLES_USUAL;
+		out->brief = p->samples < PILOT_SAMPLES;
 		out->misses = path_misses(w);
 		out->media_shine = w->effects.medium_light;
 		rc = run_pilot(p, &film, out, e);
